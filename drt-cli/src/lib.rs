@@ -1,0 +1,1 @@
+//! Scene, job and image files for drt, and the drt command

@@ -1,0 +1,1 @@
+//! Volumetric path tracing and its path-space derivatives

@@ -1,0 +1,1 @@
+//! Triangle meshes, topology, watertight f64 ray queries and procedural shapes

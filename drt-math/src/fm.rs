@@ -1,0 +1,91 @@
+//! Elementary functions of `f64`, from `std` or, without it (or when `libm` is asked for), from
+//! the `libm` crate. Everything above calls these, so that one switch decides for the family.
+
+macro_rules! unary {
+    ($($(#[$doc:meta])* $name:ident = $libm:ident),* $(,)?) => {$(
+        $(#[$doc])*
+        #[inline]
+        #[must_use]
+        pub fn $name(x: f64) -> f64 {
+            #[cfg(not(feature = "libm"))]
+            { x.$name() }
+            #[cfg(feature = "libm")]
+            { libm::$libm(x) }
+        }
+    )*};
+}
+
+unary! {
+    /// Square root.
+    sqrt = sqrt,
+    /// Cube root.
+    cbrt = cbrt,
+    /// e to the x.
+    exp = exp,
+    /// e to the x, less one, accurate near zero.
+    exp_m1 = expm1,
+    /// Natural logarithm.
+    ln = log,
+    /// ln(1 + x), accurate near zero.
+    ln_1p = log1p,
+    /// Sine.
+    sin = sin,
+    /// Cosine.
+    cos = cos,
+    /// Tangent.
+    tan = tan,
+    /// Arc sine.
+    asin = asin,
+    /// Arc cosine.
+    acos = acos,
+    /// Arc tangent.
+    atan = atan,
+    /// Largest integer not above x.
+    floor = floor,
+    /// Smallest integer not below x.
+    ceil = ceil,
+    /// Nearest integer, halves away from zero.
+    round = round,
+}
+
+/// Angle of the point (x, y) from the x axis, in (-pi, pi].
+#[inline]
+#[must_use]
+pub fn atan2(y: f64, x: f64) -> f64 {
+    #[cfg(not(feature = "libm"))]
+    {
+        y.atan2(x)
+    }
+    #[cfg(feature = "libm")]
+    {
+        libm::atan2(y, x)
+    }
+}
+
+/// x to the power y.
+#[inline]
+#[must_use]
+pub fn powf(x: f64, y: f64) -> f64 {
+    #[cfg(not(feature = "libm"))]
+    {
+        x.powf(y)
+    }
+    #[cfg(feature = "libm")]
+    {
+        libm::pow(x, y)
+    }
+}
+
+/// Sine and cosine together.
+#[inline]
+#[must_use]
+pub fn sin_cos(x: f64) -> (f64, f64) {
+    #[cfg(not(feature = "libm"))]
+    {
+        x.sin_cos()
+    }
+    #[cfg(feature = "libm")]
+    {
+        libm::sincos(x)
+    }
+}

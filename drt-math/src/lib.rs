@@ -1,0 +1,31 @@
+//! Scalars, forward duals, vectors, sampling and statistics: the ground every other `drt` crate
+//! stands on, and useful alone.
+//!
+//! Conventions: vectors are columns, frames are right-handed, angles are radians, and every
+//! generic item works for `f64` and for [`Dual`] numbers alike through the [`Real`] trait.
+#![cfg_attr(not(feature = "std"), no_std)]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+#[cfg(not(any(feature = "std", feature = "libm")))]
+compile_error!("drt-math needs elementary functions: enable the feature `std` or `libm`");
+
+mod affine;
+mod dual;
+pub mod fm;
+mod frame;
+mod mat3;
+mod real;
+mod rgb;
+mod rng;
+mod vec3;
+
+pub use affine::Affine;
+pub use dual::Dual;
+pub use frame::Frame;
+pub use mat3::Mat3;
+pub use real::Real;
+pub use rgb::{Rgb, RgbVec};
+pub use rng::Rng;
+pub use vec3::{Vec3, vec3};

@@ -1,0 +1,121 @@
+use core::ops::{Add, Mul};
+
+use crate::{Real, Vec3, vec3};
+
+/// A 3×3 matrix, stored by columns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Mat3<T = f64> {
+    /// The columns.
+    pub cols: [Vec3<T>; 3],
+}
+
+impl Mat3 {
+    /// The zero matrix.
+    pub const ZERO: Self = Self { cols: [Vec3::ZERO; 3] };
+    /// The unit matrix.
+    pub const IDENTITY: Self = Self { cols: [Vec3::X, Vec3::Y, Vec3::Z] };
+
+    /// The matrix of `v -> w × v`.
+    #[must_use]
+    pub fn skew(w: Vec3) -> Self {
+        Self { cols: [vec3(0.0, w.z, -w.y), vec3(-w.z, 0.0, w.x), vec3(w.y, -w.x, 0.0)] }
+    }
+
+    /// Rotation by `angle` radians about the unit vector `axis`, right-handed.
+    #[must_use]
+    pub fn rotation(axis: Vec3, angle: f64) -> Self {
+        let (s, c) = crate::fm::sin_cos(angle);
+        let k = Self::skew(axis);
+        let kk = k * k;
+        Self::IDENTITY + k * s + kk * (1.0 - c)
+    }
+
+    /// True when no entry is NaN or infinite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.cols.iter().all(|c| c.is_finite())
+    }
+}
+
+impl<T: Real> Mat3<T> {
+    /// From rows.
+    #[inline]
+    pub fn from_rows(a: Vec3<T>, b: Vec3<T>, c: Vec3<T>) -> Self {
+        Self { cols: [vec3(a.x, b.x, c.x), vec3(a.y, b.y, c.y), vec3(a.z, b.z, c.z)] }
+    }
+    /// Diagonal matrix.
+    #[inline]
+    pub fn diagonal(d: Vec3<T>) -> Self {
+        let z = T::zero();
+        Self { cols: [vec3(d.x, z, z), vec3(z, d.y, z), vec3(z, z, d.z)] }
+    }
+    /// Transpose.
+    #[inline]
+    #[must_use]
+    pub fn transpose(&self) -> Self {
+        Self::from_rows(self.cols[0], self.cols[1], self.cols[2])
+    }
+    /// Product of the transpose with a vector.
+    #[inline]
+    pub fn transpose_mul(&self, v: Vec3<T>) -> Vec3<T> {
+        vec3(self.cols[0].dot(v), self.cols[1].dot(v), self.cols[2].dot(v))
+    }
+    /// Determinant.
+    #[inline]
+    pub fn determinant(&self) -> T {
+        self.cols[0].dot(self.cols[1].cross(self.cols[2]))
+    }
+    /// Trace.
+    #[inline]
+    pub fn trace(&self) -> T {
+        self.cols[0].x + self.cols[1].y + self.cols[2].z
+    }
+    /// Inverse; not finite for a singular matrix.
+    #[inline]
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let [a, b, c] = self.cols;
+        let d = self.determinant().recip();
+        Self::from_rows(b.cross(c) * d, c.cross(a) * d, a.cross(b) * d)
+    }
+}
+
+impl<T: Real> Mul<Vec3<T>> for Mat3<T> {
+    type Output = Vec3<T>;
+    #[inline]
+    fn mul(self, v: Vec3<T>) -> Vec3<T> {
+        self.cols[0] * v.x + self.cols[1] * v.y + self.cols[2] * v.z
+    }
+}
+impl<T: Real> Mul for Mat3<T> {
+    type Output = Self;
+    #[inline]
+    fn mul(self, o: Self) -> Self {
+        Self { cols: o.cols.map(|c| self * c) }
+    }
+}
+impl<T: Real> Mul<T> for Mat3<T> {
+    type Output = Self;
+    #[inline]
+    fn mul(self, s: T) -> Self {
+        Self { cols: self.cols.map(|c| c * s) }
+    }
+}
+impl<T: Real> Add for Mat3<T> {
+    type Output = Self;
+    #[inline]
+    fn add(self, o: Self) -> Self {
+        Self { cols: core::array::from_fn(|i| self.cols[i] + o.cols[i]) }
+    }
+}
+impl From<glam::DMat3> for Mat3 {
+    fn from(m: glam::DMat3) -> Self {
+        Self { cols: [m.x_axis.into(), m.y_axis.into(), m.z_axis.into()] }
+    }
+}
+impl From<Mat3> for glam::DMat3 {
+    fn from(m: Mat3) -> Self {
+        glam::DMat3::from_cols(m.cols[0].into(), m.cols[1].into(), m.cols[2].into())
+    }
+}

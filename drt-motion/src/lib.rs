@@ -1,0 +1,1 @@
+//! Parameters as lists of effects, and the velocity fields of moving and deforming geometry
