@@ -1,0 +1,81 @@
+//! What a run will do and what it skips, decided once and printable.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
+
+/// How a medium is tracked, and how surface velocities reach its inside.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MediumPlan {
+    /// The medium's name.
+    pub medium: String,
+    /// `closed form` or `delta tracking`.
+    pub tracking: String,
+    /// Per parameter that moves it: its name and `affine` or `static with flux`.
+    pub motion: Vec<(String, String)>,
+}
+
+/// What a run will do and what it skips.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Plan {
+    /// Media that a path can meet.
+    pub media: Vec<MediumPlan>,
+    /// True when paths leave records to differentiate.
+    pub record: bool,
+    /// Shapes that move under some parameter.
+    pub moving_shapes: Vec<String>,
+    /// Edges that can be silhouettes of something, out of all edges.
+    pub edges: [u64; 2],
+    /// Boundary segments to the camera are sampled.
+    pub primary: bool,
+    /// Jumps of a box filter at pixel borders are sampled.
+    pub borders: bool,
+    /// Boundary segments to emitters are sampled.
+    pub direct: bool,
+    /// Boundary segments between scattering vertices are sampled.
+    pub indirect: bool,
+    /// Surfaces whose flux into static media is sampled.
+    pub flux_shapes: Vec<String>,
+    /// Image points come in mirrored pairs.
+    pub antithetic: bool,
+    /// What is skipped, and why.
+    pub skipped: Vec<String>,
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for m in &self.media {
+            writeln!(f, "medium {}: {}", m.medium, m.tracking)?;
+            for (parameter, motion) in &m.motion {
+                writeln!(f, "  inside moves with {parameter}: {motion}")?;
+            }
+        }
+        let yes = |on: bool| if on { "yes" } else { "no" };
+        writeln!(f, "path record: {}", yes(self.record))?;
+        if self.record {
+            let pairs = if self.antithetic { ", mirrored pairs" } else { "" };
+            writeln!(f, "interior term: yes{pairs}")?;
+        }
+        if !self.moving_shapes.is_empty() {
+            writeln!(f, "moving shapes: {}", self.moving_shapes.join(", "))?;
+        }
+        writeln!(f, "edges kept: {} of {}", self.edges[0], self.edges[1])?;
+        for (name, on) in [
+            ("camera boundary", self.primary),
+            ("pixel borders", self.borders),
+            ("emitter boundary", self.direct),
+            ("indirect boundary", self.indirect),
+        ] {
+            writeln!(f, "{name}: {}", yes(on))?;
+        }
+        if !self.flux_shapes.is_empty() {
+            writeln!(f, "flux through: {}", self.flux_shapes.join(", "))?;
+        }
+        for s in &self.skipped {
+            writeln!(f, "skipped: {s}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,55 @@
+//! What is asked of an estimator.
+
+/// How derivatives are estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum EstimatorKind {
+    /// Material-form path integrals, interior and boundary (2021 paper).
+    #[default]
+    PathSpace,
+    /// Central differences with common random numbers.
+    FiniteDifference,
+}
+
+/// Sample budgets and switches of one run.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Settings {
+    /// How derivatives are estimated.
+    pub estimator: EstimatorKind,
+    /// Index of the sensor.
+    pub sensor: usize,
+    /// Interior (and forward) samples per pixel.
+    pub spp: u32,
+    /// Boundary samples, per pixel on average; `None` is as many as `spp`.
+    pub boundary_spp: Option<u32>,
+    /// Path depth; `None` takes the scene's, `Some(None)` is unlimited.
+    pub max_depth: Option<Option<u32>>,
+    /// Image points in pairs mirrored at the pixel's centre (theory: 2021 paper, §5.4).
+    pub antithetic: bool,
+    /// Finite-difference half step, in units of each parameter.
+    pub step: f64,
+    /// Names the random numbers: same seed, same pixel data.
+    pub seed: u64,
+    /// Threads; 0 takes all cores. Without the feature `parallel`, one.
+    pub threads: usize,
+    /// Keep each derivative's terms apart as well.
+    pub terms: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            estimator: EstimatorKind::default(),
+            sensor: 0,
+            spp: 64,
+            boundary_spp: None,
+            max_depth: None,
+            antithetic: true,
+            step: 1e-3,
+            seed: 0,
+            threads: 0,
+            terms: false,
+        }
+    }
+}
