@@ -1,1 +1,27 @@
-//! Parameters as lists of effects, and the velocity fields of moving and deforming geometry
+#![doc = include_str!("../README.md")]
+#![cfg_attr(not(feature = "std"), no_std)]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+mod adjoint;
+mod element;
+mod error;
+mod geometry;
+mod moved;
+mod normals;
+mod parameter;
+mod property;
+mod surface;
+mod volume;
+
+pub use adjoint::{AffineGradient, JetAdjoint, VertexGradient};
+pub use element::SurfaceElement;
+pub use error::{Cause, MotionError};
+pub use geometry::GeometryChange;
+pub use moved::{MovedFrame, MovedMesh, move_affine, move_mesh};
+pub use normals::SmoothNormals;
+pub use parameter::{Applied, Change, Effect, Parameter, geometry_changes, property_changes};
+pub use property::{ChangedValue, PropertyChange, ValueChange, ValueMap, change_value};
+pub use surface::{SurfaceJet, SurfaceMotion, SurfacePoint};
+pub use volume::{InsideMotion, VolumeAdjoint, VolumeJet, VolumeMotion, inside_motion};

@@ -1,0 +1,69 @@
+use thiserror::Error;
+
+/// A change that cannot be applied: which parameter, which change, and why.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[error("parameter {parameter}, `{change}`: {cause}")]
+pub struct MotionError {
+    /// Index of the parameter in the list of all parameters.
+    pub parameter: usize,
+    /// The kind of change, as job files spell it.
+    pub change: &'static str,
+    /// What is wrong with it.
+    pub cause: Cause,
+}
+
+/// Why a change cannot be applied.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum Cause {
+    /// A list of velocities does not fit the mesh.
+    #[error(
+        "expected {expected} velocities, one per vertex of the mesh file in its order, found {found}"
+    )]
+    VertexCount {
+        /// Vertices in the file.
+        expected: usize,
+        /// Velocities given.
+        found: usize,
+    },
+    /// A vertex that the mesh does not have.
+    #[error("vertex {index} does not exist: the mesh file has {count} vertices, counted from 0")]
+    VertexIndex {
+        /// The vertex asked for.
+        index: u32,
+        /// Vertices in the file.
+        count: usize,
+    },
+    /// A rotation about nothing.
+    #[error("the rotation axis is the zero vector; give a direction, of any length")]
+    ZeroAxis,
+    /// A NaN or infinity, given or arising.
+    #[error("{what} is not finite")]
+    NotFinite {
+        /// The offending item.
+        what: &'static str,
+    },
+    /// The map at this value of the parameter flattens space or mirrors it.
+    #[error(
+        "at theta = {theta} the map collapses or mirrors space (determinant {determinant}); \
+         choose a value nearer to zero"
+    )]
+    Collapsed {
+        /// The parameter's value.
+        theta: f64,
+        /// Determinant of the linear part there.
+        determinant: f64,
+    },
+    /// A deformation of something that has no vertices.
+    #[error("its target is placed as a whole and has no vertices to move; use an affine change")]
+    NotAffine,
+    /// The parameter's index is outside the number of parameters announced.
+    #[error("there are only {count} parameters")]
+    ParameterIndex {
+        /// Number of parameters.
+        count: usize,
+    },
+    /// Targets that follow each other.
+    #[error("targets follow each other in a circle; let one of them carry the motion itself")]
+    FollowCycle,
+}

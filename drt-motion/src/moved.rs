@@ -1,0 +1,221 @@
+use alloc::vec;
+use alloc::vec::Vec;
+
+use drt_geom::Mesh;
+use drt_math::{Affine, Mat3, Vec3};
+
+use crate::error::Cause;
+use crate::geometry::finite;
+use crate::{Applied, GeometryChange, MotionError, SmoothNormals, SurfaceMotion};
+
+/// A mesh at the parameters' values, and how it goes on moving from there.
+#[derive(Clone, Debug)]
+pub struct MovedMesh {
+    /// The moved mesh.
+    pub mesh: Mesh,
+    /// Its velocity for each parameter.
+    pub motions: Vec<SurfaceMotion>,
+    /// How the vertex normals follow the positions, where they do: a mesh with vertex normals that
+    /// some change deforms.
+    pub smooth: Option<SmoothNormals>,
+}
+
+/// Something placed as a whole, such as a camera, at the parameters' values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MovedFrame {
+    /// From the placement in the scene file to the moved one.
+    pub map: Affine,
+    /// Per parameter, the velocity field as a function of the moved position.
+    pub velocities: Vec<Affine>,
+}
+
+/// Applies changes to a mesh, in the order given, for `parameters` parameters in all.
+///
+/// A later change carries along the velocities of the earlier ones: of f2(f1(x)), the parameter of
+/// f1 moves the result by Df2 times what it moved f1(x).
+///
+/// Vertex normals turn with affine changes. As soon as one change moves single vertices, even at
+/// theta = 0, the normals in the file give way to [`SmoothNormals`], so that the moved mesh is one
+/// smooth function of the parameters.
+///
+/// # Errors
+/// When a change is [unusable](GeometryChange::check), does not fit the mesh, or takes it out of
+/// the range of numbers.
+pub fn move_mesh(
+    mesh: &Mesh,
+    changes: &[Applied<'_, GeometryChange>],
+    parameters: usize,
+) -> Result<MovedMesh, MotionError> {
+    let mut moved = mesh.clone();
+    let mut fields = vec![Field::Affine(Affine::ZERO); parameters];
+    let mut deformed = false;
+    for c in changes {
+        check(c, parameters)?;
+        let fail = |cause| MotionError { parameter: c.parameter, change: c.change.kind(), cause };
+        if let Some(velocities) = vertex_velocities(mesh, c.change).map_err(fail)? {
+            deformed = true;
+            for field in &mut fields {
+                field.pin(c.theta, &moved.positions);
+            }
+            for (x, v) in moved.positions.iter_mut().zip(&velocities) {
+                *x += *v * c.theta;
+            }
+            fields[c.parameter].add(Field::Vertices(velocities), &moved.positions);
+        } else if let Some(step) = Step::new(c) {
+            moved = moved.transform(&step.map);
+            for field in &mut fields {
+                field.carry(&step);
+            }
+            fields[c.parameter].add(Field::Affine(step.velocity), &moved.positions);
+        }
+        finite(moved.positions.iter().all(|x| x.is_finite()), "a moved position").map_err(fail)?;
+    }
+    let smooth = (deformed && mesh.normals.is_some()).then(|| SmoothNormals::new(mesh));
+    if let Some(smooth) = &smooth {
+        moved.normals = Some(smooth.normals(&moved));
+    }
+    let motions = fields.into_iter().map(|f| f.into_motion(&moved, smooth.as_ref())).collect();
+    Ok(MovedMesh { mesh: moved, motions, smooth })
+}
+
+/// Applies changes to something placed as a whole, in the order given, for `parameters` parameters
+/// in all.
+///
+/// # Errors
+/// When a change is [unusable](GeometryChange::check) or not affine.
+pub fn move_affine(
+    changes: &[Applied<'_, GeometryChange>],
+    parameters: usize,
+) -> Result<MovedFrame, MotionError> {
+    let mut map = Affine::IDENTITY;
+    let mut velocities = vec![Affine::ZERO; parameters];
+    for c in changes {
+        check(c, parameters)?;
+        let fail = |cause| MotionError { parameter: c.parameter, change: c.change.kind(), cause };
+        let step = Step::new(c).ok_or_else(|| fail(Cause::NotAffine))?;
+        map = step.map.after(&map);
+        for v in &mut velocities {
+            *v = step.carry(v);
+        }
+        velocities[c.parameter] = velocities[c.parameter].plus(&step.velocity);
+        finite(map.is_finite(), "the moved placement").map_err(fail)?;
+    }
+    Ok(MovedFrame { map, velocities })
+}
+
+fn check(c: &Applied<'_, GeometryChange>, parameters: usize) -> Result<(), MotionError> {
+    let index = if c.parameter < parameters {
+        Ok(())
+    } else {
+        Err(Cause::ParameterIndex { count: parameters })
+    };
+    index.and_then(|()| c.change.check(c.theta)).map_err(|cause| MotionError {
+        parameter: c.parameter,
+        change: c.change.kind(),
+        cause,
+    })
+}
+
+/// An affine change at its parameter's value.
+struct Step {
+    map: Affine,
+    inverse: Affine,
+    velocity: Affine,
+}
+
+impl Step {
+    fn new(c: &Applied<'_, GeometryChange>) -> Option<Self> {
+        let map = c.change.affine(c.theta)?;
+        Some(Self { map, inverse: map.inverse(), velocity: c.change.velocity(c.theta)? })
+    }
+
+    /// The field u of positions before the step, as a field of positions after it: L u(map⁻¹ y).
+    fn carry(&self, u: &Affine) -> Affine {
+        Affine { linear: self.map.linear * u.linear, translation: self.map.vector(u.translation) }
+            .after(&self.inverse)
+    }
+}
+
+/// A velocity field on the vertices, kept affine for as long as it is.
+#[derive(Clone, Debug)]
+enum Field {
+    Affine(Affine),
+    Vertices(Vec<Vec3>),
+}
+
+impl Field {
+    /// Takes the field through an affine change of the positions.
+    fn carry(&mut self, step: &Step) {
+        match self {
+            Self::Affine(u) => *u = step.carry(u),
+            Self::Vertices(v) => v.iter_mut().for_each(|v| *v = step.map.vector(*v)),
+        }
+    }
+
+    /// Ties the field to the vertices before these are moved singly by theta times a velocity that
+    /// no other parameter influences: an affine function of the position would not survive that.
+    fn pin(&mut self, theta: f64, positions: &[Vec3]) {
+        if let Self::Affine(u) = self
+            && theta != 0.0
+            && u.linear != Mat3::ZERO
+        {
+            *self = Self::Vertices(at_vertices(u, positions));
+        }
+    }
+
+    fn add(&mut self, other: Self, positions: &[Vec3]) {
+        *self = match (core::mem::replace(self, Self::Affine(Affine::ZERO)), other) {
+            (Self::Affine(a), Self::Affine(b)) => Self::Affine(a.plus(&b)),
+            (Self::Affine(u), Self::Vertices(v)) | (Self::Vertices(v), Self::Affine(u)) => {
+                let u = at_vertices(&u, positions);
+                Self::Vertices(u.iter().zip(&v).map(|(u, v)| *u + *v).collect())
+            }
+            (Self::Vertices(a), Self::Vertices(b)) => {
+                Self::Vertices(a.iter().zip(&b).map(|(a, b)| *a + *b).collect())
+            }
+        };
+    }
+
+    fn into_motion(self, moved: &Mesh, smooth: Option<&SmoothNormals>) -> SurfaceMotion {
+        let velocities = match self {
+            Self::Affine(u) if u.is_zero() => return SurfaceMotion::Rest,
+            // Angles, which weigh recomputed normals, do not survive every affine field.
+            Self::Affine(u) if smooth.is_some() && u.linear != Mat3::ZERO => {
+                at_vertices(&u, &moved.positions)
+            }
+            Self::Affine(u) => return SurfaceMotion::Affine(u),
+            Self::Vertices(v) if v.iter().all(|v| *v == Vec3::ZERO) => return SurfaceMotion::Rest,
+            Self::Vertices(v) => v,
+        };
+        let normals = smooth.map(|s| s.rates(moved, &velocities).into());
+        SurfaceMotion::Vertices { positions: velocities.into(), normals }
+    }
+}
+
+fn at_vertices(u: &Affine, positions: &[Vec3]) -> Vec<Vec3> {
+    positions.iter().map(|&x| u.point(x)).collect()
+}
+
+/// Velocities of the mesh's vertices, from a change given in the order of the mesh's file; `None`
+/// for a change of space as a whole.
+fn vertex_velocities(mesh: &Mesh, change: &GeometryChange) -> Result<Option<Vec<Vec3>>, Cause> {
+    let count = mesh.source_vertex_count as usize;
+    let gather = |velocity: &dyn Fn(u32) -> Vec3| {
+        let vertices = 0..mesh.positions.len() as u32;
+        Ok(Some(vertices.map(|i| velocity(mesh.source_vertex(i))).collect()))
+    };
+    match change {
+        GeometryChange::VertexVelocity(v) if v.len() == count => gather(&|i| v[i as usize]),
+        GeometryChange::VertexVelocity(v) => {
+            Err(Cause::VertexCount { expected: count, found: v.len() })
+        }
+        &GeometryChange::Vertex { index, direction } if (index as usize) < count => {
+            gather(&|i| if i == index { direction } else { Vec3::ZERO })
+        }
+        &GeometryChange::Vertex { index, .. } => Err(Cause::VertexIndex { index, count }),
+        GeometryChange::Translate(_)
+        | GeometryChange::Rotate { .. }
+        | GeometryChange::Scale { .. }
+        | GeometryChange::Matrix(_) => Ok(None),
+    }
+}

@@ -1,0 +1,151 @@
+use alloc::collections::BTreeMap;
+use alloc::vec;
+use alloc::vec::Vec;
+
+use drt_geom::{Mesh, weld};
+use drt_math::{Vec3, fm};
+
+use crate::element::{Unit, area_rate, area_rate_transposed, edges_and_area};
+
+/// Vertex normals recomputed from the positions of a deforming mesh, with their rates and the
+/// transpose of those.
+///
+/// As in [`Mesh::with_smooth_normals`], a vertex normal is the mean of the normals of the triangles
+/// around it, weighted by their angles there (Thürmer and Wüthrich 1998). Vertices that coincide
+/// in the reference configuration *and* have the same normal there share one: seams stay smooth and
+/// creases stay sharp. They go on sharing it when a deformation pulls them apart, for otherwise
+/// normals would jump as soon as theta leaves zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SmoothNormals {
+    /// The shared normal that each mesh vertex takes.
+    shared: Vec<u32>,
+    count: usize,
+}
+
+impl SmoothNormals {
+    /// Decides which vertices of the reference mesh share a normal.
+    #[must_use]
+    pub fn new(reference: &Mesh) -> Self {
+        let positions = weld(&reference.positions);
+        let normals = match &reference.normals {
+            Some(normals) => weld(normals),
+            None => vec![0; positions.len()],
+        };
+        let mut numbers = BTreeMap::new();
+        let shared = positions.into_iter().zip(normals).map(|key| {
+            let next = numbers.len() as u32;
+            *numbers.entry(key).or_insert(next)
+        });
+        let shared = shared.collect();
+        Self { shared, count: numbers.len() }
+    }
+
+    /// Unit normals of the mesh's vertices. Where the triangles around a vertex cancel, the normal
+    /// that the mesh has is left in place.
+    ///
+    /// # Panics
+    /// As all methods, when `mesh` is not the reference mesh in another position.
+    #[must_use]
+    pub fn normals(&self, mesh: &Mesh) -> Vec<Vec3> {
+        let units = self.units(mesh);
+        let unit = |(i, &s): (usize, &u32)| match units[s as usize].dir {
+            Vec3::ZERO => mesh.normals.as_ref().map_or(Vec3::ZERO, |n| n[i]),
+            n => n,
+        };
+        self.shared.iter().enumerate().map(unit).collect()
+    }
+
+    /// Rates of the normals for given velocities of the mesh's vertices.
+    #[must_use]
+    pub fn rates(&self, mesh: &Mesh, velocities: &[Vec3]) -> Vec<Vec3> {
+        let mut sums = vec![Vec3::ZERO; self.count];
+        for t in &mesh.triangles {
+            let rates = Face::new(mesh, t).rates(t.map(|i| velocities[i as usize]));
+            for (&i, rate) in t.iter().zip(rates) {
+                sums[self.shared[i as usize] as usize] += rate;
+            }
+        }
+        let units = self.units(mesh);
+        let rates: Vec<_> = units.iter().zip(sums).map(|(unit, sum)| unit.rate(sum)).collect();
+        self.shared.iter().map(|&s| rates[s as usize]).collect()
+    }
+
+    /// Transpose of [`rates`](Self::rates): adds to `positions` the gradient with respect to the
+    /// velocities, given the gradient with respect to the rates of the normals.
+    pub fn rates_transposed(&self, mesh: &Mesh, normals: &[Vec3], positions: &mut [Vec3]) {
+        let units = self.units(mesh);
+        let mut on_sums = vec![Vec3::ZERO; self.count];
+        for (&s, &g) in self.shared.iter().zip(normals) {
+            on_sums[s as usize] += units[s as usize].rate(g);
+        }
+        for t in &mesh.triangles {
+            let on_corners = t.map(|i| on_sums[self.shared[i as usize] as usize]);
+            let on_positions = Face::new(mesh, t).rates_transposed(on_corners);
+            for (&i, g) in t.iter().zip(on_positions) {
+                positions[i as usize] += g;
+            }
+        }
+    }
+
+    fn units(&self, mesh: &Mesh) -> Vec<Unit> {
+        let mut sums = vec![Vec3::ZERO; self.count];
+        for t in &mesh.triangles {
+            let face = Face::new(mesh, t);
+            for (&i, angle) in t.iter().zip(face.angles) {
+                sums[self.shared[i as usize] as usize] += face.normal.dir * angle;
+            }
+        }
+        sums.into_iter().map(Unit::new).collect()
+    }
+}
+
+/// What a triangle gives to the normals of its corners: its unit normal times its angle there.
+/// A triangle without area gives nothing.
+struct Face {
+    edges: [Vec3; 2],
+    normal: Unit,
+    angles: [f64; 3],
+    /// Gradient of each side's turning, within the plane, with respect to the side: (n × d) / d².
+    turning: [Vec3; 3],
+}
+
+impl Face {
+    fn new(mesh: &Mesh, t: &[u32; 3]) -> Self {
+        let x = t.map(|i| mesh.positions[i as usize]);
+        let (edges, area) = edges_and_area(x);
+        let normal = Unit::new(area);
+        if normal.dir == Vec3::ZERO {
+            return Self { edges, normal, angles: [0.0; 3], turning: [Vec3::ZERO; 3] };
+        }
+        // Side k runs from corner k to the next.
+        let sides = [0, 1, 2].map(|k| x[(k + 1) % 3] - x[k]);
+        let angle = |k: usize| fm::atan2(area.length(), -sides[k].dot(sides[(k + 2) % 3]));
+        Self {
+            edges,
+            normal,
+            angles: [0, 1, 2].map(angle),
+            turning: sides.map(|d| normal.dir.cross(d) / d.length_squared()),
+        }
+    }
+
+    /// Rates of what the corners get. The angle at corner k closes by as much as side k turns, and
+    /// opens by as much as the side before it.
+    fn rates(&self, v: [Vec3; 3]) -> [Vec3; 3] {
+        let n_dot = self.normal.rate(area_rate(self.edges, v));
+        let turned = [0, 1, 2].map(|k| self.turning[k].dot(v[(k + 1) % 3] - v[k]));
+        [0, 1, 2]
+            .map(|k| n_dot * self.angles[k] + self.normal.dir * (turned[(k + 2) % 3] - turned[k]))
+    }
+
+    fn rates_transposed(&self, g: [Vec3; 3]) -> [Vec3; 3] {
+        let on_normal = g[0] * self.angles[0] + g[1] * self.angles[1] + g[2] * self.angles[2];
+        let mut on_v = area_rate_transposed(self.edges, self.normal.rate(on_normal));
+        for k in 0..3 {
+            let next = (k + 1) % 3;
+            let on_side = self.turning[k] * self.normal.dir.dot(g[next] - g[k]);
+            on_v[next] += on_side;
+            on_v[k] += -on_side;
+        }
+        on_v
+    }
+}
