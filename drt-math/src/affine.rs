@@ -41,10 +41,7 @@ impl Affine {
     /// This map after another: `self ∘ first`.
     #[must_use]
     pub fn after(&self, first: &Self) -> Self {
-        Self {
-            linear: self.linear * first.linear,
-            translation: self.point(first.translation),
-        }
+        Self { linear: self.linear * first.linear, translation: self.point(first.translation) }
     }
     /// The inverse map; not finite when the linear part is singular.
     #[must_use]

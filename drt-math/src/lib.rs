@@ -12,6 +12,7 @@ extern crate alloc;
 compile_error!("drt-math needs elementary functions: enable the feature `std` or `libm`");
 
 mod affine;
+pub mod discrete;
 mod dual;
 pub mod fm;
 mod frame;
@@ -19,13 +20,19 @@ mod mat3;
 mod real;
 mod rgb;
 mod rng;
+pub mod stats;
+#[cfg(any(test, feature = "testing"))]
+pub mod testing;
 mod vec3;
+pub mod warp;
 
 pub use affine::Affine;
+pub use discrete::{AliasTable, CdfTable};
 pub use dual::Dual;
 pub use frame::Frame;
 pub use mat3::Mat3;
 pub use real::Real;
 pub use rgb::{Rgb, RgbVec};
 pub use rng::Rng;
+pub use stats::{CompensatedSum, Moments, RgbMoments};
 pub use vec3::{Vec3, vec3};
