@@ -1,0 +1,273 @@
+//! Emitters, with Mitsuba's meaning, units and defaults.
+//!
+//! Directions of emission are directions of light *flow*. Delta emitters (point, spot and
+//! directional) keep apart what the path integral keeps apart: the emission towards a direction,
+//! and the 1/r² of the geometric term.
+
+mod emission;
+mod incident;
+mod motion;
+#[cfg(test)]
+mod tests;
+
+use core::f64::consts::PI;
+
+use drt_math::{Frame, Rgb, Vec3, fm, vec3};
+use thiserror::Error;
+
+pub use emission::{Emission, EmitterGradient, EmitterTangent};
+pub use incident::Incident;
+
+/// An emitter that cannot be used.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum EmitterError {
+    /// A direction that does not exist.
+    #[error("the {0} emitter's direction is the zero vector; give a direction, of any length")]
+    ZeroDirection(&'static str),
+    /// A NaN or infinity.
+    #[error("the {kind} emitter's {what} is not finite")]
+    NotFinite {
+        /// Kind of the emitter.
+        kind: &'static str,
+        /// The offending field.
+        what: &'static str,
+    },
+    /// A cone that does not exist.
+    #[error(
+        "the spot emitter's cutoff_angle is {cutoff_angle} and its beam_width {beam_width} \
+         degrees; expected 0 <= beam_width <= cutoff_angle <= 180 and cutoff_angle > 0"
+    )]
+    Cone {
+        /// Cutoff angle in degrees.
+        cutoff_angle: f64,
+        /// Beam width in degrees.
+        beam_width: f64,
+    },
+    /// A motion that flattens the emitter.
+    #[error("the motion takes the {0} emitter's direction to zero; choose a value nearer to zero")]
+    Flattened(&'static str),
+    /// A property that this kind of emitter does not have.
+    #[error("a {kind} emitter has no property `{property}`; it has {known}")]
+    UnknownProperty {
+        /// Kind of the emitter.
+        kind: &'static str,
+        /// The name asked for.
+        property: alloc::string::String,
+        /// Names that exist.
+        known: &'static str,
+    },
+    /// Different numbers for the channels of something that has none.
+    #[error("`{0}` is a single number; give three equal ones")]
+    NotScalar(&'static str),
+}
+
+/// A source of light. [`checked`](Self::checked) makes directions unit vectors; everything else
+/// here relies on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Emitter {
+    /// A shape that glows on its front side.
+    Area {
+        /// Radiance, the same in all directions.
+        radiance: Rgb,
+    },
+    /// A point that shines equally in all directions.
+    Point {
+        /// Where it is.
+        position: Vec3,
+        /// Power per steradian.
+        intensity: Rgb,
+    },
+    /// A point that shines in a cone.
+    Spot {
+        /// Where it is.
+        position: Vec3,
+        /// The cone's axis.
+        direction: Vec3,
+        /// Power per steradian inside the beam.
+        intensity: Rgb,
+        /// Angle from the axis at which the light ends, in radians.
+        cutoff_angle: f64,
+        /// Angle from the axis up to which it is full, in radians; between the two it falls
+        /// linearly with the angle.
+        beam_width: f64,
+    },
+    /// Parallel light from infinitely far away.
+    Directional {
+        /// Where the light flows to.
+        direction: Vec3,
+        /// Power per area perpendicular to the flow.
+        irradiance: Rgb,
+    },
+    /// A sky of the same radiance in all directions.
+    Constant {
+        /// The radiance.
+        radiance: Rgb,
+    },
+}
+
+/// A direction of flow drawn from a point or spot light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlowSample {
+    /// Unit vector.
+    pub flow: Vec3,
+    /// Density per steradian.
+    pub pdf: f64,
+}
+
+impl Emitter {
+    /// Mitsuba's default cutoff angle of a spot, 20 degrees, in radians.
+    pub const DEFAULT_CUTOFF_ANGLE: f64 = PI / 9.0;
+    /// Mitsuba's default beam width of a spot, as a fraction of the cutoff angle.
+    pub const DEFAULT_BEAM_FRACTION: f64 = 0.75;
+
+    /// The same emitter with unit directions.
+    ///
+    /// # Errors
+    /// Names the field that is not finite, a zero direction, or a cone that is none.
+    pub fn checked(self) -> Result<Self, EmitterError> {
+        let kind = self.kind();
+        let finite =
+            |ok: bool, what| if ok { Ok(()) } else { Err(EmitterError::NotFinite { kind, what }) };
+        let unit = |v: Vec3| {
+            finite(v.is_finite(), "direction")?;
+            let size = v.max_abs();
+            // Scaled by the largest coordinate first, so that no length under- or overflows.
+            let v = v * (1.0 / size);
+            if v.is_finite() { Ok(v.normalize()) } else { Err(EmitterError::ZeroDirection(kind)) }
+        };
+        finite(self.strength().is_finite(), self.strength_name())?;
+        match self {
+            Self::Area { .. } | Self::Constant { .. } => Ok(self),
+            Self::Point { position, .. } => finite(position.is_finite(), "position").map(|()| self),
+            Self::Spot { position, direction, intensity, cutoff_angle, beam_width } => {
+                finite(position.is_finite(), "position")?;
+                let direction = unit(direction)?;
+                let cone = 0.0 <= beam_width && beam_width <= cutoff_angle;
+                if !(cone && 0.0 < cutoff_angle && cutoff_angle <= PI) {
+                    let [cutoff_angle, beam_width] =
+                        [cutoff_angle, beam_width].map(f64::to_degrees);
+                    return Err(EmitterError::Cone { cutoff_angle, beam_width });
+                }
+                Ok(Self::Spot { position, direction, intensity, cutoff_angle, beam_width })
+            }
+            Self::Directional { direction, irradiance } => {
+                Ok(Self::Directional { direction: unit(direction)?, irradiance })
+            }
+        }
+    }
+
+    /// The plugin's name in scene files.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Area { .. } => "area",
+            Self::Point { .. } => "point",
+            Self::Spot { .. } => "spot",
+            Self::Directional { .. } => "directional",
+            Self::Constant { .. } => "constant",
+        }
+    }
+
+    /// True for point, spot and directional lights, which no ray can hit.
+    #[must_use]
+    pub fn is_delta(&self) -> bool {
+        !matches!(self, Self::Area { .. } | Self::Constant { .. })
+    }
+
+    /// False for a spot that ends with a jump, whose shadow-like rim needs a boundary integral.
+    #[must_use]
+    pub fn is_continuous(&self) -> bool {
+        !matches!(self, Self::Spot { cutoff_angle, beam_width, .. } if cutoff_angle == beam_width)
+    }
+
+    /// Where a point or spot light is.
+    #[inline]
+    #[must_use]
+    pub fn position(&self) -> Option<Vec3> {
+        match *self {
+            Self::Point { position, .. } | Self::Spot { position, .. } => Some(position),
+            _ => None,
+        }
+    }
+
+    /// Total power, for choosing among emitters: of an area emitter on `area`, of distant light
+    /// through the disk or sphere of `scene_radius`.
+    #[must_use]
+    pub fn power(&self, area: f64, scene_radius: f64) -> Rgb {
+        let disk = PI * scene_radius * scene_radius;
+        let factor = match *self {
+            Self::Area { .. } => PI * area,
+            Self::Point { .. } => 4.0 * PI,
+            Self::Spot { cutoff_angle: c, beam_width: b, .. } => 2.0 * PI * cone_mean(b, c),
+            Self::Directional { .. } => disk,
+            Self::Constant { .. } => 4.0 * PI * disk,
+        };
+        self.strength() * factor
+    }
+
+    /// Draws a direction of flow from two uniform numbers, uniformly over those that a point or
+    /// spot light shines in; `None` for other emitters.
+    #[must_use]
+    pub fn sample_flow(&self, u: [f64; 2]) -> Option<FlowSample> {
+        let (axis, half_angle) = match *self {
+            Self::Point { .. } => (Vec3::Z, PI),
+            Self::Spot { direction, cutoff_angle, .. } => (direction, cutoff_angle),
+            _ => return None,
+        };
+        let h = fm::sin(0.5 * half_angle);
+        let height = 2.0 * h * h;
+        // 1 - cos is uniform; sin² = (1 - cos)(1 + cos) keeps narrow cones exact.
+        let below = u[0] * height;
+        let sin = fm::sqrt(below * (2.0 - below));
+        let (sin_phi, cos_phi) = fm::sin_cos(2.0 * PI * u[1]);
+        let local = vec3(sin * cos_phi, sin * sin_phi, 1.0 - below);
+        let flow = Frame::from_normal(axis).to_world(local);
+        Some(FlowSample { flow, pdf: 1.0 / (2.0 * PI * height) })
+    }
+
+    /// Density of [`sample_flow`](Self::sample_flow) per steradian.
+    #[must_use]
+    pub fn flow_pdf(&self, flow: Vec3) -> f64 {
+        match *self {
+            Self::Point { .. } => 0.25 / PI,
+            Self::Spot { direction, cutoff_angle, .. } => {
+                let h = fm::sin(0.5 * cutoff_angle);
+                let inside = emission::angle(direction, flow) <= cutoff_angle;
+                if inside { 0.25 / (PI * h * h) } else { 0.0 }
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Radiance, intensity or irradiance.
+    #[inline]
+    fn strength(&self) -> Rgb {
+        match *self {
+            Self::Area { radiance } | Self::Constant { radiance } => radiance,
+            Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity,
+            Self::Directional { irradiance, .. } => irradiance,
+        }
+    }
+
+    fn strength_name(&self) -> &'static str {
+        match self {
+            Self::Area { .. } | Self::Constant { .. } => "radiance",
+            Self::Point { .. } | Self::Spot { .. } => "intensity",
+            Self::Directional { .. } => "irradiance",
+        }
+    }
+}
+
+/// Integral of a spot's falloff over the sphere, over 2 pi: 1 - (sin c - sin b)/(c - b).
+fn cone_mean(b: f64, c: f64) -> f64 {
+    // (sin c - sin b)/(c - b) = cos(mean) sinc(half the difference).
+    let half = 0.5 * (c - b);
+    let sinc = if half < 1e-4 { 1.0 - half * half / 6.0 } else { fm::sin(half) / half };
+    let h = fm::sin(0.25 * (b + c));
+    // 1 - cos(mean) and 1 - sinc apart: narrow cones would cancel.
+    let one_minus_sinc = if half < 1e-4 { half * half / 6.0 } else { 1.0 - sinc };
+    2.0 * h * h * sinc + one_minus_sinc
+}
