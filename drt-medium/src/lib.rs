@@ -1,1 +1,28 @@
-//! Homogeneous and voxel-grid participating media: tracking, transmittance, phase functions and their derivatives
+#![doc = include_str!("../README.md")]
+#![cfg_attr(not(feature = "std"), no_std)]
+#![forbid(unsafe_code)]
+
+extern crate alloc;
+
+mod bounds;
+mod coefficients;
+mod error;
+mod field;
+mod grid;
+mod grid_medium;
+mod homogeneous;
+mod lattice;
+mod medium;
+mod phase;
+mod reach;
+pub mod tracking;
+
+pub use coefficients::{CoefficientGradients, CoefficientRates, Coefficients};
+pub use error::{MediumError, Property};
+pub use field::{DensityField, Piece, Ray};
+pub use grid::{Filter, Grid, Layout, Wrap};
+pub use grid_medium::{GridMedium, Volume};
+pub use homogeneous::Homogeneous;
+pub use medium::{Medium, MediumKind};
+pub use phase::{Phase, henyey_greenstein, rayleigh};
+pub use tracking::{DistanceSample, TrackingStats};

@@ -1,0 +1,124 @@
+use core::fmt;
+
+/// The property of a medium that an error or a change is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Property {
+    /// Extinction after the medium's scale.
+    SigmaT,
+    /// Single-scattering albedo.
+    Albedo,
+    /// Emitted radiance.
+    Emission,
+    /// Mean cosine of the phase function.
+    G,
+}
+
+impl fmt::Display for Property {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::SigmaT => "sigma_t",
+            Self::Albedo => "albedo",
+            Self::Emission => "emission",
+            Self::G => "g",
+        })
+    }
+}
+
+/// Why a medium cannot be built or changed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MediumError {
+    /// A grid's value count does not fit its size.
+    #[error(
+        "a grid of {}x{}x{} voxels with {channels} channels needs {expected} values, found {found}",
+        size[0], size[1], size[2]
+    )]
+    ValueCount {
+        /// Voxels along x, y, z.
+        size: [usize; 3],
+        /// Values per voxel.
+        channels: usize,
+        /// Values needed; `usize::MAX` when the product overflows.
+        expected: usize,
+        /// Values given.
+        found: usize,
+    },
+    /// A grid has no voxels along an axis, or neither one nor three channels.
+    #[error(
+        "a grid needs at least one voxel per axis and 1 or 3 channels, found {}x{}x{} with {channels}",
+        size[0], size[1], size[2]
+    )]
+    GridShape {
+        /// Voxels along x, y, z.
+        size: [usize; 3],
+        /// Values per voxel.
+        channels: usize,
+    },
+    /// A grid value is NaN or infinite.
+    #[error("the grid value at voxel [{}, {}, {}], channel {channel}, is {value}; it must be finite",
+        voxel[0], voxel[1], voxel[2])]
+    NotFinite {
+        /// Position in the grid.
+        voxel: [usize; 3],
+        /// Channel.
+        channel: usize,
+        /// The value found.
+        value: f64,
+    },
+    /// A placement cannot be inverted.
+    #[error(
+        "the placement of a grid is singular or not finite; it must map the unit cube to a box of positive volume"
+    )]
+    SingularPlacement,
+    /// A coefficient lies outside its physical range.
+    #[error("{property} is {value}; it must be {expected}")]
+    OutOfRange {
+        /// The property.
+        property: Property,
+        /// The value found.
+        value: f64,
+        /// The range in words.
+        expected: &'static str,
+    },
+    /// A voxel was addressed that the property does not have.
+    #[error("voxel [{}, {}, {}] of {property} does not exist; the grid has {}x{}x{} voxels",
+        voxel[0], voxel[1], voxel[2], size[0], size[1], size[2])]
+    NoSuchVoxel {
+        /// The property.
+        property: Property,
+        /// The voxel asked for.
+        voxel: [usize; 3],
+        /// Voxels along x, y, z.
+        size: [usize; 3],
+    },
+    /// A voxel of a constant property was addressed.
+    #[error("{property} of this medium is one constant; only a grid has voxels to change")]
+    NotAGrid {
+        /// The property.
+        property: Property,
+    },
+    /// Three different numbers were given for a scalar.
+    #[error("{property} is one number; give three equal ones")]
+    NotScalar {
+        /// The property.
+        property: Property,
+    },
+    /// The phase function has no such parameter.
+    #[error("this phase function has no g; use Henyey-Greenstein")]
+    NoMeanCosine,
+    /// A field defined by its user has no parameters known here.
+    #[error("{property} of a custom field cannot be changed here; change the field itself")]
+    CustomField {
+        /// The property.
+        property: Property,
+    },
+    /// The factor of a `multiply` change has reached zero, so the value it multiplied is lost.
+    #[error(
+        "{property} is multiplied by zero at this parameter value, where the derivative cannot be told from the product; use a logarithmic factor"
+    )]
+    VanishingFactor {
+        /// The property.
+        property: Property,
+    },
+}

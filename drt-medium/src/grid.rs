@@ -1,0 +1,386 @@
+use alloc::vec::Vec;
+
+use drt_math::{Affine, Rgb, RgbVec, Vec3, vec3};
+
+use crate::MediumError;
+use crate::lattice::{Axis, Between};
+
+/// Where the values sit in the unit cube.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Layout {
+    /// Value i of n at (i + 1/2) / n: the middle of its voxel, as in Mitsuba.
+    #[default]
+    VoxelCentred,
+    /// Value i of n at i / (n - 1): the outermost values lie on the faces of the cube.
+    NodeCentred,
+}
+
+/// How values are joined between the places where they sit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Filter {
+    /// Trilinear interpolation: continuous, with jumps of slope between voxels.
+    #[default]
+    Trilinear,
+    /// The value of the nearest voxel: constant inside, with jumps between voxels. Its gradient is
+    /// zero almost everywhere, so derivatives for *motions* of such a grid lack the jumps' part.
+    Nearest,
+}
+
+/// What lies beyond the outermost values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Wrap {
+    /// The outermost value goes on.
+    #[default]
+    Clamp,
+    /// The grid starts again.
+    Repeat,
+    /// The grid runs back and forth; the outermost value appears twice.
+    Mirror,
+}
+
+/// A field of numbers or colours given by values on a regular lattice in a placed box.
+///
+/// Values are stored x fastest, then y, then z, the channels of a voxel side by side, in f64 so
+/// that small steps of a parameter are not rounded away. The field is defined everywhere, by
+/// [`Wrap`]; who uses it as a density cuts it off at the box.
+///
+/// ```
+/// use drt_math::{Rgb, vec3};
+/// use drt_medium::{Grid, Layout};
+/// let ramp = Grid::new([2, 1, 1], 1, vec![0.0, 1.0])?.with_layout(Layout::NodeCentred);
+/// assert_eq!(ramp.value(vec3(0.25, 0.5, 0.5)), Rgb::splat(0.25));
+/// # Ok::<(), drt_medium::MediumError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "stored::Grid", try_from = "stored::Grid"))]
+pub struct Grid {
+    size: [usize; 3],
+    channels: usize,
+    values: Vec<f64>,
+    layout: Layout,
+    filter: Filter,
+    wrap: Wrap,
+    to_world: Affine,
+    from_world: Affine,
+    axes: [Axis; 3],
+}
+
+/// The neighbours of a point along the three axes.
+pub(crate) type Cell = [Between; 3];
+
+impl Grid {
+    /// A voxel-centred, trilinear, clamped grid filling the unit cube.
+    ///
+    /// # Errors
+    /// When the shape has an empty axis or other than 1 or 3 channels, when the number of values
+    /// does not fit it, or when a value is not finite.
+    pub fn new(size: [usize; 3], channels: usize, values: Vec<f64>) -> Result<Self, MediumError> {
+        if size.contains(&0) || !matches!(channels, 1 | 3) {
+            return Err(MediumError::GridShape { size, channels });
+        }
+        let expected = size.iter().try_fold(channels, |n, &s| n.checked_mul(s));
+        if expected != Some(values.len()) {
+            let expected = expected.unwrap_or(usize::MAX);
+            return Err(MediumError::ValueCount { size, channels, expected, found: values.len() });
+        }
+        if let Some(at) = values.iter().position(|v| !v.is_finite()) {
+            let (voxel, channel) = (unflatten(size, at / channels), at % channels);
+            return Err(MediumError::NotFinite { voxel, channel, value: values[at] });
+        }
+        let (layout, filter, wrap) = Default::default();
+        Ok(Self {
+            size,
+            channels,
+            values,
+            layout,
+            filter,
+            wrap,
+            to_world: Affine::IDENTITY,
+            from_world: Affine::IDENTITY,
+            axes: size.map(|n| Axis::new(n, layout, filter, wrap)),
+        })
+    }
+
+    /// One value everywhere, in the unit cube.
+    ///
+    /// # Errors
+    /// When the value is not finite.
+    pub fn constant(value: Rgb) -> Result<Self, MediumError> {
+        Self::new([1; 3], 3, value.to_array().to_vec())
+    }
+
+    /// The same values sitting elsewhere in the box.
+    #[must_use]
+    pub fn with_layout(mut self, layout: Layout) -> Self {
+        self.layout = layout;
+        self.rebuild_axes()
+    }
+    /// The same values joined differently.
+    #[must_use]
+    pub fn with_filter(mut self, filter: Filter) -> Self {
+        self.filter = filter;
+        self.rebuild_axes()
+    }
+    /// The same values continued differently.
+    #[must_use]
+    pub fn with_wrap(mut self, wrap: Wrap) -> Self {
+        self.wrap = wrap;
+        self.rebuild_axes()
+    }
+    /// The same values in the image of the unit cube under `to_world`.
+    ///
+    /// # Errors
+    /// When the map cannot be inverted.
+    pub fn with_placement(mut self, to_world: Affine) -> Result<Self, MediumError> {
+        self.set_placement(to_world)?;
+        Ok(self)
+    }
+
+    fn set_placement(&mut self, to_world: Affine) -> Result<(), MediumError> {
+        let from_world = to_world.inverse();
+        if !to_world.is_finite() || !from_world.is_finite() {
+            return Err(MediumError::SingularPlacement);
+        }
+        (self.to_world, self.from_world) = (to_world, from_world);
+        Ok(())
+    }
+
+    /// Moves the box by a map of the world. On an error nothing has changed.
+    ///
+    /// # Errors
+    /// When the new placement cannot be inverted.
+    pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
+        self.set_placement(map.after(&self.to_world))
+    }
+
+    fn rebuild_axes(mut self) -> Self {
+        self.axes = self.size.map(|n| Axis::new(n, self.layout, self.filter, self.wrap));
+        self
+    }
+
+    /// Values along x, y and z.
+    #[must_use]
+    pub fn size(&self) -> [usize; 3] {
+        self.size
+    }
+    /// Values per voxel: 1 or 3.
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.channels
+    }
+    /// All values: `values[((k ny + j) nx + i) channels + channel]`.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+    /// Where the values sit.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        self.layout
+    }
+    /// How they are joined.
+    #[must_use]
+    pub fn filter(&self) -> Filter {
+        self.filter
+    }
+    /// How they go on outside.
+    #[must_use]
+    pub fn wrap(&self) -> Wrap {
+        self.wrap
+    }
+    /// The map of the unit cube to the box in the world.
+    #[must_use]
+    pub fn to_world(&self) -> &Affine {
+        &self.to_world
+    }
+    /// The map of the world to the unit cube.
+    #[must_use]
+    pub fn from_world(&self) -> &Affine {
+        &self.from_world
+    }
+    /// Smallest corner and largest corner of the box's axis-aligned hull in the world.
+    #[must_use]
+    pub fn world_bounds(&self) -> [Vec3; 2] {
+        let corner = |n: usize| {
+            let bit = |k: usize| (n >> k & 1) as f64;
+            self.to_world.point(vec3(bit(0), bit(1), bit(2)))
+        };
+        (1..8).map(corner).fold([corner(0); 2], |[lo, hi], p| [lo.min(p), hi.max(p)])
+    }
+
+    /// The values of one voxel; a single channel stands for all three.
+    ///
+    /// # Panics
+    /// When the voxel lies outside the grid.
+    #[inline]
+    #[must_use]
+    pub fn voxel(&self, voxel: [usize; 3]) -> Rgb {
+        let at = self.flatten(voxel) * self.channels;
+        match self.channels {
+            1 => Rgb::splat(self.values[at]),
+            _ => Rgb::new(self.values[at], self.values[at + 1], self.values[at + 2]),
+        }
+    }
+
+    /// The field at a point of the world.
+    #[inline]
+    #[must_use]
+    pub fn value(&self, x: Vec3) -> Rgb {
+        self.value_at_unit(self.from_world.point(x))
+    }
+
+    /// The field at a point of the unit cube.
+    #[inline]
+    #[must_use]
+    pub fn value_at_unit(&self, u: Vec3) -> Rgb {
+        let cell = self.cell(u);
+        let at = self.corners(&cell);
+        self.per_channel(|c| interpolate(&cell, &self.corner_values(&at, c)))
+    }
+
+    /// Gradient of the field at a point of the world, per scene unit. On the planes between voxels,
+    /// where the slope jumps, the gradient of the side with the larger coordinates.
+    #[inline]
+    #[must_use]
+    pub fn gradient(&self, x: Vec3) -> RgbVec {
+        let cell = self.cell(self.from_world.point(x));
+        let at = self.corners(&cell);
+        let world = |c: usize| {
+            let g = slopes(&cell, &self.corner_values(&at, c));
+            let unit = vec3(
+                g.x * self.axes[0].scale(),
+                g.y * self.axes[1].scale(),
+                g.z * self.axes[2].scale(),
+            );
+            self.from_world.linear.transpose_mul(unit)
+        };
+        match self.channels {
+            1 => Rgb::ONE.outer(world(0)),
+            _ => RgbVec { r: world(0), g: world(1), b: world(2) },
+        }
+    }
+
+    #[inline]
+    fn per_channel(&self, f: impl Fn(usize) -> f64) -> Rgb {
+        match self.channels {
+            1 => Rgb::splat(f(0)),
+            _ => Rgb::new(f(0), f(1), f(2)),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn cell(&self, u: Vec3) -> Cell {
+        [self.axes[0].between(u.x), self.axes[1].between(u.y), self.axes[2].between(u.z)]
+    }
+
+    /// Voxel numbers of a cell's corners; bit k of the position chooses the side along axis k.
+    #[inline]
+    pub(crate) fn corners(&self, cell: &Cell) -> [usize; 8] {
+        let [nx, ny, _] = self.size;
+        let x = [cell[0].lo, cell[0].hi];
+        let y = [cell[1].lo * nx, cell[1].hi * nx];
+        let z = [cell[2].lo * nx * ny, cell[2].hi * nx * ny];
+        core::array::from_fn(|n| x[n & 1] + y[n >> 1 & 1] + z[n >> 2])
+    }
+
+    #[inline]
+    fn corner_values(&self, at: &[usize; 8], channel: usize) -> [f64; 8] {
+        at.map(|i| self.values[i * self.channels + channel])
+    }
+
+    /// Number of a voxel in storage order.
+    #[inline]
+    pub(crate) fn flatten(&self, [i, j, k]: [usize; 3]) -> usize {
+        (k * self.size[1] + j) * self.size[0] + i
+    }
+
+    pub(crate) fn axes(&self) -> &[Axis; 3] {
+        &self.axes
+    }
+
+    pub(crate) fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
+    /// Gives every colour channel its own values.
+    pub(crate) fn spread_channels(&mut self) {
+        if self.channels == 1 {
+            self.values = self.values.iter().flat_map(|&v| [v; 3]).collect();
+            self.channels = 3;
+        }
+    }
+}
+
+/// The voxel with a number in storage order.
+pub(crate) fn unflatten([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
+    [n % nx, n / nx % ny, n / (nx * ny)]
+}
+
+/// Weight of each corner of a cell in the order of [`Grid::corners`].
+#[inline]
+pub(crate) fn corner_weights(cell: &Cell) -> [f64; 8] {
+    let w = cell.map(|b| [1.0 - b.frac, b.frac]);
+    core::array::from_fn(|n| w[0][n & 1] * w[1][n >> 1 & 1] * w[2][n >> 2])
+}
+
+#[inline]
+fn lerp(a: f64, b: f64, s: f64) -> f64 {
+    a + (b - a) * s
+}
+
+#[inline]
+fn interpolate(cell: &Cell, v: &[f64; 8]) -> f64 {
+    let [fx, fy, fz] = cell.map(|b| b.frac);
+    let face = |k: usize| lerp(lerp(v[k], v[k + 1], fx), lerp(v[k + 2], v[k + 3], fx), fy);
+    lerp(face(0), face(4), fz)
+}
+
+/// Slopes of the interpolant along the lattice axes.
+#[inline]
+fn slopes(cell: &Cell, v: &[f64; 8]) -> Vec3 {
+    let [fx, fy, fz] = cell.map(|b| b.frac);
+    let along = |step: usize, a: usize, fa: f64, b: usize, fb: f64| {
+        let d = |k: usize| v[k + step] - v[k];
+        lerp(lerp(d(0), d(a), fa), lerp(d(b), d(a + b), fa), fb)
+    };
+    vec3(along(1, 2, fy, 4, fz), along(2, 1, fx, 4, fz), along(4, 1, fx, 2, fy))
+}
+
+#[cfg(feature = "serde")]
+mod stored {
+    use super::{Affine, Filter, Layout, MediumError, Vec, Wrap};
+
+    /// What a file holds of a grid; everything else follows from it.
+    #[derive(serde::Serialize, serde::Deserialize)]
+    pub(super) struct Grid {
+        size: [usize; 3],
+        channels: usize,
+        layout: Layout,
+        filter: Filter,
+        wrap: Wrap,
+        to_world: Affine,
+        values: Vec<f64>,
+    }
+
+    impl From<super::Grid> for Grid {
+        fn from(g: super::Grid) -> Self {
+            let super::Grid { size, channels, values, layout, filter, wrap, to_world, .. } = g;
+            Self { size, channels, layout, filter, wrap, to_world, values }
+        }
+    }
+
+    impl TryFrom<Grid> for super::Grid {
+        type Error = MediumError;
+        fn try_from(g: Grid) -> Result<Self, MediumError> {
+            Self::new(g.size, g.channels, g.values)?
+                .with_layout(g.layout)
+                .with_filter(g.filter)
+                .with_wrap(g.wrap)
+                .with_placement(g.to_world)
+        }
+    }
+}

@@ -1,0 +1,259 @@
+use core::ops::ControlFlow;
+
+use drt_math::{Affine, Rgb, RgbVec, Vec3};
+
+use crate::bounds::{Bounds, in_unit_cube};
+use crate::homogeneous::check;
+use crate::{
+    CoefficientGradients, Coefficients, DensityField, Grid, MediumError, Piece, Property, Ray,
+};
+
+/// A quantity in space: one constant or a grid.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Volume {
+    /// The same everywhere.
+    Constant(Rgb),
+    /// Given by voxels.
+    Grid(Grid),
+}
+
+impl Volume {
+    /// The quantity at a point of the world.
+    #[inline]
+    #[must_use]
+    pub fn value(&self, x: Vec3) -> Rgb {
+        match self {
+            Self::Constant(c) => *c,
+            Self::Grid(g) => g.value(x),
+        }
+    }
+    /// Its gradient there, per scene unit.
+    #[inline]
+    #[must_use]
+    pub fn gradient(&self, x: Vec3) -> RgbVec {
+        match self {
+            Self::Constant(_) => RgbVec::ZERO,
+            Self::Grid(g) => g.gradient(x),
+        }
+    }
+    /// The grid, if it is one.
+    #[must_use]
+    pub fn grid(&self) -> Option<&Grid> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Grid(g) => Some(g),
+        }
+    }
+    fn is_zero(&self) -> bool {
+        match self {
+            Self::Constant(c) => c.is_zero(),
+            Self::Grid(g) => g.values().iter().all(|&v| v == 0.0),
+        }
+    }
+    fn check(&self, property: Property) -> Result<(), MediumError> {
+        match self {
+            Self::Constant(c) => check(property, *c),
+            Self::Grid(g) => check_grid(property, g),
+        }
+    }
+    pub(crate) fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
+        match self {
+            Self::Constant(_) => Ok(()),
+            Self::Grid(g) => g.place(map),
+        }
+    }
+}
+
+fn check_grid(property: Property, grid: &Grid) -> Result<(), MediumError> {
+    grid.values().iter().try_for_each(|&v| check(property, Rgb::splat(v)))
+}
+
+/// A medium given by voxels: extinction = scale × density grid, with albedo and emission from
+/// grids of their own (each with its own resolution and placement) or constant.
+///
+/// The medium ends at the box of its *density* grid: outside there is nothing, even where a wrap
+/// mode would continue the values. Changes of a parameter may push values outside the physical
+/// range; every estimate is then that of the analytic continuation.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "stored::GridMedium", try_from = "stored::GridMedium"))]
+pub struct GridMedium {
+    pub(crate) density: Grid,
+    pub(crate) scale: f64,
+    pub(crate) albedo: Volume,
+    pub(crate) emission: Volume,
+    bounds: Bounds,
+    floor_fraction: f64,
+}
+
+impl GridMedium {
+    /// Fraction of the largest extinction that is the least majorant of defensive sampling.
+    pub const DEFAULT_FLOOR_FRACTION: f64 = 0.1;
+
+    /// A medium with extinction `scale × density` (1 / scene unit), and emitted radiance `emission`.
+    ///
+    /// # Errors
+    /// When a coefficient is negative or not finite, or an albedo exceeds one.
+    pub fn new(
+        density: Grid,
+        scale: f64,
+        albedo: Volume,
+        emission: Volume,
+    ) -> Result<Self, MediumError> {
+        check(Property::SigmaT, Rgb::splat(scale))?;
+        check_grid(Property::SigmaT, &density)?;
+        albedo.check(Property::Albedo)?;
+        emission.check(Property::Emission)?;
+        let bounds = Bounds::new(&density);
+        let floor_fraction = Self::DEFAULT_FLOOR_FRACTION;
+        Ok(Self { density, scale, albedo, emission, bounds, floor_fraction })
+    }
+
+    /// Another least majorant for defensive sampling, as a fraction of the largest extinction.
+    #[must_use]
+    pub fn with_floor_fraction(mut self, fraction: f64) -> Self {
+        self.floor_fraction = fraction.clamp(0.0, 1.0);
+        self
+    }
+
+    /// The density grid.
+    #[must_use]
+    pub fn density(&self) -> &Grid {
+        &self.density
+    }
+    /// What the density is multiplied with.
+    #[must_use]
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+    /// The albedo.
+    #[must_use]
+    pub fn albedo(&self) -> &Volume {
+        &self.albedo
+    }
+    /// The emitted radiance.
+    #[must_use]
+    pub fn emission(&self) -> &Volume {
+        &self.emission
+    }
+    /// Largest extinction in the medium over all channels, in 1 / scene unit.
+    #[must_use]
+    pub fn largest_sigma_t(&self) -> f64 {
+        self.scale * self.bounds.largest()
+    }
+
+    pub(crate) fn is_scattering(&self) -> bool {
+        self.largest_sigma_t() > 0.0 && !self.albedo.is_zero()
+    }
+    pub(crate) fn is_emissive(&self) -> bool {
+        let absorbs = match &self.albedo {
+            Volume::Constant(c) => *c != Rgb::ONE,
+            Volume::Grid(g) => g.values().iter().any(|&v| v != 1.0),
+        };
+        self.largest_sigma_t() > 0.0 && absorbs && !self.emission.is_zero()
+    }
+
+    /// True where the medium can be: in the closed box of the density grid.
+    #[inline]
+    #[must_use]
+    pub fn contains(&self, x: Vec3) -> bool {
+        in_unit_cube(self.density.from_world().point(x))
+    }
+
+    /// Moves all grids by a map of the world.
+    ///
+    /// # Errors
+    /// When the map is singular.
+    pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
+        self.density.place(map)?;
+        self.albedo.place(map)?;
+        self.emission.place(map)
+    }
+}
+
+impl DensityField for GridMedium {
+    #[inline]
+    fn coefficients(&self, x: Vec3) -> Coefficients {
+        let u = self.density.from_world().point(x);
+        if !in_unit_cube(u) {
+            return Coefficients::VACUUM;
+        }
+        Coefficients {
+            sigma_t: self.density.value_at_unit(u) * self.scale,
+            albedo: self.albedo.value(x),
+            emission: self.emission.value(x),
+        }
+    }
+
+    #[inline]
+    fn sigma_t(&self, x: Vec3) -> Rgb {
+        let u = self.density.from_world().point(x);
+        if in_unit_cube(u) { self.density.value_at_unit(u) * self.scale } else { Rgb::ZERO }
+    }
+
+    fn gradients(&self, x: Vec3) -> CoefficientGradients {
+        if !self.contains(x) {
+            return CoefficientGradients::ZERO;
+        }
+        CoefficientGradients {
+            sigma_t: self.density.gradient(x) * self.scale,
+            albedo: self.albedo.gradient(x),
+            emission: self.emission.gradient(x),
+        }
+    }
+
+    #[inline]
+    fn pieces(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>) {
+        self.bounds.walk(&self.density, self.scale, ray, visit);
+    }
+
+    fn majorant_floor(&self) -> f64 {
+        let largest = self.largest_sigma_t();
+        if largest > 0.0 {
+            self.floor_fraction * largest
+        } else {
+            // An empty medium has no extinction to compare with: one tentative collision, on
+            // average, along the box's diagonal.
+            let [lo, hi] = self.density.world_bounds();
+            1.0 / (hi - lo).length()
+        }
+    }
+
+    fn feature_size(&self) -> f64 {
+        let edges = self.density.to_world().linear.cols;
+        let size = self.density.size();
+        let widths = [0, 1, 2].map(|k| edges[k].length() / size[k] as f64);
+        widths.into_iter().fold(f64::INFINITY, f64::min)
+    }
+}
+
+#[cfg(feature = "serde")]
+mod stored {
+    use super::{Grid, MediumError, Volume};
+
+    /// What a file holds of a grid medium; the bounds follow from it.
+    #[derive(serde::Serialize, serde::Deserialize)]
+    pub(super) struct GridMedium {
+        density: Grid,
+        scale: f64,
+        albedo: Volume,
+        emission: Volume,
+        floor_fraction: f64,
+    }
+
+    impl From<super::GridMedium> for GridMedium {
+        fn from(m: super::GridMedium) -> Self {
+            let super::GridMedium { density, scale, albedo, emission, floor_fraction, .. } = m;
+            Self { density, scale, albedo, emission, floor_fraction }
+        }
+    }
+
+    impl TryFrom<GridMedium> for super::GridMedium {
+        type Error = MediumError;
+        fn try_from(m: GridMedium) -> Result<Self, MediumError> {
+            let medium = Self::new(m.density, m.scale, m.albedo, m.emission)?;
+            Ok(medium.with_floor_fraction(m.floor_fraction))
+        }
+    }
+}

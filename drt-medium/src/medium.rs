@@ -1,0 +1,241 @@
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::ops::ControlFlow;
+
+use drt_math::{Affine, Rgb, Rng, Vec3};
+
+use crate::tracking::zip;
+use crate::{
+    CoefficientGradients, Coefficients, DensityField, DistanceSample, GridMedium, Homogeneous,
+    MediumError, Phase, Ray, TrackingStats, tracking,
+};
+
+/// Where a medium gets its coefficients from.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum MediumKind {
+    /// One set of coefficients everywhere.
+    Homogeneous(Homogeneous),
+    /// Voxels in a box.
+    Grid(GridMedium),
+    /// A field of the user's own. It takes part in everything but changes of parameters, and is
+    /// not serialised.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    Custom(Arc<dyn DensityField>),
+}
+
+/// A participating medium: coefficients in space and a phase function.
+///
+/// Rays are given as `origin + t dir` with unit `dir` and `0 < t < t_max`, lengths in scene
+/// units; `t_max` may be infinite. All sampling is detached: weights are to be used as numbers,
+/// derivatives come from [`Medium::gradients`] and tangents.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Medium {
+    /// The coefficients.
+    pub kind: MediumKind,
+    /// The distribution of scattered directions.
+    pub phase: Phase,
+}
+
+impl From<Homogeneous> for MediumKind {
+    fn from(h: Homogeneous) -> Self {
+        Self::Homogeneous(h)
+    }
+}
+
+impl From<GridMedium> for MediumKind {
+    fn from(g: GridMedium) -> Self {
+        Self::Grid(g)
+    }
+}
+
+impl Medium {
+    /// A medium from its parts.
+    #[must_use]
+    pub fn new(kind: impl Into<MediumKind>, phase: Phase) -> Self {
+        Self { kind: kind.into(), phase }
+    }
+
+    /// Everything at a point.
+    #[inline]
+    #[must_use]
+    pub fn coefficients(&self, x: Vec3) -> Coefficients {
+        match &self.kind {
+            MediumKind::Homogeneous(h) => h.coefficients(),
+            MediumKind::Grid(g) => g.coefficients(x),
+            MediumKind::Custom(f) => f.coefficients(x),
+        }
+    }
+
+    /// The extinction at a point, in 1 / scene unit.
+    #[inline]
+    #[must_use]
+    pub fn sigma_t(&self, x: Vec3) -> Rgb {
+        match &self.kind {
+            MediumKind::Homogeneous(h) => h.coefficients().sigma_t,
+            MediumKind::Grid(g) => g.sigma_t(x),
+            MediumKind::Custom(f) => f.sigma_t(x),
+        }
+    }
+
+    /// Spatial gradients at a point of the medium at rest. Jumps at the box of a grid are not in
+    /// them.
+    #[inline]
+    #[must_use]
+    pub fn gradients(&self, x: Vec3) -> CoefficientGradients {
+        match &self.kind {
+            MediumKind::Homogeneous(_) => CoefficientGradients::ZERO,
+            MediumKind::Grid(g) => g.gradients(x),
+            MediumKind::Custom(f) => f.gradients(x),
+        }
+    }
+
+    /// The coefficients of a medium that has the same everywhere.
+    #[inline]
+    #[must_use]
+    pub fn homogeneous(&self) -> Option<&Homogeneous> {
+        match &self.kind {
+            MediumKind::Homogeneous(h) => Some(h),
+            _ => None,
+        }
+    }
+
+    /// The grids of a medium that has them.
+    #[inline]
+    #[must_use]
+    pub fn grid(&self) -> Option<&GridMedium> {
+        match &self.kind {
+            MediumKind::Grid(g) => Some(g),
+            _ => None,
+        }
+    }
+
+    /// False when no point of the medium emits. Custom fields are taken to emit.
+    #[must_use]
+    pub fn is_emissive(&self) -> bool {
+        match &self.kind {
+            MediumKind::Homogeneous(h) => !h.coefficients().source().is_zero(),
+            MediumKind::Grid(g) => g.is_emissive(),
+            MediumKind::Custom(_) => true,
+        }
+    }
+
+    /// False when no point of the medium scatters. Custom fields are taken to scatter.
+    #[must_use]
+    pub fn is_scattering(&self) -> bool {
+        match &self.kind {
+            MediumKind::Homogeneous(h) => !h.coefficients().sigma_s().is_zero(),
+            MediumKind::Grid(g) => g.is_scattering(),
+            MediumKind::Custom(_) => true,
+        }
+    }
+
+    /// Samples a distance; see [`tracking::sample_distance`] and [`Homogeneous::free_flight_pdf`]
+    /// for the densities. `channels` are the nonnegative weights of the colour channels
+    /// (throughput), `defensive` in [0, 1) is the least probability of an event where the medium
+    /// could have one; 0 is plain free flight.
+    #[inline]
+    #[expect(clippy::too_many_arguments, reason = "a ray, three choices and two sinks")]
+    pub fn sample_distance(
+        &self,
+        origin: Vec3,
+        dir: Vec3,
+        t_max: f64,
+        channels: Rgb,
+        defensive: f64,
+        rng: &mut Rng,
+        stats: &mut TrackingStats,
+    ) -> DistanceSample {
+        let ray = Ray::new(origin, dir, t_max);
+        match &self.kind {
+            MediumKind::Homogeneous(h) => h.sample_distance(t_max, channels, defensive, rng),
+            MediumKind::Grid(g) => {
+                tracking::sample_distance(g, &ray, channels, defensive, rng, stats)
+            }
+            MediumKind::Custom(f) => {
+                tracking::sample_distance(&**f, &ray, channels, defensive, rng, stats)
+            }
+        }
+    }
+
+    /// The density of [`Medium::sample_distance`] at the distance t: exact for a homogeneous
+    /// medium, otherwise the positive stand-in of [`tracking::approximate_pdf`] for weights of
+    /// multiple importance sampling.
+    #[must_use]
+    pub fn free_flight_pdf(&self, ray: &Ray, t: f64, channels: Rgb, defensive: f64) -> f64 {
+        match &self.kind {
+            MediumKind::Homogeneous(h) => h.free_flight_pdf(t, ray.t_max, channels, defensive),
+            MediumKind::Grid(g) => tracking::approximate_pdf(g, ray, t, channels, defensive),
+            MediumKind::Custom(f) => tracking::approximate_pdf(&**f, ray, t, channels, defensive),
+        }
+    }
+
+    /// Transmittance of the segment: exact for a homogeneous medium, otherwise an unbiased
+    /// estimate.
+    #[inline]
+    pub fn transmittance(
+        &self,
+        origin: Vec3,
+        dir: Vec3,
+        t_max: f64,
+        rng: &mut Rng,
+        stats: &mut TrackingStats,
+    ) -> Rgb {
+        let ray = Ray::new(origin, dir, t_max);
+        match &self.kind {
+            MediumKind::Homogeneous(h) => h.transmittance(t_max),
+            MediumKind::Grid(g) => tracking::transmittance(g, &ray, rng, stats),
+            MediumKind::Custom(f) => tracking::transmittance(&**f, &ray, rng, stats),
+        }
+    }
+
+    /// Points and weights `(t, w)` such that `sum w h(t)` estimates `∫_0^t_max h(t) dt` without
+    /// bias for an h that vanishes where the medium's box is not; appended to `out`. A homogeneous
+    /// medium, whose integrals have closed forms, adds none.
+    pub fn line_points(
+        &self,
+        origin: Vec3,
+        dir: Vec3,
+        t_max: f64,
+        rng: &mut Rng,
+        out: &mut Vec<(f64, f64)>,
+    ) {
+        let ray = Ray::new(origin, dir, t_max);
+        match &self.kind {
+            MediumKind::Homogeneous(_) => {}
+            MediumKind::Grid(g) => tracking::line_points(g, &ray, rng, out),
+            MediumKind::Custom(f) => tracking::line_points(&**f, &ray, rng, out),
+        }
+    }
+
+    /// An upper bound of the extinction along a ray.
+    #[must_use]
+    pub fn majorant(&self, ray: &Ray) -> Rgb {
+        let bound = |field: &dyn DensityField| {
+            let mut bound = Rgb::ZERO;
+            field.pieces(ray, &mut |p| {
+                bound = zip(bound, p.majorant, f64::max);
+                ControlFlow::Continue(())
+            });
+            bound
+        };
+        match &self.kind {
+            MediumKind::Homogeneous(h) => h.coefficients().sigma_t,
+            MediumKind::Grid(g) => bound(g),
+            MediumKind::Custom(f) => bound(&**f),
+        }
+    }
+
+    /// Moves the grids by a map of the world. A homogeneous medium has nothing that could move;
+    /// surfaces bound it. A custom field places itself.
+    ///
+    /// # Errors
+    /// When the map is singular.
+    pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
+        match &mut self.kind {
+            MediumKind::Grid(g) => g.place(map),
+            MediumKind::Homogeneous(_) | MediumKind::Custom(_) => Ok(()),
+        }
+    }
+}
