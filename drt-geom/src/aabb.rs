@@ -1,0 +1,50 @@
+use drt_math::{Vec3, vec3};
+
+/// An axis-aligned box; empty when `min > max`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Aabb {
+    /// Smallest coordinates.
+    pub min: Vec3,
+    /// Largest coordinates.
+    pub max: Vec3,
+}
+
+impl Aabb {
+    /// The box of no points.
+    pub const EMPTY: Self = Self {
+        min: vec3(f64::INFINITY, f64::INFINITY, f64::INFINITY),
+        max: vec3(f64::NEG_INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY),
+    };
+
+    /// The smallest box around some points.
+    #[must_use]
+    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
+        points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+    }
+    /// The smallest box around two boxes.
+    #[must_use]
+    pub fn union(&self, o: &Self) -> Self {
+        Self { min: self.min.min(o.min), max: self.max.max(o.max) }
+    }
+    /// True when it holds no point.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        !(self.min.x <= self.max.x && self.min.y <= self.max.y && self.min.z <= self.max.z)
+    }
+    /// The middle; not finite for the empty box.
+    #[must_use]
+    pub fn center(&self) -> Vec3 {
+        self.min * 0.5 + self.max * 0.5
+    }
+    /// Edge lengths; negative for the empty box.
+    #[must_use]
+    pub fn extent(&self) -> Vec3 {
+        self.max - self.min
+    }
+    /// True when the point lies inside or on the boundary.
+    #[must_use]
+    pub fn contains(&self, p: Vec3) -> bool {
+        (0..3).all(|k| self.min[k] <= p[k] && p[k] <= self.max[k])
+    }
+}

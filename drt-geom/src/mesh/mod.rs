@@ -1,0 +1,289 @@
+use alloc::vec::Vec;
+
+use drt_math::{Affine, Mat3, Vec3};
+
+use crate::Aabb;
+
+mod clean;
+mod smooth;
+
+/// A triangle mesh: positions, triangles, and shading normals where the surface has them.
+///
+/// Triangles list their vertices counter-clockwise seen from outside, so that
+/// `(v1 - v0) × (v2 - v0)` points outward. [`Mesh::new`] establishes what every method relies on:
+/// finite coordinates and indices in range; code that edits the fields keeps it so.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(try_from = "unchecked::Mesh")
+)]
+pub struct Mesh {
+    /// Vertex positions.
+    pub positions: Vec<Vec3>,
+    /// Unit shading normals, one per vertex.
+    pub normals: Option<Vec<Vec3>>,
+    /// Vertex indices of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// The index of each vertex in the order of the file it came from, where the loader split
+    /// vertices (a position with several normals) or left some out. `None` is the identity.
+    pub source_vertices: Option<Vec<u32>>,
+    /// How many vertices the file held.
+    pub source_vertex_count: u32,
+}
+
+/// Why a mesh cannot be made of the given arrays.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// A coordinate is NaN or infinite.
+    #[error("vertex {vertex} (from 0) has a coordinate that is not a finite number")]
+    NonFinitePosition {
+        /// Which vertex.
+        vertex: usize,
+    },
+    /// A normal is NaN, infinite or of length zero.
+    #[error("the normal of vertex {vertex} (from 0) must be finite and not zero")]
+    BadNormal {
+        /// Which vertex.
+        vertex: usize,
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} (from 0) names vertex {index}, but there are only {count}")]
+    IndexOutOfRange {
+        /// Which triangle.
+        triangle: usize,
+        /// The index it names.
+        index: u32,
+        /// How many vertices there are.
+        count: usize,
+    },
+    /// An array with one entry per vertex has another length.
+    #[error("{what} has {found} entries; it needs one for each of the {expected} vertices")]
+    WrongLength {
+        /// Which array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The number of vertices.
+        expected: usize,
+    },
+    /// A source index is not below the source's vertex count.
+    #[error(
+        "vertex {vertex} (from 0) claims source vertex {index}, but the source has only {count}"
+    )]
+    SourceOutOfRange {
+        /// Which vertex.
+        vertex: usize,
+        /// The source index it claims.
+        index: u32,
+        /// How many vertices the source has.
+        count: u32,
+    },
+    /// More vertices or triangles than 32-bit indices can name.
+    #[error("{count} {what} are too many: at most 4294967294 can be indexed")]
+    TooLarge {
+        /// Vertices or triangles.
+        what: &'static str,
+        /// How many there are.
+        count: usize,
+    },
+}
+
+impl Mesh {
+    /// A mesh without shading normals.
+    ///
+    /// # Errors
+    /// When a coordinate is not finite or a triangle names a missing vertex.
+    pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
+        for (what, count) in [("vertices", positions.len()), ("triangles", triangles.len())] {
+            if count >= crate::NONE as usize {
+                return Err(MeshError::TooLarge { what, count });
+            }
+        }
+        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
+            return Err(MeshError::NonFinitePosition { vertex });
+        }
+        let count = positions.len();
+        for (triangle, corners) in triangles.iter().enumerate() {
+            if let Some(&index) = corners.iter().find(|&&i| i as usize >= count) {
+                return Err(MeshError::IndexOutOfRange { triangle, index, count });
+            }
+        }
+        let source_vertex_count = count as u32;
+        Ok(Self { positions, triangles, normals: None, source_vertices: None, source_vertex_count })
+    }
+
+    /// The same mesh with the given shading normals, brought to unit length.
+    ///
+    /// # Errors
+    /// When their number differs from the vertices' or one has no direction.
+    pub fn with_normals(mut self, mut normals: Vec<Vec3>) -> Result<Self, MeshError> {
+        self.expect_per_vertex("normals", normals.len())?;
+        for (vertex, n) in normals.iter_mut().enumerate() {
+            *n = direction(*n).ok_or(MeshError::BadNormal { vertex })?;
+        }
+        self.normals = Some(normals);
+        Ok(self)
+    }
+
+    /// The same mesh, remembering which of a file's `count` vertices each vertex is.
+    ///
+    /// # Errors
+    /// When the number of entries differs from the vertices' or one is not below `count`.
+    pub fn with_source(mut self, vertices: Vec<u32>, count: u32) -> Result<Self, MeshError> {
+        self.expect_per_vertex("source_vertices", vertices.len())?;
+        if let Some(vertex) = vertices.iter().position(|&s| s >= count) {
+            return Err(MeshError::SourceOutOfRange { vertex, index: vertices[vertex], count });
+        }
+        let identity = count as usize == vertices.len()
+            && vertices.iter().enumerate().all(|(i, &s)| i == s as usize);
+        self.source_vertices = if identity { None } else { Some(vertices) };
+        self.source_vertex_count = count;
+        Ok(self)
+    }
+
+    fn expect_per_vertex(&self, what: &'static str, found: usize) -> Result<(), MeshError> {
+        let expected = self.positions.len();
+        if found == expected {
+            Ok(())
+        } else {
+            Err(MeshError::WrongLength { what, found, expected })
+        }
+    }
+
+    /// The index, in the source file's order, of a vertex.
+    #[must_use]
+    pub fn source_vertex(&self, vertex: u32) -> u32 {
+        self.source_vertices.as_ref().map_or(vertex, |s| s[vertex as usize])
+    }
+
+    /// The corners of a triangle.
+    #[inline]
+    #[must_use]
+    pub fn triangle(&self, i: u32) -> [Vec3; 3] {
+        self.triangles[i as usize].map(|v| self.positions[v as usize])
+    }
+
+    /// All triangles by their corners, in order: what [`TriangleBvh::build`](crate::TriangleBvh::build)
+    /// takes.
+    #[must_use]
+    pub fn soup(&self) -> Vec<[Vec3; 3]> {
+        (0..self.triangles.len() as u32).map(|i| self.triangle(i)).collect()
+    }
+
+    /// Unit geometric normal of a triangle; zero for a triangle without area.
+    #[must_use]
+    pub fn normal(&self, i: u32) -> Vec3 {
+        let [a, b, c] = self.triangle(i);
+        let (e1, e2) = (b - a, c - a);
+        // Brought to size one first, so that neither tiny nor huge triangles lose their normal.
+        let size = f64::max(e1.max_abs(), e2.max_abs());
+        if size == 0.0 {
+            return Vec3::ZERO;
+        }
+        direction((e1 / size).cross(e2 / size)).unwrap_or(Vec3::ZERO)
+    }
+
+    /// Area of a triangle.
+    #[must_use]
+    pub fn area(&self, i: u32) -> f64 {
+        let [a, b, c] = self.triangle(i);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Sum of the triangles' areas.
+    #[must_use]
+    pub fn surface_area(&self) -> f64 {
+        (0..self.triangles.len() as u32).map(|i| self.area(i)).sum()
+    }
+
+    /// Signed volume: positive for a closed mesh with outward normals. For an open mesh, that of the
+    /// cone from the middle of its bounds.
+    #[must_use]
+    pub fn volume(&self) -> f64 {
+        // Relative to the middle: far from the origin the terms would cancel.
+        let o = self.bounds().center();
+        let six = |[a, b, c]: [Vec3; 3]| (a - o).dot((b - o).cross(c - o));
+        (0..self.triangles.len() as u32).map(|i| six(self.triangle(i))).sum::<f64>() / 6.0
+    }
+
+    /// The smallest box around all positions.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb {
+        Aabb::around(self.positions.iter().copied())
+    }
+
+    /// The image under a finite map: positions by the map, normals by its inverse transpose.
+    ///
+    /// A mirroring map (negative determinant) also reverses the vertex order of every triangle, so
+    /// that what was outside stays outside. Triangles and vertices keep their numbers.
+    #[must_use]
+    pub fn transform(&self, map: &Affine) -> Self {
+        let [a, b, c] = map.linear.cols;
+        // det · M⁻ᵀ, which also exists when the map flattens the mesh into a plane.
+        let cofactors = Mat3 { cols: [b.cross(c), c.cross(a), a.cross(b)] };
+        let mirrored = map.linear.determinant() < 0.0;
+        let side = if mirrored { -1.0 } else { 1.0 };
+        let turn = |n: &Vec3| direction(cofactors * *n * side).unwrap_or(*n);
+        let mut image = Self {
+            positions: self.positions.iter().map(|p| map.point(*p)).collect(),
+            normals: self.normals.as_ref().map(|ns| ns.iter().map(turn).collect()),
+            ..self.clone()
+        };
+        if mirrored {
+            image.reverse_winding();
+        }
+        image
+    }
+
+    /// Turns the surface inside out: vertex order and shading normals.
+    pub fn flip(&mut self) {
+        self.reverse_winding();
+        for n in self.normals.iter_mut().flatten() {
+            *n = -*n;
+        }
+    }
+
+    fn reverse_winding(&mut self) {
+        for t in &mut self.triangles {
+            t.swap(1, 2);
+        }
+    }
+}
+
+/// The unit vector along `v`, for any finite length but zero.
+pub(crate) fn direction(v: Vec3) -> Option<Vec3> {
+    let size = v.max_abs();
+    (v.is_finite() && size > 0.0).then(|| (v / size).normalize())
+}
+
+#[cfg(feature = "serde")]
+mod unchecked {
+    use super::{MeshError, Vec, Vec3};
+
+    /// A mesh as stored, before its arrays are checked against each other.
+    #[derive(serde::Deserialize)]
+    pub(super) struct Mesh {
+        positions: Vec<Vec3>,
+        normals: Option<Vec<Vec3>>,
+        triangles: Vec<[u32; 3]>,
+        source_vertices: Option<Vec<u32>>,
+        source_vertex_count: u32,
+    }
+
+    impl TryFrom<Mesh> for super::Mesh {
+        type Error = MeshError;
+        fn try_from(m: Mesh) -> Result<Self, MeshError> {
+            let mesh = Self::new(m.positions, m.triangles)?;
+            let mesh = match m.source_vertices {
+                Some(v) => mesh.with_source(v, m.source_vertex_count)?,
+                None => mesh,
+            };
+            match m.normals {
+                Some(n) => mesh.with_normals(n),
+                None => Ok(mesh),
+            }
+        }
+    }
+}

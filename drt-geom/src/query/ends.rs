@@ -1,0 +1,90 @@
+//! What keeps a ray from meeting the surface it starts or ends on.
+//!
+//! A point on a surface is a rounded point: interpolated from three vertices it lies off the
+//! triangle by at most a few units of rounding of their coordinates. A ray from there meets its own
+//! triangle at some t of either sign, and next to an edge or a vertex also the neighbours. Its own
+//! triangles are excluded by number ([`Skip`](super::Skip)). Any other is passed over when the
+//! ray's end itself lies *on* it to within that rounding error: inside the triangle's box widened
+//! by the error, and off its plane by no more than the error bound of that distance. Nothing here
+//! depends on the size of the scene or on the direction of the ray, and triangles that the end does
+//! not touch are never dropped, however close the hit.
+
+use super::watertight::Corners;
+
+/// Unit roundoff of `f64`.
+const U: f64 = f64::EPSILON / 2.0;
+
+/// `n u / (1 - n u)`: bound of the relative error of `n` roundings (Higham 2002, Lemma 3.1).
+const fn gamma(n: f64) -> f64 {
+    n * U / (1.0 - n * U)
+}
+
+/// Error, relative to the largest coordinate of the triangle, allowed to a point said to lie on it.
+/// Barycentric interpolation with the third weight computed as `1 - b1 - b2` needs gamma(7), a point
+/// on an edge by `lerp` gamma(5).
+const ON_SURFACE: f64 = gamma(16.0);
+
+/// An end of a ray, with the rounding error of its coordinates beyond that of a point interpolated
+/// on a triangle.
+#[derive(Clone, Copy)]
+pub(super) struct End {
+    point: [f64; 3],
+    error: [f64; 3],
+}
+
+impl End {
+    /// The origin, as given.
+    #[inline]
+    pub(super) fn origin(origin: [f64; 3]) -> Self {
+        Self { point: origin, error: [0.0; 3] }
+    }
+
+    /// The point `origin + t dir`, whose terms were rounded, `dir` perhaps by a subtraction.
+    pub(super) fn far(origin: [f64; 3], dir: [f64; 3], t: f64) -> Self {
+        let error = |k: usize| gamma(4.0) * (origin[k].abs() + (t * dir[k]).abs());
+        Self {
+            point: [0, 1, 2].map(|k| origin[k] + t * dir[k]),
+            error: [error(0), error(1), error(2)],
+        }
+    }
+
+    /// Whether the end lies on the triangle, as far as rounding lets one tell.
+    ///
+    /// `leaving` is the direction away from the end along the ray. Right at the triangle the sign of
+    /// a computed hit distance is less certain than that of the end's distance to the plane, so an
+    /// end from which the ray moves off the plane counts too.
+    #[inline]
+    pub(super) fn lies_on(&self, triangle: &Corners, leaving: [f64; 3]) -> bool {
+        let mut slack = [0.0; 3];
+        for k in 0..3 {
+            let [a, b, c] = [triangle[0][k], triangle[1][k], triangle[2][k]];
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            slack[k] = ON_SURFACE * low.abs().max(high.abs()) + self.error[k];
+            // Written so that a NaN counts as outside.
+            if !(self.point[k] >= low - slack[k] && self.point[k] <= high + slack[k]) {
+                return false;
+            }
+        }
+        self.touches_plane(triangle, slack, leaving)
+    }
+
+    #[cold]
+    fn touches_plane(&self, triangle: &Corners, slack: [f64; 3], leaving: [f64; 3]) -> bool {
+        let [v0, v1, v2] = triangle;
+        let (mut distance, mut distance_error) = (0.0, 0.0);
+        let (mut approach, mut approach_error) = (0.0, 0.0);
+        for k in 0..3 {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            let (p, q) = ((v1[i] - v0[i]) * (v2[j] - v0[j]), (v1[j] - v0[j]) * (v2[i] - v0[i]));
+            let (normal, magnitude) = (p - q, p.abs() + q.abs());
+            let offset = self.point[k] - v0[k];
+            distance += normal * offset;
+            distance_error +=
+                normal.abs() * slack[k] + magnitude * gamma(8.0) * (offset.abs() + slack[k]);
+            approach += normal * leaving[k];
+            approach_error += magnitude * gamma(8.0) * leaving[k].abs();
+        }
+        distance.abs() <= distance_error
+            || (approach.abs() > approach_error && (distance > 0.0) == (approach > 0.0))
+    }
+}

@@ -1,0 +1,188 @@
+//! Single-precision boxes that lose no double-precision hit.
+//!
+//! The tree holds its boxes in `f32`, in coordinates centred on the scene and scaled to [-1, 1].
+//! A ray is first clipped to the scene's box in `f64`, so that its origin has such coordinates too,
+//! however far away it started. All roundings of a slab test then shift box planes by at most
+//! about 14 · 2^-24 (conversion of the origin 1, difference 2, inverse direction and products 6,
+//! decompression of quantized boxes 5), and every box is padded by 32 · 2^-24. The rounding of the
+//! hits themselves moves a triangle by a few 2^-53 of its distance from the ray's origin, which is
+//! less than the padding left as long as the origin is within 2^28 scene sizes.
+
+use drt_math::Vec3;
+
+use super::ray::Ray;
+use crate::Aabb;
+
+/// Padding of every box, in units of the scene's half extent.
+const PADDING: f64 = 1.0 / (1 << 19) as f64;
+
+/// Length (largest coordinate) of a box ray's direction. So short that the padding alone keeps a ray
+/// in the box it starts in for a t of one or more: traversals that ignore everything below some
+/// small t (obvhs does below 1e-4) then still see every box.
+const SPEED: f64 = 1.0 / (1 << 20) as f64;
+
+/// Direction coordinates nearer to zero than this are treated as this: over the whole scene it
+/// moves the ray by less than 1e-20.
+const STILL: f32 = 1e-30;
+
+/// The map from the scene's coordinates to those of the boxes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BoxFrame {
+    center: Vec3,
+    scale: f64,
+}
+
+/// A box in the tree's coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Box32 {
+    pub(super) min: [f32; 3],
+    pub(super) max: [f32; 3],
+}
+
+/// A ray in the tree's coordinates, for box tests only.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BoxRay {
+    pub(super) origin: [f32; 3],
+    pub(super) dir: [f32; 3],
+    pub(super) inverse: [f32; 3],
+    /// Where the ray ends, in its own parameter.
+    pub(super) far: f32,
+    start: f64,
+    rate: f64,
+}
+
+impl BoxFrame {
+    /// The frame of a scene with the given bounds.
+    pub(super) fn new(bounds: &Aabb) -> Self {
+        let half = bounds.extent().max_abs() * 0.5;
+        Self { center: bounds.center(), scale: if half > 0.0 { 1.0 / half } else { 1.0 } }
+    }
+
+    /// A point in the tree's coordinates.
+    pub(super) fn local(&self, p: Vec3) -> [f64; 3] {
+        ((p - self.center) * self.scale).to_array()
+    }
+
+    /// Ratio of lengths in the tree's coordinates to lengths in the scene.
+    pub(super) fn scale(&self) -> f64 {
+        self.scale
+    }
+
+    /// The padded box of some points, rounded outward.
+    pub(super) fn enclose(&self, points: &[Vec3; 3]) -> Box32 {
+        points.iter().fold(Box32::EMPTY, |b, p| {
+            let l = self.local(*p);
+            b.union(&Box32 {
+                min: l.map(|c| round_down(c - PADDING)),
+                max: l.map(|c| round_up(c + PADDING)),
+            })
+        })
+    }
+
+    /// The part of the ray near the scene; `None` when it passes the scene by.
+    #[inline]
+    pub(super) fn clip(&self, ray: &Ray) -> Option<BoxRay> {
+        let speed = ray.dir.max_abs() * self.scale;
+        if !(speed > 0.0 && speed < f64::INFINITY && ray.origin.is_finite() && ray.dir.is_finite())
+        {
+            return None;
+        }
+        let origin = self.local(ray.origin);
+        let dir = (ray.dir * self.scale).to_array();
+        let (mut near, mut far) = (0.0, ray.t_max);
+        for k in 0..3 {
+            let reach = 1.0 + 2.0 * PADDING;
+            if dir[k] != 0.0 {
+                let (a, b) = ((-reach - origin[k]) / dir[k], (reach - origin[k]) / dir[k]);
+                near = f64::max(near, f64::min(a, b));
+                far = f64::min(far, f64::max(a, b));
+            } else if origin[k].abs() > reach {
+                return None;
+            }
+        }
+        // Also turns away a NaN end.
+        if !(near <= far && ray.t_max > 0.0) {
+            return None;
+        }
+        // Adding zero turns -0 into 0, for traversals that look at the sign.
+        let dir32 = dir.map(|d| (d / speed * SPEED) as f32 + 0.0);
+        let inverse = dir32.map(|d| if d.abs() < STILL { 1.0 / STILL } else { 1.0 / d });
+        let rate = speed / SPEED;
+        Some(BoxRay {
+            origin: [0, 1, 2].map(|k| (origin[k] + near * dir[k]) as f32),
+            dir: dir32,
+            inverse,
+            far: ((far - near) * rate) as f32 + 1.0,
+            start: near,
+            rate,
+        })
+    }
+}
+
+impl BoxRay {
+    /// The box parameter behind which nothing nearer than the scene's `t` can be.
+    ///
+    /// The padding puts a box's entry at least one before any hit in it (1/2 of it spent on rounding
+    /// box planes, 1/16 on rounding this), so rounding to nearest is enough.
+    #[inline]
+    pub(super) fn limit(&self, t: f64) -> f32 {
+        ((t - self.start) * self.rate) as f32
+    }
+
+    /// Where the ray enters a box, if it does so before `far`.
+    #[inline]
+    pub(super) fn enter(&self, b: &Box32, far: f32) -> Option<f32> {
+        let (mut near, mut far) = (0.0_f32, far);
+        for k in 0..3 {
+            let t0 = (b.min[k] - self.origin[k]) * self.inverse[k];
+            let t1 = (b.max[k] - self.origin[k]) * self.inverse[k];
+            near = near.max(t0.min(t1));
+            far = far.min(t0.max(t1));
+        }
+        (near <= far).then_some(near)
+    }
+}
+
+impl Box32 {
+    pub(super) const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+
+    #[must_use]
+    pub(super) fn union(&self, o: &Self) -> Self {
+        let pick = |f: fn(f32, f32) -> f32, a: &[f32; 3], b: &[f32; 3]| {
+            [f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2])]
+        };
+        Self { min: pick(f32::min, &self.min, &o.min), max: pick(f32::max, &self.max, &o.max) }
+    }
+
+    /// Half the surface area; zero for the empty box.
+    pub(super) fn half_area(&self) -> f32 {
+        let [x, y, z] = [0, 1, 2].map(|k| (self.max[k] - self.min[k]).max(0.0));
+        x * y + y * z + z * x
+    }
+
+    /// Twice the middle.
+    pub(super) fn doubled_center(&self) -> [f32; 3] {
+        [0, 1, 2].map(|k| self.min[k] + self.max[k])
+    }
+
+    /// Squared distance of a point from the box; zero inside.
+    pub(super) fn distance_squared(&self, p: [f64; 3]) -> f64 {
+        (0..3)
+            .map(|k| {
+                let (low, high) = (f64::from(self.min[k]), f64::from(self.max[k]));
+                let d = f64::max(f64::max(low - p[k], p[k] - high), 0.0);
+                d * d
+            })
+            .sum()
+    }
+}
+
+fn round_down(x: f64) -> f32 {
+    let r = x as f32;
+    if f64::from(r) > x { r.next_down() } else { r }
+}
+
+fn round_up(x: f64) -> f32 {
+    let r = x as f32;
+    if f64::from(r) < x { r.next_up() } else { r }
+}
