@@ -48,6 +48,17 @@ impl VertexGradient {
         SurfaceElement::new(mesh, point).scatter(adjoint, self);
     }
 
+    /// Adds the transpose of the [velocity](SurfaceMotion::velocity) at a point alone.
+    ///
+    /// # Panics
+    /// As [`scatter`](Self::scatter).
+    pub fn scatter_velocity(&mut self, mesh: &Mesh, point: &SurfacePoint, u: Vec3) {
+        let corners = mesh.triangles[point.triangle as usize];
+        for (i, w) in corners.into_iter().zip(point.weights()) {
+            self.positions[i as usize] += u * w;
+        }
+    }
+
     /// Adds another gradient of the same mesh: for buffers filled in parallel.
     pub fn add(&mut self, other: &Self) {
         let pairs = self.positions.iter_mut().zip(&other.positions);
@@ -99,6 +110,20 @@ impl VertexGradient {
         }
         positions
     }
+}
+
+/// Sums a gradient over the mesh vertices that stem from the same vertex of the mesh's file: the
+/// gradient with respect to velocities in the order of the file.
+///
+/// # Panics
+/// When there are fewer entries than mesh vertices.
+#[must_use]
+pub fn in_file_order(mesh: &Mesh, per_vertex: &[Vec3]) -> Vec<Vec3> {
+    let mut per_source = vec![Vec3::ZERO; mesh.source_vertex_count as usize];
+    for i in 0..mesh.positions.len() as u32 {
+        per_source[mesh.source_vertex(i) as usize] += per_vertex[i as usize];
+    }
+    per_source
 }
 
 /// A gradient with respect to the twelve coefficients of an affine velocity field A x + t.

@@ -16,7 +16,7 @@ pub struct MotionError {
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum Cause {
-    /// A list of velocities does not fit the mesh.
+    /// A list of velocities does not fit the mesh's file.
     #[error(
         "expected {expected} velocities, one per vertex of the mesh file in its order, found {found}"
     )]
@@ -24,6 +24,14 @@ pub enum Cause {
         /// Vertices in the file.
         expected: usize,
         /// Velocities given.
+        found: usize,
+    },
+    /// A [motion](crate::SurfaceMotion) of another mesh.
+    #[error("expected {expected} vectors, one per mesh vertex, found {found}")]
+    MotionLength {
+        /// Vertices of the mesh.
+        expected: usize,
+        /// Vectors given.
         found: usize,
     },
     /// A vertex that the mesh does not have.

@@ -15,7 +15,7 @@ mod property;
 mod surface;
 mod volume;
 
-pub use adjoint::{AffineGradient, JetAdjoint, VertexGradient};
+pub use adjoint::{AffineGradient, JetAdjoint, VertexGradient, in_file_order};
 pub use element::SurfaceElement;
 pub use error::{Cause, MotionError};
 pub use geometry::GeometryChange;

@@ -77,7 +77,7 @@ impl SurfaceMotion {
                 for list in [Some(positions), normals.as_ref()].into_iter().flatten() {
                     finite(list.iter().all(|v| v.is_finite()), "a vertex velocity")?;
                     if list.len() != mesh.positions.len() {
-                        return Err(Cause::VertexCount {
+                        return Err(Cause::MotionLength {
                             expected: mesh.positions.len(),
                             found: list.len(),
                         });
