@@ -20,6 +20,7 @@ mod mat3;
 mod real;
 mod rgb;
 mod rng;
+pub mod sobol;
 pub mod stats;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;
@@ -34,5 +35,6 @@ pub use mat3::Mat3;
 pub use real::Real;
 pub use rgb::{Rgb, RgbVec};
 pub use rng::Rng;
+pub use sobol::SobolSampler;
 pub use stats::{CompensatedSum, Moments, RgbMoments};
 pub use vec3::{Vec3, vec3};
