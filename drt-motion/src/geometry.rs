@@ -9,6 +9,7 @@ use crate::error::Cause;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
 pub enum GeometryChange {
     /// x + theta t.
     Translate(Vec3),

@@ -51,7 +51,7 @@ pub fn move_mesh(
     let mut deformed = false;
     for c in changes {
         check(c, parameters)?;
-        let fail = |cause| MotionError { parameter: c.parameter, change: c.change.kind(), cause };
+        let fail = |cause| c.error(cause);
         if let Some(velocities) = vertex_velocities(mesh, c.change).map_err(fail)? {
             deformed = true;
             for field in &mut fields {
@@ -91,29 +91,22 @@ pub fn move_affine(
     let mut velocities = vec![Affine::ZERO; parameters];
     for c in changes {
         check(c, parameters)?;
-        let fail = |cause| MotionError { parameter: c.parameter, change: c.change.kind(), cause };
-        let step = Step::new(c).ok_or_else(|| fail(Cause::NotAffine))?;
+        let step = Step::new(c).ok_or_else(|| c.error(Cause::NotAffine))?;
         map = step.map.after(&map);
         for v in &mut velocities {
             *v = step.carry(v);
         }
         velocities[c.parameter] = velocities[c.parameter].plus(&step.velocity);
-        finite(map.is_finite(), "the moved placement").map_err(fail)?;
+        finite(map.is_finite(), "the moved placement").map_err(|cause| c.error(cause))?;
     }
     Ok(MovedFrame { map, velocities })
 }
 
 fn check(c: &Applied<'_, GeometryChange>, parameters: usize) -> Result<(), MotionError> {
-    let index = if c.parameter < parameters {
-        Ok(())
-    } else {
-        Err(Cause::ParameterIndex { count: parameters })
-    };
-    index.and_then(|()| c.change.check(c.theta)).map_err(|cause| MotionError {
-        parameter: c.parameter,
-        change: c.change.kind(),
-        cause,
-    })
+    if c.parameter >= parameters {
+        return Err(c.error(Cause::ParameterIndex { count: parameters }));
+    }
+    c.change.check(c.theta).map_err(|cause| c.error(cause))
 }
 
 /// An affine change at its parameter's value.
@@ -179,8 +172,8 @@ impl Field {
     fn into_motion(self, moved: &Mesh, smooth: Option<&SmoothNormals>) -> SurfaceMotion {
         let velocities = match self {
             Self::Affine(u) if u.is_zero() => return SurfaceMotion::Rest,
-            // Angles, which weigh recomputed normals, do not survive every affine field.
-            Self::Affine(u) if smooth.is_some() && u.linear != Mat3::ZERO => {
+            // Angles weigh recomputed normals; where they change, these do not turn as the field.
+            Self::Affine(u) if smooth.is_some() && !keeps_angles(&u.linear) => {
                 at_vertices(&u, &moved.positions)
             }
             Self::Affine(u) => return SurfaceMotion::Affine(u),
@@ -190,6 +183,13 @@ impl Field {
         let normals = smooth.map(|s| s.rates(moved, &velocities).into());
         SurfaceMotion::Vertices { positions: velocities.into(), normals }
     }
+}
+
+/// Whether the linear part of a velocity field is a spin plus a uniform growth, up to rounding.
+fn keeps_angles(a: &Mat3) -> bool {
+    let deviatoric = *a + a.transpose() + Mat3::IDENTITY * (a.trace() * (-2.0 / 3.0));
+    let size = |m: &Mat3| m.cols.iter().fold(0.0, |s, c| f64::max(s, c.max_abs()));
+    size(&deviatoric) <= 16.0 * f64::EPSILON * size(a)
 }
 
 fn at_vertices(u: &Affine, positions: &[Vec3]) -> Vec<Vec3> {

@@ -52,6 +52,12 @@ pub struct Applied<'a, C> {
     pub change: &'a C,
 }
 
+impl Applied<'_, GeometryChange> {
+    pub(crate) fn error(&self, cause: Cause) -> MotionError {
+        MotionError { parameter: self.parameter, change: self.change.kind(), cause }
+    }
+}
+
 /// Everything that moves `target`, in the order of application: parameters in the order given,
 /// each parameter's effects in theirs.
 ///

@@ -177,8 +177,17 @@ fn kinds_of_motion_are_kept_as_simple_as_they_are() {
     assert!(matches!(m[1], SurfaceMotion::Affine(Affine { linear: Mat3::ZERO, .. })));
     assert_eq!(m[2], SurfaceMotion::Rest);
 
-    let m = motions(&[applied(0, 0.5, &turn), applied(1, 0.1, &shift), applied(2, 0.1, &vertex)]);
-    assert!(matches!(m[0], SurfaceMotion::Vertices { .. }));
+    let m = motions(&[applied(2, 0.1, &vertex), applied(0, 0.5, &turn), applied(1, 0.1, &shift)]);
+    assert!(matches!(m[0], SurfaceMotion::Affine(_)));
     assert!(matches!(m[1], SurfaceMotion::Affine(_)));
     assert!(matches!(m[2], SurfaceMotion::Vertices { normals: Some(_), .. }));
+
+    // Vertices moved singly after a turn no longer turn about one axis.
+    let m = motions(&[applied(0, 0.5, &turn), applied(2, 0.1, &vertex)]);
+    assert!(matches!(m[0], SurfaceMotion::Vertices { .. }));
+
+    // Recomputed normals are weighed by angles, which a stretch changes.
+    let stretch = GeometryChange::Scale { factor: Vec3::X, pivot: Vec3::ZERO };
+    let m = motions(&[applied(0, 0.0, &stretch), applied(1, 0.0, &vertex)]);
+    assert!(matches!(m[0], SurfaceMotion::Vertices { .. }));
 }

@@ -1,12 +1,12 @@
-//! Parameters as data: which changes reach a target, values of properties, and files.
+//! Parameters as data: which changes reach a target, and files.
 
+#[cfg(feature = "serde")]
 mod common;
 
-use common::*;
-use drt_math::{Affine, Rgb, Rng, Vec3};
+use drt_math::Vec3;
 use drt_motion::{
-    Applied, Cause, Change, Effect, GeometryChange, Parameter, PropertyChange, SurfaceMotion,
-    ValueChange, VolumeMotion, change_value, geometry_changes, inside_motion, property_changes,
+    Applied, Cause, Change, Effect, GeometryChange, Parameter, PropertyChange, ValueChange,
+    geometry_changes, property_changes,
 };
 
 fn effect<T>(target: T, change: Change<T>) -> Effect<T> {
@@ -62,68 +62,6 @@ fn property(op: ValueChange) -> PropertyChange {
 }
 
 #[test]
-fn a_value_and_its_rate() {
-    let value = Rgb::new(0.5, 1.0, 2.0);
-    let h = 1e-5;
-    for op in [
-        ValueChange::Add(Rgb::new(1.0, -2.0, 0.3)),
-        ValueChange::Multiply(0.7),
-        ValueChange::MultiplyLog(-1.3),
-    ] {
-        for theta in [-0.4, 0.0, 0.8] {
-            let slope = (op.at(value, theta + h) - op.at(value, theta - h)) / (2.0 * h);
-            let after = op.at(value, theta);
-            assert!((op.rate(after, theta) - slope).max_abs() < 1e-9);
-            assert!((op.map_rate(theta).value(value) - slope).max_abs() < 1e-9);
-        }
-    }
-}
-
-#[test]
-fn changes_of_one_value_compose() {
-    let ops = [
-        property(ValueChange::Multiply(0.5)),
-        property(ValueChange::Add(Rgb::new(1.0, 2.0, 3.0))),
-        property(ValueChange::MultiplyLog(0.9)),
-        PropertyChange { voxels: Some([1, 0, 2]), ..property(ValueChange::Add(Rgb::ONE)) },
-    ];
-    let value = Rgb::new(0.3, 0.6, 0.9);
-    let at = |values: [f64; 2], voxel| {
-        let applied: Vec<_> = ops
-            .iter()
-            .enumerate()
-            .map(|(i, change)| Applied { parameter: i % 2, theta: values[i % 2], change })
-            .collect();
-        change_value(&applied, voxel, 2).unwrap()
-    };
-    let h = 1e-5;
-    // theta = -2 wipes the value out: its rate survives.
-    for theta in [0.3, -2.0] {
-        for voxel in [None, Some([1, 0, 2]), Some([0, 0, 0])] {
-            let here = at([theta, -0.2], voxel);
-            for (p, d) in [[h, 0.0], [0.0, h]].into_iter().enumerate() {
-                let plus = at([theta + d[0], -0.2 + d[1]], voxel).map.value(value);
-                let minus = at([theta - d[0], -0.2 - d[1]], voxel).map.value(value);
-                let slope = (plus - minus) / (2.0 * h);
-                assert!((here.rates[p].value(value) - slope).max_abs() < 1e-8);
-            }
-        }
-        assert_eq!(at([theta, 0.1], None), at([theta, 0.1], Some([0, 0, 0])));
-        assert_ne!(at([theta, 0.1], None).map, at([theta, 0.1], Some([1, 0, 2])).map);
-    }
-}
-
-#[test]
-fn values_that_cannot_be() {
-    let change = property(ValueChange::MultiplyLog(1.0));
-    let applied = |parameter, theta| [Applied { parameter, theta, change: &change }];
-    let cause = |p, theta| change_value(&applied(p, theta), None, 1).unwrap_err().cause;
-    assert!(matches!(cause(0, f64::NAN), Cause::NotFinite { .. }));
-    assert!(matches!(cause(0, 1e4), Cause::NotFinite { .. }));
-    assert_eq!(cause(1, 0.0), Cause::ParameterIndex { count: 1 });
-}
-
-#[test]
 fn properties_are_found_by_name() {
     let change = property(ValueChange::Multiply(1.0));
     let parameters = [
@@ -136,35 +74,13 @@ fn properties_are_found_by_name() {
     assert!(property_changes(&parameters, &"cube", "sigma_t").is_empty());
 }
 
-#[test]
-fn the_inside_follows_a_boundary_that_moves_as_one() {
-    let mut rng = Rng::new(50, 0, 0);
-    let field = random_affine(&mut rng);
-    let (affine, other) = (SurfaceMotion::Affine(field), random_affine(&mut rng));
-    let other = SurfaceMotion::Affine(other);
-    let rest = SurfaceMotion::Rest;
-    let still = SurfaceMotion::Affine(Affine::ZERO);
-    let vertices =
-        SurfaceMotion::Vertices { positions: random_vecs(&mut rng, 3).into(), normals: None };
-
-    let choice = |boundary: &[&SurfaceMotion]| {
-        let inside = inside_motion(boundary);
-        (inside.motion, inside.flux)
-    };
-    assert_eq!(choice(&[]), (VolumeMotion::Static, false));
-    assert_eq!(choice(&[&rest, &still]), (VolumeMotion::Static, false));
-    assert_eq!(choice(&[&affine, &affine]), (VolumeMotion::Affine(field), false));
-    for mixed in [[&affine, &rest], [&rest, &affine], [&affine, &other], [&vertices, &vertices]] {
-        assert_eq!(choice(&mixed), (VolumeMotion::Static, true));
-    }
-    assert!(VolumeMotion::Static.is_rest() && VolumeMotion::Affine(Affine::ZERO).is_rest());
-    let jet = VolumeMotion::Static.jet(Vec3::X);
-    assert_eq!((jet.u, jet.j_dot), (Vec3::ZERO, 0.0));
-}
-
 #[cfg(feature = "serde")]
 #[test]
 fn files_give_back_what_was_written() {
+    use common::*;
+    use drt_math::{Rgb, Rng};
+    use drt_motion::{SurfaceMotion, VolumeMotion};
+
     fn round_trip<T>(value: &T)
     where
         T: serde::Serialize + serde::de::DeserializeOwned + PartialEq + std::fmt::Debug,
