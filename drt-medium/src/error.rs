@@ -108,11 +108,8 @@ pub enum MediumError {
     #[error("this phase function has no g; use Henyey-Greenstein")]
     NoMeanCosine,
     /// A field defined by its user has no parameters known here.
-    #[error("{property} of a custom field cannot be changed here; change the field itself")]
-    CustomField {
-        /// The property.
-        property: Property,
-    },
+    #[error("a custom field cannot be changed or moved from outside; change it where it is made")]
+    CustomField,
     /// The factor of a `multiply` change has reached zero, so the value it multiplied is lost.
     #[error(
         "{property} is multiplied by zero at this parameter value, where the derivative cannot be told from the product; use a logarithmic factor"

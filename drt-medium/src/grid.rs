@@ -320,6 +320,13 @@ pub(crate) fn unflatten([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
     [n % nx, n / nx % ny, n / (nx * ny)]
 }
 
+/// The voxels of a cell's corners in the order of [`Grid::corners`].
+#[inline]
+pub(crate) fn corner_voxels(cell: &Cell) -> [[usize; 3]; 8] {
+    let side = |k: usize, bit: usize| if bit == 0 { cell[k].lo } else { cell[k].hi };
+    core::array::from_fn(|n| [side(0, n & 1), side(1, n >> 1 & 1), side(2, n >> 2)])
+}
+
 /// Weight of each corner of a cell in the order of [`Grid::corners`].
 #[inline]
 pub(crate) fn corner_weights(cell: &Cell) -> [f64; 8] {

@@ -161,6 +161,14 @@ impl GridMedium {
         in_unit_cube(self.density.from_world().point(x))
     }
 
+    /// Brings the bounds up to date after a change of one voxel of the density, or of all.
+    pub(crate) fn update_bounds(&mut self, voxel: Option<[usize; 3]>) {
+        match voxel {
+            Some(v) => self.bounds.refresh(&self.density, v),
+            None => self.bounds = Bounds::new(&self.density),
+        }
+    }
+
     /// Moves all grids by a map of the world.
     ///
     /// # Errors

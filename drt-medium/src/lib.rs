@@ -5,9 +5,11 @@
 extern crate alloc;
 
 mod bounds;
+mod change;
 mod coefficients;
 mod error;
 mod field;
+mod gradient;
 mod grid;
 mod grid_medium;
 mod homogeneous;
@@ -15,14 +17,22 @@ mod lattice;
 mod medium;
 mod phase;
 mod reach;
+mod tangent;
 pub mod tracking;
+mod transmittance;
+#[cfg(feature = "vol")]
+pub mod vol;
 
+pub use change::{MediumChange, ValueChange};
 pub use coefficients::{CoefficientGradients, CoefficientRates, Coefficients};
 pub use error::{MediumError, Property};
 pub use field::{DensityField, Piece, Ray};
+pub use gradient::{FieldGradient, MediumGradient};
 pub use grid::{Filter, Grid, Layout, Wrap};
 pub use grid_medium::{GridMedium, Volume};
 pub use homogeneous::Homogeneous;
 pub use medium::{Medium, MediumKind};
 pub use phase::{Phase, henyey_greenstein, rayleigh};
+pub use tangent::{FieldTangent, MediumTangent};
 pub use tracking::{DistanceSample, TrackingStats};
+pub use transmittance::{Crossing, TransmittanceRate};

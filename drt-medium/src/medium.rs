@@ -228,14 +228,15 @@ impl Medium {
     }
 
     /// Moves the grids by a map of the world. A homogeneous medium has nothing that could move;
-    /// surfaces bound it. A custom field places itself.
+    /// surfaces bound it.
     ///
     /// # Errors
-    /// When the map is singular.
+    /// When the map is singular, and for custom fields, which nobody outside can move.
     pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
         match &mut self.kind {
             MediumKind::Grid(g) => g.place(map),
-            MediumKind::Homogeneous(_) | MediumKind::Custom(_) => Ok(()),
+            MediumKind::Homogeneous(_) => Ok(()),
+            MediumKind::Custom(_) => Err(MediumError::CustomField),
         }
     }
 }

@@ -1,0 +1,251 @@
+use drt_math::{Affine, Rgb, fm};
+
+use crate::homogeneous::Homogeneous;
+use crate::{Grid, GridMedium, Medium, MediumError, MediumKind, Phase, Property, Volume};
+
+/// How a value depends on a parameter theta.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum ValueChange {
+    /// `value + theta a`; for a scalar three equal numbers.
+    Add(Rgb),
+    /// `value (1 + theta m)`.
+    Multiply(f64),
+    /// `value exp(theta m)`.
+    MultiplyLog(f64),
+}
+
+impl ValueChange {
+    /// The change at theta as `value -> factor value + term`.
+    pub(crate) fn at(&self, theta: f64) -> (f64, Rgb) {
+        match *self {
+            Self::Add(a) => (1.0, a * theta),
+            Self::Multiply(m) => (1.0 + theta * m, Rgb::ZERO),
+            Self::MultiplyLog(m) => (fm::exp(theta * m), Rgb::ZERO),
+        }
+    }
+
+    /// Three equal numbers, or none: what a scalar can be changed by.
+    pub(crate) fn is_scalar(&self) -> bool {
+        match self {
+            Self::Add(a) => a.r == a.g && a.g == a.b,
+            Self::Multiply(_) | Self::MultiplyLog(_) => true,
+        }
+    }
+}
+
+/// One way in which a medium depends on a parameter theta.
+///
+/// `sigma_t` is the extinction after the medium's scale and changes with the albedo held; the
+/// albedo changes with `sigma_t` held. A change of a grid acts on all voxels alike, or on the one
+/// voxel `[i, j, k]` (x fastest).
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum MediumChange {
+    /// Changes the extinction, in 1 / scene unit.
+    SigmaT {
+        /// How.
+        op: ValueChange,
+        /// One voxel only.
+        voxels: Option<[usize; 3]>,
+    },
+    /// Changes the albedo.
+    Albedo {
+        /// How.
+        op: ValueChange,
+        /// One voxel only.
+        voxels: Option<[usize; 3]>,
+    },
+    /// Changes the emitted radiance.
+    Emission {
+        /// How.
+        op: ValueChange,
+        /// One voxel only.
+        voxels: Option<[usize; 3]>,
+    },
+    /// Changes the mean cosine of the phase function.
+    G(ValueChange),
+    /// Moves the grids of the medium.
+    Place {
+        /// The map of the world at the parameter's value.
+        map: Affine,
+        /// Velocity of the moved grid per unit of theta at each point of the world.
+        velocity: Affine,
+    },
+}
+
+/// The coefficients that vary in space.
+#[derive(Clone, Copy)]
+pub(crate) enum Field {
+    SigmaT,
+    Albedo,
+    Emission,
+}
+
+impl From<Field> for Property {
+    fn from(f: Field) -> Self {
+        match f {
+            Field::SigmaT => Self::SigmaT,
+            Field::Albedo => Self::Albedo,
+            Field::Emission => Self::Emission,
+        }
+    }
+}
+
+/// A change of one field of a medium.
+#[derive(Clone, Copy)]
+pub(crate) struct FieldChange {
+    pub(crate) field: Field,
+    pub(crate) op: ValueChange,
+    pub(crate) voxel: Option<[usize; 3]>,
+}
+
+impl MediumChange {
+    pub(crate) fn field(&self) -> Option<FieldChange> {
+        let change = |field, op, voxel| Some(FieldChange { field, op, voxel });
+        match *self {
+            Self::SigmaT { op, voxels } => change(Field::SigmaT, op, voxels),
+            Self::Albedo { op, voxels } => change(Field::Albedo, op, voxels),
+            Self::Emission { op, voxels } => change(Field::Emission, op, voxels),
+            Self::G(_) | Self::Place { .. } => None,
+        }
+    }
+}
+
+impl Medium {
+    /// Carries a change out at the parameter value theta.
+    ///
+    /// # Errors
+    /// When the medium has no such property or voxel, or the result would not be finite.
+    pub fn apply(&mut self, change: &MediumChange, theta: f64) -> Result<(), MediumError> {
+        match change {
+            MediumChange::Place { map, .. } => self.place(map),
+            MediumChange::G(op) => self.phase.change(op, theta),
+            _ => match (change.field(), &mut self.kind) {
+                (Some(c), MediumKind::Homogeneous(h)) => h.change(c, theta),
+                (Some(c), MediumKind::Grid(g)) => g.change(c, theta),
+                (_, MediumKind::Custom(_)) => Err(MediumError::CustomField),
+                (None, _) => Ok(()),
+            },
+        }
+    }
+}
+
+impl Phase {
+    fn change(&mut self, op: &ValueChange, theta: f64) -> Result<(), MediumError> {
+        let g = self.mean_cosine_parameter().ok_or(MediumError::NoMeanCosine)?;
+        if !op.is_scalar() {
+            return Err(MediumError::NotScalar { property: Property::G });
+        }
+        let (factor, term) = op.at(theta);
+        *self = Self::henyey_greenstein(g * factor + term.r)?;
+        Ok(())
+    }
+}
+
+impl Homogeneous {
+    fn change(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
+        let c0 = &mut self.coefficients;
+        let value = match c.field {
+            Field::SigmaT => &mut c0.sigma_t,
+            Field::Albedo => &mut c0.albedo,
+            Field::Emission => &mut c0.emission,
+        };
+        *value = c.of_constant(*value, theta)?;
+        Ok(())
+    }
+}
+
+impl GridMedium {
+    fn change(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
+        let volume = match c.field {
+            Field::SigmaT => return self.change_density(c, theta),
+            Field::Albedo => &mut self.albedo,
+            Field::Emission => &mut self.emission,
+        };
+        match volume {
+            Volume::Constant(v) => *v = c.of_constant(*v, theta)?,
+            Volume::Grid(g) => c.of_grid(g, theta, 1.0)?,
+        }
+        Ok(())
+    }
+
+    fn change_density(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
+        let (factor, term) = c.op.at(theta);
+        if c.voxel.is_none() && term.is_zero() && factor > 0.0 && c.op.is_scalar() {
+            // The bounds are those of the unscaled grid, so they stay.
+            self.scale = c.finite(self.scale * factor)?;
+            return Ok(());
+        }
+        if self.scale == 0.0 {
+            // Nothing is left of the values; a term needs a scale it can be divided by.
+            self.density.values_mut().fill(0.0);
+            self.scale = 1.0;
+            self.update_bounds(None);
+        }
+        c.of_grid(&mut self.density, theta, self.scale)?;
+        self.update_bounds(c.voxel);
+        Ok(())
+    }
+}
+
+impl FieldChange {
+    pub(crate) fn property(&self) -> Property {
+        self.field.into()
+    }
+
+    fn finite(&self, value: f64) -> Result<f64, MediumError> {
+        if value.is_finite() {
+            return Ok(value);
+        }
+        Err(MediumError::OutOfRange { property: self.property(), value, expected: "finite" })
+    }
+
+    fn of_constant(&self, value: Rgb, theta: f64) -> Result<Rgb, MediumError> {
+        if self.voxel.is_some() {
+            return Err(MediumError::NotAGrid { property: self.property() });
+        }
+        let (factor, term) = self.op.at(theta);
+        let changed = value * factor + term;
+        changed.to_array().into_iter().try_for_each(|v| self.finite(v).map(drop))?;
+        Ok(changed)
+    }
+
+    /// Changes a grid whose values times `scale` are the property.
+    fn of_grid(&self, grid: &mut Grid, theta: f64, scale: f64) -> Result<(), MediumError> {
+        let size = grid.size();
+        if let Some(voxel) = self.voxel.filter(|v| (0..3).any(|k| v[k] >= size[k])) {
+            return Err(MediumError::NoSuchVoxel { property: self.property(), voxel, size });
+        }
+        let (factor, term) = self.op.at(theta);
+        let term = term / scale;
+        let largest = grid.values().iter().fold(0.0, |m, v| f64::max(m, v.abs()));
+        self.finite(largest * factor.abs() + term.max_abs())?;
+        if !factor.is_finite() || !term.is_finite() {
+            return Err(MediumError::OutOfRange {
+                property: self.property(),
+                value: factor,
+                expected: "finite",
+            });
+        }
+        // Also at theta = 0: the derivative needs the channels that the value does not use yet.
+        if !self.op.is_scalar() {
+            grid.spread_channels();
+        }
+        let channels = grid.channels();
+        let range = match self.voxel {
+            Some(v) => {
+                let at = grid.flatten(v) * channels;
+                at..at + channels
+            }
+            None => 0..grid.values().len(),
+        };
+        let term = term.to_array();
+        for voxel in grid.values_mut()[range].chunks_exact_mut(channels) {
+            for (value, term) in voxel.iter_mut().zip(term) {
+                *value = *value * factor + term;
+            }
+        }
+        Ok(())
+    }
+}

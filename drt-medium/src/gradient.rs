@@ -1,0 +1,178 @@
+use alloc::vec;
+use alloc::vec::Vec;
+
+use drt_math::{Affine, Rgb, Vec3};
+
+use crate::grid::corner_weights;
+use crate::{CoefficientRates, Crossing, FieldTangent, Grid, Medium, MediumKind, MediumTangent};
+
+/// Derivative of a loss with respect to one coefficient field: the transpose of [`FieldTangent`].
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FieldGradient {
+    /// With respect to a term added everywhere in the medium.
+    pub uniform: Rgb,
+    /// With respect to the logarithm of a common factor.
+    pub relative: f64,
+    /// With respect to the voxels' values (after a density's scale), in the order and with the
+    /// channels of the grid; a single channel stands for all three. Empty for a constant.
+    pub voxels: Vec<f64>,
+    size: [usize; 3],
+}
+
+/// Derivative of a loss with respect to everything a [`MediumTangent`] can change.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MediumGradient {
+    /// Of the extinction, albedo held.
+    pub sigma_t: FieldGradient,
+    /// Of the albedo, extinction held.
+    pub albedo: FieldGradient,
+    /// Of the emitted radiance.
+    pub emission: FieldGradient,
+    /// Of the phase function's mean cosine.
+    pub g: f64,
+    /// Of the coefficients of the grids' velocity field.
+    pub velocity: Affine,
+}
+
+impl FieldGradient {
+    fn zeros(grid: Option<&Grid>) -> Self {
+        Self {
+            voxels: vec![0.0; grid.map_or(0, |g| g.values().len())],
+            size: grid.map_or([0; 3], Grid::size),
+            ..Self::default()
+        }
+    }
+
+    fn channels(&self) -> usize {
+        self.voxels.len() / self.size.iter().product::<usize>().max(1)
+    }
+
+    fn scatter(&mut self, field: Rgb, grid: Option<&Grid>, x: Vec3, adjoint: Rgb) {
+        if adjoint.is_zero() {
+            return;
+        }
+        self.uniform += adjoint;
+        self.relative += field.dot(adjoint);
+        let (Some(grid), false) = (grid, self.voxels.is_empty()) else { return };
+        let cell = grid.cell(grid.from_world().point(x));
+        let channels = self.channels();
+        for (voxel, w) in grid.corners(&cell).into_iter().zip(corner_weights(&cell)) {
+            let at = &mut self.voxels[voxel * channels..][..channels];
+            match at {
+                [one] => *one += adjoint.sum() * w,
+                _ => {
+                    for (a, c) in at.iter_mut().zip(adjoint.to_array()) {
+                        *a += c * w;
+                    }
+                }
+            }
+        }
+    }
+
+    fn dot(&self, tangent: &FieldTangent) -> f64 {
+        let channels = self.channels();
+        let voxels = tangent.voxels.iter().map(|([i, j, k], v)| {
+            let at = ((k * self.size[1] + j) * self.size[0] + i) * channels;
+            match self.voxels[at..at + channels] {
+                [one] => one * v.r,
+                [r, g, b] => Rgb::new(r, g, b).dot(*v),
+                _ => 0.0,
+            }
+        });
+        self.uniform.dot(tangent.uniform) + self.relative * tangent.relative + voxels.sum::<f64>()
+    }
+
+    fn add(&mut self, o: &Self) {
+        self.uniform += o.uniform;
+        self.relative += o.relative;
+        for (a, b) in self.voxels.iter_mut().zip(&o.voxels) {
+            *a += b;
+        }
+    }
+}
+
+impl MediumGradient {
+    /// No derivative yet, with room for every voxel of the medium.
+    #[must_use]
+    pub fn zeros(medium: &Medium) -> Self {
+        let grids =
+            medium.grid().map(|g| [Some(g.density()), g.albedo().grid(), g.emission().grid()]);
+        let [sigma_t, albedo, emission] = grids.unwrap_or_default().map(FieldGradient::zeros);
+        Self { sigma_t, albedo, emission, g: 0.0, velocity: Affine::ZERO }
+    }
+
+    /// No derivative yet, without room for voxels: for media none of whose parameters names a
+    /// voxel.
+    #[must_use]
+    pub fn zeros_without_voxels() -> Self {
+        let [sigma_t, albedo, emission] = [None; 3].map(FieldGradient::zeros);
+        Self { sigma_t, albedo, emission, g: 0.0, velocity: Affine::ZERO }
+    }
+
+    /// Adds the derivatives of a loss with respect to the coefficients at the point x of the world:
+    /// the exact transpose of [`MediumTangent::rates`].
+    pub fn scatter(&mut self, medium: &Medium, x: Vec3, adjoint: &CoefficientRates) {
+        self.g += adjoint.g;
+        let grids = match &medium.kind {
+            MediumKind::Homogeneous(_) => [None; 3],
+            MediumKind::Grid(g) if g.contains(x) => {
+                [Some(g.density()), g.albedo().grid(), g.emission().grid()]
+            }
+            MediumKind::Grid(_) | MediumKind::Custom(_) => return,
+        };
+        let c = medium.coefficients(x);
+        self.sigma_t.scatter(c.sigma_t, grids[0], x, adjoint.sigma_t);
+        self.albedo.scatter(c.albedo, grids[1], x, adjoint.albedo);
+        self.emission.scatter(c.emission, grids[2], x, adjoint.emission);
+        if grids[0].is_some() {
+            let g = medium.gradients(x);
+            let pull = g.sigma_t.weighted(adjoint.sigma_t)
+                + g.albedo.weighted(adjoint.albedo)
+                + g.emission.weighted(adjoint.emission);
+            self.scatter_velocity(x, -pull);
+        }
+    }
+
+    /// Adds the derivative of a loss with respect to the optical depth that a crossing's motion
+    /// changes: the transpose of [`Crossing::depth_rate`].
+    pub fn scatter_crossing(&mut self, crossing: &Crossing, x: Vec3, adjoint: Rgb) {
+        self.scatter_velocity(x, crossing.depth_per_velocity().weighted(adjoint));
+    }
+
+    /// Adds the derivative of a loss with respect to the velocity of the grid's point at x.
+    pub fn scatter_velocity(&mut self, x: Vec3, adjoint: Vec3) {
+        let v = &mut self.velocity;
+        v.translation += adjoint;
+        for (col, x) in v.linear.cols.iter_mut().zip(x.to_array()) {
+            *col += adjoint * x;
+        }
+    }
+
+    /// The derivative of the loss along a tangent.
+    ///
+    /// # Panics
+    /// When the tangent names voxels and this gradient was made without room for them, or for
+    /// another medium.
+    #[must_use]
+    pub fn dot(&self, tangent: &MediumTangent) -> f64 {
+        let (a, b) = (&self.velocity, &tangent.velocity);
+        let linear = (0..3).map(|k| a.linear.cols[k].dot(b.linear.cols[k])).sum::<f64>();
+        self.sigma_t.dot(&tangent.sigma_t)
+            + self.albedo.dot(&tangent.albedo)
+            + self.emission.dot(&tangent.emission)
+            + self.g * tangent.g
+            + linear
+            + a.translation.dot(b.translation)
+    }
+
+    /// Adds another gradient of the same medium: for sums over threads.
+    pub fn add(&mut self, o: &Self) {
+        self.sigma_t.add(&o.sigma_t);
+        self.albedo.add(&o.albedo);
+        self.emission.add(&o.emission);
+        self.g += o.g;
+        self.velocity = self.velocity.plus(&o.velocity);
+    }
+}

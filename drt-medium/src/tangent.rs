@@ -1,0 +1,276 @@
+use alloc::collections::BTreeMap;
+
+use drt_math::{Affine, Rgb, Vec3};
+
+use crate::change::{Field, FieldChange};
+use crate::grid::{corner_voxels, corner_weights};
+use crate::{
+    CoefficientGradients, CoefficientRates, Coefficients, Grid, Medium, MediumChange, MediumError,
+    MediumKind, Property, ValueChange,
+};
+
+/// Derivative of one coefficient field with respect to a parameter, at rest:
+/// `uniform + relative × field + voxel values`.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FieldTangent {
+    /// The same everywhere in the medium.
+    pub uniform: Rgb,
+    /// In proportion to the field.
+    pub relative: f64,
+    /// At single voxels, interpolated like the grid's values (after a density's scale).
+    pub voxels: BTreeMap<[usize; 3], Rgb>,
+}
+
+/// Derivative of a medium with respect to one parameter, at the medium's present state.
+///
+/// Tangents are linear; those of several changes by the same parameter add up with
+/// [`MediumTangent::plus`], each first carried through the changes that came after it with
+/// [`MediumTangent::push_through`].
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MediumTangent {
+    /// Of the extinction, albedo held.
+    pub sigma_t: FieldTangent,
+    /// Of the albedo, extinction held.
+    pub albedo: FieldTangent,
+    /// Of the emitted radiance.
+    pub emission: FieldTangent,
+    /// Of the phase function's mean cosine.
+    pub g: f64,
+    /// Velocity field of the grids, in world coordinates.
+    pub velocity: Affine,
+}
+
+impl FieldTangent {
+    /// True when nothing changes.
+    #[must_use]
+    pub fn is_zero(&self) -> bool {
+        self.uniform.is_zero() && self.relative == 0.0 && self.voxels.values().all(|v| v.is_zero())
+    }
+
+    fn add(&mut self, o: &Self) {
+        self.uniform += o.uniform;
+        self.relative += o.relative;
+        for (voxel, v) in &o.voxels {
+            *self.voxels.entry(*voxel).or_default() += *v;
+        }
+    }
+
+    /// The tangent of `change` at theta, once it has been carried out. `present` is the changed
+    /// value of the voxel it names.
+    fn of(change: &FieldChange, theta: f64, present: Rgb) -> Result<Self, MediumError> {
+        let mut tangent = Self::default();
+        let relative = |m| relative_rate(change.property(), m, theta);
+        match (change.op, change.voxel) {
+            (ValueChange::Add(a), None) => tangent.uniform = a,
+            (ValueChange::Add(a), Some(v)) => {
+                tangent.voxels.insert(v, a);
+            }
+            (ValueChange::Multiply(m), None) => tangent.relative = relative(m)?,
+            (ValueChange::Multiply(m), Some(v)) => {
+                tangent.voxels.insert(v, present * relative(m)?);
+            }
+            (ValueChange::MultiplyLog(m), None) => tangent.relative = m,
+            (ValueChange::MultiplyLog(m), Some(v)) => {
+                tangent.voxels.insert(v, present * m);
+            }
+        }
+        Ok(tangent)
+    }
+
+    /// Chain rule through a later change `f -> factor f + term` of all voxels or one. The part in
+    /// proportion to the field refers to the field as it is then, so terms must be taken off it.
+    fn push_through(&mut self, later: &FieldChange, theta: f64) {
+        let (factor, term) = later.op.at(theta);
+        let taken = term * -self.relative;
+        match later.voxel {
+            None => {
+                self.uniform = self.uniform * factor + taken;
+                for v in self.voxels.values_mut() {
+                    *v = *v * factor;
+                }
+            }
+            Some(voxel) => {
+                let own = self.voxels.entry(voxel).or_default();
+                *own = *own * factor + self.uniform * (factor - 1.0) + taken;
+            }
+        }
+    }
+
+    #[inline]
+    fn rate(&self, field: Rgb, grid: Option<&Grid>, x: Vec3) -> Rgb {
+        let mut rate = self.uniform + field * self.relative;
+        if let Some(grid) = grid.filter(|_| !self.voxels.is_empty()) {
+            let cell = grid.cell(grid.from_world().point(x));
+            for (voxel, w) in corner_voxels(&cell).iter().zip(corner_weights(&cell)) {
+                if let Some(v) = self.voxels.get(voxel) {
+                    rate += *v * w;
+                }
+            }
+        }
+        rate
+    }
+}
+
+/// Logarithmic derivative of `1 + theta m`.
+fn relative_rate(property: Property, m: f64, theta: f64) -> Result<f64, MediumError> {
+    let rate = m / (1.0 + theta * m);
+    if rate.is_finite() { Ok(rate) } else { Err(MediumError::VanishingFactor { property }) }
+}
+
+impl MediumTangent {
+    /// Nothing changes.
+    #[must_use]
+    pub fn zero() -> Self {
+        Self {
+            sigma_t: FieldTangent::default(),
+            albedo: FieldTangent::default(),
+            emission: FieldTangent::default(),
+            g: 0.0,
+            velocity: Affine::ZERO,
+        }
+    }
+
+    /// True when nothing changes.
+    #[must_use]
+    pub fn is_zero(&self) -> bool {
+        self.sigma_t.is_zero()
+            && self.albedo.is_zero()
+            && self.emission.is_zero()
+            && self.g == 0.0
+            && self.velocity.is_zero()
+    }
+
+    /// The sum of two tangents.
+    #[must_use]
+    pub fn plus(mut self, o: &Self) -> Self {
+        self.sigma_t.add(&o.sigma_t);
+        self.albedo.add(&o.albedo);
+        self.emission.add(&o.emission);
+        self.g += o.g;
+        self.velocity = self.velocity.plus(&o.velocity);
+        self
+    }
+
+    /// Chain rule: this tangent after a later change, made at theta, has acted on the medium too.
+    pub fn push_through(&mut self, later: &MediumChange, theta: f64) {
+        match later {
+            MediumChange::G(op) => self.g *= op.at(theta).0,
+            MediumChange::Place { map, .. } => {
+                let turn = Affine { linear: map.linear, translation: Vec3::ZERO };
+                self.velocity = turn.after(&self.velocity).after(&map.inverse());
+            }
+            _ => {
+                if let Some(change) = later.field() {
+                    self.field_mut(change.field).push_through(&change, theta);
+                }
+            }
+        }
+    }
+
+    fn field_mut(&mut self, field: Field) -> &mut FieldTangent {
+        match field {
+            Field::SigmaT => &mut self.sigma_t,
+            Field::Albedo => &mut self.albedo,
+            Field::Emission => &mut self.emission,
+        }
+    }
+
+    /// The velocity field of the grids, if they move.
+    #[must_use]
+    pub fn grid_velocity(&self) -> Option<Affine> {
+        (!self.velocity.is_zero()).then_some(self.velocity)
+    }
+
+    /// Eulerian rates of the coefficients at the fixed point x of the world: a grid carried along
+    /// with velocity u adds `-u . grad`. The jumps at the box of a moving grid are not in them,
+    /// see [`GridMedium::crossings`](crate::GridMedium::crossings).
+    #[must_use]
+    pub fn rates(&self, medium: &Medium, x: Vec3) -> CoefficientRates {
+        let gradients =
+            if self.velocity.is_zero() { CoefficientGradients::ZERO } else { medium.gradients(x) };
+        self.rates_given(medium, x, &medium.coefficients(x), &gradients)
+    }
+
+    /// [`MediumTangent::rates`] where the coefficients and gradients at x are at hand already: for
+    /// many parameters of one point.
+    #[must_use]
+    pub fn rates_given(
+        &self,
+        medium: &Medium,
+        x: Vec3,
+        coefficients: &Coefficients,
+        gradients: &CoefficientGradients,
+    ) -> CoefficientRates {
+        let c = coefficients;
+        let grids = match &medium.kind {
+            MediumKind::Homogeneous(_) => [None; 3],
+            MediumKind::Grid(g) if g.contains(x) => {
+                [Some(g.density()), g.albedo().grid(), g.emission().grid()]
+            }
+            MediumKind::Grid(_) | MediumKind::Custom(_) => {
+                return CoefficientRates { g: self.g, ..CoefficientRates::ZERO };
+            }
+        };
+        let u = self.velocity.point(x);
+        CoefficientRates {
+            sigma_t: self.sigma_t.rate(c.sigma_t, grids[0], x) - gradients.sigma_t.dot(u),
+            albedo: self.albedo.rate(c.albedo, grids[1], x) - gradients.albedo.dot(u),
+            emission: self.emission.rate(c.emission, grids[2], x) - gradients.emission.dot(u),
+            g: self.g,
+        }
+    }
+}
+
+impl Medium {
+    /// The derivative with respect to theta of a change that has been [applied](Medium::apply) at
+    /// theta, as the last one so far.
+    ///
+    /// # Errors
+    /// As [`Medium::apply`]; and when a factor `1 + theta m` is zero.
+    pub fn tangent(&self, change: &MediumChange, theta: f64) -> Result<MediumTangent, MediumError> {
+        let mut tangent = MediumTangent::zero();
+        match change {
+            MediumChange::Place { velocity, .. } => {
+                if self.grid().is_some() {
+                    tangent.velocity = *velocity;
+                }
+            }
+            MediumChange::G(op) => {
+                let g = self.phase.mean_cosine_parameter().ok_or(MediumError::NoMeanCosine)?;
+                tangent.g = match *op {
+                    ValueChange::Add(a) => a.r,
+                    ValueChange::Multiply(m) => g * relative_rate(Property::G, m, theta)?,
+                    ValueChange::MultiplyLog(m) => g * m,
+                };
+            }
+            _ => {
+                if let Some(c) = change.field() {
+                    let present = self.voxel_value(&c)?;
+                    *tangent.field_mut(c.field) = FieldTangent::of(&c, theta, present)?;
+                }
+            }
+        }
+        Ok(tangent)
+    }
+
+    /// Present value of the voxel that a change names; zero when it names none.
+    fn voxel_value(&self, change: &FieldChange) -> Result<Rgb, MediumError> {
+        let (property, Some(voxel)) = (change.property(), change.voxel) else {
+            return Ok(Rgb::ZERO);
+        };
+        let medium = self.grid().ok_or(MediumError::NotAGrid { property })?;
+        let (grid, scale) = match change.field {
+            Field::SigmaT => (Some(medium.density()), medium.scale()),
+            Field::Albedo => (medium.albedo().grid(), 1.0),
+            Field::Emission => (medium.emission().grid(), 1.0),
+        };
+        let grid = grid.ok_or(MediumError::NotAGrid { property })?;
+        let size = grid.size();
+        if (0..3).any(|k| voxel[k] >= size[k]) {
+            return Err(MediumError::NoSuchVoxel { property, voxel, size });
+        }
+        Ok(grid.voxel(voxel) * scale)
+    }
+}
