@@ -11,6 +11,7 @@ use crate::{
 /// A quantity in space: one constant or a grid.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[expect(clippy::large_enum_variant, reason = "few exist; a box would cost every lookup")]
 pub enum Volume {
     /// The same everywhere.
     Constant(Rgb),

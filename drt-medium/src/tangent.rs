@@ -88,7 +88,7 @@ impl FieldTangent {
             None => {
                 self.uniform = self.uniform * factor + taken;
                 for v in self.voxels.values_mut() {
-                    *v = *v * factor;
+                    *v *= factor;
                 }
             }
             Some(voxel) => {

@@ -101,7 +101,7 @@ pub fn sample_distance<F: DensityField + ?Sized>(
                 event = Some((t, weight / (majorant * accept)));
                 return ControlFlow::Break(());
             }
-            weight = weight * sigma.map(|s| (majorant - s) / (majorant * (1.0 - accept)));
+            weight *= sigma.map(|s| (majorant - s) / (majorant * (1.0 - accept)));
         }
         ControlFlow::Continue(())
     });
@@ -135,7 +135,7 @@ pub fn transmittance<F: DensityField + ?Sized>(
             depth = exponential(rng);
             stats.lookups += 1;
             let sigma = field.sigma_t(ray.at(t)) - piece.minorant;
-            weight = weight * sigma.map(|s| 1.0 - s / residual);
+            weight *= sigma.map(|s| 1.0 - s / residual);
         }
         if weight.is_zero() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
