@@ -48,9 +48,10 @@ impl SmoothNormals {
     #[must_use]
     pub fn normals(&self, mesh: &Mesh) -> Vec<Vec3> {
         let units = self.units(mesh);
-        let unit = |(i, &s): (usize, &u32)| match units[s as usize].dir {
-            Vec3::ZERO => mesh.normals.as_ref().map_or(Vec3::ZERO, |n| n[i]),
-            n => n,
+        let unit = |(i, &s): (usize, &u32)| {
+            let n = units[s as usize].dir;
+            let kept = mesh.normals.as_ref().filter(|_| n == Vec3::ZERO);
+            kept.map_or(n, |normals| normals[i])
         };
         self.shared.iter().enumerate().map(unit).collect()
     }

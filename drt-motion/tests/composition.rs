@@ -97,7 +97,7 @@ fn surfaces_move_as_the_meshes_do() {
                 assert!(found.iter().all(|v| v.max_abs() < 1e-11));
                 continue;
             }
-            assert_close(&found, &expected, 1e-6);
+            assert_close(&found, &expected, 1e-7);
 
             // A velocity that later changes do not carry along.
             let last = scene.changes.iter().rposition(|(p, _)| *p == parameter);
