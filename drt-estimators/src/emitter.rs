@@ -12,7 +12,7 @@ mod tests;
 
 use core::f64::consts::PI;
 
-use drt_math::{Frame, Rgb, Vec3, fm, vec3};
+use drt_math::{Frame, Rgb, Vec3, fm, vec3, warp};
 use thiserror::Error;
 
 pub use emission::{Emission, EmitterGradient, EmitterTangent};
@@ -193,50 +193,56 @@ impl Emitter {
         }
     }
 
-    /// Total power, for choosing among emitters: of an area emitter on `area`, of distant light
-    /// through the disk or sphere of `scene_radius`.
+    /// The radiance of an area emitter.
+    #[inline]
     #[must_use]
-    pub fn power(&self, area: f64, scene_radius: f64) -> Rgb {
+    pub fn area_radiance(&self) -> Option<Rgb> {
+        match *self {
+            Self::Area { radiance } => Some(radiance),
+            _ => None,
+        }
+    }
+
+    /// Power sent into a scene inside a sphere of `scene_radius`, mean of the channels: what
+    /// emitters are chosen by. That of an area emitter is per unit of area.
+    #[must_use]
+    pub fn power(&self, scene_radius: f64) -> f64 {
         let disk = PI * scene_radius * scene_radius;
         let factor = match *self {
-            Self::Area { .. } => PI * area,
+            Self::Area { .. } => PI,
             Self::Point { .. } => 4.0 * PI,
-            Self::Spot { cutoff_angle: c, beam_width: b, .. } => 2.0 * PI * cone_mean(b, c),
+            Self::Spot { cutoff_angle, beam_width, .. } => {
+                2.0 * PI * cone_mean(beam_width, cutoff_angle)
+            }
             Self::Directional { .. } => disk,
             Self::Constant { .. } => 4.0 * PI * disk,
         };
-        self.strength() * factor
+        self.strength().mean() * factor
     }
 
     /// Draws a direction of flow from two uniform numbers, uniformly over those that a point or
     /// spot light shines in; `None` for other emitters.
     #[must_use]
     pub fn sample_flow(&self, u: [f64; 2]) -> Option<FlowSample> {
-        let (axis, half_angle) = match *self {
-            Self::Point { .. } => (Vec3::Z, PI),
-            Self::Spot { direction, cutoff_angle, .. } => (direction, cutoff_angle),
+        let flow = match *self {
+            Self::Point { .. } => warp::uniform_sphere(u),
+            Self::Spot { direction, cutoff_angle, .. } => {
+                let local = warp::uniform_cone(u, fm::cos(cutoff_angle));
+                Frame::from_normal(direction).to_world(local)
+            }
             _ => return None,
         };
-        let h = fm::sin(0.5 * half_angle);
-        let height = 2.0 * h * h;
-        // 1 - cos is uniform; sin² = (1 - cos)(1 + cos) keeps narrow cones exact.
-        let below = u[0] * height;
-        let sin = fm::sqrt(below * (2.0 - below));
-        let (sin_phi, cos_phi) = fm::sin_cos(2.0 * PI * u[1]);
-        let local = vec3(sin * cos_phi, sin * sin_phi, 1.0 - below);
-        let flow = Frame::from_normal(axis).to_world(local);
-        Some(FlowSample { flow, pdf: 1.0 / (2.0 * PI * height) })
+        Some(FlowSample { flow, pdf: self.flow_pdf(flow) })
     }
 
     /// Density of [`sample_flow`](Self::sample_flow) per steradian.
     #[must_use]
     pub fn flow_pdf(&self, flow: Vec3) -> f64 {
         match *self {
-            Self::Point { .. } => 0.25 / PI,
+            Self::Point { .. } => warp::uniform_sphere_pdf(),
             Self::Spot { direction, cutoff_angle, .. } => {
-                let h = fm::sin(0.5 * cutoff_angle);
-                let inside = emission::angle(direction, flow) <= cutoff_angle;
-                if inside { 0.25 / (PI * h * h) } else { 0.0 }
+                let height = vec3(0.0, 0.0, direction.dot(flow));
+                warp::uniform_cone_pdf(height, fm::cos(cutoff_angle))
             }
             _ => 0.0,
         }
@@ -261,13 +267,17 @@ impl Emitter {
     }
 }
 
-/// Integral of a spot's falloff over the sphere, over 2 pi: 1 - (sin c - sin b)/(c - b).
+/// Integral over the sphere, over 2 pi, of a spot's falloff from full at the angle b to none at c:
+/// 1 - (sin c - sin b)/(c - b), in terms that do not cancel for narrow cones.
 fn cone_mean(b: f64, c: f64) -> f64 {
-    // (sin c - sin b)/(c - b) = cos(mean) sinc(half the difference).
     let half = 0.5 * (c - b);
-    let sinc = if half < 1e-4 { 1.0 - half * half / 6.0 } else { fm::sin(half) / half };
+    let squared = half * half;
+    // (sin c - sin b)/(c - b) is cos((b + c)/2) sin(half)/half.
+    let lack = if half < 1e-2 {
+        squared / 6.0 * (1.0 - squared / 20.0 * (1.0 - squared / 42.0))
+    } else {
+        1.0 - fm::sin(half) / half
+    };
     let h = fm::sin(0.25 * (b + c));
-    // 1 - cos(mean) and 1 - sinc apart: narrow cones would cancel.
-    let one_minus_sinc = if half < 1e-4 { half * half / 6.0 } else { 1.0 - sinc };
-    2.0 * h * h * sinc + one_minus_sinc
+    2.0 * h * h * (1.0 - lack) + lack
 }

@@ -13,6 +13,7 @@ use sampling::HalfProfile;
 /// Shape of a filter along one axis. Lengths are in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum FilterKind {
     /// Constant on [-radius, radius).
     Box {
@@ -99,7 +100,7 @@ pub struct Filter {
 impl Filter {
     /// Segments that stand for half a Gaussian when sampling: the density is within 2·10⁻³ of a
     /// filter cut at four standard deviations in its inner half.
-    const GAUSSIAN_SEGMENTS: usize = 32;
+    const GAUSSIAN_SEGMENTS: usize = 64;
 
     /// Normalises a filter and prepares to sample it.
     ///

@@ -181,6 +181,13 @@ impl Sensor {
         Affine { linear: Mat3 { cols: [-right, up, forward] }, translation: position }
     }
 
+    /// The centre of projection.
+    #[inline]
+    #[must_use]
+    pub fn position(&self) -> Vec3 {
+        self.pinhole.position
+    }
+
     /// Position, axes and image coordinates.
     #[must_use]
     pub fn pinhole(&self) -> &Pinhole {

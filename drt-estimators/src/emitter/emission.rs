@@ -164,7 +164,7 @@ macro_rules! sum {
 sum! { EmitterTangent EmitterGradient }
 
 /// Angle between unit vectors, exact for small angles too.
-pub(super) fn angle(a: Vec3, b: Vec3) -> f64 {
+fn angle(a: Vec3, b: Vec3) -> f64 {
     fm::atan2(a.cross(b).length(), a.dot(b))
 }
 

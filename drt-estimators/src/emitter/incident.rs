@@ -6,13 +6,14 @@ use super::{Emission, Emitter, EmitterGradient, EmitterTangent};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Incident {
     /// Unit vector from the point towards the light; the flow is its opposite.
-    pub toward: Vec3,
+    pub w: Vec3,
     /// Distance of the light; infinite for a directional one.
     pub distance: f64,
-    /// Emission towards the point, with its gradients.
+    /// Irradiance on a plane across the flow: I(flow)/r², or E.
+    pub value: Rgb,
+    /// I(flow) or E alone: the factor besides the geometric term's 1/r².
     pub emission: Emission,
-    /// Square of the reciprocal distance, or 1 for directional light: `emission` times this is
-    /// the irradiance on a plane across the flow.
+    /// 1/r², or 1 for directional light.
     pub inverse_square: f64,
 }
 
@@ -22,58 +23,43 @@ impl Emitter {
     #[inline]
     #[must_use]
     pub fn incident(&self, x: Vec3) -> Option<Incident> {
-        match *self {
+        let (w, distance, inverse_square) = match *self {
             Self::Point { position, .. } | Self::Spot { position, .. } => {
                 let offset = position - x;
                 let distance = offset.length();
-                let toward = offset / distance;
-                let inverse_square = 1.0 / (distance * distance);
-                (toward.is_finite() && inverse_square.is_finite()).then(|| Incident {
-                    toward,
-                    distance,
-                    emission: self.emission(-toward),
-                    inverse_square,
-                })
+                (offset / distance, distance, 1.0 / (distance * distance))
             }
-            Self::Directional { direction, .. } => Some(Incident {
-                toward: -direction,
-                distance: f64::INFINITY,
-                emission: self.emission(direction),
-                inverse_square: 1.0,
-            }),
-            Self::Area { .. } | Self::Constant { .. } => None,
-        }
+            Self::Directional { direction, .. } => (-direction, f64::INFINITY, 1.0),
+            Self::Area { .. } | Self::Constant { .. } => return None,
+        };
+        let emission = self.emission(-w);
+        let value = emission.value * inverse_square;
+        let usable = w.is_finite() && value.is_finite();
+        usable.then_some(Incident { w, distance, value, emission, inverse_square })
     }
 }
 
 impl Incident {
-    /// Irradiance on a plane across the flow: I/r², or E.
-    #[inline]
-    #[must_use]
-    pub fn irradiance(&self) -> Rgb {
-        self.emission.value * self.inverse_square
-    }
-
-    /// Rate of the [`irradiance`](Self::irradiance) while the point and the emitter move.
+    /// Rate of [`value`](Self::value) while the point and the emitter move.
     #[inline]
     #[must_use]
     pub fn rate(&self, x_rate: Vec3, t: &EmitterTangent) -> Rgb {
         // Reciprocal distance: zero for directional light, which turns no flow by moving.
         let per_r = 1.0 / self.distance;
         let apart = (t.position - x_rate) * per_r;
-        let emission_rate = self.emission.rate(-apart.reject(self.toward), t);
-        let spread_rate = self.emission.value * (-2.0 * apart.dot(self.toward));
+        let emission_rate = self.emission.rate(-apart.reject(self.w), t);
+        let spread_rate = self.emission.value * (-2.0 * apart.dot(self.w));
         (emission_rate + spread_rate) * self.inverse_square
     }
 
-    /// Gradient of `adjoint · irradiance`, first with respect to the point, then to the emitter.
+    /// Gradient of `adjoint · value`, first with respect to the point, then to the emitter.
     #[inline]
     #[must_use]
     pub fn gradient(&self, adjoint: Rgb) -> (Vec3, EmitterGradient) {
         let per_r = 1.0 / self.distance;
         let (flow, mut emitter) = self.emission.gradient(adjoint * self.inverse_square);
-        let spread = 2.0 * self.irradiance().dot(adjoint);
-        let point = (flow.reject(self.toward) + self.toward * spread) * per_r;
+        let spread = 2.0 * self.value.dot(adjoint);
+        let point = (flow.reject(self.w) + self.w * spread) * per_r;
         emitter.position = -point;
         (point, emitter)
     }
