@@ -1,0 +1,181 @@
+use alloc::string::String;
+use core::fmt;
+
+use drt_math::Rgb;
+
+/// A number or colour of a BSDF that a parameter can move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Property {
+    /// Albedo of the diffuse lobe.
+    Reflectance,
+    /// Weight of the glossy reflection.
+    SpecularReflectance,
+    /// Weight of the glossy refraction.
+    SpecularTransmittance,
+    /// Roughness of the microfacets, a scalar.
+    Alpha,
+    /// Relative index of refraction: a scalar for dielectrics (interior over exterior), a colour for
+    /// conductors (real part).
+    Eta,
+    /// Imaginary part of a conductor's index.
+    K,
+    /// Sharpness of the Phong lobe, a scalar.
+    Exponent,
+}
+
+impl Property {
+    pub(super) const ALL: [Self; 7] = [
+        Self::Reflectance,
+        Self::SpecularReflectance,
+        Self::SpecularTransmittance,
+        Self::Alpha,
+        Self::Eta,
+        Self::K,
+        Self::Exponent,
+    ];
+
+    /// The property's name in job files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Reflectance => "reflectance",
+            Self::SpecularReflectance => "specular_reflectance",
+            Self::SpecularTransmittance => "specular_transmittance",
+            Self::Alpha => "alpha",
+            Self::Eta => "eta",
+            Self::K => "k",
+            Self::Exponent => "exponent",
+        }
+    }
+
+    /// The property of a name; `diffuse_reflectance` is another name of `reflectance`.
+    ///
+    /// # Errors
+    /// [`SurfaceError::UnknownProperty`], which lists the names that exist.
+    pub fn from_name(name: &str) -> Result<Self, SurfaceError> {
+        let wanted = if name == "diffuse_reflectance" { "reflectance" } else { name };
+        Self::ALL.into_iter().find(|p| p.name() == wanted).ok_or_else(|| {
+            SurfaceError::UnknownProperty { name: name.into(), known: names(Self::ALL) }
+        })
+    }
+}
+
+impl fmt::Display for Property {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Names separated by commas.
+pub(super) fn names(properties: impl IntoIterator<Item = Property>) -> String {
+    let mut list = String::new();
+    for p in properties {
+        if !list.is_empty() {
+            list.push_str(", ");
+        }
+        list.push_str(p.name());
+    }
+    list
+}
+
+/// What is wrong with a BSDF or with a change of one.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// No BSDF has a property of this name.
+    #[error("no BSDF has a property \"{name}\"; there are: {known}")]
+    UnknownProperty {
+        /// The name asked for.
+        name: String,
+        /// The names that exist.
+        known: String,
+    },
+    /// This BSDF lacks the property.
+    #[error("a {bsdf} BSDF has no \"{property}\"; it has: {available}")]
+    NoSuchProperty {
+        /// Kind of BSDF, by its plugin name.
+        bsdf: &'static str,
+        /// The property asked for.
+        property: Property,
+        /// The names of those it has, or `nothing that can change`.
+        available: String,
+    },
+    /// A value, given or reached by a change, that the model does not allow.
+    #[error("\"{property}\" is {value}, but must be {expected}")]
+    OutOfRange {
+        /// The property.
+        property: Property,
+        /// The value refused.
+        value: f64,
+        /// What is allowed.
+        expected: &'static str,
+    },
+    /// A scalar property was to be moved by three different numbers.
+    #[error("\"{property}\" is a single number: add three equal numbers, not {r}, {g}, {b}")]
+    NotUniform {
+        /// The property.
+        property: Property,
+        /// First number.
+        r: f64,
+        /// Second number.
+        g: f64,
+        /// Third number.
+        b: f64,
+    },
+    /// Only plain reflectors have two equal sides.
+    #[error("a twosided BSDF cannot hold a {bsdf} BSDF; use it without twosided")]
+    NotReflective {
+        /// Kind of the nested BSDF, by its plugin name.
+        bsdf: &'static str,
+    },
+    /// A change does not say which of two different sides it means.
+    #[error(
+        "\"{property}\" of a twosided BSDF with two different sides cannot change; use one BSDF for \
+         both sides, or two surfaces"
+    )]
+    DifferentSides {
+        /// The property.
+        property: Property,
+    },
+}
+
+/// Where a BSDF keeps a property.
+pub(super) enum Slot<'a> {
+    Color(&'a mut Rgb),
+    Scalar(&'a mut f64),
+}
+
+impl Slot<'_> {
+    /// The value, a scalar in every channel.
+    pub(super) fn value(&self) -> Rgb {
+        match self {
+            Self::Color(c) => **c,
+            Self::Scalar(s) => Rgb::splat(**s),
+        }
+    }
+
+    /// Sets the value; of a scalar's three equal channels the first counts.
+    pub(super) fn set(self, value: Rgb) {
+        match self {
+            Self::Color(c) => *c = value,
+            Self::Scalar(s) => *s = value.r,
+        }
+    }
+}
+
+pub(super) fn in_range(
+    property: Property,
+    value: f64,
+    allowed: bool,
+    expected: &'static str,
+) -> Result<(), SurfaceError> {
+    if allowed && value.is_finite() {
+        Ok(())
+    } else {
+        Err(SurfaceError::OutOfRange { property, value, expected })
+    }
+}
+
+pub(super) fn nonnegative(property: Property, value: Rgb) -> Result<(), SurfaceError> {
+    value.to_array().into_iter().try_for_each(|v| in_range(property, v, v >= 0.0, "0 or more"))
+}

@@ -1,0 +1,90 @@
+//! Beckmann slopes as seen from a direction.
+//!
+//! Heitz & d'Eon 2014, "Importance Sampling Microfacet-Based BSDFs using the Distribution of Visible
+//! Normals": at roughness one, the slope `p` towards a direction of cosine `c` and sine `s` is seen
+//! with density proportional to `(s p + c)⁺ exp(-p²)`, and the other slope is Gaussian.
+
+use drt_math::fm;
+
+/// sqrt(pi)
+pub(super) const SQRT_PI: f64 = 1.772_453_850_905_516;
+
+/// `exp(x²) erfc(x)` for x >= 0, with a relative error below 2e-9.
+///
+/// In t = 1 / (1 + x/2) the quotient by t is smooth on [0, 1]; the coefficients interpolate it at
+/// Chebyshev points.
+pub(super) fn erfc_scaled(x: f64) -> f64 {
+    const C: [f64; 13] = [
+        0.282_094_792_003_41,
+        0.282_094_715_536_09,
+        0.246_836_833_531_86,
+        0.176_238_997_142_94,
+        0.084_285_718_457_183,
+        -0.005_591_836_963_112_5,
+        -0.065_777_222_750_475,
+        0.024_762_004_543_429,
+        -0.280_041_871_516_06,
+        0.587_850_698_713_58,
+        -0.510_431_760_187_28,
+        0.213_732_579_472_36,
+        -0.036_053_648_791_38,
+    ];
+    let t = 1.0 / (1.0 + 0.5 * x);
+    t * C.iter().rev().fold(0.0, |acc, c| acc * t + c)
+}
+
+/// Draws the slope towards the direction of cosine `cos` and sine `sin`, both at least 0; `cos = 1`
+/// gives a Gaussian of variance 1/2.
+///
+/// Solves `Q(p) = u Q(-inf)` for `Q(p)`, the integral of the density from `p` on, by Newton's method
+/// from a side where convexity makes it monotone: it needs no bracket.
+pub(super) fn visible_slope(cos: f64, sin: f64, u: f64) -> f64 {
+    let tail = 0.5 * SQRT_PI * cos;
+    // For p >= 0, Q = exp(-p²) scaled(p).
+    let scaled = |p: f64| 0.5 * sin + tail * erfc_scaled(p);
+    let at_zero = 0.5 * sin + tail;
+    let target = u * visible_area(cos, sin) * SQRT_PI;
+    if target < at_zero {
+        // ln Q is concave, and Q(p) <= Q(0) exp(-p²) gives a start beyond the root.
+        let level = fm::ln(target);
+        let mut p = fm::sqrt(fm::ln(at_zero) - level);
+        for _ in 0..MAX_STEPS {
+            let q = scaled(p);
+            let step = (fm::ln(q) - p * p - level) * q / (sin * p + cos);
+            p = (p + step).max(0.0);
+            if step.abs() < TOLERANCE {
+                break;
+            }
+        }
+        p
+    } else {
+        // At p = -t the integral from 0 to t is concave in t, up to the horizon t = cos / sin.
+        let wanted = target - at_zero;
+        let mut t = 0.0;
+        for _ in 0..MAX_STEPS {
+            let e = fm::exp(-t * t);
+            let have = tail - 0.5 * sin + e * (0.5 * sin - tail * erfc_scaled(t));
+            let slope = (cos - sin * t) * e;
+            let step = (wanted - have) / slope;
+            if step.is_nan() || step < TOLERANCE {
+                break;
+            }
+            t += step;
+        }
+        -t
+    }
+}
+
+/// The area a direction sees of the microfacets over its own projection's, times its cosine: `cos / G1`,
+/// Smith's masking without approximation. At roughness one; not below `cos`.
+pub(super) fn visible_area(cos: f64, sin: f64) -> f64 {
+    let cot = cos / sin;
+    if cot > 26.0 || sin == 0.0 {
+        return cos;
+    }
+    let e = fm::exp(-cot * cot);
+    0.5 * cos * (2.0 - e * erfc_scaled(cot)) + 0.5 * sin * e / SQRT_PI
+}
+
+const TOLERANCE: f64 = 1e-7;
+const MAX_STEPS: usize = 64;
