@@ -284,3 +284,6 @@ impl From<CdfTable> for Vec<f64> {
         table.cdf
     }
 }
+
+#[cfg(test)]
+mod tests;

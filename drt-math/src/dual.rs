@@ -8,6 +8,9 @@ use crate::Real;
 ///
 /// `Dual<Dual<f64, 1>, 1>` nests to second derivatives.
 ///
+/// Equality and order compare values only, as [`Real`] demands: two duals may be equal and differ
+/// in their derivatives.
+///
 /// ```
 /// use drt_math::{Dual, Real};
 /// let x = Dual::<f64, 2>::variable(3.0, 0);
@@ -16,12 +19,12 @@ use crate::Real;
 /// assert_eq!((f.re, f.eps), (18.0, [12.0, 9.0]));
 /// ```
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Dual<T, const N: usize> {
     /// The value.
     pub re: T,
     /// The derivatives.
-    #[cfg_attr(feature = "serde", serde(skip))]
+    #[cfg_attr(feature = "serde", serde(with = "lanes"))]
     pub eps: [T; N],
 }
 
@@ -41,6 +44,14 @@ impl<T: Real, const N: usize> Dual<T, N> {
     #[inline]
     fn chain(self, value: T, slope: T) -> Self {
         Self { re: value, eps: self.eps.map(|e| e * slope) }
+    }
+
+    /// [`Dual::chain`] for functions with an infinite slope somewhere: a lane along which the
+    /// argument does not move stays zero there, rather than 0 * inf.
+    #[inline]
+    fn chain_steep(self, value: T, slope: T) -> Self {
+        let moved = |e: T| if e.is_zero() { e } else { e * slope };
+        Self { re: value, eps: self.eps.map(moved) }
     }
 }
 
@@ -89,6 +100,7 @@ impl<T: Real, const N: usize> Sub for Dual<T, N> {
     }
 }
 
+#[expect(clippy::suspicious_arithmetic_impl, reason = "the product rule adds")]
 impl<T: Real, const N: usize> Mul for Dual<T, N> {
     type Output = Self;
     #[inline]
@@ -97,34 +109,58 @@ impl<T: Real, const N: usize> Mul for Dual<T, N> {
     }
 }
 
+#[expect(clippy::suspicious_arithmetic_impl, reason = "one division for all lanes")]
 impl<T: Real, const N: usize> Div for Dual<T, N> {
     type Output = Self;
     #[inline]
     fn div(self, o: Self) -> Self {
-        let q = self.re / o.re;
-        Self { re: q, eps: from_fn(|i| (self.eps[i] - q * o.eps[i]) / o.re) }
+        let (q, inverse) = (self.re / o.re, o.re.recip());
+        Self { re: q, eps: from_fn(|i| (self.eps[i] - q * o.eps[i]) * inverse) }
     }
 }
 
-macro_rules! mixed {
-    ($($trait:ident $f:ident, $assign:ident $g:ident);* $(;)?) => {$(
-        impl<T: Real, const N: usize> $trait<f64> for Dual<T, N> {
-            type Output = Self;
+// A constant has no lanes to carry along.
+impl<T: Real, const N: usize> Add<f64> for Dual<T, N> {
+    type Output = Self;
+    #[inline]
+    fn add(self, o: f64) -> Self {
+        Self { re: self.re + o, ..self }
+    }
+}
+
+impl<T: Real, const N: usize> Sub<f64> for Dual<T, N> {
+    type Output = Self;
+    #[inline]
+    fn sub(self, o: f64) -> Self {
+        Self { re: self.re - o, ..self }
+    }
+}
+
+impl<T: Real, const N: usize> Mul<f64> for Dual<T, N> {
+    type Output = Self;
+    #[inline]
+    fn mul(self, o: f64) -> Self {
+        Self { re: self.re * o, eps: self.eps.map(|e| e * o) }
+    }
+}
+
+impl<T: Real, const N: usize> Div<f64> for Dual<T, N> {
+    type Output = Self;
+    #[inline]
+    fn div(self, o: f64) -> Self {
+        Self { re: self.re / o, eps: self.eps.map(|e| e / o) }
+    }
+}
+
+macro_rules! assigning {
+    ($($trait:ident $f:ident $op:tt);* $(;)?) => {$(
+        impl<T: Real, const N: usize> $trait for Dual<T, N> {
             #[inline]
-            fn $f(self, o: f64) -> Self { self.$f(Self::from(o)) }
-        }
-        impl<T: Real, const N: usize> $assign for Dual<T, N> {
-            #[inline]
-            fn $g(&mut self, o: Self) { *self = (*self).$f(o); }
+            fn $f(&mut self, o: Self) { *self = *self $op o; }
         }
     )*};
 }
-mixed! {
-    Add add, AddAssign add_assign;
-    Sub sub, SubAssign sub_assign;
-    Mul mul, MulAssign mul_assign;
-    Div div, DivAssign div_assign;
-}
+assigning! { AddAssign add_assign +; SubAssign sub_assign -; MulAssign mul_assign *; DivAssign div_assign / }
 
 impl<T: Real, const N: usize> Real for Dual<T, N> {
     #[inline]
@@ -132,9 +168,18 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
         self.re.re()
     }
     #[inline]
+    fn is_zero(self) -> bool {
+        self.re.is_zero() && self.eps.iter().all(|e| e.is_zero())
+    }
+    #[inline]
     fn sqrt(self) -> Self {
         let s = self.re.sqrt();
-        self.chain(s, T::from(0.5) / s)
+        self.chain_steep(s, T::from(0.5) / s)
+    }
+    #[inline]
+    fn recip(self) -> Self {
+        let r = self.re.recip();
+        self.chain(r, -(r * r))
     }
     #[inline]
     fn exp(self) -> Self {
@@ -147,7 +192,7 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
     }
     #[inline]
     fn ln(self) -> Self {
-        self.chain(self.re.ln(), self.re.recip())
+        self.chain_steep(self.re.ln(), self.re.recip())
     }
     #[inline]
     fn ln_1p(self) -> Self {
@@ -164,7 +209,7 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
     }
     #[inline]
     fn acos(self) -> Self {
-        self.chain(self.re.acos(), -(T::one() - self.re.squared()).sqrt().recip())
+        self.chain_steep(self.re.acos(), -(T::one() - self.re.squared()).sqrt().recip())
     }
     #[inline]
     fn abs(self) -> Self {
@@ -172,10 +217,44 @@ impl<T: Real, const N: usize> Real for Dual<T, N> {
     }
     #[inline]
     fn powf(self, e: f64) -> Self {
-        self.chain(self.re.powf(e), self.re.powf(e - 1.0) * e)
+        if e == 0.0 {
+            return Self::one();
+        }
+        self.chain_steep(self.re.powf(e), self.re.powf(e - 1.0) * e)
     }
     #[inline]
     fn powi(self, e: i32) -> Self {
-        self.chain(self.re.powi(e), self.re.powi(e - 1) * f64::from(e))
+        if e == 0 {
+            return Self::one();
+        }
+        self.chain_steep(self.re.powi(e), self.re.powi(e.saturating_sub(1)) * f64::from(e))
     }
 }
+
+/// Arrays of any length as sequences; serde itself stops at a fixed list of lengths.
+#[cfg(feature = "serde")]
+mod lanes {
+    use alloc::vec::Vec;
+
+    use serde::de::{Deserialize, Deserializer, Error};
+    use serde::{Serialize, Serializer};
+
+    pub(super) fn serialize<T: Serialize, S: Serializer, const N: usize>(
+        lanes: &[T; N],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        lanes.as_slice().serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>, const N: usize>(
+        deserializer: D,
+    ) -> Result<[T; N], D::Error> {
+        let lanes = Vec::deserialize(deserializer)?;
+        let found = lanes.len();
+        let wrong = || D::Error::custom(format_args!("{found} derivatives where {N} belong"));
+        lanes.try_into().map_err(|_| wrong())
+    }
+}
+
+#[cfg(test)]
+mod tests;

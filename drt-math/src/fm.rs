@@ -89,3 +89,40 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
         libm::sincos(x)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::{E, FRAC_PI_3, LN_2, PI};
+
+    use super::*;
+
+    #[test]
+    fn every_name_is_the_function_it_says() {
+        let half_root = 0.5 * sqrt(3.0);
+        for (value, known) in [
+            (sqrt(2.25), 1.5),
+            (cbrt(-27.0), -3.0),
+            (exp(1.0), E),
+            (exp_m1(LN_2), 1.0),
+            (exp_m1(1e-20), 1e-20),
+            (ln(E), 1.0),
+            (ln_1p(1.0), LN_2),
+            (ln_1p(1e-20), 1e-20),
+            (sin(FRAC_PI_3), half_root),
+            (cos(FRAC_PI_3), 0.5),
+            (tan(FRAC_PI_3), 2.0 * half_root),
+            (asin(half_root), FRAC_PI_3),
+            (acos(0.5), FRAC_PI_3),
+            (atan(2.0 * half_root), FRAC_PI_3),
+            (atan2(-half_root, -0.5), FRAC_PI_3 - PI),
+            (powf(2.0, -1.5), 0.5 / sqrt(2.0)),
+            (floor(-1.5), -2.0),
+            (ceil(-1.5), -1.0),
+            (round(-1.5), -2.0),
+            (sin_cos(FRAC_PI_3).0, half_root),
+            (sin_cos(FRAC_PI_3).1, 0.5),
+        ] {
+            assert!((value / known - 1.0).abs() < 1e-15, "{value} for {known}");
+        }
+    }
+}

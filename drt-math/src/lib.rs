@@ -1,8 +1,4 @@
-//! Scalars, forward duals, vectors, sampling and statistics: the ground every other `drt` crate
-//! stands on, and useful alone.
-//!
-//! Conventions: vectors are columns, frames are right-handed, angles are radians, and every
-//! generic item works for `f64` and for [`Dual`] numbers alike through the [`Real`] trait.
+#![doc = include_str!("../README.md")]
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 

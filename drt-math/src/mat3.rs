@@ -119,3 +119,85 @@ impl From<Mat3> for glam::DMat3 {
         glam::DMat3::from_cols(m.cols[0].into(), m.cols[1].into(), m.cols[2].into())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::Dual;
+
+    fn distance(a: Mat3, b: Mat3) -> f64 {
+        (a + b * -1.0).cols.iter().map(|c| c.max_abs()).fold(0.0, f64::max)
+    }
+
+    fn matrix() -> impl Strategy<Value = Mat3> {
+        prop::array::uniform3(prop::array::uniform3(-2.0..2.0_f64))
+            .prop_map(|cols| Mat3 { cols: cols.map(Vec3::from) })
+    }
+
+    proptest! {
+        #[test]
+        fn algebra(a in matrix(), b in matrix(), v in prop::array::uniform3(-2.0..2.0_f64)) {
+            let v = Vec3::from(v);
+            prop_assert!(((a * b) * v - a * (b * v)).max_abs() < 1e-13);
+            prop_assert!((a.transpose() * v - a.transpose_mul(v)).max_abs() < 1e-14);
+            prop_assert!(((a * b).determinant() - a.determinant() * b.determinant()).abs() < 1e-12);
+            prop_assert!((a + b).trace() - a.trace() - b.trace() < 1e-14);
+            if a.determinant().abs() > 0.01 {
+                prop_assert!(distance(a * a.inverse(), Mat3::IDENTITY) < 1e-11);
+            }
+        }
+
+        #[test]
+        fn determinant_changes_by_the_trace(a in matrix(), v in matrix()) {
+            // Jacobi: d det(A) = det(A) tr(A^-1 dA), the rate of a volume under a motion.
+            prop_assume!(a.determinant().abs() > 0.05);
+            let moving = Mat3 {
+                cols: core::array::from_fn(|j| Vec3::from(core::array::from_fn::<_, 3, _>(|i| {
+                    Dual::<f64, 1>::new(a.cols[j][i], [v.cols[j][i]])
+                }))),
+            };
+            let rate = a.determinant() * (a.inverse() * v).trace();
+            let [dual] = moving.determinant().eps;
+            prop_assert!((dual - rate).abs() < 1e-11 * (1.0 + rate.abs()));
+            let [back] = (moving * moving.inverse()).determinant().eps;
+            prop_assert!(back.abs() < 1e-9);
+        }
+
+        #[test]
+        fn rotations(axis in prop::array::uniform3(-1.0..1.0_f64), angle in -7.0..7.0_f64) {
+            let axis = Vec3::from(axis);
+            prop_assume!(axis.length() > 0.1);
+            let axis = axis.normalize();
+            let r = Mat3::rotation(axis, angle);
+            prop_assert!(distance(r * r.transpose(), Mat3::IDENTITY) < 1e-14);
+            prop_assert!((r.determinant() - 1.0).abs() < 1e-14);
+            prop_assert!((r * axis - axis).max_abs() < 1e-15);
+            prop_assert!((r.trace() - 1.0 - 2.0 * crate::fm::cos(angle)).abs() < 1e-14);
+            let half = Mat3::rotation(axis, 0.5 * angle);
+            prop_assert!(distance(half * half, r) < 1e-14);
+        }
+    }
+
+    #[test]
+    fn conventions() {
+        let quarter = Mat3::rotation(Vec3::Z, core::f64::consts::FRAC_PI_2);
+        assert!((quarter * Vec3::X - Vec3::Y).max_abs() < 1e-15, "right-handed");
+        assert_eq!(Mat3::skew(Vec3::X) * Vec3::Y, Vec3::Z);
+        let m = Mat3::from_rows(vec3(1.0, 2.0, 3.0), vec3(4.0, 5.0, 6.0), vec3(7.0, 8.0, 10.0));
+        assert_eq!(m * Vec3::X, vec3(1.0, 4.0, 7.0));
+        assert_eq!((m.determinant(), m.trace()), (-3.0, 16.0));
+        assert_eq!(Mat3::diagonal(vec3(1.0, 2.0, 3.0)) * Vec3::splat(1.0), vec3(1.0, 2.0, 3.0));
+        assert!(m.is_finite() && !Mat3::ZERO.inverse().is_finite());
+    }
+
+    #[test]
+    fn glam_agrees() {
+        let m = Mat3::from_rows(vec3(1.0, 2.0, 3.0), vec3(4.0, 5.0, 6.0), vec3(7.0, 8.0, 10.0));
+        let g = glam::DMat3::from(m);
+        assert_eq!(Vec3::from(g * glam::DVec3::Y), m * Vec3::Y);
+        assert_eq!(g.determinant(), m.determinant());
+        assert_eq!(Mat3::from(g), m);
+    }
+}

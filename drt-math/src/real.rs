@@ -30,7 +30,10 @@ pub trait Real:
 {
     /// The value without its derivatives, all nesting levels down.
     fn re(self) -> f64;
-    /// Square root. At zero the derivative is infinite, as in calculus.
+    /// True when the value and every derivative are exactly zero.
+    fn is_zero(self) -> bool;
+    /// Square root. At zero the derivative is infinite, as in calculus, but along directions in
+    /// which x does not move it is zero.
     fn sqrt(self) -> Self;
     /// e to the x.
     fn exp(self) -> Self;
@@ -101,6 +104,10 @@ impl Real for f64 {
         self
     }
     #[inline]
+    fn is_zero(self) -> bool {
+        self == 0.0
+    }
+    #[inline]
     fn sqrt(self) -> Self {
         fm::sqrt(self)
     }
@@ -134,7 +141,7 @@ impl Real for f64 {
     }
     #[inline]
     fn abs(self) -> Self {
-        if self < 0.0 { -self } else { self }
+        Self::abs(self)
     }
     #[inline]
     fn powf(self, e: f64) -> Self {

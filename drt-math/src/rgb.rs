@@ -150,6 +150,7 @@ impl<T: Real> Mul<T> for Rgb<T> {
         self.map(|c| c * s)
     }
 }
+#[expect(clippy::suspicious_arithmetic_impl, reason = "one division for all channels")]
 impl<T: Real> Div<T> for Rgb<T> {
     type Output = Self;
     #[inline]
@@ -258,5 +259,50 @@ impl Mul<f64> for RgbVec {
     #[inline]
     fn mul(self, s: f64) -> Self {
         self.map(|v| v * s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vec3;
+
+    #[test]
+    fn channels_do_not_mix() {
+        let (a, b) = (Rgb::new(1.0, 2.0, 4.0), Rgb::new(3.0, 0.5, 8.0));
+        assert_eq!(a * b, Rgb::new(3.0, 1.0, 32.0));
+        assert_eq!(a / b, Rgb::new(1.0 / 3.0, 4.0, 0.5));
+        assert_eq!((a - b + b) * 2.0 / 2.0, a);
+        assert_eq!((a.sum(), a.dot(b), (-b).max_abs()), (7.0, 36.0, 8.0));
+        assert_eq!((-b).max_channel(), -0.5);
+        assert!((a.mean() - 7.0 / 3.0).abs() < 1e-15);
+        assert_eq!(Rgb::splat(0.0).exp(), Rgb::ONE);
+        assert_eq!(Rgb::from(a.to_array()), a);
+    }
+
+    #[test]
+    fn vanishing_ratios_are_zero() {
+        let q = Rgb::new(0.0, 1.0, 6.0).div_or_zero(Rgb::new(0.0, 0.0, 2.0));
+        assert_eq!(q, Rgb::new(0.0, 0.0, 3.0));
+    }
+
+    #[test]
+    fn gradients_contract_both_ways() {
+        // <w, G v> = <G^T w, v>.
+        let (c, p, v) = (Rgb::new(1.0, -2.0, 0.5), vec3(3.0, 1.0, -1.0), vec3(0.2, 0.4, 0.7));
+        let g = c.outer(p) * Rgb::new(2.0, 3.0, 5.0)
+            + RgbVec { r: Vec3::X, g: Vec3::Y, b: Vec3::Z } * 0.5;
+        let w = Rgb::new(0.3, 0.9, -1.1);
+        assert!((g.dot(v).dot(w) - g.weighted(w).dot(v)).abs() < 1e-14);
+        assert_eq!(g - g, RgbVec::ZERO);
+        assert_eq!((-g).map(|x| -x), g);
+    }
+
+    #[test]
+    fn non_finite_channels_are_seen() {
+        assert!(Rgb::ONE.is_finite() && Rgb::ZERO.is_zero());
+        assert!(!Rgb::new(0.0, f64::NAN, 0.0).is_finite());
+        assert!(!Rgb::new(0.0, f64::NAN, 0.0).is_zero());
+        assert!(!Rgb::ONE.outer(vec3(0.0, f64::INFINITY, 0.0)).is_finite());
     }
 }

@@ -2,7 +2,17 @@
 /// numbers: as easy as 1, 2, 3").
 ///
 /// The numbers are a pure function of (seed, stream, index, position), so the same work item draws
-/// the same numbers whichever thread runs it and in whatever order.
+/// the same numbers whichever thread runs it and in whatever order. Each (seed, stream, index) has
+/// 2^34 numbers of 32 bits before they repeat, and shares none of them with any other.
+///
+/// ```
+/// use drt_math::Rng;
+/// let pixel = 640 * 12 + 7;
+/// let mut rng = Rng::new(42, pixel, 3);
+/// let u = rng.next_2d();
+/// assert_eq!(Rng::new(42, pixel, 3).next_2d(), u);
+/// assert_ne!(Rng::new(42, pixel, 4).next_2d(), u);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Rng {
     key: [u32; 2],
@@ -43,10 +53,10 @@ impl Rng {
         u64::from(self.next_u32()) << 32 | u64::from(self.next_u32())
     }
 
-    /// A uniform number in [0, 1) with 52 bits, never exactly 0.
+    /// A uniform number in (0, 1): the centre of one of 2^52 equal intervals, so neither 0 nor 1.
     #[inline]
     pub fn next_f64(&mut self) -> f64 {
-        ((self.next_u64() >> 12) as f64 + 0.5) * (1.0 / 4_503_599_627_370_496.0)
+        interval_centre(self.next_u64() >> 12)
     }
 
     /// Two uniform numbers in (0, 1).
@@ -54,6 +64,12 @@ impl Rng {
     pub fn next_2d(&mut self) -> [f64; 2] {
         [self.next_f64(), self.next_f64()]
     }
+}
+
+/// The centre of interval `k` of 2^52.
+#[inline]
+fn interval_centre(k: u64) -> f64 {
+    (k as f64 + 0.5) * (1.0 / 4_503_599_627_370_496.0)
 }
 
 /// The ten-round Philox bijection.
@@ -74,4 +90,66 @@ pub(crate) fn philox4x32(mut c: [u32; 4], mut k: [u32; 2]) -> [u32; 4] {
         ];
     }
     c
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{SIGNIFICANCE, interval_chi_square, rectangle_chi_square};
+
+    #[test]
+    fn philox_known_answers() {
+        // Random123 1.09, tests/kat_vectors, "philox4x32 10".
+        let ones = u32::MAX;
+        let cases = [
+            ([0; 4], [0; 2], [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]),
+            ([ones; 4], [ones; 2], [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]),
+            (
+                [0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344],
+                [0xa409_3822, 0x299f_31d0],
+                [0xd16c_fe09, 0x94fd_cceb, 0x5001_e420, 0x2412_6ea1],
+            ),
+        ];
+        for (counter, key, answer) in cases {
+            assert_eq!(philox4x32(counter, key), answer);
+        }
+    }
+
+    #[test]
+    fn numbers_come_from_the_named_block() {
+        let mut rng = Rng::new(0x0123_4567_89ab_cdef, 0xfeed_0000_beef, 9);
+        let key = [0x89ab_cdef, 0x0123_4567];
+        for position in 0..3 {
+            for word in philox4x32([position, 9, 0x0000_beef, 0xfeed], key) {
+                assert_eq!(rng.next_u32(), word);
+            }
+        }
+    }
+
+    #[test]
+    fn uniform_alone_in_pairs_and_across_streams() {
+        const N: u32 = 200_000;
+        let mut rng = Rng::new(7, 1, 0);
+        let p = interval_chi_square((0..N).map(|_| rng.next_f64()), [0.0, 1.0], |_| 1.0);
+        assert!(p > SIGNIFICANCE, "{p}");
+        let square = |points: &mut dyn Iterator<Item = [f64; 2]>| {
+            rectangle_chi_square(points, [0.0; 2], [1.0; 2], |_| 1.0)
+        };
+        let p = square(&mut (0..N).map(|_| rng.next_2d()));
+        assert!(p > SIGNIFICANCE, "{p}");
+        let first = |stream: u64, index: u32| Rng::new(7, stream, index).next_f64();
+        let p = square(&mut (0..N).map(|i| [first(2, i), first(3, i)]));
+        assert!(p > SIGNIFICANCE, "{p}");
+        let p = square(&mut (0..N).map(|i| [first(u64::from(i), 0), first(u64::from(i) + 1, 0)]));
+        assert!(p > SIGNIFICANCE, "{p}");
+        let p = square(&mut (0..N).map(|i| [first(2, i), first(2, i / 2)]));
+        assert!(p > SIGNIFICANCE, "{p}");
+        let p = square(&mut (0..N).map(|i| [first(2, i % 1000), first(3, i % 1000)]));
+        assert!(p < SIGNIFICANCE, "numbers used over and over: {p}");
+    }
+
+    #[test]
+    fn extremes_stay_inside_the_open_interval() {
+        assert!(interval_centre(0) > 0.0 && interval_centre((1 << 52) - 1) < 1.0);
+    }
 }

@@ -266,3 +266,6 @@ impl RgbMoments {
         self.channels.map(|m| m.standard_error()).into()
     }
 }
+
+#[cfg(test)]
+mod tests;

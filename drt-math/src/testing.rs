@@ -28,7 +28,7 @@ pub fn chi_square(counts: &[u64], expected: &[f64]) -> f64 {
     assert_eq!(counts.len(), expected.len(), "one expected count per counted cell");
     let mut cells: Vec<(f64, f64)> =
         counts.iter().zip(expected).map(|(&n, &e)| (e, n as f64)).collect();
-    if cells.iter().any(|&(e, n)| !(e >= 0.0) || (n > 0.0 && e < 1e-9)) {
+    if cells.iter().any(|&(e, n)| e.is_nan() || e < 0.0 || (n > 0.0 && e < 1e-9)) {
         return 0.0;
     }
     cells.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -183,6 +183,7 @@ impl<T: Real> Mul<T> for Vec3<T> {
         vec3(self.x * s, self.y * s, self.z * s)
     }
 }
+#[expect(clippy::suspicious_arithmetic_impl, reason = "one division for all coordinates")]
 impl<T: Real> Div<T> for Vec3<T> {
     type Output = Self;
     #[inline]
@@ -206,5 +207,63 @@ impl<T: Real> MulAssign<T> for Vec3<T> {
     #[inline]
     fn mul_assign(&mut self, s: T) {
         *self = *self * s;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::Dual;
+
+    fn vector() -> impl Strategy<Value = Vec3> {
+        prop::array::uniform3(-3.0..3.0_f64).prop_map(Vec3::from)
+    }
+
+    proptest! {
+        #[test]
+        fn products(a in vector(), b in vector(), c in vector()) {
+            let n = a.cross(b);
+            prop_assert!(n.dot(a).abs() < 1e-14 * 81.0 && n.dot(b).abs() < 1e-14 * 81.0);
+            prop_assert!((n.dot(c) - a.dot(b.cross(c))).abs() < 1e-13);
+            let lagrange = a.length_squared() * b.length_squared() - a.dot(b) * a.dot(b);
+            prop_assert!((n.length_squared() - lagrange).abs() < 1e-11);
+            prop_assert!((a.lerp(b, 0.25) - (a * 0.75 + b / 4.0)).max_abs() < 1e-14);
+            prop_assert_eq!(a.min(b) + a.max(b), a + b);
+        }
+
+        #[test]
+        fn unit_vectors_move_at_right_angles(a in vector(), v in vector()) {
+            prop_assume!(a.length() > 0.1);
+            let moving = Vec3::from(core::array::from_fn::<_, 3, _>(|i| {
+                Dual::<f64, 1>::new(a[i], [v[i]])
+            }));
+            let n = moving.normalize();
+            let rate = vec3(n.x.eps[0], n.y.eps[0], n.z.eps[0]);
+            let expected = v.reject(n.re()) / a.length();
+            prop_assert!((rate - expected).max_abs() < 1e-12 * (1.0 + expected.max_abs()));
+        }
+    }
+
+    #[test]
+    fn axes_and_arrays() {
+        assert_eq!(Vec3::X.cross(Vec3::Y), Vec3::Z);
+        let mut v = vec3(1.0, -5.0, 3.0);
+        assert_eq!((v[0], v[1], v[2], v.max_abs()), (1.0, -5.0, 3.0, 5.0));
+        v += Vec3::X;
+        v -= Vec3::Y;
+        v *= 2.0;
+        assert_eq!(v.to_array(), [4.0, -12.0, 6.0]);
+        assert_eq!(v.lift::<Dual<f64, 2>>().x.eps, [0.0; 2]);
+        assert!(v.is_finite() && !Vec3::ZERO.normalize().is_finite());
+    }
+
+    #[test]
+    fn glam_agrees() {
+        let (a, b) = (vec3(1.0, 2.0, -3.0), vec3(0.5, 4.0, 1.0));
+        let (g, h) = (glam::DVec3::from(a), glam::DVec3::from(b));
+        assert_eq!(Vec3::from(g.cross(h)), a.cross(b));
+        assert_eq!((g.dot(h), g.length()), (a.dot(b), a.length()));
     }
 }

@@ -52,19 +52,23 @@ pub struct Equiangular {
     angle: f64,
 }
 
+/// The square of this is still a normal number.
+const SHORTEST: f64 = 1e-150;
+
 impl Equiangular {
-    /// The part `t_min..t_max` of the ray `origin + t direction` (a unit vector), seen from
+    /// The part `t_min < t < t_max` of the ray `origin + t direction` (a unit vector), seen from
     /// `point`. `t_max` may be infinite.
     ///
-    /// A point nearer to the ray than a 1e-9th of its distance to the segment's ends is taken to be
-    /// that far away: sampling and density remain a matching pair and finite.
+    /// A point nearer to the ray than a 1e-9th of its distance to the segment's farther end (the
+    /// finite one) is taken to be that far away: sampling and density remain a matching pair and
+    /// finite.
     #[must_use]
     pub fn new(origin: Vec3, direction: Vec3, point: Vec3, t_min: f64, t_max: f64) -> Self {
         let to_point = point - origin;
         let nearest = to_point.dot(direction);
         let (a, b) = (t_min - nearest, t_max - nearest);
-        let reach = if b.is_finite() { f64::max(a.abs(), b.abs()) } else { a.abs() + 1.0 };
-        let distance = to_point.reject(direction).length().max(1e-9 * reach);
+        let reach = if b.is_finite() { f64::max(a.abs(), b.abs()) } else { a.abs() };
+        let distance = to_point.reject(direction).length().max(1e-9 * reach).max(SHORTEST);
         let angle = if b.is_finite() {
             fm::atan2(distance * (b - a), distance * distance + a * b)
         } else {

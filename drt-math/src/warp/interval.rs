@@ -2,7 +2,7 @@ use core::f64::consts::{FRAC_2_PI, PI};
 
 use crate::fm;
 
-/// A number from the tent filter of the given radius: density falling linearly from 0 to both
+/// A number from the tent filter of the given (positive) radius: density falling linearly from 0 to both
 /// ends of [-radius, radius].
 #[inline]
 #[must_use]

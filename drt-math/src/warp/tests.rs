@@ -131,6 +131,8 @@ fn equiangular_follows_its_density() {
         (vec3(-3.0, 0.2, 0.3), 0.2),
         (vec3(9.0, -3.0, 0.3), 0.0),
         (direction * -0.5, 0.0),
+        (direction * 5.0 + vec3(1e-7, 0.0, 0.0), 0.0),
+        (vec3(1e7, 3e7, -2e7), 0.0),
     ] {
         let along = Equiangular::new(Vec3::ZERO, direction, point, t_min, 4.0);
         assert_interval([t_min, 4.0], |u| along.sample(u), |t| along.pdf(t));
@@ -142,6 +144,8 @@ fn equiangular_follows_its_density() {
 
 #[test]
 fn equiangular_bears_a_point_on_the_ray() {
+    let endless = Equiangular::new(Vec3::ZERO, Vec3::X, Vec3::ZERO, 0.0, f64::INFINITY);
+    assert!(endless.sample(0.5).is_finite() && endless.pdf(endless.sample(0.5)).is_finite());
     for x in [-1.0, 0.0, 0.5, 2.0, 3.0] {
         let along = Equiangular::new(Vec3::ZERO, Vec3::X, vec3(x, 0.0, 0.0), 0.0, 2.0);
         for u in [1e-16, 0.25, 0.5, 1.0 - 1e-16] {
