@@ -76,7 +76,9 @@ pub fn uniform_hemisphere_pdf(w: Vec3) -> f64 {
 #[inline]
 #[must_use]
 pub fn uniform_cone(u: [f64; 2], cos_max: f64) -> Vec3 {
-    cap((1.0 - cos_max) * u[0], u[1])
+    let w = cap((1.0 - cos_max) * u[0], u[1]);
+    // Rounding must not carry a sample out of its own density's support.
+    vec3(w.x, w.y, w.z.max(cos_max))
 }
 
 /// Density of [`uniform_cone`] in solid angle at the unit vector `w`:

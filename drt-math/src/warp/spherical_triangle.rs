@@ -70,6 +70,9 @@ impl SphericalTriangle {
     }
 
     /// Density in solid angle at the unit vector `w`: `1 / solid_angle` inside the triangle.
+    ///
+    /// For directions that came from elsewhere. Rounding may put a sample of this triangle just
+    /// beyond an edge: its density is `1 / solid_angle` all the same.
     #[inline]
     #[must_use]
     pub fn pdf(&self, w: Vec3) -> f64 {

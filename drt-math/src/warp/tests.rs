@@ -73,6 +73,9 @@ fn directions_follow_their_densities() {
 #[test]
 fn narrow_cones_stay_narrow() {
     let cos_max = 1.0 - 1e-12;
+    for cos in [-0.7, 0.1, 0.3, cos_max] {
+        assert!(uniform_cone_pdf(uniform_cone([1.0 - 1e-16, 0.3], cos), cos) > 0.0);
+    }
     for w in planar(3, |u| uniform_cone(u, cos_max)) {
         assert!(fm::sqrt(w.x * w.x + w.y * w.y) <= fm::sqrt(2.01e-12) && w.is_finite());
     }
