@@ -78,6 +78,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(crate::fixed_cases())]
+
         #[test]
         fn derivatives_are_those_of_an_orthonormal_frame(u in 0.0..1.0_f64, v in 0.0..1.0_f64, w in -1.0..1.0_f64) {
             for n in [warp::uniform_sphere([u, v]).normalize(), -Vec3::Z, Vec3::Z] {

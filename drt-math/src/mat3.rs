@@ -137,6 +137,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(crate::fixed_cases())]
+
         #[test]
         fn algebra(a in matrix(), b in matrix(), v in prop::array::uniform3(-2.0..2.0_f64)) {
             let v = Vec3::from(v);

@@ -222,6 +222,8 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(crate::fixed_cases())]
+
         #[test]
         fn products(a in vector(), b in vector(), c in vector()) {
             let n = a.cross(b);

@@ -71,6 +71,8 @@ fn cdf_is_monotone_and_its_residual_continues() {
 }
 
 proptest! {
+    #![proptest_config(crate::fixed_cases())]
+
     #[test]
     fn tables_hold_the_weights_exactly(
         weights in prop::collection::vec(prop_oneof![Just(0.0), 1e-12..1.0_f64, 1.0..1e6_f64], 1..50),

@@ -99,6 +99,8 @@ fn direct(numbers: &[f64]) -> (f64, f64) {
 }
 
 proptest! {
+    #![proptest_config(crate::fixed_cases())]
+
     #[test]
     fn merging_in_any_order_equals_pushing(
         numbers in prop::collection::vec(-1e3..1e3_f64, 2..60),
