@@ -25,15 +25,18 @@ struct Range {
 }
 
 impl Bounds {
-    /// Cells are this many voxels wide, or wider in large grids: small enough to follow a cloud's
-    /// outline, large enough that a ray crosses few.
-    const STRIDE: usize = 4;
-    const MOST_CELLS_PER_AXIS: usize = 64;
+    /// Cells per axis as a rule: enough to follow a cloud's outline, few enough for a ray to cross.
+    const CELLS: usize = 16;
+    /// Voxels per cell and axis as a rule at most: beyond, more cells are better than wider ones.
+    const WIDTH: usize = 4;
+    /// Cells per axis at most: the bounds stay small beside the grid.
+    const MOST_CELLS: usize = 64;
 
     pub(crate) fn new(grid: &Grid) -> Self {
-        let size = grid.size().map(|n| {
-            let stride = usize::max(Self::STRIDE, n.div_ceil(Self::MOST_CELLS_PER_AXIS));
-            n.div_ceil(stride)
+        let size = grid.axes().each_ref().map(|axis| {
+            let n = axis.intervals();
+            let width = usize::min(n.div_ceil(Self::CELLS), Self::WIDTH);
+            n.div_ceil(usize::max(width, n.div_ceil(Self::MOST_CELLS)))
         });
         let mut bounds = Self { size, cells: Vec::new(), largest: 0.0 };
         let count = size.iter().product();

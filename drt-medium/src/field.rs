@@ -68,8 +68,9 @@ pub trait DensityField: Debug + Send + Sync {
     /// a bound must hold on the whole piece.
     fn pieces(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>);
 
-    /// The least majorant used on the pieces when distances are sampled defensively, so that
-    /// vertices also fall where the field is zero now. Zero: no vertices there.
+    /// The least majorant, in 1 / scene unit, used on the pieces when distances are sampled
+    /// defensively, so that vertices also fall where the field is zero now. One over the field's
+    /// size is a good value; zero: no vertices there.
     fn majorant_floor(&self) -> f64 {
         0.0
     }

@@ -3,12 +3,10 @@ use alloc::vec::Vec;
 
 use drt_math::{Affine, Rgb, Vec3};
 
-use crate::grid::corner_weights;
 use crate::{CoefficientRates, Crossing, FieldTangent, Grid, Medium, MediumKind, MediumTangent};
 
 /// Derivative of a loss with respect to one coefficient field: the transpose of [`FieldTangent`].
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FieldGradient {
     /// With respect to a term added everywhere in the medium.
     pub uniform: Rgb,
@@ -22,7 +20,6 @@ pub struct FieldGradient {
 
 /// Derivative of a loss with respect to everything a [`MediumTangent`] can change.
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MediumGradient {
     /// Of the extinction, albedo held.
     pub sigma_t: FieldGradient,
@@ -58,7 +55,7 @@ impl FieldGradient {
         let (Some(grid), false) = (grid, self.voxels.is_empty()) else { return };
         let cell = grid.cell(grid.from_world().point(x));
         let channels = self.channels();
-        for (voxel, w) in grid.corners(&cell).into_iter().zip(corner_weights(&cell)) {
+        for (voxel, w) in grid.corners(&cell).into_iter().zip(cell.weights()) {
             let at = &mut self.voxels[voxel * channels..][..channels];
             match at {
                 [one] => *one += adjoint.sum() * w,

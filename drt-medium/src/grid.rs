@@ -3,7 +3,7 @@ use alloc::vec::Vec;
 use drt_math::{Affine, Rgb, RgbVec, Vec3, vec3};
 
 use crate::MediumError;
-use crate::lattice::{Axis, Between};
+use crate::lattice::{Axis, Cell};
 
 /// Where the values sit in the unit cube.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,9 +68,6 @@ pub struct Grid {
     from_world: Affine,
     axes: [Axis; 3],
 }
-
-/// The neighbours of a point along the three axes.
-pub(crate) type Cell = [Between; 3];
 
 impl Grid {
     /// A voxel-centred, trilinear, clamped grid filling the unit cube.
@@ -239,7 +236,7 @@ impl Grid {
     pub fn value_at_unit(&self, u: Vec3) -> Rgb {
         let cell = self.cell(u);
         let at = self.corners(&cell);
-        self.per_channel(|c| interpolate(&cell, &self.corner_values(&at, c)))
+        self.per_channel(|c| cell.interpolate(&self.corner_values(&at, c)))
     }
 
     /// Gradient of the field at a point of the world, per scene unit. On the planes between voxels,
@@ -250,7 +247,7 @@ impl Grid {
         let cell = self.cell(self.from_world.point(x));
         let at = self.corners(&cell);
         let world = |c: usize| {
-            let g = slopes(&cell, &self.corner_values(&at, c));
+            let g = cell.slopes(&self.corner_values(&at, c));
             let unit = vec3(
                 g.x * self.axes[0].scale(),
                 g.y * self.axes[1].scale(),
@@ -272,19 +269,17 @@ impl Grid {
         }
     }
 
+    /// The lattice cell around a point of the unit cube.
     #[inline]
     pub(crate) fn cell(&self, u: Vec3) -> Cell {
-        [self.axes[0].between(u.x), self.axes[1].between(u.y), self.axes[2].between(u.z)]
+        Cell::new(&self.axes, u)
     }
 
-    /// Voxel numbers of a cell's corners; bit k of the position chooses the side along axis k.
+    /// Voxel numbers in storage order of a cell's corners.
     #[inline]
     pub(crate) fn corners(&self, cell: &Cell) -> [usize; 8] {
         let [nx, ny, _] = self.size;
-        let x = [cell[0].lo, cell[0].hi];
-        let y = [cell[1].lo * nx, cell[1].hi * nx];
-        let z = [cell[2].lo * nx * ny, cell[2].hi * nx * ny];
-        core::array::from_fn(|n| x[n & 1] + y[n >> 1 & 1] + z[n >> 2])
+        cell.sums([1, nx, nx * ny])
     }
 
     #[inline]
@@ -318,43 +313,6 @@ impl Grid {
 /// The voxel with a number in storage order.
 pub(crate) fn unflatten([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
     [n % nx, n / nx % ny, n / (nx * ny)]
-}
-
-/// The voxels of a cell's corners in the order of [`Grid::corners`].
-#[inline]
-pub(crate) fn corner_voxels(cell: &Cell) -> [[usize; 3]; 8] {
-    let side = |k: usize, bit: usize| if bit == 0 { cell[k].lo } else { cell[k].hi };
-    core::array::from_fn(|n| [side(0, n & 1), side(1, n >> 1 & 1), side(2, n >> 2)])
-}
-
-/// Weight of each corner of a cell in the order of [`Grid::corners`].
-#[inline]
-pub(crate) fn corner_weights(cell: &Cell) -> [f64; 8] {
-    let w = cell.map(|b| [1.0 - b.frac, b.frac]);
-    core::array::from_fn(|n| w[0][n & 1] * w[1][n >> 1 & 1] * w[2][n >> 2])
-}
-
-#[inline]
-fn lerp(a: f64, b: f64, s: f64) -> f64 {
-    a + (b - a) * s
-}
-
-#[inline]
-fn interpolate(cell: &Cell, v: &[f64; 8]) -> f64 {
-    let [fx, fy, fz] = cell.map(|b| b.frac);
-    let face = |k: usize| lerp(lerp(v[k], v[k + 1], fx), lerp(v[k + 2], v[k + 3], fx), fy);
-    lerp(face(0), face(4), fz)
-}
-
-/// Slopes of the interpolant along the lattice axes.
-#[inline]
-fn slopes(cell: &Cell, v: &[f64; 8]) -> Vec3 {
-    let [fx, fy, fz] = cell.map(|b| b.frac);
-    let along = |step: usize, a: usize, fa: f64, b: usize, fb: f64| {
-        let d = |k: usize| v[k + step] - v[k];
-        lerp(lerp(d(0), d(a), fa), lerp(d(b), d(a + b), fa), fb)
-    };
-    vec3(along(1, 2, fy, 4, fz), along(2, 1, fx, 4, fz), along(4, 1, fx, 2, fy))
 }
 
 #[cfg(feature = "serde")]

@@ -85,12 +85,12 @@ pub struct GridMedium {
     pub(crate) albedo: Volume,
     pub(crate) emission: Volume,
     bounds: Bounds,
-    floor_fraction: f64,
+    floor_depth: f64,
 }
 
 impl GridMedium {
-    /// Fraction of the largest extinction that is the least majorant of defensive sampling.
-    pub const DEFAULT_FLOOR_FRACTION: f64 = 0.1;
+    /// Optical depth of the least majorant of defensive sampling along the diagonal of the box.
+    pub const DEFAULT_FLOOR_DEPTH: f64 = 1.0;
 
     /// A medium with extinction `scale × density` (1 / scene unit), and emitted radiance `emission`.
     ///
@@ -107,14 +107,15 @@ impl GridMedium {
         albedo.check(Property::Albedo)?;
         emission.check(Property::Emission)?;
         let bounds = Bounds::new(&density);
-        let floor_fraction = Self::DEFAULT_FLOOR_FRACTION;
-        Ok(Self { density, scale, albedo, emission, bounds, floor_fraction })
+        let floor_depth = Self::DEFAULT_FLOOR_DEPTH;
+        Ok(Self { density, scale, albedo, emission, bounds, floor_depth })
     }
 
-    /// Another least majorant for defensive sampling, as a fraction of the largest extinction.
+    /// Another least majorant for defensive sampling, given by its optical depth along the diagonal
+    /// of the box: about `defensive × depth` events per diagonal fall into empty voxels.
     #[must_use]
-    pub fn with_floor_fraction(mut self, fraction: f64) -> Self {
-        self.floor_fraction = fraction.clamp(0.0, 1.0);
+    pub fn with_floor_depth(mut self, depth: f64) -> Self {
+        self.floor_depth = f64::max(depth, 0.0);
         self
     }
 
@@ -218,15 +219,8 @@ impl DensityField for GridMedium {
     }
 
     fn majorant_floor(&self) -> f64 {
-        let largest = self.largest_sigma_t();
-        if largest > 0.0 {
-            self.floor_fraction * largest
-        } else {
-            // An empty medium has no extinction to compare with: one tentative collision, on
-            // average, along the box's diagonal.
-            let [lo, hi] = self.density.world_bounds();
-            1.0 / (hi - lo).length()
-        }
+        let [lo, hi] = self.density.world_bounds();
+        self.floor_depth / (hi - lo).length()
     }
 
     fn feature_size(&self) -> f64 {
@@ -248,13 +242,13 @@ mod stored {
         scale: f64,
         albedo: Volume,
         emission: Volume,
-        floor_fraction: f64,
+        floor_depth: f64,
     }
 
     impl From<super::GridMedium> for GridMedium {
         fn from(m: super::GridMedium) -> Self {
-            let super::GridMedium { density, scale, albedo, emission, floor_fraction, .. } = m;
-            Self { density, scale, albedo, emission, floor_fraction }
+            let super::GridMedium { density, scale, albedo, emission, floor_depth, .. } = m;
+            Self { density, scale, albedo, emission, floor_depth }
         }
     }
 
@@ -262,7 +256,7 @@ mod stored {
         type Error = MediumError;
         fn try_from(m: GridMedium) -> Result<Self, MediumError> {
             let medium = Self::new(m.density, m.scale, m.albedo, m.emission)?;
-            Ok(medium.with_floor_fraction(m.floor_fraction))
+            Ok(medium.with_floor_depth(m.floor_depth))
         }
     }
 }

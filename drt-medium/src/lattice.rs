@@ -1,3 +1,5 @@
+use drt_math::{Vec3, vec3};
+
 use crate::{Filter, Layout, Wrap};
 
 /// Where the values of a grid sit along one axis of its unit cube, and which of them a point sees.
@@ -13,10 +15,10 @@ pub(crate) struct Axis {
 
 /// The two neighbours of a point along one axis, and the weight of the second.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Between {
-    pub(crate) lo: usize,
-    pub(crate) hi: usize,
-    pub(crate) frac: f64,
+struct Between {
+    lo: usize,
+    hi: usize,
+    frac: f64,
 }
 
 impl Axis {
@@ -34,8 +36,13 @@ impl Axis {
         self.scale
     }
 
+    /// Steps of the lattice on the unit interval.
+    pub(crate) fn intervals(&self) -> usize {
+        usize::max(self.scale as usize, 1)
+    }
+
     #[inline]
-    pub(crate) fn between(&self, u: f64) -> Between {
+    fn between(&self, u: f64) -> Between {
         let (base, frac) = self.split(u);
         if self.filter == Filter::Nearest {
             let i = self.wrapped(if frac < 0.5 { base } else { base + 1 });
@@ -51,8 +58,8 @@ impl Axis {
     /// Every value that some point of the closed interval of unit coordinates can see.
     pub(crate) fn covering(&self, from: f64, to: f64) -> impl Iterator<Item = usize> + use<> {
         let axis = *self;
-        let (first, last) = (self.split(from).0, self.split(to).0 + 1);
-        (first..=last).map(move |i| axis.wrapped(i))
+        let (first, (last, beyond)) = (self.split(from).0, self.split(to));
+        (first..=last + i64::from(beyond > 0.0)).map(move |i| axis.wrapped(i))
     }
 
     /// Whole and fractional part of the lattice coordinate.
@@ -78,4 +85,64 @@ impl Axis {
             }
         }) as usize
     }
+}
+
+/// The eight values around a point. Corner n lies on the upper side along axis k when bit k of n is
+/// set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Cell([Between; 3]);
+
+impl Cell {
+    #[inline]
+    pub(crate) fn new(axes: &[Axis; 3], u: Vec3) -> Self {
+        Self([axes[0].between(u.x), axes[1].between(u.y), axes[2].between(u.z)])
+    }
+
+    /// Per corner, the sum of its coordinates times the strides.
+    #[inline]
+    pub(crate) fn sums(&self, strides: [usize; 3]) -> [usize; 8] {
+        let side = |k: usize| [self.0[k].lo * strides[k], self.0[k].hi * strides[k]];
+        let (x, y, z) = (side(0), side(1), side(2));
+        core::array::from_fn(|n| x[n & 1] + y[n >> 1 & 1] + z[n >> 2])
+    }
+
+    /// Position of each corner in the grid.
+    #[inline]
+    pub(crate) fn voxels(&self) -> [[usize; 3]; 8] {
+        let side = |k: usize, n: usize| if n >> k & 1 == 0 { self.0[k].lo } else { self.0[k].hi };
+        core::array::from_fn(|n| [side(0, n), side(1, n), side(2, n)])
+    }
+
+    /// Weight of each corner in the interpolation.
+    #[inline]
+    pub(crate) fn weights(&self) -> [f64; 8] {
+        let w = self.0.map(|b| [1.0 - b.frac, b.frac]);
+        core::array::from_fn(|n| w[0][n & 1] * w[1][n >> 1 & 1] * w[2][n >> 2])
+    }
+
+    /// The trilinear interpolant of values at the corners.
+    #[inline]
+    pub(crate) fn interpolate(&self, v: &[f64; 8]) -> f64 {
+        let [fx, fy, fz] = self.0.map(|b| b.frac);
+        let face = |k: usize| lerp(lerp(v[k], v[k + 1], fx), lerp(v[k + 2], v[k + 3], fx), fy);
+        lerp(face(0), face(4), fz)
+    }
+
+    /// Its slopes along the lattice axes, per lattice step.
+    #[inline]
+    pub(crate) fn slopes(&self, v: &[f64; 8]) -> Vec3 {
+        let [fx, fy, fz] = self.0.map(|b| b.frac);
+        // Differences across one axis, interpolated along the steps a and b of the other two.
+        let across = |step: usize, (a, fa): (usize, f64), (b, fb): (usize, f64)| {
+            let d = |k: usize| v[k + step] - v[k];
+            lerp(lerp(d(0), d(a), fa), lerp(d(b), d(a + b), fa), fb)
+        };
+        let (x, y, z) = ((1, fx), (2, fy), (4, fz));
+        vec3(across(1, y, z), across(2, x, z), across(4, x, y))
+    }
+}
+
+#[inline]
+fn lerp(a: f64, b: f64, s: f64) -> f64 {
+    a + (b - a) * s
 }

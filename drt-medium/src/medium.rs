@@ -134,8 +134,8 @@ impl Medium {
 
     /// Samples a distance; see [`tracking::sample_distance`] and [`Homogeneous::free_flight_pdf`]
     /// for the densities. `channels` are the nonnegative weights of the colour channels
-    /// (throughput), `defensive` in [0, 1) is the least probability of an event where the medium
-    /// could have one; 0 is plain free flight.
+    /// (throughput). `defensive` in [0, 1) is the share of events placed without regard to the
+    /// present extinction, as derivatives with respect to it need; 0 is plain free flight.
     #[inline]
     #[expect(clippy::too_many_arguments, reason = "a ray, three choices and two sinks")]
     pub fn sample_distance(

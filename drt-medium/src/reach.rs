@@ -27,7 +27,7 @@ impl Reach {
             1.0 / self.length
         } else {
             let r = self.scale + t;
-            self.scale / (r * r)
+            self.scale / r / r
         }
     }
 }

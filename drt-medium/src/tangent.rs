@@ -3,7 +3,6 @@ use alloc::collections::BTreeMap;
 use drt_math::{Affine, Rgb, Vec3};
 
 use crate::change::{Field, FieldChange};
-use crate::grid::{corner_voxels, corner_weights};
 use crate::{
     CoefficientGradients, CoefficientRates, Coefficients, Grid, Medium, MediumChange, MediumError,
     MediumKind, Property, ValueChange,
@@ -12,7 +11,6 @@ use crate::{
 /// Derivative of one coefficient field with respect to a parameter, at rest:
 /// `uniform + relative × field + voxel values`.
 #[derive(Clone, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FieldTangent {
     /// The same everywhere in the medium.
     pub uniform: Rgb,
@@ -28,7 +26,6 @@ pub struct FieldTangent {
 /// [`MediumTangent::plus`], each first carried through the changes that came after it with
 /// [`MediumTangent::push_through`].
 #[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MediumTangent {
     /// Of the extinction, albedo held.
     pub sigma_t: FieldTangent,
@@ -103,7 +100,7 @@ impl FieldTangent {
         let mut rate = self.uniform + field * self.relative;
         if let Some(grid) = grid.filter(|_| !self.voxels.is_empty()) {
             let cell = grid.cell(grid.from_world().point(x));
-            for (voxel, w) in corner_voxels(&cell).iter().zip(corner_weights(&cell)) {
+            for (voxel, w) in cell.voxels().iter().zip(cell.weights()) {
                 if let Some(v) = self.voxels.get(voxel) {
                     rate += *v * w;
                 }

@@ -69,10 +69,11 @@ pub fn channel_probabilities(channels: Rgb, defensive: f64) -> Rgb {
 /// weighted channels.
 ///
 /// `channels` are nonnegative weights, as a rule the path's throughput. With `defensive` > 0, in
-/// [0, 1), a tentative collision becomes an event with at least that probability, and majorants
-/// are at least [`DensityField::majorant_floor`]: then vertices also fall where the extinction is
-/// zero, as derivatives with respect to it need (the idea of differential ratio tracking,
-/// Nimier-David et al. 2022, as one density instead of two samples). Weights account for both.
+/// [0, 1), majorants are at least [`DensityField::majorant_floor`], and events happen at a rate of
+/// at least `defensive × floor` wherever the field has a piece: then vertices also fall where the
+/// extinction is zero, as derivatives with respect to it need (the aim of differential ratio
+/// tracking, Nimier-David et al. 2022, reached with one density instead of a second sample).
+/// Weights account for it. With `defensive` zero, a channel of weight zero is not estimated.
 pub fn sample_distance<F: DensityField + ?Sized>(
     field: &F,
     ray: &Ray,
@@ -89,6 +90,7 @@ pub fn sample_distance<F: DensityField + ?Sized>(
     field.pieces(ray, &mut |piece| {
         stats.pieces += 1;
         let majorant = f64::max(rate_bound(piece), floor);
+        let least = defensive * floor / majorant;
         let mut t = piece.start;
         while let Some(next) = next_collision(t, piece.end, majorant, &mut depth) {
             t = next;
@@ -96,7 +98,7 @@ pub fn sample_distance<F: DensityField + ?Sized>(
             stats.lookups += 1;
             let sigma = field.sigma_t(ray.at(t));
             let accept = acceptance(probabilities * weight.abs(), sigma.abs() / majorant);
-            let accept = accept.clamp(defensive, 1.0);
+            let accept = accept.clamp(least, 1.0);
             if rng.next_f64() < accept {
                 event = Some((t, weight / (majorant * accept)));
                 return ControlFlow::Break(());

@@ -1,0 +1,126 @@
+//! Phase functions: normalised, sampled as evaluated, with the mean cosine they promise, the right
+//! way round, and with exact derivatives.
+
+use std::f64::consts::PI;
+
+use drt_math::testing::{SIGNIFICANCE, sphere_chi_square};
+use drt_math::{Dual, Rng, Vec3, vec3};
+use drt_medium::{Phase, henyey_greenstein};
+
+const SHARPEST: f64 = 0.9999;
+
+fn phases() -> Vec<Phase> {
+    let hg = [-SHARPEST, -0.6, -1e-9, 0.0, 1e-9, 0.3, 0.85, SHARPEST];
+    let mut all = vec![Phase::Isotropic, Phase::Rayleigh];
+    all.extend(hg.map(|g| Phase::henyey_greenstein(g).expect("a valid g")));
+    all
+}
+
+fn mean_cosine(p: &Phase) -> f64 {
+    match *p {
+        Phase::HenyeyGreenstein { g } => g,
+        _ => 0.0,
+    }
+}
+
+/// `∫ f over the sphere` for f of the cosine c alone; with c = ±(1 - x²/…) clustered at the peak by
+/// the substitution 1 ∓ c = exp(y).
+fn sphere_integral(peak: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
+    let (low, high, steps) = (-60.0_f64, 2.0_f64.ln(), 20_000);
+    let h = (high - low) / f64::from(steps);
+    let value = |y: f64| {
+        let from_pole = y.exp();
+        let c = if peak >= 0.0 { 1.0 - from_pole } else { from_pole - 1.0 };
+        2.0 * PI * f(c, from_pole) * from_pole
+    };
+    let simpson = |i: i32| {
+        let y = low + f64::from(i) * h;
+        (value(y) + 4.0 * value(y + 0.5 * h) + value(y + h)) * h / 6.0
+    };
+    (0..steps).map(simpson).sum()
+}
+
+#[test]
+fn normalised_with_the_mean_cosine_promised() {
+    for p in phases() {
+        let g = mean_cosine(&p);
+        let total = sphere_integral(g, |c, _| p.eval(c));
+        assert!((total - 1.0).abs() < 1e-7, "{p:?} integrates to {total}");
+        let mean = sphere_integral(g, |c, _| c * p.eval(c));
+        assert!((mean - g).abs() < 1e-7, "{p:?} has mean cosine {mean}");
+    }
+}
+
+#[test]
+fn sampled_as_evaluated() {
+    let flow = vec3(0.48, -0.6, 0.64);
+    for p in phases().into_iter().filter(|p| mean_cosine(p).abs() < 0.9) {
+        let directions = (0..200_000).map(|i| {
+            let (w, pdf) = p.sample(flow, Rng::new(1, 2, i).next_2d());
+            assert!((w.length() - 1.0).abs() < 1e-12);
+            assert!((pdf / p.eval(flow.dot(w)) - 1.0).abs() < 1e-9);
+            w
+        });
+        let value = sphere_chi_square(directions, |w| p.eval(flow.dot(w)));
+        assert!(value > SIGNIFICANCE, "{p:?}: p-value {value}");
+    }
+}
+
+#[test]
+fn the_wrong_orientation_is_noticed() {
+    let p = Phase::henyey_greenstein(0.05).expect("a valid g");
+    let directions = (0..200_000).map(|i| p.sample(Vec3::Z, Rng::new(1, 2, i).next_2d()).0);
+    let value = sphere_chi_square(directions, |w| p.eval(-w.z));
+    assert!(value < SIGNIFICANCE, "backward passes for forward: p-value {value}");
+}
+
+#[test]
+fn inversion_holds_for_the_sharpest_lobes() {
+    // The distribution function of Henyey-Greenstein in closed form, as a function of 1 - c.
+    for g in [0.5, 0.99, SHARPEST] {
+        let p = Phase::henyey_greenstein(g).expect("a valid g");
+        for u in [1e-9, 0.01, 0.3, 0.7, 0.99, 1.0 - 1e-9] {
+            let (w, _) = p.sample(Vec3::Z, [u, 0.0]);
+            // The sine has its digits where the cosine has lost them.
+            let below = w.x.hypot(w.y).powi(2) / (1.0 + w.z);
+            let root = ((1.0 - g).powi(2) + 2.0 * g * below).sqrt();
+            let above = (1.0 + g) / (2.0 * g) * (1.0 - (1.0 - g) / root);
+            assert!((above + u - 1.0).abs() < 1e-9, "g {g}: {u} comes back as {}", 1.0 - above);
+        }
+    }
+}
+
+#[test]
+fn forward_is_forward() {
+    let forward = Phase::henyey_greenstein(0.7).expect("a valid g");
+    assert!(forward.eval(1.0) > 100.0 * forward.eval(-1.0));
+    let (w, _) = forward.sample(Vec3::X, [0.5, 0.5]);
+    assert!(w.x > 0.8);
+    for p in phases() {
+        assert_eq!(p.sample(Vec3::Y, [0.25, 0.5]).1.is_finite(), true, "{p:?}");
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_duals() {
+    let close = |a: f64, b: f64| (a - b).abs() <= 1e-10 * b.abs().max(1e-300);
+    let mut rng = Rng::new(5, 0, 0);
+    for p in phases() {
+        for _ in 0..200 {
+            let c = 2.0 * rng.next_f64() - 1.0;
+            let d = p.eval(Dual::<f64, 1>::variable(c, 0));
+            assert!(close(p.d_cos(c), d.eps[0]), "{p:?} at {c}: {} {}", p.d_cos(c), d.eps[0]);
+            if let Some(g) = p.mean_cosine_parameter() {
+                let d = henyey_greenstein(Dual::<f64, 1>::variable(g, 0), Dual::from(c));
+                assert!(close(p.d_g(c), d.eps[0]), "{p:?} at {c}: {} {}", p.d_g(c), d.eps[0]);
+            }
+        }
+    }
+}
+
+#[test]
+fn impossible_mean_cosines_are_refused() {
+    for g in [1.0, -1.0, 1.5, f64::NAN, f64::INFINITY] {
+        assert!(Phase::henyey_greenstein(g).is_err(), "{g}");
+    }
+}
