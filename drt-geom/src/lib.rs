@@ -6,17 +6,27 @@ extern crate alloc;
 
 mod aabb;
 mod intersect;
+#[cfg(any(feature = "obj", feature = "ply"))]
+mod io;
 mod mesh;
 pub mod procedural;
 mod query;
 mod topology;
+#[cfg(feature = "spade")]
+mod triangulate;
 mod weld;
 
 pub use aabb::Aabb;
 pub use intersect::ray_plane;
+#[cfg(feature = "obj")]
+pub use io::{ObjError, ObjErrorKind, load_obj};
+#[cfg(feature = "ply")]
+pub use io::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
 pub use mesh::{Mesh, MeshError};
 pub use query::{BvhError, ClosestPoint, Hit, Ray, Skip, TriangleBvh};
 pub use topology::{Edge, EdgeClass, Topology};
+#[cfg(feature = "spade")]
+pub use triangulate::{PolygonError, newell_normal, triangulate};
 pub use weld::weld;
 
 /// The index that stands for "none" where a face or primitive may be absent.

@@ -9,7 +9,6 @@ use core::ops::ControlFlow;
 use super::frame::{Box32, BoxRay};
 
 const BINS: usize = 16;
-const LEAF: usize = 4;
 
 /// Below this depth nodes are halved by count, so that no input makes a deep tree: with 2^32
 /// primitives the depth stays below [`STACK`].
@@ -17,12 +16,12 @@ const SAH_DEPTH: usize = 60;
 const STACK: usize = SAH_DEPTH + 34;
 
 #[derive(Clone, Copy, Debug)]
-struct Node {
-    bounds: Box32,
+pub(super) struct Node {
+    pub(super) bounds: Box32,
     /// Inner node: index of the first of its two children. Leaf: first primitive.
-    first: u32,
+    pub(super) first: u32,
     /// Number of primitives; zero marks an inner node.
-    count: u32,
+    pub(super) count: u32,
 }
 
 /// The tree. It numbers the primitives in its own order, that of the leaves from left to right.
@@ -32,9 +31,11 @@ pub(super) struct CompactTree {
 }
 
 impl CompactTree {
-    /// Builds the tree over the boxes and returns it with the boxes' numbers in the tree's order.
-    pub(super) fn build(boxes: &[Box32]) -> (Self, Vec<u32>) {
+    /// Builds the tree over the boxes, with at most `leaf_size` in a leaf, and returns it with the
+    /// boxes' numbers in the tree's order.
+    pub(super) fn build(boxes: &[Box32], leaf_size: usize) -> (Self, Vec<u32>) {
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
+        let centers: Vec<_> = boxes.iter().map(Box32::doubled_center).collect();
         let mut nodes = Vec::with_capacity(boxes.len());
         nodes.push(Node { bounds: Box32::EMPTY, first: 0, count: boxes.len() as u32 });
         let mut open = alloc::vec![(0, 0)];
@@ -42,7 +43,8 @@ impl CompactTree {
             let Node { first, count, .. } = nodes[index];
             let range = &mut order[first as usize..(first + count) as usize];
             nodes[index].bounds = union(boxes, range);
-            if let Some(left) = split(boxes, range, depth, &nodes[index].bounds) {
+            let node_area = nodes[index].bounds.half_area();
+            if let Some(left) = split(boxes, &centers, range, depth, leaf_size, node_area) {
                 let left = left as u32;
                 let child = nodes.len();
                 for (first, count) in [(first, left), (first + left, count - left)] {
@@ -54,6 +56,12 @@ impl CompactTree {
             }
         }
         (Self { nodes }, order)
+    }
+
+    /// The nodes, the root first and children after their parents.
+    #[cfg(feature = "obvhs")]
+    pub(super) fn nodes(&self) -> &[Node] {
+        &self.nodes
     }
 
     /// New boxes for the same tree, by primitive in the tree's order.
@@ -139,66 +147,103 @@ fn union(boxes: &[Box32], range: &[u32]) -> Box32 {
 }
 
 /// Reorders the primitives of a node and returns how many go left; `None` for a leaf.
-fn split(boxes: &[Box32], range: &mut [u32], depth: usize, bounds: &Box32) -> Option<usize> {
-    if range.len() <= 1 {
+fn split(
+    boxes: &[Box32],
+    centers: &[[f32; 3]],
+    range: &mut [u32],
+    depth: usize,
+    leaf_size: usize,
+    node_area: f32,
+) -> Option<usize> {
+    let count = range.len();
+    if count <= 1 {
         return None;
     }
-    let center = |i: u32, axis: usize| boxes[i as usize].doubled_center()[axis];
     let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for &i in range.iter() {
+        let c = centers[i as usize];
         for k in 0..3 {
-            low[k] = low[k].min(center(i, k));
-            high[k] = high[k].max(center(i, k));
+            low[k] = low[k].min(c[k]);
+            high[k] = high[k].max(c[k]);
         }
     }
+    let extent = [0, 1, 2].map(|k| high[k] - low[k]);
     let bin = |i: u32, axis: usize| {
-        let place = (center(i, axis) - low[axis]) / (high[axis] - low[axis]);
-        usize::min((place * BINS as f32) as usize, BINS - 1)
+        let place = (centers[i as usize][axis] - low[axis]) * (BINS as f32 / extent[axis]);
+        usize::min(place as usize, BINS - 1)
     };
 
-    // Cost of each way to split, in units of (primitive tests × area of the node).
-    let mut best = (f32::INFINITY, 0, 0);
-    for axis in (0..3).filter(|&k| high[k] > low[k] && depth < SAH_DEPTH) {
-        let mut bins = [(Box32::EMPTY, 0_u32); BINS];
-        for &i in range.iter() {
-            let b = &mut bins[bin(i, axis)];
-            *b = (b.0.union(&boxes[i as usize]), b.1 + 1);
-        }
-        let mut right_cost = [0.0; BINS];
-        let grow = |sum: &mut (Box32, u32), b: &(Box32, u32)| {
-            *sum = (sum.0.union(&b.0), sum.1 + b.1);
-            sum.0.half_area() * sum.1 as f32
-        };
-        let mut sum = (Box32::EMPTY, 0);
-        for cut in (1..BINS).rev() {
-            right_cost[cut] = grow(&mut sum, &bins[cut]);
-        }
-        let mut sum = (Box32::EMPTY, 0);
-        for cut in 1..BINS {
-            let cost = grow(&mut sum, &bins[cut - 1]) + right_cost[cut];
-            if cost < best.0 && sum.1 > 0 && (sum.1 as usize) < range.len() {
-                best = (cost, axis, cut);
-            }
+    let mut bins = [[Bin::EMPTY; BINS]; 3];
+    let axes = (0..3).filter(|&k| extent[k] > 0.0 && depth < SAH_DEPTH);
+    for &i in range.iter() {
+        for axis in axes.clone() {
+            bins[axis][bin(i, axis)].add(&Bin { bounds: boxes[i as usize], count: 1 });
         }
     }
+    let best = axes
+        .filter_map(|axis| best_cut(&bins[axis], count).map(|(cost, cut)| (cost, axis, cut)))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
 
-    let (cost, axis, cut) = best;
-    let node_cost = (range.len() as f32 - 1.0) * bounds.half_area();
-    if cost < node_cost {
-        Some(partition(range, |i| bin(i, axis) < cut))
-    } else if range.len() <= LEAF {
-        None
-    } else {
-        let longest =
-            (0..3).fold(0, |k, j| if high[j] - low[j] > high[k] - low[k] { j } else { k });
-        let middle = range.len() / 2;
-        range.select_nth_unstable_by(middle, |&a, &b| {
-            center(a, longest).total_cmp(&center(b, longest)).then(a.cmp(&b))
-        });
-        Some(middle)
+    // Visiting a node costs about one primitive test.
+    let leaf_cost = (count as f32 - 1.0) * node_area;
+    match best {
+        Some((cost, axis, cut)) if cost < leaf_cost || count > leaf_size => {
+            Some(partition(range, |i| bin(i, axis) < cut))
+        }
+        _ if count <= leaf_size => None,
+        _ => {
+            let longest = (0..3).fold(0, |k, j| if extent[j] > extent[k] { j } else { k });
+            range.select_nth_unstable_by(count / 2, |&a, &b| {
+                let center = |i: u32| centers[i as usize][longest];
+                center(a).total_cmp(&center(b)).then(a.cmp(&b))
+            });
+            Some(count / 2)
+        }
     }
 }
 
+/// Some primitives of a node.
+#[derive(Clone, Copy)]
+struct Bin {
+    bounds: Box32,
+    count: u32,
+}
+
+impl Bin {
+    const EMPTY: Self = Self { bounds: Box32::EMPTY, count: 0 };
+
+    fn add(&mut self, o: &Self) {
+        *self = Self { bounds: self.bounds.union(&o.bounds), count: self.count + o.count };
+    }
+    /// Expected primitive tests, times the area of the parent node.
+    fn cost(&self) -> f32 {
+        self.bounds.half_area() * self.count as f32
+    }
+}
+
+/// The cheapest way to cut a row of bins in two that each hold something: cost, and how many bins go
+/// left.
+fn best_cut(bins: &[Bin; BINS], count: usize) -> Option<(f32, usize)> {
+    let mut right_cost = [0.0; BINS];
+    let mut right = Bin::EMPTY;
+    for cut in (1..BINS).rev() {
+        right.add(&bins[cut]);
+        right_cost[cut] = right.cost();
+    }
+    let mut left = Bin::EMPTY;
+    let mut best = None;
+    for cut in 1..BINS {
+        left.add(&bins[cut - 1]);
+        let cost = left.cost() + right_cost[cut];
+        let parts = left.count > 0 && (left.count as usize) < count;
+        if parts && best.is_none_or(|(least, _)| cost < least) {
+            best = Some((cost, cut));
+        }
+    }
+    best
+}
+
+/// Brings those that go left to the front and returns their number.
 fn partition(range: &mut [u32], left: impl Fn(u32) -> bool) -> usize {
     let mut count = 0;
     for i in 0..range.len() {

@@ -3,10 +3,11 @@
 //! The tree holds its boxes in `f32`, in coordinates centred on the scene and scaled to [-1, 1].
 //! A ray is first clipped to the scene's box in `f64`, so that its origin has such coordinates too,
 //! however far away it started. All roundings of a slab test then shift box planes by at most
-//! about 14 · 2^-24 (conversion of the origin 1, difference 2, inverse direction and products 6,
-//! decompression of quantized boxes 5), and every box is padded by 32 · 2^-24. The rounding of the
-//! hits themselves moves a triangle by a few 2^-53 of its distance from the ray's origin, which is
-//! less than the padding left as long as the origin is within 2^28 scene sizes.
+//! about 21 · 2^-24 (conversion of the origin 1, difference 2, inverse direction and products 6,
+//! quantization of compressed boxes 6, their decompression 6), and every box is padded by
+//! 64 · 2^-24. The rounding of the hits themselves moves a triangle by a few 2^-53 of its distance
+//! from the ray's origin, which is less than the padding left as long as the origin is within 2^28
+//! scene sizes.
 
 use drt_math::Vec3;
 
@@ -14,7 +15,7 @@ use super::ray::Ray;
 use crate::Aabb;
 
 /// Padding of every box, in units of the scene's half extent.
-const PADDING: f64 = 1.0 / (1 << 19) as f64;
+const PADDING: f64 = 1.0 / (1 << 18) as f64;
 
 /// Length (largest coordinate) of a box ray's direction. So short that the padding alone keeps a ray
 /// in the box it starts in for a t of one or more: traversals that ignore everything below some
@@ -122,8 +123,8 @@ impl BoxFrame {
 impl BoxRay {
     /// The box parameter behind which nothing nearer than the scene's `t` can be.
     ///
-    /// The padding puts a box's entry at least one before any hit in it (1/2 of it spent on rounding
-    /// box planes, 1/16 on rounding this), so rounding to nearest is enough.
+    /// Padding less roundings puts a box's entry two or more before any hit in it, and parameters
+    /// stay below 2^22, so rounding to nearest (by at most 1/4) is enough.
     #[inline]
     pub(super) fn limit(&self, t: f64) -> f32 {
         ((t - self.start) * self.rate) as f32

@@ -3,14 +3,13 @@
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-use drt_math::Vec3;
-
 use self::ends::End;
-use self::frame::{Box32, BoxFrame, BoxRay};
+use self::frame::{BoxFrame, BoxRay};
 use self::tree::Tree;
-use self::watertight::{Corners, Crossing, ShearedRay, corners};
-use crate::{Aabb, Mesh, NONE};
+use self::watertight::{Corners, Crossing, ShearedRay};
+use crate::Aabb;
 
+mod build;
 mod compact;
 mod ends;
 mod frame;
@@ -18,46 +17,20 @@ mod nearest;
 mod ray;
 mod tree;
 mod watertight;
+#[cfg(feature = "obvhs")]
+mod wide;
 mod winding;
 
+pub use build::BvhError;
 pub use nearest::ClosestPoint;
 pub use ray::{Hit, Ray, Skip};
-
-/// Largest coordinate a scene may have: products of three stay in the range of `f64`.
-const LARGEST: f64 = 1e100;
-
-/// Why a tree cannot be built.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BvhError {
-    /// A coordinate is NaN, infinite or beyond 1e100.
-    #[error("triangle {prim} (from 0) has a coordinate that is not a number below 1e100")]
-    BadCoordinate {
-        /// Which triangle.
-        prim: u32,
-    },
-    /// More triangles than 32-bit indices can name.
-    #[error("{count} triangles are too many: at most 4294967294 can be indexed")]
-    TooMany {
-        /// How many there are.
-        count: usize,
-    },
-    /// A refit with another number of triangles than the tree was built over.
-    #[error("the tree was built over {expected} triangles and cannot be refitted to {found}")]
-    CountChanged {
-        /// How many the tree has.
-        expected: usize,
-        /// How many were given.
-        found: usize,
-    },
-}
 
 /// A triangle in the tree's order.
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     corners: Corners,
     prim: u32,
-    /// The next slot with the same three corner positions, or [`NONE`]. Only the first of such a
+    /// The next slot with the same three corner positions, or [`NONE`](crate::NONE). Only the first of such a
     /// chain is a leaf of the tree: coincident boxes would make trees deep and their building slow.
     twin: u32,
 }
@@ -95,91 +68,6 @@ struct Probe {
 }
 
 impl TriangleBvh {
-    /// Builds the tree over triangles, which queries name by their place in the slice.
-    ///
-    /// # Errors
-    /// When a coordinate is not finite or beyond 1e100, or there are too many triangles.
-    pub fn build(triangles: &[[Vec3; 3]]) -> Result<Self, BvhError> {
-        Self::build_with(triangles, Tree::build)
-    }
-
-    /// Builds the tree over the triangles of a mesh.
-    ///
-    /// # Errors
-    /// As [`TriangleBvh::build`].
-    pub fn of(mesh: &Mesh) -> Result<Self, BvhError> {
-        Self::build(&mesh.soup())
-    }
-
-    fn build_with(
-        triangles: &[[Vec3; 3]],
-        build: impl Fn(&[Box32]) -> (Tree, Vec<u32>),
-    ) -> Result<Self, BvhError> {
-        if triangles.len() >= NONE as usize {
-            return Err(BvhError::TooMany { count: triangles.len() });
-        }
-        let bounds = usable_bounds(triangles)?;
-        let frame = BoxFrame::new(&bounds);
-        let (leaves, twins) = group_twins(triangles);
-        let mut bvh = Self {
-            tree: None,
-            frame,
-            bounds,
-            slots: Vec::with_capacity(leaves.len() + twins.len()),
-            triangle_count: triangles.len(),
-        };
-        if leaves.is_empty() {
-            return Ok(bvh);
-        }
-        let boxes: Vec<_> = leaves.iter().map(|&i| frame.enclose(&triangles[i as usize])).collect();
-        let (tree, order) = build(&boxes);
-        bvh.tree = Some(tree);
-        let slot =
-            |prim: u32| Slot { corners: corners(&triangles[prim as usize]), prim, twin: NONE };
-        let mut place = alloc::vec![NONE; triangles.len()];
-        for leaf in order {
-            let prim = leaves[leaf as usize];
-            place[prim as usize] = bvh.slots.len() as u32;
-            bvh.slots.push(slot(prim));
-        }
-        for (first, prim) in twins {
-            let index = bvh.slots.len() as u32;
-            let head = &mut bvh.slots[place[first as usize] as usize];
-            let twin = core::mem::replace(&mut head.twin, index);
-            bvh.slots.push(Slot { twin, ..slot(prim) });
-        }
-        Ok(bvh)
-    }
-
-    /// Follows triangles that moved, keeping their numbers.
-    ///
-    /// # Errors
-    /// As [`TriangleBvh::build`], or when the number of triangles changed.
-    pub fn refit(&mut self, triangles: &[[Vec3; 3]]) -> Result<(), BvhError> {
-        if triangles.len() != self.triangle_count {
-            let (expected, found) = (self.triangle_count, triangles.len());
-            return Err(BvhError::CountChanged { expected, found });
-        }
-        let whole = self.slots.len() == triangles.len() && triangles.iter().all(has_area);
-        let (true, Some(tree)) = (whole, &mut self.tree) else {
-            *self = Self::build(triangles)?;
-            return Ok(());
-        };
-        self.bounds = usable_bounds(triangles)?;
-        self.frame = BoxFrame::new(&self.bounds);
-        for slot in &mut self.slots {
-            slot.corners = corners(&triangles[slot.prim as usize]);
-        }
-        let (slots, frame) = (&self.slots, &self.frame);
-        // Twins may have parted.
-        tree.refit(|leaf| {
-            chain(slots, leaf)
-                .map(|s| frame.enclose(&triangles[s.prim as usize]))
-                .fold(Box32::EMPTY, |b, o| b.union(&o))
-        });
-        Ok(())
-    }
-
     /// The smallest box around all triangles.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
@@ -303,43 +191,4 @@ fn hit(prim: u32, crossing: &Crossing) -> Hit {
 fn chain(slots: &[Slot], leaf: usize) -> impl Iterator<Item = &Slot> {
     let next = |s: &&Slot| slots.get(s.twin as usize);
     core::iter::successors(Some(&slots[leaf]), next)
-}
-
-fn usable_bounds(triangles: &[[Vec3; 3]]) -> Result<Aabb, BvhError> {
-    let usable = |t: &[Vec3; 3]| t.iter().all(|v| v.is_finite() && v.max_abs() <= LARGEST);
-    match triangles.iter().position(|t| !usable(t)) {
-        Some(prim) => Err(BvhError::BadCoordinate { prim: prim as u32 }),
-        None => Ok(Aabb::around(triangles.iter().flatten().copied())),
-    }
-}
-
-fn has_area(t: &[Vec3; 3]) -> bool {
-    (t[1] - t[0]).cross(t[2] - t[0]) != Vec3::ZERO
-}
-
-/// The triangles with an area, without repetitions; and the repetitions, each with the triangle it
-/// repeats (the same three positions in whatever order).
-fn group_twins(triangles: &[[Vec3; 3]]) -> (Vec<u32>, Vec<(u32, u32)>) {
-    let key = |i: u32| {
-        let mut t = triangles[i as usize];
-        t.sort_unstable_by(|a, b| crate::weld::lexicographic(*a, *b));
-        t
-    };
-    let mut order: Vec<(u32, [Vec3; 3])> = (0..triangles.len() as u32)
-        .filter(|&i| has_area(&triangles[i as usize]))
-        .map(|i| (i, key(i)))
-        .collect();
-    order.sort_unstable_by(|(i, a), (j, b)| {
-        let by_position =
-            a.iter().zip(b).map(|(p, q)| crate::weld::lexicographic(*p, *q)).find(|o| o.is_ne());
-        by_position.unwrap_or_else(|| i.cmp(j))
-    });
-    let mut twins = Vec::new();
-    let mut leaves = Vec::new();
-    for run in order.chunk_by(|(_, a), (_, b)| a == b) {
-        leaves.push(run[0].0);
-        twins.extend(run[1..].iter().map(|(prim, _)| (run[0].0, *prim)));
-    }
-    leaves.sort_unstable();
-    (leaves, twins)
 }

@@ -1,0 +1,110 @@
+use alloc::vec::Vec;
+
+use drt_math::Vec3;
+
+use crate::mesh::direction;
+use crate::triangulate::{PolygonError, newell_normal, triangulate};
+use crate::{Mesh, MeshError, NONE};
+
+/// A file's vertices and polygons before they become a mesh.
+#[derive(Default)]
+pub(super) struct Polygons {
+    pub(super) positions: Vec<Vec3>,
+    /// Shading normals of any length, in an order of their own.
+    pub(super) normals: Vec<Vec3>,
+    corners: Vec<Corner>,
+    /// Where each polygon's corners end.
+    ends: Vec<usize>,
+}
+
+/// A polygon's vertex and normal, both by index and in range.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Corner {
+    pub(super) vertex: u32,
+    /// [`NONE`] where the file gives none.
+    pub(super) normal: u32,
+}
+
+/// Why polygons do not become a mesh.
+pub(super) enum AssembleError {
+    Polygon { index: usize, error: PolygonError },
+    Mesh(MeshError),
+}
+
+impl Polygons {
+    /// Adds a corner to the polygon under construction.
+    pub(super) fn corner(&mut self, corner: Corner) {
+        self.corners.push(corner);
+    }
+
+    /// Ends the polygon under construction and returns its number of corners.
+    pub(super) fn end_polygon(&mut self) -> usize {
+        let begin = self.ends.last().copied().unwrap_or(0);
+        self.ends.push(self.corners.len());
+        self.corners.len() - begin
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The triangulated mesh, of the vertices that polygons use, in the file's order. A vertex with
+    /// several normals becomes several. Once any corner has a normal, those without (or with one of
+    /// length zero) take their polygon's.
+    pub(super) fn assemble(mut self) -> Result<Mesh, AssembleError> {
+        if self.corners.iter().any(|c| c.normal != NONE) {
+            self.complete_normals();
+        }
+        let mut vertices = self.corners.clone();
+        vertices.sort_unstable();
+        vertices.dedup();
+        let place = |c: &Corner| vertices.partition_point(|v| v < c) as u32;
+
+        let mut triangles = Vec::with_capacity(self.corners.len());
+        for (index, corners) in self.polygons().enumerate() {
+            let points: Vec<_> =
+                corners.iter().map(|c| self.positions[c.vertex as usize]).collect();
+            let pieces =
+                triangulate(&points).map_err(|error| AssembleError::Polygon { index, error })?;
+            triangles.extend(pieces.iter().map(|t| t.map(|k| place(&corners[k as usize]))));
+        }
+
+        let positions = vertices.iter().map(|c| self.positions[c.vertex as usize]).collect();
+        let source = vertices.iter().map(|c| c.vertex).collect();
+        let mesh = Mesh::new(positions, triangles)
+            .and_then(|m| m.with_source(source, self.positions.len() as u32));
+        let has_normals = vertices.first().is_some_and(|c| c.normal != NONE);
+        let mesh = if has_normals {
+            let normals = vertices.iter().map(|c| self.normals[c.normal as usize]).collect();
+            mesh.and_then(|m| m.with_normals(normals))
+        } else {
+            mesh
+        };
+        mesh.map_err(AssembleError::Mesh)
+    }
+
+    fn polygons(&self) -> impl Iterator<Item = &[Corner]> {
+        let begins = core::iter::once(0).chain(self.ends.iter().copied());
+        begins.zip(&self.ends).map(|(begin, &end)| &self.corners[begin..end])
+    }
+
+    fn complete_normals(&mut self) {
+        let mut begin = 0;
+        for &end in &self.ends {
+            let polygon = &mut self.corners[begin..end];
+            begin = end;
+            let given =
+                |c: &Corner| c.normal != NONE && self.normals[c.normal as usize] != Vec3::ZERO;
+            if polygon.iter().all(given) {
+                continue;
+            }
+            let points = polygon.iter().map(|c| self.positions[c.vertex as usize]);
+            // A polygon without area has no normal; any unit vector does for what is never hit.
+            let own = direction(newell_normal(points)).unwrap_or(Vec3::Z);
+            for c in polygon.iter_mut().filter(|c| !given(c)) {
+                c.normal = self.normals.len() as u32;
+            }
+            self.normals.push(own);
+        }
+    }
+}
