@@ -1,3 +1,4 @@
+use core::fmt;
 use core::ops::ControlFlow;
 
 use alloc::vec::Vec;
@@ -10,7 +11,7 @@ use crate::{Grid, Piece, Ray};
 ///
 /// A cell's bounds are taken over every value its points can see, neighbours included, so they
 /// hold for any interpolation between values.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub(crate) struct Bounds {
     size: [usize; 3],
     cells: Vec<Range>,
@@ -22,6 +23,12 @@ struct Range {
     min: Rgb,
     max: Rgb,
     mean: Rgb,
+}
+
+impl fmt::Debug for Bounds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Bounds").field("size", &self.size).finish_non_exhaustive()
+    }
 }
 
 impl Bounds {

@@ -1,4 +1,5 @@
 use alloc::vec::Vec;
+use core::fmt;
 
 use drt_math::{Affine, Rgb, RgbVec, Vec3, vec3};
 
@@ -54,7 +55,7 @@ pub enum Wrap {
 /// assert_eq!(ramp.value(vec3(0.25, 0.5, 0.5)), Rgb::splat(0.25));
 /// # Ok::<(), drt_medium::MediumError>(())
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(into = "stored::Grid", try_from = "stored::Grid"))]
 pub struct Grid {
@@ -307,6 +308,20 @@ impl Grid {
             self.values = self.values.iter().flat_map(|&v| [v; 3]).collect();
             self.channels = 3;
         }
+    }
+}
+
+impl fmt::Debug for Grid {
+    /// Without the values, which may be millions.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Grid")
+            .field("size", &self.size)
+            .field("channels", &self.channels)
+            .field("layout", &self.layout)
+            .field("filter", &self.filter)
+            .field("wrap", &self.wrap)
+            .field("to_world", &self.to_world)
+            .finish_non_exhaustive()
     }
 }
 

@@ -1,0 +1,257 @@
+//! Changes by parameters: tangents against finite differences of the changed medium, the chain rule
+//! through later changes, and gradients as exact transposes.
+
+mod common;
+
+use common::*;
+use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
+use drt_medium::{
+    CoefficientRates, Grid, GridMedium, Homogeneous, Layout, Medium, MediumChange, MediumError,
+    MediumGradient, MediumTangent, Phase, Property, ValueChange, Volume, Wrap,
+};
+
+const MULTIPLY: ValueChange = ValueChange::Multiply(0.7);
+const LOG: ValueChange = ValueChange::MultiplyLog(-0.6);
+const ADD: ValueChange = ValueChange::Add(Rgb { r: 0.3, g: -0.1, b: 0.2 });
+const ADD_GRAY: ValueChange = ValueChange::Add(Rgb { r: 0.4, g: 0.4, b: 0.4 });
+
+/// Everything a grid: a density of one channel, albedo and emission placed elsewhere.
+fn full(density_channels: usize) -> Medium {
+    let turn = Mat3::rotation(vec3(0.0, 0.0, 1.0), 0.3);
+    let place = Affine { linear: turn * Mat3::diagonal(vec3(2.0, 1.0, 1.5)), translation: Vec3::X };
+    let grid = |size: [usize; 3], channels: usize, seed| {
+        let values = random_values(channels * size.iter().product::<usize>(), seed);
+        Grid::new(size, channels, values).expect("a valid grid")
+    };
+    let density = grid([5, 4, 3], density_channels, 1).with_placement(place).expect("a box");
+    let wider = Affine { linear: place.linear * 1.3, translation: vec3(0.8, -0.1, -0.2) };
+    let albedo = grid([3, 3, 2], 3, 2).with_wrap(Wrap::Mirror).with_placement(wider);
+    let emission = grid([2, 6, 2], 1, 3).with_layout(Layout::NodeCentred).with_placement(place);
+    let (albedo, emission) = (albedo.expect("a box"), emission.expect("a box"));
+    let g = GridMedium::new(density, 2.5, Volume::Grid(albedo), Volume::Grid(emission));
+    Medium::new(g.expect("a valid medium"), Phase::HenyeyGreenstein { g: 0.4 })
+}
+
+fn plain() -> Medium {
+    let h = Homogeneous::new(Rgb::new(0.5, 1.0, 2.0), Rgb::splat(0.4), Rgb::new(1.0, 0.0, 3.0));
+    Medium::new(h.expect("a valid medium"), Phase::Isotropic)
+}
+
+/// A turn by 0.8 theta about an axis through a pivot, and a drift.
+fn turning(theta: f64) -> MediumChange {
+    let (axis, pivot, drift) = (vec3(0.6, 0.8, 0.0), vec3(1.0, 0.5, 0.2), vec3(0.1, 0.2, -0.3));
+    let turn = Affine::about(Mat3::rotation(axis, 0.8 * theta), pivot);
+    let map = Affine { translation: turn.translation + drift * theta, ..turn };
+    // d/dtheta of the moved point, as a function of where it is now.
+    let spin = Mat3::skew(axis) * 0.8;
+    let velocity = Affine { linear: spin, translation: drift - spin * (pivot + drift * theta) };
+    MediumChange::Place { map, velocity }
+}
+
+type ChangeAt = fn(f64) -> MediumChange;
+
+/// All at once, in an order in which each meets what came before.
+const CHANGES: [ChangeAt; 12] = [
+    |_| MediumChange::SigmaT { op: ADD_GRAY, voxels: None },
+    |_| MediumChange::SigmaT { op: MULTIPLY, voxels: Some([2, 1, 1]) },
+    |_| MediumChange::Emission { op: MULTIPLY, voxels: None },
+    turning,
+    |_| MediumChange::SigmaT { op: LOG, voxels: None },
+    |_| MediumChange::SigmaT { op: ADD, voxels: Some([2, 1, 1]) },
+    |_| MediumChange::Albedo { op: LOG, voxels: Some([1, 1, 1]) },
+    |_| MediumChange::SigmaT { op: ADD, voxels: None },
+    |_| MediumChange::Albedo { op: ADD, voxels: None },
+    turning,
+    |_| MediumChange::G(ValueChange::Add(Rgb { r: 0.2, g: 0.2, b: 0.2 })),
+    |_| MediumChange::G(ValueChange::MultiplyLog(0.3)),
+];
+
+/// The medium after the changes, and its tangent with respect to their common parameter.
+fn changed(start: &Medium, changes: &[ChangeAt], theta: f64) -> (Medium, MediumTangent) {
+    let mut medium = start.clone();
+    let mut tangent = MediumTangent::zero();
+    for change in changes {
+        let change = change(theta);
+        medium.apply(&change, theta).expect("a change that fits");
+        tangent.push_through(&change, theta);
+        tangent = tangent.plus(&medium.tangent(&change, theta).expect("a change that fits"));
+    }
+    (medium, tangent)
+}
+
+fn local(medium: &Medium, x: Vec3) -> CoefficientRates {
+    let c = medium.coefficients(x);
+    let g = medium.phase.mean_cosine_parameter().unwrap_or(0.0);
+    CoefficientRates { sigma_t: c.sigma_t, albedo: c.albedo, emission: c.emission, g }
+}
+
+/// Points inside the density box of the medium, away from its faces and from voxel planes.
+fn points(medium: &Medium) -> Vec<Vec3> {
+    let mut rng = Rng::new(6, 0, 0);
+    let mut unit = || vec3(rng.next_f64(), rng.next_f64(), rng.next_f64()) * 0.96;
+    let unit: Vec<_> = (0..60).map(|_| unit() + Vec3::splat(0.02)).collect();
+    match medium.grid() {
+        Some(g) => unit.into_iter().map(|u| g.density().to_world().point(u)).collect(),
+        None => unit,
+    }
+}
+
+fn difference(a: &CoefficientRates, b: &CoefficientRates) -> f64 {
+    let fields = [a.sigma_t - b.sigma_t, a.albedo - b.albedo, a.emission - b.emission];
+    fields.into_iter().map(Rgb::max_abs).fold((a.g - b.g).abs(), f64::max)
+}
+
+fn check_rates(start: &Medium, changes: &[ChangeAt], theta: f64) {
+    let (medium, tangent) = changed(start, changes, theta);
+    let h = 1e-6;
+    let (above, below) =
+        (changed(start, changes, theta + h).0, changed(start, changes, theta - h).0);
+    for x in points(&medium) {
+        let rates = tangent.rates(&medium, x);
+        let (a, b) = (local(&above, x), local(&below, x));
+        let slope = |a: Rgb, b: Rgb| (a - b) / (2.0 * h);
+        let numeric = CoefficientRates {
+            sigma_t: slope(a.sigma_t, b.sigma_t),
+            albedo: slope(a.albedo, b.albedo),
+            emission: slope(a.emission, b.emission),
+            g: (a.g - b.g) / (2.0 * h),
+        };
+        let error = difference(&rates, &numeric);
+        assert!(error < 1e-6, "theta {theta}, {x:?}: {rates:?}, numeric {numeric:?}");
+    }
+}
+
+#[test]
+fn each_change_alone() {
+    for change in CHANGES {
+        for theta in [0.0, 0.35] {
+            for medium in [full(1), full(3)] {
+                check_rates(&medium, &[change], theta);
+            }
+        }
+    }
+}
+
+#[test]
+fn all_changes_together_by_the_chain_rule() {
+    for theta in [0.0, 0.35, -0.2] {
+        for medium in [full(1), full(3)] {
+            check_rates(&medium, &CHANGES, theta);
+        }
+    }
+}
+
+#[test]
+fn homogeneous_changes() {
+    let whole: [ChangeAt; 5] = [
+        |_| MediumChange::SigmaT { op: MULTIPLY, voxels: None },
+        |_| MediumChange::Emission { op: ADD, voxels: None },
+        |_| MediumChange::SigmaT { op: ADD, voxels: None },
+        |_| MediumChange::G(ADD_GRAY),
+        turning,
+    ];
+    check_rates(&plain(), &whole, 0.3);
+}
+
+#[test]
+fn gradients_are_the_transposes_of_rates() {
+    let mut rng = Rng::new(9, 0, 0);
+    let mut color = || Rgb::new(rng.next_f64() - 0.5, rng.next_f64() - 0.5, rng.next_f64() - 0.5);
+    for start in [full(1), full(3), plain()] {
+        let fits = |c: &&ChangeAt| start.clone().apply(&c(0.0), 0.0).is_ok();
+        let changes: Vec<_> = CHANGES.iter().filter(fits).copied().collect();
+        let (medium, tangent) = changed(&start, &changes, 0.35);
+        let mut parts = [MediumGradient::zeros(&medium), MediumGradient::zeros(&medium)];
+        let mut forward = 0.0;
+        let mut size = 0.0;
+        for (n, x) in points(&medium).into_iter().enumerate() {
+            let adjoint = CoefficientRates {
+                sigma_t: color(),
+                albedo: color(),
+                emission: color(),
+                g: color().r,
+            };
+            let rate = tangent.rates(&medium, x).dot(&adjoint);
+            forward += rate;
+            size += rate.abs();
+            parts[n % 2].scatter(&medium, x, &adjoint);
+        }
+        let [mut gradient, other] = parts;
+        gradient.add(&other);
+        let reverse = gradient.dot(&tangent);
+        assert!((forward - reverse).abs() < 1e-13 * size, "{forward} forward, {reverse} reverse");
+    }
+}
+
+#[test]
+fn crossings_scatter_what_they_rate() {
+    let medium = cloud(Layout::NodeCentred);
+    let ray = ray_through(&medium, vec3(0.8, 0.3, -0.2));
+    let motion = turning(0.0);
+    let tangent = medium.tangent(&motion, 0.0).expect("a motion");
+    let velocity = tangent.grid_velocity().expect("it moves");
+    let adjoint = Rgb::new(0.3, -1.0, 2.0);
+    let mut gradient = MediumGradient::zeros_without_voxels();
+    let mut forward = 0.0;
+    let grid = medium.grid().expect("a grid");
+    assert_eq!(grid.crossings(&ray).count(), 2);
+    for c in grid.crossings(&ray) {
+        forward += c.depth_rate(velocity.point(ray.at(c.t))).dot(adjoint);
+        gradient.scatter_crossing(&c, ray.at(c.t), adjoint);
+    }
+    assert!((gradient.dot(&tangent) - forward).abs() < 1e-13 * forward.abs());
+}
+
+#[test]
+fn one_voxel_keeps_the_bounds() {
+    use drt_medium::DensityField;
+    use std::ops::ControlFlow;
+    let mut medium = full(1);
+    for voxel in [[0, 0, 0], [4, 3, 2], [2, 0, 1]] {
+        let op = ValueChange::Add(Rgb::splat(50.0));
+        medium.apply(&MediumChange::SigmaT { op, voxels: Some(voxel) }, 1.0).expect("a voxel");
+    }
+    let grid = medium.grid().expect("a grid");
+    assert!(grid.largest_sigma_t() > 50.0);
+    for x in points(&medium) {
+        let ray = drt_medium::Ray::new(x - Vec3::Y * 3.0, Vec3::Y, 6.0);
+        grid.pieces(&ray, &mut |p| {
+            let sigma = medium.sigma_t(ray.at(0.5 * (p.start + p.end)));
+            assert!(sigma.r <= p.majorant.r + 1e-12 && sigma.r >= p.minorant.r - 1e-12);
+            ControlFlow::Continue(())
+        });
+    }
+}
+
+#[test]
+fn changes_that_do_not_fit_say_why() {
+    let sigma = |op, voxels| MediumChange::SigmaT { op, voxels };
+    let (mut h, mut g) = (plain(), full(1));
+    let voxel = Some([0, 0, 3]);
+    let property = Property::SigmaT;
+    assert_eq!(h.apply(&sigma(ADD, voxel), 0.1), Err(MediumError::NotAGrid { property }),);
+    assert_eq!(
+        g.apply(&sigma(ADD, voxel), 0.1),
+        Err(MediumError::NoSuchVoxel { property, voxel: [0, 0, 3], size: [5, 4, 3] }),
+    );
+    assert!(g.apply(&sigma(MULTIPLY, None), f64::INFINITY).is_err());
+    assert!(g.apply(&sigma(ValueChange::MultiplyLog(1e3), Some([0, 0, 0])), 10.0).is_err());
+    assert_eq!(
+        g.apply(&MediumChange::G(ADD), 1.0),
+        Err(MediumError::NotScalar { property: Property::G })
+    );
+    assert!(g.apply(&MediumChange::G(ADD_GRAY), 5.0).is_err());
+    let vanishing = ValueChange::Multiply(-1.0);
+    g.apply(&sigma(vanishing, None), 1.0).expect("an empty medium");
+    assert_eq!(
+        g.tangent(&sigma(vanishing, None), 1.0),
+        Err(MediumError::VanishingFactor { property }),
+    );
+    g.apply(&sigma(ADD_GRAY, None), 1.0).expect("a term on an empty medium");
+    assert!((g.sigma_t(points(&g)[0]).r - 0.4).abs() < 1e-15);
+    let flat = Affine { linear: Mat3::ZERO, translation: Vec3::ZERO };
+    let collapse = MediumChange::Place { map: flat, velocity: flat };
+    assert_eq!(g.apply(&collapse, 0.0), Err(MediumError::SingularPlacement));
+    let rayleigh = &mut Medium { phase: Phase::Rayleigh, ..plain() };
+    assert_eq!(rayleigh.apply(&MediumChange::G(ADD_GRAY), 0.1), Err(MediumError::NoMeanCosine));
+}
