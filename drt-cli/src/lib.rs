@@ -1,1 +1,10 @@
-//! Scene, job and image files for drt, and the drt command
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+pub mod error;
+mod job;
+mod scene_xml;
+
+pub use error::CliError;
+pub use job::{Job, Overrides, load_job};
+pub use scene_xml::{Defaults, load_scene, parse_scene_str};

@@ -1,0 +1,104 @@
+//! What can go wrong between a file and an image, and the exit code each failure stands for.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use thiserror::Error;
+
+/// A place in an input file; lines and columns are counted from 1.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The file.
+    pub file: Arc<Path>,
+    /// The line, where one is to blame.
+    pub line: Option<u32>,
+    /// The column in that line, where it is known.
+    pub column: Option<u32>,
+}
+
+impl Place {
+    /// A whole file.
+    #[must_use]
+    pub fn file(path: &Path) -> Self {
+        Self { file: path.into(), line: None, column: None }
+    }
+
+    /// The place of a byte offset in the text of a file.
+    #[must_use]
+    pub fn of_offset(path: &Path, text: &str, offset: usize) -> Self {
+        let before = text.get(..offset).unwrap_or(text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.rsplit('\n').next().unwrap_or(before).chars().count() + 1;
+        Self { file: path.into(), line: Some(line as u32), column: Some(column as u32) }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.file.display())?;
+        for n in [self.line, self.column].into_iter().flatten() {
+            write!(f, ":{n}")?;
+        }
+        Ok(())
+    }
+}
+
+/// Why a command could not do what it was asked.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum CliError {
+    /// A file that cannot be used; the message names the element or key and what was expected.
+    #[error("{place}: {message}")]
+    Input {
+        /// Where.
+        place: Place,
+        /// What is wrong, and what was expected.
+        message: String,
+    },
+    /// An argument that cannot be used.
+    #[error("{0}")]
+    Argument(String),
+    /// A result that cannot be written.
+    #[error("cannot write {}: {reason}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The cause.
+        reason: String,
+    },
+}
+
+impl CliError {
+    /// An unusable input.
+    pub fn input(place: &Place, message: impl fmt::Display) -> Self {
+        Self::Input { place: place.clone(), message: message.to_string() }
+    }
+
+    /// An unusable argument.
+    pub fn argument(message: impl fmt::Display) -> Self {
+        Self::Argument(message.to_string())
+    }
+
+    /// A failure to write.
+    pub fn write(path: &Path, reason: impl fmt::Display) -> Self {
+        Self::Write { path: path.into(), reason: reason.to_string() }
+    }
+
+    /// The exit code of the command: 2 for unusable input or arguments, 3 for a failure to write.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Input { .. } | Self::Argument(_) => 2,
+            Self::Write { .. } => 3,
+        }
+    }
+}
+
+/// Reads a text file that was named at `from`.
+pub(crate) fn read_text(path: &Path, from: Option<&Place>) -> Result<String, CliError> {
+    std::fs::read_to_string(path).map_err(|e| match from {
+        Some(place) => CliError::input(place, format!("cannot read {}: {e}", path.display())),
+        None => CliError::input(&Place::file(path), format!("cannot read this file: {e}")),
+    })
+}

@@ -1,0 +1,115 @@
+//! From the keys of an effect to what it does.
+
+use std::path::Path;
+
+use drt_math::{Affine, Mat3, Rgb, Vec3};
+use drt_motion::{Change, Effect, GeometryChange, PropertyChange, ValueChange};
+
+use super::keys::{self, Voxels};
+use super::velocities;
+use crate::CliError;
+
+/// Why an effect cannot be used.
+pub(super) enum Refusal {
+    /// Its keys do not make sense together; told with the place of the effect.
+    Keys(String),
+    /// A file it names is unusable.
+    File(CliError),
+}
+
+impl From<String> for Refusal {
+    fn from(message: String) -> Self {
+        Self::Keys(message)
+    }
+}
+
+/// Keys of which an effect has exactly one.
+const KINDS: &str =
+    "translate, rotate, scale, matrix, vertex_velocity, vertex, cage, follow or property";
+
+/// What an effect does; files are relative to `folder`.
+pub(super) fn effect(keys: &keys::Effect, folder: &Path) -> Result<Effect, Refusal> {
+    let geometry = |change| Change::Geometry(change);
+    let vec = Vec3::from;
+    let mut changes = Vec::new();
+    if let Some(t) = keys.translate {
+        changes.push(geometry(GeometryChange::Translate(vec(t))));
+    }
+    if let Some(r) = &keys.rotate {
+        let (axis, pivot) = (vec(r.axis), vec(r.pivot));
+        changes.push(geometry(GeometryChange::Rotate { axis, pivot }));
+    }
+    if let Some(s) = &keys.scale {
+        let (factor, pivot) = (vec(s.factor), vec(s.pivot));
+        changes.push(geometry(GeometryChange::Scale { factor, pivot }));
+    }
+    if let Some(rows) = keys.matrix {
+        changes.push(geometry(GeometryChange::Matrix(affine(rows))));
+    }
+    if let Some(file) = &keys.vertex_velocity {
+        let velocities = velocities::read(&folder.join(file)).map_err(Refusal::File)?;
+        changes.push(geometry(GeometryChange::VertexVelocity(velocities.into())));
+    }
+    if let Some(v) = &keys.vertex {
+        let direction = vec(v.direction);
+        changes.push(geometry(GeometryChange::Vertex { index: v.index, direction }));
+    }
+    if keys.cage.is_some() {
+        return Err("`cage` is not supported yet".to_owned().into());
+    }
+    if let Some(leader) = &keys.follow {
+        changes.push(Change::Follow(leader.clone()));
+    }
+    if let Some(change) = property(keys)? {
+        changes.push(Change::Property(change));
+    }
+    match (changes.pop(), changes.len()) {
+        (Some(change), 0) => Ok(Effect { target: keys.target.clone(), change }),
+        (None, _) => Err(format!("the effect does nothing; give one of {KINDS}").into()),
+        (Some(_), n) => {
+            Err(format!("the effect does {} things; give one of {KINDS} each", n + 1).into())
+        }
+    }
+}
+
+fn affine(rows: [[f64; 4]; 3]) -> Affine {
+    let row = |i: usize| Vec3::from([rows[i][0], rows[i][1], rows[i][2]]);
+    Affine {
+        linear: Mat3::from_rows(row(0), row(1), row(2)),
+        translation: Vec3::from(rows.map(|r| r[3])),
+    }
+}
+
+fn property(keys: &keys::Effect) -> Result<Option<PropertyChange>, String> {
+    let Some(property) = keys.property.clone() else {
+        let stray = [
+            ("add", keys.add.is_some()),
+            ("multiply", keys.multiply.is_some()),
+            ("log", keys.log.is_some()),
+            ("voxels", keys.voxels.is_some()),
+        ];
+        return match stray.iter().find(|(_, given)| *given) {
+            Some((key, _)) => Err(format!("`{key}` belongs to a `property`, which is missing")),
+            None => Ok(None),
+        };
+    };
+    let op = match (keys.add, keys.multiply, keys.log) {
+        (Some(a), None, None) => ValueChange::Add(Rgb::from(a)),
+        (None, Some(m), None | Some(false)) => ValueChange::Multiply(m),
+        (None, Some(m), Some(true)) => ValueChange::MultiplyLog(m),
+        (Some(_), None, Some(_)) => return Err("`log` belongs to `multiply`".into()),
+        _ => return Err("a `property` needs either `add` or `multiply`".into()),
+    };
+    let finite = match op {
+        ValueChange::Add(a) => a.is_finite(),
+        ValueChange::Multiply(m) | ValueChange::MultiplyLog(m) => m.is_finite(),
+    };
+    if !finite {
+        return Err(format!("`{}` is not finite", op.kind()));
+    }
+    let voxels = match keys.voxels {
+        None | Some(Voxels::All(_)) => None,
+        Some(Voxels::One(voxel)) => Some(voxel),
+    };
+    Ok(Some(PropertyChange { property, op, voxels }))
+}

@@ -1,0 +1,252 @@
+//! Jobs: a scene, an estimator and parameters, in one TOML file.
+
+mod document;
+mod effects;
+mod keys;
+#[cfg(test)]
+mod tests;
+mod velocities;
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use drt_estimators::{EstimatorKind, Scene, Settings, Target};
+use drt_motion::Parameter;
+use toml::Spanned;
+
+use crate::error::{Place, read_text};
+use crate::{CliError, Defaults, load_scene};
+use document::Document;
+use effects::Refusal;
+
+/// What the command line lays over a job or scene.
+#[derive(Clone, Debug, Default)]
+pub struct Overrides {
+    /// Job keys and values, as `--set KEY=VALUE` gives them.
+    pub set: Vec<(String, String)>,
+    /// Values of the scene's `<default>` names, as `-D NAME=VALUE` gives them.
+    pub defaults: Defaults,
+}
+
+/// A scene with what is to be estimated in it.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// The file it came from: a job, or a scene alone.
+    pub path: PathBuf,
+    /// The job file's text; `None` for a scene alone.
+    pub text: Option<String>,
+    /// The scene file.
+    pub scene_path: PathBuf,
+    /// The scene at the parameters' zero.
+    pub scene: Scene,
+    /// What is differentiated with respect to, in file order.
+    pub parameters: Vec<Parameter<String>>,
+    /// Budgets and switches.
+    pub settings: Settings,
+    /// Where each parameter stands.
+    places: Vec<Place>,
+    /// What stands in the way of derivatives.
+    refused: Option<CliError>,
+}
+
+/// Reads a job file and its scene.
+///
+/// # Errors
+/// Names the file, line and key, or the `--set`, of what is malformed, unknown, missing or not
+/// supported.
+pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
+    let text = read_text(path, None)?;
+    let document = Document::new(path, &text, &overrides.set);
+    let keys: keys::Job = document.parse()?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let scene_path = folder.join(&keys.scene);
+    let scene = load_scene(&scene_path, &overrides.defaults)?;
+    let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
+    let settings = settings(&document, &keys, &scene)?;
+    let refused = refused(&document, &keys);
+    let path = path.into();
+    Ok(Job { path, text: Some(text), scene_path, scene, parameters, settings, places, refused })
+}
+
+impl Job {
+    /// A scene alone, with the number of samples its sensor asks for.
+    ///
+    /// # Errors
+    /// As [`load_scene`].
+    pub fn from_scene(path: &Path, defaults: &Defaults) -> Result<Self, CliError> {
+        let scene = load_scene(path, defaults)?;
+        let mut settings = Settings::default();
+        if let Some(count) = scene.sensors.first().and_then(|s| s.item.sample_count) {
+            settings.spp = count;
+        }
+        Ok(Self {
+            path: path.into(),
+            text: None,
+            scene_path: path.into(),
+            scene,
+            parameters: Vec::new(),
+            settings,
+            places: Vec::new(),
+            refused: None,
+        })
+    }
+
+    /// Chooses the sensor of an id, or of kind and order such as `sensor[1]`.
+    ///
+    /// # Errors
+    /// When nothing has this name, or it is not a sensor.
+    pub fn select_sensor(&mut self, name: &str) -> Result<(), CliError> {
+        self.settings.sensor = find_sensor(&self.scene, name)
+            .map_err(|e| CliError::argument(format!("--sensor: {e}")))?;
+        Ok(())
+    }
+
+    /// Refuses what would change derivatives and is not supported yet.
+    ///
+    /// # Errors
+    /// Names the key.
+    pub fn require_derivatives(&self) -> Result<(), CliError> {
+        self.refused.clone().map_or(Ok(()), Err)
+    }
+
+    /// An error of the estimators with the file, and the parameter's line, that it is about.
+    #[must_use]
+    pub fn blame(&self, error: &drt_estimators::Error) -> CliError {
+        let place = match error {
+            drt_estimators::Error::Effect { parameter, .. } => {
+                let at = self.parameters.iter().position(|p| p.name == *parameter);
+                at.and_then(|i| self.places.get(i)).cloned()
+            }
+            drt_estimators::Error::Element { .. } => Some(Place::file(&self.scene_path)),
+            _ => None,
+        };
+        CliError::input(&place.unwrap_or_else(|| Place::file(&self.path)), error)
+    }
+}
+
+fn find_sensor(scene: &Scene, name: &str) -> Result<usize, String> {
+    match scene.find(name).map_err(|e| e.to_string())? {
+        Target::Sensor(i) => Ok(i),
+        _ => Err(format!("`{name}` is not a sensor")),
+    }
+}
+
+fn settings(
+    document: &Document<'_>,
+    keys: &keys::Job,
+    scene: &Scene,
+) -> Result<Settings, CliError> {
+    let keys::Estimator { kind, sampling, spp, boundary_spp, max_depth, antithetic, step, .. } =
+        &keys.estimator;
+    let mut settings = Settings::default();
+    if let Some(name) = &keys.sensor {
+        settings.sensor = find_sensor(scene, name.get_ref())
+            .map_err(|e| document.error_at(name.span().start, format!("`sensor`: {e}")))?;
+    }
+    if kind.as_ref().is_some_and(|k| *k.get_ref() == keys::Kind::FiniteDifference) {
+        settings.estimator = EstimatorKind::FiniteDifference;
+    }
+    if let Some(s) = sampling.as_ref().filter(|s| *s.get_ref() == keys::Sampling::Bidirectional) {
+        return Err(
+            document.error_at(s.span().start, "bidirectional sampling is not supported yet")
+        );
+    }
+    let count = |key: &str, value: &Spanned<i64>| {
+        let fits = u32::try_from(*value.get_ref()).ok().filter(|n| *n >= 1);
+        let message = format!("`{key}` is {}; expected at least 1", value.get_ref());
+        fits.ok_or_else(|| document.error_at(value.span().start, message))
+    };
+    if let Some(n) = spp {
+        settings.spp = count("spp", n)?;
+    }
+    if let Some(n) = boundary_spp {
+        settings.boundary_spp = Some(count("boundary_spp", n)?);
+    }
+    if let Some(n) = max_depth {
+        settings.max_depth = Some(
+            depth(*n.get_ref()).map_err(|message| document.error_at(n.span().start, message))?,
+        );
+    }
+    settings.antithetic = antithetic.unwrap_or(settings.antithetic);
+    if let Some(s) = step {
+        settings.step = *s.get_ref();
+        if !(settings.step > 0.0 && settings.step.is_finite()) {
+            let message = format!("`step` is {}; expected a positive number", settings.step);
+            return Err(document.error_at(s.span().start, message));
+        }
+    }
+    Ok(settings)
+}
+
+/// A path depth, where -1 is unlimited.
+pub(crate) fn depth(value: i64) -> Result<Option<u32>, String> {
+    match (value, u32::try_from(value)) {
+        (-1, _) => Ok(None),
+        (_, Ok(depth)) => Ok(Some(depth)),
+        _ => Err(format!("`max_depth` is {value}; expected -1 (unlimited), 0 or more")),
+    }
+}
+
+fn parameters(
+    document: &Document<'_>,
+    keys: &keys::Job,
+    folder: &Path,
+    scene: &Scene,
+) -> Result<(Vec<Parameter<String>>, Vec<Place>), CliError> {
+    let mut names = BTreeSet::new();
+    let mut parameters = Vec::new();
+    let mut places = Vec::new();
+    for spanned in &keys.parameter {
+        let (at, parameter) = (spanned.span().start, spanned.get_ref());
+        let name = &parameter.name;
+        let fail =
+            |message: String| document.error_at(at, format!("parameter `{name}`: {message}"));
+        if name.is_empty() || name.contains(|c: char| c.is_control() || c == ',') {
+            return Err(fail("the name must not be empty nor contain commas".into()));
+        }
+        if !names.insert(name) {
+            return Err(fail("the name is already taken".into()));
+        }
+        if !parameter.value.is_finite() {
+            return Err(fail("`value` is not finite".into()));
+        }
+        let mut effects = Vec::new();
+        for effect in &parameter.effect {
+            let at = effect.span().start;
+            let fail = |message| document.error_at(at, format!("parameter `{name}`: {message}"));
+            let effect =
+                effects::effect(effect.get_ref(), folder).map_err(|refusal| match refusal {
+                    Refusal::Keys(message) => fail(message),
+                    Refusal::File(error) => error,
+                })?;
+            scene.find(&effect.target).map_err(|e| fail(e.to_string()))?;
+            effects.push(effect);
+        }
+        parameters.push(Parameter { name: name.clone(), value: parameter.value, effects });
+        places.push(document.place(at));
+    }
+    Ok((parameters, places))
+}
+
+/// The first key that asks for derivatives in a way that is not there yet.
+fn refused(document: &Document<'_>, keys: &keys::Job) -> Option<CliError> {
+    let kind = keys.estimator.kind.as_ref().and_then(|k| {
+        let name = match k.get_ref() {
+            keys::Kind::Radiative => "radiative",
+            keys::Kind::Warped => "warped",
+            keys::Kind::PathSpace | keys::Kind::FiniteDifference => return None,
+        };
+        Some((k.span().start, format!("the estimator kind `{name}` is not supported yet")))
+    });
+    let group = keys
+        .parameter_group
+        .first()
+        .map(|g| (g.span().start, "[[parameter_group]] is not supported yet".to_owned()));
+    let motion = keys.motion.first().map(|m| {
+        let message = "[[motion]] is not supported yet: the plan chooses, and prints, how the \
+                       inside of a medium moves";
+        (m.span().start, message.to_owned())
+    });
+    let (at, message) = kind.or(group).or(motion)?;
+    Some(document.error_at(at, message))
+}

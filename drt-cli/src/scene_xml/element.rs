@@ -1,0 +1,104 @@
+//! The tree of a scene file after substitution: defaults filled in, includes spliced, names in one
+//! spelling. Nothing after this knows of several files or several spellings.
+
+use std::path::Path;
+
+use crate::CliError;
+use crate::error::Place;
+use crate::scene_xml::dialect::Dialect;
+
+/// One XML element.
+#[derive(Debug)]
+pub(super) struct Element {
+    /// The tag, such as `shape` or `float`.
+    pub(super) tag: String,
+    attributes: Vec<(String, String)>,
+    /// The elements inside.
+    pub(super) children: Vec<Element>,
+    /// Where it stands.
+    pub(super) place: Place,
+    /// The dialect of its file.
+    pub(super) dialect: Dialect,
+    /// Its number in document order: an identity.
+    pub(super) ordinal: usize,
+}
+
+impl Element {
+    /// An element whose property name, if it has one, is put into the common spelling. The name in
+    /// a `<default>` is the scene's own and stays.
+    pub(super) fn new(
+        tag: String,
+        mut attributes: Vec<(String, String)>,
+        place: Place,
+        dialect: Dialect,
+    ) -> Self {
+        for (key, value) in &mut attributes {
+            if key == "name" && tag != "default" {
+                *value = dialect.property_name(value);
+            }
+        }
+        Self { tag, attributes, children: Vec::new(), place, dialect, ordinal: 0 }
+    }
+
+    /// An attribute's text.
+    pub(super) fn attribute(&self, key: &str) -> Option<&str> {
+        self.attributes.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str())
+    }
+
+    /// An attribute that must be there.
+    pub(super) fn required(&self, key: &str) -> Result<&str, CliError> {
+        self.attribute(key).ok_or_else(|| self.error(format!("the attribute `{key}` is missing")))
+    }
+
+    /// Refuses attributes other than those listed.
+    pub(super) fn only_attributes(&self, known: &[&str]) -> Result<(), CliError> {
+        match self.attributes.iter().find(|(k, _)| !known.contains(&k.as_str())) {
+            None => Ok(()),
+            Some((k, _)) => Err(self
+                .error(format!("unknown attribute `{k}`; expected one of {}", known.join(", ")))),
+        }
+    }
+
+    /// The id under which others refer to it.
+    pub(super) fn id(&self) -> Option<&str> {
+        self.attribute("id")
+    }
+
+    /// True in files of version 0.5 and 0.6.
+    pub(super) fn is_legacy(&self) -> bool {
+        self.dialect == Dialect::Legacy
+    }
+
+    /// An error at this element.
+    pub(super) fn error(&self, message: impl std::fmt::Display) -> CliError {
+        CliError::input(&self.place, format!("{self}: {message}"))
+    }
+
+    /// A path in an attribute, relative to the file in which the element stands.
+    pub(super) fn resolve(&self, path: &str) -> std::path::PathBuf {
+        self.place.file.parent().unwrap_or(Path::new("")).join(path)
+    }
+
+    /// Numbers the tree in document order.
+    pub(super) fn number(&mut self) {
+        fn visit(e: &mut Element, next: &mut usize) {
+            e.ordinal = *next;
+            *next += 1;
+            e.children.iter_mut().for_each(|c| visit(c, next));
+        }
+        visit(self, &mut 0);
+    }
+}
+
+impl std::fmt::Display for Element {
+    /// As in the file, with what identifies it: `<float name="alpha">`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "<{}", self.tag)?;
+        for key in ["type", "name", "id"] {
+            if let Some(v) = self.attribute(key) {
+                write!(f, " {key}=\"{v}\"")?;
+            }
+        }
+        f.write_str(">")
+    }
+}

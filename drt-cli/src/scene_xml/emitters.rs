@@ -1,0 +1,102 @@
+//! Emitters: area, point, spot, directional, constant.
+
+use drt_estimators::emitter::Emitter;
+use drt_estimators::{Named, SceneEmitter, Surrounding};
+use drt_math::{Affine, Rgb, Vec3};
+
+use super::Loader;
+use super::element::Element;
+use super::properties::Properties;
+use crate::CliError;
+
+impl<'a> Loader<'a> {
+    /// One emitter; an area emitter only where it is `on_shape`.
+    pub(super) fn emitter(
+        &self,
+        e: &'a Element,
+        on_shape: bool,
+    ) -> Result<Named<SceneEmitter>, CliError> {
+        let p = Properties::of(e)?;
+        let kind = p.kind()?;
+        if on_shape != (kind == "area") {
+            return Err(e.error(if on_shape {
+                "a shape can only carry an emitter of type `area`"
+            } else {
+                "an `area` emitter belongs inside a <shape>"
+            }));
+        }
+        let mut medium = Surrounding::Counted;
+        let light = |name| Ok::<Rgb, CliError>(p.light(name)?.unwrap_or(Rgb::ONE));
+        let emitter = match kind {
+            "area" => Emitter::Area { radiance: light("radiance")? },
+            "constant" => Emitter::Constant { radiance: light("radiance")? },
+            "point" => {
+                medium = self.surrounding(&p)?;
+                Emitter::Point { position: position(&p)?, intensity: light("intensity")? }
+            }
+            "spot" => {
+                medium = self.surrounding(&p)?;
+                let intensity = light("intensity")?;
+                spot(&p, intensity)?
+            }
+            "directional" => {
+                Emitter::Directional { direction: direction(&p)?, irradiance: light("irradiance")? }
+            }
+            other => {
+                return Err(e.error(format!(
+                    "the emitter type `{other}` is not supported; expected area, point, spot, \
+                     directional or constant"
+                )));
+            }
+        };
+        p.finish()?;
+        let emitter = emitter.checked().map_err(|err| e.error(err))?;
+        if is_negative(&emitter) {
+            return Err(e.error("an emitter's colour must not be negative"));
+        }
+        Ok(Named { id: e.id().map(Into::into), item: SceneEmitter { emitter, medium } })
+    }
+}
+
+fn is_negative(emitter: &Emitter) -> bool {
+    let (Emitter::Area { radiance: c }
+    | Emitter::Constant { radiance: c }
+    | Emitter::Point { intensity: c, .. }
+    | Emitter::Spot { intensity: c, .. }
+    | Emitter::Directional { irradiance: c, .. }) = emitter;
+    c.to_array().iter().any(|v| *v < 0.0)
+}
+
+/// `position`, or the image of the origin under `to_world`.
+fn position(p: &Properties<'_>) -> Result<Vec3, CliError> {
+    match (p.vector("position")?, p.transform("to_world")?) {
+        (Some(_), Some(_)) => Err(p.element.error("give `position` or `to_world`, not both")),
+        (Some(position), None) => Ok(position),
+        (None, to_world) => Ok(to_world.map_or(Vec3::ZERO, |m| m.translation)),
+    }
+}
+
+/// `direction`, or the image of +z under `to_world`.
+fn direction(p: &Properties<'_>) -> Result<Vec3, CliError> {
+    match (p.vector("direction")?, p.transform("to_world")?) {
+        (Some(_), Some(_)) => Err(p.element.error("give `direction` or `to_world`, not both")),
+        (Some(direction), None) => Ok(direction),
+        (None, to_world) => Ok(to_world.map_or(Vec3::Z, |m| m.vector(Vec3::Z))),
+    }
+}
+
+/// Sits at the origin of `to_world` and shines along its +z axis; angles are in degrees.
+fn spot(p: &Properties<'_>, intensity: Rgb) -> Result<Emitter, CliError> {
+    let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
+    let radians = |name| Ok::<_, CliError>(p.float(name)?.map(f64::to_radians));
+    let cutoff_angle = radians("cutoff_angle")?.unwrap_or(Emitter::DEFAULT_CUTOFF_ANGLE);
+    let beam_width =
+        radians("beam_width")?.unwrap_or(Emitter::DEFAULT_BEAM_FRACTION * cutoff_angle);
+    Ok(Emitter::Spot {
+        position: to_world.translation,
+        direction: to_world.vector(Vec3::Z),
+        intensity,
+        cutoff_angle,
+        beam_width,
+    })
+}

@@ -1,0 +1,140 @@
+//! Participating media and phase functions.
+
+use drt_estimators::{Named, Surrounding};
+use drt_math::Rgb;
+use drt_medium::{Grid, GridMedium, Homogeneous, Medium, MediumKind, Phase, Volume};
+
+use super::Loader;
+use super::element::Element;
+use super::properties::Properties;
+use super::volumes::Field;
+use crate::CliError;
+
+/// Extinction (before the medium's scale), albedo and emitted radiance.
+struct Quantities {
+    sigma_t: Field,
+    albedo: Field,
+    emission: Field,
+}
+
+impl<'a> Loader<'a> {
+    pub(super) fn medium(&self, e: &'a Element) -> Result<Named<Medium>, CliError> {
+        let p = Properties::of(e)?;
+        let scale = p.float("scale")?.unwrap_or(1.0);
+        let phase = match self.index.single(&p, "phase", None)? {
+            Some(phase) => self.phase(phase.target)?,
+            None => Phase::Isotropic,
+        };
+        let quantities = self.quantities(&p)?;
+        // How distances and lights are sampled does not change expected values.
+        p.accept(&["sample_emitters", "has_spectral_extinction", "strategy", "method"]);
+        p.accept(&["sampling_weight"]);
+        let kind = match p.kind()? {
+            "homogeneous" => homogeneous(e, quantities, scale)?,
+            "heterogeneous" => heterogeneous(e, quantities, scale)?,
+            other => {
+                return Err(e.error(format!(
+                    "the medium type `{other}` is not supported; expected homogeneous or \
+                     heterogeneous"
+                )));
+            }
+        };
+        p.finish()?;
+        Ok(Named { id: e.id().map(Into::into), item: Medium::new(kind, phase) })
+    }
+
+    /// `sigma_t` and `albedo`, or `sigma_a` and `sigma_s`, with `emission`.
+    fn quantities(&self, p: &Properties<'a>) -> Result<Quantities, CliError> {
+        let e = p.element;
+        let density = if e.is_legacy() { self.field(p, "density")? } else { None };
+        let sigma_t = match (self.field(p, "sigma_t")?, density) {
+            (Some(_), Some(_)) => return Err(e.error("give `density` or `sigma_t`, not both")),
+            (sigma_t, density) => sigma_t.or(density),
+        };
+        let albedo = self.field(p, "albedo")?;
+        let (sigma_a, sigma_s) = (self.field(p, "sigma_a")?, self.field(p, "sigma_s")?);
+        let (sigma_t, albedo) = match (sigma_t, albedo, sigma_a, sigma_s) {
+            (Some(sigma_t), Some(albedo), None, None) => (sigma_t, albedo),
+            (None, None, Some(sigma_a), Some(sigma_s)) => sum(e, sigma_a, sigma_s)?,
+            // Mitsuba 3 has defaults; 0.6 would take those of human skin, in millimetres.
+            (sigma_t, albedo, None, None) if !e.is_legacy() => (
+                sigma_t.unwrap_or_else(|| Field::constant(Rgb::ONE)),
+                albedo.unwrap_or_else(|| Field::constant(Rgb::splat(0.75))),
+            ),
+            _ => {
+                return Err(e.error(
+                    "give `sigma_t` and `albedo`, or `sigma_a` and `sigma_s`, and no more",
+                ));
+            }
+        };
+        let emission = self.field(p, "emission")?.unwrap_or_else(|| Field::constant(Rgb::ZERO));
+        Ok(Quantities { sigma_t, albedo, emission })
+    }
+
+    pub(super) fn phase(&self, e: &'a Element) -> Result<Phase, CliError> {
+        let p = Properties::of(e)?;
+        let phase = match p.kind()? {
+            "isotropic" => Phase::Isotropic,
+            "rayleigh" => Phase::Rayleigh,
+            "hg" => Phase::henyey_greenstein(p.float("g")?.unwrap_or(0.8))
+                .map_err(|err| e.error(err))?,
+            other => {
+                return Err(e.error(format!(
+                    "the phase function type `{other}` is not supported; expected isotropic, hg \
+                     or rayleigh"
+                )));
+            }
+        };
+        p.finish()?;
+        Ok(phase)
+    }
+
+    /// The medium stated for a camera or light: a reference, or one nested there.
+    pub(super) fn surrounding(&self, p: &Properties<'a>) -> Result<Surrounding, CliError> {
+        Ok(match self.index.single(p, "medium", None)? {
+            Some(medium) => Surrounding::Stated(self.index.position(medium.target)),
+            None => Surrounding::Counted,
+        })
+    }
+}
+
+/// Extinction and albedo from absorption and scattering. The albedo of two grids would not be one
+/// of trilinear values, so only constants can be added, and grids where the other is zero.
+fn sum(e: &Element, sigma_a: Field, sigma_s: Field) -> Result<(Field, Field), CliError> {
+    match (sigma_a.as_constant(), sigma_s.as_constant()) {
+        (Some(a), Some(s)) => {
+            let albedo = Field::constant(s.div_or_zero(a + s));
+            Ok((Field { volume: Volume::Constant(a + s), ..sigma_s }, albedo))
+        }
+        (Some(a), None) if a.is_zero() => Ok((sigma_s, Field::constant(Rgb::ONE))),
+        (None, Some(s)) if s.is_zero() => Ok((sigma_a, Field::constant(Rgb::ZERO))),
+        _ => Err(e.error(
+            "`sigma_a` and `sigma_s` as grids are not supported; give `sigma_t` and `albedo`",
+        )),
+    }
+}
+
+fn homogeneous(e: &Element, q: Quantities, scale: f64) -> Result<MediumKind, CliError> {
+    let number = |field: &Field, name| {
+        let message = format!("`{name}` of a homogeneous medium must be one number or colour");
+        field.as_constant().ok_or_else(|| e.error(message))
+    };
+    let sigma_t = number(&q.sigma_t, "sigma_t")? * scale;
+    let (albedo, emission) = (number(&q.albedo, "albedo")?, number(&q.emission, "emission")?);
+    let medium = Homogeneous::new(sigma_t, albedo, emission).map_err(|err| e.error(err))?;
+    Ok(medium.into())
+}
+
+/// A constant density fills the unit cube of its volume, as in Mitsuba.
+fn heterogeneous(e: &Element, q: Quantities, scale: f64) -> Result<MediumKind, CliError> {
+    let density = match q.sigma_t.volume {
+        Volume::Grid(grid) => Ok(grid),
+        Volume::Constant(c) => {
+            Grid::constant(c).and_then(|g| g.with_placement(q.sigma_t.placement))
+        }
+    };
+    let medium = density
+        .and_then(|density| GridMedium::new(density, scale, q.albedo.volume, q.emission.volume))
+        .map_err(|err| e.error(err))?;
+    Ok(medium.into())
+}

@@ -1,0 +1,134 @@
+//! Mitsuba XML, versions 3 and 0.5–0.6, to [`Scene`]s.
+//!
+//! A file becomes one tree of elements in one spelling ([`source`], [`element`], [`dialect`]), the
+//! tree an [`index`] of ids and order, and each element a thing of the scene. Properties are taken
+//! out of an element one by one; what is left over is an error with its line ([`properties`]).
+
+mod bsdfs;
+mod dialect;
+mod element;
+mod emitters;
+mod index;
+mod media;
+mod properties;
+mod sensors;
+mod shapes;
+mod source;
+mod spectrum;
+#[cfg(test)]
+mod tests;
+mod transform;
+mod volumes;
+
+use std::path::Path;
+
+use drt_estimators::surface::{Bsdf, Diffuse};
+use drt_estimators::{Named, Scene};
+use drt_math::Rgb;
+
+use crate::CliError;
+use crate::error::read_text;
+use element::Element;
+use index::Index;
+pub use source::Defaults;
+use source::Source;
+
+/// Reads a scene file; `defaults` override its `<default>` values.
+///
+/// # Errors
+/// Names the file, line and element of what is malformed, missing or not supported.
+pub fn load_scene(path: &Path, defaults: &Defaults) -> Result<Scene, CliError> {
+    parse_scene(path, &read_text(path, None)?, defaults)
+}
+
+/// Reads a scene from text; relative file names start from `base_dir`.
+///
+/// ```
+/// let scene = drt_cli::parse_scene_str(
+///     r#"<scene version="3.0.0"><emitter type="constant" id="sky"/></scene>"#,
+///     std::path::Path::new("."),
+/// )?;
+/// assert_eq!(scene.emitters.len(), 1);
+/// # Ok::<(), drt_cli::CliError>(())
+/// ```
+///
+/// # Errors
+/// As [`load_scene`].
+pub fn parse_scene_str(xml: &str, base_dir: &Path) -> Result<Scene, CliError> {
+    parse_scene(&base_dir.join("scene.xml"), xml, &Defaults::new())
+}
+
+fn parse_scene(path: &Path, text: &str, defaults: &Defaults) -> Result<Scene, CliError> {
+    let root = Source::new(defaults).read(path, text)?;
+    let index = Index::new(&root)?;
+    Loader { index }.scene(&root)
+}
+
+/// Turns elements into things of the scene.
+struct Loader<'a> {
+    index: Index<'a>,
+}
+
+impl<'a> Loader<'a> {
+    fn scene(&self, root: &'a Element) -> Result<Scene, CliError> {
+        let mut scene = Scene::default();
+        for e in self.index.all("medium") {
+            scene.media.push(self.medium(e)?);
+        }
+        for e in self.index.all("bsdf") {
+            scene.bsdfs.push(Named { id: e.id().map(Into::into), item: self.bsdf(e)? });
+        }
+        let shapes = self.index.all("shape");
+        let carried: Vec<usize> =
+            shapes.iter().flat_map(|s| &s.children).map(|child| child.ordinal).collect();
+        for e in self.index.all("emitter") {
+            scene.emitters.push(self.emitter(e, carried.contains(&e.ordinal))?);
+        }
+        for e in shapes {
+            let shape = self.shape(e, &mut scene.bsdfs)?;
+            scene.shapes.push(shape);
+        }
+        for e in self.index.all("sensor") {
+            scene.sensors.push(self.sensor(e)?);
+        }
+        self.top_level(root, &mut scene)?;
+        Ok(scene)
+    }
+
+    /// Everything else that stands directly in the scene.
+    fn top_level(&self, root: &'a Element, scene: &mut Scene) -> Result<(), CliError> {
+        let mut integrators = 0;
+        for e in &root.children {
+            match e.tag.as_str() {
+                "shape" | "bsdf" | "medium" | "emitter" | "sensor" | "alias" => {}
+                // Read for their own sake, so that mistakes in unused ones are found too.
+                "phase" => drop(self.phase(e)?),
+                "volume" => drop(self.volume(e)?),
+                "integrator" => {
+                    integrators += 1;
+                    if integrators > 1 {
+                        return Err(e.error("a scene has only one integrator"));
+                    }
+                    scene.integrator = sensors::integrator(e)?;
+                }
+                _ => return Err(e.error("not supported directly inside <scene>")),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The material of a shape without one: gray, or black where the shape is a light, as in Mitsuba.
+/// It is added after all others, so that their order in the file stays.
+fn default_bsdf(bsdfs: &mut Vec<Named<Bsdf>>, declared: usize, glows: bool) -> usize {
+    let reflectance = if glows { Rgb::ZERO } else { Diffuse::default().reflectance };
+    let wanted = Bsdf::Diffuse(Diffuse { reflectance });
+    let added = bsdfs[declared..].iter().position(|b| b.item == wanted);
+    added.map_or_else(
+        || {
+            bsdfs.push(Named::anonymous(wanted));
+            bsdfs.len() - 1
+        },
+        |i| declared + i,
+    )
+}

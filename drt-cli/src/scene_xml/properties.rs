@@ -1,0 +1,238 @@
+//! Typed access to what is inside an element. Whatever nobody asked for is an error in the end, so
+//! that nothing in a scene file is silently ignored.
+
+use std::cell::RefCell;
+use std::path::PathBuf;
+
+use drt_math::{Affine, Rgb, Vec3, vec3};
+
+use super::element::Element;
+use super::{spectrum, transform};
+use crate::CliError;
+
+/// The children of an element, each to be asked for once.
+pub(super) struct Properties<'a> {
+    /// The element itself.
+    pub(super) element: &'a Element,
+    used: RefCell<Vec<bool>>,
+    /// Property names asked for, for the message about those that were not.
+    asked: RefCell<Vec<&'static str>>,
+}
+
+impl<'a> Properties<'a> {
+    /// Opens a plugin element: one with a `type`, perhaps a `name` and an `id`.
+    pub(super) fn of(element: &'a Element) -> Result<Self, CliError> {
+        element.only_attributes(&["type", "name", "id"])?;
+        let mut names: Vec<_> = element.children.iter().filter_map(property_name).collect();
+        names.sort_unstable_by_key(|e| e.0);
+        if let Some(twice) = names.windows(2).find(|w| w[0].0 == w[1].0) {
+            return Err(twice[1].1.error("given twice"));
+        }
+        let used = RefCell::new(vec![false; element.children.len()]);
+        Ok(Self { element, used, asked: RefCell::default() })
+    }
+
+    /// The plugin's type.
+    pub(super) fn kind(&self) -> Result<&'a str, CliError> {
+        self.element.required("type")
+    }
+
+    /// The children that `wanted` picks; they count as asked for.
+    pub(super) fn children(&self, wanted: impl Fn(&'a Element) -> bool) -> Vec<&'a Element> {
+        let mut found = Vec::new();
+        for (child, used) in self.element.children.iter().zip(self.used.borrow_mut().iter_mut()) {
+            if wanted(child) {
+                *used = true;
+                found.push(child);
+            }
+        }
+        found
+    }
+
+    /// The property of a name, whatever its tag.
+    pub(super) fn property(&self, name: &'static str) -> Option<&'a Element> {
+        self.asked.borrow_mut().push(name);
+        self.children(|e| property_name(e).is_some_and(|(n, _)| n == name)).first().copied()
+    }
+
+    fn value<T>(
+        &self,
+        name: &'static str,
+        tags: &[&str],
+        parse: impl Fn(&'a Element) -> Result<T, CliError>,
+    ) -> Result<Option<T>, CliError> {
+        let Some(e) = self.property(name) else { return Ok(None) };
+        if tags.contains(&e.tag.as_str()) {
+            return parse(e).map(Some);
+        }
+        Err(e.error(format!("`{name}` must be a <{}>", tags.join("> or <"))))
+    }
+
+    /// A finite number.
+    pub(super) fn float(&self, name: &'static str) -> Result<Option<f64>, CliError> {
+        self.value(name, &["float", "integer"], |e| match *plain_numbers(e)? {
+            [v] => Ok(v),
+            _ => Err(e.error("expected one number")),
+        })
+    }
+
+    /// A whole number.
+    pub(super) fn integer(&self, name: &'static str) -> Result<Option<i64>, CliError> {
+        self.value(name, &["integer"], |e| {
+            let text = plain_value(e)?;
+            let bad = || e.error(format!("`{text}` is not a whole number"));
+            text.trim().parse().map_err(|_| bad())
+        })
+    }
+
+    /// A whole number within bounds.
+    pub(super) fn integer_in<T: TryFrom<i64>>(
+        &self,
+        name: &'static str,
+        range: std::ops::RangeInclusive<i64>,
+    ) -> Result<Option<T>, CliError> {
+        let Some(v) = self.integer(name)? else { return Ok(None) };
+        match T::try_from(v) {
+            Ok(t) if range.contains(&v) => Ok(Some(t)),
+            _ => Err(self.element.error(format!(
+                "`{name}` is {v}; expected {} to {}",
+                range.start(),
+                range.end()
+            ))),
+        }
+    }
+
+    /// `true` or `false`.
+    pub(super) fn boolean(&self, name: &'static str) -> Result<Option<bool>, CliError> {
+        self.value(name, &["boolean"], |e| match plain_value(e)? {
+            "true" => Ok(true),
+            "false" => Ok(false),
+            other => Err(e.error(format!("`{other}` is neither `true` nor `false`"))),
+        })
+    }
+
+    /// A word or sentence.
+    pub(super) fn string(&self, name: &'static str) -> Result<Option<&'a str>, CliError> {
+        self.value(name, &["string"], plain_value)
+    }
+
+    /// A file, relative to the scene file.
+    pub(super) fn path(&self, name: &'static str) -> Result<Option<PathBuf>, CliError> {
+        Ok(self.string(name)?.map(|s| self.element.resolve(s)))
+    }
+
+    /// One of several words, as what it stands for.
+    pub(super) fn choice<T: Copy>(
+        &self,
+        name: &'static str,
+        choices: &[(&str, T)],
+    ) -> Result<Option<T>, CliError> {
+        let Some(word) = self.string(name)? else { return Ok(None) };
+        match choices.iter().find(|(w, _)| *w == word) {
+            Some((_, t)) => Ok(Some(*t)),
+            None => {
+                let words: Vec<_> = choices.iter().map(|(w, _)| *w).collect();
+                let message = format!("`{name}` is `{word}`; expected {}", words.join(", "));
+                Err(self.element.error(message))
+            }
+        }
+    }
+
+    /// A point or vector.
+    pub(super) fn vector(&self, name: &'static str) -> Result<Option<Vec3>, CliError> {
+        self.value(name, &["point", "vector"], |e| {
+            e.only_attributes(&["name", "value", "x", "y", "z"])?;
+            if e.attribute("value").is_some() {
+                return triple(e, "value");
+            }
+            let axis = |key| number(e, key, e.required(key)?);
+            Ok(vec3(axis("x")?, axis("y")?, axis("z")?))
+        })
+    }
+
+    /// A placement.
+    pub(super) fn transform(&self, name: &'static str) -> Result<Option<Affine>, CliError> {
+        self.value(name, &["transform"], transform::parse)
+    }
+
+    /// A colour of something that reflects, refracts or absorbs.
+    pub(super) fn color(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
+        self.value(name, spectrum::TAGS, spectrum::reflected)
+    }
+
+    /// A colour of light.
+    pub(super) fn light(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
+        self.value(name, spectrum::TAGS, spectrum::emitted)
+    }
+
+    /// Accepts properties that do not change the expected image.
+    pub(super) fn accept(&self, names: &[&'static str]) {
+        for name in names {
+            self.property(name);
+        }
+    }
+
+    /// Accepts everything that is left.
+    pub(super) fn accept_rest(&self) {
+        self.children(|_| true);
+    }
+
+    /// Refuses what nobody asked for.
+    pub(super) fn finish(&self) -> Result<(), CliError> {
+        let used = self.used.borrow();
+        let Some(i) = used.iter().position(|u| !u) else { return Ok(()) };
+        let child = &self.element.children[i];
+        if property_name(child).is_none() {
+            return Err(child.error(format!("not supported inside {}", self.element)));
+        }
+        let mut known = self.asked.borrow().clone();
+        known.sort_unstable();
+        known.dedup();
+        let known = if known.is_empty() { "no properties".into() } else { known.join(", ") };
+        Err(child.error(format!("not supported by {}, which takes {known}", self.element)))
+    }
+}
+
+/// Name of a property, with its element; nested plugins and references may do without.
+fn property_name(e: &Element) -> Option<(&str, &Element)> {
+    // References to media share names by design: an interior and an exterior are told apart there.
+    if e.tag == "ref" { None } else { e.attribute("name").map(|n| (n, e)) }
+}
+
+/// The `value` of a property that has nothing else.
+pub(super) fn plain_value(e: &Element) -> Result<&str, CliError> {
+    e.only_attributes(&["name", "value"])?;
+    if let Some(child) = e.children.first() {
+        return Err(child.error(format!("not supported inside {e}")));
+    }
+    e.required("value")
+}
+
+/// The numbers in the `value` of a property that has nothing else.
+pub(super) fn plain_numbers(e: &Element) -> Result<Vec<f64>, CliError> {
+    numbers(e, plain_value(e)?)
+}
+
+/// Numbers separated by blanks or commas.
+pub(super) fn numbers(e: &Element, text: &str) -> Result<Vec<f64>, CliError> {
+    text.split(|c: char| c.is_whitespace() || c == ',')
+        .filter(|word| !word.is_empty())
+        .map(|word| number(e, "value", word))
+        .collect()
+}
+
+/// One finite number.
+pub(super) fn number(e: &Element, key: &str, word: &str) -> Result<f64, CliError> {
+    match word.trim().parse::<f64>() {
+        Ok(v) if v.is_finite() => Ok(v),
+        _ => Err(e.error(format!("`{key}` holds `{word}`; expected a finite number"))),
+    }
+}
+
+/// Three numbers in an attribute.
+pub(super) fn triple(e: &Element, key: &str) -> Result<Vec3, CliError> {
+    match *numbers(e, e.required(key)?)? {
+        [x, y, z] => Ok(vec3(x, y, z)),
+        _ => Err(e.error(format!("`{key}` must hold three numbers"))),
+    }
+}

@@ -1,0 +1,151 @@
+//! Shapes: meshes from files and tessellated primitives, with what they are made of.
+
+mod mesh_file;
+
+use std::sync::Arc;
+
+use drt_estimators::surface::Bsdf;
+use drt_estimators::{MediumBoundary, Named, Shape};
+use drt_geom::{Mesh, procedural};
+use drt_math::{Affine, Mat3, Vec3};
+
+use super::element::Element;
+use super::properties::Properties;
+use super::{Loader, default_bsdf};
+use crate::CliError;
+
+/// Bands of a sphere between its poles where none are given; twice as many meridians.
+const SPHERE_RESOLUTION: u32 = 64;
+/// Corners of a disk where none are given.
+const DISK_RESOLUTION: u32 = 128;
+
+/// A shape before its placement.
+struct Model {
+    mesh: Mesh,
+    /// A mirroring placement turns it inside out, as it does in Mitsuba: it has no normals of its
+    /// own that say which side is the front.
+    turns: bool,
+    /// Shading normals are to be made from the placed mesh.
+    smooth: bool,
+}
+
+impl Model {
+    fn faceted(mesh: Mesh) -> Self {
+        Self { mesh, turns: false, smooth: false }
+    }
+}
+
+impl<'a> Loader<'a> {
+    /// One shape; a default material is added to `bsdfs` where it has none.
+    pub(super) fn shape(
+        &self,
+        e: &'a Element,
+        bsdfs: &mut Vec<Named<Bsdf>>,
+    ) -> Result<Shape, CliError> {
+        let p = Properties::of(e)?;
+        let mesh = place(&p, model(&p)?)?;
+        let emitter = self.index.single(&p, "emitter", None)?;
+        let bsdf = match self.index.single(&p, "bsdf", None)? {
+            Some(bsdf) => self.counted(bsdf.child, bsdf.target)?,
+            None => default_bsdf(bsdfs, self.index.all("bsdf").len(), emitter.is_some()),
+        };
+        let boundary = self.boundary(&p)?;
+        p.finish()?;
+        let emitter = emitter.map(|inner| self.counted(inner.child, inner.target)).transpose()?;
+        Ok(Shape { id: e.id().map(Into::into), mesh: Arc::new(mesh), bsdf, boundary, emitter })
+    }
+
+    /// The number of what `child` stands for among things of its kind.
+    fn counted(&self, child: &Element, target: &Element) -> Result<usize, CliError> {
+        let inside = || child.error("refers to something inside another bsdf; give it a place");
+        self.index.position(target).ok_or_else(inside)
+    }
+
+    fn boundary(&self, p: &Properties<'a>) -> Result<Option<MediumBoundary>, CliError> {
+        let side = |name| -> Result<Option<usize>, CliError> {
+            let inner = self.index.single(p, "medium", Some(name))?;
+            inner.map(|inner| self.counted(inner.child, inner.target)).transpose()
+        };
+        let (interior, exterior) = (side("interior")?, side("exterior")?);
+        if let Some(other) =
+            self.index.inner(p, "medium", None).first().filter(|inner| {
+                !matches!(inner.child.attribute("name"), Some("interior" | "exterior"))
+            })
+        {
+            let message = "a medium of a shape must be named `interior` or `exterior`";
+            return Err(other.child.error(message));
+        }
+        let any = interior.is_some() || exterior.is_some();
+        Ok(any.then_some(MediumBoundary { interior, exterior }))
+    }
+}
+
+fn model(p: &Properties<'_>) -> Result<Model, CliError> {
+    let face_normals = p.boolean("face_normals")?.unwrap_or(false);
+    let mut model = match p.kind()? {
+        "obj" => from_file(p, face_normals, mesh_file::obj)?,
+        "ply" => from_file(p, face_normals, mesh_file::ply)?,
+        "cube" => Model::faceted(procedural::cube()),
+        "rectangle" => Model::faceted(procedural::rectangle()),
+        "disk" => {
+            let corners = p.integer_in("resolution", 3..=1 << 20)?.unwrap_or(DISK_RESOLUTION);
+            Model::faceted(procedural::disk(corners))
+        }
+        "sphere" => sphere(p)?,
+        other => {
+            return Err(p.element.error(format!(
+                "the shape type `{other}` is not supported; expected obj, ply, rectangle, cube, \
+                 sphere or disk"
+            )));
+        }
+    };
+    if face_normals {
+        model.mesh.normals = None;
+    }
+    Ok(model)
+}
+
+fn from_file(
+    p: &Properties<'_>,
+    face_normals: bool,
+    read: fn(&Element, &std::path::Path) -> Result<Mesh, CliError>,
+) -> Result<Model, CliError> {
+    let path = p.path("filename")?.ok_or_else(|| p.element.error("`filename` is missing"))?;
+    // There are no textures, and silhouettes are sampled in another way.
+    p.accept(&["flip_tex_coords", "silhouette_sampling_weight"]);
+    let mesh = read(p.element, &path)?;
+    let turns = face_normals || mesh.normals.is_none();
+    let smooth = !face_normals && mesh.normals.is_none();
+    Ok(Model { mesh, turns, smooth })
+}
+
+fn sphere(p: &Properties<'_>) -> Result<Model, CliError> {
+    let bands = p.integer_in("resolution", 2..=2048)?.unwrap_or(SPHERE_RESOLUTION);
+    let center = p.vector("center")?.unwrap_or(Vec3::ZERO);
+    let radius = p.float("radius")?.unwrap_or(1.0);
+    if radius <= 0.0 {
+        return Err(p.element.error(format!("`radius` is {radius}; it must be positive")));
+    }
+    let map = Affine { linear: Mat3::IDENTITY * radius, translation: center };
+    let mesh = procedural::uv_sphere(bands).transform(&map);
+    Ok(Model { mesh, turns: true, smooth: false })
+}
+
+/// The model in the world.
+fn place(p: &Properties<'_>, model: Model) -> Result<Mesh, CliError> {
+    let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
+    let determinant = to_world.linear.determinant();
+    if determinant == 0.0 && model.mesh.normals.is_some() {
+        let message = "`to_world` flattens a shape with shading normals";
+        return Err(p.element.error(message));
+    }
+    let mut mesh = model.mesh.transform(&to_world);
+    if mesh.positions.iter().any(|v| !v.is_finite()) {
+        return Err(p.element.error("`to_world` moves vertices to infinity"));
+    }
+    let mirrored_inside_out = determinant < 0.0 && model.turns;
+    if mirrored_inside_out != p.boolean("flip_normals")?.unwrap_or(false) {
+        mesh.flip();
+    }
+    if model.smooth { mesh_file::smooth(p.element, mesh) } else { Ok(mesh) }
+}

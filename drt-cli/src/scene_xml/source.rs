@@ -1,0 +1,167 @@
+//! From text to one tree: parsing, `<default>` and `$name`, `<include>`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use roxmltree::{Document, Node};
+
+use super::dialect::Dialect;
+use super::element::Element;
+use crate::CliError;
+use crate::error::{Place, read_text};
+
+/// Values for the `<default>` names of a scene, as `-D NAME=VALUE` gives them.
+pub type Defaults = BTreeMap<String, String>;
+
+/// Elements inside each other beyond this depth are refused: no scene needs them, and reading them
+/// takes stack.
+const MAX_NESTING: usize = 64;
+
+/// Reads one scene file and all it includes.
+pub(super) struct Source {
+    /// Values given from outside, which win over the file's defaults.
+    given: Defaults,
+    /// Values seen so far.
+    known: Defaults,
+    /// Names of `given` that the scene has used or declared.
+    used: BTreeSet<String>,
+    /// The files being read, outermost first.
+    open: Vec<PathBuf>,
+}
+
+impl Source {
+    pub(super) fn new(given: &Defaults) -> Self {
+        Self { given: given.clone(), known: given.clone(), used: BTreeSet::new(), open: Vec::new() }
+    }
+
+    /// The tree of a scene's text; `path` names it in messages and anchors relative paths.
+    pub(super) fn read(mut self, path: &Path, text: &str) -> Result<Element, CliError> {
+        let mut root = self.parse(path, text)?;
+        if let Some(name) = self.given.keys().find(|k| !self.used.contains(*k)) {
+            return Err(CliError::input(
+                &Place::file(path),
+                format!("-D {name}: the scene has neither <default name=\"{name}\"> nor ${name}"),
+            ));
+        }
+        root.number();
+        Ok(root)
+    }
+
+    fn parse(&mut self, path: &Path, text: &str) -> Result<Element, CliError> {
+        let document = Document::parse(text).map_err(|e| {
+            let at = e.pos();
+            let place = Place { line: Some(at.row), column: Some(at.col), ..Place::file(path) };
+            CliError::input(&place, format!("not well-formed XML: {e}"))
+        })?;
+        let root = document.root_element();
+        let file: Arc<Path> = path.into();
+        let place = place_of(&file, root);
+        if root.tag_name().name() != "scene" {
+            let found = root.tag_name().name();
+            let message = format!("expected a <scene version=\"…\"> element, found <{found}>");
+            return Err(CliError::input(&place, message));
+        }
+        let version = root.attribute("version").ok_or_else(|| {
+            CliError::input(
+                &place,
+                "<scene>: the attribute `version` is missing, such as \"3.0.0\"",
+            )
+        })?;
+        let dialect = Dialect::of_version(version, &place)?;
+        self.open.push(path.canonicalize().unwrap_or_else(|_| path.into()));
+        let scene = self.element(&file, root, dialect, 0)?;
+        self.open.pop();
+        scene.only_attributes(&["version"])?;
+        Ok(scene)
+    }
+
+    fn element(
+        &mut self,
+        file: &Arc<Path>,
+        node: Node<'_, '_>,
+        dialect: Dialect,
+        depth: usize,
+    ) -> Result<Element, CliError> {
+        let place = place_of(file, node);
+        if depth > MAX_NESTING {
+            let message = format!("elements nest deeper than {MAX_NESTING}");
+            return Err(CliError::input(&place, message));
+        }
+        let attributes = node
+            .attributes()
+            .map(|a| Ok((a.name().to_owned(), self.substitute(a.value(), &place)?)))
+            .collect::<Result<_, CliError>>()?;
+        let mut element = Element::new(node.tag_name().name().into(), attributes, place, dialect);
+        for child in node.children() {
+            if child.is_text() && !child.text().unwrap_or("").trim().is_empty() {
+                return Err(element.error("text inside an element; expected elements only"));
+            }
+            if child.is_element() {
+                let child = self.element(file, child, dialect, depth + 1)?;
+                self.add(&mut element, child)?;
+            }
+        }
+        Ok(element)
+    }
+
+    /// Adds a child, unless it is an instruction to the reader itself.
+    fn add(&mut self, parent: &mut Element, child: Element) -> Result<(), CliError> {
+        match child.tag.as_str() {
+            "default" => {
+                child.only_attributes(&["name", "value"])?;
+                let (name, value) = (child.required("name")?, child.required("value")?);
+                if name.is_empty() {
+                    return Err(child.error("the name is empty"));
+                }
+                self.used.insert(name.into());
+                self.known.entry(name.into()).or_insert_with(|| value.into());
+            }
+            "include" => {
+                child.only_attributes(&["filename"])?;
+                parent.children.extend(self.include(&child)?.children);
+            }
+            _ => parent.children.push(child),
+        }
+        Ok(())
+    }
+
+    fn include(&mut self, at: &Element) -> Result<Element, CliError> {
+        let path = at.resolve(at.required("filename")?);
+        let text = read_text(&path, Some(&at.place))?;
+        if self.open.contains(&path.canonicalize().unwrap_or_else(|_| path.clone())) {
+            return Err(at.error(format!("{} includes itself", path.display())));
+        }
+        self.parse(&path, &text)
+    }
+
+    /// The text with every `$name` replaced by the value of the longest known name that fits.
+    fn substitute(&mut self, text: &str, place: &Place) -> Result<String, CliError> {
+        let mut out = String::new();
+        let mut rest = text;
+        while let Some(at) = rest.find('$') {
+            out.push_str(&rest[..at]);
+            rest = &rest[at + 1..];
+            let fits = self.known.iter().filter(|(name, _)| rest.starts_with(name.as_str()));
+            let Some((name, value)) = fits.max_by_key(|(name, _)| name.len()) else {
+                let word = |c: char| !(c.is_alphanumeric() || c == '_');
+                let name = rest.split(word).next().unwrap_or(rest);
+                let message = format!(
+                    "${name} has no value; give one with -D {name}=VALUE or with a \
+                     <default name=\"{name}\" value=\"…\"/> before it"
+                );
+                return Err(CliError::input(place, message));
+            };
+            out.push_str(value);
+            rest = &rest[name.len()..];
+            self.used.insert(name.clone());
+        }
+        out.push_str(rest);
+        Ok(out)
+    }
+}
+
+fn place_of(file: &Arc<Path>, node: Node<'_, '_>) -> Place {
+    let at = node.document().text_pos_at(node.range().start);
+    Place { file: file.clone(), line: Some(at.row), column: None }
+}

@@ -1,0 +1,89 @@
+//! Quantities in space: numbers, colours, `constvolume` and `gridvolume`.
+
+use drt_math::{Affine, Rgb};
+use drt_medium::{Filter, Layout, Volume, Wrap, vol};
+
+use super::Loader;
+use super::element::Element;
+use super::properties::Properties;
+use crate::CliError;
+
+/// A quantity in space, and the box in which it counts as a density.
+pub(super) struct Field {
+    pub(super) volume: Volume,
+    /// The image of the unit cube that bounds a constant density.
+    pub(super) placement: Affine,
+}
+
+impl Field {
+    pub(super) fn constant(value: Rgb) -> Self {
+        Self { volume: Volume::Constant(value), placement: Affine::IDENTITY }
+    }
+
+    /// The value of a quantity that is the same everywhere.
+    pub(super) fn as_constant(&self) -> Option<Rgb> {
+        match &self.volume {
+            Volume::Constant(c) => Some(*c),
+            Volume::Grid(_) => None,
+        }
+    }
+}
+
+impl<'a> Loader<'a> {
+    /// The quantity of a name: a volume, a colour or a number.
+    pub(super) fn field(
+        &self,
+        p: &Properties<'a>,
+        name: &'static str,
+    ) -> Result<Option<Field>, CliError> {
+        match self.index.single(p, "volume", Some(name))? {
+            Some(volume) => self.volume(volume.target).map(Some),
+            None => Ok(p.color(name)?.map(Field::constant)),
+        }
+    }
+
+    /// A `<volume>` element.
+    pub(super) fn volume(&self, e: &'a Element) -> Result<Field, CliError> {
+        let p = Properties::of(e)?;
+        let field = match p.kind()? {
+            "constvolume" => constant(&p)?,
+            "gridvolume" => grid(&p)?,
+            other => {
+                return Err(e.error(format!(
+                    "the volume type `{other}` is not supported; expected gridvolume or constvolume"
+                )));
+            }
+        };
+        p.finish()?;
+        Ok(field)
+    }
+}
+
+fn constant(p: &Properties<'_>) -> Result<Field, CliError> {
+    let value = p.color("value")?.ok_or_else(|| p.element.error("`value` is missing"))?;
+    let placement = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
+    Ok(Field { volume: Volume::Constant(value), placement })
+}
+
+fn grid(p: &Properties<'_>) -> Result<Field, CliError> {
+    let e = p.element;
+    let path = p.path("filename")?.ok_or_else(|| e.error("`filename` is missing"))?;
+    let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
+    let filters = [("trilinear", Filter::Trilinear), ("nearest", Filter::Nearest)];
+    let wraps = [("clamp", Wrap::Clamp), ("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror)];
+    let filter = p.choice("filter_type", &filters)?.unwrap_or_default();
+    let wrap = p.choice("wrap_mode", &wraps)?.unwrap_or_default();
+    // Files of Mitsuba 0.5 and 0.6 place a grid in the box stored with it, its outermost values on
+    // the faces.
+    let legacy = e.is_legacy();
+    let in_stored_box = p.boolean("use_grid_bbox")?.unwrap_or(legacy);
+    let layout = if legacy { Layout::NodeCentred } else { Layout::VoxelCentred };
+    // Spectral upsampling and texture hardware.
+    p.accept(&["raw", "accel", "send_data"]);
+    let file = vol::read(&path).map_err(|err| e.error(err))?;
+    let stored = if in_stored_box { file.placement() } else { Affine::IDENTITY };
+    let grid = (file.grid.with_layout(layout).with_filter(filter).with_wrap(wrap))
+        .with_placement(to_world.after(&stored))
+        .map_err(|err| e.error(err))?;
+    Ok(Field { placement: *grid.to_world(), volume: Volume::Grid(grid) })
+}
