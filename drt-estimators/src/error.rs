@@ -18,7 +18,9 @@ pub enum Error {
         known: Vec<String>,
     },
     /// More than one item has this name.
-    #[error("more than one element is called `{name}`; address it by kind and order, such as shape[0]")]
+    #[error(
+        "more than one element is called `{name}`; address it by kind and order, such as shape[0]"
+    )]
     AmbiguousTarget {
         /// The name asked for.
         name: String,

@@ -4,22 +4,37 @@
 
 extern crate alloc;
 
+mod agreement;
+mod boundary;
+mod contraction;
 pub mod emitter;
 mod error;
+mod film;
 pub mod filter;
+mod finite_difference;
+mod flux;
+mod inside;
+mod interior;
+mod parallel;
 mod plan;
 mod rendering;
 mod scene;
+mod sensitivity;
 pub mod sensor;
+mod session;
 mod settings;
+mod splatting;
 pub mod surface;
+mod tangents;
+mod transport;
 
+pub use agreement::{Agreement, agreement};
 pub use error::Error;
+pub use finite_difference::finite_differences;
 pub use plan::{MediumPlan, Plan};
-pub use rendering::{
-    BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term,
-};
+pub use rendering::{BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term};
 pub use scene::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding, Target,
 };
+pub use session::{Control, FinishedTile, Session, Unattended};
 pub use settings::{EstimatorKind, Settings};

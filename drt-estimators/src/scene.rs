@@ -144,6 +144,37 @@ pub enum Target {
 }
 
 impl Scene {
+    /// Checks that indices refer to something and emitters are usable.
+    ///
+    /// # Errors
+    /// Names the element and what is wrong with it.
+    pub fn check(&self) -> Result<(), crate::Error> {
+        let fail = |element: String, reason: String| Err(crate::Error::Element { element, reason });
+        let missing = |m: Option<usize>| m.is_some_and(|m| m >= self.media.len());
+        for (i, s) in self.shapes.iter().enumerate() {
+            let name = || s.id.clone().unwrap_or_else(|| alloc::format!("shape[{i}]"));
+            if s.bsdf >= self.bsdfs.len() {
+                return fail(name(), alloc::format!("there is no bsdf {}", s.bsdf));
+            }
+            if s.emitter.is_some_and(|e| e >= self.emitters.len()) {
+                return fail(name(), "its emitter does not exist".into());
+            }
+            if s.boundary.is_some_and(|b| missing(b.interior) || missing(b.exterior)) {
+                return fail(name(), "one of its media does not exist".into());
+            }
+            if s.emitter.is_some() && s.mesh.surface_area() <= 0.0 {
+                return fail(name(), "it emits but has no area".into());
+            }
+        }
+        for (i, e) in self.emitters.iter().enumerate() {
+            if let Err(error) = e.item.emitter.checked() {
+                let name = e.id.clone().unwrap_or_else(|| alloc::format!("emitter[{i}]"));
+                return fail(name, alloc::format!("{error}"));
+            }
+        }
+        Ok(())
+    }
+
     /// Finds what a job calls `name`: an id, or kind and order such as `shape[0]`.
     ///
     /// # Errors

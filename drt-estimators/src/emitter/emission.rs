@@ -127,6 +127,12 @@ impl Emission {
 }
 
 impl EmitterTangent {
+    /// True when the emitter's place or direction changes.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.position != Vec3::ZERO || self.direction != Vec3::ZERO
+    }
+
     /// True when nothing changes.
     #[must_use]
     pub fn is_zero(&self) -> bool {

@@ -1,4 +1,4 @@
-use drt_math::{Dual, Real, Rgb, Vec3};
+use drt_math::{Real, Rgb, Vec3};
 
 use super::{BsdfGradient, BsdfParams};
 
@@ -33,18 +33,6 @@ impl<T: Real> Angles<T> {
     #[inline]
     pub(super) fn in_front(&self) -> bool {
         self.cos_o.re() > 0.0 && self.cos_i.re() > 0.0
-    }
-}
-
-impl Angles {
-    /// The angles as independent variables in lanes 0, 1 and 2.
-    #[inline]
-    pub(super) fn seeded<const N: usize>(self) -> Angles<Dual<f64, N>> {
-        Angles {
-            cos_o: Dual::variable(self.cos_o, 0),
-            cos_i: Dual::variable(self.cos_i, 1),
-            h2: Dual::variable(self.h2, 2),
-        }
     }
 }
 

@@ -34,32 +34,29 @@ impl Default for RoughConductor {
 }
 
 impl<T: Real> RoughConductor<T> {
-    /// `fs cos` without Fresnel's factor.
-    #[inline]
-    fn facets(distribution: Distribution, a: &Angles<T>, alpha: T) -> T {
-        let density = distribution.density(a.cos_o + a.cos_i, a.h2, alpha) * a.h2.squared();
-        let masking = distribution.masking(a.cos_o, alpha) * distribution.masking(a.cos_i, alpha);
-        density * masking * a.cos_i * 0.25
-    }
-
     #[inline]
     pub(super) fn value(&self, a: &Angles<T>) -> Rgb<T> {
         if !a.in_front() {
             return Rgb::splat(T::zero());
         }
-        let facets = Self::facets(self.distribution, a, self.alpha);
-        // Also where |h| = 0, which Fresnel's factor below could not be differentiated at.
+        let facets = self.distribution.facets(a, T::one(), self.alpha);
+        // Also where |h| = 0, which the rest could not be differentiated at.
         if facets.re() == 0.0 {
             return Rgb::splat(T::zero());
         }
-        let cos = a.h2.sqrt() * 0.5;
-        let fresnel = Rgb::new(
-            conductor_reflected(cos, self.eta.r, self.k.r),
-            conductor_reflected(cos, self.eta.g, self.k.g),
-            conductor_reflected(cos, self.eta.b, self.k.b),
+        let reflected = Rgb::new(
+            facet_reflectance(a.h2, self.eta.r, self.k.r),
+            facet_reflectance(a.h2, self.eta.g, self.k.g),
+            facet_reflectance(a.h2, self.eta.b, self.k.b),
         );
-        self.specular_reflectance * fresnel * facets
+        self.specular_reflectance * reflected * facets
     }
+}
+
+/// Fresnel's factor at a microfacet, with the Jacobian `|h|⁴ / 4` of reflection.
+#[inline]
+fn facet_reflectance<T: Real>(h2: T, eta: T, k: T) -> T {
+    conductor_reflected(h2.sqrt() * 0.5, eta, k) * h2.squared() * 0.25
 }
 
 impl RoughConductor {
@@ -69,33 +66,28 @@ impl RoughConductor {
         if !a.in_front() {
             return s;
         }
-        let facets = RoughConductor::<Dual<f64, 4>>::facets(
-            self.distribution,
-            &a.seeded(),
-            Dual::variable(self.alpha, 3),
-        );
-        if facets.re == 0.0 {
+        let Some(facets) = self.distribution.facet_slopes(a, 1.0, self.alpha) else {
             return s;
-        }
-        let cos = (Dual::<f64, 3>::variable(a.h2, 0)).sqrt() * 0.5;
-        let reflected =
-            |eta, k| conductor_reflected(cos, Dual::variable(eta, 1), Dual::variable(k, 2));
-        let fresnel = Rgb {
-            r: reflected(self.eta.r, self.k.r),
-            g: reflected(self.eta.g, self.k.g),
-            b: reflected(self.eta.b, self.k.b),
         };
-        let value = |f: Dual<f64, 3>| f.re;
-        let colour = self.specular_reflectance * fresnel.map(value);
-        let scale = self.specular_reflectance * facets.re;
-        s.value = colour * facets.re;
-        s.cos_o = colour * facets.eps[0];
-        s.cos_i = colour * facets.eps[1];
-        s.h2 = colour * facets.eps[2] + scale * fresnel.map(|f| f.eps[0]);
-        s.params.alpha = colour * facets.eps[3];
-        s.params.eta = scale * fresnel.map(|f| f.eps[1]);
-        s.params.k = scale * fresnel.map(|f| f.eps[2]);
-        s.params.specular_reflectance = fresnel.map(value) * facets.re;
+        let h2 = Dual::<f64, 3>::variable(a.h2, 0);
+        let reflectance =
+            |eta, k| facet_reflectance(h2, Dual::variable(eta, 1), Dual::variable(k, 2));
+        let reflected = Rgb {
+            r: reflectance(self.eta.r, self.k.r),
+            g: reflectance(self.eta.g, self.k.g),
+            b: reflectance(self.eta.b, self.k.b),
+        };
+        let by_reflectance = reflected.map(|f| f.re) * facets.value;
+        let colour = self.specular_reflectance * reflected.map(|f| f.re);
+        let scale = self.specular_reflectance * facets.value;
+        s.value = colour * facets.value;
+        s.cos_o = colour * facets.cos_o;
+        s.cos_i = colour * facets.cos_i;
+        s.h2 = colour * facets.h2 + scale * reflected.map(|f| f.eps[0]);
+        s.params.alpha = colour * facets.alpha;
+        s.params.eta = scale * reflected.map(|f| f.eps[1]);
+        s.params.k = scale * reflected.map(|f| f.eps[2]);
+        s.params.specular_reflectance = by_reflectance;
         s
     }
 
@@ -104,8 +96,7 @@ impl RoughConductor {
         if !a.in_front() {
             return 0.0;
         }
-        let density = self.distribution.density(a.cos_o + a.cos_i, a.h2, self.alpha);
-        density * a.h2 * a.h2 * 0.25 * self.distribution.exact_masking(a.cos_o, self.alpha)
+        0.25 * a.h2 * a.h2 * self.distribution.visible_density(a, 1.0, self.alpha)
     }
 
     #[inline]

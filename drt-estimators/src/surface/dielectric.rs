@@ -47,118 +47,117 @@ struct Passage<T> {
     eta: T,
 }
 
-/// The scaled half vector `wo + eta wi` of a refraction.
-struct HalfVector<T> {
-    n_dot: T,
-    length2: T,
-    /// Its products with `wo` and `-wi` after turning it to the side of `n`.
-    cos_o: T,
-    cos_i: T,
+/// Products of `h = wo + eta wi` with `wo` and `-wi`, once `h` is turned to the side of the normal.
+/// They are |h| times the cosines of incidence and refraction.
+struct FacetCosines<T> {
+    o: T,
+    i: T,
 }
 
 impl<T: Real> Passage<T> {
+    /// None where a direction lies in the surface.
     #[inline]
-    fn half_vector(&self) -> HalfVector<T> {
-        let Self { a, eta } = *self;
-        let contrast = T::one() - eta;
-        let n_dot = a.cos_o + eta * a.cos_i;
-        let side = if n_dot.re() < 0.0 { -1.0 } else { 1.0 };
-        HalfVector {
-            n_dot,
-            length2: contrast.squared() + eta * a.h2,
-            cos_o: (contrast + eta * a.h2 * 0.5) * side,
-            cos_i: (contrast - a.h2 * 0.5) * side,
+    fn new(a: &Angles<T>, eta: T) -> Option<Self> {
+        if a.cos_i.re() == 0.0 || a.cos_o.re() == 0.0 {
+            None
+        } else if a.cos_o.re() > 0.0 {
+            Some(Self { a: *a, eta })
+        } else {
+            Some(Self { a: a.flipped(), eta: eta.recip() })
         }
     }
 
-    /// `fs |cos|` of the reflection; both directions in front.
     #[inline]
-    fn reflection(&self, distribution: Distribution, alpha: T) -> T {
-        let a = &self.a;
-        let density = distribution.density(a.cos_o + a.cos_i, a.h2, alpha) * a.h2.squared();
-        if density.re() == 0.0 {
-            return T::zero();
-        }
-        let masking = distribution.masking(a.cos_o, alpha) * distribution.masking(a.cos_i, alpha);
-        let fresnel = dielectric_reflected(a.h2.sqrt() * 0.5, self.eta);
-        density * masking * fresnel * a.cos_i * 0.25
+    fn reflects(&self) -> bool {
+        self.a.cos_i.re() > 0.0
     }
 
-    /// `fs |cos|` of the refraction; the second direction behind.
+    /// Scale of `wi` in the half vector.
     #[inline]
-    fn refraction(&self, distribution: Distribution, alpha: T) -> T {
-        let h = self.half_vector();
-        // Microfacets seen from behind, and pairs of directions that no refraction joins.
-        if h.cos_o.re() <= 0.0 || h.cos_i.re() <= 0.0 {
-            return T::zero();
+    fn index(&self) -> T {
+        if self.reflects() { T::one() } else { self.eta }
+    }
+
+    /// None for pairs of directions that no refraction at the front of a microfacet joins.
+    #[inline]
+    fn refraction_cosines(&self) -> Option<FacetCosines<T>> {
+        let n_dot_h = self.a.cos_o.re() + self.eta.re() * self.a.cos_i.re();
+        let side = if n_dot_h < 0.0 { -1.0 } else { 1.0 };
+        let contrast = T::one() - self.eta;
+        let o = (contrast + self.eta * self.a.h2 * 0.5) * side;
+        let i = (contrast - self.a.h2 * 0.5) * side;
+        (o.re() > 0.0 && i.re() > 0.0).then_some(FacetCosines { o, i })
+    }
+
+    /// What the value has besides [`Distribution::facets`]: Fresnel's factor, and `|h|⁴ / 4` in
+    /// reflections or `|h·wo| |h·wi|` in refractions. A function of h2 and eta alone.
+    #[inline]
+    fn facet_share(&self) -> T {
+        let h2 = self.a.h2;
+        if self.reflects() {
+            dielectric_reflected(h2.sqrt() * 0.5, self.eta) * h2.squared() * 0.25
+        } else if let Some(cos) = self.refraction_cosines() {
+            dielectric_transmitted(cos.o, cos.i, self.eta) * cos.o * cos.i
+        } else {
+            T::zero()
         }
-        let density = distribution.density(h.n_dot, h.length2, alpha);
-        if density.re() == 0.0 {
-            return T::zero();
-        }
-        let cos_i = -self.a.cos_i;
-        let masking =
-            distribution.masking(self.a.cos_o, alpha) * distribution.masking(cos_i, alpha);
-        let fresnel = dielectric_transmitted(h.cos_o, h.cos_i, self.eta);
-        // The Jacobian's 1 / |h|⁴ is inside the density.
-        density * masking * fresnel * h.cos_o * h.cos_i * cos_i
     }
 }
 
 impl<T: Real> RoughDielectric<T> {
-    /// None where a direction lies in the surface.
     #[inline]
-    fn passage(a: &Angles<T>, eta: T) -> Option<Passage<T>> {
-        if a.cos_i.re() == 0.0 {
-            None
-        } else if a.cos_o.re() > 0.0 {
-            Some(Passage { a: *a, eta })
-        } else if a.cos_o.re() < 0.0 {
-            Some(Passage { a: a.flipped(), eta: eta.recip() })
-        } else {
-            None
+    pub(super) fn value(&self, a: &Angles<T>) -> Rgb<T> {
+        let black = Rgb::splat(T::zero());
+        let Some(passage) = Passage::new(a, self.eta) else { return black };
+        let facets = self.distribution.facets(&passage.a, passage.index(), self.alpha);
+        // Also where |h| = 0, which the rest could not be differentiated at.
+        if facets.re() == 0.0 {
+            return black;
         }
+        self.colour(passage.reflects()) * (facets * passage.facet_share())
     }
 
     #[inline]
-    pub(super) fn value(&self, a: &Angles<T>) -> Rgb<T> {
-        match Self::passage(a, self.eta) {
-            None => Rgb::splat(T::zero()),
-            Some(p) if p.a.in_front() => {
-                self.specular_reflectance * p.reflection(self.distribution, self.alpha)
-            }
-            Some(p) => self.specular_transmittance * p.refraction(self.distribution, self.alpha),
-        }
+    fn colour(&self, reflects: bool) -> Rgb<T> {
+        if reflects { self.specular_reflectance } else { self.specular_transmittance }
     }
 }
 
 impl RoughDielectric {
     #[inline]
     pub(super) fn slopes(&self, a: &Angles) -> Slopes {
-        let (alpha, eta) = (Dual::<f64, 5>::variable(self.alpha, 3), Dual::variable(self.eta, 4));
-        let Some(passage) = RoughDielectric::passage(&a.seeded(), eta) else {
-            return Slopes::default();
+        let mut s = Slopes::default();
+        let Some(Passage { a: seen, eta }) = Passage::new(a, self.eta) else { return s };
+        let reflects = seen.cos_i > 0.0;
+        let index = if reflects { 1.0 } else { eta };
+        let Some(facets) = self.distribution.facet_slopes(&seen, index, self.alpha) else {
+            return s;
         };
-        let reflects = passage.a.in_front();
-        let (facets, colour) = if reflects {
-            (passage.reflection(self.distribution, alpha), self.specular_reflectance)
-        } else {
-            (passage.refraction(self.distribution, alpha), self.specular_transmittance)
-        };
-        let along = |lane: usize| colour * facets.eps[lane];
-        let mut s = Slopes {
-            value: colour * facets.re,
-            cos_o: along(0),
-            cos_i: along(1),
-            h2: along(2),
-            ..Slopes::default()
-        };
-        s.params.alpha = along(3);
-        s.params.eta = along(4);
+        let share = Passage::<Dual<f64, 2>> {
+            a: Angles {
+                cos_o: Dual::from(seen.cos_o),
+                cos_i: Dual::from(seen.cos_i),
+                h2: Dual::variable(seen.h2, 0),
+            },
+            eta: Dual::variable(eta, 1),
+        }
+        .facet_share();
+
+        let colour = self.colour(reflects);
+        // Seen from behind, the cosines are turned over and the index is inverted.
+        let (side, inversion) = if a.cos_o > 0.0 { (1.0, 1.0) } else { (-1.0, -eta * eta) };
+        let by_index = if reflects { 0.0 } else { facets.index * share.re };
+        let value = facets.value * share.re;
+        s.value = colour * value;
+        s.cos_o = colour * (side * facets.cos_o * share.re);
+        s.cos_i = colour * (side * facets.cos_i * share.re);
+        s.h2 = colour * (facets.h2 * share.re + facets.value * share.eps[0]);
+        s.params.alpha = colour * (facets.alpha * share.re);
+        s.params.eta = colour * (inversion * (by_index + facets.value * share.eps[1]));
         if reflects {
-            s.params.specular_reflectance = Rgb::splat(facets.re);
+            s.params.specular_reflectance = Rgb::splat(value);
         } else {
-            s.params.specular_transmittance = Rgb::splat(facets.re);
+            s.params.specular_transmittance = Rgb::splat(value);
         }
         s
     }
@@ -175,24 +174,18 @@ impl RoughDielectric {
 
     #[inline]
     pub(super) fn pdf(&self, a: &Angles) -> f64 {
-        let Some(passage) = RoughDielectric::passage(a, self.eta) else {
+        let Some(passage) = Passage::new(a, self.eta) else { return 0.0 };
+        let Passage { a, eta } = passage;
+        let (probability, jacobian) = if passage.reflects() {
+            let fresnel = dielectric_reflected(0.5 * fm::sqrt(a.h2), eta);
+            (self.reflection_choice(fresnel), 0.25 * a.h2 * a.h2)
+        } else if let Some(cos) = passage.refraction_cosines() {
+            let fresnel = 1.0 - dielectric_transmitted(cos.o, cos.i, eta);
+            (1.0 - self.reflection_choice(fresnel), eta * eta * cos.o * cos.i)
+        } else {
             return 0.0;
         };
-        let Passage { a, eta } = passage;
-        let masking = self.distribution.exact_masking(a.cos_o, self.alpha);
-        if a.in_front() {
-            let density = self.distribution.density(a.cos_o + a.cos_i, a.h2, self.alpha);
-            let fresnel = dielectric_reflected(0.5 * fm::sqrt(a.h2), eta);
-            return density * a.h2 * a.h2 * 0.25 * masking * self.reflection_choice(fresnel);
-        }
-        let h = passage.half_vector();
-        if h.cos_o <= 0.0 || h.cos_i <= 0.0 {
-            return 0.0;
-        }
-        let fresnel = 1.0 - dielectric_transmitted(h.cos_o, h.cos_i, eta);
-        let jacobian = eta * eta * h.cos_o * h.cos_i;
-        let density = self.distribution.density(h.n_dot, h.length2, self.alpha);
-        density * jacobian * masking * (1.0 - self.reflection_choice(fresnel))
+        probability * jacobian * self.distribution.visible_density(&a, passage.index(), self.alpha)
     }
 
     #[inline]

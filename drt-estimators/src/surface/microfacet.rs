@@ -4,8 +4,9 @@
 
 use core::f64::consts::{FRAC_1_PI, PI};
 
-use drt_math::{Frame, Real, Vec3, fm};
+use drt_math::{Dual, Frame, Real, Vec3, fm};
 
+use super::angles::Angles;
 use super::visible_slope::{visible_area, visible_slope};
 
 /// Distribution of the normals of microfacets.
@@ -21,31 +22,92 @@ pub enum Distribution {
 /// Least roughness: below it a surface is a mirror to double precision, which has no density.
 pub(super) const LEAST_ALPHA: f64 = 1e-4;
 
+/// Least squared `n·h`: below it `h` lies in the surface or vanishes, and its powers underflow.
+const LEAST_COS2: f64 = 1e-40;
+
 /// From this ratio of cotangent to roughness on, Walter's rational fit of Beckmann's masking is one:
 /// the smaller root of `0.396 a² - 1.259 a + 1`.
 const UNMASKED: f64 = 1.548_140_7;
 
+/// A scattering by microfacets, without its factors of |h|², and its derivatives.
+///
+/// The half vector is `h = wo + index wi`, where `index` is 1 in reflections.
+pub(super) struct FacetSlopes {
+    pub(super) value: f64,
+    pub(super) cos_o: f64,
+    pub(super) cos_i: f64,
+    pub(super) h2: f64,
+    pub(super) index: f64,
+    pub(super) alpha: f64,
+}
+
 impl Distribution {
+    /// `D(m) G1(wo) G1(wi) / (|h|⁴ |n·wo|)` for the normal `m` along `h = wo + index wi`: what
+    /// reflection (`index` 1) and refraction have in common, once multiplied by `|n·wi|`.
+    ///
+    /// `n·wo > 0`; whether the microfacet shows `wo` and `wi` its front is not looked at.
+    #[inline]
+    pub(super) fn facets<T: Real>(self, a: &Angles<T>, index: T, alpha: T) -> T {
+        let n_dot_h = a.cos_o + index * a.cos_i;
+        let h2 = (T::one() - index).squared() + index * a.h2;
+        let density = self.density(n_dot_h, h2, alpha);
+        if density.re() == 0.0 {
+            return T::zero();
+        }
+        let cos_i = a.cos_i.abs();
+        density * self.masking(a.cos_o, alpha) * self.masking(cos_i, alpha) * cos_i
+    }
+
+    /// As [`Distribution::facets`], with duals only as wide as each factor needs.
+    #[inline]
+    pub(super) fn facet_slopes(self, a: &Angles, index: f64, alpha: f64) -> Option<FacetSlopes> {
+        type Narrow = Dual<f64, 2>;
+        type Wide = Dual<f64, 3>;
+        let contrast = 1.0 - index;
+        let density = self.density(
+            Wide::variable(a.cos_o + index * a.cos_i, 0),
+            Wide::variable(contrast * contrast + index * a.h2, 1),
+            Wide::variable(alpha, 2),
+        );
+        if density.re == 0.0 {
+            return None;
+        }
+        let narrow_alpha = Narrow::variable(alpha, 1);
+        let masking_o = self.masking(Narrow::variable(a.cos_o, 0), narrow_alpha);
+        let cos_i = Narrow::variable(a.cos_i, 0).abs();
+        let masked_i = self.masking(cos_i, narrow_alpha) * cos_i;
+
+        let [d, o, i] = [density.re, masking_o.re, masked_i.re];
+        let [by_n_dot_h, by_h2, by_alpha] = density.eps.map(|slope| slope * o * i);
+        Some(FacetSlopes {
+            value: d * o * i,
+            cos_o: by_n_dot_h + d * i * masking_o.eps[0],
+            cos_i: by_n_dot_h * index + d * o * masked_i.eps[0],
+            h2: by_h2 * index,
+            index: by_n_dot_h * a.cos_i + by_h2 * (a.h2 - 2.0 * contrast),
+            alpha: by_alpha + d * (i * masking_o.eps[1] + o * masked_i.eps[1]),
+        })
+    }
+
     /// `D(h/|h|) / |h|⁴` of a half vector `h`, per steradian, from `n·h` and `|h|²`. Even in `h`;
     /// zero where it underflows.
     #[inline]
-    pub(super) fn density<T: Real>(self, n_dot_h: T, h2: T, alpha: T) -> T {
+    fn density<T: Real>(self, n_dot_h: T, h2: T, alpha: T) -> T {
         let cos2 = n_dot_h.squared();
         let sin2 = (h2 - cos2).max(T::zero());
         let alpha2 = alpha.squared();
+        if cos2.re() < LEAST_COS2 {
+            return T::zero();
+        }
         match self {
             Self::Beckmann => {
                 let slope2 = sin2 / (cos2 * alpha2);
-                // Refuses NaN as well, where the half vector vanishes.
-                if !(slope2.re() < 600.0) {
+                if slope2.re() > 600.0 {
                     return T::zero();
                 }
                 (-slope2).exp() * FRAC_1_PI / (alpha2 * cos2.squared())
             }
-            Self::Ggx => {
-                let d = (sin2 + alpha2 * cos2).squared();
-                if d.re() > 0.0 { alpha2 * FRAC_1_PI / d } else { T::zero() }
-            }
+            Self::Ggx => alpha2 * FRAC_1_PI / (sin2 + alpha2 * cos2).squared(),
         }
     }
 
@@ -82,6 +144,16 @@ impl Distribution {
             }
             Self::Ggx => self.masking(cos, alpha),
         }
+    }
+
+    /// `G1(wo) D(m) / (|h|⁴ n·wo)`, Smith's masking being exact: the density of visible normals
+    /// but for `m·wo` and the powers of |h|. Conventions of [`Distribution::facets`].
+    #[inline]
+    pub(super) fn visible_density(self, a: &Angles, index: f64, alpha: f64) -> f64 {
+        let contrast = 1.0 - index;
+        let h2 = contrast * contrast + index * a.h2;
+        let density = self.density(a.cos_o + index * a.cos_i, h2, alpha);
+        if density == 0.0 { 0.0 } else { density * self.exact_masking(a.cos_o, alpha) }
     }
 
     /// Draws a microfacet normal `m` as seen from `from` (`n·from > 0`), with density

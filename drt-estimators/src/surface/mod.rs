@@ -38,6 +38,8 @@ mod fresnel;
 mod microfacet;
 mod phong;
 mod property;
+#[cfg(test)]
+mod tests;
 mod visible_slope;
 
 use alloc::boxed::Box;

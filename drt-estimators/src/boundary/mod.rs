@@ -1,0 +1,488 @@
+//! The boundary term: visibility jumps where a segment of a path grazes an edge.
+//!
+//! With both ends free, one collapsed kernel serves every kind of end (theory sheet §4.2, from 2021
+//! paper, Eqs. 35–44): for an edge point x_B, a unit direction w from the source end S to the
+//! detector end D, the edge tangent t, N the unit normal of plane(t, w) on the side of the faces,
+//! and l = |x_B - x_S| / |x_D - x_S|,
+//!
+//! ```text
+//! ∫ dl(x_B) ∫ dσ(w) [dr_S] [dr_D] τ(x_S, x_D) |t×w| N·(u_B - (1-l) u_S - l u_D) Lout(S→D) Wout(D→S)
+//! ```
+//!
+//! It is linear in the velocities, which is why a sample is a [`Functional`] times light. Delta ends
+//! (camera, point and directional lights) replace dσ by 1/r² and drop their dr. The strategies:
+//!
+//! | strategy | edge | direction | S | D |
+//! |---|---|---|---|---|
+//! | [`primary`](Strategy::Primary) | silhouette from the camera | to the camera | behind the edge | camera |
+//! | [`direct`](Strategy::Direct) | any, or silhouette from the light | from a sampled light | the light | beyond |
+//! | [`indirect`](Strategy::Indirect) | any | drawn around the edge | traced | traced |
+//!
+//! `direct` and `indirect` both find area lights; they share them by the balance heuristic.
+
+pub(crate) mod border;
+mod edges;
+
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, Vec3};
+
+use edges::{EdgePoint, sine};
+pub(crate) use edges::{EdgeTable, collect, seen_along, seen_from};
+
+use crate::Error;
+use crate::emitter::{Emitter, EmitterGradient};
+use crate::sensitivity::{Functional, Rate};
+use crate::sensor::SensorGradient;
+use crate::transport::importance::Splat;
+use crate::transport::lights::{LightKind, LightTable};
+use crate::transport::trace::{Flight, Travel};
+use crate::transport::{Kind, RadianceBySegments, RayPath, SurfacePoint, Tracer, Vertex, World};
+
+/// How a boundary segment is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Strategy {
+    /// Between the camera and what lies behind an edge.
+    Primary,
+    /// Between an emitter and what it lights past an edge.
+    Direct,
+    /// Between any two vertices.
+    Indirect,
+}
+
+/// The edges of a scene, by what sees them.
+#[derive(Debug, Default)]
+pub(crate) struct Boundary {
+    /// All that can be grazed.
+    general: Option<EdgeTable>,
+    /// Silhouettes from the camera.
+    camera: Option<EdgeTable>,
+    /// Silhouettes from each delta light, by emitter.
+    lights: Vec<Option<EdgeTable>>,
+    /// Edges kept and edges in all.
+    pub(crate) count: [u64; 2],
+}
+
+/// What a sample's value is handed to.
+pub(crate) trait Receiver {
+    /// Evaluates how the sample's geometry moves; false when it does not, which ends the sample.
+    fn moves(&mut self, functional: &Functional) -> bool;
+    /// The last functional times `value` goes to `pixel`.
+    fn receive(&mut self, pixel: u32, value: Rgb);
+}
+
+/// One end of a boundary segment.
+struct End {
+    /// `None` when the ray escaped.
+    vertex: Option<Vertex>,
+    distance: f64,
+    weight: Rgb,
+    flight: Option<Flight>,
+}
+
+/// Reusable buffers of a boundary worker.
+#[derive(Debug, Default)]
+pub(crate) struct Buffers {
+    functional: Functional,
+    light: RadianceBySegments,
+    splats: Vec<Splat>,
+    ray: RayPath,
+}
+
+impl Boundary {
+    pub(crate) fn new(world: &World) -> Result<Self, Error> {
+        let (edges, all) = collect(world);
+        let general = EdgeTable::new(&edges, EdgeTable::general_weight)?;
+        let eye = world.camera.position();
+        let camera = EdgeTable::new(&edges, |e| seen_from(e, eye))?;
+        let lights = world
+            .scene
+            .emitters
+            .iter()
+            .map(|e| match e.item.emitter {
+                Emitter::Point { position, .. } | Emitter::Spot { position, .. } => {
+                    EdgeTable::new(&edges, |e| seen_from(e, position))
+                }
+                Emitter::Directional { direction, .. } => {
+                    EdgeTable::new(&edges, |e| seen_along(e, direction))
+                }
+                _ => Ok(None),
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self { count: [edges.len() as u64, all], general, camera, lights })
+    }
+
+    /// True when a strategy can find anything.
+    pub(crate) fn offers(&self, world: &World, strategy: Strategy) -> bool {
+        match strategy {
+            Strategy::Primary => self.camera.is_some(),
+            // One scattering vertex beyond the light, at least.
+            Strategy::Direct => {
+                world.max_depth >= 2
+                    && (self.lights.iter().any(Option::is_some)
+                        || (self.general.is_some() && world.lights.has_areas()))
+            }
+            Strategy::Indirect => world.max_depth >= 2 && self.general.is_some(),
+        }
+    }
+
+    /// Takes one sample.
+    pub(crate) fn sample<R: Receiver>(
+        &self,
+        strategy: Strategy,
+        tracer: &mut Tracer<'_>,
+        buffers: &mut Buffers,
+        receiver: &mut R,
+    ) {
+        tracer.counters.boundary_samples += 1;
+        let mut s = Sampler { boundary: self, tracer, b: buffers, receiver };
+        match strategy {
+            Strategy::Primary => s.primary(),
+            Strategy::Direct => s.direct(),
+            Strategy::Indirect => s.indirect(),
+        };
+    }
+}
+
+struct Sampler<'s, 'w, R> {
+    boundary: &'s Boundary,
+    tracer: &'s mut Tracer<'w>,
+    b: &'s mut Buffers,
+    receiver: &'s mut R,
+}
+
+impl<'w, R: Receiver> Sampler<'_, 'w, R> {
+    /// Camera segments: D is the pinhole.
+    fn primary(&mut self) -> Option<()> {
+        let world = self.tracer.world;
+        let at = self.boundary.camera.as_ref()?.sample(world, &mut self.tracer.rng);
+        let camera = &world.camera;
+        let d = camera.position() - at.x;
+        let distance = d.length();
+        let w = d / distance;
+        let n = at.edge.occluded_side(w)?;
+        let view = Vertex { x: at.x, medium: at.edge.medium(world, at.x), kind: Kind::Point };
+        let (_, transport) = self.tracer.see(&view)?;
+        // The camera's side must be open.
+        let tau = self.open(&at, view.medium, w, distance)?;
+        let s = self.end(&at, view.medium, -w, Rgb::ONE)?;
+        let l = self.share(&s, distance);
+        self.b.functional.items.clear();
+        self.edge_rate(&at, n);
+        self.end_rate(&s, n * -(1.0 - l));
+        let position = n * -l;
+        let gradient = SensorGradient { position, ..SensorGradient::default() };
+        self.b.functional.items.push(Rate::Sensor(gradient));
+        if !self.receiver.moves(&self.b.functional) {
+            return None;
+        }
+        let light = self.light_from(&s, w, world.max_depth.checked_sub(1)?);
+        let value = light * s.weight * tau * (sine(at.edge, w) * at.inv_pdf * transport);
+        if value.is_zero() {
+            return None;
+        }
+        let pixel = camera.pinhole().project(at.x).pixel;
+        let width = camera.film()[0];
+        for p in camera.footprint(pixel) {
+            self.receiver.receive(p.pixel[1] * width + p.pixel[0], value * p.weight);
+        }
+        Some(())
+    }
+
+    /// Segments that start on a sampled light.
+    fn direct(&mut self) -> Option<()> {
+        let world = self.tracer.world;
+        let choice = world.lights.choose(&mut self.tracer.rng)?;
+        if let Some(emitter) = choice.delta {
+            return self.delta(emitter, choice.pmf);
+        }
+        if !choice.is_area {
+            return None;
+        }
+        let general = self.boundary.general.as_ref()?;
+        let at = general.sample(world, &mut self.tracer.rng);
+        let light = world.lights.sample_area(world, &choice, at.x, &mut self.tracer.rng)?;
+        let LightKind::Area(emitting) = light.kind else { return None };
+        let w = -light.w;
+        let n = at.edge.occluded_side(w)?;
+        let medium = at.edge.medium(world, at.x);
+        let tau = self.open_to(&at, medium, light.w, &emitting)?;
+        let vertex = Vertex { x: light.y, medium: None, kind: Kind::Surface(emitting) };
+        let mis = light.pdf / (light.pdf + at.edge.direction_pdf(w));
+        let s = End {
+            vertex: Some(vertex),
+            distance: light.distance,
+            weight: tau * (mis * light.inv_pdf),
+            flight: None,
+        };
+        self.b.light.0.clear();
+        self.b.light.0.push(world.emitted(&emitting, w));
+        let scale = sine(at.edge, w) * at.inv_pdf;
+        self.detector(&at, medium, w, n, &s, scale)
+    }
+
+    /// Segments that start on a point, spot or directional light.
+    fn delta(&mut self, emitter: usize, pmf: f64) -> Option<()> {
+        let world = self.tracer.world;
+        let table = self.boundary.lights.get(emitter)?.as_ref()?;
+        let at = table.sample(world, &mut self.tracer.rng);
+        let light = LightTable::delta(world, emitter, at.x, pmf)?;
+        let w = -light.w;
+        let n = at.edge.occluded_side(w)?;
+        let medium = at.edge.medium(world, at.x);
+        let tau = self.open(&at, medium, light.w, light.distance)?;
+        let s = End {
+            vertex: None,
+            distance: light.distance,
+            weight: tau * light.inv_pdf,
+            flight: None,
+        };
+        self.b.light.0.clear();
+        self.b.light.0.push(light.value);
+        let scale = sine(at.edge, w) * at.inv_pdf;
+        let beyond = self.beyond(&at, medium, w, s.weight);
+        for d in beyond.into_iter().flatten() {
+            let l = self.share(&s, d.0.distance);
+            self.b.functional.items.clear();
+            self.edge_rate(&at, n);
+            let gradient = match light.kind {
+                LightKind::Position => {
+                    EmitterGradient { position: n * -(1.0 - l), ..EmitterGradient::default() }
+                }
+                _ => EmitterGradient { direction: n * d.0.distance, ..EmitterGradient::default() },
+            };
+            self.b.functional.items.push(Rate::Emitter(emitter, gradient));
+            self.end_rate(&d.0, n * -l);
+            self.deliver(&d.0, d.1, w, s.weight * scale);
+        }
+        Some(())
+    }
+
+    /// Segments in a drawn direction.
+    fn indirect(&mut self) -> Option<()> {
+        let world = self.tracer.world;
+        let at = self.boundary.general.as_ref()?.sample(world, &mut self.tracer.rng);
+        let (w, inv_pdf) = at.edge.sample_direction(&mut self.tracer.rng);
+        let n = at.edge.occluded_side(w)?;
+        let medium = at.edge.medium(world, at.x);
+        let s = self.end(&at, medium, -w, Rgb::ONE)?;
+        let scale = sine(at.edge, w) * at.inv_pdf * inv_pdf;
+        let mut lit = false;
+        let beyond = self.beyond(&at, medium, w, s.weight);
+        for (d, only_camera) in beyond.into_iter().flatten() {
+            let l = self.share(&s, d.distance);
+            self.b.functional.items.clear();
+            self.edge_rate(&at, n);
+            self.end_rate(&s, n * -(1.0 - l));
+            self.end_rate(&d, n * -l);
+            if !self.receiver.moves(&self.b.functional) {
+                continue;
+            }
+            if !lit {
+                self.light_from(&s, w, world.max_depth.checked_sub(2)?);
+                self.share_emission(&s, w, 1.0 / inv_pdf);
+                lit = true;
+            }
+            self.deliver(&d, only_camera, w, s.weight * scale);
+        }
+        Some(())
+    }
+
+    /// Takes from the emission of S what light sampling finds as well.
+    fn share_emission(&mut self, s: &End, w: Vec3, pdf: f64) {
+        let world = self.tracer.world;
+        if let Some(Vertex { kind: Kind::Surface(point), .. }) = &s.vertex
+            && let Some(emitted) = self.b.light.0.first_mut()
+        {
+            let other = world.lights.area_pdf(point, -w, s.distance);
+            *emitted *= pdf / (pdf + other);
+        }
+    }
+
+    /// The detector's end for an area light: one kernel, however D is found.
+    fn detector(
+        &mut self,
+        at: &EdgePoint<'_>,
+        medium: Option<usize>,
+        w: Vec3,
+        n: Vec3,
+        s: &End,
+        scale: f64,
+    ) -> Option<()> {
+        let beyond = self.beyond(at, medium, w, s.weight);
+        for (d, only_camera) in beyond.into_iter().flatten() {
+            let l = self.share(s, d.distance);
+            self.b.functional.items.clear();
+            self.edge_rate(at, n);
+            self.end_rate(s, n * -(1.0 - l));
+            self.end_rate(&d, n * -l);
+            self.deliver(&d, only_camera, w, s.weight * scale);
+        }
+        Some(())
+    }
+
+    /// Detector ends: where free flight stops, and a point placed towards a camera in the medium,
+    /// which is connected to the camera alone.
+    fn beyond(
+        &mut self,
+        at: &EdgePoint<'_>,
+        medium: Option<usize>,
+        w: Vec3,
+        channels: Rgb,
+    ) -> [Option<(End, bool)>; 2] {
+        let mut ray = core::mem::take(&mut self.b.ray);
+        let (faces, counters) = (at.edge.faces, &mut self.tracer.counters);
+        self.tracer.world.cast_past(at.x, faces, medium, w, &mut ray, counters);
+        let span = self.tracer.camera_span(&ray);
+        let placed = self.tracer.equiangular_to_camera(at.x, w, &ray, span).map(|v| {
+            let end =
+                End { vertex: Some(v.vertex), distance: v.t, weight: v.arrival, flight: None };
+            (end, true)
+        });
+        let flown = self.arrive(at, w, &ray, channels, span).map(|end| (end, false));
+        self.b.ray = ray;
+        [flown, placed]
+    }
+
+    /// Follows a ray from the edge and stops by free flight.
+    fn end(
+        &mut self,
+        at: &EdgePoint<'_>,
+        medium: Option<usize>,
+        w: Vec3,
+        channels: Rgb,
+    ) -> Option<End> {
+        let mut ray = core::mem::take(&mut self.b.ray);
+        let (faces, counters) = (at.edge.faces, &mut self.tracer.counters);
+        self.tracer.world.cast_past(at.x, faces, medium, w, &mut ray, counters);
+        let end = self.arrive(at, w, &ray, channels, None);
+        self.b.ray = ray;
+        end
+    }
+
+    fn arrive(
+        &mut self,
+        at: &EdgePoint<'_>,
+        w: Vec3,
+        ray: &RayPath,
+        channels: Rgb,
+        span: Option<(f64, f64)>,
+    ) -> Option<End> {
+        match self.tracer.travel(at.x, w, ray, channels) {
+            Travel::Volume(v) => Some(End {
+                vertex: Some(v.vertex),
+                distance: v.t,
+                weight: v.arrival,
+                flight: span.map(|span| v.flight(span, at.x, w)),
+            }),
+            Travel::Surface(point, x, weight) => {
+                let medium = ray.crossings.last().map_or(ray.medium, |c| c.after);
+                let vertex = Vertex { x, medium, kind: Kind::Surface(point) };
+                Some(End { vertex: Some(vertex), distance: ray.length, weight, flight: None })
+            }
+            Travel::Escape(weight) => {
+                Some(End { vertex: None, distance: f64::INFINITY, weight, flight: None })
+            }
+            Travel::Absorbed => None,
+        }
+    }
+
+    /// Transmittance from the edge to a point at `distance`, if nothing blocks.
+    fn open(
+        &mut self,
+        at: &EdgePoint<'_>,
+        medium: Option<usize>,
+        w: Vec3,
+        distance: f64,
+    ) -> Option<Rgb> {
+        let mut ray = core::mem::take(&mut self.b.ray);
+        let world = self.tracer.world;
+        world.cast_past(at.x, at.edge.faces, medium, w, &mut ray, &mut self.tracer.counters);
+        let open = ray.length >= distance;
+        let mut tau = None;
+        if open {
+            ray.cut(distance);
+            let tracer = &mut *self.tracer;
+            tau = Some(world.transmittance(at.x, w, &ray, &mut tracer.rng, &mut tracer.counters));
+        }
+        self.b.ray = ray;
+        tau
+    }
+
+    /// Transmittance from the edge to a surface point, if that is what the ray meets.
+    fn open_to(
+        &mut self,
+        at: &EdgePoint<'_>,
+        medium: Option<usize>,
+        w: Vec3,
+        target: &SurfacePoint,
+    ) -> Option<Rgb> {
+        let mut ray = core::mem::take(&mut self.b.ray);
+        let world = self.tracer.world;
+        world.cast_past(at.x, at.edge.faces, medium, w, &mut ray, &mut self.tracer.counters);
+        let mut tau = None;
+        if ray.end.as_ref().is_some_and(|(p, _)| p.prim == target.prim) {
+            let tracer = &mut *self.tracer;
+            tau = Some(world.transmittance(at.x, w, &ray, &mut tracer.rng, &mut tracer.counters));
+        }
+        self.b.ray = ray;
+        tau
+    }
+
+    /// l = |x_B - x_S| / |x_D - x_S|; 1 when S is a direction.
+    fn share(&self, s: &End, to_detector: f64) -> f64 {
+        if s.distance.is_finite() { s.distance / (s.distance + to_detector) } else { 1.0 }
+    }
+
+    fn edge_rate(&mut self, at: &EdgePoint<'_>, n: Vec3) {
+        self.b.functional.items.push(Rate::Surface(at.point, n));
+    }
+
+    fn end_rate(&mut self, end: &End, n: Vec3) {
+        let Some(v) = &end.vertex else { return };
+        match (&v.kind, v.medium) {
+            (Kind::Surface(p), _) => self.b.functional.items.push(Rate::Surface(*p, n)),
+            (Kind::Volume(_), Some(m)) => self.b.functional.items.push(Rate::Volume(m, v.x, n)),
+            _ => {}
+        }
+    }
+
+    /// Light that leaves S along `w` over at most `longest` segments, kept by segments.
+    fn light_from(&mut self, s: &End, w: Vec3, longest: u32) -> Rgb {
+        self.b.light.0.clear();
+        match s.vertex {
+            Some(vertex) => {
+                let own = self.tracer.max_segments;
+                self.tracer.max_segments = u32::min(own, longest);
+                self.tracer.from_vertex(vertex, w, &mut self.b.light);
+                self.tracer.max_segments = own;
+            }
+            None => {
+                let sky = self.tracer.world.lights.environment();
+                self.b.light.0.push(sky.map_or(Rgb::ZERO, |(_, l)| l));
+            }
+        }
+        self.b.light.within(longest)
+    }
+
+    /// Walks from D to the camera and hands on what arrives.
+    fn deliver(&mut self, d: &End, only_camera: bool, w: Vec3, value: Rgb) {
+        let Some(vertex) = d.vertex else { return };
+        if !self.receiver.moves(&self.b.functional) {
+            return;
+        }
+        let world = self.tracer.world;
+        // Camera segments beyond D, with one more for the boundary segment itself.
+        let longest = world.max_depth - 1;
+        let longest = if only_camera { u32::min(longest, 1) } else { longest };
+        self.b.splats.clear();
+        self.tracer.importance(vertex, -w, longest, d.flight, &mut self.b.splats);
+        for s in &self.b.splats {
+            let light = self.b.light.within(world.max_depth - 1 - s.segments);
+            let v = value * d.weight * light * s.value;
+            if !v.is_zero() {
+                self.receiver.receive(s.pixel, v);
+            }
+        }
+    }
+}

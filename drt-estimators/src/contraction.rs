@@ -1,0 +1,127 @@
+//! Forward mode: sensitivities contracted with the tangents of N parameters, one dot product each.
+
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, RgbVec, Vec3};
+
+use crate::emitter::EmitterGradient;
+use crate::inside::Insides;
+use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint};
+use crate::sensor::SensorGradient;
+use crate::surface::BsdfParams;
+use crate::tangents::Tangents;
+use crate::transport::{SurfacePoint, World};
+
+/// Everything that changes with the parameters.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Motion {
+    pub(crate) tangents: Tangents,
+    pub(crate) insides: Insides,
+    pub(crate) interest: Interest,
+}
+
+impl Motion {
+    pub(crate) fn new(tangents: Tangents, insides: Insides) -> Self {
+        fn some<T>(lists: &[Vec<T>]) -> Vec<bool> {
+            lists.iter().map(|l| !l.is_empty()).collect()
+        }
+        let interest = Interest {
+            shapes: some(&tangents.shapes),
+            volumes: some(&insides.volumes),
+            media: some(&tangents.media),
+            bsdfs: some(&tangents.bsdfs),
+            emitters: some(&tangents.emitters),
+            moving_emitters: tangents
+                .emitters
+                .iter()
+                .map(|l| l.iter().any(|(_, t)| t.moves()))
+                .collect(),
+            sensor: !tangents.sensor.is_empty(),
+        };
+        Self { tangents, insides, interest }
+    }
+
+    pub(crate) fn parameters(&self) -> usize {
+        self.tangents.names.len()
+    }
+}
+
+/// The derivative of one value by every parameter.
+pub(crate) struct Contraction<'a> {
+    world: &'a World,
+    motion: &'a Motion,
+    pub(crate) rates: Vec<Rgb>,
+}
+
+impl<'a> Contraction<'a> {
+    pub(crate) fn new(world: &'a World, motion: &'a Motion) -> Self {
+        Self { world, motion, rates: alloc::vec![Rgb::ZERO; motion.parameters()] }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.rates.fill(Rgb::ZERO);
+    }
+
+    /// The rates of a functional, one number per parameter; false when all vanish.
+    pub(crate) fn evaluate(&mut self, functional: &Functional) -> bool {
+        self.clear();
+        functional.send(Rgb::new(1.0, 0.0, 0.0), self);
+        self.rates.iter().any(|r| r.r != 0.0)
+    }
+}
+
+impl AdjointSink for Contraction<'_> {
+    fn interest(&self) -> &Interest {
+        &self.motion.interest
+    }
+
+    fn surface(&mut self, point: &SurfacePoint, adjoint: &SurfaceAdjoint) {
+        let motions = &self.motion.tangents.shapes[point.shape as usize];
+        if motions.is_empty() {
+            return;
+        }
+        let mesh = &self.world.scene.shapes[point.shape as usize].mesh;
+        let at = drt_motion::SurfacePoint { triangle: point.triangle, bary: point.bary };
+        let element = drt_motion::SurfaceElement::new(mesh, &at);
+        for (p, motion) in motions {
+            let jet = motion.jet_of(&element);
+            self.rates[*p] += adjoint.u.dot(jet.u)
+                + adjoint.n.dot(jet.n_dot)
+                + adjoint.ns.dot(jet.ns_dot)
+                + adjoint.j * jet.j_dot;
+        }
+    }
+
+    fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb) {
+        for (p, motion) in &self.motion.insides.volumes[medium] {
+            let jet = motion.jet(x);
+            self.rates[*p] += u.dot(jet.u) + j * jet.j_dot;
+        }
+    }
+
+    fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
+        for (p, tangent) in &self.motion.tangents.media[medium] {
+            self.rates[*p] += adjoint.dot(&tangent.rates(self.world.medium(medium), x));
+        }
+    }
+
+    fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
+        for (p, tangent) in &self.motion.tangents.bsdfs[bsdf] {
+            self.rates[*p] += params.dot(tangent) * weight;
+        }
+    }
+
+    fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]) {
+        for (p, tangent) in &self.motion.tangents.emitters[emitter] {
+            let rates: [f64; 3] = core::array::from_fn(|c| gradient[c].dot(tangent));
+            self.rates[*p] += Rgb::from(rates);
+        }
+    }
+
+    fn sensor(&mut self, gradient: &[SensorGradient; 3]) {
+        for (p, tangent) in &self.motion.tangents.sensor {
+            let rates: [f64; 3] = core::array::from_fn(|c| gradient[c].dot(tangent));
+            self.rates[*p] += Rgb::from(rates);
+        }
+    }
+}

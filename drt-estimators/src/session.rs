@@ -1,0 +1,448 @@
+//! A run: a scene prepared once, sampled in passes, with its results available at any time.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::cell::Cell;
+
+use drt_motion::Parameter;
+
+use crate::boundary::{Boundary, Strategy};
+use crate::contraction::Motion;
+use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm, Tile};
+use crate::flux::Flux;
+use crate::inside;
+use crate::interior::PixelSampler;
+use crate::parallel::Pool;
+use crate::plan::{MediumPlan, Plan};
+use crate::rendering::{Counters, Derivative, Layer, NonFinite, Rendering, Term};
+use crate::scene::Scene;
+use crate::settings::Settings;
+use crate::splatting::{Account, Checked, Source, Splatter, ToImages};
+use crate::tangents;
+use crate::transport::World;
+use crate::{Error, Estimate};
+
+/// Pixels of a tile.
+const TILE: u32 = 256;
+/// Non-finite contributions that are described one by one.
+const DESCRIBED: usize = 16;
+
+/// Watches and steers a run. Every method has a default that does nothing.
+pub trait Control: Sync {
+    /// True to stop soon; what is finished is kept.
+    fn cancelled(&self) -> bool {
+        false
+    }
+    /// Called with the part of the current call to [`Session::run`] that is done, from 0 to 1.
+    fn progress(&self, _done: f64) {}
+    /// Called with each finished piece of the image, in order.
+    fn tile(&self, _tile: &FinishedTile<'_>) {}
+}
+
+/// No control: run to the end in silence.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unattended;
+impl Control for Unattended {}
+
+/// Some neighbouring pixels after another round of samples.
+#[derive(Clone, Copy, Debug)]
+pub struct FinishedTile<'a> {
+    /// First pixel and one past the last, row by row from the top left.
+    pub pixels: (u32, u32),
+    /// The forward image there so far.
+    pub image: &'a [Estimate],
+}
+
+/// A prepared scene and what has been accumulated for it.
+pub struct Session {
+    world: World,
+    motion: Option<Motion>,
+    boundary: Boundary,
+    flux: Option<Flux>,
+    sources: Vec<Source>,
+    settings: Settings,
+    plan: Plan,
+    blocks: Blocks,
+    pixels: PixelFilm,
+    splats: Vec<SplatFilm>,
+    counters: Counters,
+    non_finite: Vec<NonFinite>,
+    non_finite_count: u64,
+    samples: u32,
+    passes: u32,
+    complete: bool,
+    pool: Pool,
+}
+
+impl Session {
+    /// Prepares `scene` at the parameters' values; without parameters, only the image is computed.
+    ///
+    /// # Errors
+    /// When an effect does not fit its target, or the scene or a setting is unusable.
+    pub fn new(
+        scene: &Scene,
+        parameters: &[Parameter],
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        check(settings)?;
+        scene.check()?;
+        let (scene, tangents) = tangents::apply(scene, parameters, settings.sensor)?;
+        let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
+        let mut world = World::new(scene, settings.sensor, depth)?;
+        let motion = (!parameters.is_empty()).then(|| {
+            let insides = inside::plan(&world, &tangents);
+            Motion::new(tangents, insides)
+        });
+        if let Some(motion) = &motion {
+            world.prepare_for_derivatives(motion);
+        }
+        let moving = motion.as_ref().is_some_and(|m| m.interest.moves_geometry());
+        let boundary = if moving { Boundary::new(&world)? } else { Boundary::default() };
+        let flux = match &motion {
+            Some(m) => Flux::new(&world, &m.insides.flux_shapes)?,
+            None => None,
+        };
+        let sources = sources(&world, &boundary, flux.as_ref(), moving);
+        let plan = describe(&world, motion.as_ref(), &boundary, &sources, settings);
+        let size = world.camera.film();
+        let parameters = motion.as_ref().map_or(0, Motion::parameters);
+        let layers = PixelSampler::layers(parameters, settings.terms && flux.is_some());
+        Ok(Self {
+            blocks: Blocks::new(size),
+            pixels: PixelFilm::new(size, layers),
+            splats: sources.iter().map(|_| SplatFilm::new(size, parameters)).collect(),
+            pool: Pool::new(settings.threads),
+            settings: settings.clone(),
+            counters: Counters::default(),
+            non_finite: Vec::new(),
+            non_finite_count: 0,
+            samples: 0,
+            passes: 0,
+            complete: true,
+            world,
+            motion,
+            boundary,
+            flux,
+            sources,
+            plan,
+        })
+    }
+
+    /// What will run and what is skipped.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Adds `spp` samples per pixel, and boundary samples in proportion. Returns false when `control`
+    /// cancelled it; the result then holds what was finished.
+    pub fn run(&mut self, spp: u32, control: &dyn Control) -> bool {
+        let per_unit = if self.plan.antithetic { 2 } else { 1 };
+        let units = spp.div_ceil(per_unit);
+        // The share of the work that is done when the pixels are.
+        let share = if self.sources.is_empty() { 1.0 } else { 0.5 };
+        let slice = (units / 16).clamp(1, 32);
+        let mut done = 0;
+        let mut going = true;
+        while done < units && going {
+            let n = u32::min(slice, units - done);
+            let before = f64::from(done) / f64::from(units);
+            going = self.run_pixels(n, control, |part| {
+                control.progress(share * (before + part * f64::from(n) / f64::from(units)));
+            });
+            if going {
+                done += n;
+                self.samples += n * per_unit;
+            }
+        }
+        for i in 0..self.sources.len() {
+            if going {
+                let n = self.sources.len() as f64;
+                going = self.run_splats(i, spp, control, |part| {
+                    control.progress(share + (1.0 - share) * (i as f64 + part) / n);
+                });
+            }
+        }
+        self.passes += 1;
+        self.complete &= going;
+        going
+    }
+
+    /// Samples every pixel `units` times more.
+    fn run_pixels(&mut self, units: u32, control: &dyn Control, progress: impl Fn(f64)) -> bool {
+        let [w, h] = self.world.camera.film();
+        let count = w * h;
+        let tiles = count.div_ceil(TILE);
+        let parameters = self.motion.as_ref().map_or(0, Motion::parameters);
+        let separate = self.settings.terms && self.flux.is_some();
+        let layers = PixelSampler::layers(parameters, separate);
+        let first = self.pixels.units();
+        let (world, motion, flux) = (&self.world, self.motion.as_ref(), self.flux.as_ref());
+        let (settings, blocks) = (&self.settings, &self.blocks);
+        let antithetic = self.plan.antithetic;
+        let mut finished = Vec::with_capacity(tiles as usize);
+        let cancelled = Cell::new(false);
+        self.pool.ordered(
+            0..tiles,
+            4,
+            |t| {
+                let range = t * TILE..u32::min(count, (t + 1) * TILE);
+                let mut tile = Tile::new(range.clone(), layers);
+                let mut sampler =
+                    PixelSampler::new(world, motion, flux, settings.seed, antithetic, separate);
+                let mut values = alloc::vec![drt_math::Rgb::ZERO; layers];
+                for pixel in range {
+                    for unit in first..first + units {
+                        sampler.sample(pixel, unit, &mut values);
+                        tile.push(blocks, pixel, unit, &values);
+                    }
+                }
+                let counters = sampler.counters();
+                let account = Account {
+                    counters,
+                    non_finite: sampler.non_finite,
+                    non_finite_count: sampler.non_finite_count,
+                };
+                (tile, account)
+            },
+            |t, result| {
+                finished.push(result);
+                progress(f64::from(t + 1) / f64::from(tiles));
+                cancelled.set(control.cancelled());
+                !cancelled.get()
+            },
+        );
+        // A round that was cut short would leave pixels with different numbers of samples.
+        if cancelled.get() && finished.len() < tiles as usize {
+            return false;
+        }
+        self.pixels.advance(units);
+        for (tile, account) in finished {
+            self.pixels.merge(&tile);
+            self.account(account);
+            let image = self.pixels.estimates(tile.pixels.clone());
+            let pixels = (tile.pixels.start, tile.pixels.end);
+            control.tile(&FinishedTile { pixels, image: &image });
+        }
+        !cancelled.get()
+    }
+
+    /// Samples one splatted source in as many batches as error bars need.
+    fn run_splats(
+        &mut self,
+        i: usize,
+        spp: u32,
+        control: &dyn Control,
+        progress: impl Fn(f64),
+    ) -> bool {
+        let Some(motion) = &self.motion else { return true };
+        let [w, h] = self.world.camera.film();
+        let source = self.sources[i];
+        let ratio = self
+            .settings
+            .boundary_spp
+            .map_or(1.0, |b| f64::from(b) / f64::from(self.settings.spp.max(1)));
+        let samples = f64::from(spp) * ratio * f64::from(w) * f64::from(h);
+        let per_batch = (samples / (self.sources.len() * BATCHES) as f64).max(1.0) as u32;
+        let splatter = Splatter {
+            world: &self.world,
+            boundary: &self.boundary,
+            flux: self.flux.as_ref(),
+            seed: self.settings.seed,
+        };
+        let mut pass = self.splats[i].begin();
+        let first = self.passes * BATCHES as u32;
+        let blocks = &self.blocks;
+        let mut accounts = Vec::new();
+        let going = self.pool.ordered(
+            first..first + BATCHES as u32,
+            1,
+            |b| {
+                let mut receiver = Checked::new(ToImages::new(&self.world, motion));
+                let stream = source.stream() + u64::from(b);
+                let account = splatter.run(source, stream, per_batch, &mut receiver);
+                (receiver.inner.splats, account)
+            },
+            |b, (splats, account)| {
+                pass.add(&splats, f64::from(per_batch), blocks);
+                accounts.push(account);
+                progress(f64::from(b - first + 1) / BATCHES as f64);
+                !control.cancelled()
+            },
+        );
+        let finished = accounts.len() as f64 * f64::from(per_batch);
+        self.splats[i].finish(&pass, finished);
+        for account in accounts {
+            self.account(account);
+        }
+        going
+    }
+
+    fn account(&mut self, account: Account) {
+        self.counters.add(&account.counters);
+        self.non_finite_count += account.non_finite_count;
+        let room = DESCRIBED.saturating_sub(self.non_finite.len());
+        self.non_finite.extend(account.non_finite.into_iter().take(room));
+    }
+
+    /// The images so far.
+    #[must_use]
+    pub fn rendering(&self) -> Rendering {
+        Rendering {
+            image: self.pixels.layer(0, &self.blocks),
+            derivatives: self.derivatives(),
+            plan: self.plan.clone(),
+            counters: self.counters,
+            non_finite: self.non_finite_count,
+            non_finite_examples: self.non_finite.clone(),
+            spp: self.samples,
+            complete: self.complete,
+        }
+    }
+
+    fn derivatives(&self) -> Vec<Derivative> {
+        let Some(motion) = &self.motion else { return Vec::new() };
+        let n = motion.parameters();
+        let separate = self.settings.terms && self.flux.is_some();
+        (0..n)
+            .map(|p| {
+                let mut parts =
+                    alloc::vec![(Term::Interior, self.pixels.layer(1 + p, &self.blocks))];
+                if separate {
+                    parts.push((Term::Flux, self.pixels.layer(1 + n + p, &self.blocks)));
+                }
+                for (source, film) in self.sources.iter().zip(&self.splats) {
+                    parts.push((source.term(), film.layer(p)));
+                }
+                let total = sum(parts.iter().map(|(_, l)| l)).unwrap_or_else(|| parts[0].1.clone());
+                let mut terms = Vec::new();
+                if self.settings.terms {
+                    for term in Term::ALL {
+                        let own = parts.iter().filter(|(t, _)| *t == term).map(|(_, l)| l);
+                        terms.extend(sum(own).map(|l| (term, l)));
+                    }
+                }
+                Derivative { name: motion.tangents.names[p].clone(), total, terms }
+            })
+            .collect()
+    }
+}
+
+fn sum<'a>(layers: impl Iterator<Item = &'a Layer>) -> Option<Layer> {
+    layers.fold(None, |sum, l| {
+        Some(match sum {
+            None => l.clone(),
+            Some(s) => s.plus(l),
+        })
+    })
+}
+
+fn check(settings: &Settings) -> Result<(), Error> {
+    if !(settings.step > 0.0 && settings.step.is_finite()) {
+        return Err(Error::Setting {
+            setting: "step".into(),
+            reason: alloc::format!("is {}; expected a positive number", settings.step),
+        });
+    }
+    Ok(())
+}
+
+/// The splatted sources that can contribute.
+fn sources(world: &World, boundary: &Boundary, flux: Option<&Flux>, moving: bool) -> Vec<Source> {
+    let mut sources = Vec::new();
+    if moving {
+        for strategy in [Strategy::Primary, Strategy::Direct, Strategy::Indirect] {
+            if boundary.offers(world, strategy) {
+                sources.push(Source::Edges(strategy));
+            }
+        }
+        if !world.camera.filter().is_continuous() {
+            sources.push(Source::Borders);
+        }
+    }
+    if flux.is_some() && world.max_depth >= 3 {
+        sources.push(Source::Flux);
+    }
+    sources
+}
+
+fn describe(
+    world: &World,
+    motion: Option<&Motion>,
+    boundary: &Boundary,
+    sources: &[Source],
+    settings: &Settings,
+) -> Plan {
+    let has = |s: Source| sources.contains(&s);
+    let mut plan = Plan {
+        media: world
+            .scene
+            .media
+            .iter()
+            .enumerate()
+            .map(|(i, _)| medium_plan(world, motion, i))
+            .collect(),
+        edges: boundary.count,
+        primary: has(Source::Edges(Strategy::Primary)),
+        direct: has(Source::Edges(Strategy::Direct)),
+        indirect: has(Source::Edges(Strategy::Indirect)),
+        borders: has(Source::Borders),
+        ..Plan::default()
+    };
+    let mut skip = |what: &str| plan.skipped.push(String::from(what));
+    if !world.has_media() {
+        skip("tracking: the scene has no media");
+    }
+    let Some(motion) = motion else {
+        skip("derivatives: there are no parameters");
+        return plan;
+    };
+    if !motion.interest.moves_geometry() {
+        skip("boundary terms: no parameter moves geometry");
+    }
+    if motion.insides.flux_shapes.is_empty() {
+        skip("flux: every inside follows its surfaces");
+    }
+    plan.record = motion.interest.any();
+    // The filter's rate is what mirrored pairs cancel; without it they only cost.
+    plan.antithetic = settings.antithetic
+        && motion.interest.moves_geometry()
+        && world.camera.filter().is_continuous();
+    plan.moving_shapes = motion
+        .interest
+        .shapes
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| **m)
+        .map(|(i, _)| world.shape_name(i))
+        .collect();
+    plan.flux_shapes = motion.insides.flux_shapes.iter().map(|s| world.shape_name(*s)).collect();
+    plan
+}
+
+fn medium_plan(world: &World, motion: Option<&Motion>, i: usize) -> MediumPlan {
+    let item = &world.scene.media[i];
+    let tracking = match item.item.homogeneous() {
+        Some(_) => "closed form",
+        None => "delta tracking",
+    };
+    let motions = motion.map_or_else(Vec::new, |m| {
+        m.insides.flux[i]
+            .iter()
+            .map(|(p, flux)| {
+                let moving = m.insides.volumes[i].iter().any(|(q, _)| q == p);
+                let how = match (moving, flux) {
+                    (true, false) => "affine",
+                    (true, true) => "affine with flux",
+                    (false, _) => "static with flux",
+                };
+                (m.tangents.names[*p].clone(), String::from(how))
+            })
+            .collect()
+    });
+    MediumPlan {
+        medium: item.id.clone().unwrap_or_else(|| alloc::format!("medium[{i}]")),
+        tracking: tracking.into(),
+        motion: motions,
+    }
+}

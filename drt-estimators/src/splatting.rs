@@ -1,0 +1,173 @@
+//! Terms whose samples land anywhere on the film: boundary segments, pixel borders and flux.
+
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, Rng};
+
+use crate::boundary::{self, Boundary, Receiver, Strategy};
+use crate::contraction::{Contraction, Motion};
+use crate::film::Splats;
+use crate::flux::{self, Flux};
+use crate::rendering::{Counters, NonFinite, Term};
+use crate::sensitivity::Functional;
+use crate::transport::{Tracer, World};
+
+/// A splatted source of derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Source {
+    /// Boundary segments found by a strategy.
+    Edges(Strategy),
+    /// Jumps of a box filter.
+    Borders,
+    /// Flux through moving surfaces, seen indirectly.
+    Flux,
+}
+
+impl Source {
+    pub(crate) fn term(self) -> Term {
+        match self {
+            Self::Edges(Strategy::Primary) | Self::Borders => Term::Primary,
+            Self::Edges(Strategy::Direct) => Term::Direct,
+            Self::Edges(Strategy::Indirect) => Term::Indirect,
+            Self::Flux => Term::Flux,
+        }
+    }
+
+    /// Tells the source's random numbers apart from all others.
+    pub(crate) fn stream(self) -> u64 {
+        let id = match self {
+            Self::Edges(Strategy::Primary) => 1,
+            Self::Edges(Strategy::Direct) => 2,
+            Self::Edges(Strategy::Indirect) => 3,
+            Self::Borders => 4,
+            Self::Flux => 5,
+        };
+        id << 40
+    }
+}
+
+/// What splatted terms are sampled from.
+pub(crate) struct Splatter<'a> {
+    pub(crate) world: &'a World,
+    pub(crate) boundary: &'a Boundary,
+    pub(crate) flux: Option<&'a Flux>,
+    pub(crate) seed: u64,
+}
+
+/// What a batch of splats leaves besides its images.
+pub(crate) struct Account {
+    pub(crate) counters: Counters,
+    pub(crate) non_finite: Vec<NonFinite>,
+    pub(crate) non_finite_count: u64,
+}
+
+impl Splatter<'_> {
+    /// Samples `count` times from a source and hands everything to `receiver`. The stream is unique
+    /// to the batch.
+    pub(crate) fn run<R: Receiver>(
+        &self,
+        source: Source,
+        stream: u64,
+        count: u32,
+        receiver: &mut Checked<R>,
+    ) -> Account {
+        let mut tracer = Tracer::new(self.world);
+        let mut edges = boundary::Buffers::default();
+        let mut flux = flux::Buffers::default();
+        receiver.term = Some(source.term());
+        receiver.seed = self.seed;
+        receiver.stream = stream;
+        for index in 0..count {
+            tracer.rng = Rng::new(self.seed, stream, index);
+            receiver.index = index;
+            match source {
+                Source::Edges(strategy) => {
+                    self.boundary.sample(strategy, &mut tracer, &mut edges, receiver);
+                }
+                Source::Borders => {
+                    boundary::border::sample(&mut tracer, &mut edges, receiver);
+                }
+                Source::Flux => {
+                    if let Some(f) = self.flux {
+                        f.sample(&mut tracer, &mut flux, receiver);
+                    }
+                }
+            }
+        }
+        Account {
+            counters: tracer.counters,
+            non_finite: core::mem::take(&mut receiver.found),
+            non_finite_count: receiver.count,
+        }
+    }
+}
+
+/// Passes finite values on; counts and describes the others.
+pub(crate) struct Checked<R> {
+    pub(crate) inner: R,
+    term: Option<Term>,
+    seed: u64,
+    stream: u64,
+    index: u32,
+    found: Vec<NonFinite>,
+    count: u64,
+}
+
+impl<R> Checked<R> {
+    pub(crate) fn new(inner: R) -> Self {
+        Self { inner, term: None, seed: 0, stream: 0, index: 0, found: Vec::new(), count: 0 }
+    }
+}
+
+impl<R: Receiver> Receiver for Checked<R> {
+    fn moves(&mut self, functional: &Functional) -> bool {
+        self.inner.moves(functional)
+    }
+
+    fn receive(&mut self, pixel: u32, value: Rgb) {
+        if value.is_finite() {
+            self.inner.receive(pixel, value);
+            return;
+        }
+        self.count += 1;
+        if self.found.len() < 8 {
+            self.found.push(NonFinite {
+                term: self.term,
+                seed: self.seed,
+                stream: self.stream,
+                index: self.index,
+                bounces: 0,
+                primitive: None,
+            });
+        }
+    }
+}
+
+/// Forward mode: adds each parameter's derivative to its image.
+pub(crate) struct ToImages<'a> {
+    contraction: Contraction<'a>,
+    pub(crate) splats: Splats,
+}
+
+impl<'a> ToImages<'a> {
+    pub(crate) fn new(world: &'a World, motion: &'a Motion) -> Self {
+        Self {
+            contraction: Contraction::new(world, motion),
+            splats: Splats::new(world.camera.film(), motion.parameters()),
+        }
+    }
+}
+
+impl Receiver for ToImages<'_> {
+    fn moves(&mut self, functional: &Functional) -> bool {
+        self.contraction.evaluate(functional)
+    }
+
+    fn receive(&mut self, pixel: u32, value: Rgb) {
+        for (image, rate) in self.splats.layers.iter_mut().zip(&self.contraction.rates) {
+            if rate.r != 0.0 {
+                image[pixel as usize] += value * rate.r;
+            }
+        }
+    }
+}

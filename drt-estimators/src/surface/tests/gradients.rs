@@ -1,0 +1,191 @@
+use drt_math::{Dual, Real};
+
+use super::super::angles::Angles;
+use super::*;
+
+/// Lanes 0..9 are the coordinates of `wo`, `wi` and `n`; properties follow.
+const LANES: usize = 20;
+type D = Dual<f64, LANES>;
+
+/// A model over dual numbers, made in one pass that also notes each property's first lane.
+struct Seeds {
+    next: usize,
+    placed: Vec<(Property, usize, bool)>,
+}
+
+impl Seeds {
+    fn color(&mut self, property: Property, value: Rgb) -> Rgb<D> {
+        let lane = self.place(property, 3);
+        Rgb::new(
+            D::variable(value.r, lane),
+            D::variable(value.g, lane + 1),
+            D::variable(value.b, lane + 2),
+        )
+    }
+    fn scalar(&mut self, property: Property, value: f64) -> D {
+        let lane = self.place(property, 1);
+        D::variable(value, lane)
+    }
+    fn place(&mut self, property: Property, lanes: usize) -> usize {
+        let lane = self.next;
+        self.placed.push((property, lane, lanes == 3));
+        self.next += lanes;
+        lane
+    }
+}
+
+fn seeded(v: Vec3, lane: usize) -> Vec3<D> {
+    vec3(D::variable(v.x, lane), D::variable(v.y, lane + 1), D::variable(v.z, lane + 2))
+}
+
+/// The value of a one-sided BSDF with all its derivatives, by the generic code of `eval`.
+fn by_duals(bsdf: &Bsdf, wo: Vec3, wi: Vec3, n: Vec3) -> (Rgb<D>, Seeds) {
+    let mut seeds = Seeds { next: 9, placed: Vec::new() };
+    let a = Angles::new(seeded(wo, 0), seeded(wi, 3), seeded(n, 6));
+    let s = &mut seeds;
+    let value = match bsdf {
+        Bsdf::Diffuse(b) => {
+            Diffuse { reflectance: s.color(Property::Reflectance, b.reflectance) }.value(&a)
+        }
+        Bsdf::Phong(b) => Phong {
+            reflectance: s.color(Property::Reflectance, b.reflectance),
+            specular_reflectance: s.color(Property::SpecularReflectance, b.specular_reflectance),
+            exponent: s.scalar(Property::Exponent, b.exponent),
+        }
+        .value(&a),
+        Bsdf::RoughConductor(b) => RoughConductor {
+            distribution: b.distribution,
+            alpha: s.scalar(Property::Alpha, b.alpha),
+            eta: s.color(Property::Eta, b.eta),
+            k: s.color(Property::K, b.k),
+            specular_reflectance: s.color(Property::SpecularReflectance, b.specular_reflectance),
+        }
+        .value(&a),
+        Bsdf::RoughDielectric(b) => RoughDielectric {
+            distribution: b.distribution,
+            alpha: s.scalar(Property::Alpha, b.alpha),
+            eta: s.scalar(Property::Eta, b.eta),
+            specular_reflectance: s.color(Property::SpecularReflectance, b.specular_reflectance),
+            specular_transmittance: s
+                .color(Property::SpecularTransmittance, b.specular_transmittance),
+        }
+        .value(&a),
+        Bsdf::Null | Bsdf::TwoSided(_) => Rgb::splat(D::zero()),
+    };
+    (value, seeds)
+}
+
+/// Directions at random, about half of the second ones by sampling (or sharp lobes would be missed)
+/// and some close to the surface.
+fn configuration(bsdf: &Bsdf, rng: &mut Rng) -> Option<(Vec3, Vec3)> {
+    let squeeze = |w: Vec3, by: f64| (w - normal() * (normal().dot(w) * by)).normalize();
+    let mut wo = random_direction(rng);
+    if rng.next_f64() < 0.2 {
+        wo = squeeze(wo, 0.999);
+    }
+    if rng.next_f64() < 0.5 {
+        return Some((wo, squeeze(random_direction(rng), 0.9)));
+    }
+    bsdf.sample(wo, normal(), random_3d(rng), Given::Wo).map(|s| (wo, s.w))
+}
+
+fn for_each_configuration(per_case: u32, mut check: impl FnMut(&Bsdf, Vec3, Vec3)) {
+    let mut all = cases();
+    all.extend(sharp_cases());
+    let mut rng = Rng::new(31, 0, 0);
+    for bsdf in &all {
+        let mut nonzero = 0;
+        for _ in 0..per_case {
+            if let Some((wo, wi)) = configuration(bsdf, &mut rng) {
+                check(bsdf, wo, wi);
+                nonzero += u32::from(!bsdf.eval(wo, wi, normal()).is_zero());
+            }
+        }
+        assert!(nonzero > per_case / 10, "{bsdf:?}: {nonzero}");
+    }
+}
+
+#[test]
+fn gradients_equal_those_of_dual_numbers() {
+    for_each_configuration(500, |bsdf, wo, wi| {
+        if matches!(bsdf, Bsdf::TwoSided(_)) {
+            return;
+        }
+        let g = bsdf.gradient(wo, wi, normal());
+        let (value, seeds) = by_duals(bsdf, wo, wi, normal());
+        let channels = [
+            (value.r, g.value.r, g.wo.r, g.wi.r, g.n.r),
+            (value.g, g.value.g, g.wo.g, g.wi.g, g.n.g),
+            (value.b, g.value.b, g.wo.b, g.wi.b, g.n.b),
+        ];
+        for (channel, (dual, value, by_wo, by_wi, by_n)) in channels.into_iter().enumerate() {
+            assert!((dual.re - value).abs() <= 1e-12 * value);
+            let largest = dual.eps[..9].iter().fold(0.0, |m: f64, e| m.max(e.abs()));
+            for (i, vector) in [by_wo, by_wi, by_n].into_iter().enumerate() {
+                for (j, slope) in vector.to_array().into_iter().enumerate() {
+                    let error = (slope - dual.eps[3 * i + j]).abs();
+                    assert!(error <= 1e-10 * largest, "{bsdf:?} {wo:?} {wi:?}: {error:e}");
+                }
+            }
+            for &(property, lane, is_color) in &seeds.placed {
+                let expected = dual.eps[lane + if is_color { channel } else { 0 }];
+                let slope = g.params.get(property).to_array()[channel];
+                let error = (slope - expected).abs();
+                assert!(error <= 1e-10 * expected.abs(), "{bsdf:?} {property}: {slope} {expected}");
+            }
+        }
+    });
+}
+
+#[test]
+fn values_of_eval_and_gradient_agree() {
+    for_each_configuration(200, |bsdf, wo, wi| {
+        let (a, b) = (bsdf.eval(wo, wi, normal()), bsdf.gradient(wo, wi, normal()).value);
+        assert!((a - b).max_abs() <= 1e-12 * a.max_abs(), "{bsdf:?}: {a:?} {b:?}");
+    });
+}
+
+/// Turning everything changes nothing, whatever the extension off the unit spheres.
+#[test]
+fn rigid_rotations_have_no_derivative() {
+    let mut rng = Rng::new(32, 0, 0);
+    for_each_configuration(200, |bsdf, wo, wi| {
+        let axis = random_direction(&mut rng);
+        let g = bsdf.gradient(wo, wi, normal());
+        let parts = [(g.wo, wo), (g.wi, wi), (g.n, normal())].map(|(g, v)| g.dot(axis.cross(v)));
+        let largest = parts.iter().fold(0.0, |m: f64, p| m.max(p.max_abs()));
+        let sum = parts[0] + parts[1] + parts[2];
+        assert!(sum.max_abs() <= 1e-9 * largest + 1e-9, "{bsdf:?}: {parts:?}");
+    });
+}
+
+/// Central differences of the value along great circles, where it is smooth enough for them.
+#[test]
+fn tangential_slopes_are_those_of_finite_differences() {
+    let mut rng = Rng::new(33, 0, 0);
+    let step = 1e-5;
+    for bsdf in cases() {
+        for _ in 0..200 {
+            let n = normal();
+            let wo = random_direction(&mut rng);
+            let Some(s) = bsdf.sample(wo, n, random_3d(&mut rng), Given::Wo) else { continue };
+            // Away from where the model ends.
+            if n.dot(wo).abs() < 0.05 || n.dot(s.w).abs() < 0.05 {
+                continue;
+            }
+            let at = [wo, s.w, n];
+            let velocity = at.map(|v| random_direction(&mut rng).reject(v));
+            let moved = |t: f64| {
+                let [wo, wi, n] = [0, 1, 2].map(|i| (at[i] + velocity[i] * t).normalize());
+                bsdf.eval(wo, wi, n)
+            };
+            let g = bsdf.gradient(wo, s.w, n);
+            let slope = g.wo.dot(velocity[0]) + g.wi.dot(velocity[1]) + g.n.dot(velocity[2]);
+            let coarse = (moved(step) - moved(-step)) * (0.5 / step);
+            let fine = (moved(0.5 * step) - moved(-0.5 * step)) * (1.0 / step);
+            let tolerance = 4.0 * (fine - coarse).max_abs() + 1e-6 * (1.0 + slope.max_abs());
+            let error = (slope - fine).max_abs();
+            assert!(error <= tolerance, "{bsdf:?} {at:?}: {slope:?} {fine:?}");
+        }
+    }
+}

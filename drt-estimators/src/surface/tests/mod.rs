@@ -1,0 +1,88 @@
+//! Every model is judged as the same list of cases, from the same directions.
+
+mod changes;
+mod energy;
+mod formulas;
+mod gradients;
+mod sampling;
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, Rng, Vec3, vec3, warp};
+
+use super::*;
+
+/// A normal along no axis.
+fn normal() -> Vec3 {
+    vec3(0.48, -0.6, 0.64)
+}
+
+/// The direction at a polar angle in degrees from [`normal`], at some azimuth.
+fn tilted(degrees: f64) -> Vec3 {
+    let frame = drt_math::Frame::from_normal(normal());
+    let (polar, azimuth) = (degrees.to_radians(), 0.7_f64);
+    let (sin, cos) = polar.sin_cos();
+    frame.to_world(vec3(sin * azimuth.cos(), sin * azimuth.sin(), cos))
+}
+
+fn random_direction(rng: &mut Rng) -> Vec3 {
+    warp::uniform_sphere(rng.next_2d())
+}
+
+fn random_3d(rng: &mut Rng) -> [f64; 3] {
+    [rng.next_f64(), rng.next_f64(), rng.next_f64()]
+}
+
+fn copper(distribution: Distribution, alpha: f64) -> RoughConductor {
+    RoughConductor {
+        distribution,
+        alpha,
+        eta: Rgb::new(0.2, 0.92, 1.1),
+        k: Rgb::new(3.91, 2.45, 2.14),
+        specular_reflectance: Rgb::new(1.0, 0.9, 0.8),
+    }
+}
+
+fn glass(distribution: Distribution, alpha: f64, eta: f64) -> RoughDielectric {
+    RoughDielectric { distribution, alpha, eta, ..Default::default() }
+}
+
+/// All models, smooth enough for quadrature.
+fn cases() -> Vec<Bsdf> {
+    use Distribution::{Beckmann, Ggx};
+    let phong = Phong { reflectance: Rgb::new(0.5, 0.3, 0.1), ..Default::default() };
+    let copper_front = TwoSided {
+        front: Bsdf::RoughConductor(copper(Ggx, 0.4)),
+        back: Some(Bsdf::Diffuse(Diffuse::default())),
+    };
+    alloc::vec![
+        Bsdf::Diffuse(Diffuse::default()),
+        Bsdf::Phong(phong),
+        Bsdf::Phong(Phong { specular_reflectance: Rgb::ZERO, exponent: 2.5, ..phong }),
+        Bsdf::RoughConductor(RoughConductor::default()),
+        Bsdf::RoughConductor(copper(Beckmann, 0.5)),
+        Bsdf::RoughConductor(copper(Ggx, 0.2)),
+        Bsdf::RoughDielectric(glass(Beckmann, 0.3, 1.5)),
+        Bsdf::RoughDielectric(glass(Ggx, 0.2, 1.2)),
+        Bsdf::RoughDielectric(glass(Beckmann, 0.2, 1.0 / 1.33)),
+        Bsdf::RoughDielectric(RoughDielectric {
+            specular_transmittance: Rgb::ZERO,
+            ..glass(Ggx, 0.5, 1.8)
+        }),
+        Bsdf::TwoSided(Box::new(TwoSided { front: Bsdf::Phong(phong), back: None })),
+        Bsdf::TwoSided(Box::new(copper_front)),
+    ]
+}
+
+/// Mirror-like surfaces, too sharp for quadrature.
+fn sharp_cases() -> Vec<Bsdf> {
+    let mut cases = Vec::new();
+    for distribution in [Distribution::Beckmann, Distribution::Ggx] {
+        for alpha in [1e-3, 1e-2] {
+            cases.push(Bsdf::RoughConductor(copper(distribution, alpha)));
+            cases.push(Bsdf::RoughDielectric(glass(distribution, alpha, 1.5)));
+        }
+    }
+    cases
+}

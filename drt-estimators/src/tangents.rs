@@ -1,0 +1,368 @@
+//! Parameters become tangents: the scene at the parameters' values, and its rate of change by each.
+
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_medium::{MediumChange, MediumTangent};
+use drt_motion::{
+    Applied, Change, GeometryChange, Parameter, PropertyChange, SmoothNormals, SurfaceMotion,
+    change_value, geometry_changes, move_affine, move_mesh,
+};
+
+use crate::Error;
+use crate::emitter::{Emitter, EmitterTangent};
+use crate::scene::{Scene, Target};
+use crate::sensor::SensorTangent;
+use crate::surface::{BsdfChange, BsdfTangent, ChangeOp, Property};
+
+/// What changes with each parameter: for every item of the scene, the parameters that change it
+/// (by index) and how.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tangents {
+    pub(crate) names: Vec<String>,
+    pub(crate) shapes: Vec<Vec<(usize, SurfaceMotion)>>,
+    /// Where a deformed shape's normals are recomputed: the map to pull gradients back through.
+    pub(crate) smooth: Vec<Option<SmoothNormals>>,
+    pub(crate) media: Vec<Vec<(usize, MediumTangent)>>,
+    pub(crate) bsdfs: Vec<Vec<(usize, BsdfTangent)>>,
+    pub(crate) emitters: Vec<Vec<(usize, EmitterTangent)>>,
+    pub(crate) sensor: Vec<(usize, SensorTangent)>,
+}
+
+/// Looks up every effect's target, and follows property effects on a shape to what carries the
+/// property.
+fn resolve(scene: &Scene, parameters: &[Parameter]) -> Result<Vec<Parameter<Target>>, Error> {
+    parameters
+        .iter()
+        .map(|p| {
+            let effects = p
+                .effects
+                .iter()
+                .map(|e| {
+                    let fail = |reason: String| effect_error(p, &e.target, reason);
+                    let mut target = scene.find(&e.target)?;
+                    let change = match &e.change {
+                        Change::Geometry(g) => {
+                            if let Target::Bsdf(_) = target {
+                                return Err(fail("a bsdf does not move".into()));
+                            }
+                            Change::Geometry(g.clone())
+                        }
+                        Change::Property(c) => {
+                            target = carrier(scene, target, c).map_err(fail)?;
+                            Change::Property(c.clone())
+                        }
+                        Change::Follow(leader) => Change::Follow(scene.find(leader)?),
+                    };
+                    Ok(drt_motion::Effect { target, change })
+                })
+                .collect::<Result<_, Error>>()?;
+            Ok(Parameter { name: p.name.clone(), value: p.value, effects })
+        })
+        .collect()
+}
+
+fn carrier(scene: &Scene, target: Target, change: &PropertyChange) -> Result<Target, String> {
+    let Target::Shape(i) = target else { return Ok(target) };
+    let shape = &scene.shapes[i];
+    if change.property == "radiance" {
+        return shape.emitter.map(Target::Emitter).ok_or_else(|| "the shape does not emit".into());
+    }
+    Ok(Target::Bsdf(shape.bsdf))
+}
+
+fn effect_error<T>(p: &Parameter<T>, target: &str, reason: String) -> Error {
+    Error::Effect { parameter: p.name.clone(), target_name: target.into(), reason }
+}
+
+/// The effects on one target, in the order in which they apply.
+fn effects_on(
+    parameters: &[Parameter<Target>],
+    target: Target,
+) -> impl Iterator<Item = (usize, &Parameter<Target>, &Change<Target>)> {
+    parameters.iter().enumerate().flat_map(move |(i, p)| {
+        p.effects.iter().filter(move |e| e.target == target).map(move |e| (i, p, &e.change))
+    })
+}
+
+/// Applies the parameters to a scene and differentiates it; `sensor` is the camera in use.
+pub(crate) fn apply(
+    scene: &Scene,
+    parameters: &[Parameter],
+    sensor: usize,
+) -> Result<(Scene, Tangents), Error> {
+    let parameters = resolve(scene, parameters)?;
+    let mut applied = Apply {
+        scene: scene.clone(),
+        tangents: Tangents {
+            names: parameters.iter().map(|p| p.name.clone()).collect(),
+            ..Tangents::default()
+        },
+        parameters: &parameters,
+    };
+    for i in 0..scene.shapes.len() {
+        applied.shape(i)?;
+    }
+    for i in 0..scene.media.len() {
+        applied.medium(i)?;
+    }
+    for i in 0..scene.bsdfs.len() {
+        applied.bsdf(i)?;
+    }
+    for i in 0..scene.emitters.len() {
+        applied.emitter(i)?;
+    }
+    for i in 0..scene.sensors.len() {
+        let tangents = applied.sensor(i)?;
+        if i == sensor {
+            applied.tangents.sensor = tangents;
+        }
+    }
+    Ok((applied.scene, applied.tangents))
+}
+
+struct Apply<'a> {
+    scene: Scene,
+    tangents: Tangents,
+    parameters: &'a [Parameter<Target>],
+}
+
+impl Apply<'_> {
+    fn name(&self, target: Target) -> String {
+        let (kind, i, id) = match target {
+            Target::Shape(i) => ("shape", i, &self.scene.shapes[i].id),
+            Target::Medium(i) => ("medium", i, &self.scene.media[i].id),
+            Target::Bsdf(i) => ("bsdf", i, &self.scene.bsdfs[i].id),
+            Target::Emitter(i) => ("emitter", i, &self.scene.emitters[i].id),
+            Target::Sensor(i) => ("sensor", i, &self.scene.sensors[i].id),
+        };
+        id.clone().unwrap_or_else(|| alloc::format!("{kind}[{i}]"))
+    }
+
+    fn fail(&self, parameter: usize, target: Target, reason: impl ToString) -> Error {
+        effect_error(&self.parameters[parameter], &self.name(target), reason.to_string())
+    }
+
+    fn geometry(&self, target: Target) -> Result<Vec<Applied<'_, GeometryChange>>, Error> {
+        geometry_changes(self.parameters, &target)
+            .map_err(|e| self.fail(e.parameter, target, e.cause))
+    }
+
+    fn shape(&mut self, i: usize) -> Result<(), Error> {
+        let target = Target::Shape(i);
+        let changes = self.geometry(target)?;
+        let (mut motions, mut smooth) = (Vec::new(), None);
+        if !changes.is_empty() {
+            let moved = move_mesh(&self.scene.shapes[i].mesh, &changes, self.parameters.len())
+                .map_err(|e| self.fail(e.parameter, target, e.cause))?;
+            motions = keep(moved.motions, |m| !m.is_rest());
+            smooth = moved.smooth;
+            self.scene.shapes[i].mesh = Arc::new(moved.mesh);
+        }
+        self.tangents.shapes.push(motions);
+        self.tangents.smooth.push(smooth);
+        Ok(())
+    }
+
+    fn medium(&mut self, i: usize) -> Result<(), Error> {
+        let target = Target::Medium(i);
+        let mut tangents = alloc::vec![MediumTangent::zero(); self.parameters.len()];
+        let parameters = self.parameters;
+        for (p, parameter, change) in effects_on(parameters, target) {
+            let theta = parameter.value;
+            for change in self.medium_changes(p, target, theta, change)? {
+                for t in &mut tangents {
+                    t.push_through(&change, theta);
+                }
+                let medium = &mut self.scene.media[i].item;
+                let own =
+                    medium.apply(&change, theta).and_then(|()| medium.tangent(&change, theta));
+                let own = own.map_err(|e| self.fail(p, target, e))?;
+                tangents[p] = tangents[p].clone().plus(&own);
+            }
+        }
+        self.tangents.media.push(keep(tangents, |t| !t.is_zero()));
+        Ok(())
+    }
+
+    /// What an effect does to a medium, step by step.
+    fn medium_changes(
+        &self,
+        p: usize,
+        target: Target,
+        theta: f64,
+        change: &Change<Target>,
+    ) -> Result<Vec<MediumChange>, Error> {
+        let place = |change: &GeometryChange| match (change.affine(theta), change.velocity(theta)) {
+            (Some(map), Some(velocity)) => Ok(MediumChange::Place { map, velocity }),
+            _ => Err(self.fail(
+                p,
+                target,
+                "a grid moves by affine maps only; it cannot follow single vertices yet",
+            )),
+        };
+        match change {
+            Change::Geometry(g) => Ok(alloc::vec![place(g)?]),
+            Change::Follow(_) => {
+                let of_parameter = core::slice::from_ref(&self.parameters[p]);
+                let changes = geometry_changes(of_parameter, &target)
+                    .map_err(|e| self.fail(p, target, e.cause))?;
+                changes.iter().map(|c| place(c.change)).collect()
+            }
+            Change::Property(c) => {
+                let (op, voxels) = (medium_op(c.op), c.voxels);
+                Ok(alloc::vec![match c.property.as_str() {
+                    "sigma_t" => MediumChange::SigmaT { op, voxels },
+                    "albedo" => MediumChange::Albedo { op, voxels },
+                    "emission" => MediumChange::Emission { op, voxels },
+                    "g" => MediumChange::G(op),
+                    other => {
+                        let reason = alloc::format!(
+                            "a medium has no property `{other}`; it has sigma_t, albedo, emission and g"
+                        );
+                        return Err(self.fail(p, target, reason));
+                    }
+                }])
+            }
+        }
+    }
+
+    fn bsdf(&mut self, i: usize) -> Result<(), Error> {
+        let target = Target::Bsdf(i);
+        let mut tangents = alloc::vec![BsdfTangent::default(); self.parameters.len()];
+        let parameters = self.parameters;
+        for (p, parameter, change) in effects_on(parameters, target) {
+            let Change::Property(c) = change else {
+                return Err(self.fail(p, target, "a bsdf does not move"));
+            };
+            let theta = parameter.value;
+            let property = Property::from_name(&c.property).map_err(|e| self.fail(p, target, e))?;
+            let change = BsdfChange { property, op: surface_op(c.op) };
+            let bsdf = &mut self.scene.bsdfs[i].item;
+            let own = bsdf.tangent(&change, theta);
+            let own = own.and_then(|t| bsdf.apply(&change, theta).map(|()| t));
+            let own = own.map_err(|e| self.fail(p, target, e))?;
+            for t in &mut tangents {
+                change.carry(t, theta);
+            }
+            let sum = tangents[p].get(property) + own.get(property);
+            *tangents[p].get_mut(property) = sum;
+        }
+        self.tangents.bsdfs.push(keep(tangents, |t| *t != BsdfTangent::default()));
+        Ok(())
+    }
+
+    fn emitter(&mut self, i: usize) -> Result<(), Error> {
+        let target = Target::Emitter(i);
+        let n = self.parameters.len();
+        let mut emitter = self.scene.emitters[i].item.emitter;
+        let mut tangents = alloc::vec![EmitterTangent::default(); n];
+        let changes = self.geometry(target)?;
+        if !changes.is_empty() {
+            if let Emitter::Area { .. } | Emitter::Constant { .. } = emitter {
+                let reason = "this emitter has no place of its own; move its shape";
+                return Err(self.fail(changes[0].parameter, target, reason));
+            }
+            let frame =
+                move_affine(&changes, n).map_err(|e| self.fail(e.parameter, target, e.cause))?;
+            emitter = emitter
+                .moved(&frame.map)
+                .map_err(|e| self.fail(changes[0].parameter, target, e))?;
+            for (t, v) in tangents.iter_mut().zip(&frame.velocities) {
+                *t += emitter.velocity(v);
+            }
+        }
+        self.properties(target, |property, changed| {
+            let before = emitter.property(property).map_err(|e| e.to_string())?;
+            emitter = emitter
+                .with_property(property, changed.map.value(before))
+                .map_err(|e| e.to_string())?;
+            for (t, rate) in tangents.iter_mut().zip(&changed.rates) {
+                *t += emitter
+                    .property_tangent(property, rate.value(before))
+                    .map_err(|e| e.to_string())?;
+            }
+            Ok(())
+        })?;
+        self.scene.emitters[i].item.emitter = emitter;
+        self.tangents.emitters.push(keep(tangents, |t| !t.is_zero()));
+        Ok(())
+    }
+
+    fn sensor(&mut self, i: usize) -> Result<Vec<(usize, SensorTangent)>, Error> {
+        let target = Target::Sensor(i);
+        let n = self.parameters.len();
+        let mut sensor = self.scene.sensors[i].item.sensor.clone();
+        let mut tangents = alloc::vec![SensorTangent::default(); n];
+        let changes = self.geometry(target)?;
+        if !changes.is_empty() {
+            let frame =
+                move_affine(&changes, n).map_err(|e| self.fail(e.parameter, target, e.cause))?;
+            sensor =
+                sensor.moved(&frame.map).map_err(|e| self.fail(changes[0].parameter, target, e))?;
+            for (t, v) in tangents.iter_mut().zip(&frame.velocities) {
+                *t += sensor.velocity(v);
+            }
+        }
+        self.properties(target, |property, changed| {
+            let before = sensor.property(property).map_err(|e| e.to_string())?;
+            sensor = sensor
+                .with_property(property, changed.map.value(before))
+                .map_err(|e| e.to_string())?;
+            for (t, rate) in tangents.iter_mut().zip(&changed.rates) {
+                *t += sensor
+                    .property_tangent(property, rate.value(before))
+                    .map_err(|e| e.to_string())?;
+            }
+            Ok(())
+        })?;
+        self.scene.sensors[i].item.sensor = sensor;
+        Ok(keep(tangents, |t| !t.is_zero()))
+    }
+
+    /// Calls `change` for each property that effects on the target name.
+    fn properties(
+        &self,
+        target: Target,
+        mut change: impl FnMut(&str, &drt_motion::ChangedValue) -> Result<(), String>,
+    ) -> Result<(), Error> {
+        let mut done: Vec<&str> = Vec::new();
+        for (p, _, effect) in effects_on(self.parameters, target) {
+            let Change::Property(c) = effect else { continue };
+            if done.contains(&c.property.as_str()) {
+                continue;
+            }
+            if c.voxels.is_some() {
+                return Err(self.fail(p, target, "only the grids of a medium have voxels"));
+            }
+            done.push(&c.property);
+            let changes = drt_motion::property_changes(self.parameters, &target, &c.property);
+            let changed = change_value(&changes, None, self.parameters.len())
+                .map_err(|e| self.fail(e.parameter, target, e.cause))?;
+            change(&c.property, &changed).map_err(|reason| self.fail(p, target, reason))?;
+        }
+        Ok(())
+    }
+}
+
+/// The entries worth keeping, with their parameters' indices.
+fn keep<T>(items: Vec<T>, worth: impl Fn(&T) -> bool) -> Vec<(usize, T)> {
+    items.into_iter().enumerate().filter(|(_, t)| worth(t)).collect()
+}
+
+fn medium_op(op: drt_motion::ValueChange) -> drt_medium::ValueChange {
+    match op {
+        drt_motion::ValueChange::Add(a) => drt_medium::ValueChange::Add(a),
+        drt_motion::ValueChange::Multiply(m) => drt_medium::ValueChange::Multiply(m),
+        drt_motion::ValueChange::MultiplyLog(m) => drt_medium::ValueChange::MultiplyLog(m),
+    }
+}
+
+fn surface_op(op: drt_motion::ValueChange) -> ChangeOp {
+    match op {
+        drt_motion::ValueChange::Add(a) => ChangeOp::Add(a),
+        drt_motion::ValueChange::Multiply(m) => ChangeOp::Multiply(m),
+        drt_motion::ValueChange::MultiplyLog(m) => ChangeOp::MultiplyLog(m),
+    }
+}

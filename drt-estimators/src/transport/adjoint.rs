@@ -1,0 +1,717 @@
+//! Differentiating a recorded path once: the gradient of its value with respect to every local
+//! quantity, in one backward sweep.
+//!
+//! With the symbols of [`trace`](super::trace), let R_k be what reaches vertex k per unit of
+//! throughput and Q_k what its scattering collects:
+//!
+//! ```text
+//! Q_k = NEE_k + s_k C_k,   C_k = sum over children c of a_c R_c,   R_k = e_k + σ_k Q_k
+//! ```
+//!
+//! The path's value is R_0. Its factors, in the material form (2021 paper, Eqs. 23–30; theory sheet
+//! §4), are the geometric term, Jacobian and transmittance of each segment, the scattering functions
+//! and the coefficients. The derivative by a segment's factors is Θ_c R_c times their logarithmic
+//! gradient; by a scattering function Θ_k σ_k C_k / p times its gradient; by σ_k it is Θ_k Q_k. No
+//! quotient by a factor that can vanish is formed. Cost is linear in the number of vertices.
+//!
+//! Transmittance over a segment x → y of length R (theory sheet §2): with τ = exp(-t),
+//!
+//! ```text
+//! t_dot = (R_dot/R) t + R ∫ [σ_dot + z_dot·∇σ] ds + sum over crossings (σ₋-σ₊) N·(u_c - z_dot) / (N·w)
+//! ```
+
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, RgbVec, Rng, Vec3};
+use drt_medium::Coefficients;
+
+use super::lights::{LightKind, LightSample};
+use super::record::{Node, PathRecord};
+use super::trace::Endpoint;
+use super::vertex::{Kind, Vertex};
+use super::world::{Crossing, World, intervals};
+use crate::emitter::EmitterGradient;
+use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
+use crate::sensor::SensorGradient;
+
+/// What has been collected for a vertex while its neighbours are processed.
+#[derive(Clone, Copy, Debug, Default)]
+struct Local {
+    at: SurfaceAdjoint,
+    /// C_k, the value of the children per unit of scattering.
+    children: Rgb,
+}
+
+/// A segment's far end.
+enum Far<'a> {
+    /// A vertex, with a receiver for its adjoint.
+    Vertex(&'a Vertex, &'a mut SurfaceAdjoint),
+    /// A point light; its position's adjoint is returned.
+    Position,
+    /// A fixed direction.
+    Direction,
+}
+
+/// The backward sweep and its buffers.
+pub(crate) struct Differentiator<'w> {
+    world: &'w World,
+    locals: Vec<Local>,
+    points: Vec<(f64, f64)>,
+    rng: Rng,
+}
+
+impl<'w> Differentiator<'w> {
+    pub(crate) fn new(world: &'w World) -> Self {
+        Self { world, locals: Vec::new(), points: Vec::new(), rng: Rng::new(0, 0, 0) }
+    }
+
+    /// Sends the gradient of the record's value to `sink`. `filter` holds the gradient by the pixel
+    /// position of the filter over the density; `rng` serves line integrals through grids and must
+    /// be independent of the walk's.
+    pub(crate) fn differentiate<S: AdjointSink>(
+        &mut self,
+        record: &PathRecord,
+        filter: [f64; 2],
+        rng: Rng,
+        sink: &mut S,
+    ) {
+        self.rng = rng;
+        self.locals.clear();
+        self.locals.resize(record.nodes.len(), Local::default());
+        for k in (1..record.nodes.len()).rev() {
+            self.node(record, k, sink);
+        }
+        self.camera(record, filter, sink);
+    }
+
+    fn node<S: AdjointSink>(&mut self, record: &PathRecord, k: usize, sink: &mut S) {
+        let node = &record.nodes[k];
+        let Some(arrival) = &node.arrival else { return };
+        let world = self.world;
+        let theta = arrival.throughput;
+        let scattered = node.value * node.inv_pdf * self.locals[k].children;
+        let mut collected = scattered;
+        let mut here = self.locals[k].at;
+        let received = match &arrival.end {
+            Endpoint::Environment => {
+                let Some((emitter, radiance)) = world.lights.environment() else { return };
+                strength(emitter, theta * arrival.emission_weight, sink);
+                radiance * arrival.emission_weight
+            }
+            Endpoint::Surface(vertex) => {
+                collected += self.connections(record, node, vertex, theta, &mut here, sink);
+                let Kind::Surface(point) = &vertex.kind else { return };
+                let mut emitted = Rgb::ZERO;
+                if let Some(e) = world.scene.shapes[point.shape as usize].emitter
+                    && arrival.emission_weight > 0.0
+                    && point.ng.dot(arrival.dir) < 0.0
+                {
+                    emitted = world.emitted(point, -arrival.dir) * arrival.emission_weight;
+                    strength(e, theta * arrival.emission_weight, sink);
+                }
+                emitted + collected
+            }
+            Endpoint::Volume(vertex, c) => {
+                let theta_s = theta * c.sigma_s();
+                collected += self.connections(record, node, vertex, theta_s, &mut here, sink);
+                self.coefficients(
+                    vertex,
+                    c,
+                    theta,
+                    collected,
+                    arrival.emission_weight,
+                    &mut here,
+                    sink,
+                );
+                c.source() * arrival.emission_weight + c.sigma_s() * collected
+            }
+        };
+        self.arrive(record, k, received, &mut here, sink);
+        if let Some(vertex) = node.vertex() {
+            send(vertex, &here, sink);
+        }
+    }
+
+    /// The segment from the parent to node `k`, and the parent's scattering into it.
+    fn arrive<S: AdjointSink>(
+        &mut self,
+        record: &PathRecord,
+        k: usize,
+        received: Rgb,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let world = self.world;
+        let Some(arrival) = &record.nodes[k].arrival else { return };
+        let p = arrival.parent as usize;
+        let value = arrival.arrival * received;
+        self.locals[p].children += value;
+        if value.is_zero() {
+            return;
+        }
+        let weight = arrival.throughput * received;
+        let parent = &record.nodes[p];
+        let (from, theta) = match &parent.arrival {
+            None => (world.eye(), Rgb::ONE),
+            Some(a) => match &a.end {
+                Endpoint::Surface(v) => (*v, a.throughput),
+                Endpoint::Volume(v, c) => (*v, a.throughput * c.sigma_s()),
+                Endpoint::Environment => return,
+            },
+        };
+        let mut there = core::mem::take(&mut self.locals[p].at);
+        let vertex = record.nodes[k].vertex();
+        let moving = moves(&from, sink.interest(), sink.interest().sensor)
+            || vertex.is_some_and(|v| moves(v, sink.interest(), false));
+        // The scattering function of the parent sees the two ends of the segment as a direction.
+        if parent.arrival.is_some() {
+            let adjoint = theta * value * parent.inv_pdf;
+            let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
+            let to_wi = self.scattering(
+                &from,
+                wo,
+                parent.wi,
+                adjoint,
+                parent.arrival.as_ref().map(|a| (a.parent as usize, a.distance)),
+                &mut there,
+                sink,
+            );
+            if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
+                let g = turn(&to_wi, parent.wi, arrival.distance);
+                here.u += g;
+                there.u -= g;
+            }
+        }
+        let crossings = &record.crossings[record.nodes[k].crossings.clone()];
+        let path = Stretch {
+            start: from.x,
+            dir: arrival.dir,
+            length: arrival.distance,
+            medium: arrival.start_medium,
+            crossings,
+        };
+        let far = match vertex {
+            Some(v) => Far::Vertex(v, here),
+            None => Far::Direction,
+        };
+        self.segment(&path, far, moving, weight, &mut there, sink);
+        self.locals[p].at = there;
+    }
+
+    /// Sensitivities of one stretch between two ends: geometric term, far-end Jacobian and
+    /// transmittance, all weighted by the contributions that pass. The near end's go to `near`; the
+    /// far end's to its own receiver, or back to the caller for a point light.
+    fn segment<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        far: Far<'_>,
+        moving: bool,
+        weight: Rgb,
+        near: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> RgbVec {
+        let mut along = (RgbVec::ZERO, RgbVec::ZERO);
+        self.transmittance(path, matches!(far, Far::Direction), moving, weight, &mut along, sink);
+        if !moving {
+            return RgbVec::ZERO;
+        }
+        near.u += along.0;
+        let d = path.dir * path.length;
+        match far {
+            Far::Vertex(v, receiver) => {
+                receiver.u += along.1;
+                // ln(|n·d| / R^3) on a surface, ln(1/R^2) in a volume.
+                let mut g = path.dir * (-2.0 / path.length);
+                if let Kind::Surface(s) = &v.kind {
+                    let nd = s.ng.dot(d);
+                    g = s.ng / nd - path.dir * (3.0 / path.length);
+                    receiver.n += weight.outer(d / nd);
+                }
+                receiver.j += weight;
+                let g = weight.outer(g);
+                receiver.u += g;
+                near.u -= g;
+                RgbVec::ZERO
+            }
+            Far::Position => {
+                let g = weight.outer(path.dir * (-2.0 / path.length));
+                near.u -= g;
+                along.1 + g
+            }
+            Far::Direction => RgbVec::ZERO,
+        }
+    }
+
+    /// Sensitivities of the transmittance over a stretch; those by the ends' positions are added to
+    /// `ends`. Along a fixed direction only the near end counts.
+    fn transmittance<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        fixed_direction: bool,
+        moving: bool,
+        weight: Rgb,
+        ends: &mut (RgbVec, RgbVec),
+        sink: &mut S,
+    ) {
+        let world = self.world;
+        if !world.has_media() {
+            return;
+        }
+        // How much a point at distance t follows the far end.
+        let share = |t: f64| if fixed_direction { 0.0 } else { t / path.length };
+        let mut depth_per_length = Rgb::ZERO;
+        for i in intervals(path.medium, path.crossings, path.length) {
+            let Some(m) = i.medium else { continue };
+            let medium = world.medium(m);
+            let length = i.end - i.start;
+            if !length.is_finite() {
+                continue;
+            }
+            if let Some(h) = medium.homogeneous() {
+                if sink.interest().media[m] {
+                    let x = path.start + path.dir * i.start;
+                    let sigma_t = weight * -length;
+                    let adjoint = CoefficientAdjoint { sigma_t, ..CoefficientAdjoint::default() };
+                    sink.medium(m, x, &adjoint);
+                }
+                if !fixed_direction {
+                    depth_per_length += h.coefficients().sigma_t * (length / path.length);
+                }
+                continue;
+            }
+            if !moving && !sink.interest().media[m] {
+                continue;
+            }
+            let start = path.start + path.dir * i.start;
+            let mut points = core::mem::take(&mut self.points);
+            points.clear();
+            medium.line_points(start, path.dir, length, &mut self.rng, &mut points);
+            for &(t, w) in &points {
+                let x = start + path.dir * t;
+                if sink.interest().media[m] {
+                    let sigma_t = weight * -w;
+                    let adjoint = CoefficientAdjoint { sigma_t, ..CoefficientAdjoint::default() };
+                    sink.medium(m, x, &adjoint);
+                }
+                if moving {
+                    let s = share(i.start + t);
+                    let g = medium.gradients(x).sigma_t * (weight * -w);
+                    ends.0 += g * (1.0 - s);
+                    ends.1 += g * s;
+                    if !fixed_direction {
+                        depth_per_length += medium.sigma_t(x) * (w / path.length);
+                    }
+                }
+            }
+            self.points = points;
+        }
+        if moving && !fixed_direction {
+            let g = (weight * -depth_per_length).outer(path.dir);
+            ends.1 += g;
+            ends.0 -= g;
+        }
+        let mut before = path.medium;
+        for c in path.crossings {
+            let sigma = |m: Option<usize>| m.map_or(Rgb::ZERO, |m| world.medium(m).sigma_t(c.x));
+            let jump = sigma(before) - sigma(c.after);
+            before = c.after;
+            let shape_moves = sink.interest().shapes[c.point.shape as usize];
+            if jump.is_zero() || !(moving || shape_moves) {
+                continue;
+            }
+            let n = c.point.ng;
+            let g = (weight * -jump).outer(n / n.dot(path.dir));
+            if shape_moves {
+                sink.surface(&c.point, &SurfaceAdjoint { u: g, ..SurfaceAdjoint::default() });
+            }
+            let s = share(c.t);
+            ends.0 -= g * (1.0 - s);
+            ends.1 -= g * s;
+        }
+    }
+
+    /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
+    /// behind `wo`, by normals and by materials. Returns that by the direction `wi`, which is the
+    /// caller's.
+    #[allow(clippy::too_many_arguments)]
+    fn scattering<S: AdjointSink>(
+        &mut self,
+        v: &Vertex,
+        wo: Vec3,
+        wi: Vec3,
+        adjoint: Rgb,
+        behind: Option<(usize, f64)>,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> Option<RgbVec> {
+        let world = self.world;
+        let interest = sink.interest();
+        let material = match &v.kind {
+            Kind::Surface(s) => interest.bsdfs[world.scene.shapes[s.shape as usize].bsdf],
+            _ => v.medium.is_some_and(|m| interest.media[m]),
+        };
+        if adjoint.is_zero() || !(material || interest.sensor || geometry_moves(interest)) {
+            return None;
+        }
+        let d = world.scattering(v)?.gradient(wo, wi);
+        match &v.kind {
+            Kind::Surface(s) => {
+                here.ns += d.ns * adjoint;
+                if material && let Some(params) = &d.params {
+                    sink.bsdf(world.scene.shapes[s.shape as usize].bsdf, params, adjoint);
+                }
+            }
+            _ => {
+                if material
+                    && d.g != 0.0
+                    && let Some(m) = v.medium
+                {
+                    let g = adjoint * d.g;
+                    sink.medium(m, v.x, &CoefficientAdjoint { g, ..CoefficientAdjoint::default() });
+                }
+            }
+        }
+        if let Some((p, distance)) = behind {
+            let g = turn(&(d.wo * adjoint), wo, distance);
+            self.locals[p].at.u += g;
+            here.u -= g;
+        }
+        Some(d.wi * adjoint)
+    }
+
+    /// Next-event connections of a vertex: returns their sum, without the scattering coefficient.
+    fn connections<S: AdjointSink>(
+        &mut self,
+        record: &PathRecord,
+        node: &Node,
+        vertex: &Vertex,
+        theta: Rgb,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        let Some(arrival) = &node.arrival else { return sum };
+        for (c, crossings) in &record.connections[node.connections.clone()] {
+            let rest = c.rest();
+            sum += c.f * rest;
+            let light = &c.light;
+            let behind = Some((arrival.parent as usize, arrival.distance));
+            let to_wi =
+                self.scattering(vertex, -arrival.dir, light.w, theta * rest, behind, here, sink);
+            let per_value = theta * c.f * c.transport;
+            let path = Stretch {
+                start: vertex.x,
+                dir: light.w,
+                length: light.distance,
+                medium: c.start_medium,
+                crossings: &record.crossings[crossings.clone()],
+            };
+            self.light_end(&path, vertex, light, to_wi, per_value, here, sink);
+        }
+        sum
+    }
+
+    /// The emitter's end of a connection.
+    #[allow(clippy::too_many_arguments)]
+    fn light_end<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        vertex: &Vertex,
+        light: &LightSample,
+        to_wi: Option<RgbVec>,
+        per_value: Rgb,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let weight = per_value * light.value;
+        let interest = sink.interest();
+        let emitter = interest.emitters[light.emitter];
+        let near_moves = moves(vertex, interest, false);
+        match &light.kind {
+            LightKind::Area(s) => {
+                let end = Vertex { x: light.y, medium: None, kind: Kind::Surface(*s) };
+                let moving = near_moves || moves(&end, interest, false);
+                let mut there = SurfaceAdjoint::default();
+                let far = Far::Vertex(&end, &mut there);
+                self.segment(path, far, moving, weight, here, sink);
+                if moving && let Some(to_wi) = to_wi {
+                    let g = turn(&to_wi, light.w, light.distance);
+                    there.u += g;
+                    here.u -= g;
+                }
+                send(&end, &there, sink);
+                if emitter {
+                    strength_of(light.emitter, per_value, sink);
+                }
+            }
+            LightKind::Environment => {
+                self.segment(path, Far::Direction, near_moves, weight, here, sink);
+                if emitter {
+                    strength_of(light.emitter, per_value, sink);
+                }
+            }
+            LightKind::Position => {
+                let moving = near_moves || emitter;
+                let far = Far::Position;
+                let mut at_light = self.segment(path, far, moving, weight, here, sink);
+                if moving && let Some(to_wi) = to_wi {
+                    let g = turn(&to_wi, light.w, light.distance);
+                    at_light += g;
+                    here.u -= g;
+                }
+                self.intensity(path, light, per_value, at_light, here, sink);
+            }
+            LightKind::Direction => {
+                self.segment(path, Far::Direction, near_moves, weight, here, sink);
+                if emitter {
+                    self.direction(path, light, to_wi, per_value, sink);
+                }
+            }
+        }
+    }
+
+    /// A point or spot light: its strength, its falloff by direction, its position.
+    fn intensity<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        light: &LightSample,
+        per_value: Rgb,
+        at_light: RgbVec,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let item = &self.world.scene.emitters[light.emitter].item.emitter;
+        let emission = item.emission(-light.w);
+        let per_value = (per_value / (path.length * path.length)).to_array();
+        let mut gradients = [EmitterGradient::default(); 3];
+        let mut to_flow = [Vec3::ZERO; 3];
+        for c in 0..3 {
+            let mut adjoint = [0.0; 3];
+            adjoint[c] = per_value[c];
+            (to_flow[c], gradients[c]) = emission.gradient(adjoint.into());
+        }
+        let to_flow = RgbVec { r: to_flow[0], g: to_flow[1], b: to_flow[2] };
+        // The flow direction runs from the light to the vertex.
+        let g = turn(&to_flow, -light.w, path.length);
+        here.u += g;
+        let at = at_light - g;
+        if sink.interest().emitters[light.emitter] {
+            let at = [at.r, at.g, at.b];
+            for c in 0..3 {
+                gradients[c].position += at[c];
+            }
+            sink.emitter(light.emitter, &gradients);
+        }
+    }
+
+    /// A directional light: its strength, and its direction through the scattering function and
+    /// through where the ray crosses interfaces and grids.
+    fn direction<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        light: &LightSample,
+        to_wi: Option<RgbVec>,
+        per_value: Rgb,
+        sink: &mut S,
+    ) {
+        let world = self.world;
+        let weight = per_value * light.value;
+        // wi = -direction; a point at distance t from the vertex moves by -t direction_dot.
+        let mut g = to_wi.map_or(RgbVec::ZERO, |g| -g);
+        for i in intervals(path.medium, path.crossings, path.length) {
+            let Some(m) = i.medium else { continue };
+            let medium = world.medium(m);
+            if medium.homogeneous().is_some() {
+                continue;
+            }
+            let start = path.start + path.dir * i.start;
+            self.points.clear();
+            medium.line_points(start, path.dir, i.end - i.start, &mut self.rng, &mut self.points);
+            for &(t, w) in &self.points {
+                let slope = medium.gradients(start + path.dir * t).sigma_t;
+                g += slope * (weight * (w * (i.start + t)));
+            }
+        }
+        let mut before = path.medium;
+        for c in path.crossings {
+            let sigma = |m: Option<usize>| m.map_or(Rgb::ZERO, |m| world.medium(m).sigma_t(c.x));
+            let jump = sigma(before) - sigma(c.after);
+            before = c.after;
+            let n = c.point.ng;
+            g -= (weight * jump).outer(n * (c.t / n.dot(path.dir)));
+        }
+        let mut gradients = [EmitterGradient::default(); 3];
+        let value = per_value.to_array();
+        let direction = [g.r, g.g, g.b];
+        for c in 0..3 {
+            let mut strength = [0.0; 3];
+            strength[c] = value[c];
+            gradients[c].strength = strength.into();
+            gradients[c].direction = direction[c].reject(light.w);
+        }
+        sink.emitter(light.emitter, &gradients);
+    }
+
+    /// The coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e.
+    #[allow(clippy::too_many_arguments)]
+    fn coefficients<S: AdjointSink>(
+        &mut self,
+        vertex: &Vertex,
+        c: &Coefficients,
+        theta: Rgb,
+        collected: Rgb,
+        emission_weight: f64,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let Some(m) = vertex.medium else { return };
+        let emission = c.emission * emission_weight;
+        let adjoint = CoefficientAdjoint {
+            sigma_t: theta * (c.albedo * collected + (Rgb::ONE - c.albedo) * emission),
+            albedo: theta * c.sigma_t * (collected - emission),
+            emission: theta * c.sigma_a() * emission_weight,
+            g: Rgb::ZERO,
+        };
+        if sink.interest().media[m] {
+            sink.medium(m, vertex.x, &adjoint);
+        }
+        if moves(vertex, sink.interest(), false) {
+            let g = self.world.medium(m).gradients(vertex.x);
+            here.u += g.sigma_t * adjoint.sigma_t
+                + g.albedo * adjoint.albedo
+                + g.emission * adjoint.emission;
+        }
+    }
+
+    /// The camera: importance, filter and position.
+    fn camera<S: AdjointSink>(&mut self, record: &PathRecord, filter: [f64; 2], sink: &mut S) {
+        let world = self.world;
+        let pinhole = world.camera.pinhole();
+        let mut sensor = [SensorGradient::default(); 3];
+        let position = self.locals[0].at.u;
+        for k in 1..record.nodes.len() {
+            let node = &record.nodes[k];
+            let Some(arrival) = &node.arrival else { continue };
+            if arrival.parent != 0 {
+                continue;
+            }
+            let received = self.received(record, k);
+            let per_weight = arrival.arrival * received;
+            if per_weight.is_zero() {
+                continue;
+            }
+            let total = per_weight * record.nodes[0].value;
+            let vertex = node.vertex();
+            let x = vertex.map_or(pinhole.position + arrival.dir, |v| v.x);
+            let projection = pinhole.project(x);
+            let mut at = [Vec3::ZERO; 3];
+            for (c, (v, t)) in per_weight.to_array().into_iter().zip(total.to_array()).enumerate() {
+                let (point, mut gradient) =
+                    pinhole.projection_gradient(&projection, filter.map(|f| f * v), t);
+                if vertex.is_none() {
+                    // A direction has no parallax.
+                    gradient.position = Vec3::ZERO;
+                }
+                sensor[c] += gradient;
+                at[c] = point;
+            }
+            if let Some(v) = vertex {
+                let u = RgbVec { r: at[0], g: at[1], b: at[2] };
+                send(v, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() }, sink);
+            }
+        }
+        if sink.interest().sensor {
+            for (g, p) in sensor.iter_mut().zip([position.r, position.g, position.b]) {
+                g.position += p;
+            }
+            sink.sensor(&sensor);
+        }
+    }
+
+    /// R_k of a child of the camera.
+    fn received(&self, record: &PathRecord, k: usize) -> Rgb {
+        let node = &record.nodes[k];
+        let Some(arrival) = &node.arrival else { return Rgb::ZERO };
+        let nee = record.connections[node.connections.clone()]
+            .iter()
+            .fold(Rgb::ZERO, |sum, (c, _)| sum + c.f * c.rest());
+        let collected = nee + node.value * node.inv_pdf * self.locals[k].children;
+        match &arrival.end {
+            Endpoint::Environment => {
+                self.world.lights.environment().map_or(Rgb::ZERO, |(_, l)| l)
+                    * arrival.emission_weight
+            }
+            Endpoint::Surface(v) => {
+                let emitted =
+                    v.surface().map_or(Rgb::ZERO, |s| self.world.emitted(s, -arrival.dir));
+                emitted * arrival.emission_weight + collected
+            }
+            Endpoint::Volume(_, c) => {
+                c.source() * arrival.emission_weight + c.sigma_s() * collected
+            }
+        }
+    }
+}
+
+/// A straight stretch of a path.
+struct Stretch<'a> {
+    start: Vec3,
+    dir: Vec3,
+    length: f64,
+    medium: Option<usize>,
+    crossings: &'a [Crossing],
+}
+
+/// Gradient by the far end of a segment, from that by its unit direction `w`.
+fn turn(g: &RgbVec, w: Vec3, distance: f64) -> RgbVec {
+    g.map(|g| g.reject(w) / distance)
+}
+
+fn geometry_moves(interest: &Interest) -> bool {
+    [&interest.shapes, &interest.volumes, &interest.emitters].into_iter().any(|l| l.contains(&true))
+}
+
+fn moves(v: &Vertex, interest: &Interest, camera: bool) -> bool {
+    match &v.kind {
+        Kind::Surface(s) => interest.shapes[s.shape as usize],
+        Kind::Volume(_) => v.medium.is_some_and(|m| interest.volumes[m]),
+        Kind::Point => camera,
+    }
+}
+
+/// Sends what a vertex collected.
+fn send<S: AdjointSink>(v: &Vertex, adjoint: &SurfaceAdjoint, sink: &mut S) {
+    match (&v.kind, v.medium) {
+        (Kind::Surface(s), _) => {
+            if sink.interest().shapes[s.shape as usize] {
+                sink.surface(s, adjoint);
+            }
+        }
+        (Kind::Volume(_), Some(m)) => {
+            if sink.interest().volumes[m] {
+                sink.volume(m, v.x, &adjoint.u, adjoint.j);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn strength<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
+    if sink.interest().emitters[emitter] && !adjoint.is_zero() {
+        strength_of(emitter, adjoint, sink);
+    }
+}
+
+/// Sensitivity to an emitter's radiance, channel by channel.
+fn strength_of<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
+    let gradient =
+        |r, g, b| EmitterGradient { strength: Rgb::new(r, g, b), ..EmitterGradient::default() };
+    sink.emitter(
+        emitter,
+        &[
+            gradient(adjoint.r, 0.0, 0.0),
+            gradient(0.0, adjoint.g, 0.0),
+            gradient(0.0, 0.0, adjoint.b),
+        ],
+    );
+}

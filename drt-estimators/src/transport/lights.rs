@@ -1,0 +1,284 @@
+//! Choosing emitters for next-event estimation.
+
+use alloc::vec::Vec;
+
+use drt_math::{AliasTable, Rgb, Rng, Vec3, warp};
+
+use super::vertex::SurfacePoint;
+use super::world::World;
+use crate::Error;
+use crate::emitter::Emitter;
+use crate::scene::Scene;
+
+/// One choice of the table.
+#[derive(Clone, Copy, Debug)]
+enum Entry {
+    /// A triangle of an area emitter, by its index in the soup.
+    Triangle { emitter: u32, prim: u32, area: f64 },
+    /// A point, spot or directional light.
+    Delta { emitter: u32 },
+    /// The constant environment.
+    Environment { emitter: u32 },
+}
+
+/// An emitter chosen by the table, not yet a point of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Choice {
+    /// The emitter, when it is a delta light.
+    pub(crate) delta: Option<usize>,
+    pub(crate) is_area: bool,
+    pub(crate) pmf: f64,
+    entry: Entry,
+}
+
+/// What was sampled.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum LightKind {
+    /// A point of an area emitter.
+    Area(SurfacePoint),
+    /// A point or spot light.
+    Position,
+    /// A directional light.
+    Direction,
+    /// A direction of the environment.
+    Environment,
+}
+
+/// A sampled point or direction of an emitter, seen from somewhere.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightSample {
+    pub(crate) emitter: usize,
+    pub(crate) kind: LightKind,
+    /// Unit, towards the light.
+    pub(crate) w: Vec3,
+    /// The light's point; meaningless for directions.
+    pub(crate) y: Vec3,
+    /// Infinite for directions.
+    pub(crate) distance: f64,
+    /// Radiance (area, environment), I/r² (position) or irradiance (direction).
+    pub(crate) value: Rgb,
+    /// 1 over the density: solid angle for areas and the environment, selection probability for
+    /// delta lights.
+    pub(crate) inv_pdf: f64,
+    /// Solid-angle density; 0 for delta lights, which nothing else can hit.
+    pub(crate) pdf: f64,
+}
+
+/// The emitters of a scene by power.
+#[derive(Debug, Default)]
+pub(crate) struct LightTable {
+    entries: Vec<Entry>,
+    table: Option<AliasTable>,
+    /// Radiance of each area emitter, zero for others.
+    area_radiance: Vec<Rgb>,
+    /// Selection probability per unit area of each soup triangle's emitter.
+    density: Vec<f64>,
+    environment: Option<(usize, Rgb, f64)>,
+    /// Lights with a position inside a scattering medium: emitter index, selection probability,
+    /// position; and the sum of the probabilities.
+    inside: (Vec<(usize, f64, Vec3)>, f64),
+}
+
+impl LightTable {
+    pub(crate) fn new(scene: &Scene, first_prim: &[u32], radius: f64) -> Result<Self, Error> {
+        let mut entries = Vec::new();
+        let mut weights = Vec::new();
+        let count: usize = scene.shapes.iter().map(|s| s.mesh.triangles.len()).sum();
+        let mut area_radiance = alloc::vec![Rgb::ZERO; scene.emitters.len()];
+        for (i, shape) in scene.shapes.iter().enumerate() {
+            let Some(e) = shape.emitter else { continue };
+            let Emitter::Area { radiance } = scene.emitters[e].item.emitter else { continue };
+            area_radiance[e] = radiance;
+            for t in 0..shape.mesh.triangles.len() as u32 {
+                let area = shape.mesh.area(t);
+                let emitter = e as u32;
+                entries.push(Entry::Triangle { emitter, prim: first_prim[i] + t, area });
+                weights.push(area * core::f64::consts::PI * radiance.mean());
+            }
+        }
+        for (e, named) in scene.emitters.iter().enumerate() {
+            let emitter = e as u32;
+            match &named.item.emitter {
+                Emitter::Area { .. } => continue,
+                Emitter::Constant { .. } => entries.push(Entry::Environment { emitter }),
+                _ => entries.push(Entry::Delta { emitter }),
+            }
+            weights.push(named.item.emitter.power(radius));
+        }
+        // A light that is off still has a derivative by its strength.
+        let floor = 0.01 * weights.iter().sum::<f64>() / weights.len().max(1) as f64;
+        for w in &mut weights {
+            *w = f64::max(*w, floor);
+        }
+        let table = if weights.is_empty() {
+            None
+        } else {
+            if weights.iter().all(|w| *w == 0.0) {
+                weights.fill(1.0);
+            }
+            Some(AliasTable::new(&weights).map_err(|e| Error::Element {
+                element: "emitters".into(),
+                reason: alloc::format!("powers cannot be sampled: {e}"),
+            })?)
+        };
+        let mut lights = Self {
+            entries,
+            table,
+            area_radiance,
+            density: alloc::vec![0.0; count],
+            environment: None,
+            inside: (Vec::new(), 0.0),
+        };
+        for (i, entry) in lights.entries.iter().enumerate() {
+            let pmf = lights.table.as_ref().map_or(0.0, |t| t.pmf(i));
+            match *entry {
+                Entry::Triangle { prim, area, .. } => lights.density[prim as usize] = pmf / area,
+                Entry::Environment { emitter } => {
+                    let e = emitter as usize;
+                    if let Emitter::Constant { radiance } = scene.emitters[e].item.emitter {
+                        lights.environment = Some((e, radiance, pmf));
+                    }
+                }
+                Entry::Delta { emitter } => {
+                    let e = emitter as usize;
+                    if let Some(at) = scene.emitters[e].item.emitter.position() {
+                        lights.inside.0.push((e, pmf, at));
+                    }
+                }
+            }
+        }
+        Ok(lights)
+    }
+
+    pub(crate) fn area_radiance(&self, emitter: usize) -> Rgb {
+        self.area_radiance[emitter]
+    }
+
+    /// The environment: emitter index and radiance.
+    pub(crate) fn environment(&self) -> Option<(usize, Rgb)> {
+        self.environment.map(|(e, l, _)| (e, l))
+    }
+
+    /// Lights with a position inside a scattering medium, for equiangular sampling: emitter index,
+    /// selection probability and position; and the sum of the probabilities.
+    pub(crate) fn inside(&self) -> (&[(usize, f64, Vec3)], f64) {
+        (&self.inside.0, self.inside.1)
+    }
+
+    /// Keeps the lights for which `scatters(emitter, position)` holds around them.
+    pub(crate) fn keep_inside(&mut self, scatters: impl Fn(usize, Vec3) -> bool) {
+        self.inside.0.retain(|(e, pmf, x)| *pmf > 0.0 && scatters(*e, *x));
+        self.inside.1 = self.inside.0.iter().map(|l| l.1).sum();
+    }
+
+    /// Solid-angle density with which [`LightTable::sample`] finds the emitting point `s` at
+    /// `distance` along the unit direction `w`.
+    pub(crate) fn area_pdf(&self, s: &SurfacePoint, w: Vec3, distance: f64) -> f64 {
+        let cosine = -s.ng.dot(w);
+        if cosine <= 0.0 {
+            return 0.0;
+        }
+        self.density[s.prim as usize] * distance * distance / cosine
+    }
+
+    /// Solid-angle density with which [`LightTable::sample`] finds a direction of the environment.
+    pub(crate) fn environment_pdf(&self) -> f64 {
+        self.environment.map_or(0.0, |(_, _, pmf)| pmf * warp::uniform_sphere_pdf())
+    }
+
+    /// True when some surface emits.
+    pub(crate) fn has_areas(&self) -> bool {
+        self.density.iter().any(|d| *d > 0.0)
+    }
+
+    /// Chooses an emitter, or a triangle of one.
+    pub(crate) fn choose(&self, rng: &mut Rng) -> Option<Choice> {
+        let i = self.table.as_ref()?.sample(rng.next_f64()).index;
+        let entry = self.entries[i];
+        let (delta, is_area) = match entry {
+            Entry::Delta { emitter } => (Some(emitter as usize), false),
+            Entry::Triangle { .. } => (None, true),
+            Entry::Environment { .. } => (None, false),
+        };
+        let pmf = self.table.as_ref().map_or(0.0, |t| t.pmf(i));
+        Some(Choice { delta, is_area, pmf, entry })
+    }
+
+    /// Samples a point of a chosen area emitter, as seen from `x`.
+    pub(crate) fn sample_area(
+        &self,
+        world: &World,
+        choice: &Choice,
+        x: Vec3,
+        rng: &mut Rng,
+    ) -> Option<LightSample> {
+        let Entry::Triangle { emitter, prim, .. } = choice.entry else { return None };
+        let (point, y) = world.point(prim, triangle_bary(rng.next_2d()));
+        let d = y - x;
+        let distance = d.length();
+        let w = d / distance;
+        let pdf = self.area_pdf(&point, w, distance);
+        if pdf.is_nan() || pdf <= 0.0 {
+            return None;
+        }
+        Some(LightSample {
+            emitter: emitter as usize,
+            kind: LightKind::Area(point),
+            w,
+            y,
+            distance,
+            value: self.area_radiance[emitter as usize],
+            inv_pdf: 1.0 / pdf,
+            pdf,
+        })
+    }
+
+    /// Samples an emitter as seen from `x`.
+    pub(crate) fn sample(&self, world: &World, x: Vec3, rng: &mut Rng) -> Option<LightSample> {
+        let choice = self.choose(rng)?;
+        match choice.entry {
+            Entry::Triangle { .. } => self.sample_area(world, &choice, x, rng),
+            Entry::Environment { emitter } => {
+                let (_, radiance, _) = self.environment?;
+                let pdf = self.environment_pdf();
+                Some(LightSample {
+                    emitter: emitter as usize,
+                    kind: LightKind::Environment,
+                    w: warp::uniform_sphere(rng.next_2d()),
+                    y: Vec3::ZERO,
+                    distance: f64::INFINITY,
+                    value: radiance,
+                    inv_pdf: 1.0 / pdf,
+                    pdf,
+                })
+            }
+            Entry::Delta { emitter } => Self::delta(world, emitter as usize, x, choice.pmf),
+        }
+    }
+
+    /// A delta light as seen from `x`, chosen with probability `pmf`.
+    pub(crate) fn delta(world: &World, emitter: usize, x: Vec3, pmf: f64) -> Option<LightSample> {
+        let light = &world.scene.emitters[emitter].item.emitter;
+        let incident = light.incident(x)?;
+        let (kind, y) = match light.position() {
+            Some(p) => (LightKind::Position, p),
+            None => (LightKind::Direction, Vec3::ZERO),
+        };
+        Some(LightSample {
+            emitter,
+            kind,
+            w: incident.w,
+            y,
+            distance: incident.distance,
+            value: incident.value,
+            inv_pdf: 1.0 / pmf,
+            pdf: 0.0,
+        })
+    }
+}
+
+/// Uniform barycentric weights of a triangle's second and third vertex.
+pub(crate) fn triangle_bary(u: [f64; 2]) -> [f64; 2] {
+    let [_, b1, b2] = warp::uniform_triangle(u);
+    [b1, b2]
+}

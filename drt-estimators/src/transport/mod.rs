@@ -1,0 +1,17 @@
+//! Light transport in plain numbers: the prepared scene, the walks through it, the record they
+//! leave and its differentiation.
+
+pub(crate) mod adjoint;
+pub(crate) mod importance;
+pub(crate) mod lights;
+pub(crate) mod record;
+pub(crate) mod scatter;
+pub(crate) mod trace;
+pub(crate) mod vertex;
+pub(crate) mod world;
+
+pub(crate) use adjoint::Differentiator;
+pub(crate) use record::{PathRecord, Radiance, RadianceBySegments};
+pub(crate) use trace::Tracer;
+pub(crate) use vertex::{Kind, SurfacePoint, Vertex};
+pub(crate) use world::{RayPath, World};

@@ -1,0 +1,515 @@
+//! A scene prepared for ray queries: one soup of triangles under one tree, media by side.
+
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
+
+use drt_geom::{Hit, Ray, Skip, TriangleBvh};
+use drt_math::{Rgb, Rng, Vec3};
+use drt_medium::{Medium, TrackingStats};
+
+use super::lights::LightTable;
+use super::scatter::Scattering;
+use super::vertex::{Contact, Kind, SurfacePoint, Vertex};
+use crate::contraction::Motion;
+use crate::scene::{Scene, Surrounding};
+use crate::surface::Bsdf;
+use crate::{Counters, Error};
+
+/// A null interface on a ray.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Crossing {
+    pub(crate) point: SurfacePoint,
+    pub(crate) x: Vec3,
+    /// Distance from the ray's start.
+    pub(crate) t: f64,
+    pub(crate) after: Option<usize>,
+}
+
+/// What lies along a ray up to the first surface that scatters.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RayPath {
+    /// The medium the ray starts in.
+    pub(crate) medium: Option<usize>,
+    pub(crate) crossings: Vec<Crossing>,
+    /// The surface it ends on; `None` when it escapes.
+    pub(crate) end: Option<(SurfacePoint, Vec3)>,
+    /// Its length; infinite when it escapes.
+    pub(crate) length: f64,
+    hits: Vec<Hit>,
+}
+
+impl RayPath {
+    /// Ends the ray at `length`.
+    pub(crate) fn cut(&mut self, length: f64) {
+        self.crossings.retain(|c| c.t < length);
+        self.end = None;
+        self.length = length;
+    }
+
+    /// Becomes the first `length` of another ray.
+    pub(crate) fn truncate_from(&mut self, other: &Self, length: f64) {
+        self.medium = other.medium;
+        self.crossings.clear();
+        self.crossings.extend(other.crossings.iter().take_while(|c| c.t < length));
+        self.end = None;
+        self.length = length;
+    }
+}
+
+/// A piece of a ray inside one medium.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Interval {
+    pub(crate) medium: Option<usize>,
+    pub(crate) start: f64,
+    pub(crate) end: f64,
+}
+
+/// The pieces a ray is cut into by its crossings.
+pub(crate) fn intervals(
+    medium: Option<usize>,
+    crossings: &[Crossing],
+    length: f64,
+) -> impl Iterator<Item = Interval> + '_ {
+    (0..=crossings.len()).map(move |i| Interval {
+        medium: if i == 0 { medium } else { crossings[i - 1].after },
+        start: if i == 0 { 0.0 } else { crossings[i - 1].t },
+        end: crossings.get(i).map_or(length, |c| c.t),
+    })
+}
+
+/// A triangle of the soup.
+#[derive(Clone, Copy, Debug)]
+struct Prim {
+    shape: u32,
+    triangle: u32,
+}
+
+/// Least probability of a scattering vertex per tentative collision where coefficients change.
+const DEFENSIVE: f64 = 0.1;
+
+/// What tracking may skip in a medium.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tracking {
+    /// Vertices are sampled inside.
+    Vertices,
+    /// It only absorbs: segments are attenuated, no vertex is sampled.
+    Attenuation,
+}
+
+/// A scene prepared for light transport.
+pub(crate) struct World {
+    pub(crate) scene: Scene,
+    pub(crate) lights: LightTable,
+    /// The sensor in use and the medium around it.
+    pub(crate) camera: crate::sensor::Sensor,
+    pub(crate) camera_medium: Option<usize>,
+    pub(crate) tracking: Vec<Tracking>,
+    /// Least probability of a scattering vertex per tentative collision, per medium: nonzero
+    /// where derivatives need vertices in empty space.
+    pub(crate) defensive: Vec<f64>,
+    pub(crate) max_depth: u32,
+    pub(crate) rr_depth: u32,
+    bvh: TriangleBvh,
+    prims: Vec<Prim>,
+    null: Vec<bool>,
+    any_null: bool,
+    first_prim: Vec<u32>,
+    /// The medium beyond every interface.
+    ambient: Option<usize>,
+}
+
+impl World {
+    pub(crate) fn new(scene: Scene, sensor: usize, max_depth: Option<u32>) -> Result<Self, Error> {
+        let camera = scene.sensors.get(sensor).ok_or_else(|| Error::Setting {
+            setting: "sensor".into(),
+            reason: alloc::format!(
+                "there is no sensor {sensor}; the scene has {}",
+                scene.sensors.len()
+            ),
+        })?;
+        let (camera_item, surrounding) = (camera.item.sensor.clone(), camera.item.medium);
+        let mut soup = Vec::new();
+        let mut prims = Vec::new();
+        let mut first_prim = Vec::new();
+        for (i, shape) in scene.shapes.iter().enumerate() {
+            first_prim.push(prims.len() as u32);
+            for t in 0..shape.mesh.triangles.len() as u32 {
+                soup.push(shape.mesh.triangle(t));
+                prims.push(Prim { shape: i as u32, triangle: t });
+            }
+        }
+        let bvh = TriangleBvh::build(&soup).map_err(|e| Error::Element {
+            element: "scene geometry".into(),
+            reason: e.to_string(),
+        })?;
+        let null: Vec<bool> =
+            scene.shapes.iter().map(|s| scene.bsdfs[s.bsdf].item.is_null()).collect();
+        let (mut lo, mut hi) = (Vec3::splat(f64::INFINITY), Vec3::splat(f64::NEG_INFINITY));
+        for t in &soup {
+            for p in t {
+                lo = lo.min(*p);
+                hi = hi.max(*p);
+            }
+        }
+        let radius = if soup.is_empty() { 1.0 } else { (hi - lo).length() * 0.5 };
+        let tracking = scene
+            .media
+            .iter()
+            .map(|m| {
+                if m.item.is_scattering() || m.item.is_emissive() {
+                    Tracking::Vertices
+                } else {
+                    Tracking::Attenuation
+                }
+            })
+            .collect();
+        let lights = LightTable::new(&scene, &first_prim, radius)?;
+        let depth = max_depth.or(scene.integrator.max_depth).unwrap_or(u32::MAX);
+        let mut world = Self {
+            lights,
+            camera: camera_item,
+            camera_medium: None,
+            tracking,
+            defensive: alloc::vec![0.0; scene.media.len()],
+            max_depth: depth,
+            rr_depth: scene.integrator.rr_depth,
+            any_null: null.iter().any(|n| *n),
+            bvh,
+            prims,
+            null,
+            first_prim,
+            ambient: None,
+            scene,
+        };
+        world.settle_media(surrounding);
+        Ok(world)
+    }
+
+    /// Makes sure that what derivatives need is sampled where its value is zero (theory sheet §14.5):
+    /// vertices in media whose coefficients change.
+    pub(crate) fn prepare_for_derivatives(&mut self, motion: &Motion) {
+        for (m, tangents) in motion.tangents.media.iter().enumerate() {
+            let scatters = |t: &drt_medium::MediumTangent| {
+                !t.albedo.is_zero() || !t.emission.is_zero() || !t.sigma_t.is_zero()
+            };
+            if tangents.iter().any(|(_, t)| !t.albedo.is_zero() || !t.emission.is_zero()) {
+                self.tracking[m] = Tracking::Vertices;
+            }
+            if tangents.iter().any(|(_, t)| scatters(t)) {
+                self.defensive[m] = DEFENSIVE;
+            }
+        }
+    }
+
+    /// Finds the medium beyond all interfaces and the one around the camera.
+    fn settle_media(&mut self, camera: Surrounding) {
+        let eye = self.camera.position();
+        self.camera_medium = match camera {
+            Surrounding::Stated(m) => {
+                if self.first_boundary(eye).is_none() {
+                    self.ambient = m;
+                }
+                m
+            }
+            Surrounding::Counted => self.medium_at(eye),
+        };
+        let mut lights = core::mem::take(&mut self.lights);
+        lights.keep_inside(|e, x| {
+            self.medium_of_emitter(e, x).is_some_and(|m| self.tracking[m] == Tracking::Vertices)
+        });
+        self.lights = lights;
+    }
+
+    /// The medium around an emitter at `x`.
+    pub(crate) fn medium_of_emitter(&self, emitter: usize, x: Vec3) -> Option<usize> {
+        match self.scene.emitters[emitter].item.medium {
+            Surrounding::Stated(m) => m,
+            Surrounding::Counted => self.medium_at(x),
+        }
+    }
+
+    pub(crate) fn medium(&self, m: usize) -> &Medium {
+        &self.scene.media[m].item
+    }
+
+    pub(crate) fn bsdf_of(&self, shape: u32) -> &Bsdf {
+        &self.scene.bsdfs[self.scene.shapes[shape as usize].bsdf].item
+    }
+
+    pub(crate) fn is_null(&self, shape: u32) -> bool {
+        self.null[shape as usize]
+    }
+
+    pub(crate) fn has_media(&self) -> bool {
+        !self.scene.media.is_empty()
+    }
+
+    pub(crate) fn prim_of(&self, shape: usize, triangle: u32) -> u32 {
+        self.first_prim[shape] + triangle
+    }
+
+    pub(crate) fn shape_name(&self, shape: usize) -> String {
+        let id = self.scene.shapes[shape].id.clone();
+        id.unwrap_or_else(|| alloc::format!("shape[{shape}]"))
+    }
+
+    /// The point of a triangle at given barycentric weights.
+    pub(crate) fn point(&self, prim: u32, bary: [f64; 2]) -> (SurfacePoint, Vec3) {
+        let Prim { shape, triangle } = self.prims[prim as usize];
+        let mesh = &self.scene.shapes[shape as usize].mesh;
+        let [a, b, c] = mesh.triangle(triangle);
+        let (e1, e2) = (b - a, c - a);
+        let ng = e1.cross(e2).normalize();
+        let ns = match &mesh.normals {
+            None => ng,
+            Some(normals) => {
+                let [i, j, k] = mesh.triangles[triangle as usize].map(|v| normals[v as usize]);
+                (i * (1.0 - bary[0] - bary[1]) + j * bary[0] + k * bary[1]).normalize()
+            }
+        };
+        let x = a * (1.0 - bary[0] - bary[1]) + b * bary[0] + c * bary[1];
+        (SurfacePoint { prim, shape, triangle, bary, ng, ns }, x)
+    }
+
+    /// The scattering function at a vertex; `None` at points.
+    pub(crate) fn scattering(&self, v: &Vertex) -> Option<Scattering<'_>> {
+        match &v.kind {
+            Kind::Surface(s) => Some(Scattering::Surface {
+                bsdf: self.bsdf_of(s.shape),
+                ng: s.ng,
+                ns: s.ns,
+                smooth: self.scene.shapes[s.shape as usize].mesh.normals.is_some(),
+            }),
+            Kind::Volume(_) => v.medium.map(|m| Scattering::Volume(&self.medium(m).phase)),
+            Kind::Point => None,
+        }
+    }
+
+    /// The medium on one side of a surface; `through` is the medium of surfaces that separate none.
+    pub(crate) fn medium_on_side(
+        &self,
+        s: &SurfacePoint,
+        front: bool,
+        through: Option<usize>,
+    ) -> Option<usize> {
+        match self.scene.shapes[s.shape as usize].boundary {
+            Some(b) if front => b.exterior,
+            Some(b) => b.interior,
+            None => through,
+        }
+    }
+
+    /// The medium a ray leaving `v` along `dir` starts in.
+    pub(crate) fn medium_toward(&self, v: &Vertex, dir: Vec3) -> Option<usize> {
+        match &v.kind {
+            Kind::Surface(s) => self.medium_on_side(s, s.ng.dot(dir) > 0.0, v.medium),
+            _ => v.medium,
+        }
+    }
+
+    fn skip_of(v: &Vertex) -> Skip {
+        match &v.kind {
+            Kind::Surface(s) => Skip::one(s.prim),
+            Kind::Volume(Some(c)) => Skip::one(c.point.prim),
+            _ => Skip::NOTHING,
+        }
+    }
+
+    /// Follows a ray from `v` along the unit direction `dir` to the first surface that scatters.
+    pub(crate) fn cast(&self, v: &Vertex, dir: Vec3, path: &mut RayPath, counters: &mut Counters) {
+        path.medium = self.medium_toward(v, dir);
+        self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v);
+    }
+
+    /// As [`World::cast`] from a point on an edge, past the edge's own faces.
+    pub(crate) fn cast_past(
+        &self,
+        x: Vec3,
+        faces: [u32; 2],
+        medium: Option<usize>,
+        dir: Vec3,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) {
+        path.medium = medium;
+        let v = Vertex { x, medium, kind: Kind::Point };
+        self.cast_from(x, Skip::two(faces[0], faces[1]), dir, path, counters, &v);
+    }
+
+    fn cast_from(
+        &self,
+        origin: Vec3,
+        mut skip: Skip,
+        dir: Vec3,
+        path: &mut RayPath,
+        counters: &mut Counters,
+        v: &Vertex,
+    ) {
+        path.crossings.clear();
+        path.end = None;
+        path.length = f64::INFINITY;
+        let mut medium = path.medium;
+        // A volume vertex that touches a surface meets it at once when it looks into it.
+        if let Kind::Volume(Some(c)) = &v.kind
+            && (c.point.ng.dot(dir) > 0.0) != c.front
+        {
+            if !self.is_null(c.point.shape) {
+                path.end = Some((c.point, v.x));
+                path.length = 0.0;
+                return;
+            }
+            medium = self.medium_on_side(&c.point, !c.front, medium);
+            path.crossings.push(Crossing { point: c.point, x: v.x, t: 0.0, after: medium });
+        }
+        let (mut start, mut travelled) = (origin, 0.0);
+        loop {
+            counters.rays += 1;
+            let ray = Ray { origin: start, dir, t_max: f64::INFINITY };
+            let Some(hit) = self.bvh.closest(&ray, skip) else { return };
+            let (point, x) = self.point(hit.prim, hit.bary);
+            let t = travelled + hit.t;
+            if !self.is_null(point.shape) {
+                path.end = Some((point, x));
+                path.length = t;
+                return;
+            }
+            medium = self.medium_on_side(&point, point.ng.dot(dir) > 0.0, medium);
+            path.crossings.push(Crossing { point, x, t, after: medium });
+            (start, travelled, skip) = (x, t, Skip::one(hit.prim));
+        }
+    }
+
+    /// The null interfaces between `v` and a point at `distance` along the unit direction `dir`;
+    /// `None` when a surface blocks. `target` is excluded from blocking.
+    pub(crate) fn connect(
+        &self,
+        v: &Vertex,
+        dir: Vec3,
+        distance: f64,
+        target: Option<u32>,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) -> bool {
+        path.medium = self.medium_toward(v, dir);
+        path.crossings.clear();
+        path.end = None;
+        path.length = distance;
+        let mut medium = path.medium;
+        if let Kind::Volume(Some(c)) = &v.kind
+            && (c.point.ng.dot(dir) > 0.0) != c.front
+        {
+            if !self.is_null(c.point.shape) {
+                return false;
+            }
+            medium = self.medium_on_side(&c.point, !c.front, medium);
+            path.crossings.push(Crossing { point: c.point, x: v.x, t: 0.0, after: medium });
+        }
+        counters.rays += 1;
+        let Skip([start, _]) = Self::skip_of(v);
+        let skip = target.map_or(Skip::one(start), |end| Skip::two(start, end));
+        let ray = Ray { origin: v.x, dir, t_max: distance };
+        if !self.any_null {
+            return !self.bvh.any(&ray, skip, |_| true);
+        }
+        path.hits.clear();
+        let blocks = |prim: u32| !self.is_null(self.prims[prim as usize].shape);
+        if self.bvh.crossings(&ray, skip, blocks, &mut path.hits) {
+            return false;
+        }
+        for hit in &path.hits {
+            let (point, x) = self.point(hit.prim, hit.bary);
+            medium = self.medium_on_side(&point, point.ng.dot(dir) > 0.0, medium);
+            path.crossings.push(Crossing { point, x, t: hit.t, after: medium });
+        }
+        true
+    }
+
+    /// Transmittance along a ray that [`World::connect`] or [`World::cast`] has followed.
+    pub(crate) fn transmittance(
+        &self,
+        origin: Vec3,
+        dir: Vec3,
+        path: &RayPath,
+        rng: &mut Rng,
+        counters: &mut Counters,
+    ) -> Rgb {
+        let mut tau = Rgb::ONE;
+        if !self.has_media() {
+            return tau;
+        }
+        for i in intervals(path.medium, &path.crossings, path.length) {
+            if let Some(m) = i.medium {
+                let mut stats = TrackingStats::default();
+                let start = origin + dir * i.start;
+                tau *= self.medium(m).transmittance(start, dir, i.end - i.start, rng, &mut stats);
+                counters.tracking_steps += stats.lookups;
+                if tau.is_zero() {
+                    break;
+                }
+            }
+        }
+        tau
+    }
+
+    /// The side of the first surface around `x` that bounds media, in a fixed direction.
+    fn first_boundary(&self, x: Vec3) -> Option<(SurfacePoint, bool)> {
+        // Any direction serves; an irrational one avoids edges and axis-aligned faces.
+        let dir = drt_math::vec3(0.577_215_66, 0.414_213_56, 0.703_818_4).normalize();
+        let mut best: Option<(f64, SurfacePoint)> = None;
+        let ray = Ray { origin: x, dir, t_max: f64::INFINITY };
+        self.bvh.all(&ray, Skip::NOTHING, |hit| {
+            let shape = self.prims[hit.prim as usize].shape as usize;
+            if self.scene.shapes[shape].boundary.is_some()
+                && best.as_ref().is_none_or(|(t, _)| hit.t < *t)
+            {
+                best = Some((hit.t, self.point(hit.prim, hit.bary).0));
+            }
+        });
+        best.map(|(_, p)| (p, p.ng.dot(dir) < 0.0))
+    }
+
+    /// The medium around a point off all surfaces: that on the near side of the first interface
+    /// met on the way to infinity.
+    pub(crate) fn medium_at(&self, x: Vec3) -> Option<usize> {
+        if !self.has_media() {
+            return None;
+        }
+        match self.first_boundary(x) {
+            Some((point, front)) => self.medium_on_side(&point, front, None),
+            None => self.ambient,
+        }
+    }
+
+    /// The medium around a surface that separates none, at one of its points.
+    pub(crate) fn medium_around(&self, point: &SurfacePoint, x: Vec3) -> Option<usize> {
+        match self.scene.shapes[point.shape as usize].boundary {
+            Some(_) => None,
+            None => self.medium_at(x),
+        }
+    }
+
+    /// A volume vertex touching a surface on one side.
+    pub(crate) fn touching(
+        &self,
+        point: SurfacePoint,
+        x: Vec3,
+        front: bool,
+        medium: usize,
+    ) -> Vertex {
+        let contact = Contact { point, front };
+        Vertex { x, medium: Some(medium), kind: Kind::Volume(Some(contact)) }
+    }
+
+    /// The camera as a vertex.
+    pub(crate) fn eye(&self) -> Vertex {
+        Vertex { x: self.camera.position(), medium: self.camera_medium, kind: Kind::Point }
+    }
+
+    /// Radiance a surface emits from `s` towards the unit direction `w`.
+    pub(crate) fn emitted(&self, s: &SurfacePoint, w: Vec3) -> Rgb {
+        match self.scene.shapes[s.shape as usize].emitter {
+            Some(e) if s.ng.dot(w) > 0.0 => self.lights.area_radiance(e),
+            _ => Rgb::ZERO,
+        }
+    }
+}
