@@ -1,7 +1,7 @@
-use drt_math::{Dual, Real, Rgb, Vec3};
+use drt_math::{Real, Rgb, Vec3, fm};
 
 use super::angles::{Angles, Slopes};
-use super::fresnel::conductor_reflected;
+use super::fresnel::{conductor_reflected, conductor_slopes};
 use super::microfacet::{Distribution, LEAST_ALPHA};
 use super::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 
@@ -44,19 +44,20 @@ impl<T: Real> RoughConductor<T> {
         if facets.re() == 0.0 {
             return Rgb::splat(T::zero());
         }
-        let reflected = Rgb::new(
-            facet_reflectance(a.h2, self.eta.r, self.k.r),
-            facet_reflectance(a.h2, self.eta.g, self.k.g),
-            facet_reflectance(a.h2, self.eta.b, self.k.b),
+        let cos = a.h2.sqrt() * 0.5;
+        let fresnel = Rgb::new(
+            conductor_reflected(cos, self.eta.r, self.k.r),
+            conductor_reflected(cos, self.eta.g, self.k.g),
+            conductor_reflected(cos, self.eta.b, self.k.b),
         );
-        self.specular_reflectance * reflected * facets
+        self.specular_reflectance * fresnel * (facets * reflection_jacobian(a.h2))
     }
 }
 
-/// Fresnel's factor at a microfacet, with the Jacobian `|h|⁴ / 4` of reflection.
+/// `|h|⁴ / 4`
 #[inline]
-fn facet_reflectance<T: Real>(h2: T, eta: T, k: T) -> T {
-    conductor_reflected(h2.sqrt() * 0.5, eta, k) * h2.squared() * 0.25
+fn reflection_jacobian<T: Real>(h2: T) -> T {
+    h2.squared() * 0.25
 }
 
 impl RoughConductor {
@@ -69,25 +70,30 @@ impl RoughConductor {
         let Some(facets) = self.distribution.facet_slopes(a, 1.0, self.alpha) else {
             return s;
         };
-        let h2 = Dual::<f64, 3>::variable(a.h2, 0);
-        let reflectance =
-            |eta, k| facet_reflectance(h2, Dual::variable(eta, 1), Dual::variable(k, 2));
-        let reflected = Rgb {
-            r: reflectance(self.eta.r, self.k.r),
-            g: reflectance(self.eta.g, self.k.g),
-            b: reflectance(self.eta.b, self.k.b),
-        };
-        let by_reflectance = reflected.map(|f| f.re) * facets.value;
-        let colour = self.specular_reflectance * reflected.map(|f| f.re);
-        let scale = self.specular_reflectance * facets.value;
-        s.value = colour * facets.value;
-        s.cos_o = colour * facets.cos_o;
-        s.cos_i = colour * facets.cos_i;
-        s.h2 = colour * facets.h2 + scale * reflected.map(|f| f.eps[0]);
-        s.params.alpha = colour * facets.alpha;
-        s.params.eta = scale * reflected.map(|f| f.eps[1]);
-        s.params.k = scale * reflected.map(|f| f.eps[2]);
-        s.params.specular_reflectance = by_reflectance;
+        let cos = 0.5 * fm::sqrt(a.h2);
+        let (mut by_cos, mut by_eta, mut by_k) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
+        let fresnel = Rgb::new(
+            conductor_reflected(cos, self.eta.r, self.k.r),
+            conductor_reflected(cos, self.eta.g, self.k.g),
+            conductor_reflected(cos, self.eta.b, self.k.b),
+        );
+        [by_cos.r, by_eta.r, by_k.r] = conductor_slopes(cos, self.eta.r, self.k.r);
+        [by_cos.g, by_eta.g, by_k.g] = conductor_slopes(cos, self.eta.g, self.k.g);
+        [by_cos.b, by_eta.b, by_k.b] = conductor_slopes(cos, self.eta.b, self.k.b);
+
+        let jacobian = reflection_jacobian(a.h2);
+        let grey = facets.value * jacobian;
+        let scale = self.specular_reflectance * grey;
+        let colour = self.specular_reflectance * fresnel;
+        s.value = colour * grey;
+        s.cos_o = colour * (facets.cos_o * jacobian);
+        s.cos_i = colour * (facets.cos_i * jacobian);
+        s.h2 = colour * (facets.h2 * jacobian + facets.value * 0.5 * a.h2)
+            + scale * by_cos * (0.125 / cos);
+        s.params.alpha = colour * (facets.alpha * jacobian);
+        s.params.eta = scale * by_eta;
+        s.params.k = scale * by_k;
+        s.params.specular_reflectance = fresnel * grey;
         s
     }
 
@@ -96,7 +102,7 @@ impl RoughConductor {
         if !a.in_front() {
             return 0.0;
         }
-        0.25 * a.h2 * a.h2 * self.distribution.visible_density(a, 1.0, self.alpha)
+        reflection_jacobian(a.h2) * self.distribution.visible_density(a, 1.0, self.alpha)
     }
 
     #[inline]

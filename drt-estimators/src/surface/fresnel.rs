@@ -1,5 +1,7 @@
 //! Fresnel's equations for unpolarised light.
 
+use core::ops::Mul;
+
 use drt_math::Real;
 
 /// Part of the power a dielectric interface reflects.
@@ -36,23 +38,80 @@ pub(super) fn dielectric_transmitted<T: Real>(cos_i: T, cos_t: T, eta: T) -> T {
 pub(super) fn conductor_reflected<T: Real>(cos: T, eta: T, k: T) -> T {
     let cos2 = cos.squared();
     let sin2 = T::one() - cos2;
-    // a + i b is the square root of (eta + i k)² - sin², with a, b >= 0.
-    let square = eta.squared() - k.squared() - sin2;
-    let ab = eta * k;
-    let modulus2 = square.squared() + ab.squared() * 4.0;
-    if modulus2.re() <= 0.0 {
-        return T::one();
-    }
-    let modulus = modulus2.sqrt();
-    // The larger of a and b has no cancellation; the other one follows from their product.
-    let a = if square.re() >= 0.0 {
-        ((modulus + square) * 0.5).sqrt()
-    } else {
-        ab / ((modulus - square) * 0.5).sqrt()
-    };
-    let (even, odd) = (modulus + cos2, a * cos * 2.0);
+    let Some([a, b]) = inner_cosine(sin2, eta, k) else { return T::one() };
+    let (even, odd) = (a.squared() + b.squared() + cos2, a * cos * 2.0);
     let s = (even - odd) / (even + odd);
-    let (even, odd) = (modulus * cos2 + sin2.squared(), odd * sin2);
+    let (even, odd) = ((even - cos2) * cos2 + sin2.squared(), odd * sin2);
     let p = s * (even - odd) / (even + odd);
     (s + p) * 0.5
+}
+
+/// Real and imaginary part, neither negative, of `w = sqrt((eta + i k)² - sin²)`: the index times
+/// the complex cosine of refraction. None where it is zero.
+#[inline]
+fn inner_cosine<T: Real>(sin2: T, eta: T, k: T) -> Option<[T; 2]> {
+    let square = eta.squared() - k.squared() - sin2;
+    let product = eta * k;
+    let modulus2 = square.squared() + product.squared() * 4.0;
+    if modulus2.re() <= 0.0 {
+        return None;
+    }
+    let modulus = modulus2.sqrt();
+    // The larger part has no cancellation; the other one follows from their product.
+    Some(if square.re() >= 0.0 {
+        let a = ((modulus + square) * 0.5).sqrt();
+        [a, product / a]
+    } else {
+        let b = ((modulus - square) * 0.5).sqrt();
+        [product / b, b]
+    })
+}
+
+/// Derivatives of [`conductor_reflected`] with respect to `cos`, `eta` and `k`.
+///
+/// With `z = eta + i k` both amplitudes are `r = (x - w) / (x + w)`, `x = cos` or `x = z² cos`, and
+/// analytic in `z`. Zero at a non-absorbing medium's critical angle, where there are none.
+#[inline]
+pub(super) fn conductor_slopes(cos: f64, eta: f64, k: f64) -> [f64; 3] {
+    let Some([a, b]) = inner_cosine(1.0 - cos * cos, eta, k) else { return [0.0; 3] };
+    let (z, w) = (Complex(eta, k), Complex(a, b));
+    let z2 = z * z;
+    let contrast = Complex(z2.0 - 1.0, z2.1);
+    let mut slopes = [0.0; 3];
+    let mut add = |x: Complex, by_cos: Complex, by_z: Complex| {
+        // dr = 2 (w dx - x dw) / (x + w)²; the numerators come as multiples of 1 / w.
+        let sum = Complex(x.0 + w.0, x.1 + w.1);
+        let conjugate_of_difference = Complex(x.0 - w.0, w.1 - x.1);
+        let divisor = w * sum;
+        let weight = conjugate_of_difference
+            * Complex(divisor.0, -divisor.1)
+            * Complex(2.0 / (sum.norm2() * divisor.norm2()), 0.0);
+        slopes[0] += (weight * by_cos).0;
+        let by_z = weight * by_z;
+        slopes[1] += by_z.0;
+        slopes[2] -= by_z.1;
+    };
+    add(Complex(cos, 0.0), contrast, Complex(-cos * eta, -cos * k));
+    // 2 w² - z² = z² - 2 sin²
+    let bend = Complex(z2.0 - 2.0 * (1.0 - cos * cos), z2.1);
+    add(Complex(z2.0 * cos, z2.1 * cos), z2 * contrast, z * bend * Complex(cos, 0.0));
+    slopes
+}
+
+#[derive(Clone, Copy)]
+struct Complex(f64, f64);
+
+impl Complex {
+    #[inline]
+    fn norm2(self) -> f64 {
+        self.0 * self.0 + self.1 * self.1
+    }
+}
+
+impl Mul for Complex {
+    type Output = Self;
+    #[inline]
+    fn mul(self, o: Self) -> Self {
+        Self(self.0 * o.0 - self.1 * o.1, self.0 * o.1 + self.1 * o.0)
+    }
 }

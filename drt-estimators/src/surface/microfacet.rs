@@ -55,7 +55,7 @@ impl Distribution {
             return T::zero();
         }
         let cos_i = a.cos_i.abs();
-        density * self.masking(a.cos_o, alpha) * self.masking(cos_i, alpha) * cos_i
+        density * self.masking(a.cos_o, alpha) * (self.masking(cos_i, alpha) * cos_i)
     }
 
     /// As [`Distribution::facets`], with duals only as wide as each factor needs.

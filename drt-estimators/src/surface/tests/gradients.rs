@@ -105,6 +105,17 @@ fn for_each_configuration(per_case: u32, mut check: impl FnMut(&Bsdf, Vec3, Vec3
     }
 }
 
+/// The half vector's tangent comes by a cancellation that sharp microfacets magnify.
+fn rounding(bsdf: &Bsdf) -> f64 {
+    match bsdf {
+        Bsdf::RoughConductor(RoughConductor { alpha, .. })
+        | Bsdf::RoughDielectric(RoughDielectric { alpha, .. }) => {
+            f64::max(1e-10, 1e-14 / (alpha * alpha))
+        }
+        _ => 1e-10,
+    }
+}
+
 #[test]
 fn gradients_equal_those_of_dual_numbers() {
     for_each_configuration(500, |bsdf, wo, wi| {
@@ -124,14 +135,17 @@ fn gradients_equal_those_of_dual_numbers() {
             for (i, vector) in [by_wo, by_wi, by_n].into_iter().enumerate() {
                 for (j, slope) in vector.to_array().into_iter().enumerate() {
                     let error = (slope - dual.eps[3 * i + j]).abs();
-                    assert!(error <= 1e-10 * largest, "{bsdf:?} {wo:?} {wi:?}: {error:e}");
+                    assert!(error <= rounding(bsdf) * largest, "{bsdf:?} {wo:?} {wi:?}: {error:e}");
                 }
             }
             for &(property, lane, is_color) in &seeds.placed {
                 let expected = dual.eps[lane + if is_color { channel } else { 0 }];
                 let slope = g.params.get(property).to_array()[channel];
                 let error = (slope - expected).abs();
-                assert!(error <= 1e-10 * expected.abs(), "{bsdf:?} {property}: {slope} {expected}");
+                assert!(
+                    error <= rounding(bsdf) * (expected.abs() + value),
+                    "{bsdf:?} {property}: {slope} {expected}"
+                );
             }
         }
     });
@@ -140,8 +154,7 @@ fn gradients_equal_those_of_dual_numbers() {
 #[test]
 fn values_of_eval_and_gradient_agree() {
     for_each_configuration(200, |bsdf, wo, wi| {
-        let (a, b) = (bsdf.eval(wo, wi, normal()), bsdf.gradient(wo, wi, normal()).value);
-        assert!((a - b).max_abs() <= 1e-12 * a.max_abs(), "{bsdf:?}: {a:?} {b:?}");
+        assert_eq!(bsdf.gradient(wo, wi, normal()).value, bsdf.eval(wo, wi, normal()));
     });
 }
 
