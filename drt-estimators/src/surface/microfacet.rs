@@ -42,8 +42,8 @@ pub(super) struct FacetSlopes {
 }
 
 impl Distribution {
-    /// `D(m) G1(wo) G1(wi) / (|h|⁴ |n·wo|)` for the normal `m` along `h = wo + index wi`: what
-    /// reflection (`index` 1) and refraction have in common, once multiplied by `|n·wi|`.
+    /// `D(m) G1(wo) G1(wi) / (|h|⁴ n·wo)` for the normal `m` along `h = wo + index wi`: the factor
+    /// that the values of reflection (`index` 1) and refraction have in common.
     ///
     /// `n·wo > 0`; whether the microfacet shows `wo` and `wi` its front is not looked at.
     #[inline]
