@@ -97,13 +97,9 @@ impl<'a> PixelSampler<'a> {
 
     fn path(&mut self, pixel: u32, unit: u32, u: [f64; 2], rng: Rng, values: &mut [Rgb]) {
         let camera = &self.world.camera;
-        let width = camera.film()[0];
-        let filter = camera.filter();
         let derivative = self.contraction.is_some();
-        let s = filter.sample(u, derivative);
-        let centre = [pixel % width, pixel / width].map(|p| f64::from(p) + 0.5);
-        let q = [centre[0] + s.offset[0], centre[1] + s.offset[1]];
-        let dir = camera.ray(q).direction;
+        let s = camera.sample_view(pixel, u, derivative);
+        let dir = s.direction;
         let weight = Rgb::splat(s.weight);
         self.tracer.rng = rng;
         let Some(contraction) = &mut self.contraction else {
@@ -120,9 +116,8 @@ impl<'a> PixelSampler<'a> {
         if contraction.interest().any() {
             self.differentiated += 1;
             let line = Rng::new(self.seed, LINE_STREAM | u64::from(pixel), unit);
-            let slope = filter.gradient(s.offset[0], s.offset[1]).map(|g| g / s.pdf);
             contraction.clear();
-            self.differentiator.differentiate(&self.record, slope, line, contraction);
+            self.differentiator.differentiate(&self.record, s.slope, line, contraction);
             for (v, r) in values[1..=n].iter_mut().zip(&contraction.rates) {
                 *v += *r;
             }

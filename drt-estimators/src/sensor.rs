@@ -13,6 +13,7 @@ mod footprint;
 mod lens;
 mod motion;
 mod pinhole;
+mod view;
 #[cfg(test)]
 mod tests;
 
@@ -23,6 +24,7 @@ use crate::filter::{Filter, FilterError};
 
 pub use footprint::{Footprint, PixelWeight};
 pub use lens::{FovAxis, Lens};
+pub use view::{Response, ViewSample};
 pub use pinhole::{Pinhole, Projection, SensorGradient, SensorTangent};
 
 /// A camera that cannot be used.
@@ -84,6 +86,7 @@ pub struct Sensor {
     lens: Lens,
     film: [u32; 2],
     filter: Filter,
+    response: Response,
 }
 
 /// A ray into the scene.
@@ -144,7 +147,7 @@ impl Sensor {
         let principal = lens.principal_point(film);
         let position = to_world.translation;
         let pinhole = Pinhole { position, right, up, forward, pixel_size, principal };
-        Ok(Self { pinhole, lens, film, filter })
+        Ok(Self { pinhole, lens, film, filter, response: Response::Perspective })
     }
 
     /// A camera at `origin` that looks at `target`; see [`look_at`].
@@ -165,7 +168,13 @@ impl Sensor {
     /// # Errors
     /// When a side is zero.
     pub fn with_film(&self, film: [u32; 2]) -> Result<Self, SensorError> {
-        Self::from_to_world(&self.to_world(), self.lens, film, self.filter.clone())
+        self.with(self.lens, film)
+    }
+
+    /// The same sensor with another lens and film.
+    fn with(&self, lens: Lens, film: [u32; 2]) -> Result<Self, SensorError> {
+        let camera = Self::from_to_world(&self.to_world(), lens, film, self.filter.clone())?;
+        Ok(Self { response: self.response, ..camera })
     }
 
     /// The same camera with another filter.
@@ -248,13 +257,15 @@ struct Parts {
     lens: Lens,
     film: [u32; 2],
     filter: Filter,
+    response: Response,
 }
 
 #[cfg(feature = "serde")]
 impl TryFrom<Parts> for Sensor {
     type Error = SensorError;
     fn try_from(p: Parts) -> Result<Self, SensorError> {
-        Self::from_to_world(&p.to_world, p.lens, p.film, p.filter)
+        let camera = Self::from_to_world(&p.to_world, p.lens, p.film, p.filter)?;
+        Ok(Self { response: p.response, ..camera })
     }
 }
 

@@ -356,7 +356,7 @@ fn sources(world: &World, boundary: &Boundary, flux: Option<&Flux>, moving: bool
                 sources.push(Source::Edges(strategy));
             }
         }
-        if !world.camera.filter().is_continuous() {
+        if world.camera.has_borders() {
             sources.push(Source::Borders);
         }
     }

@@ -66,7 +66,7 @@ pub(crate) fn sample<R: Receiver>(
     along[axis] = 1.0;
     let x = vertex.map_or(camera.position() + dir, |v| v.x);
     let (point, mut sensor) =
-        camera.pinhole().projection_gradient(&camera.pinhole().project(x), along, 0.0);
+        camera.view_gradient(&camera.view(x), along, 0.0);
     let items = &mut b.functional.items;
     items.clear();
     match vertex {

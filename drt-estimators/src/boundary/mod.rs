@@ -181,7 +181,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         if value.is_zero() {
             return None;
         }
-        let pixel = camera.pinhole().project(at.x).pixel;
+        let pixel = camera.view(at.x).pixel;
         let width = camera.film()[0];
         for p in camera.footprint(pixel) {
             self.receiver.receive(p.pixel[1] * width + p.pixel[0], value * p.weight);

@@ -70,7 +70,7 @@ impl Sensor {
         let mut lens = self.lens;
         let (known, number) = slot(&mut lens, name)?;
         *number = scalar(known, value)?;
-        Self::from_to_world(&self.to_world(), lens, self.film, self.filter.clone())
+        self.with(lens, self.film)
     }
 
     /// The rates of the camera when a property has the given rate.

@@ -33,7 +33,7 @@ pub struct Projection<T = f64> {
     /// Distance along the forward axis.
     pub depth: T,
     /// The point less the pinhole.
-    offset: Vec3<T>,
+    pub(super) offset: Vec3<T>,
     /// Coordinates (a, b) on the plane at distance one.
     plane: [T; 2],
 }

@@ -586,7 +586,7 @@ impl<'w> Differentiator<'w> {
     /// The camera: importance, filter and position.
     fn camera<S: AdjointSink>(&mut self, record: &PathRecord, filter: [f64; 2], sink: &mut S) {
         let world = self.world;
-        let pinhole = world.camera.pinhole();
+        let camera = &world.camera;
         let mut sensor = [SensorGradient::default(); 3];
         let position = self.locals[0].at.u;
         for k in 1..record.nodes.len() {
@@ -602,12 +602,12 @@ impl<'w> Differentiator<'w> {
             }
             let total = per_weight * record.nodes[0].value;
             let vertex = node.vertex();
-            let x = vertex.map_or(pinhole.position + arrival.dir, |v| v.x);
-            let projection = pinhole.project(x);
+            let x = vertex.map_or(camera.position() + arrival.dir, |v| v.x);
+            let projection = camera.view(x);
             let mut at = [Vec3::ZERO; 3];
             for (c, (v, t)) in per_weight.to_array().into_iter().zip(total.to_array()).enumerate() {
                 let (point, mut gradient) =
-                    pinhole.projection_gradient(&projection, filter.map(|f| f * v), t);
+                    camera.view_gradient(&projection, filter.map(|f| f * v), t);
                 if vertex.is_none() {
                     // A direction has no parallax.
                     gradient.position = Vec3::ZERO;

@@ -59,7 +59,7 @@ impl Tracer<'_> {
                 return;
             }
             let weight =
-                flight.as_ref().map_or(1.0, |f| f.weight(world.camera.pinhole().position, 1.0));
+                flight.as_ref().map_or(1.0, |f| f.weight(world.camera.position(), 1.0));
             self.splat(&vertex, wi, beta * weight, segments, splats);
             if segments == longest {
                 return;
@@ -134,7 +134,7 @@ impl Tracer<'_> {
         span: Option<(f64, f64)>,
     ) -> Option<Flown> {
         let (begin, end) = span?;
-        let eye = self.world.camera.pinhole().position;
+        let eye = self.world.camera.position();
         let distances = warp::Equiangular::new(origin, dir, eye, begin, end);
         let t = distances.sample(self.rng.next_f64());
         let mut part = core::mem::take(&mut self.shadow);
@@ -164,8 +164,7 @@ impl Tracer<'_> {
     /// `None` when no pixel can see the point.
     pub(crate) fn see(&self, v: &Vertex) -> Option<(Vec3, f64)> {
         let camera = &self.world.camera;
-        let pinhole = camera.pinhole();
-        let projection = pinhole.project(v.x);
+        let projection = camera.view(v.x);
         let r = camera.filter().radius();
         let film = camera.film().map(f64::from);
         let inside = |q: f64, n: f64| q > -r && q < n + r;
@@ -173,7 +172,7 @@ impl Tracer<'_> {
         if !(projection.depth > 0.0 && inside(x, film[0]) && inside(y, film[1])) {
             return None;
         }
-        let d = pinhole.position - v.x;
+        let d = camera.position() - v.x;
         let r2 = d.length_squared();
         Some((d.normalize(), projection.importance / r2))
     }
@@ -192,14 +191,14 @@ impl Tracer<'_> {
             return;
         }
         let world = self.world;
-        let eye = world.camera.pinhole().position;
+        let eye = world.camera.position();
         let distance = (eye - v.x).length();
         if !world.connect(v, wo, distance, None, &mut self.shadow, &mut self.counters) {
             return;
         }
         let tau = world.transmittance(v.x, wo, &self.shadow, &mut self.rng, &mut self.counters);
         let value = value * tau * transport;
-        let pixel = world.camera.pinhole().project(v.x).pixel;
+        let pixel = world.camera.view(v.x).pixel;
         let width = world.camera.film()[0];
         for p in world.camera.footprint(pixel) {
             let [x, y] = p.pixel;
