@@ -114,14 +114,17 @@ impl Mesh {
         Ok(Self { positions, triangles, normals: None, source_vertices: None, source_vertex_count })
     }
 
-    /// The same mesh with the given shading normals, brought to unit length.
+    /// The same mesh with the given shading normals, brought to unit length where they are not.
     ///
     /// # Errors
     /// When their number differs from the vertices' or one has no direction.
     pub fn with_normals(mut self, mut normals: Vec<Vec3>) -> Result<Self, MeshError> {
         self.expect_per_vertex("normals", normals.len())?;
         for (vertex, n) in normals.iter_mut().enumerate() {
-            *n = direction(*n).ok_or(MeshError::BadNormal { vertex })?;
+            // Unit normals stay as they are, bit for bit.
+            if !((n.length_squared() - 1.0).abs() <= 4.0 * f64::EPSILON) {
+                *n = direction(*n).ok_or(MeshError::BadNormal { vertex })?;
+            }
         }
         self.normals = Some(normals);
         Ok(self)
