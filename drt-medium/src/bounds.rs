@@ -15,12 +15,12 @@ use crate::{Grid, Piece, Ray};
 pub(crate) struct Bounds {
     size: [usize; 3],
     cells: Vec<Range>,
-    largest: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Range {
     min: Rgb,
+    /// Of the magnitudes.
     max: Rgb,
     mean: Rgb,
 }
@@ -45,13 +45,12 @@ impl Bounds {
             let width = usize::min(n.div_ceil(Self::CELLS), Self::WIDTH);
             n.div_ceil(usize::max(width, n.div_ceil(Self::MOST_CELLS)))
         });
-        let mut bounds = Self { size, cells: Vec::new(), largest: 0.0 };
+        let mut bounds = Self { size, cells: Vec::new() };
         let count = size.iter().product();
         bounds.cells.reserve_exact(count);
         for n in 0..count {
             bounds.cells.push(bounds.range(grid, crate::grid::unflatten(size, n)));
         }
-        bounds.largest = bounds.find_largest();
         bounds
     }
 
@@ -69,17 +68,11 @@ impl Bounds {
                 }
             }
         }
-        self.largest = self.find_largest();
     }
 
     /// Largest magnitude of the grid's values.
     pub(crate) fn largest(&self) -> f64 {
-        self.largest
-    }
-
-    fn find_largest(&self) -> f64 {
-        let magnitude = |r: &Range| f64::max(r.max.max_abs(), r.min.max_abs());
-        self.cells.iter().map(magnitude).fold(0.0, f64::max)
+        self.cells.iter().map(|r| r.max.max_channel()).fold(0.0, f64::max)
     }
 
     fn seen(&self, grid: &Grid, axis: usize, cell: usize) -> impl Iterator<Item = usize> + use<> {
@@ -88,14 +81,14 @@ impl Bounds {
     }
 
     fn range(&self, grid: &Grid, cell: [usize; 3]) -> Range {
-        let (mut min, mut max) = (Rgb::splat(f64::INFINITY), Rgb::splat(f64::NEG_INFINITY));
+        let (mut min, mut max) = (Rgb::splat(f64::INFINITY), Rgb::ZERO);
         let (mut sum, mut count) = (Rgb::ZERO, 0.0);
         for k in self.seen(grid, 2, cell[2]) {
             for j in self.seen(grid, 1, cell[1]) {
                 for i in self.seen(grid, 0, cell[0]) {
                     let v = grid.voxel([i, j, k]);
                     min = zip(min, v, f64::min);
-                    max = zip(max, v, f64::max);
+                    max = zip(max, v.abs(), f64::max);
                     sum += v;
                     count += 1.0;
                 }
@@ -105,7 +98,7 @@ impl Bounds {
     }
 
     /// The cells a ray crosses, in order, as pieces of the field times `scale`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn walk(
         &self,
         grid: &Grid,

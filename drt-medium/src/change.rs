@@ -131,6 +131,48 @@ impl Medium {
     }
 }
 
+impl Medium {
+    /// Adds to every value of a grid at once, as a step along a gradient does: one number per voxel
+    /// and channel in the grid's order, in the units of the property (a density's scale is
+    /// divided out).
+    ///
+    /// # Errors
+    /// When the property has no grid, or the numbers do not fit it or are not finite.
+    pub fn add_to_voxels(&mut self, property: Property, step: &[f64]) -> Result<(), MediumError> {
+        let MediumKind::Grid(medium) = &mut self.kind else {
+            return Err(MediumError::NotAGrid { property });
+        };
+        let scale = if property == Property::SigmaT { medium.editable_scale() } else { 1.0 };
+        let grid = match property {
+            Property::SigmaT => Some(&mut medium.density),
+            Property::Albedo => medium.albedo.grid_mut(),
+            Property::Emission => medium.emission.grid_mut(),
+            Property::G => None,
+        };
+        let grid = grid.ok_or(MediumError::NotAGrid { property })?;
+        let values = grid.values();
+        if step.len() != values.len() {
+            return Err(MediumError::ValueCount {
+                size: grid.size(),
+                channels: grid.channels(),
+                expected: values.len(),
+                found: step.len(),
+            });
+        }
+        let mut sums = values.iter().zip(step).map(|(v, s)| v + s / scale);
+        if let Some(value) = sums.find(|v| !v.is_finite()) {
+            return Err(MediumError::OutOfRange { property, value, expected: "finite" });
+        }
+        for (v, s) in grid.values_mut().iter_mut().zip(step) {
+            *v += s / scale;
+        }
+        if property == Property::SigmaT {
+            medium.update_bounds(None);
+        }
+        Ok(())
+    }
+}
+
 impl Phase {
     fn change(&mut self, op: &ValueChange, theta: f64) -> Result<(), MediumError> {
         let g = self.mean_cosine_parameter().ok_or(MediumError::NoMeanCosine)?;
@@ -177,15 +219,21 @@ impl GridMedium {
             self.scale = c.finite(self.scale * factor)?;
             return Ok(());
         }
+        let scale = self.editable_scale();
+        c.of_grid(&mut self.density, theta, scale)?;
+        self.update_bounds(c.voxel);
+        Ok(())
+    }
+
+    /// A scale that terms of the extinction can be divided by.
+    fn editable_scale(&mut self) -> f64 {
         if self.scale == 0.0 {
-            // Nothing is left of the values; a term needs a scale it can be divided by.
+            // Nothing is left of the values.
             self.density.values_mut().fill(0.0);
             self.scale = 1.0;
             self.update_bounds(None);
         }
-        c.of_grid(&mut self.density, theta, self.scale)?;
-        self.update_bounds(c.voxel);
-        Ok(())
+        self.scale
     }
 }
 
@@ -219,27 +267,18 @@ impl FieldChange {
         }
         let (factor, term) = self.op.at(theta);
         let term = term / scale;
-        let largest = grid.values().iter().fold(0.0, |m, v| f64::max(m, v.abs()));
-        self.finite(largest * factor.abs() + term.max_abs())?;
-        if !factor.is_finite() || !term.is_finite() {
-            return Err(MediumError::OutOfRange {
-                property: self.property(),
-                value: factor,
-                expected: "finite",
-            });
-        }
+        let voxels = match self.voxel.map(|v| grid.flatten(v)) {
+            Some(n) => n..n + 1,
+            None => 0..grid.values().len() / grid.channels(),
+        };
+        let values = |grid: &Grid| voxels.start * grid.channels()..voxels.end * grid.channels();
+        let largest = grid.values()[values(grid)].iter().fold(0.0, |m, v| f64::max(m, v.abs()));
+        self.finite(largest * factor.abs() + term.abs().sum())?;
         // Also at theta = 0: the derivative needs the channels that the value does not use yet.
         if !self.op.is_scalar() {
             grid.spread_channels();
         }
-        let channels = grid.channels();
-        let range = match self.voxel {
-            Some(v) => {
-                let at = grid.flatten(v) * channels;
-                at..at + channels
-            }
-            None => 0..grid.values().len(),
-        };
+        let (range, channels) = (values(grid), grid.channels());
         let term = term.to_array();
         for voxel in grid.values_mut()[range].chunks_exact_mut(channels) {
             for (value, term) in voxel.iter_mut().zip(term) {

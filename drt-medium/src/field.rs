@@ -38,7 +38,7 @@ pub struct Piece {
     pub start: f64,
     /// Distance where it ends.
     pub end: f64,
-    /// At least the extinction, everywhere on the piece.
+    /// At least the extinction, everywhere on the piece (its magnitude, where it is negative).
     pub majorant: Rgb,
     /// At most the extinction, everywhere on the piece. The tighter, the fewer lookups a
     /// transmittance needs; zero is always allowed.

@@ -285,7 +285,9 @@ impl Grid {
 
     #[inline]
     fn corner_values(&self, at: &[usize; 8], channel: usize) -> [f64; 8] {
-        at.map(|i| self.values[i * self.channels + channel])
+        // Written out: mapping the array does not inline.
+        let v = |n: usize| self.values[at[n] * self.channels + channel];
+        [v(0), v(1), v(2), v(3), v(4), v(5), v(6), v(7)]
     }
 
     /// Number of a voxel in storage order.

@@ -46,6 +46,12 @@ impl Volume {
             Self::Grid(g) => Some(g),
         }
     }
+    pub(crate) fn grid_mut(&mut self) -> Option<&mut Grid> {
+        match self {
+            Self::Constant(_) => None,
+            Self::Grid(g) => Some(g),
+        }
+    }
     fn is_zero(&self) -> bool {
         match self {
             Self::Constant(c) => c.is_zero(),
@@ -213,7 +219,7 @@ impl DensityField for GridMedium {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn pieces(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>) {
         self.bounds.walk(&self.density, self.scale, ray, visit);
     }

@@ -41,7 +41,7 @@ impl Axis {
         usize::max(self.scale as usize, 1)
     }
 
-    #[inline]
+    #[inline(always)]
     fn between(&self, u: f64) -> Between {
         let (base, frac) = self.split(u);
         if self.filter == Filter::Nearest {
@@ -63,7 +63,7 @@ impl Axis {
     }
 
     /// Whole and fractional part of the lattice coordinate.
-    #[inline]
+    #[inline(always)]
     fn split(&self, u: f64) -> (i64, f64) {
         // Beyond 2^52 a lattice coordinate has no fraction left, and i64 could overflow.
         const LIMIT: f64 = 4_503_599_627_370_496.0;

@@ -112,7 +112,8 @@ impl Medium {
         }
     }
 
-    /// False when no point of the medium emits. Custom fields are taken to emit.
+    /// False when no point of the medium emits. Custom fields are taken to emit. Looks at every
+    /// voxel: a question for the preparation of a scene.
     #[must_use]
     pub fn is_emissive(&self) -> bool {
         match &self.kind {
@@ -122,7 +123,8 @@ impl Medium {
         }
     }
 
-    /// False when no point of the medium scatters. Custom fields are taken to scatter.
+    /// False when no point of the medium scatters. Custom fields are taken to scatter. Looks at
+    /// every voxel: a question for the preparation of a scene.
     #[must_use]
     pub fn is_scattering(&self) -> bool {
         match &self.kind {

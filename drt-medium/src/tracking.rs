@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, Rng, fm};
 
 use crate::reach::Reach;
-use crate::{DensityField, Piece, Ray};
+use crate::{DensityField, Ray};
 
 /// A sampled distance along a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,7 +89,7 @@ pub fn sample_distance<F: DensityField + ?Sized>(
     let mut depth = exponential(rng);
     field.pieces(ray, &mut |piece| {
         stats.pieces += 1;
-        let majorant = f64::max(rate_bound(piece), floor);
+        let majorant = f64::max(piece.majorant.max_channel(), floor);
         let least = defensive * floor / majorant;
         let mut t = piece.start;
         while let Some(next) = next_collision(t, piece.end, majorant, &mut depth) {
@@ -220,12 +220,6 @@ fn next_collision(t: f64, end: f64, majorant: f64, depth: &mut f64) -> Option<f6
 fn acceptance(shares: Rgb, collision: Rgb) -> f64 {
     let total = shares.sum();
     if total > 0.0 { shares.dot(collision) / total } else { collision.mean() }
-}
-
-/// The largest extinction of a piece in magnitude.
-#[inline]
-fn rate_bound(piece: &Piece) -> f64 {
-    f64::max(piece.majorant.max_channel(), (-piece.minorant).max_channel())
 }
 
 #[inline]

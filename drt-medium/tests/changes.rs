@@ -142,6 +142,22 @@ fn all_changes_together_by_the_chain_rule() {
 }
 
 #[test]
+fn the_chain_rule_is_needed() {
+    let theta = 0.35;
+    let start = full(3);
+    let (medium, whole) = changed(&start, &CHANGES, theta);
+    let mut sum = MediumTangent::zero();
+    let mut stepped = start;
+    for change in CHANGES {
+        let change = change(theta);
+        stepped.apply(&change, theta).expect("a change that fits");
+        sum = sum.plus(&stepped.tangent(&change, theta).expect("a change that fits"));
+    }
+    let differs = |x: &Vec3| difference(&sum.rates(&medium, *x), &whole.rates(&medium, *x)) > 1e-3;
+    assert!(points(&medium).iter().all(differs), "a plain sum of tangents passes");
+}
+
+#[test]
 fn homogeneous_changes() {
     let whole: [ChangeAt; 5] = [
         |_| MediumChange::SigmaT { op: MULTIPLY, voxels: None },
@@ -224,6 +240,29 @@ fn one_voxel_keeps_the_bounds() {
 }
 
 #[test]
+fn a_step_of_all_voxels_is_the_sum_of_single_ones() {
+    let start = full(3);
+    let count = start.grid().expect("a grid").density().values().len();
+    let step = random_values(count, 8);
+    let (mut whole, mut single) = (start.clone(), start);
+    whole.add_to_voxels(Property::SigmaT, &step).expect("a fitting step");
+    for (n, s) in step.chunks_exact(3).enumerate() {
+        let voxel = [n % 5, n / 5 % 4, n / 20];
+        let op = ValueChange::Add(Rgb::new(s[0], s[1], s[2]));
+        let change = MediumChange::SigmaT { op, voxels: Some(voxel) };
+        single.apply(&change, 1.0).expect("a voxel");
+    }
+    let largest = |m: &Medium| m.grid().expect("a grid").largest_sigma_t();
+    assert!((largest(&whole) - largest(&single)).abs() < 1e-14);
+    for x in points(&whole) {
+        assert!((whole.sigma_t(x) - single.sigma_t(x)).max_abs() < 1e-14);
+    }
+    assert!(whole.add_to_voxels(Property::SigmaT, &step[1..]).is_err());
+    assert!(whole.add_to_voxels(Property::G, &step).is_err());
+    assert!(whole.add_to_voxels(Property::SigmaT, &vec![f64::NAN; count]).is_err());
+}
+
+#[test]
 fn changes_that_do_not_fit_say_why() {
     let sigma = |op, voxels| MediumChange::SigmaT { op, voxels };
     let (mut h, mut g) = (plain(), full(1));
@@ -241,6 +280,9 @@ fn changes_that_do_not_fit_say_why() {
         Err(MediumError::NotScalar { property: Property::G })
     );
     assert!(g.apply(&MediumChange::G(ADD_GRAY), 5.0).is_err());
+    let nan = ValueChange::Add(Rgb::new(f64::NAN, 1.0, 1.0));
+    assert!(g.apply(&sigma(nan, None), 1.0).is_err());
+    assert!(h.apply(&sigma(nan, None), 1.0).is_err());
     let vanishing = ValueChange::Multiply(-1.0);
     g.apply(&sigma(vanishing, None), 1.0).expect("an empty medium");
     assert_eq!(
