@@ -154,12 +154,18 @@ impl Flight {
     }
 
     /// `T(t_max) / P(pass)`, with the slowest attenuation divided out of both, so that deep
-    /// segments do not end in 0/0.
+    /// segments do not end in 0/0. Channels that are not followed get no weight: it could be
+    /// infinite, for a throughput of zero.
     fn pass_weight(&self, sigma_t: Rgb) -> Rgb {
-        let used = zip(self.rates, self.probabilities, |r, q| if q > 0.0 { r } else { f64::MAX });
-        let slowest = f64::min(f64::min(used.r, used.g), used.b);
-        let pass = self.probabilities.dot(self.rates.map(|r| attenuation(r - slowest, self.t_max)));
-        let through = sigma_t.map(|s| attenuation(s - slowest, self.t_max));
-        through / ((1.0 - self.defensive) * pass)
+        let followed =
+            zip(self.rates, self.probabilities, |r, q| if q > 0.0 { r } else { f64::MAX });
+        let slowest = f64::min(f64::min(followed.r, followed.g), followed.b);
+        let through = |sigma: Rgb| {
+            zip(sigma, self.probabilities, |s, q| {
+                if q > 0.0 { attenuation(s - slowest, self.t_max) } else { 0.0 }
+            })
+        };
+        let pass = self.probabilities.dot(through(self.rates));
+        through(sigma_t) / ((1.0 - self.defensive) * pass)
     }
 }

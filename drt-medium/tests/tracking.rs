@@ -192,6 +192,20 @@ fn extreme_homogeneous_segments_stay_finite() {
 }
 
 #[test]
+fn channels_without_throughput_get_finite_weights() {
+    let medium = homogeneous(Rgb::new(0.0, 5.0, 6.0));
+    let ray = Ray::new(Vec3::ZERO, Vec3::Z, f64::INFINITY);
+    let channels = Rgb::new(0.0, 1.0, 1.0);
+    for t_max in [1e-3, 4.0, 1e3, f64::INFINITY] {
+        for i in 0..200 {
+            let s = sample(&medium, &Ray { t_max, ..ray }, channels, 0.0, &mut Rng::new(4, 0, i));
+            let (DistanceSample::Scatter { weight, .. } | DistanceSample::Pass { weight }) = s;
+            assert!((weight * channels).is_finite(), "{s:?}");
+        }
+    }
+}
+
+#[test]
 fn ratio_tracking_is_the_transmittance_in_every_channel() {
     for layout in [Layout::VoxelCentred, Layout::NodeCentred] {
         let medium = cloud(layout);
