@@ -1,10 +1,20 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod atomic;
+pub mod commands;
+mod digest;
 pub mod error;
+mod image;
 mod job;
 mod scene_xml;
 
+pub use atomic::{check_target, write_atomically};
+pub use digest::{RunFacts, Verdict, digest, write_digest};
 pub use error::CliError;
+pub use image::{ExrFile, Provenance, read_exr, write_exr, write_preview};
 pub use job::{Job, Overrides, load_job};
 pub use scene_xml::{Defaults, load_scene, parse_scene_str};
+
+/// Name and version, as files carry them.
+pub const PROGRAM: &str = concat!("drt ", env!("CARGO_PKG_VERSION"));

@@ -1,0 +1,97 @@
+//! `drt check`: derivatives against finite differences with common random numbers.
+
+use drt_estimators::{Layer, Rendering, agreement};
+
+use super::monitor::Monitor;
+use super::noise::relative_noise;
+use super::options::Options;
+use super::outputs::Outputs;
+use super::table::Table;
+use super::{Outcome, grad, run};
+use crate::digest::Verdict;
+use crate::{CliError, Job};
+
+pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
+    let job = run::open_with_parameters(options)?;
+    if job.parameters.is_empty() {
+        return Err(CliError::argument(format!(
+            "{} has no [[parameter]] to check",
+            job.path.display()
+        )));
+    }
+    let outputs = Outputs::new(options, "check")?;
+    let monitor = Monitor::new(options.quiet);
+    let mut rendering = grad::derivatives(&job, options, &monitor, 0.4)?;
+    let differences = match rendering.complete {
+        true => two_steps(&job, rendering.spp, &monitor)?,
+        false => None,
+    };
+    monitor.finish();
+    let Some([coarse, fine]) = differences else {
+        rendering.complete = false;
+        outputs.write(&job, &rendering, &[], &[])?;
+        return Ok(Outcome::Interrupted);
+    };
+    let verdicts = judge(&rendering, &coarse, &fine);
+    let names = job.parameters.iter().map(|p| format!("fd_{}", p.name));
+    let further: Vec<(String, &Layer)> = names.zip(&fine).collect();
+    outputs.write(&job, &rendering, &further, &verdicts)?;
+    let table = table(&verdicts);
+    if outputs.digest_on_stdout() {
+        eprint!("{table}");
+    } else {
+        print!("{table}");
+    }
+    let agrees = verdicts.iter().all(|v| v.agrees);
+    Ok(if agrees { Outcome::Done } else { Outcome::Failed })
+}
+
+/// Differences at the job's step and at half of it.
+fn two_steps(job: &Job, spp: u32, monitor: &Monitor) -> Result<Option<[Vec<Layer>; 2]>, CliError> {
+    let step = job.settings.step;
+    monitor.stage("differences, step 1", 0.4, 0.7);
+    let Some(coarse) = run::differences(job, spp, step, monitor)? else { return Ok(None) };
+    monitor.stage("differences, step 2", 0.7, 1.0);
+    let fine = run::differences(job, spp, 0.5 * step, monitor)?;
+    Ok(fine.map(|fine| [coarse, fine]))
+}
+
+fn judge(rendering: &Rendering, coarse: &[Layer], fine: &[Layer]) -> Vec<Verdict> {
+    let pairs = rendering.derivatives.iter().zip(coarse.iter().zip(fine));
+    pairs
+        .map(|(d, (coarse, fine))| {
+            let a = agreement(&d.total, fine, Some(&difference(coarse, fine)));
+            Verdict {
+                parameter: d.name.clone(),
+                rms_z: a.rms_z,
+                max_z: a.max_z,
+                limit: a.limit,
+                relative_noise: relative_noise(&d.total, rendering),
+                agrees: a.agrees,
+            }
+        })
+        .collect()
+}
+
+/// What the choice of the step changes.
+fn difference(coarse: &Layer, fine: &Layer) -> Layer {
+    let mut difference = fine.clone();
+    for (d, c) in difference.blocks.iter_mut().zip(&coarse.blocks) {
+        d.mean = c.mean - d.mean;
+    }
+    difference
+}
+
+fn table(verdicts: &[Verdict]) -> Table<6> {
+    let rows = verdicts.iter().map(|v| {
+        [
+            v.parameter.clone(),
+            format!("{:.3}", v.rms_z),
+            format!("{:.3}", v.max_z),
+            format!("{:.3}", v.limit),
+            format!("{:.2} %", 100.0 * v.relative_noise),
+            if v.agrees { "agrees" } else { "DISAGREES" }.into(),
+        ]
+    });
+    Table::new(["parameter", "rms z", "max z", "limit", "relative noise", "verdict"], rows)
+}

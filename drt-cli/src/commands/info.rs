@@ -1,0 +1,161 @@
+//! `drt info`: what is in a scene or job, and what a run would do.
+
+use drt_estimators::emitter::Emitter;
+use drt_estimators::{Integrator, MediumBoundary, Scene, Shape, Surrounding};
+use drt_geom::{EdgeClass, Topology};
+use drt_medium::{Medium, MediumKind, Phase};
+use drt_motion::{Change, Parameter};
+
+use super::options::Options;
+use super::table::Table;
+use super::{Outcome, run};
+use crate::{CliError, Job};
+
+pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
+    let job = run::open(options)?;
+    print!("{}", describe(&job));
+    // The plan comes last: preparing it can fail for reasons that the tables help to find.
+    if !job.scene.sensors.is_empty() {
+        job.require_derivatives()?;
+        print!("plan\n{}", run::prepare(&job, &job.parameters)?.plan());
+    }
+    Ok(Outcome::Done)
+}
+
+fn describe(job: &Job) -> String {
+    let scene = &job.scene;
+    let mut text = format!("scene {}\n", job.scene_path.display());
+    if job.text.is_some() {
+        text = format!("job {}\n{text}", job.path.display());
+    }
+    let Integrator { max_depth, rr_depth } = scene.integrator;
+    let depth = job.settings.max_depth.unwrap_or(max_depth);
+    let depth = depth.map_or("unlimited".into(), |d| d.to_string());
+    text += &format!("depth {depth}, Russian roulette from {rr_depth}\n\n");
+    text += &shapes(scene).to_string();
+    text += &media(scene).to_string();
+    text += &emitters(scene).to_string();
+    text += &sensors(job).to_string();
+    text += &parameters(&job.parameters).to_string();
+    text
+}
+
+/// The id, or kind and order.
+fn name(id: Option<&String>, kind: &str, i: usize) -> String {
+    id.cloned().unwrap_or_else(|| format!("{kind}[{i}]"))
+}
+
+fn medium_name(scene: &Scene, medium: Option<usize>) -> String {
+    let named = |i: usize| name(scene.media.get(i).and_then(|m| m.id.as_ref()), "medium", i);
+    medium.map_or_else(|| "vacuum".into(), named)
+}
+
+fn shapes(scene: &Scene) -> Table<8> {
+    let row = |(i, s): (usize, &Shape)| {
+        let topology = Topology::of(&s.mesh);
+        let rims = topology.edges.iter().filter(|e| e.class == EdgeClass::Boundary).count();
+        let edges = match rims {
+            0 => topology.edges.len().to_string(),
+            n => format!("{}, {n} on rims", topology.edges.len()),
+        };
+        let bsdf = &scene.bsdfs[s.bsdf];
+        let id = bsdf.id.as_ref().map_or(String::new(), |id| format!(" {id}"));
+        let between = |b: MediumBoundary| {
+            let [inside, outside] = [b.interior, b.exterior].map(|m| medium_name(scene, m));
+            format!("{inside} | {outside}")
+        };
+        [
+            name(s.id.as_ref(), "shape", i),
+            s.mesh.triangles.len().to_string(),
+            if topology.is_closed() { "closed" } else { "open" }.into(),
+            edges,
+            if s.mesh.normals.is_some() { "smooth" } else { "faceted" }.into(),
+            format!("{}{id}", bsdf.item.name()),
+            s.boundary.map_or(String::new(), between),
+            s.emitter.map_or(String::new(), |_| "emits".into()),
+        ]
+    };
+    let heads =
+        ["shape", "triangles", "surface", "edges", "normals", "bsdf", "inside | outside", ""];
+    Table::new(heads, scene.shapes.iter().enumerate().map(row))
+}
+
+fn media(scene: &Scene) -> Table<4> {
+    let kind = |m: &Medium| match &m.kind {
+        MediumKind::Homogeneous(h) => {
+            let c = h.coefficients();
+            let [t, a] = [c.sigma_t, c.albedo].map(|c| format!("{:?}", c.to_array()));
+            ("homogeneous".into(), format!("sigma_t {t}, albedo {a}"))
+        }
+        MediumKind::Grid(g) => {
+            let [x, y, z] = g.density().size();
+            let largest = g.largest_sigma_t();
+            (format!("grid {x}x{y}x{z}"), format!("largest sigma_t {largest}"))
+        }
+        _ => ("custom".into(), String::new()),
+    };
+    let phase = |m: &Medium| match m.phase {
+        Phase::Isotropic => "isotropic".into(),
+        Phase::Rayleigh => "rayleigh".into(),
+        Phase::HenyeyGreenstein { g } => format!("hg, g {g}"),
+    };
+    let rows = scene.media.iter().enumerate().map(|(i, m)| {
+        let (kind, coefficients) = kind(&m.item);
+        [name(m.id.as_ref(), "medium", i), kind, coefficients, phase(&m.item)]
+    });
+    Table::new(["medium", "kind", "coefficients", "phase function"], rows)
+}
+
+fn emitters(scene: &Scene) -> Table<3> {
+    let rows = scene.emitters.iter().enumerate().map(|(i, e)| {
+        let (kind, strength) = match e.item.emitter {
+            Emitter::Area { radiance } => ("area", radiance),
+            Emitter::Point { intensity, .. } => ("point", intensity),
+            Emitter::Spot { intensity, .. } => ("spot", intensity),
+            Emitter::Directional { irradiance, .. } => ("directional", irradiance),
+            Emitter::Constant { radiance } => ("constant", radiance),
+        };
+        [name(e.id.as_ref(), "emitter", i), kind.into(), format!("{:?}", strength.to_array())]
+    });
+    Table::new(["emitter", "kind", "strength"], rows)
+}
+
+fn sensors(job: &Job) -> Table<6> {
+    let scene = &job.scene;
+    let rows = scene.sensors.iter().enumerate().map(|(i, s)| {
+        let [w, h] = s.item.sensor.film();
+        let lens = s.item.sensor.lens();
+        let medium = match s.item.medium {
+            Surrounding::Counted => "found by counting".into(),
+            Surrounding::Stated(medium) => medium_name(scene, medium),
+        };
+        [
+            name(s.id.as_ref(), "sensor", i),
+            format!("{w}x{h}"),
+            format!("{:?}", s.item.sensor.filter().kind()),
+            format!("{} degrees", lens.fov),
+            medium,
+            if i == job.settings.sensor { "used" } else { "" }.into(),
+        ]
+    });
+    Table::new(["sensor", "film", "filter", "field of view", "medium", ""], rows)
+}
+
+fn parameters(parameters: &[Parameter<String>]) -> Table<4> {
+    let rows = parameters.iter().flat_map(|p| {
+        p.effects.iter().enumerate().map(move |(i, e)| {
+            let what = match &e.change {
+                Change::Geometry(g) => g.kind().into(),
+                Change::Property(c) => format!("{} {}", c.op.kind(), c.property),
+                Change::Follow(leader) => format!("follow {leader}"),
+            };
+            // Only the first effect repeats the parameter it belongs to.
+            let [name, value] = match i {
+                0 => [p.name.clone(), p.value.to_string()],
+                _ => [String::new(), String::new()],
+            };
+            [name, value, e.target.clone(), what]
+        })
+    });
+    Table::new(["parameter", "value", "target", "effect"], rows)
+}

@@ -1,0 +1,75 @@
+//! The commands of `drt`, from arguments to an exit code.
+
+mod check;
+mod grad;
+mod info;
+mod monitor;
+mod noise;
+mod options;
+mod outputs;
+mod render;
+mod run;
+mod table;
+
+use std::ffi::OsString;
+
+use clap::Parser;
+
+use crate::CliError;
+use options::{Command, CommandLine};
+
+/// How a command ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Outcome {
+    /// All is done.
+    Done,
+    /// A check did not pass.
+    Failed,
+    /// Stopped by the user; what was finished is written.
+    Interrupted,
+}
+
+impl Outcome {
+    fn exit_code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::Failed => 1,
+            Self::Interrupted => 130,
+        }
+    }
+}
+
+/// Runs the command line `args`, the first of which is the program's name, and returns its exit
+/// code: 0 done, 1 a check failed, 2 unusable input or arguments, 3 failure while writing, 130
+/// stopped by Ctrl-C.
+///
+/// Errors are told in one message on the standard error.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
+    let line = match CommandLine::try_parse_from(args) {
+        Ok(line) => line,
+        Err(e) => {
+            // Help and version are no errors; where even they cannot be shown, nobody is listening.
+            let _ = e.print();
+            return e.exit_code() as u8;
+        }
+    };
+    match dispatch(&line.command) {
+        Ok(outcome) => outcome.exit_code(),
+        Err(e) => {
+            eprintln!("drt: error: {e}");
+            e.exit_code()
+        }
+    }
+}
+
+fn dispatch(command: &Command) -> Result<Outcome, CliError> {
+    let later = |what| Err(CliError::argument(format!("`drt {what}` arrives in a later version")));
+    match command {
+        Command::Render(options) => render::run(options),
+        Command::Grad(options) => grad::run(options),
+        Command::Check(options) => check::run(options),
+        Command::Info(options) => info::run(options),
+        Command::Optimize(_) => later("optimize"),
+        Command::Bench(_) => later("bench"),
+    }
+}

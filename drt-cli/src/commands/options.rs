@@ -1,0 +1,141 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::{CliError, Overrides};
+
+/// Differentiable rendering of surfaces and participating media.
+#[derive(Debug, Parser)]
+#[command(name = "drt", version, about)]
+pub(super) struct CommandLine {
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Render a scene, or a job's scene at its parameters' values.
+    Render(Options),
+    /// Render a job's scene and its derivative with respect to each parameter.
+    Grad(GradOptions),
+    /// Compare derivatives with finite differences; exit 1 when they disagree.
+    Check(Options),
+    /// Fit a job's parameters to target images (not available yet).
+    Optimize(Options),
+    /// Measure run time against error (not available yet).
+    Bench(BenchOptions),
+    /// Show what a scene or job holds, and what will run.
+    Info(Options),
+}
+
+/// What every command takes.
+#[derive(Args, Clone, Debug)]
+pub(super) struct Options {
+    /// A scene (.xml) or a job (.toml).
+    pub(super) input: PathBuf,
+    /// Where to write images and standard errors, as OpenEXR.
+    #[arg(short, long, value_name = "FILE.exr")]
+    pub(super) output: Option<PathBuf>,
+    /// Where to write a summary, as JSON; `-` is the standard output.
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) digest: Option<PathBuf>,
+    /// Where to write a picture to look at.
+    #[arg(long, value_name = "FILE.png")]
+    pub(super) preview: Option<PathBuf>,
+    /// Samples per pixel.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) spp: Option<u32>,
+    /// Stop after this time.
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub(super) seconds: Option<f64>,
+    /// Stop when the relative noise of every image is below this.
+    #[arg(long, value_name = "E", value_parser = positive)]
+    pub(super) target_error: Option<f64>,
+    /// Same seed, same pixels.
+    #[arg(long, value_name = "N")]
+    pub(super) seed: Option<u64>,
+    /// Threads; all cores when not given.
+    #[arg(long, value_name = "N")]
+    pub(super) threads: Option<usize>,
+    /// Size of the image.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(super) size: Option<[u32; 2]>,
+    /// Path depth; 1 is directly seen light, -1 is unlimited.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub(super) max_depth: Option<i64>,
+    /// The camera, by id or as in `sensor[1]`.
+    #[arg(long, value_name = "ID")]
+    pub(super) sensor: Option<String>,
+    /// No progress and no summary.
+    #[arg(long)]
+    pub(super) quiet: bool,
+    /// Value of a `<default>` of the scene.
+    #[arg(short = 'D', value_name = "NAME=VALUE", value_parser = assignment)]
+    defaults: Vec<(String, String)>,
+    /// Value of a key of the job, such as `parameter.NAME.value=0.3`.
+    #[arg(long, value_name = "KEY=VALUE", value_parser = assignment)]
+    set: Vec<(String, String)>,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct GradOptions {
+    #[command(flatten)]
+    pub(super) common: Options,
+    /// Store each term of a derivative in a layer of its own.
+    #[arg(long)]
+    pub(super) terms: bool,
+    /// Gradient of the distance to a target image (not available yet).
+    #[arg(long, value_name = "FILE.exr")]
+    pub(super) loss: Option<PathBuf>,
+    /// Gradient of a loss given by its derivative image (not available yet).
+    #[arg(long, value_name = "FILE.exr")]
+    pub(super) adjoint: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct BenchOptions {
+    /// Jobs to measure.
+    _jobs: Vec<PathBuf>,
+    /// Image that errors are measured against.
+    #[arg(long, value_name = "FILE")]
+    _reference: Option<PathBuf>,
+}
+
+impl Options {
+    pub(super) fn overrides(&self) -> Overrides {
+        Overrides { set: self.set.clone(), defaults: self.defaults.iter().cloned().collect() }
+    }
+
+    /// Refuses job keys where there is no job.
+    pub(super) fn refuse_set(&self) -> Result<(), CliError> {
+        match self.set.first() {
+            None => Ok(()),
+            Some((key, _)) => Err(CliError::argument(format!(
+                "--set {key}: {} is a scene, which has no job keys; use -D for its defaults",
+                self.input.display()
+            ))),
+        }
+    }
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => {
+            Ok((key.trim().into(), value.trim().into()))
+        }
+        _ => Err("expected NAME=VALUE".into()),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|v| *v > 0.0 && v.is_finite());
+    value.ok_or_else(|| "expected a positive number".into())
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=65_536).contains(n));
+    let sides = text.split_once('x').and_then(|(w, h)| Some([side(w)?, side(h)?]));
+    sides.ok_or_else(|| "expected two numbers of pixels such as 640x480".into())
+}

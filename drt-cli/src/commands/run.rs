@@ -1,0 +1,133 @@
+//! From options to a finished rendering.
+
+use std::time::Instant;
+
+use drt_estimators::{Layer, Rendering, Session, Settings, finite_differences};
+use drt_motion::Parameter;
+
+use super::monitor::Monitor;
+use super::noise::largest_noise;
+use super::options::Options;
+use crate::job::depth;
+use crate::{CliError, Job, load_job};
+
+/// Samples per pixel of the first pass where time or noise decides when to stop.
+const FIRST_PASS: u32 = 16;
+
+/// Opens the input and lays the options over it.
+pub(super) fn open(options: &Options) -> Result<Job, CliError> {
+    let overrides = options.overrides();
+    let is_job = options.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    let mut job = if is_job {
+        load_job(&options.input, &overrides)?
+    } else {
+        options.refuse_set()?;
+        Job::from_scene(&options.input, &overrides.defaults)?
+    };
+    if let Some(name) = &options.sensor {
+        job.select_sensor(name)?;
+    }
+    if let (Some(film), Some(sensor)) =
+        (options.size, job.scene.sensors.get_mut(job.settings.sensor))
+    {
+        let resized = sensor.item.sensor.with_film(film);
+        sensor.item.sensor = resized.map_err(|e| CliError::argument(format!("--size: {e}")))?;
+    }
+    let settings = &mut job.settings;
+    settings.spp = options.spp.unwrap_or(settings.spp);
+    settings.seed = options.seed.unwrap_or(settings.seed);
+    settings.threads = options.threads.unwrap_or(settings.threads);
+    if let Some(value) = options.max_depth {
+        let depth = depth(value).map_err(|e| CliError::argument(format!("--max-depth: {e}")))?;
+        settings.max_depth = Some(depth);
+    }
+    Ok(job)
+}
+
+/// Opens an input that must be a job with derivatives that can be computed.
+pub(super) fn open_with_parameters(options: &Options) -> Result<Job, CliError> {
+    let job = open(options)?;
+    if job.text.is_none() {
+        return Err(CliError::argument(format!(
+            "{} is a scene; derivatives need a job, a .toml file with parameters",
+            options.input.display()
+        )));
+    }
+    job.require_derivatives()?;
+    Ok(job)
+}
+
+/// Prepares a job with derivatives by some of its parameters.
+pub(super) fn prepare(job: &Job, parameters: &[Parameter<String>]) -> Result<Session, CliError> {
+    if job.scene.sensors.is_empty() {
+        let place = crate::error::Place::file(&job.scene_path);
+        return Err(CliError::input(&place, "the scene has no <sensor>"));
+    }
+    Session::new(&job.scene, parameters, &job.settings).map_err(|e| job.blame(&e))
+}
+
+/// Prepares the image alone, at the parameters' values.
+pub(super) fn prepare_forward(job: &Job) -> Result<Session, CliError> {
+    // At zero, effects change nothing, and without parameters nothing is spent on derivatives.
+    let at_rest = job.parameters.iter().all(|p| p.value == 0.0);
+    prepare(job, if at_rest { &[] } else { &job.parameters })
+}
+
+/// Finite differences of every parameter; `None` when they were interrupted.
+pub(super) fn differences(
+    job: &Job,
+    spp: u32,
+    step: f64,
+    monitor: &Monitor,
+) -> Result<Option<Vec<Layer>>, CliError> {
+    let settings = Settings { spp, ..job.settings.clone() };
+    let layers = finite_differences(&job.scene, &job.parameters, &settings, step, monitor)
+        .map_err(|e| job.blame(&e))?;
+    Ok((layers.len() == job.parameters.len()).then_some(layers))
+}
+
+/// Samples until the options say that it is enough.
+pub(super) fn sample(
+    session: &mut Session,
+    options: &Options,
+    spp: u32,
+    monitor: &Monitor,
+) -> Rendering {
+    let by_count = options.seconds.is_none() && options.target_error.is_none();
+    if by_count {
+        session.run(spp, monitor);
+        return session.rendering();
+    }
+    let start = Instant::now();
+    let limit = options.spp.unwrap_or(u32::MAX);
+    let mut pass = u32::min(FIRST_PASS, limit);
+    let mut done = 0;
+    loop {
+        if !session.run(pass, monitor) {
+            return session.rendering();
+        }
+        done += pass;
+        let rendering = session.rendering();
+        let elapsed = start.elapsed().as_secs_f64();
+        let mut left = limit - done;
+        let mut part = f64::from(done) / f64::from(limit);
+        if let Some(seconds) = options.seconds {
+            left = u32::min(left, ((seconds - elapsed) * f64::from(done) / elapsed) as u32);
+            part = part.max(elapsed / seconds);
+        }
+        if let Some(target) = options.target_error {
+            // Noise falls with the square root of the number of samples.
+            let needed = (largest_noise(&rendering) / target).powi(2);
+            let reached = needed <= 1.0;
+            left =
+                if reached { 0 } else { u32::min(left, (f64::from(done) * needed) as u32 - done) };
+            part = part.max(1.0 / needed);
+        }
+        // Pairs of mirrored image points are not torn apart.
+        pass = u32::min(left, done).next_multiple_of(2);
+        if left < 2 || pass > limit - done {
+            return rendering;
+        }
+        monitor.stage(&format!("{done} spp"), part, f64::min(1.0, 2.0 * part));
+    }
+}

@@ -1,0 +1,41 @@
+//! Tables of text.
+
+use std::fmt;
+
+/// Rows under heads, each column as wide as its widest entry.
+pub(super) struct Table<const N: usize> {
+    heads: [&'static str; N],
+    rows: Vec<[String; N]>,
+}
+
+impl<const N: usize> Table<N> {
+    pub(super) fn new(
+        heads: [&'static str; N],
+        rows: impl IntoIterator<Item = [String; N]>,
+    ) -> Self {
+        Self { heads, rows: rows.into_iter().collect() }
+    }
+}
+
+impl<const N: usize> fmt::Display for Table<N> {
+    /// Nothing at all without rows.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.rows.is_empty() {
+            return Ok(());
+        }
+        let width = |c: usize| {
+            let cells = self.rows.iter().map(|row| row[c].chars().count());
+            cells.fold(self.heads[c].chars().count(), usize::max)
+        };
+        let heads = self.heads.map(String::from);
+        for row in std::iter::once(&heads).chain(&self.rows) {
+            let line: String = row
+                .iter()
+                .enumerate()
+                .map(|(c, cell)| format!("{cell:w$}  ", w = width(c)))
+                .collect();
+            writeln!(f, "{}", line.trim_end())?;
+        }
+        writeln!(f)
+    }
+}

@@ -1,0 +1,224 @@
+//! The digest: a result in numbers, small enough to compare by programs.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use drt_estimators::{Counters, Estimate, Layer, MediumPlan, Plan, Rendering};
+use drt_math::Rgb;
+use serde::{Serialize, Serializer};
+
+use crate::CliError;
+use crate::atomic::write_atomically;
+
+/// What a digest says beyond the rendering itself.
+#[derive(Clone, Debug)]
+pub struct RunFacts {
+    /// The command, such as `grad`.
+    pub command: &'static str,
+    /// The scene file.
+    pub scene: String,
+    /// The job file, where there was one.
+    pub job: Option<String>,
+    /// Names the random numbers.
+    pub seed: u64,
+    /// Wall time spent.
+    pub seconds: f64,
+    /// Processor time spent by all threads.
+    pub cpu_seconds: f64,
+    /// Threads used.
+    pub threads: usize,
+}
+
+/// Agreement of one derivative with finite differences, as `check` reports it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Verdict {
+    /// The parameter's name.
+    pub parameter: String,
+    /// Root mean square of z over blocks and channels.
+    pub rms_z: f64,
+    /// Largest |z|.
+    pub max_z: f64,
+    /// What chance passes once in 1000 images.
+    pub limit: f64,
+    /// Root mean square standard error of the derivative over that of its value.
+    pub relative_noise: f64,
+    /// True when the two agree.
+    pub agrees: bool,
+}
+
+#[derive(Serialize)]
+struct Digest<'a> {
+    program: &'static str,
+    command: &'static str,
+    scene: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    job: Option<&'a str>,
+    width: u32,
+    height: u32,
+    seed: u64,
+    spp: u32,
+    seconds: f64,
+    cpu_seconds: f64,
+    threads: usize,
+    complete: bool,
+    non_finite: u64,
+    image: Summary,
+    #[serde(serialize_with = "as_map")]
+    derivatives: Vec<(&'a str, Summary)>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    checks: &'a [Verdict],
+    plan: PlanSummary<'a>,
+    counters: WorkDone,
+}
+
+/// The plan under the names of the digest.
+#[derive(Serialize)]
+struct PlanSummary<'a> {
+    media: Vec<MediumSummary<'a>>,
+    record: bool,
+    moving_shapes: &'a [String],
+    edges: [u64; 2],
+    primary: bool,
+    borders: bool,
+    direct: bool,
+    indirect: bool,
+    flux_shapes: &'a [String],
+    antithetic: bool,
+    skipped: &'a [String],
+}
+
+#[derive(Serialize)]
+struct MediumSummary<'a> {
+    medium: &'a str,
+    tracking: &'a str,
+    motion: BTreeMap<&'a str, &'a str>,
+}
+
+impl<'a> From<&'a Plan> for PlanSummary<'a> {
+    fn from(plan: &'a Plan) -> Self {
+        let medium = |m: &'a MediumPlan| MediumSummary {
+            medium: &m.medium,
+            tracking: &m.tracking,
+            motion: m.motion.iter().map(|(p, how)| (p.as_str(), how.as_str())).collect(),
+        };
+        Self {
+            media: plan.media.iter().map(medium).collect(),
+            record: plan.record,
+            moving_shapes: &plan.moving_shapes,
+            edges: plan.edges,
+            primary: plan.primary,
+            borders: plan.borders,
+            direct: plan.direct,
+            indirect: plan.indirect,
+            flux_shapes: &plan.flux_shapes,
+            antithetic: plan.antithetic,
+            skipped: &plan.skipped,
+        }
+    }
+}
+
+/// The counters under the names of the digest.
+#[derive(Serialize)]
+struct WorkDone {
+    paths: u64,
+    rays: u64,
+    recorded_vertices: u64,
+    differentiated_paths: u64,
+    boundary_samples: u64,
+    border_samples: u64,
+    flux_samples: u64,
+    tracking_steps: u64,
+}
+
+impl From<&Counters> for WorkDone {
+    fn from(c: &Counters) -> Self {
+        Self {
+            paths: c.paths,
+            rays: c.rays,
+            recorded_vertices: c.recorded_vertices,
+            differentiated_paths: c.differentiated_paths,
+            boundary_samples: c.boundary_samples,
+            border_samples: c.border_samples,
+            flux_samples: c.flux_samples,
+            tracking_steps: c.tracking_steps,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Summary {
+    mean: [f64; 3],
+    stderr: [f64; 3],
+    blocks: Blocks,
+}
+
+#[derive(Serialize)]
+struct Blocks {
+    grid: [usize; 2],
+    mean: Vec<[f64; 3]>,
+    stderr: Vec<[f64; 3]>,
+}
+
+impl Summary {
+    fn of(layer: &Layer) -> Self {
+        let all =
+            |part: fn(&Estimate) -> Rgb| layer.blocks.iter().map(|b| part(b).to_array()).collect();
+        Self {
+            mean: layer.total.mean.to_array(),
+            stderr: layer.total.stderr.to_array(),
+            blocks: Blocks {
+                grid: [drt_estimators::BLOCKS; 2],
+                mean: all(|e| e.mean),
+                stderr: all(|e| e.stderr),
+            },
+        }
+    }
+}
+
+/// Pairs as a map that keeps their order.
+fn as_map<S: Serializer>(pairs: &[(&str, Summary)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(pairs.iter().map(|(name, value)| (name, value)))
+}
+
+/// The digest as JSON text.
+#[must_use]
+pub fn digest(rendering: &Rendering, facts: &RunFacts, checks: &[Verdict]) -> String {
+    let derivatives = rendering.derivatives.iter();
+    let digest = Digest {
+        program: crate::PROGRAM,
+        command: facts.command,
+        scene: &facts.scene,
+        job: facts.job.as_deref(),
+        width: rendering.image.size[0],
+        height: rendering.image.size[1],
+        seed: facts.seed,
+        spp: rendering.spp,
+        seconds: facts.seconds,
+        cpu_seconds: facts.cpu_seconds,
+        threads: facts.threads,
+        complete: rendering.complete,
+        non_finite: rendering.non_finite,
+        image: Summary::of(&rendering.image),
+        derivatives: derivatives.map(|d| (d.name.as_str(), Summary::of(&d.total))).collect(),
+        checks,
+        plan: (&rendering.plan).into(),
+        counters: (&rendering.counters).into(),
+    };
+    // Serialising plain numbers and strings to memory has no way to fail.
+    serde_json::to_string(&digest).unwrap_or_default()
+}
+
+/// Writes a digest; `-` is the standard output.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write_digest(path: &Path, text: &str) -> Result<(), CliError> {
+    use std::io::Write;
+    if path.as_os_str() == "-" {
+        let mut out = std::io::stdout().lock();
+        return writeln!(out, "{text}")
+            .and_then(|()| out.flush())
+            .map_err(|e| CliError::write(path, e));
+    }
+    write_atomically(path, |out| Ok(writeln!(out, "{text}")?))
+}

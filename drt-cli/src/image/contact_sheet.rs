@@ -1,0 +1,89 @@
+//! A PNG to look at: the image, and beside it each derivative under its name.
+
+use std::path::Path;
+
+use drt_estimators::{Layer, Rendering};
+
+use super::font;
+use super::tone::{self, Pixel};
+use crate::CliError;
+use crate::atomic::write_atomically;
+
+const BACKGROUND: Pixel = [38, 38, 40];
+const INK: Pixel = [225, 225, 225];
+/// Blank pixels around panels.
+const MARGIN: usize = 6;
+/// Panels narrower than this are enlarged by a whole factor.
+const LEAST_PANEL: usize = 160;
+
+struct Canvas {
+    width: usize,
+    height: usize,
+    pixels: Vec<Pixel>,
+}
+
+impl Canvas {
+    fn new(width: usize, height: usize) -> Self {
+        Self { width, height, pixels: vec![BACKGROUND; width * height] }
+    }
+
+    fn set(&mut self, x: usize, y: usize, color: Pixel) {
+        if x < self.width && y < self.height {
+            self.pixels[y * self.width + x] = color;
+        }
+    }
+}
+
+/// Writes a preview. Without derivatives it is the image alone, pixel for pixel.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_preview(
+    path: &Path,
+    rendering: &Rendering,
+    further: &[(String, &Layer)],
+) -> Result<(), CliError> {
+    let image = tone::exposed(&rendering.image);
+    let derivatives = rendering.derivatives.iter();
+    let mut panels: Vec<(String, Vec<Pixel>)> =
+        derivatives.map(|d| (format!("d_{}", d.name), tone::diverging(&d.total))).collect();
+    panels.extend(further.iter().map(|(name, layer)| (name.clone(), tone::diverging(layer))));
+    let [w, h] = rendering.image.size.map(|n| n as usize);
+    let canvas = if panels.is_empty() {
+        Canvas { width: w, height: h, pixels: image }
+    } else {
+        panels.insert(0, ("image".into(), image));
+        sheet(&panels, [w, h])
+    };
+    write_atomically(path, |out| {
+        let mut encoder = png::Encoder::new(out, canvas.width as u32, canvas.height as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(canvas.pixels.as_flattened())?;
+        Ok(writer.finish()?)
+    })
+}
+
+/// Panels of one size in a grid, each above its name.
+fn sheet(panels: &[(String, Vec<Pixel>)], [w, h]: [usize; 2]) -> Canvas {
+    let zoom = LEAST_PANEL.div_ceil(w).clamp(1, 16);
+    let columns = (panels.len() as f64).sqrt().ceil() as usize;
+    let cell = [w * zoom + MARGIN, h * zoom + font::HEIGHT + 2 * MARGIN];
+    let rows = panels.len().div_ceil(columns);
+    let mut canvas = Canvas::new(columns * cell[0] + MARGIN, rows * cell[1] + MARGIN);
+    for (i, (name, pixels)) in panels.iter().enumerate() {
+        let [left, top] = [i % columns * cell[0] + MARGIN, i / columns * cell[1] + MARGIN];
+        for y in 0..h * zoom {
+            for x in 0..w * zoom {
+                canvas.set(left + x, top + y, pixels[y / zoom * w + x / zoom]);
+            }
+        }
+        let fitting = w * zoom / font::ADVANCE;
+        font::draw(&name.chars().take(fitting).collect::<String>(), |x, y| {
+            canvas.set(left + x, top + h * zoom + MARGIN / 2 + y, INK);
+        });
+    }
+    canvas
+}

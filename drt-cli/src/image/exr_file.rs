@@ -1,0 +1,185 @@
+//! OpenEXR: the image, derivatives, terms and standard errors as layers of one file.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use drt_estimators::{Estimate, Layer, Rendering};
+use drt_math::Rgb;
+use exr::error::Error;
+use exr::meta::attribute::{AttributeValue, Text};
+use exr::prelude::SmallVec;
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, LayerAttributes, ReadChannels, ReadLayers,
+    WritableImage,
+};
+
+use crate::CliError;
+use crate::atomic::write_atomically;
+use crate::error::Place;
+
+/// Where an image comes from; stored with it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Provenance {
+    /// The scene file.
+    pub scene: String,
+    /// The job file and its text, where there was one.
+    pub job: Option<(String, String)>,
+    /// Names the random numbers.
+    pub seed: u64,
+    /// Wall time spent.
+    pub seconds: f64,
+}
+
+/// An EXR file as read: colours by layer name, the plain `R`, `G`, `B` under the empty name.
+#[derive(Clone, Debug, Default)]
+pub struct ExrFile {
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// Pixels of each layer, row by row from the top left; missing channels are zero.
+    pub layers: BTreeMap<String, Vec<[f32; 3]>>,
+    /// Attributes, as text.
+    pub attributes: BTreeMap<String, String>,
+}
+
+const CHANNELS: [&str; 3] = ["R", "G", "B"];
+
+/// Writes a result, with further images (such as finite differences) by layer name.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_exr(
+    path: &Path,
+    rendering: &Rendering,
+    further: &[(String, &Layer)],
+    provenance: &Provenance,
+) -> Result<(), CliError> {
+    let [width, height] = rendering.image.size;
+    let mut channels: SmallVec<[_; 4]> = SmallVec::new();
+    for (name, layer) in layers(rendering, further) {
+        let errors = if name.is_empty() { "stderr".into() } else { format!("{name}_stderr") };
+        add_channels(&mut channels, &name, layer, |e| e.mean);
+        add_channels(&mut channels, &errors, layer, |e| e.stderr);
+    }
+    let layer = exr::prelude::Layer::new(
+        (width as usize, height as usize),
+        attributes(rendering, provenance),
+        Encoding::SMALL_LOSSLESS,
+        AnyChannels::sort(channels),
+    );
+    let image = exr::prelude::Image::from_layer(layer);
+    write_atomically(path, |out| Ok(image.write().non_parallel().to_buffered(out)?))
+}
+
+/// All images of a result by layer name.
+fn layers<'a>(
+    rendering: &'a Rendering,
+    further: &'a [(String, &'a Layer)],
+) -> impl Iterator<Item = (String, &'a Layer)> {
+    let derivatives = rendering.derivatives.iter().flat_map(|d| {
+        let terms = d.terms.iter();
+        std::iter::once((format!("d_{}", d.name), &d.total))
+            .chain(terms.map(|(term, layer)| (format!("d_{}.{}", d.name, term.name()), layer)))
+    });
+    std::iter::once((String::new(), &rendering.image))
+        .chain(derivatives)
+        .chain(further.iter().map(|(name, layer)| (name.clone(), *layer)))
+}
+
+fn add_channels(
+    channels: &mut SmallVec<[AnyChannel<FlatSamples>; 4]>,
+    layer: &str,
+    image: &Layer,
+    part: impl Fn(&Estimate) -> Rgb,
+) {
+    for (c, channel) in CHANNELS.into_iter().enumerate() {
+        let samples = image.pixels.iter().map(|p| part(p).to_array()[c] as f32).collect();
+        let name = if layer.is_empty() { channel.into() } else { format!("{layer}.{channel}") };
+        channels.push(AnyChannel::new(text(&name), FlatSamples::F32(samples)));
+    }
+}
+
+fn attributes(rendering: &Rendering, provenance: &Provenance) -> LayerAttributes {
+    let string = |s: &str| AttributeValue::Text(text(s));
+    let mut own = vec![
+        ("drt_scene", string(&provenance.scene)),
+        // As text: the format has no 64-bit integers.
+        ("drt_seed", string(&provenance.seed.to_string())),
+        ("drt_spp", string(&rendering.spp.to_string())),
+        ("drt_seconds", AttributeValue::F64(provenance.seconds)),
+        ("drt_complete", AttributeValue::I32(i32::from(rendering.complete))),
+    ];
+    if let Some((job, job_text)) = &provenance.job {
+        own.push(("drt_job", string(job)));
+        own.push(("drt_job_text", string(job_text)));
+    }
+    LayerAttributes {
+        software_name: Some(text(crate::PROGRAM)),
+        other: own.into_iter().map(|(name, value)| (text(name), value)).collect(),
+        ..LayerAttributes::default()
+    }
+}
+
+/// UTF-8 in the format's byte strings.
+fn text(s: &str) -> Text {
+    Text::from_slice_unchecked(s.as_bytes())
+}
+
+/// Reads the colours of an EXR file of one or several parts.
+///
+/// # Errors
+/// When it cannot be read, is malformed, has parts of several sizes or no colour channels.
+pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
+    let fail = |reason: &dyn std::fmt::Display| CliError::input(&Place::file(path), reason);
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .non_parallel()
+        .from_file(path)
+        .map_err(|e: Error| fail(&e))?;
+    let mut file = ExrFile::default();
+    for part in &image.layer_data {
+        let size = [part.size.width() as u32, part.size.height() as u32];
+        if file.layers.is_empty() {
+            file.size = size;
+        } else if file.size != size {
+            return Err(fail(&"its parts differ in size; expected one size"));
+        }
+        let prefix = part.attributes.layer_name.as_ref().map(ToString::to_string);
+        for channel in &part.channel_data.list {
+            let name = channel.name.to_string();
+            let (layer, channel_name) = name.rsplit_once('.').unwrap_or(("", &name));
+            let Some(c) = CHANNELS.iter().position(|n| *n == channel_name) else { continue };
+            let layer = match prefix.as_deref() {
+                Some(prefix) if layer.is_empty() => prefix.into(),
+                Some(prefix) => format!("{prefix}.{layer}"),
+                None => layer.into(),
+            };
+            let pixels = file.layers.entry(layer);
+            let pixels = pixels.or_insert_with(|| vec![[0.0; 3]; channel.sample_data.len()]);
+            for (pixel, value) in pixels.iter_mut().zip(channel.sample_data.values_as_f32()) {
+                pixel[c] = value;
+            }
+        }
+        let standard =
+            part.attributes.software_name.iter().map(|s| ("software".into(), s.to_string()));
+        let other = part.attributes.other.iter().chain(&image.attributes.other);
+        file.attributes.extend(standard);
+        file.attributes.extend(other.filter_map(|(k, v)| Some((k.to_string(), show(v)?))));
+    }
+    if file.layers.is_empty() {
+        return Err(fail(&"it has no channels R, G or B"));
+    }
+    Ok(file)
+}
+
+fn show(value: &AttributeValue) -> Option<String> {
+    match value {
+        AttributeValue::Text(t) => Some(t.to_string()),
+        AttributeValue::F64(v) => Some(v.to_string()),
+        AttributeValue::I32(v) => Some(v.to_string()),
+        _ => None,
+    }
+}

@@ -1,0 +1,9 @@
+//! Image files: EXR with everything, PNG to look at.
+
+mod contact_sheet;
+mod exr_file;
+mod font;
+mod tone;
+
+pub use contact_sheet::write_preview;
+pub use exr_file::{ExrFile, Provenance, read_exr, write_exr};
