@@ -1,1 +1,16 @@
-//! Cross-crate tests of the drt family
+//! What the cross-crate tests of the drt family share: the oracle file, scenes built from it,
+//! measurements to a given noise, and their judge.
+
+#![forbid(unsafe_code)]
+
+pub mod detector;
+pub mod judge;
+pub mod measure;
+pub mod motion;
+pub mod oracle;
+pub mod region;
+pub mod scene;
+pub mod trial;
+
+/// A result whose error is for a reader of test output.
+pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;

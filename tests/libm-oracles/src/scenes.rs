@@ -1,0 +1,90 @@
+//! Scenes in code.
+
+use std::sync::Arc;
+
+use drt_estimators::emitter::Emitter;
+use drt_estimators::filter::{Filter, FilterKind};
+use drt_estimators::sensor::{Lens, Sensor};
+use drt_estimators::surface::{Bsdf, Diffuse};
+use drt_estimators::{
+    Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding,
+};
+use drt_geom::Mesh;
+use drt_math::{Affine, Mat3, Rgb, Vec3};
+use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, ValueChange};
+
+pub(crate) const BLACK: usize = 0;
+pub(crate) const NULL: usize = 1;
+pub(crate) const GREY: usize = 2;
+
+/// Nothing but the scattering models above, the given light and the given sensor.
+pub(crate) fn empty(light: Emitter, sensor: Sensor) -> Scene {
+    let light = SceneEmitter { emitter: light, medium: Surrounding::Counted };
+    let sensor = SceneSensor { sensor, medium: Surrounding::Counted, sample_count: None };
+    let diffuse = |reflectance| Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(reflectance) });
+    Scene {
+        bsdfs: [diffuse(0.0), Bsdf::Null, diffuse(0.7)].map(Named::anonymous).into(),
+        emitters: vec![Named::new("light", light)],
+        sensors: vec![Named::new("sensor", sensor)],
+        integrator: Integrator::default(),
+        ..Scene::default()
+    }
+}
+
+pub(crate) fn shape(id: &str, mesh: Mesh, bsdf: usize) -> Shape {
+    Shape { id: Some(id.into()), mesh: Arc::new(mesh), bsdf, boundary: None, emitter: None }
+}
+
+/// The same shape around medium 0.
+pub(crate) fn filled(shape: Shape) -> Shape {
+    Shape { boundary: Some(MediumBoundary { interior: Some(0), exterior: None }), ..shape }
+}
+
+/// The same shape with the scene's light on it.
+pub(crate) fn shining(shape: Shape) -> Shape {
+    Shape { emitter: Some(0), ..shape }
+}
+
+pub(crate) fn triangle(corners: [[f64; 3]; 3]) -> Mesh {
+    Mesh::new(corners.map(Vec3::from).into(), vec![[0, 1, 2]]).expect("a valid mesh")
+}
+
+pub(crate) fn quad(corners: [[f64; 3]; 4]) -> Mesh {
+    Mesh::new(corners.map(Vec3::from).into(), vec![[0, 1, 2], [0, 2, 3]]).expect("a valid mesh")
+}
+
+/// A camera with one pixel under a tent that reaches `half_width` in the image plane at distance
+/// one, around the image point `center`.
+pub(crate) fn pixel(
+    position: [f64; 3],
+    [right, up, forward]: [[f64; 3]; 3],
+    center: [f64; 2],
+    half_width: f64,
+) -> Sensor {
+    let mut lens = Lens::with_fov(2.0 * (0.5 * half_width).atan().to_degrees());
+    lens.principal_point_offset = [center[0] / half_width, -center[1] / half_width];
+    let cols = [-Vec3::from(right), Vec3::from(up), Vec3::from(forward)];
+    let to_world = Affine { linear: Mat3 { cols }, translation: Vec3::from(position) };
+    let filter = Filter::new(FilterKind::TENT).expect("a valid filter");
+    Sensor::from_to_world(&to_world, lens, [1, 1], filter).expect("a valid camera")
+}
+
+pub(crate) fn moves(name: &str, target: &str, velocity: [f64; 3]) -> Parameter {
+    parameter(name, target, Change::Geometry(GeometryChange::Translate(Vec3::from(velocity))))
+}
+
+pub(crate) fn deforms(name: &str, target: &str, velocities: &[[f64; 3]]) -> Parameter {
+    let velocities: Vec<_> = velocities.iter().copied().map(Vec3::from).collect();
+    parameter(name, target, Change::Geometry(GeometryChange::VertexVelocity(velocities.into())))
+}
+
+pub(crate) fn grows(name: &str, target: &str, property: &str) -> Parameter {
+    let op = ValueChange::Add(Rgb::splat(1.0));
+    let change = PropertyChange { property: property.into(), op, voxels: None };
+    parameter(name, target, Change::Property(change))
+}
+
+fn parameter(name: &str, target: &str, change: Change) -> Parameter {
+    let effects = vec![Effect { target: target.into(), change }];
+    Parameter { name: name.into(), value: 0.0, effects }
+}

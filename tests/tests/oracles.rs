@@ -1,0 +1,61 @@
+//! Every oracle, value and derivatives, each within four standard errors.
+
+use drt_tests::judge::{Row, Table, rows};
+use drt_tests::measure::{Effort, measure};
+use drt_tests::oracle::OracleFile;
+use drt_tests::trial::Trial;
+
+/// Runs all cases of a kind and judges them.
+fn check(kind: &str, effort: &Effort) {
+    let file = OracleFile::read().unwrap();
+    let mut all: Vec<Row> = Vec::new();
+    for case in file.cases.iter().filter(|c| c.kind == kind) {
+        for trial in Trial::of_case(case).unwrap() {
+            let measured = measure(&trial, effort).unwrap();
+            assert_eq!(measured.non_finite, 0, "{}", trial.name);
+            all.extend(rows(&trial, &measured, effort));
+        }
+    }
+    println!("{}", Table(&all));
+    assert!(!all.is_empty(), "the file has no case of kind `{kind}`");
+    let failing = all.iter().filter(|row| !row.passes()).count();
+    assert_eq!(failing, 0, "{failing} of {} numbers fail", all.len());
+}
+
+macro_rules! kinds {
+    ($($kind:ident: $noise:expr, $samples:expr;)*) => {
+        $(#[test] fn $kind() {
+            check(stringify!($kind), &Effort { noise: $noise, samples: $samples });
+        })*
+
+        /// No case is passed over.
+        #[test]
+        fn every_kind_is_known() {
+            let known = [$(stringify!($kind)),*];
+            for case in OracleFile::read().unwrap().cases {
+                assert!(known.contains(&&*case.kind), "{}: unknown kind `{}`", case.id, case.kind);
+            }
+        }
+    };
+}
+
+kinds! {
+    irradiance_polygon: 0.003, 1 << 17;
+    irradiance_polygon_occluder_edge: 0.003, 1 << 17;
+    irradiance_polygon_occluder_inside: 0.003, 1 << 17;
+    irradiance_polygon_absorbing_medium: 0.003, 1 << 17;
+    furnace_closed_enclosure: 0.003, 1 << 16;
+    absorbing_emitting_box: 0.003, 1 << 17;
+    grid_transmittance: 0.003, 1 << 17;
+    single_scatter_infinite: 0.003, 1 << 17;
+    single_scatter_box: 0.003, 1 << 17;
+    volumetric_shadow_ray: 0.003, 1 << 17;
+    volumetric_shadow_pixel: 0.003, 1 << 17;
+    pixel_emissive_triangle: 0.003, 1 << 17;
+    pixel_floor_shadow: 0.003, 1 << 17;
+    one_bounce_irradiance: 0.003, 1 << 17;
+    null_interface_two_media: 0.003, 1 << 17;
+    area_light_volumetric_penumbra_ray: 0.003, 1 << 17;
+    area_light_volumetric_penumbra_pixel: 0.003, 1 << 17;
+    multiple_scattering_slab: 0.01, 1 << 16;
+}
