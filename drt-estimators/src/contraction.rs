@@ -41,6 +41,15 @@ impl Motion {
         Self { tangents, insides, interest }
     }
 
+    /// Media whose coefficients change, and whether albedo or emission do.
+    pub(crate) fn samples_media(&self) -> impl Iterator<Item = (usize, bool)> {
+        self.tangents.media.iter().enumerate().filter_map(|(m, tangents)| {
+            let source = tangents.iter().any(|(_, t)| !t.albedo.is_zero() || !t.emission.is_zero());
+            let density = tangents.iter().any(|(_, t)| !t.sigma_t.is_zero());
+            (source || density).then_some((m, source))
+        })
+    }
+
     pub(crate) fn parameters(&self) -> usize {
         self.tangents.names.len()
     }

@@ -7,8 +7,9 @@ use drt_math::Rgb;
 use drt_motion::Parameter;
 
 use crate::Error;
+use crate::contraction::Contraction;
 use crate::film::{Blocks, PixelFilm, Tile};
-use crate::interior::PixelSampler;
+use crate::interior::{AlongRays, PixelSampler};
 use crate::parallel::Pool;
 use crate::rendering::Layer;
 use crate::scene::Scene;
@@ -103,8 +104,9 @@ impl Pair<'_> {
     fn tile(&self, pixels: core::ops::Range<u32>, units: u32, blocks: &Blocks) -> Tile {
         let mut tile = Tile::new(pixels.clone(), 1);
         let seed = self.settings.seed;
-        let [mut low, mut high] =
-            [0, 1].map(|k| PixelSampler::new(&self.worlds[k], None, None, seed, false, false));
+        let [mut low, mut high]: [PixelSampler<'_, Contraction<'_>>; 2] = [0, 1].map(|k| {
+            PixelSampler::new(&self.worlds[k], None, AlongRays::default(), seed, false, false)
+        });
         let mut values = [[Rgb::ZERO]; 2];
         for pixel in pixels {
             for unit in 0..units {

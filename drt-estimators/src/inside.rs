@@ -104,7 +104,7 @@ fn mismatch(mesh: &Mesh, surface: &SurfaceMotion, volume: &VolumeMotion) -> bool
 }
 
 /// The scattering or emitting media that each shape touches.
-fn adjacency(world: &World) -> Vec<Vec<usize>> {
+pub(crate) fn adjacency(world: &World) -> Vec<Vec<usize>> {
     let scene = &world.scene;
     scene
         .shapes

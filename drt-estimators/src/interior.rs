@@ -4,26 +4,83 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Rng};
 
-use crate::contraction::{Contraction, Motion};
+use crate::boundary::shadow::{self, Shadows};
+use crate::contraction::Contraction;
 use crate::flux::{self, Flux};
 use crate::rendering::{Counters, NonFinite, Term};
-use crate::sensitivity::AdjointSink;
+use crate::sensitivity::{AdjointSink, Functional};
 use crate::transport::{Differentiator, PathRecord, Radiance, Tracer, World};
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
 pub(crate) const LINE_STREAM: u64 = 1 << 62;
 
+/// Boundary and flux terms that are found along camera rays.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct AlongRays<'a> {
+    pub(crate) flux: Option<&'a Flux>,
+    pub(crate) shadows: Option<&'a Shadows>,
+}
+
+impl AlongRays<'_> {
+    /// The terms kept in layers of their own, where terms are kept apart.
+    pub(crate) fn terms(&self) -> impl Iterator<Item = Term> {
+        let flux = self.flux.map(|_| Term::Flux);
+        flux.into_iter().chain(self.shadows.map(|_| Term::Direct))
+    }
+
+    /// Layers of a sample: the image, a derivative per parameter, and where terms are kept apart
+    /// those of each parameter.
+    pub(crate) fn layers(&self, parameters: usize, separate: bool) -> usize {
+        1 + parameters * (1 + if separate { self.terms().count() } else { 0 })
+    }
+}
+
+/// Where the derivatives of a pixel's paths go.
+pub(crate) trait PathSink: AdjointSink {
+    /// A path's sensitivities follow.
+    fn begin(&mut self);
+    /// They are complete; layers of `values` may be added to.
+    fn finish(&mut self, values: &mut [Rgb]);
+    /// A boundary or flux contribution found along the camera ray.
+    fn functional(&mut self, f: &Functional, value: Rgb, values: &mut [Rgb]);
+    /// Layers that each separately kept term takes.
+    fn layers(&self) -> usize;
+}
+
+impl PathSink for Contraction<'_> {
+    fn begin(&mut self) {
+        self.clear();
+    }
+    fn finish(&mut self, values: &mut [Rgb]) {
+        for (v, r) in values.iter_mut().zip(&self.rates) {
+            *v += *r;
+        }
+    }
+    fn functional(&mut self, f: &Functional, value: Rgb, values: &mut [Rgb]) {
+        if self.evaluate(f) {
+            for (v, r) in values.iter_mut().zip(&self.rates) {
+                *v += value * r.r;
+            }
+        }
+    }
+    fn layers(&self) -> usize {
+        self.rates.len()
+    }
+}
+
 /// Samples pixels and differentiates what it traces.
-pub(crate) struct PixelSampler<'a> {
+pub(crate) struct PixelSampler<'a, S> {
     world: &'a World,
     seed: u64,
     antithetic: bool,
     tracer: Tracer<'a>,
     record: PathRecord,
     differentiator: Differentiator<'a>,
-    contraction: Option<Contraction<'a>>,
+    pub(crate) sink: Option<S>,
     flux: Option<&'a Flux>,
-    buffers: flux::Buffers,
+    shadows: Option<&'a Shadows>,
+    flux_buffers: flux::Buffers,
+    shadow_buffers: shadow::Buffers,
     separate: bool,
     pub(crate) non_finite: Vec<NonFinite>,
     pub(crate) non_finite_count: u64,
@@ -34,11 +91,11 @@ pub(crate) struct PixelSampler<'a> {
 /// Non-finite samples that are described one by one.
 const DESCRIBED: usize = 8;
 
-impl<'a> PixelSampler<'a> {
+impl<'a, S: PathSink> PixelSampler<'a, S> {
     pub(crate) fn new(
         world: &'a World,
-        motion: Option<&'a Motion>,
-        flux: Option<&'a Flux>,
+        sink: Option<S>,
+        along: AlongRays<'a>,
         seed: u64,
         antithetic: bool,
         separate: bool,
@@ -50,21 +107,17 @@ impl<'a> PixelSampler<'a> {
             tracer: Tracer::new(world),
             record: PathRecord::default(),
             differentiator: Differentiator::new(world),
-            contraction: motion.map(|m| Contraction::new(world, m)),
-            flux,
-            buffers: flux::Buffers::default(),
+            sink,
+            flux: along.flux,
+            shadows: along.shadows,
+            flux_buffers: flux::Buffers::default(),
+            shadow_buffers: shadow::Buffers::default(),
             separate,
             non_finite: Vec::new(),
             non_finite_count: 0,
             differentiated: 0,
             recorded: 0,
         }
-    }
-
-    /// Layers of a sample: the image, a derivative per parameter, and where flux is kept apart that
-    /// of each parameter.
-    pub(crate) fn layers(parameters: usize, separate_flux: bool) -> usize {
-        1 + parameters * if separate_flux { 2 } else { 1 }
     }
 
     /// Work done so far.
@@ -97,12 +150,12 @@ impl<'a> PixelSampler<'a> {
 
     fn path(&mut self, pixel: u32, unit: u32, u: [f64; 2], rng: Rng, values: &mut [Rgb]) {
         let camera = &self.world.camera;
-        let derivative = self.contraction.is_some();
+        let derivative = self.sink.is_some();
         let s = camera.sample_view(pixel, u, derivative);
         let dir = s.direction;
         let weight = Rgb::splat(s.weight);
         self.tracer.rng = rng;
-        let Some(contraction) = &mut self.contraction else {
+        let Some(sink) = &mut self.sink else {
             let mut radiance = Radiance::default();
             self.tracer.from_camera(dir, weight, &mut radiance);
             values[0] += radiance.0;
@@ -112,26 +165,32 @@ impl<'a> PixelSampler<'a> {
         self.tracer.from_camera(dir, weight, &mut self.record);
         values[0] += self.record.value;
         self.recorded += self.record.nodes.len() as u64;
-        let n = contraction.rates.len();
-        if contraction.interest().any() {
+        let n = sink.layers();
+        if sink.interest().any() {
             self.differentiated += 1;
             let line = Rng::new(self.seed, LINE_STREAM | u64::from(pixel), unit);
-            contraction.clear();
-            self.differentiator.differentiate(&self.record, s.slope, line, contraction);
-            for (v, r) in values[1..=n].iter_mut().zip(&contraction.rates) {
-                *v += *r;
-            }
+            sink.begin();
+            self.differentiator.differentiate(&self.record, s.slope, line, sink);
+            sink.finish(&mut values[1..=n]);
         }
+        // Each kept apart goes to layers of its own, in the order of `AlongRays::terms`.
+        let mut at = 1;
         if let Some(flux) = self.flux {
-            let at = if self.separate { 1 + n } else { 1 };
-            let (tracer, buffers) = (&mut self.tracer, &mut self.buffers);
-            flux.along_camera_ray(tracer, dir, buffers, |functional, value| {
-                if contraction.evaluate(functional) {
-                    for (v, r) in values[at..at + n].iter_mut().zip(&contraction.rates) {
-                        *v += value * weight * r.r;
-                    }
-                }
+            at += if self.separate { n } else { 0 };
+            flux.along_camera_ray(&mut self.tracer, dir, &mut self.flux_buffers, |f, value| {
+                sink.functional(f, value * weight, &mut values[at..at + n]);
             });
+        }
+        if let Some(shadows) = self.shadows {
+            at += if self.separate { n } else { 0 };
+            shadows.along_camera_ray(
+                &mut self.tracer,
+                dir,
+                &mut self.shadow_buffers,
+                |f, value| {
+                    sink.functional(f, value * weight, &mut values[at..at + n]);
+                },
+            );
         }
     }
 

@@ -17,7 +17,9 @@ mod inside;
 mod interior;
 mod parallel;
 mod plan;
+mod prepared;
 mod rendering;
+mod reverse;
 mod scene;
 mod sensitivity;
 pub mod sensor;
@@ -33,6 +35,7 @@ pub use error::Error;
 pub use finite_difference::finite_differences;
 pub use plan::{MediumPlan, Plan};
 pub use rendering::{BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term};
+pub use reverse::{SceneGradient, gradient};
 pub use scene::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding, Target,
 };

@@ -135,30 +135,9 @@ impl Functional {
                     sink.surface(&point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
                 }
                 Rate::Volume(medium, x, n) => sink.volume(medium, x, &weight.outer(n), Rgb::ZERO),
-                Rate::Emitter(e, g) => sink.emitter(e, &weight.to_array().map(|w| scaled(&g, w))),
-                Rate::Sensor(g) => sink.sensor(&weight.to_array().map(|w| scaled_sensor(&g, w))),
+                Rate::Emitter(e, g) => sink.emitter(e, &weight.to_array().map(|w| g.scaled(w))),
+                Rate::Sensor(g) => sink.sensor(&weight.to_array().map(|w| g.scaled(w))),
             }
         }
-    }
-}
-
-fn scaled(g: &EmitterGradient, w: f64) -> EmitterGradient {
-    EmitterGradient {
-        strength: g.strength * w,
-        position: g.position * w,
-        direction: g.direction * w,
-        cutoff_angle: g.cutoff_angle * w,
-        beam_width: g.beam_width * w,
-    }
-}
-
-fn scaled_sensor(g: &SensorGradient, w: f64) -> SensorGradient {
-    SensorGradient {
-        position: g.position * w,
-        right: g.right * w,
-        up: g.up * w,
-        forward: g.forward * w,
-        pixel_size: g.pixel_size * w,
-        principal: g.principal.map(|p| p * w),
     }
 }

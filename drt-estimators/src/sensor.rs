@@ -13,9 +13,9 @@ mod footprint;
 mod lens;
 mod motion;
 mod pinhole;
-mod view;
 #[cfg(test)]
 mod tests;
+mod view;
 
 use drt_math::{Affine, Mat3, Vec3, fm};
 use thiserror::Error;
@@ -24,8 +24,8 @@ use crate::filter::{Filter, FilterError};
 
 pub use footprint::{Footprint, PixelWeight};
 pub use lens::{FovAxis, Lens};
-pub use view::{Response, ViewSample};
 pub use pinhole::{Pinhole, Projection, SensorGradient, SensorTangent};
+pub use view::{Response, ViewSample};
 
 /// A camera that cannot be used.
 #[derive(Clone, Debug, Error, PartialEq)]

@@ -6,18 +6,19 @@ use core::cell::Cell;
 
 use drt_motion::Parameter;
 
-use crate::boundary::{Boundary, Strategy};
-use crate::contraction::Motion;
+use crate::boundary::Strategy;
+use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm, Tile};
-use crate::flux::Flux;
 use crate::inside;
 use crate::interior::PixelSampler;
 use crate::parallel::Pool;
 use crate::plan::{MediumPlan, Plan};
+use crate::prepared::Prepared;
 use crate::rendering::{Counters, Derivative, Layer, NonFinite, Rendering, Term};
 use crate::scene::Scene;
+use crate::sensitivity::Interest;
 use crate::settings::Settings;
-use crate::splatting::{Account, Checked, Source, Splatter, ToImages};
+use crate::splatting::{Account, Checked, Source, ToImages};
 use crate::tangents;
 use crate::transport::World;
 use crate::{Error, Estimate};
@@ -55,11 +56,8 @@ pub struct FinishedTile<'a> {
 
 /// A prepared scene and what has been accumulated for it.
 pub struct Session {
-    world: World,
+    prepared: Prepared,
     motion: Option<Motion>,
-    boundary: Boundary,
-    flux: Option<Flux>,
-    sources: Vec<Source>,
     settings: Settings,
     plan: Plan,
     blocks: Blocks,
@@ -84,7 +82,7 @@ impl Session {
         parameters: &[Parameter],
         settings: &Settings,
     ) -> Result<Self, Error> {
-        check(settings)?;
+        settings.check()?;
         scene.check()?;
         let (scene, tangents) = tangents::apply(scene, parameters, settings.sensor)?;
         let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
@@ -94,23 +92,21 @@ impl Session {
             Motion::new(tangents, insides)
         });
         if let Some(motion) = &motion {
-            world.prepare_for_derivatives(motion);
+            world.prepare_for_derivatives(motion.samples_media());
         }
-        let moving = motion.as_ref().is_some_and(|m| m.interest.moves_geometry());
-        let boundary = if moving { Boundary::new(&world)? } else { Boundary::default() };
-        let flux = match &motion {
-            Some(m) => Flux::new(&world, &m.insides.flux_shapes)?,
-            None => None,
-        };
-        let sources = sources(&world, &boundary, flux.as_ref(), moving);
-        let plan = describe(&world, motion.as_ref(), &boundary, &sources, settings);
-        let size = world.camera.film();
+        let nothing = Interest::default();
+        let interest = motion.as_ref().map_or(&nothing, |m| &m.interest);
+        let flux_shapes = motion.as_ref().map_or(&[][..], |m| &m.insides.flux_shapes);
+        let prepared = Prepared::new(world, interest, flux_shapes, settings)?;
+        let plan = describe(&prepared, motion.as_ref());
+        let size = prepared.world.camera.film();
         let parameters = motion.as_ref().map_or(0, Motion::parameters);
-        let layers = PixelSampler::layers(parameters, settings.terms && flux.is_some());
+        let layers = prepared.along_rays().layers(parameters, settings.terms);
+        let films = prepared.sources.iter().map(|_| SplatFilm::new(size, parameters)).collect();
         Ok(Self {
             blocks: Blocks::new(size),
             pixels: PixelFilm::new(size, layers),
-            splats: sources.iter().map(|_| SplatFilm::new(size, parameters)).collect(),
+            splats: films,
             pool: Pool::new(settings.threads),
             settings: settings.clone(),
             counters: Counters::default(),
@@ -119,11 +115,8 @@ impl Session {
             samples: 0,
             passes: 0,
             complete: true,
-            world,
+            prepared,
             motion,
-            boundary,
-            flux,
-            sources,
             plan,
         })
     }
@@ -140,7 +133,7 @@ impl Session {
         let per_unit = if self.plan.antithetic { 2 } else { 1 };
         let units = spp.div_ceil(per_unit);
         // The share of the work that is done when the pixels are.
-        let share = if self.sources.is_empty() { 1.0 } else { 0.5 };
+        let share = if self.prepared.sources.is_empty() { 1.0 } else { 0.5 };
         let slice = (units / 16).clamp(1, 32);
         let mut done = 0;
         let mut going = true;
@@ -155,9 +148,9 @@ impl Session {
                 self.samples += n * per_unit;
             }
         }
-        for i in 0..self.sources.len() {
+        for i in 0..self.prepared.sources.len() {
             if going {
-                let n = self.sources.len() as f64;
+                let n = self.prepared.sources.len() as f64;
                 going = self.run_splats(i, spp, control, |part| {
                     control.progress(share + (1.0 - share) * (i as f64 + part) / n);
                 });
@@ -170,14 +163,14 @@ impl Session {
 
     /// Samples every pixel `units` times more.
     fn run_pixels(&mut self, units: u32, control: &dyn Control, progress: impl Fn(f64)) -> bool {
-        let [w, h] = self.world.camera.film();
+        let [w, h] = self.prepared.world.camera.film();
         let count = w * h;
         let tiles = count.div_ceil(TILE);
         let parameters = self.motion.as_ref().map_or(0, Motion::parameters);
-        let separate = self.settings.terms && self.flux.is_some();
-        let layers = PixelSampler::layers(parameters, separate);
+        let (along, separate) = (self.prepared.along_rays(), self.settings.terms);
+        let layers = along.layers(parameters, separate);
         let first = self.pixels.units();
-        let (world, motion, flux) = (&self.world, self.motion.as_ref(), self.flux.as_ref());
+        let (world, motion) = (&self.prepared.world, self.motion.as_ref());
         let (settings, blocks) = (&self.settings, &self.blocks);
         let antithetic = self.plan.antithetic;
         let mut finished = Vec::with_capacity(tiles as usize);
@@ -188,8 +181,9 @@ impl Session {
             |t| {
                 let range = t * TILE..u32::min(count, (t + 1) * TILE);
                 let mut tile = Tile::new(range.clone(), layers);
+                let sink = motion.map(|m| Contraction::new(world, m));
                 let mut sampler =
-                    PixelSampler::new(world, motion, flux, settings.seed, antithetic, separate);
+                    PixelSampler::new(world, sink, along, settings.seed, antithetic, separate);
                 let mut values = alloc::vec![drt_math::Rgb::ZERO; layers];
                 for pixel in range {
                     for unit in first..first + units {
@@ -236,20 +230,9 @@ impl Session {
         progress: impl Fn(f64),
     ) -> bool {
         let Some(motion) = &self.motion else { return true };
-        let [w, h] = self.world.camera.film();
-        let source = self.sources[i];
-        let ratio = self
-            .settings
-            .boundary_spp
-            .map_or(1.0, |b| f64::from(b) / f64::from(self.settings.spp.max(1)));
-        let samples = f64::from(spp) * ratio * f64::from(w) * f64::from(h);
-        let per_batch = (samples / (self.sources.len() * BATCHES) as f64).max(1.0) as u32;
-        let splatter = Splatter {
-            world: &self.world,
-            boundary: &self.boundary,
-            flux: self.flux.as_ref(),
-            seed: self.settings.seed,
-        };
+        let source = self.prepared.sources[i];
+        let per_batch = self.prepared.samples_per_batch(&self.settings, spp);
+        let splatter = self.prepared.splatter(self.settings.seed);
         let mut pass = self.splats[i].begin();
         let first = self.passes * BATCHES as u32;
         let blocks = &self.blocks;
@@ -258,7 +241,7 @@ impl Session {
             first..first + BATCHES as u32,
             1,
             |b| {
-                let mut receiver = Checked::new(ToImages::new(&self.world, motion));
+                let mut receiver = Checked::new(ToImages::new(&self.prepared.world, motion));
                 let stream = source.stream() + u64::from(b);
                 let account = splatter.run(source, stream, per_batch, &mut receiver);
                 (receiver.inner.splats, account)
@@ -303,15 +286,16 @@ impl Session {
     fn derivatives(&self) -> Vec<Derivative> {
         let Some(motion) = &self.motion else { return Vec::new() };
         let n = motion.parameters();
-        let separate = self.settings.terms && self.flux.is_some();
+        let along = self.prepared.along_rays();
+        let kept_apart: Vec<Term> = along.terms().filter(|_| self.settings.terms).collect();
         (0..n)
             .map(|p| {
                 let mut parts =
                     alloc::vec![(Term::Interior, self.pixels.layer(1 + p, &self.blocks))];
-                if separate {
-                    parts.push((Term::Flux, self.pixels.layer(1 + n + p, &self.blocks)));
+                for (i, term) in kept_apart.iter().enumerate() {
+                    parts.push((*term, self.pixels.layer(1 + (i + 1) * n + p, &self.blocks)));
                 }
-                for (source, film) in self.sources.iter().zip(&self.splats) {
+                for (source, film) in self.prepared.sources.iter().zip(&self.splats) {
                     parts.push((source.term(), film.layer(p)));
                 }
                 let total = sum(parts.iter().map(|(_, l)| l)).unwrap_or_else(|| parts[0].1.clone());
@@ -337,56 +321,17 @@ fn sum<'a>(layers: impl Iterator<Item = &'a Layer>) -> Option<Layer> {
     })
 }
 
-fn check(settings: &Settings) -> Result<(), Error> {
-    if !(settings.step > 0.0 && settings.step.is_finite()) {
-        return Err(Error::Setting {
-            setting: "step".into(),
-            reason: alloc::format!("is {}; expected a positive number", settings.step),
-        });
-    }
-    Ok(())
-}
-
-/// The splatted sources that can contribute.
-fn sources(world: &World, boundary: &Boundary, flux: Option<&Flux>, moving: bool) -> Vec<Source> {
-    let mut sources = Vec::new();
-    if moving {
-        for strategy in [Strategy::Primary, Strategy::Direct, Strategy::Indirect] {
-            if boundary.offers(world, strategy) {
-                sources.push(Source::Edges(strategy));
-            }
-        }
-        if world.camera.has_borders() {
-            sources.push(Source::Borders);
-        }
-    }
-    if flux.is_some() && world.max_depth >= 3 {
-        sources.push(Source::Flux);
-    }
-    sources
-}
-
-fn describe(
-    world: &World,
-    motion: Option<&Motion>,
-    boundary: &Boundary,
-    sources: &[Source],
-    settings: &Settings,
-) -> Plan {
-    let has = |s: Source| sources.contains(&s);
+fn describe(prepared: &Prepared, motion: Option<&Motion>) -> Plan {
+    let world = &prepared.world;
+    let has = |s: Source| prepared.sources.contains(&s);
     let mut plan = Plan {
-        media: world
-            .scene
-            .media
-            .iter()
-            .enumerate()
-            .map(|(i, _)| medium_plan(world, motion, i))
-            .collect(),
-        edges: boundary.count,
+        media: (0..world.scene.media.len()).map(|i| medium_plan(world, motion, i)).collect(),
+        edges: prepared.boundary.count,
         primary: has(Source::Edges(Strategy::Primary)),
-        direct: has(Source::Edges(Strategy::Direct)),
+        direct: has(Source::Edges(Strategy::Direct)) || prepared.boundary.shadows.is_some(),
         indirect: has(Source::Edges(Strategy::Indirect)),
         borders: has(Source::Borders),
+        antithetic: prepared.antithetic,
         ..Plan::default()
     };
     let mut skip = |what: &str| plan.skipped.push(String::from(what));
@@ -404,10 +349,6 @@ fn describe(
         skip("flux: every inside follows its surfaces");
     }
     plan.record = motion.interest.any();
-    // The filter's rate is what mirrored pairs cancel; without it they only cost.
-    plan.antithetic = settings.antithetic
-        && motion.interest.moves_geometry()
-        && world.camera.filter().is_continuous();
     plan.moving_shapes = motion
         .interest
         .shapes

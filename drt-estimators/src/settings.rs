@@ -53,3 +53,19 @@ impl Default for Settings {
         }
     }
 }
+
+impl Settings {
+    /// Checks what cannot be meant.
+    ///
+    /// # Errors
+    /// Names the setting.
+    pub(crate) fn check(&self) -> Result<(), crate::Error> {
+        if self.step > 0.0 && self.step.is_finite() {
+            return Ok(());
+        }
+        Err(crate::Error::Setting {
+            setting: "step".into(),
+            reason: alloc::format!("is {}; expected a positive number", self.step),
+        })
+    }
+}

@@ -65,8 +65,7 @@ pub(crate) fn sample<R: Receiver>(
     let mut along = [0.0; 2];
     along[axis] = 1.0;
     let x = vertex.map_or(camera.position() + dir, |v| v.x);
-    let (point, mut sensor) =
-        camera.view_gradient(&camera.view(x), along, 0.0);
+    let (point, mut sensor) = camera.view_gradient(&camera.view(x), along, 0.0);
     let items = &mut b.functional.items;
     items.clear();
     match vertex {

@@ -96,8 +96,13 @@ impl Edge {
         (h0, if y.dot(h1) < 0.0 { -y } else { y })
     }
 
-    /// A point of the edge, for the uniform number `u`.
-    fn point(&self, world: &World, u: f64) -> (Vec3, SurfacePoint) {
+    /// Its first end, and the vector to its second.
+    pub(crate) fn line(&self) -> (Vec3, Vec3) {
+        (self.a, self.b - self.a)
+    }
+
+    /// The point at `u` of the way along the edge.
+    pub(crate) fn point(&self, world: &World, u: f64) -> (Vec3, SurfacePoint) {
         let mut bary = [0.0; 3];
         bary[self.corners[0] as usize] = 1.0 - u;
         bary[self.corners[1] as usize] = u;

@@ -18,10 +18,12 @@
 //! | [`direct`](Strategy::Direct) | any, or silhouette from the light | from a sampled light | the light | beyond |
 //! | [`indirect`](Strategy::Indirect) | any | drawn around the edge | traced | traced |
 //!
-//! `direct` and `indirect` both find area lights; they share them by the balance heuristic.
+//! `direct` and `indirect` both find area lights; they share them by the balance heuristic. Shadows of
+//! directly lit media, seen directly, are left to [`shadow`] where that serves.
 
 pub(crate) mod border;
 mod edges;
+pub(crate) mod shadow;
 
 use alloc::vec::Vec;
 
@@ -29,6 +31,8 @@ use drt_math::{Rgb, Vec3};
 
 use edges::{EdgePoint, sine};
 pub(crate) use edges::{EdgeTable, collect, seen_along, seen_from};
+
+use shadow::Shadows;
 
 use crate::Error;
 use crate::emitter::{Emitter, EmitterGradient};
@@ -59,6 +63,8 @@ pub(crate) struct Boundary {
     camera: Option<EdgeTable>,
     /// Silhouettes from each delta light, by emitter.
     lights: Vec<Option<EdgeTable>>,
+    /// Shadow boundaries in media that are found along camera rays instead.
+    pub(crate) shadows: Option<Shadows>,
     /// Edges kept and edges in all.
     pub(crate) count: [u64; 2],
 }
@@ -109,7 +115,8 @@ impl Boundary {
                 _ => Ok(None),
             })
             .collect::<Result<_, _>>()?;
-        Ok(Self { count: [edges.len() as u64, all], general, camera, lights })
+        let shadows = Shadows::new(world, &edges);
+        Ok(Self { count: [edges.len() as u64, all], general, camera, lights, shadows })
     }
 
     /// True when a strategy can find anything.
@@ -253,7 +260,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
             };
             self.b.functional.items.push(Rate::Emitter(emitter, gradient));
             self.end_rate(&d.0, n * -l);
-            self.deliver(&d.0, d.1, w, s.weight * scale);
+            self.deliver(&d.0, d.1, true, w, s.weight * scale);
         }
         Some(())
     }
@@ -283,7 +290,8 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
                 self.share_emission(&s, w, 1.0 / inv_pdf);
                 lit = true;
             }
-            self.deliver(&d, only_camera, w, s.weight * scale);
+            let emits = s.vertex.as_ref().is_some_and(|v| v.surface().is_some());
+            self.deliver(&d, only_camera, emits, w, s.weight * scale);
         }
         Some(())
     }
@@ -316,7 +324,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
             self.edge_rate(at, n);
             self.end_rate(s, n * -(1.0 - l));
             self.end_rate(&d, n * -l);
-            self.deliver(&d, only_camera, w, s.weight * scale);
+            self.deliver(&d, only_camera, true, w, s.weight * scale);
         }
         Some(())
     }
@@ -465,20 +473,37 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         self.b.light.within(longest)
     }
 
-    /// Walks from D to the camera and hands on what arrives.
-    fn deliver(&mut self, d: &End, only_camera: bool, w: Vec3, value: Rgb) {
+    /// True when [`shadow`] has the paths on which the emission of S lights a volume vertex that the
+    /// camera sees.
+    fn left_to_shadows(&self, s_emits: bool, d: &Vertex, segments: u32) -> bool {
+        s_emits
+            && segments == 1
+            && matches!(d.kind, Kind::Volume(_))
+            && self.boundary.shadows.is_some()
+    }
+
+    /// Walks from D to the camera and hands on what arrives. `s_emits` tells that the light over no
+    /// segments is an emitter's.
+    fn deliver(&mut self, d: &End, only_camera: bool, s_emits: bool, w: Vec3, value: Rgb) {
         let Some(vertex) = d.vertex else { return };
+        let world = self.tracer.world;
+        let only_emission = self.b.light.0.len() == 1;
+        if only_camera && only_emission && self.left_to_shadows(s_emits, &vertex, 1) {
+            return;
+        }
         if !self.receiver.moves(&self.b.functional) {
             return;
         }
-        let world = self.tracer.world;
         // Camera segments beyond D, with one more for the boundary segment itself.
         let longest = world.max_depth - 1;
         let longest = if only_camera { u32::min(longest, 1) } else { longest };
         self.b.splats.clear();
         self.tracer.importance(vertex, -w, longest, d.flight, &mut self.b.splats);
         for s in &self.b.splats {
-            let light = self.b.light.within(world.max_depth - 1 - s.segments);
+            let mut light = self.b.light.within(world.max_depth - 1 - s.segments);
+            if self.left_to_shadows(s_emits, &vertex, s.segments) {
+                light -= self.b.light.within(0);
+            }
             let v = value * d.weight * light * s.value;
             if !v.is_zero() {
                 self.receiver.receive(s.pixel, v);

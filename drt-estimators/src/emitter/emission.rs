@@ -141,6 +141,19 @@ impl EmitterTangent {
 }
 
 impl EmitterGradient {
+    /// A multiple.
+    #[inline]
+    #[must_use]
+    pub fn scaled(&self, w: f64) -> Self {
+        Self {
+            strength: self.strength * w,
+            position: self.position * w,
+            direction: self.direction * w,
+            cutoff_angle: self.cutoff_angle * w,
+            beam_width: self.beam_width * w,
+        }
+    }
+
     /// The derivative along a tangent.
     #[inline]
     #[must_use]

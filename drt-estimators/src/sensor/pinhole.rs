@@ -170,6 +170,20 @@ impl SensorTangent {
 }
 
 impl SensorGradient {
+    /// A multiple.
+    #[inline]
+    #[must_use]
+    pub fn scaled(&self, w: f64) -> Self {
+        Self {
+            position: self.position * w,
+            right: self.right * w,
+            up: self.up * w,
+            forward: self.forward * w,
+            pixel_size: self.pixel_size * w,
+            principal: self.principal.map(|p| p * w),
+        }
+    }
+
     /// The derivative along a tangent.
     #[inline]
     #[must_use]

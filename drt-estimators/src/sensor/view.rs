@@ -145,7 +145,8 @@ mod tests {
             assert!((fd - d).abs() < 1e-8);
             let field = Affine { linear: drt_math::Mat3::skew(axis), translation: axis };
             let at = |s: f64| {
-                let map = Affine { linear: drt_math::Mat3::rotation(axis, s), translation: axis * s };
+                let map =
+                    Affine { linear: drt_math::Mat3::rotation(axis, s), translation: axis * s };
                 ln(&meter.moved(&map).unwrap(), x)
             };
             let fd = (at(h) - at(-h)) / (2.0 * h);

@@ -58,8 +58,7 @@ impl Tracer<'_> {
             if beta.is_zero() {
                 return;
             }
-            let weight =
-                flight.as_ref().map_or(1.0, |f| f.weight(world.camera.position(), 1.0));
+            let weight = flight.as_ref().map_or(1.0, |f| f.weight(world.camera.position(), 1.0));
             self.splat(&vertex, wi, beta * weight, segments, splats);
             if segments == longest {
                 return;

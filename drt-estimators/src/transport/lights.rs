@@ -31,6 +31,16 @@ pub(crate) struct Choice {
     entry: Entry,
 }
 
+impl Choice {
+    /// 1 over the density per area of a point of a chosen area emitter.
+    pub(crate) fn inverse_area_pdf(&self) -> f64 {
+        match self.entry {
+            Entry::Triangle { area, .. } => area / self.pmf,
+            _ => 0.0,
+        }
+    }
+}
+
 /// What was sampled.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum LightKind {
@@ -204,6 +214,17 @@ impl LightTable {
         Some(Choice { delta, is_area, pmf, entry })
     }
 
+    /// Samples a point of a chosen area emitter.
+    pub(crate) fn point_of(
+        &self,
+        world: &World,
+        choice: &Choice,
+        rng: &mut Rng,
+    ) -> Option<(SurfacePoint, Vec3)> {
+        let Entry::Triangle { prim, .. } = choice.entry else { return None };
+        Some(world.point(prim, triangle_bary(rng.next_2d())))
+    }
+
     /// Samples a point of a chosen area emitter, as seen from `x`.
     pub(crate) fn sample_area(
         &self,
@@ -212,8 +233,8 @@ impl LightTable {
         x: Vec3,
         rng: &mut Rng,
     ) -> Option<LightSample> {
-        let Entry::Triangle { emitter, prim, .. } = choice.entry else { return None };
-        let (point, y) = world.point(prim, triangle_bary(rng.next_2d()));
+        let Entry::Triangle { emitter, .. } = choice.entry else { return None };
+        let (point, y) = self.point_of(world, choice, rng)?;
         let d = y - x;
         let distance = d.length();
         let w = d / distance;

@@ -19,7 +19,7 @@
 //! sees each factor apart, so that a factor which is zero can still be differentiated (theory sheet
 //! §14.5).
 
-use drt_math::{Rgb, Rng, Vec3, warp};
+use drt_math::{Rgb, Rng, Vec3, fm, warp};
 use drt_medium::{Coefficients, DistanceSample, TrackingStats};
 
 use super::lights::{LightKind, LightSample, LightTable};
@@ -398,7 +398,7 @@ impl<'w> Tracer<'w> {
                             t: interval.start + t,
                             arrival: passed * weight,
                             crossed: i,
-                            density: proxy_extinction(world, m, Some(x)) * (-depth).exp(),
+                            density: proxy_extinction(world, m, Some(x)) * fm::exp(-depth),
                         });
                     }
                 }
@@ -611,7 +611,7 @@ impl<'w> Tracer<'w> {
         let depth: f64 = intervals(part.medium, &part.crossings, t)
             .filter_map(|i| i.medium.map(|m| proxy_extinction(world, m, None) * (i.end - i.start)))
             .sum();
-        let free = proxy_extinction(world, medium, Some(x)) * (-depth).exp();
+        let free = proxy_extinction(world, medium, Some(x)) * fm::exp(-depth);
         let tau = world.transmittance(origin, dir, part, &mut self.rng, &mut self.counters);
         Some(Flown {
             vertex: Vertex { x, medium: Some(medium), kind: Kind::Volume(None) },

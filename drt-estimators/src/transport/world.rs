@@ -10,7 +10,6 @@ use drt_medium::{Medium, TrackingStats};
 use super::lights::LightTable;
 use super::scatter::Scattering;
 use super::vertex::{Contact, Kind, SurfacePoint, Vertex};
-use crate::contraction::Motion;
 use crate::scene::{Scene, Surrounding};
 use crate::surface::Bsdf;
 use crate::{Counters, Error};
@@ -186,17 +185,13 @@ impl World {
     }
 
     /// Makes sure that what derivatives need is sampled where its value is zero (theory sheet §14.5):
-    /// vertices in media whose coefficients change.
-    pub(crate) fn prepare_for_derivatives(&mut self, motion: &Motion) {
-        for (m, tangents) in motion.tangents.media.iter().enumerate() {
-            let scatters = |t: &drt_medium::MediumTangent| {
-                !t.albedo.is_zero() || !t.emission.is_zero() || !t.sigma_t.is_zero()
-            };
-            if tangents.iter().any(|(_, t)| !t.albedo.is_zero() || !t.emission.is_zero()) {
+    /// vertices in media whose coefficients change. Each item is a medium, and whether its albedo or
+    /// emission changes.
+    pub(crate) fn prepare_for_derivatives(&mut self, media: impl Iterator<Item = (usize, bool)>) {
+        for (m, needs_vertices) in media {
+            self.defensive[m] = DEFENSIVE;
+            if needs_vertices {
                 self.tracking[m] = Tracking::Vertices;
-            }
-            if tangents.iter().any(|(_, t)| scatters(t)) {
-                self.defensive[m] = DEFENSIVE;
             }
         }
     }

@@ -1,0 +1,71 @@
+//! Everything sampling needs that does not depend on how many parameters there are.
+
+use alloc::vec::Vec;
+
+use crate::Error;
+use crate::boundary::{Boundary, Strategy};
+use crate::film::BATCHES;
+use crate::flux::Flux;
+use crate::interior::AlongRays;
+use crate::sensitivity::Interest;
+use crate::settings::Settings;
+use crate::splatting::{Source, Splatter};
+use crate::transport::World;
+
+/// A scene ready to be sampled for what is of interest.
+pub(crate) struct Prepared {
+    pub(crate) world: World,
+    pub(crate) boundary: Boundary,
+    pub(crate) flux: Option<Flux>,
+    /// Splatted terms that can contribute.
+    pub(crate) sources: Vec<Source>,
+    /// Image points come in mirrored pairs.
+    pub(crate) antithetic: bool,
+}
+
+impl Prepared {
+    pub(crate) fn new(
+        world: World,
+        interest: &Interest,
+        flux_shapes: &[usize],
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        let moving = interest.moves_geometry();
+        let boundary = if moving { Boundary::new(&world)? } else { Boundary::default() };
+        let flux = Flux::new(&world, flux_shapes)?;
+        let mut sources = Vec::new();
+        if moving {
+            for strategy in [Strategy::Primary, Strategy::Direct, Strategy::Indirect] {
+                if boundary.offers(&world, strategy) {
+                    sources.push(Source::Edges(strategy));
+                }
+            }
+            if world.camera.has_borders() {
+                sources.push(Source::Borders);
+            }
+        }
+        if flux.is_some() && world.max_depth >= 3 {
+            sources.push(Source::Flux);
+        }
+        // The filter's rate is what mirrored pairs cancel; without it they only cost.
+        let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
+        Ok(Self { world, boundary, flux, sources, antithetic })
+    }
+
+    pub(crate) fn along_rays(&self) -> AlongRays<'_> {
+        AlongRays { flux: self.flux.as_ref(), shadows: self.boundary.shadows.as_ref() }
+    }
+
+    pub(crate) fn splatter(&self, seed: u64) -> Splatter<'_> {
+        Splatter { world: &self.world, boundary: &self.boundary, flux: self.flux.as_ref(), seed }
+    }
+
+    /// Samples of each batch of each splatted source, when every pixel takes `spp`.
+    pub(crate) fn samples_per_batch(&self, settings: &Settings, spp: u32) -> u32 {
+        let [w, h] = self.world.camera.film();
+        let ratio =
+            settings.boundary_spp.map_or(1.0, |b| f64::from(b) / f64::from(settings.spp.max(1)));
+        let samples = f64::from(spp) * ratio * f64::from(w) * f64::from(h);
+        f64::max(samples / (self.sources.len().max(1) * BATCHES) as f64, 1.0) as u32
+    }
+}
