@@ -24,7 +24,7 @@ fn p01_lambert_triangle() {
         (deforms("turn", "lamp", &turn), 0.12559989055832),
         (moves("receiver", "sensor", [0.4, 0.1, -0.3]), -0.17879542108805),
     ];
-    judge(&scene, 0.64056791327105, &parameters, 1, 1 << 20);
+    judge(&scene, 0.64056791327105, &parameters, 1);
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn p06_absorbing_emitting_box() {
         (deforms("low face", "box", &low), 0.15994454016244),
         (moves("box", "box", [0.3, 0.5, -0.2]), 0.0),
     ];
-    judge(&scene, 0.92108240462589, &parameters, 1, 1 << 16);
+    judge(&scene, 0.92108240462589, &parameters, 1);
 }
 
 #[test]
@@ -61,12 +61,11 @@ fn p12_pixel_emissive_triangle() {
     let occluder = triangle([[-0.05, -0.3, 1.2], [0.2, -0.1, 1.3], [0.0, 0.1, 1.1]]);
     scene.shapes = vec![shining(shape("lamp", lamp, BLACK)), shape("occluder", occluder, BLACK)];
     let parameters = [
-        (deforms("vertex", "lamp", &[[0.0; 3], [0.0; 3], [0.2, 0.4, -0.3]]), 0.059475167357704),
         (moves("lamp", "lamp", [0.3, -0.2, 0.6]), -0.78924125466711),
         (moves("camera", "sensor", [0.5, 0.0, 0.2]), -0.47449655400322),
         (moves("occluder", "occluder", [0.0, 1.0, 0.0]), -8.3341001754736),
     ];
-    judge(&scene, 0.82873256271869, &parameters, 1, 1 << 18);
+    judge(&scene, 0.82873256271869, &parameters, 1);
 }
 
 #[test]
@@ -89,5 +88,5 @@ fn p13_pixel_floor_shadow() {
         (moves("floor", "floor", [0.0, 0.0, 1.0]), 0.63035141922801),
         (moves("camera", "sensor", [1.0, 0.0, 0.0]), 0.4929846044487),
     ];
-    judge(&scene, 0.079256635186462, &parameters, 2, 1 << 18);
+    judge(&scene, 0.079256635186462, &parameters, 2);
 }
