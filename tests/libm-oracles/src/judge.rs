@@ -13,13 +13,7 @@ const SAMPLES: u32 = 1 << 22;
 
 /// The run's estimates of `value` and of the derivatives in `parameters` must agree with the exact
 /// numbers, and disagree with numbers that are 10 % off.
-pub(crate) fn judge(
-    scene: &Scene,
-    value: f64,
-    parameters: &[(Parameter, f64)],
-    depth: u32,
-    spp: u32,
-) {
+pub(crate) fn judge(scene: &Scene, value: f64, parameters: &[(Parameter, f64)], depth: u32) {
     let (parameters, exact): (Vec<_>, Vec<_>) = parameters.iter().cloned().unzip();
     let settings =
         Settings { spp: SAMPLES, max_depth: Some(Some(depth)), seed: 11, ..Settings::default() };
