@@ -272,7 +272,8 @@ impl TryFrom<Parts> for Sensor {
 #[cfg(feature = "serde")]
 impl From<Sensor> for Parts {
     fn from(s: Sensor) -> Self {
-        Self { to_world: s.to_world(), lens: s.lens, film: s.film, filter: s.filter }
+        let (to_world, response) = (s.to_world(), s.response);
+        Self { to_world, lens: s.lens, film: s.film, filter: s.filter, response }
     }
 }
 

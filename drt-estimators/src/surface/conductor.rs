@@ -8,6 +8,7 @@ use super::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 /// A rough metal: the single-scattering microfacet reflection of Cook & Torrance in the form of
 /// Walter et al. 2007, eq. 20, with separable Smith masking; black from behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoughConductor<T = f64> {
     /// Distribution of the microfacets; default Beckmann.
     pub distribution: Distribution,

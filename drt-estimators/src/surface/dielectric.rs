@@ -11,6 +11,7 @@ use super::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 /// Radiance is transported: refraction carries the squared ratio of the indices, so that radiance
 /// over squared index is what the surface conserves.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RoughDielectric<T = f64> {
     /// Distribution of the microfacets; default Beckmann.
     pub distribution: Distribution,

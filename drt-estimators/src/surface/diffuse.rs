@@ -7,6 +7,7 @@ use super::property::{Property, Slot, SurfaceError, nonnegative};
 
 /// A Lambertian reflector: `fs = reflectance / pi` in front, black from behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Diffuse<T = f64> {
     /// Part of the incident power that is reflected; default 0.5.
     pub reflectance: Rgb<T>,

@@ -11,6 +11,7 @@ use super::visible_slope::{visible_area, visible_slope};
 
 /// Distribution of the normals of microfacets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Distribution {
     /// Gaussian slopes.
     #[default]

@@ -60,6 +60,7 @@ pub use property::{Property, SurfaceError};
 /// Fields are plain data: [`Bsdf::validate`] says whether they make sense, and everything else
 /// relies on it.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Bsdf {
     /// No surface at all: the border of a medium.
     Null,
@@ -77,6 +78,7 @@ pub enum Bsdf {
 
 /// One-sided reflectors used on both sides of a surface: from behind, the normal is turned over.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TwoSided {
     /// The side the normal points to.
     pub front: Bsdf,

@@ -13,6 +13,7 @@ use super::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 ///
 /// It conserves energy when `reflectance + specular_reflectance <= 1`; this is not enforced.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Phong<T = f64> {
     /// Weight of the diffuse lobe; default 0.5.
     pub reflectance: Rgb<T>,
