@@ -64,9 +64,9 @@ fn values_are_those_of_the_tree() {
                 / (n.normalize().dot(ray.dir.normalize()).abs());
             let (t, bary) = ray_plane(ray.origin, ray.dir, triangle);
             assert!((t - hit.t).abs() < tolerance * (1.0 + 1.0 / ray.dir.length()));
-            for k in 0..2 {
+            for (ours, theirs) in bary.into_iter().zip(hit.bary) {
                 let slack = tolerance * 10.0 / f64::min(e1.length(), e2.length());
-                assert!((bary[k] - hit.bary[k]).abs() < slack);
+                assert!((ours - theirs).abs() < slack);
             }
         });
     }

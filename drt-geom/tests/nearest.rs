@@ -89,21 +89,21 @@ fn assert_inside(m: &Mesh, inside: impl Fn(Vec3) -> Option<bool>, seed: u64) {
 
 #[test]
 fn inside_matches_closed_forms() {
-    let ball = |r: f64| (r < 0.99 || r > 1.01).then_some(r < 1.0);
+    let ball = |r: f64| (!(0.99..=1.01).contains(&r)).then_some(r < 1.0);
     assert_inside(&icosphere(4), |p| ball(p.length()), 7);
     assert_inside(&cube(), |p| Some(p.max_abs() < 1.0), 8);
     let bumpy = |p: Vec3| {
         let d = p.normalize();
         let bump = d.to_array().map(|c| (6.0 * c).sin());
         let r = p.length() / (1.0 + 0.4 * bump[0] * bump[1] * bump[2]);
-        (r < 0.97 || r > 1.03).then_some(r < 1.0)
+        (!(0.97..=1.03).contains(&r)).then_some(r < 1.0)
     };
     assert_inside(&bumpy_sphere(5, 0.4, 6.0), bumpy, 9);
     let torus =
         TorusKnot { p: 1, q: 0, minor: 0.0, tube: 0.5, segments: 128, sides: 64, major: 1.0 };
     let tube = |p: Vec3| {
         let r = (p.x.hypot(p.y) - 1.0).hypot(p.z) / 0.5;
-        (r < 0.98 || r > 1.01).then_some(r < 1.0)
+        (!(0.98..=1.01).contains(&r)).then_some(r < 1.0)
     };
     assert_inside(&torus_knot(&torus), tube, 10);
 }

@@ -73,10 +73,12 @@ fn concave_polygons_are_cut_right() {
     assert_eq!(m.surface_area(), 1.5);
 }
 
+type Expected = fn(&ObjErrorKind) -> bool;
+
 #[test]
 fn wrong_lines_are_named() {
     let four = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
-    let cases: [(&str, usize, fn(&ObjErrorKind) -> bool); 18] = [
+    let cases: [(&str, usize, Expected); 18] = [
         ("f 1 2 3 9", 5, |k| matches!(k, ObjErrorKind::MissingItem { index: 9, count: 4, .. })),
         ("f 1 2 -5", 5, |k| matches!(k, ObjErrorKind::MissingItem { index: -5, .. })),
         ("f 1 2 0", 5, |k| matches!(k, ObjErrorKind::BadCorner(_))),

@@ -25,6 +25,13 @@ fn placed(m: &Mesh, scale: f64, offset: f64) -> Mesh {
     m.transform(&Affine { linear, translation: vec3(1.0, -0.7, 0.3) * offset })
 }
 
+/// A closed convex surface of long thin triangles, askew.
+fn flattened(thickness: f64) -> Mesh {
+    let turn = Mat3::rotation(vec3(0.36, 0.48, 0.8), 0.8);
+    let squash = turn * Mat3::diagonal(vec3(1.0, thickness, 1.0 / thickness));
+    icosphere(2).transform(&Affine::about(squash, Vec3::ZERO))
+}
+
 /// A point of the surface and the triangles around it.
 struct Start {
     point: Vec3,
@@ -106,6 +113,24 @@ fn naming_the_own_triangle_is_not_even_needed() {
         for start in starts(&m, &mut rng) {
             let out = aim(&m, &start, 1.0, &mut rng).unwrap();
             assert_eq!(bvh.closest(&Ray::new(start.point, out), Skip::NOTHING), None);
+        }
+    }
+}
+
+/// Slivers, whose planes are known least.
+#[test]
+fn long_thin_surfaces_are_left_freely() {
+    let mut rng = Rng::new(5, 0, 0);
+    for thickness in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
+        for (scale, offset) in PLACES {
+            let m = placed(&flattened(thickness), scale, offset);
+            let bvh = TriangleBvh::of(&m).unwrap();
+            for start in starts(&m, &mut rng) {
+                // At the tips such directions are rare.
+                let Some(out) = aim(&m, &start, 1.0, &mut rng) else { continue };
+                let hit = bvh.closest(&Ray::new(start.point, out), Skip::one(start.prim));
+                assert_eq!(hit, None, "{thickness} {scale} {offset}");
+            }
         }
     }
 }

@@ -112,9 +112,11 @@ fn unused_vertices_are_left_out() {
     assert_eq!(m.source_vertex_count, 5);
 }
 
+type Expected = fn(&PlyErrorKind) -> bool;
+
 #[test]
 fn wrong_files_are_named() {
-    let cases: [(&str, &str, fn(&PlyErrorKind) -> bool); 16] = [
+    let cases: [(&str, &str, Expected); 16] = [
         ("ply\n", "plx\n", |k| matches!(k, PlyErrorKind::Header { .. })),
         ("ascii 1.0", "ascii 2.0", |k| matches!(k, PlyErrorKind::Header { .. })),
         ("ascii", "binary_middle_endian", |k| matches!(k, PlyErrorKind::Header { .. })),

@@ -122,7 +122,8 @@ impl Mesh {
         self.expect_per_vertex("normals", normals.len())?;
         for (vertex, n) in normals.iter_mut().enumerate() {
             // Unit normals stay as they are, bit for bit.
-            if !((n.length_squared() - 1.0).abs() <= 4.0 * f64::EPSILON) {
+            let is_unit = (n.length_squared() - 1.0).abs() <= 4.0 * f64::EPSILON;
+            if !is_unit {
                 *n = direction(*n).ok_or(MeshError::BadNormal { vertex })?;
             }
         }

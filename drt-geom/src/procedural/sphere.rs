@@ -98,7 +98,7 @@ pub fn bumpy_sphere(subdivisions: u32, amplitude: f64, frequency: f64) -> Mesh {
     let mut m = icosphere(subdivisions);
     for p in &mut m.positions {
         let [x, y, z] = p.to_array().map(|c| fm::sin(frequency * c));
-        *p = *p * (1.0 + amplitude * x * y * z);
+        *p *= 1.0 + amplitude * x * y * z;
     }
     m
 }

@@ -88,3 +88,48 @@ impl End {
             || (approach.abs() > approach_error && (distance > 0.0) == (approach > 0.0))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::End;
+
+    const TRIANGLE: [[f64; 3]; 3] = [[1.0, 1.0, 1.0], [2.0, 1.0, 1.5], [1.0, 2.0, 1.0]];
+    const NORMAL: [f64; 3] = [-0.5, 0.0, 1.0];
+
+    /// The middle of the edge from vertex 1 to vertex 2, lifted along the normal.
+    fn on_edge(lift: f64) -> End {
+        End::origin([0, 1, 2].map(|k| 0.5 * (TRIANGLE[1][k] + TRIANGLE[2][k]) + lift * NORMAL[k]))
+    }
+
+    #[test]
+    fn an_end_on_the_triangle_is_told_from_one_off_it() {
+        let toward = NORMAL.map(|c| -c);
+        for lift in [0.0, 2e-16, -2e-16, 1e-15] {
+            assert!(on_edge(lift).lies_on(&TRIANGLE, toward), "{lift}");
+        }
+        for lift in [1e-13, 1e-9, 1e-2] {
+            assert!(!on_edge(lift).lies_on(&TRIANGLE, toward), "{lift}");
+        }
+        let beside = End::origin([1.0 - 1e-13, 1.5, 1.0]);
+        assert!(!beside.lies_on(&TRIANGLE, toward));
+        assert!(!End::origin([f64::NAN, 1.5, 1.0]).lies_on(&TRIANGLE, toward));
+    }
+
+    #[test]
+    fn a_ray_that_leaves_the_plane_cannot_hit_it() {
+        assert!(on_edge(-1e-13).lies_on(&TRIANGLE, NORMAL.map(|c| -c)));
+        assert!(on_edge(1e-13).lies_on(&TRIANGLE, NORMAL));
+        assert!(!on_edge(-1e-13).lies_on(&TRIANGLE, NORMAL));
+    }
+
+    #[test]
+    fn far_ends_carry_the_error_of_their_sum() {
+        let [x, y, z] = [0, 1, 2].map(|k| 0.5 * (TRIANGLE[1][k] + TRIANGLE[2][k]));
+        let dir = [-1e6 / 3.0, 2e6 / 3.0, 1e6 / 7.0];
+        for t in [1.0, 0.1, 1e-3] {
+            let origin = [x - t * dir[0], y - t * dir[1], z - t * dir[2]];
+            let end = End::far(origin, dir, t);
+            assert!(end.lies_on(&TRIANGLE, [0.5, 0.0, -1.0]), "{t}");
+        }
+    }
+}

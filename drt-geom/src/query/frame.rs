@@ -22,8 +22,8 @@ const PADDING: f64 = 1.0 / (1 << 18) as f64;
 /// small t (obvhs does below 1e-4) then still see every box.
 const SPEED: f64 = 1.0 / (1 << 20) as f64;
 
-/// Direction coordinates nearer to zero than this are treated as this: over the whole scene it
-/// moves the ray by less than 1e-20.
+/// Direction coordinates nearer to zero than this are zero, and their inverse is that of this: over the
+/// whole scene either moves the ray by less than 1e-20.
 const STILL: f32 = 1e-30;
 
 /// The map from the scene's coordinates to those of the boxes.
@@ -44,7 +44,6 @@ pub(super) struct Box32 {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BoxRay {
     pub(super) origin: [f32; 3],
-    pub(super) dir: [f32; 3],
     pub(super) inverse: [f32; 3],
     /// Where the ray ends, in its own parameter.
     pub(super) far: f32,
@@ -105,13 +104,13 @@ impl BoxFrame {
         if !(near <= far && ray.t_max > 0.0) {
             return None;
         }
-        // Adding zero turns -0 into 0, for traversals that look at the sign.
-        let dir32 = dir.map(|d| (d / speed * SPEED) as f32 + 0.0);
-        let inverse = dir32.map(|d| if d.abs() < STILL { 1.0 / STILL } else { 1.0 / d });
+        let inverse = dir.map(|d| {
+            let d = (d / speed * SPEED) as f32;
+            if d.abs() < STILL { 1.0 / STILL } else { 1.0 / d }
+        });
         let rate = speed / SPEED;
         Some(BoxRay {
             origin: [0, 1, 2].map(|k| (origin[k] + near * dir[k]) as f32),
-            dir: dir32,
             inverse,
             far: ((far - near) * rate) as f32 + 1.0,
             start: near,

@@ -46,35 +46,22 @@ impl TriangleBvh {
     }
 }
 
-/// Weights of vertices 1 and 2 at the point of a triangle nearest to `p`, by the Voronoi region of
-/// the feature it lies in (Ericson 2005, "Real-Time Collision Detection", section 5.1.5).
+/// Weights of vertices 1 and 2 at the point of a triangle nearest to `p`: the foot of the
+/// perpendicular where that lies inside, else the nearest point of the three edges.
 fn nearest_weights([a, b, c]: [Vec3; 3], p: Vec3) -> [f64; 2] {
-    let (ab, ac) = (b - a, c - a);
-    let (d1, d2) = (ab.dot(p - a), ac.dot(p - a));
-    if d1 <= 0.0 && d2 <= 0.0 {
-        return [0.0, 0.0];
+    let (ab, ac, ap) = (b - a, c - a, p - a);
+    let n = ab.cross(ac);
+    let [u, v] = [ap.cross(ac).dot(n), ab.cross(ap).dot(n)].map(|x| x / n.length_squared());
+    if u > 0.0 && v > 0.0 && u + v < 1.0 {
+        return [u, v];
     }
-    let (d3, d4) = (ab.dot(p - b), ac.dot(p - b));
-    if d3 >= 0.0 && d4 <= d3 {
-        return [1.0, 0.0];
-    }
-    let vc = d1 * d4 - d3 * d2;
-    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return [d1 / (d1 - d3), 0.0];
-    }
-    let (d5, d6) = (ab.dot(p - c), ac.dot(p - c));
-    if d6 >= 0.0 && d5 <= d6 {
-        return [0.0, 1.0];
-    }
-    let vb = d5 * d2 - d1 * d6;
-    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return [0.0, d2 / (d2 - d6)];
-    }
-    let va = d3 * d6 - d5 * d4;
-    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        let w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
-        return [1.0 - w, w];
-    }
-    let sum = va + vb + vc;
-    [vb / sum, vc / sum]
+    let along = |from: Vec3, to: Vec3| {
+        let edge = to - from;
+        ((p - from).dot(edge) / edge.length_squared()).clamp(0.0, 1.0)
+    };
+    let (s, t, r) = (along(a, b), along(b, c), along(a, c));
+    let on_edges = [[s, 0.0], [1.0 - t, t], [0.0, r]];
+    let distance = |[u, v]: [f64; 2]| (ab * u + ac * v - ap).length_squared();
+    let nearer = |x, y| if distance(y) < distance(x) { y } else { x };
+    nearer(nearer(on_edges[0], on_edges[1]), on_edges[2])
 }

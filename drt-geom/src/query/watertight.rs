@@ -5,7 +5,10 @@
 //! then hits where the origin lies in the projected triangle. Neighbouring triangles project a
 //! shared vertex to the same two numbers, and the side of an edge is decided exactly, so that no ray
 //! slips between them. Where the paper repeats a zero edge function in twice the precision, the
-//! rounding errors of its two products decide here: they are exact.
+//! rounding errors of its two products decide here: they are exact. A ray exactly through an edge or
+//! vertex is decided as if it were moved by an infinitesimal amount (Edelsbrunner and Mücke 1990,
+//! "Simulation of Simplicity"), the same for all triangles: it crosses exactly one of two neighbours
+//! that lie on both sides of it, and a closed surface as often inward as outward.
 
 use drt_math::Vec3;
 
@@ -38,10 +41,6 @@ impl Crossing {
     #[inline]
     pub(super) fn bary(&self) -> [f64; 2] {
         [self.edge[1] / self.det, self.edge[2] / self.det]
-    }
-    /// Whether the line runs exactly through an edge or a vertex of the projected triangle.
-    pub(super) fn is_on_edge(&self) -> bool {
-        self.edge.contains(&0.0)
     }
 }
 
@@ -77,24 +76,34 @@ impl ShearedRay {
             [v[x] - self.origin[x] - sx * h, v[y] - self.origin[y] - sy * h, h]
         };
         let [a, b, c] = [project(&triangle[0]), project(&triangle[1]), project(&triangle[2])];
-        let mut u = c[0] * b[1] - c[1] * b[0];
-        let mut v = a[0] * c[1] - a[1] * c[0];
-        let mut w = b[0] * a[1] - b[1] * a[0];
-        if u == 0.0 || v == 0.0 || w == 0.0 {
-            u = product_difference(c[0], b[1], c[1], b[0]);
-            v = product_difference(a[0], c[1], a[1], c[0]);
-            w = product_difference(b[0], a[1], b[1], a[0]);
+        let mut edge =
+            [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]];
+        let mut side = edge;
+        if edge.contains(&0.0) {
+            let exact = [edge_function(c, b), edge_function(a, c), edge_function(b, a)];
+            edge = exact.map(|e| e.0);
+            side = exact.map(|e| e.1);
         }
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+        if side.iter().any(|s| *s < 0.0) && side.iter().any(|s| *s > 0.0) {
             return None;
         }
+        let [u, v, w] = edge;
         let det = u + v + w;
         if det == 0.0 {
             return None;
         }
         let t = (u * a[2] + v * b[2] + w * c[2]) * sz / det;
-        Some(Crossing { t, edge: [u, v, w], det })
+        Some(Crossing { t, edge, det })
     }
+}
+
+/// The edge function of two projected vertices, and its sign once the ray is moved by (e, e²) for an
+/// infinitesimal e: zero only where the vertices coincide.
+#[cold]
+fn edge_function(p: [f64; 3], q: [f64; 3]) -> (f64, f64) {
+    let value = product_difference(p[0], q[1], p[1], q[0]);
+    let moved = [value, p[1] - q[1], q[0] - p[0]];
+    (value, moved.into_iter().find(|s| *s != 0.0).unwrap_or(0.0))
 }
 
 /// `a b - c d` with the exact sign. Rounding is monotonic, so different rounded products are already
@@ -121,4 +130,33 @@ fn split(a: f64) -> [f64; 2] {
 /// The corners as arrays.
 pub(super) fn corners(triangle: &[Vec3; 3]) -> Corners {
     triangle.map(|v| v.to_array())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::product_difference;
+    use drt_math::Rng;
+
+    #[test]
+    fn the_sign_of_a_difference_of_products_is_exact() {
+        let mut rng = Rng::new(1, 0, 0);
+        let mut ties = 0;
+        for i in 0..200_000 {
+            let mut integer = || (rng.next_u64() >> 12) as i64 - (1 << 51);
+            let (a, b, c) = (integer(), integer(), integer());
+            // Nearly equal products, often the same when rounded.
+            let d = (i128::from(a) * i128::from(b) / i128::from(c)) as i64 + i % 3 - 1;
+            if d.unsigned_abs() >= 1 << 53 {
+                continue;
+            }
+            let exact = i128::from(a) * i128::from(b) - i128::from(c) * i128::from(d);
+            let [fa, fb, fc, fd] = [a, b, c, d].map(|x| x as f64);
+            ties += i32::from(fa * fb == fc * fd);
+            for scale in [1.0, 2.0_f64.powi(-300), 2.0_f64.powi(300)] {
+                let got = product_difference(fa * scale, fb, fc * scale, fd);
+                assert_eq!(got.partial_cmp(&0.0), Some(exact.cmp(&0)), "{a} {b} {c} {d}");
+            }
+        }
+        assert!(ties > 1_000, "{ties}");
+    }
 }

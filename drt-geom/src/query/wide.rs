@@ -7,6 +7,7 @@
 
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
+
 use glam::{UVec2, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
@@ -68,7 +69,8 @@ impl WideTree {
     pub(super) fn visit(&self, ray: &BoxRay, mut leaf: impl FnMut(usize) -> ControlFlow<(), f32>) {
         let mut ray = Ray {
             origin: Vec3A::from_array(ray.origin),
-            direction: Vec3A::from_array(ray.dir),
+            // Only its signs are used; they must be those of the inverse.
+            direction: Vec3A::from_array(ray.inverse),
             inv_direction: Vec3A::from_array(ray.inverse),
             tmin: 0.0,
             tmax: ray.far,

@@ -1,0 +1,92 @@
+//! Writes the meshes of the example scenes as OBJ files, and the vertex velocities that go with
+//! them as text.
+//!
+//! `cargo run --release -p drt-geom --example write_meshes -- examples/meshes`
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs, io, process};
+
+use drt_geom::Mesh;
+use drt_geom::procedural::{self, BranchingTree, TorusKnot};
+use drt_math::{Vec3, vec3};
+
+/// Radius of the star's notches; its tips are on the unit circle.
+const NOTCH: f64 = 0.4;
+
+fn main() {
+    let Some(folder) = env::args_os().nth(1).map(PathBuf::from) else {
+        eprintln!("expected the folder to write to");
+        process::exit(2);
+    };
+    if let Err(error) = write_all(&folder) {
+        eprintln!("{}: {error}", folder.display());
+        process::exit(3);
+    }
+}
+
+fn write_all(folder: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let star = procedural::star(7, NOTCH, 1.0);
+    let tree = BranchingTree { seed: 5, sides: 6, radius: 0.07, ..BranchingTree::default() };
+    let knot = TorusKnot { segments: 160, sides: 14, tube: 0.22, ..TorusKnot::default() };
+    let meshes = [
+        ("bumpy", procedural::bumpy_sphere(4, 0.35, 4.0)),
+        ("crystal", crystal()),
+        ("knot", procedural::torus_knot(&knot)),
+        ("sphere", procedural::icosphere(4)),
+        ("tree", procedural::branching_tree(&tree)),
+        ("star", star.clone()),
+    ];
+    for (name, mesh) in meshes {
+        fs::write(folder.join(name).with_extension("obj"), obj(&mesh))?;
+    }
+    fs::write(folder.join("star-tips.txt"), tips_outward(&star))
+}
+
+fn obj(mesh: &Mesh) -> String {
+    let mut text = String::new();
+    for p in &mesh.positions {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "v {:.6} {:.6} {:.6}", p.x, p.y, p.z);
+    }
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|i| i + 1);
+        let _ = writeln!(text, "f {a} {b} {c}");
+    }
+    text
+}
+
+/// A hexagonal prism with pointed ends along z, from -1 to 1: few edges, all of them creases.
+/// Vertex 0 is the upper tip.
+fn crystal() -> Mesh {
+    const SIDES: u32 = 6;
+    let ring = |z: f64| {
+        (0..SIDES).map(move |i| {
+            let (s, c) = (std::f64::consts::TAU * f64::from(i) / f64::from(SIDES)).sin_cos();
+            vec3(0.5 * c, 0.5 * s, z)
+        })
+    };
+    let mut positions = vec![Vec3::Z];
+    positions.extend(ring(0.45).chain(ring(-0.6)));
+    positions.push(-Vec3::Z);
+    let last = positions.len() as u32 - 1;
+    let (upper, lower) = (|i: u32| 1 + i % SIDES, |i: u32| 1 + SIDES + i % SIDES);
+    let side = |i: u32| {
+        let (a, b, c, d) = (lower(i), lower(i + 1), upper(i + 1), upper(i));
+        [[0, d, c], [a, b, c], [a, c, d], [last, b, a]]
+    };
+    let triangles = (0..SIDES).flat_map(side).collect();
+    Mesh::new(positions, triangles).expect("the arrays are right by construction")
+}
+
+/// One velocity per vertex of the star: its tips move away from the middle.
+fn tips_outward(star: &Mesh) -> String {
+    let mut text = String::from("# one velocity per vertex of star.obj\n");
+    for p in &star.positions {
+        let is_tip = p.length() > 0.5 * (1.0 + NOTCH);
+        let v = if is_tip { *p } else { Vec3::ZERO };
+        let _ = writeln!(text, "{:.6} {:.6} {:.6}", v.x, v.y, v.z);
+    }
+    text
+}
