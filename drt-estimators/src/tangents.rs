@@ -14,7 +14,7 @@ use crate::Error;
 use crate::emitter::{Emitter, EmitterTangent};
 use crate::scene::{Scene, Target};
 use crate::sensor::SensorTangent;
-use crate::surface::{BsdfChange, BsdfTangent, ChangeOp, Property};
+use crate::surface::{BsdfChange, BsdfTangent, Property};
 
 /// What changes with each parameter: for every item of the scene, the parameters that change it
 /// (by index) and how.
@@ -211,7 +211,7 @@ impl Apply<'_> {
                 changes.iter().map(|c| place(c.change)).collect()
             }
             Change::Property(c) => {
-                let (op, voxels) = (medium_op(c.op), c.voxels);
+                let (op, voxels) = (c.op, c.voxels);
                 Ok(alloc::vec![match c.property.as_str() {
                     "sigma_t" => MediumChange::SigmaT { op, voxels },
                     "albedo" => MediumChange::Albedo { op, voxels },
@@ -238,7 +238,7 @@ impl Apply<'_> {
             };
             let theta = parameter.value;
             let property = Property::from_name(&c.property).map_err(|e| self.fail(p, target, e))?;
-            let change = BsdfChange { property, op: surface_op(c.op) };
+            let change = BsdfChange { property, op: c.op };
             let bsdf = &mut self.scene.bsdfs[i].item;
             let own = bsdf.tangent(&change, theta);
             let own = own.and_then(|t| bsdf.apply(&change, theta).map(|()| t));
@@ -349,20 +349,4 @@ impl Apply<'_> {
 /// The entries worth keeping, with their parameters' indices.
 fn keep<T>(items: Vec<T>, worth: impl Fn(&T) -> bool) -> Vec<(usize, T)> {
     items.into_iter().enumerate().filter(|(_, t)| worth(t)).collect()
-}
-
-fn medium_op(op: drt_motion::ValueChange) -> drt_medium::ValueChange {
-    match op {
-        drt_motion::ValueChange::Add(a) => drt_medium::ValueChange::Add(a),
-        drt_motion::ValueChange::Multiply(m) => drt_medium::ValueChange::Multiply(m),
-        drt_motion::ValueChange::MultiplyLog(m) => drt_medium::ValueChange::MultiplyLog(m),
-    }
-}
-
-fn surface_op(op: drt_motion::ValueChange) -> ChangeOp {
-    match op {
-        drt_motion::ValueChange::Add(a) => ChangeOp::Add(a),
-        drt_motion::ValueChange::Multiply(m) => ChangeOp::Multiply(m),
-        drt_motion::ValueChange::MultiplyLog(m) => ChangeOp::MultiplyLog(m),
-    }
 }

@@ -8,6 +8,7 @@ extern crate alloc;
 compile_error!("drt-math needs elementary functions: enable the feature `std` or `libm`");
 
 mod affine;
+mod change;
 pub mod discrete;
 mod dual;
 pub mod fm;
@@ -24,6 +25,7 @@ mod vec3;
 pub mod warp;
 
 pub use affine::Affine;
+pub use change::{ValueChange, ValueMap};
 pub use discrete::{AliasTable, CdfTable};
 pub use dual::Dual;
 pub use frame::Frame;

@@ -1,38 +1,7 @@
-use drt_math::{Affine, Rgb, fm};
+use drt_math::{Affine, Rgb, ValueChange, ValueMap};
 
 use crate::homogeneous::Homogeneous;
 use crate::{Grid, GridMedium, Medium, MediumError, MediumKind, Phase, Property, Volume};
-
-/// How a value depends on a parameter theta.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum ValueChange {
-    /// `value + theta a`; for a scalar three equal numbers.
-    Add(Rgb),
-    /// `value (1 + theta m)`.
-    Multiply(f64),
-    /// `value exp(theta m)`.
-    MultiplyLog(f64),
-}
-
-impl ValueChange {
-    /// The change at theta as `value -> factor value + term`.
-    pub(crate) fn at(&self, theta: f64) -> (f64, Rgb) {
-        match *self {
-            Self::Add(a) => (1.0, a * theta),
-            Self::Multiply(m) => (1.0 + theta * m, Rgb::ZERO),
-            Self::MultiplyLog(m) => (fm::exp(theta * m), Rgb::ZERO),
-        }
-    }
-
-    /// Three equal numbers, or none: what a scalar can be changed by.
-    pub(crate) fn is_scalar(&self) -> bool {
-        match self {
-            Self::Add(a) => a.r == a.g && a.g == a.b,
-            Self::Multiply(_) | Self::MultiplyLog(_) => true,
-        }
-    }
-}
 
 /// One way in which a medium depends on a parameter theta.
 ///
@@ -179,8 +148,7 @@ impl Phase {
         if !op.is_scalar() {
             return Err(MediumError::NotScalar { property: Property::G });
         }
-        let (factor, term) = op.at(theta);
-        *self = Self::henyey_greenstein(g * factor + term.r)?;
+        *self = Self::henyey_greenstein(op.at(Rgb::splat(g), theta).r)?;
         Ok(())
     }
 }
@@ -213,8 +181,8 @@ impl GridMedium {
     }
 
     fn change_density(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
-        let (factor, term) = c.op.at(theta);
-        if c.voxel.is_none() && term.is_zero() && factor > 0.0 && c.op.is_scalar() {
+        let ValueMap { factor, offset } = c.op.map(theta);
+        if c.voxel.is_none() && offset.is_zero() && factor > 0.0 && c.op.is_scalar() {
             // The bounds are those of the unscaled grid, so they stay.
             self.scale = c.finite(self.scale * factor)?;
             return Ok(());
@@ -253,8 +221,7 @@ impl FieldChange {
         if self.voxel.is_some() {
             return Err(MediumError::NotAGrid { property: self.property() });
         }
-        let (factor, term) = self.op.at(theta);
-        let changed = value * factor + term;
+        let changed = self.op.at(value, theta);
         changed.to_array().into_iter().try_for_each(|v| self.finite(v).map(drop))?;
         Ok(changed)
     }
@@ -265,8 +232,8 @@ impl FieldChange {
         if let Some(voxel) = self.voxel.filter(|v| (0..3).any(|k| v[k] >= size[k])) {
             return Err(MediumError::NoSuchVoxel { property: self.property(), voxel, size });
         }
-        let (factor, term) = self.op.at(theta);
-        let term = term / scale;
+        let ValueMap { factor, offset } = self.op.map(theta);
+        let term = offset / scale;
         let voxels = match self.voxel.map(|v| grid.flatten(v)) {
             Some(n) => n..n + 1,
             None => 0..grid.values().len() / grid.channels(),

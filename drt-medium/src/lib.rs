@@ -23,7 +23,9 @@ mod transmittance;
 #[cfg(feature = "vol")]
 pub mod vol;
 
-pub use change::{MediumChange, ValueChange};
+pub use drt_math::ValueChange;
+
+pub use change::MediumChange;
 pub use coefficients::{CoefficientGradients, CoefficientRates, Coefficients};
 pub use error::{MediumError, Property};
 pub use field::{DensityField, Piece, Ray};

@@ -1,11 +1,11 @@
 use alloc::collections::BTreeMap;
 
-use drt_math::{Affine, Rgb, Vec3};
+use drt_math::{Affine, Rgb, ValueChange, ValueMap, Vec3};
 
 use crate::change::{Field, FieldChange};
 use crate::{
     CoefficientGradients, CoefficientRates, Coefficients, Grid, Medium, MediumChange, MediumError,
-    MediumKind, Property, ValueChange,
+    MediumKind, Property,
 };
 
 /// Derivative of one coefficient field with respect to a parameter, at rest:
@@ -58,20 +58,13 @@ impl FieldTangent {
     /// value of the voxel it names.
     fn of(change: &FieldChange, theta: f64, present: Rgb) -> Result<Self, MediumError> {
         let mut tangent = Self::default();
-        let relative = |m| relative_rate(change.property(), m, theta);
+        let relative = relative_rate(change.property(), &change.op, theta)?;
         match (change.op, change.voxel) {
+            (op, Some(v)) => {
+                tangent.voxels.insert(v, op.rate(present, theta));
+            }
             (ValueChange::Add(a), None) => tangent.uniform = a,
-            (ValueChange::Add(a), Some(v)) => {
-                tangent.voxels.insert(v, a);
-            }
-            (ValueChange::Multiply(m), None) => tangent.relative = relative(m)?,
-            (ValueChange::Multiply(m), Some(v)) => {
-                tangent.voxels.insert(v, present * relative(m)?);
-            }
-            (ValueChange::MultiplyLog(m), None) => tangent.relative = m,
-            (ValueChange::MultiplyLog(m), Some(v)) => {
-                tangent.voxels.insert(v, present * m);
-            }
+            (_, None) => tangent.relative = relative,
         }
         Ok(tangent)
     }
@@ -79,8 +72,8 @@ impl FieldTangent {
     /// Chain rule through a later change `f -> factor f + term` of all voxels or one. The part in
     /// proportion to the field refers to the field as it is then, so terms must be taken off it.
     fn push_through(&mut self, later: &FieldChange, theta: f64) {
-        let (factor, term) = later.op.at(theta);
-        let taken = term * -self.relative;
+        let ValueMap { factor, offset } = later.op.map(theta);
+        let taken = offset * -self.relative;
         match later.voxel {
             None => {
                 self.uniform = self.uniform * factor + taken;
@@ -110,9 +103,8 @@ impl FieldTangent {
     }
 }
 
-/// Logarithmic derivative of `1 + theta m`.
-fn relative_rate(property: Property, m: f64, theta: f64) -> Result<f64, MediumError> {
-    let rate = m / (1.0 + theta * m);
+fn relative_rate(property: Property, op: &ValueChange, theta: f64) -> Result<f64, MediumError> {
+    let rate = op.relative_rate(theta);
     if rate.is_finite() { Ok(rate) } else { Err(MediumError::VanishingFactor { property }) }
 }
 
@@ -153,7 +145,7 @@ impl MediumTangent {
     /// Chain rule: this tangent after a later change, made at theta, has acted on the medium too.
     pub fn push_through(&mut self, later: &MediumChange, theta: f64) {
         match later {
-            MediumChange::G(op) => self.g *= op.at(theta).0,
+            MediumChange::G(op) => self.g *= op.map(theta).factor,
             MediumChange::Place { map, .. } => {
                 let turn = Affine { linear: map.linear, translation: Vec3::ZERO };
                 self.velocity = turn.after(&self.velocity).after(&map.inverse());
@@ -236,11 +228,8 @@ impl Medium {
             }
             MediumChange::G(op) => {
                 let g = self.phase.mean_cosine_parameter().ok_or(MediumError::NoMeanCosine)?;
-                tangent.g = match *op {
-                    ValueChange::Add(a) => a.r,
-                    ValueChange::Multiply(m) => g * relative_rate(Property::G, m, theta)?,
-                    ValueChange::MultiplyLog(m) => g * m,
-                };
+                relative_rate(Property::G, op, theta)?;
+                tangent.g = op.rate(Rgb::splat(g), theta).r;
             }
             _ => {
                 if let Some(c) = change.field() {

@@ -15,6 +15,8 @@ mod property;
 mod surface;
 mod volume;
 
+pub use drt_math::{ValueChange, ValueMap};
+
 pub use adjoint::{AffineGradient, JetAdjoint, VertexGradient, in_file_order};
 pub use element::SurfaceElement;
 pub use error::{Cause, MotionError};
@@ -22,6 +24,6 @@ pub use geometry::GeometryChange;
 pub use moved::{MovedFrame, MovedMesh, move_affine, move_mesh};
 pub use normals::SmoothNormals;
 pub use parameter::{Applied, Change, Effect, Parameter, geometry_changes, property_changes};
-pub use property::{ChangedValue, PropertyChange, ValueChange, ValueMap, change_value};
+pub use property::{ChangedValue, PropertyChange, change_value};
 pub use surface::{SurfaceJet, SurfaceMotion, SurfacePoint};
 pub use volume::{InsideMotion, VolumeAdjoint, VolumeJet, VolumeMotion, inside_motion};

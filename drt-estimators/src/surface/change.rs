@@ -1,4 +1,4 @@
-use drt_math::{Rgb, fm};
+use drt_math::{Rgb, ValueChange};
 
 use super::Bsdf;
 use super::property::{Property, Slot, SurfaceError, names};
@@ -85,27 +85,16 @@ impl BsdfParams {
     }
 }
 
-/// How a parameter of value theta acts on a property of value v.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ChangeOp {
-    /// `v + theta · add`; three equal numbers for a scalar property.
-    Add(Rgb),
-    /// `v (1 + theta · m)`.
-    Multiply(f64),
-    /// `v exp(theta · m)`.
-    MultiplyLog(f64),
-}
-
 /// A parameter's effect on one property of a BSDF.
 ///
 /// ```
-/// use drt_estimators::surface::{Bsdf, BsdfChange, ChangeOp, Diffuse, Property};
-/// use drt_math::Rgb;
+/// use drt_estimators::surface::{Bsdf, BsdfChange, Diffuse, Property};
+/// use drt_math::{Rgb, ValueChange};
 ///
 /// let mut wall = Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.4) });
 /// let redder = BsdfChange {
 ///     property: Property::from_name("reflectance")?,
-///     op: ChangeOp::Add(Rgb::new(1.0, 0.0, 0.0)),
+///     op: ValueChange::Add(Rgb::new(1.0, 0.0, 0.0)),
 /// };
 /// let velocity = wall.tangent(&redder, 0.1)?;
 /// wall.apply(&redder, 0.1)?;
@@ -118,37 +107,13 @@ pub struct BsdfChange {
     /// What changes.
     pub property: Property,
     /// How it depends on theta.
-    pub op: ChangeOp,
+    pub op: ValueChange,
 }
 
 impl BsdfChange {
-    fn value(&self, v: Rgb, theta: f64) -> Rgb {
-        match self.op {
-            ChangeOp::Add(a) => v + a * theta,
-            ChangeOp::Multiply(_) | ChangeOp::MultiplyLog(_) => v * self.factor(theta),
-        }
-    }
-
-    fn velocity(&self, v: Rgb, theta: f64) -> Rgb {
-        match self.op {
-            ChangeOp::Add(a) => a,
-            ChangeOp::Multiply(m) => v * m,
-            ChangeOp::MultiplyLog(m) => v * (m * self.factor(theta)),
-        }
-    }
-
-    /// Derivative of the changed value with respect to the unchanged one.
-    fn factor(&self, theta: f64) -> f64 {
-        match self.op {
-            ChangeOp::Add(_) => 1.0,
-            ChangeOp::Multiply(m) => 1.0 + theta * m,
-            ChangeOp::MultiplyLog(m) => fm::exp(theta * m),
-        }
-    }
-
     /// Carries a velocity that an earlier effect gave the BSDF through this later change.
     pub fn carry(&self, velocity: &mut BsdfTangent, theta: f64) {
-        *velocity.get_mut(self.property) *= self.factor(theta);
+        *velocity.get_mut(self.property) *= self.op.map(theta).factor;
     }
 }
 
@@ -160,7 +125,7 @@ impl Bsdf {
     pub fn apply(&mut self, change: &BsdfChange, theta: f64) -> Result<(), SurfaceError> {
         let mut changed = self.clone();
         let slot = changed.slot(change)?;
-        let value = change.value(slot.value(), theta);
+        let value = change.op.at(slot.value(), theta);
         slot.set(value);
         changed.validate()?;
         *self = changed;
@@ -175,7 +140,8 @@ impl Bsdf {
     pub fn tangent(&self, change: &BsdfChange, theta: f64) -> Result<BsdfTangent, SurfaceError> {
         let mut base = self.clone();
         let mut velocity = BsdfTangent::default();
-        *velocity.get_mut(change.property) = change.velocity(base.slot(change)?.value(), theta);
+        let value = base.slot(change)?.value();
+        *velocity.get_mut(change.property) = change.op.map_rate(theta).value(value);
         Ok(velocity)
     }
 
@@ -207,7 +173,7 @@ impl Bsdf {
         let lacks = self.lacks(property);
         let slot = self.property(property).ok_or(lacks)?;
         match (&slot, change.op) {
-            (Slot::Scalar(_), ChangeOp::Add(a)) if a.r != a.g || a.g != a.b => {
+            (Slot::Scalar(_), ValueChange::Add(a)) if !change.op.is_scalar() => {
                 Err(SurfaceError::NotUniform { property, r: a.r, g: a.g, b: a.b })
             }
             _ => Ok(slot),

@@ -47,7 +47,7 @@ use alloc::boxed::Box;
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use angles::{Angles, Slopes};
-pub use change::{BsdfChange, BsdfParams, BsdfTangent, ChangeOp};
+pub use change::{BsdfChange, BsdfParams, BsdfTangent};
 pub use conductor::RoughConductor;
 pub use dielectric::RoughDielectric;
 pub use diffuse::Diffuse;

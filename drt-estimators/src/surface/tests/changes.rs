@@ -1,12 +1,16 @@
 use alloc::string::ToString;
 
+use drt_math::ValueChange;
+
 use super::*;
 
 fn every_change() -> Vec<BsdfChange> {
     let mut changes = Vec::new();
     for property in Property::ALL {
         let add = Rgb::splat(0.3);
-        for op in [ChangeOp::Add(add), ChangeOp::Multiply(0.7), ChangeOp::MultiplyLog(-0.4)] {
+        for op in
+            [ValueChange::Add(add), ValueChange::Multiply(0.7), ValueChange::MultiplyLog(-0.4)]
+        {
             changes.push(BsdfChange { property, op });
         }
     }
@@ -45,7 +49,7 @@ fn tangents_are_the_rates_of_applied_changes() {
 #[test]
 fn a_scaled_reflectance_of_zero_still_has_a_slope() {
     let black = Bsdf::Diffuse(Diffuse { reflectance: Rgb::ZERO });
-    let change = BsdfChange { property: Property::Reflectance, op: ChangeOp::Add(Rgb::ONE) };
+    let change = BsdfChange { property: Property::Reflectance, op: ValueChange::Add(Rgb::ONE) };
     let g = black.gradient(normal(), normal(), normal());
     let slope = g.params.dot(&black.tangent(&change, 0.0).unwrap());
     assert!((slope.r - core::f64::consts::FRAC_1_PI).abs() < 1e-12 && g.value.is_zero());
@@ -68,8 +72,8 @@ fn scattering_is_the_transpose_of_contraction() {
 #[test]
 fn later_effects_carry_earlier_velocities() {
     let base = Bsdf::Diffuse(Diffuse::default());
-    let first = BsdfChange { property: Property::Reflectance, op: ChangeOp::Add(Rgb::ONE) };
-    let second = BsdfChange { property: Property::Reflectance, op: ChangeOp::MultiplyLog(2.0) };
+    let first = BsdfChange { property: Property::Reflectance, op: ValueChange::Add(Rgb::ONE) };
+    let second = BsdfChange { property: Property::Reflectance, op: ValueChange::MultiplyLog(2.0) };
     let both = |theta: f64| {
         let mut bsdf = base.clone();
         bsdf.apply(&first, theta).unwrap();
@@ -94,7 +98,7 @@ fn refusals_say_what_would_do() {
         assert_eq!(bsdf, before);
         error.to_string()
     };
-    let add = |v| ChangeOp::Add(Rgb::splat(v));
+    let add = |v| ValueChange::Add(Rgb::splat(v));
     let phong = || Bsdf::Phong(Phong::default());
     let metal = || Bsdf::RoughConductor(RoughConductor::default());
     let glass = || Bsdf::RoughDielectric(glass(Distribution::Ggx, 0.1, 1.5));
@@ -111,7 +115,7 @@ fn refusals_say_what_would_do() {
     assert!(text.contains("at least 1e-4"), "{text}");
     let text = refusal(metal(), Property::K, add(-1.0), 1.0);
     assert!(text.contains("above 0"), "{text}");
-    let text = refusal(metal(), Property::Alpha, ChangeOp::Add(Rgb::new(1.0, 2.0, 1.0)), 0.2);
+    let text = refusal(metal(), Property::Alpha, ValueChange::Add(Rgb::new(1.0, 2.0, 1.0)), 0.2);
     assert!(text.contains("single number"), "{text}");
     let text = refusal(glass(), Property::Eta, add(-1.0), 0.5);
     assert!(text.contains("not 1"), "{text}");
