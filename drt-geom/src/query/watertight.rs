@@ -78,14 +78,15 @@ impl ShearedRay {
         let [a, b, c] = [project(&triangle[0]), project(&triangle[1]), project(&triangle[2])];
         let mut edge =
             [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]];
-        let mut side = edge;
+        if disagree(edge) {
+            return None;
+        }
         if edge.contains(&0.0) {
             let exact = [edge_function(c, b), edge_function(a, c), edge_function(b, a)];
+            if disagree(exact.map(|e| e.1)) {
+                return None;
+            }
             edge = exact.map(|e| e.0);
-            side = exact.map(|e| e.1);
-        }
-        if side.iter().any(|s| *s < 0.0) && side.iter().any(|s| *s > 0.0) {
-            return None;
         }
         let [u, v, w] = edge;
         let det = u + v + w;
@@ -95,6 +96,12 @@ impl ShearedRay {
         let t = (u * a[2] + v * b[2] + w * c[2]) * sz / det;
         Some(Crossing { t, edge, det })
     }
+}
+
+/// Whether both signs occur. The sign of an edge function is exact unless it is zero.
+#[inline]
+fn disagree([u, v, w]: [f64; 3]) -> bool {
+    (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)
 }
 
 /// The edge function of two projected vertices, and its sign once the ray is moved by (e, e²) for an
