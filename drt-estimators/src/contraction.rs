@@ -3,9 +3,10 @@
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
+use drt_motion::{SiteWeight, VolumeMotion, blend_jet};
 
 use crate::emitter::EmitterGradient;
-use crate::inside::Insides;
+use crate::inside::{Inside, Insides};
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
@@ -60,11 +61,18 @@ pub(crate) struct Contraction<'a> {
     world: &'a World,
     motion: &'a Motion,
     pub(crate) rates: Vec<Rgb>,
+    /// Of the sites around a medium.
+    weights: Vec<SiteWeight>,
 }
 
 impl<'a> Contraction<'a> {
     pub(crate) fn new(world: &'a World, motion: &'a Motion) -> Self {
-        Self { world, motion, rates: alloc::vec![Rgb::ZERO; motion.parameters()] }
+        Self {
+            world,
+            motion,
+            rates: alloc::vec![Rgb::ZERO; motion.parameters()],
+            weights: Vec::new(),
+        }
     }
 
     pub(crate) fn clear(&mut self) {
@@ -102,8 +110,16 @@ impl AdjointSink for Contraction<'_> {
     }
 
     fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb) {
-        for (p, motion) in &self.motion.insides.volumes[medium] {
-            let jet = motion.jet(x);
+        let insides = &self.motion.insides;
+        let motions = &insides.volumes[medium];
+        if let Some(blend) = &insides.blends[medium] {
+            blend.weights(x, &mut self.weights);
+        }
+        for (p, motion) in motions {
+            let jet = match motion {
+                Inside::Affine(field) => VolumeMotion::Affine(*field).jet(x),
+                Inside::Blend(fields) => blend_jet(&self.weights, fields, x),
+            };
             self.rates[*p] += u.dot(jet.u) + j * jet.j_dot;
         }
     }

@@ -1,5 +1,5 @@
-//! The flux term: scattering carried through moving surfaces around an inside that does not follow
-//! them (theory sheet §4.1).
+//! The flux term: scattering carried through deforming surfaces around an inside that does not
+//! follow them (theory sheet §4.1).
 //!
 //! For every surface Σ with unit normal n from its back (-) to its front (+) and a medium whose
 //! field u does not match the surface's velocity u_Σ,
@@ -9,206 +9,168 @@
 //! ```
 //!
 //! f being the contribution of paths with a volume vertex on that side of Σ (0 inside an opaque
-//! body). Its detector side is the camera itself, or a walk that ends there. The first is sampled
-//! along camera rays, where each surface crossed gives one term (this finds it however small the
-//! pixel); the second from points drawn on Σ.
+//! body). Seen from the vertex before it, dA = r² dω / |n·w|: every ray that a camera path follows
+//! and that meets Σ gives one term, throughput × τ × Lout / |n·w|. So the term is gathered on the
+//! camera's own paths, however small the pixel. To keep the cost linear in path length, one of a
+//! path's meetings is chosen in proportion to its throughput over the cosine (weighted reservoir
+//! sampling), and Lout traced for it alone.
 
-use alloc::vec::Vec;
+use alloc::sync::Arc;
 
-use drt_math::{AliasTable, Rgb, Vec3, warp};
+use drt_math::{Real, Rgb, Rng, Vec3};
 
-use crate::Error;
-use crate::boundary::Receiver;
 use crate::sensitivity::{Functional, Rate};
-use crate::transport::importance::Splat;
-use crate::transport::lights::triangle_bary;
-use crate::transport::trace::{Tracer, Travel};
-use crate::transport::world::{Tracking, intervals};
-use crate::transport::{Kind, Radiance, RadianceBySegments, RayPath, SurfacePoint, Vertex, World};
+use crate::transport::trace::Tracer;
+use crate::transport::world::Tracking;
+use crate::transport::{Radiance, RayPath, SurfacePoint, Vertex, World};
 
 /// The surfaces with a flux.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Flux {
-    prims: Vec<(u32, f64)>,
-    table: AliasTable,
-    shapes: Vec<bool>,
-}
-
-/// Reusable buffers of a flux worker.
-#[derive(Debug, Default)]
-pub(crate) struct Buffers {
-    pub(crate) functional: Functional,
-    light: RadianceBySegments,
-    splats: Vec<Splat>,
-    ray: RayPath,
-    outgoing: RayPath,
+    shapes: Arc<[bool]>,
 }
 
 impl Flux {
-    pub(crate) fn new(world: &World, shapes: &[usize]) -> Result<Option<Self>, Error> {
-        let mut prims = Vec::new();
-        let mut of = alloc::vec![false; world.scene.shapes.len()];
-        for &s in shapes {
-            of[s] = true;
-            let mesh = &world.scene.shapes[s].mesh;
-            for t in 0..mesh.triangles.len() as u32 {
-                prims.push((world.prim_of(s, t), mesh.area(t)));
-            }
+    /// `None` when no shape has a flux.
+    pub(crate) fn new(world: &World, shapes: &[usize]) -> Option<Self> {
+        let flags = (0..world.scene.shapes.len()).map(|s| shapes.contains(&s)).collect();
+        (!shapes.is_empty()).then_some(Self { shapes: flags })
+    }
+}
+
+/// One of the meetings of a path with surfaces that have a flux.
+#[derive(Clone, Copy, Debug)]
+struct Meeting {
+    origin: Vec3,
+    dir: Vec3,
+    point: SurfacePoint,
+    x: Vec3,
+    /// The medium the ray arrived in.
+    around: Option<usize>,
+    throughput: Rgb,
+    /// Segments up to the surface.
+    segments: u32,
+    weight: f64,
+}
+
+/// Chooses one meeting per path.
+#[derive(Clone, Debug)]
+pub(crate) struct Reservoir {
+    flux: Option<Flux>,
+    rng: Rng,
+    total: f64,
+    chosen: Option<Meeting>,
+    /// The chosen ray up to the surface.
+    part: RayPath,
+    functional: Functional,
+}
+
+impl Default for Reservoir {
+    fn default() -> Self {
+        Self {
+            flux: None,
+            rng: Rng::new(0, 0, 0),
+            total: 0.0,
+            chosen: None,
+            part: RayPath::default(),
+            functional: Functional::default(),
         }
-        if prims.is_empty() {
-            return Ok(None);
-        }
-        let weights: Vec<f64> = prims.iter().map(|(_, a)| *a).collect();
-        let table = AliasTable::new(&weights).map_err(|e| Error::Element {
-            element: "moving surfaces".into(),
-            reason: alloc::format!("areas cannot be sampled: {e}"),
-        })?;
-        Ok(Some(Self { prims, table, shapes: of }))
+    }
+}
+
+impl Reservoir {
+    pub(crate) fn new(flux: Option<&Flux>) -> Self {
+        Self { flux: flux.cloned(), ..Self::default() }
     }
 
-    /// The side's vertex, if there is a medium to sample on it.
-    fn side(
-        &self,
-        world: &World,
-        point: SurfacePoint,
-        x: Vec3,
-        front: bool,
-        around: Option<usize>,
-    ) -> Option<(Vertex, usize)> {
-        let medium = world.medium_on_side(&point, front, around)?;
-        (world.tracking[medium] == Tracking::Vertices)
-            .then(|| (world.touching(point, x, front, medium), medium))
+    pub(crate) fn begin(&mut self, rng: Rng) {
+        self.rng = rng;
+        self.total = 0.0;
+        self.chosen = None;
     }
 
-    /// How the volume vertex is left behind: n·(u_Σ - u), signed by the side.
-    fn functional(
-        functional: &mut Functional,
-        point: SurfacePoint,
-        x: Vec3,
-        front: bool,
-        medium: usize,
+    /// Offers the surfaces that a ray meets.
+    pub(crate) fn offer(
+        &mut self,
+        segments: u32,
+        throughput: Rgb,
+        origin: Vec3,
+        dir: Vec3,
+        ray: &RayPath,
     ) {
-        let n = if front { -point.ng } else { point.ng };
-        functional.items.clear();
-        functional.items.push(Rate::Surface(point, n));
-        functional.items.push(Rate::Volume(medium, x, -n));
-    }
-
-    /// One sample of paths with at least one vertex between the surface and the camera.
-    pub(crate) fn sample<R: Receiver>(
-        &self,
-        tracer: &mut Tracer<'_>,
-        b: &mut Buffers,
-        receiver: &mut R,
-    ) {
-        tracer.counters.flux_samples += 1;
-        let world = tracer.world;
-        if world.max_depth < 3 {
+        let Some(flux) = &self.flux else { return };
+        let strength = throughput.max_abs();
+        if strength == 0.0 {
             return;
         }
-        let i = self.table.sample(tracer.rng.next_f64()).index;
-        let (prim, area) = self.prims[i];
-        let (point, x) = world.point(prim, triangle_bary(tracer.rng.next_2d()));
-        let inv_pdf = area / self.table.pmf(i);
-        let wo = warp::uniform_sphere(tracer.rng.next_2d());
-        let inv_pdf = inv_pdf / warp::uniform_sphere_pdf();
-        let around = world.medium_around(&point, x);
-        for front in [false, true] {
-            // A null interface looks the same from both sides but for the medium at the vertex; an
-            // opaque one blocks what looks into it, which the contact takes care of.
-            let Some((vertex, medium)) = self.side(world, point, x, front, around) else {
-                continue;
-            };
-            Self::functional(&mut b.functional, point, x, front, medium);
-            if !receiver.moves(&b.functional) {
+        let mut around = ray.medium;
+        let crossings = ray.crossings.iter().map(|c| (c.point, c.x, c.t, c.after));
+        let end = ray.end.iter().map(|(point, x)| (*point, *x, ray.length, None));
+        for (point, x, t, after) in crossings.chain(end) {
+            let before = core::mem::replace(&mut around, after);
+            let cosine = Real::abs(point.ng.dot(dir));
+            if !flux.shapes[point.shape as usize] || cosine == 0.0 {
                 continue;
             }
-            world.cast(&vertex, wo, &mut b.outgoing, &mut tracer.counters);
-            let (next, weight) = match tracer.travel(x, wo, &b.outgoing, Rgb::ONE) {
-                Travel::Volume(v) => (v.vertex, v.arrival),
-                Travel::Surface(p, y, weight) => {
-                    let medium = b.outgoing.crossings.last().map_or(b.outgoing.medium, |c| c.after);
-                    (Vertex { x: y, medium, kind: Kind::Surface(p) }, weight)
-                }
-                Travel::Escape(_) | Travel::Absorbed => continue,
-            };
-            b.splats.clear();
-            tracer.importance(next, -wo, world.max_depth - 2, None, &mut b.splats);
-            if b.splats.is_empty() {
-                continue;
-            }
-            b.light.0.clear();
-            let own = tracer.max_segments;
-            tracer.max_segments = world.max_depth - 2;
-            tracer.from_vertex(vertex, wo, &mut b.light);
-            tracer.max_segments = own;
-            for s in &b.splats {
-                let light = b.light.within(world.max_depth - 1 - s.segments);
-                receiver.receive(s.pixel, light * weight * s.value * inv_pdf);
+            let weight = strength / cosine;
+            self.total += weight;
+            if self.rng.next_f64() * self.total < weight {
+                let segments = segments + 1;
+                let around = before;
+                self.chosen =
+                    Some(Meeting { origin, dir, point, x, around, throughput, segments, weight });
+                self.part.truncate_from(ray, t);
             }
         }
     }
 
-    /// The terms along one camera ray: every surface with a flux it crosses or ends on. Calls `add`
-    /// with each functional and its weight.
-    pub(crate) fn along_camera_ray(
-        &self,
+    /// Evaluates the chosen meeting; calls `add` with each functional and its weight.
+    pub(crate) fn evaluate(
+        &mut self,
         tracer: &mut Tracer<'_>,
-        dir: Vec3,
-        b: &mut Buffers,
         mut add: impl FnMut(&Functional, Rgb),
     ) {
+        let Some(m) = self.chosen.take() else { return };
         let world = tracer.world;
-        if world.max_depth < 1 {
+        if m.segments > tracer.max_segments {
             return;
         }
-        let eye = world.eye();
-        let mut ray = core::mem::take(&mut b.ray);
-        world.cast(&eye, dir, &mut ray, &mut tracer.counters);
-        let mut tau = Rgb::ONE;
-        for (i, part) in intervals(ray.medium, &ray.crossings, ray.length).enumerate() {
-            if let Some(m) = part.medium {
-                let start = eye.x + dir * part.start;
-                let length = part.end - part.start;
-                let mut stats = drt_medium::TrackingStats::default();
-                tau *=
-                    world.medium(m).transmittance(start, dir, length, &mut tracer.rng, &mut stats);
-                tracer.counters.tracking_steps += stats.lookups;
-            }
-            let hit = match ray.crossings.get(i) {
-                Some(c) => Some((c.point, c.x)),
-                None => ray.end,
-            };
-            let Some((point, x)) = hit else { break };
-            if tau.is_zero() {
-                break;
-            }
-            if !self.shapes[point.shape as usize] {
+        let (rng, counters) = (&mut tracer.rng, &mut tracer.counters);
+        let tau = world.transmittance(m.origin, m.dir, &self.part, rng, counters);
+        if tau.is_zero() {
+            return;
+        }
+        tracer.counters.flux_samples += 1;
+        let cosine = m.point.ng.dot(m.dir);
+        let null = world.is_null(m.point.shape);
+        let scale = self.total / m.weight / Real::abs(cosine);
+        for front in [false, true] {
+            // Behind an opaque surface nothing is seen.
+            if !null && front == (cosine > 0.0) {
                 continue;
             }
-            tracer.counters.flux_samples += 1;
-            let cosine = point.ng.dot(dir);
-            let null = world.is_null(point.shape);
-            for front in [false, true] {
-                // Behind an opaque surface nothing is seen.
-                if !null && front == (cosine > 0.0) {
-                    continue;
-                }
-                let Some((vertex, medium)) = self.side(world, point, x, front, part.medium) else {
-                    continue;
-                };
-                let mut light = Radiance::default();
-                let own = tracer.max_segments;
-                tracer.max_segments = own - 1;
-                tracer.from_vertex(vertex, -dir, &mut light);
-                tracer.max_segments = own;
-                if light.0.is_zero() {
-                    continue;
-                }
-                Self::functional(&mut b.functional, point, x, front, medium);
-                add(&b.functional, tau * light.0 * (1.0 / cosine.abs()));
+            let Some((vertex, medium)) = side(world, &m, front) else { continue };
+            let mut light = Radiance::default();
+            let own = tracer.max_segments;
+            tracer.max_segments = own - m.segments;
+            tracer.from_vertex(vertex, -m.dir, &mut light);
+            tracer.max_segments = own;
+            if light.0.is_zero() {
+                continue;
             }
+            // The vertex is left behind at n·(u_Σ - u), n from the medium's side across.
+            let n = if front { -m.point.ng } else { m.point.ng };
+            self.functional.items.clear();
+            self.functional.items.push(Rate::Surface(m.point, n));
+            self.functional.items.push(Rate::Volume(medium, m.x, -n));
+            add(&self.functional, m.throughput * tau * light.0 * scale);
         }
-        b.ray = ray;
     }
+}
+
+/// The volume vertex on one side of the surface, if there is a medium to scatter in.
+fn side(world: &World, m: &Meeting, front: bool) -> Option<(Vertex, usize)> {
+    let medium = world.medium_on_side(&m.point, front, m.around)?;
+    (world.tracking[medium] == Tracking::Vertices)
+        .then(|| (world.touching(m.point, m.x, front, medium), medium))
 }

@@ -1,109 +1,162 @@
 //! How the inside of each medium moves with each parameter (theory sheet §4.1, §14.1).
 //!
-//! Any field is right as long as it matches the normal velocity of the surfaces around the medium,
-//! or the flux through those it does not match is added. A camera or point light inside a medium
-//! is one more boundary: near it the field must have its velocity, or rates grow like 1/r.
+//! Any continuous field is right that matches the normal velocity of the surfaces around the medium,
+//! or misses it where the flux is added. The variance is finite only if the field also matches
+//! surfaces on which paths have vertices, and cameras and point lights inside the medium: else rates
+//! near them grow like 1/r. So, per medium and parameter:
+//!
+//! * nothing around it moves: static;
+//! * everything around it moves by one affine field: that field;
+//! * surfaces move by different affine fields, or some rest: the blend of all (drt-motion's `Blend`);
+//! * a surface deforms by its vertices: it counts as resting in the blend, and its flux is added.
 
 use alloc::vec::Vec;
 
-use drt_geom::Mesh;
+use drt_geom::TriangleBvh;
 use drt_math::{Affine, Vec3};
-use drt_motion::{SurfaceMotion, VolumeMotion, inside_motion};
+use drt_motion::{Blend, Site, SurfaceMotion};
 
+use crate::Error;
 use crate::tangents::Tangents;
 use crate::transport::World;
+
+/// The motion of an inside under one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Inside {
+    /// One affine field.
+    Affine(Affine),
+    /// The fields of the medium's sites that move, blended.
+    Blend(Vec<(usize, Affine)>),
+}
 
 /// The motions of all insides, and the shapes whose flux must be added.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Insides {
-    /// Per medium: the parameters that move it, and how.
-    pub(crate) volumes: Vec<Vec<(usize, VolumeMotion)>>,
+    /// Per medium: the parameters that move its inside, and how.
+    pub(crate) volumes: Vec<Vec<(usize, Inside)>>,
+    /// Per medium: its surroundings, where some parameter blends.
+    pub(crate) blends: Vec<Option<Blend>>,
     /// Shapes through which some medium has a flux for some parameter.
     pub(crate) flux_shapes: Vec<usize>,
-    /// Per medium and parameter that concerns it: true when flux is needed.
-    pub(crate) flux: Vec<Vec<(usize, bool)>>,
+    /// Per medium: parameters that need a flux.
+    pub(crate) flux: Vec<Vec<usize>>,
 }
 
-/// Points of each medium that must move with their own velocity.
-struct Anchor {
-    medium: usize,
-    x: Vec3,
-    velocities: Vec<Vec3>,
+/// Something around a medium that moves as one.
+struct Part {
+    shapes: Vec<usize>,
+    point: Option<Vec3>,
+    /// Per parameter.
+    velocities: Vec<Affine>,
 }
 
-pub(crate) fn plan(world: &World, tangents: &Tangents) -> Insides {
+pub(crate) fn plan(world: &World, tangents: &Tangents) -> Result<Insides, Error> {
     let media = world.scene.media.len();
-    let n = tangents.names.len();
     let adjacent = adjacency(world);
-    let anchors = anchors(world, tangents);
     let mut insides = Insides {
         volumes: alloc::vec![Vec::new(); media],
+        blends: alloc::vec![None; media],
         flux: alloc::vec![Vec::new(); media],
         flux_shapes: Vec::new(),
-    };
-    let rest = SurfaceMotion::Rest;
-    let of = |shape: usize, p: usize| {
-        tangents.shapes[shape].iter().find(|(q, _)| *q == p).map_or(&rest, |(_, m)| m)
     };
     for m in 0..media {
         let shapes: Vec<usize> =
             (0..world.scene.shapes.len()).filter(|s| adjacent[*s].contains(&m)).collect();
-        let inside: Vec<&Anchor> = anchors.iter().filter(|a| a.medium == m).collect();
-        for p in 0..n {
-            let motions: Vec<&SurfaceMotion> = shapes.iter().map(|s| of(*s, p)).collect();
-            let mut chosen = inside_motion(&motions);
-            let off =
-                |a: &&&Anchor| (chosen.motion.velocity(a.x) - a.velocities[p]).max_abs() > 0.0;
-            if let Some(a) = inside.iter().find(off) {
-                let v = a.velocities[p];
-                chosen.motion = if v == Vec3::ZERO {
-                    VolumeMotion::Static
-                } else {
-                    VolumeMotion::Affine(Affine { translation: v, ..Affine::ZERO })
-                };
-                chosen.flux = true;
-            }
-            let moves = !chosen.motion.is_rest();
-            if moves {
-                insides.volumes[m].push((p, chosen.motion.clone()));
-            }
-            if chosen.flux {
-                for (s, motion) in shapes.iter().zip(&motions) {
-                    let mesh = &world.scene.shapes[*s].mesh;
-                    if mismatch(mesh, motion, &chosen.motion) && !insides.flux_shapes.contains(s) {
-                        insides.flux_shapes.push(*s);
-                    }
+        for &s in &shapes {
+            for (p, motion) in &tangents.shapes[s] {
+                if matches!(motion, SurfaceMotion::Vertices { .. }) {
+                    insides.flux[m].push(*p);
+                    insides.flux_shapes.push(s);
                 }
             }
-            if moves || motions.iter().any(|m| !m.is_rest()) {
-                insides.flux[m].push((p, chosen.flux));
+        }
+        insides.flux[m].sort_unstable();
+        insides.flux[m].dedup();
+        let parts = parts(world, tangents, m, &shapes);
+        let mut blended = false;
+        for p in 0..tangents.names.len() {
+            let Some(first) = parts.first().map(|part| part.velocities[p]) else { continue };
+            if parts.iter().all(|part| part.velocities[p].is_zero()) {
+                continue;
             }
+            // A point has one velocity, whatever the field is elsewhere.
+            let agrees = |part: &Part| match part.point {
+                Some(x) => part.velocities[p].point(x) == first.point(x),
+                None => part.velocities[p] == first,
+            };
+            let inside = if parts[0].point.is_none() && parts.iter().all(agrees) {
+                Inside::Affine(first)
+            } else {
+                blended = true;
+                let fields = parts.iter().map(|part| part.velocities[p]).enumerate();
+                Inside::Blend(fields.filter(|(_, v)| !v.is_zero()).collect())
+            };
+            insides.volumes[m].push((p, inside));
+        }
+        if blended {
+            let sites = parts.iter().map(|part| site(world, part)).collect::<Result<_, _>>()?;
+            insides.blends[m] = Some(Blend::new(sites));
         }
     }
     insides.flux_shapes.sort_unstable();
-    insides
+    insides.flux_shapes.dedup();
+    Ok(insides)
 }
 
-fn mismatch(mesh: &Mesh, surface: &SurfaceMotion, volume: &VolumeMotion) -> bool {
-    match (surface, volume) {
-        (SurfaceMotion::Affine(a), VolumeMotion::Affine(b)) if a == b => false,
-        (s, v) if s.is_rest() && v.is_rest() => false,
-        _ => (0..mesh.triangles.len() as u32).any(|t| {
-            let n = mesh.normal(t);
-            let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-            corners.into_iter().any(|bary| {
-                let point = drt_motion::SurfacePoint { triangle: t, bary };
-                let [a, b, c] = mesh.triangle(t);
-                let x = a * (1.0 - bary[0] - bary[1]) + b * bary[0] + c * bary[1];
-                let (u, v) = (surface.velocity(mesh, &point), volume.velocity(x));
-                let relative = n.dot(u - v);
-                relative * relative > 1e-24 * (u.length_squared() + v.length_squared())
-            })
-        }),
+/// What surrounds a medium, grouped by motion; the surfaces come first.
+fn parts(world: &World, tangents: &Tangents, medium: usize, shapes: &[usize]) -> Vec<Part> {
+    let n = tangents.names.len();
+    let mut parts: Vec<Part> = Vec::new();
+    for &s in shapes {
+        let mut velocities = alloc::vec![Affine::ZERO; n];
+        for (p, motion) in &tangents.shapes[s] {
+            if let SurfaceMotion::Affine(field) = motion {
+                velocities[*p] = *field;
+            }
+        }
+        match parts.iter_mut().find(|part| part.velocities == velocities) {
+            Some(part) => part.shapes.push(s),
+            None => parts.push(Part { shapes: alloc::vec![s], point: None, velocities }),
+        }
     }
+    let mut anchor = |x: Vec3, moves: &mut dyn Iterator<Item = (usize, Vec3)>| {
+        let mut velocities = alloc::vec![Affine::ZERO; n];
+        for (p, v) in moves {
+            velocities[p] = Affine { translation: v, ..Affine::ZERO };
+        }
+        parts.push(Part { shapes: Vec::new(), point: Some(x), velocities });
+    };
+    if world.camera_medium == Some(medium) {
+        let moves = &mut tangents.sensor.iter().map(|(p, t)| (*p, t.position));
+        anchor(world.camera.position(), moves);
+    }
+    for (e, named) in world.scene.emitters.iter().enumerate() {
+        if let Some(x) = named.item.emitter.position()
+            && world.medium_of_emitter(e, x) == Some(medium)
+        {
+            anchor(x, &mut tangents.emitters[e].iter().map(|(p, t)| (*p, t.position)));
+        }
+    }
+    parts
 }
 
-/// The scattering or emitting media that each shape touches.
+fn site(world: &World, part: &Part) -> Result<Site, Error> {
+    if let Some(x) = part.point {
+        return Ok(Site::Point(x));
+    }
+    let mut soup = Vec::new();
+    for s in &part.shapes {
+        let mesh = &world.scene.shapes[*s].mesh;
+        soup.extend((0..mesh.triangles.len() as u32).map(|t| mesh.triangle(t)));
+    }
+    let bvh = TriangleBvh::build(&soup).map_err(|e| Error::Element {
+        element: "surfaces around a medium".into(),
+        reason: alloc::format!("{e}"),
+    })?;
+    Ok(Site::Surface(bvh))
+}
+
+/// The media that each shape touches.
 pub(crate) fn adjacency(world: &World) -> Vec<Vec<usize>> {
     let scene = &world.scene;
     scene
@@ -129,26 +182,4 @@ pub(crate) fn adjacency(world: &World) -> Vec<Vec<usize>> {
             }
         })
         .collect()
-}
-
-fn anchors(world: &World, tangents: &Tangents) -> Vec<Anchor> {
-    let n = tangents.names.len();
-    let mut anchors = Vec::new();
-    if let Some(medium) = world.camera_medium {
-        let mut velocities = alloc::vec![Vec3::ZERO; n];
-        for (p, t) in &tangents.sensor {
-            velocities[*p] = t.position;
-        }
-        anchors.push(Anchor { medium, x: world.camera.position(), velocities });
-    }
-    for (e, named) in world.scene.emitters.iter().enumerate() {
-        let Some(x) = named.item.emitter.position() else { continue };
-        let Some(medium) = world.medium_of_emitter(e, x) else { continue };
-        let mut velocities = alloc::vec![Vec3::ZERO; n];
-        for (p, t) in &tangents.emitters[e] {
-            velocities[*p] = t.position;
-        }
-        anchors.push(Anchor { medium, x, velocities });
-    }
-    anchors
 }

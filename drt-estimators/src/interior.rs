@@ -6,13 +6,14 @@ use drt_math::{Rgb, Rng};
 
 use crate::boundary::shadow::{self, Shadows};
 use crate::contraction::Contraction;
-use crate::flux::{self, Flux};
+use crate::flux::{Flux, Reservoir};
 use crate::rendering::{Counters, NonFinite, Term};
 use crate::sensitivity::{AdjointSink, Functional};
 use crate::transport::{Differentiator, PathRecord, Radiance, Tracer, World};
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
 pub(crate) const LINE_STREAM: u64 = 1 << 62;
+const FLUX_STREAM: u64 = 1 << 61;
 
 /// Boundary and flux terms that are found along camera rays.
 #[derive(Clone, Copy, Default)]
@@ -77,9 +78,8 @@ pub(crate) struct PixelSampler<'a, S> {
     record: PathRecord,
     differentiator: Differentiator<'a>,
     pub(crate) sink: Option<S>,
-    flux: Option<&'a Flux>,
+    flux: bool,
     shadows: Option<&'a Shadows>,
-    flux_buffers: flux::Buffers,
     shadow_buffers: shadow::Buffers,
     separate: bool,
     pub(crate) non_finite: Vec<NonFinite>,
@@ -105,12 +105,11 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             seed,
             antithetic,
             tracer: Tracer::new(world),
-            record: PathRecord::default(),
+            record: PathRecord { flux: Reservoir::new(along.flux), ..PathRecord::default() },
             differentiator: Differentiator::new(world),
             sink,
-            flux: along.flux,
+            flux: along.flux.is_some(),
             shadows: along.shadows,
-            flux_buffers: flux::Buffers::default(),
             shadow_buffers: shadow::Buffers::default(),
             separate,
             non_finite: Vec::new(),
@@ -162,6 +161,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             return;
         };
         self.record.begin(dir, weight);
+        self.record.flux.begin(Rng::new(self.seed, FLUX_STREAM | u64::from(pixel), unit));
         self.tracer.from_camera(dir, weight, &mut self.record);
         values[0] += self.record.value;
         self.recorded += self.record.nodes.len() as u64;
@@ -175,10 +175,10 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         }
         // Each kept apart goes to layers of its own, in the order of `AlongRays::terms`.
         let mut at = 1;
-        if let Some(flux) = self.flux {
+        if self.flux {
             at += if self.separate { n } else { 0 };
-            flux.along_camera_ray(&mut self.tracer, dir, &mut self.flux_buffers, |f, value| {
-                sink.functional(f, value * weight, &mut values[at..at + n]);
+            self.record.flux.evaluate(&mut self.tracer, |f, value| {
+                sink.functional(f, value, &mut values[at..at + n]);
             });
         }
         if let Some(shadows) = self.shadows {

@@ -12,7 +12,7 @@ pub struct MediumPlan {
     pub medium: String,
     /// `closed form` or `delta tracking`.
     pub tracking: String,
-    /// Per parameter that moves it: its name and `affine` or `static with flux`.
+    /// Per parameter that moves it: its name and `affine`, `blend` or `static with flux`.
     pub motion: Vec<(String, String)>,
 }
 

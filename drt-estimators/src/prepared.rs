@@ -32,7 +32,7 @@ impl Prepared {
     ) -> Result<Self, Error> {
         let moving = interest.moves_geometry();
         let boundary = if moving { Boundary::new(&world)? } else { Boundary::default() };
-        let flux = Flux::new(&world, flux_shapes)?;
+        let flux = Flux::new(&world, flux_shapes);
         let mut sources = Vec::new();
         if moving {
             for strategy in [Strategy::Primary, Strategy::Direct, Strategy::Indirect] {
@@ -44,9 +44,6 @@ impl Prepared {
                 sources.push(Source::Borders);
             }
         }
-        if flux.is_some() && world.max_depth >= 3 {
-            sources.push(Source::Flux);
-        }
         // The filter's rate is what mirrored pairs cancel; without it they only cost.
         let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
         Ok(Self { world, boundary, flux, sources, antithetic })
@@ -57,7 +54,7 @@ impl Prepared {
     }
 
     pub(crate) fn splatter(&self, seed: u64) -> Splatter<'_> {
-        Splatter { world: &self.world, boundary: &self.boundary, flux: self.flux.as_ref(), seed }
+        Splatter { world: &self.world, boundary: &self.boundary, seed }
     }
 
     /// Samples of each batch of each splatted source, when every pixel takes `spp`.

@@ -9,7 +9,7 @@ use drt_motion::Parameter;
 use crate::boundary::Strategy;
 use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm, Tile};
-use crate::inside;
+use crate::inside::{self, Inside};
 use crate::interior::PixelSampler;
 use crate::parallel::Pool;
 use crate::plan::{MediumPlan, Plan};
@@ -87,10 +87,11 @@ impl Session {
         let (scene, tangents) = tangents::apply(scene, parameters, settings.sensor)?;
         let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
         let mut world = World::new(scene, settings.sensor, depth)?;
-        let motion = (!parameters.is_empty()).then(|| {
-            let insides = inside::plan(&world, &tangents);
-            Motion::new(tangents, insides)
-        });
+        let mut motion = None;
+        if !parameters.is_empty() {
+            let insides = inside::plan(&world, &tangents)?;
+            motion = Some(Motion::new(tangents, insides));
+        }
         if let Some(motion) = &motion {
             world.prepare_for_derivatives(motion.samples_media());
         }
@@ -368,16 +369,19 @@ fn medium_plan(world: &World, motion: Option<&Motion>, i: usize) -> MediumPlan {
         None => "delta tracking",
     };
     let motions = motion.map_or_else(Vec::new, |m| {
-        m.insides.flux[i]
-            .iter()
-            .map(|(p, flux)| {
-                let moving = m.insides.volumes[i].iter().any(|(q, _)| q == p);
-                let how = match (moving, flux) {
-                    (true, false) => "affine",
-                    (true, true) => "affine with flux",
-                    (false, _) => "static with flux",
+        let insides = &m.insides;
+        (0..m.parameters())
+            .filter_map(|p| {
+                let inside = insides.volumes[i].iter().find(|(q, _)| *q == p).map(|(_, m)| m);
+                let how = match (inside, insides.flux[i].contains(&p)) {
+                    (None, false) => return None,
+                    (None, true) => "static with flux",
+                    (Some(Inside::Affine(_)), false) => "affine",
+                    (Some(Inside::Affine(_)), true) => "affine with flux",
+                    (Some(Inside::Blend(_)), false) => "blend",
+                    (Some(Inside::Blend(_)), true) => "blend with flux",
                 };
-                (m.tangents.names[*p].clone(), String::from(how))
+                Some((m.tangents.names[p].clone(), String::from(how)))
             })
             .collect()
     });

@@ -1,4 +1,4 @@
-//! Terms whose samples land anywhere on the film: boundary segments, pixel borders and flux.
+//! Terms whose samples land anywhere on the film: boundary segments and pixel borders.
 
 use alloc::vec::Vec;
 
@@ -7,7 +7,6 @@ use drt_math::{Rgb, Rng};
 use crate::boundary::{self, Boundary, Receiver, Strategy};
 use crate::contraction::{Contraction, Motion};
 use crate::film::Splats;
-use crate::flux::{self, Flux};
 use crate::rendering::{Counters, NonFinite, Term};
 use crate::sensitivity::Functional;
 use crate::transport::{Tracer, World};
@@ -19,8 +18,6 @@ pub(crate) enum Source {
     Edges(Strategy),
     /// Jumps of a box filter.
     Borders,
-    /// Flux through moving surfaces, seen indirectly.
-    Flux,
 }
 
 impl Source {
@@ -29,7 +26,6 @@ impl Source {
             Self::Edges(Strategy::Primary) | Self::Borders => Term::Primary,
             Self::Edges(Strategy::Direct) => Term::Direct,
             Self::Edges(Strategy::Indirect) => Term::Indirect,
-            Self::Flux => Term::Flux,
         }
     }
 
@@ -40,7 +36,6 @@ impl Source {
             Self::Edges(Strategy::Direct) => 2,
             Self::Edges(Strategy::Indirect) => 3,
             Self::Borders => 4,
-            Self::Flux => 5,
         };
         id << 40
     }
@@ -50,7 +45,6 @@ impl Source {
 pub(crate) struct Splatter<'a> {
     pub(crate) world: &'a World,
     pub(crate) boundary: &'a Boundary,
-    pub(crate) flux: Option<&'a Flux>,
     pub(crate) seed: u64,
 }
 
@@ -73,7 +67,6 @@ impl Splatter<'_> {
     ) -> Account {
         let mut tracer = Tracer::new(self.world);
         let mut edges = boundary::Buffers::default();
-        let mut flux = flux::Buffers::default();
         receiver.term = Some(source.term());
         receiver.seed = self.seed;
         receiver.stream = stream;
@@ -86,11 +79,6 @@ impl Splatter<'_> {
                 }
                 Source::Borders => {
                     boundary::border::sample(&mut tracer, &mut edges, receiver);
-                }
-                Source::Flux => {
-                    if let Some(f) = self.flux {
-                        f.sample(&mut tracer, &mut flux, receiver);
-                    }
                 }
             }
         }

@@ -5,6 +5,7 @@
 extern crate alloc;
 
 mod adjoint;
+mod blend;
 mod element;
 mod error;
 mod geometry;
@@ -18,6 +19,7 @@ mod volume;
 pub use drt_math::{ValueChange, ValueMap};
 
 pub use adjoint::{AffineGradient, JetAdjoint, VertexGradient, in_file_order};
+pub use blend::{Blend, Site, SiteWeight, blend_jet};
 pub use element::SurfaceElement;
 pub use error::{Cause, MotionError};
 pub use geometry::GeometryChange;

@@ -7,7 +7,8 @@ use drt_math::{Rgb, Vec3};
 
 use super::trace::{Arrival, Connection, Endpoint, Observer};
 use super::vertex::Vertex;
-use super::world::Crossing;
+use super::world::{Crossing, RayPath};
+use crate::flux::Reservoir;
 
 /// A vertex of the record. Node 0 is the camera; every other knows its parent, which comes before.
 #[derive(Clone, Debug)]
@@ -42,6 +43,8 @@ pub(crate) struct PathRecord {
     pub(crate) connections: Vec<(Connection, Range<usize>)>,
     /// The path's value.
     pub(crate) value: Rgb,
+    /// Where it met surfaces with a flux.
+    pub(crate) flux: Reservoir,
 }
 
 impl PathRecord {
@@ -73,6 +76,10 @@ impl Observer for PathRecord {
 
     fn contribution(&mut self, _segments: u32, value: Rgb) {
         self.value += value;
+    }
+
+    fn ray(&mut self, segments: u32, throughput: Rgb, origin: Vec3, dir: Vec3, ray: &RayPath) {
+        self.flux.offer(segments, throughput, origin, dir, ray);
     }
 
     fn arrive(&mut self, arrival: &Arrival, crossings: &[Crossing]) -> u32 {

@@ -189,7 +189,14 @@ impl World {
     /// emission changes.
     pub(crate) fn prepare_for_derivatives(&mut self, media: impl Iterator<Item = (usize, bool)>) {
         for (m, needs_vertices) in media {
-            self.defensive[m] = DEFENSIVE;
+            // Where every channel attenuates, free flights reach everything by themselves.
+            let sparse = self
+                .medium(m)
+                .homogeneous()
+                .is_none_or(|h| h.coefficients().sigma_t.to_array().into_iter().any(|s| s <= 0.0));
+            if sparse {
+                self.defensive[m] = DEFENSIVE;
+            }
             if needs_vertices {
                 self.tracking[m] = Tracking::Vertices;
             }
@@ -472,14 +479,6 @@ impl World {
         match self.first_boundary(x) {
             Some((point, front)) => self.medium_on_side(&point, front, None),
             None => self.ambient,
-        }
-    }
-
-    /// The medium around a surface that separates none, at one of its points.
-    pub(crate) fn medium_around(&self, point: &SurfacePoint, x: Vec3) -> Option<usize> {
-        match self.scene.shapes[point.shape as usize].boundary {
-            Some(_) => None,
-            None => self.medium_at(x),
         }
     }
 

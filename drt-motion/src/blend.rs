@@ -1,0 +1,164 @@
+//! Several motions blended over the space between them: the inside of a medium whose surroundings
+//! move differently.
+//!
+//! At a point x with distances d_i to the sites, the weights are Shepard's (1968),
+//!
+//! ```text
+//! λ_i = d_i⁻² / Σ_j d_j⁻²,   u(x) = Σ λ_i u_i(x),
+//! ```
+//!
+//! so u equals u_i on site i, with its first derivatives, and is continuous everywhere: what a field
+//! inside a medium must be (theory sheet §4.1, §14.1). The divergence jumps where the nearest point
+//! of a site does, which is harmless.
+
+use alloc::vec::Vec;
+
+use drt_geom::TriangleBvh;
+use drt_math::{Affine, Vec3};
+
+use crate::VolumeJet;
+
+/// Something that moves on its own.
+#[derive(Clone, Debug)]
+pub enum Site {
+    /// A surface.
+    Surface(TriangleBvh),
+    /// A camera or point light.
+    Point(Vec3),
+}
+
+/// The weight of a site at a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SiteWeight {
+    /// λ, from 0 to 1; all sum to 1.
+    pub lambda: f64,
+    /// Gradient of λ.
+    pub gradient: Vec3,
+}
+
+/// The sites around a medium.
+#[derive(Clone, Debug, Default)]
+pub struct Blend {
+    sites: Vec<Site>,
+}
+
+impl Blend {
+    /// A blend of these sites; empty surfaces count for nothing.
+    #[must_use]
+    pub fn new(sites: Vec<Site>) -> Self {
+        Self { sites }
+    }
+
+    /// Replaces `out` by the weights of all sites at `x`.
+    pub fn weights(&self, x: Vec3, out: &mut Vec<SiteWeight>) {
+        out.clear();
+        // First, λ holds d² and the gradient x - nearest.
+        for site in &self.sites {
+            let nearest = match site {
+                Site::Surface(bvh) => bvh.closest_point(x).map(|c| c.point),
+                Site::Point(p) => Some(*p),
+            };
+            let gradient = nearest.map_or(Vec3::ZERO, |p| x - p);
+            let lambda = nearest.map_or(f64::INFINITY, |_| gradient.length_squared());
+            out.push(SiteWeight { lambda, gradient });
+        }
+        let Some(least) = out.iter().map(|w| w.lambda).min_by(f64::total_cmp) else { return };
+        if least == 0.0 {
+            // On a site: it alone counts, and derivatives of the weights vanish.
+            let mut first = true;
+            for w in out {
+                let on = w.lambda == 0.0 && first;
+                first &= !on;
+                *w = SiteWeight { lambda: f64::from(u8::from(on)), gradient: Vec3::ZERO };
+            }
+            return;
+        }
+        let sum: f64 = out.iter().map(|w| least / w.lambda).sum();
+        let mut mean = Vec3::ZERO;
+        for w in out.iter_mut() {
+            // ∇ ln d⁻² = -2 (x - nearest) / d².
+            let slope =
+                if w.lambda.is_finite() { w.gradient * (-2.0 / w.lambda) } else { Vec3::ZERO };
+            w.lambda = least / w.lambda / sum;
+            w.gradient = slope;
+            mean += slope * w.lambda;
+        }
+        for w in out {
+            w.gradient = (w.gradient - mean) * w.lambda;
+        }
+    }
+}
+
+/// The blended velocity at `x` and its divergence: `velocities` gives the field of each site that
+/// moves, by its place in the blend; the others are at rest.
+#[must_use]
+pub fn blend_jet(weights: &[SiteWeight], velocities: &[(usize, Affine)], x: Vec3) -> VolumeJet {
+    let mut jet = VolumeJet::default();
+    for (site, field) in velocities {
+        let w = &weights[*site];
+        let u = field.point(x);
+        jet.u += u * w.lambda;
+        jet.j_dot += field.linear.trace() * w.lambda + u.dot(w.gradient);
+    }
+    jet
+}
+
+#[cfg(test)]
+mod tests {
+    use drt_geom::procedural;
+    use drt_math::{Mat3, vec3};
+
+    use super::*;
+
+    fn example() -> (Blend, Vec<(usize, Affine)>) {
+        let sphere = procedural::icosphere(2);
+        let plate = procedural::rectangle().transform(&Affine::translation(vec3(0.0, 0.0, -3.0)));
+        let blend = Blend::new(alloc::vec![
+            Site::Surface(TriangleBvh::of(&sphere).unwrap()),
+            Site::Surface(TriangleBvh::of(&plate).unwrap()),
+            Site::Point(vec3(4.0, 0.0, 1.0)),
+        ]);
+        let spin =
+            Affine { linear: Mat3::skew(vec3(0.2, -0.5, 0.3)), translation: vec3(1.0, 0.2, 0.0) };
+        let slide = Affine { translation: vec3(0.0, -0.7, 0.1), ..Affine::ZERO };
+        (blend, alloc::vec![(0, spin), (2, slide)])
+    }
+
+    #[test]
+    fn meets_every_site_with_its_velocity() {
+        let (blend, v) = example();
+        let mut w = Vec::new();
+        for (x, expected) in [
+            (vec3(0.0, 0.0, 1.0), v[0].1.point(vec3(0.0, 0.0, 1.0))),
+            (vec3(0.3, 0.1, -3.0), Vec3::ZERO),
+            (vec3(4.0, 0.0, 1.0), v[1].1.translation),
+        ] {
+            for off in [0.0, 1e-7] {
+                let p = x + vec3(0.0, 0.0, off);
+                blend.weights(p, &mut w);
+                let sum: f64 = w.iter().map(|w| w.lambda).sum();
+                assert!((sum - 1.0).abs() < 1e-14);
+                assert!((blend_jet(&w, &v, p).u - expected).max_abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn divergence_matches_differences() {
+        let (blend, v) = example();
+        let mut w = Vec::new();
+        let mut u = |x: Vec3| {
+            blend.weights(x, &mut w);
+            blend_jet(&w, &v, x)
+        };
+        let h = 1e-6;
+        for x in [vec3(1.3, 0.4, 0.2), vec3(-0.2, 1.7, -1.0), vec3(3.5, 0.4, 0.7)] {
+            let along = |axis: Vec3| axis * h;
+            let fd = ((u(x + along(Vec3::X)).u - u(x - along(Vec3::X)).u).x
+                + (u(x + along(Vec3::Y)).u - u(x - along(Vec3::Y)).u).y
+                + (u(x + along(Vec3::Z)).u - u(x - along(Vec3::Z)).u).z)
+                / (2.0 * h);
+            assert!((u(x).j_dot - fd).abs() < 1e-7 * fd.abs().max(1.0), "{} {fd}", u(x).j_dot);
+        }
+    }
+}
