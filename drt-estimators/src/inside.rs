@@ -7,8 +7,10 @@
 //!
 //! * nothing around it moves: static;
 //! * everything around it moves by one affine field: that field;
-//! * surfaces move by different affine fields, or some rest: the blend of all (drt-motion's `Blend`);
-//! * a surface deforms by its vertices: it counts as resting in the blend, and its flux is added.
+//! * only surfaces without path vertices move (null or black): static, and their flux is added;
+//! * other surfaces move by different affine fields, or some rest: the blend of all (drt-motion's
+//!   `Blend`);
+//! * a surface deforms by its vertices: it counts as resting in the above, and its flux is added.
 
 use alloc::vec::Vec;
 
@@ -46,6 +48,8 @@ pub(crate) struct Insides {
 struct Part {
     shapes: Vec<usize>,
     point: Option<Vec3>,
+    /// Paths have vertices on it.
+    scatters: bool,
     /// Per parameter.
     velocities: Vec<Affine>,
 }
@@ -70,8 +74,6 @@ pub(crate) fn plan(world: &World, tangents: &Tangents) -> Result<Insides, Error>
                 }
             }
         }
-        insides.flux[m].sort_unstable();
-        insides.flux[m].dedup();
         let parts = parts(world, tangents, m, &shapes);
         let mut blended = false;
         for p in 0..tangents.names.len() {
@@ -84,8 +86,13 @@ pub(crate) fn plan(world: &World, tangents: &Tangents) -> Result<Insides, Error>
                 Some(x) => part.velocities[p].point(x) == first.point(x),
                 None => part.velocities[p] == first,
             };
+            let moving = || parts.iter().filter(|part| !part.velocities[p].is_zero());
             let inside = if parts[0].point.is_none() && parts.iter().all(agrees) {
                 Inside::Affine(first)
+            } else if !moving().any(|part| part.scatters) {
+                insides.flux[m].push(p);
+                insides.flux_shapes.extend(moving().flat_map(|part| &part.shapes));
+                continue;
             } else {
                 blended = true;
                 let fields = parts.iter().map(|part| part.velocities[p]).enumerate();
@@ -93,6 +100,8 @@ pub(crate) fn plan(world: &World, tangents: &Tangents) -> Result<Insides, Error>
             };
             insides.volumes[m].push((p, inside));
         }
+        insides.flux[m].sort_unstable();
+        insides.flux[m].dedup();
         if blended {
             let sites = parts.iter().map(|part| site(world, part)).collect::<Result<_, _>>()?;
             insides.blends[m] = Some(Blend::new(sites));
@@ -114,9 +123,11 @@ fn parts(world: &World, tangents: &Tangents, medium: usize, shapes: &[usize]) ->
                 velocities[*p] = *field;
             }
         }
-        match parts.iter_mut().find(|part| part.velocities == velocities) {
+        let scatters = world.scatters(s);
+        let same = |part: &&mut Part| part.scatters == scatters && part.velocities == velocities;
+        match parts.iter_mut().find(same) {
             Some(part) => part.shapes.push(s),
-            None => parts.push(Part { shapes: alloc::vec![s], point: None, velocities }),
+            None => parts.push(Part { shapes: alloc::vec![s], point: None, scatters, velocities }),
         }
     }
     let mut anchor = |x: Vec3, moves: &mut dyn Iterator<Item = (usize, Vec3)>| {
@@ -124,7 +135,7 @@ fn parts(world: &World, tangents: &Tangents, medium: usize, shapes: &[usize]) ->
         for (p, v) in moves {
             velocities[p] = Affine { translation: v, ..Affine::ZERO };
         }
-        parts.push(Part { shapes: Vec::new(), point: Some(x), velocities });
+        parts.push(Part { shapes: Vec::new(), point: Some(x), scatters: true, velocities });
     };
     if world.camera_medium == Some(medium) {
         let moves = &mut tangents.sensor.iter().map(|(p, t)| (*p, t.position));

@@ -25,6 +25,10 @@ use crate::{Error, Estimate};
 
 /// Pixels of a tile.
 const TILE: u32 = 256;
+/// Samples of one piece of work.
+const WORK: u32 = 1 << 12;
+/// Samples after which a small film is looked at again.
+const SLICE: u32 = 1 << 18;
 /// Non-finite contributions that are described one by one.
 const DESCRIBED: usize = 16;
 
@@ -135,7 +139,8 @@ impl Session {
         let units = spp.div_ceil(per_unit);
         // The share of the work that is done when the pixels are.
         let share = if self.prepared.sources.is_empty() { 1.0 } else { 0.5 };
-        let slice = (units / 16).clamp(1, 32);
+        let [w, h] = self.prepared.world.camera.film();
+        let slice = (units / 16).clamp(1, u32::max(32, SLICE / (w * h)));
         let mut done = 0;
         let mut going = true;
         while done < units && going {
@@ -174,20 +179,26 @@ impl Session {
         let (world, motion) = (&self.prepared.world, self.motion.as_ref());
         let (settings, blocks) = (&self.settings, &self.blocks);
         let antithetic = self.plan.antithetic;
-        let mut finished = Vec::with_capacity(tiles as usize);
+        // A film of few pixels is cut into samples as well.
+        let per_work = (WORK / u32::min(count, TILE)).max(1);
+        let cuts = units.div_ceil(per_work);
+        let works = tiles * cuts;
+        let mut finished = Vec::with_capacity(works as usize);
         let cancelled = Cell::new(false);
         self.pool.ordered(
-            0..tiles,
+            0..works,
             4,
-            |t| {
+            |i| {
+                let (t, cut) = (i / cuts, i % cuts);
                 let range = t * TILE..u32::min(count, (t + 1) * TILE);
+                let own = first + cut * per_work..first + u32::min(units, (cut + 1) * per_work);
                 let mut tile = Tile::new(range.clone(), layers);
                 let sink = motion.map(|m| Contraction::new(world, m));
                 let mut sampler =
                     PixelSampler::new(world, sink, along, settings.seed, antithetic, separate);
                 let mut values = alloc::vec![drt_math::Rgb::ZERO; layers];
                 for pixel in range {
-                    for unit in first..first + units {
+                    for unit in own.clone() {
                         sampler.sample(pixel, unit, &mut values);
                         tile.push(blocks, pixel, unit, &values);
                     }
@@ -202,13 +213,13 @@ impl Session {
             },
             |t, result| {
                 finished.push(result);
-                progress(f64::from(t + 1) / f64::from(tiles));
+                progress(f64::from(t + 1) / f64::from(works));
                 cancelled.set(control.cancelled());
                 !cancelled.get()
             },
         );
         // A round that was cut short would leave pixels with different numbers of samples.
-        if cancelled.get() && finished.len() < tiles as usize {
+        if cancelled.get() && finished.len() < works as usize {
             return false;
         }
         self.pixels.advance(units);

@@ -17,7 +17,7 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Vec3, warp};
 
-use super::trace::{Flight, Flown, Tracer, Travel, medium_span};
+use super::trace::{Flight, Flown, MOST_SURVIVAL, Tracer, Travel, medium_span};
 use super::vertex::{Kind, Vertex};
 use super::world::{RayPath, Tracking};
 use crate::surface::Given;
@@ -71,7 +71,7 @@ impl Tracer<'_> {
             let f = scattering.eval(wo, wi) * scattering.adjoint_correction(wo, wi);
             beta *= f * (1.0 / pdf);
             if segments > world.rr_depth {
-                let survival = f64::min(0.95, beta.max_channel());
+                let survival = f64::min(MOST_SURVIVAL, beta.max_channel());
                 if survival <= 0.0 || self.rng.next_f64() >= survival {
                     return;
                 }

@@ -28,6 +28,9 @@ use super::world::{Crossing, RayPath, Tracking, World, intervals};
 use crate::Counters;
 use crate::surface::Given;
 
+/// Largest probability of going on under Russian roulette. Below one it also ends paths that lose
+/// nothing, at the price of weights that grow with every vertex.
+pub(crate) const MOST_SURVIVAL: f64 = 0.99;
 /// Longest path with unlimited depth: far beyond where Russian roulette lets any path go.
 const LONGEST: u32 = 1 << 20;
 
@@ -182,7 +185,8 @@ impl<'w> Tracer<'w> {
             dir,
             pdf: None,
             throughput: weight,
-            alive: Alive::new(weight),
+            // Roulette must not end paths for the filter's sake: its derivative needs them.
+            alive: Alive::new(Rgb::ONE),
             segments: 0,
         };
         if let Some(stop) = self.follow(&leaving, observer) {
@@ -266,7 +270,7 @@ impl<'w> Tracer<'w> {
             return None;
         }
         if stop.segments >= world.rr_depth {
-            let survival = f64::min(0.95, alive.value.max_channel());
+            let survival = f64::min(MOST_SURVIVAL, alive.value.max_channel());
             if self.rng.next_f64() >= survival {
                 return None;
             }
