@@ -130,6 +130,14 @@ impl AdjointSink for Contraction<'_> {
         }
     }
 
+    fn grid_face(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
+        for (p, tangent) in &self.motion.tangents.media[medium] {
+            if let Some(velocity) = tangent.grid_velocity() {
+                self.rates[*p] += u.dot(velocity.point(x));
+            }
+        }
+    }
+
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
         for (p, tangent) in &self.motion.tangents.bsdfs[bsdf] {
             self.rates[*p] += params.dot(tangent) * weight;

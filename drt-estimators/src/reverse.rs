@@ -292,6 +292,12 @@ impl AdjointSink for Scatter<'_> {
         }
     }
 
+    fn grid_face(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
+        if let Some(gradient) = &mut self.gradient.media[medium] {
+            gradient.scatter_velocity(x, u.weighted(self.weights));
+        }
+    }
+
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
         if let Some(gradient) = &mut self.gradient.bsdfs[bsdf] {
             gradient.scatter(params, weight * self.weights);

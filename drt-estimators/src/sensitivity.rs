@@ -37,6 +37,11 @@ pub(crate) struct CoefficientAdjoint {
 }
 
 impl CoefficientAdjoint {
+    /// Of the extinction alone.
+    pub(crate) fn of_sigma_t(sigma_t: Rgb) -> Self {
+        Self { sigma_t, ..Self::default() }
+    }
+
     /// The change along rates of the coefficients.
     pub(crate) fn dot(&self, r: &CoefficientRates) -> Rgb {
         self.sigma_t * r.sigma_t
@@ -98,6 +103,8 @@ pub(crate) trait AdjointSink {
     fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb);
     /// Of a medium's coefficients at a point of space.
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint);
+    /// Of the velocity of a face of a grid's box, at a point of it.
+    fn grid_face(&mut self, medium: usize, x: Vec3, u: &RgbVec);
     /// Of a material's parameters; `weight` multiplies channel by channel.
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb);
     /// Of an emitter, per channel.

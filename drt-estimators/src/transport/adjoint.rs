@@ -29,7 +29,7 @@ use super::lights::{LightKind, LightSample};
 use super::record::{Node, PathRecord};
 use super::trace::Endpoint;
 use super::vertex::{Kind, Vertex};
-use super::world::{Crossing, World, intervals};
+use super::world::{Crossing, Interval, World, intervals};
 use crate::emitter::EmitterGradient;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
@@ -200,7 +200,8 @@ impl<'w> Differentiator<'w> {
 
     /// Sensitivities of one stretch between two ends: geometric term, far-end Jacobian and
     /// transmittance, all weighted by the contributions that pass. The near end's go to `near`; the
-    /// far end's to its own receiver, or back to the caller for a point light.
+    /// far end's to its own receiver, or back to the caller for a point light's position or the rate
+    /// of a fixed direction.
     fn segment<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
@@ -210,16 +211,16 @@ impl<'w> Differentiator<'w> {
         near: &mut SurfaceAdjoint,
         sink: &mut S,
     ) -> RgbVec {
-        let mut along = (RgbVec::ZERO, RgbVec::ZERO);
-        self.transmittance(path, matches!(far, Far::Direction), moving, weight, &mut along, sink);
+        let mut along = Along { fixed: matches!(far, Far::Direction), ..Along::default() };
+        self.transmittance(path, moving, weight, &mut along, sink);
         if !moving {
             return RgbVec::ZERO;
         }
-        near.u += along.0;
+        near.u += along.near;
         let d = path.dir * path.length;
         match far {
             Far::Vertex(v, receiver) => {
-                receiver.u += along.1;
+                receiver.u += along.far;
                 // ln(|n·d| / R^3) on a surface, ln(1/R^2) in a volume.
                 let mut g = path.dir * (-2.0 / path.length);
                 if let Kind::Surface(s) = &v.kind {
@@ -236,79 +237,48 @@ impl<'w> Differentiator<'w> {
             Far::Position => {
                 let g = weight.outer(path.dir * (-2.0 / path.length));
                 near.u -= g;
-                along.1 + g
+                along.far + g
             }
-            Far::Direction => RgbVec::ZERO,
+            Far::Direction => along.turn,
         }
     }
 
-    /// Sensitivities of the transmittance over a stretch; those by the ends' positions are added to
-    /// `ends`. Along a fixed direction only the near end counts.
+    /// Sensitivities of the transmittance over a stretch; those by the places of points along it are
+    /// added to `along`.
     fn transmittance<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
-        fixed_direction: bool,
         moving: bool,
         weight: Rgb,
-        ends: &mut (RgbVec, RgbVec),
+        along: &mut Along,
         sink: &mut S,
     ) {
         let world = self.world;
         if !world.has_media() {
             return;
         }
-        // How much a point at distance t follows the far end.
-        let share = |t: f64| if fixed_direction { 0.0 } else { t / path.length };
         let mut depth_per_length = Rgb::ZERO;
         for i in intervals(path.medium, path.crossings, path.length) {
             let Some(m) = i.medium else { continue };
-            let medium = world.medium(m);
             let length = i.end - i.start;
-            if !length.is_finite() {
+            if !length.is_finite() && world.medium(m).homogeneous().is_some() {
                 continue;
             }
-            if let Some(h) = medium.homogeneous() {
-                if sink.interest().media[m] {
-                    let x = path.start + path.dir * i.start;
-                    let sigma_t = weight * -length;
-                    let adjoint = CoefficientAdjoint { sigma_t, ..CoefficientAdjoint::default() };
-                    sink.medium(m, x, &adjoint);
-                }
-                if !fixed_direction {
-                    depth_per_length += h.coefficients().sigma_t * (length / path.length);
-                }
-                continue;
-            }
-            if !moving && !sink.interest().media[m] {
-                continue;
-            }
+            let changes = sink.interest().media[m];
             let start = path.start + path.dir * i.start;
-            let mut points = core::mem::take(&mut self.points);
-            points.clear();
-            medium.line_points(start, path.dir, length, &mut self.rng, &mut points);
-            for &(t, w) in &points {
-                let x = start + path.dir * t;
-                if sink.interest().media[m] {
-                    let sigma_t = weight * -w;
-                    let adjoint = CoefficientAdjoint { sigma_t, ..CoefficientAdjoint::default() };
-                    sink.medium(m, x, &adjoint);
+            if let Some(h) = world.medium(m).homogeneous() {
+                if changes {
+                    sink.medium(m, start, &CoefficientAdjoint::of_sigma_t(weight * -length));
                 }
-                if moving {
-                    let s = share(i.start + t);
-                    let g = medium.gradients(x).sigma_t * (weight * -w);
-                    ends.0 += g * (1.0 - s);
-                    ends.1 += g * s;
-                    if !fixed_direction {
-                        depth_per_length += medium.sigma_t(x) * (w / path.length);
-                    }
-                }
+                depth_per_length += h.coefficients().sigma_t * (length / path.length);
+            } else if moving || changes {
+                depth_per_length += self.grid(path, &i, m, moving, weight, along, sink);
             }
-            self.points = points;
         }
-        if moving && !fixed_direction {
+        if moving && !along.fixed {
             let g = (weight * -depth_per_length).outer(path.dir);
-            ends.1 += g;
-            ends.0 -= g;
+            along.far += g;
+            along.near -= g;
         }
         let mut before = path.medium;
         for c in path.crossings {
@@ -324,10 +294,53 @@ impl<'w> Differentiator<'w> {
             if shape_moves {
                 sink.surface(&c.point, &SurfaceAdjoint { u: g, ..SurfaceAdjoint::default() });
             }
-            let s = share(c.t);
-            ends.0 -= g * (1.0 - s);
-            ends.1 -= g * s;
+            along.add(&-g, c.t, path.length);
         }
+    }
+
+    /// The part of a stretch inside a grid: an unbiased line integral, and the faces of the grid's
+    /// own box. Returns the estimated optical depth per length of the stretch.
+    #[allow(clippy::too_many_arguments)]
+    fn grid<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        i: &Interval,
+        m: usize,
+        moving: bool,
+        weight: Rgb,
+        along: &mut Along,
+        sink: &mut S,
+    ) -> Rgb {
+        let medium = self.world.medium(m);
+        let changes = sink.interest().media[m];
+        let (start, length) = (path.start + path.dir * i.start, i.end - i.start);
+        let mut depth = Rgb::ZERO;
+        let mut points = core::mem::take(&mut self.points);
+        points.clear();
+        medium.line_points(start, path.dir, length, &mut self.rng, &mut points);
+        for &(t, w) in &points {
+            let x = start + path.dir * t;
+            if changes {
+                sink.medium(m, x, &CoefficientAdjoint::of_sigma_t(weight * -w));
+            }
+            if moving {
+                let g = medium.gradients(x).sigma_t * (weight * -w);
+                along.add(&g, i.start + t, path.length);
+                depth += medium.sigma_t(x) * (w / path.length);
+            }
+        }
+        self.points = points;
+        if let Some(grid) = medium.grid() {
+            let ray = drt_medium::Ray { origin: start, dir: path.dir, t_max: length };
+            for c in grid.crossings(&ray) {
+                let g = c.depth_per_velocity() * -weight;
+                if changes {
+                    sink.grid_face(m, start + path.dir * c.t, &g);
+                }
+                along.add(&-g, i.start + c.t, path.length);
+            }
+        }
+        depth
     }
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
@@ -462,9 +475,10 @@ impl<'w> Differentiator<'w> {
                 self.intensity(path, light, per_value, at_light, here, sink);
             }
             LightKind::Direction => {
-                self.segment(path, Far::Direction, near_moves, weight, here, sink);
+                let moving = near_moves || emitter;
+                let turn = self.segment(path, Far::Direction, moving, weight, here, sink);
                 if emitter {
-                    self.direction(path, light, to_wi, per_value, sink);
+                    direction(light, to_wi, turn, per_value, sink);
                 }
             }
         }
@@ -502,54 +516,6 @@ impl<'w> Differentiator<'w> {
             }
             sink.emitter(light.emitter, &gradients);
         }
-    }
-
-    /// A directional light: its strength, and its direction through the scattering function and
-    /// through where the ray crosses interfaces and grids.
-    fn direction<S: AdjointSink>(
-        &mut self,
-        path: &Stretch<'_>,
-        light: &LightSample,
-        to_wi: Option<RgbVec>,
-        per_value: Rgb,
-        sink: &mut S,
-    ) {
-        let world = self.world;
-        let weight = per_value * light.value;
-        // wi = -direction; a point at distance t from the vertex moves by -t direction_dot.
-        let mut g = to_wi.map_or(RgbVec::ZERO, |g| -g);
-        for i in intervals(path.medium, path.crossings, path.length) {
-            let Some(m) = i.medium else { continue };
-            let medium = world.medium(m);
-            if medium.homogeneous().is_some() {
-                continue;
-            }
-            let start = path.start + path.dir * i.start;
-            self.points.clear();
-            medium.line_points(start, path.dir, i.end - i.start, &mut self.rng, &mut self.points);
-            for &(t, w) in &self.points {
-                let slope = medium.gradients(start + path.dir * t).sigma_t;
-                g += slope * (weight * (w * (i.start + t)));
-            }
-        }
-        let mut before = path.medium;
-        for c in path.crossings {
-            let sigma = |m: Option<usize>| m.map_or(Rgb::ZERO, |m| world.medium(m).sigma_t(c.x));
-            let jump = sigma(before) - sigma(c.after);
-            before = c.after;
-            let n = c.point.ng;
-            g -= (weight * jump).outer(n * (c.t / n.dot(path.dir)));
-        }
-        let mut gradients = [EmitterGradient::default(); 3];
-        let value = per_value.to_array();
-        let direction = [g.r, g.g, g.b];
-        for c in 0..3 {
-            let mut strength = [0.0; 3];
-            strength[c] = value[c];
-            gradients[c].strength = strength.into();
-            gradients[c].direction = direction[c].reject(light.w);
-        }
-        sink.emitter(light.emitter, &gradients);
     }
 
     /// The coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e.
@@ -651,6 +617,54 @@ impl<'w> Differentiator<'w> {
             }
         }
     }
+}
+
+/// Sensitivities by the places of the points along a stretch, collected at its ends.
+#[derive(Default)]
+struct Along {
+    /// The far end is a fixed direction: points follow the near end alone.
+    fixed: bool,
+    near: RgbVec,
+    far: RgbVec,
+    /// By the rate of a fixed direction.
+    turn: RgbVec,
+}
+
+impl Along {
+    /// Adds the gradient by the point at distance `t` of `length`.
+    fn add(&mut self, g: &RgbVec, t: f64, length: f64) {
+        if self.fixed {
+            self.near += *g;
+            self.turn += *g * t;
+        } else {
+            let s = t / length;
+            self.near += *g * (1.0 - s);
+            self.far += *g * s;
+        }
+    }
+}
+
+/// A directional light: its strength, and its direction through the scattering function and
+/// through where the ray crosses interfaces and grids.
+fn direction<S: AdjointSink>(
+    light: &LightSample,
+    to_wi: Option<RgbVec>,
+    turn: RgbVec,
+    per_value: Rgb,
+    sink: &mut S,
+) {
+    // Both directions and points along the ray turn against the direction of travel.
+    let g = -(to_wi.unwrap_or(RgbVec::ZERO) + turn);
+    let mut gradients = [EmitterGradient::default(); 3];
+    let value = per_value.to_array();
+    let direction = [g.r, g.g, g.b];
+    for c in 0..3 {
+        let mut strength = [0.0; 3];
+        strength[c] = value[c];
+        gradients[c].strength = strength.into();
+        gradients[c].direction = direction[c].reject(light.w);
+    }
+    sink.emitter(light.emitter, &gradients);
 }
 
 /// A straight stretch of a path.

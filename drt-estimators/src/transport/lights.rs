@@ -99,11 +99,12 @@ impl LightTable {
             let Some(e) = shape.emitter else { continue };
             let Emitter::Area { radiance } = scene.emitters[e].item.emitter else { continue };
             area_radiance[e] = radiance;
+            let surface = shape.mesh.surface_area();
             for t in 0..shape.mesh.triangles.len() as u32 {
                 let area = shape.mesh.area(t);
                 let emitter = e as u32;
                 entries.push(Entry::Triangle { emitter, prim: first_prim[i] + t, area });
-                weights.push(area * core::f64::consts::PI * radiance.mean());
+                weights.push((area * core::f64::consts::PI * radiance.mean(), area / surface));
             }
         }
         for (e, named) in scene.emitters.iter().enumerate() {
@@ -113,19 +114,19 @@ impl LightTable {
                 Emitter::Constant { .. } => entries.push(Entry::Environment { emitter }),
                 _ => entries.push(Entry::Delta { emitter }),
             }
-            weights.push(named.item.emitter.power(radius));
+            weights.push((named.item.emitter.power(radius), 1.0));
         }
-        // A light that is off still has a derivative by its strength.
-        let floor = 0.01 * weights.iter().sum::<f64>() / weights.len().max(1) as f64;
-        for w in &mut weights {
-            *w = f64::max(*w, floor);
-        }
+        // Half by power, half by the number of emitters: a narrow spot has little power and is the
+        // brightest thing where it shines; a light that is off still has a derivative.
+        let power: f64 = weights.iter().map(|w| w.0).sum();
+        let number: f64 = weights.iter().map(|w| w.1).sum();
+        let weights: Vec<f64> = weights
+            .iter()
+            .map(|(p, n)| if power > 0.0 { p / power + n / number } else { *n })
+            .collect();
         let table = if weights.is_empty() {
             None
         } else {
-            if weights.iter().all(|w| *w == 0.0) {
-                weights.fill(1.0);
-            }
             Some(AliasTable::new(&weights).map_err(|e| Error::Element {
                 element: "emitters".into(),
                 reason: alloc::format!("powers cannot be sampled: {e}"),

@@ -1,24 +1,24 @@
 //! Scattering at a vertex, surface or volume, under one roof.
 //!
-//! Interpolated normals can put a direction in front of the surface by one normal and behind it by
-//! the other. Sides are decided by the geometric normal, because contributions vanish continuously
-//! there; a direction on the wrong side of the shading normal is mirrored at the tangent plane
-//! before the scattering model sees it. The measurement contribution then has no jumps besides
-//! visibility, which its derivative relies on (theory sheet §7, §13).
+//! With interpolated normals the shading normal decides sides, as in Mitsuba. A surface then turns
+//! black, or shows its other side, where the camera's direction crosses the shading horizon while
+//! the surface is still in view: a jump of the contribution that is no visibility, and that no
+//! boundary term knows. So the value fades to zero over the last [`FADE`] of the cosine, and the
+//! measurement contribution has no jumps besides visibility, which its derivative relies on.
 
-use drt_math::{Real, Rgb, RgbVec, Rng, Vec3, warp};
+use drt_math::{Real, Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Phase;
 
 use crate::surface::{Bsdf, BsdfParams, Given};
 
-/// Share of directions drawn uniformly where shading normals are interpolated, so that every
-/// direction which can contribute has a density.
-const SMOOTH_DEFENSE: f64 = 0.1;
+/// Shading cosine towards the camera below which interpolated surfaces fade: 0.04 % of a sphere's
+/// image.
+const FADE: f64 = 0.02;
 
 /// The local scattering function of a vertex.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Scattering<'a> {
-    /// BSDF times the cosine on the light's side.
+    /// BSDF times the cosine on the light's side; `smooth` where normals are interpolated.
     Surface { bsdf: &'a Bsdf, ng: Vec3, ns: Vec3, smooth: bool },
     /// Phase function; the scattering coefficient is not in it.
     Volume(&'a Phase),
@@ -36,19 +36,19 @@ pub(crate) struct ScatteringGradient {
     pub(crate) params: Option<BsdfParams>,
 }
 
-/// The reflection that puts `w` on the same side of `ns` as it is of `ng`.
-fn mirrored(w: Vec3, ng: Vec3, ns: Vec3) -> (Vec3, bool) {
-    let c = w.dot(ns);
-    if c * w.dot(ng) < 0.0 { (w - ns * (2.0 * c), true) } else { (w, false) }
+/// The fading factor, and its derivative by the cosine.
+fn fade(cosine: f64) -> (f64, f64) {
+    let c = Real::abs(cosine) / FADE;
+    if c < 1.0 { (c, cosine.signum() / FADE) } else { (1.0, 0.0) }
 }
 
 impl Scattering<'_> {
     /// The value for light from `wi` leaving to `wo`, both unit and away from the vertex.
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Rgb {
         match self {
-            Self::Surface { bsdf, ns, smooth: false, .. } => bsdf.eval(wo, wi, *ns),
-            Self::Surface { bsdf, ng, ns, smooth: true } => {
-                bsdf.eval(mirrored(wo, *ng, *ns).0, mirrored(wi, *ng, *ns).0, *ns)
+            Self::Surface { bsdf, ns, smooth, .. } => {
+                let value = bsdf.eval(wo, wi, *ns);
+                if *smooth { value * fade(ns.dot(wo)).0 } else { value }
             }
             Self::Volume(phase) => Rgb::splat(phase.eval(-wo.dot(wi))),
         }
@@ -57,18 +57,9 @@ impl Scattering<'_> {
     /// Draws the direction that is not given; returns it with its solid-angle density.
     pub(crate) fn sample(&self, from: Vec3, given: Given, rng: &mut Rng) -> Option<(Vec3, f64)> {
         match self {
-            Self::Surface { bsdf, ns, smooth: false, .. } => {
+            Self::Surface { bsdf, ns, .. } => {
                 let u = [rng.next_f64(), rng.next_f64(), rng.next_f64()];
                 bsdf.sample(from, *ns, u, given).map(|s| (s.w, s.pdf))
-            }
-            Self::Surface { bsdf, ng, ns, smooth: true } => {
-                let w = if rng.next_f64() < SMOOTH_DEFENSE {
-                    warp::uniform_sphere(rng.next_2d())
-                } else {
-                    let u = [rng.next_f64(), rng.next_f64(), rng.next_f64()];
-                    bsdf.sample(mirrored(from, *ng, *ns).0, *ns, u, given)?.w
-                };
-                Some((w, self.pdf(from, w, given)))
             }
             Self::Volume(phase) => {
                 // Both phase functions here depend on the angle alone, so which of the two
@@ -82,12 +73,7 @@ impl Scattering<'_> {
     /// The solid-angle density of [`Scattering::sample`].
     pub(crate) fn pdf(&self, from: Vec3, to: Vec3, given: Given) -> f64 {
         match self {
-            Self::Surface { bsdf, ns, smooth: false, .. } => bsdf.pdf(from, to, *ns, given),
-            Self::Surface { bsdf, ng, ns, smooth: true } => {
-                // The model draws `to` itself, not its mirror image.
-                let p = bsdf.pdf(mirrored(from, *ng, *ns).0, to, *ns, given);
-                SMOOTH_DEFENSE * warp::uniform_sphere_pdf() + (1.0 - SMOOTH_DEFENSE) * p
-            }
+            Self::Surface { bsdf, ns, .. } => bsdf.pdf(from, to, *ns, given),
             Self::Volume(phase) => phase.eval(-from.dot(to)),
         }
     }
@@ -95,25 +81,20 @@ impl Scattering<'_> {
     /// Derivatives of [`Scattering::eval`].
     pub(crate) fn gradient(&self, wo: Vec3, wi: Vec3) -> ScatteringGradient {
         match self {
-            Self::Surface { bsdf, ng, ns, smooth } => {
-                let ((mo, fo), (mi, fi)) = if *smooth {
-                    (mirrored(wo, *ng, *ns), mirrored(wi, *ng, *ns))
-                } else {
-                    ((wo, false), (wi, false))
-                };
-                let d = bsdf.gradient(mo, mi, *ns);
-                let mut normal = d.n;
-                // The mirror image w - 2 (w·n) n, transposed.
-                let mut unmirror = |grad: RgbVec, w: Vec3, flipped: bool| {
-                    if !flipped {
-                        return grad;
-                    }
-                    normal -= grad.map(|g| w * (2.0 * g.dot(*ns)) + g * (2.0 * w.dot(*ns)));
-                    grad.map(|g| g - *ns * (2.0 * g.dot(*ns)))
-                };
-                let wo = unmirror(d.wo, wo, fo);
-                let wi = unmirror(d.wi, wi, fi);
-                ScatteringGradient { wo, wi, ns: normal, g: 0.0, params: Some(d.params) }
+            Self::Surface { bsdf, ns, smooth, .. } => {
+                let mut d = bsdf.gradient(wo, wi, *ns);
+                if *smooth {
+                    let (factor, slope) = fade(ns.dot(wo));
+                    let steep = d.value * slope;
+                    d.wo = d.wo * factor + steep.outer(*ns);
+                    d.n = d.n * factor + steep.outer(wo);
+                    d.wi = d.wi * factor;
+                    let mut params = BsdfParams::default();
+                    params.scatter(&d.params, Rgb::splat(factor));
+                    d.params = params;
+                }
+                let params = Some(d.params);
+                ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, g: 0.0, params }
             }
             Self::Volume(phase) => {
                 let c = -wo.dot(wi);
