@@ -28,7 +28,7 @@ fn main() {
 fn write_all(folder: &Path) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let star = procedural::star(7, NOTCH, 1.0);
-    let tree = BranchingTree { seed: 5, sides: 6, radius: 0.07, ..BranchingTree::default() };
+    let tree = BranchingTree { seed: 5, sides: 6, radius: 0.12, ..BranchingTree::default() };
     let knot = TorusKnot { segments: 160, sides: 14, tube: 0.22, ..TorusKnot::default() };
     let meshes = [
         ("bumpy", procedural::bumpy_sphere(4, 0.35, 4.0)),
