@@ -1,0 +1,159 @@
+//! Writes a corpus for every target to start from: the examples' files, and small files made here.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use drt_fuzz::{SCENE, write};
+use drt_geom::{Mesh, procedural};
+use drt_math::Vec3;
+use drt_medium::{Grid, vol};
+
+const OLD_SCENE: &str = r#"<scene version="0.5.0">
+    <sensor type="perspective">
+        <transform name="toWorld"><lookAt origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
+    </sensor>
+    <shape type="sphere" id="ball">
+        <point name="center" x="0" y="0" z="0"/><float name="radius" value="0.5"/>
+        <bsdf type="phong"><float name="exponent" value="20"/><float name="kd" value="0.4"/></bsdf>
+    </shape>
+    <emitter type="spot"><float name="cutoffAngle" value="30"/></emitter>
+    <emitter type="directional"><vector name="direction" x="0" y="-1" z="0"/></emitter>
+    <emitter type="constant"/>
+</scene>"#;
+
+const EFFECTS: [&str; 10] = [
+    r#"target = "box"
+translate = [1, 0, 0]"#,
+    r#"target = "lamp"
+rotate = { axis = [0, 1, 0], pivot = [1, 0, 0] }"#,
+    r#"target = "camera"
+translate = [0.0, 1e-1, 0]"#,
+    r#"target = "box"
+scale = { factor = [1, 0.5, 0], pivot = [0, 0.6, 0] }"#,
+    r#"target = "shape[0]"
+matrix = [[0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 0.5]]"#,
+    r#"target = "floor"
+vertex_velocity = "velocity.txt""#,
+    r#"target = "box"
+vertex = { index = 3, direction = [0, 1, 0] }"#,
+    r#"target = "fog"
+property = "sigma_t"
+add = [1, 1, 1]"#,
+    r#"target = "metal"
+property = "alpha"
+multiply = 0.5
+log = true"#,
+    r#"target = "haze"
+follow = "box""#,
+];
+
+fn main() {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
+    for target in ["obj", "ply", "vol", "xml", "toml"] {
+        std::fs::create_dir_all(corpus.join(target)).expect("the corpus folder can be written");
+    }
+    meshes(&corpus);
+    volumes(&corpus.join("vol"));
+    write(&corpus.join("xml/new.xml"), SCENE.as_bytes());
+    write(&corpus.join("xml/old.xml"), OLD_SCENE.as_bytes());
+    for (i, effect) in EFFECTS.iter().enumerate() {
+        let job = format!(
+            "scene = \"scene.xml\"\nsensor = \"camera\"\n[estimator]\nspp = 4\nmax_depth = 3\n\
+             [[parameter]]\nname = \"p{i}\"\nvalue = 0.1\n[[parameter.effect]]\n{effect}\n"
+        );
+        write(&corpus.join(format!("toml/{i}.toml")), job.as_bytes());
+    }
+    examples(&corpus);
+}
+
+/// The files of the repository's examples that are small enough to mutate.
+fn examples(corpus: &Path) {
+    for path in files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples")) {
+        let Ok(bytes) = std::fs::read(&path) else { continue };
+        let target = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        let names = [path.parent().and_then(Path::file_name), path.file_name()];
+        let [Some(folder), Some(file)] = names else { continue };
+        if bytes.len() < 1 << 13 && corpus.join(target).is_dir() && !target.is_empty() {
+            let name = format!("{}-{}", folder.display(), file.display());
+            write(&corpus.join(target).join(name), &bytes);
+        }
+    }
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    entries
+        .filter_map(|e| Some(e.ok()?.path()))
+        .flat_map(|p| if p.is_dir() { files(&p) } else { vec![p] })
+        .collect()
+}
+
+fn meshes(corpus: &Path) {
+    let meshes = [procedural::cube(), procedural::rectangle(), procedural::star(4, 0.4, 1.0)];
+    for (i, mesh) in meshes.iter().enumerate() {
+        let smooth = mesh.clone().with_smooth_normals();
+        write(&corpus.join(format!("obj/{i}.obj")), obj(&smooth).as_bytes());
+        write(&corpus.join(format!("ply/{i}-ascii.ply")), &ply(mesh, "ascii"));
+        write(&corpus.join(format!("ply/{i}-le.ply")), &ply(mesh, "binary_little_endian"));
+        write(&corpus.join(format!("ply/{i}-be.ply")), &ply(mesh, "binary_big_endian"));
+    }
+    let polygons =
+        "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 1 .5 0\nv 0 2 0\ng a\nf 1 2 3 4 5\nf -5/1 -4/2 -2\n";
+    write(&corpus.join("obj/polygons.obj"), polygons.as_bytes());
+}
+
+fn obj(mesh: &Mesh) -> String {
+    let mut text = String::from("o mesh\n");
+    let mut line = |kind: &str, v: &Vec3| {
+        let _ = writeln!(text, "{kind} {} {} {}", v.x, v.y, v.z);
+    };
+    mesh.positions.iter().for_each(|p| line("v", p));
+    mesh.normals.iter().flatten().for_each(|n| line("vn", n));
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|i| i + 1);
+        let _ = writeln!(text, "f {a}//{a} {b}//{b} {c}//{c}");
+    }
+    text
+}
+
+fn ply(mesh: &Mesh, format: &str) -> Vec<u8> {
+    let (vertices, faces) = (mesh.positions.len(), mesh.triangles.len());
+    let mut file = format!(
+        "ply\nformat {format} 1.0\ncomment a seed\nelement vertex {vertices}\nproperty float x\n\
+         property float y\nproperty double z\nelement face {faces}\n\
+         property list uchar int vertex_indices\nend_header\n"
+    )
+    .into_bytes();
+    let mut put = |text: String, little: &[u8]| match format {
+        "ascii" => file.extend(text.bytes()),
+        "binary_little_endian" => file.extend(little),
+        _ => file.extend(little.iter().rev()),
+    };
+    for p in &mesh.positions {
+        put(format!("{} ", p.x), &(p.x as f32).to_le_bytes());
+        put(format!("{} ", p.y), &(p.y as f32).to_le_bytes());
+        put(format!("{}\n", p.z), &p.z.to_le_bytes());
+    }
+    for t in &mesh.triangles {
+        put("3".into(), &[3]);
+        t.iter().for_each(|i| put(format!(" {i}"), &i.to_le_bytes()));
+        put("\n".into(), &[]);
+    }
+    file
+}
+
+fn volumes(folder: &Path) {
+    for channels in [1, 3] {
+        let values = (0..2 * 3 * 2 * channels).map(|i| f64::from(i as u32) / 8.0).collect();
+        let grid = Grid::new([2, 3, 2], channels, values).expect("a valid grid");
+        let bounds = [Vec3::ZERO, Vec3::splat(2.0)];
+        let volume = vol::encode(&vol::VolFile { grid, bounds }).expect("a small grid");
+        write(&folder.join(format!("{channels}-f32.vol")), &volume);
+        // The same bytes taken for narrower values, of which fewer are needed.
+        for (encoding, name) in [(2, "f16"), (3, "u8")] {
+            let mut narrow = volume.clone();
+            narrow[4] = encoding;
+            write(&folder.join(format!("{channels}-{name}.vol")), &narrow);
+        }
+    }
+}

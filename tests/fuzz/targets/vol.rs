@@ -1,0 +1,13 @@
+//! Mitsuba's `.vol` grids.
+
+#![no_main]
+
+use drt_medium::vol::{decode, encode};
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Ok(volume) = decode(bytes, "fuzz.vol") {
+        let bytes = encode(&volume).expect("what was read can be written");
+        assert_eq!(decode(&bytes, "again.vol").expect("what was written can be read"), volume);
+    }
+});
