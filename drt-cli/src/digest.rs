@@ -222,3 +222,77 @@ pub fn write_digest(path: &Path, text: &str) -> Result<(), CliError> {
     }
     write_atomically(path, |out| Ok(writeln!(out, "{text}")?))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::tests::rendering;
+    use crate::testing::Folder;
+
+    fn facts() -> RunFacts {
+        RunFacts {
+            command: "grad",
+            scene: "s.xml".into(),
+            job: None,
+            seed: 3,
+            seconds: 1.5,
+            cpu_seconds: 2.5,
+            threads: 2,
+        }
+    }
+
+    #[test]
+    fn shape_is_the_contracts() {
+        let text = digest(&rendering([4, 2]), &facts(), &[]);
+        let d: serde_json::Value = serde_json::from_str(&text).unwrap();
+        for (key, value) in [
+            ("program", serde_json::json!(crate::PROGRAM)),
+            ("command", "grad".into()),
+            ("scene", "s.xml".into()),
+            ("width", 4.into()),
+            ("height", 2.into()),
+            ("seed", 3.into()),
+            ("spp", 7.into()),
+            ("seconds", 1.5.into()),
+            ("cpu_seconds", 2.5.into()),
+            ("threads", 2.into()),
+            ("complete", false.into()),
+            ("non_finite", 1.into()),
+        ] {
+            assert_eq!(d[key], value, "{key}");
+        }
+        assert_eq!(d["image"]["mean"], serde_json::json!([103.0, 103.25, 97.0]));
+        assert_eq!(d["image"]["blocks"]["grid"], serde_json::json!([8, 8]));
+        let cube = &d["derivatives"]["cube-x"];
+        assert_eq!(cube["blocks"]["mean"].as_array().unwrap().len(), 64);
+        assert_eq!(cube["blocks"]["stderr"][2], serde_json::json!([201.0, 201.0, 201.0]));
+        assert_eq!(d["counters"]["paths"], 12);
+        assert!(d["counters"]["rays"].is_u64() && d["counters"]["boundary_samples"].is_u64());
+        assert!(d["plan"].is_object() && d.get("checks").is_none() && d.get("job").is_none());
+        // In the order of the job, not of the alphabet.
+        assert!(text.find("cube-x").unwrap() < text.find("\u{e9}t\u{e9}").unwrap());
+    }
+
+    #[test]
+    fn verdicts_join_when_there_are_any() {
+        let verdict = Verdict {
+            parameter: "p".into(),
+            rms_z: 1.0,
+            max_z: 2.0,
+            limit: 4.5,
+            relative_noise: 0.1,
+            agrees: true,
+        };
+        let text = digest(&rendering([1, 1]), &facts(), &[verdict]);
+        let d: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(d["checks"][0]["agrees"], true);
+    }
+
+    #[test]
+    fn files_are_replaced_whole() {
+        let folder = Folder::new();
+        let path = folder.file("d.json", "a longer text than what comes");
+        write_digest(&path, "{}").unwrap();
+        assert_eq!(std::fs::read_to_string(path).unwrap(), "{}\n");
+    }
+}

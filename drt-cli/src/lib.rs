@@ -8,6 +8,8 @@ pub mod error;
 mod image;
 mod job;
 mod scene_xml;
+#[cfg(test)]
+mod testing;
 
 pub use atomic::{check_target, write_atomically};
 pub use digest::{RunFacts, Verdict, digest, write_digest};

@@ -95,3 +95,45 @@ fn table(verdicts: &[Verdict]) -> Table<6> {
     });
     Table::new(["parameter", "rms z", "max z", "limit", "relative noise", "verdict"], rows)
 }
+
+#[cfg(test)]
+mod tests {
+    use drt_math::{Rgb, Rng};
+
+    use super::*;
+    use crate::image::tests::rendering;
+
+    /// A derivative with noise of the size it claims, around `scale` times the truth.
+    fn noisy(truth: &Layer, scale: f64, rng: &mut Rng) -> Layer {
+        let mut layer = truth.clone();
+        for block in &mut layer.blocks {
+            // Twelve uniform numbers make a variance of one.
+            let mut normal = || (0..12).map(|_| rng.next_f64()).sum::<f64>() - 6.0;
+            let error = Rgb::new(normal(), normal(), normal());
+            block.stderr = Rgb::splat(2.0);
+            block.mean = block.mean * scale + error * 2.0;
+        }
+        layer
+    }
+
+    #[test]
+    fn faults_of_two_percent_disagree_and_noise_does_not() {
+        let mut rng = Rng::new(1, 2, 0);
+        let mut result = rendering([8, 8]);
+        let mut truth = result.derivatives[0].total.clone();
+        truth.blocks.iter_mut().for_each(|b| b.stderr = Rgb::ZERO);
+        for (scale, agrees) in [(1.0, true), (1.02, false), (-1.0, false)] {
+            for d in &mut result.derivatives {
+                d.total = noisy(&truth, scale, &mut rng);
+            }
+            let differences = [(); 2].map(|()| noisy(&truth, 1.0, &mut rng));
+            let exact = [truth.clone(), truth.clone()];
+            // Errors of the step would excuse the fault: between exact differences there is none.
+            for v in judge(&result, &exact, &exact) {
+                assert_eq!(v.agrees, agrees, "{v:?}");
+            }
+            let excused = judge(&result, &exact, &differences);
+            assert!(scale != 1.0 || excused.iter().all(|v| v.agrees));
+        }
+    }
+}

@@ -47,11 +47,7 @@ impl Outcome {
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
     let line = match CommandLine::try_parse_from(args) {
         Ok(line) => line,
-        Err(e) => {
-            // Help and version are no errors; where even they cannot be shown, nobody is listening.
-            let _ = e.print();
-            return e.exit_code() as u8;
-        }
+        Err(e) => return explain(&e),
     };
     match dispatch(&line.command) {
         Ok(outcome) => outcome.exit_code(),
@@ -60,6 +56,21 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
             e.exit_code()
         }
     }
+}
+
+/// Shows what is wrong with a command line, or the help that was asked for.
+fn explain(e: &clap::Error) -> u8 {
+    let code = e.exit_code() as u8;
+    let text = e.to_string();
+    match text.strip_prefix("error: ") {
+        Some(text) if code != 0 => {
+            let message = text.split("\n\nUsage:").next().unwrap_or(text);
+            eprintln!("drt: error: {}", message.trim_end());
+        }
+        // Where not even the help can be shown, nobody is listening.
+        _ => drop(e.print()),
+    }
+    code
 }
 
 fn dispatch(command: &Command) -> Result<Outcome, CliError> {

@@ -48,10 +48,10 @@ pub(super) struct Options {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) spp: Option<u32>,
     /// Stop after this time.
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub(super) seconds: Option<f64>,
     /// Stop when the relative noise of every image is below this.
-    #[arg(long, value_name = "E", value_parser = positive)]
+    #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     pub(super) target_error: Option<f64>,
     /// Same seed, same pixels.
     #[arg(long, value_name = "N")]

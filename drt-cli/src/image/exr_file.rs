@@ -124,6 +124,10 @@ fn text(s: &str) -> Text {
     Text::from_slice_unchecked(s.as_bytes())
 }
 
+fn string(t: &Text) -> String {
+    String::from_utf8_lossy(t.as_slice()).into_owned()
+}
+
 /// Reads the colours of an EXR file of one or several parts.
 ///
 /// # Errors
@@ -147,9 +151,9 @@ pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
         } else if file.size != size {
             return Err(fail(&"its parts differ in size; expected one size"));
         }
-        let prefix = part.attributes.layer_name.as_ref().map(ToString::to_string);
+        let prefix = part.attributes.layer_name.as_ref().map(string);
         for channel in &part.channel_data.list {
-            let name = channel.name.to_string();
+            let name = string(&channel.name);
             let (layer, channel_name) = name.rsplit_once('.').unwrap_or(("", &name));
             let Some(c) = CHANNELS.iter().position(|n| *n == channel_name) else { continue };
             let layer = match prefix.as_deref() {
@@ -163,11 +167,10 @@ pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
                 pixel[c] = value;
             }
         }
-        let standard =
-            part.attributes.software_name.iter().map(|s| ("software".into(), s.to_string()));
+        let standard = part.attributes.software_name.iter().map(|s| ("software".into(), string(s)));
         let other = part.attributes.other.iter().chain(&image.attributes.other);
         file.attributes.extend(standard);
-        file.attributes.extend(other.filter_map(|(k, v)| Some((k.to_string(), show(v)?))));
+        file.attributes.extend(other.filter_map(|(k, v)| Some((string(k), show(v)?))));
     }
     if file.layers.is_empty() {
         return Err(fail(&"it has no channels R, G or B"));
@@ -177,7 +180,7 @@ pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
 
 fn show(value: &AttributeValue) -> Option<String> {
     match value {
-        AttributeValue::Text(t) => Some(t.to_string()),
+        AttributeValue::Text(t) => Some(string(t)),
         AttributeValue::F64(v) => Some(v.to_string()),
         AttributeValue::I32(v) => Some(v.to_string()),
         _ => None,

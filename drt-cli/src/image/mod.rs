@@ -3,6 +3,8 @@
 mod contact_sheet;
 mod exr_file;
 mod font;
+#[cfg(test)]
+pub(crate) mod tests;
 mod tone;
 
 pub use contact_sheet::write_preview;

@@ -74,21 +74,26 @@ impl Job {
     /// # Errors
     /// As [`load_scene`].
     pub fn from_scene(path: &Path, defaults: &Defaults) -> Result<Self, CliError> {
-        let scene = load_scene(path, defaults)?;
-        let mut settings = Settings::default();
-        if let Some(count) = scene.sensors.first().and_then(|s| s.item.sample_count) {
-            settings.spp = count;
-        }
-        Ok(Self {
+        let mut job = Self {
             path: path.into(),
             text: None,
             scene_path: path.into(),
-            scene,
+            scene: load_scene(path, defaults)?,
             parameters: Vec::new(),
-            settings,
+            settings: Settings::default(),
             places: Vec::new(),
             refused: None,
-        })
+        };
+        job.take_sample_count();
+        Ok(job)
+    }
+
+    /// Where no job says how many samples to take, the sensor's sampler does.
+    fn take_sample_count(&mut self) {
+        let sensor = self.scene.sensors.get(self.settings.sensor);
+        if let (None, Some(count)) = (&self.text, sensor.and_then(|s| s.item.sample_count)) {
+            self.settings.spp = count;
+        }
     }
 
     /// Chooses the sensor of an id, or of kind and order such as `sensor[1]`.
@@ -98,6 +103,7 @@ impl Job {
     pub fn select_sensor(&mut self, name: &str) -> Result<(), CliError> {
         self.settings.sensor = find_sensor(&self.scene, name)
             .map_err(|e| CliError::argument(format!("--sensor: {e}")))?;
+        self.take_sample_count();
         Ok(())
     }
 

@@ -82,6 +82,7 @@ fn lookat(e: &Element) -> Result<Affine, CliError> {
     let (origin, target) = (triple(e, "origin")?, triple(e, "target")?);
     let up = match e.attribute("up") {
         Some(_) => triple(e, "up")?,
+        None if target == origin => Vec3::Y,
         // Mitsuba's choice: the first tangent of its frame around the viewing direction.
         None => Frame::from_normal((target - origin).normalize()).s,
     };

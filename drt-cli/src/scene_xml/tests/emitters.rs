@@ -1,0 +1,104 @@
+use drt_estimators::emitter::Emitter;
+use drt_estimators::{SceneEmitter, Surrounding};
+use drt_math::{Rgb, Vec3, vec3};
+
+use super::{old_scene, refused, scene};
+
+fn emitter(kind: &str, inside: &str) -> Emitter {
+    scene(&format!("<emitter type=\"{kind}\">{inside}</emitter>")).emitters.remove(0).item.emitter
+}
+
+#[test]
+fn defaults_are_mitsubas() {
+    let one = Rgb::ONE;
+    assert_eq!(emitter("point", ""), Emitter::Point { position: Vec3::ZERO, intensity: one });
+    assert_eq!(emitter("constant", ""), Emitter::Constant { radiance: one });
+    let directional = Emitter::Directional { direction: Vec3::Z, irradiance: one };
+    assert_eq!(emitter("directional", ""), directional);
+    let Emitter::Spot { direction, cutoff_angle, beam_width, .. } = emitter("spot", "") else {
+        panic!()
+    };
+    assert_eq!(direction, Vec3::Z);
+    assert!((cutoff_angle.to_degrees() - 20.0).abs() < 1e-12);
+    assert!((beam_width.to_degrees() - 15.0).abs() < 1e-12);
+}
+
+#[test]
+fn placed_by_position_direction_or_transform() {
+    let at = |inside: &str| match emitter("point", inside) {
+        Emitter::Point { position, .. } => position,
+        _ => panic!(),
+    };
+    let three = vec3(1.0, 2.0, 3.0);
+    assert_eq!(at(r#"<point name="position" x="1" y="2" z="3"/>"#), three);
+    assert_eq!(at(r#"<point name="position" value="1, 2, 3"/>"#), three);
+    let placed = r#"<transform name="to_world"><translate value="1 2 3"/></transform>"#;
+    assert_eq!(at(placed), three);
+    let flows = |inside: &str| match emitter("directional", inside) {
+        Emitter::Directional { direction, .. } => direction,
+        _ => panic!(),
+    };
+    assert_eq!(flows(r#"<vector name="direction" x="0" y="-2" z="0"/>"#), -Vec3::Y);
+    let turned = r#"<transform name="to_world"><rotate x="1" angle="90"/></transform>"#;
+    assert!((flows(turned) + Vec3::Y).max_abs() < 1e-12);
+    let inside = r#"<float name="cutoff_angle" value="30"/><float name="beam_width" value="10"/>
+        <transform name="to_world"><lookat origin="0 5 0" target="0 0 0" up="0 0 1"/></transform>"#;
+    let Emitter::Spot { position, direction, cutoff_angle, beam_width, .. } =
+        emitter("spot", inside)
+    else {
+        panic!()
+    };
+    assert_eq!((position, direction), (vec3(0.0, 5.0, 0.0), -Vec3::Y));
+    assert!((cutoff_angle - 30f64.to_radians()).abs() < 1e-12);
+    assert!((beam_width - 10f64.to_radians()).abs() < 1e-12);
+}
+
+/// Mitsuba 3 sees a `<spectrum>` of one number as light of equal energy, which is not white in sRGB.
+#[test]
+fn light_of_equal_energy() {
+    let strength = |e: &Emitter| match e {
+        Emitter::Constant { radiance } => *radiance,
+        _ => panic!(),
+    };
+    let spectrum = r#"<spectrum name="radiance" value="8"/>"#;
+    let seen = strength(&emitter("constant", spectrum));
+    // As Mitsuba 3.9.1 prints it.
+    for (ours, theirs) in seen.to_array().into_iter().zip([9.63835, 7.58633, 7.27133]) {
+        assert!((ours - theirs).abs() < 1e-5);
+    }
+    assert_eq!(strength(&emitter("constant", r#"<rgb name="radiance" value="8"/>"#)).r, 8.0);
+    assert_eq!(strength(&emitter("constant", r#"<float name="radiance" value="8"/>"#)).r, 8.0);
+    let old = old_scene(&format!("<emitter type=\"constant\">{spectrum}</emitter>"));
+    assert_eq!(strength(&old.emitters[0].item.emitter), Rgb::splat(8.0));
+}
+
+#[test]
+fn media_around_lights() {
+    let around = |body: &str| -> SceneEmitter {
+        scene(&format!("<medium type=\"homogeneous\" id=\"m\"/>{body}")).emitters.remove(0).item
+    };
+    assert_eq!(around("<emitter type=\"point\"/>").medium, Surrounding::Counted);
+    let named = "<emitter type=\"point\"><ref name=\"medium\" id=\"m\"/></emitter>";
+    assert_eq!(around(named).medium, Surrounding::Stated(Some(0)));
+    let far = "<medium type=\"homogeneous\" id=\"m\"/>\n\
+               <emitter type=\"directional\"><ref id=\"m\"/></emitter>";
+    refused(far, &[":3", "not supported inside"]);
+}
+
+#[test]
+fn unusable_lights() {
+    refused("<emitter type=\"envmap\"/>", &["`envmap` is not supported", "constant"]);
+    for (kind, inside, part) in [
+        ("point", r#"<rgb name="intensity" value="-1"/>"#, "negative"),
+        ("point", r#"<rgb name="radiance" value="1"/>"#, "which takes intensity"),
+        ("directional", r#"<vector name="direction" value="0 0 0"/>"#, "zero vector"),
+        ("spot", r#"<float name="beam_width" value="30"/>"#, "beam_width"),
+        (
+            "point",
+            r#"<point name="position" value="0 0 0"/><transform name="to_world"/>"#,
+            "not both",
+        ),
+    ] {
+        refused(&format!("<emitter type=\"{kind}\">{inside}</emitter>"), &[":2", part]);
+    }
+}

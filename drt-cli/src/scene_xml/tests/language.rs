@@ -1,0 +1,125 @@
+//! Files, substitution, references and order.
+
+use drt_estimators::Target;
+use drt_estimators::surface::Bsdf;
+use drt_math::Rgb;
+
+use super::{read, refused, scene};
+use crate::testing::Folder;
+use crate::{Defaults, load_scene};
+
+fn reflectance(b: &Bsdf) -> Rgb {
+    match b {
+        Bsdf::Diffuse(d) => d.reflectance,
+        _ => panic!("not diffuse"),
+    }
+}
+
+#[test]
+fn defaults_fill_in_and_the_command_line_wins() {
+    let folder = Folder::new();
+    let file = folder.file(
+        "s.xml",
+        r#"<scene version="3.0.0"><default name="rho" value="0.25"/><default name="r" value="x"/>
+           <bsdf type="$kind"><rgb name="reflectance" value="$rho 0 1"/></bsdf></scene>"#,
+    );
+    let with = |pairs: &[(&str, &str)]| {
+        let defaults: Defaults = pairs.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
+        load_scene(&file, &defaults)
+    };
+    let s = with(&[("kind", "diffuse")]).unwrap();
+    assert_eq!(reflectance(&s.bsdfs[0].item), Rgb::new(0.25, 0.0, 1.0));
+    let s = with(&[("kind", "diffuse"), ("rho", "0.75")]).unwrap();
+    assert_eq!(reflectance(&s.bsdfs[0].item).r, 0.75);
+    let missing = with(&[]).unwrap_err().to_string();
+    assert!(missing.contains("s.xml:2") && missing.contains("-D kind=VALUE"), "{missing}");
+    let unused = with(&[("kind", "diffuse"), ("speed", "1")]).unwrap_err().to_string();
+    assert!(unused.contains("-D speed"), "{unused}");
+}
+
+#[test]
+fn included_files_have_their_own_folder_dialect_and_lines() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path().join("parts")).unwrap();
+    folder.file("parts/mesh.obj", crate::testing::TETRAHEDRON);
+    folder.file(
+        "parts/a.xml",
+        "<scene version=\"0.6.0\">\n<shape type=\"obj\"><string name=\"filename\" \
+         value=\"mesh.obj\"/>\n<boolean name=\"faceNormals\" value=\"true\"/></shape></scene>",
+    );
+    let file = folder.file(
+        "s.xml",
+        "<scene version=\"3.0.0\"><include filename=\"parts/a.xml\"/><shape type=\"cube\"/></scene>",
+    );
+    let s = load_scene(&file, &Defaults::new()).unwrap();
+    assert_eq!(s.shapes[0].mesh.triangles.len(), 4);
+    assert_eq!(s.shapes[1].mesh.triangles.len(), 12);
+
+    folder.file("parts/a.xml", "<scene version=\"3.0.0\">\n\n<shape type=\"pyramid\"/></scene>");
+    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    assert!(message.contains("a.xml:3: <shape type=\"pyramid\">"), "{message}");
+
+    folder.file("parts/a.xml", "<scene version=\"3.0.0\"><include filename=\"../s.xml\"/></scene>");
+    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    assert!(message.contains("includes itself"), "{message}");
+    refused("<include filename=\"nowhere.xml\"/>", &[":2:", "nowhere.xml"]);
+}
+
+#[test]
+fn references_aliases_and_order() {
+    let s = scene(
+        r#"<shape type="cube" id="late"><ref id="other"/></shape>
+           <bsdf type="diffuse" id="gray"/>
+           <alias id="gray" as="other"/>
+           <shape type="cube"><bsdf type="twosided"><bsdf type="diffuse"/></bsdf></shape>
+           <shape type="cube"><bsdf type="null" id="null"/></shape>
+           <shape type="cube"/>"#,
+    );
+    assert_eq!(s.shapes.iter().map(|s| s.bsdf).collect::<Vec<_>>(), [0, 1, 2, 3]);
+    assert_eq!(s.bsdfs.len(), 4);
+    assert_eq!(s.find("late").unwrap(), Target::Shape(0));
+    assert_eq!(s.find("bsdf[2]").unwrap(), s.find("null").unwrap());
+    assert_eq!(reflectance(&s.bsdfs[3].item), Rgb::splat(0.5));
+}
+
+#[test]
+fn mistakes_are_told_with_their_line() {
+    refused("\n<shape type=\"cube\"><ref id=\"b\"/></shape>", &["scene.xml:3", "the id `b`"]);
+    refused("<bsdf type=\"null\" id=\"a\"/>\n<bsdf type=\"null\" id=\"a\"/>", &[":3", "line 2"]);
+    refused("<shape type=\"cube\">\n<float name=\"size\" value=\"1\"/></shape>", &[":3", "size"]);
+    refused("<shape type=\"cube\"><rotor/></shape>", &["<rotor>: not supported inside"]);
+    refused("<film type=\"hdrfilm\"/>", &["<film type=\"hdrfilm\">: not supported directly"]);
+    refused("<shape type=\"cube\" color=\"red\"/>", &["unknown attribute `color`"]);
+    refused("<shape/>", &["the attribute `type` is missing"]);
+    refused("<shape type=\"cube\">cube</shape>", &["text inside an element"]);
+    refused("<shape type=\"cube\">", &["not well-formed XML"]);
+    refused("<alias id=\"a\" as=\"b\"/><alias id=\"b\" as=\"a\"/>", &["nothing has the id"]);
+    refused("<default name=\"\" value=\"\"/>", &["the name is empty"]);
+    let twice = "<bsdf type=\"diffuse\"><rgb name=\"reflectance\" value=\"1\"/>\n\
+                 <rgb name=\"reflectance\" value=\"1\"/></bsdf>";
+    refused(twice, &[":3", "given twice"]);
+    let deep = format!("{}{}", "<bsdf type=\"twosided\">".repeat(70), "</bsdf>".repeat(70));
+    refused(&deep, &["nest deeper"]);
+    let place = std::path::Path::new(".");
+    for (text, part) in [
+        ("<scene/>", "`version` is missing"),
+        ("<scene version=\"1.0\"/>", "version `1.0`"),
+        ("<mesh/>", "found <mesh>"),
+        ("", "not well-formed"),
+    ] {
+        let message = crate::parse_scene_str(text, place).unwrap_err().to_string();
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn names_of_the_other_dialect_are_unknown() {
+    assert!(
+        read(r#"<integrator type="path"><integer name="maxDepth" value="3"/></integrator>"#)
+            .is_err()
+    );
+    let old = super::old_scene(
+        r#"<integrator type="path"><integer name="maxDepth" value="3"/></integrator>"#,
+    );
+    assert_eq!(old.integrator.max_depth, Some(3));
+}

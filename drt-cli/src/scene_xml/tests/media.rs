@@ -1,0 +1,175 @@
+use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
+use drt_medium::vol::{VolFile, encode};
+use drt_medium::{Coefficients, Grid, Medium, MediumKind, Phase, Volume};
+
+use super::{old_scene, refused, scene};
+use crate::testing::Folder;
+use crate::{Defaults, load_scene};
+
+fn medium(kind: &str, inside: &str) -> Medium {
+    scene(&format!("<medium type=\"{kind}\">{inside}</medium>")).media.remove(0).item
+}
+
+fn homogeneous(inside: &str) -> Coefficients {
+    medium("homogeneous", inside).homogeneous().unwrap().coefficients()
+}
+
+#[test]
+fn homogeneous_by_either_pair_of_coefficients() {
+    let c = homogeneous("");
+    assert_eq!((c.sigma_t, c.albedo, c.emission), (Rgb::ONE, Rgb::splat(0.75), Rgb::ZERO));
+    let c = homogeneous(
+        r#"<rgb name="sigma_t" value="1 2 3"/><spectrum name="albedo" value="0.5"/>
+           <float name="scale" value="10"/><rgb name="emission" value="4"/>"#,
+    );
+    assert_eq!(c.sigma_t, Rgb::new(10.0, 20.0, 30.0));
+    assert_eq!((c.albedo, c.emission), (Rgb::splat(0.5), Rgb::splat(4.0)));
+    let c =
+        homogeneous(r#"<rgb name="sigma_a" value="1 0 3"/><rgb name="sigma_s" value="1 0 1"/>"#);
+    assert_eq!((c.sigma_t, c.albedo), (Rgb::new(2.0, 0.0, 4.0), Rgb::new(0.5, 0.0, 0.25)));
+    let c = homogeneous(
+        r#"<volume name="sigma_t" type="constvolume"><rgb name="value" value="1 2 3"/></volume>"#,
+    );
+    assert_eq!(c.sigma_t.b, 3.0);
+    for (inside, part) in [
+        (r#"<float name="sigma_a" value="1"/>"#, "give `sigma_t` and `albedo`"),
+        (r#"<float name="albedo" value="2"/>"#, "albedo"),
+        (r#"<float name="sigma_t" value="-1"/>"#, "sigma_t"),
+        (r#"<float name="density" value="1"/>"#, "density"),
+        (r#"<phase type="hg"><float name="g" value="1"/></phase>"#, "g"),
+        (r#"<phase type="sggx"/>"#, "`sggx` is not supported"),
+    ] {
+        refused(&format!("<medium type=\"homogeneous\">\n{inside}</medium>"), &[part]);
+    }
+    refused("<medium type=\"foggy\"/>", &["`foggy` is not supported"]);
+}
+
+#[test]
+fn phase_functions() {
+    let phase = |inside: &str| medium("homogeneous", inside).phase;
+    assert_eq!(phase(""), Phase::Isotropic);
+    assert_eq!(phase("<phase type=\"rayleigh\"/>"), Phase::Rayleigh);
+    assert_eq!(phase("<phase type=\"hg\"/>"), Phase::HenyeyGreenstein { g: 0.8 });
+    let s = scene(
+        r#"<phase type="hg" id="p"><float name="g" value="-0.3"/></phase>
+           <medium type="homogeneous"><ref id="p"/></medium>"#,
+    );
+    assert_eq!(s.media[0].item.phase, Phase::HenyeyGreenstein { g: -0.3 });
+}
+
+#[test]
+fn old_media_have_no_defaults() {
+    let s = old_scene(
+        r#"<medium type="homogeneous" id="m"><spectrum name="sigmaT" value="0.1"/>
+           <spectrum name="albedo" value="0.9, 0.5, 0.5"/></medium>"#,
+    );
+    let c = s.media[0].item.homogeneous().unwrap().coefficients();
+    assert_eq!((c.sigma_t, c.albedo), (Rgb::splat(0.1), Rgb::new(0.9, 0.5, 0.5)));
+    assert!(super::read_version("0.5.0", "<medium type=\"homogeneous\"/>").is_err());
+}
+
+/// A ramp from 0 to 3 along x, stored in the box (0, 0, 0)-(2, 1, 1).
+fn ramp(folder: &Folder) {
+    let grid = Grid::new([4, 1, 1], 1, vec![0.0, 1.0, 2.0, 3.0]).unwrap();
+    let bounds = [Vec3::ZERO, vec3(2.0, 1.0, 1.0)];
+    folder.file("ramp.vol", encode(&VolFile { grid, bounds }).unwrap());
+}
+
+fn grid_medium(folder: &Folder, version: &str, inside: &str) -> Medium {
+    let text = format!(
+        "<scene version=\"{version}\"><medium type=\"heterogeneous\">{inside}</medium></scene>"
+    );
+    let file = folder.file("s.xml", text);
+    load_scene(&file, &Defaults::new()).unwrap().media.remove(0).item
+}
+
+#[test]
+fn grids_of_version_3_fill_the_unit_cube() {
+    let folder = Folder::new();
+    ramp(&folder);
+    let density = |more: &str| {
+        format!(
+            "<volume name=\"sigma_t\" type=\"gridvolume\"><string name=\"filename\" \
+             value=\"ramp.vol\"/>{more}</volume><float name=\"scale\" value=\"2\"/>\
+             <float name=\"albedo\" value=\"0.5\"/>"
+        )
+    };
+    let at = |more: &str, x: f64| {
+        grid_medium(&folder, "3.0.0", &density(more)).sigma_t(vec3(x, 0.5, 0.5)).r
+    };
+    // Value i of 4 sits at (i + 1/2) / 4.
+    assert!((at("", 0.375) - 2.0).abs() < 1e-12);
+    assert_eq!(at("", 1.5), 0.0);
+    let stored = r#"<boolean name="use_grid_bbox" value="true"/>"#;
+    assert!((at(stored, 0.75) - 2.0).abs() < 1e-12);
+    let moved = r#"<transform name="to_world"><translate x="10"/></transform>"#;
+    assert!((at(moved, 10.375) - 2.0).abs() < 1e-12);
+    assert!((at(&format!("{moved}{stored}"), 10.75) - 2.0).abs() < 1e-12);
+    let nearest = r#"<string name="filter_type" value="nearest"/><string name="wrap_mode"
+                     value="mirror"/><boolean name="raw" value="true"/>"#;
+    assert_eq!(at(nearest, 0.49), 2.0);
+}
+
+#[test]
+fn grids_of_old_files_fill_their_own_box_with_values_at_its_faces() {
+    let folder = Folder::new();
+    ramp(&folder);
+    let inside = r#"<volume name="density" type="gridvolume"><string name="filename"
+        value="ramp.vol"/></volume><volume name="albedo" type="constvolume"><spectrum name="value"
+        value="0.1, 0.2, 0.3"/></volume><float name="scale" value="5"/>"#;
+    let m = grid_medium(&folder, "0.5.0", inside);
+    assert!((m.sigma_t(vec3(2.0, 0.5, 0.5)).r - 15.0).abs() < 1e-12);
+    assert!((m.sigma_t(vec3(1.0, 0.5, 0.5)).g - 7.5).abs() < 1e-12);
+    assert_eq!(m.coefficients(vec3(1.0, 0.5, 0.5)).albedo, Rgb::new(0.1, 0.2, 0.3));
+}
+
+#[test]
+fn heterogeneous_of_constants_is_a_box() {
+    let m = medium(
+        "heterogeneous",
+        r#"<volume name="sigma_t" type="constvolume"><float name="value" value="2"/>
+           <transform name="to_world"><scale value="3"/></transform></volume>"#,
+    );
+    assert_eq!(m.sigma_t(vec3(2.9, 2.9, 0.1)).r, 2.0);
+    assert_eq!(m.sigma_t(vec3(3.1, 0.5, 0.5)).r, 0.0);
+    let MediumKind::Grid(g) = &m.kind else { panic!() };
+    let placement = Affine::about(Mat3::diagonal(vec3(3.0, 3.0, 3.0)), Vec3::ZERO);
+    assert_eq!(*g.density().to_world(), placement);
+    assert_eq!(*g.albedo(), Volume::Constant(Rgb::splat(0.75)));
+}
+
+#[test]
+fn absorbing_and_scattering_grids() {
+    let folder = Folder::new();
+    ramp(&folder);
+    let grid = |name: &str| {
+        format!(
+            "<volume name=\"{name}\" type=\"gridvolume\"><string name=\"filename\" \
+             value=\"ramp.vol\"/></volume>"
+        )
+    };
+    let zero = "<float name=\"sigma_a\" value=\"0\"/>";
+    let m = grid_medium(&folder, "3.0.0", &format!("{}{zero}", grid("sigma_s")));
+    let c = m.coefficients(vec3(0.375, 0.5, 0.5));
+    assert_eq!((c.sigma_t, c.albedo), (Rgb::ONE, Rgb::ONE));
+    let both = format!("{}{}", grid("sigma_s"), grid("sigma_a"));
+    let text =
+        format!("<scene version=\"3.0.0\"><medium type=\"heterogeneous\">{both}</medium></scene>");
+    let file = folder.file("s.xml", text);
+    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    assert!(message.contains("give `sigma_t` and `albedo`"), "{message}");
+}
+
+#[test]
+fn unusable_grids() {
+    let volume = |more: &str| {
+        format!(
+            "<medium type=\"heterogeneous\">\n<volume name=\"sigma_t\" type=\"gridvolume\">{more}\
+             </volume></medium>"
+        )
+    };
+    refused(&volume(""), &[":3", "`filename` is missing"]);
+    refused(&volume(r#"<string name="filename" value="no.vol"/>"#), &[":3", "no.vol"]);
+    let vdb = "<medium type=\"heterogeneous\"><volume name=\"sigma_t\" type=\"vdb\"/></medium>";
+    refused(vdb, &["`vdb` is not supported"]);
+}

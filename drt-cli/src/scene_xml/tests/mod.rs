@@ -1,0 +1,38 @@
+mod emitters;
+mod language;
+mod materials;
+mod media;
+mod sensors;
+mod shapes;
+
+use std::path::Path;
+
+use drt_estimators::Scene;
+
+use crate::{CliError, parse_scene_str};
+
+/// A scene of version 3 around `body`, which starts at line 2.
+fn read(body: &str) -> Result<Scene, CliError> {
+    read_version("3.0.0", body)
+}
+
+fn read_version(version: &str, body: &str) -> Result<Scene, CliError> {
+    parse_scene_str(&format!("<scene version=\"{version}\">\n{body}\n</scene>"), Path::new("dir"))
+}
+
+fn scene(body: &str) -> Scene {
+    read(body).unwrap()
+}
+
+fn old_scene(body: &str) -> Scene {
+    read_version("0.6.0", body).unwrap()
+}
+
+/// Asserts that `body` is refused with a message that holds all of `parts`.
+#[track_caller]
+fn refused(body: &str, parts: &[&str]) {
+    let message = read(body).map(|_| ()).unwrap_err().to_string();
+    for part in parts {
+        assert!(message.contains(part), "expected `{part}` in: {message}");
+    }
+}

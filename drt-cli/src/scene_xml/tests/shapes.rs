@@ -1,0 +1,169 @@
+use drt_estimators::{MediumBoundary, Scene, Shape};
+use drt_math::{Vec3, vec3};
+
+use super::{refused, scene};
+use crate::testing::{Folder, TETRAHEDRON};
+use crate::{Defaults, load_scene};
+
+fn shape(body: &str) -> Shape {
+    scene(body).shapes.remove(0)
+}
+
+fn from_folder(folder: &Folder, body: &str) -> Scene {
+    let file = folder.file("s.xml", format!("<scene version=\"3.0.0\">{body}</scene>"));
+    load_scene(&file, &Defaults::new()).unwrap()
+}
+
+#[test]
+fn primitives_stand_where_mitsuba_has_them() {
+    let cube = shape(r#"<shape type="cube"/>"#);
+    assert!((cube.mesh.volume() - 8.0).abs() < 1e-12);
+    let rectangle = shape(r#"<shape type="rectangle"/>"#);
+    assert!((rectangle.mesh.surface_area() - 4.0).abs() < 1e-12);
+    assert_eq!(rectangle.mesh.normal(0), Vec3::Z);
+    let disk = shape(r#"<shape type="disk"><integer name="resolution" value="6"/></shape>"#);
+    assert!((disk.mesh.surface_area() - 1.5 * 3f64.sqrt()).abs() < 1e-12);
+    let sphere = shape(
+        r#"<shape type="sphere"><float name="radius" value="2"/><point name="center" value="1 2 3"/>
+           </shape>"#,
+    );
+    let exact = 32.0 / 3.0 * std::f64::consts::PI;
+    assert!((sphere.mesh.volume() / exact - 1.0).abs() < 2e-3);
+    let normals = sphere.mesh.normals.as_ref().unwrap();
+    let outward = sphere.mesh.positions[7] - vec3(1.0, 2.0, 3.0);
+    assert!((normals[7] - outward.normalize()).max_abs() < 1e-12);
+    refused(r#"<shape type="sphere"><float name="radius" value="0"/></shape>"#, &["`radius` is 0"]);
+}
+
+#[test]
+fn transform_steps_apply_in_file_order() {
+    let first = |steps: &str| {
+        let body = format!(
+            "<shape type=\"rectangle\"><transform name=\"to_world\">{steps}</transform></shape>"
+        );
+        // The corner that was at (-1, -1, 0).
+        shape(&body).mesh.positions[0]
+    };
+    let close = |a: Vec3, b: Vec3| assert!((a - b).max_abs() < 1e-12, "{a:?} {b:?}");
+    close(first(r#"<translate x="3"/><scale x="2"/>"#), vec3(4.0, -1.0, 0.0));
+    close(first(r#"<scale value="2"/><translate value="0, 0, 1"/>"#), vec3(-2.0, -2.0, 1.0));
+    close(first(r#"<rotate z="2" angle="90"/>"#), vec3(1.0, -1.0, 0.0));
+    close(first(r#"<matrix value="1 0 0 5  0 1 0 6  0 0 1 7  0 0 0 1"/>"#), vec3(4.0, 5.0, 7.0));
+    close(first(r#"<matrix value="0 1 0  1 0 0  0 0 1"/>"#), vec3(-1.0, -1.0, 0.0));
+    // The camera's left is the first axis.
+    let lookat = r#"<lookat origin="0 0 5" target="0 0 0" up="0 1 0"/>"#;
+    close(first(lookat), vec3(1.0, -1.0, 5.0));
+    close(first(&lookat.replace("lookat", "lookAt")), vec3(1.0, -1.0, 5.0));
+    for (step, part) in [
+        ("<rotate angle=\"3\"/>", "zero vector"),
+        ("<rotate x=\"1\"/>", "`angle` is missing"),
+        ("<scale w=\"1\"/>", "unknown attribute `w`"),
+        ("<translate x=\"one\"/>", "expected a finite number"),
+        ("<matrix value=\"1 2 3\"/>", "9 or 16 numbers, found 3"),
+        ("<matrix value=\"1 0 0 0 0 1 0 0 0 0 1 0 1 0 0 1\"/>", "last row"),
+        ("<shear x=\"1\"/>", "<shear>: expected translate"),
+        ("<lookat origin=\"0 0 0\" target=\"0 0 0\"/>", "same point"),
+    ] {
+        let body = format!(
+            "<shape type=\"cube\">\n<transform name=\"to_world\">{step}</transform></shape>"
+        );
+        refused(&body, &[":3", part]);
+    }
+}
+
+#[test]
+fn mesh_files_get_mitsubas_normals() {
+    let folder = Folder::new();
+    folder.file("plain.obj", TETRAHEDRON);
+    folder.file("own.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 1 1\nf 1//1 2//1 3//1\n");
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+               property float z\nelement face 1\nproperty list uchar int vertex_indices\n\
+               end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+    folder.file("t.ply", ply);
+    let mesh = |kind: &str, file: &str, more: &str| {
+        let body = format!(
+            "<shape type=\"{kind}\"><string name=\"filename\" value=\"{file}\"/>{more}</shape>"
+        );
+        from_folder(&folder, &body).shapes.remove(0).mesh
+    };
+    let facets = r#"<boolean name="face_normals" value="true"/>"#;
+    let flip = r#"<boolean name="flip_normals" value="true"/>"#;
+    let mirror = r#"<transform name="to_world"><scale x="-1"/></transform>"#;
+    let diagonal = vec3(1.0, 1.0, 1.0).normalize();
+
+    let smooth = mesh("obj", "plain.obj", "");
+    assert!((smooth.normals.as_ref().unwrap()[0] + diagonal).max_abs() < 1e-12);
+    assert!(smooth.volume() > 0.0);
+    assert_eq!(mesh("obj", "plain.obj", facets).normals, None);
+    let flipped = mesh("obj", "plain.obj", flip);
+    assert!((flipped.normals.as_ref().unwrap()[0] - diagonal).max_abs() < 1e-12);
+    assert!(flipped.volume() < 0.0);
+    // Without normals of its own a mirrored mesh turns inside out; with them it does not.
+    assert!(mesh("obj", "plain.obj", mirror).volume() < 0.0);
+    assert!(mesh("obj", "plain.obj", &format!("{mirror}{flip}")).volume() > 0.0);
+    let own = mesh("obj", "own.obj", mirror);
+    assert!((own.normals.as_ref().unwrap()[0] - vec3(0.0, 1.0, 1.0).normalize()).max_abs() < 1e-12);
+    assert_eq!(own.normal(0), Vec3::Z);
+    assert_eq!(mesh("obj", "own.obj", &format!("{facets}{mirror}")).normal(0), -Vec3::Z);
+    assert_eq!(mesh("ply", "t.ply", facets).normal(0), Vec3::Z);
+}
+
+#[test]
+fn vertices_repeated_in_a_file_keep_their_crease() {
+    let folder = Folder::new();
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 0 0 1\nv 1 0 0\nf 1 2 3\nf 4 6 5\n";
+    folder.file("fold.obj", text);
+    let body = r#"<shape type="obj"><string name="filename" value="fold.obj"/></shape>"#;
+    let mesh = from_folder(&folder, body).shapes.remove(0).mesh;
+    assert_eq!(mesh.normals.as_ref().unwrap()[0], Vec3::Z);
+    assert_eq!(mesh.normals.as_ref().unwrap()[3], -Vec3::Y);
+}
+
+#[test]
+fn unusable_files_name_scene_line_and_cause() {
+    let folder = Folder::new();
+    folder.file("cut.obj", "v 0 0 0\nv 1 0\n");
+    let file = folder.file(
+        "s.xml",
+        "<scene version=\"3.0.0\">\n<shape type=\"obj\"><string name=\"filename\" \
+         value=\"cut.obj\"/></shape></scene>",
+    );
+    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    for part in ["s.xml:2: <shape type=\"obj\">", "cut.obj:2"] {
+        assert!(message.contains(part), "{message}");
+    }
+    refused(
+        r#"<shape type="ply"><string name="filename" value="no.ply"/></shape>"#,
+        &[":2", "cannot read dir/no.ply"],
+    );
+    refused(r#"<shape type="obj"/>"#, &["`filename` is missing"]);
+    refused(r#"<shape type="cylinder"/>"#, &["`cylinder` is not supported", "rectangle"]);
+}
+
+#[test]
+fn shapes_hold_materials_lights_and_media() {
+    let s = scene(
+        r#"<medium type="homogeneous" id="fog"/>
+           <shape type="cube"><ref name="interior" id="fog"/><bsdf type="null"/></shape>
+           <shape type="cube"><medium name="exterior" type="homogeneous"/><ref name="interior" id="fog"/>
+             <emitter type="area" id="glow"/></shape>
+           <shape type="cube"/>"#,
+    );
+    assert_eq!(s.shapes[0].boundary, Some(MediumBoundary { interior: Some(0), exterior: None }));
+    assert_eq!(s.shapes[1].boundary, Some(MediumBoundary { interior: Some(0), exterior: Some(1) }));
+    assert_eq!(s.shapes[2].boundary, None);
+    assert_eq!(s.shapes[1].emitter, Some(0));
+    assert_eq!(s.emitters[0].id.as_deref(), Some("glow"));
+    // Mitsuba's defaults: a light is black, anything else gray.
+    assert_ne!(s.shapes[1].bsdf, s.shapes[2].bsdf);
+    refused(
+        "<medium type=\"homogeneous\" id=\"fog\"/><shape type=\"cube\">\n<ref id=\"fog\"/></shape>",
+        &[":3", "`interior` or `exterior`"],
+    );
+    refused(
+        "<shape type=\"cube\"><bsdf type=\"null\"/>\n<bsdf type=\"null\"/></shape>",
+        &[":3", "only one bsdf"],
+    );
+    refused("<shape type=\"cube\"><emitter type=\"point\"/></shape>", &["type `area`"]);
+    refused("<emitter type=\"area\"/>", &["belongs inside a <shape>"]);
+}

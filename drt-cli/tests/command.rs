@@ -1,0 +1,249 @@
+//! The `drt` program from outside: exit codes, files and messages.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+const SCENE: &str = r#"<scene version="3.0.0">
+  <default name="rho" value="0.5"/>
+  <integrator type="path"><integer name="max_depth" value="3"/></integrator>
+  <sensor type="perspective" id="cam"><float name="fov" value="50"/>
+    <transform name="to_world"><lookat origin="0 -4 3" target="0 0 0" up="0 0 1"/></transform>
+    <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="8"/>
+      <rfilter type="tent"/></film>
+    <sampler type="independent"><integer name="sample_count" value="4"/></sampler></sensor>
+  <shape type="rectangle" id="floor"><bsdf type="diffuse" id="gray">
+    <rgb name="reflectance" value="$rho"/></bsdf></shape>
+  <emitter type="point" id="lamp"><point name="position" value="1 -1 2"/></emitter>
+</scene>"#;
+
+const JOB: &str = r#"scene = "scene.xml"
+[estimator]
+spp = 64
+[[parameter]]
+name = "gray"
+[[parameter.effect]]
+target = "gray"
+property = "reflectance"
+add = [1.0, 1.0, 1.0]
+[[parameter]]
+name = "lamp-x"
+value = 0.1
+[[parameter.effect]]
+target = "lamp"
+translate = [1.0, 0.0, 0.0]
+"#;
+
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let n = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("drt-command-{}-{n}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        std::fs::write(path.join("scene.xml"), SCENE).unwrap();
+        std::fs::write(path.join("job.toml"), JOB).unwrap();
+        Self(path)
+    }
+
+    fn command(&self, line: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_drt"));
+        command.current_dir(&self.0).args(line.split_whitespace());
+        command
+    }
+
+    fn run(&self, line: &str) -> Output {
+        self.command(line).output().unwrap()
+    }
+
+    fn json(&self, name: &str) -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(self.0.join(name)).unwrap()).unwrap()
+    }
+
+    fn exr(&self, name: &str) -> drt_cli::ExrFile {
+        drt_cli::read_exr(&self.0.join(name)).unwrap()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[track_caller]
+fn expect(output: &Output, code: i32, parts: &[&str]) {
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{stderr}");
+    for part in parts {
+        assert!(stderr.contains(part), "expected `{part}` in: {stderr}");
+    }
+}
+
+fn means(image: &serde_json::Value) -> Vec<f64> {
+    image["mean"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn render_writes_everything_asked_for() {
+    let folder = Folder::new();
+    let out = folder.run("render scene.xml -o a.exr --digest a.json --preview a.png");
+    expect(&out, 0, &["16x8, 4 spp"]);
+    assert!(out.stdout.is_empty());
+    let digest = folder.json("a.json");
+    assert_eq!((&digest["spp"], &digest["complete"]), (&4.into(), &true.into()));
+    assert_eq!(digest["derivatives"], serde_json::json!({}));
+    assert!(means(&digest["image"])[0] > 0.0);
+    assert_eq!(folder.exr("a.exr").layers.len(), 2);
+    assert!(std::fs::read(folder.0.join("a.png")).unwrap().starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn options_reach_scene_and_job() {
+    let folder = Folder::new();
+    let out = folder.run(
+        "render scene.xml --digest - --quiet --spp 8 --size 9x5 --seed 3 --threads 1 --max-depth 2 \
+         --sensor cam -D rho=0",
+    );
+    expect(&out, 0, &[]);
+    assert!(out.stderr.is_empty());
+    let digest: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    for (key, value) in [("spp", 8), ("width", 9), ("height", 5), ("seed", 3), ("threads", 1)] {
+        assert_eq!(digest[key], value, "{key}");
+    }
+    assert_eq!(means(&digest["image"]), [0.0; 3]);
+    let set = "--set estimator.spp=2 --set parameter.gray.value=0.25";
+    let out = folder.run(&format!("render job.toml --quiet --digest - {set}"));
+    let brighter: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(brighter["spp"], 2);
+}
+
+#[test]
+fn same_seed_same_pixels_for_any_number_of_threads() {
+    let folder = Folder::new();
+    for threads in [1, 3] {
+        let line = format!("grad job.toml --quiet --terms --threads {threads} -o {threads}.exr");
+        expect(&folder.run(&line), 0, &[]);
+    }
+    let (one, three) = (folder.exr("1.exr"), folder.exr("3.exr"));
+    assert_eq!(one.layers, three.layers);
+    for layer in ["", "stderr", "d_gray", "d_gray_stderr", "d_lamp-x", "d_gray.interior"] {
+        assert!(one.layers.contains_key(layer), "{layer}");
+    }
+    assert!(one.attributes["drt_job_text"].contains("lamp-x"));
+}
+
+#[test]
+fn gradients_pass_their_check() {
+    let folder = Folder::new();
+    let out = folder.run("check job.toml --spp 512 --digest c.json -o c.exr");
+    expect(&out, 0, &[]);
+    let table = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(table.contains("relative noise") && table.contains("agrees"), "{table}");
+    assert_eq!(folder.json("c.json")["checks"].as_array().unwrap().len(), 2);
+    assert!(folder.exr("c.exr").layers.contains_key("fd_lamp-x"));
+}
+
+#[test]
+fn info_lists_and_plans() {
+    let folder = Folder::new();
+    let out = folder.run("info job.toml");
+    expect(&out, 0, &[]);
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    for part in ["floor", "gray", "lamp", "cam", "16x8", "translate", "plan", "path record: yes"] {
+        assert!(text.contains(part), "expected `{part}` in: {text}");
+    }
+    expect(&folder.run("info scene.xml"), 0, &[]);
+}
+
+#[test]
+fn unusable_input_exits_with_2_and_writes_nothing() {
+    let folder = Folder::new();
+    let write = |name: &str, text: &str| std::fs::write(folder.0.join(name), text).unwrap();
+    write("bad.xml", &SCENE.replace("type=\"rectangle\"", "type=\"torus\""));
+    write("bad.toml", &JOB.replace("spp", "ssp"));
+    write("alone.xml", "<scene version=\"3.0.0\"/>");
+    write("effect.toml", &JOB.replace("reflectance", "colour"));
+    for (line, part) in [
+        ("render bad.xml", "drt: error: bad.xml:9: <shape type=\"torus\""),
+        ("grad bad.toml", "drt: error: bad.toml:3:1: unknown field `ssp`"),
+        ("render none.xml", "none.xml: cannot read"),
+        ("render alone.xml", "alone.xml: the scene has no <sensor>"),
+        ("grad scene.xml", "derivatives need a job"),
+        ("grad effect.toml", "effect.toml:4"),
+        ("render scene.xml --set estimator.spp=3", "--set estimator.spp"),
+        ("render scene.xml -D speed=3", "-D speed"),
+        ("render scene.xml --size 0x3", "640x480"),
+        ("render scene.xml --spp 0", "--spp"),
+        ("render scene.xml --seconds -1", "--seconds"),
+        ("render scene.xml --sensor eye", "--sensor: "),
+        ("render scene.xml --max-depth -2", "--max-depth: "),
+        ("render scene.xml --colour", "--colour"),
+        ("paint scene.xml", "paint"),
+        ("grad job.toml --loss t.exr", "--loss is not supported yet"),
+        ("optimize job.toml", "later version"),
+        ("bench", "later version"),
+    ] {
+        let out = folder.run(&format!(
+            "{line} {}",
+            match line {
+                "bench" => "",
+                _ => "-o a.exr --digest a.json --preview a.png",
+            }
+        ));
+        expect(&out, 2, &[part]);
+        assert!(out.stdout.is_empty());
+        for name in ["a.exr", "a.json", "a.png"] {
+            assert!(!Path::new(&folder.0.join(name)).exists(), "{line} wrote {name}");
+        }
+    }
+    expect(&folder.run("--help"), 0, &[]);
+    expect(&folder.run("--version"), 0, &[]);
+}
+
+#[test]
+fn failures_while_writing_exit_with_3() {
+    let folder = Folder::new();
+    expect(&folder.run("render scene.xml -o nowhere/a.exr"), 3, &["cannot write nowhere/a.exr"]);
+    expect(&folder.run("render scene.xml --digest ."), 3, &["cannot write ."]);
+}
+
+#[test]
+fn stop_rules() {
+    let folder = Folder::new();
+    let out = folder.run("render scene.xml --quiet --target-error 0.01 --digest a.json");
+    expect(&out, 0, &[]);
+    let [coarse, fine] = [0.01, 0.003].map(|target| {
+        let line = format!("render scene.xml --quiet --target-error {target} --digest a.json");
+        expect(&folder.run(&line), 0, &[]);
+        folder.json("a.json")["spp"].as_u64().unwrap()
+    });
+    assert!(fine > coarse, "{fine} {coarse}");
+    let capped =
+        folder.run("render scene.xml --quiet --target-error 1e-9 --spp 40 --digest a.json");
+    expect(&capped, 0, &[]);
+    assert_eq!(folder.json("a.json")["spp"], 40);
+    let timed = folder.run("render scene.xml --quiet --seconds 0.3 --digest a.json");
+    expect(&timed, 0, &[]);
+    let digest = folder.json("a.json");
+    assert!(digest["seconds"].as_f64().unwrap() < 3.0);
+    assert!(digest["spp"].as_u64().unwrap() > 4);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_keeps_what_is_finished() {
+    let folder = Folder::new();
+    let mut command = folder.command("render scene.xml --seconds 600 --digest a.json -o a.exr");
+    let child = command.stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    let out = child.wait_with_output().unwrap();
+    expect(&out, 130, &["incomplete"]);
+    let digest = folder.json("a.json");
+    assert_eq!(digest["complete"], false);
+    assert!(digest["spp"].as_u64().unwrap() > 0);
+    assert_eq!(folder.exr("a.exr").attributes["drt_complete"], "0");
+}
