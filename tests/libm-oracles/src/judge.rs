@@ -9,7 +9,7 @@ const LIMIT: f64 = 4.0;
 /// A deviation that the run must be able to see.
 const VISIBLE: f64 = 0.1;
 
-const SAMPLES: u32 = 1 << 22;
+const SAMPLES: u32 = 1 << 21;
 
 /// The run's estimates of `value` and of the derivatives in `parameters` must agree with the exact
 /// numbers, and disagree with numbers that are 10 % off.
