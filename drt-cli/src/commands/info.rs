@@ -15,8 +15,11 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     let job = run::open(options)?;
     print!("{}", describe(&job));
     // The plan comes last: preparing it can fail for reasons that the tables help to find.
-    if !job.scene.sensors.is_empty() {
-        job.require_derivatives()?;
+    if job.scene.sensors.is_empty() {
+        println!("no plan: the scene has no <sensor>");
+    } else if let Err(e) = job.require_derivatives() {
+        println!("no plan: {e}");
+    } else {
         print!("plan\n{}", run::prepare(&job, &job.parameters)?.plan());
     }
     Ok(Outcome::Done)

@@ -56,9 +56,9 @@ pub(super) struct Options {
     /// Same seed, same pixels.
     #[arg(long, value_name = "N")]
     pub(super) seed: Option<u64>,
-    /// Threads; all cores when not given.
-    #[arg(long, value_name = "N")]
-    pub(super) threads: Option<usize>,
+    /// Threads; 0, or none given, for all cores.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(..=1024))]
+    pub(super) threads: Option<u16>,
     /// Size of the image.
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(super) size: Option<[u32; 2]>,

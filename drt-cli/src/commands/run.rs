@@ -11,8 +11,10 @@ use super::options::Options;
 use crate::job::depth;
 use crate::{CliError, Job, load_job};
 
-/// Samples per pixel of the first pass where time or noise decides when to stop.
-const FIRST_PASS: u32 = 16;
+/// Samples per pixel of the first pass where time or noise decides when to stop; later ones double.
+const FIRST_PASS: u32 = 4;
+/// Most pixels of an image.
+const MAX_PIXELS: u64 = 1 << 28;
 
 /// Opens the input and lays the options over it.
 pub(super) fn open(options: &Options) -> Result<Job, CliError> {
@@ -33,10 +35,16 @@ pub(super) fn open(options: &Options) -> Result<Job, CliError> {
         let resized = sensor.item.sensor.with_film(film);
         sensor.item.sensor = resized.map_err(|e| CliError::argument(format!("--size: {e}")))?;
     }
+    if let Some(sensor) = job.scene.sensors.get(job.settings.sensor) {
+        let [w, h] = sensor.item.sensor.film();
+        if u64::from(w) * u64::from(h) > MAX_PIXELS {
+            return Err(CliError::argument(format!("{w}x{h} pixels are more than {MAX_PIXELS}")));
+        }
+    }
     let settings = &mut job.settings;
     settings.spp = options.spp.unwrap_or(settings.spp);
     settings.seed = options.seed.unwrap_or(settings.seed);
-    settings.threads = options.threads.unwrap_or(settings.threads);
+    settings.threads = options.threads.map_or(settings.threads, usize::from);
     if let Some(value) = options.max_depth {
         let depth = depth(value).map_err(|e| CliError::argument(format!("--max-depth: {e}")))?;
         settings.max_depth = Some(depth);
@@ -103,31 +111,30 @@ pub(super) fn sample(
     let mut pass = u32::min(FIRST_PASS, limit);
     let mut done = 0;
     loop {
-        if !session.run(pass, monitor) {
-            return session.rendering();
-        }
-        done += pass;
+        let going = session.run(pass, monitor);
         let rendering = session.rendering();
-        let elapsed = start.elapsed().as_secs_f64();
+        done += pass;
         let mut left = limit - done;
         let mut part = f64::from(done) / f64::from(limit);
         if let Some(seconds) = options.seconds {
-            left = u32::min(left, ((seconds - elapsed) * f64::from(done) / elapsed) as u32);
+            let elapsed = start.elapsed().as_secs_f64();
+            // A negative or oversized number saturates.
+            let affordable = (seconds - elapsed) * f64::from(done) / elapsed;
+            left = u32::min(left, affordable as u32);
             part = part.max(elapsed / seconds);
         }
         if let Some(target) = options.target_error {
             // Noise falls with the square root of the number of samples.
             let needed = (largest_noise(&rendering) / target).powi(2);
-            let reached = needed <= 1.0;
-            left =
-                if reached { 0 } else { u32::min(left, (f64::from(done) * needed) as u32 - done) };
-            part = part.max(1.0 / needed);
+            let missing = (f64::from(done) * (needed - 1.0)).ceil();
+            left = u32::min(left, missing as u32);
+            part = part.max(1.0 / needed.max(1.0));
         }
-        // Pairs of mirrored image points are not torn apart.
-        pass = u32::min(left, done).next_multiple_of(2);
-        if left < 2 || pass > limit - done {
+        if !going || left == 0 {
             return rendering;
         }
-        monitor.stage(&format!("{done} spp"), part, f64::min(1.0, 2.0 * part));
+        // Mirrored pairs of image points are not torn apart.
+        pass = u32::min(u32::min(left, done).next_multiple_of(2), limit - done);
+        monitor.stage(&format!("{done} spp"), part, 2.0 * part);
     }
 }

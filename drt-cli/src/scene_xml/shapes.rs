@@ -120,7 +120,7 @@ fn from_file(
 }
 
 fn sphere(p: &Properties<'_>) -> Result<Model, CliError> {
-    let bands = p.integer_in("resolution", 2..=2048)?.unwrap_or(SPHERE_RESOLUTION);
+    let bands = p.integer_in("resolution", 2..=1024)?.unwrap_or(SPHERE_RESOLUTION);
     let center = p.vector("center")?.unwrap_or(Vec3::ZERO);
     let radius = p.float("radius")?.unwrap_or(1.0);
     if radius <= 0.0 {

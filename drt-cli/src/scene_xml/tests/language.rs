@@ -123,3 +123,38 @@ fn names_of_the_other_dialect_are_unknown() {
     );
     assert_eq!(old.integrator.max_depth, Some(3));
 }
+
+/// Whatever is done to a scene's text, it is read or refused.
+#[test]
+fn damaged_text_never_panics() {
+    let text = r##"<scene version="0.6.0"><default name="a" value="1, 2, 3"/>
+        <integrator type="volpath"><integer name="maxDepth" value="-1"/></integrator>
+        <medium type="heterogeneous" id="m"><volume name="density" type="constvolume">
+        <spectrum name="value" value="$a"/><transform name="toWorld"><scale x="2"/></transform>
+        </volume><float name="albedo" value="0.5"/><phase type="hg"/></medium>
+        <shape type="sphere" id="s"><integer name="resolution" value="3"/><ref name="interior" id="m"/>
+        <bsdf type="twosided"><bsdf type="phong"><rgb name="reflectance" value="#a0b0c0"/></bsdf>
+        </bsdf><transform name="toWorld"><rotate x="1" y="0" z="1" angle="4"/><matrix value="1 0 0
+        0 1 0 0 0 1"/><lookAt origin="1 2 3" target="0 0 0"/></transform></shape><alias id="s" as="t"/>
+        <emitter type="spot"><float name="cutoffAngle" value="30"/></emitter>
+        <sensor type="perspective"><float name="fov" value="30"/><film type="hdrfilm">
+        <integer name="width" value="3"/><rfilter type="tent"/></film></sensor></scene>"##;
+    let base = std::path::Path::new(".");
+    crate::parse_scene_str(text, base).unwrap();
+    let mut rng = drt_math::Rng::new(7, 0, 0);
+    let mut below = |n: usize| (rng.next_f64() * n as f64) as usize;
+    let words = ["", "-1", "1e308", "nan", "\"", ">", "<", "/", "$", "&#0;", "0 0 0", "é", "ref"];
+    let mut read = 0;
+    for _ in 0..3000 {
+        let mut bytes = text.as_bytes().to_vec();
+        for _ in 0..1 + below(3) {
+            let at = below(bytes.len());
+            let end = (at + below(6)).min(bytes.len());
+            bytes.splice(at..end, words[below(words.len())].bytes());
+        }
+        if let Ok(text) = String::from_utf8(bytes) {
+            read += usize::from(crate::parse_scene_str(&text, base).is_ok());
+        }
+    }
+    assert!(read > 0, "some damage is harmless");
+}
