@@ -8,7 +8,7 @@ use crate::{CliError, Overrides};
 
 /// Differentiable rendering of surfaces and participating media.
 #[derive(Debug, Parser)]
-#[command(name = "drt", version, about)]
+#[command(name = "drt", version)]
 pub(super) struct CommandLine {
     #[command(subcommand)]
     pub(super) command: Command,
