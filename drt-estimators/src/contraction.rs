@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
+use drt_medium::MediumTangent;
 use drt_motion::{SiteWeight, VolumeMotion, blend_jet};
 
 use crate::emitter::EmitterGradient;
@@ -11,7 +12,7 @@ use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, 
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
 use crate::tangents::Tangents;
-use crate::transport::{SurfacePoint, World};
+use crate::transport::{MediumNeed, Needs, SurfacePoint, World};
 
 /// Everything that changes with the parameters.
 #[derive(Clone, Debug, Default)]
@@ -42,13 +43,22 @@ impl Motion {
         Self { tangents, insides, interest }
     }
 
-    /// Media whose coefficients change, and whether albedo or emission do.
-    pub(crate) fn samples_media(&self) -> impl Iterator<Item = (usize, bool)> {
-        self.tangents.media.iter().enumerate().filter_map(|(m, tangents)| {
-            let source = tangents.iter().any(|(_, t)| !t.albedo.is_zero() || !t.emission.is_zero());
-            let density = tangents.iter().any(|(_, t)| !t.sigma_t.is_zero());
-            (source || density).then_some((m, source))
-        })
+    /// What must be sampled even where it contributes nothing to the image.
+    pub(crate) fn needs(&self) -> Needs {
+        let need = |tangents: &Vec<(usize, MediumTangent)>| {
+            let any = |f: fn(&MediumTangent) -> bool| tangents.iter().any(|(_, t)| f(t));
+            if any(|t| !t.albedo.is_zero() || !t.emission.is_zero()) {
+                MediumNeed::Vertices
+            } else if any(|t| !t.sigma_t.is_zero()) {
+                MediumNeed::Density
+            } else {
+                MediumNeed::Nothing
+            }
+        };
+        Needs {
+            media: self.tangents.media.iter().map(need).collect(),
+            bsdfs: self.interest.bsdfs.clone(),
+        }
     }
 
     pub(crate) fn parameters(&self) -> usize {

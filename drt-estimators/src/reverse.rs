@@ -27,7 +27,7 @@ use crate::session::Control;
 use crate::settings::Settings;
 use crate::splatting::Checked;
 use crate::surface::BsdfParams;
-use crate::transport::{SurfacePoint, World};
+use crate::transport::{MediumNeed, Needs, SurfacePoint, World};
 use crate::{Error, tangents};
 
 /// The gradient of a loss with respect to a scene. Entries that were not asked for are `None`.
@@ -117,8 +117,11 @@ pub fn gradient(
     let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
     let mut world = World::new(scene, settings.sensor, depth)?;
     let interest = interest(&world.scene, wanted);
-    let media = interest.media.iter().enumerate().filter(|(_, w)| **w).map(|(m, _)| (m, true));
-    world.prepare_for_derivatives(media);
+    let need = |w: &bool| if *w { MediumNeed::Vertices } else { MediumNeed::Nothing };
+    world.prepare_for_derivatives(Needs {
+        media: interest.media.iter().map(need).collect(),
+        bsdfs: interest.bsdfs.clone(),
+    });
     let film = world.camera.film();
     if adjoint.len() != (film[0] * film[1]) as usize {
         return Err(Error::Setting {

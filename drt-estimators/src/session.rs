@@ -97,7 +97,7 @@ impl Session {
             motion = Some(Motion::new(tangents, insides));
         }
         if let Some(motion) = &motion {
-            world.prepare_for_derivatives(motion.samples_media());
+            world.prepare_for_derivatives(motion.needs());
         }
         let nothing = Interest::default();
         let interest = motion.as_ref().map_or(&nothing, |m| &m.interest);

@@ -211,6 +211,10 @@ impl<'w> Differentiator<'w> {
         near: &mut SurfaceAdjoint,
         sink: &mut S,
     ) -> RgbVec {
+        // Two points of one flat lamp see each other at right angles: 0 × infinity.
+        if weight.is_zero() {
+            return RgbVec::ZERO;
+        }
         let mut along = Along { fixed: matches!(far, Far::Direction), ..Along::default() };
         self.transmittance(path, moving, weight, &mut along, sink);
         if !moving {

@@ -14,4 +14,4 @@ pub(crate) use adjoint::Differentiator;
 pub(crate) use record::{PathRecord, Radiance, RadianceBySegments};
 pub(crate) use trace::Tracer;
 pub(crate) use vertex::{Kind, SurfacePoint, Vertex};
-pub(crate) use world::{RayPath, World};
+pub(crate) use world::{MediumNeed, Needs, RayPath, World};

@@ -244,8 +244,8 @@ impl<'w> Tracer<'w> {
         let world = self.world;
         let scattering = world.scattering(&stop.vertex)?;
         let sigma_s = stop.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s);
-        let dead = stop.alive.times(stop.arrival * sigma_s, O::RECORDS).value.is_zero();
-        if dead {
+        let spare = O::RECORDS && world.may_revive(&stop.vertex);
+        if stop.alive.times(stop.arrival * sigma_s, spare).value.is_zero() {
             return None;
         }
         if let Some(light) = world.lights.sample(world, stop.vertex.x, &mut self.rng) {
@@ -265,7 +265,7 @@ impl<'w> Tracer<'w> {
         }
         let value = scattering.eval(stop.wo, wi);
         let mut inv_pdf = 1.0 / pdf;
-        let mut alive = stop.alive.times(stop.arrival * sigma_s * (value * inv_pdf), O::RECORDS);
+        let mut alive = stop.alive.times(stop.arrival * sigma_s * (value * inv_pdf), spare);
         if alive.value.is_zero() {
             return None;
         }
@@ -312,9 +312,8 @@ impl<'w> Tracer<'w> {
         let world = self.world;
         let Some(scattering) = world.scattering(&stop.vertex) else { return };
         let f = scattering.eval(stop.wo, light.w);
-        if weight == 0.0
-            || (f.is_zero() && !(O::RECORDS && matches!(stop.vertex.kind, Kind::Surface(_))))
-        {
+        let spare = O::RECORDS && world.may_revive(&stop.vertex);
+        if weight == 0.0 || (f.is_zero() && !spare) {
             return;
         }
         let target = match &light.kind {

@@ -86,6 +86,24 @@ struct Prim {
 /// Least probability of a scattering vertex per tentative collision where coefficients change.
 const DEFENSIVE: f64 = 0.1;
 
+/// What derivatives need of a medium.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MediumNeed {
+    /// Its coefficients do not change.
+    Nothing,
+    /// They change.
+    Density,
+    /// So does what happens at vertices, even if nothing does now.
+    Vertices,
+}
+
+/// What derivatives need beyond the image.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Needs {
+    pub(crate) media: Vec<MediumNeed>,
+    pub(crate) bsdfs: Vec<bool>,
+}
+
 /// What tracking may skip in a medium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tracking {
@@ -106,6 +124,7 @@ pub(crate) struct World {
     /// Least probability of a scattering vertex per tentative collision, per medium: nonzero
     /// where derivatives need vertices in empty space.
     pub(crate) defensive: Vec<f64>,
+    needs: Needs,
     pub(crate) max_depth: u32,
     pub(crate) rr_depth: u32,
     bvh: TriangleBvh,
@@ -170,6 +189,7 @@ impl World {
             camera_medium: None,
             tracking,
             defensive: alloc::vec![0.0; scene.media.len()],
+            needs: Needs::default(),
             max_depth: depth,
             rr_depth: scene.integrator.rr_depth,
             any_null: null.iter().any(|n| *n),
@@ -185,21 +205,35 @@ impl World {
     }
 
     /// Makes sure that what derivatives need is sampled where its value is zero (theory sheet §14.5):
-    /// vertices in media whose coefficients change. Each item is a medium, and whether its albedo or
-    /// emission changes.
-    pub(crate) fn prepare_for_derivatives(&mut self, media: impl Iterator<Item = (usize, bool)>) {
-        for (m, needs_vertices) in media {
+    /// vertices in media whose coefficients change, and paths over materials that change.
+    pub(crate) fn prepare_for_derivatives(&mut self, needs: Needs) {
+        for (m, need) in needs.media.iter().enumerate() {
+            if *need == MediumNeed::Nothing {
+                continue;
+            }
             // Where every channel attenuates, free flights reach everything by themselves.
-            let sparse = self
-                .medium(m)
-                .homogeneous()
-                .is_none_or(|h| h.coefficients().sigma_t.to_array().into_iter().any(|s| s <= 0.0));
+            let sparse = self.medium(m).homogeneous().is_none_or(|h| {
+                h.coefficients().sigma_t.to_array().into_iter().any(|s| s <= 0.0)
+            });
             if sparse {
                 self.defensive[m] = DEFENSIVE;
             }
-            if needs_vertices {
+            if *need == MediumNeed::Vertices {
                 self.tracking[m] = Tracking::Vertices;
             }
+        }
+        self.needs = needs;
+    }
+
+    /// True when a parameter changes how `v` scatters, so that a zero there may not stay zero.
+    pub(crate) fn may_revive(&self, v: &Vertex) -> bool {
+        match (&v.kind, v.medium) {
+            (Kind::Surface(s), _) => {
+                let bsdf = self.scene.shapes[s.shape as usize].bsdf;
+                self.needs.bsdfs.get(bsdf).copied().unwrap_or(false)
+            }
+            (_, Some(m)) => self.needs.media.get(m).is_some_and(|n| *n != MediumNeed::Nothing),
+            _ => false,
         }
     }
 
