@@ -28,13 +28,18 @@ use crate::transport::{Radiance, RayPath, SurfacePoint, Vertex, World};
 #[derive(Clone, Debug)]
 pub(crate) struct Flux {
     shapes: Arc<[bool]>,
+    /// Segments at which a volume vertex can no longer send anything.
+    longest: u32,
 }
 
 impl Flux {
     /// `None` when no shape has a flux.
     pub(crate) fn new(world: &World, shapes: &[usize]) -> Option<Self> {
         let flags = (0..world.scene.shapes.len()).map(|s| shapes.contains(&s)).collect();
-        (!shapes.is_empty()).then_some(Self { shapes: flags })
+        // A vertex that is the path's last sends light only if it emits.
+        let emissive = world.scene.media.iter().any(|m| m.item.is_emissive());
+        let longest = world.max_depth.saturating_add(u32::from(emissive));
+        (!shapes.is_empty()).then_some(Self { shapes: flags, longest })
     }
 }
 
@@ -98,7 +103,7 @@ impl Reservoir {
         dir: Vec3,
         ray: &RayPath,
     ) {
-        let Some(flux) = &self.flux else { return };
+        let Some(flux) = self.flux.as_ref().filter(|f| segments + 1 < f.longest) else { return };
         let strength = throughput.max_abs();
         if strength == 0.0 {
             return;

@@ -3,6 +3,9 @@
 #![forbid(unsafe_code)]
 
 extern crate alloc;
+// Scenes for tests are shared with the tests outside the crate.
+#[cfg(all(test, feature = "std"))]
+extern crate self as drt_estimators;
 
 mod agreement;
 mod boundary;
@@ -40,4 +43,4 @@ pub use scene::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding, Target,
 };
 pub use session::{Control, FinishedTile, Session, Unattended};
-pub use settings::{EstimatorKind, Settings};
+pub use settings::{EstimatorKind, InsideKind, Settings};

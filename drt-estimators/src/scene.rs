@@ -144,7 +144,7 @@ pub enum Target {
 }
 
 impl Scene {
-    /// Checks that indices refer to something and emitters are usable.
+    /// Checks that indices refer to something and that what emits has an area.
     ///
     /// # Errors
     /// Names the element and what is wrong with it.
@@ -164,12 +164,6 @@ impl Scene {
             }
             if s.emitter.is_some() && s.mesh.surface_area() <= 0.0 {
                 return fail(name(), "it emits but has no area".into());
-            }
-        }
-        for (i, e) in self.emitters.iter().enumerate() {
-            if let Err(error) = e.item.emitter.checked() {
-                let name = e.id.clone().unwrap_or_else(|| alloc::format!("emitter[{i}]"));
-                return fail(name, alloc::format!("{error}"));
             }
         }
         Ok(())

@@ -93,7 +93,7 @@ impl Session {
         let mut world = World::new(scene, settings.sensor, depth)?;
         let mut motion = None;
         if !parameters.is_empty() {
-            let insides = inside::plan(&world, &tangents)?;
+            let insides = inside::plan(&world, &tangents, &settings.insides)?;
             motion = Some(Motion::new(tangents, insides));
         }
         if let Some(motion) = &motion {

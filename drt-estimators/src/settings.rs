@@ -1,5 +1,7 @@
 //! What is asked of an estimator.
 
+use alloc::vec::Vec;
+
 /// How derivatives are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -9,6 +11,19 @@ pub enum EstimatorKind {
     PathSpace,
     /// Central differences with common random numbers.
     FiniteDifference,
+}
+
+/// How surface velocities reach the inside of a medium.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum InsideKind {
+    /// By the one affine field that everything around the medium moves by.
+    Affine,
+    /// Not at all; the flux through moving surfaces is added. Always right, but noisy next to moving
+    /// surfaces that scatter.
+    Static,
+    /// By a blend of the affine fields around it; the flux through others is added.
+    Blend,
 }
 
 /// Sample budgets and switches of one run.
@@ -35,6 +50,8 @@ pub struct Settings {
     pub threads: usize,
     /// Keep each derivative's terms apart as well.
     pub terms: bool,
+    /// Insides that do not move as the plan would choose, by the medium's index.
+    pub insides: Vec<(usize, InsideKind)>,
 }
 
 impl Default for Settings {
@@ -50,6 +67,7 @@ impl Default for Settings {
             seed: 0,
             threads: 0,
             terms: false,
+            insides: Vec::new(),
         }
     }
 }

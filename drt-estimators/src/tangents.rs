@@ -256,7 +256,10 @@ impl Apply<'_> {
     fn emitter(&mut self, i: usize) -> Result<(), Error> {
         let target = Target::Emitter(i);
         let n = self.parameters.len();
-        let mut emitter = self.scene.emitters[i].item.emitter;
+        let given = self.scene.emitters[i].item.emitter;
+        let mut emitter = given
+            .checked()
+            .map_err(|e| Error::Element { element: self.name(target), reason: e.to_string() })?;
         let mut tangents = alloc::vec![EmitterTangent::default(); n];
         let changes = self.geometry(target)?;
         if !changes.is_empty() {

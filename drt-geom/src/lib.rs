@@ -23,7 +23,7 @@ pub use io::{ObjError, ObjErrorKind, load_obj};
 #[cfg(feature = "ply")]
 pub use io::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
 pub use mesh::{Mesh, MeshError};
-pub use query::{BvhError, ClosestPoint, Hit, Ray, Skip, TriangleBvh};
+pub use query::{BvhError, ClosestPoint, Hit, Ray, Skip, TriangleBvh, nearest_point};
 pub use topology::{Edge, EdgeClass, Topology};
 #[cfg(feature = "spade")]
 pub use triangulate::{PolygonError, newell_normal, triangulate};

@@ -13,16 +13,18 @@
 
 use alloc::vec::Vec;
 
-use drt_geom::TriangleBvh;
-use drt_math::{Affine, Vec3};
+use drt_geom::{TriangleBvh, nearest_point};
+use drt_math::{Affine, Mat3, Vec3};
 
 use crate::VolumeJet;
 
 /// Something that moves on its own.
 #[derive(Clone, Debug)]
 pub enum Site {
-    /// A surface.
+    /// A surface that moves by one field.
     Surface(TriangleBvh),
+    /// A triangle of a surface that deforms.
+    Triangle([Vec3; 3]),
     /// A camera or point light.
     Point(Vec3),
 }
@@ -56,6 +58,7 @@ impl Blend {
         for site in &self.sites {
             let nearest = match site {
                 Site::Surface(bvh) => bvh.closest_point(x).map(|c| c.point),
+                Site::Triangle(t) => Some(nearest_point(*t, x)),
                 Site::Point(p) => Some(*p),
             };
             let gradient = nearest.map_or(Vec3::ZERO, |p| x - p);
@@ -89,6 +92,17 @@ impl Blend {
     }
 }
 
+/// The affine field with given velocities at a triangle's corners, the same along its normal.
+#[must_use]
+pub fn triangle_field([a, b, c]: [Vec3; 3], [u, v, w]: [Vec3; 3]) -> Affine {
+    let (e1, e2) = (b - a, c - a);
+    let edges = Mat3 { cols: [e1, e2, e1.cross(e2)] };
+    let rates = Mat3 { cols: [v - u, w - u, Vec3::ZERO] };
+    let linear = rates * edges.inverse();
+    let field = Affine { linear, translation: u - linear * a };
+    if field.is_finite() { field } else { Affine { translation: u, ..Affine::ZERO } }
+}
+
 /// The blended velocity at `x` and its divergence: `velocities` gives the field of each site that
 /// moves, by its place in the blend; the others are at rest.
 #[must_use]
@@ -106,7 +120,7 @@ pub fn blend_jet(weights: &[SiteWeight], velocities: &[(usize, Affine)], x: Vec3
 #[cfg(test)]
 mod tests {
     use drt_geom::procedural;
-    use drt_math::{Mat3, vec3};
+    use drt_math::vec3;
 
     use super::*;
 
@@ -140,6 +154,18 @@ mod tests {
                 assert!((sum - 1.0).abs() < 1e-14);
                 assert!((blend_jet(&w, &v, p).u - expected).max_abs() < 1e-6);
             }
+        }
+    }
+
+    #[test]
+    fn triangle_fields_meet_their_corners() {
+        let t = [vec3(0.1, 0.2, 0.3), vec3(1.0, -0.4, 0.2), vec3(0.3, 0.9, -0.5)];
+        let v = [vec3(0.4, 0.0, -1.0), vec3(0.2, 0.3, 0.1), vec3(-0.6, 0.5, 0.0)];
+        let field = triangle_field(t, v);
+        let n = (t[1] - t[0]).cross(t[2] - t[0]);
+        for (x, u) in t.into_iter().zip(v) {
+            assert!((field.point(x) - u).max_abs() < 1e-14);
+            assert!((field.point(x + n) - u).max_abs() < 1e-14);
         }
     }
 

@@ -19,7 +19,7 @@ mod volume;
 pub use drt_math::{ValueChange, ValueMap};
 
 pub use adjoint::{AffineGradient, JetAdjoint, VertexGradient, in_file_order};
-pub use blend::{Blend, Site, SiteWeight, blend_jet};
+pub use blend::{Blend, Site, SiteWeight, blend_jet, triangle_field};
 pub use element::SurfaceElement;
 pub use error::{Cause, MotionError};
 pub use geometry::GeometryChange;

@@ -145,16 +145,15 @@ pub(super) struct ParameterGroup {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "checked for form; motions come with their solvers")]
 pub(super) struct Motion {
-    medium: String,
-    kind: MotionKind,
-    mesh: Option<PathBuf>,
-    velocities: Option<PathBuf>,
-    parameter: Option<String>,
+    pub(super) medium: String,
+    pub(super) kind: MotionKind,
+    pub(super) mesh: Option<PathBuf>,
+    pub(super) velocities: Option<PathBuf>,
+    pub(super) parameter: Option<String>,
 }
 
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum MotionKind {
     Affine,

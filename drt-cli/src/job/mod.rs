@@ -10,7 +10,7 @@ mod velocities;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use drt_estimators::{EstimatorKind, Scene, Settings, Target};
+use drt_estimators::{EstimatorKind, InsideKind, Scene, Settings, Target};
 use drt_motion::Parameter;
 use toml::Spanned;
 
@@ -173,6 +173,21 @@ fn settings(
             depth(*n.get_ref()).map_err(|message| document.error_at(n.span().start, message))?,
         );
     }
+    for motion in &keys.motion {
+        let keys::Motion { medium, kind, .. } = motion.get_ref();
+        let fail = |message: String| document.error_at(motion.span().start, message);
+        let target = scene.find(medium).map_err(|e| fail(format!("[[motion]]: {e}")))?;
+        let Target::Medium(index) = target else {
+            return Err(fail(format!("[[motion]]: `{medium}` is not a medium")));
+        };
+        let kind = match kind {
+            keys::MotionKind::Affine => InsideKind::Affine,
+            keys::MotionKind::Static => InsideKind::Static,
+            // Refused where derivatives are asked for; an image does not depend on them.
+            keys::MotionKind::Tetrahedral | keys::MotionKind::MeanValue => continue,
+        };
+        settings.insides.push((index, kind));
+    }
     settings.antithetic = antithetic.unwrap_or(settings.antithetic);
     if let Some(s) = step {
         settings.step = *s.get_ref();
@@ -248,10 +263,17 @@ fn refused(document: &Document<'_>, keys: &keys::Job) -> Option<CliError> {
         .parameter_group
         .first()
         .map(|g| (g.span().start, "[[parameter_group]] is not supported yet".to_owned()));
-    let motion = keys.motion.first().map(|m| {
-        let message = "[[motion]] is not supported yet: the plan chooses, and prints, how the \
-                       inside of a medium moves";
-        (m.span().start, message.to_owned())
+    let motion = keys.motion.iter().find_map(|m| {
+        let keys::Motion { kind, mesh, velocities, parameter, .. } = m.get_ref();
+        let name = match kind {
+            keys::MotionKind::Tetrahedral => "kind `tetrahedral`",
+            keys::MotionKind::MeanValue => "kind `mean-value`",
+            _ if mesh.is_some() => "`mesh`",
+            _ if velocities.is_some() => "`velocities`",
+            _ if parameter.is_some() => "`parameter`",
+            _ => return None,
+        };
+        Some((m.span().start, format!("[[motion]] with {name} is not supported yet")))
     });
     let (at, message) = kind.or(group).or(motion)?;
     Some(document.error_at(at, message))

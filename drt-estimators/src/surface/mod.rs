@@ -39,7 +39,7 @@ mod microfacet;
 mod phong;
 mod property;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 mod visible_slope;
 
 use alloc::boxed::Box;

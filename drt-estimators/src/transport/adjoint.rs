@@ -286,8 +286,8 @@ impl<'w> Differentiator<'w> {
         }
         let mut before = path.medium;
         for c in path.crossings {
-            let sigma = |m: Option<usize>| m.map_or(Rgb::ZERO, |m| world.medium(m).sigma_t(c.x));
-            let jump = sigma(before) - sigma(c.after);
+            let jump = world.sigma_t_at_border(before, c.x, -path.dir)
+                - world.sigma_t_at_border(c.after, c.x, path.dir);
             before = c.after;
             let shape_moves = sink.interest().shapes[c.point.shape as usize];
             if jump.is_zero() || !(moving || shape_moves) {
@@ -374,6 +374,7 @@ impl<'w> Differentiator<'w> {
         match &v.kind {
             Kind::Surface(s) => {
                 here.ns += d.ns * adjoint;
+                here.n += d.ng * adjoint;
                 if material && let Some(params) = &d.params {
                     sink.bsdf(world.scene.shapes[s.shape as usize].bsdf, params, adjoint);
                 }

@@ -6,6 +6,8 @@ pub(crate) mod importance;
 pub(crate) mod lights;
 pub(crate) mod record;
 pub(crate) mod scatter;
+#[cfg(all(test, feature = "std"))]
+mod tests;
 pub(crate) mod trace;
 pub(crate) mod vertex;
 pub(crate) mod world;

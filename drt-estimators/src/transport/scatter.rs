@@ -1,18 +1,18 @@
 //! Scattering at a vertex, surface or volume, under one roof.
 //!
-//! With interpolated normals the shading normal decides sides, as in Mitsuba. A surface then turns
-//! black, or shows its other side, where the camera's direction crosses the shading horizon while
-//! the surface is still in view: a jump of the contribution that is no visibility, and that no
-//! boundary term knows. So the value fades to zero over the last [`FADE`] of the cosine, and the
-//! measurement contribution has no jumps besides visibility, which its derivative relies on.
+//! With interpolated normals the shading normal decides sides, as in Mitsuba. The contribution then
+//! jumps where the camera's direction crosses the shading horizon while the surface is still in view,
+//! and where the light's direction sinks under the facet while the shading normal still sees it:
+//! jumps that no boundary term knows. So the value fades to zero over the last [`FADE`] of both
+//! cosines, and the measurement contribution has no jumps besides visibility, which its derivative
+//! relies on.
 
 use drt_math::{Real, Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Phase;
 
 use crate::surface::{Bsdf, BsdfParams, Given};
 
-/// Shading cosine towards the camera below which interpolated surfaces fade: 0.04 % of a sphere's
-/// image.
+/// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.
 const FADE: f64 = 0.02;
 
 /// The local scattering function of a vertex.
@@ -30,6 +30,8 @@ pub(crate) struct ScatteringGradient {
     pub(crate) wi: RgbVec,
     /// With respect to the shading normal.
     pub(crate) ns: RgbVec,
+    /// With respect to the geometric normal.
+    pub(crate) ng: RgbVec,
     /// With respect to the phase function's asymmetry.
     pub(crate) g: f64,
     /// With respect to the material, on surfaces.
@@ -46,9 +48,9 @@ impl Scattering<'_> {
     /// The value for light from `wi` leaving to `wo`, both unit and away from the vertex.
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Rgb {
         match self {
-            Self::Surface { bsdf, ns, smooth, .. } => {
+            Self::Surface { bsdf, ng, ns, smooth } => {
                 let value = bsdf.eval(wo, wi, *ns);
-                if *smooth { value * fade(ns.dot(wo)).0 } else { value }
+                if *smooth { value * (fade(ns.dot(wo)).0 * fade(ng.dot(wi)).0) } else { value }
             }
             Self::Volume(phase) => Rgb::splat(phase.eval(-wo.dot(wi))),
         }
@@ -81,20 +83,22 @@ impl Scattering<'_> {
     /// Derivatives of [`Scattering::eval`].
     pub(crate) fn gradient(&self, wo: Vec3, wi: Vec3) -> ScatteringGradient {
         match self {
-            Self::Surface { bsdf, ns, smooth, .. } => {
+            Self::Surface { bsdf, ng, ns, smooth } => {
                 let mut d = bsdf.gradient(wo, wi, *ns);
+                let mut by_ng = RgbVec::ZERO;
                 if *smooth {
-                    let (factor, slope) = fade(ns.dot(wo));
-                    let steep = d.value * slope;
-                    d.wo = d.wo * factor + steep.outer(*ns);
-                    d.n = d.n * factor + steep.outer(wo);
-                    d.wi = d.wi * factor;
+                    let ((a, da), (b, db)) = (fade(ns.dot(wo)), fade(ng.dot(wi)));
+                    let (factor, by_wo, by_wi) = (a * b, d.value * (da * b), d.value * (a * db));
+                    d.wo = d.wo * factor + by_wo.outer(*ns);
+                    d.n = d.n * factor + by_wo.outer(wo);
+                    d.wi = d.wi * factor + by_wi.outer(*ng);
+                    by_ng = by_wi.outer(wi);
                     let mut params = BsdfParams::default();
                     params.scatter(&d.params, Rgb::splat(factor));
                     d.params = params;
                 }
                 let params = Some(d.params);
-                ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, g: 0.0, params }
+                ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, ng: by_ng, g: 0.0, params }
             }
             Self::Volume(phase) => {
                 let c = -wo.dot(wi);
@@ -103,6 +107,7 @@ impl Scattering<'_> {
                     wo: slope.outer(wi),
                     wi: slope.outer(wo),
                     ns: RgbVec::ZERO,
+                    ng: RgbVec::ZERO,
                     g: phase.d_g(c),
                     params: None,
                 }

@@ -212,9 +212,10 @@ impl World {
                 continue;
             }
             // Where every channel attenuates, free flights reach everything by themselves.
-            let sparse = self.medium(m).homogeneous().is_none_or(|h| {
-                h.coefficients().sigma_t.to_array().into_iter().any(|s| s <= 0.0)
-            });
+            let sparse = self
+                .medium(m)
+                .homogeneous()
+                .is_none_or(|h| h.coefficients().sigma_t.to_array().into_iter().any(|s| s <= 0.0));
             if sparse {
                 self.defensive[m] = DEFENSIVE;
             }
@@ -526,6 +527,21 @@ impl World {
         }
     }
 
+    /// How far inside a medium its values at its own border are taken: a grid ends at its box, on
+    /// which surfaces and their rounded points lie.
+    fn border(&self, medium: usize) -> f64 {
+        self.medium(medium).grid().map_or(0.0, |g| {
+            let [lo, hi] = g.density().world_bounds();
+            2e-9 * (hi - lo).max_abs()
+        })
+    }
+
+    /// The extinction at a point of an interface, on the side that the unit vector `towards` points to.
+    pub(crate) fn sigma_t_at_border(&self, medium: Option<usize>, x: Vec3, towards: Vec3) -> Rgb {
+        let Some(m) = medium else { return Rgb::ZERO };
+        self.medium(m).sigma_t(x + towards * self.border(m))
+    }
+
     /// A volume vertex touching a surface on one side.
     pub(crate) fn touching(
         &self,
@@ -535,6 +551,7 @@ impl World {
         medium: usize,
     ) -> Vertex {
         let contact = Contact { point, front };
+        let x = x + point.ng * (self.border(medium) * if front { 1.0 } else { -1.0 });
         Vertex { x, medium: Some(medium), kind: Kind::Volume(Some(contact)) }
     }
 

@@ -22,7 +22,7 @@ mod wide;
 mod winding;
 
 pub use build::BvhError;
-pub use nearest::ClosestPoint;
+pub use nearest::{ClosestPoint, nearest_point};
 pub use ray::{Hit, Ray, Skip};
 
 /// A triangle in the tree's order.

@@ -46,6 +46,14 @@ impl TriangleBvh {
     }
 }
 
+/// The point of a triangle nearest to `p`.
+#[must_use]
+pub fn nearest_point(triangle: [Vec3; 3], p: Vec3) -> Vec3 {
+    let [u, v] = nearest_weights(triangle, p);
+    let [a, b, c] = triangle;
+    a * (1.0 - u - v) + b * u + c * v
+}
+
 /// Weights of vertices 1 and 2 at the point of a triangle nearest to `p`: the foot of the
 /// perpendicular where that lies inside, else the nearest point of the three edges.
 fn nearest_weights([a, b, c]: [Vec3; 3], p: Vec3) -> [f64; 2] {

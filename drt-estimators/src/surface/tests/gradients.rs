@@ -1,78 +1,25 @@
-use drt_math::{Dual, Real};
+use drt_math::Dual;
 
-use super::super::angles::Angles;
 use super::*;
 
-/// Lanes 0..9 are the coordinates of `wo`, `wi` and `n`; properties follow.
-const LANES: usize = 20;
+/// Lanes 0..9 are the coordinates of `wo`, `wi` and `n`; three for each property follow.
+const LANES: usize = 21;
 type D = Dual<f64, LANES>;
 
-/// A model over dual numbers, made in one pass that also notes each property's first lane.
-struct Seeds {
-    next: usize,
-    placed: Vec<(Property, usize, bool)>,
+fn seeded(v: [f64; 3], lane: usize) -> [D; 3] {
+    [0, 1, 2].map(|i| D::variable(v[i], lane + i))
 }
 
-impl Seeds {
-    fn color(&mut self, property: Property, value: Rgb) -> Rgb<D> {
-        let lane = self.place(property, 3);
-        Rgb::new(
-            D::variable(value.r, lane),
-            D::variable(value.g, lane + 1),
-            D::variable(value.b, lane + 2),
-        )
-    }
-    fn scalar(&mut self, property: Property, value: f64) -> D {
-        let lane = self.place(property, 1);
-        D::variable(value, lane)
-    }
-    fn place(&mut self, property: Property, lanes: usize) -> usize {
-        let lane = self.next;
-        self.placed.push((property, lane, lanes == 3));
-        self.next += lanes;
-        lane
-    }
-}
-
-fn seeded(v: Vec3, lane: usize) -> Vec3<D> {
-    vec3(D::variable(v.x, lane), D::variable(v.y, lane + 1), D::variable(v.z, lane + 2))
-}
-
-/// The value of a one-sided BSDF with all its derivatives, by the generic code of `eval`.
-fn by_duals(bsdf: &Bsdf, wo: Vec3, wi: Vec3, n: Vec3) -> (Rgb<D>, Seeds) {
-    let mut seeds = Seeds { next: 9, placed: Vec::new() };
-    let a = Angles::new(seeded(wo, 0), seeded(wi, 3), seeded(n, 6));
-    let s = &mut seeds;
-    let value = match bsdf {
-        Bsdf::Diffuse(b) => {
-            Diffuse { reflectance: s.color(Property::Reflectance, b.reflectance) }.value(&a)
-        }
-        Bsdf::Phong(b) => Phong {
-            reflectance: s.color(Property::Reflectance, b.reflectance),
-            specular_reflectance: s.color(Property::SpecularReflectance, b.specular_reflectance),
-            exponent: s.scalar(Property::Exponent, b.exponent),
-        }
-        .value(&a),
-        Bsdf::RoughConductor(b) => RoughConductor {
-            distribution: b.distribution,
-            alpha: s.scalar(Property::Alpha, b.alpha),
-            eta: s.color(Property::Eta, b.eta),
-            k: s.color(Property::K, b.k),
-            specular_reflectance: s.color(Property::SpecularReflectance, b.specular_reflectance),
-        }
-        .value(&a),
-        Bsdf::RoughDielectric(b) => RoughDielectric {
-            distribution: b.distribution,
-            alpha: s.scalar(Property::Alpha, b.alpha),
-            eta: s.scalar(Property::Eta, b.eta),
-            specular_reflectance: s.color(Property::SpecularReflectance, b.specular_reflectance),
-            specular_transmittance: s
-                .color(Property::SpecularTransmittance, b.specular_transmittance),
-        }
-        .value(&a),
-        Bsdf::Null | Bsdf::TwoSided(_) => Rgb::splat(D::zero()),
-    };
-    (value, seeds)
+/// The value of a BSDF with all its derivatives, and each property's first lane.
+fn by_duals(bsdf: &Bsdf, wo: Vec3, wi: Vec3, n: Vec3) -> (Rgb<D>, Vec<(Property, usize)>) {
+    let mut lanes = Vec::new();
+    let [wo, wi, n] = [(wo, 0), (wi, 3), (n, 6)].map(|(v, lane)| seeded(v.to_array(), lane).into());
+    let value = value_over(bsdf, wo, wi, n, &mut |property, value| {
+        let lane = 9 + 3 * lanes.len();
+        lanes.push((property, lane));
+        seeded(value.to_array(), lane).into()
+    });
+    (value, lanes)
 }
 
 /// Directions at random, about half of the second ones by sampling (or sharp lobes would be missed)
@@ -123,7 +70,7 @@ fn gradients_equal_those_of_dual_numbers() {
             return;
         }
         let g = bsdf.gradient(wo, wi, normal());
-        let (value, seeds) = by_duals(bsdf, wo, wi, normal());
+        let (value, lanes) = by_duals(bsdf, wo, wi, normal());
         let channels = [
             (value.r, g.value.r, g.wo.r, g.wi.r, g.n.r),
             (value.g, g.value.g, g.wo.g, g.wi.g, g.n.g),
@@ -138,8 +85,9 @@ fn gradients_equal_those_of_dual_numbers() {
                     assert!(error <= rounding(bsdf) * largest, "{bsdf:?} {wo:?} {wi:?}: {error:e}");
                 }
             }
-            for &(property, lane, is_color) in &seeds.placed {
-                let expected = dual.eps[lane + if is_color { channel } else { 0 }];
+            for &(property, lane) in &lanes {
+                // A channel depends on its own lane of a colour, on the first of a number.
+                let expected: f64 = dual.eps[lane..lane + 3].iter().sum();
                 let slope = g.params.get(property).to_array()[channel];
                 let error = (slope - expected).abs();
                 assert!(

@@ -9,9 +9,52 @@ mod sampling;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use drt_math::{Rgb, Rng, Vec3, vec3, warp};
+use drt_math::{Real, Rgb, Rng, Vec3, vec3, warp};
 
+use super::angles::Angles;
 use super::*;
+
+/// The value of a BSDF over another scalar, by the generic code of `eval`: `lift` turns the value of
+/// a property into one of that scalar (a number's into three equal ones).
+pub(crate) fn value_over<T: Real>(
+    bsdf: &Bsdf,
+    wo: Vec3<T>,
+    wi: Vec3<T>,
+    n: Vec3<T>,
+    lift: &mut impl FnMut(Property, Rgb) -> Rgb<T>,
+) -> Rgb<T> {
+    let a = Angles::new(wo, wi, n);
+    match bsdf {
+        Bsdf::Null => Rgb::splat(T::zero()),
+        Bsdf::Diffuse(b) => {
+            Diffuse { reflectance: lift(Property::Reflectance, b.reflectance) }.value(&a)
+        }
+        Bsdf::Phong(b) => Phong {
+            reflectance: lift(Property::Reflectance, b.reflectance),
+            specular_reflectance: lift(Property::SpecularReflectance, b.specular_reflectance),
+            exponent: lift(Property::Exponent, Rgb::splat(b.exponent)).r,
+        }
+        .value(&a),
+        Bsdf::RoughConductor(b) => RoughConductor {
+            distribution: b.distribution,
+            alpha: lift(Property::Alpha, Rgb::splat(b.alpha)).r,
+            eta: lift(Property::Eta, b.eta),
+            k: lift(Property::K, b.k),
+            specular_reflectance: lift(Property::SpecularReflectance, b.specular_reflectance),
+        }
+        .value(&a),
+        Bsdf::RoughDielectric(b) => RoughDielectric {
+            distribution: b.distribution,
+            alpha: lift(Property::Alpha, Rgb::splat(b.alpha)).r,
+            eta: lift(Property::Eta, Rgb::splat(b.eta)).r,
+            specular_reflectance: lift(Property::SpecularReflectance, b.specular_reflectance),
+            specular_transmittance: lift(Property::SpecularTransmittance, b.specular_transmittance),
+        }
+        .value(&a),
+        Bsdf::TwoSided(b) if a.cos_o.re() >= 0.0 => value_over(&b.front, wo, wi, n, lift),
+        Bsdf::TwoSided(b) => value_over(b.back.as_ref().unwrap_or(&b.front), wo, wi, -n, lift),
+    }
+}
 
 /// A normal along no axis.
 fn normal() -> Vec3 {

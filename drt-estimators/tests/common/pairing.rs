@@ -1,0 +1,95 @@
+//! One parameter that changes many things, as reverse mode sees it: the items it wants, and the
+//! pairing of their gradient with the parameter's velocities.
+
+use drt_estimators::surface::{BsdfChange, Property};
+use drt_estimators::{Scene, SceneGradient, Target};
+use drt_math::{Affine, Rgb, Vec3};
+use drt_medium::MediumChange;
+use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotion};
+
+/// What the parameter changes.
+pub fn targets(scene: &Scene, parameter: &Parameter) -> Vec<Target> {
+    parameter.effects.iter().map(|e| scene.find(&e.target).expect("a known target")).collect()
+}
+
+/// The derivative along the parameter, at theta = 0, of what `gradient` is the gradient of.
+pub fn pair(scene: &Scene, parameter: &Parameter, gradient: &SceneGradient) -> f64 {
+    let effects = targets(scene, parameter).into_iter().zip(&parameter.effects);
+    effects
+        .map(|(target, e)| match &e.change {
+            Change::Geometry(g) => geometry(scene, target, g, gradient),
+            Change::Property(p) => property(scene, target, p, gradient),
+            Change::Follow(_) => unreachable!("not used here"),
+        })
+        .sum()
+}
+
+fn field(change: &GeometryChange) -> Affine {
+    change.velocity(0.0).expect("an affine change")
+}
+
+fn geometry(scene: &Scene, target: Target, change: &GeometryChange, g: &SceneGradient) -> f64 {
+    match (target, change) {
+        (Target::Shape(i), GeometryChange::VertexVelocity(v)) => {
+            let gradient = g.vertices(scene, i).expect("wanted");
+            gradient.iter().zip(v.iter()).map(|(g, v): (&Vec3, &Vec3)| g.dot(*v)).sum()
+        }
+        (Target::Shape(i), change) => {
+            let mesh = &scene.shapes[i].mesh;
+            let motion = SurfaceMotion::Affine(field(change));
+            g.shapes[i].as_ref().expect("wanted").dot(mesh, &motion)
+        }
+        (Target::Emitter(i), change) => {
+            let tangent = scene.emitters[i].item.emitter.velocity(&field(change));
+            g.emitters[i].as_ref().expect("wanted").dot(&tangent)
+        }
+        (Target::Sensor(i), change) => {
+            let tangent = scene.sensors[i].item.sensor.velocity(&field(change));
+            g.sensor.as_ref().expect("wanted").dot(&tangent)
+        }
+        (Target::Medium(i), change) => {
+            let velocity = field(change);
+            medium(scene, i, &MediumChange::Place { map: Affine::IDENTITY, velocity }, g)
+        }
+        (Target::Bsdf(_), _) => unreachable!("nothing to move"),
+    }
+}
+
+fn medium(scene: &Scene, i: usize, change: &MediumChange, g: &SceneGradient) -> f64 {
+    let tangent = scene.media[i].item.tangent(change, 0.0).expect("a valid change");
+    g.media[i].as_ref().expect("wanted").dot(&tangent)
+}
+
+fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient) -> f64 {
+    let (op, voxels) = (c.op, c.voxels);
+    match target {
+        Target::Medium(i) => {
+            let change = match c.property.as_str() {
+                "sigma_t" => MediumChange::SigmaT { op, voxels },
+                "albedo" => MediumChange::Albedo { op, voxels },
+                "emission" => MediumChange::Emission { op, voxels },
+                _ => MediumChange::G(op),
+            };
+            medium(scene, i, &change, g)
+        }
+        Target::Bsdf(i) => {
+            let property = Property::from_name(&c.property).expect("a property");
+            let tangent = scene.bsdfs[i].item.tangent(&BsdfChange { property, op }, 0.0);
+            let velocity = tangent.expect("a valid change");
+            g.bsdfs[i].as_ref().expect("wanted").get(property).dot(velocity.get(property))
+        }
+        Target::Emitter(i) => {
+            let emitter = &scene.emitters[i].item.emitter;
+            let rate = op.rate(emitter.property(&c.property).expect("a property"), 0.0);
+            let tangent = emitter.property_tangent(&c.property, rate).expect("a valid change");
+            g.emitters[i].as_ref().expect("wanted").dot(&tangent)
+        }
+        Target::Sensor(i) => {
+            let sensor = &scene.sensors[i].item.sensor;
+            let rate: Rgb = op.rate(sensor.property(&c.property).expect("a property"), 0.0);
+            let tangent = sensor.property_tangent(&c.property, rate).expect("a valid change");
+            g.sensor.as_ref().expect("wanted").dot(&tangent)
+        }
+        Target::Shape(_) => unreachable!("properties are those of materials and lights"),
+    }
+}

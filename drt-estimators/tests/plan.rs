@@ -1,0 +1,159 @@
+//! What a scene does not need is not done: the plan says so and the counters prove it.
+
+mod common;
+
+use common::*;
+use drt_estimators::{
+    Counters, Plan, Rendering, Scene, Session, Settings, Target, Unattended, gradient,
+};
+use drt_math::{Rgb, ValueChange};
+use drt_motion::{Effect, Parameter};
+
+fn rendered(scene: &Scene, parameters: &[Parameter]) -> Rendering {
+    let settings = Settings { spp: 8, terms: true, ..Settings::default() };
+    let mut session = Session::new(scene, parameters, &settings).expect("a valid scene");
+    assert!(session.run(settings.spp, &Unattended));
+    session.rendering()
+}
+
+fn under(scene: &Scene, effects: Vec<Effect>) -> Rendering {
+    rendered(scene, &[parameter("p", 0.0, effects)])
+}
+
+fn skips(plan: &Plan, what: &str) -> bool {
+    plan.skipped.iter().any(|s| s.starts_with(what))
+}
+
+fn no_boundary(r: &Rendering) {
+    let c = &r.counters;
+    assert_eq!((c.boundary_samples, c.border_samples, c.flux_samples), (0, 0, 0));
+    assert!(!r.plan.primary && !r.plan.direct && !r.plan.indirect && !r.plan.borders);
+    assert!(!r.plan.antithetic, "mirrored pairs only help moving geometry");
+    assert!(skips(&r.plan, "boundary"), "{}", r.plan);
+}
+
+const PATHS: u64 = (FILM[0] * FILM[1]) as u64 * 8;
+
+#[test]
+fn no_medium_no_tracking() {
+    let r = under(&surfaces(phong(), phong()), vec![moves("ball", shift())]);
+    assert_eq!((r.counters.tracking_steps, r.counters.flux_samples), (0, 0));
+    assert!(skips(&r.plan, "tracking") && skips(&r.plan, "flux") && r.plan.media.is_empty());
+    assert!(r.counters.boundary_samples > 0 && r.plan.primary && r.plan.direct && r.plan.indirect);
+    assert_eq!(r.plan.moving_shapes, ["ball"]);
+}
+
+#[test]
+fn homogeneous_media_are_not_tracked() {
+    let r = under(&fog(), vec![moves("ball", wobble(&fog(), "ball", 1))]);
+    assert_eq!(r.counters.tracking_steps, 0);
+    assert!(r.plan.media.iter().all(|m| m.tracking == "closed form"));
+    let r = rendered(&smoke(0.0), &[]);
+    assert!(r.counters.tracking_steps > 0);
+    assert_eq!(r.plan.media[0].tracking, "delta tracking");
+}
+
+#[test]
+fn no_parameters_no_record() {
+    for scene in [surfaces(phong(), phong()), fog(), smoke(0.0)] {
+        let r = rendered(&scene, &[]);
+        let paths = Counters { paths: PATHS, rays: r.counters.rays, ..Counters::default() };
+        let tracked = r.counters.tracking_steps;
+        assert_eq!(r.counters, Counters { tracking_steps: tracked, ..paths });
+        assert!(r.derivatives.is_empty() && !r.plan.record && skips(&r.plan, "derivatives"));
+    }
+}
+
+#[test]
+fn parameters_that_change_nothing() {
+    let scene = surfaces(phong(), phong());
+    let still = moves("ball", drt_motion::GeometryChange::Translate(drt_math::Vec3::ZERO));
+    for effects in [vec![], vec![still]] {
+        let r = under(&scene, effects);
+        no_boundary(&r);
+        assert_eq!(r.counters.differentiated_paths, 0);
+        assert!(!r.plan.record && r.plan.moving_shapes.is_empty());
+        assert!(r.derivatives[0].total.pixels.iter().all(|p| p.mean.is_zero()));
+    }
+}
+
+#[test]
+fn materials_media_and_strengths_have_no_boundary() {
+    let colour = ValueChange::Add(Rgb::new(0.5, -0.2, 0.3));
+    for (scene, effect) in [
+        (surfaces(metal(), phong()), changes("ball-bsdf", "alpha", grey(0.1))),
+        (surfaces(metal(), phong()), changes("bulb", "intensity", colour)),
+        (surfaces(metal(), phong()), changes("glow", "radiance", colour)),
+        (surfaces(metal(), phong()), changes("spot", "cutoff_angle", grey(1.0))),
+        (fog(), changes("thin", "sigma_t", colour)),
+        (fog(), changes("dense", "g", grey(0.2))),
+        (smoke(0.0), changes_voxel("smoke", "sigma_t", [2, 2, 2], grey(0.2))),
+    ] {
+        let r = under(&scene, vec![effect]);
+        no_boundary(&r);
+        assert_eq!(r.counters.differentiated_paths, PATHS);
+        assert!(r.plan.record && r.counters.recorded_vertices > PATHS);
+        assert!(r.derivatives[0].total.pixels.iter().any(|p| !p.mean.is_zero()));
+    }
+}
+
+#[test]
+fn lights_and_cameras_have_boundaries_too() {
+    let scene = surfaces(phong(), phong());
+    for effect in [
+        moves("bulb", shift()),
+        moves("sun", turn()),
+        moves("camera", turn()),
+        moves("spot", turn()),
+    ] {
+        let r = under(&scene, vec![effect]);
+        assert!(r.counters.boundary_samples > 0 && r.plan.antithetic, "{}", r.plan);
+        assert!(r.plan.moving_shapes.is_empty());
+    }
+}
+
+#[test]
+fn insides_follow_what_they_can() {
+    let scene = fog();
+    let how = |effects: Vec<Effect>| {
+        let r = under(&scene, effects);
+        let thin = &r.plan.media[0];
+        (
+            thin.motion.first().map(|(_, how)| how.clone()),
+            r.plan.flux_shapes,
+            r.counters.flux_samples,
+        )
+    };
+    let motion = |s: &str| Some(String::from(s));
+    // A deforming surface leaves the inside where it is.
+    let (thin, shapes, samples) = how(vec![moves("ball", wobble(&scene, "ball", 1))]);
+    assert_eq!((thin, shapes), (motion("static with flux"), vec![String::from("ball")]));
+    assert!(samples > 0);
+    // A surface with vertices on it takes its surroundings along.
+    let (thin, shapes, samples) = how(vec![moves("ball", turn())]);
+    assert_eq!((thin, shapes.len(), samples), (motion("blend"), 0, 0));
+    // Nothing moves.
+    let (thin, shapes, samples) = how(vec![changes("thin", "albedo", grey(0.1))]);
+    assert_eq!((thin, shapes.len(), samples), (None, 0, 0));
+}
+
+#[test]
+fn reverse_mode_skips_as_much() {
+    let adjoint = vec![Rgb::ONE; (FILM[0] * FILM[1]) as usize];
+    let settings = Settings { spp: 8, ..Settings::default() };
+    let run = |scene: &Scene, wanted: &[Target]| {
+        gradient(scene, wanted, &settings, &adjoint, &Unattended).expect("a valid scene")
+    };
+    let scene = surfaces(phong(), phong());
+    let g = run(&scene, &[Target::Bsdf(0)]);
+    let c = &g.counters;
+    assert_eq!((c.boundary_samples, c.flux_samples, c.tracking_steps), (0, 0, 0));
+    assert_eq!(c.differentiated_paths, PATHS);
+    assert!(g.bsdfs[0].is_some() && g.bsdfs[1].is_none() && g.shapes.iter().all(Option::is_none));
+    let g = run(&scene, &[]);
+    assert_eq!((g.counters.differentiated_paths, g.counters.boundary_samples), (0, 0));
+    let g = run(&fog(), &[Target::Medium(0)]);
+    assert_eq!((g.counters.boundary_samples, g.counters.flux_samples), (0, 0));
+    let g = run(&fog(), &[Target::Shape(2)]);
+    assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples > 0);
+}
