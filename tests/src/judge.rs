@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::measure::{Effort, Measurement, Number, scales};
+use crate::measure::{Effort, Measurement, Number};
 use crate::trial::Trial;
 
 /// Standard errors that a number may be off.
@@ -76,7 +76,7 @@ pub fn rows(trial: &Trial, measured: &Measurement, effort: &Effort) -> Vec<Row> 
     };
     let mut rows = vec![row("value", measured.value, trial.value, trial.value.abs())];
     let derivatives = trial.parameters.iter().zip(&measured.derivatives);
-    let scales = scales(trial.value, &expected);
+    let scales = effort.scales(trial.value, &expected);
     rows.extend(derivatives.zip(scales).map(|(((p, d), n), s)| row(&p.name, *n, *d, s)));
     rows
 }

@@ -3,12 +3,14 @@
 
 #![forbid(unsafe_code)]
 
+pub mod comparison;
 pub mod detector;
 pub mod judge;
 pub mod measure;
 pub mod motion;
 pub mod oracle;
 pub mod region;
+pub mod rooms;
 pub mod scene;
 pub mod trial;
 

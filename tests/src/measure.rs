@@ -14,6 +14,8 @@ use crate::trial::Trial;
 pub struct Effort {
     /// Standard error over the number's scale.
     pub noise: f64,
+    /// The part of a scene's largest derivative below which a derivative counts as near zero.
+    pub near_zero: f64,
     /// Samples after which it is given up.
     pub samples: u32,
 }
@@ -42,17 +44,16 @@ pub struct Measurement {
     pub non_finite: u64,
 }
 
-/// Where a derivative counts as near zero: this part of the largest of its scene.
-const NEAR_ZERO: f64 = 0.01;
-
-/// What the noise of each derivative is compared with: its size, or where that is near zero, the
-/// size of the largest of the scene (that of the value, where all are zero).
-#[must_use]
-pub fn scales(value: f64, derivatives: &[f64]) -> Vec<f64> {
-    let largest = derivatives.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-    let largest = if largest > 0.0 { largest } else { value.abs() };
-    let scale = |d: &f64| if d.abs() < NEAR_ZERO * largest { largest } else { d.abs() };
-    derivatives.iter().map(scale).collect()
+impl Effort {
+    /// What the noise of each derivative is compared with: its size, or where that is near zero, the
+    /// size of the largest of the scene (that of the value, where all are zero).
+    #[must_use]
+    pub fn scales(&self, value: f64, derivatives: &[f64]) -> Vec<f64> {
+        let largest = derivatives.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
+        let largest = if largest > 0.0 { largest } else { value.abs() };
+        let scale = |d: &f64| if d.abs() < self.near_zero * largest { largest } else { d.abs() };
+        derivatives.iter().map(scale).collect()
+    }
 }
 
 /// Runs a trial until value and derivatives are precise enough, or effort is spent.
@@ -62,7 +63,7 @@ pub fn scales(value: f64, derivatives: &[f64]) -> Vec<f64> {
 pub fn measure(trial: &Trial, effort: &Effort) -> Result<Measurement> {
     let expected: Vec<f64> = trial.parameters.iter().map(|(_, d)| *d).collect();
     let parameters: Vec<Parameter> = trial.parameters.iter().map(|(p, _)| p.clone()).collect();
-    let scales = scales(trial.value, &expected);
+    let scales = effort.scales(trial.value, &expected);
     measure_scaled(&trial.built, &parameters, trial.unit, trial.value.abs(), &scales, effort)
         .map_err(|e| format!("{}: {e}", trial.name).into())
 }

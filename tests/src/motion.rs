@@ -53,6 +53,36 @@ pub fn moves_everything(built: &Built, field: &Affine) -> Vec<Effect> {
         .collect()
 }
 
+/// The same changes, `factor` times as fast.
+#[must_use]
+pub fn scaled(effects: &[Effect], factor: f64) -> Vec<Effect> {
+    let scaled = |change: &Change| match change {
+        Change::Geometry(GeometryChange::Translate(v)) => {
+            Change::Geometry(GeometryChange::Translate(*v * factor))
+        }
+        Change::Geometry(GeometryChange::VertexVelocity(v)) => Change::Geometry(
+            GeometryChange::VertexVelocity(v.iter().map(|v| *v * factor).collect()),
+        ),
+        Change::Geometry(GeometryChange::Matrix(m)) => {
+            Change::Geometry(GeometryChange::Matrix(m.times(factor)))
+        }
+        &Change::Geometry(GeometryChange::Vertex { index, direction }) => {
+            let direction = direction * factor;
+            Change::Geometry(GeometryChange::Vertex { index, direction })
+        }
+        Change::Property(p) => {
+            let op = match p.op {
+                ValueChange::Add(a) => ValueChange::Add(a * factor),
+                ValueChange::Multiply(m) => ValueChange::Multiply(m * factor),
+                ValueChange::MultiplyLog(m) => ValueChange::MultiplyLog(m * factor),
+            };
+            Change::Property(PropertyChange { op, ..p.clone() })
+        }
+        other => unreachable!("no parameter here has the effect {other:?}"),
+    };
+    effects.iter().map(|e| Effect { target: e.target.clone(), change: scaled(&e.change) }).collect()
+}
+
 /// Vertices in a plane of box faces move; whatever else they belong to is stretched.
 #[must_use]
 pub fn moves_plane(built: &Built, plane: Plane, velocity: Vec3) -> Vec<Effect> {

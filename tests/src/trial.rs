@@ -165,7 +165,7 @@ fn identical_layers(case: &Case) -> Result<Option<Trial>> {
 }
 
 /// A slab in place of the infinite one: a box this many thicknesses wide.
-const SLAB_WIDTH: f64 = 1e4;
+const SLAB_WIDTH: f64 = 20.0;
 /// Not 1, so that the two derivatives by the optical thickness differ.
 const SLAB_THICKNESS: f64 = 0.8;
 
