@@ -158,7 +158,7 @@ impl Reservoir {
             let mut light = Radiance::default();
             let own = tracer.max_segments;
             tracer.max_segments = own - m.segments;
-            tracer.from_vertex(vertex, -m.dir, &mut light);
+            tracer.radiance_from(vertex, -m.dir, &mut light);
             tracer.max_segments = own;
             if light.0.is_zero() {
                 continue;

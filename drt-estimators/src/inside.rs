@@ -47,7 +47,7 @@ pub(crate) struct Insides {
 }
 
 /// Triangles of a deforming surface that are blended one by one: each costs every volume vertex.
-const MOST_TRIANGLES: usize = 256;
+const MOST_TRIANGLES: usize = 1024;
 
 /// Something around a medium that moves as one.
 struct Part {

@@ -149,20 +149,21 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
 
     fn path(&mut self, pixel: u32, unit: u32, u: [f64; 2], rng: Rng, values: &mut [Rgb]) {
         let camera = &self.world.camera;
-        let derivative = self.sink.is_some();
+        // Only where things move is the filter differentiated.
+        let derivative = self.sink.as_ref().is_some_and(|s| s.interest().moves_geometry());
         let s = camera.sample_view(pixel, u, derivative);
         let dir = s.direction;
         let weight = Rgb::splat(s.weight);
         self.tracer.rng = rng;
         let Some(sink) = &mut self.sink else {
             let mut radiance = Radiance::default();
-            self.tracer.from_camera(dir, weight, &mut radiance);
+            self.tracer.trace_camera(dir, weight, &mut radiance);
             values[0] += radiance.0;
             return;
         };
         self.record.begin(dir, weight);
         self.record.flux.begin(Rng::new(self.seed, FLUX_STREAM | u64::from(pixel), unit));
-        self.tracer.from_camera(dir, weight, &mut self.record);
+        self.tracer.trace_camera(dir, weight, &mut self.record);
         values[0] += self.record.value;
         self.recorded += self.record.nodes.len() as u64;
         let n = sink.layers();

@@ -7,12 +7,14 @@ use common::pairing::{pair, targets};
 use common::*;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::Sensor;
-use drt_estimators::{Scene, Session, Settings, Unattended, gradient};
+use drt_estimators::{InsideKind, Scene, Session, Settings, Unattended, gradient};
 use drt_math::{Rgb, Rng, ValueChange, vec3};
 use drt_motion::{Effect, Parameter};
 
+/// Insides stay, as reverse mode takes them.
 fn settings() -> Settings {
-    Settings { spp: 16, seed: 3, threads: 1, ..Settings::default() }
+    let insides = vec![(0, InsideKind::Static), (1, InsideKind::Static)];
+    Settings { spp: 16, seed: 3, threads: 1, insides, ..Settings::default() }
 }
 
 /// A random number per pixel and channel.
@@ -129,6 +131,8 @@ fn fog_with_a_solid() {
     agree("extinction alone", &scene, extinction, &settings());
     agree("box", &scene, vec![moves("box", wobble(&scene, "box", 5))], &settings());
     agree("ball", &scene, vec![moves("ball", wobble(&scene, "ball", 5))], &settings());
+    agree("ball turns", &scene, vec![moves("ball", turn())], &settings());
+    agree("bulb", &scene, vec![moves("bulb", shift())], &settings());
 }
 
 #[test]

@@ -14,7 +14,8 @@ use drt_math::{Rgb, Vec3};
 
 use super::{Buffers, Receiver};
 use crate::sensitivity::Rate;
-use crate::transport::trace::{Tracer, Travel};
+use crate::transport::flight::Travel;
+use crate::transport::trace::Tracer;
 use crate::transport::{Kind, Radiance, Vertex};
 
 /// Takes one sample of all pixel borders.
@@ -82,7 +83,7 @@ pub(crate) fn sample<R: Receiver>(
             let mut light = Radiance::default();
             let own = tracer.max_segments;
             tracer.max_segments = own.checked_sub(1)?;
-            tracer.from_vertex(vertex, -dir, &mut light);
+            tracer.radiance_from(vertex, -dir, &mut light);
             tracer.max_segments = own;
             light.0
         }

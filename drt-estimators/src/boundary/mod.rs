@@ -38,9 +38,9 @@ use crate::Error;
 use crate::emitter::{Emitter, EmitterGradient};
 use crate::sensitivity::{Functional, Rate};
 use crate::sensor::SensorGradient;
+use crate::transport::flight::{Flight, Travel};
 use crate::transport::importance::Splat;
 use crate::transport::lights::{LightKind, LightTable};
-use crate::transport::trace::{Flight, Travel};
 use crate::transport::{Kind, RadianceBySegments, RayPath, SurfacePoint, Tracer, Vertex, World};
 
 /// How a boundary segment is found.
@@ -462,7 +462,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
             Some(vertex) => {
                 let own = self.tracer.max_segments;
                 self.tracer.max_segments = u32::min(own, longest);
-                self.tracer.from_vertex(vertex, w, &mut self.b.light);
+                self.tracer.radiance_from(vertex, w, &mut self.b.light);
                 self.tracer.max_segments = own;
             }
             None => {

@@ -257,7 +257,7 @@ fn meet(edge: &Edge, source: &Source, eye: Vec3, dir: Vec3) -> Option<Meeting> {
             let p = eye + dir * t - a;
             let s = plane.dot(p.cross(*w)) / plane.length_squared();
             let behind = (p - along * s).dot(*w) > 0.0;
-            (t > 0.0 && t.is_finite() && (0.0..1.0).contains(&s) && behind).then(|| Meeting {
+            (t > 0.0 && t.is_finite() && (0.0..1.0).contains(&s) && behind).then_some(Meeting {
                 t,
                 s,
                 w: *w,

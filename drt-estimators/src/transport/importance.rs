@@ -17,7 +17,8 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Vec3, warp};
 
-use super::trace::{Flight, Flown, MOST_SURVIVAL, Tracer, Travel, medium_span};
+use super::flight::{Flight, Flown, Travel, medium_span};
+use super::trace::{MOST_SURVIVAL, Tracer};
 use super::vertex::{Kind, Vertex};
 use super::world::{RayPath, Tracking};
 use crate::surface::Given;

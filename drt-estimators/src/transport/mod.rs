@@ -2,6 +2,7 @@
 //! leave and its differentiation.
 
 pub(crate) mod adjoint;
+pub(crate) mod flight;
 pub(crate) mod importance;
 pub(crate) mod lights;
 pub(crate) mod record;

@@ -1,15 +1,16 @@
 //! Scattering under one roof: gradients against dual numbers, densities against samples' weights.
 
-use drt_math::{Dual, Real, Rgb, Rng, Vec3, warp};
+use drt_math::{Dual, Real, Rgb, RgbVec, Rng, Vec3, warp};
 use drt_medium::{Phase, henyey_greenstein};
 
+use super::fade;
 use super::scenes::{diffuse, glass, metal, phong, twosided};
 use crate::surface::tests::value_over;
 use crate::surface::{Bsdf, Given};
 use crate::transport::scatter::Scattering;
 
-/// The coordinates of `wo`, `wi` and the shading normal.
-type D = Dual<f64, 9>;
+/// The coordinates of `wo`, `wi`, the shading and the geometric normal.
+type D = Dual<f64, 12>;
 
 fn seeded(v: Vec3, lane: usize) -> Vec3<D> {
     let [x, y, z] = v.to_array();
@@ -20,8 +21,8 @@ fn random(rng: &mut Rng) -> Vec3 {
     warp::uniform_sphere(rng.next_2d())
 }
 
-/// The largest deviation of nine derivatives per channel, over the largest derivative.
-fn deviation(gradient: [drt_math::RgbVec; 3], truth: Rgb<D>) -> f64 {
+/// The largest deviation of the derivatives of each channel, over the largest derivative.
+fn deviation(gradient: [RgbVec; 4], truth: Rgb<D>) -> f64 {
     let mut worst: f64 = 0.0;
     let channels = gradient.map(|g| [g.r, g.g, g.b]);
     for (channel, truth) in truth.to_array().into_iter().enumerate() {
@@ -35,6 +36,11 @@ fn deviation(gradient: [drt_math::RgbVec; 3], truth: Rgb<D>) -> f64 {
     worst
 }
 
+/// A direction bent to within a few degrees of the plane.
+fn near_horizon(w: Vec3, n: Vec3, rng: &mut Rng) -> Vec3 {
+    (w.reject(n) + n * (0.05 * (rng.next_f64() - 0.3))).normalize()
+}
+
 #[test]
 fn surfaces_also_where_they_fade() {
     let mut rng = Rng::new(1, 0, 0);
@@ -45,25 +51,28 @@ fn surfaces_also_where_they_fade() {
             let (ng, ns) = (random(&mut rng), random(&mut rng));
             let mut wo = random(&mut rng);
             if i % 3 == 0 {
-                // Near the horizon.
-                wo = (wo.reject(ns) + ns * (0.05 * (rng.next_f64() - 0.3))).normalize();
+                wo = near_horizon(wo, ns, &mut rng);
             }
             let u = [rng.next_f64(), rng.next_f64(), rng.next_f64()];
-            let Some(wi) = bsdf.sample(wo, ns, u, Given::Wo).map(|s| s.w) else { continue };
+            let Some(mut wi) = bsdf.sample(wo, ns, u, Given::Wo).map(|s| s.w) else { continue };
+            if i % 3 == 1 {
+                wi = near_horizon(wi, ng, &mut rng);
+            }
             for smooth in [false, true] {
                 let scattering = Scattering::Surface { bsdf, ng, ns, smooth };
-                let (o, n) = (seeded(wo, 0), seeded(ns, 6));
-                let lift = &mut |_, value: Rgb| value.map(D::from);
-                let mut truth = value_over(bsdf, o, seeded(wi, 3), n, lift);
-                let cosine = o.dot(n).abs();
-                if smooth && cosine.re < 0.02 {
-                    truth = truth * (cosine / 0.02);
-                    fading += u32::from(truth.r.re > 0.0);
+                let [o, i, n, facet] =
+                    [(wo, 0), (wi, 3), (ns, 6), (ng, 9)].map(|(v, lane)| seeded(v, lane));
+                let mut truth = value_over(bsdf, o, i, n, &mut |_, v: Rgb| v.map(D::from));
+                if smooth {
+                    let factor = fade(n.dot(o)) * fade(facet.dot(i));
+                    truth = truth * factor;
+                    fading += u32::from(factor.re < 1.0 && truth.r.re > 0.0);
                 }
                 let value = scattering.eval(wo, wi);
-                assert!((truth.map(Real::re) - value).max_abs() <= 1e-12 * value.max_abs());
+                let error = (truth.map(Real::re) - value).max_abs();
+                assert!(error <= 1e-12 * value.max_abs(), "{bsdf:?}: {error:e} of {value:?}");
                 let g = scattering.gradient(wo, wi);
-                worst = worst.max(deviation([g.wo, g.wi, g.ns], truth));
+                worst = worst.max(deviation([g.wo, g.wi, g.ns, g.ng], truth));
             }
         }
     }
@@ -79,7 +88,7 @@ fn phase_functions() {
             let g = Scattering::Volume(&phase).gradient(wo, wi);
             let cosine = -seeded(wo, 0).dot(seeded(wi, 3));
             let truth = Rgb::splat(phase.eval(cosine));
-            assert!(deviation([g.wo, g.wi, g.ns], truth) < 1e-10);
+            assert!(deviation([g.wo, g.wi, g.ns, g.ng], truth) < 1e-10);
             if let Some(mean) = phase.mean_cosine_parameter() {
                 let by_g = henyey_greenstein(Dual::<f64, 1>::variable(mean, 0), cosine.re.into());
                 assert!((by_g.eps[0] - g.g).abs() < 1e-10 * (1.0 + g.g.abs()));

@@ -6,3 +6,12 @@ mod records;
 mod replay;
 #[path = "../../../tests/common/mod.rs"]
 mod scenes;
+
+use drt_math::Real;
+
+/// How surfaces with interpolated normals fade at their horizons: linearly over the last 0.02 of a
+/// cosine.
+fn fade<T: Real>(cosine: T) -> T {
+    let c = cosine.abs() / 0.02;
+    if c.re() < 1.0 { c } else { T::one() }
+}

@@ -37,7 +37,7 @@ fn trace(tracer: &mut Tracer<'_>, record: &mut PathRecord, seed: u64, i: u32) ->
     let weight = Rgb::splat(view.weight);
     record.begin(view.direction, weight);
     tracer.rng = rng;
-    tracer.from_camera(view.direction, weight, record);
+    tracer.trace_camera(view.direction, weight, record);
     view.slope
 }
 

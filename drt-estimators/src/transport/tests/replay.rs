@@ -7,6 +7,7 @@ use drt_geom::ray_plane;
 use drt_math::{Real, Rgb, Vec3};
 use drt_medium::{Phase, henyey_greenstein, rayleigh};
 
+use super::fade;
 use super::moving::{D, Moving, rgb, with_rate};
 use crate::emitter::Emitter;
 use crate::surface::tests::value_over;
@@ -20,9 +21,6 @@ use crate::transport::world::Crossing;
 /// Gauss's rule of two points on [0, 1], exact for cubics: extinction is one along a line within
 /// a voxel, as is its gradient times a velocity linear along the line.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
-
-/// Cosine below which surfaces with interpolated normals fade linearly.
-const HORIZON: f64 = 0.02;
 
 /// A vertex as it moves.
 #[derive(Clone, Copy)]
@@ -57,7 +55,7 @@ pub(super) fn replay(scene: &Moving<'_>, record: &PathRecord, slope: [f64; 2]) -
         }
     }
     let replay = Replay { scene, record, children };
-    replay.from_camera(slope)
+    replay.trace_camera(slope)
 }
 
 fn black() -> Rgb<D> {
@@ -254,10 +252,10 @@ impl Replay<'_> {
                 let value = value_over(bsdf, wo, wi, p.ns, &mut |property, value| {
                     self.scene.material(shape.bsdf, property, value)
                 });
-                // Interpolated surfaces fade at their horizon.
-                let cosine = p.ns.dot(wo).abs();
-                let fades = shape.mesh.normals.is_some() && cosine.re < HORIZON;
-                if fades { value * (cosine / HORIZON) } else { value }
+                if shape.mesh.normals.is_none() {
+                    return value;
+                }
+                value * (fade(p.ns.dot(wo)) * fade(p.ng.dot(wi)))
             }
             _ => {
                 let m = v.medium.expect("a medium");

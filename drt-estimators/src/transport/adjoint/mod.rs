@@ -20,17 +20,19 @@
 //! t_dot = (R_dot/R) t + R ∫ [σ_dot + z_dot·∇σ] ds + sum over crossings (σ₋-σ₊) N·(u_c - z_dot) / (N·w)
 //! ```
 
+mod emitters;
+
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Coefficients;
 
-use super::lights::{LightKind, LightSample};
+use emitters::strength;
+
 use super::record::{Node, PathRecord};
 use super::trace::Endpoint;
 use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, Interval, World, intervals};
-use crate::emitter::EmitterGradient;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 
@@ -429,100 +431,6 @@ impl<'w> Differentiator<'w> {
         sum
     }
 
-    /// The emitter's end of a connection.
-    #[allow(clippy::too_many_arguments)]
-    fn light_end<S: AdjointSink>(
-        &mut self,
-        path: &Stretch<'_>,
-        vertex: &Vertex,
-        light: &LightSample,
-        to_wi: Option<RgbVec>,
-        per_value: Rgb,
-        here: &mut SurfaceAdjoint,
-        sink: &mut S,
-    ) {
-        let weight = per_value * light.value;
-        let interest = sink.interest();
-        let emitter = interest.emitters[light.emitter];
-        let near_moves = moves(vertex, interest, false);
-        match &light.kind {
-            LightKind::Area(s) => {
-                let end = Vertex { x: light.y, medium: None, kind: Kind::Surface(*s) };
-                let moving = near_moves || moves(&end, interest, false);
-                let mut there = SurfaceAdjoint::default();
-                let far = Far::Vertex(&end, &mut there);
-                self.segment(path, far, moving, weight, here, sink);
-                if moving && let Some(to_wi) = to_wi {
-                    let g = turn(&to_wi, light.w, light.distance);
-                    there.u += g;
-                    here.u -= g;
-                }
-                send(&end, &there, sink);
-                if emitter {
-                    strength_of(light.emitter, per_value, sink);
-                }
-            }
-            LightKind::Environment => {
-                self.segment(path, Far::Direction, near_moves, weight, here, sink);
-                if emitter {
-                    strength_of(light.emitter, per_value, sink);
-                }
-            }
-            LightKind::Position => {
-                let moving = near_moves || emitter;
-                let far = Far::Position;
-                let mut at_light = self.segment(path, far, moving, weight, here, sink);
-                if moving && let Some(to_wi) = to_wi {
-                    let g = turn(&to_wi, light.w, light.distance);
-                    at_light += g;
-                    here.u -= g;
-                }
-                self.intensity(path, light, per_value, at_light, here, sink);
-            }
-            LightKind::Direction => {
-                let moving = near_moves || emitter;
-                let turn = self.segment(path, Far::Direction, moving, weight, here, sink);
-                if emitter {
-                    direction(light, to_wi, turn, per_value, sink);
-                }
-            }
-        }
-    }
-
-    /// A point or spot light: its strength, its falloff by direction, its position.
-    fn intensity<S: AdjointSink>(
-        &mut self,
-        path: &Stretch<'_>,
-        light: &LightSample,
-        per_value: Rgb,
-        at_light: RgbVec,
-        here: &mut SurfaceAdjoint,
-        sink: &mut S,
-    ) {
-        let item = &self.world.scene.emitters[light.emitter].item.emitter;
-        let emission = item.emission(-light.w);
-        let per_value = (per_value / (path.length * path.length)).to_array();
-        let mut gradients = [EmitterGradient::default(); 3];
-        let mut to_flow = [Vec3::ZERO; 3];
-        for c in 0..3 {
-            let mut adjoint = [0.0; 3];
-            adjoint[c] = per_value[c];
-            (to_flow[c], gradients[c]) = emission.gradient(adjoint.into());
-        }
-        let to_flow = RgbVec { r: to_flow[0], g: to_flow[1], b: to_flow[2] };
-        // The flow direction runs from the light to the vertex.
-        let g = turn(&to_flow, -light.w, path.length);
-        here.u += g;
-        let at = at_light - g;
-        if sink.interest().emitters[light.emitter] {
-            let at = [at.r, at.g, at.b];
-            for c in 0..3 {
-                gradients[c].position += at[c];
-            }
-            sink.emitter(light.emitter, &gradients);
-        }
-    }
-
     /// The coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e.
     #[allow(clippy::too_many_arguments)]
     fn coefficients<S: AdjointSink>(
@@ -649,29 +557,6 @@ impl Along {
     }
 }
 
-/// A directional light: its strength, and its direction through the scattering function and
-/// through where the ray crosses interfaces and grids.
-fn direction<S: AdjointSink>(
-    light: &LightSample,
-    to_wi: Option<RgbVec>,
-    turn: RgbVec,
-    per_value: Rgb,
-    sink: &mut S,
-) {
-    // Both directions and points along the ray turn against the direction of travel.
-    let g = -(to_wi.unwrap_or(RgbVec::ZERO) + turn);
-    let mut gradients = [EmitterGradient::default(); 3];
-    let value = per_value.to_array();
-    let direction = [g.r, g.g, g.b];
-    for c in 0..3 {
-        let mut strength = [0.0; 3];
-        strength[c] = value[c];
-        gradients[c].strength = strength.into();
-        gradients[c].direction = direction[c].reject(light.w);
-    }
-    sink.emitter(light.emitter, &gradients);
-}
-
 /// A straight stretch of a path.
 struct Stretch<'a> {
     start: Vec3,
@@ -701,36 +586,12 @@ fn moves(v: &Vertex, interest: &Interest, camera: bool) -> bool {
 /// Sends what a vertex collected.
 fn send<S: AdjointSink>(v: &Vertex, adjoint: &SurfaceAdjoint, sink: &mut S) {
     match (&v.kind, v.medium) {
-        (Kind::Surface(s), _) => {
-            if sink.interest().shapes[s.shape as usize] {
-                sink.surface(s, adjoint);
-            }
+        (Kind::Surface(s), _) if sink.interest().shapes[s.shape as usize] => {
+            sink.surface(s, adjoint);
         }
-        (Kind::Volume(_), Some(m)) => {
-            if sink.interest().volumes[m] {
-                sink.volume(m, v.x, &adjoint.u, adjoint.j);
-            }
+        (Kind::Volume(_), Some(m)) if sink.interest().volumes[m] => {
+            sink.volume(m, v.x, &adjoint.u, adjoint.j);
         }
         _ => {}
     }
-}
-
-fn strength<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
-    if sink.interest().emitters[emitter] && !adjoint.is_zero() {
-        strength_of(emitter, adjoint, sink);
-    }
-}
-
-/// Sensitivity to an emitter's radiance, channel by channel.
-fn strength_of<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
-    let gradient =
-        |r, g, b| EmitterGradient { strength: Rgb::new(r, g, b), ..EmitterGradient::default() };
-    sink.emitter(
-        emitter,
-        &[
-            gradient(adjoint.r, 0.0, 0.0),
-            gradient(0.0, adjoint.g, 0.0),
-            gradient(0.0, 0.0, adjoint.b),
-        ],
-    );
 }

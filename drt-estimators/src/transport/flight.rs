@@ -1,0 +1,169 @@
+//! Where paths stop along a ray: free flight through media, and vertices placed by other densities
+//! that compete with it.
+
+use drt_math::{Rgb, Vec3, fm, warp};
+use drt_medium::{Coefficients, DistanceSample, TrackingStats};
+
+use super::trace::Tracer;
+use super::vertex::{Kind, SurfacePoint, Vertex};
+use super::world::{RayPath, Tracking, World, intervals};
+
+impl Tracer<'_> {
+    /// Samples where along a followed ray the path stops, by free flight. `channels` weighs the
+    /// colours of extinction against each other.
+    pub(crate) fn travel(
+        &mut self,
+        origin: Vec3,
+        dir: Vec3,
+        ray: &RayPath,
+        channels: Rgb,
+    ) -> Travel {
+        let world = self.world;
+        let mut passed = Rgb::ONE;
+        let mut depth = 0.0;
+        if world.has_media() {
+            for (i, interval) in intervals(ray.medium, &ray.crossings, ray.length).enumerate() {
+                let Some(m) = interval.medium else { continue };
+                let medium = world.medium(m);
+                let start = origin + dir * interval.start;
+                let length = interval.end - interval.start;
+                let mut stats = TrackingStats::default();
+                let rng = &mut self.rng;
+                let sample = if world.tracking[m] == Tracking::Attenuation {
+                    let weight = medium.transmittance(start, dir, length, rng, &mut stats);
+                    DistanceSample::Pass { weight }
+                } else {
+                    let channels = (channels * passed).abs();
+                    let defensive = world.defensive[m];
+                    medium.sample_distance(start, dir, length, channels, defensive, rng, &mut stats)
+                };
+                self.counters.tracking_steps += stats.lookups;
+                match sample {
+                    DistanceSample::Pass { weight } => {
+                        passed *= weight;
+                        depth += proxy_extinction(world, m, None) * length;
+                    }
+                    DistanceSample::Scatter { t, weight, .. } => {
+                        let x = start + dir * t;
+                        depth += proxy_extinction(world, m, None) * t;
+                        let vertex = Vertex { x, medium: Some(m), kind: Kind::Volume(None) };
+                        return Travel::Volume(Flown {
+                            vertex,
+                            coefficients: medium.coefficients(x),
+                            t: interval.start + t,
+                            arrival: passed * weight,
+                            crossed: i,
+                            density: proxy_extinction(world, m, Some(x)) * fm::exp(-depth),
+                        });
+                    }
+                }
+                if passed.is_zero() {
+                    return Travel::Absorbed;
+                }
+            }
+        }
+        match ray.end {
+            Some((point, x)) => Travel::Surface(point, x, passed),
+            None => Travel::Escape(passed),
+        }
+    }
+
+    /// A volume vertex put at distance `t` with a given density, weighted against free flight;
+    /// `part` is the ray up to there.
+    pub(crate) fn place(
+        &mut self,
+        origin: Vec3,
+        dir: Vec3,
+        part: &RayPath,
+        t: f64,
+        density: f64,
+    ) -> Option<Flown> {
+        let world = self.world;
+        let medium = part.crossings.last().map_or(part.medium, |c| c.after)?;
+        if world.tracking[medium] == Tracking::Attenuation || density.is_nan() || density <= 0.0 {
+            return None;
+        }
+        let x = origin + dir * t;
+        let depth: f64 = intervals(part.medium, &part.crossings, t)
+            .filter_map(|i| i.medium.map(|m| proxy_extinction(world, m, None) * (i.end - i.start)))
+            .sum();
+        let free = proxy_extinction(world, medium, Some(x)) * fm::exp(-depth);
+        let tau = world.transmittance(origin, dir, part, &mut self.rng, &mut self.counters);
+        Some(Flown {
+            vertex: Vertex { x, medium: Some(medium), kind: Kind::Volume(None) },
+            coefficients: world.medium(medium).coefficients(x),
+            t,
+            arrival: tau / (density + free),
+            crossed: part.crossings.len(),
+            density: free,
+        })
+    }
+}
+
+/// Where a path stopped along a ray.
+pub(crate) enum Travel {
+    /// At a volume vertex.
+    Volume(Flown),
+    /// At the ray's end; with the transmittance over the probability of getting there.
+    Surface(SurfacePoint, Vec3, Rgb),
+    /// Nowhere: past everything.
+    Escape(Rgb),
+    /// Nothing got through.
+    Absorbed,
+}
+
+/// A volume vertex reached by free flight.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Flown {
+    pub(crate) vertex: Vertex,
+    pub(crate) coefficients: Coefficients,
+    pub(crate) t: f64,
+    /// Transmittance over density.
+    pub(crate) arrival: Rgb,
+    /// Interfaces crossed on the way.
+    pub(crate) crossed: usize,
+    /// Density of the distance by [`proxy_extinction`], for MIS weights.
+    pub(crate) density: f64,
+}
+
+/// A distance sampled by free flight, and the span of the ray that equiangular sampling covers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Flight {
+    pub(crate) span: (f64, f64),
+    pub(crate) origin: Vec3,
+    pub(crate) dir: Vec3,
+    pub(crate) t: f64,
+    pub(crate) density: f64,
+}
+
+impl Flight {
+    /// Balance-heuristic weight of connecting to the point `at`, which equiangular sampling chooses
+    /// one in `choices` times.
+    pub(crate) fn weight(&self, at: Vec3, choices: f64) -> f64 {
+        let (begin, end) = self.span;
+        let d = warp::Equiangular::new(self.origin, self.dir, at, begin, end);
+        self.density / (self.density + d.pdf(self.t) / choices)
+    }
+}
+
+/// A positive stand-in for a medium's extinction in MIS weights: they may be any fixed function of
+/// the path that sums to one. Grids count where they are evaluated but not along the way.
+fn proxy_extinction(world: &World, medium: usize, at: Option<Vec3>) -> f64 {
+    let m = world.medium(medium);
+    match (m.homogeneous(), at) {
+        (Some(h), _) => h.coefficients().sigma_t.mean(),
+        (None, Some(x)) => m.sigma_t(x).mean(),
+        (None, None) => 0.0,
+    }
+}
+
+/// The hull of the intervals inside media.
+pub(crate) fn medium_span(ray: &RayPath) -> Option<(f64, f64)> {
+    let mut span: Option<(f64, f64)> = None;
+    for i in intervals(ray.medium, &ray.crossings, ray.length) {
+        if i.medium.is_some() && i.end > i.start {
+            span = Some((span.map_or(i.start, |s| s.0), i.end));
+        }
+    }
+    span
+}
