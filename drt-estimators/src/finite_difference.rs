@@ -46,14 +46,16 @@ pub fn finite_differences(
     let pool = Pool::new(settings.threads);
     let mut layers = Vec::new();
     for p in 0..parameters.len() {
-        let at = |offset: f64| {
+        let at = |offset: f64, middle: Option<&World>| {
             let mut moved = parameters.to_vec();
             moved[p].value += offset;
             let (scene, _) = tangents::apply(scene, &moved, settings.sensor)?;
             let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-            World::new(scene, settings.sensor, depth)
+            World::new(scene, settings.sensor, depth, middle)
         };
-        let pair = Pair { worlds: [at(-step)?, at(step)?], step, settings };
+        let middle = at(0.0, None)?;
+        let worlds = [at(-step, Some(&middle))?, at(step, Some(&middle))?];
+        let pair = Pair { worlds, step, settings };
         let progress = |done: f64| {
             control.progress((p as f64 + done) / parameters.len() as f64);
         };

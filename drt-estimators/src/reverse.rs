@@ -115,7 +115,7 @@ pub fn gradient(
     scene.check()?;
     let (scene, _) = tangents::apply(scene, &[], settings.sensor)?;
     let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-    let mut world = World::new(scene, settings.sensor, depth)?;
+    let mut world = World::new(scene, settings.sensor, depth, None)?;
     let interest = interest(&world.scene, wanted);
     let need = |w: &bool| if *w { MediumNeed::Vertices } else { MediumNeed::Nothing };
     world.prepare_for_derivatives(Needs {

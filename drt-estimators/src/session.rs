@@ -90,7 +90,7 @@ impl Session {
         scene.check()?;
         let (scene, tangents) = tangents::apply(scene, parameters, settings.sensor)?;
         let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-        let mut world = World::new(scene, settings.sensor, depth)?;
+        let mut world = World::new(scene, settings.sensor, depth, None)?;
         let mut motion = None;
         if !parameters.is_empty() {
             let insides = inside::plan(&world, &tangents, &settings.insides)?;

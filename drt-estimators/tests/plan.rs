@@ -73,6 +73,7 @@ fn parameters_that_change_nothing() {
         no_boundary(&r);
         assert_eq!(r.counters.differentiated_paths, 0);
         assert!(!r.plan.record && r.plan.moving_shapes.is_empty());
+        assert_eq!(r.image.pixels, rendered(&scene, &[]).image.pixels);
         assert!(r.derivatives[0].total.pixels.iter().all(|p| p.mean.is_zero()));
     }
 }

@@ -18,7 +18,7 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, Vec3, warp};
 
 use super::flight::{Flight, Flown, Travel, medium_span};
-use super::trace::{MOST_SURVIVAL, Tracer};
+use super::trace::Tracer;
 use super::vertex::{Kind, Vertex};
 use super::world::{RayPath, Tracking};
 use crate::surface::Given;
@@ -72,7 +72,7 @@ impl Tracer<'_> {
             let f = scattering.eval(wo, wi) * scattering.adjoint_correction(wo, wi);
             beta *= f * (1.0 / pdf);
             if segments > world.rr_depth {
-                let survival = f64::min(MOST_SURVIVAL, beta.max_channel());
+                let survival = world.survival(beta);
                 if survival <= 0.0 || self.rng.next_f64() >= survival {
                     return;
                 }

@@ -90,7 +90,14 @@ pub(crate) struct LightTable {
 }
 
 impl LightTable {
-    pub(crate) fn new(scene: &Scene, first_prim: &[u32], radius: f64) -> Result<Self, Error> {
+    /// The emitters of a scene, chosen with the probabilities of `like` where that is given: a scene
+    /// that differs from this one in values alone.
+    pub(crate) fn new(
+        scene: &Scene,
+        first_prim: &[u32],
+        radius: f64,
+        like: Option<&Self>,
+    ) -> Result<Self, Error> {
         let mut entries = Vec::new();
         let mut weights = Vec::new();
         let count: usize = scene.shapes.iter().map(|s| s.mesh.triangles.len()).sum();
@@ -124,7 +131,9 @@ impl LightTable {
             .iter()
             .map(|(p, n)| if power > 0.0 { p / power + n / number } else { *n })
             .collect();
-        let table = if weights.is_empty() {
+        let table = if let Some(like) = like {
+            like.table.clone()
+        } else if weights.is_empty() {
             None
         } else {
             Some(AliasTable::new(&weights).map_err(|e| Error::Element {

@@ -29,9 +29,6 @@ use super::world::{Crossing, RayPath, World};
 use crate::Counters;
 use crate::surface::Given;
 
-/// Largest probability of going on under Russian roulette. Below one it also ends paths that lose
-/// nothing, at the price of weights that grow with every vertex.
-pub(crate) const MOST_SURVIVAL: f64 = 0.99;
 /// Longest path with unlimited depth: far beyond where Russian roulette lets any path go.
 const LONGEST: u32 = 1 << 20;
 
@@ -276,7 +273,7 @@ impl<'w> Tracer<'w> {
             return None;
         }
         if stop.segments >= world.rr_depth {
-            let survival = f64::min(MOST_SURVIVAL, alive.value.max_channel());
+            let survival = world.survival(alive.value);
             if self.rng.next_f64() >= survival {
                 return None;
             }

@@ -83,6 +83,11 @@ struct Prim {
     triangle: u32,
 }
 
+/// Largest probability of going on under Russian roulette. Below one it also ends paths that lose
+/// nothing, at the price of weights that grow with every vertex.
+const MOST_SURVIVAL: f64 = 0.99;
+/// The probability where it must not depend on what a path carries.
+const STEADY_SURVIVAL: f64 = 0.9;
 /// Least probability of a scattering vertex per tentative collision where coefficients change.
 const DEFENSIVE: f64 = 0.1;
 
@@ -125,6 +130,8 @@ pub(crate) struct World {
     /// where derivatives need vertices in empty space.
     pub(crate) defensive: Vec<f64>,
     needs: Needs,
+    /// Russian roulette by a fixed probability, whatever the path carries.
+    steady: bool,
     pub(crate) max_depth: u32,
     pub(crate) rr_depth: u32,
     bvh: TriangleBvh,
@@ -137,7 +144,14 @@ pub(crate) struct World {
 }
 
 impl World {
-    pub(crate) fn new(scene: Scene, sensor: usize, max_depth: Option<u32>) -> Result<Self, Error> {
+    /// Prepares a scene. `like` is the same scene at other values, whose discrete choices this one
+    /// repeats: finite differences need both sides to draw alike.
+    pub(crate) fn new(
+        scene: Scene,
+        sensor: usize,
+        max_depth: Option<u32>,
+        like: Option<&Self>,
+    ) -> Result<Self, Error> {
         let camera = scene.sensors.get(sensor).ok_or_else(|| Error::Setting {
             setting: "sensor".into(),
             reason: alloc::format!(
@@ -181,7 +195,7 @@ impl World {
                 }
             })
             .collect();
-        let lights = LightTable::new(&scene, &first_prim, radius)?;
+        let lights = LightTable::new(&scene, &first_prim, radius, like.map(|w| &w.lights))?;
         let depth = max_depth.or(scene.integrator.max_depth).unwrap_or(u32::MAX);
         let mut world = Self {
             lights,
@@ -190,6 +204,7 @@ impl World {
             tracking,
             defensive: alloc::vec![0.0; scene.media.len()],
             needs: Needs::default(),
+            steady: like.is_some(),
             max_depth: depth,
             rr_depth: scene.integrator.rr_depth,
             any_null: null.iter().any(|n| *n),
@@ -224,6 +239,15 @@ impl World {
             }
         }
         self.needs = needs;
+    }
+
+    /// Probability that Russian roulette lets a path go on which carries `throughput`.
+    pub(crate) fn survival(&self, throughput: Rgb) -> f64 {
+        if self.steady {
+            STEADY_SURVIVAL
+        } else {
+            throughput.max_channel().clamp(0.0, MOST_SURVIVAL)
+        }
     }
 
     /// True when a parameter changes how `v` scatters, so that a zero there may not stay zero.

@@ -65,7 +65,7 @@ fn surfaces_also_where_they_fade() {
                 let mut truth = value_over(bsdf, o, i, n, &mut |_, v: Rgb| v.map(D::from));
                 if smooth {
                     let factor = fade(n.dot(o)) * fade(facet.dot(i));
-                    truth = truth * factor;
+                    truth *= factor;
                     fading += u32::from(factor.re < 1.0 && truth.r.re > 0.0);
                 }
                 let value = scattering.eval(wo, wi);

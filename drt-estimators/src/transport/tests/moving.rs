@@ -157,7 +157,7 @@ impl<'a> Moving<'a> {
             if let GeometryChange::VertexVelocity(v) = g {
                 deformed = true;
                 for (x, v) in positions.iter_mut().zip(v.iter()) {
-                    *x = *x + v.lift() * self.theta;
+                    *x += v.lift() * self.theta;
                 }
                 continue;
             }
@@ -454,7 +454,7 @@ fn smooth(mesh: &Mesh, x: &[Vec3<D>], normals: &mut [Vec3<D>]) {
             let [v, next, last] = [0, 1, 2].map(|j| corners[(k + j) % 3] as usize);
             let (a, b) = (x[next] - x[v], x[last] - x[v]);
             let angle = a.normalize().dot(b.normalize()).acos();
-            normals[v] = normals[v] + a.cross(b).normalize() * angle;
+            normals[v] += a.cross(b).normalize() * angle;
         }
     }
     normals.iter_mut().for_each(|n| *n = n.normalize());

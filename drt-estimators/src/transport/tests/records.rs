@@ -22,7 +22,8 @@ use crate::{inside, tangents};
 fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
     let (at_value, tangents) =
         tangents::apply(scene, core::slice::from_ref(parameter), 0).expect("a valid parameter");
-    let mut world = World::new(at_value, 0, scene.integrator.max_depth).expect("a valid scene");
+    let mut world =
+        World::new(at_value, 0, scene.integrator.max_depth, None).expect("a valid scene");
     let insides = inside::plan(&world, &tangents, &[]).expect("a valid scene");
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());

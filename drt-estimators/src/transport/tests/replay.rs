@@ -40,7 +40,7 @@ struct Stretch<'a> {
     crossings: &'a [Crossing],
 }
 
-pub(super) struct Replay<'a> {
+struct Replay<'a> {
     scene: &'a Moving<'a>,
     record: &'a PathRecord,
     children: Vec<Vec<usize>>,
@@ -55,7 +55,7 @@ pub(super) fn replay(scene: &Moving<'_>, record: &PathRecord, slope: [f64; 2]) -
         }
     }
     let replay = Replay { scene, record, children };
-    replay.trace_camera(slope)
+    replay.value(slope)
 }
 
 fn black() -> Rgb<D> {
@@ -68,7 +68,7 @@ fn relative(v: D) -> D {
 }
 
 impl Replay<'_> {
-    fn from_camera(&self, slope: [f64; 2]) -> Rgb<D> {
+    fn value(&self, slope: [f64; 2]) -> Rgb<D> {
         let camera = &self.scene.camera;
         let mut sum = black();
         for &k in &self.children[0] {
