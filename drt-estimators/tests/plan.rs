@@ -73,7 +73,9 @@ fn parameters_that_change_nothing() {
         no_boundary(&r);
         assert_eq!(r.counters.differentiated_paths, 0);
         assert!(!r.plan.record && r.plan.moving_shapes.is_empty());
-        assert_eq!(r.image.pixels, rendered(&scene, &[]).image.pixels);
+        for (a, b) in r.image.pixels.iter().zip(&rendered(&scene, &[]).image.pixels) {
+            assert!((a.mean - b.mean).max_abs() < 1e-14);
+        }
         assert!(r.derivatives[0].total.pixels.iter().all(|p| p.mean.is_zero()));
     }
 }

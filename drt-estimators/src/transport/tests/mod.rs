@@ -1,11 +1,14 @@
 //! The derivative of a recorded path and of each of its factors, against dual numbers.
 
+mod changes;
 mod factors;
 mod moving;
 mod records;
 mod replay;
 #[path = "../../../tests/common/mod.rs"]
 mod scenes;
+mod setup;
+mod voxels;
 
 use drt_math::Real;
 

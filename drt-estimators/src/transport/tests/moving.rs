@@ -4,9 +4,10 @@
 use alloc::vec::Vec;
 
 use drt_geom::Mesh;
-use drt_math::{Dual, Real, Rgb, ValueChange, Vec3, vec3};
+use drt_math::{Real, Rgb, ValueChange, Vec3, vec3};
 use drt_motion::{Change, GeometryChange, Parameter};
 
+use super::changes::{D, change, hat, moved, moved_vector, rgb, smooth, turned_normal, with_rate};
 use crate::contraction::{Contraction, Motion};
 use crate::emitter::Emitter;
 use crate::scene::{Scene, Target};
@@ -14,21 +15,6 @@ use crate::sensitivity::AdjointSink;
 use crate::sensor::Pinhole;
 use crate::surface::Property;
 use crate::transport::{SurfacePoint, World};
-
-pub(super) type D = Dual<f64, 1>;
-
-pub(super) fn rgb(v: Rgb) -> Rgb<D> {
-    v.map(D::from)
-}
-
-pub(super) fn rates(v: Rgb<D>) -> Rgb {
-    v.map(|c| c.eps[0])
-}
-
-/// A number whose derivative is given.
-pub(super) fn with_rate(value: f64, rate: f64) -> D {
-    D::new(value, [rate])
-}
 
 /// A point of a moving surface.
 #[derive(Clone, Copy)]
@@ -358,24 +344,6 @@ impl<'a> Moving<'a> {
     }
 }
 
-/// One voxel of a grid set to one, the others to zero.
-fn hat(grid: &drt_medium::Grid, voxel: [usize; 3]) -> drt_medium::Grid {
-    let size = grid.size();
-    let mut values = alloc::vec![0.0; size.iter().product()];
-    values[(voxel[2] * size[1] + voxel[1]) * size[0] + voxel[0]] = 1.0;
-    let basis = drt_medium::Grid::new(size, 1, values).expect("the same shape");
-    let basis = basis.with_layout(grid.layout()).with_filter(grid.filter()).with_wrap(grid.wrap());
-    basis.with_placement(*grid.to_world()).expect("the same box")
-}
-
-fn change(op: &ValueChange, v: Rgb<D>, theta: D) -> Rgb<D> {
-    match *op {
-        ValueChange::Add(a) => v + rgb(a) * theta,
-        ValueChange::Multiply(m) => v * (theta * m + 1.0),
-        ValueChange::MultiplyLog(m) => v * (theta * m).exp(),
-    }
-}
-
 fn light(emitter: &Emitter) -> Light {
     let still = Light {
         strength: Rgb::splat(D::zero()),
@@ -413,49 +381,4 @@ fn lifted(p: &Pinhole) -> Pinhole<D> {
         pixel_size: D::from(p.pixel_size),
         principal: p.principal.map(D::from),
     }
-}
-
-/// The image of a point under a change of space.
-fn moved(g: &GeometryChange, x: Vec3<D>, theta: D) -> Vec3<D> {
-    match *g {
-        GeometryChange::Translate(t) => x + t.lift() * theta,
-        GeometryChange::Rotate { axis, pivot } => {
-            // Rodrigues' formula.
-            let (k, d) = (axis.normalize().lift(), x - pivot.lift());
-            let (sin, cos) = theta.sin_cos();
-            x + k.cross(d) * sin + k.cross(k.cross(d)) * (D::one() - cos)
-        }
-        GeometryChange::Scale { factor, pivot } => {
-            let d = x - pivot.lift();
-            let grow = |f: f64, d: D| d * (theta * f).exp();
-            pivot.lift() + vec3(grow(factor.x, d.x), grow(factor.y, d.y), grow(factor.z, d.z))
-        }
-        _ => unreachable!("not used here"),
-    }
-}
-
-fn moved_vector(g: &GeometryChange, v: Vec3<D>, theta: D) -> Vec3<D> {
-    moved(g, v, theta) - moved(g, Vec3::zero(), theta)
-}
-
-/// Normals go with the inverse transpose.
-fn turned_normal(g: &GeometryChange, n: Vec3<D>, theta: D) -> Vec3<D> {
-    match g {
-        GeometryChange::Scale { .. } => moved_vector(g, n, -theta).normalize(),
-        _ => moved_vector(g, n, theta),
-    }
-}
-
-/// Normals at the corners of a mesh without seams: the faces' normals weighted by their angles.
-fn smooth(mesh: &Mesh, x: &[Vec3<D>], normals: &mut [Vec3<D>]) {
-    normals.fill(Vec3::zero());
-    for corners in &mesh.triangles {
-        for k in 0..3 {
-            let [v, next, last] = [0, 1, 2].map(|j| corners[(k + j) % 3] as usize);
-            let (a, b) = (x[next] - x[v], x[last] - x[v]);
-            let angle = a.normalize().dot(b.normalize()).acos();
-            normals[v] += a.cross(b).normalize() * angle;
-        }
-    }
-    normals.iter_mut().for_each(|n| *n = n.normalize());
 }

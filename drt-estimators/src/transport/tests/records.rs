@@ -3,101 +3,17 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use drt_math::{Moments, Rgb, RgbVec, Rng, ValueChange, Vec3};
+use drt_math::{Rgb, Rng, ValueChange};
 use drt_motion::Parameter;
 
-use super::moving::{Moving, rates};
+use super::changes::rates;
+use super::moving::Moving;
 use super::replay::replay;
 use super::scenes::*;
-use crate::contraction::{Contraction, Motion};
-use crate::emitter::EmitterGradient;
+use super::setup::{Fault, Faulty, coloured, motion, prepare, set, trace};
+use crate::contraction::Contraction;
 use crate::scene::Scene;
-use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
-use crate::sensor::SensorGradient;
-use crate::surface::BsdfParams;
-use crate::transport::{Differentiator, PathRecord, SurfacePoint, Tracer, World};
-use crate::{inside, tangents};
-
-/// A scene prepared at a parameter's value, as a session does.
-fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
-    let (at_value, tangents) =
-        tangents::apply(scene, core::slice::from_ref(parameter), 0).expect("a valid parameter");
-    let mut world =
-        World::new(at_value, 0, scene.integrator.max_depth, None).expect("a valid scene");
-    let insides = inside::plan(&world, &tangents, &[]).expect("a valid scene");
-    let motion = Motion::new(tangents, insides);
-    world.prepare_for_derivatives(motion.needs());
-    (world, motion)
-}
-
-/// Traces a path from some pixel; returns the filter's gradient over the density.
-fn trace(tracer: &mut Tracer<'_>, record: &mut PathRecord, seed: u64, i: u32) -> [f64; 2] {
-    let pixels = FILM[0] * FILM[1];
-    let mut rng = Rng::new(seed, u64::from(i % pixels), i / pixels);
-    let view = tracer.world.camera.sample_view(i % pixels, rng.next_2d(), true);
-    let weight = Rgb::splat(view.weight);
-    record.begin(view.direction, weight);
-    tracer.rng = rng;
-    tracer.trace_camera(view.direction, weight, record);
-    view.slope
-}
-
-/// Something done wrong on purpose.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Fault {
-    None,
-    /// The area Jacobian is left out.
-    NoJacobian,
-    /// The geometric normal's rate has the wrong sign.
-    Normal,
-    /// Interpolated normals stay.
-    ShadingNormal,
-    /// Volume vertices stay.
-    Volume,
-    /// The box of a moving grid stays.
-    GridFace,
-}
-
-/// A contraction that makes a mistake.
-struct Faulty<'a>(Contraction<'a>, Fault);
-
-impl AdjointSink for Faulty<'_> {
-    fn interest(&self) -> &Interest {
-        self.0.interest()
-    }
-    fn surface(&mut self, point: &SurfacePoint, adjoint: &SurfaceAdjoint) {
-        let mut a = *adjoint;
-        match self.1 {
-            Fault::NoJacobian => a.j = Rgb::ZERO,
-            Fault::Normal => a.n = -a.n,
-            Fault::ShadingNormal => a.ns = RgbVec::ZERO,
-            Fault::None | Fault::Volume | Fault::GridFace => {}
-        }
-        self.0.surface(point, &a);
-    }
-    fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb) {
-        if self.1 != Fault::Volume {
-            self.0.volume(medium, x, u, j);
-        }
-    }
-    fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
-        self.0.medium(medium, x, adjoint);
-    }
-    fn grid_face(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
-        if self.1 != Fault::GridFace {
-            self.0.grid_face(medium, x, u);
-        }
-    }
-    fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
-        self.0.bsdf(bsdf, params, weight);
-    }
-    fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]) {
-        self.0.emitter(emitter, gradient);
-    }
-    fn sensor(&mut self, gradient: &[SensorGradient; 3]) {
-        self.0.sensor(gradient);
-    }
-}
+use crate::transport::{Differentiator, PathRecord, Tracer};
 
 /// What has been compared.
 #[derive(Debug, Default)]
@@ -152,14 +68,6 @@ fn compare_all(scene: &Scene, parameters: &[Parameter]) {
     }
 }
 
-fn set(name: &str, id: &str, property: &str, op: ValueChange) -> Parameter {
-    parameter(name, 0.0, vec![changes(id, property, op)])
-}
-
-fn motion(id: &str, name: &str, change: drt_motion::GeometryChange) -> Parameter {
-    parameter(&format!("{id} {name}"), 0.0, vec![moves(id, change)])
-}
-
 /// Every motion of every shape, light and the camera.
 fn motions(scene: &Scene) -> Vec<Parameter> {
     let mut all = Vec::new();
@@ -180,10 +88,6 @@ fn motions(scene: &Scene) -> Vec<Parameter> {
     all.push(motion("camera", "shift", shift()));
     all.push(motion("camera", "turn", turn()));
     all
-}
-
-fn coloured() -> ValueChange {
-    ValueChange::Add(Rgb::new(0.5, -0.2, 0.3))
 }
 
 fn strengths() -> Vec<Parameter> {
@@ -295,76 +199,4 @@ fn faults_are_found() {
         let tally = compare(scene, &parameter, fault);
         assert!(tally.worst.0 > 1e-3, "{fault:?}: {tally:?}");
     }
-}
-
-/// Line integrals through voxels are random: their mean must be right, and all else exact.
-#[test]
-fn voxels_on_average() {
-    let scene = smoke(0.0);
-    let one = ValueChange::Add(Rgb::splat(0.8));
-    let voxel = vec![changes_voxel("smoke", "sigma_t", [2, 2, 2], one)];
-    for p in [
-        set("density", "smoke", "sigma_t", ValueChange::MultiplyLog(1.0)),
-        parameter("voxel", 0.0, voxel),
-        set("albedo", "smoke", "albedo", grey(0.5)),
-        set("emission", "smoke", "emission", coloured()),
-        motion("box", "shift", shift()),
-        motion("lamp", "wobble", wobble(&scene, "lamp", 2)),
-    ] {
-        judge(&scene, &p);
-    }
-    // With a jump of the extinction at the grid's box.
-    let scene = smoke(1.0);
-    for p in [
-        motion("smoke", "turn", turn()),
-        motion("smoke", "shift", shift()),
-        motion("sun", "turn", turn()),
-        motion("bulb", "shift", shift()),
-        motion("camera", "turn", turn()),
-    ] {
-        judge(&scene, &p);
-    }
-    let turned = motion("smoke", "turn", turn());
-    let off = |z: &f64| z.abs() > 6.0;
-    assert!(mean_deviations(&scene, &turned, Fault::None, 1.02).iter().any(off));
-    assert!(mean_deviations(&scene, &turned, Fault::GridFace, 1.0).iter().any(off));
-}
-
-fn judge(scene: &Scene, parameter: &Parameter) {
-    let deviations = mean_deviations(scene, parameter, Fault::None, 1.0);
-    let n = deviations.len() as f64;
-    let squares: f64 = deviations.iter().map(|z| z * z).sum();
-    let worst = deviations.iter().fold(0.0, |w: f64, z| w.max(z.abs()));
-    // Chi-squared with n degrees of freedom, whose variance is 2 n.
-    let fits = squares <= n + 4.0 * (2.0 * n).sqrt();
-    assert!(fits && worst < 4.5, "{}: {deviations:?}", parameter.name);
-}
-
-/// Deviations, path by path, of the mean over line points in standard errors; `factor` multiplies
-/// what is expected. Where nothing is random, a deviation of more than rounding counts as many.
-fn mean_deviations(scene: &Scene, parameter: &Parameter, fault: Fault, factor: f64) -> Vec<f64> {
-    let (world, motion) = prepare(scene, parameter);
-    let moving = Moving::new(scene, parameter, &world, &motion);
-    let mut tracer = Tracer::new(&world);
-    let mut record = PathRecord::default();
-    let mut differentiator = Differentiator::new(&world);
-    let mut sink = Faulty(Contraction::new(&world, &motion), fault);
-    let mut deviations = Vec::new();
-    for i in 0..120 {
-        let slope = trace(&mut tracer, &mut record, 15, i);
-        let expected = rates(replay(&moving, &record, slope)).g * factor;
-        let mean: Moments = (0..1000)
-            .map(|j| {
-                sink.0.clear();
-                differentiator.differentiate(&record, slope, Rng::new(16, j, i), &mut sink);
-                sink.0.rates[0].g
-            })
-            .collect();
-        let (error, stderr) = (mean.mean() - expected, mean.standard_error());
-        let rounding = 1e-10 * f64::max(expected.abs(), record.value.g);
-        if error.abs() > rounding || stderr > rounding {
-            deviations.push(error / f64::hypot(stderr, rounding));
-        }
-    }
-    deviations
 }

@@ -7,8 +7,9 @@ use drt_geom::ray_plane;
 use drt_math::{Real, Rgb, Vec3};
 use drt_medium::{Phase, henyey_greenstein, rayleigh};
 
+use super::changes::{D, rgb, with_rate};
 use super::fade;
-use super::moving::{D, Moving, rgb, with_rate};
+use super::moving::Moving;
 use crate::emitter::Emitter;
 use crate::surface::tests::value_over;
 use crate::transport::PathRecord;

@@ -1,0 +1,114 @@
+//! A scene prepared for one parameter, paths through it, and mistakes to be found.
+
+use alloc::vec;
+
+use drt_math::{Rgb, RgbVec, Rng, ValueChange, Vec3};
+use drt_motion::{GeometryChange, Parameter};
+
+use super::scenes::*;
+use crate::contraction::{Contraction, Motion};
+use crate::emitter::EmitterGradient;
+use crate::scene::Scene;
+use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
+use crate::sensor::SensorGradient;
+use crate::surface::BsdfParams;
+use crate::transport::{PathRecord, SurfacePoint, Tracer, World};
+use crate::{inside, tangents};
+
+pub(super) fn set(name: &str, id: &str, property: &str, op: ValueChange) -> Parameter {
+    parameter(name, 0.0, vec![changes(id, property, op)])
+}
+
+pub(super) fn motion(id: &str, name: &str, change: GeometryChange) -> Parameter {
+    parameter(&format!("{id} {name}"), 0.0, vec![moves(id, change)])
+}
+
+pub(super) fn coloured() -> ValueChange {
+    ValueChange::Add(Rgb::new(0.5, -0.2, 0.3))
+}
+
+/// A scene prepared at a parameter's value, as a session does.
+pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
+    let (at_value, tangents) =
+        tangents::apply(scene, core::slice::from_ref(parameter), 0).expect("a valid parameter");
+    let mut world =
+        World::new(at_value, 0, scene.integrator.max_depth, None).expect("a valid scene");
+    let insides = inside::plan(&world, &tangents, &[]).expect("a valid scene");
+    let motion = Motion::new(tangents, insides);
+    world.prepare_for_derivatives(motion.needs());
+    (world, motion)
+}
+
+/// Traces a path from some pixel; returns the filter's gradient over the density.
+pub(super) fn trace(
+    tracer: &mut Tracer<'_>,
+    record: &mut PathRecord,
+    seed: u64,
+    i: u32,
+) -> [f64; 2] {
+    let pixels = FILM[0] * FILM[1];
+    let mut rng = Rng::new(seed, u64::from(i % pixels), i / pixels);
+    let view = tracer.world.camera.sample_view(i % pixels, rng.next_2d(), true);
+    let weight = Rgb::splat(view.weight);
+    record.begin(view.direction, weight);
+    tracer.rng = rng;
+    tracer.trace_camera(view.direction, weight, record);
+    view.slope
+}
+
+/// Something done wrong on purpose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Fault {
+    None,
+    /// The area Jacobian is left out.
+    NoJacobian,
+    /// The geometric normal's rate has the wrong sign.
+    Normal,
+    /// Interpolated normals stay.
+    ShadingNormal,
+    /// Volume vertices stay.
+    Volume,
+    /// The box of a moving grid stays.
+    GridFace,
+}
+
+/// A contraction that makes a mistake.
+pub(super) struct Faulty<'a>(pub(super) Contraction<'a>, pub(super) Fault);
+
+impl AdjointSink for Faulty<'_> {
+    fn interest(&self) -> &Interest {
+        self.0.interest()
+    }
+    fn surface(&mut self, point: &SurfacePoint, adjoint: &SurfaceAdjoint) {
+        let mut a = *adjoint;
+        match self.1 {
+            Fault::NoJacobian => a.j = Rgb::ZERO,
+            Fault::Normal => a.n = -a.n,
+            Fault::ShadingNormal => a.ns = RgbVec::ZERO,
+            Fault::None | Fault::Volume | Fault::GridFace => {}
+        }
+        self.0.surface(point, &a);
+    }
+    fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb) {
+        if self.1 != Fault::Volume {
+            self.0.volume(medium, x, u, j);
+        }
+    }
+    fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
+        self.0.medium(medium, x, adjoint);
+    }
+    fn grid_face(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
+        if self.1 != Fault::GridFace {
+            self.0.grid_face(medium, x, u);
+        }
+    }
+    fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
+        self.0.bsdf(bsdf, params, weight);
+    }
+    fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]) {
+        self.0.emitter(emitter, gradient);
+    }
+    fn sensor(&mut self, gradient: &[SensorGradient; 3]) {
+        self.0.sensor(gradient);
+    }
+}
