@@ -3,12 +3,13 @@
 //! `cargo run --release -p drt-medium --features vol --example write_smoke -- smoke.vol`
 
 /// The density of the plume at a point of the unit cube, y up: puffs along a rising helix that widens,
-/// faded out towards the faces.
+/// faded out towards the faces. What is too thin to be seen is cut off.
 #[cfg(feature = "vol")]
 fn plume(x: drt_math::Vec3) -> f64 {
     use drt_math::vec3;
 
     const PUFFS: u32 = 14;
+    const THINNEST: f64 = 0.03;
     let puff = |i: u32| {
         let height = f64::from(i) / f64::from(PUFFS - 1);
         let (s, c) = (9.0 * height).sin_cos();
@@ -19,7 +20,8 @@ fn plume(x: drt_math::Vec3) -> f64 {
     };
     let fade = |v: f64| (4.0 * v * (1.0 - v)).powf(0.25);
     let sum: f64 = (0..PUFFS).map(puff).sum();
-    sum.min(1.0) * fade(x.x) * fade(x.y) * fade(x.z)
+    let density = sum.min(1.0) * fade(x.x) * fade(x.y) * fade(x.z);
+    (density - THINNEST).max(0.0)
 }
 
 #[cfg(feature = "vol")]
