@@ -32,6 +32,14 @@ impl Tracer<'_> {
                 let sample = if world.tracking[m] == Tracking::Attenuation {
                     let weight = medium.transmittance(start, dir, length, rng, &mut stats);
                     DistanceSample::Pass { weight }
+                } else if let Some((other, excess)) = world.drawn_by(m) {
+                    let sparse = other.coefficients().sigma_t.to_array().iter().any(|s| *s <= 0.0);
+                    let defensive = if sparse { 0.1 } else { 0.0 };
+                    reweighted(
+                        other.sample_distance(length, Rgb::ONE, defensive, rng),
+                        length,
+                        excess,
+                    )
                 } else {
                     let channels = (channels * passed).abs();
                     let defensive = world.defensive[m];
@@ -97,6 +105,17 @@ impl Tracer<'_> {
             crossed: part.crossings.len(),
             density: free,
         })
+    }
+}
+
+/// A distance drawn in a medium with `excess` more extinction, weighted for one without.
+fn reweighted(sample: DistanceSample, length: f64, excess: Rgb) -> DistanceSample {
+    let ratio = |t: f64| excess.map(|e| if e == 0.0 { 1.0 } else { fm::exp(e * t) });
+    match sample {
+        DistanceSample::Scatter { t, weight, pdf } => {
+            DistanceSample::Scatter { t, weight: weight * ratio(t), pdf }
+        }
+        DistanceSample::Pass { weight } => DistanceSample::Pass { weight: weight * ratio(length) },
     }
 }
 

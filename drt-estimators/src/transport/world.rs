@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use drt_geom::{Hit, Ray, Skip, TriangleBvh};
 use drt_math::{Rgb, Rng, Vec3};
-use drt_medium::{Medium, TrackingStats};
+use drt_medium::{Homogeneous, Medium, TrackingStats};
 
 use super::lights::LightTable;
 use super::scatter::Scattering;
@@ -130,8 +130,10 @@ pub(crate) struct World {
     /// where derivatives need vertices in empty space.
     pub(crate) defensive: Vec<f64>,
     needs: Needs,
-    /// Russian roulette by a fixed probability, whatever the path carries.
-    steady: bool,
+    /// Where set, no discrete choice depends on values that may differ between this scene and
+    /// another: the extinctions by which distances in homogeneous media are drawn instead of their
+    /// own.
+    steady: Option<Vec<Option<Homogeneous>>>,
     pub(crate) max_depth: u32,
     pub(crate) rr_depth: u32,
     bvh: TriangleBvh,
@@ -204,7 +206,8 @@ impl World {
             tracking,
             defensive: alloc::vec![0.0; scene.media.len()],
             needs: Needs::default(),
-            steady: like.is_some(),
+            steady: like
+                .map(|w| w.scene.media.iter().map(|m| m.item.homogeneous().copied()).collect()),
             max_depth: depth,
             rr_depth: scene.integrator.rr_depth,
             any_null: null.iter().any(|n| *n),
@@ -239,6 +242,14 @@ impl World {
             }
         }
         self.needs = needs;
+    }
+
+    /// The medium by whose extinction distances are drawn, and its extinction less the medium's own;
+    /// `None` when that is the medium itself.
+    pub(crate) fn drawn_by(&self, m: usize) -> Option<(&Homogeneous, Rgb)> {
+        let other = self.steady.as_ref()?.get(m)?.as_ref()?;
+        let own = self.medium(m).homogeneous()?;
+        Some((other, other.coefficients().sigma_t - own.coefficients().sigma_t))
     }
 
     /// Probability that Russian roulette lets a path go on which carries `throughput`.
