@@ -254,7 +254,7 @@ impl World {
 
     /// Probability that Russian roulette lets a path go on which carries `throughput`.
     pub(crate) fn survival(&self, throughput: Rgb) -> f64 {
-        if self.steady {
+        if self.steady.is_some() {
             STEADY_SURVIVAL
         } else {
             throughput.max_channel().clamp(0.0, MOST_SURVIVAL)
