@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
-use drt_math::{Affine, Frame, Mat3, Vec3};
+use drt_math::{Affine, Mat3, Vec3};
 
 use crate::Result;
 use crate::oracle::{Camera, Detector, Triple};
@@ -32,12 +32,7 @@ pub fn sensor(detector: &Detector) -> Result<Sensor> {
         Detector::Irradiance { point, normal } => {
             Ok(Sensor::irradiance_meter(vector(*point), vector(*normal))?)
         }
-        Detector::Radiance { origin, direction } => {
-            let forward = vector(*direction);
-            let frame = Frame::from_normal(forward.normalize());
-            let axes = [frame.s, frame.t, frame.n];
-            pixel(axes, vector(*origin), [0.0, 0.0], RAY)
-        }
+        Detector::Radiance { .. } => sensor(&detector.clone().widened(RAY)),
         Detector::PinholePixel { camera, filter, center, half_width } => {
             if filter != "tent" {
                 return Err(format!("unknown pixel filter `{filter}`").into());

@@ -7,9 +7,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use drt_math::Frame;
 use serde::Deserialize;
 
 use crate::Result;
+use crate::detector::vector;
 
 /// A point or vector as the file writes it.
 pub type Triple = [f64; 3];
@@ -304,6 +306,19 @@ impl OracleFile {
         let failed = |e: &dyn std::fmt::Display| format!("{}: {e}", path.display());
         let text = std::fs::read_to_string(&path).map_err(|e| failed(&e))?;
         Ok(serde_json::from_str(&text).map_err(|e| failed(&e))?)
+    }
+}
+
+impl Detector {
+    /// The same with a pixel of some width in place of a ray, where the number itself does not
+    /// matter: it costs far fewer samples.
+    #[must_use]
+    pub fn widened(self, half_width: f64) -> Self {
+        let Self::Radiance { origin, direction } = self else { return self };
+        let Frame { s, t, n } = Frame::from_normal(vector(direction).normalize());
+        let [right, up, forward] = [s, t, n].map(|axis| axis.to_array());
+        let camera = Camera { position: origin, right, up, forward };
+        Self::PinholePixel { camera, filter: "tent".into(), center: [0.0; 2], half_width }
     }
 }
 

@@ -13,13 +13,13 @@ use drt_motion::{Effect, GeometryChange, ValueChange};
 use drt_tests::Result;
 use drt_tests::comparison::{Claim, examine};
 use drt_tests::motion::{changes, moves, moves_everything, scaled};
-use drt_tests::oracle::{Detector, MediumText, NumberText, OracleFile, SceneText, Surface};
+use drt_tests::oracle::{Case, Detector, MediumText, NumberText, OracleFile, SceneText, Surface};
 use drt_tests::rooms::rooms;
 use drt_tests::scene::{Built, DETECTOR, build};
 use drt_tests::trial::Trial;
 
 /// Samples a claim may cost, per pixel of an image and of a single number.
-const SAMPLES: [u32; 2] = [1 << 10, 1 << 18];
+const SAMPLES: [u32; 2] = [1 << 11, 1 << 18];
 
 fn check(claims: Vec<Claim>) {
     assert!(claims.len() >= 5, "only {} scenes", claims.len());
@@ -45,10 +45,18 @@ fn check_faults(claims: Vec<Claim>) {
     }
 }
 
-/// The first scene of every oracle.
+/// Half the width of the pixels that stand for rays, whose exact numbers do not matter here.
+const WIDE: f64 = 0.1;
+
+/// One scene of every oracle: of the slab the one with an irradiance meter, else the first.
 fn trials() -> Vec<Trial> {
-    let cases = OracleFile::read().unwrap().cases;
-    cases.iter().map(|c| Trial::of_case(c).unwrap().swap_remove(0)).collect()
+    let trial = |mut case: Case| {
+        case.detector = case.detector.widened(WIDE);
+        let mut trials = Trial::of_case(&case).unwrap();
+        let diffuse = trials.iter().position(|t| t.name.ends_with("R_diffuse"));
+        trials.swap_remove(diffuse.unwrap_or(0))
+    };
+    OracleFile::read().unwrap().cases.into_iter().map(trial).collect()
 }
 
 /// Every oracle's scene and every room.
@@ -145,7 +153,9 @@ fn i3_the_inside_may_move_at_will() {
         let homogeneous = built.scene.media.iter().all(|m| m.item.homogeneous().is_some());
         !built.interfaces.is_empty() && homogeneous
     };
-    check(scenes().into_iter().filter(|(_, built)| boxed(built)).map(claim).collect());
+    // Of the slab, whose flux is expensive, the oracle itself is judged both ways.
+    let chosen = |(name, built): &(String, Built)| boxed(built) && !name.contains("slab");
+    check(scenes().into_iter().filter(chosen).map(claim).collect());
 }
 
 /// A closed null surface inside the first box, most of its size, around a copy of its medium with
@@ -229,7 +239,7 @@ fn isothermal(body: &drt_geom::Mesh, filled: bool, emission: f64) -> Result<Buil
     // At the body, off its middle.
     let (eye, target) = (vec3(-0.8, -0.9, 0.7), vec3(0.2, 0.15, 0.1));
     let direction = (target - eye).normalize().to_array();
-    build(&text, &Detector::Radiance { origin: eye.to_array(), direction })
+    build(&text, &Detector::Radiance { origin: eye.to_array(), direction }.widened(0.6))
 }
 
 #[test]
@@ -288,7 +298,7 @@ fn i6_sliding_in_the_own_plane_shows_nothing() {
     let with_floor = oracles.chain(rooms).filter(|(_, b)| b.mesh("floor").is_some());
     let claim = |(name, built): (String, Built)| {
         let slides = |v| vec![moves("floor", GeometryChange::Translate(v))];
-        let wrong = Some(slides(vec3(1.0, 0.0, 0.3)));
+        let wrong = Some(slides(vec3(1.0, 0.0, 2.0)));
         Claim { name, built, left: slides(Vec3::X), right: Vec::new(), wrong }
     };
     check(with_floor.map(claim).collect());
@@ -316,7 +326,9 @@ fn i7_derivatives_are_linear() {
     }
     let claim = |(name, built, first, second): (String, Built, Vec<Effect>, Vec<Effect>)| {
         let sum = |a, b| [scaled(&first, a), scaled(&second, b)];
-        let wrong = (!name.contains("furnace")).then(|| sum(b, a).concat());
+        // In a furnace nothing shows, and the motions of the slab are two of the same effect.
+        let alike = name.contains("furnace") || name.contains("slab");
+        let wrong = (!alike).then(|| sum(b, a).concat());
         Claim { name, built, left: sum(a, b).concat(), right: sum(a, b).into(), wrong }
     };
     check(motions.into_iter().map(claim).collect());

@@ -78,5 +78,5 @@ kinds! {
     null_interface_two_media: 0.01;
     area_light_volumetric_penumbra_ray: 0.01;
     area_light_volumetric_penumbra_pixel: 0.01;
-    multiple_scattering_slab: 0.05;
+    multiple_scattering_slab: 0.01;
 }
