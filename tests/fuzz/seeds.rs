@@ -156,4 +156,9 @@ fn volumes(folder: &Path) {
             write(&folder.join(format!("{channels}-{name}.vol")), &narrow);
         }
     }
+    // Sizes whose product with three channels is the largest `usize`, 2⁶⁴ - 1.
+    let sizes: [u32; 5] = [3, 14_002_645, 65_537, 6_700_417, 3];
+    let largest = sizes.iter().flat_map(|n| n.to_le_bytes());
+    let header: Vec<u8> = (*b"VOL\x03").into_iter().chain(largest).chain([0; 24]).collect();
+    write(&folder.join("largest.vol"), &header);
 }
