@@ -136,8 +136,8 @@ pub fn decode(bytes: &[u8], file: &str) -> Result<VolFile, VolError> {
 
     let width = encoding.width();
     let length = size.iter().try_fold(channels * width, |n, &s| n.checked_mul(s));
-    let length = length.unwrap_or(usize::MAX - HEADER);
-    let data = bytes[HEADER..].get(..length).ok_or_else(|| input.cut(HEADER + length))?;
+    let end = length.and_then(|n| n.checked_add(HEADER)).unwrap_or(usize::MAX);
+    let data = bytes.get(HEADER..end).ok_or_else(|| input.cut(end))?;
     let values = data
         .chunks_exact(width)
         .enumerate()

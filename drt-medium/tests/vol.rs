@@ -78,6 +78,9 @@ fn bad_files_are_refused_with_the_place() {
     assert!(refusal(&header(1, [1, 1, 1], 2)).contains("byte 20"));
     // 2^93 values: more than any memory.
     assert!(refusal(&header(1, [i32::MAX; 3], 3)).contains("cut off"));
+    // 2⁶⁴ - 1 bytes of values, which leave no room for the header.
+    let largest = refusal(&header(3, [14_002_645, 65_537, 6_700_417], 3));
+    assert!(largest.contains(&usize::MAX.to_string()), "{largest}");
     let mut nan = good.clone();
     nan[52..56].copy_from_slice(&f32::NAN.to_le_bytes());
     assert!(refusal(&nan).contains("byte 52: a grid value is NaN"));
