@@ -6,6 +6,7 @@
 pub mod comparison;
 pub mod detector;
 pub mod judge;
+pub mod matrix;
 pub mod measure;
 pub mod motion;
 pub mod oracle;

@@ -1,0 +1,94 @@
+//! What is compared, and with how many samples.
+
+use drt_estimators::{InsideKind, Scene};
+use drt_motion::{Effect, Parameter};
+
+/// One derivative that is compared with finite differences.
+#[derive(Clone, Debug)]
+pub struct Cell {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Half step of the finite difference; half of it is compared, and the difference between both
+    /// stands for its error.
+    pub step: f64,
+    /// Samples per pixel of each image that a finite difference takes.
+    pub samples: u32,
+    /// True for the cells of the short check.
+    pub representative: bool,
+    /// True where its largest term must not pass 3 % too large.
+    pub precise: bool,
+}
+
+impl Cell {
+    /// A parameter of value 0 with a half step of 0.06.
+    #[must_use]
+    pub fn new(name: &str, effects: impl IntoIterator<Item = Effect>) -> Self {
+        let effects = effects.into_iter().collect();
+        let parameter = Parameter { name: name.into(), value: 0.0, effects };
+        Self { parameter, step: 0.06, samples: 2048, representative: false, precise: false }
+    }
+
+    /// The same at another value of the parameter.
+    #[must_use]
+    pub fn at(mut self, value: f64) -> Self {
+        self.parameter.value = value;
+        self
+    }
+
+    /// The same with another half step.
+    #[must_use]
+    pub fn step(self, step: f64) -> Self {
+        Self { step, ..self }
+    }
+
+    /// The same with other samples per pixel for finite differences.
+    #[must_use]
+    pub fn samples(self, samples: u32) -> Self {
+        Self { samples, ..self }
+    }
+
+    /// The same as a part of the short check.
+    #[must_use]
+    pub fn representative(self) -> Self {
+        Self { representative: true, ..self }
+    }
+
+    /// The same, which must see its largest term multiplied by 1.03.
+    #[must_use]
+    pub fn precise(self) -> Self {
+        Self { precise: true, ..self }
+    }
+}
+
+/// A scene and what is differentiated in it.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    /// The name in tables.
+    pub name: &'static str,
+    /// The scene.
+    pub scene: Scene,
+    /// Samples per pixel of the derivatives.
+    pub samples: u32,
+    /// Boundary samples, per pixel on average.
+    pub boundary_samples: u32,
+    /// Media, by index, whose insides move otherwise than the plan would choose.
+    pub insides: Vec<(usize, InsideKind)>,
+    /// One per parameter.
+    pub cells: Vec<Cell>,
+}
+
+impl Stage {
+    /// A scene with its derivatives, of 2048 samples per pixel.
+    #[must_use]
+    pub fn new(name: &'static str, scene: Scene, cells: Vec<Cell>) -> Self {
+        let (samples, boundary_samples) = (2048, 2048);
+        Self { name, scene, samples, boundary_samples, insides: Vec::new(), cells }
+    }
+
+    /// The same with the cells of the short check only.
+    #[must_use]
+    pub fn short(mut self) -> Self {
+        self.cells.retain(|c| c.representative);
+        self
+    }
+}
