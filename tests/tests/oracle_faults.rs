@@ -54,7 +54,7 @@ fn too_bright_a_light_is_rejected() {
                 | Emitter::Constant { radiance: strength }
                 | Emitter::Point { intensity: strength, .. }
                 | Emitter::Spot { intensity: strength, .. }
-                | Emitter::Directional { irradiance: strength, .. } => *strength *= 1.2,
+                | Emitter::Directional { irradiance: strength, .. } => *strength *= 2.0,
             }
         }
         for row in judged(&trial) {

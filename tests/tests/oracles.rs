@@ -65,7 +65,7 @@ kinds! {
     irradiance_polygon_occluder_edge: 0.01;
     irradiance_polygon_occluder_inside: 0.01;
     irradiance_polygon_absorbing_medium: 0.01;
-    furnace_closed_enclosure: 0.01;
+    furnace_closed_enclosure: 0.02;
     absorbing_emitting_box: 0.01;
     grid_transmittance: 0.01;
     single_scatter_infinite: 0.01;
