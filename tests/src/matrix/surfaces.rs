@@ -126,7 +126,9 @@ pub fn knot() -> Result<Stage> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn gloss() -> Result<Stage> {
-    let ball = at(&uv_sphere(10), Vec3::splat(0.6), Vec3::ZERO);
+    // With the normals that it is given as soon as a parameter deforms it, so that every cell has
+    // the same scene.
+    let ball = at(&uv_sphere(10), Vec3::splat(0.6), Vec3::ZERO).with_smooth_normals();
     let inflate = ball.positions.iter().map(|p| *p * (1.0 + p.y) + vec3(0.0, 0.0, 0.3 * p.x));
     let inflate = GeometryChange::VertexVelocity(inflate.collect());
     let phong = Phong {
