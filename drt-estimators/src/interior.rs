@@ -2,10 +2,12 @@
 
 use alloc::vec::Vec;
 
+use drt_math::sobol::SobolSampler;
 use drt_math::{Rgb, Rng};
 
 use crate::boundary::shadow::{self, Shadows};
 use crate::contraction::Contraction;
+use crate::film::BATCHES;
 use crate::flux::{Flux, Reservoir};
 use crate::rendering::{Counters, NonFinite, Term};
 use crate::sensitivity::{AdjointSink, Functional};
@@ -14,6 +16,9 @@ use crate::transport::{Differentiator, PathRecord, Radiance, Tracer, World};
 /// Random-number streams are pixels; the top bits tell other uses apart.
 pub(crate) const LINE_STREAM: u64 = 1 << 62;
 const FLUX_STREAM: u64 = 1 << 61;
+pub(crate) const SEQUENCE_STREAM: u64 = 1 << 60;
+/// Numbers of a sample that are spread evenly: image point, and the first vertices.
+pub(crate) const DIMENSIONS: u32 = 12;
 
 /// Boundary and flux terms that are found along camera rays.
 #[derive(Clone, Copy, Default)]
@@ -34,6 +39,14 @@ impl AlongRays<'_> {
     pub(crate) fn layers(&self, parameters: usize, separate: bool) -> usize {
         1 + parameters * (1 + if separate { self.terms().count() } else { 0 })
     }
+}
+
+/// The random numbers of a sample: as many Sobol' sequences a pixel as there are batches, so that the
+/// scatter of batches stays an honest error.
+fn sequence(seed: u64, pixel: u64, unit: u32) -> Rng {
+    let (batch, index) = (unit % BATCHES as u32, unit / BATCHES as u32);
+    let name = Rng::new(seed, SEQUENCE_STREAM | pixel, batch).next_u32();
+    Rng::new(seed, pixel, unit).led_by(SobolSampler::new(name, index), DIMENSIONS)
 }
 
 /// Where the derivatives of a pixel's paths go.
@@ -131,7 +144,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     /// Sample `unit` of a pixel: a path, or a pair of paths mirrored at the pixel's centre.
     pub(crate) fn sample(&mut self, pixel: u32, unit: u32, values: &mut [Rgb]) {
         values.fill(Rgb::ZERO);
-        let mut rng = Rng::new(self.seed, u64::from(pixel), unit);
+        let mut rng = sequence(self.seed, u64::from(pixel), unit);
         let u = rng.next_2d();
         if self.antithetic {
             self.path(pixel, unit, u, rng.clone(), values);

@@ -2,11 +2,13 @@
 
 use alloc::vec::Vec;
 
+use drt_math::sobol::SobolSampler;
 use drt_math::{Rgb, Rng};
 
 use crate::boundary::{self, Boundary, Receiver, Strategy};
 use crate::contraction::{Contraction, Motion};
 use crate::film::Splats;
+use crate::interior::{DIMENSIONS, SEQUENCE_STREAM};
 use crate::rendering::{Counters, NonFinite, Term};
 use crate::sensitivity::Functional;
 use crate::transport::{Tracer, World};
@@ -70,8 +72,11 @@ impl Splatter<'_> {
         receiver.term = Some(source.term());
         receiver.seed = self.seed;
         receiver.stream = stream;
+        // One Sobol' sequence a batch, so that the scatter of batches stays an honest error.
+        let sequence = Rng::new(self.seed, SEQUENCE_STREAM | stream, 0).next_u32();
         for index in 0..count {
-            tracer.rng = Rng::new(self.seed, stream, index);
+            let points = SobolSampler::new(sequence, index);
+            tracer.rng = Rng::new(self.seed, stream, index).led_by(points, DIMENSIONS);
             receiver.index = index;
             match source {
                 Source::Edges(strategy) => {

@@ -1,3 +1,5 @@
+use crate::sobol::SobolSampler;
+
 /// A counter-based random number generator: Philox 4×32-10 (Salmon et al. 2011, "Parallel random
 /// numbers: as easy as 1, 2, 3").
 ///
@@ -19,6 +21,10 @@ pub struct Rng {
     counter: [u32; 4],
     block: [u32; 4],
     used: u32,
+    /// Stands in for the first numbers.
+    points: SobolSampler,
+    /// How many of them are left.
+    leading: u32,
 }
 
 impl Rng {
@@ -31,7 +37,24 @@ impl Rng {
             counter: [0, index, stream as u32, (stream >> 32) as u32],
             block: [0; 4],
             used: 4,
+            points: SobolSampler::new(0, 0),
+            leading: 0,
         }
+    }
+
+    /// The same with its first `dimensions` uniform numbers taken from a point of a Sobol' sequence:
+    /// what is drawn first spreads evenly over the points of one sequence. Bits are not affected.
+    ///
+    /// ```
+    /// use drt_math::{Rng, sobol::SobolSampler};
+    /// let first = |i| Rng::new(1, 2, i).led_by(SobolSampler::new(9, i), 1).next_f64();
+    /// let mut strata: Vec<u32> = (0..16).map(|i| (16.0 * first(i)) as u32).collect();
+    /// strata.sort();
+    /// assert_eq!(strata, (0..16).collect::<Vec<_>>());
+    /// ```
+    #[must_use]
+    pub fn led_by(self, points: SobolSampler, dimensions: u32) -> Self {
+        Self { points, leading: dimensions, ..self }
     }
 
     /// 32 random bits.
@@ -53,9 +76,14 @@ impl Rng {
         u64::from(self.next_u32()) << 32 | u64::from(self.next_u32())
     }
 
-    /// A uniform number in (0, 1): the centre of one of 2^52 equal intervals, so neither 0 nor 1.
+    /// A uniform number in (0, 1): the centre of one of 2^52 equal intervals (2^32 for a leading
+    /// one), so neither 0 nor 1.
     #[inline]
     pub fn next_f64(&mut self) -> f64 {
+        if self.leading > 0 {
+            self.leading -= 1;
+            return self.points.next_f64();
+        }
         interval_centre(self.next_u64() >> 12)
     }
 

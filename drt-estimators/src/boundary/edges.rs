@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use core::f64::consts::PI;
 
 use drt_geom::{EdgeClass, NONE, Topology};
-use drt_math::{AliasTable, Real, Rng, Vec3, fm, warp};
+use drt_math::{CdfTable, Real, Rng, Vec3, fm, warp};
 
 use crate::Error;
 use crate::transport::{SurfacePoint, World};
@@ -133,7 +133,7 @@ impl Edge {
 #[derive(Debug)]
 pub(crate) struct EdgeTable {
     pub(crate) edges: Vec<Edge>,
-    table: AliasTable,
+    table: CdfTable,
 }
 
 impl EdgeTable {
@@ -148,7 +148,7 @@ impl EdgeTable {
             return Ok(None);
         }
         let weights: Vec<f64> = kept.iter().map(|(_, w)| *w).collect();
-        let table = AliasTable::new(&weights).map_err(|e| Error::Element {
+        let table = CdfTable::new(&weights).map_err(|e| Error::Element {
             element: "edges".into(),
             reason: alloc::format!("cannot be sampled: {e}"),
         })?;
@@ -161,10 +161,11 @@ impl EdgeTable {
     }
 
     pub(crate) fn sample(&self, world: &World, rng: &mut Rng) -> EdgePoint<'_> {
-        let i = self.table.sample(rng.next_f64()).index;
-        let edge = &self.edges[i];
-        let (x, point) = edge.point(world, rng.next_f64());
-        EdgePoint { edge, x, point, inv_pdf: edge.length / self.table.pmf(i) }
+        // Monotone: one number places the point among all edges.
+        let s = self.table.sample(rng.next_f64());
+        let edge = &self.edges[s.index];
+        let (x, point) = edge.point(world, s.residual);
+        EdgePoint { edge, x, point, inv_pdf: edge.length / s.pmf }
     }
 }
 

@@ -140,6 +140,17 @@ macro_rules! match_model {
 }
 
 impl Bsdf {
+    /// True when nothing is scattered, as of now: a null interface, or no reflectance on any side.
+    #[must_use]
+    pub(crate) fn is_black(&self) -> bool {
+        match self {
+            Self::Null => true,
+            Self::Diffuse(d) => d.reflectance.is_zero(),
+            Self::TwoSided(t) => t.front.is_black() && t.back.as_ref().is_none_or(Self::is_black),
+            _ => false,
+        }
+    }
+
     /// The value `fs(wo, wi) |n·wi|` per channel; zero where the model is black.
     #[inline]
     #[must_use]

@@ -318,12 +318,7 @@ impl World {
 
     /// True when paths have vertices on a shape: it scatters or emits.
     pub(crate) fn scatters(&self, shape: usize) -> bool {
-        let black = match self.bsdf_of(shape as u32) {
-            Bsdf::Null => true,
-            Bsdf::Diffuse(d) => d.reflectance.is_zero(),
-            _ => false,
-        };
-        !black || self.scene.shapes[shape].emitter.is_some()
+        !self.bsdf_of(shape as u32).is_black() || self.scene.shapes[shape].emitter.is_some()
     }
 
     pub(crate) fn prim_of(&self, shape: usize, triangle: u32) -> u32 {
