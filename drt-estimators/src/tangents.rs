@@ -3,7 +3,9 @@
 use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::ops::AddAssign;
 
+use drt_math::{Affine, Rgb};
 use drt_medium::{MediumChange, MediumTangent};
 use drt_motion::{
     Applied, Change, GeometryChange, Parameter, PropertyChange, SmoothNormals, SurfaceMotion,
@@ -13,7 +15,7 @@ use drt_motion::{
 use crate::Error;
 use crate::emitter::{Emitter, EmitterTangent};
 use crate::scene::{Scene, Target};
-use crate::sensor::SensorTangent;
+use crate::sensor::{Sensor, SensorTangent};
 use crate::surface::{BsdfChange, BsdfTangent, Property};
 
 /// What changes with each parameter: for every item of the scene, the parameters that change it
@@ -255,73 +257,57 @@ impl Apply<'_> {
 
     fn emitter(&mut self, i: usize) -> Result<(), Error> {
         let target = Target::Emitter(i);
-        let n = self.parameters.len();
         let given = self.scene.emitters[i].item.emitter;
-        let mut emitter = given
+        let emitter = given
             .checked()
             .map_err(|e| Error::Element { element: self.name(target), reason: e.to_string() })?;
-        let mut tangents = alloc::vec![EmitterTangent::default(); n];
         let changes = self.geometry(target)?;
-        if !changes.is_empty() {
-            if let Emitter::Area { .. } | Emitter::Constant { .. } = emitter {
-                let reason = "this emitter has no place of its own; move its shape";
-                return Err(self.fail(changes[0].parameter, target, reason));
-            }
-            let frame =
-                move_affine(&changes, n).map_err(|e| self.fail(e.parameter, target, e.cause))?;
-            emitter = emitter
-                .moved(&frame.map)
-                .map_err(|e| self.fail(changes[0].parameter, target, e))?;
-            for (t, v) in tangents.iter_mut().zip(&frame.velocities) {
-                *t += emitter.velocity(v);
-            }
+        if let (Some(first), Emitter::Area { .. } | Emitter::Constant { .. }) =
+            (changes.first(), emitter)
+        {
+            let reason = "this emitter has no place of its own; move its shape";
+            return Err(self.fail(first.parameter, target, reason));
         }
-        self.properties(target, |property, changed| {
-            let before = emitter.property(property).map_err(|e| e.to_string())?;
-            emitter = emitter
-                .with_property(property, changed.map.value(before))
-                .map_err(|e| e.to_string())?;
-            for (t, rate) in tangents.iter_mut().zip(&changed.rates) {
-                *t += emitter
-                    .property_tangent(property, rate.value(before))
-                    .map_err(|e| e.to_string())?;
-            }
-            Ok(())
-        })?;
+        let (emitter, tangents) = self.placed(target, emitter)?;
         self.scene.emitters[i].item.emitter = emitter;
         self.tangents.emitters.push(keep(tangents, |t| !t.is_zero()));
         Ok(())
     }
 
     fn sensor(&mut self, i: usize) -> Result<Vec<(usize, SensorTangent)>, Error> {
-        let target = Target::Sensor(i);
+        let given = self.scene.sensors[i].item.sensor.clone();
+        let (sensor, tangents) = self.placed(Target::Sensor(i), given)?;
+        self.scene.sensors[i].item.sensor = sensor;
+        Ok(keep(tangents, |t| !t.is_zero()))
+    }
+
+    /// An emitter or sensor at the parameters' values, with its rate of change by each.
+    fn placed<T: Placed>(
+        &self,
+        target: Target,
+        mut item: T,
+    ) -> Result<(T, Vec<T::Tangent>), Error> {
         let n = self.parameters.len();
-        let mut sensor = self.scene.sensors[i].item.sensor.clone();
-        let mut tangents = alloc::vec![SensorTangent::default(); n];
+        let mut tangents = alloc::vec![T::Tangent::default(); n];
         let changes = self.geometry(target)?;
-        if !changes.is_empty() {
+        if let Some(first) = changes.first() {
             let frame =
                 move_affine(&changes, n).map_err(|e| self.fail(e.parameter, target, e.cause))?;
-            sensor =
-                sensor.moved(&frame.map).map_err(|e| self.fail(changes[0].parameter, target, e))?;
+            item =
+                item.at(&frame.map).map_err(|reason| self.fail(first.parameter, target, reason))?;
             for (t, v) in tangents.iter_mut().zip(&frame.velocities) {
-                *t += sensor.velocity(v);
+                *t += item.rate(v);
             }
         }
         self.properties(target, |property, changed| {
-            let before = sensor.property(property).map_err(|e| e.to_string())?;
-            sensor = sensor
-                .with_property(property, changed.map.value(before))
-                .map_err(|e| e.to_string())?;
+            let before = item.value(property)?;
+            item = item.with(property, changed.map.value(before))?;
             for (t, rate) in tangents.iter_mut().zip(&changed.rates) {
-                *t += sensor
-                    .property_tangent(property, rate.value(before))
-                    .map_err(|e| e.to_string())?;
+                *t += item.rate_of(property, rate.value(before))?;
             }
             Ok(())
         })?;
-        self.scene.sensors[i].item.sensor = sensor;
-        Ok(keep(tangents, |t| !t.is_zero()))
+        Ok((item, tangents))
     }
 
     /// Calls `change` for each property that effects on the target name.
@@ -348,6 +334,41 @@ impl Apply<'_> {
         Ok(())
     }
 }
+
+/// What has a frame and named numbers: emitters and sensors.
+trait Placed: Sized {
+    type Tangent: Clone + Default + AddAssign;
+    fn at(&self, map: &Affine) -> Result<Self, String>;
+    fn rate(&self, field: &Affine) -> Self::Tangent;
+    fn value(&self, property: &str) -> Result<Rgb, String>;
+    fn with(&self, property: &str, value: Rgb) -> Result<Self, String>;
+    fn rate_of(&self, property: &str, rate: Rgb) -> Result<Self::Tangent, String>;
+}
+
+macro_rules! placed {
+    ($($item:ty => $tangent:ty),*) => {$(
+        impl Placed for $item {
+            type Tangent = $tangent;
+            fn at(&self, map: &Affine) -> Result<Self, String> {
+                self.moved(map).map_err(|e| e.to_string())
+            }
+            fn rate(&self, field: &Affine) -> $tangent {
+                self.velocity(field)
+            }
+            fn value(&self, property: &str) -> Result<Rgb, String> {
+                self.property(property).map_err(|e| e.to_string())
+            }
+            fn with(&self, property: &str, value: Rgb) -> Result<Self, String> {
+                self.with_property(property, value).map_err(|e| e.to_string())
+            }
+            fn rate_of(&self, property: &str, rate: Rgb) -> Result<$tangent, String> {
+                self.property_tangent(property, rate).map_err(|e| e.to_string())
+            }
+        }
+    )*};
+}
+
+placed!(Emitter => EmitterTangent, Sensor => SensorTangent);
 
 /// The entries worth keeping, with their parameters' indices.
 fn keep<T>(items: Vec<T>, worth: impl Fn(&T) -> bool) -> Vec<(usize, T)> {

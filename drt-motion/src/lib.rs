@@ -28,4 +28,4 @@ pub use normals::SmoothNormals;
 pub use parameter::{Applied, Change, Effect, Parameter, geometry_changes, property_changes};
 pub use property::{ChangedValue, PropertyChange, change_value};
 pub use surface::{SurfaceJet, SurfaceMotion, SurfacePoint};
-pub use volume::{InsideMotion, VolumeAdjoint, VolumeJet, VolumeMotion, inside_motion};
+pub use volume::{VolumeAdjoint, VolumeJet, VolumeMotion};

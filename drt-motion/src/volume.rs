@@ -1,7 +1,5 @@
 use drt_math::{Affine, Vec3};
 
-use crate::SurfaceMotion;
-
 /// The velocity field inside a medium for one parameter, at the parameters' current values.
 ///
 /// Volume vertices ride on it; which field is used cannot matter as long as it has the normal
@@ -71,36 +69,5 @@ impl VolumeMotion {
     #[must_use]
     pub fn jet(&self, x: Vec3) -> VolumeJet {
         VolumeJet { u: self.velocity(x), j_dot: self.divergence(x) }
-    }
-}
-
-/// How the inside of a medium follows its boundary, for one parameter.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct InsideMotion {
-    /// The field inside.
-    pub motion: VolumeMotion,
-    /// Whether the flux through the boundary must be added: the integral over every moving surface
-    /// of \[f(-) - f(+)\] n·(u_surface - u_inside), n from side - to side +.
-    pub flux: bool,
-}
-
-/// Chooses the motion inside a medium from the motions of *all* the surfaces that bound it: those
-/// around it, those immersed in it, and [`SurfaceMotion::Rest`] for an outer boundary that stays.
-///
-/// Surfaces that move by one and the same affine field carry the inside with them, with no flux.
-/// Surfaces at rest leave it at rest. In every other case the inside stays and the flux through the
-/// moving surfaces makes up for it, which is always right.
-#[must_use]
-pub fn inside_motion(boundary: &[&SurfaceMotion]) -> InsideMotion {
-    if boundary.iter().all(|m| m.is_rest()) {
-        return InsideMotion::default();
-    }
-    match boundary {
-        [SurfaceMotion::Affine(field), rest @ ..]
-            if rest.iter().all(|m| matches!(m, SurfaceMotion::Affine(f) if f == field)) =>
-        {
-            InsideMotion { motion: VolumeMotion::Affine(*field), flux: false }
-        }
-        _ => InsideMotion { motion: VolumeMotion::Static, flux: true },
     }
 }

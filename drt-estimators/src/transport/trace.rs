@@ -350,7 +350,7 @@ impl<'w> Tracer<'w> {
             Travel::Absorbed => None,
             Travel::Volume(v) => {
                 let flight = span.map(|span| v.flight(span, origin, leaving.dir));
-                Some(self.pause(leaving, &ray, &v, flight, observer))
+                Some(self.pause(leaving, &ray, &v, flight, 1.0, observer))
             }
             Travel::Surface(point, x, arrival) => {
                 Some(self.land(leaving, &ray, point, x, arrival, observer))
@@ -364,18 +364,19 @@ impl<'w> Tracer<'w> {
         stop
     }
 
-    /// Arrives at a volume vertex.
+    /// Arrives at a volume vertex, whose own emission counts by `emission_weight`.
     fn pause<O: Observer>(
         &mut self,
         leaving: &Leaving,
         ray: &RayPath,
         v: &Flown,
         flight: Option<Flight>,
+        emission_weight: f64,
         observer: &mut O,
     ) -> Stop {
         let segments = leaving.segments + 1;
         let throughput = leaving.throughput * v.arrival;
-        let source = v.coefficients.source();
+        let source = v.coefficients.source() * emission_weight;
         if !source.is_zero() {
             observer.contribution(segments, throughput * source);
         }
@@ -387,7 +388,7 @@ impl<'w> Tracer<'w> {
             start_medium: ray.medium,
             arrival: v.arrival,
             throughput,
-            emission_weight: 1.0,
+            emission_weight,
         };
         let node = observer.arrive(&record, &ray.crossings[..v.crossed]);
         Stop {
@@ -498,7 +499,9 @@ impl<'w> Tracer<'w> {
         let density = distances.pdf(t) / total;
         let mut part = core::mem::take(&mut self.shadow);
         part.truncate_from(ray, t);
-        let stop = self.equiangular_stop(leaving, &part, t, density, observer);
+        let placed = self.place(origin, leaving.dir, &part, t, density);
+        // The emission here is left to free flight.
+        let stop = placed.map(|v| self.pause(leaving, &part, &v, None, 0.0, observer));
         self.shadow = part;
         if let Some(stop) = stop
             && let Some(light) = LightTable::delta(world, emitter, stop.vertex.x, pmf)
@@ -507,40 +510,6 @@ impl<'w> Tracer<'w> {
             self.connect(&stop, &light, 1.0, sigma_s, observer);
         }
         Some(span)
-    }
-
-    fn equiangular_stop<O: Observer>(
-        &mut self,
-        leaving: &Leaving,
-        part: &RayPath,
-        t: f64,
-        density: f64,
-        observer: &mut O,
-    ) -> Option<Stop> {
-        let v = self.place(leaving.vertex.x, leaving.dir, part, t, density)?;
-        let throughput = leaving.throughput * v.arrival;
-        let record = Arrival {
-            parent: leaving.node,
-            end: Endpoint::Volume(v.vertex, v.coefficients),
-            dir: leaving.dir,
-            distance: t,
-            start_medium: part.medium,
-            arrival: v.arrival,
-            throughput,
-            emission_weight: 0.0,
-        };
-        let node = observer.arrive(&record, &part.crossings);
-        Some(Stop {
-            node,
-            vertex: v.vertex,
-            coefficients: Some(v.coefficients),
-            wo: -leaving.dir,
-            throughput,
-            arrival: v.arrival,
-            alive: leaving.alive,
-            segments: leaving.segments + 1,
-            flight: None,
-        })
     }
 }
 
