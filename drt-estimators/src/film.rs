@@ -4,6 +4,10 @@
 //! own filter, so pixels are independent). A [`SplatFilm`] takes values that land anywhere, in
 //! batches: 32 independent ones a pass, whose scatter gives the variance of every pixel, block and
 //! mean with all correlations between pixels in it.
+//!
+//! Rare events spoil such errors: what saw none of them claims to know its mean exactly. So every
+//! standard error of a block or of the whole contains one event more of the layer's typical size
+//! Σx² / Σ|x| ([`Events`]), which is lost among many and honest among few.
 
 use alloc::vec::Vec;
 
@@ -55,6 +59,39 @@ impl BlockSums {
     }
 }
 
+/// Sizes of a layer's contributions.
+#[derive(Clone, Copy, Debug)]
+struct Events {
+    absolute: Rgb,
+    squares: Rgb,
+}
+
+impl Events {
+    const NONE: Self = Self { absolute: Rgb::ZERO, squares: Rgb::ZERO };
+
+    fn push(&mut self, v: Rgb) {
+        self.absolute += v.abs();
+        self.squares += v * v;
+    }
+
+    fn add(&mut self, o: &Self) {
+        self.absolute += o.absolute;
+        self.squares += o.squares;
+    }
+
+    /// Widens the errors of blocks and total by one event over the samples that each saw.
+    fn widen(&self, image: &mut Layer, blocks: &Blocks, per_pixel: f64) {
+        let inverse = self.absolute.map(|a| if a > 0.0 { 1.0 / a } else { 0.0 });
+        let size = self.squares * inverse;
+        let all: u32 = blocks.count.iter().sum();
+        let estimates = image.blocks.iter_mut().zip(blocks.count);
+        for (e, pixels) in estimates.chain([(&mut image.total, all)]) {
+            let one = size * (1.0 / (f64::from(pixels.max(1)) * per_pixel));
+            e.stderr = (e.stderr * e.stderr + one * one).map(Real::sqrt);
+        }
+    }
+}
+
 /// Values of some neighbouring pixels, before they are merged into the film.
 #[derive(Debug)]
 pub(crate) struct Tile {
@@ -63,6 +100,7 @@ pub(crate) struct Tile {
     layers: usize,
     moments: Vec<RgbMoments>,
     batches: Vec<BlockSums>,
+    events: Vec<Events>,
 }
 
 impl Tile {
@@ -73,6 +111,7 @@ impl Tile {
             layers,
             moments: alloc::vec![RgbMoments::default(); n],
             batches: alloc::vec![BlockSums::ZERO; BATCHES * layers],
+            events: alloc::vec![Events::NONE; layers],
         }
     }
 
@@ -84,6 +123,7 @@ impl Tile {
         for (l, v) in values.iter().enumerate() {
             self.moments[at + l].push(*v);
             self.batches[batch * self.layers + l].add(block, *v);
+            self.events[l].push(*v);
         }
     }
 }
@@ -95,6 +135,7 @@ pub(crate) struct PixelFilm {
     layers: usize,
     moments: Vec<RgbMoments>,
     batches: Vec<BlockSums>,
+    events: Vec<Events>,
     units: u32,
 }
 
@@ -106,6 +147,7 @@ impl PixelFilm {
             layers,
             moments: alloc::vec![RgbMoments::default(); n],
             batches: alloc::vec![BlockSums::ZERO; BATCHES * layers],
+            events: alloc::vec![Events::NONE; layers],
             units: 0,
         }
     }
@@ -120,6 +162,9 @@ impl PixelFilm {
             for (s, v) in b.0.iter_mut().zip(&t.0) {
                 *s += *v;
             }
+        }
+        for (e, t) in self.events.iter_mut().zip(&tile.events) {
+            e.add(t);
         }
     }
 
@@ -154,6 +199,7 @@ impl PixelFilm {
         if self.units as usize >= BATCHES {
             self.batch_errors(l, blocks, &mut image);
         }
+        self.events[l].widen(&mut image, blocks, f64::from(self.units.max(1)));
         image
     }
 
@@ -182,13 +228,22 @@ impl PixelFilm {
 /// One batch of a splatted term: a sum per pixel and layer.
 #[derive(Debug)]
 pub(crate) struct Splats {
-    pub(crate) layers: Vec<Vec<Rgb>>,
+    layers: Vec<Vec<Rgb>>,
+    events: Vec<Events>,
 }
 
 impl Splats {
     pub(crate) fn new(size: [u32; 2], layers: usize) -> Self {
         let n = (size[0] * size[1]) as usize;
-        Self { layers: alloc::vec![alloc::vec![Rgb::ZERO; n]; layers] }
+        Self {
+            layers: alloc::vec![alloc::vec![Rgb::ZERO; n]; layers],
+            events: alloc::vec![Events::NONE; layers],
+        }
+    }
+
+    pub(crate) fn add(&mut self, layer: usize, pixel: u32, v: Rgb) {
+        self.layers[layer][pixel as usize] += v;
+        self.events[layer].push(v);
     }
 }
 
@@ -206,6 +261,7 @@ pub(crate) struct SplatFilm {
 struct SplatLayer {
     sum: Vec<Rgb>,
     variance: Vec<Rgb>,
+    events: Events,
 }
 
 /// A pass in progress: sums and sums of squares over batches.
@@ -213,19 +269,21 @@ struct SplatLayer {
 pub(crate) struct SplatPass {
     batches: u32,
     layers: Vec<(Vec<Rgb>, Vec<Rgb>)>,
+    events: Vec<Events>,
 }
 
 impl SplatFilm {
     pub(crate) fn new(size: [u32; 2], layers: usize) -> Self {
         let n = (size[0] * size[1]) as usize + BLOCKS * BLOCKS + 1;
         let zero = alloc::vec![Rgb::ZERO; n];
-        let layer = SplatLayer { sum: zero.clone(), variance: zero };
+        let layer = SplatLayer { sum: zero.clone(), variance: zero, events: Events::NONE };
         Self { size, weight: 0.0, layers: alloc::vec![layer; layers] }
     }
 
     pub(crate) fn begin(&self) -> SplatPass {
         let zero = alloc::vec![Rgb::ZERO; self.layers.first().map_or(0, |l| l.sum.len())];
-        SplatPass { batches: 0, layers: alloc::vec![(zero.clone(), zero); self.layers.len()] }
+        let layers = alloc::vec![(zero.clone(), zero); self.layers.len()];
+        SplatPass { batches: 0, events: alloc::vec![Events::NONE; layers.len()], layers }
     }
 
     /// Ends a pass of `samples` samples in all.
@@ -235,6 +293,9 @@ impl SplatFilm {
             return;
         }
         self.weight += samples;
+        for (layer, events) in self.layers.iter_mut().zip(&pass.events) {
+            layer.events.add(events);
+        }
         for (layer, (sum, squares)) in self.layers.iter_mut().zip(&pass.layers) {
             for i in 0..sum.len() {
                 let mean = sum[i] * (1.0 / n);
@@ -247,19 +308,22 @@ impl SplatFilm {
     }
 
     /// One layer as an image.
-    pub(crate) fn layer(&self, l: usize) -> Layer {
+    pub(crate) fn layer(&self, l: usize, blocks: &Blocks) -> Layer {
         let n = (self.size[0] * self.size[1]) as usize;
         let scale = if self.weight > 0.0 { 1.0 / self.weight } else { 0.0 };
         let estimate = |i: usize| Estimate {
             mean: self.layers[l].sum[i] * scale,
             stderr: (self.layers[l].variance[i] * (scale * scale)).map(Real::sqrt),
         };
-        Layer {
+        let mut image = Layer {
             size: self.size,
             pixels: (0..n).map(estimate).collect(),
             blocks: (n..n + BLOCKS * BLOCKS).map(estimate).collect(),
             total: estimate(n + BLOCKS * BLOCKS),
-        }
+        };
+        // A sample is one of all that were spread over the film.
+        self.layers[l].events.widen(&mut image, blocks, f64::max(self.weight, 1.0));
+        image
     }
 }
 
@@ -269,6 +333,9 @@ impl SplatPass {
         self.batches += 1;
         let scale = 1.0 / samples;
         let all: u32 = blocks.count.iter().sum();
+        for (e, b) in self.events.iter_mut().zip(&batch.events) {
+            e.add(b);
+        }
         for ((sum, squares), image) in self.layers.iter_mut().zip(&batch.layers) {
             let mut sums = BlockSums::ZERO;
             for (i, v) in image.iter().enumerate() {

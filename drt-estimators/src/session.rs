@@ -308,7 +308,7 @@ impl Session {
                     parts.push((*term, self.pixels.layer(1 + (i + 1) * n + p, &self.blocks)));
                 }
                 for (source, film) in self.prepared.sources.iter().zip(&self.splats) {
-                    parts.push((source.term(), film.layer(p)));
+                    parts.push((source.term(), film.layer(p, &self.blocks)));
                 }
                 let total = sum(parts.iter().map(|(_, l)| l)).unwrap_or_else(|| parts[0].1.clone());
                 let mut terms = Vec::new();

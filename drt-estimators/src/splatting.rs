@@ -157,9 +157,9 @@ impl Receiver for ToImages<'_> {
     }
 
     fn receive(&mut self, pixel: u32, value: Rgb) {
-        for (image, rate) in self.splats.layers.iter_mut().zip(&self.contraction.rates) {
+        for (layer, rate) in self.contraction.rates.iter().enumerate() {
             if rate.r != 0.0 {
-                image[pixel as usize] += value * rate.r;
+                self.splats.add(layer, pixel, value * rate.r);
             }
         }
     }
