@@ -196,7 +196,7 @@ fn i4_a_surface_between_equal_media_is_nothing() {
         )
     };
     check(bubbles(1.0).collect());
-    check_faults(bubbles(1.5).collect());
+    check_faults(bubbles(4.0).collect());
 }
 
 /// A room whose walls, body and medium all glow so that the radiance is the same everywhere.
