@@ -20,7 +20,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
         )));
     }
     let outputs = Outputs::new(options, "check")?;
-    let monitor = Monitor::new(options.quiet);
+    let monitor = Monitor::new(options.changes.quiet);
     let mut rendering = grad::derivatives(&job, options, &monitor, 0.4)?;
     let differences = match rendering.complete {
         true => two_steps(&job, rendering.spp, &monitor)?,

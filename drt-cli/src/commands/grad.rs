@@ -19,7 +19,7 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     let mut job = run::open_with_parameters(common)?;
     job.settings.terms = options.terms;
     let outputs = Outputs::new(common, "grad")?;
-    let monitor = Monitor::new(common.quiet);
+    let monitor = Monitor::new(common.changes.quiet);
     let rendering = derivatives(&job, common, &monitor, 1.0)?;
     monitor.finish();
     outputs.write(&job, &rendering, &[], &[])?;

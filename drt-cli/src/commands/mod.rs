@@ -1,6 +1,8 @@
 //! The commands of `drt`, from arguments to an exit code.
 
+mod bench;
 mod check;
+mod clock;
 mod grad;
 mod info;
 mod monitor;
@@ -81,6 +83,6 @@ fn dispatch(command: &Command) -> Result<Outcome, CliError> {
         Command::Check(options) => check::run(options),
         Command::Info(options) => info::run(options),
         Command::Optimize(_) => later("optimize"),
-        Command::Bench(_) => later("bench"),
+        Command::Bench(options) => bench::run(options),
     }
 }

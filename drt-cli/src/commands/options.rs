@@ -1,6 +1,6 @@
 //! The command line.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 
@@ -24,13 +24,13 @@ pub(super) enum Command {
     Check(Options),
     /// Fit a job's parameters to target images (not available yet).
     Optimize(Options),
-    /// Measure run time against error (not available yet).
+    /// Measure error against run time at doubling sample counts.
     Bench(BenchOptions),
     /// Show what a scene or job holds, and what will run.
     Info(Options),
 }
 
-/// What every command takes.
+/// What the commands on one scene or job take.
 #[derive(Args, Clone, Debug)]
 pub(super) struct Options {
     /// A scene (.xml) or a job (.toml).
@@ -53,6 +53,13 @@ pub(super) struct Options {
     /// Stop when the relative noise of every image is below this.
     #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     pub(super) target_error: Option<f64>,
+    #[command(flatten)]
+    pub(super) changes: Changes,
+}
+
+/// What every command may change about a scene or job.
+#[derive(Args, Clone, Debug)]
+pub(super) struct Changes {
     /// Same seed, same pixels.
     #[arg(long, value_name = "N")]
     pub(super) seed: Option<u64>,
@@ -96,25 +103,40 @@ pub(super) struct GradOptions {
 
 #[derive(Args, Debug)]
 pub(super) struct BenchOptions {
-    /// Jobs to measure.
-    _jobs: Vec<PathBuf>,
-    /// Image that errors are measured against.
-    #[arg(long, value_name = "FILE")]
-    _reference: Option<PathBuf>,
+    /// Jobs (.toml) or scenes (.xml) to measure.
+    #[arg(required = true)]
+    pub(super) inputs: Vec<PathBuf>,
+    /// Image, as of `drt grad` with many samples, that errors are measured against.
+    #[arg(long, value_name = "FILE.exr")]
+    pub(super) reference: Option<PathBuf>,
+    /// Most time for each estimator of each job.
+    #[arg(long, value_name = "S", default_value = "10", value_parser = positive, allow_negative_numbers = true)]
+    pub(super) seconds: f64,
+    /// Most samples per pixel.
+    #[arg(long, value_name = "N", default_value = "65536", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) spp: u32,
+    /// Where to write every measurement, as comma-separated values.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(super) csv: Option<PathBuf>,
+    /// Where to draw errors against times, both logarithmic.
+    #[arg(long, value_name = "FILE.svg")]
+    pub(super) plot: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) changes: Changes,
 }
 
-impl Options {
+impl Changes {
     pub(super) fn overrides(&self) -> Overrides {
         Overrides { set: self.set.clone(), defaults: self.defaults.iter().cloned().collect() }
     }
 
     /// Refuses job keys where there is no job.
-    pub(super) fn refuse_set(&self) -> Result<(), CliError> {
+    pub(super) fn refuse_set(&self, scene: &Path) -> Result<(), CliError> {
         match self.set.first() {
             None => Ok(()),
             Some((key, _)) => Err(CliError::argument(format!(
                 "--set {key}: {} is a scene, which has no job keys; use -D for its defaults",
-                self.input.display()
+                scene.display()
             ))),
         }
     }

@@ -1,10 +1,10 @@
 //! What a command leaves behind.
 
 use std::path::Path;
-use std::time::Instant;
 
 use drt_estimators::{Layer, Rendering};
 
+use super::clock::Clock;
 use super::noise::largest_noise;
 use super::options::Options;
 use crate::digest::{RunFacts, Verdict, digest, write_digest};
@@ -14,7 +14,7 @@ use crate::{CliError, Job, Provenance, check_target, write_exr, write_preview};
 pub(super) struct Outputs<'a> {
     options: &'a Options,
     command: &'static str,
-    start: Instant,
+    clock: Clock,
 }
 
 impl<'a> Outputs<'a> {
@@ -24,7 +24,7 @@ impl<'a> Outputs<'a> {
         for path in files.into_iter().flatten().filter(|p| p.as_os_str() != "-") {
             check_target(path)?;
         }
-        Ok(Self { options, command, start: Instant::now() })
+        Ok(Self { options, command, clock: Clock::start() })
     }
 
     /// True when the standard output belongs to the digest.
@@ -41,7 +41,7 @@ impl<'a> Outputs<'a> {
         further: &[(String, &Layer)],
         checks: &[Verdict],
     ) -> Result<(), CliError> {
-        let seconds = self.start.elapsed().as_secs_f64();
+        let seconds = self.clock.seconds();
         let threads = match job.settings.threads {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             n => n,
@@ -52,7 +52,7 @@ impl<'a> Outputs<'a> {
             job: job.text.as_ref().map(|_| job.path.display().to_string()),
             seed: job.settings.seed,
             seconds,
-            cpu_seconds: cpu_seconds().unwrap_or(seconds),
+            cpu_seconds: self.clock.cpu_seconds(),
             threads,
         };
         if let Some(path) = &self.options.output {
@@ -70,7 +70,7 @@ impl<'a> Outputs<'a> {
         if let Some(path) = &self.options.digest {
             write_digest(path, &digest(rendering, &facts, checks))?;
         }
-        if !self.options.quiet {
+        if !self.options.changes.quiet {
             summarize(rendering, seconds);
         }
         Ok(())
@@ -89,17 +89,4 @@ fn summarize(rendering: &Rendering, seconds: f64) {
             eprintln!("  {example:?}");
         }
     }
-}
-
-/// Processor time of this process so far, user and system; `None` where Linux's account is missing.
-fn cpu_seconds() -> Option<f64> {
-    /// Clock ticks per second in this file, whatever the kernel counts inside.
-    const USER_HZ: f64 = 100.0;
-    let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The second field is the program's name in parentheses and may contain anything.
-    let (_, rest) = stat.rsplit_once(')')?;
-    let mut fields = rest.split_whitespace().skip(11);
-    let user: f64 = fields.next()?.parse().ok()?;
-    let system: f64 = fields.next()?.parse().ok()?;
-    Some((user + system) / USER_HZ)
 }

@@ -10,7 +10,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     let job = run::open(options)?;
     let outputs = Outputs::new(options, "render")?;
     let mut session = run::prepare_forward(&job)?;
-    let monitor = Monitor::new(options.quiet);
+    let monitor = Monitor::new(options.changes.quiet);
     monitor.stage("render", 0.0, 1.0);
     let mut rendering = run::sample(&mut session, options, job.settings.spp, &monitor);
     monitor.finish();

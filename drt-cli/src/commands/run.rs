@@ -1,5 +1,6 @@
 //! From options to a finished rendering.
 
+use std::path::Path;
 use std::time::Instant;
 
 use drt_estimators::{Layer, Rendering, Session, Settings, finite_differences};
@@ -7,7 +8,7 @@ use drt_motion::Parameter;
 
 use super::monitor::Monitor;
 use super::noise::largest_noise;
-use super::options::Options;
+use super::options::{Changes, Options};
 use crate::job::depth;
 use crate::{CliError, Job, load_job};
 
@@ -18,19 +19,26 @@ const MAX_PIXELS: u64 = 1 << 28;
 
 /// Opens the input and lays the options over it.
 pub(super) fn open(options: &Options) -> Result<Job, CliError> {
-    let overrides = options.overrides();
-    let is_job = options.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    let mut job = open_changed(&options.input, &options.changes)?;
+    job.settings.spp = options.spp.unwrap_or(job.settings.spp);
+    Ok(job)
+}
+
+/// Opens a scene or job with changes.
+pub(super) fn open_changed(input: &Path, changes: &Changes) -> Result<Job, CliError> {
+    let overrides = changes.overrides();
+    let is_job = input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     let mut job = if is_job {
-        load_job(&options.input, &overrides)?
+        load_job(input, &overrides)?
     } else {
-        options.refuse_set()?;
-        Job::from_scene(&options.input, &overrides.defaults)?
+        changes.refuse_set(input)?;
+        Job::from_scene(input, &overrides.defaults)?
     };
-    if let Some(name) = &options.sensor {
+    if let Some(name) = &changes.sensor {
         job.select_sensor(name)?;
     }
     if let (Some(film), Some(sensor)) =
-        (options.size, job.scene.sensors.get_mut(job.settings.sensor))
+        (changes.size, job.scene.sensors.get_mut(job.settings.sensor))
     {
         let resized = sensor.item.sensor.with_film(film);
         sensor.item.sensor = resized.map_err(|e| CliError::argument(format!("--size: {e}")))?;
@@ -42,10 +50,9 @@ pub(super) fn open(options: &Options) -> Result<Job, CliError> {
         }
     }
     let settings = &mut job.settings;
-    settings.spp = options.spp.unwrap_or(settings.spp);
-    settings.seed = options.seed.unwrap_or(settings.seed);
-    settings.threads = options.threads.map_or(settings.threads, usize::from);
-    if let Some(value) = options.max_depth {
+    settings.seed = changes.seed.unwrap_or(settings.seed);
+    settings.threads = changes.threads.map_or(settings.threads, usize::from);
+    if let Some(value) = changes.max_depth {
         let depth = depth(value).map_err(|e| CliError::argument(format!("--max-depth: {e}")))?;
         settings.max_depth = Some(depth);
     }

@@ -96,6 +96,19 @@ impl Job {
         }
     }
 
+    /// What to call it among others: the file's name, or that of its folder where the file's says
+    /// nothing.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let folder = self.path.parent().and_then(Path::file_name);
+        let name = match (self.path.file_stem(), folder) {
+            (Some(stem), Some(folder)) if stem == "job" || stem == "scene" => folder,
+            (Some(stem), _) => stem,
+            (None, _) => self.path.as_os_str(),
+        };
+        name.to_string_lossy().into_owned()
+    }
+
     /// Chooses the sensor of an id, or of kind and order such as `sensor[1]`.
     ///
     /// # Errors
