@@ -9,7 +9,7 @@ use drt_math::{Rng, Vec3, vec3};
 fn assert_agreement(triangles: &[[Vec3; 3]], rays: impl Iterator<Item = Ray>) -> usize {
     let brute = BruteForce::new(triangles);
     let trees =
-        [TriangleBvh::build(triangles).unwrap(), TriangleBvh::build_compact(triangles).unwrap()];
+        [TriangleBvh::build(triangles).unwrap(), TriangleBvh::build(triangles).unwrap().portable()];
     let mut out = Vec::new();
     let mut total = 0;
     for ray in rays {
@@ -142,7 +142,7 @@ fn refitted_trees_are_as_good_as_new() {
         }
         let fresh = TriangleBvh::build(&after).unwrap();
         for mut tree in
-            [TriangleBvh::build(start).unwrap(), TriangleBvh::build_compact(start).unwrap()]
+            [TriangleBvh::build(start).unwrap(), TriangleBvh::build(start).unwrap().portable()]
         {
             tree.refit(&after).unwrap();
             assert_eq!(tree.bounds(), fresh.bounds());

@@ -12,10 +12,10 @@ fn the_nearest_point_is_the_nearest_of_all_triangles() {
     for (seed, size) in [(1, 0.05), (2, 0.5), (3, 3.0)] {
         let triangles = soup(150, size, seed);
         let alone: Vec<_> =
-            triangles.iter().map(|t| TriangleBvh::build_compact(&[*t]).unwrap()).collect();
+            triangles.iter().map(|t| TriangleBvh::build(&[*t]).unwrap().portable()).collect();
         let trees = [
             TriangleBvh::build(&triangles).unwrap(),
-            TriangleBvh::build_compact(&triangles).unwrap(),
+            TriangleBvh::build(&triangles).unwrap().portable(),
         ];
         let mut rng = Rng::new(seed, 1, 0);
         for _ in 0..2_000 {
@@ -72,7 +72,7 @@ fn a_sphere_is_nearest_along_the_radius() {
 }
 
 fn assert_inside(m: &Mesh, inside: impl Fn(Vec3) -> Option<bool>, seed: u64) {
-    let trees = [TriangleBvh::of(m).unwrap(), TriangleBvh::build_compact(&m.soup()).unwrap()];
+    let trees = [TriangleBvh::of(m).unwrap(), TriangleBvh::build(&m.soup()).unwrap().portable()];
     let mut rng = Rng::new(seed, 0, 0);
     let mut counts = [0; 2];
     for _ in 0..20_000 {

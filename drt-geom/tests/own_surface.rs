@@ -82,7 +82,7 @@ fn a_convex_surface_is_left_freely_and_entered_surely() {
         for (scale, offset) in PLACES {
             let m = placed(&shape, scale, offset);
             let trees =
-                [TriangleBvh::of(&m).unwrap(), TriangleBvh::build_compact(&m.soup()).unwrap()];
+                [TriangleBvh::of(&m).unwrap(), TriangleBvh::build(&m.soup()).unwrap().portable()];
             for start in starts(&m, &mut rng) {
                 for bvh in &trees {
                     let skip = Skip::one(start.prim);

@@ -8,7 +8,7 @@ use drt_geom::{BvhError, Ray, Skip, TriangleBvh};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
 
 fn both(triangles: &[[Vec3; 3]]) -> [TriangleBvh; 2] {
-    [TriangleBvh::build(triangles).unwrap(), TriangleBvh::build_compact(triangles).unwrap()]
+    [TriangleBvh::build(triangles).unwrap(), TriangleBvh::build(triangles).unwrap().portable()]
 }
 
 #[test]

@@ -2,15 +2,21 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
+use super::TriangleBvh;
+use super::block::{BLOCK, Block, Twin};
+use super::collapse::collapse;
 use super::frame::{Box32, BoxFrame};
-use super::tree::Tree;
+use super::lanes::Machine;
 use super::watertight::corners;
-use super::{Slot, TriangleBvh, chain};
+use super::wide::WideTree;
 use crate::weld::lexicographic;
 use crate::{Aabb, Mesh, NONE};
 
 /// Largest coordinate a scene may have: products of three stay in the range of `f64`.
 const LARGEST: f64 = 1e100;
+
+/// Most triangles: blocks of them have 31 bits in the tree.
+const MOST: usize = (1 << 31) - 1;
 
 /// Why a tree cannot be built.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -22,8 +28,8 @@ pub enum BvhError {
         /// Which triangle.
         prim: u32,
     },
-    /// More triangles than 32-bit indices can name.
-    #[error("{count} triangles are too many: at most 4294967294 can be indexed")]
+    /// More triangles than the tree can name.
+    #[error("{count} triangles are too many: at most 2147483647 can be indexed")]
     TooMany {
         /// How many there are.
         count: usize,
@@ -39,14 +45,58 @@ pub enum BvhError {
 }
 
 impl TriangleBvh {
-    /// Builds the tree over triangles, which queries name by their place in the slice: an
-    /// eight-wide compressed tree by obvhs where that feature is on, else (and for scenes obvhs
-    /// makes too deep a tree of) the compact tree.
+    /// Builds the tree over triangles, which queries name by their place in the slice.
     ///
     /// # Errors
     /// When a coordinate is not finite or beyond 1e100, or there are too many triangles.
     pub fn build(triangles: &[[Vec3; 3]]) -> Result<Self, BvhError> {
-        Self::build_with(triangles, Tree::build)
+        if triangles.len() > MOST {
+            return Err(BvhError::TooMany { count: triangles.len() });
+        }
+        let bounds = usable_bounds(triangles)?;
+        let (leaves, repeats) = group_twins(triangles);
+        let mut bvh = Self {
+            tree: None,
+            frame: BoxFrame::new(&bounds),
+            bounds,
+            blocks: Vec::new(),
+            twins: Vec::with_capacity(repeats.len()),
+            triangle_count: triangles.len(),
+            machine: Machine::detect(),
+        };
+        if leaves.is_empty() {
+            return Ok(bvh);
+        }
+        let boxes: Vec<_> =
+            leaves.iter().map(|&i| bvh.frame.enclose(&triangles[i as usize])).collect();
+        let collapsed = collapse(&boxes, BLOCK);
+        // Where each triangle that has repetitions is.
+        let mut places = alloc::vec![NONE; if repeats.is_empty() { 0 } else { triangles.len() }];
+        for members in &collapsed.blocks {
+            let mut block = Block::EMPTY;
+            let members = &collapsed.order[members.start as usize..members.end as usize];
+            for (lane, &leaf) in members.iter().enumerate() {
+                let prim = leaves[leaf as usize];
+                block.set(lane, prim, &corners(&triangles[prim as usize]));
+                if let Some(place) = places.get_mut(prim as usize) {
+                    *place = (bvh.blocks.len() * BLOCK + lane) as u32;
+                }
+            }
+            bvh.blocks.push(block);
+        }
+        for (first, prim) in repeats {
+            let place = places[first as usize] as usize;
+            let index = bvh.twins.len() as u32;
+            let head = &mut bvh.blocks[place / BLOCK].twins[place % BLOCK];
+            let next = core::mem::replace(head, index);
+            bvh.twins.push(Twin { corners: corners(&triangles[prim as usize]), prim, next });
+        }
+        bvh.tree = Some(WideTree::new(&collapsed, |block| {
+            let members =
+                collapsed.blocks[block].start as usize..collapsed.blocks[block].end as usize;
+            Box32::around(collapsed.order[members].iter().map(|&leaf| boxes[leaf as usize]))
+        }));
+        Ok(bvh)
     }
 
     /// Builds the tree over the triangles of a mesh.
@@ -57,53 +107,8 @@ impl TriangleBvh {
         Self::build(&mesh.soup())
     }
 
-    /// Builds the compact binary tree also where obvhs is available: slower to trace, and the only
-    /// one that [`TriangleBvh::refit`] fits in place. Answers are the same.
-    ///
-    /// # Errors
-    /// As [`TriangleBvh::build`].
-    pub fn build_compact(triangles: &[[Vec3; 3]]) -> Result<Self, BvhError> {
-        Self::build_with(triangles, Tree::build_compact)
-    }
-
-    fn build_with(
-        triangles: &[[Vec3; 3]],
-        build: impl Fn(&[Box32]) -> (Tree, Vec<u32>),
-    ) -> Result<Self, BvhError> {
-        if triangles.len() >= NONE as usize {
-            return Err(BvhError::TooMany { count: triangles.len() });
-        }
-        let bounds = usable_bounds(triangles)?;
-        let frame = BoxFrame::new(&bounds);
-        let (leaves, twins) = group_twins(triangles);
-        let (tree, order) = if leaves.is_empty() {
-            (None, Vec::new())
-        } else {
-            let boxes: Vec<_> =
-                leaves.iter().map(|&i| frame.enclose(&triangles[i as usize])).collect();
-            let (tree, order) = build(&boxes);
-            (Some(tree), order)
-        };
-
-        let slot =
-            |prim: u32| Slot { corners: corners(&triangles[prim as usize]), prim, twin: NONE };
-        let mut slots: Vec<_> = order.iter().map(|&leaf| slot(leaves[leaf as usize])).collect();
-        if !twins.is_empty() {
-            let mut place = alloc::vec![0; triangles.len()];
-            for (index, s) in slots.iter().enumerate() {
-                place[s.prim as usize] = index;
-            }
-            for (first, prim) in twins {
-                let index = slots.len() as u32;
-                let twin = core::mem::replace(&mut slots[place[first as usize]].twin, index);
-                slots.push(Slot { twin, ..slot(prim) });
-            }
-        }
-        Ok(Self { tree, frame, bounds, slots, triangle_count: triangles.len() })
-    }
-
-    /// Follows triangles that moved, keeping their numbers. The compact tree keeps its shape, and
-    /// serves less well the further they moved; the wide one is built anew.
+    /// Follows triangles that moved, keeping their numbers and the shape of the tree, which serves
+    /// less well the further they moved. It is built anew where triangles have no area or coincide.
     ///
     /// # Errors
     /// As [`TriangleBvh::build`], or when the number of triangles changed. The tree is then as
@@ -113,26 +118,26 @@ impl TriangleBvh {
             let (expected, found) = (self.triangle_count, triangles.len());
             return Err(BvhError::CountChanged { expected, found });
         }
-        // Triangles that had no area are not in the tree.
-        let same_set = self.slots.len() == triangles.len() && triangles.iter().all(has_area);
-        let (true, Some(Tree::Compact(tree))) = (same_set, &mut self.tree) else {
-            *self = match self.tree {
-                Some(Tree::Compact(_)) => Self::build_compact(triangles)?,
-                _ => Self::build(triangles)?,
-            };
+        let bounds = usable_bounds(triangles)?;
+        // Triangles that had no area are not in the tree, and twins may part.
+        let held: usize = self.blocks.iter().map(Block::len).sum();
+        let same_set = held == triangles.len() && triangles.iter().all(has_area);
+        let (true, Some(tree)) = (same_set, &mut self.tree) else {
+            *self = Self { machine: self.machine, ..Self::build(triangles)? };
             return Ok(());
         };
-        self.bounds = usable_bounds(triangles)?;
-        self.frame = BoxFrame::new(&self.bounds);
-        for slot in &mut self.slots {
-            slot.corners = corners(&triangles[slot.prim as usize]);
+        self.bounds = bounds;
+        self.frame = BoxFrame::new(&bounds);
+        for block in &mut self.blocks {
+            for lane in 0..block.len() {
+                let prim = block.prims[lane];
+                block.set(lane, prim, &corners(&triangles[prim as usize]));
+            }
         }
-        let (slots, frame) = (&self.slots, &self.frame);
-        // Twins may have parted, so a leaf's box is that of its whole chain.
-        tree.refit(|leaf| {
-            chain(slots, leaf)
-                .map(|s| frame.enclose(&triangles[s.prim as usize]))
-                .fold(Box32::EMPTY, |b, o| b.union(&o))
+        let (frame, blocks) = (&self.frame, &self.blocks);
+        tree.fit(|block| {
+            let prims = blocks[block].prims.iter().take_while(|p| **p != NONE);
+            Box32::around(prims.map(|&p| frame.enclose(&triangles[p as usize])))
         });
         Ok(())
     }

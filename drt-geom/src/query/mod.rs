@@ -3,37 +3,30 @@
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
+use self::block::{Block, Twin, chain};
 use self::ends::End;
 use self::frame::{BoxFrame, BoxRay};
-use self::tree::Tree;
+use self::lanes::{Lanes, Machine, Task};
 use self::watertight::{Corners, Crossing, ShearedRay};
+use self::wide::{Visitor, WideTree};
 use crate::Aabb;
 
+mod binary;
+mod block;
 mod build;
-mod compact;
+mod collapse;
 mod ends;
 mod frame;
+mod lanes;
 mod nearest;
 mod ray;
-mod tree;
 mod watertight;
-#[cfg(feature = "obvhs")]
 mod wide;
 mod winding;
 
 pub use build::BvhError;
 pub use nearest::{ClosestPoint, nearest_point};
 pub use ray::{Hit, Ray, Skip};
-
-/// A triangle in the tree's order.
-#[derive(Clone, Copy, Debug)]
-struct Slot {
-    corners: Corners,
-    prim: u32,
-    /// The next slot with the same three corner positions, or [`NONE`](crate::NONE). Only the first of such a
-    /// chain is a leaf of the tree: coincident boxes would make trees deep and their building slow.
-    twin: u32,
-}
 
 /// A bounding volume hierarchy over triangles, for rays and nearest points.
 ///
@@ -50,11 +43,13 @@ struct Slot {
 /// triangle with the lower number comes first, so that results do not depend on the tree.
 #[derive(Clone, Debug)]
 pub struct TriangleBvh {
-    tree: Option<Tree>,
+    tree: Option<WideTree>,
     frame: BoxFrame,
     bounds: Aabb,
-    slots: Vec<Slot>,
+    blocks: Vec<Block>,
+    twins: Vec<Twin>,
     triangle_count: usize,
+    machine: Machine,
 }
 
 /// One query's ray in all its forms.
@@ -137,7 +132,7 @@ impl TriangleBvh {
         blocked
     }
 
-    #[inline]
+    #[inline(always)]
     fn probe(&self, ray: &Ray, skip: Skip) -> Option<Probe> {
         let boxes = self.frame.clip(ray)?;
         let (origin, dir) = (ray.origin.to_array(), ray.dir.to_array());
@@ -151,44 +146,94 @@ impl TriangleBvh {
         })
     }
 
+    /// The same tree, walked without instructions that not every machine of its kind has. Queries
+    /// answer the same, only slower.
+    #[must_use]
+    pub fn portable(self) -> Self {
+        Self { machine: Machine::Portable, ..self }
+    }
+
     /// Calls `found` with every hit of the probe. Its answer is where the ray may be cut off, in the
     /// parameter of the probe's box ray.
     #[inline]
-    fn visit(&self, probe: &Probe, mut found: impl FnMut(u32, &Crossing) -> ControlFlow<(), f32>) {
+    fn visit(&self, probe: &Probe, found: impl FnMut(u32, &Crossing) -> ControlFlow<(), f32>) {
         let Some(tree) = &self.tree else { return };
-        let mut far = probe.boxes.far;
-        tree.visit(&probe.boxes, |leaf| {
-            for slot in chain(&self.slots, leaf) {
-                if let Some(crossing) = probe.meet(slot) {
-                    far = far.min(found(slot.prim, &crossing)?);
-                }
+        let visitor = Hits { bvh: self, probe, far: probe.boxes.far, found };
+        self.machine.run(Walk { tree, query: &probe.boxes, visitor });
+    }
+}
+
+/// A walk through a tree, by whichever lanes.
+struct Walk<'a, Q, V> {
+    tree: &'a WideTree,
+    query: Q,
+    visitor: V,
+}
+
+impl<Q: wide::Query, V: Visitor> Task for Walk<'_, Q, V> {
+    #[inline(always)]
+    fn run<L: Lanes>(mut self, lanes: L) {
+        self.tree.walk(lanes, self.query, &mut self.visitor);
+    }
+}
+
+/// Finds the hits of a probe.
+struct Hits<'a, F> {
+    bvh: &'a TriangleBvh,
+    probe: &'a Probe,
+    far: f32,
+    found: F,
+}
+
+impl<F: FnMut(u32, &Crossing) -> ControlFlow<(), f32>> Visitor for Hits<'_, F> {
+    #[inline(always)]
+    fn announce<L: Lanes>(&self, lanes: L, index: usize) {
+        lanes.prefetch(&self.bvh.blocks[index]);
+    }
+    #[inline(always)]
+    fn block<L: Lanes>(&mut self, lanes: L, index: usize) -> ControlFlow<(), f32> {
+        let block = &self.bvh.blocks[index];
+        let mut mask = block.crossed(lanes, &self.probe.sheared);
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            self.test(block.prims[lane], &block.triangle(lane))?;
+            for twin in chain(&self.bvh.twins, block.twins[lane]) {
+                self.test(twin.prim, &twin.corners)?;
             }
-            ControlFlow::Continue(far)
-        });
+        }
+        ControlFlow::Continue(self.far)
+    }
+}
+
+impl<F: FnMut(u32, &Crossing) -> ControlFlow<(), f32>> Hits<'_, F> {
+    #[inline(always)]
+    fn test(&mut self, prim: u32, triangle: &Corners) -> ControlFlow<()> {
+        if let Some(crossing) = self.probe.meet(prim, triangle) {
+            match (self.found)(prim, &crossing) {
+                ControlFlow::Continue(limit) => self.far = self.far.min(limit),
+                ControlFlow::Break(()) => return ControlFlow::Break(()),
+            }
+        }
+        ControlFlow::Continue(())
     }
 }
 
 impl Probe {
     /// The crossing with a triangle, if it is a hit of this query.
     #[inline]
-    fn meet(&self, slot: &Slot) -> Option<Crossing> {
-        let crossing = self.sheared.cross(&slot.corners)?;
-        if !(crossing.t > 0.0 && crossing.t < self.ray.t_max) || self.skip.contains(slot.prim) {
+    fn meet(&self, prim: u32, triangle: &Corners) -> Option<Crossing> {
+        let crossing = self.sheared.cross(triangle)?;
+        if !(crossing.t > 0.0 && crossing.t < self.ray.t_max) || self.skip.contains(prim) {
             return None;
         }
         let dir = self.ray.dir;
-        let touched = self.start.lies_on(&slot.corners, dir.to_array())
-            || self.end.is_some_and(|e| e.lies_on(&slot.corners, (-dir).to_array()));
+        let touched = self.start.lies_on(triangle, dir.to_array())
+            || self.end.is_some_and(|e| e.lies_on(triangle, (-dir).to_array()));
         (!touched).then_some(crossing)
     }
 }
 
 fn hit(prim: u32, crossing: &Crossing) -> Hit {
     Hit { t: crossing.t, prim, bary: crossing.bary() }
-}
-
-/// The slot of a leaf and those of its twins.
-fn chain(slots: &[Slot], leaf: usize) -> impl Iterator<Item = &Slot> {
-    let next = |s: &&Slot| slots.get(s.twin as usize);
-    core::iter::successors(Some(&slots[leaf]), next)
 }

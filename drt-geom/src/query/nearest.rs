@@ -1,6 +1,12 @@
+use core::ops::ControlFlow;
+
 use drt_math::Vec3;
 
-use super::TriangleBvh;
+use super::block::chain;
+use super::lanes::Lanes;
+use super::watertight::Corners;
+use super::wide::Visitor;
+use super::{Hit, TriangleBvh, Walk};
 
 /// The point of a surface nearest to a given one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,25 +30,53 @@ impl TriangleBvh {
         if !p.is_finite() {
             return None;
         }
-        let mut best: Option<(f64, ClosestPoint)> = None;
-        let mut squared = f64::INFINITY;
-        let per_length = self.frame.scale() * self.frame.scale();
-        self.tree.as_ref()?.visit_near(self.frame.local(p), |leaf| {
-            for slot in super::chain(&self.slots, leaf) {
-                let triangle = slot.corners.map(Vec3::from);
-                let bary = nearest_weights(triangle, p);
-                let hit = super::Hit { t: 0.0, prim: slot.prim, bary };
-                let point = hit.point(triangle);
-                let d = (point - p).length_squared();
-                if best.is_none_or(|(b, c)| (d, slot.prim) < (b, c.prim)) {
-                    squared = d;
-                    let prim = slot.prim;
-                    best = Some((d, ClosestPoint { point, prim, bary, distance: 0.0 }));
-                }
+        let tree = self.tree.as_ref()?;
+        let mut best = None;
+        let visitor = Nearest { bvh: self, p, squared: f64::INFINITY, best: &mut best };
+        self.machine.run(Walk { tree, query: self.frame.point(p), visitor });
+        best.map(|c| ClosestPoint { distance: (c.point - p).length(), ..c })
+    }
+}
+
+/// Finds the nearest point.
+struct Nearest<'a> {
+    bvh: &'a TriangleBvh,
+    p: Vec3,
+    /// The squared distance of the best point, which lacks its distance.
+    squared: f64,
+    best: &'a mut Option<ClosestPoint>,
+}
+
+impl Visitor for Nearest<'_> {
+    #[inline(always)]
+    fn announce<L: Lanes>(&self, lanes: L, index: usize) {
+        lanes.prefetch(&self.bvh.blocks[index]);
+    }
+    #[inline(always)]
+    fn block<L: Lanes>(&mut self, _lanes: L, index: usize) -> ControlFlow<(), f32> {
+        let block = &self.bvh.blocks[index];
+        for lane in 0..block.len() {
+            self.test(block.prims[lane], &block.triangle(lane));
+            for twin in chain(&self.bvh.twins, block.twins[lane]) {
+                self.test(twin.prim, &twin.corners);
             }
-            squared * per_length
-        });
-        best.map(|(_, c)| ClosestPoint { distance: (c.point - p).length(), ..c })
+        }
+        let scale = self.bvh.frame.scale();
+        // Never as far as boxes that are not there, whatever the arithmetic of absurd triangles gave.
+        ControlFlow::Continue((self.squared * (scale * scale)).min(f32::MAX.into()) as f32)
+    }
+}
+
+impl Nearest<'_> {
+    fn test(&mut self, prim: u32, triangle: &Corners) {
+        let triangle = triangle.map(Vec3::from);
+        let bary = nearest_weights(triangle, self.p);
+        let point = Hit { t: 0.0, prim, bary }.point(triangle);
+        let d = (point - self.p).length_squared();
+        if self.best.is_none_or(|c| (d, prim) < (self.squared, c.prim)) {
+            self.squared = d;
+            *self.best = Some(ClosestPoint { point, prim, bary, distance: 0.0 });
+        }
     }
 }
 

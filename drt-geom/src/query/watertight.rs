@@ -20,9 +20,10 @@ pub(super) type Corners = [[f64; 3]; 3];
 /// A ray prepared for the test.
 #[derive(Clone, Copy)]
 pub(super) struct ShearedRay {
-    origin: [f64; 3],
-    axes: [usize; 3],
-    shear: [f64; 3],
+    pub(super) origin: [f64; 3],
+    /// The axis along which the ray runs fastest comes last.
+    pub(super) axes: [usize; 3],
+    pub(super) shear: [f64; 3],
 }
 
 /// A triangle crossed by a line, at any `t`.

@@ -1,124 +1,239 @@
-//! An eight-wide compressed tree by obvhs (Ylitie, Karras and Laine 2017, "Efficient
-//! Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs").
-//!
-//! obvhs loses rays in three cases: it drops what is nearer than t = 1e-4, mistakes the side of a
-//! direction coordinate of -0, and clamps inverse directions at 1.2e-7. None can occur with the
-//! rays of [`super::frame`], which bring their own inverse.
+//! The tree that queries walk: nodes of eight children whose boxes are tested together.
 
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-use glam::{UVec2, Vec3A};
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::node::Bvh2Node;
-use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
-use obvhs::cwbvh::{BRANCHING, CwBvh};
-use obvhs::ray::Ray;
-use obvhs::traverse;
+use super::collapse::Collapsed;
+use super::frame::{Box32, BoxPoint, BoxRay};
+use super::lanes::{Lanes, Vector};
 
-use super::compact::{CompactTree, Node};
-use super::frame::{Box32, BoxRay};
+/// Most children of a node.
+pub(super) const WIDTH: usize = 8;
 
-/// obvhs's traversal overwrites its stack beyond this depth.
-const MAX_DEPTH: usize = 32;
+/// Marks a child that is a block of primitives.
+pub(super) const LEAF: u32 = 1 << 31;
 
-/// The most its node format holds.
-const PRIMS_PER_LEAF: u32 = 3;
+/// Stands where a node has no child.
+pub(super) const NO_CHILD: u32 = u32::MAX;
 
+/// Entries of the stack before it moves to the heap, which takes a tree of 70 million triangles or
+/// one that is very uneven.
+const STACK: usize = 64;
+
+/// An inner node, four lines of cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct WideNode {
+    /// Lower and upper bounds of the children by axis: x, x, y, y, z, z. Children that are not there
+    /// have the empty box, which nothing enters.
+    bounds: [[f32; WIDTH]; 6],
+    /// Another node, a block with the mark [`LEAF`], or [`NO_CHILD`].
+    children: [u32; WIDTH],
+}
+
+/// The tree. It numbers blocks of primitives in its own order.
 #[derive(Clone, Debug)]
 pub(super) struct WideTree {
-    bvh: CwBvh,
+    /// The root first, children after their parents.
+    nodes: Vec<WideNode>,
+}
+
+/// What a walk does with the blocks it meets.
+pub(super) trait Visitor {
+    /// Looks at a block, and answers where the walk ends from now on: the ray's parameter, or the
+    /// squared distance. Breaks off a walk that has found enough.
+    fn block<L: Lanes>(&mut self, lanes: L, index: usize) -> ControlFlow<(), f32>;
+    /// Is told of a block that it will be shown, unless it finds something nearer first.
+    fn announce<L: Lanes>(&self, lanes: L, index: usize);
+}
+
+/// What a walk follows through the boxes.
+pub(super) trait Query: Copy {
+    /// Those of a node's boxes, as bits, that begin before `far`; and where each does.
+    fn enter<L: Lanes>(self, lanes: L, node: &WideNode, far: f32) -> (u32, [f32; WIDTH]);
+    /// Where the walk ends at first.
+    fn far(self) -> f32;
 }
 
 impl WideTree {
-    /// The tree over the boxes with the boxes' numbers in the tree's order, or `None` for boxes that
-    /// would make it too deep.
-    ///
-    /// The binary tree it starts from is our own, whose depth and building time are bounded for any
-    /// input: obvhs's builder takes quadratic time, and makes trees as deep as there are boxes, where
-    /// many are equal or nested.
-    pub(super) fn build(boxes: &[Box32]) -> Option<(Self, Vec<u32>)> {
-        let (binary, order) = CompactTree::build(boxes, 1);
-        let node = |n: &Node| Bvh2Node::new(aabb(&n.bounds), n.count, n.first);
-        let binary = Bvh2 {
-            nodes: binary.nodes().iter().map(node).collect(),
-            primitive_indices: order,
-            ..Bvh2::default()
-        };
-        let mut bvh = bvh2_to_cwbvh(&binary, PRIMS_PER_LEAF, true, false);
-        let order = core::mem::take(&mut bvh.primitive_indices);
-        let tree = Self { bvh };
-        (tree.depth() <= MAX_DEPTH).then_some((tree, order))
+    /// The tree with the boxes of its blocks.
+    pub(super) fn new(collapsed: &Collapsed, block: impl Fn(usize) -> Box32) -> Self {
+        let node = |children: &[u32; WIDTH]| WideNode { bounds: EMPTY, children: *children };
+        let mut tree = Self { nodes: collapsed.nodes.iter().map(node).collect() };
+        tree.fit(block);
+        tree
     }
 
-    fn depth(&self) -> usize {
-        let mut deepest = 0;
-        let mut open = alloc::vec![(0, 1)];
-        while let Some((index, depth)) = open.pop() {
-            deepest = usize::max(deepest, depth);
-            let node = &self.bvh.nodes[index];
-            let inner = (0..BRANCHING).filter(|&c| !node.is_leaf(c));
-            open.extend(inner.map(|c| (node.child_node_index(c) as usize, depth + 1)));
-        }
-        deepest
-    }
-
-    /// As [`CompactTree::visit`](super::compact::CompactTree::visit).
-    #[inline]
-    pub(super) fn visit(&self, ray: &BoxRay, mut leaf: impl FnMut(usize) -> ControlFlow<(), f32>) {
-        let mut ray = Ray {
-            origin: Vec3A::from_array(ray.origin),
-            // Only its signs are used; they must be those of the inverse.
-            direction: Vec3A::from_array(ray.inverse),
-            inv_direction: Vec3A::from_array(ray.inverse),
-            tmin: 0.0,
-            tmax: ray.far,
-        };
-        let mut state = self.bvh.new_traversal(ray.direction);
-        let mut node;
-        'walk: {
-            traverse!(self.bvh, node, state, node.intersect_ray(&ray, state.oct_inv4), {
-                match leaf(state.primitive_id as usize) {
-                    ControlFlow::Continue(limit) => ray.tmax = limit,
-                    ControlFlow::Break(()) => break 'walk,
+    /// New boxes for the same tree, by block.
+    pub(super) fn fit(&mut self, block: impl Fn(usize) -> Box32) {
+        for i in (0..self.nodes.len()).rev() {
+            for place in 0..WIDTH {
+                let child = self.nodes[i].children[place];
+                let bounds = match child {
+                    NO_CHILD => Box32::EMPTY,
+                    _ if child & LEAF != 0 => block((child & !LEAF) as usize),
+                    _ => self.nodes[child as usize].union(),
+                };
+                for (k, row) in self.nodes[i].bounds.iter_mut().enumerate() {
+                    row[place] = if k % 2 == 0 { bounds.min[k / 2] } else { bounds.max[k / 2] };
                 }
-            });
+            }
         }
     }
 
-    /// As [`CompactTree::visit_near`](super::compact::CompactTree::visit_near).
-    pub(super) fn visit_near(&self, p: [f64; 3], mut leaf: impl FnMut(usize) -> f64) {
-        let mut best = f64::INFINITY;
-        let mut open = alloc::vec![(0.0, 0)];
-        while let Some((d, index)) = open.pop() {
-            if d > best {
-                continue;
-            }
-            let node = &self.bvh.nodes[index];
-            let mut children: Vec<_> = (0..BRANCHING)
-                .filter(|&c| !node.is_child_empty(c))
-                .map(|c| {
-                    let b = node.child_aabb(c);
-                    let b = Box32 { min: b.min.to_array(), max: b.max.to_array() };
-                    (b.distance_squared(p), c)
-                })
-                .collect();
-            children.sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-            for &(d, c) in children.iter().rev().filter(|(_, c)| node.is_leaf(*c)) {
-                if d <= best {
-                    let (first, count) = node.child_primitives(c);
-                    for i in first..first + count {
-                        best = leaf(i as usize);
+    /// Shows the visitor every block whose box the query meets, by and large the nearer first.
+    #[inline(always)]
+    pub(super) fn walk<L: Lanes>(&self, lanes: L, query: impl Query, visitor: &mut impl Visitor) {
+        let mut far = query.far();
+        let mut stack = Stack { entries: [0; STACK], len: 0, spilled: Vec::new() };
+        let mut next = entry(0.0, 0);
+        loop {
+            let index = next as u32;
+            if index & LEAF != 0 {
+                match visitor.block(lanes, (index & !LEAF) as usize) {
+                    ControlFlow::Continue(limit) => far = limit,
+                    ControlFlow::Break(()) => return,
+                }
+            } else {
+                let node = &self.nodes[index as usize];
+                let (mut mask, begin) = query.enter(lanes, node, far);
+                // The nearest so far is not in the list, farthest first, of the others.
+                let (mut nearest, mut others, mut count) = (u64::MAX, [0; WIDTH], 0);
+                while mask != 0 {
+                    let place = mask.trailing_zeros() as usize % WIDTH;
+                    mask &= mask - 1;
+                    let child = node.children[place];
+                    self.announce(lanes, child, visitor);
+                    let this = entry(begin[place], child);
+                    let other = u64::max(this, nearest);
+                    nearest = u64::min(this, nearest);
+                    if other != u64::MAX {
+                        let mut k = count % WIDTH;
+                        while k > 0 && others[k - 1] < other {
+                            others[k] = others[k - 1];
+                            k -= 1;
+                        }
+                        others[k] = other;
+                        count += 1;
                     }
                 }
+                if nearest != u64::MAX {
+                    for other in &others[..count % WIDTH] {
+                        stack.push(*other);
+                    }
+                    next = nearest;
+                    continue;
+                }
             }
-            let inner = children.iter().filter(|(d, c)| !node.is_leaf(*c) && *d <= best);
-            open.extend(inner.map(|&(d, c)| (d, node.child_node_index(c) as usize)));
+            loop {
+                let Some(later) = stack.pop() else { return };
+                if f32::from_bits((later >> 32) as u32) <= far {
+                    next = later;
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Has a child brought near that a walk will come to.
+    #[inline(always)]
+    fn announce<L: Lanes>(&self, lanes: L, child: u32, visitor: &impl Visitor) {
+        if child & LEAF != 0 {
+            visitor.announce(lanes, (child & !LEAF) as usize);
+        } else {
+            lanes.prefetch(&self.nodes[child as usize]);
         }
     }
 }
 
-fn aabb(b: &Box32) -> Aabb {
-    Aabb::new(Vec3A::from_array(b.min), Vec3A::from_array(b.max))
+const EMPTY: [[f32; WIDTH]; 6] = {
+    let (low, high) = ([f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]);
+    [low, high, low, high, low, high]
+};
+
+impl WideNode {
+    /// The box around all children.
+    fn union(&self) -> Box32 {
+        Box32::around((0..WIDTH).map(|c| Box32 {
+            min: [0, 1, 2].map(|k| self.bounds[2 * k][c]),
+            max: [0, 1, 2].map(|k| self.bounds[2 * k + 1][c]),
+        }))
+    }
+}
+
+impl Query for &BoxRay {
+    #[inline(always)]
+    fn enter<L: Lanes>(self, lanes: L, node: &WideNode, far: f32) -> (u32, [f32; WIDTH]) {
+        let (mut enter, mut leave) = (lanes.single(0.0), lanes.single(far));
+        for k in 0..3 {
+            let back = usize::from(self.inverse[k] < 0.0);
+            let (origin, inverse) = (lanes.single(self.origin[k]), lanes.single(self.inverse[k]));
+            let front = lanes.singles(&node.bounds[2 * k + back]);
+            let rear = lanes.singles(&node.bounds[2 * k + 1 - back]);
+            enter = ((front - origin) * inverse).max(enter);
+            leave = ((rear - origin) * inverse).min(leave);
+        }
+        (enter.le(leave), enter.array())
+    }
+    fn far(self) -> f32 {
+        self.far
+    }
+}
+
+impl Query for BoxPoint {
+    #[inline(always)]
+    fn enter<L: Lanes>(self, lanes: L, node: &WideNode, far: f32) -> (u32, [f32; WIDTH]) {
+        let mut sum = lanes.single(0.0);
+        for k in 0..3 {
+            let p = lanes.single(self.point[k]);
+            let below = lanes.singles(&node.bounds[2 * k]) - p;
+            let above = p - lanes.singles(&node.bounds[2 * k + 1]);
+            let d = below.max(above).max(lanes.single(0.0));
+            sum = sum + d * d;
+        }
+        let sum = sum * lanes.single(self.trust);
+        (sum.le(lanes.single(far)), sum.array())
+    }
+    fn far(self) -> f32 {
+        // No box that is there is as far as this, and the empty one is farther.
+        f32::MAX
+    }
+}
+
+/// A child and where it begins, ordered by that: the bits of floats that are not negative are.
+#[inline(always)]
+fn entry(begin: f32, child: u32) -> u64 {
+    u64::from(begin.to_bits()) << 32 | u64::from(child)
+}
+
+struct Stack {
+    entries: [u64; STACK],
+    len: usize,
+    spilled: Vec<u64>,
+}
+
+impl Stack {
+    #[inline(always)]
+    fn push(&mut self, e: u64) {
+        if let Some(place) = self.entries.get_mut(self.len) {
+            *place = e;
+            self.len += 1;
+        } else {
+            self.spill(e);
+        }
+    }
+    #[cold]
+    fn spill(&mut self, e: u64) {
+        self.spilled.push(e);
+    }
+    #[inline(always)]
+    fn pop(&mut self) -> Option<u64> {
+        if self.len == STACK
+            && let Some(e) = self.spilled.pop()
+        {
+            return Some(e);
+        }
+        self.len = self.len.checked_sub(1)?;
+        self.entries.get(self.len).copied()
+    }
 }

@@ -41,7 +41,7 @@ pub(crate) struct BruteForce(Vec<TriangleBvh>);
 
 impl BruteForce {
     pub(crate) fn new(triangles: &[[Vec3; 3]]) -> Self {
-        Self(triangles.iter().map(|t| TriangleBvh::build_compact(&[*t]).unwrap()).collect())
+        Self(triangles.iter().map(|t| TriangleBvh::build(&[*t]).unwrap().portable()).collect())
     }
 
     /// All hits, sorted as `crossings` sorts them.

@@ -1,0 +1,90 @@
+use super::lanes::{Lanes, Vector};
+use super::watertight::{Corners, ShearedRay};
+use crate::NONE;
+
+/// Triangles in a block: as many as are tested together.
+pub(super) const BLOCK: usize = 4;
+
+/// Up to four neighbouring triangles, a leaf of the tree.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(super) struct Block {
+    /// By corner, axis and triangle; NaN in places that are empty, so that nothing is found there.
+    corners: [[[f64; BLOCK]; 3]; 3],
+    /// The triangles' numbers.
+    pub(super) prims: [u32; BLOCK],
+    /// The first of the twins of each (see [`Twin`]), or [`NONE`].
+    pub(super) twins: [u32; BLOCK],
+}
+
+/// A triangle with the same three corner positions as one that is in a block, in whatever order.
+/// Twins are no leaves of their own: coincident boxes would make trees deep and useless.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Twin {
+    pub(super) corners: Corners,
+    pub(super) prim: u32,
+    /// The next twin of the same triangle, or [`NONE`].
+    pub(super) next: u32,
+}
+
+impl Block {
+    pub(super) const EMPTY: Self =
+        Self { corners: [[[f64::NAN; BLOCK]; 3]; 3], prims: [NONE; BLOCK], twins: [NONE; BLOCK] };
+
+    /// Puts a triangle in a place.
+    pub(super) fn set(&mut self, lane: usize, prim: u32, triangle: &Corners) {
+        self.prims[lane] = prim;
+        for (rows, corner) in self.corners.iter_mut().zip(triangle) {
+            for (row, x) in rows.iter_mut().zip(corner) {
+                row[lane] = *x;
+            }
+        }
+    }
+
+    /// The triangle in a place.
+    #[inline(always)]
+    pub(super) fn triangle(&self, lane: usize) -> Corners {
+        let mut triangle = [[0.0; 3]; 3];
+        for (corner, rows) in triangle.iter_mut().zip(&self.corners) {
+            for (x, row) in corner.iter_mut().zip(rows) {
+                *x = row[lane];
+            }
+        }
+        triangle
+    }
+
+    /// How many places are taken, from the first.
+    pub(super) fn len(&self) -> usize {
+        self.prims.iter().take_while(|p| **p != NONE).count()
+    }
+
+    /// The places, as bits, whose triangles the ray's line may cross: all for which
+    /// [`ShearedRay::cross`] says so, and hardly any else.
+    #[inline(always)]
+    pub(super) fn crossed<L: Lanes>(&self, lanes: L, ray: &ShearedRay) -> u32 {
+        let [a, b, c] = &self.corners;
+        let (a, b, c) = (project(lanes, ray, a), project(lanes, ray, b), project(lanes, ray, c));
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        let zero = lanes.double(0.0);
+        zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero)
+    }
+}
+
+/// Corners seen along the ray, as in [`ShearedRay::cross`]. (A function, because what a closure
+/// does with lanes is not always compiled in place.)
+#[inline(always)]
+fn project<L: Lanes>(lanes: L, ray: &ShearedRay, corner: &[[f64; BLOCK]; 3]) -> [L::Doubles; 2] {
+    let [x, y, z] = ray.axes;
+    let h = lanes.doubles(&corner[z]) - lanes.double(ray.origin[z]);
+    let px = lanes.doubles(&corner[x]) - lanes.double(ray.origin[x]);
+    let py = lanes.doubles(&corner[y]) - lanes.double(ray.origin[y]);
+    [px - lanes.double(ray.shear[0]) * h, py - lanes.double(ray.shear[1]) * h]
+}
+
+/// The twins from one on.
+pub(super) fn chain(twins: &[Twin], first: u32) -> impl Iterator<Item = &Twin> {
+    let next = |twin: &&Twin| twins.get(twin.next as usize);
+    core::iter::successors(twins.get(first as usize), next)
+}
