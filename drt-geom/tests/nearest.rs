@@ -10,7 +10,9 @@ use drt_math::{Affine, Rng, Vec3, vec3};
 #[test]
 fn the_nearest_point_is_the_nearest_of_all_triangles() {
     for (seed, size) in [(1, 0.05), (2, 0.5), (3, 3.0)] {
-        let triangles = soup(150, size, seed);
+        let mut triangles = soup(150, size, seed);
+        let [a, b, c] = triangles[70];
+        triangles.extend([[b, c, a], [c, b, a]]);
         let alone: Vec<_> =
             triangles.iter().map(|t| TriangleBvh::build(&[*t]).unwrap().portable()).collect();
         let trees = [
@@ -27,6 +29,7 @@ fn the_nearest_point_is_the_nearest_of_all_triangles() {
             for tree in &trees {
                 let c = tree.closest_point(p).unwrap();
                 assert_eq!(c.distance, least);
+                assert_eq!(Some(c), trees[0].closest_point(p));
                 let hit = Hit { t: 0.0, prim: c.prim, bary: c.bary };
                 assert_eq!(c.point, hit.point(triangles[c.prim as usize]));
                 assert_eq!((c.point - p).length(), c.distance);

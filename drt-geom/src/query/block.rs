@@ -58,6 +58,13 @@ impl Block {
         self.prims.iter().take_while(|p| **p != NONE).count()
     }
 
+    /// The triangles' corners, for lanes.
+    #[inline(always)]
+    pub(super) fn corners<L: Lanes>(&self, lanes: L) -> [[L::Doubles; 3]; 3] {
+        let [a, b, c] = &self.corners;
+        [load(lanes, a), load(lanes, b), load(lanes, c)]
+    }
+
     /// The places, as bits, whose triangles the ray's line may cross: all for which
     /// [`ShearedRay::cross`] says so, and hardly any else.
     #[inline(always)]
@@ -70,6 +77,11 @@ impl Block {
         let zero = lanes.double(0.0);
         zero.le(u.min(v).min(w)) | u.max(v).max(w).le(zero)
     }
+}
+
+#[inline(always)]
+fn load<L: Lanes>(lanes: L, [x, y, z]: &[[f64; BLOCK]; 3]) -> [L::Doubles; 3] {
+    [lanes.doubles(x), lanes.doubles(y), lanes.doubles(z)]
 }
 
 /// Corners seen along the ray, as in [`ShearedRay::cross`]. (A function, because what a closure

@@ -16,6 +16,8 @@ pub(super) trait Vector<T, const N: usize>:
     fn min(self, o: Self) -> Self;
     /// `if self > o { self } else { o }` for each: with a NaN, `o`.
     fn max(self, o: Self) -> Self;
+    /// `if self < o { yes } else { no }` for each.
+    fn less(self, o: Self, yes: Self, no: Self) -> Self;
     /// A bit, from the lowest, for each that is at most its counterpart; NaN never is.
     fn le(self, o: Self) -> u32;
     /// The numbers.
@@ -78,7 +80,7 @@ impl Machine {
 pub(super) struct Portable;
 
 #[derive(Clone, Copy)]
-pub(super) struct Array<T, const N: usize>([T; N]);
+pub(super) struct Array<T, const N: usize>(pub(super) [T; N]);
 
 impl<T: Copy, const N: usize> Array<T, N> {
     #[inline(always)]
@@ -114,6 +116,13 @@ where
     #[inline(always)]
     fn max(self, o: Self) -> Self {
         self.zip(o, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn less(self, o: Self, yes: Self, mut no: Self) -> Self {
+        for i in 0..N {
+            no.0[i] = if self.0[i] < o.0[i] { yes.0[i] } else { no.0[i] };
+        }
+        no
     }
     #[inline(always)]
     fn le(self, o: Self) -> u32 {
@@ -172,7 +181,7 @@ mod x86 {
     macro_rules! vector {
         ($name:ident($register:ident) of $n:literal $t:ident:
          $add:ident $sub:ident $mul:ident $div:ident $min:ident $max:ident
-         $compare:ident $mask:ident $store:ident) => {
+         $compare:ident $blend:ident $mask:ident $store:ident) => {
             #[derive(Clone, Copy)]
             pub(in super::super) struct $name($register);
 
@@ -188,6 +197,11 @@ mod x86 {
                 fn max(self, o: Self) -> Self {
                     // SAFETY: made only by an `Avx2`.
                     Self(unsafe { $max(self.0, o.0) })
+                }
+                #[inline(always)]
+                fn less(self, o: Self, yes: Self, no: Self) -> Self {
+                    // SAFETY: made only by an `Avx2`.
+                    Self(unsafe { $blend(no.0, yes.0, $compare::<_CMP_LT_OQ>(self.0, o.0)) })
                 }
                 #[inline(always)]
                 fn le(self, o: Self) -> u32 {
@@ -217,10 +231,10 @@ mod x86 {
 
     vector!(Singles(__m256) of 8 f32:
         _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_min_ps _mm256_max_ps
-        _mm256_cmp_ps _mm256_movemask_ps _mm256_storeu_ps);
+        _mm256_cmp_ps _mm256_blendv_ps _mm256_movemask_ps _mm256_storeu_ps);
     vector!(Doubles(__m256d) of 4 f64:
         _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd _mm256_min_pd _mm256_max_pd
-        _mm256_cmp_pd _mm256_movemask_pd _mm256_storeu_pd);
+        _mm256_cmp_pd _mm256_blendv_pd _mm256_movemask_pd _mm256_storeu_pd);
 
     impl Lanes for Avx2 {
         type Singles = Singles;

@@ -1,12 +1,13 @@
 use core::ops::ControlFlow;
 
-use drt_math::Vec3;
+use drt_math::{Vec3, vec3};
 
-use super::block::chain;
-use super::lanes::Lanes;
+use super::block::{BLOCK, chain};
+use super::lanes::{Array, Lanes, Vector};
 use super::watertight::Corners;
 use super::wide::Visitor;
-use super::{Hit, TriangleBvh, Walk};
+use super::{TriangleBvh, Walk};
+use crate::NONE;
 
 /// The point of a surface nearest to a given one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,10 +32,11 @@ impl TriangleBvh {
             return None;
         }
         let tree = self.tree.as_ref()?;
-        let mut best = None;
+        let mut best = ClosestPoint { point: p, prim: NONE, bary: [0.0; 2], distance: 0.0 };
         let visitor = Nearest { bvh: self, p, squared: f64::INFINITY, best: &mut best };
         self.machine.run(Walk { tree, query: self.frame.point(p), visitor });
-        best.map(|c| ClosestPoint { distance: (c.point - p).length(), ..c })
+        best.distance = (best.point - p).length();
+        (best.prim != NONE).then_some(best)
     }
 }
 
@@ -44,7 +46,7 @@ struct Nearest<'a> {
     p: Vec3,
     /// The squared distance of the best point, which lacks its distance.
     squared: f64,
-    best: &'a mut Option<ClosestPoint>,
+    best: &'a mut ClosestPoint,
 }
 
 impl Visitor for Nearest<'_> {
@@ -53,29 +55,42 @@ impl Visitor for Nearest<'_> {
         lanes.prefetch(&self.bvh.blocks[index]);
     }
     #[inline(always)]
-    fn block<L: Lanes>(&mut self, _lanes: L, index: usize) -> ControlFlow<(), f32> {
+    fn block<L: Lanes>(&mut self, lanes: L, index: usize) -> ControlFlow<(), f32> {
         let block = &self.bvh.blocks[index];
-        for lane in 0..block.len() {
-            self.test(block.prims[lane], &block.triangle(lane));
-            for twin in chain(&self.bvh.twins, block.twins[lane]) {
-                self.test(twin.prim, &twin.corners);
+        let p = [lanes.double(self.p.x), lanes.double(self.p.y), lanes.double(self.p.z)];
+        let units = [lanes.double(0.0), lanes.double(1.0)];
+        let Foot { bary, point, squared } = foot(units, &block.corners(lanes), p);
+        let mut mask = squared.le(lanes.double(self.squared));
+        if mask != 0 {
+            let squared = squared.array();
+            let bary = [bary[0].array(), bary[1].array()];
+            let point = [point[0].array(), point[1].array(), point[2].array()];
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize % BLOCK;
+                mask &= mask - 1;
+                let point = vec3(point[0][lane], point[1][lane], point[2][lane]);
+                let bary = [bary[0][lane], bary[1][lane]];
+                self.compare(block.prims[lane], bary, point, squared[lane]);
+            }
+        }
+        if !self.bvh.twins.is_empty() {
+            for twin in block.twins.iter().flat_map(|first| chain(&self.bvh.twins, *first)) {
+                let Foot { bary, point, squared } = foot_of(twin.corners, self.p);
+                self.compare(twin.prim, bary.map(one), point.map(one).into(), one(squared));
             }
         }
         let scale = self.bvh.frame.scale();
-        // Never as far as boxes that are not there, whatever the arithmetic of absurd triangles gave.
+        // Never as far as boxes that are not there.
         ControlFlow::Continue((self.squared * (scale * scale)).min(f32::MAX.into()) as f32)
     }
 }
 
 impl Nearest<'_> {
-    fn test(&mut self, prim: u32, triangle: &Corners) {
-        let triangle = triangle.map(Vec3::from);
-        let bary = nearest_weights(triangle, self.p);
-        let point = Hit { t: 0.0, prim, bary }.point(triangle);
-        let d = (point - self.p).length_squared();
-        if self.best.is_none_or(|c| (d, prim) < (self.squared, c.prim)) {
-            self.squared = d;
-            *self.best = Some(ClosestPoint { point, prim, bary, distance: 0.0 });
+    #[inline]
+    fn compare(&mut self, prim: u32, bary: [f64; 2], point: Vec3, squared: f64) {
+        if (squared, prim) < (self.squared, self.best.prim) {
+            self.squared = squared;
+            *self.best = ClosestPoint { point, prim, bary, distance: 0.0 };
         }
     }
 }
@@ -83,27 +98,96 @@ impl Nearest<'_> {
 /// The point of a triangle nearest to `p`.
 #[must_use]
 pub fn nearest_point(triangle: [Vec3; 3], p: Vec3) -> Vec3 {
-    let [u, v] = nearest_weights(triangle, p);
-    let [a, b, c] = triangle;
-    a * (1.0 - u - v) + b * u + c * v
+    foot_of(triangle.map(|v| v.to_array()), p).point.map(one).into()
 }
 
-/// Weights of vertices 1 and 2 at the point of a triangle nearest to `p`: the foot of the
-/// perpendicular where that lies inside, else the nearest point of the three edges.
-fn nearest_weights([a, b, c]: [Vec3; 3], p: Vec3) -> [f64; 2] {
-    let (ab, ac, ap) = (b - a, c - a, p - a);
-    let n = ab.cross(ac);
-    let [u, v] = [ap.cross(ac).dot(n), ab.cross(ap).dot(n)].map(|x| x / n.length_squared());
-    if u > 0.0 && v > 0.0 && u + v < 1.0 {
-        return [u, v];
+/// The point of a triangle nearest to another.
+struct Foot<V> {
+    /// Weights of vertices 1 and 2.
+    bary: [V; 2],
+    /// The point, as [`Hit::point`](super::Hit::point) has it.
+    point: [V; 3],
+    /// Its squared distance.
+    squared: V,
+}
+
+/// [`foot`] of one triangle.
+fn foot_of(triangle: Corners, p: Vec3) -> Foot<Array<f64, 1>> {
+    let number = |x| Array([x]);
+    let units = [0.0, 1.0].map(number);
+    foot(units, &triangle.map(|v| v.map(number)), p.to_array().map(number))
+}
+
+fn one(x: Array<f64, 1>) -> f64 {
+    x.array()[0]
+}
+
+/// The points of triangles nearest to `p`: the foot of the perpendicular where that lies inside, else
+/// the nearest point of the three edges. `zero` and `one` are the numbers.
+#[inline(always)]
+fn foot<V: Vector<f64, N>, const N: usize>(
+    [zero, one]: [V; 2],
+    [a, b, c]: &[[V; 3]; 3],
+    p: [V; 3],
+) -> Foot<V> {
+    let (ab, ac, ap) = (sub(*b, *a), sub(*c, *a), sub(p, *a));
+    let n = cross(ab, ac);
+    let nn = dot(n, n);
+    let (u, v) = (dot(cross(ap, ac), n) / nn, dot(cross(ab, ap), n) / nn);
+    // The least weight; NaN if any is, and then not positive.
+    let inside = u.min(v).min(one - (u + v));
+
+    let s = clamp(zero, one, dot(ap, ab) / dot(ab, ab));
+    let r = clamp(zero, one, dot(ap, ac) / dot(ac, ac));
+    let bc = sub(*c, *b);
+    let t = clamp(zero, one, dot(sub(p, *b), bc) / dot(bc, bc));
+    let (mut best, mut least) = ([s, zero], offset([s, zero], ab, ac, ap));
+    for on_edge in [[one - t, t], [zero, r]] {
+        let d = offset(on_edge, ab, ac, ap);
+        best = [d.less(least, on_edge[0], best[0]), d.less(least, on_edge[1], best[1])];
+        least = d.less(least, d, least);
     }
-    let along = |from: Vec3, to: Vec3| {
-        let edge = to - from;
-        ((p - from).dot(edge) / edge.length_squared()).clamp(0.0, 1.0)
-    };
-    let (s, t, r) = (along(a, b), along(b, c), along(a, c));
-    let on_edges = [[s, 0.0], [1.0 - t, t], [0.0, r]];
-    let distance = |[u, v]: [f64; 2]| (ab * u + ac * v - ap).length_squared();
-    let nearer = |x, y| if distance(y) < distance(x) { y } else { x };
-    nearer(nearer(on_edges[0], on_edges[1]), on_edges[2])
+    let bary = [zero.less(inside, u, best[0]), zero.less(inside, v, best[1])];
+
+    let rest = one - bary[0] - bary[1];
+    let x = a[0] * rest + b[0] * bary[0] + c[0] * bary[1];
+    let y = a[1] * rest + b[1] * bary[0] + c[1] * bary[1];
+    let z = a[2] * rest + b[2] * bary[0] + c[2] * bary[1];
+    let point = [x, y, z];
+    let away = sub(point, p);
+    Foot { bary, point, squared: dot(away, away) }
+}
+
+/// Squared distance of the point of the given weights from the one at `ap`.
+#[inline(always)]
+fn offset<V: Vector<f64, N>, const N: usize>(
+    [u, v]: [V; 2],
+    ab: [V; 3],
+    ac: [V; 3],
+    ap: [V; 3],
+) -> V {
+    let x = ab[0] * u + ac[0] * v - ap[0];
+    let y = ab[1] * u + ac[1] * v - ap[1];
+    let z = ab[2] * u + ac[2] * v - ap[2];
+    dot([x, y, z], [x, y, z])
+}
+
+#[inline(always)]
+fn clamp<V: Vector<f64, N>, const N: usize>(zero: V, one: V, x: V) -> V {
+    x.max(zero).min(one)
+}
+
+#[inline(always)]
+fn sub<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> [V; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn dot<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> V {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+fn cross<V: Vector<f64, N>, const N: usize>(a: [V; 3], b: [V; 3]) -> [V; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
