@@ -44,6 +44,21 @@ impl fmt::Display for Place {
     }
 }
 
+/// Something in an input that is passed over: harmless, but perhaps not meant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Warning {
+    /// Where.
+    pub place: Place,
+    /// What it is, and what becomes of it.
+    pub message: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.place, self.message)
+    }
+}
+
 /// Why a command could not do what it was asked.
 #[derive(Clone, Debug, Error)]
 #[non_exhaustive]

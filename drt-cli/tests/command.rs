@@ -1,8 +1,10 @@
 //! The `drt` program from outside: exit codes, files and messages.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
+mod common;
+
+use std::process::{Command, Stdio};
+
+use common::{Folder, expect};
 
 const SCENE: &str = r#"<scene version="3.0.0">
   <default name="rho" value="0.5"/>
@@ -34,51 +36,12 @@ target = "lamp"
 translate = [1.0, 0.0, 0.0]
 "#;
 
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new() -> Self {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let n = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("drt-command-{}-{n}", std::process::id()));
-        std::fs::create_dir_all(&path).unwrap();
-        std::fs::write(path.join("scene.xml"), SCENE).unwrap();
-        std::fs::write(path.join("job.toml"), JOB).unwrap();
-        Self(path)
-    }
-
-    fn command(&self, line: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_drt"));
-        command.current_dir(&self.0).args(line.split_whitespace());
-        command
-    }
-
-    fn run(&self, line: &str) -> Output {
-        self.command(line).output().unwrap()
-    }
-
-    fn json(&self, name: &str) -> serde_json::Value {
-        serde_json::from_slice(&std::fs::read(self.0.join(name)).unwrap()).unwrap()
-    }
-
-    fn exr(&self, name: &str) -> drt_cli::ExrFile {
-        drt_cli::read_exr(&self.0.join(name)).unwrap()
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
-#[track_caller]
-fn expect(output: &Output, code: i32, parts: &[&str]) {
-    let stderr = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(code), "{stderr}");
-    for part in parts {
-        assert!(stderr.contains(part), "expected `{part}` in: {stderr}");
-    }
+/// A folder with a scene and a job.
+fn folder() -> Folder {
+    let folder = Folder::new();
+    folder.file("scene.xml", SCENE);
+    folder.file("job.toml", JOB);
+    folder
 }
 
 fn means(image: &serde_json::Value) -> Vec<f64> {
@@ -87,7 +50,7 @@ fn means(image: &serde_json::Value) -> Vec<f64> {
 
 #[test]
 fn render_writes_everything_asked_for() {
-    let folder = Folder::new();
+    let folder = folder();
     let out = folder.run("render scene.xml -o a.exr --digest a.json --preview a.png");
     expect(&out, 0, &["16x8, 4 spp"]);
     assert!(out.stdout.is_empty());
@@ -96,12 +59,12 @@ fn render_writes_everything_asked_for() {
     assert_eq!(digest["derivatives"], serde_json::json!({}));
     assert!(means(&digest["image"])[0] > 0.0);
     assert_eq!(folder.exr("a.exr").layers.len(), 2);
-    assert!(std::fs::read(folder.0.join("a.png")).unwrap().starts_with(b"\x89PNG"));
+    assert!(std::fs::read(folder.path().join("a.png")).unwrap().starts_with(b"\x89PNG"));
 }
 
 #[test]
 fn options_reach_scene_and_job() {
-    let folder = Folder::new();
+    let folder = folder();
     let out = folder.run(
         "render scene.xml --digest - --quiet --spp 8 --size 9x5 --seed 3 --threads 1 --max-depth 2 \
          --sensor cam -D rho=0",
@@ -121,7 +84,7 @@ fn options_reach_scene_and_job() {
 
 #[test]
 fn same_seed_same_pixels_for_any_number_of_threads() {
-    let folder = Folder::new();
+    let folder = folder();
     for threads in [1, 3] {
         let line = format!("grad job.toml --quiet --terms --threads {threads} -o {threads}.exr");
         expect(&folder.run(&line), 0, &[]);
@@ -136,7 +99,7 @@ fn same_seed_same_pixels_for_any_number_of_threads() {
 
 #[test]
 fn gradients_pass_their_check() {
-    let folder = Folder::new();
+    let folder = folder();
     let out = folder.run("check job.toml --spp 512 --digest c.json -o c.exr");
     expect(&out, 0, &[]);
     let table = String::from_utf8_lossy(&out.stdout).into_owned();
@@ -147,7 +110,7 @@ fn gradients_pass_their_check() {
 
 #[test]
 fn info_lists_and_plans() {
-    let folder = Folder::new();
+    let folder = folder();
     let out = folder.run("info job.toml");
     expect(&out, 0, &[]);
     let text = String::from_utf8_lossy(&out.stdout).into_owned();
@@ -159,8 +122,8 @@ fn info_lists_and_plans() {
 
 #[test]
 fn unusable_input_exits_with_2_and_writes_nothing() {
-    let folder = Folder::new();
-    let write = |name: &str, text: &str| std::fs::write(folder.0.join(name), text).unwrap();
+    let folder = folder();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
     write("bad.xml", &SCENE.replace("type=\"rectangle\"", "type=\"torus\""));
     write("bad.toml", &JOB.replace("spp", "ssp"));
     write("alone.xml", "<scene version=\"3.0.0\"/>");
@@ -183,7 +146,7 @@ fn unusable_input_exits_with_2_and_writes_nothing() {
         ("paint scene.xml", "paint"),
         ("grad job.toml --loss t.exr", "--loss is not supported yet"),
         ("optimize job.toml", "later version"),
-        ("bench", "later version"),
+        ("bench", "<INPUTS>"),
     ] {
         let out = folder.run(&format!(
             "{line} {}",
@@ -195,7 +158,7 @@ fn unusable_input_exits_with_2_and_writes_nothing() {
         expect(&out, 2, &[part]);
         assert!(out.stdout.is_empty());
         for name in ["a.exr", "a.json", "a.png"] {
-            assert!(!Path::new(&folder.0.join(name)).exists(), "{line} wrote {name}");
+            assert!(!folder.path().join(name).exists(), "{line} wrote {name}");
         }
     }
     expect(&folder.run("--help"), 0, &[]);
@@ -204,14 +167,14 @@ fn unusable_input_exits_with_2_and_writes_nothing() {
 
 #[test]
 fn failures_while_writing_exit_with_3() {
-    let folder = Folder::new();
+    let folder = folder();
     expect(&folder.run("render scene.xml -o nowhere/a.exr"), 3, &["cannot write nowhere/a.exr"]);
     expect(&folder.run("render scene.xml --digest ."), 3, &["cannot write ."]);
 }
 
 #[test]
 fn stop_rules() {
-    let folder = Folder::new();
+    let folder = folder();
     let out = folder.run("render scene.xml --quiet --target-error 0.01 --digest a.json");
     expect(&out, 0, &[]);
     let [coarse, fine] = [0.01, 0.003].map(|target| {
@@ -234,7 +197,7 @@ fn stop_rules() {
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_what_is_finished() {
-    let folder = Folder::new();
+    let folder = folder();
     let mut command = folder.command("render scene.xml --seconds 600 --digest a.json -o a.exr");
     let child = command.stderr(Stdio::piped()).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_millis(700));

@@ -14,8 +14,9 @@ use drt_estimators::{EstimatorKind, InsideKind, Scene, Settings, Target};
 use drt_motion::Parameter;
 use toml::Spanned;
 
-use crate::error::{Place, read_text};
-use crate::{CliError, Defaults, load_scene};
+use crate::error::{Place, Warning, read_text};
+use crate::scene_xml::read_scene;
+use crate::{CliError, Defaults};
 use document::Document;
 use effects::Refusal;
 
@@ -43,6 +44,8 @@ pub struct Job {
     pub parameters: Vec<Parameter<String>>,
     /// Budgets and switches.
     pub settings: Settings,
+    /// What in the scene is passed over.
+    pub warnings: Vec<Warning>,
     /// Where each parameter stands.
     places: Vec<Place>,
     /// What stands in the way of derivatives.
@@ -60,27 +63,30 @@ pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
     let keys: keys::Job = document.parse()?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let scene_path = folder.join(&keys.scene);
-    let scene = load_scene(&scene_path, &overrides.defaults)?;
+    let (scene, warnings) = read_scene(&scene_path, &overrides.defaults)?;
     let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
     let settings = settings(&document, &keys, &scene)?;
     let refused = refused(&document, &keys);
     let path = path.into();
-    Ok(Job { path, text: Some(text), scene_path, scene, parameters, settings, places, refused })
+    let text = Some(text);
+    Ok(Job { path, text, scene_path, scene, parameters, settings, warnings, places, refused })
 }
 
 impl Job {
     /// A scene alone, with the number of samples its sensor asks for.
     ///
     /// # Errors
-    /// As [`load_scene`].
+    /// As [`load_scene`](crate::load_scene).
     pub fn from_scene(path: &Path, defaults: &Defaults) -> Result<Self, CliError> {
+        let (scene, warnings) = read_scene(path, defaults)?;
         let mut job = Self {
             path: path.into(),
             text: None,
             scene_path: path.into(),
-            scene: load_scene(path, defaults)?,
+            scene,
             parameters: Vec::new(),
             settings: Settings::default(),
+            warnings,
             places: Vec::new(),
             refused: None,
         };

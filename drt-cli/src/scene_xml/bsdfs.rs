@@ -34,6 +34,12 @@ impl<'a> Loader<'a> {
 
     fn two_sided(&self, p: &Properties<'a>) -> Result<TwoSided, CliError> {
         let sides = self.index.inner(p, "bsdf", None);
+        // Also what keeps a reference to itself from being followed for ever.
+        if let Some(s) = sides.iter().find(|s| s.target.attribute("type") == Some("twosided")) {
+            return Err(s
+                .child
+                .error("a twosided bsdf cannot be a side of another one, or its own"));
+        }
         let side = |i: usize| sides.get(i).map(|s| self.bsdf(s.target)).transpose();
         match (side(0)?, sides.len()) {
             (Some(front), 1 | 2) => Ok(TwoSided { front, back: side(1)? }),

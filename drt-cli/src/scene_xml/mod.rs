@@ -20,6 +20,7 @@ mod tests;
 mod transform;
 mod volumes;
 
+use std::cell::RefCell;
 use std::path::Path;
 
 use drt_estimators::surface::{Bsdf, Diffuse};
@@ -27,7 +28,7 @@ use drt_estimators::{Named, Scene};
 use drt_math::Rgb;
 
 use crate::CliError;
-use crate::error::read_text;
+use crate::error::{Warning, read_text};
 use element::Element;
 use index::Index;
 pub use source::Defaults;
@@ -38,6 +39,14 @@ use source::Source;
 /// # Errors
 /// Names the file, line and element of what is malformed, missing or not supported.
 pub fn load_scene(path: &Path, defaults: &Defaults) -> Result<Scene, CliError> {
+    read_scene(path, defaults).map(|(scene, _)| scene)
+}
+
+/// As [`load_scene`], with what was passed over.
+pub(crate) fn read_scene(
+    path: &Path,
+    defaults: &Defaults,
+) -> Result<(Scene, Vec<Warning>), CliError> {
     parse_scene(path, &read_text(path, None)?, defaults)
 }
 
@@ -55,21 +64,33 @@ pub fn load_scene(path: &Path, defaults: &Defaults) -> Result<Scene, CliError> {
 /// # Errors
 /// As [`load_scene`].
 pub fn parse_scene_str(xml: &str, base_dir: &Path) -> Result<Scene, CliError> {
-    parse_scene(&base_dir.join("scene.xml"), xml, &Defaults::new())
+    parse_scene(&base_dir.join("scene.xml"), xml, &Defaults::new()).map(|(scene, _)| scene)
 }
 
-fn parse_scene(path: &Path, text: &str, defaults: &Defaults) -> Result<Scene, CliError> {
+fn parse_scene(
+    path: &Path,
+    text: &str,
+    defaults: &Defaults,
+) -> Result<(Scene, Vec<Warning>), CliError> {
     let root = Source::new(defaults).read(path, text)?;
-    let index = Index::new(&root)?;
-    Loader { index }.scene(&root)
+    let loader = Loader { index: Index::new(&root)?, warnings: RefCell::default() };
+    let scene = loader.scene(&root)?;
+    Ok((scene, loader.warnings.into_inner()))
 }
 
 /// Turns elements into things of the scene.
 struct Loader<'a> {
     index: Index<'a>,
+    warnings: RefCell<Vec<Warning>>,
 }
 
 impl<'a> Loader<'a> {
+    /// Notes something harmless that is passed over.
+    fn warn(&self, e: &Element, message: impl std::fmt::Display) {
+        let warning = Warning { place: e.place.clone(), message: format!("{e}: {message}") };
+        self.warnings.borrow_mut().push(warning);
+    }
+
     fn scene(&self, root: &'a Element) -> Result<Scene, CliError> {
         let mut scene = Scene::default();
         for e in self.index.all("medium") {

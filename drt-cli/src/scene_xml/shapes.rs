@@ -18,6 +18,8 @@ use crate::CliError;
 const SPHERE_RESOLUTION: u32 = 64;
 /// Corners of a disk where none are given.
 const DISK_RESOLUTION: u32 = 128;
+/// Largest coordinate: products of three stay finite.
+const LARGEST: f64 = 1e100;
 
 /// A shape before its placement.
 struct Model {
@@ -43,7 +45,7 @@ impl<'a> Loader<'a> {
         bsdfs: &mut Vec<Named<Bsdf>>,
     ) -> Result<Shape, CliError> {
         let p = Properties::of(e)?;
-        let mesh = place(&p, model(&p)?)?;
+        let mesh = self.without_degenerate(e, place(&p, model(&p)?)?)?;
         let emitter = self.index.single(&p, "emitter", None)?;
         let bsdf = match self.index.single(&p, "bsdf", None)? {
             Some(bsdf) => self.counted(bsdf.child, bsdf.target)?,
@@ -53,6 +55,20 @@ impl<'a> Loader<'a> {
         p.finish()?;
         let emitter = emitter.map(|inner| self.counted(inner.child, inner.target)).transpose()?;
         Ok(Shape { id: e.id().map(Into::into), mesh: Arc::new(mesh), bsdf, boundary, emitter })
+    }
+
+    /// The mesh without triangles that cannot be seen or are there twice.
+    fn without_degenerate(&self, e: &Element, mesh: Mesh) -> Result<Mesh, CliError> {
+        let (clean, dropped) = mesh.drop_degenerate();
+        if clean.triangles.is_empty() {
+            return Err(e.error("no triangle of this shape has an area"));
+        }
+        if dropped > 0 {
+            let all = mesh.triangles.len();
+            let message = format!("dropped {dropped} of {all} triangles: no area, or there before");
+            self.warn(e, message);
+        }
+        Ok(clean)
     }
 
     /// The number of what `child` stands for among things of its kind.
@@ -140,8 +156,9 @@ fn place(p: &Properties<'_>, model: Model) -> Result<Mesh, CliError> {
         return Err(p.element.error(message));
     }
     let mut mesh = model.mesh.transform(&to_world);
-    if mesh.positions.iter().any(|v| !v.is_finite()) {
-        return Err(p.element.error("`to_world` moves vertices to infinity"));
+    if mesh.positions.iter().any(|v| !(v.max_abs() <= LARGEST)) {
+        let message = format!("a vertex has a coordinate that is not a number below {LARGEST:e}");
+        return Err(p.element.error(message));
     }
     let mirrored_inside_out = determinant < 0.0 && model.turns;
     if mirrored_inside_out != p.boolean("flip_normals")?.unwrap_or(false) {

@@ -17,6 +17,12 @@ pub type Defaults = BTreeMap<String, String>;
 /// Elements inside each other beyond this depth are refused: no scene needs them, and reading them
 /// takes stack.
 const MAX_NESTING: usize = 64;
+/// More files are refused: a few that include each other again and again can stand for billions.
+const MAX_FILES: usize = 4096;
+/// More elements are refused, all included files together.
+const MAX_ELEMENTS: usize = 1 << 20;
+/// Longest text, in bytes, that values of `$name` may make; each can double the one before.
+const MAX_TEXT: usize = 1 << 16;
 
 /// Reads one scene file and all it includes.
 pub(super) struct Source {
@@ -28,16 +34,20 @@ pub(super) struct Source {
     used: BTreeSet<String>,
     /// The files being read, outermost first.
     open: Vec<PathBuf>,
+    /// Files and elements read so far.
+    files: usize,
+    elements: usize,
 }
 
 impl Source {
     pub(super) fn new(given: &Defaults) -> Self {
-        Self { given: given.clone(), known: given.clone(), used: BTreeSet::new(), open: Vec::new() }
+        let (given, known) = (given.clone(), given.clone());
+        Self { given, known, used: BTreeSet::new(), open: Vec::new(), files: 0, elements: 0 }
     }
 
     /// The tree of a scene's text; `path` names it in messages and anchors relative paths.
     pub(super) fn read(mut self, path: &Path, text: &str) -> Result<Element, CliError> {
-        let mut root = self.parse(path, text)?;
+        let mut root = self.parse(path, text, 0)?;
         if let Some(name) = self.given.keys().find(|k| !self.used.contains(*k)) {
             return Err(CliError::input(
                 &Place::file(path),
@@ -48,7 +58,13 @@ impl Source {
         Ok(root)
     }
 
-    fn parse(&mut self, path: &Path, text: &str) -> Result<Element, CliError> {
+    /// The tree of one file, whose root stands inside `depth` elements.
+    fn parse(&mut self, path: &Path, text: &str, depth: usize) -> Result<Element, CliError> {
+        self.files += 1;
+        if self.files > MAX_FILES {
+            let message = format!("the scene includes more than {MAX_FILES} files");
+            return Err(CliError::input(&Place::file(path), message));
+        }
         let document = Document::parse(text).map_err(|e| {
             let at = e.pos();
             let place = Place { line: Some(at.row), column: Some(at.col), ..Place::file(path) };
@@ -70,7 +86,7 @@ impl Source {
         })?;
         let dialect = Dialect::of_version(version, &place)?;
         self.open.push(path.canonicalize().unwrap_or_else(|_| path.into()));
-        let scene = self.element(&file, root, dialect, 0)?;
+        let scene = self.element(&file, root, dialect, depth)?;
         self.open.pop();
         scene.only_attributes(&["version"])?;
         Ok(scene)
@@ -88,6 +104,11 @@ impl Source {
             let message = format!("elements nest deeper than {MAX_NESTING}");
             return Err(CliError::input(&place, message));
         }
+        self.elements += 1;
+        if self.elements > MAX_ELEMENTS {
+            let message = format!("the scene has more than {MAX_ELEMENTS} elements");
+            return Err(CliError::input(&place, message));
+        }
         let attributes = node
             .attributes()
             .map(|a| Ok((a.name().to_owned(), self.substitute(a.value(), &place)?)))
@@ -99,14 +120,14 @@ impl Source {
             }
             if child.is_element() {
                 let child = self.element(file, child, dialect, depth + 1)?;
-                self.add(&mut element, child)?;
+                self.add(&mut element, child, depth + 1)?;
             }
         }
         Ok(element)
     }
 
     /// Adds a child, unless it is an instruction to the reader itself.
-    fn add(&mut self, parent: &mut Element, child: Element) -> Result<(), CliError> {
+    fn add(&mut self, parent: &mut Element, child: Element, depth: usize) -> Result<(), CliError> {
         match child.tag.as_str() {
             "default" => {
                 child.only_attributes(&["name", "value"])?;
@@ -119,20 +140,20 @@ impl Source {
             }
             "include" => {
                 child.only_attributes(&["filename"])?;
-                parent.children.extend(self.include(&child)?.children);
+                parent.children.extend(self.include(&child, depth)?.children);
             }
             _ => parent.children.push(child),
         }
         Ok(())
     }
 
-    fn include(&mut self, at: &Element) -> Result<Element, CliError> {
+    fn include(&mut self, at: &Element, depth: usize) -> Result<Element, CliError> {
         let path = at.resolve(at.required("filename")?);
         let text = read_text(&path, Some(&at.place))?;
         if self.open.contains(&path.canonicalize().unwrap_or_else(|_| path.clone())) {
             return Err(at.error(format!("{} includes itself", path.display())));
         }
-        self.parse(&path, &text)
+        self.parse(&path, &text, depth)
     }
 
     /// The text with every `$name` replaced by the value of the longest known name that fits.
@@ -153,6 +174,10 @@ impl Source {
                 return Err(CliError::input(place, message));
             };
             out.push_str(value);
+            if out.len() > MAX_TEXT {
+                let message = format!("${name} makes a text longer than {MAX_TEXT} bytes");
+                return Err(CliError::input(place, message));
+            }
             rest = &rest[name.len()..];
             self.used.insert(name.clone());
         }
