@@ -100,3 +100,58 @@ pub(super) fn chain(twins: &[Twin], first: u32) -> impl Iterator<Item = &Twin> {
     let next = |twin: &&Twin| twins.get(twin.next as usize);
     core::iter::successors(twins.get(first as usize), next)
 }
+
+#[cfg(test)]
+mod tests {
+    use drt_math::{Rng, vec3};
+
+    use super::{BLOCK, Block};
+    use crate::Ray;
+    use crate::query::lanes::{Lanes, Machine, Task};
+    use crate::query::watertight::ShearedRay;
+
+    struct Crossed<'a>(&'a Block, &'a ShearedRay, &'a mut u32);
+
+    impl Task for Crossed<'_> {
+        fn run<L: Lanes>(self, lanes: L) {
+            *self.2 = self.0.crossed(lanes, self.1);
+        }
+    }
+
+    #[test]
+    fn no_crossing_is_lost_in_a_block() {
+        let mut rng = Rng::new(1, 0, 0);
+        let (mut crossings, mut more) = (0, 0);
+        for i in 0..100_000 {
+            // Coordinates that are often the same make ties.
+            let mut point = || {
+                let mut x = || match i % 2 {
+                    0 => f64::from(rng.next_u32() % 5) - 2.0,
+                    _ => rng.next_f64() * 4.0 - 2.0,
+                };
+                [x(), x(), x()]
+            };
+            let [ox, oy, oz] = point();
+            let [dx, dy, dz] = point();
+            let ray = Ray::new(vec3(ox, oy, oz), vec3(dx, dy, dz + 0.25));
+            let ray = ShearedRay::new(&ray);
+            let mut block = Block::EMPTY;
+            for lane in 0..i % (BLOCK + 1) {
+                block.set(lane, lane as u32, &[point(), point(), point()]);
+            }
+            let mut expected = 0;
+            for lane in 0..block.len() {
+                expected |= u32::from(ray.cross(&block.triangle(lane)).is_some()) << lane;
+            }
+            for machine in [Machine::Portable, Machine::detect()] {
+                let mut mask = 0;
+                machine.run(Crossed(&block, &ray, &mut mask));
+                assert_eq!(mask & expected, expected);
+                assert!(mask < 1 << block.len());
+                more += (mask & !expected).count_ones();
+            }
+            crossings += expected.count_ones();
+        }
+        assert!(crossings > 10_000 && more < crossings, "{crossings} {more}");
+    }
+}

@@ -270,3 +270,77 @@ mod x86 {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use drt_math::Rng;
+
+    use super::{Lanes, Machine, Task, Vector};
+
+    struct Everything<'a>([[f64; 4]; 2], &'a mut Vec<u64>);
+
+    impl Task for Everything<'_> {
+        fn run<L: Lanes>(self, lanes: L) {
+            let [x, y] = self.0;
+            let (a, b) = (lanes.doubles(&x), lanes.doubles(&y));
+            let zero = lanes.double(0.0);
+            for v in [a + b, a - b, a * b, a / b, a.min(b), a.max(b), a.less(b, a, zero)] {
+                self.1.extend(v.array().map(f64::to_bits));
+            }
+            self.1.push(a.le(b).into());
+            let eight = |x: [f64; 4]| [0, 1, 2, 3, 0, 1, 2, 3].map(|i| x[i] as f32);
+            let (a, b) = (lanes.singles(&eight(x)), lanes.singles(&eight(y)));
+            let zero = lanes.single(0.0);
+            for v in [a + b, a - b, a * b, a / b, a.min(b), a.max(b), a.less(b, a, zero)] {
+                self.1.extend(v.array().map(|x| u64::from(x.to_bits())));
+            }
+            self.1.push(a.le(b).into());
+        }
+    }
+
+    #[test]
+    fn the_machine_and_arrays_give_the_same_bits() {
+        let odd = [0.0, -0.0, 1e-310, -1e-40, 1.0 / 3.0];
+        let mut rng = Rng::new(2, 0, 0);
+        let mut number = || match rng.next_u32() % 8 {
+            i @ 0..5 => odd[i as usize],
+            _ => (rng.next_f64() - 0.5) * 1e3,
+        };
+        for _ in 0..10_000 {
+            let x = [0; 4].map(|_| number());
+            let y = [0; 4].map(|_| number());
+            let [arrays, machine] = [Machine::Portable, Machine::detect()].map(|machine| {
+                let mut bits = Vec::new();
+                machine.run(Everything([x, y], &mut bits));
+                bits
+            });
+            // The sign of a NaN from 0/0 is anybody's.
+            let nan = |(i, b): (usize, &u64)| match i {
+                0..29 => f64::from_bits(*b).is_nan(),
+                _ => f32::from_bits(*b as u32).is_nan(),
+            };
+            for (i, (a, m)) in arrays.iter().zip(&machine).enumerate() {
+                assert!(a == m || (nan((i, a)) && nan((i, m))), "{i} of {x:?} {y:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_nan_loses_and_is_at_most_nothing() {
+        struct Nan;
+        impl Task for Nan {
+            fn run<L: Lanes>(self, lanes: L) {
+                let (nan, one) = (lanes.double(f64::NAN), lanes.double(1.0));
+                assert_eq!(nan.min(one).array(), [1.0; 4]);
+                assert_eq!(nan.max(one).array(), [1.0; 4]);
+                assert!(one.min(nan).array()[0].is_nan() && one.max(nan).array()[0].is_nan());
+                assert_eq!((nan.le(one), one.le(nan), one.le(one)), (0, 0, 0b1111));
+                assert_eq!(nan.less(one, nan, one).array(), [1.0; 4]);
+            }
+        }
+        Machine::Portable.run(Nan);
+        Machine::detect().run(Nan);
+    }
+}

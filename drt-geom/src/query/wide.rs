@@ -16,8 +16,7 @@ pub(super) const LEAF: u32 = 1 << 31;
 /// Stands where a node has no child.
 pub(super) const NO_CHILD: u32 = u32::MAX;
 
-/// Entries of the stack before it moves to the heap, which takes a tree of 70 million triangles or
-/// one that is very uneven.
+/// Entries of the stack before it goes on in the heap: enough unless a tree is huge or very uneven.
 const STACK: usize = 64;
 
 /// An inner node, four lines of cache.
@@ -206,6 +205,7 @@ fn entry(begin: f32, child: u32) -> u64 {
     u64::from(begin.to_bits()) << 32 | u64::from(child)
 }
 
+/// What is left to visit.
 struct Stack {
     entries: [u64; STACK],
     len: usize,
@@ -235,5 +235,32 @@ impl Stack {
         }
         self.len = self.len.checked_sub(1)?;
         self.entries.get(self.len).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec::Vec;
+
+    use super::{STACK, Stack};
+
+    #[test]
+    fn a_stack_holds_more_than_it_has_room_for() {
+        let mut stack = Stack { entries: [0; STACK], len: 0, spilled: Vec::new() };
+        let mut model = Vec::new();
+        for round in 0..10 {
+            for i in 0..STACK as u64 / 2 {
+                stack.push(round << 32 | i);
+                model.push(round << 32 | i);
+            }
+            for _ in 0..round {
+                assert_eq!(stack.pop(), model.pop());
+            }
+        }
+        assert!(model.len() > 2 * STACK);
+        while let Some(e) = model.pop() {
+            assert_eq!(stack.pop(), Some(e));
+        }
+        assert_eq!(stack.pop(), None);
     }
 }
