@@ -33,8 +33,7 @@ impl Tracer<'_> {
                     let weight = medium.transmittance(start, dir, length, rng, &mut stats);
                     DistanceSample::Pass { weight }
                 } else if let Some((other, excess)) = world.drawn_by(m) {
-                    let sparse = other.coefficients().sigma_t.to_array().iter().any(|s| *s <= 0.0);
-                    let defensive = if sparse { 0.1 } else { 0.0 };
+                    let defensive = world.defensive_where_thin(m, other);
                     reweighted(
                         other.sample_distance(length, Rgb::ONE, defensive, rng),
                         length,

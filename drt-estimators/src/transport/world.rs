@@ -3,14 +3,14 @@
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-use drt_geom::{Hit, Ray, Skip, TriangleBvh};
+use drt_geom::{Aabb, Hit, Ray, Skip, TriangleBvh};
 use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::{Homogeneous, Medium, TrackingStats};
 
 use super::lights::LightTable;
 use super::scatter::Scattering;
 use super::vertex::{Contact, Kind, SurfacePoint, Vertex};
-use crate::scene::{Scene, Surrounding};
+use crate::scene::{Scene, Shape, Surrounding};
 use crate::surface::Bsdf;
 use crate::{Counters, Error};
 
@@ -127,9 +127,11 @@ pub(crate) struct World {
     pub(crate) camera_medium: Option<usize>,
     pub(crate) tracking: Vec<Tracking>,
     /// Least probability of a scattering vertex per tentative collision, per medium: nonzero
-    /// where derivatives need vertices in empty space.
+    /// where derivatives need vertices in empty or thin space.
     pub(crate) defensive: Vec<f64>,
     needs: Needs,
+    /// How far light can go in each medium, at most.
+    extent: Vec<f64>,
     /// Where set, no discrete choice depends on values that may differ between this scene and
     /// another: the extinctions by which distances in homogeneous media are drawn instead of their
     /// own.
@@ -206,6 +208,7 @@ impl World {
             tracking,
             defensive: alloc::vec![0.0; scene.media.len()],
             needs: Needs::default(),
+            extent: (0..scene.media.len()).map(|m| extent(&scene, m, 2.0 * radius)).collect(),
             steady: like
                 .map(|w| w.scene.media.iter().map(|m| m.item.homogeneous().copied()).collect()),
             max_depth: depth,
@@ -229,19 +232,23 @@ impl World {
             if *need == MediumNeed::Nothing {
                 continue;
             }
-            // Where every channel attenuates, free flights reach everything by themselves.
-            let sparse = self
-                .medium(m)
-                .homogeneous()
-                .is_none_or(|h| h.coefficients().sigma_t.to_array().into_iter().any(|s| s <= 0.0));
-            if sparse {
-                self.defensive[m] = DEFENSIVE;
-            }
+            self.defensive[m] = match self.medium(m).homogeneous() {
+                Some(h) => self.defensive_where_thin(m, h),
+                None => DEFENSIVE,
+            };
             if *need == MediumNeed::Vertices {
                 self.tracking[m] = Tracking::Vertices;
             }
         }
         self.needs = needs;
+    }
+
+    /// The least probability of a vertex per flight through a homogeneous filling of medium `m`: zero
+    /// where free flights stop inside more often than that by themselves.
+    pub(crate) fn defensive_where_thin(&self, m: usize, filling: &Homogeneous) -> f64 {
+        let sigma_t = filling.coefficients().sigma_t.to_array();
+        let thin = |s: f64| s * self.extent[m] < DEFENSIVE;
+        if sigma_t.into_iter().any(thin) { DEFENSIVE } else { 0.0 }
     }
 
     /// The medium by whose extinction distances are drawn, and its extinction less the medium's own;
@@ -597,4 +604,13 @@ impl World {
             _ => Rgb::ZERO,
         }
     }
+}
+
+/// The diagonal of the box around the surfaces that hold a medium; `all` where none do.
+fn extent(scene: &Scene, medium: usize, all: f64) -> f64 {
+    let holds = |s: &&Shape| s.boundary.is_some_and(|b| b.interior == Some(medium));
+    let meshes = scene.shapes.iter().filter(holds).map(|s| &s.mesh);
+    let corners = meshes.map(|m| m.bounds()).flat_map(|b| [b.min, b.max]);
+    let bounds = Aabb::around(corners);
+    if bounds.is_empty() { all } else { (bounds.max - bounds.min).length() }
 }
