@@ -105,8 +105,10 @@ pub fn examine(claim: &Claim, samples: u32) -> Result<Finding> {
     }
 }
 
-/// Compares a number where there is one pixel, and images by their blocks.
-fn compare(a: &Layer, b: &Layer, value: f64) -> Difference {
+/// Compares a number where there is one pixel, and images by their blocks. Deviations below a
+/// millionth of `value` or of either image do not count.
+#[must_use]
+pub fn compare(a: &Layer, b: &Layer, value: f64) -> Difference {
     let stderr = a.total.stderr.g.hypot(b.total.stderr.g);
     let negligible = NEGLIGIBLE * value.max(a.rms_value()).max(b.rms_value());
     let (rms_z, agrees) = if a.pixels.len() == 1 {

@@ -13,6 +13,7 @@ pub mod oracle;
 pub mod region;
 pub mod rooms;
 pub mod scene;
+pub mod stability;
 pub mod trial;
 
 /// A result whose error is for a reader of test output.

@@ -4,10 +4,10 @@
 //! A [`Stage`] is a scene with [`Cell`]s, one per parameter. [`Row`] is a cell's verdict.
 
 mod cell;
-mod effects;
+pub(crate) mod effects;
 pub mod lights;
 pub mod media;
-mod set;
+pub(crate) mod set;
 pub mod surfaces;
 mod verdict;
 

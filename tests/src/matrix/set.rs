@@ -127,26 +127,26 @@ fn emitting(emitter: Emitter) -> SceneEmitter {
 
 /// A Lambertian reflector.
 #[must_use]
-pub(super) fn diffuse(reflectance: [f64; 3]) -> Bsdf {
+pub(crate) fn diffuse(reflectance: [f64; 3]) -> Bsdf {
     Bsdf::Diffuse(Diffuse { reflectance: reflectance.into() })
 }
 
 /// A mesh stretched along the axes, turned about an axis, and put at a place, in this order.
 #[must_use]
-pub(super) fn placed(mesh: &Mesh, size: Vec3, axis: Vec3, angle: f64, at: Vec3) -> Mesh {
+pub(crate) fn placed(mesh: &Mesh, size: Vec3, axis: Vec3, angle: f64, at: Vec3) -> Mesh {
     let linear = Mat3::rotation(axis.normalize(), angle) * Mat3::diagonal(size);
     mesh.transform(&Affine { linear, translation: at })
 }
 
 /// A mesh stretched along the axes and put at a place.
 #[must_use]
-pub(super) fn at(mesh: &Mesh, size: Vec3, place: Vec3) -> Mesh {
+pub(crate) fn at(mesh: &Mesh, size: Vec3, place: Vec3) -> Mesh {
     placed(mesh, size, Vec3::X, 0.0, place)
 }
 
 /// The mesh with its normals turned over.
 #[must_use]
-pub(super) fn inside_out(mut mesh: Mesh) -> Mesh {
+pub(crate) fn inside_out(mut mesh: Mesh) -> Mesh {
     mesh.flip();
     mesh
 }
