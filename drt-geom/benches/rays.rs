@@ -4,7 +4,7 @@
 //!
 //! Without a mesh, a bumpy sphere of 82 000 triangles. Contenders take turns on the same short
 //! batches of rays, and each row gives the medians over the batches, so that what else the machine
-//! does meanwhile weighs little. The reference is the compact tree, and a peer if there is one: a
+//! does meanwhile weighs little. The references are the portable walk, and a peer if there is one: a
 //! program that is given the paths of two files, the triangles (a `u64` count, then nine `f64`
 //! each) and the rays (a count, then origin, direction and end), and answers each line
 //! `closest|any FIRST COUNT` with the seconds these rays took and how many of them hit something.
@@ -28,9 +28,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let start = Instant::now();
     let bvh = TriangleBvh::build(&triangles)?;
     let built = start.elapsed().as_secs_f64();
-    let compact = bvh.clone().portable();
+    let portable = bvh.clone().portable();
     println!("{} triangles, built in {:.0} ms", triangles.len(), built * 1e3);
-    println!("rays                  Mrays/s   to compact   to peer   hits");
+    println!("rays                  Mrays/s  to portable   to peer   hits");
     for (name, rays) in ray_sets(&bvh) {
         if options.only.as_ref().is_some_and(|only| !name.contains(only.as_str())) {
             continue;
@@ -40,11 +40,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             None => None,
         };
         for query in [Query::Closest, Query::Any, Query::Crossings] {
-            let row = measure(query, &rays, &bvh, &compact, peer.as_mut())?;
+            let row = measure(query, &rays, &bvh, &portable, peer.as_mut())?;
             println!("{name:10} {:9} {row}", query.name());
         }
     }
-    nearest(&bvh, &compact);
+    nearest(&bvh, &portable);
     Ok(())
 }
 
@@ -145,7 +145,7 @@ fn measure(
     query: Query,
     rays: &[Ray],
     bvh: &TriangleBvh,
-    compact: &TriangleBvh,
+    portable: &TriangleBvh,
     mut peer: Option<&mut Peer>,
 ) -> Result<String, Box<dyn Error>> {
     let mut hits = Vec::new();
@@ -154,11 +154,11 @@ fn measure(
         let hit = query.run(bvh, batch, &mut hits);
         (start.elapsed().as_secs_f64(), hit)
     };
-    let (mut own, mut to_compact, mut to_peer, mut found) = (vec![], vec![], vec![], 0);
+    let (mut own, mut to_portable, mut to_peer, mut found) = (vec![], vec![], vec![], 0);
     for (i, batch) in rays.chunks(BATCH).enumerate() {
         let (seconds, hit) = timed(bvh, batch);
         own.push(batch.len() as f64 / seconds * 1e-6);
-        to_compact.push(timed(compact, batch).0 / seconds);
+        to_portable.push(timed(portable, batch).0 / seconds);
         found += hit;
         if let Some(peer) = peer.as_mut().filter(|_| !matches!(query, Query::Crossings)) {
             to_peer.push(peer.seconds(query, i * BATCH, batch.len())? / seconds);
@@ -166,14 +166,14 @@ fn measure(
     }
     let ratio = |r: Vec<f64>| if r.is_empty() { "-".into() } else { format!("{:.3}", median(r)) };
     let hit_rate = found as f64 / rays.len() as f64;
-    let (own, to_compact, to_peer) = (median(own), ratio(to_compact), ratio(to_peer));
-    Ok(format!("{own:8.2} {to_compact:>12} {to_peer:>9}   {hit_rate:.3}"))
+    let (own, to_portable, to_peer) = (median(own), ratio(to_portable), ratio(to_peer));
+    Ok(format!("{own:8.2} {to_portable:>12} {to_peer:>9}   {hit_rate:.3}"))
 }
 
-fn nearest(bvh: &TriangleBvh, compact: &TriangleBvh) {
+fn nearest(bvh: &TriangleBvh, portable: &TriangleBvh) {
     let bounds = bvh.bounds();
     let mut rng = Rng::new(2, 0, 0);
-    let (mut own, mut to_compact) = (vec![], vec![]);
+    let (mut own, mut to_portable) = (vec![], vec![]);
     for _ in 0..BATCHES {
         let point = |_| {
             let u = vec3(rng.next_f64(), rng.next_f64(), rng.next_f64()) * 2.0 - Vec3::splat(1.0);
@@ -189,9 +189,9 @@ fn nearest(bvh: &TriangleBvh, compact: &TriangleBvh) {
         };
         let seconds = timed(bvh);
         own.push(points.len() as f64 / seconds * 1e-6);
-        to_compact.push(timed(compact) / seconds);
+        to_portable.push(timed(portable) / seconds);
     }
-    println!("points     nearest   {:8.2} {:12.3}", median(own), median(to_compact));
+    println!("points     nearest   {:8.2} {:12.3}", median(own), median(to_portable));
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
