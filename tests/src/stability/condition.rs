@@ -5,14 +5,14 @@ use std::fmt;
 use drt_estimators::{
     InsideKind, Layer, Rendering, Scene, Session, Settings, Target, Unattended, gradient,
 };
-use drt_math::Rgb;
-use drt_motion::{Change, Effect, Parameter, ValueChange};
+use drt_math::{Affine, Mat3, Rgb, Vec3};
+use drt_motion::{Change, Effect, GeometryChange, Parameter, ValueChange};
 
 use super::pairing::{pair, targets};
 use crate::Result;
 use crate::comparison::{Difference, compare};
 use crate::judge::LIMIT;
-use crate::motion::changes;
+use crate::motion::{changes, moves};
 
 /// A scene with what is differentiated in it.
 #[derive(Clone, Debug)]
@@ -168,7 +168,7 @@ fn transposed(scene: &Scene, parameter: &Parameter) -> Result<Transposed> {
 }
 
 /// The parameter with every change stated for the item that has it: properties for materials and
-/// emitters instead of shapes, and motions for those that follow.
+/// emitters instead of shapes, motions for those that follow, a vertex as one of all.
 fn by_item(scene: &Scene, parameter: &Parameter) -> Result<Parameter> {
     let mut effects = Vec::new();
     for effect in &parameter.effects {
@@ -176,6 +176,20 @@ fn by_item(scene: &Scene, parameter: &Parameter) -> Result<Parameter> {
             (Change::Follow(leader), _) => {
                 let led = parameter.effects.iter().filter(|e| e.target == *leader);
                 effects.extend(led.map(|e| Effect { target: effect.target.clone(), ..e.clone() }));
+            }
+            (Change::Geometry(GeometryChange::Vertex { index, direction }), Target::Shape(s)) => {
+                let mut velocities = vec![Vec3::ZERO; scene.shapes[s].mesh.positions.len()];
+                velocities[*index as usize] = *direction;
+                let all = GeometryChange::VertexVelocity(velocities.into());
+                effects.push(moves(&effect.target, all));
+            }
+            (Change::Property(_), Target::Emitter(e))
+                if scene.emitters[e].item.emitter.is_delta() =>
+            {
+                // The same for what lights without a shape move by.
+                let linear = Mat3::skew(Vec3::splat(1e-100));
+                let least = GeometryChange::Matrix(Affine { linear, translation: Vec3::ZERO });
+                effects.extend([effect.clone(), moves(&effect.target, least)]);
             }
             (Change::Property(p), Target::Shape(s)) => {
                 let shape = &scene.shapes[s];
