@@ -19,8 +19,9 @@ use std::time::Instant;
 use drt_geom::{Hit, Mesh, Ray, Skip, TriangleBvh, procedural};
 use drt_math::{Rng, Vec3, vec3};
 
-const BATCH: usize = 8_000;
-const BATCHES: usize = 48;
+/// Rays of a batch: less than a millisecond, so that most batches are not interrupted.
+const BATCH: usize = 1_000;
+const BATCHES: usize = 400;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse()?;
