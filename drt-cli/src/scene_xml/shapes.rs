@@ -156,7 +156,7 @@ fn place(p: &Properties<'_>, model: Model) -> Result<Mesh, CliError> {
         return Err(p.element.error(message));
     }
     let mut mesh = model.mesh.transform(&to_world);
-    if mesh.positions.iter().any(|v| !(v.max_abs() <= LARGEST)) {
+    if mesh.positions.iter().any(|v| !v.is_finite() || v.max_abs() > LARGEST) {
         let message = format!("a vertex has a coordinate that is not a number below {LARGEST:e}");
         return Err(p.element.error(message));
     }
