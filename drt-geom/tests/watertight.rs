@@ -1,4 +1,4 @@
-//! No ray slips through a closed surface, and none of obvhs's traps catches one.
+//! No ray slips through a closed surface, and none of the traps catches one that obvhs 0.4 has.
 
 mod common;
 

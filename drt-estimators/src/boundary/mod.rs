@@ -41,6 +41,7 @@ use crate::sensor::SensorGradient;
 use crate::transport::flight::{Flight, Travel};
 use crate::transport::importance::Splat;
 use crate::transport::lights::{LightKind, LightTable};
+use crate::transport::world::short_of;
 use crate::transport::{Kind, RadianceBySegments, RayPath, SurfacePoint, Tracer, Vertex, World};
 
 /// How a boundary segment is found.
@@ -406,7 +407,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         let mut ray = core::mem::take(&mut self.b.ray);
         let world = self.tracer.world;
         world.cast_past(at.x, at.edge.faces, medium, w, &mut ray, &mut self.tracer.counters);
-        let open = ray.length >= distance;
+        let open = ray.length >= short_of(at.x, distance);
         let mut tau = None;
         if open {
             ray.cut(distance);

@@ -21,7 +21,7 @@ use super::edges::Edge;
 use crate::emitter::{Emitter, EmitterGradient};
 use crate::sensitivity::{Functional, Rate};
 use crate::transport::trace::Tracer;
-use crate::transport::world::{Tracking, intervals};
+use crate::transport::world::{Tracking, intervals, short_of};
 use crate::transport::{RayPath, SurfacePoint, World};
 
 /// Edges whose shadows are looked for along camera rays.
@@ -219,7 +219,7 @@ impl Shadows {
             Source::Point(_, Some(s)) => {
                 b.segment.end.as_ref().is_some_and(|(p, _)| p.prim == s.prim)
             }
-            _ => b.segment.length >= distance,
+            _ => b.segment.length >= short_of(x, distance),
         };
         if !reached {
             return None;

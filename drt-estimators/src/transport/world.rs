@@ -491,7 +491,7 @@ impl World {
         counters.rays += 1;
         let Skip([start, _]) = Self::skip_of(v);
         let skip = target.map_or(Skip::one(start), |end| Skip::two(start, end));
-        let ray = Ray { origin: v.x, dir, t_max: distance };
+        let ray = Ray { origin: v.x, dir, t_max: short_of(v.x, distance) };
         if !self.any_null {
             return !self.bvh.any(&ray, skip, |_| true);
         }
@@ -613,4 +613,10 @@ fn extent(scene: &Scene, medium: usize, all: f64) -> f64 {
     let corners = meshes.map(|m| m.bounds()).flat_map(|b| [b.min, b.max]);
     let bounds = Aabb::around(corners);
     if bounds.is_empty() { all } else { (bounds.max - bounds.min).length() }
+}
+
+/// A distance from `x`, less what rounding may add to it: a surface in which a camera or light sits
+/// does not hide it.
+pub(crate) fn short_of(x: Vec3, distance: f64) -> f64 {
+    distance - 8.0 * f64::EPSILON * (x.length() + distance)
 }

@@ -19,7 +19,7 @@ const PADDING: f64 = 1.0 / (1 << 18) as f64;
 
 /// Length (largest coordinate) of a box ray's direction. So short that the padding alone keeps a ray
 /// in the box it starts in for a t of one or more: traversals that ignore everything below some
-/// small t (obvhs does below 1e-4) then still see every box.
+/// small t (some do below 1e-4) then still see every box.
 const SPEED: f64 = 1.0 / (1 << 20) as f64;
 
 /// Direction coordinates nearer to zero than this are zero, and their inverse is that of this: over the
