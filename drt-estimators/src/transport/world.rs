@@ -618,5 +618,6 @@ fn extent(scene: &Scene, medium: usize, all: f64) -> f64 {
 /// A distance from `x`, less what rounding may add to it: a surface in which a camera or light sits
 /// does not hide it.
 pub(crate) fn short_of(x: Vec3, distance: f64) -> f64 {
-    distance - 8.0 * f64::EPSILON * (x.length() + distance)
+    // The sky stays infinitely far.
+    distance * (1.0 - 8.0 * f64::EPSILON) - 8.0 * f64::EPSILON * x.length()
 }
