@@ -62,7 +62,6 @@ impl Row {
 /// The rows of a trial: its value, and its derivatives in order.
 #[must_use]
 pub fn rows(trial: &Trial, measured: &Measurement, effort: &Effort) -> Vec<Row> {
-    let expected: Vec<f64> = trial.parameters.iter().map(|(_, d)| *d).collect();
     let row = |what: &str, number: Number, expected: f64, scale: f64| Row {
         trial: trial.name.clone(),
         what: what.into(),
@@ -76,7 +75,7 @@ pub fn rows(trial: &Trial, measured: &Measurement, effort: &Effort) -> Vec<Row> 
     };
     let mut rows = vec![row("value", measured.value, trial.value, trial.value.abs())];
     let derivatives = trial.parameters.iter().zip(&measured.derivatives);
-    let scales = effort.scales(trial.value, &expected);
+    let scales = effort.scales(trial);
     rows.extend(derivatives.zip(scales).map(|(((p, d), n), s)| row(&p.name, *n, *d, s)));
     rows
 }

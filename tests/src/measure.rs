@@ -14,8 +14,10 @@ use crate::trial::Trial;
 pub struct Effort {
     /// Standard error over the number's scale.
     pub noise: f64,
-    /// The part of a scene's largest derivative below which a derivative counts as near zero.
+    /// The part of the largest derivative below which a derivative counts as near zero.
     pub near_zero: f64,
+    /// The largest derivative is that of the whole case, not of the scene alone.
+    pub of_case: bool,
     /// Samples after which it is given up.
     pub samples: u32,
 }
@@ -46,13 +48,18 @@ pub struct Measurement {
 
 impl Effort {
     /// What the noise of each derivative is compared with: its size, or where that is near zero, the
-    /// size of the largest of the scene (that of the value, where all are zero).
+    /// size of the largest (that of the value, where all are zero).
     #[must_use]
-    pub fn scales(&self, value: f64, derivatives: &[f64]) -> Vec<f64> {
-        let largest = derivatives.iter().fold(0.0_f64, |m, d| m.max(d.abs()));
-        let largest = if largest > 0.0 { largest } else { value.abs() };
+    pub fn scales(&self, trial: &Trial) -> Vec<f64> {
+        let derivatives = || trial.parameters.iter().map(|(_, d)| d);
+        let largest = if self.of_case {
+            trial.largest_of_case
+        } else {
+            derivatives().fold(0.0_f64, |m, d| m.max(d.abs()))
+        };
+        let largest = if largest > 0.0 { largest } else { trial.value.abs() };
         let scale = |d: &f64| if d.abs() < self.near_zero * largest { largest } else { d.abs() };
-        derivatives.iter().map(scale).collect()
+        derivatives().map(scale).collect()
     }
 }
 
@@ -61,9 +68,8 @@ impl Effort {
 /// # Errors
 /// When the library rejects the scene.
 pub fn measure(trial: &Trial, effort: &Effort) -> Result<Measurement> {
-    let expected: Vec<f64> = trial.parameters.iter().map(|(_, d)| *d).collect();
     let parameters: Vec<Parameter> = trial.parameters.iter().map(|(p, _)| p.clone()).collect();
-    let scales = effort.scales(trial.value, &expected);
+    let scales = effort.scales(trial);
     measure_scaled(&trial.built, &parameters, trial.unit, trial.value.abs(), &scales, effort)
         .map_err(|e| format!("{}: {e}", trial.name).into())
 }

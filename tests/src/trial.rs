@@ -27,6 +27,8 @@ pub struct Trial {
     pub parameters: Vec<(Parameter, f64)>,
     /// Relative deviation that the detector's own width may cause.
     pub bias: f64,
+    /// Size of the largest derivative of the case, in all its rows.
+    pub largest_of_case: f64,
 }
 
 impl Trial {
@@ -44,6 +46,7 @@ impl Trial {
         let name = name.into();
         let fail = |e| format!("{name}: {e}");
         let built = build(scene, detector).map_err(fail)?;
+        let largest_of_case = parameters.iter().fold(0.0, |m, p| f64::max(m, p.derivative.abs()));
         let parameters = parameters
             .iter()
             .map(|p| Ok((parameter(&built, p).map_err(fail)?, p.derivative)))
@@ -52,7 +55,7 @@ impl Trial {
             Detector::Radiance { .. } => crate::detector::RAY_BIAS,
             _ => 1e-9,
         };
-        Ok(Self { name, built, unit: 1.0, value, parameters, bias })
+        Ok(Self { name, built, unit: 1.0, value, parameters, bias, largest_of_case })
     }
 
     /// Everything a case asks for.
@@ -62,7 +65,11 @@ impl Trial {
     pub fn of_case(case: &Case) -> Result<Vec<Self>> {
         if !case.rows.is_empty() {
             let rows = case.rows.iter().map(|row| slab(&case.id, row));
-            return Ok(rows.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect());
+            let mut trials: Vec<Self> =
+                rows.collect::<Result<Vec<_>>>()?.into_iter().flatten().collect();
+            let largest = trials.iter().fold(0.0, |m, t| f64::max(m, t.largest_of_case));
+            trials.iter_mut().for_each(|t| t.largest_of_case = largest);
+            return Ok(trials);
         }
         let value = case.value.ok_or_else(|| format!("{}: has no value", case.id))?;
         let case = &in_wide_pixels(case);

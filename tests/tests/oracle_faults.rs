@@ -7,7 +7,7 @@ use drt_tests::motion::scaled;
 use drt_tests::oracle::OracleFile;
 use drt_tests::trial::Trial;
 
-const EFFORT: Effort = Effort { noise: 0.02, near_zero: 1.0, samples: 1 << 20 };
+const EFFORT: Effort = Effort { noise: 0.02, near_zero: 1.0, of_case: false, samples: 1 << 20 };
 
 /// Each kind's first scene.
 fn trials() -> Vec<Trial> {

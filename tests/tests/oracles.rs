@@ -3,6 +3,8 @@
 //! The tests that run by default are quick; `--ignored` runs the strict ones. `DRT_ORACLES=FILE`
 //! reads another file of the same form.
 
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
 use drt_tests::judge::{Row, Table, rows};
 use drt_tests::measure::{Effort, measure};
 use drt_tests::oracle::OracleFile;
@@ -11,22 +13,43 @@ use drt_tests::trial::Trial;
 /// Runs all cases of a kind and judges them.
 fn check(kind: &str, effort: &Effort) {
     let file = OracleFile::read().unwrap();
-    let mut all: Vec<Row> = Vec::new();
-    for case in file.cases.iter().filter(|c| c.kind == kind) {
-        for trial in Trial::of_case(case).unwrap() {
-            let measured = measure(&trial, effort).unwrap();
-            assert_eq!(measured.non_finite, 0, "{}", trial.name);
-            all.extend(rows(&trial, &measured, effort));
-        }
-    }
+    let cases = file.cases.iter().filter(|c| c.kind == kind);
+    let trials: Vec<Trial> = cases.flat_map(|c| Trial::of_case(c).unwrap()).collect();
+    let all: Vec<Row> = on_all_cores(&trials, |trial| {
+        let measured = measure(trial, effort).unwrap();
+        assert_eq!(measured.non_finite, 0, "{}", trial.name);
+        let rows = rows(trial, &measured, effort);
+        eprintln!("{}", Table(&rows));
+        rows
+    });
     println!("{}", Table(&all));
     assert!(!all.is_empty(), "the file has no case of kind `{kind}`");
     let failing = all.iter().filter(|row| !row.passes()).count();
     assert_eq!(failing, 0, "{failing} of {} numbers fail", all.len());
 }
 
-/// Every number to 0.3 %, those near zero to 0.3 % of the largest of their scene.
-const STRICT: Effort = Effort { noise: 0.003, near_zero: 0.01, samples: 1 << 30 };
+/// Does something for each trial, and keeps their order.
+fn on_all_cores<T: Send>(trials: &[Trial], of: impl Fn(&Trial) -> Vec<T> + Sync) -> Vec<T> {
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        while let Some((i, trial)) = trials.iter().enumerate().nth(next.fetch_add(1, Relaxed)) {
+            done.push((i, of(trial)));
+        }
+        done
+    };
+    let mut all = std::thread::scope(|scope| {
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
+        threads.into_iter().flat_map(|t| t.join().unwrap()).collect::<Vec<_>>()
+    });
+    all.sort_by_key(|(i, _)| *i);
+    all.into_iter().flat_map(|(_, rows)| rows).collect()
+}
+
+/// Every number to 0.3 %, those near zero (less than a twentieth of the largest) to 0.3 % of the
+/// largest of their case.
+const STRICT: Effort = Effort { noise: 0.003, near_zero: 0.05, of_case: true, samples: 1 << 30 };
 
 macro_rules! kinds {
     ($($kind:ident: $noise:literal;)*) => {
@@ -34,7 +57,7 @@ macro_rules! kinds {
             /// To a percent of the scene's largest derivative.
             #[test]
             fn $kind() {
-                let quick = Effort { noise: $noise, near_zero: 1.0, samples: 1 << 22 };
+                let quick = Effort { noise: $noise, near_zero: 1.0, of_case: false, samples: 1 << 22 };
                 check(stringify!($kind), &quick);
             }
         )*
