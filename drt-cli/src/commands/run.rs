@@ -34,6 +34,11 @@ pub(super) fn open_changed(input: &Path, changes: &Changes) -> Result<Job, CliEr
         changes.refuse_set(input)?;
         Job::from_scene(input, &overrides.defaults)?
     };
+    if !changes.quiet {
+        for warning in &job.warnings {
+            eprintln!("drt: warning: {warning}");
+        }
+    }
     if let Some(name) = &changes.sensor {
         job.select_sensor(name)?;
     }
