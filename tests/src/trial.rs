@@ -182,8 +182,9 @@ fn identical_layers(case: &Case) -> Result<Option<Trial>> {
     Ok(Some(Trial::new(name, &scene, &case.detector, numbers.value, &interface)?))
 }
 
-/// A slab in place of the infinite one: a box this many thicknesses wide.
-const SLAB_WIDTH: f64 = 20.0;
+/// A slab in place of the infinite one: a box this many thicknesses wide. Past its rim a meter below sees
+/// the sky itself, in proportion to the inverse square of the width.
+const SLAB_WIDTH: f64 = 120.0;
 /// Not 1, so that the two derivatives by the optical thickness differ.
 const SLAB_THICKNESS: f64 = 0.8;
 
