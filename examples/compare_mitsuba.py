@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Compares forward images of drt and Mitsuba 3, scene file by scene file.
 
-    python3 -m venv /tmp/mitsuba && /tmp/mitsuba/bin/pip install mitsuba numpy
+    python3 -m venv target/mitsuba && target/mitsuba/bin/pip install mitsuba numpy
     cargo build --release -p drt-cli
-    /tmp/mitsuba/bin/python examples/compare_mitsuba.py
+    target/mitsuba/bin/python examples/compare_mitsuba.py
 
 Each scene is rendered by both programs from the same file. The image is cut into 8 x 8 blocks;
 compared are the means of the inner 6 x 6, in standard errors: Mitsuba's film divides by the sum of

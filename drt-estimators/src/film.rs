@@ -392,3 +392,31 @@ impl Layer {
         self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A block that saw nothing is as uncertain as one event among its samples.
+    #[test]
+    fn errors_hold_one_event_more() {
+        let (size, units) = ([8, 8], 64);
+        let blocks = Blocks::new(size);
+        let mut film = PixelFilm::new(size, 1);
+        let mut tile = Tile::new(0..64, 1);
+        for unit in 0..units {
+            for pixel in 0..64 {
+                let seen = pixel == 5 && unit == 7;
+                let value = if seen { -3.0 } else { 0.0 };
+                tile.push(&blocks, pixel, unit, &[Rgb::splat(value)]);
+            }
+        }
+        film.merge(&tile);
+        film.advance(units);
+        let image = film.layer(0, &blocks);
+        let one = 3.0 / f64::from(units);
+        assert!((image.blocks[40].stderr.g - one).abs() < 1e-12);
+        assert!(image.blocks[5].stderr.g > 1.3 * one);
+        assert!((image.blocks[5].mean.g + one).abs() < 1e-12);
+    }
+}

@@ -621,3 +621,16 @@ pub(crate) fn short_of(x: Vec3, distance: f64) -> f64 {
     // The sky stays infinitely far.
     distance * (1.0 - 8.0 * f64::EPSILON) - 8.0 * f64::EPSILON * x.length()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_give_way_by_rounding_alone() {
+        let x = drt_math::vec3(1e6, -2.0, 3.0);
+        assert_eq!(short_of(x, f64::INFINITY), f64::INFINITY);
+        let given = 1.5 - short_of(x, 1.5);
+        assert!(given > 1e-10 && given < 1e-8, "{given}");
+    }
+}
