@@ -26,7 +26,7 @@ pub struct Plan {
     pub record: bool,
     /// Shapes that move under some parameter.
     pub moving_shapes: Vec<String>,
-    /// Edges that can be silhouettes of something, out of all edges.
+    /// Edges at which visibility can change, out of all edges.
     pub edges: [u64; 2],
     /// Boundary segments to the camera are sampled.
     pub primary: bool,

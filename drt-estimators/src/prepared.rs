@@ -31,7 +31,7 @@ impl Prepared {
         settings: &Settings,
     ) -> Result<Self, Error> {
         let moving = interest.moves_geometry();
-        let boundary = if moving { Boundary::new(&world)? } else { Boundary::default() };
+        let boundary = if moving { Boundary::new(&world, interest)? } else { Boundary::default() };
         let flux = Flux::new(&world, flux_shapes);
         let mut sources = Vec::new();
         if moving {

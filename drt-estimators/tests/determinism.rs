@@ -7,8 +7,8 @@ use common::*;
 use drt_estimators::{
     Layer, Rendering, Scene, SceneGradient, Session, Settings, Unattended, gradient,
 };
-use drt_math::Rgb;
-use drt_motion::Parameter;
+use drt_math::{Rgb, vec3};
+use drt_motion::{GeometryChange, Parameter};
 
 fn settings(threads: usize, seed: u64) -> Settings {
     Settings { spp: 20, seed, threads, terms: true, ..Settings::default() }
@@ -113,10 +113,12 @@ fn the_seed_decides_everything() {
 #[test]
 fn parameters_do_not_disturb_each_other() {
     let scene = surfaces(phong(), phong());
-    let ball = parameter("ball", 0.0, vec![moves("ball", turn())]);
-    let floor = parameter("floor", 0.0, vec![moves("floor", shift())]);
-    let alone = rendered(&scene, core::slice::from_ref(&ball), &settings(1, 5));
-    let both = rendered(&scene, &[floor, ball], &settings(1, 5));
+    // Of the same shape, so that the same edges count for both.
+    let slide = parameter("slide", 0.0, vec![moves("ball", shift())]);
+    let up = GeometryChange::Translate(vec3(0.1, 0.2, 0.3));
+    let lift = parameter("lift", 0.0, vec![moves("ball", up)]);
+    let alone = rendered(&scene, core::slice::from_ref(&lift), &settings(1, 5));
+    let both = rendered(&scene, &[slide, lift], &settings(1, 5));
     assert_eq!(alone.image.pixels, both.image.pixels);
     let (a, b) = (&alone.derivatives[0].total.pixels, &both.derivatives[1].total.pixels);
     for (a, b) in a.iter().zip(b) {

@@ -62,7 +62,10 @@ pub fn move_mesh(
             }
             fields[c.parameter].add(Field::Vertices(velocities), &moved.positions);
         } else if let Some(step) = Step::new(c) {
-            moved = moved.transform(&step.map);
+            // Normals are made unit anew, which would not leave them the same bits.
+            if step.map != Affine::IDENTITY {
+                moved = moved.transform(&step.map);
+            }
             for field in &mut fields {
                 field.carry(&step);
             }

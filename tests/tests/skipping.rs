@@ -13,8 +13,8 @@ use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::{Bsdf, Diffuse};
 use drt_estimators::{
-    Counters, MediumBoundary, Named, Rendering, Scene, SceneEmitter, SceneSensor, Session,
-    Settings, Shape, Surrounding, Unattended,
+    Counters, Layer, MediumBoundary, Named, Rendering, Scene, SceneEmitter, SceneSensor, Session,
+    Settings, Shape, Surrounding, Term, Unattended, agreement,
 };
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, ValueChange, Vec3, vec3};
@@ -138,6 +138,11 @@ fn rendered(scene: &Scene, parameters: &[Parameter], spp: u32) -> Rendering {
     r
 }
 
+fn term(r: &Rendering, term: Term) -> &Layer {
+    let mut terms = r.derivatives[0].terms.iter();
+    &terms.find(|(t, _)| *t == term).expect("the term was sampled").1
+}
+
 #[test]
 fn no_medium() {
     let r = rendered(&crowd(), &moves(&["thing 25"]), 4);
@@ -194,12 +199,62 @@ fn no_parameters() {
     }
 }
 
+/// Edges that rest count only where what moves can be seen past them.
 #[test]
 fn one_object_of_fifty_moves() {
-    let r = rendered(&crowd(), &moves(&["thing 25"]), 4);
-    assert_eq!(r.plan.moving_shapes, ["thing 25"]);
-    assert!(r.plan.primary && r.plan.direct && r.plan.indirect);
-    assert_eq!(r.counters.differentiated_paths, 4 * PIXELS);
+    let all: Vec<String> = (1..OBJECTS).map(|i| format!("thing {i}")).collect();
+    let all: Vec<&str> = all.iter().map(String::as_str).collect();
+    let every = rendered(&crowd(), &moves(&all), 4).plan.edges;
+    let one = rendered(&crowd(), &moves(&["thing 25"]), 4).plan;
+    assert_eq!((one.moving_shapes.len(), one.edges[1]), (1, every[1]));
+    assert!(one.primary && one.direct && one.indirect);
+    assert!(one.edges[0] * 5 < every[0] * 2, "{:?} of {every:?}", one.edges);
+}
+
+/// What rests is not looked at by what rests: a camera alone moves only what it sees itself, a bulb
+/// only its own shadows.
+#[test]
+fn a_camera_or_a_bulb_alone() {
+    let camera = rendered(&crowd(), &moves(&["camera"]), 4).plan;
+    assert_eq!((camera.primary, camera.direct, camera.indirect), (true, false, false));
+    let bulb = rendered(&crowd(), &moves(&["bulb"]), 4).plan;
+    assert_eq!((bulb.primary, bulb.direct, bulb.indirect), (false, true, false));
+    // Where these terms are sampled for the sake of others, not one sample counts for these two.
+    for (target, skipped) in
+        [("camera", [Term::Direct, Term::Indirect]), ("bulb", [Term::Primary, Term::Indirect])]
+    {
+        let company = rendered(&crowd(), &in_company(moves(&[target])), 16);
+        for t in skipped {
+            assert!(term(&company, t).pixels.iter().all(|p| p.mean.is_zero()), "{target} {t:?}");
+        }
+    }
+    // In a haze around both, insides move with them, and everything counts.
+    let hazy = rendered(&hazy(homogeneous()), &moves(&["bulb"]), 4).plan;
+    assert!(hazy.primary && hazy.direct && hazy.indirect);
+}
+
+/// Everything moves with the second parameter, so that no edge is skipped for the first.
+fn in_company(mut parameters: Vec<Parameter>) -> Vec<Parameter> {
+    let scene = crowd();
+    let shapes = scene.shapes.iter().filter_map(|s| s.id.as_deref());
+    let all: Vec<&str> = shapes.chain(["camera", "bulb"]).collect();
+    parameters.extend(moves(&all).into_iter().map(|p| Parameter { name: "all".into(), ..p }));
+    parameters
+}
+
+/// Nothing that counts is left out: a derivative is the same whether edges are skipped or not.
+#[test]
+fn skipped_edges_contribute_nothing() {
+    let scene = crowd();
+    for target in ["thing 25", "thing 3", "floor", "lamp"] {
+        let alone = rendered(&scene, &moves(&[target]), 512);
+        let company = rendered(&scene, &in_company(moves(&[target])), 512);
+        let verdict = |layer: &Layer| agreement(layer, &company.derivatives[0].total, None);
+        let found = verdict(&alone.derivatives[0].total);
+        assert!(found.agrees, "{target}: {found:?}");
+        let without = verdict(term(&alone, Term::Interior));
+        assert!(!without.agrees, "{target} does not need its boundary: {without:?}");
+    }
 }
 
 /// The median of the seconds that each task takes, taken in turns.
@@ -242,6 +297,13 @@ fn the_time_is_not_spent() {
     println!("materials / no parameters     {:.2}", painted / forward);
     println!("one moves / no parameters     {:.2}", single / forward);
     println!("one moves / all move          {:.2}", single / crowded);
+    // What skipping edges is worth: the variance of one's boundary terms among all edges, over that
+    // among those that count.
+    let [alone, company] = [one.clone(), in_company(one)].map(|p| rendered(&vacuum, &p, 512));
+    for t in [Term::Primary, Term::Direct, Term::Indirect] {
+        let [a, b] = [&alone, &company].map(|r| term(r, t).relative_noise(Some(1.0)).powi(2));
+        println!("variance of the term {:<9} {:.2}", t.name(), b / a);
+    }
     // Generous: machines are busy.
     assert!(still < 1.5 * forward && painted < 3.0 * forward && closed < tracked);
 }

@@ -24,7 +24,7 @@ pub(crate) struct Edge {
     across: [Vec3; 2],
     /// Angle between the faces, 0 for an open edge.
     between: f64,
-    shape: u32,
+    pub(super) shape: u32,
     /// Corners of the first face that are `a` and `b`.
     corners: [u8; 2],
     /// Where segments that graze the edge run: before the faces, behind them, or on an open edge.
@@ -33,7 +33,7 @@ pub(crate) struct Edge {
 
 /// The side of an edge's faces on which it can be grazed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
+pub(super) enum Side {
     Front,
     Back,
     Unknown,
@@ -51,6 +51,43 @@ pub(crate) struct EdgePoint<'a> {
 }
 
 impl Edge {
+    /// An edge between two `ends` of faces with the given corners `opposite` to it; `None` where it
+    /// has no length or a face no area.
+    pub(super) fn new(
+        ends: [Vec3; 2],
+        opposite: [Vec3; 2],
+        faces: [u32; 2],
+        shape: u32,
+        corners: [u8; 2],
+        side: Side,
+    ) -> Option<Self> {
+        let [a, b] = ends;
+        let length = (b - a).length();
+        let tangent = (b - a) / length;
+        let across = opposite.map(|c| (c - a).reject(tangent).normalize());
+        let [h0, h1] = across;
+        let usable = tangent.is_finite() && h0.is_finite() && h1.is_finite() && length > 0.0;
+        let between = fm::atan2(h0.cross(h1).length(), h0.dot(h1));
+        usable.then_some(Self {
+            a,
+            b,
+            length,
+            tangent,
+            faces,
+            across,
+            between,
+            shape,
+            corners,
+            side,
+        })
+    }
+
+    /// Normals of the faces' planes. Directions that graze the edge with both faces on one side have
+    /// products of the same sign with both.
+    pub(super) fn plane_normals(&self) -> [Vec3; 2] {
+        self.across.map(|h| h.cross(self.tangent))
+    }
+
     /// The unit normal of the plane of the edge and the unit direction `w`, towards the side where
     /// the faces lie; `None` unless all of them lie strictly on one side.
     pub(crate) fn occluded_side(&self, w: Vec3) -> Option<Vec3> {
@@ -137,13 +174,14 @@ pub(crate) struct EdgeTable {
 }
 
 impl EdgeTable {
-    /// Keeps the edges of positive weight; `None` when there are none.
+    /// Takes the edges that matter and have positive weight; `None` when there are none.
     pub(crate) fn new(
         edges: &[Edge],
+        matters: impl Fn(&Edge) -> bool,
         weight: impl Fn(&Edge) -> f64,
     ) -> Result<Option<Self>, Error> {
         let kept: Vec<(Edge, f64)> =
-            edges.iter().map(|e| (*e, weight(e))).filter(|(_, w)| *w > 0.0).collect();
+            edges.iter().map(|e| (*e, weight(e))).filter(|(e, w)| *w > 0.0 && matters(e)).collect();
         if kept.is_empty() {
             return Ok(None);
         }
@@ -202,39 +240,21 @@ pub(crate) fn collect(world: &World) -> (Vec<Edge>, u64) {
                 continue;
             }
             let [a, b] = e.vertices.map(|v| mesh.positions[v as usize]);
-            let length = (b - a).length();
-            let tangent = (b - a) / length;
             let face = mesh.triangles[e.faces[0] as usize];
             let corner = |v: u32| face.iter().position(|c| *c == v);
             let (Some(ca), Some(cb)) = (corner(e.vertices[0]), corner(e.vertices[1])) else {
                 continue;
             };
-            let across =
-                |k: usize| (mesh.positions[e.opposite[k] as usize] - a).reject(tangent).normalize();
-            let open = e.faces[1] == NONE;
-            let h0 = across(0);
-            let h1 = if open { h0 } else { across(1) };
+            let second = usize::from(e.faces[1] != NONE);
+            let opposite = [0, second].map(|k| mesh.positions[e.opposite[k] as usize]);
+            let faces = [0, second].map(|k| world.prim_of(i, e.faces[k]));
             let side = match e.class {
                 EdgeClass::Convex => Side::Front,
                 EdgeClass::Concave => Side::Back,
                 _ => Side::Unknown,
             };
-            let prim = |k: usize| world.prim_of(i, e.faces[k]);
-            let edge = Edge {
-                a,
-                b,
-                length,
-                tangent,
-                faces: [prim(0), if open { prim(0) } else { prim(1) }],
-                across: [h0, h1],
-                between: fm::atan2(h0.cross(h1).length(), h0.dot(h1)),
-                shape: i as u32,
-                corners: [ca as u8, cb as u8],
-                side,
-            };
-            if edge.tangent.is_finite() && h0.is_finite() && h1.is_finite() && length > 0.0 {
-                edges.push(edge);
-            }
+            let corners = [ca as u8, cb as u8];
+            edges.extend(Edge::new([a, b], opposite, faces, i as u32, corners, side));
         }
     }
     (edges, all)

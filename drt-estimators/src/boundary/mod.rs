@@ -23,20 +23,20 @@
 
 pub(crate) mod border;
 mod edges;
+mod movers;
 pub(crate) mod shadow;
 
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, Vec3};
 
-use edges::{EdgePoint, sine};
-pub(crate) use edges::{EdgeTable, collect, seen_along, seen_from};
-
+use edges::{EdgePoint, EdgeTable, collect, seen_along, seen_from, sine};
+use movers::Movers;
 use shadow::Shadows;
 
 use crate::Error;
 use crate::emitter::{Emitter, EmitterGradient};
-use crate::sensitivity::{Functional, Rate};
+use crate::sensitivity::{Functional, Interest, Rate};
 use crate::sensor::SensorGradient;
 use crate::transport::flight::{Flight, Travel};
 use crate::transport::importance::Splat;
@@ -66,7 +66,7 @@ pub(crate) struct Boundary {
     lights: Vec<Option<EdgeTable>>,
     /// Shadow boundaries in media that are found along camera rays instead.
     pub(crate) shadows: Option<Shadows>,
-    /// Edges kept and edges in all.
+    /// Edges at which visibility can change, and edges in all.
     pub(crate) count: [u64; 2],
 }
 
@@ -97,26 +97,31 @@ pub(crate) struct Buffers {
 }
 
 impl Boundary {
-    pub(crate) fn new(world: &World) -> Result<Self, Error> {
-        let (edges, all) = collect(world);
-        let general = EdgeTable::new(&edges, EdgeTable::general_weight)?;
+    /// The edges at which something can change of what is of interest.
+    pub(crate) fn new(world: &World, interest: &Interest) -> Result<Self, Error> {
+        let movers = Movers::new(world, interest);
+        let (mut edges, all) = collect(world);
+        edges.retain(|e| movers.matter_to(e));
+        let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
         let eye = world.camera.position();
-        let camera = EdgeTable::new(&edges, |e| seen_from(e, eye))?;
-        let lights = world
-            .scene
-            .emitters
-            .iter()
-            .map(|e| match e.item.emitter {
-                Emitter::Point { position, .. } | Emitter::Spot { position, .. } => {
-                    EdgeTable::new(&edges, |e| seen_from(e, position))
-                }
-                Emitter::Directional { direction, .. } => {
-                    EdgeTable::new(&edges, |e| seen_along(e, direction))
-                }
-                _ => Ok(None),
-            })
-            .collect::<Result<_, _>>()?;
-        let shadows = Shadows::new(world, &edges);
+        let camera = EdgeTable::new(&edges, |e| movers.pass_camera(e, eye), |e| seen_from(e, eye))?;
+        let light = |i: usize, emitter: &Emitter| match *emitter {
+            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => EdgeTable::new(
+                &edges,
+                |e| movers.pass_emitter(e, i, |x| x - position),
+                |e| seen_from(e, position),
+            ),
+            Emitter::Directional { direction, .. } => EdgeTable::new(
+                &edges,
+                |e| movers.pass_emitter(e, i, |_| direction),
+                |e| seen_along(e, direction),
+            ),
+            _ => Ok(None),
+        };
+        let emitters = world.scene.emitters.iter().enumerate();
+        let lights = emitters.map(|(i, e)| light(i, &e.item.emitter)).collect::<Result<_, _>>()?;
+        let lit = edges.iter().filter(|e| movers.pass_lights(world, e)).copied().collect();
+        let shadows = Shadows::new(world, lit);
         Ok(Self { count: [edges.len() as u64, all], general, camera, lights, shadows })
     }
 

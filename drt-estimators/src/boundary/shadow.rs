@@ -62,14 +62,13 @@ impl Shadows {
     /// More edges than this are left to splatting.
     pub(crate) const MOST_EDGES: usize = 96;
 
-    /// Takes the edges of a scene in which lights shine into media, if they are few.
-    pub(crate) fn new(world: &World, edges: &[Edge]) -> Option<Self> {
+    /// Takes edges of a scene in which lights shine into media, if they are few.
+    pub(crate) fn new(world: &World, edges: Vec<Edge>) -> Option<Self> {
         let lit = world.max_depth >= 2
             && world.tracking.contains(&Tracking::Vertices)
             && (world.lights.has_areas()
                 || world.scene.emitters.iter().any(|e| e.item.emitter.is_delta()));
-        (lit && !edges.is_empty() && edges.len() <= Self::MOST_EDGES)
-            .then(|| Self { edges: edges.to_vec() })
+        (lit && !edges.is_empty() && edges.len() <= Self::MOST_EDGES).then_some(Self { edges })
     }
 
     /// Calls `add` with the functional and the weight of each shadow boundary along a camera ray.
