@@ -63,14 +63,19 @@ def by_mitsuba(mi, path, defaults, options):
     return passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(len(passes))
 
 
-def by_drt(path, defaults, options):
-    command = [options.drt, "render", path, "--spp", options.spp, "--digest", "-", "--quiet"]
+def digest(drt, path, defaults, options):
+    """What drt says of an image it renders."""
+    command = [drt, "render", path, "--digest", "-", "--quiet", *options]
     for name, value in defaults.items():
         command += ["-D", f"{name}={value}"]
     run = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
     if run.returncode != 0:
         sys.exit(f"{path}: drt failed: {run.stderr.strip()}")
-    grid = json.loads(run.stdout)["image"]["blocks"]
+    return json.loads(run.stdout)
+
+
+def by_drt(path, defaults, options):
+    grid = digest(options.drt, path, defaults, ["--spp", options.spp])["image"]["blocks"]
     return (np.array(grid[key]).reshape(CELLS, CELLS, 3) for key in ("mean", "stderr"))
 
 

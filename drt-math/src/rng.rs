@@ -37,7 +37,7 @@ impl Rng {
             counter: [0, index, stream as u32, (stream >> 32) as u32],
             block: [0; 4],
             used: 4,
-            points: SobolSampler::new(0, 0),
+            points: SobolSampler::UNUSED,
             leading: 0,
         }
     }

@@ -11,7 +11,7 @@ mod directions;
 #[cfg(test)]
 mod tests;
 
-use directions::{DIMENSIONS, DIRECTIONS};
+use directions::{BY_NIBBLE, DIMENSIONS};
 
 /// Number of dimensions with generator matrices of their own.
 pub const SET_DIMENSIONS: u32 = DIMENSIONS as u32;
@@ -48,6 +48,9 @@ impl SobolSampler {
         Self { index, seed, dimension: 0, shuffled: shuffled(index, 0, seed) }
     }
 
+    /// Stands where no points are asked for.
+    pub(crate) const UNUSED: Self = Self { index: 0, seed: 0, dimension: 0, shuffled: 0 };
+
     /// The next coordinate, in (0, 1).
     #[inline]
     pub fn next_f64(&mut self) -> f64 {
@@ -75,15 +78,11 @@ fn shuffled(index: u32, set: u32, seed: u32) -> u32 {
 
 #[inline]
 fn coordinate(shuffled: u32, dimension: u32, seed: u32) -> f64 {
+    let index = shuffled.reverse_bits();
+    let table = &BY_NIBBLE[(dimension % SET_DIMENSIONS) as usize];
     let mut digits = 0;
-    let mut rest = shuffled.reverse_bits();
-    for direction in &DIRECTIONS[(dimension % SET_DIMENSIONS) as usize] {
-        if rest == 0 {
-            break;
-        }
-        // A mask, not a branch: index bits are as good as random.
-        digits ^= direction & (rest & 1).wrapping_neg();
-        rest >>= 1;
+    for (k, row) in table.iter().enumerate() {
+        digits ^= row[(index >> (4 * k) & 15) as usize];
     }
     let digits = nested_uniform_scramble(digits, mix(seed, dimension)).reverse_bits();
     (f64::from(digits) + 0.5) * (1.0 / 4_294_967_296.0)

@@ -81,10 +81,10 @@ impl Tracer<'_> {
             if beta.is_zero() {
                 return;
             }
-            let mut ray = core::mem::take(&mut self.ray);
+            let mut ray = self.ray.take().unwrap_or_default();
             world.cast(&vertex, wo, &mut ray, &mut self.counters);
             let next = self.toward_camera(vertex.x, wo, &ray, beta, segments + 1, splats);
-            self.ray = ray;
+            self.ray = Some(ray);
             let Some((v, arrival, f)) = next else { return };
             beta *= arrival;
             (vertex, wi, flight) = (v, -wo, f);

@@ -1,4 +1,7 @@
 //! Choosing emitters for next-event estimation.
+//!
+//! The constant environment is not among them: scattering finds it by itself, with densities
+//! proportional to all that varies but visibility, and no light sample would improve on that.
 
 use alloc::vec::Vec;
 
@@ -17,8 +20,6 @@ enum Entry {
     Triangle { emitter: u32, prim: u32, area: f64 },
     /// A point, spot or directional light.
     Delta { emitter: u32 },
-    /// The constant environment.
-    Environment { emitter: u32 },
 }
 
 /// An emitter chosen by the table, not yet a point of it.
@@ -50,8 +51,6 @@ pub(crate) enum LightKind {
     Position,
     /// A directional light.
     Direction,
-    /// A direction of the environment.
-    Environment,
 }
 
 /// A sampled point or direction of an emitter, seen from somewhere.
@@ -65,10 +64,9 @@ pub(crate) struct LightSample {
     pub(crate) y: Vec3,
     /// Infinite for directions.
     pub(crate) distance: f64,
-    /// Radiance (area, environment), I/r² (position) or irradiance (direction).
+    /// Radiance (area), I/r² (position) or irradiance (direction).
     pub(crate) value: Rgb,
-    /// 1 over the density: solid angle for areas and the environment, selection probability for
-    /// delta lights.
+    /// 1 over the density: solid angle for areas, selection probability for delta lights.
     pub(crate) inv_pdf: f64,
     /// Solid-angle density; 0 for delta lights, which nothing else can hit.
     pub(crate) pdf: f64,
@@ -83,7 +81,7 @@ pub(crate) struct LightTable {
     area_radiance: Vec<Rgb>,
     /// Selection probability per unit area of each soup triangle's emitter.
     density: Vec<f64>,
-    environment: Option<(usize, Rgb, f64)>,
+    environment: Option<(usize, Rgb)>,
     /// Lights with a position inside a scattering medium: emitter index, selection probability,
     /// position; and the sum of the probabilities.
     inside: (Vec<(usize, f64, Vec3)>, f64),
@@ -101,6 +99,7 @@ impl LightTable {
         let mut entries = Vec::new();
         let mut weights = Vec::new();
         let count: usize = scene.shapes.iter().map(|s| s.mesh.triangles.len()).sum();
+        let mut environment = None;
         let mut area_radiance = alloc::vec![Rgb::ZERO; scene.emitters.len()];
         for (i, shape) in scene.shapes.iter().enumerate() {
             let Some(e) = shape.emitter else { continue };
@@ -116,9 +115,12 @@ impl LightTable {
         }
         for (e, named) in scene.emitters.iter().enumerate() {
             let emitter = e as u32;
-            match &named.item.emitter {
+            match named.item.emitter {
                 Emitter::Area { .. } => continue,
-                Emitter::Constant { .. } => entries.push(Entry::Environment { emitter }),
+                Emitter::Constant { radiance } => {
+                    environment = Some((e, radiance));
+                    continue;
+                }
                 _ => entries.push(Entry::Delta { emitter }),
             }
             weights.push((named.item.emitter.power(radius), 1.0));
@@ -146,19 +148,13 @@ impl LightTable {
             table,
             area_radiance,
             density: alloc::vec![0.0; count],
-            environment: None,
+            environment,
             inside: (Vec::new(), 0.0),
         };
         for (i, entry) in lights.entries.iter().enumerate() {
             let pmf = lights.table.as_ref().map_or(0.0, |t| t.pmf(i));
             match *entry {
                 Entry::Triangle { prim, area, .. } => lights.density[prim as usize] = pmf / area,
-                Entry::Environment { emitter } => {
-                    let e = emitter as usize;
-                    if let Emitter::Constant { radiance } = scene.emitters[e].item.emitter {
-                        lights.environment = Some((e, radiance, pmf));
-                    }
-                }
                 Entry::Delta { emitter } => {
                     let e = emitter as usize;
                     if let Some(at) = scene.emitters[e].item.emitter.position() {
@@ -176,7 +172,7 @@ impl LightTable {
 
     /// The environment: emitter index and radiance.
     pub(crate) fn environment(&self) -> Option<(usize, Rgb)> {
-        self.environment.map(|(e, l, _)| (e, l))
+        self.environment
     }
 
     /// Lights with a position inside a scattering medium, for equiangular sampling: emitter index,
@@ -201,11 +197,6 @@ impl LightTable {
         self.density[s.prim as usize] * distance * distance / cosine
     }
 
-    /// Solid-angle density with which [`LightTable::sample`] finds a direction of the environment.
-    pub(crate) fn environment_pdf(&self) -> f64 {
-        self.environment.map_or(0.0, |(_, _, pmf)| pmf * warp::uniform_sphere_pdf())
-    }
-
     /// True when some surface emits.
     pub(crate) fn has_areas(&self) -> bool {
         self.density.iter().any(|d| *d > 0.0)
@@ -218,7 +209,6 @@ impl LightTable {
         let (delta, is_area) = match entry {
             Entry::Delta { emitter } => (Some(emitter as usize), false),
             Entry::Triangle { .. } => (None, true),
-            Entry::Environment { .. } => (None, false),
         };
         let pmf = self.table.as_ref().map_or(0.0, |t| t.pmf(i));
         Some(Choice { delta, is_area, pmf, entry })
@@ -269,20 +259,6 @@ impl LightTable {
         let choice = self.choose(rng)?;
         match choice.entry {
             Entry::Triangle { .. } => self.sample_area(world, &choice, x, rng),
-            Entry::Environment { emitter } => {
-                let (_, radiance, _) = self.environment?;
-                let pdf = self.environment_pdf();
-                Some(LightSample {
-                    emitter: emitter as usize,
-                    kind: LightKind::Environment,
-                    w: warp::uniform_sphere(rng.next_2d()),
-                    y: Vec3::ZERO,
-                    distance: f64::INFINITY,
-                    value: radiance,
-                    inv_pdf: 1.0 / pdf,
-                    pdf,
-                })
-            }
             Entry::Delta { emitter } => Self::delta(world, emitter as usize, x, choice.pmf),
         }
     }

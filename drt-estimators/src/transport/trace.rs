@@ -19,6 +19,8 @@
 //! sees each factor apart, so that a factor which is zero can still be differentiated (theory sheet
 //! §14.5).
 
+use alloc::boxed::Box;
+
 use drt_math::{Rgb, Rng, Vec3, warp};
 use drt_medium::Coefficients;
 
@@ -158,7 +160,8 @@ pub(crate) struct Tracer<'w> {
     pub(crate) counters: Counters,
     /// Longest path in segments.
     pub(crate) max_segments: u32,
-    pub(crate) ray: RayPath,
+    /// Boxed, as it is lent out for every segment.
+    pub(crate) ray: Option<Box<RayPath>>,
     pub(crate) shadow: RayPath,
 }
 
@@ -169,7 +172,7 @@ impl<'w> Tracer<'w> {
             rng: Rng::new(0, 0, 0),
             counters: Counters::default(),
             max_segments: world.max_depth.min(LONGEST),
-            ray: RayPath::default(),
+            ray: None,
             shadow: RayPath::default(),
         }
     }
@@ -255,7 +258,7 @@ impl<'w> Tracer<'w> {
             let weight = match light.kind {
                 LightKind::Position => self.free_flight_weight(stop, &light),
                 LightKind::Direction => 1.0,
-                LightKind::Area(_) | LightKind::Environment => {
+                LightKind::Area(_) => {
                     let p = scattering.pdf(stop.wo, light.w, Given::Wo);
                     light.pdf / (light.pdf + p)
                 }
@@ -342,7 +345,7 @@ impl<'w> Tracer<'w> {
     /// Follows a ray to its next vertex.
     fn follow<O: Observer>(&mut self, leaving: &Leaving, observer: &mut O) -> Option<Stop> {
         let origin = leaving.vertex.x;
-        let mut ray = core::mem::take(&mut self.ray);
+        let mut ray = self.ray.take().unwrap_or_default();
         self.world.cast(&leaving.vertex, leaving.dir, &mut ray, &mut self.counters);
         observer.ray(leaving.segments, leaving.throughput, origin, leaving.dir, &ray);
         let span = self.equiangular(leaving, &ray, observer);
@@ -360,7 +363,7 @@ impl<'w> Tracer<'w> {
                 None
             }
         };
-        self.ray = ray;
+        self.ray = Some(ray);
         stop
     }
 
@@ -458,10 +461,8 @@ impl<'w> Tracer<'w> {
         observer: &mut O,
     ) {
         let Some((_, radiance)) = self.world.lights.environment() else { return };
-        let light = self.world.lights.environment_pdf();
-        let emission_weight = leaving.pdf.map_or(1.0, |p| p / (p + light));
         let throughput = leaving.throughput * arrival;
-        observer.contribution(leaving.segments + 1, throughput * radiance * emission_weight);
+        observer.contribution(leaving.segments + 1, throughput * radiance);
         let record = Arrival {
             parent: leaving.node,
             end: Endpoint::Environment,
@@ -470,7 +471,7 @@ impl<'w> Tracer<'w> {
             start_medium: ray.medium,
             arrival,
             throughput,
-            emission_weight,
+            emission_weight: 1.0,
         };
         observer.arrive(&record, &ray.crossings);
     }

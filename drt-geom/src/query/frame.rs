@@ -115,11 +115,13 @@ impl BoxFrame {
         }
         let origin = self.local(ray.origin);
         let dir = (ray.dir * self.scale).to_array();
+        // Padding is far more than a rounding of these.
+        let per = dir.map(|d| 1.0 / d);
         let (mut near, mut far) = (0.0, ray.t_max);
         for k in 0..3 {
             let reach = 1.0 + 2.0 * PADDING;
             if dir[k] != 0.0 {
-                let (a, b) = ((-reach - origin[k]) / dir[k], (reach - origin[k]) / dir[k]);
+                let (a, b) = ((-reach - origin[k]) * per[k], (reach - origin[k]) * per[k]);
                 near = f64::max(near, f64::min(a, b));
                 far = f64::min(far, f64::max(a, b));
             } else if origin[k].abs() > reach {
@@ -130,11 +132,11 @@ impl BoxFrame {
         if !(near <= far && ray.t_max > 0.0) {
             return None;
         }
-        let inverse = dir.map(|d| {
-            let d = (d / speed * SPEED) as f32;
-            if d.abs() < STILL { 1.0 / STILL } else { 1.0 / d }
-        });
         let rate = speed / SPEED;
+        let inverse = per.map(|p| {
+            let inverse = (p * rate) as f32;
+            if inverse.abs() > 1.0 / STILL { 1.0 / STILL } else { inverse }
+        });
         Some(BoxRay {
             origin: [0, 1, 2].map(|k| (origin[k] + near * dir[k]) as f32),
             inverse,

@@ -3,7 +3,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::f64::consts::PI;
 
-use super::directions::INITIAL;
+use super::directions::{DIRECTIONS, INITIAL};
 use super::*;
 use crate::testing::{SIGNIFICANCE, chi_square, z_score};
 use crate::{Moments, Rng, fm};

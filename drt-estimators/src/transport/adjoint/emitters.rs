@@ -43,12 +43,6 @@ impl Differentiator<'_> {
                     strength_of(light.emitter, per_value, sink);
                 }
             }
-            LightKind::Environment => {
-                self.segment(path, Far::Direction, near_moves, weight, here, sink);
-                if emitter {
-                    strength_of(light.emitter, per_value, sink);
-                }
-            }
             LightKind::Position => {
                 let moving = near_moves || emitter;
                 let far = Far::Position;

@@ -213,7 +213,6 @@ impl Replay<'_> {
                 let end = End { x: p.x, ng: Some(p.ng), jacobian: p.jacobian };
                 moving.strength * geometric_term(&end, path.dir, path.length)
             }
-            LightKind::Environment => moving.strength,
             LightKind::Position => {
                 towards(moving.position);
                 moving.strength * (self.falloff(light, path.dir) / path.length.squared())
