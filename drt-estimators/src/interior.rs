@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use drt_math::sobol::SobolSampler;
+use drt_math::sobol::{SET_DIMENSIONS, SobolSampler};
 use drt_math::{Rgb, Rng};
 
 use crate::boundary::shadow::{self, Shadows};
@@ -18,7 +18,7 @@ pub(crate) const LINE_STREAM: u64 = 1 << 62;
 const FLUX_STREAM: u64 = 1 << 61;
 pub(crate) const SEQUENCE_STREAM: u64 = 1 << 60;
 /// Numbers of a sample that are spread evenly: image point, and the first vertices.
-pub(crate) const DIMENSIONS: u32 = 12;
+pub(crate) const DIMENSIONS: u32 = SET_DIMENSIONS;
 
 /// Boundary and flux terms that are found along camera rays.
 #[derive(Clone, Copy, Default)]

@@ -20,6 +20,10 @@ fn assert_agreement(triangles: &[[Vec3; 3]], rays: impl Iterator<Item = Ray>) ->
             assert_eq!(tree.any(&ray, Skip::NOTHING, |_| true), !expected.is_empty(), "{ray:?}");
             assert!(!tree.crossings(&ray, Skip::NOTHING, |_| false, &mut out));
             assert_eq!(out, expected, "{ray:?}");
+            let end = expected.get(1).copied();
+            let blocks = |p| end.is_some_and(|e: Hit| e.prim == p);
+            assert_eq!(tree.closest_through(&ray, Skip::NOTHING, blocks, &mut out), end);
+            assert_eq!(out, expected[..expected.len().min(1)], "{ray:?}");
             let mut all: Vec<Hit> = Vec::new();
             tree.all(&ray, Skip::NOTHING, |h| all.push(h));
             assert_eq!(all.len(), expected.len(), "{ray:?}");

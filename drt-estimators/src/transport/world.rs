@@ -423,7 +423,7 @@ impl World {
     fn cast_from(
         &self,
         origin: Vec3,
-        mut skip: Skip,
+        skip: Skip,
         dir: Vec3,
         path: &mut RayPath,
         counters: &mut Counters,
@@ -445,21 +445,28 @@ impl World {
             medium = self.medium_on_side(&c.point, !c.front, medium);
             path.crossings.push(Crossing { point: c.point, x: v.x, t: 0.0, after: medium });
         }
-        let (mut start, mut travelled) = (origin, 0.0);
-        loop {
-            counters.rays += 1;
-            let ray = Ray { origin: start, dir, t_max: f64::INFINITY };
-            let Some(hit) = self.bvh.closest(&ray, skip) else { return };
+        counters.rays += 1;
+        let ray = Ray { origin, dir, t_max: f64::INFINITY };
+        let end = if self.any_null {
+            let blocks = |prim: u32| !self.is_null(self.prims[prim as usize].shape);
+            let end = self.bvh.closest_through(&ray, skip, blocks, &mut path.hits);
+            self.cross(path, dir, medium);
+            end
+        } else {
+            self.bvh.closest(&ray, skip)
+        };
+        if let Some(hit) = end {
+            path.end = Some(self.point(hit.prim, hit.bary));
+            path.length = hit.t;
+        }
+    }
+
+    /// Crosses the interfaces that a path's hits are on.
+    fn cross(&self, path: &mut RayPath, dir: Vec3, mut medium: Option<usize>) {
+        for hit in &path.hits {
             let (point, x) = self.point(hit.prim, hit.bary);
-            let t = travelled + hit.t;
-            if !self.is_null(point.shape) {
-                path.end = Some((point, x));
-                path.length = t;
-                return;
-            }
             medium = self.medium_on_side(&point, point.ng.dot(dir) > 0.0, medium);
-            path.crossings.push(Crossing { point, x, t, after: medium });
-            (start, travelled, skip) = (x, t, Skip::one(hit.prim));
+            path.crossings.push(Crossing { point, x, t: hit.t, after: medium });
         }
     }
 
@@ -500,11 +507,7 @@ impl World {
         if self.bvh.crossings(&ray, skip, blocks, &mut path.hits) {
             return false;
         }
-        for hit in &path.hits {
-            let (point, x) = self.point(hit.prim, hit.bary);
-            medium = self.medium_on_side(&point, point.ng.dot(dir) > 0.0, medium);
-            path.crossings.push(Crossing { point, x, t: hit.t, after: medium });
-        }
+        self.cross(path, dir, medium);
         true
     }
 

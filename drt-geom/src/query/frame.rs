@@ -109,11 +109,12 @@ impl BoxFrame {
     #[inline(always)]
     pub(super) fn clip(&self, ray: &Ray) -> Option<BoxRay> {
         let speed = ray.dir.max_abs() * self.scale;
-        if !(speed > 0.0 && speed < f64::INFINITY && ray.origin.is_finite() && ray.dir.is_finite())
-        {
+        let origin = self.local(ray.origin);
+        // Zero times what is not finite is no number.
+        let nothing = (ray.origin + ray.dir) * 0.0;
+        if !(speed > 0.0 && speed < f64::INFINITY && nothing.x + nothing.y + nothing.z == 0.0) {
             return None;
         }
-        let origin = self.local(ray.origin);
         let dir = (ray.dir * self.scale).to_array();
         // Padding is far more than a rounding of these.
         let per = dir.map(|d| 1.0 / d);
@@ -122,8 +123,8 @@ impl BoxFrame {
             let reach = 1.0 + 2.0 * PADDING;
             if dir[k] != 0.0 {
                 let (a, b) = ((-reach - origin[k]) * per[k], (reach - origin[k]) * per[k]);
-                near = f64::max(near, f64::min(a, b));
-                far = f64::min(far, f64::max(a, b));
+                near = greater(near, lesser(a, b));
+                far = lesser(far, greater(a, b));
             } else if origin[k].abs() > reach {
                 return None;
             }
@@ -184,6 +185,18 @@ impl Box32 {
     pub(super) fn doubled_center(&self) -> [f32; 3] {
         [0, 1, 2].map(|k| self.min[k] + self.max[k])
     }
+}
+
+/// The lesser, in one instruction; the first where one is no number.
+#[inline(always)]
+fn lesser(a: f64, b: f64) -> f64 {
+    if b < a { b } else { a }
+}
+
+/// The greater, in one instruction; the first where one is no number.
+#[inline(always)]
+fn greater(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 fn round_down(x: f64) -> f32 {

@@ -128,8 +128,40 @@ impl TriangleBvh {
         if blocked {
             out.clear();
         }
-        out.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.prim.cmp(&b.prim)));
+        sort(out);
         blocked
+    }
+
+    /// The first hit on a triangle that `blocks`, and in `out` the hits on others before it, sorted
+    /// as by [`TriangleBvh::crossings`].
+    pub fn closest_through(
+        &self,
+        ray: &Ray,
+        skip: Skip,
+        blocks: impl Fn(u32) -> bool,
+        out: &mut Vec<Hit>,
+    ) -> Option<Hit> {
+        out.clear();
+        let probe = self.probe(ray, skip)?;
+        let mut best: Option<Hit> = None;
+        self.visit(&probe, |prim, crossing| {
+            let hit = hit(prim, crossing);
+            let limit = if !blocks(prim) {
+                out.push(hit);
+                f32::INFINITY
+            } else if best.is_none_or(|b| hit.is_before(&b)) {
+                best = Some(hit);
+                probe.boxes.limit(hit.t)
+            } else {
+                f32::INFINITY
+            };
+            ControlFlow::Continue(limit)
+        });
+        if let Some(best) = &best {
+            out.retain(|h| h.is_before(best));
+        }
+        sort(out);
+        best
     }
 
     #[inline(always)]
@@ -232,6 +264,10 @@ impl Probe {
             || self.end.is_some_and(|e| e.lies_on(triangle, (-dir).to_array()));
         (!touched).then_some(crossing)
     }
+}
+
+fn sort(hits: &mut [Hit]) {
+    hits.sort_unstable_by(|a, b| a.t.total_cmp(&b.t).then(a.prim.cmp(&b.prim)));
 }
 
 fn hit(prim: u32, crossing: &Crossing) -> Hit {

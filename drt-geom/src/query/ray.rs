@@ -61,6 +61,12 @@ impl Hit {
         let [u, v] = self.bary;
         a * (1.0 - u - v) + b * u + c * v
     }
+
+    /// The order of hits along a ray.
+    #[inline]
+    pub(super) fn is_before(&self, other: &Self) -> bool {
+        (self.t, self.prim) < (other.t, other.prim)
+    }
 }
 
 /// Up to two triangles that a query passes over: those the ray starts or ends on.
