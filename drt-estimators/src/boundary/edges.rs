@@ -138,6 +138,33 @@ impl Edge {
         (self.a, self.b - self.a)
     }
 
+    /// The number of each end, whatever their order, the same for edges that coincide.
+    pub(super) fn place(&self) -> [[u64; 3]; 2] {
+        // Adding zero makes a zero positive.
+        let [a, b] = [self.a, self.b].map(|p| p.to_array().map(|c| (c + 0.0).to_bits()));
+        if a < b { [a, b] } else { [b, a] }
+    }
+
+    /// The faces with the angles around the edge at which they lie, measured from a first face of
+    /// `other`, which has the same place.
+    pub(super) fn faces_around(&self, other: &Self) -> [(f64, u32, Vec3); 2] {
+        let x = other.across[0];
+        let y = other.tangent.cross(x);
+        let angle = |h: Vec3| fm::atan2(h.dot(y), h.dot(x));
+        [0, 1].map(|k| (angle(self.across[k]), self.faces[k], self.across[k]))
+    }
+
+    /// The same edge with the faces of others that coincide with it, of which only those at the ends
+    /// of the wedge that holds them all decide what grazes the edge.
+    pub(super) fn among(&self, [first, second]: [(u32, Vec3); 2], between: f64) -> Self {
+        // The faces of the edge itself stay what rays leave and velocities are taken from.
+        let own = self.faces[0] != self.faces[1];
+        let beside = if first.0 == self.faces[0] { second.0 } else { first.0 };
+        let faces = if own { self.faces } else { [self.faces[0], beside] };
+        let across = [first.1, second.1];
+        Self { faces, across, between, side: Side::Unknown, ..*self }
+    }
+
     /// The point at `u` of the way along the edge.
     pub(crate) fn point(&self, world: &World, u: f64) -> (Vec3, SurfacePoint) {
         let mut bary = [0.0; 3];

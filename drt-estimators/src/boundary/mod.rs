@@ -25,6 +25,7 @@ pub(crate) mod border;
 mod edges;
 mod movers;
 pub(crate) mod shadow;
+mod weld;
 
 use alloc::vec::Vec;
 
@@ -33,6 +34,7 @@ use drt_math::{Rgb, Vec3};
 use edges::{EdgePoint, EdgeTable, collect, seen_along, seen_from, sine};
 use movers::Movers;
 use shadow::Shadows;
+use weld::weld;
 
 use crate::Error;
 use crate::emitter::{Emitter, EmitterGradient};
@@ -100,7 +102,8 @@ impl Boundary {
     /// The edges at which something can change of what is of interest.
     pub(crate) fn new(world: &World, interest: &Interest) -> Result<Self, Error> {
         let movers = Movers::new(world, interest);
-        let (mut edges, all) = collect(world);
+        let (edges, all) = collect(world);
+        let mut edges = weld(edges, |e| movers.moves(e));
         edges.retain(|e| movers.matter_to(e));
         let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
         let eye = world.camera.position();

@@ -77,9 +77,14 @@ impl<'a> Movers<'a> {
             || shapes.any(|(s, moves)| *moves && s.emitter.is_some())
     }
 
+    /// True when the edge itself moves.
+    pub(crate) fn moves(&self, e: &Edge) -> bool {
+        self.interest.shapes[e.shape as usize]
+    }
+
     /// The edge or an inside moves.
     fn always(&self, e: &Edge) -> bool {
-        self.insides || self.interest.shapes[e.shape as usize]
+        self.insides || self.moves(e)
     }
 
     fn pass_beyond(&self, e: &Edge, onward: impl Fn(Vec3) -> Vec3) -> bool {

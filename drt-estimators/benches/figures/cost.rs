@@ -1,0 +1,115 @@
+//! What derivatives cost, in units of the image: one parameter, ten, and the gradient of a loss by
+//! all vertices of a mesh.
+
+use drt_estimators::{Scene, Session, Settings, Target, Unattended, gradient};
+use drt_math::Rgb;
+use drt_motion::Parameter;
+
+use crate::scenes::{self, Subject};
+use crate::turns::{Task, take_turns};
+
+const TURNS: usize = 7;
+/// Samples per pixel of a turn, interior and boundary alike.
+const SPP: u32 = 8;
+
+pub(crate) fn print() {
+    println!("COST of derivatives, at as many interior and boundary samples as the image has");
+    println!(
+        "(\"rays\" are those of a path; a gradient is that by all vertices of the mesh named)"
+    );
+    println!();
+    println!(
+        "{:9} {:11} {:>8} {:>6} {:>12} {:>6} {:>13}",
+        "scene", "parameter", "us/path", "rays", "one / image", "rays", "ten / one"
+    );
+    println!("{:9} {:11} {:>8} {:>6} {:>12} {:>6} {:>13}", "", "", "", "", "<= 2.5", "", "<= 1.3");
+    let subjects = scenes::all();
+    for subject in &subjects {
+        for (kind, ten) in &subject.parameters {
+            parameters(subject, kind, ten);
+        }
+    }
+    println!();
+    println!(
+        "{:9} {:11} {:>8} {:>15} {:>6} {:>13}",
+        "scene", "gradient by", "vertices", "gradient / image", "rays", "prepared in ms"
+    );
+    println!("{:9} {:11} {:>8} {:>15}", "", "", "", "<= 4");
+    for subject in &subjects {
+        vertices(subject);
+    }
+    println!();
+}
+
+fn settings() -> Settings {
+    Settings { spp: SPP, threads: 1, seed: 3, ..Settings::default() }
+}
+
+fn session(scene: &Scene, parameters: &[Parameter]) -> Session {
+    Session::new(scene, parameters, &settings()).expect("a valid scene")
+}
+
+/// Goes on with a run.
+fn more(session: &mut Session) -> Task<'_> {
+    Box::new(|| {
+        session.run(SPP, &Unattended);
+    })
+}
+
+fn rays_a_path(session: &Session) -> f64 {
+    let c = session.rendering().counters;
+    c.rays as f64 / c.paths as f64
+}
+
+fn parameters(subject: &Subject, kind: &str, ten: &[Parameter]) {
+    let [mut image, mut one, mut all] =
+        [&[][..], &ten[..1], ten].map(|parameters| session(&subject.scene, parameters));
+    let [forward, single, tenfold] =
+        take_turns(TURNS, [more(&mut image), more(&mut one), more(&mut all)]);
+    let paths = f64::from(SPP) * pixels(&subject.scene) as f64;
+    println!(
+        "{:9} {kind:11} {:8.2} {:6.1} {:12.2} {:6.1} {:13.2}",
+        subject.name,
+        forward.median() / paths * 1e6,
+        rays_a_path(&image),
+        single.over(&forward),
+        rays_a_path(&one),
+        tenfold.over(&single),
+    );
+}
+
+fn vertices(subject: &Subject) {
+    let scene = &subject.scene;
+    let target = scene.find(subject.vertices_of).expect("a shape");
+    let Target::Shape(shape) = target else { panic!("{} is no shape", subject.vertices_of) };
+    let adjoint = vec![Rgb::ONE; pixels(scene)];
+    let call = |settings: &Settings| {
+        gradient(scene, &[target], settings, &adjoint, &Unattended).expect("a valid scene")
+    };
+    // What a call does whatever the number of samples: the least it can be asked for.
+    const LEAST: u32 = 2;
+    let least = Settings { spp: LEAST, boundary_spp: None, ..settings() };
+    let full = Settings { spp: SPP + LEAST, ..least.clone() };
+    let mut image = session(scene, &[]);
+    let [forward, fixed, all] = take_turns(
+        TURNS,
+        [more(&mut image), Box::new(|| drop(call(&least))), Box::new(|| drop(call(&full)))],
+    );
+    let samples = all.without(1.0, &fixed);
+    let preparation = fixed.without(f64::from(LEAST) / f64::from(SPP), &samples);
+    let counters = call(&full).counters;
+    println!(
+        "{:9} {:11} {:8} {:15.2} {:6.1} {:13.1}",
+        subject.name,
+        subject.vertices_of,
+        scene.shapes[shape].mesh.positions.len(),
+        samples.over(&forward),
+        counters.rays as f64 / counters.paths as f64,
+        preparation.median() * 1e3,
+    );
+}
+
+fn pixels(scene: &Scene) -> usize {
+    let [w, h] = scene.sensors[0].item.sensor.film();
+    (w * h) as usize
+}

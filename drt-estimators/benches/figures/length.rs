@@ -1,0 +1,67 @@
+//! The cost of a path against its length: the time per vertex is to stay the same.
+
+use drt_estimators::{Session, Settings, Target, Unattended, gradient};
+use drt_math::Rgb;
+
+use crate::scenes;
+use crate::turns::{Task, take_turns};
+
+const TURNS: usize = 5;
+const DEPTHS: [u32; 5] = [8, 16, 32, 64, 128];
+const FILM: [u32; 2] = [8, 8];
+const PIXELS: u32 = FILM[0] * FILM[1];
+/// Vertices per pixel and turn, at every depth.
+const VERTICES: u32 = 512;
+
+#[derive(Clone, Copy)]
+enum Job {
+    Image,
+    DerivativeImage,
+    Gradient,
+}
+
+pub(crate) fn print() {
+    println!("LENGTH of paths: microseconds per vertex in a closed room where nothing is absorbed");
+    println!();
+    print!("{:6} {:17}", "room", "maximum depth");
+    DEPTHS.map(|d| print!(" {d:>6}"));
+    println!(" {:>9}", "128 / 16");
+    println!("{:24} {:>45}", "", "about 1");
+    for misty in [false, true] {
+        for (name, job) in [
+            ("image", Job::Image),
+            ("derivative image", Job::DerivativeImage),
+            ("gradient", Job::Gradient),
+        ] {
+            let times = take_turns(TURNS, DEPTHS.map(|depth| task(job, misty, depth)));
+            print!("{:6} {name:17}", if misty { "misty" } else { "clear" });
+            for t in &times {
+                print!(" {:6.3}", t.median() * 1e6 / f64::from(PIXELS * VERTICES));
+            }
+            println!(" {:9.2}", times[4].over(&times[1]));
+        }
+    }
+    println!();
+}
+
+/// Paths of `depth` vertices, the fewer the longer they are.
+fn task(job: Job, misty: bool, depth: u32) -> Task<'static> {
+    let (scene, parameter) = scenes::furnace(misty, depth);
+    let scene = scenes::with_film(scene, FILM);
+    let settings = Settings { spp: VERTICES / depth, threads: 1, ..Settings::default() };
+    let parameters = match job {
+        Job::Image => vec![],
+        Job::DerivativeImage => vec![parameter],
+        Job::Gradient => {
+            let ball: Target = scene.find("ball").expect("a ball");
+            let adjoint = [Rgb::ONE; PIXELS as usize];
+            return Box::new(move || {
+                gradient(&scene, &[ball], &settings, &adjoint, &Unattended).expect("a gradient");
+            });
+        }
+    };
+    let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
+    Box::new(move || {
+        session.run(settings.spp, &Unattended);
+    })
+}
