@@ -24,7 +24,7 @@ pub(crate) fn print() {
     println!("LENGTH of paths: microseconds per vertex in a closed room where nothing is absorbed");
     println!();
     print!("{:6} {:17}", "room", "maximum depth");
-    DEPTHS.map(|d| print!(" {d:>6}"));
+    DEPTHS.iter().for_each(|d| print!(" {d:>6}"));
     println!(" {:>9}", "128 / 16");
     println!("{:24} {:>45}", "", "about 1");
     for misty in [false, true] {
