@@ -5,7 +5,7 @@ use drt_estimators::{Scene, Session, Settings, Target, Unattended, gradient};
 use drt_math::Rgb;
 use drt_motion::Parameter;
 
-use crate::scenes::{self, Subject};
+use crate::scenes::{self, Detail, Subject};
 use crate::turns::{Task, take_turns};
 
 const TURNS: usize = 7;
@@ -23,7 +23,7 @@ pub(crate) fn print() {
         "scene", "parameter", "us/path", "rays", "one / image", "rays", "ten / one"
     );
     println!("{:9} {:11} {:>8} {:>6} {:>12} {:>6} {:>13}", "", "", "", "", "<= 2.5", "", "<= 1.3");
-    let subjects = scenes::all();
+    let subjects = scenes::all(Detail::Fine);
     for subject in &subjects {
         for (kind, ten) in &subject.parameters {
             parameters(subject, kind, ten);

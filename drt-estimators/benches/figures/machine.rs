@@ -2,7 +2,7 @@
 
 use drt_estimators::{Session, Settings, Unattended};
 
-use crate::scenes::{self, Subject};
+use crate::scenes::{self, Detail, Subject};
 use crate::turns::{Task, take_turns};
 
 const TURNS: usize = 7;
@@ -15,7 +15,7 @@ pub(crate) fn threads() {
         return;
     }
     println!("{:9} {:>6} {:>17}", "scene", "image", "derivative image");
-    for subject in scenes::all() {
+    for subject in scenes::all(Detail::Fine) {
         let gain = |parameters: usize| {
             let task = |threads| {
                 let spp = 16;
@@ -48,7 +48,7 @@ pub(crate) fn memory() {
         return;
     }
     println!("{:9} {:>8} {:>10} {:>15}", "scene", "prepared", "16 samples", "64 samples more");
-    for subject in scenes::all() {
+    for subject in scenes::all(Detail::Fine) {
         let mut session = session(&subject, 10, 1);
         let prepared = peak();
         session.run(16, &Unattended);

@@ -1,5 +1,6 @@
-//! The scenes that are measured, with what moves and changes in them: opaque surfaces, a body in
-//! fog, a coloured blob, a cloud of voxels. The same floor, lights and camera in all of them.
+//! The scenes that are measured, with what moves and changes in them: opaque surfaces in the open and
+//! in a room, a body in fog, a coloured blob, a cloud of voxels. The same floor, lights and camera in
+//! all of them.
 
 use std::sync::Arc;
 
@@ -24,29 +25,46 @@ pub(crate) struct Subject {
     pub(crate) vertices_of: &'static str,
 }
 
-pub(crate) fn all() -> [Subject; 4] {
-    [surfaces(), fog(), blob(), cloud()]
+/// Triangles of the bodies.
+#[derive(Clone, Copy)]
+pub(crate) enum Detail {
+    /// Some 10 000.
+    Fine,
+    /// Some 600, quickly prepared.
+    Coarse,
+}
+
+pub(crate) fn all(detail: Detail) -> [Subject; 5] {
+    [open, room, fog, blob, cloud].map(|subject| subject(detail))
 }
 
 /// A knot and a ball over a floor.
-pub(crate) fn surfaces() -> Subject {
+fn open(detail: Detail) -> Subject {
     let mut scene = stage();
-    scene.shapes.push(shape("knot", knot(), 0));
+    scene.shapes.push(shape("knot", knot(detail), 0));
     scene.shapes.push(shape("ball", sized(&procedural::icosphere(3), 0.5, vec3(0.9, 0.8, 0.5)), 0));
     let parameters = vec![
         ("moves", ten(|i| moves(&["knot"], i))),
         ("colour", ten(|i| paints("gray", "reflectance", i))),
     ];
-    Subject { name: "surfaces", scene, parameters, vertices_of: "knot" }
+    Subject { name: "open", scene, parameters, vertices_of: "knot" }
 }
 
-/// The knot in fog that fills the room.
-pub(crate) fn fog() -> Subject {
+/// The same between walls: no path escapes.
+fn room(detail: Detail) -> Subject {
+    let open = open(detail);
+    let mut scene = open.scene;
+    scene.shapes.push(shape("walls", walls(), 0));
+    Subject { name: "room", scene, ..open }
+}
+
+/// The knot in a room full of fog.
+fn fog(detail: Detail) -> Subject {
     let mut scene = stage();
-    scene.shapes.push(shape("knot", knot(), 0));
+    scene.shapes.push(shape("knot", knot(detail), 0));
     let fog = homogeneous(Rgb::splat(0.15), Rgb::splat(0.9), 0.3);
-    let walls = sized(&procedural::cube(), 6.0, vec3(0.0, 0.0, 5.0));
-    enclose(&mut scene, "walls", walls, "fog", fog);
+    let border = sized(&procedural::cube(), 6.0, vec3(0.0, 0.0, 5.0));
+    enclose(&mut scene, "border", border, "fog", fog);
     let parameters = vec![
         ("moves", ten(|i| moves(&["knot"], i))),
         ("extinction", ten(|i| paints("fog", "sigma_t", i))),
@@ -55,9 +73,12 @@ pub(crate) fn fog() -> Subject {
 }
 
 /// A bumpy blob that scatters each colour differently.
-pub(crate) fn blob() -> Subject {
+fn blob(detail: Detail) -> Subject {
     let mut scene = stage();
-    let mut mesh = procedural::uv_sphere(50);
+    let mut mesh = procedural::uv_sphere(match detail {
+        Detail::Fine => 50,
+        Detail::Coarse => 12,
+    });
     for p in &mut mesh.positions {
         *p *= 1.0 + 0.15 * ((5.0 * p.x).sin() + (4.0 * p.y).sin() * (5.0 * p.z).sin());
     }
@@ -72,9 +93,9 @@ pub(crate) fn blob() -> Subject {
 }
 
 /// Voxels of smoke that fade out inside their box, over the knot.
-pub(crate) fn cloud() -> Subject {
+fn cloud(detail: Detail) -> Subject {
     let mut scene = stage();
-    scene.shapes.push(shape("knot", knot(), 0));
+    scene.shapes.push(shape("knot", knot(detail), 0));
     const N: usize = 32;
     let values = (0..N * N * N).map(|v| {
         let centred = |i: usize| 2.0 * (i as f64 + 0.5) / N as f64 - 1.0;
@@ -103,9 +124,7 @@ pub(crate) fn furnace(misty: bool, max_depth: u32) -> (Scene, Parameter) {
     scene.shapes.clear();
     scene.emitters.retain(|e| e.id.as_deref() == Some("bulb"));
     scene.bsdfs[0] = Named::new("white", Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE }));
-    let mut walls = sized(&procedural::cube(), 7.0, vec3(0.0, 0.0, 3.0));
-    walls.flip();
-    scene.shapes.push(shape("walls", walls, 0));
+    scene.shapes.push(shape("walls", walls(), 0));
     scene.shapes.push(shape("ball", sized(&procedural::icosphere(2), 1.0, vec3(0.0, 0.0, 1.2)), 0));
     if misty {
         scene.media.push(Named::new("mist", homogeneous(Rgb::splat(0.15), Rgb::ONE, 0.0)));
@@ -152,10 +171,21 @@ fn stage() -> Scene {
     }
 }
 
-/// 5120 vertices and many silhouettes.
-fn knot() -> Mesh {
-    let knot = procedural::TorusKnot { segments: 320, ..procedural::TorusKnot::default() };
+/// Many silhouettes.
+fn knot(detail: Detail) -> Mesh {
+    let (segments, sides) = match detail {
+        Detail::Fine => (320, 16),
+        Detail::Coarse => (60, 5),
+    };
+    let knot = procedural::TorusKnot { segments, sides, ..procedural::TorusKnot::default() };
     sized(&procedural::torus_knot(&knot), 0.9, vec3(-0.2, 0.0, 1.2))
+}
+
+/// Around everything, seen from inside.
+fn walls() -> Mesh {
+    let mut walls = sized(&procedural::cube(), 8.0, vec3(0.0, 0.0, 7.0));
+    walls.flip();
+    walls
 }
 
 fn sized(mesh: &Mesh, size: f64, at: Vec3) -> Mesh {

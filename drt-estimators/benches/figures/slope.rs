@@ -8,7 +8,7 @@
 use drt_estimators::{Layer, Session, Settings, Unattended};
 use drt_math::Moments;
 
-use crate::scenes::{self, Subject};
+use crate::scenes::{self, Detail, Subject};
 
 const FILM: [u32; 2] = [2, 2];
 /// Three decades.
@@ -21,7 +21,7 @@ pub(crate) fn print() {
     print!("{:9} {:20} {:>7}", "scene", "layer", "slope");
     SAMPLES[1..].iter().for_each(|n| print!(" {n:>7}"));
     println!("\n{:9} {:20} {:>7}", "", "", "<= -0.5");
-    for subject in scenes::all() {
+    for subject in scenes::all(Detail::Coarse) {
         let first = subject.parameters.iter().map(|(_, ten)| ten[0].clone());
         let names = ["image"].into_iter().chain(subject.parameters.iter().map(|(kind, _)| *kind));
         let parameters: Vec<_> = first.collect();
@@ -41,12 +41,12 @@ pub(crate) fn print() {
 
 /// Per layer, the root mean square over pixels and channels of the standard deviation between runs.
 fn scatter(subject: &Subject, parameters: &[drt_motion::Parameter], spp: u32) -> Vec<f64> {
-    // Fewer runs where they take long; the few pixels make up for it.
-    let runs = (65536 / spp).clamp(4, 64);
+    // As many samples in all at each N, so that rare large values show alike.
+    let runs = 4 * SAMPLES[SAMPLES.len() - 1] / spp;
     let scene = scenes::with_film(subject.scene.clone(), FILM);
     let mut moments = vec![Vec::new(); 1 + parameters.len()];
     for seed in 0..u64::from(runs) {
-        let settings = Settings { spp, seed, threads: 0, ..Settings::default() };
+        let settings = Settings { spp, seed, threads: 1, ..Settings::default() };
         let mut session = Session::new(&scene, parameters, &settings).expect("a valid scene");
         session.run(spp, &Unattended);
         let r = session.rendering();

@@ -21,7 +21,7 @@ pub(crate) struct Edge {
     /// The edge's faces in the soup; twice the same for an open edge.
     pub(crate) faces: [u32; 2],
     /// Unit, across the edge into each face; twice the same for an open edge.
-    across: [Vec3; 2],
+    pub(super) across: [Vec3; 2],
     /// Angle between the faces, 0 for an open edge.
     between: f64,
     pub(super) shape: u32,
@@ -29,6 +29,8 @@ pub(crate) struct Edge {
     corners: [u8; 2],
     /// Where segments that graze the edge run: before the faces, behind them, or on an open edge.
     side: Side,
+    /// Something is so near that the edge may rest on it.
+    pub(super) may_rest: bool,
 }
 
 /// The side of an edge's faces on which it can be grazed.
@@ -79,7 +81,14 @@ impl Edge {
             shape,
             corners,
             side,
+            may_rest: false,
         })
+    }
+
+    /// Unit, from the edge in between its faces; `None` where they lie in one plane.
+    pub(super) fn inward(&self) -> Option<Vec3> {
+        let sum = self.across[0] + self.across[1];
+        (sum.length_squared() > 1e-8).then(|| sum.normalize())
     }
 
     /// Normals of the faces' planes. Directions that graze the edge with both faces on one side have

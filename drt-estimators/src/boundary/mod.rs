@@ -22,6 +22,7 @@
 //! directly lit media, seen directly, are left to [`shadow`] where that serves.
 
 pub(crate) mod border;
+mod contact;
 mod edges;
 mod movers;
 pub(crate) mod shadow;
@@ -31,6 +32,7 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Vec3};
 
+use contact::Contact;
 use edges::{EdgePoint, EdgeTable, collect, seen_along, seen_from, sine};
 use movers::Movers;
 use shadow::Shadows;
@@ -80,6 +82,15 @@ pub(crate) trait Receiver {
     fn receive(&mut self, pixel: u32, value: Rgb);
 }
 
+/// Where a segment's rays start.
+#[derive(Clone, Copy, Debug)]
+struct Start {
+    x: Vec3,
+    /// The faces it lies on.
+    faces: [u32; 2],
+    medium: Option<usize>,
+}
+
 /// One end of a boundary segment.
 struct End {
     /// `None` when the ray escaped.
@@ -105,6 +116,9 @@ impl Boundary {
         let (edges, all) = collect(world);
         let mut edges = weld(edges, |e| movers.moves(e));
         edges.retain(|e| movers.matter_to(e));
+        for e in &mut edges {
+            e.may_rest = Contact::anywhere(world, e);
+        }
         let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
         let eye = world.camera.position();
         let camera = EdgeTable::new(&edges, |e| movers.pass_camera(e, eye), |e| seen_from(e, eye))?;
@@ -160,6 +174,18 @@ impl Boundary {
     }
 }
 
+impl Start {
+    /// On an edge that nothing touches.
+    fn on(world: &World, at: &EdgePoint<'_>) -> Self {
+        Self { x: at.x, faces: at.edge.faces, medium: at.edge.medium(world, at.x) }
+    }
+
+    /// Follows a ray to the first surface that scatters.
+    fn cast(&self, tracer: &mut Tracer<'_>, w: Vec3, ray: &mut RayPath) {
+        tracer.world.cast_past(self.x, self.faces, self.medium, w, ray, &mut tracer.counters);
+    }
+}
+
 struct Sampler<'s, 'w, R> {
     boundary: &'s Boundary,
     tracer: &'s mut Tracer<'w>,
@@ -173,15 +199,18 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         let world = self.tracer.world;
         let at = self.boundary.camera.as_ref()?.sample(world, &mut self.tracer.rng);
         let camera = &world.camera;
+        if let Some(contact) = Contact::at(world, &at) {
+            return self.contact_with_camera(&at, &contact);
+        }
         let d = camera.position() - at.x;
         let distance = d.length();
         let w = d / distance;
         let n = at.edge.occluded_side(w)?;
-        let view = Vertex { x: at.x, medium: at.edge.medium(world, at.x), kind: Kind::Point };
-        let (_, transport) = self.tracer.see(&view)?;
+        let start = Start::on(world, &at);
+        let transport = self.seen(&start)?;
         // The camera's side must be open.
-        let tau = self.open(&at, view.medium, w, distance)?;
-        let s = self.end(&at, view.medium, -w, Rgb::ONE)?;
+        let tau = self.open(&start, w, distance)?;
+        let s = self.end(&start, -w, Rgb::ONE)?;
         let l = self.share(&s, distance);
         self.b.functional.items.clear();
         self.edge_rate(&at, n);
@@ -194,15 +223,27 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         }
         let light = self.light_from(&s, w, world.max_depth.checked_sub(1)?);
         let value = light * s.weight * tau * (sine(at.edge, w) * at.inv_pdf * transport);
+        self.show(at.x, value);
+        Some(())
+    }
+
+    /// The camera's importance at a point per area across the segment, where the point is seen.
+    fn seen(&self, start: &Start) -> Option<f64> {
+        let view = Vertex { x: start.x, medium: start.medium, kind: Kind::Point };
+        Some(self.tracer.see(&view)?.1)
+    }
+
+    /// Hands a value to the pixels around the image of `x`.
+    fn show(&mut self, x: Vec3, value: Rgb) {
         if value.is_zero() {
-            return None;
+            return;
         }
-        let pixel = camera.view(at.x).pixel;
+        let camera = &self.tracer.world.camera;
+        let pixel = camera.view(x).pixel;
         let width = camera.film()[0];
         for p in camera.footprint(pixel) {
             self.receiver.receive(p.pixel[1] * width + p.pixel[0], value * p.weight);
         }
-        Some(())
     }
 
     /// Segments that start on a sampled light.
@@ -217,12 +258,15 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         }
         let general = self.boundary.general.as_ref()?;
         let at = general.sample(world, &mut self.tracer.rng);
+        if Contact::at(world, &at).is_some() {
+            return None;
+        }
         let light = world.lights.sample_area(world, &choice, at.x, &mut self.tracer.rng)?;
         let LightKind::Area(emitting) = light.kind else { return None };
         let w = -light.w;
         let n = at.edge.occluded_side(w)?;
-        let medium = at.edge.medium(world, at.x);
-        let tau = self.open_to(&at, medium, light.w, &emitting)?;
+        let start = Start::on(world, &at);
+        let tau = self.open_to(&start, light.w, &emitting)?;
         let vertex = Vertex { x: light.y, medium: None, kind: Kind::Surface(emitting) };
         let mis = light.pdf / (light.pdf + at.edge.direction_pdf(w));
         let s = End {
@@ -234,7 +278,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         self.b.light.0.clear();
         self.b.light.0.push(world.emitted(&emitting, w));
         let scale = sine(at.edge, w) * at.inv_pdf;
-        self.detector(&at, medium, w, n, &s, scale)
+        self.detector(&at, &start, w, n, &s, scale)
     }
 
     /// Segments that start on a point, spot or directional light.
@@ -242,11 +286,14 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         let world = self.tracer.world;
         let table = self.boundary.lights.get(emitter)?.as_ref()?;
         let at = table.sample(world, &mut self.tracer.rng);
+        if Contact::at(world, &at).is_some() {
+            return None;
+        }
         let light = LightTable::delta(world, emitter, at.x, pmf)?;
         let w = -light.w;
         let n = at.edge.occluded_side(w)?;
-        let medium = at.edge.medium(world, at.x);
-        let tau = self.open(&at, medium, light.w, light.distance)?;
+        let start = Start::on(world, &at);
+        let tau = self.open(&start, light.w, light.distance)?;
         let s = End {
             vertex: None,
             distance: light.distance,
@@ -256,7 +303,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         self.b.light.0.clear();
         self.b.light.0.push(light.value);
         let scale = sine(at.edge, w) * at.inv_pdf;
-        let beyond = self.beyond(&at, medium, w, s.weight);
+        let beyond = self.beyond(&start, w, s.weight);
         for d in beyond.into_iter().flatten() {
             let l = self.share(&s, d.0.distance);
             self.b.functional.items.clear();
@@ -278,13 +325,16 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
     fn indirect(&mut self) -> Option<()> {
         let world = self.tracer.world;
         let at = self.boundary.general.as_ref()?.sample(world, &mut self.tracer.rng);
+        if let Some(contact) = Contact::at(world, &at) {
+            return self.contact_with_others(&at, &contact);
+        }
         let (w, inv_pdf) = at.edge.sample_direction(&mut self.tracer.rng);
         let n = at.edge.occluded_side(w)?;
-        let medium = at.edge.medium(world, at.x);
-        let s = self.end(&at, medium, -w, Rgb::ONE)?;
+        let start = Start::on(world, &at);
+        let s = self.end(&start, -w, Rgb::ONE)?;
         let scale = sine(at.edge, w) * at.inv_pdf * inv_pdf;
         let mut lit = false;
-        let beyond = self.beyond(&at, medium, w, s.weight);
+        let beyond = self.beyond(&start, w, s.weight);
         for (d, only_camera) in beyond.into_iter().flatten() {
             let l = self.share(&s, d.distance);
             self.b.functional.items.clear();
@@ -320,13 +370,13 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
     fn detector(
         &mut self,
         at: &EdgePoint<'_>,
-        medium: Option<usize>,
+        start: &Start,
         w: Vec3,
         n: Vec3,
         s: &End,
         scale: f64,
     ) -> Option<()> {
-        let beyond = self.beyond(at, medium, w, s.weight);
+        let beyond = self.beyond(start, w, s.weight);
         for (d, only_camera) in beyond.into_iter().flatten() {
             let l = self.share(s, d.distance);
             self.b.functional.items.clear();
@@ -340,57 +390,43 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
 
     /// Detector ends: where free flight stops, and a point placed towards a camera in the medium,
     /// which is connected to the camera alone.
-    fn beyond(
-        &mut self,
-        at: &EdgePoint<'_>,
-        medium: Option<usize>,
-        w: Vec3,
-        channels: Rgb,
-    ) -> [Option<(End, bool)>; 2] {
+    fn beyond(&mut self, start: &Start, w: Vec3, channels: Rgb) -> [Option<(End, bool)>; 2] {
         let mut ray = core::mem::take(&mut self.b.ray);
-        let (faces, counters) = (at.edge.faces, &mut self.tracer.counters);
-        self.tracer.world.cast_past(at.x, faces, medium, w, &mut ray, counters);
+        start.cast(self.tracer, w, &mut ray);
         let span = self.tracer.camera_span(&ray);
-        let placed = self.tracer.equiangular_to_camera(at.x, w, &ray, span).map(|v| {
+        let placed = self.tracer.equiangular_to_camera(start.x, w, &ray, span).map(|v| {
             let end =
                 End { vertex: Some(v.vertex), distance: v.t, weight: v.arrival, flight: None };
             (end, true)
         });
-        let flown = self.arrive(at, w, &ray, channels, span).map(|end| (end, false));
+        let flown = self.arrive(start, w, &ray, channels, span).map(|end| (end, false));
         self.b.ray = ray;
         [flown, placed]
     }
 
     /// Follows a ray from the edge and stops by free flight.
-    fn end(
-        &mut self,
-        at: &EdgePoint<'_>,
-        medium: Option<usize>,
-        w: Vec3,
-        channels: Rgb,
-    ) -> Option<End> {
+    fn end(&mut self, start: &Start, w: Vec3, channels: Rgb) -> Option<End> {
         let mut ray = core::mem::take(&mut self.b.ray);
-        let (faces, counters) = (at.edge.faces, &mut self.tracer.counters);
-        self.tracer.world.cast_past(at.x, faces, medium, w, &mut ray, counters);
-        let end = self.arrive(at, w, &ray, channels, None);
+        start.cast(self.tracer, w, &mut ray);
+        let end = self.arrive(start, w, &ray, channels, None);
         self.b.ray = ray;
         end
     }
 
     fn arrive(
         &mut self,
-        at: &EdgePoint<'_>,
+        start: &Start,
         w: Vec3,
         ray: &RayPath,
         channels: Rgb,
         span: Option<(f64, f64)>,
     ) -> Option<End> {
-        match self.tracer.travel(at.x, w, ray, channels) {
+        match self.tracer.travel(start.x, w, ray, channels) {
             Travel::Volume(v) => Some(End {
                 vertex: Some(v.vertex),
                 distance: v.t,
                 weight: v.arrival,
-                flight: span.map(|span| v.flight(span, at.x, w)),
+                flight: span.map(|span| v.flight(span, start.x, w)),
             }),
             Travel::Surface(point, x, weight) => {
                 let medium = ray.crossings.last().map_or(ray.medium, |c| c.after);
@@ -405,42 +441,32 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
     }
 
     /// Transmittance from the edge to a point at `distance`, if nothing blocks.
-    fn open(
-        &mut self,
-        at: &EdgePoint<'_>,
-        medium: Option<usize>,
-        w: Vec3,
-        distance: f64,
-    ) -> Option<Rgb> {
+    fn open(&mut self, start: &Start, w: Vec3, distance: f64) -> Option<Rgb> {
         let mut ray = core::mem::take(&mut self.b.ray);
         let world = self.tracer.world;
-        world.cast_past(at.x, at.edge.faces, medium, w, &mut ray, &mut self.tracer.counters);
-        let open = ray.length >= short_of(at.x, distance);
+        start.cast(self.tracer, w, &mut ray);
+        let open = ray.length >= short_of(start.x, distance);
         let mut tau = None;
         if open {
             ray.cut(distance);
             let tracer = &mut *self.tracer;
-            tau = Some(world.transmittance(at.x, w, &ray, &mut tracer.rng, &mut tracer.counters));
+            tau =
+                Some(world.transmittance(start.x, w, &ray, &mut tracer.rng, &mut tracer.counters));
         }
         self.b.ray = ray;
         tau
     }
 
     /// Transmittance from the edge to a surface point, if that is what the ray meets.
-    fn open_to(
-        &mut self,
-        at: &EdgePoint<'_>,
-        medium: Option<usize>,
-        w: Vec3,
-        target: &SurfacePoint,
-    ) -> Option<Rgb> {
+    fn open_to(&mut self, start: &Start, w: Vec3, target: &SurfacePoint) -> Option<Rgb> {
         let mut ray = core::mem::take(&mut self.b.ray);
         let world = self.tracer.world;
-        world.cast_past(at.x, at.edge.faces, medium, w, &mut ray, &mut self.tracer.counters);
+        start.cast(self.tracer, w, &mut ray);
         let mut tau = None;
         if ray.end.as_ref().is_some_and(|(p, _)| p.prim == target.prim) {
             let tracer = &mut *self.tracer;
-            tau = Some(world.transmittance(at.x, w, &ray, &mut tracer.rng, &mut tracer.counters));
+            tau =
+                Some(world.transmittance(start.x, w, &ray, &mut tracer.rng, &mut tracer.counters));
         }
         self.b.ray = ray;
         tau

@@ -470,6 +470,11 @@ impl World {
         }
     }
 
+    /// The first hit of a ray, whatever it is on.
+    pub(crate) fn nearest_on(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
+        self.bvh.closest(ray, skip)
+    }
+
     /// The null interfaces between `v` and a point at `distance` along the unit direction `dir`;
     /// `None` when a surface blocks. `target` is excluded from blocking.
     pub(crate) fn connect(

@@ -1,0 +1,162 @@
+//! Edges that rest on another surface: the foot of a block on a floor.
+//!
+//! A segment past such an edge has one end on the floor, right at the edge, and neither which end nor
+//! whether it is in shadow there can be told by rays. But what the edge does is simple: it bounds the
+//! part of the floor that is not covered. With V the speed of that bound away from the faces, relative
+//! to the floor,
+//!
+//! ```text
+//! d/dθ ∫ f dA = - ∫ V f dl,
+//! ```
+//!
+//! where f is everything that paths carry through a floor vertex just outside (the boundary of the
+//! domain in Reynolds' theorem; 2021 paper, Eq. 17, with a jump of f from its value to zero). It is the
+//! limit of the kernel in the [parent](super) for a gap that closes (l = 0, |t×w| N = cos θ times the
+//! conormal), with segments that end in the shadow of the edge and those that start in it together: so
+//! each path counts once, light and camera both above the floor.
+
+use core::f64::consts::PI;
+
+use drt_geom::{Ray, Skip};
+use drt_math::{Frame, Real, Rgb, Vec3, fm, warp};
+
+use super::edges::{Edge, EdgePoint};
+use super::{End, Receiver, Sampler, Start};
+use crate::transport::{Kind, SurfacePoint, Vertex, World};
+
+/// How far an edge may be from the surface it rests on, in its own lengths: what coordinates in
+/// files written with single precision are off by.
+const GAP: f64 = 1e-6;
+
+/// Sine of the angle by which faces that lie in the floor may be off.
+const FLAT: f64 = 1e-5;
+
+/// Where along an edge it is found out whether it rests on anything.
+const PROBES: [f64; 5] = [0.01, 0.3, 0.5, 0.7, 0.99];
+
+/// Where an edge rests on a surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Contact {
+    floor: SurfacePoint,
+    x: Vec3,
+    medium: Option<usize>,
+    /// Unit normal of the floor, on the side of the faces.
+    up: Vec3,
+    /// Unit, in the floor, across the edge.
+    side: Vec3,
+    /// Angles from `side` over `up` between which the edge's faces are.
+    wedge: [f64; 2],
+    gap: f64,
+}
+
+impl Contact {
+    /// What the edge rests on at a point of it; `None` nearly everywhere.
+    pub(super) fn at(world: &World, at: &EdgePoint<'_>) -> Option<Self> {
+        let e = at.edge;
+        if !e.may_rest {
+            return None;
+        }
+        let inward = e.inward()?;
+        let gap = GAP * e.line().1.length();
+        let ray = Ray { origin: at.x + inward * gap, dir: -inward, t_max: 2.0 * gap };
+        let hit = world.nearest_on(&ray, Skip::two(e.faces[0], e.faces[1]))?;
+        let (floor, x) = world.point(hit.prim, hit.bary);
+        if world.is_null(floor.shape) || Real::abs(floor.ng.dot(e.tangent)) > FLAT {
+            return None;
+        }
+        let front = floor.ng.dot(inward) > 0.0;
+        let up = if front { floor.ng } else { -floor.ng };
+        let side = e.tangent.cross(up).normalize();
+        let angles = e.across.map(|h| {
+            let (sine, cosine) = (h.dot(up), h.dot(side));
+            (sine >= -FLAT).then(|| fm::atan2(f64::max(sine, 0.0), cosine))
+        });
+        let [Some(a), Some(b)] = angles else { return None };
+        let medium = world.medium_on_side(&floor, front, e.medium(world, at.x));
+        let wedge = [f64::min(a, b), f64::max(a, b)];
+        Some(Self { floor, x, medium, up, side, wedge, gap })
+    }
+
+    /// True when an edge rests on something somewhere.
+    pub(super) fn anywhere(world: &World, e: &Edge) -> bool {
+        let mut e = *e;
+        e.may_rest = true;
+        PROBES.into_iter().any(|u| {
+            let (x, point) = e.point(world, u);
+            Self::at(world, &EdgePoint { edge: &e, x, point, inv_pdf: 1.0 }).is_some()
+        })
+    }
+
+    /// Along the floor away from the faces, on the side from which `w` leaves the floor; `None` where
+    /// it leaves into the faces, or floor and faces touch.
+    fn outward(&self, w: Vec3) -> Option<Vec3> {
+        let angle = fm::atan2(w.dot(self.up), w.dot(self.side));
+        let [low, high] = self.wedge;
+        if angle <= 0.0 {
+            None
+        } else if low > FLAT && angle < low {
+            Some(self.side)
+        } else if high < PI - FLAT && angle > high {
+            Some(-self.side)
+        } else {
+            None
+        }
+    }
+
+    /// The floor vertex next to the edge, which its faces neither touch nor shade from outside.
+    fn vertex(&self, outward: Vec3) -> Vertex {
+        let x = self.x + outward * (4.0 * self.gap);
+        Vertex { x, medium: self.medium, kind: Kind::Surface(self.floor) }
+    }
+}
+
+impl<R: Receiver> Sampler<'_, '_, R> {
+    /// The camera sees the floor next to the edge.
+    pub(super) fn contact_with_camera(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
+        let world = self.tracer.world;
+        let d = world.camera.position() - c.x;
+        let distance = d.length();
+        let w = d / distance;
+        let (s, start) = self.contact(at, c, w)?;
+        let transport = self.seen(&start)?;
+        let tau = self.open(&start, w, distance)?;
+        if !self.receiver.moves(&self.b.functional) {
+            return None;
+        }
+        let light = self.light_from(&s, w, world.max_depth.checked_sub(1)?);
+        let cosine = w.dot(c.up);
+        self.show(c.x, light * tau * (cosine * at.inv_pdf * transport));
+        Some(())
+    }
+
+    /// Another vertex sees it.
+    pub(super) fn contact_with_others(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
+        let world = self.tracer.world;
+        let u = self.tracer.rng.next_2d();
+        let w = Frame::from_normal(c.up).to_world(warp::cosine_hemisphere(u));
+        let (s, start) = self.contact(at, c, w)?;
+        if !self.receiver.moves(&self.b.functional) {
+            return None;
+        }
+        let beyond = self.beyond(&start, w, Rgb::ONE);
+        self.light_from(&s, w, world.max_depth.checked_sub(2)?);
+        for (d, only_camera) in beyond.into_iter().flatten() {
+            // The density of w is cos θ / π.
+            self.deliver(&d, only_camera, true, w, Rgb::splat(PI * at.inv_pdf));
+        }
+        Some(())
+    }
+
+    /// The floor as the source end of a segment along `w`, where that starts, and how it moves.
+    fn contact(&mut self, at: &EdgePoint<'_>, c: &Contact, w: Vec3) -> Option<(End, Start)> {
+        let outward = c.outward(w)?;
+        let vertex = c.vertex(outward);
+        let prim = c.floor.prim;
+        let start = Start { x: vertex.x, faces: [prim, prim], medium: c.medium };
+        let s = End { vertex: Some(vertex), distance: 0.0, weight: Rgb::ONE, flight: None };
+        self.b.functional.items.clear();
+        self.edge_rate(at, -outward);
+        self.end_rate(&s, outward);
+        Some((s, start))
+    }
+}
