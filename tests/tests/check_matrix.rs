@@ -26,7 +26,7 @@ macro_rules! stages {
 }
 
 stages! {
-    surfaces: room room_box_filter knot gloss near_lamp;
+    surfaces: room room_box_filter standing knot gloss near_lamp;
     lights: spot point_and_sun;
     media: fog_box blob still_blob smoke glass dented_glass beam layers sheet ember;
 }

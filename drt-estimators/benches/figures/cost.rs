@@ -5,8 +5,8 @@ use drt_estimators::{Scene, Session, Settings, Target, Unattended, gradient};
 use drt_math::Rgb;
 use drt_motion::Parameter;
 
-use crate::scenes::{self, Detail, Subject};
-use crate::turns::{Task, take_turns};
+use crate::common::scenes::{self, Detail, Subject};
+use crate::common::turns::{Task, take_turns};
 
 const TURNS: usize = 7;
 /// Samples per pixel of a turn, interior and boundary alike.

@@ -3,8 +3,8 @@
 use drt_estimators::{Session, Settings, Target, Unattended, gradient};
 use drt_math::Rgb;
 
-use crate::scenes;
-use crate::turns::{Task, take_turns};
+use crate::common::scenes;
+use crate::common::turns::{Task, take_turns};
 
 const TURNS: usize = 5;
 const DEPTHS: [u32; 5] = [8, 16, 32, 64, 128];

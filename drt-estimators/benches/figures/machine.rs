@@ -2,8 +2,8 @@
 
 use drt_estimators::{Session, Settings, Unattended};
 
-use crate::scenes::{self, Detail, Subject};
-use crate::turns::{Task, take_turns};
+use crate::common::scenes::{self, Detail, Subject};
+use crate::common::turns::{Task, take_turns};
 
 const TURNS: usize = 7;
 

@@ -22,7 +22,7 @@ use drt_math::{Frame, Real, Rgb, Vec3, fm, warp};
 
 use super::edges::{Edge, EdgePoint};
 use super::{End, Receiver, Sampler, Start};
-use crate::transport::{Kind, SurfacePoint, Vertex, World};
+use crate::transport::{Kind, Vertex, World};
 
 /// How far an edge may be from the surface it rests on, in its own lengths: what coordinates in
 /// files written with single precision are off by.
@@ -37,16 +37,14 @@ const PROBES: [f64; 5] = [0.01, 0.3, 0.5, 0.7, 0.99];
 /// Where an edge rests on a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
-    floor: SurfacePoint,
-    x: Vec3,
-    medium: Option<usize>,
     /// Unit normal of the floor, on the side of the faces.
     up: Vec3,
     /// Unit, in the floor, across the edge.
     side: Vec3,
     /// Angles from `side` over `up` between which the edge's faces are.
     wedge: [f64; 2],
-    gap: f64,
+    /// The floor along `side` and against it, where it goes on.
+    floor: [Option<Vertex>; 2],
 }
 
 impl Contact {
@@ -59,22 +57,37 @@ impl Contact {
         let inward = e.inward()?;
         let gap = GAP * e.line().1.length();
         let ray = Ray { origin: at.x + inward * gap, dir: -inward, t_max: 2.0 * gap };
-        let hit = world.nearest_on(&ray, Skip::two(e.faces[0], e.faces[1]))?;
-        let (floor, x) = world.point(hit.prim, hit.bary);
-        if world.is_null(floor.shape) || Real::abs(floor.ng.dot(e.tangent)) > FLAT {
+        let skip = Skip::two(e.faces[0], e.faces[1]);
+        let hit = world.nearest_on(&ray, skip)?;
+        let (below, x) = world.point(hit.prim, hit.bary);
+        if world.is_null(below.shape) || Real::abs(below.ng.dot(e.tangent)) > FLAT {
             return None;
         }
-        let front = floor.ng.dot(inward) > 0.0;
-        let up = if front { floor.ng } else { -floor.ng };
+        let up = if below.ng.dot(inward) > 0.0 { below.ng } else { -below.ng };
         let side = e.tangent.cross(up).normalize();
         let angles = e.across.map(|h| {
             let (sine, cosine) = (h.dot(up), h.dot(side));
             (sine >= -FLAT).then(|| fm::atan2(f64::max(sine, 0.0), cosine))
         });
         let [Some(a), Some(b)] = angles else { return None };
-        let medium = world.medium_on_side(&floor, front, e.medium(world, at.x));
         let wedge = [f64::min(a, b), f64::max(a, b)];
-        Some(Self { floor, x, medium, up, side, wedge, gap })
+        // Next to the edge, so that its faces neither touch the floor there nor shade it from outside.
+        let medium = e.medium(world, at.x);
+        let beside = |outward: Vec3| {
+            let x = x + outward * (4.0 * gap);
+            let ray = Ray { origin: x + up * gap, dir: -up, t_max: 2.0 * gap };
+            let hit = world.nearest_on(&ray, skip)?;
+            let (floor, x) = world.point(hit.prim, hit.bary);
+            let medium = world.medium_on_side(&floor, floor.ng.dot(up) > 0.0, medium);
+            let found = Vertex { x, medium, kind: Kind::Surface(floor) };
+            (floor.shape == below.shape && floor.ng.dot(up) * below.ng.dot(up) > 0.0)
+                .then_some(found)
+        };
+        let open = [wedge[0] > FLAT, wedge[1] < PI - FLAT];
+        let floor =
+            [open[0].then(|| beside(side)).flatten(), open[1].then(|| beside(-side)).flatten()];
+        // Without a floor outside, it is another's edge that this one meets.
+        (floor[0].is_some() || floor[1].is_some()).then_some(Self { up, side, wedge, floor })
     }
 
     /// True when an edge rests on something somewhere.
@@ -87,26 +100,25 @@ impl Contact {
         })
     }
 
-    /// Along the floor away from the faces, on the side from which `w` leaves the floor; `None` where
-    /// it leaves into the faces, or floor and faces touch.
-    fn outward(&self, w: Vec3) -> Option<Vec3> {
+    /// The floor next to the edge on the side from which `w` leaves it, and the unit vector along the
+    /// floor to there; `None` where `w` leaves into the faces.
+    fn beside(&self, w: Vec3) -> Option<(Vertex, Vec3)> {
         let angle = fm::atan2(w.dot(self.up), w.dot(self.side));
         let [low, high] = self.wedge;
-        if angle <= 0.0 {
-            None
-        } else if low > FLAT && angle < low {
-            Some(self.side)
-        } else if high < PI - FLAT && angle > high {
-            Some(-self.side)
-        } else {
-            None
+        let [along, against] = self.floor;
+        match angle {
+            a if a <= 0.0 => None,
+            a if a < low => Some((along?, self.side)),
+            a if a > high => Some((against?, -self.side)),
+            _ => None,
         }
     }
 
-    /// The floor vertex next to the edge, which its faces neither touch nor shade from outside.
-    fn vertex(&self, outward: Vec3) -> Vertex {
-        let x = self.x + outward * (4.0 * self.gap);
-        Vertex { x, medium: self.medium, kind: Kind::Surface(self.floor) }
+    /// The direction and distance of a point from the contact.
+    fn towards(&self, p: Vec3) -> Option<(Vec3, f64)> {
+        let x = self.floor.iter().flatten().next()?.x;
+        let distance = (p - x).length();
+        Some(((p - x) / distance, distance))
     }
 }
 
@@ -114,9 +126,7 @@ impl<R: Receiver> Sampler<'_, '_, R> {
     /// The camera sees the floor next to the edge.
     pub(super) fn contact_with_camera(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
         let world = self.tracer.world;
-        let d = world.camera.position() - c.x;
-        let distance = d.length();
-        let w = d / distance;
+        let (w, distance) = c.towards(world.camera.position())?;
         let (s, start) = self.contact(at, c, w)?;
         let transport = self.seen(&start)?;
         let tau = self.open(&start, w, distance)?;
@@ -125,7 +135,7 @@ impl<R: Receiver> Sampler<'_, '_, R> {
         }
         let light = self.light_from(&s, w, world.max_depth.checked_sub(1)?);
         let cosine = w.dot(c.up);
-        self.show(c.x, light * tau * (cosine * at.inv_pdf * transport));
+        self.show(start.x, light * tau * (cosine * at.inv_pdf * transport));
         Some(())
     }
 
@@ -149,10 +159,9 @@ impl<R: Receiver> Sampler<'_, '_, R> {
 
     /// The floor as the source end of a segment along `w`, where that starts, and how it moves.
     fn contact(&mut self, at: &EdgePoint<'_>, c: &Contact, w: Vec3) -> Option<(End, Start)> {
-        let outward = c.outward(w)?;
-        let vertex = c.vertex(outward);
-        let prim = c.floor.prim;
-        let start = Start { x: vertex.x, faces: [prim, prim], medium: c.medium };
+        let (vertex, outward) = c.beside(w)?;
+        let prim = vertex.surface()?.prim;
+        let start = Start { x: vertex.x, faces: [prim, prim], medium: vertex.medium };
         let s = End { vertex: Some(vertex), distance: 0.0, weight: Rgb::ONE, flight: None };
         self.b.functional.items.clear();
         self.edge_rate(at, -outward);

@@ -7,7 +7,7 @@ use drt_estimators::filter::FilterKind;
 use drt_estimators::surface::{Bsdf, Distribution, Phong, RoughConductor};
 use drt_geom::procedural::{TorusKnot, cube, grid, rectangle, torus_knot, uv_sphere};
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
-use drt_motion::GeometryChange;
+use drt_motion::{Effect, GeometryChange};
 
 use super::effects::{add, grow, raise, translate, turn};
 use super::set::{at, diffuse, inside_out, placed};
@@ -83,6 +83,33 @@ pub fn room_box_filter() -> Result<Stage> {
     ];
     let scene = furnished()?.filter(FilterKind::BOX)?.scene;
     Ok(Stage::new("room, box filter", scene, cells))
+}
+
+/// A block that stands on a floor, with another on top of it, by direct light of lamp and sky: a
+/// quarter of the sliding block's derivative comes from the line where it meets the floor.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn standing() -> Result<Stage> {
+    let floor = placed(&rectangle(), vec3(3.0, 3.0, 1.0), Vec3::X, -FRAC_PI_2, Vec3::ZERO);
+    let block = placed(&cube(), vec3(0.35, 0.25, 0.3), Vec3::Y, 0.35, vec3(0.0, 0.25, 0.0));
+    let top = at(&cube(), Vec3::splat(0.12), vec3(0.0, 0.62, 0.0));
+    let lamp = placed(&rectangle(), vec3(0.4, 0.4, 1.0), Vec3::X, FRAC_PI_2, vec3(0.8, 1.8, -0.4));
+    let scene = Set::new(vec3(1.2, 1.5, 2.6), vec3(0.0, 0.2, 0.0), 35.0, 2)?
+        .shape("floor", floor, diffuse([0.7, 0.6, 0.5]))
+        .shape("block", block, diffuse([0.2, 0.4, 0.7]))
+        .shape("top", top, diffuse([0.7, 0.4, 0.2]))
+        .lamp("lamp", lamp, Rgb::new(9.0, 9.0, 8.0))
+        .light("sky", Emitter::Constant { radiance: Rgb::new(0.3, 0.35, 0.5) })
+        .scene;
+    let both = |effect: &dyn Fn(&str) -> Effect| ["block", "top"].map(effect);
+    let cells = vec![
+        Cell::new("both slide", both(&|id| translate(id, vec3(1.0, 0.0, 0.3)))).representative(),
+        Cell::new("the top slides", [translate("top", vec3(0.6, 0.0, -0.8))]),
+        Cell::new("both turn", both(&|id| turn(id, Vec3::Y, vec3(0.3, 0.0, 0.0)))),
+        Cell::new("the floor slides", [translate("floor", vec3(0.7, 0.0, 0.7))]),
+    ];
+    Ok(Stage::new("standing blocks", scene, cells))
 }
 
 /// A metal knot over a floor under a constant sky.

@@ -19,13 +19,10 @@ use crate::motion::moves;
 
 pub(super) fn conditions() -> Result<Vec<Condition>> {
     let mut all = vec![needles()?, needle_apart()?, split()?, twice()?, double_wall()?];
+    all.extend([twin()?, sheets()?, standing()?, leaning()?]);
     all.extend([thin_gap()?, thin_film()?]);
     all.extend(aligned()?);
     Ok(all)
-}
-
-pub(super) fn unsolved() -> Result<Vec<Condition>> {
-    Ok(vec![twin()?, sheets()?, standing()?, leaning()?])
 }
 
 /// Where the block is.

@@ -14,11 +14,7 @@ use crate::matrix::effects::{add, translate, turn};
 use crate::matrix::set::{at, diffuse, inside_out, placed};
 
 pub(super) fn conditions() -> Result<Vec<Condition>> {
-    Ok(vec![tiny()?, huge()?, standing()?, flat_on_a_wall()?, grazing()?])
-}
-
-pub(super) fn unsolved() -> Result<Vec<Condition>> {
-    Ok(vec![all_around()?])
+    Ok(vec![tiny()?, huge()?, standing()?, flat_on_a_wall()?, grazing()?, all_around()?])
 }
 
 fn furniture(camera: Vec3) -> Result<Set> {

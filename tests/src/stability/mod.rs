@@ -27,7 +27,7 @@ pub enum Extent {
     Full,
 }
 
-/// Conditions under which everything agrees.
+/// The conditions.
 ///
 /// # Errors
 /// When the library rejects a scene.
@@ -42,15 +42,4 @@ pub fn conditions(extent: Extent) -> Result<Vec<Condition>> {
         }
     }
     Ok(all)
-}
-
-/// Conditions under which derivatives are known to be wrong: edges of different shapes that
-/// coincide count once for each shape, visibility past an edge that lies on another surface is
-/// undecided, and edges of a huge shape leave no samples to those of a small one.
-///
-/// # Errors
-/// When the library rejects a scene.
-pub fn unsolved() -> Result<Vec<Condition>> {
-    let all = [bodies::unsolved()?, lights::unsolved()?].concat();
-    Ok(all.into_iter().map(|c| c.samples(1 << 13)).collect())
 }
