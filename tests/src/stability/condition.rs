@@ -103,8 +103,8 @@ const ROUNDING: f64 = 1e-8;
 /// When the library rejects a scene or parameter.
 pub fn examine(condition: &Condition) -> Result<Vec<Row>> {
     // Other random numbers, so that the errors are independent.
-    let hard = condition.hard.render(condition.samples, 7)?;
-    let easy = condition.easy.render(condition.samples, 11)?;
+    let hard = condition.hard.render(condition.samples, 31)?;
+    let easy = condition.easy.render(condition.samples, 32)?;
     if easy.non_finite > 0 {
         return Err("the well-conditioned scene is none".into());
     }
