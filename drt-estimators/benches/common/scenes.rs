@@ -117,23 +117,29 @@ fn cloud(detail: Detail) -> Subject {
     Subject { name: "cloud", scene, parameters, vertices_of: "knot" }
 }
 
-/// A closed room in which nothing is ever absorbed and no path ends before `max_depth`: a ball that
-/// moves under a bulb, in mist where `misty`.
-pub(crate) fn furnace(misty: bool, max_depth: u32) -> (Scene, Parameter) {
+/// A closed room in which nothing is ever absorbed and no path ends before `max_depth`: a ball under
+/// a bulb, in mist where `misty`.
+pub(crate) fn furnace(misty: bool, max_depth: u32) -> Subject {
     let mut scene = stage();
     scene.shapes.clear();
     scene.emitters.retain(|e| e.id.as_deref() == Some("bulb"));
     scene.bsdfs[0] = Named::new("white", Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE }));
     scene.shapes.push(shape("walls", walls(), 0));
     scene.shapes.push(shape("ball", sized(&procedural::icosphere(2), 1.0, vec3(0.0, 0.0, 1.2)), 0));
+    scene.integrator = Integrator { max_depth: Some(max_depth), rr_depth: u32::MAX };
+    let mut parameters = vec![
+        ("moves", ten(|i| moves(&["ball"], i))),
+        ("colour", ten(|i| paints("white", "reflectance", i))),
+    ];
     if misty {
         scene.media.push(Named::new("mist", homogeneous(Rgb::splat(0.15), Rgb::ONE, 0.0)));
         for s in &mut scene.shapes {
             s.boundary = Some(MediumBoundary { interior: None, exterior: Some(0) });
         }
+        parameters.push(("extinction", ten(|i| paints("mist", "sigma_t", i))));
     }
-    scene.integrator = Integrator { max_depth: Some(max_depth), rr_depth: u32::MAX };
-    (scene, moves(&["ball"], 0))
+    let name = if misty { "misty" } else { "clear" };
+    Subject { name, scene, parameters, vertices_of: "ball" }
 }
 
 /// The same scene with another film.

@@ -46,17 +46,17 @@ pub(crate) fn print() {
 
 /// Paths of `depth` vertices, the fewer the longer they are.
 fn task(job: Job, misty: bool, depth: u32) -> Task<'static> {
-    let (scene, parameter) = scenes::furnace(misty, depth);
-    let scene = scenes::with_film(scene, FILM);
+    let subject = scenes::furnace(misty, depth);
+    let scene = scenes::with_film(subject.scene, FILM);
     let settings = Settings { spp: VERTICES / depth, threads: 1, ..Settings::default() };
     let parameters = match job {
         Job::Image => vec![],
-        Job::DerivativeImage => vec![parameter],
+        Job::DerivativeImage => subject.parameters[0].1[..1].to_vec(),
         Job::Gradient => {
-            let ball: Target = scene.find("ball").expect("a ball");
+            let target: Target = scene.find(subject.vertices_of).expect("a shape");
             let adjoint = [Rgb::ONE; PIXELS as usize];
             return Box::new(move || {
-                gradient(&scene, &[ball], &settings, &adjoint, &Unattended).expect("a gradient");
+                gradient(&scene, &[target], &settings, &adjoint, &Unattended).expect("a gradient");
             });
         }
     };
