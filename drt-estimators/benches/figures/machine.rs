@@ -5,10 +5,12 @@ use drt_estimators::{Session, Settings, Unattended};
 use crate::common::scenes::{self, Detail, Subject};
 use crate::common::turns::{Task, take_turns};
 
-const TURNS: usize = 7;
+const TURNS: usize = 5;
 
 pub(crate) fn threads() {
-    println!("THREADS: the time of one thread over that of two (>= 1.9)");
+    println!(
+        "THREADS: the time of one over that of two, on a machine that does nothing else (>= 1.9)"
+    );
     println!();
     if !cfg!(feature = "parallel") {
         println!("one thread only: build with --features parallel\n");
@@ -18,7 +20,7 @@ pub(crate) fn threads() {
     for subject in scenes::all(Detail::Fine) {
         let gain = |parameters: usize| {
             let task = |threads| {
-                let spp = 16;
+                let spp = 8;
                 let mut session = session(&subject, parameters, threads);
                 let task: Task<'_> = Box::new(move || {
                     session.run(spp, &Unattended);

@@ -547,17 +547,14 @@ impl World {
     fn first_boundary(&self, x: Vec3) -> Option<(SurfacePoint, bool)> {
         // Any direction serves; an irrational one avoids edges and axis-aligned faces.
         let dir = drt_math::vec3(0.577_215_66, 0.414_213_56, 0.703_818_4).normalize();
-        let mut best: Option<(f64, SurfacePoint)> = None;
         let ray = Ray { origin: x, dir, t_max: f64::INFINITY };
-        self.bvh.all(&ray, Skip::NOTHING, |hit| {
-            let shape = self.prims[hit.prim as usize].shape as usize;
-            if self.scene.shapes[shape].boundary.is_some()
-                && best.as_ref().is_none_or(|(t, _)| hit.t < *t)
-            {
-                best = Some((hit.t, self.point(hit.prim, hit.bary).0));
-            }
-        });
-        best.map(|(_, p)| (p, p.ng.dot(dir) < 0.0))
+        let bounds = |prim: u32| {
+            let shape = self.prims[prim as usize].shape as usize;
+            self.scene.shapes[shape].boundary.is_some()
+        };
+        let hit = self.bvh.closest_through(&ray, Skip::NOTHING, bounds, &mut Vec::new())?;
+        let (point, _) = self.point(hit.prim, hit.bary);
+        Some((point, point.ng.dot(dir) < 0.0))
     }
 
     /// The medium around a point off all surfaces: that on the near side of the first interface
