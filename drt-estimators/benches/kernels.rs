@@ -184,14 +184,13 @@ fn paths() {
         "vertex, ns", "", "traced", "differentiated", "another parameter"
     );
     for misty in [false, true] {
-        let subject = scenes::furnace(misty, DEPTH);
-        let scene = scenes::with_film(subject.scene, FILM);
+        let subject = scenes::furnace(misty, DEPTH).with_film(FILM);
         for (kind, ten) in &subject.parameters {
             let task = |parameters: &[Parameter]| -> Task<'_> {
                 let settings =
                     Settings { spp: SPP, boundary_spp: Some(0), threads: 1, ..Settings::default() };
                 let mut session =
-                    Session::new(&scene, parameters, &settings).expect("a valid scene");
+                    Session::new(&subject.scene, parameters, &settings).expect("a valid scene");
                 Box::new(move || {
                     session.run(SPP, &Unattended);
                 })

@@ -28,7 +28,7 @@ fn main() {
     print!("{:9} {:20} {:>7}", "scene", "layer", "slope");
     SAMPLES[1..].iter().for_each(|n| print!(" {n:>7}"));
     println!("\n{:9} {:20} {:>7}", "", "", "<= -0.5");
-    for subject in scenes::all(Detail::Coarse) {
+    for subject in scenes::all(Detail::Coarse).map(|subject| subject.with_film(FILM)) {
         if !(names.is_empty() || names.iter().any(|n| n == subject.name)) {
             continue;
         }
@@ -52,11 +52,11 @@ fn main() {
 fn scatter(subject: &Subject, parameters: &[drt_motion::Parameter], spp: u32) -> Vec<f64> {
     // As many samples in all at each N where time permits, so that rare large values show alike.
     let runs = u32::min(2 * SAMPLES[SAMPLES.len() - 1] / spp, 512);
-    let scene = scenes::with_film(subject.scene.clone(), FILM);
     let mut moments = vec![Vec::new(); 1 + parameters.len()];
     for seed in 0..u64::from(runs) {
         let settings = Settings { spp, seed, threads: 1, ..Settings::default() };
-        let mut session = Session::new(&scene, parameters, &settings).expect("a valid scene");
+        let mut session =
+            Session::new(&subject.scene, parameters, &settings).expect("a valid scene");
         session.run(spp, &Unattended);
         let r = session.rendering();
         let layers = [&r.image].into_iter().chain(r.derivatives.iter().map(|d| &d.total));

@@ -49,6 +49,7 @@ enum Shown {
 #[derive(Debug)]
 struct Reticent {
     cloud: GridMedium,
+    largest: Rgb,
     shown: Shown,
 }
 
@@ -68,14 +69,13 @@ impl DensityField for Reticent {
                 self.cloud.pieces(ray, &mut |p| visit(&Piece { minorant: Rgb::ZERO, ..*p }));
             }
             Shown::OneMajorant => {
-                let majorant = Rgb::splat(self.cloud.largest_sigma_t());
                 // All rays here lie inside the box.
                 let _ = visit(&Piece {
                     start: 0.0,
                     end: ray.t_max,
-                    majorant,
+                    majorant: self.largest,
                     minorant: Rgb::ZERO,
-                    mean: majorant,
+                    mean: self.largest,
                 });
             }
         }
@@ -98,7 +98,9 @@ fn media(depth: f64) -> [Named; 4] {
     let cloud = GridMedium::new(grid, depth / mean, albedo, emission).expect("coefficients");
     let even = Homogeneous::new(Rgb::splat(depth), Rgb::splat(0.9), Rgb::ZERO).expect("valid");
     let medium = |kind: MediumKind| Medium::new(kind, Phase::Isotropic);
-    let reticent = |shown| MediumKind::Custom(Arc::new(Reticent { cloud: cloud.clone(), shown }));
+    let largest = Rgb::splat(cloud.largest_sigma_t());
+    let reticent =
+        |shown| MediumKind::Custom(Arc::new(Reticent { cloud: cloud.clone(), largest, shown }));
     [
         ("one medium, closed form", medium(even.into())),
         ("cloud", medium(cloud.clone().into())),

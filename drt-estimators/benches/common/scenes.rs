@@ -25,6 +25,14 @@ pub(crate) struct Subject {
     pub(crate) vertices_of: &'static str,
 }
 
+impl Subject {
+    pub(crate) fn with_film(mut self, film: [u32; 2]) -> Self {
+        let sensor = &mut self.scene.sensors[0].item.sensor;
+        *sensor = sensor.with_film(film).expect("a film");
+        self
+    }
+}
+
 /// Triangles of the bodies.
 #[derive(Clone, Copy)]
 pub(crate) enum Detail {
@@ -140,13 +148,6 @@ pub(crate) fn furnace(misty: bool, max_depth: u32) -> Subject {
     }
     let name = if misty { "misty" } else { "clear" };
     Subject { name, scene, parameters, vertices_of: "ball" }
-}
-
-/// The same scene with another film.
-pub(crate) fn with_film(mut scene: Scene, film: [u32; 2]) -> Scene {
-    let sensor = &mut scene.sensors[0].item.sensor;
-    *sensor = sensor.with_film(film).expect("a film");
-    scene
 }
 
 /// A floor under a lamp and a bulb, and a camera.

@@ -8,9 +8,12 @@ use drt_motion::Parameter;
 use crate::common::scenes::{self, Detail, Subject};
 use crate::common::turns::{Task, take_turns};
 
-const TURNS: usize = 7;
-/// Samples per pixel of a turn, interior and boundary alike.
-const SPP: u32 = 8;
+const TURNS: usize = 5;
+/// Samples per pixel of a turn, interior and boundary alike: as many as an image is rendered with,
+/// on few pixels.
+const SPP: u32 = 64;
+const FILM: [u32; 2] = [16, 16];
+const PIXELS: usize = (FILM[0] * FILM[1]) as usize;
 
 pub(crate) fn print() {
     println!("COST of derivatives, at as many interior and boundary samples as the image has");
@@ -23,7 +26,7 @@ pub(crate) fn print() {
         "scene", "parameter", "us/path", "rays", "one / image", "rays", "ten / one"
     );
     println!("{:9} {:11} {:>8} {:>6} {:>12} {:>6} {:>13}", "", "", "", "", "<= 2.5", "", "<= 1.3");
-    let subjects = scenes::all(Detail::Fine);
+    let subjects = scenes::all(Detail::Fine).map(|subject| subject.with_film(FILM));
     for subject in &subjects {
         for (kind, ten) in &subject.parameters {
             parameters(subject, kind, ten);
@@ -66,7 +69,7 @@ fn parameters(subject: &Subject, kind: &str, ten: &[Parameter]) {
         [&[][..], &ten[..1], ten].map(|parameters| session(&subject.scene, parameters));
     let [forward, single, tenfold] =
         take_turns(TURNS, [more(&mut image), more(&mut one), more(&mut all)]);
-    let paths = f64::from(SPP) * pixels(&subject.scene) as f64;
+    let paths = f64::from(SPP) * PIXELS as f64;
     println!(
         "{:9} {kind:11} {:8.2} {:6.1} {:12.2} {:6.1} {:13.2}",
         subject.name,
@@ -82,7 +85,7 @@ fn vertices(subject: &Subject) {
     let scene = &subject.scene;
     let target = scene.find(subject.vertices_of).expect("a shape");
     let Target::Shape(shape) = target else { panic!("{} is no shape", subject.vertices_of) };
-    let adjoint = vec![Rgb::ONE; pixels(scene)];
+    let adjoint = [Rgb::ONE; PIXELS];
     let call = |settings: &Settings| {
         gradient(scene, &[target], settings, &adjoint, &Unattended).expect("a valid scene")
     };
@@ -107,9 +110,4 @@ fn vertices(subject: &Subject) {
         counters.rays as f64 / counters.paths as f64,
         preparation.median() * 1e3,
     );
-}
-
-fn pixels(scene: &Scene) -> usize {
-    let [w, h] = scene.sensors[0].item.sensor.film();
-    (w * h) as usize
 }

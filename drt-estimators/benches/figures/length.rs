@@ -46,8 +46,8 @@ pub(crate) fn print() {
 
 /// Paths of `depth` vertices, the fewer the longer they are.
 fn task(job: Job, misty: bool, depth: u32) -> Task<'static> {
-    let subject = scenes::furnace(misty, depth);
-    let scene = scenes::with_film(subject.scene, FILM);
+    let subject = scenes::furnace(misty, depth).with_film(FILM);
+    let scene = subject.scene;
     let settings = Settings { spp: VERTICES / depth, threads: 1, ..Settings::default() };
     let parameters = match job {
         Job::Image => vec![],

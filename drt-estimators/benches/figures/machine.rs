@@ -17,7 +17,8 @@ pub(crate) fn threads() {
         return;
     }
     println!("{:9} {:>6} {:>17}", "scene", "image", "derivative image");
-    for subject in scenes::all(Detail::Fine) {
+    let [_, room, fog, _, cloud] = scenes::all(Detail::Fine).map(|s| s.with_film([64, 64]));
+    for subject in [room, fog, cloud] {
         let gain = |parameters: usize| {
             let task = |threads| {
                 let spp = 8;
@@ -49,13 +50,13 @@ pub(crate) fn memory() {
         println!("unknown on this platform\n");
         return;
     }
-    println!("{:9} {:>8} {:>10} {:>15}", "scene", "prepared", "16 samples", "64 samples more");
+    println!("{:9} {:>8} {:>10} {:>15}", "scene", "prepared", "8 samples", "32 samples more");
     for subject in scenes::all(Detail::Fine) {
         let mut session = session(&subject, 10, 1);
         let prepared = peak();
-        session.run(16, &Unattended);
+        session.run(8, &Unattended);
         let short = peak();
-        session.run(64, &Unattended);
+        session.run(32, &Unattended);
         let [prepared, short, long] = [prepared, short, peak()].map(|p| p.unwrap_or(f64::NAN));
         println!("{:9} {prepared:8.2} {short:10.2} {long:15.2}", subject.name);
     }
