@@ -55,13 +55,15 @@ fn draw<T>(mut source: T, next: fn(&mut T) -> f64) {
     }
 }
 
+type Integrand = fn(&[f64]) -> f64;
+
 fn worth() {
     const COUNTS: [u32; 7] = [2, 4, 16, 64, 256, 1024, 4096];
     const SEQUENCES: u32 = 400;
     print!("{:24}", "worth of N points");
     COUNTS.iter().for_each(|n| print!(" {n:>8}"));
     println!();
-    let integrands: [(&str, fn(&[f64]) -> f64); 2] = [("smooth", smooth), ("edge", edge)];
+    let integrands: [(&str, Integrand); 2] = [("smooth", smooth), ("edge", edge)];
     for (name, f) in integrands {
         for dimensions in [2, 4, 8] {
             let variance = |n: u32| {
