@@ -91,7 +91,7 @@ fn vertices(subject: &Subject) {
     };
     // What a call does whatever the number of samples: the least it can be asked for.
     const LEAST: u32 = 2;
-    let least = Settings { spp: LEAST, boundary_spp: None, ..settings() };
+    let least = Settings { spp: LEAST, ..settings() };
     let full = Settings { spp: SPP + LEAST, ..least.clone() };
     let mut image = session(scene, &[]);
     let [forward, fixed, all] = take_turns(
