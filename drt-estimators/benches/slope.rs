@@ -51,7 +51,7 @@ fn main() {
 /// Per layer, the root mean square over pixels and channels of the standard deviation between runs.
 fn scatter(subject: &Subject, parameters: &[drt_motion::Parameter], spp: u32) -> Vec<f64> {
     // As many samples in all at each N where time permits, so that rare large values show alike.
-    let runs = u32::min(2 * SAMPLES[SAMPLES.len() - 1] / spp, 512);
+    let runs = u32::min(2 * SAMPLES[SAMPLES.len() - 1] / spp, 256);
     let mut moments = vec![Vec::new(); 1 + parameters.len()];
     for seed in 0..u64::from(runs) {
         let settings = Settings { spp, seed, threads: 1, ..Settings::default() };
