@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
-use drt_medium::MediumTangent;
+use drt_medium::{CoefficientGradients, CoefficientRates, MediumTangent};
 use drt_motion::{SiteWeight, VolumeMotion, blend_jet};
 
 use crate::emitter::EmitterGradient;
@@ -73,15 +73,23 @@ pub(crate) struct Contraction<'a> {
     pub(crate) rates: Vec<Rgb>,
     /// Of the sites around a medium.
     weights: Vec<SiteWeight>,
+    /// By medium, the rates of what is the same everywhere in it.
+    uniform: Vec<Option<Vec<CoefficientRates>>>,
 }
 
 impl<'a> Contraction<'a> {
     pub(crate) fn new(world: &'a World, motion: &'a Motion) -> Self {
+        let uniform = motion.tangents.media.iter().enumerate().map(|(m, tangents)| {
+            let medium = world.medium(m);
+            medium.homogeneous()?;
+            Some(tangents.iter().map(|(_, t)| t.rates(medium, Vec3::ZERO)).collect())
+        });
         Self {
             world,
             motion,
             rates: alloc::vec![Rgb::ZERO; motion.parameters()],
             weights: Vec::new(),
+            uniform: uniform.collect(),
         }
     }
 
@@ -135,8 +143,23 @@ impl AdjointSink for Contraction<'_> {
     }
 
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
-        for (p, tangent) in &self.motion.tangents.media[medium] {
-            self.rates[*p] += adjoint.dot(&tangent.rates(self.world.medium(medium), x));
+        let tangents = &self.motion.tangents.media[medium];
+        if let Some(uniform) = &self.uniform[medium] {
+            for ((p, _), rates) in tangents.iter().zip(uniform) {
+                self.rates[*p] += adjoint.dot(rates);
+            }
+            return;
+        }
+        if tangents.is_empty() {
+            return;
+        }
+        let medium = self.world.medium(medium);
+        let coefficients = medium.coefficients(x);
+        let moves = tangents.iter().any(|(_, t)| t.grid_velocity().is_some());
+        let gradients = if moves { medium.gradients(x) } else { CoefficientGradients::ZERO };
+        for (p, tangent) in tangents {
+            let rates = tangent.rates_given(medium, x, &coefficients, &gradients);
+            self.rates[*p] += adjoint.dot(&rates);
         }
     }
 

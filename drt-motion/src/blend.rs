@@ -10,6 +10,16 @@
 //! so u equals u_i on site i, with its first derivatives, and is continuous everywhere: what a field
 //! inside a medium must be (theory sheet §4.1, §14.1). The divergence jumps where the nearest point
 //! of a site does, which is harmless.
+//!
+//! Away from a surface its distance may be any that goes over into the true one near it: with s the
+//! distance to the box around it, d that to the surface itself, and w rising smoothly from 0 at the
+//! box to 1 at a distance from it,
+//!
+//! ```text
+//! d_i = d + w (s - d),
+//! ```
+//!
+//! so that the nearest point of a mesh is looked for near it only.
 
 use alloc::vec::Vec;
 
@@ -38,6 +48,42 @@ pub struct SiteWeight {
     pub gradient: Vec3,
 }
 
+impl Site {
+    /// Its squared distance as λ, with half the gradient; infinitely far where there is nothing.
+    fn squared_distance(&self, x: Vec3) -> SiteWeight {
+        let to = |p: Vec3| SiteWeight { lambda: (x - p).length_squared(), gradient: x - p };
+        match self {
+            Self::Surface(bvh) => surface_distance(bvh, x).unwrap_or(NOWHERE),
+            Self::Triangle(t) => to(nearest_point(*t, x)),
+            Self::Point(p) => to(*p),
+        }
+    }
+}
+
+const NOWHERE: SiteWeight = SiteWeight { lambda: f64::INFINITY, gradient: Vec3::ZERO };
+
+/// How far from the box around it, in diagonals of the box, a surface is no more than its box.
+const FAR: f64 = 0.2;
+
+fn surface_distance(bvh: &TriangleBvh, x: Vec3) -> Option<SiteWeight> {
+    let bounds = bvh.bounds();
+    let off = x - x.max(bounds.min).min(bounds.max);
+    let (s, far) = (off.length(), FAR * bounds.extent().length());
+    if s > 0.0 && s >= far {
+        return Some(SiteWeight { lambda: s * s, gradient: off });
+    }
+    let away = x - bvh.closest_point(x)?.point;
+    let d = away.length();
+    if s == 0.0 || d == 0.0 {
+        return Some(SiteWeight { lambda: d * d, gradient: away });
+    }
+    let z = s / far;
+    let (w, slope) = (z * z * (3.0 - 2.0 * z), 6.0 * z * (1.0 - z) / far);
+    let distance = d + w * (s - d);
+    let gradient = away * ((1.0 - w) / d) + off * ((w + slope * (s - d)) / s);
+    Some(SiteWeight { lambda: distance * distance, gradient: gradient * distance })
+}
+
 /// The sites around a medium.
 #[derive(Clone, Debug, Default)]
 pub struct Blend {
@@ -54,17 +100,8 @@ impl Blend {
     /// Replaces `out` by the weights of all sites at `x`.
     pub fn weights(&self, x: Vec3, out: &mut Vec<SiteWeight>) {
         out.clear();
-        // First, λ holds d² and the gradient x - nearest.
-        for site in &self.sites {
-            let nearest = match site {
-                Site::Surface(bvh) => bvh.closest_point(x).map(|c| c.point),
-                Site::Triangle(t) => Some(nearest_point(*t, x)),
-                Site::Point(p) => Some(*p),
-            };
-            let gradient = nearest.map_or(Vec3::ZERO, |p| x - p);
-            let lambda = nearest.map_or(f64::INFINITY, |_| gradient.length_squared());
-            out.push(SiteWeight { lambda, gradient });
-        }
+        // First, λ holds d² and the gradient half that of d².
+        out.extend(self.sites.iter().map(|site| site.squared_distance(x)));
         let Some(least) = out.iter().map(|w| w.lambda).min_by(f64::total_cmp) else { return };
         if least == 0.0 {
             // On a site: it alone counts, and derivatives of the weights vanish.
@@ -178,7 +215,14 @@ mod tests {
             blend_jet(&w, &v, x)
         };
         let h = 1e-6;
-        for x in [vec3(1.3, 0.4, 0.2), vec3(-0.2, 1.7, -1.0), vec3(3.5, 0.4, 0.7)] {
+        // In the box around the ball, next to it, and beyond where it counts.
+        for x in [
+            vec3(0.9, 0.4, 0.6),
+            vec3(1.3, 0.4, 0.2),
+            vec3(-0.2, 1.6, -1.0),
+            vec3(1.2, 1.3, 1.1),
+            vec3(3.5, 0.4, 0.7),
+        ] {
             let along = |axis: Vec3| axis * h;
             let fd = ((u(x + along(Vec3::X)).u - u(x - along(Vec3::X)).u).x
                 + (u(x + along(Vec3::Y)).u - u(x - along(Vec3::Y)).u).y
