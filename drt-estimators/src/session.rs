@@ -2,7 +2,6 @@
 
 use alloc::string::String;
 use alloc::vec::Vec;
-use core::cell::Cell;
 
 use drt_motion::Parameter;
 
@@ -27,6 +26,8 @@ use crate::{Error, Estimate};
 const TILE: u32 = 256;
 /// Samples of one piece of work.
 const WORK: u32 = 1 << 12;
+/// Most pieces that the samples of a round are cut into.
+const CUTS: u32 = 256;
 /// Samples after which a small film is looked at again.
 const SLICE: u32 = 1 << 18;
 /// Non-finite contributions that are described one by one.
@@ -139,21 +140,9 @@ impl Session {
         let units = spp.div_ceil(per_unit);
         // The share of the work that is done when the pixels are.
         let share = if self.prepared.sources.is_empty() { 1.0 } else { 0.5 };
-        let [w, h] = self.prepared.world.camera.film();
-        let slice = (units / 16).clamp(1, u32::max(32, SLICE / (w * h)));
-        let mut done = 0;
-        let mut going = true;
-        while done < units && going {
-            let n = u32::min(slice, units - done);
-            let before = f64::from(done) / f64::from(units);
-            going = self.run_pixels(n, control, |part| {
-                control.progress(share * (before + part * f64::from(n) / f64::from(units)));
-            });
-            if going {
-                done += n;
-                self.samples += n * per_unit;
-            }
-        }
+        let done = self.run_pixels(units, control, |part| control.progress(share * part));
+        self.samples += done * per_unit;
+        let mut going = done == units;
         for i in 0..self.prepared.sources.len() {
             if going {
                 let n = self.prepared.sources.len() as f64;
@@ -167,10 +156,13 @@ impl Session {
         going
     }
 
-    /// Samples every pixel `units` times more.
-    fn run_pixels(&mut self, units: u32, control: &dyn Control, progress: impl Fn(f64)) -> bool {
+    /// Samples every pixel `units` times more, in rounds of which each is finished or left out: one
+    /// that was cut short would leave pixels with different numbers of samples. Returns how many
+    /// units were finished.
+    fn run_pixels(&mut self, units: u32, control: &dyn Control, progress: impl Fn(f64)) -> u32 {
         let [w, h] = self.prepared.world.camera.film();
         let count = w * h;
+        let round = (units / 16).clamp(1, u32::max(32, SLICE / count));
         let tiles = count.div_ceil(TILE);
         let parameters = self.motion.as_ref().map_or(0, Motion::parameters);
         let (along, separate) = (self.prepared.along_rays(), self.settings.terms);
@@ -180,57 +172,59 @@ impl Session {
         let (settings, blocks) = (&self.settings, &self.blocks);
         let antithetic = self.plan.antithetic;
         // A film of few pixels is cut into samples as well.
-        let per_work = (WORK / u32::min(count, TILE)).max(1);
-        let cuts = units.div_ceil(per_work);
+        let per_work = u32::max(WORK / u32::min(count, TILE), round.div_ceil(CUTS)).max(1);
+        let cuts = if tiles > CUTS { 1 } else { round.div_ceil(per_work) };
         let works = tiles * cuts;
-        let mut finished = Vec::with_capacity(works as usize);
-        let cancelled = Cell::new(false);
-        self.pool.ordered(
-            0..works,
-            4,
-            |i| {
-                let (t, cut) = (i / cuts, i % cuts);
-                let range = t * TILE..u32::min(count, (t + 1) * TILE);
-                let own = first + cut * per_work..first + u32::min(units, (cut + 1) * per_work);
-                let mut tile = Tile::new(range.clone(), layers);
-                let sink = motion.map(|m| Contraction::new(world, m));
-                let mut sampler =
-                    PixelSampler::new(world, sink, along, settings.seed, antithetic, separate);
-                let mut values = alloc::vec![drt_math::Rgb::ZERO; layers];
-                for pixel in range {
-                    for unit in own.clone() {
-                        sampler.sample(pixel, unit, &mut values);
-                        tile.push(blocks, pixel, unit, &values);
-                    }
+        let rounds = units.div_ceil(round);
+        let work = |i: u32| {
+            let (r, t, cut) = (i / works, i / cuts % tiles, i % cuts);
+            let range = t * TILE..u32::min(count, (t + 1) * TILE);
+            let of = |cut: u32| {
+                let within = if cut == cuts { round } else { cut * per_work };
+                u32::min(units, r * round + within)
+            };
+            let mut tile = Tile::new(range.clone(), layers);
+            let sink = motion.map(|m| Contraction::new(world, m));
+            let mut sampler =
+                PixelSampler::new(world, sink, along, settings.seed, antithetic, separate);
+            let mut values = alloc::vec![drt_math::Rgb::ZERO; layers];
+            for pixel in range {
+                for unit in first + of(cut)..first + of(cut + 1) {
+                    sampler.sample(pixel, unit, &mut values);
+                    tile.push(blocks, pixel, unit, &values);
                 }
-                let counters = sampler.counters();
-                let account = Account {
-                    counters,
-                    non_finite: sampler.non_finite,
-                    non_finite_count: sampler.non_finite_count,
-                };
-                (tile, account)
-            },
-            |t, result| {
-                finished.push(result);
-                progress(f64::from(t + 1) / f64::from(works));
-                cancelled.set(control.cancelled());
-                !cancelled.get()
-            },
-        );
-        // A round that was cut short would leave pixels with different numbers of samples.
-        if cancelled.get() && finished.len() < works as usize {
-            return false;
-        }
-        self.pixels.advance(units);
-        for (tile, account) in finished {
-            self.pixels.merge(&tile);
+            }
+            let counters = sampler.counters();
+            let account = Account {
+                counters,
+                non_finite: sampler.non_finite,
+                non_finite_count: sampler.non_finite_count,
+            };
+            (tile, account)
+        };
+        let (mut finished, mut accounts, mut done) = (Vec::new(), Vec::new(), 0);
+        let (pixels, all) = (&mut self.pixels, rounds * works);
+        self.pool.ordered(0..all, 4, work, |i, result| {
+            finished.push(result);
+            progress(f64::from(i + 1) / f64::from(all));
+            if (i + 1) % works == 0 {
+                let now = u32::min(units, (i + 1) / works * round);
+                pixels.advance(now - done);
+                done = now;
+                for (tile, account) in finished.drain(..) {
+                    pixels.merge(&tile);
+                    accounts.push(account);
+                    let image = pixels.estimates(tile.pixels.clone());
+                    let pixels = (tile.pixels.start, tile.pixels.end);
+                    control.tile(&FinishedTile { pixels, image: &image });
+                }
+            }
+            !control.cancelled()
+        });
+        for account in accounts {
             self.account(account);
-            let image = self.pixels.estimates(tile.pixels.clone());
-            let pixels = (tile.pixels.start, tile.pixels.end);
-            control.tile(&FinishedTile { pixels, image: &image });
         }
-        !cancelled.get()
+        done
     }
 
     /// Samples one splatted source in as many batches as error bars need.
