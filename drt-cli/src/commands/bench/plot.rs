@@ -123,7 +123,7 @@ fn panel(text: &mut String, [x, y]: [f64; 2], job: &str, series: &[&Series]) {
         let line: String = s
             .points
             .iter()
-            .filter(|p| p.noise > 0.0 && p.seconds > 0.0)
+            .filter(|p| p.has_logarithms())
             .map(|p| {
                 let percent = 100.0 * s.relative(p.noise);
                 format!("{:.1},{:.1} ", time.place(p.seconds), noise.place(percent))
@@ -191,6 +191,8 @@ mod tests {
     #[test]
     fn plots_are_well_formed_and_lines_fall_inside_their_panel() {
         let mut other = falling(-0.8);
+        // Of a single sample.
+        other.points[0].noise = f64::INFINITY;
         other.job = "a < b & c".into();
         let text = svg(&[falling(-0.5), other]);
         let document = roxmltree::Document::parse(&text).unwrap();

@@ -33,6 +33,13 @@ pub(super) struct Series {
 /// Samples from which on batches make the standard errors.
 const TRUSTED: u32 = 64;
 
+impl Point {
+    /// True where noise and time are positive and finite: after a single sample the noise is not.
+    pub(super) fn has_logarithms(&self) -> bool {
+        self.noise > 0.0 && self.noise.is_finite() && self.seconds > 0.0
+    }
+}
+
 impl Series {
     /// An error over the scale.
     pub(super) fn relative(&self, error: f64) -> f64 {
@@ -42,7 +49,7 @@ impl Series {
     /// Exponent of the noise against the time; -1/2 for independent samples. `None` with fewer than
     /// three points.
     pub(super) fn slope(&self) -> Option<f64> {
-        let known = |p: &&Point| p.noise > 0.0 && p.noise.is_finite() && p.seconds > 0.0;
+        let known = |p: &&Point| p.has_logarithms();
         let trusted = |p: &&Point| p.spp >= TRUSTED;
         let logs = |points: &mut dyn Iterator<Item = &Point>| -> Vec<[f64; 2]> {
             points.filter(known).map(|p| [p.seconds.ln(), p.noise.ln()]).collect()
