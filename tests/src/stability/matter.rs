@@ -64,7 +64,7 @@ fn thin() -> Result<Condition> {
         parameters[3].1 = vec![raise("fog", "albedo", 0.1 / sigma_t)];
         Ok(Case::new(filled(fog(sigma_t, 0.8)?, phase, 3)?, parameters.split_off(1)))
     };
-    Ok(Condition::new("optical depth 1e-9", of(1e-9)?, of(1e-2)?))
+    Ok(Condition::new("optical depth 1e-9", of(1e-9)?, of(1e-4)?))
 }
 
 /// The same against no medium.
@@ -177,7 +177,7 @@ fn mirror() -> Result<Condition> {
         ];
         Ok(Case::new(scene, parameters))
     };
-    Ok(Condition::new("alpha 1e-3", of(1e-3)?, of(1e-2)?))
+    Ok(Condition::new("alpha 1e-3", of(1e-3)?, of(3e-3)?))
 }
 
 /// Inside a closed white room, whose radiance the walls' emission and losses balance.
