@@ -203,7 +203,7 @@ impl Session {
             (tile, account)
         };
         let (mut finished, mut accounts, mut done) = (Vec::new(), Vec::new(), 0);
-        let (pixels, all) = (&mut self.pixels, rounds * works);
+        let (pixels, all) = (&mut self.pixels, rounds.saturating_mul(works));
         self.pool.ordered(0..all, 4, work, |i, result| {
             finished.push(result);
             progress(f64::from(i + 1) / f64::from(all));

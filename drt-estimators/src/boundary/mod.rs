@@ -253,9 +253,6 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         if let Some(emitter) = choice.delta {
             return self.delta(emitter, choice.pmf);
         }
-        if !choice.is_area {
-            return None;
-        }
         let general = self.boundary.general.as_ref()?;
         let at = general.sample(world, &mut self.tracer.rng);
         if Contact::at(world, &at).is_some() {

@@ -27,7 +27,6 @@ enum Entry {
 pub(crate) struct Choice {
     /// The emitter, when it is a delta light.
     pub(crate) delta: Option<usize>,
-    pub(crate) is_area: bool,
     pub(crate) pmf: f64,
     entry: Entry,
 }
@@ -206,12 +205,12 @@ impl LightTable {
     pub(crate) fn choose(&self, rng: &mut Rng) -> Option<Choice> {
         let i = self.table.as_ref()?.sample(rng.next_f64()).index;
         let entry = self.entries[i];
-        let (delta, is_area) = match entry {
-            Entry::Delta { emitter } => (Some(emitter as usize), false),
-            Entry::Triangle { .. } => (None, true),
+        let delta = match entry {
+            Entry::Delta { emitter } => Some(emitter as usize),
+            Entry::Triangle { .. } => None,
         };
         let pmf = self.table.as_ref().map_or(0.0, |t| t.pmf(i));
-        Some(Choice { delta, is_area, pmf, entry })
+        Some(Choice { delta, pmf, entry })
     }
 
     /// Samples a point of a chosen area emitter.
