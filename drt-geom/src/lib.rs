@@ -12,6 +12,7 @@ mod io;
 mod mesh;
 pub mod procedural;
 mod query;
+mod tet;
 mod topology;
 #[cfg(feature = "spade")]
 mod triangulate;
@@ -25,6 +26,7 @@ pub use io::{ObjError, ObjErrorKind, load_obj};
 pub use io::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
 pub use mesh::{Mesh, MeshError};
 pub use query::{BvhError, ClosestPoint, Hit, Ray, Skip, TriangleBvh, nearest_point};
+pub use tet::{TetMesh, TetVertexOrigin};
 pub use topology::{Edge, EdgeClass, Topology};
 #[cfg(feature = "spade")]
 pub use triangulate::{PolygonError, newell_normal, triangulate};
