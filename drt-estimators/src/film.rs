@@ -1,9 +1,10 @@
 //! Accumulating images with their variance.
 //!
-//! Two kinds of film. A [`PixelFilm`] takes values that belong to one pixel (each pixel samples its
-//! own filter, so pixels are independent). A [`SplatFilm`] takes values that land anywhere, in
-//! batches: 32 independent ones a pass, whose scatter gives the variance of every pixel, block and
-//! mean with all correlations between pixels in it.
+//! Two kinds of film. A [`PixelFilm`] takes values that belong to one pixel: each pixel samples its
+//! own filter, so pixels are independent, and their variances add up to those of blocks and of the
+//! mean. A [`SplatFilm`] takes values that land anywhere, in batches: 32 independent ones a pass,
+//! whose scatter gives the variance of every pixel, block and mean with all correlations between
+//! pixels in it.
 //!
 //! Rare events spoil such errors: what saw none of them claims to know its mean exactly. So every
 //! standard error of a block or of the whole contains one event more of the layer's typical size
@@ -11,11 +12,11 @@
 
 use alloc::vec::Vec;
 
-use drt_math::{Real, Rgb, RgbMoments};
+use drt_math::{Real, Rgb};
 
 use crate::rendering::{BLOCKS, Estimate, Layer};
 
-/// Independent batches that a standard error is estimated from.
+/// Independent batches that the standard error of a splatted term is estimated from.
 pub(crate) const BATCHES: usize = 32;
 
 /// Cell of the block grid that a pixel lies in, along one axis of `n` pixels.
@@ -92,51 +93,91 @@ impl Events {
     }
 }
 
-/// Values of some neighbouring pixels, before they are merged into the film.
+/// Sums over some neighbouring pixels, before they are merged into the film.
 #[derive(Debug)]
 pub(crate) struct Tile {
-    /// First pixel (row by row) and one past the last.
-    pub(crate) pixels: core::ops::Range<u32>,
+    /// First pixel, row by row.
+    start: u32,
     layers: usize,
-    moments: Vec<RgbMoments>,
-    batches: Vec<BlockSums>,
+    sums: Vec<Rgb>,
     events: Vec<Events>,
 }
 
 impl Tile {
     pub(crate) fn new(pixels: core::ops::Range<u32>, layers: usize) -> Self {
-        let n = pixels.len() * layers;
         Self {
-            pixels,
+            start: pixels.start,
             layers,
-            moments: alloc::vec![RgbMoments::default(); n],
-            batches: alloc::vec![BlockSums::ZERO; BATCHES * layers],
+            sums: alloc::vec![Rgb::ZERO; pixels.len() * layers],
             events: alloc::vec![Events::NONE; layers],
         }
     }
 
-    /// Adds one sample of a pixel: a value per layer. `unit` counts the pixel's samples.
-    pub(crate) fn push(&mut self, blocks: &Blocks, pixel: u32, unit: u32, values: &[Rgb]) {
-        let block = blocks.of[pixel as usize];
-        let batch = unit as usize % BATCHES;
-        let at = (pixel - self.pixels.start) as usize * self.layers;
-        for (l, v) in values.iter().enumerate() {
-            self.moments[at + l].push(*v);
-            self.batches[batch * self.layers + l].add(block, *v);
-            self.events[l].push(*v);
+    /// Adds one sample of a pixel: a value per layer.
+    pub(crate) fn push(&mut self, pixel: u32, values: &[Rgb]) {
+        let at = (pixel - self.start) as usize * self.layers;
+        for ((sum, event), v) in self.sums[at..].iter_mut().zip(&mut self.events).zip(values) {
+            *sum += *v;
+            event.push(*v);
         }
     }
 }
 
 /// Images whose pixels are sampled one by one.
+///
+/// In a pass, each pixel takes its samples in runs whose means are independent
+/// ([`Pass`](crate::pixels::Pass)); passes are weighted by their samples. A pass of a single run
+/// knows nothing of its error, and takes that of the others.
 #[derive(Debug)]
 pub(crate) struct PixelFilm {
     size: [u32; 2],
     layers: usize,
-    moments: Vec<RgbMoments>,
-    batches: Vec<BlockSums>,
+    /// Passes before the last one; empty when there are none.
+    passes: Vec<Passes>,
+    before: Count,
+    /// The last pass, and of its current run what is finished.
+    runs: Vec<Runs>,
+    partial: Vec<Rgb>,
+    run_count: u32,
+    run_units: u32,
+    partial_units: u32,
     events: Vec<Events>,
+}
+
+/// Samples of each pixel in some passes, and how many of them have a known error.
+#[derive(Clone, Copy, Debug, Default)]
+struct Count {
     units: u32,
+    known: u32,
+}
+
+/// Σ N mean over passes of N samples, and Σ N² variance over those whose errors are known.
+#[derive(Clone, Copy, Debug)]
+struct Passes {
+    sum: Rgb,
+    variance: Rgb,
+}
+
+/// Mean of the means of runs, each weighted by its length, and the weighted sum of their squared
+/// deviations from it (West 1979, "Updating mean and variance estimates").
+#[derive(Clone, Copy, Debug)]
+struct Runs {
+    mean: Rgb,
+    m2: [f32; 3],
+}
+
+impl Runs {
+    const NONE: Self = Self { mean: Rgb::ZERO, m2: [0.0; 3] };
+
+    /// Takes in a run of a given length that makes the length of all `total`.
+    fn push(&mut self, x: Rgb, length: f64, total: f64) {
+        let delta = x - self.mean;
+        self.mean += delta * (length / total);
+        let m2 = (delta * (x - self.mean) * length).to_array();
+        for (sum, m2) in self.m2.iter_mut().zip(m2) {
+            *sum += m2 as f32;
+        }
+    }
 }
 
 impl PixelFilm {
@@ -145,83 +186,117 @@ impl PixelFilm {
         Self {
             size,
             layers,
-            moments: alloc::vec![RgbMoments::default(); n],
-            batches: alloc::vec![BlockSums::ZERO; BATCHES * layers],
+            passes: Vec::new(),
+            before: Count::default(),
+            runs: alloc::vec![Runs::NONE; n],
+            partial: alloc::vec![Rgb::ZERO; n],
+            run_count: 0,
+            run_units: 0,
+            partial_units: 0,
             events: alloc::vec![Events::NONE; layers],
-            units: 0,
         }
+    }
+
+    pub(crate) fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    pub(crate) fn layers(&self) -> usize {
+        self.layers
+    }
+
+    /// Samples that every pixel has received.
+    pub(crate) fn units(&self) -> u32 {
+        self.before.units + self.run_units + self.partial_units
+    }
+
+    /// Begins a pass.
+    pub(crate) fn begin(&mut self) {
+        let count = self.count();
+        if count.units == 0 {
+            return;
+        }
+        self.passes = (0..self.runs.len()).map(|i| self.passes_with_last(i)).collect();
+        self.before = count;
+        self.runs.fill(Runs::NONE);
+        self.partial.fill(Rgb::ZERO);
+        (self.run_count, self.run_units, self.partial_units) = (0, 0, 0);
     }
 
     /// Merges a tile; the order of merging is part of the result's bits.
     pub(crate) fn merge(&mut self, tile: &Tile) {
-        let at = tile.pixels.start as usize * self.layers;
-        for (m, t) in self.moments[at..].iter_mut().zip(&tile.moments) {
-            m.merge(t);
-        }
-        for (b, t) in self.batches.iter_mut().zip(&tile.batches) {
-            for (s, v) in b.0.iter_mut().zip(&t.0) {
-                *s += *v;
-            }
+        let at = tile.start as usize * self.layers;
+        for (sum, t) in self.partial[at..].iter_mut().zip(&tile.sums) {
+            *sum += *t;
         }
         for (e, t) in self.events.iter_mut().zip(&tile.events) {
             e.add(t);
         }
     }
 
-    /// Counts samples that every pixel has received.
-    pub(crate) fn advance(&mut self, units: u32) {
-        self.units += units;
+    /// Counts samples that every pixel has received; with them a run may end.
+    pub(crate) fn advance(&mut self, units: u32, ends_run: bool) {
+        self.partial_units += units;
+        if !ends_run {
+            return;
+        }
+        self.run_count += 1;
+        self.run_units += self.partial_units;
+        let (length, total) = (f64::from(self.partial_units), f64::from(self.run_units));
+        for (runs, sum) in self.runs.iter_mut().zip(&mut self.partial) {
+            runs.push(*sum * (1.0 / length), length, total);
+            *sum = Rgb::ZERO;
+        }
+        self.partial_units = 0;
     }
 
-    pub(crate) fn units(&self) -> u32 {
-        self.units
+    /// Samples of all passes, the last one included.
+    fn count(&self) -> Count {
+        let last = self.run_units + self.partial_units;
+        let known = if self.run_count < 2 { 0 } else { last };
+        Count { units: self.before.units + last, known: self.before.known + known }
+    }
+
+    /// The sums of all passes, the last one included.
+    fn passes_with_last(&self, i: usize) -> Passes {
+        let zero = Passes { sum: Rgb::ZERO, variance: Rgb::ZERO };
+        let mut passes = self.passes.get(i).copied().unwrap_or(zero);
+        let units = f64::from(self.run_units);
+        passes.sum += self.runs[i].mean * units + self.partial[i];
+        if self.run_count >= 2 {
+            // The unfinished run is as uncertain, by its length, as those before it.
+            let all = units + f64::from(self.partial_units);
+            let scale = all / f64::from(self.run_count - 1);
+            passes.variance += Rgb::from(self.runs[i].m2.map(f64::from)) * scale;
+        }
+        passes
+    }
+
+    fn estimate(&self, i: usize) -> Estimate {
+        let count = self.count();
+        if count.units == 0 {
+            return Estimate { mean: Rgb::ZERO, stderr: Rgb::splat(f64::INFINITY) };
+        }
+        let passes = self.passes_with_last(i);
+        let (units, known) = (f64::from(count.units), f64::from(count.known));
+        let stderr = match count.known {
+            0 => Rgb::splat(f64::INFINITY),
+            _ => (passes.variance * (1.0 / (known * units))).map(Real::sqrt),
+        };
+        Estimate { mean: passes.sum * (1.0 / units), stderr }
     }
 
     /// The first layer of some pixels.
     pub(crate) fn estimates(&self, pixels: core::ops::Range<u32>) -> Vec<Estimate> {
-        let of = |i: u32| {
-            let m = &self.moments[i as usize * self.layers];
-            Estimate { mean: m.mean(), stderr: m.standard_error() }
-        };
-        pixels.map(of).collect()
+        pixels.map(|p| self.estimate(p as usize * self.layers)).collect()
     }
 
     /// One layer as an image.
     pub(crate) fn layer(&self, l: usize, blocks: &Blocks) -> Layer {
-        let pixels: Vec<Estimate> = self
-            .moments
-            .iter()
-            .skip(l)
-            .step_by(self.layers)
-            .map(|m| Estimate { mean: m.mean(), stderr: m.standard_error() })
-            .collect();
+        let pixels = (l..self.runs.len()).step_by(self.layers).map(|i| self.estimate(i)).collect();
         let mut image = Layer::from_pixels(self.size, pixels, blocks);
-        if self.units as usize >= BATCHES {
-            self.batch_errors(l, blocks, &mut image);
-        }
-        self.events[l].widen(&mut image, blocks, f64::from(self.units.max(1)));
+        self.events[l].widen(&mut image, blocks, f64::from(self.units().max(1)));
         image
-    }
-
-    /// Replaces the block errors from independent pixels by those from batches.
-    fn batch_errors(&self, l: usize, blocks: &Blocks, image: &mut Layer) {
-        let full = self.units / BATCHES as u32;
-        let rest = self.units as usize % BATCHES;
-        let all: u32 = blocks.count.iter().sum();
-        for k in 0..=BLOCKS * BLOCKS {
-            let pixels = blocks.count.get(k).copied().unwrap_or(all);
-            if pixels == 0 {
-                continue;
-            }
-            let mut m = RgbMoments::default();
-            for b in 0..BATCHES {
-                let units = full + u32::from(b < rest);
-                let n = f64::from(pixels) * f64::from(units);
-                m.push(self.batches[b * self.layers + l].0[k] * (1.0 / n));
-            }
-            let e = if k < BLOCKS * BLOCKS { &mut image.blocks[k] } else { &mut image.total };
-            e.stderr = m.standard_error();
-        }
     }
 }
 
@@ -403,20 +478,66 @@ mod tests {
         let (size, units) = ([8, 8], 64);
         let blocks = Blocks::new(size);
         let mut film = PixelFilm::new(size, 1);
-        let mut tile = Tile::new(0..64, 1);
+        film.begin();
         for unit in 0..units {
+            let mut tile = Tile::new(0..64, 1);
             for pixel in 0..64 {
                 let seen = pixel == 5 && unit == 7;
-                let value = if seen { -3.0 } else { 0.0 };
-                tile.push(&blocks, pixel, unit, &[Rgb::splat(value)]);
+                tile.push(pixel, &[Rgb::splat(if seen { -3.0 } else { 0.0 })]);
             }
+            film.merge(&tile);
+            film.advance(1, true);
         }
-        film.merge(&tile);
-        film.advance(units);
         let image = film.layer(0, &blocks);
         let one = 3.0 / f64::from(units);
         assert!((image.blocks[40].stderr.g - one).abs() < 1e-12);
         assert!(image.blocks[5].stderr.g > 1.3 * one);
         assert!((image.blocks[5].mean.g + one).abs() < 1e-12);
+    }
+    /// Values of a pixel in passes, as a film sees them and as a plain list.
+    fn filled(passes: &[&[&[f64]]]) -> (PixelFilm, f64) {
+        let mut film = PixelFilm::new([1, 1], 1);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for pass in passes {
+            film.begin();
+            for run in *pass {
+                for x in *run {
+                    let mut tile = Tile::new(0..1, 1);
+                    tile.push(0, &[Rgb::splat(*x)]);
+                    film.merge(&tile);
+                    film.advance(1, core::ptr::eq(x, &run[run.len() - 1]));
+                    (sum, count) = (sum + x, count + 1.0);
+                }
+            }
+        }
+        (film, sum / count)
+    }
+
+    #[test]
+    fn means_are_of_all_samples_and_errors_of_runs() {
+        let (film, mean) = filled(&[&[&[1.0, 3.0], &[4.0, 2.0], &[0.0, 8.0]]]);
+        let e = film.estimate(0);
+        assert_eq!(film.units(), 6);
+        assert!((e.mean.g - mean).abs() < 1e-15);
+        // Means of runs are 2, 3, 4: their variance is 1, that of their mean 1/3.
+        assert!((e.stderr.g - f64::sqrt(1.0 / 3.0)).abs() < 1e-7);
+
+        // A pass of a single run adds to the mean, and is as uncertain as the others.
+        let (film, mean) = filled(&[&[&[7.0, 1.0]], &[&[1.0, 3.0], &[4.0, 2.0], &[0.0, 8.0]]]);
+        let e = film.estimate(0);
+        assert!((e.mean.g - mean).abs() < 1e-15);
+        assert!((e.stderr.g - f64::sqrt(1.0 / 3.0 * 6.0 / 8.0)).abs() < 1e-7);
+
+        // Passes of 2 and 4 samples with variances 4 and 1/4 of their means.
+        let (film, _) = filled(&[&[&[1.0], &[5.0]], &[&[1.0, 2.0], &[2.0, 3.0]]]);
+        let expected = f64::sqrt((4.0 * 4.0 + 16.0 * 0.25) / 36.0);
+        assert!((film.estimate(0).stderr.g - expected).abs() < 1e-7);
+    }
+
+    #[test]
+    fn single_samples_have_no_error_bar() {
+        let (film, _) = filled(&[&[&[1.0]], &[&[5.0]]]);
+        assert_eq!(film.estimate(0).mean.g, 3.0);
+        assert_eq!(film.estimate(0).stderr.g, f64::INFINITY);
     }
 }

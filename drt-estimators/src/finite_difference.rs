@@ -1,25 +1,23 @@
 //! Finite differences with common random numbers: the judge of every other estimator.
 
 use alloc::vec::Vec;
-use core::cell::Cell;
 
 use drt_math::Rgb;
+use drt_math::sobol::SobolSampler;
 use drt_motion::Parameter;
 
 use crate::Error;
 use crate::contraction::Contraction;
-use crate::film::{Blocks, PixelFilm, Tile};
+use crate::film::{Blocks, PixelFilm};
 use crate::interior::{AlongRays, PixelSampler};
 use crate::parallel::Pool;
+use crate::pixels::{Filling, Sampler};
 use crate::rendering::Layer;
 use crate::scene::Scene;
 use crate::session::Control;
 use crate::settings::Settings;
 use crate::tangents;
 use crate::transport::World;
-
-/// Pixels of a tile.
-const TILE: u32 = 256;
 
 /// Central differences of the image by each parameter, in the order of `parameters`: the difference
 /// of the images at value ± `step`, over 2 `step`.
@@ -82,42 +80,41 @@ impl Pair<'_> {
         progress: impl Fn(f64),
     ) -> Option<Layer> {
         let size = self.worlds[0].camera.film();
-        let count = size[0] * size[1];
-        let tiles = count.div_ceil(TILE);
-        let blocks = Blocks::new(size);
         let mut film = PixelFilm::new(size, 1);
         let units = self.settings.spp.max(1);
-        let cancelled = Cell::new(false);
-        pool.ordered(
-            0..tiles,
-            4,
-            |t| self.tile(t * TILE..u32::min(count, (t + 1) * TILE), units, &blocks),
-            |t, tile| {
-                film.merge(&tile);
-                progress(f64::from(t + 1) / f64::from(tiles));
-                cancelled.set(control.cancelled());
-                !cancelled.get()
-            },
-        );
-        film.advance(units);
-        (!cancelled.get()).then(|| film.layer(0, &blocks))
-    }
-
-    fn tile(&self, pixels: core::ops::Range<u32>, units: u32, blocks: &Blocks) -> Tile {
-        let mut tile = Tile::new(pixels.clone(), 1);
         let seed = self.settings.seed;
-        let [mut low, mut high]: [PixelSampler<'_, Contraction<'_>>; 2] = [0, 1].map(|k| {
-            PixelSampler::new(&self.worlds[k], None, AlongRays::default(), seed, false, false)
-        });
-        let mut values = [[Rgb::ZERO]; 2];
-        for pixel in pixels {
-            for unit in 0..units {
-                low.sample(pixel, unit, &mut values[0]);
-                high.sample(pixel, unit, &mut values[1]);
-                let difference = (values[1][0] - values[0][0]) * (0.5 / self.step);
-                tile.push(blocks, pixel, unit, &[difference]);
-            }
-        }
-        tile
+        let filling = Filling {
+            pool,
+            seed,
+            sampler: || Sides {
+                samplers: [0, 1].map(|k| {
+                    let along = AlongRays::default();
+                    PixelSampler::new(&self.worlds[k], None, along, seed, false, false)
+                }),
+                scale: 0.5 / self.step,
+            },
+        };
+        let going = |_: Sides<'_>, part| {
+            progress(part);
+            !control.cancelled()
+        };
+        let done = filling.fill(&mut film, units, going, |_, _| {});
+        (done == units).then(|| film.layer(0, &Blocks::new(size)))
+    }
+}
+
+/// Samples both displaced scenes alike.
+struct Sides<'a> {
+    samplers: [PixelSampler<'a, Contraction<'a>>; 2],
+    scale: f64,
+}
+
+impl Sampler for Sides<'_> {
+    fn sample(&mut self, pixel: u32, unit: u32, points: SobolSampler, values: &mut [Rgb]) {
+        let [low, high] = &mut self.samplers;
+        let mut below = [Rgb::ZERO];
+        low.sample(pixel, unit, points.clone(), &mut below);
+        high.sample(pixel, unit, points, values);
+        values[0] = (values[0] - below[0]) * self.scale;
     }
 }

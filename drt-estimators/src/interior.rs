@@ -7,9 +7,9 @@ use drt_math::{Rgb, Rng};
 
 use crate::boundary::shadow::{self, Shadows};
 use crate::contraction::Contraction;
-use crate::film::BATCHES;
 use crate::flux::{Flux, Reservoir};
-use crate::rendering::{Counters, NonFinite, Term};
+use crate::pixels::Sampler;
+use crate::rendering::{Account, Counters, NonFinite, Term};
 use crate::sensitivity::{AdjointSink, Functional};
 use crate::transport::{Differentiator, PathRecord, Radiance, Tracer, World};
 
@@ -41,12 +41,9 @@ impl AlongRays<'_> {
     }
 }
 
-/// The random numbers of a sample: as many Sobol' sequences a pixel as there are batches, so that the
-/// scatter of batches stays an honest error.
-fn sequence(seed: u64, pixel: u64, unit: u32) -> Rng {
-    let (batch, index) = (unit % BATCHES as u32, unit / BATCHES as u32);
-    let name = Rng::new(seed, SEQUENCE_STREAM | pixel, batch).next_u32();
-    Rng::new(seed, pixel, unit).led_by(SobolSampler::new(name, index), DIMENSIONS)
+/// The name of a Sobol' sequence of a pixel.
+pub(crate) fn sequence_name(seed: u64, pixel: u32, number: u32) -> u32 {
+    Rng::new(seed, SEQUENCE_STREAM | u64::from(pixel), number).next_u32()
 }
 
 /// Where the derivatives of a pixel's paths go.
@@ -82,6 +79,27 @@ impl PathSink for Contraction<'_> {
     }
 }
 
+impl<S: PathSink> Sampler for PixelSampler<'_, S> {
+    /// A path, or a pair of paths mirrored at the pixel's centre.
+    fn sample(&mut self, pixel: u32, unit: u32, points: SobolSampler, values: &mut [Rgb]) {
+        values.fill(Rgb::ZERO);
+        let mut rng = Rng::new(self.seed, u64::from(pixel), unit).led_by(points, DIMENSIONS);
+        let u = rng.next_2d();
+        if self.antithetic {
+            self.path(pixel, unit, u, rng.clone(), values);
+            self.path(pixel, unit, u.map(|u| 1.0 - u), rng, values);
+            for v in values.iter_mut() {
+                *v *= 0.5;
+            }
+        } else {
+            self.path(pixel, unit, u, rng, values);
+        }
+        if values.iter().any(|v| !v.is_finite()) {
+            self.report(pixel, unit, values);
+        }
+    }
+}
+
 /// Samples pixels and differentiates what it traces.
 pub(crate) struct PixelSampler<'a, S> {
     world: &'a World,
@@ -95,8 +113,8 @@ pub(crate) struct PixelSampler<'a, S> {
     shadows: Option<&'a Shadows>,
     shadow_buffers: shadow::Buffers,
     separate: bool,
-    pub(crate) non_finite: Vec<NonFinite>,
-    pub(crate) non_finite_count: u64,
+    non_finite: Vec<NonFinite>,
+    non_finite_count: u64,
     differentiated: u64,
     recorded: u64,
 }
@@ -132,31 +150,16 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         }
     }
 
-    /// Work done so far.
-    pub(crate) fn counters(&self) -> Counters {
-        Counters {
-            differentiated_paths: self.differentiated,
-            recorded_vertices: self.recorded,
-            ..self.tracer.counters
-        }
-    }
-
-    /// Sample `unit` of a pixel: a path, or a pair of paths mirrored at the pixel's centre.
-    pub(crate) fn sample(&mut self, pixel: u32, unit: u32, values: &mut [Rgb]) {
-        values.fill(Rgb::ZERO);
-        let mut rng = sequence(self.seed, u64::from(pixel), unit);
-        let u = rng.next_2d();
-        if self.antithetic {
-            self.path(pixel, unit, u, rng.clone(), values);
-            self.path(pixel, unit, u.map(|u| 1.0 - u), rng, values);
-            for v in values.iter_mut() {
-                *v *= 0.5;
-            }
-        } else {
-            self.path(pixel, unit, u, rng, values);
-        }
-        if values.iter().any(|v| !v.is_finite()) {
-            self.report(pixel, unit, values);
+    /// What the work done so far leaves besides its values.
+    pub(crate) fn account(self) -> Account {
+        Account {
+            counters: Counters {
+                differentiated_paths: self.differentiated,
+                recorded_vertices: self.recorded,
+                ..self.tracer.counters
+            },
+            non_finite: self.non_finite,
+            non_finite_count: self.non_finite_count,
         }
     }
 

@@ -19,6 +19,7 @@ mod flux;
 mod inside;
 mod interior;
 mod parallel;
+mod pixels;
 mod plan;
 mod prepared;
 mod rendering;

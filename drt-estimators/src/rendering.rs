@@ -21,7 +21,7 @@ pub struct Estimate {
 }
 
 /// An image with the standard error of each pixel, and of its 8×8 block means and total mean
-/// (from independent batches, so correlations between pixels are in them).
+/// (correlations between pixels are in them).
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Layer {
@@ -134,6 +134,27 @@ pub struct NonFinite {
     pub bounces: u32,
     /// Primitive of the last vertex, where it lay on one.
     pub primitive: Option<u32>,
+}
+
+/// What work leaves besides its images.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Account {
+    pub(crate) counters: Counters,
+    /// The first contributions that were not finite.
+    pub(crate) non_finite: Vec<NonFinite>,
+    pub(crate) non_finite_count: u64,
+}
+
+impl Account {
+    /// Non-finite contributions that are described one by one.
+    const DESCRIBED: usize = 16;
+
+    pub(crate) fn add(&mut self, o: Self) {
+        self.counters.add(&o.counters);
+        self.non_finite_count += o.non_finite_count;
+        let room = Self::DESCRIBED.saturating_sub(self.non_finite.len());
+        self.non_finite.extend(o.non_finite.into_iter().take(room));
+    }
 }
 
 /// A finished (or cancelled) run.

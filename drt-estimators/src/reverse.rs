@@ -18,6 +18,7 @@ use crate::emitter::EmitterGradient;
 use crate::film::BATCHES;
 use crate::interior::{PathSink, PixelSampler};
 use crate::parallel::Pool;
+use crate::pixels::{Pass, Sampler};
 use crate::prepared::Prepared;
 use crate::rendering::Counters;
 use crate::scene::{Scene, Target};
@@ -208,22 +209,25 @@ impl Reverse<'_> {
             false,
         );
         let mut values = [Rgb::ZERO];
+        let (seed, film) = (self.settings.seed, self.prepared.world.camera.film());
+        let pass = Pass::new(0, units, film);
         for pixel in at(chunk)..at(chunk + 1) {
-            for unit in 0..units {
-                if let Some(sink) = &mut sampler.sink {
-                    sink.weights = self.adjoint[pixel as usize] * scale;
-                }
-                sampler.sample(pixel, unit, &mut values);
+            if let Some(sink) = &mut sampler.sink {
+                sink.weights = self.adjoint[pixel as usize] * scale;
+            }
+            for run in pass.runs() {
+                pass.sample(seed, pixel, run, pass.units(run), |unit, points| {
+                    sampler.sample(pixel, unit, points, &mut values);
+                });
             }
         }
-        let counters = sampler.counters();
-        let non_finite = sampler.non_finite_count;
-        let mut gradient = match sampler.sink {
+        let mut gradient = match sampler.sink.take() {
             Some(sink) => sink.gradient,
             None => SceneGradient::zeros(&self.prepared.world, self.interest),
         };
-        gradient.counters = counters;
-        gradient.non_finite += non_finite;
+        let account = sampler.account();
+        gradient.counters = account.counters;
+        gradient.non_finite += account.non_finite_count;
         gradient
     }
 

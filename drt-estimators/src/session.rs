@@ -7,31 +7,21 @@ use drt_motion::Parameter;
 
 use crate::boundary::Strategy;
 use crate::contraction::{Contraction, Motion};
-use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm, Tile};
+use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm};
 use crate::inside::{self, Inside};
 use crate::interior::PixelSampler;
 use crate::parallel::Pool;
+use crate::pixels::Filling;
 use crate::plan::{MediumPlan, Plan};
 use crate::prepared::Prepared;
-use crate::rendering::{Counters, Derivative, Layer, NonFinite, Rendering, Term};
+use crate::rendering::{Account, Derivative, Layer, Rendering, Term};
 use crate::scene::Scene;
 use crate::sensitivity::Interest;
 use crate::settings::Settings;
-use crate::splatting::{Account, Checked, Source, ToImages};
+use crate::splatting::{Checked, Source, ToImages};
 use crate::tangents;
 use crate::transport::World;
 use crate::{Error, Estimate};
-
-/// Pixels of a tile.
-const TILE: u32 = 256;
-/// Samples of one piece of work.
-const WORK: u32 = 1 << 12;
-/// Most pieces that the samples of a round are cut into.
-const CUTS: u32 = 256;
-/// Samples after which a small film is looked at again.
-const SLICE: u32 = 1 << 18;
-/// Non-finite contributions that are described one by one.
-const DESCRIBED: usize = 16;
 
 /// Watches and steers a run. Every method has a default that does nothing.
 pub trait Control: Sync {
@@ -68,9 +58,7 @@ pub struct Session {
     blocks: Blocks,
     pixels: PixelFilm,
     splats: Vec<SplatFilm>,
-    counters: Counters,
-    non_finite: Vec<NonFinite>,
-    non_finite_count: u64,
+    account: Account,
     samples: u32,
     passes: u32,
     complete: bool,
@@ -115,9 +103,7 @@ impl Session {
             splats: films,
             pool: Pool::new(settings.threads),
             settings: settings.clone(),
-            counters: Counters::default(),
-            non_finite: Vec::new(),
-            non_finite_count: 0,
+            account: Account::default(),
             samples: 0,
             passes: 0,
             complete: true,
@@ -156,75 +142,29 @@ impl Session {
         going
     }
 
-    /// Samples every pixel `units` times more, in rounds of which each is finished or left out: one
-    /// that was cut short would leave pixels with different numbers of samples. Returns how many
-    /// units were finished.
+    /// Samples every pixel `units` times more; returns how often each was.
     fn run_pixels(&mut self, units: u32, control: &dyn Control, progress: impl Fn(f64)) -> u32 {
-        let [w, h] = self.prepared.world.camera.film();
-        let count = w * h;
-        let round = (units / 16).clamp(1, u32::max(32, SLICE / count));
-        let tiles = count.div_ceil(TILE);
-        let parameters = self.motion.as_ref().map_or(0, Motion::parameters);
-        let (along, separate) = (self.prepared.along_rays(), self.settings.terms);
-        let layers = along.layers(parameters, separate);
-        let first = self.pixels.units();
         let (world, motion) = (&self.prepared.world, self.motion.as_ref());
-        let (settings, blocks) = (&self.settings, &self.blocks);
-        let antithetic = self.plan.antithetic;
-        // A film of few pixels is cut into samples as well.
-        let per_work = u32::max(WORK / u32::min(count, TILE), round.div_ceil(CUTS)).max(1);
-        let cuts = if tiles > CUTS { 1 } else { round.div_ceil(per_work) };
-        let works = tiles * cuts;
-        let rounds = units.div_ceil(round);
-        let work = |i: u32| {
-            let (r, t, cut) = (i / works, i / cuts % tiles, i % cuts);
-            let range = t * TILE..u32::min(count, (t + 1) * TILE);
-            let of = |cut: u32| {
-                let within = if cut == cuts { round } else { cut * per_work };
-                u32::min(units, r * round + within)
-            };
-            let mut tile = Tile::new(range.clone(), layers);
-            let sink = motion.map(|m| Contraction::new(world, m));
-            let mut sampler =
-                PixelSampler::new(world, sink, along, settings.seed, antithetic, separate);
-            let mut values = alloc::vec![drt_math::Rgb::ZERO; layers];
-            for pixel in range {
-                for unit in first + of(cut)..first + of(cut + 1) {
-                    sampler.sample(pixel, unit, &mut values);
-                    tile.push(blocks, pixel, unit, &values);
-                }
-            }
-            let counters = sampler.counters();
-            let account = Account {
-                counters,
-                non_finite: sampler.non_finite,
-                non_finite_count: sampler.non_finite_count,
-            };
-            (tile, account)
+        let (along, seed) = (self.prepared.along_rays(), self.settings.seed);
+        let (antithetic, separate) = (self.plan.antithetic, self.settings.terms);
+        let filling = Filling {
+            pool: &self.pool,
+            seed,
+            sampler: || {
+                let sink = motion.map(|m| Contraction::new(world, m));
+                PixelSampler::new(world, sink, along, seed, antithetic, separate)
+            },
         };
-        let (mut finished, mut accounts, mut done) = (Vec::new(), Vec::new(), 0);
-        let (pixels, all) = (&mut self.pixels, rounds.saturating_mul(works));
-        self.pool.ordered(0..all, 4, work, |i, result| {
-            finished.push(result);
-            progress(f64::from(i + 1) / f64::from(all));
-            if (i + 1) % works == 0 {
-                let now = u32::min(units, (i + 1) / works * round);
-                pixels.advance(now - done);
-                done = now;
-                for (tile, account) in finished.drain(..) {
-                    pixels.merge(&tile);
-                    accounts.push(account);
-                    let image = pixels.estimates(tile.pixels.clone());
-                    let pixels = (tile.pixels.start, tile.pixels.end);
-                    control.tile(&FinishedTile { pixels, image: &image });
-                }
-            }
+        let account = &mut self.account;
+        let finished = |sampler: PixelSampler<'_, _>, part| {
+            account.add(sampler.account());
+            progress(part);
             !control.cancelled()
-        });
-        for account in accounts {
-            self.account(account);
-        }
-        done
+        };
+        filling.fill(&mut self.pixels, units, finished, |film, pixels| {
+            let image = film.estimates(pixels.clone());
+            control.tile(&FinishedTile { pixels: (pixels.start, pixels.end), image: &image });
+        })
     }
 
     /// Samples one splatted source in as many batches as error bars need.
@@ -242,7 +182,7 @@ impl Session {
         let mut pass = self.splats[i].begin();
         let first = self.passes * BATCHES as u32;
         let blocks = &self.blocks;
-        let mut accounts = Vec::new();
+        let (account, mut finished) = (&mut self.account, 0.0);
         let going = self.pool.ordered(
             first..first + BATCHES as u32,
             1,
@@ -252,26 +192,16 @@ impl Session {
                 let account = splatter.run(source, stream, per_batch, &mut receiver);
                 (receiver.inner.splats, account)
             },
-            |b, (splats, account)| {
+            |b, (splats, of_batch)| {
                 pass.add(&splats, f64::from(per_batch), blocks);
-                accounts.push(account);
+                account.add(of_batch);
+                finished += f64::from(per_batch);
                 progress(f64::from(b - first + 1) / BATCHES as f64);
                 !control.cancelled()
             },
         );
-        let finished = accounts.len() as f64 * f64::from(per_batch);
         self.splats[i].finish(&pass, finished);
-        for account in accounts {
-            self.account(account);
-        }
         going
-    }
-
-    fn account(&mut self, account: Account) {
-        self.counters.add(&account.counters);
-        self.non_finite_count += account.non_finite_count;
-        let room = DESCRIBED.saturating_sub(self.non_finite.len());
-        self.non_finite.extend(account.non_finite.into_iter().take(room));
     }
 
     /// The images so far.
@@ -281,9 +211,9 @@ impl Session {
             image: self.pixels.layer(0, &self.blocks),
             derivatives: self.derivatives(),
             plan: self.plan.clone(),
-            counters: self.counters,
-            non_finite: self.non_finite_count,
-            non_finite_examples: self.non_finite.clone(),
+            counters: self.account.counters,
+            non_finite: self.account.non_finite_count,
+            non_finite_examples: self.account.non_finite.clone(),
             spp: self.samples,
             complete: self.complete,
         }

@@ -9,7 +9,7 @@ use crate::boundary::{self, Boundary, Receiver, Strategy};
 use crate::contraction::{Contraction, Motion};
 use crate::film::Splats;
 use crate::interior::{DIMENSIONS, SEQUENCE_STREAM};
-use crate::rendering::{Counters, NonFinite, Term};
+use crate::rendering::{Account, NonFinite, Term};
 use crate::sensitivity::Functional;
 use crate::transport::{Tracer, World};
 
@@ -48,13 +48,6 @@ pub(crate) struct Splatter<'a> {
     pub(crate) world: &'a World,
     pub(crate) boundary: &'a Boundary,
     pub(crate) seed: u64,
-}
-
-/// What a batch of splats leaves besides its images.
-pub(crate) struct Account {
-    pub(crate) counters: Counters,
-    pub(crate) non_finite: Vec<NonFinite>,
-    pub(crate) non_finite_count: u64,
 }
 
 impl Splatter<'_> {

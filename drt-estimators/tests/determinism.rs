@@ -126,7 +126,7 @@ fn parameters_do_not_disturb_each_other() {
     }
 }
 
-/// More samples in several calls are as good as all at once, up to the batches of boundary terms.
+/// More samples in several calls are as good as all at once.
 #[test]
 fn interior_samples_continue_where_they_stopped() {
     let scene = fog();
@@ -136,8 +136,11 @@ fn interior_samples_continue_where_they_stopped() {
     assert!([6, 2, 12].into_iter().all(|spp| session.run(spp, &Unattended)));
     let in_parts = session.rendering();
     assert_eq!((at_once.spp, in_parts.spp), (20, 20));
-    let (a, b) = (layers(&at_once), layers(&in_parts));
-    for (a, b) in a.iter().zip(&b).flat_map(|(a, b)| a.pixels.iter().zip(&b.pixels)) {
-        assert!((a.mean - b.mean).max_abs() <= 1e-13 * a.mean.max_abs());
+    for (a, b) in layers(&at_once).into_iter().zip(layers(&in_parts)) {
+        let (a, b) = (&a.total, &b.total);
+        let error = (a.stderr * a.stderr + b.stderr * b.stderr).map(f64::sqrt);
+        assert!((a.mean - b.mean).max_abs() < 4.0 * error.max_abs());
+        // Neither is much more certain than the other, nor are they the same samples.
+        assert!((a.stderr.g / b.stderr.g).ln().abs() < 0.5 && a.mean != b.mean);
     }
 }
