@@ -19,8 +19,8 @@ const WORK: u32 = 1 << 12;
 const CUTS: u32 = 256;
 /// Samples after which a small film is looked at again.
 const SLICE: u32 = 1 << 18;
-/// Fewest sequences of a pixel: what its own standard error is estimated from.
-const FEWEST: u32 = 8;
+/// Fewest sequences of a pixel: what its own standard error is estimated from, to some 40 %.
+const FEWEST: u32 = 4;
 /// Sequences of all the pixels of a block: what the block's standard error is estimated from.
 const OF_A_BLOCK: u32 = 64;
 
