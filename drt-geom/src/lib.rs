@@ -26,7 +26,10 @@ pub use io::{ObjError, ObjErrorKind, load_obj};
 pub use io::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
 pub use mesh::{Mesh, MeshError};
 pub use query::{BvhError, ClosestPoint, Hit, Ray, Skip, TriangleBvh, nearest_point};
-pub use tet::{TetMesh, TetVertexOrigin};
+pub use tet::{
+    ConformityError, SurfacePlace, TetLocator, TetMesh, TetMeshError, TetPoint, TetVertexOrigin,
+    tet_barycentric,
+};
 pub use topology::{Edge, EdgeClass, Topology};
 #[cfg(feature = "spade")]
 pub use triangulate::{PolygonError, newell_normal, triangulate};

@@ -13,6 +13,7 @@ use crate::Aabb;
 
 mod binary;
 mod block;
+mod boxes;
 mod build;
 mod collapse;
 mod ends;
@@ -24,6 +25,7 @@ mod watertight;
 mod wide;
 mod winding;
 
+pub(crate) use boxes::BoxTree;
 pub use build::BvhError;
 pub use nearest::{ClosestPoint, nearest_point};
 pub use ray::{Hit, Ray, Skip};

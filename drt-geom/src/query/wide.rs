@@ -151,6 +151,12 @@ const EMPTY: [[f32; WIDTH]; 6] = {
 };
 
 impl WideNode {
+    /// The children's lower and upper bounds along an axis.
+    #[inline(always)]
+    pub(super) fn bounds<L: Lanes>(&self, lanes: L, axis: usize) -> [L::Singles; 2] {
+        [lanes.singles(&self.bounds[2 * axis]), lanes.singles(&self.bounds[2 * axis + 1])]
+    }
+
     /// The box around all children.
     fn union(&self) -> Box32 {
         Box32::around((0..WIDTH).map(|c| Box32 {
