@@ -13,6 +13,7 @@ mod flat;
 mod knot;
 mod solid;
 mod sphere;
+mod tet_grid;
 mod tree;
 mod tube;
 
@@ -20,6 +21,7 @@ pub use flat::{disk, grid, rectangle, star};
 pub use knot::{TorusKnot, torus_knot};
 pub use solid::cube;
 pub use sphere::{bumpy_sphere, icosphere, uv_sphere};
+pub use tet_grid::tet_grid;
 pub use tree::{BranchingTree, branching_tree};
 
 /// A mesh whose arrays are right by construction.

@@ -147,14 +147,23 @@ impl TetLocator {
         None
     }
 
-    /// Among all tetrahedra near the point.
+    /// From scratch: a walk from any tetrahedron near the point, or else all of them.
     fn search(&self, x: Vec3) -> Option<TetPoint> {
         if !self.reach.contains(x) {
             return None;
         }
+        let here = Aabb { min: x, max: x };
+        let mut found = None;
+        self.tree.near(&here, |tet| {
+            found = self.walk(x, tet);
+            ControlFlow::Break(())
+        });
+        if found.is_some() {
+            return found;
+        }
         let mut best: Option<TetPoint> = None;
         let mut most = f64::NEG_INFINITY;
-        self.tree.near(&Aabb { min: x, max: x }, |tet| {
+        self.tree.near(&here, |tet| {
             let record = &self.records[tet as usize];
             let bary = record.weights(x);
             if record.holds(&bary) {
