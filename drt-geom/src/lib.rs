@@ -13,6 +13,7 @@ mod mesh;
 pub mod procedural;
 mod query;
 mod tet;
+mod tetrahedralize;
 mod topology;
 #[cfg(feature = "spade")]
 mod triangulate;
@@ -29,6 +30,9 @@ pub use query::{BvhError, ClosestPoint, Hit, Ray, Skip, TriangleBvh, nearest_poi
 pub use tet::{
     ConformityError, SurfacePlace, TetLocator, TetMesh, TetMeshError, TetPoint, TetVertexOrigin,
     tet_barycentric,
+};
+pub use tetrahedralize::{
+    SurfaceTriangle, TetrahedralizeError, TetrahedralizeInput, Tetrahedralization, tetrahedralize,
 };
 pub use topology::{Edge, EdgeClass, Topology};
 #[cfg(feature = "spade")]
