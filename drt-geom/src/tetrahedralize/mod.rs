@@ -6,7 +6,22 @@ use drt_math::Vec3;
 
 use crate::{Mesh, TetMesh, TetVertexOrigin};
 
+mod complex;
+mod delaunay;
+mod faces;
+mod flips;
+mod input;
+mod origins;
+mod polygon;
 mod predicates;
+mod recovery;
+mod segments;
+mod triangles;
+mod walk;
+
+use delaunay::delaunay;
+use input::Merged;
+use recovery::Recovery;
 
 /// What to fill with tetrahedra.
 #[derive(Clone, Copy, Debug)]
@@ -53,14 +68,73 @@ pub enum TetrahedralizeError {
         /// Which of its vertices.
         vertex: usize,
     },
+    /// A triangle names a vertex that does not exist.
+    #[error("surface {surface} (from 0): triangle {triangle} names a vertex that does not exist")]
+    IndexOutOfRange {
+        /// Which surface.
+        surface: usize,
+        /// Which of its triangles.
+        triangle: usize,
+    },
+    /// A coordinate of a point is NaN or infinite.
+    #[error("point {point} (from 0) has a coordinate that is not a finite number")]
+    NonFinitePoint {
+        /// Which point.
+        point: usize,
+    },
+    /// The margin is not a positive number.
+    #[error("the box's margin is {margin}; it must be positive and finite")]
+    BadMargin {
+        /// The margin given.
+        margin: f64,
+    },
+    /// More vertices than 32-bit indices can name.
+    #[error("{count} vertices are too many")]
+    TooLarge {
+        /// How many there are.
+        count: usize,
+    },
+    /// Two triangles pass through each other.
+    #[error("{first} and {second} intersect; separate them or join the surfaces where they meet")]
+    Intersection {
+        /// One of the triangles.
+        first: SurfaceTriangle,
+        /// The other.
+        second: SurfaceTriangle,
+    },
+    /// A triangle could not be made a union of faces: something is as near to it as coordinates
+    /// are rounded.
+    #[error("{triangle} is too thin, or too near to others, for the precision of its coordinates")]
+    Unrecovered {
+        /// Which triangle.
+        triangle: SurfaceTriangle,
+    },
+    /// The signs of determinants contradict each other: coordinates differ by more than 1e50 or so.
+    #[error("the coordinates are too different in size: their determinants underflow")]
+    Arithmetic,
 }
 
-/// Fills a box around surfaces with tetrahedra that respect them.
+impl core::fmt::Display for SurfaceTriangle {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "triangle {} of surface {} (from 0)", self.triangle, self.surface)
+    }
+}
+
+/// Fills a box around surfaces with tetrahedra that respect them: every triangle of the surfaces is
+/// a union of faces, some with added vertices on its edges or inside.
+///
+/// Triangles without area are skipped. Vertices that belong to no other triangle do not appear.
 ///
 /// # Errors
-/// See [`TetrahedralizeError`].
+/// See [`TetrahedralizeError`]; above all when surfaces pass through each other.
 pub fn tetrahedralize(
-    _input: &TetrahedralizeInput<'_>,
+    input: &TetrahedralizeInput<'_>,
 ) -> Result<Tetrahedralization, TetrahedralizeError> {
-    Ok(Tetrahedralization::default())
+    let merged = Merged::new(input)?;
+    let bounds = merged.enclosing_box(input.margin);
+    let complex = delaunay(&bounds, &merged.positions).ok_or(TetrahedralizeError::Arithmetic)?;
+    let mut recovery = Recovery::new(complex, &merged);
+    recovery.edges(&merged)?;
+    recovery.triangles(&merged)?;
+    Ok(recovery.finish(&merged))
 }

@@ -1,0 +1,139 @@
+//! Input edges and triangles as edges and faces of the complex: what is there already, and what
+//! lies on what.
+//!
+//! All decisions are exact for the coordinates as they are. A vertex added on an input edge or
+//! triangle is rounded, so that the edge or triangle bends by as much; from then on it is that bent
+//! one that is recovered, and the complex is a valid one at every moment.
+
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+
+use drt_math::Vec3;
+
+use super::complex::Complex;
+use super::faces::sorted;
+use super::input::{Carrier, FIRST, Merged, Named, edge_key};
+use super::{SurfaceTriangle, TetrahedralizeError};
+use crate::NONE;
+
+/// How far a vertex may be moved onto an input edge or triangle, of the largest coordinate: some
+/// roundings.
+pub(super) const ROUNDING: f64 = 1e-14;
+
+/// An edge that must stay.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Kept {
+    /// Which list of carriers.
+    pub(super) list: u32,
+    /// The vertex at which it is two; [`NONE`] while it is one.
+    pub(super) split: u32,
+}
+
+pub(super) struct Recovery<'a> {
+    pub(super) complex: Complex,
+    /// Edges that must stay, whole ones and those they are made of.
+    pub(super) kept_edges: BTreeMap<[u32; 2], Kept>,
+    /// Faces that must stay, and an input triangle that each is part of.
+    pub(super) kept_faces: BTreeMap<[u32; 3], u32>,
+    /// What an edge or triangle, and so each vertex added there, lies on.
+    pub(super) lists: Vec<Vec<Carrier>>,
+    /// What each vertex lies on.
+    pub(super) owners: Vec<Vec<Carrier>>,
+    pub(super) named: &'a [Named],
+    pub(super) star: Vec<u32>,
+}
+
+impl<'a> Recovery<'a> {
+    pub(super) fn new(complex: Complex, merged: &'a Merged) -> Self {
+        let mut owners = alloc::vec![Vec::new(); FIRST as usize];
+        owners.extend_from_slice(&merged.owners);
+        Self {
+            complex,
+            kept_edges: BTreeMap::new(),
+            kept_faces: BTreeMap::new(),
+            lists: Vec::new(),
+            owners,
+            named: &merged.named,
+            star: Vec::new(),
+        }
+    }
+
+    pub(super) fn add_list(&mut self, carriers: &[Carrier]) -> u32 {
+        self.lists.push(carriers.to_vec());
+        self.lists.len() as u32 - 1
+    }
+
+    pub(super) fn is_kept(&self, [a, b]: [u32; 2]) -> bool {
+        self.kept_edges.contains_key(&edge_key(a, b))
+    }
+
+    /// Notes that a vertex also lies on what is listed.
+    pub(super) fn own(&mut self, v: u32, list: u32) {
+        let owners = &mut self.owners[v as usize];
+        for carrier in &self.lists[list as usize] {
+            if owners.iter().all(|o| o.triangle != carrier.triangle) {
+                owners.push(*carrier);
+            }
+        }
+    }
+
+    /// Adds a vertex in the place of the given tetrahedra; none when one would not be positive.
+    pub(super) fn insert(&mut self, p: Vec3, old: &[u32]) -> Option<u32> {
+        let v = self.complex.add_point(p);
+        if self.complex.replace_by_cone(old, v) {
+            self.owners.push(Vec::new());
+            Some(v)
+        } else {
+            self.complex.remove_last_point();
+            None
+        }
+    }
+
+    /// Splits an inner edge of a tetrahedron at a point near it, and with it all that must stay.
+    pub(super) fn split_edge(&mut self, [a, b]: [u32; 2], tet: u32, p: Vec3) -> Option<u32> {
+        let ring = self.complex.ring(a, b, tet)?;
+        let v = self.insert(p, &ring.tets)?;
+        let Some(&kept) = self.kept_edges.get(&edge_key(a, b)) else { return Some(v) };
+        self.keep_parts([a, b], kept.list, v);
+        for end in [a, b] {
+            self.kept_edges.insert(edge_key(end, v), Kept { list: kept.list, split: NONE });
+        }
+        self.own(v, kept.list);
+        for r in ring.vertices {
+            if let Some(triangle) = self.kept_faces.remove(&sorted([a, b, r])) {
+                for end in [a, b] {
+                    self.kept_faces.insert(sorted([end, v, r]), triangle);
+                }
+            }
+        }
+        Some(v)
+    }
+
+    /// Notes that an edge is two.
+    pub(super) fn keep_parts(&mut self, [a, b]: [u32; 2], list: u32, split: u32) {
+        self.kept_edges.insert(edge_key(a, b), Kept { list, split });
+    }
+
+    pub(super) fn name(&self, triangle: u32) -> SurfaceTriangle {
+        self.named[triangle as usize].name
+    }
+
+    /// Why what is listed cannot be recovered: a triangle is in its way.
+    pub(super) fn intersection(&self, list: u32, triangle: u32) -> TetrahedralizeError {
+        let own = self.lists[list as usize][0].triangle;
+        if own == triangle {
+            return self.unrecovered(list);
+        }
+        let (first, second) = (self.name(own.min(triangle)), self.name(own.max(triangle)));
+        TetrahedralizeError::Intersection { first, second }
+    }
+
+    pub(super) fn unrecovered(&self, list: u32) -> TetrahedralizeError {
+        let own = self.lists[list as usize][0].triangle;
+        TetrahedralizeError::Unrecovered { triangle: self.name(own) }
+    }
+
+    pub(super) fn are_near(&self, v: u32, p: Vec3) -> bool {
+        (self.complex.points[v as usize] - p).max_abs() <= ROUNDING
+    }
+}
