@@ -4,10 +4,9 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
 use drt_medium::{CoefficientGradients, CoefficientRates, MediumTangent};
-use drt_motion::{SiteWeight, VolumeMotion, blend_jet};
 
 use crate::emitter::EmitterGradient;
-use crate::inside::{Inside, Insides};
+use crate::inside::{Insides, Place};
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
@@ -71,8 +70,8 @@ pub(crate) struct Contraction<'a> {
     world: &'a World,
     motion: &'a Motion,
     pub(crate) rates: Vec<Rgb>,
-    /// Of the sites around a medium.
-    weights: Vec<SiteWeight>,
+    /// What the field of an inside is like at the last point.
+    place: Place,
     /// By medium, the rates of what is the same everywhere in it.
     uniform: Vec<Option<Vec<CoefficientRates>>>,
 }
@@ -88,7 +87,7 @@ impl<'a> Contraction<'a> {
             world,
             motion,
             rates: alloc::vec![Rgb::ZERO; motion.parameters()],
-            weights: Vec::new(),
+            place: Place::default(),
             uniform: uniform.collect(),
         }
     }
@@ -130,14 +129,11 @@ impl AdjointSink for Contraction<'_> {
     fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb) {
         let insides = &self.motion.insides;
         let motions = &insides.volumes[medium];
-        if let Some(blend) = &insides.blends[medium] {
-            blend.weights(x, &mut self.weights);
+        if let Some(field) = &insides.fields[medium] {
+            field.place(x, &mut self.place);
         }
         for (p, motion) in motions {
-            let jet = match motion {
-                Inside::Affine(field) => VolumeMotion::Affine(*field).jet(x),
-                Inside::Blend(fields) => blend_jet(&self.weights, fields, x),
-            };
+            let jet = motion.jet(x, &self.place);
             self.rates[*p] += u.dot(jet.u) + j * jet.j_dot;
         }
     }

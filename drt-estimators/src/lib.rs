@@ -44,4 +44,4 @@ pub use scene::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding, Target,
 };
 pub use session::{Control, FinishedTile, Session, Unattended};
-pub use settings::{EstimatorKind, InsideKind, Settings};
+pub use settings::{EstimatorKind, GivenTetrahedra, InsideKind, Settings};

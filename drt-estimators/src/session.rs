@@ -308,15 +308,13 @@ fn medium_plan(world: &World, motion: Option<&Motion>, i: usize) -> MediumPlan {
         (0..m.parameters())
             .filter_map(|p| {
                 let inside = insides.volumes[i].iter().find(|(q, _)| *q == p).map(|(_, m)| m);
+                let name = inside.map_or("static", Inside::name);
                 let how = match (inside, insides.flux[i].contains(&p)) {
                     (None, false) => return None,
-                    (None, true) => "static with flux",
-                    (Some(Inside::Affine(_)), false) => "affine",
-                    (Some(Inside::Affine(_)), true) => "affine with flux",
-                    (Some(Inside::Blend(_)), false) => "blend",
-                    (Some(Inside::Blend(_)), true) => "blend with flux",
+                    (_, false) => String::from(name),
+                    (_, true) => alloc::format!("{name} with flux"),
                 };
-                Some((m.tangents.names[p].clone(), String::from(how)))
+                Some((m.tangents.names[p].clone(), how))
             })
             .collect()
     });

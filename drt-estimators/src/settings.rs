@@ -1,6 +1,10 @@
 //! What is asked of an estimator.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
+
+use drt_geom::TetMesh;
+use drt_motion::TetVelocities;
 
 /// How derivatives are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -14,7 +18,7 @@ pub enum EstimatorKind {
 }
 
 /// How surface velocities reach the inside of a medium.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum InsideKind {
     /// By the one affine field that everything around the medium moves by.
@@ -24,6 +28,20 @@ pub enum InsideKind {
     Static,
     /// By a blend of the affine fields around it; the flux through others is added.
     Blend,
+    /// By tetrahedra that fill the space around and inside all surfaces that touch it: those given,
+    /// or our own.
+    Tetrahedral(Option<Arc<GivenTetrahedra>>),
+}
+
+/// Tetrahedra of somebody else's making.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct GivenTetrahedra {
+    /// The tetrahedra, of which every surface that touches the medium must be a union of faces.
+    pub mesh: TetMesh,
+    /// Velocities of all vertices per unit of a parameter, by the parameter's index. For parameters
+    /// that are not listed, vertices move with the surfaces that they lie on.
+    pub velocities: Vec<(usize, TetVelocities)>,
 }
 
 /// Sample budgets and switches of one run.

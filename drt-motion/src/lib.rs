@@ -14,6 +14,7 @@ mod normals;
 mod parameter;
 mod property;
 mod surface;
+mod tetrahedral;
 mod volume;
 
 pub use drt_math::{ValueChange, ValueMap};
@@ -28,4 +29,5 @@ pub use normals::SmoothNormals;
 pub use parameter::{Applied, Change, Effect, Parameter, geometry_changes, property_changes};
 pub use property::{ChangedValue, PropertyChange, change_value};
 pub use surface::{SurfaceJet, SurfaceMotion, SurfacePoint};
+pub use tetrahedral::{Carrier, TetVelocities, TetrahedralField, TetrahedralPlace};
 pub use volume::{VolumeAdjoint, VolumeJet, VolumeMotion};

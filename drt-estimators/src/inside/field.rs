@@ -1,0 +1,64 @@
+//! The velocity fields inside media: for each medium one geometry that all parameters share, for each
+//! parameter what it carries.
+
+use alloc::vec::Vec;
+
+use drt_math::{Affine, Vec3};
+use drt_motion::{
+    Blend, SiteWeight, TetVelocities, TetrahedralField, TetrahedralPlace, VolumeJet, VolumeMotion,
+    blend_jet,
+};
+
+/// The motion of an inside under one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Inside {
+    /// One affine field.
+    Affine(Affine),
+    /// The fields of the medium's sites that move, blended.
+    Blend(Vec<(usize, Affine)>),
+    /// Velocities at the vertices of the medium's tetrahedra.
+    Tetrahedra(TetVelocities),
+}
+
+/// What the motions of an inside share.
+#[derive(Clone, Debug)]
+pub(crate) enum Field {
+    Blend(Blend),
+    Tetrahedra(TetrahedralField),
+}
+
+/// A field at a point.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Place {
+    weights: Vec<SiteWeight>,
+    corners: TetrahedralPlace,
+}
+
+impl Field {
+    pub(crate) fn place(&self, x: Vec3, place: &mut Place) {
+        match self {
+            Self::Blend(blend) => blend.weights(x, &mut place.weights),
+            Self::Tetrahedra(tetrahedra) => place.corners = tetrahedra.place(x),
+        }
+    }
+}
+
+impl Inside {
+    /// Velocity and divergence at a point, at which the medium's field is `place`.
+    pub(crate) fn jet(&self, x: Vec3, place: &Place) -> VolumeJet {
+        match self {
+            Self::Affine(field) => VolumeMotion::Affine(*field).jet(x),
+            Self::Blend(fields) => blend_jet(&place.weights, fields, x),
+            Self::Tetrahedra(velocities) => place.corners.jet(velocities),
+        }
+    }
+
+    /// How it is called where the plan is printed.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            Self::Affine(_) => "affine",
+            Self::Blend(_) => "blend",
+            Self::Tetrahedra(_) => "tetrahedral",
+        }
+    }
+}

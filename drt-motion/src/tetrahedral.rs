@@ -1,0 +1,189 @@
+//! Velocities carried by tetrahedra: linear in each, so that a field has the velocities of the
+//! surfaces it was made from, and is continuous (2021 paper, §6.1).
+//!
+//! In a tetrahedron with velocities v_i at its corners and barycentric weights b_i,
+//!
+//! ```text
+//! u(x) = Σ b_i(x) v_i,   div u = Σ v_i · ∇b_i.
+//! ```
+//!
+//! A surface's own velocity is linear on its triangles. Where these are unions of faces of tetrahedra,
+//! the field equals it on the whole surface, however its vertices lie.
+
+use alloc::vec::Vec;
+
+use drt_geom::{Mesh, TetLocator, TetMesh, TetMeshError, TetVertexOrigin, Tetrahedralization};
+use drt_math::Vec3;
+
+use crate::{SurfaceMotion, SurfacePoint, VertexGradient, VolumeAdjoint, VolumeJet};
+
+/// Tetrahedra that fill a part of space, and what each vertex belongs to; at rest elsewhere.
+#[derive(Clone, Debug)]
+pub struct TetrahedralField {
+    mesh: TetMesh,
+    locator: TetLocator,
+    origins: Vec<TetVertexOrigin>,
+    shared: Vec<(u32, TetVertexOrigin)>,
+    /// Vertices that belong to nothing, each with its neighbours that do, sorted.
+    between: Vec<(u32, u32)>,
+}
+
+/// The velocities at the vertices of a [`TetrahedralField`], for one parameter.
+pub type TetVelocities = alloc::sync::Arc<[Vec3]>;
+
+/// What a [`TetrahedralField`] looks like at a point: the same for all parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TetrahedralPlace {
+    corners: [u32; 4],
+    weights: [f64; 4],
+    gradients: [Vec3; 4],
+}
+
+/// Something that moves with velocities of its own, and that vertices lie on.
+#[derive(Clone, Copy, Debug)]
+pub struct Carrier<'a> {
+    /// Its mesh, as moved.
+    pub mesh: &'a Mesh,
+    /// How it goes on moving.
+    pub motion: &'a SurfaceMotion,
+}
+
+impl TetrahedralField {
+    /// Prepares a field in tetrahedra made from surfaces.
+    ///
+    /// # Errors
+    /// As [`TetLocator::new`].
+    pub fn new(made: Tetrahedralization) -> Result<Self, TetMeshError> {
+        let Tetrahedralization { mesh, origins, shared } = made;
+        let free = |v: u32| matches!(origins[v as usize], TetVertexOrigin::Inside);
+        let mut between = Vec::new();
+        for tet in &mesh.tets {
+            for &a in tet.iter().filter(|a| free(**a)) {
+                between.extend(tet.iter().filter(|b| !free(**b)).map(|&b| (a, b)));
+            }
+        }
+        between.sort_unstable();
+        between.dedup();
+        Ok(Self { locator: TetLocator::new(&mesh)?, mesh, origins, shared, between })
+    }
+
+    /// The tetrahedra.
+    #[must_use]
+    pub fn mesh(&self) -> &TetMesh {
+        &self.mesh
+    }
+
+    /// Velocities of all vertices: those on surfaces move with these, those at points with the points'
+    /// velocities, corners of the enclosing box rest, and others take the mean of their neighbours.
+    ///
+    /// Where surfaces touch that move differently, a vertex takes the velocity that suits all of them
+    /// best: a body that slides along a floor carries the space in the contact along, which keeps the
+    /// floor's normal velocity (theory sheet §14.3).
+    ///
+    /// # Panics
+    /// When there are fewer carriers or points than the tetrahedra were made from.
+    #[must_use]
+    pub fn velocities(&self, carriers: &[Carrier<'_>], points: &[Vec3]) -> TetVelocities {
+        let mut velocities = alloc::vec![Vec3::ZERO; self.origins.len()];
+        for (v, origin) in velocities.iter_mut().zip(&self.origins) {
+            *v = velocity(origin, carriers, points).0;
+        }
+        for group in self.shared.chunk_by(|a, b| a.0 == b.0) {
+            let v = group[0].0 as usize;
+            let all = core::iter::once(&self.origins[v]).chain(group.iter().map(|(_, o)| o));
+            let owners: Vec<_> = all.map(|o| velocity(o, carriers, points)).collect();
+            velocities[v] = agreement(&owners);
+        }
+        for around in self.between.chunk_by(|a, b| a.0 == b.0) {
+            let sum = around.iter().fold(Vec3::ZERO, |s, (_, b)| s + velocities[*b as usize]);
+            velocities[around[0].0 as usize] = sum * (1.0 / around.len() as f64);
+        }
+        velocities.into()
+    }
+
+    /// Where a point lies; outside of all tetrahedra everything rests.
+    #[must_use]
+    pub fn place(&self, x: Vec3) -> TetrahedralPlace {
+        let Some(found) = self.locator.locate(x, None) else { return TetrahedralPlace::default() };
+        TetrahedralPlace {
+            corners: self.mesh.tets[found.tet as usize],
+            weights: found.bary,
+            gradients: self.locator.gradients(found.tet),
+        }
+    }
+
+    /// The transpose of [`velocities`](Self::velocities) as far as surfaces go: moves the gradient
+    /// with respect to vertices to the vertices of surfaces. A vertex of several surfaces counts for
+    /// the first, so it is exact for motions in which surfaces that touch move alike.
+    ///
+    /// # Panics
+    /// When there are fewer surfaces than the tetrahedra were made from.
+    pub fn gather(&self, mut gradient: Vec<Vec3>, surfaces: &mut [(&Mesh, &mut VertexGradient)]) {
+        for around in self.between.chunk_by(|a, b| a.0 == b.0) {
+            let part = gradient[around[0].0 as usize] * (1.0 / around.len() as f64);
+            around.iter().for_each(|(_, b)| gradient[*b as usize] += part);
+        }
+        for (g, origin) in gradient.iter().zip(&self.origins) {
+            if let TetVertexOrigin::Surface { surface, triangle, bary } = *origin {
+                let (mesh, to) = &mut surfaces[surface as usize];
+                to.scatter_velocity(mesh, &SurfacePoint { triangle, bary }, *g);
+            }
+        }
+    }
+}
+
+/// The velocity at a vertex by one of the things it belongs to, and the normal of that, if any.
+fn velocity(origin: &TetVertexOrigin, carriers: &[Carrier<'_>], points: &[Vec3]) -> (Vec3, Vec3) {
+    match *origin {
+        TetVertexOrigin::Surface { surface, triangle, bary } => {
+            let Carrier { mesh, motion } = carriers[surface as usize];
+            let point = SurfacePoint { triangle, bary };
+            (motion.velocity(mesh, &point), mesh.normal(triangle))
+        }
+        TetVertexOrigin::Point(i) => (points[i as usize], Vec3::ZERO),
+        TetVertexOrigin::Box | TetVertexOrigin::Inside => (Vec3::ZERO, Vec3::ZERO),
+    }
+}
+
+/// The velocity that misses the others' along their normals least.
+fn agreement(owners: &[(Vec3, Vec3)]) -> Vec3 {
+    let missed = |u: &Vec3| -> f64 {
+        owners.iter().map(|(v, n)| (*u - *v).dot(*n)).map(|d| d * d).sum::<f64>()
+    };
+    let best = owners.iter().map(|(u, _)| (missed(u), *u)).reduce(|a, b| {
+        // Of equals, what moves: a body that slides over something at rest.
+        let moves = b.1.length_squared() > a.1.length_squared();
+        if b.0 < a.0 || (b.0 == a.0 && moves) { b } else { a }
+    });
+    best.map_or(Vec3::ZERO, |(_, u)| u)
+}
+
+impl TetrahedralPlace {
+    /// Velocity and divergence by the velocities of one parameter.
+    ///
+    /// # Panics
+    /// When the velocities belong to another field.
+    #[inline]
+    #[must_use]
+    pub fn jet(&self, velocities: &[Vec3]) -> VolumeJet {
+        let mut jet = VolumeJet::default();
+        for k in 0..4 {
+            let v = velocities[self.corners[k] as usize];
+            jet.u += v * self.weights[k];
+            jet.j_dot += v.dot(self.gradients[k]);
+        }
+        jet
+    }
+
+    /// The transpose of [`jet`](Self::jet): adds to the gradient with respect to the velocities.
+    ///
+    /// # Panics
+    /// As [`jet`](Self::jet).
+    #[inline]
+    pub fn scatter(&self, adjoint: &VolumeAdjoint, gradient: &mut [Vec3]) {
+        for k in 0..4 {
+            let g = adjoint.u * self.weights[k] + self.gradients[k] * adjoint.j;
+            gradient[self.corners[k] as usize] += g;
+        }
+    }
+}
