@@ -28,6 +28,8 @@ pub enum InsideKind {
     Static,
     /// By a blend of the affine fields around it; the flux through others is added.
     Blend,
+    /// By mean value coordinates with respect to all surfaces that touch it.
+    MeanValue,
     /// By tetrahedra that fill the space around and inside all surfaces that touch it: those given,
     /// or our own.
     Tetrahedral(Option<Arc<GivenTetrahedra>>),

@@ -3,6 +3,7 @@
 mod document;
 mod effects;
 mod keys;
+mod motions;
 #[cfg(test)]
 mod tests;
 mod velocities;
@@ -10,7 +11,7 @@ mod velocities;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use drt_estimators::{EstimatorKind, InsideKind, Scene, Settings, Target};
+use drt_estimators::{EstimatorKind, Scene, Settings, Target};
 use drt_motion::Parameter;
 use toml::Spanned;
 
@@ -65,7 +66,7 @@ pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
     let scene_path = folder.join(&keys.scene);
     let (scene, warnings) = read_scene(&scene_path, &overrides.defaults)?;
     let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
-    let settings = settings(&document, &keys, &scene)?;
+    let settings = settings(&document, &keys, folder, &scene, &parameters)?;
     let refused = refused(&document, &keys);
     let path = path.into();
     let text = Some(text);
@@ -159,7 +160,9 @@ fn find_sensor(scene: &Scene, name: &str) -> Result<usize, String> {
 fn settings(
     document: &Document<'_>,
     keys: &keys::Job,
+    folder: &Path,
     scene: &Scene,
+    parameters: &[Parameter<String>],
 ) -> Result<Settings, CliError> {
     let keys::Estimator { kind, sampling, spp, boundary_spp, max_depth, antithetic, step, .. } =
         &keys.estimator;
@@ -192,21 +195,7 @@ fn settings(
             depth(*n.get_ref()).map_err(|message| document.error_at(n.span().start, message))?,
         );
     }
-    for motion in &keys.motion {
-        let keys::Motion { medium, kind, .. } = motion.get_ref();
-        let fail = |message: String| document.error_at(motion.span().start, message);
-        let target = scene.find(medium).map_err(|e| fail(format!("[[motion]]: {e}")))?;
-        let Target::Medium(index) = target else {
-            return Err(fail(format!("[[motion]]: `{medium}` is not a medium")));
-        };
-        let kind = match kind {
-            keys::MotionKind::Affine => InsideKind::Affine,
-            keys::MotionKind::Static => InsideKind::Static,
-            // Refused where derivatives are asked for; an image does not depend on them.
-            keys::MotionKind::Tetrahedral | keys::MotionKind::MeanValue => continue,
-        };
-        settings.insides.push((index, kind));
-    }
+    settings.insides = motions::insides(document, &keys.motion, folder, scene, parameters)?;
     settings.antithetic = antithetic.unwrap_or(settings.antithetic);
     if let Some(s) = step {
         settings.step = *s.get_ref();
@@ -282,18 +271,6 @@ fn refused(document: &Document<'_>, keys: &keys::Job) -> Option<CliError> {
         .parameter_group
         .first()
         .map(|g| (g.span().start, "[[parameter_group]] is not supported yet".to_owned()));
-    let motion = keys.motion.iter().find_map(|m| {
-        let keys::Motion { kind, mesh, velocities, parameter, .. } = m.get_ref();
-        let name = match kind {
-            keys::MotionKind::Tetrahedral => "kind `tetrahedral`",
-            keys::MotionKind::MeanValue => "kind `mean-value`",
-            _ if mesh.is_some() => "`mesh`",
-            _ if velocities.is_some() => "`velocities`",
-            _ if parameter.is_some() => "`parameter`",
-            _ => return None,
-        };
-        Some((m.span().start, format!("[[motion]] with {name} is not supported yet")))
-    });
-    let (at, message) = kind.or(group).or(motion)?;
+    let (at, message) = kind.or(group)?;
     Some(document.error_at(at, message))
 }

@@ -202,12 +202,6 @@ fn keys_of_later_versions_are_read_and_stand_in_the_way_of_derivatives_only() {
         ("[estimator]\nkind = \"warped\"", "`warped` is not supported yet"),
         ("[estimator]\nkind = \"radiative\"", "`radiative` is not supported yet"),
         ("[[parameter_group]]\ntarget = \"cube\"\nvertices = \"all\"", "[[parameter_group]]"),
-        ("[[motion]]\nmedium = \"fog\"\nkind = \"mean-value\"", "[[motion]]"),
-        (
-            "[[motion]]\nmedium = \"fog\"\nkind = \"tetrahedral\"\nmesh = \"a.mesh\"\n\
-             velocities = \"v.txt\"\nparameter = \"p\"",
-            "[[motion]]",
-        ),
     ] {
         let j = job(&text(more), &[]).unwrap();
         let message = j.require_derivatives().unwrap_err().to_string();
@@ -215,6 +209,13 @@ fn keys_of_later_versions_are_read_and_stand_in_the_way_of_derivatives_only() {
     }
     refused(&text("[estimator]\nsampling = \"bidirectional\""), &[], &["bidirectional"]);
     refused(&text("[[motion]]\nmedium = \"fog\"\nkind = \"liquid\""), &[], &["`liquid`"]);
+    let motion = |more: &str| text(&format!("[[motion]]\nmedium = \"fog\"\n{more}"));
+    refused(&motion("kind = \"affine\"\nmesh = \"a.mesh\""), &[], &["`tetrahedral`"]);
+    let velocities = "kind = \"tetrahedral\"\nvelocities = \"v.txt\"";
+    refused(&motion(velocities), &[], &["`mesh`, which is missing"]);
+    let unnamed = format!("{velocities}\nmesh = \"a.mesh\"");
+    refused(&motion(&unnamed), &[], &["need each other"]);
+    refused(&motion("kind = \"tetrahedral\"\nmesh = \"a.mesh\""), &[], &["a.mesh"]);
     let still = "[[motion]]\nmedium = \"fog\"\nkind = \"static\"";
     let j = job(&text(still), &[]).unwrap();
     j.require_derivatives().unwrap();
