@@ -42,6 +42,30 @@ pub enum Cause {
         /// Vertices in the file.
         count: usize,
     },
+    /// A vertex that the cage does not have.
+    #[error("vertex {index} does not exist: the cage has {count} vertices, counted from 0")]
+    CageVertexIndex {
+        /// The vertex asked for.
+        index: u32,
+        /// Vertices in the cage's file.
+        count: usize,
+    },
+    /// A cage with a hole.
+    #[error(
+        "the cage is not closed: the edge from vertex {} to vertex {} has an odd number of faces",
+        vertices[0],
+        vertices[1]
+    )]
+    OpenCage {
+        /// Ends of an edge on the rim, in the order of the cage's file.
+        vertices: [u32; 2],
+    },
+    /// A cage like a Klein bottle.
+    #[error("the cage has one side only; its faces cannot be turned to point outward")]
+    OneSidedCage,
+    /// A cage without an inside.
+    #[error("a closed part of the cage encloses no volume")]
+    FlatCage,
     /// A rotation about nothing.
     #[error("the rotation axis is the zero vector; give a direction, of any length")]
     ZeroAxis,

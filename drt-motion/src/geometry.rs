@@ -1,5 +1,6 @@
 use alloc::sync::Arc;
 
+use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3, fm, vec3};
 
 use crate::error::Cause;
@@ -38,6 +39,19 @@ pub enum GeometryChange {
         /// Velocity of the vertex.
         direction: Vec3,
     },
+    /// Every vertex x of the mesh, where the scene file places it, moves by theta times the sum of
+    /// λ(x) v over moving vertices of a [cage](crate::Cage): λ is the vertex's mean value coordinate
+    /// and v its velocity.
+    ///
+    /// A mesh vertex outside of the cage moves, too; farther out than about the cage's size, coordinates
+    /// grow with the distance and change sign.
+    Cage {
+        /// The cage, in the scene's coordinates: one closed mesh, or several nested ones.
+        mesh: Arc<Mesh>,
+        /// Moving vertices, counted from 0 in the order of the cage's file, and their velocities.
+        /// Those of a vertex that comes twice add up.
+        vertices: Arc<[(u32, Vec3)]>,
+    },
 }
 
 impl GeometryChange {
@@ -59,7 +73,7 @@ impl GeometryChange {
                 ))
             }
             Self::Matrix(m) => Some(Affine::IDENTITY.plus(&m.times(theta))),
-            Self::VertexVelocity(_) | Self::Vertex { .. } => None,
+            Self::VertexVelocity(_) | Self::Vertex { .. } | Self::Cage { .. } => None,
         }
     }
 
@@ -75,7 +89,7 @@ impl GeometryChange {
             Self::Rotate { axis, pivot } => Some(spin(Mat3::skew(unit_or_zero(axis)), pivot)),
             Self::Scale { factor, pivot } => Some(spin(Mat3::diagonal(factor), pivot)),
             Self::Matrix(m) => Some(m.after(&Affine::IDENTITY.plus(&m.times(theta)).inverse())),
-            Self::VertexVelocity(_) | Self::Vertex { .. } => None,
+            Self::VertexVelocity(_) | Self::Vertex { .. } | Self::Cage { .. } => None,
         }
     }
 
@@ -89,6 +103,7 @@ impl GeometryChange {
             Self::Matrix(_) => "matrix",
             Self::VertexVelocity(_) => "vertex_velocity",
             Self::Vertex { .. } => "vertex",
+            Self::Cage { .. } => "cage",
         }
     }
 
@@ -116,6 +131,9 @@ impl GeometryChange {
                 finite(v.iter().all(|v| v.is_finite()), "a vertex velocity")?;
             }
             Self::Vertex { direction, .. } => finite(direction.is_finite(), "the direction")?,
+            Self::Cage { vertices, .. } => {
+                finite(vertices.iter().all(|(_, v)| v.is_finite()), "the direction")?;
+            }
         }
         match self.affine(theta) {
             Some(map) => check_map(&map, theta),

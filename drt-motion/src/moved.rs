@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
+use crate::caged::Caged;
 use crate::error::Cause;
 use crate::geometry::finite;
 use crate::{Applied, GeometryChange, MotionError, SmoothNormals, SurfaceMotion};
@@ -49,10 +50,11 @@ pub fn move_mesh(
     let mut moved = mesh.clone();
     let mut fields = vec![Field::Affine(Affine::ZERO); parameters];
     let mut deformed = false;
+    let caged = Caged::new(mesh, changes)?;
     for c in changes {
         check(c, parameters)?;
         let fail = |cause| c.error(cause);
-        if let Some(velocities) = vertex_velocities(mesh, c.change).map_err(fail)? {
+        if let Some(velocities) = vertex_velocities(mesh, &caged, c.change).map_err(fail)? {
             deformed = true;
             for field in &mut fields {
                 field.pin(c.theta, &moved.positions);
@@ -201,7 +203,11 @@ fn at_vertices(u: &Affine, positions: &[Vec3]) -> Vec<Vec3> {
 
 /// Velocities of the mesh's vertices, from a change given in the order of the mesh's file; `None`
 /// for a change of space as a whole.
-fn vertex_velocities(mesh: &Mesh, change: &GeometryChange) -> Result<Option<Vec<Vec3>>, Cause> {
+fn vertex_velocities(
+    mesh: &Mesh,
+    caged: &Caged<'_>,
+    change: &GeometryChange,
+) -> Result<Option<Vec<Vec3>>, Cause> {
     let count = mesh.source_vertex_count as usize;
     let gather = |velocity: &dyn Fn(u32) -> Vec3| {
         let vertices = 0..mesh.positions.len() as u32;
@@ -216,6 +222,7 @@ fn vertex_velocities(mesh: &Mesh, change: &GeometryChange) -> Result<Option<Vec<
             gather(&|i| if i == index { direction } else { Vec3::ZERO })
         }
         &GeometryChange::Vertex { index, .. } => Err(Cause::VertexIndex { index, count }),
+        GeometryChange::Cage { mesh: cage, vertices } => Ok(caged.velocities(cage, vertices)),
         GeometryChange::Translate(_)
         | GeometryChange::Rotate { .. }
         | GeometryChange::Scale { .. }

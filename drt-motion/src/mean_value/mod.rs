@@ -1,0 +1,56 @@
+//! Mean value coordinates: interpolation from a closed triangle mesh into all of space.
+//!
+//! From a point x, with n the normals of a closed surface and φ the piecewise linear function that
+//! is 1 at a vertex and 0 at the others (Floater, Kós and Reimers 2005; Ju, Schaefer and Warren
+//! 2005),
+//!
+//! ```text
+//! w = ∫ φ K dA(y),   D = ∫ K dA(y),   K = n·(y - x) / |y - x|⁴,   λ = w / D.
+//! ```
+//!
+//! These λ are smooth off the surface, take the piecewise linear values on it, and give linear
+//! functions back everywhere. By the divergence theorem, where the surface winds W(y) times around
+//! y,
+//!
+//! ```text
+//! D(x) = ∫ (W(x) - W(y)) / |y - x|⁴ dy,
+//! ```
+//!
+//! over all of space: as long as W takes two neighbouring values only, D is positive where W is the
+//! larger, negative where it is the smaller, and vanishes nowhere. Surfaces are therefore turned such
+//! that they alternate (see [`orientation`]): nested ones, too, bound one region, seen from both of
+//! its sides.
+
+mod cage;
+mod edge;
+mod far;
+mod orientation;
+mod plane;
+mod quadrature;
+mod triangle;
+
+use drt_math::Vec3;
+
+pub use cage::{Cage, CageWeights};
+
+/// The weight of a vertex at a point, and how it changes with the point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MeanValueWeight {
+    /// The weight.
+    pub value: f64,
+    /// Its gradient.
+    pub gradient: Vec3,
+}
+
+impl MeanValueWeight {
+    fn add(&mut self, other: &Self) {
+        self.value += other.value;
+        self.gradient += other.gradient;
+    }
+}
+
+/// 1 over the power of two next to a size: lengths times this can be squared and cubed safely.
+fn unit_of(size: f64) -> f64 {
+    let exponent = (size.to_bits() >> 52) & 0x7ff;
+    f64::from_bits(2046_u64.saturating_sub(exponent).clamp(1, 2045) << 52)
+}
