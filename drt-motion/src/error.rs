@@ -50,22 +50,23 @@ pub enum Cause {
         /// Vertices in the cage's file.
         count: usize,
     },
-    /// A cage with a hole.
+    /// A surface with a hole, where mean value coordinates need an inside.
     #[error(
-        "the cage is not closed: the edge from vertex {} to vertex {} has an odd number of faces",
+        "the surface is not closed: the edge from vertex {} to vertex {} has an odd number of faces",
         vertices[0],
         vertices[1]
     )]
-    OpenCage {
-        /// Ends of an edge on the rim, in the order of the cage's file.
+    OpenSurface {
+        /// Ends of an edge on the rim, in the order of the mesh's file; of a list of triangles,
+        /// corner k of triangle i is 3 i + k.
         vertices: [u32; 2],
     },
-    /// A cage like a Klein bottle.
-    #[error("the cage has one side only; its faces cannot be turned to point outward")]
-    OneSidedCage,
-    /// A cage without an inside.
-    #[error("a closed part of the cage encloses no volume")]
-    FlatCage,
+    /// A surface like a Klein bottle.
+    #[error("the surface has one side only; its faces cannot be turned to point outward")]
+    OneSidedSurface,
+    /// A surface without an inside.
+    #[error("a closed part of the surface encloses no volume")]
+    FlatSurface,
     /// A rotation about nothing.
     #[error("the rotation axis is the zero vector; give a direction, of any length")]
     ZeroAxis,

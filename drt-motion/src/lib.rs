@@ -26,7 +26,9 @@ pub use blend::{Blend, Site, SiteWeight, blend_jet, triangle_field};
 pub use element::SurfaceElement;
 pub use error::{Cause, MotionError};
 pub use geometry::GeometryChange;
-pub use mean_value::{Cage, CageWeights, MeanValueWeight};
+pub use mean_value::{
+    Cage, CageWeights, MeanValueField, MeanValueVelocities, MeanValueWeight, MeanValueWeights,
+};
 pub use moved::{MovedFrame, MovedMesh, move_affine, move_mesh};
 pub use normals::SmoothNormals;
 pub use parameter::{Applied, Change, Effect, Parameter, geometry_changes, property_changes};

@@ -5,11 +5,8 @@ use drt_geom::Mesh;
 use drt_math::Vec3;
 
 use super::triangle::{Triangle, View};
-use super::{MeanValueWeight, orientation, unit_of};
+use super::{BEYOND, MeanValueWeight, orientation, unit_of};
 use crate::error::Cause;
-
-/// How many sizes of the cage away a point is too far to tell its vertices apart.
-const BEYOND: f64 = 1e12;
 
 /// A closed triangle mesh whose vertices carry space with them.
 #[derive(Clone, Debug)]

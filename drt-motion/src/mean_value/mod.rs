@@ -24,6 +24,9 @@
 mod cage;
 mod edge;
 mod far;
+mod field;
+mod hierarchy;
+mod moments;
 mod orientation;
 mod plane;
 mod quadrature;
@@ -32,6 +35,10 @@ mod triangle;
 use drt_math::Vec3;
 
 pub use cage::{Cage, CageWeights};
+pub use field::{MeanValueField, MeanValueVelocities, MeanValueWeights};
+
+/// How many sizes of a surface away a point is too far to tell its vertices apart.
+const BEYOND: f64 = 1e12;
 
 /// The weight of a vertex at a point, and how it changes with the point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -46,6 +53,13 @@ impl MeanValueWeight {
     fn add(&mut self, other: &Self) {
         self.value += other.value;
         self.gradient += other.gradient;
+    }
+
+    fn times(&self, other: &Self) -> Self {
+        Self {
+            value: self.value * other.value,
+            gradient: self.gradient * other.value + other.gradient * self.value,
+        }
     }
 }
 

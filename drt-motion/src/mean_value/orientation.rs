@@ -30,14 +30,14 @@ pub(super) fn alternating(mesh: &Mesh) -> Result<Vec<[u32; 3]>, Cause> {
     if !topology.is_closed() {
         let open = topology.edges.iter().find(|e| e.class == EdgeClass::Boundary);
         let vertices = open.map_or([0; 2], |e| e.vertices.map(|v| mesh.source_vertex(v)));
-        return Err(Cause::OpenCage { vertices });
+        return Err(Cause::OpenSurface { vertices });
     }
     let parts = parts(mesh, &topology)?;
     let mut outward = mesh.clone();
     for part in &parts {
         let (volume, size) = volume(mesh, part);
         if !(volume.abs() > FLAT * size * size * size) {
-            return Err(Cause::FlatCage);
+            return Err(Cause::FlatSurface);
         }
         for &(face, flipped) in part {
             if flipped != (volume < 0.0) {
@@ -45,7 +45,7 @@ pub(super) fn alternating(mesh: &Mesh) -> Result<Vec<[u32; 3]>, Cause> {
             }
         }
     }
-    let Ok(bvh) = TriangleBvh::of(&outward) else { return Err(Cause::FlatCage) };
+    let Ok(bvh) = TriangleBvh::of(&outward) else { return Err(Cause::FlatSurface) };
     let mut triangles = outward.triangles.clone();
     for part in parts {
         if is_nested(&outward, &bvh, &part) {
@@ -97,7 +97,7 @@ fn parts(mesh: &Mesh, topology: &Topology) -> Result<Vec<Vec<(u32, bool)>>, Caus
                 };
                 let against = flipped ^ (along(face) == along(other));
                 match seen[other as usize] {
-                    Some(known) if known != against => return Err(Cause::OneSidedCage),
+                    Some(known) if known != against => return Err(Cause::OneSidedSurface),
                     Some(_) => {}
                     None => {
                         seen[other as usize] = Some(against);

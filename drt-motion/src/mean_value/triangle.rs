@@ -1,6 +1,7 @@
 use drt_math::Vec3;
 
 use super::edge::EdgeView;
+use super::moments::Moments;
 use super::{MeanValueWeight, far, plane};
 
 /// A point nearer to a triangle than this, relative to its farthest corner, is on it: what rounding
@@ -80,6 +81,24 @@ impl Triangle {
             return View::Apart(far::weights(self, &local));
         }
         View::Apart(self.weights(&local, lengths[nearest]))
+    }
+
+    /// Adds the moments about `middle` of the linear function with given values at the corners.
+    pub(super) fn add_moments(&self, values: [f64; 3], middle: Vec3, moments: &mut Moments) {
+        // A rule of degree 3: the function times two coordinates.
+        for (weight, one, others) in [(-27.0, 1.0 / 3.0, 1.0 / 3.0), (25.0, 0.6, 0.2)] {
+            let nodes = if weight < 0.0 { 1 } else { 3 };
+            for node in 0..nodes {
+                let mut lambda = [others; 3];
+                lambda[node] = one;
+                let (mut place, mut value) = (-middle, 0.0);
+                for l in 0..3 {
+                    place += self.corners[l] * lambda[l];
+                    value += values[l] * lambda[l];
+                }
+                moments.add(self.normal * (weight / 96.0 * self.double_area * value), place);
+            }
+        }
     }
 
     /// Barycentric weights of the origin where it is within `tolerance` of the triangle, in whose

@@ -1,0 +1,207 @@
+//! Expansion of the mean value kernel about the middle of a cluster of triangles.
+//!
+//! The kernel is a gradient: z_i / |z|⁴ = ∂_i P with P = -1 / (2 |z|²). So with n the normals, ξ the
+//! places relative to the middle and z the middle relative to the point,
+//!
+//! ```text
+//! ∫ u n·(z + ξ) / |z + ξ|⁴ dA ≈ Σ_i M_i ∂_i P + Σ_ij M_ij ∂_ij P + Σ_ijk M_ijk ∂_ijk P,
+//! M_i = ∫ u n_i,   M_ij = ∫ u n_i ξ_j,   M_ijk = ½ ∫ u n_i ξ_j ξ_k,
+//! ```
+//!
+//! of which the symmetric parts count only: they are kept as the coefficients of homogeneous
+//! polynomials. Monomial xᵃ yᵇ zᶜ of any degree is number m (m + 1) / 2 + c with m = b + c.
+
+use drt_math::Vec3;
+
+/// Monomials of degree 1 to 3.
+const MOMENTS: usize = 3 + 6 + 10;
+/// Where each degree starts among those of degree 1 to 4.
+const START: [usize; 4] = [0, 3, 9, 19];
+/// Exponents b + c of a monomial.
+const BEYOND_X: [usize; 15] = [0, 1, 1, 2, 2, 2, 3, 3, 3, 3, 4, 4, 4, 4, 4];
+
+/// The monomial times a coordinate.
+const fn raised(monomial: usize, axis: usize) -> usize {
+    if axis == 0 { monomial } else { monomial + BEYOND_X[monomial] + axis }
+}
+
+const fn monomials(degree: usize) -> usize {
+    (degree + 1) * (degree + 2) / 2
+}
+
+/// Moments of a function on a cluster's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Moments([f64; MOMENTS]);
+
+/// Derivatives of P of order 1 to 4, in the order of the monomials.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Derivatives([f64; MOMENTS + 15]);
+
+impl Moments {
+    pub(super) const ZERO: Self = Self([0.0; MOMENTS]);
+
+    /// Adds a piece of surface at ξ, of area and value combined in the length of its normal.
+    pub(super) fn add(&mut self, normal: Vec3, xi: Vec3) {
+        let mut term = [normal.x, normal.y, normal.z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        self.add_degree(1, &term, 1.0);
+        multiply(&mut term, 1, xi);
+        self.add_degree(2, &term, 1.0);
+        multiply(&mut term, 2, xi);
+        self.add_degree(3, &term, 0.5);
+    }
+
+    /// Adds the moments of a part whose middle lies at `t`.
+    pub(super) fn add_part(&mut self, part: &Self, t: Vec3) {
+        for degree in 1..=3 {
+            let mut term = [0.0; 10];
+            let count = monomials(degree);
+            let start = START[degree - 1];
+            term[..count].copy_from_slice(&part.0[start..start + count]);
+            let mut factor = 1.0;
+            for higher in degree..=3 {
+                self.add_degree(higher, &term, factor);
+                if higher < 3 {
+                    multiply(&mut term, higher, t);
+                    factor /= (higher + 1 - degree) as f64;
+                }
+            }
+        }
+    }
+
+    fn add_degree(&mut self, degree: usize, term: &[f64; 10], factor: f64) {
+        let moments = &mut self.0[START[degree - 1]..][..monomials(degree)];
+        for (m, t) in moments.iter_mut().zip(term) {
+            *m += t * factor;
+        }
+    }
+
+    /// The integral.
+    #[inline]
+    pub(super) fn value(&self, p: &Derivatives) -> f64 {
+        self.0.iter().zip(&p.0).map(|(m, p)| m * p).sum()
+    }
+
+    /// Derivative of the integral as the point moves along an axis.
+    #[inline]
+    pub(super) fn slope(&self, p: &Derivatives, axis: usize) -> f64 {
+        let mut sum = 0.0;
+        for degree in 1..=3 {
+            let (start, next) = (START[degree - 1], START[degree]);
+            for k in 0..monomials(degree) {
+                sum -= self.0[start + k] * p.0[next + raised(k, axis)];
+            }
+        }
+        sum
+    }
+}
+
+/// A polynomial of the given degree times x·t.
+fn multiply(term: &mut [f64; 10], degree: usize, t: Vec3) {
+    let mut product = [0.0; 10];
+    for (k, factor) in term.iter().enumerate().take(monomials(degree)) {
+        for axis in 0..3 {
+            product[raised(k, axis)] += factor * t[axis];
+        }
+    }
+    *term = product;
+}
+
+impl Derivatives {
+    /// At the place of the middle relative to the point, by the recurrence of McMurchie and
+    /// Davidson 1978: of R⁽ᵐ⁾ = (2 d/d|z|²)ᵐ P, derivatives are those of lower order of R⁽ᵐ⁺¹⁾.
+    pub(super) fn at(z: Vec3) -> Self {
+        let q = 1.0 / z.length_squared();
+        let q2 = q * q;
+        // Orders 0 to 4, and within each, levels 0 to 4 minus the order.
+        let mut r = [[[0.0; 15]; 5]; 5];
+        for (m, v) in [-0.5 * q, q2, -4.0 * q2 * q, 24.0 * q2 * q2, -192.0 * q2 * q2 * q]
+            .into_iter()
+            .enumerate()
+        {
+            r[0][m][0] = v;
+        }
+        let mut out = [0.0; MOMENTS + 15];
+        for order in 1..=4 {
+            for m in 0..=4 - order {
+                for k in 0..monomials(order) {
+                    let beyond = BEYOND_X[k];
+                    let c = k - beyond * (beyond + 1) / 2;
+                    let (axis, exponent, down) = match (order - beyond, beyond - c) {
+                        (0, 0) => (2, c, beyond + 1),
+                        (0, b) => (1, b, beyond),
+                        (a, _) => (0, a, 0),
+                    };
+                    let lower = k - down;
+                    let mut v = z[axis] * r[order - 1][m + 1][lower];
+                    if exponent > 1 {
+                        let down = if axis == 0 { 0 } else { down - 1 };
+                        v += (exponent - 1) as f64 * r[order - 2][m + 1][lower - down];
+                    }
+                    r[order][m][k] = v;
+                }
+            }
+            let start = START[order - 1];
+            out[start..start + monomials(order)].copy_from_slice(&r[order][0][..monomials(order)]);
+        }
+        Self(out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drt_math::{Rng, vec3};
+
+    use super::*;
+
+    fn random(rng: &mut Rng) -> Vec3 {
+        [(); 3].map(|()| 2.0 * rng.next_f64() - 1.0).into()
+    }
+
+    #[test]
+    fn derivatives_are_those_of_each_other() {
+        let mut rng = Rng::new(60, 0, 0);
+        let h = 1e-5;
+        for _ in 0..20 {
+            let z = random(&mut rng) + vec3(1.5, 0.0, 0.0);
+            let p = Derivatives::at(z);
+            let q = z.length_squared();
+            for axis in 0..3 {
+                assert!((p.0[axis] - z[axis] / (q * q)).abs() < 1e-14 / (q * q));
+                let mut off = Vec3::ZERO;
+                (off.x, off.y, off.z) = match axis {
+                    0 => (h, 0.0, 0.0),
+                    1 => (0.0, h, 0.0),
+                    _ => (0.0, 0.0, h),
+                };
+                let (plus, minus) = (Derivatives::at(z + off), Derivatives::at(z - off));
+                for degree in 1..=3 {
+                    for k in 0..monomials(degree) {
+                        let i = START[degree - 1] + k;
+                        let slope = (plus.0[i] - minus.0[i]) / (2.0 * h);
+                        let found = p.0[START[degree] + raised(k, axis)];
+                        assert!((found - slope).abs() < 1e-6 * (1.0 + 1.0 / (q * q * q)).powi(2));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn moments_of_parts_add_up() {
+        let mut rng = Rng::new(61, 0, 0);
+        let (mut whole, mut sum) = (Moments::ZERO, Moments::ZERO);
+        for _ in 0..3 {
+            let middle = random(&mut rng);
+            let mut part = Moments::ZERO;
+            for _ in 0..4 {
+                let (n, xi) = (random(&mut rng), random(&mut rng));
+                part.add(n, xi);
+                whole.add(n, middle + xi);
+            }
+            sum.add_part(&part, middle);
+        }
+        for (a, b) in whole.0.iter().zip(&sum.0) {
+            assert!((a - b).abs() < 1e-13);
+        }
+    }
+}
