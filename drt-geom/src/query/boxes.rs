@@ -1,7 +1,7 @@
 //! What may lie at a place: a tree over the boxes of anything that has corners.
 
 use alloc::vec::Vec;
-use core::ops::ControlFlow;
+use core::ops::{ControlFlow, Range};
 
 use drt_math::Vec3;
 
@@ -10,17 +10,17 @@ use super::collapse::collapse;
 use super::frame::{Box32, BoxFrame};
 use super::lanes::{Lanes, Machine, Vector};
 use super::wide::{Query, Visitor, WIDTH, WideNode, WideTree};
-use crate::{Aabb, NONE};
+use crate::Aabb;
 
 /// Boxes in a leaf of the tree.
 const BLOCK: usize = 4;
 
-/// The tree, over things that are named by their numbers.
+/// The tree, over things in an order of its own in which neighbours are near each other.
 #[derive(Clone, Debug)]
 pub(crate) struct BoxTree {
     tree: Option<WideTree>,
     frame: BoxFrame,
-    blocks: Vec<[u32; BLOCK]>,
+    blocks: Vec<Range<u32>>,
     machine: Machine,
 }
 
@@ -33,43 +33,37 @@ struct Window {
 }
 
 impl BoxTree {
-    /// The tree over as many things, each within the box of the corners it is given by, and all
-    /// within finite bounds.
+    /// The tree over as many things, each within the box of the corners it is given by and all
+    /// within finite bounds; and their numbers in the tree's order.
     pub(crate) fn build<const N: usize>(
         bounds: &Aabb,
         count: u32,
         corners: impl Fn(u32) -> [Vec3; N],
-    ) -> Self {
+    ) -> (Self, Vec<u32>) {
         let frame = BoxFrame::new(bounds);
         let enclose = |i: u32| {
             let around = Aabb::around(corners(i));
             frame.enclose(&[around.min, around.max, around.max])
         };
         let boxes: Vec<Box32> = (0..count).map(enclose).collect();
+        let mut built = Self { tree: None, frame, blocks: Vec::new(), machine: Machine::detect() };
         if boxes.is_empty() {
-            return Self { tree: None, frame, blocks: Vec::new(), machine: Machine::detect() };
+            return (built, Vec::new());
         }
         let collapsed = collapse(&boxes, BLOCK);
-        let members = |b: usize| {
-            let range = &collapsed.blocks[b];
-            &collapsed.order[range.start as usize..range.end as usize]
-        };
-        let block = |b: usize| {
-            let mut block = [NONE; BLOCK];
-            block[..members(b).len()].copy_from_slice(members(b));
-            block
-        };
-        let blocks = (0..collapsed.blocks.len()).map(block).collect();
-        let tree = WideTree::new(&collapsed, |b| {
-            Box32::around(members(b).iter().map(|&i| boxes[i as usize]))
-        });
-        Self { tree: Some(tree), frame, blocks, machine: Machine::detect() }
+        built.tree = Some(WideTree::new(&collapsed, |b| {
+            let Range { start, end } = collapsed.blocks[b];
+            let members = &collapsed.order[start as usize..end as usize];
+            Box32::around(members.iter().map(|&i| boxes[i as usize]))
+        }));
+        built.blocks = collapsed.blocks;
+        (built, collapsed.order)
     }
 
-    /// Calls `visit` with everything whose box meets the given one, and with some that lie near it,
-    /// in no particular order, until it breaks off.
+    /// Calls `visit` with places in the tree's order that have among them everything whose box meets
+    /// the given one, and some that lie near it, until it breaks off.
     #[inline]
-    pub(crate) fn near(&self, window: &Aabb, visit: impl FnMut(u32) -> ControlFlow<()>) {
+    pub(crate) fn near(&self, window: &Aabb, visit: impl FnMut(Range<usize>) -> ControlFlow<()>) {
         let Some(tree) = &self.tree else { return };
         let local = |v| self.frame.local(v).map(|c| c as f32);
         let query = Window { min: local(window.min), max: local(window.max) };
@@ -78,20 +72,19 @@ impl BoxTree {
 }
 
 struct Members<'a, F> {
-    blocks: &'a [[u32; BLOCK]],
+    blocks: &'a [Range<u32>],
     visit: F,
 }
 
-impl<F: FnMut(u32) -> ControlFlow<()>> Visitor for Members<'_, F> {
+impl<F: FnMut(Range<usize>) -> ControlFlow<()>> Visitor for Members<'_, F> {
     #[inline(always)]
     fn announce<L: Lanes>(&self, lanes: L, index: usize) {
         lanes.prefetch(&self.blocks[index]);
     }
     #[inline(always)]
     fn block<L: Lanes>(&mut self, _: L, index: usize) -> ControlFlow<(), f32> {
-        for &member in self.blocks[index].iter().take_while(|m| **m != NONE) {
-            (self.visit)(member)?;
-        }
+        let Range { start, end } = self.blocks[index];
+        (self.visit)(start as usize..end as usize)?;
         ControlFlow::Continue(0.0)
     }
 }

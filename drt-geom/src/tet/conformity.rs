@@ -102,7 +102,7 @@ impl TetMesh {
         tolerance: f64,
     ) -> Result<Vec<f64>, ConformityError> {
         let count = surface.triangles.len() as u32;
-        let tree = BoxTree::build(&surface.bounds(), count, |i| surface.triangle(i));
+        let (tree, order) = BoxTree::build(&surface.bounds(), count, |i| surface.triangle(i));
         let mut covered = alloc::vec![0.0; count as usize];
         for (tet, k) in self.distinct_faces()? {
             let face = self.face(tet, k);
@@ -119,12 +119,14 @@ impl TetMesh {
             let mut touched = None;
             let reach = Vec3::splat(tolerance);
             let window = Aabb { min: middle - reach, max: middle + reach };
-            tree.near(&window, |triangle| {
-                if corners.iter().all(|p| is_on(triangle, *p)) {
-                    whole = true;
-                    covered[triangle as usize] += 0.5 * (b - a).cross(c - a).length();
-                } else if is_on(triangle, middle) {
-                    touched = Some(touched.map_or(triangle, |t: u32| t.min(triangle)));
+            tree.near(&window, |places| {
+                for &triangle in &order[places] {
+                    if corners.iter().all(|p| is_on(triangle, *p)) {
+                        whole = true;
+                        covered[triangle as usize] += 0.5 * (b - a).cross(c - a).length();
+                    } else if is_on(triangle, middle) {
+                        touched = Some(touched.map_or(triangle, |t: u32| t.min(triangle)));
+                    }
                 }
                 ControlFlow::Continue(())
             });

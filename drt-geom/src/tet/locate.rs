@@ -5,8 +5,8 @@ use drt_math::{Vec3, vec3};
 
 use super::double::EdgeFrame;
 use super::{TetMesh, TetMeshError, flat_height};
-use crate::Aabb;
 use crate::query::BoxTree;
+use crate::{Aabb, NONE};
 
 /// Steps of a walk before searching from scratch takes less time.
 const STEPS: usize = 16;
@@ -40,7 +40,10 @@ pub struct TetPoint {
 /// corners inverted, are never answers: within rounding their points are points of neighbours.
 #[derive(Clone, Debug)]
 pub struct TetLocator {
+    /// In the tree's order.
     pub(super) records: Vec<Record>,
+    /// Where the record of each tetrahedron is.
+    places: Vec<u32>,
     pub(super) tree: BoxTree,
     /// Where anything can be found.
     reach: Aabb,
@@ -56,10 +59,12 @@ pub(super) struct Record {
     origin: [f64; 3],
     /// By axis: the gradients of the weights of the other corners.
     gradients: [[f64; 3]; 3],
-    /// What the rounding error of each weight is less than, for a point inside; infinite for a
-    /// tetrahedron that counts as flat.
-    pub(super) error: [f32; 4],
-    /// The tetrahedra across the faces opposite to the corners, or [`NONE`](crate::NONE).
+    /// What the rounding error of each of these weights is less than, for a point inside; infinite
+    /// for a tetrahedron that counts as flat.
+    error: [f32; 3],
+    /// The tetrahedron's number.
+    pub(super) tet: u32,
+    /// The places of the tetrahedra across the faces opposite to the corners, or [`NONE`].
     neighbours: [u32; 4],
 }
 
@@ -79,24 +84,26 @@ impl TetLocator {
         mesh.check_arrays()?;
         let across = mesh.neighbours()?;
         let height = flat_height(&mesh.positions);
-        let mut records = Vec::with_capacity(mesh.tets.len());
-        for (tet, neighbours) in (0..).zip(across) {
-            records.push(Record::new(mesh, tet, neighbours, height)?);
-        }
         let bounds = Aabb::around(mesh.tets.iter().flatten().map(|v| mesh.positions[*v as usize]));
-        let largest = f64::max(bounds.min.max_abs(), bounds.max.max_abs());
-        let slack = if records.is_empty() {
-            0.0
-        } else {
-            128.0 * f64::EPSILON * bounds.extent().max_abs() + 16.0 * f64::EPSILON * largest
+        let (tree, order) = BoxTree::build(&bounds, across.len() as u32, |tet| mesh.tet(tet));
+        let mut places = alloc::vec![0; order.len()];
+        for (place, tet) in (0..).zip(&order) {
+            places[*tet as usize] = place;
+        }
+        let record = |tet: &u32| {
+            let place = |t: u32| places.get(t as usize).copied().unwrap_or(NONE);
+            Record::new(mesh, *tet, across[*tet as usize].map(place), height)
         };
+        let records = order.iter().map(record).collect::<Result<_, _>>()?;
+        let largest = f64::max(bounds.min.max_abs(), bounds.max.max_abs());
+        let slack =
+            128.0 * f64::EPSILON * bounds.extent().max_abs() + 16.0 * f64::EPSILON * largest;
+        let reach = Vec3::splat(if bounds.is_empty() { 0.0 } else { slack });
         Ok(Self {
-            tree: BoxTree::build(&bounds, records.len() as u32, |tet| mesh.tet(tet)),
             records,
-            reach: Aabb {
-                min: bounds.min - Vec3::splat(slack),
-                max: bounds.max + Vec3::splat(slack),
-            },
+            places,
+            tree,
+            reach: Aabb { min: bounds.min - reach, max: bounds.max + reach },
             slack,
         })
     }
@@ -108,12 +115,8 @@ impl TetLocator {
     #[inline]
     #[must_use]
     pub fn locate(&self, x: Vec3, hint: Option<u32>) -> Option<TetPoint> {
-        if let Some(hint) = hint
-            && let Some(found) = self.walk(x, hint)
-        {
-            return Some(found);
-        }
-        self.search(x)
+        let place = hint.and_then(|tet| self.places.get(tet as usize));
+        place.and_then(|place| self.walk(x, *place)).or_else(|| self.search(x))
     }
 
     /// The gradients of the weights of a tetrahedron's corners, per unit of length; zero where it
@@ -121,25 +124,24 @@ impl TetLocator {
     /// `Σ f[i] gradients[i]`, and a velocity `u` the divergence `Σ u[i] · gradients[i]`.
     #[must_use]
     pub fn gradients(&self, tet: u32) -> [Vec3; 4] {
-        let [x, y, z] = &self.records[tet as usize].gradients;
-        let [b, c, d] = [0, 1, 2].map(|i| vec3(x[i], y[i], z[i]));
-        [-(b + c + d), b, c, d]
+        self.records[self.places[tet as usize] as usize].gradients()
     }
 
     /// From neighbour to neighbour through the face that the point is farthest beyond.
     #[inline]
-    fn walk(&self, x: Vec3, hint: u32) -> Option<TetPoint> {
-        let mut tet = hint;
+    fn walk(&self, x: Vec3, from: u32) -> Option<TetPoint> {
+        let mut place = from;
         for _ in 0..STEPS {
-            let record = self.records.get(tet as usize)?;
+            let record = self.records.get(place as usize)?;
             let bary = record.weights(x);
-            if record.holds(&bary) {
-                return Some(TetPoint { tet, bary });
+            let error = record.errors();
+            if holds(&bary, &error) {
+                return Some(TetPoint { tet: record.tet, bary });
             }
             let exit = least(&bary);
             // Not so on a face, nor where there are no weights to go by.
-            if bary[exit] < -f64::from(record.error[exit]) {
-                tet = record.neighbours[exit];
+            if bary[exit] < -error[exit] {
+                place = record.neighbours[exit];
             } else {
                 return None;
             }
@@ -147,45 +149,52 @@ impl TetLocator {
         None
     }
 
-    /// From scratch: a walk from any tetrahedron near the point, or else all of them.
+    /// From scratch: a walk from a tetrahedron near the point, or else all of those.
     fn search(&self, x: Vec3) -> Option<TetPoint> {
         if !self.reach.contains(x) {
             return None;
         }
         let here = Aabb { min: x, max: x };
-        let mut found = None;
-        self.tree.near(&here, |tet| {
-            found = self.walk(x, tet);
+        let mut start = NONE;
+        self.tree.near(&here, |places| {
+            let depth = |place: usize| {
+                let bary = self.records[place].weights(x);
+                bary[least(&bary)]
+            };
+            let mut most = f64::NEG_INFINITY;
+            for place in places {
+                let depth = depth(place);
+                if depth > most {
+                    (most, start) = (depth, place as u32);
+                }
+            }
             ControlFlow::Break(())
         });
-        if found.is_some() {
-            return found;
-        }
+        self.walk(x, start).or_else(|| self.nearest(x))
+    }
+
+    /// Of the tetrahedra near the point the one that holds it, or with the largest least weight of
+    /// those that nearly do, and of several the first.
+    fn nearest(&self, x: Vec3) -> Option<TetPoint> {
         let mut best: Option<TetPoint> = None;
         let mut most = f64::NEG_INFINITY;
-        self.tree.near(&here, |tet| {
-            let record = &self.records[tet as usize];
-            let bary = record.weights(x);
-            if record.holds(&bary) {
-                best = Some(TetPoint { tet, bary });
-                return ControlFlow::Break(());
-            }
-            let weight = bary[least(&bary)];
-            let better = weight > most || (weight == most && best.is_some_and(|b| tet < b.tet));
-            if better && self.nearly_holds(tet, &bary) {
-                most = weight;
-                best = Some(TetPoint { tet, bary });
+        self.tree.near(&Aabb { min: x, max: x }, |places| {
+            for record in &self.records[places] {
+                let (tet, bary) = (record.tet, record.weights(x));
+                if holds(&bary, &record.errors()) {
+                    best = Some(TetPoint { tet, bary });
+                    return ControlFlow::Break(());
+                }
+                let weight = bary[least(&bary)];
+                let first = best.is_none_or(|b| tet < b.tet);
+                let better = weight > most || (weight == most && first);
+                if better && record.nearly_holds(&bary, self.slack) {
+                    (most, best) = (weight, Some(TetPoint { tet, bary }));
+                }
             }
             ControlFlow::Continue(())
         });
         best
-    }
-
-    /// Whether a point of the given weights is in a tetrahedron or off it by the slack.
-    fn nearly_holds(&self, tet: u32, bary: &[f64; 4]) -> bool {
-        let gradients = self.gradients(tet);
-        let inside = |i: usize| bary[i] >= -self.slack * gradients[i].length();
-        !self.records[tet as usize].is_flat() && (0..4).all(inside)
     }
 }
 
@@ -199,9 +208,10 @@ impl Record {
         let corners = mesh.tet(tet);
         let frame = EdgeFrame::of(corners);
         let flat = Self {
+            tet,
             origin: corners[0].to_array(),
             gradients: [[0.0; 3]; 3],
-            error: [f32::INFINITY; 4],
+            error: [f32::INFINITY; 3],
             neighbours,
         };
         if frame.determinant() < 0.0 && !frame.is_flat(flat_height) {
@@ -214,9 +224,7 @@ impl Record {
         // inside, of 2^-53 each. A point farther off has larger errors but for some corner a weight
         // below them, as long as none is above `WORST_ERROR`.
         let one_norm = |g: &Vec3| g.x.abs() + g.y.abs() + g.z.abs();
-        let [b, c, d] =
-            [0, 1, 2].map(|i| 8.0 * f64::EPSILON * (1.0 + frame.size * one_norm(&rows[i])));
-        let error = [b + c + d, b, c, d];
+        let error = rows.map(|g| 8.0 * f64::EPSILON * (1.0 + frame.size * one_norm(&g)));
         if !error.iter().all(|e| *e < WORST_ERROR) {
             return Ok(flat);
         }
@@ -236,19 +244,38 @@ impl Record {
         [1.0 - (b + c + d), b, c, d]
     }
 
-    /// Whether the weights are positive beyond doubt.
+    /// What the rounding errors of the weights are less than, for a point inside.
     #[inline(always)]
-    pub(super) fn holds(&self, bary: &[f64; 4]) -> bool {
-        (0..4).all(|i| bary[i] > f64::from(self.error[i]))
+    pub(super) fn errors(&self) -> [f64; 4] {
+        let [b, c, d] = self.error.map(f64::from);
+        [b + c + d, b, c, d]
     }
 
-    fn is_flat(&self) -> bool {
-        self.error[0] == f32::INFINITY
+    /// Whether a point of the given weights is in the tetrahedron, or off its faces by the slack.
+    fn nearly_holds(&self, bary: &[f64; 4], slack: f64) -> bool {
+        let is_flat = self.error[0] == f32::INFINITY;
+        let gradients = self.gradients();
+        !is_flat && (0..4).all(|i| bary[i] >= -slack * gradients[i].length())
     }
+
+    fn gradients(&self) -> [Vec3; 4] {
+        let [x, y, z] = &self.gradients;
+        let [b, c, d] = [0, 1, 2].map(|i| vec3(x[i], y[i], z[i]));
+        [-(b + c + d), b, c, d]
+    }
+}
+
+/// Whether weights are positive beyond doubt.
+#[inline(always)]
+pub(super) fn holds(bary: &[f64; 4], error: &[f64; 4]) -> bool {
+    let [a, b, c, d] = [0, 1, 2, 3].map(|i| bary[i] > error[i]);
+    a & b & c & d
 }
 
 /// The corner of the least weight.
 #[inline(always)]
-fn least(bary: &[f64; 4]) -> usize {
-    (1..4).fold(0, |k, i| if bary[i] < bary[k] { i } else { k })
+fn least(&[a, b, c, d]: &[f64; 4]) -> usize {
+    let (i, first) = if b < a { (1, b) } else { (0, a) };
+    let (j, second) = if d < c { (3, d) } else { (2, c) };
+    if second < first { j } else { i }
 }

@@ -5,7 +5,7 @@ use core::ops::ControlFlow;
 
 use drt_math::Vec3;
 
-use super::locate::Record;
+use super::locate::{Record, holds};
 use super::{TetLocator, TetMesh};
 use crate::Aabb;
 
@@ -15,9 +15,11 @@ impl TetLocator {
     pub(super) fn overlap(&self, mesh: &TetMesh, boundary: &[(u32, usize)]) -> Option<[u32; 2]> {
         let first = |window: &Aabb, of: u32, overlaps: &dyn Fn(&Record) -> bool| {
             let mut found: Option<u32> = None;
-            self.tree.near(window, |tet| {
-                if tet != of && overlaps(&self.records[tet as usize]) {
-                    found = Some(found.map_or(tet, |f| f.min(tet)));
+            self.tree.near(window, |places| {
+                for record in &self.records[places] {
+                    if record.tet != of && overlaps(record) {
+                        found = Some(found.map_or(record.tet, |f| f.min(record.tet)));
+                    }
                 }
                 ControlFlow::Continue(())
             });
@@ -31,7 +33,7 @@ impl TetLocator {
             (0..mesh.tets.len() as u32).find_map(|tet| {
                 let middle = mesh.tet(tet).iter().fold(Vec3::ZERO, |sum, v| sum + *v * 0.25);
                 let window = Aabb { min: middle, max: middle };
-                first(&window, tet, &|record| record.holds(&record.weights(middle)))
+                first(&window, tet, &|r| holds(&r.weights(middle), &r.errors()))
             })
         })
     }
@@ -43,7 +45,7 @@ fn enters(record: &Record, triangle: [Vec3; 3]) -> bool {
     let mut polygon: Vec<[f64; 4]> = triangle.iter().map(|v| record.weights(*v)).collect();
     // The errors are those of points inside and grow with the distance, as weights do.
     let largest = polygon.iter().flatten().fold(1.0, |m, w| f64::max(m, w.abs()));
-    let least = record.error.map(|e| f64::from(e) * 4.0 * largest);
+    let least = record.errors().map(|e| e * 4.0 * largest);
     let reaches = |i: usize| polygon.iter().any(|w| w[i] > least[i]);
     if !(0..4).all(reaches) {
         return false;
