@@ -9,8 +9,10 @@ use drt_motion::{
     blend_jet,
 };
 
+use super::mean_value::{self, MeanValue};
+
 /// The motion of an inside under one parameter.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(crate) enum Inside {
     /// One affine field.
     Affine(Affine),
@@ -18,6 +20,8 @@ pub(crate) enum Inside {
     Blend(Vec<(usize, Affine)>),
     /// Velocities at the vertices of the medium's tetrahedra.
     Tetrahedra(TetVelocities),
+    /// Velocities of all surfaces, interpolated.
+    MeanValue(mean_value::Velocities),
 }
 
 /// What the motions of an inside share.
@@ -25,6 +29,7 @@ pub(crate) enum Inside {
 pub(crate) enum Field {
     Blend(Blend),
     Tetrahedra(TetrahedralField),
+    MeanValue(MeanValue),
 }
 
 /// A field at a point.
@@ -32,6 +37,7 @@ pub(crate) enum Field {
 pub(crate) struct Place {
     weights: Vec<SiteWeight>,
     corners: TetrahedralPlace,
+    mean_value: mean_value::Place,
 }
 
 impl Field {
@@ -39,6 +45,7 @@ impl Field {
         match self {
             Self::Blend(blend) => blend.weights(x, &mut place.weights),
             Self::Tetrahedra(tetrahedra) => place.corners = tetrahedra.place(x),
+            Self::MeanValue(field) => field.place(x, &mut place.mean_value),
         }
     }
 }
@@ -50,6 +57,7 @@ impl Inside {
             Self::Affine(field) => VolumeMotion::Affine(*field).jet(x),
             Self::Blend(fields) => blend_jet(&place.weights, fields, x),
             Self::Tetrahedra(velocities) => place.corners.jet(velocities),
+            Self::MeanValue(velocities) => velocities.jet(&place.mean_value),
         }
     }
 
@@ -59,6 +67,7 @@ impl Inside {
             Self::Affine(_) => "affine",
             Self::Blend(_) => "blend",
             Self::Tetrahedra(_) => "tetrahedral",
+            Self::MeanValue(_) => "mean value",
         }
     }
 }

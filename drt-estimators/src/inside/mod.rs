@@ -29,11 +29,13 @@ use crate::transport::World;
 
 mod adjacency;
 mod field;
+mod mean_value;
 mod parts;
 mod tetrahedra;
 
 pub(crate) use adjacency::adjacency;
 pub(crate) use field::{Field, Inside, Place};
+use mean_value::MeanValue;
 use parts::Part;
 
 /// The motions of all insides, and the shapes whose flux must be added.
@@ -116,6 +118,11 @@ impl Surroundings<'_> {
                     let fields = self.parts.iter().map(|part| part.velocities[p]).enumerate();
                     Inside::Blend(fields.filter(|(_, v)| !v.is_zero()).collect())
                 }
+                Field::MeanValue(field) => {
+                    let Self { world, tangents, shapes, parts, .. } = self;
+                    let velocities = field.velocities(world, tangents, m, shapes, parts, p)?;
+                    Inside::MeanValue(velocities)
+                }
                 Field::Tetrahedra(tetrahedra) => {
                     let given = self.given().map_or(Ok(None), |given| {
                         tetrahedra::given_velocities(self.world, m, given, p)
@@ -190,6 +197,9 @@ impl Surroundings<'_> {
             |s: &usize| parameters.iter().any(|p| parts::is_deformed_by(self.tangents, *s, *p));
         match self.asked {
             Some(InsideKind::Tetrahedral(_)) => Ok(Field::Tetrahedra(tetrahedra()?)),
+            Some(InsideKind::MeanValue) => {
+                Ok(Field::MeanValue(MeanValue::new(world, *medium, shapes, parts)?))
+            }
             None if shapes.iter().any(deforms) => match tetrahedra() {
                 Ok(field) => Ok(Field::Tetrahedra(field)),
                 Err(_) => self.blend(),

@@ -98,6 +98,12 @@ impl MeanValueField {
         Ok(field)
     }
 
+    /// How many triangles the surfaces have.
+    #[must_use]
+    pub fn triangle_count(&self) -> usize {
+        self.triangles.len()
+    }
+
     /// The mean value interpolation itself, every triangle by itself: slow.
     #[must_use]
     pub fn exact(self) -> Self {
