@@ -34,8 +34,21 @@ pub(crate) type Task<'a> = Box<dyn FnMut() + 'a>;
 /// Lets each task run once a turn. A turn before the first fills caches and does not count.
 pub(crate) fn take_turns<const N: usize>(turns: usize, mut tasks: [Task<'_>; N]) -> [Times; N] {
     let mut times = [const { Times(Vec::new()) }; N];
+    run(turns, &mut tasks, &mut times);
+    times
+}
+
+/// The same for any number of tasks.
+#[allow(dead_code, reason = "not every bench has a list of contenders")]
+pub(crate) fn take_turns_all(turns: usize, mut tasks: Vec<Task<'_>>) -> Vec<Times> {
+    let mut times = vec![Times::default(); tasks.len()];
+    run(turns, &mut tasks, &mut times);
+    times
+}
+
+fn run(turns: usize, tasks: &mut [Task<'_>], times: &mut [Times]) {
     for turn in 0..=turns {
-        for (task, times) in tasks.iter_mut().zip(&mut times) {
+        for (task, times) in tasks.iter_mut().zip(&mut *times) {
             let start = Instant::now();
             task();
             if turn > 0 {
@@ -43,5 +56,4 @@ pub(crate) fn take_turns<const N: usize>(turns: usize, mut tasks: [Task<'_>; N])
             }
         }
     }
-    times
 }
