@@ -6,6 +6,7 @@
 extern crate alloc;
 
 mod aabb;
+mod crossing;
 mod intersect;
 #[cfg(any(feature = "obj", feature = "ply"))]
 mod io;
@@ -20,6 +21,7 @@ mod triangulate;
 mod weld;
 
 pub use aabb::Aabb;
+pub use crossing::crossing_pairs;
 pub use intersect::ray_plane;
 #[cfg(feature = "obj")]
 pub use io::{ObjError, ObjErrorKind, load_obj};

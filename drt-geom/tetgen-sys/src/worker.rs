@@ -84,7 +84,7 @@ fn wait(mut worker: Child, limit: Duration) -> Result<Option<ExitStatus>, Error>
 fn failure(status: ExitStatus) -> Option<Error> {
     match (status.code(), status.signal()) {
         (Some(0), _) => None,
-        (Some(code), _) if code >= REFUSED && code < REFUSED + 32 => {
+        (Some(code), _) if (REFUSED..REFUSED + 32).contains(&code) => {
             let code = code - REFUSED;
             Some(Error::Refused { code, reason: reason(code) })
         }

@@ -1,0 +1,178 @@
+//! Where surfaces run through each other: what counts as crossing, exactly, and that none is missed.
+
+use drt_geom::{Mesh, crossing_pairs, procedural};
+use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
+
+fn triangle(corners: [[f64; 3]; 3]) -> Mesh {
+    Mesh::new(corners.map(Vec3::from).to_vec(), vec![[0, 1, 2]]).unwrap()
+}
+
+const FLOOR: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+
+fn crosses_floor(corners: [[f64; 3]; 3]) -> bool {
+    let (a, b) = (triangle(FLOOR), triangle(corners));
+    let found = crossing_pairs(&[&a, &b], 9);
+    assert_eq!(found, crossing_pairs(&[&a, &b, &triangle([[9.0; 3]; 3])], 9));
+    // In whatever order the corners and the triangles come.
+    for turn in 0..6 {
+        let mut turned = corners;
+        turned.rotate_left(turn % 3);
+        if turn > 2 {
+            turned.swap(0, 1);
+        }
+        let again = crossing_pairs(&[&triangle(turned), &a], 9);
+        assert_eq!(found.is_empty(), again.is_empty(), "{corners:?} as {turned:?}");
+    }
+    assert!(found.is_empty() || found == [[(0, 0), (1, 0)]]);
+    !found.is_empty()
+}
+
+#[test]
+fn common_corners_and_edges_are_no_crossing() {
+    // A corner; an edge, from above and in the plane; beside it; above it.
+    assert!(!crosses_floor([[0.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 1.0]]));
+    assert!(!crosses_floor([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [2.0, 1.0, 1.0]]));
+    assert!(!crosses_floor([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 1e-300]]));
+    assert!(!crosses_floor([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, -4.0, 0.0]]));
+    assert!(!crosses_floor([[0.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]));
+    assert!(!crosses_floor([[5.0, 0.0, 0.0], [6.0, 0.0, 0.0], [5.0, 4.0, 0.0]]));
+    assert!(!crosses_floor([[1.0, 1.0, 1e-30], [2.0, 1.0, 1.0], [1.0, 2.0, 1.0]]));
+    // The planes cross, the triangles do not.
+    assert!(!crosses_floor([[3.0, 3.0, -1.0], [3.0, 3.0, 1.0], [4.0, 4.0, 0.0]]));
+}
+
+#[test]
+fn what_runs_through_is_a_crossing() {
+    assert!(crosses_floor([[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [9.0, 9.0, 0.0]]));
+    assert!(crosses_floor([[1.0, 1.0, -1.0], [1.0, 1.0, 1.0], [1.5, 1.0, 1.0]]));
+    // From a common corner on, through the inside and through the opposite edge.
+    assert!(crosses_floor([[0.0, 0.0, 0.0], [1.0, 1.0, -1.0], [1.0, 1.0, 1.0]]));
+    assert!(crosses_floor([[0.0, 0.0, 0.0], [9.0, 9.0, -1.0], [9.0, 9.0, 1.0]]));
+}
+
+#[test]
+fn overlap_in_a_plane_is_a_crossing() {
+    assert!(crosses_floor(FLOOR));
+    assert!(crosses_floor([[1.0, 1.0, 0.0], [1.5, 1.0, 0.0], [1.0, 1.5, 0.0]]));
+    assert!(crosses_floor([[-1.0, 1.0, 0.0], [9.0, 1.0, 0.0], [9.0, 1.5, 0.0]]));
+    assert!(crosses_floor([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [1.0, 1.0, 0.0]]));
+    assert!(crosses_floor([[0.0, 0.0, 0.0], [9.0, 1.0, 0.0], [1.0, 9.0, 0.0]]));
+    assert!(crosses_floor([[0.0, 0.0, 0.0], [1.0, 0.2, 0.0], [0.2, 1.0, 0.0]]));
+}
+
+#[test]
+fn a_corner_where_the_other_has_none_is_a_crossing() {
+    // On the inside, on an edge, and an edge along a part of an edge.
+    assert!(crosses_floor([[1.0, 1.0, 0.0], [1.0, 1.0, 1.0], [2.0, 1.0, 1.0]]));
+    assert!(crosses_floor([[2.0, 0.0, 0.0], [2.0, -1.0, 1.0], [3.0, -1.0, 1.0]]));
+    assert!(crosses_floor([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, -4.0, 0.0]]));
+    assert!(crosses_floor([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, -4.0, 3.0]]));
+    assert!(crosses_floor([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, -4.0, 3.0]]));
+}
+
+#[test]
+fn signs_are_exact() {
+    // One unit in the last place decides whether the tip reaches the plane x + y + z = 1.
+    let plane = triangle([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    let tip = |z: f64| triangle([[0.25, 0.25, z], [3.0, 2.0, 2.0], [2.0, 3.0, 2.0]]);
+    let at = |z| crossing_pairs(&[&plane, &tip(z)], 1).len();
+    assert_eq!([at(0.5_f64.next_down()), at(0.5), at(0.5_f64.next_up())], [1, 1, 0]);
+}
+
+#[test]
+fn good_meshes_do_not_cross_and_copies_of_them_do() {
+    let knot = procedural::torus_knot(&procedural::TorusKnot::default());
+    let sphere = procedural::icosphere(3);
+    let grid = procedural::grid(9, 7);
+    let cube = procedural::cube();
+    for mesh in [&knot, &sphere, &grid, &cube] {
+        assert!(crossing_pairs(&[mesh], 9).is_empty());
+        let n = mesh.triangles.len();
+        assert!(crossing_pairs(&[mesh, mesh], usize::MAX).len() >= n);
+    }
+    let inner = sphere.transform(&Affine::about(Mat3::IDENTITY * 0.5, Vec3::ZERO));
+    assert!(crossing_pairs(&[&sphere, &inner], 9).is_empty());
+}
+
+#[test]
+fn the_tree_misses_nothing() {
+    // A cloud of triangles over common corners, with degenerate ones and repetitions among them.
+    let mut rng = Rng::new(5, 0, 0);
+    let mut coordinate = || (rng.next_f64() * 16.0).floor() / 4.0;
+    let positions: Vec<_> =
+        (0..150).map(|_| vec3(coordinate(), coordinate(), coordinate())).collect();
+    let triangles = (0..300_u32).map(|i| [i % 150, (i * 7 + i / 150) % 150, (i * 31 + 5) % 150]);
+    let cloud = Mesh::new(positions, triangles.collect()).unwrap();
+    let found = crossing_pairs(&[&cloud], usize::MAX);
+    let mut expected = Vec::new();
+    for i in 0..300_u32 {
+        for j in i + 1..300 {
+            let of =
+                |k: u32| Mesh { triangles: vec![cloud.triangles[k as usize]], ..cloud.clone() };
+            if !crossing_pairs(&[&of(i), &of(j)], 1).is_empty() {
+                expected.push([(0, i), (0, j)]);
+            }
+        }
+    }
+    assert!(expected.len() > 1000);
+    assert_eq!(found, expected);
+    // A few of them, when a few are asked for.
+    let few = crossing_pairs(&[&cloud], 7);
+    assert!(few.len() == 7 && few.iter().all(|pair| expected.contains(pair)));
+    assert!(crossing_pairs(&[&cloud], 0).is_empty());
+}
+
+/// Whether no plane separates two triangles strictly: of those along a face, along an edge of each,
+/// or upright on a face along its edge, one does when any does. Exact for small integers.
+fn inseparable(t: [Vec3; 3], u: [Vec3; 3]) -> bool {
+    let edges = |[a, b, c]: [Vec3; 3]| [b - a, c - b, a - c];
+    let (e, f) = (edges(t), edges(u));
+    let normals = [e[0].cross(e[1]), f[0].cross(f[1])];
+    let mut axes = normals.to_vec();
+    axes.extend(e.iter().flat_map(|e| f.iter().map(|f| e.cross(*f))));
+    axes.extend(e.iter().map(|e| e.cross(normals[0])));
+    axes.extend(f.iter().map(|f| f.cross(normals[1])));
+    axes.iter().all(|axis| {
+        let reach = |t: [Vec3; 3]| {
+            let heights = t.map(|p| axis.dot(p));
+            (
+                heights.iter().copied().fold(f64::INFINITY, f64::min),
+                heights.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            )
+        };
+        let ((low, high), (lower, higher)) = (reach(t), reach(u));
+        low <= higher && lower <= high
+    })
+}
+
+#[test]
+fn separating_planes_agree() {
+    let mut rng = Rng::new(6, 0, 0);
+    let mut random = |flat: bool| {
+        let mut c = || (rng.next_f64() * 6.0).floor();
+        [(); 3].map(|()| if flat { vec3(c(), c(), 1.0) } else { vec3(c(), c(), c()) })
+    };
+    let (mut crossing, mut clear) = (0, 0);
+    for trial in 0..40_000 {
+        let (t, u) = (random(trial % 2 == 0), random(trial % 4 == 0));
+        let has_area = |[a, b, c]: [Vec3; 3]| (b - a).cross(c - a) != Vec3::ZERO;
+        if !has_area(t) || !has_area(u) || t.iter().any(|p| u.contains(p)) {
+            continue;
+        }
+        let [a, b] = [t, u].map(|t| Mesh::new(t.to_vec(), vec![[0, 1, 2]]).unwrap());
+        let found = !crossing_pairs(&[&a, &b], 1).is_empty();
+        assert_eq!(found, inseparable(t, u), "{t:?} {u:?}");
+        *if found { &mut crossing } else { &mut clear } += 1;
+    }
+    assert!(crossing > 5000 && clear > 5000, "{crossing} {clear}");
+}
+
+#[test]
+fn nonsense_meets_nothing() {
+    let mut bad = triangle(FLOOR);
+    bad.positions[1].x = f64::NAN;
+    assert!(crossing_pairs(&[&bad, &triangle(FLOOR)], 9).is_empty());
+    bad.triangles[0] = [0, 2, 7];
+    assert!(crossing_pairs(&[&bad, &triangle(FLOOR)], 9).is_empty());
+    assert!(crossing_pairs(&[], 9).is_empty());
+}
