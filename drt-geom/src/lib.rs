@@ -15,6 +15,8 @@ pub mod procedural;
 mod query;
 mod tet;
 mod tetrahedralize;
+#[cfg(feature = "tetgen")]
+mod tetgen;
 mod topology;
 #[cfg(feature = "spade")]
 mod triangulate;
@@ -36,6 +38,11 @@ pub use tet::{
 pub use tetrahedralize::{
     SurfaceTriangle, TetrahedralizeError, TetrahedralizeInput, Tetrahedralization, tetrahedralize,
 };
+#[cfg(feature = "tetgen")]
+pub use tet::{TetInput, Tetrahedralization};
+pub use tet::{TetMesh, TetVertexOrigin};
+#[cfg(feature = "tetgen")]
+pub use tetgen::{TetgenError, tetrahedralize_tetgen};
 pub use topology::{Edge, EdgeClass, Topology};
 #[cfg(feature = "spade")]
 pub use triangulate::{PolygonError, newell_normal, triangulate};

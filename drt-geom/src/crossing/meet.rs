@@ -8,7 +8,7 @@ type Triangle = [Vec3; 3];
 type Plane = [Coord<f64>; 3];
 
 /// Whether the corners are not all on one line.
-pub(super) fn has_area(t: &Triangle) -> bool {
+pub(crate) fn has_area(t: &Triangle) -> bool {
     flat_axis(t).is_some()
 }
 
@@ -86,6 +86,12 @@ fn hits_flat([p, q]: [Coord<f64>; 2], t: Plane) -> bool {
 
 fn one_side(sides: [f64; 3]) -> bool {
     sides.iter().all(|s| *s >= 0.0) || sides.iter().all(|s| *s <= 0.0)
+}
+
+/// The sign of the tetrahedron's volume, as of [`TetMesh`](crate::TetMesh), on some number.
+#[cfg(feature = "tetgen")]
+pub(crate) fn volume_sign([a, b, c, d]: [Vec3; 4]) -> f64 {
+    -side(&[a, b, c], d)
 }
 
 /// On which side of the triangle's plane a point lies.

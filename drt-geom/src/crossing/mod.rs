@@ -10,6 +10,9 @@ use crate::{Mesh, weld};
 mod meet;
 mod near;
 
+#[cfg(feature = "tetgen")]
+pub(crate) use meet::{has_area, volume_sign};
+
 /// Pairs of triangles, each as (surface, triangle), that have more in common than corners and edges
 /// of both: what cross, overlap, coincide, or touch with a corner where the other has none.
 ///
