@@ -42,7 +42,13 @@ pub use tetrahedralize::{
 pub use tet::{TetInput, Tetrahedralization};
 pub use tet::{TetMesh, TetVertexOrigin};
 #[cfg(feature = "tetgen")]
+pub use tet::{Tetrahedralization, TetrahedralizeInput};
+#[cfg(feature = "tetgen")]
 pub use tetgen::{TetgenError, tetrahedralize_tetgen};
+#[cfg(feature = "tetgen")]
+/// The library's own errors, which [`TetgenError`] holds.
+#[cfg(feature = "tetgen")]
+pub use tetgen_sys;
 pub use topology::{Edge, EdgeClass, Topology};
 #[cfg(feature = "spade")]
 pub use triangulate::{PolygonError, newell_normal, triangulate};

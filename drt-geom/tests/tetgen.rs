@@ -5,15 +5,15 @@ use std::collections::HashMap;
 use std::time::Duration;
 
 use drt_geom::{
-    Mesh, MeshError, TetInput, TetVertexOrigin, TetgenError, Tetrahedralization, TriangleBvh,
-    crossing_pairs, procedural, tetrahedralize_tetgen,
+    Mesh, MeshError, TetVertexOrigin, TetgenError, Tetrahedralization, TetrahedralizeInput,
+    TriangleBvh, crossing_pairs, procedural, tetrahedralize_tetgen,
 };
 use drt_math::{Affine, Mat3, Vec3, vec3};
 
 const LIMIT: Duration = Duration::from_secs(60);
 
 fn make(surfaces: &[&Mesh], points: &[Vec3]) -> Result<Tetrahedralization, TetgenError> {
-    tetrahedralize_tetgen(&TetInput { surfaces, points, margin: 0.1 }, LIMIT)
+    tetrahedralize_tetgen(&TetrahedralizeInput { surfaces, points, margin: 0.1 }, LIMIT)
 }
 
 fn placed(mesh: &Mesh, scale: f64, shift: Vec3) -> Mesh {
@@ -47,6 +47,8 @@ fn check(
     }
     let count = |is: fn(&TetVertexOrigin) -> bool| made.origins.iter().filter(|o| is(o)).count();
     assert_eq!(count(|o| *o == TetVertexOrigin::Box), 8);
+
+    assert!(made.shared.is_sorted_by_key(|(vertex, _)| *vertex));
 
     // Each face is that of two tetrahedra, or on the box.
     let mut faces: HashMap<[Vec3Bits; 3], usize> = HashMap::new();
@@ -238,7 +240,7 @@ fn nonsense_is_refused() {
     assert!(matches!(make(&[&flat], &[]), Err(TetgenError::Empty)));
     assert!(matches!(make(&[], &[Vec3::X]), Err(TetgenError::BadMargin { .. })));
     for margin in [0.0, -1.0, 1e-30, f64::NAN, f64::INFINITY] {
-        let input = TetInput { surfaces: &[&cube], points: &[], margin };
+        let input = TetrahedralizeInput { surfaces: &[&cube], points: &[], margin };
         let error = tetrahedralize_tetgen(&input, LIMIT).unwrap_err();
         assert!(matches!(error, TetgenError::BadMargin { .. }), "{margin}: {error}");
     }
@@ -247,7 +249,7 @@ fn nonsense_is_refused() {
 #[test]
 fn time_is_limited() {
     let sphere = procedural::icosphere(6);
-    let input = TetInput { surfaces: &[&sphere], points: &[], margin: 0.1 };
+    let input = TetrahedralizeInput { surfaces: &[&sphere], points: &[], margin: 0.1 };
     let error = tetrahedralize_tetgen(&input, Duration::from_millis(10)).unwrap_err();
     let timed_out = matches!(error, TetgenError::Library(tetgen_sys::Error::TimedOut { .. }));
     assert!(timed_out, "{error}");

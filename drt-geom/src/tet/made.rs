@@ -7,7 +7,7 @@ use crate::Mesh;
 
 /// What a tetrahedral mesh is to be made of.
 #[derive(Clone, Copy, Debug)]
-pub struct TetInput<'a> {
+pub struct TetrahedralizeInput<'a> {
     /// Surfaces that are to become faces of the tetrahedra, open or closed. They may meet in common
     /// edges and corners only, which are those of equal positions.
     pub surfaces: &'a [&'a Mesh],
@@ -26,7 +26,7 @@ pub struct Tetrahedralization {
     pub mesh: TetMesh,
     /// Where each vertex comes from; the first, in the order of the input, where it has several origins.
     pub origins: Vec<TetVertexOrigin>,
-    /// The further origins of vertices at which several vertices of the input coincide, by vertex in
-    /// the order of the input: corners where surfaces touch, copies of a vertex within one.
+    /// The further origins of vertices at which several vertices of the input coincide: corners
+    /// where surfaces touch, copies of a vertex within one. Sorted by vertex.
     pub shared: Vec<(u32, TetVertexOrigin)>,
 }

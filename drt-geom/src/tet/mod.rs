@@ -24,7 +24,7 @@ use double::EdgeFrame;
 mod made;
 
 #[cfg(feature = "tetgen")]
-pub use made::{TetInput, Tetrahedralization};
+pub use made::{Tetrahedralization, TetrahedralizeInput};
 
 /// Tetrahedra that share vertices.
 ///

@@ -4,7 +4,7 @@ use drt_math::{Vec3, vec3};
 
 use super::TetgenError;
 use crate::crossing::has_area;
-use crate::{Aabb, Mesh, NONE, TetInput, TetVertexOrigin, procedural, weld};
+use crate::{Aabb, Mesh, NONE, TetVertexOrigin, TetrahedralizeInput, procedural, weld};
 
 /// The input as one set of points and triangles over them.
 #[derive(Default)]
@@ -13,7 +13,7 @@ pub(super) struct Facets {
     pub(super) positions: Vec<Vec3>,
     /// Where each position comes from.
     pub(super) origins: Vec<TetVertexOrigin>,
-    /// Further origins.
+    /// Further origins, sorted by position.
     pub(super) shared: Vec<(u32, TetVertexOrigin)>,
     /// No two over the same corners; those of the box are last.
     pub(super) triangles: Vec<[u32; 3]>,
@@ -22,7 +22,7 @@ pub(super) struct Facets {
 }
 
 impl Facets {
-    pub(super) fn new(input: &TetInput<'_>) -> Result<Self, TetgenError> {
+    pub(super) fn new(input: &TetrahedralizeInput<'_>) -> Result<Self, TetgenError> {
         for (surface, mesh) in input.surfaces.iter().enumerate() {
             // For what it checks; fields may have been edited.
             Mesh::new(mesh.positions.clone(), mesh.triangles.clone())
@@ -42,7 +42,7 @@ impl Facets {
     }
 
     /// Numbers the vertices that triangles with an area use, and the points, each position once.
-    fn gather(&mut self, input: &TetInput<'_>) {
+    fn gather(&mut self, input: &TetrahedralizeInput<'_>) {
         let surfaces = input.surfaces.iter().flat_map(|s| &s.positions);
         let all: Vec<Vec3> = surfaces.chain(input.points).copied().collect();
         let welded = weld(&all);
@@ -80,6 +80,7 @@ impl Facets {
         for point in 0..input.points.len() {
             number(self, base + point, TetVertexOrigin::Point(point as u32));
         }
+        self.shared.sort_by_key(|(vertex, _)| *vertex);
     }
 
     /// Keeps the first of the triangles with the same corners.

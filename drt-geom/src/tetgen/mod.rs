@@ -9,7 +9,9 @@ use drt_math::Vec3;
 
 use self::facets::Facets;
 use crate::crossing::{crossings, volume_sign};
-use crate::{MeshError, TetInput, TetMesh, TetVertexOrigin, Tetrahedralization, TriangleBvh};
+use crate::{
+    MeshError, TetMesh, TetVertexOrigin, Tetrahedralization, TetrahedralizeInput, TriangleBvh,
+};
 
 mod facets;
 
@@ -118,7 +120,7 @@ pub enum TetgenError {
 /// box; when triangles repeat, cross, overlap, or touch other than in common corners and edges; when
 /// TetGen cannot run, fails, or is not done in time.
 pub fn tetrahedralize_tetgen(
-    input: &TetInput<'_>,
+    input: &TetrahedralizeInput<'_>,
     limit: Duration,
 ) -> Result<Tetrahedralization, TetgenError> {
     let facets = Facets::new(input)?;
