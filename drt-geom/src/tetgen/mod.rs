@@ -219,3 +219,41 @@ impl<const N: usize> fmt::Display for Named<'_, N> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use drt_math::vec3;
+
+    use super::{TetMesh, TetgenError, Vec, expect_faces, expect_volumes};
+
+    /// Two tetrahedra on a common face.
+    fn pair() -> TetMesh {
+        let tip = |z| vec3(0.25, 0.25, z);
+        let positions = [vec3(0.0, 0.0, 0.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0)];
+        let positions: Vec<_> = positions.into_iter().chain([tip(1.0), tip(-1.0)]).collect();
+        TetMesh { positions, tets: vec![[0, 1, 2, 3], [1, 0, 2, 4]] }
+    }
+
+    #[test]
+    fn lost_faces_are_named() {
+        let triangles = [[2, 1, 0], [3, 4, 0], [4, 2, 1], [1, 3, 4], [0, 3, 4]];
+        let names = [(0, 7), (1, 5), (1, 6), (2, 9)];
+        let error = expect_faces(&pair(), &triangles, &names).unwrap_err();
+        let TetgenError::Lost { faces, count: 2 } = &error else { panic!("{error}") };
+        assert_eq!(*faces, [(1, 5), (2, 9)]);
+        let text =
+            "TetGen lost 2 faces of the input: triangle 5 of surface 1, triangle 9 of surface 2";
+        assert_eq!(error.to_string(), text);
+        assert!(expect_faces(&pair(), &triangles, &names[..1]).is_ok());
+    }
+
+    #[test]
+    fn tetrahedra_without_volume_are_found() {
+        let mut mesh = pair();
+        assert!(expect_volumes(&mesh).is_ok());
+        mesh.tets.push([0, 1, 2, 4]);
+        mesh.positions[3].z = 0.0;
+        let error = expect_volumes(&mesh).unwrap_err();
+        assert!(matches!(error, TetgenError::Flat { count: 2, .. }), "{error}");
+    }
+}
