@@ -10,7 +10,9 @@ use std::time::Instant;
 use drt_geom::{Mesh, TetVertexOrigin, TetrahedralizeInput, procedural, tetrahedralize};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    println!("mesh                 triangles  positions   vertices  (added)     tetrahedra  seconds");
+    println!(
+        "mesh                 triangles  positions   vertices  (added)     tetrahedra  seconds"
+    );
     // Cargo adds --bench.
     let paths: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
     if paths.is_empty() {
@@ -61,6 +63,8 @@ fn report(name: &str, mesh: &Mesh) {
                 made.mesh.tets.len(),
             );
         }
-        Err(error) => println!("{name:20} {:9} after {seconds:.3} s: {error}", mesh.triangles.len()),
+        Err(error) => {
+            println!("{name:20} {:9} after {seconds:.3} s: {error}", mesh.triangles.len())
+        }
     }
 }

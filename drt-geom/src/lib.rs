@@ -14,9 +14,9 @@ mod mesh;
 pub mod procedural;
 mod query;
 mod tet;
-mod tetrahedralize;
 #[cfg(feature = "tetgen")]
 mod tetgen;
+mod tetrahedralize;
 mod topology;
 #[cfg(feature = "spade")]
 mod triangulate;
@@ -35,20 +35,14 @@ pub use tet::{
     ConformityError, SurfacePlace, TetLocator, TetMesh, TetMeshError, TetPoint, TetVertexOrigin,
     tet_barycentric,
 };
-pub use tetrahedralize::{
-    SurfaceTriangle, TetrahedralizeError, TetrahedralizeInput, Tetrahedralization, tetrahedralize,
-};
-#[cfg(feature = "tetgen")]
-pub use tet::{TetInput, Tetrahedralization};
-pub use tet::{TetMesh, TetVertexOrigin};
-#[cfg(feature = "tetgen")]
-pub use tet::{Tetrahedralization, TetrahedralizeInput};
 #[cfg(feature = "tetgen")]
 pub use tetgen::{TetgenError, tetrahedralize_tetgen};
-#[cfg(feature = "tetgen")]
 /// The library's own errors, which [`TetgenError`] holds.
 #[cfg(feature = "tetgen")]
 pub use tetgen_sys;
+pub use tetrahedralize::{
+    SurfaceTriangle, Tetrahedralization, TetrahedralizeError, TetrahedralizeInput, tetrahedralize,
+};
 pub use topology::{Edge, EdgeClass, Topology};
 #[cfg(feature = "spade")]
 pub use triangulate::{PolygonError, newell_normal, triangulate};

@@ -20,12 +20,6 @@ pub use locate::{TetLocator, TetPoint};
 
 use double::EdgeFrame;
 
-#[cfg(feature = "tetgen")]
-mod made;
-
-#[cfg(feature = "tetgen")]
-pub use made::{Tetrahedralization, TetrahedralizeInput};
-
 /// Tetrahedra that share vertices.
 ///
 /// Each lists its vertices so that the last is seen from the first three on the side from which

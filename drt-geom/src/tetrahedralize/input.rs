@@ -131,9 +131,11 @@ impl Merged {
         for carrier in self.triangles.iter().flat_map(|(_, carriers)| carriers) {
             let corners = named[carrier.triangle as usize].corners;
             for k in 0..3 {
-                let edge = self.edges.entry(edge_key(corners[k], corners[(k + 1) % 3])).or_default();
+                let edge =
+                    self.edges.entry(edge_key(corners[k], corners[(k + 1) % 3])).or_default();
                 let this = own(carrier.triangle, k);
-                let is_this = |c: &Carrier| matches!(c.part, Part::Edge(k) if own(c.triangle, k) == this);
+                let is_this =
+                    |c: &Carrier| matches!(c.part, Part::Edge(k) if own(c.triangle, k) == this);
                 if !edge.iter().any(is_this) {
                     edge.push(Carrier { triangle: carrier.triangle, part: Part::Edge(k) });
                 }

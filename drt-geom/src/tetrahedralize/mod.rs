@@ -61,7 +61,9 @@ pub struct SurfaceTriangle {
 #[non_exhaustive]
 pub enum TetrahedralizeError {
     /// A coordinate is NaN or infinite.
-    #[error("surface {surface} (from 0): vertex {vertex} has a coordinate that is not a finite number")]
+    #[error(
+        "surface {surface} (from 0): vertex {vertex} has a coordinate that is not a finite number"
+    )]
     NonFinitePosition {
         /// Which surface.
         surface: usize,

@@ -27,7 +27,8 @@ impl Recovery<'_> {
         }
         let unscaled = 1.0 / merged.scale;
         let positions = self.complex.points.iter().map(|&p| p * unscaled).collect();
-        result.mesh = TetMesh { positions, tets: self.complex.live().map(|t| t.vertices).collect() };
+        result.mesh =
+            TetMesh { positions, tets: self.complex.live().map(|t| t.vertices).collect() };
         result
     }
 
