@@ -5,6 +5,7 @@ use std::path::Path;
 use drt_math::{Affine, Mat3, Rgb, Vec3};
 use drt_motion::{Change, Effect, GeometryChange, PropertyChange, ValueChange};
 
+use super::cages::Cages;
 use super::keys::{self, Voxels};
 use super::velocities;
 use crate::CliError;
@@ -28,7 +29,11 @@ const KINDS: &str =
     "translate, rotate, scale, matrix, vertex_velocity, vertex, cage, follow or property";
 
 /// What an effect does; files are relative to `folder`.
-pub(super) fn effect(keys: &keys::Effect, folder: &Path) -> Result<Effect, Refusal> {
+pub(super) fn effect(
+    keys: &keys::Effect,
+    folder: &Path,
+    cages: &mut Cages,
+) -> Result<Effect, Refusal> {
     let geometry = |change| Change::Geometry(change);
     let vec = Vec3::from;
     let mut changes = Vec::new();
@@ -54,8 +59,8 @@ pub(super) fn effect(keys: &keys::Effect, folder: &Path) -> Result<Effect, Refus
         let direction = vec(v.direction);
         changes.push(geometry(GeometryChange::Vertex { index: v.index, direction }));
     }
-    if keys.cage.is_some() {
-        return Err("`cage` is not supported yet".to_owned().into());
+    if let Some(cage) = &keys.cage {
+        changes.push(geometry(cages.change(cage, folder)?));
     }
     if let Some(leader) = &keys.follow {
         changes.push(Change::Follow(leader.clone()));

@@ -111,11 +111,10 @@ pub(super) struct Vertex {
 /// A control cage: one of its vertices, or, in a group, all of them.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "checked for form; cages come with mean value coordinates")]
 pub(super) struct Cage {
-    mesh: PathBuf,
-    vertex: Option<u32>,
-    direction: Option<[f64; 3]>,
+    pub(super) mesh: PathBuf,
+    pub(super) vertex: Option<u32>,
+    pub(super) direction: Option<[f64; 3]>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]

@@ -1,5 +1,6 @@
 //! Jobs: a scene, an estimator and parameters, in one TOML file.
 
+mod cages;
 mod document;
 mod effects;
 mod keys;
@@ -18,6 +19,7 @@ use toml::Spanned;
 use crate::error::{Place, Warning, read_text};
 use crate::scene_xml::read_scene;
 use crate::{CliError, Defaults};
+use cages::Cages;
 use document::Document;
 use effects::Refusal;
 
@@ -225,6 +227,7 @@ fn parameters(
     let mut names = BTreeSet::new();
     let mut parameters = Vec::new();
     let mut places = Vec::new();
+    let mut cages = Cages::default();
     for spanned in &keys.parameter {
         let (at, parameter) = (spanned.span().start, spanned.get_ref());
         let name = &parameter.name;
@@ -243,11 +246,11 @@ fn parameters(
         for effect in &parameter.effect {
             let at = effect.span().start;
             let fail = |message| document.error_at(at, format!("parameter `{name}`: {message}"));
-            let effect =
-                effects::effect(effect.get_ref(), folder).map_err(|refusal| match refusal {
-                    Refusal::Keys(message) => fail(message),
-                    Refusal::File(error) => error,
-                })?;
+            let effect = effects::effect(effect.get_ref(), folder, &mut cages);
+            let effect = effect.map_err(|refusal| match refusal {
+                Refusal::Keys(message) => fail(message),
+                Refusal::File(error) => error,
+            })?;
             scene.find(&effect.target).map_err(|e| fail(e.to_string()))?;
             effects.push(effect);
         }

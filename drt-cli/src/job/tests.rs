@@ -14,6 +14,9 @@ const SCENE: &str = r#"<scene version="3.0.0"><medium type="homogeneous" id="fog
     <sampler type="independent"><integer name="sample_count" value="9"/></sampler></sensor>
   <shape type="cube" id="cube"/></scene>"#;
 
+/// A tetrahedron.
+const CAGE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+
 fn job(text: &str, set: &[(&str, &str)]) -> Result<Job, CliError> {
     let folder = Folder::new();
     folder.file("scene.xml", SCENE);
@@ -22,6 +25,9 @@ fn job(text: &str, set: &[(&str, &str)]) -> Result<Job, CliError> {
     let ply = "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\n\
                property double z\nend_header\n1 2 3\n4 5 6\n";
     folder.file("velocity.ply", ply);
+    folder.file("cage.obj", CAGE);
+    folder.file("open.obj", CAGE.split("f 1 4 3").next().unwrap());
+    folder.file("cage.ply", "ply\nformat");
     let set = set.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
     load_job(&folder.file("job.toml", text), &Overrides { set, ..Overrides::default() })
 }
@@ -97,6 +103,9 @@ fn geometry_effects() {
         };
         assert_eq!(v[..], [one, vec3(4.0, 5.0, 6.0)]);
     }
+    let cage = geometry("cage = { mesh = \"cage.obj\", vertex = 3, direction = [1, 2, 3] }");
+    let GeometryChange::Cage { mesh, vertices } = cage else { panic!() };
+    assert_eq!((mesh.source_vertex_count, &vertices[..]), (4, &[(3, one)][..]));
     assert_eq!(change("follow = \"fog\""), Change::Follow("fog".into()));
 }
 
@@ -130,7 +139,22 @@ fn effects_that_make_no_sense() {
         ("property = \"g\"\nadd = [1, 1, 1]\nlog = true", "`log` belongs to `multiply`"),
         ("property = \"g\"\nmultiply = inf", "not finite"),
         ("property = \"g\"\nmultiply = 1\nvoxels = \"some\"", "\"all\" or [i, j, k]"),
-        ("cage = { mesh = \"c.obj\", vertex = 1, direction = [1, 0, 0] }", "not supported yet"),
+        (
+            "cage = { mesh = \"none.obj\", vertex = 1, direction = [1, 0, 0] }",
+            "none.obj: cannot read",
+        ),
+        (
+            "cage = { mesh = \"open.obj\", vertex = 1, direction = [1, 0, 0] }",
+            "open.obj: unusable as a `cage`: the surface is not closed: the edge from vertex",
+        ),
+        ("cage = { mesh = \"cage.ply\", vertex = 1, direction = [1, 0, 0] }", "cage.ply"),
+        (
+            "cage = { mesh = \"cage.obj\", vertex = 4, direction = [1, 0, 0] }",
+            "cage.obj: vertex 4 does not exist: the cage has 4 vertices, counted from 0",
+        ),
+        ("cage = { mesh = \"cage.obj\", direction = [1, 0, 0] }", "`cage` lacks `vertex`"),
+        ("cage = { mesh = \"cage.obj\", vertex = 1 }", "`cage` lacks `direction`"),
+        ("cage = { mesh = \"cage.obj\", vertex = -1, direction = [1, 0, 0] }", "job.toml:6"),
         ("vertex_velocity = \"broken.txt\"", "broken.txt:2: `1 2` is not three finite numbers"),
         ("vertex_velocity = \"none.txt\"", "none.txt: cannot read"),
         ("stretch = [1, 2, 3]", "unknown field `stretch`"),

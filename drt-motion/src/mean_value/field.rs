@@ -72,6 +72,15 @@ pub struct MeanValueVelocities {
     moments: Vec<[Moments; 3]>,
 }
 
+impl MeanValueWeights {
+    /// How many triangles count by themselves, and how many clusters by their moments: what a
+    /// query costs.
+    #[must_use]
+    pub fn counts(&self) -> [usize; 2] {
+        [self.near.len(), self.distant.len()]
+    }
+}
+
 impl MeanValueField {
     /// A field between closed surfaces, given as triangles in any order and winding.
     ///
