@@ -16,7 +16,9 @@ use drt_motion::{MeanValueField, MeanValueVelocities, MeanValueWeights};
 const BATCHES: usize = 15;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!("triangles  set-up ms   per parameter ms   exact us   accelerated us   +1 parameter us   near  far   difference");
+    println!(
+        "triangles  set-up ms   per parameter ms   exact us   accelerated us   +1 parameter us   near  far   difference"
+    );
     for (subdivisions, points) in [(3, 40), (4, 20), (5, 20), (6, 20)] {
         row(subdivisions, points)?;
     }

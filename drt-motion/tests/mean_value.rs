@@ -169,3 +169,129 @@ fn linear_functions_come_back() {
     }
     println!("largest error of linear functions {:e}, of their gradients {:e}", worst[0], worst[1]);
 }
+
+/// A cube with a vertex 1e-8 off the middle of an edge, in one of the sides: two triangles there are
+/// needles, one of them with three long edges.
+fn needles() -> Mesh {
+    let cube = procedural::cube();
+    let [a, b, c] = cube.triangles[0];
+    let p = |i: u32| cube.positions[i as usize];
+    let mut positions = cube.positions.clone();
+    let mut triangles = cube.triangles.clone();
+    let m = positions.len() as u32;
+    let middle = (p(a) + p(b)) * 0.5;
+    positions.push(middle + (p(c) - middle) * 1e-8);
+    triangles[0] = [a, b, m];
+    triangles.extend([[b, c, m], [c, a, m]]);
+    Mesh::new(positions, triangles).unwrap()
+}
+
+/// A point of a triangle: a corner, on an edge, or inside.
+fn on_triangle(rng: &mut Rng, corners: [Vec3; 3]) -> (Vec3, [f64; 3]) {
+    let [r, s] = rng.next_2d();
+    let k = rng.next_u32() as usize % 3;
+    let mut w = [0.0; 3];
+    match rng.next_u32() % 3 {
+        0 => w[k] = 1.0,
+        1 => (w[k], w[(k + 1) % 3]) = (r, 1.0 - r),
+        _ => w = [1.0 - r.sqrt(), r.sqrt() * (1.0 - s), r.sqrt() * s],
+    }
+    (corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2], w)
+}
+
+/// The least height of a triangle.
+fn thinnest(mesh: &Mesh) -> f64 {
+    let height = |t| {
+        let [a, b, c] = mesh.triangle(t);
+        2.0 * mesh.area(t) / (b - a).length().max((c - b).length()).max((a - c).length())
+    };
+    (0..mesh.triangles.len() as u32).map(height).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn on_and_next_to_the_surface_the_data_are_met() {
+    let mut rng = Rng::new(52, 0, 0);
+    let mut cages = cages();
+    cages.push(("needles", needles()));
+    let mut worst: f64 = 0.0;
+    for (name, mesh) in cages {
+        for (scale, offset) in [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)] {
+            let mesh = placed(&mesh, scale, Vec3::splat(offset));
+            let cage = Cage::new(&mesh).unwrap();
+            let thinnest = thinnest(&mesh);
+            let data = random_vecs(&mut rng, mesh.positions.len());
+            // The coordinates of a point are rounded to this.
+            let rounding = f64::EPSILON * (scale + offset);
+            for _ in 0..200 {
+                let t = rng.next_u32() % mesh.triangles.len() as u32;
+                let (on, w) = on_triangle(&mut rng, mesh.triangle(t));
+                let off = [0.0, 1e-14, 1e-13, 1e-12, 1e-10][rng.next_u32() as usize % 5];
+                let x = on + random_vec(&mut rng) * (off * scale);
+                let corners = mesh.triangles[t as usize];
+                let expected = (0..3).fold(Vec3::ZERO, |s, k| s + data[corners[k] as usize] * w[k]);
+                let weights = coordinates(&cage, x);
+                let found =
+                    weights.iter().zip(&data).fold(Vec3::ZERO, |s, (w, v)| s + *v * w.value);
+                let error = (found - expected).max_abs();
+                // A field that bends as sharply as the triangle is thin.
+                let allowed = 1e-11 + 50.0 * (off * scale + rounding) / thinnest;
+                assert!(error < allowed, "{name} {scale} {offset} {x:?} {w:?} {off:e}: {error:e}");
+                if off == 0.0 && offset == 0.0 && name != "needles" {
+                    worst = worst.max(error);
+                }
+                assert!(weights.iter().all(|w| w.gradient.is_finite()));
+            }
+            for (i, &p) in mesh.positions.iter().enumerate() {
+                let w = coordinates(&cage, p);
+                let copies = mesh.positions.iter().zip(&w).filter(|(q, _)| **q == p);
+                assert_eq!(copies.map(|(_, w)| w.value).sum::<f64>(), 1.0, "{name} {i}");
+            }
+        }
+    }
+    println!("largest error on the surface {worst:e}");
+}
+
+#[test]
+fn no_point_is_lost() {
+    let mut rng = Rng::new(53, 0, 0);
+    let mut cages = cages();
+    cages.push(("needles", needles()));
+    let mut worst: f64 = 0.0;
+    let mut count = 0;
+    for (name, mesh) in &cages {
+        for (scale, offset) in [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)] {
+            let mesh = placed(mesh, scale, Vec3::splat(offset));
+            let cage = Cage::new(&mesh).unwrap();
+            let rounds = if mesh.triangles.len() > 100 { 1_500 } else { 5_000 };
+            for _ in 0..rounds {
+                let t = rng.next_u32() % mesh.triangles.len() as u32;
+                let [a, b, c] = mesh.triangle(t);
+                let (on, _) = on_triangle(&mut rng, [a, b, c]);
+                let size = [1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3][rng.next_u32() as usize % 7];
+                let step = random_vec(&mut rng) * (size * scale);
+                let x = match rng.next_u32() % 4 {
+                    0 => on + step,
+                    // In the plane of the triangle, and on the line of an edge.
+                    1 => on + (b - a) * step.x + (c - a) * step.y,
+                    2 => a + (b - a) * (1.0 + step.x.abs()),
+                    _ => a.lerp(b, step.x) + mesh.normal(t) * step.y,
+                };
+                let w = coordinates(&cage, x);
+                count += 1;
+                assert!(w.iter().all(|w| w.value.is_finite() && w.gradient.is_finite()), "{x:?}");
+                let distance = (x - mesh.bounds().center()).max_abs() / scale;
+                let [value, _] = linear_errors(&mesh, &w, x);
+                let rounding = 1e-10 * (1.0 + distance * distance) + 1e-15 * offset;
+                assert!(value < rounding, "{name} {scale} {offset} {x:?} {size:e}: {value:e}");
+                worst = worst.max(value / (1.0 + distance * distance));
+            }
+        }
+        let cage = Cage::new(mesh).unwrap();
+        for x in [1e9, 1e13, 1e100, 1e308, f64::INFINITY, f64::NAN] {
+            let w = coordinates(&cage, vec3(x, -x, 0.5 * x));
+            assert!(w.iter().all(|w| w.value.is_finite() && w.gradient.is_finite()), "{x}");
+        }
+    }
+    assert!(count >= 100_000);
+    println!("{count} points, error of linear functions at most {worst:e}");
+}

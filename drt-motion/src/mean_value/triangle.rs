@@ -1,4 +1,4 @@
-use drt_math::Vec3;
+use drt_math::{Mat3, Vec3};
 
 use super::edge::EdgeView;
 use super::moments::Moments;
@@ -160,21 +160,24 @@ impl Triangle {
             let half = 0.5 / h;
             MeanValueWeight { value: sum * half, gradient: (gradient + n * (sum / h)) * half }
         });
+        // Summed before it is projected on the edges: only so do the errors of a needle's weights
+        // cancel in linear functions.
+        let mut turn = Vec3::ZERO;
+        let mut turn_gradient = Mat3::ZERO;
+        for (v, e) in views.iter().zip(self.edges) {
+            turn += e * v.g;
+            for k in 0..3 {
+                turn_gradient.cols[k] += v.gradient * e[k];
+            }
+        }
         let inverse = 1.0 / self.double_area;
         [0, 1, 2].map(|l| {
             let opposite = self.edges[l];
             let lambda = n.dot(views[l].cross) * inverse;
-            let mut turn = 0.0;
-            let mut turn_gradient = Vec3::ZERO;
-            for (v, e) in views.iter().zip(self.edges) {
-                let product = e.dot(opposite);
-                turn += v.g * product;
-                turn_gradient += v.gradient * product;
-            }
-            let value = lambda * whole.value + 0.5 * h * turn * inverse;
+            let value = lambda * whole.value + 0.5 * h * turn.dot(opposite) * inverse;
             let gradient = whole.gradient * lambda
                 + n.cross(opposite) * (whole.value * inverse)
-                + (turn_gradient * h - n * turn) * (0.5 * inverse);
+                + (turn_gradient * opposite * h - n * turn.dot(opposite)) * (0.5 * inverse);
             MeanValueWeight { value, gradient }
         })
     }
