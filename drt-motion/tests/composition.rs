@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use drt_geom::Mesh;
+use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3};
 use drt_motion::{
     Applied, GeometryChange, MovedMesh, SurfaceMotion, SurfacePoint, move_affine, move_mesh,
@@ -26,7 +26,11 @@ fn random_affine_change(rng: &mut Rng) -> GeometryChange {
 
 fn random_change(rng: &mut Rng, mesh: &Mesh) -> GeometryChange {
     let count = mesh.source_vertex_count;
-    match rng.next_u32() % 4 {
+    match rng.next_u32() % 5 {
+        2 => GeometryChange::Cage {
+            mesh: procedural::icosphere(0).transform(&random_affine(rng)).into(),
+            vertices: [2, 7, 2].map(|v| (v, random_vec(rng) * 0.2)).into(),
+        },
         0 => GeometryChange::VertexVelocity(
             random_vecs(rng, count as usize).iter().map(|v| *v * 0.3).collect(),
         ),

@@ -3,7 +3,7 @@
 mod common;
 
 use common::*;
-use drt_geom::Mesh;
+use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
 use drt_motion::{
     Applied, Cause, GeometryChange, MotionError, SurfaceMotion, move_affine, move_mesh,
@@ -35,6 +35,48 @@ fn a_wrong_vertex_count_names_both() {
     );
     let change = GeometryChange::Vertex { index: 3, direction: Vec3::X };
     assert_eq!(cause(&change, 0.0), Cause::VertexIndex { index: 3, count: 3 });
+}
+
+#[test]
+fn cages_that_carry_nothing() {
+    let cage = |mesh: &Mesh, vertex, v: Vec3| GeometryChange::Cage {
+        mesh: mesh.clone().into(),
+        vertices: [(vertex, v)].into(),
+    };
+    let cube = procedural::cube();
+    let count = cube.source_vertex_count as usize;
+    let missing = Cause::CageVertexIndex { index: count as u32, count };
+    assert_eq!(cause(&cage(&cube, count as u32, Vec3::X), 0.0), missing);
+    assert!(matches!(
+        cause(&cage(&cube, 0, Vec3::X * f64::NAN), 0.0),
+        Cause::NotFinite { what: "the direction" }
+    ));
+
+    let mut open = cube.clone();
+    open.triangles.pop();
+    let error = apply(&cage(&open, 0, Vec3::X), 0.0).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .starts_with("parameter 1, `cage`: the surface is not closed: the edge from vertex ")
+    );
+    let mut broken = cube.clone();
+    broken.positions[0].x = f64::INFINITY;
+    assert!(matches!(cause(&cage(&broken, 0, Vec3::X), 0.0), Cause::NotFinite { .. }));
+    let plane = Affine { linear: Mat3::diagonal(vec3(1.0, 1.0, 0.0)), translation: Vec3::ZERO };
+    assert_eq!(cause(&cage(&cube.transform(&plane), 0, Vec3::X), 0.0), Cause::FlatSurface);
+
+    // The projective plane: a Möbius strip, and a fan from its rim to one point.
+    let n = 5;
+    let positions = (0..=n).map(|i| {
+        let phi = f64::from(i) * core::f64::consts::TAU / f64::from(n);
+        if i == n { Vec3::Z } else { vec3(phi.cos(), phi.sin(), 0.1 * f64::from(i)) }
+    });
+    let strip = (0..n).map(|i| [i, (i + 1) % n, (i + 2) % n]);
+    let rim = (0..n).map(|i| [i, (i + 2) % n, n]);
+    let mesh =
+        Mesh::new(positions.collect(), strip.chain(rim).map(|t| t.map(|i| i as u32)).collect());
+    assert_eq!(cause(&cage(&mesh.unwrap(), 0, Vec3::X), 0.0), Cause::OneSidedSurface);
 }
 
 #[test]
