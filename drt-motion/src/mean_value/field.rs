@@ -180,11 +180,10 @@ impl MeanValueField {
         out.whole = MeanValueWeight::default();
         let x = x * self.unit;
         let Some(root) = self.clusters.first() else { return };
-        if !((x - root.middle).max_abs() < BEYOND) {
-            return;
+        if (x - root.middle).max_abs() < BEYOND {
+            let all = MeanValueWeight { value: 1.0, gradient: Vec3::ZERO };
+            self.visit(0, x, &all, out);
         }
-        let all = MeanValueWeight { value: 1.0, gradient: Vec3::ZERO };
-        self.visit(0, x, &all, out);
     }
 
     /// Adds a share of a cluster; `None` as soon as the point turns out to be on the surface.
@@ -242,7 +241,7 @@ impl MeanValueField {
     fn farness(&self, cluster: &Cluster, z: Vec3) -> MeanValueWeight {
         let distance = z.length();
         let t = (distance - NEAR * cluster.radius) / ((FAR - NEAR) * cluster.radius);
-        if self.exact || !(t > 0.0) {
+        if self.exact || t <= 0.0 || t.is_nan() {
             return MeanValueWeight::default();
         }
         if t >= 1.0 {

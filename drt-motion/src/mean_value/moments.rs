@@ -107,43 +107,56 @@ fn multiply(term: &mut [f64; 10], degree: usize, t: Vec3) {
 }
 
 impl Derivatives {
-    /// At the place of the middle relative to the point, by the recurrence of McMurchie and
-    /// Davidson 1978: of R⁽ᵐ⁾ = (2 d/d|z|²)ᵐ P, derivatives are those of lower order of R⁽ᵐ⁺¹⁾.
-    pub(super) fn at(z: Vec3) -> Self {
-        let q = 1.0 / z.length_squared();
-        let q2 = q * q;
-        // Orders 0 to 4, and within each, levels 0 to 4 minus the order.
-        let mut r = [[[0.0; 15]; 5]; 5];
-        for (m, v) in [-0.5 * q, q2, -4.0 * q2 * q, 24.0 * q2 * q2, -192.0 * q2 * q2 * q]
-            .into_iter()
-            .enumerate()
-        {
-            r[0][m][0] = v;
-        }
-        let mut out = [0.0; MOMENTS + 15];
-        for order in 1..=4 {
-            for m in 0..=4 - order {
-                for k in 0..monomials(order) {
-                    let beyond = BEYOND_X[k];
-                    let c = k - beyond * (beyond + 1) / 2;
-                    let (axis, exponent, down) = match (order - beyond, beyond - c) {
-                        (0, 0) => (2, c, beyond + 1),
-                        (0, b) => (1, b, beyond),
-                        (a, _) => (0, a, 0),
-                    };
-                    let lower = k - down;
-                    let mut v = z[axis] * r[order - 1][m + 1][lower];
-                    if exponent > 1 {
-                        let down = if axis == 0 { 0 } else { down - 1 };
-                        v += (exponent - 1) as f64 * r[order - 2][m + 1][lower - down];
-                    }
-                    r[order][m][k] = v;
-                }
-            }
-            let start = START[order - 1];
-            out[start..start + monomials(order)].copy_from_slice(&r[order][0][..monomials(order)]);
-        }
-        Self(out)
+    /// At the place of the middle relative to the point.
+    pub(super) fn at(Vec3 { x, y, z }: Vec3) -> Self {
+        let (xx, yy, zz) = (x * x, y * y, z * z);
+        let q = 1.0 / (xx + yy + zz);
+        // (2 d/d|z|²)ⁿ P, which the products of n coordinates have as their factor; those with one
+        // pair of coordinates contracted have the one before.
+        let g1 = q * q;
+        let [g2, g3, g4] = [-4.0 * g1 * q, 24.0 * g1 * g1, -192.0 * g1 * g1 * q];
+        let [two_x, two_y, two_z] = [xx, yy, zz].map(|s| s * g3 + g2);
+        let [pair_x, pair_y, pair_z] = [xx, yy, zz].map(|s| s * g4 + g3);
+        let [three_x, three_y, three_z] = [xx, yy, zz].map(|s| s * g4 + 3.0 * g3);
+        let both = |s: f64, t: f64| s * t * g4 + (s + t) * g3 + g2;
+        let four = |s: f64| s * (s * g4 + 6.0 * g3) + 3.0 * g2;
+        let (xy, xz, yz) = (x * y, x * z, y * z);
+        Self([
+            x * g1,
+            y * g1,
+            z * g1,
+            xx * g2 + g1,
+            xy * g2,
+            xz * g2,
+            yy * g2 + g1,
+            yz * g2,
+            zz * g2 + g1,
+            x * (two_x + 2.0 * g2),
+            y * two_x,
+            z * two_x,
+            x * two_y,
+            xy * z * g3,
+            x * two_z,
+            y * (two_y + 2.0 * g2),
+            z * two_y,
+            y * two_z,
+            z * (two_z + 2.0 * g2),
+            four(xx),
+            xy * three_x,
+            xz * three_x,
+            both(xx, yy),
+            yz * pair_x,
+            both(xx, zz),
+            xy * three_y,
+            xz * pair_y,
+            xy * pair_z,
+            xz * three_z,
+            four(yy),
+            yz * three_y,
+            both(yy, zz),
+            yz * three_z,
+            four(zz),
+        ])
     }
 }
 

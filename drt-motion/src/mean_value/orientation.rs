@@ -36,7 +36,7 @@ pub(super) fn alternating(mesh: &Mesh) -> Result<Vec<[u32; 3]>, Cause> {
     let mut outward = mesh.clone();
     for part in &parts {
         let (volume, size) = volume(mesh, part);
-        if !(volume.abs() > FLAT * size * size * size) {
+        if volume.abs() <= FLAT * size * size * size {
             return Err(Cause::FlatSurface);
         }
         for &(face, flipped) in part {

@@ -22,7 +22,7 @@ const FLAT: f64 = 0.01;
 pub(super) fn integral(t: &Triangle, local: &Local, nearest: f64) -> Option<MeanValueWeight> {
     let (h, n) = (local.h, t.normal);
     // A corner that is not far enough away spares looking at the edges.
-    if !(h.abs() < FLAT * nearest) {
+    if h.abs() >= FLAT * nearest {
         return None;
     }
     let q = local.d.map(|d| d - n * h);

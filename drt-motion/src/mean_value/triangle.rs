@@ -50,7 +50,7 @@ impl Triangle {
         let k = (0..3).fold(0, |k, i| if edges[i].length() > edges[k].length() { i } else { k });
         let area = edges[(k + 1) % 3].cross(edges[(k + 2) % 3]);
         let double_area = area.length();
-        let is_line = !(double_area > LINE * longest * longest);
+        let is_line = double_area <= LINE * longest * longest;
         let (normal, double_area) =
             if is_line { (Vec3::ZERO, 0.0) } else { (area / double_area, double_area) };
         Self { corners, edges, normal, double_area, longest }
