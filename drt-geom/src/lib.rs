@@ -8,7 +8,7 @@ extern crate alloc;
 mod aabb;
 mod crossing;
 mod intersect;
-#[cfg(any(feature = "obj", feature = "ply"))]
+#[cfg(any(feature = "obj", feature = "ply", feature = "tet"))]
 mod io;
 mod mesh;
 pub mod procedural;
@@ -29,6 +29,8 @@ pub use intersect::ray_plane;
 pub use io::{ObjError, ObjErrorKind, load_obj};
 #[cfg(feature = "ply")]
 pub use io::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
+#[cfg(feature = "tet")]
+pub use io::{TetFileError, TetFileErrorKind, load_tet_mesh, read_medit, read_tetgen};
 pub use mesh::{Mesh, MeshError};
 pub use query::{BvhError, ClosestPoint, Hit, Ray, Skip, TriangleBvh, nearest_point};
 pub use tet::{

@@ -1,6 +1,8 @@
 //! Random points and soups, and queries without a tree.
 #![allow(dead_code, reason = "each test file uses its part")]
 
+pub(crate) mod tets;
+
 use drt_geom::{Hit, Ray, Skip, TriangleBvh};
 use drt_math::{Rng, Vec3, vec3};
 
