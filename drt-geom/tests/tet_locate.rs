@@ -95,3 +95,37 @@ fn placed_center(scale: f64, offset: f64) -> Vec3 {
     let one = TetMesh { positions: vec![Vec3::ZERO], tets: vec![] };
     placed(one, scale, offset).positions[0]
 }
+#[test]
+fn debug() {
+    let mesh = slivers(4, 1e8, 2);
+    let locator = TetLocator::new(&mesh).unwrap();
+    let x = vec3(0.429775403703239, -0.5100018074298166, -0.4830146515976043);
+    let mut v: Vec<_> = (0..mesh.tets.len() as u32)
+        .map(|t| {
+            let w = tet_barycentric(mesh.tet(t), x);
+            (w.iter().fold(1.0, |a: f64, b| a.min(*b)), t, w)
+        })
+        .filter(|v| v.0 > -1e-3)
+        .collect();
+    v.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (m, t, w) in v.iter().take(10) {
+        println!(
+            "{m:e} {t} {w:?} g {:?} vol {:e}",
+            locator.gradients(*t).map(|g| g.length()),
+            mesh.volume(*t)
+        );
+    }
+    for t in (0..mesh.tets.len() as u32)
+        .filter(|t| mesh.tet(*t).iter().any(|v| (*v - x).length() < 1e-9))
+    {
+        println!(
+            "{t} {:?} {:?} {:?} g {:?} vol {:e}",
+            mesh.tets[t as usize],
+            mesh.tet(t),
+            tet_barycentric(mesh.tet(t), x),
+            locator.gradients(t).map(|g| g.length()),
+            mesh.volume(t)
+        );
+    }
+    println!("{:?}", locator.locate(x, None));
+}

@@ -132,10 +132,22 @@ impl EdgeFrame {
         rows.iter().all(|g| g.is_finite()).then_some(rows)
     }
 
+    /// The gradients of the weights of all corners.
+    fn all_gradients(&self) -> Option<[Vec3; 4]> {
+        let [b, c, d] = self.gradients()?;
+        Some([-(b + c + d), b, c, d])
+    }
+
     /// Whether a corner is no farther than `height` from the plane of the others.
     pub(super) fn is_flat(&self, height: f64) -> bool {
-        let Some([b, c, d]) = self.gradients() else { return true };
-        !([b, c, d, -(b + c + d)].iter()).all(|g| (*g * height).length_squared() < 1.0)
+        let above = |g: &Vec3| (*g * height).length_squared() < 1.0;
+        !self.all_gradients().is_some_and(|g| g.iter().all(above))
+    }
+
+    /// The corner nearest to the plane of the others.
+    pub(super) fn steepest(&self) -> usize {
+        let gradients = self.all_gradients().unwrap_or_default().map(Vec3::max_abs);
+        (1..4).fold(0, |k, i| if gradients[i] > gradients[k] { i } else { k })
     }
 }
 

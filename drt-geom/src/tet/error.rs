@@ -3,7 +3,7 @@
 #[non_exhaustive]
 pub enum TetMeshError {
     /// More vertices or tetrahedra than 32-bit indices can name.
-    #[error("{count} {what} are too many: at most 2147483647 can be indexed")]
+    #[error("{count} {what} are too many: at most 1073741823 can be indexed")]
     TooLarge {
         /// Vertices or tetrahedra.
         what: &'static str,

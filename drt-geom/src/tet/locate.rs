@@ -4,6 +4,7 @@ use core::ops::ControlFlow;
 use drt_math::{Vec3, vec3};
 
 use super::double::EdgeFrame;
+use super::validate::MOST;
 use super::{TetMesh, TetMeshError, flat_height};
 use crate::query::BoxTree;
 use crate::{Aabb, NONE};
@@ -55,18 +56,23 @@ pub struct TetLocator {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(super) struct Record {
-    /// The first corner.
+    /// The corner whose weight has the steepest gradient: formed from the others' weights, it has an
+    /// error no larger than by its own gradient. (Flat faces would else have points that are on
+    /// them only to the rounding of steeper weights.) It changes places with the first corner.
     origin: [f64; 3],
     /// By axis: the gradients of the weights of the other corners.
     gradients: [[f64; 3]; 3],
     /// What the rounding error of each of these weights is less than, for a point inside; infinite
     /// for a tetrahedron that counts as flat.
     error: [f32; 3],
-    /// The tetrahedron's number.
-    pub(super) tet: u32,
+    /// The tetrahedron's number, and the corner at the origin in the bits above [`NUMBER`].
+    name: u32,
     /// The places of the tetrahedra across the faces opposite to the corners, or [`NONE`].
     neighbours: [u32; 4],
 }
+
+/// The bits of a name that are the number.
+const NUMBER: u32 = MOST as u32;
 
 const _: () = assert!(size_of::<Record>() == 128);
 
@@ -124,7 +130,8 @@ impl TetLocator {
     /// `Σ f[i] gradients[i]`, and a velocity `u` the divergence `Σ u[i] · gradients[i]`.
     #[must_use]
     pub fn gradients(&self, tet: u32) -> [Vec3; 4] {
-        self.records[self.places[tet as usize] as usize].gradients()
+        let record = &self.records[self.places[tet as usize] as usize];
+        record.by_corner(record.gradients())
     }
 
     /// From neighbour to neighbour through the face that the point is farthest beyond.
@@ -133,14 +140,14 @@ impl TetLocator {
         let mut place = from;
         for _ in 0..STEPS {
             let record = self.records.get(place as usize)?;
-            let bary = record.weights(x);
+            let weights = record.weights(x);
             let error = record.errors();
-            if holds(&bary, &error) {
-                return Some(TetPoint { tet: record.tet, bary });
+            if holds(&weights, &error) {
+                return Some(record.found(weights));
             }
-            let exit = least(&bary);
+            let exit = least(&weights);
             // Not so on a face, nor where there are no weights to go by.
-            if bary[exit] < -error[exit] {
+            if weights[exit] < -error[exit] {
                 place = record.neighbours[exit];
             } else {
                 return None;
@@ -158,8 +165,8 @@ impl TetLocator {
         let mut start = NONE;
         self.tree.near(&here, |places| {
             let depth = |place: usize| {
-                let bary = self.records[place].weights(x);
-                bary[least(&bary)]
+                let weights = self.records[place].weights(x);
+                weights[least(&weights)]
             };
             let mut most = f64::NEG_INFINITY;
             for place in places {
@@ -180,16 +187,16 @@ impl TetLocator {
         let mut most = f64::NEG_INFINITY;
         self.tree.near(&Aabb { min: x, max: x }, |places| {
             for record in &self.records[places] {
-                let (tet, bary) = (record.tet, record.weights(x));
-                if holds(&bary, &record.errors()) {
-                    best = Some(TetPoint { tet, bary });
+                let weights = record.weights(x);
+                if holds(&weights, &record.errors()) {
+                    best = Some(record.found(weights));
                     return ControlFlow::Break(());
                 }
-                let weight = bary[least(&bary)];
-                let first = best.is_none_or(|b| tet < b.tet);
-                let better = weight > most || (weight == most && first);
-                if better && record.nearly_holds(&bary, self.slack) {
-                    (most, best) = (weight, Some(TetPoint { tet, bary }));
+                let depth = weights[least(&weights)];
+                let first = best.is_none_or(|b| record.tet() < b.tet);
+                let better = depth > most || (depth == most && first);
+                if better && record.nearly_holds(&weights, self.slack) {
+                    (most, best) = (depth, Some(record.found(weights)));
                 }
             }
             ControlFlow::Continue(())
@@ -202,22 +209,27 @@ impl Record {
     fn new(
         mesh: &TetMesh,
         tet: u32,
-        neighbours: [u32; 4],
+        mut neighbours: [u32; 4],
         flat_height: f64,
     ) -> Result<Self, TetMeshError> {
-        let corners = mesh.tet(tet);
+        let mut corners = mesh.tet(tet);
         let frame = EdgeFrame::of(corners);
+        let determinant = frame.determinant();
+        if determinant < 0.0 && !frame.is_flat(flat_height) {
+            return Err(TetMeshError::Inverted { tet });
+        }
+        let steepest = frame.steepest();
+        corners.swap(0, steepest);
+        neighbours.swap(0, steepest);
         let flat = Self {
-            tet,
             origin: corners[0].to_array(),
             gradients: [[0.0; 3]; 3],
             error: [f32::INFINITY; 3],
+            name: tet | (steepest as u32) << NUMBER.count_ones(),
             neighbours,
         };
-        if frame.determinant() < 0.0 && !frame.is_flat(flat_height) {
-            return Err(TetMeshError::Inverted { tet });
-        }
-        let Some(rows) = frame.gradients().filter(|_| frame.determinant() > 0.0) else {
+        let frame = EdgeFrame::of(corners);
+        let Some(rows) = frame.gradients().filter(|_| determinant > 0.0) else {
             return Ok(flat);
         };
         // Coordinate differences, gradients, products and sums of three: seven roundings of a point
@@ -235,6 +247,24 @@ impl Record {
         })
     }
 
+    /// The tetrahedron's number.
+    pub(super) fn tet(&self) -> u32 {
+        self.name & NUMBER
+    }
+
+    /// What is listed from the origin on, by the tetrahedron's own order of corners.
+    #[inline(always)]
+    fn by_corner<T>(&self, mut from_origin: [T; 4]) -> [T; 4] {
+        from_origin.swap(0, (self.name >> NUMBER.count_ones()) as usize % 4);
+        from_origin
+    }
+
+    #[inline(always)]
+    fn found(&self, weights: [f64; 4]) -> TetPoint {
+        TetPoint { tet: self.tet(), bary: self.by_corner(weights) }
+    }
+
+    /// The weights of a point, from the origin on.
     #[inline(always)]
     pub(super) fn weights(&self, x: Vec3) -> [f64; 4] {
         let o = &self.origin;
@@ -252,12 +282,14 @@ impl Record {
     }
 
     /// Whether a point of the given weights is in the tetrahedron, or off its faces by the slack.
-    fn nearly_holds(&self, bary: &[f64; 4], slack: f64) -> bool {
+    fn nearly_holds(&self, weights: &[f64; 4], slack: f64) -> bool {
         let is_flat = self.error[0] == f32::INFINITY;
-        let gradients = self.gradients();
-        !is_flat && (0..4).all(|i| bary[i] >= -slack * gradients[i].length())
+        let (gradients, errors) = (self.gradients(), self.errors());
+        let reaches = |i: usize| weights[i] >= -(slack * gradients[i].length() + errors[i]);
+        !is_flat && (0..4).all(reaches)
     }
 
+    /// The gradients of the weights, from the origin on.
     fn gradients(&self) -> [Vec3; 4] {
         let [x, y, z] = &self.gradients;
         let [b, c, d] = [0, 1, 2].map(|i| vec3(x[i], y[i], z[i]));

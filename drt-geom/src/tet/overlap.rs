@@ -17,8 +17,9 @@ impl TetLocator {
             let mut found: Option<u32> = None;
             self.tree.near(window, |places| {
                 for record in &self.records[places] {
-                    if record.tet != of && overlaps(record) {
-                        found = Some(found.map_or(record.tet, |f| f.min(record.tet)));
+                    let tet = record.tet();
+                    if tet != of && overlaps(record) {
+                        found = Some(found.map_or(tet, |f| f.min(tet)));
                     }
                 }
                 ControlFlow::Continue(())

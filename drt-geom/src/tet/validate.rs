@@ -8,8 +8,8 @@ use crate::weld;
 /// Largest coordinate: products of three stay in the range of `f64`.
 const LARGEST: f64 = 1e100;
 
-/// Most tetrahedra, and vertices: trees over them have 31 bits for each.
-const MOST: usize = (1 << 31) - 1;
+/// Most tetrahedra, and vertices: 30 bits name them.
+pub(super) const MOST: usize = (1 << 30) - 1;
 
 impl TetMesh {
     /// Checks that the tetrahedra are a mesh of a domain: every point of it lies in one of them, or
