@@ -4,7 +4,7 @@ mod common;
 
 use common::tets::{at, jittered, placed, slivers, weights};
 use common::{direction, point};
-use drt_geom::{Aabb, TetLocator, TetMesh, TetMeshError, procedural, tet_barycentric};
+use drt_geom::{TetLocator, TetMesh, TetMeshError, tet_barycentric};
 use drt_math::{Dual, Rng, Vec3, vec3};
 
 /// Rounding of weights, and of the points made of them, per unit of a tetrahedron's condition.
@@ -95,37 +95,167 @@ fn placed_center(scale: f64, offset: f64) -> Vec3 {
     let one = TetMesh { positions: vec![Vec3::ZERO], tets: vec![] };
     placed(one, scale, offset).positions[0]
 }
+/// Velocities at a mesh's vertices, different everywhere.
+fn velocities(mesh: &TetMesh) -> Vec<Vec3> {
+    let mut rng = Rng::new(9, 0, 0);
+    mesh.positions.iter().map(|_| point(&mut rng)).collect()
+}
+
+/// The interpolated velocity.
+fn velocity(mesh: &TetMesh, u: &[Vec3], tet: u32, weights: [f64; 4]) -> Vec3 {
+    at(mesh.tets[tet as usize].map(|v| u[v as usize]), weights)
+}
+
 #[test]
-fn debug() {
-    let mesh = slivers(4, 1e8, 2);
+fn velocities_are_continuous_across_faces() {
+    for (scale, offset) in [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e3)] {
+        let mesh = placed(slivers(4, 1e8, 5), scale, offset);
+        let locator = TetLocator::new(&mesh).unwrap();
+        let neighbours = mesh.neighbours().unwrap();
+        let u = velocities(&mesh);
+        let mut torn = u.clone();
+        torn[150] += Vec3::splat(1e-3);
+        let mut rng = Rng::new(6, 0, 0);
+        let mut faults = 0;
+        for tet in 0..mesh.tets.len() as u32 {
+            for (k, &across) in neighbours[tet as usize].iter().enumerate() {
+                if across == drt_geom::NONE {
+                    continue;
+                }
+                let corners = mesh.face(tet, k).map(|v| v as usize);
+                let w = weights(0, &mut rng);
+                let w = [w[0], w[1], w[2] + w[3]];
+                let on_face = |f: &dyn Fn(usize) -> Vec3| {
+                    (0..3).fold(Vec3::ZERO, |sum, i| sum + f(corners[i]) * w[i])
+                };
+                let x = on_face(&|v| mesh.positions[v]);
+                let expected = on_face(&|v| u[v]);
+                let found = locator.locate(x, Some(tet)).unwrap();
+                let condition = condition(&locator, &mesh, found.tet, x);
+                let jump = velocity(&mesh, &u, found.tet, found.bary) - expected;
+                assert!(jump.max_abs() < ROUNDING * condition, "{tet} {across} {jump:?}");
+                let jump = velocity(&mesh, &torn, found.tet, found.bary) - expected;
+                faults += usize::from(jump.max_abs() > ROUNDING * condition);
+            }
+        }
+        assert!(faults > 0, "a vertex that moves on its own goes unnoticed");
+    }
+}
+
+#[test]
+fn outside_of_the_domain_is_nowhere() {
+    for (scale, offset) in [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e3)] {
+        // A cube with a cavity.
+        let mut mesh = slivers(4, 1e6, 7);
+        let middle =
+            |t: &[u32; 4]| t.iter().fold(Vec3::ZERO, |s, v| s + mesh.positions[*v as usize] * 0.25);
+        let solid = mesh.tets.iter().copied().filter(|t| middle(t).max_abs() > 0.4).collect();
+        mesh.tets = solid;
+        let mesh = placed(mesh, scale, offset);
+        let locator = TetLocator::new(&mesh).unwrap();
+        let boundary: Vec<_> = TetMesh::boundary_faces(&mesh.neighbours().unwrap()).collect();
+        let mut rng = Rng::new(8, 0, 0);
+        for _ in 0..3_000 {
+            let (tet, k) = boundary[rng.next_u32() as usize % boundary.len()];
+            let [a, b, c] = mesh.face(tet, k).map(|v| mesh.positions[v as usize]);
+            let out = (b - a).cross(c - a).normalize();
+            let x = a * 0.3 + b * 0.3 + c * 0.4;
+            let reach = 1e-9 * (scale + 1e-3 * offset);
+            assert!(locator.locate(x, None).is_some());
+            assert!(locator.locate(x - out * reach, Some(tet)).is_some());
+            // Slivers at the cavity are thinner than that, and then it is the cavity's other side.
+            let hint = Some(tet);
+            assert_eq!(
+                locator.locate(x + out * reach, hint),
+                locator.locate(x + out * reach, None)
+            );
+            if (0..3).any(|i| out[i].abs() > 0.999) {
+                let outside = x + out * reach;
+                if !mesh.bounds().contains(outside) {
+                    assert_eq!(locator.locate(outside, hint), None);
+                }
+            }
+        }
+        for x in [Vec3::splat(f64::NAN), vec3(f64::INFINITY, 0.0, 0.0), Vec3::splat(-1e300)] {
+            assert_eq!((locator.locate(x, None), locator.locate(x, Some(0))), (None, None));
+        }
+        let cavity = placed_center(scale, offset);
+        assert_eq!((locator.locate(cavity, None), locator.locate(cavity, Some(3))), (None, None));
+    }
+    let nothing = TetLocator::new(&TetMesh::default()).unwrap();
+    assert_eq!(nothing.locate(Vec3::ZERO, Some(0)), None);
+}
+
+#[test]
+fn slivers_inverted_by_rounding_are_passed_over() {
+    // Steiner points on faces, of which rounding decides on which side they are.
+    let mut mesh = jittered(4, 10);
+    let mut rng = Rng::new(11, 0, 0);
+    for tet in 0..mesh.tets.len() {
+        let k = rng.next_u32() as usize % 4;
+        if !rng.next_u32().is_multiple_of(4) {
+            continue;
+        }
+        let mut w = weights(0, &mut rng);
+        w[k] = 0.0;
+        let sum: f64 = w.iter().sum();
+        let x = at(mesh.tet(tet as u32), w.map(|w| w / sum));
+        let corners = mesh.tets[tet];
+        mesh.positions.push(x);
+        for j in 0..4 {
+            let mut part = corners;
+            part[j] = mesh.positions.len() as u32 - 1;
+            if j == k { mesh.tets[tet] = part } else { mesh.tets.push(part) }
+        }
+    }
+    for (scale, offset) in [(1.0, 0.0), (1e-6, 0.0), (1.0, 1e6)] {
+        let mut mesh = placed(mesh.clone(), scale, offset);
+        let inverted = (0..mesh.tets.len() as u32).filter(|t| mesh.volume(*t) < 0.0).count();
+        assert!(inverted > 10, "{inverted}");
+        assert!(mesh.validate().is_err());
+        let before = mesh.clone();
+        assert_eq!(mesh.orient(), 0);
+        mesh.tets.iter_mut().for_each(|t| t.swap(0, 1));
+        assert_eq!(mesh.orient(), mesh.tets.len());
+        assert_eq!(TetLocator::new(&mesh).err(), None);
+        let locator = TetLocator::new(&before).unwrap();
+        let no_hints = [u32::MAX; 2];
+        for n in 0..10_000 {
+            let tet = rng.next_u32() % before.tets.len() as u32;
+            let x = at(before.tet(tet), weights(n % 4, &mut rng));
+            check(&locator, &before, x, no_hints).unwrap_or_else(|e| panic!("{scale} {n}: {e}"));
+        }
+    }
+}
+
+#[test]
+fn derivatives_of_weights_are_the_gradients() {
+    let mesh = jittered(3, 12);
     let locator = TetLocator::new(&mesh).unwrap();
-    let x = vec3(0.429775403703239, -0.5100018074298166, -0.4830146515976043);
-    let mut v: Vec<_> = (0..mesh.tets.len() as u32)
-        .map(|t| {
-            let w = tet_barycentric(mesh.tet(t), x);
-            (w.iter().fold(1.0, |a: f64, b| a.min(*b)), t, w)
-        })
-        .filter(|v| v.0 > -1e-3)
-        .collect();
-    v.sort_by(|a, b| b.0.total_cmp(&a.0));
-    for (m, t, w) in v.iter().take(10) {
-        println!(
-            "{m:e} {t} {w:?} g {:?} vol {:e}",
-            locator.gradients(*t).map(|g| g.length()),
-            mesh.volume(*t)
-        );
+    let mut rng = Rng::new(13, 0, 0);
+    for tet in 0..mesh.tets.len() as u32 {
+        let x = at(mesh.tet(tet), weights(0, &mut rng));
+        let moving = |k: usize| Dual::<f64, 3>::variable(x[k], k);
+        let corners = mesh.tet(tet).map(|v| v.lift());
+        let dual = tet_barycentric(corners, vec3(moving(0), moving(1), moving(2)));
+        let found = locator.locate(x, None).unwrap();
+        assert_eq!(found.tet, tet);
+        for (i, g) in locator.gradients(tet).iter().enumerate() {
+            assert!((dual[i].re - found.bary[i]).abs() < 1e-13);
+            for k in 0..3 {
+                assert!((dual[i].eps[k] - g[k]).abs() < 1e-10 * g.length());
+            }
+        }
     }
-    for t in (0..mesh.tets.len() as u32)
-        .filter(|t| mesh.tet(*t).iter().any(|v| (*v - x).length() < 1e-9))
-    {
-        println!(
-            "{t} {:?} {:?} {:?} g {:?} vol {:e}",
-            mesh.tets[t as usize],
-            mesh.tet(t),
-            tet_barycentric(mesh.tet(t), x),
-            locator.gradients(t).map(|g| g.length()),
-            mesh.volume(t)
-        );
-    }
-    println!("{:?}", locator.locate(x, None));
+}
+
+#[test]
+fn inverted_tetrahedra_are_refused() {
+    let mut mesh = jittered(2, 14);
+    mesh.tets[17].swap(0, 3);
+    let found = TetLocator::new(&mesh).err();
+    assert!(matches!(found, Some(TetMeshError::Overlap { tets: [_, 17] })), "{found:?}");
+    let mut mesh = jittered(2, 14);
+    mesh.positions[13] = vec3(1.5, 0.2, 0.1);
+    assert!(matches!(TetLocator::new(&mesh).err(), Some(TetMeshError::Inverted { .. })));
 }

@@ -15,7 +15,8 @@ impl TetMesh {
     /// Checks that the tetrahedra are a mesh of a domain: every point of it lies in one of them, or
     /// on faces that neighbours share.
     ///
-    /// However thin, a tetrahedron of positive volume is fine. Beyond what [`TetMesh::neighbours`]
+    /// However thin, a tetrahedron of positive volume is fine. Parts that touch without a common face
+    /// are apart. Beyond what [`TetMesh::neighbours`]
     /// finds, overlaps are seen where a face of the boundary passes through a tetrahedron, or the
     /// middle of one lies in another: since neighbours lie on the two sides of their faces, the
     /// tetrahedra over a point change in number at the boundary only. (For the same reason their
@@ -63,8 +64,16 @@ impl TetMesh {
         sides.sort_unstable();
         match sides.windows(2).find(|s| s[0].0 == s[1].0) {
             None => Ok(()),
-            Some(s) if s[0].1 == s[1].1 => Err(TetMeshError::Overlap { tets: [s[0].2, s[1].2] }),
-            Some(s) => Err(TetMeshError::Crack { tets: [s[0].2, s[1].2] }),
+            Some(s) => {
+                let mut tets = [s[0].2, s[1].2];
+                tets.sort_unstable();
+                let same_side = s[0].1 == s[1].1;
+                Err(if same_side {
+                    TetMeshError::Overlap { tets }
+                } else {
+                    TetMeshError::Crack { tets }
+                })
+            }
         }
     }
 

@@ -28,7 +28,7 @@ pub(crate) fn slivers(cells: u32, aspect: f64, seed: u64) -> TetMesh {
     let mut mesh = jittered(cells, seed);
     let mut rng = Rng::new(seed, 1, 0);
     for i in 0..mesh.tets.len() {
-        if rng.next_u32() % 10 != 0 {
+        if !rng.next_u32().is_multiple_of(10) {
             continue;
         }
         let corners = mesh.tets[i];
