@@ -23,6 +23,14 @@ use delaunay::delaunay;
 use input::Merged;
 use recovery::Recovery;
 mod predicates;
+mod recovery;
+mod segments;
+mod triangles;
+mod walk;
+
+use delaunay::delaunay;
+use input::Merged;
+use recovery::Recovery;
 
 /// What to fill with tetrahedra.
 #[derive(Clone, Copy, Debug)]
@@ -143,12 +151,27 @@ pub fn tetrahedralize(
     Ok(recovery.finish(&merged))
 }
 
-/// Fills a box around surfaces with tetrahedra that respect them.
+impl core::fmt::Display for SurfaceTriangle {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "triangle {} of surface {} (from 0)", self.triangle, self.surface)
+    }
+}
+
+/// Fills a box around surfaces with tetrahedra that respect them: every triangle of the surfaces is
+/// a union of faces, some with added vertices on its edges or inside.
+///
+/// Triangles without area are skipped. Vertices that belong to no other triangle do not appear.
 ///
 /// # Errors
-/// See [`TetrahedralizeError`].
+/// See [`TetrahedralizeError`]; above all when surfaces pass through each other.
 pub fn tetrahedralize(
-    _input: &TetrahedralizeInput<'_>,
+    input: &TetrahedralizeInput<'_>,
 ) -> Result<Tetrahedralization, TetrahedralizeError> {
-    Ok(Tetrahedralization::default())
+    let merged = Merged::new(input)?;
+    let bounds = merged.enclosing_box(input.margin);
+    let complex = delaunay(&bounds, &merged.positions).ok_or(TetrahedralizeError::Arithmetic)?;
+    let mut recovery = Recovery::new(complex, &merged);
+    recovery.edges(&merged)?;
+    recovery.triangles(&merged)?;
+    Ok(recovery.finish(&merged))
 }

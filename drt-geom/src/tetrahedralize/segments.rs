@@ -24,6 +24,11 @@ impl Recovery<'_> {
 
     /// Makes the segment between two vertices a chain of edges that stay.
     pub(super) fn segment(&mut self, ends: [u32; 2], list: u32) -> Result<(), TetrahedralizeError> {
+    pub(super) fn segment(
+        &mut self,
+        ends: [u32; 2],
+        list: u32,
+    ) -> Result<(), TetrahedralizeError> {
         let mut open = alloc::vec![ends];
         let mut parts = 0;
         while let Some([a, b]) = open.pop() {
@@ -135,6 +140,9 @@ impl Recovery<'_> {
         }
         let ends: Vec<u32> = candidates.into_iter().flatten().collect();
         ends.into_iter().find(|&v| self.are_near(v, p)).ok_or_else(|| self.unrecovered(list))
+        ends.into_iter()
+            .find(|&v| self.are_near(v, p))
+            .ok_or_else(|| self.unrecovered(list))
     }
 
     fn is_on(&self, [x, y]: [u32; 2], p: drt_math::Vec3) -> bool {

@@ -86,6 +86,11 @@ impl Recovery<'_> {
 
     /// Makes a triangle a face (none), or finds or adds a vertex on it.
     fn recover_face(&mut self, t: [u32; 3], list: u32) -> Result<Option<u32>, TetrahedralizeError> {
+    fn recover_face(
+        &mut self,
+        t: [u32; 3],
+        list: u32,
+    ) -> Result<Option<u32>, TetrahedralizeError> {
         // Each removal leaves one edge less through it, so this ends.
         loop {
             let (edge, tet) = match self.between(t) {
@@ -183,6 +188,9 @@ impl Recovery<'_> {
         let middle = t
             .iter()
             .fold(drt_math::Vec3::ZERO, |m, &v| m + self.complex.points[v as usize] * (1.0 / 3.0));
+        let middle = t.iter().fold(drt_math::Vec3::ZERO, |m, &v| {
+            m + self.complex.points[v as usize] * (1.0 / 3.0)
+        });
         let off = |c: &Complex, e| (c.on_triangle(t, e) - middle).length_squared();
         through.sort_by(|a, b| off(&self.complex, a.0).total_cmp(&off(&self.complex, b.0)));
         for &(edge, tet) in &through {
