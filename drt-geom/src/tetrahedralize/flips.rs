@@ -2,36 +2,66 @@
 
 use alloc::vec::Vec;
 
-use super::complex::{Complex, Ring};
+use super::complex::Complex;
 use crate::NONE;
 
 /// Rings longer than this are left alone: removing their edge is the cube of it in work.
 const LONGEST_RING: usize = 20;
 
+/// What edges and faces are in the way of.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Wanted {
+    /// An edge; faces that it pierces are in its way.
+    Edge([u32; 2]),
+    /// A face whose edges are there; edges through it are in its way.
+    Face([u32; 3]),
+}
+
+impl Wanted {
+    fn blocked_by_edge(self, c: &Complex, edge: [u32; 2]) -> u32 {
+        match self {
+            Self::Edge(_) => 0,
+            Self::Face(face) => c.pierces(edge, face).into(),
+        }
+    }
+
+    fn blocked_by_face(self, c: &Complex, face: [u32; 3]) -> u32 {
+        match self {
+            Self::Edge(edge) => c.pierces(edge, face).into(),
+            Self::Face(_) => 0,
+        }
+    }
+}
+
 impl Complex {
     /// Replaces the two tetrahedra at a face by three around the edge between the vertices across
-    /// from it (the 2-3 flip), where these are positive and `allowed` takes each new face.
-    pub(super) fn face_to_edge(
+    /// from it (the 2-3 flip), where these are positive and what is in the way becomes less by at
+    /// least `gain`.
+    pub(super) fn remove_face(
         &mut self,
         tet: u32,
         corner: usize,
-        allowed: impl Fn(&Self, [u32; 3]) -> bool,
+        wanted: Wanted,
+        gain: u32,
     ) -> bool {
         let below = self.tets[tet as usize];
         let other = below.neighbors[corner];
         if other == NONE {
             return false;
         }
-        let above = &self.tets[other as usize];
-        let [x, y, z] = below.face(corner);
+        let face = below.face(corner);
         let p = below.vertices[corner];
-        let Some(q) = above.vertices.into_iter().find(|v| ![x, y, z].contains(v)) else {
-            return false;
-        };
-        // Counter-clockwise seen from outside the lower one is from above: around p → q.
+        let above = self.tets[other as usize].vertices;
+        let Some(q) = above.into_iter().find(|v| !face.contains(v)) else { return false };
+        // Counter-clockwise seen from outside the lower one is so from above: around p → q.
+        let [x, y, z] = face;
         let made = [[p, q, x, y], [p, q, y, z], [p, q, z, x]];
-        let possible = made.iter().all(|&t| self.orient(t) > 0.0)
-            && [x, y, z].iter().all(|&v| allowed(self, [p, q, v]));
+        if made.iter().any(|&t| self.orient(t) <= 0.0) {
+            return false;
+        }
+        let new = wanted.blocked_by_edge(self, [p, q])
+            + face.iter().map(|&v| wanted.blocked_by_face(self, [p, q, v])).sum::<u32>();
+        let possible = new + gain <= wanted.blocked_by_face(self, face);
         if possible {
             self.replace(&[tet, other], &made);
         }
@@ -39,51 +69,53 @@ impl Complex {
     }
 
     /// Removes an edge by filling its ring with triangles, each the base of a tetrahedron to
-    /// either end of the edge, at the least total `cost`, which must be less than `below`.
+    /// either end of the edge, where that leaves less in the way by at least `gain`.
     ///
-    /// `cost` is that of a diagonal of the ring and, separately, of a triangle. The best
-    /// filling is found by dynamic programming: Klincsek 1980; for tetrahedra Shewchuk 2002, "Two
-    /// discrete optimization algorithms for the topological improvement of tetrahedral meshes".
+    /// The filling that leaves least is found by dynamic programming: Klincsek 1980; for tetrahedra
+    /// Shewchuk 2002, "Two discrete optimization algorithms for the topological improvement of
+    /// tetrahedral meshes".
     pub(super) fn remove_edge(
         &mut self,
         [p, q]: [u32; 2],
-        ring: &Ring,
-        below: u32,
-        diagonal_cost: impl Fn(&Self, [u32; 2]) -> u32,
-        triangle_cost: impl Fn(&Self, [u32; 3]) -> u32,
+        tet: u32,
+        wanted: Wanted,
+        gain: u32,
     ) -> bool {
+        let Some(ring) = self.ring(p, q, tet) else { return false };
         let r = &ring.vertices;
         let n = r.len();
-        if n > LONGEST_RING || below == 0 {
+        let faces = r.iter().map(|&v| wanted.blocked_by_face(self, [p, q, v]));
+        let now = wanted.blocked_by_edge(self, [p, q]) + faces.sum::<u32>();
+        if n > LONGEST_RING || now < gain {
             return false;
         }
-        // Of the part of the ring from i to j: the least cost, and the third vertex of the triangle
-        // on the diagonal.
+        // Of the part of the ring from i to j: the least in the way, and the third vertex of the
+        // triangle on the diagonal.
         let mut best = alloc::vec![(0_u32, 0_usize); n * n];
-        for span in 2..n {
-            for i in 0..n - span {
-                let j = i + span;
-                let closing = i == 0 && j == n - 1;
-                let of_diagonal = if closing { 0 } else { diagonal_cost(self, [r[i], r[j]]) };
-                let mut least = (u32::MAX, 0);
-                for k in i + 1..j {
-                    let parts = best[i * n + k].0.saturating_add(best[k * n + j].0);
-                    let bound = parts.saturating_add(of_diagonal);
-                    if bound >= u32::min(least.0, below) {
-                        continue;
-                    }
-                    let [a, b, c] = [r[i], r[k], r[j]];
-                    let positive =
-                        self.orient([a, b, c, q]) > 0.0 && self.orient([a, c, b, p]) > 0.0;
-                    if positive {
-                        let total = bound.saturating_add(triangle_cost(self, [a, b, c]));
-                        least = least.min((total, k));
-                    }
+        for (i, j) in (2..n).flat_map(|span| (0..n - span).map(move |i| (i, i + span))) {
+            let of_diagonal = if j - i == n - 1 {
+                0
+            } else {
+                wanted.blocked_by_edge(self, [r[i], r[j]])
+                    + wanted.blocked_by_face(self, [p, r[i], r[j]])
+                    + wanted.blocked_by_face(self, [q, r[i], r[j]])
+            };
+            let mut least = (u32::MAX, 0);
+            for k in i + 1..j {
+                let parts = best[i * n + k].0.saturating_add(best[k * n + j].0);
+                let bound = parts.saturating_add(of_diagonal);
+                let [a, b, c] = [r[i], r[k], r[j]];
+                if bound < least.0
+                    && bound.saturating_add(gain) <= now
+                    && self.orient([a, b, c, q]) > 0.0
+                    && self.orient([a, c, b, p]) > 0.0
+                {
+                    least = least.min((bound + wanted.blocked_by_face(self, [a, b, c]), k));
                 }
-                best[i * n + j] = least;
             }
+            best[i * n + j] = least;
         }
-        if best[n - 1].0 >= below {
+        if best[n - 1].0.saturating_add(gain) > now {
             return false;
         }
         let mut made = Vec::with_capacity(2 * n);

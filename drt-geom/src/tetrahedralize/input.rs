@@ -199,6 +199,9 @@ fn checked(input: &TetrahedralizeInput<'_>) -> Result<Vec<Vec3>, TetrahedralizeE
 
 /// Brings coordinates near one without rounding them, so that products of five stay in range.
 fn power_of_two_over(largest: f64) -> f64 {
+    if largest == 0.0 {
+        return 1.0;
+    }
     let exponent = (largest.to_bits() >> 52) as i64 - 1023;
     f64::from_bits(((1023 - exponent.clamp(-1000, 1000)) as u64) << 52)
 }

@@ -8,10 +8,11 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use drt_math::Vec3;
+use drt_math::{Rng, Vec3};
 
 use super::complex::Complex;
 use super::faces::sorted;
+use super::flips::Wanted;
 use super::input::{Carrier, FIRST, Merged, Named, edge_key};
 use super::{SurfaceTriangle, TetrahedralizeError};
 use crate::NONE;
@@ -19,6 +20,9 @@ use crate::NONE;
 /// How far a vertex may be moved onto an input edge or triangle, of the largest coordinate: some
 /// roundings.
 pub(super) const ROUNDING: f64 = 1e-14;
+
+/// Changes tried at random before a vertex is added.
+pub(super) const MOST_TRIALS: u32 = 200;
 
 /// An edge that must stay.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +45,7 @@ pub(super) struct Recovery<'a> {
     pub(super) owners: Vec<Vec<Carrier>>,
     pub(super) named: &'a [Named],
     pub(super) star: Vec<u32>,
+    rng: Rng,
 }
 
 impl<'a> Recovery<'a> {
@@ -55,6 +60,7 @@ impl<'a> Recovery<'a> {
             owners,
             named: &merged.named,
             star: Vec::new(),
+            rng: Rng::new(4, 0, 0),
         }
     }
 
@@ -135,5 +141,58 @@ impl<'a> Recovery<'a> {
 
     pub(super) fn are_near(&self, v: u32, p: Vec3) -> bool {
         (self.complex.points[v as usize] - p).max_abs() <= ROUNDING
+    }
+
+    /// Removes an edge that need not stay, with the gain asked for.
+    pub(super) fn remove_edge(
+        &mut self,
+        edge: [u32; 2],
+        tet: u32,
+        wanted: Wanted,
+        gain: u32,
+    ) -> bool {
+        !self.is_kept(edge) && self.complex.remove_edge(edge, tet, wanted, gain)
+    }
+
+    /// Removes a face that need not stay, with the gain asked for.
+    pub(super) fn remove_face(
+        &mut self,
+        tet: u32,
+        corner: usize,
+        wanted: Wanted,
+        gain: u32,
+    ) -> bool {
+        let face = self.complex.tets[tet as usize].face(corner);
+        !self.kept_faces.contains_key(&sorted(face))
+            && self.complex.remove_face(tet, corner, wanted, gain)
+    }
+
+    /// Changes something near edges, each given with a tetrahedron, that leaves no more in the way
+    /// than there is: after that there may be a change for the better. False when the trials are
+    /// used up.
+    pub(super) fn shuffle(
+        &mut self,
+        edges: &[([u32; 2], u32)],
+        wanted: Wanted,
+        trials: &mut u32,
+    ) -> bool {
+        while *trials > 0 {
+            *trials -= 1;
+            let mut pick = |n: usize| self.rng.next_u32() as usize % n;
+            let ([p, q], tet) = edges[pick(edges.len())];
+            let Some(ring) = self.complex.ring(p, q, tet) else { continue };
+            let tet = ring.tets[pick(ring.tets.len())];
+            let (corner, other) = (pick(4), pick(3));
+            let changed = if pick(3) == 0 {
+                self.remove_face(tet, corner, wanted, 0)
+            } else {
+                let v = self.complex.tets[tet as usize].vertices;
+                self.remove_edge([v[corner], v[(corner + other + 1) % 4]], tet, wanted, 0)
+            };
+            if changed {
+                return true;
+            }
+        }
+        false
     }
 }

@@ -3,10 +3,10 @@
 use alloc::vec::Vec;
 
 use super::TetrahedralizeError;
-use super::complex::Complex;
 use super::faces::sorted;
+use super::flips::Wanted;
 use super::input::{Merged, edge_key};
-use super::recovery::{Kept, Recovery};
+use super::recovery::{Kept, MOST_TRIALS, Recovery};
 use super::walk::Meets;
 use crate::NONE;
 
@@ -69,58 +69,51 @@ impl Recovery<'_> {
 
     /// Makes a segment an edge ([`NONE`]) or finds or adds a vertex on it.
     fn recover(&mut self, ends: [u32; 2], list: u32) -> Result<u32, TetrahedralizeError> {
-        let mut stuck = 0;
+        let wanted = Wanted::Edge(ends);
         let [mut a, mut b] = ends;
-        // Each change leaves fewer faces in the way, so this ends.
+        let (mut stuck, mut trials) = (0, MOST_TRIALS);
+        // Each change but the trials leaves fewer faces in the way, so this ends.
         while stuck < 2 {
-            let mut star = core::mem::take(&mut self.star);
-            let meets = self.complex.look(a, b, &mut star);
-            self.star = star;
-            let changed = match meets.ok_or(TetrahedralizeError::Arithmetic)? {
+            let (edge, tet, changed) = match self.look(a, b)? {
                 Meets::Nothing => return Ok(NONE),
                 Meets::Vertex(v) => return Ok(v),
-                Meets::Edge(edge, tet) => self.remove([a, b], edge, tet),
+                Meets::Edge(edge, tet) => (edge, tet, self.remove_edge(edge, tet, wanted, 1)),
                 Meets::Face(tet, corner) => {
                     let [x, y, z] = self.complex.tets[tet as usize].face(corner);
                     if let Some(&other) = self.kept_faces.get(&sorted([x, y, z])) {
                         return Err(self.intersection(list, other));
                     }
-                    let free = |c: &Complex, face| !c.pierces([a, b], face);
-                    self.complex.face_to_edge(tet, corner, free)
-                        || [[x, y], [y, z], [z, x]].into_iter().any(|e| self.remove([a, b], e, tet))
+                    let mut edges = [[x, y], [y, z], [z, x]].into_iter();
+                    let changed = self.remove_face(tet, corner, wanted, 1)
+                        || edges.any(|e| self.remove_edge(e, tet, wanted, 1));
+                    ([x, y], tet, changed)
                 }
             };
-            stuck = if changed { 0 } else { stuck + 1 };
-            (a, b) = if changed { (a, b) } else { (b, a) };
+            if changed || self.shuffle(&[(edge, tet)], wanted, &mut trials) {
+                stuck = 0;
+            } else {
+                stuck += 1;
+                (a, b) = (b, a);
+            }
         }
         self.divide(ends, list)
     }
 
-    /// Removes an edge if that leaves fewer faces in the way of a segment.
-    fn remove(&mut self, [a, b]: [u32; 2], edge: [u32; 2], tet: u32) -> bool {
-        if self.is_kept(edge) {
-            return false;
-        }
-        let Some(ring) = self.complex.ring(edge[0], edge[1], tet) else { return false };
-        let pierced = |c: &Complex, face| u32::from(c.pierces([a, b], face));
-        let [p, q] = edge;
-        let now = ring.vertices.iter().map(|&r| pierced(&self.complex, [p, q, r])).sum();
-        let diagonal =
-            |c: &Complex, [r, s]: [u32; 2]| pierced(c, [p, r, s]) + pierced(c, [q, r, s]);
-        self.complex.remove_edge(edge, &ring, now, diagonal, pierced)
+    fn look(&mut self, a: u32, b: u32) -> Result<Meets, TetrahedralizeError> {
+        let mut star = core::mem::take(&mut self.star);
+        let meets = self.complex.look(a, b, &mut star);
+        self.star = star;
+        meets.ok_or(TetrahedralizeError::Arithmetic)
     }
 
     /// Adds a vertex on a segment where it first meets something.
     fn divide(&mut self, [a, b]: [u32; 2], list: u32) -> Result<u32, TetrahedralizeError> {
-        let mut star = core::mem::take(&mut self.star);
-        let meets = self.complex.look(a, b, &mut star);
-        self.star = star;
-        let (p, candidates, tet) = match meets {
-            Some(Meets::Edge(edge, tet)) => {
+        let (p, candidates, tet) = match self.look(a, b)? {
+            Meets::Edge(edge, tet) => {
                 let p = self.complex.on_coplanar([a, b], edge);
                 (p, alloc::vec![edge], tet)
             }
-            Some(Meets::Face(tet, corner)) => {
+            Meets::Face(tet, corner) => {
                 let this = self.complex.tets[tet as usize];
                 let [x, y, z] = this.face(corner);
                 let p = self.complex.on_segment([a, b], [x, y, z]);
@@ -129,7 +122,8 @@ impl Recovery<'_> {
                 }
                 (p, alloc::vec![[x, y], [y, z], [z, x]], tet)
             }
-            _ => return Err(TetrahedralizeError::Arithmetic),
+            Meets::Nothing => return Ok(NONE),
+            Meets::Vertex(v) => return Ok(v),
         };
         // Through an edge, or so near to one or to a vertex that rounding has put it there.
         for &edge in &candidates {

@@ -5,9 +5,10 @@ use alloc::vec::Vec;
 use super::TetrahedralizeError;
 use super::complex::Complex;
 use super::faces::sorted;
+use super::flips::Wanted;
 use super::input::{Merged, edge_key};
 use super::polygon::{Rim, cut};
-use super::recovery::Recovery;
+use super::recovery::{MOST_TRIALS, Recovery};
 use crate::NONE;
 
 /// Far more parts than any triangle needs whose surroundings are not thin as rounding.
@@ -91,7 +92,9 @@ impl Recovery<'_> {
         t: [u32; 3],
         list: u32,
     ) -> Result<Option<u32>, TetrahedralizeError> {
-        // Each removal leaves one edge less through it, so this ends.
+        let wanted = Wanted::Face(t);
+        let mut trials = MOST_TRIALS;
+        // Each removal but the trials leaves one edge less through it, so this ends.
         loop {
             let (edge, tet) = match self.between(t) {
                 Some(Between::Face) => return Ok(None),
@@ -103,7 +106,8 @@ impl Recovery<'_> {
             if let Some(v) = self.obstacle(t, &through, list)? {
                 return Ok(Some(v));
             }
-            if !through.iter().any(|&(e, tet)| self.remove_through(t, e, tet)) {
+            let changed = through.iter().any(|&(e, tet)| self.remove_edge(e, tet, wanted, 1));
+            if !changed && !self.shuffle(&through, wanted, &mut trials) {
                 return self.divide_face(t, through, list).map(Some);
             }
         }
@@ -170,12 +174,6 @@ impl Recovery<'_> {
             };
         }
         Ok(None)
-    }
-
-    fn remove_through(&mut self, t: [u32; 3], edge: [u32; 2], tet: u32) -> bool {
-        let Some(ring) = self.complex.ring(edge[0], edge[1], tet) else { return false };
-        let through = |c: &Complex, diagonal| u32::from(c.pierces(diagonal, t));
-        self.complex.remove_edge(edge, &ring, 1, through, |_, _| 0)
     }
 
     /// Splits an edge through a triangle, that nearest to its middle first.
