@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use super::complex::Complex;
+use super::plate::Plate;
 use crate::NONE;
 
 /// Rings longer than this are left alone: removing their edge is the cube of it in work.
@@ -10,18 +11,18 @@ const LONGEST_RING: usize = 20;
 
 /// What edges and faces are in the way of.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Wanted {
+pub(super) enum Wanted<'a> {
     /// An edge; faces that it pierces are in its way.
     Edge([u32; 2]),
     /// A face whose edges are there; edges through it are in its way.
-    Face([u32; 3]),
+    Face(&'a Plate),
 }
 
-impl Wanted {
+impl Wanted<'_> {
     fn blocked_by_edge(self, c: &Complex, edge: [u32; 2]) -> u32 {
         match self {
             Self::Edge(_) => 0,
-            Self::Face(face) => c.pierces(edge, face).into(),
+            Self::Face(plate) => plate.is_pierced_by(c, edge).into(),
         }
     }
 
@@ -41,7 +42,7 @@ impl Complex {
         &mut self,
         tet: u32,
         corner: usize,
-        wanted: Wanted,
+        wanted: Wanted<'_>,
         gain: u32,
     ) -> bool {
         let below = self.tets[tet as usize];
@@ -78,7 +79,7 @@ impl Complex {
         &mut self,
         [p, q]: [u32; 2],
         tet: u32,
-        wanted: Wanted,
+        wanted: Wanted<'_>,
         gain: u32,
     ) -> bool {
         let Some(ring) = self.ring(p, q, tet) else { return false };

@@ -12,7 +12,7 @@ mod faces;
 mod flips;
 mod input;
 mod origins;
-mod polygon;
+mod plate;
 mod predicates;
 mod recovery;
 mod segments;

@@ -148,7 +148,7 @@ impl<'a> Recovery<'a> {
         &mut self,
         edge: [u32; 2],
         tet: u32,
-        wanted: Wanted,
+        wanted: Wanted<'_>,
         gain: u32,
     ) -> bool {
         !self.is_kept(edge) && self.complex.remove_edge(edge, tet, wanted, gain)
@@ -159,7 +159,7 @@ impl<'a> Recovery<'a> {
         &mut self,
         tet: u32,
         corner: usize,
-        wanted: Wanted,
+        wanted: Wanted<'_>,
         gain: u32,
     ) -> bool {
         let face = self.complex.tets[tet as usize].face(corner);
@@ -173,7 +173,7 @@ impl<'a> Recovery<'a> {
     pub(super) fn shuffle(
         &mut self,
         edges: &[([u32; 2], u32)],
-        wanted: Wanted,
+        wanted: Wanted<'_>,
         trials: &mut u32,
     ) -> bool {
         while *trials > 0 {

@@ -1,12 +1,12 @@
 //! Input edges become chains of edges of the complex.
 
-use alloc::vec::Vec;
+use drt_math::Vec3;
 
 use super::TetrahedralizeError;
 use super::faces::sorted;
 use super::flips::Wanted;
 use super::input::{Merged, edge_key};
-use super::recovery::{Kept, MOST_TRIALS, Recovery};
+use super::recovery::{Kept, MOST_TRIALS, ROUNDING, Recovery};
 use super::walk::Meets;
 use crate::NONE;
 
@@ -83,6 +83,14 @@ impl Recovery<'_> {
                     if let Some(&other) = self.kept_faces.get(&sorted([x, y, z])) {
                         return Err(self.intersection(list, other));
                     }
+                    let p = self.complex.on_segment([a, b], [x, y, z]);
+                    if let Some(v) = [x, y, z].into_iter().find(|&v| self.are_near(v, p)) {
+                        return Ok(v);
+                    }
+                    let touched = |&e: &[u32; 2]| self.is_kept(e) && self.is_on(e, p);
+                    if let Some(e) = [[x, y], [y, z], [z, x]].into_iter().find(touched) {
+                        return self.split_near(e, tet, p).ok_or_else(|| self.unrecovered(list));
+                    }
                     let mut edges = [[x, y], [y, z], [z, x]].into_iter();
                     let changed = self.remove_face(tet, corner, wanted, 1)
                         || edges.any(|e| self.remove_edge(e, tet, wanted, 1));
@@ -136,13 +144,22 @@ impl Recovery<'_> {
         ends.into_iter().find(|&v| self.are_near(v, p)).ok_or_else(|| self.unrecovered(list))
         ends.into_iter()
             .find(|&v| self.are_near(v, p))
+        candidates
+            .into_iter()
+            .find_map(|e| self.split_near(e, tet, p))
             .ok_or_else(|| self.unrecovered(list))
     }
 
-    fn is_on(&self, [x, y]: [u32; 2], p: drt_math::Vec3) -> bool {
+    /// Splits an edge, unless it must stay and the point is not on it.
+    fn split_near(&mut self, edge: [u32; 2], tet: u32, p: Vec3) -> Option<u32> {
+        let may = !self.is_kept(edge) || self.is_on(edge, p);
+        may.then(|| self.split_edge(edge, tet, p)).flatten()
+    }
+
+    fn is_on(&self, [x, y]: [u32; 2], p: Vec3) -> bool {
         let [x, y] = [x, y].map(|v| self.complex.points[v as usize]);
         let along = y - x;
         let s = (p - x).dot(along) / along.length_squared();
-        (x.lerp(y, s) - p).max_abs() <= super::recovery::ROUNDING
+        (x.lerp(y, s) - p).max_abs() <= ROUNDING
     }
 }
