@@ -117,6 +117,9 @@ fn faces_of(made: &Tetrahedralization, mesh: &Mesh, tolerance: f64) -> Vec<[f64;
     }
     let on_triangle = |i: u32| {
         let [a, b, c] = mesh.triangle(i);
+        // The normal of a needle is less sure.
+        let length = f64::max((b - a).length(), (c - a).length());
+        let tolerance = tolerance + 1e-15 * length.powi(3) / mesh.area(i);
         let inward = {
             let n = mesh.normal(i);
             [(a, b), (b, c), (c, a)].map(|(p, q)| (p, n.cross((q - p).normalize())))
@@ -295,7 +298,7 @@ fn soup(cells: i32, rng: &mut Rng) -> Mesh {
         let cell = vec3(i % cells, i / cells % cells, i / cells / cells);
         let centre = vec3(f64::from(cell.x), f64::from(cell.y), f64::from(cell.z));
         let (d, e) = (direction(rng), direction(rng));
-        let thin = rng.next_f64().powi(12);
+        let thin = 1e-5 + rng.next_f64().powi(12);
         positions.extend([centre + d * 0.49, centre - d * 0.49, centre + d * 0.2 + e * (0.2 * thin)]);
     }
     let triangles = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);

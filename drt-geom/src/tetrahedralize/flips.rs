@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use super::complex::Complex;
 use super::plate::Plate;
+use super::recovery::ROUNDING;
 use crate::NONE;
 
 /// Rings longer than this are left alone: removing their edge is the cube of it in work.
@@ -35,6 +36,14 @@ impl Wanted<'_> {
 }
 
 impl Complex {
+    /// Whether a tetrahedron is positive and none of its corners as near to the face across as
+    /// rounding is: vertices to come could not be placed there.
+    fn is_thick(&self, t: [u32; 4]) -> bool {
+        let [a, b, c, d] = t.map(|v| self.points[v as usize]);
+        let size = [b - a, c - a, d - a].iter().fold(0.0, |m, e| f64::max(m, e.max_abs()));
+        self.orient(t) > ROUNDING * size * size
+    }
+
     /// Replaces the two tetrahedra at a face by three around the edge between the vertices across
     /// from it (the 2-3 flip), where these are positive and what is in the way becomes less by at
     /// least `gain`.
@@ -57,7 +66,7 @@ impl Complex {
         // Counter-clockwise seen from outside the lower one is so from above: around p → q.
         let [x, y, z] = face;
         let made = [[p, q, x, y], [p, q, y, z], [p, q, z, x]];
-        if made.iter().any(|&t| self.orient(t) <= 0.0) {
+        if !made.iter().all(|&t| self.is_thick(t)) {
             return false;
         }
         let new = wanted.blocked_by_edge(self, [p, q])
@@ -108,8 +117,8 @@ impl Complex {
                 let [a, b, c] = [r[i], r[k], r[j]];
                 if bound < least.0
                     && bound.saturating_add(gain) <= now
-                    && self.orient([a, b, c, q]) > 0.0
-                    && self.orient([a, c, b, p]) > 0.0
+                    && self.is_thick([a, b, c, q])
+                    && self.is_thick([a, c, b, p])
                 {
                     least = least.min((bound + wanted.blocked_by_face(self, [a, b, c]), k));
                 }

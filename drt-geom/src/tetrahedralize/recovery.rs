@@ -8,7 +8,7 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use drt_math::{Rng, Vec3};
+use drt_math::{Rng, Vec3, vec3};
 
 use super::complex::Complex;
 use super::faces::sorted;
@@ -23,6 +23,9 @@ pub(super) const ROUNDING: f64 = 1e-14;
 
 /// Changes tried at random before a vertex is added.
 pub(super) const MOST_TRIALS: u32 = 200;
+
+/// Places tried for a vertex, within some roundings of where it should be.
+const MOST_PLACES: u32 = 16;
 
 /// An edge that must stay.
 #[derive(Clone, Copy, Debug)]
@@ -83,39 +86,37 @@ impl<'a> Recovery<'a> {
         }
     }
 
-    /// Adds a vertex in the place of the given tetrahedra; none when one would not be positive.
+    /// Adds a vertex in the place of the given tetrahedra, at a point or a few roundings from it;
+    /// none when one of the new tetrahedra would not be positive.
     pub(super) fn insert(&mut self, p: Vec3, old: &[u32]) -> Option<u32> {
         let v = self.complex.add_point(p);
-        if self.complex.replace_by_cone(old, v) {
-            self.owners.push(Vec::new());
-            Some(v)
-        } else {
-            self.complex.remove_last_point();
-            None
+        let step = p.max_abs() * f64::EPSILON;
+        for trial in 0..MOST_PLACES {
+            if self.complex.replace_by_cone(old, v) {
+                self.owners.push(Vec::new());
+                return Some(v);
+            }
+            let mut off = || (self.rng.next_f64() - 0.5) * step * f64::from(2 + trial / 4);
+            self.complex.points[v as usize] = p + vec3(off(), off(), off());
         }
+        self.complex.remove_last_point();
+        None
     }
 
-    /// Splits an inner edge of a tetrahedron at a point near it, and with it all that must stay.
+    /// Splits an inner edge of a tetrahedron at a point near it; what must stay does so in parts.
     pub(super) fn split_edge(&mut self, [a, b]: [u32; 2], tet: u32, p: Vec3) -> Option<u32> {
         let ring = self.complex.ring(a, b, tet)?;
         let v = self.insert(p, &ring.tets)?;
-        let Some(&kept) = self.kept_edges.get(&edge_key(a, b)) else { return Some(v) };
-        self.keep_parts([a, b], kept.list, v);
-        for end in [a, b] {
-            self.kept_edges.insert(edge_key(end, v), Kept { list: kept.list, split: NONE });
-        }
-        self.own(v, kept.list);
-        for r in ring.vertices {
-            if let Some(triangle) = self.kept_faces.remove(&sorted([a, b, r])) {
-                for end in [a, b] {
-                    self.kept_faces.insert(sorted([end, v, r]), triangle);
-                }
-            }
+        if let Some(&kept) = self.kept_edges.get(&edge_key(a, b)) {
+            self.keep_parts([a, b], kept.list, v);
+            self.keep_parts([a, v], kept.list, NONE);
+            self.keep_parts([v, b], kept.list, NONE);
+            self.own(v, kept.list);
         }
         Some(v)
     }
 
-    /// Notes that an edge is two.
+    /// Notes that an edge must stay, whole ([`NONE`]) or in two parts.
     pub(super) fn keep_parts(&mut self, [a, b]: [u32; 2], list: u32, split: u32) {
         self.kept_edges.insert(edge_key(a, b), Kept { list, split });
     }

@@ -3,7 +3,6 @@
 use drt_math::Vec3;
 
 use super::TetrahedralizeError;
-use super::faces::sorted;
 use super::flips::Wanted;
 use super::input::{Merged, edge_key};
 use super::recovery::{Kept, MOST_TRIALS, ROUNDING, Recovery};
@@ -77,20 +76,10 @@ impl Recovery<'_> {
             let (edge, tet, changed) = match self.look(a, b)? {
                 Meets::Nothing => return Ok(NONE),
                 Meets::Vertex(v) => return Ok(v),
+                Meets::Edge(edge, _) if self.is_kept(edge) => return self.divide([a, b], list),
                 Meets::Edge(edge, tet) => (edge, tet, self.remove_edge(edge, tet, wanted, 1)),
                 Meets::Face(tet, corner) => {
                     let [x, y, z] = self.complex.tets[tet as usize].face(corner);
-                    if let Some(&other) = self.kept_faces.get(&sorted([x, y, z])) {
-                        return Err(self.intersection(list, other));
-                    }
-                    let p = self.complex.on_segment([a, b], [x, y, z]);
-                    if let Some(v) = [x, y, z].into_iter().find(|&v| self.are_near(v, p)) {
-                        return Ok(v);
-                    }
-                    let touched = |&e: &[u32; 2]| self.is_kept(e) && self.is_on(e, p);
-                    if let Some(e) = [[x, y], [y, z], [z, x]].into_iter().find(touched) {
-                        return self.split_near(e, tet, p).ok_or_else(|| self.unrecovered(list));
-                    }
                     let mut edges = [[x, y], [y, z], [z, x]].into_iter();
                     let changed = self.remove_face(tet, corner, wanted, 1)
                         || edges.any(|e| self.remove_edge(e, tet, wanted, 1));
@@ -107,31 +96,44 @@ impl Recovery<'_> {
         self.divide(ends, list)
     }
 
+    /// What a segment meets first, where what is as near as rounding is met.
     fn look(&mut self, a: u32, b: u32) -> Result<Meets, TetrahedralizeError> {
         let mut star = core::mem::take(&mut self.star);
         let meets = self.complex.look(a, b, &mut star);
         self.star = star;
-        meets.ok_or(TetrahedralizeError::Arithmetic)
+        let meets = meets.ok_or(TetrahedralizeError::Arithmetic)?;
+        let (p, tet, vertices) = match meets {
+            Meets::Nothing | Meets::Vertex(_) => return Ok(meets),
+            Meets::Edge(edge, tet) => {
+                (self.complex.on_coplanar([a, b], edge), tet, edge.to_vec())
+            }
+            Meets::Face(tet, corner) => {
+                let face = self.complex.tets[tet as usize].face(corner);
+                (self.complex.on_segment([a, b], face), tet, face.to_vec())
+            }
+        };
+        if let Some(&v) = vertices.iter().find(|&&v| self.are_near(v, p)) {
+            return Ok(Meets::Vertex(v));
+        }
+        let edges = (0..vertices.len()).map(|k| [vertices[k], vertices[(k + 1) % vertices.len()]]);
+        let near = edges.into_iter().find(|&e| self.is_on(e, p));
+        Ok(near.map_or(meets, |edge| Meets::Edge(edge, tet)))
     }
 
     /// Adds a vertex on a segment where it first meets something.
     fn divide(&mut self, [a, b]: [u32; 2], list: u32) -> Result<u32, TetrahedralizeError> {
-        let (p, candidates, tet) = match self.look(a, b)? {
+        let added = match self.look(a, b)? {
+            Meets::Nothing => return Ok(NONE),
+            Meets::Vertex(v) => return Ok(v),
             Meets::Edge(edge, tet) => {
                 let p = self.complex.on_coplanar([a, b], edge);
-                (p, alloc::vec![edge], tet)
+                self.split_edge(edge, tet, p)
             }
             Meets::Face(tet, corner) => {
                 let this = self.complex.tets[tet as usize];
-                let [x, y, z] = this.face(corner);
-                let p = self.complex.on_segment([a, b], [x, y, z]);
-                if let Some(v) = self.insert(p, &[tet, this.neighbors[corner]]) {
-                    return Ok(v);
-                }
-                (p, alloc::vec![[x, y], [y, z], [z, x]], tet)
+                let p = self.complex.on_segment([a, b], this.face(corner));
+                self.insert(p, &[tet, this.neighbors[corner]])
             }
-            Meets::Nothing => return Ok(NONE),
-            Meets::Vertex(v) => return Ok(v),
         };
         // Through an edge, or so near to one or to a vertex that rounding has put it there.
         for &edge in &candidates {
@@ -154,6 +156,7 @@ impl Recovery<'_> {
     fn split_near(&mut self, edge: [u32; 2], tet: u32, p: Vec3) -> Option<u32> {
         let may = !self.is_kept(edge) || self.is_on(edge, p);
         may.then(|| self.split_edge(edge, tet, p)).flatten()
+        added.ok_or_else(|| self.unrecovered(list))
     }
 
     fn is_on(&self, [x, y]: [u32; 2], p: Vec3) -> bool {
