@@ -11,7 +11,7 @@ use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, 
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
 use crate::tangents::Tangents;
-use crate::transport::{MediumNeed, Needs, SurfacePoint, World};
+use crate::transport::{MaterialPoint, MediumNeed, Needs, World};
 
 /// Everything that changes with the parameters.
 #[derive(Clone, Debug, Default)]
@@ -109,14 +109,13 @@ impl AdjointSink for Contraction<'_> {
         &self.motion.interest
     }
 
-    fn surface(&mut self, point: &SurfacePoint, adjoint: &SurfaceAdjoint) {
+    fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint) {
         let motions = &self.motion.tangents.shapes[point.shape as usize];
         if motions.is_empty() {
             return;
         }
         let mesh = &self.world.scene.shapes[point.shape as usize].mesh;
-        let at = drt_motion::SurfacePoint { triangle: point.triangle, bary: point.bary };
-        let element = drt_motion::SurfaceElement::new(mesh, &at);
+        let element = drt_motion::SurfaceElement::new(mesh, &point.at);
         for (p, motion) in motions {
             let jet = motion.jet_of(&element);
             self.rates[*p] += adjoint.u.dot(jet.u)

@@ -166,7 +166,7 @@ impl Reservoir {
             // The vertex is left behind at n·(u_Σ - u), n from the medium's side across.
             let n = if front { -m.point.ng } else { m.point.ng };
             self.functional.items.clear();
-            self.functional.items.push(Rate::Surface(m.point, n));
+            self.functional.items.push(Rate::Surface(m.point.material(), n));
             self.functional.items.push(Rate::Volume(medium, m.x, -n));
             add(&self.functional, m.throughput * tau * light.0 * scale);
         }

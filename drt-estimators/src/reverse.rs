@@ -28,7 +28,7 @@ use crate::session::Control;
 use crate::settings::Settings;
 use crate::splatting::Checked;
 use crate::surface::BsdfParams;
-use crate::transport::{MediumNeed, Needs, SurfacePoint, World};
+use crate::transport::{MaterialPoint, MediumNeed, Needs, World};
 use crate::{Error, tangents};
 
 /// The gradient of a loss with respect to a scene. Entries that were not asked for are `None`.
@@ -267,7 +267,7 @@ impl AdjointSink for Scatter<'_> {
         self.interest
     }
 
-    fn surface(&mut self, point: &SurfacePoint, adjoint: &SurfaceAdjoint) {
+    fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint) {
         let shape = point.shape as usize;
         let Some(gradient) = &mut self.gradient.shapes[shape] else { return };
         let w = self.weights;
@@ -281,8 +281,7 @@ impl AdjointSink for Scatter<'_> {
             self.gradient.non_finite += 1;
             return;
         }
-        let at = drt_motion::SurfacePoint { triangle: point.triangle, bary: point.bary };
-        gradient.scatter(&self.world.scene.shapes[shape].mesh, &at, &jet);
+        gradient.scatter(&self.world.scene.shapes[shape].mesh, &point.at, &jet);
     }
 
     fn volume(&mut self, _: usize, _: Vec3, _: &RgbVec, _: Rgb) {

@@ -11,7 +11,7 @@ use drt_medium::CoefficientRates;
 use crate::emitter::EmitterGradient;
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
-use crate::transport::SurfacePoint;
+use crate::transport::MaterialPoint;
 
 /// Per channel, the change of a value per unit of each entry of a surface point's jet.
 #[derive(Clone, Copy, Debug, Default)]
@@ -98,7 +98,7 @@ pub(crate) trait AdjointSink {
     /// What it depends on.
     fn interest(&self) -> &Interest;
     /// Of a surface point.
-    fn surface(&mut self, point: &SurfacePoint, adjoint: &SurfaceAdjoint);
+    fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint);
     /// Of the position, and the volume Jacobian, of a material point inside a medium.
     fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb);
     /// Of a medium's coefficients at a point of space.
@@ -123,7 +123,7 @@ pub(crate) struct Functional {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Rate {
     /// Velocity of a surface point, dotted with a vector.
-    Surface(SurfacePoint, Vec3),
+    Surface(MaterialPoint, Vec3),
     /// Velocity of the inside of a medium at a point, dotted with a vector.
     Volume(usize, Vec3, Vec3),
     /// Change of an emitter.

@@ -42,6 +42,11 @@ impl Aabb {
     pub fn extent(&self) -> Vec3 {
         self.max - self.min
     }
+    /// True when the boxes have a point in common, on their boundaries at least.
+    #[must_use]
+    pub fn meets(&self, o: &Self) -> bool {
+        (0..3).all(|k| self.min[k] <= o.max[k] && o.min[k] <= self.max[k])
+    }
     /// True when the point lies inside or on the boundary.
     #[must_use]
     pub fn contains(&self, p: Vec3) -> bool {

@@ -70,7 +70,9 @@ pub(crate) fn sample<R: Receiver>(
     let items = &mut b.functional.items;
     items.clear();
     match vertex {
-        Some(Vertex { kind: Kind::Surface(s), .. }) => items.push(Rate::Surface(s, point)),
+        Some(Vertex { kind: Kind::Surface(s), .. }) => {
+            items.push(Rate::Surface(s.material(), point))
+        }
         Some(Vertex { medium: Some(m), x, .. }) => items.push(Rate::Volume(m, x, point)),
         _ => sensor.position = Vec3::ZERO,
     }

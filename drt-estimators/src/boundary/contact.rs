@@ -95,7 +95,7 @@ impl Contact {
         let mut e = *e;
         e.may_rest = true;
         PROBES.into_iter().any(|u| {
-            let (x, point) = e.point(world, u);
+            let (x, point) = e.point(u);
             Self::at(world, &EdgePoint { edge: &e, x, point, inv_pdf: 1.0 }).is_some()
         })
     }

@@ -8,7 +8,7 @@ use drt_geom::{EdgeClass, NONE, Topology};
 use drt_math::{CdfTable, Real, Rng, Vec3, fm, warp};
 
 use crate::Error;
-use crate::transport::{SurfacePoint, World};
+use crate::transport::{MaterialPoint, World};
 
 /// An edge of a surface that blocks.
 #[derive(Clone, Copy, Debug)]
@@ -25,10 +25,13 @@ pub(crate) struct Edge {
     /// Angle between the faces, 0 for an open edge.
     between: f64,
     pub(super) shape: u32,
-    /// Corners of the first face that are `a` and `b`.
+    /// The first face in its shape, and which of its corners are `a` and `b`.
+    triangle: u32,
     corners: [u8; 2],
     /// Where segments that graze the edge run: before the faces, behind them, or on an open edge.
     side: Side,
+    /// The medium in which they run, where that is the same all along the edge.
+    medium: Option<Option<usize>>,
     /// Something is so near that the edge may rest on it.
     pub(super) may_rest: bool,
 }
@@ -47,7 +50,7 @@ pub(crate) struct EdgePoint<'a> {
     pub(crate) edge: &'a Edge,
     pub(crate) x: Vec3,
     /// The same point on the edge's first face.
-    pub(crate) point: SurfacePoint,
+    pub(crate) point: MaterialPoint,
     /// 1 over the density per length.
     pub(crate) inv_pdf: f64,
 }
@@ -79,8 +82,10 @@ impl Edge {
             across,
             between,
             shape,
+            triangle: 0,
             corners,
             side,
+            medium: None,
             may_rest: false,
         })
     }
@@ -175,25 +180,29 @@ impl Edge {
     }
 
     /// The point at `u` of the way along the edge.
-    pub(crate) fn point(&self, world: &World, u: f64) -> (Vec3, SurfacePoint) {
+    pub(crate) fn point(&self, u: f64) -> (Vec3, MaterialPoint) {
         let mut bary = [0.0; 3];
         bary[self.corners[0] as usize] = 1.0 - u;
         bary[self.corners[1] as usize] = u;
-        let (point, _) = world.point(self.faces[0], [bary[1], bary[2]]);
-        (self.a * (1.0 - u) + self.b * u, point)
+        let at = drt_motion::SurfacePoint { triangle: self.triangle, bary: [bary[1], bary[2]] };
+        (self.a * (1.0 - u) + self.b * u, MaterialPoint { shape: self.shape, at })
+    }
+
+    /// Looks up the medium around the edge where one answer holds for all of it; `around` is the one
+    /// around its shape, as [`World::medium_around`] has it.
+    pub(super) fn settle_medium(&mut self, world: &World, around: Option<Option<usize>>) {
+        let boundary = world.scene.shapes[self.shape as usize].boundary;
+        self.medium = match (boundary, self.side) {
+            (Some(b), Side::Front) => Some(b.exterior),
+            (Some(b), Side::Back) => Some(b.interior),
+            (Some(_), Side::Unknown) => None,
+            (None, _) => around,
+        };
     }
 
     /// The medium in which segments graze the edge at `x`.
     pub(crate) fn medium(&self, world: &World, x: Vec3) -> Option<usize> {
-        if !world.has_media() {
-            return None;
-        }
-        let boundary = world.scene.shapes[self.shape as usize].boundary;
-        match (boundary, self.side) {
-            (Some(b), Side::Front) => b.exterior,
-            (Some(b), Side::Back) => b.interior,
-            _ => world.medium_at(x),
-        }
+        self.medium.unwrap_or_else(|| world.medium_at(x))
     }
 
     /// True when the edge can be a silhouette seen along `w`.
@@ -234,11 +243,11 @@ impl EdgeTable {
         e.length * (PI - e.between)
     }
 
-    pub(crate) fn sample(&self, world: &World, rng: &mut Rng) -> EdgePoint<'_> {
+    pub(crate) fn sample(&self, rng: &mut Rng) -> EdgePoint<'_> {
         // Monotone: one number places the point among all edges.
         let s = self.table.sample(rng.next_f64());
         let edge = &self.edges[s.index];
-        let (x, point) = edge.point(world, s.residual);
+        let (x, point) = edge.point(s.residual);
         EdgePoint { edge, x, point, inv_pdf: edge.length / s.pmf }
     }
 }
@@ -290,7 +299,8 @@ pub(crate) fn collect(world: &World) -> (Vec<Edge>, u64) {
                 _ => Side::Unknown,
             };
             let corners = [ca as u8, cb as u8];
-            edges.extend(Edge::new([a, b], opposite, faces, i as u32, corners, side));
+            let edge = Edge::new([a, b], opposite, faces, i as u32, corners, side);
+            edges.extend(edge.map(|edge| Edge { triangle: e.faces[0], ..edge }));
         }
     }
     (edges, all)

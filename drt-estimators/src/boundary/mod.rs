@@ -45,7 +45,6 @@ use crate::sensor::SensorGradient;
 use crate::transport::flight::{Flight, Travel};
 use crate::transport::importance::Splat;
 use crate::transport::lights::{LightKind, LightTable};
-use crate::transport::world::short_of;
 use crate::transport::{Kind, RadianceBySegments, RayPath, SurfacePoint, Tracer, Vertex, World};
 
 /// How a boundary segment is found.
@@ -116,7 +115,10 @@ impl Boundary {
         let (edges, all) = collect(world);
         let mut edges = weld(edges, |e| movers.moves(e));
         edges.retain(|e| movers.matter_to(e));
+        let around: Vec<_> =
+            (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
         for e in &mut edges {
+            e.settle_medium(world, around[e.shape as usize]);
             e.may_rest = Contact::anywhere(world, e);
         }
         let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
@@ -197,7 +199,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
     /// Camera segments: D is the pinhole.
     fn primary(&mut self) -> Option<()> {
         let world = self.tracer.world;
-        let at = self.boundary.camera.as_ref()?.sample(world, &mut self.tracer.rng);
+        let at = self.boundary.camera.as_ref()?.sample(&mut self.tracer.rng);
         let camera = &world.camera;
         if let Some(contact) = Contact::at(world, &at) {
             return self.contact_with_camera(&at, &contact);
@@ -210,7 +212,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         let transport = self.seen(&start)?;
         // The camera's side must be open.
         let tau = self.open(&start, w, distance)?;
-        let s = self.end(&start, -w, Rgb::ONE)?;
+        let s = self.end(&start, -w, Rgb::ONE).filter(|s| !self.is_dark(s))?;
         let l = self.share(&s, distance);
         self.b.functional.items.clear();
         self.edge_rate(&at, n);
@@ -254,7 +256,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
             return self.delta(emitter, choice.pmf);
         }
         let general = self.boundary.general.as_ref()?;
-        let at = general.sample(world, &mut self.tracer.rng);
+        let at = general.sample(&mut self.tracer.rng);
         if Contact::at(world, &at).is_some() {
             return None;
         }
@@ -282,7 +284,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
     fn delta(&mut self, emitter: usize, pmf: f64) -> Option<()> {
         let world = self.tracer.world;
         let table = self.boundary.lights.get(emitter)?.as_ref()?;
-        let at = table.sample(world, &mut self.tracer.rng);
+        let at = table.sample(&mut self.tracer.rng);
         if Contact::at(world, &at).is_some() {
             return None;
         }
@@ -321,14 +323,14 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
     /// Segments in a drawn direction.
     fn indirect(&mut self) -> Option<()> {
         let world = self.tracer.world;
-        let at = self.boundary.general.as_ref()?.sample(world, &mut self.tracer.rng);
+        let at = self.boundary.general.as_ref()?.sample(&mut self.tracer.rng);
         if let Some(contact) = Contact::at(world, &at) {
             return self.contact_with_others(&at, &contact);
         }
         let (w, inv_pdf) = at.edge.sample_direction(&mut self.tracer.rng);
         let n = at.edge.occluded_side(w)?;
         let start = Start::on(world, &at);
-        let s = self.end(&start, -w, Rgb::ONE)?;
+        let s = self.end(&start, -w, Rgb::ONE).filter(|s| !self.is_dark(s))?;
         let scale = sine(at.edge, w) * at.inv_pdf * inv_pdf;
         let mut lit = false;
         let beyond = self.beyond(&start, w, s.weight);
@@ -343,6 +345,9 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
             }
             if !lit {
                 self.light_from(&s, w, world.max_depth.checked_sub(2)?);
+                if self.b.light.is_dark() {
+                    return None;
+                }
                 self.share_emission(&s, w, 1.0 / inv_pdf);
                 lit = true;
             }
@@ -350,6 +355,11 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
             self.deliver(&d, only_camera, emits, w, s.weight * scale);
         }
         Some(())
+    }
+
+    /// True when no light can come from S: it is the sky, and there is none.
+    fn is_dark(&self, s: &End) -> bool {
+        s.vertex.is_none() && self.tracer.world.lights.environment().is_none()
     }
 
     /// Takes from the emission of S what light sampling finds as well.
@@ -385,8 +395,8 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         Some(())
     }
 
-    /// Detector ends: where free flight stops, and a point placed towards a camera in the medium,
-    /// which is connected to the camera alone.
+    /// Detector ends: where free flight stops on a vertex, and a point placed towards a camera in the
+    /// medium, which is connected to the camera alone.
     fn beyond(&mut self, start: &Start, w: Vec3, channels: Rgb) -> [Option<(End, bool)>; 2] {
         let mut ray = core::mem::take(&mut self.b.ray);
         start.cast(self.tracer, w, &mut ray);
@@ -396,7 +406,8 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
                 End { vertex: Some(v.vertex), distance: v.t, weight: v.arrival, flight: None };
             (end, true)
         });
-        let flown = self.arrive(start, w, &ray, channels, span).map(|end| (end, false));
+        let flown = self.arrive(start, w, &ray, channels, span);
+        let flown = flown.filter(|end| end.vertex.is_some()).map(|end| (end, false));
         self.b.ray = ray;
         [flown, placed]
     }
@@ -440,16 +451,10 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
     /// Transmittance from the edge to a point at `distance`, if nothing blocks.
     fn open(&mut self, start: &Start, w: Vec3, distance: f64) -> Option<Rgb> {
         let mut ray = core::mem::take(&mut self.b.ray);
-        let world = self.tracer.world;
-        start.cast(self.tracer, w, &mut ray);
-        let open = ray.length >= short_of(start.x, distance);
-        let mut tau = None;
-        if open {
-            ray.cut(distance);
-            let tracer = &mut *self.tracer;
-            tau =
-                Some(world.transmittance(start.x, w, &ray, &mut tracer.rng, &mut tracer.counters));
-        }
+        let Tracer { world, rng, counters, .. } = &mut *self.tracer;
+        let (x, faces) = (start.x, start.faces);
+        let open = world.connect_past(x, faces, start.medium, w, distance, &mut ray, counters);
+        let tau = open.then(|| world.transmittance(x, w, &ray, rng, counters));
         self.b.ray = ray;
         tau
     }
@@ -481,7 +486,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
     fn end_rate(&mut self, end: &End, n: Vec3) {
         let Some(v) = &end.vertex else { return };
         match (&v.kind, v.medium) {
-            (Kind::Surface(p), _) => self.b.functional.items.push(Rate::Surface(*p, n)),
+            (Kind::Surface(p), _) => self.b.functional.items.push(Rate::Surface(p.material(), n)),
             (Kind::Volume(_), Some(m)) => self.b.functional.items.push(Rate::Volume(m, v.x, n)),
             _ => {}
         }
@@ -526,8 +531,10 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         if !self.receiver.moves(&self.b.functional) {
             return;
         }
-        // Camera segments beyond D, with one more for the boundary segment itself.
-        let longest = world.max_depth - 1;
+        // Camera segments beyond D, with one more for the boundary segment itself, and what the light
+        // takes at least.
+        let Some(least) = self.b.light.fewest_segments() else { return };
+        let longest = world.max_depth - 1 - least;
         let longest = if only_camera { u32::min(longest, 1) } else { longest };
         self.b.splats.clear();
         self.tracer.importance(vertex, -w, longest, d.flight, &mut self.b.splats);

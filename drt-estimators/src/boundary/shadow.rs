@@ -129,7 +129,7 @@ impl Shadows {
         tracer.counters.boundary_samples += 1;
         let eye = world.eye().x;
         let x = eye + dir * m.t;
-        let (x_edge, point) = edge.point(world, m.s);
+        let (x_edge, point) = edge.point(m.s);
         let around = edge.medium(world, x_edge);
         // Light: from the edge back to the source, and on to the point.
         let tau = self.open(tracer, edge, x_edge, around, -m.w, source, m.r_edge, b)?
@@ -177,7 +177,9 @@ impl Shadows {
             Source::Direction(_) => 1.0,
         };
         match (source, choice.delta) {
-            (Source::Point(_, Some(s)), _) => items.push(Rate::Surface(*s, n * -(1.0 - l))),
+            (Source::Point(_, Some(s)), _) => {
+                items.push(Rate::Surface(s.material(), n * -(1.0 - l)))
+            }
             (Source::Point(_, None), Some(e)) => {
                 let position = n * -(1.0 - l);
                 items.push(Rate::Emitter(

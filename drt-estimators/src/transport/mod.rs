@@ -16,5 +16,5 @@ pub(crate) mod world;
 pub(crate) use adjoint::Differentiator;
 pub(crate) use record::{PathRecord, Radiance, RadianceBySegments};
 pub(crate) use trace::Tracer;
-pub(crate) use vertex::{Kind, SurfacePoint, Vertex};
+pub(crate) use vertex::{Kind, MaterialPoint, SurfacePoint, Vertex};
 pub(crate) use world::{MediumNeed, Needs, RayPath, World};

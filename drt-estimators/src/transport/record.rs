@@ -130,6 +130,16 @@ impl Observer for Radiance {
 pub(crate) struct RadianceBySegments(pub(crate) Vec<Rgb>);
 
 impl RadianceBySegments {
+    /// The number of segments that some light took at least; `None` without any.
+    pub(crate) fn fewest_segments(&self) -> Option<u32> {
+        self.0.iter().position(|v| !v.is_zero()).map(|i| i as u32)
+    }
+
+    /// True without any light.
+    pub(crate) fn is_dark(&self) -> bool {
+        self.fewest_segments().is_none()
+    }
+
     /// The light that took at most `segments` segments.
     pub(crate) fn within(&self, segments: u32) -> Rgb {
         let n = self.0.len().min(segments as usize + 1);

@@ -2,6 +2,13 @@
 
 use drt_math::Vec3;
 
+/// A material point of a shape, however the shape moves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MaterialPoint {
+    pub(crate) shape: u32,
+    pub(crate) at: drt_motion::SurfacePoint,
+}
+
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfacePoint {
@@ -15,6 +22,13 @@ pub(crate) struct SurfacePoint {
     pub(crate) ng: Vec3,
     /// Unit shading normal.
     pub(crate) ns: Vec3,
+}
+
+impl SurfacePoint {
+    pub(crate) fn material(&self) -> MaterialPoint {
+        let at = drt_motion::SurfacePoint { triangle: self.triangle, bary: self.bary };
+        MaterialPoint { shape: self.shape, at }
+    }
 }
 
 /// Where a volume vertex touches a surface: the limit of points on one of its sides.

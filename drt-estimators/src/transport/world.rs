@@ -3,7 +3,7 @@
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 
-use drt_geom::{Aabb, Hit, Ray, Skip, TriangleBvh};
+use drt_geom::{Aabb, Hit, Mesh, Ray, Skip, TriangleBvh};
 use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::{Homogeneous, Medium, TrackingStats};
 
@@ -476,7 +476,7 @@ impl World {
     }
 
     /// The null interfaces between `v` and a point at `distance` along the unit direction `dir`;
-    /// `None` when a surface blocks. `target` is excluded from blocking.
+    /// false when a surface blocks. `target` is excluded from blocking.
     pub(crate) fn connect(
         &self,
         v: &Vertex,
@@ -487,6 +487,37 @@ impl World {
         counters: &mut Counters,
     ) -> bool {
         path.medium = self.medium_toward(v, dir);
+        let Skip([start, _]) = Self::skip_of(v);
+        let skip = target.map_or(Skip::one(start), |end| Skip::two(start, end));
+        self.connect_from(v, skip, dir, distance, path, counters)
+    }
+
+    /// As [`World::connect`] from a point on an edge, past the edge's own faces.
+    #[allow(clippy::too_many_arguments)]
+    pub(crate) fn connect_past(
+        &self,
+        x: Vec3,
+        faces: [u32; 2],
+        medium: Option<usize>,
+        dir: Vec3,
+        distance: f64,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) -> bool {
+        path.medium = medium;
+        let v = Vertex { x, medium, kind: Kind::Point };
+        self.connect_from(&v, Skip::two(faces[0], faces[1]), dir, distance, path, counters)
+    }
+
+    fn connect_from(
+        &self,
+        v: &Vertex,
+        skip: Skip,
+        dir: Vec3,
+        distance: f64,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) -> bool {
         path.crossings.clear();
         path.end = None;
         path.length = distance;
@@ -501,8 +532,6 @@ impl World {
             path.crossings.push(Crossing { point: c.point, x: v.x, t: 0.0, after: medium });
         }
         counters.rays += 1;
-        let Skip([start, _]) = Self::skip_of(v);
-        let skip = target.map_or(Skip::one(start), |end| Skip::two(start, end));
         let ray = Ray { origin: v.x, dir, t_max: short_of(v.x, distance) };
         if !self.any_null {
             return !self.bvh.any(&ray, skip, |_| true);
@@ -567,6 +596,22 @@ impl World {
             Some((point, front)) => self.medium_on_side(&point, front, None),
             None => self.ambient,
         }
+    }
+
+    /// The medium around a shape that bounds none itself, where no interface comes near it: then the
+    /// same everywhere around it.
+    pub(crate) fn medium_around(&self, shape: usize) -> Option<Option<usize>> {
+        if !self.has_media() {
+            return Some(None);
+        }
+        let bounds = self.scene.shapes[shape].mesh.bounds();
+        let near = |mesh: &Mesh| {
+            let triangles = 0..mesh.triangles.len() as u32;
+            mesh.bounds().meets(&bounds)
+                && triangles.map(|t| Aabb::around(mesh.triangle(t))).any(|b| b.meets(&bounds))
+        };
+        let mut interfaces = self.scene.shapes.iter().filter(|s| s.boundary.is_some());
+        (!interfaces.any(|s| near(&s.mesh))).then(|| self.medium_at(bounds.center()))
     }
 
     /// How far inside a medium its values at its own border are taken: a grid ends at its box, on

@@ -298,7 +298,10 @@ impl<'w> Differentiator<'w> {
             let n = c.point.ng;
             let g = (weight * -jump).outer(n / n.dot(path.dir));
             if shape_moves {
-                sink.surface(&c.point, &SurfaceAdjoint { u: g, ..SurfaceAdjoint::default() });
+                sink.surface(
+                    &c.point.material(),
+                    &SurfaceAdjoint { u: g, ..SurfaceAdjoint::default() },
+                );
             }
             along.add(&-g, c.t, path.length);
         }
@@ -587,7 +590,7 @@ fn moves(v: &Vertex, interest: &Interest, camera: bool) -> bool {
 fn send<S: AdjointSink>(v: &Vertex, adjoint: &SurfaceAdjoint, sink: &mut S) {
     match (&v.kind, v.medium) {
         (Kind::Surface(s), _) if sink.interest().shapes[s.shape as usize] => {
-            sink.surface(s, adjoint);
+            sink.surface(&s.material(), adjoint);
         }
         (Kind::Volume(_), Some(m)) if sink.interest().volumes[m] => {
             sink.volume(m, v.x, &adjoint.u, adjoint.j);

@@ -12,7 +12,7 @@ use crate::scene::Scene;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
-use crate::transport::{PathRecord, SurfacePoint, Tracer, World};
+use crate::transport::{MaterialPoint, PathRecord, Tracer, World};
 use crate::{inside, tangents};
 
 pub(super) fn set(name: &str, id: &str, property: &str, op: ValueChange) -> Parameter {
@@ -79,7 +79,7 @@ impl AdjointSink for Faulty<'_> {
     fn interest(&self) -> &Interest {
         self.0.interest()
     }
-    fn surface(&mut self, point: &SurfacePoint, adjoint: &SurfaceAdjoint) {
+    fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint) {
         let mut a = *adjoint;
         match self.1 {
             Fault::NoJacobian => a.j = Rgb::ZERO,
