@@ -4,6 +4,8 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
 use drt_medium::{CoefficientGradients, CoefficientRates, MediumTangent};
+use drt_medium::{CoefficientGradients, CoefficientRates, DepthEstimate, MediumTangent};
+use drt_motion::{SiteWeight, VolumeMotion, blend_jet};
 
 use crate::emitter::EmitterGradient;
 use crate::inside::{Insides, Place};
@@ -30,6 +32,7 @@ impl Motion {
             shapes: some(&tangents.shapes),
             volumes: some(&insides.volumes),
             media: some(&tangents.media),
+            grids: tangents.media.iter().map(|l| l.iter().any(|(_, t)| moves_grids(t))).collect(),
             bsdfs: some(&tangents.bsdfs),
             emitters: some(&tangents.emitters),
             moving_emitters: tangents
@@ -65,9 +68,13 @@ impl Motion {
     }
 }
 
+fn moves_grids(tangent: &MediumTangent) -> bool {
+    tangent.grid_velocity().is_some()
+}
+
 /// The derivative of one value by every parameter.
 pub(crate) struct Contraction<'a> {
-    world: &'a World,
+    pub(crate) world: &'a World,
     motion: &'a Motion,
     pub(crate) rates: Vec<Rgb>,
     /// What the field of an inside is like at the last point.
@@ -148,9 +155,9 @@ impl AdjointSink for Contraction<'_> {
         if tangents.is_empty() {
             return;
         }
+        let moves = self.motion.interest.grids[medium];
         let medium = self.world.medium(medium);
         let coefficients = medium.coefficients(x);
-        let moves = tangents.iter().any(|(_, t)| t.grid_velocity().is_some());
         let gradients = if moves { medium.gradients(x) } else { CoefficientGradients::ZERO };
         for (p, tangent) in tangents {
             let rates = tangent.rates_given(medium, x, &coefficients, &gradients);
@@ -158,11 +165,9 @@ impl AdjointSink for Contraction<'_> {
         }
     }
 
-    fn grid_face(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
+    fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {
         for (p, tangent) in &self.motion.tangents.media[medium] {
-            if let Some(velocity) = tangent.grid_velocity() {
-                self.rates[*p] += u.dot(velocity.point(x));
-            }
+            self.rates[*p] += depth.rate(self.world.medium(medium), tangent) * adjoint;
         }
     }
 

@@ -10,7 +10,7 @@
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
-use drt_medium::{CoefficientRates, MediumGradient};
+use drt_medium::{CoefficientRates, DepthEstimate, MediumGradient};
 use drt_motion::{JetAdjoint, SmoothNormals, VertexGradient};
 
 use crate::boundary::Receiver;
@@ -168,6 +168,7 @@ fn interest(scene: &Scene, wanted: &[Target]) -> Interest {
         shapes: flags(scene.shapes.len(), wanted, Target::Shape),
         volumes: alloc::vec![false; scene.media.len()],
         media: flags(scene.media.len(), wanted, Target::Medium),
+        grids: flags(scene.media.len(), wanted, Target::Medium),
         bsdfs: flags(scene.bsdfs.len(), wanted, Target::Bsdf),
         moving_emitters: emitters.iter().enumerate().map(|(e, w)| *w && placed(e)).collect(),
         emitters,
@@ -298,9 +299,13 @@ impl AdjointSink for Scatter<'_> {
         }
     }
 
-    fn grid_face(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
-        if let Some(gradient) = &mut self.gradient.media[medium] {
-            gradient.scatter_velocity(x, u.weighted(self.weights));
+    fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {
+        let Some(gradient) = &mut self.gradient.media[medium] else { return };
+        let adjoint = adjoint * self.weights;
+        if adjoint.is_finite() {
+            gradient.scatter_depth(self.world.medium(medium), depth, adjoint);
+        } else {
+            self.gradient.non_finite += 1;
         }
     }
 

@@ -6,7 +6,7 @@
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
-use drt_medium::CoefficientRates;
+use drt_medium::{CoefficientRates, DepthEstimate};
 
 use crate::emitter::EmitterGradient;
 use crate::sensor::SensorGradient;
@@ -70,6 +70,8 @@ pub(crate) struct Interest {
     pub(crate) volumes: Vec<bool>,
     /// Media whose coefficients change.
     pub(crate) media: Vec<bool>,
+    /// Of those, the ones whose grids move.
+    pub(crate) grids: Vec<bool>,
     pub(crate) bsdfs: Vec<bool>,
     pub(crate) emitters: Vec<bool>,
     /// Emitters whose place or direction changes.
@@ -103,8 +105,8 @@ pub(crate) trait AdjointSink {
     fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb);
     /// Of a medium's coefficients at a point of space.
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint);
-    /// Of the velocity of a face of a grid's box, at a point of it.
-    fn grid_face(&mut self, medium: usize, x: Vec3, u: &RgbVec);
+    /// Of the optical depth of a ray through a medium that varies in space.
+    fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb);
     /// Of a material's parameters; `weight` multiplies channel by channel.
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb);
     /// Of an emitter, per channel.

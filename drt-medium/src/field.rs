@@ -68,6 +68,16 @@ pub trait DensityField: Debug + Send + Sync {
     /// a bound must hold on the whole piece.
     fn pieces(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>);
 
+    /// From where to where the ray's pieces reach; `None` without any.
+    fn covered(&self, ray: &Ray) -> Option<(f64, f64)> {
+        let mut covered: Option<(f64, f64)> = None;
+        self.pieces(ray, &mut |piece| {
+            covered = Some((covered.map_or(piece.start, |c| c.0), piece.end));
+            ControlFlow::Continue(())
+        });
+        covered
+    }
+
     /// The least majorant, in 1 / scene unit, used on the pieces when distances are sampled
     /// defensively, so that vertices also fall where the field is zero now. One over the field's
     /// size is a good value; zero: no vertices there.

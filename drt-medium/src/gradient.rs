@@ -3,7 +3,10 @@ use alloc::vec::Vec;
 
 use drt_math::{Affine, Rgb, Vec3};
 
-use crate::{CoefficientRates, Crossing, FieldTangent, Grid, Medium, MediumKind, MediumTangent};
+use crate::{
+    CoefficientRates, Crossing, DepthEstimate, FieldTangent, Grid, Medium, MediumKind,
+    MediumTangent,
+};
 
 /// Derivative of a loss with respect to one coefficient field: the transpose of [`FieldTangent`].
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,7 +55,15 @@ impl FieldGradient {
         }
         self.uniform += adjoint;
         self.relative += field.dot(adjoint);
-        let (Some(grid), false) = (grid, self.voxels.is_empty()) else { return };
+        if let Some(grid) = grid {
+            self.scatter_voxels(grid, x, adjoint);
+        }
+    }
+
+    fn scatter_voxels(&mut self, grid: &Grid, x: Vec3, adjoint: Rgb) {
+        if self.voxels.is_empty() {
+            return;
+        }
         let cell = grid.cell(grid.from_world().point(x));
         let channels = self.channels();
         for (voxel, w) in grid.corners(&cell).into_iter().zip(cell.weights()) {
@@ -136,6 +147,24 @@ impl MediumGradient {
     /// changes: the transpose of [`Crossing::depth_rate`].
     pub fn scatter_crossing(&mut self, crossing: &Crossing, x: Vec3, adjoint: Rgb) {
         self.scatter_velocity(x, crossing.depth_per_velocity().weighted(adjoint));
+    }
+
+    /// Adds the derivative of a loss with respect to a ray's optical depth: the transpose of
+    /// [`DepthEstimate::rate`].
+    pub fn scatter_depth(&mut self, medium: &Medium, depth: &DepthEstimate<'_>, adjoint: Rgb) {
+        let sigma_t = &mut self.sigma_t;
+        sigma_t.uniform += adjoint * depth.length;
+        sigma_t.relative += depth.depth.dot(adjoint);
+        if let (Some(grid), false) = (medium.grid(), sigma_t.voxels.is_empty()) {
+            for (t, w) in depth.points_inside(grid) {
+                sigma_t.scatter_voxels(grid.density(), depth.ray.at(t), adjoint * w);
+            }
+        }
+        let turn = -depth.moment.weighted(adjoint);
+        self.scatter_velocity(depth.ray.origin, -depth.gradient.weighted(adjoint));
+        for (col, w) in self.velocity.linear.cols.iter_mut().zip(depth.ray.dir.to_array()) {
+            *col += turn * w;
+        }
     }
 
     /// Adds the derivative of a loss with respect to the velocity of the grid's point at x.

@@ -210,6 +210,13 @@ impl Grid {
         (1..8).map(corner).fold([corner(0); 2], |[lo, hi], p| [lo.min(p), hi.max(p)])
     }
 
+    /// Edge lengths of that hull.
+    #[must_use]
+    pub fn world_extent(&self) -> Vec3 {
+        let [x, y, z] = self.to_world.linear.cols.map(|c| c.max(-c));
+        x + y + z
+    }
+
     /// The values of one voxel; a single channel stands for all three.
     ///
     /// # Panics
@@ -247,19 +254,19 @@ impl Grid {
     pub fn gradient(&self, x: Vec3) -> RgbVec {
         let cell = self.cell(self.from_world.point(x));
         let at = self.corners(&cell);
-        let world = |c: usize| {
-            let g = cell.slopes(&self.corner_values(&at, c));
-            let unit = vec3(
-                g.x * self.axes[0].scale(),
-                g.y * self.axes[1].scale(),
-                g.z * self.axes[2].scale(),
-            );
-            self.from_world.linear.transpose_mul(unit)
-        };
+        let world = |c: usize| self.slope_in_world(cell.slopes(&self.corner_values(&at, c)));
         match self.channels {
             1 => Rgb::ONE.outer(world(0)),
             _ => RgbVec { r: world(0), g: world(1), b: world(2) },
         }
+    }
+
+    /// The gradient in the world that belongs to slopes per lattice step.
+    #[inline]
+    pub(crate) fn slope_in_world(&self, slope: Vec3) -> Vec3 {
+        let [x, y, z] = &self.axes;
+        let unit = vec3(slope.x * x.scale(), slope.y * y.scale(), slope.z * z.scale());
+        self.from_world.linear.transpose_mul(unit)
     }
 
     #[inline]
@@ -284,7 +291,7 @@ impl Grid {
     }
 
     #[inline]
-    fn corner_values(&self, at: &[usize; 8], channel: usize) -> [f64; 8] {
+    pub(crate) fn corner_values(&self, at: &[usize; 8], channel: usize) -> [f64; 8] {
         // Written out: mapping the array does not inline.
         let v = |n: usize| self.values[at[n] * self.channels + channel];
         [v(0), v(1), v(2), v(3), v(4), v(5), v(6), v(7)]

@@ -2,7 +2,7 @@ use core::ops::ControlFlow;
 
 use drt_math::{Affine, Rgb, RgbVec, Vec3};
 
-use crate::bounds::{Bounds, in_unit_cube};
+use crate::bounds::{Bounds, clip_to_box, in_unit_cube};
 use crate::homogeneous::check;
 use crate::{
     CoefficientGradients, Coefficients, DensityField, Grid, MediumError, Piece, Property, Ray,
@@ -224,9 +224,12 @@ impl DensityField for GridMedium {
         self.bounds.walk(&self.density, self.scale, ray, visit);
     }
 
+    fn covered(&self, ray: &Ray) -> Option<(f64, f64)> {
+        clip_to_box(&self.density, ray)
+    }
+
     fn majorant_floor(&self) -> f64 {
-        let [lo, hi] = self.density.world_bounds();
-        self.floor_depth / (hi - lo).length()
+        self.floor_depth / self.density.world_extent().length()
     }
 
     fn feature_size(&self) -> f64 {

@@ -7,6 +7,7 @@ extern crate alloc;
 mod bounds;
 mod change;
 mod coefficients;
+mod depth;
 mod error;
 mod field;
 mod gradient;
@@ -27,6 +28,7 @@ pub use drt_math::ValueChange;
 
 pub use change::MediumChange;
 pub use coefficients::{CoefficientGradients, CoefficientRates, Coefficients};
+pub use depth::DepthEstimate;
 pub use error::{MediumError, Property};
 pub use field::{DensityField, Piece, Ray};
 pub use gradient::{FieldGradient, MediumGradient};

@@ -92,11 +92,18 @@ impl FieldTangent {
     fn rate(&self, field: Rgb, grid: Option<&Grid>, x: Vec3) -> Rgb {
         let mut rate = self.uniform + field * self.relative;
         if let Some(grid) = grid.filter(|_| !self.voxels.is_empty()) {
-            let cell = grid.cell(grid.from_world().point(x));
-            for (voxel, w) in cell.voxels().iter().zip(cell.weights()) {
-                if let Some(v) = self.voxels.get(voxel) {
-                    rate += *v * w;
-                }
+            rate += self.voxel_rate(grid, x);
+        }
+        rate
+    }
+
+    /// The part of the rate that single voxels have in it.
+    pub(crate) fn voxel_rate(&self, grid: &Grid, x: Vec3) -> Rgb {
+        let cell = grid.cell(grid.from_world().point(x));
+        let mut rate = Rgb::ZERO;
+        for (voxel, w) in cell.voxels().iter().zip(cell.weights()) {
+            if let Some(v) = self.voxels.get(voxel) {
+                rate += *v * w;
             }
         }
         rate

@@ -153,12 +153,7 @@ pub fn line_points<F: DensityField + ?Sized>(
     rng: &mut Rng,
     out: &mut Vec<(f64, f64)>,
 ) {
-    let mut covered: Option<(f64, f64)> = None;
-    field.pieces(ray, &mut |piece| {
-        covered = Some((covered.map_or(piece.start, |c| c.0), piece.end));
-        ControlFlow::Continue(())
-    });
-    let Some((start, end)) = covered.filter(|c| c.1 > c.0) else { return };
+    let Some((start, end)) = field.covered(ray).filter(|c| c.1 > c.0) else { return };
     const FEATURES_PER_POINT: f64 = 4.0;
     const MOST_POINTS: f64 = 16.0;
     let features = (end - start) / field.feature_size();

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, RgbVec, Rng, Vec3};
 
 use crate::bounds::clip_to_box;
-use crate::{GridMedium, Medium, MediumTangent, Ray, TrackingStats};
+use crate::{DepthEstimate, GridMedium, Medium, MediumTangent, Ray, TrackingStats};
 
 /// A place where a ray passes through a face of a grid's box, and the extinction jumps to zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,8 +47,7 @@ impl GridMedium {
     /// bounds the medium there owns the jump.
     pub fn crossings(&self, ray: &Ray) -> impl Iterator<Item = Crossing> + '_ {
         let ends = clip_to_box(self.density(), ray).map(<[f64; 2]>::from).unwrap_or([-1.0; 2]);
-        let [lo, hi] = self.density().world_bounds();
-        let margin = 1e-9 * (hi - lo).max_abs();
+        let margin = 1e-9 * self.density().world_extent().max_abs();
         let ray = *ray;
         ends.into_iter()
             .filter(move |&t| t > margin && t < ray.t_max - margin)
@@ -104,16 +103,10 @@ impl Medium {
         }
         points.clear();
         self.line_points(ray.origin, ray.dir, ray.t_max, rng, points);
-        let mut depth = Rgb::ZERO;
-        for &(t, weight) in points.iter() {
-            depth += tangent.rates(self, ray.at(t)).sigma_t * weight;
-        }
-        if let (Some(grid), Some(u)) = (self.grid(), tangent.grid_velocity()) {
-            for c in grid.crossings(ray) {
-                depth += c.depth_rate(u.point(ray.at(c.t)));
-            }
-        }
-        depth
+        let moving = tangent.grid_velocity().is_some();
+        let depth = DepthEstimate::inside(self, *ray, points, moving);
+        let depth = if moving { depth.with_faces(self) } else { depth };
+        depth.rate(self, tangent)
     }
 
     /// Unbiased estimates of the transmittance of a fixed ray and of its derivative along a
@@ -152,24 +145,8 @@ impl Medium {
         }
         points.clear();
         self.line_points(ray.origin, ray.dir, length, rng, points);
-        let mut ends = [RgbVec::ZERO; 2];
-        let mut depth = Rgb::ZERO;
-        let mut pull = |t: f64, gradient: RgbVec| {
-            let s = t / length;
-            ends[0] += gradient * (1.0 - s);
-            ends[1] += gradient * s;
-        };
-        for &(t, weight) in points.iter() {
-            let x = ray.at(t);
-            depth += self.sigma_t(x) * weight;
-            pull(t, self.gradients(x).sigma_t * weight);
-        }
-        if let Some(grid) = self.grid() {
-            for c in grid.crossings(ray) {
-                pull(c.t, -c.depth_per_velocity());
-            }
-        }
-        let stretch = depth.outer(ray.dir / length);
-        [ends[0] - stretch, ends[1] + stretch]
+        let e = DepthEstimate::inside(self, *ray, points, true).with_faces(self);
+        let end = (e.moment + e.depth.outer(ray.dir)) * (1.0 / length);
+        [e.gradient - end, end]
     }
 }

@@ -617,10 +617,7 @@ impl World {
     /// How far inside a medium its values at its own border are taken: a grid ends at its box, on
     /// which surfaces and their rounded points lie.
     fn border(&self, medium: usize) -> f64 {
-        self.medium(medium).grid().map_or(0.0, |g| {
-            let [lo, hi] = g.density().world_bounds();
-            2e-9 * (hi - lo).max_abs()
-        })
+        self.medium(medium).grid().map_or(0.0, |g| 2e-9 * g.density().world_extent().max_abs())
     }
 
     /// The extinction at a point of an interface, on the side that the unit vector `towards` points to.

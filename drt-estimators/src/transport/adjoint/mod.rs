@@ -25,7 +25,7 @@ mod emitters;
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Rng, Vec3};
-use drt_medium::Coefficients;
+use drt_medium::{Coefficients, DepthEstimate};
 
 use emitters::strength;
 
@@ -303,7 +303,7 @@ impl<'w> Differentiator<'w> {
                     &SurfaceAdjoint { u: g, ..SurfaceAdjoint::default() },
                 );
             }
-            along.add(&-g, c.t, path.length);
+            along.add(&-g, &(-g * c.t), path.length);
         }
     }
 
@@ -323,33 +323,25 @@ impl<'w> Differentiator<'w> {
         let medium = self.world.medium(m);
         let changes = sink.interest().media[m];
         let (start, length) = (path.start + path.dir * i.start, i.end - i.start);
-        let mut depth = Rgb::ZERO;
         let mut points = core::mem::take(&mut self.points);
         points.clear();
         medium.line_points(start, path.dir, length, &mut self.rng, &mut points);
-        for &(t, w) in &points {
-            let x = start + path.dir * t;
-            if changes {
-                sink.medium(m, x, &CoefficientAdjoint::of_sigma_t(weight * -w));
-            }
-            if moving {
-                let g = medium.gradients(x).sigma_t * (weight * -w);
-                along.add(&g, i.start + t, path.length);
-                depth += medium.sigma_t(x) * (w / path.length);
-            }
+        let ray = drt_medium::Ray::new(start, path.dir, length);
+        let relative = moving || (changes && sink.interest().grids[m]);
+        let mut depth = DepthEstimate::inside(medium, ray, &points, relative);
+        if relative {
+            depth = depth.with_faces(medium);
         }
+        if changes {
+            sink.depth(m, &depth, -weight);
+        }
+        if moving {
+            let (g, moment) = (depth.gradient * -weight, depth.moment * -weight);
+            along.add(&g, &(moment + g * i.start), path.length);
+        }
+        let depth = depth.depth;
         self.points = points;
-        if let Some(grid) = medium.grid() {
-            let ray = drt_medium::Ray { origin: start, dir: path.dir, t_max: length };
-            for c in grid.crossings(&ray) {
-                let g = c.depth_per_velocity() * -weight;
-                if changes {
-                    sink.grid_face(m, start + path.dir * c.t, &g);
-                }
-                along.add(&-g, i.start + c.t, path.length);
-            }
-        }
-        depth
+        depth / path.length
     }
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
@@ -547,15 +539,16 @@ struct Along {
 }
 
 impl Along {
-    /// Adds the gradient by the point at distance `t` of `length`.
-    fn add(&mut self, g: &RgbVec, t: f64, length: f64) {
+    /// Adds the gradient by points of a stretch of a given length, and the sum of it times their
+    /// distances from the start.
+    fn add(&mut self, g: &RgbVec, moment: &RgbVec, length: f64) {
         if self.fixed {
             self.near += *g;
-            self.turn += *g * t;
+            self.turn += *moment;
         } else {
-            let s = t / length;
-            self.near += *g * (1.0 - s);
-            self.far += *g * s;
+            let far = *moment * (1.0 / length);
+            self.near += *g - far;
+            self.far += far;
         }
     }
 }

@@ -3,6 +3,7 @@
 use alloc::vec;
 
 use drt_math::{Rgb, RgbVec, Rng, ValueChange, Vec3};
+use drt_medium::DepthEstimate;
 use drt_motion::{GeometryChange, Parameter};
 
 use super::scenes::*;
@@ -97,10 +98,13 @@ impl AdjointSink for Faulty<'_> {
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
         self.0.medium(medium, x, adjoint);
     }
-    fn grid_face(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
-        if self.1 != Fault::GridFace {
-            self.0.grid_face(medium, x, u);
+    fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {
+        let mut depth = *depth;
+        if self.1 == Fault::GridFace {
+            let of = self.0.world.medium(medium);
+            depth = DepthEstimate::inside(of, depth.ray, depth.points, true);
         }
+        self.0.depth(medium, &depth, adjoint);
     }
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
         self.0.bsdf(bsdf, params, weight);

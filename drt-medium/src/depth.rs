@@ -1,0 +1,151 @@
+//! Optical depths of rays through a medium that varies in space, and all that their derivatives
+//! depend on, in one estimate that any number of parameters share.
+//!
+//! With a ray o + t w and a grid that moves by an affine field u(x) = A x + b, the rate of its optical
+//! depth needs the field only at the origin and along the direction,
+//!
+//! ```text
+//! ∫ u·∇σ dt = u(o)·G + (A w)·M,   G = ∫ ∇σ dt,   M = ∫ t ∇σ dt,
+//! ```
+//!
+//! and so do the rates by the motion of the ray's own ends. At the faces of a grid's box, where σ
+//! jumps by -σ along the outward normal N, ∇σ dt stands for -σ N / |N·w|.
+
+use drt_math::{Rgb, RgbVec, Vec3};
+
+use crate::bounds::in_unit_cube;
+use crate::{Crossing, DensityField, GridMedium, Medium, MediumKind, MediumTangent, Ray};
+
+/// An estimate of a ray's optical depth and of what its derivatives depend on; unbiased where
+/// [`Medium::line_points`] gave the points.
+#[derive(Clone, Copy, Debug)]
+pub struct DepthEstimate<'a> {
+    /// The ray.
+    pub ray: Ray,
+    /// The points `(t, w)` and weights of the estimate.
+    pub points: &'a [(f64, f64)],
+    /// Length of the ray inside the medium.
+    pub length: f64,
+    /// The optical depth, `∫ sigma_t dt`.
+    pub depth: Rgb,
+    /// `∫ grad sigma_t dt`; zero unless asked for.
+    pub gradient: RgbVec,
+    /// `∫ t grad sigma_t dt`; zero unless asked for.
+    pub moment: RgbVec,
+}
+
+impl<'a> DepthEstimate<'a> {
+    /// The estimate from points of the ray, without the faces of a grid's box. Gradients are looked
+    /// up only for what is `moving`. A homogeneous medium, which has closed forms, gives nothing.
+    #[must_use]
+    pub fn inside(medium: &Medium, ray: Ray, points: &'a [(f64, f64)], moving: bool) -> Self {
+        let mut estimate = Self {
+            ray,
+            points,
+            length: 0.0,
+            depth: Rgb::ZERO,
+            gradient: RgbVec::ZERO,
+            moment: RgbVec::ZERO,
+        };
+        match &medium.kind {
+            MediumKind::Homogeneous(_) => {}
+            MediumKind::Grid(g) if moving => estimate.add_grid::<true>(g),
+            MediumKind::Grid(g) => estimate.add_grid::<false>(g),
+            MediumKind::Custom(f) => estimate.add_field(&**f, moving),
+        }
+        estimate
+    }
+
+    /// The same with the faces of a grid's box that the ray passes through.
+    #[must_use]
+    pub fn with_faces(mut self, medium: &Medium) -> Self {
+        if let Some(grid) = medium.grid() {
+            for c in grid.crossings(&self.ray) {
+                self.add_face(&c);
+            }
+        }
+        self
+    }
+
+    fn add_face(&mut self, c: &Crossing) {
+        let g = -c.depth_per_velocity();
+        self.gradient += g;
+        self.moment += g * c.t;
+    }
+
+    fn add_field(&mut self, field: &dyn DensityField, moving: bool) {
+        for &(t, w) in self.points {
+            let x = self.ray.at(t);
+            self.length += w;
+            self.depth += field.sigma_t(x) * w;
+            if moving {
+                let g = field.gradients(x).sigma_t * w;
+                self.gradient += g;
+                self.moment += g * t;
+            }
+        }
+    }
+
+    fn add_grid<const MOVING: bool>(&mut self, medium: &GridMedium) {
+        let grid = medium.density();
+        let unit = grid.from_world();
+        let (origin, dir) = (unit.point(self.ray.origin), unit.vector(self.ray.dir));
+        // Sums per channel: of the values, and of the slopes along the lattice with their moments.
+        let (mut depth, mut slopes, mut moments) = ([0.0; 3], [Vec3::ZERO; 3], [Vec3::ZERO; 3]);
+        for &(t, w) in self.points {
+            let u = origin + dir * t;
+            if !in_unit_cube(u) {
+                continue;
+            }
+            self.length += w;
+            let cell = grid.cell(u);
+            let at = grid.corners(&cell);
+            for c in 0..grid.channels() {
+                let v = grid.corner_values(&at, c);
+                depth[c] += cell.interpolate(&v) * w;
+                if MOVING {
+                    let slope = cell.slopes(&v) * w;
+                    slopes[c] += slope;
+                    moments[c] += slope * t;
+                }
+            }
+        }
+        let scale = medium.scale();
+        // One channel stands for all three.
+        let of = |c: usize| if grid.channels() == 1 { 0 } else { c };
+        self.depth = Rgb::new(depth[of(0)], depth[of(1)], depth[of(2)]) * scale;
+        if MOVING {
+            let world = |slopes: &[Vec3; 3]| {
+                let world = |c: usize| grid.slope_in_world(slopes[of(c)]) * scale;
+                RgbVec { r: world(0), g: world(1), b: world(2) }
+            };
+            self.gradient = world(&slopes);
+            self.moment = world(&moments);
+        }
+    }
+
+    /// The rate of the fixed ray's optical depth along a tangent of the medium, the motion of its
+    /// grids included.
+    #[must_use]
+    pub fn rate(&self, medium: &Medium, tangent: &MediumTangent) -> Rgb {
+        let MediumTangent { sigma_t, velocity, .. } = tangent;
+        let mut rate = sigma_t.uniform * self.length + self.depth * sigma_t.relative
+            - self.gradient.dot(velocity.point(self.ray.origin))
+            - self.moment.dot(velocity.vector(self.ray.dir));
+        if let (Some(grid), false) = (medium.grid(), sigma_t.voxels.is_empty()) {
+            for (t, w) in self.points_inside(grid) {
+                rate += sigma_t.voxel_rate(grid.density(), self.ray.at(t)) * w;
+            }
+        }
+        rate
+    }
+
+    /// The points of the estimate that lie inside a grid.
+    pub(crate) fn points_inside(
+        &self,
+        grid: &'a GridMedium,
+    ) -> impl Iterator<Item = (f64, f64)> + 'a {
+        let ray = self.ray;
+        self.points.iter().copied().filter(move |(t, _)| grid.contains(ray.at(*t)))
+    }
+}
