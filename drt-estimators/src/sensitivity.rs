@@ -26,6 +26,12 @@ pub(crate) struct SurfaceAdjoint {
     pub(crate) j: Rgb,
 }
 
+impl SurfaceAdjoint {
+    pub(crate) fn is_zero(&self) -> bool {
+        [self.u, self.n, self.ns].into_iter().all(|v| v == RgbVec::ZERO) && self.j.is_zero()
+    }
+}
+
 /// Per channel, the change of a value per unit of each coefficient at a point of a medium.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CoefficientAdjoint {

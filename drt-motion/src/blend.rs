@@ -12,8 +12,7 @@
 //! of a site does, which is harmless.
 //!
 //! Away from a surface its distance may be any that goes over into the true one near it: with s the
-//! distance to the box around it, d that to the surface itself, and w rising smoothly from 0 at the
-//! box to 1 at a distance from it,
+//! distance interpolated on a lattice, d the true one, and w rising smoothly from 0 to 1 with s,
 //!
 //! ```text
 //! d_i = d + w (s - d),
@@ -27,6 +26,7 @@ use drt_geom::{TriangleBvh, nearest_point};
 use drt_math::{Affine, Mat3, Vec3};
 
 use crate::VolumeJet;
+use crate::distances::Distances;
 
 /// Something that moves on its own.
 #[derive(Clone, Debug)]
@@ -39,6 +39,14 @@ pub enum Site {
     Point(Vec3),
 }
 
+/// A site and what is prepared for it.
+#[derive(Clone, Debug)]
+struct Prepared {
+    site: Site,
+    /// Of a surface.
+    distances: Option<Distances>,
+}
+
 /// The weight of a site at a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SiteWeight {
@@ -48,53 +56,65 @@ pub struct SiteWeight {
     pub gradient: Vec3,
 }
 
-impl Site {
+impl Prepared {
+    fn new(site: Site) -> Self {
+        let distances = match &site {
+            Site::Surface(bvh) => Distances::new(bvh),
+            _ => None,
+        };
+        Self { site, distances }
+    }
+
     /// Its squared distance as λ, with half the gradient; infinitely far where there is nothing.
     fn squared_distance(&self, x: Vec3) -> SiteWeight {
         let to = |p: Vec3| SiteWeight { lambda: (x - p).length_squared(), gradient: x - p };
-        match self {
-            Self::Surface(bvh) => surface_distance(bvh, x).unwrap_or(NOWHERE),
-            Self::Triangle(t) => to(nearest_point(*t, x)),
-            Self::Point(p) => to(*p),
+        match &self.site {
+            Site::Surface(bvh) => match &self.distances {
+                Some(distances) => surface_distance(bvh, distances, x),
+                None => bvh.closest_point(x).map(|c| to(c.point)),
+            }
+            .unwrap_or(NOWHERE),
+            Site::Triangle(t) => to(nearest_point(*t, x)),
+            Site::Point(p) => to(*p),
         }
     }
 }
 
 const NOWHERE: SiteWeight = SiteWeight { lambda: f64::INFINITY, gradient: Vec3::ZERO };
 
-/// How far from the box around it, in diagonals of the box, a surface is no more than its box.
-const FAR: f64 = 0.2;
+/// Where interpolated distances begin to count, and where they alone do, in cubes of their lattice:
+/// the first is more than they can be off by.
+const FADE: [f64; 2] = [1.0, 2.0];
 
-fn surface_distance(bvh: &TriangleBvh, x: Vec3) -> Option<SiteWeight> {
-    let bounds = bvh.bounds();
-    let off = x - x.max(bounds.min).min(bounds.max);
-    let (s, far) = (off.length(), FAR * bounds.extent().length());
-    if s > 0.0 && s >= far {
-        return Some(SiteWeight { lambda: s * s, gradient: off });
+fn surface_distance(bvh: &TriangleBvh, distances: &Distances, x: Vec3) -> Option<SiteWeight> {
+    let far = distances.at(x);
+    let (s, [begin, end]) = (far.distance, FADE.map(|f| f * distances.width()));
+    if s >= end {
+        return Some(SiteWeight { lambda: s * s, gradient: far.gradient * s });
     }
-    let away = x - bvh.closest_point(x)?.point;
+    let away = x - bvh.closest_point_within(x, 1.001 * (s + distances.error()))?.point;
     let d = away.length();
-    if s == 0.0 || d == 0.0 {
+    if s <= begin || d == 0.0 {
         return Some(SiteWeight { lambda: d * d, gradient: away });
     }
-    let z = s / far;
-    let (w, slope) = (z * z * (3.0 - 2.0 * z), 6.0 * z * (1.0 - z) / far);
+    let z = (s - begin) / (end - begin);
+    let (w, slope) = (z * z * (3.0 - 2.0 * z), 6.0 * z * (1.0 - z) / (end - begin));
     let distance = d + w * (s - d);
-    let gradient = away * ((1.0 - w) / d) + off * ((w + slope * (s - d)) / s);
+    let gradient = away * ((1.0 - w) / d) + far.gradient * (w + slope * (s - d));
     Some(SiteWeight { lambda: distance * distance, gradient: gradient * distance })
 }
 
 /// The sites around a medium.
 #[derive(Clone, Debug, Default)]
 pub struct Blend {
-    sites: Vec<Site>,
+    sites: Vec<Prepared>,
 }
 
 impl Blend {
     /// A blend of these sites; empty surfaces count for nothing.
     #[must_use]
     pub fn new(sites: Vec<Site>) -> Self {
-        Self { sites }
+        Self { sites: sites.into_iter().map(Prepared::new).collect() }
     }
 
     /// Replaces `out` by the weights of all sites at `x`.
@@ -215,11 +235,13 @@ mod tests {
             blend_jet(&w, &v, x)
         };
         let h = 1e-6;
-        // In the box around the ball, next to it, and beyond where it counts.
+        // Near the ball, where its distance fades over into the interpolated one, and beyond.
         for x in [
             vec3(0.9, 0.4, 0.6),
+            vec3(1.01, 0.4, 0.2),
+            vec3(1.05, 0.4, 0.2),
             vec3(1.3, 0.4, 0.2),
-            vec3(-0.2, 1.6, -1.0),
+            vec3(-0.2, 1.6, -1.1),
             vec3(1.2, 1.3, 1.1),
             vec3(3.5, 0.4, 0.7),
         ] {
@@ -228,7 +250,11 @@ mod tests {
                 + (u(x + along(Vec3::Y)).u - u(x - along(Vec3::Y)).u).y
                 + (u(x + along(Vec3::Z)).u - u(x - along(Vec3::Z)).u).z)
                 / (2.0 * h);
-            assert!((u(x).j_dot - fd).abs() < 1e-7 * fd.abs().max(1.0), "{} {fd}", u(x).j_dot);
+            assert!(
+                (u(x).j_dot - fd).abs() < 1e-7 * fd.abs().max(1.0),
+                "{x:?} {} {fd}",
+                u(x).j_dot
+            );
         }
     }
 }

@@ -7,6 +7,7 @@ extern crate alloc;
 mod adjoint;
 mod blend;
 mod caged;
+mod distances;
 mod element;
 mod error;
 mod geometry;

@@ -65,6 +65,8 @@ pub(super) struct BoxPoint {
     pub(super) point: [f32; 3],
     /// Factor of the squared distances.
     pub(super) trust: f32,
+    /// The squared distance up to which boxes count.
+    pub(super) far: f32,
 }
 
 impl BoxFrame {
@@ -79,9 +81,9 @@ impl BoxFrame {
         ((p - self.center) * self.scale).to_array()
     }
 
-    /// Ratio of lengths in the tree's coordinates to lengths in the scene.
-    pub(super) fn scale(&self) -> f64 {
-        self.scale
+    /// A squared distance in the tree's coordinates. Never as far as boxes that are not there.
+    pub(super) fn squared(&self, squared: f64) -> f32 {
+        (squared * (self.scale * self.scale)).min(f32::MAX.into()) as f32
     }
 
     /// The padded box of some points, rounded outward.
@@ -95,13 +97,15 @@ impl BoxFrame {
         })
     }
 
-    /// A point for distances to boxes.
-    pub(super) fn point(&self, p: Vec3) -> BoxPoint {
+    /// A point for distances to boxes, of which those farther than the given squared distance do not
+    /// count.
+    pub(super) fn point(&self, p: Vec3, squared: f64) -> BoxPoint {
+        let far = self.squared(squared);
         let local = self.local(p);
         if local.iter().all(|c| c.abs() < REMOTE) {
-            BoxPoint { point: local.map(|c| c as f32), trust: 1.0 - 2.0 * PADDING as f32 }
+            BoxPoint { point: local.map(|c| c as f32), trust: 1.0 - 2.0 * PADDING as f32, far }
         } else {
-            BoxPoint { point: [0.0; 3], trust: 0.0 }
+            BoxPoint { point: [0.0; 3], trust: 0.0, far }
         }
     }
 

@@ -28,13 +28,20 @@ impl TriangleBvh {
     /// finite.
     #[must_use]
     pub fn closest_point(&self, p: Vec3) -> Option<ClosestPoint> {
-        if !p.is_finite() {
+        self.closest_point_within(p, f64::INFINITY)
+    }
+
+    /// [`TriangleBvh::closest_point`] if its distance is less than `radius`: the less, the faster.
+    #[must_use]
+    pub fn closest_point_within(&self, p: Vec3, radius: f64) -> Option<ClosestPoint> {
+        if !p.is_finite() || radius.is_nan() {
             return None;
         }
         let tree = self.tree.as_ref()?;
+        let squared = radius * radius;
         let mut best = ClosestPoint { point: p, prim: NONE, bary: [0.0; 2], distance: 0.0 };
-        let visitor = Nearest { bvh: self, p, squared: f64::INFINITY, best: &mut best };
-        self.machine.run(Walk { tree, query: self.frame.point(p), visitor });
+        let visitor = Nearest { bvh: self, p, squared, best: &mut best };
+        self.machine.run(Walk { tree, query: self.frame.point(p, squared), visitor });
         best.distance = (best.point - p).length();
         (best.prim != NONE).then_some(best)
     }
@@ -79,9 +86,7 @@ impl Visitor for Nearest<'_> {
                 self.compare(twin.prim, bary.map(one), point.map(one).into(), one(squared));
             }
         }
-        let scale = self.bvh.frame.scale();
-        // Never as far as boxes that are not there.
-        ControlFlow::Continue((self.squared * (scale * scale)).min(f32::MAX.into()) as f32)
+        ControlFlow::Continue(self.bvh.frame.squared(self.squared))
     }
 }
 

@@ -200,8 +200,8 @@ impl Query for BoxPoint {
         (sum.le(lanes.single(far)), sum.array())
     }
     fn far(self) -> f32 {
-        // No box that is there is as far as this, and the empty one is farther.
-        f32::MAX
+        // No box that is there is as far as the largest number, and the empty one is farther.
+        self.far
     }
 }
 

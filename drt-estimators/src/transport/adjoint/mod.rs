@@ -582,6 +582,8 @@ fn moves(v: &Vertex, interest: &Interest, camera: bool) -> bool {
 /// Sends what a vertex collected.
 fn send<S: AdjointSink>(v: &Vertex, adjoint: &SurfaceAdjoint, sink: &mut S) {
     match (&v.kind, v.medium) {
+        // Nothing reaches the vertex: where it would go needs no looking up.
+        _ if adjoint.is_zero() => {}
         (Kind::Surface(s), _) if sink.interest().shapes[s.shape as usize] => {
             sink.surface(&s.material(), adjoint);
         }
