@@ -123,27 +123,29 @@ impl Blend {
         // First, λ holds d² and the gradient half that of d².
         out.extend(self.sites.iter().map(|site| site.squared_distance(x)));
         let Some(least) = out.iter().map(|w| w.lambda).min_by(f64::total_cmp) else { return };
-        if least == 0.0 {
+        if least < f64::MIN_POSITIVE {
             // On a site: it alone counts, and derivatives of the weights vanish.
             let mut first = true;
             for w in out {
-                let on = w.lambda == 0.0 && first;
+                let on = w.lambda == least && first;
                 first &= !on;
                 *w = SiteWeight { lambda: f64::from(u8::from(on)), gradient: Vec3::ZERO };
             }
             return;
         }
-        let sum: f64 = out.iter().map(|w| least / w.lambda).sum();
-        let mut mean = Vec3::ZERO;
+        let (mut sum, mut mean) = (0.0, Vec3::ZERO);
         for w in out.iter_mut() {
+            let inverse = 1.0 / w.lambda;
             // ∇ ln d⁻² = -2 (x - nearest) / d².
-            let slope =
-                if w.lambda.is_finite() { w.gradient * (-2.0 / w.lambda) } else { Vec3::ZERO };
-            w.lambda = least / w.lambda / sum;
-            w.gradient = slope;
-            mean += slope * w.lambda;
+            w.gradient *= -2.0 * inverse;
+            w.lambda = least * inverse;
+            sum += w.lambda;
+            mean += w.gradient * w.lambda;
         }
+        let normalized = 1.0 / sum;
+        mean *= normalized;
         for w in out {
+            w.lambda *= normalized;
             w.gradient = (w.gradient - mean) * w.lambda;
         }
     }

@@ -60,11 +60,22 @@ pub(crate) struct Differentiator<'w> {
     locals: Vec<Local>,
     points: Vec<(f64, f64)>,
     rng: Rng,
+    /// The filter's gradient by the pixel position, over the density.
+    filter: [f64; 2],
+    /// Of the camera's importance and filter, per channel.
+    sensor: [SensorGradient; 3],
 }
 
 impl<'w> Differentiator<'w> {
     pub(crate) fn new(world: &'w World) -> Self {
-        Self { world, locals: Vec::new(), points: Vec::new(), rng: Rng::new(0, 0, 0) }
+        Self {
+            world,
+            locals: Vec::new(),
+            points: Vec::new(),
+            rng: Rng::new(0, 0, 0),
+            filter: [0.0; 2],
+            sensor: [SensorGradient::default(); 3],
+        }
     }
 
     /// Sends the gradient of the record's value to `sink`. `filter` holds the gradient by the pixel
@@ -78,12 +89,14 @@ impl<'w> Differentiator<'w> {
         sink: &mut S,
     ) {
         self.rng = rng;
+        self.filter = filter;
+        self.sensor = [SensorGradient::default(); 3];
         self.locals.clear();
         self.locals.resize(record.nodes.len(), Local::default());
         for k in (1..record.nodes.len()).rev() {
             self.node(record, k, sink);
         }
-        self.camera(record, filter, sink);
+        self.camera(sink);
     }
 
     fn node<S: AdjointSink>(&mut self, record: &PathRecord, k: usize, sink: &mut S) {
@@ -183,6 +196,9 @@ impl<'w> Differentiator<'w> {
                 here.u += g;
                 there.u -= g;
             }
+        }
+        if p == 0 {
+            self.seen(vertex, arrival.dir, value, parent.value, here, sink);
         }
         let crossings = &record.crossings[record.nodes[k].crossings.clone()];
         let path = Stretch {
@@ -457,72 +473,47 @@ impl<'w> Differentiator<'w> {
         }
     }
 
-    /// The camera: importance, filter and position.
-    fn camera<S: AdjointSink>(&mut self, record: &PathRecord, filter: [f64; 2], sink: &mut S) {
-        let world = self.world;
-        let camera = &world.camera;
-        let mut sensor = [SensorGradient::default(); 3];
-        let position = self.locals[0].at.u;
-        for k in 1..record.nodes.len() {
-            let node = &record.nodes[k];
-            let Some(arrival) = &node.arrival else { continue };
-            if arrival.parent != 0 {
-                continue;
-            }
-            let received = self.received(record, k);
-            let per_weight = arrival.arrival * received;
-            if per_weight.is_zero() {
-                continue;
-            }
-            let total = per_weight * record.nodes[0].value;
-            let vertex = node.vertex();
-            let x = vertex.map_or(camera.position() + arrival.dir, |v| v.x);
-            let projection = camera.view(x);
-            let mut at = [Vec3::ZERO; 3];
-            for (c, (v, t)) in per_weight.to_array().into_iter().zip(total.to_array()).enumerate() {
-                let (point, mut gradient) =
-                    camera.view_gradient(&projection, filter.map(|f| f * v), t);
-                if vertex.is_none() {
-                    // A direction has no parallax.
-                    gradient.position = Vec3::ZERO;
-                }
-                sensor[c] += gradient;
-                at[c] = point;
-            }
-            if let Some(v) = vertex {
-                let u = RgbVec { r: at[0], g: at[1], b: at[2] };
-                send(v, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() }, sink);
-            }
+    /// The camera's importance and filter towards a vertex, or the environment, that `value` reaches it
+    /// from per unit of the filter's weight.
+    fn seen<S: AdjointSink>(
+        &mut self,
+        vertex: Option<&Vertex>,
+        dir: Vec3,
+        value: Rgb,
+        weight: Rgb,
+        here: &mut SurfaceAdjoint,
+        sink: &S,
+    ) {
+        let interest = sink.interest();
+        if !(interest.sensor || vertex.is_some_and(|v| moves(v, interest, false))) {
+            return;
         }
-        if sink.interest().sensor {
-            for (g, p) in sensor.iter_mut().zip([position.r, position.g, position.b]) {
-                g.position += p;
+        let camera = &self.world.camera;
+        let x = vertex.map_or(camera.position() + dir, |v| v.x);
+        let projection = camera.view(x);
+        let total = (value * weight).to_array();
+        let mut at = [Vec3::ZERO; 3];
+        for (c, v) in value.to_array().into_iter().enumerate() {
+            let filter = self.filter.map(|f| f * v);
+            let (point, mut gradient) = camera.view_gradient(&projection, filter, total[c]);
+            if vertex.is_none() {
+                // A direction has no parallax.
+                gradient.position = Vec3::ZERO;
             }
-            sink.sensor(&sensor);
+            self.sensor[c] += gradient;
+            at[c] = point;
         }
+        here.u += RgbVec { r: at[0], g: at[1], b: at[2] };
     }
 
-    /// R_k of a child of the camera.
-    fn received(&self, record: &PathRecord, k: usize) -> Rgb {
-        let node = &record.nodes[k];
-        let Some(arrival) = &node.arrival else { return Rgb::ZERO };
-        let nee = record.connections[node.connections.clone()]
-            .iter()
-            .fold(Rgb::ZERO, |sum, (c, _)| sum + c.f * c.rest());
-        let collected = nee + node.value * node.inv_pdf * self.locals[k].children;
-        match &arrival.end {
-            Endpoint::Environment => {
-                self.world.lights.environment().map_or(Rgb::ZERO, |(_, l)| l)
-                    * arrival.emission_weight
+    /// What the camera collected.
+    fn camera<S: AdjointSink>(&mut self, sink: &mut S) {
+        if sink.interest().sensor {
+            let position = self.locals[0].at.u;
+            for (g, p) in self.sensor.iter_mut().zip([position.r, position.g, position.b]) {
+                g.position += p;
             }
-            Endpoint::Surface(v) => {
-                let emitted =
-                    v.surface().map_or(Rgb::ZERO, |s| self.world.emitted(s, -arrival.dir));
-                emitted * arrival.emission_weight + collected
-            }
-            Endpoint::Volume(_, c) => {
-                c.source() * arrival.emission_weight + c.sigma_s() * collected
-            }
+            sink.sensor(&self.sensor);
         }
     }
 }
