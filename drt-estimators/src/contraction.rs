@@ -3,9 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
-use drt_medium::{CoefficientGradients, CoefficientRates, MediumTangent};
 use drt_medium::{CoefficientGradients, CoefficientRates, DepthEstimate, MediumTangent};
-use drt_motion::{SiteWeight, VolumeMotion, blend_jet};
 
 use crate::emitter::EmitterGradient;
 use crate::inside::{Insides, Place};

@@ -13,7 +13,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!(
         "mesh                 triangles  positions   vertices  (added)     tetrahedra  seconds"
     );
-    println!("mesh                 triangles  positions   vertices  (added)     tetrahedra  seconds");
     // Cargo adds --bench.
     let paths: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
     if paths.is_empty() {
@@ -67,6 +66,5 @@ fn report(name: &str, mesh: &Mesh) {
         Err(error) => {
             println!("{name:20} {:9} after {seconds:.3} s: {error}", mesh.triangles.len())
         }
-        Err(error) => println!("{name:20} {:9} after {seconds:.3} s: {error}", mesh.triangles.len()),
     }
 }

@@ -44,9 +44,6 @@ pub use tetgen::{TetgenError, tetrahedralize_tetgen};
 pub use tetgen_sys;
 pub use tetrahedralize::{
     SurfaceTriangle, Tetrahedralization, TetrahedralizeError, TetrahedralizeInput, tetrahedralize,
-pub use tet::{TetMesh, TetVertexOrigin};
-pub use tetrahedralize::{
-    SurfaceTriangle, TetrahedralizeError, TetrahedralizeInput, Tetrahedralization, tetrahedralize,
 };
 pub use topology::{Edge, EdgeClass, Topology};
 #[cfg(feature = "spade")]

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use drt_geom::{
-    Aabb, Mesh, TetVertexOrigin, TetrahedralizeError, TetrahedralizeInput, Tetrahedralization,
+    Aabb, Mesh, TetVertexOrigin, Tetrahedralization, TetrahedralizeError, TetrahedralizeInput,
     procedural, tetrahedralize,
 };
 use drt_math::{Affine, CompensatedSum, Frame, Mat3, Rng, Vec3, vec3};
@@ -268,10 +268,10 @@ fn crossing_bodies_are_named() {
     assert!(crosses(s, t), "{s:?} {t:?}");
     // A needle through a sheet, and a sheet through a sheet.
     let sheet = procedural::grid(4, 4);
-    let needle =
-        Mesh::new(vec![vec3(0.1, 0.2, -1.0), vec3(0.11, 0.2, 1.0), vec3(0.1, 0.21, 1.0)], vec![[
-            0, 1, 2,
-        ]]);
+    let needle = Mesh::new(
+        vec![vec3(0.1, 0.2, -1.0), vec3(0.11, 0.2, 1.0), vec3(0.1, 0.21, 1.0)],
+        vec![[0, 1, 2]],
+    );
     assert!(matches!(
         fill(&[&sheet, &needle.unwrap()]),
         Err(TetrahedralizeError::Intersection { .. })
@@ -299,7 +299,11 @@ fn soup(cells: i32, rng: &mut Rng) -> Mesh {
         let centre = vec3(f64::from(cell.x), f64::from(cell.y), f64::from(cell.z));
         let (d, e) = (direction(rng), direction(rng));
         let thin = 1e-5 + rng.next_f64().powi(12);
-        positions.extend([centre + d * 0.49, centre - d * 0.49, centre + d * 0.2 + e * (0.2 * thin)]);
+        positions.extend([
+            centre + d * 0.49,
+            centre - d * 0.49,
+            centre + d * 0.2 + e * (0.2 * thin),
+        ]);
     }
     let triangles = (0..positions.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
     let triangles = triangles.collect();
@@ -311,7 +315,8 @@ fn soups_of_random_triangles_and_needles() {
     let mut rng = Rng::new(5, 0, 0);
     for _ in 0..8 {
         let soup = soup(6, &mut rng);
-        let points: Vec<Vec3> = (0..100).map(|_| point(&mut rng) * 3.0 + Vec3::splat(3.0)).collect();
+        let points: Vec<Vec3> =
+            (0..100).map(|_| point(&mut rng) * 3.0 + Vec3::splat(3.0)).collect();
         let made = checked(&[&soup], &points);
         println!("{} vertices added, {} tets", count_added(&made), made.mesh.tets.len());
     }

@@ -46,7 +46,10 @@ pub(super) fn insides(
                     Some((InsideKind::Tetrahedral(Some(given)), Some(path))) if path == *file => {
                         Arc::unwrap_or_clone(given)
                     }
-                    _ => GivenTetrahedra { mesh: tetrahedra(&folder.join(file))?, velocities: vec![] },
+                    _ => GivenTetrahedra {
+                        mesh: tetrahedra(&folder.join(file))?,
+                        velocities: vec![],
+                    },
                 };
                 if let (Some(file), Some(name)) = (&keys.velocities, &keys.parameter) {
                     let parameter = parameters.iter().position(|p| p.name == *name);

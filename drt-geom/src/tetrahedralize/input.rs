@@ -136,9 +136,6 @@ impl Merged {
                 let this = own(carrier.triangle, k);
                 let is_this =
                     |c: &Carrier| matches!(c.part, Part::Edge(k) if own(c.triangle, k) == this);
-                let edge = self.edges.entry(edge_key(corners[k], corners[(k + 1) % 3])).or_default();
-                let this = own(carrier.triangle, k);
-                let is_this = |c: &Carrier| matches!(c.part, Part::Edge(k) if own(c.triangle, k) == this);
                 if !edge.iter().any(is_this) {
                     edge.push(Carrier { triangle: carrier.triangle, part: Part::Edge(k) });
                 }

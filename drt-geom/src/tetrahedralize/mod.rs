@@ -22,15 +22,6 @@ mod walk;
 use delaunay::delaunay;
 use input::Merged;
 use recovery::Recovery;
-mod predicates;
-mod recovery;
-mod segments;
-mod triangles;
-mod walk;
-
-use delaunay::delaunay;
-use input::Merged;
-use recovery::Recovery;
 
 /// What to fill with tetrahedra.
 #[derive(Clone, Copy, Debug)]
@@ -73,7 +64,6 @@ pub enum TetrahedralizeError {
     #[error(
         "surface {surface} (from 0): vertex {vertex} has a coordinate that is not a finite number"
     )]
-    #[error("surface {surface} (from 0): vertex {vertex} has a coordinate that is not a finite number")]
     NonFinitePosition {
         /// Which surface.
         surface: usize,
@@ -124,31 +114,6 @@ pub enum TetrahedralizeError {
     /// The signs of determinants contradict each other: coordinates differ by more than 1e50 or so.
     #[error("the coordinates are too different in size: their determinants underflow")]
     Arithmetic,
-}
-
-impl core::fmt::Display for SurfaceTriangle {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "triangle {} of surface {} (from 0)", self.triangle, self.surface)
-    }
-}
-
-/// Fills a box around surfaces with tetrahedra that respect them: every triangle of the surfaces is
-/// a union of faces, some with added vertices on its edges or inside.
-///
-/// Triangles without area are skipped. Vertices that belong to no other triangle do not appear.
-///
-/// # Errors
-/// See [`TetrahedralizeError`]; above all when surfaces pass through each other.
-pub fn tetrahedralize(
-    input: &TetrahedralizeInput<'_>,
-) -> Result<Tetrahedralization, TetrahedralizeError> {
-    let merged = Merged::new(input)?;
-    let bounds = merged.enclosing_box(input.margin);
-    let complex = delaunay(&bounds, &merged.positions).ok_or(TetrahedralizeError::Arithmetic)?;
-    let mut recovery = Recovery::new(complex, &merged);
-    recovery.edges(&merged)?;
-    recovery.triangles(&merged)?;
-    Ok(recovery.finish(&merged))
 }
 
 impl core::fmt::Display for SurfaceTriangle {

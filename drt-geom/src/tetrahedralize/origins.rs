@@ -29,7 +29,6 @@ impl Recovery<'_> {
         let positions = self.complex.points.iter().map(|&p| p * unscaled).collect();
         result.mesh =
             TetMesh { positions, tets: self.complex.live().map(|t| t.vertices).collect() };
-        result.mesh = TetMesh { positions, tets: self.complex.live().map(|t| t.vertices).collect() };
         result
     }
 

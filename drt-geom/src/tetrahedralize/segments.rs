@@ -23,11 +23,6 @@ impl Recovery<'_> {
 
     /// Makes the segment between two vertices a chain of edges that stay.
     pub(super) fn segment(&mut self, ends: [u32; 2], list: u32) -> Result<(), TetrahedralizeError> {
-    pub(super) fn segment(
-        &mut self,
-        ends: [u32; 2],
-        list: u32,
-    ) -> Result<(), TetrahedralizeError> {
         let mut open = alloc::vec![ends];
         let mut parts = 0;
         while let Some([a, b]) = open.pop() {
@@ -104,9 +99,7 @@ impl Recovery<'_> {
         let meets = meets.ok_or(TetrahedralizeError::Arithmetic)?;
         let (p, tet, vertices) = match meets {
             Meets::Nothing | Meets::Vertex(_) => return Ok(meets),
-            Meets::Edge(edge, tet) => {
-                (self.complex.on_coplanar([a, b], edge), tet, edge.to_vec())
-            }
+            Meets::Edge(edge, tet) => (self.complex.on_coplanar([a, b], edge), tet, edge.to_vec()),
             Meets::Face(tet, corner) => {
                 let face = self.complex.tets[tet as usize].face(corner);
                 (self.complex.on_segment([a, b], face), tet, face.to_vec())
@@ -135,27 +128,6 @@ impl Recovery<'_> {
                 self.insert(p, &[tet, this.neighbors[corner]])
             }
         };
-        // Through an edge, or so near to one or to a vertex that rounding has put it there.
-        for &edge in &candidates {
-            let may = candidates.len() == 1 || !self.is_kept(edge) || self.is_on(edge, p);
-            if let Some(v) = may.then(|| self.split_edge(edge, tet, p)).flatten() {
-                return Ok(v);
-            }
-        }
-        let ends: Vec<u32> = candidates.into_iter().flatten().collect();
-        ends.into_iter().find(|&v| self.are_near(v, p)).ok_or_else(|| self.unrecovered(list))
-        ends.into_iter()
-            .find(|&v| self.are_near(v, p))
-        candidates
-            .into_iter()
-            .find_map(|e| self.split_near(e, tet, p))
-            .ok_or_else(|| self.unrecovered(list))
-    }
-
-    /// Splits an edge, unless it must stay and the point is not on it.
-    fn split_near(&mut self, edge: [u32; 2], tet: u32, p: Vec3) -> Option<u32> {
-        let may = !self.is_kept(edge) || self.is_on(edge, p);
-        may.then(|| self.split_edge(edge, tet, p)).flatten()
         added.ok_or_else(|| self.unrecovered(list))
     }
 

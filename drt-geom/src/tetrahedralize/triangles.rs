@@ -56,14 +56,6 @@ impl Recovery<'_> {
         rim
     }
 
-    /// Makes a triangle a face (none), or finds or adds a vertex on it.
-    fn recover_face(&mut self, t: [u32; 3], list: u32) -> Result<Option<u32>, TetrahedralizeError> {
-    fn recover_face(
-        &mut self,
-        t: [u32; 3],
-        list: u32,
-    ) -> Result<Option<u32>, TetrahedralizeError> {
-        let wanted = Wanted::Face(t);
     /// Clears a triangle, whose edges are there, of what passes through it.
     ///
     /// Once every edge through it is removed or split, it is a union of faces: none of the edges
@@ -150,44 +142,6 @@ impl Recovery<'_> {
         found
     }
 
-    /// An edge that must stay goes through a triangle: an intersection, unless it ends there.
-    fn obstacle(
-        &self,
-        t: [u32; 3],
-        through: &[([u32; 2], u32)],
-        list: u32,
-    ) -> Result<Option<u32>, TetrahedralizeError> {
-        for &(edge, _) in through {
-            let Some(kept) = self.kept_edges.get(&edge) else { continue };
-            let p = self.complex.on_triangle(t, edge);
-            let end = edge.into_iter().find(|&v| self.are_near(v, p));
-            return match end {
-                Some(v) => Ok(Some(v)),
-                None => Err(self.intersection(list, self.lists[kept.list as usize][0].triangle)),
-            };
-        }
-        Ok(None)
-    }
-
-    /// Splits an edge through a triangle, that nearest to its middle first.
-    fn divide_face(
-        &mut self,
-        t: [u32; 3],
-        mut through: Vec<([u32; 2], u32)>,
-        list: u32,
-    ) -> Result<u32, TetrahedralizeError> {
-        let middle = t
-            .iter()
-            .fold(drt_math::Vec3::ZERO, |m, &v| m + self.complex.points[v as usize] * (1.0 / 3.0));
-        let middle = t.iter().fold(drt_math::Vec3::ZERO, |m, &v| {
-            m + self.complex.points[v as usize] * (1.0 / 3.0)
-        });
-        let off = |c: &Complex, e| (c.on_triangle(t, e) - middle).length_squared();
-        through.sort_by(|a, b| off(&self.complex, a.0).total_cmp(&off(&self.complex, b.0)));
-        for &(edge, tet) in &through {
-            let p = self.complex.on_triangle(t, edge);
-            if let Some(v) = self.split_edge(edge, tet, p) {
-                return Ok(v);
     /// The faces between the vertices on a triangle must stay, and so must their edges.
     fn keep_faces(&mut self, plate: &Plate, list: u32) -> Result<(), TetrahedralizeError> {
         let triangle = self.lists[list as usize][0].triangle;
