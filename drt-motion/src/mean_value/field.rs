@@ -25,6 +25,8 @@ pub struct MeanValueField {
     ones: Vec<Moments>,
     /// In the order of the hierarchy.
     triangles: Vec<Placed>,
+    /// How many triangles there were, those that cancel included.
+    given: usize,
     unit: f64,
     exact: bool,
 }
@@ -84,6 +86,12 @@ impl MeanValueWeights {
 impl MeanValueField {
     /// A field between closed surfaces, given as triangles in any order and winding.
     ///
+    /// Surfaces are turned so that those inside one another alternate: the denominator of the
+    /// interpolation is then positive on one side of each and negative on the other, and vanishes
+    /// nowhere off them. Bodies may touch; triangles of the same three corners cancel in pairs, and
+    /// their velocities count for nothing. Where surfaces intersect, no winding alternates, and the
+    /// field may grow without bound near places inside.
+    ///
     /// # Errors
     /// When they are not closed or have one side only, or a connected part encloses no volume.
     pub fn new(triangles: &[[Vec3; 3]]) -> Result<Self, Cause> {
@@ -94,15 +102,16 @@ impl MeanValueField {
         let turned = orientation::alternating(&mesh)?;
         let unit = unit_of(mesh.bounds().extent().max_abs());
         let scaled: Vec<[Vec3; 3]> =
-            turned.iter().map(|t| t.map(|i| mesh.positions[i as usize] * unit)).collect();
+            turned.iter().map(|(_, t)| t.map(|i| mesh.positions[i as usize] * unit)).collect();
         let (clusters, order) = hierarchy::build(&scaled);
-        let placed = |&source: &u32| Placed {
-            triangle: Triangle::new(scaled[source as usize]),
-            source,
-            swapped: turned[source as usize] != mesh.triangles[source as usize],
+        let placed = |&i: &u32| {
+            let (source, corners) = turned[i as usize];
+            let swapped = corners != mesh.triangles[source as usize];
+            Placed { triangle: Triangle::new(scaled[i as usize]), source, swapped }
         };
         let triangles = order.iter().map(placed).collect();
-        let mut field = Self { clusters, ones: Vec::new(), triangles, unit, exact: false };
+        let given = mesh.triangles.len();
+        let mut field = Self { clusters, ones: Vec::new(), triangles, given, unit, exact: false };
         field.ones = field.moments(|_| [1.0; 3]);
         Ok(field)
     }
@@ -147,8 +156,8 @@ impl MeanValueField {
     /// # Errors
     /// When there is not one entry per triangle, or one is not finite.
     pub fn velocities(&self, corners: &[[Vec3; 3]]) -> Result<MeanValueVelocities, Cause> {
-        if corners.len() != self.triangles.len() {
-            let (expected, found) = (self.triangles.len(), corners.len());
+        if corners.len() != self.given {
+            let (expected, found) = (self.given, corners.len());
             return Err(Cause::MotionLength { expected, found });
         }
         crate::geometry::finite(
