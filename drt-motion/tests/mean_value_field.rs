@@ -5,7 +5,10 @@ mod common;
 use common::*;
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
-use drt_motion::{Cause, MeanValueField, MeanValueVelocities, MeanValueWeights, VolumeJet};
+use drt_motion::{
+    Cause, MeanValueField, MeanValueGradient, MeanValueVelocities, MeanValueWeights, VolumeAdjoint,
+    VolumeJet,
+};
 
 /// A bumpy body and a knot in a box, every third triangle wound the wrong way, with velocities that
 /// know no symmetry, linear on the triangles.
@@ -111,7 +114,7 @@ fn there_are_no_jumps_where_clusters_change_over() {
     let mut counts = Vec::new();
     let mut weights = MeanValueWeights::default();
     let (from, to) = (vec3(-2.9, -2.8, 2.3), vec3(2.7, 2.6, 2.5));
-    let n = 200_000;
+    let n = 60_000;
     let at = |i: usize| from + (to - from) * (i as f64 / n as f64);
     let [mut a, mut b] = [s.jet(at(0)), s.jet(at(1))];
     let (mut bend, mut bend_of_divergence): (f64, f64) = (0.0, 0.0);
@@ -126,8 +129,8 @@ fn there_are_no_jumps_where_clusters_change_over() {
     counts.dedup();
     println!("{} changes, bends {bend:e} {bend_of_divergence:e}", counts.len());
     assert!(counts.len() > 100);
-    // Second differences of smooth functions at steps of 4e-5 of the box.
-    assert!(bend < 2e-8 && bend_of_divergence < 2e-7, "{bend:e} {bend_of_divergence:e}");
+    // Second differences of smooth functions at steps of 1e-4 of the box.
+    assert!(bend < 2e-7 && bend_of_divergence < 2e-7, "{bend:e} {bend_of_divergence:e}");
 }
 
 #[test]
@@ -186,6 +189,29 @@ fn nested_surfaces_alternate_whatever_their_winding() {
         let bound = if x.length() < 0.95 { 1.2 } else { 4.0 };
         assert!(field.jet(&w, &velocities).u.length() < bound * largest, "{x:?}");
     }
+}
+
+#[test]
+fn scattering_is_the_transpose_of_jets() {
+    let mut rng = Rng::new(74, 0, 0);
+    let s = Setting::new(1.0, Vec3::ZERO);
+    let mut halves = [MeanValueGradient::zeros(&s.field), MeanValueGradient::zeros(&s.field)];
+    let mut w = MeanValueWeights::default();
+    let mut forward = 0.0;
+    for i in 0..200 {
+        let x = if i == 7 { s.soup[40][1] } else { random_vec(&mut rng) * 3.0 };
+        let a = VolumeAdjoint { u: random_vec(&mut rng), j: random_vec(&mut rng).x };
+        s.field.weights(x, &mut w);
+        let jet = s.field.jet(&w, &s.velocities);
+        forward += jet.u.dot(a.u) + jet.j_dot * a.j;
+        s.field.scatter(&w, &a, &mut halves[i % 2]);
+    }
+    let [mut gradient, other] = halves;
+    gradient.add(&other);
+    let corners = s.field.finish(&gradient);
+    let reverse: f64 =
+        corners.iter().flatten().zip(s.corners.iter().flatten()).map(|(g, v)| g.dot(*v)).sum();
+    assert!((forward - reverse).abs() < 1e-10 * forward.abs().max(1.0), "{forward} {reverse}");
 }
 
 #[test]

@@ -20,48 +20,48 @@ const FAR: f64 = 4.0;
 /// surfaces around it: mean value interpolation.
 #[derive(Clone, Debug)]
 pub struct MeanValueField {
-    clusters: Vec<Cluster>,
+    pub(super) clusters: Vec<Cluster>,
     /// Moments of the clusters for the constant 1.
     ones: Vec<Moments>,
     /// In the order of the hierarchy.
-    triangles: Vec<Placed>,
+    pub(super) triangles: Vec<Placed>,
     /// How many triangles there were, those that cancel included.
-    given: usize,
-    unit: f64,
+    pub(super) given: usize,
+    pub(super) unit: f64,
     exact: bool,
 }
 
 #[derive(Clone, Debug)]
-struct Placed {
-    triangle: Triangle,
+pub(super) struct Placed {
+    pub(super) triangle: Triangle,
     /// Its number in the list that was given.
-    source: u32,
+    pub(super) source: u32,
     /// Whether its second and third corner changed places.
-    swapped: bool,
+    pub(super) swapped: bool,
 }
 
 /// What a point sees of the surfaces: common to all parameters, and reused from point to point.
 #[derive(Clone, Debug, Default)]
 pub struct MeanValueWeights {
-    near: Vec<Near>,
-    distant: Vec<Distant>,
-    whole: MeanValueWeight,
+    pub(super) near: Vec<Near>,
+    pub(super) distant: Vec<Distant>,
+    pub(super) whole: MeanValueWeight,
 }
 
 /// A triangle that counts by itself.
 #[derive(Clone, Debug)]
-struct Near {
-    triangle: u32,
-    weights: [MeanValueWeight; 3],
+pub(super) struct Near {
+    pub(super) triangle: u32,
+    pub(super) weights: [MeanValueWeight; 3],
 }
 
 /// A cluster that counts by its moments.
 #[derive(Clone, Debug)]
-struct Distant {
-    cluster: u32,
+pub(super) struct Distant {
+    pub(super) cluster: u32,
     /// The part of it that does.
-    share: MeanValueWeight,
-    derivatives: Derivatives,
+    pub(super) share: MeanValueWeight,
+    pub(super) derivatives: Derivatives,
 }
 
 /// The velocities of all surfaces for one parameter.

@@ -68,6 +68,46 @@ impl Moments {
         }
     }
 
+    /// Transpose of [`add_part`](Self::add_part): adds to the gradient with respect to a part's
+    /// moments what it gets from that with respect to the whole's.
+    pub(super) fn add_part_transposed(&mut self, whole: &Self, t: Vec3) {
+        for degree in 1..=3 {
+            let count = monomials(degree);
+            let mut term = [0.0; 10];
+            term[..count].copy_from_slice(&whole.0[START[degree - 1]..][..count]);
+            let mut factor = 1.0;
+            for lower in (1..=degree).rev() {
+                self.add_degree(lower, &term, factor);
+                if lower > 1 {
+                    multiply_transposed(&mut term, lower - 1, t);
+                    factor /= (degree + 1 - lower) as f64;
+                }
+            }
+        }
+    }
+
+    /// Transpose of [`value`](Self::value).
+    pub(super) fn add_value_transposed(&mut self, p: &Derivatives, g: f64) {
+        for (m, p) in self.0.iter_mut().zip(&p.0) {
+            *m += p * g;
+        }
+    }
+
+    /// Transpose of [`slope`](Self::slope).
+    pub(super) fn add_slope_transposed(&mut self, p: &Derivatives, axis: usize, g: f64) {
+        for degree in 1..=3 {
+            let (start, next) = (START[degree - 1], START[degree]);
+            for k in 0..monomials(degree) {
+                self.0[start + k] -= p.0[next + raised(k, axis)] * g;
+            }
+        }
+    }
+
+    /// Sum of products.
+    pub(super) fn dot(&self, other: &Self) -> f64 {
+        self.0.iter().zip(&other.0).map(|(a, b)| a * b).sum()
+    }
+
     fn add_degree(&mut self, degree: usize, term: &[f64; 10], factor: f64) {
         let moments = &mut self.0[START[degree - 1]..][..monomials(degree)];
         for (m, t) in moments.iter_mut().zip(term) {
@@ -102,6 +142,15 @@ fn multiply(term: &mut [f64; 10], degree: usize, t: Vec3) {
         for axis in 0..3 {
             product[raised(k, axis)] += factor * t[axis];
         }
+    }
+    *term = product;
+}
+
+/// Transpose of [`multiply`].
+fn multiply_transposed(term: &mut [f64; 10], degree: usize, t: Vec3) {
+    let mut product = [0.0; 10];
+    for (k, p) in product.iter_mut().enumerate().take(monomials(degree)) {
+        *p = (0..3).map(|axis| term[raised(k, axis)] * t[axis]).sum();
     }
     *term = product;
 }
