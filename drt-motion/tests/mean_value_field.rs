@@ -278,7 +278,7 @@ fn surfaces_that_bound_nothing_are_refused() {
     let cause = |soup: &[[Vec3; 3]]| MeanValueField::new(soup).map(|_| ()).unwrap_err();
     let mut soup = procedural::cube().soup();
     let field = MeanValueField::new(&soup).unwrap();
-    let short = Cause::MotionLength { expected: 12, found: 11 };
+    let short = Cause::TriangleCount { expected: 12, found: 11 };
     assert_eq!(field.velocities(&[[Vec3::X; 3]; 11]).unwrap_err(), short);
     assert!(field.velocities(&[[Vec3::X * f64::NAN; 3]; 12]).is_err());
     soup.extend([[Vec3::X, Vec3::Y, Vec3::Z], [Vec3::X, Vec3::Z, Vec3::Y]]);

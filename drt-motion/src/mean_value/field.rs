@@ -2,7 +2,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use drt_geom::{Mesh, NONE};
-use drt_math::Vec3;
+use drt_math::{Vec3, vec3};
 
 use super::hierarchy::{self, Cluster};
 use super::moments::{Derivatives, Moments};
@@ -158,7 +158,7 @@ impl MeanValueField {
     pub fn velocities(&self, corners: &[[Vec3; 3]]) -> Result<MeanValueVelocities, Cause> {
         if corners.len() != self.given {
             let (expected, found) = (self.given, corners.len());
-            return Err(Cause::MotionLength { expected, found });
+            return Err(Cause::TriangleCount { expected, found });
         }
         crate::geometry::finite(
             corners.iter().flatten().all(|v| v.is_finite()),
@@ -212,7 +212,7 @@ impl MeanValueField {
             let ones = &self.ones[index as usize];
             let whole = MeanValueWeight {
                 value: ones.value(&derivatives),
-                gradient: [0, 1, 2].map(|axis| ones.slope(&derivatives, axis)).into(),
+                gradient: ones.gradient(&derivatives),
             };
             out.whole.add(&whole.times(&share));
             out.distant.push(Distant { cluster: index, share, derivatives });
@@ -276,12 +276,12 @@ impl MeanValueField {
         for d in &weights.distant {
             let slot = velocities.slots[d.cluster as usize];
             let Some(moments) = velocities.moments.get(slot as usize) else { continue };
-            let here = [0, 1, 2].map(|axis| moments[axis].value(&d.derivatives));
-            let slopes = [0, 1, 2].map(|axis| moments[axis].slope(&d.derivatives, axis));
-            let here = Vec3::from(here);
+            let [x, y, z] = moments;
+            let p = &d.derivatives;
+            let here = vec3(x.value(p), y.value(p), z.value(p));
+            let spread = x.slope(p, 0) + y.slope(p, 1) + z.slope(p, 2);
             u += here * d.share.value;
-            divergence +=
-                d.share.value * (slopes[0] + slopes[1] + slopes[2]) + here.dot(d.share.gradient);
+            divergence += d.share.value * spread + here.dot(d.share.gradient);
         }
         let inverse = 1.0 / weights.whole.value;
         if !inverse.is_finite() {

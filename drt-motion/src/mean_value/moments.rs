@@ -11,7 +11,7 @@
 //! of which the symmetric parts count only: they are kept as the coefficients of homogeneous
 //! polynomials. Monomial xᵃ yᵇ zᶜ of any degree is number m (m + 1) / 2 + c with m = b + c.
 
-use drt_math::Vec3;
+use drt_math::{Vec3, vec3};
 
 /// Monomials of degree 1 to 3.
 const MOMENTS: usize = 3 + 6 + 10;
@@ -28,6 +28,25 @@ const fn raised(monomial: usize, axis: usize) -> usize {
 const fn monomials(degree: usize) -> usize {
     (degree + 1) * (degree + 2) / 2
 }
+
+/// For each monomial of degree 1 to 3, counted through, its product with each coordinate.
+const RAISED: [[usize; 3]; MOMENTS] = {
+    let mut table = [[0; 3]; MOMENTS];
+    let mut degree = 1;
+    while degree <= 3 {
+        let mut k = 0;
+        while k < monomials(degree) {
+            let mut axis = 0;
+            while axis < 3 {
+                table[START[degree - 1] + k][axis] = START[degree] + raised(k, axis);
+                axis += 1;
+            }
+            k += 1;
+        }
+        degree += 1;
+    }
+    table
+};
 
 /// Moments of a function on a cluster's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,11 +114,8 @@ impl Moments {
 
     /// Transpose of [`slope`](Self::slope).
     pub(super) fn add_slope_transposed(&mut self, p: &Derivatives, axis: usize, g: f64) {
-        for degree in 1..=3 {
-            let (start, next) = (START[degree - 1], START[degree]);
-            for k in 0..monomials(degree) {
-                self.0[start + k] -= p.0[next + raised(k, axis)] * g;
-            }
+        for (m, raised) in self.0.iter_mut().zip(&RAISED) {
+            *m -= p.0[raised[axis]] * g;
         }
     }
 
@@ -124,12 +140,15 @@ impl Moments {
     /// Derivative of the integral as the point moves along an axis.
     #[inline]
     pub(super) fn slope(&self, p: &Derivatives, axis: usize) -> f64 {
-        let mut sum = 0.0;
-        for degree in 1..=3 {
-            let (start, next) = (START[degree - 1], START[degree]);
-            for k in 0..monomials(degree) {
-                sum -= self.0[start + k] * p.0[next + raised(k, axis)];
-            }
+        -self.0.iter().zip(&RAISED).map(|(m, raised)| m * p.0[raised[axis]]).sum::<f64>()
+    }
+
+    /// Gradient of the integral with respect to the point.
+    #[inline]
+    pub(super) fn gradient(&self, p: &Derivatives) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        for (m, [x, y, z]) in self.0.iter().zip(RAISED) {
+            sum -= vec3(p.0[x], p.0[y], p.0[z]) * *m;
         }
         sum
     }
@@ -157,6 +176,7 @@ fn multiply_transposed(term: &mut [f64; 10], degree: usize, t: Vec3) {
 
 impl Derivatives {
     /// At the place of the middle relative to the point.
+    #[inline]
     pub(super) fn at(Vec3 { x, y, z }: Vec3) -> Self {
         let (xx, yy, zz) = (x * x, y * y, z * z);
         let q = 1.0 / (xx + yy + zz);
@@ -211,7 +231,7 @@ impl Derivatives {
 
 #[cfg(test)]
 mod tests {
-    use drt_math::{Rng, vec3};
+    use drt_math::Rng;
 
     use super::*;
 
