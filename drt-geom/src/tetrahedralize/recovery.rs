@@ -22,7 +22,7 @@ use crate::NONE;
 pub(super) const ROUNDING: f64 = 1e-14;
 
 /// Changes tried at random before a vertex is added.
-pub(super) const MOST_TRIALS: u32 = 200;
+pub(super) const MOST_TRIALS: u32 = 60;
 
 /// Places tried for a vertex, within some roundings of where it should be.
 const MOST_PLACES: u32 = 16;
