@@ -103,17 +103,22 @@ impl<'a> Recovery<'a> {
         None
     }
 
-    /// Splits an inner edge of a tetrahedron at a point near it; what must stay does so in parts.
+    /// Splits an inner edge of a tetrahedron at a point near it.
     pub(super) fn split_edge(&mut self, [a, b]: [u32; 2], tet: u32, p: Vec3) -> Option<u32> {
         let ring = self.complex.ring(a, b, tet)?;
         let v = self.insert(p, &ring.tets)?;
         if let Some(&kept) = self.kept_edges.get(&edge_key(a, b)) {
-            self.keep_parts([a, b], kept.list, v);
-            self.keep_parts([a, v], kept.list, NONE);
-            self.keep_parts([v, b], kept.list, NONE);
-            self.own(v, kept.list);
+            self.split_kept([a, b], kept, v);
         }
         Some(v)
+    }
+
+    /// What must stay does so in parts.
+    pub(super) fn split_kept(&mut self, [a, b]: [u32; 2], kept: Kept, v: u32) {
+        self.keep_parts([a, b], kept.list, v);
+        self.keep_parts([a, v], kept.list, NONE);
+        self.keep_parts([v, b], kept.list, NONE);
+        self.own(v, kept.list);
     }
 
     /// Notes that an edge must stay, whole ([`NONE`]) or in two parts.

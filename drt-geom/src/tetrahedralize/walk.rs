@@ -10,8 +10,8 @@ use super::predicates::projected_areas;
 /// What the open segment from one vertex to another meets first.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Meets {
-    /// Nothing: it is an edge.
-    Nothing,
+    /// Nothing: it is an edge, of this tetrahedron.
+    Nothing(u32),
     Vertex(u32),
     /// The inside of an edge; also a tetrahedron that has it.
     Edge([u32; 2], u32),
@@ -22,8 +22,8 @@ pub(super) enum Meets {
 impl Complex {
     /// Looks from `a` to `b`, exactly. None only for points that are no vertices of the complex.
     pub(super) fn look(&mut self, a: u32, b: u32, star: &mut Vec<u32>) -> Option<Meets> {
-        if self.tet_with(a, b, star).is_some() {
-            return Some(Meets::Nothing);
+        if let Some(t) = self.tet_with(a, b, star) {
+            return Some(Meets::Nothing(t));
         }
         for &t in star.iter() {
             let tet = &self.tets[t as usize];
