@@ -27,6 +27,9 @@ pub(super) const MOST_TRIALS: u32 = 60;
 /// Places tried for a vertex, within some roundings of where it should be.
 const MOST_PLACES: u32 = 16;
 
+/// How many further tetrahedra make way for a vertex.
+const MOST_MORE: usize = 12;
+
 /// An edge that must stay.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kept {
@@ -86,15 +89,31 @@ impl<'a> Recovery<'a> {
         }
     }
 
-    /// Adds a vertex in the place of the given tetrahedra, at a point or a few roundings from it;
-    /// none when one of the new tetrahedra would not be positive.
-    pub(super) fn insert(&mut self, p: Vec3, old: &[u32]) -> Option<u32> {
+    /// Adds a vertex in the place of the given tetrahedra, and of more where these are thin as
+    /// rounding, at a point or a few roundings from it. None when that cannot be without losing
+    /// an edge that must stay, other than `split`.
+    pub(super) fn insert(
+        &mut self,
+        p: Vec3,
+        old: &[u32],
+        split: Option<[u32; 2]>,
+    ) -> Option<u32> {
         let v = self.complex.add_point(p);
         let step = p.max_abs() * f64::EPSILON;
         for trial in 0..MOST_PLACES {
-            if self.complex.replace_by_cone(old, v) {
-                self.owners.push(Vec::new());
-                return Some(v);
+            let mut cavity = old.to_vec();
+            while cavity.len() < old.len() + MOST_MORE {
+                match self.complex.replace_by_cone(&cavity, v) {
+                    Ok(()) => {
+                        self.owners.push(Vec::new());
+                        return Some(v);
+                    }
+                    Err(NONE) => break,
+                    Err(beyond) => cavity.push(beyond),
+                }
+                if self.loses(&cavity, split) {
+                    break;
+                }
             }
             let mut off = || (self.rng.next_f64() - 0.5) * step * f64::from(2 + trial / 4);
             self.complex.points[v as usize] = p + vec3(off(), off(), off());
@@ -103,10 +122,37 @@ impl<'a> Recovery<'a> {
         None
     }
 
+    /// Whether a vertex, or an edge or face that must stay, is not on the hull of tetrahedra.
+    fn loses(&mut self, tets: &[u32], split: Option<[u32; 2]>) -> bool {
+        let split = split.map(|[a, b]| edge_key(a, b));
+        let (mut vertices, mut edges, mut faces) = (Vec::new(), Vec::new(), Vec::new());
+        self.complex.hull(tets, |_, [x, y, z], _| {
+            vertices.extend([x, y, z]);
+            edges.extend([edge_key(x, y), edge_key(y, z), edge_key(z, x)]);
+            faces.push(sorted([x, y, z]));
+        });
+        tets.iter().any(|&t| {
+            let tet = &self.complex.tets[t as usize];
+            let v = tet.vertices;
+            let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+            let lost_edge = |&(i, j): &(usize, usize)| {
+                let edge = edge_key(v[i], v[j]);
+                Some(edge) != split && self.is_kept(edge) && !edges.contains(&edge)
+            };
+            let lost_face = |corner: usize| {
+                let face = sorted(tet.face(corner));
+                self.kept_faces.contains_key(&face) && !faces.contains(&face)
+            };
+            v.iter().any(|w| !vertices.contains(w))
+                || pairs.iter().any(lost_edge)
+                || (0..4).any(lost_face)
+        })
+    }
+
     /// Splits an inner edge of a tetrahedron at a point near it.
     pub(super) fn split_edge(&mut self, [a, b]: [u32; 2], tet: u32, p: Vec3) -> Option<u32> {
         let ring = self.complex.ring(a, b, tet)?;
-        let v = self.insert(p, &ring.tets)?;
+        let v = self.insert(p, &ring.tets, Some([a, b]))?;
         if let Some(&kept) = self.kept_edges.get(&edge_key(a, b)) {
             self.split_kept([a, b], kept, v);
         }

@@ -115,7 +115,7 @@ impl Recovery<'_> {
                 around.extend(across.tets);
                 around.sort_unstable();
                 around.dedup();
-                let v = self.insert(p, &around)?;
+                let v = self.insert(p, &around, Some([r, s]))?;
                 self.split_kept([r, s], kept, v);
                 return Some(v);
             }
@@ -161,7 +161,7 @@ impl Recovery<'_> {
             Meets::Face(tet, corner) => {
                 let this = self.complex.tets[tet as usize];
                 let p = self.complex.on_segment([a, b], this.face(corner));
-                self.insert(p, &[tet, this.neighbors[corner]])
+                self.insert(p, &[tet, this.neighbors[corner]], None)
             }
         };
         added.ok_or_else(|| self.unrecovered(list))

@@ -11,6 +11,9 @@ use super::plate::Plate;
 use super::recovery::{Kept, MOST_TRIALS, Recovery};
 use crate::NONE;
 
+/// Far more vertices on a triangle than are ever added but where all around is thin as rounding.
+const MOST_VERTICES: usize = 10_000;
+
 impl Recovery<'_> {
     pub(super) fn triangles(&mut self, merged: &Merged) -> Result<(), TetrahedralizeError> {
         for (corners, carriers) in &merged.triangles {
@@ -66,6 +69,9 @@ impl Recovery<'_> {
             let through = self.through(&mut plate);
             if through.is_empty() {
                 break;
+            }
+            if plate.vertices().len() > MOST_VERTICES {
+                return Err(self.unrecovered(list));
             }
             let kept = through.iter().find_map(|(e, _)| self.kept_edges.get(e));
             if let Some(kept) = kept {
