@@ -21,8 +21,10 @@ use crate::NONE;
 /// roundings.
 pub(super) const ROUNDING: f64 = 1e-14;
 
-/// Changes tried at random before a vertex is added.
-pub(super) const MOST_TRIALS: u32 = 60;
+/// Changes tried at random, in all and with some more for each vertex: where many edges are
+/// missing, trials cost more than the vertices that they save.
+const ALL_TRIALS: usize = 5000;
+const TRIALS_PER_VERTEX: usize = 4;
 
 /// Places tried for a vertex, within some roundings of where it should be.
 const MOST_PLACES: u32 = 16;
@@ -52,6 +54,7 @@ pub(super) struct Recovery<'a> {
     pub(super) named: &'a [Named],
     pub(super) star: Vec<u32>,
     rng: Rng,
+    trials: usize,
 }
 
 impl<'a> Recovery<'a> {
@@ -67,6 +70,7 @@ impl<'a> Recovery<'a> {
             named: &merged.named,
             star: Vec::new(),
             rng: Rng::new(4, 0, 0),
+            trials: ALL_TRIALS + TRIALS_PER_VERTEX * merged.positions.len(),
         }
     }
 
@@ -92,12 +96,7 @@ impl<'a> Recovery<'a> {
     /// Adds a vertex in the place of the given tetrahedra, and of more where these are thin as
     /// rounding, at a point or a few roundings from it. None when that cannot be without losing
     /// an edge that must stay, other than `split`.
-    pub(super) fn insert(
-        &mut self,
-        p: Vec3,
-        old: &[u32],
-        split: Option<[u32; 2]>,
-    ) -> Option<u32> {
+    pub(super) fn insert(&mut self, p: Vec3, old: &[u32], split: Option<[u32; 2]>) -> Option<u32> {
         let v = self.complex.add_point(p);
         let step = p.max_abs() * f64::EPSILON;
         for trial in 0..MOST_PLACES {
@@ -219,6 +218,11 @@ impl<'a> Recovery<'a> {
             && self.complex.remove_face(tet, corner, wanted, gain)
     }
 
+    /// How many changes may be tried at random before a vertex is added.
+    pub(super) fn allowance(&self) -> usize {
+        usize::min(200, self.trials / 16)
+    }
+
     /// Changes something near edges, each given with a tetrahedron, that leaves no more in the way
     /// than there is: after that there may be a change for the better. False when the trials are
     /// used up.
@@ -226,10 +230,11 @@ impl<'a> Recovery<'a> {
         &mut self,
         edges: &[([u32; 2], u32)],
         wanted: Wanted<'_>,
-        trials: &mut u32,
+        trials: &mut usize,
     ) -> bool {
         while *trials > 0 {
             *trials -= 1;
+            self.trials -= 1;
             let mut pick = |n: usize| self.rng.next_u32() as usize % n;
             let ([p, q], tet) = edges[pick(edges.len())];
             let Some(ring) = self.complex.ring(p, q, tet) else { continue };

@@ -5,7 +5,7 @@ use drt_math::Vec3;
 use super::TetrahedralizeError;
 use super::flips::Wanted;
 use super::input::{Merged, edge_key};
-use super::recovery::{Kept, MOST_TRIALS, ROUNDING, Recovery};
+use super::recovery::{Kept, ROUNDING, Recovery};
 use super::walk::Meets;
 use crate::NONE;
 
@@ -65,7 +65,7 @@ impl Recovery<'_> {
     fn recover(&mut self, ends: [u32; 2], list: u32) -> Result<u32, TetrahedralizeError> {
         let wanted = Wanted::Edge(ends);
         let [mut a, mut b] = ends;
-        let (mut stuck, mut trials) = (0, MOST_TRIALS);
+        let (mut stuck, mut trials) = (0, self.allowance());
         // Each change but the trials leaves fewer faces in the way, so this ends.
         while stuck < 2 {
             let (edge, tet, changed) = match self.look(a, b)? {
@@ -133,9 +133,7 @@ impl Recovery<'_> {
             Meets::Nothing | Meets::Vertex(_) => return Ok(meets),
             Meets::Edge(edge, tet) => (self.complex.on_coplanar([a, b], edge), tet, edge.to_vec()),
             Meets::Nothing(_) | Meets::Vertex(_) => return Ok(meets),
-            Meets::Edge(edge, tet) => {
-                (self.complex.on_coplanar([a, b], edge), tet, edge.to_vec())
-            }
+            Meets::Edge(edge, tet) => (self.complex.on_coplanar([a, b], edge), tet, edge.to_vec()),
             Meets::Face(tet, corner) => {
                 let face = self.complex.tets[tet as usize].face(corner);
                 (self.complex.on_segment([a, b], face), tet, face.to_vec())

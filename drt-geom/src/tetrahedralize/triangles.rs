@@ -8,7 +8,7 @@ use super::faces::sorted;
 use super::flips::Wanted;
 use super::input::{Merged, edge_key};
 use super::plate::Plate;
-use super::recovery::{Kept, MOST_TRIALS, Recovery};
+use super::recovery::{Kept, Recovery};
 use crate::NONE;
 
 /// Far more vertices on a triangle than are ever added but where all around is thin as rounding.
@@ -64,7 +64,7 @@ impl Recovery<'_> {
     /// Once every edge through it is removed or split, it is a union of faces: none of the edges
     /// that come of a split passes through it again. Vertices on it count as exactly on it.
     fn triangle(&mut self, mut plate: Plate, list: u32) -> Result<(), TetrahedralizeError> {
-        let mut trials = MOST_TRIALS;
+        let mut trials = self.allowance();
         loop {
             let through = self.through(&mut plate);
             if through.is_empty() {
