@@ -37,6 +37,7 @@ pub struct TetrahedralizeInput<'a> {
 
 /// A box full of tetrahedra, in which every surface triangle is a union of faces.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tetrahedralization {
     /// The tetrahedra; all have positive volume, by exact arithmetic on the coordinates.
     pub mesh: TetMesh,
@@ -49,6 +50,7 @@ pub struct Tetrahedralization {
 
 /// A triangle of one of several surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SurfaceTriangle {
     /// Index of the surface in the input.
     pub surface: u32,

@@ -55,7 +55,8 @@ impl Complex {
             return false;
         }
         let sides = [a, b].map(|end| self.orient([x, y, z, end]));
-        if sides[0] * sides[1] > 0.0 || sides == [0.0; 2] {
+        let same = sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0);
+        if same && (sides[0] == 0.0) == (sides[1] == 0.0) {
             return false;
         }
         let around = [[x, y], [y, z], [z, x]].map(|[v, w]| self.orient([a, b, v, w]));
