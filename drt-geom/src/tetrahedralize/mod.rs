@@ -1,4 +1,10 @@
 //! Tetrahedra around and inside triangle surfaces.
+//!
+//! The Delaunay tetrahedra of all vertices come first (Bowyer 1981, Watson 1981, on the predicates of
+//! Shewchuk 1997). Most edges and triangles of the surfaces are among theirs; missing ones are
+//! recovered by changes of connectivity, as Si 2015, "TetGen, a Delaunay-based quality tetrahedral
+//! mesh generator", does, and where these get stuck by adding a vertex where the edge or triangle
+//! meets what is in its way. All edges come before all triangles.
 
 use alloc::vec::Vec;
 
