@@ -130,8 +130,6 @@ impl Recovery<'_> {
         self.star = star;
         let meets = meets.ok_or(TetrahedralizeError::Arithmetic)?;
         let (p, tet, vertices) = match meets {
-            Meets::Nothing | Meets::Vertex(_) => return Ok(meets),
-            Meets::Edge(edge, tet) => (self.complex.on_coplanar([a, b], edge), tet, edge.to_vec()),
             Meets::Nothing(_) | Meets::Vertex(_) => return Ok(meets),
             Meets::Edge(edge, tet) => (self.complex.on_coplanar([a, b], edge), tet, edge.to_vec()),
             Meets::Face(tet, corner) => {
