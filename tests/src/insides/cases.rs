@@ -84,7 +84,7 @@ impl Draft {
         let half = further.len() as u32 / 2;
         let right = self.way("given tetrahedra, stirred", vec![given.kind()]);
         let lagging =
-            self.way("surfaces at 4/5 of their speed", vec![given.clone().lagging(0.8).kind()]);
+            self.way("surfaces at half their speed", vec![given.clone().lagging(0.5).kind()]);
         let torn = self.way("torn inside", vec![given.torn(half).kind()]);
         self.case.wrong.extend([lagging, torn]);
         Ok(self.right(right).case)
@@ -175,7 +175,7 @@ pub fn body_around_the_eye() -> Result<Case> {
 
 /// A slab of something translucent, half lit through.
 fn slab() -> Result<Set> {
-    let slab = block([4, 1, 3], vec3(0.9, 0.25, 0.7));
+    let slab = block([2, 1, 1], vec3(0.9, 0.25, 0.7));
     Ok(seen(vec3(0.3, 1.9, -2.0), Vec3::ZERO, 24.0, 3)?
         .medium("wax", fog([2.5, 2.0, 1.5], [0.9, 0.8, 0.6])?, Phase::henyey_greenstein(0.3)?)
         .interface("slab", slab, "wax", None)
@@ -210,13 +210,15 @@ pub fn stretched_slab() -> Result<Case> {
     draft.stirred(&["slab"], None, &scattered(16, vec3(0.8, 0.2, 0.6)))
 }
 
-/// A refractive ball with a medium in it, before a bright sky and a coloured wall.
+/// A refractive ball with a glowing medium in it, under a bright sky.
 fn glass_ball() -> Result<Set> {
     let ball = at(&icosphere(1), Vec3::splat(0.8), Vec3::ZERO);
     let glass = RoughDielectric { alpha: 0.5, eta: 1.2, ..RoughDielectric::default() };
     let floor = at(&cube(), vec3(2.0, 0.1, 2.0), vec3(0.0, -1.2, 0.0));
-    Ok(seen(vec3(0.3, 0.6, -2.6), Vec3::ZERO, 20.0, 4)?
-        .medium("syrup", fog([2.0, 2.5, 3.0], [0.9, 0.8, 0.7])?, Phase::henyey_greenstein(0.3)?)
+    let glow = Rgb::new(1.0, 0.8, 0.9);
+    let syrup = Homogeneous::new(Rgb::new(1.0, 1.4, 1.8), Rgb::new(0.7, 0.6, 0.5), glow)?;
+    Ok(seen(vec3(0.3, 0.6, -2.6), Vec3::ZERO, 36.0, 3)?
+        .medium("syrup", syrup, Phase::henyey_greenstein(0.3)?)
         .filled("ball", ball, Bsdf::RoughDielectric(glass), "syrup", None)
         .shape("floor", floor, diffuse([0.3, 0.2, 0.1]))
         .light("sky", Emitter::Constant { radiance: Rgb::new(0.8, 0.9, 1.0) }))
@@ -273,9 +275,8 @@ pub fn turning_grid() -> Result<Case> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn blob() -> Result<Case> {
-    let blob = at(&bumpy_sphere(1, 0.3, 3.0), Vec3::splat(0.8), Vec3::ZERO);
-    let breathes =
-        blob.positions.iter().map(|p| *p * (1.0 + 2.0 * p.x * p.y) + vec3(0.0, p.z, 0.0));
+    let blob = at(&bumpy_sphere(0, 0.3, 3.0), Vec3::splat(0.8), Vec3::ZERO);
+    let breathes = blob.positions.iter().map(|p| *p * (1.0 + p.x * p.y) + vec3(0.0, p.z, 0.0));
     let effects = [moves("blob", GeometryChange::VertexVelocity(breathes.collect()))];
     let set = seen(vec3(0.4, 0.5, -2.6), Vec3::ZERO, 24.0, 3)?
         .medium("milk", fog([3.0, 2.2, 1.5], [0.95, 0.8, 0.6])?, Phase::henyey_greenstein(0.4)?)
@@ -290,7 +291,7 @@ pub fn blob() -> Result<Case> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn nested() -> Result<Case> {
-    let ball = at(&icosphere(1), Vec3::splat(0.45), vec3(0.2, 0.1, -0.1));
+    let ball = at(&icosphere(0), Vec3::splat(0.45), vec3(0.2, 0.1, -0.1));
     let velocity = cube().positions.iter().map(|p| vec3(0.3 * p.y, 0.5 * p.y * p.z, 0.2)).collect();
     let effects = [
         translate("ball", vec3(0.6, 0.3, -0.4)),

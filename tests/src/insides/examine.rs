@@ -3,20 +3,17 @@
 use std::fmt;
 use std::time::Instant;
 
-use drt_estimators::{Agreement, Layer, Session, Settings, Unattended, agreement};
+use drt_estimators::{Agreement, Estimate, Layer, Session, Settings, Unattended, agreement};
+use drt_math::Rgb;
 
 use super::{Case, Way};
 use crate::Result;
 
-/// Samples per pixel of the first round; each further one doubles them.
+/// Samples per pixel of the first round.
 const ROUND: u32 = 1 << 9;
 
-/// How much is computed.
-#[derive(Clone, Copy, Debug)]
-struct Effort {
-    noise: f64,
-    samples: u32,
-}
+/// Rms z at which what is wrong has shown.
+const CLEAR: f64 = 2.0;
 
 /// A derivative image by one way, and whether it is that of the first.
 #[derive(Clone, Debug)]
@@ -57,65 +54,97 @@ impl Finding {
     }
 }
 
-/// Computes every way to a relative noise, or to a number of samples per pixel.
+/// Computes every right way to a relative noise, or to a number of samples per pixel, and every wrong
+/// one until it shows, at most with the samples of the first.
 ///
 /// # Errors
 /// When the library rejects the scene or a way.
 pub fn examine(case: &Case, noise: f64, samples: u32) -> Result<Finding> {
-    let mut first: Option<Run> = None;
+    let fail = |way: &Way, e: drt_estimators::Error| format!("{}, {}: {e}", case.name, way.name);
+    let mut right: Vec<Verdict> = Vec::new();
+    let mut wrong = Vec::new();
+    let mut first: Option<Layer> = None;
     let mut non_finite = 0;
-    let mut judge = |seed: u64, way: &Way, noise: f64| -> Result<Verdict> {
-        // Where velocities jump, the noise that the right ways reach may never come.
-        let samples = if noise > 0.0 { samples } else { first.as_ref().map_or(0, |f| f.samples) };
-        let run = compute(case, way, Effort { noise, samples }, seed)
-            .map_err(|e| format!("{}, {}: {e}", case.name, way.name))?;
-        non_finite += run.non_finite;
-        let first = first.get_or_insert_with(|| run.clone());
-        Ok(Verdict {
-            way: way.name,
-            agreement: agreement(&run.layer, &first.layer, None),
-            noise: run.layer.relative_noise(None),
-            samples: run.samples,
-            seconds: run.seconds,
-        })
-    };
     // Other random numbers for each, so that their errors are independent.
-    let right = (1..).zip(&case.right).map(|(seed, way)| judge(seed, way, noise));
-    let right = right.collect::<Result<_>>()?;
-    let wrong = (101..).zip(&case.wrong).map(|(seed, way)| judge(seed, way, 0.0));
-    let wrong = wrong.collect::<Result<_>>()?;
+    for (seed, way) in (1..).zip(&case.right) {
+        let mut run = Run::new(case, way, seed).map_err(|e| fail(way, e))?;
+        while run.noise() > noise && run.samples < samples {
+            run.go_on(noise, samples);
+        }
+        let other = first.get_or_insert_with(|| run.layer.clone());
+        right.push(run.verdict(way, other));
+        non_finite += run.non_finite;
+    }
+    let (first, samples) = (first.ok_or("a case needs a way")?, right[0].samples);
+    for (seed, way) in (101..).zip(&case.wrong) {
+        let mut run = Run::new(case, way, seed).map_err(|e| fail(way, e))?;
+        while compare(&run.layer, &first).rms_z < CLEAR && run.samples < samples {
+            run.go_on(noise, samples);
+        }
+        wrong.push(run.verdict(way, &first));
+    }
     Ok(Finding { name: case.name, limit: noise, right, wrong, non_finite })
 }
 
-#[derive(Clone)]
+/// The comparison of blocks in which something is seen: images here have fewer pixels than blocks.
+fn compare(a: &Layer, b: &Layer) -> Agreement {
+    let seen = |(a, b): &(&Estimate, &Estimate)| a.mean != Rgb::ZERO || b.mean != Rgb::ZERO;
+    let (x, y) = a.blocks.iter().zip(&b.blocks).filter(seen).unzip();
+    agreement(&Layer { blocks: x, ..a.clone() }, &Layer { blocks: y, ..b.clone() }, None)
+}
+
+/// A derivative image as far as it has been computed.
 struct Run {
+    session: Session,
+    start: Instant,
     layer: Layer,
     samples: u32,
-    seconds: f64,
     non_finite: u64,
 }
 
-fn compute(case: &Case, way: &Way, effort: Effort, seed: u64) -> Result<Run> {
-    let start = Instant::now();
-    let insides = way.insides.clone();
-    let settings = Settings { threads: 1, seed, insides, ..Settings::default() };
-    let mut session = Session::new(&case.scene, &[way.parameter.clone()], &settings)?;
-    let (mut samples, mut next) = (0, ROUND);
-    loop {
-        session.run(next, &Unattended);
-        samples += next;
-        let rendering = session.rendering();
-        let non_finite = rendering.non_finite;
-        let layer = rendering.derivatives.into_iter().next().ok_or("no derivative")?.total;
-        let left = layer.relative_noise(None) / effort.noise;
-        if left <= 1.0 || samples >= effort.samples {
-            let seconds = start.elapsed().as_secs_f64();
-            return Ok(Run { layer, samples, seconds, non_finite });
+impl Run {
+    fn new(case: &Case, way: &Way, seed: u64) -> std::result::Result<Self, drt_estimators::Error> {
+        let insides = way.insides.clone();
+        let settings = Settings { threads: 1, seed, insides, ..Settings::default() };
+        let start = Instant::now();
+        let session = Session::new(&case.scene, std::slice::from_ref(&way.parameter), &settings)?;
+        let layer = session.rendering().image;
+        let mut run = Self { session, start, layer, samples: 0, non_finite: 0 };
+        run.sample(ROUND);
+        Ok(run)
+    }
+
+    fn sample(&mut self, count: u32) {
+        self.session.run(count, &Unattended);
+        self.samples += count;
+        let rendering = self.session.rendering();
+        self.non_finite = rendering.non_finite;
+        self.layer = rendering.derivatives[0].total.clone();
+    }
+
+    /// Relative.
+    fn noise(&self) -> f64 {
+        let seen = self.layer.blocks.iter().filter(|b| b.mean != Rgb::ZERO).copied().collect();
+        Layer { blocks: seen, ..self.layer.clone() }.relative_noise(None)
+    }
+
+    /// Takes as many samples as the noise seen so far says are missing, and a little more, but no
+    /// more than twice as many as there are.
+    fn go_on(&mut self, noise: f64, most: u32) {
+        let left = self.noise() / noise;
+        let wanted = f64::from(self.samples) * (1.1 * left * left - 1.0);
+        let next = wanted.clamp(f64::from(ROUND), 2.0 * f64::from(self.samples)) as u32;
+        self.sample(next.min(most - self.samples));
+    }
+
+    fn verdict(&self, way: &Way, first: &Layer) -> Verdict {
+        Verdict {
+            way: way.name,
+            agreement: compare(&self.layer, first),
+            noise: self.noise(),
+            samples: self.samples,
+            seconds: self.start.elapsed().as_secs_f64(),
         }
-        // Up to the noise asked for by what has been seen, and a little further.
-        let wanted = (f64::from(samples) * (1.1 * left * left - 1.0)).ceil();
-        next = wanted.clamp(f64::from(ROUND), f64::from(4 * samples)) as u32;
-        next = next.min(effort.samples - samples);
     }
 }
 
