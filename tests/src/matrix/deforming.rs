@@ -107,7 +107,7 @@ pub fn still_wax() -> Result<Stage> {
 pub fn jelly() -> Result<Stage> {
     let scene = Set::new(vec3(0.3, 1.7, -2.6), Vec3::ZERO, 36.0, 4)?
         .medium("jelly", fog([0.8, 1.2, 1.6], [0.9, 0.8, 0.7])?, forward(0.4)?)
-        .filled("jelly", block([2, 1, 2], vec3(0.8, 0.4, 0.8)), glass(), "jelly", None)
+        .filled("block", block([2, 1, 2], vec3(0.8, 0.4, 0.8)), glass(), "jelly", None)
         .shape(
             "body",
             at(&cube(), vec3(0.3, 0.1, 0.25), vec3(0.1, 0.1, 0.0)),
@@ -121,10 +121,10 @@ pub fn jelly() -> Result<Stage> {
     let cells = vec![
         Cell::new(
             "body pushed in",
-            [translate("body", vec3(0.0, -0.5, 0.1)), flows(&scene, "jelly", below)],
+            [translate("body", vec3(0.0, -0.5, 0.1)), flows(&scene, "block", below)],
         )
         .representative(),
-        Cell::new("jelly shakes", [flows(&scene, "jelly", shakes)]),
+        Cell::new("jelly shakes", [flows(&scene, "block", shakes)]),
         Cell::new("body turns", [turn("body", vec3(0.2, 1.0, 0.3), vec3(0.1, 0.1, 0.0))]),
     ];
     Ok(inside(Stage::new("jelly", scene, cells), 1, &InsideKind::Tetrahedral(None)))
