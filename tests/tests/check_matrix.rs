@@ -33,3 +33,11 @@ stages! {
         stirred_smoke fine_milk fine_glass;
     caged: caged_milk caged_glass caged_solid;
 }
+
+/// Of any mesh: `DRT_BODY=bunny.obj cargo test --release -p drt-tests --test check_matrix -- --ignored scanned`
+#[test]
+#[ignore = "needs a mesh, named by DRT_BODY"]
+fn scanned_body() {
+    let path = std::env::var_os("DRT_BODY").expect("DRT_BODY names an OBJ file");
+    run(caged::scanned(path.as_ref()));
+}

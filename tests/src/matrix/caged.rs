@@ -1,11 +1,13 @@
-//! Stages whose bodies are deformed by cages.
+//! Stages whose bodies are deformed by cages: procedural ones, and any from a file.
 
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
 use std::sync::Arc;
 
 use drt_estimators::InsideKind;
 use drt_estimators::surface::Bsdf;
-use drt_geom::Mesh;
 use drt_geom::procedural::{bumpy_sphere, cube, icosphere};
+use drt_geom::{Mesh, load_obj, weld};
 use drt_math::{Vec3, vec3};
 use drt_motion::{Effect, GeometryChange};
 
@@ -77,4 +79,41 @@ pub fn caged_solid() -> Result<Stage> {
         .light("sun", sun())
         .scene;
     Ok(Stage::new("caged solid", scene, of_cage("solid", &cage, 7)))
+}
+
+/// A body from an OBJ file, translucent and without a surface of its own, in a cage of twenty
+/// triangles. Its holes are closed.
+///
+/// # Errors
+/// When the file cannot be read, or the library rejects it.
+pub fn scanned(path: &Path) -> Result<Stage> {
+    let read = load_obj(&std::fs::read(path)?, &path.display().to_string())?;
+    let bounds = read.bounds();
+    let size = 1.4 / bounds.extent().max_abs();
+    let scan = at(&closed(&read)?, Vec3::splat(size), -bounds.center() * size);
+    body("scanned", scan, Bsdf::Null, at(&icosphere(0), Vec3::splat(1.3), Vec3::ZERO))
+}
+
+/// The mesh with a fan across every loop of edges that have one face.
+fn closed(mesh: &Mesh) -> Result<Mesh> {
+    let first = weld(&mesh.positions);
+    let same = |t: &[u32; 3]| t.map(|v| first[v as usize]);
+    let mut triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(same).collect();
+    let mut positions = mesh.positions.clone();
+    let sides = |t: &[u32; 3]| [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+    let both: HashSet<[u32; 2]> = triangles.iter().flat_map(sides).collect();
+    let open = both.iter().filter(|[a, b]| !both.contains(&[*b, *a]));
+    let mut next: HashMap<u32, u32> = open.map(|[a, b]| (*a, *b)).collect();
+    while let Some(start) = next.keys().min().copied() {
+        let mut around = vec![start];
+        while let Some(to) = next.remove(&around[around.len() - 1]) {
+            around.push(to);
+        }
+        let count = around.len() - 1;
+        let sum = around[1..].iter().fold(Vec3::ZERO, |s, v| s + positions[*v as usize]);
+        let middle = positions.len() as u32;
+        positions.push(sum * (1.0 / count as f64));
+        triangles.extend(around.windows(2).map(|e| [e[1], e[0], middle]));
+    }
+    Ok(Mesh::new(positions, triangles)?)
 }

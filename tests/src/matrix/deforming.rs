@@ -151,7 +151,7 @@ pub fn sheared_glass() -> Result<Stage> {
     let shear = GeometryChange::Matrix(Affine { linear, translation: vec3(0.3, 0.1, 0.0) });
     let cells = vec![
         Cell::new("body sheared", [moves("body", shear)]).representative(),
-        Cell::new("body turns", [turn("body", vec3(0.2, 1.0, 0.3), vec3(0.4, 0.0, 0.0))]),
+        Cell::new("body turns", [turn("body", vec3(0.2, 1.0, 0.3), vec3(1.2, 0.0, 0.6))]),
     ];
     Ok(inside(Stage::new("sheared glass", scene, cells), 1, &InsideKind::Affine))
 }
