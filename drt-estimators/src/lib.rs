@@ -25,6 +25,7 @@ mod prepared;
 mod rendering;
 mod reverse;
 mod scene;
+mod scene_gradient;
 mod sensitivity;
 pub mod sensor;
 mod session;
@@ -39,9 +40,10 @@ pub use error::Error;
 pub use finite_difference::finite_differences;
 pub use plan::{MediumPlan, Plan};
 pub use rendering::{BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term};
-pub use reverse::{SceneGradient, gradient};
+pub use reverse::gradient;
 pub use scene::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding, Target,
 };
+pub use scene_gradient::SceneGradient;
 pub use session::{Control, FinishedTile, Session, Unattended};
 pub use settings::{EstimatorKind, GivenTetrahedra, InsideKind, Settings};
