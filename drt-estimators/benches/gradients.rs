@@ -23,14 +23,14 @@ const SEEDS: usize = 16;
 fn main() {
     let names: Vec<String> = std::env::args().skip(1).filter(|w| w != "--bench").collect();
     println!(
-        "{:18} {:12} {:>8} {:>11} {:>10} {:>9} {:>9} {:>9} {:>9}",
+        "{:18} {:12} {:>8} {:>11} {:>16} {:>9} {:>9} {:>9} {:>9}",
         "scene",
         "inside",
         "vertices",
         "prepared, s",
-        "us a path",
-        "noise %",
-        "shift %",
+        "gradient / image",
+        "noise",
+        "of shift",
         "largest",
         "work"
     );
@@ -57,7 +57,10 @@ fn compare(title: &str, scene: &Scene, shape: &str) {
     image.run(SPP, &Unattended);
     let light = image.rendering().image.total.mean.sum();
     let adjoint = [Rgb::splat(1.0 / light / PIXELS); PIXELS as usize];
-    let kinds = [("static", vec![(0, InsideKind::Static)]), ("tetrahedral", Vec::new())];
+    let kinds = [
+        ("static", vec![(0, InsideKind::Static)]),
+        ("tetrahedral", vec![(0, InsideKind::Tetrahedral(None))]),
+    ];
     let run = |kind: usize, spp, seed| -> Vec<Vec3> {
         let settings = Settings { spp, seed, insides: kinds[kind].1.clone(), ..settings.clone() };
         let g = gradient(scene, &[target], &settings, &adjoint, &Unattended);

@@ -36,17 +36,20 @@ use crate::{Error, tangents};
 /// by row from the top left, per channel).
 ///
 /// The inside of a medium moves with tetrahedra between the shapes that touch it, and the cameras and
-/// point lights in it, if any of them is wanted; what the tetrahedra collect is added to the gradients
-/// of those. So rates are finite next to surfaces that scatter. Forward mode does the same with
-/// [`InsideKind::Tetrahedral`](crate::InsideKind::Tetrahedral), and is then the exact transpose unless shapes touch that move
-/// differently: no field follows both, and the flux that it misses is added here.
+/// point lights in it, if paths have vertices on any of them that is wanted; what the tetrahedra
+/// collect is added to the gradients of those. So rates stay finite next to surfaces that scatter.
+/// Tetrahedra are made anew by every call, in 0.05 to 0.25 s per 1000 vertices around the medium.
 ///
 /// An inside stays static, and the flux through shapes that are wanted is added, which is right for
-/// every motion too but noisier, where shapes pass through each other, so that there are no tetrahedra;
-/// where paths scatter once and only black or index-matched shapes are wanted; and where
-/// [`Settings::insides`] asks for [`InsideKind::Static`](crate::InsideKind::Static). Given tetrahedra are taken, without
-/// velocities given along with them. The other kinds have no transpose here, and count as not asked
-/// for.
+/// every motion too, where no paths have vertices on what is wanted (null and black surfaces), where
+/// shapes pass through each other, so that there are no tetrahedra, and where [`Settings::insides`]
+/// asks for [`InsideKind::Static`](crate::InsideKind::Static).
+///
+/// If [`Settings::insides`] asks for [`InsideKind::Tetrahedral`](crate::InsideKind::Tetrahedral), given
+/// or not, these are taken, without velocities given along with them. For the same seed forward mode
+/// with the same settings is then the exact transpose, unless shapes touch that move differently: no
+/// field follows both, and the flux through what is left behind is added here. Other kinds of insides
+/// have no transpose here, and count as not asked for.
 ///
 /// # Errors
 /// When the adjoint's size is not the film's, the scene or a setting is unusable, or tetrahedra that

@@ -163,10 +163,10 @@ fn reverse_mode_skips_as_much() {
     assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples > 0);
     // So it is where surfaces pass through each other, or touch.
     for (at, why) in [(-1.1, "pass through"), (-1.0, "touch")] {
-        let scene = fog_with_a_block(at);
+        let scene = fog_with_a_block(at, 0.5);
         let block = scene.find("block").expect("a shape");
         assert!(run(&scene, &[block]).counters.flux_samples > 0, "{why}");
     }
-    let g = run(&fog_with_a_block(-0.7), &[Target::Shape(2)]);
+    let g = run(&fog_with_a_block(-0.7, 0.5), &[Target::Shape(2)]);
     assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples == 0);
 }

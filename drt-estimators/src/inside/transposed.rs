@@ -5,8 +5,9 @@
 //! tetrahedral one applies. Per medium:
 //!
 //! * nothing around it is asked for: static;
-//! * paths scatter once, and only surfaces without path vertices are asked for: static, with the flux
-//!   added, as in forward mode;
+//! * only surfaces without path vertices (null or black) are asked for: static, with the flux added.
+//!   Its variance is finite there, and less by single vertices than that of tetrahedra: these are as
+//!   thin as triangles are small, and reach far;
 //! * else: tetrahedra. Where surfaces touch, no field follows them both, and their flux is added: it
 //!   comes to nothing wherever the field does follow;
 //! * there are no tetrahedra, because surfaces pass through each other: static, with the flux.
@@ -91,7 +92,7 @@ impl TransposedInsides {
                 Some(tetrahedra::around(world, medium, &shapes, &points)?)
             }
             Some(InsideKind::Static) => None,
-            _ if world.max_depth <= 2 && !scatters() => None,
+            _ if !scatters() => None,
             _ => tetrahedra::around(world, medium, &shapes, &points).ok(),
         };
         let Some(field) = field else {

@@ -225,13 +225,13 @@ pub fn fog() -> Scene {
     b.camera(vec3(0.4, 0.8, 4.2), vec3(0.0, 0.1, 0.0), 4)
 }
 
-/// A block in a tub of fog whose floor is at -1; its own bottom is at `bottom`.
-pub fn fog_with_a_block(bottom: f64) -> Scene {
+/// A block in a tub of fog with a floor at -1, both of one reflectance; its own bottom is at `bottom`.
+pub fn fog_with_a_block(bottom: f64, reflectance: f64) -> Scene {
     let mut b = Build::default();
     let fog = homogeneous(Rgb::new(0.6, 0.5, 0.4), Rgb::new(0.9, 0.8, 0.7), Rgb::ZERO, 0.2);
     let fog = b.medium("fog", fog);
     b.interface("tub", procedural::cube().transform(&scaled(1.5, vec3(0.0, 0.25, 0.0))), fog, None);
-    let bsdf = b.bsdf("floor-bsdf", diffuse(0.7, 0.6, 0.5));
+    let bsdf = b.bsdf("floor-bsdf", diffuse(reflectance, reflectance, reflectance));
     b.shape(
         "floor",
         {
@@ -241,12 +241,14 @@ pub fn fog_with_a_block(bottom: f64) -> Scene {
         },
         bsdf,
     );
-    let bsdf = b.bsdf("block-bsdf", diffuse(0.3, 0.5, 0.6));
     let place = scaled(0.4, vec3(0.1, bottom + 0.4, 0.0));
     b.shape("block", procedural::cube().transform(&place), bsdf);
     b.light(
-        "bulb",
-        Emitter::Point { position: vec3(0.9, 0.8, 0.5), intensity: Rgb::new(3.0, 2.5, 2.0) },
+        "sun",
+        Emitter::Directional {
+            direction: vec3(0.4, -1.0, -0.3),
+            irradiance: Rgb::new(2.0, 2.5, 3.0),
+        },
     );
     b.camera(vec3(0.4, 0.8, 4.2), vec3(0.0, -0.2, 0.0), 4)
 }
