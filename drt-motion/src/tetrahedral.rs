@@ -195,15 +195,24 @@ fn velocity(origin: &TetVertexOrigin, carriers: &[Carrier<'_>], points: &[Vec3])
     }
 }
 
+/// Normals of surfaces that touch agree to rounding of their vertices, single precision included: what
+/// is missed for that alone, in units of the greatest speed, squared.
+const ROUNDING: f64 = 1e-10;
+
 /// The velocity that misses the others' along their normals least.
 fn agreement(owners: &[(Vec3, Vec3)]) -> Vec3 {
-    let missed = |u: &Vec3| -> f64 {
-        owners.iter().map(|(v, n)| (*u - *v).dot(*n)).map(|d| d * d).sum::<f64>()
+    let missed = |u: Vec3| -> f64 {
+        owners.iter().map(|(v, n)| (u - *v).dot(*n)).map(|d| d * d).sum::<f64>()
     };
-    let best = owners.iter().map(|(u, _)| (missed(u), *u)).reduce(|a, b| {
-        // Of equals, what moves: a body that slides over something at rest.
-        let moves = b.1.length_squared() > a.1.length_squared();
-        if b.0 < a.0 || (b.0 == a.0 && moves) { b } else { a }
+    let fastest = owners.iter().map(|(u, _)| u.length_squared()).fold(0.0, f64::max);
+    let best = owners.iter().map(|(u, _)| (missed(*u), *u)).reduce(|a, b| {
+        let better = if (b.0 - a.0).abs() > ROUNDING * fastest {
+            b.0 < a.0
+        } else {
+            // Of equals, what moves: a body that slides over something at rest.
+            b.1.length_squared() > a.1.length_squared()
+        };
+        if better { b } else { a }
     });
     best.map_or(Vec3::ZERO, |(_, u)| u)
 }
