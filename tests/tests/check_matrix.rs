@@ -30,7 +30,7 @@ stages! {
     lights: spot point_and_sun;
     media: fog_box blob still_blob smoke glass dented_glass beam layers sheet ember;
     deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed lantern
-        stirred_smoke fine_milk fine_glass;
+        stirred_smoke still_smoke fine_milk fine_glass;
     caged: caged_milk caged_glass caged_solid;
 }
 

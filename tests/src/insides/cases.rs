@@ -76,28 +76,50 @@ impl Draft {
         self.by("affine", &InsideKind::Affine)
     }
 
-    /// With tetrahedra of our own: those right that are stirred, those wrong that lag behind the
-    /// surfaces, or are torn around half of the further vertices.
-    fn stirred(mut self, surfaces: &[&str], eye: Option<Vec3>, further: &[Vec3]) -> Result<Case> {
+    /// With tetrahedra of our own around the first medium: those right that are stirred, those wrong
+    /// that are torn around some of the first of the further vertices.
+    fn stirred(
+        mut self,
+        surfaces: &[&str],
+        eye: Option<Vec3>,
+        further: &[Vec3],
+        torn: u32,
+    ) -> Result<(Self, Stirred)> {
         let Self { case, parameter } = &self;
         let given = Stirred::new(&case.scene, parameter, surfaces, eye, further, SPEED)?;
-        let half = further.len() as u32 / 2;
+        let torn = self.way("torn inside", vec![given.clone().torn(torn).kind()]);
+        self.case.wrong.push(torn);
         let right = self.way("given tetrahedra, stirred", vec![given.kind()]);
-        let lagging =
-            self.way("surfaces at half their speed", vec![given.clone().lagging(0.5).kind()]);
-        let torn = self.way("torn inside", vec![given.torn(half).kind()]);
-        self.case.wrong.extend([lagging, torn]);
-        Ok(self.right(right).case)
+        Ok((self.right(right), given))
+    }
+
+    /// The same, and wrong where vertices on surfaces lag behind. Next to surfaces that scatter that
+    /// would hide in noise without bounds.
+    fn stirred_and_lagging(self, surfaces: &[&str], further: &[Vec3]) -> Result<Case> {
+        let half = further.len() as u32 / 2;
+        let (mut draft, given) = self.stirred(surfaces, None, further, half)?;
+        let lagging = draft.way("surfaces at half their speed", vec![given.lagging(0.5).kind()]);
+        draft.case.wrong.push(lagging);
+        Ok(draft.case)
     }
 
     /// With a field right but for its divergence, which is `divergence` everywhere: without it, each
-    /// volume vertex counts as if the albedo fell at that rate.
-    fn without_divergence(mut self, medium: &str, divergence: f64) -> Self {
+    /// volume vertex counts as if the medium scattered and glowed less at that rate, and absorbed more.
+    fn without_divergence(mut self, divergence: f64) -> Result<Self> {
+        let medium = &self.case.scene.media[0];
+        let id = medium.id.clone().ok_or("a medium without a name")?;
+        let now = medium.item.homogeneous().ok_or("a medium that varies")?.coefficients();
+        // Emission is per absorption, which grows as the albedo falls.
+        let glows = now.emission.to_array().into_iter().zip(now.albedo.to_array());
+        let dims = glows.map(|(e, albedo)| -divergence * e / (1.0 - albedo));
+        let dims: Vec<f64> = dims.collect();
         let mut way = self.way("divergence dropped", vec![(0, InsideKind::Affine)]);
-        let falls = changes(medium, "albedo", ValueChange::Multiply(-divergence));
-        way.parameter.effects.push(falls);
+        way.parameter.effects.extend([
+            changes(&id, "albedo", ValueChange::Multiply(-divergence)),
+            changes(&id, "emission", ValueChange::Add(Rgb::new(dims[0], dims[1], dims[2]))),
+        ]);
         self.case.wrong.push(way);
-        self
+        Ok(self)
     }
 }
 
@@ -154,11 +176,8 @@ fn around_body() -> Vec<Vec3> {
 pub fn black_body_in_fog() -> Result<Case> {
     let set = foggy(seen(vec3(0.3, 0.4, -3.6), vec3(0.2, 0.1, 0.0), 20.0, 3)?, 0.0)?;
     let effects = [translate("body", vec3(0.8, 0.5, -0.2))];
-    Draft::new("black body moves in fog", set, effects).at_rest().stirred(
-        &["border", "body"],
-        None,
-        &around_body(),
-    )
+    let draft = Draft::new("black body moves in fog", set, effects).at_rest();
+    draft.stirred_and_lagging(&["border", "body"], &around_body())
 }
 
 /// A grey body turns in the fog that the camera is in.
@@ -170,7 +189,9 @@ pub fn body_around_the_eye() -> Result<Case> {
     let set = foggy(seen(eye, vec3(0.1, 0.0, 0.1), 70.0, 3)?, 0.5)?;
     let effects = [turn("body", vec3(0.3, 1.0, 0.2), BODY + vec3(0.3, 0.0, 0.0))];
     let draft = Draft::new("grey body turns in fog, camera inside", set, effects);
-    draft.stirred(&["border", "body"], Some(eye), &around_body())
+    let points = around_body();
+    let half = points.len() as u32 / 2;
+    Ok(draft.stirred(&["border", "body"], Some(eye), &points, half)?.0.case)
 }
 
 /// A slab of something translucent, half lit through.
@@ -195,7 +216,7 @@ pub fn bent_slab() -> Result<Case> {
     });
     let effects = [moves("slab", GeometryChange::VertexVelocity(bends.collect()))];
     let draft = Draft::new("translucent slab bends", set, effects).at_rest();
-    draft.stirred(&["slab"], None, &scattered(16, vec3(0.8, 0.2, 0.6)))
+    draft.stirred_and_lagging(&["slab"], &scattered(16, vec3(0.8, 0.2, 0.6)))
 }
 
 /// The slab is stretched, so that one affine field does.
@@ -206,8 +227,8 @@ pub fn stretched_slab() -> Result<Case> {
     let factor = vec3(0.3, 0.8, -0.2);
     let effects = [grow("slab", factor, vec3(0.3, -0.25, 0.0))];
     let draft = Draft::new("translucent slab grows", slab()?, effects).at_rest().affine();
-    let draft = draft.without_divergence("wax", factor.x + factor.y + factor.z);
-    draft.stirred(&["slab"], None, &scattered(16, vec3(0.8, 0.2, 0.6)))
+    let draft = draft.without_divergence(factor.x + factor.y + factor.z)?;
+    draft.stirred_and_lagging(&["slab"], &scattered(16, vec3(0.8, 0.2, 0.6)))
 }
 
 /// A refractive ball with a glowing medium in it, under a bright sky.
@@ -224,6 +245,12 @@ fn glass_ball() -> Result<Set> {
         .light("sky", Emitter::Constant { radiance: Rgb::new(0.8, 0.9, 1.0) }))
 }
 
+/// The middle of the ball, and points around it that keep what is torn there away from the surface.
+fn shell() -> Vec<Vec3> {
+    let around = scattered(24, Vec3::splat(1.0)).into_iter().map(|p| p.normalize() * 0.5);
+    std::iter::once(Vec3::ZERO).chain(around).collect()
+}
+
 /// A refractive ball of syrup moves and swells.
 ///
 /// # Errors
@@ -233,7 +260,8 @@ pub fn glass_ball_moves() -> Result<Case> {
     let field = Affine { linear: strain, translation: vec3(0.4, 0.3, -0.3) };
     let effects = [moves("ball", GeometryChange::Matrix(field))];
     let draft = Draft::new("refractive ball moves and swells", glass_ball()?, effects).affine();
-    draft.stirred(&["ball"], None, &scattered(16, Vec3::splat(0.4)))
+    let draft = draft.without_divergence(strain.trace())?;
+    Ok(draft.stirred(&["ball"], None, &shell(), 1)?.0.case)
 }
 
 /// The ball deforms.
@@ -246,7 +274,7 @@ pub fn glass_ball_deforms() -> Result<Case> {
     let velocity = mesh.positions.iter().map(|p| vec3(p.x + p.y * p.z, 0.8 * p.y, p.x * p.x));
     let effects = [moves("ball", GeometryChange::VertexVelocity(velocity.collect()))];
     let draft = Draft::new("refractive ball deforms", set, effects);
-    draft.stirred(&["ball"], None, &scattered(16, Vec3::splat(0.4)))
+    Ok(draft.stirred(&["ball"], None, &shell(), 1)?.0.case)
 }
 
 /// Smoke in a box that turns with it.
@@ -260,14 +288,14 @@ pub fn turning_grid() -> Result<Case> {
     let grid = Grid::new([size; 3], 1, values)?.with_layout(Layout::NodeCentred);
     let [albedo, glow] = [[0.9, 0.7, 0.5].into(), Rgb::ZERO].map(Volume::Constant);
     let smoke = GridMedium::new(grid.with_placement(place)?, 1.5, albedo, glow)?;
-    let set = seen(vec3(0.3, 0.8, -3.0), Vec3::ZERO, 30.0, 3)?
+    let set = seen(vec3(0.3, 0.95, -3.0), Vec3::ZERO, 30.0, 3)?
         .medium("smoke", smoke, Phase::henyey_greenstein(-0.2)?)
         .interface("box", at(&cube(), Vec3::splat(0.8), Vec3::ZERO), "smoke", None)
         .light("sun", sun());
     let ride = Effect { target: "smoke".into(), change: Change::Follow("box".into()) };
     let effects = [turn("box", vec3(0.2, 1.0, 0.3), vec3(0.5, 0.0, 0.0)), ride];
     let draft = Draft::new("cube turns with its grid", set, effects).at_rest().affine();
-    draft.stirred(&["box"], None, &scattered(16, Vec3::splat(0.7)))
+    draft.stirred_and_lagging(&["box"], &scattered(16, Vec3::splat(0.7)))
 }
 
 /// A blob without a surface of its own deforms.
@@ -283,7 +311,7 @@ pub fn blob() -> Result<Case> {
         .interface("blob", blob, "milk", None)
         .light("sun", sun());
     let draft = Draft::new("null-bounded blob deforms", set, effects).at_rest();
-    draft.stirred(&["blob"], None, &scattered(16, Vec3::splat(0.35)))
+    draft.stirred_and_lagging(&["blob"], &scattered(16, Vec3::splat(0.35)))
 }
 
 /// A ball of one medium moves in a box of another, which deforms.
@@ -307,5 +335,5 @@ pub fn nested() -> Result<Case> {
     let further = scattered(30, Vec3::splat(0.9)).into_iter();
     let further: Vec<Vec3> =
         further.filter(|p| (*p - vec3(0.2, 0.1, -0.1)).length() > 0.6).collect();
-    draft.stirred(&["box", "ball"], None, &further)
+    draft.stirred_and_lagging(&["box", "ball"], &further)
 }
