@@ -27,13 +27,13 @@ macro_rules! insides {
 }
 
 insides! {
-    black_body_in_fog: 0.04;
+    black_body_in_fog: 0.06;
     body_around_the_eye: 0.1;
     bent_slab: 0.05;
-    stretched_slab: 0.03;
+    stretched_slab: 0.04;
     glass_ball_moves: 0.08;
     glass_ball_deforms: 0.08;
     turning_grid: 0.06;
     blob: 0.04;
-    nested: 0.06;
+    nested: 0.08;
 }

@@ -245,11 +245,16 @@ fn glass_ball() -> Result<Set> {
         .light("sky", Emitter::Constant { radiance: Rgb::new(0.8, 0.9, 1.0) }))
 }
 
-/// The middle of the ball, and points around it that keep what is torn there away from the surface.
+/// Points in the middle of the ball, of which the first `TORN` are torn out, and others around them
+/// that keep that away from the surface.
 fn shell() -> Vec<Vec3> {
-    let around = scattered(24, Vec3::splat(1.0)).into_iter().map(|p| p.normalize() * 0.5);
-    std::iter::once(Vec3::ZERO).chain(around).collect()
+    let middle = scattered(TORN as usize, Vec3::splat(0.25));
+    let around = scattered(32, Vec3::splat(1.0)).into_iter().map(|p| p.normalize() * 0.55);
+    middle.into_iter().chain(around).collect()
 }
+
+/// Points that lose their tetrahedra in the ball.
+const TORN: u32 = 6;
 
 /// A refractive ball of syrup moves and swells.
 ///
@@ -261,7 +266,7 @@ pub fn glass_ball_moves() -> Result<Case> {
     let effects = [moves("ball", GeometryChange::Matrix(field))];
     let draft = Draft::new("refractive ball moves and swells", glass_ball()?, effects).affine();
     let draft = draft.without_divergence(strain.trace())?;
-    Ok(draft.stirred(&["ball"], None, &shell(), 1)?.0.case)
+    Ok(draft.stirred(&["ball"], None, &shell(), TORN)?.0.case)
 }
 
 /// The ball deforms.
@@ -274,7 +279,7 @@ pub fn glass_ball_deforms() -> Result<Case> {
     let velocity = mesh.positions.iter().map(|p| vec3(p.x + p.y * p.z, 0.8 * p.y, p.x * p.x));
     let effects = [moves("ball", GeometryChange::VertexVelocity(velocity.collect()))];
     let draft = Draft::new("refractive ball deforms", set, effects);
-    Ok(draft.stirred(&["ball"], None, &shell(), 1)?.0.case)
+    Ok(draft.stirred(&["ball"], None, &shell(), TORN)?.0.case)
 }
 
 /// Smoke in a box that turns with it.

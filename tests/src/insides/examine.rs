@@ -15,6 +15,9 @@ const ROUND: u32 = 1 << 9;
 /// Rms z at which what is wrong has shown.
 const CLEAR: f64 = 2.0;
 
+/// Samples of what is wrong before it counts as unnoticed, over those of the first way.
+const PATIENCE: u32 = 4;
+
 /// A derivative image by one way, and whether it is that of the first.
 #[derive(Clone, Debug)]
 pub struct Verdict {
@@ -55,7 +58,7 @@ impl Finding {
 }
 
 /// Computes every right way to a relative noise, or to a number of samples per pixel, and every wrong
-/// one until it shows, at most with the samples of the first.
+/// one until it shows, at most with a few times the samples of the first.
 ///
 /// # Errors
 /// When the library rejects the scene or a way.
@@ -75,7 +78,7 @@ pub fn examine(case: &Case, noise: f64, samples: u32) -> Result<Finding> {
         right.push(run.verdict(way, other));
         non_finite += run.non_finite;
     }
-    let (first, samples) = (first.ok_or("a case needs a way")?, right[0].samples);
+    let (first, samples) = (first.ok_or("a case needs a way")?, PATIENCE * right[0].samples);
     for (seed, way) in (101..).zip(&case.wrong) {
         let mut run = Run::new(case, way, seed).map_err(|e| fail(way, e))?;
         while compare(&run.layer, &first).rms_z < CLEAR && run.samples < samples {
