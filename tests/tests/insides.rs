@@ -8,7 +8,7 @@ use drt_tests::Result;
 use drt_tests::insides::{Case, Table, cases, examine};
 
 fn check(case: Result<Case>, noise: f64) {
-    let finding = examine(&case.unwrap(), noise, 1 << 20).unwrap();
+    let finding = examine(&case.unwrap(), noise, 1 << 22).unwrap();
     println!("{}", Table(&finding));
     assert!(finding.holds());
 }

@@ -77,7 +77,7 @@ impl Draft {
     }
 
     /// With tetrahedra of our own around the first medium: those right that are stirred, those wrong
-    /// that are torn around some of the first of the further vertices.
+    /// that are torn around the first of the further vertices, if any.
     fn stirred(
         mut self,
         surfaces: &[&str],
@@ -87,8 +87,10 @@ impl Draft {
     ) -> Result<(Self, Stirred)> {
         let Self { case, parameter } = &self;
         let given = Stirred::new(&case.scene, parameter, surfaces, eye, further, SPEED)?;
-        let torn = self.way("torn inside", vec![given.clone().torn(torn).kind()]);
-        self.case.wrong.push(torn);
+        if torn > 0 {
+            let way = self.way("torn inside", vec![given.clone().torn(torn).kind()]);
+            self.case.wrong.push(way);
+        }
         let right = self.way("given tetrahedra, stirred", vec![given.kind()]);
         Ok((self.right(right), given))
     }
@@ -248,13 +250,13 @@ fn glass_ball() -> Result<Set> {
 /// Points in the middle of the ball, of which the first `TORN` are torn out, and others around them
 /// that keep that away from the surface.
 fn shell() -> Vec<Vec3> {
-    let middle = scattered(TORN as usize, Vec3::splat(0.25));
-    let around = scattered(32, Vec3::splat(1.0)).into_iter().map(|p| p.normalize() * 0.55);
+    let middle = scattered(TORN as usize, Vec3::splat(0.3));
+    let around = scattered(48, Vec3::splat(1.0)).into_iter().map(|p| p.normalize() * 0.66);
     middle.into_iter().chain(around).collect()
 }
 
 /// Points that lose their tetrahedra in the ball.
-const TORN: u32 = 6;
+const TORN: u32 = 10;
 
 /// A refractive ball of syrup moves and swells.
 ///
@@ -266,7 +268,7 @@ pub fn glass_ball_moves() -> Result<Case> {
     let effects = [moves("ball", GeometryChange::Matrix(field))];
     let draft = Draft::new("refractive ball moves and swells", glass_ball()?, effects).affine();
     let draft = draft.without_divergence(strain.trace())?;
-    Ok(draft.stirred(&["ball"], None, &shell(), TORN)?.0.case)
+    Ok(draft.stirred(&["ball"], None, &shell(), 0)?.0.case)
 }
 
 /// The ball deforms.

@@ -91,7 +91,10 @@ pub fn scanned(path: &Path) -> Result<Stage> {
     let bounds = read.bounds();
     let size = 1.4 / bounds.extent().max_abs();
     let scan = at(&closed(&read)?, Vec3::splat(size), -bounds.center() * size);
-    body("scanned", scan, Bsdf::Null, at(&icosphere(0), Vec3::splat(1.3), Vec3::ZERO))
+    let cage = at(&icosphere(0), Vec3::splat(1.3), Vec3::ZERO);
+    let stage = body("scanned", scan, Bsdf::Null, cage)?;
+    let cells = stage.cells.into_iter().map(|c| c.samples(8192)).collect();
+    Ok(Stage { samples: 16384, cells, ..stage })
 }
 
 /// The mesh with a fan across every loop of edges that have one face.
