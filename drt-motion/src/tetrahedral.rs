@@ -100,6 +100,40 @@ impl TetrahedralField {
         velocities.into()
     }
 
+    /// The surfaces whose normal velocity a field misses next to a contact with others that move
+    /// otherwise, sorted: the flux through them must be added.
+    ///
+    /// # Panics
+    /// As [`velocities`](Self::velocities), whose arguments these are, and result.
+    #[must_use]
+    pub fn left_behind(&self, velocities: &[Vec3], carriers: &[Carrier<'_>]) -> Vec<u32> {
+        let mut found = Vec::new();
+        for group in self.shared.chunk_by(|a, b| a.0 == b.0) {
+            let here = velocities[group[0].0 as usize];
+            for owner in self.owners(group) {
+                let &TetVertexOrigin::Surface { surface, triangle, bary } = owner else { continue };
+                let Carrier { mesh, motion } = carriers[surface as usize];
+                let own = motion.velocity(mesh, &SurfacePoint { triangle, bary });
+                let fastest = f64::max(here.length_squared(), own.length_squared());
+                let miss = here - own;
+                if miss.length_squared() <= ROUNDING * fastest || found.contains(&surface) {
+                    continue;
+                }
+                let missed = |t: u32| square(miss.dot(mesh.normal(t))) > ROUNDING * fastest;
+                let corners = mesh.triangles[triangle as usize];
+                let weights = SurfacePoint { triangle, bary }.weights();
+                let corner = (0..3).find(|k| weights[*k] == 1.0).map(|k| corners[k]);
+                let around = (0..mesh.triangles.len() as u32)
+                    .filter(|t| corner.is_some_and(|c| mesh.triangles[*t as usize].contains(&c)));
+                if missed(triangle) || around.into_iter().any(missed) {
+                    found.push(surface);
+                }
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
     /// Where a point lies; outside of all tetrahedra everything rests.
     #[must_use]
     pub fn place(&self, x: Vec3) -> TetrahedralPlace {
@@ -195,15 +229,18 @@ fn velocity(origin: &TetVertexOrigin, carriers: &[Carrier<'_>], points: &[Vec3])
     }
 }
 
+fn square(x: f64) -> f64 {
+    x * x
+}
+
 /// Normals of surfaces that touch agree to rounding of their vertices, single precision included: what
 /// is missed for that alone, in units of the greatest speed, squared.
 const ROUNDING: f64 = 1e-10;
 
 /// The velocity that misses the others' along their normals least.
 fn agreement(owners: &[(Vec3, Vec3)]) -> Vec3 {
-    let missed = |u: Vec3| -> f64 {
-        owners.iter().map(|(v, n)| (u - *v).dot(*n)).map(|d| d * d).sum::<f64>()
-    };
+    let missed =
+        |u: Vec3| -> f64 { owners.iter().map(|(v, n)| square((u - *v).dot(*n))).sum::<f64>() };
     let fastest = owners.iter().map(|(u, _)| u.length_squared()).fold(0.0, f64::max);
     let best = owners.iter().map(|(u, _)| (missed(*u), *u)).reduce(|a, b| {
         let better = if (b.0 - a.0).abs() > ROUNDING * fastest {

@@ -129,10 +129,20 @@ impl Surroundings<'_> {
                     let given = self.given().map_or(Ok(None), |given| {
                         tetrahedra::given_velocities(self.world, m, given, p)
                     })?;
-                    Inside::Tetrahedra(given.unwrap_or_else(|| {
-                        let Self { world, tangents, shapes, parts, .. } = self;
-                        tetrahedra::velocities(tetrahedra, world, tangents, shapes, parts, p)
-                    }))
+                    Inside::Tetrahedra(match given {
+                        Some(given) => given,
+                        None => {
+                            let Self { world, tangents, shapes, parts, .. } = self;
+                            let (velocities, left) = tetrahedra::velocities(
+                                tetrahedra, world, tangents, shapes, parts, p,
+                            );
+                            if !left.is_empty() {
+                                insides.flux[m].push(p);
+                                insides.flux_shapes.extend(left);
+                            }
+                            velocities
+                        }
+                    })
                 }
             };
             insides.volumes[m].push((p, inside));

@@ -88,7 +88,8 @@ pub(super) fn given(
     TetrahedralField::new(made).map_err(|e| fail(&e))
 }
 
-/// The velocities of a field's vertices for one parameter.
+/// The velocities of a field's vertices for one parameter, and the shapes that it leaves behind where
+/// others touch them.
 pub(super) fn velocities(
     field: &TetrahedralField,
     world: &World,
@@ -96,7 +97,7 @@ pub(super) fn velocities(
     shapes: &[usize],
     parts: &[Part],
     parameter: usize,
-) -> TetVelocities {
+) -> (TetVelocities, Vec<usize>) {
     const REST: &SurfaceMotion = &SurfaceMotion::Rest;
     let carriers: Vec<Carrier<'_>> = shapes
         .iter()
@@ -112,7 +113,9 @@ pub(super) fn velocities(
         .iter()
         .filter_map(|part| Some(part.velocities[parameter].point(part.point?)))
         .collect();
-    field.velocities(&carriers, &points)
+    let velocities = field.velocities(&carriers, &points);
+    let left = field.left_behind(&velocities, &carriers);
+    (velocities, left.into_iter().map(|s| shapes[s as usize]).collect())
 }
 
 /// The velocities that came with tetrahedra, for one parameter.
