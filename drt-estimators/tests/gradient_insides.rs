@@ -4,8 +4,9 @@
 mod common;
 
 use common::*;
-use drt_estimators::{InsideKind, Scene, Settings, Target, Unattended, gradient};
+use drt_estimators::{InsideKind, Scene, Session, Settings, Target, Unattended, gradient};
 use drt_math::{Rgb, Rng, Vec3, vec3};
+use drt_motion::GeometryChange;
 
 const SEEDS: u64 = 48;
 
@@ -80,4 +81,27 @@ fn a_block_in_the_air() {
 #[test]
 fn a_block_on_the_floor() {
     agree_where(-1.0);
+}
+
+/// A body that leaves what it stands on: no field follows both, and forward mode, too, adds the flux
+/// through what is left behind.
+#[test]
+fn a_block_lifts_off() {
+    let scene = fog_with_a_block(-1.0, 0.0);
+    let up = moves("block", GeometryChange::Translate(Vec3::Y));
+    let lift = parameter("lift", 0.0, vec![up]);
+    let total = |kind: InsideKind| {
+        let insides = vec![(0, kind)];
+        let settings = Settings { spp: 16384, seed: 3, insides, ..Settings::default() };
+        let mut session = Session::new(&scene, core::slice::from_ref(&lift), &settings);
+        let session = session.as_mut().expect("a valid scene");
+        session.run(settings.spp, &Unattended);
+        let total = session.rendering().derivatives[0].total.total;
+        (total.mean.g, total.stderr.g)
+    };
+    let (a, e) = total(InsideKind::Static);
+    let (b, f) = total(InsideKind::Tetrahedral(None));
+    let (off, error) = ((a - b).abs(), e.hypot(f));
+    assert!(off < 4.0 * error, "{a} ± {e}, {b} ± {f}");
+    assert!(error < 0.04 * a.abs(), "{e} and {f} of {a} is too much noise");
 }

@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io, process};
 
-use drt_geom::{Aabb, Mesh, NONE, TetMesh};
 use drt_geom::procedural::{self, BranchingTree, TorusKnot};
+use drt_geom::{Aabb, Mesh, NONE, TetMesh};
 use drt_math::{Affine, Vec3, vec3};
 
 /// Radius of the star's notches; its tips are on the unit circle.

@@ -111,11 +111,9 @@ impl MeanValue {
         place.near = self.points.iter().enumerate().find_map(|(i, (c, reach))| {
             let away = x - *c;
             let t = away.length() / reach;
-            if !(t < 1.0) {
-                return None;
-            }
             // The gradient of t² (3 - 2t) is 6 (1 - t) (x - c) / R².
-            Some((i, t * t * (3.0 - 2.0 * t), away * (6.0 * (1.0 - t) / (reach * reach))))
+            let slope = away * (6.0 * (1.0 - t) / (reach * reach));
+            (t < 1.0).then_some((i, t * t * (3.0 - 2.0 * t), slope))
         });
     }
 }

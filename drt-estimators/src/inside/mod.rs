@@ -16,6 +16,7 @@
 //! surface of few triangles counting triangle by triangle, and one of many as resting, with its flux
 //! added.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::fmt::Display;
 
@@ -211,12 +212,12 @@ impl Surroundings<'_> {
         let deforms =
             |s: &usize| parameters.iter().any(|p| parts::is_deformed_by(self.tangents, *s, *p));
         match self.asked {
-            Some(InsideKind::Tetrahedral(_)) => Ok(Field::Tetrahedra(tetrahedra()?)),
+            Some(InsideKind::Tetrahedral(_)) => Ok(Field::Tetrahedra(Box::new(tetrahedra()?))),
             Some(InsideKind::MeanValue) => {
                 Ok(Field::MeanValue(MeanValue::new(world, *medium, shapes, parts)?))
             }
             None if shapes.iter().any(deforms) => match tetrahedra() {
-                Ok(field) => Ok(Field::Tetrahedra(field)),
+                Ok(field) => Ok(Field::Tetrahedra(Box::new(field))),
                 Err(_) => self.blend(),
             },
             _ => self.blend(),
