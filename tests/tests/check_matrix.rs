@@ -5,6 +5,7 @@
 
 use drt_tests::Result;
 use drt_tests::matrix::{Stage, Table, caged, check, deforming, lights, media, surfaces};
+use drt_tests::matrix::{Stage, Table, check, lights, media, riding, surfaces};
 
 fn run(stage: Result<Stage>) {
     let rows = check(&stage.unwrap()).unwrap();
@@ -40,4 +41,5 @@ stages! {
 fn scanned_body() {
     let path = std::env::var_os("DRT_BODY").expect("DRT_BODY names an OBJ file");
     run(caged::scanned(path.as_ref()));
+    riding: riding riding_tight riding_inside riding_still riding_tetrahedral riding_mean_value;
 }

@@ -9,6 +9,7 @@ pub mod deforming;
 pub(crate) mod effects;
 pub mod lights;
 pub mod media;
+pub mod riding;
 pub(crate) mod set;
 pub mod surfaces;
 mod verdict;
