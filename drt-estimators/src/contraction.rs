@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
-use drt_medium::{CoefficientGradients, CoefficientRates, DepthEstimate, MediumTangent};
+use drt_medium::{CoefficientGradients, CoefficientRates, DepthEstimate, FlowPlace, MediumTangent};
 
 use crate::emitter::EmitterGradient;
 use crate::inside::{Insides, Place};
@@ -30,7 +30,7 @@ impl Motion {
             shapes: some(&tangents.shapes),
             volumes: some(&insides.volumes),
             media: some(&tangents.media),
-            grids: tangents.media.iter().map(|l| l.iter().any(|(_, t)| moves_grids(t))).collect(),
+            grids: tangents.media.iter().map(|l| l.iter().any(|(_, t)| t.moves_grids())).collect(),
             bsdfs: some(&tangents.bsdfs),
             emitters: some(&tangents.emitters),
             moving_emitters: tangents
@@ -66,10 +66,6 @@ impl Motion {
     }
 }
 
-fn moves_grids(tangent: &MediumTangent) -> bool {
-    tangent.grid_velocity().is_some()
-}
-
 /// The derivative of one value by every parameter.
 pub(crate) struct Contraction<'a> {
     pub(crate) world: &'a World,
@@ -77,6 +73,8 @@ pub(crate) struct Contraction<'a> {
     pub(crate) rates: Vec<Rgb>,
     /// What the field of an inside is like at the last point.
     place: Place,
+    /// And that of the flow of grids.
+    flow: FlowPlace,
     /// By medium, the rates of what is the same everywhere in it.
     uniform: Vec<Option<Vec<CoefficientRates>>>,
 }
@@ -93,6 +91,7 @@ impl<'a> Contraction<'a> {
             motion,
             rates: alloc::vec![Rgb::ZERO; motion.parameters()],
             place: Place::default(),
+            flow: FlowPlace::default(),
             uniform: uniform.collect(),
         }
     }
@@ -158,15 +157,27 @@ impl AdjointSink for Contraction<'_> {
         let coefficients = medium.coefficients(x);
         let gradients = if moves { medium.gradients(x) } else { CoefficientGradients::ZERO };
         for (p, tangent) in tangents {
-            let rates = tangent.rates_given(medium, x, &coefficients, &gradients);
+            let velocity = tangent.grid_velocity(x, &mut self.flow);
+            let rates = tangent.rates_given(medium, x, &coefficients, &gradients, velocity);
             self.rates[*p] += adjoint.dot(&rates);
         }
     }
 
     fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {
-        for (p, tangent) in &self.motion.tangents.media[medium] {
-            self.rates[*p] += depth.rate(self.world.medium(medium), tangent) * adjoint;
+        let tangents = &self.motion.tangents.media[medium];
+        let medium = self.world.medium(medium);
+        for (p, tangent) in tangents {
+            self.rates[*p] += depth.rate_without_flows(medium, tangent) * adjoint;
         }
+        if tangents.iter().all(|(_, t)| t.flows.is_empty()) {
+            return;
+        }
+        let Self { rates, flow, .. } = self;
+        depth.pulls(medium, |x, pull| {
+            for (p, tangent) in tangents {
+                rates[*p] += pull.dot(tangent.flow(x, flow)) * adjoint;
+            }
+        });
     }
 
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {

@@ -24,6 +24,7 @@ mod plan;
 mod prepared;
 mod rendering;
 mod reverse;
+mod riding;
 mod scene;
 mod sensitivity;
 pub mod sensor;

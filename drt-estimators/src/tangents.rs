@@ -14,6 +14,7 @@ use drt_motion::{
 
 use crate::Error;
 use crate::emitter::{Emitter, EmitterTangent};
+use crate::riding::{Ride, RideError};
 use crate::scene::{Scene, Target};
 use crate::sensor::{Sensor, SensorTangent};
 use crate::surface::{BsdfChange, BsdfTangent, Property};
@@ -88,6 +89,23 @@ fn effects_on(
     })
 }
 
+/// What a target follows by one parameter, directly or not.
+fn leaders(parameter: &Parameter<Target>, target: Target) -> Vec<Target> {
+    let mut found = alloc::vec![target];
+    let mut next = 0;
+    while let Some(&follower) = found.get(next) {
+        for e in parameter.effects.iter().filter(|e| e.target == follower) {
+            if let Change::Follow(leader) = e.change
+                && !found.contains(&leader)
+            {
+                found.push(leader);
+            }
+        }
+        next += 1;
+    }
+    found
+}
+
 /// Applies the parameters to a scene and differentiates it; `sensor` is the camera in use.
 pub(crate) fn apply(
     scene: &Scene,
@@ -102,6 +120,7 @@ pub(crate) fn apply(
             ..Tangents::default()
         },
         parameters: &parameters,
+        given: scene,
     };
     for i in 0..scene.shapes.len() {
         applied.shape(i)?;
@@ -128,6 +147,8 @@ struct Apply<'a> {
     scene: Scene,
     tangents: Tangents,
     parameters: &'a [Parameter<Target>],
+    /// The scene before the changes.
+    given: &'a Scene,
 }
 
 impl Apply<'_> {
@@ -173,61 +194,106 @@ impl Apply<'_> {
         let parameters = self.parameters;
         for (p, parameter, change) in effects_on(parameters, target) {
             let theta = parameter.value;
-            for change in self.medium_changes(p, target, theta, change)? {
-                for t in &mut tangents {
-                    t.push_through(&change, theta);
-                }
-                let medium = &mut self.scene.media[i].item;
-                let own =
-                    medium.apply(&change, theta).and_then(|()| medium.tangent(&change, theta));
-                let own = own.map_err(|e| self.fail(p, target, e))?;
-                tangents[p] = tangents[p].clone().plus(&own);
+            let Change::Property(change) = change else { continue };
+            let change = self.medium_change(p, target, change)?;
+            for t in &mut tangents {
+                t.push_through(&change, theta);
             }
+            let medium = &mut self.scene.media[i].item;
+            let own = medium.apply(&change, theta).and_then(|()| medium.tangent(&change, theta));
+            let own = own.map_err(|e| self.fail(p, target, e))?;
+            tangents[p] = tangents[p].clone().plus(&own);
         }
+        // Coefficients do not depend on where they are: what moves the grids can come last.
+        self.move_grids(i, &mut tangents)?;
         self.tangents.media.push(keep(tangents, |t| !t.is_zero()));
         Ok(())
     }
 
-    /// What an effect does to a medium, step by step.
-    fn medium_changes(
+    fn move_grids(&mut self, i: usize, tangents: &mut [MediumTangent]) -> Result<(), Error> {
+        let target = Target::Medium(i);
+        let changes = self.geometry(target)?;
+        let Some(first) = changes.first().map(|c| c.parameter) else { return Ok(()) };
+        let n = self.parameters.len();
+        let mut medium = self.scene.media[i].item.clone();
+        match (self.deforming_leader(target)?, medium.grid()) {
+            (Some(leader), Some(grid)) => {
+                let shape = &self.given.shapes[leader].mesh;
+                let ride = Ride::new(grid, shape, &changes, n).map_err(|e| match e {
+                    RideError::Motion(e) => self.fail(e.parameter, target, e.cause),
+                    RideError::Shape(p, reason) => self.fail(p, target, reason),
+                })?;
+                for (p, t) in tangents.iter_mut().enumerate() {
+                    t.flows.extend(Some(ride.flow(p)).filter(|flow| !flow.is_zero()));
+                }
+                ride.carry(&mut medium).map_err(|e| self.fail(first, target, e))?;
+            }
+            // Surfaces bound it; it has nothing of its own that could deform.
+            (Some(_), None) if medium.homogeneous().is_some() => {}
+            (Some(_), None) => {
+                return Err(self.fail(first, target, drt_medium::MediumError::CustomField));
+            }
+            (None, _) => {
+                let frame = move_affine(&changes, n)
+                    .map_err(|e| self.fail(e.parameter, target, e.cause))?;
+                medium.place(&frame.map).map_err(|e| self.fail(first, target, e))?;
+                if medium.grid().is_some() {
+                    for (t, velocity) in tangents.iter_mut().zip(&frame.velocities) {
+                        t.velocity = *velocity;
+                    }
+                }
+            }
+        }
+        self.scene.media[i].item = medium;
+        Ok(())
+    }
+
+    /// The shape that a target follows while it deforms.
+    fn deforming_leader(&self, target: Target) -> Result<Option<usize>, Error> {
+        let mut found: Option<usize> = None;
+        for (p, parameter) in self.parameters.iter().enumerate() {
+            let deforms = |leader: &Target| {
+                let of = parameter.effects.iter().filter(|e| e.target == *leader);
+                let changes = of.filter_map(|e| match &e.change {
+                    Change::Geometry(g) => Some(g),
+                    _ => None,
+                });
+                changes.into_iter().any(|g| g.affine(parameter.value).is_none())
+            };
+            for leader in leaders(parameter, target).into_iter().filter(deforms) {
+                let Target::Shape(shape) = leader else {
+                    return Err(self.fail(p, leader, drt_motion::Cause::NotAffine));
+                };
+                if found.is_some_and(|other| other != shape) {
+                    let reason = "it follows two shapes that deform; it can follow one";
+                    return Err(self.fail(p, target, reason));
+                }
+                found = Some(shape);
+            }
+        }
+        Ok(found)
+    }
+
+    /// What a property effect does to a medium.
+    fn medium_change(
         &self,
         p: usize,
         target: Target,
-        theta: f64,
-        change: &Change<Target>,
-    ) -> Result<Vec<MediumChange>, Error> {
-        let place = |change: &GeometryChange| match (change.affine(theta), change.velocity(theta)) {
-            (Some(map), Some(velocity)) => Ok(MediumChange::Place { map, velocity }),
-            _ => Err(self.fail(
-                p,
-                target,
-                "a grid moves by affine maps only; it cannot follow single vertices yet",
-            )),
-        };
-        match change {
-            Change::Geometry(g) => Ok(alloc::vec![place(g)?]),
-            Change::Follow(_) => {
-                let of_parameter = core::slice::from_ref(&self.parameters[p]);
-                let changes = geometry_changes(of_parameter, &target)
-                    .map_err(|e| self.fail(p, target, e.cause))?;
-                changes.iter().map(|c| place(c.change)).collect()
+        change: &PropertyChange,
+    ) -> Result<MediumChange, Error> {
+        let (op, voxels) = (change.op, change.voxels);
+        Ok(match change.property.as_str() {
+            "sigma_t" => MediumChange::SigmaT { op, voxels },
+            "albedo" => MediumChange::Albedo { op, voxels },
+            "emission" => MediumChange::Emission { op, voxels },
+            "g" => MediumChange::G(op),
+            other => {
+                let reason = alloc::format!(
+                    "a medium has no property `{other}`; it has sigma_t, albedo, emission and g"
+                );
+                return Err(self.fail(p, target, reason));
             }
-            Change::Property(c) => {
-                let (op, voxels) = (c.op, c.voxels);
-                Ok(alloc::vec![match c.property.as_str() {
-                    "sigma_t" => MediumChange::SigmaT { op, voxels },
-                    "albedo" => MediumChange::Albedo { op, voxels },
-                    "emission" => MediumChange::Emission { op, voxels },
-                    "g" => MediumChange::G(op),
-                    other => {
-                        let reason = alloc::format!(
-                            "a medium has no property `{other}`; it has sigma_t, albedo, emission and g"
-                        );
-                        return Err(self.fail(p, target, reason));
-                    }
-                }])
-            }
-        }
+        })
     }
 
     fn bsdf(&mut self, i: usize) -> Result<(), Error> {

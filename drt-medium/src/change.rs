@@ -93,6 +93,7 @@ impl Medium {
             _ => match (change.field(), &mut self.kind) {
                 (Some(c), MediumKind::Homogeneous(h)) => h.change(c, theta),
                 (Some(c), MediumKind::Grid(g)) => g.change(c, theta),
+                (_, MediumKind::Deformed(_)) => Err(MediumError::Deformed),
                 (_, MediumKind::Custom(_)) => Err(MediumError::CustomField),
                 (None, _) => Ok(()),
             },
@@ -108,8 +109,10 @@ impl Medium {
     /// # Errors
     /// When the property has no grid, or the numbers do not fit it or are not finite.
     pub fn add_to_voxels(&mut self, property: Property, step: &[f64]) -> Result<(), MediumError> {
-        let MediumKind::Grid(medium) = &mut self.kind else {
-            return Err(MediumError::NotAGrid { property });
+        let medium = match &mut self.kind {
+            MediumKind::Grid(medium) => medium,
+            MediumKind::Deformed(_) => return Err(MediumError::Deformed),
+            _ => return Err(MediumError::NotAGrid { property }),
         };
         let scale = if property == Property::SigmaT { medium.editable_scale() } else { 1.0 };
         let grid = match property {

@@ -14,7 +14,10 @@
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::bounds::in_unit_cube;
-use crate::{Crossing, DensityField, GridMedium, Medium, MediumKind, MediumTangent, Ray};
+use crate::{
+    Crossing, DeformedGrid, DensityField, FlowPlace, GridMedium, Medium, MediumKind, MediumTangent,
+    Ray,
+};
 
 /// An estimate of a ray's optical depth and of what its derivatives depend on; unbiased where
 /// [`Medium::line_points`] gave the points.
@@ -32,6 +35,8 @@ pub struct DepthEstimate<'a> {
     pub gradient: RgbVec,
     /// `∫ t grad sigma_t dt`; zero unless asked for.
     pub moment: RgbVec,
+    /// The faces of a grid's box are in it.
+    pub faces: bool,
 }
 
 impl<'a> DepthEstimate<'a> {
@@ -46,11 +51,13 @@ impl<'a> DepthEstimate<'a> {
             depth: Rgb::ZERO,
             gradient: RgbVec::ZERO,
             moment: RgbVec::ZERO,
+            faces: false,
         };
         match &medium.kind {
             MediumKind::Homogeneous(_) => {}
             MediumKind::Grid(g) if moving => estimate.add_grid::<true>(g),
             MediumKind::Grid(g) => estimate.add_grid::<false>(g),
+            MediumKind::Deformed(d) => estimate.add_deformed(d, moving),
             MediumKind::Custom(f) => estimate.add_field(&**f, moving),
         }
         estimate
@@ -59,11 +66,9 @@ impl<'a> DepthEstimate<'a> {
     /// The same with the faces of a grid's box that the ray passes through.
     #[must_use]
     pub fn with_faces(mut self, medium: &Medium) -> Self {
-        if let Some(grid) = medium.grid() {
-            for c in grid.crossings(&self.ray) {
-                self.add_face(&c);
-            }
-        }
+        let ray = self.ray;
+        medium.crossings(&ray, |c| self.add_face(c));
+        self.faces = true;
         self
     }
 
@@ -71,6 +76,20 @@ impl<'a> DepthEstimate<'a> {
         let g = -c.depth_per_velocity();
         self.gradient += g;
         self.moment += g * c.t;
+    }
+
+    fn add_deformed(&mut self, medium: &DeformedGrid, moving: bool) {
+        for &(t, w) in self.points {
+            let Some((material, slope)) = medium.material(self.ray.at(t)) else { continue };
+            self.length += w;
+            self.depth += medium.grids.sigma_t(material) * w;
+            if moving {
+                let g = medium.grids.density().gradient(material) * (medium.grids.scale() * w);
+                let g = g.map(|g| slope.transpose_mul(g));
+                self.gradient += g;
+                self.moment += g * t;
+            }
+        }
     }
 
     fn add_field(&mut self, field: &dyn DensityField, moving: bool) {
@@ -128,24 +147,55 @@ impl<'a> DepthEstimate<'a> {
     /// grids included.
     #[must_use]
     pub fn rate(&self, medium: &Medium, tangent: &MediumTangent) -> Rgb {
+        let mut rate = self.rate_without_flows(medium, tangent);
+        if !tangent.flows.is_empty() {
+            let place = &mut FlowPlace::default();
+            self.pulls(medium, |x, pull| rate += pull.dot(tangent.flow(x, place)));
+        }
+        rate
+    }
+
+    /// How the optical depth depends on the velocity of the grids: calls `visit` with points of the ray,
+    /// and the derivative by the velocity there. Of many parameters whose tangents flow, each adds the
+    /// products with its own velocities to [`rate_without_flows`](Self::rate_without_flows).
+    pub fn pulls(&self, medium: &Medium, mut visit: impl FnMut(Vec3, RgbVec)) {
+        for &(t, w) in self.points {
+            let x = self.ray.at(t);
+            let g = medium.gradients(x).sigma_t;
+            if g != RgbVec::ZERO {
+                visit(x, g * -w);
+            }
+        }
+        if self.faces {
+            medium.crossings(&self.ray, |c| visit(self.ray.at(c.t), c.depth_per_velocity()));
+        }
+    }
+
+    /// [`rate`](Self::rate) but for what the tangent's flows add to it.
+    #[must_use]
+    pub fn rate_without_flows(&self, medium: &Medium, tangent: &MediumTangent) -> Rgb {
         let MediumTangent { sigma_t, velocity, .. } = tangent;
         let mut rate = sigma_t.uniform * self.length + self.depth * sigma_t.relative
             - self.gradient.dot(velocity.point(self.ray.origin))
             - self.moment.dot(velocity.vector(self.ray.dir));
-        if let (Some(grid), false) = (medium.grid(), sigma_t.voxels.is_empty()) {
-            for (t, w) in self.points_inside(grid) {
-                rate += sigma_t.voxel_rate(grid.density(), self.ray.at(t)) * w;
+        if !sigma_t.voxels.is_empty() {
+            for (grid, material, w) in self.points_inside(medium) {
+                rate += sigma_t.voxel_rate(grid.density(), material) * w;
             }
         }
         rate
     }
 
-    /// The points of the estimate that lie inside a grid.
-    pub(crate) fn points_inside(
+    /// The points of the estimate that lie inside the medium's grids, as the grids see them, with their
+    /// weights.
+    pub(crate) fn points_inside<'m>(
         &self,
-        grid: &'a GridMedium,
-    ) -> impl Iterator<Item = (f64, f64)> + 'a {
-        let ray = self.ray;
-        self.points.iter().copied().filter(move |(t, _)| grid.contains(ray.at(*t)))
+        medium: &'m Medium,
+    ) -> impl Iterator<Item = (&'m GridMedium, Vec3, f64)> + use<'a, 'm> {
+        let (ray, points) = (self.ray, self.points);
+        points.iter().filter_map(move |(t, w)| {
+            let (grid, material) = medium.grid_at(ray.at(*t))?;
+            Some((grid, material, *w))
+        })
     }
 }

@@ -107,6 +107,9 @@ pub enum MediumError {
     /// The phase function has no such parameter.
     #[error("this phase function has no g; use Henyey-Greenstein")]
     NoMeanCosine,
+    /// A deformed grid cannot be changed.
+    #[error("the grid is deformed; place it, and change its values, before that")]
+    Deformed,
     /// A field defined by its user has no parameters known here.
     #[error("a custom field cannot be changed or moved from outside; change it where it is made")]
     CustomField,

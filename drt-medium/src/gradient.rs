@@ -1,11 +1,12 @@
+use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
 use drt_math::{Affine, Rgb, Vec3};
 
 use crate::{
-    CoefficientRates, Crossing, DepthEstimate, FieldTangent, Grid, Medium, MediumKind,
-    MediumTangent,
+    CoefficientRates, Crossing, DepthEstimate, FieldTangent, Flow, FlowBasis, Grid, GridMedium,
+    Medium, MediumKind, MediumTangent,
 };
 
 /// Derivative of a loss with respect to one coefficient field: the transpose of [`FieldTangent`].
@@ -21,6 +22,32 @@ pub struct FieldGradient {
     size: [usize; 3],
 }
 
+/// Derivative of a loss with respect to the velocities of nodes: the transpose of [`Flow`].
+#[derive(Clone, Debug)]
+pub struct FlowGradient {
+    /// Whose nodes they are.
+    pub basis: Arc<dyn FlowBasis>,
+    /// With respect to the velocity of each node.
+    pub nodes: Vec<Vec3>,
+}
+
+impl PartialEq for FlowGradient {
+    fn eq(&self, o: &Self) -> bool {
+        Arc::ptr_eq(&self.basis, &o.basis) && self.nodes == o.nodes
+    }
+}
+
+impl FlowGradient {
+    fn scatter(&mut self, x: Vec3, adjoint: Vec3) {
+        self.basis.weights(x).scatter(adjoint, &mut self.nodes);
+    }
+
+    fn dot(&self, flow: &Flow) -> Option<f64> {
+        let products = self.nodes.iter().zip(&*flow.nodes).map(|(g, v)| g.dot(*v));
+        Arc::ptr_eq(&self.basis, &flow.basis).then(|| products.sum())
+    }
+}
+
 /// Derivative of a loss with respect to everything a [`MediumTangent`] can change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MediumGradient {
@@ -34,6 +61,8 @@ pub struct MediumGradient {
     pub g: f64,
     /// Of the coefficients of the grids' velocity field.
     pub velocity: Affine,
+    /// Of the velocities of nodes, where there is room for them.
+    pub flow: Option<FlowGradient>,
 }
 
 impl FieldGradient {
@@ -105,10 +134,9 @@ impl MediumGradient {
     /// No derivative yet, with room for every voxel of the medium.
     #[must_use]
     pub fn zeros(medium: &Medium) -> Self {
-        let grids =
-            medium.grid().map(|g| [Some(g.density()), g.albedo().grid(), g.emission().grid()]);
+        let grids = medium.grid().map(GridMedium::volumes);
         let [sigma_t, albedo, emission] = grids.unwrap_or_default().map(FieldGradient::zeros);
-        Self { sigma_t, albedo, emission, g: 0.0, velocity: Affine::ZERO }
+        Self { sigma_t, albedo, emission, g: 0.0, velocity: Affine::ZERO, flow: None }
     }
 
     /// No derivative yet, without room for voxels: for media none of whose parameters names a
@@ -116,24 +144,29 @@ impl MediumGradient {
     #[must_use]
     pub fn zeros_without_voxels() -> Self {
         let [sigma_t, albedo, emission] = [None; 3].map(FieldGradient::zeros);
-        Self { sigma_t, albedo, emission, g: 0.0, velocity: Affine::ZERO }
+        Self { sigma_t, albedo, emission, g: 0.0, velocity: Affine::ZERO, flow: None }
+    }
+
+    /// The same with room for the velocities of `nodes` nodes.
+    #[must_use]
+    pub fn with_flow(mut self, basis: Arc<dyn FlowBasis>, nodes: usize) -> Self {
+        self.flow = Some(FlowGradient { basis, nodes: vec![Vec3::ZERO; nodes] });
+        self
     }
 
     /// Adds the derivatives of a loss with respect to the coefficients at the point x of the world:
     /// the exact transpose of [`MediumTangent::rates`].
     pub fn scatter(&mut self, medium: &Medium, x: Vec3, adjoint: &CoefficientRates) {
         self.g += adjoint.g;
-        let grids = match &medium.kind {
-            MediumKind::Homogeneous(_) => [None; 3],
-            MediumKind::Grid(g) if g.contains(x) => {
-                [Some(g.density()), g.albedo().grid(), g.emission().grid()]
-            }
-            MediumKind::Grid(_) | MediumKind::Custom(_) => return,
+        let (grids, at) = match (&medium.kind, medium.grid_at(x)) {
+            (MediumKind::Homogeneous(_), _) => ([None; 3], x),
+            (_, Some((g, material))) => (g.volumes(), material),
+            (_, None) => return,
         };
         let c = medium.coefficients(x);
-        self.sigma_t.scatter(c.sigma_t, grids[0], x, adjoint.sigma_t);
-        self.albedo.scatter(c.albedo, grids[1], x, adjoint.albedo);
-        self.emission.scatter(c.emission, grids[2], x, adjoint.emission);
+        self.sigma_t.scatter(c.sigma_t, grids[0], at, adjoint.sigma_t);
+        self.albedo.scatter(c.albedo, grids[1], at, adjoint.albedo);
+        self.emission.scatter(c.emission, grids[2], at, adjoint.emission);
         if grids[0].is_some() {
             let g = medium.gradients(x);
             let pull = g.sigma_t.weighted(adjoint.sigma_t)
@@ -155,13 +188,16 @@ impl MediumGradient {
         let sigma_t = &mut self.sigma_t;
         sigma_t.uniform += adjoint * depth.length;
         sigma_t.relative += depth.depth.dot(adjoint);
-        if let (Some(grid), false) = (medium.grid(), sigma_t.voxels.is_empty()) {
-            for (t, w) in depth.points_inside(grid) {
-                sigma_t.scatter_voxels(grid.density(), depth.ray.at(t), adjoint * w);
+        if !sigma_t.voxels.is_empty() {
+            for (grid, material, w) in depth.points_inside(medium) {
+                sigma_t.scatter_voxels(grid.density(), material, adjoint * w);
             }
         }
+        if let Some(flow) = &mut self.flow {
+            depth.pulls(medium, |x, pull| flow.scatter(x, pull.weighted(adjoint)));
+        }
         let turn = -depth.moment.weighted(adjoint);
-        self.scatter_velocity(depth.ray.origin, -depth.gradient.weighted(adjoint));
+        self.scatter_affine(depth.ray.origin, -depth.gradient.weighted(adjoint));
         for (col, w) in self.velocity.linear.cols.iter_mut().zip(depth.ray.dir.to_array()) {
             *col += turn * w;
         }
@@ -169,6 +205,13 @@ impl MediumGradient {
 
     /// Adds the derivative of a loss with respect to the velocity of the grid's point at x.
     pub fn scatter_velocity(&mut self, x: Vec3, adjoint: Vec3) {
+        self.scatter_affine(x, adjoint);
+        if let Some(flow) = &mut self.flow {
+            flow.scatter(x, adjoint);
+        }
+    }
+
+    fn scatter_affine(&mut self, x: Vec3, adjoint: Vec3) {
         let v = &mut self.velocity;
         v.translation += adjoint;
         for (col, x) in v.linear.cols.iter_mut().zip(x.to_array()) {
@@ -179,17 +222,20 @@ impl MediumGradient {
     /// The derivative of the loss along a tangent.
     ///
     /// # Panics
-    /// When the tangent names voxels and this gradient was made without room for them, or for
-    /// another medium.
+    /// When the tangent names voxels, or flows, and this gradient was made without room for them, or
+    /// for another medium.
     #[must_use]
     pub fn dot(&self, tangent: &MediumTangent) -> f64 {
         let (a, b) = (&self.velocity, &tangent.velocity);
         let linear = (0..3).map(|k| a.linear.cols[k].dot(b.linear.cols[k])).sum::<f64>();
+        let flow = |flow| self.flow.as_ref().and_then(|own| own.dot(flow));
+        let flows = tangent.flows.iter().map(|f| flow(f).expect("room for the flow's nodes"));
         self.sigma_t.dot(&tangent.sigma_t)
             + self.albedo.dot(&tangent.albedo)
             + self.emission.dot(&tangent.emission)
             + self.g * tangent.g
             + linear
+            + flows.sum::<f64>()
             + a.translation.dot(b.translation)
     }
 
@@ -200,5 +246,8 @@ impl MediumGradient {
         self.emission.add(&o.emission);
         self.g += o.g;
         self.velocity = self.velocity.plus(&o.velocity);
+        if let (Some(a), Some(b)) = (&mut self.flow, &o.flow) {
+            a.nodes.iter_mut().zip(&b.nodes).for_each(|(a, b)| *a += *b);
+        }
     }
 }

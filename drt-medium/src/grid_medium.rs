@@ -162,6 +162,11 @@ impl GridMedium {
         self.largest_sigma_t() > 0.0 && absorbs && !self.emission.is_zero()
     }
 
+    /// The grids of the density, the albedo and the emission, as far as they are grids.
+    pub(crate) fn volumes(&self) -> [Option<&Grid>; 3] {
+        [Some(&self.density), self.albedo.grid(), self.emission.grid()]
+    }
+
     /// True where the medium can be: in the closed box of the density grid.
     #[inline]
     #[must_use]

@@ -6,8 +6,8 @@ use drt_math::{Affine, Rgb, Rng, Vec3};
 
 use crate::tracking::zip;
 use crate::{
-    CoefficientGradients, Coefficients, DensityField, DistanceSample, GridMedium, Homogeneous,
-    MediumError, Phase, Ray, TrackingStats, tracking,
+    CoefficientGradients, Coefficients, Crossing, DeformedGrid, DensityField, DistanceSample,
+    GridMedium, Homogeneous, MediumError, Phase, Ray, SpaceMap, TrackingStats, tracking,
 };
 
 /// Where a medium gets its coefficients from.
@@ -19,6 +19,10 @@ pub enum MediumKind {
     Homogeneous(Homogeneous),
     /// Voxels in a box.
     Grid(GridMedium),
+    /// Voxels in a box that is bent out of shape. It is made from the other for as long as it has
+    /// that shape, takes part in everything but changes of parameters, and is not serialised.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    Deformed(DeformedGrid),
     /// A field of the user's own. It takes part in everything but changes of parameters, and is
     /// not serialised.
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -51,6 +55,12 @@ impl From<GridMedium> for MediumKind {
     }
 }
 
+impl From<DeformedGrid> for MediumKind {
+    fn from(d: DeformedGrid) -> Self {
+        Self::Deformed(d)
+    }
+}
+
 impl Medium {
     /// A medium from its parts.
     #[must_use]
@@ -65,6 +75,7 @@ impl Medium {
         match &self.kind {
             MediumKind::Homogeneous(h) => h.coefficients(),
             MediumKind::Grid(g) => g.coefficients(x),
+            MediumKind::Deformed(d) => d.coefficients(x),
             MediumKind::Custom(f) => f.coefficients(x),
         }
     }
@@ -76,6 +87,7 @@ impl Medium {
         match &self.kind {
             MediumKind::Homogeneous(h) => h.coefficients().sigma_t,
             MediumKind::Grid(g) => g.sigma_t(x),
+            MediumKind::Deformed(d) => d.sigma_t(x),
             MediumKind::Custom(f) => f.sigma_t(x),
         }
     }
@@ -88,6 +100,7 @@ impl Medium {
         match &self.kind {
             MediumKind::Homogeneous(_) => CoefficientGradients::ZERO,
             MediumKind::Grid(g) => g.gradients(x),
+            MediumKind::Deformed(d) => d.gradients(x),
             MediumKind::Custom(f) => f.gradients(x),
         }
     }
@@ -102,13 +115,35 @@ impl Medium {
         }
     }
 
-    /// The grids of a medium that has them.
+    /// The grids of a medium that has them; of a deformed one as they were placed before.
     #[inline]
     #[must_use]
     pub fn grid(&self) -> Option<&GridMedium> {
         match &self.kind {
             MediumKind::Grid(g) => Some(g),
-            _ => None,
+            MediumKind::Deformed(d) => Some(d.grids()),
+            MediumKind::Homogeneous(_) | MediumKind::Custom(_) => None,
+        }
+    }
+
+    /// The grids and the place in them that a point of the world sees, inside of the density's box.
+    #[inline]
+    pub(crate) fn grid_at(&self, x: Vec3) -> Option<(&GridMedium, Vec3)> {
+        match &self.kind {
+            MediumKind::Grid(g) => g.contains(x).then_some((g, x)),
+            MediumKind::Deformed(d) => d.material(x).map(|(material, _)| (d.grids(), material)),
+            MediumKind::Homogeneous(_) | MediumKind::Custom(_) => None,
+        }
+    }
+
+    /// Calls `visit` with the places where a ray passes through the faces of a grid's box; see
+    /// [`GridMedium::crossings`].
+    #[inline]
+    pub fn crossings(&self, ray: &Ray, mut visit: impl FnMut(&Crossing)) {
+        match &self.kind {
+            MediumKind::Grid(g) => g.crossings(ray).for_each(|c| visit(&c)),
+            MediumKind::Deformed(d) => d.crossings(ray).iter().for_each(visit),
+            MediumKind::Homogeneous(_) | MediumKind::Custom(_) => {}
         }
     }
 
@@ -119,6 +154,7 @@ impl Medium {
         match &self.kind {
             MediumKind::Homogeneous(h) => !h.coefficients().source().is_zero(),
             MediumKind::Grid(g) => g.is_emissive(),
+            MediumKind::Deformed(d) => d.grids().is_emissive(),
             MediumKind::Custom(_) => true,
         }
     }
@@ -130,6 +166,7 @@ impl Medium {
         match &self.kind {
             MediumKind::Homogeneous(h) => !h.coefficients().sigma_s().is_zero(),
             MediumKind::Grid(g) => g.is_scattering(),
+            MediumKind::Deformed(d) => d.grids().is_scattering(),
             MediumKind::Custom(_) => true,
         }
     }
@@ -156,6 +193,9 @@ impl Medium {
             MediumKind::Grid(g) => {
                 tracking::sample_distance(g, &ray, channels, defensive, rng, stats)
             }
+            MediumKind::Deformed(d) => {
+                tracking::sample_distance(d, &ray, channels, defensive, rng, stats)
+            }
             MediumKind::Custom(f) => {
                 tracking::sample_distance(&**f, &ray, channels, defensive, rng, stats)
             }
@@ -170,6 +210,7 @@ impl Medium {
         match &self.kind {
             MediumKind::Homogeneous(h) => h.free_flight_pdf(t, ray.t_max, channels, defensive),
             MediumKind::Grid(g) => tracking::approximate_pdf(g, ray, t, channels, defensive),
+            MediumKind::Deformed(d) => tracking::approximate_pdf(d, ray, t, channels, defensive),
             MediumKind::Custom(f) => tracking::approximate_pdf(&**f, ray, t, channels, defensive),
         }
     }
@@ -189,6 +230,7 @@ impl Medium {
         match &self.kind {
             MediumKind::Homogeneous(h) => h.transmittance(t_max),
             MediumKind::Grid(g) => tracking::transmittance(g, &ray, rng, stats),
+            MediumKind::Deformed(d) => tracking::transmittance(d, &ray, rng, stats),
             MediumKind::Custom(f) => tracking::transmittance(&**f, &ray, rng, stats),
         }
     }
@@ -208,6 +250,7 @@ impl Medium {
         match &self.kind {
             MediumKind::Homogeneous(_) => {}
             MediumKind::Grid(g) => tracking::line_points(g, &ray, rng, out),
+            MediumKind::Deformed(d) => tracking::line_points(d, &ray, rng, out),
             MediumKind::Custom(f) => tracking::line_points(&**f, &ray, rng, out),
         }
     }
@@ -226,19 +269,37 @@ impl Medium {
         match &self.kind {
             MediumKind::Homogeneous(h) => h.coefficients().sigma_t,
             MediumKind::Grid(g) => bound(g),
+            MediumKind::Deformed(d) => bound(d),
             MediumKind::Custom(f) => bound(&**f),
         }
+    }
+
+    /// Lets a map of space carry the grids from where they are placed. The rest has nothing that could
+    /// be carried.
+    ///
+    /// # Errors
+    /// For grids that are deformed already, and for custom fields.
+    pub fn deform(&mut self, map: Arc<dyn SpaceMap>) -> Result<(), MediumError> {
+        self.kind = match &self.kind {
+            MediumKind::Grid(g) => MediumKind::Deformed(DeformedGrid::new(g.clone(), map)),
+            MediumKind::Homogeneous(_) => return Ok(()),
+            MediumKind::Deformed(_) => return Err(MediumError::Deformed),
+            MediumKind::Custom(_) => return Err(MediumError::CustomField),
+        };
+        Ok(())
     }
 
     /// Moves the grids by a map of the world. A homogeneous medium has nothing that could move;
     /// surfaces bound it.
     ///
     /// # Errors
-    /// When the map is singular, and for custom fields, which nobody outside can move.
+    /// When the map is singular, for deformed grids, and for custom fields, which nobody outside can
+    /// move.
     pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
         match &mut self.kind {
             MediumKind::Grid(g) => g.place(map),
             MediumKind::Homogeneous(_) => Ok(()),
+            MediumKind::Deformed(_) => Err(MediumError::Deformed),
             MediumKind::Custom(_) => Err(MediumError::CustomField),
         }
     }

@@ -1,11 +1,12 @@
 use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
 
 use drt_math::{Affine, Rgb, ValueChange, ValueMap, Vec3};
 
 use crate::change::{Field, FieldChange};
 use crate::{
-    CoefficientGradients, CoefficientRates, Coefficients, Grid, Medium, MediumChange, MediumError,
-    MediumKind, Property,
+    CoefficientGradients, CoefficientRates, Coefficients, Flow, FlowPlace, Grid, Medium,
+    MediumChange, MediumError, MediumKind, Property,
 };
 
 /// Derivative of one coefficient field with respect to a parameter, at rest:
@@ -37,6 +38,8 @@ pub struct MediumTangent {
     pub g: f64,
     /// Velocity field of the grids, in world coordinates.
     pub velocity: Affine,
+    /// Further velocities of the grids, which add up.
+    pub flows: Vec<Flow>,
 }
 
 impl FieldTangent {
@@ -125,6 +128,7 @@ impl MediumTangent {
             emission: FieldTangent::default(),
             g: 0.0,
             velocity: Affine::ZERO,
+            flows: Vec::new(),
         }
     }
 
@@ -135,7 +139,7 @@ impl MediumTangent {
             && self.albedo.is_zero()
             && self.emission.is_zero()
             && self.g == 0.0
-            && self.velocity.is_zero()
+            && !self.moves_grids()
     }
 
     /// The sum of two tangents.
@@ -146,6 +150,11 @@ impl MediumTangent {
         self.emission.add(&o.emission);
         self.g += o.g;
         self.velocity = self.velocity.plus(&o.velocity);
+        for flow in &o.flows {
+            if !self.flows.iter_mut().any(|own| own.add(flow)) {
+                self.flows.push(flow.clone());
+            }
+        }
         self
     }
 
@@ -156,6 +165,7 @@ impl MediumTangent {
             MediumChange::Place { map, .. } => {
                 let turn = Affine { linear: map.linear, translation: Vec3::ZERO };
                 self.velocity = turn.after(&self.velocity).after(&map.inverse());
+                self.flows.iter_mut().for_each(|flow| flow.carry(map));
             }
             _ => {
                 if let Some(change) = later.field() {
@@ -173,10 +183,26 @@ impl MediumTangent {
         }
     }
 
-    /// The velocity field of the grids, if they move.
+    /// True when the grids move.
     #[must_use]
-    pub fn grid_velocity(&self) -> Option<Affine> {
-        (!self.velocity.is_zero()).then_some(self.velocity)
+    pub fn moves_grids(&self) -> bool {
+        !(self.velocity.is_zero() && self.flows.iter().all(Flow::is_zero))
+    }
+
+    /// The velocity of the grids at a point of the world. `place` remembers what other tangents at the
+    /// same point can use.
+    #[inline]
+    #[must_use]
+    pub fn grid_velocity(&self, x: Vec3, place: &mut FlowPlace) -> Vec3 {
+        self.velocity.point(x) + self.flow(x, place)
+    }
+
+    /// The part of the grids' velocity that [flows](Self::flows) give.
+    #[inline]
+    #[must_use]
+    pub fn flow(&self, x: Vec3, place: &mut FlowPlace) -> Vec3 {
+        let add = |sum, flow: &Flow| sum + place.at(&flow.basis, x).velocity(&flow.nodes);
+        self.flows.iter().fold(Vec3::ZERO, add)
     }
 
     /// Eulerian rates of the coefficients at the fixed point x of the world: a grid carried along
@@ -184,13 +210,17 @@ impl MediumTangent {
     /// see [`GridMedium::crossings`](crate::GridMedium::crossings).
     #[must_use]
     pub fn rates(&self, medium: &Medium, x: Vec3) -> CoefficientRates {
-        let gradients =
-            if self.velocity.is_zero() { CoefficientGradients::ZERO } else { medium.gradients(x) };
-        self.rates_given(medium, x, &medium.coefficients(x), &gradients)
+        let (coefficients, mut place) = (medium.coefficients(x), FlowPlace::default());
+        if !self.moves_grids() {
+            let still = (&CoefficientGradients::ZERO, Vec3::ZERO);
+            return self.rates_given(medium, x, &coefficients, still.0, still.1);
+        }
+        let velocity = self.grid_velocity(x, &mut place);
+        self.rates_given(medium, x, &coefficients, &medium.gradients(x), velocity)
     }
 
-    /// [`MediumTangent::rates`] where the coefficients and gradients at x are at hand already: for
-    /// many parameters of one point.
+    /// [`MediumTangent::rates`] where the coefficients and gradients at x, and the
+    /// [velocity](Self::grid_velocity) there, are at hand already: for many parameters of one point.
     #[must_use]
     pub fn rates_given(
         &self,
@@ -198,22 +228,18 @@ impl MediumTangent {
         x: Vec3,
         coefficients: &Coefficients,
         gradients: &CoefficientGradients,
+        velocity: Vec3,
     ) -> CoefficientRates {
-        let c = coefficients;
-        let grids = match &medium.kind {
-            MediumKind::Homogeneous(_) => [None; 3],
-            MediumKind::Grid(g) if g.contains(x) => {
-                [Some(g.density()), g.albedo().grid(), g.emission().grid()]
-            }
-            MediumKind::Grid(_) | MediumKind::Custom(_) => {
-                return CoefficientRates { g: self.g, ..CoefficientRates::ZERO };
-            }
+        let (c, u) = (coefficients, velocity);
+        let (grids, at) = match (&medium.kind, medium.grid_at(x)) {
+            (MediumKind::Homogeneous(_), _) => ([None; 3], x),
+            (_, Some((g, material))) => (g.volumes(), material),
+            (_, None) => return CoefficientRates { g: self.g, ..CoefficientRates::ZERO },
         };
-        let u = self.velocity.point(x);
         CoefficientRates {
-            sigma_t: self.sigma_t.rate(c.sigma_t, grids[0], x) - gradients.sigma_t.dot(u),
-            albedo: self.albedo.rate(c.albedo, grids[1], x) - gradients.albedo.dot(u),
-            emission: self.emission.rate(c.emission, grids[2], x) - gradients.emission.dot(u),
+            sigma_t: self.sigma_t.rate(c.sigma_t, grids[0], at) - gradients.sigma_t.dot(u),
+            albedo: self.albedo.rate(c.albedo, grids[1], at) - gradients.albedo.dot(u),
+            emission: self.emission.rate(c.emission, grids[2], at) - gradients.emission.dot(u),
             g: self.g,
         }
     }

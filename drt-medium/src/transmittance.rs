@@ -3,7 +3,7 @@
 
 use alloc::vec::Vec;
 
-use drt_math::{Rgb, RgbVec, Rng, Vec3};
+use drt_math::{Affine, Rgb, RgbVec, Rng, Vec3};
 
 use crate::bounds::clip_to_box;
 use crate::{DepthEstimate, GridMedium, Medium, MediumTangent, Ray, TrackingStats};
@@ -47,15 +47,20 @@ impl GridMedium {
     /// bounds the medium there owns the jump.
     pub fn crossings(&self, ray: &Ray) -> impl Iterator<Item = Crossing> + '_ {
         let ends = clip_to_box(self.density(), ray).map(<[f64; 2]>::from).unwrap_or([-1.0; 2]);
-        let margin = 1e-9 * self.density().world_extent().max_abs();
+        let margin = self.crossing_margin();
         let ray = *ray;
         ends.into_iter()
             .filter(move |&t| t > margin && t < ray.t_max - margin)
-            .map(move |t| self.crossing(&ray, t))
+            .map(move |t| self.crossing(self.density().from_world(), &ray, t))
     }
 
-    fn crossing(&self, ray: &Ray, t: f64) -> Crossing {
-        let unit = self.density().from_world();
+    /// How near to a ray's ends faces are left out.
+    pub(crate) fn crossing_margin(&self) -> f64 {
+        1e-9 * self.density().world_extent().max_abs()
+    }
+
+    /// The crossing at a distance, `unit` being the map to the unit cube there.
+    pub(crate) fn crossing(&self, unit: &Affine, ray: &Ray, t: f64) -> Crossing {
         let u = unit.point(ray.at(t));
         let offset = (u - Vec3::splat(0.5)).to_array();
         let mut axis = 0;
@@ -103,7 +108,7 @@ impl Medium {
         }
         points.clear();
         self.line_points(ray.origin, ray.dir, ray.t_max, rng, points);
-        let moving = tangent.grid_velocity().is_some();
+        let moving = tangent.moves_grids();
         let depth = DepthEstimate::inside(self, *ray, points, moving);
         let depth = if moving { depth.with_faces(self) } else { depth };
         depth.rate(self, tangent)

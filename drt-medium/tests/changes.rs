@@ -205,7 +205,7 @@ fn crossings_scatter_what_they_rate() {
     let ray = ray_through(&medium, vec3(0.8, 0.3, -0.2));
     let motion = turning(0.0);
     let tangent = medium.tangent(&motion, 0.0).expect("a motion");
-    let velocity = tangent.grid_velocity().expect("it moves");
+    let velocity = tangent.velocity;
     let adjoint = Rgb::new(0.3, -1.0, 2.0);
     let mut gradient = MediumGradient::zeros_without_voxels();
     let mut forward = 0.0;

@@ -7,6 +7,7 @@ extern crate alloc;
 mod adjoint;
 mod blend;
 mod caged;
+mod deformation;
 mod distances;
 mod element;
 mod error;
@@ -24,6 +25,7 @@ pub use drt_math::{ValueChange, ValueMap};
 
 pub use adjoint::{AffineGradient, JetAdjoint, VertexGradient, in_file_order};
 pub use blend::{Blend, Site, SiteWeight, blend_jet, triangle_field};
+pub use deformation::{AffineStretch, Deformation, DeformationError, DeformedPlace};
 pub use element::SurfaceElement;
 pub use error::{Cause, MotionError};
 pub use geometry::GeometryChange;

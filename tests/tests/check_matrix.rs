@@ -4,7 +4,7 @@
 //! `cargo test --release -p drt-tests --test check_matrix -- --ignored`
 
 use drt_tests::Result;
-use drt_tests::matrix::{Stage, Table, check, lights, media, surfaces};
+use drt_tests::matrix::{Stage, Table, check, lights, media, riding, surfaces};
 
 fn run(stage: Result<Stage>) {
     let rows = check(&stage.unwrap()).unwrap();
@@ -29,4 +29,5 @@ stages! {
     surfaces: room room_box_filter standing knot gloss near_lamp;
     lights: spot point_and_sun;
     media: fog_box blob still_blob smoke glass dented_glass beam layers sheet ember;
+    riding: riding riding_tight riding_inside riding_still riding_tetrahedral riding_mean_value;
 }

@@ -37,6 +37,7 @@ pub(crate) use adjacency::adjacency;
 pub(crate) use field::{Field, Inside, Place};
 use mean_value::MeanValue;
 use parts::Part;
+pub(crate) use tetrahedra::MARGIN;
 
 /// The motions of all insides, and the shapes whose flux must be added.
 #[derive(Clone, Debug, Default)]

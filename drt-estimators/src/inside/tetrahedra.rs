@@ -18,7 +18,7 @@ use crate::tangents::Tangents;
 use crate::transport::World;
 
 /// How far the enclosing box is, in diagonals of what it encloses: the field dies out on the way.
-pub(super) const MARGIN: f64 = 0.5;
+pub(crate) const MARGIN: f64 = 0.5;
 
 /// Fills the surroundings of a medium with tetrahedra.
 pub(super) fn around(

@@ -16,6 +16,7 @@ mod plate;
 mod predicates;
 mod recovery;
 mod segments;
+mod slivers;
 mod triangles;
 mod walk;
 

@@ -7,6 +7,7 @@ mod cell;
 pub(crate) mod effects;
 pub mod lights;
 pub mod media;
+pub mod riding;
 pub(crate) mod set;
 pub mod surfaces;
 mod verdict;

@@ -104,7 +104,9 @@ impl Similarity {
                 let scale = g.scale() / self.scale;
                 GridMedium::new(density, scale, placed(g.albedo())?, placed(g.emission())?)?.into()
             }
-            MediumKind::Custom(_) => return Err("no scene here has a custom medium".into()),
+            MediumKind::Custom(_) | MediumKind::Deformed(_) => {
+                return Err("no scene here has a medium of its own kind".into());
+            }
         };
         Ok(Medium::new(kind, medium.phase))
     }

@@ -1,0 +1,163 @@
+//! Grids that ride with a shape which deforms: the deformation of space that carries both.
+//!
+//! Tetrahedra fill the space in the followed shape and around it, up to a box that holds the grid as
+//! well. Their vertices on the shape go where the shape goes; the others go with the affine part of the
+//! changes alone, so that the deformation dies out towards the box. A grid is as deformed as the space
+//! it lies in, and its faces stay on the shape's where they lie on them.
+
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::ops::ControlFlow;
+
+use drt_geom::{Mesh, TetrahedralizeInput, tetrahedralize};
+use drt_math::{Affine, Mat3, Vec3};
+use drt_medium::{Flow, FlowBasis, GridMedium, Medium, NodeWeights, Ray, SpaceMap};
+use drt_motion::{
+    Applied, Carrier, Deformation, DeformationError, GeometryChange, MotionError, MovedFrame,
+    SurfaceMotion, TetrahedralField, move_affine, move_mesh,
+};
+
+use crate::inside::MARGIN;
+
+/// Why a grid cannot ride.
+pub(crate) enum RideError {
+    /// A change is at fault.
+    Motion(MotionError),
+    /// The shape is, or how far it has gone; with the first parameter that deforms it.
+    Shape(usize, String),
+}
+
+impl From<MotionError> for RideError {
+    fn from(e: MotionError) -> Self {
+        Self::Motion(e)
+    }
+}
+
+/// What changes do to a grid that rides with a shape.
+pub(crate) struct Ride {
+    deformation: Arc<Deformed>,
+    /// The affine part of the changes.
+    frame: MovedFrame,
+    /// Nothing else has happened yet.
+    is_affine: bool,
+    velocities: Vec<Arc<[Vec3]>>,
+}
+
+impl Ride {
+    /// The ride of a grid on a shape, given as it was before any change, that `changes` are made to.
+    pub(crate) fn new(
+        grid: &GridMedium,
+        shape: &Mesh,
+        changes: &[Applied<'_, GeometryChange>],
+        parameters: usize,
+    ) -> Result<Self, RideError> {
+        let again = changes.iter().map(|c| Applied { ..*c });
+        let (affine, deforming): (Vec<_>, Vec<_>) =
+            again.partition(|c| c.change.affine(c.theta).is_some());
+        let culprit = deforming.first().map_or(0, |c| c.parameter);
+        let frame = move_affine(&affine, parameters)?;
+        let moved = move_mesh(shape, changes, parameters)?;
+        let field = fill(grid, shape).map_err(|reason| RideError::Shape(culprit, reason))?;
+        // What vertices on the shape do beyond the affine part; others do nothing beyond it.
+        let spread = |own: Vec<Vec3>| {
+            let motion = SurfaceMotion::Vertices { positions: own.into(), normals: None };
+            field.velocities(&[Carrier { mesh: shape, motion: &motion }], &[])
+        };
+        let carried = |p: &Vec3| frame.map.point(*p);
+        let tets = field.mesh();
+        let offsets =
+            shape.positions.iter().zip(&moved.mesh.positions).map(|(p, q)| *q - carried(p));
+        let offsets = spread(offsets.collect());
+        let positions = tets.positions.iter().zip(&*offsets).map(|(p, d)| carried(p) + *d);
+        let deformation = Deformation::new(tets, positions.collect())
+            .map_err(|e| RideError::Shape(culprit, turned_over(&e)))?;
+        let velocities = moved.motions.iter().zip(&frame.velocities).map(|(motion, affine)| {
+            let own = (0..shape.positions.len()).map(|v| {
+                at_vertex(motion, &moved.mesh, v) - affine.point(carried(&shape.positions[v]))
+            });
+            let own = spread(own.collect());
+            tets.positions.iter().zip(&*own).map(|(p, v)| affine.point(carried(p)) + *v).collect()
+        });
+        Ok(Self {
+            velocities: velocities.collect(),
+            is_affine: deforming.iter().all(|c| c.theta == 0.0),
+            deformation: Arc::new(Deformed(deformation)),
+            frame,
+        })
+    }
+
+    /// Takes the grids of a medium along.
+    pub(crate) fn carry(&self, medium: &mut Medium) -> Result<(), drt_medium::MediumError> {
+        if self.is_affine {
+            return medium.place(&self.frame.map);
+        }
+        medium.deform(self.deformation.clone())
+    }
+
+    /// The velocity of the grids by a parameter.
+    pub(crate) fn flow(&self, parameter: usize) -> Flow {
+        let nodes = self.velocities[parameter].clone();
+        Flow { basis: self.deformation.clone(), nodes }
+    }
+}
+
+/// Tetrahedra in a shape and around it.
+fn fill(grid: &GridMedium, shape: &Mesh) -> Result<TetrahedralField, String> {
+    let bounds = shape.bounds();
+    let [min, max] = grid.density().world_bounds();
+    let beyond = (bounds.min - min).max(max - bounds.max).max(Vec3::ZERO).max_abs();
+    let diagonal = bounds.extent().length();
+    let margin = MARGIN + if diagonal > 0.0 { beyond / diagonal } else { 0.0 };
+    let input = TetrahedralizeInput { surfaces: &[shape], points: &[], margin };
+    let fail = |e: &dyn core::fmt::Display| {
+        format!("no tetrahedra fill the space around the shape that it follows: {e}")
+    };
+    let mut made = tetrahedralize(&input).map_err(|e| fail(&e))?;
+    made.remove_slivers(&[shape]);
+    TetrahedralField::new(made).map_err(|e| fail(&e))
+}
+
+fn turned_over(e: &DeformationError) -> String {
+    match e {
+        DeformationError::TurnedOver { at: [x, y, z], .. } => format!(
+            "the shape that it follows deforms too far: around ({x:.3}, {y:.3}, {z:.3}) space would be \
+             turned inside out; choose a value nearer to zero"
+        ),
+        other => other.to_string(),
+    }
+}
+
+fn at_vertex(motion: &SurfaceMotion, moved: &Mesh, v: usize) -> Vec3 {
+    match motion {
+        SurfaceMotion::Rest => Vec3::ZERO,
+        SurfaceMotion::Affine(field) => field.point(moved.positions[v]),
+        SurfaceMotion::Vertices { positions, .. } => positions[v],
+    }
+}
+
+/// A deformation as media see it.
+#[derive(Debug)]
+struct Deformed(Deformation);
+
+impl SpaceMap for Deformed {
+    fn material(&self, x: Vec3) -> Option<(Vec3, Mat3)> {
+        self.0.place(x).map(|place| (place.material, place.inverse))
+    }
+
+    fn stretches(&self, ray: &Ray, visit: &mut dyn FnMut(f64, f64, &Affine) -> ControlFlow<()>) {
+        let Ray { origin, dir, t_max } = *ray;
+        self.0.stretches(origin, dir, t_max, &mut |s| visit(s.start, s.end, &s.inverse));
+    }
+}
+
+impl FlowBasis for Deformed {
+    fn weights(&self, x: Vec3) -> NodeWeights {
+        let place = self.0.place(x);
+        place.map_or_else(NodeWeights::default, |p| NodeWeights {
+            nodes: p.corners,
+            weights: p.weights,
+        })
+    }
+}
