@@ -26,6 +26,7 @@ mod rendering;
 mod reverse;
 mod riding;
 mod scene;
+mod scene_gradient;
 mod sensitivity;
 pub mod sensor;
 mod session;
@@ -40,9 +41,10 @@ pub use error::Error;
 pub use finite_difference::finite_differences;
 pub use plan::{MediumPlan, Plan};
 pub use rendering::{BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term};
-pub use reverse::{SceneGradient, gradient};
+pub use reverse::gradient;
 pub use scene::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding, Target,
 };
+pub use scene_gradient::SceneGradient;
 pub use session::{Control, FinishedTile, Session, Unattended};
 pub use settings::{EstimatorKind, GivenTetrahedra, InsideKind, Settings};

@@ -4,7 +4,7 @@ mod common;
 
 use common::*;
 use drt_estimators::{
-    Counters, Plan, Rendering, Scene, Session, Settings, Target, Unattended, gradient,
+    Counters, InsideKind, Plan, Rendering, Scene, Session, Settings, Target, Unattended, gradient,
 };
 use drt_math::{Rgb, ValueChange};
 use drt_motion::{Effect, Parameter};
@@ -129,9 +129,9 @@ fn insides_follow_what_they_can() {
     };
     let motion = |s: &str| Some(String::from(s));
     // A surface with vertices on it takes its surroundings along.
-    for change in [turn(), wobble(&scene, "ball", 1)] {
+    for (change, kind) in [(turn(), "blend"), (wobble(&scene, "ball", 1), "tetrahedral")] {
         let (thin, shapes, samples) = how(vec![moves("ball", change)]);
-        assert_eq!((thin, shapes.len(), samples), (motion("blend"), 0, 0));
+        assert_eq!((thin, shapes.len(), samples), (motion(kind), 0, 0));
     }
     // Nothing moves.
     let (thin, shapes, samples) = how(vec![changes("thin", "albedo", grey(0.1))]);
@@ -141,10 +141,11 @@ fn insides_follow_what_they_can() {
 #[test]
 fn reverse_mode_skips_as_much() {
     let adjoint = vec![Rgb::ONE; (FILM[0] * FILM[1]) as usize];
-    let settings = Settings { spp: 8, ..Settings::default() };
-    let run = |scene: &Scene, wanted: &[Target]| {
+    let under = |scene: &Scene, wanted: &[Target], insides: Vec<(usize, InsideKind)>| {
+        let settings = Settings { spp: 8, insides, ..Settings::default() };
         gradient(scene, wanted, &settings, &adjoint, &Unattended).expect("a valid scene")
     };
+    let run = |scene: &Scene, wanted: &[Target]| under(scene, wanted, Vec::new());
     let scene = surfaces(phong(), phong());
     let g = run(&scene, &[Target::Bsdf(0)]);
     let c = &g.counters;
@@ -155,6 +156,17 @@ fn reverse_mode_skips_as_much() {
     assert_eq!((g.counters.differentiated_paths, g.counters.boundary_samples), (0, 0));
     let g = run(&fog(), &[Target::Medium(0)]);
     assert_eq!((g.counters.boundary_samples, g.counters.flux_samples), (0, 0));
+    // Insides follow; where they stay, the flux is needed.
     let g = run(&fog(), &[Target::Shape(2)]);
+    assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples == 0);
+    let g = under(&fog(), &[Target::Shape(2)], vec![(0, InsideKind::Static)]);
     assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples > 0);
+    // So it is where surfaces pass through each other, or touch.
+    for (at, why) in [(-1.1, "pass through"), (-1.0, "touch")] {
+        let scene = fog_with_a_block(at, 0.5);
+        let block = scene.find("block").expect("a shape");
+        assert!(run(&scene, &[block]).counters.flux_samples > 0, "{why}");
+    }
+    let g = run(&fog_with_a_block(-0.7, 0.5), &[Target::Shape(2)]);
+    assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples == 0);
 }

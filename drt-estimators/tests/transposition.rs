@@ -6,15 +6,26 @@ mod common;
 use common::pairing::{pair, targets};
 use common::*;
 use drt_estimators::filter::{Filter, FilterKind};
-use drt_estimators::sensor::Sensor;
+use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::{InsideKind, Scene, Session, Settings, Unattended, gradient};
-use drt_math::{Rgb, Rng, ValueChange, vec3};
-use drt_motion::{Effect, Parameter};
+use drt_geom::procedural;
+use drt_math::{Rgb, Rng, ValueChange, Vec3, vec3};
+use drt_motion::{Effect, GeometryChange, Parameter};
 
-/// Insides stay, as reverse mode takes them.
-fn settings() -> Settings {
-    let insides = vec![(0, InsideKind::Static), (1, InsideKind::Static)];
+/// Every inside moves as said.
+fn with(kind: &InsideKind) -> Settings {
+    let insides = vec![(0, kind.clone()), (1, kind.clone())];
     Settings { spp: 16, seed: 3, threads: 1, insides, ..Settings::default() }
+}
+
+/// Insides stay, and the flux is added.
+fn settings() -> Settings {
+    with(&InsideKind::Static)
+}
+
+/// Insides move with tetrahedra.
+fn carried() -> Settings {
+    with(&InsideKind::Tetrahedral(None))
 }
 
 /// A random number per pixel and channel.
@@ -110,8 +121,7 @@ fn surfaces_one_at_a_time() {
     }
 }
 
-#[test]
-fn fog_with_a_solid() {
+fn fog_with_a_solid_in(settings: &Settings) {
     let scene = fog();
     let mut effects = wobbles(&scene);
     for medium in ["thin", "dense"] {
@@ -124,15 +134,61 @@ fn fog_with_a_solid() {
     effects.push(changes("bulb", "intensity", coloured()));
     effects.push(moves("sun", turn()));
     effects.push(moves("camera", turn()));
-    agree("everything", &scene, effects, &settings());
+    agree("everything", &scene, effects, settings);
     let coefficients = ["sigma_t", "albedo"].map(|p| changes("thin", p, coloured()));
-    agree("coefficients", &scene, coefficients.into(), &settings());
+    agree("coefficients", &scene, coefficients.into(), settings);
     let extinction = vec![changes("thin", "sigma_t", coloured())];
-    agree("extinction alone", &scene, extinction, &settings());
-    agree("box", &scene, vec![moves("box", wobble(&scene, "box", 5))], &settings());
-    agree("ball", &scene, vec![moves("ball", wobble(&scene, "ball", 5))], &settings());
-    agree("ball turns", &scene, vec![moves("ball", turn())], &settings());
-    agree("bulb", &scene, vec![moves("bulb", shift())], &settings());
+    agree("extinction alone", &scene, extinction, settings);
+    agree("box", &scene, vec![moves("box", wobble(&scene, "box", 5))], settings);
+    agree("ball", &scene, vec![moves("ball", wobble(&scene, "ball", 5))], settings);
+    agree("ball turns", &scene, vec![moves("ball", turn())], settings);
+    agree("bulb", &scene, vec![moves("bulb", shift())], settings);
+}
+
+#[test]
+fn fog_with_a_solid() {
+    fog_with_a_solid_in(&settings());
+}
+
+#[test]
+fn fog_carried_by_a_solid() {
+    fog_with_a_solid_in(&carried());
+}
+
+#[test]
+fn fog_bent_by_cages() {
+    let scene = fog();
+    for (name, settings) in [("static", settings()), ("carried", carried())] {
+        for (shape, size) in [("ball", 0.9), ("blob", 1.5), ("box", 2.5)] {
+            let effects = vec![moves(shape, bend(size))];
+            agree(&format!("{shape}, {name}"), &scene, effects, &settings);
+        }
+    }
+}
+
+/// Fog seen from inside.
+#[test]
+fn a_camera_and_a_light_in_the_fog() {
+    let mut scene = fog();
+    let eye = [vec3(0.1, 0.9, 1.2), vec3(0.2, -0.1, 0.0), Vec3::Y];
+    let filter = Filter::new(FilterKind::Tent { radius: 1.0 }).expect("a valid filter");
+    let sensor = Sensor::look_at(eye, Lens::with_fov(70.0), FILM, filter);
+    scene.sensors[0].item.sensor = sensor.expect("a valid camera");
+    let camera = moves("camera", turn());
+    for settings in [settings(), carried()] {
+        agree("camera", &scene, vec![camera.clone()], &settings);
+        agree("bulb", &scene, vec![moves("bulb", shift())], &settings);
+        let mut effects = wobbles(&scene);
+        effects.extend([camera.clone(), moves("bulb", shift())]);
+        agree("everything", &scene, effects, &settings);
+    }
+}
+
+/// Two corners of a cage around everything move.
+fn bend(size: f64) -> GeometryChange {
+    let cage = placed(procedural::cube(), Vec3::splat(size), 0.4, vec3(0.1, 0.0, 0.2));
+    let vertices = [(0, vec3(0.5, -0.7, 0.2)), (5, vec3(-0.4, 0.1, 0.9))];
+    GeometryChange::Cage { mesh: cage.into(), vertices: vertices.into() }
 }
 
 #[test]
@@ -150,8 +206,10 @@ fn voxels() {
     agree("voxels", &scene, effects.clone(), &settings());
     effects.push(moves("lamp", wobble(&scene, "lamp", 1)));
     effects.push(moves("camera", shift()));
-    agree("with motions", &scene, effects, &settings());
+    agree("with motions", &scene, effects.clone(), &settings());
     agree("carried", &scene, vec![moves("smoke", turn())], &settings());
+    effects.extend([moves("box", wobble(&scene, "box", 2)), moves("smoke", turn())]);
+    agree("in a moving box", &scene, effects, &carried());
 }
 
 #[test]

@@ -7,9 +7,9 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io, process};
 
-use drt_geom::Mesh;
 use drt_geom::procedural::{self, BranchingTree, TorusKnot};
-use drt_math::{Vec3, vec3};
+use drt_geom::{Aabb, Mesh, NONE, TetMesh};
+use drt_math::{Affine, Vec3, vec3};
 
 /// Radius of the star's notches; its tips are on the unit circle.
 const NOTCH: f64 = 0.4;
@@ -30,7 +30,11 @@ fn write_all(folder: &Path) -> io::Result<()> {
     let star = procedural::star(7, NOTCH, 1.0);
     let tree = BranchingTree { seed: 5, sides: 6, radius: 0.12, ..BranchingTree::default() };
     let knot = TorusKnot { segments: 160, sides: 14, tube: 0.22, ..TorusKnot::default() };
+    // Where the scene puts the bar.
+    let cage = box_surface([1, 3, 1], vec3(0.5, 1.2, 0.5));
     let meshes = [
+        ("bar", bar()),
+        ("bar-cage", cage.transform(&Affine::translation(vec3(0.0, 1.12, 0.0)))),
         ("bumpy", procedural::bumpy_sphere(4, 0.35, 4.0)),
         ("crystal", crystal()),
         ("knot", procedural::torus_knot(&knot)),
@@ -55,6 +59,34 @@ fn obj(mesh: &Mesh) -> String {
         let _ = writeln!(text, "f {a} {b} {c}");
     }
     text
+}
+
+/// The surface of a box around the origin, its sides divided into triangles.
+fn box_surface(cells: [u32; 3], half: Vec3) -> Mesh {
+    let tets = procedural::tet_grid(cells, &Aabb { min: -half, max: half });
+    let neighbours = tets.neighbours().expect("a mesh by construction");
+    let faces = TetMesh::boundary_faces(&neighbours).map(|(tet, k)| tets.face(tet, k));
+    let faces: Vec<[u32; 3]> = faces.collect();
+    let mut numbers = vec![NONE; tets.positions.len()];
+    let mut positions = Vec::new();
+    for v in faces.iter().flatten() {
+        if numbers[*v as usize] == NONE {
+            numbers[*v as usize] = positions.len() as u32;
+            positions.push(tets.positions[*v as usize]);
+        }
+    }
+    let triangles = faces.iter().map(|t| t.map(|v| numbers[v as usize])).collect();
+    Mesh::new(positions, triangles).expect("the arrays are right by construction")
+}
+
+/// An upright bar with round edges.
+fn bar() -> Mesh {
+    let mut bar = box_surface([8, 24, 8], vec3(1.0, 1.0, 1.0));
+    for p in &mut bar.positions {
+        let size = (p.x.powi(8) + p.y.powi(8) + p.z.powi(8)).powf(0.125);
+        *p = vec3(0.42 * p.x / size, 1.05 * p.y / size, 0.3 * p.z / size);
+    }
+    bar
 }
 
 /// A hexagonal prism with pointed ends along z, from -1 to 1: few edges, all of them creases.

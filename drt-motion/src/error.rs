@@ -34,6 +34,14 @@ pub enum Cause {
         /// Vectors given.
         found: usize,
     },
+    /// Velocities of a [field](crate::MeanValueField) with other surfaces.
+    #[error("expected the velocities of {expected} triangles' corners, found {found}")]
+    TriangleCount {
+        /// Triangles of the field.
+        expected: usize,
+        /// Triangles given.
+        found: usize,
+    },
     /// A vertex that the mesh does not have.
     #[error("vertex {index} does not exist: the mesh file has {count} vertices, counted from 0")]
     VertexIndex {

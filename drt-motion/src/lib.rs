@@ -30,7 +30,8 @@ pub use element::SurfaceElement;
 pub use error::{Cause, MotionError};
 pub use geometry::GeometryChange;
 pub use mean_value::{
-    Cage, CageWeights, MeanValueField, MeanValueVelocities, MeanValueWeight, MeanValueWeights,
+    Cage, CageWeights, MeanValueField, MeanValueGradient, MeanValueVelocities, MeanValueWeight,
+    MeanValueWeights,
 };
 pub use moved::{MovedFrame, MovedMesh, move_affine, move_mesh};
 pub use normals::SmoothNormals;

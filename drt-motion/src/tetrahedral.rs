@@ -89,10 +89,9 @@ impl TetrahedralField {
             *v = velocity(origin, carriers, points).0;
         }
         for group in self.shared.chunk_by(|a, b| a.0 == b.0) {
-            let v = group[0].0 as usize;
-            let all = core::iter::once(&self.origins[v]).chain(group.iter().map(|(_, o)| o));
-            let owners: Vec<_> = all.map(|o| velocity(o, carriers, points)).collect();
-            velocities[v] = agreement(&owners);
+            let owners: Vec<_> =
+                self.owners(group).map(|o| velocity(o, carriers, points)).collect();
+            velocities[group[0].0 as usize] = agreement(&owners);
         }
         for around in self.between.chunk_by(|a, b| a.0 == b.0) {
             let sum = around.iter().fold(Vec3::ZERO, |s, (_, b)| s + velocities[*b as usize]);
@@ -112,23 +111,74 @@ impl TetrahedralField {
         }
     }
 
-    /// The transpose of [`velocities`](Self::velocities) as far as surfaces go: moves the gradient
-    /// with respect to vertices to the vertices of surfaces. A vertex of several surfaces counts for
-    /// the first, so it is exact for motions in which surfaces that touch move alike.
+    /// Pairs of surfaces that share vertices, each with the lower index first, sorted.
+    #[must_use]
+    pub fn contacts(&self) -> Vec<[u32; 2]> {
+        let mut pairs = Vec::new();
+        for group in self.shared.chunk_by(|a, b| a.0 == b.0) {
+            let surfaces: Vec<u32> = self.owners(group).filter_map(surface_of).collect();
+            for (i, a) in surfaces.iter().enumerate() {
+                let others = surfaces[i + 1..].iter().filter(|b| *b != a);
+                pairs.extend(others.map(|b| [*a.min(b), *a.max(b)]));
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs
+    }
+
+    /// The transpose of [`velocities`](Self::velocities): hands the gradient with respect to the
+    /// velocities of all vertices on to the vertices of surfaces and to points; `None` stands for
+    /// those at rest.
+    ///
+    /// Where several touch, a vertex moves with the first that is not at rest. This is linear, as a
+    /// gradient must be, and is what [`velocities`](Self::velocities) does too if they move alike.
+    /// Surfaces that do not are left behind next to their [contacts](Self::contacts), and the flux
+    /// through both surfaces must be added.
     ///
     /// # Panics
-    /// When there are fewer surfaces than the tetrahedra were made from.
-    pub fn gather(&self, mut gradient: Vec<Vec3>, surfaces: &mut [(&Mesh, &mut VertexGradient)]) {
+    /// When there are fewer entries, surfaces or points than the tetrahedra have.
+    pub fn gather(
+        &self,
+        mut gradient: Vec<Vec3>,
+        surfaces: &mut [(&Mesh, Option<&mut VertexGradient>)],
+        points: &mut [Option<Vec3>],
+    ) {
         for around in self.between.chunk_by(|a, b| a.0 == b.0) {
             let part = gradient[around[0].0 as usize] * (1.0 / around.len() as f64);
             around.iter().for_each(|(_, b)| gradient[*b as usize] += part);
         }
-        for (g, origin) in gradient.iter().zip(&self.origins) {
-            if let TetVertexOrigin::Surface { surface, triangle, bary } = *origin {
-                let (mesh, to) = &mut surfaces[surface as usize];
-                to.scatter_velocity(mesh, &SurfacePoint { triangle, bary }, *g);
+        let mut hand_on = |origin: &TetVertexOrigin, g: Vec3| match *origin {
+            TetVertexOrigin::Surface { surface, triangle, bary } => {
+                let (mesh, Some(to)) = &mut surfaces[surface as usize] else { return false };
+                to.scatter_velocity(mesh, &SurfacePoint { triangle, bary }, g);
+                true
             }
+            TetVertexOrigin::Point(i) => points[i as usize].as_mut().map(|sum| *sum += g).is_some(),
+            TetVertexOrigin::Box | TetVertexOrigin::Inside => false,
+        };
+        let mut groups = self.shared.chunk_by(|a, b| a.0 == b.0).peekable();
+        for ((v, origin), g) in (0..).zip(&self.origins).zip(gradient) {
+            let others = groups.next_if(|group| group[0].0 == v).unwrap_or_default();
+            let mut owners = core::iter::once(origin).chain(others.iter().map(|(_, o)| o));
+            owners.any(|owner| hand_on(owner, g));
         }
+    }
+
+    /// All that a vertex lies on which several things share, given its entries.
+    fn owners<'a>(
+        &'a self,
+        group: &'a [(u32, TetVertexOrigin)],
+    ) -> impl Iterator<Item = &'a TetVertexOrigin> {
+        let first = &self.origins[group[0].0 as usize];
+        core::iter::once(first).chain(group.iter().map(|(_, o)| o))
+    }
+}
+
+fn surface_of(origin: &TetVertexOrigin) -> Option<u32> {
+    match origin {
+        TetVertexOrigin::Surface { surface, .. } => Some(*surface),
+        _ => None,
     }
 }
 

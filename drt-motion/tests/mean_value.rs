@@ -262,7 +262,7 @@ fn no_point_is_lost() {
         for (scale, offset) in [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)] {
             let mesh = placed(mesh, scale, Vec3::splat(offset));
             let cage = Cage::new(&mesh).unwrap();
-            let rounds = if mesh.triangles.len() > 100 { 1_500 } else { 5_000 };
+            let rounds = if mesh.triangles.len() > 100 { 1_500 } else { 5_500 };
             for _ in 0..rounds {
                 let t = rng.next_u32() % mesh.triangles.len() as u32;
                 let [a, b, c] = mesh.triangle(t);

@@ -5,7 +5,10 @@ mod common;
 use common::*;
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
-use drt_motion::{Cause, MeanValueField, MeanValueVelocities, MeanValueWeights, VolumeJet};
+use drt_motion::{
+    Cause, MeanValueField, MeanValueGradient, MeanValueVelocities, MeanValueWeights, VolumeAdjoint,
+    VolumeJet,
+};
 
 /// A bumpy body and a knot in a box, every third triangle wound the wrong way, with velocities that
 /// know no symmetry, linear on the triangles.
@@ -111,7 +114,7 @@ fn there_are_no_jumps_where_clusters_change_over() {
     let mut counts = Vec::new();
     let mut weights = MeanValueWeights::default();
     let (from, to) = (vec3(-2.9, -2.8, 2.3), vec3(2.7, 2.6, 2.5));
-    let n = 200_000;
+    let n = 60_000;
     let at = |i: usize| from + (to - from) * (i as f64 / n as f64);
     let [mut a, mut b] = [s.jet(at(0)), s.jet(at(1))];
     let (mut bend, mut bend_of_divergence): (f64, f64) = (0.0, 0.0);
@@ -126,8 +129,8 @@ fn there_are_no_jumps_where_clusters_change_over() {
     counts.dedup();
     println!("{} changes, bends {bend:e} {bend_of_divergence:e}", counts.len());
     assert!(counts.len() > 100);
-    // Second differences of smooth functions at steps of 4e-5 of the box.
-    assert!(bend < 2e-8 && bend_of_divergence < 2e-7, "{bend:e} {bend_of_divergence:e}");
+    // Second differences of smooth functions at steps of 1e-4 of the box.
+    assert!(bend < 2e-7 && bend_of_divergence < 2e-7, "{bend:e} {bend_of_divergence:e}");
 }
 
 #[test]
@@ -189,12 +192,65 @@ fn nested_surfaces_alternate_whatever_their_winding() {
 }
 
 #[test]
+fn scattering_is_the_transpose_of_jets() {
+    let mut rng = Rng::new(74, 0, 0);
+    let s = Setting::new(1.0, Vec3::ZERO);
+    let mut halves = [MeanValueGradient::zeros(&s.field), MeanValueGradient::zeros(&s.field)];
+    let mut w = MeanValueWeights::default();
+    let mut forward = 0.0;
+    for i in 0..200 {
+        let x = if i == 7 { s.soup[40][1] } else { random_vec(&mut rng) * 3.0 };
+        let a = VolumeAdjoint { u: random_vec(&mut rng), j: random_vec(&mut rng).x };
+        s.field.weights(x, &mut w);
+        let jet = s.field.jet(&w, &s.velocities);
+        forward += jet.u.dot(a.u) + jet.j_dot * a.j;
+        s.field.scatter(&w, &a, &mut halves[i % 2]);
+    }
+    let [mut gradient, other] = halves;
+    gradient.add(&other);
+    let corners = s.field.finish(&gradient);
+    let reverse: f64 =
+        corners.iter().flatten().zip(s.corners.iter().flatten()).map(|(g, v)| g.dot(*v)).sum();
+    assert!((forward - reverse).abs() < 1e-10 * forward.abs().max(1.0), "{forward} {reverse}");
+}
+
+#[test]
+fn bodies_may_touch() {
+    // Two cubes side by side, with a face in common, standing on the floor of a box.
+    let at = |size: f64, at: Vec3| {
+        let map = Affine { linear: Mat3::IDENTITY * size, translation: at };
+        procedural::cube().transform(&map).soup()
+    };
+    let mut soup = at(3.0, Vec3::ZERO);
+    soup.extend(at(0.5, vec3(-0.5, 0.0, -2.5)));
+    soup.extend(at(0.5, vec3(0.5, 0.0, -2.5)).into_iter().map(|[a, b, c]| [b, a, c]));
+    let corners: Vec<_> = soup.iter().map(|t| t.map(wave)).collect();
+    let field = MeanValueField::new(&soup).unwrap();
+    let velocities = field.velocities(&corners).unwrap();
+    let mut w = MeanValueWeights::default();
+    let largest = corners.iter().flatten().map(|v| v.length()).fold(0.0, f64::max);
+    for i in 0..=1000 {
+        let x = vec3(-2.9 + 5.8 * f64::from(i) / 1000.0, 0.2, -1.97);
+        field.weights(x, &mut w);
+        assert!(field.jet(&w, &velocities).u.length() < 1.1 * largest, "{x:?}");
+        // Down to the floor, along a side of a cube.
+        let x = vec3(1.0 + 1e-3, 0.2, -3.0 + 3.0 * f64::from(i) / 1000.0);
+        field.weights(x, &mut w);
+        assert!(field.jet(&w, &velocities).u.length() < 1.1 * largest, "{x:?}");
+    }
+    for (t, v) in soup.iter().zip(&corners).take(12) {
+        field.weights(t[0], &mut w);
+        assert!((field.jet(&w, &velocities).u - v[0]).max_abs() < 1e-12);
+    }
+}
+
+#[test]
 fn no_point_is_lost() {
     let mut rng = Rng::new(73, 0, 0);
     for (scale, offset) in [(1.0, 0.0), (1e-6, 0.0), (1e6, 0.0), (1.0, 1e6)] {
         let s = Setting::new(scale, Vec3::splat(offset));
         let largest = s.corners.iter().flatten().map(|v| v.length()).fold(0.0, f64::max);
-        for _ in 0..2_500 {
+        for _ in 0..25_000 {
             let [a, b, c] = s.soup[rng.next_u32() as usize % s.soup.len()];
             let [r, q] = rng.next_2d();
             let size = [0.0, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3][rng.next_u32() as usize % 6];
@@ -222,7 +278,7 @@ fn surfaces_that_bound_nothing_are_refused() {
     let cause = |soup: &[[Vec3; 3]]| MeanValueField::new(soup).map(|_| ()).unwrap_err();
     let mut soup = procedural::cube().soup();
     let field = MeanValueField::new(&soup).unwrap();
-    let short = Cause::MotionLength { expected: 12, found: 11 };
+    let short = Cause::TriangleCount { expected: 12, found: 11 };
     assert_eq!(field.velocities(&[[Vec3::X; 3]; 11]).unwrap_err(), short);
     assert!(field.velocities(&[[Vec3::X * f64::NAN; 3]; 12]).is_err());
     soup.extend([[Vec3::X, Vec3::Y, Vec3::Z], [Vec3::X, Vec3::Z, Vec3::Y]]);

@@ -97,6 +97,10 @@ fn files_give_back_what_was_written() {
         GeometryChange::Matrix(random_affine(&mut rng)),
         GeometryChange::VertexVelocity(random_vecs(&mut rng, 5).into()),
         GeometryChange::Vertex { index: 3, direction: v },
+        GeometryChange::Cage {
+            mesh: drt_geom::procedural::cube().into(),
+            vertices: [(5, v)].into(),
+        },
     ];
     let values =
         [ValueChange::Add(Rgb::ONE), ValueChange::Multiply(2.0), ValueChange::MultiplyLog(3.0)];

@@ -5,6 +5,7 @@
 
 pub mod comparison;
 pub mod detector;
+pub mod insides;
 pub mod judge;
 pub mod matrix;
 pub mod measure;

@@ -2,11 +2,10 @@
 
 use std::time::Instant;
 
-use drt_estimators::{Estimate, Rendering, Session, Settings, Unattended};
+use drt_estimators::{Estimate, Rendering, Session, Unattended};
 use drt_motion::Parameter;
 
 use crate::Result;
-use crate::scene::Built;
 use crate::trial::Trial;
 
 /// How precise a measurement has to be, and how much it may cost.
@@ -69,35 +68,18 @@ impl Effort {
 /// When the library rejects the scene.
 pub fn measure(trial: &Trial, effort: &Effort) -> Result<Measurement> {
     let parameters: Vec<Parameter> = trial.parameters.iter().map(|(p, _)| p.clone()).collect();
-    let scales = effort.scales(trial);
-    measure_scaled(&trial.built, &parameters, trial.unit, trial.value.abs(), &scales, effort)
-        .map_err(|e| format!("{}: {e}", trial.name).into())
-}
-
-/// Runs a scene until the noise is small against the given scales, or effort is spent.
-///
-/// # Errors
-/// When the library rejects the scene.
-pub fn measure_scaled(
-    built: &Built,
-    parameters: &[Parameter],
-    unit: f64,
-    value_scale: f64,
-    scales: &[f64],
-    effort: &Effort,
-) -> Result<Measurement> {
+    let (value_scale, scales) = (trial.value.abs(), effort.scales(trial));
     let start = Instant::now();
-    // Tests run side by side; each keeps to one thread.
-    let settings = Settings { threads: 1, seed: 2021, ..Settings::default() };
-    let mut session = Session::new(&built.scene, parameters, &settings)?;
+    let mut session = Session::new(&trial.built.scene, &parameters, &trial.settings())
+        .map_err(|e| format!("{}: {e}", trial.name))?;
     let mut samples = 0;
     let mut next = 1 << 12;
     loop {
         session.run(next, &Unattended);
         samples += next;
         let result = session.rendering();
-        let mut measured = numbers(&result, unit);
-        let noise = measured.noise(value_scale, scales);
+        let mut measured = numbers(&result, trial.unit);
+        let noise = measured.noise(value_scale, &scales);
         if noise <= effort.noise || samples >= effort.samples {
             measured.seconds = start.elapsed().as_secs_f64();
             return Ok(measured);

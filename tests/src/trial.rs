@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 
-use drt_motion::{GeometryChange, Parameter};
+use drt_estimators::{InsideKind, Session, Settings};
+use drt_motion::{Change, GeometryChange, Parameter};
 
 use crate::Result;
 use crate::motion::{moves, moves_everything, parameter};
@@ -29,6 +30,8 @@ pub struct Trial {
     pub bias: f64,
     /// Size of the largest derivative of the case, in all its rows.
     pub largest_of_case: f64,
+    /// How the insides of its media move, where the plan is not to choose.
+    pub insides: Option<InsideKind>,
 }
 
 impl Trial {
@@ -55,7 +58,34 @@ impl Trial {
             Detector::Radiance { .. } => crate::detector::RAY_BIAS,
             _ => 1e-9,
         };
-        Ok(Self { name, built, unit: 1.0, value, parameters, bias, largest_of_case })
+        let insides = None;
+        Ok(Self { name, built, unit: 1.0, value, parameters, bias, largest_of_case, insides })
+    }
+
+    /// The same with insides that move in one way: `None` where that does not apply, or nothing moves
+    /// that bounds a medium.
+    #[must_use]
+    pub fn with_insides(&self, name: &str, kind: InsideKind) -> Option<Self> {
+        let mut trial = self.clone();
+        trial.name = format!("{}: {name}", self.name);
+        trial.insides = Some(kind);
+        // Only motions are in question.
+        trial
+            .parameters
+            .retain(|(p, _)| p.effects.iter().any(|e| matches!(e.change, Change::Geometry(_))));
+        let parameters: Vec<Parameter> = trial.parameters.iter().map(|(p, _)| p.clone()).collect();
+        let session = Session::new(&trial.built.scene, &parameters, &trial.settings()).ok()?;
+        let moves = session.plan().media.iter().any(|m| !m.motion.is_empty());
+        moves.then_some(trial)
+    }
+
+    /// How it is run.
+    #[must_use]
+    pub fn settings(&self) -> Settings {
+        let media = 0..self.built.scene.media.len();
+        let insides = self.insides.iter().flat_map(|kind| media.clone().map(|m| (m, kind.clone())));
+        // Tests run side by side; each keeps to one thread.
+        Settings { threads: 1, seed: 2021, insides: insides.collect(), ..Settings::default() }
     }
 
     /// Everything a case asks for.

@@ -5,6 +5,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
+use drt_estimators::InsideKind;
 use drt_tests::judge::{Row, Table, rows};
 use drt_tests::measure::{Effort, measure};
 use drt_tests::oracle::OracleFile;
@@ -12,10 +13,19 @@ use drt_tests::trial::Trial;
 
 /// Runs all cases of a kind and judges them.
 fn check(kind: &str, effort: &Effort) {
+    judge(&trials(kind), effort);
+}
+
+fn trials(kind: &str) -> Vec<Trial> {
     let file = OracleFile::read().unwrap();
     let cases = file.cases.iter().filter(|c| c.kind == kind);
     let trials: Vec<Trial> = cases.flat_map(|c| Trial::of_case(c).unwrap()).collect();
-    let all: Vec<Row> = on_all_cores(&trials, |trial| {
+    assert!(!trials.is_empty(), "the file has no case of kind `{kind}`");
+    trials
+}
+
+fn judge(trials: &[Trial], effort: &Effort) {
+    let all: Vec<Row> = on_all_cores(trials, |trial| {
         let measured = measure(trial, effort).unwrap();
         assert_eq!(measured.non_finite, 0, "{}", trial.name);
         let rows = rows(trial, &measured, effort);
@@ -23,9 +33,28 @@ fn check(kind: &str, effort: &Effort) {
         rows
     });
     println!("{}", Table(&all));
-    assert!(!all.is_empty(), "the file has no case of kind `{kind}`");
     let failing = all.iter().filter(|row| !row.passes()).count();
     assert_eq!(failing, 0, "{failing} of {} numbers fail", all.len());
+}
+
+/// Runs the motions of all cases of some kinds with every kind of inside that applies to them.
+fn check_insides(kinds: &[&str], effort: &Effort) {
+    let insides = [
+        ("static", InsideKind::Static),
+        ("affine", InsideKind::Affine),
+        ("blend", InsideKind::Blend),
+        ("tetrahedral", InsideKind::Tetrahedral(None)),
+        ("mean value", InsideKind::MeanValue),
+    ];
+    let mut all = Vec::new();
+    for (name, inside) in insides {
+        let plain = kinds.iter().flat_map(|kind| trials(kind));
+        let these: Vec<Trial> =
+            plain.filter_map(|t| t.with_insides(name, inside.clone())).collect();
+        assert!(!these.is_empty(), "nothing moves by {name}");
+        all.extend(these);
+    }
+    judge(&all, effort);
 }
 
 /// Does something for each trial, and keeps their order.
@@ -51,6 +80,24 @@ fn on_all_cores<T: Send>(trials: &[Trial], of: impl Fn(&Trial) -> Vec<T> + Sync)
 /// largest of their case.
 const STRICT: Effort = Effort { noise: 0.003, near_zero: 0.05, of_case: true, samples: 1 << 30 };
 
+/// Cases in which a motion reaches the inside of a medium.
+const MOVING: [&str; 8] = [
+    "irradiance_polygon_absorbing_medium",
+    "absorbing_emitting_box",
+    "grid_transmittance",
+    "single_scatter_box",
+    "volumetric_shadow_ray",
+    "volumetric_shadow_pixel",
+    "null_interface_two_media",
+    "area_light_volumetric_penumbra_pixel",
+];
+
+#[test]
+fn quickly_by_every_inside() {
+    let quick = Effort { noise: 0.02, near_zero: 1.0, of_case: false, samples: 1 << 20 };
+    check_insides(&MOVING[1..], &quick);
+}
+
 macro_rules! kinds {
     ($($kind:ident: $noise:literal;)*) => {
         $(
@@ -63,6 +110,13 @@ macro_rules! kinds {
         )*
 
         mod strict {
+            /// The inside does not matter (theory sheet §4.1).
+            #[test]
+            #[ignore = "takes minutes"]
+            fn by_every_inside() {
+                super::check_insides(&super::MOVING, &super::STRICT);
+            }
+
             $(
                 #[test]
                 #[ignore = "takes minutes"]

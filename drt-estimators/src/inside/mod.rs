@@ -19,7 +19,7 @@
 use alloc::vec::Vec;
 use core::fmt::Display;
 
-use drt_math::Affine;
+use drt_math::{Affine, Vec3};
 use drt_motion::Blend;
 
 use crate::Error;
@@ -32,12 +32,14 @@ mod field;
 mod mean_value;
 mod parts;
 mod tetrahedra;
+mod transposed;
 
-pub(crate) use adjacency::adjacency;
+use adjacency::adjacency;
 pub(crate) use field::{Field, Inside, Place};
 use mean_value::MeanValue;
 use parts::Part;
 pub(crate) use tetrahedra::MARGIN;
+pub(crate) use transposed::{InsideGradients, TransposedInsides};
 
 /// The motions of all insides, and the shapes whose flux must be added.
 #[derive(Clone, Debug, Default)]
@@ -69,7 +71,7 @@ pub(crate) fn plan(
         let shapes: Vec<usize> =
             (0..world.scene.shapes.len()).filter(|s| adjacent[*s].contains(&m)).collect();
         let parts = parts::parts(world, tangents, m, &shapes);
-        let asked = asked.iter().rev().find(|(medium, _)| *medium == m).map(|(_, kind)| kind);
+        let asked = asked_for(asked, m);
         Surroundings { world, tangents, medium: m, shapes, parts, asked }.plan(&mut insides)?;
         insides.flux[m].sort_unstable();
         insides.flux[m].dedup();
@@ -192,7 +194,10 @@ impl Surroundings<'_> {
         let Self { world, medium, shapes, parts, .. } = self;
         let tetrahedra = || match self.given() {
             Some(given) => tetrahedra::given(world, *medium, shapes, &given.mesh),
-            None => tetrahedra::around(world, *medium, shapes, parts),
+            None => {
+                let points: Vec<Vec3> = parts.iter().filter_map(|part| part.point).collect();
+                tetrahedra::around(world, *medium, shapes, &points)
+            }
         };
         let deforms =
             |s: &usize| parameters.iter().any(|p| parts::is_deformed_by(self.tangents, *s, *p));
@@ -225,6 +230,11 @@ impl Surroundings<'_> {
             ),
         )
     }
+}
+
+/// How a medium's inside is to move, if that was said.
+fn asked_for(asked: &[(usize, InsideKind)], medium: usize) -> Option<&InsideKind> {
+    asked.iter().rev().find(|(m, _)| *m == medium).map(|(_, kind)| kind)
 }
 
 fn unusable(world: &World, medium: usize, reason: impl Display) -> Error {

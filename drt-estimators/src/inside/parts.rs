@@ -26,6 +26,13 @@ pub(super) struct Part {
     pub(super) velocities: Vec<Affine>,
 }
 
+/// A point inside a medium whose velocity is its own.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Anchor {
+    Camera,
+    Emitter(usize),
+}
+
 /// What surrounds a medium, grouped by motion; the surfaces come first.
 pub(super) fn parts(
     world: &World,
@@ -58,26 +65,37 @@ pub(super) fn parts(
             }
         }
     }
-    let mut anchor = |x: Vec3, moves: &mut dyn Iterator<Item = (usize, Vec3)>| {
+    for (anchor, x) in anchors(world, medium) {
         let mut velocities = alloc::vec![Affine::ZERO; n];
-        for (p, v) in moves {
+        let mut moves = |p: usize, v: Vec3| {
             velocities[p] = Affine { translation: v, ..Affine::ZERO };
+        };
+        match anchor {
+            Anchor::Camera => tangents.sensor.iter().for_each(|(p, t)| moves(*p, t.position)),
+            Anchor::Emitter(e) => {
+                tangents.emitters[e].iter().for_each(|(p, t)| moves(*p, t.position));
+            }
         }
-        let point = Some(x);
-        parts.push(Part { shapes: Vec::new(), triangle: None, point, scatters: true, velocities });
-    };
+        let (shapes, point) = (Vec::new(), Some(x));
+        parts.push(Part { shapes, triangle: None, point, scatters: true, velocities });
+    }
+    parts
+}
+
+/// The cameras and point lights in a medium, and where they are.
+pub(super) fn anchors(world: &World, medium: usize) -> Vec<(Anchor, Vec3)> {
+    let mut anchors = Vec::new();
     if world.camera_medium == Some(medium) {
-        let moves = &mut tangents.sensor.iter().map(|(p, t)| (*p, t.position));
-        anchor(world.camera.position(), moves);
+        anchors.push((Anchor::Camera, world.camera.position()));
     }
     for (e, named) in world.scene.emitters.iter().enumerate() {
         if let Some(x) = named.item.emitter.position()
             && world.medium_of_emitter(e, x) == Some(medium)
         {
-            anchor(x, &mut tangents.emitters[e].iter().map(|(p, t)| (*p, t.position)));
+            anchors.push((Anchor::Emitter(e), x));
         }
     }
-    parts
+    anchors
 }
 
 /// True when some parameter moves a shape's vertices one by one.

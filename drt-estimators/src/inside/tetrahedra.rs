@@ -25,11 +25,10 @@ pub(super) fn around(
     world: &World,
     medium: usize,
     shapes: &[usize],
-    parts: &[Part],
+    points: &[Vec3],
 ) -> Result<TetrahedralField, Error> {
     let surfaces: Vec<&Mesh> = shapes.iter().map(|s| &*world.scene.shapes[*s].mesh).collect();
-    let points: Vec<Vec3> = parts.iter().filter_map(|part| part.point).collect();
-    let input = TetrahedralizeInput { surfaces: &surfaces, points: &points, margin: MARGIN };
+    let input = TetrahedralizeInput { surfaces: &surfaces, points, margin: MARGIN };
     let made = tetrahedralize(&input).map_err(|e| {
         let named = |t: SurfaceTriangle| {
             alloc::format!(

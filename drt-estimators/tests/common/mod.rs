@@ -225,6 +225,38 @@ pub fn fog() -> Scene {
     b.camera(vec3(0.4, 0.8, 4.2), vec3(0.0, 0.1, 0.0), 4)
 }
 
+/// A block in a tub of fog with a floor at -1, both of one reflectance; its own bottom is at `bottom`.
+pub fn fog_with_a_block(bottom: f64, reflectance: f64) -> Scene {
+    let mut b = Build::default();
+    let fog = homogeneous(Rgb::new(0.6, 0.5, 0.4), Rgb::new(0.9, 0.8, 0.7), Rgb::ZERO, 0.2);
+    let fog = b.medium("fog", fog);
+    b.interface("tub", procedural::cube().transform(&scaled(1.5, vec3(0.0, 0.25, 0.0))), fog, None);
+    let bsdf = b.bsdf("floor-bsdf", diffuse(reflectance, reflectance, reflectance));
+    b.shape(
+        "floor",
+        {
+            let mut floor = floor();
+            floor.positions.iter_mut().for_each(|p| *p = vec3(0.3 * p.x, p.y, 0.3 * p.z));
+            floor
+        },
+        bsdf,
+    );
+    let place = scaled(0.4, vec3(0.1, bottom + 0.4, 0.0));
+    b.shape("block", procedural::cube().transform(&place), bsdf);
+    b.light(
+        "sun",
+        Emitter::Directional {
+            direction: vec3(0.4, -1.0, -0.3),
+            irradiance: Rgb::new(2.0, 2.5, 3.0),
+        },
+    );
+    b.camera(vec3(0.4, 0.8, 4.2), vec3(0.0, -0.2, 0.0), 4)
+}
+
+fn scaled(size: f64, at: Vec3) -> Affine {
+    Affine { linear: Mat3::IDENTITY * size, translation: at }
+}
+
 /// Voxels of smoke, with at least `border` at the faces of their box, in a larger box.
 pub fn smoke(border: f64) -> Scene {
     let mut b = Build::default();

@@ -5,7 +5,7 @@ use drt_estimators::surface::{BsdfChange, Property};
 use drt_estimators::{Scene, SceneGradient, Target};
 use drt_math::{Affine, Rgb, Vec3};
 use drt_medium::MediumChange;
-use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotion};
+use drt_motion::{Applied, Change, GeometryChange, Parameter, PropertyChange, move_mesh};
 
 /// What the parameter changes.
 pub fn targets(scene: &Scene, parameter: &Parameter) -> Vec<Target> {
@@ -36,8 +36,9 @@ fn geometry(scene: &Scene, target: Target, change: &GeometryChange, g: &SceneGra
         }
         (Target::Shape(i), change) => {
             let mesh = &scene.shapes[i].mesh;
-            let motion = SurfaceMotion::Affine(field(change));
-            g.shapes[i].as_ref().expect("wanted").dot(mesh, &motion)
+            let changes = [Applied { parameter: 0, theta: 0.0, change }];
+            let moved = move_mesh(mesh, &changes, 1).expect("a valid change");
+            g.shapes[i].as_ref().expect("wanted").dot(mesh, &moved.motions[0])
         }
         (Target::Emitter(i), change) => {
             let tangent = scene.emitters[i].item.emitter.velocity(&field(change));

@@ -167,32 +167,42 @@ impl Complex {
         }
     }
 
-    /// Replaces tetrahedra by the cone of a vertex over their common hull, unless one of its
-    /// tetrahedra would not be positive.
-    pub(super) fn replace_by_cone(&mut self, old: &[u32], apex: u32) -> bool {
-        self.begin_search();
-        for &t in old {
-            self.first_visit(t);
-        }
+    /// Replaces tetrahedra by the cone of a vertex over their common hull.
+    ///
+    /// # Errors
+    /// When one of the cone's would not be positive: the tetrahedron beyond its face of the hull.
+    pub(super) fn replace_by_cone(&mut self, old: &[u32], apex: u32) -> Result<(), u32> {
         let mut made = core::mem::take(&mut self.made);
         made.clear();
-        let positive = old.iter().all(|&t| {
-            let tet = self.tets[t as usize];
-            (0..4).all(|corner| {
-                let outer = tet.neighbors[corner];
-                if outer != NONE && self.was_seen(outer) {
-                    return true;
-                }
-                let [x, y, z] = tet.face(corner);
-                made.push([apex, x, y, z]);
-                self.orient([apex, x, y, z]) > 0.0
-            })
+        let mut blocked = None;
+        self.hull(old, |complex, [x, y, z], beyond| {
+            made.push([apex, x, y, z]);
+            if blocked.is_none() && complex.orient([apex, x, y, z]) <= 0.0 {
+                blocked = Some(beyond);
+            }
         });
-        if positive {
+        if blocked.is_none() {
             self.replace(old, &made);
         }
         self.made = made;
-        positive
+        blocked.map_or(Ok(()), Err)
+    }
+
+    /// Visits the faces around some tetrahedra, each counter-clockwise seen from outside, with the
+    /// tetrahedron beyond ([`NONE`] outside the box).
+    pub(super) fn hull(&mut self, of: &[u32], mut visit: impl FnMut(&Self, [u32; 3], u32)) {
+        self.begin_search();
+        for &t in of {
+            self.first_visit(t);
+        }
+        for &t in of {
+            let tet = self.tets[t as usize];
+            for (corner, &outer) in tet.neighbors.iter().enumerate() {
+                if outer == NONE || !self.was_seen(outer) {
+                    visit(self, tet.face(corner), outer);
+                }
+            }
+        }
     }
 
     /// Some tetrahedron of a vertex.

@@ -26,9 +26,7 @@ pub(super) fn delaunay(bounds: &Aabb, points: &[Vec3]) -> Option<Complex> {
         let p = complex.points[v as usize];
         let tet = locate(&complex, p, last)?;
         conflicts(&mut complex, p, tet, &mut conflict);
-        if !complex.replace_by_cone(&conflict, v) {
-            return None;
-        }
+        complex.replace_by_cone(&conflict, v).ok()?;
         last = complex.home(v);
     }
     Some(complex)

@@ -38,7 +38,7 @@ impl Wanted<'_> {
 impl Complex {
     /// Whether a tetrahedron is positive and none of its corners as near to the face across as
     /// rounding is: vertices to come could not be placed there.
-    fn is_thick(&self, t: [u32; 4]) -> bool {
+    pub(super) fn is_thick(&self, t: [u32; 4]) -> bool {
         let [a, b, c, d] = t.map(|v| self.points[v as usize]);
         let size = [b - a, c - a, d - a].iter().fold(0.0, |m, e| f64::max(m, e.max_abs()));
         self.orient(t) > ROUNDING * size * size

@@ -1,4 +1,10 @@
 //! Tetrahedra around and inside triangle surfaces.
+//!
+//! The Delaunay tetrahedra of all vertices come first (Bowyer 1981, Watson 1981, on the predicates of
+//! Shewchuk 1997). Most edges and triangles of the surfaces are among theirs; missing ones are
+//! recovered by changes of connectivity, as Si 2015, "TetGen, a Delaunay-based quality tetrahedral
+//! mesh generator", does, and where these get stuck by adding a vertex where the edge or triangle
+//! meets what is in its way. All edges come before all triangles.
 
 use alloc::vec::Vec;
 
@@ -38,6 +44,7 @@ pub struct TetrahedralizeInput<'a> {
 
 /// A box full of tetrahedra, in which every surface triangle is a union of faces.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tetrahedralization {
     /// The tetrahedra; all have positive volume, by exact arithmetic on the coordinates.
     pub mesh: TetMesh,
@@ -50,6 +57,7 @@ pub struct Tetrahedralization {
 
 /// A triangle of one of several surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SurfaceTriangle {
     /// Index of the surface in the input.
     pub surface: u32,

@@ -21,11 +21,16 @@ use crate::NONE;
 /// roundings.
 pub(super) const ROUNDING: f64 = 1e-14;
 
-/// Changes tried at random before a vertex is added.
-pub(super) const MOST_TRIALS: u32 = 200;
+/// Changes tried at random, in all and with some more for each vertex: where many edges are
+/// missing, trials cost more than the vertices that they save.
+const ALL_TRIALS: usize = 5000;
+const TRIALS_PER_VERTEX: usize = 4;
 
 /// Places tried for a vertex, within some roundings of where it should be.
 const MOST_PLACES: u32 = 16;
+
+/// How many further tetrahedra make way for a vertex.
+const MOST_MORE: usize = 12;
 
 /// An edge that must stay.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +54,7 @@ pub(super) struct Recovery<'a> {
     pub(super) named: &'a [Named],
     pub(super) star: Vec<u32>,
     rng: Rng,
+    trials: usize,
 }
 
 impl<'a> Recovery<'a> {
@@ -64,6 +70,7 @@ impl<'a> Recovery<'a> {
             named: &merged.named,
             star: Vec::new(),
             rng: Rng::new(4, 0, 0),
+            trials: ALL_TRIALS + TRIALS_PER_VERTEX * merged.positions.len(),
         }
     }
 
@@ -86,15 +93,26 @@ impl<'a> Recovery<'a> {
         }
     }
 
-    /// Adds a vertex in the place of the given tetrahedra, at a point or a few roundings from it;
-    /// none when one of the new tetrahedra would not be positive.
-    pub(super) fn insert(&mut self, p: Vec3, old: &[u32]) -> Option<u32> {
+    /// Adds a vertex in the place of the given tetrahedra, and of more where these are thin as
+    /// rounding, at a point or a few roundings from it. None when that cannot be without losing
+    /// an edge that must stay, other than `split`.
+    pub(super) fn insert(&mut self, p: Vec3, old: &[u32], split: Option<[u32; 2]>) -> Option<u32> {
         let v = self.complex.add_point(p);
         let step = p.max_abs() * f64::EPSILON;
         for trial in 0..MOST_PLACES {
-            if self.complex.replace_by_cone(old, v) {
-                self.owners.push(Vec::new());
-                return Some(v);
+            let mut cavity = old.to_vec();
+            while cavity.len() < old.len() + MOST_MORE {
+                match self.complex.replace_by_cone(&cavity, v) {
+                    Ok(()) => {
+                        self.owners.push(Vec::new());
+                        return Some(v);
+                    }
+                    Err(NONE) => break,
+                    Err(beyond) => cavity.push(beyond),
+                }
+                if self.loses(&cavity, split) {
+                    break;
+                }
             }
             let mut off = || (self.rng.next_f64() - 0.5) * step * f64::from(2 + trial / 4);
             self.complex.points[v as usize] = p + vec3(off(), off(), off());
@@ -103,17 +121,49 @@ impl<'a> Recovery<'a> {
         None
     }
 
-    /// Splits an inner edge of a tetrahedron at a point near it; what must stay does so in parts.
+    /// Whether a vertex, or an edge or face that must stay, is not on the hull of tetrahedra.
+    fn loses(&mut self, tets: &[u32], split: Option<[u32; 2]>) -> bool {
+        let split = split.map(|[a, b]| edge_key(a, b));
+        let (mut vertices, mut edges, mut faces) = (Vec::new(), Vec::new(), Vec::new());
+        self.complex.hull(tets, |_, [x, y, z], _| {
+            vertices.extend([x, y, z]);
+            edges.extend([edge_key(x, y), edge_key(y, z), edge_key(z, x)]);
+            faces.push(sorted([x, y, z]));
+        });
+        tets.iter().any(|&t| {
+            let tet = &self.complex.tets[t as usize];
+            let v = tet.vertices;
+            let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+            let lost_edge = |&(i, j): &(usize, usize)| {
+                let edge = edge_key(v[i], v[j]);
+                Some(edge) != split && self.is_kept(edge) && !edges.contains(&edge)
+            };
+            let lost_face = |corner: usize| {
+                let face = sorted(tet.face(corner));
+                self.kept_faces.contains_key(&face) && !faces.contains(&face)
+            };
+            v.iter().any(|w| !vertices.contains(w))
+                || pairs.iter().any(lost_edge)
+                || (0..4).any(lost_face)
+        })
+    }
+
+    /// Splits an inner edge of a tetrahedron at a point near it.
     pub(super) fn split_edge(&mut self, [a, b]: [u32; 2], tet: u32, p: Vec3) -> Option<u32> {
         let ring = self.complex.ring(a, b, tet)?;
-        let v = self.insert(p, &ring.tets)?;
+        let v = self.insert(p, &ring.tets, Some([a, b]))?;
         if let Some(&kept) = self.kept_edges.get(&edge_key(a, b)) {
-            self.keep_parts([a, b], kept.list, v);
-            self.keep_parts([a, v], kept.list, NONE);
-            self.keep_parts([v, b], kept.list, NONE);
-            self.own(v, kept.list);
+            self.split_kept([a, b], kept, v);
         }
         Some(v)
+    }
+
+    /// What must stay does so in parts.
+    pub(super) fn split_kept(&mut self, [a, b]: [u32; 2], kept: Kept, v: u32) {
+        self.keep_parts([a, b], kept.list, v);
+        self.keep_parts([a, v], kept.list, NONE);
+        self.keep_parts([v, b], kept.list, NONE);
+        self.own(v, kept.list);
     }
 
     /// Notes that an edge must stay, whole ([`NONE`]) or in two parts.
@@ -168,6 +218,11 @@ impl<'a> Recovery<'a> {
             && self.complex.remove_face(tet, corner, wanted, gain)
     }
 
+    /// How many changes may be tried at random before a vertex is added.
+    pub(super) fn allowance(&self) -> usize {
+        usize::min(200, self.trials / 16)
+    }
+
     /// Changes something near edges, each given with a tetrahedron, that leaves no more in the way
     /// than there is: after that there may be a change for the better. False when the trials are
     /// used up.
@@ -175,10 +230,11 @@ impl<'a> Recovery<'a> {
         &mut self,
         edges: &[([u32; 2], u32)],
         wanted: Wanted<'_>,
-        trials: &mut u32,
+        trials: &mut usize,
     ) -> bool {
         while *trials > 0 {
             *trials -= 1;
+            self.trials -= 1;
             let mut pick = |n: usize| self.rng.next_u32() as usize % n;
             let ([p, q], tet) = edges[pick(edges.len())];
             let Some(ring) = self.complex.ring(p, q, tet) else { continue };

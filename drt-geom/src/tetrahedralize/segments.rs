@@ -5,7 +5,7 @@ use drt_math::Vec3;
 use super::TetrahedralizeError;
 use super::flips::Wanted;
 use super::input::{Merged, edge_key};
-use super::recovery::{Kept, MOST_TRIALS, ROUNDING, Recovery};
+use super::recovery::{Kept, ROUNDING, Recovery};
 use super::walk::Meets;
 use crate::NONE;
 
@@ -65,11 +65,11 @@ impl Recovery<'_> {
     fn recover(&mut self, ends: [u32; 2], list: u32) -> Result<u32, TetrahedralizeError> {
         let wanted = Wanted::Edge(ends);
         let [mut a, mut b] = ends;
-        let (mut stuck, mut trials) = (0, MOST_TRIALS);
+        let (mut stuck, mut trials) = (0, self.allowance());
         // Each change but the trials leaves fewer faces in the way, so this ends.
         while stuck < 2 {
             let (edge, tet, changed) = match self.look(a, b)? {
-                Meets::Nothing => return Ok(NONE),
+                Meets::Nothing(tet) => return Ok(self.touch([a, b], tet).unwrap_or(NONE)),
                 Meets::Vertex(v) => return Ok(v),
                 Meets::Edge(edge, _) if self.is_kept(edge) => return self.divide([a, b], list),
                 Meets::Edge(edge, tet) => (edge, tet, self.remove_edge(edge, tet, wanted, 1)),
@@ -91,6 +91,38 @@ impl Recovery<'_> {
         self.divide(ends, list)
     }
 
+    /// A vertex on an edge that is there, up to rounding, or one added where an edge that stays
+    /// crosses it: four vertices almost in a plane may have edges both ways.
+    fn touch(&mut self, [a, b]: [u32; 2], tet: u32) -> Option<u32> {
+        let ring = self.complex.ring(a, b, tet)?;
+        let n = ring.tets.len();
+        for i in 0..n {
+            let (r, s) = (ring.vertices[i], ring.vertices[(i + 1) % n]);
+            if self.complex.is_thick([a, b, r, s]) {
+                continue;
+            }
+            let at = |v: u32| self.complex.points[v as usize];
+            if let Some(v) = [r, s].into_iter().find(|&v| self.is_on([a, b], at(v))) {
+                return Some(v);
+            }
+            let p = self.complex.on_coplanar([a, b], [r, s]);
+            if let Some(&kept) = self.kept_edges.get(&edge_key(r, s))
+                && self.is_on([a, b], p)
+                && self.is_on([r, s], p)
+            {
+                let mut around = ring.tets;
+                let across = self.complex.ring(r, s, around[i])?;
+                around.extend(across.tets);
+                around.sort_unstable();
+                around.dedup();
+                let v = self.insert(p, &around, Some([r, s]))?;
+                self.split_kept([r, s], kept, v);
+                return Some(v);
+            }
+        }
+        None
+    }
+
     /// What a segment meets first, where what is as near as rounding is met.
     fn look(&mut self, a: u32, b: u32) -> Result<Meets, TetrahedralizeError> {
         let mut star = core::mem::take(&mut self.star);
@@ -98,7 +130,7 @@ impl Recovery<'_> {
         self.star = star;
         let meets = meets.ok_or(TetrahedralizeError::Arithmetic)?;
         let (p, tet, vertices) = match meets {
-            Meets::Nothing | Meets::Vertex(_) => return Ok(meets),
+            Meets::Nothing(_) | Meets::Vertex(_) => return Ok(meets),
             Meets::Edge(edge, tet) => (self.complex.on_coplanar([a, b], edge), tet, edge.to_vec()),
             Meets::Face(tet, corner) => {
                 let face = self.complex.tets[tet as usize].face(corner);
@@ -116,7 +148,7 @@ impl Recovery<'_> {
     /// Adds a vertex on a segment where it first meets something.
     fn divide(&mut self, [a, b]: [u32; 2], list: u32) -> Result<u32, TetrahedralizeError> {
         let added = match self.look(a, b)? {
-            Meets::Nothing => return Ok(NONE),
+            Meets::Nothing(_) => return Ok(NONE),
             Meets::Vertex(v) => return Ok(v),
             Meets::Edge(edge, tet) => {
                 let p = self.complex.on_coplanar([a, b], edge);
@@ -125,16 +157,17 @@ impl Recovery<'_> {
             Meets::Face(tet, corner) => {
                 let this = self.complex.tets[tet as usize];
                 let p = self.complex.on_segment([a, b], this.face(corner));
-                self.insert(p, &[tet, this.neighbors[corner]])
+                self.insert(p, &[tet, this.neighbors[corner]], None)
             }
         };
         added.ok_or_else(|| self.unrecovered(list))
     }
 
+    /// Whether a point is on the inside of an edge, up to rounding.
     fn is_on(&self, [x, y]: [u32; 2], p: Vec3) -> bool {
         let [x, y] = [x, y].map(|v| self.complex.points[v as usize]);
         let along = y - x;
         let s = (p - x).dot(along) / along.length_squared();
-        (x.lerp(y, s) - p).max_abs() <= ROUNDING
+        s > 0.0 && s < 1.0 && (x.lerp(y, s) - p).max_abs() <= ROUNDING
     }
 }

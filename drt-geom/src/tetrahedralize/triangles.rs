@@ -8,8 +8,11 @@ use super::faces::sorted;
 use super::flips::Wanted;
 use super::input::{Merged, edge_key};
 use super::plate::Plate;
-use super::recovery::{Kept, MOST_TRIALS, Recovery};
+use super::recovery::{Kept, Recovery};
 use crate::NONE;
+
+/// Far more vertices on a triangle than are ever added but where all around is thin as rounding.
+const MOST_VERTICES: usize = 10_000;
 
 impl Recovery<'_> {
     pub(super) fn triangles(&mut self, merged: &Merged) -> Result<(), TetrahedralizeError> {
@@ -61,11 +64,14 @@ impl Recovery<'_> {
     /// Once every edge through it is removed or split, it is a union of faces: none of the edges
     /// that come of a split passes through it again. Vertices on it count as exactly on it.
     fn triangle(&mut self, mut plate: Plate, list: u32) -> Result<(), TetrahedralizeError> {
-        let mut trials = MOST_TRIALS;
+        let mut trials = self.allowance();
         loop {
             let through = self.through(&mut plate);
             if through.is_empty() {
                 break;
+            }
+            if plate.vertices().len() > MOST_VERTICES {
+                return Err(self.unrecovered(list));
             }
             let kept = through.iter().find_map(|(e, _)| self.kept_edges.get(e));
             if let Some(kept) = kept {

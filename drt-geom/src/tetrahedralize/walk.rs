@@ -10,8 +10,8 @@ use super::predicates::projected_areas;
 /// What the open segment from one vertex to another meets first.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Meets {
-    /// Nothing: it is an edge.
-    Nothing,
+    /// Nothing: it is an edge, of this tetrahedron.
+    Nothing(u32),
     Vertex(u32),
     /// The inside of an edge; also a tetrahedron that has it.
     Edge([u32; 2], u32),
@@ -22,8 +22,8 @@ pub(super) enum Meets {
 impl Complex {
     /// Looks from `a` to `b`, exactly. None only for points that are no vertices of the complex.
     pub(super) fn look(&mut self, a: u32, b: u32, star: &mut Vec<u32>) -> Option<Meets> {
-        if self.tet_with(a, b, star).is_some() {
-            return Some(Meets::Nothing);
+        if let Some(t) = self.tet_with(a, b, star) {
+            return Some(Meets::Nothing(t));
         }
         for &t in star.iter() {
             let tet = &self.tets[t as usize];
@@ -55,7 +55,8 @@ impl Complex {
             return false;
         }
         let sides = [a, b].map(|end| self.orient([x, y, z, end]));
-        if sides[0] * sides[1] > 0.0 || sides == [0.0; 2] {
+        let same = sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0);
+        if same && (sides[0] == 0.0) == (sides[1] == 0.0) {
             return false;
         }
         let around = [[x, y], [y, z], [z, x]].map(|[v, w]| self.orient([a, b, v, w]));

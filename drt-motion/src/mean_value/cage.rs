@@ -33,11 +33,12 @@ impl Cage {
         }
         let bounds = mesh.bounds();
         let unit = unit_of(if bounds.is_empty() { 1.0 } else { bounds.extent().max_abs() });
-        let corners = orientation::alternating(mesh)?;
-        let place = |t: &[u32; 3]| Triangle::new(t.map(|i| mesh.positions[i as usize] * unit));
+        let turned = orientation::alternating(mesh)?;
+        let corners = turned.iter().map(|(_, t)| *t);
+        let place = |t: [u32; 3]| Triangle::new(t.map(|i| mesh.positions[i as usize] * unit));
         Ok(Self {
-            triangles: corners.iter().map(place).collect(),
-            corners: corners.iter().map(|t| t.map(|i| mesh.source_vertex(i))).collect(),
+            triangles: corners.clone().map(place).collect(),
+            corners: corners.map(|t| t.map(|i| mesh.source_vertex(i))).collect(),
             vertices: mesh.source_vertex_count as usize,
             middle: bounds.center() * unit,
             unit,

@@ -2,7 +2,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use drt_geom::{Mesh, NONE};
-use drt_math::Vec3;
+use drt_math::{Vec3, vec3};
 
 use super::hierarchy::{self, Cluster};
 use super::moments::{Derivatives, Moments};
@@ -20,46 +20,48 @@ const FAR: f64 = 4.0;
 /// surfaces around it: mean value interpolation.
 #[derive(Clone, Debug)]
 pub struct MeanValueField {
-    clusters: Vec<Cluster>,
+    pub(super) clusters: Vec<Cluster>,
     /// Moments of the clusters for the constant 1.
     ones: Vec<Moments>,
     /// In the order of the hierarchy.
-    triangles: Vec<Placed>,
-    unit: f64,
+    pub(super) triangles: Vec<Placed>,
+    /// How many triangles there were, those that cancel included.
+    pub(super) given: usize,
+    pub(super) unit: f64,
     exact: bool,
 }
 
 #[derive(Clone, Debug)]
-struct Placed {
-    triangle: Triangle,
+pub(super) struct Placed {
+    pub(super) triangle: Triangle,
     /// Its number in the list that was given.
-    source: u32,
+    pub(super) source: u32,
     /// Whether its second and third corner changed places.
-    swapped: bool,
+    pub(super) swapped: bool,
 }
 
 /// What a point sees of the surfaces: common to all parameters, and reused from point to point.
 #[derive(Clone, Debug, Default)]
 pub struct MeanValueWeights {
-    near: Vec<Near>,
-    distant: Vec<Distant>,
-    whole: MeanValueWeight,
+    pub(super) near: Vec<Near>,
+    pub(super) distant: Vec<Distant>,
+    pub(super) whole: MeanValueWeight,
 }
 
 /// A triangle that counts by itself.
 #[derive(Clone, Debug)]
-struct Near {
-    triangle: u32,
-    weights: [MeanValueWeight; 3],
+pub(super) struct Near {
+    pub(super) triangle: u32,
+    pub(super) weights: [MeanValueWeight; 3],
 }
 
 /// A cluster that counts by its moments.
 #[derive(Clone, Debug)]
-struct Distant {
-    cluster: u32,
+pub(super) struct Distant {
+    pub(super) cluster: u32,
     /// The part of it that does.
-    share: MeanValueWeight,
-    derivatives: Derivatives,
+    pub(super) share: MeanValueWeight,
+    pub(super) derivatives: Derivatives,
 }
 
 /// The velocities of all surfaces for one parameter.
@@ -84,6 +86,12 @@ impl MeanValueWeights {
 impl MeanValueField {
     /// A field between closed surfaces, given as triangles in any order and winding.
     ///
+    /// Surfaces are turned so that those inside one another alternate: the denominator of the
+    /// interpolation is then positive on one side of each and negative on the other, and vanishes
+    /// nowhere off them. Bodies may touch; triangles of the same three corners cancel in pairs, and
+    /// their velocities count for nothing. Where surfaces intersect, no winding alternates, and the
+    /// field may grow without bound near places inside.
+    ///
     /// # Errors
     /// When they are not closed or have one side only, or a connected part encloses no volume.
     pub fn new(triangles: &[[Vec3; 3]]) -> Result<Self, Cause> {
@@ -94,15 +102,16 @@ impl MeanValueField {
         let turned = orientation::alternating(&mesh)?;
         let unit = unit_of(mesh.bounds().extent().max_abs());
         let scaled: Vec<[Vec3; 3]> =
-            turned.iter().map(|t| t.map(|i| mesh.positions[i as usize] * unit)).collect();
+            turned.iter().map(|(_, t)| t.map(|i| mesh.positions[i as usize] * unit)).collect();
         let (clusters, order) = hierarchy::build(&scaled);
-        let placed = |&source: &u32| Placed {
-            triangle: Triangle::new(scaled[source as usize]),
-            source,
-            swapped: turned[source as usize] != mesh.triangles[source as usize],
+        let placed = |&i: &u32| {
+            let (source, corners) = turned[i as usize];
+            let swapped = corners != mesh.triangles[source as usize];
+            Placed { triangle: Triangle::new(scaled[i as usize]), source, swapped }
         };
         let triangles = order.iter().map(placed).collect();
-        let mut field = Self { clusters, ones: Vec::new(), triangles, unit, exact: false };
+        let given = mesh.triangles.len();
+        let mut field = Self { clusters, ones: Vec::new(), triangles, given, unit, exact: false };
         field.ones = field.moments(|_| [1.0; 3]);
         Ok(field)
     }
@@ -147,9 +156,9 @@ impl MeanValueField {
     /// # Errors
     /// When there is not one entry per triangle, or one is not finite.
     pub fn velocities(&self, corners: &[[Vec3; 3]]) -> Result<MeanValueVelocities, Cause> {
-        if corners.len() != self.triangles.len() {
-            let (expected, found) = (self.triangles.len(), corners.len());
-            return Err(Cause::MotionLength { expected, found });
+        if corners.len() != self.given {
+            let (expected, found) = (self.given, corners.len());
+            return Err(Cause::TriangleCount { expected, found });
         }
         crate::geometry::finite(
             corners.iter().flatten().all(|v| v.is_finite()),
@@ -203,7 +212,7 @@ impl MeanValueField {
             let ones = &self.ones[index as usize];
             let whole = MeanValueWeight {
                 value: ones.value(&derivatives),
-                gradient: [0, 1, 2].map(|axis| ones.slope(&derivatives, axis)).into(),
+                gradient: ones.gradient(&derivatives),
             };
             out.whole.add(&whole.times(&share));
             out.distant.push(Distant { cluster: index, share, derivatives });
@@ -267,12 +276,12 @@ impl MeanValueField {
         for d in &weights.distant {
             let slot = velocities.slots[d.cluster as usize];
             let Some(moments) = velocities.moments.get(slot as usize) else { continue };
-            let here = [0, 1, 2].map(|axis| moments[axis].value(&d.derivatives));
-            let slopes = [0, 1, 2].map(|axis| moments[axis].slope(&d.derivatives, axis));
-            let here = Vec3::from(here);
+            let [x, y, z] = moments;
+            let p = &d.derivatives;
+            let here = vec3(x.value(p), y.value(p), z.value(p));
+            let spread = x.slope(p, 0) + y.slope(p, 1) + z.slope(p, 2);
             u += here * d.share.value;
-            divergence +=
-                d.share.value * (slopes[0] + slopes[1] + slopes[2]) + here.dot(d.share.gradient);
+            divergence += d.share.value * spread + here.dot(d.share.gradient);
         }
         let inverse = 1.0 / weights.whole.value;
         if !inverse.is_finite() {

@@ -30,12 +30,14 @@ mod moments;
 mod orientation;
 mod plane;
 mod quadrature;
+mod transpose;
 mod triangle;
 
 use drt_math::Vec3;
 
 pub use cage::{Cage, CageWeights};
 pub use field::{MeanValueField, MeanValueVelocities, MeanValueWeights};
+pub use transpose::MeanValueGradient;
 
 /// How many sizes of a surface away a point is too far to tell its vertices apart.
 const BEYOND: f64 = 1e12;

@@ -11,7 +11,7 @@
 //! of which the symmetric parts count only: they are kept as the coefficients of homogeneous
 //! polynomials. Monomial xᵃ yᵇ zᶜ of any degree is number m (m + 1) / 2 + c with m = b + c.
 
-use drt_math::Vec3;
+use drt_math::{Vec3, vec3};
 
 /// Monomials of degree 1 to 3.
 const MOMENTS: usize = 3 + 6 + 10;
@@ -28,6 +28,25 @@ const fn raised(monomial: usize, axis: usize) -> usize {
 const fn monomials(degree: usize) -> usize {
     (degree + 1) * (degree + 2) / 2
 }
+
+/// For each monomial of degree 1 to 3, counted through, its product with each coordinate.
+const RAISED: [[usize; 3]; MOMENTS] = {
+    let mut table = [[0; 3]; MOMENTS];
+    let mut degree = 1;
+    while degree <= 3 {
+        let mut k = 0;
+        while k < monomials(degree) {
+            let mut axis = 0;
+            while axis < 3 {
+                table[START[degree - 1] + k][axis] = START[degree] + raised(k, axis);
+                axis += 1;
+            }
+            k += 1;
+        }
+        degree += 1;
+    }
+    table
+};
 
 /// Moments of a function on a cluster's surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +87,43 @@ impl Moments {
         }
     }
 
+    /// Transpose of [`add_part`](Self::add_part): adds to the gradient with respect to a part's
+    /// moments what it gets from that with respect to the whole's.
+    pub(super) fn add_part_transposed(&mut self, whole: &Self, t: Vec3) {
+        for degree in 1..=3 {
+            let count = monomials(degree);
+            let mut term = [0.0; 10];
+            term[..count].copy_from_slice(&whole.0[START[degree - 1]..][..count]);
+            let mut factor = 1.0;
+            for lower in (1..=degree).rev() {
+                self.add_degree(lower, &term, factor);
+                if lower > 1 {
+                    multiply_transposed(&mut term, lower - 1, t);
+                    factor /= (degree + 1 - lower) as f64;
+                }
+            }
+        }
+    }
+
+    /// Transpose of [`value`](Self::value).
+    pub(super) fn add_value_transposed(&mut self, p: &Derivatives, g: f64) {
+        for (m, p) in self.0.iter_mut().zip(&p.0) {
+            *m += p * g;
+        }
+    }
+
+    /// Transpose of [`slope`](Self::slope).
+    pub(super) fn add_slope_transposed(&mut self, p: &Derivatives, axis: usize, g: f64) {
+        for (m, raised) in self.0.iter_mut().zip(&RAISED) {
+            *m -= p.0[raised[axis]] * g;
+        }
+    }
+
+    /// Sum of products.
+    pub(super) fn dot(&self, other: &Self) -> f64 {
+        self.0.iter().zip(&other.0).map(|(a, b)| a * b).sum()
+    }
+
     fn add_degree(&mut self, degree: usize, term: &[f64; 10], factor: f64) {
         let moments = &mut self.0[START[degree - 1]..][..monomials(degree)];
         for (m, t) in moments.iter_mut().zip(term) {
@@ -84,12 +140,15 @@ impl Moments {
     /// Derivative of the integral as the point moves along an axis.
     #[inline]
     pub(super) fn slope(&self, p: &Derivatives, axis: usize) -> f64 {
-        let mut sum = 0.0;
-        for degree in 1..=3 {
-            let (start, next) = (START[degree - 1], START[degree]);
-            for k in 0..monomials(degree) {
-                sum -= self.0[start + k] * p.0[next + raised(k, axis)];
-            }
+        -self.0.iter().zip(&RAISED).map(|(m, raised)| m * p.0[raised[axis]]).sum::<f64>()
+    }
+
+    /// Gradient of the integral with respect to the point.
+    #[inline]
+    pub(super) fn gradient(&self, p: &Derivatives) -> Vec3 {
+        let mut sum = Vec3::ZERO;
+        for (m, [x, y, z]) in self.0.iter().zip(RAISED) {
+            sum -= vec3(p.0[x], p.0[y], p.0[z]) * *m;
         }
         sum
     }
@@ -106,8 +165,18 @@ fn multiply(term: &mut [f64; 10], degree: usize, t: Vec3) {
     *term = product;
 }
 
+/// Transpose of [`multiply`].
+fn multiply_transposed(term: &mut [f64; 10], degree: usize, t: Vec3) {
+    let mut product = [0.0; 10];
+    for (k, p) in product.iter_mut().enumerate().take(monomials(degree)) {
+        *p = (0..3).map(|axis| term[raised(k, axis)] * t[axis]).sum();
+    }
+    *term = product;
+}
+
 impl Derivatives {
     /// At the place of the middle relative to the point.
+    #[inline]
     pub(super) fn at(Vec3 { x, y, z }: Vec3) -> Self {
         let (xx, yy, zz) = (x * x, y * y, z * z);
         let q = 1.0 / (xx + yy + zz);
@@ -162,7 +231,7 @@ impl Derivatives {
 
 #[cfg(test)]
 mod tests {
-    use drt_math::{Rng, vec3};
+    use drt_math::Rng;
 
     use super::*;
 

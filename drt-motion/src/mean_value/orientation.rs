@@ -4,7 +4,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use drt_geom::{EdgeClass, Mesh, NONE, Topology, TriangleBvh};
+use drt_geom::{Edge, EdgeClass, Mesh, NONE, Topology, TriangleBvh};
 use drt_math::Vec3;
 
 use crate::error::Cause;
@@ -18,14 +18,50 @@ const PROBES: usize = 15;
 /// How far off a probed triangle the asking starts, relative to its size.
 const OFF: f64 = 1e-4;
 
-/// The triangles of the mesh, each with its corners in the order that makes all alternate.
+/// A triangle of a mesh: its number, and its corners in the order that makes all alternate.
+pub(super) type Turned = (u32, [u32; 3]);
+
+/// The triangles of the mesh without those that cancel.
 ///
-/// Whatever order they come in is of no account. Parts are connected by edges of exactly two faces,
-/// on welded positions.
+/// Whatever order their corners come in is of no account. Triangles at the same place cancel in
+/// pairs: there, bodies touch. Parts are connected by edges of exactly two faces, on welded
+/// positions.
 ///
 /// # Errors
 /// When the mesh is not closed, has one side only, or a part of it encloses no volume.
-pub(super) fn alternating(mesh: &Mesh) -> Result<Vec<[u32; 3]>, Cause> {
+pub(super) fn alternating(mesh: &Mesh) -> Result<Vec<Turned>, Cause> {
+    let sources = single(mesh)?;
+    let triangles = sources.iter().map(|&i| mesh.triangles[i as usize]).collect();
+    let turned = turned(&Mesh { triangles, ..mesh.clone() })?;
+    Ok(sources.into_iter().zip(turned).collect())
+}
+
+/// The triangles that no other one cancels.
+fn single(mesh: &Mesh) -> Result<Vec<u32>, Cause> {
+    let topology = Topology::of(mesh);
+    let place = |face: u32| {
+        let mut t = mesh.triangles[face as usize].map(|v| topology.welded[v as usize]);
+        t.sort_unstable();
+        t
+    };
+    // The rim of a sheet seen from both sides, which would cancel as a whole.
+    let rim = |e: &Edge| e.class != EdgeClass::NonManifold && e.faces[1] != NONE;
+    if topology.edges.iter().any(|e| rim(e) && place(e.faces[0]) == place(e.faces[1])) {
+        return Err(Cause::FlatSurface);
+    }
+    let has_area = |t: [u32; 3]| t[0] != t[1] && t[1] != t[2];
+    let faces = 0..mesh.triangles.len() as u32;
+    let mut places: Vec<([u32; 3], u32)> = faces.map(|face| (place(face), face)).collect();
+    places.sort_unstable();
+    let odd = |same: &&[([u32; 3], u32)]| same.len() % 2 == 1 && has_area(same[0].0);
+    let mut single: Vec<u32> =
+        places.chunk_by(|a, b| a.0 == b.0).filter(odd).map(|same| same[0].1).collect();
+    single.sort_unstable();
+    Ok(single)
+}
+
+/// Each triangle with its corners in the order that makes all alternate.
+fn turned(mesh: &Mesh) -> Result<Vec<[u32; 3]>, Cause> {
     let topology = Topology::of(mesh);
     if !topology.is_closed() {
         let open = topology.edges.iter().find(|e| e.class == EdgeClass::Boundary);
@@ -76,7 +112,7 @@ fn parts(mesh: &Mesh, topology: &Topology) -> Result<Vec<Vec<(u32, bool)>>, Caus
     let mut seen: Vec<Option<bool>> = vec![None; mesh.triangles.len()];
     let mut parts = Vec::new();
     for first in 0..mesh.triangles.len() as u32 {
-        if seen[first as usize].is_some() || topology.face_edges[first as usize][0] == NONE {
+        if seen[first as usize].is_some() {
             continue;
         }
         seen[first as usize] = Some(false);

@@ -3,7 +3,9 @@
 //!
 //! A [`Stage`] is a scene with [`Cell`]s, one per parameter. [`Row`] is a cell's verdict.
 
+pub mod caged;
 mod cell;
+pub mod deforming;
 pub(crate) mod effects;
 pub mod lights;
 pub mod media;

@@ -9,7 +9,8 @@ use drt_estimators::surface::{Bsdf, Diffuse};
 use drt_estimators::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding,
 };
-use drt_geom::Mesh;
+use drt_geom::procedural::tet_grid;
+use drt_geom::{Aabb, Mesh, TetMesh};
 use drt_math::{Affine, Mat3, Rgb, Vec3};
 use drt_medium::{Medium, MediumKind, Phase};
 
@@ -149,4 +150,16 @@ pub(crate) fn at(mesh: &Mesh, size: Vec3, place: Vec3) -> Mesh {
 pub(crate) fn inside_out(mut mesh: Mesh) -> Mesh {
     mesh.flip();
     mesh
+}
+
+/// The box from `-half` to `half` with its faces cut into cells.
+///
+/// # Panics
+/// When a side has no cells.
+#[must_use]
+pub(crate) fn block(cells: [u32; 3], half: Vec3) -> Mesh {
+    let tets = tet_grid(cells, &Aabb { min: -half, max: half });
+    let neighbours = tets.neighbours().expect("cells share their faces");
+    let faces = TetMesh::boundary_faces(&neighbours).map(|(tet, k)| tets.face(tet, k));
+    Mesh::new(tets.positions.clone(), faces.collect()).expect("a box has a surface")
 }

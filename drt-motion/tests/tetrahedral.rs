@@ -1,0 +1,118 @@
+//! Velocities carried by tetrahedra, against the transpose.
+
+mod common;
+
+use common::*;
+use drt_geom::{Mesh, TetrahedralizeInput, procedural, tetrahedralize};
+use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
+use drt_motion::{
+    Carrier, SurfaceMotion, TetrahedralField, VertexGradient, VolumeAdjoint, VolumeJet,
+};
+
+fn sized(mesh: &Mesh, size: f64, at: Vec3) -> Mesh {
+    mesh.transform(&Affine { linear: Mat3::IDENTITY * size, translation: at })
+}
+
+/// A plate, a block over it whose bottom is at a height, and a ball that touches nothing.
+fn bodies(height: f64) -> [Mesh; 3] {
+    [
+        sized(&procedural::grid(3, 3), 2.0, Vec3::ZERO),
+        sized(&procedural::cube(), 0.4, vec3(0.2, 0.1, 0.4 + height)),
+        sized(&procedural::icosphere(1), 0.5, vec3(-0.5, 0.3, 2.0)),
+    ]
+}
+
+const LIGHT: Vec3 = Vec3 { x: 1.2, y: -0.3, z: 1.4 };
+
+fn field(bodies: &[Mesh]) -> TetrahedralField {
+    let surfaces: Vec<&Mesh> = bodies.iter().collect();
+    let input = TetrahedralizeInput { surfaces: &surfaces, points: &[LIGHT], margin: 0.5 };
+    TetrahedralField::new(tetrahedralize(&input).unwrap()).unwrap()
+}
+
+fn wobble(rng: &mut Rng, mesh: &Mesh) -> SurfaceMotion {
+    let positions = random_vecs(rng, mesh.positions.len()).into();
+    SurfaceMotion::Vertices { positions, normals: None }
+}
+
+/// The pairing of random adjoints with the jets of a motion, and of their gradient with the motion.
+fn sides(
+    rng: &mut Rng,
+    bodies: &[Mesh],
+    field: &TetrahedralField,
+    motions: &[SurfaceMotion],
+    light: Vec3,
+) -> [f64; 2] {
+    let carriers: Vec<Carrier<'_>> =
+        bodies.iter().zip(motions).map(|(mesh, motion)| Carrier { mesh, motion }).collect();
+    let velocities = field.velocities(&carriers, &[light]);
+    let mut gradient = vec![Vec3::ZERO; field.mesh().positions.len()];
+    let mut forward = 0.0;
+    for _ in 0..500 {
+        let place = field.place(random_vec(rng) * 2.0 + Vec3::Z);
+        let adjoint = VolumeAdjoint { u: random_vec(rng), j: random_vec(rng).x };
+        let VolumeJet { u, j_dot } = place.jet(&velocities);
+        forward += u.dot(adjoint.u) + j_dot * adjoint.j;
+        place.scatter(&adjoint, &mut gradient);
+    }
+    let mut to: Vec<Option<VertexGradient>> = bodies
+        .iter()
+        .zip(motions)
+        .map(|(mesh, motion)| (!motion.is_rest()).then(|| VertexGradient::zeros(mesh)))
+        .collect();
+    let mut surfaces: Vec<_> = bodies.iter().zip(to.iter_mut().map(Option::as_mut)).collect();
+    let mut points = [(light != Vec3::ZERO).then_some(Vec3::ZERO)];
+    field.gather(gradient, &mut surfaces, &mut points);
+    let of_surfaces = to
+        .iter()
+        .zip(bodies)
+        .zip(motions)
+        .filter_map(|((g, mesh), motion)| Some(g.as_ref()?.dot(mesh, motion)));
+    [forward, of_surfaces.sum::<f64>() + points[0].map_or(0.0, |g| g.dot(light))]
+}
+
+#[track_caller]
+fn assert_equal([forward, reverse]: [f64; 2]) {
+    assert!((forward - reverse).abs() <= 1e-12 * forward.abs().max(1.0), "{forward} {reverse}");
+}
+
+#[test]
+fn gathering_is_the_transpose() {
+    let mut rng = Rng::new(50, 0, 0);
+    let bodies = bodies(0.2);
+    let field = field(&bodies);
+    assert!(field.contacts().is_empty());
+    for round in 0..20 {
+        // Some rest.
+        let motions: Vec<SurfaceMotion> = (0..3)
+            .map(|i| match round % 4 {
+                r if r == i => SurfaceMotion::Rest,
+                _ if round % 2 == 0 => SurfaceMotion::Affine(random_affine(&mut rng)),
+                _ => wobble(&mut rng, &bodies[i]),
+            })
+            .collect();
+        let light = if round % 3 == 0 { Vec3::ZERO } else { random_vec(&mut rng) };
+        assert_equal(sides(&mut rng, &bodies, &field, &motions, light));
+    }
+}
+
+/// What touches is carried by what moves; bodies that move alike count as one.
+#[test]
+fn gathering_where_surfaces_touch() {
+    let mut rng = Rng::new(51, 0, 0);
+    let bodies = bodies(0.0);
+    let field = field(&bodies);
+    assert_eq!(field.contacts(), [[0, 1]]);
+    let affine = SurfaceMotion::Affine(random_affine(&mut rng));
+    let alike = [affine.clone(), affine, wobble(&mut rng, &bodies[2])];
+    assert_equal(sides(&mut rng, &bodies, &field, &alike, Vec3::X));
+    let translation = vec3(0.3, -0.2, 0.0);
+    let slides = SurfaceMotion::Affine(Affine { linear: Mat3::ZERO, translation });
+    let one = [SurfaceMotion::Rest, slides.clone(), SurfaceMotion::Rest];
+    assert_equal(sides(&mut rng, &bodies, &field, &one, Vec3::ZERO));
+    // Each as it likes: no linear map does what suits both.
+    let back = SurfaceMotion::Affine(Affine { linear: Mat3::ZERO, translation: -translation });
+    let [forward, reverse] =
+        sides(&mut rng, &bodies, &field, &[back, slides, SurfaceMotion::Rest], Vec3::ZERO);
+    assert!((forward - reverse).abs() > 1e-3 * forward.abs());
+}

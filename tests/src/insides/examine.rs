@@ -1,0 +1,178 @@
+//! One derivative by several ways, compared.
+
+use std::fmt;
+use std::time::Instant;
+
+use drt_estimators::{Agreement, Estimate, Layer, Session, Settings, Unattended, agreement};
+use drt_math::Rgb;
+
+use super::{Case, Way};
+use crate::Result;
+
+/// Samples per pixel of the first round.
+const ROUND: u32 = 1 << 9;
+
+/// Rms z at which what is wrong has shown.
+const CLEAR: f64 = 2.0;
+
+/// A derivative image by one way, and whether it is that of the first.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// The name of the way.
+    pub way: &'static str,
+    /// The comparison.
+    pub agreement: Agreement,
+    /// Relative noise.
+    pub noise: f64,
+    /// Per pixel.
+    pub samples: u32,
+    /// Time taken.
+    pub seconds: f64,
+}
+
+/// What the ways of a case show.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// Of the case.
+    pub name: &'static str,
+    /// Relative noise asked for.
+    pub limit: f64,
+    /// The right ways, the first of which the others are compared with.
+    pub right: Vec<Verdict>,
+    /// The wrong ones.
+    pub wrong: Vec<Verdict>,
+    /// Contributions that were no numbers.
+    pub non_finite: u64,
+}
+
+impl Finding {
+    /// True when the right ways agree, the wrong ones do not, and all are as precise as asked for.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        let right = self.right.iter().all(|v| v.agreement.agrees && v.noise <= self.limit);
+        right && !self.wrong.iter().any(|v| v.agreement.agrees) && self.non_finite == 0
+    }
+}
+
+/// Computes every right way to a relative noise, or to a number of samples per pixel, and every wrong
+/// one until it shows, at most with the samples of the first.
+///
+/// # Errors
+/// When the library rejects the scene or a way.
+pub fn examine(case: &Case, noise: f64, samples: u32) -> Result<Finding> {
+    let fail = |way: &Way, e: drt_estimators::Error| format!("{}, {}: {e}", case.name, way.name);
+    let mut right: Vec<Verdict> = Vec::new();
+    let mut wrong = Vec::new();
+    let mut first: Option<Layer> = None;
+    let mut non_finite = 0;
+    // Other random numbers for each, so that their errors are independent.
+    for (seed, way) in (1..).zip(&case.right) {
+        let mut run = Run::new(case, way, seed).map_err(|e| fail(way, e))?;
+        while run.noise() > noise && run.samples < samples {
+            run.go_on(noise, samples);
+        }
+        let other = first.get_or_insert_with(|| run.layer.clone());
+        right.push(run.verdict(way, other));
+        non_finite += run.non_finite;
+    }
+    let (first, samples) = (first.ok_or("a case needs a way")?, right[0].samples);
+    for (seed, way) in (101..).zip(&case.wrong) {
+        let mut run = Run::new(case, way, seed).map_err(|e| fail(way, e))?;
+        while compare(&run.layer, &first).rms_z < CLEAR && run.samples < samples {
+            run.go_on(noise, samples);
+        }
+        wrong.push(run.verdict(way, &first));
+    }
+    Ok(Finding { name: case.name, limit: noise, right, wrong, non_finite })
+}
+
+/// The comparison of blocks in which something is seen: images here have fewer pixels than blocks.
+fn compare(a: &Layer, b: &Layer) -> Agreement {
+    let seen = |(a, b): &(&Estimate, &Estimate)| a.mean != Rgb::ZERO || b.mean != Rgb::ZERO;
+    let (x, y) = a.blocks.iter().zip(&b.blocks).filter(seen).unzip();
+    agreement(&Layer { blocks: x, ..a.clone() }, &Layer { blocks: y, ..b.clone() }, None)
+}
+
+/// A derivative image as far as it has been computed.
+struct Run {
+    session: Session,
+    start: Instant,
+    layer: Layer,
+    samples: u32,
+    non_finite: u64,
+}
+
+impl Run {
+    fn new(case: &Case, way: &Way, seed: u64) -> std::result::Result<Self, drt_estimators::Error> {
+        let insides = way.insides.clone();
+        let settings = Settings { threads: 1, seed, insides, ..Settings::default() };
+        let start = Instant::now();
+        let session = Session::new(&case.scene, std::slice::from_ref(&way.parameter), &settings)?;
+        let layer = session.rendering().image;
+        let mut run = Self { session, start, layer, samples: 0, non_finite: 0 };
+        run.sample(ROUND);
+        Ok(run)
+    }
+
+    fn sample(&mut self, count: u32) {
+        self.session.run(count, &Unattended);
+        self.samples += count;
+        let rendering = self.session.rendering();
+        self.non_finite = rendering.non_finite;
+        self.layer = rendering.derivatives[0].total.clone();
+    }
+
+    /// Relative.
+    fn noise(&self) -> f64 {
+        let seen = self.layer.blocks.iter().filter(|b| b.mean != Rgb::ZERO).copied().collect();
+        Layer { blocks: seen, ..self.layer.clone() }.relative_noise(None)
+    }
+
+    /// Takes as many samples as the noise seen so far says are missing, and a little more, but no
+    /// more than twice as many as there are.
+    fn go_on(&mut self, noise: f64, most: u32) {
+        let left = self.noise() / noise;
+        let wanted = f64::from(self.samples) * (1.1 * left * left - 1.0);
+        let next = wanted.clamp(f64::from(ROUND), 2.0 * f64::from(self.samples)) as u32;
+        self.sample(next.min(most - self.samples));
+    }
+
+    fn verdict(&self, way: &Way, first: &Layer) -> Verdict {
+        Verdict {
+            way: way.name,
+            agreement: compare(&self.layer, first),
+            noise: self.noise(),
+            samples: self.samples,
+            seconds: self.start.elapsed().as_secs_f64(),
+        }
+    }
+}
+
+/// Findings as a table for a reader of test output.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a>(pub &'a Finding);
+
+impl fmt::Display for Table<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(finding) = self;
+        let head = ["rms z", "max z", "limit", "noise", "spp", "s"];
+        write!(f, "\n{:<44}", finding.name)?;
+        for head in head {
+            write!(f, " {head:>7}")?;
+        }
+        writeln!(f)?;
+        let right = finding.right.iter().map(|v| ("", v, v.agreement.agrees));
+        let wrong = finding.wrong.iter().map(|v| ("wrong: ", v, !v.agreement.agrees));
+        for (kind, v, as_expected) in right.chain(wrong) {
+            let a = &v.agreement;
+            write!(f, "  {:<42}", format!("{kind}{}", v.way))?;
+            write!(f, " {:>7.2} {:>7.2} {:>7.2}", a.rms_z, a.max_z, a.limit)?;
+            write!(f, " {:>6.2}% {:>7} {:>7.1}", 100.0 * v.noise, v.samples, v.seconds)?;
+            writeln!(f, "{}", if as_expected { "" } else { "  <<< FAILS" })?;
+        }
+        if finding.non_finite > 0 {
+            writeln!(f, "  {} contributions not finite", finding.non_finite)?;
+        }
+        Ok(())
+    }
+}
