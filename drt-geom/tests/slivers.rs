@@ -54,7 +54,8 @@ fn stands(made: &Tetrahedralization, by: f64) -> bool {
 
 #[test]
 fn slivers_go() {
-    let bodies = [turned_cube(2), turned_cube(3), turned_cube(4), icosphere(2), bumpy_sphere(2, 0.3, 3.0)];
+    let bodies =
+        [turned_cube(2), turned_cube(3), turned_cube(4), icosphere(2), bumpy_sphere(2, 0.3, 3.0)];
     for (n, body) in bodies.iter().enumerate() {
         let before = filled(body);
         let mut made = before.clone();
