@@ -141,6 +141,12 @@ impl AdjointSink for Contraction<'_> {
         }
     }
 
+    fn grid(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
+        for (p, tangent) in &self.motion.tangents.media[medium] {
+            self.rates[*p] += u.dot(tangent.grid_velocity(x, &mut self.flow));
+        }
+    }
+
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
         let tangents = &self.motion.tangents.media[medium];
         if let Some(uniform) = &self.uniform[medium] {

@@ -14,33 +14,69 @@
 //! camera's own paths, however small the pixel. To keep the cost linear in path length, one of a
 //! path's meetings is chosen in proportion to its throughput over the cosine (weighted reservoir
 //! sampling), and Lout traced for it alone.
+//!
+//! A grid ends at its box, where coefficients jump to zero. Faces of the box that lie inside the medium
+//! are such surfaces too, with f(+) = 0 and the velocity of the grid for u_Σ.
 
 use alloc::sync::Arc;
 
 use drt_math::{Real, Rgb, Rng, Vec3};
+use drt_medium::MediumKind;
 
-use crate::sensitivity::{Functional, Rate};
+use crate::sensitivity::{Functional, Interest, Rate};
 use crate::transport::trace::Tracer;
-use crate::transport::world::Tracking;
+use crate::transport::world::{Tracking, intervals};
 use crate::transport::{Radiance, RayPath, SurfacePoint, Vertex, World};
 
 /// The surfaces with a flux.
 #[derive(Clone, Debug)]
 pub(crate) struct Flux {
     shapes: Arc<[bool]>,
+    /// Media in which the faces of a grid's box have a flux.
+    grids: Arc<[bool]>,
     /// Segments at which a volume vertex can no longer send anything.
     longest: u32,
 }
 
 impl Flux {
-    /// `None` when no shape has a flux.
-    pub(crate) fn new(world: &World, shapes: &[usize]) -> Option<Self> {
+    /// `None` when nothing has a flux.
+    pub(crate) fn new(world: &World, shapes: &[usize], interest: &Interest) -> Option<Self> {
         let flags = (0..world.scene.shapes.len()).map(|s| shapes.contains(&s)).collect();
         // A vertex that is the path's last sends light only if it emits.
         let emissive = world.scene.media.iter().any(|m| m.item.is_emissive());
         let longest = world.max_depth.saturating_add(u32::from(emissive));
-        (!shapes.is_empty()).then_some(Self { shapes: flags, longest })
+        let moves = |m: usize| {
+            let of = |list: &[bool]| list.get(m).copied().unwrap_or(false);
+            (of(&interest.grids) || of(&interest.volumes))
+                && world.tracking[m] == Tracking::Vertices
+                && ends_inside(world, m)
+        };
+        let grids: Arc<[bool]> = (0..world.scene.media.len()).map(moves).collect();
+        let any = !shapes.is_empty() || grids.contains(&true);
+        any.then_some(Self { shapes: flags, grids, longest })
     }
+}
+
+/// Whether a medium's grid may end inside of it: not all around the medium is in the grid's box.
+fn ends_inside(world: &World, medium: usize) -> bool {
+    let grid = match &world.medium(medium).kind {
+        MediumKind::Grid(grid) => grid.density(),
+        MediumKind::Deformed(_) => return true,
+        MediumKind::Homogeneous(_) | MediumKind::Custom(_) => return false,
+    };
+    let shapes = &world.scene.shapes;
+    let mut around =
+        shapes.iter().filter(|s| s.boundary.is_some_and(|b| b.interior == Some(medium))).peekable();
+    let beyond = |x: &Vec3| (grid.from_world().point(*x) - Vec3::splat(0.5)).max_abs() > 0.5 + 1e-9;
+    around.peek().is_none() || around.any(|s| s.mesh.positions.iter().any(beyond))
+}
+
+/// What a path meets.
+#[derive(Clone, Copy, Debug)]
+enum Face {
+    Surface(SurfacePoint),
+    /// A face of the box of a medium's grid, and its normal out of the box.
+    Grid(usize, Vec3),
 }
 
 /// One of the meetings of a path with surfaces that have a flux.
@@ -48,7 +84,7 @@ impl Flux {
 struct Meeting {
     origin: Vec3,
     dir: Vec3,
-    point: SurfacePoint,
+    face: Face,
     x: Vec3,
     /// The medium the ray arrived in.
     around: Option<usize>,
@@ -97,6 +133,7 @@ impl Reservoir {
     /// Offers the surfaces that a ray meets.
     pub(crate) fn offer(
         &mut self,
+        world: &World,
         segments: u32,
         throughput: Rgb,
         origin: Vec3,
@@ -108,24 +145,39 @@ impl Reservoir {
         if strength == 0.0 {
             return;
         }
-        let mut around = ray.medium;
-        let crossings = ray.crossings.iter().map(|c| (c.point, c.x, c.t, c.after));
-        let end = ray.end.iter().map(|(point, x)| (*point, *x, ray.length, None));
-        for (point, x, t, after) in crossings.chain(end) {
-            let before = core::mem::replace(&mut around, after);
-            let cosine = Real::abs(point.ng.dot(dir));
-            if !flux.shapes[point.shape as usize] || cosine == 0.0 {
-                continue;
+        let (shapes, grids) = (flux.shapes.clone(), flux.grids.clone());
+        let mut meet = |face: Face, normal: Vec3, x: Vec3, t: f64, around: Option<usize>| {
+            let cosine = Real::abs(normal.dot(dir));
+            if cosine == 0.0 {
+                return;
             }
             let weight = strength / cosine;
             self.total += weight;
             if self.rng.next_f64() * self.total < weight {
                 let segments = segments + 1;
-                let around = before;
                 self.chosen =
-                    Some(Meeting { origin, dir, point, x, around, throughput, segments, weight });
+                    Some(Meeting { origin, dir, face, x, around, throughput, segments, weight });
                 self.part.truncate_from(ray, t);
             }
+        };
+        let mut around = ray.medium;
+        let crossings = ray.crossings.iter().map(|c| (c.point, c.x, c.t, c.after));
+        let end = ray.end.iter().map(|(point, x)| (*point, *x, ray.length, None));
+        for (point, x, t, after) in crossings.chain(end) {
+            let before = core::mem::replace(&mut around, after);
+            if shapes[point.shape as usize] {
+                meet(Face::Surface(point), point.ng, x, t, before);
+            }
+        }
+        if !grids.contains(&true) {
+            return;
+        }
+        for i in intervals(ray.medium, &ray.crossings, ray.length) {
+            let Some(m) = i.medium.filter(|m| grids[*m]) else { continue };
+            let part = drt_medium::Ray::new(origin + dir * i.start, dir, i.end - i.start);
+            world.medium(m).crossings(&part, |c| {
+                meet(Face::Grid(m, c.normal), c.normal, part.at(c.t), i.start + c.t, Some(m));
+            });
         }
     }
 
@@ -146,36 +198,58 @@ impl Reservoir {
             return;
         }
         tracer.counters.flux_samples += 1;
-        let cosine = m.point.ng.dot(m.dir);
-        let null = world.is_null(m.point.shape);
-        let scale = self.total / m.weight / Real::abs(cosine);
-        for front in [false, true] {
-            // Behind an opaque surface nothing is seen.
-            if !null && front == (cosine > 0.0) {
-                continue;
+        match m.face {
+            Face::Grid(medium, n) => {
+                let vertex = world.inside_grid(medium, m.x, n);
+                let scale = self.total / m.weight / Real::abs(n.dot(m.dir));
+                let rates = [Rate::Grid(medium, m.x, n), Rate::Volume(medium, m.x, -n)];
+                self.send(tracer, &m, vertex, rates, tau * scale, &mut add);
             }
-            let Some((vertex, medium)) = side(world, &m, front) else { continue };
-            let mut light = Radiance::default();
-            let own = tracer.max_segments;
-            tracer.max_segments = own - m.segments;
-            tracer.radiance_from(vertex, -m.dir, &mut light);
-            tracer.max_segments = own;
-            if light.0.is_zero() {
-                continue;
+            Face::Surface(point) => {
+                let cosine = point.ng.dot(m.dir);
+                let null = world.is_null(point.shape);
+                let scale = self.total / m.weight / Real::abs(cosine);
+                for front in [false, true] {
+                    // Behind an opaque surface nothing is seen.
+                    if !null && front == (cosine > 0.0) {
+                        continue;
+                    }
+                    let Some((vertex, medium)) = side(world, &m, point, front) else { continue };
+                    // The vertex is left behind at n·(u_Σ - u), n from the medium's side across.
+                    let n = if front { -point.ng } else { point.ng };
+                    let rates = [Rate::Surface(point.material(), n), Rate::Volume(medium, m.x, -n)];
+                    self.send(tracer, &m, vertex, rates, tau * scale, &mut add);
+                }
             }
-            // The vertex is left behind at n·(u_Σ - u), n from the medium's side across.
-            let n = if front { -m.point.ng } else { m.point.ng };
+        }
+    }
+
+    /// Adds what a vertex that is left behind sends back along the path, at some rates.
+    fn send(
+        &mut self,
+        tracer: &mut Tracer<'_>,
+        m: &Meeting,
+        vertex: Vertex,
+        rates: [Rate; 2],
+        weight: Rgb,
+        add: &mut impl FnMut(&Functional, Rgb),
+    ) {
+        let mut light = Radiance::default();
+        let own = tracer.max_segments;
+        tracer.max_segments = own - m.segments;
+        tracer.radiance_from(vertex, -m.dir, &mut light);
+        tracer.max_segments = own;
+        if !light.0.is_zero() {
             self.functional.items.clear();
-            self.functional.items.push(Rate::Surface(m.point.material(), n));
-            self.functional.items.push(Rate::Volume(medium, m.x, -n));
-            add(&self.functional, m.throughput * tau * light.0 * scale);
+            self.functional.items.extend(rates);
+            add(&self.functional, m.throughput * light.0 * weight);
         }
     }
 }
 
 /// The volume vertex on one side of the surface, if there is a medium to scatter in.
-fn side(world: &World, m: &Meeting, front: bool) -> Option<(Vertex, usize)> {
-    let medium = world.medium_on_side(&m.point, front, m.around)?;
+fn side(world: &World, m: &Meeting, point: SurfacePoint, front: bool) -> Option<(Vertex, usize)> {
+    let medium = world.medium_on_side(&point, front, m.around)?;
     (world.tracking[medium] == Tracking::Vertices)
-        .then(|| (world.touching(m.point, m.x, front, medium), medium))
+        .then(|| (world.touching(point, m.x, front, medium), medium))
 }

@@ -32,7 +32,7 @@ impl Prepared {
     ) -> Result<Self, Error> {
         let moving = interest.moves_geometry();
         let boundary = if moving { Boundary::new(&world, interest)? } else { Boundary::default() };
-        let flux = Flux::new(&world, flux_shapes);
+        let flux = Flux::new(&world, flux_shapes, interest);
         let mut sources = Vec::new();
         if moving {
             for strategy in [Strategy::Primary, Strategy::Direct, Strategy::Indirect] {

@@ -263,6 +263,16 @@ impl AdjointSink for Scatter<'_> {
         }
     }
 
+    fn grid(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
+        let Some(gradient) = &mut self.sums.scene.media[medium] else { return };
+        let u = u.weighted(self.weights);
+        if u.is_finite() {
+            gradient.scatter_velocity(x, u);
+        } else {
+            self.sums.scene.non_finite += 1;
+        }
+    }
+
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
         let Some(gradient) = &mut self.sums.scene.media[medium] else { return };
         let rates = adjoint.weighted(self.weights);

@@ -109,6 +109,8 @@ pub(crate) trait AdjointSink {
     fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint);
     /// Of the position, and the volume Jacobian, of a material point inside a medium.
     fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb);
+    /// Of the velocity of a medium's grids at a point of space.
+    fn grid(&mut self, medium: usize, x: Vec3, u: &RgbVec);
     /// Of a medium's coefficients at a point of space.
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint);
     /// Of the optical depth of a ray through a medium that varies in space.
@@ -134,6 +136,8 @@ pub(crate) enum Rate {
     Surface(MaterialPoint, Vec3),
     /// Velocity of the inside of a medium at a point, dotted with a vector.
     Volume(usize, Vec3, Vec3),
+    /// Velocity of a medium's grids at a point, dotted with a vector.
+    Grid(usize, Vec3, Vec3),
     /// Change of an emitter.
     Emitter(usize, EmitterGradient),
     /// Change of the camera.
@@ -150,6 +154,7 @@ impl Functional {
                     sink.surface(&point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
                 }
                 Rate::Volume(medium, x, n) => sink.volume(medium, x, &weight.outer(n), Rgb::ZERO),
+                Rate::Grid(medium, x, n) => sink.grid(medium, x, &weight.outer(n)),
                 Rate::Emitter(e, g) => sink.emitter(e, &weight.to_array().map(|w| g.scaled(w))),
                 Rate::Sensor(g) => sink.sensor(&weight.to_array().map(|w| g.scaled(w))),
             }

@@ -281,7 +281,7 @@ fn describe(prepared: &Prepared, motion: Option<&Motion>) -> Plan {
     if !motion.interest.moves_geometry() {
         skip("boundary terms: no parameter moves geometry");
     }
-    if motion.insides.flux_shapes.is_empty() {
+    if prepared.flux.is_none() {
         skip("flux: every inside follows its surfaces");
     }
     plan.record = motion.interest.any();

@@ -4,8 +4,7 @@
 //! `cargo test --release -p drt-tests --test check_matrix -- --ignored`
 
 use drt_tests::Result;
-use drt_tests::matrix::{Stage, Table, caged, check, deforming, lights, media, surfaces};
-use drt_tests::matrix::{Stage, Table, check, lights, media, riding, surfaces};
+use drt_tests::matrix::{Stage, Table, caged, check, deforming, lights, media, riding, surfaces};
 
 fn run(stage: Result<Stage>) {
     let rows = check(&stage.unwrap()).unwrap();
@@ -32,6 +31,7 @@ stages! {
     media: fog_box blob still_blob smoke glass dented_glass beam layers sheet ember;
     deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed lantern
         stirred_smoke still_smoke fine_milk fine_glass;
+    riding: riding riding_tight riding_inside riding_still riding_tetrahedral riding_mean_value;
     caged: caged_milk caged_glass caged_solid;
 }
 
@@ -41,5 +41,4 @@ stages! {
 fn scanned_body() {
     let path = std::env::var_os("DRT_BODY").expect("DRT_BODY names an OBJ file");
     run(caged::scanned(path.as_ref()));
-    riding: riding riding_tight riding_inside riding_still riding_tetrahedral riding_mean_value;
 }

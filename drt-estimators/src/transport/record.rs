@@ -7,7 +7,7 @@ use drt_math::{Rgb, Vec3};
 
 use super::trace::{Arrival, Connection, Endpoint, Observer};
 use super::vertex::Vertex;
-use super::world::{Crossing, RayPath};
+use super::world::{Crossing, RayPath, World};
 use crate::flux::Reservoir;
 
 /// A vertex of the record. Node 0 is the camera; every other knows its parent, which comes before.
@@ -78,8 +78,16 @@ impl Observer for PathRecord {
         self.value += value;
     }
 
-    fn ray(&mut self, segments: u32, throughput: Rgb, origin: Vec3, dir: Vec3, ray: &RayPath) {
-        self.flux.offer(segments, throughput, origin, dir, ray);
+    fn ray(
+        &mut self,
+        world: &World,
+        segments: u32,
+        throughput: Rgb,
+        origin: Vec3,
+        dir: Vec3,
+        ray: &RayPath,
+    ) {
+        self.flux.offer(world, segments, throughput, origin, dir, ray);
     }
 
     fn arrive(&mut self, arrival: &Arrival, crossings: &[Crossing]) -> u32 {

@@ -86,7 +86,15 @@ pub(crate) trait Observer {
     /// Light that reached the walk's start over `segments` segments.
     fn contribution(&mut self, segments: u32, value: Rgb);
     /// The walk is about to follow a ray, after `segments` segments.
-    fn ray(&mut self, _segments: u32, _throughput: Rgb, _origin: Vec3, _dir: Vec3, _ray: &RayPath) {
+    fn ray(
+        &mut self,
+        _world: &World,
+        _segments: u32,
+        _throughput: Rgb,
+        _origin: Vec3,
+        _dir: Vec3,
+        _ray: &RayPath,
+    ) {
     }
     /// The walk arrived somewhere; returns the name by which the walk refers to it.
     fn arrive(&mut self, _arrival: &Arrival, _crossings: &[Crossing]) -> u32 {
@@ -347,7 +355,7 @@ impl<'w> Tracer<'w> {
         let origin = leaving.vertex.x;
         let mut ray = self.ray.take().unwrap_or_default();
         self.world.cast(&leaving.vertex, leaving.dir, &mut ray, &mut self.counters);
-        observer.ray(leaving.segments, leaving.throughput, origin, leaving.dir, &ray);
+        observer.ray(self.world, leaving.segments, leaving.throughput, origin, leaving.dir, &ray);
         let span = self.equiangular(leaving, &ray, observer);
         let stop = match self.travel(origin, leaving.dir, &ray, leaving.alive.value) {
             Travel::Absorbed => None,

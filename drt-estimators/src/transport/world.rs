@@ -639,6 +639,12 @@ impl World {
         Vertex { x, medium: Some(medium), kind: Kind::Volume(Some(contact)) }
     }
 
+    /// A volume vertex at a face of a grid's box with the outward normal `n`, where the grid still is.
+    pub(crate) fn inside_grid(&self, medium: usize, x: Vec3, n: Vec3) -> Vertex {
+        let x = x - n * self.border(medium);
+        Vertex { x, medium: Some(medium), kind: Kind::Volume(None) }
+    }
+
     /// The camera as a vertex.
     pub(crate) fn eye(&self) -> Vertex {
         Vertex { x: self.camera.position(), medium: self.camera_medium, kind: Kind::Point }

@@ -95,6 +95,9 @@ impl AdjointSink for Faulty<'_> {
             self.0.volume(medium, x, u, j);
         }
     }
+    fn grid(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
+        self.0.grid(medium, x, u);
+    }
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
         self.0.medium(medium, x, adjoint);
     }
