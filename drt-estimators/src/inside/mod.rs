@@ -40,7 +40,6 @@ pub(crate) use field::{Field, Inside, Place};
 use mean_value::MeanValue;
 use parts::Part;
 pub(crate) use tetrahedra::MARGIN;
-pub(crate) use tetrahedra::MARGIN;
 pub(crate) use transposed::{InsideGradients, TransposedInsides};
 
 /// The motions of all insides, and the shapes whose flux must be added.
