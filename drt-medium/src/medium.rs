@@ -13,7 +13,6 @@ use crate::{
 /// Where a medium gets its coefficients from.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[expect(clippy::large_enum_variant, reason = "few exist; a box would cost every lookup")]
 pub enum MediumKind {
     /// One set of coefficients everywhere.
     Homogeneous(Homogeneous),
