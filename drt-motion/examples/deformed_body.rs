@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let wished = vec3(0.2, 0.0, 0.6);
     field.place(wished).scatter(&wish, &mut at_vertices);
     let mut at_surface = VertexGradient::zeros(&moved.mesh);
-    field.gather(at_vertices, &mut [(&moved.mesh, &mut at_surface)]);
+    field.gather(at_vertices, &mut [(&moved.mesh, Some(&mut at_surface))], &mut []);
     let at_cage =
         CageWeights::new(&Cage::new(&cage)?, &body.positions).gather(&at_surface.positions);
     for (corner, gradient) in at_cage.iter().enumerate() {
