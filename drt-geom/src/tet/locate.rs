@@ -4,6 +4,7 @@ use core::ops::ControlFlow;
 use drt_math::{Vec3, vec3};
 
 use super::double::EdgeFrame;
+use super::starts::Starts;
 use super::validate::MOST;
 use super::{TetMesh, TetMeshError, flat_height};
 use crate::query::BoxTree;
@@ -46,6 +47,8 @@ pub struct TetLocator {
     /// Where the record of each tetrahedron is.
     places: Vec<u32>,
     pub(super) tree: BoxTree,
+    /// Where walks begin without a hint.
+    starts: Option<Starts>,
     /// Where anything can be found.
     reach: Aabb,
     /// How far off a tetrahedron points are still its own when they are no other's.
@@ -105,13 +108,19 @@ impl TetLocator {
         let slack =
             128.0 * f64::EPSILON * bounds.extent().max_abs() + 16.0 * f64::EPSILON * largest;
         let reach = Vec3::splat(if bounds.is_empty() { 0.0 } else { slack });
-        Ok(Self {
+        let mut locator = Self {
             records,
             places,
             tree,
+            starts: None,
             reach: Aabb { min: bounds.min - reach, max: bounds.max + reach },
             slack,
-        })
+        };
+        if !bounds.is_empty() {
+            let find = |x| Some(locator.places[locator.search(x)?.tet as usize]);
+            locator.starts = Some(Starts::new(&bounds, mesh.tets.len(), find));
+        }
+        Ok(locator)
     }
 
     /// The tetrahedron that holds a point, and the point's weights there; `None` outside of the
@@ -121,8 +130,9 @@ impl TetLocator {
     #[inline]
     #[must_use]
     pub fn locate(&self, x: Vec3, hint: Option<u32>) -> Option<TetPoint> {
-        let place = hint.and_then(|tet| self.places.get(tet as usize));
-        place.and_then(|place| self.walk(x, *place)).or_else(|| self.search(x))
+        let hinted = hint.and_then(|tet| self.places.get(tet as usize).copied());
+        let start = hinted.or_else(|| Some(self.starts.as_ref()?.near(x)));
+        start.and_then(|place| self.walk(x, place)).or_else(|| self.search(x))
     }
 
     /// The gradients of the weights of a tetrahedron's corners, per unit of length; zero where it

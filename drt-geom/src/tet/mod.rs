@@ -12,6 +12,7 @@ mod error;
 mod faces;
 mod locate;
 mod overlap;
+mod starts;
 mod validate;
 
 pub use conformity::{ConformityError, SurfacePlace};

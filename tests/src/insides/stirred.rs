@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use drt_estimators::{GivenTetrahedra, InsideKind, Scene};
-use drt_geom::{Mesh, TetMesh, TetVertexOrigin, TetrahedralizeInput, tetrahedralize};
+use drt_geom::{Mesh, TetMesh, TetVertexOrigin, Tetrahedralization, TetrahedralizeInput};
 use drt_math::{Rng, Vec3, vec3};
 use drt_motion::{Carrier, Parameter, TetrahedralField, geometry_changes, move_mesh};
 
@@ -11,6 +11,14 @@ use crate::Result;
 
 /// Space beyond the surfaces, in diagonals: not as much as the library leaves.
 const MARGIN: f64 = 0.2;
+
+/// Tetrahedra of somebody else's making: TetGen's, where its feature is on.
+fn fill(input: &TetrahedralizeInput<'_>) -> Result<Tetrahedralization> {
+    #[cfg(feature = "tetgen")]
+    return Ok(drt_geom::tetrahedralize_tetgen(input, std::time::Duration::from_secs(60))?);
+    #[cfg(not(feature = "tetgen"))]
+    return Ok(drt_geom::tetrahedralize(input)?);
+}
 
 /// Tetrahedra around a medium with velocities of all vertices.
 #[derive(Clone, Debug)]
@@ -45,7 +53,7 @@ impl Stirred {
         // The eye comes last, so that the others keep their numbers.
         let points: Vec<Vec3> = further.iter().copied().chain(eye).collect();
         let input = TetrahedralizeInput { surfaces: &meshes, points: &points, margin: MARGIN };
-        let made = tetrahedralize(&input)?;
+        let made = fill(&input)?;
         let (mesh, origins) = (made.mesh.clone(), made.origins.clone());
         let carriers: Vec<Carrier<'_>> =
             moved.iter().map(|m| Carrier { mesh: &m.mesh, motion: &m.motions[0] }).collect();
