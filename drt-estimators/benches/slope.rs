@@ -2,8 +2,8 @@
 //!
 //! `cargo bench -p drt-estimators --bench slope -- [SCENE...]`
 //!
-//! Errors are the scatter of each pixel between runs that differ by their seeds alone. A run spreads
-//! its samples over 32 batches with Sobol' sequences of their own, so at 16 samples per pixel (and as
+//! Errors are the scatter of each pixel between runs that differ by their seeds alone. A film of
+//! six pixels gives each 32 Sobol' sequences (larger ones 4), so at 16 samples per pixel (and as
 //! few boundary samples on this film) every sample is the first of its sequence: independent random
 //! numbers. Their variance at N is therefore 16 / N times that at 16. The few pixels are large and
 //! full of edges; smaller ones gain more. With two runs at the largest N, the last column is known to
