@@ -158,6 +158,10 @@ struct Passes {
     variance: Rgb,
 }
 
+impl Passes {
+    const NONE: Self = Self { sum: Rgb::ZERO, variance: Rgb::ZERO };
+}
+
 /// Mean of the means of runs, each weighted by its length, and the weighted sum of their squared
 /// deviations from it (West 1979, "Updating mean and variance estimates").
 #[derive(Clone, Copy, Debug)]
@@ -216,7 +220,10 @@ impl PixelFilm {
         if count.units == 0 {
             return;
         }
-        self.passes = (0..self.runs.len()).map(|i| self.passes_with_last(i)).collect();
+        self.passes.resize(self.runs.len(), Passes::NONE);
+        for i in 0..self.runs.len() {
+            self.passes[i] = self.passes_with_last(i);
+        }
         self.before = count;
         self.runs.fill(Runs::NONE);
         self.partial.fill(Rgb::ZERO);
@@ -259,8 +266,7 @@ impl PixelFilm {
 
     /// The sums of all passes, the last one included.
     fn passes_with_last(&self, i: usize) -> Passes {
-        let zero = Passes { sum: Rgb::ZERO, variance: Rgb::ZERO };
-        let mut passes = self.passes.get(i).copied().unwrap_or(zero);
+        let mut passes = self.passes.get(i).copied().unwrap_or(Passes::NONE);
         let units = f64::from(self.run_units);
         passes.sum += self.runs[i].mean * units + self.partial[i];
         if self.run_count >= 2 {

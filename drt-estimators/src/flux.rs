@@ -145,19 +145,21 @@ impl Reservoir {
         if strength == 0.0 {
             return;
         }
-        let (shapes, grids) = (flux.shapes.clone(), flux.grids.clone());
+        let (shapes, grids) = (&flux.shapes, &flux.grids);
+        let (total, rng) = (&mut self.total, &mut self.rng);
+        let (chosen, kept) = (&mut self.chosen, &mut self.part);
         let mut meet = |face: Face, normal: Vec3, x: Vec3, t: f64, around: Option<usize>| {
             let cosine = Real::abs(normal.dot(dir));
             if cosine == 0.0 {
                 return;
             }
             let weight = strength / cosine;
-            self.total += weight;
-            if self.rng.next_f64() * self.total < weight {
+            *total += weight;
+            if rng.next_f64() * *total < weight {
                 let segments = segments + 1;
-                self.chosen =
+                *chosen =
                     Some(Meeting { origin, dir, face, x, around, throughput, segments, weight });
-                self.part.truncate_from(ray, t);
+                kept.truncate_from(ray, t);
             }
         };
         let mut around = ray.medium;

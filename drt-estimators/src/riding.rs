@@ -75,7 +75,7 @@ impl Ride {
             .map_err(|e| RideError::Shape(culprit, turned_over(&e)))?;
         let velocities = moved.motions.iter().zip(&frame.velocities).map(|(motion, affine)| {
             let own = (0..shape.positions.len()).map(|v| {
-                at_vertex(motion, &moved.mesh, v) - affine.point(carried(&shape.positions[v]))
+                motion.vertex_velocity(&moved.mesh, v) - affine.point(carried(&shape.positions[v]))
             });
             let own = spread(own.collect());
             tets.positions.iter().zip(&*own).map(|(p, v)| affine.point(carried(p)) + *v).collect()
@@ -126,14 +126,6 @@ fn turned_over(e: &DeformationError) -> String {
              turned inside out; choose a value nearer to zero"
         ),
         other => other.to_string(),
-    }
-}
-
-fn at_vertex(motion: &SurfaceMotion, moved: &Mesh, v: usize) -> Vec3 {
-    match motion {
-        SurfaceMotion::Rest => Vec3::ZERO,
-        SurfaceMotion::Affine(field) => field.point(moved.positions[v]),
-        SurfaceMotion::Vertices { positions, .. } => positions[v],
     }
 }
 

@@ -104,6 +104,19 @@ impl SurfaceMotion {
         }
     }
 
+    /// Velocity of a vertex of the moved mesh.
+    ///
+    /// # Panics
+    /// As [`velocity`](Self::velocity).
+    #[must_use]
+    pub fn vertex_velocity(&self, mesh: &Mesh, vertex: usize) -> Vec3 {
+        match self {
+            Self::Rest => Vec3::ZERO,
+            Self::Affine(field) => field.point(mesh.positions[vertex]),
+            Self::Vertices { positions, .. } => positions[vertex],
+        }
+    }
+
     /// All rates at a point of the moved mesh.
     ///
     /// # Panics

@@ -107,30 +107,48 @@ impl TetrahedralField {
     /// As [`velocities`](Self::velocities), whose arguments these are, and result.
     #[must_use]
     pub fn left_behind(&self, velocities: &[Vec3], carriers: &[Carrier<'_>]) -> Vec<u32> {
+        // What is missed, with the square of the speed it is measured by: at mesh vertices, and in
+        // triangles that a vertex lies on elsewhere.
+        let mut at_vertices: Vec<(u32, u32, Vec3, f64)> = Vec::new();
         let mut found = Vec::new();
         for group in self.shared.chunk_by(|a, b| a.0 == b.0) {
             let here = velocities[group[0].0 as usize];
             for owner in self.owners(group) {
                 let &TetVertexOrigin::Surface { surface, triangle, bary } = owner else { continue };
                 let Carrier { mesh, motion } = carriers[surface as usize];
-                let own = motion.velocity(mesh, &SurfacePoint { triangle, bary });
+                let point = SurfacePoint { triangle, bary };
+                let own = motion.velocity(mesh, &point);
                 let fastest = f64::max(here.length_squared(), own.length_squared());
                 let miss = here - own;
-                if miss.length_squared() <= ROUNDING * fastest || found.contains(&surface) {
+                if miss.length_squared() <= ROUNDING * fastest {
                     continue;
                 }
-                let missed = |t: u32| square(miss.dot(mesh.normal(t))) > ROUNDING * fastest;
-                let corners = mesh.triangles[triangle as usize];
-                let weights = SurfacePoint { triangle, bary }.weights();
-                let corner = (0..3).find(|k| weights[*k] == 1.0).map(|k| corners[k]);
-                let around = (0..mesh.triangles.len() as u32)
-                    .filter(|t| corner.is_some_and(|c| mesh.triangles[*t as usize].contains(&c)));
-                if missed(triangle) || around.into_iter().any(missed) {
+                if square(miss.dot(mesh.normal(triangle))) > ROUNDING * fastest {
                     found.push(surface);
+                }
+                let corners = mesh.triangles[triangle as usize];
+                if let Some(k) = point.weights().iter().position(|w| *w == 1.0) {
+                    at_vertices.push((surface, corners[k], miss, fastest));
                 }
             }
         }
+        at_vertices.sort_unstable_by_key(|(surface, vertex, ..)| (*surface, *vertex));
+        for of_surface in at_vertices.chunk_by(|a, b| a.0 == b.0) {
+            let (surface, mesh) = (of_surface[0].0, carriers[of_surface[0].0 as usize].mesh);
+            let misses = |t: usize| {
+                mesh.triangles[t].iter().any(|v| {
+                    let first = of_surface.partition_point(|m| m.1 < *v);
+                    let here = of_surface[first..].iter().take_while(|m| m.1 == *v);
+                    let mut here = here.map(|(.., miss, fastest)| (miss, fastest));
+                    here.any(|(m, f)| square(m.dot(mesh.normal(t as u32))) > ROUNDING * f)
+                })
+            };
+            if (0..mesh.triangles.len()).any(misses) {
+                found.push(surface);
+            }
+        }
         found.sort_unstable();
+        found.dedup();
         found
     }
 

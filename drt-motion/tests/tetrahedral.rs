@@ -119,3 +119,26 @@ fn gathering_where_surfaces_touch() {
         sides(&mut rng, &bodies, &field, &[back, slides, SurfaceMotion::Rest], Vec3::ZERO);
     assert!((forward - reverse).abs() > 1e-3 * forward.abs());
 }
+
+/// A body that leaves its plate leaves it, or part of itself, behind; one that slides, or stands a
+/// little above it, leaves nothing.
+#[test]
+fn who_is_left_behind() {
+    let moves = |translation| SurfaceMotion::Affine(Affine { linear: Mat3::ZERO, translation });
+    for (height, velocity, leaves) in [
+        (0.0, Vec3::Y, true),
+        (0.0, vec3(0.3, -0.5, 0.1), true),
+        (0.0, vec3(0.3, 0.0, -0.2), false),
+        (0.2, Vec3::Y, false),
+    ] {
+        let bodies = bodies(height);
+        let field = field(&bodies);
+        let motions = [SurfaceMotion::Rest, moves(velocity), SurfaceMotion::Rest];
+        let carriers: Vec<Carrier<'_>> =
+            bodies.iter().zip(&motions).map(|(mesh, motion)| Carrier { mesh, motion }).collect();
+        let velocities = field.velocities(&carriers, &[Vec3::ZERO]);
+        let left = field.left_behind(&velocities, &carriers);
+        assert_eq!(!left.is_empty(), leaves, "{velocity:?}: {left:?}");
+        assert!(left.iter().all(|s| *s < 2), "{left:?}");
+    }
+}

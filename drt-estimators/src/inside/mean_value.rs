@@ -14,7 +14,7 @@ use alloc::vec::Vec;
 
 use drt_geom::{Aabb, Mesh, procedural};
 use drt_math::{Affine, Mat3, Vec3};
-use drt_motion::{MeanValueField, MeanValueVelocities, MeanValueWeights, SurfaceMotion, VolumeJet};
+use drt_motion::{MeanValueField, MeanValueVelocities, MeanValueWeights, VolumeJet};
 
 use super::parts::Part;
 use super::tetrahedra::MARGIN;
@@ -56,8 +56,7 @@ impl MeanValue {
     ) -> Result<Self, Error> {
         let mut triangles = Vec::new();
         for s in shapes {
-            let mesh = &world.scene.shapes[*s].mesh;
-            triangles.extend((0..mesh.triangles.len() as u32).map(|t| mesh.triangle(t)));
+            triangles.extend(world.scene.shapes[*s].mesh.soup());
         }
         let points: Vec<Vec3> = parts.iter().filter_map(|part| part.point).collect();
         let distance = |x: Vec3| {
@@ -67,8 +66,7 @@ impl MeanValue {
         };
         let points = points.iter().map(|x| (*x, distance(*x))).collect();
         if let Some(bounds) = enclosure(world, medium, &triangles) {
-            let bounds = enclosing(&bounds);
-            triangles.extend((0..bounds.triangles.len() as u32).map(|t| bounds.triangle(t)));
+            triangles.extend(enclosing(&bounds).soup());
         }
         let field = MeanValueField::new(&triangles).map_err(|e| {
             unusable(world, medium, alloc::format!("mean value coordinates around it: {e}"))
@@ -89,11 +87,8 @@ impl MeanValue {
         for s in shapes {
             let mesh = &world.scene.shapes[*s].mesh;
             let motion = tangents.shapes[*s].iter().find(|(p, _)| *p == parameter);
-            let at = |v: u32| match motion {
-                None | Some((_, SurfaceMotion::Rest)) => Vec3::ZERO,
-                Some((_, SurfaceMotion::Affine(field))) => field.point(mesh.positions[v as usize]),
-                Some((_, SurfaceMotion::Vertices { positions, .. })) => positions[v as usize],
-            };
+            let at =
+                |v: u32| motion.map_or(Vec3::ZERO, |(_, m)| m.vertex_velocity(mesh, v as usize));
             corners.extend(mesh.triangles.iter().map(|t| t.map(at)));
         }
         // The enclosing box rests.

@@ -149,8 +149,7 @@ pub(super) fn site(world: &World, medium: usize, part: &Part) -> Result<Site, Er
     }
     let mut soup = Vec::new();
     for s in &part.shapes {
-        let mesh = &world.scene.shapes[*s].mesh;
-        soup.extend((0..mesh.triangles.len() as u32).map(|t| mesh.triangle(t)));
+        soup.extend(world.scene.shapes[*s].mesh.soup());
     }
     let bvh = TriangleBvh::build(&soup).map_err(|e| unusable(world, medium, e))?;
     Ok(Site::Surface(bvh))

@@ -83,6 +83,10 @@ impl ShearedRay {
             return None;
         }
         if edge.contains(&0.0) {
+            // In a plane with the ray and an axis: without a doubt edge-on.
+            if [0, 1].iter().any(|&k| a[k] == 0.0 && b[k] == 0.0 && c[k] == 0.0) {
+                return None;
+            }
             let exact = [edge_function(c, b), edge_function(a, c), edge_function(b, a)];
             if disagree(exact.map(|e| e.1)) {
                 return None;
