@@ -15,6 +15,10 @@
 //! path's meetings is chosen in proportion to its throughput over the cosine (weighted reservoir
 //! sampling), and Lout traced for it alone.
 //!
+//! In the spatial form (2019 paper, Eq. 16 and 20; theory sheet §3, §6) volume vertices stand at fixed
+//! distances of their rays, u is the velocity of the ray's point at Σ, and every surface beside a
+//! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term.
+//!
 //! A grid ends at its box, where coefficients jump to zero. Faces of the box that lie inside the medium
 //! are such surfaces too, with f(+) = 0 and the velocity of the grid for u_Σ.
 
@@ -24,7 +28,7 @@ use drt_math::{Real, Rgb, Rng, Vec3};
 use drt_medium::MediumKind;
 
 use crate::sensitivity::{Functional, Interest, Rate};
-use crate::transport::trace::Tracer;
+use crate::transport::trace::{Leaving, Tracer};
 use crate::transport::world::{Tracking, intervals};
 use crate::transport::{Radiance, RayPath, SurfacePoint, Vertex, World};
 
@@ -36,15 +40,21 @@ pub(crate) struct Flux {
     grids: Arc<[bool]>,
     /// Segments at which a volume vertex can no longer send anything.
     longest: u32,
+    /// In the spatial form: where there is a flux even if the ray stands still.
+    movers: Option<Movers>,
+}
+
+/// What moves by itself.
+#[derive(Clone, Debug)]
+struct Movers {
+    shapes: Arc<[bool]>,
+    grids: Arc<[bool]>,
 }
 
 impl Flux {
-    /// `None` when nothing has a flux.
+    /// Of the material form; `None` when nothing has a flux.
     pub(crate) fn new(world: &World, shapes: &[usize], interest: &Interest) -> Option<Self> {
         let flags = (0..world.scene.shapes.len()).map(|s| shapes.contains(&s)).collect();
-        // A vertex that is the path's last sends light only if it emits.
-        let emissive = world.scene.media.iter().any(|m| m.item.is_emissive());
-        let longest = world.max_depth.saturating_add(u32::from(emissive));
         let moves = |m: usize| {
             let of = |list: &[bool]| list.get(m).copied().unwrap_or(false);
             (of(&interest.grids) || of(&interest.volumes))
@@ -53,8 +63,43 @@ impl Flux {
         };
         let grids: Arc<[bool]> = (0..world.scene.media.len()).map(moves).collect();
         let any = !shapes.is_empty() || grids.contains(&true);
-        any.then_some(Self { shapes: flags, grids, longest })
+        any.then_some(Self { shapes: flags, grids, longest: longest(world), movers: None })
     }
+
+    /// Of the spatial form; `None` when no medium has vertices.
+    pub(crate) fn spatial(world: &World, interest: &Interest) -> Option<Self> {
+        let media = 0..world.scene.media.len();
+        let tracked = |m: usize| world.tracking[m] == Tracking::Vertices;
+        let grids = media.clone().map(|m| tracked(m) && ends_inside(world, m)).collect();
+        let movers = Movers {
+            shapes: interest.shapes.as_slice().into(),
+            grids: interest.grids.as_slice().into(),
+        };
+        media.clone().any(tracked).then(|| Self {
+            shapes: alloc::vec![true; world.scene.shapes.len()].into(),
+            grids,
+            longest: longest(world),
+            movers: Some(movers),
+        })
+    }
+}
+
+/// Segments at which a volume vertex can no longer send anything: one that is the path's last sends
+/// light only if it emits.
+fn longest(world: &World) -> u32 {
+    let emissive = world.scene.media.iter().any(|m| m.item.is_emissive());
+    world.max_depth.saturating_add(u32::from(emissive))
+}
+
+/// A point of a path's ray that a surface sweeps over, in the spatial form: the sensitivity to its
+/// velocity is the flux's value times `normal`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Swept {
+    /// The record's node that the ray left.
+    pub(crate) node: usize,
+    /// Distance along the ray.
+    pub(crate) t: f64,
+    pub(crate) normal: Vec3,
 }
 
 /// Whether a medium's grid may end inside of it: not all around the medium is in the grid's box.
@@ -82,6 +127,8 @@ enum Face {
 /// One of the meetings of a path with surfaces that have a flux.
 #[derive(Clone, Copy, Debug)]
 struct Meeting {
+    node: u32,
+    t: f64,
     origin: Vec3,
     dir: Vec3,
     face: Face,
@@ -131,21 +178,23 @@ impl Reservoir {
     }
 
     /// Offers the surfaces that a ray meets.
-    pub(crate) fn offer(
-        &mut self,
-        world: &World,
-        segments: u32,
-        throughput: Rgb,
-        origin: Vec3,
-        dir: Vec3,
-        ray: &RayPath,
-    ) {
+    pub(crate) fn offer(&mut self, world: &World, leaving: &Leaving, carried: bool, ray: &RayPath) {
+        let Leaving { node, throughput, dir, segments, .. } = *leaving;
+        let origin = leaving.vertex.x;
         let Some(flux) = self.flux.as_ref().filter(|f| segments + 1 < f.longest) else { return };
         let strength = throughput.max_abs();
         if strength == 0.0 {
             return;
         }
         let (shapes, grids) = (&flux.shapes, &flux.grids);
+        let sweeps = |shape: u32| match &flux.movers {
+            Some(movers) => carried || movers.shapes[shape as usize],
+            None => shapes[shape as usize],
+        };
+        let grid_sweeps = |m: usize| match &flux.movers {
+            Some(movers) => grids[m] && (carried || movers.grids[m]),
+            None => grids[m],
+        };
         let (total, rng) = (&mut self.total, &mut self.rng);
         let (chosen, kept) = (&mut self.chosen, &mut self.part);
         let mut meet = |face: Face, normal: Vec3, x: Vec3, t: f64, around: Option<usize>| {
@@ -157,8 +206,18 @@ impl Reservoir {
             *total += weight;
             if rng.next_f64() * *total < weight {
                 let segments = segments + 1;
-                *chosen =
-                    Some(Meeting { origin, dir, face, x, around, throughput, segments, weight });
+                *chosen = Some(Meeting {
+                    node,
+                    t,
+                    origin,
+                    dir,
+                    face,
+                    x,
+                    around,
+                    throughput,
+                    segments,
+                    weight,
+                });
                 kept.truncate_from(ray, t);
             }
         };
@@ -167,7 +226,10 @@ impl Reservoir {
         let end = ray.end.iter().map(|(point, x)| (*point, *x, ray.length, None));
         for (point, x, t, after) in crossings.chain(end) {
             let before = core::mem::replace(&mut around, after);
-            if shapes[point.shape as usize] {
+            let has_side = |front| filled(world, &point, front, before).is_some();
+            let near = point.ng.dot(dir) < 0.0;
+            let null = world.is_null(point.shape);
+            if sweeps(point.shape) && (has_side(near) || (null && has_side(!near))) {
                 meet(Face::Surface(point), point.ng, x, t, before);
             }
         }
@@ -175,7 +237,7 @@ impl Reservoir {
             return;
         }
         for i in intervals(ray.medium, &ray.crossings, ray.length) {
-            let Some(m) = i.medium.filter(|m| grids[*m]) else { continue };
+            let Some(m) = i.medium.filter(|m| grid_sweeps(*m)) else { continue };
             let part = drt_medium::Ray::new(origin + dir * i.start, dir, i.end - i.start);
             world.medium(m).crossings(&part, |c| {
                 meet(Face::Grid(m, c.normal), c.normal, part.at(c.t), i.start + c.t, Some(m));
@@ -183,11 +245,12 @@ impl Reservoir {
         }
     }
 
-    /// Evaluates the chosen meeting; calls `add` with each functional and its weight.
+    /// Evaluates the chosen meeting; calls `add` with each functional, the point of the ray in the
+    /// spatial form, and the weight of both.
     pub(crate) fn evaluate(
         &mut self,
         tracer: &mut Tracer<'_>,
-        mut add: impl FnMut(&Functional, Rgb),
+        mut add: impl FnMut(&Functional, Option<Swept>, Rgb),
     ) {
         let Some(m) = self.chosen.take() else { return };
         let world = tracer.world;
@@ -204,8 +267,7 @@ impl Reservoir {
             Face::Grid(medium, n) => {
                 let vertex = world.inside_grid(medium, m.x, n);
                 let scale = self.total / m.weight / Real::abs(n.dot(m.dir));
-                let rates = [Rate::Grid(medium, m.x, n), Rate::Volume(medium, m.x, -n)];
-                self.send(tracer, &m, vertex, rates, tau * scale, &mut add);
+                self.send(tracer, &m, vertex, Rate::Grid(medium, m.x, n), n, tau * scale, &mut add);
             }
             Face::Surface(point) => {
                 let cosine = point.ng.dot(m.dir);
@@ -216,25 +278,30 @@ impl Reservoir {
                     if !null && front == (cosine > 0.0) {
                         continue;
                     }
-                    let Some((vertex, medium)) = side(world, &m, point, front) else { continue };
+                    let medium = filled(world, &point, front, m.around);
+                    let Some(medium) = medium else { continue };
+                    let vertex = world.touching(point, m.x, front, medium);
                     // The vertex is left behind at n·(u_Σ - u), n from the medium's side across.
                     let n = if front { -point.ng } else { point.ng };
-                    let rates = [Rate::Surface(point.material(), n), Rate::Volume(medium, m.x, -n)];
-                    self.send(tracer, &m, vertex, rates, tau * scale, &mut add);
+                    let rate = Rate::Surface(point.material(), n);
+                    self.send(tracer, &m, vertex, rate, n, tau * scale, &mut add);
                 }
             }
         }
     }
 
-    /// Adds what a vertex that is left behind sends back along the path, at some rates.
+    /// Adds what a vertex that is left behind sends back along the path, by the rate of what leaves it
+    /// along the normal `n`.
+    #[allow(clippy::too_many_arguments)]
     fn send(
         &mut self,
         tracer: &mut Tracer<'_>,
         m: &Meeting,
         vertex: Vertex,
-        rates: [Rate; 2],
+        rate: Rate,
+        n: Vec3,
         weight: Rgb,
-        add: &mut impl FnMut(&Functional, Rgb),
+        add: &mut impl FnMut(&Functional, Option<Swept>, Rgb),
     ) {
         let mut light = Radiance::default();
         let own = tracer.max_segments;
@@ -242,16 +309,25 @@ impl Reservoir {
         tracer.radiance_from(vertex, -m.dir, &mut light);
         tracer.max_segments = own;
         if !light.0.is_zero() {
+            let spatial = self.flux.as_ref().is_some_and(|f| f.movers.is_some());
             self.functional.items.clear();
-            self.functional.items.extend(rates);
-            add(&self.functional, m.throughput * light.0 * weight);
+            self.functional.items.push(rate);
+            if let (false, Some(medium)) = (spatial, vertex.medium) {
+                self.functional.items.push(Rate::Volume(medium, m.x, -n));
+            }
+            let swept = Swept { node: m.node as usize, t: m.t, normal: -n };
+            add(&self.functional, spatial.then_some(swept), m.throughput * light.0 * weight);
         }
     }
 }
 
-/// The volume vertex on one side of the surface, if there is a medium to scatter in.
-fn side(world: &World, m: &Meeting, point: SurfacePoint, front: bool) -> Option<(Vertex, usize)> {
-    let medium = world.medium_on_side(&point, front, m.around)?;
-    (world.tracking[medium] == Tracking::Vertices)
-        .then(|| (world.touching(point, m.x, front, medium), medium))
+/// The medium on one side of a surface, if paths have vertices in it.
+fn filled(
+    world: &World,
+    point: &SurfacePoint,
+    front: bool,
+    around: Option<usize>,
+) -> Option<usize> {
+    let medium = world.medium_on_side(point, front, around)?;
+    (world.tracking[medium] == Tracking::Vertices).then_some(medium)
 }

@@ -9,9 +9,10 @@ use crate::boundary::shadow::{self, Shadows};
 use crate::contraction::Contraction;
 use crate::flux::{Flux, Reservoir};
 use crate::pixels::Sampler;
+use crate::radiative::Radiative;
 use crate::rendering::{Account, Counters, NonFinite, Term};
-use crate::sensitivity::{AdjointSink, Functional};
-use crate::transport::{Differentiator, PathRecord, Radiance, Tracer, World};
+use crate::sensitivity::{AdjointSink, Functional, SurfaceAdjoint};
+use crate::transport::{Carriers, Differentiator, Form, PathRecord, Radiance, Tracer, World};
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
 pub(crate) const LINE_STREAM: u64 = 1 << 62;
@@ -25,13 +26,18 @@ pub(crate) const DIMENSIONS: u32 = SET_DIMENSIONS;
 pub(crate) struct AlongRays<'a> {
     pub(crate) flux: Option<&'a Flux>,
     pub(crate) shadows: Option<&'a Shadows>,
+    /// Set in the spatial form.
+    pub(crate) radiative: Option<&'a Radiative>,
+    /// Whether it finds edges from the vertices of paths.
+    pub(crate) edges: bool,
 }
 
 impl AlongRays<'_> {
     /// The terms kept in layers of their own, where terms are kept apart.
     pub(crate) fn terms(&self) -> impl Iterator<Item = Term> {
         let flux = self.flux.map(|_| Term::Flux);
-        flux.into_iter().chain(self.shadows.map(|_| Term::Direct))
+        let edges = if self.edges { &[Term::Direct, Term::Indirect][..] } else { &[] };
+        flux.into_iter().chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
     }
 
     /// Layers of a sample: the image, a derivative per parameter, and where terms are kept apart
@@ -109,8 +115,7 @@ pub(crate) struct PixelSampler<'a, S> {
     record: PathRecord,
     differentiator: Differentiator<'a>,
     pub(crate) sink: Option<S>,
-    flux: bool,
-    shadows: Option<&'a Shadows>,
+    along: AlongRays<'a>,
     shadow_buffers: shadow::Buffers,
     separate: bool,
     non_finite: Vec<NonFinite>,
@@ -131,16 +136,24 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         antithetic: bool,
         separate: bool,
     ) -> Self {
+        let form = if along.radiative.is_some() { Form::Spatial } else { Form::Material };
+        let carriers = match (&sink, form) {
+            (Some(s), Form::Spatial) => s.interest().carriers(),
+            _ => Carriers::default(),
+        };
         Self {
             world,
             seed,
             antithetic,
             tracer: Tracer::new(world),
-            record: PathRecord { flux: Reservoir::new(along.flux), ..PathRecord::default() },
-            differentiator: Differentiator::new(world),
+            record: PathRecord {
+                flux: Reservoir::new(along.flux),
+                carriers,
+                ..PathRecord::default()
+            },
+            differentiator: Differentiator::new(world, form),
             sink,
-            flux: along.flux.is_some(),
-            shadows: along.shadows,
+            along,
             shadow_buffers: shadow::Buffers::default(),
             separate,
             non_finite: Vec::new(),
@@ -166,7 +179,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     fn path(&mut self, pixel: u32, unit: u32, u: [f64; 2], rng: Rng, values: &mut [Rgb]) {
         let camera = &self.world.camera;
         // Only where things move is the filter differentiated.
-        let derivative = self.sink.as_ref().is_some_and(|s| s.interest().moves_geometry());
+        let derivative = self.along.radiative.is_none()
+            && self.sink.as_ref().is_some_and(|s| s.interest().moves_geometry());
         let s = camera.sample_view(pixel, u, derivative);
         let dir = s.direction;
         let weight = Rgb::splat(s.weight);
@@ -192,13 +206,34 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         }
         // Each kept apart goes to layers of its own, in the order of `AlongRays::terms`.
         let mut at = 1;
-        if self.flux {
+        if self.along.flux.is_some() {
             at += if self.separate { n } else { 0 };
-            self.record.flux.evaluate(&mut self.tracer, |f, value| {
-                sink.functional(f, value, &mut values[at..at + n]);
+            let mut flux = core::mem::take(&mut self.record.flux);
+            flux.evaluate(&mut self.tracer, |f, swept, value| {
+                let values = &mut values[at..at + n];
+                let Some(swept) = swept else { return sink.functional(f, value, values) };
+                sink.begin();
+                f.send(value, sink);
+                let carried = value.outer(swept.normal);
+                self.differentiator.carry_back(&self.record, swept.node, swept.t, carried, sink);
+                sink.finish(values);
             });
+            self.record.flux = flux;
         }
-        if let Some(shadows) = self.shadows {
+        if self.along.edges
+            && let Some(e) =
+                self.along.radiative.and_then(|r| r.edge(&mut self.tracer, &self.record))
+        {
+            if self.separate {
+                at += if e.node == 1 { n } else { 2 * n };
+            }
+            sink.begin();
+            let u = e.value.outer(e.n);
+            sink.surface(&e.point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
+            self.differentiator.carry_back(&self.record, e.node, 0.0, -u, sink);
+            sink.finish(&mut values[at..at + n]);
+        }
+        if let Some(shadows) = self.along.shadows {
             at += if self.separate { n } else { 0 };
             shadows.along_camera_ray(
                 &mut self.tracer,

@@ -22,6 +22,7 @@ mod parallel;
 mod pixels;
 mod plan;
 mod prepared;
+mod radiative;
 mod rendering;
 mod reverse;
 mod riding;

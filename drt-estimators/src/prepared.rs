@@ -7,8 +7,9 @@ use crate::boundary::{Boundary, Strategy};
 use crate::film::BATCHES;
 use crate::flux::Flux;
 use crate::interior::AlongRays;
+use crate::radiative::Radiative;
 use crate::sensitivity::Interest;
-use crate::settings::Settings;
+use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::{Source, Splatter};
 use crate::transport::World;
 
@@ -17,6 +18,8 @@ pub(crate) struct Prepared {
     pub(crate) world: World,
     pub(crate) boundary: Boundary,
     pub(crate) flux: Option<Flux>,
+    /// Set in the spatial form.
+    pub(crate) radiative: Option<Radiative>,
     /// Splatted terms that can contribute.
     pub(crate) sources: Vec<Source>,
     /// Image points come in mirrored pairs.
@@ -31,6 +34,9 @@ impl Prepared {
         settings: &Settings,
     ) -> Result<Self, Error> {
         let moving = interest.moves_geometry();
+        if settings.estimator == EstimatorKind::Radiative {
+            return Self::spatial(world, interest);
+        }
         let boundary = if moving { Boundary::new(&world, interest)? } else { Boundary::default() };
         let flux = Flux::new(&world, flux_shapes, interest);
         let mut sources = Vec::new();
@@ -46,15 +52,35 @@ impl Prepared {
         }
         // The filter's rate is what mirrored pairs cancel; without it they only cost.
         let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
-        Ok(Self { world, boundary, flux, sources, antithetic })
+        Ok(Self { world, boundary, flux, radiative: None, sources, antithetic })
+    }
+
+    /// For the 2019 estimator.
+    fn spatial(world: World, interest: &Interest) -> Result<Self, Error> {
+        // Grids that move sweep over what stands still.
+        let flux = (interest.moves_geometry() || interest.grids.contains(&true))
+            .then(|| Flux::spatial(&world, interest))
+            .flatten();
+        let radiative = Radiative::new(&world, interest)?;
+        let sources =
+            if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
+        let boundary = Boundary::default();
+        Ok(Self { world, boundary, flux, radiative: Some(radiative), sources, antithetic: false })
     }
 
     pub(crate) fn along_rays(&self) -> AlongRays<'_> {
-        AlongRays { flux: self.flux.as_ref(), shadows: self.boundary.shadows.as_ref() }
+        let radiative = self.radiative.as_ref();
+        AlongRays {
+            flux: self.flux.as_ref(),
+            shadows: self.boundary.shadows.as_ref(),
+            radiative,
+            edges: radiative.filter(|r| r.has_edges(&self.world)).is_some(),
+        }
     }
 
     pub(crate) fn splatter(&self, seed: u64) -> Splatter<'_> {
-        Splatter { world: &self.world, boundary: &self.boundary, seed }
+        let radiative = self.radiative.as_ref();
+        Splatter { world: &self.world, boundary: &self.boundary, radiative, seed }
     }
 
     /// Samples of each batch of each splatted source, when every pixel takes `spp`.

@@ -11,7 +11,7 @@ use drt_medium::{CoefficientRates, DepthEstimate};
 use crate::emitter::EmitterGradient;
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
-use crate::transport::MaterialPoint;
+use crate::transport::{Carriers, MaterialPoint};
 
 /// Per channel, the change of a value per unit of each entry of a surface point's jet.
 #[derive(Clone, Copy, Debug, Default)]
@@ -92,6 +92,11 @@ impl Interest {
             || [&self.shapes, &self.volumes, &self.moving_emitters]
                 .into_iter()
                 .any(|l| l.contains(&true))
+    }
+
+    /// What carries the vertices of paths in the spatial form.
+    pub(crate) fn carriers(&self) -> Carriers {
+        Carriers { shapes: self.shapes.as_slice().into(), camera: self.sensor }
     }
 
     /// True when anything changes.

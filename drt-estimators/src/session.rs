@@ -8,7 +8,7 @@ use drt_motion::Parameter;
 use crate::boundary::Strategy;
 use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm};
-use crate::inside::{self, Inside};
+use crate::inside::{self, Inside, Insides};
 use crate::interior::PixelSampler;
 use crate::parallel::Pool;
 use crate::pixels::Filling;
@@ -17,7 +17,7 @@ use crate::prepared::Prepared;
 use crate::rendering::{Account, Derivative, Layer, Rendering, Term};
 use crate::scene::Scene;
 use crate::sensitivity::Interest;
-use crate::settings::Settings;
+use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::{Checked, Source, ToImages};
 use crate::tangents;
 use crate::transport::World;
@@ -82,7 +82,10 @@ impl Session {
         let mut world = World::new(scene, settings.sensor, depth, None)?;
         let mut motion = None;
         if !parameters.is_empty() {
-            let insides = inside::plan(&world, &tangents, &settings.insides)?;
+            let insides = match settings.estimator {
+                EstimatorKind::Radiative => Insides::at_rest(&world),
+                _ => inside::plan(&world, &tangents, &settings.insides)?,
+            };
             motion = Some(Motion::new(tangents, insides));
         }
         if let Some(motion) = &motion {

@@ -13,6 +13,8 @@ pub enum EstimatorKind {
     /// Material-form path integrals, interior and boundary (2021 paper).
     #[default]
     PathSpace,
+    /// The derivative of radiance along rays, with edges seen from every vertex (2019 paper).
+    Radiative,
     /// Central differences with common random numbers.
     FiniteDifference,
 }

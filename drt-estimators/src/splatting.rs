@@ -9,6 +9,7 @@ use crate::boundary::{self, Boundary, Receiver, Strategy};
 use crate::contraction::{Contraction, Motion};
 use crate::film::Splats;
 use crate::interior::{DIMENSIONS, SEQUENCE_STREAM};
+use crate::radiative::Radiative;
 use crate::rendering::{Account, NonFinite, Term};
 use crate::sensitivity::Functional;
 use crate::transport::{Tracer, World};
@@ -20,12 +21,14 @@ pub(crate) enum Source {
     Edges(Strategy),
     /// Jumps of a box filter.
     Borders,
+    /// Edges seen from the camera, in the spatial form.
+    Outlines,
 }
 
 impl Source {
     pub(crate) fn term(self) -> Term {
         match self {
-            Self::Edges(Strategy::Primary) | Self::Borders => Term::Primary,
+            Self::Edges(Strategy::Primary) | Self::Borders | Self::Outlines => Term::Primary,
             Self::Edges(Strategy::Direct) => Term::Direct,
             Self::Edges(Strategy::Indirect) => Term::Indirect,
         }
@@ -38,6 +41,7 @@ impl Source {
             Self::Edges(Strategy::Direct) => 2,
             Self::Edges(Strategy::Indirect) => 3,
             Self::Borders => 4,
+            Self::Outlines => 5,
         };
         id << 40
     }
@@ -47,6 +51,7 @@ impl Source {
 pub(crate) struct Splatter<'a> {
     pub(crate) world: &'a World,
     pub(crate) boundary: &'a Boundary,
+    pub(crate) radiative: Option<&'a Radiative>,
     pub(crate) seed: u64,
 }
 
@@ -62,6 +67,7 @@ impl Splatter<'_> {
     ) -> Account {
         let mut tracer = Tracer::new(self.world);
         let mut edges = boundary::Buffers::default();
+        let mut functional = Functional::default();
         receiver.term = Some(source.term());
         receiver.seed = self.seed;
         receiver.stream = stream;
@@ -77,6 +83,11 @@ impl Splatter<'_> {
                 }
                 Source::Borders => {
                     boundary::border::sample(&mut tracer, &mut edges, receiver);
+                }
+                Source::Outlines => {
+                    if let Some(radiative) = self.radiative {
+                        radiative.outline(&mut tracer, &mut functional, receiver);
+                    }
                 }
             }
         }

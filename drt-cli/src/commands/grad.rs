@@ -34,7 +34,7 @@ pub(super) fn derivatives(
     part: f64,
 ) -> Result<Rendering, CliError> {
     match job.settings.estimator {
-        EstimatorKind::PathSpace => {
+        EstimatorKind::PathSpace | EstimatorKind::Radiative => {
             let mut session = run::prepare(job, &job.parameters)?;
             monitor.stage("grad", 0.0, part);
             Ok(run::sample(&mut session, options, job.settings.spp, monitor))

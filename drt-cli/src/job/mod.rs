@@ -173,9 +173,11 @@ fn settings(
         settings.sensor = find_sensor(scene, name.get_ref())
             .map_err(|e| document.error_at(name.span().start, format!("`sensor`: {e}")))?;
     }
-    if kind.as_ref().is_some_and(|k| *k.get_ref() == keys::Kind::FiniteDifference) {
-        settings.estimator = EstimatorKind::FiniteDifference;
-    }
+    settings.estimator = match kind.as_ref().map(Spanned::get_ref) {
+        Some(keys::Kind::FiniteDifference) => EstimatorKind::FiniteDifference,
+        Some(keys::Kind::Radiative) => EstimatorKind::Radiative,
+        _ => EstimatorKind::PathSpace,
+    };
     if let Some(s) = sampling.as_ref().filter(|s| *s.get_ref() == keys::Sampling::Bidirectional) {
         return Err(
             document.error_at(s.span().start, "bidirectional sampling is not supported yet")
@@ -262,14 +264,9 @@ fn parameters(
 
 /// The first key that asks for derivatives in a way that is not there yet.
 fn refused(document: &Document<'_>, keys: &keys::Job) -> Option<CliError> {
-    let kind = keys.estimator.kind.as_ref().and_then(|k| {
-        let name = match k.get_ref() {
-            keys::Kind::Radiative => "radiative",
-            keys::Kind::Warped => "warped",
-            keys::Kind::PathSpace | keys::Kind::FiniteDifference => return None,
-        };
-        Some((k.span().start, format!("the estimator kind `{name}` is not supported yet")))
-    });
+    let kind = keys.estimator.kind.as_ref().filter(|k| *k.get_ref() == keys::Kind::Warped);
+    let kind = kind
+        .map(|k| (k.span().start, "the estimator kind `warped` is not supported yet".to_owned()));
     let group = keys
         .parameter_group
         .first()

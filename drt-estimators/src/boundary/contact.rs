@@ -36,7 +36,7 @@ const PROBES: [f64; 5] = [0.01, 0.3, 0.5, 0.7, 0.99];
 
 /// Where an edge rests on a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Contact {
+pub(crate) struct Contact {
     /// Unit normal of the floor, on the side of the faces.
     up: Vec3,
     /// Unit, in the floor, across the edge.
@@ -49,7 +49,7 @@ pub(super) struct Contact {
 
 impl Contact {
     /// What the edge rests on at a point of it; `None` nearly everywhere.
-    pub(super) fn at(world: &World, at: &EdgePoint<'_>) -> Option<Self> {
+    pub(crate) fn at(world: &World, at: &EdgePoint<'_>) -> Option<Self> {
         let e = at.edge;
         if !e.may_rest {
             return None;
@@ -91,7 +91,7 @@ impl Contact {
     }
 
     /// True when an edge rests on something somewhere.
-    pub(super) fn anywhere(world: &World, e: &Edge) -> bool {
+    pub(crate) fn anywhere(world: &World, e: &Edge) -> bool {
         let mut e = *e;
         e.may_rest = true;
         PROBES.into_iter().any(|u| {
@@ -112,6 +112,11 @@ impl Contact {
             a if a > high => Some((against?, -self.side)),
             _ => None,
         }
+    }
+
+    /// The floor next to the edge on the side to which `w` points, if it goes on there.
+    pub(crate) fn floor_along(&self, w: Vec3) -> Option<Vertex> {
+        self.floor[usize::from(self.side.dot(w) < 0.0)]
     }
 
     /// The direction and distance of a point from the contact.

@@ -21,10 +21,10 @@ pub(crate) struct Edge {
     /// The edge's faces in the soup; twice the same for an open edge.
     pub(crate) faces: [u32; 2],
     /// Unit, across the edge into each face; twice the same for an open edge.
-    pub(super) across: [Vec3; 2],
+    pub(crate) across: [Vec3; 2],
     /// Angle between the faces, 0 for an open edge.
     between: f64,
-    pub(super) shape: u32,
+    pub(crate) shape: u32,
     /// The first face in its shape, and which of its corners are `a` and `b`.
     triangle: u32,
     corners: [u8; 2],
@@ -33,7 +33,7 @@ pub(crate) struct Edge {
     /// The medium in which they run, where that is the same all along the edge.
     medium: Option<Option<usize>>,
     /// Something is so near that the edge may rest on it.
-    pub(super) may_rest: bool,
+    pub(crate) may_rest: bool,
 }
 
 /// The side of an edge's faces on which it can be grazed.
@@ -153,7 +153,7 @@ impl Edge {
     }
 
     /// The number of each end, whatever their order, the same for edges that coincide.
-    pub(super) fn place(&self) -> [[u64; 3]; 2] {
+    pub(crate) fn place(&self) -> [[u64; 3]; 2] {
         // Adding zero makes a zero positive.
         let [a, b] = [self.a, self.b].map(|p| p.to_array().map(|c| (c + 0.0).to_bits()));
         if a < b { [a, b] } else { [b, a] }
@@ -161,7 +161,7 @@ impl Edge {
 
     /// The faces with the angles around the edge at which they lie, measured from a first face of
     /// `other`, which has the same place.
-    pub(super) fn faces_around(&self, other: &Self) -> [(f64, u32, Vec3); 2] {
+    pub(crate) fn faces_around(&self, other: &Self) -> [(f64, u32, Vec3); 2] {
         let x = other.across[0];
         let y = other.tangent.cross(x);
         let angle = |h: Vec3| fm::atan2(h.dot(y), h.dot(x));

@@ -22,8 +22,8 @@
 //! directly lit media, seen directly, are left to [`shadow`] where that serves.
 
 pub(crate) mod border;
-mod contact;
-mod edges;
+pub(crate) mod contact;
+pub(crate) mod edges;
 mod movers;
 pub(crate) mod shadow;
 mod weld;

@@ -55,18 +55,26 @@ pub(crate) struct Insides {
     pub(crate) flux: Vec<Vec<usize>>,
 }
 
+impl Insides {
+    /// Nothing moves, and nothing else makes up for it.
+    pub(crate) fn at_rest(world: &World) -> Self {
+        let media = world.scene.media.len();
+        Self {
+            volumes: alloc::vec![Vec::new(); media],
+            fields: alloc::vec![None; media],
+            flux: alloc::vec![Vec::new(); media],
+            flux_shapes: Vec::new(),
+        }
+    }
+}
+
 pub(crate) fn plan(
     world: &World,
     tangents: &Tangents,
     asked: &[(usize, InsideKind)],
 ) -> Result<Insides, Error> {
     let media = world.scene.media.len();
-    let mut insides = Insides {
-        volumes: alloc::vec![Vec::new(); media],
-        fields: alloc::vec![None; media],
-        flux: alloc::vec![Vec::new(); media],
-        flux_shapes: Vec::new(),
-    };
+    let mut insides = Insides::at_rest(world);
     let adjacent = adjacency(world);
     for m in 0..media {
         let shapes: Vec<usize> =

@@ -159,6 +159,24 @@ impl Pinhole {
         let length = v.length();
         rate.reject(v / length) / length
     }
+
+    /// The transpose of [`Pinhole::direction_rate`]: the gradient by the camera of a number whose
+    /// gradient by the unit direction is `adjoint`; `direction` needs not be unit.
+    pub(super) fn direction_gradient(&self, direction: Vec3, adjoint: Vec3) -> SensorGradient {
+        let depth = direction.dot(self.forward);
+        let [a, b] = [self.right, self.up].map(|axis| direction.dot(axis) / depth);
+        let length = direction.length();
+        let forward = adjoint.reject(direction / length) * (depth / length);
+        let [to_a, to_b] = [forward.dot(self.right), forward.dot(self.up)];
+        SensorGradient {
+            position: Vec3::ZERO,
+            right: forward * a,
+            up: forward * b,
+            forward,
+            pixel_size: (to_a * a + to_b * b) / self.pixel_size,
+            principal: [-self.pixel_size * to_a, self.pixel_size * to_b],
+        }
+    }
 }
 
 impl SensorTangent {

@@ -120,6 +120,22 @@ impl Sensor {
         }
     }
 
+    /// The gradient by the sensor of a number whose gradient by the unit direction into the scene, of
+    /// one and the same image point, is `adjoint`; its position has no part in it.
+    #[must_use]
+    pub fn direction_gradient(&self, direction: Vec3, adjoint: Vec3) -> SensorGradient {
+        let p = &self.pinhole;
+        match self.response {
+            Response::Perspective => p.direction_gradient(direction, adjoint),
+            Response::Irradiance => SensorGradient {
+                right: adjoint * direction.dot(p.right),
+                up: adjoint * direction.dot(p.up),
+                forward: adjoint * direction.dot(p.forward),
+                ..SensorGradient::default()
+            },
+        }
+    }
+
     /// True when the filter jumps at the borders of pixels.
     #[must_use]
     pub fn has_borders(&self) -> bool {
@@ -152,6 +168,40 @@ mod tests {
             let fd = (at(h) - at(-h)) / (2.0 * h);
             assert!((fd - gradient.dot(&meter.velocity(&field))).abs() < 1e-8);
         }
+    }
+
+    /// Against the rates of directions themselves, for cameras that move, turn and zoom.
+    #[test]
+    fn direction_gradients_are_transposed_rates() {
+        let lens = Lens::with_fov(50.0);
+        let place = Affine {
+            linear: drt_math::Mat3::rotation(vec3(0.3, 0.8, -0.4).normalize(), 0.7),
+            translation: vec3(1.0, -2.0, 0.5),
+        };
+        let camera =
+            Sensor::from_to_world(&place, lens, [40, 30], Filter::new(FilterKind::BOX).unwrap())
+                .unwrap();
+        let pixel = [7.3, 21.9];
+        let direction = camera.ray(pixel).direction;
+        let adjoint = vec3(0.4, -1.3, 0.7);
+        let gradient = camera.direction_gradient(direction, adjoint);
+        let field = Affine {
+            linear: drt_math::Mat3::skew(vec3(0.2, -0.6, 0.3)),
+            translation: vec3(3.0, 1.0, 2.0),
+        };
+        let zoom = camera.property_tangent("fov", drt_math::Rgb::splat(2.0)).unwrap();
+        let shift =
+            camera.property_tangent("principal_point_offset_y", drt_math::Rgb::ONE).unwrap();
+        for tangent in [camera.velocity(&field), zoom, shift] {
+            let rate = camera.pinhole.direction_rate(pixel, &tangent);
+            assert!((gradient.dot(&tangent) - adjoint.dot(rate)).abs() < 1e-12);
+            assert!(rate.length() > 1e-3);
+        }
+        let meter = Sensor::irradiance_meter(vec3(0.3, -0.2, 0.5), vec3(0.2, -0.4, 1.0)).unwrap();
+        let tangent = meter.velocity(&field);
+        let turned = field.vector(direction);
+        let found = meter.direction_gradient(direction, adjoint).dot(&tangent);
+        assert!((found - adjoint.dot(turned)).abs() < 1e-12);
     }
 
     #[test]

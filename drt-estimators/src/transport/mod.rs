@@ -13,8 +13,8 @@ pub(crate) mod trace;
 pub(crate) mod vertex;
 pub(crate) mod world;
 
-pub(crate) use adjoint::Differentiator;
-pub(crate) use record::{PathRecord, Radiance, RadianceBySegments};
+pub(crate) use adjoint::{Differentiator, Form};
+pub(crate) use record::{Carriers, PathRecord, Radiance, RadianceBySegments};
 pub(crate) use trace::Tracer;
 pub(crate) use vertex::{Kind, MaterialPoint, SurfacePoint, Vertex};
 pub(crate) use world::{MediumNeed, Needs, RayPath, World};

@@ -1,12 +1,13 @@
 //! The path record: what a walk leaves behind when its derivative is wanted.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::Range;
 
 use drt_math::{Rgb, Vec3};
 
-use super::trace::{Arrival, Connection, Endpoint, Observer};
-use super::vertex::Vertex;
+use super::trace::{Arrival, Connection, Endpoint, Leaving, Observer};
+use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, RayPath, World};
 use crate::flux::Reservoir;
 
@@ -23,6 +24,8 @@ pub(crate) struct Node {
     pub(crate) value: Rgb,
     /// Its inverse density, Russian roulette included.
     pub(crate) inv_pdf: f64,
+    /// The rays up to here move, so that it does in the spatial form.
+    pub(crate) carried: bool,
 }
 
 impl Node {
@@ -35,6 +38,14 @@ impl Node {
     }
 }
 
+/// What carries the vertices of a path in the spatial form.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Carriers {
+    /// Shapes that move.
+    pub(crate) shapes: Arc<[bool]>,
+    pub(crate) camera: bool,
+}
+
 /// A recorded path: a tree, since equiangular side vertices branch off its segments.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PathRecord {
@@ -45,6 +56,8 @@ pub(crate) struct PathRecord {
     pub(crate) value: Rgb,
     /// Where it met surfaces with a flux.
     pub(crate) flux: Reservoir,
+    /// What carries vertices, where that is asked for.
+    pub(crate) carriers: Carriers,
 }
 
 impl PathRecord {
@@ -61,7 +74,18 @@ impl PathRecord {
             wi: dir,
             value,
             inv_pdf: 1.0,
+            carried: self.carriers.camera,
         });
+    }
+
+    /// The segments up to a node.
+    pub(crate) fn segments(&self, mut node: usize) -> u32 {
+        let mut n = 0;
+        while let Some(a) = &self.nodes[node].arrival {
+            n += 1;
+            node = a.parent as usize;
+        }
+        n
     }
 
     fn keep(&mut self, crossings: &[Crossing]) -> Range<usize> {
@@ -78,21 +102,21 @@ impl Observer for PathRecord {
         self.value += value;
     }
 
-    fn ray(
-        &mut self,
-        world: &World,
-        segments: u32,
-        throughput: Rgb,
-        origin: Vec3,
-        dir: Vec3,
-        ray: &RayPath,
-    ) {
-        self.flux.offer(world, segments, throughput, origin, dir, ray);
+    fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {
+        let carried = self.nodes[leaving.node as usize].carried;
+        self.flux.offer(world, leaving, carried, ray);
     }
 
     fn arrive(&mut self, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
         let crossings = self.keep(crossings);
         let c = self.connections.len();
+        let on_mover = || match &arrival.end {
+            Endpoint::Surface(Vertex { kind: Kind::Surface(s), .. }) => {
+                self.carriers.shapes.get(s.shape as usize) == Some(&true)
+            }
+            _ => false,
+        };
+        let carried = self.nodes[arrival.parent as usize].carried || on_mover();
         self.nodes.push(Node {
             arrival: Some(*arrival),
             crossings,
@@ -100,6 +124,7 @@ impl Observer for PathRecord {
             wi: Vec3::ZERO,
             value: Rgb::ZERO,
             inv_pdf: 0.0,
+            carried,
         });
         self.nodes.len() as u32 - 1
     }

@@ -85,17 +85,8 @@ pub(crate) trait Observer {
     const RECORDS: bool;
     /// Light that reached the walk's start over `segments` segments.
     fn contribution(&mut self, segments: u32, value: Rgb);
-    /// The walk is about to follow a ray, after `segments` segments.
-    fn ray(
-        &mut self,
-        _world: &World,
-        _segments: u32,
-        _throughput: Rgb,
-        _origin: Vec3,
-        _dir: Vec3,
-        _ray: &RayPath,
-    ) {
-    }
+    /// The walk is about to follow a ray.
+    fn ray(&mut self, _world: &World, _leaving: &Leaving, _ray: &RayPath) {}
     /// The walk arrived somewhere; returns the name by which the walk refers to it.
     fn arrive(&mut self, _arrival: &Arrival, _crossings: &[Crossing]) -> u32 {
         0
@@ -150,15 +141,16 @@ impl Alive {
 
 /// A ray about to be followed.
 #[derive(Clone, Copy, Debug)]
-struct Leaving {
-    node: u32,
-    vertex: Vertex,
-    dir: Vec3,
+pub(crate) struct Leaving {
+    pub(crate) node: u32,
+    pub(crate) vertex: Vertex,
+    pub(crate) dir: Vec3,
     /// Solid-angle density of `dir`, where next-event estimation competes.
     pdf: Option<f64>,
-    throughput: Rgb,
+    pub(crate) throughput: Rgb,
     alive: Alive,
-    segments: u32,
+    /// Segments before the ray.
+    pub(crate) segments: u32,
 }
 
 /// Everything one walk needs: the scene, its random numbers and reusable buffers.
@@ -355,7 +347,7 @@ impl<'w> Tracer<'w> {
         let origin = leaving.vertex.x;
         let mut ray = self.ray.take().unwrap_or_default();
         self.world.cast(&leaving.vertex, leaving.dir, &mut ray, &mut self.counters);
-        observer.ray(self.world, leaving.segments, leaving.throughput, origin, leaving.dir, &ray);
+        observer.ray(self.world, leaving, &ray);
         let span = self.equiangular(leaving, &ray, observer);
         let stop = match self.travel(origin, leaving.dir, &ray, leaving.alive.value) {
             Travel::Absorbed => None,

@@ -323,6 +323,11 @@ impl World {
         !self.scene.media.is_empty()
     }
 
+    /// True when light can leave a vertex by scattering.
+    pub(crate) fn can_scatter(&self, v: &Vertex) -> bool {
+        v.surface().is_none_or(|s| !self.bsdf_of(s.shape).is_black())
+    }
+
     /// True when paths have vertices on a shape: it scatters or emits.
     pub(crate) fn scatters(&self, shape: usize) -> bool {
         !self.bsdf_of(shape as u32).is_black() || self.scene.shapes[shape].emitter.is_some()
@@ -353,6 +358,28 @@ impl World {
         };
         let x = a * (1.0 - bary[0] - bary[1]) + b * bary[0] + c * bary[1];
         (SurfacePoint { prim, shape, triangle, bary, ng, ns }, x)
+    }
+
+    /// The point of a triangle's plane nearest to `x`, moved into the triangle.
+    pub(crate) fn point_near(&self, prim: u32, x: Vec3) -> (SurfacePoint, Vec3) {
+        let Prim { shape, triangle } = self.prims[prim as usize];
+        let [a, b, c] = self.scene.shapes[shape as usize].mesh.triangle(triangle);
+        let [g1, g2] = barycentric_gradients(b - a, c - a);
+        let [b1, b2] = [g1, g2].map(|g| g.dot(x - a).clamp(0.0, 1.0));
+        let sum = f64::max(b1 + b2, 1.0);
+        self.point(prim, [b1 / sum, b2 / sum])
+    }
+
+    /// The gradient of `adjoint · shading normal` by the place of the point in its triangle.
+    pub(crate) fn normal_slide(&self, s: &SurfacePoint, adjoint: Vec3) -> Vec3 {
+        let mesh = &self.scene.shapes[s.shape as usize].mesh;
+        let Some(normals) = &mesh.normals else { return Vec3::ZERO };
+        let [i, j, k] = mesh.triangles[s.triangle as usize].map(|v| normals[v as usize]);
+        let sum = i * (1.0 - s.bary[0] - s.bary[1]) + j * s.bary[0] + k * s.bary[1];
+        let adjoint = adjoint.reject(s.ns) / sum.length();
+        let [a, b, c] = mesh.triangle(s.triangle);
+        let [g1, g2] = barycentric_gradients(b - a, c - a);
+        g1 * adjoint.dot(j - i) + g2 * adjoint.dot(k - i)
     }
 
     /// The scattering function at a vertex; `None` at points.
@@ -657,6 +684,14 @@ impl World {
             _ => Rgb::ZERO,
         }
     }
+}
+
+/// The gradients, in a triangle's plane, of the barycentric weights of its second and third vertex, by
+/// its edges from the first.
+fn barycentric_gradients(e1: Vec3, e2: Vec3) -> [Vec3; 2] {
+    let n = e1.cross(e2);
+    let per_area = 1.0 / n.length_squared();
+    [e2.cross(n) * per_area, n.cross(e1) * per_area]
 }
 
 /// The diagonal of the box around the surfaces that hold a medium; `all` where none do.

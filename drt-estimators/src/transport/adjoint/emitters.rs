@@ -3,7 +3,7 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use super::{Differentiator, Far, Stretch, moves, send, turn};
+use super::{Differentiator, Far, Form, Stretch, moves, send, turn};
 use crate::emitter::EmitterGradient;
 use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::transport::lights::{LightKind, LightSample};
@@ -15,7 +15,7 @@ impl Differentiator<'_> {
     pub(super) fn light_end<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
-        vertex: &Vertex,
+        near_moves: bool,
         light: &LightSample,
         to_wi: Option<RgbVec>,
         per_value: Rgb,
@@ -25,11 +25,18 @@ impl Differentiator<'_> {
         let weight = per_value * light.value;
         let interest = sink.interest();
         let emitter = interest.emitters[light.emitter];
-        let near_moves = moves(vertex, interest, false);
         match &light.kind {
             LightKind::Area(s) => {
                 let end = Vertex { x: light.y, medium: None, kind: Kind::Surface(*s) };
-                let moving = near_moves || moves(&end, interest, false);
+                if emitter {
+                    strength_of(light.emitter, per_value, sink);
+                }
+                if self.form == Form::Spatial {
+                    self.segment(path, Far::Direction, near_moves, weight, here, sink);
+                    self.land(path, &end, &SurfaceAdjoint::default(), weight, here, sink);
+                    return;
+                }
+                let moving = near_moves || moves(&end, sink.interest(), false);
                 let mut there = SurfaceAdjoint::default();
                 let far = Far::Vertex(&end, &mut there);
                 self.segment(path, far, moving, weight, here, sink);
@@ -39,9 +46,6 @@ impl Differentiator<'_> {
                     here.u -= g;
                 }
                 send(&end, &there, sink);
-                if emitter {
-                    strength_of(light.emitter, per_value, sink);
-                }
             }
             LightKind::Position => {
                 let moving = near_moves || emitter;

@@ -20,7 +20,12 @@
 //! t_dot = (R_dot/R) t + R ∫ [σ_dot + z_dot·∇σ] ds + sum over crossings (σ₋-σ₊) N·(u_c - z_dot) / (N·w)
 //! ```
 
+//!
+//! Vertices move in one of two [`Form`]s: each with the matter it is on, as above, or [carried](spatial)
+//! by the rays that found them.
+
 mod emitters;
+mod spatial;
 
 use alloc::vec::Vec;
 
@@ -44,6 +49,15 @@ struct Local {
     children: Rgb,
 }
 
+/// How the vertices of paths move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// With the material points they are, as their medium's inside and their surface do (2021 paper).
+    Material,
+    /// With the rays, whose directions and distances stand still (2019 paper).
+    Spatial,
+}
+
 /// A segment's far end.
 enum Far<'a> {
     /// A vertex, with a receiver for its adjoint.
@@ -57,29 +71,34 @@ enum Far<'a> {
 /// The backward sweep and its buffers.
 pub(crate) struct Differentiator<'w> {
     world: &'w World,
+    form: Form,
     locals: Vec<Local>,
     points: Vec<(f64, f64)>,
     rng: Rng,
-    /// The filter's gradient by the pixel position, over the density.
+    /// The filter's gradient by the pixel position, over the density; of the material form.
     filter: [f64; 2],
+    /// By the rate of the camera ray's direction; of the spatial form.
+    turn: RgbVec,
     /// Of the camera's importance and filter, per channel.
     sensor: [SensorGradient; 3],
 }
 
 impl<'w> Differentiator<'w> {
-    pub(crate) fn new(world: &'w World) -> Self {
+    pub(crate) fn new(world: &'w World, form: Form) -> Self {
         Self {
             world,
+            form,
             locals: Vec::new(),
             points: Vec::new(),
             rng: Rng::new(0, 0, 0),
             filter: [0.0; 2],
+            turn: RgbVec::ZERO,
             sensor: [SensorGradient::default(); 3],
         }
     }
 
     /// Sends the gradient of the record's value to `sink`. `filter` holds the gradient by the pixel
-    /// position of the filter over the density; `rng` serves line integrals through grids and must
+    /// position of the filter over the density, which the spatial form does not need; `rng` serves line integrals through grids and must
     /// be independent of the walk's.
     pub(crate) fn differentiate<S: AdjointSink>(
         &mut self,
@@ -90,13 +109,17 @@ impl<'w> Differentiator<'w> {
     ) {
         self.rng = rng;
         self.filter = filter;
+        self.turn = RgbVec::ZERO;
         self.sensor = [SensorGradient::default(); 3];
         self.locals.clear();
         self.locals.resize(record.nodes.len(), Local::default());
         for k in (1..record.nodes.len()).rev() {
             self.node(record, k, sink);
         }
-        self.camera(sink);
+        match self.form {
+            Form::Material => self.camera(sink),
+            Form::Spatial => self.camera_ray(record, self.locals[0].at.u, self.turn, sink),
+        }
     }
 
     fn node<S: AdjointSink>(&mut self, record: &PathRecord, k: usize, sink: &mut S) {
@@ -129,21 +152,27 @@ impl<'w> Differentiator<'w> {
             Endpoint::Volume(vertex, c) => {
                 let theta_s = theta * c.sigma_s();
                 collected += self.connections(record, node, vertex, theta_s, &mut here, sink);
-                self.coefficients(
-                    vertex,
-                    c,
-                    theta,
-                    collected,
-                    arrival.emission_weight,
-                    &mut here,
-                    sink,
-                );
+                let moving = self.moves(record, k, sink.interest());
+                let weight = arrival.emission_weight;
+                self.coefficients(vertex, c, theta, collected, weight, moving, &mut here, sink);
                 c.source() * arrival.emission_weight + c.sigma_s() * collected
             }
         };
         self.arrive(record, k, received, &mut here, sink);
-        if let Some(vertex) = node.vertex() {
+        if let (Form::Material, Some(vertex)) = (self.form, node.vertex()) {
             send(vertex, &here, sink);
+        }
+    }
+
+    /// True when a node moves.
+    fn moves(&self, record: &PathRecord, k: usize, interest: &Interest) -> bool {
+        let node = &record.nodes[k];
+        match self.form {
+            Form::Spatial => node.carried,
+            Form::Material => match node.vertex() {
+                Some(v) => moves(v, interest, false),
+                None => node.arrival.is_none() && interest.sensor,
+            },
         }
     }
 
@@ -161,7 +190,8 @@ impl<'w> Differentiator<'w> {
         let p = arrival.parent as usize;
         let value = arrival.arrival * received;
         self.locals[p].children += value;
-        if value.is_zero() {
+        // What nothing comes back from may still turn.
+        if value.is_zero() && (self.form == Form::Material || here.is_zero()) {
             return;
         }
         let weight = arrival.throughput * received;
@@ -176,8 +206,7 @@ impl<'w> Differentiator<'w> {
         };
         let mut there = core::mem::take(&mut self.locals[p].at);
         let vertex = record.nodes[k].vertex();
-        let moving = moves(&from, sink.interest(), sink.interest().sensor)
-            || vertex.is_some_and(|v| moves(v, sink.interest(), false));
+        let near_moves = self.moves(record, p, sink.interest());
         // The scattering function of the parent sees the two ends of the segment as a direction.
         if parent.arrival.is_some() {
             let adjoint = theta * value * parent.inv_pdf;
@@ -191,14 +220,11 @@ impl<'w> Differentiator<'w> {
                 &mut there,
                 sink,
             );
-            if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
+            if let (Form::Material, Some(to_wi), Some(_)) = (self.form, to_wi, vertex) {
                 let g = turn(&to_wi, parent.wi, arrival.distance);
                 here.u += g;
                 there.u -= g;
             }
-        }
-        if p == 0 {
-            self.seen(vertex, arrival.dir, value, parent.value, here, sink);
         }
         let crossings = &record.crossings[record.nodes[k].crossings.clone()];
         let path = Stretch {
@@ -208,11 +234,26 @@ impl<'w> Differentiator<'w> {
             medium: arrival.start_medium,
             crossings,
         };
-        let far = match vertex {
-            Some(v) => Far::Vertex(v, here),
-            None => Far::Direction,
-        };
-        self.segment(&path, far, moving, weight, &mut there, sink);
+        match (self.form, vertex) {
+            (Form::Material, _) => {
+                if p == 0 {
+                    self.seen(vertex, arrival.dir, value, parent.value, here, sink);
+                }
+                let moving = near_moves || self.moves(record, k, sink.interest());
+                let far = vertex.map_or(Far::Direction, |v| Far::Vertex(v, here));
+                self.segment(&path, far, moving, weight, &mut there, sink);
+            }
+            (Form::Spatial, _) => {
+                let mut turn =
+                    self.segment(&path, Far::Direction, near_moves, weight, &mut there, sink);
+                if let Some(v) = vertex {
+                    turn += self.land(&path, v, here, weight, &mut there, sink);
+                }
+                if p == 0 {
+                    self.turn += turn;
+                }
+            }
+        }
         self.locals[p].at = there;
     }
 
@@ -402,10 +443,15 @@ impl<'w> Differentiator<'w> {
                 }
             }
         }
-        if let Some((p, distance)) = behind {
-            let g = turn(&(d.wo * adjoint), wo, distance);
-            self.locals[p].at.u += g;
-            here.u -= g;
+        match (self.form, behind) {
+            (Form::Material, Some((p, distance))) => {
+                let g = turn(&(d.wo * adjoint), wo, distance);
+                self.locals[p].at.u += g;
+                here.u -= g;
+            }
+            // Only the camera's ray turns.
+            (Form::Spatial, Some((0, _))) => self.turn -= d.wo * adjoint,
+            _ => {}
         }
         Some(d.wi * adjoint)
     }
@@ -422,6 +468,10 @@ impl<'w> Differentiator<'w> {
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
         let Some(arrival) = &node.arrival else { return sum };
+        let moving = match self.form {
+            Form::Material => moves(vertex, sink.interest(), false),
+            Form::Spatial => node.carried,
+        };
         for (c, crossings) in &record.connections[node.connections.clone()] {
             let rest = c.rest();
             sum += c.f * rest;
@@ -437,7 +487,7 @@ impl<'w> Differentiator<'w> {
                 medium: c.start_medium,
                 crossings: &record.crossings[crossings.clone()],
             };
-            self.light_end(&path, vertex, light, to_wi, per_value, here, sink);
+            self.light_end(&path, moving, light, to_wi, per_value, here, sink);
         }
         sum
     }
@@ -451,6 +501,7 @@ impl<'w> Differentiator<'w> {
         theta: Rgb,
         collected: Rgb,
         emission_weight: f64,
+        moving: bool,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
     ) {
@@ -465,7 +516,7 @@ impl<'w> Differentiator<'w> {
         if sink.interest().media[m] {
             sink.medium(m, vertex.x, &adjoint);
         }
-        if moves(vertex, sink.interest(), false) {
+        if moving {
             let g = self.world.medium(m).gradients(vertex.x);
             here.u += g.sigma_t * adjoint.sigma_t
                 + g.albedo * adjoint.albedo

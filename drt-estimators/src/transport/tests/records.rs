@@ -13,7 +13,7 @@ use super::scenes::*;
 use super::setup::{Fault, Faulty, coloured, motion, prepare, set, trace};
 use crate::contraction::Contraction;
 use crate::scene::Scene;
-use crate::transport::{Differentiator, PathRecord, Tracer};
+use crate::transport::{Differentiator, Form, PathRecord, Tracer};
 
 /// What has been compared.
 #[derive(Debug, Default)]
@@ -33,7 +33,7 @@ fn compare(scene: &Scene, parameter: &Parameter, fault: Fault) -> Tally {
     let moving = Moving::new(scene, parameter, &world, &motion);
     let mut tracer = Tracer::new(&world);
     let mut record = PathRecord::default();
-    let mut differentiator = Differentiator::new(&world);
+    let mut differentiator = Differentiator::new(&world, Form::Material);
     let mut sink = Faulty(Contraction::new(&world, &motion), fault);
     let mut tally = Tally::default();
     while (tally.paths < 200 || tally.moving < 30) && tally.paths < 20_000 {

@@ -13,7 +13,7 @@ use super::scenes::*;
 use super::setup::{Fault, Faulty, coloured, motion, prepare, set, trace};
 use crate::contraction::Contraction;
 use crate::scene::Scene;
-use crate::transport::{Differentiator, PathRecord, Tracer};
+use crate::transport::{Differentiator, Form, PathRecord, Tracer};
 
 #[test]
 fn derivatives_on_average() {
@@ -64,7 +64,7 @@ fn mean_deviations(scene: &Scene, parameter: &Parameter, fault: Fault, factor: f
     let moving = Moving::new(scene, parameter, &world, &motion);
     let mut tracer = Tracer::new(&world);
     let mut record = PathRecord::default();
-    let mut differentiator = Differentiator::new(&world);
+    let mut differentiator = Differentiator::new(&world, Form::Material);
     let mut sink = Faulty(Contraction::new(&world, &motion), fault);
     let mut deviations = Vec::new();
     for i in 0..120 {

@@ -1,0 +1,215 @@
+//! Edges of surfaces, each with all faces around it.
+
+use alloc::vec::Vec;
+use core::f64::consts::PI;
+use core::ops::Range;
+
+use drt_math::{Vec3, fm};
+
+use crate::boundary::contact::Contact;
+use crate::boundary::edges::{Edge, EdgePoint, collect};
+use crate::transport::{MaterialPoint, SurfacePoint, World};
+
+/// How much less radiance jumps at a crease of a surface with interpolated normals than its angle tells.
+const SMOOTH: f64 = 0.05;
+
+/// Angle by which two faces may be out of one plane and still go on in it.
+const FLAT: f64 = 1e-6;
+
+/// Distance from an edge at which radiance beside it is taken, in the edge's lengths: on the edge
+/// itself a ray would not tell which face it leaves.
+const BESIDE: f64 = 1e-6;
+
+/// An edge at which radiance jumps.
+#[derive(Clone, Debug)]
+pub(crate) struct Jump {
+    pub(crate) edge: Edge,
+    /// Its faces, in the order in which one goes around it.
+    fan: Range<usize>,
+    /// The medium around its shape, where that bounds none and it is the same everywhere.
+    around: Option<Option<usize>>,
+    /// How much a crease jumps, compared to a silhouette.
+    crease: f64,
+}
+
+/// A face at an edge.
+#[derive(Clone, Copy, Debug)]
+struct Blade {
+    /// Around the edge, from the first face's direction.
+    angle: f64,
+    prim: u32,
+    /// Unit, across the edge into the face.
+    across: Vec3,
+}
+
+/// All edges.
+#[derive(Debug)]
+pub(crate) struct Jumps {
+    pub(super) list: Vec<Jump>,
+    blades: Vec<Blade>,
+    /// Edges of the scene's meshes in all, flat ones too.
+    pub(super) all: u64,
+}
+
+/// What is seen on the two sides of an edge.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sides {
+    /// Unit normal of the plane of the edge and the viewer.
+    pub(super) n: Vec3,
+    /// Sine of the angle between edge and view.
+    pub(super) sine: f64,
+    /// The face on the side of `n`, and the one on the other side; `None` where one sees past the edge.
+    pub(super) faces: [Option<(u32, Vec3)>; 2],
+}
+
+impl Sides {
+    /// The faces that rays from the edge ignore.
+    pub(super) fn own_faces(&self) -> Option<[u32; 2]> {
+        let [a, b] = self.faces.map(|f| f.map(|(prim, _)| prim));
+        Some([a.or(b)?, b.or(a)?])
+    }
+
+    /// To the side on which one sees past the edge.
+    pub(super) fn outward(&self) -> Vec3 {
+        if self.faces[0].is_none() { self.n } else { -self.n }
+    }
+}
+
+impl Jumps {
+    /// Collects the edges of surfaces that scatter or block. Of edges at one place, that of a shape that
+    /// `moves` tells how the place moves.
+    pub(super) fn collect(world: &World, moves: &[bool]) -> Self {
+        let (edges, all) = collect(world);
+        let mut places: Vec<_> = edges.iter().zip(0..).map(|(e, i)| (e.place(), i)).collect();
+        places.sort_unstable();
+        let around: Vec<_> =
+            (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
+        let mut jumps = Self { list: Vec::new(), blades: Vec::new(), all };
+        for same in places.chunk_by(|a, b| a.0 == b.0) {
+            let of = |i: &usize| &edges[*i];
+            let indices = || same.iter().map(|(_, i)| *i);
+            let main = indices().find(|i| moves[of(i).shape as usize]).unwrap_or(same[0].1);
+            let edge = &edges[main];
+            let start = jumps.blades.len();
+            for i in indices() {
+                for (angle, prim, across) in edges[i].faces_around(edge) {
+                    if jumps.blades[start..].iter().all(|b| b.prim != prim) {
+                        jumps.blades.push(Blade { angle, prim, across });
+                    }
+                }
+            }
+            let fan = start..jumps.blades.len();
+            jumps.blades[fan.clone()].sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
+            match jumps.crease(world, &fan) {
+                Some(crease) => {
+                    let mut edge = *edge;
+                    edge.may_rest = Contact::anywhere(world, &edge);
+                    let around = around[edge.shape as usize];
+                    jumps.list.push(Jump { edge, fan, around, crease });
+                }
+                None => jumps.blades.truncate(start),
+            }
+        }
+        jumps
+    }
+
+    /// How much radiance jumps at a crease between faces; `None` where it never does.
+    fn crease(&self, world: &World, fan: &Range<usize>) -> Option<f64> {
+        let blades = &self.blades[fan.clone()];
+        let [a, b] = blades else { return Some(1.0) };
+        let [sa, sb] = [a, b].map(|b| world.point(b.prim, [0.0; 2]).0.shape as usize);
+        let shapes = &world.scene.shapes;
+        let dull = |s: usize| shapes[s].emitter.is_none();
+        if shapes[sa].bsdf != shapes[sb].bsdf || !dull(sa) || !dull(sb) {
+            return Some(1.0);
+        }
+        let bend = PI - fm::atan2(a.across.cross(b.across).length(), a.across.dot(b.across));
+        if bend < FLAT {
+            return None;
+        }
+        let smooth = sa == sb && shapes[sa].mesh.normals.is_some();
+        Some(f64::min(bend, 1.0) * if smooth { SMOOTH } else { 1.0 })
+    }
+
+    /// What a viewer sees of an edge; `w` is unit, from the edge to the viewer.
+    pub(super) fn sides(&self, jump: &Jump, w: Vec3) -> Option<Sides> {
+        let edge = &jump.edge;
+        let n = edge.tangent.cross(w);
+        let sine = n.length();
+        if sine < 1e-12 {
+            return None;
+        }
+        let blades = &self.blades[jump.fan.clone()];
+        let x = edge.across[0];
+        let y = edge.tangent.cross(x);
+        let view = fm::atan2(w.dot(y), w.dot(x));
+        let turn = |angle: f64| if angle < 0.0 { angle + 2.0 * PI } else { angle };
+        // The first face met on each way around.
+        let first = |turned: fn(f64, f64) -> f64| {
+            let nearest = |b: &Blade| turn(turned(b.angle, view));
+            blades
+                .iter()
+                .min_by(|a, b| nearest(a).total_cmp(&nearest(b)))
+                .filter(|b| nearest(b) < PI)
+                .map(|b| (b.prim, b.across))
+        };
+        let faces = [first(|angle, view| angle - view), first(|angle, view| view - angle)];
+        Some(Sides { n: n / sine, sine, faces })
+    }
+}
+
+impl Jump {
+    pub(super) fn length(&self) -> f64 {
+        self.edge.line().1.length()
+    }
+
+    /// How much radiance jumps at most, roughly and relatively.
+    pub(super) fn prior(&self) -> f64 {
+        0.1 + 0.9 * self.crease
+    }
+
+    /// Weight of the edge seen from a point: the angle it subtends, less where it is a crease.
+    pub(super) fn seen_from(&self, eye: Vec3) -> f64 {
+        let (a, along) = self.edge.line();
+        let (da, db) = (a - eye, a + along - eye);
+        let silhouette = crate::boundary::edges::seen_from(&self.edge, eye);
+        if silhouette > 0.0 {
+            silhouette
+        } else {
+            self.crease * fm::atan2(da.cross(db).length(), da.dot(db))
+        }
+    }
+
+    /// The point `along` the edge.
+    pub(super) fn point(&self, along: f64) -> (Vec3, MaterialPoint) {
+        self.edge.point(along)
+    }
+
+    /// What the edge rests on at a point of it.
+    pub(super) fn contact(&self, world: &World, along: f64) -> Option<Contact> {
+        let (x, point) = self.edge.point(along);
+        Contact::at(world, &EdgePoint { edge: &self.edge, x, point, inv_pdf: 1.0 })
+    }
+
+    /// A surface point on a face, beside the point `x` of the edge.
+    pub(super) fn beside(
+        &self,
+        world: &World,
+        x: Vec3,
+        (prim, across): (u32, Vec3),
+    ) -> (SurfacePoint, Vec3) {
+        world.point_near(prim, x + across * (BESIDE * self.length()))
+    }
+
+    /// The medium around the edge at `x` on the viewer's side, `w` pointing to the viewer.
+    pub(super) fn medium(&self, world: &World, sides: &Sides, x: Vec3, w: Vec3) -> Option<usize> {
+        for (prim, _) in sides.faces.iter().flatten() {
+            let (point, _) = world.point(*prim, [1.0 / 3.0; 2]);
+            let bounds = world.scene.shapes[point.shape as usize].boundary.is_some();
+            if bounds {
+                return world.medium_on_side(&point, point.ng.dot(w) > 0.0, None);
+            }
+        }
+        self.around.unwrap_or_else(|| world.medium_at(x))
+    }
+}

@@ -1,0 +1,123 @@
+//! The 2019 estimator: the derivative of radiance itself, along the rays that carry it.
+//!
+//! Radiance L(x, w) is differentiated for a ray whose origin and direction move (2019 paper, Eqs.
+//! 16–32, in the corrected form of theory sheet §3). Every integral over directions and distances is
+//! differentiated at fixed directions and distances, so the record of an ordinary path is enough for
+//! the part without jumps: [`Form::Spatial`](crate::transport::Form) sweeps it backwards. Wherever the
+//! integrand jumps, and the jump moves relative to the ray, Reynolds' theorem adds a term:
+//!
+//! * in distance, at surfaces beside media: D_dot σ_s L^ins of D19.16 and D19.20, on both sides of
+//!   interfaces that do not scatter. That is the [flux](crate::flux), against rays that are carried;
+//! * in direction, at edges (D19.23): for an edge point y seen from a vertex x along d = (y - x)/r,
+//!   with the edge's tangent t and N = t × (-d) / |t × d|,
+//!
+//!   ```text
+//!   ∫ f(x, d) τ(x, y) [L(-N) - L(+N)] N·(y_dot - x_dot) |t × d| / r²  dl(y),
+//!   ```
+//!
+//!   L(±N) being the radiance that leaves y towards x just beside the edge on either side, or comes
+//!   from behind the edge where that side is open (D19.52–53). Silhouettes, borders and creases are
+//!   one case: going around the edge from x's direction, a side is a face if one is met within half a
+//!   turn. At the camera f is the filter and importance, and d turns with the image point.
+//!
+//! Cost is linear in path length: of all vertices of a path one, in proportion to its throughput,
+//! looks for an edge, and of all surfaces met one is asked for its flux; each traces side paths that
+//! branch no more. (The paper does both at every vertex, at a cost that is quadratic.)
+//!
+//! Light from points and directions does not fit this form: its shadows make radiance jump along lines
+//! on surfaces, which would be edges of the vertex before. A [`Session`](crate::Session) leaves such lights to
+//! the path-space estimator and adds the two.
+
+mod difference;
+mod jumps;
+mod outlines;
+mod vertices;
+
+use alloc::vec::Vec;
+
+use drt_math::{CdfTable, Rng};
+
+use jumps::{Jump, Jumps};
+
+use crate::Error;
+use crate::sensitivity::Interest;
+use crate::transport::World;
+
+/// The edges at which radiance jumps, by what sees them.
+#[derive(Debug)]
+pub(crate) struct Radiative {
+    jumps: Jumps,
+    /// Seen from the camera.
+    camera: Option<Choice>,
+    /// Seen from a vertex that stands still.
+    moving: Option<Choice>,
+    /// Seen from a vertex that moves.
+    all: Option<Choice>,
+    /// Edges that can be chosen, and edges in all.
+    pub(crate) count: [u64; 2],
+}
+
+/// A choice of edges by weight, and of points on them by length.
+#[derive(Debug)]
+struct Choice {
+    jumps: Vec<u32>,
+    table: CdfTable,
+}
+
+/// A point on an edge.
+struct Chosen<'a> {
+    jump: &'a Jump,
+    /// How far along the edge.
+    along: f64,
+    /// 1 over the density per length.
+    inv_pdf: f64,
+}
+
+impl Choice {
+    fn new(jumps: &Jumps, weight: impl Fn(&Jump) -> f64) -> Result<Option<Self>, Error> {
+        let weighed = jumps.list.iter().zip(0..).map(|(j, i)| (i, weight(j)));
+        let (indices, weights): (Vec<u32>, Vec<f64>) = weighed.filter(|(_, w)| *w > 0.0).unzip();
+        if indices.is_empty() {
+            return Ok(None);
+        }
+        let table = CdfTable::new(&weights).map_err(|e| Error::Element {
+            element: "edges".into(),
+            reason: alloc::format!("cannot be sampled: {e}"),
+        })?;
+        Ok(Some(Self { jumps: indices, table }))
+    }
+
+    fn sample<'a>(&self, jumps: &'a Jumps, rng: &mut Rng) -> Chosen<'a> {
+        // Monotone: one number places the point among all edges.
+        let s = self.table.sample(rng.next_f64());
+        let jump = &jumps.list[self.jumps[s.index] as usize];
+        Chosen { jump, along: s.residual, inv_pdf: jump.length() / s.pmf }
+    }
+}
+
+impl Radiative {
+    /// The edges at which something can change of what is of interest.
+    pub(crate) fn new(world: &World, interest: &Interest) -> Result<Self, Error> {
+        let jumps = Jumps::collect(world, &interest.shapes);
+        let moves = |j: &Jump| interest.sensor || interest.shapes[j.edge.shape as usize];
+        let eye = world.camera.position();
+        let camera = Choice::new(&jumps, |j| if moves(j) { j.seen_from(eye) } else { 0.0 })?;
+        let by_length = |j: &Jump| j.length() * j.prior();
+        let moving = Choice::new(&jumps, |j| if moves(j) { by_length(j) } else { 0.0 })?;
+        // From a vertex on what moves, everything seems to.
+        let any = interest.sensor || interest.shapes.contains(&true);
+        let all = Choice::new(&jumps, |j| if any { by_length(j) } else { 0.0 })?;
+        let count = [if any { jumps.list.len() as u64 } else { 0 }, jumps.all];
+        Ok(Self { jumps, camera, moving, all, count })
+    }
+
+    /// True when the camera can see something change.
+    pub(crate) fn has_outlines(&self) -> bool {
+        self.camera.is_some()
+    }
+
+    /// True when a vertex can.
+    pub(crate) fn has_edges(&self, world: &World) -> bool {
+        world.max_depth >= 2 && self.all.is_some()
+    }
+}

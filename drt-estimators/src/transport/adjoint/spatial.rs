@@ -1,0 +1,130 @@
+//! The spatial form: vertices carried by rays (2019 paper, Eqs. 19–32; theory sheet §2, §3).
+//!
+//! A path is a function of the camera's ray and of directions and distances that do not depend on the
+//! parameters. A ray x + t d whose origin has the velocity x_dot, and whose direction turns by d_dot (the
+//! camera's alone; every other direction is an integration variable), carries the points along it by
+//! x_dot + t d_dot: volume vertices at fixed t, and the points at which coefficients are looked up. It
+//! lands on a surface with unit normal n and velocity u at the distance D, where (D19.19)
+//!
+//! ```text
+//! D_dot = n·(u - x_dot - D d_dot) / (n·d),     x0_dot = x_dot + D d_dot + D_dot d.
+//! ```
+//!
+//! Both are linear in the velocities, so a sensitivity to x0_dot is one to x_dot, d_dot and u: it is
+//! carried back from vertex to vertex to the camera, and left on every surface on the way. So one
+//! backward sweep serves any number of parameters here, too, and has a transpose.
+//!
+//! A landing point slides over its triangle with the velocity x0_dot - u. A plane's normal does not mind;
+//! an interpolated one does, and turns with the barycentric weights.
+//!
+//! What these derivatives leave out, jumps of the integrand that move, is in
+//! [`radiative`](crate::radiative).
+
+use drt_math::{Rgb, RgbVec, Vec3};
+
+use super::{Differentiator, Stretch};
+use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
+use crate::transport::record::PathRecord;
+use crate::transport::vertex::{Kind, SurfacePoint, Vertex};
+use crate::transport::world::World;
+
+impl Differentiator<'_> {
+    /// The far end of a stretch: `weight` of light passes, `here` holds the sensitivities of the vertex
+    /// there. Leaves those of the surface, adds those of the near end, and returns those of the
+    /// direction's rate.
+    pub(super) fn land<S: AdjointSink>(
+        &self,
+        path: &Stretch<'_>,
+        end: &Vertex,
+        here: &SurfaceAdjoint,
+        weight: Rgb,
+        near: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> RgbVec {
+        let Kind::Surface(point) = &end.kind else {
+            near.u += here.u;
+            return here.u * path.length;
+        };
+        // A longer way dims what passes.
+        let medium = path.crossings.last().map_or(path.medium, |c| c.after);
+        let dims = self.world.sigma_t_at_border(medium, end.x, -path.dir) * -weight;
+        let (back, lift) = split(self.world, point, path.dir, here, dims);
+        if sink.interest().shapes[point.shape as usize] {
+            sink.surface(&point.material(), &lift);
+        }
+        near.u += back;
+        back * path.length
+    }
+
+    /// Sends the sensitivity `adjoint` to the velocity of the point at distance `t` of the ray that left
+    /// `node`.
+    pub(crate) fn carry_back<S: AdjointSink>(
+        &self,
+        record: &PathRecord,
+        node: usize,
+        t: f64,
+        adjoint: RgbVec,
+        sink: &mut S,
+    ) {
+        let (mut k, mut u, mut turn) = (node, adjoint, adjoint * t);
+        loop {
+            let node = &record.nodes[k];
+            if !node.carried {
+                return;
+            }
+            let Some(arrival) = &node.arrival else { break };
+            if let Some(Vertex { kind: Kind::Surface(point), .. }) = node.vertex() {
+                let here = SurfaceAdjoint { u, ..SurfaceAdjoint::default() };
+                let (back, lift) = split(self.world, point, arrival.dir, &here, Rgb::ZERO);
+                if sink.interest().shapes[point.shape as usize] {
+                    sink.surface(&point.material(), &lift);
+                }
+                u = back;
+            }
+            turn = u * arrival.distance;
+            k = arrival.parent as usize;
+        }
+        self.camera_ray(record, u, turn, sink);
+    }
+
+    /// Sends the sensitivities to the camera ray's origin and to the rate of its direction.
+    pub(super) fn camera_ray<S: AdjointSink>(
+        &self,
+        record: &PathRecord,
+        origin: RgbVec,
+        turn: RgbVec,
+        sink: &mut S,
+    ) {
+        if !sink.interest().sensor {
+            return;
+        }
+        let camera = &self.world.camera;
+        let gradient = |origin: Vec3, turn: Vec3| {
+            let mut g = camera.direction_gradient(record.nodes[0].wi, turn);
+            g.position += origin;
+            g
+        };
+        sink.sensor(&[
+            gradient(origin.r, turn.r),
+            gradient(origin.g, turn.g),
+            gradient(origin.b, turn.b),
+        ]);
+    }
+}
+
+/// Sensitivities of a point where a ray along `dir` lands, and `dims` to the ray's length: split into
+/// one to the ray's velocity there, and those of the surface.
+fn split(
+    world: &World,
+    point: &SurfacePoint,
+    dir: Vec3,
+    here: &SurfaceAdjoint,
+    dims: Rgb,
+) -> (RgbVec, SurfaceAdjoint) {
+    let slide = here.ns.map(|ns| world.normal_slide(point, ns));
+    let carried = here.u + slide;
+    let by_length = carried.dot(dir) + dims;
+    let along_normal = by_length.outer(point.ng / point.ng.dot(dir));
+    let lift = SurfaceAdjoint { u: along_normal - slide, j: Rgb::ZERO, ..*here };
+    (carried - along_normal, lift)
+}
