@@ -459,17 +459,11 @@ impl Layer {
 
     /// The sum of two independent estimates.
     pub(crate) fn plus(mut self, other: &Self) -> Self {
-        let add = |a: &mut Estimate, b: &Estimate| {
-            a.mean += b.mean;
-            a.stderr = (a.stderr * a.stderr + b.stderr * b.stderr).map(Real::sqrt);
-        };
-        for (a, b) in self.pixels.iter_mut().zip(&other.pixels) {
-            add(a, b);
+        let own = self.pixels.iter_mut().chain(&mut self.blocks);
+        for (a, b) in own.zip(other.pixels.iter().chain(&other.blocks)) {
+            *a = a.plus(b);
         }
-        for (a, b) in self.blocks.iter_mut().zip(&other.blocks) {
-            add(a, b);
-        }
-        add(&mut self.total, &other.total);
+        self.total = self.total.plus(&other.total);
         self
     }
 }

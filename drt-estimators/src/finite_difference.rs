@@ -17,7 +17,7 @@ use crate::scene::Scene;
 use crate::session::Control;
 use crate::settings::Settings;
 use crate::tangents;
-use crate::transport::World;
+use crate::transport::{Lit, World};
 
 /// Central differences of the image by each parameter, in the order of `parameters`: the difference
 /// of the images at value ± `step`, over 2 `step`.
@@ -49,7 +49,7 @@ pub fn finite_differences(
             moved[p].value += offset;
             let (scene, _) = tangents::apply(scene, &moved, settings.sensor)?;
             let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-            World::new(scene, settings.sensor, depth, middle)
+            World::new(scene, settings.sensor, depth, middle, Lit::All)
         };
         let middle = at(0.0, None)?;
         let worlds = [at(-step, Some(&middle))?, at(step, Some(&middle))?];

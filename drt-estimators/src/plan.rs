@@ -20,6 +20,8 @@ pub struct MediumPlan {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plan {
+    /// The estimators of derivatives, and the light that each looks at.
+    pub estimators: Vec<String>,
     /// Media that a path can meet.
     pub media: Vec<MediumPlan>,
     /// True when paths leave records to differentiate.
@@ -44,8 +46,45 @@ pub struct Plan {
     pub skipped: Vec<String>,
 }
 
+impl Plan {
+    /// Several estimators at once, each for some of the light.
+    pub(crate) fn together<'a>(plans: impl Iterator<Item = &'a Self>) -> Self {
+        plans.fold(Self::default(), |mut all, one| {
+            for (own, other) in [
+                (&mut all.record, one.record),
+                (&mut all.primary, one.primary),
+                (&mut all.borders, one.borders),
+                (&mut all.direct, one.direct),
+                (&mut all.indirect, one.indirect),
+                (&mut all.antithetic, one.antithetic),
+            ] {
+                *own |= other;
+            }
+            fn unite<T: Clone + PartialEq>(all: &mut Vec<T>, one: &[T]) {
+                for item in one {
+                    if !all.contains(item) {
+                        all.push(item.clone());
+                    }
+                }
+            }
+            unite(&mut all.media, &one.media);
+            unite(&mut all.estimators, &one.estimators);
+            unite(&mut all.moving_shapes, &one.moving_shapes);
+            unite(&mut all.flux_shapes, &one.flux_shapes);
+            unite(&mut all.skipped, &one.skipped);
+            for (own, other) in all.edges.iter_mut().zip(one.edges) {
+                *own = u64::max(*own, other);
+            }
+            all
+        })
+    }
+}
+
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for e in &self.estimators {
+            writeln!(f, "estimator: {e}")?;
+        }
         for m in &self.media {
             writeln!(f, "medium {}: {}", m.medium, m.tracking)?;
             for (parameter, motion) in &m.motion {

@@ -3,7 +3,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use drt_math::Rgb;
+use drt_math::{Real, Rgb};
 
 use crate::plan::Plan;
 
@@ -18,6 +18,15 @@ pub struct Estimate {
     pub mean: Rgb,
     /// The standard error of that mean.
     pub stderr: Rgb,
+}
+
+impl Estimate {
+    /// The sum with an independent estimate.
+    #[must_use]
+    pub fn plus(&self, o: &Self) -> Self {
+        let variance = self.stderr * self.stderr + o.stderr * o.stderr;
+        Self { mean: self.mean + o.mean, stderr: variance.map(Real::sqrt) }
+    }
 }
 
 /// An image with the standard error of each pixel, and of its 8×8 block means and total mean
@@ -80,6 +89,21 @@ pub struct Derivative {
     pub total: Layer,
     /// Its terms, where they were asked for.
     pub terms: Vec<(Term, Layer)>,
+}
+
+impl Derivative {
+    /// The sum with an independent estimate of another share of the light.
+    pub(crate) fn plus(&self, o: &Self) -> Self {
+        let mut terms = self.terms.clone();
+        for (term, layer) in &o.terms {
+            match terms.iter_mut().find(|(t, _)| t == term) {
+                Some((_, own)) => *own = own.clone().plus(layer),
+                None => terms.push((*term, layer.clone())),
+            }
+        }
+        terms.sort_by_key(|(t, _)| *t);
+        Self { name: self.name.clone(), total: self.total.clone().plus(&o.total), terms }
+    }
 }
 
 /// Work done, for tests that assert what was skipped.

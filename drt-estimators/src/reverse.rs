@@ -25,11 +25,11 @@ use crate::scene::{Scene, Target};
 use crate::scene_gradient::SceneGradient;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
-use crate::session::Control;
-use crate::settings::Settings;
+use crate::session::{Control, shares};
+use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::Checked;
 use crate::surface::BsdfParams;
-use crate::transport::{MaterialPoint, MediumNeed, Needs, World};
+use crate::transport::{Lit, MaterialPoint, MediumNeed, Needs, World};
 use crate::{Error, tangents};
 
 /// The gradient of a loss by the items `wanted`, with `adjoint` holding dLoss/dI for every pixel (row
@@ -64,17 +64,7 @@ pub fn gradient(
     settings.check()?;
     scene.check()?;
     let (scene, _) = tangents::apply(scene, &[], settings.sensor)?;
-    let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-    let mut world = World::new(scene, settings.sensor, depth, None)?;
-    let mut interest = interest(&world.scene, wanted);
-    let insides = TransposedInsides::new(&world, &interest, &settings.insides)?;
-    interest.volumes = insides.volumes();
-    let need = |w: &bool| if *w { MediumNeed::Vertices } else { MediumNeed::Nothing };
-    world.prepare_for_derivatives(Needs {
-        media: interest.media.iter().map(need).collect(),
-        bsdfs: interest.bsdfs.clone(),
-    });
-    let film = world.camera.film();
+    let film = scene.sensors[settings.sensor].item.sensor.film();
     if adjoint.len() != (film[0] * film[1]) as usize {
         return Err(Error::Setting {
             setting: "adjoint".into(),
@@ -86,6 +76,44 @@ pub fn gradient(
             ),
         });
     }
+    let mut total: Option<SceneGradient> = None;
+    for (settings, lit) in shares(&scene, settings) {
+        let part = gradient_of_share(&scene, wanted, &settings, lit, adjoint, control)?;
+        match &mut total {
+            Some(total) => total.add(&part),
+            None => total = Some(part),
+        }
+    }
+    total
+        .ok_or_else(|| Error::Setting { setting: "estimator".into(), reason: "has no part".into() })
+}
+
+/// The part that one estimator has in a gradient, by the light of some emitters.
+fn gradient_of_share(
+    scene: &Scene,
+    wanted: &[Target],
+    settings: &Settings,
+    lit: Lit,
+    adjoint: &[Rgb],
+    control: &dyn Control,
+) -> Result<SceneGradient, Error> {
+    let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
+    let mut world = World::new(scene.clone(), settings.sensor, depth, None, lit)?;
+    let mut interest = interest(&world.scene, wanted);
+    for (e, emitter) in scene.emitters.iter().enumerate() {
+        interest.emitters[e] &= lit.by(&emitter.item.emitter);
+        interest.moving_emitters[e] &= lit.by(&emitter.item.emitter);
+    }
+    let insides = match settings.estimator {
+        EstimatorKind::Radiative => TransposedInsides::at_rest(&world),
+        _ => TransposedInsides::new(&world, &interest, &settings.insides)?,
+    };
+    interest.volumes = insides.volumes();
+    let need = |w: &bool| if *w { MediumNeed::Vertices } else { MediumNeed::Nothing };
+    world.prepare_for_derivatives(Needs {
+        media: interest.media.iter().map(need).collect(),
+        bsdfs: interest.bsdfs.clone(),
+    });
     let prepared = Prepared::new(world, &interest, &insides.flux_shapes, settings)?;
     let run =
         Reverse { prepared: &prepared, interest: &interest, insides: &insides, settings, adjoint };

@@ -46,6 +46,12 @@ struct Transposed {
 pub(crate) struct InsideGradients(Vec<Vec<Vec3>>);
 
 impl TransposedInsides {
+    /// Nothing moves, and nothing else makes up for it.
+    pub(crate) fn at_rest(world: &World) -> Self {
+        let media = world.scene.media.iter().map(|_| None).collect();
+        Self { media, flux_shapes: Vec::new() }
+    }
+
     /// Chooses for every medium. Affine, blended and mean value insides count as not asked for.
     pub(crate) fn new(
         world: &World,

@@ -56,7 +56,7 @@ impl Tracer<'_> {
                         let vertex = Vertex { x, medium: Some(m), kind: Kind::Volume(None) };
                         return Travel::Volume(Flown {
                             vertex,
-                            coefficients: medium.coefficients(x),
+                            coefficients: world.coefficients(m, x),
                             t: interval.start + t,
                             arrival: passed * weight,
                             crossed: i,
@@ -98,7 +98,7 @@ impl Tracer<'_> {
         let tau = world.transmittance(origin, dir, part, &mut self.rng, &mut self.counters);
         Some(Flown {
             vertex: Vertex { x, medium: Some(medium), kind: Kind::Volume(None) },
-            coefficients: world.medium(medium).coefficients(x),
+            coefficients: world.coefficients(medium, x),
             t,
             arrival: tau / (density + free),
             crossed: part.crossings.len(),

@@ -13,6 +13,35 @@ use crate::Error;
 use crate::emitter::Emitter;
 use crate::scene::Scene;
 
+/// The emitters whose light is looked at. Light adds up, so that an estimator may leave some of it to
+/// another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Lit {
+    /// By all.
+    #[default]
+    All,
+    /// By surfaces, media and the environment.
+    Extended,
+    /// By points and directions.
+    Delta,
+}
+
+impl Lit {
+    /// Whether an emitter counts.
+    pub(crate) fn by(self, emitter: &Emitter) -> bool {
+        match self {
+            Self::All => true,
+            Self::Extended => !emitter.is_delta(),
+            Self::Delta => emitter.is_delta(),
+        }
+    }
+
+    /// Whether emission in media counts.
+    pub(crate) fn by_media(self) -> bool {
+        self != Self::Delta
+    }
+}
+
 /// One choice of the table.
 #[derive(Clone, Copy, Debug)]
 enum Entry {
@@ -94,6 +123,7 @@ impl LightTable {
         first_prim: &[u32],
         radius: f64,
         like: Option<&Self>,
+        lit: Lit,
     ) -> Result<Self, Error> {
         let mut entries = Vec::new();
         let mut weights = Vec::new();
@@ -102,6 +132,9 @@ impl LightTable {
         let mut area_radiance = alloc::vec![Rgb::ZERO; scene.emitters.len()];
         for (i, shape) in scene.shapes.iter().enumerate() {
             let Some(e) = shape.emitter else { continue };
+            if !lit.by(&scene.emitters[e].item.emitter) {
+                continue;
+            }
             let Emitter::Area { radiance } = scene.emitters[e].item.emitter else { continue };
             area_radiance[e] = radiance;
             let surface = shape.mesh.surface_area();
@@ -114,6 +147,9 @@ impl LightTable {
         }
         for (e, named) in scene.emitters.iter().enumerate() {
             let emitter = e as u32;
+            if !lit.by(&named.item.emitter) {
+                continue;
+            }
             match named.item.emitter {
                 Emitter::Area { .. } => continue,
                 Emitter::Constant { radiance } => {

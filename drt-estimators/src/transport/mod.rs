@@ -14,6 +14,7 @@ pub(crate) mod vertex;
 pub(crate) mod world;
 
 pub(crate) use adjoint::{Differentiator, Form};
+pub(crate) use lights::Lit;
 pub(crate) use record::{Carriers, PathRecord, Radiance, RadianceBySegments};
 pub(crate) use trace::Tracer;
 pub(crate) use vertex::{Kind, MaterialPoint, SurfacePoint, Vertex};

@@ -213,7 +213,7 @@ impl<'w> Tracer<'w> {
             }
             Kind::Volume(_) => {
                 let Some(m) = vertex.medium else { return };
-                let c = self.world.medium(m).coefficients(vertex.x);
+                let c = self.world.coefficients(m, vertex.x);
                 observer.contribution(0, c.source());
                 Some(c)
             }

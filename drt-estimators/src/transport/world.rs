@@ -5,9 +5,9 @@ use alloc::vec::Vec;
 
 use drt_geom::{Aabb, Hit, Mesh, Ray, Skip, TriangleBvh};
 use drt_math::{Rgb, Rng, Vec3};
-use drt_medium::{Homogeneous, Medium, TrackingStats};
+use drt_medium::{Coefficients, Homogeneous, Medium, TrackingStats};
 
-use super::lights::LightTable;
+use super::lights::{LightTable, Lit};
 use super::scatter::Scattering;
 use super::vertex::{Contact, Kind, SurfacePoint, Vertex};
 use crate::scene::{Scene, Shape, Surrounding};
@@ -122,6 +122,7 @@ pub(crate) enum Tracking {
 pub(crate) struct World {
     pub(crate) scene: Scene,
     pub(crate) lights: LightTable,
+    pub(crate) lit: Lit,
     /// The sensor in use and the medium around it.
     pub(crate) camera: crate::sensor::Sensor,
     pub(crate) camera_medium: Option<usize>,
@@ -155,6 +156,7 @@ impl World {
         sensor: usize,
         max_depth: Option<u32>,
         like: Option<&Self>,
+        lit: Lit,
     ) -> Result<Self, Error> {
         let camera = scene.sensors.get(sensor).ok_or_else(|| Error::Setting {
             setting: "sensor".into(),
@@ -199,10 +201,11 @@ impl World {
                 }
             })
             .collect();
-        let lights = LightTable::new(&scene, &first_prim, radius, like.map(|w| &w.lights))?;
+        let lights = LightTable::new(&scene, &first_prim, radius, like.map(|w| &w.lights), lit)?;
         let depth = max_depth.or(scene.integrator.max_depth).unwrap_or(u32::MAX);
         let mut world = Self {
             lights,
+            lit,
             camera: camera_item,
             camera_medium: None,
             tracking,
@@ -309,6 +312,15 @@ impl World {
 
     pub(crate) fn medium(&self, m: usize) -> &Medium {
         &self.scene.media[m].item
+    }
+
+    /// The coefficients of medium `m` at `x`, its emission as far as it counts.
+    pub(crate) fn coefficients(&self, m: usize, x: Vec3) -> Coefficients {
+        let mut c = self.medium(m).coefficients(x);
+        if !self.lit.by_media() {
+            c.emission = Rgb::ZERO;
+        }
+        c
     }
 
     pub(crate) fn bsdf_of(&self, shape: u32) -> &Bsdf {

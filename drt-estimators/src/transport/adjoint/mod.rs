@@ -510,7 +510,11 @@ impl<'w> Differentiator<'w> {
         let adjoint = CoefficientAdjoint {
             sigma_t: theta * (c.albedo * collected + (Rgb::ONE - c.albedo) * emission),
             albedo: theta * c.sigma_t * (collected - emission),
-            emission: theta * c.sigma_a() * emission_weight,
+            emission: if self.world.lit.by_media() {
+                theta * c.sigma_a() * emission_weight
+            } else {
+                Rgb::ZERO
+            },
             g: Rgb::ZERO,
         };
         if sink.interest().media[m] {

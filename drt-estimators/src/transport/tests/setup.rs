@@ -13,7 +13,7 @@ use crate::scene::Scene;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
-use crate::transport::{MaterialPoint, PathRecord, Tracer, World};
+use crate::transport::{Lit, MaterialPoint, PathRecord, Tracer, World};
 use crate::{inside, tangents};
 
 pub(super) fn set(name: &str, id: &str, property: &str, op: ValueChange) -> Parameter {
@@ -33,7 +33,7 @@ pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
     let (at_value, tangents) =
         tangents::apply(scene, core::slice::from_ref(parameter), 0).expect("a valid parameter");
     let mut world =
-        World::new(at_value, 0, scene.integrator.max_depth, None).expect("a valid scene");
+        World::new(at_value, 0, scene.integrator.max_depth, None, Lit::All).expect("a valid scene");
     let insides = inside::plan(&world, &tangents, &[]).expect("a valid scene");
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());

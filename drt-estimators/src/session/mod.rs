@@ -1,0 +1,181 @@
+//! A run: a scene prepared once, sampled in passes, with its results available at any time.
+
+mod describe;
+mod part;
+
+use alloc::vec::Vec;
+
+use drt_motion::Parameter;
+
+use part::{Part, Round};
+
+use crate::film::Blocks;
+use crate::parallel::Pool;
+use crate::plan::Plan;
+use crate::rendering::{Account, Rendering};
+use crate::scene::Scene;
+use crate::settings::{EstimatorKind, Settings};
+use crate::tangents;
+use crate::transport::Lit;
+use crate::{Error, Estimate};
+
+/// Watches and steers a run. Every method has a default that does nothing.
+pub trait Control: Sync {
+    /// True to stop soon; what is finished is kept.
+    fn cancelled(&self) -> bool {
+        false
+    }
+    /// Called with the part of the current call to [`Session::run`] that is done, from 0 to 1.
+    fn progress(&self, _done: f64) {}
+    /// Called with each finished piece of the image, in order.
+    fn tile(&self, _tile: &FinishedTile<'_>) {}
+}
+
+/// No control: run to the end in silence.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unattended;
+impl Control for Unattended {}
+
+/// Some neighbouring pixels after another round of samples.
+#[derive(Clone, Copy, Debug)]
+pub struct FinishedTile<'a> {
+    /// First pixel and one past the last, row by row from the top left.
+    pub pixels: (u32, u32),
+    /// The forward image there so far.
+    pub image: &'a [Estimate],
+}
+
+/// Between the seeds of the parts of a session, whose errors must not depend on each other.
+const SEED_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// A prepared scene and what has been accumulated for it.
+pub struct Session {
+    /// Light adds up: each looks at some of it.
+    parts: Vec<Part>,
+    plan: Plan,
+    /// Each derivative's terms are kept apart.
+    terms: bool,
+    blocks: Blocks,
+    samples: u32,
+    passes: u32,
+    complete: bool,
+    pool: Pool,
+}
+
+impl Session {
+    /// Prepares `scene` at the parameters' values; without parameters, only the image is computed.
+    ///
+    /// # Errors
+    /// When an effect does not fit its target, or the scene or a setting is unusable.
+    pub fn new(
+        scene: &Scene,
+        parameters: &[Parameter],
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        settings.check()?;
+        scene.check()?;
+        let (scene, tangents) = tangents::apply(scene, parameters, settings.sensor)?;
+        let mut parts = Vec::new();
+        for (settings, lit) in shares(&scene, settings) {
+            parts.push(Part::new(scene.clone(), tangents.clone(), settings, lit)?);
+        }
+        let plan = Plan::together(parts.iter().map(|p| &p.plan));
+        let size = scene.sensors[settings.sensor].item.sensor.film();
+        Ok(Self {
+            blocks: Blocks::new(size),
+            pool: Pool::new(settings.threads),
+            terms: settings.terms,
+            samples: 0,
+            passes: 0,
+            complete: true,
+            parts,
+            plan,
+        })
+    }
+
+    /// What will run and what is skipped.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Adds `spp` samples per pixel, and boundary samples in proportion. Returns false when `control`
+    /// cancelled it; the result then holds what was finished.
+    pub fn run(&mut self, spp: u32, control: &dyn Control) -> bool {
+        let Self { pool, blocks, passes, .. } = self;
+        let round = Round { pool, blocks, spp, passes: *passes, control };
+        let n = self.parts.len();
+        let (mut going, mut samples) = (true, 0);
+        for i in 0..n {
+            let (before, rest) = self.parts.split_at_mut(i);
+            let image = |pixels: core::ops::Range<u32>| sum_of(before, pixels);
+            let progress = |part| control.progress((i as f64 + part) / n as f64);
+            if going {
+                (samples, going) = rest[0].run(&round, &image, i + 1 == n, progress);
+            }
+        }
+        self.samples += samples;
+        self.passes += 1;
+        self.complete &= going;
+        going
+    }
+
+    /// The images so far.
+    #[must_use]
+    pub fn rendering(&self) -> Rendering {
+        let (first, others) = self.parts.split_first().expect("a session has parts");
+        let mut account = Account::default();
+        account.add(first.account.clone());
+        let mut image = first.image(&self.blocks);
+        let mut derivatives = first.derivatives(self.terms, &self.blocks);
+        for part in others {
+            account.add(part.account.clone());
+            image = image.plus(&part.image(&self.blocks));
+            let more = part.derivatives(self.terms, &self.blocks);
+            derivatives = derivatives.iter().zip(&more).map(|(a, b)| a.plus(b)).collect();
+        }
+        Rendering {
+            image,
+            derivatives,
+            plan: self.plan.clone(),
+            counters: account.counters,
+            non_finite: account.non_finite_count,
+            non_finite_examples: account.non_finite,
+            spp: self.samples,
+            complete: self.complete,
+        }
+    }
+}
+
+/// The image of several parts together, if there are any.
+fn sum_of(parts: &[Part], pixels: core::ops::Range<u32>) -> Option<Vec<Estimate>> {
+    let (first, others) = parts.split_first()?;
+    let mut sum = first.estimates(pixels.clone());
+    for part in others {
+        for (s, e) in sum.iter_mut().zip(part.estimates(pixels.clone())) {
+            *s = s.plus(&e);
+        }
+    }
+    Some(sum)
+}
+
+/// Which estimator looks at which light: points and directions do not fit the 2019 form (theory sheet
+/// §3), which leaves them to path space.
+pub(crate) fn shares(scene: &Scene, settings: &Settings) -> Vec<(Settings, Lit)> {
+    let emitters = || scene.emitters.iter().map(|e| &e.item.emitter);
+    let mut shares = Vec::new();
+    if settings.estimator == EstimatorKind::Radiative && emitters().any(|e| e.is_delta()) {
+        shares.push((EstimatorKind::PathSpace, Lit::Delta));
+        let media = scene.media.iter().any(|m| m.item.is_emissive());
+        if media || emitters().any(|e| !e.is_delta()) {
+            shares.push((EstimatorKind::Radiative, Lit::Extended));
+        }
+    } else {
+        shares.push((settings.estimator, Lit::All));
+    }
+    let with_seed = |(i, (estimator, lit)): (usize, _)| {
+        let seed = settings.seed.wrapping_add(SEED_STEP.wrapping_mul(i as u64));
+        (Settings { estimator, seed, ..settings.clone() }, lit)
+    };
+    shares.into_iter().enumerate().map(with_seed).collect()
+}
