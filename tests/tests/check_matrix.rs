@@ -25,15 +25,7 @@ macro_rules! stages {
     };
 }
 
-stages! {
-    surfaces: room room_box_filter standing knot gloss near_lamp;
-    lights: spot point_and_sun;
-    media: fog_box blob still_blob smoke glass dented_glass beam layers sheet ember;
-    deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed lantern
-        stirred_smoke still_smoke fine_milk fine_glass;
-    riding: riding riding_tight riding_inside riding_still riding_tetrahedral riding_mean_value;
-    caged: caged_milk caged_glass caged_solid;
-}
+drt_tests::every_stage!(stages);
 
 /// Of any mesh: `DRT_BODY=bunny.obj cargo test --release -p drt-tests --test check_matrix -- --ignored scanned`
 #[test]

@@ -7,6 +7,7 @@ pub mod caged;
 mod cell;
 pub mod deforming;
 pub(crate) mod effects;
+pub mod estimators;
 pub mod lights;
 pub mod media;
 pub mod riding;
@@ -17,3 +18,20 @@ mod verdict;
 pub use cell::{Cell, Stage};
 pub use set::Set;
 pub use verdict::{Fault, Row, Table, check};
+
+/// Hands the names of all stages, by module, to another macro.
+#[macro_export]
+macro_rules! every_stage {
+    ($with:ident) => {
+        $with! {
+            surfaces: room room_box_filter standing knot gloss near_lamp;
+            lights: spot point_and_sun;
+            media: fog_box blob still_blob smoke glass dented_glass beam layers sheet ember;
+            deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed
+                lantern stirred_smoke still_smoke fine_milk fine_glass;
+            riding: riding riding_tight riding_inside riding_still riding_tetrahedral
+                riding_mean_value;
+            caged: caged_milk caged_glass caged_solid;
+        }
+    };
+}

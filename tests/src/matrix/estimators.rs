@@ -1,0 +1,176 @@
+//! Derivatives by one estimator against those by another.
+
+use std::fmt;
+use std::time::Instant;
+
+use drt_estimators::{
+    Agreement, EstimatorKind, Layer, Rendering, Session, Settings, Term, Unattended, agreement,
+};
+use drt_motion::Parameter;
+
+use super::{Cell, Fault, Stage};
+use crate::Result;
+
+/// Terms from this part of the derivative on must not pass with the wrong sign.
+const SIGNIFICANT: f64 = 0.3;
+
+/// Samples per pixel of the first round.
+const ROUND: u32 = 1 << 7;
+
+/// How far to go.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Relative noise of each derivative that is enough.
+    pub noise: f64,
+    /// Seconds for each estimator and stage after which what has been found has to do.
+    pub seconds: f64,
+}
+
+/// One derivative by both.
+#[derive(Clone, Debug)]
+pub struct Pair {
+    /// Name of the stage.
+    pub stage: &'static str,
+    /// Name of the parameter.
+    pub parameter: String,
+    /// The comparison.
+    pub agreement: Agreement,
+    /// Relative noise of the one in question, and of the one it is compared with.
+    pub noise: [f64; 2],
+    /// Variance × time of the one in question over that of the other.
+    pub work: f64,
+    /// Block means of each term over the derivative, rms.
+    pub terms: Vec<(Term, f64)>,
+    /// What was planted, and the comparisons then.
+    pub faults: Vec<Fault>,
+    /// Contributions that were no numbers.
+    pub non_finite: u64,
+}
+
+impl Pair {
+    /// True when both agree, and what is clearly wrong does not.
+    #[must_use]
+    pub fn passes(&self) -> bool {
+        let unseen = |f: &Fault| f.agreement.agrees && self.could_see(f);
+        self.agreement.agrees && !self.faults.iter().any(unseen) && self.non_finite == 0
+    }
+
+    /// A term of the wrong sign is off by twice its size.
+    fn could_see(&self, fault: &Fault) -> bool {
+        let part = self.terms.iter().find(|(t, _)| *t == fault.term).map_or(0.0, |(_, p)| *p);
+        2.0 * part > 3.0 * self.noise[0].hypot(self.noise[1])
+    }
+}
+
+/// Compares every derivative of a stage by `kind` with that by path space.
+///
+/// # Errors
+/// When the library rejects the scene or a parameter.
+pub fn compare(stage: &Stage, kind: EstimatorKind, effort: Effort) -> Result<Vec<Pair>> {
+    let mut pairs = Vec::new();
+    let at_rest = |c: &Cell| c.parameter.value == 0.0;
+    for cells in stage.cells.chunk_by(|a, b| at_rest(a) && at_rest(b)) {
+        let parameters: Vec<Parameter> = cells.iter().map(|c| c.parameter.clone()).collect();
+        let run = |kind, seed| sample(stage, &parameters, kind, seed, effort);
+        // Other random numbers, so that the errors are independent.
+        let (reference, reference_seconds) = run(EstimatorKind::PathSpace, 7)?;
+        let (own, seconds) = run(kind, 19)?;
+        for (a, b) in own.derivatives.iter().zip(&reference.derivatives) {
+            let size = b.total.rms_value();
+            let noise = [&a.total, &b.total].map(|l| l.relative_noise(Some(size)));
+            let terms: Vec<(Term, f64)> =
+                a.terms.iter().map(|(t, l)| (*t, l.rms_value() / size)).collect();
+            let plant = |((term, part), (_, layer)): (&(Term, f64), &(Term, Layer))| {
+                (*part >= SIGNIFICANT).then(|| Fault {
+                    term: *term,
+                    factor: -1.0,
+                    agreement: agreement(&plus(&a.total, -2.0, layer), &b.total, None),
+                })
+            };
+            pairs.push(Pair {
+                stage: stage.name,
+                parameter: a.name.clone(),
+                agreement: agreement(&a.total, &b.total, None),
+                noise,
+                work: (noise[0] / noise[1]).powi(2) * seconds / reference_seconds,
+                faults: terms.iter().zip(&a.terms).filter_map(plant).collect(),
+                terms,
+                non_finite: own.non_finite,
+            });
+        }
+    }
+    Ok(pairs)
+}
+
+/// Samples until every derivative is precise enough, or the time is up.
+fn sample(
+    stage: &Stage,
+    parameters: &[Parameter],
+    estimator: EstimatorKind,
+    seed: u64,
+    effort: Effort,
+) -> Result<(Rendering, f64)> {
+    let settings = Settings {
+        threads: 1,
+        seed,
+        estimator,
+        terms: true,
+        insides: stage.insides.clone(),
+        ..Settings::default()
+    };
+    let mut session = Session::new(&stage.scene, parameters, &settings)?;
+    let start = Instant::now();
+    let mut count = ROUND;
+    loop {
+        session.run(count, &Unattended);
+        let (rendering, seconds) = (session.rendering(), start.elapsed().as_secs_f64());
+        let noise = rendering.derivatives.iter().map(|d| d.total.relative_noise(None));
+        let most = noise.fold(0.0, f64::max);
+        // The next round would double the time.
+        if most <= effort.noise || 2.0 * seconds > effort.seconds {
+            return Ok((rendering, seconds));
+        }
+        count = rendering.spp;
+    }
+}
+
+/// Block means of `a + factor b`, with the errors of `a`.
+fn plus(a: &Layer, factor: f64, b: &Layer) -> Layer {
+    let mut sum = a.clone();
+    for (s, b) in sum.blocks.iter_mut().zip(&b.blocks) {
+        s.mean += b.mean * factor;
+    }
+    sum
+}
+
+/// Pairs as a table for a reader of test output.
+#[derive(Clone, Copy, Debug)]
+pub struct Pairs<'a>(pub &'a [Pair]);
+
+impl fmt::Display for Pairs<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "\n{:<44}  rms z  max z  limit  noise   path    work  terms; faults and their rms z",
+            ""
+        )?;
+        for pair in self.0 {
+            let name = format!("{}: {}", pair.stage, pair.parameter);
+            let a = &pair.agreement;
+            write!(f, "{name:<44} {:>6.2} {:>6.2} {:>6.2}", a.rms_z, a.max_z, a.limit)?;
+            for noise in pair.noise {
+                write!(f, " {:>5.1}%", 100.0 * noise)?;
+            }
+            write!(f, " {:>7.3} ", pair.work)?;
+            for (term, part) in pair.terms.iter().filter(|(_, part)| *part >= 5e-3) {
+                write!(f, " {} {part:.2}", term.name())?;
+            }
+            for fault in &pair.faults {
+                let unclear = if pair.could_see(fault) { "" } else { " (in noise)" };
+                write!(f, "; {} × -1: {:.1}{unclear}", fault.term.name(), fault.agreement.rms_z)?;
+            }
+            writeln!(f, "{}", if pair.passes() { "" } else { "  <<< FAILS" })?;
+        }
+        Ok(())
+    }
+}

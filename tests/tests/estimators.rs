@@ -1,0 +1,48 @@
+//! Derivatives by the 2019 estimator against those by path space: every cell of the check matrix.
+//!
+//! The short check runs the representative cells, to the noise that a few seconds reach. All of them,
+//! to 1 % or for ten minutes each:
+//! `cargo test --release -p drt-tests --test estimators -- --ignored`
+
+use drt_estimators::EstimatorKind;
+use drt_tests::Result;
+use drt_tests::matrix::estimators::{Effort, Pairs, compare};
+use drt_tests::matrix::{Stage, caged, deforming, lights, media, riding, surfaces};
+
+fn run(stage: Result<Stage>, effort: Effort) {
+    let pairs = compare(&stage.unwrap(), EstimatorKind::Radiative, effort).unwrap();
+    println!("{}", Pairs(&pairs));
+    assert!(!pairs.is_empty(), "the stage has no such cells");
+    let failing = pairs.iter().filter(|pair| !pair.passes()).count();
+    assert_eq!(failing, 0, "{failing} of {} derivatives fail", pairs.len());
+}
+
+/// Seconds that each estimator has for a stage, unless `DRT_SECONDS` says otherwise.
+fn seconds(default: f64) -> f64 {
+    std::env::var("DRT_SECONDS").ok().and_then(|s| s.parse().ok()).unwrap_or(default)
+}
+
+fn short() -> Effort {
+    Effort { noise: 0.05, seconds: seconds(2.0) }
+}
+
+fn precise() -> Effort {
+    Effort { noise: 0.01, seconds: seconds(600.0) }
+}
+
+macro_rules! stages {
+    ($($room:ident: $($stage:ident)*;)*) => {
+        mod short {
+            $($(#[test] fn $stage() {
+                super::run(super::$room::$stage().map(super::Stage::short), super::short());
+            })*)*
+        }
+        mod all {
+            $($(#[test] #[ignore = "minutes"] fn $stage() {
+                super::run(super::$room::$stage(), super::precise());
+            })*)*
+        }
+    };
+}
+
+drt_tests::every_stage!(stages);
