@@ -47,12 +47,20 @@ log = true"#,
 follow = "box""#,
 ];
 
+const MEDIT: &str = "MeshVersionFormatted 2\nDimension 3\nVertices 5\n0 0 0 1\n1 0 0 1\n0 1 0 2\n\
+0 0 1 2\n0 0 -1 0\nTriangles 1\n1 2 3 9\nTetrahedra 2\n1 2 3 4 0\n1 3 2 5 0\nEnd\n";
+
+const TETGEN: &str = "5 3 1 1\n1 0 0 0 .5 1\n2 1 0 0 .5 1\n3 0 1 0 .5 1\n4 0 0 1 .5 1\n5 0 0 -1 .5 1\n\
+---\n2 4 1\n1 1 2 3 4 7\n2 1 2 3 5 8\n";
+
 fn main() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in ["obj", "ply", "vol", "xml", "toml"] {
+    for target in ["obj", "ply", "tet", "vol", "xml", "toml"] {
         std::fs::create_dir_all(corpus.join(target)).expect("the corpus folder can be written");
     }
     meshes(&corpus);
+    write(&corpus.join("tet/two.mesh"), MEDIT.as_bytes());
+    write(&corpus.join("tet/two.node"), TETGEN.as_bytes());
     volumes(&corpus.join("vol"));
     write(&corpus.join("xml/new.xml"), SCENE.as_bytes());
     write(&corpus.join("xml/old.xml"), OLD_SCENE.as_bytes());

@@ -11,8 +11,8 @@
 use std::path::{Path, PathBuf};
 
 use drt_estimators::{Scene, Session, Settings, Unattended};
-use drt_geom::{Mesh, Ray, Skip, TriangleBvh};
-use drt_math::vec3;
+use drt_geom::{Mesh, Ray, Skip, TetLocator, TetMesh, TriangleBvh};
+use drt_math::{Vec3, vec3};
 use drt_motion::Parameter;
 
 /// A scene with something of every kind for jobs to name.
@@ -29,6 +29,19 @@ pub fn use_mesh(mesh: &Mesh) {
         let ray = Ray::new(bvh.bounds().center(), vec3(0.3, -0.5, 0.8));
         let hit = bvh.closest(&ray, Skip::default());
         assert!(hit.is_none_or(|h| h.t.is_finite()));
+    }
+}
+
+/// Locates points in tetrahedra, where they are any that points can be located in.
+pub fn use_tetrahedra(mesh: &TetMesh) {
+    let _ = mesh.validate();
+    let Ok(locator) = TetLocator::new(mesh) else { return };
+    for tet in 0..mesh.tets.len() as u32 {
+        let middle = mesh.tet(tet).into_iter().fold(Vec3::ZERO, |sum, p| sum + p * 0.25);
+        for hint in [None, Some(tet)] {
+            let found = locator.locate(middle, hint);
+            assert!(found.is_none_or(|p| (p.tet as usize) < mesh.tets.len()));
+        }
     }
 }
 
