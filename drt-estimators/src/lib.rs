@@ -22,6 +22,8 @@ mod parallel;
 mod pixels;
 mod plan;
 mod prepared;
+#[allow(dead_code)]
+mod radiative;
 mod rendering;
 mod reverse;
 mod riding;
