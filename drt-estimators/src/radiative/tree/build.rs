@@ -1,12 +1,13 @@
 //! Putting segments that lie close together and face alike into the same nodes.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use drt_math::{Vec3, vec3};
 
 use super::node::Node;
 use super::piece::Piece;
-use super::{ARITY, EdgeTree, Segment, Span};
+use super::{EdgeTree, Segment, Span};
 
 impl EdgeTree {
     /// A tree over the segments that can count. `None` when there are none: when each is without
@@ -29,7 +30,7 @@ impl EdgeTree {
 type Key = [f32; 6];
 
 /// How much normals at right angles count in comparison with middles an extent apart.
-const TURN: f64 = 0.5;
+const TURN: f64 = 0.1;
 
 /// Orders the pieces and builds the nodes over them, each followed somewhere by its children in a
 /// row.
@@ -49,11 +50,12 @@ fn build(pieces: &mut Vec<Piece>) -> Option<Vec<Node>> {
     let mut next = 0;
     while next < nodes.len() {
         let span = spans[next];
-        if span.len > ARITY {
+        let parts = span.parts();
+        if parts > 0 {
             nodes[next].children = nodes.len() as u32;
-            halve(&mut order, &keys, span, 0..ARITY);
-            for k in 0..ARITY {
-                let part = span.part(k);
+            halve(&mut order, &keys, span, parts, 0..parts);
+            for k in 0..parts {
+                let part = span.part(k, parts);
                 nodes.push(node(&part, &order, pieces));
                 spans.push(part);
             }
@@ -66,19 +68,19 @@ fn build(pieces: &mut Vec<Piece>) -> Option<Vec<Node>> {
 
 /// Orders a span so that its parts are what halving at the median, along the widest axis each time,
 /// makes of it.
-fn halve(order: &mut [u32], keys: &[Key], span: Span, parts: core::ops::Range<usize>) {
+fn halve(order: &mut [u32], keys: &[Key], span: Span, count: usize, parts: Range<usize>) {
     if parts.len() < 2 {
         return;
     }
     let middle = (parts.start + parts.end) / 2;
-    let [begin, cut, end] = [parts.start, middle, parts.end].map(|k| span.part(k).begin);
+    let [begin, cut, end] = [parts.start, middle, parts.end].map(|k| span.part(k, count).begin);
     let part = &mut order[begin..end];
     let axis = widest(part, keys);
     part.select_nth_unstable_by(cut - begin, |i, j| {
         keys[*i as usize][axis].total_cmp(&keys[*j as usize][axis])
     });
-    halve(order, keys, span, parts.start..middle);
-    halve(order, keys, span, middle..parts.end);
+    halve(order, keys, span, count, parts.start..middle);
+    halve(order, keys, span, count, middle..parts.end);
 }
 
 fn widest(part: &[u32], keys: &[Key]) -> usize {

@@ -56,8 +56,11 @@ pub(crate) struct EdgeTree {
     largest: f64,
 }
 
-/// Children of a node, and segments of a leaf.
+/// Most children of a node.
 const ARITY: usize = 8;
+
+/// Most segments of a leaf.
+const LEAF: usize = 32;
 
 /// Consecutive pieces.
 #[derive(Clone, Copy, Debug)]
@@ -67,9 +70,15 @@ struct Span {
 }
 
 impl Span {
-    /// One of [`ARITY`] parts; of fewer pieces than that some parts are empty, none has two.
-    fn part(&self, k: usize) -> Self {
-        let [begin, end] = [k, k + 1].map(|k| self.begin + self.len * k / ARITY);
+    /// Into how many parts a node of so many segments is cut: as many as make the parts leaves, or
+    /// else [`ARITY`]; 0 for a leaf.
+    fn parts(&self) -> usize {
+        if self.len <= LEAF { 0 } else { self.len.div_ceil(LEAF).next_power_of_two().min(ARITY) }
+    }
+
+    /// One of `parts` parts.
+    fn part(&self, k: usize, parts: usize) -> Self {
+        let [begin, end] = [k, k + 1].map(|k| self.begin + self.len * k / parts);
         Self { begin, len: end - begin }
     }
 
@@ -103,9 +112,9 @@ impl EdgeTree {
     /// The density per length of [`EdgeTree::sample`].
     pub(crate) fn pdf(&self, view: &Viewpoint, edge: usize, u: f64) -> f64 {
         let Some(place) = self.places.get(edge).filter(|p| **p != u32::MAX) else { return 0.0 };
-        let found = self.descend(view, |span, _, _| {
-            (0..ARITY).find(|k| span.part(*k).range().contains(&(*place as usize)))
-        });
+        let place = *place as usize;
+        let found =
+            self.descend(view, |spans, _, _| spans.iter().position(|s| s.range().contains(&place)));
         found.map_or(0.0, |(_, pmf, stretch)| pmf * stretch.pdf(u))
     }
 
@@ -114,31 +123,37 @@ impl EdgeTree {
     fn descend(
         &self,
         view: &Viewpoint,
-        mut choose: impl FnMut(&Span, &[f64; ARITY], f64) -> Option<usize>,
+        mut choose: impl FnMut(&[Span], &[f64], f64) -> Option<usize>,
     ) -> Option<(usize, f64, Stretch)> {
         let slack = 1e-15 * (self.largest + view.x.max_abs());
-        let mut pick = |span: &Span, weights: &[f64; ARITY]| {
+        let mut pick = |spans: &[Span], weights: &[f64]| {
             let total: f64 = weights.iter().sum();
             if !(total > 0.0 && total.is_finite()) {
                 return None;
             }
-            let k = choose(span, weights, total)?;
-            (weights[k] > 0.0).then(|| (k, weights[k] / total))
+            let k = choose(spans, weights, total)?;
+            (weights[k] > 0.0).then(|| (spans[k], k, weights[k] / total))
         };
         let mut span = Span { begin: 0, len: self.pieces.len() };
         let mut node = &self.nodes[0];
         let mut pmf = 1.0;
+        let (mut weights, mut spans) = ([0.0; LEAF], [span; LEAF]);
         while node.children != 0 {
-            let children = &self.nodes[node.children as usize..][..ARITY];
-            let weights = core::array::from_fn(|k| children[k].importance(view, slack));
-            let (k, p) = pick(&span, &weights)?;
-            (node, span, pmf) = (&children[k], span.part(k), pmf * p);
+            let parts = span.parts();
+            let children = &self.nodes[node.children as usize..][..parts];
+            for (k, child) in children.iter().enumerate() {
+                weights[k] = child.importance(view, slack);
+                spans[k] = span.part(k, parts);
+            }
+            let (part, k, p) = pick(&spans[..parts], &weights[..parts])?;
+            (node, span, pmf) = (&children[k], part, pmf * p);
         }
-        let stretches: [Option<Stretch>; ARITY] = core::array::from_fn(|k| {
-            self.pieces[span.part(k).range()].first()?.stretch(view, slack)
-        });
-        let weights = core::array::from_fn(|k| stretches[k].as_ref().map_or(0.0, |s| s.weight));
-        let (k, p) = pick(&span, &weights)?;
-        Some((span.part(k).begin, pmf * p, stretches[k]?))
+        for (k, piece) in self.pieces[span.range()].iter().enumerate() {
+            weights[k] = piece.stretch(view, slack).map_or(0.0, |s| s.weight);
+            spans[k] = Span { begin: span.begin + k, len: 1 };
+        }
+        let (one, _, p) = pick(&spans[..span.len], &weights[..span.len])?;
+        let stretch = self.pieces[one.begin].stretch(view, slack)?;
+        Some((one.begin, pmf * p, stretch))
     }
 }

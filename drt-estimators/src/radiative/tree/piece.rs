@@ -92,11 +92,15 @@ impl Piece {
         let nearest = to - self.tangent * start;
         let kernel = Kernel::new(nearest.length(), start + part[0], start + part[1]);
         let cosine = view.normal.map_or(1.0, |(n, _)| {
-            let at = |u: f64| {
-                let d = nearest + self.tangent * kernel.sample(u);
+            let at = |t: f64| {
+                let d = nearest + self.tangent * t;
                 f64::abs(n.dot(d)) / d.length().max(f64::MIN_POSITIVE)
             };
-            f64::max(0.25 * at(0.0) + 0.5 * at(0.5) + 0.25 * at(1.0), ALMOST_NOTHING)
+            let [near, far] = part.map(|s| start + s);
+            f64::max(
+                0.25 * at(near) + 0.5 * at(kernel.sample(0.5)) + 0.25 * at(far),
+                ALMOST_NOTHING,
+            )
         });
         let weight = prior * kernel.mass * cosine;
         Some(Stretch { kernel, start, length: self.length, weight })

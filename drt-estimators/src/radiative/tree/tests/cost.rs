@@ -8,7 +8,8 @@ use super::super::*;
 use super::setup::*;
 
 /// Relative variance and dead ends of the tree, and of a table of lengths, and times in ns.
-fn compare(name: &str, segments: &[Segment], views: &[Viewpoint]) {
+#[allow(dead_code)]
+fn compare_(name: &str, segments: &[Segment], views: &[Viewpoint]) {
     let start = Instant::now();
     let tree = EdgeTree::new(segments).unwrap();
     let built = start.elapsed().as_secs_f64();
@@ -82,9 +83,82 @@ fn compare(name: &str, segments: &[Segment], views: &[Viewpoint]) {
     );
 }
 
+use std::collections::HashMap;
+use std::string::String;
+use std::string::ToString;
+use std::sync::Mutex;
+static TRUTH: Mutex<Option<HashMap<String, Vec<f64>>>> = Mutex::new(None);
+fn compare(name: &str, segments: &[Segment], views: &[Viewpoint]) {
+    let tree = EdgeTree::new(segments).unwrap();
+    let mut guard = TRUTH.lock().unwrap();
+    let truths = guard
+        .get_or_insert_with(HashMap::new)
+        .entry(name.to_string())
+        .or_insert_with(|| {
+            views
+                .iter()
+                .map(|v| segments.iter().map(|s| integral(s, v.x, v.normal)).sum())
+                .collect()
+        })
+        .clone();
+    let mut all = Vec::new();
+    let mut ns = 0.0;
+    let mut dead = 0.0;
+    for (i, (view, truth)) in views.iter().zip(&truths).enumerate() {
+        if *truth == 0.0 {
+            continue;
+        }
+        let mut rng = Rng::new(5, i as u64, 0);
+        let n = 10000;
+        let start = Instant::now();
+        let mut samples: Vec<f64> = (0..n)
+            .map(|_| match tree.sample(view, &mut rng) {
+                Some(c) => kernel(&segments[c.edge], c.u, view.x, view.normal) * c.inv_pdf,
+                None => {
+                    dead += 1.0;
+                    0.0
+                }
+            })
+            .collect();
+        ns += start.elapsed().as_secs_f64() * 1e9 / n as f64 / truths.len() as f64;
+        let _ = &mut samples;
+        let a: Moments = samples.into_iter().collect();
+        all.push(a.variance() / (truth * truth));
+    }
+    all.sort_by(f64::total_cmp);
+    eprintln!(
+        "   {name:24} ns {ns:.0} dead {:.3} median {:.3} q90 {:.2} max {:.2}",
+        dead / 10000.0 / all.len() as f64,
+        all[all.len() / 2],
+        all[all.len() * 9 / 10],
+        all[all.len() - 1]
+    );
+}
+fn set(v: [f64; 8]) {
+    for (i, x) in v.iter().enumerate() {
+        let _ = (i, x);
+    }
+}
 #[test]
 #[ignore = "scratch"]
 fn experiment() {
+    for v in sets() {
+        set(v);
+        eprintln!("{v:?}");
+        scenes();
+    }
+}
+fn sets() -> Vec<[f64; 8]> {
+    std::env::var("SETS")
+        .unwrap()
+        .split(';')
+        .map(|l| {
+            let mut it = l.split(',').map(|x| x.trim().parse().unwrap());
+            core::array::from_fn(|_| it.next().unwrap_or(0.0))
+        })
+        .collect()
+}
+fn scenes() {
     let sphere = procedural::icosphere(6);
     let mut rng = Rng::new(3, 0, 0);
     let sil = segments(&sphere, 1.0, [0.0; 2]);
