@@ -29,7 +29,7 @@ pub(crate) struct Jump {
     /// The medium around its shape, where that bounds none and it is the same everywhere.
     around: Option<Option<usize>>,
     /// How much a crease jumps, compared to a silhouette.
-    crease: f64,
+    pub(super) crease: f64,
 }
 
 /// A face at an edge.
@@ -131,6 +131,11 @@ impl Jumps {
         Some(f64::min(bend, 1.0) * if smooth { SMOOTH } else { 1.0 })
     }
 
+    /// The faces around an edge, and the unit vectors across it into them.
+    pub(super) fn faces(&self, jump: &Jump) -> impl Iterator<Item = (u32, Vec3)> {
+        self.blades[jump.fan.clone()].iter().map(|b| (b.prim, b.across))
+    }
+
     /// What a viewer sees of an edge; `w` is unit, from the edge to the viewer.
     pub(super) fn sides(&self, jump: &Jump, w: Vec3) -> Option<Sides> {
         let edge = &jump.edge;
@@ -161,11 +166,6 @@ impl Jumps {
 impl Jump {
     pub(super) fn length(&self) -> f64 {
         self.edge.line().1.length()
-    }
-
-    /// How much radiance jumps at most, roughly and relatively.
-    pub(super) fn prior(&self) -> f64 {
-        0.1 + 0.9 * self.crease
     }
 
     /// Weight of the edge seen from a point: the angle it subtends, less where it is a crease.

@@ -31,13 +31,16 @@
 mod difference;
 mod jumps;
 mod outlines;
+mod tree;
 mod vertices;
+mod views;
 
 use alloc::vec::Vec;
 
 use drt_math::{CdfTable, Rng};
 
 use jumps::{Jump, Jumps};
+use views::Views;
 
 use crate::Error;
 use crate::sensitivity::Interest;
@@ -48,18 +51,18 @@ use crate::transport::World;
 pub(crate) struct Radiative {
     jumps: Jumps,
     /// Seen from the camera.
-    camera: Option<Choice>,
+    camera: Option<Outlines>,
     /// Seen from a vertex that stands still.
-    moving: Option<Choice>,
+    moving: Option<Views>,
     /// Seen from a vertex that moves.
-    all: Option<Choice>,
+    all: Option<Views>,
     /// Edges that can be chosen, and edges in all.
     pub(crate) count: [u64; 2],
 }
 
-/// A choice of edges by weight, and of points on them by length.
+/// A choice of edges by how much of them the camera sees, and of points on them by length.
 #[derive(Debug)]
-struct Choice {
+struct Outlines {
     jumps: Vec<u32>,
     table: CdfTable,
 }
@@ -73,7 +76,7 @@ struct Chosen<'a> {
     inv_pdf: f64,
 }
 
-impl Choice {
+impl Outlines {
     fn new(jumps: &Jumps, weight: impl Fn(&Jump) -> f64) -> Result<Option<Self>, Error> {
         let weighed = jumps.list.iter().zip(0..).map(|(j, i)| (i, weight(j)));
         let (indices, weights): (Vec<u32>, Vec<f64>) = weighed.filter(|(_, w)| *w > 0.0).unzip();
@@ -101,12 +104,11 @@ impl Radiative {
         let jumps = Jumps::collect(world, &interest.shapes);
         let moves = |j: &Jump| interest.sensor || interest.shapes[j.edge.shape as usize];
         let eye = world.camera.position();
-        let camera = Choice::new(&jumps, |j| if moves(j) { j.seen_from(eye) } else { 0.0 })?;
-        let by_length = |j: &Jump| j.length() * j.prior();
-        let moving = Choice::new(&jumps, |j| if moves(j) { by_length(j) } else { 0.0 })?;
+        let camera = Outlines::new(&jumps, |j| if moves(j) { j.seen_from(eye) } else { 0.0 })?;
+        let moving = Views::new(world, &jumps, moves);
         // From a vertex on what moves, everything seems to.
         let any = interest.sensor || interest.shapes.contains(&true);
-        let all = Choice::new(&jumps, |j| if any { by_length(j) } else { 0.0 })?;
+        let all = Views::new(world, &jumps, |_| any);
         let count = [if any { jumps.list.len() as u64 } else { 0 }, jumps.all];
         Ok(Self { jumps, camera, moving, all, count })
     }

@@ -28,11 +28,12 @@ impl Radiative {
             scattering_vertex(recorded.vertex()?, &arrival.end, arrival.throughput)?;
         let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
         let choice = if recorded.carried { &self.all } else { &self.moving };
-        let chosen = choice.as_ref()?.sample(&self.jumps, &mut tracer.rng);
         tracer.counters.boundary_samples += 1;
+        let (world, wo) = (tracer.world, -arrival.dir);
+        let chosen = choice.as_ref()?.sample(world, &self.jumps, vertex, wo, &mut tracer.rng)?;
         let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex.x)?;
         let scattering = tracer.world.scattering(vertex)?;
-        let f = scattering.eval(-arrival.dir, -sight.w);
+        let f = scattering.eval(wo, -sight.w);
         if f.is_zero() {
             return None;
         }

@@ -1,0 +1,159 @@
+//! Points on edges for the boundary term of the 2019 form.
+
+mod build;
+mod kernel;
+mod node;
+mod piece;
+#[cfg(test)]
+mod tests;
+mod view;
+
+use alloc::vec::Vec;
+use core::ops::Range;
+
+use drt_math::{Rng, Vec3};
+
+use node::Node;
+use piece::{Piece, Stretch};
+pub(crate) use view::Viewpoint;
+
+/// An edge of a surface at which the radiance may jump that arrives at a point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Segment {
+    pub(crate) a: Vec3,
+    pub(crate) b: Vec3,
+    /// Unit normals of the two faces, on the sides that are one side of the surface; only the first
+    /// is looked at of an open edge.
+    pub(crate) faces: [Vec3; 2],
+    /// One face only: always a silhouette.
+    pub(crate) open: bool,
+    /// What to expect of the jump where the edge is a silhouette.
+    pub(crate) jump: f64,
+    /// The same where both faces are seen from the front, and where both are from the back.
+    pub(crate) crease: [f64; 2],
+}
+
+/// A point on an edge.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Chosen {
+    pub(crate) edge: usize,
+    /// How far it is from the edge's first end, as a part of its length.
+    pub(crate) u: f64,
+    /// 1 over the density per length.
+    pub(crate) inv_pdf: f64,
+}
+
+/// Edges to choose from.
+#[derive(Debug)]
+pub(crate) struct EdgeTree {
+    /// The root first.
+    nodes: Vec<Node>,
+    /// In the order of the leaves.
+    pieces: Vec<Piece>,
+    /// Where each of the caller's segments is among the pieces.
+    places: Vec<u32>,
+    /// Of all coordinates.
+    largest: f64,
+}
+
+/// Most children of a node.
+const ARITY: usize = 8;
+
+/// Most segments of a leaf.
+const LEAF: usize = 32;
+
+/// Consecutive pieces.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    begin: usize,
+    len: usize,
+}
+
+impl Span {
+    /// Into how many parts a node of so many segments is cut: as many as make the parts leaves, or
+    /// else [`ARITY`]; 0 for a leaf.
+    fn parts(&self) -> usize {
+        if self.len <= LEAF { 0 } else { self.len.div_ceil(LEAF).next_power_of_two().min(ARITY) }
+    }
+
+    /// One of `parts` parts.
+    fn part(&self, k: usize, parts: usize) -> Self {
+        let [begin, end] = [k, k + 1].map(|k| self.begin + self.len * k / parts);
+        Self { begin, len: end - begin }
+    }
+
+    fn range(&self) -> Range<usize> {
+        self.begin..self.begin + self.len
+    }
+}
+
+impl EdgeTree {
+    /// Draws a point.
+    pub(crate) fn sample(&self, view: &Viewpoint, rng: &mut Rng) -> Option<Chosen> {
+        let [mut u, along] = rng.next_2d();
+        let (place, pmf, stretch) = self.descend(view, |_, weights, total| {
+            let mut target = u * total;
+            let mut chosen = None;
+            for (k, w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+                chosen = Some(k);
+                if target < *w {
+                    u = target / w;
+                    break;
+                }
+                target -= w;
+            }
+            chosen
+        })?;
+        let t = stretch.sample(along);
+        let pdf = pmf * stretch.pdf(t);
+        Some(Chosen { edge: self.pieces[place].edge as usize, u: t, inv_pdf: 1.0 / pdf })
+    }
+
+    /// The density per length of [`EdgeTree::sample`].
+    pub(crate) fn pdf(&self, view: &Viewpoint, edge: usize, u: f64) -> f64 {
+        let Some(place) = self.places.get(edge).filter(|p| **p != u32::MAX) else { return 0.0 };
+        let place = *place as usize;
+        let found =
+            self.descend(view, |spans, _, _| spans.iter().position(|s| s.range().contains(&place)));
+        found.map_or(0.0, |(_, pmf, stretch)| pmf * stretch.pdf(u))
+    }
+
+    /// Goes down by choices among weights, and returns the piece, the probability, and what of the
+    /// piece counts.
+    fn descend(
+        &self,
+        view: &Viewpoint,
+        mut choose: impl FnMut(&[Span], &[f64], f64) -> Option<usize>,
+    ) -> Option<(usize, f64, Stretch)> {
+        let slack = 1e-15 * (self.largest + view.x.max_abs());
+        let mut pick = |spans: &[Span], weights: &[f64]| {
+            let total: f64 = weights.iter().sum();
+            if !(total > 0.0 && total.is_finite()) {
+                return None;
+            }
+            let k = choose(spans, weights, total)?;
+            (weights[k] > 0.0).then(|| (spans[k], k, weights[k] / total))
+        };
+        let mut span = Span { begin: 0, len: self.pieces.len() };
+        let mut node = &self.nodes[0];
+        let mut pmf = 1.0;
+        let (mut weights, mut spans) = ([0.0; LEAF], [span; LEAF]);
+        while node.children != 0 {
+            let parts = span.parts();
+            let children = &self.nodes[node.children as usize..][..parts];
+            for (k, child) in children.iter().enumerate() {
+                weights[k] = child.importance(view, slack);
+                spans[k] = span.part(k, parts);
+            }
+            let (part, k, p) = pick(&spans[..parts], &weights[..parts])?;
+            (node, span, pmf) = (&children[k], part, pmf * p);
+        }
+        for (k, piece) in self.pieces[span.range()].iter().enumerate() {
+            weights[k] = piece.stretch(view, slack).map_or(0.0, |s| s.weight);
+            spans[k] = Span { begin: span.begin + k, len: 1 };
+        }
+        let (one, _, p) = pick(&spans[..span.len], &weights[..span.len])?;
+        let stretch = self.pieces[one.begin].stretch(view, slack)?;
+        Some((one.begin, pmf * p, stretch))
+    }
+}

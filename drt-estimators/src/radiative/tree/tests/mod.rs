@@ -1,0 +1,6 @@
+//! Trees against brute force.
+
+extern crate std;
+
+mod cost;
+mod setup;

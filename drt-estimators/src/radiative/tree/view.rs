@@ -1,0 +1,113 @@
+//! Where edges are looked at from, and which way.
+
+use drt_math::{Real, Vec3};
+
+/// A point at which light scatters, as edges matter to it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Viewpoint {
+    pub(super) x: Vec3,
+    pub(super) normal: Option<(Vec3, bool)>,
+    pub(super) cone: Option<Cone>,
+}
+
+/// A cone of directions less than a right angle wide on either side.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cone {
+    /// Unit.
+    pub(super) axis: Vec3,
+    /// Of half its angle.
+    pub(super) cos: f64,
+    pub(super) sin: f64,
+}
+
+impl Viewpoint {
+    /// A point `x` on a surface with the unit `normal`, or in a volume where there is none. With the
+    /// normal goes whether light from below counts too; where it does not, what lies below the
+    /// plane through `x` does not matter.
+    pub(crate) fn new(x: Vec3, normal: Option<(Vec3, bool)>) -> Self {
+        Self { x, normal, cone: None }
+    }
+
+    /// The same, looking only towards a sphere: at the cone of directions that meet it. From inside
+    /// the sphere these are all.
+    pub(crate) fn toward(self, center: Vec3, radius: f64) -> Self {
+        let to = center - self.x;
+        let distance = to.length();
+        let sin = radius / distance;
+        let cone = (sin < 1.0).then(|| {
+            let cos = Real::sqrt((1.0 - sin) * (1.0 + sin));
+            Cone { axis: to / distance, cos, sin }
+        });
+        Self { cone, ..self }
+    }
+}
+
+impl Cone {
+    /// An estimate of how much of a box lies in the cone whose apex is at `-center`: 0 only if none
+    /// does, 1 where all does. `half` are half its edges.
+    ///
+    /// The plane that touches the cone in its line nearest to the box's centre has the cone on one
+    /// side. Where the box lies on the other they are apart.
+    pub(super) fn overlap(&self, center: Vec3, half: Vec3) -> f64 {
+        let (along, aside) = self.split(center);
+        let off = aside.length();
+        if off == 0.0 {
+            return if along > 0.0 { 1.0 } else { ALMOST_NOTHING };
+        }
+        let normal = aside * (self.cos / off) - self.axis * self.sin;
+        let outside = off * self.cos - along * self.sin;
+        let reach = normal.x.abs() * half.x + normal.y.abs() * half.y + normal.z.abs() * half.z;
+        if outside > reach * (1.0 + 1e-9) {
+            return 0.0;
+        }
+        if reach == 0.0 {
+            return 1.0;
+        }
+        let across = ((reach - outside) / (2.0 * reach)).clamp(ALMOST_NOTHING, 1.0);
+        across * f64::min(1.0, center.length() * self.sin / reach).max(ALMOST_NOTHING)
+    }
+
+    /// The part of a line inside the cone whose apex is the origin, from `near` to `far` along it:
+    /// an interval, as a cone is convex.
+    pub(super) fn clip(
+        &self,
+        from: Vec3,
+        tangent: Vec3,
+        [near, far]: [f64; 2],
+    ) -> Option<[f64; 2]> {
+        // Where the distance from the axis, times the cosine, is that along it, times the sine: on
+        // this nappe or the opposite one. And where the line leaves the half space before x.
+        let [(p, p_aside), (t, t_aside)] = [from, tangent].map(|v| self.split(v));
+        let (c2, s2) = (self.cos * self.cos, self.sin * self.sin);
+        let a = c2 * t_aside.length_squared() - s2 * t * t;
+        let half_b = c2 * p_aside.dot(t_aside) - s2 * p * t;
+        let c = c2 * p_aside.length_squared() - s2 * p * p;
+        let root = Real::sqrt(f64::max(0.0, half_b * half_b - a * c));
+        let q = -(half_b + if half_b < 0.0 { -root } else { root });
+        let mut cuts = [near, q / a, c / q, -p / t, far]
+            .map(|s| if s.is_nan() { near } else { s.clamp(near, far) });
+        cuts.sort_unstable_by(f64::total_cmp);
+        let mut inside = None;
+        for ends in cuts.windows(2).filter(|ends| ends[0] < ends[1]) {
+            if self.holds(from + tangent * (0.5 * (ends[0] + ends[1]))) {
+                let start = inside.map_or(ends[0], |[start, _]: [f64; 2]| start);
+                inside = Some([start, ends[1]]);
+            }
+        }
+        inside
+    }
+
+    fn holds(&self, p: Vec3) -> bool {
+        let (along, aside) = self.split(p);
+        along > 0.0 && aside.length() * self.cos <= along * self.sin
+    }
+
+    /// A vector's component along the axis, and the rest of it.
+    fn split(&self, v: Vec3) -> (f64, Vec3) {
+        let along = v.dot(self.axis);
+        (along, v - self.axis * along)
+    }
+}
+
+/// What a node that may count has left at least of its weight.
+pub(super) const ALMOST_NOTHING: f64 = 1e-6;
