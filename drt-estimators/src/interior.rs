@@ -9,7 +9,7 @@ use crate::boundary::shadow::{self, Shadows};
 use crate::contraction::Contraction;
 use crate::flux::{Flux, Reservoir};
 use crate::pixels::Sampler;
-use crate::radiative::Radiative;
+use crate::radiative::{Look, Radiative};
 use crate::rendering::{Account, Counters, NonFinite, Term};
 use crate::sensitivity::{AdjointSink, Functional, SurfaceAdjoint};
 use crate::transport::{Carriers, Differentiator, Form, PathRecord, Radiance, Tracer, World};
@@ -184,6 +184,9 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let s = camera.sample_view(pixel, u, derivative);
         let dir = s.direction;
         let weight = Rgb::splat(s.weight);
+        // What places an edge comes before what the path takes an unknown number of.
+        let mut rng = rng;
+        let look = self.along.edges.then(|| Look::new(&mut rng));
         self.tracer.rng = rng;
         let Some(sink) = &mut self.sink else {
             let mut radiance = Radiance::default();
@@ -220,9 +223,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             });
             self.record.flux = flux;
         }
-        if self.along.edges
-            && let Some(e) =
-                self.along.radiative.and_then(|r| r.edge(&mut self.tracer, &self.record))
+        if let (Some(radiative), Some(look)) = (self.along.radiative, look)
+            && let Some(e) = radiative.edge(&mut self.tracer, &self.record, &look)
         {
             if self.separate {
                 at += if e.node == 1 { n } else { 2 * n };

@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use crate::Error;
 use crate::boundary::{Boundary, Strategy};
+use crate::contraction::Motion;
 use crate::film::BATCHES;
 use crate::flux::Flux;
 use crate::interior::AlongRays;
@@ -27,15 +28,17 @@ pub(crate) struct Prepared {
 }
 
 impl Prepared {
+    /// `motion` tells which edges move how fast, where that is known.
     pub(crate) fn new(
         world: World,
         interest: &Interest,
         flux_shapes: &[usize],
         settings: &Settings,
+        motion: Option<&Motion>,
     ) -> Result<Self, Error> {
         let moving = interest.moves_geometry();
         if settings.estimator == EstimatorKind::Radiative {
-            return Self::spatial(world, interest);
+            return Self::spatial(world, interest, motion);
         }
         let boundary = if moving { Boundary::new(&world, interest)? } else { Boundary::default() };
         let flux = Flux::new(&world, flux_shapes, interest);
@@ -56,12 +59,15 @@ impl Prepared {
     }
 
     /// For the 2019 estimator.
-    fn spatial(world: World, interest: &Interest) -> Result<Self, Error> {
+    fn spatial(world: World, interest: &Interest, motion: Option<&Motion>) -> Result<Self, Error> {
         // Grids that move sweep over what stands still.
         let flux = (interest.moves_geometry() || interest.grids.contains(&true))
             .then(|| Flux::spatial(&world, interest))
             .flatten();
-        let radiative = Radiative::new(&world, interest)?;
+        let radiative = match motion {
+            Some(motion) => Radiative::new(&world, interest, motion.speeds(&world))?,
+            None => Radiative::new(&world, interest, |_| 1.0)?,
+        };
         let sources =
             if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
         let boundary = Boundary::default();

@@ -114,7 +114,7 @@ fn gradient_of_share(
         media: interest.media.iter().map(need).collect(),
         bsdfs: interest.bsdfs.clone(),
     });
-    let prepared = Prepared::new(world, &interest, &insides.flux_shapes, settings)?;
+    let prepared = Prepared::new(world, &interest, &insides.flux_shapes, settings, None)?;
     let run =
         Reverse { prepared: &prepared, interest: &interest, insides: &insides, settings, adjoint };
     let pool = Pool::new(settings.threads);

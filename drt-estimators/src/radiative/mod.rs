@@ -43,6 +43,7 @@ use jumps::{Jump, Jumps};
 use views::Views;
 
 use crate::Error;
+use crate::boundary::edges::Edge;
 use crate::sensitivity::Interest;
 use crate::transport::World;
 
@@ -65,6 +66,23 @@ pub(crate) struct Radiative {
 struct Outlines {
     jumps: Vec<u32>,
     table: CdfTable,
+}
+
+/// Uniform numbers for a look from a path at an edge.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Look {
+    /// For the vertex.
+    vertex: f64,
+    /// For where to look.
+    way: f64,
+    /// For the edge, and the point on it.
+    point: [f64; 2],
+}
+
+impl Look {
+    pub(crate) fn new(rng: &mut Rng) -> Self {
+        Self { vertex: rng.next_f64(), way: rng.next_f64(), point: rng.next_2d() }
+    }
 }
 
 /// A point on an edge.
@@ -99,16 +117,24 @@ impl Outlines {
 }
 
 impl Radiative {
-    /// The edges at which something can change of what is of interest.
-    pub(crate) fn new(world: &World, interest: &Interest) -> Result<Self, Error> {
+    /// The edges at which something can change of what is of interest, which move with some relative
+    /// `speed`.
+    pub(crate) fn new(
+        world: &World,
+        interest: &Interest,
+        speed: impl Fn(&Edge) -> f64,
+    ) -> Result<Self, Error> {
         let jumps = Jumps::collect(world, &interest.shapes);
-        let moves = |j: &Jump| interest.sensor || interest.shapes[j.edge.shape as usize];
+        let moves = |j: &Jump| {
+            if interest.shapes[j.edge.shape as usize] { speed(&j.edge) } else { 0.0 }
+        };
         let eye = world.camera.position();
-        let camera = Outlines::new(&jumps, |j| if moves(j) { j.seen_from(eye) } else { 0.0 })?;
+        let relative = |j: &Jump| if interest.sensor { 1.0 } else { moves(j) };
+        let camera = Outlines::new(&jumps, |j| relative(j) * j.seen_from(eye))?;
         let moving = Views::new(world, &jumps, moves);
         // From a vertex on what moves, everything seems to.
         let any = interest.sensor || interest.shapes.contains(&true);
-        let all = Views::new(world, &jumps, |_| any);
+        let all = Views::new(world, &jumps, |_| if any { 1.0 } else { 0.0 });
         let count = [if any { jumps.list.len() as u64 } else { 0 }, jumps.all];
         Ok(Self { jumps, camera, moving, all, count })
     }

@@ -2,8 +2,8 @@
 
 use drt_math::{Rgb, Vec3};
 
-use super::Radiative;
 use super::difference::Sight;
+use super::{Look, Radiative};
 use crate::transport::record::PathRecord;
 use crate::transport::trace::Endpoint;
 use crate::transport::{MaterialPoint, Tracer, Vertex};
@@ -20,8 +20,13 @@ pub(crate) struct Edged {
 
 impl Radiative {
     /// Takes one sample: one of the path's vertices, an edge that it sees.
-    pub(crate) fn edge(&self, tracer: &mut Tracer<'_>, record: &PathRecord) -> Option<Edged> {
-        let (node, chance) = self.choose_vertex(tracer, record)?;
+    pub(crate) fn edge(
+        &self,
+        tracer: &mut Tracer<'_>,
+        record: &PathRecord,
+        look: &Look,
+    ) -> Option<Edged> {
+        let (node, chance) = self.choose_vertex(tracer, record, look.vertex)?;
         let recorded = &record.nodes[node];
         let arrival = recorded.arrival.as_ref()?;
         let (vertex, theta) =
@@ -30,7 +35,7 @@ impl Radiative {
         let choice = if recorded.carried { &self.all } else { &self.moving };
         tracer.counters.boundary_samples += 1;
         let (world, wo) = (tracer.world, -arrival.dir);
-        let chosen = choice.as_ref()?.sample(world, &self.jumps, vertex, wo, &mut tracer.rng)?;
+        let chosen = choice.as_ref()?.sample(world, &self.jumps, vertex, wo, look)?;
         let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex.x)?;
         let scattering = tracer.world.scattering(vertex)?;
         let f = scattering.eval(wo, -sight.w);
@@ -46,9 +51,13 @@ impl Radiative {
     }
 
     /// Chooses a vertex that can see an edge change, in proportion to what passes it.
-    fn choose_vertex(&self, tracer: &mut Tracer<'_>, record: &PathRecord) -> Option<(usize, f64)> {
+    fn choose_vertex(
+        &self,
+        tracer: &Tracer<'_>,
+        record: &PathRecord,
+        mut u: f64,
+    ) -> Option<(usize, f64)> {
         let (mut total, mut chosen) = (0.0, None);
-        let mut u = tracer.rng.next_f64();
         for (k, node) in record.nodes.iter().enumerate().skip(1) {
             let choice = if node.carried { &self.all } else { &self.moving };
             let Some(arrival) = node.arrival.as_ref().filter(|_| choice.is_some()) else {

@@ -6,11 +6,11 @@
 
 use alloc::vec::Vec;
 
-use drt_math::{Rng, Vec3};
+use drt_math::Vec3;
 
-use super::Chosen;
 use super::jumps::{Jump, Jumps};
 use super::tree::{EdgeTree, Segment, Viewpoint};
+use super::{Chosen, Look};
 use crate::transport::{Kind, Vertex, World};
 
 /// The part of looks that go towards lamps.
@@ -39,16 +39,14 @@ pub(super) struct Views {
 }
 
 impl Views {
-    /// Of the jumps that matter; `None` without any.
-    pub(super) fn new(
-        world: &World,
-        jumps: &Jumps,
-        matters: impl Fn(&Jump) -> bool,
-    ) -> Option<Self> {
-        let kept: Vec<(u32, &Jump)> = (0..).zip(&jumps.list).filter(|(_, j)| matters(j)).collect();
-        let segments: Vec<_> = kept.iter().map(|(_, j)| segment(world, jumps, j)).collect();
+    /// Of the jumps that `matter`, in proportion to how much; `None` without any.
+    pub(super) fn new(world: &World, jumps: &Jumps, matter: impl Fn(&Jump) -> f64) -> Option<Self> {
+        let weighed = (0..).zip(&jumps.list).map(|(i, jump)| (i, jump, matter(jump)));
+        let kept = weighed.filter(|(_, _, weight)| *weight > 0.0);
+        let (indices, segments): (Vec<u32>, Vec<Segment>) =
+            kept.map(|(i, jump, weight)| (i, segment(world, jumps, jump, weight))).unzip();
         let tree = EdgeTree::new(&segments)?;
-        Some(Self { tree, jumps: kept.iter().map(|(i, _)| *i).collect(), lamps: lamps(world) })
+        Some(Self { tree, jumps: indices, lamps: lamps(world) })
     }
 
     /// Draws a point of an edge that `vertex` may see, from where it scatters light to `wo`.
@@ -58,19 +56,19 @@ impl Views {
         jumps: &'a Jumps,
         vertex: &Vertex,
         wo: Vec3,
-        rng: &mut Rng,
+        look: &Look,
     ) -> Option<Chosen<'a>> {
         let around = viewpoint(world, vertex, wo);
         let share = if self.lamps.is_empty() { 0.0 } else { TOWARD_LAMPS };
         let per_lamp = share / self.lamps.len().max(1) as f64;
-        let u = rng.next_f64();
+        let u = look.way;
         let view = if u < share {
             let lamp = self.lamps[((u / per_lamp) as usize).min(self.lamps.len() - 1)];
             around.toward(lamp.center, lamp.radius)
         } else {
             around
         };
-        let chosen = self.tree.sample(&view, rng)?;
+        let chosen = self.tree.sample(&view, look.point)?;
         let pdf = |view: &Viewpoint| self.tree.pdf(view, chosen.edge, chosen.u);
         let mut density = (1.0 - share) * pdf(&around);
         for lamp in &self.lamps {
@@ -92,13 +90,13 @@ fn viewpoint(world: &World, vertex: &Vertex, wo: Vec3) -> Viewpoint {
     Viewpoint::new(vertex.x, normal)
 }
 
-fn segment(world: &World, jumps: &Jumps, jump: &Jump) -> Segment {
+fn segment(world: &World, jumps: &Jumps, jump: &Jump, weight: f64) -> Segment {
     let (a, along) = jump.edge.line();
     let lamp = jumps.faces(jump).any(|(prim, _)| {
         let shape = world.point(prim, [0.0; 2]).0.shape;
         world.scene.shapes[shape as usize].emitter.is_some()
     });
-    let size = if lamp { LAMP } else { 1.0 };
+    let size = if lamp { LAMP * weight } else { weight };
     let across: Vec<Vec3> = jumps.faces(jump).map(|(_, across)| across).collect();
     // Both on one side of the surface, whatever the order of the faces' corners.
     let t = jump.edge.tangent;

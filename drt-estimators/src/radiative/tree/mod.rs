@@ -89,8 +89,7 @@ impl Span {
 
 impl EdgeTree {
     /// Draws a point.
-    pub(crate) fn sample(&self, view: &Viewpoint, rng: &mut Rng) -> Option<Chosen> {
-        let [mut u, along] = rng.next_2d();
+    pub(crate) fn sample(&self, view: &Viewpoint, [mut u, along]: [f64; 2]) -> Option<Chosen> {
         let (place, pmf, stretch) = self.descend(view, |_, weights, total| {
             let mut target = u * total;
             let mut chosen = None;
