@@ -29,13 +29,15 @@ pub(super) struct Kernel {
 const SHORTEST: f64 = 1e-100;
 
 impl Kernel {
-    /// The part from `near` to `far > near`. A line that passes nearer than a 1e-9th of the distance
+    /// The part from `near` to `far`, of which the latter should be more. A line that passes nearer than a 1e-9th of the distance
     /// of the part's farther end is taken to pass at that distance: sampling and density remain a
     /// pair, and finite.
     pub(super) fn new(distance: f64, near: f64, far: f64) -> Self {
         let d = distance.max(1e-9 * f64::max(near.abs(), far.abs())).max(SHORTEST);
         let [r0, r1] = [near, far].map(|t| radius(d, t));
-        let mass = if near * far < 0.0 {
+        let mass = if near >= far {
+            0.0
+        } else if near * far < 0.0 {
             (far / r1 - near / r0) / d
         } else {
             // The same without the difference of two numbers near one.

@@ -103,7 +103,7 @@ impl Piece {
             )
         });
         let weight = prior * kernel.mass * cosine;
-        Some(Stretch { kernel, start, length: self.length, weight })
+        (weight > 0.0).then_some(Stretch { kernel, start, length: self.length, weight })
     }
 }
 
