@@ -149,7 +149,7 @@ impl EdgeTree {
             (node, span, pmf) = (&children[k], part, pmf * p);
         }
         for (k, piece) in self.pieces[span.range()].iter().enumerate() {
-            weights[k] = piece.stretch(view, slack).map_or(0.0, |s| s.weight);
+            weights[k] = piece.stretch(view, slack).map_or(0.0, |s| s.weight(view));
             spans[k] = Span { begin: span.begin + k, len: 1 };
         }
         let (one, _, p) = pick(&spans[..span.len], &weights[..span.len])?;

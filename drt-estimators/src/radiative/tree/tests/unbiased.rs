@@ -52,10 +52,11 @@ fn together_with_samples_towards_a_light() {
         });
         let z = z_score(&estimate, truth);
         assert!(z.abs() < 4.0, "{z}: {estimate:?} for {truth}");
-        // Planted: the light's samples taken for what they would be without the cone.
+        // Planted: the light's samples said to be drawn every time.
         let faulty = moments(2, |rng| {
             let c = pick(rng)?;
-            Some(kernel(&segments[c.edge], c.u, view) / pdf(&c, view))
+            let both = 0.5 * pdf(&c, view) + pdf(&c, &light);
+            Some(kernel(&segments[c.edge], c.u, view) / both)
         });
         assert!(z_score(&faulty, truth).abs() > 4.0, "{faulty:?} for {truth}");
     }
