@@ -51,7 +51,7 @@ impl Kernel {
     }
 
     /// The middle, and nearly the integral, of a part that is half as long as it is far away or
-    /// shorter; `None` for others. It is off by an eighth at most.
+    /// shorter; `None` for others. It is off by a seventh at most.
     pub(super) fn of_short(&self) -> Option<(f64, f64)> {
         let Self { near, far, d } = *self;
         let (middle, length) = (0.5 * (near + far), far - near);
@@ -79,12 +79,8 @@ impl Kernel {
         t.clamp(near, far)
     }
 
-    /// Density per length; also a little outside, where rounding carried a sample.
+    /// Density per length on the part.
     pub(super) fn pdf(&self, t: f64) -> f64 {
-        let slip = 1e-12 * (self.far - self.near);
-        if !(self.near - slip..=self.far + slip).contains(&t) {
-            return 0.0;
-        }
         let r = radius(self.d, t);
         self.d / (r * r * r * self.mass())
     }

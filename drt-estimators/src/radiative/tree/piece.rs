@@ -122,9 +122,14 @@ impl Stretch {
         ((self.kernel.sample(u) - self.start) / self.length).clamp(0.0, 1.0)
     }
 
-    /// Density per length there.
+    /// Density per length there; 0 outside the part that counts.
     pub(super) fn pdf(&self, u: f64) -> f64 {
-        self.kernel.pdf(self.start + u * self.length)
+        let t = self.start + u * self.length;
+        let Kernel { near, far, .. } = self.kernel;
+        // Rounding must not carry a sample out of its own density's support.
+        let slip = 1e-14 * (self.start.abs() + self.length);
+        let within = (near - slip..=far + slip).contains(&t);
+        if within { self.kernel.pdf(t) } else { 0.0 }
     }
 }
 

@@ -8,7 +8,7 @@ use drt_math::vec3;
 use super::super::*;
 use super::setup::*;
 
-const SAMPLES: u32 = 60_000;
+const SAMPLES: u32 = 40_000;
 
 /// Parts of each segment that samples are counted in.
 const CELLS: usize = 3;
@@ -32,7 +32,7 @@ fn counts(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<u64> {
 
 /// The same expected from the density.
 fn expected(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<f64> {
-    const STEPS: usize = 200;
+    const STEPS: usize = 300;
     let mut expected = Vec::new();
     for (edge, s) in segments.iter().enumerate() {
         let step = 1.0 / (CELLS * STEPS) as f64;

@@ -122,8 +122,12 @@ fn segments_without_use_are_left_out() {
     assert_eq!(c.edge, bad.len());
     assert_eq!(tree.pdf(&view, 0, 0.5), 0.0);
     assert_eq!(tree.pdf(&view, 99, 0.5), 0.0);
-    let nowhere = Viewpoint::new(vec3(f64::NAN, 0.0, 0.0), None);
-    assert!(tree.sample(&nowhere, &mut Rng::new(1, 0, 0)).is_none());
+    for x in [f64::NAN, f64::INFINITY, 1e200] {
+        for normal in [None, Some((Vec3::Z, true)), Some((Vec3::Z, false))] {
+            let nowhere = Viewpoint::new(vec3(x, 0.0, 0.0), normal);
+            assert!(tree.sample(&nowhere, &mut Rng::new(1, 0, 0)).is_none());
+        }
+    }
 }
 
 #[test]
