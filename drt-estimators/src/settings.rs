@@ -64,6 +64,9 @@ pub struct Settings {
     pub max_depth: Option<Option<u32>>,
     /// Image points in pairs mirrored at the pixel's centre (theory: 2021 paper, §5.4).
     pub antithetic: bool,
+    /// Choose samples by what is known of how things move; the expected values do not change. Reverse
+    /// mode knows nothing of it, so that without guiding forward mode is its exact transpose.
+    pub guiding: bool,
     /// Finite-difference half step, in units of each parameter.
     pub step: f64,
     /// Names the random numbers: same seed, same pixel data.
@@ -85,6 +88,7 @@ impl Default for Settings {
             boundary_spp: None,
             max_depth: None,
             antithetic: true,
+            guiding: true,
             step: 1e-3,
             seed: 0,
             threads: 0,

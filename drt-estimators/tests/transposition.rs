@@ -7,7 +7,7 @@ use common::pairing::{pair, targets};
 use common::*;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
-use drt_estimators::{InsideKind, Scene, Session, Settings, Unattended, gradient};
+use drt_estimators::{EstimatorKind, InsideKind, Scene, Session, Settings, Unattended, gradient};
 use drt_geom::procedural;
 use drt_math::{Rgb, Rng, ValueChange, Vec3, vec3};
 use drt_motion::{Effect, GeometryChange, Parameter};
@@ -60,6 +60,13 @@ fn sides(scene: &Scene, parameter: &Parameter, settings: &Settings) -> (f64, f64
 }
 
 fn agree(name: &str, scene: &Scene, effects: Vec<Effect>, settings: &Settings) {
+    by_one_estimator(name, scene, effects.clone(), settings);
+    let radiative =
+        Settings { estimator: EstimatorKind::Radiative, guiding: false, ..settings.clone() };
+    by_one_estimator(&format!("{name}, radiative"), scene, effects, &radiative);
+}
+
+fn by_one_estimator(name: &str, scene: &Scene, effects: Vec<Effect>, settings: &Settings) {
     let parameter = parameter(name, 0.0, effects);
     let (forward, reverse, size) = sides(scene, &parameter, settings);
     let error = (forward - reverse).abs() / size;

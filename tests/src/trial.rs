@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use drt_estimators::{InsideKind, Session, Settings};
+use drt_estimators::{EstimatorKind, InsideKind, SceneEmitter, Session, Settings};
 use drt_motion::{Change, GeometryChange, Parameter};
 
 use crate::Result;
@@ -32,6 +32,8 @@ pub struct Trial {
     pub largest_of_case: f64,
     /// How the insides of its media move, where the plan is not to choose.
     pub insides: Option<InsideKind>,
+    /// Of its derivatives.
+    pub estimator: EstimatorKind,
 }
 
 impl Trial {
@@ -58,8 +60,17 @@ impl Trial {
             Detector::Radiance { .. } => crate::detector::RAY_BIAS,
             _ => 1e-9,
         };
-        let insides = None;
-        Ok(Self { name, built, unit: 1.0, value, parameters, bias, largest_of_case, insides })
+        Ok(Self {
+            name,
+            built,
+            unit: 1.0,
+            value,
+            parameters,
+            bias,
+            largest_of_case,
+            insides: None,
+            estimator: EstimatorKind::default(),
+        })
     }
 
     /// The same with insides that move in one way: `None` where that does not apply, or nothing moves
@@ -79,13 +90,31 @@ impl Trial {
         moves.then_some(trial)
     }
 
+    /// The same by the 2019 estimator; `None` where no light fits it, and path space does it all.
+    #[must_use]
+    pub fn by_radiative(mut self) -> Option<Self> {
+        self.name = format!("{}: radiative", self.name);
+        self.estimator = EstimatorKind::Radiative;
+        let delta = |e: &SceneEmitter| e.emitter.is_delta();
+        let emitters = self.built.scene.emitters.iter();
+        let emissive = self.built.scene.media.iter().any(|m| m.item.is_emissive());
+        let fits = emissive || emitters.clone().any(|e| !delta(&e.item));
+        fits.then_some(self)
+    }
+
     /// How it is run.
     #[must_use]
     pub fn settings(&self) -> Settings {
         let media = 0..self.built.scene.media.len();
         let insides = self.insides.iter().flat_map(|kind| media.clone().map(|m| (m, kind.clone())));
         // Tests run side by side; each keeps to one thread.
-        Settings { threads: 1, seed: 2021, insides: insides.collect(), ..Settings::default() }
+        Settings {
+            threads: 1,
+            seed: 2021,
+            insides: insides.collect(),
+            estimator: self.estimator,
+            ..Settings::default()
+        }
     }
 
     /// Everything a case asks for.

@@ -98,6 +98,22 @@ fn quickly_by_every_inside() {
     check_insides(&MOVING[1..], &quick);
 }
 
+/// The cases whose light fits the 2019 form. In the furnace filled with a medium all derivatives
+/// vanish by cancellation along endless paths: there the material form is the one to use.
+fn by_radiative(effort: &Effort) {
+    let file = OracleFile::read().unwrap();
+    let cases = file.cases.iter().filter(|c| c.kind != "furnace_closed_enclosure");
+    let all = cases.flat_map(|c| Trial::of_case(c).unwrap());
+    let trials: Vec<Trial> = all.filter_map(Trial::by_radiative).collect();
+    assert!(trials.len() > 10, "{} cases", trials.len());
+    judge(&trials, effort);
+}
+
+#[test]
+fn quickly_by_radiative() {
+    by_radiative(&Effort { noise: 0.02, near_zero: 1.0, of_case: false, samples: 1 << 20 });
+}
+
 macro_rules! kinds {
     ($($kind:ident: $noise:literal;)*) => {
         $(
@@ -115,6 +131,12 @@ macro_rules! kinds {
             #[ignore = "takes minutes"]
             fn by_every_inside() {
                 super::check_insides(&super::MOVING, &super::STRICT);
+            }
+
+            #[test]
+            #[ignore = "takes minutes"]
+            fn by_radiative() {
+                super::by_radiative(&super::STRICT);
             }
 
             $(

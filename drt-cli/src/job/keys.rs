@@ -34,8 +34,7 @@ pub(super) struct Estimator {
     pub(super) max_depth: Option<Spanned<i64>>,
     pub(super) antithetic: Option<bool>,
     /// Where guiding exists it does not change expected values.
-    #[serde(rename = "guiding")]
-    pub(super) _guiding: Option<bool>,
+    pub(super) guiding: Option<bool>,
     pub(super) step: Option<Spanned<f64>>,
 }
 

@@ -166,8 +166,17 @@ fn settings(
     scene: &Scene,
     parameters: &[Parameter<String>],
 ) -> Result<Settings, CliError> {
-    let keys::Estimator { kind, sampling, spp, boundary_spp, max_depth, antithetic, step, .. } =
-        &keys.estimator;
+    let keys::Estimator {
+        kind,
+        sampling,
+        spp,
+        boundary_spp,
+        max_depth,
+        antithetic,
+        guiding,
+        step,
+        ..
+    } = &keys.estimator;
     let mut settings = Settings::default();
     if let Some(name) = &keys.sensor {
         settings.sensor = find_sensor(scene, name.get_ref())
@@ -201,6 +210,7 @@ fn settings(
     }
     settings.insides = motions::insides(document, &keys.motion, folder, scene, parameters)?;
     settings.antithetic = antithetic.unwrap_or(settings.antithetic);
+    settings.guiding = guiding.unwrap_or(settings.guiding);
     if let Some(s) = step {
         settings.step = *s.get_ref();
         if !(settings.step > 0.0 && settings.step.is_finite()) {

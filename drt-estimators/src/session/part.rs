@@ -72,7 +72,8 @@ impl Part {
         let nothing = Interest::default();
         let interest = motion.as_ref().map_or(&nothing, |m| &m.interest);
         let flux_shapes = motion.as_ref().map_or(&[][..], |m| &m.insides.flux_shapes);
-        let prepared = Prepared::new(world, interest, flux_shapes, &settings, motion.as_ref())?;
+        let guide = motion.as_ref().filter(|_| settings.guiding);
+        let prepared = Prepared::new(world, interest, flux_shapes, &settings, guide)?;
         let plan = describe(&prepared, motion.as_ref());
         let size = prepared.world.camera.film();
         let parameters = motion.as_ref().map_or(0, Motion::parameters);

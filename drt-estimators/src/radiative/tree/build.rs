@@ -29,24 +29,23 @@ impl EdgeTree {
 /// its normals.
 type Key = [f32; 6];
 
-/// How much normals at right angles count in comparison with middles an extent apart.
+/// How much normals at right angles count in comparison with middles an extent apart. Measured on
+/// spheres, dented spheres and cubes: with more, near viewpoints suffer, and others gain little.
 const TURN: f64 = 0.1;
 
 /// Orders the pieces and builds the nodes over them, each followed somewhere by its children in a
 /// row.
 fn build(pieces: &mut Vec<Piece>) -> Option<Vec<Node>> {
-    let (keys, unit) = (keys(pieces), unit(pieces));
-    let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
-    let all = Span { begin: 0, len: order.len() };
-    let mut nodes = Vec::new();
-    let node = |span: &Span, order: &[u32], pieces: &[Piece]| {
-        Node::around(order[span.range()].iter().map(|i| &pieces[*i as usize]), unit)
-    };
-    if order.is_empty() {
+    if pieces.is_empty() {
         return None;
     }
-    let mut spans = alloc::vec![all];
-    nodes.push(node(&all, &order, pieces));
+    let (keys, unit) = (keys(pieces), unit(pieces));
+    let mut order: Vec<u32> = (0..pieces.len() as u32).collect();
+    let node = |span: &Span, order: &[u32]| {
+        Node::around(order[span.range()].iter().map(|i| &pieces[*i as usize]), unit)
+    };
+    let all = Span { begin: 0, len: order.len() };
+    let (mut nodes, mut spans) = (alloc::vec![node(&all, &order)], alloc::vec![all]);
     let mut next = 0;
     while next < nodes.len() {
         let span = spans[next];
@@ -56,7 +55,7 @@ fn build(pieces: &mut Vec<Piece>) -> Option<Vec<Node>> {
             halve(&mut order, &keys, span, parts, 0..parts);
             for k in 0..parts {
                 let part = span.part(k, parts);
-                nodes.push(node(&part, &order, pieces));
+                nodes.push(node(&part, &order));
                 spans.push(part);
             }
         }

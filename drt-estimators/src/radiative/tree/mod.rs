@@ -1,4 +1,39 @@
-//! Points on edges for the boundary term of the 2019 form.
+//! Points on edges for the boundary term of the 2019 form (theory sheet §3), drawn as they matter to
+//! one scattering vertex.
+//!
+//! At a vertex x that term is an integral over all edges at which the radiance arriving at x jumps,
+//!
+//! ```text
+//! ∫ f(x, w) ΔL(x, w) N.(y_dot - x_dot) sin(t, w) / r^2 dl(y),    r = |y - x|, w r = y - x,
+//! ```
+//!
+//! t the edge's tangent. Of a fine mesh few edges have a jump: silhouettes, one of whose faces turns
+//! its front to x and the other its back, and creases between faces with different radiance. Which an
+//! edge is depends on x alone and is the same all along it, since the planes of its faces hold it.
+//!
+//! [`EdgeTree`] is a hierarchy over edges in the space of positions and normals (Li et al. 2018,
+//! "Differentiable Monte Carlo Ray Tracing through Edge Sampling", section 4), gone through as
+//! hierarchies of lights are (Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with
+//! Adaptive Tree Splitting"): from the root down, one of a node's children is chosen in proportion
+//! to an estimate of
+//!
+//! ```text
+//! sum over its edges: weight × length × P(counts as silhouette or crease) × cosine / r^2,
+//! ```
+//!
+//! the cosine being that with the normal of a surface at x. The estimate ([`node`]) is positive
+//! wherever an edge below may count, so nothing is lost, and 0 where it is proved that none does.
+//! Nodes have eight children, as each choice adds its error and a wide tree has few of them; leaves
+//! weigh each of their edges by what it really amounts to ([`piece`]). On the edge the density is
+//! sin / r^2, exactly ([`kernel`]). A sample costs time logarithmic in the number of edges.
+//!
+//! A node may turn out to hold nothing that counts after all. Then there is no sample, and the
+//! density is what it is, with an integral below one: an estimate that takes such a sample for zero
+//! is unbiased.
+//!
+//! The same tree also draws points towards a light: those in the cone of directions to a sphere
+//! around it ([`Viewpoint::toward`]), with segments cut to their part in the cone. Both densities are
+//! known at any point, so that the two can share samples (Veach & Guibas 1995).
 
 mod build;
 mod kernel;
@@ -11,7 +46,7 @@ mod view;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use drt_math::{Rng, Vec3};
+use drt_math::Vec3;
 
 use node::Node;
 use piece::{Piece, Stretch};
@@ -43,7 +78,8 @@ pub(crate) struct Chosen {
     pub(crate) inv_pdf: f64,
 }
 
-/// Edges to choose from.
+/// Edges to choose from: a node's children are consecutive, and so are the pieces below it. Where
+/// they are follows from their number ([`Span`]), and a node takes up 96 bytes.
 #[derive(Debug)]
 pub(crate) struct EdgeTree {
     /// The root first.
@@ -59,7 +95,7 @@ pub(crate) struct EdgeTree {
 /// Most children of a node.
 const ARITY: usize = 8;
 
-/// Most segments of a leaf.
+/// Most segments of a leaf: among fewer than this, the number of silhouettes is hard to guess.
 const LEAF: usize = 32;
 
 /// Consecutive pieces.
@@ -88,7 +124,9 @@ impl Span {
 }
 
 impl EdgeTree {
-    /// Draws a point.
+    /// Draws a point with two uniform numbers: the first chooses the edge, what each choice leaves of
+    /// it serving for the next, the second the place on it. `None` where nothing counts, or nothing
+    /// is found (see [above](self)).
     pub(crate) fn sample(&self, view: &Viewpoint, [mut u, along]: [f64; 2]) -> Option<Chosen> {
         let (place, pmf, stretch) = self.descend(view, |_, weights, total| {
             let mut target = u * total;
@@ -124,6 +162,9 @@ impl EdgeTree {
         view: &Viewpoint,
         mut choose: impl FnMut(&[Span], &[f64], f64) -> Option<usize>,
     ) -> Option<(usize, f64, Stretch)> {
+        if !view.x.is_finite() {
+            return None;
+        }
         let slack = 1e-15 * (self.largest + view.x.max_abs());
         let mut pick = |spans: &[Span], weights: &[f64]| {
             let total: f64 = weights.iter().sum();
@@ -148,7 +189,7 @@ impl EdgeTree {
             (node, span, pmf) = (&children[k], part, pmf * p);
         }
         for (k, piece) in self.pieces[span.range()].iter().enumerate() {
-            weights[k] = piece.stretch(view, slack).map_or(0.0, |s| s.weight);
+            weights[k] = piece.stretch(view, slack).map_or(0.0, |s| s.weight(view));
             spans[k] = Span { begin: span.begin + k, len: 1 };
         }
         let (one, _, p) = pick(&spans[..span.len], &weights[..span.len])?;

@@ -31,8 +31,10 @@ pub(super) struct Stretch {
     /// Where the segment starts, measured along its line from where that is nearest to x.
     start: f64,
     length: f64,
-    /// In proportion to which it is chosen.
-    pub(super) weight: f64,
+    prior: f64,
+    /// From x to the nearest point of the line.
+    nearest: Vec3,
+    tangent: Vec3,
 }
 
 impl Piece {
@@ -91,31 +93,43 @@ impl Piece {
         let start = to.dot(self.tangent);
         let nearest = to - self.tangent * start;
         let kernel = Kernel::new(nearest.length(), start + part[0], start + part[1]);
-        let cosine = view.normal.map_or(1.0, |(n, _)| {
-            let at = |t: f64| {
-                let d = nearest + self.tangent * t;
-                f64::abs(n.dot(d)) / d.length().max(f64::MIN_POSITIVE)
-            };
-            let [near, far] = part.map(|s| start + s);
-            f64::max(
-                0.25 * at(near) + 0.5 * at(kernel.sample(0.5)) + 0.25 * at(far),
-                ALMOST_NOTHING,
-            )
-        });
-        let weight = prior * kernel.mass * cosine;
-        Some(Stretch { kernel, start, length: self.length, weight })
+        Some(Stretch { kernel, start, length: self.length, prior, nearest, tangent: self.tangent })
     }
 }
 
 impl Stretch {
+    /// What it amounts to: the kernel's integral, less than exactly where that makes no difference.
+    pub(super) fn weight(&self, view: &Viewpoint) -> f64 {
+        let Kernel { near, far, .. } = self.kernel;
+        let cosine = |t: f64| {
+            view.normal.map_or(1.0, |(n, _)| {
+                let to = self.nearest + self.tangent * t;
+                f64::abs(n.dot(to)) / to.length().max(f64::MIN_POSITIVE)
+            })
+        };
+        let (mass, cosine) = match self.kernel.of_short() {
+            Some((middle, mass)) => (mass, cosine(middle)),
+            None => {
+                let ends = 0.25 * (cosine(near) + cosine(far));
+                (self.kernel.mass(), ends + 0.5 * cosine(self.kernel.sample(0.5)))
+            }
+        };
+        self.prior * mass * cosine.max(ALMOST_NOTHING)
+    }
+
     /// How far along the segment the point for a uniform number lies, as a part of its length.
     pub(super) fn sample(&self, u: f64) -> f64 {
         ((self.kernel.sample(u) - self.start) / self.length).clamp(0.0, 1.0)
     }
 
-    /// Density per length there.
+    /// Density per length there; 0 outside the part that counts.
     pub(super) fn pdf(&self, u: f64) -> f64 {
-        self.kernel.pdf(self.start + u * self.length)
+        let t = self.start + u * self.length;
+        let Kernel { near, far, .. } = self.kernel;
+        // Rounding must not carry a sample out of its own density's support.
+        let slip = 1e-14 * (self.start.abs() + self.length);
+        let within = (near - slip..=far + slip).contains(&t);
+        if within { self.kernel.pdf(t) } else { 0.0 }
     }
 }
 

@@ -75,6 +75,13 @@ impl Cone {
         tangent: Vec3,
         [near, far]: [f64; 2],
     ) -> Option<[f64; 2]> {
+        let at = |s: f64| self.outside(from + tangent * s);
+        if at(near) <= 0.0 && at(far) <= 0.0 {
+            return Some([near, far]);
+        }
+        if at(0.5 * (near + far)) > 0.5 * (far - near) {
+            return None;
+        }
         // Where the distance from the axis, times the cosine, is that along it, times the sine: on
         // this nappe or the opposite one. And where the line leaves the half space before x.
         let [(p, p_aside), (t, t_aside)] = [from, tangent].map(|v| self.split(v));
@@ -89,7 +96,7 @@ impl Cone {
         cuts.sort_unstable_by(f64::total_cmp);
         let mut inside = None;
         for ends in cuts.windows(2).filter(|ends| ends[0] < ends[1]) {
-            if self.holds(from + tangent * (0.5 * (ends[0] + ends[1]))) {
+            if at(0.5 * (ends[0] + ends[1])) <= 0.0 {
                 let start = inside.map_or(ends[0], |[start, _]: [f64; 2]| start);
                 inside = Some([start, ends[1]]);
             }
@@ -97,9 +104,10 @@ impl Cone {
         inside
     }
 
-    fn holds(&self, p: Vec3) -> bool {
+    /// Positive outside the cone whose apex is the origin, and there at most the distance from it.
+    fn outside(&self, p: Vec3) -> f64 {
         let (along, aside) = self.split(p);
-        along > 0.0 && aside.length() * self.cos <= along * self.sin
+        aside.length() * self.cos - along * self.sin
     }
 
     /// A vector's component along the axis, and the rest of it.

@@ -3,4 +3,8 @@
 extern crate std;
 
 mod cost;
+mod density;
+mod lost;
+mod parts;
 mod setup;
+mod unbiased;

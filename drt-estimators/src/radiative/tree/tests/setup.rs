@@ -1,14 +1,17 @@
-//! Edges of meshes, and what they amount to without a tree.
+//! Edges of meshes, where they are seen from, and what they amount to without a tree.
 
 use alloc::vec::Vec;
 
-use drt_geom::{EdgeClass, Mesh, NONE, Topology};
-use drt_math::{Vec3, vec3};
+use drt_geom::{EdgeClass, Mesh, NONE, Topology, procedural};
+use drt_math::{Vec3, vec3, warp};
 
 use super::super::*;
 
-/// All edges of a mesh that are not flat, each counting as much as any other.
-pub(super) fn segments(mesh: &Mesh, jump: f64, crease: [f64; 2]) -> Vec<Segment> {
+/// Weights of silhouettes and creases that can be told apart.
+pub(super) const PRIORS: (f64, [f64; 2]) = (1.0, [0.3, 0.15]);
+
+/// All edges of a mesh that are not flat.
+pub(super) fn segments(mesh: &Mesh, (jump, crease): (f64, [f64; 2])) -> Vec<Segment> {
     let normal = |f: u32| {
         let [a, b, c] = mesh.triangles[f as usize].map(|v| mesh.positions[v as usize]);
         (b - a).cross(c - a).normalize()
@@ -25,7 +28,7 @@ pub(super) fn segments(mesh: &Mesh, jump: f64, crease: [f64; 2]) -> Vec<Segment>
 }
 
 /// The weight with which a segment counts, seen from `x`.
-pub(super) fn prior(s: &Segment, x: Vec3) -> f64 {
+fn prior(s: &Segment, x: Vec3) -> f64 {
     if s.open {
         return s.jump;
     }
@@ -36,51 +39,71 @@ pub(super) fn prior(s: &Segment, x: Vec3) -> f64 {
     }
 }
 
-/// The kernel at a point of a segment: angular speed times weight times cosine.
-pub(super) fn kernel(s: &Segment, u: f64, x: Vec3, normal: Option<(Vec3, bool)>) -> f64 {
-    let to = s.a.lerp(s.b, u) - x;
+/// What a point of a segment amounts to: angular speed times weight times cosine.
+pub(super) fn kernel(s: &Segment, u: f64, view: &Viewpoint) -> f64 {
+    let to = s.a.lerp(s.b, u) - view.x;
     let r = to.length();
     let sine = to.cross(s.b - s.a).length() / (r * (s.b - s.a).length());
-    let cosine = normal.map_or(1.0, |(n, through)| {
+    let cosine = view.normal.map_or(1.0, |(n, through)| {
         let c = n.dot(to) / r;
         if through { c.abs() } else { c.max(0.0) }
     });
-    prior(s, x) * sine * cosine / (r * r)
+    prior(s, view.x) * sine * cosine / (r * r)
 }
 
-/// Its integral along a segment.
-pub(super) fn integral(s: &Segment, x: Vec3, normal: Option<(Vec3, bool)>) -> f64 {
-    if prior(s, x) == 0.0 {
-        return 0.0;
-    }
-    // Steps even in the angle.
-    let t = (s.b - s.a).normalize();
-    let (t0, length) = ((s.a - x).dot(t), (s.b - s.a).length());
-    let d = (s.a - x - t * t0).length();
-    let steps = 64;
-    let (from, to) = ((t0 / d).atan(), ((t0 + length) / d).atan());
-    let step = (to - from) / f64::from(steps);
-    (0..steps)
-        .map(|i| {
+/// The integral over all segments of what their points amount to.
+pub(super) fn integral(segments: &[Segment], view: &Viewpoint) -> f64 {
+    const STEPS: u32 = 400;
+    let along = |s: &Segment| -> f64 {
+        // Steps of equal angles.
+        let length = (s.b - s.a).length();
+        let tangent = (s.b - s.a) / length;
+        let start = (s.a - view.x).dot(tangent);
+        let d = (s.a - view.x).reject(tangent).length();
+        let [from, to] = [start, start + length].map(|t| (t / d).atan());
+        let step = (to - from) / f64::from(STEPS);
+        let at = |i: u32| {
             let angle = from + (f64::from(i) + 0.5) * step;
-            let jacobian = d / (angle.cos() * angle.cos());
-            kernel(s, (d * angle.tan() - t0) / length, x, normal) * jacobian * step
-        })
-        .sum()
+            let per_angle = d / (angle.cos() * angle.cos());
+            kernel(s, (d * angle.tan() - start) / length, view) * per_angle * step
+        };
+        (0..STEPS).map(at).sum()
+    };
+    segments.iter().filter(|s| prior(s, view.x) > 0.0).map(along).sum()
+}
+
+/// The mesh scaled and then shifted.
+pub(super) fn moved(mesh: &Mesh, scale: f64, by: Vec3) -> Mesh {
+    let positions = mesh.positions.iter().map(|p| *p * scale + by).collect();
+    Mesh { positions, ..mesh.clone() }
 }
 
 pub(super) fn direction(rng: &mut Rng) -> Vec3 {
-    drt_math::warp::uniform_sphere(rng.next_2d())
+    warp::uniform_sphere(rng.next_2d())
 }
 
-pub(super) fn moved(mesh: &Mesh, scale: f64, by: Vec3) -> Mesh {
-    let mut mesh = mesh.clone();
-    for p in &mut mesh.positions {
-        *p = *p * scale + by;
-    }
-    mesh
-}
-
-pub(super) fn cloud(rng: &mut Rng) -> Vec3 {
+/// A point in the cube from -1 to 1.
+pub(super) fn in_cube(rng: &mut Rng) -> Vec3 {
     vec3(rng.next_f64(), rng.next_f64(), rng.next_f64()) * 2.0 - Vec3::splat(1.0)
+}
+
+/// A cube, a ball with dents, and a sheet with a rim.
+pub(super) fn still_life() -> Vec<Segment> {
+    let meshes = [
+        moved(&procedural::cube(), 0.5, vec3(-1.2, 0.1, 0.2)),
+        moved(&procedural::bumpy_sphere(2, 0.3, 4.0), 0.7, vec3(1.1, -0.3, 0.1)),
+        moved(&procedural::grid(3, 3), 2.0, vec3(0.0, 0.3, -1.1)),
+    ];
+    meshes.iter().flat_map(|m| segments(m, PRIORS)).collect()
+}
+
+/// From a volume, from a surface, and from one that lets light through; some way off all edges.
+pub(super) fn views() -> [Viewpoint; 4] {
+    let up = vec3(0.2, -0.1, 1.0).normalize();
+    [
+        Viewpoint::new(vec3(0.1, 0.2, 1.3), None),
+        Viewpoint::new(vec3(-0.2, 0.9, -0.4), Some((up, false))),
+        Viewpoint::new(vec3(0.3, -1.2, 0.15), Some((up, true))),
+        Viewpoint::new(vec3(-1.1, -0.9, -2.0), Some((vec3(0.0, 0.6, 0.8), false))),
+    ]
 }

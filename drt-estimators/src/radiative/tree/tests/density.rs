@@ -1,0 +1,78 @@
+//! Samples follow the density that is reported for them.
+
+use alloc::vec::Vec;
+
+use drt_math::testing::{SIGNIFICANCE, chi_square};
+use drt_math::vec3;
+
+use super::super::*;
+use super::setup::*;
+
+const SAMPLES: u32 = 40_000;
+
+/// Parts of each segment that samples are counted in.
+const CELLS: usize = 3;
+
+/// Samples by segment and part of it, and at the end those that found nothing.
+fn counts(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<u64> {
+    let mut counts = alloc::vec![0; CELLS * segments.len() + 1];
+    let nothing = counts.len() - 1;
+    let mut rng = Rng::new(11, 0, 0);
+    for _ in 0..SAMPLES {
+        let found = tree.sample(view, rng.next_2d());
+        let cell = found.map_or(nothing, |c| {
+            let product = c.inv_pdf * tree.pdf(view, c.edge, c.u);
+            assert!((product - 1.0).abs() < 1e-6, "{c:?}: {product}");
+            CELLS * c.edge + ((CELLS as f64 * c.u) as usize).min(CELLS - 1)
+        });
+        counts[cell] += 1;
+    }
+    counts
+}
+
+/// The same expected from the density.
+fn expected(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<f64> {
+    const STEPS: usize = 300;
+    let mut expected = Vec::new();
+    for (edge, s) in segments.iter().enumerate() {
+        let step = 1.0 / (CELLS * STEPS) as f64;
+        for cell in 0..CELLS {
+            let at = |i: usize| ((cell * STEPS + i) as f64 + 0.5) * step;
+            let sum: f64 = (0..STEPS).map(|i| tree.pdf(view, edge, at(i))).sum();
+            expected.push(sum * step * (s.b - s.a).length() * f64::from(SAMPLES));
+        }
+    }
+    let rest = f64::from(SAMPLES) - expected.iter().sum::<f64>();
+    // What quadrature leaves over where there is always something to find.
+    expected.push(f64::max(rest, 0.0));
+    expected
+}
+
+fn check(view: &Viewpoint) {
+    let segments = still_life();
+    let tree = EdgeTree::new(&segments).unwrap();
+    let counts = counts(&tree, view, &segments);
+    let expected = expected(&tree, view, &segments);
+    let total: f64 = expected.iter().sum::<f64>() / f64::from(SAMPLES);
+    assert!((total - 1.0).abs() < 2e-3, "{total} from {view:?}");
+    let p = chi_square(&counts, &expected);
+    assert!(p > SIGNIFICANCE, "{p}");
+    // A density that leans to one end of each segment by a little is told apart.
+    let lean = |i: usize, e: f64| e * (1.0 + 0.15 * ((i % CELLS) as f64 - 1.0));
+    let leaning: Vec<f64> = expected.iter().enumerate().map(|(i, e)| lean(i, *e)).collect();
+    let p = chi_square(&counts, &leaning);
+    assert!(p < SIGNIFICANCE, "{p}");
+}
+
+#[test]
+fn all_around() {
+    views().iter().for_each(check);
+}
+
+#[test]
+fn towards_a_light() {
+    let lights = [(vec3(1.3, -0.2, 0.4), 0.5), (vec3(-0.9, 0.6, -0.8), 0.9)];
+    for (view, (center, radius)) in views().iter().zip(lights.iter().cycle()) {
+        check(&view.toward(*center, *radius));
+    }
+}
