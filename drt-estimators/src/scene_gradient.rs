@@ -52,10 +52,12 @@ impl SceneGradient {
     }
 
     pub(crate) fn add(&mut self, o: &Self) {
-        fn each<T>(a: &mut [Option<T>], b: &[Option<T>], add: impl Fn(&mut T, &T)) {
+        fn each<T: Clone>(a: &mut [Option<T>], b: &[Option<T>], add: impl Fn(&mut T, &T)) {
             for (a, b) in a.iter_mut().zip(b) {
-                if let (Some(a), Some(b)) = (a, b) {
-                    add(a, b);
+                match (a, b) {
+                    (Some(a), Some(b)) => add(a, b),
+                    (a @ None, Some(b)) => *a = Some(b.clone()),
+                    (_, None) => {}
                 }
             }
         }

@@ -61,19 +61,17 @@ impl Views {
         let around = viewpoint(world, vertex, wo);
         let share = if self.lamps.is_empty() { 0.0 } else { TOWARD_LAMPS };
         let per_lamp = share / self.lamps.len().max(1) as f64;
-        let u = look.way;
-        let view = if u < share {
-            let lamp = self.lamps[((u / per_lamp) as usize).min(self.lamps.len() - 1)];
-            around.toward(lamp.center, lamp.radius)
-        } else {
-            around
-        };
+        // Lamps first, the rest last.
+        let way = ((look.way / per_lamp) as usize).min(self.lamps.len());
+        let ways = self.lamps.iter().map(|lamp| around.toward(lamp.center, lamp.radius));
+        let view = ways.clone().nth(way).unwrap_or(around);
         let chosen = self.tree.sample(&view, look.point)?;
-        let pdf = |view: &Viewpoint| self.tree.pdf(view, chosen.edge, chosen.u);
-        let mut density = (1.0 - share) * pdf(&around);
-        for lamp in &self.lamps {
-            density += per_lamp * pdf(&around.toward(lamp.center, lamp.radius));
-        }
+        let densities = ways.chain([around]).enumerate().map(|(i, view)| {
+            let chance = if i < self.lamps.len() { per_lamp } else { 1.0 - share };
+            let known = (i == way).then(|| 1.0 / chosen.inv_pdf);
+            chance * known.unwrap_or_else(|| self.tree.pdf(&view, chosen.edge, chosen.u))
+        });
+        let density: f64 = densities.sum();
         let jump = &jumps.list[self.jumps[chosen.edge] as usize];
         (density > 0.0).then(|| Chosen { jump, along: chosen.u, inv_pdf: 1.0 / density })
     }

@@ -87,7 +87,7 @@ fn time_of_a_sample() {
         let [general, toward] = [0, 20].map(|from| {
             let start = Instant::now();
             let found: f64 = (0..n)
-                .filter_map(|i| tree.sample(&views[from + i % 20], &mut rng))
+                .filter_map(|i| tree.sample(&views[from + i % 20], rng.next_2d()))
                 .map(|c| c.inv_pdf)
                 .sum();
             assert!(found.is_finite());

@@ -118,7 +118,7 @@ fn segments_without_use_are_left_out() {
     all.push(good);
     let tree = EdgeTree::new(&all).unwrap();
     let view = Viewpoint::new(vec3(0.3, 0.2, 2.0), None);
-    let c = tree.sample(&view, &mut Rng::new(1, 0, 0)).unwrap();
+    let c = tree.sample(&view, Rng::new(1, 0, 0).next_2d()).unwrap();
     assert_eq!(c.edge, bad.len());
     assert_eq!(tree.pdf(&view, 0, 0.5), 0.0);
     assert_eq!(tree.pdf(&view, 99, 0.5), 0.0);
