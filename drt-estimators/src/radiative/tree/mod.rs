@@ -11,7 +11,7 @@
 //! its front to x and the other its back, and creases between faces with different radiance. Which an
 //! edge is depends on x alone and is the same all along it, since the planes of its faces hold it.
 //!
-//! [`EdgeTree`] is a hierarchy over edges in the space of positions and normals (Li et al. 2018,
+//! [`EdgeTree`] is a hierarchy over edges with bounds of their positions and normals (Li et al. 2018,
 //! "Differentiable Monte Carlo Ray Tracing through Edge Sampling", section 4), gone through as
 //! hierarchies of lights are (Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with
 //! Adaptive Tree Splitting"): from the root down, one of a node's children is chosen in proportion
@@ -44,7 +44,6 @@ mod tests;
 mod view;
 
 use alloc::vec::Vec;
-use core::ops::Range;
 
 use drt_math::Vec3;
 
@@ -79,7 +78,7 @@ pub(crate) struct Chosen {
 }
 
 /// Edges to choose from: a node's children are consecutive, and so are the pieces below it. Where
-/// they are follows from their number ([`Span`]), and a node takes up 96 bytes.
+/// they are follows from where each ends; a node takes up 96 bytes.
 #[derive(Debug)]
 pub(crate) struct EdgeTree {
     /// The root first.
@@ -97,31 +96,6 @@ const ARITY: usize = 8;
 
 /// Most segments of a leaf: among fewer than this, the number of silhouettes is hard to guess.
 const LEAF: usize = 32;
-
-/// Consecutive pieces.
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    begin: usize,
-    len: usize,
-}
-
-impl Span {
-    /// Into how many parts a node of so many segments is cut: as many as make the parts leaves, or
-    /// else [`ARITY`]; 0 for a leaf.
-    fn parts(&self) -> usize {
-        if self.len <= LEAF { 0 } else { self.len.div_ceil(LEAF).next_power_of_two().min(ARITY) }
-    }
-
-    /// One of `parts` parts.
-    fn part(&self, k: usize, parts: usize) -> Self {
-        let [begin, end] = [k, k + 1].map(|k| self.begin + self.len * k / parts);
-        Self { begin, len: end - begin }
-    }
-
-    fn range(&self) -> Range<usize> {
-        self.begin..self.begin + self.len
-    }
-}
 
 impl EdgeTree {
     /// Draws a point with two uniform numbers: the first chooses the edge, what each choice leaves of
@@ -149,51 +123,52 @@ impl EdgeTree {
     /// The density per length of [`EdgeTree::sample`].
     pub(crate) fn pdf(&self, view: &Viewpoint, edge: usize, u: f64) -> f64 {
         let Some(place) = self.places.get(edge).filter(|p| **p != u32::MAX) else { return 0.0 };
-        let place = *place as usize;
-        let found =
-            self.descend(view, |spans, _, _| spans.iter().position(|s| s.range().contains(&place)));
+        let found = self.descend(view, |ends, _, _| ends.iter().position(|end| place < end));
         found.map_or(0.0, |(_, pmf, stretch)| pmf * stretch.pdf(u))
     }
 
-    /// Goes down by choices among weights, and returns the piece, the probability, and what of the
-    /// piece counts.
+    /// Goes down by choices among weights, of parts of the pieces that have the given ends. Returns
+    /// the piece, the probability, and what of the piece counts.
     fn descend(
         &self,
         view: &Viewpoint,
-        mut choose: impl FnMut(&[Span], &[f64], f64) -> Option<usize>,
+        mut choose: impl FnMut(&[u32], &[f64], f64) -> Option<usize>,
     ) -> Option<(usize, f64, Stretch)> {
         if !view.x.is_finite() {
             return None;
         }
         let slack = 1e-15 * (self.largest + view.x.max_abs());
-        let mut pick = |spans: &[Span], weights: &[f64]| {
+        let mut pick = |ends: &[u32], weights: &[f64]| {
             let total: f64 = weights.iter().sum();
             if !(total > 0.0 && total.is_finite()) {
                 return None;
             }
-            let k = choose(spans, weights, total)?;
-            (weights[k] > 0.0).then(|| (spans[k], k, weights[k] / total))
+            let k = choose(ends, weights, total)?;
+            (weights[k] > 0.0).then(|| (k, weights[k] / total))
         };
-        let mut span = Span { begin: 0, len: self.pieces.len() };
-        let mut node = &self.nodes[0];
+        let (mut node, mut begin) = (&self.nodes[0], 0);
         let mut pmf = 1.0;
-        let (mut weights, mut spans) = ([0.0; LEAF], [span; LEAF]);
+        let (mut weights, mut ends) = ([0.0; LEAF], [0; LEAF]);
         while node.children != 0 {
-            let parts = span.parts();
-            let children = &self.nodes[node.children as usize..][..parts];
-            for (k, child) in children.iter().enumerate() {
-                weights[k] = child.importance(view, slack);
-                spans[k] = span.part(k, parts);
+            let children = &self.nodes[node.children as usize..];
+            let mut count = 0;
+            for child in children {
+                (weights[count], ends[count]) = (child.importance(view, slack), child.end);
+                count += 1;
+                if child.end == node.end {
+                    break;
+                }
             }
-            let (part, k, p) = pick(&spans[..parts], &weights[..parts])?;
-            (node, span, pmf) = (&children[k], part, pmf * p);
+            let (k, p) = pick(&ends[..count], &weights[..count])?;
+            begin = if k > 0 { ends[k - 1] } else { begin };
+            (node, pmf) = (&children[k], pmf * p);
         }
-        for (k, piece) in self.pieces[span.range()].iter().enumerate() {
+        let pieces = &self.pieces[begin as usize..node.end as usize];
+        for (k, piece) in pieces.iter().enumerate() {
             weights[k] = piece.stretch(view, slack).map_or(0.0, |s| s.weight(view));
-            spans[k] = Span { begin: span.begin + k, len: 1 };
+            ends[k] = begin + k as u32 + 1;
         }
-        let (one, _, p) = pick(&spans[..span.len], &weights[..span.len])?;
-        let stretch = self.pieces[one.begin].stretch(view, slack)?;
-        Some((one.begin, pmf * p, stretch))
+        let (k, p) = pick(&ends[..pieces.len()], &weights[..pieces.len()])?;
+        Some((begin as usize + k, pmf * p, pieces[k].stretch(view, slack)?))
     }
 }

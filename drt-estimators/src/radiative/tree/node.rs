@@ -35,7 +35,7 @@ type Box32 = ([f32; 3], [f32; 3]);
 const LEAST_DENSITY: f64 = 0.05;
 
 /// From within a box, segments are taken to be as near as this part of half its diagonal, squared.
-/// Measured on spheres and cubes: with more, close edges come too seldom, with less, too often.
+/// Measured on spheres, dents and cubes: with more, close edges come too seldom, with less, too often.
 const CLOSEST: f64 = 0.04;
 
 /// Bounds of a set of segments.
@@ -58,11 +58,17 @@ pub(super) struct Node {
     crease: [f32; 2],
     /// The first of its children, 0 for none.
     pub(super) children: u32,
+    /// The segment after its last.
+    pub(super) end: u32,
 }
 
 impl Node {
-    /// Around some segments, with weights as multiples of `unit`.
-    pub(super) fn around<'a>(pieces: impl Iterator<Item = &'a Piece> + Clone, unit: f64) -> Self {
+    /// Around the segments before `end`, with weights as multiples of `unit`; without children.
+    pub(super) fn around<'a>(
+        pieces: impl Iterator<Item = &'a Piece> + Clone,
+        unit: f64,
+        end: u32,
+    ) -> Self {
         let points = pieces.clone().flat_map(|p| [p.a, p.end()]);
         let (center, half) = middle(points);
         let normals = pieces.clone().flat_map(|p| p.faces);
@@ -90,6 +96,7 @@ impl Node {
             turning: sum(&|p| p.jump * (p.faces[1] - p.faces[0]).length()),
             crease: [0, 1].map(|k| sum(&|p| p.crease[k])),
             children: 0,
+            end,
         }
     }
 

@@ -58,6 +58,11 @@ impl Piece {
         self.a + self.tangent * self.length
     }
 
+    /// Its length times what it counts for at most.
+    pub(super) fn most(&self) -> f64 {
+        self.length * self.jump.max(self.crease[0]).max(self.crease[1])
+    }
+
     /// Light it may let through or hide as seen from where it lies `to` away; all that it may where
     /// rounding leaves it open on which side of a face that is.
     fn prior(&self, to: Vec3, slack: f64) -> f64 {

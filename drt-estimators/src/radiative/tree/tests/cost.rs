@@ -59,6 +59,24 @@ fn silhouettes_of_a_fine_mesh() {
 }
 
 #[test]
+fn a_room_around_a_fine_mesh_costs_little() {
+    let ball = segments(&procedural::icosphere(5), (1.0, [0.0; 2]));
+    let room = segments(&moved(&procedural::cube(), 12.0, Vec3::ZERO), (0.0, [0.0, 0.2]));
+    let both = [ball.clone(), room].concat();
+    for view in outside(5) {
+        let [alone, inside] = [&ball, &both].map(|segments| {
+            let tree = EdgeTree::new(segments).unwrap();
+            let mut rng = Rng::new(7, 0, 0);
+            let value = |c: Chosen| kernel(&segments[c.edge], c.u, &view) * c.inv_pdf;
+            let m: Moments =
+                (0..20_000).map(|_| tree.sample(&view, &mut rng).map_or(0.0, value)).collect();
+            m.variance() / (m.mean() * m.mean())
+        });
+        assert!(inside < 2.0 * alone, "{inside} in the room, {alone} without it");
+    }
+}
+
+#[test]
 #[ignore = "measures time: run alone, with --release"]
 fn worth_of_a_sample() {
     let bumpy = procedural::bumpy_sphere(6, 0.15, 6.0);
@@ -73,9 +91,13 @@ fn worth_of_a_sample() {
 #[test]
 #[ignore = "measures time: run alone, with --release"]
 fn time_of_a_sample() {
-    for (subdivisions, priors) in
-        [(3, (1.0, [0.0; 2])), (5, (1.0, [0.0; 2])), (6, (1.0, [0.0; 2])), (6, PRIORS)]
-    {
+    for (subdivisions, priors) in [
+        (3, (1.0, [0.0; 2])),
+        (5, (1.0, [0.0; 2])),
+        (6, (1.0, [0.0; 2])),
+        (7, (1.0, [0.0; 2])),
+        (6, PRIORS),
+    ] {
         let segments = segments(&procedural::icosphere(subdivisions), priors);
         let start = Instant::now();
         let tree = EdgeTree::new(&segments).unwrap();

@@ -138,7 +138,7 @@ fn segments_in_one_place_or_plane_are_like_others() {
     let line = (0..5000).map(|i| Segment { b: one.a + vec3(1.0, 0.0, 0.0) * f64::from(i), ..one });
     for segments in [twins, flat, line.collect()] {
         let tree = EdgeTree::new(&segments).unwrap();
-        assert!(tree.nodes.len() < segments.len() / 8 + 2);
+        assert!(tree.nodes.len() < segments.len() / 8 + 2, "{}", tree.nodes.len());
         let view = Viewpoint::new(vec3(0.2, 0.1, 0.7), None);
         let mut rng = Rng::new(3, 0, 0);
         let mut hit: Vec<usize> =
