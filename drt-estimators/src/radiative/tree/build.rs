@@ -24,13 +24,14 @@ impl EdgeTree {
         if pieces.is_empty() {
             return None;
         }
-        let nodes = build(&mut pieces);
+        let unit = pieces.iter().map(Piece::most).sum();
+        let nodes = build(&mut pieces, unit);
         let mut places = alloc::vec![u32::MAX; segments.len()];
         for (piece, place) in pieces.iter().zip(0..) {
             places[piece.edge as usize] = place;
         }
         let largest = pieces.iter().fold(0.0, |m, p| f64::max(m, p.a.max_abs() + p.length));
-        Some(Self { nodes, pieces, places, largest })
+        Some(Self { nodes, pieces, places, unit, largest })
     }
 }
 
@@ -81,9 +82,8 @@ impl Span {
 }
 
 /// Orders the pieces and builds the nodes over them, the children of each in a row.
-fn build(pieces: &mut Vec<Piece>) -> Vec<Node> {
+fn build(pieces: &mut Vec<Piece>, unit: f64) -> Vec<Node> {
     let mut items = items(pieces);
-    let unit = pieces.iter().map(Piece::most).sum();
     let node = |span: &Span, items: &[Item]| {
         let below = items[span.begin..span.end].iter().map(|i| &pieces[i.piece as usize]);
         Node::around(below, unit, span.end as u32)

@@ -24,8 +24,9 @@
 //! the cosine being that with the normal of a surface at x. The estimate ([`node`]) is positive
 //! wherever an edge below may count, so nothing is lost, and 0 where it is proved that none does.
 //! Nodes have eight children, as each choice adds its error and a wide tree has few of them; leaves
-//! weigh each of their edges by what it really amounts to ([`piece`]). On the edge the density is
-//! sin / r^2, exactly ([`kernel`]). A sample costs time logarithmic in the number of edges.
+//! weigh each of their edges by what it really amounts to ([`piece`]), and so does a node with many
+//! segments for children with few. On the edge the density is sin / r^2, exactly ([`kernel`]). A
+//! sample costs time logarithmic in the number of edges.
 //!
 //! A node may turn out to hold nothing that counts after all. Then there is no sample, and the
 //! density is what it is, with an integral below one: an estimate that takes such a sample for zero
@@ -87,12 +88,17 @@ pub(crate) struct EdgeTree {
     pieces: Vec<Piece>,
     /// Where each of the caller's segments is among the pieces.
     places: Vec<u32>,
+    /// The weight in which the nodes count.
+    unit: f64,
     /// Of all coordinates.
     largest: f64,
 }
 
 /// Most children of a node.
 const ARITY: usize = 8;
+
+/// Evenly made choices in comparison with others.
+const EVEN: f64 = 0.1;
 
 /// Most segments of a leaf: among fewer than this, the number of silhouettes is hard to guess.
 const LEAF: usize = 32;
@@ -146,29 +152,48 @@ impl EdgeTree {
             let k = choose(ends, weights, total)?;
             (weights[k] > 0.0).then(|| (k, weights[k] / total))
         };
+        let weigh = |piece: &Piece| piece.stretch(view, slack).map_or(0.0, |s| s.weight(view));
         let (mut node, mut begin) = (&self.nodes[0], 0);
         let mut pmf = 1.0;
         let (mut weights, mut ends) = ([0.0; LEAF], [0; LEAF]);
         while node.children != 0 {
+            let many = (node.end - begin) as usize > ARITY * LEAF;
+            let (mut count, mut from) = (0, begin);
             let children = &self.nodes[node.children as usize..];
-            let mut count = 0;
             for child in children {
-                (weights[count], ends[count]) = (child.importance(view, slack), child.end);
+                weights[count] = if many && child.children == 0 {
+                    let few = &self.pieces[from as usize..child.end as usize];
+                    few.iter().map(weigh).sum::<f64>() / self.unit
+                } else {
+                    child.importance(view, slack)
+                };
+                (from, ends[count]) = (child.end, child.end);
                 count += 1;
                 if child.end == node.end {
                     break;
                 }
             }
+            even_out(&mut weights[..count]);
             let (k, p) = pick(&ends[..count], &weights[..count])?;
             begin = if k > 0 { ends[k - 1] } else { begin };
             (node, pmf) = (&children[k], pmf * p);
         }
         let pieces = &self.pieces[begin as usize..node.end as usize];
         for (k, piece) in pieces.iter().enumerate() {
-            weights[k] = piece.stretch(view, slack).map_or(0.0, |s| s.weight(view));
-            ends[k] = begin + k as u32 + 1;
+            (weights[k], ends[k]) = (weigh(piece), begin + k as u32 + 1);
         }
         let (k, p) = pick(&ends[..pieces.len()], &weights[..pieces.len()])?;
         Some((begin as usize + k, pmf * p, pieces[k].stretch(view, slack)?))
+    }
+}
+
+/// Gives children that may count an equal share in a part of all choices: an estimate may be too low
+/// by any factor, and variance grows with the greatest.
+fn even_out(weights: &mut [f64]) {
+    let total: f64 = weights.iter().sum();
+    let positive = weights.iter().filter(|w| **w > 0.0).count();
+    let share = EVEN * total / positive.max(1) as f64;
+    for w in weights.iter_mut().filter(|w| **w > 0.0) {
+        *w += share;
     }
 }

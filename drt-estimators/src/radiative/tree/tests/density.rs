@@ -32,7 +32,7 @@ fn counts(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<u64> {
 
 /// The same expected from the density.
 fn expected(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<f64> {
-    const STEPS: usize = 300;
+    const STEPS: usize = 200;
     let mut expected = Vec::new();
     for (edge, s) in segments.iter().enumerate() {
         let step = 1.0 / (CELLS * STEPS) as f64;
