@@ -58,7 +58,7 @@ def run(command, job, seed, options):
         size = f"{options.size}x{options.size}"
         line = [options.drt, command, job, "--quiet", "--threads", 1, "--size", size, "--spp", options.spp]
         line += ["--seed", seed, "--output", image, "--digest", digest]
-        if options.kind:
+        if options.kind and command == "grad":
             line += ["--set", f"estimator.kind={options.kind}"]
         if options.max_depth is not None:
             line += ["--max-depth", options.max_depth]
