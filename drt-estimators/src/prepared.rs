@@ -37,7 +37,7 @@ impl Prepared {
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
         let moving = interest.moves_geometry();
-        if settings.estimator == EstimatorKind::Radiative {
+        if settings.estimator == EstimatorKind::Radiative && interest.any() {
             return Self::spatial(world, interest, motion);
         }
         let boundary = if moving { Boundary::new(&world, interest)? } else { Boundary::default() };

@@ -30,7 +30,9 @@ const LIGHT: Vec3 = Vec3 { x: 1.2, y: 0.4, z: -0.3 };
 fn field(bodies: &[Mesh]) -> TetrahedralField {
     let surfaces: Vec<&Mesh> = bodies.iter().collect();
     let input = TetrahedralizeInput { surfaces: &surfaces, points: &[LIGHT], margin: 0.5 };
-    TetrahedralField::new(tetrahedralize(&input).unwrap()).unwrap()
+    let mut made = tetrahedralize(&input).unwrap();
+    made.remove_slivers(&surfaces);
+    TetrahedralField::new(made).unwrap()
 }
 
 fn wobble(rng: &mut Rng, mesh: &Mesh) -> SurfaceMotion {
@@ -140,5 +142,36 @@ fn who_is_left_behind() {
         let left = field.left_behind(&velocities, &carriers);
         assert_eq!(!left.is_empty(), leaves, "{velocity:?}: {left:?}");
         assert!(left.iter().all(|s| *s < 2), "{left:?}");
+    }
+}
+
+/// On a surface the field is that of the surface, whichever way its flat faces are cut into triangles.
+#[test]
+fn surfaces_are_followed_everywhere() {
+    let mut rng = Rng::new(17, 0, 0);
+    let body = |angle: f64| {
+        let turned = Mat3::rotation(vec3(0.3, 1.0, 0.2).normalize(), angle);
+        let place = Affine { linear: turned * 0.8, translation: Vec3::ZERO };
+        procedural::cube().transform(&place)
+    };
+    let mut worst: f64 = 0.0;
+    for angle in [0.0, 0.4, 1.0, 2.2] {
+        let mesh = body(angle);
+        let motion = wobble(&mut rng, &mesh);
+        let field = field(core::slice::from_ref(&mesh));
+        let carrier = Carrier { mesh: &mesh, motion: &motion };
+        let velocities = field.velocities(&[carrier], &[Vec3::ZERO]);
+        for triangle in 0..mesh.triangles.len() as u32 {
+            for _ in 0..20 {
+                let [b, c] = rng.next_2d();
+                let bary = if b + c > 1.0 { [1.0 - b, 1.0 - c] } else { [b, c] };
+                let at = drt_motion::SurfacePoint { triangle, bary };
+                let [p, q, r] = mesh.triangle(triangle);
+                let x = p * (1.0 - bary[0] - bary[1]) + q * bary[0] + r * bary[1];
+                let off = field.place(x).jet(&velocities).u - motion.velocity(&mesh, &at);
+                worst = worst.max(off.max_abs());
+            }
+        }
+        assert!(worst < 1e-9, "{angle}: off by {worst}");
     }
 }

@@ -29,7 +29,7 @@ pub(super) fn around(
 ) -> Result<TetrahedralField, Error> {
     let surfaces: Vec<&Mesh> = shapes.iter().map(|s| &*world.scene.shapes[*s].mesh).collect();
     let input = TetrahedralizeInput { surfaces: &surfaces, points, margin: MARGIN };
-    let made = tetrahedralize(&input).map_err(|e| {
+    let mut made = tetrahedralize(&input).map_err(|e| {
         let named = |t: SurfaceTriangle| {
             alloc::format!(
                 "triangle {} of {}",
@@ -48,6 +48,9 @@ pub(super) fn around(
         };
         unusable(world, medium, alloc::format!("no tetrahedra fill it: {reason}"))
     })?;
+    // A flat face is cut in two ways by a sliver that lies on it: on its far side velocities would be
+    // those of another surface.
+    made.remove_slivers(&surfaces);
     TetrahedralField::new(made).map_err(|e| unusable(world, medium, e))
 }
 
