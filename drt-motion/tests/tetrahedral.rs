@@ -31,7 +31,7 @@ fn field(bodies: &[Mesh]) -> TetrahedralField {
     let surfaces: Vec<&Mesh> = bodies.iter().collect();
     let input = TetrahedralizeInput { surfaces: &surfaces, points: &[LIGHT], margin: 0.5 };
     let mut made = tetrahedralize(&input).unwrap();
-    made.remove_slivers(&surfaces);
+    made.remove_flat(&surfaces);
     TetrahedralField::new(made).unwrap()
 }
 

@@ -48,9 +48,8 @@ pub(super) fn around(
         };
         unusable(world, medium, alloc::format!("no tetrahedra fill it: {reason}"))
     })?;
-    // A flat face is cut in two ways by a sliver that lies on it: on its far side velocities would be
-    // those of another surface.
-    made.remove_slivers(&surfaces);
+    // Beyond one that lies on a flat face, velocities would be those of another surface.
+    made.remove_flat(&surfaces);
     TetrahedralField::new(made).map_err(|e| unusable(world, medium, e))
 }
 

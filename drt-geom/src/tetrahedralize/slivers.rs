@@ -16,6 +16,8 @@ use crate::{Mesh, TetMesh, TetVertexOrigin, weld};
 
 /// A tetrahedron is good enough from this least height on, in parts of its longest edge.
 const GOOD: f64 = 0.15;
+/// Below this it has none.
+const FLAT: f64 = 1e-6;
 /// Below this least height a further vertex is worth it.
 const SLIVER: f64 = 1e-3;
 /// What a change may leave behind at worst: well above the rounding of a height.
@@ -37,6 +39,24 @@ impl Tetrahedralization {
     /// # Panics
     /// When it was made from other surfaces.
     pub fn remove_slivers(&mut self, surfaces: &[&Mesh]) {
+        self.exchange_below(GOOD, surfaces);
+    }
+
+    /// Exchanges only tetrahedra without any height to speak of. Where four vertices of a flat face are
+    /// in one plane but for rounding, one of these lies on the face, and beyond it the face is cut into
+    /// triangles another way.
+    ///
+    /// # Panics
+    /// When it was made from other surfaces.
+    pub fn remove_flat(&mut self, surfaces: &[&Mesh]) {
+        self.exchange_below(FLAT, surfaces);
+    }
+
+    fn exchange_below(&mut self, good: f64, surfaces: &[&Mesh]) {
+        let is_bad = |tet: [Vec3; 4]| quality(tet) < good;
+        if !(0..self.mesh.tets.len() as u32).any(|t| is_bad(self.mesh.tet(t))) {
+            return;
+        }
         let triangles = self.triangles_of_vertices(surfaces);
         let mut around = alloc::vec![Vec::new(); self.mesh.positions.len()];
         for (t, tet) in (0..).zip(&self.mesh.tets) {
@@ -47,7 +67,7 @@ impl Tetrahedralization {
         for _ in 0..ROUNDS {
             let mut bad: Vec<(f64, u32)> = (0..complex.tets.len() as u32)
                 .map(|t| (complex.quality(complex.tets[t as usize]), t))
-                .filter(|(q, _)| *q < GOOD)
+                .filter(|(q, _)| *q < good)
                 .collect();
             bad.sort_by(|a, b| a.0.total_cmp(&b.0));
             let same = |t: u32, q: f64, c: &Complex| c.quality(c.tets[t as usize]) == q;
@@ -123,14 +143,7 @@ impl Complex {
 
     /// The same where the next vertex would be at `place`.
     fn quality_with(&self, tet: [u32; 4], place: Vec3) -> f64 {
-        let [a, b, c, d] = tet.map(|v| self.positions.get(v as usize).copied().unwrap_or(place));
-        let (e1, e2, e3) = (b - a, c - a, d - a);
-        let volume = e1.cross(e2).dot(e3);
-        let areas = [e1.cross(e2), e2.cross(e3), e3.cross(e1), (c - b).cross(d - b)];
-        let area = areas.iter().fold(0.0, |m, n| f64::max(m, n.length_squared()));
-        let edges = [e1, e2, e3, c - b, d - b, d - c];
-        let edge = edges.iter().fold(0.0, |m, e| f64::max(m, e.length_squared()));
-        volume / Real::sqrt(area * edge)
+        quality(tet.map(|v| self.positions.get(v as usize).copied().unwrap_or(place)))
     }
 
     /// Exchanges a tetrahedron together with neighbours; false when nothing better is found.
@@ -297,6 +310,17 @@ impl Complex {
             tet.iter().for_each(|v| self.around[*v as usize].push(t));
         }
     }
+}
+
+/// The least height of a tetrahedron over its longest edge; negative for one that is turned over.
+fn quality([a, b, c, d]: [Vec3; 4]) -> f64 {
+    let (e1, e2, e3) = (b - a, c - a, d - a);
+    let volume = e1.cross(e2).dot(e3);
+    let areas = [e1.cross(e2), e2.cross(e3), e3.cross(e1), (c - b).cross(d - b)];
+    let area = areas.iter().fold(0.0, |m, n| f64::max(m, n.length_squared()));
+    let edges = [e1, e2, e3, c - b, d - b, d - c];
+    let edge = edges.iter().fold(0.0, |m, e| f64::max(m, e.length_squared()));
+    volume / Real::sqrt(area * edge)
 }
 
 /// The tetrahedra over and under a triangle of the ring around an edge.
