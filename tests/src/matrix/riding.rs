@@ -98,7 +98,8 @@ pub fn riding() -> Result<Stage> {
     stage.cells.extend([
         Cell::new("a corner", [moves("box", corner), rides()]),
         Cell::new("turns and bends", [spin.clone(), bend(), rides()]),
-        Cell::new("turned and bent", [spin, bend(), rides()]).at(0.2),
+        // With a step of 0.06 the difference itself is off: rms z 1.48, then 1.00 and 0.83 as it halves.
+        Cell::new("turned and bent", [spin, bend(), rides()]).at(0.2).step(0.03),
         Cell::new("bent, thins", [bend(), rides(), add("smoke", "sigma_t", [-0.5, 0.3, 0.4])])
             .at(0.15),
     ]);
