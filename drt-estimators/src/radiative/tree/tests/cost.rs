@@ -4,7 +4,7 @@ use std::time::Instant;
 use std::{eprintln, vec::Vec};
 
 use drt_geom::{Mesh, procedural};
-use drt_math::{CdfTable, Moments};
+use drt_math::{CdfTable, Moments, Rng};
 
 use super::super::*;
 use super::setup::*;
@@ -69,7 +69,7 @@ fn a_room_around_a_fine_mesh_costs_little() {
             let mut rng = Rng::new(7, 0, 0);
             let value = |c: Chosen| kernel(&segments[c.edge], c.u, &view) * c.inv_pdf;
             let m: Moments =
-                (0..20_000).map(|_| tree.sample(&view, &mut rng).map_or(0.0, value)).collect();
+                (0..20_000).map(|_| tree.sample(&view, rng.next_2d()).map_or(0.0, value)).collect();
             m.variance() / (m.mean() * m.mean())
         });
         assert!(inside < 2.0 * alone, "{inside} in the room, {alone} without it");

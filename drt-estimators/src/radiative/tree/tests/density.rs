@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_math::testing::{SIGNIFICANCE, chi_square};
-use drt_math::vec3;
+use drt_math::{Rng, vec3};
 
 use super::super::*;
 use super::setup::*;

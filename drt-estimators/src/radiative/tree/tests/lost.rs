@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_geom::procedural;
-use drt_math::{Vec3, vec3};
+use drt_math::{Rng, Vec3, vec3};
 
 use super::super::*;
 use super::setup::*;
@@ -125,7 +125,7 @@ fn segments_without_use_are_left_out() {
     for x in [f64::NAN, f64::INFINITY, 1e200] {
         for normal in [None, Some((Vec3::Z, true)), Some((Vec3::Z, false))] {
             let nowhere = Viewpoint::new(vec3(x, 0.0, 0.0), normal);
-            assert!(tree.sample(&nowhere, &mut Rng::new(1, 0, 0)).is_none());
+            assert!(tree.sample(&nowhere, Rng::new(1, 0, 0).next_2d()).is_none());
         }
     }
 }

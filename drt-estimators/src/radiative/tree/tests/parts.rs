@@ -1,7 +1,7 @@
 //! The pieces a tree is made of: the kernel along a line, and cones.
 
 use drt_math::testing::{SIGNIFICANCE, interval_chi_square};
-use drt_math::{Vec3, vec3};
+use drt_math::{Rng, Vec3, vec3};
 
 use super::super::kernel::Kernel;
 use super::super::*;

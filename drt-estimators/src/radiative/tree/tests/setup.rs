@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_geom::{EdgeClass, Mesh, NONE, Topology, procedural};
-use drt_math::{Vec3, vec3, warp};
+use drt_math::{Rng, Vec3, vec3, warp};
 
 use super::super::*;
 

@@ -1,7 +1,7 @@
 //! Estimates by the tree against integrals over all edges.
 
 use drt_math::testing::z_score;
-use drt_math::{Moments, vec3};
+use drt_math::{Moments, Rng, vec3};
 
 use super::super::*;
 use super::setup::*;
@@ -20,13 +20,13 @@ fn integrals_over_all_edges() {
     for view in &views() {
         let truth = integral(&segments, view);
         let value = |c: &Chosen| kernel(&segments[c.edge], c.u, view) * c.inv_pdf;
-        let estimate = moments(1, |rng| Some(value(&tree.sample(view, rng)?)));
+        let estimate = moments(1, |rng| Some(value(&tree.sample(view, rng.next_2d())?)));
         let z = z_score(&estimate, truth);
         assert!(z.abs() < 4.0, "{z}: {estimate:?} for {truth}");
         assert!(estimate.standard_error() < 0.01 * truth, "{estimate:?} for {truth}");
         // Planted: some children chosen a little more often than is said.
         let faulty = moments(1, |rng| {
-            let c = tree.sample(view, rng)?;
+            let c = tree.sample(view, rng.next_2d())?;
             Some(value(&c) * if c.edge % 3 == 0 { 1.1 } else { 1.0 })
         });
         assert!(z_score(&faulty, truth).abs() > 4.0, "{faulty:?} for {truth}");
@@ -42,7 +42,7 @@ fn together_with_samples_towards_a_light() {
         let truth = integral(&segments, view);
         let pick = |rng: &mut Rng| {
             let technique = if rng.next_f64() < 0.5 { view } else { &light };
-            tree.sample(technique, rng)
+            tree.sample(technique, rng.next_2d())
         };
         let pdf = |c: &Chosen, v: &Viewpoint| tree.pdf(v, c.edge, c.u);
         let estimate = moments(2, |rng| {
