@@ -4,7 +4,8 @@ mod common;
 
 use common::*;
 use drt_estimators::{
-    Counters, InsideKind, Plan, Rendering, Scene, Session, Settings, Target, Unattended, gradient,
+    Counters, EstimatorKind, InsideKind, Plan, Rendering, Scene, Session, Settings, Target,
+    Unattended, gradient,
 };
 use drt_math::{Rgb, ValueChange};
 use drt_motion::{Effect, Parameter};
@@ -169,4 +170,34 @@ fn reverse_mode_skips_as_much() {
     }
     let g = run(&fog_with_a_block(-0.7, 0.5), &[Target::Shape(2)]);
     assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples == 0);
+}
+
+fn by_rays(scene: &Scene, parameters: &[Parameter]) -> Rendering {
+    let estimator = EstimatorKind::Radiative;
+    let settings = Settings { spp: 8, terms: true, estimator, ..Settings::default() };
+    let mut session = Session::new(scene, parameters, &settings).expect("a valid scene");
+    assert!(session.run(settings.spp, &Unattended));
+    session.rendering()
+}
+
+#[test]
+fn the_2019_estimator_skips_as_much() {
+    for scene in [surfaces(phong(), diffuse(0.5, 0.4, 0.3)), fog()] {
+        let r = by_rays(&scene, &[]);
+        assert_eq!((r.counters.recorded_vertices, r.counters.boundary_samples), (0, 0));
+        let colour = changes("sky", "radiance", grey(0.1));
+        no_boundary(&by_rays(&scene, &[parameter("p", 0.0, vec![colour])]));
+        let r = by_rays(&scene, &[parameter("p", 0.0, vec![moves("ball", shift())])]);
+        assert!(r.counters.boundary_samples > 0 && r.plan.primary && r.plan.indirect);
+    }
+}
+
+#[test]
+fn each_light_has_one_estimator() {
+    let shift = || [parameter("p", 0.0, vec![moves("ball", shift())])];
+    let plan = by_rays(&surfaces(phong(), phong()), &shift()).plan;
+    let named = |what: &str| plan.estimators.iter().filter(|e| e.starts_with(what)).count();
+    assert_eq!((named("radiative"), named("path-space")), (1, 1), "{plan}");
+    let plan = rendered(&surfaces(phong(), phong()), &shift()).plan;
+    assert_eq!(plan.estimators, ["path-space, all light"]);
 }

@@ -8,11 +8,9 @@ use drt_estimators::{
 };
 use drt_motion::Parameter;
 
+use super::verdict::{SIGNIFICANT, plus};
 use super::{Cell, Fault, Stage};
 use crate::Result;
-
-/// Terms from this part of the derivative on must not pass with the wrong sign.
-const SIGNIFICANT: f64 = 0.3;
 
 /// Samples per pixel of the first round.
 const ROUND: u32 = 1 << 7;
@@ -157,15 +155,6 @@ fn sample(
         }
         count = rendering.spp;
     }
-}
-
-/// Block means of `a + factor b`, with the errors of `a`.
-fn plus(a: &Layer, factor: f64, b: &Layer) -> Layer {
-    let mut sum = a.clone();
-    for (s, b) in sum.blocks.iter_mut().zip(&b.blocks) {
-        s.mean += b.mean * factor;
-    }
-    sum
 }
 
 /// Pairs as a table for a reader of test output.

@@ -16,7 +16,7 @@ use crate::Result;
 const RESOLUTION: f64 = 5e-3;
 
 /// Terms from this part of the derivative on must not pass with the wrong sign.
-const SIGNIFICANT: f64 = 0.3;
+pub(super) const SIGNIFICANT: f64 = 0.3;
 
 /// A cell's verdict.
 #[derive(Clone, Debug)]
@@ -151,7 +151,7 @@ fn compare(stage: &Stage, cell: &Cell, derivative: &Derivative, radiance: f64) -
 }
 
 /// Block means of `a + factor b`, with the errors of `a`.
-fn plus(a: &Layer, factor: f64, b: &Layer) -> Layer {
+pub(super) fn plus(a: &Layer, factor: f64, b: &Layer) -> Layer {
     let mut sum = a.clone();
     for (s, b) in sum.blocks.iter_mut().zip(&b.blocks) {
         s.mean += b.mean * factor;

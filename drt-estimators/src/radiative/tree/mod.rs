@@ -40,7 +40,7 @@ mod build;
 mod kernel;
 mod node;
 mod piece;
-#[cfg(test)]
+#[cfg(all(test, feature = "std"))]
 mod tests;
 mod view;
 

@@ -1,7 +1,5 @@
 //! Trees against brute force.
 
-extern crate std;
-
 mod cost;
 mod density;
 mod lost;
