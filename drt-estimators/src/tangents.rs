@@ -181,7 +181,13 @@ impl Apply<'_> {
                 .map_err(|e| self.fail(e.parameter, target, e.cause))?;
             motions = keep(moved.motions, |m| !m.is_rest());
             smooth = moved.smooth;
-            self.scene.shapes[i].mesh = Arc::new(moved.mesh);
+            // What has not moved yet stays what it is to the last bit.
+            let rests = |c: &Applied<'_, GeometryChange>| {
+                c.theta == 0.0 && c.change.affine(c.theta).is_some()
+            };
+            if !changes.iter().all(rests) {
+                self.scene.shapes[i].mesh = Arc::new(moved.mesh);
+            }
         }
         self.tangents.shapes.push(motions);
         self.tangents.smooth.push(smooth);

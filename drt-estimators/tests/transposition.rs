@@ -60,18 +60,30 @@ fn sides(scene: &Scene, parameter: &Parameter, settings: &Settings) -> (f64, f64
 }
 
 fn agree(name: &str, scene: &Scene, effects: Vec<Effect>, settings: &Settings) {
-    by_one_estimator(name, scene, effects.clone(), settings);
-    let radiative =
-        Settings { estimator: EstimatorKind::Radiative, guiding: false, ..settings.clone() };
-    by_one_estimator(&format!("{name}, radiative"), scene, effects, &radiative);
+    by_one_estimator(name, scene, effects.clone(), settings, EXACT);
+    // Normals that are computed anew differ in their last bits, which now and then tips the choice
+    // between two edges.
+    by_one_estimator(&format!("{name}, radiative"), scene, effects, &radiative(settings), 1e-4);
 }
 
-fn by_one_estimator(name: &str, scene: &Scene, effects: Vec<Effect>, settings: &Settings) {
+const EXACT: f64 = 1e-12;
+
+fn radiative(settings: &Settings) -> Settings {
+    Settings { estimator: EstimatorKind::Radiative, guiding: false, ..settings.clone() }
+}
+
+fn by_one_estimator(
+    name: &str,
+    scene: &Scene,
+    effects: Vec<Effect>,
+    settings: &Settings,
+    limit: f64,
+) {
     let parameter = parameter(name, 0.0, effects);
     let (forward, reverse, size) = sides(scene, &parameter, settings);
     let error = (forward - reverse).abs() / size;
     assert!(
-        size > 1e-3 && error < 1e-12,
+        size > 1e-3 && error < limit,
         "{name}: {forward} {reverse} of {size}, off by {error:e}"
     );
 }
@@ -261,4 +273,19 @@ fn another_seed_is_no_transpose() {
     let (forward, _, size) = sides(&scene, &parameter, &settings());
     let (_, reverse, _) = sides(&scene, &parameter, &Settings { seed: 4, ..settings() });
     assert!((forward - reverse).abs() > 1e-4 * size);
+}
+
+/// Where a motion at rest leaves even the last bits as they are, the tree of edges, too, takes the same
+/// ways in both modes.
+#[test]
+fn rays_carry_back_exactly() {
+    let scene = surfaces(phong(), phong());
+    let exactly = |name: &str, id: &str, change: GeometryChange| {
+        by_one_estimator(name, &scene, vec![moves(id, change)], &radiative(&settings()), EXACT);
+    };
+    exactly("ball shifts", "ball", shift());
+    exactly("ball turns", "ball", turn());
+    exactly("floor", "floor", wobble(&scene, "floor", 1));
+    exactly("lamp", "lamp", wobble(&scene, "lamp", 1));
+    exactly("ball", "ball", wobble(&scene, "ball", 1));
 }

@@ -23,7 +23,7 @@ fn seconds(default: f64) -> f64 {
 }
 
 fn short() -> Effort {
-    Effort { noise: 0.05, seconds: seconds(2.0) }
+    Effort { noise: 0.05, seconds: seconds(1.0) }
 }
 
 fn precise() -> Effort {
