@@ -61,8 +61,9 @@ fn sides(scene: &Scene, parameter: &Parameter, settings: &Settings) -> (f64, f64
 
 fn agree(name: &str, scene: &Scene, effects: Vec<Effect>, settings: &Settings) {
     by_one_estimator(name, scene, effects.clone(), settings, EXACT);
-    // Normals that are computed anew differ in their last bits, which now and then tips the choice
-    // between two edges.
+    // Normals that are computed anew differ in their last bits. That tips the choice between edges of
+    // next to no weight, those in the plane of the face that looks: of 182 events of the ball one then
+    // had 1e-5 for 1e-12.
     by_one_estimator(&format!("{name}, radiative"), scene, effects, &radiative(settings), 1e-4);
 }
 

@@ -43,7 +43,7 @@ struct Blade {
 }
 
 /// All edges.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Jumps {
     pub(super) list: Vec<Jump>,
     blades: Vec<Blade>,

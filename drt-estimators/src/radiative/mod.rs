@@ -124,7 +124,9 @@ impl Radiative {
         interest: &Interest,
         speed: impl Fn(&Edge) -> f64,
     ) -> Result<Self, Error> {
-        let jumps = Jumps::collect(world, &interest.shapes);
+        // From a vertex on what moves, everything seems to; else no edge is even looked for.
+        let any = interest.sensor || interest.shapes.contains(&true);
+        let jumps = if any { Jumps::collect(world, &interest.shapes) } else { Jumps::default() };
         let moves = |j: &Jump| {
             if interest.shapes[j.edge.shape as usize] { speed(&j.edge) } else { 0.0 }
         };
@@ -132,10 +134,8 @@ impl Radiative {
         let relative = |j: &Jump| if interest.sensor { 1.0 } else { moves(j) };
         let camera = Outlines::new(&jumps, |j| relative(j) * j.seen_from(eye))?;
         let moving = Views::new(world, &jumps, moves);
-        // From a vertex on what moves, everything seems to.
-        let any = interest.sensor || interest.shapes.contains(&true);
-        let all = Views::new(world, &jumps, |_| if any { 1.0 } else { 0.0 });
-        let count = [if any { jumps.list.len() as u64 } else { 0 }, jumps.all];
+        let all = Views::new(world, &jumps, |_| 1.0);
+        let count = [jumps.list.len() as u64, jumps.all];
         Ok(Self { jumps, camera, moving, all, count })
     }
 
