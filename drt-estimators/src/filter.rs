@@ -164,6 +164,25 @@ impl Filter {
         [self.axis_slope(dx) * self.axis(dy), self.axis(dx) * self.axis_slope(dy)]
     }
 
+    /// A function of the offset that is 1 at the pixel's centre and falls to 0 where the support ends,
+    /// however the filter does, and its gradient. Its product with P has a slope that P bounds.
+    #[must_use]
+    pub(crate) fn window(&self, offset: [f64; 2]) -> (f64, [f64; 2]) {
+        let [(x, dx), (y, dy)] = offset.map(|o| {
+            let peak = self.axis(0.0);
+            let (height, slope, steepness) = match self.kind {
+                FilterKind::Box { radius } => {
+                    let s = o / radius;
+                    (f64::max(1.0 - s * s, 0.0), -2.0 * s / radius, 2)
+                }
+                _ => (self.axis(o) / peak, self.axis_slope(o) / peak, 6),
+            };
+            let rest = Real::powi(1.0 - height, steepness - 1);
+            (1.0 - rest * (1.0 - height), f64::from(steepness) * rest * slope)
+        });
+        (x * y, [dx * y, x * dy])
+    }
+
     /// The factor p of one axis, per pixel.
     #[inline]
     #[must_use]

@@ -194,7 +194,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             values[0] += radiance.0;
             return;
         };
-        self.record.begin(dir, weight);
+        let width = camera.film()[0];
+        self.record.begin([pixel % width, pixel / width], dir, weight);
         self.record.flux.begin(Rng::new(self.seed, FLUX_STREAM | u64::from(pixel), unit));
         self.tracer.trace_camera(dir, weight, &mut self.record);
         values[0] += self.record.value;
@@ -230,9 +231,14 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                 at += if e.node == 1 { n } else { 2 * n };
             }
             sink.begin();
-            let u = e.value.outer(e.n);
-            sink.surface(&e.point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
-            self.differentiator.carry_back(&self.record, e.node, 0.0, -u, sink);
+            for (point, value) in e.matter.iter().flatten() {
+                if sink.interest().shapes[point.shape as usize] {
+                    let u = value.outer(e.n);
+                    sink.surface(point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
+                }
+            }
+            let viewer = e.viewer.outer(e.n);
+            self.differentiator.carry_back(&self.record, e.node, 0.0, viewer, sink);
             sink.finish(&mut values[at..at + n]);
         }
         if let Some(shadows) = self.along.shadows {

@@ -59,7 +59,12 @@ impl Prepared {
     }
 
     /// For the 2019 estimator.
-    fn spatial(world: World, interest: &Interest, motion: Option<&Motion>) -> Result<Self, Error> {
+    fn spatial(
+        mut world: World,
+        interest: &Interest,
+        motion: Option<&Motion>,
+    ) -> Result<Self, Error> {
+        world.prepare_holds();
         // Grids that move sweep over what stands still.
         let flux = (interest.moves_geometry() || interest.grids.contains(&true))
             .then(|| Flux::spatial(&world, interest))

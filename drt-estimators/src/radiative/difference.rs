@@ -5,7 +5,7 @@ use drt_math::{Rgb, Vec3};
 
 use super::jumps::{Jump, Jumps, Sides};
 use crate::transport::flight::Travel;
-use crate::transport::{Kind, Radiance, RayPath, Tracer, Vertex};
+use crate::transport::{Kind, MaterialPoint, Radiance, RayPath, SurfacePoint, Tracer, Vertex};
 
 /// An edge point and a viewer of it.
 pub(super) struct Sight<'a> {
@@ -19,25 +19,40 @@ pub(super) struct Sight<'a> {
     pub(super) sides: Sides,
     medium: Option<usize>,
     own_faces: [u32; 2],
+    by_camera: bool,
+}
+
+/// What is seen on one side of an edge.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Side {
+    pub(super) light: Rgb,
+    /// How much of the velocity of what is seen its place in view has: the share of its
+    /// [hold](crate::transport::hold), over its distance in those of the edge.
+    pub(super) hold: f64,
+    /// The distance of what is seen.
+    pub(super) distance: f64,
+    /// What is seen; `None` for what stands still.
+    pub(super) matter: Option<MaterialPoint>,
 }
 
 impl<'a> Sight<'a> {
-    /// Of the point `along` an edge, from a viewer at `from`; `None` where the edge is seen end on.
+    /// Of the point `along` an edge, from a viewer; `None` where the edge is seen end on.
     pub(super) fn new(
         tracer: &Tracer<'_>,
         jumps: &Jumps,
         jump: &'a Jump,
         along: f64,
-        from: Vec3,
+        viewer: &Vertex,
     ) -> Option<Self> {
         let (x, _) = jump.point(along);
-        let to = from - x;
+        let to = viewer.x - x;
         let distance = to.length();
         let w = to / distance;
         let sides = jumps.sides(jump, w)?;
         let own_faces = sides.own_faces()?;
         let medium = jump.medium(tracer.world, &sides, x, w);
-        Some(Self { jump, along, x, w, distance, sides, medium, own_faces })
+        let by_camera = matches!(viewer.kind, Kind::Point);
+        Some(Self { jump, along, x, w, distance, sides, medium, own_faces, by_camera })
     }
 
     /// Transmittance to the viewer, if nothing blocks.
@@ -58,48 +73,55 @@ impl<'a> Sight<'a> {
         tau.filter(|t| !t.is_zero())
     }
 
-    /// L(-n) - L(n), over at most `longest` segments beyond the edge.
-    pub(super) fn difference(&self, tracer: &mut Tracer<'_>, longest: u32) -> Rgb {
+    /// What is seen on the sides of -n and n, over at most `longest` segments beyond the edge.
+    pub(super) fn sides(&self, tracer: &mut Tracer<'_>, longest: u32) -> [Side; 2] {
         let own = core::mem::replace(&mut tracer.max_segments, longest);
         let [plus, minus] = self.sides.faces;
-        let difference = if plus.is_some() && minus.is_some() {
+        let numbers = tracer.rng.clone();
+        let first = self.side(tracer, minus);
+        if plus.is_some() && minus.is_some() {
             // Both sides of a crease see much the same: the same numbers for both.
-            let numbers = tracer.rng.clone();
-            let l = self.side(tracer, minus);
             tracer.rng = numbers;
-            l - self.side(tracer, plus)
-        } else {
-            self.side(tracer, minus) - self.side(tracer, plus)
-        };
+        }
+        let second = self.side(tracer, plus);
         tracer.max_segments = own;
-        difference
+        [first, second]
     }
 
     /// What comes from one side of the edge.
-    fn side(&self, tracer: &mut Tracer<'_>, face: Option<(u32, Vec3)>) -> Rgb {
-        let mut light = Radiance::default();
+    fn side(&self, tracer: &mut Tracer<'_>, face: Option<(u32, Vec3)>) -> Side {
         match face {
             Some(face) => {
                 let (point, x) = self.jump.beside(tracer.world, self.x, face);
                 let vertex = Vertex { x, medium: self.medium, kind: Kind::Surface(point) };
-                tracer.radiance_from(vertex, self.w, &mut light);
-                light.0
+                self.from(tracer, vertex, self.distance)
             }
             None => match self.jump.contact(tracer.world, self.along) {
                 Some(contact) => {
                     let floor = contact.floor_along(self.sides.outward());
-                    if let Some(vertex) = floor {
-                        tracer.radiance_from(vertex, self.w, &mut light);
-                    }
-                    light.0
+                    floor.map_or_else(Side::default, |v| self.from(tracer, v, self.distance))
                 }
                 None => self.beyond(tracer),
             },
         }
     }
 
+    /// What leaves a vertex, at a `distance` from the viewer.
+    fn from(&self, tracer: &mut Tracer<'_>, vertex: Vertex, distance: f64) -> Side {
+        let mut light = Radiance::default();
+        tracer.radiance_from(vertex, self.w, &mut light);
+        let world = tracer.world;
+        let hold = if self.by_camera {
+            world.hold_in_view(&vertex)
+        } else {
+            world.hold(&vertex, -self.w, distance)
+        };
+        let matter = vertex.surface().map(SurfacePoint::material);
+        Side { light: light.0, hold: hold.share * self.distance / distance, distance, matter }
+    }
+
     /// What comes from behind the edge.
-    fn beyond(&self, tracer: &mut Tracer<'_>) -> Rgb {
+    fn beyond(&self, tracer: &mut Tracer<'_>) -> Side {
         let mut ray = tracer.ray.take().unwrap_or_default();
         let d = -self.w;
         let (x, faces, medium) = (self.x, self.own_faces, self.medium);
@@ -115,14 +137,14 @@ impl<'a> Sight<'a> {
             Travel::Escape(arrival) => {
                 tracer.ray = Some(ray);
                 let sky = tracer.world.lights.environment();
-                return sky.map_or(Rgb::ZERO, |(_, l)| l * arrival);
+                let light = sky.map_or(Rgb::ZERO, |(_, l)| l * arrival);
+                return Side { light, ..Side::default() };
             }
             Travel::Absorbed => None,
         };
         tracer.ray = Some(ray);
-        let Some((vertex, arrival)) = found else { return Rgb::ZERO };
-        let mut light = Radiance::default();
-        tracer.radiance_from(vertex, self.w, &mut light);
-        light.0 * arrival
+        let Some((vertex, arrival)) = found else { return Side::default() };
+        let side = self.from(tracer, vertex, self.distance + (vertex.x - x).length());
+        Side { light: side.light * arrival, ..side }
     }
 }

@@ -57,6 +57,9 @@ pub(crate) struct Radiative {
     moving: Option<Views>,
     /// Seen from a vertex that moves.
     all: Option<Views>,
+    /// An edge at rest counts for a vertex that stands still, too: something that moves holds what is
+    /// seen of it.
+    at_rest: bool,
     /// Edges that can be chosen, and edges in all.
     pub(crate) count: [u64; 2],
 }
@@ -67,6 +70,10 @@ struct Outlines {
     jumps: Vec<u32>,
     table: CdfTable,
 }
+
+/// How much an edge at rest matters before something that moves, to what stands still, compared to one
+/// that moves.
+const AT_REST: f64 = 0.1;
 
 /// Uniform numbers for a look from a path at an edge.
 #[derive(Clone, Copy, Debug)]
@@ -88,6 +95,8 @@ impl Look {
 /// A point on an edge.
 struct Chosen<'a> {
     jump: &'a Jump,
+    /// In the list of all.
+    index: u32,
     /// How far along the edge.
     along: f64,
     /// 1 over the density per length.
@@ -95,8 +104,9 @@ struct Chosen<'a> {
 }
 
 impl Outlines {
-    fn new(jumps: &Jumps, weight: impl Fn(&Jump) -> f64) -> Result<Option<Self>, Error> {
-        let weighed = jumps.list.iter().zip(0..).map(|(j, i)| (i, weight(j)));
+    /// Of all edges with their weights.
+    fn new(weights: impl Iterator<Item = f64>) -> Result<Option<Self>, Error> {
+        let weighed = (0..).zip(weights);
         let (indices, weights): (Vec<u32>, Vec<f64>) = weighed.filter(|(_, w)| *w > 0.0).unzip();
         if indices.is_empty() {
             return Ok(None);
@@ -111,8 +121,9 @@ impl Outlines {
     fn sample<'a>(&self, jumps: &'a Jumps, rng: &mut Rng) -> Chosen<'a> {
         // Monotone: one number places the point among all edges.
         let s = self.table.sample(rng.next_f64());
-        let jump = &jumps.list[self.jumps[s.index] as usize];
-        Chosen { jump, along: s.residual, inv_pdf: jump.length() / s.pmf }
+        let index = self.jumps[s.index];
+        let jump = &jumps.list[index as usize];
+        Chosen { jump, index, along: s.residual, inv_pdf: jump.length() / s.pmf }
     }
 }
 
@@ -131,12 +142,20 @@ impl Radiative {
             if interest.shapes[j.edge.shape as usize] { speed(&j.edge) } else { 0.0 }
         };
         let eye = world.camera.position();
-        let relative = |j: &Jump| if interest.sensor { 1.0 } else { moves(j) };
-        let camera = Outlines::new(&jumps, |j| relative(j) * j.seen_from(eye))?;
+        let at_rest = world.any_holds(&interest.shapes);
+        let speeds: Vec<f64> = jumps.list.iter().map(moves).collect();
+        let fastest = speeds.iter().copied().fold(0.0, f64::max);
+        let relative = |speed: f64| match (interest.sensor, at_rest) {
+            (true, _) => 1.0,
+            (_, true) => f64::max(speed, AT_REST * fastest),
+            _ => speed,
+        };
+        let seen = jumps.list.iter().zip(&speeds).map(|(j, s)| relative(*s) * j.seen_from(eye));
+        let camera = Outlines::new(seen)?;
         let moving = Views::new(world, &jumps, moves);
         let all = Views::new(world, &jumps, |_| 1.0);
         let count = [jumps.list.len() as u64, jumps.all];
-        Ok(Self { jumps, camera, moving, all, count })
+        Ok(Self { jumps, camera, moving, all, at_rest, count })
     }
 
     /// True when the camera can see something change.

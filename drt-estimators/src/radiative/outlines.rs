@@ -1,7 +1,5 @@
 //! Edges seen from the camera (2019 paper, Eq. 41, at fixed image points).
 
-use drt_math::Rgb;
-
 use super::Radiative;
 use super::difference::Sight;
 use crate::boundary::Receiver;
@@ -21,27 +19,36 @@ impl Radiative {
         let camera = &world.camera;
         let chosen = self.camera.as_ref()?.sample(&self.jumps, &mut tracer.rng);
         let eye = world.eye();
-        let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, eye.x)?;
+        let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, &eye)?;
         let (x, point) = chosen.jump.point(chosen.along);
         let (_, importance) = tracer.see(&Vertex { x, medium: None, kind: Kind::Point })?;
-        let n = sight.sides.n;
-        // A camera that turns takes its image points with it.
-        let mut gradient = camera.direction_gradient(-sight.w, n * -sight.distance);
-        gradient.position -= n;
-        functional.items.clear();
-        functional.items.extend([Rate::Surface(point, n), Rate::Sensor(gradient)]);
-        if !receiver.moves(functional) {
-            return None;
-        }
         let tau = sight.open(tracer)?;
-        let difference = sight.difference(tracer, tracer.max_segments.checked_sub(1)?);
-        let value: Rgb = tau * difference * (sight.sides.sine * chosen.inv_pdf * importance);
-        if value.is_zero() {
-            return None;
-        }
+        let [minus, plus] = sight.sides(tracer, tracer.max_segments.checked_sub(1)?);
+        let weight = tau * (sight.sides.sine * chosen.inv_pdf * importance);
+        let [minus_light, plus_light] = [weight * minus.light, weight * -plus.light];
+        // What is held moves in view by itself.
+        let parts = [
+            (Some(point), sight.distance, minus_light + plus_light, false),
+            (minus.matter, minus.distance, minus_light * -minus.hold, true),
+            (plus.matter, plus.distance, plus_light * -plus.hold, true),
+        ];
         let width = camera.film()[0];
-        for p in camera.footprint(camera.view(x).pixel) {
-            receiver.receive(p.pixel[1] * width + p.pixel[0], value * p.weight);
+        let image_point = camera.view(x).pixel;
+        for (matter, distance, value, held) in parts {
+            let n = sight.sides.n;
+            // A camera that turns takes its image points with it.
+            let mut gradient = camera.direction_gradient(-sight.w, n * -distance);
+            gradient.position -= n;
+            functional.items.clear();
+            functional.items.extend(matter.map(|point| Rate::Surface(point, n)));
+            functional.items.push(Rate::Sensor(gradient));
+            if value.is_zero() || !receiver.moves(functional) {
+                continue;
+            }
+            for p in camera.footprint(image_point) {
+                let share = if held { camera.window(p.pixel, image_point).0 } else { 1.0 };
+                receiver.receive(p.pixel[1] * width + p.pixel[0], value * (p.weight * share));
+            }
         }
         Some(())
     }

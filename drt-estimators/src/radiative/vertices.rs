@@ -2,20 +2,22 @@
 
 use drt_math::{Rgb, Vec3};
 
-use super::difference::Sight;
-use super::{Look, Radiative};
+use super::difference::{Side, Sight};
+use super::{AT_REST, Chosen, Look, Radiative};
 use crate::transport::record::PathRecord;
 use crate::transport::trace::Endpoint;
-use crate::transport::{MaterialPoint, Tracer, Vertex};
+use crate::transport::{MaterialPoint, Tracer, Vertex, World};
 
-/// An edge's contribution to a path: `value` times the speed along `n` of the edge point less that of
-/// the vertex that sees it.
+/// An edge's contribution to a path: a sum of speeds along `n`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Edged {
+    /// The vertex that sees the edge.
     pub(crate) node: usize,
-    pub(crate) point: MaterialPoint,
     pub(crate) n: Vec3,
-    pub(crate) value: Rgb,
+    /// What multiplies the speed of the vertex.
+    pub(crate) viewer: Rgb,
+    /// What multiplies those of the edge, and of what is seen on its two sides.
+    pub(crate) matter: [Option<(MaterialPoint, Rgb)>; 3],
 }
 
 impl Radiative {
@@ -32,22 +34,54 @@ impl Radiative {
         let (vertex, theta) =
             scattering_vertex(recorded.vertex()?, &arrival.end, arrival.throughput)?;
         let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
-        let choice = if recorded.carried { &self.all } else { &self.moving };
         tracer.counters.boundary_samples += 1;
-        let (world, wo) = (tracer.world, -arrival.dir);
-        let chosen = choice.as_ref()?.sample(world, &self.jumps, vertex, wo, look)?;
-        let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex.x)?;
+        let wo = -arrival.dir;
+        let chosen = self.look(tracer.world, vertex, wo, recorded.carried, look)?;
+        let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex)?;
         let scattering = tracer.world.scattering(vertex)?;
         let f = scattering.eval(wo, -sight.w);
         if f.is_zero() {
             return None;
         }
         let tau = sight.open(tracer)?;
-        let difference = sight.difference(tracer, longest);
+        let [minus, plus] = sight.sides(tracer, longest);
         let kernel = sight.sides.sine / (sight.distance * sight.distance);
-        let value = theta * f * tau * difference * (kernel * chosen.inv_pdf / chance);
+        let weight = theta * f * tau * (kernel * chosen.inv_pdf / chance);
         let (_, point) = chosen.jump.point(chosen.along);
-        (!value.is_zero()).then_some(Edged { node, point, n: sight.sides.n, value })
+        let lights = [weight * minus.light, weight * -plus.light];
+        let held = [lights[0] * minus.hold, lights[1] * plus.hold];
+        let [edge, viewer] = [lights, held].map(|[a, b]| a + b);
+        let of = |side: &Side, held: Rgb| side.matter.map(|m| (m, -held));
+        let matter = [Some((point, edge)), of(&minus, held[0]), of(&plus, held[1])];
+        let dark = lights.iter().all(|l| l.is_zero());
+        (!dark).then_some(Edged { node, n: sight.sides.n, viewer: viewer - edge, matter })
+    }
+
+    /// Chooses a point on an edge to look at. From a vertex that moves every edge counts; from one that
+    /// stands still an edge at rest only does before something that moves and is grazed.
+    fn look(
+        &self,
+        world: &World,
+        vertex: &Vertex,
+        wo: Vec3,
+        carried: bool,
+        look: &Look,
+    ) -> Option<Chosen<'_>> {
+        let all = self.all.as_ref()?;
+        let Some(moving) = self.moving.as_ref().filter(|_| !carried) else {
+            return all.sample(world, &self.jumps, vertex, wo, look);
+        };
+        if !self.at_rest {
+            return moving.sample(world, &self.jumps, vertex, wo, look);
+        }
+        let (mut look, at_rest) = (*look, look.way < AT_REST);
+        let (views, other) = if at_rest { (all, moving) } else { (moving, all) };
+        let chance = if at_rest { AT_REST } else { 1.0 - AT_REST };
+        look.way = if at_rest { look.way } else { look.way - AT_REST } / chance;
+        let chosen = views.sample(world, &self.jumps, vertex, wo, &look)?;
+        let density =
+            chance / chosen.inv_pdf + (1.0 - chance) * other.density(world, vertex, wo, &chosen);
+        Some(Chosen { inv_pdf: 1.0 / density, ..chosen })
     }
 
     /// Chooses a vertex that can see an edge change, in proportion to what passes it.

@@ -59,21 +59,35 @@ impl Views {
         look: &Look,
     ) -> Option<Chosen<'a>> {
         let around = viewpoint(world, vertex, wo);
-        let share = if self.lamps.is_empty() { 0.0 } else { TOWARD_LAMPS };
-        let per_lamp = share / self.lamps.len().max(1) as f64;
-        // Lamps first, the rest last.
-        let way = ((look.way / per_lamp) as usize).min(self.lamps.len());
-        let ways = self.lamps.iter().map(|lamp| around.toward(lamp.center, lamp.radius));
-        let view = ways.clone().nth(way).unwrap_or(around);
+        let mut way = look.way;
+        let (i, (_, view)) = self.ways(around).enumerate().find(|(_, (chance, _))| {
+            way -= chance;
+            way < 0.0
+        })?;
         let chosen = self.tree.sample(&view, look.point)?;
-        let densities = ways.chain([around]).enumerate().map(|(i, view)| {
-            let chance = if i < self.lamps.len() { per_lamp } else { 1.0 - share };
-            let known = (i == way).then(|| 1.0 / chosen.inv_pdf);
+        let densities = self.ways(around).enumerate().map(|(k, (chance, view))| {
+            let known = (k == i).then(|| 1.0 / chosen.inv_pdf);
             chance * known.unwrap_or_else(|| self.tree.pdf(&view, chosen.edge, chosen.u))
         });
         let density: f64 = densities.sum();
-        let jump = &jumps.list[self.jumps[chosen.edge] as usize];
-        (density > 0.0).then(|| Chosen { jump, along: chosen.u, inv_pdf: 1.0 / density })
+        let index = self.jumps[chosen.edge];
+        let jump = &jumps.list[index as usize];
+        (density > 0.0).then(|| Chosen { jump, index, along: chosen.u, inv_pdf: 1.0 / density })
+    }
+
+    /// The ways of looking, and their chances: towards lamps, and anywhere.
+    fn ways(&self, around: Viewpoint) -> impl Iterator<Item = (f64, Viewpoint)> {
+        let share = if self.lamps.is_empty() { 0.0 } else { TOWARD_LAMPS };
+        let per_lamp = share / self.lamps.len().max(1) as f64;
+        let lamps = self.lamps.iter().map(move |l| (per_lamp, around.toward(l.center, l.radius)));
+        lamps.chain([(1.0 - share, around)])
+    }
+
+    /// The density per length of [`Views::sample`].
+    pub(super) fn density(&self, world: &World, vertex: &Vertex, wo: Vec3, at: &Chosen) -> f64 {
+        let Ok(edge) = self.jumps.binary_search(&at.index) else { return 0.0 };
+        let around = viewpoint(world, vertex, wo);
+        self.ways(around).map(|(chance, view)| chance * self.tree.pdf(&view, edge, at.along)).sum()
     }
 }
 

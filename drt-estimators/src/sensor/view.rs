@@ -136,6 +136,12 @@ impl Sensor {
         }
     }
 
+    /// The window of a pixel's filter (see `Filter::window`) around an image point.
+    pub(crate) fn window(&self, pixel: [u32; 2], point: [f64; 2]) -> (f64, [f64; 2]) {
+        let center = pixel.map(|p| f64::from(p) + 0.5);
+        self.filter.window([point[0] - center[0], point[1] - center[1]])
+    }
+
     /// True when the filter jumps at the borders of pixels.
     #[must_use]
     pub fn has_borders(&self) -> bool {

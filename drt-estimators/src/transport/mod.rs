@@ -3,6 +3,7 @@
 
 pub(crate) mod adjoint;
 pub(crate) mod flight;
+pub(crate) mod hold;
 pub(crate) mod importance;
 pub(crate) mod lights;
 pub(crate) mod record;

@@ -6,6 +6,7 @@ use core::ops::Range;
 
 use drt_math::{Rgb, Vec3};
 
+use super::hold::Hold;
 use super::trace::{Arrival, Connection, Endpoint, Leaving, Observer};
 use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, RayPath, World};
@@ -24,8 +25,10 @@ pub(crate) struct Node {
     pub(crate) value: Rgb,
     /// Its inverse density, Russian roulette included.
     pub(crate) inv_pdf: f64,
-    /// The rays up to here move, so that it does in the spatial form.
+    /// It moves, in the spatial form.
     pub(crate) carried: bool,
+    /// What keeps it, if it moves, from being carried, in the spatial form.
+    pub(crate) hold: Hold,
 }
 
 impl Node {
@@ -52,6 +55,8 @@ pub(crate) struct PathRecord {
     pub(crate) nodes: Vec<Node>,
     pub(crate) crossings: Vec<Crossing>,
     pub(crate) connections: Vec<(Connection, Range<usize>)>,
+    /// Column and row that the path serves.
+    pub(crate) pixel: [u32; 2],
     /// The path's value.
     pub(crate) value: Rgb,
     /// Where it met surfaces with a flux.
@@ -61,8 +66,9 @@ pub(crate) struct PathRecord {
 }
 
 impl PathRecord {
-    /// Empties the record for a camera ray along `dir` with filter weight `value`.
-    pub(crate) fn begin(&mut self, dir: Vec3, value: Rgb) {
+    /// Empties the record for a camera ray of a `pixel` along `dir` with filter weight `value`.
+    pub(crate) fn begin(&mut self, pixel: [u32; 2], dir: Vec3, value: Rgb) {
+        self.pixel = pixel;
         self.nodes.clear();
         self.crossings.clear();
         self.connections.clear();
@@ -75,6 +81,7 @@ impl PathRecord {
             value,
             inv_pdf: 1.0,
             carried: self.carriers.camera,
+            hold: Hold::default(),
         });
     }
 
@@ -95,6 +102,14 @@ impl PathRecord {
     }
 }
 
+fn hold_of(world: &World, pixel: [u32; 2], arrival: &Arrival) -> Hold {
+    match &arrival.end {
+        Endpoint::Surface(v) if arrival.parent == 0 => world.hold_in_pixel(v, pixel),
+        Endpoint::Surface(v) => world.hold(v, arrival.dir, arrival.distance),
+        _ => Hold::default(),
+    }
+}
+
 impl Observer for PathRecord {
     const RECORDS: bool = true;
 
@@ -107,7 +122,7 @@ impl Observer for PathRecord {
         self.flux.offer(world, leaving, carried, ray);
     }
 
-    fn arrive(&mut self, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
+    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
         let crossings = self.keep(crossings);
         let c = self.connections.len();
         let on_mover = || match &arrival.end {
@@ -116,7 +131,9 @@ impl Observer for PathRecord {
             }
             _ => false,
         };
-        let carried = self.nodes[arrival.parent as usize].carried || on_mover();
+        let (brought, on_mover) = (self.nodes[arrival.parent as usize].carried, on_mover());
+        let carried = brought || on_mover;
+        let hold = if carried { hold_of(world, self.pixel, arrival) } else { Hold::default() };
         self.nodes.push(Node {
             arrival: Some(*arrival),
             crossings,
@@ -125,6 +142,7 @@ impl Observer for PathRecord {
             value: Rgb::ZERO,
             inv_pdf: 0.0,
             carried,
+            hold,
         });
         self.nodes.len() as u32 - 1
     }

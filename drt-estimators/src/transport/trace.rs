@@ -88,7 +88,7 @@ pub(crate) trait Observer {
     /// The walk is about to follow a ray.
     fn ray(&mut self, _world: &World, _leaving: &Leaving, _ray: &RayPath) {}
     /// The walk arrived somewhere; returns the name by which the walk refers to it.
-    fn arrive(&mut self, _arrival: &Arrival, _crossings: &[Crossing]) -> u32 {
+    fn arrive(&mut self, _world: &World, _arrival: &Arrival, _crossings: &[Crossing]) -> u32 {
         0
     }
     /// The walk leaves `node` along `wi`.
@@ -393,7 +393,7 @@ impl<'w> Tracer<'w> {
             throughput,
             emission_weight,
         };
-        let node = observer.arrive(&record, &ray.crossings[..v.crossed]);
+        let node = observer.arrive(self.world, &record, &ray.crossings[..v.crossed]);
         Stop {
             node,
             vertex: v.vertex,
@@ -439,7 +439,7 @@ impl<'w> Tracer<'w> {
             throughput,
             emission_weight,
         };
-        let node = observer.arrive(&record, &ray.crossings);
+        let node = observer.arrive(self.world, &record, &ray.crossings);
         Stop {
             node,
             vertex,
@@ -473,7 +473,7 @@ impl<'w> Tracer<'w> {
             throughput,
             emission_weight: 1.0,
         };
-        observer.arrive(&record, &ray.crossings);
+        observer.arrive(self.world, &record, &ray.crossings);
     }
 
     /// Scatters light of a point light at a distance chosen by the angle it is seen under (Kulla and

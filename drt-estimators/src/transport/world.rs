@@ -10,6 +10,7 @@ use drt_math::{Rgb, Vec3};
 use drt_medium::{Coefficients, Homogeneous, Medium};
 pub(crate) use rays::short_of;
 
+use super::hold::Holds;
 use super::lights::{LightTable, Lit};
 use super::scatter::Scattering;
 use super::vertex::{Contact, Kind, SurfacePoint, Vertex};
@@ -136,6 +137,7 @@ pub(crate) struct World {
     needs: Needs,
     /// How far light can go in each medium, at most.
     extent: Vec<f64>,
+    pub(super) holds: Holds,
     /// Where set, no discrete choice depends on values that may differ between this scene and
     /// another: the extinctions by which distances in homogeneous media are drawn instead of their
     /// own.
@@ -215,6 +217,7 @@ impl World {
             defensive: alloc::vec![0.0; scene.media.len()],
             needs: Needs::default(),
             extent: (0..scene.media.len()).map(|m| extent(&scene, m, 2.0 * radius)).collect(),
+            holds: Holds::default(),
             steady: like
                 .map(|w| w.scene.media.iter().map(|m| m.item.homogeneous().copied()).collect()),
             max_depth: depth,

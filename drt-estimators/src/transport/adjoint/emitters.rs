@@ -6,6 +6,7 @@ use drt_math::{Rgb, RgbVec, Vec3};
 use super::{Differentiator, Far, Form, Stretch, moves, send, turn};
 use crate::emitter::EmitterGradient;
 use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
+use crate::transport::hold::Hold;
 use crate::transport::lights::{LightKind, LightSample};
 use crate::transport::vertex::{Kind, Vertex};
 
@@ -33,7 +34,8 @@ impl Differentiator<'_> {
                 }
                 if self.form == Form::Spatial {
                     self.segment(path, Far::Direction, near_moves, weight, here, sink);
-                    self.land(path, &end, &SurfaceAdjoint::default(), weight, here, sink);
+                    let (hold, lit) = (Hold::default(), SurfaceAdjoint::default());
+                    self.land(path, &end, &hold, &lit, RgbVec::ZERO, weight, here, sink);
                     return;
                 }
                 let moving = near_moves || moves(&end, sink.interest(), false);

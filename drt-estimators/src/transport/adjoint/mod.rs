@@ -34,7 +34,7 @@ use drt_medium::{Coefficients, DepthEstimate};
 
 use emitters::strength;
 
-use super::record::{Node, PathRecord};
+use super::record::PathRecord;
 use super::trace::Endpoint;
 use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, Interval, World, intervals};
@@ -45,6 +45,8 @@ use crate::sensor::SensorGradient;
 #[derive(Clone, Copy, Debug, Default)]
 struct Local {
     at: SurfaceAdjoint,
+    /// To the velocity of the matter it is on, where it does not move with that.
+    matter: RgbVec,
     /// C_k, the value of the children per unit of scattering.
     children: Rgb,
 }
@@ -56,6 +58,16 @@ pub(crate) enum Form {
     Material,
     /// With the rays, whose directions and distances stand still (2019 paper).
     Spatial,
+}
+
+/// The segment by which a walk arrived at a node.
+#[derive(Clone, Copy, Debug)]
+struct Behind {
+    node: usize,
+    parent: usize,
+    distance: f64,
+    /// What of the node's motion turns the segment.
+    share: f64,
 }
 
 /// A segment's far end.
@@ -75,7 +87,7 @@ pub(crate) struct Differentiator<'w> {
     locals: Vec<Local>,
     points: Vec<(f64, f64)>,
     rng: Rng,
-    /// The filter's gradient by the pixel position, over the density; of the material form.
+    /// The filter's gradient by the pixel position, over the density.
     filter: [f64; 2],
     /// By the rate of the camera ray's direction; of the spatial form.
     turn: RgbVec,
@@ -98,8 +110,8 @@ impl<'w> Differentiator<'w> {
     }
 
     /// Sends the gradient of the record's value to `sink`. `filter` holds the gradient by the pixel
-    /// position of the filter over the density, which the spatial form does not need; `rng` serves line integrals through grids and must
-    /// be independent of the walk's.
+    /// position of the filter over the density; `rng` serves line integrals through grids and must be
+    /// independent of the walk's.
     pub(crate) fn differentiate<S: AdjointSink>(
         &mut self,
         record: &PathRecord,
@@ -118,7 +130,9 @@ impl<'w> Differentiator<'w> {
         }
         match self.form {
             Form::Material => self.camera(sink),
-            Form::Spatial => self.camera_ray(record, self.locals[0].at.u, self.turn, sink),
+            Form::Spatial => {
+                self.camera_ray(record, self.locals[0].at.u, self.turn, &self.sensor, sink)
+            }
         }
     }
 
@@ -137,7 +151,7 @@ impl<'w> Differentiator<'w> {
                 radiance * arrival.emission_weight
             }
             Endpoint::Surface(vertex) => {
-                collected += self.connections(record, node, vertex, theta, &mut here, sink);
+                collected += self.connections(record, k, vertex, theta, &mut here, sink);
                 let Kind::Surface(point) = &vertex.kind else { return };
                 let mut emitted = Rgb::ZERO;
                 if let Some(e) = world.scene.shapes[point.shape as usize].emitter
@@ -151,7 +165,7 @@ impl<'w> Differentiator<'w> {
             }
             Endpoint::Volume(vertex, c) => {
                 let theta_s = theta * c.sigma_s();
-                collected += self.connections(record, node, vertex, theta_s, &mut here, sink);
+                collected += self.connections(record, k, vertex, theta_s, &mut here, sink);
                 let moving = self.moves(record, k, sink.interest());
                 let weight = arrival.emission_weight;
                 self.coefficients(vertex, c, theta, collected, weight, moving, &mut here, sink);
@@ -176,6 +190,20 @@ impl<'w> Differentiator<'w> {
         }
     }
 
+    /// What of a node's motion turns the segment to it.
+    fn share(&self, record: &PathRecord, k: usize) -> f64 {
+        match self.form {
+            Form::Material => 1.0,
+            Form::Spatial => record.nodes[k].hold.share,
+        }
+    }
+
+    fn behind(&self, record: &PathRecord, node: usize) -> Option<Behind> {
+        let arrival = record.nodes[node].arrival.as_ref()?;
+        let (parent, distance) = (arrival.parent as usize, arrival.distance);
+        Some(Behind { node, parent, distance, share: self.share(record, node) })
+    }
+
     /// The segment from the parent to node `k`, and the parent's scattering into it.
     fn arrive<S: AdjointSink>(
         &mut self,
@@ -191,7 +219,8 @@ impl<'w> Differentiator<'w> {
         let value = arrival.arrival * received;
         self.locals[p].children += value;
         // What nothing comes back from may still turn.
-        if value.is_zero() && (self.form == Form::Material || here.is_zero()) {
+        let still = || here.is_zero() && self.locals[k].matter == RgbVec::ZERO;
+        if value.is_zero() && (self.form == Form::Material || still()) {
             return;
         }
         let weight = arrival.throughput * received;
@@ -216,14 +245,17 @@ impl<'w> Differentiator<'w> {
                 wo,
                 parent.wi,
                 adjoint,
-                parent.arrival.as_ref().map(|a| (a.parent as usize, a.distance)),
+                self.behind(record, p),
                 &mut there,
                 sink,
             );
-            if let (Form::Material, Some(to_wi), Some(_)) = (self.form, to_wi, vertex) {
-                let g = turn(&to_wi, parent.wi, arrival.distance);
-                here.u += g;
+            if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
+                let g = turn(&(to_wi * self.share(record, k)), parent.wi, arrival.distance);
                 there.u -= g;
+                match self.form {
+                    Form::Material => here.u += g,
+                    Form::Spatial => self.locals[k].matter += g,
+                }
             }
         }
         let crossings = &record.crossings[record.nodes[k].crossings.clone()];
@@ -244,10 +276,26 @@ impl<'w> Differentiator<'w> {
                 self.segment(&path, far, moving, weight, &mut there, sink);
             }
             (Form::Spatial, _) => {
+                let hold = &record.nodes[k].hold;
+                let free = weight * (1.0 - hold.share);
                 let mut turn =
-                    self.segment(&path, Far::Direction, near_moves, weight, &mut there, sink);
+                    self.segment(&path, Far::Direction, near_moves, free, &mut there, sink);
                 if let Some(v) = vertex {
-                    turn += self.land(&path, v, here, weight, &mut there, sink);
+                    let mut matter = self.locals[k].matter;
+                    if hold.share > 0.0 {
+                        let mut held = SurfaceAdjoint::default();
+                        let moving = near_moves || moves(v, sink.interest(), false);
+                        if p == 0 {
+                            let seen = value * hold.share;
+                            self.seen(vertex, arrival.dir, seen, parent.value, &mut held, sink);
+                        }
+                        let far = Far::Vertex(v, &mut held);
+                        self.segment(&path, far, moving, weight * hold.share, &mut there, sink);
+                        matter += core::mem::take(&mut held.u);
+                        here.n += held.n;
+                        here.j += held.j;
+                    }
+                    turn += self.land(&path, v, hold, here, matter, weight, &mut there, sink);
                 }
                 if p == 0 {
                     self.turn += turn;
@@ -411,7 +459,7 @@ impl<'w> Differentiator<'w> {
         wo: Vec3,
         wi: Vec3,
         adjoint: Rgb,
-        behind: Option<(usize, f64)>,
+        behind: Option<Behind>,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
     ) -> Option<RgbVec> {
@@ -443,15 +491,18 @@ impl<'w> Differentiator<'w> {
                 }
             }
         }
-        match (self.form, behind) {
-            (Form::Material, Some((p, distance))) => {
-                let g = turn(&(d.wo * adjoint), wo, distance);
-                self.locals[p].at.u += g;
-                here.u -= g;
+        if let Some(b) = behind {
+            let to_wo = d.wo * adjoint;
+            let g = turn(&(to_wo * b.share), wo, b.distance);
+            self.locals[b.parent].at.u += g;
+            match self.form {
+                Form::Material => here.u -= g,
+                Form::Spatial => self.locals[b.node].matter -= g,
             }
-            // Only the camera's ray turns.
-            (Form::Spatial, Some((0, _))) => self.turn -= d.wo * adjoint,
-            _ => {}
+            // Only the camera's ray turns by itself.
+            if b.parent == 0 && self.form == Form::Spatial {
+                self.turn -= to_wo * (1.0 - b.share);
+            }
         }
         Some(d.wi * adjoint)
     }
@@ -460,14 +511,16 @@ impl<'w> Differentiator<'w> {
     fn connections<S: AdjointSink>(
         &mut self,
         record: &PathRecord,
-        node: &Node,
+        k: usize,
         vertex: &Vertex,
         theta: Rgb,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
+        let node = &record.nodes[k];
         let Some(arrival) = &node.arrival else { return sum };
+        let behind = self.behind(record, k);
         let moving = match self.form {
             Form::Material => moves(vertex, sink.interest(), false),
             Form::Spatial => node.carried,
@@ -476,7 +529,6 @@ impl<'w> Differentiator<'w> {
             let rest = c.rest();
             sum += c.f * rest;
             let light = &c.light;
-            let behind = Some((arrival.parent as usize, arrival.distance));
             let to_wi =
                 self.scattering(vertex, -arrival.dir, light.w, theta * rest, behind, here, sink);
             let per_value = theta * c.f * c.transport;

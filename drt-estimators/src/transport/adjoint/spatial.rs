@@ -17,6 +17,9 @@
 //! A landing point slides over its triangle with the velocity x0_dot - u. A plane's normal does not mind;
 //! an interpolated one does, and turns with the barycentric weights.
 //!
+//! Where a surface is grazed, vertices [hold](crate::transport::hold) to their matter with a share φ, which
+//! adds φ times the material form of their segment.
+//!
 //! What these derivatives leave out, jumps of the integrand that move, is in
 //! [`radiative`](crate::radiative).
 
@@ -24,19 +27,24 @@ use drt_math::{Rgb, RgbVec, Vec3};
 
 use super::{Differentiator, Stretch};
 use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
+use crate::sensor::SensorGradient;
+use crate::transport::hold::Hold;
 use crate::transport::record::PathRecord;
 use crate::transport::vertex::{Kind, SurfacePoint, Vertex};
 use crate::transport::world::World;
 
 impl Differentiator<'_> {
     /// The far end of a stretch: `weight` of light passes, `here` holds the sensitivities of the vertex
-    /// there. Leaves those of the surface, adds those of the near end, and returns those of the
-    /// direction's rate.
+    /// there, `matter` those to the velocity of the matter it is on. Leaves those of the surface, adds
+    /// those of the near end, and returns those of the direction's rate.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn land<S: AdjointSink>(
         &self,
         path: &Stretch<'_>,
         end: &Vertex,
+        hold: &Hold,
         here: &SurfaceAdjoint,
+        matter: RgbVec,
         weight: Rgb,
         near: &mut SurfaceAdjoint,
         sink: &mut S,
@@ -45,10 +53,13 @@ impl Differentiator<'_> {
             near.u += here.u;
             return here.u * path.length;
         };
+        let free = 1.0 - hold.share;
+        let shift = weight.outer(hold.slope);
         // A longer way dims what passes.
         let medium = path.crossings.last().map_or(path.medium, |c| c.after);
-        let dims = self.world.sigma_t_at_border(medium, end.x, -path.dir) * -weight;
-        let (back, lift) = split(self.world, point, path.dir, here, dims);
+        let dims = self.world.sigma_t_at_border(medium, end.x, -path.dir) * (weight * -free);
+        let (back, mut lift) = split(self.world, point, path.dir, free, here, shift, dims);
+        lift.u += matter;
         if sink.interest().shapes[point.shape as usize] {
             sink.surface(&point.material(), &lift);
         }
@@ -75,7 +86,9 @@ impl Differentiator<'_> {
             let Some(arrival) = &node.arrival else { break };
             if let Some(Vertex { kind: Kind::Surface(point), .. }) = node.vertex() {
                 let here = SurfaceAdjoint { u, ..SurfaceAdjoint::default() };
-                let (back, lift) = split(self.world, point, arrival.dir, &here, Rgb::ZERO);
+                let (dir, none) = (arrival.dir, RgbVec::ZERO);
+                let free = 1.0 - node.hold.share;
+                let (back, lift) = split(self.world, point, dir, free, &here, none, Rgb::ZERO);
                 if sink.interest().shapes[point.shape as usize] {
                     sink.surface(&point.material(), &lift);
                 }
@@ -84,47 +97,54 @@ impl Differentiator<'_> {
             turn = u * arrival.distance;
             k = arrival.parent as usize;
         }
-        self.camera_ray(record, u, turn, sink);
+        self.camera_ray(record, u, turn, &Default::default(), sink);
     }
 
-    /// Sends the sensitivities to the camera ray's origin and to the rate of its direction.
+    /// Sends the sensitivities to the camera ray's origin and to the rate of its direction, besides what
+    /// was `seen` of its own.
     pub(super) fn camera_ray<S: AdjointSink>(
         &self,
         record: &PathRecord,
         origin: RgbVec,
         turn: RgbVec,
+        seen: &[SensorGradient; 3],
         sink: &mut S,
     ) {
         if !sink.interest().sensor {
             return;
         }
         let camera = &self.world.camera;
-        let gradient = |origin: Vec3, turn: Vec3| {
+        let gradient = |origin: Vec3, turn: Vec3, seen: &SensorGradient| {
             let mut g = camera.direction_gradient(record.nodes[0].wi, turn);
             g.position += origin;
+            g += *seen;
             g
         };
         sink.sensor(&[
-            gradient(origin.r, turn.r),
-            gradient(origin.g, turn.g),
-            gradient(origin.b, turn.b),
+            gradient(origin.r, turn.r, &seen[0]),
+            gradient(origin.g, turn.g, &seen[1]),
+            gradient(origin.b, turn.b, &seen[2]),
         ]);
     }
 }
 
-/// Sensitivities of a point where a ray along `dir` lands, and `dims` to the ray's length: split into
-/// one to the ray's velocity there, and those of the surface.
+/// Sensitivities of a point where a ray along `dir` lands, `shift` to the velocity of matter less that of
+/// the ray there, and `dims` to the ray's length: split into one to the ray's velocity there, and those
+/// of the surface. The point is carried with a share of `free`.
 fn split(
     world: &World,
     point: &SurfacePoint,
     dir: Vec3,
+    free: f64,
     here: &SurfaceAdjoint,
+    shift: RgbVec,
     dims: Rgb,
 ) -> (RgbVec, SurfaceAdjoint) {
     let slide = here.ns.map(|ns| world.normal_slide(point, ns));
-    let carried = here.u + slide;
+    let carried = (here.u + slide) * free - shift;
     let by_length = carried.dot(dir) + dims;
     let along_normal = by_length.outer(point.ng / point.ng.dot(dir));
-    let lift = SurfaceAdjoint { u: along_normal - slide, j: Rgb::ZERO, ..*here };
+    let u = along_normal + here.u - carried;
+    let lift = SurfaceAdjoint { u, ..*here };
     (carried - along_normal, lift)
 }

@@ -51,7 +51,8 @@ pub(super) fn trace(
     let mut rng = Rng::new(seed, u64::from(i % pixels), i / pixels);
     let view = tracer.world.camera.sample_view(i % pixels, rng.next_2d(), true);
     let weight = Rgb::splat(view.weight);
-    record.begin(view.direction, weight);
+    let pixel = [i % pixels % FILM[0], i % pixels / FILM[0]];
+    record.begin(pixel, view.direction, weight);
     tracer.rng = rng;
     tracer.trace_camera(view.direction, weight, record);
     view.slope

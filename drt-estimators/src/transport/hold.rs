@@ -1,0 +1,157 @@
+//! How far the vertices of the spatial form hold to the matter they are on.
+//!
+//! A ray at fixed direction d lands on a surface with the velocity (theory sheet §3)
+//!
+//! ```text
+//! c = x_dot + D_dot d,    D_dot = n·(u - x_dot) / (n·d),
+//! ```
+//!
+//! which grows without bounds where it grazes: second moments of what moves with c diverge, however
+//! slowly. The velocity field v by which an integral over a surface is differentiated is free, as
+//! long as v - u is tangential, u being that of matter. So vertices move by
+//!
+//! ```text
+//! v = (1 - φ) c + φ u,
+//! ```
+//!
+//! with φ = 1 where a curved surface is grazed. With div v = (1-φ) div c + φ div u + ∇φ·(u - c), the derivative of
+//! ∫ F dA, F holding the geometric term, scattering and transmittance, becomes
+//!
+//! ```text
+//! ∫ (1-φ) [∂_c F + F div c] + φ [∂_u F + F div u] + F ∇φ·(u - c)  dA,
+//! ```
+//!
+//! the first bracket being the spatial form, the second the material one (2021 paper, Eqs. 23–30). A
+//! jump of F at an edge moves relative to v, no more to c: of the two sides each counts by its own v.
+//!
+//! The second bracket has 1 / (n·d) too, from the geometric term, but over the ray's length where the
+//! first has the curvature of the surface, with whose normal radiance changes. So only what lies farther
+//! than its radius of curvature is held; and of what the camera sees, where a filter's slope takes the
+//! length's place, what grazes within about a pixel of its outline, less towards the borders of the
+//! filter's support.
+
+use alloc::vec::Vec;
+
+use drt_math::{Real, Vec3};
+
+use super::vertex::{Kind, SurfacePoint, Vertex};
+use super::world::World;
+
+/// Cosine below which surfaces begin to hold vertices.
+const GRAZING: f64 = 0.5;
+
+/// The same for the camera, per pixel in radii of curvature.
+const GRAZING_PIXELS: f64 = 2.0;
+
+/// What holds a vertex at its matter.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Hold {
+    /// φ.
+    pub(crate) share: f64,
+    /// ∇φ by the vertex's place.
+    pub(crate) slope: Vec3,
+}
+
+/// What a scene holds, and where from.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Holds {
+    /// Mean curvatures of the shapes, zero where nothing is held.
+    bends: Vec<f64>,
+    /// Cosines below which the camera's rays are held.
+    grazing: Vec<f64>,
+}
+
+impl Hold {
+    /// The product of two shares.
+    fn and(self, other: Self) -> Self {
+        let slope = self.slope * other.share + other.slope * self.share;
+        Self { share: self.share * other.share, slope }
+    }
+}
+
+impl World {
+    /// Lets surfaces hold vertices.
+    pub(crate) fn prepare_holds(&mut self) {
+        let bends: Vec<f64> = (0..self.scene.shapes.len()).map(|s| self.bend(s)).collect();
+        let camera = &self.camera;
+        let cosine = |(s, bend): (usize, &f64)| {
+            let center = self.scene.shapes[s].mesh.bounds().center();
+            let pixel = camera.pinhole().pixel_size * (center - camera.position()).length();
+            f64::min(GRAZING_PIXELS * bend * pixel, GRAZING)
+        };
+        let grazing = bends.iter().enumerate().map(cosine).collect();
+        self.holds = Holds { bends, grazing };
+    }
+
+    /// True when one of the shapes holds vertices.
+    pub(crate) fn any_holds(&self, shapes: &[bool]) -> bool {
+        self.holds.bends.iter().zip(shapes).any(|(bend, among)| *among && *bend > 0.0)
+    }
+
+    /// The mean curvature of a shape by its shading normals.
+    fn bend(&self, shape: usize) -> f64 {
+        let shape = &self.scene.shapes[shape];
+        // Next-event estimation shares the light of lamps, and does not hold their points.
+        let Some(normals) = shape.mesh.normals.as_ref().filter(|_| shape.emitter.is_none()) else {
+            return 0.0;
+        };
+        let (mut turns, mut area) = (0.0, 0.0);
+        for (t, corners) in (0..).zip(&shape.mesh.triangles) {
+            let [a, b, c] = shape.mesh.triangle(t);
+            let [i, j, k] = corners.map(|v| normals[v as usize]);
+            let own = (b - a).cross(c - a).length();
+            let (turn, along) = (
+                (j - i).length() + (k - j).length() + (i - k).length(),
+                (b - a).length() + (c - b).length() + (a - c).length(),
+            );
+            if own > 0.0 {
+                turns += own * turn / along;
+                area += own;
+            }
+        }
+        if area > 0.0 { turns / area } else { 0.0 }
+    }
+
+    /// What holds a vertex seen along `dir` from a vertex at a `distance`.
+    pub(crate) fn hold(&self, vertex: &Vertex, dir: Vec3, distance: f64) -> Hold {
+        let Kind::Surface(s) = &vertex.kind else { return Hold::default() };
+        let bend = self.holds.bends.get(s.shape as usize).copied().unwrap_or(0.0);
+        let graze = self.graze(s, dir, distance, if bend > 0.0 { GRAZING } else { 0.0 });
+        let q = bend * distance;
+        let rest = 1.0 / (1.0 + q * q);
+        graze.and(Hold { share: q * q * rest, slope: dir * (2.0 * q * bend * rest * rest) })
+    }
+
+    /// What holds a vertex that the camera sees, in every pixel.
+    pub(crate) fn hold_in_view(&self, vertex: &Vertex) -> Hold {
+        let Kind::Surface(s) = &vertex.kind else { return Hold::default() };
+        let cosine = self.holds.grazing.get(s.shape as usize).copied().unwrap_or(0.0);
+        let ray = vertex.x - self.camera.position();
+        let distance = ray.length();
+        self.graze(s, ray / distance, distance, cosine)
+    }
+
+    /// What holds a vertex that the camera sees, in one pixel.
+    pub(crate) fn hold_in_pixel(&self, vertex: &Vertex, pixel: [u32; 2]) -> Hold {
+        let hold = self.hold_in_view(vertex);
+        if hold.share == 0.0 {
+            return hold;
+        }
+        let view = self.camera.view(vertex.x);
+        let (share, slope) = self.camera.window(pixel, view.pixel);
+        let (slope, _) = self.camera.view_gradient(&view, slope, 0.0);
+        hold.and(Hold { share, slope })
+    }
+
+    /// Holds what is seen at less than a `cosine`.
+    fn graze(&self, s: &SurfacePoint, dir: Vec3, distance: f64, cosine: f64) -> Hold {
+        let seen = s.ns.dot(dir);
+        if Real::abs(seen) >= cosine {
+            return Hold::default();
+        }
+        let q = seen / cosine;
+        let rest = 1.0 - q * q;
+        let turn = self.normal_slide(s, dir) + s.ns.reject(dir) / distance;
+        Hold { share: rest * rest, slope: turn * (-4.0 * q * rest / cosine) }
+    }
+}
