@@ -30,6 +30,9 @@
 //! length's place, what grazes within about a pixel of its outline, less towards the borders of the
 //! filter's support.
 
+#[cfg(all(test, feature = "std"))]
+mod tests;
+
 use alloc::vec::Vec;
 
 use drt_math::{Real, Vec3};

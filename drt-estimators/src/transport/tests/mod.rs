@@ -6,7 +6,7 @@ mod moving;
 mod records;
 mod replay;
 #[path = "../../../tests/common/mod.rs"]
-mod scenes;
+pub(super) mod scenes;
 mod setup;
 mod voxels;
 
