@@ -361,6 +361,10 @@ impl SplatFilm {
         Self { size, weight: 0.0, layers: alloc::vec![layer; layers] }
     }
 
+    pub(crate) fn layers(&self) -> usize {
+        self.layers.len()
+    }
+
     pub(crate) fn begin(&self) -> SplatPass {
         let zero = alloc::vec![Rgb::ZERO; self.layers.first().map_or(0, |l| l.sum.len())];
         let layers = alloc::vec![(zero.clone(), zero); self.layers.len()];

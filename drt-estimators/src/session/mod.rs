@@ -48,6 +48,10 @@ pub struct FinishedTile<'a> {
 /// Between the seeds of the parts of a session, whose errors must not depend on each other.
 const SEED_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
+fn seed_of_part(seed: u64, i: usize) -> u64 {
+    seed.wrapping_add(SEED_STEP.wrapping_mul(i as u64))
+}
+
 /// A prepared scene and what has been accumulated for it.
 pub struct Session {
     /// Light adds up: each looks at some of it.
@@ -97,6 +101,15 @@ impl Session {
     #[must_use]
     pub fn plan(&self) -> &Plan {
         &self.plan
+    }
+
+    /// Forgets all images, and goes on as if prepared with this seed: what comes is independent of what
+    /// was.
+    pub fn restart(&mut self, seed: u64) {
+        for (i, part) in self.parts.iter_mut().enumerate() {
+            part.restart(seed_of_part(seed, i));
+        }
+        (self.samples, self.passes, self.complete) = (0, 0, true);
     }
 
     /// Adds `spp` samples per pixel, and boundary samples in proportion. Returns false when `control`
@@ -174,7 +187,7 @@ pub(crate) fn shares(scene: &Scene, settings: &Settings) -> Vec<(Settings, Lit)>
         shares.push((settings.estimator, Lit::All));
     }
     let with_seed = |(i, (estimator, lit)): (usize, _)| {
-        let seed = settings.seed.wrapping_add(SEED_STEP.wrapping_mul(i as u64));
+        let seed = seed_of_part(settings.seed, i);
         (Settings { estimator, seed, ..settings.clone() }, lit)
     };
     shares.into_iter().enumerate().map(with_seed).collect()

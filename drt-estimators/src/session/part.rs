@@ -90,6 +90,16 @@ impl Part {
         })
     }
 
+    /// Forgets all images and takes other random numbers from now on.
+    pub(super) fn restart(&mut self, seed: u64) {
+        self.pixels = PixelFilm::new(self.pixels.size(), self.pixels.layers());
+        for film in &mut self.splats {
+            *film = SplatFilm::new(self.pixels.size(), film.layers());
+        }
+        self.account = Account::default();
+        self.settings.seed = seed;
+    }
+
     /// Adds samples; returns how many each pixel took, and false when it was cancelled. `before` holds
     /// the image of the parts that ran already.
     pub(super) fn run(
