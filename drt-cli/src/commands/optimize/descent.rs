@@ -87,7 +87,7 @@ impl<'a> Descent<'a> {
             if i > 0 && problem.plan.reduce.at(i) != problem.plan.reduce.at(i - 1) {
                 fit = problem.fit_at(i)?;
             }
-            let Some(evaluation) = self.evaluate(&fit, monitor)? else {
+            let Some(evaluation) = self.evaluate(&mut fit, monitor)? else {
                 self.store()?;
                 return Ok(Outcome::Interrupted);
             };
@@ -111,7 +111,7 @@ impl<'a> Descent<'a> {
         }
     }
 
-    fn evaluate(&self, fit: &Fit, monitor: &Monitor) -> Result<Option<Evaluation>, CliError> {
+    fn evaluate(&self, fit: &mut Fit, monitor: &Monitor) -> Result<Option<Evaluation>, CliError> {
         let (i, n) = (self.steps(), self.problem.iterations);
         let name = match self.history.losses.last() {
             Some(loss) => format!("{i} of {n}, loss {loss:.4e}"),
