@@ -19,8 +19,6 @@ mod evaluation;
 mod linear;
 mod source;
 mod step;
-#[cfg(all(test, feature = "std"))]
-mod tests;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
