@@ -121,8 +121,10 @@ impl Report<'_> {
             for i in self.gallery.frames().filter(|i| *i <= self.steps) {
                 text += &figure(&self.gallery.frame(v, i), &format!("iteration {i}"));
             }
-            let now = format!("now, iteration {}", self.steps);
-            text += &figure(&self.gallery.file(v, "current"), &now);
+            if !self.gallery.frames().any(|i| i == self.steps) {
+                let now = format!("now, iteration {}", self.steps);
+                text += &figure(&self.gallery.file(v, "current"), &now);
+            }
             text += &figure(&self.gallery.file(v, "target"), "target");
             text += &figure(&self.gallery.file(v, "difference"), "now − target");
             text += "</div>\n";
