@@ -7,7 +7,7 @@
 use std::error::Error;
 
 use drt_geom::Mesh;
-use drt_geom::procedural::{bumpy_sphere, cube};
+use drt_geom::procedural::{bumpy_sphere, icosphere};
 use drt_math::{Affine, Mat3, Vec3, fm, vec3};
 use drt_motion::optimize::{Decay, Method, Optimizer, Variable};
 use drt_motion::{Cage, CageWeights};
@@ -16,9 +16,9 @@ const ITERATIONS: u32 = 300;
 
 /// What a fit came to.
 pub struct Fitted {
-    /// Root mean square distances of the cage's vertices from the true ones, and of the body's from the
-    /// target's, before and after.
+    /// Root mean square distance of the cage's vertices from the true ones, before and after.
     pub cage: [f64; 2],
+    /// That of the body's vertices from the target's.
     pub body: [f64; 2],
 }
 
@@ -43,12 +43,10 @@ fn vectors(numbers: &[f64]) -> Vec<Vec3> {
 /// Finds the motion of a cage's vertices from that of a body in it.
 pub fn fit() -> Result<Fitted, Box<dyn Error>> {
     let body = bumpy_sphere(3, 0.2, 5.0);
-    let cage = cube().transform(&Affine { linear: Mat3::IDENTITY * 1.6, translation: Vec3::ZERO });
+    let size = Affine { linear: Mat3::IDENTITY * 1.7, translation: Vec3::ZERO };
+    let cage = icosphere(0).transform(&size);
     let weights = CageWeights::new(&Cage::new(&cage)?, &body.positions);
-    // One entry per vertex of the cage's file, of which its mesh may have copies.
-    let truth = drt_motion::in_file_order(&cage, &true_motion(&cage));
-    let copies = drt_motion::in_file_order(&cage, &vec![Vec3::X; cage.positions.len()]);
-    let truth: Vec<Vec3> = truth.iter().zip(&copies).map(|(v, n)| *v * (1.0 / n.x)).collect();
+    let truth = true_motion(&cage);
     let target = weights.spread(&truth);
 
     let n = 3 * truth.len();
