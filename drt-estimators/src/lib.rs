@@ -15,9 +15,11 @@ mod error;
 mod film;
 pub mod filter;
 mod finite_difference;
+pub mod fit;
 mod flux;
 mod inside;
 mod interior;
+pub mod loss;
 mod parallel;
 mod pixels;
 mod plan;
@@ -49,3 +51,4 @@ pub use scene::{
 pub use scene_gradient::SceneGradient;
 pub use session::{Control, FinishedTile, Session, Unattended};
 pub use settings::{EstimatorKind, GivenTetrahedra, InsideKind, Settings};
+pub use tangents::moved;

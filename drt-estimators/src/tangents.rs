@@ -106,6 +106,14 @@ fn leaders(parameter: &Parameter<Target>, target: Target) -> Vec<Target> {
     found
 }
 
+/// The scene at its parameters' values.
+///
+/// # Errors
+/// When an effect does not fit its target.
+pub fn moved(scene: &Scene, parameters: &[Parameter]) -> Result<Scene, Error> {
+    apply(scene, parameters, 0).map(|(scene, _)| scene)
+}
+
 /// Applies the parameters to a scene and differentiates it; `sensor` is the camera in use.
 pub(crate) fn apply(
     scene: &Scene,

@@ -15,6 +15,7 @@ mod geometry;
 mod mean_value;
 mod moved;
 mod normals;
+pub mod optimize;
 mod parameter;
 mod property;
 mod surface;

@@ -5,8 +5,10 @@ mod check;
 mod clock;
 mod grad;
 mod info;
+mod markup;
 mod monitor;
 mod noise;
+mod optimize;
 mod options;
 mod outputs;
 mod render;
@@ -76,13 +78,12 @@ fn explain(e: &clap::Error) -> u8 {
 }
 
 fn dispatch(command: &Command) -> Result<Outcome, CliError> {
-    let later = |what| Err(CliError::argument(format!("`drt {what}` arrives in a later version")));
     match command {
         Command::Render(options) => render::run(options),
         Command::Grad(options) => grad::run(options),
         Command::Check(options) => check::run(options),
         Command::Info(options) => info::run(options),
-        Command::Optimize(_) => later("optimize"),
+        Command::Optimize(options) => optimize::run(options),
         Command::Bench(options) => bench::run(options),
     }
 }

@@ -22,8 +22,8 @@ pub(super) enum Command {
     Grad(GradOptions),
     /// Compare derivatives with finite differences; exit 1 when they disagree.
     Check(Options),
-    /// Fit a job's parameters to target images (not available yet).
-    Optimize(Options),
+    /// Fit a job's parameters to target images.
+    Optimize(OptimizeOptions),
     /// Measure error against run time at doubling sample counts.
     Bench(BenchOptions),
     /// Show what a scene or job holds, and what will run.
@@ -99,6 +99,18 @@ pub(super) struct GradOptions {
     /// Gradient of a loss given by its derivative image (not available yet).
     #[arg(long, value_name = "FILE.exr")]
     pub(super) adjoint: Option<PathBuf>,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct OptimizeOptions {
+    #[command(flatten)]
+    pub(super) common: Options,
+    /// Steps to take, instead of the job's.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) iterations: Option<u32>,
+    /// Begin anew, whatever the checkpoint says.
+    #[arg(long)]
+    pub(super) restart: bool,
 }
 
 #[derive(Args, Debug)]

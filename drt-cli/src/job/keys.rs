@@ -1,5 +1,6 @@
 //! The keys of a job file, as they stand there.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Deserialize;
@@ -19,9 +20,7 @@ pub(super) struct Job {
     pub(super) parameter_group: Vec<Spanned<ParameterGroup>>,
     #[serde(default)]
     pub(super) motion: Vec<Spanned<Motion>>,
-    /// Changes nothing unless fitting is asked for.
-    #[serde(rename = "optimize")]
-    pub(super) _optimize: Option<Optimize>,
+    pub(super) optimize: Option<Spanned<Optimize>>,
 }
 
 #[derive(Debug, Default, Deserialize)]
@@ -162,36 +161,122 @@ pub(super) enum MotionKind {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "checked for form; used by the optimisation")]
 pub(super) struct Optimize {
-    targets: Vec<PathBuf>,
-    loss: Option<Loss>,
-    optimizer: Option<Optimizer>,
-    checkpoint: Option<PathBuf>,
+    pub(super) targets: Vec<PathBuf>,
+    pub(super) sensors: Option<Spanned<Vec<String>>>,
+    pub(super) masks: Option<Spanned<Vec<PathBuf>>>,
+    pub(super) loss: Option<Spanned<Loss>>,
+    pub(super) optimizer: Option<Spanned<Optimizer>>,
+    #[serde(default)]
+    pub(super) bounds: BTreeMap<Spanned<String>, [f64; 2]>,
+    #[serde(default)]
+    pub(super) log: Vec<Spanned<String>>,
+    #[serde(default)]
+    pub(super) spp: Vec<Spanned<[u32; 2]>>,
+    #[serde(default)]
+    pub(super) reduce: Vec<Spanned<[u32; 2]>>,
+    pub(super) checkpoint: Option<PathBuf>,
+    pub(super) checkpoint_every: Option<Spanned<u32>>,
 }
 
 #[derive(Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[expect(dead_code, reason = "checked for form; used by the optimisation")]
+#[serde(
+    untagged,
+    expecting = "expected \"l2\", \"l1\", \"rmse\", \"pyramid-l2\" or { pyramid-l2 = { levels = 10, weight = 4 } }"
+)]
 pub(super) enum Loss {
+    Plain(LossKind),
+    Pyramid(PyramidLoss),
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum LossKind {
     L2,
     L1,
     Rmse,
-    PyramidL2 { levels: u32, weight: f64 },
+    PyramidL2,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub(super) struct PyramidLoss {
+    pub(super) pyramid_l2: Pyramid,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct Pyramid {
+    pub(super) levels: u32,
+    pub(super) weight: f64,
+}
+
+impl Default for Pyramid {
+    fn default() -> Self {
+        Self { levels: 10, weight: 4.0 }
+    }
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct Optimizer {
+    pub(super) kind: OptimizerKind,
+    pub(super) learning_rate: LearningRate,
+    pub(super) iterations: Option<u32>,
+    pub(super) betas: Option<[f64; 2]>,
+    pub(super) epsilon: Option<f64>,
+    pub(super) momentum: Option<f64>,
+    pub(super) decay: Decay,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum OptimizerKind {
+    #[default]
+    Adam,
+    Sgd,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "expected a number, or { NAME = number } with every parameter")]
+pub(super) enum LearningRate {
+    All(f64),
+    Each(BTreeMap<String, f64>),
+}
+
+impl Default for LearningRate {
+    fn default() -> Self {
+        Self::All(0.05)
+    }
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected \"constant\", \"exponential\", \"cosine\" or { kind = \"cosine\", end = 0.01 }"
+)]
+pub(super) enum Decay {
+    Plain(DecayKind),
+    Table(DecayTable),
+}
+
+impl Default for Decay {
+    fn default() -> Self {
+        Self::Plain(DecayKind::Constant)
+    }
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum DecayKind {
+    Constant,
+    Exponential,
+    Cosine,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "checked for form; used by the optimisation")]
-pub(super) struct Optimizer {
-    kind: OptimizerKind,
-    learning_rate: f64,
-    iterations: u32,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub(super) enum OptimizerKind {
-    Adam,
-    Sgd,
+pub(super) struct DecayTable {
+    pub(super) kind: DecayKind,
+    pub(super) end: f64,
 }

@@ -5,6 +5,7 @@ mod document;
 mod effects;
 mod keys;
 mod motions;
+mod optimize;
 #[cfg(test)]
 mod tests;
 mod velocities;
@@ -22,6 +23,7 @@ use crate::{CliError, Defaults};
 use cages::Cages;
 use document::Document;
 use effects::Refusal;
+pub use optimize::Optimize;
 
 /// What the command line lays over a job or scene.
 #[derive(Clone, Debug, Default)]
@@ -47,6 +49,8 @@ pub struct Job {
     pub parameters: Vec<Parameter<String>>,
     /// Budgets and switches.
     pub settings: Settings,
+    /// How the parameters are fitted to target images, where the job says so.
+    pub optimize: Option<Optimize>,
     /// What in the scene is passed over.
     pub warnings: Vec<Warning>,
     /// Where each parameter stands.
@@ -69,10 +73,22 @@ pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
     let (scene, warnings) = read_scene(&scene_path, &overrides.defaults)?;
     let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
     let settings = settings(&document, &keys, folder, &scene, &parameters)?;
+    let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters)?;
     let refused = refused(&document, &keys);
     let path = path.into();
     let text = Some(text);
-    Ok(Job { path, text, scene_path, scene, parameters, settings, warnings, places, refused })
+    Ok(Job {
+        path,
+        text,
+        scene_path,
+        scene,
+        parameters,
+        settings,
+        optimize,
+        warnings,
+        places,
+        refused,
+    })
 }
 
 impl Job {
@@ -89,6 +105,7 @@ impl Job {
             scene,
             parameters: Vec::new(),
             settings: Settings::default(),
+            optimize: None,
             warnings,
             places: Vec::new(),
             refused: None,

@@ -3,6 +3,7 @@
 mod describe;
 mod part;
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_motion::Parameter;
@@ -16,7 +17,7 @@ use crate::rendering::{Account, Rendering};
 use crate::scene::Scene;
 use crate::settings::{EstimatorKind, Settings};
 use crate::tangents;
-use crate::transport::Lit;
+use crate::transport::{Geometry, Lit};
 use crate::{Error, Estimate};
 
 /// Watches and steers a run. Every method has a default that does nothing.
@@ -48,6 +49,10 @@ pub struct FinishedTile<'a> {
 /// Between the seeds of the parts of a session, whose errors must not depend on each other.
 const SEED_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
+fn seed_of_part(seed: u64, i: usize) -> u64 {
+    seed.wrapping_add(SEED_STEP.wrapping_mul(i as u64))
+}
+
 /// A prepared scene and what has been accumulated for it.
 pub struct Session {
     /// Light adds up: each looks at some of it.
@@ -72,12 +77,23 @@ impl Session {
         parameters: &[Parameter],
         settings: &Settings,
     ) -> Result<Self, Error> {
+        Self::reusing(scene, parameters, settings, &mut None)
+    }
+
+    /// As [`new`](Self::new), with the geometry of an earlier scene where it is still the same; that of
+    /// this one is left there.
+    pub(crate) fn reusing(
+        scene: &Scene,
+        parameters: &[Parameter],
+        settings: &Settings,
+        geometry: &mut Option<Arc<Geometry>>,
+    ) -> Result<Self, Error> {
         settings.check()?;
         scene.check()?;
         let (scene, tangents) = tangents::apply(scene, parameters, settings.sensor)?;
         let mut parts = Vec::new();
         for (settings, lit) in shares(&scene, settings) {
-            parts.push(Part::new(scene.clone(), tangents.clone(), settings, lit)?);
+            parts.push(Part::new(scene.clone(), tangents.clone(), settings, lit, geometry)?);
         }
         let plan = Plan::together(parts.iter().map(|p| &p.plan));
         let size = scene.sensors[settings.sensor].item.sensor.film();
@@ -97,6 +113,15 @@ impl Session {
     #[must_use]
     pub fn plan(&self) -> &Plan {
         &self.plan
+    }
+
+    /// Forgets all images, and goes on as if prepared with this seed: what comes is independent of what
+    /// was.
+    pub fn restart(&mut self, seed: u64) {
+        for (i, part) in self.parts.iter_mut().enumerate() {
+            part.restart(seed_of_part(seed, i));
+        }
+        (self.samples, self.passes, self.complete) = (0, 0, true);
     }
 
     /// Adds `spp` samples per pixel, and boundary samples in proportion. Returns false when `control`
@@ -174,7 +199,7 @@ pub(crate) fn shares(scene: &Scene, settings: &Settings) -> Vec<(Settings, Lit)>
         shares.push((settings.estimator, Lit::All));
     }
     let with_seed = |(i, (estimator, lit)): (usize, _)| {
-        let seed = settings.seed.wrapping_add(SEED_STEP.wrapping_mul(i as u64));
+        let seed = seed_of_part(settings.seed, i);
         (Settings { estimator, seed, ..settings.clone() }, lit)
     };
     shares.into_iter().enumerate().map(with_seed).collect()

@@ -27,7 +27,7 @@ fn prepare() -> (Prepared, Motion) {
     let motion = parameter("ball", 0.0, vec![moves("ball", shift())]);
     let (scene, tangents) =
         tangents::apply(&scene, core::slice::from_ref(&motion), 0).expect("a valid parameter");
-    let world = World::new(scene, 0, Some(4), None, Lit::Extended).expect("a valid scene");
+    let world = World::new(scene, 0, Some(4), None, Lit::Extended, None).expect("a valid scene");
     let insides = Insides::at_rest(&world);
     let motion = Motion::new(tangents, insides);
     let settings = Settings { estimator: EstimatorKind::Radiative, ..Settings::default() };

@@ -1,0 +1,191 @@
+//! What is to be fitted: the job with its targets read.
+
+use std::collections::BTreeMap;
+
+use drt_estimators::Scene;
+use drt_estimators::fit::{Fit, View};
+use drt_estimators::loss::Reference;
+use drt_math::Rng;
+use drt_motion::Parameter;
+use drt_motion::optimize::Stages;
+
+use super::checkpoint::Fingerprint;
+use crate::commands::options::OptimizeOptions;
+use crate::error::{Place, read_text};
+use crate::image::read_picture;
+use crate::job::Optimize;
+use crate::{CliError, Job};
+
+/// Random numbers that name the seeds of iterations.
+const SEED_STREAM: u64 = 0x0f17;
+
+/// A job that can be fitted.
+pub(super) struct Problem<'a> {
+    pub(super) job: &'a Job,
+    pub(super) plan: &'a Optimize,
+    /// Sensors and what they shall see, at full size.
+    pub(super) views: Vec<View>,
+    pub(super) iterations: u32,
+    spp: Stages<u32>,
+}
+
+impl<'a> Problem<'a> {
+    pub(super) fn new(job: &'a Job, options: &OptimizeOptions) -> Result<Self, CliError> {
+        let place = Place::file(&job.path);
+        let plan = job.optimize.as_ref().ok_or_else(|| {
+            CliError::input(&place, "it has no [optimize], which names the targets to fit to")
+        })?;
+        if job.parameters.is_empty() {
+            return Err(CliError::input(&place, "it has no [[parameter]] to fit"));
+        }
+        let spp = match options.common.spp {
+            Some(spp) => Stages::new(spp, Vec::new()),
+            None => Stages::new(job.settings.spp, plan.spp.clone()),
+        };
+        let iterations = options.iterations.unwrap_or(plan.iterations);
+        let views = views(job, plan)?;
+        let problem = Self { job, plan, views, iterations, spp };
+        for factor in plan.reduce.values() {
+            problem.fit(factor)?;
+        }
+        Ok(problem)
+    }
+
+    /// What an iteration evaluates.
+    pub(super) fn fit_at(&self, iteration: u32) -> Result<Fit, CliError> {
+        self.fit(self.plan.reduce.at(iteration))
+    }
+
+    /// The problem with its images' sides divided by `factor`.
+    fn fit(&self, factor: u32) -> Result<Fit, CliError> {
+        let mut scene: Scene = self.job.scene.clone();
+        let mut views = Vec::new();
+        for (view, target) in self.views.iter().zip(&self.plan.targets) {
+            let fail = |e: &dyn std::fmt::Display| CliError::input(&Place::file(target), e);
+            let reference = match factor {
+                1 => view.reference.clone(),
+                _ => view.reference.reduced(factor).map_err(|e| fail(&e))?,
+            };
+            let sensor = &mut scene.sensors[view.sensor].item;
+            if factor != 1 {
+                let resized = sensor.sensor.with_film(reference.size());
+                sensor.sensor = resized.map_err(|e| fail(&e))?;
+            }
+            views.push(View { sensor: view.sensor, reference });
+        }
+        Fit::new(scene, views, self.plan.loss, self.job.settings.clone())
+            .map_err(|e| self.job.blame(&e))
+    }
+
+    pub(super) fn spp(&self, iteration: u32) -> u32 {
+        self.spp.at(iteration)
+    }
+
+    /// The seed of an iteration. Targets are often made with small seeds by the same program: no
+    /// iteration shares its random numbers with one.
+    pub(super) fn seed(&self, iteration: u32) -> u64 {
+        Rng::new(self.job.settings.seed, SEED_STREAM, iteration).next_u64()
+    }
+
+    /// Columns and rows of a view's images in an iteration.
+    pub(super) fn size(&self, view: usize, iteration: u32) -> [u32; 2] {
+        self.views[view].reference.size().map(|n| n / self.plan.reduce.at(iteration))
+    }
+
+    /// True when steps change a parameter.
+    pub(super) fn varies(&self, parameter: usize) -> bool {
+        self.plan.variables[parameter].learning_rate > 0.0
+    }
+
+    /// The first iteration with images of the size of iteration `i`, without another size between.
+    pub(super) fn stage_start(&self, i: u32) -> u32 {
+        let reduce = |i| self.plan.reduce.at(i);
+        (0..i).rev().take_while(|j| reduce(*j) == reduce(i)).last().unwrap_or(i)
+    }
+
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.job.parameters.iter().map(|p| p.name.as_str())
+    }
+
+    pub(super) fn start(&self) -> Vec<f64> {
+        self.job.parameters.iter().map(|p| p.value).collect()
+    }
+
+    pub(super) fn at(&self, values: &[f64]) -> Vec<Parameter> {
+        let parameters = self.job.parameters.iter().zip(values);
+        parameters.map(|(p, value)| Parameter { value: *value, ..p.clone() }).collect()
+    }
+
+    /// Tells this problem from others, for as far as it decides the steps; how many there are is left
+    /// out, so that a run can be prolonged.
+    pub(super) fn fingerprint(&self) -> Result<Fingerprint, CliError> {
+        let plan = self.plan;
+        let settings = drt_estimators::Settings { threads: 0, ..self.job.settings.clone() };
+        let mut sum = Fingerprint::default();
+        sum.add(read_text(&self.job.scene_path, None)?.as_bytes());
+        sum.add(format!("{:?} {settings:?}", self.job.parameters).as_bytes());
+        sum.add(format!("{:?} {:?}", plan.loss, plan.method).as_bytes());
+        sum.add(format!("{:?} {:?}", plan.variables, plan.decay).as_bytes());
+        sum.add(format!("{:?} {:?}", self.spp, plan.reduce).as_bytes());
+        for view in &self.views {
+            sum.add(format!("{} {:?}", view.sensor, view.reference).as_bytes());
+        }
+        Ok(sum)
+    }
+}
+
+/// The targets with their sensors.
+fn views(job: &Job, plan: &Optimize) -> Result<Vec<View>, CliError> {
+    let count = plan.targets.len();
+    let sensors = match &plan.sensors {
+        Some(sensors) => sensors.clone(),
+        None if count == 1 => vec![job.settings.sensor],
+        None if count == job.scene.sensors.len() => (0..count).collect(),
+        None => {
+            let message = format!(
+                "`targets` has {count} files, but the scene has {} sensors; expected one target, \
+                 one per sensor, or `sensors` with the sensor of each",
+                job.scene.sensors.len()
+            );
+            return Err(CliError::input(&Place::file(&job.path), message));
+        }
+    };
+    let mut used = BTreeMap::new();
+    let mut views = Vec::new();
+    for (i, (path, sensor)) in plan.targets.iter().zip(sensors).enumerate() {
+        if let Some(other) = used.insert(sensor, path) {
+            let message = format!("sensor {sensor} sees two targets, {} and this", other.display());
+            return Err(CliError::input(&Place::file(path), message));
+        }
+        let Some(of) = job.scene.sensors.get(sensor) else {
+            return Err(CliError::input(
+                &Place::file(&job.scene_path),
+                "the scene has no <sensor>",
+            ));
+        };
+        let film = of.item.sensor.film();
+        let check = |path, size: [u32; 2]| match size == film {
+            true => Ok(()),
+            false => Err(CliError::input(
+                &Place::file(path),
+                format!(
+                    "it has {}x{} pixels, but the film of its sensor has {}x{}; expected the same \
+                     size (`--size` changes the film's)",
+                    size[0], size[1], film[0], film[1]
+                ),
+            )),
+        };
+        let picture = read_picture(path)?;
+        check(path, picture.size)?;
+        let fail = |path, e| CliError::input(&Place::file(path), e);
+        let mut reference =
+            Reference::new(picture.size, picture.linear()).map_err(|e| fail(path, e))?;
+        if let Some(path) = plan.masks.get(i) {
+            let mask = read_picture(path)?;
+            check(path, mask.size)?;
+            reference = reference.with_mask(mask.gray()).map_err(|e| fail(path, e))?;
+        }
+        views.push(View { sensor, reference });
+    }
+    Ok(views)
+}

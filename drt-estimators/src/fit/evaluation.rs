@@ -1,0 +1,199 @@
+//! What an iteration learns from its images.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, fm};
+
+use super::View;
+use super::linear::newton_noise;
+use crate::loss::{Loss, inner};
+
+/// Sides of the squares of pixels whose errors are taken together, because filters may spread one
+/// sample over several pixels.
+const SQUARE: u32 = 4;
+
+/// Image and derivatives from half of the samples.
+#[derive(Clone, Debug)]
+pub(super) struct Half {
+    pub(super) image: Vec<Rgb>,
+    /// Per parameter.
+    pub(super) derivatives: Vec<Vec<Rgb>>,
+    pub(super) non_finite: u64,
+}
+
+/// One view by both halves.
+#[derive(Clone, Debug)]
+pub(super) struct Seen {
+    pub(super) halves: [Half; 2],
+}
+
+impl Seen {
+    fn image(&self) -> Vec<Rgb> {
+        let [a, b] = &self.halves;
+        mean(&a.image, &b.image)
+    }
+
+    fn derivative(&self, parameter: usize) -> Vec<Rgb> {
+        let [a, b] = &self.halves;
+        mean(&a.derivatives[parameter], &b.derivatives[parameter])
+    }
+}
+
+/// A scene at some values of its parameters, seen by every view of a [`Fit`](super::Fit).
+#[derive(Clone, Debug)]
+pub struct Evaluation {
+    loss: Loss,
+    views: Arc<[View]>,
+    seen: Vec<Seen>,
+    parameters: usize,
+}
+
+impl Evaluation {
+    pub(super) fn new(loss: Loss, views: Arc<[View]>, seen: Vec<Seen>, parameters: usize) -> Self {
+        Self { loss, views, seen, parameters }
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (&View, &Seen)> {
+        self.views.iter().zip(&self.seen)
+    }
+
+    /// The loss of the images by all samples, summed over views. Their noise adds to it.
+    #[must_use]
+    pub fn loss(&self) -> f64 {
+        self.pairs().map(|(v, s)| self.loss.value(&s.image(), &v.reference)).sum()
+    }
+
+    /// The gradient of the loss by the parameters, from images and derivatives with independent errors.
+    #[must_use]
+    pub fn gradient(&self) -> Vec<f64> {
+        let mut gradient = alloc::vec![0.0; self.parameters];
+        for (view, seen) in self.pairs() {
+            for (image, other) in [(0, 1), (1, 0)] {
+                let adjoint = self.loss.adjoint(&seen.halves[image].image, &view.reference);
+                for (sum, d) in gradient.iter_mut().zip(&seen.halves[other].derivatives) {
+                    *sum += 0.5 * inner(&adjoint, d);
+                }
+            }
+        }
+        gradient
+    }
+
+    /// The covariance of the [gradient](Self::gradient)'s errors, one row per parameter.
+    ///
+    /// From what the halves differ by, to first order in the noise; errors of pixels that are far apart
+    /// are taken as independent.
+    #[must_use]
+    pub fn covariance(&self) -> Vec<Vec<f64>> {
+        let n = self.parameters;
+        let mut covariance = alloc::vec![alloc::vec![0.0; n]; n];
+        for (view, seen) in self.pairs() {
+            let image = seen.image();
+            let value = self.loss.value(&image, &view.reference);
+            let adjoint = self.loss.adjoint(&image, &view.reference);
+            let [a, b] = &seen.halves;
+            let of = |p: usize| {
+                let slope = self.loss.curvature(&seen.derivative(p), value, &view.reference);
+                let product = |i: usize| {
+                    adjoint[i].dot(a.derivatives[p][i] - b.derivatives[p][i])
+                        + slope[i].dot(a.image[i] - b.image[i])
+                };
+                in_squares(view.reference.size(), product)
+            };
+            let differences: Vec<Vec<f64>> = (0..n).map(of).collect();
+            for (row, x) in covariance.iter_mut().zip(&differences) {
+                for (sum, y) in row.iter_mut().zip(&differences) {
+                    *sum += 0.25 * x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+                }
+            }
+        }
+        covariance
+    }
+
+    /// The standard errors of the [gradient](Self::gradient).
+    #[must_use]
+    pub fn gradient_errors(&self) -> Vec<f64> {
+        let covariance = self.covariance();
+        covariance.iter().enumerate().map(|(i, row)| fm::sqrt(row[i])).collect()
+    }
+
+    /// The second derivatives of the loss as far as they come from the first derivatives of the images
+    /// (Gauss and Newton's), one row per parameter; unbiased as the gradient.
+    #[must_use]
+    pub fn curvature(&self) -> Vec<Vec<f64>> {
+        let n = self.parameters;
+        let mut curvature = alloc::vec![alloc::vec![0.0; n]; n];
+        for (view, seen) in self.pairs() {
+            let value = self.loss.value(&seen.image(), &view.reference);
+            for (first, second) in [(0, 1), (1, 0)] {
+                for (j, d) in seen.halves[first].derivatives.iter().enumerate() {
+                    let curved = self.loss.curvature(d, value, &view.reference);
+                    for (k, other) in seen.halves[second].derivatives.iter().enumerate() {
+                        let product = 0.25 * inner(&curved, other);
+                        curvature[j][k] += product;
+                        curvature[k][j] += product;
+                    }
+                }
+            }
+        }
+        curvature
+    }
+
+    /// How far the noise of this evaluation alone would lead a Newton step astray, per parameter: a
+    /// measure of how well the samples determine the values. `None` where the images do not tell the
+    /// parameters apart.
+    #[must_use]
+    pub fn uncertainty(&self) -> Option<Vec<f64>> {
+        newton_noise(&self.curvature(), &self.covariance())
+    }
+
+    /// The image of a view by all samples, row by row from the top left.
+    ///
+    /// # Panics
+    /// When there is no such view.
+    #[must_use]
+    pub fn image(&self, view: usize) -> Vec<Rgb> {
+        self.seen[view].image()
+    }
+
+    /// The derivative of a view's image by a parameter, by all samples.
+    ///
+    /// # Panics
+    /// When there is no such view or parameter.
+    #[must_use]
+    pub fn derivative(&self, view: usize, parameter: usize) -> Vec<Rgb> {
+        self.seen[view].derivative(parameter)
+    }
+
+    /// True when the derivative by a parameter is zero in every pixel of every view.
+    ///
+    /// # Panics
+    /// When there is no such parameter.
+    #[must_use]
+    pub fn is_blind_to(&self, parameter: usize) -> bool {
+        let halves = self.seen.iter().flat_map(|s| &s.halves);
+        halves.into_iter().all(|h| h.derivatives[parameter].iter().all(|d| d.is_zero()))
+    }
+
+    /// Contributions that were not finite; they count as zero.
+    #[must_use]
+    pub fn non_finite(&self) -> u64 {
+        self.seen.iter().flat_map(|s| &s.halves).map(|h| h.non_finite).sum()
+    }
+}
+
+fn mean(a: &[Rgb], b: &[Rgb]) -> Vec<Rgb> {
+    a.iter().zip(b).map(|(a, b)| (*a + *b) * 0.5).collect()
+}
+
+/// Sums of a number per pixel over squares of pixels.
+fn in_squares([w, h]: [u32; 2], value: impl Fn(usize) -> f64) -> Vec<f64> {
+    let columns = w.div_ceil(SQUARE);
+    let mut sums = alloc::vec![0.0; (columns * h.div_ceil(SQUARE)) as usize];
+    for y in 0..h {
+        for x in 0..w {
+            sums[(y / SQUARE * columns + x / SQUARE) as usize] += value((y * w + x) as usize);
+        }
+    }
+    sums
+}

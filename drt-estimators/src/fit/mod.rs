@@ -1,0 +1,158 @@
+//! Fitting parameters to pictures: what one iteration needs to know.
+//!
+//! An image is an estimate, and so is its derivative; where both come from the same samples, their
+//! errors multiply to something that does not average out. Every iteration therefore takes its samples
+//! in two independent halves A and B, and pairs the adjoint a = dLoss/dI of one with the derivative of
+//! the other:
+//!
+//! ```text
+//! gradient = (⟨a(I_A), dI_B⟩ + ⟨a(I_B), dI_A⟩) / 2.
+//! ```
+//!
+//! That is unbiased where the adjoint is linear in the image, as it is for squared losses
+//! ([`Loss::L2`], [`Loss::PyramidL2`]), with any number of samples; for the others it is as far as the
+//! image's own noise matters less than its distance from the target. All samples still serve image and
+//! derivative alike, and a first-order expansion shows that nothing is lost: the error is that of the
+//! shared product, without its bias.
+
+mod evaluation;
+mod linear;
+mod source;
+mod step;
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_motion::Parameter;
+
+use crate::Error;
+use crate::loss::{Loss, Reference};
+use crate::scene::Scene;
+use crate::session::Control;
+use crate::settings::Settings;
+use crate::transport::Geometry;
+
+pub use evaluation::Evaluation;
+use evaluation::{Half, Seen};
+use source::Source;
+pub use step::{Misstep, check_step};
+
+/// A picture that a scene shall look like.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Index of the sensor that sees it.
+    pub sensor: usize,
+    /// What it shall see.
+    pub reference: Reference,
+}
+
+/// A scene, and what it shall look like.
+pub struct Fit {
+    scene: Scene,
+    views: Arc<[View]>,
+    loss: Loss,
+    settings: Settings,
+    /// Of the last evaluation.
+    geometry: Option<Arc<Geometry>>,
+}
+
+/// Between the seeds of the halves of an iteration, those of iterations being small steps apart.
+const HALF: u64 = 0xd1b5_4a32_d192_ed03;
+
+impl Fit {
+    /// `scene` at its parameters' zero; `settings` says how images and derivatives are estimated, its
+    /// sensor aside.
+    ///
+    /// # Errors
+    /// When there is no view, a view's sensor does not exist or has a film of another size, or a number
+    /// of the loss is out of its range.
+    pub fn new(
+        scene: Scene,
+        views: Vec<View>,
+        loss: Loss,
+        settings: Settings,
+    ) -> Result<Self, Error> {
+        let fail = |reason: alloc::string::String| {
+            Err(Error::Setting { setting: "target".into(), reason })
+        };
+        loss.check()?;
+        if views.is_empty() {
+            return fail("is missing: there is nothing to fit to".into());
+        }
+        for view in &views {
+            let Some(sensor) = scene.sensors.get(view.sensor) else {
+                return fail(alloc::format!("is of sensor {}, which does not exist", view.sensor));
+            };
+            let ([w, h], [fw, fh]) = (view.reference.size(), sensor.item.sensor.film());
+            if [w, h] != [fw, fh] {
+                return fail(alloc::format!(
+                    "has {w}x{h} pixels; the film of its sensor has {fw}x{fh}"
+                ));
+            }
+        }
+        Ok(Self { scene, views: views.into(), loss, settings, geometry: None })
+    }
+
+    /// Loss and derivatives at the parameters' values, from `spp` samples per pixel of each view, and at
+    /// least two; boundary samples are as many in proportion as the settings say. The same seed gives
+    /// the same result, whatever the settings' own, and whatever was evaluated before: what has not
+    /// changed since is used again. `None` when `control` cancelled it.
+    ///
+    /// # Errors
+    /// As [`Session::new`](crate::Session::new).
+    pub fn evaluate(
+        &mut self,
+        parameters: &[Parameter],
+        spp: u32,
+        seed: u64,
+        control: &dyn Control,
+    ) -> Result<Option<Evaluation>, Error> {
+        let mut seen = Vec::new();
+        let views = self.views.clone();
+        for (v, view) in views.iter().enumerate() {
+            let progress = |done| control.progress((v as f64 + done) / views.len() as f64);
+            let control = Watched { control, progress };
+            match self.halves(parameters, view.sensor, spp.div_ceil(2), seed, &control)? {
+                Some(halves) => seen.push(Seen { halves }),
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(Evaluation::new(self.loss, views, seen, parameters.len())))
+    }
+
+    /// Image and derivatives by one sensor, twice independently.
+    fn halves(
+        &mut self,
+        parameters: &[Parameter],
+        sensor: usize,
+        spp: u32,
+        seed: u64,
+        control: &dyn Control,
+    ) -> Result<Option<[Half; 2]>, Error> {
+        let settings = Settings { sensor, terms: false, ..self.settings.clone() };
+        let mut source = Source::new(&self.scene, parameters, settings, &mut self.geometry)?;
+        let mut half = |k: usize, seed| {
+            let progress = |done| control.progress(0.5 * (k as f64 + done));
+            source.half(spp, seed, &Watched { control, progress })
+        };
+        let Some(a) = half(0, seed)? else { return Ok(None) };
+        let b = half(1, seed.wrapping_add(HALF))?;
+        Ok(b.map(|b| [a, b]))
+    }
+}
+
+/// Watches a part of a longer run.
+struct Watched<'a, P> {
+    control: &'a dyn Control,
+    progress: P,
+}
+
+impl<P: Fn(f64) + Sync> Control for Watched<'_, P> {
+    fn cancelled(&self) -> bool {
+        self.control.cancelled()
+    }
+
+    fn progress(&self, done: f64) {
+        (self.progress)(done);
+    }
+}

@@ -1,0 +1,69 @@
+//! Where images and derivatives come from.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_math::Rgb;
+use drt_motion::Parameter;
+
+use super::evaluation::Half;
+use crate::rendering::Layer;
+use crate::scene::Scene;
+use crate::session::{Control, Session};
+use crate::settings::{EstimatorKind, Settings};
+use crate::transport::Geometry;
+use crate::{Error, finite_differences, moved};
+
+/// A scene prepared at its parameters' values.
+pub(super) struct Source<'a> {
+    session: Session,
+    /// Set where derivatives are differences of images.
+    differences: Option<(&'a Scene, &'a [Parameter])>,
+    settings: Settings,
+}
+
+impl<'a> Source<'a> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        parameters: &'a [Parameter],
+        settings: Settings,
+        geometry: &mut Option<Arc<Geometry>>,
+    ) -> Result<Self, Error> {
+        if settings.estimator == EstimatorKind::FiniteDifference {
+            let session = Session::reusing(&moved(scene, parameters)?, &[], &settings, geometry)?;
+            return Ok(Self { session, differences: Some((scene, parameters)), settings });
+        }
+        let session = Session::reusing(scene, parameters, &settings, geometry)?;
+        Ok(Self { session, differences: None, settings })
+    }
+
+    /// Image and derivatives by `spp` samples per pixel; `None` when it was cancelled.
+    pub(super) fn half(
+        &mut self,
+        spp: u32,
+        seed: u64,
+        control: &dyn Control,
+    ) -> Result<Option<Half>, Error> {
+        self.session.restart(seed);
+        if !self.session.run(spp, control) {
+            return Ok(None);
+        }
+        let rendering = self.session.rendering();
+        let mut derivatives: Vec<_> =
+            rendering.derivatives.iter().map(|d| means(&d.total)).collect();
+        if let Some((scene, parameters)) = self.differences {
+            let settings = Settings { seed, spp, ..self.settings.clone() };
+            let layers = finite_differences(scene, parameters, &settings, settings.step, control)?;
+            if layers.len() < parameters.len() {
+                return Ok(None);
+            }
+            derivatives = layers.iter().map(means).collect();
+        }
+        let (image, non_finite) = (means(&rendering.image), rendering.non_finite);
+        Ok(Some(Half { image, derivatives, non_finite }))
+    }
+}
+
+fn means(layer: &Layer) -> Vec<Rgb> {
+    layer.pixels.iter().map(|p| p.mean).collect()
+}

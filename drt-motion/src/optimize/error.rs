@@ -1,0 +1,77 @@
+use thiserror::Error;
+
+/// A request that cannot be optimised. Variables are counted from 0.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum OptimizeError {
+    /// Lists that belong together differ in length.
+    #[error("{what}: expected {expected} numbers, one per variable, found {found}")]
+    Length {
+        /// The list.
+        what: &'static str,
+        /// Variables.
+        expected: usize,
+        /// Numbers given.
+        found: usize,
+    },
+    /// A NaN or infinity.
+    #[error("variable {variable}: {what} is not finite")]
+    NotFinite {
+        /// The variable.
+        variable: usize,
+        /// The offending number.
+        what: &'static str,
+    },
+    /// A learning rate that is negative or not finite.
+    #[error(
+        "variable {variable}: the learning rate is {value}; expected a positive number, or 0 to keep the value"
+    )]
+    LearningRate {
+        /// The variable.
+        variable: usize,
+        /// The rate given.
+        value: f64,
+    },
+    /// Bounds with nothing between them.
+    #[error(
+        "variable {variable}: the bounds {lower} and {upper} leave no room; expected lower < upper"
+    )]
+    Bounds {
+        /// The variable.
+        variable: usize,
+        /// The lower bound.
+        lower: f64,
+        /// The upper bound.
+        upper: f64,
+    },
+    /// A start outside of the bounds.
+    #[error("variable {variable} starts at {value}, outside of its bounds {lower} to {upper}")]
+    Start {
+        /// The variable.
+        variable: usize,
+        /// The start.
+        value: f64,
+        /// The lower bound.
+        lower: f64,
+        /// The upper bound.
+        upper: f64,
+    },
+    /// A start that has no logarithm.
+    #[error("variable {variable} starts at {value}; what varies by its logarithm must be positive")]
+    NotPositive {
+        /// The variable.
+        variable: usize,
+        /// The start.
+        value: f64,
+    },
+    /// A number of the method out of its range.
+    #[error("{name} is {value}; expected {expected}")]
+    Method {
+        /// The number.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+}
