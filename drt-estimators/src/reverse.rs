@@ -77,7 +77,7 @@ pub fn gradient(
         });
     }
     let mut total: Option<SceneGradient> = None;
-    for (settings, lit) in shares(&scene, settings) {
+    for (settings, lit) in shares(&scene, wanted.iter().copied(), settings) {
         let part = gradient_of_share(&scene, wanted, &settings, lit, adjoint, control)?;
         match &mut total {
             Some(total) => total.add(&part),

@@ -33,6 +33,20 @@ pub(crate) struct Tangents {
     pub(crate) sensor: Vec<(usize, SensorTangent)>,
 }
 
+impl Tangents {
+    /// What changes with any parameter.
+    pub(crate) fn targets(&self) -> impl Iterator<Item = Target> {
+        fn some<T>(lists: &[Vec<T>]) -> impl Iterator<Item = usize> {
+            lists.iter().enumerate().filter(|(_, l)| !l.is_empty()).map(|(i, _)| i)
+        }
+        let shapes = some(&self.shapes).map(Target::Shape);
+        let media = some(&self.media).map(Target::Medium);
+        let emitters = some(&self.emitters).map(Target::Emitter);
+        let sensor = (!self.sensor.is_empty()).then_some(Target::Sensor(0));
+        shapes.chain(media).chain(emitters).chain(sensor)
+    }
+}
+
 /// Looks up every effect's target, and follows property effects on a shape to what carries the
 /// property.
 fn resolve(scene: &Scene, parameters: &[Parameter]) -> Result<Vec<Parameter<Target>>, Error> {

@@ -14,7 +14,7 @@ use crate::film::Blocks;
 use crate::parallel::Pool;
 use crate::plan::Plan;
 use crate::rendering::{Account, Rendering};
-use crate::scene::Scene;
+use crate::scene::{Scene, Target};
 use crate::settings::{EstimatorKind, Settings};
 use crate::tangents;
 use crate::transport::{Geometry, Lit};
@@ -92,7 +92,7 @@ impl Session {
         scene.check()?;
         let (scene, tangents) = tangents::apply(scene, parameters, settings.sensor)?;
         let mut parts = Vec::new();
-        for (settings, lit) in shares(&scene, settings) {
+        for (settings, lit) in shares(&scene, tangents.targets(), settings) {
             parts.push(Part::new(scene.clone(), tangents.clone(), settings, lit, geometry)?);
         }
         let plan = Plan::together(parts.iter().map(|p| &p.plan));
@@ -185,11 +185,24 @@ fn sum_of(parts: &[Part], pixels: core::ops::Range<u32>) -> Option<Vec<Estimate>
 }
 
 /// Which estimator looks at which light: points and directions do not fit the 2019 form (theory sheet
-/// §3), which leaves them to path space.
-pub(crate) fn shares(scene: &Scene, settings: &Settings) -> Vec<(Settings, Lit)> {
+/// §3), which leaves them to path space where one of the targets may move.
+pub(crate) fn shares(
+    scene: &Scene,
+    targets: impl IntoIterator<Item = Target>,
+    settings: &Settings,
+) -> Vec<(Settings, Lit)> {
+    let may_move = |target| match target {
+        Target::Shape(_) | Target::Sensor(_) => true,
+        Target::Bsdf(_) => false,
+        Target::Medium(m) => scene.media.get(m).is_some_and(|m| m.item.homogeneous().is_none()),
+        Target::Emitter(e) => scene.emitters.get(e).is_some_and(|e| e.item.emitter.is_delta()),
+    };
     let emitters = || scene.emitters.iter().map(|e| &e.item.emitter);
     let mut shares = Vec::new();
-    if settings.estimator == EstimatorKind::Radiative && emitters().any(|e| e.is_delta()) {
+    if settings.estimator == EstimatorKind::Radiative
+        && emitters().any(|e| e.is_delta())
+        && targets.into_iter().any(may_move)
+    {
         shares.push((EstimatorKind::PathSpace, Lit::Delta));
         let media = scene.media.iter().any(|m| m.item.is_emissive());
         if media || emitters().any(|e| !e.is_delta()) {
