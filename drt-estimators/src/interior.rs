@@ -28,15 +28,15 @@ pub(crate) struct AlongRays<'a> {
     pub(crate) shadows: Option<&'a Shadows>,
     /// Set in the spatial form.
     pub(crate) radiative: Option<&'a Radiative>,
-    /// Whether it finds edges from the vertices of paths.
-    pub(crate) edges: bool,
+    /// Looks of a path for edges, on average.
+    pub(crate) looks: f64,
 }
 
 impl AlongRays<'_> {
     /// The terms kept in layers of their own, where terms are kept apart.
     pub(crate) fn terms(&self) -> impl Iterator<Item = Term> {
         let flux = self.flux.map(|_| Term::Flux);
-        let edges = if self.edges { &[Term::Direct, Term::Indirect][..] } else { &[] };
+        let edges = if self.looks > 0.0 { &[Term::Direct, Term::Indirect][..] } else { &[] };
         flux.into_iter().chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
     }
 
@@ -186,7 +186,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let weight = Rgb::splat(s.weight);
         // What places an edge comes before what the path takes an unknown number of.
         let mut rng = rng;
-        let look = self.along.edges.then(|| Look::new(&mut rng));
+        let look = (self.along.looks > 0.0).then(|| Look::new(&mut rng));
         self.tracer.rng = rng;
         let Some(sink) = &mut self.sink else {
             let mut radiance = Radiance::default();
@@ -224,22 +224,33 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             });
             self.record.flux = flux;
         }
-        if let (Some(radiative), Some(look)) = (self.along.radiative, look)
-            && let Some(e) = radiative.edge(&mut self.tracer, &self.record, &look)
-        {
-            if self.separate {
-                at += if e.node == 1 { n } else { 2 * n };
-            }
-            sink.begin();
-            for (point, value) in e.matter.iter().flatten() {
-                if sink.interest().shapes[point.shape as usize] {
-                    let u = value.outer(e.n);
-                    sink.surface(point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
+        if let (Some(radiative), Some(first)) = (self.along.radiative, look) {
+            let share = 1.0 / self.along.looks;
+            let mut left = self.along.looks;
+            while left > 0.0 {
+                // The first has the best numbers; a part of a look is one now and then.
+                let rng = &mut self.tracer.rng;
+                let taken = left >= 1.0 || rng.next_f64() < left;
+                let look = if left == self.along.looks { first } else { Look::new(rng) };
+                left -= 1.0;
+                let edge = taken.then(|| radiative.edge(&mut self.tracer, &self.record, &look));
+                let Some(e) = edge.flatten() else { continue };
+                let layer = match e.node {
+                    _ if !self.separate => at,
+                    1 => at + n,
+                    _ => at + 2 * n,
+                };
+                sink.begin();
+                for (point, value) in e.matter.iter().flatten() {
+                    if sink.interest().shapes[point.shape as usize] {
+                        let u = (*value * share).outer(e.n);
+                        sink.surface(point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
+                    }
                 }
+                let viewer = (e.viewer * share).outer(e.n);
+                self.differentiator.carry_back(&self.record, e.node, 0.0, viewer, sink);
+                sink.finish(&mut values[layer..layer + n]);
             }
-            let viewer = e.viewer.outer(e.n);
-            self.differentiator.carry_back(&self.record, e.node, 0.0, viewer, sink);
-            sink.finish(&mut values[at..at + n]);
         }
         if let Some(shadows) = self.along.shadows {
             at += if self.separate { n } else { 0 };

@@ -25,6 +25,8 @@ pub(crate) struct Prepared {
     pub(crate) sources: Vec<Source>,
     /// Image points come in mirrored pairs.
     pub(crate) antithetic: bool,
+    /// Looks of a path for edges, on average; of the spatial form.
+    looks: f64,
 }
 
 impl Prepared {
@@ -38,7 +40,7 @@ impl Prepared {
     ) -> Result<Self, Error> {
         let moving = interest.moves_geometry();
         if settings.estimator == EstimatorKind::Radiative && interest.any() {
-            return Self::spatial(world, interest, motion);
+            return Self::spatial(world, interest, settings, motion);
         }
         let boundary = if moving { Boundary::new(&world, interest)? } else { Boundary::default() };
         let flux = Flux::new(&world, flux_shapes, interest);
@@ -55,13 +57,14 @@ impl Prepared {
         }
         // The filter's rate is what mirrored pairs cancel; without it they only cost.
         let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
-        Ok(Self { world, boundary, flux, radiative: None, sources, antithetic })
+        Ok(Self { world, boundary, flux, radiative: None, sources, antithetic, looks: 0.0 })
     }
 
     /// For the 2019 estimator.
     fn spatial(
         mut world: World,
         interest: &Interest,
+        settings: &Settings,
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
         world.prepare_holds();
@@ -75,17 +78,18 @@ impl Prepared {
         };
         let sources =
             if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
+        let looks = if radiative.has_edges(&world) { boundary_ratio(settings) } else { 0.0 };
         let boundary = Boundary::default();
-        Ok(Self { world, boundary, flux, radiative: Some(radiative), sources, antithetic: false })
+        let radiative = Some(radiative);
+        Ok(Self { world, boundary, flux, radiative, sources, antithetic: false, looks })
     }
 
     pub(crate) fn along_rays(&self) -> AlongRays<'_> {
-        let radiative = self.radiative.as_ref();
         AlongRays {
             flux: self.flux.as_ref(),
             shadows: self.boundary.shadows.as_ref(),
-            radiative,
-            edges: radiative.filter(|r| r.has_edges(&self.world)).is_some(),
+            radiative: self.radiative.as_ref(),
+            looks: self.looks,
         }
     }
 
@@ -97,9 +101,12 @@ impl Prepared {
     /// Samples of each batch of each splatted source, when every pixel takes `spp`.
     pub(crate) fn samples_per_batch(&self, settings: &Settings, spp: u32) -> u32 {
         let [w, h] = self.world.camera.film();
-        let ratio =
-            settings.boundary_spp.map_or(1.0, |b| f64::from(b) / f64::from(settings.spp.max(1)));
-        let samples = f64::from(spp) * ratio * f64::from(w) * f64::from(h);
+        let samples = f64::from(spp) * boundary_ratio(settings) * f64::from(w) * f64::from(h);
         f64::max(samples / (self.sources.len().max(1) * BATCHES) as f64, 1.0) as u32
     }
+}
+
+/// Boundary samples to each sample of a pixel.
+fn boundary_ratio(settings: &Settings) -> f64 {
+    settings.boundary_spp.map_or(1.0, |b| f64::from(b) / f64::from(settings.spp.max(1)))
 }
