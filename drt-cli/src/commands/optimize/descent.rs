@@ -224,6 +224,7 @@ impl<'a> Descent<'a> {
             gallery,
             steps: self.steps(),
             uncertainty: seen.uncertainty(),
+            left: seen.newton_step(),
             spent: self.spent(),
             failure,
         };
