@@ -103,6 +103,9 @@ impl<'a> Descent<'a> {
             }
             let Some(evaluation) = self.evaluate(&mut fit, monitor)? else {
                 self.store()?;
+                if let Some(seen) = &last {
+                    self.picture(seen, None)?;
+                }
                 return Ok((Outcome::Interrupted, last));
             };
             self.look_at(i, &evaluation)?;
