@@ -30,6 +30,9 @@ pub(crate) struct Tangents {
     pub(crate) media: Vec<Vec<(usize, MediumTangent)>>,
     pub(crate) bsdfs: Vec<Vec<(usize, BsdfTangent)>>,
     pub(crate) emitters: Vec<Vec<(usize, EmitterTangent)>>,
+    /// Of every sensor.
+    sensors: Vec<Vec<(usize, SensorTangent)>>,
+    /// Of the one that is in use.
     pub(crate) sensor: Vec<(usize, SensorTangent)>,
 }
 
@@ -44,6 +47,12 @@ impl Tangents {
         let emitters = some(&self.emitters).map(Target::Emitter);
         let sensor = (!self.sensor.is_empty()).then_some(Target::Sensor(0));
         shapes.chain(media).chain(emitters).chain(sensor)
+    }
+
+    /// The same for one of the sensors; where there is no such sensor, none changes.
+    pub(crate) fn seen_by(&self, sensor: usize) -> Self {
+        let sensor = self.sensors.get(sensor).cloned().unwrap_or_default();
+        Self { sensor, ..self.clone() }
     }
 }
 
@@ -125,15 +134,11 @@ fn leaders(parameter: &Parameter<Target>, target: Target) -> Vec<Target> {
 /// # Errors
 /// When an effect does not fit its target.
 pub fn moved(scene: &Scene, parameters: &[Parameter]) -> Result<Scene, Error> {
-    apply(scene, parameters, 0).map(|(scene, _)| scene)
+    apply(scene, parameters).map(|(scene, _)| scene)
 }
 
-/// Applies the parameters to a scene and differentiates it; `sensor` is the camera in use.
-pub(crate) fn apply(
-    scene: &Scene,
-    parameters: &[Parameter],
-    sensor: usize,
-) -> Result<(Scene, Tangents), Error> {
+/// Applies the parameters to a scene and differentiates it, without a sensor in use.
+pub(crate) fn apply(scene: &Scene, parameters: &[Parameter]) -> Result<(Scene, Tangents), Error> {
     let parameters = resolve(scene, parameters)?;
     let mut applied = Apply {
         scene: scene.clone(),
@@ -158,9 +163,7 @@ pub(crate) fn apply(
     }
     for i in 0..scene.sensors.len() {
         let tangents = applied.sensor(i)?;
-        if i == sensor {
-            applied.tangents.sensor = tangents;
-        }
+        applied.tangents.sensors.push(tangents);
     }
     Ok((applied.scene, applied.tangents))
 }

@@ -1,6 +1,7 @@
 //! The example that fits a cage arrives.
 
 #[path = "../examples/fit_cage.rs"]
+#[allow(unreachable_pub, reason = "an example is a crate of its own")]
 mod fit_cage;
 
 #[test]

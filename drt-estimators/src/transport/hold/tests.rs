@@ -13,6 +13,7 @@ use crate::boundary::Receiver;
 use crate::contraction::{Contraction, Motion};
 use crate::inside::Insides;
 use crate::interior::{PixelSampler, sequence_name};
+use crate::kept::Kept;
 use crate::pixels::Sampler;
 use crate::prepared::Prepared;
 use crate::sensitivity::Functional;
@@ -26,10 +27,12 @@ fn prepare() -> (Prepared, Motion) {
     let scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
     let motion = parameter("ball", 0.0, vec![moves("ball", shift())]);
     let (scene, tangents) =
-        tangents::apply(&scene, core::slice::from_ref(&motion), 0).expect("a valid parameter");
-    let world = World::new(scene, 0, Some(4), None, Lit::Extended, None).expect("a valid scene");
+        tangents::apply(&scene, core::slice::from_ref(&motion)).expect("a valid parameter");
+    let mut kept = Kept::default();
+    let world = World::new(scene, 0, Some(4), None, Lit::Extended, &mut kept);
+    let world = world.expect("a valid scene");
     let insides = Insides::at_rest(&world);
-    let motion = Motion::new(tangents, insides);
+    let motion = Motion::new(tangents.seen_by(0), insides);
     let settings = Settings { estimator: EstimatorKind::Radiative, ..Settings::default() };
     let prepared = Prepared::new(world, &motion.interest, &[], &settings, Some(&motion));
     (prepared.expect("a valid scene"), motion)
