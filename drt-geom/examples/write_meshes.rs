@@ -32,9 +32,12 @@ fn write_all(folder: &Path) -> io::Result<()> {
     let knot = TorusKnot { segments: 160, sides: 14, tube: 0.22, ..TorusKnot::default() };
     // Where the scene puts the bar.
     let cage = box_surface([1, 3, 1], vec3(0.5, 1.2, 0.5));
+    // Around a body that stands on the ground, two high.
+    let body_cage = box_surface([1, 3, 1], vec3(0.95, 0.95, 0.95));
     let meshes = [
         ("bar", bar()),
         ("bar-cage", cage.transform(&Affine::translation(vec3(0.0, 1.12, 0.0)))),
+        ("body-cage", body_cage.transform(&Affine::translation(vec3(0.0, 0.95, 0.0)))),
         ("bumpy", procedural::bumpy_sphere(4, 0.35, 4.0)),
         ("crystal", crystal()),
         ("knot", procedural::torus_knot(&knot)),
