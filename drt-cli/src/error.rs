@@ -74,6 +74,9 @@ pub enum CliError {
     /// An argument that cannot be used.
     #[error("{0}")]
     Argument(String),
+    /// A fit that cannot go on; what it reached is stored.
+    #[error("{0}")]
+    Unsolved(String),
     /// A result that cannot be written.
     #[error("cannot write {}: {reason}", path.display())]
     Write {
@@ -100,11 +103,17 @@ impl CliError {
         Self::Write { path: path.into(), reason: reason.to_string() }
     }
 
-    /// The exit code of the command: 2 for unusable input or arguments, 3 for a failure to write.
+    /// A fit that cannot go on.
+    pub fn unsolved(message: impl fmt::Display) -> Self {
+        Self::Unsolved(message.to_string())
+    }
+
+    /// The exit code of the command: 1 for a fit that failed, 2 for unusable input or arguments, 3 for a failure to write.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Input { .. } | Self::Argument(_) => 2,
+            Self::Unsolved(_) => 1,
             Self::Write { .. } => 3,
         }
     }

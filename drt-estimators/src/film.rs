@@ -214,6 +214,16 @@ impl PixelFilm {
         self.before.units + self.run_units + self.partial_units
     }
 
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
+        self.passes.clear();
+        self.before = Count::default();
+        self.runs.fill(Runs::NONE);
+        self.partial.fill(Rgb::ZERO);
+        (self.run_count, self.run_units, self.partial_units) = (0, 0, 0);
+        self.events.fill(Events::NONE);
+    }
+
     /// Begins a pass.
     pub(crate) fn begin(&mut self) {
         let count = self.count();
@@ -361,8 +371,14 @@ impl SplatFilm {
         Self { size, weight: 0.0, layers: alloc::vec![layer; layers] }
     }
 
-    pub(crate) fn layers(&self) -> usize {
-        self.layers.len()
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
+        self.weight = 0.0;
+        for layer in &mut self.layers {
+            layer.sum.fill(Rgb::ZERO);
+            layer.variance.fill(Rgb::ZERO);
+            layer.events = Events::NONE;
+        }
     }
 
     pub(crate) fn begin(&self) -> SplatPass {

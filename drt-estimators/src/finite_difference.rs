@@ -49,7 +49,7 @@ pub fn finite_differences(
             moved[p].value += offset;
             let (scene, _) = tangents::apply(scene, &moved, settings.sensor)?;
             let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-            World::new(scene, settings.sensor, depth, middle, Lit::All)
+            World::new(scene, settings.sensor, depth, middle, Lit::All, None)
         };
         let middle = at(0.0, None)?;
         let worlds = [at(-step, Some(&middle))?, at(step, Some(&middle))?];

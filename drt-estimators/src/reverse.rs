@@ -98,7 +98,7 @@ fn gradient_of_share(
     control: &dyn Control,
 ) -> Result<SceneGradient, Error> {
     let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-    let mut world = World::new(scene.clone(), settings.sensor, depth, None, lit)?;
+    let mut world = World::new(scene.clone(), settings.sensor, depth, None, lit, None)?;
     let mut interest = interest(&world.scene, wanted);
     for (e, emitter) in scene.emitters.iter().enumerate() {
         interest.emitters[e] &= lit.by(&emitter.item.emitter);

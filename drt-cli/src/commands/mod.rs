@@ -5,6 +5,7 @@ mod check;
 mod clock;
 mod grad;
 mod info;
+mod markup;
 mod monitor;
 mod noise;
 mod optimize;

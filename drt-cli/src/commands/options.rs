@@ -103,25 +103,14 @@ pub(super) struct GradOptions {
 
 #[derive(Args, Debug)]
 pub(super) struct OptimizeOptions {
-    /// A job (.toml) with [optimize].
-    pub(super) input: PathBuf,
+    #[command(flatten)]
+    pub(super) common: Options,
     /// Steps to take, instead of the job's.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) iterations: Option<u32>,
-    /// Samples per pixel and iteration, instead of the job's.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-    pub(super) spp: Option<u32>,
-    /// Stop after this time; the same command goes on from the checkpoint.
-    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
-    pub(super) seconds: Option<f64>,
     /// Begin anew, whatever the checkpoint says.
     #[arg(long)]
     pub(super) restart: bool,
-    /// Where to write the final image and derivatives, as OpenEXR.
-    #[arg(short, long, value_name = "FILE.exr")]
-    pub(super) output: Option<PathBuf>,
-    #[command(flatten)]
-    pub(super) changes: Changes,
 }
 
 #[derive(Args, Debug)]

@@ -88,9 +88,12 @@ pub(super) fn prepare(job: &Job, parameters: &[Parameter<String>]) -> Result<Ses
 
 /// Prepares the image alone, at the parameters' values.
 pub(super) fn prepare_forward(job: &Job) -> Result<Session, CliError> {
-    // At zero, effects change nothing, and without parameters nothing is spent on derivatives.
     let at_rest = job.parameters.iter().all(|p| p.value == 0.0);
-    prepare(job, if at_rest { &[] } else { &job.parameters })
+    if at_rest {
+        return prepare(job, &[]);
+    }
+    let scene = drt_estimators::moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
+    Session::new(&scene, &[], &job.settings).map_err(|e| job.blame(&e))
 }
 
 /// Finite differences of every parameter; `None` when they were interrupted.

@@ -3,8 +3,10 @@
 use std::path::Path;
 
 use drt_estimators::{Layer, Rendering};
+use drt_math::Rgb;
 
 use super::font;
+use super::picture::encode_png;
 use super::tone::{self, Pixel};
 use crate::CliError;
 use crate::atomic::write_atomically;
@@ -43,11 +45,13 @@ pub fn write_preview(
     rendering: &Rendering,
     further: &[(String, &Layer)],
 ) -> Result<(), CliError> {
-    let image = tone::exposed(&rendering.image);
+    let image = means(&rendering.image);
+    let image = tone::exposed(&image, tone::white_of(&image));
     let derivatives = rendering.derivatives.iter();
     let mut panels: Vec<(String, Vec<Pixel>)> =
-        derivatives.map(|d| (format!("d_{}", d.name), tone::diverging(&d.total))).collect();
-    panels.extend(further.iter().map(|(name, layer)| (name.clone(), tone::diverging(layer))));
+        derivatives.map(|d| (format!("d_{}", d.name), tone::diverging(&means(&d.total)))).collect();
+    panels
+        .extend(further.iter().map(|(name, layer)| (name.clone(), tone::diverging(&means(layer)))));
     let [w, h] = rendering.image.size.map(|n| n as usize);
     let canvas = if panels.is_empty() {
         Canvas { width: w, height: h, pixels: image }
@@ -56,14 +60,12 @@ pub fn write_preview(
         sheet(&panels, [w, h])
     };
     write_atomically(path, |out| {
-        let mut encoder = png::Encoder::new(out, canvas.width as u32, canvas.height as u32);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
-        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-        let mut writer = encoder.write_header()?;
-        writer.write_image_data(canvas.pixels.as_flattened())?;
-        Ok(writer.finish()?)
+        Ok(encode_png(out, [canvas.width as u32, canvas.height as u32], &canvas.pixels)?)
     })
+}
+
+fn means(layer: &Layer) -> Vec<Rgb> {
+    layer.pixels.iter().map(|p| p.mean).collect()
 }
 
 /// Panels of one size in a grid, each above its name.

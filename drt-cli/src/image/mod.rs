@@ -6,8 +6,8 @@ mod font;
 mod picture;
 #[cfg(test)]
 pub(crate) mod tests;
-mod tone;
+pub(crate) mod tone;
 
 pub use contact_sheet::write_preview;
 pub use exr_file::{ExrFile, Provenance, read_exr, write_exr};
-pub(crate) use picture::read_picture;
+pub(crate) use picture::{encode_png, read_picture};

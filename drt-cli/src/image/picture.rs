@@ -1,12 +1,13 @@
-//! Pictures to fit to: linear colours from EXR or PNG.
+//! Plain pictures: linear colours from EXR or PNG, and PNG to look at.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Write};
 use std::path::Path;
 
 use drt_math::Rgb;
 
 use super::read_exr;
+use super::tone::Pixel;
 use crate::CliError;
 use crate::error::Place;
 
@@ -79,4 +80,19 @@ fn read_png(path: &Path) -> Result<Picture, Box<dyn std::error::Error>> {
 /// The inverse of the sRGB transfer curve (IEC 61966-2-1).
 fn decode(s: f64) -> f64 {
     if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
+}
+
+/// Writes a picture as PNG.
+pub(crate) fn encode_png(
+    out: impl Write,
+    [w, h]: [u32; 2],
+    pixels: &[Pixel],
+) -> Result<(), png::EncodingError> {
+    let mut encoder = png::Encoder::new(out, w, h);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(pixels.as_flattened())?;
+    writer.finish()
 }

@@ -1,24 +1,27 @@
 //! From radiance and derivatives to colours on a screen.
 
-use drt_estimators::Layer;
 use drt_math::Rgb;
 
 /// Part of the pixels that may be overexposed.
 const BRIGHTEST: f64 = 0.01;
 
 /// Eight bits per channel, in sRGB.
-pub(super) type Pixel = [u8; 3];
+pub(crate) type Pixel = [u8; 3];
 
-/// An image exposed so that all but its brightest pixels fit.
-pub(super) fn exposed(layer: &Layer) -> Vec<Pixel> {
-    let white = quantile(layer, |c| c.max_channel());
-    let scale = if white > 0.0 { 1.0 / white } else { 1.0 };
-    layer.pixels.iter().map(|p| (p.mean * scale).to_array().map(encode)).collect()
+/// The value to show as white, so that all but the brightest pixels fit.
+pub(crate) fn white_of(image: &[Rgb]) -> f64 {
+    let white = quantile(image, |c| c.max_channel());
+    if white > 0.0 { white } else { 1.0 }
+}
+
+/// An image with `white` as white.
+pub(crate) fn exposed(image: &[Rgb], white: f64) -> Vec<Pixel> {
+    image.iter().map(|c| (*c * (1.0 / white)).to_array().map(encode)).collect()
 }
 
 /// Blue for negative, white for zero, red for positive; full colour at the image's own range.
-pub(super) fn diverging(layer: &Layer) -> Vec<Pixel> {
-    let range = quantile(layer, |c| c.mean().abs());
+pub(crate) fn diverging(image: &[Rgb]) -> Vec<Pixel> {
+    let range = quantile(image, |c| c.mean().abs());
     let scale = if range > 0.0 { 1.0 / range } else { 0.0 };
     let negative = Rgb::new(0.02, 0.12, 0.55);
     let positive = Rgb::new(0.55, 0.03, 0.04);
@@ -27,13 +30,13 @@ pub(super) fn diverging(layer: &Layer) -> Vec<Pixel> {
         let t = v.abs().min(1.0);
         Rgb::ONE * (1.0 - t) + end * t
     };
-    layer.pixels.iter().map(|p| color(p.mean.mean() * scale).to_array().map(encode)).collect()
+    image.iter().map(|c| color(c.mean() * scale).to_array().map(encode)).collect()
 }
 
 /// The value that only the brightest pixels exceed.
-fn quantile(layer: &Layer, measure: impl Fn(Rgb) -> f64) -> f64 {
+fn quantile(image: &[Rgb], measure: impl Fn(Rgb) -> f64) -> f64 {
     let mut values: Vec<f64> =
-        layer.pixels.iter().map(|p| measure(p.mean)).filter(|v| v.is_finite()).collect();
+        image.iter().map(|c| measure(*c)).filter(|v| v.is_finite()).collect();
     if values.is_empty() {
         return 0.0;
     }
@@ -53,35 +56,29 @@ fn encode(v: f64) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drt_estimators::Estimate;
-
-    fn layer(values: &[f64]) -> Layer {
-        let estimate = |v: &f64| Estimate { mean: Rgb::splat(*v), ..Default::default() };
-        Layer {
-            size: [values.len() as u32, 1],
-            pixels: values.iter().map(estimate).collect(),
-            blocks: Vec::new(),
-            total: Estimate::default(),
-        }
+    fn gray(values: &[f64]) -> Vec<Rgb> {
+        values.iter().copied().map(Rgb::splat).collect()
     }
 
     #[test]
     fn zero_is_white_and_signs_are_told_apart() {
-        let [minus, zero, plus] = diverging(&layer(&[-2.0, 0.0, 2.0]))[..] else { panic!() };
+        let [minus, zero, plus] = diverging(&gray(&[-2.0, 0.0, 2.0]))[..] else { panic!() };
         assert_eq!(zero, [255; 3]);
         assert!(minus[2] > minus[0] && plus[0] > plus[2]);
     }
 
     #[test]
     fn black_images_stay_black() {
-        assert_eq!(exposed(&layer(&[0.0, 0.0])), [[0; 3]; 2]);
-        assert_eq!(diverging(&layer(&[0.0])), [[255; 3]]);
+        let black = gray(&[0.0, 0.0]);
+        assert_eq!(exposed(&black, white_of(&black)), [[0; 3]; 2]);
+        assert_eq!(diverging(&gray(&[0.0])), [[255; 3]]);
     }
 
     #[test]
     fn the_brightest_pixel_of_a_dark_image_shows() {
         let mut values = vec![0.0; 1000];
         values[7] = 1e-6;
-        assert_eq!(exposed(&layer(&values))[7], [255; 3]);
+        let image = gray(&values);
+        assert_eq!(exposed(&image, white_of(&image))[7], [255; 3]);
     }
 }

@@ -18,8 +18,7 @@
 mod evaluation;
 mod linear;
 mod source;
-#[cfg(all(test, feature = "std"))]
-mod tests;
+mod step;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -31,10 +30,12 @@ use crate::loss::{Loss, Reference};
 use crate::scene::Scene;
 use crate::session::Control;
 use crate::settings::Settings;
+use crate::transport::Geometry;
 
 pub use evaluation::Evaluation;
 use evaluation::{Half, Seen};
 use source::Source;
+pub use step::{Misstep, check_step};
 
 /// A picture that a scene shall look like.
 #[derive(Clone, Debug)]
@@ -51,6 +52,8 @@ pub struct Fit {
     views: Arc<[View]>,
     loss: Loss,
     settings: Settings,
+    /// Of the last evaluation.
+    geometry: Option<Arc<Geometry>>,
 }
 
 /// Between the seeds of the halves of an iteration, those of iterations being small steps apart.
@@ -87,37 +90,39 @@ impl Fit {
                 ));
             }
         }
-        Ok(Self { scene, views: views.into(), loss, settings })
+        Ok(Self { scene, views: views.into(), loss, settings, geometry: None })
     }
 
     /// Loss and derivatives at the parameters' values, from `spp` samples per pixel of each view, and at
     /// least two; boundary samples are as many in proportion as the settings say. The same seed gives
-    /// the same result, whatever the settings' own. `None` when `control` cancelled it.
+    /// the same result, whatever the settings' own, and whatever was evaluated before: what has not
+    /// changed since is used again. `None` when `control` cancelled it.
     ///
     /// # Errors
     /// As [`Session::new`](crate::Session::new).
     pub fn evaluate(
-        &self,
+        &mut self,
         parameters: &[Parameter],
         spp: u32,
         seed: u64,
         control: &dyn Control,
     ) -> Result<Option<Evaluation>, Error> {
         let mut seen = Vec::new();
-        for (v, view) in self.views.iter().enumerate() {
-            let progress = |done| control.progress((v as f64 + done) / self.views.len() as f64);
+        let views = self.views.clone();
+        for (v, view) in views.iter().enumerate() {
+            let progress = |done| control.progress((v as f64 + done) / views.len() as f64);
             let control = Watched { control, progress };
             match self.halves(parameters, view.sensor, spp.div_ceil(2), seed, &control)? {
                 Some(halves) => seen.push(Seen { halves }),
                 None => return Ok(None),
             }
         }
-        Ok(Some(Evaluation::new(self.loss, self.views.clone(), seen, parameters.len())))
+        Ok(Some(Evaluation::new(self.loss, views, seen, parameters.len())))
     }
 
     /// Image and derivatives by one sensor, twice independently.
     fn halves(
-        &self,
+        &mut self,
         parameters: &[Parameter],
         sensor: usize,
         spp: u32,
@@ -125,7 +130,7 @@ impl Fit {
         control: &dyn Control,
     ) -> Result<Option<[Half; 2]>, Error> {
         let settings = Settings { sensor, terms: false, ..self.settings.clone() };
-        let mut source = Source::new(&self.scene, parameters, settings)?;
+        let mut source = Source::new(&self.scene, parameters, settings, &mut self.geometry)?;
         let mut half = |k: usize, seed| {
             let progress = |done| control.progress(0.5 * (k as f64 + done));
             source.half(spp, seed, &Watched { control, progress })

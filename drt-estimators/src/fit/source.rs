@@ -1,5 +1,6 @@
 //! Where images and derivatives come from.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::Rgb;
@@ -10,6 +11,7 @@ use crate::rendering::Layer;
 use crate::scene::Scene;
 use crate::session::{Control, Session};
 use crate::settings::{EstimatorKind, Settings};
+use crate::transport::Geometry;
 use crate::{Error, finite_differences, moved};
 
 /// A scene prepared at its parameters' values.
@@ -25,12 +27,13 @@ impl<'a> Source<'a> {
         scene: &'a Scene,
         parameters: &'a [Parameter],
         settings: Settings,
+        geometry: &mut Option<Arc<Geometry>>,
     ) -> Result<Self, Error> {
         if settings.estimator == EstimatorKind::FiniteDifference {
-            let session = Session::new(&moved(scene, parameters)?, &[], &settings)?;
+            let session = Session::reusing(&moved(scene, parameters)?, &[], &settings, geometry)?;
             return Ok(Self { session, differences: Some((scene, parameters)), settings });
         }
-        let session = Session::new(scene, parameters, &settings)?;
+        let session = Session::reusing(scene, parameters, &settings, geometry)?;
         Ok(Self { session, differences: None, settings })
     }
 

@@ -3,6 +3,7 @@
 mod describe;
 mod part;
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_motion::Parameter;
@@ -16,7 +17,7 @@ use crate::rendering::{Account, Rendering};
 use crate::scene::Scene;
 use crate::settings::{EstimatorKind, Settings};
 use crate::tangents;
-use crate::transport::Lit;
+use crate::transport::{Geometry, Lit};
 use crate::{Error, Estimate};
 
 /// Watches and steers a run. Every method has a default that does nothing.
@@ -76,12 +77,23 @@ impl Session {
         parameters: &[Parameter],
         settings: &Settings,
     ) -> Result<Self, Error> {
+        Self::reusing(scene, parameters, settings, &mut None)
+    }
+
+    /// As [`new`](Self::new), with the geometry of an earlier scene where it is still the same; that of
+    /// this one is left there.
+    pub(crate) fn reusing(
+        scene: &Scene,
+        parameters: &[Parameter],
+        settings: &Settings,
+        geometry: &mut Option<Arc<Geometry>>,
+    ) -> Result<Self, Error> {
         settings.check()?;
         scene.check()?;
         let (scene, tangents) = tangents::apply(scene, parameters, settings.sensor)?;
         let mut parts = Vec::new();
         for (settings, lit) in shares(&scene, settings) {
-            parts.push(Part::new(scene.clone(), tangents.clone(), settings, lit)?);
+            parts.push(Part::new(scene.clone(), tangents.clone(), settings, lit, geometry)?);
         }
         let plan = Plan::together(parts.iter().map(|p| &p.plan));
         let size = scene.sensors[settings.sensor].item.sensor.film();

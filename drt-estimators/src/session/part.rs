@@ -1,5 +1,6 @@
 //! One estimator's share of a run: what it samples of which light.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use super::describe::describe;
@@ -18,7 +19,7 @@ use crate::sensitivity::Interest;
 use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::{Checked, ToImages};
 use crate::tangents::Tangents;
-use crate::transport::{Lit, World};
+use crate::transport::{Geometry, Lit, World};
 use crate::{Error, Estimate};
 
 /// A scene prepared for one estimator, and what has been accumulated.
@@ -44,12 +45,14 @@ pub(super) struct Round<'a> {
 }
 
 impl Part {
-    /// Prepares a scene at the parameters' values for the light of some emitters.
+    /// Prepares a scene at the parameters' values for the light of some emitters. Geometry that is still
+    /// right is taken, and what was taken or made is left there.
     pub(super) fn new(
         scene: Scene,
         mut tangents: Tangents,
         settings: Settings,
         lit: Lit,
+        geometry: &mut Option<Arc<Geometry>>,
     ) -> Result<Self, Error> {
         for (e, emitter) in scene.emitters.iter().enumerate() {
             if !lit.by(&emitter.item.emitter) {
@@ -57,7 +60,8 @@ impl Part {
             }
         }
         let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-        let mut world = World::new(scene, settings.sensor, depth, None, lit)?;
+        let mut world = World::new(scene, settings.sensor, depth, None, lit, geometry.as_ref())?;
+        *geometry = Some(world.geometry.clone());
         let mut motion = None;
         if !tangents.names.is_empty() {
             let insides = match settings.estimator {
@@ -92,10 +96,8 @@ impl Part {
 
     /// Forgets all images and takes other random numbers from now on.
     pub(super) fn restart(&mut self, seed: u64) {
-        self.pixels = PixelFilm::new(self.pixels.size(), self.pixels.layers());
-        for film in &mut self.splats {
-            *film = SplatFilm::new(self.pixels.size(), film.layers());
-        }
+        self.pixels.clear();
+        self.splats.iter_mut().for_each(SplatFilm::clear);
         self.account = Account::default();
         self.settings.seed = seed;
     }

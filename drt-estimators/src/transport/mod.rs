@@ -3,6 +3,7 @@
 
 pub(crate) mod adjoint;
 pub(crate) mod flight;
+mod geometry;
 pub(crate) mod importance;
 pub(crate) mod lights;
 pub(crate) mod record;
@@ -14,6 +15,7 @@ pub(crate) mod vertex;
 pub(crate) mod world;
 
 pub(crate) use adjoint::{Differentiator, Form};
+pub(crate) use geometry::Geometry;
 pub(crate) use lights::Lit;
 pub(crate) use record::{Carriers, PathRecord, Radiance, RadianceBySegments};
 pub(crate) use trace::Tracer;

@@ -2,14 +2,16 @@
 
 mod rays;
 
-use alloc::string::{String, ToString};
+use alloc::string::String;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use drt_geom::{Aabb, Hit, Mesh, Ray, Skip, TriangleBvh};
+use drt_geom::{Aabb, Hit, Mesh, Ray, Skip};
 use drt_math::{Rgb, Vec3};
 use drt_medium::{Coefficients, Homogeneous, Medium};
 pub(crate) use rays::short_of;
 
+use super::geometry::{Geometry, Prim};
 use super::lights::{LightTable, Lit};
 use super::scatter::Scattering;
 use super::vertex::{Contact, Kind, SurfacePoint, Vertex};
@@ -79,13 +81,6 @@ pub(crate) fn intervals(
     })
 }
 
-/// A triangle of the soup.
-#[derive(Clone, Copy, Debug)]
-struct Prim {
-    shape: u32,
-    triangle: u32,
-}
-
 /// Largest probability of going on under Russian roulette. Below one it also ends paths that lose
 /// nothing, at the price of weights that grow with every vertex.
 const MOST_SURVIVAL: f64 = 0.99;
@@ -142,24 +137,24 @@ pub(crate) struct World {
     steady: Option<Vec<Option<Homogeneous>>>,
     pub(crate) max_depth: u32,
     pub(crate) rr_depth: u32,
-    bvh: TriangleBvh,
-    prims: Vec<Prim>,
+    pub(crate) geometry: Arc<Geometry>,
     null: Vec<bool>,
     any_null: bool,
-    first_prim: Vec<u32>,
     /// The medium beyond every interface.
     ambient: Option<usize>,
 }
 
 impl World {
     /// Prepares a scene. `like` is the same scene at other values, whose discrete choices this one
-    /// repeats: finite differences need both sides to draw alike.
+    /// repeats: finite differences need both sides to draw alike. `geometry` is taken if it is that of
+    /// the scene.
     pub(crate) fn new(
         scene: Scene,
         sensor: usize,
         max_depth: Option<u32>,
         like: Option<&Self>,
         lit: Lit,
+        geometry: Option<&Arc<Geometry>>,
     ) -> Result<Self, Error> {
         let camera = scene.sensors.get(sensor).ok_or_else(|| Error::Setting {
             setting: "sensor".into(),
@@ -169,30 +164,10 @@ impl World {
             ),
         })?;
         let (camera_item, surrounding) = (camera.item.sensor.clone(), camera.item.medium);
-        let mut soup = Vec::new();
-        let mut prims = Vec::new();
-        let mut first_prim = Vec::new();
-        for (i, shape) in scene.shapes.iter().enumerate() {
-            first_prim.push(prims.len() as u32);
-            for t in 0..shape.mesh.triangles.len() as u32 {
-                soup.push(shape.mesh.triangle(t));
-                prims.push(Prim { shape: i as u32, triangle: t });
-            }
-        }
-        let bvh = TriangleBvh::build(&soup).map_err(|e| Error::Element {
-            element: "scene geometry".into(),
-            reason: e.to_string(),
-        })?;
+        let geometry = Geometry::new(&scene, geometry)?;
+        let radius = geometry.radius;
         let null: Vec<bool> =
             scene.shapes.iter().map(|s| scene.bsdfs[s.bsdf].item.is_null()).collect();
-        let (mut lo, mut hi) = (Vec3::splat(f64::INFINITY), Vec3::splat(f64::NEG_INFINITY));
-        for t in &soup {
-            for p in t {
-                lo = lo.min(*p);
-                hi = hi.max(*p);
-            }
-        }
-        let radius = if soup.is_empty() { 1.0 } else { (hi - lo).length() * 0.5 };
         let tracking = scene
             .media
             .iter()
@@ -204,7 +179,8 @@ impl World {
                 }
             })
             .collect();
-        let lights = LightTable::new(&scene, &first_prim, radius, like.map(|w| &w.lights), lit)?;
+        let lights =
+            LightTable::new(&scene, &geometry.first_prim, radius, like.map(|w| &w.lights), lit)?;
         let depth = max_depth.or(scene.integrator.max_depth).unwrap_or(u32::MAX);
         let mut world = Self {
             lights,
@@ -220,10 +196,8 @@ impl World {
             max_depth: depth,
             rr_depth: scene.integrator.rr_depth,
             any_null: null.iter().any(|n| *n),
-            bvh,
-            prims,
+            geometry,
             null,
-            first_prim,
             ambient: None,
             scene,
         };
@@ -349,7 +323,7 @@ impl World {
     }
 
     pub(crate) fn prim_of(&self, shape: usize, triangle: u32) -> u32 {
-        self.first_prim[shape] + triangle
+        self.geometry.first_prim[shape] + triangle
     }
 
     pub(crate) fn shape_name(&self, shape: usize) -> String {
@@ -359,7 +333,7 @@ impl World {
 
     /// The point of a triangle at given barycentric weights.
     pub(crate) fn point(&self, prim: u32, bary: [f64; 2]) -> (SurfacePoint, Vec3) {
-        let Prim { shape, triangle } = self.prims[prim as usize];
+        let Prim { shape, triangle } = self.geometry.prims[prim as usize];
         let mesh = &self.scene.shapes[shape as usize].mesh;
         let [a, b, c] = mesh.triangle(triangle);
         let (e1, e2) = (b - a, c - a);
@@ -377,7 +351,7 @@ impl World {
 
     /// The point of a triangle's plane nearest to `x`, moved into the triangle.
     pub(crate) fn point_near(&self, prim: u32, x: Vec3) -> (SurfacePoint, Vec3) {
-        let Prim { shape, triangle } = self.prims[prim as usize];
+        let Prim { shape, triangle } = self.geometry.prims[prim as usize];
         let [a, b, c] = self.scene.shapes[shape as usize].mesh.triangle(triangle);
         let [g1, g2] = barycentric_gradients(b - a, c - a);
         let [b1, b2] = [g1, g2].map(|g| g.dot(x - a).clamp(0.0, 1.0));
@@ -439,10 +413,11 @@ impl World {
         let dir = drt_math::vec3(0.577_215_66, 0.414_213_56, 0.703_818_4).normalize();
         let ray = Ray { origin: x, dir, t_max: f64::INFINITY };
         let bounds = |prim: u32| {
-            let shape = self.prims[prim as usize].shape as usize;
+            let shape = self.geometry.prims[prim as usize].shape as usize;
             self.scene.shapes[shape].boundary.is_some()
         };
-        let hit = self.bvh.closest_through(&ray, Skip::NOTHING, bounds, &mut Vec::new())?;
+        let hit =
+            self.geometry.bvh.closest_through(&ray, Skip::NOTHING, bounds, &mut Vec::new())?;
         let (point, _) = self.point(hit.prim, hit.bary);
         Some((point, point.ng.dot(dir) < 0.0))
     }

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::series::Series;
+use crate::commands::markup::{decade, escaped};
 
 /// Pixels of a panel, and of what surrounds its axes.
 const PANEL: [f64; 2] = [380.0, 280.0];
@@ -169,18 +170,6 @@ fn legend(text: &mut String, y: f64) {
             x + 36.0
         );
     }
-}
-
-/// A power of ten as people write it.
-fn decade(d: i32) -> String {
-    match d {
-        -3..=4 => format!("{}", 10.0_f64.powi(d)),
-        _ => format!("1e{d}"),
-    }
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]

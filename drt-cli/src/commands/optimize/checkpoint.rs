@@ -14,25 +14,40 @@ use crate::{CliError, PROGRAM};
 /// is newer is made anew.
 const FILE: &str = "checkpoint.json";
 
+/// Tells problems apart: the FNV-1a hash (Fowler, Noll and Vo) of all that decides a run's steps.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
+pub(super) struct Fingerprint(u64);
+
+impl Default for Fingerprint {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Fingerprint {
+    pub(super) fn add(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+}
+
 /// The state after some steps.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(super) struct Checkpoint {
-    program: String,
-    /// Tells problems apart.
-    fingerprint: u64,
+    pub(super) program: String,
+    pub(super) fingerprint: Fingerprint,
     pub(super) optimizer: State,
+    /// Iterations in a row in which each parameter changed nothing.
+    pub(super) blind: Vec<u32>,
     /// Of all runs so far.
     pub(super) seconds: f64,
     pub(super) cpu_seconds: f64,
 }
 
 impl Checkpoint {
-    pub(super) fn new(fingerprint: u64, optimizer: State, seconds: f64, cpu_seconds: f64) -> Self {
-        Self { program: PROGRAM.into(), fingerprint, optimizer, seconds, cpu_seconds }
-    }
-
     /// Reads the checkpoint of a folder, where there is one.
-    pub(super) fn read(folder: &Path, fingerprint: u64) -> Result<Option<Self>, CliError> {
+    pub(super) fn read(folder: &Path, fingerprint: Fingerprint) -> Result<Option<Self>, CliError> {
         let path = folder.join(FILE);
         if !path.exists() {
             return Ok(None);

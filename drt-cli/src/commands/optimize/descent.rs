@@ -1,6 +1,5 @@
 //! The run itself: evaluate, step, store.
 
-use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 use std::time::Instant;
@@ -8,110 +7,130 @@ use std::time::Instant;
 use drt_estimators::fit::{Evaluation, Fit};
 use drt_motion::optimize::Optimizer;
 
-use super::checkpoint::Checkpoint;
+use super::checkpoint::{Checkpoint, Fingerprint};
+use super::gallery::Gallery;
 use super::history::{History, LOSSES, PARAMETERS};
 use super::problem::Problem;
-use crate::CliError;
+use super::report::{self, Report};
+use super::watch::Watch;
 use crate::atomic::write_atomically;
 use crate::commands::Outcome;
 use crate::commands::clock::Clock;
 use crate::commands::monitor::Monitor;
-use crate::commands::options::OptimizeOptions;
+use crate::error::Place;
+use crate::{CliError, PROGRAM};
 
 /// Seconds after which a checkpoint is written, however few iterations have passed.
 const CHECKPOINT_SECONDS: f64 = 30.0;
+/// Least seconds between pictures of the present state.
+const PICTURE_SECONDS: f64 = 10.0;
 
 /// A fit on its way.
 pub(super) struct Descent<'a> {
     problem: &'a Problem<'a>,
+    fingerprint: Fingerprint,
     optimizer: Optimizer,
     history: History,
+    watch: Watch<'a>,
+    gallery: Option<Gallery<'a>>,
     clock: Clock,
     /// Spent before this run.
     before: [f64; 2],
-    seconds: Option<f64>,
-    last: Option<Evaluation>,
 }
 
 impl<'a> Descent<'a> {
-    /// Begins, or goes on from the checkpoint.
-    pub(super) fn begin(
-        problem: &'a Problem<'a>,
-        options: &OptimizeOptions,
-    ) -> Result<Self, CliError> {
-        let plan = problem.plan;
-        let clock = Clock::start();
-        let refuse = |e| CliError::input(&crate::error::Place::file(&problem.job.path), e);
-        let stored = match &plan.checkpoint {
-            Some(folder) if !options.restart => {
-                Checkpoint::read(folder, problem.fingerprint())?.map(|c| (folder, c))
+    /// Begins, or goes on from the checkpoint unless told to `restart`.
+    pub(super) fn begin(problem: &'a Problem<'a>, restart: bool) -> Result<Self, CliError> {
+        let (clock, plan) = (Clock::start(), problem.plan);
+        let fingerprint = problem.fingerprint()?;
+        let refuse = |e| CliError::input(&Place::file(&problem.job.path), e);
+        let folder = plan.checkpoint.as_deref();
+        let stored = match folder.filter(|_| !restart) {
+            Some(folder) => Checkpoint::read(folder, fingerprint)?.map(|c| (folder, c)),
+            None => None,
+        };
+        let count = problem.job.parameters.len();
+        let (optimizer, history, blind, before) = match stored {
+            None => {
+                let start = problem.start();
+                let optimizer = Optimizer::new(plan.method, plan.variables.clone(), &start);
+                let history = History { values: vec![start], losses: Vec::new() };
+                (optimizer, history, vec![0; count], [0.0; 2])
             }
-            _ => None,
+            Some((folder, stored)) => {
+                let history = History::read(folder, stored.optimizer.steps as usize, count)?;
+                let before = [stored.seconds, stored.cpu_seconds];
+                let optimizer =
+                    Optimizer::resume(plan.method, plan.variables.clone(), stored.optimizer);
+                (optimizer, history, stored.blind, before)
+            }
         };
-        let seconds = options.seconds;
-        let Some((folder, stored)) = stored else {
-            let start = problem.start();
-            let optimizer = Optimizer::new(plan.method, plan.variables.clone(), &start);
-            let optimizer = optimizer.map_err(refuse)?;
-            let history = History { values: vec![start], losses: Vec::new() };
-            return Ok(Self {
-                problem,
-                optimizer,
-                history,
-                clock,
-                before: [0.0; 2],
-                seconds,
-                last: None,
-            });
-        };
-        let before = [stored.seconds, stored.cpu_seconds];
-        let steps = stored.optimizer.steps as usize;
-        let optimizer = Optimizer::resume(plan.method, plan.variables.clone(), stored.optimizer);
         let optimizer = optimizer.map_err(refuse)?;
-        let history = History::read(folder, steps, problem.job.parameters.len())?;
-        Ok(Self { problem, optimizer, history, clock, before, seconds, last: None })
+        let watch = Watch::new(problem, optimizer.values(), blind)?;
+        let gallery = folder.map(|folder| Gallery::new(problem, folder));
+        Ok(Self { problem, fingerprint, optimizer, history, watch, gallery, clock, before })
     }
 
     /// Steps taken.
-    fn steps(&self) -> u32 {
+    pub(super) fn steps(&self) -> u32 {
         self.optimizer.state().steps as u32
     }
 
-    /// Goes on to the end, or until it is told to stop.
-    pub(super) fn run(&mut self, monitor: &Monitor) -> Result<Outcome, CliError> {
+    /// The values reached.
+    pub(super) fn values(&self) -> &[f64] {
+        self.optimizer.values()
+    }
+
+    /// Goes on to the end, or until it is told to stop, or for so many seconds. Returns what was seen
+    /// last, at the values reached if that is the end.
+    pub(super) fn run(
+        &mut self,
+        seconds: Option<f64>,
+        monitor: &Monitor,
+    ) -> Result<(Outcome, Option<Evaluation>), CliError> {
         let problem = self.problem;
-        let (mut stored, mut stored_at) = (Instant::now(), self.steps());
+        let (mut stored, mut stored_at, mut pictured) = (Instant::now(), self.steps(), None);
         let mut fit = problem.fit_at(self.steps())?;
+        let mut last = None;
         loop {
             let i = self.steps();
-            if i > 0 && problem.plan.reduce.at(i) != problem.plan.reduce.at(i - 1) {
+            if problem.stage_start(i) == i && i > 0 {
                 fit = problem.fit_at(i)?;
             }
-            let Some(evaluation) = self.evaluate(&fit, monitor)? else {
+            let Some(evaluation) = self.evaluate(&mut fit, monitor)? else {
                 self.store()?;
-                return Ok(Outcome::Interrupted);
+                return Ok((Outcome::Interrupted, last));
             };
-            self.history.losses.push(evaluation.loss());
+            self.look_at(i, &evaluation)?;
             if i >= problem.iterations {
-                self.last = Some(evaluation);
-                self.finish()?;
-                return Ok(Outcome::Done);
+                self.store()?;
+                self.picture(&evaluation, None)?;
+                return Ok((Outcome::Done, Some(evaluation)));
             }
-            self.step(&evaluation)?;
-            let due = self.steps() - stored_at >= problem.plan.checkpoint_every
-                || stored.elapsed().as_secs_f64() >= CHECKPOINT_SECONDS;
-            let out_of_time = self.seconds.is_some_and(|s| self.clock.seconds() >= s);
-            if due || out_of_time {
+            self.step(i, &evaluation)?;
+            let out_of_time = seconds.is_some_and(|s| self.clock.seconds() >= s);
+            let waited = |since: Option<Instant>, s| {
+                since.is_none_or(|since: Instant| since.elapsed().as_secs_f64() >= s)
+            };
+            if self.steps() - stored_at >= problem.plan.checkpoint_every
+                || waited(Some(stored), CHECKPOINT_SECONDS)
+                || out_of_time
+            {
                 self.store()?;
                 (stored, stored_at) = (Instant::now(), self.steps());
+                if waited(pictured, PICTURE_SECONDS) || out_of_time {
+                    self.picture(&evaluation, None)?;
+                    pictured = Some(Instant::now());
+                }
             }
+            last = Some(evaluation);
             if out_of_time {
-                return Ok(Outcome::Done);
+                return Ok((Outcome::Done, last));
             }
         }
     }
 
-    fn evaluate(&self, fit: &Fit, monitor: &Monitor) -> Result<Option<Evaluation>, CliError> {
+    fn evaluate(&self, fit: &mut Fit, monitor: &Monitor) -> Result<Option<Evaluation>, CliError> {
         let (i, n) = (self.steps(), self.problem.iterations);
         let name = match self.history.losses.last() {
             Some(loss) => format!("{i} of {n}, loss {loss:.4e}"),
@@ -119,60 +138,103 @@ impl<'a> Descent<'a> {
         };
         let part = |i: u32| f64::from(i) / f64::from(n + 1);
         monitor.stage(&name, part(i), part(i + 1));
-        let parameters = self.problem.at(self.optimizer.values());
+        let parameters = self.problem.at(self.values());
         fit.evaluate(&parameters, self.problem.spp(i), self.problem.seed(i), monitor)
             .map_err(|e| self.problem.job.blame(&e))
     }
 
-    fn step(&mut self, evaluation: &Evaluation) -> Result<(), CliError> {
-        let factor = self.problem.plan.decay.factor(self.steps(), self.problem.iterations);
-        self.optimizer
+    /// Takes down what iteration `i` saw.
+    fn look_at(&mut self, i: u32, evaluation: &Evaluation) -> Result<(), CliError> {
+        self.history.losses.truncate(i as usize);
+        self.history.losses.push(evaluation.loss());
+        let of_stage = &self.history.losses[self.problem.stage_start(i) as usize..];
+        let judged = self.watch.evaluation(i, evaluation, of_stage);
+        if let (Err(error @ CliError::Unsolved(_)), true) = (&judged, i > 0) {
+            self.fail(evaluation, error)?;
+        }
+        judged?;
+        let Some(gallery) = &self.gallery else { return Ok(()) };
+        if i == 0 {
+            create(self.problem.plan.checkpoint.as_deref())?;
+            gallery.targets()?;
+        }
+        gallery.keep(i, evaluation)
+    }
+
+    fn step(&mut self, i: u32, evaluation: &Evaluation) -> Result<(), CliError> {
+        let factor = self.problem.plan.decay.factor(i, self.problem.iterations);
+        let before = self.optimizer.clone();
+        let stepped = self
+            .optimizer
             .step(&evaluation.gradient(), factor)
-            .map_err(|e| CliError::argument(format!("iteration {}: {e}", self.steps())))?;
+            .map_err(|e| CliError::unsolved(format!("iteration {i}: {e}")));
+        if let Err(error) = stepped.and_then(|()| self.watch.step(i, self.optimizer.values())) {
+            self.optimizer = before;
+            self.fail(evaluation, &error)?;
+            return Err(error);
+        }
         self.history.values.push(self.optimizer.values().to_vec());
         Ok(())
     }
 
-    /// Writes what is needed to go on from here.
-    fn store(&self) -> Result<(), CliError> {
-        let Some(folder) = &self.problem.plan.checkpoint else { return Ok(()) };
-        self.write_tables(folder)?;
-        let [seconds, cpu_seconds] = self.spent();
-        let state = self.optimizer.state().clone();
-        Checkpoint::new(self.problem.fingerprint(), state, seconds, cpu_seconds).write(folder)
+    /// Stores how far it came before it failed.
+    fn fail(&mut self, evaluation: &Evaluation, error: &CliError) -> Result<(), CliError> {
+        create(self.problem.plan.checkpoint.as_deref())?;
+        self.store()?;
+        self.picture(evaluation, Some(&error.to_string()))
     }
 
-    fn write_tables(&self, folder: &Path) -> Result<(), CliError> {
-        std::fs::create_dir_all(folder).map_err(|e| CliError::write(folder, e))?;
+    /// Writes what is needed to go on from here, and the tables.
+    fn store(&self) -> Result<(), CliError> {
+        let Some(folder) = &self.problem.plan.checkpoint else { return Ok(()) };
+        create(Some(folder))?;
         for (name, text) in [
             (PARAMETERS, self.history.parameters(self.problem.names())),
             (LOSSES, self.history.losses()),
         ] {
             write_atomically(&folder.join(name), |out| Ok(out.write_all(text.as_bytes())?))?;
         }
-        Ok(())
+        let [seconds, cpu_seconds] = self.spent();
+        let checkpoint = Checkpoint {
+            program: PROGRAM.into(),
+            fingerprint: self.fingerprint,
+            optimizer: self.optimizer.state().clone(),
+            blind: self.watch.blind.clone(),
+            seconds,
+            cpu_seconds,
+        };
+        checkpoint.write(folder)
     }
 
-    fn finish(&self) -> Result<(), CliError> {
-        self.store()
+    /// Shows what was seen last, and the page that tells of it.
+    fn picture(&self, seen: &Evaluation, failure: Option<&str>) -> Result<(), CliError> {
+        let Some((gallery, folder)) =
+            self.gallery.as_ref().zip(self.problem.plan.checkpoint.as_ref())
+        else {
+            return Ok(());
+        };
+        let iteration = self.history.losses.len().saturating_sub(1) as u32;
+        gallery.current(iteration, seen)?;
+        let page = Report {
+            problem: self.problem,
+            history: &self.history,
+            gallery,
+            steps: self.steps(),
+            uncertainty: seen.uncertainty(),
+            spent: self.spent(),
+            failure,
+        };
+        let page = page.html();
+        write_atomically(&folder.join(report::FILE), |out| Ok(out.write_all(page.as_bytes())?))
     }
 
     /// Wall and processor time of this run and those before.
     fn spent(&self) -> [f64; 2] {
         [self.before[0] + self.clock.seconds(), self.before[1] + self.clock.cpu_seconds()]
     }
+}
 
-    /// The values reached, and how well they are known.
-    pub(super) fn summary(&self) -> String {
-        let uncertainty = self.last.as_ref().and_then(Evaluation::uncertainty);
-        let mut text = String::new();
-        for (p, (name, value)) in self.problem.names().zip(self.optimizer.values()).enumerate() {
-            // Writing to a string cannot fail.
-            let _ = match &uncertainty {
-                Some(u) => writeln!(text, "{name} = {value:.6} ± {:.2e}", u[p]),
-                None => writeln!(text, "{name} = {value:.6}"),
-            };
-        }
-        text
-    }
+fn create(folder: Option<&Path>) -> Result<(), CliError> {
+    let Some(folder) = folder else { return Ok(()) };
+    std::fs::create_dir_all(folder).map_err(|e| CliError::write(folder, e))
 }

@@ -1,28 +1,88 @@
 //! `drt optimize`: the parameters at which a scene looks like its targets.
+//!
+//! A [`Problem`](problem::Problem) is the job with its targets read, a [`Descent`] the run over it. What
+//! a run leaves in its folder comes in two kinds: tables and checkpoint, from which it goes on to the
+//! same bits whenever it was stopped, and pictures with a report, which are made anew from them.
 
 mod checkpoint;
 mod descent;
+mod gallery;
 mod history;
 mod problem;
+mod report;
+mod watch;
+
+use drt_estimators::fit::Evaluation;
 
 use super::monitor::Monitor;
 use super::options::OptimizeOptions;
-use super::{Outcome, run};
-use crate::CliError;
+use super::outputs::Outputs;
+use super::{Outcome, grad, run};
+use crate::{CliError, Job};
 use descent::Descent;
 use problem::Problem;
 
 pub(super) fn run(options: &OptimizeOptions) -> Result<Outcome, CliError> {
-    let job = run::open_changed(&options.input, &options.changes)?;
-    job.require_derivatives()?;
+    let common = &options.common;
+    if common.target_error.is_some() {
+        return Err(CliError::argument(
+            "--target-error: a fit ends after its iterations, or --seconds",
+        ));
+    }
+    let job = run::open_with_parameters(common)?;
+    let outputs = Outputs::new(common, "optimize")?;
     let problem = Problem::new(&job, options)?;
-    let monitor = Monitor::new(options.changes.quiet);
-    let mut descent = Descent::begin(&problem, options)?;
-    let outcome = descent.run(&monitor);
+    let monitor = Monitor::new(common.changes.quiet);
+    let mut descent = Descent::begin(&problem, options.restart)?;
+    let ran = descent.run(common.seconds, &monitor);
+    let (outcome, last) = ran.inspect_err(|_| monitor.finish())?;
+    if outcome == Outcome::Done
+        && (common.output.is_some() || common.digest.is_some() || common.preview.is_some())
+    {
+        write(&job, &descent, options, &outputs, &monitor)?;
+    }
     monitor.finish();
-    let outcome = outcome?;
-    if !options.changes.quiet {
-        print!("{}", descent.summary());
+    if !common.changes.quiet {
+        let text = summary(&problem, &descent, last.as_ref());
+        match outputs.digest_on_stdout() {
+            true => eprint!("{text}"),
+            false => print!("{text}"),
+        }
     }
     Ok(outcome)
+}
+
+/// Image and derivatives at the values reached, where they were asked for.
+fn write(
+    job: &Job,
+    descent: &Descent<'_>,
+    options: &OptimizeOptions,
+    outputs: &Outputs<'_>,
+    monitor: &Monitor,
+) -> Result<(), CliError> {
+    let mut job = job.clone();
+    for (parameter, value) in job.parameters.iter_mut().zip(descent.values()) {
+        parameter.value = *value;
+    }
+    let by_count = super::options::Options { seconds: None, ..options.common.clone() };
+    let rendering = grad::derivatives(&job, &by_count, monitor, 1.0)?;
+    outputs.write(&job, &rendering, &[], &[])
+}
+
+/// The values reached, and how well they are known.
+fn summary(problem: &Problem<'_>, descent: &Descent<'_>, last: Option<&Evaluation>) -> String {
+    let uncertainty = last.and_then(Evaluation::uncertainty);
+    let line = |(p, (name, value)): (usize, (&str, &f64))| match &uncertainty {
+        Some(u) => format!("{name} = {value:.6} ± {:.1e}\n", u[p]),
+        None => format!("{name} = {value:.6}\n"),
+    };
+    let mut text: String = problem.names().zip(descent.values()).enumerate().map(line).collect();
+    if descent.steps() < problem.iterations {
+        let (steps, n) = (descent.steps(), problem.iterations);
+        text += &match &problem.plan.checkpoint {
+            Some(_) => format!("{steps} of {n} iterations; the same command goes on from here\n"),
+            None => format!("{steps} of {n} iterations\n"),
+        };
+    }
+    text
 }

@@ -1,8 +1,6 @@
 //! What is to be fitted: the job with its targets read.
 
 use std::collections::BTreeMap;
-use std::collections::hash_map::DefaultHasher;
-use std::hash::{Hash, Hasher};
 
 use drt_estimators::Scene;
 use drt_estimators::fit::{Fit, View};
@@ -11,8 +9,9 @@ use drt_math::Rng;
 use drt_motion::Parameter;
 use drt_motion::optimize::Stages;
 
+use super::checkpoint::Fingerprint;
 use crate::commands::options::OptimizeOptions;
-use crate::error::Place;
+use crate::error::{Place, read_text};
 use crate::image::read_picture;
 use crate::job::Optimize;
 use crate::{CliError, Job};
@@ -39,7 +38,7 @@ impl<'a> Problem<'a> {
         if job.parameters.is_empty() {
             return Err(CliError::input(&place, "it has no [[parameter]] to fit"));
         }
-        let spp = match options.spp {
+        let spp = match options.common.spp {
             Some(spp) => Stages::new(spp, Vec::new()),
             None => Stages::new(job.settings.spp, plan.spp.clone()),
         };
@@ -88,6 +87,22 @@ impl<'a> Problem<'a> {
         Rng::new(self.job.settings.seed, SEED_STREAM, iteration).next_u64()
     }
 
+    /// Columns and rows of a view's images in an iteration.
+    pub(super) fn size(&self, view: usize, iteration: u32) -> [u32; 2] {
+        self.views[view].reference.size().map(|n| n / self.plan.reduce.at(iteration))
+    }
+
+    /// True when steps change a parameter.
+    pub(super) fn varies(&self, parameter: usize) -> bool {
+        self.plan.variables[parameter].learning_rate > 0.0
+    }
+
+    /// The first iteration with images of the size of iteration `i`, without another size between.
+    pub(super) fn stage_start(&self, i: u32) -> u32 {
+        let reduce = |i| self.plan.reduce.at(i);
+        (0..i).rev().take_while(|j| reduce(*j) == reduce(i)).last().unwrap_or(i)
+    }
+
     pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         self.job.parameters.iter().map(|p| p.name.as_str())
     }
@@ -101,23 +116,21 @@ impl<'a> Problem<'a> {
         parameters.map(|(p, value)| Parameter { value: *value, ..p.clone() }).collect()
     }
 
-    /// A number that tells this problem from others, for as far as it decides the steps; how many
-    /// there are is left out, so that a run can be prolonged.
-    pub(super) fn fingerprint(&self) -> u64 {
-        let mut hasher = DefaultHasher::new();
+    /// Tells this problem from others, for as far as it decides the steps; how many there are is left
+    /// out, so that a run can be prolonged.
+    pub(super) fn fingerprint(&self) -> Result<Fingerprint, CliError> {
         let plan = self.plan;
         let settings = drt_estimators::Settings { threads: 0, ..self.job.settings.clone() };
-        format!("{:?} {:?}", self.job.parameters, settings).hash(&mut hasher);
-        format!("{:?} {:?} {:?} {:?}", plan.loss, plan.method, plan.variables, plan.decay)
-            .hash(&mut hasher);
-        format!("{:?} {:?}", self.spp, plan.reduce).hash(&mut hasher);
+        let mut sum = Fingerprint::default();
+        sum.add(read_text(&self.job.scene_path, None)?.as_bytes());
+        sum.add(format!("{:?} {settings:?}", self.job.parameters).as_bytes());
+        sum.add(format!("{:?} {:?}", plan.loss, plan.method).as_bytes());
+        sum.add(format!("{:?} {:?}", plan.variables, plan.decay).as_bytes());
+        sum.add(format!("{:?} {:?}", self.spp, plan.reduce).as_bytes());
         for view in &self.views {
-            view.sensor.hash(&mut hasher);
-            for pixel in view.reference.pixels() {
-                pixel.to_array().map(f64::to_bits).hash(&mut hasher);
-            }
+            sum.add(format!("{} {:?}", view.sensor, view.reference).as_bytes());
         }
-        hasher.finish()
+        Ok(sum)
     }
 }
 

@@ -66,12 +66,12 @@ impl World {
         counters.rays += 1;
         let ray = Ray { origin, dir, t_max: f64::INFINITY };
         let end = if self.any_null {
-            let blocks = |prim: u32| !self.is_null(self.prims[prim as usize].shape);
-            let end = self.bvh.closest_through(&ray, skip, blocks, &mut path.hits);
+            let blocks = |prim: u32| !self.is_null(self.geometry.prims[prim as usize].shape);
+            let end = self.geometry.bvh.closest_through(&ray, skip, blocks, &mut path.hits);
             self.cross(path, dir, medium);
             end
         } else {
-            self.bvh.closest(&ray, skip)
+            self.geometry.bvh.closest(&ray, skip)
         };
         if let Some(hit) = end {
             path.end = Some(self.point(hit.prim, hit.bary));
@@ -90,7 +90,7 @@ impl World {
 
     /// The first hit of a ray, whatever it is on.
     pub(crate) fn nearest_on(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
-        self.bvh.closest(ray, skip)
+        self.geometry.bvh.closest(ray, skip)
     }
 
     /// The null interfaces between `v` and a point at `distance` along the unit direction `dir`;
@@ -152,11 +152,11 @@ impl World {
         counters.rays += 1;
         let ray = Ray { origin: v.x, dir, t_max: short_of(v.x, distance) };
         if !self.any_null {
-            return !self.bvh.any(&ray, skip, |_| true);
+            return !self.geometry.bvh.any(&ray, skip, |_| true);
         }
         path.hits.clear();
-        let blocks = |prim: u32| !self.is_null(self.prims[prim as usize].shape);
-        if self.bvh.crossings(&ray, skip, blocks, &mut path.hits) {
+        let blocks = |prim: u32| !self.is_null(self.geometry.prims[prim as usize].shape);
+        if self.geometry.bvh.crossings(&ray, skip, blocks, &mut path.hits) {
             return false;
         }
         self.cross(path, dir, medium);

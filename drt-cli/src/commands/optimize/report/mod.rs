@@ -1,0 +1,152 @@
+//! A page that tells of a run, in one file that needs nothing else.
+
+mod chart;
+mod embed;
+
+use std::fmt::Write as _;
+
+use chart::Chart;
+use embed::figure;
+
+use super::gallery::Gallery;
+use super::history::History;
+use super::problem::Problem;
+use crate::PROGRAM;
+use crate::commands::markup::escaped;
+
+/// The name of the page.
+pub(super) const FILE: &str = "report.html";
+/// Most parameters with a curve and a derivative image of their own.
+const MOST_SHOWN: usize = 24;
+
+/// A run so far.
+pub(super) struct Report<'a> {
+    pub(super) problem: &'a Problem<'a>,
+    pub(super) history: &'a History,
+    pub(super) gallery: &'a Gallery<'a>,
+    /// Steps taken.
+    pub(super) steps: u32,
+    /// Per parameter, as far as it is known.
+    pub(super) uncertainty: Option<Vec<f64>>,
+    /// Wall and processor time of all runs.
+    pub(super) spent: [f64; 2],
+    /// Why it ended early, where it did.
+    pub(super) failure: Option<&'a str>,
+}
+
+impl Report<'_> {
+    pub(super) fn html(&self) -> String {
+        let name = escaped(&self.problem.job.name());
+        let style = include_str!("style.css");
+        let mut page = format!(
+            "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\
+             <title>{name}: fit</title>\n<style>\n{style}</style></head><body>\n\
+             <h1>{name}</h1>\n<p>{}</p>\n",
+            self.summary()
+        );
+        if let Some(failure) = self.failure {
+            page += &format!("<p class=\"failed\">{}</p>\n", escaped(failure));
+        }
+        page += &self.parameters();
+        page += &self.curves();
+        page += &self.images();
+        page += &self.times();
+        if let Some(text) = &self.problem.job.text {
+            page += &format!(
+                "<h2>Job</h2>\n<details><summary>{}</summary><pre>{}</pre></details>\n",
+                escaped(&self.problem.job.path.display().to_string()),
+                escaped(text)
+            );
+        }
+        page + "</body></html>\n"
+    }
+
+    fn summary(&self) -> String {
+        let (n, losses) = (self.problem.iterations, &self.history.losses);
+        let loss = match (losses.first(), losses.last()) {
+            (Some(first), Some(last)) => format!(", loss from {first:.4e} to {last:.4e}"),
+            _ => String::new(),
+        };
+        format!("{} of {n} iterations{loss}. Written by {PROGRAM}.", self.steps)
+    }
+
+    fn parameters(&self) -> String {
+        let mut text = String::from(
+            "<h2>Parameters</h2>\n<table><tr><th>parameter</th><th>start</th><th>now</th>\
+             <th>±</th><th>learning rate</th><th>bounds</th></tr>\n",
+        );
+        let rows = self.history.values.first().zip(self.history.values.last());
+        let Some((start, now)) = rows else { return String::new() };
+        for (p, name) in self.problem.names().enumerate() {
+            let variable = &self.problem.plan.variables[p];
+            let logarithmic = if variable.logarithmic { " (of the logarithm)" } else { "" };
+            let bounds = match (variable.lower.is_finite(), variable.upper.is_finite()) {
+                (false, false) => "none".to_owned(),
+                _ => format!("{} to {}", variable.lower, variable.upper),
+            };
+            let error =
+                self.uncertainty.as_ref().map_or("not known".into(), |u| format!("{:.2e}", u[p]));
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                text,
+                "<tr><td>{}</td><td>{:.6}</td><td>{:.6}</td><td>{error}</td>\
+                 <td>{}{logarithmic}</td><td>{bounds}</td></tr>",
+                escaped(name),
+                start[p],
+                now[p],
+                variable.learning_rate
+            );
+        }
+        text + "</table>\n<p>± is how far the noise of the last iteration's image and derivatives \
+                alone would lead a Newton step astray; a fit averages over many iterations. It is \
+                not known where derivatives do not tell parameters apart.</p>\n"
+    }
+
+    fn curves(&self) -> String {
+        let loss =
+            Chart { title: "loss", values: &self.history.losses, logarithmic: true, error: None };
+        let mut text = format!("<h2>Curves</h2>\n<div class=\"row\">\n{}", loss.svg());
+        for (p, name) in self.problem.names().enumerate().take(MOST_SHOWN) {
+            let values: Vec<f64> = self.history.values.iter().map(|row| row[p]).collect();
+            let error = self.uncertainty.as_ref().map(|u| u[p]);
+            text += &Chart { title: name, values: &values, logarithmic: false, error }.svg();
+        }
+        text + "</div>\n<p>Over iterations; the red bar is ±.</p>\n"
+    }
+
+    fn images(&self) -> String {
+        let mut text = String::from("<h2>Images</h2>\n");
+        for v in 0..self.problem.views.len() {
+            text += "<div class=\"row\">\n";
+            for i in self.gallery.frames().filter(|i| *i <= self.steps) {
+                text += &figure(&self.gallery.frame(v, i), &format!("iteration {i}"));
+            }
+            let now = format!("now, iteration {}", self.steps);
+            text += &figure(&self.gallery.file(v, "current"), &now);
+            text += &figure(&self.gallery.file(v, "target"), "target");
+            text += &figure(&self.gallery.file(v, "difference"), "now − target");
+            text += "</div>\n";
+        }
+        text += "<h2>Derivatives</h2>\n";
+        for v in 0..self.problem.views.len() {
+            text += "<div class=\"row\">\n";
+            for (p, name) in self.problem.names().enumerate().take(MOST_SHOWN) {
+                text += &figure(&self.gallery.derivative(v, p), name);
+            }
+            text += "</div>\n";
+        }
+        text + "<p>Blue is negative, red positive, each picture in its own range.</p>\n"
+    }
+
+    fn times(&self) -> String {
+        let [seconds, cpu_seconds] = self.spent;
+        let evaluations = self.history.losses.len().max(1) as f64;
+        format!(
+            "<h2>Times</h2>\n<table><tr><th></th><th>all</th><th>per iteration</th></tr>\n\
+             <tr><td>wall time</td><td>{seconds:.1} s</td><td>{:.3} s</td></tr>\n\
+             <tr><td>processor time</td><td>{cpu_seconds:.1} s</td><td>{:.3} s</td></tr></table>\n",
+            seconds / evaluations,
+            cpu_seconds / evaluations
+        )
+    }
+}
