@@ -10,9 +10,13 @@
 //! standard error of a block or of the whole contains one event more of the layer's typical size
 //! Σx² / Σ|x| ([`Events`]), which is lost among many and honest among few.
 
+mod splats;
+
 use alloc::vec::Vec;
 
 use drt_math::{Real, Rgb};
+
+pub(crate) use splats::Splats;
 
 use crate::rendering::{BLOCKS, Estimate, Layer};
 
@@ -316,28 +320,6 @@ impl PixelFilm {
     }
 }
 
-/// One batch of a splatted term: a sum per pixel and layer.
-#[derive(Debug)]
-pub(crate) struct Splats {
-    layers: Vec<Vec<Rgb>>,
-    events: Vec<Events>,
-}
-
-impl Splats {
-    pub(crate) fn new(size: [u32; 2], layers: usize) -> Self {
-        let n = (size[0] * size[1]) as usize;
-        Self {
-            layers: alloc::vec![alloc::vec![Rgb::ZERO; n]; layers],
-            events: alloc::vec![Events::NONE; layers],
-        }
-    }
-
-    pub(crate) fn add(&mut self, layer: usize, pixel: u32, v: Rgb) {
-        self.layers[layer][pixel as usize] += v;
-        self.events[layer].push(v);
-    }
-}
-
 /// Images whose samples land anywhere.
 #[derive(Debug)]
 pub(crate) struct SplatFilm {
@@ -439,17 +421,17 @@ impl SplatPass {
         }
         for ((sum, squares), image) in self.layers.iter_mut().zip(&batch.layers) {
             let mut sums = BlockSums::ZERO;
-            for (i, v) in image.iter().enumerate() {
-                let v = *v * scale;
+            image.for_each(|i, v| {
+                let v = v * scale;
                 sum[i] += v;
                 squares[i] += v * v;
                 sums.add(blocks.of[i], v);
-            }
+            });
             for (k, s) in sums.0.iter().enumerate() {
                 let pixels = blocks.count.get(k).copied().unwrap_or(all);
                 let v = *s * (1.0 / f64::from(pixels.max(1)));
-                sum[image.len() + k] += v;
-                squares[image.len() + k] += v * v;
+                sum[blocks.of.len() + k] += v;
+                squares[blocks.of.len() + k] += v * v;
             }
         }
     }

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, fm};
 
 use super::View;
-use super::linear::newton_noise;
+use super::linear::{newton_noise, newton_step};
 use crate::loss::{Loss, inner};
 
 /// Sides of the squares of pixels whose errors are taken together, because filters may spread one
@@ -145,6 +145,14 @@ impl Evaluation {
     #[must_use]
     pub fn uncertainty(&self) -> Option<Vec<f64>> {
         newton_noise(&self.curvature(), &self.covariance())
+    }
+
+    /// What a Newton step would add to the parameters: how far they seem to be from their goal. `None`
+    /// as for [`uncertainty`](Self::uncertainty).
+    #[must_use]
+    pub fn newton_step(&self) -> Option<Vec<f64>> {
+        let step = newton_step(&self.curvature(), &self.gradient())?;
+        Some(step.into_iter().map(|s| -s).collect())
     }
 
     /// The image of a view by all samples, row by row from the top left.

@@ -25,6 +25,14 @@ pub(super) fn newton_noise(curvature: &[Vec<f64>], covariance: &[Vec<f64>]) -> O
     Some(noise.collect())
 }
 
+/// H⁻¹ g; `None` as above.
+pub(super) fn newton_step(curvature: &[Vec<f64>], gradient: &[f64]) -> Option<Vec<f64>> {
+    let factor = cholesky(curvature)?;
+    let mut step = gradient.to_vec();
+    solve(&factor, &mut step);
+    Some(step)
+}
+
 /// The lower triangle L of H = L Lᵀ.
 fn cholesky(h: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let mut l: Vec<Vec<f64>> = Vec::new();
@@ -70,6 +78,8 @@ mod tests {
         for (f, e) in found.iter().zip(expected) {
             assert!((f * f - e).abs() < 1e-12, "{f} {e}");
         }
+        let step = newton_step(&h, &[2.0, 1.0]).unwrap();
+        assert!(step[0].abs() < 1e-12 && (step[1] - 2.0).abs() < 1e-12, "{step:?}");
     }
 
     #[test]

@@ -200,7 +200,7 @@ impl Loss {
             Self::Rmse => scaled(1.0 / (channels(reference) * value)),
             Self::PyramidL2 { levels, weight } => {
                 let mut sum = Pyramid::new(reference.size, levels, weight).apply(d);
-                sum.iter_mut().for_each(|s| *s = *s * 2.0);
+                sum.iter_mut().for_each(|s| *s *= 2.0);
                 sum
             }
         }
@@ -216,7 +216,7 @@ fn masked_difference(image: &[Rgb], reference: &Reference) -> Vec<Rgb> {
 fn times_mask(mut image: Vec<Rgb>, reference: &Reference) -> Vec<Rgb> {
     assert_eq!(image.len(), reference.pixels.len(), "an image of another size");
     for (pixel, factor) in image.iter_mut().zip(reference.mask.iter().flatten()) {
-        *pixel = *pixel * *factor;
+        *pixel *= *factor;
     }
     image
 }

@@ -186,7 +186,7 @@ impl Part {
                 let mut receiver = Checked::new(ToImages::new(&self.prepared.world, motion));
                 let stream = source.stream() + u64::from(b);
                 let account = splatter.run(source, stream, per_batch, &mut receiver);
-                (receiver.inner.splats, account)
+                (receiver.inner.splats.settled(), account)
             },
             |b, (splats, of_batch)| {
                 pass.add(&splats, f64::from(per_batch), blocks);

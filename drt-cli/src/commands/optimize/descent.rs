@@ -13,7 +13,7 @@ use super::history::{History, LOSSES, PARAMETERS};
 use super::problem::Problem;
 use super::report::{self, Report};
 use super::watch::Watch;
-use crate::atomic::write_atomically;
+use crate::atomic::{remove_drafts, write_atomically};
 use crate::commands::Outcome;
 use crate::commands::clock::Clock;
 use crate::commands::monitor::Monitor;
@@ -67,6 +67,9 @@ impl<'a> Descent<'a> {
         };
         let optimizer = optimizer.map_err(refuse)?;
         let watch = Watch::new(problem, optimizer.values(), blind)?;
+        if let Some(folder) = folder {
+            remove_drafts(folder);
+        }
         let gallery = folder.map(|folder| Gallery::new(problem, folder));
         Ok(Self { problem, fingerprint, optimizer, history, watch, gallery, clock, before })
     }
@@ -221,6 +224,7 @@ impl<'a> Descent<'a> {
             gallery,
             steps: self.steps(),
             uncertainty: seen.uncertainty(),
+            left: seen.newton_step(),
             spent: self.spent(),
             failure,
         };

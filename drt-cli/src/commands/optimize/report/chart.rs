@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use crate::commands::markup::{decade, escaped};
 
 /// Pixels of a chart, and of what surrounds its axes: left, top, right, bottom.
-const SIZE: [f64; 2] = [420.0, 230.0];
+const SIZE: [f64; 2] = [350.0, 210.0];
 const MARGIN: [f64; 4] = [64.0, 26.0, 12.0, 24.0];
 /// About as many marks as fit along the vertical axis.
 const MARKS: f64 = 5.0;

@@ -28,6 +28,8 @@ pub(super) struct Report<'a> {
     pub(super) steps: u32,
     /// Per parameter, as far as it is known.
     pub(super) uncertainty: Option<Vec<f64>>,
+    /// What a Newton step would still add.
+    pub(super) left: Option<Vec<f64>>,
     /// Wall and processor time of all runs.
     pub(super) spent: [f64; 2],
     /// Why it ended early, where it did.
@@ -73,7 +75,7 @@ impl Report<'_> {
     fn parameters(&self) -> String {
         let mut text = String::from(
             "<h2>Parameters</h2>\n<table><tr><th>parameter</th><th>start</th><th>now</th>\
-             <th>±</th><th>learning rate</th><th>bounds</th></tr>\n",
+             <th>±</th><th>left</th><th>learning rate</th><th>bounds</th></tr>\n",
         );
         let rows = self.history.values.first().zip(self.history.values.last());
         let Some((start, now)) = rows else { return String::new() };
@@ -84,12 +86,14 @@ impl Report<'_> {
                 (false, false) => "none".to_owned(),
                 _ => format!("{} to {}", variable.lower, variable.upper),
             };
-            let error =
-                self.uncertainty.as_ref().map_or("not known".into(), |u| format!("{:.2e}", u[p]));
+            let known = |list: &Option<Vec<f64>>| {
+                list.as_ref().map_or("not known".into(), |l| format!("{:.1e}", l[p]))
+            };
+            let (error, left) = (known(&self.uncertainty), known(&self.left));
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
-                "<tr><td>{}</td><td>{:.6}</td><td>{:.6}</td><td>{error}</td>\
+                "<tr><td>{}</td><td>{:.6}</td><td>{:.6}</td><td>{error}</td><td>{left}</td>\
                  <td>{}{logarithmic}</td><td>{bounds}</td></tr>",
                 escaped(name),
                 start[p],
@@ -97,9 +101,10 @@ impl Report<'_> {
                 variable.learning_rate
             );
         }
-        text + "</table>\n<p>± is how far the noise of the last iteration's image and derivatives \
-                alone would lead a Newton step astray; a fit averages over many iterations. It is \
-                not known where derivatives do not tell parameters apart.</p>\n"
+        text + "</table>\n<p><b>left</b> is what a Newton step from here would add, by the last \
+                iteration's image and derivatives, and <b>±</b> how far their noise alone would \
+                lead it astray; a fit averages over many iterations. Both are unknown where \
+                derivatives do not tell parameters apart.</p>\n"
     }
 
     fn curves(&self) -> String {
@@ -121,8 +126,10 @@ impl Report<'_> {
             for i in self.gallery.frames().filter(|i| *i <= self.steps) {
                 text += &figure(&self.gallery.frame(v, i), &format!("iteration {i}"));
             }
-            let now = format!("now, iteration {}", self.steps);
-            text += &figure(&self.gallery.file(v, "current"), &now);
+            if !self.gallery.frames().any(|i| i == self.steps) {
+                let now = format!("now, iteration {}", self.steps);
+                text += &figure(&self.gallery.file(v, "current"), &now);
+            }
             text += &figure(&self.gallery.file(v, "target"), "target");
             text += &figure(&self.gallery.file(v, "difference"), "now − target");
             text += "</div>\n";

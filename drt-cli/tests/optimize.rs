@@ -1,0 +1,269 @@
+//! `drt optimize` from outside: it arrives, goes on after a crash to the same bits, and says plainly
+//! why it cannot.
+
+mod common;
+
+use std::path::Path;
+use std::time::Duration;
+
+use common::{Folder, expect};
+
+const SCENE: &str = r#"<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="2"/></integrator>
+  <sensor type="perspective" id="cam"><float name="fov" value="40"/>
+    <transform name="to_world"><lookat origin="0 -4 3" target="0 0 0" up="0 0 1"/></transform>
+    <film type="hdrfilm"><integer name="width" value="16"/><integer name="height" value="16"/>
+      <rfilter type="box"/></film></sensor>
+  <sensor type="perspective" id="above"><float name="fov" value="40"/>
+    <transform name="to_world"><lookat origin="0 0 5" target="0 0 0" up="0 1 0"/></transform>
+    <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/>
+      <rfilter type="box"/></film></sensor>
+  <shape type="rectangle" id="floor"><bsdf type="diffuse" id="gray">
+    <rgb name="reflectance" value="0.5"/></bsdf></shape>
+  <emitter type="point" id="lamp"><point name="position" value="0.5 -0.5 1"/></emitter>
+</scene>"#;
+
+const JOB: &str = r#"scene = "scene.xml"
+[estimator]
+spp = 16
+[[parameter]]
+name = "gray"
+[[parameter.effect]]
+target = "gray"
+property = "reflectance"
+add = [1.0, 1.0, 1.0]
+[[parameter]]
+name = "lamp-x"
+[[parameter.effect]]
+target = "lamp"
+translate = [1.0, 0.0, 0.0]
+"#;
+
+const FIT: &str = r#"
+[optimize]
+targets = ["target.exr"]
+loss = { pyramid-l2 = { levels = 10, weight = 4 } }
+bounds = { gray = [-0.4, 0.4] }
+checkpoint = "run"
+checkpoint_every = 3
+optimizer = { kind = "adam", learning_rate = { gray = 0.02, lamp-x = 0.05 }, iterations = 60, decay = "cosine" }
+"#;
+
+/// A folder with a scene, a job and its target at gray = 0.2 and lamp-x = -0.5.
+fn folder(fit: &str) -> Folder {
+    let folder = Folder::new();
+    folder.file("scene.xml", SCENE);
+    folder.file("job.toml", format!("{JOB}{fit}"));
+    render(&folder, "-o target.exr");
+    folder
+}
+
+fn render(folder: &Folder, options: &str) {
+    let at = "--set parameter.gray.value=0.2 --set parameter.lamp-x.value=-0.5";
+    let line = format!("render job.toml --quiet --spp 256 {at} {options}");
+    expect(&folder.run(&line), 0, &[]);
+}
+
+fn text(folder: &Folder, name: &str) -> String {
+    std::fs::read_to_string(folder.path().join(name)).unwrap()
+}
+
+/// The last row of the table of values.
+fn result(folder: &Folder) -> Vec<f64> {
+    let table = text(folder, "run/params.csv");
+    let last = table.lines().last().unwrap();
+    last.split(',').skip(1).map(|v| v.parse().unwrap()).collect()
+}
+
+#[test]
+fn a_fit_arrives_and_tells_of_it() {
+    let folder = folder(FIT);
+    let out = folder.run("optimize job.toml -o end.exr --digest end.json");
+    expect(&out, 0, &[]);
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert!(said.contains("gray = 0.") && said.contains(" ± "), "{said}");
+    let [gray, lamp] = result(&folder)[..] else { panic!() };
+    assert!((gray - 0.2).abs() < 0.02 && (lamp + 0.5).abs() < 0.05, "{gray} {lamp}");
+    let (values, losses) = (text(&folder, "run/params.csv"), text(&folder, "run/loss.csv"));
+    assert!(values.starts_with("iteration,gray,lamp-x\n0,0.0,0.0\n1,"));
+    assert!(losses.starts_with("iteration,loss\n0,"));
+    assert_eq!((values.lines().count(), losses.lines().count()), (62, 62));
+    assert_eq!(folder.json("end.json")["command"], "optimize");
+    assert!(folder.exr("end.exr").layers.contains_key("d_lamp-x"));
+    for name in ["initial", "target", "current", "difference", "derivative-000", "frame-00060"] {
+        assert!(folder.path().join(format!("run/{name}.png")).is_file(), "{name}");
+    }
+    let page = text(&folder, "run/report.html");
+    assert!(page.contains("<td>lamp-x</td>") && page.contains("data:image/png;base64,"));
+    assert!(!page.contains("http://") && !page.contains("https://"), "it needs nothing else");
+    // Once there, it stays there.
+    let before = text(&folder, "run/params.csv");
+    expect(&folder.run("optimize job.toml --quiet"), 0, &[]);
+    assert_eq!(before, text(&folder, "run/params.csv"));
+}
+
+/// All that must not depend on where a run was stopped.
+fn outcome(folder: &Folder) -> (String, String, serde_json::Value) {
+    let state = folder.json("run/checkpoint.json")["optimizer"].clone();
+    (text(folder, "run/params.csv"), text(folder, "run/loss.csv"), state)
+}
+
+#[test]
+fn killed_at_any_moment_it_ends_in_the_same_bits() {
+    let [whole, broken] = [(); 2].map(|()| folder(FIT));
+    expect(&whole.run("optimize job.toml --quiet --threads 1"), 0, &[]);
+    let (mut killed, mut random) = (0, 12345_u32);
+    for _ in 0..40 {
+        let mut child = broken.command("optimize job.toml --quiet --threads 2").spawn().unwrap();
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        std::thread::sleep(Duration::from_millis(u64::from(40 + random % 300)));
+        match child.try_wait().unwrap() {
+            Some(status) => assert!(status.success()),
+            None => {
+                // SIGKILL: nothing can be done about it.
+                child.kill().unwrap();
+                killed += 1;
+            }
+        }
+        child.wait().unwrap();
+        if killed == 10 {
+            break;
+        }
+    }
+    assert!(killed >= 2, "killed {killed} times");
+    expect(&broken.run("optimize job.toml --quiet"), 0, &[]);
+    assert_eq!(outcome(&whole), outcome(&broken));
+    let left = std::fs::read_dir(broken.path().join("run")).unwrap();
+    let drafts =
+        left.filter(|f| f.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
+    assert_eq!(drafts.count(), 0, "what a kill left behind is gone");
+}
+
+#[test]
+fn a_run_can_stop_for_a_while_and_go_on_longer() {
+    let [whole, broken] = [(); 2].map(|()| folder(&FIT.replace("\"cosine\"", "\"constant\"")));
+    expect(&whole.run("optimize job.toml --quiet"), 0, &[]);
+    expect(&broken.run("optimize job.toml --seconds 0.001"), 0, &[]);
+    assert!(text(&broken, "run/params.csv").lines().count() < 62);
+    expect(&broken.run("optimize job.toml --quiet --iterations 20"), 0, &[]);
+    expect(&broken.run("optimize job.toml --quiet"), 0, &[]);
+    assert_eq!(outcome(&whole), outcome(&broken));
+    // Another problem does not go on from there.
+    let other = "optimize job.toml --quiet --seed 7";
+    expect(&broken.run(other), 2, &["checkpoint.json: it belongs to another problem"]);
+    expect(&broken.run(&format!("{other} --restart")), 0, &[]);
+    assert_ne!(outcome(&whole), outcome(&broken));
+}
+
+#[test]
+fn several_sensors_masks_schedules_and_png() {
+    let fit = r#"
+[optimize]
+targets = ["target.png", "above.exr"]
+masks = ["mask.png", "ones.png"]
+loss = "rmse"
+log = []
+spp = [[10, 16]]
+reduce = [[0, 2], [20, 1]]
+optimizer = { kind = "sgd", momentum = 0.5, learning_rate = 0.3, iterations = 40 }
+checkpoint = "run"
+"#;
+    let folder = folder(fit);
+    render(&folder, "--preview target.png --set estimator.spp=4 --size 16x16");
+    render(&folder, "-o above.exr --sensor above");
+    for (name, size, black) in [("mask.png", 16, 10), ("ones.png", 8, 0)] {
+        let pixels: Vec<u8> =
+            (0..size * size).map(|i| if i % size < black { 0 } else { 255 }).collect();
+        let file = std::fs::File::create(folder.path().join(name)).unwrap();
+        let mut encoder = png::Encoder::new(file, size, size);
+        encoder.set_color(png::ColorType::Grayscale);
+        encoder.write_header().unwrap().write_image_data(&pixels).unwrap();
+    }
+    expect(&folder.run("optimize job.toml --quiet"), 0, &[]);
+    assert!(folder.path().join("run/current-2.png").is_file());
+    let losses = text(&folder, "run/loss.csv");
+    assert_eq!(losses.lines().count(), 42);
+}
+
+#[test]
+fn what_cannot_be_fitted_is_refused_before_anything_is_written() {
+    let folder = folder(FIT);
+    let refused = |line: &str, parts: &[&str]| {
+        expect(&folder.run(line), 2, parts);
+        assert!(!folder.path().join("run").exists(), "{line}");
+    };
+    refused("optimize scene.xml", &["scene.xml is a scene"]);
+    refused("optimize job.toml --size 8x8", &["target.exr: it has 16x16 pixels", "8x8"]);
+    refused("optimize job.toml --sensor above", &["target.exr: it has 16x16 pixels", "8x8"]);
+    refused("optimize job.toml --target-error 0.1", &["--target-error"]);
+    let nothing = "[[parameter]]\nname = \"idle\"\n[[parameter.effect]]\ntarget = \"above\"\ntranslate = [1.0, 0.0, 0.0]\n";
+    let rates = "learning_rate = { gray = 0.02, lamp-x = 0.05 }";
+    let changed = |from: &str, to: &str, parts: &[&str]| {
+        let job = format!("{JOB}{FIT}").replace(from, to);
+        assert_ne!(job, format!("{JOB}{FIT}"));
+        folder.file("other.toml", job);
+        refused("optimize other.toml", parts);
+    };
+    folder.file("idle.toml", format!("{JOB}{nothing}{FIT}").replace(rates, "learning_rate = 0.1"));
+    refused("optimize idle.toml", &["idle.toml: parameter `idle` changes nothing"]);
+    folder.file("bare.toml", JOB);
+    refused("optimize bare.toml", &["bare.toml: it has no [optimize]"]);
+    changed("checkpoint_every", "checkpoint_ever", &["other.toml:", "checkpoint_ever"]);
+    changed("\"cosine\"", "\"cosin\"", &["other.toml:", "\"cosine\""]);
+    changed("gray = 0.02, ", "", &["`learning_rate` has no entry for parameter `gray`"]);
+    changed("bounds = { gray", "bounds = { grey", &["`bounds`: there is no parameter `grey`"]);
+    changed("[-0.4, 0.4]", "[0.1, 0.4]", &["parameter `gray` starts at 0, outside of its bounds"]);
+    changed("weight = 4", "weight = 0", &["other.toml:", "weight 0"]);
+    changed("weight = 4", "wait = 4", &["other.toml:"]);
+    changed(
+        "iterations = 60",
+        "iterations = 60, momentum = 0.5",
+        &["does not belong to this kind"],
+    );
+    changed("target.exr", "none.exr", &["none.exr"]);
+    changed("\"target.exr\"", "", &["`targets` is empty"]);
+    changed("checkpoint = ", "reduce = [[0, 3]]\ncheckpoint = ", &["target.exr", "16x16", "3"]);
+    changed("checkpoint = ", "log = [\"gray\"]\ncheckpoint = ", &["must be positive"]);
+    changed("checkpoint = ", "sensors = [\"cam\", \"above\"]\ncheckpoint = ", &["one per target"]);
+}
+
+#[test]
+fn failures_on_the_way_are_told_and_stored() {
+    let folder = folder(&FIT.replace("lamp-x = 0.05", "lamp-x = 40.0"));
+    // Into the floor.
+    let job = text(&folder, "job.toml")
+        .replace("translate = [1.0, 0.0, 0.0]", "translate = [0.0, 0.0, -1.0]");
+    folder.file("down.toml", job.replace("lamp-x = 40.0", "lamp-x = 3.0"));
+    let out = folder.run("optimize down.toml --quiet --set parameter.gray.value=-0.4");
+    expect(&out, 1, &["iteration 0: the step to", "`lamp` passed through `floor`"]);
+    assert!(text(&folder, "run/report.html").contains("passed through"));
+    assert_eq!(text(&folder, "run/params.csv").lines().count(), 2);
+    // Steps too far, back and forth.
+    std::fs::remove_dir_all(folder.path().join("run")).unwrap();
+    let moves = "target = \"lamp\"\ntranslate = [1.0, 0.0, 0.0]";
+    let brightens = "target = \"lamp\"\nproperty = \"intensity\"\nadd = [1.0, 1.0, 1.0]";
+    let far = "kind = \"sgd\", learning_rate = { gray = 0.0, lamp-x = 50.0 }";
+    let near = "kind = \"adam\", learning_rate = { gray = 0.02, lamp-x = 40.0 }";
+    let bright = text(&folder, "job.toml").replace(moves, brightens).replace(near, far);
+    folder.file("bright.toml", bright);
+    expect(&folder.run("optimize bright.toml --quiet"), 1, &["the loss diverges", "learning rate"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_stores_and_the_rest_follows() {
+    let [whole, broken] = [(); 2].map(|()| folder(FIT));
+    expect(&whole.run("optimize job.toml --quiet"), 0, &[]);
+    let mut child =
+        broken.command("optimize job.toml --quiet --set estimator.spp=16").spawn().unwrap();
+    let started = |p: &Path| p.join("run/target.png").exists();
+    while !started(broken.path()) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let pid = child.id().to_string();
+    assert!(std::process::Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(broken.path().join("run/checkpoint.json").is_file());
+    expect(&broken.run("optimize job.toml --quiet"), 0, &[]);
+    assert_eq!(outcome(&whole), outcome(&broken));
+}
