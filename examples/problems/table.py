@@ -2,12 +2,12 @@
 """Fits the inverse problems and prints how near they come, in how much time.
 
     cargo build --release -p drt-cli
-    python3 examples/problems/table.py [--threads N] [--again] [NAME...]
+    python3 examples/problems/table.py [--threads N] [--again] [--pictures FOLDER] [NAME...]
 
 Renders the targets (once; another seed than any of the fits'), runs `drt optimize` on each job, and prints a
 table in Markdown. What is there already is read, not run: a stopped fit goes on, a finished one costs nothing;
 --again begins all anew. The scenes of dtrt must lie beside their jobs: see examples/dtrt/README.md. The bunny
-of the row `bunny, scan` is not part of this project either: --bunny PATH/TO/stanford-bunny.obj.
+of the row `bunny-scan` is not part of this project either: --bunny PATH/TO/stanford-bunny.obj.
 
 Errors are distances between vectors of parameters, over that of the start. `core s` are processor seconds of
 the whole process, user and system, reading the scene and writing pictures included.
@@ -19,6 +19,7 @@ import dataclasses
 import json
 import math
 import pathlib
+import shutil
 import subprocess
 import sys
 
@@ -74,7 +75,7 @@ PROBLEMS = {
     "branches": Problem("problems/branches/job.toml", {"turn": 0.5}, 0.05, 2048, 8 * 39, 100),
     "bunny": Problem("problems/bunny/job.toml", BODY, 0.05, 2048, 8 * 575, 125, ("front", "side", "above")),
 }
-SCAN = ("scale=11", "x=0.19", "y=-0.34")
+SCAN = ("scale=10", "x=0.17", "y=-0.25")
 
 
 def arguments():
@@ -83,6 +84,7 @@ def arguments():
     parser.add_argument("--drt", default=EXAMPLES.parent / "target/release/drt", help="the drt binary")
     parser.add_argument("--threads", type=int, default=0, help="threads of each run; all cores by default")
     parser.add_argument("--bunny", type=pathlib.Path, help="a scanned bunny, 0.15 high, for a row of its own")
+    parser.add_argument("--pictures", type=pathlib.Path, help="where to put start, target and result of each as PNG")
     parser.add_argument("--again", action="store_true", help="begin fits anew")
     return parser.parse_args()
 
@@ -107,7 +109,6 @@ def fit(name, problem, options):
         if not target.exists():
             sees = ["--sensor", sensor] if sensor else []
             drt(options, "render", job, *values, *defines, *sees, "--seed", 1, "--spp", problem.spp, "--output", target)
-    # The folder of a run with a mesh from elsewhere is its own.
     line = ["optimize", job, *defines, "--set", f"optimize.targets={json.dumps(targets)}"]
     line += ["--set", f"optimize.checkpoint={json.dumps('/'.join(problem.run(name)))}"]
     drt(options, *line, *(["--restart"] if options.again else []))
@@ -115,6 +116,14 @@ def fit(name, problem, options):
         rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
     seconds = json.loads((folder / "checkpoint.json").read_text())["cpu_seconds"]
     return rows, seconds
+
+
+def keep_pictures(name, folder, to):
+    to.mkdir(parents=True, exist_ok=True)
+    for picture in ("initial", "target", "current"):
+        found = sorted(folder.glob(f"{picture}*.png"))
+        if found:
+            shutil.copyfile(found[0], to / f"{name}-{picture}.png")
 
 
 def distance(values, target):
@@ -127,6 +136,8 @@ def short(values, target):
 
 def row(name, problem, options):
     rows, seconds = fit(name, problem, options)
+    if options.pictures:
+        keep_pictures(name, problem.folder(name), options.pictures)
     errors = [distance(values, problem.target) / distance(rows[0], problem.target) for values in rows]
     iterations = len(rows) - 1
     # From here on it stays below the bound.
@@ -156,13 +167,13 @@ def main():
     problems = dict(PROBLEMS)
     if options.bunny:
         mesh = f"mesh={options.bunny.resolve()}"
-        problems["bunny, scan"] = dataclasses.replace(PROBLEMS["bunny"], define=(mesh, *SCAN))
+        problems["bunny-scan"] = dataclasses.replace(PROBLEMS["bunny"], define=(mesh, *SCAN))
     names = options.names or list(problems)
     for name in names:
         if name not in problems:
             sys.exit(f"{name}: expected one of {', '.join(problems)}")
-    print("| problem | parameters | start | target | reached | error | iterations (below the bound from) | core s an iteration "
-          "| core s | the papers' programs, core s × iterations | in iterations of theirs |")
+    print("| problem | parameters | start | target | reached | error | iterations (within the bound from) "
+          "| core s an iteration | core s | theirs, core s × iterations | core s / theirs of one iteration |")
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     reached = [row(name, problems[name], options) for name in names]
     sys.exit(0 if all(reached) else 1)
