@@ -7,6 +7,7 @@ mod digest;
 pub mod error;
 mod image;
 mod job;
+mod npy;
 mod scene_xml;
 #[cfg(test)]
 mod testing;

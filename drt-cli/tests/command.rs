@@ -144,8 +144,8 @@ fn unusable_input_exits_with_2_and_writes_nothing() {
         ("render scene.xml --max-depth -2", "--max-depth: "),
         ("render scene.xml --colour", "--colour"),
         ("paint scene.xml", "paint"),
-        ("grad job.toml --loss t.exr", "--loss is not supported yet"),
-        ("optimize job.toml", "later version"),
+        ("grad job.toml --loss t.exr", "--digest does not go with a gradient"),
+        ("optimize job.toml", "it has no [optimize]"),
         ("bench", "<INPUTS>"),
     ] {
         let out = folder.run(&format!(

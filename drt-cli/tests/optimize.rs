@@ -185,6 +185,48 @@ checkpoint = "run"
     assert_eq!(losses.lines().count(), 42);
 }
 
+/// The numbers of an NPY file.
+fn array(folder: &Folder, name: &str) -> Vec<f64> {
+    let bytes = std::fs::read(folder.path().join(name)).unwrap();
+    let start = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    assert!(bytes.starts_with(b"\x93NUMPY\x01\x00") && bytes[..start].ends_with(b"\n"));
+    assert!(String::from_utf8_lossy(&bytes[..start]).contains("'<f8'"));
+    bytes[start..].chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect()
+}
+
+#[test]
+fn gradients_by_target_and_by_adjoint_agree() {
+    let folder = folder("");
+    expect(&folder.run("grad job.toml --quiet --spp 512 --loss target.exr -o a.npy"), 0, &[]);
+    let gradient = array(&folder, "a.npy");
+    assert_eq!(gradient.len(), 2);
+    // Of squares: twice the difference of images.
+    expect(&folder.run("render job.toml --quiet --spp 512 -o now.exr --seed 9"), 0, &[]);
+    let [now, target] = ["now.exr", "target.exr"].map(|f| folder.exr(f).layers[""].clone());
+    let twice = |(a, b): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|c| f64::from(2.0 * (a[c] - b[c])));
+    let adjoint: Vec<[f64; 3]> = now.iter().zip(&target).map(twice).collect();
+    expect(&folder.run("grad job.toml --quiet --spp 512 -o d.exr"), 0, &[]);
+    let layers = folder.exr("d.exr").layers;
+    for (name, g) in ["d_gray", "d_lamp-x"].into_iter().zip(&gradient) {
+        let pairs = layers[name].iter().zip(&adjoint);
+        let product = pairs.map(|(d, a)| (0..3).map(|c| f64::from(d[c]) * a[c]).sum::<f64>());
+        let expected = product.sum::<f64>();
+        assert!((g - expected).abs() < 0.05 * expected.abs(), "{name}: {g} {expected}");
+    }
+    // An image of ones adds up every derivative.
+    let ones = vec![255_u8; 16 * 16];
+    let file = std::fs::File::create(folder.path().join("ones.png")).unwrap();
+    let mut encoder = png::Encoder::new(file, 16, 16);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.write_header().unwrap().write_image_data(&ones).unwrap();
+    expect(&folder.run("grad job.toml --quiet --spp 512 --adjoint ones.png -o b.npy"), 0, &[]);
+    let sum = layers["d_gray"].iter().flatten().map(|v| f64::from(*v)).sum::<f64>();
+    assert!((array(&folder, "b.npy")[0] - sum).abs() < 1e-4 * sum.abs());
+    expect(&folder.run("grad job.toml --quiet --loss target.exr"), 2, &["-o FILE.npy"]);
+    let small = "grad job.toml --quiet --loss target.exr --size 8x8 -o c.npy";
+    expect(&folder.run(small), 2, &["target.exr: it has 16x16 pixels"]);
+}
+
 #[test]
 fn what_cannot_be_fitted_is_refused_before_anything_is_written() {
     let folder = folder(FIT);
@@ -213,6 +255,8 @@ fn what_cannot_be_fitted_is_refused_before_anything_is_written() {
     changed("gray = 0.02, ", "", &["`learning_rate` has no entry for parameter `gray`"]);
     changed("bounds = { gray", "bounds = { grey", &["`bounds`: there is no parameter `grey`"]);
     changed("[-0.4, 0.4]", "[0.1, 0.4]", &["parameter `gray` starts at 0, outside of its bounds"]);
+    // That a fit could not begin there stands in the way of fits alone.
+    expect(&folder.run("render other.toml --quiet --spp 1"), 0, &[]);
     changed("weight = 4", "weight = 0", &["other.toml:", "weight 0"]);
     changed("weight = 4", "wait = 4", &["other.toml:"]);
     changed(

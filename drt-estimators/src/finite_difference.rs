@@ -10,6 +10,7 @@ use crate::Error;
 use crate::contraction::Contraction;
 use crate::film::{Blocks, PixelFilm};
 use crate::interior::{AlongRays, PixelSampler};
+use crate::kept::Kept;
 use crate::parallel::Pool;
 use crate::pixels::{Filling, Sampler};
 use crate::rendering::Layer;
@@ -47,9 +48,9 @@ pub fn finite_differences(
         let at = |offset: f64, middle: Option<&World>| {
             let mut moved = parameters.to_vec();
             moved[p].value += offset;
-            let (scene, _) = tangents::apply(scene, &moved, settings.sensor)?;
+            let (scene, _) = tangents::apply(scene, &moved)?;
             let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-            World::new(scene, settings.sensor, depth, middle, Lit::All, None)
+            World::new(scene, settings.sensor, depth, middle, Lit::All, &mut Kept::default())
         };
         let middle = at(0.0, None)?;
         let worlds = [at(-step, Some(&middle))?, at(step, Some(&middle))?];

@@ -19,6 +19,7 @@ pub mod fit;
 mod flux;
 mod inside;
 mod interior;
+mod kept;
 pub mod loss;
 mod parallel;
 mod pixels;

@@ -18,6 +18,7 @@ use crate::emitter::EmitterGradient;
 use crate::film::BATCHES;
 use crate::inside::{InsideGradients, TransposedInsides};
 use crate::interior::{PathSink, PixelSampler};
+use crate::kept::Kept;
 use crate::parallel::Pool;
 use crate::pixels::{Pass, Sampler};
 use crate::prepared::Prepared;
@@ -63,7 +64,7 @@ pub fn gradient(
 ) -> Result<SceneGradient, Error> {
     settings.check()?;
     scene.check()?;
-    let (scene, _) = tangents::apply(scene, &[], settings.sensor)?;
+    let (scene, _) = tangents::apply(scene, &[])?;
     let film = scene.sensors[settings.sensor].item.sensor.film();
     if adjoint.len() != (film[0] * film[1]) as usize {
         return Err(Error::Setting {
@@ -98,7 +99,8 @@ fn gradient_of_share(
     control: &dyn Control,
 ) -> Result<SceneGradient, Error> {
     let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-    let mut world = World::new(scene.clone(), settings.sensor, depth, None, lit, None)?;
+    let mut world =
+        World::new(scene.clone(), settings.sensor, depth, None, lit, &mut Kept::default())?;
     let mut interest = interest(&world.scene, wanted);
     for (e, emitter) in scene.emitters.iter().enumerate() {
         interest.emitters[e] &= lit.by(&emitter.item.emitter);

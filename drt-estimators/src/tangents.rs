@@ -30,7 +30,18 @@ pub(crate) struct Tangents {
     pub(crate) media: Vec<Vec<(usize, MediumTangent)>>,
     pub(crate) bsdfs: Vec<Vec<(usize, BsdfTangent)>>,
     pub(crate) emitters: Vec<Vec<(usize, EmitterTangent)>>,
+    /// Of every sensor.
+    sensors: Vec<Vec<(usize, SensorTangent)>>,
+    /// Of the one that is in use.
     pub(crate) sensor: Vec<(usize, SensorTangent)>,
+}
+
+impl Tangents {
+    /// The same for one of the sensors; where there is no such sensor, none changes.
+    pub(crate) fn seen_by(&self, sensor: usize) -> Self {
+        let sensor = self.sensors.get(sensor).cloned().unwrap_or_default();
+        Self { sensor, ..self.clone() }
+    }
 }
 
 /// Looks up every effect's target, and follows property effects on a shape to what carries the
@@ -111,15 +122,11 @@ fn leaders(parameter: &Parameter<Target>, target: Target) -> Vec<Target> {
 /// # Errors
 /// When an effect does not fit its target.
 pub fn moved(scene: &Scene, parameters: &[Parameter]) -> Result<Scene, Error> {
-    apply(scene, parameters, 0).map(|(scene, _)| scene)
+    apply(scene, parameters).map(|(scene, _)| scene)
 }
 
-/// Applies the parameters to a scene and differentiates it; `sensor` is the camera in use.
-pub(crate) fn apply(
-    scene: &Scene,
-    parameters: &[Parameter],
-    sensor: usize,
-) -> Result<(Scene, Tangents), Error> {
+/// Applies the parameters to a scene and differentiates it, without a sensor in use.
+pub(crate) fn apply(scene: &Scene, parameters: &[Parameter]) -> Result<(Scene, Tangents), Error> {
     let parameters = resolve(scene, parameters)?;
     let mut applied = Apply {
         scene: scene.clone(),
@@ -144,9 +151,7 @@ pub(crate) fn apply(
     }
     for i in 0..scene.sensors.len() {
         let tangents = applied.sensor(i)?;
-        if i == sensor {
-            applied.tangents.sensor = tangents;
-        }
+        applied.tangents.sensors.push(tangents);
     }
     Ok((applied.scene, applied.tangents))
 }

@@ -41,11 +41,11 @@ fn image(scene: &Scene, parameters: &[Parameter], spp: u32) -> Vec<Rgb> {
 fn fit(scene: &Scene, target: [f64; 3], loss: Loss) -> Fit {
     let pixels = image(&moved(scene, &parameters(target)).unwrap(), &[], 256);
     let view = View { sensor: 0, reference: Reference::new(FILM, pixels).unwrap() };
-    Fit::new(scene.clone(), vec![view], loss, settings()).unwrap()
+    Fit::new(scene.clone(), parameters([0.0; 3]), vec![view], loss, settings()).unwrap()
 }
 
 fn evaluate(fit: &mut Fit, values: [f64; 3], spp: u32, seed: u64) -> Evaluation {
-    fit.evaluate(&parameters(values), spp, seed, &Unattended).unwrap().unwrap()
+    fit.evaluate(&values, spp, seed, &Unattended).unwrap().unwrap()
 }
 
 /// Means and standard errors of a list of vectors.
@@ -127,6 +127,28 @@ fn what_is_kept_changes_no_bit() {
     }
 }
 
+/// Tetrahedra around a ball that deforms serve two cameras, and are made anew as it does.
+#[test]
+fn views_share_what_they_can() {
+    let mut scene = fog();
+    scene.sensors.push(scene.sensors[0].clone());
+    let black = || Reference::new(FILM, vec![Rgb::ZERO; (FILM[0] * FILM[1]) as usize]).unwrap();
+    let wobbling = || {
+        let effects = vec![moves("ball", wobble(&scene, "ball", 1))];
+        let views = [0, 1].map(|sensor| View { sensor, reference: black() });
+        let parameters = vec![parameter("wobble", 0.0, effects)];
+        Fit::new(scene.clone(), parameters, views.into(), Loss::L2, settings()).unwrap()
+    };
+    let mut kept = wobbling();
+    for value in [0.0, 0.1, 0.1, 0.0] {
+        let [a, b] = [&mut kept, &mut wobbling()]
+            .map(|fit| fit.evaluate(&[value], 4, 3, &Unattended).unwrap().unwrap());
+        assert_eq!(a.image(0), a.image(1));
+        assert_eq!((a.image(1), a.derivative(1, 0)), (b.image(1), b.derivative(1, 0)));
+        assert!(!a.is_blind_to(0));
+    }
+}
+
 #[test]
 fn a_restarted_session_is_a_new_one() {
     let scene = room();
@@ -171,10 +193,12 @@ fn a_descent_arrives() {
 #[test]
 fn parameters_that_change_nothing_are_seen() {
     let scene = room();
-    let mut fit = fit(&scene, [0.0; 3], Loss::L2);
+    let reference = Reference::new(FILM, image(&scene, &[], 4)).unwrap();
     let mut all = parameters([0.0; 3]);
     all.push(parameter("nothing", 0.0, vec![]));
-    let seen = fit.evaluate(&all, 4, 0, &Unattended).unwrap().unwrap();
+    let views = vec![View { sensor: 0, reference }];
+    let mut fit = Fit::new(scene, all, views, Loss::L2, settings()).unwrap();
+    let seen = fit.evaluate(&[0.0; 4], 4, 0, &Unattended).unwrap().unwrap();
     assert_eq!([0, 1, 2, 3].map(|p| seen.is_blind_to(p)), [false, false, false, true]);
     assert!(seen.uncertainty().is_none());
 }
@@ -201,8 +225,9 @@ fn targets_must_fit_the_film() {
         let pixels = vec![Rgb::ZERO; (size[0] * size[1]) as usize];
         View { sensor, reference: Reference::new(size, pixels).unwrap() }
     };
-    let fail =
-        |views| Fit::new(scene.clone(), views, Loss::L2, settings()).err().unwrap().to_string();
+    let fail = |views| {
+        Fit::new(scene.clone(), vec![], views, Loss::L2, settings()).err().unwrap().to_string()
+    };
     assert!(fail(vec![view(0, [3, 5])]).contains("3x5 pixels; the film of its sensor has 6x5"));
     assert!(fail(vec![view(1, FILM)]).contains("sensor 1, which does not exist"));
     assert!(fail(vec![]).contains("nothing to fit to"));

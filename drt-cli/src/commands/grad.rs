@@ -5,15 +5,12 @@ use drt_estimators::{Derivative, EstimatorKind, Rendering};
 use super::monitor::Monitor;
 use super::options::{GradOptions, Options};
 use super::outputs::Outputs;
-use super::{Outcome, run};
+use super::{Outcome, gradient, run};
 use crate::{CliError, Job};
 
 pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
-    for (name, given) in [("loss", options.loss.is_some()), ("adjoint", options.adjoint.is_some())]
-    {
-        if given {
-            return Err(CliError::argument(format!("--{name} is not supported yet")));
-        }
+    if options.loss.is_some() || options.adjoint.is_some() {
+        return gradient::run(options);
     }
     let common = &options.common;
     let mut job = run::open_with_parameters(common)?;

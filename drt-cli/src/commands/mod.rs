@@ -4,6 +4,7 @@ mod bench;
 mod check;
 mod clock;
 mod grad;
+mod gradient;
 mod info;
 mod markup;
 mod monitor;

@@ -93,10 +93,10 @@ pub(super) struct GradOptions {
     /// Store each term of a derivative in a layer of its own.
     #[arg(long)]
     pub(super) terms: bool,
-    /// Gradient of the distance to a target image (not available yet).
-    #[arg(long, value_name = "FILE.exr")]
+    /// Write the gradient of the distance to this target image, as NPY, instead of images.
+    #[arg(long, value_name = "FILE")]
     pub(super) loss: Option<PathBuf>,
-    /// Gradient of a loss given by its derivative image (not available yet).
+    /// The same for a loss of which this is the derivative by every pixel.
     #[arg(long, value_name = "FILE.exr")]
     pub(super) adjoint: Option<PathBuf>,
 }

@@ -30,6 +30,19 @@ impl Picture {
         }
     }
 
+    /// Refuses a picture of another size than the film's.
+    pub(crate) fn check_size(&self, path: &Path, film: [u32; 2]) -> Result<(), CliError> {
+        let ([w, h], [fw, fh]) = (self.size, film);
+        if self.size == film {
+            return Ok(());
+        }
+        let message = format!(
+            "it has {w}x{h} pixels, but the film of its sensor has {fw}x{fh}; expected the same \
+             size (`--size` changes the film's)"
+        );
+        Err(CliError::input(&Place::file(path), message))
+    }
+
     /// One number per pixel, as stored, whatever the encoding.
     pub(crate) fn gray(&self) -> Vec<f64> {
         self.values.iter().map(|v| v.mean()).collect()

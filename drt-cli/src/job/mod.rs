@@ -49,12 +49,12 @@ pub struct Job {
     pub parameters: Vec<Parameter<String>>,
     /// Budgets and switches.
     pub settings: Settings,
-    /// How the parameters are fitted to target images, where the job says so.
-    pub optimize: Option<Optimize>,
     /// What in the scene is passed over.
     pub warnings: Vec<Warning>,
     /// Where each parameter stands.
     places: Vec<Place>,
+    /// How the parameters are fitted, where that is said, or what stands in the way.
+    optimize: Result<Option<Optimize>, CliError>,
     /// What stands in the way of derivatives.
     refused: Option<CliError>,
 }
@@ -73,7 +73,7 @@ pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
     let (scene, warnings) = read_scene(&scene_path, &overrides.defaults)?;
     let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
     let settings = settings(&document, &keys, folder, &scene, &parameters)?;
-    let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters)?;
+    let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters);
     let refused = refused(&document, &keys);
     let path = path.into();
     let text = Some(text);
@@ -105,7 +105,7 @@ impl Job {
             scene,
             parameters: Vec::new(),
             settings: Settings::default(),
-            optimize: None,
+            optimize: Ok(None),
             warnings,
             places: Vec::new(),
             refused: None,
@@ -152,6 +152,14 @@ impl Job {
     /// Names the key.
     pub fn require_derivatives(&self) -> Result<(), CliError> {
         self.refused.clone().map_or(Ok(()), Err)
+    }
+
+    /// How the parameters are fitted to target images, where the job says so.
+    ///
+    /// # Errors
+    /// Names what in `[optimize]` cannot be meant.
+    pub fn optimize(&self) -> Result<Option<&Optimize>, CliError> {
+        self.optimize.as_ref().map(Option::as_ref).map_err(CliError::clone)
     }
 
     /// An error of the estimators with the file, and the parameter's line, that it is about.

@@ -26,15 +26,15 @@ use alloc::vec::Vec;
 use drt_motion::Parameter;
 
 use crate::Error;
+use crate::kept::Kept;
 use crate::loss::{Loss, Reference};
 use crate::scene::Scene;
 use crate::session::Control;
 use crate::settings::Settings;
-use crate::transport::Geometry;
 
 pub use evaluation::Evaluation;
 use evaluation::{Half, Seen};
-use source::Source;
+use source::{Applied, Source};
 pub use step::{Misstep, check_step};
 
 /// A picture that a scene shall look like.
@@ -46,21 +46,24 @@ pub struct View {
     pub reference: Reference,
 }
 
-/// A scene, and what it shall look like.
+/// A scene, what may change in it, and what it shall look like.
 pub struct Fit {
     scene: Scene,
+    parameters: Vec<Parameter>,
     views: Arc<[View]>,
     loss: Loss,
     settings: Settings,
-    /// Of the last evaluation.
-    geometry: Option<Arc<Geometry>>,
+    /// The scene at the values that were asked for last.
+    applied: Option<Arc<Applied>>,
+    /// From the last evaluation.
+    kept: Kept,
 }
 
 /// Between the seeds of the halves of an iteration, those of iterations being small steps apart.
 const HALF: u64 = 0xd1b5_4a32_d192_ed03;
 
 impl Fit {
-    /// `scene` at its parameters' zero; `settings` says how images and derivatives are estimated, its
+    /// `scene` at its parameters' zero; their own values do not matter. `settings` says how images and derivatives are estimated, its
     /// sensor aside.
     ///
     /// # Errors
@@ -68,6 +71,7 @@ impl Fit {
     /// of the loss is out of its range.
     pub fn new(
         scene: Scene,
+        parameters: Vec<Parameter>,
         views: Vec<View>,
         loss: Loss,
         settings: Settings,
@@ -90,10 +94,45 @@ impl Fit {
                 ));
             }
         }
-        Ok(Self { scene, views: views.into(), loss, settings, geometry: None })
+        let (views, applied, kept) = (views.into(), None, Kept::default());
+        Ok(Self { scene, parameters, views, loss, settings, applied, kept })
     }
 
-    /// Loss and derivatives at the parameters' values, from `spp` samples per pixel of each view, and at
+    /// The scene at these values of the parameters.
+    ///
+    /// # Errors
+    /// When an effect does not fit its target there.
+    pub fn scene_at(&mut self, values: &[f64]) -> Result<&Scene, Error> {
+        self.apply(values)?;
+        Ok(self.applied.as_ref().map_or(&self.scene, |applied| &applied.scene))
+    }
+
+    fn apply(&mut self, values: &[f64]) -> Result<Arc<Applied>, Error> {
+        if values.len() != self.parameters.len() {
+            return Err(Error::Setting {
+                setting: "values".into(),
+                reason: alloc::format!(
+                    "has {} numbers; there are {} parameters",
+                    values.len(),
+                    self.parameters.len()
+                ),
+            });
+        }
+        for (parameter, value) in self.parameters.iter_mut().zip(values) {
+            if parameter.value.to_bits() != value.to_bits() {
+                parameter.value = *value;
+                self.applied = None;
+            }
+        }
+        if let Some(applied) = &self.applied {
+            return Ok(applied.clone());
+        }
+        let applied = Arc::new(Applied::new(&self.scene, &self.parameters)?);
+        self.applied = Some(applied.clone());
+        Ok(applied)
+    }
+
+    /// Loss and derivatives at these values of the parameters, from `spp` samples per pixel of each view, and at
     /// least two; boundary samples are as many in proportion as the settings say. The same seed gives
     /// the same result, whatever the settings' own, and whatever was evaluated before: what has not
     /// changed since is used again. `None` when `control` cancelled it.
@@ -102,35 +141,38 @@ impl Fit {
     /// As [`Session::new`](crate::Session::new).
     pub fn evaluate(
         &mut self,
-        parameters: &[Parameter],
+        values: &[f64],
         spp: u32,
         seed: u64,
         control: &dyn Control,
     ) -> Result<Option<Evaluation>, Error> {
         let mut seen = Vec::new();
         let views = self.views.clone();
+        self.scene.check()?;
+        let applied = self.apply(values)?;
         for (v, view) in views.iter().enumerate() {
             let progress = |done| control.progress((v as f64 + done) / views.len() as f64);
             let control = Watched { control, progress };
-            match self.halves(parameters, view.sensor, spp.div_ceil(2), seed, &control)? {
+            match self.halves(&applied, view.sensor, spp.div_ceil(2), seed, &control)? {
                 Some(halves) => seen.push(Seen { halves }),
                 None => return Ok(None),
             }
         }
-        Ok(Some(Evaluation::new(self.loss, views, seen, parameters.len())))
+        Ok(Some(Evaluation::new(self.loss, views, seen, values.len())))
     }
 
     /// Image and derivatives by one sensor, twice independently.
     fn halves(
         &mut self,
-        parameters: &[Parameter],
+        applied: &Applied,
         sensor: usize,
         spp: u32,
         seed: u64,
         control: &dyn Control,
     ) -> Result<Option<[Half; 2]>, Error> {
         let settings = Settings { sensor, terms: false, ..self.settings.clone() };
-        let mut source = Source::new(&self.scene, parameters, settings, &mut self.geometry)?;
+        let mut source =
+            Source::new(&self.scene, &self.parameters, applied, settings, &mut self.kept)?;
         let mut half = |k: usize, seed| {
             let progress = |done| control.progress(0.5 * (k as f64 + done));
             source.half(spp, seed, &Watched { control, progress })

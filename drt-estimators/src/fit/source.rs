@@ -1,18 +1,31 @@
 //! Where images and derivatives come from.
 
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::Rgb;
 use drt_motion::Parameter;
 
 use super::evaluation::Half;
+use crate::kept::Kept;
 use crate::rendering::Layer;
 use crate::scene::Scene;
 use crate::session::{Control, Session};
 use crate::settings::{EstimatorKind, Settings};
-use crate::transport::Geometry;
-use crate::{Error, finite_differences, moved};
+use crate::tangents::{self, Tangents};
+use crate::{Error, finite_differences};
+
+/// A scene at its parameters' values, and its rates of change.
+pub(super) struct Applied {
+    pub(super) scene: Scene,
+    tangents: Tangents,
+}
+
+impl Applied {
+    pub(super) fn new(scene: &Scene, parameters: &[Parameter]) -> Result<Self, Error> {
+        let (scene, tangents) = tangents::apply(scene, parameters)?;
+        Ok(Self { scene, tangents })
+    }
+}
 
 /// A scene prepared at its parameters' values.
 pub(super) struct Source<'a> {
@@ -26,14 +39,17 @@ impl<'a> Source<'a> {
     pub(super) fn new(
         scene: &'a Scene,
         parameters: &'a [Parameter],
+        applied: &Applied,
         settings: Settings,
-        geometry: &mut Option<Arc<Geometry>>,
+        kept: &mut Kept,
     ) -> Result<Self, Error> {
+        let Applied { scene: moved, tangents } = applied;
         if settings.estimator == EstimatorKind::FiniteDifference {
-            let session = Session::reusing(&moved(scene, parameters)?, &[], &settings, geometry)?;
+            let (moved, no_tangents) = tangents::apply(moved, &[])?;
+            let session = Session::prepared(&moved, &no_tangents, &settings, kept)?;
             return Ok(Self { session, differences: Some((scene, parameters)), settings });
         }
-        let session = Session::reusing(scene, parameters, &settings, geometry)?;
+        let session = Session::prepared(moved, tangents, &settings, kept)?;
         Ok(Self { session, differences: None, settings })
     }
 

@@ -1,7 +1,7 @@
 //! The velocity fields inside media: for each medium one geometry that all parameters share, for each
 //! parameter what it carries.
 
-use alloc::boxed::Box;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::{Affine, Vec3};
@@ -29,7 +29,7 @@ pub(crate) enum Inside {
 #[derive(Clone, Debug)]
 pub(crate) enum Field {
     Blend(Blend),
-    Tetrahedra(Box<TetrahedralField>),
+    Tetrahedra(Arc<TetrahedralField>),
     MeanValue(MeanValue),
 }
 

@@ -16,7 +16,7 @@
 //! surface of few triangles counting triangle by triangle, and one of many as resting, with its flux
 //! added.
 
-use alloc::boxed::Box;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt::Display;
 
@@ -24,6 +24,7 @@ use drt_math::{Affine, Vec3};
 use drt_motion::Blend;
 
 use crate::Error;
+use crate::kept::Kept;
 use crate::settings::{GivenTetrahedra, InsideKind};
 use crate::tangents::Tangents;
 use crate::transport::World;
@@ -72,6 +73,7 @@ pub(crate) fn plan(
     world: &World,
     tangents: &Tangents,
     asked: &[(usize, InsideKind)],
+    kept: &mut Kept,
 ) -> Result<Insides, Error> {
     let media = world.scene.media.len();
     let mut insides = Insides::at_rest(world);
@@ -81,7 +83,8 @@ pub(crate) fn plan(
             (0..world.scene.shapes.len()).filter(|s| adjacent[*s].contains(&m)).collect();
         let parts = parts::parts(world, tangents, m, &shapes);
         let asked = asked_for(asked, m);
-        Surroundings { world, tangents, medium: m, shapes, parts, asked }.plan(&mut insides)?;
+        Surroundings { world, tangents, medium: m, shapes, parts, asked }
+            .plan(&mut insides, kept)?;
         insides.flux[m].sort_unstable();
         insides.flux[m].dedup();
     }
@@ -101,7 +104,7 @@ struct Surroundings<'a> {
 }
 
 impl Surroundings<'_> {
-    fn plan(&self, insides: &mut Insides) -> Result<(), Error> {
+    fn plan(&self, insides: &mut Insides, kept: &mut Kept) -> Result<(), Error> {
         let m = self.medium;
         let mut fielded = Vec::new();
         for p in (0..self.tangents.names.len()).filter(|p| self.moves(*p)) {
@@ -119,7 +122,7 @@ impl Surroundings<'_> {
         if fielded.is_empty() {
             return Ok(());
         }
-        let field = self.field(&fielded)?;
+        let field = self.field(&fielded, kept)?;
         for p in fielded {
             let inside = match &field {
                 Field::Blend(_) => {
@@ -209,24 +212,25 @@ impl Surroundings<'_> {
     }
 
     /// What the motions by some parameters share.
-    fn field(&self, parameters: &[usize]) -> Result<Field, Error> {
+    fn field(&self, parameters: &[usize], kept: &mut Kept) -> Result<Field, Error> {
         let Self { world, medium, shapes, parts, .. } = self;
-        let tetrahedra = || match self.given() {
-            Some(given) => tetrahedra::given(world, *medium, shapes, &given.mesh),
+        let tetrahedra = |kept: &mut Kept| match self.given() {
+            Some(given) => tetrahedra::given(world, *medium, shapes, &given.mesh).map(Arc::new),
             None => {
                 let points: Vec<Vec3> = parts.iter().filter_map(|part| part.point).collect();
-                tetrahedra::around(world, *medium, shapes, &points)
+                let make = || tetrahedra::around(world, *medium, shapes, &points);
+                kept.tetrahedra(*medium, &world.scene, shapes, &points, make)
             }
         };
         let deforms =
             |s: &usize| parameters.iter().any(|p| parts::is_deformed_by(self.tangents, *s, *p));
         match self.asked {
-            Some(InsideKind::Tetrahedral(_)) => Ok(Field::Tetrahedra(Box::new(tetrahedra()?))),
+            Some(InsideKind::Tetrahedral(_)) => Ok(Field::Tetrahedra(tetrahedra(kept)?)),
             Some(InsideKind::MeanValue) => {
                 Ok(Field::MeanValue(MeanValue::new(world, *medium, shapes, parts)?))
             }
-            None if shapes.iter().any(deforms) => match tetrahedra() {
-                Ok(field) => Ok(Field::Tetrahedra(Box::new(field))),
+            None if shapes.iter().any(deforms) => match tetrahedra(kept) {
+                Ok(field) => Ok(Field::Tetrahedra(field)),
                 Err(_) => self.blend(),
             },
             _ => self.blend(),

@@ -3,7 +3,6 @@
 mod describe;
 mod part;
 
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_motion::Parameter;
@@ -11,13 +10,14 @@ use drt_motion::Parameter;
 use part::{Part, Round};
 
 use crate::film::Blocks;
+use crate::kept::Kept;
 use crate::parallel::Pool;
 use crate::plan::Plan;
 use crate::rendering::{Account, Rendering};
 use crate::scene::Scene;
 use crate::settings::{EstimatorKind, Settings};
-use crate::tangents;
-use crate::transport::{Geometry, Lit};
+use crate::tangents::{self, Tangents};
+use crate::transport::Lit;
 use crate::{Error, Estimate};
 
 /// Watches and steers a run. Every method has a default that does nothing.
@@ -77,23 +77,23 @@ impl Session {
         parameters: &[Parameter],
         settings: &Settings,
     ) -> Result<Self, Error> {
-        Self::reusing(scene, parameters, settings, &mut None)
+        scene.check()?;
+        let (scene, tangents) = tangents::apply(scene, parameters)?;
+        Self::prepared(&scene, &tangents, settings, &mut Kept::default())
     }
 
-    /// As [`new`](Self::new), with the geometry of an earlier scene where it is still the same; that of
-    /// this one is left there.
-    pub(crate) fn reusing(
+    /// Prepares a scene at the parameters' values, with what earlier ones left to be used again.
+    pub(crate) fn prepared(
         scene: &Scene,
-        parameters: &[Parameter],
+        tangents: &Tangents,
         settings: &Settings,
-        geometry: &mut Option<Arc<Geometry>>,
+        kept: &mut Kept,
     ) -> Result<Self, Error> {
         settings.check()?;
-        scene.check()?;
-        let (scene, tangents) = tangents::apply(scene, parameters, settings.sensor)?;
+        let tangents = tangents.seen_by(settings.sensor);
         let mut parts = Vec::new();
-        for (settings, lit) in shares(&scene, settings) {
-            parts.push(Part::new(scene.clone(), tangents.clone(), settings, lit, geometry)?);
+        for (settings, lit) in shares(scene, settings) {
+            parts.push(Part::new(scene.clone(), tangents.clone(), settings, lit, kept)?);
         }
         let plan = Plan::together(parts.iter().map(|p| &p.plan));
         let size = scene.sensors[settings.sensor].item.sensor.film();

@@ -1,6 +1,5 @@
 //! One estimator's share of a run: what it samples of which light.
 
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use super::describe::describe;
@@ -9,6 +8,7 @@ use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm};
 use crate::inside::{self, Insides};
 use crate::interior::PixelSampler;
+use crate::kept::Kept;
 use crate::parallel::Pool;
 use crate::pixels::Filling;
 use crate::plan::Plan;
@@ -19,7 +19,7 @@ use crate::sensitivity::Interest;
 use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::{Checked, ToImages};
 use crate::tangents::Tangents;
-use crate::transport::{Geometry, Lit, World};
+use crate::transport::{Lit, World};
 use crate::{Error, Estimate};
 
 /// A scene prepared for one estimator, and what has been accumulated.
@@ -45,14 +45,13 @@ pub(super) struct Round<'a> {
 }
 
 impl Part {
-    /// Prepares a scene at the parameters' values for the light of some emitters. Geometry that is still
-    /// right is taken, and what was taken or made is left there.
+    /// Prepares a scene at the parameters' values for the light of some emitters.
     pub(super) fn new(
         scene: Scene,
         mut tangents: Tangents,
         settings: Settings,
         lit: Lit,
-        geometry: &mut Option<Arc<Geometry>>,
+        kept: &mut Kept,
     ) -> Result<Self, Error> {
         for (e, emitter) in scene.emitters.iter().enumerate() {
             if !lit.by(&emitter.item.emitter) {
@@ -60,13 +59,12 @@ impl Part {
             }
         }
         let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-        let mut world = World::new(scene, settings.sensor, depth, None, lit, geometry.as_ref())?;
-        *geometry = Some(world.geometry.clone());
+        let mut world = World::new(scene, settings.sensor, depth, None, lit, kept)?;
         let mut motion = None;
         if !tangents.names.is_empty() {
             let insides = match settings.estimator {
                 EstimatorKind::Radiative => Insides::at_rest(&world),
-                _ => inside::plan(&world, &tangents, &settings.insides)?,
+                _ => inside::plan(&world, &tangents, &settings.insides, kept)?,
             };
             motion = Some(Motion::new(tangents, insides));
         }

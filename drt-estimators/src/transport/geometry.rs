@@ -8,7 +8,8 @@ use drt_geom::{Mesh, TriangleBvh};
 use drt_math::Vec3;
 
 use crate::Error;
-use crate::scene::Scene;
+use crate::kept::same_triangles;
+use crate::scene::{Scene, Shape};
 
 /// A triangle of the soup.
 #[derive(Clone, Copy, Debug)]
@@ -58,10 +59,7 @@ impl Geometry {
     }
 
     fn is_of(&self, scene: &Scene) -> bool {
-        let same = |(own, shape): (&Arc<Mesh>, &crate::Shape)| {
-            Arc::ptr_eq(own, &shape.mesh)
-                || (own.triangles == shape.mesh.triangles && own.positions == shape.mesh.positions)
-        };
+        let same = |(own, shape): (&Arc<Mesh>, &Shape)| same_triangles(own, &shape.mesh);
         self.meshes.len() == scene.shapes.len() && self.meshes.iter().zip(&scene.shapes).all(same)
     }
 }

@@ -16,6 +16,7 @@ use super::lights::{LightTable, Lit};
 use super::scatter::Scattering;
 use super::vertex::{Contact, Kind, SurfacePoint, Vertex};
 use crate::Error;
+use crate::kept::Kept;
 use crate::scene::{Scene, Shape, Surrounding};
 use crate::surface::Bsdf;
 
@@ -146,15 +147,15 @@ pub(crate) struct World {
 
 impl World {
     /// Prepares a scene. `like` is the same scene at other values, whose discrete choices this one
-    /// repeats: finite differences need both sides to draw alike. `geometry` is taken if it is that of
-    /// the scene.
+    /// repeats: finite differences need both sides to draw alike. What is `kept` is taken where it
+    /// is that of the scene.
     pub(crate) fn new(
         scene: Scene,
         sensor: usize,
         max_depth: Option<u32>,
         like: Option<&Self>,
         lit: Lit,
-        geometry: Option<&Arc<Geometry>>,
+        kept: &mut Kept,
     ) -> Result<Self, Error> {
         let camera = scene.sensors.get(sensor).ok_or_else(|| Error::Setting {
             setting: "sensor".into(),
@@ -164,7 +165,7 @@ impl World {
             ),
         })?;
         let (camera_item, surrounding) = (camera.item.sensor.clone(), camera.item.medium);
-        let geometry = Geometry::new(&scene, geometry)?;
+        let geometry = kept.geometry(&scene)?;
         let radius = geometry.radius;
         let null: Vec<bool> =
             scene.shapes.iter().map(|s| scene.bsdfs[s.bsdf].item.is_null()).collect();

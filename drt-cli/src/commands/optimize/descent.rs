@@ -66,7 +66,7 @@ impl<'a> Descent<'a> {
             }
         };
         let optimizer = optimizer.map_err(refuse)?;
-        let watch = Watch::new(problem, optimizer.values(), blind)?;
+        let watch = Watch::new(problem, blind);
         if let Some(folder) = folder {
             remove_drafts(folder);
         }
@@ -94,6 +94,7 @@ impl<'a> Descent<'a> {
         let problem = self.problem;
         let (mut stored, mut stored_at, mut pictured) = (Instant::now(), self.steps(), None);
         let mut fit = problem.fit_at(self.steps())?;
+        self.watch.begin(self.optimizer.values(), &mut fit)?;
         let mut last = None;
         loop {
             let i = self.steps();
@@ -110,7 +111,7 @@ impl<'a> Descent<'a> {
                 self.picture(&evaluation, None)?;
                 return Ok((Outcome::Done, Some(evaluation)));
             }
-            self.step(i, &evaluation)?;
+            self.step(i, &evaluation, &mut fit)?;
             let out_of_time = seconds.is_some_and(|s| self.clock.seconds() >= s);
             let waited = |since: Option<Instant>, s| {
                 since.is_none_or(|since: Instant| since.elapsed().as_secs_f64() >= s)
@@ -141,8 +142,7 @@ impl<'a> Descent<'a> {
         };
         let part = |i: u32| f64::from(i) / f64::from(n + 1);
         monitor.stage(&name, part(i), part(i + 1));
-        let parameters = self.problem.at(self.values());
-        fit.evaluate(&parameters, self.problem.spp(i), self.problem.seed(i), monitor)
+        fit.evaluate(self.values(), self.problem.spp(i), self.problem.seed(i), monitor)
             .map_err(|e| self.problem.job.blame(&e))
     }
 
@@ -164,14 +164,15 @@ impl<'a> Descent<'a> {
         gallery.keep(i, evaluation)
     }
 
-    fn step(&mut self, i: u32, evaluation: &Evaluation) -> Result<(), CliError> {
+    fn step(&mut self, i: u32, evaluation: &Evaluation, fit: &mut Fit) -> Result<(), CliError> {
         let factor = self.problem.plan.decay.factor(i, self.problem.iterations);
         let before = self.optimizer.clone();
         let stepped = self
             .optimizer
             .step(&evaluation.gradient(), factor)
             .map_err(|e| CliError::unsolved(format!("iteration {i}: {e}")));
-        if let Err(error) = stepped.and_then(|()| self.watch.step(i, self.optimizer.values())) {
+        if let Err(error) = stepped.and_then(|()| self.watch.step(i, self.optimizer.values(), fit))
+        {
             self.optimizer = before;
             self.fail(evaluation, &error)?;
             return Err(error);

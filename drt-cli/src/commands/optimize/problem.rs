@@ -6,7 +6,6 @@ use drt_estimators::Scene;
 use drt_estimators::fit::{Fit, View};
 use drt_estimators::loss::Reference;
 use drt_math::Rng;
-use drt_motion::Parameter;
 use drt_motion::optimize::Stages;
 
 use super::checkpoint::Fingerprint;
@@ -32,7 +31,7 @@ pub(super) struct Problem<'a> {
 impl<'a> Problem<'a> {
     pub(super) fn new(job: &'a Job, options: &OptimizeOptions) -> Result<Self, CliError> {
         let place = Place::file(&job.path);
-        let plan = job.optimize.as_ref().ok_or_else(|| {
+        let plan = job.optimize()?.ok_or_else(|| {
             CliError::input(&place, "it has no [optimize], which names the targets to fit to")
         })?;
         if job.parameters.is_empty() {
@@ -73,7 +72,8 @@ impl<'a> Problem<'a> {
             }
             views.push(View { sensor: view.sensor, reference });
         }
-        Fit::new(scene, views, self.plan.loss, self.job.settings.clone())
+        let parameters = self.job.parameters.clone();
+        Fit::new(scene, parameters, views, self.plan.loss, self.job.settings.clone())
             .map_err(|e| self.job.blame(&e))
     }
 
@@ -109,11 +109,6 @@ impl<'a> Problem<'a> {
 
     pub(super) fn start(&self) -> Vec<f64> {
         self.job.parameters.iter().map(|p| p.value).collect()
-    }
-
-    pub(super) fn at(&self, values: &[f64]) -> Vec<Parameter> {
-        let parameters = self.job.parameters.iter().zip(values);
-        parameters.map(|(p, value)| Parameter { value: *value, ..p.clone() }).collect()
     }
 
     /// Tells this problem from others, for as far as it decides the steps; how many there are is left
@@ -164,25 +159,14 @@ fn views(job: &Job, plan: &Optimize) -> Result<Vec<View>, CliError> {
             ));
         };
         let film = of.item.sensor.film();
-        let check = |path, size: [u32; 2]| match size == film {
-            true => Ok(()),
-            false => Err(CliError::input(
-                &Place::file(path),
-                format!(
-                    "it has {}x{} pixels, but the film of its sensor has {}x{}; expected the same \
-                     size (`--size` changes the film's)",
-                    size[0], size[1], film[0], film[1]
-                ),
-            )),
-        };
         let picture = read_picture(path)?;
-        check(path, picture.size)?;
+        picture.check_size(path, film)?;
         let fail = |path, e| CliError::input(&Place::file(path), e);
         let mut reference =
             Reference::new(picture.size, picture.linear()).map_err(|e| fail(path, e))?;
         if let Some(path) = plan.masks.get(i) {
             let mask = read_picture(path)?;
-            check(path, mask.size)?;
+            mask.check_size(path, film)?;
             reference = reference.with_mask(mask.gray()).map_err(|e| fail(path, e))?;
         }
         views.push(View { sensor, reference });

@@ -1,7 +1,7 @@
 //! What tells that a fit cannot succeed.
 
-use drt_estimators::fit::{Evaluation, check_step};
-use drt_estimators::{Scene, moved};
+use drt_estimators::Scene;
+use drt_estimators::fit::{Evaluation, Fit, check_step};
 
 use super::problem::Problem;
 use crate::CliError;
@@ -24,14 +24,14 @@ pub(super) struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    pub(super) fn new(
-        problem: &'a Problem<'a>,
-        values: &[f64],
-        blind: Vec<u32>,
-    ) -> Result<Self, CliError> {
-        let scene = moved(&problem.job.scene, &problem.at(values));
-        let scene = scene.map_err(|e| problem.job.blame(&e))?;
-        Ok(Self { problem, blind, scene })
+    pub(super) fn new(problem: &'a Problem<'a>, blind: Vec<u32>) -> Self {
+        Self { problem, blind, scene: Scene::default() }
+    }
+
+    /// Takes note of where steps begin.
+    pub(super) fn begin(&mut self, values: &[f64], fit: &mut Fit) -> Result<(), CliError> {
+        self.scene = fit.scene_at(values).map_err(|e| self.problem.job.blame(&e))?.clone();
+        Ok(())
     }
 
     /// Judges what iteration `i` saw; `losses` are those since the images last changed size, this one
@@ -77,7 +77,7 @@ impl<'a> Watch<'a> {
     }
 
     /// Judges the step from iteration `i` to these values.
-    pub(super) fn step(&mut self, i: u32, values: &[f64]) -> Result<(), CliError> {
+    pub(super) fn step(&mut self, i: u32, values: &[f64], fit: &mut Fit) -> Result<(), CliError> {
         let fail = |what: String| {
             let values = self.problem.names().zip(values).map(|(n, v)| format!("{n} = {v:.6}"));
             CliError::unsolved(format!(
@@ -86,11 +86,10 @@ impl<'a> Watch<'a> {
                 values.collect::<Vec<_>>().join(", ")
             ))
         };
-        let next = moved(&self.problem.job.scene, &self.problem.at(values))
-            .map_err(|e| fail(e.to_string()))?;
+        let next = fit.scene_at(values).map_err(|e| fail(e.to_string()))?;
         let sensors: Vec<usize> = self.problem.views.iter().map(|v| v.sensor).collect();
-        check_step(&self.scene, &next, &sensors).map_err(|e| fail(e.to_string()))?;
-        self.scene = next;
+        check_step(&self.scene, next, &sensors).map_err(|e| fail(e.to_string()))?;
+        self.scene = next.clone();
         Ok(())
     }
 }

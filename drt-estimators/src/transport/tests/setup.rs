@@ -31,9 +31,16 @@ pub(super) fn coloured() -> ValueChange {
 /// A scene prepared at a parameter's value, as a session does.
 pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
     let (at_value, tangents) =
-        tangents::apply(scene, core::slice::from_ref(parameter), 0).expect("a valid parameter");
-    let mut world = World::new(at_value, 0, scene.integrator.max_depth, None, Lit::All, None)
-        .expect("a valid scene");
+        tangents::apply(scene, core::slice::from_ref(parameter)).expect("a valid parameter");
+    let mut world = World::new(
+        at_value,
+        0,
+        scene.integrator.max_depth,
+        None,
+        Lit::All,
+        &mut crate::kept::Kept::default(),
+    )
+    .expect("a valid scene");
     let insides = inside::plan(&world, &tangents, &[]).expect("a valid scene");
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());
