@@ -5,8 +5,8 @@
     python3 examples/problems/table.py [--threads N] [--again] [--pictures FOLDER] [NAME...]
 
 Renders the targets (once; another seed than any of the fits'), runs `drt optimize` on each job, and prints a
-table in Markdown. What is there already is read, not run: a stopped fit goes on, a finished one costs nothing;
---again begins all anew. The scenes of dtrt must lie beside their jobs: see examples/dtrt/README.md. The bunny
+table in Markdown. What is there already is read, not run: a stopped fit goes on, a finished one only
+evaluates its last image; --again begins all anew. The scenes of dtrt must lie beside their jobs: see examples/dtrt/README.md. The bunny
 of the row `bunny-scan` is not part of this project either: --bunny PATH/TO/stanford-bunny.obj.
 
 Errors are distances between vectors of parameters, over that of the start. `core s` are processor seconds of
@@ -19,7 +19,6 @@ import dataclasses
 import json
 import math
 import pathlib
-import shutil
 import subprocess
 import sys
 
@@ -100,8 +99,7 @@ def fit(name, problem, options):
     job, folder = EXAMPLES / problem.job, problem.folder(name)
     folder.mkdir(parents=True, exist_ok=True)
     defines = [word for d in problem.define for word in ("-D", d)]
-    values = [f"parameter.{key}.value={float(value)}" for key, value in problem.target.items()]
-    values = [word for v in values for word in ("--set", v)]
+    values = at(problem.target, problem.target)
     targets = []
     for sensor in problem.sensors:
         target = folder / f"{sensor or 'target'}.exr"
@@ -118,12 +116,20 @@ def fit(name, problem, options):
     return rows, seconds
 
 
-def keep_pictures(name, folder, to):
-    to.mkdir(parents=True, exist_ok=True)
-    for picture in ("initial", "target", "current"):
-        found = sorted(folder.glob(f"{picture}*.png"))
-        if found:
-            shutil.copyfile(found[0], to / f"{name}-{picture}.png")
+def render_pictures(name, problem, rows, options):
+    """Start, target and result, by the first of the cameras."""
+    options.pictures.mkdir(parents=True, exist_ok=True)
+    for stage, values in (("start", rows[0]), ("target", problem.target), ("reached", rows[-1])):
+        line = ["render", EXAMPLES / problem.job, *at(values, problem.target)]
+        line += [word for d in problem.define for word in ("-D", d)]
+        line += ["--sensor", problem.sensors[0]] if problem.sensors[0] else []
+        line += ["--size", "96x96", "--spp", 64, "--seed", 2]
+        drt(options, *line, "--preview", options.pictures / f"{name}-{stage}.png")
+
+
+def at(values, names):
+    """The options that set parameters."""
+    return [word for name in names for word in ("--set", f"parameter.{name}.value={float(values[name])}")]
 
 
 def distance(values, target):
@@ -137,7 +143,7 @@ def short(values, target):
 def row(name, problem, options):
     rows, seconds = fit(name, problem, options)
     if options.pictures:
-        keep_pictures(name, problem.folder(name), options.pictures)
+        render_pictures(name, problem, rows, options)
     errors = [distance(values, problem.target) / distance(rows[0], problem.target) for values in rows]
     iterations = len(rows) - 1
     # From here on it stays below the bound.
