@@ -35,6 +35,7 @@ fn write_all(folder: &Path) -> io::Result<()> {
     let meshes = [
         ("bar", bar()),
         ("bar-cage", cage.transform(&Affine::translation(vec3(0.0, 1.12, 0.0)))),
+        ("body-cage", body_cage()),
         ("bumpy", procedural::bumpy_sphere(4, 0.35, 4.0)),
         ("crystal", crystal()),
         ("knot", procedural::torus_knot(&knot)),
@@ -109,6 +110,35 @@ fn crystal() -> Mesh {
         [[0, d, c], [a, b, c], [a, c, d], [last, b, a]]
     };
     let triangles = (0..SIDES).flat_map(side).collect();
+    Mesh::new(positions, triangles).expect("the arrays are right by construction")
+}
+
+/// Sixteen corners around a body that stands on the ground, about as high as it is wide: a top, a ring of
+/// seven, one below it that is turned by half a step, and a bottom.
+fn body_cage() -> Mesh {
+    const RING: u32 = 7;
+    let (middle, radius, latitude) = (vec3(0.0, 0.92, 0.0), 1.15, 27_f64.to_radians());
+    let ring = |height: f64, turned: f64| {
+        (0..RING).map(move |i| {
+            let (s, c) =
+                (std::f64::consts::TAU * (f64::from(i) + turned) / f64::from(RING)).sin_cos();
+            let (up, out) = height.sin_cos();
+            vec3(out * c, up, out * s)
+        })
+    };
+    let mut positions = vec![Vec3::Y];
+    positions.extend(ring(latitude, 0.0).chain(ring(-latitude, 0.5)));
+    positions.push(-Vec3::Y);
+    for p in &mut positions {
+        *p = middle + *p * radius;
+    }
+    let last = positions.len() as u32 - 1;
+    let (upper, lower) = (|i: u32| 1 + i % RING, |i: u32| 1 + RING + i % RING);
+    let sector = |i: u32| {
+        let (a, b, c, d) = (upper(i), upper(i + 1), lower(i), lower(i + 1));
+        [[0, b, a], [a, b, c], [b, d, c], [last, c, d]]
+    };
+    let triangles = (0..RING).flat_map(sector).collect();
     Mesh::new(positions, triangles).expect("the arrays are right by construction")
 }
 
