@@ -9,6 +9,7 @@ use drt_motion::{GeometryChange, Parameter};
 use super::scenes::*;
 use crate::contraction::{Contraction, Motion};
 use crate::emitter::EmitterGradient;
+use crate::kept::Kept;
 use crate::scene::Scene;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
@@ -32,6 +33,7 @@ pub(super) fn coloured() -> ValueChange {
 pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
     let (at_value, tangents) =
         tangents::apply(scene, core::slice::from_ref(parameter)).expect("a valid parameter");
+    let (tangents, mut kept) = (tangents.seen_by(0), Kept::default());
     let mut world = World::new(
         at_value,
         0,
@@ -41,7 +43,7 @@ pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
         &mut crate::kept::Kept::default(),
     )
     .expect("a valid scene");
-    let insides = inside::plan(&world, &tangents, &[]).expect("a valid scene");
+    let insides = inside::plan(&world, &tangents, &[], &mut kept).expect("a valid scene");
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());
     (world, motion)
