@@ -16,7 +16,7 @@ pub use atomic::{check_target, write_atomically};
 pub use digest::{RunFacts, Verdict, digest, write_digest};
 pub use error::CliError;
 pub use image::{ExrFile, Provenance, read_exr, write_exr, write_preview};
-pub use job::{Job, Optimize, Overrides, load_job};
+pub use job::{Job, Optimize, Overrides, ParameterGroup, load_job};
 pub use scene_xml::{Defaults, load_scene, parse_scene_str};
 
 /// Name and version, as files carry them.

@@ -227,6 +227,39 @@ fn gradients_by_target_and_by_adjoint_agree() {
     expect(&folder.run(small), 2, &["target.exr: it has 16x16 pixels"]);
 }
 
+/// The whole cage, and the whole of the shape's vertices, shifted alike, shift the shape.
+#[test]
+fn groups_have_gradients_in_reverse() {
+    let folder = folder("");
+    folder.file("cage.obj", CAGE);
+    let job = text(&folder, "job.toml");
+    let groups = "\n[[parameter]]\nname = \"up\"\n[[parameter.effect]]\ntarget = \"floor\"\n\
+                  translate = [0.0, 0.0, 1.0]\n\
+                  [[parameter_group]]\ntarget = \"floor\"\nvertices = \"all\"\n\
+                  [[parameter_group]]\ntarget = \"floor\"\ncage = { mesh = \"cage.obj\" }\n";
+    folder.file("groups.toml", format!("{job}{groups}"));
+    expect(&folder.run("grad groups.toml -o a.exr"), 2, &["[[parameter_group]] has a gradient"]);
+    for options in ["--loss target.exr", "--adjoint target.exr"] {
+        let line = format!("grad groups.toml --quiet --spp 1024 {options} -o a.npy");
+        expect(&folder.run(&line), 0, &[]);
+        let numbers = array(&folder, "a.npy");
+        assert_eq!(numbers.len(), 3 + 3 * 4 + 3 * 8);
+        let lift =
+            |range: std::ops::Range<usize>| numbers[range].iter().skip(2).step_by(3).sum::<f64>();
+        let (up, vertices, cage) = (numbers[2], lift(3..15), lift(15..39));
+        assert!((vertices - cage).abs() < 1e-9 * cage.abs(), "{vertices} {cage}");
+        assert!((up - vertices).abs() < 0.05 * up.abs(), "{options}: {up} {vertices}");
+    }
+    let wrong = format!("{job}[[parameter_group]]\ntarget = \"lamp\"\nvertices = \"all\"\n");
+    folder.file("wrong.toml", wrong);
+    let line = "grad wrong.toml --loss target.exr -o a.npy";
+    expect(&folder.run(line), 2, &["wrong.toml:", "`lamp` is not a shape"]);
+}
+
+/// A box around the floor.
+const CAGE: &str = "v -2 -2 -1\nv 2 -2 -1\nv 2 2 -1\nv -2 2 -1\nv -2 -2 1\nv 2 -2 1\nv 2 2 1\nv -2 2 1\n\
+    f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
 #[test]
 fn what_cannot_be_fitted_is_refused_before_anything_is_written() {
     let folder = folder(FIT);

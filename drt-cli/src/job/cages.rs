@@ -41,7 +41,8 @@ impl Cages {
         Ok(GeometryChange::Cage { mesh, vertices: [(index, direction.into())].into() })
     }
 
-    fn load(&mut self, path: &Path) -> Result<Arc<Mesh>, CliError> {
+    /// A cage's mesh, checked.
+    pub(super) fn load(&mut self, path: &Path) -> Result<Arc<Mesh>, CliError> {
         if let Some(mesh) = self.0.get(path) {
             return Ok(Arc::clone(mesh));
         }

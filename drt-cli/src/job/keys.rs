@@ -130,14 +130,15 @@ pub(super) enum All {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-#[expect(dead_code, reason = "checked for form; groups come with the reverse mode")]
 pub(super) struct ParameterGroup {
-    target: String,
-    name: Option<String>,
-    property: Option<String>,
-    vertices: Option<All>,
-    cage: Option<Cage>,
-    voxels: Option<All>,
+    pub(super) target: String,
+    /// For the reader of the job alone.
+    #[serde(rename = "name")]
+    pub(super) _name: Option<String>,
+    pub(super) property: Option<String>,
+    pub(super) vertices: Option<All>,
+    pub(super) cage: Option<Cage>,
+    pub(super) voxels: Option<All>,
 }
 
 #[derive(Debug, Deserialize)]

@@ -3,6 +3,7 @@
 mod cages;
 mod document;
 mod effects;
+mod groups;
 mod keys;
 mod motions;
 mod optimize;
@@ -23,6 +24,7 @@ use crate::{CliError, Defaults};
 use cages::Cages;
 use document::Document;
 use effects::Refusal;
+pub use groups::ParameterGroup;
 pub use optimize::Optimize;
 
 /// What the command line lays over a job or scene.
@@ -55,8 +57,11 @@ pub struct Job {
     places: Vec<Place>,
     /// How the parameters are fitted, where that is said, or what stands in the way.
     optimize: Result<Option<Optimize>, CliError>,
-    /// What stands in the way of derivatives.
+    /// Parameters that only gradients know, after those of [`parameters`](Self::parameters).
+    pub groups: Vec<ParameterGroup>,
+    /// What stands in the way of derivatives, and of those but by a gradient.
     refused: Option<CliError>,
+    grouped: Option<CliError>,
 }
 
 /// Reads a job file and its scene.
@@ -74,7 +79,8 @@ pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
     let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
     let settings = settings(&document, &keys, folder, &scene, &parameters)?;
     let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters);
-    let refused = refused(&document, &keys);
+    let groups = groups::groups(&document, &keys.parameter_group, folder, &scene)?;
+    let [refused, grouped] = refused(&document, &keys);
     let path = path.into();
     let text = Some(text);
     Ok(Job {
@@ -87,7 +93,9 @@ pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
         optimize,
         warnings,
         places,
+        groups,
         refused,
+        grouped,
     })
 }
 
@@ -108,7 +116,9 @@ impl Job {
             optimize: Ok(None),
             warnings,
             places: Vec::new(),
+            groups: Vec::new(),
             refused: None,
+            grouped: None,
         };
         job.take_sample_count();
         Ok(job)
@@ -151,6 +161,15 @@ impl Job {
     /// # Errors
     /// Names the key.
     pub fn require_derivatives(&self) -> Result<(), CliError> {
+        self.require_gradient()?;
+        self.grouped.clone().map_or(Ok(()), Err)
+    }
+
+    /// Refuses what would change gradients and is not supported yet.
+    ///
+    /// # Errors
+    /// Names the key.
+    pub fn require_gradient(&self) -> Result<(), CliError> {
         self.refused.clone().map_or(Ok(()), Err)
     }
 
@@ -297,15 +316,16 @@ fn parameters(
     Ok((parameters, places))
 }
 
-/// The first key that asks for derivatives in a way that is not there yet.
-fn refused(document: &Document<'_>, keys: &keys::Job) -> Option<CliError> {
+/// Keys that ask for derivatives in a way that is not there yet, and that ask for more parameters than
+/// there can be images.
+fn refused(document: &Document<'_>, keys: &keys::Job) -> [Option<CliError>; 2] {
     let kind = keys.estimator.kind.as_ref().filter(|k| *k.get_ref() == keys::Kind::Warped);
     let kind = kind
         .map(|k| (k.span().start, "the estimator kind `warped` is not supported yet".to_owned()));
-    let group = keys
-        .parameter_group
-        .first()
-        .map(|g| (g.span().start, "[[parameter_group]] is not supported yet".to_owned()));
-    let (at, message) = kind.or(group)?;
-    Some(document.error_at(at, message))
+    let group = keys.parameter_group.first().map(|g| {
+        let message = "[[parameter_group]] has a gradient (`drt grad --loss` or `--adjoint`), but \
+                       no derivative images, and is not fitted yet";
+        (g.span().start, message.to_owned())
+    });
+    [kind, group].map(|found| found.map(|(at, message)| document.error_at(at, message)))
 }

@@ -1,0 +1,116 @@
+//! From `[[parameter_group]]` to many parameters at once.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use drt_estimators::{Scene, SceneGradient, Target};
+use drt_geom::Mesh;
+use drt_motion::{Cage, CageWeights, in_file_order};
+use toml::Spanned;
+
+use super::cages::Cages;
+use super::document::Document;
+use super::keys;
+use crate::CliError;
+
+/// Parameters that are all zero in the scene's file and too many to name.
+#[derive(Clone, Debug)]
+pub struct ParameterGroup {
+    /// What they change.
+    pub target: Target,
+    kind: GroupKind,
+}
+
+#[derive(Clone, Debug)]
+enum GroupKind {
+    /// The x, y and z of each vertex of the shape's file.
+    Vertices,
+    /// The x, y and z of each vertex of a cage around the shape.
+    Cage(Arc<Mesh>),
+    /// Each voxel's value, channel by channel.
+    Voxels(drt_medium::Property),
+}
+
+pub(super) fn groups(
+    document: &Document<'_>,
+    keys: &[Spanned<keys::ParameterGroup>],
+    folder: &Path,
+    scene: &Scene,
+) -> Result<Vec<ParameterGroup>, CliError> {
+    let mut cages = Cages::default();
+    keys.iter()
+        .map(|spanned| {
+            let fail = |message: String| {
+                document.error_at(spanned.span().start, format!("[[parameter_group]]: {message}"))
+            };
+            let keys = spanned.get_ref();
+            let target = scene.find(&keys.target).map_err(|e| fail(e.to_string()))?;
+            let wrong = |what: &str| fail(format!("`{}` is not {what}", keys.target));
+            let kind = match (&keys.vertices, &keys.cage, &keys.voxels) {
+                (Some(_), None, None) => GroupKind::Vertices,
+                (None, Some(cage), None) => GroupKind::Cage(cages.load(&folder.join(&cage.mesh))?),
+                (None, None, Some(_)) => {
+                    GroupKind::Voxels(property(keys.property.as_deref()).map_err(fail)?)
+                }
+                _ => return Err(fail("expected one of `vertices`, `cage` and `voxels`".into())),
+            };
+            match (&kind, target) {
+                (GroupKind::Voxels(_), Target::Medium(m)) => match scene.media[m].item.grid() {
+                    Some(_) => Ok(ParameterGroup { target, kind }),
+                    None => Err(wrong("a medium with a grid")),
+                },
+                (GroupKind::Voxels(_), _) => Err(wrong("a medium with a grid")),
+                (_, Target::Shape(_)) => Ok(ParameterGroup { target, kind }),
+                _ => Err(wrong("a shape")),
+            }
+        })
+        .collect()
+}
+
+fn property(name: Option<&str>) -> Result<drt_medium::Property, String> {
+    match name {
+        Some("sigma_t") => Ok(drt_medium::Property::SigmaT),
+        Some("albedo") => Ok(drt_medium::Property::Albedo),
+        Some("emission") => Ok(drt_medium::Property::Emission),
+        _ => Err("`voxels` need `property`: sigma_t, albedo or emission".into()),
+    }
+}
+
+impl ParameterGroup {
+    /// Adds the group's part to the gradient of a loss. `given` is the scene as the file has it,
+    /// `scene` the one that was differentiated.
+    pub(crate) fn collect(
+        &self,
+        given: &Scene,
+        scene: &Scene,
+        gradient: &SceneGradient,
+        out: &mut Vec<f64>,
+    ) {
+        match (&self.kind, self.target) {
+            (GroupKind::Voxels(property), Target::Medium(m)) => {
+                let Some(of) = &gradient.media[m] else { return };
+                match property {
+                    drt_medium::Property::SigmaT => out.extend(&of.sigma_t.voxels),
+                    drt_medium::Property::Albedo => out.extend(&of.albedo.voxels),
+                    drt_medium::Property::Emission => out.extend(&of.emission.voxels),
+                    // Has no voxels.
+                    drt_medium::Property::G => {}
+                }
+            }
+            (kind, Target::Shape(s)) => {
+                let Some(vertices) = gradient.vertices(scene, s) else { return };
+                let mesh = &given.shapes[s].mesh;
+                let vectors = match kind {
+                    GroupKind::Cage(cage) => {
+                        // It was loaded as a cage.
+                        let Ok(cage) = Cage::new(cage) else { return };
+                        CageWeights::new(&cage, &mesh.positions).gather(&vertices)
+                    }
+                    _ => in_file_order(mesh, &vertices),
+                };
+                out.extend(vectors.iter().flat_map(|v| [v.x, v.y, v.z]));
+            }
+            _ => {}
+        }
+    }
+}
