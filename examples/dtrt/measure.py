@@ -43,7 +43,7 @@ def arguments():
     jobs = [HERE / f"{name}.toml" for name in DTRT]
     parser.add_argument("jobs", nargs="*", type=pathlib.Path, default=jobs, help="glass_1, shadow_1, multilayer by default")
     parser.add_argument("--drt", default=HERE.parents[1] / "target/release/drt", help="the drt binary")
-    parser.add_argument("--kind", help="the kind of estimator; the job's by default")
+    parser.add_argument("--kind", default="path-space", help="the kind of estimator")
     parser.add_argument("--size", type=int, default=64, help="width and height of the images")
     parser.add_argument("--spp", type=int, default=16, help="samples per pixel")
     parser.add_argument("--seeds", type=int, default=16, help="runs with different random numbers")
@@ -58,7 +58,7 @@ def run(command, job, seed, options):
         size = f"{options.size}x{options.size}"
         line = [options.drt, command, job, "--quiet", "--threads", 1, "--size", size, "--spp", options.spp]
         line += ["--seed", seed, "--output", image, "--digest", digest]
-        if options.kind and command == "grad":
+        if command == "grad":
             line += ["--set", f"estimator.kind={options.kind}"]
         if options.max_depth is not None:
             line += ["--max-depth", options.max_depth]

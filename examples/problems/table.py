@@ -5,9 +5,10 @@
     python3 examples/problems/table.py [--threads N] [--again] [--pictures FOLDER] [NAME...]
 
 Renders the targets (once; another seed than any of the fits'), runs `drt optimize` on each job, and prints a
-table in Markdown. What is there already is read, not run: a stopped fit goes on, a finished one only
-evaluates its last image; --again begins all anew. The scenes of dtrt must lie beside their jobs: see examples/dtrt/README.md. The bunny
-of the row `bunny-scan` is not part of this project either: --bunny PATH/TO/stanford-bunny.obj.
+table in Markdown. What is there already is read, not run: a stopped fit goes on, a finished one only evaluates
+its last image; --again begins all anew. The scenes of dtrt must lie beside their jobs: see
+examples/dtrt/README.md. The bunny of the row `bunny-scan` is not part of this project either:
+--bunny PATH/TO/stanford-bunny.obj.
 
 Errors are distances between vectors of parameters, over that of the start. `core s` are processor seconds of
 the whole process, user and system, reading the scene and writing pictures included.
@@ -50,8 +51,8 @@ class Problem:
 BODY = {
     "top": (0.3, -0.3, 0.2),
     "right": (-0.25, 0.3, -0.3),
-    "corner": (0.3, -0.25, 0.25),
     "front": (-0.3, 0.2, 0.3),
+    "left": (0.3, -0.25, 0.25),
     "back": (0.25, -0.2, -0.3),
 }
 BODY = {f"{vertex}-{axis}": v for vertex, vs in BODY.items() for axis, v in zip("xyz", vs)}
@@ -72,7 +73,7 @@ PROBLEMS = {
         "dtrt/camera_pose.toml", {"camera-x": -1.6, "camera-z": 1.2, "nod": -1.5}, 0.02, 128, 7 * 60, 500
     ),
     "branches": Problem("problems/branches/job.toml", {"turn": 0.5}, 0.05, 2048, 8 * 39, 100),
-    "bunny": Problem("problems/bunny/job.toml", BODY, 0.05, 2048, 8 * 575, 125, ("front", "side", "above")),
+    "bunny": Problem("problems/bunny/job.toml", BODY, 0.05, 1024, 8 * 575, 125, ("front", "side", "corner", "behind", "above")),
 }
 SCAN = ("scale=10", "x=0.17", "y=-0.25")
 
