@@ -67,7 +67,9 @@ impl Prepared {
         settings: &Settings,
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
-        world.prepare_holds();
+        if interest.moves_geometry() {
+            world.prepare_holds();
+        }
         // Grids that move sweep over what stands still.
         let flux = (interest.moves_geometry() || interest.grids.contains(&true))
             .then(|| Flux::spatial(&world, interest))
@@ -106,7 +108,7 @@ impl Prepared {
     }
 }
 
-/// Boundary samples to each sample of a pixel.
+/// Boundary samples to each sample of a pixel; never none, which would drop a term.
 fn boundary_ratio(settings: &Settings) -> f64 {
-    settings.boundary_spp.map_or(1.0, |b| f64::from(b) / f64::from(settings.spp.max(1)))
+    settings.boundary_spp.map_or(1.0, |b| f64::from(b.max(1)) / f64::from(settings.spp.max(1)))
 }
