@@ -44,7 +44,7 @@ mod visible_slope;
 
 use alloc::boxed::Box;
 
-use drt_math::{Rgb, RgbVec, Vec3};
+use drt_math::{Rgb, RgbVec, Vec3, fm};
 
 use angles::{Angles, Slopes};
 pub use change::{BsdfChange, BsdfParams, BsdfTangent};
@@ -215,6 +215,21 @@ impl Bsdf {
     #[must_use]
     pub fn is_transmissive(&self) -> bool {
         matches!(self, Self::RoughDielectric(_))
+    }
+
+    /// About how far the half vector of its sharpest lobe is from the normal, in slopes; at most 1.
+    pub(crate) fn lobe_width(&self) -> f64 {
+        let width = match self {
+            Self::Null | Self::Diffuse(_) => 1.0,
+            Self::Phong(b) => 1.0 / fm::sqrt(1.0 + 0.5 * b.exponent),
+            Self::RoughConductor(b) => b.alpha,
+            Self::RoughDielectric(b) => b.alpha,
+            Self::TwoSided(b) => {
+                let back = b.back.as_ref().map_or(1.0, Self::lobe_width);
+                f64::min(b.front.lobe_width(), back)
+            }
+        };
+        f64::min(width, 1.0)
     }
 
     /// The name of the plugin this BSDF follows.

@@ -26,9 +26,11 @@
 //!
 //! The second bracket has 1 / (n·d) too, from the geometric term, but over the ray's length where the
 //! first has the curvature of the surface, with whose normal radiance changes. So only what lies farther
-//! than its radius of curvature is held; and of what the camera sees, where a filter's slope takes the
-//! length's place, what grazes within about a pixel of its outline, less towards the borders of the
-//! filter's support.
+//! than its radius of curvature is held, the farther ones wholly: c - u along the ray is 1 / (n·d) as
+//! well, and must not meet a slope of φ there. A glossy surface turns its lobes with its normals, and
+//! holds from steeper angles on, as lobes are narrow. Of what the camera sees, where a filter's slope
+//! takes the length's place, only what grazes within about a pixel of its outline is held, less towards
+//! the borders of the filter's support.
 
 #[cfg(all(test, feature = "std"))]
 mod tests;
@@ -40,7 +42,7 @@ use drt_math::{Real, Vec3};
 use super::vertex::{Kind, SurfacePoint, Vertex};
 use super::world::World;
 
-/// Cosine below which surfaces begin to hold vertices.
+/// Cosine below which surfaces begin to hold vertices, over the width of their lobes.
 const GRAZING: f64 = 0.5;
 
 /// The same for the camera, per pixel in radii of curvature.
@@ -60,8 +62,10 @@ pub(crate) struct Hold {
 pub(crate) struct Holds {
     /// Mean curvatures of the shapes, zero where nothing is held.
     bends: Vec<f64>,
-    /// Cosines below which the camera's rays are held.
-    grazing: Vec<f64>,
+    /// Cosines below which rays are held.
+    cosines: Vec<f64>,
+    /// The same for rays of the camera.
+    seen: Vec<f64>,
 }
 
 impl Hold {
@@ -77,13 +81,15 @@ impl World {
     pub(crate) fn prepare_holds(&mut self) {
         let bends: Vec<f64> = (0..self.scene.shapes.len()).map(|s| self.bend(s)).collect();
         let camera = &self.camera;
-        let cosine = |(s, bend): (usize, &f64)| {
+        let cosines: Vec<f64> =
+            (0..).map(|s| GRAZING / self.bsdf_of(s).lobe_width()).take(bends.len()).collect();
+        let seen = |(s, bend): (usize, &f64)| {
             let center = self.scene.shapes[s].mesh.bounds().center();
             let pixel = camera.pinhole().pixel_size * (center - camera.position()).length();
             f64::min(GRAZING_PIXELS * bend * pixel, GRAZING)
         };
-        let grazing = bends.iter().enumerate().map(cosine).collect();
-        self.holds = Holds { bends, grazing };
+        let seen = bends.iter().enumerate().map(seen).collect();
+        self.holds = Holds { bends, cosines, seen };
     }
 
     /// True when one of the shapes holds vertices.
@@ -118,17 +124,20 @@ impl World {
     /// What holds a vertex seen along `dir` from a vertex at a `distance`.
     pub(crate) fn hold(&self, vertex: &Vertex, dir: Vec3, distance: f64) -> Hold {
         let Kind::Surface(s) = &vertex.kind else { return Hold::default() };
-        let bend = self.holds.bends.get(s.shape as usize).copied().unwrap_or(0.0);
-        let graze = self.graze(s, dir, distance, if bend > 0.0 { GRAZING } else { 0.0 });
-        let q = bend * distance;
-        let rest = 1.0 / (1.0 + q * q);
-        graze.and(Hold { share: q * q * rest, slope: dir * (2.0 * q * bend * rest * rest) })
+        let shape = s.shape as usize;
+        let Some(bend) = self.holds.bends.get(shape).filter(|b| **b > 0.0) else {
+            return Hold::default();
+        };
+        let graze = self.graze(s, dir, distance, self.holds.cosines[shape]);
+        let q = f64::min(bend * distance, 1.0);
+        let (share, slope) = (q * q * (3.0 - 2.0 * q), 6.0 * q * (1.0 - q) * bend);
+        graze.and(Hold { share, slope: dir * slope })
     }
 
     /// What holds a vertex that the camera sees, in every pixel.
     pub(crate) fn hold_in_view(&self, vertex: &Vertex) -> Hold {
         let Kind::Surface(s) = &vertex.kind else { return Hold::default() };
-        let cosine = self.holds.grazing.get(s.shape as usize).copied().unwrap_or(0.0);
+        let cosine = self.holds.seen.get(s.shape as usize).copied().unwrap_or(0.0);
         let ray = vertex.x - self.camera.position();
         let distance = ray.length();
         self.graze(s, ray / distance, distance, cosine)

@@ -88,7 +88,7 @@ fn derivative(strengths: [f64; 2]) -> Moments {
     let [rays, edges] = strengths.map(|strength| {
         let (mut prepared, motion) = prepare();
         let holds = &mut prepared.world.holds;
-        holds.bends.iter_mut().chain(&mut holds.grazing).for_each(|h| *h *= strength);
+        holds.bends.iter_mut().chain(&mut holds.seen).for_each(|h| *h *= strength);
         let mut batches = [Vec::new(), Vec::new()];
         for seed in 0..BATCHES {
             let [mut rays, mut edges] = [0.0; 2];
