@@ -9,7 +9,7 @@ use crate::boundary::shadow::{self, Shadows};
 use crate::contraction::Contraction;
 use crate::flux::{Flux, Reservoir};
 use crate::pixels::Sampler;
-use crate::radiative::{Look, Radiative};
+use crate::radiative::{Edged, Look, Radiative};
 use crate::rendering::{Account, Counters, NonFinite, Term};
 use crate::sensitivity::{AdjointSink, Functional, SurfaceAdjoint};
 use crate::transport::{Carriers, Differentiator, Form, PathRecord, Radiance, Tracer, World};
@@ -28,15 +28,35 @@ pub(crate) struct AlongRays<'a> {
     pub(crate) shadows: Option<&'a Shadows>,
     /// Set in the spatial form.
     pub(crate) radiative: Option<&'a Radiative>,
-    /// Looks of a path for edges, on average.
-    pub(crate) looks: f64,
+    pub(crate) looks: Looks,
+}
+
+/// How often a path looks for edges.
+#[derive(Clone, Copy)]
+pub(crate) enum Looks {
+    /// So many times on average, each time from one of its vertices.
+    Average(f64),
+    /// Once from each of its vertices.
+    EveryVertex,
+}
+
+impl Default for Looks {
+    fn default() -> Self {
+        Self::Average(0.0)
+    }
+}
+
+impl Looks {
+    fn any(self) -> bool {
+        !matches!(self, Self::Average(0.0))
+    }
 }
 
 impl AlongRays<'_> {
     /// The terms kept in layers of their own, where terms are kept apart.
     pub(crate) fn terms(&self) -> impl Iterator<Item = Term> {
         let flux = self.flux.map(|_| Term::Flux);
-        let edges = if self.looks > 0.0 { &[Term::Direct, Term::Indirect][..] } else { &[] };
+        let edges = if self.looks.any() { &[Term::Direct, Term::Indirect][..] } else { &[] };
         flux.into_iter().chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
     }
 
@@ -186,7 +206,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let weight = Rgb::splat(s.weight);
         // What places an edge comes before what the path takes an unknown number of.
         let mut rng = rng;
-        let look = (self.along.looks > 0.0).then(|| Look::new(&mut rng));
+        let look = self.along.looks.any().then(|| Look::new(&mut rng));
         self.tracer.rng = rng;
         let Some(sink) = &mut self.sink else {
             let mut radiance = Radiance::default();
@@ -224,35 +244,11 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             });
             self.record.flux = flux;
         }
-        if let (Some(radiative), Some(first)) = (self.along.radiative, look) {
-            let share = 1.0 / self.along.looks;
-            let mut left = self.along.looks;
-            while left > 0.0 {
-                // The first has the best numbers; a part of a look is one now and then.
-                let rng = &mut self.tracer.rng;
-                let taken = left >= 1.0 || rng.next_f64() < left;
-                let look = if left == self.along.looks { first } else { Look::new(rng) };
-                left -= 1.0;
-                let edge = taken.then(|| radiative.edge(&mut self.tracer, &self.record, &look));
-                let Some(e) = edge.flatten() else { continue };
-                let layer = match e.node {
-                    _ if !self.separate => at,
-                    1 => at + n,
-                    _ => at + 2 * n,
-                };
-                sink.begin();
-                for (point, value) in e.matter.iter().flatten() {
-                    if sink.interest().shapes[point.shape as usize] {
-                        let u = (*value * share).outer(e.n);
-                        sink.surface(point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
-                    }
-                }
-                let viewer = (e.viewer * share).outer(e.n);
-                self.differentiator.carry_back(&self.record, e.node, 0.0, viewer, sink);
-                sink.finish(&mut values[layer..layer + n]);
-            }
+        if let (Some(radiative), Some(look)) = (self.along.radiative, look) {
+            let from = if self.separate { at + n } else { at };
+            self.edges(radiative, look, &mut values[from..]);
         }
-        if let Some(shadows) = self.along.shadows {
+        if let (Some(shadows), Some(sink)) = (self.along.shadows, &mut self.sink) {
             at += if self.separate { n } else { 0 };
             shadows.along_camera_ray(
                 &mut self.tracer,
@@ -263,6 +259,50 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                 },
             );
         }
+    }
+
+    /// Looks for edges; the `first` look has the best numbers.
+    fn edges(&mut self, radiative: &Radiative, first: Look, values: &mut [Rgb]) {
+        match self.along.looks {
+            Looks::Average(looks) => {
+                let mut left = looks;
+                while left > 0.0 {
+                    // A part of a look is one now and then.
+                    let rng = &mut self.tracer.rng;
+                    let taken = left >= 1.0 || rng.next_f64() < left;
+                    let look = if left == looks { first } else { Look::new(rng) };
+                    left -= 1.0;
+                    let edge = taken.then(|| radiative.edge(&mut self.tracer, &self.record, &look));
+                    self.send(edge.flatten(), 1.0 / looks, values);
+                }
+            }
+            Looks::EveryVertex => {
+                for node in 1..self.record.nodes.len() {
+                    let rng = &mut self.tracer.rng;
+                    let look = if node == 1 { first } else { Look::new(rng) };
+                    let edge =
+                        radiative.edge_from(&mut self.tracer, &self.record, node, 1.0, &look);
+                    self.send(edge, 1.0, values);
+                }
+            }
+        }
+    }
+
+    /// Contracts a `share` of what an edge contributes; `values` are of the edges' terms.
+    fn send(&mut self, edge: Option<Edged>, share: f64, values: &mut [Rgb]) {
+        let (Some(sink), Some(e)) = (&mut self.sink, edge) else { return };
+        let n = sink.layers();
+        let layer = if self.separate && e.node > 1 { n } else { 0 };
+        sink.begin();
+        for (point, value) in e.matter.iter().flatten() {
+            if sink.interest().shapes[point.shape as usize] {
+                let u = (*value * share).outer(e.n);
+                sink.surface(point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
+            }
+        }
+        let viewer = (e.viewer * share).outer(e.n);
+        self.differentiator.carry_back(&self.record, e.node, 0.0, viewer, sink);
+        sink.finish(&mut values[layer..layer + n]);
     }
 
     /// Notes a sample that is not finite and counts it as zero.

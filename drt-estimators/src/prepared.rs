@@ -7,7 +7,7 @@ use crate::boundary::{Boundary, Strategy};
 use crate::contraction::Motion;
 use crate::film::BATCHES;
 use crate::flux::Flux;
-use crate::interior::AlongRays;
+use crate::interior::{AlongRays, Looks};
 use crate::radiative::Radiative;
 use crate::sensitivity::Interest;
 use crate::settings::{EstimatorKind, Settings};
@@ -25,8 +25,8 @@ pub(crate) struct Prepared {
     pub(crate) sources: Vec<Source>,
     /// Image points come in mirrored pairs.
     pub(crate) antithetic: bool,
-    /// Looks of a path for edges, on average; of the spatial form.
-    looks: f64,
+    /// Of the spatial form.
+    looks: Looks,
 }
 
 impl Prepared {
@@ -57,7 +57,8 @@ impl Prepared {
         }
         // The filter's rate is what mirrored pairs cancel; without it they only cost.
         let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
-        Ok(Self { world, boundary, flux, radiative: None, sources, antithetic, looks: 0.0 })
+        let looks = Looks::default();
+        Ok(Self { world, boundary, flux, radiative: None, sources, antithetic, looks })
     }
 
     /// For the 2019 estimator.
@@ -80,7 +81,11 @@ impl Prepared {
         };
         let sources =
             if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
-        let looks = if radiative.has_edges(&world) { boundary_ratio(settings) } else { 0.0 };
+        let looks = match settings.every_vertex {
+            _ if !radiative.has_edges(&world) => Looks::default(),
+            true => Looks::EveryVertex,
+            false => Looks::Average(boundary_ratio(settings)),
+        };
         let boundary = Boundary::default();
         let radiative = Some(radiative);
         Ok(Self { world, boundary, flux, radiative, sources, antithetic: false, looks })

@@ -67,6 +67,10 @@ pub struct Settings {
     /// Choose samples by what is known of how things move; the expected values do not change. Reverse
     /// mode knows nothing of it, so that without guiding forward mode is its exact transpose.
     pub guiding: bool,
+    /// Of [`EstimatorKind::Radiative`]: look for an edge from every vertex of a path, as the 2019 paper
+    /// does, at a cost that grows with the square of its length; `boundary_spp` then tells the camera's
+    /// edges alone. Else one of a path's vertices looks, chosen by its throughput.
+    pub every_vertex: bool,
     /// Finite-difference half step, in units of each parameter.
     pub step: f64,
     /// Names the random numbers: same seed, same pixel data.
@@ -89,6 +93,7 @@ impl Default for Settings {
             max_depth: None,
             antithetic: true,
             guiding: true,
+            every_vertex: false,
             step: 1e-3,
             seed: 0,
             threads: 0,

@@ -34,6 +34,8 @@ pub(super) struct Estimator {
     pub(super) antithetic: Option<bool>,
     /// Where guiding exists it does not change expected values.
     pub(super) guiding: Option<bool>,
+    /// Of `radiative`: every vertex of a path looks for an edge, not one of them.
+    pub(super) every_vertex: Option<bool>,
     pub(super) step: Option<Spanned<f64>>,
 }
 

@@ -218,6 +218,7 @@ fn settings(
         max_depth,
         antithetic,
         guiding,
+        every_vertex,
         step,
         ..
     } = &keys.estimator;
@@ -255,6 +256,7 @@ fn settings(
     settings.insides = motions::insides(document, &keys.motion, folder, scene, parameters)?;
     settings.antithetic = antithetic.unwrap_or(settings.antithetic);
     settings.guiding = guiding.unwrap_or(settings.guiding);
+    settings.every_vertex = every_vertex.unwrap_or(settings.every_vertex);
     if let Some(s) = step {
         settings.step = *s.get_ref();
         if !(settings.step > 0.0 && settings.step.is_finite()) {

@@ -1,6 +1,6 @@
 //! The cost of a path against its length: the time per vertex is to stay the same.
 
-use drt_estimators::{Session, Settings, Target, Unattended, gradient};
+use drt_estimators::{EstimatorKind, Session, Settings, Target, Unattended, gradient};
 use drt_math::Rgb;
 
 use crate::common::scenes;
@@ -8,6 +8,8 @@ use crate::common::turns::{Task, take_turns};
 
 const TURNS: usize = 5;
 const DEPTHS: [u32; 5] = [8, 16, 32, 64, 128];
+/// Of the derivatives of the 2019 form.
+const RADIATIVE_DEPTHS: [u32; 4] = [8, 16, 32, 64];
 const FILM: [u32; 2] = [8, 8];
 const PIXELS: u32 = FILM[0] * FILM[1];
 /// Vertices per pixel and turn, at every depth.
@@ -42,13 +44,42 @@ pub(crate) fn print() {
         }
     }
     println!();
+    radiative();
+}
+
+/// The 2019 form: one vertex of a path looks for an edge, or all do.
+fn radiative() {
+    print!("{:6} {:17}", "room", "radiative, depth");
+    RADIATIVE_DEPTHS.iter().for_each(|d| print!(" {d:>6}"));
+    println!(" {:>9}", "64 / 16");
+    for misty in [false, true] {
+        for (name, every_vertex) in [("one vertex looks", false), ("every vertex does", true)] {
+            let looks = Settings {
+                estimator: EstimatorKind::Radiative,
+                every_vertex,
+                ..Settings::default()
+            };
+            let task = |depth| with(Job::DerivativeImage, misty, depth, &looks);
+            let times = take_turns(TURNS, RADIATIVE_DEPTHS.map(task));
+            print!("{:6} {name:17}", if misty { "misty" } else { "clear" });
+            for t in &times {
+                print!(" {:6.3}", t.median() * 1e6 / f64::from(PIXELS * VERTICES));
+            }
+            println!(" {:9.2}", times[3].over(&times[1]));
+        }
+    }
+    println!();
 }
 
 /// Paths of `depth` vertices, the fewer the longer they are.
 fn task(job: Job, misty: bool, depth: u32) -> Task<'static> {
+    with(job, misty, depth, &Settings::default())
+}
+
+fn with(job: Job, misty: bool, depth: u32, settings: &Settings) -> Task<'static> {
     let subject = scenes::furnace(misty, depth).with_film(FILM);
     let scene = subject.scene;
-    let settings = Settings { spp: VERTICES / depth, threads: 1, ..Settings::default() };
+    let settings = Settings { spp: VERTICES / depth, threads: 1, ..settings.clone() };
     let parameters = match job {
         Job::Image => vec![],
         Job::DerivativeImage => subject.parameters[0].1[..1].to_vec(),

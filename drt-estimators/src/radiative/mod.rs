@@ -22,7 +22,8 @@
 //!
 //! Cost is linear in path length: of all vertices of a path one, in proportion to its throughput,
 //! looks for an edge, and of all surfaces met one is asked for its flux; each traces side paths that
-//! branch no more. (The paper does both at every vertex, at a cost that is quadratic.)
+//! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
+//! [`every_vertex`](crate::Settings::every_vertex) does so with edges.)
 //!
 //! Light from points and directions does not fit this form: its shadows make radiance jump along lines
 //! on surfaces, which would be edges of the vertex before. A [`Session`](crate::Session) leaves such lights to
@@ -40,6 +41,7 @@ use alloc::vec::Vec;
 use drt_math::{CdfTable, Rng};
 
 use jumps::{Jump, Jumps};
+pub(crate) use vertices::Edged;
 use views::Views;
 
 use crate::Error;

@@ -29,13 +29,28 @@ impl Radiative {
         look: &Look,
     ) -> Option<Edged> {
         let (node, chance) = self.choose_vertex(tracer, record, look.vertex)?;
+        self.edge_from(tracer, record, node, chance, look)
+    }
+
+    /// The same from a given vertex, chosen with a given `chance`.
+    pub(crate) fn edge_from(
+        &self,
+        tracer: &mut Tracer<'_>,
+        record: &PathRecord,
+        node: usize,
+        chance: f64,
+        look: &Look,
+    ) -> Option<Edged> {
         let recorded = &record.nodes[node];
         let arrival = recorded.arrival.as_ref()?;
         let (vertex, theta) =
             scattering_vertex(recorded.vertex()?, &arrival.end, arrival.throughput)?;
         let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
-        tracer.counters.boundary_samples += 1;
         let wo = -arrival.dir;
+        if !(recorded.carried || self.moving.is_some()) {
+            return None;
+        }
+        tracer.counters.boundary_samples += 1;
         let chosen = self.look(tracer.world, vertex, wo, recorded.carried, look)?;
         let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex)?;
         let scattering = tracer.world.scattering(vertex)?;
