@@ -37,16 +37,24 @@ mod tests;
 
 use alloc::vec::Vec;
 
+use drt_geom::Mesh;
 use drt_math::{Real, Vec3};
 
 use super::vertex::{Kind, SurfacePoint, Vertex};
 use super::world::World;
+use crate::boundary::edges::collect;
 
 /// Cosine below which surfaces begin to hold vertices, over the width of their lobes.
 const GRAZING: f64 = 0.5;
 
 /// The same for the camera, per pixel in radii of curvature.
 const GRAZING_PIXELS: f64 = 2.0;
+
+/// Angle from which on an edge is a corner of what is flat beside it, no facet of something curved.
+const CORNER: f64 = 1.0;
+
+/// Fewer facets make nothing curved.
+const FACETS: usize = 16;
 
 /// What holds a vertex at its matter.
 #[derive(Clone, Copy, Debug, Default)]
@@ -79,7 +87,7 @@ impl Hold {
 impl World {
     /// Lets surfaces hold vertices.
     pub(crate) fn prepare_holds(&mut self) {
-        let bends: Vec<f64> = (0..self.scene.shapes.len()).map(|s| self.bend(s)).collect();
+        let bends = self.bends();
         let camera = &self.camera;
         let cosines: Vec<f64> =
             (0..).map(|s| GRAZING / self.bsdf_of(s).lobe_width()).take(bends.len()).collect();
@@ -97,28 +105,30 @@ impl World {
         self.holds.bends.iter().zip(shapes).any(|(bend, among)| *among && *bend > 0.0)
     }
 
-    /// The mean curvature of a shape by its shading normals.
-    fn bend(&self, shape: usize) -> f64 {
-        let shape = &self.scene.shapes[shape];
-        // Next-event estimation shares the light of lamps, and does not hold their points.
-        let Some(normals) = shape.mesh.normals.as_ref().filter(|_| shape.emitter.is_none()) else {
-            return 0.0;
-        };
-        let (mut turns, mut area) = (0.0, 0.0);
-        for (t, corners) in (0..).zip(&shape.mesh.triangles) {
-            let [a, b, c] = shape.mesh.triangle(t);
-            let [i, j, k] = corners.map(|v| normals[v as usize]);
-            let own = (b - a).cross(c - a).length();
-            let (turn, along) = (
-                (j - i).length() + (k - j).length() + (i - k).length(),
-                (b - a).length() + (c - b).length() + (a - c).length(),
-            );
-            if own > 0.0 {
-                turns += own * turn / along;
-                area += own;
+    /// The mean curvatures of the shapes by their shading normals, or by their edges where they have
+    /// none.
+    fn bends(&self) -> Vec<f64> {
+        let shapes = &self.scene.shapes;
+        let mut bends: Vec<f64> = shapes.iter().map(|s| by_normals(&s.mesh)).collect();
+        let faceted = |s: usize| shapes[s].mesh.normals.is_none();
+        if (0..shapes.len()).any(|s| faceted(s) && shapes[s].mesh.triangles.len() >= FACETS) {
+            for edge in collect(self).0 {
+                let (turn, length) = edge.turn();
+                if faceted(edge.shape as usize) && turn < CORNER {
+                    bends[edge.shape as usize] += 0.5 * turn * length;
+                }
+            }
+            for (bend, shape) in
+                bends.iter_mut().zip(shapes).filter(|(_, s)| s.mesh.normals.is_none())
+            {
+                *bend /= f64::max(shape.mesh.surface_area(), f64::MIN_POSITIVE);
             }
         }
-        if area > 0.0 { turns / area } else { 0.0 }
+        // Next-event estimation shares the light of lamps, and does not hold their points.
+        for (bend, _) in bends.iter_mut().zip(shapes).filter(|(_, s)| s.emitter.is_some()) {
+            *bend = 0.0;
+        }
+        bends
     }
 
     /// What holds a vertex seen along `dir` from a vertex at a `distance`.
@@ -166,4 +176,24 @@ impl World {
         let turn = self.normal_slide(s, dir) + s.ns.reject(dir) / distance;
         Hold { share: rest * rest, slope: turn * (-4.0 * q * rest / cosine) }
     }
+}
+
+/// The mean curvature of a mesh by its shading normals; zero without them.
+fn by_normals(mesh: &Mesh) -> f64 {
+    let Some(normals) = &mesh.normals else { return 0.0 };
+    let (mut turns, mut area) = (0.0, 0.0);
+    for (t, corners) in (0..).zip(&mesh.triangles) {
+        let [a, b, c] = mesh.triangle(t);
+        let [i, j, k] = corners.map(|v| normals[v as usize]);
+        let own = (b - a).cross(c - a).length();
+        let (turn, along) = (
+            (j - i).length() + (k - j).length() + (i - k).length(),
+            (b - a).length() + (c - b).length() + (a - c).length(),
+        );
+        if own > 0.0 {
+            turns += own * turn / along;
+            area += own;
+        }
+    }
+    if area > 0.0 { turns / area } else { 0.0 }
 }

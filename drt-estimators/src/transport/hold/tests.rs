@@ -1,5 +1,6 @@
 //! The holds' algebra, and that they are one choice among many.
 
+use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -22,9 +23,13 @@ use crate::splatting::Checked;
 use crate::tangents;
 use crate::transport::{Kind, Lit, SurfacePoint, Vertex, World};
 
-/// A ball over a floor that moves; the ball's surface holds.
-fn prepare() -> (Prepared, Motion) {
-    let scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
+/// A ball over a floor that moves; the ball's surface holds. It has smooth normals, or `facets`.
+fn prepare(facets: bool) -> (Prepared, Motion) {
+    let mut scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
+    if facets {
+        let ball = scene.shapes.iter_mut().find(|s| s.id.as_deref() == Some("ball"));
+        Arc::make_mut(&mut ball.expect("a ball").mesh).normals = None;
+    }
     let motion = parameter("ball", 0.0, vec![moves("ball", shift())]);
     let (scene, tangents) =
         tangents::apply(&scene, core::slice::from_ref(&motion)).expect("a valid parameter");
@@ -41,7 +46,7 @@ fn prepare() -> (Prepared, Motion) {
 /// The slope is the gradient of the share, along the surface.
 #[test]
 fn slopes_are_those_of_shares() {
-    let (prepared, _) = prepare();
+    let (prepared, _) = prepare(false);
     let world = &prepared.world;
     let mut rng = Rng::new(1, 2, 3);
     let mut held = [0; 2];
@@ -84,9 +89,9 @@ fn slopes_are_those_of_shares() {
 
 /// The derivative of the light's moment across the image: what is found along rays with holds `strengths[0]` times
 /// as strong as they are, what is found at edges with holds `strengths[1]` times as strong.
-fn derivative(strengths: [f64; 2]) -> Moments {
+fn derivative(facets: bool, strengths: [f64; 2]) -> Moments {
     let [rays, edges] = strengths.map(|strength| {
-        let (mut prepared, motion) = prepare();
+        let (mut prepared, motion) = prepare(facets);
         let holds = &mut prepared.world.holds;
         holds.bends.iter_mut().chain(&mut holds.seen).for_each(|h| *h *= strength);
         let mut batches = [Vec::new(), Vec::new()];
@@ -153,11 +158,10 @@ impl Receiver for Total<'_> {
 
 /// How vertices move is a choice; the sum of all terms does not depend on it, that of terms which do not
 /// choose alike does.
-#[test]
-fn the_choice_does_not_matter() {
-    let reference = derivative([1.0; 2]);
+fn check(facets: bool) {
+    let reference = derivative(facets, [1.0; 2]);
     let compare = |strengths: [f64; 2]| {
-        let m = derivative(strengths);
+        let m = derivative(facets, strengths);
         let error = f64::sqrt(m.variance_of_mean() + reference.variance_of_mean());
         ((m.mean() - reference.mean()) / error, error / reference.mean())
     };
@@ -165,4 +169,14 @@ fn the_choice_does_not_matter() {
     assert!(alike.iter().all(|(z, _)| z.abs() < 4.0), "{alike:?}");
     let unlike = compare([3.0, 0.0]);
     assert!(unlike.0.abs() > 5.0, "{unlike:?}");
+}
+
+#[test]
+fn the_choice_does_not_matter() {
+    check(false);
+}
+
+#[test]
+fn nor_does_it_with_facets() {
+    check(true);
 }
