@@ -46,6 +46,7 @@ def arguments():
     parser.add_argument("--kind", default="path-space", help="the kind of estimator")
     parser.add_argument("--size", type=int, default=64, help="width and height of the images")
     parser.add_argument("--spp", type=int, default=16, help="samples per pixel")
+    parser.add_argument("--boundary-spp", type=int, help="boundary samples per pixel; as many as --spp by default")
     parser.add_argument("--seeds", type=int, default=16, help="runs with different random numbers")
     parser.add_argument("--max-depth", type=int, help="path depth; the job's by default")
     return parser.parse_args()
@@ -60,6 +61,8 @@ def run(command, job, seed, options):
         line += ["--seed", seed, "--output", image, "--digest", digest]
         if command == "grad":
             line += ["--set", f"estimator.kind={options.kind}"]
+            if options.boundary_spp is not None:
+                line += ["--set", f"estimator.boundary_spp={options.boundary_spp}"]
         if options.max_depth is not None:
             line += ["--max-depth", options.max_depth]
         process = subprocess.Popen([str(word) for word in line])
