@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""Compares derivatives on the scenes of dtrt with finite differences, and prints a table in Markdown.
+
+    cargo build --release -p drt-cli
+    python3 examples/dtrt/check.py [--kind KIND...] [NAME...]
+
+Runs `drt check` on each job by each kind of estimator: derivatives on 8 x 8 block means beside finite
+differences with common random numbers at the job's step and at half of it. Exit code 1 when any disagrees.
+The scenes must lie beside the jobs: see README.md.
+"""
+
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+
+# Samples per pixel: what takes each job a few minutes on one core.
+SPP = {"glass_1": 512, "multilayer": 512, "shadow_1": 2048, "shadow_2": 1024, "camera_pose": 1024}
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(SPP)}; all by default")
+    parser.add_argument("--drt", default=HERE.parents[1] / "target/release/drt", help="the drt binary")
+    parser.add_argument("--kind", nargs="+", default=["radiative", "path-space"], help="kinds of estimators; both by default")
+    parser.add_argument("--size", type=int, default=64, help="width and height of the images")
+    parser.add_argument("--scale", type=float, default=1, help="factor on the numbers of samples")
+    parser.add_argument("--seed", type=int, default=0, help="of the random numbers")
+    parser.add_argument("--threads", type=int, default=0, help="threads of each run; all cores by default")
+    return parser.parse_args()
+
+
+def check(name, kind, options):
+    """What `drt check` says of a job, as its digest."""
+    line = [options.drt, "check", HERE / f"{name}.toml", "--set", f"estimator.kind={kind}", "--quiet"]
+    line += ["--size", f"{options.size}x{options.size}", "--spp", max(1, round(SPP[name] * options.scale))]
+    line += ["--seed", options.seed, "--threads", options.threads, "--digest", "-"]
+    run = subprocess.run([str(word) for word in line], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    # 1 is a disagreement, which the digest tells in full.
+    if run.returncode not in (0, 1):
+        sys.exit(f"{name}: drt check failed: {run.stderr.strip()}")
+    return json.loads(run.stdout)
+
+
+def main():
+    options = arguments()
+    for name in options.names:
+        if name not in SPP:
+            sys.exit(f"{name}: expected one of {', '.join(SPP)}")
+    print("| job | parameter | estimator | samples | rms z | max z | limit | relative noise | verdict | core s of the job |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    agree = True
+    for name in options.names or SPP:
+        for kind in options.kind:
+            digest = check(name, kind, options)
+            for row in digest["checks"]:
+                agree &= row["agrees"]
+                print(
+                    f"| {name} | {row['parameter']} | {kind} | {digest['spp']} | {row['rms_z']:.2f} | {row['max_z']:.2f} "
+                    f"| {row['limit']:.2f} | {100 * row['relative_noise']:.1f} % "
+                    f"| {'agrees' if row['agrees'] else 'DISAGREES'} | {digest['cpu_seconds']:.0f} |",
+                    flush=True,
+                )
+    sys.exit(0 if agree else 1)
+
+
+if __name__ == "__main__":
+    main()
