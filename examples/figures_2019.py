@@ -50,8 +50,7 @@ class Row:
         return f"{self.job}: {self.parameter}"
 
 
-COMPONENTS = [Row("fog-box", "up"), Row("fog-box", "sideways"), Row("blob", "blob-y")]
-EQUAL_TIME = [*COMPONENTS, Row("surface-box", "cube-x")]
+ROWS = [Row("fog-box", "up"), Row("fog-box", "sideways"), Row("blob", "blob-y")]
 
 
 def arguments():
@@ -131,7 +130,7 @@ class Renderer:
 
     def derivatives(self, name, row, kind, seconds, seed):
         """By all parameters of a job that are in the figures, at once."""
-        job = self.job(row.job, [r.parameter for r in EQUAL_TIME if r.job == row.job])
+        job = self.job(row.job, [r.parameter for r in ROWS if r.job == row.job])
         more = ["--terms", "--set", f"estimator.kind={kind}"]
         return self.timed(f"{row.job}-{name}", "grad", job, seconds, seed, *more)
 
@@ -241,7 +240,7 @@ def components(renderer, options):
     rows, without = [], []
     print("| job | parameter | left out | rms difference from finite differences | rms z | max z |")
     print("|---|---|---|---|---|---|")
-    for row in COMPONENTS:
+    for row in ROWS:
         name = f"d_{row.parameter}"
         long = renderer.derivatives("radiative-long", row, "radiative", options.seconds * options.long, 1)
         total = long.layer(name)
@@ -281,7 +280,7 @@ def equal_time(renderer, references, options):
     rows = []
     print("| job | parameter | estimate | samples | CPU s | error |")
     print("|---|---|---|---|---|---|")
-    for row in EQUAL_TIME:
+    for row in ROWS:
         name, reference = f"d_{row.parameter}", references(row)
         estimates = {}
         for kind in ("radiative", "path-space"):

@@ -25,7 +25,7 @@ def arguments():
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(SPP)}; all by default")
     parser.add_argument("--drt", default=HERE.parents[1] / "target/release/drt", help="the drt binary")
     parser.add_argument("--kind", default="radiative", help="the kind of estimator")
-    parser.add_argument("--size", type=int, default=96, help="width and height of the images")
+    parser.add_argument("--size", type=int, default=64, help="width and height of the images")
     parser.add_argument("--scale", type=float, default=1, help="factor on the numbers of samples")
     parser.add_argument("--threads", type=int, default=0, help="threads of each run; all cores by default")
     parser.add_argument("--folder", type=pathlib.Path, default=PICTURES, help="where to put NAME.png")
