@@ -1,6 +1,6 @@
 //! Running a job at doubling sample counts.
 
-use drt_estimators::{Layer, Rendering, Session};
+use drt_estimators::{EstimatorKind, Layer, Rendering, Session};
 
 use super::reference::Reference;
 use super::series::{Point, Series};
@@ -30,7 +30,12 @@ pub(super) fn job(
     if job.parameters.is_empty() || monitor.interrupted() {
         return Ok(all);
     }
-    let derivatives = bench.session("path-space", |job| run::prepare(job, &job.parameters))?;
+    let by_paths = match job.settings.estimator {
+        EstimatorKind::Radiative => "radiative",
+        // Differences are measured in any case.
+        EstimatorKind::PathSpace | EstimatorKind::FiniteDifference => "path-space",
+    };
+    let derivatives = bench.session(by_paths, |job| run::prepare(job, &job.parameters))?;
     // The image comes along; it is measured by itself already.
     let derivatives = derivatives.into_iter().filter(|s| s.image != IMAGE);
     let derivatives: Vec<Series> = derivatives.collect();
