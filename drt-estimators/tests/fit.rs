@@ -93,6 +93,51 @@ fn gradients_are_unbiased() {
     }
 }
 
+/// Gauss and Newton's matrix from two samples per pixel averages to that of many, and each is between what
+/// the halves see by themselves and its negative, in every direction.
+#[test]
+fn curvatures_are_unbiased_and_bounded() {
+    let (scene, at) = (room(), [0.1, 0.2, 0.5]);
+    for loss in [Loss::L2, PYRAMID] {
+        let mut fit = fit(&scene, [0.15, 0.3, 0.7], loss);
+        let flat = |m: Vec<Vec<f64>>| m.concat();
+        let batch = |fit: &mut Fit, spp, runs: u64, from| -> Vec<[f64; 2]> {
+            let runs = (0..runs).map(|seed| flat(evaluate(fit, at, spp, from + seed).curvature()));
+            statistics(&runs.collect::<Vec<_>>())
+        };
+        let exact = batch(&mut fit, 1 << 10, 16, 9000);
+        let z = |found: &[[f64; 2]]| -> Vec<f64> {
+            let pairs = found.iter().zip(&exact);
+            pairs.map(|([m, s], [g, e])| (m - g) / (s * s + e * e).sqrt()).collect()
+        };
+        let fair = z(&batch(&mut fit, 2, 500, 100));
+        assert!(fair.iter().all(|z| z.abs() < 4.0), "{loss:?}: {fair:?}");
+        let mut own = Vec::new();
+        let mut indefinite = 0;
+        for seed in 0..500 {
+            let seen = evaluate(&mut fit, at, 2, 100 + seed);
+            let (signal, noise) = (seen.curvature(), seen.curvature_noise());
+            let sum = |sign: f64| -> Vec<Vec<f64>> {
+                let rows = signal.iter().zip(&noise);
+                rows.map(|(s, n)| s.iter().zip(n).map(|(s, n)| n + s + sign * s).collect())
+                    .collect()
+            };
+            // H + N, twice for H + N + H, and N.
+            for bound in [sum(1.0), sum(-1.0)] {
+                let scale = bound.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
+                let (values, _) = drt_math::dense::eigen(&bound);
+                assert!(values.iter().all(|v| *v > -1e-12 * scale), "{values:?}");
+            }
+            indefinite += u32::from(drt_math::dense::Cholesky::new(&signal, 0.0).is_none());
+            own.push(flat(sum(0.0)));
+        }
+        assert!(indefinite > 0, "two samples are too many for this test");
+        // Squares of the same samples' derivatives are not it.
+        let planted = z(&statistics(&own));
+        assert!(planted[0] > 6.0, "{loss:?}: {planted:?}");
+    }
+}
+
 #[test]
 fn errors_are_honest_where_noise_is_not_all() {
     for loss in [Loss::L2, PYRAMID] {

@@ -71,7 +71,7 @@ fn write(
 
 /// The values reached, and how well they are known.
 fn summary(problem: &Problem<'_>, descent: &Descent<'_>, last: Option<&Evaluation>) -> String {
-    let uncertainty = last.and_then(Evaluation::uncertainty);
+    let uncertainty = last.and_then(|seen| descent.uncertainty(seen));
     let line = |(p, (name, value)): (usize, (&str, &f64))| match &uncertainty {
         Some(u) => format!("{name} = {value:.6} ± {:.1e}\n", u[p]),
         None => format!("{name} = {value:.6}\n"),
