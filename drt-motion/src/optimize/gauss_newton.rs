@@ -44,11 +44,13 @@
 //! With M = L Lᵀ and L⁻¹ H L⁻ᵀ = V μ Vᵀ, all that follows is one number in each direction:
 //!
 //! - H, known to be positive, takes μ between 0 and 1: the nearest that is possible.
-//! - The error of an average of k iterations' H is at most about N / √k: that of J_Aᵀ W J_B is below the mean of both
-//!   halves' squares, by the inequality above. The damped matrix is B = H + q N, with q = 1/√k and
-//!   1/k = Σ w² / (Σ w)²: μ + q (1 − μ) in each direction.
+//! - With 1/k = Σ w² / (Σ w)², the averaged H has 1/√k of the errors of one H_t. Those of L⁻¹ H_t L⁻ᵀ, n × n numbers, are
+//!   seen as they come: f is the mean of ‖L⁻¹ (H_t − H) L⁻ᵀ‖² over iterations, the squared norm by Frobenius, 1/k of it
+//!   due to H. A symmetric matrix of independent errors with the variance f/n² has no eigenvalue beyond 2 √(f/n), by
+//!   Wigner's semicircle; nor, as above, beyond 1. The damped matrix is B = H + q N with q = min(1, 2 √(f/n)) / √k:
+//!   μ + q (1 − μ) in each direction.
 //!
-//! B is positive definite as q > 0. The first step takes M itself; without noise B is H throughout. The step
+//! B is positive definite as q > 0. The first step, with no f yet, takes M itself; without noise B is H throughout. The step
 //! changes the gradient by H Δ, not by B Δ, so that damping delays, but does not bias.
 //!
 //! # Limits
@@ -123,6 +125,8 @@ pub struct Averages {
     pub total: f64,
     /// 1/k = Σ w² / (Σ w)²: the variance of the averages relative to that of one iteration.
     pub share: f64,
+    /// f, the squared scatter of one iteration's curvature, relative to that with noise.
+    pub scatter: f64,
 }
 
 /// Least pivot of a matrix with a diagonal of ones, added to it: variables that do the same share a step.
@@ -135,7 +139,9 @@ const SETTLED: f64 = 1e-13;
 impl Averages {
     pub(super) fn new(n: usize) -> Self {
         let (curvature, noise) = (zeros(n), zeros(n));
-        Self { gradient: alloc::vec![0.0; n], curvature, noise, total: 0.0, share: 0.0 }
+        // As large as it can be, until it is seen.
+        let scatter = 0.25 * n as f64;
+        Self { gradient: alloc::vec![0.0; n], curvature, noise, total: 0.0, share: 0.0, scatter }
     }
 
     pub(super) fn check(&self, n: usize) -> Result<(), OptimizeError> {
@@ -149,91 +155,123 @@ impl Averages {
                 return Err(OptimizeError::Method { name, value, expected });
             }
         }
-        Ok(())
+        if self.scatter >= 0.0 && self.scatter.is_finite() {
+            return Ok(());
+        }
+        let expected = "a number that is not negative";
+        Err(OptimizeError::Method { name: "scatter", value: self.scatter, expected })
     }
 
     /// Takes an iteration into the averages; `slopes` are the derivatives of the values by their
-    /// coordinates.
-    pub(super) fn observe(&mut self, seen: &Observation<'_>, slopes: &[f64], memory: f64) {
+    /// coordinates. `None` as for [`step`](Self::step).
+    pub(super) fn observe(
+        &mut self,
+        seen: &Observation<'_>,
+        slopes: &[f64],
+        memory: f64,
+    ) -> Option<()> {
+        let n = slopes.len();
+        let curvature = table(n, |i, j| seen.curvature[i][j] * slopes[i] * slopes[j]);
+        let scatter = match self.total > 0.0 {
+            true => {
+                let change = table(n, |i, j| curvature[i][j] - self.curvature[i][j]);
+                let change = Metric::new(self)?.relative(&change);
+                change.iter().map(|row| dot(row, row)).sum::<f64>() / (1.0 + self.share)
+            }
+            false => self.scatter,
+        };
         self.total += seen.weight;
         let part = f64::min(1.0, seen.weight / (memory * self.total));
         self.share = (1.0 - part) * (1.0 - part) * self.share + part * part;
         let towards = |mean: &mut f64, new: f64| *mean += part * (new - *mean);
-        for (i, slope) in slopes.iter().enumerate() {
-            towards(&mut self.gradient[i], seen.gradient[i] * slope);
-            for (j, other) in slopes.iter().enumerate() {
-                let both = slope * other;
-                towards(&mut self.curvature[i][j], seen.curvature[i][j] * both);
+        towards(&mut self.scatter, scatter);
+        for i in 0..n {
+            towards(&mut self.gradient[i], seen.gradient[i] * slopes[i]);
+            for j in 0..n {
+                towards(&mut self.curvature[i][j], curvature[i][j]);
                 let noise = seen.noise.get(i).map_or(0.0, |row| row[j]);
-                towards(&mut self.noise[i][j], noise * both);
+                towards(&mut self.noise[i][j], noise * slopes[i] * slopes[j]);
             }
         }
+        Some(())
+    }
+
+    /// q.
+    fn damping(&self) -> f64 {
+        let edge = 2.0 * fm::sqrt(self.scatter / self.gradient.len() as f64);
+        f64::min(1.0, edge) * fm::sqrt(self.share)
     }
 
     /// The step of the coordinates, each between its two limits, which include 0. The averaged gradient
-    /// becomes that at the end of it. `None` when the averages are too large for numbers.
+    /// becomes that at the end of it. `None` when the matrices are not those of a sum of squares.
     pub(super) fn step(&mut self, limits: &[[f64; 2]]) -> Option<Vec<f64>> {
-        let model = Model::new(self)?;
-        let step = least(&model.damped, &self.gradient, limits);
-        for (b, change) in self.gradient.iter_mut().zip(times(&model.curvature, &step)) {
+        let metric = Metric::new(self)?;
+        let (signal, directions) = eigen(&metric.relative(&self.curvature));
+        let signal: Vec<f64> = signal.iter().map(|s| s.clamp(0.0, 1.0)).collect();
+        let directions: Vec<Vec<f64>> = directions.iter().map(|v| metric.absolute(v)).collect();
+        let sum = |value: &dyn Fn(f64) -> f64| {
+            let weights: Vec<f64> = signal.iter().map(|s| value(*s)).collect();
+            table(limits.len(), |i, j| {
+                weights.iter().zip(&directions).map(|(w, v)| w * v[i] * v[j]).sum()
+            })
+        };
+        let q = self.damping();
+        let damped = sum(&|s| s + q * (1.0 - s));
+        if !damped.iter().flatten().all(|v| v.is_finite()) {
+            return None;
+        }
+        let step = least(&damped, &self.gradient, limits);
+        for (b, change) in self.gradient.iter_mut().zip(times(&sum(&|s| s), &step)) {
             *b += change;
         }
         Some(step)
     }
 }
 
-/// The matrices of a step.
-struct Model {
-    /// H as the nearest that is possible.
-    curvature: Vec<Vec<f64>>,
-    /// B.
-    damped: Vec<Vec<f64>>,
+/// M as L Lᵀ, of variables with units in which its diagonal is 1.
+struct Metric {
+    units: Vec<f64>,
+    factor: Cholesky,
 }
 
-impl Model {
+impl Metric {
     fn new(averages: &Averages) -> Option<Self> {
-        let Averages { curvature, noise, share, .. } = averages;
+        let Averages { curvature, noise, .. } = averages;
         let n = curvature.len();
         let square = |i: usize| curvature[i][i] + noise[i][i];
         // Variables without any effect have a unit of their own.
-        let scale: Vec<f64> =
+        let units: Vec<f64> =
             (0..n).map(|i| if square(i) > 0.0 { fm::sqrt(square(i)) } else { 1.0 }).collect();
-        let scaled = |i: usize, j: usize, value: f64| value / scale[i] / scale[j];
-        let table = |value: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
-            (0..n).map(|i| (0..n).map(|j| value(i, j)).collect()).collect()
-        };
-        let all = table(&|i, j| {
-            let ridge = if i != j {
-                0.0
-            } else if square(i) > 0.0 {
-                RIDGE
-            } else {
-                1.0
+        let matrix = table(n, |i, j| {
+            let ridge = match i == j {
+                true if square(i) > 0.0 => RIDGE,
+                true => 1.0,
+                false => 0.0,
             };
-            scaled(i, j, curvature[i][j] + noise[i][j]) + ridge
+            (curvature[i][j] + noise[i][j]) / units[i] / units[j] + ridge
         });
-        let factor = Cholesky::new(&all, 0.0)?;
-        // L⁻¹ H L⁻ᵀ: from the left, then from the right.
-        let from_left = |rows: &[Vec<f64>]| -> Vec<Vec<f64>> {
-            let mut columns = table(&|j, i| rows[i][j]);
-            columns.iter_mut().for_each(|column| factor.solve_lower(column));
-            columns
-        };
-        let relative = from_left(&from_left(&table(&|i, j| scaled(i, j, curvature[i][j]))));
-        let (signal, directions) = eigen(&relative);
-        let signal: Vec<f64> = signal.iter().map(|s| s.clamp(0.0, 1.0)).collect();
-        let directions: Vec<Vec<f64>> = directions.iter().map(|v| factor.times(v)).collect();
-        let damping = fm::sqrt(*share);
-        let sum = |value: &dyn Fn(f64) -> f64| {
-            let weights: Vec<f64> = signal.iter().map(|s| value(*s)).collect();
-            table(&|i, j| {
-                let terms = weights.iter().zip(&directions).map(|(w, v)| w * v[i] * v[j]);
-                terms.sum::<f64>() * scale[i] * scale[j]
-            })
-        };
-        let model = Self { curvature: sum(&|s| s), damped: sum(&|s| s + damping * (1.0 - s)) };
-        model.damped.iter().flatten().all(|v| v.is_finite()).then_some(model)
+        Some(Self { units, factor: Cholesky::new(&matrix, 0.0)? })
     }
+
+    /// L⁻¹ H L⁻ᵀ of a symmetric H.
+    fn relative(&self, matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let n = self.units.len();
+        let mut rows = table(n, |i, j| matrix[i][j] / self.units[i] / self.units[j]);
+        for _ in 0..2 {
+            rows.iter_mut().for_each(|row| self.factor.solve_lower(row));
+            rows = table(n, |i, j| rows[j][i]);
+        }
+        rows
+    }
+
+    /// L v: what v is the relative form of.
+    fn absolute(&self, v: &[f64]) -> Vec<f64> {
+        self.factor.times(v).iter().zip(&self.units).map(|(v, unit)| v * unit).collect()
+    }
+}
+
+fn table(n: usize, value: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
+    (0..n).map(|i| (0..n).map(|j| value(i, j)).collect()).collect()
 }
 
 /// The minimum of b·Δ + Δ·B Δ / 2 between limits, for a positive definite B.

@@ -120,8 +120,10 @@ impl Optimizer {
         let limit = |(v, value): (&Variable, &f64)| v.limits(*value, v.learning_rate * factor);
         let limits: Vec<[f64; 2]> = variables.map(limit).collect();
         let averages = next.averages.get_or_insert_with(|| Averages::new(n));
-        averages.observe(seen, &slopes, memory);
-        let step = averages.step(&limits).ok_or(OptimizeError::NotSquares)?;
+        let step = averages
+            .observe(seen, &slopes, memory)
+            .and_then(|()| averages.step(&limits))
+            .ok_or(OptimizeError::NotSquares)?;
         averages.check(n)?;
         for ((value, variable), change) in next.values.iter_mut().zip(&self.variables).zip(step) {
             if change != 0.0 {
