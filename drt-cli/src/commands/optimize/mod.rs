@@ -77,6 +77,9 @@ fn summary(problem: &Problem<'_>, descent: &Descent<'_>, last: Option<&Evaluatio
         None => format!("{name} = {value:.6}\n"),
     };
     let mut text: String = problem.names().zip(descent.values()).enumerate().map(line).collect();
+    if last.is_some() && uncertainty.is_none() {
+        text += "± not known: the derivatives do not tell these parameters apart\n";
+    }
     if descent.steps() < problem.iterations {
         let (steps, n) = (descent.steps(), problem.iterations);
         text += &match &problem.plan.checkpoint {
