@@ -52,12 +52,18 @@ pub(crate) fn remove_drafts(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
         let name = entry.file_name();
-        let name = name.to_string_lossy();
-        if name.starts_with('.') && name.ends_with(".tmp") {
+        if is_draft(&name.to_string_lossy()) {
             // One that stays does no harm.
             let _ = fs::remove_file(entry.path());
         }
     }
+}
+
+/// True for the names that [`draft_of`] gives.
+fn is_draft(name: &str) -> bool {
+    let inner = name.strip_prefix('.').and_then(|rest| rest.strip_suffix(".tmp"));
+    let process = inner.and_then(|rest| rest.rsplit_once('.')).map(|(_, process)| process);
+    process.is_some_and(|p| !p.is_empty() && p.bytes().all(|b| b.is_ascii_digit()))
 }
 
 fn draft_of(path: &Path) -> PathBuf {

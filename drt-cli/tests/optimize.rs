@@ -97,9 +97,50 @@ fn a_fit_arrives_and_tells_of_it() {
     assert!(page.contains("<td>lamp-x</td>") && page.contains("data:image/png;base64,"));
     assert!(!page.contains("http://") && !page.contains("https://"), "it needs nothing else");
     // Once there, it stays there.
-    let before = text(&folder, "run/params.csv");
+    let state = || (text(&folder, "run/params.csv"), folder.json("run/checkpoint.json"));
+    let before = state();
     expect(&folder.run("optimize job.toml --quiet"), 0, &[]);
-    assert_eq!(before, text(&folder, "run/params.csv"));
+    assert_eq!(before, state(), "times included");
+    // What begins anew leaves nothing of what was.
+    folder.file("run/frame-notes.png", "mine");
+    expect(&folder.run("optimize job.toml --quiet --restart --iterations 7"), 0, &[]);
+    let there = |name: &str| folder.path().join(format!("run/{name}.png")).is_file();
+    assert!(there("frame-00007") && there("frame-notes") && !there("frame-00060"));
+}
+
+/// Both parameters in a tenth of Adam's iterations.
+#[test]
+fn gauss_newton_arrives_sooner() {
+    let adam = r#"kind = "adam", learning_rate = { gray = 0.02, lamp-x = 0.05 }, iterations = 60, decay = "cosine""#;
+    let newton = r#"kind = "gauss-newton", learning_rate = 0.3, memory = 0.4, iterations = 12"#;
+    let fit = FIT.replace(adam, newton);
+    assert_ne!(fit, FIT);
+    let [whole, broken] = [(); 2].map(|()| folder(&fit));
+    expect(&whole.run("optimize job.toml --quiet --threads 1"), 0, &[]);
+    let [gray, lamp] = result(&whole)[..] else { panic!() };
+    assert!((gray - 0.2).abs() < 0.02 && (lamp + 0.5).abs() < 0.05, "{gray} {lamp}");
+    assert!(text(&whole, "run/report.html").contains("averages"));
+    // What it remembers is stored to the bit.
+    for n in [1, 2, 5, 12] {
+        let line = format!("optimize job.toml --quiet --threads 2 --iterations {n}");
+        expect(&broken.run(&line), 0, &[]);
+    }
+    assert_eq!(outcome(&whole), outcome(&broken));
+    let l1 = fit.replace("{ pyramid-l2 = { levels = 10, weight = 4 } }", "\"l1\"");
+    whole.file("job.toml", format!("{JOB}{l1}"));
+    expect(
+        &whole.run("optimize job.toml --restart"),
+        2,
+        &["`optimizer` \"gauss-newton\"", "\"l1\""],
+    );
+    whole.file("job.toml", format!("{JOB}{}", fit.replace("memory = 0.4", "memory = 2")));
+    expect(&whole.run("optimize job.toml --restart"), 2, &["memory is 2; expected more than 0"]);
+    whole.file("job.toml", format!("{JOB}{}", FIT.replace("decay =", "memory = 0.5, decay =")));
+    expect(
+        &whole.run("optimize job.toml --restart"),
+        2,
+        &["`memory` does not belong to this kind"],
+    );
 }
 
 /// All that must not depend on where a run was stopped.

@@ -6,6 +6,7 @@ use common::*;
 use drt_estimators::fit::{Evaluation, Fit, Misstep, View, check_step};
 use drt_estimators::loss::{Loss, Reference};
 use drt_estimators::{Scene, Session, Settings, Unattended, moved};
+use drt_math::dense::{Cholesky, eigen};
 use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::optimize::{Decay, Method, Optimizer, Variable};
 use drt_motion::{GeometryChange, Parameter};
@@ -90,6 +91,47 @@ fn gradients_are_unbiased() {
         assert!(fair.iter().all(|z| z.abs() < 4.0), "{loss:?}: {fair:?}");
         // The lamp's derivative is in proportion to the image, and so is its noise.
         assert!(planted[2] > 6.0, "{loss:?}: {planted:?}");
+    }
+}
+
+/// Gauss and Newton's matrix from two samples per pixel averages to that of many, and each is between what
+/// the halves see by themselves and its negative, in every direction.
+#[test]
+fn curvatures_are_unbiased_and_bounded() {
+    let (scene, at) = (room(), [0.1, 0.2, 0.5]);
+    for loss in [Loss::L2, PYRAMID] {
+        let mut fit = fit(&scene, [0.15, 0.3, 0.7], loss);
+        let many = (0..16).map(|seed| evaluate(&mut fit, at, 1 << 10, 9000 + seed));
+        let exact = statistics(&many.map(|seen| seen.curvature().concat()).collect::<Vec<_>>());
+        let z = |samples: &[Vec<f64>]| -> Vec<f64> {
+            let found = statistics(samples);
+            let pairs = found.iter().zip(&exact);
+            pairs.map(|([m, s], [g, e])| (m - g) / (s * s + e * e).sqrt()).collect()
+        };
+        let (mut fair, mut own, mut indefinite) = (Vec::new(), Vec::new(), 0);
+        for seed in 0..400 {
+            let seen = evaluate(&mut fit, at, 2, 100 + seed);
+            let (signal, noise) = (seen.curvature(), seen.curvature_noise());
+            let sum = |sign: f64| -> Vec<Vec<f64>> {
+                let rows = signal.iter().zip(&noise);
+                rows.map(|(s, n)| s.iter().zip(n).map(|(s, n)| n + s + sign * s).collect())
+                    .collect()
+            };
+            // M + H and M - H, with M = H + N.
+            for bound in [sum(1.0), sum(-1.0)] {
+                let scale = bound.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
+                let (values, _) = eigen(&bound);
+                assert!(values.iter().all(|v| *v > -1e-12 * scale), "{values:?}");
+            }
+            indefinite += u32::from(Cholesky::new(&signal, 0.0).is_none());
+            own.push(sum(0.0).concat());
+            fair.push(signal.concat());
+        }
+        assert!(indefinite > 0, "two samples are too many for this test");
+        let (fair, planted) = (z(&fair), z(&own));
+        assert!(fair.iter().all(|z| z.abs() < 4.0), "{loss:?}: {fair:?}");
+        // Squares of the same samples' derivatives are not it.
+        assert!(planted[0] > 6.0, "{loss:?}: {planted:?}");
     }
 }
 

@@ -9,6 +9,7 @@ compile_error!("drt-math needs elementary functions: enable the feature `std` or
 
 mod affine;
 mod change;
+pub mod dense;
 pub mod discrete;
 mod dual;
 pub mod fm;

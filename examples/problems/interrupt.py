@@ -22,9 +22,8 @@ TIMED = {"report.html"}
 
 
 def state(folder):
-    """Every file by name, the checkpoint without its times. What a kill left half written is nobody's."""
-    written = (p for p in folder.iterdir() if p.name not in TIMED and p.suffix != ".tmp")
-    files = {p.name: p.read_bytes() for p in written}
+    """Every file by name, the checkpoint without its times."""
+    files = {p.name: p.read_bytes() for p in folder.iterdir() if p.name not in TIMED}
     checkpoint = json.loads(files.pop("checkpoint.json"))
     checkpoint = {k: v for k, v in checkpoint.items() if "seconds" not in k}
     return files | {"checkpoint.json": json.dumps(checkpoint).encode()}

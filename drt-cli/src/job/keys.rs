@@ -229,6 +229,7 @@ pub(super) struct Optimizer {
     pub(super) betas: Option<[f64; 2]>,
     pub(super) epsilon: Option<f64>,
     pub(super) momentum: Option<f64>,
+    pub(super) memory: Option<f64>,
     pub(super) decay: Decay,
 }
 
@@ -238,6 +239,7 @@ pub(super) enum OptimizerKind {
     #[default]
     Adam,
     Sgd,
+    GaussNewton,
 }
 
 #[derive(Debug, Deserialize)]

@@ -60,6 +60,12 @@ pub(super) fn optimize(
     let reader = Reader { document, table, parameters };
     let keys = table.get_ref();
     let (loss, method, decay) = (reader.loss()?, reader.method(), reader.decay()?);
+    if matches!(method, Method::GaussNewton { .. }) && !loss.is_curved() {
+        return Err(reader.error(
+            "`optimizer` \"gauss-newton\" needs a loss with second derivatives, which \"l1\" lacks; \
+             expected \"l2\", \"pyramid-l2\" or \"rmse\"",
+        ));
+    }
     let variables = reader.variables()?;
     let start: Vec<f64> = parameters.iter().map(|p| p.value).collect();
     // Refuses what no run could begin with, parameters by their names.
@@ -155,6 +161,10 @@ impl Reader<'_> {
                 let [beta1, beta2] = keys.betas.unwrap_or([beta1, beta2]);
                 Method::Adam { beta1, beta2, epsilon: keys.epsilon.unwrap_or(epsilon) }
             }
+            (keys::OptimizerKind::GaussNewton, _) => match (keys.memory, Method::GAUSS_NEWTON) {
+                (Some(memory), _) => Method::GaussNewton { memory },
+                (None, method) => method,
+            },
             _ => Method::Momentum { momentum: keys.momentum.unwrap_or(0.0) },
         }
     }
@@ -166,6 +176,11 @@ impl Reader<'_> {
             ("betas", keys.betas.is_some(), matches!(keys.kind, keys::OptimizerKind::Adam)),
             ("epsilon", keys.epsilon.is_some(), matches!(keys.kind, keys::OptimizerKind::Adam)),
             ("momentum", keys.momentum.is_some(), matches!(keys.kind, keys::OptimizerKind::Sgd)),
+            (
+                "memory",
+                keys.memory.is_some(),
+                matches!(keys.kind, keys::OptimizerKind::GaussNewton),
+            ),
         ] {
             if given && !fits {
                 let message = format!("`optimizer`: `{key}` does not belong to this kind");

@@ -3,6 +3,7 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
+use drt_math::dense::zeros;
 use drt_math::{Rgb, fm};
 
 use super::View;
@@ -86,7 +87,7 @@ impl Evaluation {
     #[must_use]
     pub fn covariance(&self) -> Vec<Vec<f64>> {
         let n = self.parameters;
-        let mut covariance = alloc::vec![alloc::vec![0.0; n]; n];
+        let mut covariance = zeros(n);
         for (view, seen) in self.pairs() {
             let image = seen.image();
             let value = self.loss.value(&image, &view.reference);
@@ -122,7 +123,7 @@ impl Evaluation {
     #[must_use]
     pub fn curvature(&self) -> Vec<Vec<f64>> {
         let n = self.parameters;
-        let mut curvature = alloc::vec![alloc::vec![0.0; n]; n];
+        let mut curvature = zeros(n);
         for (view, seen) in self.pairs() {
             let value = self.loss.value(&seen.image(), &view.reference);
             for (first, second) in [(0, 1), (1, 0)] {
@@ -137,6 +138,32 @@ impl Evaluation {
             }
         }
         curvature
+    }
+
+    /// What the noise of the derivatives adds to their squares, in the units of
+    /// [`curvature`](Self::curvature): that plus this is the mean of the halves' own, which are positive but
+    /// biased.
+    #[must_use]
+    pub fn curvature_noise(&self) -> Vec<Vec<f64>> {
+        let n = self.parameters;
+        let mut noise = zeros(n);
+        for (view, seen) in self.pairs() {
+            let value = self.loss.value(&seen.image(), &view.reference);
+            let [a, b] = &seen.halves;
+            let differences: Vec<Vec<Rgb>> = (0..n)
+                .map(|p| {
+                    let pairs = a.derivatives[p].iter().zip(&b.derivatives[p]);
+                    pairs.map(|(a, b)| *a - *b).collect()
+                })
+                .collect();
+            for (row, d) in noise.iter_mut().zip(&differences) {
+                let curved = self.loss.curvature(d, value, &view.reference);
+                for (sum, other) in row.iter_mut().zip(&differences) {
+                    *sum += 0.5 * inner(&curved, other);
+                }
+            }
+        }
+        noise
     }
 
     /// How far the noise of this evaluation alone would lead a Newton step astray, per parameter: a

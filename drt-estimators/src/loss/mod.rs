@@ -189,6 +189,13 @@ impl Loss {
         times_mask(self.curve(&masked, reference, value), reference)
     }
 
+    /// True where [`curvature`](Self::curvature) says how the loss bends: for all but L1, whose bends are
+    /// all at zero.
+    #[must_use]
+    pub fn is_curved(&self) -> bool {
+        !matches!(self, Self::L1)
+    }
+
     /// The quadratic form that the loss is made of, applied to `d`: twice that of squares; that of the
     /// root is this over the root.
     fn curve(&self, d: &[Rgb], reference: &Reference, value: f64) -> Vec<Rgb> {

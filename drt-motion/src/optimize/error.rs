@@ -74,4 +74,10 @@ pub enum OptimizeError {
         /// What it may be.
         expected: &'static str,
     },
+    /// A gradient where the method needs second derivatives, too.
+    #[error("Gauss-Newton steps need a curvature besides the gradient")]
+    NoCurvature,
+    /// Second derivatives that no noise explains.
+    #[error("the curvature with its noise is not positive: it is not that of a sum of squares")]
+    NotSquares,
 }

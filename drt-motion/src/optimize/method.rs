@@ -22,9 +22,19 @@ pub enum Method {
         /// What remains of the previous step; 0 is plain gradient descent.
         momentum: f64,
     },
+    /// Gauss and Newton's steps by averaged gradients and matrices, for sums of squares: see
+    /// [`Observation`](super::Observation). The learning rate is the longest step.
+    GaussNewton {
+        /// The part of the run so far that the averages span: 1 is all of it, and less forgets sooner
+        /// what was seen far from the goal.
+        memory: f64,
+    },
 }
 
 impl Method {
+    /// Gauss and Newton's with averages over the last third of the way, about.
+    pub const GAUSS_NEWTON: Self = Self::GaussNewton { memory: 0.35 };
+
     /// Adam with the decays of its paper, and an epsilon that matters for vanishing gradients only.
     pub const ADAM: Self = Self::Adam { beta1: 0.9, beta2: 0.999, epsilon: 1e-15 };
 
@@ -45,25 +55,37 @@ impl Method {
                 Err(OptimizeError::Method { name: "epsilon", value: epsilon, expected })
             }
             Self::Momentum { momentum } => decay("momentum", momentum),
+            Self::GaussNewton { memory } if memory > 0.0 && memory <= 1.0 => Ok(()),
+            Self::GaussNewton { memory } => {
+                let expected = "more than 0 and at most 1";
+                Err(OptimizeError::Method { name: "memory", value: memory, expected })
+            }
         }
     }
 
     /// Takes gradient `g` into the moments of one variable; the step for a learning rate of 1.
     /// `unseen` is β1ᵗ and β2ᵗ after this, the t-th gradient: what the moments still hold of the zeros
-    /// that they began as.
-    pub(super) fn step(&self, g: f64, first: &mut f64, second: &mut f64, unseen: [f64; 2]) -> f64 {
+    /// that they began as. `None` where steps need more than gradients.
+    pub(super) fn step(
+        &self,
+        g: f64,
+        first: &mut f64,
+        second: &mut f64,
+        unseen: [f64; 2],
+    ) -> Option<f64> {
         match *self {
             Self::Adam { beta1, beta2, epsilon } => {
                 *first = beta1 * *first + (1.0 - beta1) * g;
                 *second = beta2 * *second + (1.0 - beta2) * g * g;
                 let mean = *first / (1.0 - unseen[0]);
                 let square = *second / (1.0 - unseen[1]);
-                mean / (fm::sqrt(square) + epsilon)
+                Some(mean / (fm::sqrt(square) + epsilon))
             }
             Self::Momentum { momentum } => {
                 *first = momentum * *first + g;
-                *first
+                Some(*first)
             }
+            Self::GaussNewton { .. } => None,
         }
     }
 
@@ -71,7 +93,7 @@ impl Method {
     pub(super) fn decays(&self) -> [f64; 2] {
         match *self {
             Self::Adam { beta1, beta2, .. } => [beta1, beta2],
-            Self::Momentum { .. } => [0.0; 2],
+            Self::Momentum { .. } | Self::GaussNewton { .. } => [0.0; 2],
         }
     }
 }

@@ -1,7 +1,9 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::{Method, OptimizeError, Variable};
+use drt_math::fm;
+
+use super::{Averages, Method, Observation, OptimizeError, Variable};
 
 /// Everything that an [`Optimizer`] remembers, one number per variable in each list.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +19,9 @@ pub struct State {
     pub second: Vec<f64>,
     /// β1ᵗ and β2ᵗ after t steps.
     pub unseen: [f64; 2],
+    /// What Gauss-Newton steps follow from.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub averages: Option<Averages>,
 }
 
 /// Minimises a function of many variables by its gradients.
@@ -47,6 +52,7 @@ impl Optimizer {
             first: zeros.clone(),
             second: zeros,
             unseen: [1.0; 2],
+            averages: None,
         };
         Self::resume(method, variables, state)
     }
@@ -68,6 +74,9 @@ impl Optimizer {
             same_length(what, expected, list)?;
             all_finite(what, list)?;
         }
+        if let Some(averages) = &state.averages {
+            averages.check(expected)?;
+        }
         for (i, (variable, value)) in variables.iter().zip(&state.values).enumerate() {
             variable.check(i, *value)?;
         }
@@ -86,11 +95,51 @@ impl Optimizer {
         &self.state
     }
 
+    /// How large the errors of what steps follow from are, next to those of one iteration: the root of a
+    /// number of iterations that are averaged. `None` where steps are not made of averages.
+    #[must_use]
+    pub fn averaging(&self) -> Option<f64> {
+        self.state.averages.as_ref().map(|a| fm::sqrt(a.share))
+    }
+
+    /// Takes one step by all that was seen at the values, with every learning rate times `factor`. Methods
+    /// that need no more than gradients look at no more.
+    ///
+    /// # Errors
+    /// As [`step`](Self::step), and when matrices have another size, or are not those of a sum of squares.
+    pub fn step_by(&mut self, seen: &Observation<'_>, factor: f64) -> Result<(), OptimizeError> {
+        let Method::GaussNewton { memory } = self.method else {
+            return self.step(seen.gradient, factor);
+        };
+        let n = self.variables.len();
+        seen.check(n)?;
+        let mut next = self.state.clone();
+        next.steps += 1;
+        let variables = self.variables.iter().zip(&self.state.values);
+        let slopes: Vec<f64> = variables.clone().map(|(v, value)| v.slope(*value)).collect();
+        let limit = |(v, value): (&Variable, &f64)| v.limits(*value, v.learning_rate * factor);
+        let limits: Vec<[f64; 2]> = variables.map(limit).collect();
+        let averages = next.averages.get_or_insert_with(|| Averages::new(n));
+        let step = averages
+            .observe(seen, &slopes, memory)
+            .and_then(|()| averages.step(&limits))
+            .ok_or(OptimizeError::NotSquares)?;
+        averages.check(n)?;
+        for ((value, variable), change) in next.values.iter_mut().zip(&self.variables).zip(step) {
+            if change != 0.0 {
+                *value = variable.value(variable.coordinate(*value) + change);
+            }
+        }
+        all_finite("the value after the step", &next.values)?;
+        self.state = next;
+        Ok(())
+    }
+
     /// Takes one step against `gradient`, with every learning rate times `factor`.
     ///
     /// # Errors
-    /// When the gradient has another length, or is not finite, or so is the value that a step leads to;
-    /// nothing changes then.
+    /// When the gradient has another length, or is not finite, or so is the value that a step leads to, or
+    /// the method needs more; nothing changes then.
     pub fn step(&mut self, gradient: &[f64], factor: f64) -> Result<(), OptimizeError> {
         same_length("the gradient", self.variables.len(), gradient)?;
         all_finite("the gradient", gradient)?;
@@ -101,8 +150,11 @@ impl Optimizer {
         }
         for (i, variable) in self.variables.iter().enumerate() {
             let value = next.values[i];
-            let g = variable.chain(value, gradient[i]);
-            let step = self.method.step(g, &mut next.first[i], &mut next.second[i], next.unseen);
+            let g = gradient[i] * variable.slope(value);
+            let step = self
+                .method
+                .step(g, &mut next.first[i], &mut next.second[i], next.unseen)
+                .ok_or(OptimizeError::NoCurvature)?;
             let rate = variable.learning_rate * factor;
             if rate != 0.0 {
                 next.values[i] = variable.value(variable.coordinate(value) - rate * step);
@@ -116,14 +168,18 @@ impl Optimizer {
     }
 }
 
-fn same_length(what: &'static str, expected: usize, list: &[f64]) -> Result<(), OptimizeError> {
+pub(super) fn same_length(
+    what: &'static str,
+    expected: usize,
+    list: &[f64],
+) -> Result<(), OptimizeError> {
     if list.len() == expected {
         return Ok(());
     }
     Err(OptimizeError::Length { what, expected, found: list.len() })
 }
 
-fn all_finite(what: &'static str, list: &[f64]) -> Result<(), OptimizeError> {
+pub(super) fn all_finite(what: &'static str, list: &[f64]) -> Result<(), OptimizeError> {
     match list.iter().position(|v| !v.is_finite()) {
         None => Ok(()),
         Some(variable) => Err(OptimizeError::NotFinite { variable, what }),

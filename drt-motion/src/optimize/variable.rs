@@ -61,8 +61,21 @@ impl Variable {
         value.clamp(self.lower, self.upper)
     }
 
-    /// The derivative by the coordinate, from that by the value.
-    pub(super) fn chain(&self, value: f64, gradient: f64) -> f64 {
-        if self.logarithmic { gradient * value } else { gradient }
+    /// The derivative of the value by the coordinate.
+    pub(super) fn slope(&self, value: f64) -> f64 {
+        if self.logarithmic { value } else { 1.0 }
+    }
+
+    /// How far the coordinate may move from that of `value`, by at most `rate` and within the bounds.
+    pub(super) fn limits(&self, value: f64, rate: f64) -> [f64; 2] {
+        let from = self.coordinate(value);
+        // Bounds that are not positive do not limit a logarithm from below.
+        let low = if self.logarithmic && self.lower <= 0.0 {
+            f64::NEG_INFINITY
+        } else {
+            self.coordinate(self.lower)
+        };
+        let high = self.coordinate(self.upper);
+        [(low - from).clamp(-rate, 0.0), (high - from).clamp(0.0, rate)]
     }
 }

@@ -40,6 +40,9 @@ pub(super) struct Checkpoint {
     pub(super) optimizer: State,
     /// Iterations in a row in which each parameter changed nothing.
     pub(super) blind: Vec<u32>,
+    /// True when all iterations were made and the last values were looked at.
+    #[serde(default)]
+    pub(super) complete: bool,
     /// Of all runs so far.
     pub(super) seconds: f64,
     pub(super) cpu_seconds: f64,

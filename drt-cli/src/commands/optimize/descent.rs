@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use drt_estimators::fit::{Evaluation, Fit};
-use drt_motion::optimize::Optimizer;
+use drt_motion::optimize::{Method, Observation, OptimizeError, Optimizer};
 
 use super::checkpoint::{Checkpoint, Fingerprint};
 use super::gallery::Gallery;
@@ -36,6 +36,8 @@ pub(super) struct Descent<'a> {
     clock: Clock,
     /// Spent before this run.
     before: [f64; 2],
+    /// Nothing was left to do: what is spent on looking at it again does not count.
+    again: bool,
 }
 
 impl<'a> Descent<'a> {
@@ -50,19 +52,21 @@ impl<'a> Descent<'a> {
             None => None,
         };
         let count = problem.job.parameters.len();
-        let (optimizer, history, blind, before) = match stored {
+        let (optimizer, history, blind, before, again) = match stored {
             None => {
                 let start = problem.start();
                 let optimizer = Optimizer::new(plan.method, plan.variables.clone(), &start);
                 let history = History { values: vec![start], losses: Vec::new() };
-                (optimizer, history, vec![0; count], [0.0; 2])
+                (optimizer, history, vec![0; count], [0.0; 2], false)
             }
             Some((folder, stored)) => {
                 let history = History::read(folder, stored.optimizer.steps as usize, count)?;
                 let before = [stored.seconds, stored.cpu_seconds];
+                let enough = stored.optimizer.steps >= u64::from(problem.iterations);
+                let again = stored.complete && enough;
                 let optimizer =
                     Optimizer::resume(plan.method, plan.variables.clone(), stored.optimizer);
-                (optimizer, history, stored.blind, before)
+                (optimizer, history, stored.blind, before, again)
             }
         };
         let optimizer = optimizer.map_err(refuse)?;
@@ -71,7 +75,7 @@ impl<'a> Descent<'a> {
             remove_drafts(folder);
         }
         let gallery = folder.map(|folder| Gallery::new(problem, folder));
-        Ok(Self { problem, fingerprint, optimizer, history, watch, gallery, clock, before })
+        Ok(Self { problem, fingerprint, optimizer, history, watch, gallery, clock, before, again })
     }
 
     /// Steps taken.
@@ -162,6 +166,7 @@ impl<'a> Descent<'a> {
         let Some(gallery) = &self.gallery else { return Ok(()) };
         if i == 0 {
             create(self.problem.plan.checkpoint.as_deref())?;
+            gallery.clear();
             gallery.targets()?;
         }
         gallery.keep(i, evaluation)
@@ -171,8 +176,7 @@ impl<'a> Descent<'a> {
         let factor = self.problem.plan.decay.factor(i, self.problem.iterations);
         let before = self.optimizer.clone();
         let stepped = self
-            .optimizer
-            .step(&evaluation.gradient(), factor)
+            .step_by(i, evaluation, factor)
             .map_err(|e| CliError::unsolved(format!("iteration {i}: {e}")));
         if let Err(error) = stepped.and_then(|()| self.watch.step(i, self.optimizer.values(), fit))
         {
@@ -182,6 +186,24 @@ impl<'a> Descent<'a> {
         }
         self.history.values.push(self.optimizer.values().to_vec());
         Ok(())
+    }
+
+    fn step_by(&mut self, i: u32, seen: &Evaluation, factor: f64) -> Result<(), OptimizeError> {
+        let gradient = seen.gradient();
+        if !matches!(self.problem.plan.method, Method::GaussNewton { .. }) {
+            return self.optimizer.step(&gradient, factor);
+        }
+        let (curvature, noise) = (&seen.curvature(), &seen.curvature_noise());
+        let weight = f64::from(self.problem.spp(i));
+        self.optimizer
+            .step_by(&Observation { gradient: &gradient, curvature, noise, weight }, factor)
+    }
+
+    /// How well the values are known, by what was seen last: by the noise of all that their last step
+    /// followed from, where that is an average.
+    pub(super) fn uncertainty(&self, seen: &Evaluation) -> Option<Vec<f64>> {
+        let averaging = self.optimizer.averaging().unwrap_or(1.0);
+        Some(seen.uncertainty()?.into_iter().map(|u| averaging * u).collect())
     }
 
     /// Stores how far it came before it failed.
@@ -207,6 +229,7 @@ impl<'a> Descent<'a> {
             fingerprint: self.fingerprint,
             optimizer: self.optimizer.state().clone(),
             blind: self.watch.blind.clone(),
+            complete: self.history.losses.len() > self.problem.iterations as usize,
             seconds,
             cpu_seconds,
         };
@@ -227,7 +250,7 @@ impl<'a> Descent<'a> {
             history: &self.history,
             gallery,
             steps: self.steps(),
-            uncertainty: seen.uncertainty(),
+            uncertainty: self.uncertainty(seen),
             left: seen.newton_step(),
             spent: self.spent(),
             failure,
@@ -236,8 +259,11 @@ impl<'a> Descent<'a> {
         write_atomically(&folder.join(report::FILE), |out| Ok(out.write_all(page.as_bytes())?))
     }
 
-    /// Wall and processor time of this run and those before.
+    /// Wall and processor time of this run and those before, as far as they brought it on.
     fn spent(&self) -> [f64; 2] {
+        if self.again {
+            return self.before;
+        }
         [self.before[0] + self.clock.seconds(), self.before[1] + self.clock.cpu_seconds()]
     }
 }

@@ -50,6 +50,17 @@ impl<'a> Gallery<'a> {
         self.file(view, &format!("derivative-{parameter:03}"))
     }
 
+    /// Removes what a run that began anew left of another: images of iterations that this one may not keep.
+    pub(super) fn clear(&self) {
+        let Ok(entries) = std::fs::read_dir(self.folder) else { return };
+        for entry in entries.flatten() {
+            if is_frame(&entry.file_name().to_string_lossy()) {
+                // One that stays does no harm.
+                let _ = std::fs::remove_file(entry.path());
+            }
+        }
+    }
+
     /// Stores the targets.
     pub(super) fn targets(&self) -> Result<(), CliError> {
         for (v, view) in self.problem.views.iter().enumerate() {
@@ -102,6 +113,14 @@ impl<'a> Gallery<'a> {
         }
         Ok(())
     }
+}
+
+/// True for the names that [`Gallery::frame`] gives.
+fn is_frame(name: &str) -> bool {
+    let numbers = name.strip_prefix("frame-").and_then(|rest| rest.strip_suffix(".png"));
+    numbers.is_some_and(|n| {
+        n.split('-').all(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    })
 }
 
 fn write(path: &Path, size: [u32; 2], pixels: &[Pixel]) -> Result<(), CliError> {

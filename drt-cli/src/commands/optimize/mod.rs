@@ -71,12 +71,15 @@ fn write(
 
 /// The values reached, and how well they are known.
 fn summary(problem: &Problem<'_>, descent: &Descent<'_>, last: Option<&Evaluation>) -> String {
-    let uncertainty = last.and_then(Evaluation::uncertainty);
+    let uncertainty = last.and_then(|seen| descent.uncertainty(seen));
     let line = |(p, (name, value)): (usize, (&str, &f64))| match &uncertainty {
         Some(u) => format!("{name} = {value:.6} ± {:.1e}\n", u[p]),
         None => format!("{name} = {value:.6}\n"),
     };
     let mut text: String = problem.names().zip(descent.values()).enumerate().map(line).collect();
+    if last.is_some() && uncertainty.is_none() {
+        text += "± not known: the derivatives do not tell these parameters apart\n";
+    }
     if descent.steps() < problem.iterations {
         let (steps, n) = (descent.steps(), problem.iterations);
         text += &match &problem.plan.checkpoint {

@@ -6,6 +6,7 @@ mod embed;
 use std::fmt::Write as _;
 
 use chart::Chart;
+use drt_motion::optimize::Method;
 use embed::figure;
 
 use super::gallery::Gallery;
@@ -101,10 +102,20 @@ impl Report<'_> {
                 variable.learning_rate
             );
         }
+        let averages = match self.problem.plan.method {
+            Method::GaussNewton { .. } => {
+                "<b>±</b> is how far the noise of the averages that Gauss-Newton steps follow from \
+                 leads them astray, and the learning rate the longest step"
+            }
+            _ => {
+                "<b>±</b> is how far the noise of that iteration alone would lead it astray; a fit \
+                 averages over many"
+            }
+        };
         text + "</table>\n<p><b>left</b> is what a Newton step from here would add, by the last \
-                iteration's image and derivatives, and <b>±</b> how far their noise alone would \
-                lead it astray; a fit averages over many iterations. Both are unknown where \
-                derivatives do not tell parameters apart.</p>\n"
+                iteration's image and derivatives. "
+            + averages
+            + ". Both are unknown where derivatives do not tell parameters apart.</p>\n"
     }
 
     fn curves(&self) -> String {
