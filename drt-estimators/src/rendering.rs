@@ -53,9 +53,10 @@ pub enum Term {
     Interior,
     /// Visibility from the camera, and jumps of the pixel filter.
     Primary,
-    /// Visibility between an emitter and the first vertex it lights.
+    /// Visibility between an emitter and the first vertex it lights; of
+    /// [`EstimatorKind::Radiative`](crate::EstimatorKind::Radiative) the edges that the first scattering vertex sees.
     Direct,
-    /// Visibility between scattering vertices.
+    /// Visibility between scattering vertices; or the edges that later ones see.
     Indirect,
     /// Flux of scattering through moving surfaces around a static inside.
     Flux,
