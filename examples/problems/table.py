@@ -39,6 +39,8 @@ class Problem:
     peer_iterations: int
     sensors: tuple = (None,)
     define: tuple = ()
+    more: tuple = ()
+    """Options of its own."""
 
     def folder(self, name):
         return (EXAMPLES / self.job).parent.joinpath(*self.run(name))
@@ -110,7 +112,7 @@ def fit(name, problem, options):
             drt(options, "render", job, *values, *defines, *sees, "--seed", 1, "--spp", problem.spp, "--output", target)
     line = ["optimize", job, *defines, "--set", f"optimize.targets={json.dumps(targets)}"]
     line += ["--set", f"optimize.checkpoint={json.dumps('/'.join(problem.run(name)))}"]
-    drt(options, *line, *(["--restart"] if options.again else []))
+    drt(options, *line, *problem.more, *(["--restart"] if options.again else []))
     with open(folder / "params.csv", newline="") as file:
         rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
     seconds = json.loads((folder / "checkpoint.json").read_text())["cpu_seconds"]
@@ -174,7 +176,7 @@ def main():
     problems = dict(PROBLEMS)
     if options.bunny:
         mesh = f"mesh={options.bunny.resolve()}"
-        problems["bunny-scan"] = dataclasses.replace(PROBLEMS["bunny"], define=(mesh, *SCAN))
+        problems["bunny-scan"] = dataclasses.replace(PROBLEMS["bunny"], define=(mesh, *SCAN), more=("--iterations", 28))
     names = options.names or list(problems)
     for name in names:
         if name not in problems:
