@@ -197,12 +197,12 @@ impl Reservoir {
         };
         let (total, rng) = (&mut self.total, &mut self.rng);
         let (chosen, kept) = (&mut self.chosen, &mut self.part);
-        let mut meet = |face: Face, normal: Vec3, x: Vec3, t: f64, around: Option<usize>| {
+        let mut meet = |face: Face, normal: Vec3, left: f64, x: Vec3, t: f64, around: Option<usize>| {
             let cosine = Real::abs(normal.dot(dir));
-            if cosine == 0.0 {
+            if cosine == 0.0 || left == 0.0 {
                 return;
             }
-            let weight = strength / cosine;
+            let weight = strength * left / cosine;
             *total += weight;
             if rng.next_f64() * *total < weight {
                 let segments = segments + 1;
@@ -226,11 +226,15 @@ impl Reservoir {
         let end = ray.end.iter().map(|(point, x)| (*point, *x, ray.length, None));
         for (point, x, t, after) in crossings.chain(end) {
             let before = core::mem::replace(&mut around, after);
-            let has_side = |front| filled(world, &point, front, before).is_some();
-            let near = point.ng.dot(dir) < 0.0;
-            let null = world.is_null(point.shape);
-            if sweeps(point.shape) && (has_side(near) || (null && has_side(!near))) {
-                meet(Face::Surface(point), point.ng, x, t, before);
+            let cosine = point.ng.dot(dir);
+            let of_side = |front| {
+                let medium = filled(world, &point, front, before);
+                medium.map_or(0.0, |m| 1.0 - world.grip(m, cosine))
+            };
+            let near = cosine < 0.0;
+            let beyond = if world.is_null(point.shape) { of_side(!near) } else { 0.0 };
+            if sweeps(point.shape) {
+                meet(Face::Surface(point), point.ng, f64::max(of_side(near), beyond), x, t, before);
             }
         }
         if !grids.contains(&true) {
@@ -240,7 +244,7 @@ impl Reservoir {
             let Some(m) = i.medium.filter(|m| grid_sweeps(*m)) else { continue };
             let part = drt_medium::Ray::new(origin + dir * i.start, dir, i.end - i.start);
             world.medium(m).crossings(&part, |c| {
-                meet(Face::Grid(m, c.normal), c.normal, part.at(c.t), i.start + c.t, Some(m));
+                meet(Face::Grid(m, c.normal), c.normal, 1.0, part.at(c.t), i.start + c.t, Some(m));
             });
         }
     }
@@ -280,11 +284,15 @@ impl Reservoir {
                     }
                     let medium = filled(world, &point, front, m.around);
                     let Some(medium) = medium else { continue };
+                    let left = 1.0 - world.grip(medium, cosine);
+                    if left == 0.0 {
+                        continue;
+                    }
                     let vertex = world.touching(point, m.x, front, medium);
                     // The vertex is left behind at n·(u_Σ - u), n from the medium's side across.
                     let n = if front { -point.ng } else { point.ng };
                     let rate = Rate::Surface(point.material(), n);
-                    self.send(tracer, &m, vertex, rate, n, tau * scale, &mut add);
+                    self.send(tracer, &m, vertex, rate, n, tau * (scale * left), &mut add);
                 }
             }
         }

@@ -70,6 +70,7 @@ impl Prepared {
     ) -> Result<Self, Error> {
         if interest.moves_geometry() {
             world.prepare_holds();
+            world.prepare_tows();
         }
         // Grids that move sweep over what stands still.
         let flux = (interest.moves_geometry() || interest.grids.contains(&true))

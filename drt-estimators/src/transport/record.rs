@@ -7,6 +7,7 @@ use core::ops::Range;
 use drt_math::{Rgb, Vec3};
 
 use super::hold::Hold;
+use super::tow::{self, Met, Tow};
 use super::trace::{Arrival, Connection, Endpoint, Leaving, Observer};
 use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, RayPath, World};
@@ -29,6 +30,8 @@ pub(crate) struct Node {
     pub(crate) carried: bool,
     /// What keeps it, if it moves, from being carried, in the spatial form.
     pub(crate) hold: Hold,
+    /// What tows it, in the spatial form.
+    pub(crate) tows: Range<usize>,
 }
 
 impl Node {
@@ -63,6 +66,9 @@ pub(crate) struct PathRecord {
     pub(crate) flux: Reservoir,
     /// What carries vertices, where that is asked for.
     pub(crate) carriers: Carriers,
+    pub(crate) tows: Vec<Tow>,
+    /// Surfaces on the present ray, if some tow.
+    pub(crate) met: Vec<Met>,
 }
 
 impl PathRecord {
@@ -72,6 +78,7 @@ impl PathRecord {
         self.nodes.clear();
         self.crossings.clear();
         self.connections.clear();
+        self.tows.clear();
         self.value = Rgb::ZERO;
         self.nodes.push(Node {
             arrival: None,
@@ -82,6 +89,7 @@ impl PathRecord {
             inv_pdf: 1.0,
             carried: self.carriers.camera,
             hold: Hold::default(),
+            tows: 0..0,
         });
     }
 
@@ -120,6 +128,11 @@ impl Observer for PathRecord {
     fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {
         let carried = self.nodes[leaving.node as usize].carried;
         self.flux.offer(world, leaving, carried, ray);
+        let Carriers { shapes, .. } = &self.carriers;
+        let moves = |shape: u32| shapes.get(shape as usize) == Some(&true);
+        if world.any_tows() {
+            tow::list_met(&mut self.met, ray, leaving.dir, |point| carried || moves(point.shape));
+        }
     }
 
     fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
@@ -132,7 +145,14 @@ impl Observer for PathRecord {
             _ => false,
         };
         let (brought, on_mover) = (self.nodes[arrival.parent as usize].carried, on_mover());
-        let carried = brought || on_mover;
+        let first = self.tows.len();
+        if let Endpoint::Volume(Vertex { medium: Some(m), .. }, _) = &arrival.end
+            && let Some(reach) = world.reach(*m)
+        {
+            self.tows.extend(tow::tows(&self.met, arrival.distance, reach));
+        }
+        let tows = first..self.tows.len();
+        let carried = brought || on_mover || !tows.is_empty();
         let hold = if carried { hold_of(world, self.pixel, arrival) } else { Hold::default() };
         self.nodes.push(Node {
             arrival: Some(*arrival),
@@ -143,6 +163,7 @@ impl Observer for PathRecord {
             inv_pdf: 0.0,
             carried,
             hold,
+            tows,
         });
         self.nodes.len() as u32 - 1
     }

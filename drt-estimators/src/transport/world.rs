@@ -134,6 +134,8 @@ pub(crate) struct World {
     /// How far light can go in each medium, at most.
     extent: Vec<f64>,
     pub(super) holds: Holds,
+    /// How far surfaces tow in each medium, where they do.
+    pub(super) reaches: Vec<Option<f64>>,
     /// Where set, no discrete choice depends on values that may differ between this scene and
     /// another: the extinctions by which distances in homogeneous media are drawn instead of their
     /// own.
@@ -195,6 +197,7 @@ impl World {
             needs: Needs::default(),
             extent: (0..scene.media.len()).map(|m| extent(&scene, m, 2.0 * radius)).collect(),
             holds: Holds::default(),
+            reaches: Vec::new(),
             steady: like
                 .map(|w| w.scene.media.iter().map(|m| m.item.homogeneous().copied()).collect()),
             max_depth: depth,

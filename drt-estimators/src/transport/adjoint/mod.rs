@@ -295,6 +295,10 @@ impl<'w> Differentiator<'w> {
                         here.n += held.n;
                         here.j += held.j;
                     }
+                    let tows = &record.tows[record.nodes[k].tows.clone()];
+                    if !tows.is_empty() {
+                        turn += self.tow(tows, &path, v, here.u, weight, &mut there, sink);
+                    }
                     turn += self.land(&path, v, hold, here, matter, weight, &mut there, sink);
                 }
                 if p == 0 {

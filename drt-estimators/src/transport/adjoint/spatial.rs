@@ -30,6 +30,7 @@ use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::transport::hold::Hold;
 use crate::transport::record::PathRecord;
+use crate::transport::tow::Tow;
 use crate::transport::vertex::{Kind, SurfacePoint, Vertex};
 use crate::transport::world::World;
 
@@ -67,6 +68,30 @@ impl Differentiator<'_> {
         back * path.length
     }
 
+    /// What [tows](crate::transport::tow) a volume vertex at the far end of a stretch: leaves its surfaces'
+    /// sensitivities, `weight` of light passing and `here` being that to the vertex's velocity. Adds that of
+    /// the near end, and returns that of the direction's rate.
+    pub(super) fn tow<S: AdjointSink>(
+        &self,
+        tows: &[Tow],
+        path: &Stretch<'_>,
+        end: &Vertex,
+        here: RgbVec,
+        weight: Rgb,
+        near: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> RgbVec {
+        let along = here.dot(path.dir)
+            - self.world.sigma_t_at_border(end.medium, end.x, -path.dir) * weight;
+        let mut turn = RgbVec::ZERO;
+        for tow in tows {
+            let g = pull(tow, path.dir, along * tow.share + weight * tow.slope, sink);
+            near.u -= g;
+            turn -= g * tow.distance;
+        }
+        turn
+    }
+
     /// Sends the sensitivity `adjoint` to the velocity of the point at distance `t` of the ray that left
     /// `node`.
     pub(crate) fn carry_back<S: AdjointSink>(
@@ -95,6 +120,12 @@ impl Differentiator<'_> {
                 u = back;
             }
             turn = u * arrival.distance;
+            let along = u.dot(arrival.dir);
+            for tow in &record.tows[node.tows.clone()] {
+                let g = pull(tow, arrival.dir, along * tow.share, sink);
+                u -= g;
+                turn -= g * tow.distance;
+            }
             k = arrival.parent as usize;
         }
         self.camera_ray(record, u, turn, &Default::default(), sink);
@@ -126,6 +157,17 @@ impl Differentiator<'_> {
             gradient(origin.b, turn.b, &seen[2]),
         ]);
     }
+}
+
+/// Sends the sensitivity `g` to the speed along `dir` at which a ray's distance to a surface grows; returns
+/// that to the surface's velocity, which the ray's own opposes.
+fn pull<S: AdjointSink>(tow: &Tow, dir: Vec3, g: Rgb, sink: &mut S) -> RgbVec {
+    let n = tow.point.ng;
+    let u = g.outer(n / n.dot(dir));
+    if sink.interest().shapes[tow.point.shape as usize] {
+        sink.surface(&tow.point.material(), &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
+    }
+    u
 }
 
 /// Sensitivities of a point where a ray along `dir` lands, `shift` to the velocity of matter less that of
