@@ -136,6 +136,8 @@ struct Meeting {
     /// The medium the ray arrived in.
     around: Option<usize>,
     throughput: Rgb,
+    /// What surfaces that [tow](crate::transport::tow) leave to the flux, before and beyond the face.
+    left: [f64; 2],
     /// Segments up to the surface.
     segments: u32,
     weight: f64,
@@ -197,12 +199,13 @@ impl Reservoir {
         };
         let (total, rng) = (&mut self.total, &mut self.rng);
         let (chosen, kept) = (&mut self.chosen, &mut self.part);
-        let mut meet = |face: Face, normal: Vec3, left: f64, x: Vec3, t: f64, around: Option<usize>| {
+        let mut meet = |face: Face, normal: Vec3, x: Vec3, t: f64, around: Option<usize>, left: [f64; 2]| {
             let cosine = Real::abs(normal.dot(dir));
-            if cosine == 0.0 || left == 0.0 {
+            let most = f64::max(left[0], left[1]);
+            if cosine == 0.0 || most == 0.0 {
                 return;
             }
-            let weight = strength * left / cosine;
+            let weight = strength * most / cosine;
             *total += weight;
             if rng.next_f64() * *total < weight {
                 let segments = segments + 1;
@@ -215,6 +218,7 @@ impl Reservoir {
                     x,
                     around,
                     throughput,
+                    left,
                     segments,
                     weight,
                 });
@@ -222,20 +226,26 @@ impl Reservoir {
             }
         };
         let mut around = ray.medium;
+        let mut start = 0.0;
         let crossings = ray.crossings.iter().map(|c| (c.point, c.x, c.t, c.after));
         let end = ray.end.iter().map(|(point, x)| (*point, *x, ray.length, None));
-        for (point, x, t, after) in crossings.chain(end) {
+        let mut surfaces = crossings.chain(end).peekable();
+        while let Some((point, x, t, after)) = surfaces.next() {
             let before = core::mem::replace(&mut around, after);
-            let cosine = point.ng.dot(dir);
-            let of_side = |front| {
-                let medium = filled(world, &point, front, before);
-                medium.map_or(0.0, |m| 1.0 - world.grip(m, cosine))
-            };
-            let near = cosine < 0.0;
-            let beyond = if world.is_null(point.shape) { of_side(!near) } else { 0.0 };
-            if sweeps(point.shape) {
-                meet(Face::Surface(point), point.ng, f64::max(of_side(near), beyond), x, t, before);
+            let stretches = [t - start, surfaces.peek().map_or(f64::INFINITY, |next| next.2) - t];
+            start = t;
+            if !sweeps(point.shape) {
+                continue;
             }
+            let cosine = point.ng.dot(dir);
+            let near = cosine < 0.0;
+            let left = |front: bool, length: f64| {
+                let medium = filled(world, &point, front, before);
+                medium.map_or(0.0, |m| 1.0 - world.grip(m, cosine, length))
+            };
+            let beyond = world.is_null(point.shape).then(|| left(!near, stretches[1]));
+            let left = [left(near, stretches[0]), beyond.unwrap_or(0.0)];
+            meet(Face::Surface(point), point.ng, x, t, before, left);
         }
         if !grids.contains(&true) {
             return;
@@ -244,7 +254,7 @@ impl Reservoir {
             let Some(m) = i.medium.filter(|m| grid_sweeps(*m)) else { continue };
             let part = drt_medium::Ray::new(origin + dir * i.start, dir, i.end - i.start);
             world.medium(m).crossings(&part, |c| {
-                meet(Face::Grid(m, c.normal), c.normal, 1.0, part.at(c.t), i.start + c.t, Some(m));
+                meet(Face::Grid(m, c.normal), c.normal, part.at(c.t), i.start + c.t, Some(m), [1.0; 2]);
             });
         }
     }
@@ -275,16 +285,10 @@ impl Reservoir {
             }
             Face::Surface(point) => {
                 let cosine = point.ng.dot(m.dir);
-                let null = world.is_null(point.shape);
                 let scale = self.total / m.weight / Real::abs(cosine);
-                for front in [false, true] {
-                    // Behind an opaque surface nothing is seen.
-                    if !null && front == (cosine > 0.0) {
-                        continue;
-                    }
-                    let medium = filled(world, &point, front, m.around);
-                    let Some(medium) = medium else { continue };
-                    let left = 1.0 - world.grip(medium, cosine);
+                let near = cosine < 0.0;
+                for (front, left) in [(near, m.left[0]), (!near, m.left[1])] {
+                    let Some(medium) = filled(world, &point, front, m.around) else { continue };
                     if left == 0.0 {
                         continue;
                     }

@@ -130,6 +130,7 @@ impl Observer for PathRecord {
         self.flux.offer(world, leaving, carried, ray);
         let Carriers { shapes, .. } = &self.carriers;
         let moves = |shape: u32| shapes.get(shape as usize) == Some(&true);
+        self.met.clear();
         if world.any_tows() {
             tow::list_met(&mut self.met, ray, leaving.dir, |point| carried || moves(point.shape));
         }

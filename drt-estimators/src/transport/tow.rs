@@ -33,7 +33,14 @@ use drt_math::{Real, Vec3, fm};
 use super::vertex::SurfacePoint;
 use super::world::{RayPath, World};
 
-fn reach_() -> f64 { std::env::var("REACH").ok().and_then(|v| v.parse().ok()).unwrap_or(1.0) }
+/// Cosine from which on surfaces tow with all of their speed.
+const GRAZING: f64 = 0.3;
+
+/// Depth of medium before or behind them from which on they do.
+const THIN: f64 = 1.0;
+
+/// How far they tow, in mean free paths.
+const FARTHEST: f64 = 3.0;
 
 /// A surface that tows a volume vertex.
 #[derive(Clone, Copy, Debug)]
@@ -52,8 +59,8 @@ pub(crate) struct Tow {
 pub(crate) struct Met {
     point: SurfacePoint,
     distance: f64,
-    /// ψ, or 0 where it does not tow.
-    grip: f64,
+    /// Of the ray with its normal; 0 where it does not tow.
+    cosine: f64,
 }
 
 impl World {
@@ -61,7 +68,7 @@ impl World {
     pub(crate) fn prepare_tows(&mut self) {
         let reach = |m: usize| {
             let sigma_t = self.medium(m).homogeneous()?.coefficients().sigma_t.mean();
-            (sigma_t > 0.0).then_some(reach_() / sigma_t)
+            (sigma_t > 0.0).then_some(1.0 / sigma_t)
         };
         self.reaches = (0..self.scene.media.len()).map(reach).collect();
     }
@@ -76,18 +83,19 @@ impl World {
         self.reaches.get(medium).copied().flatten()
     }
 
-    /// ψ of a surface that is met at a `cosine`, in a medium.
-    pub(crate) fn grip(&self, medium: usize, cosine: f64) -> f64 {
-        if self.reach(medium).is_some() { grip(cosine) } else { 0.0 }
+    /// ψ of a surface that a ray meets at a `cosine` after, or before, a `length` in a medium.
+    pub(crate) fn grip(&self, medium: usize, cosine: f64, length: f64) -> f64 {
+        self.reach(medium).map_or(0.0, |reach| grip(cosine, length / reach))
     }
 }
 
-fn grip(cosine: f64) -> f64 {
-    let q = f64::min(Real::abs(cosine) / graz(), 1.0);
-    q * q * (3.0 - 2.0 * q)
+fn grip(cosine: f64, depth: f64) -> f64 {
+    let rise = |q: f64| {
+        let q = f64::min(q, 1.0);
+        q * q * (3.0 - 2.0 * q)
+    };
+    rise(Real::abs(cosine) / GRAZING) * rise(depth / THIN)
 }
-fn graz() -> f64 { std::env::var("GRAZ").ok().and_then(|v| v.parse().ok()).unwrap_or(0.3) }
-fn far() -> f64 { std::env::var("FAR").ok().and_then(|v| v.parse().ok()).unwrap_or(3.0) }
 
 /// Lists the surfaces on a ray along `dir`, of which `tows` says whether they tow, unless none does.
 pub(super) fn list_met(
@@ -100,10 +108,10 @@ pub(super) fn list_met(
     let crossings = ray.crossings.iter().map(|c| (c.point, c.t));
     let end = ray.end.iter().map(|(point, _)| (*point, ray.length));
     met.extend(crossings.chain(end).map(|(point, distance)| {
-        let grip = if tows(&point) { grip(point.ng.dot(dir)) } else { 0.0 };
-        Met { point, distance, grip }
+        let cosine = if tows(&point) { point.ng.dot(dir) } else { 0.0 };
+        Met { point, distance, cosine }
     }));
-    if met.iter().all(|m| m.grip == 0.0) {
+    if met.iter().all(|m| m.cosine == 0.0) {
         met.clear();
     }
 }
@@ -114,7 +122,7 @@ pub(super) fn tows(met: &[Met], t: f64, reach: f64) -> impl Iterator<Item = Tow>
     let (behind, ahead) = (next.checked_sub(1).and_then(|i| met.get(i)), met.get(next));
     let start = behind.map_or(0.0, |m| m.distance);
     let end = ahead.map_or(f64::INFINITY, |m| m.distance);
-    let farthest = f64::min(end - start, far() * reach);
+    let farthest = f64::min(end - start, FARTHEST * reach);
     let last = fm::exp(-farthest / reach);
     let tow = move |m: &Met| {
         let away = m.distance - t;
@@ -122,10 +130,10 @@ pub(super) fn tows(met: &[Met], t: f64, reach: f64) -> impl Iterator<Item = Tow>
         if here <= last {
             return None;
         }
-        let scale = m.grip / (1.0 - last);
+        let scale = grip(m.cosine, (end - start) / reach) / (1.0 - last);
         let slope = if away < 0.0 { -here } else { here } / reach;
         let (share, slope) = ((here - last) * scale, slope * scale);
         Some(Tow { point: m.point, distance: m.distance, share, slope })
     };
-    behind.into_iter().chain(ahead).filter(|m| m.grip > 0.0).filter_map(tow)
+    behind.into_iter().chain(ahead).filter(|m| m.cosine != 0.0).filter_map(tow)
 }
