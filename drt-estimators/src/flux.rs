@@ -17,7 +17,8 @@
 //!
 //! In the spatial form (2019 paper, Eq. 16 and 20; theory sheet §3, §6) volume vertices stand at fixed
 //! distances of their rays, u is the velocity of the ray's point at Σ, and every surface beside a
-//! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term.
+//! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term, less what surfaces
+//! [tow](crate::transport::tow) along.
 //!
 //! A grid ends at its box, where coefficients jump to zero. Faces of the box that lie inside the medium
 //! are such surfaces too, with f(+) = 0 and the velocity of the grid for u_Σ.
@@ -199,32 +200,33 @@ impl Reservoir {
         };
         let (total, rng) = (&mut self.total, &mut self.rng);
         let (chosen, kept) = (&mut self.chosen, &mut self.part);
-        let mut meet = |face: Face, normal: Vec3, x: Vec3, t: f64, around: Option<usize>, left: [f64; 2]| {
-            let cosine = Real::abs(normal.dot(dir));
-            let most = f64::max(left[0], left[1]);
-            if cosine == 0.0 || most == 0.0 {
-                return;
-            }
-            let weight = strength * most / cosine;
-            *total += weight;
-            if rng.next_f64() * *total < weight {
-                let segments = segments + 1;
-                *chosen = Some(Meeting {
-                    node,
-                    t,
-                    origin,
-                    dir,
-                    face,
-                    x,
-                    around,
-                    throughput,
-                    left,
-                    segments,
-                    weight,
-                });
-                kept.truncate_from(ray, t);
-            }
-        };
+        let mut meet =
+            |face: Face, normal: Vec3, x: Vec3, t: f64, around: Option<usize>, left: [f64; 2]| {
+                let cosine = Real::abs(normal.dot(dir));
+                let most = f64::max(left[0], left[1]);
+                if cosine == 0.0 || most == 0.0 {
+                    return;
+                }
+                let weight = strength * most / cosine;
+                *total += weight;
+                if rng.next_f64() * *total < weight {
+                    let segments = segments + 1;
+                    *chosen = Some(Meeting {
+                        node,
+                        t,
+                        origin,
+                        dir,
+                        face,
+                        x,
+                        around,
+                        throughput,
+                        left,
+                        segments,
+                        weight,
+                    });
+                    kept.truncate_from(ray, t);
+                }
+            };
         let mut around = ray.medium;
         let mut start = 0.0;
         let crossings = ray.crossings.iter().map(|c| (c.point, c.x, c.t, c.after));
@@ -254,7 +256,14 @@ impl Reservoir {
             let Some(m) = i.medium.filter(|m| grid_sweeps(*m)) else { continue };
             let part = drt_medium::Ray::new(origin + dir * i.start, dir, i.end - i.start);
             world.medium(m).crossings(&part, |c| {
-                meet(Face::Grid(m, c.normal), c.normal, part.at(c.t), i.start + c.t, Some(m), [1.0; 2]);
+                meet(
+                    Face::Grid(m, c.normal),
+                    c.normal,
+                    part.at(c.t),
+                    i.start + c.t,
+                    Some(m),
+                    [1.0; 2],
+                );
             });
         }
     }

@@ -7,7 +7,8 @@
 //! integrand jumps, and the jump moves relative to the ray, Reynolds' theorem adds a term:
 //!
 //! * in distance, at surfaces beside media: D_dot σ_s L^ins of D19.16 and D19.20, on both sides of
-//!   interfaces that do not scatter. That is the [flux](crate::flux), against rays that are carried;
+//!   interfaces that do not scatter. That is the [flux](crate::flux), against rays that are carried. In
+//!   homogeneous media most of it is taken in by vertices that surfaces [tow](crate::transport::tow);
 //! * in direction, at edges (D19.23): for an edge point y seen from a vertex x along d = (y - x)/r,
 //!   with the edge's tangent t and N = t × (-d) / |t × d|,
 //!

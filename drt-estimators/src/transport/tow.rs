@@ -1,30 +1,39 @@
 //! Surfaces that tow the volume vertices before and behind them along their rays.
 //!
-//! In the spatial form a volume vertex stands at a fixed distance t of its ray. Where the ray meets a
-//! surface at D, the domain of t ends, and scattering at the end times D_dot is a flux (2019 paper, Eqs. 16
-//! and 20). Worse, what a vertex at height h over a curved surface sees of its outline is as near as √h, and
-//! the outline moves: rates grow like 1 / √h, whose second moment is infinite like a logarithm.
+//! In the spatial form a volume vertex stands at a fixed distance t of its ray. Where the ray meets a surface that
+//! moves, the domain of t ends or begins elsewhere: a flux, D_dot times what scatters there (2019 paper, Eqs. 16 and
+//! 20). And a vertex at rest at the height h over a curved surface is as near as √h to its outline, which moves:
+//! what it sees of that grows like 1 / √h, whose second moment is infinite like a logarithm.
 //!
-//! Distances are integration variables: they may depend on the parameters, and with them go at any speed s(t)
-//! that is continuous between two surfaces. With f the integrand in t, transmittance and scattering
-//! coefficient included, on an interval [a, b] whose ends go at a_dot and b_dot,
+//! Distances are integration variables. They may go at any speed s(t) that is continuous between surfaces: with
+//! f the integrand, transmittance and scattering coefficient included, and an interval [a, b] with ends going at
+//! a_dot and b_dot,
 //!
 //! ```text
 //! d/dθ ∫ f dt = ∫ [∂f + s f' + s' f] dt + f(b) (b_dot - s(b)) - f(a) (a_dot - s(a)).
 //! ```
 //!
-//! With s(b) = b_dot = D_dot of the surface at b and s(a) = a_dot of the one at a there is no flux, and close to
-//! a surface vertices go along with it in the direction that counts, its normal:
+//! Where s(b) = b_dot there is no flux, and vertices beside a surface go along with it in the direction that
+//! counts, its normal. With the mean extinction σ of the medium, ℓ = min(b - a, 3/σ), and
 //!
 //! ```text
-//! s(t) = φ((t - a)/R) a_dot + φ((b - t)/R) b_dot,    φ(q) = max(1 - q, 0),    R = min(b - a, 1/σ_t).
+//! s(t) = ψ_a φ(t - a) a_dot + ψ_b φ(b - t) b_dot,    φ(δ) = (exp(-σδ) - exp(-σℓ)) / (1 - exp(-σℓ)) or 0,
 //! ```
 //!
-//! Nothing tows at a = 0, where the vertex that the ray left is. s f' is the motion of the vertex along
-//! the ray, which what comes after it sees like any other, with -σ_t s from the transmittance up to it.
-//! Every way of choosing distances uses the same s, so weights between them are left alone.
+//! s falls off before a surface as transmittance does: f has the factor exp(-σt), whose derivative by s is
+//! s' - σ s = ψ_b b_dot σ exp(-σℓ) / (1 - exp(-σℓ)), the same for all of the vertices there. So does the distance that
+//! free flight draws before b with a fixed random number, and the noise is that of a flux which is computed
+//! for every ray. What is left is the motion s of the vertex along the ray, which all that comes after sees
+//! like any other. Nothing tows at a = 0, the vertex that the ray left.
 //!
-//! In media with grids vertices stand still, and surfaces have their flux.
+//! b_dot has the factor 1 / cosine of the angle of incidence, s' the factor 1 / ℓ. So surfaces tow less, by
+//! ψ, those rays that graze them or have little medium before them, and the flux has 1 - ψ. Every way of
+//! choosing distances has the same s, and weights between them are not differentiated.
+//!
+//! In media with grids vertices stand still, and surfaces have all of their flux.
+
+#[cfg(all(test, feature = "std"))]
+mod tests;
 
 use alloc::vec::Vec;
 
@@ -36,10 +45,10 @@ use super::world::{RayPath, World};
 /// Cosine from which on surfaces tow with all of their speed.
 const GRAZING: f64 = 0.3;
 
-/// Depth of medium before or behind them from which on they do.
-const THIN: f64 = 1.0;
+/// The same of the depth of medium before or behind them.
+const THIN: f64 = 0.5;
 
-/// How far they tow, in mean free paths.
+/// How far they tow at most, in mean free paths.
 const FARTHEST: f64 = 3.0;
 
 /// A surface that tows a volume vertex.
@@ -59,13 +68,14 @@ pub(crate) struct Tow {
 pub(crate) struct Met {
     point: SurfacePoint,
     distance: f64,
-    /// Of the ray with its normal; 0 where it does not tow.
+    /// Between the ray and its normal; 0 where it does not tow.
     cosine: f64,
 }
 
 impl World {
     /// Lets surfaces tow.
     pub(crate) fn prepare_tows(&mut self) {
+        // A mean free path, as s falls off like transmittance.
         let reach = |m: usize| {
             let sigma_t = self.medium(m).homogeneous()?.coefficients().sigma_t.mean();
             (sigma_t > 0.0).then_some(1.0 / sigma_t)
@@ -89,6 +99,7 @@ impl World {
     }
 }
 
+/// ψ, of a depth in mean free paths.
 fn grip(cosine: f64, depth: f64) -> f64 {
     let rise = |q: f64| {
         let q = f64::min(q, 1.0);
@@ -116,21 +127,21 @@ pub(super) fn list_met(
     }
 }
 
-/// What tows a vertex at distance `t` of a ray, with a `reach`.
+/// What tows a vertex at distance `t` of a ray, in a medium where surfaces have a `reach`.
 pub(super) fn tows(met: &[Met], t: f64, reach: f64) -> impl Iterator<Item = Tow> + '_ {
     let next = met.partition_point(|m| m.distance < t);
     let (behind, ahead) = (next.checked_sub(1).and_then(|i| met.get(i)), met.get(next));
     let start = behind.map_or(0.0, |m| m.distance);
     let end = ahead.map_or(f64::INFINITY, |m| m.distance);
-    let farthest = f64::min(end - start, FARTHEST * reach);
-    let last = fm::exp(-farthest / reach);
+    let depth = (end - start) / reach;
+    let last = fm::exp(-f64::min(depth, FARTHEST));
     let tow = move |m: &Met| {
         let away = m.distance - t;
         let here = fm::exp(-Real::abs(away) / reach);
         if here <= last {
             return None;
         }
-        let scale = grip(m.cosine, (end - start) / reach) / (1.0 - last);
+        let scale = grip(m.cosine, depth) / (1.0 - last);
         let slope = if away < 0.0 { -here } else { here } / reach;
         let (share, slope) = ((here - last) * scale, slope * scale);
         Some(Tow { point: m.point, distance: m.distance, share, slope })

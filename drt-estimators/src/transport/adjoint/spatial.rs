@@ -17,6 +17,9 @@
 //! A landing point slides over its triangle with the velocity x0_dot - u. A plane's normal does not mind;
 //! an interpolated one does, and turns with the barycentric weights.
 //!
+//! In homogeneous media surfaces [tow](crate::transport::tow) the volume vertices of rays that meet them: these move
+//! along the ray by a share of D_dot.
+//!
 //! Where a surface is grazed, vertices [hold](crate::transport::hold) to their matter with a share φ, which
 //! adds φ times the material form of their segment.
 //!

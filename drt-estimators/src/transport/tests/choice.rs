@@ -1,0 +1,120 @@
+//! How vertices move in the spatial form is a choice: the sum of all terms does not depend on it, that of
+//! terms which do not choose alike does.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use drt_math::Rgb;
+use drt_math::sobol::SobolSampler;
+use drt_math::stats::Moments;
+use drt_motion::Parameter;
+
+use super::scenes::FILM;
+use crate::boundary::Receiver;
+use crate::contraction::{Contraction, Motion};
+use crate::inside::Insides;
+use crate::interior::{PixelSampler, sequence_name};
+use crate::kept::Kept;
+use crate::pixels::Sampler;
+use crate::prepared::Prepared;
+use crate::scene::Scene;
+use crate::sensitivity::Functional;
+use crate::settings::{EstimatorKind, Settings};
+use crate::splatting::Checked;
+use crate::tangents;
+use crate::transport::{Lit, World};
+
+/// A scene prepared for `kind = "radiative"`.
+pub(crate) fn prepare(scene: &Scene, motion: &Parameter, depth: u32) -> (Prepared, Motion) {
+    let (scene, tangents) =
+        tangents::apply(scene, core::slice::from_ref(motion)).expect("a valid parameter");
+    let mut kept = Kept::default();
+    let world = World::new(scene, 0, Some(depth), None, Lit::Extended, &mut kept);
+    let world = world.expect("a valid scene");
+    let insides = Insides::at_rest(&world);
+    let motion = Motion::new(tangents.seen_by(0), insides);
+    let settings = Settings { estimator: EstimatorKind::Radiative, ..Settings::default() };
+    let prepared = Prepared::new(world, &motion.interest, &[], &settings, Some(&motion));
+    (prepared.expect("a valid scene"), motion)
+}
+
+/// The derivative of the light's moment across the image: the interior term with a world made by
+/// `prepare(strengths[0])`, and all others with one by `prepare(strengths[1])`.
+fn derivative(prepare: &dyn Fn(f64) -> (Prepared, Motion), strengths: [f64; 2]) -> Moments {
+    let [rays, edges] = strengths.map(|strength| {
+        let (prepared, motion) = prepare(strength);
+        let mut batches = [Vec::new(), Vec::new()];
+        for seed in 0..BATCHES {
+            let [mut rays, mut edges] = [0.0; 2];
+            let sink = Some(Contraction::new(&prepared.world, &motion));
+            let along = prepared.along_rays();
+            let mut sampler = PixelSampler::new(&prepared.world, sink, along, seed, false, true);
+            let mut values = vec![Rgb::ZERO; along.layers(1, true)];
+            for pixel in 0..PIXELS {
+                let sequence = sequence_name(seed, pixel, 0);
+                for unit in 0..SAMPLES {
+                    sampler.sample(pixel, unit, SobolSampler::new(sequence, unit), &mut values);
+                    let weight = weight(pixel) / f64::from(SAMPLES);
+                    rays += values[1].mean() * weight;
+                    edges += values[2..].iter().map(|v| v.mean()).sum::<f64>() * weight;
+                }
+            }
+            let contraction = Contraction::new(&prepared.world, &motion);
+            let mut outlines = Checked::new(Total { contraction, sum: 0.0 });
+            for source in &prepared.sources {
+                prepared.splatter(seed).run(
+                    *source,
+                    source.stream(),
+                    SAMPLES * PIXELS,
+                    &mut outlines,
+                );
+            }
+            edges += outlines.inner.sum / f64::from(SAMPLES * PIXELS);
+            batches[0].push(rays);
+            batches[1].push(edges);
+        }
+        batches
+    });
+    let mut moments = Moments::default();
+    rays[0].iter().zip(&edges[1]).for_each(|(rays, edges)| moments.push(rays + edges));
+    moments
+}
+
+const BATCHES: u64 = 48;
+const SAMPLES: u32 = 128;
+const PIXELS: u32 = FILM[0] * FILM[1];
+
+/// Light moves across the image: some columns gain what others lose.
+fn weight(pixel: u32) -> f64 {
+    f64::from(pixel % FILM[0]) - 2.5
+}
+
+/// What lands on any pixel.
+struct Total<'a> {
+    contraction: Contraction<'a>,
+    sum: f64,
+}
+
+impl Receiver for Total<'_> {
+    fn moves(&mut self, functional: &Functional) -> bool {
+        self.contraction.evaluate(functional)
+    }
+
+    fn receive(&mut self, pixel: u32, value: Rgb) {
+        self.sum += weight(pixel) * value.mean() * self.contraction.rates[0].r;
+    }
+}
+
+/// Compares strengths of what is chosen with each other, and finds out terms that do not choose alike.
+pub(crate) fn check(prepare: &dyn Fn(f64) -> (Prepared, Motion)) {
+    let reference = derivative(prepare, [1.0; 2]);
+    let compare = |strengths: [f64; 2]| {
+        let m = derivative(prepare, strengths);
+        let error = f64::sqrt(m.variance_of_mean() + reference.variance_of_mean());
+        ((m.mean() - reference.mean()) / error, error / reference.mean())
+    };
+    let alike = [[0.0, 0.0], [3.0, 3.0]].map(compare);
+    assert!(alike.iter().all(|(z, _)| z.abs() < 4.0), "{alike:?}");
+    let unlike = compare([3.0, 0.0]);
+    assert!(unlike.0.abs() > 5.0, "{unlike:?}");
+}
