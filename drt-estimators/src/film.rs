@@ -132,7 +132,7 @@ impl Tile {
 /// In a pass, each pixel takes its samples in runs whose means are independent
 /// ([`Pass`](crate::pixels::Pass)); passes are weighted by their samples. A pass of a single run
 /// knows nothing of its error, and takes that of the others.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct PixelFilm {
     size: [u32; 2],
     layers: usize,
@@ -304,6 +304,12 @@ impl PixelFilm {
             _ => (passes.variance * (1.0 / (known * units))).map(Real::sqrt),
         };
         Estimate { mean: passes.sum * (1.0 / units), stderr }
+    }
+
+    /// The variance of a pixel's mean in one layer, averaged over colours.
+    pub(crate) fn variance(&self, pixel: u32, layer: usize) -> f64 {
+        let stderr = self.estimate(pixel as usize * self.layers + layer).stderr;
+        (stderr * stderr).mean()
     }
 
     /// The first layer of some pixels.

@@ -87,6 +87,7 @@ impl Pair<'_> {
         let filling = Filling {
             pool,
             seed,
+            allocation: None,
             sampler: || Sides {
                 samplers: [0, 1].map(|k| {
                     let along = AlongRays::default();

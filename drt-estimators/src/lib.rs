@@ -8,6 +8,7 @@ extern crate alloc;
 extern crate self as drt_estimators;
 
 mod agreement;
+mod allocation;
 mod boundary;
 mod contraction;
 pub mod emitter;

@@ -6,6 +6,7 @@ use core::ops::Range;
 use drt_math::Rgb;
 use drt_math::sobol::SobolSampler;
 
+use crate::allocation::{Allocation, MOST};
 use crate::film::{PixelFilm, Tile};
 use crate::interior::sequence_name;
 use crate::parallel::Pool;
@@ -62,20 +63,22 @@ pub(crate) trait Sampler {
 }
 
 impl Pass {
-    /// Samples `units` (counted from the start of the pass) of one run for one pixel.
+    /// Samples `units` of one run, counted from its start, for one pixel, whose runs have names for `spread`
+    /// times their length.
     pub(crate) fn sample(
         &self,
         seed: u64,
         pixel: u32,
         run: u32,
         units: Range<u32>,
+        spread: u32,
         mut each: impl FnMut(u32, SobolSampler),
     ) {
         // Runs have no more numbers than samples have, so the names of all passes differ.
         let name = sequence_name(seed, pixel, self.first + run);
-        let start = self.units(run).start;
+        let first = (self.first + self.units(run).start).wrapping_mul(spread);
         for unit in units {
-            each(self.first + unit, SobolSampler::new(name, unit - start));
+            each(first.wrapping_add(unit), SobolSampler::new(name, unit));
         }
     }
 }
@@ -106,6 +109,8 @@ fn rounds(pass: &Pass, most: u32) -> Vec<Round> {
 pub(crate) struct Filling<'a, W> {
     pub(crate) pool: &'a Pool,
     pub(crate) seed: u64,
+    /// What of the samples each pixel takes; as many as any other by default.
+    pub(crate) allocation: Option<&'a Allocation>,
     /// Makes the sampler of a piece of work.
     pub(crate) sampler: W,
 }
@@ -127,27 +132,39 @@ impl<W> Filling<'_, W> {
         let [w, h] = film.size();
         let (count, layers) = (w * h, film.layers());
         let pass = Pass::new(film.units(), units, [w, h]);
-        let rounds = rounds(&pass, (units / 16).clamp(1, u32::max(32, SLICE / count)));
+        // Pixels that take different numbers take whole runs.
+        let most = match self.allocation {
+            None => (units / 16).clamp(1, u32::max(32, SLICE / count)),
+            Some(_) => u32::MAX,
+        };
+        let rounds = rounds(&pass, most);
         let tiles = count.div_ceil(TILE);
         let range = |t: u32| t * TILE..u32::min(count, (t + 1) * TILE);
         // A film of few pixels is cut into samples as well.
         let longest = rounds.iter().map(|r| r.units.len() as u32).max().unwrap_or(1);
         let per_work = u32::max(WORK / u32::min(count, TILE), longest.div_ceil(CUTS)).max(1);
         let cuts = if tiles > CUTS { 1 } else { longest.div_ceil(per_work) };
-        let per_work = if cuts == 1 { longest } else { per_work };
         let works = tiles * cuts;
         let all = works.saturating_mul(rounds.len() as u32);
+        let spread = if self.allocation.is_some() { MOST } else { 1 };
         let work = |i: u32| {
             let (round, t, cut) = (&rounds[(i / works) as usize], i / cuts % tiles, i % cuts);
-            let end = round.units.end;
-            let at = |cut: u32| u32::min(end, round.units.start + cut * per_work);
+            let start = round.units.start - pass.units(round.run).start;
+            let given = round.units.len() as u32;
             let mut tile = Tile::new(range(t), layers);
             let mut sampler = (self.sampler)();
             let mut values = alloc::vec![Rgb::ZERO; layers];
             for pixel in range(t) {
+                let taken = self.allocation.map_or(given, |a| a.taken(pixel, given));
+                let at =
+                    |cut: u32| start + (u64::from(taken) * u64::from(cut) / u64::from(cuts)) as u32;
+                let weight = f64::from(given) / f64::from(taken);
                 let units = at(cut)..at(cut + 1);
-                pass.sample(self.seed, pixel, round.run, units, |unit, points| {
+                pass.sample(self.seed, pixel, round.run, units, spread, |unit, points| {
                     sampler.sample(pixel, unit, points, &mut values);
+                    if taken != given {
+                        values.iter_mut().for_each(|v| *v *= weight);
+                    }
                     tile.push(pixel, &values);
                 });
             }

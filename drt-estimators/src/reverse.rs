@@ -217,7 +217,8 @@ impl Reverse<'_> {
                 sink.weights = self.adjoint[pixel as usize] * scale;
             }
             for run in pass.runs() {
-                pass.sample(seed, pixel, run, pass.units(run), |unit, points| {
+                let units = 0..pass.units(run).len() as u32;
+                pass.sample(seed, pixel, run, units, 1, |unit, points| {
                     sampler.sample(pixel, unit, points, &mut values);
                 });
             }

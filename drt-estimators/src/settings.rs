@@ -71,6 +71,9 @@ pub struct Settings {
     /// does, at a cost that grows with the square of its length; `boundary_spp` then tells the camera's
     /// edges alone. Else one of a path's vertices looks, chosen by its throughput.
     pub every_vertex: bool,
+    /// Pixels whose derivatives are noisier take more of the samples, by a pilot that takes an eighth of them
+    /// and is then forgotten; `spp` is the mean. The image, where no derivative is asked for.
+    pub adaptive: bool,
     /// Finite-difference half step, in units of each parameter.
     pub step: f64,
     /// Names the random numbers: same seed, same pixel data.
@@ -94,6 +97,7 @@ impl Default for Settings {
             antithetic: true,
             guiding: true,
             every_vertex: false,
+            adaptive: false,
             step: 1e-3,
             seed: 0,
             threads: 0,

@@ -36,6 +36,8 @@ pub(super) struct Estimator {
     pub(super) guiding: Option<bool>,
     /// Of `radiative`: every vertex of a path looks for an edge, not one of them.
     pub(super) every_vertex: Option<bool>,
+    /// Noisier pixels take more samples.
+    pub(super) adaptive: Option<bool>,
     pub(super) step: Option<Spanned<f64>>,
 }
 

@@ -219,6 +219,7 @@ fn settings(
         antithetic,
         guiding,
         every_vertex,
+        adaptive,
         step,
         ..
     } = &keys.estimator;
@@ -257,6 +258,7 @@ fn settings(
     settings.antithetic = antithetic.unwrap_or(settings.antithetic);
     settings.guiding = guiding.unwrap_or(settings.guiding);
     settings.every_vertex = every_vertex.unwrap_or(settings.every_vertex);
+    settings.adaptive = adaptive.unwrap_or(settings.adaptive);
     if let Some(s) = step {
         settings.step = *s.get_ref();
         if !(settings.step > 0.0 && settings.step.is_finite()) {

@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use super::describe::describe;
 use super::{Control, FinishedTile};
+use crate::allocation::{self, Allocation};
 use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm};
 use crate::inside::{self, Insides};
@@ -30,6 +31,8 @@ pub(super) struct Part {
     pub(super) plan: Plan,
     pixels: PixelFilm,
     splats: Vec<SplatFilm>,
+    /// Which pixels take more samples, once that is known.
+    allocation: Option<Allocation>,
     pub(super) account: Account,
 }
 
@@ -84,6 +87,7 @@ impl Part {
         Ok(Self {
             pixels: PixelFilm::new(size, layers),
             splats: films,
+            allocation: None,
             account: Account::default(),
             settings,
             prepared,
@@ -96,6 +100,7 @@ impl Part {
     pub(super) fn restart(&mut self, seed: u64) {
         self.pixels.clear();
         self.splats.iter_mut().for_each(SplatFilm::clear);
+        self.allocation = None;
         self.account = Account::default();
         self.settings.seed = seed;
     }
@@ -139,7 +144,7 @@ impl Part {
         (done * per_unit, going)
     }
 
-    /// Samples every pixel `units` times more; returns how often each was.
+    /// Samples every pixel `units` times more, or so on average; returns how often each was.
     fn run_pixels(
         &mut self,
         round: &Round<'_>,
@@ -147,12 +152,51 @@ impl Part {
         tile: impl FnMut(&PixelFilm, core::ops::Range<u32>),
         progress: impl Fn(f64),
     ) -> u32 {
+        let wanted = self.settings.adaptive && self.allocation.is_none();
+        let pilot = allocation::pilot(units).filter(|_| wanted).unwrap_or(0);
+        let begun = f64::from(pilot) / f64::from(units.max(1));
+        if pilot > 0 {
+            let mut film = PixelFilm::new(self.pixels.size(), self.pixels.layers());
+            let seed = !self.settings.seed;
+            if self.fill(&mut film, seed, round, pilot, |_, _| {}, |part| progress(begun * part))
+                < pilot
+            {
+                return 0;
+            }
+            self.allocation = Some(Allocation::new(&film, self.derivative_layers()));
+        }
+        let mut film = core::mem::take(&mut self.pixels);
+        let rest = |part| progress(begun + (1.0 - begun) * part);
+        let done = self.fill(&mut film, self.settings.seed, round, units - pilot, tile, rest);
+        self.pixels = film;
+        done + pilot
+    }
+
+    /// The layers of each derivative; of the image where there are none.
+    fn derivative_layers(&self) -> impl Iterator<Item = Vec<usize>> + use<> {
+        let (layers, n) =
+            (self.pixels.layers(), self.motion.as_ref().map_or(0, Motion::parameters));
+        let image = (n == 0).then(|| alloc::vec![0]);
+        image.into_iter().chain((0..n).map(move |p| (1 + p..layers).step_by(n).collect()))
+    }
+
+    /// Takes samples of pixels; returns how many of each were finished.
+    fn fill(
+        &mut self,
+        film: &mut PixelFilm,
+        seed: u64,
+        round: &Round<'_>,
+        units: u32,
+        tile: impl FnMut(&PixelFilm, core::ops::Range<u32>),
+        progress: impl Fn(f64),
+    ) -> u32 {
         let (world, motion) = (&self.prepared.world, self.motion.as_ref());
-        let (along, seed) = (self.prepared.along_rays(), self.settings.seed);
+        let along = self.prepared.along_rays();
         let (antithetic, separate) = (self.plan.antithetic, self.settings.terms);
         let filling = Filling {
             pool: round.pool,
             seed,
+            allocation: self.allocation.as_ref(),
             sampler: || {
                 let sink = motion.map(|m| Contraction::new(world, m));
                 PixelSampler::new(world, sink, along, seed, antithetic, separate)
@@ -164,7 +208,7 @@ impl Part {
             progress(part);
             !round.control.cancelled()
         };
-        filling.fill(&mut self.pixels, units, finished, tile)
+        filling.fill(film, units, finished, tile)
     }
 
     /// Samples one splatted source in as many batches as error bars need.

@@ -1,0 +1,46 @@
+//! Samples that go where noise is: the same images and derivatives, by either estimator.
+
+mod common;
+
+use common::*;
+use drt_estimators::{EstimatorKind, Layer, Session, Settings, Unattended, agreement};
+use drt_motion::Parameter;
+
+/// The image, and its derivative.
+fn layers(estimator: EstimatorKind, adaptive: bool, seed: u64) -> [Layer; 2] {
+    let scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
+    let parameters: [Parameter<_>; 1] = [parameter("ball", 0.0, vec![moves("ball", shift())])];
+    let settings = Settings { estimator, adaptive, seed, ..Settings::default() };
+    let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
+    // Two passes, of which the second one knows what the first one's pilot saw.
+    session.run(1 << 11, &Unattended);
+    session.run(1 << 11, &Unattended);
+    let mut found = session.rendering();
+    [found.image, found.derivatives.swap_remove(0).total]
+}
+
+#[test]
+fn nothing_but_noise_depends_on_it() {
+    for kind in [EstimatorKind::PathSpace, EstimatorKind::Radiative] {
+        let (equal, adaptive) = (layers(kind, false, 1), layers(kind, true, 2));
+        for (a, b) in equal.iter().zip(&adaptive) {
+            let found = agreement(a, b, None);
+            assert!(found.agrees, "{kind:?} {found:?}");
+            let error = a.total.stderr.r.hypot(b.total.stderr.r);
+            assert!((a.total.mean.r - b.total.mean.r).abs() < 4.0 * error, "{kind:?}");
+            // Pixels that count by their samples would be seen.
+            let planted = agreement(&scaled(a), b, None);
+            assert!(!planted.agrees, "{kind:?} {planted:?}");
+        }
+    }
+}
+
+/// As if pixels that take half as many samples again counted by them.
+fn scaled(layer: &Layer) -> Layer {
+    let mut wrong = layer.clone();
+    let of = |e: &mut drt_estimators::Estimate| e.mean = e.mean * 1.5;
+    wrong.pixels.iter_mut().for_each(of);
+    wrong.blocks.iter_mut().for_each(of);
+    of(&mut wrong.total);
+    wrong
+}
