@@ -18,10 +18,11 @@
 //! to an estimate of
 //!
 //! ```text
-//! sum over its edges: weight × length × P(counts as silhouette or crease) × cosine / r^2,
+//! sum over its edges: weight × length × P(counts as silhouette or crease) × f / r^2,
 //! ```
 //!
-//! the cosine being that with the normal of a surface at x. The estimate ([`node`]) is positive
+//! f being a [sketch](crate::surface::Lobes) of how x scatters: a cosine with the normal of a surface,
+//! and lobes, as wide as the node is seen besides their own width. The estimate ([`node`]) is positive
 //! wherever an edge below may count, so nothing is lost, and 0 where it is proved that none does.
 //! Nodes have eight children, as each choice adds its error and a wide tree has few of them; leaves
 //! weigh each of their edges by what it really amounts to ([`piece`]), and so does a node with many
@@ -126,11 +127,28 @@ impl EdgeTree {
         Some(Chosen { edge: self.pieces[place].edge as usize, u: t, inv_pdf: 1.0 / pdf })
     }
 
+    /// An estimate of the integral over all segments of kernel, scattering and weight.
+    pub(crate) fn amount(&self, view: &Viewpoint) -> f64 {
+        let slack = self.slack(view);
+        let root = &self.nodes[0];
+        let top = match root.children as usize {
+            0 => &self.nodes[..1],
+            first => &self.nodes[first..],
+        };
+        let last = top.iter().position(|n| n.end == root.end).map_or(top.len(), |k| k + 1);
+        self.unit * top[..last].iter().map(|n| n.importance(view, slack)).sum::<f64>()
+    }
+
     /// The density per length of [`EdgeTree::sample`].
     pub(crate) fn pdf(&self, view: &Viewpoint, edge: usize, u: f64) -> f64 {
         let Some(place) = self.places.get(edge).filter(|p| **p != u32::MAX) else { return 0.0 };
         let found = self.descend(view, |ends, _, _| ends.iter().position(|end| place < end));
         found.map_or(0.0, |(_, pmf, stretch)| pmf * stretch.pdf(u))
+    }
+
+    /// What rounding may move places by.
+    fn slack(&self, view: &Viewpoint) -> f64 {
+        1e-15 * (self.largest + view.x.max_abs())
     }
 
     /// Goes down by choices among weights, of parts of the pieces that have the given ends. Returns
@@ -143,7 +161,7 @@ impl EdgeTree {
         if !view.x.is_finite() {
             return None;
         }
-        let slack = 1e-15 * (self.largest + view.x.max_abs());
+        let slack = self.slack(view);
         let mut pick = |ends: &[u32], weights: &[f64]| {
             let total: f64 = weights.iter().sum();
             if !(total > 0.0 && total.is_finite()) {
