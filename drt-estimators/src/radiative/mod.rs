@@ -30,6 +30,7 @@
 //! the path-space estimator and adds the two.
 
 mod chambers;
+mod choice;
 mod difference;
 mod jumps;
 mod outlines;

@@ -2,6 +2,7 @@
 
 use drt_math::{Rgb, Vec3};
 
+use super::choice::Choice;
 use super::difference::{Side, Sight};
 use super::views::{Views, viewpoint};
 use super::{AT_REST, BY_THROUGHPUT, Chosen, Look, Radiative};
@@ -115,13 +116,9 @@ impl Radiative {
         &self,
         tracer: &Tracer<'_>,
         record: &PathRecord,
-        mut u: f64,
+        u: f64,
     ) -> Option<(usize, f64)> {
-        let by_throughput = u < BY_THROUGHPUT;
-        let [from, part] =
-            if by_throughput { [0.0, BY_THROUGHPUT] } else { [BY_THROUGHPUT, 1.0 - BY_THROUGHPUT] };
-        u = (u - from) / part;
-        let (mut totals, mut chosen) = ([0.0; 2], None);
+        let mut choice = Choice::new(u, BY_THROUGHPUT);
         for (k, node) in record.nodes.iter().enumerate().skip(1) {
             let Some(arrival) = node.arrival.as_ref() else { continue };
             if k as u32 >= tracer.max_segments {
@@ -137,26 +134,11 @@ impl Radiative {
                 continue;
             }
             let amount = self.amount(tracer.world, vertex, -arrival.dir, node.carried);
-            if amount == 0.0 {
-                continue;
-            }
-            let weights = [theta, theta * amount];
-            for (total, weight) in totals.iter_mut().zip(weights) {
-                *total += weight;
-            }
-            // One number serves all: what is left of it is uniform again.
-            let of = usize::from(!by_throughput);
-            let chance = weights[of] / totals[of];
-            if u < chance {
-                chosen = Some((k, weights));
-                u /= chance;
-            } else {
-                u = (u - chance) / (1.0 - chance);
+            if amount > 0.0 {
+                choice.offer(k, [theta, theta * amount]);
             }
         }
-        let (k, [theta, amount]) = chosen?;
-        let chance = BY_THROUGHPUT * theta / totals[0] + (1.0 - BY_THROUGHPUT) * amount / totals[1];
-        Some((k, chance))
+        choice.made().map(|(k, chance, _)| (k, chance))
     }
 }
 

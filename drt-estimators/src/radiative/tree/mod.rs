@@ -24,6 +24,8 @@
 //! f being a [sketch](crate::surface::Lobes) of how x scatters: a cosine with the normal of a surface,
 //! and lobes, as wide as the node is seen besides their own width. The estimate ([`node`]) is positive
 //! wherever an edge below may count, so nothing is lost, and 0 where it is proved that none does.
+//! Near x nodes are opened first, down to their edges ([`cut`]), and the first choice is among all that
+//! this leaves.
 //! Nodes have eight children, as each choice adds its error and a wide tree has few of them; leaves
 //! weigh each of their edges by what it really amounts to ([`piece`]), and so does a node with many
 //! segments for children with few. On the edge the density is sin / r^2, exactly ([`kernel`]). A
@@ -38,6 +40,7 @@
 //! known at any point, so that the two can share samples (Veach & Guibas 1995).
 
 mod build;
+mod cut;
 mod kernel;
 mod node;
 mod piece;
@@ -49,9 +52,12 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
+use cut::Entry;
 use node::Node;
-use piece::{Piece, Stretch};
+use piece::Piece;
 pub(crate) use view::Viewpoint;
+
+use super::choice::{Choice, probability};
 
 /// An edge of a surface at which the radiance may jump that arrives at a point.
 #[derive(Clone, Copy, Debug)]
@@ -101,6 +107,9 @@ const ARITY: usize = 8;
 /// Evenly made choices in comparison with others.
 const EVEN: f64 = 0.1;
 
+/// The same of the first choice, as a part of all.
+const FIRST_EVEN: f64 = EVEN / (1.0 + EVEN);
+
 /// Most segments of a leaf: among fewer than this, the number of silhouettes is hard to guess.
 const LEAF: usize = 32;
 
@@ -108,8 +117,12 @@ impl EdgeTree {
     /// Draws a point with two uniform numbers: the first chooses the edge, what each choice leaves of
     /// it serving for the next, the second the place on it. `None` where nothing counts, or nothing
     /// is found (see [above](self)).
-    pub(crate) fn sample(&self, view: &Viewpoint, [mut u, along]: [f64; 2]) -> Option<Chosen> {
-        let (place, pmf, stretch) = self.descend(view, |_, weights, total| {
+    pub(crate) fn sample(&self, view: &Viewpoint, [u, along]: [f64; 2]) -> Option<Chosen> {
+        let slack = self.slack(view);
+        let mut first = Choice::new(u, FIRST_EVEN);
+        self.cut(view, slack, &mut |entry, weight| first.offer(entry, [entry.evenly(), weight]));
+        let (entry, pmf, mut u) = first.made()?;
+        let (place, below) = self.descend(view, slack, entry, |_, weights, total| {
             let mut target = u * total;
             let mut chosen = None;
             for (k, w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
@@ -122,28 +135,39 @@ impl EdgeTree {
             }
             chosen
         })?;
+        let piece = &self.pieces[place];
+        let stretch = piece.stretch(view, slack)?;
         let t = stretch.sample(along);
-        let pdf = pmf * stretch.pdf(t);
-        Some(Chosen { edge: self.pieces[place].edge as usize, u: t, inv_pdf: 1.0 / pdf })
+        let pdf = pmf * below * stretch.pdf(t);
+        Some(Chosen { edge: piece.edge as usize, u: t, inv_pdf: 1.0 / pdf })
     }
 
     /// An estimate of the integral over all segments of kernel, scattering and weight.
     pub(crate) fn amount(&self, view: &Viewpoint) -> f64 {
-        let slack = self.slack(view);
-        let root = &self.nodes[0];
-        let top = match root.children as usize {
-            0 => &self.nodes[..1],
-            first => &self.nodes[first..],
-        };
-        let last = top.iter().position(|n| n.end == root.end).map_or(top.len(), |k| k + 1);
-        self.unit * top[..last].iter().map(|n| n.importance(view, slack)).sum::<f64>()
+        let mut total = 0.0;
+        self.cut(view, self.slack(view), &mut |_, weight| total += weight);
+        self.unit * total
     }
 
     /// The density per length of [`EdgeTree::sample`].
     pub(crate) fn pdf(&self, view: &Viewpoint, edge: usize, u: f64) -> f64 {
         let Some(place) = self.places.get(edge).filter(|p| **p != u32::MAX) else { return 0.0 };
-        let found = self.descend(view, |ends, _, _| ends.iter().position(|end| place < end));
-        found.map_or(0.0, |(_, pmf, stretch)| pmf * stretch.pdf(u))
+        let slack = self.slack(view);
+        let (mut totals, mut holding) = ([0.0; 2], None);
+        self.cut(view, slack, &mut |entry, weight| {
+            let weights = [entry.evenly(), weight];
+            totals = [totals[0] + weights[0], totals[1] + weights[1]];
+            if entry.contains(*place) {
+                holding = Some((entry, weights));
+            }
+        });
+        let Some((entry, weights)) = holding else { return 0.0 };
+        let pmf = probability(weights, totals, FIRST_EVEN);
+        let below = self
+            .descend(view, slack, entry, |ends, _, _| ends.iter().position(|end| place < end))
+            .map_or(0.0, |(_, p)| p);
+        let stretch = self.pieces[*place as usize].stretch(view, slack);
+        stretch.map_or(0.0, |stretch| pmf * below * stretch.pdf(u))
     }
 
     /// What rounding may move places by.
@@ -151,17 +175,29 @@ impl EdgeTree {
         1e-15 * (self.largest + view.x.max_abs())
     }
 
+    /// A node's children, each with the place of its first piece.
+    fn children<'a>(
+        &'a self,
+        node: &'a Node,
+        mut begin: u32,
+    ) -> impl Iterator<Item = (&'a Node, u32)> {
+        let mut children = self.nodes[node.children as usize..].iter();
+        core::iter::from_fn(move || {
+            let child = (begin < node.end).then(|| children.next())??;
+            let from = core::mem::replace(&mut begin, child.end);
+            Some((child, from))
+        })
+    }
+
     /// Goes down by choices among weights, of parts of the pieces that have the given ends. Returns
-    /// the piece, the probability, and what of the piece counts.
+    /// the piece and the probability.
     fn descend(
         &self,
         view: &Viewpoint,
+        slack: f64,
+        from: Entry<'_>,
         mut choose: impl FnMut(&[u32], &[f64], f64) -> Option<usize>,
-    ) -> Option<(usize, f64, Stretch)> {
-        if !view.x.is_finite() {
-            return None;
-        }
-        let slack = self.slack(view);
+    ) -> Option<(usize, f64)> {
         let mut pick = |ends: &[u32], weights: &[f64]| {
             let total: f64 = weights.iter().sum();
             if !(total > 0.0 && total.is_finite()) {
@@ -170,38 +206,36 @@ impl EdgeTree {
             let k = choose(ends, weights, total)?;
             (weights[k] > 0.0).then(|| (k, weights[k] / total))
         };
-        let weigh = |piece: &Piece| piece.stretch(view, slack).map_or(0.0, |s| s.weight(view));
-        let (mut node, mut begin) = (&self.nodes[0], 0);
+        let (mut node, mut begin) = match from {
+            Entry::Node(node, begin) => (node, begin),
+            Entry::Piece(place) => return Some((place as usize, 1.0)),
+        };
         let mut pmf = 1.0;
         let (mut weights, mut ends) = ([0.0; LEAF], [0; LEAF]);
         while node.children != 0 {
             let many = (node.end - begin) as usize > ARITY * LEAF;
-            let (mut count, mut from) = (0, begin);
-            let children = &self.nodes[node.children as usize..];
-            for child in children {
+            let mut count = 0;
+            for (child, from) in self.children(node, begin) {
                 weights[count] = if many && child.children == 0 {
                     let few = &self.pieces[from as usize..child.end as usize];
-                    few.iter().map(weigh).sum::<f64>() / self.unit
+                    few.iter().map(|piece| piece.weigh(view, slack)).sum::<f64>() / self.unit
                 } else {
                     child.importance(view, slack)
                 };
-                (from, ends[count]) = (child.end, child.end);
+                ends[count] = child.end;
                 count += 1;
-                if child.end == node.end {
-                    break;
-                }
             }
             even_out(&mut weights[..count]);
             let (k, p) = pick(&ends[..count], &weights[..count])?;
             begin = if k > 0 { ends[k - 1] } else { begin };
-            (node, pmf) = (&children[k], pmf * p);
+            (node, pmf) = (&self.nodes[node.children as usize + k], pmf * p);
         }
         let pieces = &self.pieces[begin as usize..node.end as usize];
         for (k, piece) in pieces.iter().enumerate() {
-            (weights[k], ends[k]) = (weigh(piece), begin + k as u32 + 1);
+            (weights[k], ends[k]) = (piece.weigh(view, slack), begin + k as u32 + 1);
         }
         let (k, p) = pick(&ends[..pieces.len()], &weights[..pieces.len()])?;
-        Some((begin as usize + k, pmf * p, pieces[k].stretch(view, slack)?))
+        Some((begin as usize + k, pmf * p))
     }
 }
 

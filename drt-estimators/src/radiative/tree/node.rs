@@ -127,6 +127,13 @@ impl Node {
         kinds * scattering * overlap / r.max(f64::MIN_POSITIVE)
     }
 
+    /// True within some times half the box's diagonal from the box.
+    pub(super) fn is_near(&self, view: &Viewpoint, times: f64) -> bool {
+        let half = Vec3::from(self.half.map(f64::from));
+        let outside = (absolute(view.x - self.center) - half).max(Vec3::ZERO);
+        outside.length_squared() <= times * times * half.length_squared()
+    }
+
     /// The sums of what may count as what.
     fn kinds(&self, from: Vec3, distance: f64, tolerance: f64) -> f64 {
         let (normal, spread) = self.normals();

@@ -80,6 +80,11 @@ impl Piece {
             + of(back0 && back1, self.crease[1])
     }
 
+    /// What it amounts to.
+    pub(super) fn weigh(&self, view: &Viewpoint, slack: f64) -> f64 {
+        self.stretch(view, slack).map_or(0.0, |s| s.weight(view))
+    }
+
     /// What of it counts: the part above the horizon and in the cone.
     pub(super) fn stretch(&self, view: &Viewpoint, slack: f64) -> Option<Stretch> {
         let to = self.a - view.x;
@@ -107,7 +112,7 @@ impl Piece {
 
 impl Stretch {
     /// What it amounts to: the kernel's integral, less than exactly where that makes no difference.
-    pub(super) fn weight(&self, view: &Viewpoint) -> f64 {
+    fn weight(&self, view: &Viewpoint) -> f64 {
         let Kernel { near, far, .. } = self.kernel;
         let size2 = (far - near) * (far - near) * (1.0 / 12.0);
         let scattering = |t: f64| {
