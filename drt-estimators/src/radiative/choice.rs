@@ -32,15 +32,39 @@ impl<T> Choice<T> {
         }
     }
 
-    /// The item, its probability, and a uniform number; `None` where there is none.
-    pub(super) fn made(self) -> Option<(T, f64, f64)> {
+    /// The item and its probability; `None` where there is none.
+    pub(super) fn made(self) -> Option<(T, f64)> {
         let (item, weights) = self.chosen?;
-        let chance = probability(weights, self.totals, self.share);
-        (chance > 0.0 && chance.is_finite()).then_some((item, chance, self.u))
+        let [by_first, by_second] = [0, 1].map(|k| weights[k] / self.totals[k]);
+        Some((item, self.share * by_first + (1.0 - self.share) * by_second))
     }
 }
 
-/// Of choosing an item with some weights, which add up to `totals` over all.
-pub(super) fn probability(weights: [f64; 2], totals: [f64; 2], share: f64) -> f64 {
-    share * weights[0] / totals[0] + (1.0 - share) * weights[1] / totals[1]
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use drt_math::Rng;
+    use drt_math::testing::{SIGNIFICANCE, chi_square};
+
+    use super::*;
+
+    #[test]
+    fn items_come_as_often_as_is_said() {
+        let weights = [[1.0, 0.0], [0.5, 2.0], [2.0, 0.1], [0.1, 5.0]];
+        let (mut counts, mut said) = ([0; 4], [0.0; 4]);
+        let mut rng = Rng::new(2, 0, 0);
+        for _ in 0..40_000 {
+            let mut choice = Choice::new(rng.next_f64(), 0.3);
+            weights.iter().enumerate().for_each(|(k, w)| choice.offer(k, *w));
+            let (k, chance) = choice.made().expect("one of them");
+            counts[k] += 1;
+            said[k] = 40_000.0 * chance;
+        }
+        assert!(chi_square(&counts, &said) > SIGNIFICANCE, "{counts:?} {said:?}");
+        // Planted: the share of the first weight is another.
+        let mut faulty = said;
+        faulty[0] *= 1.1;
+        faulty[3] -= 0.1 * said[0];
+        assert!(chi_square(&counts, &faulty) < SIGNIFICANCE, "{counts:?} {faulty:?}");
+        assert!(Choice::<u32>::new(0.5, 0.3).made().is_none());
+    }
 }

@@ -138,7 +138,7 @@ impl Radiative {
                 choice.offer(k, [theta, theta * amount]);
             }
         }
-        choice.made().map(|(k, chance, _)| (k, chance))
+        choice.made()
     }
 }
 

@@ -11,75 +11,110 @@
 
 use super::node::Node;
 use super::view::Viewpoint;
-use super::{EdgeTree, LEAF};
+use super::{ARITY, EVEN, EdgeTree, LEAF};
 
 /// Nodes nearer than this, in half diagonals of their boxes, are opened.
 const NEAR: f64 = 1.0;
 
-/// What can be chosen first.
-#[derive(Clone, Copy)]
-pub(super) enum Entry<'a> {
-    /// A node, and the place of its first piece.
-    Node(&'a Node, u32),
-    /// A piece by its place.
-    Piece(u32),
+/// Most entries of a cut: beyond this nothing more is opened.
+const MOST: usize = 128;
+
+/// Parts of the pieces in their order, with estimates of what they amount to.
+pub(super) struct Cut {
+    weights: [f64; MOST],
+    /// The place after the last piece of each.
+    ends: [u32; MOST],
+    /// The node of each, 0 for a single piece.
+    nodes: [u32; MOST],
+    count: usize,
 }
 
-impl Entry<'_> {
-    /// Its weight where nothing is known of any: a leaf's pieces have that of a node together.
-    pub(super) fn evenly(&self) -> f64 {
-        match self {
-            Self::Node(..) => 1.0,
-            Self::Piece(_) => 1.0 / LEAF as f64,
-        }
+impl Cut {
+    pub(super) fn weights(&self) -> &[f64] {
+        &self.weights[..self.count]
     }
 
-    pub(super) fn contains(&self, place: u32) -> bool {
-        match self {
-            Self::Node(node, begin) => (*begin..node.end).contains(&place),
-            Self::Piece(own) => *own == place,
+    pub(super) fn ends(&self) -> &[u32] {
+        &self.ends[..self.count]
+    }
+
+    pub(super) fn node(&self, k: usize) -> u32 {
+        self.nodes[k]
+    }
+
+    fn add(&mut self, weight: f64, end: u32, node: u32) {
+        let k = self.count;
+        (self.weights[k], self.ends[k], self.nodes[k]) = (weight, end, node);
+        self.count += 1;
+    }
+
+    /// Gives nodes an equal share in a part of all choices. Pieces are known too well to need it.
+    pub(super) fn even_out(&mut self) {
+        let total: f64 = self.weights().iter().sum();
+        let judged = |k: &usize| self.nodes[*k] != 0 && self.weights[*k] > 0.0;
+        let share = EVEN * total / (0..self.count).filter(judged).count().max(1) as f64;
+        for (weight, node) in self.weights.iter_mut().zip(self.nodes).take(self.count) {
+            *weight += if node != 0 && *weight > 0.0 { share } else { 0.0 };
         }
     }
 }
 
 impl EdgeTree {
-    /// Goes through everything that may count, each with an estimate of what it amounts to.
-    pub(super) fn cut<'a>(
-        &'a self,
-        view: &Viewpoint,
-        slack: f64,
-        visit: &mut impl FnMut(Entry<'a>, f64),
-    ) {
-        if view.x.is_finite() {
-            self.open(&self.nodes[0], 0, view, slack, visit);
-        }
+    /// All that may count.
+    pub(super) fn cut(&self, view: &Viewpoint, slack: f64) -> Cut {
+        let mut cut = Cut { weights: [0.0; MOST], ends: [0; MOST], nodes: [0; MOST], count: 0 };
+        self.open((0, 0), 0, view, slack, &mut cut);
+        cut
     }
 
-    fn open<'a>(
-        &'a self,
-        node: &'a Node,
-        begin: u32,
+    /// An estimate of the integral over all segments of kernel, scattering and weight. Nodes are opened
+    /// as above, but for the last.
+    pub(crate) fn amount(&self, view: &Viewpoint) -> f64 {
+        let (slack, root) = (self.slack(view), &self.nodes[0]);
+        let whole = root.children == 0;
+        self.unit * if whole { root.importance(view, slack) } else { self.sum(root, view, slack) }
+    }
+
+    fn sum(&self, node: &Node, view: &Viewpoint, slack: f64) -> f64 {
+        let children = self.children(node, 0).map(|(child, _)| {
+            let weight = child.importance(view, slack);
+            let inner = weight > 0.0 && child.children != 0 && opens(child, view);
+            if inner { self.sum(child, view, slack) } else { weight }
+        });
+        children.sum()
+    }
+
+    fn open(
+        &self,
+        (node, begin): (u32, u32),
+        after: usize,
         view: &Viewpoint,
         slack: f64,
-        visit: &mut impl FnMut(Entry<'a>, f64),
+        cut: &mut Cut,
     ) {
-        if node.children == 0 {
-            let pieces = &self.pieces[begin as usize..node.end as usize];
+        let Node { children, end, .. } = self.nodes[node as usize];
+        if children == 0 {
+            let pieces = &self.pieces[begin as usize..end as usize];
             for (place, piece) in (begin..).zip(pieces) {
-                let weight = piece.weigh(view, slack) / self.unit;
-                if weight > 0.0 {
-                    visit(Entry::Piece(place), weight);
-                }
+                cut.add(piece.weigh(view, slack) / self.unit, place + 1, 0);
             }
             return;
         }
-        for (child, from) in self.children(node, begin) {
+        for (k, (child, from)) in (children..).zip(self.children(&self.nodes[node as usize], begin))
+        {
             let weight = child.importance(view, slack);
-            if weight > 0.0 && view.normal.is_none() && child.is_near(view, NEAR) {
-                self.open(child, from, view, slack, visit);
-            } else if weight > 0.0 {
-                visit(Entry::Node(child, from), weight);
+            let near = weight > 0.0 && opens(child, view);
+            // Those that come after it on its own level and above need their room.
+            let after = after + ARITY;
+            if near && cut.count + LEAF + after <= MOST {
+                self.open((k, from), after, view, slack, cut);
+            } else {
+                cut.add(weight, child.end, k);
             }
         }
     }
+}
+
+fn opens(node: &Node, view: &Viewpoint) -> bool {
+    view.normal.is_none() && node.is_near(view, NEAR)
 }

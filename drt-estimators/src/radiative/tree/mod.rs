@@ -52,12 +52,9 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
-use cut::Entry;
 use node::Node;
-use piece::Piece;
+use piece::{Piece, Stretch};
 pub(crate) use view::Viewpoint;
-
-use super::choice::{Choice, probability};
 
 /// An edge of a surface at which the radiance may jump that arrives at a point.
 #[derive(Clone, Copy, Debug)]
@@ -107,9 +104,6 @@ const ARITY: usize = 8;
 /// Evenly made choices in comparison with others.
 const EVEN: f64 = 0.1;
 
-/// The same of the first choice, as a part of all.
-const FIRST_EVEN: f64 = EVEN / (1.0 + EVEN);
-
 /// Most segments of a leaf: among fewer than this, the number of silhouettes is hard to guess.
 const LEAF: usize = 32;
 
@@ -117,12 +111,8 @@ impl EdgeTree {
     /// Draws a point with two uniform numbers: the first chooses the edge, what each choice leaves of
     /// it serving for the next, the second the place on it. `None` where nothing counts, or nothing
     /// is found (see [above](self)).
-    pub(crate) fn sample(&self, view: &Viewpoint, [u, along]: [f64; 2]) -> Option<Chosen> {
-        let slack = self.slack(view);
-        let mut first = Choice::new(u, FIRST_EVEN);
-        self.cut(view, slack, &mut |entry, weight| first.offer(entry, [entry.evenly(), weight]));
-        let (entry, pmf, mut u) = first.made()?;
-        let (place, below) = self.descend(view, slack, entry, |_, weights, total| {
+    pub(crate) fn sample(&self, view: &Viewpoint, [mut u, along]: [f64; 2]) -> Option<Chosen> {
+        let (place, pmf, stretch) = self.descend(view, |_, weights, total| {
             let mut target = u * total;
             let mut chosen = None;
             for (k, w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
@@ -135,39 +125,16 @@ impl EdgeTree {
             }
             chosen
         })?;
-        let piece = &self.pieces[place];
-        let stretch = piece.stretch(view, slack)?;
         let t = stretch.sample(along);
-        let pdf = pmf * below * stretch.pdf(t);
-        Some(Chosen { edge: piece.edge as usize, u: t, inv_pdf: 1.0 / pdf })
-    }
-
-    /// An estimate of the integral over all segments of kernel, scattering and weight.
-    pub(crate) fn amount(&self, view: &Viewpoint) -> f64 {
-        let mut total = 0.0;
-        self.cut(view, self.slack(view), &mut |_, weight| total += weight);
-        self.unit * total
+        let pdf = pmf * stretch.pdf(t);
+        Some(Chosen { edge: self.pieces[place].edge as usize, u: t, inv_pdf: 1.0 / pdf })
     }
 
     /// The density per length of [`EdgeTree::sample`].
     pub(crate) fn pdf(&self, view: &Viewpoint, edge: usize, u: f64) -> f64 {
         let Some(place) = self.places.get(edge).filter(|p| **p != u32::MAX) else { return 0.0 };
-        let slack = self.slack(view);
-        let (mut totals, mut holding) = ([0.0; 2], None);
-        self.cut(view, slack, &mut |entry, weight| {
-            let weights = [entry.evenly(), weight];
-            totals = [totals[0] + weights[0], totals[1] + weights[1]];
-            if entry.contains(*place) {
-                holding = Some((entry, weights));
-            }
-        });
-        let Some((entry, weights)) = holding else { return 0.0 };
-        let pmf = probability(weights, totals, FIRST_EVEN);
-        let below = self
-            .descend(view, slack, entry, |ends, _, _| ends.iter().position(|end| place < end))
-            .map_or(0.0, |(_, p)| p);
-        let stretch = self.pieces[*place as usize].stretch(view, slack);
-        stretch.map_or(0.0, |stretch| pmf * below * stretch.pdf(u))
+        let found = self.descend(view, |ends, _, _| ends.iter().position(|end| place < end));
+        found.map_or(0.0, |(_, pmf, stretch)| pmf * stretch.pdf(u))
     }
 
     /// What rounding may move places by.
@@ -190,14 +157,16 @@ impl EdgeTree {
     }
 
     /// Goes down by choices among weights, of parts of the pieces that have the given ends. Returns
-    /// the piece and the probability.
+    /// the piece, the probability, and what of the piece counts.
     fn descend(
         &self,
         view: &Viewpoint,
-        slack: f64,
-        from: Entry<'_>,
         mut choose: impl FnMut(&[u32], &[f64], f64) -> Option<usize>,
-    ) -> Option<(usize, f64)> {
+    ) -> Option<(usize, f64, Stretch)> {
+        if !view.x.is_finite() {
+            return None;
+        }
+        let slack = self.slack(view);
         let mut pick = |ends: &[u32], weights: &[f64]| {
             let total: f64 = weights.iter().sum();
             if !(total > 0.0 && total.is_finite()) {
@@ -206,11 +175,15 @@ impl EdgeTree {
             let k = choose(ends, weights, total)?;
             (weights[k] > 0.0).then(|| (k, weights[k] / total))
         };
-        let (mut node, mut begin) = match from {
-            Entry::Node(node, begin) => (node, begin),
-            Entry::Piece(place) => return Some((place as usize, 1.0)),
+        let mut cut = self.cut(view, slack);
+        cut.even_out();
+        let (k, mut pmf) = pick(cut.ends(), cut.weights())?;
+        let mut begin = if k > 0 { cut.ends()[k - 1] } else { 0 };
+        let stretch = |place: u32| self.pieces[place as usize].stretch(view, slack);
+        let mut node = match cut.node(k) {
+            0 => return Some((begin as usize, pmf, stretch(begin)?)),
+            node => &self.nodes[node as usize],
         };
-        let mut pmf = 1.0;
         let (mut weights, mut ends) = ([0.0; LEAF], [0; LEAF]);
         while node.children != 0 {
             let many = (node.end - begin) as usize > ARITY * LEAF;
@@ -235,7 +208,8 @@ impl EdgeTree {
             (weights[k], ends[k]) = (piece.weigh(view, slack), begin + k as u32 + 1);
         }
         let (k, p) = pick(&ends[..pieces.len()], &weights[..pieces.len()])?;
-        Some((begin as usize + k, pmf * p))
+        let place = begin + k as u32;
+        Some((place as usize, pmf * p, stretch(place)?))
     }
 }
 
