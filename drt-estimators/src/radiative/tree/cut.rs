@@ -14,7 +14,7 @@ use super::view::Viewpoint;
 use super::{ARITY, EVEN, EdgeTree, LEAF};
 
 /// Nodes nearer than this, in half diagonals of their boxes, are opened.
-const NEAR: f64 = 1.0;
+const NEAR: f64 = 0.5;
 
 /// Most entries of a cut: beyond this nothing more is opened.
 const MOST: usize = 128;
@@ -67,21 +67,15 @@ impl EdgeTree {
         cut
     }
 
-    /// An estimate of the integral over all segments of kernel, scattering and weight. Nodes are opened
-    /// as above, but for the last.
+    /// An estimate of the integral over all segments of kernel, scattering and weight.
     pub(crate) fn amount(&self, view: &Viewpoint) -> f64 {
         let (slack, root) = (self.slack(view), &self.nodes[0]);
-        let whole = root.children == 0;
-        self.unit * if whole { root.importance(view, slack) } else { self.sum(root, view, slack) }
-    }
-
-    fn sum(&self, node: &Node, view: &Viewpoint, slack: f64) -> f64 {
-        let children = self.children(node, 0).map(|(child, _)| {
-            let weight = child.importance(view, slack);
-            let inner = weight > 0.0 && child.children != 0 && opens(child, view);
-            if inner { self.sum(child, view, slack) } else { weight }
-        });
-        children.sum()
+        let sum = match (view.normal, root.children) {
+            (None, _) => self.cut(view, slack).weights().iter().sum(),
+            (_, 0) => root.importance(view, slack),
+            _ => self.children(root, 0).map(|(child, _)| child.importance(view, slack)).sum(),
+        };
+        self.unit * sum
     }
 
     fn open(
@@ -103,7 +97,7 @@ impl EdgeTree {
         for (k, (child, from)) in (children..).zip(self.children(&self.nodes[node as usize], begin))
         {
             let weight = child.importance(view, slack);
-            let near = weight > 0.0 && opens(child, view);
+            let near = weight > 0.0 && view.normal.is_none() && child.is_near(view, NEAR);
             // Those that come after it on its own level and above need their room.
             let after = after + ARITY;
             if near && cut.count + LEAF + after <= MOST {
@@ -113,8 +107,4 @@ impl EdgeTree {
             }
         }
     }
-}
-
-fn opens(node: &Node, view: &Viewpoint) -> bool {
-    view.normal.is_none() && node.is_near(view, NEAR)
 }

@@ -90,7 +90,7 @@ fn where_lobes_are() {
 #[test]
 fn near_edges() {
     let s = still_life();
-    for (k, off) in [(5, 0.02), (90, 0.05), (260, 0.002)] {
+    for (k, off) in [(5, 0.04), (90, 0.06), (260, 0.08)] {
         let s = s[k];
         let x = s.a.lerp(s.b, 0.4) + (s.faces[0] + vec3(0.1, 0.2, -0.1)) * off;
         check(&Viewpoint::new(x, None));
