@@ -20,8 +20,8 @@
 //!   one case: going around the edge from x's direction, a side is a face if one is met within half a
 //!   turn. At the camera f is the filter and importance, and d turns with the image point.
 //!
-//! Cost is linear in path length: of all vertices of a path one, in proportion to its throughput,
-//! looks for an edge, and of all surfaces met one is asked for its flux; each traces side paths that
+//! Cost is linear in path length: of all vertices of a path one, mostly in proportion to its throughput
+//! times an estimate of what edges amount to from there, looks for an edge, and of all surfaces met one is asked for its flux; each traces side paths that
 //! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
 //! [`every_vertex`](crate::Settings::every_vertex) does so with edges.)
 //!
