@@ -81,6 +81,10 @@ struct Outlines {
 /// that moves.
 const AT_REST: f64 = 0.1;
 
+/// How much more edges matter to a vertex that moves: it moves faster than what it lands on where it
+/// grazes, and what is held by others it sees wholly.
+const CARRIED: f64 = 4.0;
+
 /// The part of choices among vertices that look at throughput alone, in case edges matter more to one
 /// than it seems.
 const BY_THROUGHPUT: f64 = 0.2;

@@ -5,7 +5,7 @@ use drt_math::{Rgb, Vec3};
 use super::choice::Choice;
 use super::difference::{Side, Sight};
 use super::views::{Views, viewpoint};
-use super::{AT_REST, BY_THROUGHPUT, Chosen, Look, Radiative};
+use super::{AT_REST, BY_THROUGHPUT, CARRIED, Chosen, Look, Radiative};
 use crate::transport::record::PathRecord;
 use crate::transport::trace::Endpoint;
 use crate::transport::{MaterialPoint, Tracer, Vertex, World};
@@ -107,7 +107,11 @@ impl Radiative {
             let seen = |v: &&Views| carried || self.chambers.in_sight(world, &v.among, vertex);
             views.as_ref().filter(seen).map_or(0.0, |v| v.amount(around()))
         };
-        if carried { of(&self.all) } else { of(&self.moving) + AT_REST * of(&self.resting) }
+        if carried {
+            CARRIED * of(&self.all)
+        } else {
+            of(&self.moving) + AT_REST * of(&self.resting)
+        }
     }
 
     /// Chooses a vertex that can see an edge change: mostly in proportion to what passes it and to how
