@@ -21,8 +21,8 @@
 //!   one case: going around the edge from x's direction, a side is a face if one is met within half a
 //!   turn. At the camera f is the filter and importance, and d turns with the image point.
 //!
-//! Cost is linear in path length: of all vertices of a path one, in proportion to its throughput,
-//! looks for an edge, and of all surfaces met one is asked for its flux; each traces side paths that
+//! Cost is linear in path length: of all vertices of a path one, mostly in proportion to its throughput
+//! times an estimate of what edges amount to from there, looks for an edge, and of all surfaces met one is asked for its flux; each traces side paths that
 //! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
 //! [`every_vertex`](crate::Settings::every_vertex) does so with edges.)
 //!
@@ -30,6 +30,8 @@
 //! on surfaces, which would be edges of the vertex before. A [`Session`](crate::Session) leaves such lights to
 //! the path-space estimator and adds the two.
 
+mod chambers;
+mod choice;
 mod difference;
 mod jumps;
 mod outlines;
@@ -41,6 +43,7 @@ use alloc::vec::Vec;
 
 use drt_math::{CdfTable, Rng};
 
+use chambers::Chambers;
 use jumps::{Jump, Jumps};
 pub(crate) use vertices::Edged;
 use views::Views;
@@ -60,9 +63,10 @@ pub(crate) struct Radiative {
     moving: Option<Views>,
     /// Seen from a vertex that moves.
     all: Option<Views>,
-    /// An edge at rest counts for a vertex that stands still, too: something that moves holds what is
-    /// seen of it.
-    at_rest: bool,
+    /// At rest, before something that moves and holds what is seen of it: this counts for a vertex that
+    /// stands still, too.
+    resting: Option<Views>,
+    chambers: Chambers,
     /// Edges that can be chosen, and edges in all.
     pub(crate) count: [u64; 2],
 }
@@ -77,6 +81,14 @@ struct Outlines {
 /// How much an edge at rest matters before something that moves, to what stands still, compared to one
 /// that moves.
 const AT_REST: f64 = 0.1;
+
+/// How much more edges matter to a vertex that moves: it moves faster than what it lands on where it
+/// grazes, and what is held by others it sees wholly.
+const CARRIED: f64 = 4.0;
+
+/// The part of choices among vertices that look at throughput alone, in case edges matter more to one
+/// than it seems.
+const BY_THROUGHPUT: f64 = 0.2;
 
 /// Uniform numbers for a look from a path at an edge.
 #[derive(Clone, Copy, Debug)]
@@ -98,8 +110,6 @@ impl Look {
 /// A point on an edge.
 struct Chosen<'a> {
     jump: &'a Jump,
-    /// In the list of all.
-    index: u32,
     /// How far along the edge.
     along: f64,
     /// 1 over the density per length.
@@ -124,9 +134,8 @@ impl Outlines {
     fn sample<'a>(&self, jumps: &'a Jumps, rng: &mut Rng) -> Chosen<'a> {
         // Monotone: one number places the point among all edges.
         let s = self.table.sample(rng.next_f64());
-        let index = self.jumps[s.index];
-        let jump = &jumps.list[index as usize];
-        Chosen { jump, index, along: s.residual, inv_pdf: jump.length() / s.pmf }
+        let jump = &jumps.list[self.jumps[s.index] as usize];
+        Chosen { jump, along: s.residual, inv_pdf: jump.length() / s.pmf }
     }
 }
 
@@ -155,10 +164,22 @@ impl Radiative {
         };
         let seen = jumps.list.iter().zip(&speeds).map(|(j, s)| relative(*s) * j.seen_from(eye));
         let camera = Outlines::new(seen)?;
-        let moving = Views::new(world, &jumps, moves);
-        let all = Views::new(world, &jumps, |_| 1.0);
+        let chambers = Chambers::new(world);
+        let views = |matter: &dyn Fn(&Jump) -> f64| Views::new(world, &chambers, &jumps, matter);
+        let moving = views(&|j| if fastest > 0.0 { moves(j) / fastest } else { 0.0 });
+        let holding: Vec<u32> = (0..interest.shapes.len())
+            .filter(|s| {
+                let only: Vec<bool> =
+                    interest.shapes.iter().zip(0..).map(|(m, k)| *m && k == *s).collect();
+                world.any_holds(&only)
+            })
+            .map(|s| s as u32)
+            .collect();
+        let resting = at_rest.then(|| views(&|j| if moves(j) > 0.0 { 0.0 } else { 1.0 })).flatten();
+        let resting = resting.map(|views| views.before(world, &chambers, &holding));
+        let all = views(&|_| 1.0);
         let count = [jumps.list.len() as u64, jumps.all];
-        Ok(Self { jumps, camera, moving, all, at_rest, count })
+        Ok(Self { jumps, camera, moving, all, resting, chambers, count })
     }
 
     /// True when the camera can see something change.

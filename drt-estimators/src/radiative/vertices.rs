@@ -2,8 +2,10 @@
 
 use drt_math::{Rgb, Vec3};
 
+use super::choice::Choice;
 use super::difference::{Side, Sight};
-use super::{AT_REST, Chosen, Look, Radiative};
+use super::views::{Views, viewpoint};
+use super::{AT_REST, BY_THROUGHPUT, CARRIED, Chosen, Look, Radiative};
 use crate::transport::record::PathRecord;
 use crate::transport::trace::Endpoint;
 use crate::transport::{MaterialPoint, Tracer, Vertex, World};
@@ -47,9 +49,6 @@ impl Radiative {
             scattering_vertex(recorded.vertex()?, &arrival.end, arrival.throughput)?;
         let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
         let wo = -arrival.dir;
-        if !(recorded.carried || self.moving.is_some()) {
-            return None;
-        }
         tracer.counters.boundary_samples += 1;
         let chosen = self.look(tracer.world, vertex, wo, recorded.carried, look)?;
         let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex)?;
@@ -73,7 +72,7 @@ impl Radiative {
     }
 
     /// Chooses a point on an edge to look at. From a vertex that moves every edge counts; from one that
-    /// stands still an edge at rest only does before something that moves and is grazed.
+    /// stands still an edge at rest only does before something that moves and is held.
     fn look(
         &self,
         world: &World,
@@ -82,36 +81,50 @@ impl Radiative {
         carried: bool,
         look: &Look,
     ) -> Option<Chosen<'_>> {
-        let all = self.all.as_ref()?;
-        let Some(moving) = self.moving.as_ref().filter(|_| !carried) else {
-            return all.sample(world, &self.jumps, vertex, wo, look);
-        };
-        if !self.at_rest {
-            return moving.sample(world, &self.jumps, vertex, wo, look);
+        let around = viewpoint(world, vertex, wo);
+        if carried {
+            return self.all.as_ref()?.sample(&self.jumps, around, look);
         }
+        let seen = |views: &&Views| self.chambers.in_sight(world, &views.among, vertex);
+        let moving = self.moving.as_ref().filter(seen);
+        let resting = self.resting.as_ref().filter(seen).filter(|v| v.amount(around) > 0.0);
+        let (Some(moving), Some(resting)) = (moving, resting) else {
+            return moving.or(resting)?.sample(&self.jumps, around, look);
+        };
+        // No edge is in both.
         let (mut look, at_rest) = (*look, look.way < AT_REST);
-        let (views, other) = if at_rest { (all, moving) } else { (moving, all) };
-        let chance = if at_rest { AT_REST } else { 1.0 - AT_REST };
-        look.way = if at_rest { look.way } else { look.way - AT_REST } / chance;
-        let chosen = views.sample(world, &self.jumps, vertex, wo, &look)?;
-        let density =
-            chance / chosen.inv_pdf + (1.0 - chance) * other.density(world, vertex, wo, &chosen);
-        Some(Chosen { inv_pdf: 1.0 / density, ..chosen })
+        let (views, from, chance) =
+            if at_rest { (resting, 0.0, AT_REST) } else { (moving, AT_REST, 1.0 - AT_REST) };
+        look.way = (look.way - from) / chance;
+        let chosen = views.sample(&self.jumps, around, &look)?;
+        Some(Chosen { inv_pdf: chosen.inv_pdf / chance, ..chosen })
     }
 
-    /// Chooses a vertex that can see an edge change, in proportion to what passes it.
+    /// An estimate of how much edges matter to a vertex; 0 only if they do not.
+    fn amount(&self, world: &World, vertex: &Vertex, wo: Vec3, carried: bool) -> f64 {
+        let around = || viewpoint(world, vertex, wo);
+        let of = |views: &Option<Views>| {
+            let seen = |v: &&Views| carried || self.chambers.in_sight(world, &v.among, vertex);
+            views.as_ref().filter(seen).map_or(0.0, |v| v.amount(around()))
+        };
+        if carried {
+            CARRIED * of(&self.all)
+        } else {
+            of(&self.moving) + AT_REST * of(&self.resting)
+        }
+    }
+
+    /// Chooses a vertex that can see an edge change: mostly in proportion to what passes it and to how
+    /// much there is to see from it, at times to the former alone.
     fn choose_vertex(
         &self,
         tracer: &Tracer<'_>,
         record: &PathRecord,
-        mut u: f64,
+        u: f64,
     ) -> Option<(usize, f64)> {
-        let (mut total, mut chosen) = (0.0, None);
+        let mut choice = Choice::new(u, BY_THROUGHPUT);
         for (k, node) in record.nodes.iter().enumerate().skip(1) {
-            let choice = if node.carried { &self.all } else { &self.moving };
-            let Some(arrival) = node.arrival.as_ref().filter(|_| choice.is_some()) else {
-                continue;
-            };
+            let Some(arrival) = node.arrival.as_ref() else { continue };
             if k as u32 >= tracer.max_segments {
                 break;
             }
@@ -120,21 +133,16 @@ impl Radiative {
             else {
                 continue;
             };
-            let weight = theta.max_abs();
-            if weight == 0.0 || !tracer.world.can_scatter(vertex) {
+            let theta = theta.max_abs();
+            if theta == 0.0 || !tracer.world.can_scatter(vertex) {
                 continue;
             }
-            total += weight;
-            // One number serves all: what is left of it is uniform again.
-            let chance = weight / total;
-            if u < chance {
-                chosen = Some((k, weight));
-                u /= chance;
-            } else {
-                u = (u - chance) / (1.0 - chance);
+            let amount = self.amount(tracer.world, vertex, -arrival.dir, node.carried);
+            if amount > 0.0 {
+                choice.offer(k, [theta, theta * amount]);
             }
         }
-        chosen.map(|(k, weight)| (k, weight / total))
+        choice.made()
     }
 }
 

@@ -3,14 +3,20 @@
 //! Radiance jumps most where a lamp is behind an edge, or the lamp's own rim. So some looks go towards
 //! the spheres around the lamps, and the rest anywhere. A point's density is that of all ways together
 //! (balance heuristic of one sample; Veach and Guibas 1995).
+//!
+//! An edge at rest matters to a vertex at rest only where something that moves holds what is seen right
+//! beside it: in the direction of a sphere around all that does, and no farther than its far side.
 
 use alloc::vec::Vec;
 
+use drt_geom::Aabb;
 use drt_math::Vec3;
 
+use super::chambers::{Among, Chambers};
 use super::jumps::{Jump, Jumps};
 use super::tree::{EdgeTree, Segment, Viewpoint};
 use super::{Chosen, Look};
+use crate::surface::Lobes;
 use crate::transport::{Kind, Vertex, World};
 
 /// The part of looks that go towards lamps.
@@ -24,7 +30,7 @@ const LAMP: f64 = 4.0;
 
 /// A sphere.
 #[derive(Clone, Copy, Debug)]
-struct Sphere {
+pub(super) struct Sphere {
     center: Vec3,
     radius: f64,
 }
@@ -35,30 +41,57 @@ pub(super) struct Views {
     tree: EdgeTree,
     /// The jumps that the tree's segments are.
     jumps: Vec<u32>,
-    lamps: Vec<Sphere>,
+    /// The part of looks that go towards some spheres, and these.
+    share: f64,
+    toward: Vec<Sphere>,
+    /// The chambers in which something can be seen of it.
+    pub(super) among: Among,
 }
 
 impl Views {
     /// Of the jumps that `matter`, in proportion to how much; `None` without any.
-    pub(super) fn new(world: &World, jumps: &Jumps, matter: impl Fn(&Jump) -> f64) -> Option<Self> {
+    pub(super) fn new(
+        world: &World,
+        chambers: &Chambers,
+        jumps: &Jumps,
+        matter: impl Fn(&Jump) -> f64,
+    ) -> Option<Self> {
         let weighed = (0..).zip(&jumps.list).map(|(i, jump)| (i, jump, matter(jump)));
         let kept = weighed.filter(|(_, _, weight)| *weight > 0.0);
         let (indices, segments): (Vec<u32>, Vec<Segment>) =
             kept.map(|(i, jump, weight)| (i, segment(world, jumps, jump, weight))).unzip();
         let tree = EdgeTree::new(&segments)?;
-        Some(Self { tree, jumps: indices, lamps: lamps(world) })
+        let list = indices.iter().map(|i| &jumps.list[*i as usize]);
+        let among = chambers.of_edges(world, jumps, list);
+        let toward = lamps(world);
+        let share = if toward.is_empty() { 0.0 } else { TOWARD_LAMPS };
+        Some(Self { tree, jumps: indices, share, toward, among })
     }
 
-    /// Draws a point of an edge that `vertex` may see, from where it scatters light to `wo`.
+    /// The same, looking only at what may be before some of the shapes.
+    pub(super) fn before(self, world: &World, chambers: &Chambers, shapes: &[u32]) -> Self {
+        let bounds = shapes.iter().map(|s| world.scene.shapes[*s as usize].mesh.bounds());
+        let toward = bounds.reduce(|a, b| a.union(&b)).map(|b| Sphere::around(&b));
+        let seen = chambers.of_shapes(world, shapes.iter().copied());
+        let among = self.among.and(&seen);
+        Self { share: 1.0, toward: toward.into_iter().collect(), among, ..self }
+    }
+
+    /// An estimate of how much there is to see: an integral of scattering and edges.
+    pub(super) fn amount(&self, around: Viewpoint) -> f64 {
+        match &self.toward[..] {
+            [all] if self.share == 1.0 => self.tree.amount(&around.toward(all.center, all.radius)),
+            _ => self.tree.amount(&around),
+        }
+    }
+
+    /// Draws a point of an edge that can be seen from a viewpoint.
     pub(super) fn sample<'a>(
         &self,
-        world: &World,
         jumps: &'a Jumps,
-        vertex: &Vertex,
-        wo: Vec3,
+        around: Viewpoint,
         look: &Look,
     ) -> Option<Chosen<'a>> {
-        let around = viewpoint(world, vertex, wo);
         let mut way = look.way;
         let (i, (_, view)) = self.ways(around).enumerate().find(|(_, (chance, _))| {
             way -= chance;
@@ -70,28 +103,27 @@ impl Views {
             chance * known.unwrap_or_else(|| self.tree.pdf(&view, chosen.edge, chosen.u))
         });
         let density: f64 = densities.sum();
-        let index = self.jumps[chosen.edge];
-        let jump = &jumps.list[index as usize];
-        (density > 0.0).then(|| Chosen { jump, index, along: chosen.u, inv_pdf: 1.0 / density })
+        let jump = &jumps.list[self.jumps[chosen.edge] as usize];
+        (density > 0.0).then(|| Chosen { jump, along: chosen.u, inv_pdf: 1.0 / density })
     }
 
-    /// The ways of looking, and their chances: towards lamps, and anywhere.
+    /// The ways of looking, and their chances: towards spheres, and anywhere.
     fn ways(&self, around: Viewpoint) -> impl Iterator<Item = (f64, Viewpoint)> {
-        let share = if self.lamps.is_empty() { 0.0 } else { TOWARD_LAMPS };
-        let per_lamp = share / self.lamps.len().max(1) as f64;
-        let lamps = self.lamps.iter().map(move |l| (per_lamp, around.toward(l.center, l.radius)));
-        lamps.chain([(1.0 - share, around)])
-    }
-
-    /// The density per length of [`Views::sample`].
-    pub(super) fn density(&self, world: &World, vertex: &Vertex, wo: Vec3, at: &Chosen) -> f64 {
-        let Ok(edge) = self.jumps.binary_search(&at.index) else { return 0.0 };
-        let around = viewpoint(world, vertex, wo);
-        self.ways(around).map(|(chance, view)| chance * self.tree.pdf(&view, edge, at.along)).sum()
+        let each = self.share / self.toward.len().max(1) as f64;
+        let spheres = self.toward.iter().map(move |s| (each, around.toward(s.center, s.radius)));
+        let rest = 1.0 - self.share;
+        spheres.chain((rest > 0.0).then_some((rest, around)))
     }
 }
 
-fn viewpoint(world: &World, vertex: &Vertex, wo: Vec3) -> Viewpoint {
+impl Sphere {
+    fn around(b: &Aabb) -> Self {
+        Self { center: b.center(), radius: 0.5 * (b.max - b.min).length() }
+    }
+}
+
+/// How edges matter to a vertex that scatters light to `wo`.
+pub(super) fn viewpoint(world: &World, vertex: &Vertex, wo: Vec3) -> Viewpoint {
     let normal = match &vertex.kind {
         Kind::Surface(s) => {
             let n = if s.ns.dot(wo) < 0.0 { -s.ns } else { s.ns };
@@ -99,7 +131,8 @@ fn viewpoint(world: &World, vertex: &Vertex, wo: Vec3) -> Viewpoint {
         }
         _ => None,
     };
-    Viewpoint::new(vertex.x, normal)
+    let lobes = world.scattering(vertex).map_or(Lobes::even(0.0), |s| s.lobes(wo));
+    Viewpoint::new(vertex.x, normal).scattering(lobes)
 }
 
 fn segment(world: &World, jumps: &Jumps, jump: &Jump, weight: f64) -> Segment {
@@ -125,8 +158,7 @@ fn segment(world: &World, jumps: &Jumps, jump: &Jump, weight: f64) -> Segment {
 fn lamps(world: &World) -> Vec<Sphere> {
     let shapes = world.scene.shapes.iter().filter_map(|s| {
         let radiance = world.lights.area_radiance(s.emitter?);
-        let b = s.mesh.bounds();
-        let sphere = Sphere { center: b.center(), radius: 0.5 * (b.max - b.min).length() };
+        let sphere = Sphere::around(&s.mesh.bounds());
         Some((radiance.mean() * s.mesh.surface_area(), sphere))
     });
     let mut lamps: Vec<(f64, Sphere)> = shapes.collect();

@@ -10,7 +10,7 @@
 use drt_math::{Real, Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Phase;
 
-use crate::surface::{Bsdf, BsdfParams, Given};
+use crate::surface::{Bsdf, BsdfParams, Given, Lobes};
 
 /// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.
 const FADE: f64 = 0.02;
@@ -77,6 +77,17 @@ impl Scattering<'_> {
         match self {
             Self::Surface { bsdf, ns, .. } => bsdf.pdf(from, to, *ns, given),
             Self::Volume(phase) => phase.eval(-from.dot(to)),
+        }
+    }
+
+    /// A sketch of [`Scattering::eval`] by the light's direction.
+    pub(crate) fn lobes(&self, wo: Vec3) -> Lobes {
+        match self {
+            Self::Surface { bsdf, ns, .. } => bsdf.lobes(wo, *ns),
+            Self::Volume(phase) => match phase.mean_cosine_parameter() {
+                Some(g) => Lobes::around(-wo * g.signum(), phase.eval(0.0), phase.eval(g.signum())),
+                None => Lobes::even(phase.eval(0.0)),
+            },
         }
     }
 

@@ -35,6 +35,11 @@ impl Kernel {
         Self { near, far, d }
     }
 
+    /// How far the part's nearest point is.
+    pub(super) fn distance(&self) -> f64 {
+        radius(self.d, f64::min(0.0, self.far).max(self.near))
+    }
+
     /// Integral of d / r^3.
     pub(super) fn mass(&self) -> f64 {
         let Self { near, far, d } = *self;

@@ -18,11 +18,14 @@
 //! to an estimate of
 //!
 //! ```text
-//! sum over its edges: weight × length × P(counts as silhouette or crease) × cosine / r^2,
+//! sum over its edges: weight × length × P(counts as silhouette or crease) × f / r^2,
 //! ```
 //!
-//! the cosine being that with the normal of a surface at x. The estimate ([`node`]) is positive
+//! f being a [sketch](crate::surface::Lobes) of how x scatters: a cosine with the normal of a surface,
+//! and lobes, as wide as the node is seen besides their own width. The estimate ([`node`]) is positive
 //! wherever an edge below may count, so nothing is lost, and 0 where it is proved that none does.
+//! Near x nodes are opened first, down to their edges ([`cut`]), and the first choice is among all that
+//! this leaves.
 //! Nodes have eight children, as each choice adds its error and a wide tree has few of them; leaves
 //! weigh each of their edges by what it really amounts to ([`piece`]), and so does a node with many
 //! segments for children with few. On the edge the density is sin / r^2, exactly ([`kernel`]). A
@@ -37,6 +40,7 @@
 //! known at any point, so that the two can share samples (Veach & Guibas 1995).
 
 mod build;
+mod cut;
 mod kernel;
 mod node;
 mod piece;
@@ -133,6 +137,25 @@ impl EdgeTree {
         found.map_or(0.0, |(_, pmf, stretch)| pmf * stretch.pdf(u))
     }
 
+    /// What rounding may move places by.
+    fn slack(&self, view: &Viewpoint) -> f64 {
+        1e-15 * (self.largest + view.x.max_abs())
+    }
+
+    /// A node's children, each with the place of its first piece.
+    fn children<'a>(
+        &'a self,
+        node: &'a Node,
+        mut begin: u32,
+    ) -> impl Iterator<Item = (&'a Node, u32)> {
+        let mut children = self.nodes[node.children as usize..].iter();
+        core::iter::from_fn(move || {
+            let child = (begin < node.end).then(|| children.next())??;
+            let from = core::mem::replace(&mut begin, child.end);
+            Some((child, from))
+        })
+    }
+
     /// Goes down by choices among weights, of parts of the pieces that have the given ends. Returns
     /// the piece, the probability, and what of the piece counts.
     fn descend(
@@ -143,7 +166,7 @@ impl EdgeTree {
         if !view.x.is_finite() {
             return None;
         }
-        let slack = 1e-15 * (self.largest + view.x.max_abs());
+        let slack = self.slack(view);
         let mut pick = |ends: &[u32], weights: &[f64]| {
             let total: f64 = weights.iter().sum();
             if !(total > 0.0 && total.is_finite()) {
@@ -152,38 +175,41 @@ impl EdgeTree {
             let k = choose(ends, weights, total)?;
             (weights[k] > 0.0).then(|| (k, weights[k] / total))
         };
-        let weigh = |piece: &Piece| piece.stretch(view, slack).map_or(0.0, |s| s.weight(view));
-        let (mut node, mut begin) = (&self.nodes[0], 0);
-        let mut pmf = 1.0;
+        let mut cut = self.cut(view, slack);
+        cut.even_out();
+        let (k, mut pmf) = pick(cut.ends(), cut.weights())?;
+        let mut begin = if k > 0 { cut.ends()[k - 1] } else { 0 };
+        let stretch = |place: u32| self.pieces[place as usize].stretch(view, slack);
+        let mut node = match cut.node(k) {
+            0 => return Some((begin as usize, pmf, stretch(begin)?)),
+            node => &self.nodes[node as usize],
+        };
         let (mut weights, mut ends) = ([0.0; LEAF], [0; LEAF]);
         while node.children != 0 {
             let many = (node.end - begin) as usize > ARITY * LEAF;
-            let (mut count, mut from) = (0, begin);
-            let children = &self.nodes[node.children as usize..];
-            for child in children {
+            let mut count = 0;
+            for (child, from) in self.children(node, begin) {
                 weights[count] = if many && child.children == 0 {
                     let few = &self.pieces[from as usize..child.end as usize];
-                    few.iter().map(weigh).sum::<f64>() / self.unit
+                    few.iter().map(|piece| piece.weigh(view, slack)).sum::<f64>() / self.unit
                 } else {
                     child.importance(view, slack)
                 };
-                (from, ends[count]) = (child.end, child.end);
+                ends[count] = child.end;
                 count += 1;
-                if child.end == node.end {
-                    break;
-                }
             }
             even_out(&mut weights[..count]);
             let (k, p) = pick(&ends[..count], &weights[..count])?;
             begin = if k > 0 { ends[k - 1] } else { begin };
-            (node, pmf) = (&children[k], pmf * p);
+            (node, pmf) = (&self.nodes[node.children as usize + k], pmf * p);
         }
         let pieces = &self.pieces[begin as usize..node.end as usize];
         for (k, piece) in pieces.iter().enumerate() {
-            (weights[k], ends[k]) = (weigh(piece), begin + k as u32 + 1);
+            (weights[k], ends[k]) = (piece.weigh(view, slack), begin + k as u32 + 1);
         }
         let (k, p) = pick(&ends[..pieces.len()], &weights[..pieces.len()])?;
-        Some((begin as usize + k, pmf * p, pieces[k].stretch(view, slack)?))
+        let place = begin + k as u32;
+        Some((place as usize, pmf * p, stretch(place)?))
     }
 }
 

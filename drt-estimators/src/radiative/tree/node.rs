@@ -100,26 +100,38 @@ impl Node {
         }
     }
 
-    /// An estimate of the kernel's integral over the segments; 0 only if none of them counts.
+    /// An estimate of the integral over the segments of kernel, scattering and weight, the weight in
+    /// multiples of the tree's unit; 0 only if none of them counts.
     pub(super) fn importance(&self, view: &Viewpoint, slack: f64) -> f64 {
         let from = view.x - self.center;
         let half = Vec3::from(self.half.map(f64::from));
         // Twice what is conceded to a single segment.
         let tolerance = 2.0 * (SLACK * (one_norm(from) + one_norm(half)) + slack);
         let length2 = from.length_squared();
+        let outside = (absolute(from) - half).max(Vec3::ZERO).length_squared();
         let kinds = self.kinds(from, Real::sqrt(length2), tolerance);
-        if kinds <= 0.0 {
+        if kinds <= 0.0 || outside > view.reach * view.reach {
             return 0.0;
         }
         let size2 = half.length_squared();
         let r2 = length2 + size2 * (1.0 / 3.0);
         let cosine =
             view.normal.map_or(1.0, |normal| self.cosine(normal, from, half, tolerance, r2));
+        if cosine <= 0.0 {
+            return 0.0;
+        }
+        let scattering = view.lobes.toward(-from, r2, size2 * (1.0 / 3.0), cosine);
         let overlap = view.cone.map_or(1.0, |cone| cone.overlap(-from, half));
         // 1 / r^2 in the mean: near the box it follows its nearest point, but not all the way.
-        let outside = (absolute(from) - half).max(Vec3::ZERO).length_squared();
         let r = Real::sqrt(r2 * (outside + size2 * CLOSEST));
-        kinds * cosine * overlap / r.max(f64::MIN_POSITIVE)
+        kinds * scattering * overlap / r.max(f64::MIN_POSITIVE)
+    }
+
+    /// True within some times half the box's diagonal from the box.
+    pub(super) fn is_near(&self, view: &Viewpoint, times: f64) -> bool {
+        let half = Vec3::from(self.half.map(f64::from));
+        let outside = (absolute(view.x - self.center) - half).max(Vec3::ZERO);
+        outside.length_squared() <= times * times * half.length_squared()
     }
 
     /// The sums of what may count as what.

@@ -1,6 +1,6 @@
 //! One segment as it is kept, and what of it counts from a viewpoint.
 
-use drt_math::Vec3;
+use drt_math::{Real, Vec3};
 
 use super::Segment;
 use super::kernel::Kernel;
@@ -80,6 +80,11 @@ impl Piece {
             + of(back0 && back1, self.crease[1])
     }
 
+    /// What it amounts to.
+    pub(super) fn weigh(&self, view: &Viewpoint, slack: f64) -> f64 {
+        self.stretch(view, slack).map_or(0.0, |s| s.weight(view))
+    }
+
     /// What of it counts: the part above the horizon and in the cone.
     pub(super) fn stretch(&self, view: &Viewpoint, slack: f64) -> Option<Stretch> {
         let to = self.a - view.x;
@@ -98,28 +103,34 @@ impl Piece {
         let start = to.dot(self.tangent);
         let nearest = to - self.tangent * start;
         let kernel = Kernel::new(nearest.length(), start + part[0], start + part[1]);
+        if kernel.distance() > view.reach {
+            return None;
+        }
         Some(Stretch { kernel, start, length: self.length, prior, nearest, tangent: self.tangent })
     }
 }
 
 impl Stretch {
     /// What it amounts to: the kernel's integral, less than exactly where that makes no difference.
-    pub(super) fn weight(&self, view: &Viewpoint) -> f64 {
+    fn weight(&self, view: &Viewpoint) -> f64 {
         let Kernel { near, far, .. } = self.kernel;
-        let cosine = |t: f64| {
-            view.normal.map_or(1.0, |(n, _)| {
-                let to = self.nearest + self.tangent * t;
-                f64::abs(n.dot(to)) / to.length().max(f64::MIN_POSITIVE)
-            })
+        let size2 = (far - near) * (far - near) * (1.0 / 12.0);
+        let scattering = |t: f64| {
+            let to = self.nearest + self.tangent * t;
+            let r2 = to.length_squared();
+            let cosine = view
+                .normal
+                .map_or(1.0, |(n, _)| f64::abs(n.dot(to)) / Real::sqrt(r2).max(f64::MIN_POSITIVE));
+            view.lobes.toward(to, r2, size2, cosine.max(ALMOST_NOTHING))
         };
-        let (mass, cosine) = match self.kernel.of_short() {
-            Some((middle, mass)) => (mass, cosine(middle)),
+        let (mass, scattering) = match self.kernel.of_short() {
+            Some((middle, mass)) => (mass, scattering(middle)),
             None => {
-                let ends = 0.25 * (cosine(near) + cosine(far));
-                (self.kernel.mass(), ends + 0.5 * cosine(self.kernel.sample(0.5)))
+                let ends = 0.25 * (scattering(near) + scattering(far));
+                (self.kernel.mass(), ends + 0.5 * scattering(self.kernel.sample(0.5)))
             }
         };
-        self.prior * mass * cosine.max(ALMOST_NOTHING)
+        self.prior * mass * scattering
     }
 
     /// How far along the segment the point for a uniform number lies, as a part of its length.

@@ -2,12 +2,18 @@
 
 use drt_math::{Real, Vec3};
 
+use crate::surface::Lobes;
+
 /// A point at which light scatters, as edges matter to it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Viewpoint {
     pub(super) x: Vec3,
     pub(super) normal: Option<(Vec3, bool)>,
+    /// What is scattered from where.
+    pub(super) lobes: Lobes,
     pub(super) cone: Option<Cone>,
+    /// Edges farther away do not matter.
+    pub(super) reach: f64,
 }
 
 /// A cone of directions less than a right angle wide on either side.
@@ -25,11 +31,16 @@ impl Viewpoint {
     /// normal goes whether light from below counts too; where it does not, what lies below the
     /// plane through `x` does not matter.
     pub(crate) fn new(x: Vec3, normal: Option<(Vec3, bool)>) -> Self {
-        Self { x, normal, cone: None }
+        Self { x, normal, lobes: Lobes::even(1.0), cone: None, reach: f64::INFINITY }
     }
 
-    /// The same, looking only towards a sphere: at the cone of directions that meet it. From inside
-    /// the sphere these are all.
+    /// The same, where light scatters as in a sketch.
+    pub(crate) fn scattering(self, lobes: Lobes) -> Self {
+        Self { lobes, ..self }
+    }
+
+    /// The same, looking only at what may be before a sphere: in the cone of directions that meet it,
+    /// up to its far side. From inside the sphere these are all directions.
     pub(crate) fn toward(self, center: Vec3, radius: f64) -> Self {
         let to = center - self.x;
         let distance = to.length();
@@ -38,7 +49,7 @@ impl Viewpoint {
             let cos = Real::sqrt((1.0 - sin) * (1.0 + sin));
             Cone { axis: to / distance, cos, sin }
         });
-        Self { cone, ..self }
+        Self { cone, reach: (distance + radius) * (1.0 + 1e-9), ..self }
     }
 }
 

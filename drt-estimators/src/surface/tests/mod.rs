@@ -4,6 +4,7 @@ mod changes;
 mod energy;
 mod formulas;
 mod gradients;
+mod lobes;
 mod sampling;
 
 use alloc::boxed::Box;

@@ -7,6 +7,7 @@ use drt_math::{Rng, vec3};
 
 use super::super::*;
 use super::setup::*;
+use crate::surface::Lobes;
 
 const SAMPLES: u32 = 40_000;
 
@@ -74,5 +75,25 @@ fn towards_a_light() {
     let lights = [(vec3(1.3, -0.2, 0.4), 0.5), (vec3(-0.9, 0.6, -0.8), 0.9)];
     for (view, (center, radius)) in views().iter().zip(lights.iter().cycle()) {
         check(&view.toward(*center, *radius));
+    }
+}
+
+#[test]
+fn where_lobes_are() {
+    let peaks = [0.5, 20.0, 5e3];
+    for (view, peak) in views().iter().zip(peaks.iter().cycle()) {
+        let lobes = Lobes::around(vec3(0.6, -0.2, -0.77).normalize(), 0.01, *peak);
+        check(&view.scattering(lobes));
+    }
+}
+
+#[test]
+fn near_edges() {
+    let s = still_life();
+    for (k, off) in [(5, 0.04), (90, 0.06), (260, 0.08)] {
+        let s = s[k];
+        let x = s.a.lerp(s.b, 0.4) + (s.faces[0] + vec3(0.1, 0.2, -0.1)) * off;
+        check(&Viewpoint::new(x, None));
+        check(&Viewpoint::new(x, None).scattering(Lobes::around(s.faces[0], 0.02, 3.0)));
     }
 }
