@@ -47,6 +47,7 @@ def arguments():
     parser.add_argument("--size", type=int, default=64, help="width and height of the images")
     parser.add_argument("--spp", type=int, default=16, help="samples per pixel")
     parser.add_argument("--boundary-spp", type=int, help="boundary samples per pixel; as many as --spp by default")
+    parser.add_argument("--adaptive", action="store_true", help="noisier pixels take more samples")
     parser.add_argument("--seeds", type=int, default=16, help="runs with different random numbers")
     parser.add_argument("--max-depth", type=int, help="path depth; the job's by default")
     return parser.parse_args()
@@ -61,6 +62,7 @@ def run(command, job, seed, options):
         line += ["--seed", seed, "--output", image, "--digest", digest]
         if command == "grad":
             line += ["--set", f"estimator.kind={options.kind}"]
+            line += ["--set", f"estimator.adaptive={str(options.adaptive).lower()}"]
             if options.boundary_spp is not None:
                 line += ["--set", f"estimator.boundary_spp={options.boundary_spp}"]
         if options.max_depth is not None:
@@ -95,8 +97,9 @@ def measure(job, options):
     for at, name in enumerate(digests[0]["derivatives"]):
         variance, error, claimed = variances(runs, name, options.spp)
         work = "–"
-        if at < len(peer_variances) and (options.size, options.spp) == (64, 16):
-            work = f"{variance * seconds / (peer_variances[at] * peer_seconds):.2f}"
+        if at < len(peer_variances) and options.size == 64:
+            peer = peer_variances[at] * peer_seconds / (64 * 64 * 16)
+            work = f"{variance * seconds / samples / peer:.2f}"
         print(
             f"| {job.stem} | {name} | {forward:.3f} | {seconds:.3f} | {seconds / forward:.1f} "
             f"| {1e6 * seconds / samples:.1f} | {variance:.3g} ± {error:.2g} | {claimed:.2f} | {work} |",

@@ -1,7 +1,7 @@
 //! What derivatives cost, in units of the image: one parameter, ten, and the gradient of a loss by
 //! all vertices of a mesh.
 
-use drt_estimators::{Scene, Session, Settings, Target, Unattended, gradient};
+use drt_estimators::{EstimatorKind, Scene, Session, Settings, Target, Unattended, gradient};
 use drt_math::Rgb;
 use drt_motion::Parameter;
 
@@ -13,23 +13,34 @@ const TURNS: usize = 5;
 /// on few pixels.
 const SPP: u32 = 64;
 const FILM: [u32; 2] = [16, 16];
+/// Estimators, with what part of the samples goes to boundaries.
+const WAYS: [(&str, EstimatorKind, u32); 3] = [
+    ("path-space", EstimatorKind::PathSpace, SPP),
+    ("radiative", EstimatorKind::Radiative, SPP),
+    ("radiative 1/8", EstimatorKind::Radiative, SPP / 8),
+];
 const PIXELS: usize = (FILM[0] * FILM[1]) as usize;
 
 pub(crate) fn print() {
-    println!("COST of derivatives, at as many interior and boundary samples as the image has");
     println!(
-        "(\"rays\" are those of a path; a gradient is that by all vertices of the mesh named)"
+        "COST of derivatives, at as many interior and boundary samples as the image has, or an"
     );
+    println!(
+        "eighth of the latter (\"rays\" are those of a path; a gradient is that by all vertices of"
+    );
+    println!("the mesh named)");
     println!();
     println!(
-        "{:9} {:11} {:>8} {:>6} {:>12} {:>6} {:>13}",
-        "scene", "parameter", "us/path", "rays", "one / image", "rays", "ten / one"
+        "{:9} {:11} {:13} {:>8} {:>6} {:>12} {:>6} {:>13}",
+        "scene", "parameter", "estimator", "us/path", "rays", "one / image", "rays", "ten / one"
     );
-    println!("{:9} {:11} {:>8} {:>6} {:>12} {:>6} {:>13}", "", "", "", "", "<= 2.5", "", "<= 1.3");
+    println!("{:44} {:>6} {:>12} {:>6} {:>13}", "", "", "<= 2.5, 3", "", "<= 1.3");
     let subjects = scenes::all(Detail::Fine).map(|subject| subject.with_film(FILM));
     for subject in &subjects {
         for (kind, ten) in &subject.parameters {
-            parameters(subject, kind, ten);
+            for way in &WAYS {
+                parameters(subject, kind, ten, way);
+            }
         }
     }
     println!();
@@ -48,8 +59,8 @@ fn settings() -> Settings {
     Settings { spp: SPP, threads: 1, seed: 3, ..Settings::default() }
 }
 
-fn session(scene: &Scene, parameters: &[Parameter]) -> Session {
-    Session::new(scene, parameters, &settings()).expect("a valid scene")
+fn session(scene: &Scene, parameters: &[Parameter], settings: &Settings) -> Session {
+    Session::new(scene, parameters, settings).expect("a valid scene")
 }
 
 /// Goes on with a run.
@@ -64,14 +75,20 @@ fn rays_a_path(session: &Session) -> f64 {
     c.rays as f64 / c.paths as f64
 }
 
-fn parameters(subject: &Subject, kind: &str, ten: &[Parameter]) {
+fn parameters(
+    subject: &Subject,
+    kind: &str,
+    ten: &[Parameter],
+    &(name, estimator, boundary): &(&str, EstimatorKind, u32),
+) {
+    let settings = Settings { estimator, boundary_spp: Some(boundary), ..settings() };
     let [mut image, mut one, mut all] =
-        [&[][..], &ten[..1], ten].map(|parameters| session(&subject.scene, parameters));
+        [&[][..], &ten[..1], ten].map(|parameters| session(&subject.scene, parameters, &settings));
     let [forward, single, tenfold] =
         take_turns(TURNS, [more(&mut image), more(&mut one), more(&mut all)]);
     let paths = f64::from(SPP) * PIXELS as f64;
     println!(
-        "{:9} {kind:11} {:8.2} {:6.1} {:12.2} {:6.1} {:13.2}",
+        "{:9} {kind:11} {name:13} {:8.2} {:6.1} {:12.2} {:6.1} {:13.2}",
         subject.name,
         forward.median() / paths * 1e6,
         rays_a_path(&image),
@@ -93,7 +110,7 @@ fn vertices(subject: &Subject) {
     const LEAST: u32 = 2;
     let least = Settings { spp: LEAST, ..settings() };
     let full = Settings { spp: SPP + LEAST, ..least.clone() };
-    let mut image = session(scene, &[]);
+    let mut image = session(scene, &[], &settings());
     let [forward, fixed, all] = take_turns(
         TURNS,
         [more(&mut image), Box::new(|| drop(call(&least))), Box::new(|| drop(call(&full)))],
