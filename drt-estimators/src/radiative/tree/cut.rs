@@ -17,7 +17,7 @@ use super::{ARITY, EVEN, EdgeTree, LEAF};
 const NEAR: f64 = 0.5;
 
 /// Most entries of a cut: beyond this nothing more is opened.
-const MOST: usize = 128;
+const MOST: usize = 384;
 
 /// Parts of the pieces in their order, with estimates of what they amount to.
 pub(super) struct Cut {
