@@ -75,7 +75,7 @@ PROBLEMS = {
         "dtrt/camera_pose.toml", {"camera-x": -1.6, "camera-z": 1.2, "nod": -1.5}, 0.02, 128, 7 * 60, 500
     ),
     "branches": Problem("problems/branches/job.toml", {"turn": 0.5}, 0.05, 2048, 8 * 39, 100),
-    "bunny": Problem("problems/bunny/job.toml", BODY, 0.05, 1024, 8 * 575, 125, ("front", "side", "corner", "behind", "above")),
+    "bunny": Problem("problems/bunny/job.toml", BODY, 0.05, 2048, 8 * 575, 125, ("front", "side", "corner", "behind", "above")),
 }
 SCAN = ("scale=10", "x=0.17", "y=-0.25")
 
@@ -176,7 +176,7 @@ def main():
     problems = dict(PROBLEMS)
     if options.bunny:
         mesh = f"mesh={options.bunny.resolve()}"
-        problems["bunny-scan"] = dataclasses.replace(PROBLEMS["bunny"], define=(mesh, *SCAN), more=("--iterations", 28))
+        problems["bunny-scan"] = dataclasses.replace(PROBLEMS["bunny"], define=(mesh, *SCAN))
     names = options.names or list(problems)
     for name in names:
         if name not in problems:
