@@ -202,6 +202,7 @@ fn several_sensors_masks_schedules_and_png() {
 [optimize]
 targets = ["target.png", "above.exr"]
 masks = ["mask.png", "ones.png"]
+relative = 0.1
 loss = "rmse"
 log = []
 spp = [[10, 16]]

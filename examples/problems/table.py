@@ -75,9 +75,11 @@ PROBLEMS = {
         "dtrt/camera_pose.toml", {"camera-x": -1.6, "camera-z": 1.2, "nod": -1.5}, 0.02, 128, 7 * 60, 500
     ),
     "branches": Problem("problems/branches/job.toml", {"turn": 0.5}, 0.05, 2048, 8 * 39, 100),
-    "bunny": Problem("problems/bunny/job.toml", BODY, 0.05, 1024, 8 * 575, 125, ("front", "side", "corner", "behind", "above")),
+    "bunny": Problem("problems/bunny/job.toml", BODY, 0.05, 2048, 8 * 575, 125, ("front", "side", "corner", "behind", "above")),
 }
 SCAN = ("scale=10", "x=0.17", "y=-0.25")
+# Two iterations more than the job's own.
+SCAN_STEPS = ("--iterations", 16, "--set", "optimize.spp=[[0, 256], [8, 768], [15, 3072], [16, 768]]")
 
 
 def arguments():
@@ -88,6 +90,7 @@ def arguments():
     parser.add_argument("--bunny", type=pathlib.Path, help="a scanned bunny, 0.15 high, for a row of its own")
     parser.add_argument("--pictures", type=pathlib.Path, help="where to put start, target and result of each as PNG")
     parser.add_argument("--again", action="store_true", help="begin fits anew")
+    parser.add_argument("--seed", type=int, help="another seed of the fits; goes with --again")
     return parser.parse_args()
 
 
@@ -112,6 +115,7 @@ def fit(name, problem, options):
             drt(options, "render", job, *values, *defines, *sees, "--seed", 1, "--spp", problem.spp, "--output", target)
     line = ["optimize", job, *defines, "--set", f"optimize.targets={json.dumps(targets)}"]
     line += ["--set", f"optimize.checkpoint={json.dumps('/'.join(problem.run(name)))}"]
+    line += ["--seed", options.seed] if options.seed is not None else []
     drt(options, *line, *problem.more, *(["--restart"] if options.again else []))
     with open(folder / "params.csv", newline="") as file:
         rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
@@ -176,7 +180,7 @@ def main():
     problems = dict(PROBLEMS)
     if options.bunny:
         mesh = f"mesh={options.bunny.resolve()}"
-        problems["bunny-scan"] = dataclasses.replace(PROBLEMS["bunny"], define=(mesh, *SCAN), more=("--iterations", 28))
+        problems["bunny-scan"] = dataclasses.replace(PROBLEMS["bunny"], define=(mesh, *SCAN), more=SCAN_STEPS)
     names = options.names or list(problems)
     for name in names:
         if name not in problems:

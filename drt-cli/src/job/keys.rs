@@ -170,6 +170,7 @@ pub(super) struct Optimize {
     pub(super) targets: Vec<PathBuf>,
     pub(super) sensors: Option<Spanned<Vec<String>>>,
     pub(super) masks: Option<Spanned<Vec<PathBuf>>>,
+    pub(super) relative: Option<f64>,
     pub(super) loss: Option<Spanned<Loss>>,
     pub(super) optimizer: Option<Spanned<Optimizer>>,
     #[serde(default)]

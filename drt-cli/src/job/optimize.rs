@@ -29,6 +29,8 @@ pub struct Optimize {
     pub sensors: Option<Vec<usize>>,
     /// Image files of the targets' masks; empty, or one per target.
     pub masks: Vec<PathBuf>,
+    /// Divides differences by what a target shows, and this part of its mean more.
+    pub relative: Option<f64>,
     /// What is minimised.
     pub loss: Loss,
     /// How steps follow from gradients.
@@ -97,6 +99,7 @@ pub(super) fn optimize(
         targets: keys.targets.iter().map(|t| folder.join(t)).collect(),
         sensors: sensors.transpose()?,
         masks,
+        relative: keys.relative,
         loss,
         method,
         variables,

@@ -79,6 +79,31 @@ impl Reference {
         Ok(Self { mask: Some(mask), ..self })
     }
 
+    /// The same with each pixel's difference divided by what it shows, the mean of its channels, and
+    /// `part` of the image's mean more; in units of that mean, and times the mask so far. Where noise and what there
+    /// is to see grow with brightness, dark pixels tell as much as bright ones.
+    ///
+    /// # Errors
+    /// When the part is not positive, or the image is black or has negative pixels.
+    pub fn relative(self, part: f64) -> Result<Self, Error> {
+        if !(part > 0.0 && part.is_finite()) {
+            let reason = alloc::format!("is {part}; expected a positive number");
+            return Err(unusable("relative", reason));
+        }
+        let mean = self.pixels.iter().map(|p| p.mean()).sum::<f64>() / self.pixels.len() as f64;
+        if let Some(i) = self.pixels.iter().position(|p| p.mean() < 0.0) {
+            let reason = alloc::format!("{} of the target is negative", at(self.size, i));
+            return Err(unusable("relative", reason));
+        }
+        if mean == 0.0 {
+            return Err(unusable("relative", "has no meaning for a black target".into()));
+        }
+        let pixels = self.pixels.iter().enumerate();
+        let factors = pixels.map(|(i, p)| self.factor(i) * mean / (p.mean() + part * mean));
+        let mask = factors.collect();
+        self.with_mask(mask)
+    }
+
     /// Columns and rows.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {

@@ -103,6 +103,18 @@ fn reduced_images_have_the_same_mean() {
     assert!(reference.reduced(5).is_err());
 }
 
+/// Pixels of 1 and 3 with a mean of 2: differences count 2 / (1 + 1) and 2 / (3 + 1) times.
+#[test]
+fn dark_pixels_count_as_much_as_bright_ones() {
+    let gray = |values: [f64; 2]| values.map(Rgb::splat).to_vec();
+    let plain = Reference::new([2, 1], gray([1.0, 3.0])).unwrap();
+    let relative = plain.clone().relative(0.5).unwrap();
+    let image = gray([2.0, 7.0]);
+    assert!((Loss::L2.value(&image, &relative) - 3.0 * (1.0 + 4.0)).abs() < 1e-12);
+    let masked = plain.with_mask(alloc::vec![0.0, 3.0]).unwrap().relative(0.5).unwrap();
+    assert!((Loss::L2.value(&image, &masked) - 3.0 * 36.0).abs() < 1e-12);
+}
+
 #[test]
 fn what_cannot_be_meant_is_refused() {
     let fail = |r: Result<Reference, crate::Error>, part: &str| {
@@ -118,6 +130,10 @@ fn what_cannot_be_meant_is_refused() {
     fail(plain.clone().with_mask(alloc::vec![0.0; 4]), "zero everywhere");
     fail(plain.clone().with_mask(alloc::vec![-1.0; 4]), "expected 0 or more");
     fail(plain.with_mask(alloc::vec![1.0; 3]), "3 pixels");
+    let gray = |values: [f64; 2]| Reference::new([2, 1], values.map(Rgb::splat).to_vec()).unwrap();
+    fail(gray([1.0, 2.0]).relative(0.0), "expected a positive number");
+    fail(gray([1.0, -0.5]).relative(0.1), "column 1, row 0 of the target is negative");
+    fail(gray([0.0, 0.0]).relative(0.1), "black target");
     assert!(Loss::PyramidL2 { levels: 0, weight: 4.0 }.check().is_err());
     assert!(Loss::PyramidL2 { levels: 3, weight: 0.0 }.check().is_err());
 }

@@ -169,6 +169,9 @@ fn views(job: &Job, plan: &Optimize) -> Result<Vec<View>, CliError> {
             mask.check_size(path, film)?;
             reference = reference.with_mask(mask.gray()).map_err(|e| fail(path, e))?;
         }
+        if let Some(part) = plan.relative {
+            reference = reference.relative(part).map_err(|e| fail(path, e))?;
+        }
         views.push(View { sensor, reference });
     }
     Ok(views)
