@@ -38,7 +38,7 @@ fn nothing_but_noise_depends_on_it() {
 /// As if pixels that take half as many samples again counted by them.
 fn scaled(layer: &Layer) -> Layer {
     let mut wrong = layer.clone();
-    let of = |e: &mut drt_estimators::Estimate| e.mean = e.mean * 1.5;
+    let of = |e: &mut drt_estimators::Estimate| e.mean *= 1.5;
     wrong.pixels.iter_mut().for_each(of);
     wrong.blocks.iter_mut().for_each(of);
     of(&mut wrong.total);

@@ -297,7 +297,9 @@ impl<'w> Differentiator<'w> {
                     }
                     let tows = &record.tows[record.nodes[k].tows.clone()];
                     if !tows.is_empty() {
-                        turn += self.tow(tows, &path, v, here.u, weight, &mut there, sink);
+                        let [near, turned] = self.tow(tows, &path, v, here.u, weight, sink);
+                        there.u += near;
+                        turn += turned;
                     }
                     turn += self.land(&path, v, hold, here, matter, weight, &mut there, sink);
                 }

@@ -72,8 +72,8 @@ impl Differentiator<'_> {
     }
 
     /// What [tows](crate::transport::tow) a volume vertex at the far end of a stretch: leaves its surfaces'
-    /// sensitivities, `weight` of light passing and `here` being that to the vertex's velocity. Adds that of
-    /// the near end, and returns that of the direction's rate.
+    /// sensitivities, `weight` of light passing and `here` being that to the vertex's velocity. Returns that of
+    /// the near end, and that of the direction's rate.
     pub(super) fn tow<S: AdjointSink>(
         &self,
         tows: &[Tow],
@@ -81,18 +81,17 @@ impl Differentiator<'_> {
         end: &Vertex,
         here: RgbVec,
         weight: Rgb,
-        near: &mut SurfaceAdjoint,
         sink: &mut S,
-    ) -> RgbVec {
+    ) -> [RgbVec; 2] {
         let along = here.dot(path.dir)
             - self.world.sigma_t_at_border(end.medium, end.x, -path.dir) * weight;
-        let mut turn = RgbVec::ZERO;
+        let [mut near, mut turn] = [RgbVec::ZERO; 2];
         for tow in tows {
             let g = pull(tow, path.dir, along * tow.share + weight * tow.slope, sink);
-            near.u -= g;
+            near -= g;
             turn -= g * tow.distance;
         }
-        turn
+        [near, turn]
     }
 
     /// Sends the sensitivity `adjoint` to the velocity of the point at distance `t` of the ray that left
