@@ -22,7 +22,8 @@
 //!   turn. At the camera f is the filter and importance, and d turns with the image point.
 //!
 //! Cost is linear in path length: of all vertices of a path one, mostly in proportion to its throughput
-//! times an estimate of what edges amount to from there, looks for an edge, and of all surfaces met one is asked for its flux; each traces side paths that
+//! times an estimate of what edges amount to from there, looks for an edge, and of all surfaces met one
+//! is asked for its flux; each traces side paths that
 //! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
 //! [`every_vertex`](crate::Settings::every_vertex) does so with edges.)
 //!
@@ -154,7 +155,10 @@ impl Radiative {
             if interest.shapes[j.edge.shape as usize] { speed(&j.edge) } else { 0.0 }
         };
         let eye = world.camera.position();
-        let at_rest = world.any_holds(&interest.shapes);
+        let moving_shapes = (0..).zip(&interest.shapes).filter(|(_, moves)| **moves);
+        let holding: Vec<u32> =
+            moving_shapes.map(|(shape, _)| shape).filter(|s| world.holds_on(*s)).collect();
+        let at_rest = !holding.is_empty();
         let speeds: Vec<f64> = jumps.list.iter().map(moves).collect();
         let fastest = speeds.iter().copied().fold(0.0, f64::max);
         let relative = |speed: f64| match (interest.sensor, at_rest) {
@@ -167,14 +171,6 @@ impl Radiative {
         let chambers = Chambers::new(world);
         let views = |matter: &dyn Fn(&Jump) -> f64| Views::new(world, &chambers, &jumps, matter);
         let moving = views(&|j| if fastest > 0.0 { moves(j) / fastest } else { 0.0 });
-        let holding: Vec<u32> = (0..interest.shapes.len())
-            .filter(|s| {
-                let only: Vec<bool> =
-                    interest.shapes.iter().zip(0..).map(|(m, k)| *m && k == *s).collect();
-                world.any_holds(&only)
-            })
-            .map(|s| s as u32)
-            .collect();
         let resting = at_rest.then(|| views(&|j| if moves(j) > 0.0 { 0.0 } else { 1.0 })).flatten();
         let resting = resting.map(|views| views.before(world, &chambers, &holding));
         let all = views(&|_| 1.0);

@@ -100,9 +100,9 @@ impl World {
         self.holds = Holds { bends, cosines, seen };
     }
 
-    /// True when one of the shapes holds vertices.
-    pub(crate) fn any_holds(&self, shapes: &[bool]) -> bool {
-        self.holds.bends.iter().zip(shapes).any(|(bend, among)| *among && *bend > 0.0)
+    /// True when a shape holds vertices.
+    pub(crate) fn holds_on(&self, shape: u32) -> bool {
+        self.holds.bends.get(shape as usize).is_some_and(|bend| *bend > 0.0)
     }
 
     /// The mean curvatures of the shapes by their shading normals, or by their edges where they have
