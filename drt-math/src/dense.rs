@@ -48,6 +48,21 @@ impl Cholesky {
         }
     }
 
+    /// The standard errors of the x of L Lᵀ x = b, where the errors of b have this covariance.
+    ///
+    /// # Panics
+    /// When the covariance has another size.
+    #[must_use]
+    pub fn errors(&self, covariance: &[Vec<f64>]) -> Vec<f64> {
+        let n = self.rows.len();
+        let error = |p: usize| {
+            let mut row: Vec<f64> = (0..n).map(|i| f64::from(u8::from(i == p))).collect();
+            self.solve(&mut row);
+            fm::sqrt(f64::max(dot(&row, &times(covariance, &row)), 0.0))
+        };
+        (0..n).map(error).collect()
+    }
+
     /// Replaces b by the x of L x = b.
     ///
     /// # Panics

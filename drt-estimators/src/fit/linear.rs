@@ -2,8 +2,7 @@
 
 use alloc::vec::Vec;
 
-use drt_math::dense::{Cholesky, dot, times};
-use drt_math::fm;
+use drt_math::dense::Cholesky;
 
 /// Least pivot relative to its diagonal entry: below, two parameters do the same.
 const LEAST_PIVOT: f64 = 1e-9;
@@ -11,14 +10,7 @@ const LEAST_PIVOT: f64 = 1e-9;
 /// With curvature H and covariance C of the gradient, the roots of the diagonal of H⁻¹ C H⁻¹; `None`
 /// when H is not positive definite.
 pub(super) fn newton_noise(curvature: &[Vec<f64>], covariance: &[Vec<f64>]) -> Option<Vec<f64>> {
-    let factor = Cholesky::new(curvature, LEAST_PIVOT)?;
-    let n = curvature.len();
-    let noise = (0..n).map(|p| {
-        let mut row: Vec<f64> = (0..n).map(|i| f64::from(u8::from(i == p))).collect();
-        factor.solve(&mut row);
-        fm::sqrt(f64::max(dot(&row, &times(covariance, &row)), 0.0))
-    });
-    Some(noise.collect())
+    Some(Cholesky::new(curvature, LEAST_PIVOT)?.errors(covariance))
 }
 
 /// H⁻¹ g; `None` as above.

@@ -37,8 +37,8 @@
 //! let gradient: Vec<f64> = (0..2).map(|i| product(i, &|k| residuals[k])).collect();
 //! let row = |i| (0..2).map(|j| product(i, &|k| rows[k][j])).collect();
 //! let curvature: Vec<Vec<f64>> = (0..2).map(row).collect();
-//! let seen =
-//!     Observation { gradient: &gradient, curvature: &curvature, noise: &[], weight: 1.0 };
+//! let (gradient, curvature) = (&gradient, &curvature);
+//! let seen = Observation { gradient, curvature, noise: &[], covariance: &[], weight: 1.0 };
 //! optimizer.step_by(&seen, 1.0)?;
 //! let x = optimizer.values();
 //! assert!((x[0] - 2.0).abs() < 1e-5 && (x[1] - 1.0).abs() < 1e-5);
@@ -57,6 +57,6 @@ mod variable;
 pub use error::OptimizeError;
 pub use gauss_newton::{Averages, Observation};
 pub use method::Method;
-pub use optimizer::{Optimizer, State};
+pub use optimizer::{Optimizer, Outlook, State};
 pub use schedule::{Decay, Stages};
 pub use variable::Variable;

@@ -1,8 +1,6 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use drt_math::fm;
-
 use super::{Averages, Method, Observation, OptimizeError, Variable};
 
 /// Everything that an [`Optimizer`] remembers, one number per variable in each list.
@@ -22,6 +20,15 @@ pub struct State {
     /// What Gauss-Newton steps follow from.
     #[cfg_attr(feature = "serde", serde(default))]
     pub averages: Option<Averages>,
+}
+
+/// How well values are known, one number per variable in each list.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outlook {
+    /// What the next step would add to the values if nothing limited it.
+    pub step: Vec<f64>,
+    /// Standard errors of the values, as far as the noise of all that was averaged leads them astray.
+    pub errors: Vec<f64>,
 }
 
 /// Minimises a function of many variables by its gradients.
@@ -95,11 +102,38 @@ impl Optimizer {
         &self.state
     }
 
-    /// How large the errors of what steps follow from are, next to those of one iteration: the root of a
-    /// number of iterations that are averaged. `None` where steps are not made of averages.
-    #[must_use]
-    pub fn averaging(&self) -> Option<f64> {
-        self.state.averages.as_ref().map(|a| fm::sqrt(a.share))
+    /// Where the goal seems to be and how well the values are known, by all that was seen before and what
+    /// is `seen` now, at the values and not stepped by yet. `None` where steps are not made of averages,
+    /// and where what was seen does not tell the variables apart.
+    ///
+    /// # Errors
+    /// As [`step_by`](Self::step_by).
+    pub fn outlook(
+        &self,
+        seen: Option<&Observation<'_>>,
+    ) -> Result<Option<Outlook>, OptimizeError> {
+        let Method::GaussNewton { memory } = self.method else { return Ok(None) };
+        let slopes = self.slopes();
+        let mut averages = self.state.averages.clone();
+        if let Some(seen) = seen {
+            seen.check(slopes.len())?;
+            averages
+                .get_or_insert_with(|| Averages::new(slopes.len()))
+                .observe(seen, &slopes, memory)
+                .ok_or(OptimizeError::NotSquares)?;
+        }
+        let by_value = |list: Vec<f64>| list.iter().zip(&slopes).map(|(x, s)| x * s).collect();
+        let found = averages.and_then(|averages| averages.outlook());
+        Ok(found.map(|found| {
+            let [step, errors] = found.map(by_value);
+            Outlook { step, errors }
+        }))
+    }
+
+    /// The derivatives of the values by their coordinates.
+    fn slopes(&self) -> Vec<f64> {
+        let variables = self.variables.iter().zip(&self.state.values);
+        variables.map(|(variable, value)| variable.slope(*value)).collect()
     }
 
     /// Takes one step by all that was seen at the values, with every learning rate times `factor`. Methods
@@ -115,8 +149,8 @@ impl Optimizer {
         seen.check(n)?;
         let mut next = self.state.clone();
         next.steps += 1;
+        let slopes = self.slopes();
         let variables = self.variables.iter().zip(&self.state.values);
-        let slopes: Vec<f64> = variables.clone().map(|(v, value)| v.slope(*value)).collect();
         let limit = |(v, value): (&Variable, &f64)| v.limits(*value, v.learning_rate * factor);
         let limits: Vec<[f64; 2]> = variables.map(limit).collect();
         let averages = next.averages.get_or_insert_with(|| Averages::new(n));

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use drt_estimators::fit::{Evaluation, Fit};
-use drt_motion::optimize::{Method, Observation, OptimizeError, Optimizer};
+use drt_motion::optimize::{Method, Observation, OptimizeError, Optimizer, Outlook};
 
 use super::checkpoint::{Checkpoint, Fingerprint};
 use super::gallery::Gallery;
@@ -189,21 +189,27 @@ impl<'a> Descent<'a> {
     }
 
     fn step_by(&mut self, i: u32, seen: &Evaluation, factor: f64) -> Result<(), OptimizeError> {
-        let gradient = seen.gradient();
-        if !matches!(self.problem.plan.method, Method::GaussNewton { .. }) {
-            return self.optimizer.step(&gradient, factor);
+        match self.problem.plan.method {
+            Method::GaussNewton { .. } => {
+                observe(self.problem.spp(i), seen, |seen| self.optimizer.step_by(&seen, factor))
+            }
+            _ => self.optimizer.step(&seen.gradient(), factor),
         }
-        let (curvature, noise) = (&seen.curvature(), &seen.curvature_noise());
-        let weight = f64::from(self.problem.spp(i));
-        self.optimizer
-            .step_by(&Observation { gradient: &gradient, curvature, noise, weight }, factor)
     }
 
-    /// How well the values are known, by what was seen last: by the noise of all that their last step
-    /// followed from, where that is an average.
-    pub(super) fn uncertainty(&self, seen: &Evaluation) -> Option<Vec<f64>> {
-        let averaging = self.optimizer.averaging().unwrap_or(1.0);
-        Some(seen.uncertainty()?.into_iter().map(|u| averaging * u).collect())
+    /// How well the values are known and how far they seem to be from their goal: by all that steps
+    /// follow from where that is an average, and else by what was seen last.
+    pub(super) fn outlook(&self, seen: &Evaluation) -> Option<Outlook> {
+        if !matches!(self.problem.plan.method, Method::GaussNewton { .. }) {
+            return Some(Outlook { step: seen.newton_step()?, errors: seen.uncertainty()? });
+        }
+        let (i, looks) = (self.steps(), self.history.losses.len());
+        if looks <= i as usize {
+            return self.optimizer.outlook(None).ok().flatten();
+        }
+        observe(self.problem.spp(i), seen, |seen| self.optimizer.outlook(Some(&seen)))
+            .ok()
+            .flatten()
     }
 
     /// Stores how far it came before it failed.
@@ -250,8 +256,7 @@ impl<'a> Descent<'a> {
             history: &self.history,
             gallery,
             steps: self.steps(),
-            uncertainty: self.uncertainty(seen),
-            left: seen.newton_step(),
+            outlook: self.outlook(seen),
             spent: self.spent(),
             failure,
         };
@@ -266,6 +271,17 @@ impl<'a> Descent<'a> {
         }
         [self.before[0] + self.clock.seconds(), self.before[1] + self.clock.cpu_seconds()]
     }
+}
+
+/// Does something with what Gauss-Newton takes from an evaluation by so many samples.
+fn observe<T>(spp: u32, seen: &Evaluation, then: impl FnOnce(Observation<'_>) -> T) -> T {
+    then(Observation {
+        gradient: &seen.gradient(),
+        curvature: &seen.curvature(),
+        noise: &seen.curvature_noise(),
+        covariance: &seen.covariance(),
+        weight: f64::from(spp),
+    })
 }
 
 fn create(folder: Option<&Path>) -> Result<(), CliError> {

@@ -71,13 +71,13 @@ fn write(
 
 /// The values reached, and how well they are known.
 fn summary(problem: &Problem<'_>, descent: &Descent<'_>, last: Option<&Evaluation>) -> String {
-    let uncertainty = last.and_then(|seen| descent.uncertainty(seen));
-    let line = |(p, (name, value)): (usize, (&str, &f64))| match &uncertainty {
-        Some(u) => format!("{name} = {value:.6} ± {:.1e}\n", u[p]),
+    let outlook = last.and_then(|seen| descent.outlook(seen));
+    let line = |(p, (name, value)): (usize, (&str, &f64))| match &outlook {
+        Some(known) => format!("{name} = {value:.6} ± {:.1e}\n", known.errors[p]),
         None => format!("{name} = {value:.6}\n"),
     };
     let mut text: String = problem.names().zip(descent.values()).enumerate().map(line).collect();
-    if last.is_some() && uncertainty.is_none() {
+    if last.is_some() && outlook.is_none() {
         text += "± not known: the derivatives do not tell these parameters apart\n";
     }
     if descent.steps() < problem.iterations {

@@ -6,7 +6,7 @@ mod embed;
 use std::fmt::Write as _;
 
 use chart::Chart;
-use drt_motion::optimize::Method;
+use drt_motion::optimize::{Method, Outlook};
 use embed::figure;
 
 use super::gallery::Gallery;
@@ -27,10 +27,8 @@ pub(super) struct Report<'a> {
     pub(super) gallery: &'a Gallery<'a>,
     /// Steps taken.
     pub(super) steps: u32,
-    /// Per parameter, as far as it is known.
-    pub(super) uncertainty: Option<Vec<f64>>,
-    /// What a Newton step would still add.
-    pub(super) left: Option<Vec<f64>>,
+    /// How well the parameters are known, where derivatives tell them apart.
+    pub(super) outlook: Option<Outlook>,
     /// Wall and processor time of all runs.
     pub(super) spent: [f64; 2],
     /// Why it ended early, where it did.
@@ -87,10 +85,11 @@ impl Report<'_> {
                 (false, false) => "none".to_owned(),
                 _ => format!("{} to {}", variable.lower, variable.upper),
             };
-            let known = |list: &Option<Vec<f64>>| {
-                list.as_ref().map_or("not known".into(), |l| format!("{:.1e}", l[p]))
+            let known = |of: fn(&Outlook) -> &Vec<f64>| {
+                let known = self.outlook.as_ref();
+                known.map_or("not known".into(), |known| format!("{:.1e}", of(known)[p]))
             };
-            let (error, left) = (known(&self.uncertainty), known(&self.left));
+            let (error, left) = (known(|o| &o.errors), known(|o| &o.step));
             // Writing to a string cannot fail.
             let _ = writeln!(
                 text,
@@ -102,20 +101,22 @@ impl Report<'_> {
                 variable.learning_rate
             );
         }
-        let averages = match self.problem.plan.method {
-            Method::GaussNewton { .. } => {
-                "<b>±</b> is how far the noise of the averages that Gauss-Newton steps follow from \
-                 leads them astray, and the learning rate the longest step"
-            }
-            _ => {
-                "<b>±</b> is how far the noise of that iteration alone would lead it astray; a fit \
-                 averages over many"
-            }
+        let (left, error) = match self.problem.plan.method {
+            Method::GaussNewton { .. } => (
+                "what the next step would add, by the averages that Gauss-Newton steps follow from",
+                "how far the noise of those leads astray, and the learning rate the longest step",
+            ),
+            _ => (
+                "what a Newton step from here would add, by the last iteration's image and \
+                 derivatives",
+                "how far the noise of that iteration alone would lead it astray; a fit averages \
+                 over many",
+            ),
         };
-        text + "</table>\n<p><b>left</b> is what a Newton step from here would add, by the last \
-                iteration's image and derivatives. "
-            + averages
-            + ". Both are unknown where derivatives do not tell parameters apart.</p>\n"
+        format!(
+            "{text}</table>\n<p><b>left</b> is {left}. <b>±</b> is {error}. Both are unknown where \
+             derivatives do not tell parameters apart.</p>\n"
+        )
     }
 
     fn curves(&self) -> String {
@@ -124,7 +125,7 @@ impl Report<'_> {
         let mut text = format!("<h2>Curves</h2>\n<div class=\"row\">\n{}", loss.svg());
         for (p, name) in self.problem.names().enumerate().take(MOST_SHOWN) {
             let values: Vec<f64> = self.history.values.iter().map(|row| row[p]).collect();
-            let error = self.uncertainty.as_ref().map(|u| u[p]);
+            let error = self.outlook.as_ref().map(|known| known.errors[p]);
             text += &Chart { title: name, values: &values, logarithmic: false, error }.svg();
         }
         text + "</div>\n<p>Over iterations; the red bar is ±.</p>\n"

@@ -53,6 +53,13 @@
 //! B is positive definite as q > 0. The first step, with no f yet, takes M itself; without noise B is H throughout. The step
 //! changes the gradient by H Δ, not by B Δ, so that damping delays, but does not bias.
 //!
+//! # Uncertainty
+//!
+//! Errors of iterations are independent, so that those of b have the covariance of a sum with the same weights:
+//! S ← (1 − γ)² S + γ² C_t, with C_t the covariance of g_t's. They lead values astray by H⁻¹ times them, the
+//! covariance of the values being H⁻¹ S H⁻¹. With the averaged H, each μ counts as at least q there: no less
+//! can be told from noise, and in a direction of less signal the values are known no better than that.
+//!
 //! # Limits
 //!
 //! The step minimises b·Δ + Δ·B Δ / 2 where no variable moves by more than its learning rate, nor out of its
@@ -64,13 +71,18 @@
 //! Residuals that are large at the goal, whose second derivatives then count. Far from it, where the quadratic
 //! model fails, only the limits hold. The time of a step grows with the cube of the number of variables.
 
+mod least;
+mod metric;
+
 use alloc::vec::Vec;
 
-use drt_math::dense::{Cholesky, dot, eigen, times, zeros};
+use drt_math::dense::{Cholesky, dot, times, zeros};
 use drt_math::fm;
 
 use super::OptimizeError;
 use super::optimizer::{all_finite, same_length};
+use least::least;
+use metric::{Metric, Signal, table};
 
 /// What one iteration sees of a sum of squares at the present values.
 #[derive(Clone, Copy, Debug)]
@@ -81,6 +93,8 @@ pub struct Observation<'a> {
     pub curvature: &'a [Vec<f64>],
     /// What noise adds to a square of derivatives, in the same units; no rows where there is no noise.
     pub noise: &'a [Vec<f64>],
+    /// The covariance of the gradient's errors; no rows where it is known exactly.
+    pub covariance: &'a [Vec<f64>],
     /// How much it counts, such as its number of samples; positive.
     pub weight: f64,
 }
@@ -90,8 +104,10 @@ impl Observation<'_> {
         same_length("the gradient", n, self.gradient)?;
         all_finite("the gradient", self.gradient)?;
         check_square("the curvature", n, self.curvature)?;
-        if !self.noise.is_empty() {
-            check_square("the noise", n, self.noise)?;
+        for (what, rows) in [("the noise", self.noise), ("the covariance", self.covariance)] {
+            if !rows.is_empty() {
+                check_square(what, n, rows)?;
+            }
         }
         if self.weight > 0.0 && self.weight.is_finite() {
             return Ok(());
@@ -111,6 +127,9 @@ fn check_square(what: &'static str, n: usize, rows: &[Vec<f64>]) -> Result<(), O
     })
 }
 
+/// Least pivot relative to its diagonal entry: below, two variables do the same.
+const LEAST_PIVOT: f64 = 1e-9;
+
 /// The averages of what was seen, at the present coordinates.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -121,7 +140,9 @@ pub struct Averages {
     pub curvature: Vec<Vec<f64>>,
     /// N.
     pub noise: Vec<Vec<f64>>,
-    /// S, the sum of all weights.
+    /// S, the covariance of b's errors.
+    pub covariance: Vec<Vec<f64>>,
+    /// The sum of all weights.
     pub total: f64,
     /// 1/k = Σ w² / (Σ w)²: the variance of the averages relative to that of one iteration.
     pub share: f64,
@@ -129,19 +150,13 @@ pub struct Averages {
     pub scatter: f64,
 }
 
-/// Least pivot of a matrix with a diagonal of ones, added to it: variables that do the same share a step.
-const RIDGE: f64 = 1e-10;
-/// Most passes over the variables in the search for the best step within limits.
-const SWEEPS: usize = 10_000;
-/// A change of a step, relative to its limits, that ends the search.
-const SETTLED: f64 = 1e-13;
-
 impl Averages {
     pub(super) fn new(n: usize) -> Self {
-        let (curvature, noise) = (zeros(n), zeros(n));
+        let [curvature, noise, covariance] = [(); 3].map(|()| zeros(n));
         // As large as it can be, until it is seen.
         let scatter = 0.25 * n as f64;
-        Self { gradient: alloc::vec![0.0; n], curvature, noise, total: 0.0, share: 0.0, scatter }
+        let gradient = alloc::vec![0.0; n];
+        Self { gradient, curvature, noise, covariance, total: 0.0, share: 0.0, scatter }
     }
 
     pub(super) fn check(&self, n: usize) -> Result<(), OptimizeError> {
@@ -149,6 +164,7 @@ impl Averages {
         all_finite("the averaged gradient", &self.gradient)?;
         check_square("the averaged curvature", n, &self.curvature)?;
         check_square("the averaged noise", n, &self.noise)?;
+        check_square("the averaged covariance", n, &self.covariance)?;
         for (name, value) in [("total", self.total), ("share", self.share)] {
             if !(value > 0.0 && value.is_finite()) {
                 let expected = "a positive number";
@@ -189,8 +205,11 @@ impl Averages {
             towards(&mut self.gradient[i], seen.gradient[i] * slopes[i]);
             for j in 0..n {
                 towards(&mut self.curvature[i][j], curvature[i][j]);
-                let noise = seen.noise.get(i).map_or(0.0, |row| row[j]);
-                towards(&mut self.noise[i][j], noise * slopes[i] * slopes[j]);
+                let [noise, error] = [seen.noise, seen.covariance]
+                    .map(|rows| rows.get(i).map_or(0.0, |row| row[j] * slopes[i] * slopes[j]));
+                towards(&mut self.noise[i][j], noise);
+                let mean = &mut self.covariance[i][j];
+                *mean = (1.0 - part) * (1.0 - part) * *mean + part * part * error;
             }
         }
         Some(())
@@ -205,104 +224,26 @@ impl Averages {
     /// The step of the coordinates, each between its two limits, which include 0. The averaged gradient
     /// becomes that at the end of it. `None` when the matrices are not those of a sum of squares.
     pub(super) fn step(&mut self, limits: &[[f64; 2]]) -> Option<Vec<f64>> {
-        let metric = Metric::new(self)?;
-        let (signal, directions) = eigen(&metric.relative(&self.curvature));
-        let signal: Vec<f64> = signal.iter().map(|s| s.clamp(0.0, 1.0)).collect();
-        let directions: Vec<Vec<f64>> = directions.iter().map(|v| metric.absolute(v)).collect();
-        let sum = |value: &dyn Fn(f64) -> f64| {
-            let weights: Vec<f64> = signal.iter().map(|s| value(*s)).collect();
-            table(limits.len(), |i, j| {
-                weights.iter().zip(&directions).map(|(w, v)| w * v[i] * v[j]).sum()
-            })
-        };
+        let signal = Signal::new(self)?;
         let q = self.damping();
-        let damped = sum(&|s| s + q * (1.0 - s));
+        let damped = signal.matrix(|s| s + q * (1.0 - s));
         if !damped.iter().flatten().all(|v| v.is_finite()) {
             return None;
         }
         let step = least(&damped, &self.gradient, limits);
-        for (b, change) in self.gradient.iter_mut().zip(times(&sum(&|s| s), &step)) {
+        for (b, change) in self.gradient.iter_mut().zip(times(&signal.matrix(|s| s), &step)) {
             *b += change;
         }
         Some(step)
     }
-}
 
-/// M as L Lᵀ, of variables with units in which its diagonal is 1.
-struct Metric {
-    units: Vec<f64>,
-    factor: Cholesky,
-}
-
-impl Metric {
-    fn new(averages: &Averages) -> Option<Self> {
-        let Averages { curvature, noise, .. } = averages;
-        let n = curvature.len();
-        let square = |i: usize| curvature[i][i] + noise[i][i];
-        // Variables without any effect have a unit of their own.
-        let units: Vec<f64> =
-            (0..n).map(|i| if square(i) > 0.0 { fm::sqrt(square(i)) } else { 1.0 }).collect();
-        let matrix = table(n, |i, j| {
-            let ridge = match i == j {
-                true if square(i) > 0.0 => RIDGE,
-                true => 1.0,
-                false => 0.0,
-            };
-            (curvature[i][j] + noise[i][j]) / units[i] / units[j] + ridge
-        });
-        Some(Self { units, factor: Cholesky::new(&matrix, 0.0)? })
-    }
-
-    /// L⁻¹ H L⁻ᵀ of a symmetric H.
-    fn relative(&self, matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
-        let n = self.units.len();
-        let mut rows = table(n, |i, j| matrix[i][j] / self.units[i] / self.units[j]);
-        for _ in 0..2 {
-            rows.iter_mut().for_each(|row| self.factor.solve_lower(row));
-            rows = table(n, |i, j| rows[j][i]);
-        }
-        rows
-    }
-
-    /// L v: what v is the relative form of.
-    fn absolute(&self, v: &[f64]) -> Vec<f64> {
-        self.factor.times(v).iter().zip(&self.units).map(|(v, unit)| v * unit).collect()
-    }
-}
-
-fn table(n: usize, value: impl Fn(usize, usize) -> f64) -> Vec<Vec<f64>> {
-    (0..n).map(|i| (0..n).map(|j| value(i, j)).collect()).collect()
-}
-
-/// The minimum of b·Δ + Δ·B Δ / 2 between limits, for a positive definite B.
-fn least(matrix: &[Vec<f64>], b: &[f64], limits: &[[f64; 2]]) -> Vec<f64> {
-    let n = b.len();
-    let mut step = alloc::vec![0.0; n];
-    if let Some(factor) = Cholesky::new(matrix, 0.0) {
-        step.iter_mut().zip(b).for_each(|(s, b)| *s = -b);
+    /// What the coordinates have still to go by the averages, without limits, and the standard errors that
+    /// noise leaves them. `None` where directions without noise are without effect, too.
+    pub(super) fn outlook(&self) -> Option<[Vec<f64>; 2]> {
+        let (signal, q) = (Signal::new(self)?, self.damping());
+        let factor = Cholesky::new(&signal.matrix(|s| f64::max(s, q)), LEAST_PIVOT)?;
+        let mut step: Vec<f64> = self.gradient.iter().map(|b| -b).collect();
         factor.solve(&mut step);
-        let within = |(s, [low, high]): (&f64, &[f64; 2])| (*low..=*high).contains(s);
-        if step.iter().zip(limits).all(within) {
-            return step;
-        }
-        step.iter_mut().zip(limits).for_each(|(s, [low, high])| *s = s.clamp(*low, *high));
+        Some([step, factor.errors(&self.covariance)])
     }
-    // One variable after the other, which converges for convex functions in a box.
-    for _ in 0..SWEEPS {
-        let mut change: f64 = 0.0;
-        for i in 0..n {
-            let [low, high] = limits[i];
-            if !(high > low && matrix[i][i] > 0.0) {
-                continue;
-            }
-            let slope = b[i] + dot(&matrix[i], &step);
-            let next = (step[i] - slope / matrix[i][i]).clamp(low, high);
-            change = change.max((next - step[i]).abs() / (high - low));
-            step[i] = next;
-        }
-        if change <= SETTLED {
-            break;
-        }
-    }
-    step
 }
