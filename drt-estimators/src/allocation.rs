@@ -41,14 +41,15 @@ pub(crate) fn pilot(units: u32) -> Option<u32> {
 }
 
 impl Allocation {
-    /// By the noise that a pilot has seen; each of `counted` is the layers of one derivative.
-    pub(crate) fn new(pilot: &PixelFilm, counted: impl Iterator<Item = Vec<usize>>) -> Self {
+    /// By the noise that a pilot has seen; each of `counted` is the layers of one derivative, with how much
+    /// the variance of each counts.
+    pub(crate) fn new(pilot: &PixelFilm, counted: impl Iterator<Item = Vec<(usize, f64)>>) -> Self {
         let size = pilot.size();
         let n = (size[0] * size[1]) as usize;
         let mut sum = alloc::vec![0.0; n];
         for layers in counted {
             let of_pixel = |i: u32| {
-                let variance: f64 = layers.iter().map(|l| pilot.variance(i, *l)).sum();
+                let variance: f64 = layers.iter().map(|(l, c)| c * pilot.variance(i, *l)).sum();
                 Real::sqrt(variance)
             };
             let noise: Vec<f64> = smooth(size, (0..n as u32).map(of_pixel).collect());
@@ -129,7 +130,7 @@ mod tests {
     /// Means keep their place, errors tell the truth, and the noise of all pixels together falls.
     #[test]
     fn samples_go_where_noise_is() {
-        let found = Allocation::new(&film(None, 8), core::iter::once(vec![0]));
+        let found = Allocation::new(&film(None, 8), core::iter::once(vec![(0, 1.0)]));
         let n = SIZE[0] * SIZE[1];
         let taken: u32 = (0..n).map(|i| found.taken(i, 64)).sum();
         assert!((f64::from(taken) / f64::from(64 * n) - 1.0).abs() < 0.02, "{taken}");

@@ -327,7 +327,7 @@ impl PixelFilm {
 }
 
 /// Images whose samples land anywhere.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct SplatFilm {
     size: [u32; 2],
     /// Samples of all finished passes.
@@ -367,6 +367,18 @@ impl SplatFilm {
             layer.variance.fill(Rgb::ZERO);
             layer.events = Events::NONE;
         }
+    }
+
+    /// Samples so far.
+    pub(crate) fn samples(&self) -> f64 {
+        self.weight
+    }
+
+    /// The variance of one layer's pixels, averaged over them and over colours.
+    pub(crate) fn variance(&self, l: usize) -> f64 {
+        let pixels = (self.size[0] * self.size[1]) as usize;
+        let sum: f64 = self.layers[l].variance[..pixels].iter().map(|v| v.mean()).sum();
+        sum / (pixels as f64 * self.weight * self.weight)
     }
 
     pub(crate) fn begin(&self) -> SplatPass {

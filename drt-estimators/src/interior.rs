@@ -142,6 +142,7 @@ pub(crate) struct PixelSampler<'a, S> {
     non_finite_count: u64,
     differentiated: u64,
     recorded: u64,
+    looking: u64,
 }
 
 /// Non-finite samples that are described one by one.
@@ -180,6 +181,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             non_finite_count: 0,
             differentiated: 0,
             recorded: 0,
+            looking: 0,
         }
     }
 
@@ -193,6 +195,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             },
             non_finite: self.non_finite,
             non_finite_count: self.non_finite_count,
+            looking: self.looking,
         }
     }
 
@@ -246,7 +249,9 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         }
         if let (Some(radiative), Some(look)) = (self.along.radiative, look) {
             let from = if self.separate { at + n } else { at };
+            let before = self.tracer.counters.rays;
             self.edges(radiative, look, &mut values[from..]);
+            self.looking += self.tracer.counters.rays - before;
         }
         if let (Some(shadows), Some(sink)) = (self.along.shadows, &mut self.sink) {
             at += if self.separate { n } else { 0 };

@@ -37,6 +37,7 @@ pub mod sensor;
 mod session;
 mod settings;
 mod splatting;
+mod split;
 pub mod surface;
 mod tangents;
 mod transport;

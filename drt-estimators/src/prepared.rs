@@ -106,11 +106,16 @@ impl Prepared {
         Splatter { world: &self.world, boundary: &self.boundary, radiative, seed }
     }
 
-    /// Samples of each batch of each splatted source, when every pixel takes `spp`.
-    pub(crate) fn samples_per_batch(&self, settings: &Settings, spp: u32) -> u32 {
+    /// Samples of each batch of a splatted source that takes so many per pixel.
+    pub(crate) fn samples_per_batch(&self, per_pixel: f64) -> u32 {
         let [w, h] = self.world.camera.film();
-        let samples = f64::from(spp) * boundary_ratio(settings) * f64::from(w) * f64::from(h);
-        f64::max(samples / (self.sources.len().max(1) * BATCHES) as f64, 1.0) as u32
+        let samples = per_pixel * f64::from(w) * f64::from(h);
+        f64::max(samples / BATCHES as f64, 1.0) as u32
+    }
+
+    /// Samples of each splatted source to each sample of a pixel, by the settings alone.
+    pub(crate) fn source_ratio(&self, settings: &Settings) -> f64 {
+        boundary_ratio(settings) / self.sources.len().max(1) as f64
     }
 }
 

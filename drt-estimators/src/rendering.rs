@@ -168,6 +168,8 @@ pub(crate) struct Account {
     /// The first contributions that were not finite.
     pub(crate) non_finite: Vec<NonFinite>,
     pub(crate) non_finite_count: u64,
+    /// Rays of looks at edges.
+    pub(crate) looking: u64,
 }
 
 impl Account {
@@ -177,6 +179,7 @@ impl Account {
     pub(crate) fn add(&mut self, o: Self) {
         self.counters.add(&o.counters);
         self.non_finite_count += o.non_finite_count;
+        self.looking += o.looking;
         let room = Self::DESCRIBED.saturating_sub(self.non_finite.len());
         self.non_finite.extend(o.non_finite.into_iter().take(room));
     }

@@ -233,7 +233,8 @@ impl Reverse<'_> {
     /// One batch of a splatted source.
     fn splats(&self, source: usize, batch: u32) -> Sums {
         let source = self.prepared.sources[source];
-        let count = self.prepared.samples_per_batch(self.settings, self.settings.spp);
+        let per_pixel = f64::from(self.settings.spp) * self.prepared.source_ratio(self.settings);
+        let count = self.prepared.samples_per_batch(per_pixel);
         let scale = 1.0 / (f64::from(count) * BATCHES as f64);
         let mut receiver = Checked::new(ToGradient {
             scatter: self.scatter(),

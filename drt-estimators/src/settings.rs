@@ -72,7 +72,9 @@ pub struct Settings {
     /// edges alone. Else one of a path's vertices looks, chosen by its throughput.
     pub every_vertex: bool,
     /// Pixels whose derivatives are noisier take more of the samples, by a pilot that takes an eighth of them
-    /// and is then forgotten; `spp` is the mean. The image, where no derivative is asked for.
+    /// and is then forgotten; `spp` is the mean. The image, where no derivative is asked for. Where
+    /// `boundary_spp` is not given, each boundary term takes as many as make the noise least for the time,
+    /// between a quarter of `spp` and four times as many.
     pub adaptive: bool,
     /// Finite-difference half step, in units of each parameter.
     pub step: f64,

@@ -95,6 +95,7 @@ impl Splatter<'_> {
             counters: tracer.counters,
             non_finite: core::mem::take(&mut receiver.found),
             non_finite_count: receiver.count,
+            looking: 0,
         }
     }
 }

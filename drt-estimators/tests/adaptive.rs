@@ -44,3 +44,25 @@ fn scaled(layer: &Layer) -> Layer {
     of(&mut wrong.total);
     wrong
 }
+
+/// Boundary samples are as many as are worth their rays: variance times rays falls, from equal numbers.
+#[test]
+fn looks_are_worth_their_rays() {
+    let scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
+    let parameters: [Parameter<_>; 1] = [parameter("ball", 0.0, vec![moves("ball", shift())])];
+    let run = |adaptive, boundary_spp| {
+        let estimator = EstimatorKind::Radiative;
+        let settings = Settings { estimator, adaptive, boundary_spp, ..Settings::default() };
+        let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
+        session.run(1 << 11, &Unattended);
+        let found = session.rendering();
+        let c = found.counters;
+        let error = |e: &drt_estimators::Estimate| (e.stderr * e.stderr).mean();
+        let variance: f64 = found.derivatives[0].total.pixels.iter().map(error).sum();
+        (variance * c.rays as f64, c.boundary_samples as f64 / c.paths as f64)
+    };
+    let (work, looks) = run(true, None);
+    let (as_many, all) = run(true, Some(64));
+    println!("{work:.0} at {looks:.2} a path, {as_many:.0} at {all:.2}");
+    assert!(work < 0.8 * as_many && looks < 0.7 * all, "{work} {as_many}");
+}

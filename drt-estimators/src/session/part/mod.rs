@@ -1,14 +1,16 @@
 //! One estimator's share of a run: what it samples of which light.
 
+mod pilot;
+
 use alloc::vec::Vec;
 
 use super::describe::describe;
 use super::{Control, FinishedTile};
-use crate::allocation::{self, Allocation};
+use crate::allocation;
 use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm};
 use crate::inside::{self, Insides};
-use crate::interior::PixelSampler;
+use crate::interior::{AlongRays, Looks, PixelSampler};
 use crate::kept::Kept;
 use crate::parallel::Pool;
 use crate::pixels::Filling;
@@ -22,6 +24,7 @@ use crate::splatting::{Checked, ToImages};
 use crate::tangents::Tangents;
 use crate::transport::{Lit, World};
 use crate::{Error, Estimate};
+use pilot::Guidance;
 
 /// A scene prepared for one estimator, and what has been accumulated.
 pub(super) struct Part {
@@ -31,9 +34,17 @@ pub(super) struct Part {
     pub(super) plan: Plan,
     pixels: PixelFilm,
     splats: Vec<SplatFilm>,
-    /// Which pixels take more samples, once that is known.
-    allocation: Option<Allocation>,
+    /// Which pixels and terms take more samples, once that is known.
+    guidance: Option<Guidance>,
     pub(super) account: Account,
+}
+
+/// How pixels are sampled.
+#[derive(Clone, Copy)]
+struct Pixels {
+    seed: u64,
+    /// Terms go to layers of their own.
+    separate: bool,
 }
 
 /// What a call to [`Part::run`] needs besides.
@@ -87,7 +98,7 @@ impl Part {
         Ok(Self {
             pixels: PixelFilm::new(size, layers),
             splats: films,
-            allocation: None,
+            guidance: None,
             account: Account::default(),
             settings,
             prepared,
@@ -100,7 +111,7 @@ impl Part {
     pub(super) fn restart(&mut self, seed: u64) {
         self.pixels.clear();
         self.splats.iter_mut().for_each(SplatFilm::clear);
-        self.allocation = None;
+        self.guidance = None;
         self.account = Account::default();
         self.settings.seed = seed;
     }
@@ -114,7 +125,7 @@ impl Part {
         last: bool,
         progress: impl Fn(f64),
     ) -> (u32, bool) {
-        let per_unit = if self.plan.antithetic { 2 } else { 1 };
+        let per_unit = self.per_unit();
         let units = round.spp.div_ceil(per_unit);
         // The share of the work that is done when the pixels are.
         let share = if self.prepared.sources.is_empty() { 1.0 } else { 0.5 };
@@ -152,75 +163,101 @@ impl Part {
         tile: impl FnMut(&PixelFilm, core::ops::Range<u32>),
         progress: impl Fn(f64),
     ) -> u32 {
-        let wanted = self.settings.adaptive && self.allocation.is_none();
+        let wanted = self.settings.adaptive && self.guidance.is_none();
         let pilot = allocation::pilot(units).filter(|_| wanted).unwrap_or(0);
         let begun = f64::from(pilot) / f64::from(units.max(1));
-        if pilot > 0 {
-            let mut film = PixelFilm::new(self.pixels.size(), self.pixels.layers());
-            let seed = !self.settings.seed;
-            if self.fill(&mut film, seed, round, pilot, |_, _| {}, |part| progress(begun * part))
-                < pilot
-            {
-                return 0;
-            }
-            self.allocation = Some(Allocation::new(&film, self.derivative_layers()));
+        if pilot > 0 && !self.fly_pilot(round, pilot, |part| progress(begun * part)) {
+            return 0;
         }
         let mut film = core::mem::take(&mut self.pixels);
         let rest = |part| progress(begun + (1.0 - begun) * part);
-        let done = self.fill(&mut film, self.settings.seed, round, units - pilot, tile, rest);
+        let pass = Pixels { seed: self.settings.seed, separate: self.settings.terms };
+        let (account, done) = self.fill(&mut film, pass, round, units - pilot, tile, rest);
+        self.account.add(account);
         self.pixels = film;
         done + pilot
     }
 
-    /// The layers of each derivative; of the image where there are none.
-    fn derivative_layers(&self) -> impl Iterator<Item = Vec<usize>> + use<> {
-        let (layers, n) =
-            (self.pixels.layers(), self.motion.as_ref().map_or(0, Motion::parameters));
-        let image = (n == 0).then(|| alloc::vec![0]);
-        image.into_iter().chain((0..n).map(move |p| (1 + p..layers).step_by(n).collect()))
+    /// Paths of a sample.
+    fn per_unit(&self) -> u32 {
+        if self.plan.antithetic { 2 } else { 1 }
+    }
+
+    /// What is found along camera rays.
+    fn along_rays(&self) -> AlongRays<'_> {
+        let mut along = self.prepared.along_rays();
+        if let (Looks::Average(looks), Some(guidance)) = (&mut along.looks, &self.guidance) {
+            *looks = guidance.split.as_ref().map_or(*looks, |split| split.looks);
+        }
+        along
     }
 
     /// Takes samples of pixels; returns how many of each were finished.
     fn fill(
-        &mut self,
+        &self,
         film: &mut PixelFilm,
-        seed: u64,
+        pass: Pixels,
         round: &Round<'_>,
         units: u32,
         tile: impl FnMut(&PixelFilm, core::ops::Range<u32>),
         progress: impl Fn(f64),
-    ) -> u32 {
-        let (world, motion) = (&self.prepared.world, self.motion.as_ref());
-        let along = self.prepared.along_rays();
-        let (antithetic, separate) = (self.plan.antithetic, self.settings.terms);
+    ) -> (Account, u32) {
+        let (world, motion, along) =
+            (&self.prepared.world, self.motion.as_ref(), self.along_rays());
+        let Pixels { seed, separate } = pass;
         let filling = Filling {
             pool: round.pool,
             seed,
-            allocation: self.allocation.as_ref(),
+            allocation: self.guidance.as_ref().map(|g| &g.pixels),
             sampler: || {
                 let sink = motion.map(|m| Contraction::new(world, m));
-                PixelSampler::new(world, sink, along, seed, antithetic, separate)
+                PixelSampler::new(world, sink, along, seed, self.plan.antithetic, separate)
             },
         };
-        let account = &mut self.account;
+        let mut account = Account::default();
         let finished = |sampler: PixelSampler<'_, _>, part| {
             account.add(sampler.account());
             progress(part);
             !round.control.cancelled()
         };
-        filling.fill(film, units, finished, tile)
+        let done = filling.fill(film, units, finished, tile);
+        (account, done)
     }
 
-    /// Samples one splatted source in as many batches as error bars need.
+    /// Samples of a splatted source to each of a pixel.
+    fn source_ratio(&self, i: usize) -> f64 {
+        let split = self.guidance.as_ref().and_then(|guidance| guidance.split.as_ref());
+        split.map_or_else(|| self.prepared.source_ratio(&self.settings), |split| split.sources[i])
+    }
+
+    /// Samples one splatted source.
     fn run_splats(&mut self, round: &Round<'_>, i: usize, progress: impl Fn(f64)) -> bool {
-        let Some(motion) = &self.motion else { return true };
+        let per_pixel = f64::from(round.spp) * self.source_ratio(i);
+        let mut film = core::mem::take(&mut self.splats[i]);
+        let seed = self.settings.seed;
+        let (account, going) = self.splat(&mut film, i, seed, per_pixel, round, progress);
+        self.account.add(account);
+        self.splats[i] = film;
+        going
+    }
+
+    /// Takes so many samples per pixel of a splatted source, in as many batches as error bars need.
+    fn splat(
+        &self,
+        film: &mut SplatFilm,
+        i: usize,
+        seed: u64,
+        per_pixel: f64,
+        round: &Round<'_>,
+        progress: impl Fn(f64),
+    ) -> (Account, bool) {
+        let (mut account, mut finished) = (Account::default(), 0.0);
+        let Some(motion) = &self.motion else { return (account, true) };
         let source = self.prepared.sources[i];
-        let per_batch = self.prepared.samples_per_batch(&self.settings, round.spp);
-        let splatter = self.prepared.splatter(self.settings.seed);
-        let mut pass = self.splats[i].begin();
+        let per_batch = self.prepared.samples_per_batch(per_pixel);
+        let splatter = self.prepared.splatter(seed);
+        let mut pass = film.begin();
         let first = round.passes * BATCHES as u32;
-        let blocks = round.blocks;
-        let (account, mut finished) = (&mut self.account, 0.0);
         let going = round.pool.ordered(
             first..first + BATCHES as u32,
             1,
@@ -231,15 +268,15 @@ impl Part {
                 (receiver.inner.splats.settled(), account)
             },
             |b, (splats, of_batch)| {
-                pass.add(&splats, f64::from(per_batch), blocks);
+                pass.add(&splats, f64::from(per_batch), round.blocks);
                 account.add(of_batch);
                 finished += f64::from(per_batch);
                 progress(f64::from(b - first + 1) / BATCHES as f64);
                 !round.control.cancelled()
             },
         );
-        self.splats[i].finish(&pass, finished);
-        going
+        film.finish(&pass, finished);
+        (account, going)
     }
 
     /// The image so far of some pixels.
