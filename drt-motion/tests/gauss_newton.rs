@@ -226,14 +226,14 @@ fn noise_is_averaged_nearly_as_well_as_can_be() {
     println!("bound {bound:.4}, Gauss-Newton {ours:.4}, Adam {adam:.4}");
 }
 
-/// The mean over runs and variables of squared errors, in units of what `known` says they are, after the
-/// covariance of a gradient at the goal was told with each iteration.
-fn squared_errors(problem: &Squares, known: impl Fn(&Optimizer) -> Vec<f64>) -> f64 {
+/// The mean over runs and variables of squared errors, in units of what `known` says they are, after a
+/// multiple of the covariance of a gradient at the goal was told with each iteration.
+fn squared_errors(problem: &Squares, told: f64, known: impl Fn(&Optimizer) -> Vec<f64>) -> f64 {
     let (n, mut normal) = (problem.goal.len(), Normal::new(78));
     let gradients: Vec<Vec<f64>> =
         (0..4000).map(|_| problem.see(&problem.goal, &mut normal).gradient).collect();
     let product = |i: usize, j: usize| gradients.iter().map(|g| g[i] * g[j]).sum::<f64>();
-    let covariance = table(n, |i, j| product(i, j) / gradients.len() as f64);
+    let covariance = table(n, |i, j| told * product(i, j) / gradients.len() as f64);
     let run = |seed| {
         let (mut optimizer, mut normal) = (gauss_newton(n, 0.2), Normal::new(seed));
         for _ in 0..ITERATIONS {
@@ -253,15 +253,18 @@ fn squared_errors(problem: &Squares, known: impl Fn(&Optimizer) -> Vec<f64>) -> 
 fn how_well_values_are_known_is_known() {
     let problem = Squares { picture_noise: 0.1, derivative_noise: 0.1, ..Squares::new(8, 60) };
     let known = |o: &Optimizer| o.outlook(None).unwrap().unwrap().errors;
-    let squares = squared_errors(&problem, known);
+    let squares = squared_errors(&problem, 1.0, known);
     assert!((squares - 1.0).abs() < 0.4, "{squares}");
     // As if all that was averaged were one iteration.
-    let planted = squared_errors(&problem, |o| {
+    let planted = squared_errors(&problem, 1.0, |o| {
         let share = o.state().averages.as_ref().unwrap().share;
         known(o).iter().map(|e| e / fm::sqrt(share)).collect()
     });
     assert!(planted < 0.1, "{planted}");
-    println!("{squares:.3}, planted {planted:.3}");
+    // Gradients themselves show how far off they are.
+    let shown = squared_errors(&problem, 1.0 / 9.0, known);
+    assert!((shown - 1.0).abs() < 0.4, "{shown}");
+    println!("{squares:.3}, told too little {shown:.3}, planted {planted:.3}");
 }
 
 /// Without noise and without a step, what is left is the way to the goal.

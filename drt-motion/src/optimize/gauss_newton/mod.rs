@@ -60,6 +60,11 @@
 //! covariance of the values being H⁻¹ S H⁻¹. With the averaged H, each μ counts as at least q there: no less
 //! can be told from noise, and in a direction of less signal the values are known no better than that.
 //!
+//! What is averaged also errs by errors of H times steps, and by what is not quadratic. Both show: before an
+//! iteration is taken in, g_t is expected to be b, with the covariance C_t + S. Where the squared differences r by that
+//! measure, rᵀ (C_t + S)⁻¹ r, exceed their number n, all errors are larger than they are said to be by the root of the
+//! ratio (Birge 1932, "The Calculation of Errors by the Method of Least Squares"), in the same average over iterations.
+//!
 //! # Limits
 //!
 //! The step minimises b·Δ + Δ·B Δ / 2 where no variable moves by more than its learning rate, nor out of its
@@ -146,6 +151,8 @@ pub struct Averages {
     pub total: f64,
     /// 1/k = Σ w² / (Σ w)²: the variance of the averages relative to that of one iteration.
     pub share: f64,
+    /// rᵀ (C_t + S)⁻¹ r / n.
+    pub surprise: f64,
     /// f, the squared scatter of one iteration's curvature, relative to that with noise.
     pub scatter: f64,
 }
@@ -156,7 +163,8 @@ impl Averages {
         // As large as it can be, until it is seen.
         let scatter = 0.25 * n as f64;
         let gradient = alloc::vec![0.0; n];
-        Self { gradient, curvature, noise, covariance, total: 0.0, share: 0.0, scatter }
+        let (total, share, surprise) = (0.0, 0.0, 1.0);
+        Self { gradient, curvature, noise, covariance, total, share, surprise, scatter }
     }
 
     pub(super) fn check(&self, n: usize) -> Result<(), OptimizeError> {
@@ -171,11 +179,13 @@ impl Averages {
                 return Err(OptimizeError::Method { name, value, expected });
             }
         }
-        if self.scatter >= 0.0 && self.scatter.is_finite() {
-            return Ok(());
+        for (name, value) in [("scatter", self.scatter), ("surprise", self.surprise)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                let expected = "a number that is not negative";
+                return Err(OptimizeError::Method { name, value, expected });
+            }
         }
-        let expected = "a number that is not negative";
-        Err(OptimizeError::Method { name: "scatter", value: self.scatter, expected })
+        Ok(())
     }
 
     /// Takes an iteration into the averages; `slopes` are the derivatives of the values by their
@@ -196,11 +206,13 @@ impl Averages {
             }
             false => self.scatter,
         };
+        let surprise = self.surprise_by(seen, slopes);
         self.total += seen.weight;
         let part = f64::min(1.0, seen.weight / (memory * self.total));
         self.share = (1.0 - part) * (1.0 - part) * self.share + part * part;
         let towards = |mean: &mut f64, new: f64| *mean += part * (new - *mean);
         towards(&mut self.scatter, scatter);
+        towards(&mut self.surprise, surprise);
         for i in 0..n {
             towards(&mut self.gradient[i], seen.gradient[i] * slopes[i]);
             for j in 0..n {
@@ -213,6 +225,26 @@ impl Averages {
             }
         }
         Some(())
+    }
+
+    /// How far a gradient is from what was expected, over how far it should be; as before where that is not
+    /// known.
+    fn surprise_by(&self, seen: &Observation<'_>, slopes: &[f64]) -> f64 {
+        let n = slopes.len();
+        let error = |i: usize, j: usize| {
+            let own = seen.covariance.get(i).map_or(0.0, |row| row[j] * slopes[i] * slopes[j]);
+            own + self.covariance[i][j]
+        };
+        let root = |i: usize| fm::sqrt(error(i, i));
+        if self.total == 0.0 || (0..n).any(|i| root(i) == 0.0) {
+            return self.surprise;
+        }
+        let correlation = table(n, |i, j| error(i, j) / root(i) / root(j));
+        let Some(factor) = Cholesky::new(&correlation, LEAST_PIVOT) else { return self.surprise };
+        let difference = |i: usize| (seen.gradient[i] * slopes[i] - self.gradient[i]) / root(i);
+        let mut r: Vec<f64> = (0..n).map(difference).collect();
+        factor.solve_lower(&mut r);
+        dot(&r, &r) / n as f64
     }
 
     /// q.
@@ -244,6 +276,8 @@ impl Averages {
         let factor = Cholesky::new(&signal.matrix(|s| f64::max(s, q)), LEAST_PIVOT)?;
         let mut step: Vec<f64> = self.gradient.iter().map(|b| -b).collect();
         factor.solve(&mut step);
-        Some([step, factor.errors(&self.covariance)])
+        let more = fm::sqrt(self.surprise.max(1.0));
+        let errors = factor.errors(&self.covariance);
+        Some([step, errors.iter().map(|e| e * more).collect()])
     }
 }
