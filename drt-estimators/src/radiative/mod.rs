@@ -46,6 +46,7 @@ use drt_math::{CdfTable, Rng};
 
 use chambers::Chambers;
 use jumps::{Jump, Jumps};
+pub(crate) use tree::Options;
 pub(crate) use vertices::Edged;
 use views::Views;
 

@@ -8,7 +8,7 @@ use super::views::{Views, viewpoint};
 use super::{AT_REST, BY_THROUGHPUT, CARRIED, Chosen, Look, Radiative};
 use crate::transport::record::PathRecord;
 use crate::transport::trace::Endpoint;
-use crate::transport::{MaterialPoint, Tracer, Vertex, World};
+use crate::transport::{MaterialPoint, Tracer, Vertex};
 
 /// An edge's contribution to a path: a sum of speeds along `n`.
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +50,7 @@ impl Radiative {
         let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
         let wo = -arrival.dir;
         tracer.counters.boundary_samples += 1;
-        let chosen = self.look(tracer.world, vertex, wo, recorded.carried, look)?;
+        let chosen = self.look(tracer, vertex, wo, recorded.carried, look)?;
         let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex)?;
         let scattering = tracer.world.scattering(vertex)?;
         let f = scattering.eval(wo, -sight.w);
@@ -75,37 +75,40 @@ impl Radiative {
     /// stands still an edge at rest only does before something that moves and is held.
     fn look(
         &self,
-        world: &World,
+        tracer: &mut Tracer<'_>,
         vertex: &Vertex,
         wo: Vec3,
         carried: bool,
         look: &Look,
     ) -> Option<Chosen<'_>> {
-        let around = viewpoint(world, vertex, wo);
+        let Tracer { world, options, .. } = tracer;
+        let around = &viewpoint(world, vertex, wo);
         if carried {
-            return self.all.as_ref()?.sample(&self.jumps, around, look);
+            return self.all.as_ref()?.sample(&self.jumps, around, look, options);
         }
         let seen = |views: &&Views| self.chambers.in_sight(world, &views.among, vertex);
         let moving = self.moving.as_ref().filter(seen);
-        let resting = self.resting.as_ref().filter(seen).filter(|v| v.amount(around) > 0.0);
+        let resting = self.resting.as_ref().filter(seen);
+        let resting = resting.filter(|v| v.amount(around, options) > 0.0);
         let (Some(moving), Some(resting)) = (moving, resting) else {
-            return moving.or(resting)?.sample(&self.jumps, around, look);
+            return moving.or(resting)?.sample(&self.jumps, around, look, options);
         };
         // No edge is in both.
         let (mut look, at_rest) = (*look, look.way < AT_REST);
         let (views, from, chance) =
             if at_rest { (resting, 0.0, AT_REST) } else { (moving, AT_REST, 1.0 - AT_REST) };
         look.way = (look.way - from) / chance;
-        let chosen = views.sample(&self.jumps, around, &look)?;
+        let chosen = views.sample(&self.jumps, around, &look, options)?;
         Some(Chosen { inv_pdf: chosen.inv_pdf / chance, ..chosen })
     }
 
     /// An estimate of how much edges matter to a vertex; 0 only if they do not.
-    fn amount(&self, world: &World, vertex: &Vertex, wo: Vec3, carried: bool) -> f64 {
-        let around = || viewpoint(world, vertex, wo);
-        let of = |views: &Option<Views>| {
+    fn amount(&self, tracer: &mut Tracer<'_>, vertex: &Vertex, wo: Vec3, carried: bool) -> f64 {
+        let Tracer { world, options, .. } = tracer;
+        let around = viewpoint(world, vertex, wo);
+        let mut of = |views: &Option<Views>| {
             let seen = |v: &&Views| carried || self.chambers.in_sight(world, &v.among, vertex);
-            views.as_ref().filter(seen).map_or(0.0, |v| v.amount(around()))
+            views.as_ref().filter(seen).map_or(0.0, |v| v.amount(&around, options))
         };
         if carried {
             CARRIED * of(&self.all)
@@ -118,7 +121,7 @@ impl Radiative {
     /// much there is to see from it, at times to the former alone.
     fn choose_vertex(
         &self,
-        tracer: &Tracer<'_>,
+        tracer: &mut Tracer<'_>,
         record: &PathRecord,
         u: f64,
     ) -> Option<(usize, f64)> {
@@ -137,7 +140,7 @@ impl Radiative {
             if theta == 0.0 || !tracer.world.can_scatter(vertex) {
                 continue;
             }
-            let amount = self.amount(tracer.world, vertex, -arrival.dir, node.carried);
+            let amount = self.amount(tracer, vertex, -arrival.dir, node.carried);
             if amount > 0.0 {
                 choice.offer(k, [theta, theta * amount]);
             }

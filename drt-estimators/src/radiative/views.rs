@@ -1,8 +1,7 @@
 //! Which edge a vertex looks at: the [tree](super::tree), asked in several ways at once.
 //!
 //! Radiance jumps most where a lamp is behind an edge, or the lamp's own rim. So some looks go towards
-//! the spheres around the lamps, and the rest anywhere. A point's density is that of all ways together
-//! (balance heuristic of one sample; Veach and Guibas 1995).
+//! the spheres around the lamps, and the rest anywhere.
 //!
 //! An edge at rest matters to a vertex at rest only where something that moves holds what is seen right
 //! beside it: in the direction of a sphere around all that does, and no farther than its far side.
@@ -14,7 +13,7 @@ use drt_math::Vec3;
 
 use super::chambers::{Among, Chambers};
 use super::jumps::{Jump, Jumps};
-use super::tree::{EdgeTree, Segment, Viewpoint};
+use super::tree::{Draw, EdgeTree, MOST_WAYS, Options, Segment, Viewpoint, Way};
 use super::{Chosen, Look};
 use crate::surface::Lobes;
 use crate::transport::{Kind, Vertex, World};
@@ -23,7 +22,7 @@ use crate::transport::{Kind, Vertex, World};
 const TOWARD_LAMPS: f64 = 0.5;
 
 /// Lamps looked towards on purpose.
-const MOST_LAMPS: usize = 4;
+const MOST_LAMPS: usize = MOST_WAYS - 1;
 
 /// How much more radiance jumps at the edges of lamps.
 const LAMP: f64 = 4.0;
@@ -78,41 +77,33 @@ impl Views {
     }
 
     /// An estimate of how much there is to see: an integral of scattering and edges.
-    pub(super) fn amount(&self, around: Viewpoint) -> f64 {
-        match &self.toward[..] {
-            [all] if self.share == 1.0 => self.tree.amount(&around.toward(all.center, all.radius)),
-            _ => self.tree.amount(&around),
-        }
+    pub(super) fn amount(&self, around: &Viewpoint, options: &mut Options) -> f64 {
+        let way = match &self.toward[..] {
+            [all] if self.share == 1.0 => around.toward(1.0, all.center, all.radius),
+            _ => Way::anywhere(1.0),
+        };
+        self.tree.amount(around, &way, options)
     }
 
     /// Draws a point of an edge that can be seen from a viewpoint.
     pub(super) fn sample<'a>(
         &self,
         jumps: &'a Jumps,
-        around: Viewpoint,
+        around: &Viewpoint,
         look: &Look,
+        options: &mut Options,
     ) -> Option<Chosen<'a>> {
-        let mut way = look.way;
-        let (i, (_, view)) = self.ways(around).enumerate().find(|(_, (chance, _))| {
-            way -= chance;
-            way < 0.0
-        })?;
-        let chosen = self.tree.sample(&view, look.point)?;
-        let densities = self.ways(around).enumerate().map(|(k, (chance, view))| {
-            let known = (k == i).then(|| 1.0 / chosen.inv_pdf);
-            chance * known.unwrap_or_else(|| self.tree.pdf(&view, chosen.edge, chosen.u))
-        });
-        let density: f64 = densities.sum();
-        let jump = &jumps.list[self.jumps[chosen.edge] as usize];
-        (density > 0.0).then(|| Chosen { jump, along: chosen.u, inv_pdf: 1.0 / density })
-    }
-
-    /// The ways of looking, and their chances: towards spheres, and anywhere.
-    fn ways(&self, around: Viewpoint) -> impl Iterator<Item = (f64, Viewpoint)> {
+        let (mut ways, mut count) = ([Way::anywhere(1.0 - self.share); MOST_WAYS], 0);
         let each = self.share / self.toward.len().max(1) as f64;
-        let spheres = self.toward.iter().map(move |s| (each, around.toward(s.center, s.radius)));
-        let rest = 1.0 - self.share;
-        spheres.chain((rest > 0.0).then_some((rest, around)))
+        for (way, s) in ways.iter_mut().zip(&self.toward) {
+            *way = around.toward(each, s.center, s.radius);
+            count += 1;
+        }
+        count += usize::from(self.share < 1.0);
+        let draw = Draw { way: look.way, point: look.point };
+        let chosen = self.tree.sample(around, &ways[..count], &draw, options)?;
+        let jump = &jumps.list[self.jumps[chosen.edge] as usize];
+        Some(Chosen { jump, along: chosen.u, inv_pdf: chosen.inv_pdf })
     }
 }
 

@@ -22,6 +22,7 @@
 //! Towards grazing angles, where lobes are wide in one direction only, cosines count as α at least.
 
 use core::f64::consts::{FRAC_1_PI, PI};
+use core::ops::{Add, Div, Mul};
 
 use drt_math::{Vec3, fm};
 
@@ -43,11 +44,11 @@ pub(crate) struct Lobes {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Lobe {
     /// Unit.
-    axis: Vec3,
+    pub(crate) axis: Vec3,
     /// w².
-    width2: f64,
+    pub(crate) width2: f64,
     /// s / π.
-    height: f64,
+    pub(crate) height: f64,
 }
 
 impl Lobe {
@@ -56,11 +57,15 @@ impl Lobe {
         Self { axis, width2: width2.max(f64::MIN_POSITIVE), height: share * FRAC_1_PI }
     }
 
-    /// In the mean over angles about a direction, of the mean square `spread`.
-    fn toward(&self, dir: Vec3, spread: f64) -> f64 {
-        let w = self.width2 + spread;
-        let off = w + 2.0 * (1.0 - self.axis.dot(dir)).max(0.0);
-        self.height * w / (off * off)
+    /// The light of a lobe of that height and w² (or w² + σ²) where a direction is off its axis by a
+    /// vector of the squared length `off2`.
+    #[inline(always)]
+    pub(crate) fn value<T>(height: T, width2: T, off2: T) -> T
+    where
+        T: Copy + Add<Output = T> + Mul<Output = T> + Div<Output = T>,
+    {
+        let off = width2 + off2;
+        height * width2 / (off * off)
     }
 }
 
@@ -74,17 +79,6 @@ impl Lobes {
     fn glossy(even: f64, lobes: [Lobe; 2]) -> Self {
         let light: f64 = lobes.iter().map(|l| l.height).sum();
         Self { even: even + ANYWHERE * light, lobes }
-    }
-
-    /// Towards something of mean squared distance `r2` about a place `to` away, over which it reaches
-    /// `size2` in mean square, and which is seen at a given mean `cosine` to the normal.
-    pub(crate) fn toward(&self, to: Vec3, r2: f64, size2: f64, cosine: f64) -> f64 {
-        let even = self.even * cosine;
-        if self.lobes[0].height + self.lobes[1].height == 0.0 || r2 == 0.0 {
-            return even;
-        }
-        let (dir, spread) = (to / fm::sqrt(r2), size2 / r2);
-        even + self.lobes.iter().map(|l| l.toward(dir, spread)).sum::<f64>()
     }
 }
 

@@ -52,7 +52,7 @@ pub use change::{BsdfChange, BsdfParams, BsdfTangent};
 pub use conductor::RoughConductor;
 pub use dielectric::RoughDielectric;
 pub use diffuse::Diffuse;
-pub(crate) use lobes::Lobes;
+pub(crate) use lobes::{Lobe, Lobes};
 pub use microfacet::Distribution;
 pub use phong::Phong;
 pub use property::{Property, SurfaceError};

@@ -29,6 +29,7 @@ use super::lights::{LightKind, LightSample, LightTable};
 use super::vertex::{Kind, SurfacePoint, Vertex};
 use super::world::{Crossing, RayPath, World};
 use crate::Counters;
+use crate::radiative::Options;
 use crate::surface::Given;
 
 /// Longest path with unlimited depth: far beyond where Russian roulette lets any path go.
@@ -163,6 +164,8 @@ pub(crate) struct Tracer<'w> {
     /// Boxed, as it is lent out for every segment.
     pub(crate) ray: Option<Box<RayPath>>,
     pub(crate) shadow: RayPath,
+    /// Edges to look at.
+    pub(crate) options: Options,
 }
 
 impl<'w> Tracer<'w> {
@@ -174,6 +177,7 @@ impl<'w> Tracer<'w> {
             max_segments: world.max_depth.min(LONGEST),
             ray: None,
             shadow: RayPath::default(),
+            options: Options::default(),
         }
     }
 

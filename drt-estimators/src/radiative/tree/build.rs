@@ -7,12 +7,15 @@
 //! lie close together face alike too; to cut by their normals as well was found to gain nothing.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use drt_geom::Aabb;
 use drt_math::fm;
 
-use super::node::Node;
-use super::piece::Piece;
+use super::bundle::Bundle;
+use super::eight::LANES;
+use super::node::{Child, Family, Node};
+use super::piece::{Line, Piece};
 use super::{ARITY, EdgeTree, LEAF, Segment};
 
 impl EdgeTree {
@@ -24,14 +27,34 @@ impl EdgeTree {
         if pieces.is_empty() {
             return None;
         }
-        let unit = pieces.iter().map(Piece::most).sum();
-        let nodes = build(&mut pieces, unit);
-        let mut places = alloc::vec![u32::MAX; segments.len()];
-        for (piece, place) in pieces.iter().zip(0..) {
-            places[piece.edge as usize] = place;
+        let spans = spans(&mut pieces);
+        let (mut bundles, mut families) = (Vec::new(), 0);
+        let mut children = Vec::with_capacity(spans.len());
+        for span in &spans {
+            if span.children.is_empty() {
+                let first = bundles.len() as u32;
+                for from in (span.begin..span.end).step_by(LANES) {
+                    let until = span.end.min(from + LANES);
+                    bundles.push(Bundle::new(&pieces[from..until], from));
+                }
+                children.push(Child { first, bundles: bundles.len() as u32 - first });
+            } else {
+                children.push(Child { first: families, bundles: 0 });
+                families += 1;
+            }
         }
-        let largest = pieces.iter().fold(0.0, |m, p| f64::max(m, p.a.max_abs() + p.length));
-        Some(Self { nodes, pieces, places, unit, largest })
+        let family = |span: &Span| {
+            let node = |k: usize| {
+                let below = pieces[spans[k].begin..spans[k].end].iter();
+                (Node::around(below), children[k])
+            };
+            let nodes: Vec<(Node, Child)> = span.children.clone().map(node).collect();
+            Family::new(&nodes, span.len())
+        };
+        let families = spans.iter().filter(|s| !s.children.is_empty()).map(family).collect();
+        let lines: Vec<Line> = pieces.iter().map(|p| p.line).collect();
+        let largest = lines.iter().fold(0.0, |m, l| f64::max(m, l.a.max_abs() + l.length));
+        Some(Self { root: children[0], families, bundles, lines, largest })
     }
 }
 
@@ -52,19 +75,21 @@ struct Item {
 }
 
 /// Consecutive items.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Span {
     begin: usize,
     end: usize,
     depth: u32,
     /// What cutting it may gain.
     cost: f64,
+    /// Its parts among all spans.
+    children: Range<usize>,
 }
 
 impl Span {
     fn new(begin: usize, end: usize, depth: u32, items: &[Item]) -> Self {
         let all = items[begin..end].iter().fold(Bin::EMPTY, |bin, item| bin.with(&item.into()));
-        Self { begin, end, depth, cost: all.cost() }
+        Self { begin, end, depth, cost: all.cost(), children: 0..0 }
     }
 
     fn len(&self) -> usize {
@@ -81,28 +106,21 @@ impl Span {
     }
 }
 
-/// Orders the pieces and builds the nodes over them, the children of each in a row.
-fn build(pieces: &mut Vec<Piece>, unit: f64) -> Vec<Node> {
+/// Orders the pieces by the spans they are in, of which the first has all. Parts of one are in a row.
+fn spans(pieces: &mut Vec<Piece>) -> Vec<Span> {
     let mut items = items(pieces);
-    let node = |span: &Span, items: &[Item]| {
-        let below = items[span.begin..span.end].iter().map(|i| &pieces[i.piece as usize]);
-        Node::around(below, unit, span.end as u32)
-    };
     let mut spans = alloc::vec![Span::new(0, items.len(), 0, &items)];
-    let mut nodes = alloc::vec![node(&spans[0], &items)];
     let mut next = 0;
-    while next < nodes.len() {
+    while next < spans.len() {
         if spans[next].len() > LEAF {
-            nodes[next].children = nodes.len() as u32;
-            for child in cut_often(spans[next], &mut items) {
-                nodes.push(node(&child, &items));
-                spans.push(child);
-            }
+            let first = spans.len();
+            spans.extend(cut_often(spans[next].clone(), &mut items));
+            spans[next].children = first..spans.len();
         }
         next += 1;
     }
     *pieces = items.iter().map(|i| pieces[i.piece as usize]).collect();
-    nodes
+    spans
 }
 
 /// The parts of a span after as many cuts as make [`ARITY`] of them, each cut where most is gained.
@@ -194,9 +212,9 @@ const LENGTH: usize = 3;
 
 fn items(pieces: &[Piece]) -> Vec<Item> {
     let item = |(p, piece): (&Piece, u32)| {
-        let bounds = Aabb::around([p.a, p.end()]);
+        let bounds = Aabb::around(p.line.ends());
         let [x, y, z] = bounds.center().to_array();
-        Item { bounds, key: [x, y, z, fm::ln(p.length)], weight: p.most(), piece }
+        Item { bounds, key: [x, y, z, fm::ln(p.line.length)], weight: p.most(), piece }
     };
     pieces.iter().zip(0..).map(item).collect()
 }

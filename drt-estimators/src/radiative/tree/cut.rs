@@ -7,104 +7,100 @@
 //! is judged by itself.
 //!
 //! Not so from points of surfaces: what is nearest to them are mostly edges of the same mesh, which
-//! move along and jump by little. To judge those well was found to cost twice the variance.
+//! move along and jump by little. To judge those well was found to cost twice the variance. Only
+//! the few long edges of a room around a fine mesh are looked at one by one from there, too: of a node
+//! with many segments, children with few.
 
-use super::node::Node;
-use super::view::Viewpoint;
-use super::{ARITY, EVEN, EdgeTree, LEAF};
+use super::eight::{Eight, LANES};
+use super::node::Child;
+use super::options::{Group, Options};
+use super::seen::{Seen, Toward};
+use super::view::{MOST_WAYS, Viewpoint, Way};
+use super::{ARITY, EdgeTree, LEAF};
 
-/// Nodes nearer than this, in half diagonals of their boxes, are opened.
-const NEAR: f64 = 0.5;
+/// Most groups of a cut: beyond this nothing more is opened.
+const MOST: usize = 64;
 
-/// Most entries of a cut: beyond this nothing more is opened.
-const MOST: usize = 384;
+/// Of a node with more segments than this, children without nodes of their own are opened, too.
+const MANY: usize = ARITY * LEAF;
 
-/// Parts of the pieces in their order, with estimates of what they amount to.
-pub(super) struct Cut {
-    weights: [f64; MOST],
-    /// The place after the last piece of each.
-    ends: [u32; MOST],
-    /// The node of each, 0 for a single piece.
-    nodes: [u32; MOST],
+/// A look, ready for groups of eight.
+pub(super) struct Looking {
+    pub(super) seen: Seen,
+    ways: [Toward; MOST_WAYS],
     count: usize,
+    /// To choose, and not only to see how much there is.
+    finely: bool,
 }
 
-impl Cut {
-    pub(super) fn weights(&self) -> &[f64] {
-        &self.weights[..self.count]
+impl Looking {
+    /// `None` where nothing counts.
+    pub(super) fn new(view: &Viewpoint, ways: &[Way], slack: f64, finely: bool) -> Option<Self> {
+        let mut all = [Toward::from(&Way::anywhere(0.0)); MOST_WAYS];
+        all.iter_mut().zip(ways).for_each(|(a, w)| *a = w.into());
+        let count = ways.len().min(MOST_WAYS);
+        Some(Self { seen: Seen::new(view, slack)?, ways: all, count, finely })
     }
 
-    pub(super) fn ends(&self) -> &[u32] {
-        &self.ends[..self.count]
-    }
-
-    pub(super) fn node(&self, k: usize) -> u32 {
-        self.nodes[k]
-    }
-
-    fn add(&mut self, weight: f64, end: u32, node: u32) {
-        let k = self.count;
-        (self.weights[k], self.ends[k], self.nodes[k]) = (weight, end, node);
-        self.count += 1;
-    }
-
-    /// Gives nodes an equal share in a part of all choices. Pieces are known too well to need it.
-    pub(super) fn even_out(&mut self) {
-        let total: f64 = self.weights().iter().sum();
-        let judged = |k: &usize| self.nodes[*k] != 0 && self.weights[*k] > 0.0;
-        let share = EVEN * total / (0..self.count).filter(judged).count().max(1) as f64;
-        for (weight, node) in self.weights.iter_mut().zip(self.nodes).take(self.count) {
-            *weight += if node != 0 && *weight > 0.0 { share } else { 0.0 };
-        }
+    fn ways(&self) -> &[Toward] {
+        &self.ways[..self.count]
     }
 }
 
 impl EdgeTree {
     /// All that may count.
-    pub(super) fn cut(&self, view: &Viewpoint, slack: f64) -> Cut {
-        let mut cut = Cut { weights: [0.0; MOST], ends: [0; MOST], nodes: [0; MOST], count: 0 };
-        self.open((0, 0), 0, view, slack, &mut cut);
-        cut
+    pub(super) fn cut(&self, looking: &Looking, options: &mut Options) {
+        options.clear(looking.count);
+        self.add(self.root, looking, looking.seen.normal.is_none(), options);
     }
 
-    /// An estimate of the integral over all segments of kernel, scattering and weight.
-    pub(crate) fn amount(&self, view: &Viewpoint) -> f64 {
-        let (slack, root) = (self.slack(view), &self.nodes[0]);
-        let sum = match (view.normal, root.children) {
-            (None, _) => self.cut(view, slack).weights().iter().sum(),
-            (_, 0) => root.importance(view, slack),
-            _ => self.children(root, 0).map(|(child, _)| child.importance(view, slack)).sum(),
-        };
-        self.unit * sum
+    /// What is below a child.
+    pub(super) fn below(&self, child: Child, looking: &Looking, options: &mut Options) {
+        options.clear(looking.count);
+        self.add(child, looking, false, options);
     }
 
-    fn open(
-        &self,
-        (node, begin): (u32, u32),
-        after: usize,
-        view: &Viewpoint,
-        slack: f64,
-        cut: &mut Cut,
-    ) {
-        let Node { children, end, .. } = self.nodes[node as usize];
-        if children == 0 {
-            let pieces = &self.pieces[begin as usize..end as usize];
-            for (place, piece) in (begin..).zip(pieces) {
-                cut.add(piece.weigh(view, slack) / self.unit, place + 1, 0);
-            }
-            return;
+    fn add(&self, child: Child, looking: &Looking, open: bool, options: &mut Options) {
+        if child.bundles == 0 {
+            return self.add_family(child.first, looking, open, options);
         }
-        for (k, (child, from)) in (children..).zip(self.children(&self.nodes[node as usize], begin))
-        {
-            let weight = child.importance(view, slack);
-            let near = weight > 0.0 && view.normal.is_none() && child.is_near(view, NEAR);
-            // Those that come after it on its own level and above need their room.
-            let after = after + ARITY;
-            if near && cut.count + LEAF + after <= MOST {
-                self.open((k, from), after, view, slack, cut);
-            } else {
-                cut.add(weight, child.end, k);
+        for index in child.first..child.first + child.bundles {
+            let (bundle, mut all) = (&self.bundles[index as usize], [Eight::ZERO; MOST_WAYS]);
+            let (weight, lines) = bundle.weigh(&looking.seen);
+            for (w, way) in all.iter_mut().zip(looking.ways()) {
+                *w = bundle.toward(way, &looking.seen, weight, &lines);
             }
+            options.add(Group::Bundle(index), bundle.unit, &all[..looking.count]);
+        }
+    }
+
+    fn add_family(&self, index: u32, looking: &Looking, open: bool, options: &mut Options) {
+        let (family, mut all) = (&self.families[index as usize], [Eight::ZERO; MOST_WAYS]);
+        let (weight, boxes) = family.weigh(&looking.seen);
+        for (w, way) in all.iter_mut().zip(looking.ways()) {
+            *w = family.toward(way, weight, &boxes);
+        }
+        let all = &mut all[..looking.count];
+        let few = looking.finely && family.count as usize > MANY;
+        let mut opened = [Child::default(); LANES];
+        let mut count = 0;
+        if open || few {
+            let near = if open { family.near(&boxes) } else { Eight::ZERO };
+            let mut room = MOST.saturating_sub(options.groups().len() + 1);
+            for (lane, child) in family.children.iter().enumerate() {
+                let badly_judged = near.0[lane] > 0.0 || (few && child.bundles > 0);
+                let groups = child.bundles.max(1) as usize;
+                if badly_judged && groups <= room && all.iter().any(|w| w.0[lane] > 0.0) {
+                    all.iter_mut().for_each(|w| w.0[lane] = 0.0);
+                    room -= groups;
+                    opened[count] = *child;
+                    count += 1;
+                }
+            }
+        }
+        options.add(Group::Family(index), family.unit, all);
+        for child in &opened[..count] {
+            self.add(*child, looking, true, options);
         }
     }
 }

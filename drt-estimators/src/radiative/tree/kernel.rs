@@ -55,16 +55,6 @@ impl Kernel {
         d * (far - near) * (a + b) / ((b * r0 + a * r1) * r0 * r1)
     }
 
-    /// The middle, and nearly the integral, of a part that is half as long as it is far away or
-    /// shorter; `None` for others. It is off by a seventh at most.
-    pub(super) fn of_short(&self) -> Option<(f64, f64)> {
-        let Self { near, far, d } = *self;
-        let (middle, length) = (0.5 * (near + far), far - near);
-        let r2 = d * d + middle * middle;
-        let short = 4.0 * length * length < r2;
-        short.then(|| (middle, d * length / (r2 * Real::sqrt(r2))))
-    }
-
     /// The point for a uniform number.
     pub(super) fn sample(&self, u: f64) -> f64 {
         let Self { near, far, d } = *self;

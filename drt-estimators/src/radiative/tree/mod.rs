@@ -25,25 +25,31 @@
 //! and lobes, as wide as the node is seen besides their own width. The estimate ([`node`]) is positive
 //! wherever an edge below may count, so nothing is lost, and 0 where it is proved that none does.
 //! Near x nodes are opened first, down to their edges ([`cut`]), and the first choice is among all that
-//! this leaves.
-//! Nodes have eight children, as each choice adds its error and a wide tree has few of them; leaves
-//! weigh each of their edges by what it really amounts to ([`piece`]), and so does a node with many
-//! segments for children with few. On the edge the density is sin / r^2, exactly ([`kernel`]). A
-//! sample costs time logarithmic in the number of edges.
+//! this leaves. Nodes have eight children, as each choice adds its error and a wide tree has few of
+//! them, and as eight are [judged at once](eight); leaves weigh their edges one by one, eight at once too
+//! ([`bundle`]). On the edge the density is sin / r^2, exactly ([`kernel`]). A sample costs time
+//! logarithmic in the number of edges.
 //!
 //! A node may turn out to hold nothing that counts after all. Then there is no sample, and the
 //! density is what it is, with an integral below one: an estimate that takes such a sample for zero
 //! is unbiased.
 //!
-//! The same tree also draws points towards a light: those in the cone of directions to a sphere
-//! around it ([`Viewpoint::toward`]), with segments cut to their part in the cone. Both densities are
-//! known at any point, so that the two can share samples (Veach & Guibas 1995).
+//! There are several [ways](Way) to look, as towards a light: at what is in the cone of directions to a
+//! sphere around it, with edges cut to their part in the cone. One way is drawn for each sample, but
+//! on the way down the probabilities of all are known, since all weigh the same nodes and differ only by
+//! how much of them is in a cone. So the density is that of all ways together, at the cost of one
+//! descent (balance heuristic of one sample; Veach & Guibas 1995). Ways that have nothing to choose
+//! from leave their part to the others.
 
 mod build;
+mod bundle;
 mod cut;
+mod eight;
 mod kernel;
 mod node;
+mod options;
 mod piece;
+mod seen;
 #[cfg(all(test, feature = "std"))]
 mod tests;
 mod view;
@@ -52,9 +58,13 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
-use node::Node;
-use piece::{Piece, Stretch};
-pub(crate) use view::Viewpoint;
+use bundle::Bundle;
+use cut::Looking;
+use node::{Child, Family};
+use options::Group;
+pub(crate) use options::Options;
+use piece::Line;
+pub(crate) use view::{MOST_WAYS, Viewpoint, Way};
 
 /// An edge of a surface at which the radiance may jump that arrives at a point.
 #[derive(Clone, Copy, Debug)]
@@ -82,24 +92,22 @@ pub(crate) struct Chosen {
     pub(crate) inv_pdf: f64,
 }
 
-/// Edges to choose from: a node's children are consecutive, and so are the pieces below it. Where
-/// they are follows from where each ends; a node takes up 96 bytes.
+/// Edges to choose from.
 #[derive(Debug)]
 pub(crate) struct EdgeTree {
-    /// The root first.
-    nodes: Vec<Node>,
+    root: Child,
+    /// The children of nodes.
+    families: Vec<Family>,
     /// In the order of the leaves.
-    pieces: Vec<Piece>,
-    /// Where each of the caller's segments is among the pieces.
-    places: Vec<u32>,
-    /// The weight in which the nodes count.
-    unit: f64,
+    bundles: Vec<Bundle>,
+    /// In the same order.
+    lines: Vec<Line>,
     /// Of all coordinates.
     largest: f64,
 }
 
 /// Most children of a node.
-const ARITY: usize = 8;
+const ARITY: usize = eight::LANES;
 
 /// Evenly made choices in comparison with others.
 const EVEN: f64 = 0.1;
@@ -107,34 +115,48 @@ const EVEN: f64 = 0.1;
 /// Most segments of a leaf: among fewer than this, the number of silhouettes is hard to guess.
 const LEAF: usize = 32;
 
+/// Uniform numbers to draw a point with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Draw {
+    /// For the way of looking.
+    pub(crate) way: f64,
+    /// For the edge: what each choice leaves of it serves for the next. And for the place on it.
+    pub(crate) point: [f64; 2],
+}
+
 impl EdgeTree {
-    /// Draws a point with two uniform numbers: the first chooses the edge, what each choice leaves of
-    /// it serving for the next, the second the place on it. `None` where nothing counts, or nothing
-    /// is found (see [above](self)).
-    pub(crate) fn sample(&self, view: &Viewpoint, [mut u, along]: [f64; 2]) -> Option<Chosen> {
-        let (place, pmf, stretch) = self.descend(view, |_, weights, total| {
-            let mut target = u * total;
-            let mut chosen = None;
-            for (k, w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
-                chosen = Some(k);
-                if target < *w {
-                    u = target / w;
-                    break;
-                }
-                target -= w;
-            }
-            chosen
+    /// Draws a point by looking one of several ways; its density is that of all of them together.
+    /// `None` where nothing counts, or nothing is found (see [above](self)).
+    pub(crate) fn sample(
+        &self,
+        view: &Viewpoint,
+        ways: &[Way],
+        draw: &Draw,
+        options: &mut Options,
+    ) -> Option<Chosen> {
+        let [mut u, along] = draw.point;
+        let mut by = None;
+        let (line, chances) = self.descend(view, ways, options, |options, chances| {
+            let way = match by {
+                Some(way) => way,
+                None => *by.insert(pick(chances, draw.way)?),
+            };
+            options.choose(way, &mut u)
         })?;
-        let t = stretch.sample(along);
-        let pdf = pmf * stretch.pdf(t);
-        Some(Chosen { edge: self.pieces[place].edge as usize, u: t, inv_pdf: 1.0 / pdf })
+        let slack = self.slack(view);
+        let u = line.stretch(view, &ways[by?], slack)?.sample(along);
+        let pdf = density(line, view, ways, &chances, u, slack);
+        Some(Chosen { edge: line.edge as usize, u, inv_pdf: 1.0 / pdf })
     }
 
-    /// The density per length of [`EdgeTree::sample`].
-    pub(crate) fn pdf(&self, view: &Viewpoint, edge: usize, u: f64) -> f64 {
-        let Some(place) = self.places.get(edge).filter(|p| **p != u32::MAX) else { return 0.0 };
-        let found = self.descend(view, |ends, _, _| ends.iter().position(|end| place < end));
-        found.map_or(0.0, |(_, pmf, stretch)| pmf * stretch.pdf(u))
+    /// An estimate of the integral over all segments of kernel, scattering and weight, looking one way.
+    pub(crate) fn amount(&self, view: &Viewpoint, way: &Way, options: &mut Options) -> f64 {
+        let slack = self.slack(view);
+        let Some(looking) = Looking::new(view, core::slice::from_ref(way), slack, false) else {
+            return 0.0;
+        };
+        self.cut(&looking, options);
+        options.sum(0)
     }
 
     /// What rounding may move places by.
@@ -142,84 +164,72 @@ impl EdgeTree {
         1e-15 * (self.largest + view.x.max_abs())
     }
 
-    /// A node's children, each with the place of its first piece.
-    fn children<'a>(
-        &'a self,
-        node: &'a Node,
-        mut begin: u32,
-    ) -> impl Iterator<Item = (&'a Node, u32)> {
-        let mut children = self.nodes[node.children as usize..].iter();
-        core::iter::from_fn(move || {
-            let child = (begin < node.end).then(|| children.next())??;
-            let from = core::mem::replace(&mut begin, child.end);
-            Some((child, from))
-        })
-    }
-
-    /// Goes down by choices among weights, of parts of the pieces that have the given ends. Returns
-    /// the piece, the probability, and what of the piece counts.
+    /// Goes down by choices among options, given how probable what they are part of is, each way.
+    /// Returns the line, and how probable it is.
     fn descend(
         &self,
         view: &Viewpoint,
-        mut choose: impl FnMut(&[u32], &[f64], f64) -> Option<usize>,
-    ) -> Option<(usize, f64, Stretch)> {
-        if !view.x.is_finite() {
-            return None;
-        }
-        let slack = self.slack(view);
-        let mut pick = |ends: &[u32], weights: &[f64]| {
-            let total: f64 = weights.iter().sum();
-            if !(total > 0.0 && total.is_finite()) {
-                return None;
+        ways: &[Way],
+        options: &mut Options,
+        mut choose: impl FnMut(&Options, &[f64]) -> Option<(usize, usize)>,
+    ) -> Option<(&Line, [f64; MOST_WAYS])> {
+        let looking = Looking::new(view, ways, self.slack(view), true)?;
+        self.cut(&looking, options);
+        let mut chances = first_chances(ways, options);
+        loop {
+            let (group, lane) = choose(options, &chances[..ways.len()])?;
+            for (way, chance) in chances[..ways.len()].iter_mut().enumerate() {
+                *chance *= options.chance(way, (group, lane));
             }
-            let k = choose(ends, weights, total)?;
-            (weights[k] > 0.0).then(|| (k, weights[k] / total))
-        };
-        let mut cut = self.cut(view, slack);
-        cut.even_out();
-        let (k, mut pmf) = pick(cut.ends(), cut.weights())?;
-        let mut begin = if k > 0 { cut.ends()[k - 1] } else { 0 };
-        let stretch = |place: u32| self.pieces[place as usize].stretch(view, slack);
-        let mut node = match cut.node(k) {
-            0 => return Some((begin as usize, pmf, stretch(begin)?)),
-            node => &self.nodes[node as usize],
-        };
-        let (mut weights, mut ends) = ([0.0; LEAF], [0; LEAF]);
-        while node.children != 0 {
-            let many = (node.end - begin) as usize > ARITY * LEAF;
-            let mut count = 0;
-            for (child, from) in self.children(node, begin) {
-                weights[count] = if many && child.children == 0 {
-                    let few = &self.pieces[from as usize..child.end as usize];
-                    few.iter().map(|piece| piece.weigh(view, slack)).sum::<f64>() / self.unit
-                } else {
-                    child.importance(view, slack)
-                };
-                ends[count] = child.end;
-                count += 1;
+            match options.groups()[group] {
+                Group::Family(f) => {
+                    let child = self.families[f as usize].children[lane];
+                    self.below(child, &looking, options);
+                }
+                Group::Bundle(b) => {
+                    let place = self.bundles[b as usize].first as usize + lane;
+                    return Some((&self.lines[place], chances));
+                }
             }
-            even_out(&mut weights[..count]);
-            let (k, p) = pick(&ends[..count], &weights[..count])?;
-            begin = if k > 0 { ends[k - 1] } else { begin };
-            (node, pmf) = (&self.nodes[node.children as usize + k], pmf * p);
         }
-        let pieces = &self.pieces[begin as usize..node.end as usize];
-        for (k, piece) in pieces.iter().enumerate() {
-            (weights[k], ends[k]) = (piece.weigh(view, slack), begin + k as u32 + 1);
-        }
-        let (k, p) = pick(&ends[..pieces.len()], &weights[..pieces.len()])?;
-        let place = begin + k as u32;
-        Some((place as usize, pmf * p, stretch(place)?))
     }
 }
 
-/// Gives children that may count an equal share in a part of all choices: an estimate may be too low
-/// by any factor, and variance grows with the greatest.
-fn even_out(weights: &mut [f64]) {
-    let total: f64 = weights.iter().sum();
-    let positive = weights.iter().filter(|w| **w > 0.0).count();
-    let share = EVEN * total / positive.max(1) as f64;
-    for w in weights.iter_mut().filter(|w| **w > 0.0) {
-        *w += share;
+/// The chances of ways that have something to choose.
+fn first_chances(ways: &[Way], options: &Options) -> [f64; MOST_WAYS] {
+    let mut chances = [0.0; MOST_WAYS];
+    for (k, way) in ways.iter().enumerate() {
+        chances[k] = if options.sum(k) > 0.0 { way.chance } else { 0.0 };
     }
+    let total: f64 = chances.iter().sum();
+    chances.map(|c| if c > 0.0 { c / total } else { 0.0 })
+}
+
+/// One of some chances that sum to one.
+fn pick(chances: &[f64], mut u: f64) -> Option<usize> {
+    let mut chosen = None;
+    for (k, chance) in chances.iter().enumerate().filter(|(_, c)| **c > 0.0) {
+        chosen = Some(k);
+        u -= chance;
+        if u < 0.0 {
+            break;
+        }
+    }
+    chosen
+}
+
+/// Density per length at a place on a line.
+fn density(
+    line: &Line,
+    view: &Viewpoint,
+    ways: &[Way],
+    chances: &[f64; MOST_WAYS],
+    u: f64,
+    slack: f64,
+) -> f64 {
+    let possible = ways.iter().zip(chances).filter(|(_, chance)| **chance > 0.0);
+    let of = |(way, chance): (&Way, &f64)| {
+        line.stretch(view, way, slack).map_or(0.0, |s| chance * s.pdf(u))
+    };
+    possible.map(of).sum()
 }

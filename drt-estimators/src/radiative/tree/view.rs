@@ -11,10 +11,20 @@ pub(crate) struct Viewpoint {
     pub(super) normal: Option<(Vec3, bool)>,
     /// What is scattered from where.
     pub(super) lobes: Lobes,
+}
+
+/// One of several ways to look from a viewpoint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Way {
+    /// The part of looks that go this way.
+    pub(super) chance: f64,
     pub(super) cone: Option<Cone>,
     /// Edges farther away do not matter.
     pub(super) reach: f64,
 }
+
+/// Most ways of a look.
+pub(crate) const MOST_WAYS: usize = 5;
 
 /// A cone of directions less than a right angle wide on either side.
 #[derive(Clone, Copy, Debug)]
@@ -31,7 +41,7 @@ impl Viewpoint {
     /// normal goes whether light from below counts too; where it does not, what lies below the
     /// plane through `x` does not matter.
     pub(crate) fn new(x: Vec3, normal: Option<(Vec3, bool)>) -> Self {
-        Self { x, normal, lobes: Lobes::even(1.0), cone: None, reach: f64::INFINITY }
+        Self { x, normal, lobes: Lobes::even(1.0) }
     }
 
     /// The same, where light scatters as in a sketch.
@@ -39,9 +49,9 @@ impl Viewpoint {
         Self { lobes, ..self }
     }
 
-    /// The same, looking only at what may be before a sphere: in the cone of directions that meet it,
-    /// up to its far side. From inside the sphere these are all directions.
-    pub(crate) fn toward(self, center: Vec3, radius: f64) -> Self {
+    /// Looking only at what may be before a sphere: in the cone of directions that meet it, up to its
+    /// far side. From inside the sphere these are all directions.
+    pub(crate) fn toward(&self, chance: f64, center: Vec3, radius: f64) -> Way {
         let to = center - self.x;
         let distance = to.length();
         let sin = radius / distance;
@@ -49,35 +59,18 @@ impl Viewpoint {
             let cos = Real::sqrt((1.0 - sin) * (1.0 + sin));
             Cone { axis: to / distance, cos, sin }
         });
-        Self { cone, reach: (distance + radius) * (1.0 + 1e-9), ..self }
+        Way { chance, cone, reach: (distance + radius) * (1.0 + 1e-9) }
+    }
+}
+
+impl Way {
+    /// Looking at all edges there are.
+    pub(crate) const fn anywhere(chance: f64) -> Self {
+        Self { chance, cone: None, reach: f64::INFINITY }
     }
 }
 
 impl Cone {
-    /// An estimate of how much of a box lies in the cone whose apex is at `-center`: 0 only if none
-    /// does, 1 where all does. `half` are half its edges.
-    ///
-    /// The plane that touches the cone in its line nearest to the box's centre has the cone on one
-    /// side. Where the box lies on the other they are apart.
-    pub(super) fn overlap(&self, center: Vec3, half: Vec3) -> f64 {
-        let (along, aside) = self.split(center);
-        let off = aside.length();
-        if off == 0.0 {
-            return if along > 0.0 { 1.0 } else { ALMOST_NOTHING };
-        }
-        let normal = aside * (self.cos / off) - self.axis * self.sin;
-        let outside = off * self.cos - along * self.sin;
-        let reach = normal.x.abs() * half.x + normal.y.abs() * half.y + normal.z.abs() * half.z;
-        if outside > reach * (1.0 + 1e-9) {
-            return 0.0;
-        }
-        if reach == 0.0 {
-            return 1.0;
-        }
-        let across = ((reach - outside) / (2.0 * reach)).clamp(ALMOST_NOTHING, 1.0);
-        across * f64::min(1.0, center.length() * self.sin / reach).max(ALMOST_NOTHING)
-    }
-
     /// The part of a line inside the cone whose apex is the origin, from `near` to `far` along it:
     /// an interval, as a cone is convex.
     pub(super) fn clip(
@@ -127,6 +120,3 @@ impl Cone {
         (along, v - self.axis * along)
     }
 }
-
-/// What a node that may count has left at least of its weight.
-pub(super) const ALMOST_NOTHING: f64 = 1e-6;

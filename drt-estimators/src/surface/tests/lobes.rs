@@ -33,6 +33,14 @@ fn cost(
     second * whole / (light * light)
 }
 
+/// What a sketch says of a direction seen at a `cosine` to the normal.
+fn toward(lobes: &Lobes, w: Vec3, cosine: f64) -> f64 {
+    let off2 = |axis: Vec3| (w - axis).length_squared();
+    let value = |l: &Lobe| Lobe::value(l.height, l.width2, off2(l.axis));
+    let shown = lobes.lobes.iter().filter(|l| l.height > 0.0);
+    lobes.even * cosine + shown.map(value).sum::<f64>()
+}
+
 fn cost_of(bsdf: &Bsdf, wo: Vec3, sketched: Vec3) -> f64 {
     let n = normal();
     let lobes = bsdf.lobes(sketched, n);
@@ -40,7 +48,7 @@ fn cost_of(bsdf: &Bsdf, wo: Vec3, sketched: Vec3) -> f64 {
     let sketch = |w: Vec3| {
         let cosine = n.dot(w) * n.dot(wo).signum();
         let shown = below || cosine > 0.0;
-        if shown { lobes.toward(w * 3.0, 9.0, 0.0, cosine.abs()) } else { 0.0 }
+        if shown { toward(&lobes, w, cosine.abs()) } else { 0.0 }
     };
     let draw = |rng: &mut Rng| Some(bsdf.sample(wo, n, random_3d(rng), Given::Wo)?.w);
     let density = |w: Vec3| bsdf.pdf(wo, w, n, Given::Wo);
@@ -82,7 +90,7 @@ fn phase_functions() {
             let lobes = lobes(peak);
             let draw = |rng: &mut Rng| Some(phase.sample(-wo, rng.next_2d()).0);
             let f = |w: Vec3| phase.eval(-wo.dot(w));
-            cost(f, |w| lobes.toward(w, 1.0, 0.0, 1.0), draw, f)
+            cost(f, |w| toward(&lobes, w, 1.0), draw, f)
         };
         let right = cost_with(phase.eval(g.signum()));
         assert!(right < 1.4, "{right} for {g}");

@@ -21,6 +21,7 @@ fn outside(count: u32) -> Vec<Viewpoint> {
 fn against_lengths(mesh: &Mesh, views: &[Viewpoint], samples: u32) -> [Vec<f64>; 2] {
     let segments = segments(mesh, (1.0, [0.0; 2]));
     let tree = EdgeTree::new(&segments).unwrap();
+    let mut tree = Drawing::new(&tree);
     let lengths: Vec<f64> = segments.iter().map(|s| (s.b - s.a).length()).collect();
     let total: f64 = lengths.iter().sum();
     let table = CdfTable::new(&lengths).unwrap();
@@ -34,7 +35,7 @@ fn against_lengths(mesh: &Mesh, views: &[Viewpoint], samples: u32) -> [Vec<f64>;
         let mut rng = Rng::new(5, 0, 0);
         let value = |edge: usize, u: f64| kernel(&segments[edge], u, view);
         let (by_tree, time) = timed(samples, &mut || {
-            tree.sample(view, rng.next_2d()).map_or(0.0, |c| value(c.edge, c.u) * c.inv_pdf)
+            tree.sample(view, &ALL, &mut rng).map_or(0.0, |c| value(c.edge, c.u) * c.inv_pdf)
         });
         let mut rng = Rng::new(6, 0, 0);
         let (by_length, length_time) = timed(10 * samples, &mut || {
@@ -66,10 +67,12 @@ fn a_room_around_a_fine_mesh_costs_little() {
     for view in outside(5) {
         let [alone, inside] = [&ball, &both].map(|segments| {
             let tree = EdgeTree::new(segments).unwrap();
+            let mut tree = Drawing::new(&tree);
             let mut rng = Rng::new(7, 0, 0);
             let value = |c: Chosen| kernel(&segments[c.edge], c.u, &view) * c.inv_pdf;
-            let m: Moments =
-                (0..20_000).map(|_| tree.sample(&view, rng.next_2d()).map_or(0.0, value)).collect();
+            let m: Moments = (0..20_000)
+                .map(|_| tree.sample(&view, &ALL, &mut rng).map_or(0.0, value))
+                .collect();
             m.variance() / (m.mean() * m.mean())
         });
         assert!(inside < 2.0 * alone, "{inside} in the room, {alone} without it");
@@ -104,19 +107,22 @@ fn time_of_a_sample() {
         let built = start.elapsed().as_secs_f64();
         let mut rng = Rng::new(3, 0, 0);
         let n = 100_000;
-        let mut views = outside(20);
-        views.extend(views.clone().iter().map(|v| v.toward(Vec3::ZERO, 0.3)));
-        let [general, toward] = [0, 20].map(|from| {
+        let mut tree = Drawing::new(&tree);
+        let views = outside(20);
+        let toward = views.iter().map(|v| v.toward(0.5, Vec3::ZERO, 0.3));
+        let toward: Vec<[Way; 2]> = toward.map(|w| [w, Way::anywhere(0.5)]).collect();
+        let [general, toward] = [false, true].map(|both| {
             let start = Instant::now();
+            let ways = |i: usize| if both { &toward[i][..] } else { &ALL[..] };
             let found: f64 = (0..n)
-                .filter_map(|i| tree.sample(&views[from + i % 20], rng.next_2d()))
+                .filter_map(|i| tree.sample(&views[i % 20], ways(i % 20), &mut rng))
                 .map(|c| c.inv_pdf)
                 .sum();
             assert!(found.is_finite());
             start.elapsed().as_secs_f64() * 1e9 / n as f64
         });
         eprintln!(
-            "{} edges, {priors:?}: built in {built:.3} s, {general:.0} ns, towards a light {toward:.0} ns",
+            "{} edges, {priors:?}: built in {built:.3} s, {general:.0} ns, also towards a light {toward:.0} ns",
             segments.len()
         );
     }

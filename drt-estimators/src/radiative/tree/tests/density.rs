@@ -15,14 +15,19 @@ const SAMPLES: u32 = 40_000;
 const CELLS: usize = 3;
 
 /// Samples by segment and part of it, and at the end those that found nothing.
-fn counts(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<u64> {
+fn counts(
+    tree: &mut Drawing<'_>,
+    view: &Viewpoint,
+    ways: &[Way],
+    segments: &[Segment],
+) -> Vec<u64> {
     let mut counts = alloc::vec![0; CELLS * segments.len() + 1];
     let nothing = counts.len() - 1;
     let mut rng = Rng::new(11, 0, 0);
     for _ in 0..SAMPLES {
-        let found = tree.sample(view, rng.next_2d());
+        let found = tree.sample(view, ways, &mut rng);
         let cell = found.map_or(nothing, |c| {
-            let product = c.inv_pdf * tree.pdf(view, c.edge, c.u);
+            let product = c.inv_pdf * tree.pdf(view, ways, c.edge, c.u);
             assert!((product - 1.0).abs() < 1e-6, "{c:?}: {product}");
             CELLS * c.edge + ((CELLS as f64 * c.u) as usize).min(CELLS - 1)
         });
@@ -32,14 +37,19 @@ fn counts(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<u64> {
 }
 
 /// The same expected from the density.
-fn expected(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<f64> {
+fn expected(
+    tree: &mut Drawing<'_>,
+    view: &Viewpoint,
+    ways: &[Way],
+    segments: &[Segment],
+) -> Vec<f64> {
     const STEPS: usize = 200;
     let mut expected = Vec::new();
     for (edge, s) in segments.iter().enumerate() {
         let step = 1.0 / (CELLS * STEPS) as f64;
         for cell in 0..CELLS {
             let at = |i: usize| ((cell * STEPS + i) as f64 + 0.5) * step;
-            let sum: f64 = (0..STEPS).map(|i| tree.pdf(view, edge, at(i))).sum();
+            let sum: f64 = (0..STEPS).map(|i| tree.pdf(view, ways, edge, at(i))).sum();
             expected.push(sum * step * (s.b - s.a).length() * f64::from(SAMPLES));
         }
     }
@@ -50,10 +60,15 @@ fn expected(tree: &EdgeTree, view: &Viewpoint, segments: &[Segment]) -> Vec<f64>
 }
 
 fn check(view: &Viewpoint) {
+    check_ways(view, &ALL);
+}
+
+fn check_ways(view: &Viewpoint, ways: &[Way]) {
     let segments = still_life();
     let tree = EdgeTree::new(&segments).unwrap();
-    let counts = counts(&tree, view, &segments);
-    let expected = expected(&tree, view, &segments);
+    let mut tree = Drawing::new(&tree);
+    let counts = counts(&mut tree, view, ways, &segments);
+    let expected = expected(&mut tree, view, ways, &segments);
     let total: f64 = expected.iter().sum::<f64>() / f64::from(SAMPLES);
     assert!((total - 1.0).abs() < 2e-3, "{total} from {view:?}");
     let p = chi_square(&counts, &expected);
@@ -74,7 +89,9 @@ fn all_around() {
 fn towards_a_light() {
     let lights = [(vec3(1.3, -0.2, 0.4), 0.5), (vec3(-0.9, 0.6, -0.8), 0.9)];
     for (view, (center, radius)) in views().iter().zip(lights.iter().cycle()) {
-        check(&view.toward(*center, *radius));
+        let light = view.toward(0.7, *center, *radius);
+        check_ways(view, &[Way { chance: 1.0, ..light }]);
+        check_ways(view, &[light, Way::anywhere(0.3)]);
     }
 }
 

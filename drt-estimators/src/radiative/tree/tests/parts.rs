@@ -3,7 +3,9 @@
 use drt_math::testing::{SIGNIFICANCE, interval_chi_square};
 use drt_math::{Rng, Vec3, vec3};
 
+use super::super::eight::{Eight, same, single};
 use super::super::kernel::Kernel;
+use super::super::seen::{Place, Seen, Toward};
 use super::super::*;
 use super::setup::*;
 
@@ -45,14 +47,34 @@ fn kernels_keep_their_digits() {
     assert_eq!(Kernel::new(1.0, 0.0, 0.0).mass(), 0.0);
 }
 
+fn overlap(view: &Viewpoint, way: &Way, middle: Vec3, half: Vec3) -> f32 {
+    let place = Place::new(middle - half, middle + half);
+    let local = Seen::new(view, 0.0).unwrap().local(&place);
+    let [center, half] = [place.of(middle), half * place.scale].map(|v| same(single(v)));
+    let center = [0, 1, 2].map(|k| center[k] - local.x()[k]);
+    Toward::from(way).overlap(&local, center, half).0[0]
+}
+
+/// The parts that planes leave of a line.
+fn clipped(view: &Viewpoint, way: &Way, from: Vec3, tangent: Vec3, length: f64) -> [f64; 2] {
+    let place = Place::new(from, from + tangent * length);
+    let local = Seen::new(view, 0.0).unwrap().local(&place);
+    let a = same(single(place.of(from)));
+    let to = [0, 1, 2].map(|k| a[k] - local.x()[k]);
+    let all = [0.0, (length * place.scale) as f32].map(Eight::splat);
+    let (part, _) = Toward::from(way).clip(&local, to, same(single(tangent)), all);
+    part.map(|s| f64::from(s.0[0]) / place.scale)
+}
+
 #[test]
 fn cones_cut_lines_where_they_are_entered_and_left() {
     let mut rng = Rng::new(5, 0, 0);
-    let (mut cut, mut none) = (0, 0);
+    let (mut cut, mut none, mut close) = (0, 0, 0);
     for i in 0..2000 {
         let (center, radius) = (in_cube(&mut rng) * 3.0, 0.05 + rng.next_f64());
-        let view = Viewpoint::new(Vec3::ZERO, None).toward(center, radius);
-        let Some(cone) = view.cone else {
+        let view = Viewpoint::new(Vec3::ZERO, None);
+        let way = view.toward(1.0, center, radius);
+        let Some(cone) = way.cone else {
             assert!(center.length() <= radius);
             continue;
         };
@@ -62,6 +84,11 @@ fn cones_cut_lines_where_they_are_entered_and_left() {
         let [start, end] = part.unwrap_or([0.0; 2]);
         cut += u32::from(part.is_some());
         none += u32::from(part.is_none());
+        let planes = clipped(&view, &way, from, tangent, length);
+        let slip = 1e-5 * (from.length() + length);
+        let inside = planes[0] <= start + slip && end <= planes[1] + slip;
+        assert!(part.is_none() || inside, "{part:?} {planes:?}");
+        close += u32::from(part.is_some() && planes[1] - planes[0] < 1.3 * (end - start) + slip);
         for k in 0..200 {
             let s = length * (f64::from(k) + 0.5) / 200.0;
             let p = from + tangent * s;
@@ -74,9 +101,9 @@ fn cones_cut_lines_where_they_are_entered_and_left() {
             }
             let half = Vec3::splat(0.01) + (in_cube(&mut rng) + Vec3::splat(1.0)) * 0.2;
             let middle = p + vec3(half.x, -half.y, half.z);
-            let overlap = cone.overlap(middle, half);
+            let overlap = overlap(&view, &way, middle, half);
             assert!((0.0..=1.0).contains(&overlap) && (!within || overlap > 0.0));
         }
     }
-    assert!(cut > 200 && none > 200, "{cut} {none}");
+    assert!(cut > 200 && none > 200 && 2 * close > cut, "{cut} {none} {close}");
 }

@@ -5,7 +5,83 @@ use alloc::vec::Vec;
 use drt_geom::{EdgeClass, Mesh, NONE, Topology, procedural};
 use drt_math::{Rng, Vec3, vec3, warp};
 
+use super::super::options::Group;
 use super::super::*;
+
+/// Looking at all edges.
+pub(super) const ALL: [Way; 1] = [Way::anywhere(1.0)];
+
+/// Draws points with memory of its own.
+pub(super) struct Drawing<'a> {
+    tree: &'a EdgeTree,
+    options: Options,
+    /// Where each piece is in the tree.
+    paths: Vec<Vec<(Group, usize)>>,
+    /// The piece of each edge.
+    pieces: Vec<Option<usize>>,
+}
+
+impl<'a> Drawing<'a> {
+    pub(super) fn new(tree: &'a EdgeTree) -> Self {
+        let mut paths = alloc::vec![Vec::new(); tree.lines.len()];
+        find(tree, tree.root, &mut Vec::new(), &mut paths);
+        let edges = tree.lines.iter().map(|p| p.edge as usize + 1).max().unwrap();
+        let mut pieces = alloc::vec![None; edges];
+        for (k, p) in tree.lines.iter().enumerate() {
+            pieces[p.edge as usize] = Some(k);
+        }
+        Self { tree, options: Options::default(), paths, pieces }
+    }
+
+    pub(super) fn sample(
+        &mut self,
+        view: &Viewpoint,
+        ways: &[Way],
+        rng: &mut Rng,
+    ) -> Option<Chosen> {
+        let draw = Draw { way: rng.next_f64(), point: rng.next_2d() };
+        self.tree.sample(view, ways, &draw, &mut self.options)
+    }
+
+    /// The density of samples at a place.
+    pub(super) fn pdf(&mut self, view: &Viewpoint, ways: &[Way], edge: usize, u: f64) -> f64 {
+        let Some(Some(piece)) = self.pieces.get(edge) else { return 0.0 };
+        let path = &self.paths[*piece];
+        let found = self.tree.descend(view, ways, &mut self.options, |options, _| {
+            let place = |group: Group| options.groups().iter().position(|g| *g == group);
+            path.iter().rev().find_map(|(group, lane)| Some((place(*group)?, *lane)))
+        });
+        let slack = self.tree.slack(view);
+        found.map_or(0.0, |(line, chances)| density(line, view, ways, &chances, u, slack))
+    }
+}
+
+/// Notes ways to all pieces below a child.
+fn find(
+    tree: &EdgeTree,
+    child: Child,
+    path: &mut Vec<(Group, usize)>,
+    paths: &mut [Vec<(Group, usize)>],
+) {
+    if child.bundles == 0 {
+        for (lane, below) in tree.families[child.first as usize].children.iter().enumerate() {
+            // What there is not is of the first family, as only the root is.
+            if below.bundles > 0 || below.first > 0 {
+                path.push((Group::Family(child.first), lane));
+                find(tree, *below, path, paths);
+                path.pop();
+            }
+        }
+    }
+    for b in child.first..child.first + child.bundles {
+        let first = tree.bundles[b as usize].first as usize;
+        // A leaf's last may have less, which the next one's first overwrite.
+        for lane in 0..(tree.lines.len() - first).min(8) {
+            paths[first + lane] = path.clone();
+            paths[first + lane].push((Group::Bundle(b), lane));
+        }
+    }
+}
 
 /// Weights of silhouettes and creases that can be told apart.
 pub(super) const PRIORS: (f64, [f64; 2]) = (1.0, [0.3, 0.15]);

@@ -1,0 +1,172 @@
+//! What eight segments amount to from a viewpoint.
+//!
+//! Among segments it is enough to choose by estimates that are nearly right, where only segments of
+//! which nothing counts are left out for certain. So horizon and cone are planes widened by what
+//! single precision rounds, and the point on the chosen one is drawn from the [part](super::piece) of it
+//! that really counts.
+
+use super::eight::{Eight, Vectors, along, dot, pairs, same, vectors};
+use super::node::{LEAST_WEIGHT, range};
+use super::piece::Piece;
+use super::seen::{ALMOST_NOTHING, Lies, Local, Place, Seen, Toward, weights};
+
+/// Up to eight segments.
+#[derive(Clone, Debug)]
+pub(super) struct Bundle {
+    place: Place,
+    a: Vectors,
+    tangent: Vectors,
+    length: Eight,
+    faces: [Vectors; 2],
+    /// As parts of the `unit`; those of open edges are the same in all.
+    jump: Eight,
+    crease: [Eight; 2],
+    /// In this the weights count.
+    pub(super) unit: f64,
+    /// Its first piece.
+    pub(super) first: u32,
+}
+
+/// What ways of looking ask of a bundle's segments from a viewpoint.
+pub(super) struct Lines {
+    local: Local,
+    /// From the viewpoint to the segments' first ends.
+    to: Vectors,
+    /// The parts of the segments above the horizon.
+    parts: [Eight; 2],
+    prior: Eight,
+}
+
+/// Of segments this much shorter than they are far away, the middle says enough.
+const SHORT: f32 = 0.5;
+
+impl Bundle {
+    pub(super) fn new(pieces: &[Piece], first: usize) -> Self {
+        let list = pieces.iter();
+        let [low, high] = range(list.clone().flat_map(|p| p.line.ends()));
+        let place = Place::new(low, high);
+        let priors = |p: &Piece| {
+            let [front, back] = if p.open { [p.jump; 2] } else { p.crease };
+            [p.jump, front, back]
+        };
+        let largest = list.clone().flat_map(priors).fold(0.0, f64::max);
+        let part = |prior: f64| if prior > 0.0 { (prior / largest).max(LEAST_WEIGHT) } else { 0.0 };
+        let prior = |k: usize| Eight::gather(list.clone().map(|p| part(priors(p)[k])));
+        Self {
+            place,
+            a: vectors(list.clone().map(|p| place.of(p.line.a))),
+            tangent: vectors(list.clone().map(|p| p.line.tangent)),
+            length: Eight::gather(list.clone().map(|p| p.line.length * place.scale)),
+            faces: [0, 1].map(|k| vectors(list.clone().map(|p| p.faces[k]))),
+            jump: prior(0),
+            crease: [prior(1), prior(2)],
+            unit: largest * place.scale,
+            first: first as u32,
+        }
+    }
+
+    /// What the segments amount to, in multiples of the unit; 0 only where nothing counts.
+    #[inline(always)]
+    pub(super) fn weigh(&self, seen: &Seen) -> (Eight, Lines) {
+        let local = seen.local(&self.place);
+        let to = pairs(self.a, local.x(), |a, b| a - b);
+        let prior = self.prior(to, &local);
+        let parts = match seen.normal {
+            Some((n, false)) => self.above(to, n, &local),
+            _ => [Eight::ZERO, self.length],
+        };
+        let lines = Lines { local, to, parts, prior };
+        (self.amount(seen, &lines, parts), lines)
+    }
+
+    /// What of these weights counts one way.
+    #[inline(always)]
+    pub(super) fn toward(&self, way: &Toward, seen: &Seen, weight: Eight, lines: &Lines) -> Eight {
+        match way.lies(&lines.local, &self.place) {
+            Lies::Outside => return Eight::ZERO,
+            Lies::Inside => return weight,
+            Lies::Across => {}
+        }
+        if !Eight::ZERO.any_less(weight) {
+            return weight;
+        }
+        let (parts, cut) = way.clip(&lines.local, lines.to, self.tangent, lines.parts);
+        let weight = if cut { self.amount(seen, lines, parts) } else { weight };
+        // The nearest point of each part.
+        let start = dot(lines.to, self.tangent);
+        let nearest = (Eight::ZERO - start).max(parts[0]).min(parts[1]);
+        let nearest = along(lines.to, self.tangent, nearest);
+        let reach2 = way.reach2(&lines.local, &self.place);
+        reach2.less(dot(nearest, nearest), Eight::ZERO, weight)
+    }
+
+    /// Light the segments may let through or hide: all that they may where rounding leaves it open on
+    /// which sides of the faces the viewpoint is.
+    #[inline(always)]
+    fn prior(&self, to: Vectors, local: &Local) -> Eight {
+        let tolerance = Eight::splat(local.tolerance);
+        let [(front0, back0), (front1, back1)] = self.faces.map(|n| {
+            let side = dot(n, to);
+            let front = side.less(tolerance, Eight::ONE, Eight::ZERO);
+            (front, (Eight::ZERO - tolerance).less(side, Eight::ONE, Eight::ZERO))
+        });
+        self.jump * (front0 * back1).max(back0 * front1)
+            + self.crease[0] * (front0 * front1)
+            + self.crease[1] * (back0 * back1)
+    }
+
+    /// The parts above the horizon.
+    #[inline(always)]
+    fn above(&self, to: Vectors, n: [f32; 3], local: &Local) -> [Eight; 2] {
+        let first = dot(to, same(n)) + local.tolerance;
+        let slope = dot(self.tangent, same(n));
+        let second = first + self.length * slope;
+        let zero = ((Eight::ZERO - first) / slope).max(Eight::ZERO).min(self.length);
+        [
+            Eight::ZERO.less(first, Eight::ZERO, zero),
+            Eight::ZERO.less(second, self.length, Eight::ZERO.less(first, zero, Eight::ZERO)),
+        ]
+    }
+
+    /// What parts amount to: integrals of kernel and scattering, the latter taken at some points.
+    #[inline(always)]
+    fn amount(&self, seen: &Seen, lines: &Lines, [from, until]: [Eight; 2]) -> Eight {
+        let counts = from.less(until, lines.prior, Eight::ZERO);
+        if !Eight::ZERO.any_less(counts) {
+            return Eight::ZERO;
+        }
+        let start = dot(lines.to, self.tangent);
+        let foot = along(lines.to, self.tangent, Eight::ZERO - start);
+        let (near, far) = (start + from, start + until);
+        let [a, b] = [near, far].map(Eight::abs);
+        let d = dot(foot, foot).sqrt().max(a.max(b) * 1e-6).max(Eight::splat(1e-18));
+        let d2 = d * d;
+        let [r0, r1] = [near, far].map(|t| (d2 + t * t).sqrt());
+        let length = until - from;
+        // The integral of the kernel d / r^3 without differences of like numbers.
+        let across = (far / r1 - near / r0) / d;
+        let aside = d * length * (a + b) / ((b * r0 + a * r1) * r0 * r1);
+        let mass = (near * far).less(Eight::ZERO, across, aside);
+        let size2 = length * length * (1.0 / 12.0);
+        let scattering = |t: Eight| {
+            let to = along(foot, self.tangent, t);
+            let r2 = dot(to, to);
+            let cosine = seen.normal.map_or(Eight::ONE, |(n, _)| {
+                let cosine = dot(to, same(n)).abs() / r2.sqrt();
+                cosine.max(Eight::splat(ALMOST_NOTHING))
+            });
+            seen.scattering(to, r2, size2, cosine)
+        };
+        let middle = (near + far) * 0.5;
+        let mut mean = scattering(middle);
+        let short = (d2 + middle * middle).sqrt() * SHORT;
+        if short.any_less(length) {
+            let sines = (near / r0 + far / r1) * 0.5;
+            let halfway = d * sines / ((Eight::ONE - sines) * (sines + 1.0)).sqrt();
+            let halfway = halfway.max(near).min(far);
+            let ends = (scattering(near) + scattering(far)) * 0.25;
+            mean = short.less(length, ends + scattering(halfway) * 0.5, mean);
+        }
+        weights(counts, counts * mass * mean)
+    }
+}
