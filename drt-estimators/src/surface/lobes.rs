@@ -12,14 +12,31 @@
 //! and Reitz over the directions about a, has integral s for a narrow lobe, and is spread over a cone of
 //! the mean squared angle σ² by taking w² + σ² for w²: no exponential, and never zero.
 //!
-//! The solid angle of a lobe is that of the microfacets, π α² of slopes, by the Jacobians of Walter et al.
-//! 2007 (eqs. 14, 17) for facets along the normal: with the cosines o and i of both directions,
+//! The solid angle of a lobe of reflections is that of the microfacets, π α² of slopes, by the Jacobian of
+//! Walter et al. 2007 (eq. 14) for facets along the normal: with the cosine o,
 //!
 //! ```text
-//! w² = 4 o α²  of reflections,    w² = α² (o - η i)² / (η² i)  of refractions.
+//! w² = 4 o α².
 //! ```
 //!
-//! Towards grazing angles, where lobes are wide in one direction only, cosines count as α at least.
+//! Refractions are bent about the facets that are seen, which at grazing angles face the viewer. With the tangent
+//! part t of the direction and l² = α² |t|² + o², they are on average along
+//!
+//! ```text
+//! m ∝ α² t + n (l + o) / 2:
+//! ```
+//!
+//! stretched to a hemisphere, visible normals are halfway between the direction v and a cap of the sphere
+//! above -v·n (Dupuy & Benyoub 2023), which has its mean at (1 - v·n) / 2. There they have some density p
+//! (Heitz 2014, eq. 16) where for n it would be 1 / (π α²), so that by Walter's eq. 17, with the cosines o and i of both
+//! directions to m,
+//!
+//! ```text
+//! w² = (o - η i)² / (η² i π p).
+//! ```
+//!
+//! Of the light that is let through, half is what n and half what m lets through. Towards grazing angles, where lobes
+//! are wide in one direction only, cosines count as α at least.
 
 use core::f64::consts::{FRAC_1_PI, PI};
 use core::ops::{Add, Div, Mul};
@@ -27,6 +44,7 @@ use core::ops::{Add, Div, Mul};
 use drt_math::{Vec3, fm};
 
 use super::fresnel::{conductor_reflected, dielectric_reflected};
+use super::microfacet::{Distribution, LEAST_ALPHA};
 use super::{Bsdf, Phong, RoughConductor, RoughDielectric};
 
 /// The part of a lobe's light that may be anywhere: the sketch is of its middle.
@@ -108,28 +126,54 @@ fn conductor(b: &RoughConductor, wo: Vec3, n: Vec3) -> Lobes {
     let cos = n.dot(wo).clamp(1e-6, 1.0);
     let fresnel = conductor_reflected(cos, b.eta.mean(), b.k.mean());
     let share = b.specular_reflectance.mean() * fresnel;
-    let lobe = Lobe::new(mirrored(wo, n), reflected_width2(cos, b.alpha), share);
-    Lobes::glossy(0.0, [lobe, Lobe::default()])
+    Lobes::glossy(0.0, [reflection(wo, n, b.alpha, share), Lobe::default()])
 }
 
 fn dielectric(b: &RoughDielectric, wo: Vec3, n: Vec3) -> Lobes {
-    let front = n.dot(wo) >= 0.0;
-    let (n, eta) = if front { (n, b.eta) } else { (-n, b.eta.recip()) };
-    let cos = n.dot(wo).clamp(1e-6, 1.0);
-    let fresnel = dielectric_reflected(cos, eta);
+    let (n, eta) = if n.dot(wo) >= 0.0 { (n, b.eta) } else { (-n, b.eta.recip()) };
+    let facet = Facet::seen_from(wo, n, b.distribution, b.alpha);
+    let cosines = [facet.cos, n.dot(wo).clamp(1e-6, 1.0)];
+    let fresnel = 0.5 * cosines.map(|cos| dielectric_reflected(cos, eta)).iter().sum::<f64>();
     let reflected = b.specular_reflectance.mean() * fresnel;
-    let reflection = Lobe::new(mirrored(wo, n), reflected_width2(cos, b.alpha), reflected);
-    // Beyond the critical angle this goes along the surface, and has no share.
-    let cos_t = fm::sqrt((1.0 - (1.0 - cos * cos) / (eta * eta)).max(0.0));
-    let axis = (n * (cos / eta - cos_t) - wo * eta.recip()).normalize();
     let refracted = b.specular_transmittance.mean() * (1.0 - fresnel) / (eta * eta);
-    let slope = b.alpha * (cos - eta * cos_t) / eta;
-    let refraction = Lobe::new(axis, slope * slope / cos_t.max(b.alpha), refracted);
-    Lobes::glossy(0.0, [reflection, refraction])
+    let lobes = [reflection(wo, n, b.alpha, reflected), facet.refraction(wo, eta, refracted)];
+    Lobes::glossy(0.0, lobes)
 }
 
-fn reflected_width2(cos: f64, alpha: f64) -> f64 {
-    4.0 * alpha * alpha * f64::max(cos, alpha)
+fn reflection(wo: Vec3, n: Vec3, alpha: f64, share: f64) -> Lobe {
+    let cos = n.dot(wo).max(alpha);
+    Lobe::new(mirrored(wo, n), 4.0 * alpha * alpha * cos, share)
+}
+
+/// The facet that stands for all that a direction sees.
+struct Facet {
+    normal: Vec3,
+    /// Of the angle between both.
+    cos: f64,
+    /// The solid angle of visible normals about it: 1 over their density there.
+    normals: f64,
+    alpha: f64,
+}
+
+impl Facet {
+    fn seen_from(wo: Vec3, n: Vec3, distribution: Distribution, alpha: f64) -> Self {
+        let alpha = alpha.max(LEAST_ALPHA);
+        let cos = n.dot(wo).clamp(1e-6, 1.0);
+        let tangent = wo - n * cos;
+        let stretched = fm::sqrt(alpha * alpha * (1.0 - cos * cos) + cos * cos);
+        let normal = (tangent * (alpha * alpha) + n * (0.5 * (stretched + cos))).normalize();
+        let cos_m = normal.dot(wo).clamp(1e-6, 1.0);
+        let density = distribution.visible(n.dot(normal), cos, alpha) * cos_m;
+        Self { normal, cos: cos_m, normals: 1.0 / density, alpha }
+    }
+
+    fn refraction(&self, wo: Vec3, eta: f64, share: f64) -> Lobe {
+        // Beyond the critical angle this goes along the facet.
+        let cos_t = fm::sqrt((1.0 - (1.0 - self.cos * self.cos) / (eta * eta)).max(0.0));
+        let axis = (self.normal * (self.cos / eta - cos_t) - wo * eta.recip()).normalize();
+        let slope = (self.cos - eta * cos_t) / eta;
+        Lobe::new(axis, FRAC_1_PI * self.normals * slope * slope / cos_t.max(self.alpha), share)
+    }
 }
 
 fn mirrored(w: Vec3, n: Vec3) -> Vec3 {

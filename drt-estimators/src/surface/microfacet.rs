@@ -112,6 +112,12 @@ impl Distribution {
         }
     }
 
+    /// Density per steradian of a normal among those that a direction sees, without the cosine
+    /// between them, from the cosines of both to the surface's normal.
+    pub(super) fn visible(self, cos_m: f64, cos_o: f64, alpha: f64) -> f64 {
+        self.density(cos_m, 1.0, alpha) * self.masking(cos_o, alpha)
+    }
+
     /// Smith's masking over the cosine, `G1 / cos`, which stays finite at grazing angles; `cos > 0`.
     ///
     /// Beckmann uses Walter's rational fit (eq. 27, within 0.35 %), as renderers do, here continued
