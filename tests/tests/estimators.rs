@@ -1,8 +1,11 @@
 //! Derivatives by the 2019 estimator against those by path space: every cell of the check matrix.
 //!
 //! The short check runs the representative cells, to the noise that a few seconds reach. All of them,
-//! to 1 % or for ten minutes each:
-//! `cargo test --release -p drt-tests --test estimators -- --ignored`
+//! for four seconds each, to know what either estimator costs:
+//! `cargo test --release -p drt-tests --test estimators -- --ignored all:: --nocapture`
+//!
+//! All that the 2019 theory covers, with the scale of each derivative known to 1 % or for ten minutes each:
+//! `cargo test --release -p drt-tests --test estimators -- --ignored covered:: --nocapture`
 
 use drt_estimators::EstimatorKind;
 use drt_tests::Result;
@@ -23,11 +26,15 @@ fn seconds(default: f64) -> f64 {
 }
 
 fn short() -> Effort {
-    Effort { noise: 0.05, seconds: seconds(1.0) }
+    Effort { noise: 0.05, scale: 0.0, seconds: seconds(1.0) }
+}
+
+fn costs() -> Effort {
+    Effort { noise: 0.01, scale: 0.0, seconds: seconds(4.0) }
 }
 
 fn precise() -> Effort {
-    Effort { noise: 0.01, seconds: seconds(600.0) }
+    Effort { noise: 0.01, scale: 0.01, seconds: seconds(600.0) }
 }
 
 macro_rules! stages {
@@ -39,7 +46,13 @@ macro_rules! stages {
         }
         mod all {
             $($(#[test] #[ignore = "minutes"] fn $stage() {
-                super::run(super::$room::$stage(), super::precise());
+                super::run(super::$room::$stage(), super::costs());
+            })*)*
+        }
+        mod covered {
+            $($(#[test] #[ignore = "hours"] fn $stage() {
+                let stage = super::$room::$stage().map(super::Stage::in_extended_light);
+                super::run(stage, super::precise());
             })*)*
         }
     };

@@ -1,7 +1,10 @@
 //! What is compared, and with how many samples.
 
-use drt_estimators::{InsideKind, Scene};
+use drt_estimators::{InsideKind, Named, Scene, SceneEmitter};
 use drt_motion::{Effect, Parameter};
+
+use super::deforming::sky;
+use super::set::emitting;
 
 /// One derivative that is compared with finite differences.
 #[derive(Clone, Debug)]
@@ -89,6 +92,27 @@ impl Stage {
     #[must_use]
     pub fn short(mut self) -> Self {
         self.cells.retain(|c| c.representative);
+        self
+    }
+
+    /// The same with nothing but what the 2019 theory covers: without lights that shine from points and
+    /// directions, and without what changes these; under a sky where nothing else shines.
+    #[must_use]
+    pub fn in_extended_light(mut self) -> Self {
+        let is_delta = |e: &Named<SceneEmitter>| e.item.emitter.is_delta();
+        let Scene { emitters, shapes, media, .. } = &mut self.scene;
+        for shape in shapes {
+            // They are named by their numbers.
+            let before = |e: usize| emitters[..e].iter().filter(|e| is_delta(e)).count();
+            shape.emitter = shape.emitter.map(|e| e - before(e));
+        }
+        let delta: Vec<Option<String>> =
+            emitters.extract_if(.., |e| is_delta(e)).map(|e| e.id).collect();
+        if emitters.is_empty() && !media.iter().any(|m| m.item.is_emissive()) {
+            emitters.push(Named::new("sky", emitting(sky())));
+        }
+        let of_delta = |e: &Effect| delta.iter().flatten().any(|id| *id == e.target);
+        self.cells.retain(|c| !c.parameter.effects.iter().any(of_delta));
         self
     }
 }

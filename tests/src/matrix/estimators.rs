@@ -4,22 +4,32 @@ use std::fmt;
 use std::time::Instant;
 
 use drt_estimators::{
-    Agreement, EstimatorKind, Layer, Rendering, Session, Settings, Term, Unattended, agreement,
+    Agreement, Derivative, EstimatorKind, Layer, Rendering, Session, Settings, Term, Unattended,
+    agreement,
 };
 use drt_motion::Parameter;
 
+use super::scale::{Halves, Scale};
 use super::verdict::{SIGNIFICANT, plus};
 use super::{Cell, Fault, Stage};
 use crate::Result;
 
-/// Samples per pixel of the first round.
-const ROUND: u32 = 1 << 7;
+/// Samples per pixel of the first round. There are two at least: they are [compared](Scale) by halves.
+const ROUND: u32 = 1 << 6;
+
+/// A derivative below this part of the largest one of its image is measured against that one.
+const NEAR_ZERO: f64 = 0.05;
+
+/// A single number agrees within this many standard errors.
+const MOST_ERRORS: f64 = 4.0;
 
 /// How far to go.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
-    /// Relative noise of each derivative that is enough.
+    /// Relative noise of each derivative's block means that is enough.
     pub noise: f64,
+    /// Standard error of each [scale](Scale) that is enough.
+    pub scale: f64,
     /// Seconds for each estimator and stage after which what has been found has to do.
     pub seconds: f64,
 }
@@ -33,7 +43,10 @@ pub struct Pair {
     pub parameter: String,
     /// The comparison.
     pub agreement: Agreement,
-    /// Relative noise of the one in question, and of the one it is compared with.
+    /// How much larger the one in question is than the other.
+    pub scale: Scale,
+    /// Noise of the one in question, and of the one it is compared with, as a part of the derivative, or
+    /// of the largest one of the image.
     pub noise: [f64; 2],
     /// Variance × time of the one in question over that of the other.
     pub work: f64,
@@ -50,7 +63,8 @@ impl Pair {
     #[must_use]
     pub fn passes(&self) -> bool {
         let unseen = |f: &Fault| f.agreement.agrees && self.could_see(f);
-        self.agreement.agrees && !self.faults.iter().any(unseen) && self.non_finite == 0
+        let scale = self.scale.z() <= MOST_ERRORS;
+        self.agreement.agrees && scale && !self.faults.iter().any(unseen) && self.non_finite == 0
     }
 
     /// A term of the wrong sign is off by twice its size.
@@ -96,11 +110,12 @@ fn compare_once(
         let parameters: Vec<Parameter> = cells.iter().map(|c| c.parameter.clone()).collect();
         let run = |kind, seed| sample(stage, &parameters, kind, seed, effort);
         // Other random numbers, so that the errors are independent.
-        let (reference, reference_seconds) = run(EstimatorKind::PathSpace, seeds[0])?;
-        let (own, seconds) = run(kind, seeds[1])?;
-        for (a, b) in own.derivatives.iter().zip(&reference.derivatives) {
+        let reference = run(EstimatorKind::PathSpace, seeds[0])?;
+        let own = run(kind, seeds[1])?;
+        for (k, (a, b)) in own.all.derivatives.iter().zip(&reference.all.derivatives).enumerate() {
             let size = b.total.rms_value();
-            let noise = [&a.total, &b.total].map(|l| l.relative_noise(Some(size)));
+            let part = reference.part(k);
+            let noise = [&a.total, &b.total].map(|l| l.relative_noise(Some(size)) * part);
             let terms: Vec<(Term, f64)> =
                 a.terms.iter().map(|(t, l)| (*t, l.rms_value() / size)).collect();
             let plant = |((term, part), (_, layer)): (&(Term, f64), &(Term, Layer))| {
@@ -114,15 +129,50 @@ fn compare_once(
                 stage: stage.name,
                 parameter: a.name.clone(),
                 agreement: agreement(&a.total, &b.total, None),
+                scale: Scale::new(own.halves(k), reference.halves(k)) * part,
                 noise,
-                work: (noise[0] / noise[1]).powi(2) * seconds / reference_seconds,
+                work: (noise[0] / noise[1]).powi(2) * own.seconds / reference.seconds,
                 faults: terms.iter().zip(&a.terms).filter_map(plant).collect(),
                 terms,
-                non_finite: own.non_finite,
+                non_finite: own.all.non_finite,
             });
         }
     }
     Ok(pairs)
+}
+
+/// What has been sampled.
+struct Sampled {
+    /// Of the first half of the samples.
+    first: Rendering,
+    /// Of all of them.
+    all: Rendering,
+    seconds: f64,
+}
+
+impl Sampled {
+    fn is_enough(&self, effort: Effort) -> bool {
+        // The scale has the errors of two.
+        let enough = std::f64::consts::FRAC_1_SQRT_2 * effort.scale;
+        let known = |k| Scale::noise(self.halves(k)) * self.part(k) <= enough;
+        let clear = |(k, d): (usize, &Derivative)| {
+            d.total.relative_noise(None) * self.part(k) <= effort.noise || known(k)
+        };
+        self.all.derivatives.iter().enumerate().all(clear)
+    }
+
+    /// 1, or what it is of the image's largest derivative where it is near zero.
+    fn part(&self, parameter: usize) -> f64 {
+        let size = |d: &Derivative| d.total.rms_value();
+        let largest = self.all.derivatives.iter().map(size).fold(0.0, f64::max);
+        let part = size(&self.all.derivatives[parameter]) / largest;
+        if part < NEAR_ZERO { part } else { 1.0 }
+    }
+
+    fn halves(&self, parameter: usize) -> Halves<'_> {
+        let [first, all] = [&self.first, &self.all].map(|r| &r.derivatives[parameter].total);
+        Halves { first, all }
+    }
 }
 
 /// Samples until every derivative is precise enough, or the time is up.
@@ -132,7 +182,7 @@ fn sample(
     estimator: EstimatorKind,
     seed: u64,
     effort: Effort,
-) -> Result<(Rendering, f64)> {
+) -> Result<Sampled> {
     let settings = Settings {
         threads: 1,
         seed,
@@ -143,17 +193,18 @@ fn sample(
     };
     let mut session = Session::new(&stage.scene, parameters, &settings)?;
     let start = Instant::now();
-    let mut count = ROUND;
+    session.run(ROUND, &Unattended);
+    let mut first = session.rendering();
     loop {
-        session.run(count, &Unattended);
-        let (rendering, seconds) = (session.rendering(), start.elapsed().as_secs_f64());
-        let noise = rendering.derivatives.iter().map(|d| d.total.relative_noise(None));
-        let most = noise.fold(0.0, f64::max);
+        // As many again.
+        session.run(first.spp, &Unattended);
+        let (all, seconds) = (session.rendering(), start.elapsed().as_secs_f64());
+        let sampled = Sampled { first, all, seconds };
         // The next round would double the time.
-        if most <= effort.noise || 2.0 * seconds > effort.seconds {
-            return Ok((rendering, seconds));
+        if sampled.is_enough(effort) || 2.0 * seconds > effort.seconds {
+            return Ok(sampled);
         }
-        count = rendering.spp;
+        first = sampled.all;
     }
 }
 
@@ -165,7 +216,7 @@ impl fmt::Display for Pairs<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "\n{:<44}  rms z  max z  limit  noise   path    work  terms; faults and their rms z",
+            "\n{:<44}  rms z  max z  limit  noise   path            scale    work  terms; faults and their rms z",
             ""
         )?;
         for pair in self.0 {
@@ -175,6 +226,8 @@ impl fmt::Display for Pairs<'_> {
             for noise in pair.noise {
                 write!(f, " {:>5.1}%", 100.0 * noise)?;
             }
+            let Scale { off, stderr } = pair.scale;
+            write!(f, "  {:>+6.2} ± {:>5.2}%", 100.0 * off, 100.0 * stderr)?;
             write!(f, " {:>7.3} ", pair.work)?;
             for (term, part) in pair.terms.iter().filter(|(_, part)| *part >= 5e-3) {
                 write!(f, " {} {part:.2}", term.name())?;

@@ -11,6 +11,7 @@ pub mod estimators;
 pub mod lights;
 pub mod media;
 pub mod riding;
+pub mod scale;
 pub(crate) mod set;
 pub mod surfaces;
 mod verdict;

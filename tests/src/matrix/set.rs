@@ -122,7 +122,7 @@ impl Set {
 }
 
 /// An emitter in whatever medium lies around it.
-fn emitting(emitter: Emitter) -> SceneEmitter {
+pub(super) fn emitting(emitter: Emitter) -> SceneEmitter {
     SceneEmitter { emitter, medium: Surrounding::Counted }
 }
 

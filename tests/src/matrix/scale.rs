@@ -1,0 +1,114 @@
+//! By how much one derivative is larger than another as a whole.
+//!
+//! Block by block, noise hides errors of its own size. An error that all blocks share, a factor that is off
+//! by a percent, shows in their sum long before: with weights w,
+//!
+//! ```text
+//! s = Σ w·a / Σ w·b - 1
+//! ```
+//!
+//! is 0 but for noise where a and b estimate the same image. It is known best with weights in proportion to the
+//! image over its variance. Those come from the first half of the samples where the second is judged and the
+//! other way round, so that no noise meets itself: the numerator's mean is that of a - b, whatever
+//! the weights. The variances of the weights are half those of their block and half the mean of all, lest
+//! blocks whose rare samples have not been seen yet decide alone.
+
+use std::ops::Mul;
+
+use drt_estimators::{Estimate, Layer};
+use drt_math::Rgb;
+
+/// A number with its standard error.
+#[derive(Clone, Copy, Debug)]
+pub struct Scale {
+    /// What one is larger than the other by, as a part of it.
+    pub off: f64,
+    /// Of that.
+    pub stderr: f64,
+}
+
+/// An image as of all samples, and as of the first half of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Halves<'a> {
+    /// Of the first half.
+    pub first: &'a Layer,
+    /// Of all.
+    pub all: &'a Layer,
+}
+
+/// A block in one of the halves.
+type Half = Vec<Estimate>;
+
+impl Scale {
+    /// Compares independent estimates.
+    #[must_use]
+    pub fn new(a: Halves<'_>, b: Halves<'_>) -> Self {
+        let [a1, a2] = a.split();
+        let [b1, b2] = b.split();
+        let (mut difference, mut size, mut variance) = (0.0, 0.0, 0.0);
+        for ([a, b], [like_a, like_b]) in [([&a2, &b2], [&a1, &b1]), ([&a1, &b1], [&a2, &b2])] {
+            for ((w, a), b) in weights(like_a, like_b).into_iter().zip(a).zip(b) {
+                difference += w.dot(a.mean - b.mean);
+                size += w.dot(b.mean);
+                variance += weighted_error(w, a).powi(2) + weighted_error(w, b).powi(2);
+            }
+        }
+        Self { off: difference / size, stderr: variance.sqrt() / size.abs() }
+    }
+
+    /// How well one estimate alone is known, as a part of it.
+    #[must_use]
+    pub fn noise(a: Halves<'_>) -> f64 {
+        let [first, second] = &a.split();
+        let (mut size, mut variance) = (0.0, 0.0);
+        for (a, like) in [(second, first), (first, second)] {
+            for (w, e) in weights(like, like).into_iter().zip(a) {
+                size += w.dot(e.mean);
+                variance += weighted_error(w, e).powi(2);
+            }
+        }
+        variance.sqrt() / f64::abs(size)
+    }
+
+    /// In standard errors.
+    #[must_use]
+    pub fn z(&self) -> f64 {
+        if self.off == 0.0 { 0.0 } else { self.off.abs() / self.stderr }
+    }
+}
+
+/// In another unit.
+impl Mul<f64> for Scale {
+    type Output = Self;
+
+    fn mul(self, part: f64) -> Self {
+        Self { off: self.off * part, stderr: self.stderr * part }
+    }
+}
+
+impl Halves<'_> {
+    fn split(&self) -> [Half; 2] {
+        let second = |(first, all): (&Estimate, &Estimate)| Estimate {
+            mean: all.mean * 2.0 - first.mean,
+            // The variance of a mean of two is a quarter of theirs.
+            stderr: (all.stderr * all.stderr * 4.0 - first.stderr * first.stderr)
+                .map(|variance| variance.max(0.0).sqrt()),
+        };
+        let blocks = self.first.blocks.iter().zip(&self.all.blocks);
+        [self.first.blocks.clone(), blocks.map(second).collect()]
+    }
+}
+
+/// Of a weighted sum over the channels of a block, which come from the same paths.
+fn weighted_error(w: Rgb, e: &Estimate) -> f64 {
+    w.map(f64::abs).dot(e.stderr)
+}
+
+/// By what has been seen of both.
+fn weights(a: &Half, b: &Half) -> Vec<Rgb> {
+    let blocks = || a.iter().zip(b);
+    let of = |(a, b): (&Estimate, &Estimate)| a.stderr.dot(a.stderr) + b.stderr.dot(b.stderr);
+    let mean = blocks().map(of).sum::<f64>() / a.len().max(1) as f64;
+    let exact = f64::from(u8::from(mean == 0.0));
+    blocks().map(|(a, b)| (a.mean + b.mean) / (of((a, b)) + mean + exact)).collect()
+}
