@@ -143,7 +143,8 @@ pub(super) fn along(a: Vectors, b: Vectors, s: Eight) -> Vectors {
 /// Eight times the same.
 #[inline(always)]
 pub(super) fn same(v: [f32; 3]) -> Vectors {
-    v.map(Eight::splat)
+    let [x, y, z] = v;
+    [Eight::splat(x), Eight::splat(y), Eight::splat(z)]
 }
 
 /// The vectors of at most eight.
@@ -152,6 +153,7 @@ pub(super) fn vectors(values: impl Iterator<Item = Vec3> + Clone) -> Vectors {
 }
 
 /// In single precision.
+#[inline(always)]
 pub(super) fn single(v: Vec3) -> [f32; 3] {
-    v.to_array().map(|c| c as f32)
+    [v.x as f32, v.y as f32, v.z as f32]
 }
