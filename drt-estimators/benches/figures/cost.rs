@@ -1,7 +1,9 @@
 //! What derivatives cost, in units of the image: one parameter, ten, and the gradient of a loss by
 //! all vertices of a mesh.
 
-use drt_estimators::{EstimatorKind, Scene, Session, Settings, Target, Unattended, gradient};
+use drt_estimators::{
+    EstimatorKind, Rendering, Scene, Session, Settings, Target, Unattended, gradient,
+};
 use drt_math::Rgb;
 use drt_motion::Parameter;
 
@@ -26,9 +28,9 @@ pub(crate) fn print() {
         "COST of derivatives, at as many interior and boundary samples as the image has, or an"
     );
     println!(
-        "eighth of the latter (\"rays\" are those of a path; a gradient is that by all vertices of"
+        "eighth of the latter (\"rays\" are those of a sample of a pixel; a gradient is that by all"
     );
-    println!("the mesh named)");
+    println!("vertices of the mesh named)");
     println!();
     println!(
         "{:9} {:11} {:13} {:>8} {:>6} {:>12} {:>6} {:>13}",
@@ -70,9 +72,10 @@ fn more(session: &mut Session) -> Task<'_> {
     })
 }
 
-fn rays_a_path(session: &Session) -> f64 {
-    let c = session.rendering().counters;
-    c.rays as f64 / c.paths as f64
+/// Rays of all paths that a sample of a pixel takes: a session of two parts follows one in each.
+fn rays_a_sample(session: &Session) -> f64 {
+    let Rendering { counters, spp, .. } = session.rendering();
+    counters.rays as f64 / (f64::from(spp) * PIXELS as f64)
 }
 
 fn parameters(
@@ -91,9 +94,9 @@ fn parameters(
         "{:9} {kind:11} {name:13} {:8.2} {:6.1} {:12.2} {:6.1} {:13.2}",
         subject.name,
         forward.median() / paths * 1e6,
-        rays_a_path(&image),
+        rays_a_sample(&image),
         single.over(&forward),
-        rays_a_path(&one),
+        rays_a_sample(&one),
         tenfold.over(&single),
     );
 }

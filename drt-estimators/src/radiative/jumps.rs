@@ -28,6 +28,8 @@ pub(crate) struct Jump {
     fan: Range<usize>,
     /// The medium around its shape, where that bounds none and it is the same everywhere.
     around: Option<Option<usize>>,
+    /// A face of it bounds a medium.
+    bounds: bool,
     /// How much a crease jumps, compared to a silhouette.
     pub(super) crease: f64,
 }
@@ -105,7 +107,9 @@ impl Jumps {
                     let mut edge = *edge;
                     edge.may_rest = Contact::anywhere(world, &edge);
                     let around = around[edge.shape as usize];
-                    jumps.list.push(Jump { edge, fan, around, crease });
+                    let shape = |i: &usize| &world.scene.shapes[of(i).shape as usize];
+                    let bounds = same.iter().any(|(_, i)| shape(i).boundary.is_some());
+                    jumps.list.push(Jump { edge, fan, around, bounds, crease });
                 }
                 None => jumps.blades.truncate(start),
             }
@@ -203,7 +207,9 @@ impl Jump {
 
     /// The medium around the edge at `x` on the viewer's side, `w` pointing to the viewer.
     pub(super) fn medium(&self, world: &World, sides: &Sides, x: Vec3, w: Vec3) -> Option<usize> {
-        for (prim, _) in sides.faces.iter().flatten() {
+        // Most bound none: what it takes to tell by a face is seldom in a cache.
+        let faces = sides.faces.iter().flatten().filter(|_| self.bounds);
+        for (prim, _) in faces {
             let (point, _) = world.point(*prim, [1.0 / 3.0; 2]);
             let bounds = world.scene.shapes[point.shape as usize].boundary.is_some();
             if bounds {

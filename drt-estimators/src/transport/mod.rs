@@ -10,7 +10,7 @@ pub(crate) mod lights;
 pub(crate) mod record;
 pub(crate) mod scatter;
 #[cfg(all(test, feature = "std"))]
-mod tests;
+pub(crate) mod tests;
 pub(crate) mod tow;
 pub(crate) mod trace;
 pub(crate) mod vertex;

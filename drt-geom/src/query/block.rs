@@ -113,6 +113,8 @@ mod tests {
     struct Crossed<'a>(&'a Block, &'a ShearedRay, &'a mut u32);
 
     impl Task for Crossed<'_> {
+        type Output = ();
+
         fn run<L: Lanes>(self, lanes: L) {
             *self.2 = self.0.crossed(lanes, self.1);
         }

@@ -43,7 +43,9 @@ pub(super) trait Lanes: Copy {
 
 /// What to compute by whichever [`Lanes`] there are.
 pub(super) trait Task {
-    fn run<L: Lanes>(self, lanes: L);
+    type Output;
+
+    fn run<L: Lanes>(self, lanes: L) -> Self::Output;
 }
 
 /// The lanes of the machine the program runs on.
@@ -65,7 +67,7 @@ impl Machine {
     }
 
     #[inline(always)]
-    pub(super) fn run(self, task: impl Task) {
+    pub(super) fn run<T: Task>(self, task: T) -> T::Output {
         match self {
             Self::Portable => task.run(Portable),
             #[cfg(all(target_arch = "x86_64", feature = "std"))]
@@ -174,8 +176,8 @@ mod x86 {
 
     /// Where AVX2 may be used, all that is inlined here may use it.
     #[target_feature(enable = "avx2")]
-    pub(super) fn with_avx2(lanes: Avx2, task: impl Task) {
-        task.run(lanes);
+    pub(super) fn with_avx2<T: Task>(lanes: Avx2, task: T) -> T::Output {
+        task.run(lanes)
     }
 
     macro_rules! vector {
@@ -282,6 +284,8 @@ mod tests {
     struct Everything<'a>([[f64; 4]; 2], &'a mut Vec<u64>);
 
     impl Task for Everything<'_> {
+        type Output = ();
+
         fn run<L: Lanes>(self, lanes: L) {
             let [x, y] = self.0;
             let (a, b) = (lanes.doubles(&x), lanes.doubles(&y));
@@ -331,6 +335,8 @@ mod tests {
     fn a_nan_loses_and_is_at_most_nothing() {
         struct Nan;
         impl Task for Nan {
+            type Output = ();
+
             fn run<L: Lanes>(self, lanes: L) {
                 let (nan, one) = (lanes.double(f64::NAN), lanes.double(1.0));
                 assert_eq!(nan.min(one).array(), [1.0; 4]);

@@ -21,6 +21,7 @@ mod frame;
 mod lanes;
 mod nearest;
 mod ray;
+mod registers;
 mod watertight;
 mod wide;
 mod winding;
@@ -29,6 +30,7 @@ pub(crate) use boxes::BoxTree;
 pub use build::BvhError;
 pub use nearest::{ClosestPoint, nearest_point};
 pub use ray::{Hit, Ray, Skip};
+pub use registers::{Registers, Work};
 
 /// A bounding volume hierarchy over triangles, for rays and nearest points.
 ///
@@ -205,6 +207,8 @@ struct Walk<'a, Q, V> {
 }
 
 impl<Q: wide::Query, V: Visitor> Task for Walk<'_, Q, V> {
+    type Output = ();
+
     #[inline(always)]
     fn run<L: Lanes>(mut self, lanes: L) {
         self.tree.walk(lanes, self.query, &mut self.visitor);

@@ -9,7 +9,7 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use drt_geom::Aabb;
+use drt_geom::{Aabb, Registers};
 use drt_math::fm;
 
 use super::bundle::Bundle;
@@ -54,7 +54,14 @@ impl EdgeTree {
         let families = spans.iter().filter(|s| !s.children.is_empty()).map(family).collect();
         let lines: Vec<Line> = pieces.iter().map(|p| p.line).collect();
         let largest = lines.iter().fold(0.0, |m, l| f64::max(m, l.a.max_abs() + l.length));
-        Some(Self { root: children[0], families, bundles, lines, largest })
+        Some(Self {
+            root: children[0],
+            families,
+            bundles,
+            lines,
+            largest,
+            registers: Registers::widest(),
+        })
     }
 }
 

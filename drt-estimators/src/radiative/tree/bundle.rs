@@ -105,11 +105,11 @@ impl Bundle {
     #[inline(always)]
     fn prior(&self, to: Vectors, local: &Local) -> Eight {
         let tolerance = Eight::splat(local.tolerance);
-        let [(front0, back0), (front1, back1)] = self.faces.map(|n| {
-            let side = dot(n, to);
-            let front = side.less(tolerance, Eight::ONE, Eight::ZERO);
-            (front, (Eight::ZERO - tolerance).less(side, Eight::ONE, Eight::ZERO))
-        });
+        let [side0, side1] = [dot(self.faces[0], to), dot(self.faces[1], to)];
+        let front0 = side0.less(tolerance, Eight::ONE, Eight::ZERO);
+        let front1 = side1.less(tolerance, Eight::ONE, Eight::ZERO);
+        let back0 = (Eight::ZERO - tolerance).less(side0, Eight::ONE, Eight::ZERO);
+        let back1 = (Eight::ZERO - tolerance).less(side1, Eight::ONE, Eight::ZERO);
         self.jump * (front0 * back1).max(back0 * front1)
             + self.crease[0] * (front0 * front1)
             + self.crease[1] * (back0 * back1)
@@ -138,35 +138,45 @@ impl Bundle {
         let start = dot(lines.to, self.tangent);
         let foot = along(lines.to, self.tangent, Eight::ZERO - start);
         let (near, far) = (start + from, start + until);
-        let [a, b] = [near, far].map(Eight::abs);
+        let [a, b] = [near.abs(), far.abs()];
         let d = dot(foot, foot).sqrt().max(a.max(b) * 1e-6).max(Eight::splat(1e-18));
         let d2 = d * d;
-        let [r0, r1] = [near, far].map(|t| (d2 + t * t).sqrt());
+        let [r0, r1] = [(d2 + near * near).sqrt(), (d2 + far * far).sqrt()];
         let length = until - from;
         // The integral of the kernel d / r^3 without differences of like numbers.
         let across = (far / r1 - near / r0) / d;
         let aside = d * length * (a + b) / ((b * r0 + a * r1) * r0 * r1);
         let mass = (near * far).less(Eight::ZERO, across, aside);
         let size2 = length * length * (1.0 / 12.0);
-        let scattering = |t: Eight| {
-            let to = along(foot, self.tangent, t);
-            let r2 = dot(to, to);
-            let cosine = seen.normal.map_or(Eight::ONE, |(n, _)| {
-                let cosine = dot(to, same(n)).abs() / r2.sqrt();
-                cosine.max(Eight::splat(ALMOST_NOTHING))
-            });
-            seen.scattering(to, r2, size2, cosine)
-        };
         let middle = (near + far) * 0.5;
-        let mut mean = scattering(middle);
+        let mut mean = self.scattering(seen, foot, middle, size2);
         let short = (d2 + middle * middle).sqrt() * SHORT;
         if short.any_less(length) {
             let sines = (near / r0 + far / r1) * 0.5;
             let halfway = d * sines / ((Eight::ONE - sines) * (sines + 1.0)).sqrt();
             let halfway = halfway.max(near).min(far);
-            let ends = (scattering(near) + scattering(far)) * 0.25;
-            mean = short.less(length, ends + scattering(halfway) * 0.5, mean);
+            // One by one, as four copies of the same in a row take longer to fetch than to run.
+            let mut all = Eight::ZERO;
+            for (t, part) in [(near, 0.25), (far, 0.25), (halfway, 0.5)] {
+                all = all + self.scattering(seen, foot, t, size2) * part;
+            }
+            mean = short.less(length, all, mean);
         }
         weights(counts, counts * mass * mean)
+    }
+
+    /// What is scattered from the points `t` along the segments' lines from their feet.
+    #[inline(always)]
+    fn scattering(&self, seen: &Seen, foot: Vectors, t: Eight, size2: Eight) -> Eight {
+        let to = along(foot, self.tangent, t);
+        let r2 = dot(to, to);
+        let cosine = match seen.normal {
+            Some((n, _)) => {
+                let cosine = dot(to, same(n)).abs() / r2.sqrt();
+                cosine.max(Eight::splat(ALMOST_NOTHING))
+            }
+            None => Eight::ONE,
+        };
+        seen.scattering(to, r2, size2, cosine)
     }
 }

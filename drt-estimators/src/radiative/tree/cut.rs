@@ -11,7 +11,7 @@
 //! the few long edges of a room around a fine mesh are looked at one by one from there, too: of a node
 //! with many segments, children with few.
 
-use super::eight::{Eight, LANES};
+use super::eight::Eight;
 use super::node::Child;
 use super::options::{Group, Options};
 use super::seen::{Seen, Toward};
@@ -35,6 +35,7 @@ pub(super) struct Looking {
 
 impl Looking {
     /// `None` where nothing counts.
+    #[inline(always)]
     pub(super) fn new(view: &Viewpoint, ways: &[Way], slack: f64, finely: bool) -> Option<Self> {
         let mut all = [Toward::from(&Way::anywhere(0.0)); MOST_WAYS];
         all.iter_mut().zip(ways).for_each(|(a, w)| *a = w.into());
@@ -48,22 +49,30 @@ impl Looking {
 }
 
 impl EdgeTree {
-    /// All that may count.
-    pub(super) fn cut(&self, looking: &Looking, options: &mut Options) {
+    /// Judges what is below a child; where it may be `open`ed, far enough down.
+    #[inline(always)]
+    pub(super) fn cut(
+        &self,
+        child: Child,
+        looking: &Looking,
+        mut open: bool,
+        options: &mut Options,
+    ) {
         options.clear(looking.count);
-        self.add(self.root, looking, looking.seen.normal.is_none(), options);
-    }
-
-    /// What is below a child.
-    pub(super) fn below(&self, child: Child, looking: &Looking, options: &mut Options) {
-        options.clear(looking.count);
-        self.add(child, looking, false, options);
-    }
-
-    fn add(&self, child: Child, looking: &Looking, open: bool, options: &mut Options) {
-        if child.bundles == 0 {
-            return self.add_family(child.first, looking, open, options);
+        let mut next = Some(child);
+        while let Some(child) = next {
+            if child.bundles > 0 {
+                self.add_bundles(child, looking, options);
+            } else {
+                self.add_family(child.first, looking, open, options);
+            }
+            next = options.opened.pop();
+            open = true;
         }
+    }
+
+    #[inline(always)]
+    fn add_bundles(&self, child: Child, looking: &Looking, options: &mut Options) {
         for index in child.first..child.first + child.bundles {
             let (bundle, mut all) = (&self.bundles[index as usize], [Eight::ZERO; MOST_WAYS]);
             let (weight, lines) = bundle.weigh(&looking.seen);
@@ -74,6 +83,7 @@ impl EdgeTree {
         }
     }
 
+    #[inline(always)]
     fn add_family(&self, index: u32, looking: &Looking, open: bool, options: &mut Options) {
         let (family, mut all) = (&self.families[index as usize], [Eight::ZERO; MOST_WAYS]);
         let (weight, boxes) = family.weigh(&looking.seen);
@@ -82,25 +92,19 @@ impl EdgeTree {
         }
         let all = &mut all[..looking.count];
         let few = looking.finely && family.count as usize > MANY;
-        let mut opened = [Child::default(); LANES];
-        let mut count = 0;
         if open || few {
             let near = if open { family.near(&boxes) } else { Eight::ZERO };
             let mut room = MOST.saturating_sub(options.groups().len() + 1);
-            for (lane, child) in family.children.iter().enumerate() {
+            for (lane, child) in family.children.iter().enumerate().rev() {
                 let badly_judged = near.0[lane] > 0.0 || (few && child.bundles > 0);
                 let groups = child.bundles.max(1) as usize;
                 if badly_judged && groups <= room && all.iter().any(|w| w.0[lane] > 0.0) {
                     all.iter_mut().for_each(|w| w.0[lane] = 0.0);
                     room -= groups;
-                    opened[count] = *child;
-                    count += 1;
+                    options.opened.push(*child);
                 }
             }
         }
         options.add(Group::Family(index), family.unit, all);
-        for child in &opened[..count] {
-            self.add(*child, looking, true, options);
-        }
     }
 }

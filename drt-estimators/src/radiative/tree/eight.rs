@@ -1,5 +1,7 @@
 //! Eight numbers of single precision at a time: what is only estimated needs no more, and machines
-//! compute with as many at once. Plain arrays, so that all of them get the same bits.
+//! compute with as many at once. Plain arrays, so that all of them get the same bits: by AVX2 they are
+//! one register each in what is inlined where [`Registers`](drt_geom::Registers) are asked for. So closures here are only for
+//! functions that are always inlined, and never for `map` of an array or an option.
 
 use core::ops::{Add, Div, Mul, Sub};
 
@@ -143,7 +145,8 @@ pub(super) fn along(a: Vectors, b: Vectors, s: Eight) -> Vectors {
 /// Eight times the same.
 #[inline(always)]
 pub(super) fn same(v: [f32; 3]) -> Vectors {
-    v.map(Eight::splat)
+    let [x, y, z] = v;
+    [Eight::splat(x), Eight::splat(y), Eight::splat(z)]
 }
 
 /// The vectors of at most eight.
@@ -152,6 +155,7 @@ pub(super) fn vectors(values: impl Iterator<Item = Vec3> + Clone) -> Vectors {
 }
 
 /// In single precision.
+#[inline(always)]
 pub(super) fn single(v: Vec3) -> [f32; 3] {
-    v.to_array().map(|c| c as f32)
+    [v.x as f32, v.y as f32, v.z as f32]
 }

@@ -56,6 +56,7 @@ mod view;
 
 use alloc::vec::Vec;
 
+use drt_geom::{Registers, Work};
 use drt_math::Vec3;
 
 use bundle::Bundle;
@@ -104,6 +105,7 @@ pub(crate) struct EdgeTree {
     lines: Vec<Line>,
     /// Of all coordinates.
     largest: f64,
+    registers: Registers,
 }
 
 /// Most children of a node.
@@ -134,29 +136,18 @@ impl EdgeTree {
         draw: &Draw,
         options: &mut Options,
     ) -> Option<Chosen> {
-        let [mut u, along] = draw.point;
-        let mut by = None;
-        let (line, chances) = self.descend(view, ways, options, |options, chances| {
-            let way = match by {
-                Some(way) => way,
-                None => *by.insert(pick(chances, draw.way)?),
-            };
-            options.choose(way, &mut u)
-        })?;
-        let slack = self.slack(view);
-        let u = line.stretch(view, &ways[by?], slack)?.sample(along);
-        let pdf = density(line, view, ways, &chances, u, slack);
-        Some(Chosen { edge: line.edge as usize, u, inv_pdf: 1.0 / pdf })
+        self.registers.run(Sampling { tree: self, view, ways, draw, options })
     }
 
     /// An estimate of the integral over all segments of kernel, scattering and weight, looking one way.
     pub(crate) fn amount(&self, view: &Viewpoint, way: &Way, options: &mut Options) -> f64 {
-        let slack = self.slack(view);
-        let Some(looking) = Looking::new(view, core::slice::from_ref(way), slack, false) else {
-            return 0.0;
-        };
-        self.cut(&looking, options);
-        options.sum(0)
+        self.registers.run(Summing { tree: self, view, way, options })
+    }
+
+    /// The same tree, with registers that every machine has.
+    #[cfg(all(test, feature = "std"))]
+    fn portable(self) -> Self {
+        Self { registers: Registers::portable(), ..self }
     }
 
     /// What rounding may move places by.
@@ -166,6 +157,7 @@ impl EdgeTree {
 
     /// Goes down by choices among options, given how probable what they are part of is, each way.
     /// Returns the line, and how probable it is.
+    #[inline(always)]
     fn descend(
         &self,
         view: &Viewpoint,
@@ -174,24 +166,80 @@ impl EdgeTree {
         mut choose: impl FnMut(&Options, &[f64]) -> Option<(usize, usize)>,
     ) -> Option<(&Line, [f64; MOST_WAYS])> {
         let looking = Looking::new(view, ways, self.slack(view), true)?;
-        self.cut(&looking, options);
-        let mut chances = first_chances(ways, options);
+        let (mut child, mut open) = (self.root, looking.seen.normal.is_none());
+        let mut so_far = None;
         loop {
+            self.cut(child, &looking, open, options);
+            let chances = so_far.get_or_insert_with(|| first_chances(ways, options));
             let (group, lane) = choose(options, &chances[..ways.len()])?;
             for (way, chance) in chances[..ways.len()].iter_mut().enumerate() {
                 *chance *= options.chance(way, (group, lane));
             }
             match options.groups()[group] {
                 Group::Family(f) => {
-                    let child = self.families[f as usize].children[lane];
-                    self.below(child, &looking, options);
+                    child = self.families[f as usize].children[lane];
+                    open = false;
                 }
                 Group::Bundle(b) => {
                     let place = self.bundles[b as usize].first as usize + lane;
-                    return Some((&self.lines[place], chances));
+                    return Some((&self.lines[place], *chances));
                 }
             }
         }
+    }
+}
+
+/// The work of [`EdgeTree::sample`].
+struct Sampling<'a> {
+    tree: &'a EdgeTree,
+    view: &'a Viewpoint,
+    ways: &'a [Way],
+    draw: &'a Draw,
+    options: &'a mut Options,
+}
+
+impl Work for Sampling<'_> {
+    type Output = Option<Chosen>;
+
+    #[inline(always)]
+    fn run(self) -> Option<Chosen> {
+        let Self { tree, view, ways, draw, options } = self;
+        let [mut u, along] = draw.point;
+        let mut by = None;
+        let (line, chances) = tree.descend(view, ways, options, |options, chances| {
+            let way = match by {
+                Some(way) => way,
+                None => *by.insert(pick(chances, draw.way)?),
+            };
+            options.choose(way, &mut u)
+        })?;
+        let slack = tree.slack(view);
+        let u = line.stretch(view, &ways[by?], slack)?.sample(along);
+        let pdf = density(line, view, ways, &chances, u, slack);
+        Some(Chosen { edge: line.edge as usize, u, inv_pdf: 1.0 / pdf })
+    }
+}
+
+/// The work of [`EdgeTree::amount`].
+struct Summing<'a> {
+    tree: &'a EdgeTree,
+    view: &'a Viewpoint,
+    way: &'a Way,
+    options: &'a mut Options,
+}
+
+impl Work for Summing<'_> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        let Self { tree, view, way, options } = self;
+        let slack = tree.slack(view);
+        let Some(looking) = Looking::new(view, core::slice::from_ref(way), slack, false) else {
+            return 0.0;
+        };
+        tree.cut(tree.root, &looking, looking.seen.normal.is_none(), options);
+        options.sum(0)
     }
 }
 

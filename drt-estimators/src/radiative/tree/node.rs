@@ -213,11 +213,10 @@ impl Family {
         let peak = (Eight::ONE - at.abs()).max(Eight::splat(LEAST_DENSITY));
         let split = (self.turning * distance * peak / half).max(least).min(Eight::ONE);
         let both = Eight::ZERO.less(front.min(back), self.jump * split, Eight::ZERO);
-        let [fronts, backs] =
-            [(front, self.crease[0]), (back, self.crease[1])].map(|(side, crease)| {
-                let part = side.max(least).min(Eight::ONE);
-                Eight::ZERO.less(side, crease * part, Eight::ZERO)
-            });
+        let fronts = self.crease[0] * front.max(least).min(Eight::ONE);
+        let fronts = Eight::ZERO.less(front, fronts, Eight::ZERO);
+        let backs = self.crease[1] * back.max(least).min(Eight::ONE);
+        let backs = Eight::ZERO.less(back, backs, Eight::ZERO);
         self.open + both + fronts + backs
     }
 

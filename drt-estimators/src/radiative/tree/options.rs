@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use super::EVEN;
 use super::eight::{Eight, LANES};
+use super::node::Child;
 use super::view::MOST_WAYS;
 
 /// A group of eight parts of a tree.
@@ -20,6 +21,8 @@ pub(super) enum Group {
 #[derive(Debug, Default)]
 pub(crate) struct Options {
     groups: Vec<Group>,
+    /// Children that are to be judged by what is below them.
+    pub(super) opened: Vec<Child>,
     /// What each group has to offer, for one way after the other.
     offers: Vec<Offer>,
     totals: [Total; MOST_WAYS],
@@ -43,18 +46,22 @@ struct Total {
 }
 
 impl Options {
+    #[inline(always)]
     pub(super) fn clear(&mut self, ways: usize) {
         self.groups.clear();
+        self.opened.clear();
         self.offers.clear();
         self.totals = [Total::default(); MOST_WAYS];
         self.ways = ways;
     }
 
+    #[inline(always)]
     pub(super) fn groups(&self) -> &[Group] {
         &self.groups
     }
 
     /// Adds a group with its weights for all ways, in a unit.
+    #[inline(always)]
     pub(super) fn add(&mut self, group: Group, unit: f64, weights: &[Eight]) {
         self.groups.push(group);
         for (total, weights) in self.totals.iter_mut().zip(weights) {
@@ -71,11 +78,13 @@ impl Options {
     }
 
     /// All of the weights for one way.
+    #[inline(always)]
     pub(super) fn sum(&self, way: usize) -> f64 {
         self.totals[way].sum
     }
 
     /// Chooses one by its weight for one way with a uniform number, of which it leaves another.
+    #[inline(always)]
     pub(super) fn choose(&self, way: usize, u: &mut f64) -> Option<(usize, usize)> {
         let total = self.totals[way];
         let all = total.all();
@@ -111,6 +120,7 @@ impl Options {
     }
 
     /// The probability of one for some way.
+    #[inline(always)]
     pub(super) fn chance(&self, way: usize, (group, lane): (usize, usize)) -> f64 {
         let total = self.totals[way];
         let weight = self.offers[group * self.ways + way].weight(lane, total.share());
@@ -120,6 +130,7 @@ impl Options {
 
 impl Offer {
     /// One's weight, and an equal `share` of what is judged as a whole.
+    #[inline(always)]
     fn weight(&self, lane: usize, share: f64) -> f64 {
         let weight = f64::from(self.weights.0[lane]);
         if weight > 0.0 && self.judged > 0 {
@@ -133,10 +144,12 @@ impl Offer {
 impl Total {
     /// What is given to each that is judged as a whole and may count: an estimate may be too low by any
     /// factor, and variance grows with the greatest.
+    #[inline(always)]
     fn share(&self) -> f64 {
         EVEN * self.sum / f64::from(self.judged.max(1))
     }
 
+    #[inline(always)]
     fn all(&self) -> f64 {
         if self.judged > 0 { self.sum * (1.0 + EVEN) } else { self.sum }
     }

@@ -76,6 +76,7 @@ impl Place {
     }
 
     /// Coordinates of a place.
+    #[inline(always)]
     pub(super) fn of(&self, x: Vec3) -> Vec3 {
         (x - self.center) * self.scale
     }
@@ -83,6 +84,7 @@ impl Place {
 
 impl Seen {
     /// `None` where nothing is scattered.
+    #[inline(always)]
     pub(super) fn new(view: &Viewpoint, slack: f64) -> Option<Self> {
         let Viewpoint { x, normal, lobes: Lobes { even, lobes } } = view;
         let seen = lobes.map(|l| {
@@ -115,11 +117,13 @@ impl Seen {
         let Some(lobes) = &self.lobes else { return even };
         let r = r2.sqrt().max(Eight::splat(LEAST));
         let (dir, spread) = (each(to, |c| c / r), size2 / r2.max(Eight::splat(LEAST)));
-        lobes.iter().fold(even, |sum, (axis, width2, height)| {
+        let mut sum = even;
+        for (axis, width2, height) in lobes {
             let off = pairs(dir, same(*axis), |a, b| a - b);
-            let [width2, height] = [*width2, *height].map(Eight::splat);
-            sum + Lobe::value(height, width2 + spread, dot(off, off))
-        })
+            let width2 = Eight::splat(*width2) + spread;
+            sum = sum + Lobe::value(Eight::splat(*height), width2, dot(off, off));
+        }
+        sum
     }
 }
 
@@ -132,6 +136,7 @@ impl Local {
 }
 
 impl From<&Way> for Toward {
+    #[inline(always)]
     fn from(way: &Way) -> Self {
         let of = |c: Cone| (single(c.axis), c.cos as f32, c.sin as f32);
         Self { cone: way.cone.map(of), reach: way.reach }
@@ -146,7 +151,7 @@ impl Toward {
             return Lies::Inside;
         }
         let radius = 1.0 + local.tolerance;
-        let [x, y, z] = local.x.map(|c| -c);
+        let [x, y, z] = [-local.x[0], -local.x[1], -local.x[2]];
         let length2 = x * x + y * y + z * z;
         let length = fm::sqrt(f64::from(length2)) as f32;
         let reach = (self.reach * place.scale) as f32;
@@ -210,7 +215,8 @@ impl Toward {
         let mut cut = false;
         for end in [near, far] {
             let (normal, _) = self.plane(along(from, tangent, end));
-            let [a, b] = [near, far].map(|s| dot(normal, along(from, tangent, s)) - tolerance);
+            let a = dot(normal, along(from, tangent, near)) - tolerance;
+            let b = dot(normal, along(from, tangent, far)) - tolerance;
             let zero = near + (far - near) * (a / (a - b));
             // Where both ends are outside, nothing is left.
             low = Eight::ZERO.less(a, Eight::ZERO.less(b, far, zero.max(low)), low);
@@ -235,8 +241,8 @@ impl Toward {
         let normal = pairs(aside, axis, |a, n| a * unit - n * sin);
         let outside = off * cos - ahead * sin;
         let least = ahead.abs() * 1e-5;
-        let known = |v: Eight| least.less(off, v, Eight::ZERO);
-        (each(normal, known), known(outside))
+        let normal = each(normal, |v| least.less(off, v, Eight::ZERO));
+        (normal, least.less(off, outside, Eight::ZERO))
     }
 }
 

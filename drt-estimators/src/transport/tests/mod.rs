@@ -7,7 +7,7 @@ mod moving;
 mod records;
 mod replay;
 #[path = "../../../tests/common/mod.rs"]
-pub(super) mod scenes;
+pub(crate) mod scenes;
 mod setup;
 mod voxels;
 

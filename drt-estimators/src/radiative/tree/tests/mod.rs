@@ -4,5 +4,6 @@ mod cost;
 mod density;
 mod lost;
 mod parts;
+mod registers;
 mod setup;
 mod unbiased;
