@@ -25,6 +25,8 @@ pub(crate) struct Prepared {
     pub(crate) sources: Vec<Source>,
     /// Image points come in mirrored pairs.
     pub(crate) antithetic: bool,
+    /// Boundary samples of each kind to each sample of a pixel, by the settings alone.
+    pub(crate) boundary_ratio: f64,
     /// Of the spatial form.
     looks: Looks,
 }
@@ -57,8 +59,16 @@ impl Prepared {
         }
         // The filter's rate is what mirrored pairs cancel; without it they only cost.
         let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
-        let looks = Looks::default();
-        Ok(Self { world, boundary, flux, radiative: None, sources, antithetic, looks })
+        Ok(Self {
+            boundary_ratio: boundary_ratio(settings, sources.len()),
+            looks: Looks::default(),
+            radiative: None,
+            world,
+            boundary,
+            flux,
+            sources,
+            antithetic,
+        })
     }
 
     /// For the 2019 estimator.
@@ -82,14 +92,24 @@ impl Prepared {
         };
         let sources =
             if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
+        let has_edges = radiative.has_edges(&world);
+        let looks = has_edges && !settings.every_vertex;
+        let boundary_ratio = boundary_ratio(settings, sources.len() + usize::from(looks));
         let looks = match settings.every_vertex {
-            _ if !radiative.has_edges(&world) => Looks::default(),
+            _ if !has_edges => Looks::default(),
             true => Looks::EveryVertex,
-            false => Looks::Average(boundary_ratio(settings)),
+            false => Looks::Average(boundary_ratio),
         };
-        let boundary = Boundary::default();
-        let radiative = Some(radiative);
-        Ok(Self { world, boundary, flux, radiative, sources, antithetic: false, looks })
+        Ok(Self {
+            boundary: Boundary::default(),
+            radiative: Some(radiative),
+            antithetic: false,
+            world,
+            flux,
+            sources,
+            boundary_ratio,
+            looks,
+        })
     }
 
     pub(crate) fn along_rays(&self) -> AlongRays<'_> {
@@ -112,14 +132,12 @@ impl Prepared {
         let samples = per_pixel * f64::from(w) * f64::from(h);
         f64::max(samples / BATCHES as f64, 1.0) as u32
     }
-
-    /// Samples of each splatted source to each sample of a pixel, by the settings alone.
-    pub(crate) fn source_ratio(&self, settings: &Settings) -> f64 {
-        boundary_ratio(settings) / self.sources.len().max(1) as f64
-    }
 }
 
-/// Boundary samples to each sample of a pixel; never none, which would drop a term.
-fn boundary_ratio(settings: &Settings) -> f64 {
-    settings.boundary_spp.map_or(1.0, |b| f64::from(b.max(1)) / f64::from(settings.spp.max(1)))
+/// Samples of each of some kinds of boundary samples to each sample of a pixel; never none, which would
+/// drop a term.
+fn boundary_ratio(settings: &Settings, kinds: usize) -> f64 {
+    let all =
+        settings.boundary_spp.map_or(1.0, |b| f64::from(b.max(1)) / f64::from(settings.spp.max(1)));
+    all / kinds.max(1) as f64
 }

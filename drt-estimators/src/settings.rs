@@ -58,8 +58,8 @@ pub struct Settings {
     pub sensor: usize,
     /// Interior (and forward) samples per pixel.
     pub spp: u32,
-    /// Boundary samples, per pixel on average; `None` is as many as `spp`, or if [`adaptive`](Self::adaptive)
-    /// as many as are worth their time.
+    /// Boundary samples of all kinds together, per pixel on average; `None` is as many as `spp`, or if
+    /// [`adaptive`](Self::adaptive) as many of each kind as are worth their time.
     pub boundary_spp: Option<u32>,
     /// Path depth; `None` takes the scene's, `Some(None)` is unlimited.
     pub max_depth: Option<Option<u32>>,

@@ -15,12 +15,34 @@ const TURNS: usize = 5;
 /// on few pixels.
 const SPP: u32 = 64;
 const FILM: [u32; 2] = [16, 16];
-/// Estimators, with what part of the samples goes to boundaries.
-const WAYS: [(&str, EstimatorKind, u32); 3] = [
-    ("path-space", EstimatorKind::PathSpace, SPP),
-    ("radiative", EstimatorKind::Radiative, SPP),
-    ("radiative 1/8", EstimatorKind::Radiative, SPP / 8),
+
+/// How derivatives are estimated.
+struct Way {
+    name: &'static str,
+    estimator: EstimatorKind,
+    boundary_spp: u32,
+    /// With the lights that shine from a point, for which `radiative` needs `path-space` as well.
+    points: bool,
+}
+
+const WAYS: [Way; 4] = [
+    Way::new("path-space", EstimatorKind::PathSpace, SPP, true),
+    Way::new("radiative", EstimatorKind::Radiative, SPP, false),
+    Way::new("and a bulb", EstimatorKind::Radiative, SPP, true),
+    Way::new("its 1/8", EstimatorKind::Radiative, SPP / 8, true),
 ];
+
+impl Way {
+    const fn new(
+        name: &'static str,
+        estimator: EstimatorKind,
+        boundary_spp: u32,
+        points: bool,
+    ) -> Self {
+        Self { name, estimator, boundary_spp, points }
+    }
+}
+
 const PIXELS: usize = (FILM[0] * FILM[1]) as usize;
 
 pub(crate) fn print() {
@@ -30,7 +52,7 @@ pub(crate) fn print() {
     println!(
         "eighth of the latter (\"rays\" are those of a sample of a pixel; a gradient is that by all"
     );
-    println!("vertices of the mesh named)");
+    println!("vertices of the mesh named; for \"radiative\" the bulb is out, unless it says so)");
     println!();
     println!(
         "{:9} {:11} {:13} {:>8} {:>6} {:>12} {:>6} {:>13}",
@@ -82,11 +104,13 @@ fn parameters(
     subject: &Subject,
     kind: &str,
     ten: &[Parameter],
-    &(name, estimator, boundary): &(&str, EstimatorKind, u32),
+    &Way { name, estimator, boundary_spp, points }: &Way,
 ) {
-    let settings = Settings { estimator, boundary_spp: Some(boundary), ..settings() };
+    let mut scene = subject.scene.clone();
+    scene.emitters.retain(|e| points || !e.item.emitter.is_delta());
+    let settings = Settings { estimator, boundary_spp: Some(boundary_spp), ..settings() };
     let [mut image, mut one, mut all] =
-        [&[][..], &ten[..1], ten].map(|parameters| session(&subject.scene, parameters, &settings));
+        [&[][..], &ten[..1], ten].map(|parameters| session(&scene, parameters, &settings));
     let [forward, single, tenfold] =
         take_turns(TURNS, [more(&mut image), more(&mut one), more(&mut all)]);
     let paths = f64::from(SPP) * PIXELS as f64;

@@ -211,9 +211,12 @@ pub(crate) fn shares(
     } else {
         shares.push((settings.estimator, Lit::All));
     }
-    let with_seed = |(i, (estimator, lit)): (usize, _)| {
+    // They share what is said of boundary samples; what is not, each finds out.
+    let said = settings.boundary_spp.or((!settings.adaptive).then_some(settings.spp));
+    let boundary_spp = said.map(|all| all.div_ceil(shares.len() as u32));
+    let own = |(i, (estimator, lit)): (usize, _)| {
         let seed = seed_of_part(settings.seed, i);
-        (Settings { estimator, seed, ..settings.clone() }, lit)
+        (Settings { estimator, seed, boundary_spp, ..settings.clone() }, lit)
     };
-    shares.into_iter().enumerate().map(with_seed).collect()
+    shares.into_iter().enumerate().map(own).collect()
 }
