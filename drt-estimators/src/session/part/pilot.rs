@@ -28,9 +28,9 @@ impl Part {
         let n = self.motion.as_ref().map_or(0, Motion::parameters);
         let along = self.prepared.along_rays();
         // Looks from every vertex belong to its path.
-        let edges = match along.looks {
-            Looks::Average(looks) if looks > 0.0 => 2,
-            _ => 0,
+        let (edges, looks) = match along.looks {
+            Looks::Average(looks) if looks > 0.0 => (2, looks),
+            _ => (0, 1.0),
         };
         let mut film = PixelFilm::new(self.pixels.size(), along.layers(n, true));
         let pass = Pixels { seed: !self.settings.seed, separate: true };
@@ -41,8 +41,8 @@ impl Part {
             let rays = [account.counters.rays - looking, looking];
             let seen = Seen { film: &film, samples, parameters: n };
             let first = film.layers() - edges * n;
-            [(1..first, rays[0]), (first..film.layers(), rays[1])]
-                .map(|(layers, rays)| seen.term(layers, rays))
+            [(1..first, rays[0], 1.0), (first..film.layers(), rays[1], looks)]
+                .map(|(layers, rays, each)| seen.term(layers, rays, each))
         });
         self.account.add(account);
         let mut split = None;
@@ -55,7 +55,7 @@ impl Part {
             split = Some(Split::new(&paths, &looks, &sources));
         }
         // Of one derivative, what is seen at edges counts by how many looks there will be.
-        let per_look = split.as_ref().map_or(1.0, |split| 1.0 / split.looks);
+        let per_look = split.as_ref().map_or(1.0, |split| looks / split.looks);
         let first_look = film.layers() - edges * n;
         let layers = film.layers();
         let counted = (1..=n).map(|p| {
@@ -94,14 +94,14 @@ struct Seen<'a> {
 }
 
 impl Seen<'_> {
-    /// Of what is in some of the layers, and took so many rays.
-    fn term(&self, layers: core::ops::Range<usize>, rays: u64) -> Observed {
+    /// Of what is in some of the layers, took so many rays, and so many samples of `each` path.
+    fn term(&self, layers: core::ops::Range<usize>, rays: u64, each: f64) -> Observed {
         let [w, h] = self.film.size();
         let mut variance = alloc::vec![0.0; self.parameters];
         for l in layers {
             let sum: f64 = (0..w * h).map(|i| self.film.variance(i, l)).sum();
-            variance[(l - 1) % self.parameters] += self.samples * sum / f64::from(w * h);
+            variance[(l - 1) % self.parameters] += each * self.samples * sum / f64::from(w * h);
         }
-        Observed { variance, rays: rays as f64 / (self.samples * f64::from(w * h)) }
+        Observed { variance, rays: rays as f64 / (each * self.samples * f64::from(w * h)) }
     }
 }
