@@ -109,6 +109,13 @@ fn by_radiative(effort: &Effort) {
     judge(&trials, effort);
 }
 
+/// As well as by path space in the [matrix](drt_tests::matrix); the strict test takes hours.
+#[test]
+#[ignore = "takes minutes"]
+fn to_a_percent_by_radiative() {
+    by_radiative(&Effort { noise: 0.01, ..STRICT });
+}
+
 #[test]
 fn quickly_by_radiative() {
     by_radiative(&Effort { noise: 0.02, near_zero: 1.0, of_case: false, samples: 1 << 20 });
