@@ -50,7 +50,7 @@ pub struct Pair {
     pub noise: [f64; 2],
     /// Variance × time of the one in question over that of the other.
     pub work: f64,
-    /// Block means of each term over the derivative, rms.
+    /// Block means of each term, rms, as a part of the same.
     pub terms: Vec<(Term, f64)>,
     /// What was planted, and the comparisons then.
     pub faults: Vec<Fault>,
@@ -117,7 +117,7 @@ fn compare_once(
             let part = reference.part(k);
             let noise = [&a.total, &b.total].map(|l| l.relative_noise(Some(size)) * part);
             let terms: Vec<(Term, f64)> =
-                a.terms.iter().map(|(t, l)| (*t, l.rms_value() / size)).collect();
+                a.terms.iter().map(|(t, l)| (*t, l.rms_value() / size * part)).collect();
             let plant = |((term, part), (_, layer)): (&(Term, f64), &(Term, Layer))| {
                 (*part >= SIGNIFICANT).then(|| Fault {
                     term: *term,

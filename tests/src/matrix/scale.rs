@@ -112,3 +112,68 @@ fn weights(a: &Half, b: &Half) -> Vec<Rgb> {
     let exact = f64::from(u8::from(mean == 0.0));
     blocks().map(|(a, b)| (a.mean + b.mean) / (of((a, b)) + mean + exact)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use drt_math::Rng;
+
+    use super::*;
+
+    const TRIALS: u64 = 400;
+
+    /// An image of 64 blocks that is a factor times another, by halves. Its noise is of samples of which few
+    /// are large, in some blocks fewer.
+    fn measured(factor: f64, rng: &mut Rng) -> [Layer; 2] {
+        let mut half = || -> Vec<Estimate> {
+            let mut block = |i: u32| {
+                let chance = if i.is_multiple_of(4) { 0.1 } else { 0.5 };
+                let samples = 64.0;
+                let hits = (0..64).filter(|_| rng.next_f64() < chance).count() as f64 / samples;
+                let value = factor * (f64::from(i) * 0.3).sin() + hits / chance - 1.0;
+                let error = (hits * (1.0 - hits) / (samples - 1.0)).sqrt() / chance;
+                Estimate { mean: Rgb::splat(value), stderr: Rgb::splat(error) }
+            };
+            (0..64).map(&mut block).collect()
+        };
+        let [first, second] = [half(), half()];
+        let both = |(a, b): (&Estimate, &Estimate)| Estimate {
+            mean: (a.mean + b.mean) * 0.5,
+            stderr: (a.stderr * a.stderr + b.stderr * b.stderr).map(|v| 0.5 * v.sqrt()),
+        };
+        let all = first.iter().zip(&second).map(both).collect();
+        [first, all].map(|blocks: Vec<Estimate>| Layer {
+            size: [16, 16],
+            pixels: Vec::new(),
+            total: blocks[0],
+            blocks,
+        })
+    }
+
+    /// Mean and rms, in standard errors, of what an image that is a factor times another is said to be
+    /// larger by; and the standard error in the mean.
+    fn said(factor: f64) -> [f64; 3] {
+        let mut rng = Rng::new(5, 0, 0);
+        let mut sums = [0.0; 3];
+        for _ in 0..TRIALS {
+            let [a, b] = [factor, 1.0].map(|f| measured(f, &mut rng));
+            let [a, b] = [&a, &b].map(|[first, all]| Halves { first, all });
+            let scale = Scale::new(a, b);
+            let z = scale.off / scale.stderr;
+            [z, z * z, scale.stderr].iter().zip(&mut sums).for_each(|(x, sum)| *sum += x);
+        }
+        let [z, squares, stderr] = sums.map(|s| s / TRIALS as f64);
+        [z, squares.sqrt(), stderr]
+    }
+
+    #[test]
+    fn deviations_are_as_large_as_is_said() {
+        let [mean, rms, stderr] = said(1.0);
+        assert!(
+            mean.abs() < 4.0 / (TRIALS as f64).sqrt() && (0.9..1.1).contains(&rms),
+            "{mean} {rms}"
+        );
+        // Planted: a factor is off by five standard errors.
+        let [mean, ..] = said(1.0 + 5.0 * stderr);
+        assert!((4.0..6.0).contains(&mean), "{mean}");
+    }
+}
