@@ -67,3 +67,31 @@ fn looks_are_worth_their_rays() {
     println!("{work:.0} at {looks:.2} a path, {as_many:.0} at {all:.2}");
     assert!(work < 0.8 * as_many && looks < 0.7 * all, "{work} {as_many}");
 }
+
+/// Boundary samples of all kinds are as many as is said, with lights that take two estimators and with those
+/// that take one.
+#[test]
+fn boundary_samples_are_shared() {
+    let mut scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
+    let parameters: [Parameter<_>; 1] = [parameter("ball", 0.0, vec![moves("ball", shift())])];
+    let said = 32;
+    let settings = Settings {
+        estimator: EstimatorKind::Radiative,
+        boundary_spp: Some(said),
+        ..Settings::default()
+    };
+    for lights in ["all", "extended"] {
+        if lights == "extended" {
+            let before = scene.emitters.len();
+            scene.emitters.retain(|e| !e.item.emitter.is_delta());
+            assert!((1..before).contains(&scene.emitters.len()));
+        }
+        let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
+        session.run(settings.spp, &Unattended);
+        let found = session.rendering();
+        let taken = found.counters.boundary_samples as f64 / found.image.pixels.len() as f64;
+        // A path that sees no edge does not look.
+        let part = taken / f64::from(said);
+        assert!((0.6..1.01).contains(&part), "{taken} with {lights} lights");
+    }
+}

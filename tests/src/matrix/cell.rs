@@ -116,3 +116,34 @@ impl Stage {
         self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use drt_estimators::emitter::Emitter;
+
+    use super::super::{Stage, deforming, lights, surfaces};
+    use crate::Result;
+
+    #[test]
+    fn extended_light_is_all_that_is_left() -> Result<()> {
+        for stage in
+            [surfaces::room()?, lights::spot()?, lights::point_and_sun()?, deforming::pulse()?]
+        {
+            let lamps = |stage: &Stage| {
+                let shapes = stage.scene.shapes.iter().filter_map(|s| s.emitter);
+                let radiance = shapes.map(|e| stage.scene.emitters[e].item.emitter.clone());
+                radiance.collect::<Vec<Emitter>>()
+            };
+            let (before, cells) = (lamps(&stage), stage.cells.len());
+            let name = stage.name;
+            let stage = stage.in_extended_light();
+            let emitters = &stage.scene.emitters;
+            assert!(!emitters.is_empty() && !emitters.iter().any(|e| e.item.emitter.is_delta()));
+            // Lamps shine as before.
+            assert_eq!(lamps(&stage), before, "{name}");
+            let moved = ["spot", "point and sun"].contains(&name);
+            assert!(!stage.cells.is_empty() && (stage.cells.len() < cells) == moved, "{name}");
+        }
+        Ok(())
+    }
+}

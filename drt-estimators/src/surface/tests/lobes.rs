@@ -80,6 +80,16 @@ fn surfaces() {
     assert!((even - 1.0).abs() < 1e-9, "{even}");
 }
 
+/// Where the mean surface refracts little or nothing, facets that are seen do.
+#[test]
+fn refractions_by_facets() {
+    let bsdf = Bsdf::RoughDielectric(glass(Distribution::Ggx, 0.4, 1.3));
+    for angle in [84.0, 120.0, 130.0] {
+        let cost = cost_of(&bsdf, tilted(angle), tilted(angle));
+        assert!(cost < 4.5, "{cost} at {angle}");
+    }
+}
+
 #[test]
 fn phase_functions() {
     let wo = tilted(20.0);
