@@ -28,7 +28,7 @@ const MOST_ERRORS: f64 = 4.0;
 pub struct Effort {
     /// Relative noise of each derivative's block means that is enough.
     pub noise: f64,
-    /// Standard error of each [scale](Scale) that is enough.
+    /// Standard error of each [scale](Scale) that is enough instead; 0 where only the former counts.
     pub scale: f64,
     /// Seconds for each estimator and stage after which what has been found has to do.
     pub seconds: f64,

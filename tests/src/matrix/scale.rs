@@ -109,6 +109,7 @@ fn weights(a: &Half, b: &Half) -> Vec<Rgb> {
     let blocks = || a.iter().zip(b);
     let of = |(a, b): (&Estimate, &Estimate)| a.stderr.dot(a.stderr) + b.stderr.dot(b.stderr);
     let mean = blocks().map(of).sum::<f64>() / a.len().max(1) as f64;
+    // Without any noise all blocks count alike.
     let exact = f64::from(u8::from(mean == 0.0));
     blocks().map(|(a, b)| (a.mean + b.mean) / (of((a, b)) + mean + exact)).collect()
 }
