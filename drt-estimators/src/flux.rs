@@ -17,25 +17,32 @@
 //!
 //! In the spatial form (2019 paper, Eq. 16 and 20; theory sheet §3, §6) volume vertices stand at fixed
 //! distances of their rays, u is the velocity of the ray's point at Σ, and every surface beside a
-//! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term, less what surfaces
-//! [tow](crate::transport::tow) along.
+//! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term, less what this surface and the
+//! one beyond the medium [tow](crate::transport::tow) along. What of the two cancels for every velocity of the ray,
+//! as in a thin layer, is not even traced.
 //!
 //! A grid ends at its box, where coefficients jump to zero. Faces of the box that lie inside the medium
 //! are such surfaces too, with f(+) = 0 and the velocity of the grid for u_Σ.
 
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use drt_math::{Real, Rgb, Rng, Vec3};
 use drt_medium::MediumKind;
 
 use crate::sensitivity::{Functional, Interest, Rate};
+use crate::transport::tow::{Met, Stretch, list_met};
 use crate::transport::trace::{Leaving, Tracer};
 use crate::transport::world::{Tracking, intervals};
 use crate::transport::{Radiance, RayPath, SurfacePoint, Vertex, World};
 
+/// What is left of two speeds that cancel.
+const ROUNDING: f64 = 1e-12;
+
 /// The surfaces with a flux.
 #[derive(Clone, Debug)]
 pub(crate) struct Flux {
+    /// Of the material form.
     shapes: Arc<[bool]>,
     /// Media in which the faces of a grid's box have a flux.
     grids: Arc<[bool]>,
@@ -77,11 +84,27 @@ impl Flux {
             grids: interest.grids.as_slice().into(),
         };
         media.clone().any(tracked).then(|| Self {
-            shapes: alloc::vec![true; world.scene.shapes.len()].into(),
+            shapes: Arc::default(),
             grids,
             longest: longest(world),
             movers: Some(movers),
         })
+    }
+
+    /// True when a shape sweeps over the points of a ray, which may itself be `carried`.
+    fn sweeps(&self, shape: u32, carried: bool) -> bool {
+        (carried && self.movers.is_some()) || self.moves(shape)
+    }
+
+    /// The same of a ray at rest.
+    fn moves(&self, shape: u32) -> bool {
+        self.movers.as_ref().map_or(&self.shapes, |m| &m.shapes)[shape as usize]
+    }
+
+    /// The same of the faces of a grid.
+    fn sweeps_grid(&self, medium: usize, carried: bool) -> bool {
+        let moves = |m: &Movers| carried || m.grids[medium];
+        self.grids[medium] && self.movers.as_ref().is_none_or(moves)
     }
 }
 
@@ -92,15 +115,16 @@ fn longest(world: &World) -> u32 {
     world.max_depth.saturating_add(u32::from(emissive))
 }
 
-/// A point of a path's ray that a surface sweeps over, in the spatial form: the sensitivity to its
-/// velocity is the flux's value times `normal`.
+/// A ray of a path whose points surfaces sweep over, in the spatial form. The flux's value times these are the
+/// sensitivities of the flux.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Swept {
     /// The record's node that the ray left.
     pub(crate) node: usize,
-    /// Distance along the ray.
-    pub(crate) t: f64,
-    pub(crate) normal: Vec3,
+    /// To the velocity that the ray's origin has.
+    pub(crate) origin: Vec3,
+    /// To the rate of its direction.
+    pub(crate) turn: Vec3,
 }
 
 /// Whether a medium's grid may end inside of it: not all around the medium is in the grid's box.
@@ -120,9 +144,30 @@ fn ends_inside(world: &World, medium: usize) -> bool {
 /// What a path meets.
 #[derive(Clone, Copy, Debug)]
 enum Face {
-    Surface(SurfacePoint),
+    /// A surface, and what lies before and beyond it.
+    Surface(SurfacePoint, [Option<Side>; 2]),
     /// A face of the box of a medium's grid, and its normal out of the box.
     Grid(usize, Vec3),
+}
+
+/// The medium on one side of a surface that a ray meets.
+#[derive(Clone, Copy, Debug)]
+struct Side {
+    medium: usize,
+    /// It is on the surface's front.
+    front: bool,
+    /// What of the surface's speed counts, and of that of the one at the medium's other end.
+    speeds: [Option<Speed>; 2],
+}
+
+/// A share of the speed of a surface along a ray.
+#[derive(Clone, Copy, Debug)]
+struct Speed {
+    point: SurfacePoint,
+    /// Distance along the ray.
+    t: f64,
+    /// Its product with the surface's velocity less the ray's is the share.
+    along: Vec3,
 }
 
 /// One of the meetings of a path with surfaces that have a flux.
@@ -134,11 +179,7 @@ struct Meeting {
     dir: Vec3,
     face: Face,
     x: Vec3,
-    /// The medium the ray arrived in.
-    around: Option<usize>,
     throughput: Rgb,
-    /// What surfaces that [tow](crate::transport::tow) leave to the flux, before and beyond the face.
-    left: [f64; 2],
     /// Segments up to the surface.
     segments: u32,
     weight: f64,
@@ -153,6 +194,8 @@ pub(crate) struct Reservoir {
     chosen: Option<Meeting>,
     /// The chosen ray up to the surface.
     part: RayPath,
+    /// The surfaces on the present ray, if some have a flux.
+    met: Vec<Met>,
     functional: Functional,
 }
 
@@ -164,6 +207,7 @@ impl Default for Reservoir {
             total: 0.0,
             chosen: None,
             part: RayPath::default(),
+            met: Vec::new(),
             functional: Functional::default(),
         }
     }
@@ -184,92 +228,67 @@ impl Reservoir {
     pub(crate) fn offer(&mut self, world: &World, leaving: &Leaving, carried: bool, ray: &RayPath) {
         let Leaving { node, throughput, dir, segments, .. } = *leaving;
         let origin = leaving.vertex.x;
-        let Some(flux) = self.flux.as_ref().filter(|f| segments + 1 < f.longest) else { return };
+        self.met.clear();
+        let Some(flux) = self.flux.as_ref() else { return };
+        list_met(&mut self.met, ray, dir, |point| flux.sweeps(point.shape, carried));
         let strength = throughput.max_abs();
-        if strength == 0.0 {
+        if strength == 0.0 || segments + 1 >= flux.longest {
             return;
         }
-        let (shapes, grids) = (&flux.shapes, &flux.grids);
-        let sweeps = |shape: u32| match &flux.movers {
-            Some(movers) => carried || movers.shapes[shape as usize],
-            None => shapes[shape as usize],
-        };
-        let grid_sweeps = |m: usize| match &flux.movers {
-            Some(movers) => grids[m] && (carried || movers.grids[m]),
-            None => grids[m],
-        };
         let (total, rng) = (&mut self.total, &mut self.rng);
         let (chosen, kept) = (&mut self.chosen, &mut self.part);
-        let mut meet =
-            |face: Face, normal: Vec3, x: Vec3, t: f64, around: Option<usize>, left: [f64; 2]| {
-                let cosine = Real::abs(normal.dot(dir));
-                let most = f64::max(left[0], left[1]);
-                if cosine == 0.0 || most == 0.0 {
-                    return;
-                }
-                let weight = strength * most / cosine;
-                *total += weight;
-                if rng.next_f64() * *total < weight {
-                    let segments = segments + 1;
-                    *chosen = Some(Meeting {
-                        node,
-                        t,
-                        origin,
-                        dir,
-                        face,
-                        x,
-                        around,
-                        throughput,
-                        left,
-                        segments,
-                        weight,
-                    });
-                    kept.truncate_from(ray, t);
-                }
-            };
-        let mut around = ray.medium;
-        let mut start = 0.0;
-        let crossings = ray.crossings.iter().map(|c| (c.point, c.x, c.t, c.after));
-        let end = ray.end.iter().map(|(point, x)| (*point, *x, ray.length, None));
-        let mut surfaces = crossings.chain(end).peekable();
-        while let Some((point, x, t, after)) = surfaces.next() {
-            let before = core::mem::replace(&mut around, after);
-            let stretches = [t - start, surfaces.peek().map_or(f64::INFINITY, |next| next.2) - t];
-            start = t;
-            if !sweeps(point.shape) {
+        let mut meet = |face: Face, most: f64, x: Vec3, t: f64| {
+            let weight = strength * most;
+            if weight == 0.0 {
+                return;
+            }
+            *total += weight;
+            if rng.next_f64() * *total < weight {
+                let segments = segments + 1;
+                *chosen =
+                    Some(Meeting { node, t, origin, dir, face, x, throughput, segments, weight });
+                kept.truncate_from(ray, t);
+            }
+        };
+        let mut before = ray.medium;
+        for (i, m) in self.met.iter().enumerate() {
+            let around = core::mem::replace(&mut before, m.after);
+            if !m.moves {
                 continue;
             }
-            let cosine = point.ng.dot(dir);
-            let near = cosine < 0.0;
-            let left = |front: bool, length: f64| {
-                let medium = filled(world, &point, front, before);
-                medium.map_or(0.0, |m| 1.0 - world.grip(m, cosine, length))
+            let others = [i.checked_sub(1).and_then(|i| self.met.get(i)), self.met.get(i + 1)];
+            let near = Side::before(world, m, others[0], around);
+            let far = world.is_null(m.point.shape).then(|| Side::beyond(world, m, others[1]));
+            let sides = [near, far.flatten()];
+            // Only what moves by itself, and the camera, moves a ray's points at different velocities.
+            let rigid = |side: &Side| {
+                let moves = |s: &Speed| flux.moves(s.point.shape);
+                node > 0 && !side.speeds.iter().flatten().any(moves)
             };
-            let beyond = world.is_null(point.shape).then(|| left(!near, stretches[1]));
-            let left = [left(near, stretches[0]), beyond.unwrap_or(0.0)];
-            meet(Face::Surface(point), point.ng, x, t, before, left);
+            let most = sides.iter().flatten().map(|side| side.most(rigid(side)));
+            meet(Face::Surface(m.point, sides), most.fold(0.0, f64::max), m.x, m.distance);
         }
-        if !grids.contains(&true) {
+        if !flux.grids.contains(&true) {
             return;
         }
         for i in intervals(ray.medium, &ray.crossings, ray.length) {
-            let Some(m) = i.medium.filter(|m| grid_sweeps(*m)) else { continue };
+            let Some(m) = i.medium.filter(|m| flux.sweeps_grid(*m, carried)) else { continue };
             let part = drt_medium::Ray::new(origin + dir * i.start, dir, i.end - i.start);
             world.medium(m).crossings(&part, |c| {
-                meet(
-                    Face::Grid(m, c.normal),
-                    c.normal,
-                    part.at(c.t),
-                    i.start + c.t,
-                    Some(m),
-                    [1.0; 2],
-                );
+                let cosine = Real::abs(c.normal.dot(dir));
+                let most = if cosine == 0.0 { 0.0 } else { 1.0 / cosine };
+                meet(Face::Grid(m, c.normal), most, part.at(c.t), i.start + c.t);
             });
         }
     }
 
-    /// Evaluates the chosen meeting; calls `add` with each functional, the point of the ray in the
-    /// spatial form, and the weight of both.
+    /// The surfaces on the present ray, if some have a flux.
+    pub(crate) fn met(&self) -> &[Met] {
+        &self.met
+    }
+
+    /// Evaluates the chosen meeting; calls `add` with each functional, the ray in the spatial form, and
+    /// the weight of both.
     pub(crate) fn evaluate(
         &mut self,
         tracer: &mut Tracer<'_>,
@@ -286,41 +305,35 @@ impl Reservoir {
             return;
         }
         tracer.counters.flux_samples += 1;
+        let weight = m.throughput * tau * (self.total / m.weight);
         match m.face {
             Face::Grid(medium, n) => {
                 let vertex = world.inside_grid(medium, m.x, n);
-                let scale = self.total / m.weight / Real::abs(n.dot(m.dir));
-                self.send(tracer, &m, vertex, Rate::Grid(medium, m.x, n), n, tau * scale, &mut add);
+                let along = n / Real::abs(n.dot(m.dir));
+                let rate = Rate::Grid(medium, m.x, along);
+                self.send(tracer, &m, vertex, &[Some((rate, along, m.t))], weight, &mut add);
             }
-            Face::Surface(point) => {
-                let cosine = point.ng.dot(m.dir);
-                let scale = self.total / m.weight / Real::abs(cosine);
-                let near = cosine < 0.0;
-                for (front, left) in [(near, m.left[0]), (!near, m.left[1])] {
-                    let Some(medium) = filled(world, &point, front, m.around) else { continue };
-                    if left == 0.0 {
-                        continue;
-                    }
-                    let vertex = world.touching(point, m.x, front, medium);
-                    // The vertex is left behind at n·(u_Σ - u), n from the medium's side across.
-                    let n = if front { -point.ng } else { point.ng };
-                    let rate = Rate::Surface(point.material(), n);
-                    self.send(tracer, &m, vertex, rate, n, tau * (scale * left), &mut add);
+            Face::Surface(point, sides) => {
+                for side in sides.iter().flatten() {
+                    let vertex = world.touching(point, m.x, side.front, side.medium);
+                    let rates = side.speeds.map(|speed| {
+                        let Speed { point, t, along } = speed?;
+                        Some((Rate::Surface(point.material(), along), along, t))
+                    });
+                    self.send(tracer, &m, vertex, &rates, weight, &mut add);
                 }
             }
         }
     }
 
-    /// Adds what a vertex that is left behind sends back along the path, by the rate of what leaves it
-    /// along the normal `n`.
-    #[allow(clippy::too_many_arguments)]
+    /// Adds what a vertex that is left behind sends back along the path, by the `rates` of what leaves it,
+    /// each with its vector and distance along the ray.
     fn send(
         &mut self,
         tracer: &mut Tracer<'_>,
         m: &Meeting,
         vertex: Vertex,
-        rate: Rate,
-        n: Vec3,
+        rates: &[Option<(Rate, Vec3, f64)>],
         weight: Rgb,
         add: &mut impl FnMut(&Functional, Option<Swept>, Rgb),
     ) {
@@ -329,15 +342,70 @@ impl Reservoir {
         tracer.max_segments = own - m.segments;
         tracer.radiance_from(vertex, -m.dir, &mut light);
         tracer.max_segments = own;
-        if !light.0.is_zero() {
-            let spatial = self.flux.as_ref().is_some_and(|f| f.movers.is_some());
-            self.functional.items.clear();
-            self.functional.items.push(rate);
-            if let (false, Some(medium)) = (spatial, vertex.medium) {
-                self.functional.items.push(Rate::Volume(medium, m.x, -n));
-            }
-            let swept = Swept { node: m.node as usize, t: m.t, normal: -n };
-            add(&self.functional, spatial.then_some(swept), m.throughput * light.0 * weight);
+        if light.0.is_zero() {
+            return;
+        }
+        let spatial = self.flux.as_ref().is_some_and(|f| f.movers.is_some());
+        let mut swept = Swept { node: m.node as usize, origin: Vec3::ZERO, turn: Vec3::ZERO };
+        let items = &mut self.functional.items;
+        items.clear();
+        for (rate, along, t) in rates.iter().flatten() {
+            items.push(*rate);
+            swept.origin -= *along;
+            swept.turn -= *along * *t;
+        }
+        if let (false, Some(medium)) = (spatial, vertex.medium) {
+            items.push(Rate::Volume(medium, m.x, swept.origin));
+        }
+        add(&self.functional, spatial.then_some(swept), light.0 * weight);
+    }
+}
+
+impl Side {
+    /// The medium before a surface, from the `start` of the stretch on, reached in `around`.
+    fn before(world: &World, m: &Met, start: Option<&Met>, around: Option<usize>) -> Option<Self> {
+        Self::new(world, m, m.cosine < 0.0, around, [start, Some(m)], 1)
+    }
+
+    /// The medium beyond a surface, up to the `end` of the stretch.
+    fn beyond(world: &World, m: &Met, end: Option<&Met>) -> Option<Self> {
+        Self::new(world, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
+    }
+
+    /// One that vertices can be in, `m` being one of the ends of its stretch.
+    fn new(
+        world: &World,
+        m: &Met,
+        front: bool,
+        around: Option<usize>,
+        ends: [Option<&Met>; 2],
+        end: usize,
+    ) -> Option<Self> {
+        let medium = filled(world, &m.point, front, around)?;
+        let left = match world.reach(medium) {
+            Some(reach) => Stretch::new(ends, reach).left(end),
+            None => [1.0, 0.0],
+        };
+        // The medium begins at one surface, and ends at the other.
+        let sign = if end == 1 { 1.0 } else { -1.0 };
+        let of = |m: Option<&Met>, left: f64| {
+            let m = m.filter(|m| left != 0.0 && m.cosine != 0.0)?;
+            let along = m.point.ng * (sign * left / m.cosine);
+            Some(Speed { point: m.point, t: m.distance, along })
+        };
+        let speeds = [of(Some(m), left[0]), of(ends[1 - end], left[1])];
+        Some(Self { medium, front, speeds })
+    }
+
+    /// What counts at most: of all velocities of the ray alone, if it is `rigid`.
+    fn most(&self, rigid: bool) -> f64 {
+        let alongs = || self.speeds.iter().flatten().map(|s| s.along);
+        let all: f64 = alongs().map(Vec3::length).sum();
+        let net = alongs().fold(Vec3::ZERO, |sum, a| sum + a).length();
+        match rigid {
+            true if net < ROUNDING * all => 0.0,
+            true => net,
+            false => all,
         }
     }
 }

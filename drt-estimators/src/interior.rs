@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_math::sobol::{SET_DIMENSIONS, SobolSampler};
-use drt_math::{Rgb, Rng};
+use drt_math::{Rgb, RgbVec, Rng};
 
 use crate::boundary::shadow::{self, Shadows};
 use crate::contraction::Contraction;
@@ -241,8 +241,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                 let Some(swept) = swept else { return sink.functional(f, value, values) };
                 sink.begin();
                 f.send(value, sink);
-                let carried = value.outer(swept.normal);
-                self.differentiator.carry_back(&self.record, swept.node, swept.t, carried, sink);
+                let [origin, turn] = [swept.origin, swept.turn].map(|v| value.outer(v));
+                self.differentiator.carry_back(&self.record, swept.node, origin, turn, sink);
                 sink.finish(values);
             });
             self.record.flux = flux;
@@ -306,7 +306,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             }
         }
         let viewer = (e.viewer * share).outer(e.n);
-        self.differentiator.carry_back(&self.record, e.node, 0.0, viewer, sink);
+        self.differentiator.carry_back(&self.record, e.node, viewer, RgbVec::ZERO, sink);
         sink.finish(&mut values[layer..layer + n]);
     }
 

@@ -21,6 +21,9 @@ use drt_math::Real;
 /// seldom sees: some have seen a thousandth of the variance that there is.
 const RANGE: [f64; 2] = [0.25, 4.0];
 
+/// The fewest of one whose samples are all of a size.
+const FEWEST_EVEN: f64 = 0.0625;
+
 /// What a sample costs besides its rays, in rays: to choose an edge and to look at what is around it.
 const BESIDES: f64 = 1.0;
 
@@ -31,6 +34,8 @@ pub(crate) struct Observed {
     pub(crate) variance: Vec<f64>,
     /// Rays of one sample.
     pub(crate) rays: f64,
+    /// No sample counts much more than others.
+    pub(crate) even: bool,
 }
 
 /// Boundary samples to each path.
@@ -57,7 +62,8 @@ impl Split {
             let other = share(term) / (term.rays + BESIDES);
             // Without noise of either there is nothing to choose.
             let ratio = if other == 0.0 && own == 0.0 { 1.0 } else { Real::sqrt(other / own) };
-            ratio.clamp(RANGE[0], RANGE[1])
+            let [fewest, most] = RANGE;
+            ratio.clamp(if term.even { FEWEST_EVEN } else { fewest }, most)
         };
         Self { looks: ratio(looks), sources: sources.iter().map(ratio).collect() }
     }
@@ -68,7 +74,7 @@ mod tests {
     use super::*;
 
     fn observed(variance: &[f64], cost: f64) -> Observed {
-        Observed { variance: variance.to_vec(), rays: cost - BESIDES }
+        Observed { variance: variance.to_vec(), rays: cost - BESIDES, even: false }
     }
 
     /// Less work than by any other split.
@@ -107,5 +113,7 @@ mod tests {
         assert_eq!(Split::new(&paths, &looks, &[]).looks, RANGE[0]);
         assert_eq!(Split::new(&looks, &paths, &[]).looks, RANGE[1]);
         assert_eq!(Split::new(&looks, &looks, &[]).looks, 1.0);
+        let even = Observed { even: true, ..looks };
+        assert_eq!(Split::new(&paths, &even, &[]).looks, FEWEST_EVEN);
     }
 }

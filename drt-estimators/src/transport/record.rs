@@ -7,7 +7,7 @@ use core::ops::Range;
 use drt_math::{Rgb, Vec3};
 
 use super::hold::Hold;
-use super::tow::{self, Met, Tow};
+use super::tow::{self, Tow};
 use super::trace::{Arrival, Connection, Endpoint, Leaving, Observer};
 use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, RayPath, World};
@@ -67,8 +67,6 @@ pub(crate) struct PathRecord {
     /// What carries vertices, where that is asked for.
     pub(crate) carriers: Carriers,
     pub(crate) tows: Vec<Tow>,
-    /// Surfaces on the present ray, if some tow.
-    pub(crate) met: Vec<Met>,
 }
 
 impl PathRecord {
@@ -128,12 +126,6 @@ impl Observer for PathRecord {
     fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {
         let carried = self.nodes[leaving.node as usize].carried;
         self.flux.offer(world, leaving, carried, ray);
-        let Carriers { shapes, .. } = &self.carriers;
-        let moves = |shape: u32| shapes.get(shape as usize) == Some(&true);
-        self.met.clear();
-        if world.any_tows() {
-            tow::list_met(&mut self.met, ray, leaving.dir, |point| carried || moves(point.shape));
-        }
     }
 
     fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
@@ -150,7 +142,7 @@ impl Observer for PathRecord {
         if let Endpoint::Volume(Vertex { medium: Some(m), .. }, _) = &arrival.end
             && let Some(reach) = world.reach(*m)
         {
-            self.tows.extend(tow::tows(&self.met, arrival.distance, reach));
+            self.tows.extend(tow::tows(self.flux.met(), arrival.distance, reach));
         }
         let tows = first..self.tows.len();
         let carried = brought || on_mover || !tows.is_empty();

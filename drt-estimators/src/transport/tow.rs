@@ -17,18 +17,28 @@
 //! counts, its normal. With the mean extinction σ of the medium, ℓ = min(b - a, 3/σ), and
 //!
 //! ```text
-//! s(t) = ψ_a φ(t - a) a_dot + ψ_b φ(b - t) b_dot,    φ(δ) = (exp(-σδ) - exp(-σℓ)) / (1 - exp(-σℓ)) or 0,
+//! s(t) = A(t - a) a_dot + B(b - t) b_dot,    A(δ) = (1 - exp(-σ(ℓ - δ))) / (1 - exp(-σℓ)) or 0,
+//!                                            B(δ) = (exp(-σδ) - exp(-σℓ)) / (1 - exp(-σℓ)) or 0,
 //! ```
 //!
-//! s falls off before a surface as transmittance does: f has the factor exp(-σt), whose derivative by s is
-//! s' - σ s = ψ_b b_dot σ exp(-σℓ) / (1 - exp(-σℓ)), the same for all of the vertices there. So does the distance that
-//! free flight draws before b with a fixed random number, and the noise is that of a flux which is computed
-//! for every ray. What is left is the motion s of the vertex along the ray, which all that comes after sees
-//! like any other. Nothing tows at a = 0, the vertex that the ray left.
+//! vertices go as the distances do that free flight would draw between a and b with a fixed random number. (Up to
+//! 3/σ, A + B = 1: between surfaces that move alike along the ray, all goes along with them.) f has the factor
+//! exp(-σ(t - a)), whose derivative together with s' is (b_dot - a_dot) σ / (exp(σℓ) - 1), the same for all of the
+//! vertices there, and the noise is that of a flux which is computed for every ray. What is left is the motion s
+//! of the vertex along the ray, which all that comes after sees like any other. Nothing tows at a = 0, the
+//! vertex that the ray left, nor do surfaces that stand still on rays that do.
 //!
 //! b_dot has the factor 1 / cosine of the angle of incidence, s' the factor 1 / ℓ. So surfaces tow less, by
-//! ψ, those rays that graze them or have little medium before them, and the flux has 1 - ψ. Every way of
-//! choosing distances has the same s, and weights between them are not differentiated.
+//! a factor γ, those rays that graze them, and where there is little medium between them, ψ of much, both
+//! tow all of it by half:
+//!
+//! ```text
+//! s(t) = γ_a a_dot (ψ A + (1 - ψ)/2) + γ_b b_dot (ψ B + (1 - ψ)/2),
+//! ```
+//!
+//! without the halves where one of the two does not tow. The flux has the rest: half the difference of the two
+//! speeds, in a thin layer with parallel sides nothing. Every way of choosing distances has the same s, and weights
+//! between them are not differentiated.
 //!
 //! In media with grids vertices stand still, and surfaces have all of their flux.
 
@@ -45,7 +55,7 @@ use super::world::{RayPath, World};
 /// Cosine from which on surfaces tow with all of their speed.
 const GRAZING: f64 = 0.3;
 
-/// The same of the depth of medium before or behind them.
+/// The same of the depth of medium between two of them.
 const THIN: f64 = 0.5;
 
 /// How far they tow at most, in mean free paths.
@@ -57,7 +67,7 @@ pub(crate) struct Tow {
     pub(crate) point: SurfacePoint,
     /// Its distance along the vertex's ray.
     pub(crate) distance: f64,
-    /// φ: what of the surface's speed along the ray the vertex has.
+    /// What of the surface's speed along the ray the vertex has.
     pub(crate) share: f64,
     /// Its derivative by the vertex's distance.
     pub(crate) slope: f64,
@@ -66,10 +76,72 @@ pub(crate) struct Tow {
 /// A surface on a ray.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Met {
-    point: SurfacePoint,
-    distance: f64,
-    /// Between the ray and its normal; 0 where it does not tow.
-    cosine: f64,
+    pub(crate) point: SurfacePoint,
+    pub(crate) x: Vec3,
+    pub(crate) distance: f64,
+    /// Between the ray and its normal.
+    pub(crate) cosine: f64,
+    /// It moves along the ray.
+    pub(crate) moves: bool,
+    /// The medium that a ray which goes on is in.
+    pub(crate) after: Option<usize>,
+}
+
+/// The medium between two surfaces of a ray, or what ends it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stretch {
+    /// How far surfaces tow.
+    reach: f64,
+    /// ℓ.
+    length: f64,
+    /// exp(-σℓ).
+    last: f64,
+    /// γ of the surfaces at the start and the end; 0 where none tows.
+    grips: [f64; 2],
+    /// What of γ falls off from a surface on, and what is the same all over the stretch.
+    parts: [f64; 2],
+}
+
+impl Stretch {
+    /// From one end to the other, in a medium where surfaces have a `reach`.
+    pub(crate) fn new(ends: [Option<&Met>; 2], reach: f64) -> Self {
+        let start = ends[0].map_or(0.0, |m| m.distance);
+        let depth = (ends[1].map_or(f64::INFINITY, |m| m.distance) - start) / reach;
+        let farthest = f64::min(depth, FARTHEST);
+        let tows = ends.map(|end| end.filter(|m| m.moves));
+        let thick = rise(depth / THIN);
+        let both = tows.iter().all(Option::is_some);
+        Self {
+            reach,
+            length: farthest * reach,
+            last: fm::exp(-farthest),
+            grips: tows.map(|m| m.map_or(0.0, |m| rise(Real::abs(m.cosine) / GRAZING))),
+            parts: [thick, if both { 0.5 * (1.0 - thick) } else { 0.0 }],
+        }
+    }
+
+    /// What a point has of the speeds of the two ends, from which it is so far `away`, and the derivatives of
+    /// that by the point's distance.
+    fn shares(&self, away: [f64; 2]) -> [[f64; 2]; 2] {
+        let whole = 1.0 - self.last;
+        let begun = fm::exp((away[0] - self.length) / self.reach);
+        let left = fm::exp(-away[1] / self.reach);
+        let falls = [
+            if begun < 1.0 { [1.0 - begun, -begun] } else { [0.0; 2] },
+            if left > self.last { [left - self.last, left] } else { [0.0; 2] },
+        ];
+        let [falling, even] = self.parts.map(|part| self.grips.map(|grip| part * grip));
+        core::array::from_fn(|end| {
+            let [share, slope] = falls[end].map(|f| f / whole * falling[end]);
+            [share + even[end], slope / self.reach]
+        })
+    }
+
+    /// What surfaces leave to the flux at one of the ends: of the speed of that end, and of the other's.
+    pub(crate) fn left(&self, end: usize) -> [f64; 2] {
+        let [falling, even] = self.parts;
+        [1.0 - (falling + even) * self.grips[end], -even * self.grips[1 - end]]
+    }
 }
 
 impl World {
@@ -83,46 +155,34 @@ impl World {
         self.reaches = (0..self.scene.media.len()).map(reach).collect();
     }
 
-    /// True when surfaces tow in some medium.
-    pub(crate) fn any_tows(&self) -> bool {
-        self.reaches.iter().any(Option::is_some)
-    }
-
     /// How far surfaces tow in a medium, if they do.
     pub(crate) fn reach(&self, medium: usize) -> Option<f64> {
         self.reaches.get(medium).copied().flatten()
     }
-
-    /// ψ of a surface that a ray meets at a `cosine` after, or before, a `length` in a medium.
-    pub(crate) fn grip(&self, medium: usize, cosine: f64, length: f64) -> f64 {
-        self.reach(medium).map_or(0.0, |reach| grip(cosine, length / reach))
-    }
 }
 
-/// ψ, of a depth in mean free paths.
-fn grip(cosine: f64, depth: f64) -> f64 {
-    let rise = |q: f64| {
-        let q = f64::min(q, 1.0);
-        q * q * (3.0 - 2.0 * q)
-    };
-    rise(Real::abs(cosine) / GRAZING) * rise(depth / THIN)
+/// From 0 to 1, and no farther.
+fn rise(q: f64) -> f64 {
+    let q = f64::min(q, 1.0);
+    q * q * (3.0 - 2.0 * q)
 }
 
-/// Lists the surfaces on a ray along `dir`, of which `tows` says whether they tow, unless none does.
-pub(super) fn list_met(
+/// Lists the surfaces on a ray along `dir`, of which `moves` says whether they move along it, unless none does.
+pub(crate) fn list_met(
     met: &mut Vec<Met>,
     ray: &RayPath,
     dir: Vec3,
-    tows: impl Fn(&SurfacePoint) -> bool,
+    moves: impl Fn(&SurfacePoint) -> bool,
 ) {
     met.clear();
-    let crossings = ray.crossings.iter().map(|c| (c.point, c.t));
-    let end = ray.end.iter().map(|(point, _)| (*point, ray.length));
-    met.extend(crossings.chain(end).map(|(point, distance)| {
-        let cosine = if tows(&point) { point.ng.dot(dir) } else { 0.0 };
-        Met { point, distance, cosine }
+    let crossings = ray.crossings.iter().map(|c| (c.point, c.x, c.t, c.after));
+    let end = ray.end.iter().map(|(point, x)| (*point, *x, ray.length, None));
+    met.extend(crossings.chain(end).map(|(point, x, distance, after)| {
+        let cosine = point.ng.dot(dir);
+        let moves = cosine != 0.0 && moves(&point);
+        Met { point, x, distance, cosine, moves, after }
     }));
-    if met.iter().all(|m| m.cosine == 0.0) {
+    if met.iter().all(|m| !m.moves) {
         met.clear();
     }
 }
@@ -130,21 +190,11 @@ pub(super) fn list_met(
 /// What tows a vertex at distance `t` of a ray, in a medium where surfaces have a `reach`.
 pub(super) fn tows(met: &[Met], t: f64, reach: f64) -> impl Iterator<Item = Tow> + '_ {
     let next = met.partition_point(|m| m.distance < t);
-    let (behind, ahead) = (next.checked_sub(1).and_then(|i| met.get(i)), met.get(next));
-    let start = behind.map_or(0.0, |m| m.distance);
-    let end = ahead.map_or(f64::INFINITY, |m| m.distance);
-    let depth = (end - start) / reach;
-    let last = fm::exp(-f64::min(depth, FARTHEST));
-    let tow = move |m: &Met| {
-        let away = m.distance - t;
-        let here = fm::exp(-Real::abs(away) / reach);
-        if here <= last {
-            return None;
-        }
-        let scale = grip(m.cosine, depth) / (1.0 - last);
-        let slope = if away < 0.0 { -here } else { here } / reach;
-        let (share, slope) = ((here - last) * scale, slope * scale);
+    let ends = [next.checked_sub(1).and_then(|i| met.get(i)), met.get(next)];
+    let away = ends.map(|end| end.map_or(f64::INFINITY, |m| Real::abs(m.distance - t)));
+    let shares = Stretch::new(ends, reach).shares(away);
+    ends.into_iter().zip(shares).filter_map(|(end, [share, slope])| {
+        let m = end.filter(|_| share > 0.0)?;
         Some(Tow { point: m.point, distance: m.distance, share, slope })
-    };
-    behind.into_iter().chain(ahead).filter(|m| m.cosine != 0.0).filter_map(tow)
+    })
 }

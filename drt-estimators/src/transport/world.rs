@@ -86,6 +86,8 @@ pub(crate) fn intervals(
 /// Largest probability of going on under Russian roulette. Below one it also ends paths that lose
 /// nothing, at the price of weights that grow with every vertex.
 const MOST_SURVIVAL: f64 = 0.99;
+/// What comes off something dark may still move fast: a survivor counts ten times at most.
+const LEAST_SURVIVAL: f64 = 0.1;
 /// The probability where it must not depend on what a path carries.
 const STEADY_SURVIVAL: f64 = 0.9;
 /// Least probability of a scattering vertex per tentative collision where coefficients change.
@@ -251,7 +253,8 @@ impl World {
         if self.steady.is_some() {
             STEADY_SURVIVAL
         } else {
-            throughput.max_channel().clamp(0.0, MOST_SURVIVAL)
+            let carried = throughput.max_channel();
+            if carried > 0.0 { carried.clamp(LEAST_SURVIVAL, MOST_SURVIVAL) } else { 0.0 }
         }
     }
 

@@ -7,6 +7,7 @@ use crate::allocation::Allocation;
 use crate::contraction::Motion;
 use crate::film::{PixelFilm, SplatFilm};
 use crate::interior::Looks;
+use crate::splatting::Source;
 use crate::split::{Observed, Split};
 
 /// What a pilot found out.
@@ -73,7 +74,10 @@ impl Part {
         let size = self.pixels.size();
         let n = self.motion.as_ref().map_or(0, Motion::parameters);
         let mut film = SplatFilm::new(size, n);
-        let per_pixel = f64::from(units * self.per_unit()) * self.source_ratio(i);
+        // Where no sample counts much more than others, few tell enough.
+        let even = self.prepared.sources[i] == Source::Outlines;
+        let part = if even { 0.25 } else { 1.0 };
+        let per_pixel = part * f64::from(units * self.per_unit()) * self.source_ratio(i);
         let seed = !self.settings.seed;
         let (account, going) = self.splat(&mut film, i, seed, per_pixel, round, |_| {});
         let samples = film.samples();
@@ -81,7 +85,7 @@ impl Part {
         let variance = (0..n).map(|p| per_pixel * film.variance(p)).collect();
         let rays = account.counters.rays as f64 / samples;
         self.account.add(account);
-        going.then_some(Observed { variance, rays })
+        going.then_some(Observed { variance, rays, even })
     }
 }
 
@@ -102,6 +106,7 @@ impl Seen<'_> {
             let sum: f64 = (0..w * h).map(|i| self.film.variance(i, l)).sum();
             variance[(l - 1) % self.parameters] += each * self.samples * sum / f64::from(w * h);
         }
-        Observed { variance, rays: rays as f64 / (each * self.samples * f64::from(w * h)) }
+        let rays = rays as f64 / (each * self.samples * f64::from(w * h));
+        Observed { variance, rays, even: false }
     }
 }

@@ -94,17 +94,16 @@ impl Differentiator<'_> {
         [near, turn]
     }
 
-    /// Sends the sensitivity `adjoint` to the velocity of the point at distance `t` of the ray that left
-    /// `node`.
+    /// Sends the sensitivities to the velocity of the ray that left `node` and to the rate of its direction.
     pub(crate) fn carry_back<S: AdjointSink>(
         &self,
         record: &PathRecord,
         node: usize,
-        t: f64,
-        adjoint: RgbVec,
+        origin: RgbVec,
+        turn: RgbVec,
         sink: &mut S,
     ) {
-        let (mut k, mut u, mut turn) = (node, adjoint, adjoint * t);
+        let (mut k, mut u, mut turn) = (node, origin, turn);
         loop {
             let node = &record.nodes[k];
             if !node.carried {

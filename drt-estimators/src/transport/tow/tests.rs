@@ -5,12 +5,13 @@ use alloc::vec::Vec;
 
 use drt_geom::procedural;
 use drt_math::{Rgb, Vec3, vec3};
+use drt_motion::{Effect, GeometryChange};
 
 use super::super::tests::choice;
 use super::super::tests::scenes::{
     Build, ball, diffuse, homogeneous, moves, parameter, placed, shift,
 };
-use super::{Met, tows};
+use super::{Met, Stretch, tows};
 use crate::Scene;
 use crate::emitter::Emitter;
 use crate::transport::SurfacePoint;
@@ -19,7 +20,11 @@ fn met(distance: f64, cosine: f64) -> Met {
     let up = vec3(0.0, 0.0, 1.0);
     let point =
         SurfacePoint { prim: 0, shape: 0, triangle: 0, bary: [0.3; 2], ng: up, ns: Vec3::ZERO };
-    Met { point, distance, cosine }
+    Met { point, x: Vec3::ZERO, distance, cosine, moves: true, after: None }
+}
+
+fn at_rest(distance: f64) -> Met {
+    Met { moves: false, ..met(distance, 0.7) }
 }
 
 /// The share of the surface at `distance` in the speed of the vertex at t, and its slope.
@@ -29,34 +34,37 @@ fn share(met: &[Met], t: f64, reach: f64, distance: f64) -> (f64, f64) {
     of.first().map_or((0.0, 0.0), |tow| (tow.share, tow.slope))
 }
 
-/// Shares are continuous between two surfaces, vanish at the other one and at the ray's start, and have the
-/// slope that they say. A surface that does not tow ends the reach of others all the same.
+/// Shares are continuous between two surfaces, have the slope that they say, and at both leave what goes to the
+/// flux; at the ray's start, and at surfaces that do not tow, they vanish.
 #[test]
 fn shares_and_slopes() {
+    let list = [met(1.0, -0.9), met(1.4, 0.2), at_rest(3.0), met(4.0, 0.8), met(4.3, -0.5)];
     for reach in [0.1, 0.7, 40.0] {
-        let list = [met(1.0, -0.9), met(1.4, 0.2), met(3.0, 0.0), met(4.0, 0.8)];
-        for (i, m) in list.iter().enumerate() {
-            let neighbours = [
-                if i == 0 { 0.0 } else { list[i - 1].distance },
-                list.get(i + 1).map_or(f64::INFINITY, |n| n.distance),
-            ];
-            for (side, other) in neighbours.into_iter().enumerate() {
-                let sign = if side == 0 { -1.0 } else { 1.0 };
-                let at = |away: f64| share(&list, m.distance + sign * away, reach, m.distance);
-                let length = f64::min((other - m.distance).abs(), 3.0 * reach);
-                assert!(at(length * (1.0 - 1e-9)).0 < 1e-8);
-                assert_eq!(at(length * (1.0 + 1e-9)).0, 0.0);
-                let full = super::grip(m.cosine, (other - m.distance).abs() / reach);
-                assert!(m.cosine == 0.0 || (at(1e-12).0 - full).abs() < 1e-9);
-                for k in 1..10 {
-                    let (t, h) = (length * 0.1 * f64::from(k), 1e-6 * length);
-                    let difference = (at(t + h).0 - at(t - h).0) / (2.0 * h);
-                    let slope = at(t).1 * sign;
-                    assert!(
-                        (difference - slope).abs() < 1e-6 * full / length + 1e-9,
-                        "{reach} {i} {k}"
-                    );
+        for i in 0..=list.len() {
+            let ends = [i.checked_sub(1).map(|i| &list[i]), list.get(i)];
+            let stretch = Stretch::new(ends, reach);
+            let start = ends[0].map_or(0.0, |m| m.distance);
+            let end = ends[1].map_or(start + 4.0 * reach, |m| m.distance);
+            let of = |end: usize, t: f64| {
+                let moving = ends[end].filter(|m| m.moves);
+                moving.map_or((0.0, 0.0), |m| share(&list, t, reach, m.distance))
+            };
+            for (e, t) in [(0, start + 1e-12), (1, end - 1e-12)] {
+                let left = match ends[e] {
+                    Some(_) => stretch.left(e),
+                    // Towed by the other end, nothing must move here.
+                    None => [0.0; 2],
+                };
+                if ends[e].is_some_and(|m| m.moves) {
+                    assert!((of(e, t).0 + left[0] - 1.0).abs() < 1e-9, "{reach} {i} {e}");
                 }
+                assert!((of(1 - e, t).0 + left[1]).abs() < 1e-9, "{reach} {i} {e}");
+            }
+            let length = end - start;
+            for (e, k) in (1..20).flat_map(|k| [(0, k), (1, k)]) {
+                let (t, h) = (start + length * (0.05 * f64::from(k) + 0.003), 1e-6 * length);
+                let difference = (of(e, t + h).0 - of(e, t - h).0) / (2.0 * h);
+                assert!((difference - of(e, t).1).abs() < 1e-5 / length, "{reach} {i} {e} {k}");
             }
         }
     }
@@ -76,30 +84,64 @@ fn reparameterised_free_flight() {
     }
 }
 
-/// A ball in a room of mist under the sky: of milk, or of matter, which only has mist around it.
-fn ball_in_mist(milk: bool) -> Scene {
+/// The same between two; and where both move alike, all between them does, however little that is.
+#[test]
+fn between_two() {
+    let (sigma, speeds) = (1.3, [0.4, -1.1]);
+    let list = [met(1.0, 0.8), met(2.5, -0.9)];
+    let of = |t: f64| [1.0, 2.5].map(|d| share(&list, t, 1.0 / sigma, d));
+    let expected = (speeds[1] - speeds[0]) * sigma / f64::exp_m1(sigma * 1.5);
+    for t in [1.01, 1.7, 2.49] {
+        let [(a, a_slope), (b, b_slope)] = of(t);
+        let [s, slope] =
+            [[a, b], [a_slope, b_slope]].map(|of| of[0] * speeds[0] + of[1] * speeds[1]);
+        let rate = slope - sigma * (s - speeds[0]);
+        assert!((rate - expected).abs() < 1e-12, "{t}");
+    }
+    for reach in [0.6, 1.0, 4.0, 200.0] {
+        let sum = |of: [(f64, f64); 2]| [of[0].0 + of[1].0, of[0].1 + of[1].1];
+        let both = sum([1.0, 2.5].map(|d| share(&list, 1.9, reach, d)));
+        assert!((both[0] - 1.0).abs() < 1e-12 && both[1].abs() < 1e-12, "{reach}");
+    }
+}
+
+/// A ball in a room of mist under the sky.
+#[derive(Clone, Copy, PartialEq)]
+enum Ball {
+    Milk,
+    /// There is only mist around it.
+    Matter,
+    /// The same in thin mist, with a thin coat.
+    Coated,
+}
+
+fn ball_in_mist(kind: Ball) -> Scene {
     let mut b = Build::default();
     let medium = |b: &mut Build, id, s| {
         b.medium(id, homogeneous(Rgb::new(1.0, 0.8, 1.2) * s, Rgb::splat(0.9), Rgb::ZERO, 0.2))
     };
-    let mist = medium(&mut b, "mist", if milk { 0.2 } else { 1.5 });
+    let mist = medium(&mut b, "mist", if kind == Ball::Matter { 1.5 } else { 0.2 });
     let room = placed(procedural::cube(), Vec3::splat(1.4), 0.0, Vec3::ZERO);
     b.interface("room", room, mist, None);
-    if milk {
+    if kind == Ball::Milk {
         let milk = medium(&mut b, "milk", 5.0);
         b.interface("ball", ball(0.8, Vec3::ZERO), milk, Some(mist));
     } else {
         let bsdf = b.bsdf("ball-bsdf", diffuse(0.1, 0.1, 0.1));
         b.shape("ball", ball(0.8, Vec3::ZERO), bsdf);
     }
+    if kind == Ball::Coated {
+        let varnish = medium(&mut b, "varnish", 2.0);
+        b.interface("coat", ball(0.9, Vec3::ZERO), varnish, Some(mist));
+    }
     b.light("sky", Emitter::Constant { radiance: Rgb::splat(1.0) });
     b.camera(vec3(0.3, 0.9, 4.0), Vec3::ZERO, 4)
 }
 
 /// Tows of three reaches, of none at first.
-fn check(milk: bool) {
-    let scene = ball_in_mist(milk);
-    let motion = parameter("ball", 0.0, vec![moves("ball", shift())]);
+fn check(kind: Ball, effects: Vec<Effect>) {
+    let scene = ball_in_mist(kind);
+    let motion = parameter("ball", 0.0, effects);
     choice::check(&|strength| {
         let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
         for reach in &mut prepared.world.reaches {
@@ -111,10 +153,17 @@ fn check(milk: bool) {
 
 #[test]
 fn the_choice_does_not_matter() {
-    check(true);
+    check(Ball::Milk, vec![moves("ball", shift())]);
 }
 
 #[test]
 fn nor_does_it_around_matter() {
-    check(false);
+    check(Ball::Matter, vec![moves("ball", shift())]);
+}
+
+/// The two sides of a coat tow it together, even where they part.
+#[test]
+fn nor_does_it_in_a_coat() {
+    let back = GeometryChange::Translate(vec3(-0.7, 0.4, -0.5));
+    check(Ball::Coated, vec![moves("ball", back), moves("coat", shift())]);
 }
