@@ -17,28 +17,28 @@
 //! counts, its normal. With the mean extinction σ of the medium, ℓ = min(b - a, 3/σ), and
 //!
 //! ```text
-//! s(t) = A(t - a) a_dot + B(b - t) b_dot,    A(δ) = (1 - exp(-σ(ℓ - δ))) / (1 - exp(-σℓ)) or 0,
-//!                                            B(δ) = (exp(-σδ) - exp(-σℓ)) / (1 - exp(-σℓ)) or 0,
+//! s(t) = φ(t - a) a_dot + φ(b - t) b_dot,    φ(δ) = (exp(-σδ) - exp(-σℓ)) / (1 - exp(-σℓ)) or 0,
 //! ```
 //!
-//! vertices go as the distances do that free flight would draw between a and b with a fixed random number. (Up to
-//! 3/σ, A + B = 1: between surfaces that move alike along the ray, all goes along with them.) f has the factor
-//! exp(-σ(t - a)), whose derivative together with s' is (b_dot - a_dot) σ / (exp(σℓ) - 1), the same for all of the
-//! vertices there, and the noise is that of a flux which is computed for every ray. What is left is the motion s
-//! of the vertex along the ray, which all that comes after sees like any other. Nothing tows at a = 0, the
-//! vertex that the ray left, nor do surfaces that stand still on rays that do.
+//! s falls off before a surface as transmittance does: f has the factor exp(-σt), whose derivative by s is
+//! s' - σ s = b_dot σ exp(-σℓ) / (1 - exp(-σℓ)), the same for all of the vertices there. So does the distance that
+//! free flight draws before b with a fixed random number, and the noise is that of a flux which is computed
+//! for every ray. What is left is the motion s of the vertex along the ray, which all that comes after sees
+//! like any other. Nothing tows at a = 0, the vertex that the ray left, nor do surfaces at rest on a ray at rest.
 //!
 //! b_dot has the factor 1 / cosine of the angle of incidence, s' the factor 1 / ℓ. So surfaces tow less, by
-//! a factor γ, those rays that graze them, and where there is little medium between them, ψ of much, both
-//! tow all of it by half:
+//! γ, those rays that graze them; and what little medium there is between two of them they both tow wholly, by half,
+//! as more of it is by φ:
 //!
 //! ```text
-//! s(t) = γ_a a_dot (ψ A + (1 - ψ)/2) + γ_b b_dot (ψ B + (1 - ψ)/2),
+//! s(t) = γ_a a_dot [ψ φ(t - a) + (1 - ψ)/2] + γ_b b_dot [ψ φ(b - t) + (1 - ψ)/2].
 //! ```
 //!
-//! without the halves where one of the two does not tow. The flux has the rest: half the difference of the two
-//! speeds, in a thin layer with parallel sides nothing. Every way of choosing distances has the same s, and weights
-//! between them are not differentiated.
+//! The halves are left out where one of the two does not tow. The flux has the rest: of a thin layer half the difference
+//! of the two speeds, which is nothing where its sides are parallel. Every way of choosing distances has the same s,
+//! and weights between them are not differentiated. (To let all between two surfaces go as free flight would draw
+//! it with fixed numbers, φ(t - a) = 1 - φ(b - t), carries vertices farther, which edges have more noise of than the
+//! rest has less.)
 //!
 //! In media with grids vertices stand still, and surfaces have all of their flux.
 
@@ -92,8 +92,6 @@ pub(crate) struct Met {
 pub(crate) struct Stretch {
     /// How far surfaces tow.
     reach: f64,
-    /// ℓ.
-    length: f64,
     /// exp(-σℓ).
     last: f64,
     /// γ of the surfaces at the start and the end; 0 where none tows.
@@ -113,7 +111,6 @@ impl Stretch {
         let both = tows.iter().all(Option::is_some);
         Self {
             reach,
-            length: farthest * reach,
             last: fm::exp(-farthest),
             grips: tows.map(|m| m.map_or(0.0, |m| rise(Real::abs(m.cosine) / GRAZING))),
             parts: [thick, if both { 0.5 * (1.0 - thick) } else { 0.0 }],
@@ -123,13 +120,11 @@ impl Stretch {
     /// What a point has of the speeds of the two ends, from which it is so far `away`, and the derivatives of
     /// that by the point's distance.
     fn shares(&self, away: [f64; 2]) -> [[f64; 2]; 2] {
-        let whole = 1.0 - self.last;
-        let begun = fm::exp((away[0] - self.length) / self.reach);
-        let left = fm::exp(-away[1] / self.reach);
-        let falls = [
-            if begun < 1.0 { [1.0 - begun, -begun] } else { [0.0; 2] },
-            if left > self.last { [left - self.last, left] } else { [0.0; 2] },
-        ];
+        let whole = f64::max(1.0 - self.last, f64::MIN_POSITIVE);
+        let falls = [(away[0], -1.0), (away[1], 1.0)].map(|(away, sign)| {
+            let here = fm::exp(-away / self.reach);
+            if here > self.last { [here - self.last, sign * here] } else { [0.0; 2] }
+        });
         let [falling, even] = self.parts.map(|part| self.grips.map(|grip| part * grip));
         core::array::from_fn(|end| {
             let [share, slope] = falls[end].map(|f| f / whole * falling[end]);
