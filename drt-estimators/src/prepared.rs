@@ -6,7 +6,7 @@ use crate::Error;
 use crate::boundary::{Boundary, Strategy};
 use crate::contraction::Motion;
 use crate::film::BATCHES;
-use crate::flux::Flux;
+use crate::flux::{EdgeOn, Flux};
 use crate::interior::{AlongRays, Looks};
 use crate::radiative::Radiative;
 use crate::sensitivity::Interest;
@@ -19,6 +19,7 @@ pub(crate) struct Prepared {
     pub(crate) world: World,
     pub(crate) boundary: Boundary,
     pub(crate) flux: Option<Flux>,
+    edge_on: Option<EdgeOn>,
     /// Set in the spatial form.
     pub(crate) radiative: Option<Radiative>,
     /// Splatted terms that can contribute.
@@ -26,7 +27,7 @@ pub(crate) struct Prepared {
     /// Image points come in mirrored pairs.
     pub(crate) antithetic: bool,
     /// Boundary samples of each kind to each sample of a pixel, by the settings alone.
-    pub(crate) boundary_ratio: f64,
+    boundary_ratio: f64,
     /// Of the spatial form.
     looks: Looks,
 }
@@ -57,15 +58,18 @@ impl Prepared {
                 sources.push(Source::Borders);
             }
         }
+        let kinds = sources.len();
+        let edge_on = seen_edge_on(&world, flux.as_ref(), interest, &mut sources)?;
         // The filter's rate is what mirrored pairs cancel; without it they only cost.
         let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
         Ok(Self {
-            boundary_ratio: boundary_ratio(settings, sources.len()),
+            boundary_ratio: boundary_ratio(settings, kinds),
             looks: Looks::default(),
             radiative: None,
             world,
             boundary,
             flux,
+            edge_on,
             sources,
             antithetic,
         })
@@ -90,11 +94,12 @@ impl Prepared {
             Some(motion) => Radiative::new(&world, interest, motion.speeds(&world))?,
             None => Radiative::new(&world, interest, |_| 1.0)?,
         };
-        let sources =
+        let mut sources =
             if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
         let has_edges = radiative.has_edges(&world);
         let looks = has_edges && !settings.every_vertex;
         let boundary_ratio = boundary_ratio(settings, sources.len() + usize::from(looks));
+        let edge_on = seen_edge_on(&world, flux.as_ref(), interest, &mut sources)?;
         let looks = match settings.every_vertex {
             _ if !has_edges => Looks::default(),
             true => Looks::EveryVertex,
@@ -106,6 +111,7 @@ impl Prepared {
             antithetic: false,
             world,
             flux,
+            edge_on,
             sources,
             boundary_ratio,
             looks,
@@ -123,7 +129,13 @@ impl Prepared {
 
     pub(crate) fn splatter(&self, seed: u64) -> Splatter<'_> {
         let radiative = self.radiative.as_ref();
-        Splatter { world: &self.world, boundary: &self.boundary, radiative, seed }
+        let edge_on = self.edge_on.as_ref();
+        Splatter { world: &self.world, boundary: &self.boundary, radiative, edge_on, seed }
+    }
+
+    /// Samples of a splatted source to each of a pixel, by the settings alone.
+    pub(crate) fn source_ratio(&self, i: usize) -> f64 {
+        self.boundary_ratio * self.sources[i].part()
     }
 
     /// Samples of each batch of a splatted source that takes so many per pixel.
@@ -132,6 +144,19 @@ impl Prepared {
         let samples = per_pixel * f64::from(w) * f64::from(h);
         f64::max(samples / BATCHES as f64, 1.0) as u32
     }
+}
+
+/// What the camera sees edge on of surfaces with a flux, as one more source.
+fn seen_edge_on(
+    world: &World,
+    flux: Option<&Flux>,
+    interest: &Interest,
+    sources: &mut Vec<Source>,
+) -> Result<Option<EdgeOn>, Error> {
+    let Some(flux) = flux else { return Ok(None) };
+    let seen = EdgeOn::new(world, flux, interest)?;
+    sources.extend(seen.is_some().then_some(Source::EdgeOn));
+    Ok(seen)
 }
 
 /// Samples of each of some kinds of boundary samples to each sample of a pixel; never none, which would

@@ -231,9 +231,9 @@ impl Reverse<'_> {
     }
 
     /// One batch of a splatted source.
-    fn splats(&self, source: usize, batch: u32) -> Sums {
-        let source = self.prepared.sources[source];
-        let per_pixel = f64::from(self.settings.spp) * self.prepared.boundary_ratio;
+    fn splats(&self, i: usize, batch: u32) -> Sums {
+        let source = self.prepared.sources[i];
+        let per_pixel = f64::from(self.settings.spp) * self.prepared.source_ratio(i);
         let count = self.prepared.samples_per_batch(per_pixel);
         let scale = 1.0 / (f64::from(count) * BATCHES as f64);
         let mut receiver = Checked::new(ToGradient {

@@ -8,6 +8,7 @@ use drt_math::{Rgb, Rng};
 use crate::boundary::{self, Boundary, Receiver, Strategy};
 use crate::contraction::{Contraction, Motion};
 use crate::film::Splats;
+use crate::flux::{self, EdgeOn};
 use crate::interior::{DIMENSIONS, SEQUENCE_STREAM};
 use crate::radiative::Radiative;
 use crate::rendering::{Account, NonFinite, Term};
@@ -23,6 +24,8 @@ pub(crate) enum Source {
     Borders,
     /// Edges seen from the camera, in the spatial form.
     Outlines,
+    /// The flux through what the camera sees edge on.
+    EdgeOn,
 }
 
 impl Source {
@@ -31,6 +34,7 @@ impl Source {
             Self::Edges(Strategy::Primary) | Self::Borders | Self::Outlines => Term::Primary,
             Self::Edges(Strategy::Direct) => Term::Direct,
             Self::Edges(Strategy::Indirect) => Term::Indirect,
+            Self::EdgeOn => Term::Flux,
         }
     }
 
@@ -42,8 +46,19 @@ impl Source {
             Self::Edges(Strategy::Indirect) => 3,
             Self::Borders => 4,
             Self::Outlines => 5,
+            Self::EdgeOn => 6,
         };
         id << 40
+    }
+
+    /// Samples of it to one of other sources.
+    pub(crate) fn part(self) -> f64 {
+        if self == Self::EdgeOn { 0.0625 } else { 1.0 }
+    }
+
+    /// True when no sample counts much more than others.
+    pub(crate) fn is_even(self) -> bool {
+        matches!(self, Self::Outlines | Self::EdgeOn)
     }
 }
 
@@ -52,6 +67,7 @@ pub(crate) struct Splatter<'a> {
     pub(crate) world: &'a World,
     pub(crate) boundary: &'a Boundary,
     pub(crate) radiative: Option<&'a Radiative>,
+    pub(crate) edge_on: Option<&'a EdgeOn>,
     pub(crate) seed: u64,
 }
 
@@ -68,6 +84,7 @@ impl Splatter<'_> {
         let mut tracer = Tracer::new(self.world);
         let mut edges = boundary::Buffers::default();
         let mut functional = Functional::default();
+        let mut edge_on = flux::Buffers::default();
         receiver.term = Some(source.term());
         receiver.seed = self.seed;
         receiver.stream = stream;
@@ -87,6 +104,11 @@ impl Splatter<'_> {
                 Source::Outlines => {
                     if let Some(radiative) = self.radiative {
                         radiative.outline(&mut tracer, &mut functional, receiver);
+                    }
+                }
+                Source::EdgeOn => {
+                    if let Some(seen) = self.edge_on {
+                        seen.sample(&mut tracer, &mut edge_on, receiver);
                     }
                 }
             }

@@ -52,7 +52,10 @@ use drt_math::{Real, Vec3, fm};
 use super::vertex::SurfacePoint;
 use super::world::{RayPath, World};
 
-/// Cosine from which on surfaces tow with all of their speed.
+/// Cosine up to which surfaces do not tow.
+pub(crate) const NO_GRIP: f64 = 0.02;
+
+/// Cosine from which on they tow with all of their speed.
 const GRAZING: f64 = 0.3;
 
 /// The same of the depth of medium between two of them.
@@ -106,13 +109,14 @@ impl Stretch {
         let start = ends[0].map_or(0.0, |m| m.distance);
         let depth = (ends[1].map_or(f64::INFINITY, |m| m.distance) - start) / reach;
         let farthest = f64::min(depth, FARTHEST);
-        let tows = ends.map(|end| end.filter(|m| m.moves));
+        let grip = |m: &Met| rise((Real::abs(m.cosine) - NO_GRIP) / (GRAZING - NO_GRIP));
+        let grips = ends.map(|end| end.filter(|m| m.moves).map_or(0.0, grip));
         let thick = rise(depth / THIN);
-        let both = tows.iter().all(Option::is_some);
+        let both = grips.iter().all(|grip| *grip > 0.0);
         Self {
             reach,
             last: fm::exp(-farthest),
-            grips: tows.map(|m| m.map_or(0.0, |m| rise(Real::abs(m.cosine) / GRAZING))),
+            grips,
             parts: [thick, if both { 0.5 * (1.0 - thick) } else { 0.0 }],
         }
     }
@@ -158,7 +162,7 @@ impl World {
 
 /// From 0 to 1, and no farther.
 fn rise(q: f64) -> f64 {
-    let q = f64::min(q, 1.0);
+    let q = q.clamp(0.0, 1.0);
     q * q * (3.0 - 2.0 * q)
 }
 

@@ -227,7 +227,7 @@ impl Part {
     /// Samples of a splatted source to each of a pixel.
     fn source_ratio(&self, i: usize) -> f64 {
         let split = self.guidance.as_ref().and_then(|guidance| guidance.split.as_ref());
-        split.map_or(self.prepared.boundary_ratio, |split| split.sources[i])
+        split.map_or_else(|| self.prepared.source_ratio(i), |split| split.sources[i])
     }
 
     /// Samples one splatted source.

@@ -7,7 +7,6 @@ use crate::allocation::Allocation;
 use crate::contraction::Motion;
 use crate::film::{PixelFilm, SplatFilm};
 use crate::interior::Looks;
-use crate::splatting::Source;
 use crate::split::{Observed, Split};
 
 /// What a pilot found out.
@@ -75,7 +74,7 @@ impl Part {
         let n = self.motion.as_ref().map_or(0, Motion::parameters);
         let mut film = SplatFilm::new(size, n);
         // Where no sample counts much more than others, few tell enough.
-        let even = self.prepared.sources[i] == Source::Outlines;
+        let even = self.prepared.sources[i].is_even();
         let part = if even { 0.25 } else { 1.0 };
         let per_pixel = part * f64::from(units * self.per_unit()) * self.source_ratio(i);
         let seed = !self.settings.seed;

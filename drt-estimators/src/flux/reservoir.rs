@@ -1,119 +1,18 @@
-//! The flux term: scattering carried through deforming surfaces around an inside that does not
-//! follow them (theory sheet §4.1).
-//!
-//! For every surface Σ with unit normal n from its back (-) to its front (+) and a medium whose
-//! field u does not match the surface's velocity u_Σ,
-//!
-//! ```text
-//! ∫_Σ [f(-) - f(+)] n·(u_Σ - u) dA,
-//! ```
-//!
-//! f being the contribution of paths with a volume vertex on that side of Σ (0 inside an opaque
-//! body). Seen from the vertex before it, dA = r² dω / |n·w|: every ray that a camera path follows
-//! and that meets Σ gives one term, throughput × τ × Lout / |n·w|. So the term is gathered on the
-//! camera's own paths, however small the pixel. To keep the cost linear in path length, one of a
-//! path's meetings is chosen in proportion to its throughput over the cosine (weighted reservoir
-//! sampling), and Lout traced for it alone.
-//!
-//! In the spatial form (2019 paper, Eq. 16 and 20; theory sheet §3, §6) volume vertices stand at fixed
-//! distances of their rays, u is the velocity of the ray's point at Σ, and every surface beside a
-//! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term, less what this surface and the
-//! one beyond the medium [tow](crate::transport::tow) along. What of the two cancels for every velocity of the ray,
-//! as in a thin layer, is not even traced.
-//!
-//! A grid ends at its box, where coefficients jump to zero. Faces of the box that lie inside the medium
-//! are such surfaces too, with f(+) = 0 and the velocity of the grid for u_Σ.
+//! The flux along the rays of a path.
 
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::{Real, Rgb, Rng, Vec3};
-use drt_medium::MediumKind;
 
-use crate::sensitivity::{Functional, Interest, Rate};
+use super::{EDGE_ON, Flux, filled};
+use crate::sensitivity::{Functional, Rate};
 use crate::transport::tow::{Met, Stretch, list_met};
 use crate::transport::trace::{Leaving, Tracer};
-use crate::transport::world::{Tracking, intervals};
+use crate::transport::world::intervals;
 use crate::transport::{Radiance, RayPath, SurfacePoint, Vertex, World};
 
 /// What is left of two speeds that cancel.
 const ROUNDING: f64 = 1e-12;
-
-/// The surfaces with a flux.
-#[derive(Clone, Debug)]
-pub(crate) struct Flux {
-    /// Of the material form.
-    shapes: Arc<[bool]>,
-    /// Media in which the faces of a grid's box have a flux.
-    grids: Arc<[bool]>,
-    /// Segments at which a volume vertex can no longer send anything.
-    longest: u32,
-    /// In the spatial form: where there is a flux even if the ray stands still.
-    movers: Option<Movers>,
-}
-
-/// What moves by itself.
-#[derive(Clone, Debug)]
-struct Movers {
-    shapes: Arc<[bool]>,
-    grids: Arc<[bool]>,
-}
-
-impl Flux {
-    /// Of the material form; `None` when nothing has a flux.
-    pub(crate) fn new(world: &World, shapes: &[usize], interest: &Interest) -> Option<Self> {
-        let flags = (0..world.scene.shapes.len()).map(|s| shapes.contains(&s)).collect();
-        let moves = |m: usize| {
-            let of = |list: &[bool]| list.get(m).copied().unwrap_or(false);
-            (of(&interest.grids) || of(&interest.volumes))
-                && world.tracking[m] == Tracking::Vertices
-                && ends_inside(world, m)
-        };
-        let grids: Arc<[bool]> = (0..world.scene.media.len()).map(moves).collect();
-        let any = !shapes.is_empty() || grids.contains(&true);
-        any.then_some(Self { shapes: flags, grids, longest: longest(world), movers: None })
-    }
-
-    /// Of the spatial form; `None` when no medium has vertices.
-    pub(crate) fn spatial(world: &World, interest: &Interest) -> Option<Self> {
-        let media = 0..world.scene.media.len();
-        let tracked = |m: usize| world.tracking[m] == Tracking::Vertices;
-        let grids = media.clone().map(|m| tracked(m) && ends_inside(world, m)).collect();
-        let movers = Movers {
-            shapes: interest.shapes.as_slice().into(),
-            grids: interest.grids.as_slice().into(),
-        };
-        media.clone().any(tracked).then(|| Self {
-            shapes: Arc::default(),
-            grids,
-            longest: longest(world),
-            movers: Some(movers),
-        })
-    }
-
-    /// True when a shape sweeps over the points of a ray, which may itself be `carried`.
-    fn sweeps(&self, shape: u32, carried: bool) -> bool {
-        (carried && self.movers.is_some()) || self.moves(shape)
-    }
-
-    /// The same of a ray at rest.
-    fn moves(&self, shape: u32) -> bool {
-        self.movers.as_ref().map_or(&self.shapes, |m| &m.shapes)[shape as usize]
-    }
-
-    /// The same of the faces of a grid.
-    fn sweeps_grid(&self, medium: usize, carried: bool) -> bool {
-        let moves = |m: &Movers| carried || m.grids[medium];
-        self.grids[medium] && self.movers.as_ref().is_none_or(moves)
-    }
-}
-
-/// Segments at which a volume vertex can no longer send anything: one that is the path's last sends
-/// light only if it emits.
-fn longest(world: &World) -> u32 {
-    let emissive = world.scene.media.iter().any(|m| m.item.is_emissive());
-    world.max_depth.saturating_add(u32::from(emissive))
-}
 
 /// A ray of a path whose points surfaces sweep over, in the spatial form. The flux's value times these are the
 /// sensitivities of the flux.
@@ -125,20 +24,6 @@ pub(crate) struct Swept {
     pub(crate) origin: Vec3,
     /// To the rate of its direction.
     pub(crate) turn: Vec3,
-}
-
-/// Whether a medium's grid may end inside of it: not all around the medium is in the grid's box.
-fn ends_inside(world: &World, medium: usize) -> bool {
-    let grid = match &world.medium(medium).kind {
-        MediumKind::Grid(grid) => grid.density(),
-        MediumKind::Deformed(_) => return true,
-        MediumKind::Homogeneous(_) | MediumKind::Custom(_) => return false,
-    };
-    let shapes = &world.scene.shapes;
-    let mut around =
-        shapes.iter().filter(|s| s.boundary.is_some_and(|b| b.interior == Some(medium))).peekable();
-    let beyond = |x: &Vec3| (grid.from_world().point(*x) - Vec3::splat(0.5)).max_abs() > 0.5 + 1e-9;
-    around.peek().is_none() || around.any(|s| s.mesh.positions.iter().any(beyond))
 }
 
 /// What a path meets.
@@ -253,7 +138,8 @@ impl Reservoir {
         let mut before = ray.medium;
         for (i, m) in self.met.iter().enumerate() {
             let around = core::mem::replace(&mut before, m.after);
-            if !m.moves {
+            let left_out = node == 0 && Real::abs(m.cosine) < EDGE_ON;
+            if !m.moves || left_out {
                 continue;
             }
             let others = [i.checked_sub(1).and_then(|i| self.met.get(i)), self.met.get(i + 1)];
@@ -410,13 +296,3 @@ impl Side {
     }
 }
 
-/// The medium on one side of a surface, if paths have vertices in it.
-fn filled(
-    world: &World,
-    point: &SurfacePoint,
-    front: bool,
-    around: Option<usize>,
-) -> Option<usize> {
-    let medium = world.medium_on_side(point, front, around)?;
-    (world.tracking[medium] == Tracking::Vertices).then_some(medium)
-}
