@@ -39,7 +39,7 @@ impl Homogeneous {
     #[inline]
     #[must_use]
     pub fn transmittance(&self, t: f64) -> Rgb {
-        self.coefficients.sigma_t.map(|s| attenuation(s, t))
+        attenuations(self.coefficients.sigma_t, t)
     }
 
     /// A distance from the density of [`Homogeneous::free_flight_pdf`], or the news that the light
@@ -67,8 +67,9 @@ impl Homogeneous {
         };
         // A rate of zero gives an infinite distance, which passes even an infinite segment.
         if t < t_max {
-            let pdf = flight.pdf(t);
-            DistanceSample::Scatter { t, weight: self.transmittance(t) / pdf, pdf: Some(pdf) }
+            let transmittance = self.transmittance(t);
+            let pdf = flight.pdf_given(t, transmittance);
+            DistanceSample::Scatter { t, weight: transmittance / pdf, pdf: Some(pdf) }
         } else {
             DistanceSample::Pass { weight: flight.pass_weight(self.coefficients.sigma_t) }
         }
@@ -125,6 +126,16 @@ fn attenuation(sigma: f64, t: f64) -> f64 {
     if sigma == 0.0 { 1.0 } else { fm::exp(-sigma * t) }
 }
 
+/// By channel; grey media, the usual ones, take one exponential.
+#[inline]
+fn attenuations(sigma: Rgb, t: f64) -> Rgb {
+    if sigma.r == sigma.g && sigma.g == sigma.b {
+        Rgb::splat(attenuation(sigma.r, t))
+    } else {
+        sigma.map(|s| attenuation(s, t))
+    }
+}
+
 /// The density of distances along one segment.
 struct Flight {
     rates: Rgb,
@@ -136,7 +147,7 @@ struct Flight {
 
 impl Flight {
     fn new(medium: &Homogeneous, t_max: f64, channels: Rgb, defensive: f64) -> Self {
-        let rates = medium.coefficients.sigma_t.abs();
+        let rates = medium.coefficients.sigma_t;
         let fastest = rates.max_channel();
         Self {
             rates,
@@ -149,7 +160,13 @@ impl Flight {
 
     #[inline]
     fn pdf(&self, t: f64) -> f64 {
-        let flight = self.rates.map(|r| r * attenuation(r, t));
+        self.pdf_given(t, attenuations(self.rates, t))
+    }
+
+    /// The same where the transmittance is known.
+    #[inline]
+    fn pdf_given(&self, t: f64, transmittance: Rgb) -> f64 {
+        let flight = self.rates * transmittance;
         (1.0 - self.defensive) * self.probabilities.dot(flight) + self.defensive * self.reach.pdf(t)
     }
 
