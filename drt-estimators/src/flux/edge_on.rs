@@ -1,8 +1,7 @@
 //! The flux through what the camera sees edge on.
 //!
 //! Rays meet a surface in proportion to the cosine c of the angle of incidence, and their flux has the factor 1/c:
-//! E \[1/c²\] diverges like a logarithm, one sample of a million has what thousands of others have, and a face
-//! seen exactly edge on is met by none, for all the flux it has. By area the integral has no such factor,
+//! E \[1/c²\] diverges like a logarithm, one sample of a million has what thousands of others have. By area the integral has no such factor,
 //!
 //! ```text
 //! ∫_{c < EDGE_ON} h_P(y) τ(x, y) / r² [Lout(-) - Lout(+)] n·(u_Σ - u) dA,
@@ -10,7 +9,11 @@
 //!
 //! x being the eye and h_P the pixel's filter and importance. So where c is small, points are drawn on
 //! triangles that may be seen so, in proportion to the angle they would fill if they faced the eye, and camera rays leave
-//! those out. Nothing [tows](crate::transport::tow) there.
+//! those out. Nothing [tows](crate::transport::tow) there. (Of a face in the very plane of the eye, flux, outlines and
+//! what is dimmed depend on each other: none is sampled.)
+
+#[cfg(all(test, feature = "std"))]
+mod tests;
 
 use alloc::vec::Vec;
 
@@ -41,6 +44,9 @@ struct Triangle {
     /// The medium around its shape, where that is the same everywhere.
     around: Option<Option<usize>>,
 }
+
+/// Cosine below which rounding decides what is seen of a face.
+const IN_PLANE: f64 = 1e-9;
 
 /// Buffers of a sample.
 #[derive(Debug, Default)]
@@ -102,7 +108,8 @@ impl EdgeOn {
         let (point, x) = world.point(prim, triangle_bary(tracer.rng.next_2d()));
         let to = world.camera.position() - x;
         let cosine = point.ng.dot(to) / to.length();
-        if !(Real::abs(cosine) < EDGE_ON && 1 < self.longest) {
+        let seen_so = (IN_PLANE..EDGE_ON).contains(&Real::abs(cosine));
+        if !seen_so || self.longest <= 1 {
             return None;
         }
         let inv_pdf = area / chosen.pmf;

@@ -9,7 +9,7 @@ use crate::sensitivity::{Functional, Rate};
 use crate::transport::tow::{Met, Stretch, list_met};
 use crate::transport::trace::{Leaving, Tracer};
 use crate::transport::world::intervals;
-use crate::transport::{Radiance, RayPath, SurfacePoint, Vertex, World};
+use crate::transport::{MaterialPoint, Radiance, RayPath, SurfacePoint, Vertex, World};
 
 /// What is left of two speeds that cancel.
 const ROUNDING: f64 = 1e-12;
@@ -29,8 +29,7 @@ pub(crate) struct Swept {
 /// What a path meets.
 #[derive(Clone, Copy, Debug)]
 enum Face {
-    /// A surface, and what lies before and beyond it.
-    Surface(SurfacePoint, [Option<Side>; 2]),
+    Surface(SurfacePoint),
     /// A face of the box of a medium's grid, and its normal out of the box.
     Grid(usize, Vec3),
 }
@@ -48,7 +47,7 @@ struct Side {
 /// A share of the speed of a surface along a ray.
 #[derive(Clone, Copy, Debug)]
 struct Speed {
-    point: SurfacePoint,
+    point: MaterialPoint,
     /// Distance along the ray.
     t: f64,
     /// Its product with the surface's velocity less the ray's is the share.
@@ -63,6 +62,8 @@ struct Meeting {
     origin: Vec3,
     dir: Vec3,
     face: Face,
+    /// What lies before and beyond a surface.
+    sides: [Option<Side>; 2],
     x: Vec3,
     throughput: Rgb,
     /// Segments up to the surface.
@@ -122,7 +123,7 @@ impl Reservoir {
         }
         let (total, rng) = (&mut self.total, &mut self.rng);
         let (chosen, kept) = (&mut self.chosen, &mut self.part);
-        let mut meet = |face: Face, most: f64, x: Vec3, t: f64| {
+        let mut meet = |face: Face, sides: [Option<Side>; 2], most: f64, x: Vec3, t: f64| {
             let weight = strength * most;
             if weight == 0.0 {
                 return;
@@ -130,8 +131,18 @@ impl Reservoir {
             *total += weight;
             if rng.next_f64() * *total < weight {
                 let segments = segments + 1;
-                *chosen =
-                    Some(Meeting { node, t, origin, dir, face, x, throughput, segments, weight });
+                *chosen = Some(Meeting {
+                    node,
+                    t,
+                    origin,
+                    dir,
+                    face,
+                    sides,
+                    x,
+                    throughput,
+                    segments,
+                    weight,
+                });
                 kept.truncate_from(ray, t);
             }
         };
@@ -152,7 +163,7 @@ impl Reservoir {
                 node > 0 && !side.speeds.iter().flatten().any(moves)
             };
             let most = sides.iter().flatten().map(|side| side.most(rigid(side)));
-            meet(Face::Surface(m.point, sides), most.fold(0.0, f64::max), m.x, m.distance);
+            meet(Face::Surface(m.point), sides, most.fold(0.0, f64::max), m.x, m.distance);
         }
         if !flux.grids.contains(&true) {
             return;
@@ -163,7 +174,7 @@ impl Reservoir {
             world.medium(m).crossings(&part, |c| {
                 let cosine = Real::abs(c.normal.dot(dir));
                 let most = if cosine == 0.0 { 0.0 } else { 1.0 / cosine };
-                meet(Face::Grid(m, c.normal), most, part.at(c.t), i.start + c.t);
+                meet(Face::Grid(m, c.normal), [None; 2], most, part.at(c.t), i.start + c.t);
             });
         }
     }
@@ -199,12 +210,12 @@ impl Reservoir {
                 let rate = Rate::Grid(medium, m.x, along);
                 self.send(tracer, &m, vertex, &[Some((rate, along, m.t))], weight, &mut add);
             }
-            Face::Surface(point, sides) => {
-                for side in sides.iter().flatten() {
+            Face::Surface(point) => {
+                for side in m.sides.iter().flatten() {
                     let vertex = world.touching(point, m.x, side.front, side.medium);
                     let rates = side.speeds.map(|speed| {
                         let Speed { point, t, along } = speed?;
-                        Some((Rate::Surface(point.material(), along), along, t))
+                        Some((Rate::Surface(point, along), along, t))
                     });
                     self.send(tracer, &m, vertex, &rates, weight, &mut add);
                 }
@@ -277,7 +288,7 @@ impl Side {
         let of = |m: Option<&Met>, left: f64| {
             let m = m.filter(|m| left != 0.0 && m.cosine != 0.0)?;
             let along = m.point.ng * (sign * left / m.cosine);
-            Some(Speed { point: m.point, t: m.distance, along })
+            Some(Speed { point: m.point.material(), t: m.distance, along })
         };
         let speeds = [of(Some(m), left[0]), of(ends[1 - end], left[1])];
         Some(Self { medium, front, speeds })
@@ -295,4 +306,3 @@ impl Side {
         }
     }
 }
-

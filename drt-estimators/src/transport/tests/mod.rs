@@ -1,7 +1,7 @@
 //! The derivative of a recorded path and of each of its factors, against dual numbers.
 
 mod changes;
-pub(super) mod choice;
+pub(crate) mod choice;
 mod factors;
 mod moving;
 mod records;
