@@ -193,7 +193,9 @@ impl Reservoir {
     ) {
         let Some(m) = self.chosen.take() else { return };
         let world = tracer.world;
-        if m.segments > tracer.max_segments {
+        // What counts for less than a path does is not followed for each.
+        let chance = f64::min(self.total, 1.0);
+        if m.segments > tracer.max_segments || self.rng.next_f64() >= chance {
             return;
         }
         let (rng, counters) = (&mut tracer.rng, &mut tracer.counters);
@@ -202,7 +204,7 @@ impl Reservoir {
             return;
         }
         tracer.counters.flux_samples += 1;
-        let weight = m.throughput * tau * (self.total / m.weight);
+        let weight = m.throughput * tau * (self.total / (m.weight * chance));
         match m.face {
             Face::Grid(medium, n) => {
                 let vertex = world.inside_grid(medium, m.x, n);
