@@ -68,7 +68,8 @@ impl EdgeOn {
             if !flux.sweeps(s, interest.sensor) {
                 continue;
             }
-            let around = world.medium_around(s as usize);
+            // What bounds media knows both of them.
+            let mut around = shape.boundary.map(|_| Some(None));
             for t in 0..shape.mesh.triangles.len() as u32 {
                 let corners = shape.mesh.triangle(t);
                 let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -78,6 +79,7 @@ impl EdgeOn {
                 let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - eye;
                 let r2 = f64::max(middle.length_squared(), area);
                 if area > 0.0 && height < EDGE_ON * farthest {
+                    let around = *around.get_or_insert_with(|| world.medium_around(s as usize));
                     triangles.push(Triangle { prim: world.prim_of(s as usize, t), area, around });
                     weights.push(area / r2);
                 }
