@@ -83,10 +83,8 @@ pub(crate) fn sample<R: Receiver>(
     let light = match vertex {
         Some(vertex) => {
             let mut light = Radiance::default();
-            let own = tracer.max_segments;
-            tracer.max_segments = own.checked_sub(1)?;
-            tracer.radiance_from(vertex, -dir, &mut light);
-            tracer.max_segments = own;
+            let longest = tracer.max_segments.checked_sub(1)?;
+            tracer.radiance_within(longest, vertex, -dir, &mut light);
             light.0
         }
         None => world.lights.environment().map_or(Rgb::ZERO, |(_, l)| l),

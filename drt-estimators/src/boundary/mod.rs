@@ -497,10 +497,8 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         self.b.light.0.clear();
         match s.vertex {
             Some(vertex) => {
-                let own = self.tracer.max_segments;
-                self.tracer.max_segments = u32::min(own, longest);
-                self.tracer.radiance_from(vertex, w, &mut self.b.light);
-                self.tracer.max_segments = own;
+                let longest = u32::min(self.tracer.max_segments, longest);
+                self.tracer.radiance_within(longest, vertex, w, &mut self.b.light);
             }
             None => {
                 let sky = self.tracer.world.lights.environment();

@@ -34,7 +34,6 @@ pub(crate) struct EdgeOn {
     table: CdfTable,
     /// Of the spatial form, where the camera's rays move with it.
     spatial: bool,
-    longest: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -85,7 +84,7 @@ impl EdgeOn {
                 }
             }
         }
-        if triangles.is_empty() {
+        if triangles.is_empty() || flux.longest <= 1 {
             return Ok(None);
         }
         let table = CdfTable::new(&weights).map_err(|e| Error::Element {
@@ -93,7 +92,7 @@ impl EdgeOn {
             reason: alloc::format!("cannot be sampled: {e}"),
         })?;
         let spatial = flux.movers.is_some();
-        Ok(Some(Self { triangles, table, spatial, longest: flux.longest }))
+        Ok(Some(Self { triangles, table, spatial }))
     }
 
     /// Takes one sample.
@@ -110,8 +109,7 @@ impl EdgeOn {
         let (point, x) = world.point(prim, triangle_bary(tracer.rng.next_2d()));
         let to = world.camera.position() - x;
         let cosine = point.ng.dot(to) / to.length();
-        let seen_so = (IN_PLANE..EDGE_ON).contains(&Real::abs(cosine));
-        if !seen_so || self.longest <= 1 {
+        if !(IN_PLANE..EDGE_ON).contains(&Real::abs(cosine)) {
             return None;
         }
         let inv_pdf = area / chosen.pmf;
@@ -130,8 +128,7 @@ impl EdgeOn {
             b.functional.items.clear();
             b.functional.items.push(Rate::Surface(point.material(), n));
             if self.spatial {
-                let mut gradient = world.camera.direction_gradient(-w, n * -to.length());
-                gradient.position -= n;
+                let gradient = world.camera.ray_gradient(-w, -n, n * -to.length());
                 b.functional.items.push(Rate::Sensor(gradient));
             } else {
                 b.functional.items.push(Rate::Volume(medium, x, -n));
@@ -140,9 +137,7 @@ impl EdgeOn {
                 continue;
             }
             let mut light = Radiance::default();
-            let own = core::mem::replace(&mut tracer.max_segments, longest);
-            tracer.radiance_from(vertex, w, &mut light);
-            tracer.max_segments = own;
+            tracer.radiance_within(longest, vertex, w, &mut light);
             b.splats.clear();
             tracer.spread(&vertex, light.0 * inv_pdf, transport, w, 1, &mut b.splats);
             for splat in &b.splats {

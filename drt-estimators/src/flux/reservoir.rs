@@ -1,5 +1,8 @@
 //! The flux along the rays of a path.
 
+#[cfg(test)]
+mod tests;
+
 use alloc::vec::Vec;
 
 use drt_math::{Real, Rgb, Rng, Vec3};
@@ -237,10 +240,8 @@ impl Reservoir {
         add: &mut impl FnMut(&Functional, Option<Swept>, Rgb),
     ) {
         let mut light = Radiance::default();
-        let own = tracer.max_segments;
-        tracer.max_segments = own - m.segments;
-        tracer.radiance_from(vertex, -m.dir, &mut light);
-        tracer.max_segments = own;
+        let longest = tracer.max_segments - m.segments;
+        tracer.radiance_within(longest, vertex, -m.dir, &mut light);
         if light.0.is_zero() {
             return;
         }

@@ -37,8 +37,7 @@ impl Radiative {
         for (matter, distance, value, held) in parts {
             let n = sight.sides.n;
             // A camera that turns takes its image points with it.
-            let mut gradient = camera.direction_gradient(-sight.w, n * -distance);
-            gradient.position -= n;
+            let gradient = camera.ray_gradient(-sight.w, -n, n * -distance);
             functional.items.clear();
             functional.items.extend(matter.map(|point| Rate::Surface(point, n)));
             functional.items.push(Rate::Sensor(gradient));

@@ -120,6 +120,14 @@ impl Sensor {
         }
     }
 
+    /// The gradient by the sensor of a number whose gradients by the origin and by the unit direction of the ray
+    /// of one and the same image point are given.
+    pub(crate) fn ray_gradient(&self, direction: Vec3, origin: Vec3, turn: Vec3) -> SensorGradient {
+        let mut gradient = self.direction_gradient(direction, turn);
+        gradient.position += origin;
+        gradient
+    }
+
     /// The gradient by the sensor of a number whose gradient by the unit direction into the scene, of
     /// one and the same image point, is `adjoint`; its position has no part in it.
     #[must_use]

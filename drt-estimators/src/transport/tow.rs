@@ -95,8 +95,8 @@ pub(crate) struct Met {
 pub(crate) struct Stretch {
     /// How far surfaces tow.
     reach: f64,
-    /// exp(-σℓ).
-    last: f64,
+    /// σℓ.
+    depth: f64,
     /// γ of the surfaces at the start and the end; 0 where none tows.
     grips: [f64; 2],
     /// What of γ falls off from a surface on, and what is the same all over the stretch.
@@ -108,14 +108,13 @@ impl Stretch {
     pub(crate) fn new(ends: [Option<&Met>; 2], reach: f64) -> Self {
         let start = ends[0].map_or(0.0, |m| m.distance);
         let depth = (ends[1].map_or(f64::INFINITY, |m| m.distance) - start) / reach;
-        let farthest = f64::min(depth, FARTHEST);
         let grip = |m: &Met| rise((Real::abs(m.cosine) - NO_GRIP) / (GRAZING - NO_GRIP));
         let grips = ends.map(|end| end.filter(|m| m.moves).map_or(0.0, grip));
         let thick = rise(depth / THIN);
         let both = grips.iter().all(|grip| *grip > 0.0);
         Self {
             reach,
-            last: fm::exp(-farthest),
+            depth: f64::min(depth, FARTHEST),
             grips,
             parts: [thick, if both { 0.5 * (1.0 - thick) } else { 0.0 }],
         }
@@ -124,10 +123,11 @@ impl Stretch {
     /// What a point has of the speeds of the two ends, from which it is so far `away`, and the derivatives of
     /// that by the point's distance.
     fn shares(&self, away: [f64; 2]) -> [[f64; 2]; 2] {
-        let whole = f64::max(1.0 - self.last, f64::MIN_POSITIVE);
+        let last = fm::exp(-self.depth);
+        let whole = f64::max(1.0 - last, f64::MIN_POSITIVE);
         let falls = [(away[0], -1.0), (away[1], 1.0)].map(|(away, sign)| {
             let here = fm::exp(-away / self.reach);
-            if here > self.last { [here - self.last, sign * here] } else { [0.0; 2] }
+            if here > last { [here - last, sign * here] } else { [0.0; 2] }
         });
         let [falling, even] = self.parts.map(|part| self.grips.map(|grip| part * grip));
         core::array::from_fn(|end| {

@@ -237,6 +237,19 @@ impl<'w> Tracer<'w> {
         self.walk(stop, observer);
     }
 
+    /// The same over at most `longest` segments.
+    pub(crate) fn radiance_within<O: Observer>(
+        &mut self,
+        longest: u32,
+        vertex: Vertex,
+        wo: Vec3,
+        observer: &mut O,
+    ) {
+        let own = core::mem::replace(&mut self.max_segments, longest);
+        self.radiance_from(vertex, wo, observer);
+        self.max_segments = own;
+    }
+
     fn walk<O: Observer>(&mut self, mut stop: Stop, observer: &mut O) {
         while let Some(leaving) = self.scatter(&stop, observer) {
             match self.follow(&leaving, observer) {

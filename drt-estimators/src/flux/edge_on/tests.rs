@@ -7,16 +7,14 @@ use drt_math::stats::Moments;
 use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{GeometryChange, Parameter};
 
-use crate::boundary::Receiver;
 use crate::contraction::Contraction;
 use crate::emitter::Emitter;
-use crate::sensitivity::Functional;
 use crate::splatting::{Checked, Source};
 use crate::transport::tests::choice;
 use crate::transport::tests::scenes::{Build, FILM, homogeneous, moves, parameter, placed};
 use crate::{EstimatorKind, Scene, Session, Settings, Unattended};
 
-/// A cube of milk, lit from above, whose top is a little lower than the camera.
+/// A cube of milk, lit by a lamp and the sky, whose top is a little lower than the camera.
 fn milk() -> (Scene, Parameter) {
     let mut b = Build::default();
     let milk = homogeneous(Rgb::new(2.0, 1.5, 3.0), Rgb::splat(0.9), Rgb::ZERO, 0.2);
@@ -31,32 +29,16 @@ fn milk() -> (Scene, Parameter) {
     (b.camera(vec3(0.0, 0.0, 4.0), Vec3::ZERO, 5), motion)
 }
 
-/// The derivative of the mean of all pixels.
-struct Mean<'a> {
-    contraction: Contraction<'a>,
-    sum: f64,
-}
-
-impl Receiver for Mean<'_> {
-    fn moves(&mut self, functional: &Functional) -> bool {
-        self.contraction.evaluate(functional)
-    }
-
-    fn receive(&mut self, _: u32, value: Rgb) {
-        self.sum += value.r * self.contraction.rates[0].r;
-    }
-}
-
 const PIXELS: u32 = FILM[0] * FILM[1];
 
-/// That of what is seen edge on alone.
+/// The derivative of the mean of all pixels, of what is seen edge on alone.
 fn seen_edge_on() -> Moments {
     let (scene, motion) = milk();
     let (prepared, motion) = choice::prepare(&scene, &motion, 5);
     let mut moments = Moments::default();
     for seed in 0..32 {
         let contraction = Contraction::new(&prepared.world, &motion);
-        let mut mean = Checked::new(Mean { contraction, sum: 0.0 });
+        let mut mean = Checked::new(choice::Total { contraction, weight: |_| 1.0, sum: 0.0 });
         let count = 1 << 12;
         prepared.splatter(seed).run(Source::EdgeOn, Source::EdgeOn.stream(), count, &mut mean);
         moments.push(mean.inner.sum / f64::from(count * PIXELS));
@@ -78,8 +60,8 @@ fn faces_seen_edge_on() {
     };
     let [path_space, radiative] = [EstimatorKind::PathSpace, EstimatorKind::Radiative].map(run);
     let part = seen_edge_on();
-    let error = path_space.stderr.r.hypot(radiative.stderr.r);
-    let off = radiative.mean.r - path_space.mean.r;
+    let error = path_space.stderr.mean().hypot(radiative.stderr.mean());
+    let off = radiative.mean.mean() - path_space.mean.mean();
     assert!(off.abs() < 4.0 * error, "{off} ± {error}");
     assert!(part.mean().abs() > 8.0 * error.hypot(part.variance_of_mean().sqrt()));
 }

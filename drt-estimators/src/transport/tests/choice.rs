@@ -60,7 +60,7 @@ fn derivative(prepare: &dyn Fn(f64) -> (Prepared, Motion), strengths: [f64; 2]) 
                 }
             }
             let contraction = Contraction::new(&prepared.world, &motion);
-            let mut outlines = Checked::new(Total { contraction, sum: 0.0 });
+            let mut outlines = Checked::new(Total { contraction, weight, sum: 0.0 });
             for source in &prepared.sources {
                 prepared.splatter(seed).run(
                     *source,
@@ -89,10 +89,11 @@ fn weight(pixel: u32) -> f64 {
     f64::from(pixel % FILM[0]) - 2.5
 }
 
-/// What lands on any pixel.
-struct Total<'a> {
-    contraction: Contraction<'a>,
-    sum: f64,
+/// What lands on any pixel, by a weight of it.
+pub(crate) struct Total<'a> {
+    pub(crate) contraction: Contraction<'a>,
+    pub(crate) weight: fn(u32) -> f64,
+    pub(crate) sum: f64,
 }
 
 impl Receiver for Total<'_> {
@@ -101,7 +102,7 @@ impl Receiver for Total<'_> {
     }
 
     fn receive(&mut self, pixel: u32, value: Rgb) {
-        self.sum += weight(pixel) * value.mean() * self.contraction.rates[0].r;
+        self.sum += (self.weight)(pixel) * value.mean() * self.contraction.rates[0].r;
     }
 }
 
