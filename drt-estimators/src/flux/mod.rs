@@ -56,6 +56,8 @@ pub(crate) struct Flux {
     longest: u32,
     /// In the spatial form: where there is a flux even if the ray stands still.
     movers: Option<Movers>,
+    /// What a flux must count for to be followed for every path, in those.
+    pub(crate) followed: f64,
 }
 
 /// What moves by itself.
@@ -77,7 +79,13 @@ impl Flux {
         };
         let grids: Arc<[bool]> = (0..world.scene.media.len()).map(moves).collect();
         let any = !shapes.is_empty() || grids.contains(&true);
-        any.then_some(Self { shapes: flags, grids, longest: longest(world), movers: None })
+        any.then_some(Self {
+            shapes: flags,
+            grids,
+            longest: longest(world),
+            movers: None,
+            followed: 1.0,
+        })
     }
 
     /// Of the spatial form; `None` when no medium has vertices.
@@ -94,6 +102,7 @@ impl Flux {
             grids,
             longest: longest(world),
             movers: Some(movers),
+            followed: 1.0,
         })
     }
 

@@ -194,10 +194,10 @@ impl Reservoir {
         tracer: &mut Tracer<'_>,
         mut add: impl FnMut(&Functional, Option<Swept>, Rgb),
     ) {
-        let Some(m) = self.chosen.take() else { return };
+        let (Some(m), Some(flux)) = (self.chosen.take(), &self.flux) else { return };
         let world = tracer.world;
         // What counts for less than a path does is not followed for each.
-        let chance = f64::min(self.total, 1.0);
+        let chance = f64::min(self.total / flux.followed, 1.0);
         if m.segments > tracer.max_segments || self.rng.next_f64() >= chance {
             return;
         }

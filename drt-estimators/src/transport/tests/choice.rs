@@ -40,7 +40,10 @@ pub(crate) fn prepare(scene: &Scene, motion: &Parameter, depth: u32) -> (Prepare
 
 /// The derivative of the light's moment across the image: the interior term with a world made by
 /// `prepare(strengths[0])`, and all others with one by `prepare(strengths[1])`.
-fn derivative(prepare: &dyn Fn(f64) -> (Prepared, Motion), strengths: [f64; 2]) -> Moments {
+pub(crate) fn derivative(
+    prepare: &dyn Fn(f64) -> (Prepared, Motion),
+    strengths: [f64; 2],
+) -> Moments {
     let [rays, edges] = strengths.map(|strength| {
         let (prepared, motion) = prepare(strength);
         let mut batches = [Vec::new(), Vec::new()];

@@ -140,6 +140,28 @@ fn check(kind: Ball, effects: Vec<Effect>) {
     });
 }
 
+/// Nor how often a flux is followed: the same with few of them, each counting as much more.
+#[test]
+fn what_is_followed_stands_for_all() {
+    let scene = ball_in_mist(Ball::Milk);
+    let motion = parameter("ball", 0.0, vec![moves("ball", shift())]);
+    let [all, few] = [1.0, 20.0].map(|followed| {
+        let prepare = |_: f64| {
+            let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
+            if let Some(flux) = &mut prepared.flux {
+                flux.followed = followed;
+            }
+            // Then all of it is flux.
+            prepared.world.reaches.clear();
+            (prepared, motion)
+        };
+        choice::derivative(&prepare, [1.0; 2])
+    });
+    let error = f64::sqrt(all.variance_of_mean() + few.variance_of_mean());
+    assert!((all.mean() - few.mean()).abs() < 4.0 * error, "{all:?} {few:?}");
+    assert!(error < 0.15 * all.mean().abs(), "{all:?} {few:?}");
+}
+
 #[test]
 fn the_choice_does_not_matter() {
     check(Ball::Milk, vec![moves("ball", shift())]);
