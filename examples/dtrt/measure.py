@@ -48,6 +48,7 @@ def arguments():
     parser.add_argument("--spp", type=int, default=16, help="samples per pixel")
     parser.add_argument("--boundary-spp", type=int, help="boundary samples per pixel; as many as --spp by default")
     parser.add_argument("--adaptive", action="store_true", help="noisier pixels take more samples")
+    parser.add_argument("--alone", action="store_true", help="each parameter in a run of its own")
     parser.add_argument("--seeds", type=int, default=16, help="runs with different random numbers")
     parser.add_argument("--max-depth", type=int, help="path depth; the job's by default")
     return parser.parse_args()
@@ -88,20 +89,38 @@ def variances(runs, name, spp):
     return mean * spp, error * spp, claimed / mean
 
 
+def alone(job):
+    """Jobs of one parameter each, for as long as they are used; beside the whole one, as it names its scene from there."""
+    head, *parameters = job.read_text().split("[[parameter]]")
+    # What comes after the parameters is of no use without all of them.
+    parameters = [text.split("\n[optimize]")[0] for text in parameters]
+    for parameter in parameters:
+        with tempfile.NamedTemporaryFile("w", suffix=".toml", prefix=f".{job.stem}-", dir=job.parent) as one:
+            one.write(f"{head}[[parameter]]{parameter}")
+            one.flush()
+            yield pathlib.Path(one.name)
+
+
 def measure(job, options):
     forward = [run("render", job, seed, options)[0] for seed in range(options.seeds)]
-    seconds, digests, runs = zip(*(run("grad", job, seed, options) for seed in range(options.seeds)))
-    forward, seconds = statistics.median(forward), statistics.median(seconds)
+    forward = statistics.median(forward)
+    # A run of one parameter has no peer: dtrt's times are for all.
+    peer = DTRT.get(job.stem) if options.size == 64 and not options.alone else None
+    for part in alone(job) if options.alone else [job]:
+        seconds, digests, runs = zip(*(run("grad", part, seed, options) for seed in range(options.seeds)))
+        report(job, forward, statistics.median(seconds), digests[0]["derivatives"], runs, peer, options)
+
+
+def report(job, forward, seconds, names, runs, peer, options):
+    """Prints a row for each parameter of these runs."""
     samples = options.size**2 * options.spp
-    peer_seconds, peer_variances = DTRT.get(job.stem, (None, ()))
-    for at, name in enumerate(digests[0]["derivatives"]):
+    for at, name in enumerate(names):
         variance, error, claimed = variances(runs, name, options.spp)
         work = "–"
-        if at < len(peer_variances) and options.size == 64:
-            peer = peer_variances[at] * peer_seconds / (64 * 64 * 16)
-            work = f"{variance * seconds / samples / peer:.2f}"
+        if peer and at < len(peer[1]):
+            work = f"{variance * seconds / samples / (peer[1][at] * peer[0] / (64 * 64 * 16)):.2f}"
         print(
-            f"| {job.stem} | {name} | {forward:.3f} | {seconds:.3f} | {seconds / forward:.1f} "
+            f"| {job.parent.name if job.stem == 'job' else job.stem} | {name} | {forward:.3f} | {seconds:.3f} | {seconds / forward:.1f} "
             f"| {1e6 * seconds / samples:.1f} | {variance:.3g} ± {error:.2g} | {claimed:.2f} | {work} |",
             flush=True,
         )

@@ -13,8 +13,8 @@ use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::{Bsdf, Diffuse};
 use drt_estimators::{
-    Counters, Layer, MediumBoundary, Named, Rendering, Scene, SceneEmitter, SceneSensor, Session,
-    Settings, Shape, Surrounding, Term, Unattended, agreement,
+    Counters, EstimatorKind, Layer, MediumBoundary, Named, Rendering, Scene, SceneEmitter,
+    SceneSensor, Session, Settings, Shape, Surrounding, Term, Unattended, agreement,
 };
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, ValueChange, Vec3, vec3};
@@ -101,8 +101,18 @@ fn homogeneous() -> Medium {
 
 /// The same medium as voxels.
 fn voxels() -> Medium {
+    voxels_of(vec![0.05; 64])
+}
+
+/// What fades out before the walls.
+fn fading() -> Medium {
+    let inside = |i: usize| [i % 4, i / 4 % 4, i / 16].iter().all(|k| (1..3).contains(k));
+    voxels_of((0..64).map(|i| if inside(i) { 0.05 } else { 0.0 }).collect())
+}
+
+fn voxels_of(density: Vec<f64>) -> Medium {
     let place = Affine { linear: Mat3::IDENTITY * 9.0, translation: vec3(-4.5, -4.5, -2.5) };
-    let grid = Grid::new([4; 3], 1, vec![0.05; 64]).and_then(|g| g.with_placement(place));
+    let grid = Grid::new([4; 3], 1, density).and_then(|g| g.with_placement(place));
     let [albedo, emission] = [Rgb::splat(0.8), Rgb::ZERO].map(Volume::Constant);
     let medium = GridMedium::new(grid.expect("a grid"), 1.0, albedo, emission).expect("a medium");
     Medium::new(medium, Phase::Isotropic)
@@ -130,7 +140,17 @@ fn paints() -> Vec<Parameter> {
 }
 
 fn rendered(scene: &Scene, parameters: &[Parameter], spp: u32) -> Rendering {
-    let settings = Settings { spp, terms: true, threads: 1, seed: 3, ..Settings::default() };
+    rendered_by(EstimatorKind::default(), scene, parameters, spp)
+}
+
+fn rendered_by(
+    estimator: EstimatorKind,
+    scene: &Scene,
+    parameters: &[Parameter],
+    spp: u32,
+) -> Rendering {
+    let settings =
+        Settings { estimator, spp, terms: true, threads: 1, seed: 3, ..Settings::default() };
     let mut session = Session::new(scene, parameters, &settings).expect("a valid scene");
     assert!(session.run(spp, &Unattended));
     let r = session.rendering();
@@ -158,6 +178,20 @@ fn homogeneous_only() {
     let r = rendered(&hazy(voxels()), &[], 4);
     assert_eq!(r.plan.media[0].tracking, "delta tracking");
     assert!(r.counters.tracking_steps > PIXELS);
+}
+
+/// Nothing flows through walls that a cloud does not reach.
+#[test]
+fn faded_out() {
+    let samples = |medium| {
+        let mut scene = hazy(medium);
+        scene.shapes.retain(|s| s.boundary.is_some() || s.emitter.is_some());
+        let above = Affine { linear: Mat3::IDENTITY, translation: Vec3::Z * 5.0 };
+        scene.shapes[0].mesh = Arc::new(scene.shapes[0].mesh.transform(&above));
+        rendered_by(EstimatorKind::Radiative, &scene, &moves(&["camera"]), 4).counters.flux_samples
+    };
+    assert_eq!(samples(fading()), 0);
+    assert!(samples(voxels()) > PIXELS / 2);
 }
 
 #[test]

@@ -40,7 +40,7 @@ pub(crate) use reservoir::Reservoir;
 use crate::sensitivity::Interest;
 use crate::transport::tow::NO_GRIP;
 use crate::transport::world::Tracking;
-use crate::transport::{SurfacePoint, World};
+use crate::transport::{SurfacePoint, Vertex, World};
 
 /// Cosine of the angle of incidence below which the camera's rays leave the flux to [`EdgeOn`].
 const EDGE_ON: f64 = NO_GRIP;
@@ -52,6 +52,8 @@ pub(crate) struct Flux {
     shapes: Arc<[bool]>,
     /// Media in which the faces of a grid's box have a flux.
     grids: Arc<[bool]>,
+    /// The largest extinctions of media that are grids.
+    largest: Arc<[Option<f64>]>,
     /// Segments at which a volume vertex can no longer send anything.
     longest: u32,
     /// In the spatial form: where there is a flux even if the ray stands still.
@@ -82,6 +84,7 @@ impl Flux {
         any.then_some(Self {
             shapes: flags,
             grids,
+            largest: largest(world),
             longest: longest(world),
             movers: None,
             followed: 1.0,
@@ -100,6 +103,7 @@ impl Flux {
         media.clone().any(tracked).then(|| Self {
             shapes: Arc::default(),
             grids,
+            largest: largest(world),
             longest: longest(world),
             movers: Some(movers),
             followed: 1.0,
@@ -121,6 +125,17 @@ impl Flux {
         let moves = |m: &Movers| carried || m.grids[medium];
         self.grids[medium] && self.movers.as_ref().is_none_or(moves)
     }
+
+    /// The extinction at a volume vertex over the largest in its grid: nothing where a cloud fades out inside of
+    /// its box. 1 in other media.
+    fn fullness(&self, world: &World, vertex: &Vertex) -> f64 {
+        let Some(medium) = vertex.medium else { return 0.0 };
+        match self.largest[medium] {
+            Some(0.0) => 0.0,
+            Some(largest) => world.medium(medium).sigma_t(vertex.x).max_abs() / largest,
+            None => 1.0,
+        }
+    }
 }
 
 /// Segments at which a volume vertex can no longer send anything: one that is the path's last sends
@@ -128,6 +143,11 @@ impl Flux {
 fn longest(world: &World) -> u32 {
     let emissive = world.scene.media.iter().any(|m| m.item.is_emissive());
     world.max_depth.saturating_add(u32::from(emissive))
+}
+
+fn largest(world: &World) -> Arc<[Option<f64>]> {
+    let of = |m: usize| Some(world.medium(m).grid()?.largest_sigma_t());
+    (0..world.scene.media.len()).map(of).collect()
 }
 
 /// Whether a medium's grid may end inside of it: not all around the medium is in the grid's box.

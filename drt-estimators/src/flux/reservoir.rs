@@ -43,6 +43,8 @@ struct Side {
     medium: usize,
     /// It is on the surface's front.
     front: bool,
+    /// How much of it there is, over where it is densest.
+    fullness: f64,
     /// What of the surface's speed counts, and of that of the one at the medium's other end.
     speeds: [Option<Speed>; 2],
 }
@@ -157,8 +159,8 @@ impl Reservoir {
                 continue;
             }
             let others = [i.checked_sub(1).and_then(|i| self.met.get(i)), self.met.get(i + 1)];
-            let near = Side::before(world, m, others[0], around);
-            let far = world.is_null(m.point.shape).then(|| Side::beyond(world, m, others[1]));
+            let near = Side::before(flux, world, m, others[0], around);
+            let far = world.is_null(m.point.shape).then(|| Side::beyond(flux, world, m, others[1]));
             let sides = [near, far.flatten()];
             // Only what moves by itself, and the camera, moves a ray's points at different velocities.
             let rigid = |side: &Side| {
@@ -176,8 +178,12 @@ impl Reservoir {
             let part = drt_medium::Ray::new(origin + dir * i.start, dir, i.end - i.start);
             world.medium(m).crossings(&part, |c| {
                 let cosine = Real::abs(c.normal.dot(dir));
-                let most = if cosine == 0.0 { 0.0 } else { 1.0 / cosine };
-                meet(Face::Grid(m, c.normal), [None; 2], most, part.at(c.t), i.start + c.t);
+                let x = part.at(c.t);
+                let most = match cosine {
+                    0.0 => 0.0,
+                    _ => flux.fullness(world, &world.inside_grid(m, x, c.normal)) / cosine,
+                };
+                meet(Face::Grid(m, c.normal), [None; 2], most, x, i.start + c.t);
             });
         }
     }
@@ -263,17 +269,24 @@ impl Reservoir {
 
 impl Side {
     /// The medium before a surface, from the `start` of the stretch on, reached in `around`.
-    fn before(world: &World, m: &Met, start: Option<&Met>, around: Option<usize>) -> Option<Self> {
-        Self::new(world, m, m.cosine < 0.0, around, [start, Some(m)], 1)
+    fn before(
+        flux: &Flux,
+        world: &World,
+        m: &Met,
+        start: Option<&Met>,
+        around: Option<usize>,
+    ) -> Option<Self> {
+        Self::new(flux, world, m, m.cosine < 0.0, around, [start, Some(m)], 1)
     }
 
     /// The medium beyond a surface, up to the `end` of the stretch.
-    fn beyond(world: &World, m: &Met, end: Option<&Met>) -> Option<Self> {
-        Self::new(world, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
+    fn beyond(flux: &Flux, world: &World, m: &Met, end: Option<&Met>) -> Option<Self> {
+        Self::new(flux, world, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
     }
 
     /// One that vertices can be in, `m` being one of the ends of its stretch.
     fn new(
+        flux: &Flux,
         world: &World,
         m: &Met,
         front: bool,
@@ -282,6 +295,10 @@ impl Side {
         end: usize,
     ) -> Option<Self> {
         let medium = filled(world, &m.point, front, around)?;
+        let fullness = flux.fullness(world, &world.touching(m.point, m.x, front, medium));
+        if fullness == 0.0 {
+            return None;
+        }
         let left = match world.reach(medium) {
             Some(reach) => Stretch::new(ends, reach).left(end),
             None => [1.0, 0.0],
@@ -294,7 +311,7 @@ impl Side {
             Some(Speed { point: m.point.material(), t: m.distance, along })
         };
         let speeds = [of(Some(m), left[0]), of(ends[1 - end], left[1])];
-        Some(Self { medium, front, speeds })
+        Some(Self { medium, front, fullness, speeds })
     }
 
     /// What counts at most: of all velocities of the ray alone, if it is `rigid`.
@@ -302,10 +319,11 @@ impl Side {
         let alongs = || self.speeds.iter().flatten().map(|s| s.along);
         let all: f64 = alongs().map(Vec3::length).sum();
         let net = alongs().fold(Vec3::ZERO, |sum, a| sum + a).length();
-        match rigid {
+        let fastest = match rigid {
             true if net < ROUNDING * all => 0.0,
             true => net,
             false => all,
-        }
+        };
+        fastest * self.fullness
     }
 }

@@ -10,7 +10,7 @@ fn side(alongs: [Vec3; 2]) -> Side {
     let at = SurfacePoint { triangle: 0, bary: [0.3; 2] };
     let point = MaterialPoint { shape: 0, at };
     let speeds = alongs.map(|along| Some(Speed { point, t: 1.0, along }));
-    Side { medium: 0, front: true, speeds }
+    Side { medium: 0, front: true, fullness: 1.0, speeds }
 }
 
 /// The sides of a parallel layer cancel for a ray that is carried, not where they move by themselves.
