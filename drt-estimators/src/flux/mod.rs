@@ -13,7 +13,8 @@
 //! and that meets Σ gives one term, throughput × τ × Lout / |n·w|. So the term is gathered on the
 //! camera's own paths, however small the pixel. To keep the cost linear in path length, one of a
 //! path's meetings is chosen in proportion to its throughput over the cosine (weighted reservoir
-//! sampling), and Lout traced for it alone.
+//! sampling), and Lout traced for it alone. In a grid it counts by the extinction there: where a cloud fades
+//! out inside of its box, nothing is traced.
 //!
 //! In the spatial form (2019 paper, Eq. 16 and 20; theory sheet §3, §6) volume vertices stand at fixed
 //! distances of their rays, u is the velocity of the ray's point at Σ, and every surface beside a

@@ -159,8 +159,8 @@ impl Reservoir {
                 continue;
             }
             let others = [i.checked_sub(1).and_then(|i| self.met.get(i)), self.met.get(i + 1)];
-            let near = Side::before(flux, world, m, others[0], around);
-            let far = world.is_null(m.point.shape).then(|| Side::beyond(flux, world, m, others[1]));
+            let near = flux.before(world, m, others[0], around);
+            let far = world.is_null(m.point.shape).then(|| flux.beyond(world, m, others[1]));
             let sides = [near, far.flatten()];
             // Only what moves by itself, and the camera, moves a ray's points at different velocities.
             let rigid = |side: &Side| {
@@ -267,35 +267,35 @@ impl Reservoir {
     }
 }
 
-impl Side {
+impl Flux {
     /// The medium before a surface, from the `start` of the stretch on, reached in `around`.
     fn before(
-        flux: &Flux,
+        &self,
         world: &World,
         m: &Met,
         start: Option<&Met>,
         around: Option<usize>,
-    ) -> Option<Self> {
-        Self::new(flux, world, m, m.cosine < 0.0, around, [start, Some(m)], 1)
+    ) -> Option<Side> {
+        self.side(world, m, m.cosine < 0.0, around, [start, Some(m)], 1)
     }
 
     /// The medium beyond a surface, up to the `end` of the stretch.
-    fn beyond(flux: &Flux, world: &World, m: &Met, end: Option<&Met>) -> Option<Self> {
-        Self::new(flux, world, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
+    fn beyond(&self, world: &World, m: &Met, end: Option<&Met>) -> Option<Side> {
+        self.side(world, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
     }
 
     /// One that vertices can be in, `m` being one of the ends of its stretch.
-    fn new(
-        flux: &Flux,
+    fn side(
+        &self,
         world: &World,
         m: &Met,
         front: bool,
         around: Option<usize>,
         ends: [Option<&Met>; 2],
         end: usize,
-    ) -> Option<Self> {
+    ) -> Option<Side> {
         let medium = filled(world, &m.point, front, around)?;
-        let fullness = flux.fullness(world, &world.touching(m.point, m.x, front, medium));
+        let fullness = self.fullness(world, &world.touching(m.point, m.x, front, medium));
         if fullness == 0.0 {
             return None;
         }
@@ -311,9 +311,11 @@ impl Side {
             Some(Speed { point: m.point.material(), t: m.distance, along })
         };
         let speeds = [of(Some(m), left[0]), of(ends[1 - end], left[1])];
-        Some(Self { medium, front, fullness, speeds })
+        Some(Side { medium, front, fullness, speeds })
     }
+}
 
+impl Side {
     /// What counts at most: of all velocities of the ray alone, if it is `rigid`.
     fn most(&self, rigid: bool) -> f64 {
         let alongs = || self.speeds.iter().flatten().map(|s| s.along);
