@@ -22,7 +22,7 @@ use drt_math::Real;
 const RANGE: [f64; 2] = [0.25, 4.0];
 
 /// The fewest of one whose samples are all of a size.
-const FEWEST_EVEN: f64 = 0.0625;
+const FEWEST_EVEN: f64 = 0.03125;
 
 /// What a sample costs besides its rays, in rays: to choose an edge and to look at what is around it.
 const BESIDES: f64 = 1.0;
