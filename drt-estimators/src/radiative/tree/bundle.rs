@@ -5,7 +5,7 @@
 //! single precision rounds, and the point on the chosen one is drawn from the [part](super::piece) of it
 //! that really counts.
 
-use super::eight::{Eight, Vectors, along, dot, pairs, same, vectors};
+use super::eight::{Eight, Vectors, along, dot, each, pairs, same, vectors};
 use super::node::{LEAST_WEIGHT, range};
 use super::piece::Piece;
 use super::seen::{ALMOST_NOTHING, Lies, Local, Place, Seen, Toward, weights};
@@ -147,36 +147,49 @@ impl Bundle {
         let across = (far / r1 - near / r0) / d;
         let aside = d * length * (a + b) / ((b * r0 + a * r1) * r0 * r1);
         let mass = (near * far).less(Eight::ZERO, across, aside);
-        let size2 = length * length * (1.0 / 12.0);
         let middle = (near + far) * 0.5;
-        let mut mean = self.scattering(seen, foot, middle, size2);
+        let mut mean = self.even(seen, foot, middle);
         let short = (d2 + middle * middle).sqrt() * SHORT;
-        if short.any_less(length) {
+        let long = short.any_less(length);
+        let halfway = || {
             let sines = (near / r0 + far / r1) * 0.5;
-            let halfway = d * sines / ((Eight::ONE - sines) * (sines + 1.0)).sqrt();
-            let halfway = halfway.max(near).min(far);
+            (d * sines / ((Eight::ONE - sines) * (sines + 1.0)).sqrt()).max(near).min(far)
+        };
+        if long {
             // One by one, as four copies of the same in a row take longer to fetch than to run.
             let mut all = Eight::ZERO;
-            for (t, part) in [(near, 0.25), (far, 0.25), (halfway, 0.5)] {
-                all = all + self.scattering(seen, foot, t, size2) * part;
+            for (t, part) in [(near, 0.25), (far, 0.25), (halfway(), 0.5)] {
+                all = all + self.even(seen, foot, t) * part;
             }
             mean = short.less(length, all, mean);
+        }
+        if seen.is_glossy() {
+            let [first, last] = [self.direction(foot, near), self.direction(foot, far)];
+            let mut lobes = seen.glossy(first, last);
+            if long {
+                let between = self.direction(foot, halfway());
+                let parts = seen.glossy(first, between) + seen.glossy(between, last);
+                lobes = short.less(length, parts * 0.5, lobes);
+            }
+            mean = mean + lobes;
         }
         weights(counts, counts * mass * mean)
     }
 
-    /// What is scattered from the points `t` along the segments' lines from their feet.
+    /// The directions of the points `t` along the segments' lines from their feet.
     #[inline(always)]
-    fn scattering(&self, seen: &Seen, foot: Vectors, t: Eight, size2: Eight) -> Eight {
+    fn direction(&self, foot: Vectors, t: Eight) -> Vectors {
         let to = along(foot, self.tangent, t);
-        let r2 = dot(to, to);
-        let cosine = match seen.normal {
-            Some((n, _)) => {
-                let cosine = dot(to, same(n)).abs() / r2.sqrt();
-                cosine.max(Eight::splat(ALMOST_NOTHING))
-            }
-            None => Eight::ONE,
-        };
-        seen.scattering(to, r2, size2, cosine)
+        let r = dot(to, to).sqrt();
+        each(to, |c| c / r)
+    }
+
+    /// What is scattered from there, apart from lobes.
+    #[inline(always)]
+    fn even(&self, seen: &Seen, foot: Vectors, t: Eight) -> Eight {
+        let Some((n, _)) = seen.normal else { return Eight::splat(seen.even) };
+        let to = along(foot, self.tangent, t);
+        let cosine = dot(to, same(n)).abs() / dot(to, to).sqrt();
+        cosine.max(Eight::splat(ALMOST_NOTHING)) * seen.even
     }
 }

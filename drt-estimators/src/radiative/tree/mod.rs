@@ -27,7 +27,8 @@
 //! Near x nodes are opened first, down to their edges ([`cut`]), and the first choice is among all that
 //! this leaves. Nodes have eight children, as each choice adds its error and a wide tree has few of
 //! them, and as eight are [judged at once](eight); leaves weigh their edges one by one, eight at once too
-//! ([`bundle`]). On the edge the density is sin / r^2, exactly ([`kernel`]). A sample costs time
+//! ([`bundle`]). On the edge the density is sin / r^2, exactly ([`kernel`]), mixed with that of lobes that are narrow
+//! along it ([`glint`]). A sample costs time
 //! logarithmic in the number of edges.
 //!
 //! A node may turn out to hold nothing that counts after all. Then there is no sample, and the
@@ -45,6 +46,7 @@ mod build;
 mod bundle;
 mod cut;
 mod eight;
+mod glint;
 mod kernel;
 mod node;
 mod options;

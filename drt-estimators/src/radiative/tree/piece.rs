@@ -3,6 +3,7 @@
 use drt_math::Vec3;
 
 use super::Segment;
+use super::glint::Glints;
 use super::kernel::Kernel;
 use super::view::{Viewpoint, Way};
 
@@ -35,6 +36,7 @@ pub(super) struct Line {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stretch {
     kernel: Kernel,
+    glints: Glints,
     /// Where the segment starts, measured along its line from where that is nearest to x.
     start: f64,
     length: f64,
@@ -82,17 +84,18 @@ impl Line {
             part = cone.clip(to, self.tangent, part)?;
         }
         let start = to.dot(self.tangent);
-        let nearest = (to - self.tangent * start).length();
-        let kernel = Kernel::new(nearest, start + part[0], start + part[1]);
+        let foot = to - self.tangent * start;
+        let kernel = Kernel::new(foot.length(), start + part[0], start + part[1]);
         let within = kernel.distance() <= way.reach;
-        within.then_some(Stretch { kernel, start, length: self.length })
+        let glints = || Glints::new(view, &kernel, foot, self.tangent);
+        within.then(|| Stretch { kernel, glints: glints(), start, length: self.length })
     }
 }
 
 impl Stretch {
     /// How far along the segment the point for a uniform number lies, as a part of its length.
     pub(super) fn sample(&self, u: f64) -> f64 {
-        ((self.kernel.sample(u) - self.start) / self.length).clamp(0.0, 1.0)
+        ((self.glints.sample(&self.kernel, u) - self.start) / self.length).clamp(0.0, 1.0)
     }
 
     /// Density per length there; 0 outside the part that counts.
@@ -102,7 +105,7 @@ impl Stretch {
         // Rounding must not carry a sample out of its own density's support.
         let slip = 1e-14 * (self.start.abs() + self.length);
         let within = (near - slip..=far + slip).contains(&t);
-        if within { self.kernel.pdf(t) } else { 0.0 }
+        if within { self.glints.pdf(&self.kernel, t) } else { 0.0 }
     }
 }
 

@@ -4,6 +4,8 @@
 //! small loses nothing. A product of a place with a unit vector is then off by a few times 1e-7 of the
 //! place's distance: less than [`TOLERANCE`], by which every bound is widened.
 
+use core::f32::consts::FRAC_2_PI;
+
 use drt_math::{Vec3, fm};
 
 use super::eight::{Eight, Vectors, along, dot, each, pairs, same, single};
@@ -38,7 +40,7 @@ pub(super) struct Seen {
     slack: f64,
     /// Unit, and whether what is below counts too.
     pub(super) normal: Option<([f32; 3], bool)>,
-    even: f32,
+    pub(super) even: f32,
     /// The axis, width and height of lobes, where there are any.
     lobes: Option<[([f32; 3], f32, f32); 2]>,
 }
@@ -122,6 +124,37 @@ impl Seen {
             let off = pairs(dir, same(*axis), |a, b| a - b);
             let width2 = Eight::splat(*width2) + spread;
             sum = sum + Lobe::value(Eight::splat(*height), width2, dot(off, off));
+        }
+        sum
+    }
+
+    #[inline(always)]
+    pub(super) fn is_glossy(&self) -> bool {
+        self.lobes.is_some()
+    }
+
+    /// What lobes scatter from arcs between two directions, in the mean: as much as from the place on the arc
+    /// that is nearest to the axis, along the part that is about as far from it,
+    ///
+    /// ```text
+    /// ∫ ds / (a² + s²)² = π / (2 a³),    a² = w² + off².
+    /// ```
+    #[inline(always)]
+    pub(super) fn glossy(&self, from: Vectors, until: Vectors) -> Eight {
+        let mut sum = Eight::ZERO;
+        let Some(lobes) = &self.lobes else { return sum };
+        let chord = pairs(until, from, |a, b| a - b);
+        let length2 = dot(chord, chord).max(Eight::splat(LEAST));
+        let length = length2.sqrt();
+        for (axis, width2, height) in lobes {
+            let to = pairs(same(*axis), from, |a, b| a - b);
+            let t = (dot(to, chord) / length2).max(Eight::ZERO).min(Eight::ONE);
+            let near = along(from, chord, t);
+            let norm = dot(near, near).sqrt().max(Eight::splat(LEAST));
+            let off = pairs(near, same(*axis), |a, b| a / norm - b);
+            let [width2, off2] = [Eight::splat(*width2), dot(off, off)];
+            let value = Lobe::value(Eight::splat(*height), width2, off2);
+            sum = sum + value / (length / (width2 + off2).sqrt() * FRAC_2_PI + 1.0);
         }
         sum
     }

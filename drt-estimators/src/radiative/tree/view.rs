@@ -49,6 +49,11 @@ impl Viewpoint {
         Self { lobes, ..self }
     }
 
+    /// That of a direction and the normal; 1 in volumes.
+    pub(super) fn cosine(&self, w: Vec3) -> f64 {
+        self.normal.map_or(1.0, |(n, _)| Real::abs(n.dot(w)))
+    }
+
     /// Looking only at what may be before a sphere: in the cone of directions that meet it, up to its
     /// far side. From inside the sphere these are all directions.
     pub(crate) fn toward(&self, chance: f64, center: Vec3, radius: f64) -> Way {
