@@ -6,11 +6,11 @@
 //! points have the density
 //!
 //! ```text
-//! s / (s² + (φ - φ₀)²) / [atan((φ - φ₀) / s)],    s² = w² + p²,
+//! s / (s² + (φ - φ₀)²) / A,    s² = w² + p²,
 //! ```
 //!
-//! which is sampled exactly and has longer tails than the [lobe](crate::surface::Lobe) itself. Kernel and lobes
-//! are mixed by what is scattered from them.
+//! A being the difference of atan((φ - φ₀) / s) between the ends. That is sampled exactly and has longer tails
+//! than the [lobe](crate::surface::Lobe) itself. Kernel and lobes are mixed by what is scattered from them.
 //!
 //! [kernel]: super::kernel
 
@@ -78,7 +78,7 @@ impl Glints {
             })
         });
         let sum: f64 = glints.iter().map(|g| g.share).sum();
-        if sum.is_nan() || sum <= 0.0 {
+        if !sum.is_finite() || sum <= 0.0 {
             return none;
         }
         let even = f64::max(even / (even + sum), LEAST_EVEN);
