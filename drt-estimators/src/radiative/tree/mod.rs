@@ -66,7 +66,7 @@ use cut::Looking;
 use node::{Child, Family};
 use options::Group;
 pub(crate) use options::Options;
-use piece::Line;
+use piece::{Line, Stretch};
 pub(crate) use view::{MOST_WAYS, Viewpoint, Way};
 
 /// An edge of a surface at which the radiance may jump that arrives at a point.
@@ -215,9 +215,10 @@ impl Work for Sampling<'_> {
             };
             options.choose(way, &mut u)
         })?;
-        let slack = tree.slack(view);
-        let u = line.stretch(view, &ways[by?], slack)?.sample(along);
-        let pdf = density(line, view, ways, &chances, u, slack);
+        let (by, slack) = (by?, tree.slack(view));
+        let stretches = stretches(line, view, ways, &chances, slack);
+        let u = stretches[by].as_ref()?.sample(along);
+        let pdf = density(&stretches, &chances, u);
         Some(Chosen { edge: line.edge as usize, u, inv_pdf: 1.0 / pdf })
     }
 }
@@ -268,18 +269,25 @@ fn pick(chances: &[f64], mut u: f64) -> Option<usize> {
     chosen
 }
 
-/// Density per length at a place on a line.
-fn density(
+/// The parts of a line that count each possible way.
+fn stretches(
     line: &Line,
     view: &Viewpoint,
     ways: &[Way],
     chances: &[f64; MOST_WAYS],
-    u: f64,
     slack: f64,
-) -> f64 {
-    let possible = ways.iter().zip(chances).filter(|(_, chance)| **chance > 0.0);
-    let of = |(way, chance): (&Way, &f64)| {
-        line.stretch(view, way, slack).map_or(0.0, |s| chance * s.pdf(u))
+) -> [Option<Stretch>; MOST_WAYS] {
+    let mut stretches = [None; MOST_WAYS];
+    for (k, way) in ways.iter().enumerate().filter(|(k, _)| chances[*k] > 0.0) {
+        stretches[k] = line.stretch(view, way, slack);
+    }
+    stretches
+}
+
+/// Density per length at a place on a line, by the parts of it that count each way.
+fn density(stretches: &[Option<Stretch>; MOST_WAYS], chances: &[f64; MOST_WAYS], u: f64) -> f64 {
+    let of = |(stretch, chance): (&Option<Stretch>, &f64)| {
+        stretch.as_ref().map_or(0.0, |s| chance * s.pdf(u))
     };
-    possible.map(of).sum()
+    stretches.iter().zip(chances).map(of).sum()
 }

@@ -52,7 +52,9 @@ impl<'a> Drawing<'a> {
             path.iter().rev().find_map(|(group, lane)| Some((place(*group)?, *lane)))
         });
         let slack = self.tree.slack(view);
-        found.map_or(0.0, |(line, chances)| density(line, view, ways, &chances, u, slack))
+        found.map_or(0.0, |(line, chances)| {
+            density(&stretches(line, view, ways, &chances, slack), &chances, u)
+        })
     }
 }
 
