@@ -19,7 +19,7 @@ pub(super) struct Sight<'a> {
     pub(super) sides: Sides,
     medium: Option<usize>,
     own_faces: [u32; 2],
-    by_camera: bool,
+    viewer: Vertex,
 }
 
 /// What is seen on one side of an edge.
@@ -51,8 +51,7 @@ impl<'a> Sight<'a> {
         let sides = jumps.sides(jump, w)?;
         let own_faces = sides.own_faces()?;
         let medium = jump.medium(tracer.world, &sides, x, w);
-        let by_camera = matches!(viewer.kind, Kind::Point);
-        Some(Self { jump, along, x, w, distance, sides, medium, own_faces, by_camera })
+        Some(Self { jump, along, x, w, distance, sides, medium, own_faces, viewer: *viewer })
     }
 
     /// Transmittance to the viewer, if nothing blocks.
@@ -111,10 +110,9 @@ impl<'a> Sight<'a> {
         let mut light = Radiance::default();
         tracer.radiance_from(vertex, self.w, &mut light);
         let world = tracer.world;
-        let hold = if self.by_camera {
-            world.hold_in_view(&vertex)
-        } else {
-            world.hold(&vertex, -self.w, distance)
+        let hold = match self.viewer.kind {
+            Kind::Point => world.hold_in_view(&vertex),
+            _ => world.hold(&self.viewer, &vertex, -self.w, distance),
         };
         let matter = vertex.surface().map(SurfacePoint::material);
         Side { light: light.0, hold: hold.share * self.distance / distance, distance, matter }

@@ -1,7 +1,7 @@
 //! Which edge a vertex looks at: the [tree](super::tree), asked in several ways at once.
 //!
-//! Radiance jumps most where a lamp is behind an edge, or the lamp's own rim. So some looks go towards
-//! the spheres around the lamps, and the rest anywhere.
+//! Radiance jumps most where a lamp is behind an edge. So some looks go towards the spheres around the
+//! lamps, and the rest anywhere.
 //!
 //! An edge at rest matters to a vertex at rest only where something that moves holds what is seen right
 //! beside it: in the direction of a sphere around all that does, and no farther than its far side.
@@ -23,9 +23,6 @@ const TOWARD_LAMPS: f64 = 0.5;
 
 /// Lamps looked towards on purpose.
 const MOST_LAMPS: usize = MOST_WAYS - 1;
-
-/// How much more radiance jumps at the edges of lamps.
-const LAMP: f64 = 4.0;
 
 /// A sphere.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +55,7 @@ impl Views {
         let weighed = (0..).zip(&jumps.list).map(|(i, jump)| (i, jump, matter(jump)));
         let kept = weighed.filter(|(_, _, weight)| *weight > 0.0);
         let (indices, segments): (Vec<u32>, Vec<Segment>) =
-            kept.map(|(i, jump, weight)| (i, segment(world, jumps, jump, weight))).unzip();
+            kept.map(|(i, jump, weight)| (i, segment(jumps, jump, weight))).unzip();
         let tree = EdgeTree::new(&segments)?;
         let list = indices.iter().map(|i| &jumps.list[*i as usize]);
         let among = chambers.of_edges(world, jumps, list);
@@ -126,13 +123,8 @@ pub(super) fn viewpoint(world: &World, vertex: &Vertex, wo: Vec3) -> Viewpoint {
     Viewpoint::new(vertex.x, normal).scattering(lobes)
 }
 
-fn segment(world: &World, jumps: &Jumps, jump: &Jump, weight: f64) -> Segment {
+fn segment(jumps: &Jumps, jump: &Jump, weight: f64) -> Segment {
     let (a, along) = jump.edge.line();
-    let lamp = jumps.faces(jump).any(|(prim, _)| {
-        let shape = world.point(prim, [0.0; 2]).0.shape;
-        world.scene.shapes[shape as usize].emitter.is_some()
-    });
-    let size = if lamp { LAMP * weight } else { weight };
     let across: Vec<Vec3> = jumps.faces(jump).map(|(_, across)| across).collect();
     // Both on one side of the surface, whatever the order of the faces' corners.
     let t = jump.edge.tangent;
@@ -141,8 +133,8 @@ fn segment(world: &World, jumps: &Jumps, jump: &Jump, weight: f64) -> Segment {
         // What is seen of three faces and more depends on where from.
         _ => ([t.cross(across[0]); 2], true),
     };
-    let crease = jump.crease * size;
-    Segment { a, b: a + along, faces, open, jump: size, crease: [crease; 2] }
+    let crease = jump.crease * weight;
+    Segment { a, b: a + along, faces, open, jump: weight, crease: [crease; 2] }
 }
 
 /// The spheres around the surfaces that emit most.

@@ -14,7 +14,7 @@
 //! v = (1 - φ) c + φ u,
 //! ```
 //!
-//! with φ = 1 where a curved surface is grazed. With div v = (1-φ) div c + φ div u + ∇φ·(u - c), the derivative of
+//! with φ = 1 where a curved surface is grazed, and on [lamps](lamp). With div v = (1-φ) div c + φ div u + ∇φ·(u - c), the derivative of
 //! ∫ F dA, F holding the geometric term, scattering and transmittance, becomes
 //!
 //! ```text
@@ -32,6 +32,7 @@
 //! takes the length's place, only what grazes within about a pixel of its outline is held, less towards
 //! the borders of the filter's support.
 
+mod lamp;
 #[cfg(all(test, feature = "std"))]
 mod tests;
 
@@ -39,6 +40,8 @@ use alloc::vec::Vec;
 
 use drt_geom::Mesh;
 use drt_math::{Real, Vec3};
+
+use lamp::Lamp;
 
 use super::vertex::{Kind, SurfacePoint, Vertex};
 use super::world::World;
@@ -74,6 +77,8 @@ pub(crate) struct Holds {
     cosines: Vec<f64>,
     /// The same for rays of the camera.
     seen: Vec<f64>,
+    /// Those of the shapes that are lamps.
+    lamps: Vec<Option<Lamp>>,
 }
 
 impl Hold {
@@ -97,12 +102,19 @@ impl World {
             f64::min(GRAZING_PIXELS * bend * pixel, GRAZING)
         };
         let seen = bends.iter().enumerate().map(seen).collect();
-        self.holds = Holds { bends, cosines, seen };
+        let shapes = self.scene.shapes.iter();
+        let lamps = shapes.map(|s| s.emitter.map(|_| Lamp::new(&s.mesh.bounds()))).collect();
+        self.holds = Holds { bends, cosines, seen, lamps };
     }
 
-    /// True when a shape holds vertices.
-    pub(crate) fn holds_on(&self, shape: u32) -> bool {
-        self.holds.bends.get(shape as usize).is_some_and(|bend| *bend > 0.0)
+    /// True when a shape holds what is seen of it: by the camera, or by anything else.
+    pub(crate) fn holds_on(&self, shape: u32, by_camera: bool) -> bool {
+        let bent = self.holds.bends.get(shape as usize).is_some_and(|bend| *bend > 0.0);
+        bent || !by_camera && self.lamp(shape as usize).is_some()
+    }
+
+    fn lamp(&self, shape: usize) -> Option<&Lamp> {
+        self.holds.lamps.get(shape)?.as_ref()
     }
 
     /// The mean curvatures of the shapes by their shading normals, or by their edges where they have
@@ -124,17 +136,21 @@ impl World {
                 *bend /= f64::max(shape.mesh.surface_area(), f64::MIN_POSITIVE);
             }
         }
-        // Next-event estimation shares the light of lamps, and does not hold their points.
+        // They hold as a whole.
         for (bend, _) in bends.iter_mut().zip(shapes).filter(|(_, s)| s.emitter.is_some()) {
             *bend = 0.0;
         }
         bends
     }
 
-    /// What holds a vertex seen along `dir` from a vertex at a `distance`.
-    pub(crate) fn hold(&self, vertex: &Vertex, dir: Vec3, distance: f64) -> Hold {
+    /// What holds a vertex seen along `dir` from a `viewer` at a `distance`.
+    pub(crate) fn hold(&self, viewer: &Vertex, vertex: &Vertex, dir: Vec3, distance: f64) -> Hold {
         let Kind::Surface(s) = &vertex.kind else { return Hold::default() };
         let shape = s.shape as usize;
+        if let Some(lamp) = self.lamp(shape) {
+            let width = self.scattering(viewer).map_or(1.0, |s| s.lobe_width());
+            return Hold { share: lamp.share(viewer.x, width), slope: Vec3::ZERO };
+        }
         let Some(bend) = self.holds.bends.get(shape).filter(|b| **b > 0.0) else {
             return Hold::default();
         };

@@ -108,10 +108,13 @@ impl PathRecord {
     }
 }
 
-fn hold_of(world: &World, pixel: [u32; 2], arrival: &Arrival) -> Hold {
-    match &arrival.end {
-        Endpoint::Surface(v) if arrival.parent == 0 => world.hold_in_pixel(v, pixel),
-        Endpoint::Surface(v) => world.hold(v, arrival.dir, arrival.distance),
+/// What holds a vertex that was seen from a `viewer`, or from the camera.
+fn hold_of(world: &World, pixel: [u32; 2], viewer: Option<&Vertex>, arrival: &Arrival) -> Hold {
+    match (&arrival.end, viewer) {
+        (Endpoint::Surface(v), None) => world.hold_in_pixel(v, pixel),
+        (Endpoint::Surface(v), Some(viewer)) => {
+            world.hold(viewer, v, arrival.dir, arrival.distance)
+        }
         _ => Hold::default(),
     }
 }
@@ -146,7 +149,11 @@ impl Observer for PathRecord {
         }
         let tows = first..self.tows.len();
         let carried = brought || on_mover || !tows.is_empty();
-        let hold = if carried { hold_of(world, self.pixel, arrival) } else { Hold::default() };
+        let viewer = self.nodes[arrival.parent as usize].vertex();
+        let hold = match carried {
+            true => hold_of(world, self.pixel, viewer, arrival),
+            false => Hold::default(),
+        };
         self.nodes.push(Node {
             arrival: Some(*arrival),
             crossings,

@@ -91,6 +91,14 @@ impl Scattering<'_> {
         }
     }
 
+    /// About how wide the narrowest lobe is, in radians; at most 1.
+    pub(crate) fn lobe_width(&self) -> f64 {
+        match self {
+            Self::Surface { bsdf, .. } => bsdf.lobe_width(),
+            Self::Volume(phase) => 1.0 - phase.mean_cosine_parameter().map_or(0.0, f64::abs),
+        }
+    }
+
     /// Derivatives of [`Scattering::eval`].
     pub(crate) fn gradient(&self, wo: Vec3, wi: Vec3) -> ScatteringGradient {
         match self {

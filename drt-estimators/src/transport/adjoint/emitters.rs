@@ -16,6 +16,7 @@ impl Differentiator<'_> {
     pub(super) fn light_end<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
+        viewer: &Vertex,
         near_moves: bool,
         light: &LightSample,
         to_wi: Option<RgbVec>,
@@ -32,13 +33,26 @@ impl Differentiator<'_> {
                 if emitter {
                     strength_of(light.emitter, per_value, sink);
                 }
+                let moving = near_moves || moves(&end, sink.interest(), false);
                 if self.form == Form::Spatial {
-                    self.segment(path, Far::Direction, near_moves, weight, here, sink);
-                    let (hold, lit) = (Hold::default(), SurfaceAdjoint::default());
-                    self.land(path, &end, &hold, &lit, RgbVec::ZERO, weight, here, sink);
+                    let mut hold = Hold::default();
+                    if moving {
+                        hold = self.world.hold(viewer, &end, path.dir, path.length);
+                    }
+                    let free = weight * (1.0 - hold.share);
+                    self.segment(path, Far::Direction, near_moves, free, here, sink);
+                    let mut lit = SurfaceAdjoint::default();
+                    if hold.share > 0.0 {
+                        lit = self.held(path, &end, near_moves, weight * hold.share, here, sink);
+                        let to_wi = to_wi.unwrap_or(RgbVec::ZERO) * hold.share;
+                        let g = turn(&to_wi, light.w, light.distance);
+                        lit.u += g;
+                        here.u -= g;
+                    }
+                    let matter = core::mem::take(&mut lit.u);
+                    self.land(path, &end, &hold, &lit, matter, weight, here, sink);
                     return;
                 }
-                let moving = near_moves || moves(&end, sink.interest(), false);
                 let mut there = SurfaceAdjoint::default();
                 let far = Far::Vertex(&end, &mut there);
                 self.segment(path, far, moving, weight, here, sink);

@@ -283,14 +283,12 @@ impl<'w> Differentiator<'w> {
                 if let Some(v) = vertex {
                     let mut matter = self.locals[k].matter;
                     if hold.share > 0.0 {
-                        let mut held = SurfaceAdjoint::default();
-                        let moving = near_moves || moves(v, sink.interest(), false);
+                        let mut held =
+                            self.held(&path, v, near_moves, weight * hold.share, &mut there, sink);
                         if p == 0 {
                             let seen = value * hold.share;
                             self.seen(vertex, arrival.dir, seen, parent.value, &mut held, sink);
                         }
-                        let far = Far::Vertex(v, &mut held);
-                        self.segment(&path, far, moving, weight * hold.share, &mut there, sink);
                         matter += core::mem::take(&mut held.u);
                         here.n += held.n;
                         here.j += held.j;
@@ -545,7 +543,7 @@ impl<'w> Differentiator<'w> {
                 medium: c.start_medium,
                 crossings: &record.crossings[crossings.clone()],
             };
-            self.light_end(&path, moving, light, to_wi, per_value, here, sink);
+            self.light_end(&path, vertex, moving, light, to_wi, per_value, here, sink);
         }
         sum
     }

@@ -28,7 +28,7 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use super::{Differentiator, Stretch};
+use super::{Differentiator, Far, Stretch, moves};
 use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::transport::hold::Hold;
@@ -69,6 +69,22 @@ impl Differentiator<'_> {
         }
         near.u += back;
         back * path.length
+    }
+
+    /// A stretch whose far end moves with its matter, `weight` of light passing: the sensitivities of that end.
+    pub(super) fn held<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        end: &Vertex,
+        near_moves: bool,
+        weight: Rgb,
+        near: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> SurfaceAdjoint {
+        let mut held = SurfaceAdjoint::default();
+        let moving = near_moves || moves(end, sink.interest(), false);
+        self.segment(path, Far::Vertex(end, &mut held), moving, weight, near, sink);
+        held
     }
 
     /// What [tows](crate::transport::tow) a volume vertex at the far end of a stretch: leaves its surfaces'

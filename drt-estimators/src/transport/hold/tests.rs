@@ -6,7 +6,7 @@ use alloc::vec;
 use drt_math::{Rng, Vec3, vec3};
 
 use super::super::tests::choice;
-use super::super::tests::scenes::{diffuse, moves, parameter, phong, shift, surfaces};
+use super::super::tests::scenes::{diffuse, fog, moves, parameter, phong, shift, surfaces};
 use super::Hold;
 use crate::contraction::Motion;
 use crate::prepared::Prepared;
@@ -34,8 +34,9 @@ fn slopes_are_those_of_shares() {
         // One of the ball's.
         let prim = (rng.next_f64() * 80.0) as u32;
         let from = vec3(rng.next_f64(), rng.next_f64(), rng.next_f64()) * 6.0 - Vec3::splat(3.0);
+        let viewer = Vertex { x: from, medium: None, kind: Kind::Point };
         let holds: [&dyn Fn(&Vertex) -> Hold; 2] =
-            [&|v| world.hold(v, (v.x - from).normalize(), (v.x - from).length()), &|v| {
+            [&|v| world.hold(&viewer, v, (v.x - from).normalize(), (v.x - from).length()), &|v| {
                 let pixel = world.camera.view(world.point(prim, [0.3; 2]).1).pixel;
                 world.hold_in_pixel(v, pixel.map(|p| p.clamp(0.0, 4.0) as u32))
             }];
@@ -65,6 +66,23 @@ fn slopes_are_those_of_shares() {
         }
     }
     assert!(held.iter().all(|h| *h > 100), "{held:?}");
+}
+
+/// The same of lamps, from surfaces and from fog.
+#[test]
+fn nor_of_lamps() {
+    let mut near = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
+    let lamp = near.shapes.iter_mut().find(|s| s.emitter.is_some()).expect("a lamp");
+    Arc::make_mut(&mut lamp.mesh).positions.iter_mut().for_each(|p| p.y -= 0.9);
+    for (scene, moved) in [(&fog(), "lamp"), (&near, "lamp"), (&near, "ball")] {
+        let motion = parameter(moved, 0.0, vec![moves(moved, shift())]);
+        choice::check(&|strength| {
+            let (mut prepared, motion) = choice::prepare(scene, &motion, 4);
+            let lamps = prepared.world.holds.lamps.iter_mut().flatten();
+            lamps.for_each(|lamp| lamp.strength = 2.0 * strength);
+            (prepared, motion)
+        });
+    }
 }
 
 /// Holds of three strengths.
