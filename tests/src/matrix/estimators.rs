@@ -17,6 +17,10 @@ use crate::Result;
 /// Samples per pixel of the first round. There are two at least: they are [compared](Scale) by halves.
 const ROUND: u32 = 1 << 6;
 
+/// What each of two may be off by, for a scale that is to be off by 1: weights that suit both are not the best of
+/// either.
+const EACH: f64 = 0.95 * std::f64::consts::FRAC_1_SQRT_2;
+
 /// A derivative below this part of the largest one of its image is measured against that one.
 const NEAR_ZERO: f64 = 0.05;
 
@@ -152,8 +156,7 @@ struct Sampled {
 
 impl Sampled {
     fn is_enough(&self, effort: Effort) -> bool {
-        // The scale has the errors of two.
-        let enough = std::f64::consts::FRAC_1_SQRT_2 * effort.scale;
+        let enough = EACH * effort.scale;
         let known = |k| Scale::noise(self.halves(k)) * self.part(k) <= enough;
         let clear = |(k, d): (usize, &Derivative)| {
             d.total.relative_noise(None) * self.part(k) <= effort.noise || known(k)
