@@ -103,7 +103,7 @@ impl World {
         };
         let seen = bends.iter().enumerate().map(seen).collect();
         let shapes = self.scene.shapes.iter();
-        let lamps = shapes.map(|s| s.emitter.map(|_| Lamp::new(&s.mesh.bounds()))).collect();
+        let lamps = shapes.map(|s| s.emitter.map(|_| Lamp::new(s.mesh.bounds()))).collect();
         self.holds = Holds { bends, cosines, seen, lamps };
     }
 

@@ -1,39 +1,85 @@
 //! How lamps hold the points from which they light others.
 //!
 //! At fixed directions, a lamp that moves changes nothing but its rim: what it lights has a derivative that is
-//! the sum of large terms of either sign, one for each edge. Next to it that is by far noisier than the
-//! derivative of the geometric term, which holding the lamp's points gives. But from where light is scattered into
-//! lobes narrower than the lamp, the latter moves a peak across its points, and its rim is in the dark. With
-//! w the width of lobes and Θ the angle of the lamp,
+//! the sum of large terms of either sign, one for each edge. That is by far noisier than the
+//! derivative of the geometric term, which holding the lamp's points gives, but for two cases:
+//!
+//! * where light is scattered into lobes narrower than the lamp. These move their peak across its points, while
+//!   its rim is in the dark;
+//! * beside the lamp. At the distance r its points pass at a rate of 1 / r, which has no second moment over
+//!   a medium that touches it.
+//!
+//! With w the width of lobes, R the lamp's radius, c its centre, and d the distance of a viewer x from its box,
 //!
 //! ```text
-//! φ = w² / (w² + (1 - w²) Θ²),
+//! φ = w² / (w² + (1 - w²) R² / |c - x|²)  d² / (d² + (R/4)²),
 //! ```
 //!
-//! the same for all points that a viewer sees of it.
+//! the same for all points that the viewer sees of it.
 
 use drt_geom::Aabb;
 use drt_math::Vec3;
 
+/// How near is beside a lamp, in its radii.
+const NEAR: f64 = 0.25;
+
 /// Where a lamp is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamp {
-    center: Vec3,
+    bounds: Aabb,
     radius2: f64,
     /// What its shares are multiplied by.
     pub(super) strength: f64,
 }
 
 impl Lamp {
-    pub(super) fn new(bounds: &Aabb) -> Self {
-        let half = (bounds.max - bounds.min) * 0.5;
-        Self { center: bounds.center(), radius2: half.length_squared(), strength: 1.0 }
+    pub(super) fn new(bounds: Aabb) -> Self {
+        let radius2 = 0.25 * (bounds.max - bounds.min).length_squared();
+        Self { bounds, radius2, strength: 1.0 }
     }
 
     /// φ as seen from `x`, where light is scattered into lobes of a `width`, of at most 1.
     pub(super) fn share(&self, x: Vec3, width: f64) -> f64 {
-        let w2 = width * width;
-        let narrow = (1.0 - w2) * self.radius2 / (self.center - x).length_squared();
-        if w2 > 0.0 { self.strength * w2 / (w2 + narrow) } else { 0.0 }
+        let outside = x - x.max(self.bounds.min).min(self.bounds.max);
+        let (d2, w2) = (outside.length_squared(), width * width);
+        if d2 == 0.0 || w2 == 0.0 {
+            return 0.0;
+        }
+        let narrow = (1.0 - w2) * self.radius2 / (self.bounds.center() - x).length_squared();
+        self.strength * w2 / (w2 + narrow) * d2 / (d2 + NEAR * NEAR * self.radius2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drt_math::vec3;
+
+    use super::*;
+
+    /// What points of a lamp pass at, times its share, is bounded beside it and from all around.
+    #[test]
+    fn what_is_beside_a_lamp_is_not_held() {
+        let lamp = Lamp::new(Aabb { min: vec3(-1.0, 0.0, -2.0), max: vec3(1.0, 0.0, 2.0) });
+        let radius = 5.0_f64.sqrt();
+        for direction in [vec3(0.0, 1.0, 0.0), vec3(0.0, -1.0, 0.0)] {
+            for power in -12..4 {
+                let distance = f64::powi(10.0, power);
+                let share = lamp.share(vec3(0.3, 0.0, 1.9) + direction * distance, 1.0);
+                assert!(share / distance <= 0.5001 / (NEAR * radius), "{distance} {share}");
+            }
+        }
+        assert_eq!(lamp.share(vec3(0.2, 0.0, 0.1), 1.0), 0.0);
+    }
+
+    /// Far away it is, unless lobes are narrower than what is seen of it.
+    #[test]
+    fn what_is_far_from_a_lamp_is_held() {
+        let lamp = Lamp::new(Aabb { min: Vec3::ZERO, max: vec3(1.0, 1.0, 0.0) });
+        let far = lamp.bounds.center() + vec3(0.0, 0.0, 10.0);
+        let angle = 0.5_f64.sqrt() / 10.0;
+        assert!(lamp.share(far, 1.0) > 0.999);
+        assert!((lamp.share(far, angle) - 0.5).abs() < 0.01);
+        assert!(lamp.share(far, 0.1 * angle) < 0.011);
+        assert_eq!(lamp.share(far, 0.0), 0.0);
     }
 }
