@@ -12,7 +12,7 @@
 //! With w the width of lobes, R the lamp's radius, c its centre, and d the distance of a viewer x from its box,
 //!
 //! ```text
-//! φ = w² / (w² + (1 - w²) R² / |c - x|²)  d² / (d² + (R/4)²),
+//! φ = w² / (w² + (1 - w²) R² / |c - x|²)  min(d² / (0.4 R)², 1),
 //! ```
 //!
 //! the same for all points that the viewer sees of it.
@@ -21,7 +21,7 @@ use drt_geom::Aabb;
 use drt_math::Vec3;
 
 /// How near is beside a lamp, in its radii.
-const NEAR: f64 = 0.25;
+const NEAR: f64 = 0.4;
 
 /// Where a lamp is.
 #[derive(Clone, Copy, Debug)]
@@ -46,7 +46,8 @@ impl Lamp {
             return 0.0;
         }
         let narrow = (1.0 - w2) * self.radius2 / (self.bounds.center() - x).length_squared();
-        self.strength * w2 / (w2 + narrow) * d2 / (d2 + NEAR * NEAR * self.radius2)
+        let beside = NEAR * NEAR * self.radius2;
+        self.strength * w2 / (w2 + narrow) * f64::min(d2 / beside, 1.0)
     }
 }
 
@@ -65,7 +66,7 @@ mod tests {
             for power in -12..4 {
                 let distance = f64::powi(10.0, power);
                 let share = lamp.share(vec3(0.3, 0.0, 1.9) + direction * distance, 1.0);
-                assert!(share / distance <= 0.5001 / (NEAR * radius), "{distance} {share}");
+                assert!(share / distance <= 1.0001 / (NEAR * radius), "{distance} {share}");
             }
         }
         assert_eq!(lamp.share(vec3(0.2, 0.0, 0.1), 1.0), 0.0);
@@ -77,7 +78,7 @@ mod tests {
         let lamp = Lamp::new(Aabb { min: Vec3::ZERO, max: vec3(1.0, 1.0, 0.0) });
         let far = lamp.bounds.center() + vec3(0.0, 0.0, 10.0);
         let angle = 0.5_f64.sqrt() / 10.0;
-        assert!(lamp.share(far, 1.0) > 0.999);
+        assert_eq!(lamp.share(far, 1.0), 1.0);
         assert!((lamp.share(far, angle) - 0.5).abs() < 0.01);
         assert!(lamp.share(far, 0.1 * angle) < 0.011);
         assert_eq!(lamp.share(far, 0.0), 0.0);
