@@ -19,7 +19,7 @@ pub(super) struct Sight<'a> {
     pub(super) sides: Sides,
     medium: Option<usize>,
     own_faces: [u32; 2],
-    viewer: Vertex,
+    viewer: &'a Vertex,
 }
 
 /// What is seen on one side of an edge.
@@ -42,7 +42,7 @@ impl<'a> Sight<'a> {
         jumps: &Jumps,
         jump: &'a Jump,
         along: f64,
-        viewer: &Vertex,
+        viewer: &'a Vertex,
     ) -> Option<Self> {
         let (x, _) = jump.point(along);
         let to = viewer.x - x;
@@ -51,7 +51,7 @@ impl<'a> Sight<'a> {
         let sides = jumps.sides(jump, w)?;
         let own_faces = sides.own_faces()?;
         let medium = jump.medium(tracer.world, &sides, x, w);
-        Some(Self { jump, along, x, w, distance, sides, medium, own_faces, viewer: *viewer })
+        Some(Self { jump, along, x, w, distance, sides, medium, own_faces, viewer })
     }
 
     /// Transmittance to the viewer, if nothing blocks.
@@ -112,7 +112,7 @@ impl<'a> Sight<'a> {
         let world = tracer.world;
         let hold = match self.viewer.kind {
             Kind::Point => world.hold_in_view(&vertex),
-            _ => world.hold(&self.viewer, &vertex, -self.w, distance),
+            _ => world.hold(self.viewer, &vertex, -self.w, distance),
         };
         let matter = vertex.surface().map(SurfacePoint::material);
         Side { light: light.0, hold: hold.share * self.distance / distance, distance, matter }

@@ -158,9 +158,9 @@ impl Radiative {
         let eye = world.camera.position();
         let moving_shapes = (0..).zip(&interest.shapes).filter(|(_, moves)| **moves);
         let holding: Vec<u32> =
-            moving_shapes.map(|(s, _)| s).filter(|s| world.holds_on(*s, false)).collect();
+            moving_shapes.map(|(s, _)| s).filter(|s| world.holds_on(*s)).collect();
         let at_rest = !holding.is_empty();
-        let at_rest_in_view = holding.iter().any(|s| world.holds_on(*s, true));
+        let at_rest_in_view = holding.iter().any(|s| world.holds_in_view_on(*s));
         let speeds: Vec<f64> = jumps.list.iter().map(moves).collect();
         let fastest = speeds.iter().copied().fold(0.0, f64::max);
         let relative = |speed: f64| match (interest.sensor, at_rest_in_view) {

@@ -14,8 +14,9 @@
 //! v = (1 - φ) c + φ u,
 //! ```
 //!
-//! with φ = 1 where a curved surface is grazed, and on [lamps](lamp). With div v = (1-φ) div c + φ div u + ∇φ·(u - c), the derivative of
-//! ∫ F dA, F holding the geometric term, scattering and transmittance, becomes
+//! with φ = 1 where a curved surface is grazed, and mostly on [lamps](lamp). With
+//! div v = (1-φ) div c + φ div u + ∇φ·(u - c), the derivative of ∫ F dA, F holding the geometric term,
+//! scattering and transmittance, becomes
 //!
 //! ```text
 //! ∫ (1-φ) [∂_c F + F div c] + φ [∂_u F + F div u] + F ∇φ·(u - c)  dA,
@@ -107,10 +108,14 @@ impl World {
         self.holds = Holds { bends, cosines, seen, lamps };
     }
 
-    /// True when a shape holds what is seen of it: by the camera, or by anything else.
-    pub(crate) fn holds_on(&self, shape: u32, by_camera: bool) -> bool {
-        let bent = self.holds.bends.get(shape as usize).is_some_and(|bend| *bend > 0.0);
-        bent || !by_camera && self.lamp(shape as usize).is_some()
+    /// True when a shape holds vertices.
+    pub(crate) fn holds_on(&self, shape: u32) -> bool {
+        self.holds_in_view_on(shape) || self.lamp(shape as usize).is_some()
+    }
+
+    /// True when it holds what the camera sees of it.
+    pub(crate) fn holds_in_view_on(&self, shape: u32) -> bool {
+        self.holds.bends.get(shape as usize).is_some_and(|bend| *bend > 0.0)
     }
 
     fn lamp(&self, shape: usize) -> Option<&Lamp> {
@@ -136,7 +141,7 @@ impl World {
                 *bend /= f64::max(shape.mesh.surface_area(), f64::MIN_POSITIVE);
             }
         }
-        // They hold as a whole.
+        // Lamps hold as a whole, and nothing that the camera sees of them.
         for (bend, _) in bends.iter_mut().zip(shapes).filter(|(_, s)| s.emitter.is_some()) {
             *bend = 0.0;
         }

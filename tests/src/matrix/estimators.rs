@@ -17,8 +17,8 @@ use crate::Result;
 /// Samples per pixel of the first round. There are two at least: they are [compared](Scale) by halves.
 const ROUND: u32 = 1 << 6;
 
-/// What each of two may be off by, for a scale that is to be off by 1: weights that suit both are not the best of
-/// either.
+/// What each of two estimates may be off by where their scale may be by 1, and a little less: weights that suit
+/// both are not the best of either.
 const EACH: f64 = 0.95 * std::f64::consts::FRAC_1_SQRT_2;
 
 /// A derivative below this part of the largest one of its image is measured against that one.

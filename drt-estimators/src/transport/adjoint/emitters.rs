@@ -34,34 +34,26 @@ impl Differentiator<'_> {
                     strength_of(light.emitter, per_value, sink);
                 }
                 let moving = near_moves || moves(&end, sink.interest(), false);
-                if self.form == Form::Spatial {
-                    let mut hold = Hold::default();
-                    if moving {
-                        hold = self.world.hold(viewer, &end, path.dir, path.length);
-                    }
-                    let free = weight * (1.0 - hold.share);
-                    self.segment(path, Far::Direction, near_moves, free, here, sink);
-                    let mut lit = SurfaceAdjoint::default();
-                    if hold.share > 0.0 {
-                        lit = self.held(path, &end, near_moves, weight * hold.share, here, sink);
-                        let to_wi = to_wi.unwrap_or(RgbVec::ZERO) * hold.share;
-                        let g = turn(&to_wi, light.w, light.distance);
-                        lit.u += g;
-                        here.u -= g;
-                    }
-                    let matter = core::mem::take(&mut lit.u);
-                    self.land(path, &end, &hold, &lit, matter, weight, here, sink);
-                    return;
-                }
-                let mut there = SurfaceAdjoint::default();
-                let far = Far::Vertex(&end, &mut there);
-                self.segment(path, far, moving, weight, here, sink);
+                let hold = match self.form {
+                    Form::Material => Hold { share: 1.0, ..Hold::default() },
+                    Form::Spatial if moving => self.world.hold(viewer, &end, path.dir, path.length),
+                    Form::Spatial => Hold::default(),
+                };
+                let free = weight * (1.0 - hold.share);
+                self.segment(path, Far::Direction, near_moves, free, here, sink);
+                let mut lit = self.held(path, &end, near_moves, weight * hold.share, here, sink);
                 if moving && let Some(to_wi) = to_wi {
-                    let g = turn(&to_wi, light.w, light.distance);
-                    there.u += g;
+                    let g = turn(&(to_wi * hold.share), light.w, light.distance);
+                    lit.u += g;
                     here.u -= g;
                 }
-                send(&end, &there, sink);
+                match self.form {
+                    Form::Material => send(&end, &lit, sink),
+                    Form::Spatial => {
+                        let matter = core::mem::take(&mut lit.u);
+                        self.land(path, &end, &hold, &lit, matter, weight, here, sink);
+                    }
+                }
             }
             LightKind::Position => {
                 let moving = near_moves || emitter;

@@ -6,7 +6,9 @@ use alloc::vec;
 use drt_math::{Rng, Vec3, vec3};
 
 use super::super::tests::choice;
-use super::super::tests::scenes::{diffuse, fog, moves, parameter, phong, shift, surfaces};
+use super::super::tests::scenes::{
+    diffuse, fog, moves, parameter, phong, shift, stretch, surfaces,
+};
 use super::Hold;
 use crate::contraction::Motion;
 use crate::prepared::Prepared;
@@ -74,8 +76,13 @@ fn nor_of_lamps() {
     let mut near = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
     let lamp = near.shapes.iter_mut().find(|s| s.emitter.is_some()).expect("a lamp");
     Arc::make_mut(&mut lamp.mesh).positions.iter_mut().for_each(|p| p.y -= 0.9);
-    for (scene, moved) in [(&fog(), "lamp"), (&near, "lamp"), (&near, "ball")] {
-        let motion = parameter(moved, 0.0, vec![moves(moved, shift())]);
+    for (scene, moved, change) in [
+        (&fog(), "lamp", shift()),
+        (&near, "lamp", shift()),
+        (&near, "lamp", stretch()),
+        (&near, "ball", shift()),
+    ] {
+        let motion = parameter(moved, 0.0, vec![moves(moved, change)]);
         choice::check(&|strength| {
             let (mut prepared, motion) = choice::prepare(scene, &motion, 4);
             let lamps = prepared.world.holds.lamps.iter_mut().flatten();
