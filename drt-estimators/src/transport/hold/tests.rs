@@ -73,7 +73,7 @@ fn slopes_are_those_of_shares() {
 /// The same of lamps, from surfaces and from fog.
 #[test]
 fn nor_of_lamps() {
-    let mut near = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
+    let mut near = surfaces(diffuse(0.6, 0.5, 0.4), phong());
     let lamp = near.shapes.iter_mut().find(|s| s.emitter.is_some()).expect("a lamp");
     Arc::make_mut(&mut lamp.mesh).positions.iter_mut().for_each(|p| p.y -= 0.9);
     for (scene, moved, change) in [
