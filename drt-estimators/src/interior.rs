@@ -11,7 +11,7 @@ use crate::flux::{Flux, Reservoir};
 use crate::pixels::Sampler;
 use crate::radiative::{Edged, Look, Radiative};
 use crate::rendering::{Account, Counters, NonFinite, Term};
-use crate::sensitivity::{AdjointSink, Functional, SurfaceAdjoint};
+use crate::sensitivity::{AdjointSink, Functional, Rate};
 use crate::transport::{Carriers, Differentiator, Form, PathRecord, Radiance, Tracer, World};
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
@@ -285,8 +285,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                 for node in 1..self.record.nodes.len() {
                     let rng = &mut self.tracer.rng;
                     let look = if node == 1 { first } else { Look::new(rng) };
-                    let edge =
-                        radiative.edge_from(&mut self.tracer, &self.record, node, 1.0, &look);
+                    let edge = radiative.edge_from(&mut self.tracer, &self.record, node, &look);
                     self.send(edge, 1.0, values);
                 }
             }
@@ -299,10 +298,9 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let n = sink.layers();
         let layer = if self.separate && e.node > 1 { n } else { 0 };
         sink.begin();
-        for (point, value) in e.matter.iter().flatten() {
-            if sink.interest().shapes[point.shape as usize] {
-                let u = (*value * share).outer(e.n);
-                sink.surface(point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
+        for (matter, value) in e.matter.iter().flatten() {
+            if sink.interest().moves(matter) {
+                Rate::of(*matter, e.n).send(*value * share, sink);
             }
         }
         let viewer = (e.viewer * share).outer(e.n);

@@ -83,7 +83,7 @@ impl Prepared {
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
         if interest.moves_geometry() {
-            world.prepare_holds();
+            world.prepare_holds(interest);
             world.prepare_tows();
         }
         // Grids that move sweep over what stands still.

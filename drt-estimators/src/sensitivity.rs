@@ -11,7 +11,7 @@ use drt_medium::{CoefficientRates, DepthEstimate};
 use crate::emitter::EmitterGradient;
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
-use crate::transport::{Carriers, MaterialPoint};
+use crate::transport::{Carriers, MaterialPoint, Matter};
 
 /// Per channel, the change of a value per unit of each entry of a surface point's jet.
 #[derive(Clone, Copy, Debug, Default)]
@@ -94,6 +94,14 @@ impl Interest {
                 .any(|l| l.contains(&true))
     }
 
+    /// True when a point of matter moves.
+    pub(crate) fn moves(&self, matter: &Matter) -> bool {
+        match matter {
+            Matter::Surface(point) => self.shapes[point.shape as usize],
+            Matter::Volume(medium, _) => self.volumes[*medium],
+        }
+    }
+
     /// What carries the vertices of paths in the spatial form.
     pub(crate) fn carriers(&self) -> Carriers {
         Carriers { shapes: self.shapes.as_slice().into(), camera: self.sensor }
@@ -152,17 +160,30 @@ pub(crate) enum Rate {
 impl Functional {
     /// Sends `weight` times the functional to a sink: the derivative of (weight × functional).
     pub(crate) fn send<S: AdjointSink>(&self, weight: Rgb, sink: &mut S) {
-        for item in &self.items {
-            match *item {
-                Rate::Surface(point, n) => {
-                    let u = weight.outer(n);
-                    sink.surface(&point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
-                }
-                Rate::Volume(medium, x, n) => sink.volume(medium, x, &weight.outer(n), Rgb::ZERO),
-                Rate::Grid(medium, x, n) => sink.grid(medium, x, &weight.outer(n)),
-                Rate::Emitter(e, g) => sink.emitter(e, &weight.to_array().map(|w| g.scaled(w))),
-                Rate::Sensor(g) => sink.sensor(&weight.to_array().map(|w| g.scaled(w))),
+        self.items.iter().for_each(|item| item.send(weight, sink));
+    }
+}
+
+impl Rate {
+    /// Of a point, dotted with a vector.
+    pub(crate) fn of(matter: Matter, n: Vec3) -> Self {
+        match matter {
+            Matter::Surface(point) => Self::Surface(point, n),
+            Matter::Volume(medium, x) => Self::Volume(medium, x, n),
+        }
+    }
+
+    /// Sends `weight` times the rate to a sink.
+    pub(crate) fn send<S: AdjointSink>(&self, weight: Rgb, sink: &mut S) {
+        match *self {
+            Self::Surface(point, n) => {
+                let u = weight.outer(n);
+                sink.surface(&point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
             }
+            Self::Volume(medium, x, n) => sink.volume(medium, x, &weight.outer(n), Rgb::ZERO),
+            Self::Grid(medium, x, n) => sink.grid(medium, x, &weight.outer(n)),
+            Self::Emitter(e, g) => sink.emitter(e, &weight.to_array().map(|w| g.scaled(w))),
+            Self::Sensor(g) => sink.sensor(&weight.to_array().map(|w| g.scaled(w))),
         }
     }
 }

@@ -159,8 +159,10 @@ impl Reservoir {
                 continue;
             }
             let others = [i.checked_sub(1).and_then(|i| self.met.get(i)), self.met.get(i + 1)];
-            let near = flux.before(world, m, others[0], around);
-            let far = world.is_null(m.point.shape).then(|| flux.beyond(world, m, others[1]));
+            let viewer = &leaving.vertex;
+            let near = flux.before(world, viewer, m, others[0], around);
+            let far =
+                world.is_null(m.point.shape).then(|| flux.beyond(world, viewer, m, others[1]));
             let sides = [near, far.flatten()];
             // Only what moves by itself, and the camera, moves a ray's points at different velocities.
             let rigid = |side: &Side| {
@@ -272,22 +274,25 @@ impl Flux {
     fn before(
         &self,
         world: &World,
+        viewer: &Vertex,
         m: &Met,
         start: Option<&Met>,
         around: Option<usize>,
     ) -> Option<Side> {
-        self.side(world, m, m.cosine < 0.0, around, [start, Some(m)], 1)
+        self.side(world, viewer, m, m.cosine < 0.0, around, [start, Some(m)], 1)
     }
 
     /// The medium beyond a surface, up to the `end` of the stretch.
-    fn beyond(&self, world: &World, m: &Met, end: Option<&Met>) -> Option<Side> {
-        self.side(world, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
+    fn beyond(&self, world: &World, viewer: &Vertex, m: &Met, end: Option<&Met>) -> Option<Side> {
+        self.side(world, viewer, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
     }
 
     /// One that vertices can be in, `m` being one of the ends of its stretch.
+    #[allow(clippy::too_many_arguments)]
     fn side(
         &self,
         world: &World,
+        viewer: &Vertex,
         m: &Met,
         front: bool,
         around: Option<usize>,
@@ -303,6 +308,9 @@ impl Flux {
             Some(reach) => Stretch::new(ends, reach).left(end),
             None => [1.0, 0.0],
         };
+        // What holds to the medium goes with its surfaces.
+        let free = 1.0 - world.hold_inside(viewer, medium);
+        let left = left.map(|left| left * free);
         // The medium begins at one surface, and ends at the other.
         let sign = if end == 1 { 1.0 } else { -1.0 };
         let of = |m: Option<&Met>, left: f64| {

@@ -69,28 +69,53 @@ impl Insides {
     }
 }
 
+/// The media that move as wholes: whichever parameter moves anything around one, everything there moves by one
+/// affine field. The others are at rest.
+pub(crate) fn wholes(world: &World, tangents: &Tangents, asked: &[(usize, InsideKind)]) -> Insides {
+    let mut insides = Insides::at_rest(world);
+    for surroundings in all(world, tangents, asked) {
+        let m = surroundings.medium;
+        let moving = (0..tangents.names.len()).filter(|p| surroundings.moves(*p));
+        let fields = moving.map(|p| Some((p, Inside::Affine(surroundings.one_affine_field(p)?))));
+        let left = matches!(surroundings.asked, Some(InsideKind::Static));
+        if !left && world.medium(m).homogeneous().is_some() {
+            insides.volumes[m] = fields.collect::<Option<_>>().unwrap_or_default();
+        }
+    }
+    insides
+}
+
 pub(crate) fn plan(
     world: &World,
     tangents: &Tangents,
     asked: &[(usize, InsideKind)],
     kept: &mut Kept,
 ) -> Result<Insides, Error> {
-    let media = world.scene.media.len();
     let mut insides = Insides::at_rest(world);
-    let adjacent = adjacency(world);
-    for m in 0..media {
-        let shapes: Vec<usize> =
-            (0..world.scene.shapes.len()).filter(|s| adjacent[*s].contains(&m)).collect();
-        let parts = parts::parts(world, tangents, m, &shapes);
-        let asked = asked_for(asked, m);
-        Surroundings { world, tangents, medium: m, shapes, parts, asked }
-            .plan(&mut insides, kept)?;
+    for surroundings in all(world, tangents, asked) {
+        surroundings.plan(&mut insides, kept)?;
+        let m = surroundings.medium;
         insides.flux[m].sort_unstable();
         insides.flux[m].dedup();
     }
     insides.flux_shapes.sort_unstable();
     insides.flux_shapes.dedup();
     Ok(insides)
+}
+
+/// All media, and what is around them.
+fn all<'a>(
+    world: &'a World,
+    tangents: &'a Tangents,
+    asked: &'a [(usize, InsideKind)],
+) -> impl Iterator<Item = Surroundings<'a>> {
+    let adjacent = adjacency(world);
+    (0..world.scene.media.len()).map(move |medium| {
+        let touches = |s: &usize| adjacent[*s].contains(&medium);
+        let shapes: Vec<usize> = (0..world.scene.shapes.len()).filter(touches).collect();
+        let parts = parts::parts(world, tangents, medium, &shapes);
+        Surroundings { world, tangents, medium, shapes, parts, asked: asked_for(asked, medium) }
+    })
 }
 
 /// A medium and what is around it.

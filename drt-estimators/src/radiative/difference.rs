@@ -5,7 +5,7 @@ use drt_math::{Rgb, Vec3};
 
 use super::jumps::{Jump, Jumps, Sides};
 use crate::transport::flight::Travel;
-use crate::transport::{Kind, MaterialPoint, Radiance, RayPath, SurfacePoint, Tracer, Vertex};
+use crate::transport::{Kind, Matter, Radiance, RayPath, Tracer, Vertex};
 
 /// An edge point and a viewer of it.
 pub(super) struct Sight<'a> {
@@ -32,7 +32,7 @@ pub(super) struct Side {
     /// The distance of what is seen.
     pub(super) distance: f64,
     /// What is seen; `None` for what stands still.
-    pub(super) matter: Option<MaterialPoint>,
+    pub(super) matter: Option<Matter>,
 }
 
 impl<'a> Sight<'a> {
@@ -114,8 +114,8 @@ impl<'a> Sight<'a> {
             Kind::Point => world.hold_in_view(&vertex),
             _ => world.hold(self.viewer, &vertex, -self.w, distance),
         };
-        let matter = vertex.surface().map(SurfacePoint::material);
-        Side { light: light.0, hold: hold.share * self.distance / distance, distance, matter }
+        let hold = hold.share * self.distance / distance;
+        Side { light: light.0, hold, distance, matter: vertex.matter() }
     }
 
     /// What comes from behind the edge.

@@ -4,7 +4,7 @@ use super::Radiative;
 use super::difference::Sight;
 use crate::boundary::Receiver;
 use crate::sensitivity::{Functional, Rate};
-use crate::transport::{Kind, Tracer, Vertex};
+use crate::transport::{Kind, Matter, Tracer, Vertex};
 
 impl Radiative {
     /// Takes one sample of the camera's edges.
@@ -28,7 +28,7 @@ impl Radiative {
         let [minus_light, plus_light] = [weight * minus.light, weight * -plus.light];
         // What is held moves in view by itself.
         let parts = [
-            (Some(point), sight.distance, minus_light + plus_light, false),
+            (Some(Matter::Surface(point)), sight.distance, minus_light + plus_light, false),
             (minus.matter, minus.distance, minus_light * -minus.hold, true),
             (plus.matter, plus.distance, plus_light * -plus.hold, true),
         ];
@@ -39,7 +39,7 @@ impl Radiative {
             // A camera that turns takes its image points with it.
             let gradient = camera.ray_gradient(-sight.w, -n, n * -distance);
             functional.items.clear();
-            functional.items.extend(matter.map(|point| Rate::Surface(point, n)));
+            functional.items.extend(matter.map(|matter| Rate::of(matter, n)));
             functional.items.push(Rate::Sensor(gradient));
             if value.is_zero() || !receiver.moves(functional) {
                 continue;

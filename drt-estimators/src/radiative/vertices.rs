@@ -5,10 +5,10 @@ use drt_math::{Rgb, Vec3};
 use super::choice::Choice;
 use super::difference::{Side, Sight};
 use super::views::{Views, viewpoint};
-use super::{AT_REST, BY_THROUGHPUT, CARRIED, Chosen, Look, Radiative};
-use crate::transport::record::PathRecord;
+use super::{AT_REST, BY_THROUGHPUT, CARRIED, Look, Radiative};
+use crate::transport::record::{Node, PathRecord};
 use crate::transport::trace::Endpoint;
-use crate::transport::{MaterialPoint, Tracer, Vertex};
+use crate::transport::{Matter, Tracer, Vertex, World};
 
 /// An edge's contribution to a path: a sum of speeds along `n`.
 #[derive(Clone, Copy, Debug)]
@@ -19,7 +19,16 @@ pub(crate) struct Edged {
     /// What multiplies the speed of the vertex.
     pub(crate) viewer: Rgb,
     /// What multiplies those of the edge, and of what is seen on its two sides.
-    pub(crate) matter: [Option<(MaterialPoint, Rgb)>; 3],
+    pub(crate) matter: [Option<(Matter, Rgb)>; 3],
+}
+
+/// What a look may find.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sought {
+    /// An edge that moves, or any from a vertex that does.
+    Moving,
+    /// An edge at rest, before something that moves and is held, from a vertex at rest.
+    Resting,
 }
 
 impl Radiative {
@@ -30,16 +39,42 @@ impl Radiative {
         record: &PathRecord,
         look: &Look,
     ) -> Option<Edged> {
-        let (node, chance) = self.choose_vertex(tracer, record, look.vertex)?;
-        self.edge_from(tracer, record, node, chance, look)
+        let (sought, likely, look) = self.sought(&record.nodes[1..], look);
+        let (node, chance) = self.choose_vertex(tracer, record, sought, look.vertex)?;
+        self.look(tracer, record, node, sought, likely * chance, &look)
     }
 
-    /// The same from a given vertex, chosen with a given `chance`.
+    /// The same from a given vertex.
     pub(crate) fn edge_from(
         &self,
         tracer: &mut Tracer<'_>,
         record: &PathRecord,
         node: usize,
+        look: &Look,
+    ) -> Option<Edged> {
+        let (sought, likely, look) = self.sought(&record.nodes[node..=node], look);
+        self.look(tracer, record, node, sought, likely, &look)
+    }
+
+    /// What a look from one of some vertices is for, its probability, and what is left of the look's numbers.
+    fn sought(&self, nodes: &[Node], look: &Look) -> (Sought, f64, Look) {
+        if self.resting.is_none() || nodes.iter().all(|n| n.carried) {
+            return (Sought::Moving, 1.0, *look);
+        }
+        let (sought, from, likely) = match look.way < AT_REST {
+            true => (Sought::Resting, 0.0, AT_REST),
+            false => (Sought::Moving, AT_REST, 1.0 - AT_REST),
+        };
+        (sought, likely, Look { way: (look.way - from) / likely, ..*look })
+    }
+
+    /// A look from a vertex for what is `sought`, which both have a given `chance`.
+    fn look(
+        &self,
+        tracer: &mut Tracer<'_>,
+        record: &PathRecord,
+        node: usize,
+        sought: Sought,
         chance: f64,
         look: &Look,
     ) -> Option<Edged> {
@@ -50,7 +85,9 @@ impl Radiative {
         let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
         let wo = -arrival.dir;
         tracer.counters.boundary_samples += 1;
-        let chosen = self.look(tracer, vertex, wo, recorded.carried, look)?;
+        let views = self.views(tracer.world, vertex, recorded.carried, sought)?;
+        let around = &viewpoint(tracer.world, vertex, wo);
+        let chosen = views.sample(&self.jumps, around, look, &mut tracer.options)?;
         let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex)?;
         let scattering = tracer.world.scattering(vertex)?;
         let f = scattering.eval(wo, -sight.w);
@@ -66,55 +103,42 @@ impl Radiative {
         let held = [lights[0] * minus.hold, lights[1] * plus.hold];
         let [edge, viewer] = [lights, held].map(|[a, b]| a + b);
         let of = |side: &Side, held: Rgb| side.matter.map(|m| (m, -held));
-        let matter = [Some((point, edge)), of(&minus, held[0]), of(&plus, held[1])];
+        let matter =
+            [Some((Matter::Surface(point), edge)), of(&minus, held[0]), of(&plus, held[1])];
         let dark = lights.iter().all(|l| l.is_zero());
         (!dark).then_some(Edged { node, n: sight.sides.n, viewer: viewer - edge, matter })
     }
 
-    /// Chooses a point on an edge to look at. From a vertex that moves every edge counts; from one that
-    /// stands still an edge at rest only does before something that moves and is held.
-    fn look(
+    /// What edges a vertex may look at.
+    fn views(
+        &self,
+        world: &World,
+        vertex: &Vertex,
+        carried: bool,
+        sought: Sought,
+    ) -> Option<&Views> {
+        let views = match (sought, carried) {
+            (Sought::Moving, true) => return self.all.as_ref(),
+            (Sought::Moving, false) => &self.moving,
+            (Sought::Resting, true) => return None,
+            (Sought::Resting, false) => &self.resting,
+        };
+        views.as_ref().filter(|views| self.chambers.in_sight(world, &views.among, vertex))
+    }
+
+    /// An estimate of how much edges matter to a vertex; 0 only if they do not.
+    fn amount(
         &self,
         tracer: &mut Tracer<'_>,
         vertex: &Vertex,
         wo: Vec3,
         carried: bool,
-        look: &Look,
-    ) -> Option<Chosen<'_>> {
+        sought: Sought,
+    ) -> f64 {
         let Tracer { world, options, .. } = tracer;
-        let around = &viewpoint(world, vertex, wo);
-        if carried {
-            return self.all.as_ref()?.sample(&self.jumps, around, look, options);
-        }
-        let seen = |views: &&Views| self.chambers.in_sight(world, &views.among, vertex);
-        let moving = self.moving.as_ref().filter(seen);
-        let resting = self.resting.as_ref().filter(seen);
-        let resting = resting.filter(|v| v.amount(around, options) > 0.0);
-        let (Some(moving), Some(resting)) = (moving, resting) else {
-            return moving.or(resting)?.sample(&self.jumps, around, look, options);
-        };
-        // No edge is in both.
-        let (mut look, at_rest) = (*look, look.way < AT_REST);
-        let (views, from, chance) =
-            if at_rest { (resting, 0.0, AT_REST) } else { (moving, AT_REST, 1.0 - AT_REST) };
-        look.way = (look.way - from) / chance;
-        let chosen = views.sample(&self.jumps, around, &look, options)?;
-        Some(Chosen { inv_pdf: chosen.inv_pdf / chance, ..chosen })
-    }
-
-    /// An estimate of how much edges matter to a vertex; 0 only if they do not.
-    fn amount(&self, tracer: &mut Tracer<'_>, vertex: &Vertex, wo: Vec3, carried: bool) -> f64 {
-        let Tracer { world, options, .. } = tracer;
-        let around = viewpoint(world, vertex, wo);
-        let mut of = |views: &Option<Views>| {
-            let seen = |v: &&Views| carried || self.chambers.in_sight(world, &v.among, vertex);
-            views.as_ref().filter(seen).map_or(0.0, |v| v.amount(&around, options))
-        };
-        if carried {
-            CARRIED * of(&self.all)
-        } else {
-            of(&self.moving) + AT_REST * of(&self.resting)
-        }
+        let Some(views) = self.views(world, vertex, carried, sought) else { return 0.0 };
+        let amount = views.amount(&viewpoint(world, vertex, wo), options);
+        if carried { CARRIED * amount } else { amount }
     }
 
     /// Chooses a vertex that can see an edge change: mostly in proportion to what passes it and to how
@@ -123,6 +147,7 @@ impl Radiative {
         &self,
         tracer: &mut Tracer<'_>,
         record: &PathRecord,
+        sought: Sought,
         u: f64,
     ) -> Option<(usize, f64)> {
         let mut choice = Choice::new(u, BY_THROUGHPUT);
@@ -140,7 +165,7 @@ impl Radiative {
             if theta == 0.0 || !tracer.world.can_scatter(vertex) {
                 continue;
             }
-            let amount = self.amount(tracer, vertex, -arrival.dir, node.carried);
+            let amount = self.amount(tracer, vertex, -arrival.dir, node.carried, sought);
             if amount > 0.0 {
                 choice.offer(k, [theta, theta * amount]);
             }

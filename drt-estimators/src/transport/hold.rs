@@ -33,20 +33,22 @@
 //! takes the length's place, only what grazes within about a pixel of its outline is held, less towards
 //! the borders of the filter's support.
 
-mod lamp;
 #[cfg(all(test, feature = "std"))]
 mod tests;
+mod whole;
 
 use alloc::vec::Vec;
 
-use drt_geom::Mesh;
+use drt_geom::{Aabb, Mesh};
 use drt_math::{Real, Vec3};
 
-use lamp::Lamp;
+use whole::Whole;
 
 use super::vertex::{Kind, SurfacePoint, Vertex};
 use super::world::World;
 use crate::boundary::edges::collect;
+use crate::scene::Shape;
+use crate::sensitivity::Interest;
 
 /// Cosine below which surfaces begin to hold vertices, over the width of their lobes.
 const GRAZING: f64 = 0.5;
@@ -79,7 +81,9 @@ pub(crate) struct Holds {
     /// The same for rays of the camera.
     seen: Vec<f64>,
     /// Those of the shapes that are lamps.
-    lamps: Vec<Option<Lamp>>,
+    lamps: Vec<Option<Whole>>,
+    /// Those of the media that move as a whole.
+    media: Vec<Option<Whole>>,
 }
 
 impl Hold {
@@ -92,7 +96,7 @@ impl Hold {
 
 impl World {
     /// Lets surfaces hold vertices.
-    pub(crate) fn prepare_holds(&mut self) {
+    pub(crate) fn prepare_holds(&mut self, interest: &Interest) {
         let bends = self.bends();
         let camera = &self.camera;
         let cosines: Vec<f64> =
@@ -104,13 +108,26 @@ impl World {
         };
         let seen = bends.iter().enumerate().map(seen).collect();
         let shapes = self.scene.shapes.iter();
-        let lamps = shapes.map(|s| s.emitter.map(|_| Lamp::new(s.mesh.bounds()))).collect();
-        self.holds = Holds { bends, cosines, seen, lamps };
+        let lamps = shapes.map(|s| s.emitter.map(|_| Whole::new(s.mesh.bounds()))).collect();
+        let media = (0..self.scene.media.len())
+            .map(|m| if interest.volumes[m] { self.bounds_of(m).map(Whole::new) } else { None })
+            .collect();
+        self.holds = Holds { bends, cosines, seen, lamps, media };
     }
 
-    /// True when a shape holds vertices.
+    /// The box of the surfaces that bound a medium.
+    fn bounds_of(&self, medium: usize) -> Option<Aabb> {
+        let shapes = self.scene.shapes.iter().filter(|s| bounds(s, medium));
+        shapes.map(|s| s.mesh.bounds()).reduce(|a, b| a.union(&b))
+    }
+
+    /// True when a shape holds vertices, or bounds a medium that does.
     pub(crate) fn holds_on(&self, shape: u32) -> bool {
-        self.holds_in_view_on(shape) || self.lamp(shape as usize).is_some()
+        let inside = |m: usize| self.holds.media.get(m).is_some_and(Option::is_some);
+        let media = 0..self.scene.media.len();
+        self.holds_in_view_on(shape)
+            || self.lamp(shape as usize).is_some()
+            || media.into_iter().any(|m| inside(m) && bounds(&self.scene.shapes[shape as usize], m))
     }
 
     /// True when it holds what the camera sees of it.
@@ -118,7 +135,7 @@ impl World {
         self.holds.bends.get(shape as usize).is_some_and(|bend| *bend > 0.0)
     }
 
-    fn lamp(&self, shape: usize) -> Option<&Lamp> {
+    fn lamp(&self, shape: usize) -> Option<&Whole> {
         self.holds.lamps.get(shape)?.as_ref()
     }
 
@@ -150,11 +167,18 @@ impl World {
 
     /// What holds a vertex seen along `dir` from a `viewer` at a `distance`.
     pub(crate) fn hold(&self, viewer: &Vertex, vertex: &Vertex, dir: Vec3, distance: f64) -> Hold {
-        let Kind::Surface(s) = &vertex.kind else { return Hold::default() };
+        let s = match &vertex.kind {
+            Kind::Surface(s) => s,
+            Kind::Volume(_) => {
+                let share = vertex.medium.map_or(0.0, |m| self.hold_inside(viewer, m));
+                return Hold { share, slope: Vec3::ZERO };
+            }
+            Kind::Point => return Hold::default(),
+        };
         let shape = s.shape as usize;
         if let Some(lamp) = self.lamp(shape) {
             let width = self.scattering(viewer).map_or(1.0, |s| s.lobe_width());
-            return Hold { share: lamp.share(viewer.x, width), slope: Vec3::ZERO };
+            return Hold { share: lamp.share_in_lobes(viewer.x, width), slope: Vec3::ZERO };
         }
         let Some(bend) = self.holds.bends.get(shape).filter(|b| **b > 0.0) else {
             return Hold::default();
@@ -163,6 +187,15 @@ impl World {
         let q = f64::min(bend * distance, 1.0);
         let (share, slope) = (q * q * (3.0 - 2.0 * q), 6.0 * q * (1.0 - q) * bend);
         graze.and(Hold { share, slope: dir * slope })
+    }
+
+    /// The share that all vertices inside of a medium have which a `viewer` sees.
+    pub(crate) fn hold_inside(&self, viewer: &Vertex, medium: usize) -> f64 {
+        match (&viewer.kind, self.holds.media.get(medium)) {
+            // Not for the camera: its pixels would be edges.
+            (Kind::Surface(_) | Kind::Volume(_), Some(Some(whole))) => whole.share(viewer.x),
+            _ => 0.0,
+        }
     }
 
     /// What holds a vertex that the camera sees, in every pixel.
@@ -197,6 +230,10 @@ impl World {
         let turn = self.normal_slide(s, dir) + s.ns.reject(dir) / distance;
         Hold { share: rest * rest, slope: turn * (-4.0 * q * rest / cosine) }
     }
+}
+
+fn bounds(shape: &Shape, medium: usize) -> bool {
+    shape.boundary.is_some_and(|b| [b.interior, b.exterior].contains(&Some(medium)))
 }
 
 /// The mean curvature of a mesh by its shading normals; zero without them.

@@ -21,5 +21,5 @@ pub(crate) use geometry::Geometry;
 pub(crate) use lights::Lit;
 pub(crate) use record::{Carriers, PathRecord, Radiance, RadianceBySegments};
 pub(crate) use trace::Tracer;
-pub(crate) use vertex::{Kind, MaterialPoint, SurfacePoint, Vertex};
+pub(crate) use vertex::{Kind, MaterialPoint, Matter, SurfacePoint, Vertex};
 pub(crate) use world::{MediumNeed, Needs, RayPath, World};

@@ -112,7 +112,7 @@ impl PathRecord {
 fn hold_of(world: &World, pixel: [u32; 2], viewer: Option<&Vertex>, arrival: &Arrival) -> Hold {
     match (&arrival.end, viewer) {
         (Endpoint::Surface(v), None) => world.hold_in_pixel(v, pixel),
-        (Endpoint::Surface(v), Some(viewer)) => {
+        (Endpoint::Surface(v) | Endpoint::Volume(v, _), Some(viewer)) => {
             world.hold(viewer, v, arrival.dir, arrival.distance)
         }
         _ => Hold::default(),
@@ -148,12 +148,13 @@ impl Observer for PathRecord {
             self.tows.extend(tow::tows(self.flux.met(), arrival.distance, reach));
         }
         let tows = first..self.tows.len();
-        let carried = brought || on_mover || !tows.is_empty();
         let viewer = self.nodes[arrival.parent as usize].vertex();
-        let hold = match carried {
+        let inside = matches!(arrival.end, Endpoint::Volume(..));
+        let hold = match brought || on_mover || inside {
             true => hold_of(world, self.pixel, viewer, arrival),
             false => Hold::default(),
         };
+        let carried = brought || on_mover || !tows.is_empty() || hold.share > 0.0;
         self.nodes.push(Node {
             arrival: Some(*arrival),
             crossings,

@@ -9,6 +9,15 @@ pub(crate) struct MaterialPoint {
     pub(crate) at: drt_motion::SurfacePoint,
 }
 
+/// A point of what a vertex is on, which may move.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Matter {
+    /// Of a surface.
+    Surface(MaterialPoint),
+    /// Of the inside of a medium.
+    Volume(usize, Vec3),
+}
+
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfacePoint {
@@ -60,6 +69,14 @@ pub(crate) struct Vertex {
 }
 
 impl Vertex {
+    pub(crate) fn matter(&self) -> Option<Matter> {
+        match (&self.kind, self.medium) {
+            (Kind::Surface(s), _) => Some(Matter::Surface(s.material())),
+            (Kind::Volume(_), Some(m)) => Some(Matter::Volume(m, self.x)),
+            _ => None,
+        }
+    }
+
     pub(crate) fn surface(&self) -> Option<&SurfacePoint> {
         match &self.kind {
             Kind::Surface(s) => Some(s),

@@ -187,6 +187,22 @@ pub fn surfaces(ball_bsdf: Bsdf, floor_bsdf: Bsdf) -> Scene {
     b.camera(vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0), 5)
 }
 
+/// A floor beside a block of fog that the camera does not see, but in the floor, with a card between the two that hides half of it.
+pub fn glow() -> Scene {
+    let mut b = Build::default();
+    let bsdf = b.bsdf("floor-bsdf", diffuse(0.6, 0.5, 0.4));
+    b.shape("floor", floor(), bsdf);
+    let bsdf = b.bsdf("card-bsdf", diffuse(0.1, 0.1, 0.1));
+    let card = placed(procedural::cube(), vec3(0.4, 0.02, 0.6), 0.0, vec3(-0.5, 0.0, 0.0));
+    b.shape("card", card, bsdf);
+    let fog = homogeneous(Rgb::new(2.0, 1.5, 2.5), Rgb::splat(0.95), Rgb::ZERO, 0.0);
+    let fog = b.medium("fog", fog);
+    let block = placed(procedural::cube(), Vec3::splat(0.7), 0.3, vec3(-0.9, 1.1, 0.0));
+    b.interface("block", block, fog, None);
+    b.lamp(lamp(), Rgb::new(3.0, 2.5, 2.0));
+    b.camera(vec3(0.3, 0.3, 3.5), vec3(0.0, -1.0, 0.0), 4)
+}
+
 /// A solid ball and a bulb in a box of fog with a denser blob in it, lit from outside as well.
 pub fn fog() -> Scene {
     let mut b = Build::default();

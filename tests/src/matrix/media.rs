@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use drt_estimators::InsideKind;
 use drt_estimators::emitter::Emitter;
-use drt_estimators::surface::{Bsdf, RoughDielectric};
+use drt_estimators::surface::{Bsdf, Phong, RoughDielectric};
 use drt_geom::Mesh;
 use drt_geom::procedural::{bumpy_sphere, cube, grid, icosphere, rectangle};
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
@@ -95,6 +95,38 @@ pub fn still_blob() -> Result<Stage> {
     stage.insides = vec![(0, InsideKind::Static)];
     stage.cells.retain(|c| ["blob moves", "blob breathes"].contains(&&*c.parameter.name));
     Ok(stage)
+}
+
+/// The shade of a cloud out of view, on a floor and in a glossy wall, with a post under it.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn shade() -> Result<Stage> {
+    let centre = vec3(-0.2, 0.7, 0.2);
+    let cloud = placed(&cube(), vec3(0.35, 0.25, 0.3), vec3(0.5, 1.0, 0.2), 0.5, centre);
+    let floor = placed(&grid(3, 3), vec3(1.6, 1.6, 1.0), Vec3::X, -FRAC_PI_2, vec3(0.0, -1.0, 0.0));
+    let wall = placed(&rectangle(), vec3(1.6, 1.2, 1.0), Vec3::Y, PI, vec3(0.0, 0.0, 1.3));
+    let post = at(&cube(), vec3(0.1, 0.4, 0.1), vec3(0.3, -0.6, 0.1));
+    let polished = Bsdf::Phong(Phong {
+        reflectance: Rgb::splat(0.3),
+        specular_reflectance: Rgb::splat(0.5),
+        exponent: 40.0,
+    });
+    let scene = Set::new(vec3(0.3, 0.2, -2.6), vec3(0.0, -0.9, 0.3), 36.0, 4)?
+        .medium("water", fog([6.0, 5.0, 4.0], [0.95, 0.8, 0.6])?, forward(0.3)?)
+        .interface("cloud", cloud, "water", None)
+        .shape("floor", floor, diffuse([0.7, 0.6, 0.5]))
+        .shape("wall", wall, polished)
+        .shape("post", post, diffuse([0.5, 0.6, 0.7]))
+        .lamp("lamp", ceiling_lamp(0.7, vec3(0.4, 2.0, -0.2)), Rgb::new(8.0, 7.0, 6.0))
+        .scene;
+    let cells = vec![
+        Cell::new("cloud moves", [translate("cloud", vec3(0.7, 0.3, -0.4))]).representative(),
+        Cell::new("cloud turns", [turn("cloud", vec3(0.3, 1.0, 0.5), centre)]),
+        Cell::new("cloud grows", [grow("cloud", vec3(0.6, 0.3, 0.8), centre)]),
+        Cell::new("post moves", [translate("post", vec3(0.3, 0.2, -0.2))]),
+    ];
+    Ok(Stage::new("shade", scene, cells))
 }
 
 /// Smoke on a grid, in sunlight.

@@ -27,7 +27,7 @@ macro_rules! every_stage {
         $with! {
             surfaces: room room_box_filter standing knot gloss near_lamp;
             lights: spot point_and_sun;
-            media: fog_box blob still_blob smoke glass dented_glass beam layers sheet ember;
+            media: fog_box blob still_blob shade smoke glass dented_glass beam layers sheet ember;
             deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed
                 lantern stirred_smoke still_smoke fine_milk fine_glass;
             riding: riding riding_tight riding_inside riding_still riding_tetrahedral

@@ -9,7 +9,7 @@ use super::{Control, FinishedTile};
 use crate::allocation;
 use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm};
-use crate::inside::{self, Insides};
+use crate::inside;
 use crate::interior::{AlongRays, Looks, PixelSampler};
 use crate::kept::Kept;
 use crate::parallel::Pool;
@@ -77,7 +77,7 @@ impl Part {
         let mut motion = None;
         if !tangents.names.is_empty() {
             let insides = match settings.estimator {
-                EstimatorKind::Radiative => Insides::at_rest(&world),
+                EstimatorKind::Radiative => inside::wholes(&world, &tangents, &settings.insides),
                 _ => inside::plan(&world, &tangents, &settings.insides, kept)?,
             };
             motion = Some(Motion::new(tangents, insides));

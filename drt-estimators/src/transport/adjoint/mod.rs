@@ -295,7 +295,8 @@ impl<'w> Differentiator<'w> {
                     }
                     let tows = &record.tows[record.nodes[k].tows.clone()];
                     if !tows.is_empty() {
-                        let [near, turned] = self.tow(tows, &path, v, here.u, weight, sink);
+                        let free_u = here.u * (1.0 - hold.share);
+                        let [near, turned] = self.tow(tows, &path, v, free_u, free, sink);
                         there.u += near;
                         turn += turned;
                     }

@@ -28,7 +28,7 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use super::{Differentiator, Far, Stretch, moves};
+use super::{Differentiator, Far, Stretch, moves, send};
 use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::transport::hold::Hold;
@@ -53,11 +53,14 @@ impl Differentiator<'_> {
         near: &mut SurfaceAdjoint,
         sink: &mut S,
     ) -> RgbVec {
-        let Kind::Surface(point) = &end.kind else {
-            near.u += here.u;
-            return here.u * path.length;
-        };
         let free = 1.0 - hold.share;
+        let Kind::Surface(point) = &end.kind else {
+            let u = here.u * hold.share + matter;
+            send(end, &SurfaceAdjoint { u, ..*here }, sink);
+            let back = here.u * free;
+            near.u += back;
+            return back * path.length;
+        };
         let shift = weight.outer(hold.slope);
         // A longer way dims what passes.
         let medium = path.crossings.last().map_or(path.medium, |c| c.after);
@@ -135,6 +138,10 @@ impl Differentiator<'_> {
                     sink.surface(&point.material(), &lift);
                 }
                 u = back;
+            } else if let Some(vertex) = node.vertex() {
+                let held = u * node.hold.share;
+                send(vertex, &SurfaceAdjoint { u: held, ..SurfaceAdjoint::default() }, sink);
+                u -= held;
             }
             turn = u * arrival.distance;
             let along = u.dot(arrival.dir);

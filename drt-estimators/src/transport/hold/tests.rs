@@ -4,10 +4,11 @@ use alloc::sync::Arc;
 use alloc::vec;
 
 use drt_math::{Rng, Vec3, vec3};
+use drt_motion::GeometryChange;
 
-use super::super::tests::choice;
+use super::super::tests::choice::{self, LIGHT, MOMENT, Sum};
 use super::super::tests::scenes::{
-    diffuse, fog, moves, parameter, phong, shift, stretch, surfaces,
+    diffuse, fog, glow, moves, parameter, phong, shift, stretch, surfaces,
 };
 use super::Hold;
 use crate::contraction::Motion;
@@ -83,7 +84,7 @@ fn nor_of_lamps() {
         (&near, "ball", shift()),
     ] {
         let motion = parameter(moved, 0.0, vec![moves(moved, change)]);
-        choice::check(&|strength| {
+        choice::check(MOMENT, &|strength| {
             let (mut prepared, motion) = choice::prepare(scene, &motion, 4);
             let lamps = prepared.world.holds.lamps.iter_mut().flatten();
             lamps.for_each(|lamp| lamp.strength = 2.0 * strength);
@@ -92,9 +93,36 @@ fn nor_of_lamps() {
     }
 }
 
+/// The same of a medium that moves as a whole.
+#[test]
+fn nor_of_media() {
+    for change in [shift(), stretch()] {
+        check_medium(LIGHT, change);
+    }
+}
+
+/// The same well enough to see what edges before the medium, and those that are seen from it, amount to: a thirtieth.
+#[test]
+#[ignore = "minutes"]
+fn nor_of_media_beside_edges() {
+    check_medium(Sum { samples: 8192, ..LIGHT }, shift());
+}
+
+fn check_medium(sum: Sum, change: GeometryChange) {
+    let scene = glow();
+    let motion = parameter("block", 0.0, vec![moves("block", change)]);
+    choice::check(sum, &|strength| {
+        let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
+        let media = &mut prepared.world.holds.media;
+        assert_eq!(media.iter().flatten().count(), 1);
+        media.iter_mut().flatten().for_each(|m| m.strength = strength);
+        (prepared, motion)
+    });
+}
+
 /// Holds of three strengths.
 fn check(facets: bool) {
-    choice::check(&|strength| {
+    choice::check(MOMENT, &|strength| {
         let (mut prepared, motion) = prepare(facets);
         let holds = &mut prepared.world.holds;
         holds.bends.iter_mut().chain(&mut holds.seen).for_each(|h| *h *= strength);

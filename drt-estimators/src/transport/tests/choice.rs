@@ -12,7 +12,7 @@ use drt_motion::Parameter;
 use super::scenes::FILM;
 use crate::boundary::Receiver;
 use crate::contraction::{Contraction, Motion};
-use crate::inside::Insides;
+use crate::inside;
 use crate::interior::{PixelSampler, sequence_name};
 use crate::kept::Kept;
 use crate::pixels::Sampler;
@@ -31,16 +31,34 @@ pub(crate) fn prepare(scene: &Scene, motion: &Parameter, depth: u32) -> (Prepare
     let mut kept = Kept::default();
     let world = World::new(scene, 0, Some(depth), None, Lit::Extended, &mut kept);
     let world = world.expect("a valid scene");
-    let insides = Insides::at_rest(&world);
-    let motion = Motion::new(tangents.seen_by(0), insides);
+    let tangents = tangents.seen_by(0);
+    let insides = inside::wholes(&world, &tangents, &[]);
+    let motion = Motion::new(tangents, insides);
     let settings = Settings { estimator: EstimatorKind::Radiative, ..Settings::default() };
     let prepared = Prepared::new(world, &motion.interest, &[], &settings, Some(&motion));
     (prepared.expect("a valid scene"), motion)
 }
 
-/// The derivative of the light's moment across the image: the interior term with a world made by
-/// `prepare(strengths[0])`, and all others with one by `prepare(strengths[1])`.
+/// A weighted sum of the image, and how well it is known.
+#[derive(Clone, Copy)]
+pub(crate) struct Sum {
+    /// By pixel.
+    pub(crate) weight: fn(u32) -> f64,
+    /// Per pixel and batch.
+    pub(crate) samples: u32,
+}
+
+/// The light's moment across the image: some columns gain what others lose.
+pub(crate) const MOMENT: Sum =
+    Sum { weight: |pixel| f64::from(pixel % FILM[0]) - 2.5, samples: 128 };
+
+/// All of it.
+pub(crate) const LIGHT: Sum = Sum { weight: |_| 1.0, samples: 128 };
+
+/// The derivative of a sum: the interior term with a world made by `prepare(strengths[0])`, and all others with
+/// one by `prepare(strengths[1])`.
 pub(crate) fn derivative(
+    Sum { weight, samples }: Sum,
     prepare: &dyn Fn(f64) -> (Prepared, Motion),
     strengths: [f64; 2],
 ) -> Moments {
@@ -55,9 +73,9 @@ pub(crate) fn derivative(
             let mut values = vec![Rgb::ZERO; along.layers(1, true)];
             for pixel in 0..PIXELS {
                 let sequence = sequence_name(seed, pixel, 0);
-                for unit in 0..SAMPLES {
+                for unit in 0..samples {
                     sampler.sample(pixel, unit, SobolSampler::new(sequence, unit), &mut values);
-                    let weight = weight(pixel) / f64::from(SAMPLES);
+                    let weight = weight(pixel) / f64::from(samples);
                     rays += values[1].mean() * weight;
                     edges += values[2..].iter().map(|v| v.mean()).sum::<f64>() * weight;
                 }
@@ -68,11 +86,11 @@ pub(crate) fn derivative(
                 prepared.splatter(seed).run(
                     *source,
                     source.stream(),
-                    SAMPLES * PIXELS,
+                    samples * PIXELS,
                     &mut outlines,
                 );
             }
-            edges += outlines.inner.sum / f64::from(SAMPLES * PIXELS);
+            edges += outlines.inner.sum / f64::from(samples * PIXELS);
             batches[0].push(rays);
             batches[1].push(edges);
         }
@@ -84,13 +102,7 @@ pub(crate) fn derivative(
 }
 
 const BATCHES: u64 = 48;
-const SAMPLES: u32 = 128;
 const PIXELS: u32 = FILM[0] * FILM[1];
-
-/// Light moves across the image: some columns gain what others lose.
-fn weight(pixel: u32) -> f64 {
-    f64::from(pixel % FILM[0]) - 2.5
-}
 
 /// What lands on any pixel, by a weight of it.
 pub(crate) struct Total<'a> {
@@ -110,10 +122,10 @@ impl Receiver for Total<'_> {
 }
 
 /// Compares strengths of what is chosen with each other, and finds out terms that do not choose alike.
-pub(crate) fn check(prepare: &dyn Fn(f64) -> (Prepared, Motion)) {
-    let reference = derivative(prepare, [1.0; 2]);
+pub(crate) fn check(sum: Sum, prepare: &dyn Fn(f64) -> (Prepared, Motion)) {
+    let reference = derivative(sum, prepare, [1.0; 2]);
     let compare = |strengths: [f64; 2]| {
-        let m = derivative(prepare, strengths);
+        let m = derivative(sum, prepare, strengths);
         let error = f64::sqrt(m.variance_of_mean() + reference.variance_of_mean());
         ((m.mean() - reference.mean()) / error, error / reference.mean())
     };

@@ -7,7 +7,7 @@ use drt_geom::procedural;
 use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{Effect, GeometryChange};
 
-use super::super::tests::choice;
+use super::super::tests::choice::{self, MOMENT};
 use super::super::tests::scenes::{
     Build, ball, diffuse, homogeneous, moves, parameter, placed, shift,
 };
@@ -131,7 +131,7 @@ fn ball_in_mist(kind: Ball) -> Scene {
 fn check(kind: Ball, effects: Vec<Effect>) {
     let scene = ball_in_mist(kind);
     let motion = parameter("ball", 0.0, effects);
-    choice::check(&|strength| {
+    choice::check(MOMENT, &|strength| {
         let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
         for reach in &mut prepared.world.reaches {
             *reach = reach.map(|r| r * strength).filter(|r| *r > 0.0);
@@ -155,7 +155,7 @@ fn what_is_followed_stands_for_all() {
             prepared.world.reaches.clear();
             (prepared, motion)
         };
-        choice::derivative(&prepare, [1.0; 2])
+        choice::derivative(MOMENT, &prepare, [1.0; 2])
     });
     let error = f64::sqrt(all.variance_of_mean() + few.variance_of_mean());
     assert!((all.mean() - few.mean()).abs() < 4.0 * error, "{all:?} {few:?}");
