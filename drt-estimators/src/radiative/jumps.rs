@@ -13,6 +13,9 @@ use crate::transport::{MaterialPoint, SurfacePoint, World};
 /// How much less radiance jumps at a crease of a surface with interpolated normals than its angle tells.
 const SMOOTH: f64 = 0.05;
 
+/// How much less from behind: next to black, and hidden by the front of what is closed.
+const BEHIND: f64 = 0.05;
+
 /// Angle by which two faces may be out of one plane and still go on in it.
 const FLAT: f64 = 1e-6;
 
@@ -30,8 +33,11 @@ pub(crate) struct Jump {
     around: Option<Option<usize>>,
     /// A face of it bounds a medium.
     bounds: bool,
-    /// How much a crease jumps, compared to a silhouette.
-    pub(super) crease: f64,
+    /// How much a crease jumps, compared to a silhouette, on the side of its faces' [normals](Jumps::normals) and
+    /// on the other.
+    pub(super) crease: [f64; 2],
+    /// Between faces with interpolated normals.
+    smooth: bool,
 }
 
 /// A face at an edge.
@@ -102,14 +108,14 @@ impl Jumps {
             }
             let fan = start..jumps.blades.len();
             jumps.blades[fan.clone()].sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
-            match jumps.crease(world, &fan) {
-                Some(crease) => {
+            match jumps.crease(world, edge.tangent, &fan) {
+                Some((crease, smooth)) => {
                     let mut edge = *edge;
                     edge.may_rest = Contact::anywhere(world, &edge);
                     let around = around[edge.shape as usize];
                     let shape = |i: &usize| &world.scene.shapes[of(i).shape as usize];
                     let bounds = same.iter().any(|(_, i)| shape(i).boundary.is_some());
-                    jumps.list.push(Jump { edge, fan, around, bounds, crease });
+                    jumps.list.push(Jump { edge, fan, around, bounds, crease, smooth });
                 }
                 None => jumps.blades.truncate(start),
             }
@@ -117,27 +123,66 @@ impl Jumps {
         jumps
     }
 
-    /// How much radiance jumps at a crease between faces; `None` where it never does.
-    fn crease(&self, world: &World, fan: &Range<usize>) -> Option<f64> {
+    /// How much radiance jumps at a crease between faces, and whether these are smooth; `None` where it never does.
+    fn crease(
+        &self,
+        world: &World,
+        tangent: Vec3,
+        fan: &Range<usize>,
+    ) -> Option<([f64; 2], bool)> {
         let blades = &self.blades[fan.clone()];
-        let [a, b] = blades else { return Some(1.0) };
-        let [sa, sb] = [a, b].map(|b| world.point(b.prim, [0.0; 2]).0.shape as usize);
+        let [a, b] = blades else { return Some(([1.0; 2], false)) };
+        let points = [a, b].map(|b| world.point(b.prim, [0.0; 2]).0);
+        let [sa, sb] = points.map(|p| p.shape as usize);
         let shapes = &world.scene.shapes;
+        let smooth = sa == sb && shapes[sa].mesh.normals.is_some();
+        // What is one-sided is black from behind.
+        let normals = normals(tangent, [a.across, b.across]);
+        let fronts = [0, 1].map(|k| normals[k].dot(points[k].ng) > 0.0);
+        let one_sided = points.iter().all(|p| world.bsdf_of(p.shape).is_black_from_behind());
+        let behind = if smooth { BEHIND } else { 0.0 };
+        let sides = match fronts {
+            _ if !one_sided => [1.0; 2],
+            [true, true] => [1.0, behind],
+            [false, false] => [behind, 1.0],
+            _ => [1.0; 2],
+        };
         let dull = |s: usize| shapes[s].emitter.is_none();
         if shapes[sa].bsdf != shapes[sb].bsdf || !dull(sa) || !dull(sb) {
-            return Some(1.0);
+            return Some((sides, false));
         }
         let bend = PI - fm::atan2(a.across.cross(b.across).length(), a.across.dot(b.across));
         if bend < FLAT {
             return None;
         }
-        let smooth = sa == sb && shapes[sa].mesh.normals.is_some();
-        Some(f64::min(bend, 1.0) * if smooth { SMOOTH } else { 1.0 })
+        let jump = f64::min(bend, 1.0) * if smooth { SMOOTH } else { 1.0 };
+        Some((sides.map(|side| side * jump), smooth))
     }
 
     /// The faces around an edge, and the unit vectors across it into them.
     pub(super) fn faces(&self, jump: &Jump) -> impl Iterator<Item = (u32, Vec3)> {
         self.blades[jump.fan.clone()].iter().map(|b| (b.prim, b.across))
+    }
+
+    /// Unit normals of the two faces of a crease, on one side of the surface.
+    pub(super) fn normals(&self, jump: &Jump) -> Option<[Vec3; 2]> {
+        let [a, b] = &self.blades[jump.fan.clone()] else { return None };
+        Some(normals(jump.edge.tangent, [a.across, b.across]))
+    }
+
+    /// Weight of an edge seen from a point: the angle it subtends, less where it is a crease. Samples of its
+    /// two sides, of the same random numbers, seldom differ, but then by all there is: their root mean square
+    /// is that of how often. Where normals are interpolated they differ each time, by little.
+    pub(super) fn seen_from(&self, jump: &Jump, eye: Vec3) -> f64 {
+        let silhouette = crate::boundary::edges::seen_from(&jump.edge, eye);
+        let Some(normals) = self.normals(jump).filter(|_| silhouette == 0.0) else {
+            return silhouette;
+        };
+        let (a, along) = jump.edge.line();
+        let (da, db) = (a - eye, a + along - eye);
+        let crease = jump.crease[usize::from(normals[0].dot(da) > 0.0)];
+        let weight = if jump.smooth { crease } else { fm::sqrt(crease) };
+        weight * fm::atan2(da.cross(db).length(), da.dot(db))
     }
 
     /// What a viewer sees of an edge; `w` is unit, from the edge to the viewer.
@@ -167,23 +212,14 @@ impl Jumps {
     }
 }
 
+/// Unit normals of two faces at an edge, by the directions across it into them, on one side of the surface.
+fn normals(tangent: Vec3, [f, g]: [Vec3; 2]) -> [Vec3; 2] {
+    [tangent.cross(f), g.cross(tangent)]
+}
+
 impl Jump {
     pub(super) fn length(&self) -> f64 {
         self.edge.line().1.length()
-    }
-
-    /// Weight of the edge seen from a point: the angle it subtends, less where it is a crease. Samples of its
-    /// two sides, of the same random numbers, seldom differ, but then by all there is: their root mean square
-    /// is that of how often.
-    pub(super) fn seen_from(&self, eye: Vec3) -> f64 {
-        let (a, along) = self.edge.line();
-        let (da, db) = (a - eye, a + along - eye);
-        let silhouette = crate::boundary::edges::seen_from(&self.edge, eye);
-        if silhouette > 0.0 {
-            silhouette
-        } else {
-            fm::sqrt(self.crease) * fm::atan2(da.cross(db).length(), da.dot(db))
-        }
     }
 
     /// The point `along` the edge.

@@ -168,7 +168,7 @@ impl Radiative {
             (_, true) => f64::max(speed, AT_REST * fastest),
             _ => speed,
         };
-        let seen = jumps.list.iter().zip(&speeds).map(|(j, s)| relative(*s) * j.seen_from(eye));
+        let seen = jumps.list.iter().zip(&speeds).map(|(j, s)| relative(*s) * jumps.seen_from(j, eye));
         let camera = Outlines::new(seen)?;
         let chambers = Chambers::new(world);
         let views = |matter: &dyn Fn(&Jump) -> f64| Views::new(world, &chambers, &jumps, matter);

@@ -125,16 +125,16 @@ pub(super) fn viewpoint(world: &World, vertex: &Vertex, wo: Vec3) -> Viewpoint {
 
 fn segment(jumps: &Jumps, jump: &Jump, weight: f64) -> Segment {
     let (a, along) = jump.edge.line();
-    let across: Vec<Vec3> = jumps.faces(jump).map(|(_, across)| across).collect();
-    // Both on one side of the surface, whatever the order of the faces' corners.
-    let t = jump.edge.tangent;
-    let (faces, open) = match across[..] {
-        [f, g] => ([t.cross(f), g.cross(t)], false),
+    let (faces, open) = match jumps.normals(jump) {
+        Some(normals) => (normals, false),
         // What is seen of three faces and more depends on where from.
-        _ => ([t.cross(across[0]); 2], true),
+        None => {
+            let across = jumps.faces(jump).map(|(_, across)| across).next();
+            ([jump.edge.tangent.cross(across.unwrap_or_default()); 2], true)
+        }
     };
-    let crease = jump.crease * weight;
-    Segment { a, b: a + along, faces, open, jump: weight, crease: [crease; 2] }
+    let crease = jump.crease.map(|crease| crease * weight);
+    Segment { a, b: a + along, faces, open, jump: weight, crease }
 }
 
 /// The spheres around the surfaces that emit most.

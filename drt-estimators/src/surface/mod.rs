@@ -219,6 +219,11 @@ impl Bsdf {
         matches!(self, Self::RoughDielectric(_))
     }
 
+    /// True when nothing is scattered where both directions are on the back of the surface.
+    pub(crate) fn is_black_from_behind(&self) -> bool {
+        matches!(self, Self::Diffuse(_) | Self::Phong(_) | Self::RoughConductor(_))
+    }
+
     /// About how far the half vector of its sharpest lobe is from the normal, in slopes; at most 1.
     pub(crate) fn lobe_width(&self) -> f64 {
         let width = match self {
