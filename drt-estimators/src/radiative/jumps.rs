@@ -124,12 +124,7 @@ impl Jumps {
     }
 
     /// How much radiance jumps at a crease between faces, and whether these are smooth; `None` where it never does.
-    fn crease(
-        &self,
-        world: &World,
-        tangent: Vec3,
-        fan: &Range<usize>,
-    ) -> Option<([f64; 2], bool)> {
+    fn crease(&self, world: &World, tangent: Vec3, fan: &Range<usize>) -> Option<([f64; 2], bool)> {
         let blades = &self.blades[fan.clone()];
         let [a, b] = blades else { return Some(([1.0; 2], false)) };
         let points = [a, b].map(|b| world.point(b.prim, [0.0; 2]).0);

@@ -39,6 +39,7 @@ mod outlines;
 mod tree;
 mod vertices;
 mod views;
+mod worth;
 
 use alloc::vec::Vec;
 
@@ -49,6 +50,7 @@ use jumps::{Jump, Jumps};
 pub(crate) use tree::Options;
 pub(crate) use vertices::Edged;
 use views::Views;
+use worth::Worth;
 
 use crate::Error;
 use crate::boundary::edges::Edge;
@@ -69,6 +71,7 @@ pub(crate) struct Radiative {
     /// stands still, too.
     resting: Option<Views>,
     chambers: Chambers,
+    worth: Worth,
     /// Edges that can be chosen, and edges in all.
     pub(crate) count: [u64; 2],
 }
@@ -168,7 +171,8 @@ impl Radiative {
             (_, true) => f64::max(speed, AT_REST * fastest),
             _ => speed,
         };
-        let seen = jumps.list.iter().zip(&speeds).map(|(j, s)| relative(*s) * jumps.seen_from(j, eye));
+        let seen =
+            jumps.list.iter().zip(&speeds).map(|(j, s)| relative(*s) * jumps.seen_from(j, eye));
         let camera = Outlines::new(seen)?;
         let chambers = Chambers::new(world);
         let views = |matter: &dyn Fn(&Jump) -> f64| Views::new(world, &chambers, &jumps, matter);
@@ -177,7 +181,7 @@ impl Radiative {
         let resting = resting.map(|views| views.before(world, &chambers, &holding));
         let all = views(&|_| 1.0);
         let count = [jumps.list.len() as u64, jumps.all];
-        Ok(Self { jumps, camera, moving, all, resting, chambers, count })
+        Ok(Self { jumps, camera, moving, all, resting, chambers, worth: Worth::default(), count })
     }
 
     /// True when the camera can see something change.

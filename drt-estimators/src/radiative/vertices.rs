@@ -8,7 +8,7 @@ use super::views::{Views, viewpoint};
 use super::{AT_REST, BY_THROUGHPUT, CARRIED, Look, Radiative};
 use crate::transport::record::{Node, PathRecord};
 use crate::transport::trace::Endpoint;
-use crate::transport::{Matter, Tracer, Vertex, World};
+use crate::transport::{MaterialPoint, Matter, Tracer, Vertex, World};
 
 /// An edge's contribution to a path: a sum of speeds along `n`.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +31,34 @@ enum Sought {
     Resting,
 }
 
+/// A point of an edge and the vertex that looks at it.
+pub(super) struct Glance<'a> {
+    node: usize,
+    sight: Sight<'a>,
+    point: MaterialPoint,
+    /// Of what the two sides differ by, all but the transmittance.
+    pub(super) weight: Rgb,
+    /// Segments beyond the edge.
+    longest: u32,
+}
+
+impl Glance<'_> {
+    /// What is seen.
+    fn follow(self, tracer: &mut Tracer<'_>) -> Option<Edged> {
+        let Self { node, sight, point, weight, longest } = self;
+        let weight = weight * sight.open(tracer)?;
+        let [minus, plus] = sight.sides(tracer, longest);
+        let lights = [weight * minus.light, weight * -plus.light];
+        let held = [lights[0] * minus.hold, lights[1] * plus.hold];
+        let [edge, viewer] = [lights, held].map(|[a, b]| a + b);
+        let of = |side: &Side, held: Rgb| side.matter.map(|m| (m, -held));
+        let matter =
+            [Some((Matter::Surface(point), edge)), of(&minus, held[0]), of(&plus, held[1])];
+        let dark = lights.iter().all(|l| l.is_zero());
+        (!dark).then_some(Edged { node, n: sight.sides.n, viewer: viewer - edge, matter })
+    }
+}
+
 impl Radiative {
     /// Takes one sample: one of the path's vertices, an edge that it sees.
     pub(crate) fn edge(
@@ -39,9 +67,25 @@ impl Radiative {
         record: &PathRecord,
         look: &Look,
     ) -> Option<Edged> {
+        let mut glance = self.glance(tracer, record, look)?;
+        let chance = self.worth.chance(glance.weight.max_abs());
+        if chance < 1.0 && tracer.rng.next_f64() >= chance {
+            return None;
+        }
+        glance.weight = glance.weight / chance;
+        glance.follow(tracer)
+    }
+
+    /// The same before anything is traced.
+    pub(super) fn glance<'a>(
+        &'a self,
+        tracer: &mut Tracer<'_>,
+        record: &'a PathRecord,
+        look: &Look,
+    ) -> Option<Glance<'a>> {
         let (sought, likely, look) = self.sought(&record.nodes[1..], look);
         let (node, chance) = self.choose_vertex(tracer, record, sought, look.vertex)?;
-        self.look(tracer, record, node, sought, likely * chance, &look)
+        self.glance_from(tracer, record, node, sought, likely * chance, &look)
     }
 
     /// The same from a given vertex.
@@ -53,7 +97,7 @@ impl Radiative {
         look: &Look,
     ) -> Option<Edged> {
         let (sought, likely, look) = self.sought(&record.nodes[node..=node], look);
-        self.look(tracer, record, node, sought, likely, &look)
+        self.glance_from(tracer, record, node, sought, likely, &look)?.follow(tracer)
     }
 
     /// What a look from one of some vertices is for, its probability, and what is left of the look's numbers.
@@ -69,15 +113,15 @@ impl Radiative {
     }
 
     /// A look from a vertex for what is `sought`, which both have a given `chance`.
-    fn look(
-        &self,
+    fn glance_from<'a>(
+        &'a self,
         tracer: &mut Tracer<'_>,
-        record: &PathRecord,
+        record: &'a PathRecord,
         node: usize,
         sought: Sought,
         chance: f64,
         look: &Look,
-    ) -> Option<Edged> {
+    ) -> Option<Glance<'a>> {
         let recorded = &record.nodes[node];
         let arrival = recorded.arrival.as_ref()?;
         let (vertex, theta) =
@@ -94,19 +138,10 @@ impl Radiative {
         if f.is_zero() {
             return None;
         }
-        let tau = sight.open(tracer)?;
-        let [minus, plus] = sight.sides(tracer, longest);
         let kernel = sight.sides.sine / (sight.distance * sight.distance);
-        let weight = theta * f * tau * (kernel * chosen.inv_pdf / chance);
+        let weight = theta * f * (kernel * chosen.inv_pdf / chance);
         let (_, point) = chosen.jump.point(chosen.along);
-        let lights = [weight * minus.light, weight * -plus.light];
-        let held = [lights[0] * minus.hold, lights[1] * plus.hold];
-        let [edge, viewer] = [lights, held].map(|[a, b]| a + b);
-        let of = |side: &Side, held: Rgb| side.matter.map(|m| (m, -held));
-        let matter =
-            [Some((Matter::Surface(point), edge)), of(&minus, held[0]), of(&plus, held[1])];
-        let dark = lights.iter().all(|l| l.is_zero());
-        (!dark).then_some(Edged { node, n: sight.sides.n, viewer: viewer - edge, matter })
+        Some(Glance { node, sight, point, weight, longest })
     }
 
     /// What edges a vertex may look at.
