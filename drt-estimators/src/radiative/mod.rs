@@ -24,7 +24,7 @@
 //! Cost is linear in path length: of all vertices of a path one, mostly in proportion to its throughput
 //! times an estimate of what edges amount to from there, looks for an edge, and of all surfaces met one
 //! is asked for its flux; each traces side paths that
-//! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
+//! branch no more, more seldom where they [count for little](worth). (The paper does both at every vertex, at a cost that is quadratic;
 //! [`every_vertex`](crate::Settings::every_vertex) does so with edges.)
 //!
 //! Light from points and directions does not fit this form: its shadows make radiance jump along lines
@@ -71,6 +71,7 @@ pub(crate) struct Radiative {
     /// stands still, too.
     resting: Option<Views>,
     chambers: Chambers,
+    /// Of looks from vertices.
     worth: Worth,
     /// Edges that can be chosen, and edges in all.
     pub(crate) count: [u64; 2],
@@ -84,7 +85,7 @@ struct Outlines {
 }
 
 /// How much an edge at rest matters before something that moves, to what stands still, compared to one
-/// that moves.
+/// that moves; and the part of looks for such.
 const AT_REST: f64 = 0.1;
 
 /// How much more edges matter to a vertex that moves: it moves faster than what it lands on where it

@@ -14,7 +14,7 @@
 //! v = (1 - φ) c + φ u,
 //! ```
 //!
-//! with φ = 1 where a curved surface is grazed, and mostly on [lamps](lamp). With
+//! with φ = 1 where a curved surface is grazed, and mostly on [lamps and in media that move as a whole](whole). With
 //! div v = (1-φ) div c + φ div u + ∇φ·(u - c), the derivative of ∫ F dA, F holding the geometric term,
 //! scattering and transmittance, becomes
 //!
