@@ -6,10 +6,10 @@
 //! the larger part: two paths. By Cauchy and Schwarz's inequality p in proportion to w is best as long as it is below 1:
 //!
 //! ```text
-//! p = min(w / w₀, 1),    w₀ = (mean of w^(1/4))⁴ / 2,
+//! p = min(w / w₀, 1),    w₀ = 0.4 × the power of two below (mean of √w)²,
 //! ```
 //!
-//! a mean that no rare large weight decides. The paths it is of are the same whatever samples a run takes.
+//! a mean that neither a rare large weight decides nor how many have next to none. The paths it is of are the same whatever samples a run takes.
 
 use drt_math::{Real, Rgb, Rng};
 
@@ -23,8 +23,14 @@ const PATHS: u32 = 256;
 /// Their seed.
 const SEED: u64 = 0x6c6f_6f6b;
 
-/// w₀ over the mean.
-const PART: f64 = 0.5;
+/// w₀ over the power of two below the mean.
+const PART: f64 = 0.4;
+
+/// The power of two below a positive number: what differs in its last bits, as the same scene by another way of
+/// preparing it does, then makes the same choices.
+fn power_of_two(x: f64) -> f64 {
+    f64::from_bits(x.to_bits() & f64::INFINITY.to_bits())
+}
 
 /// What looks must count for.
 #[derive(Clone, Copy, Debug, Default)]
@@ -47,7 +53,7 @@ impl Radiative {
         let mut record = PathRecord { carriers: interest.carriers(), ..PathRecord::default() };
         let [width, height] = world.camera.film();
         let pixels = u64::from(width) * u64::from(height);
-        let (mut sum, mut count) = (0.0, 0.0);
+        let mut sum = 0.0;
         for i in 0..PATHS {
             let mut rng = Rng::new(SEED, 0, i);
             let pixel = (u64::from(i) * pixels / u64::from(PATHS)) as u32;
@@ -58,14 +64,11 @@ impl Radiative {
             record.begin([pixel % width, pixel / width], view.direction, weight);
             tracer.trace_camera(view.direction, weight, &mut record);
             if let Some(glance) = self.glance(&mut tracer, &record, &look) {
-                sum += Real::sqrt(Real::sqrt(glance.weight.max_abs()));
-                count += 1.0;
+                sum += Real::sqrt(glance.weight.max_abs());
             }
         }
-        if count > 0.0 {
-            let mean: f64 = sum / count;
-            self.worth.whole = PART * mean * mean * mean * mean;
-        }
+        let mean = sum / f64::from(PATHS);
+        self.worth.whole = PART * power_of_two(mean * mean);
     }
 }
 
@@ -96,6 +99,15 @@ mod tests {
             let error = f64::sqrt(m.variance_of_mean() + all.variance_of_mean());
             assert!((m.mean() - all.mean()).abs() < 4.0 * error, "{m:?} {all:?}");
             assert!(error < 0.1 * all.mean().abs(), "{error} {all:?}");
+        }
+    }
+
+    #[test]
+    fn powers_of_two_are_just_below() {
+        for (x, power) in
+            [(1.0, 1.0), (1.999, 1.0), (2.0, 2.0), (0.3, 0.25), (1e-320, 0.0), (0.0, 0.0)]
+        {
+            assert_eq!(power_of_two(x), power);
         }
     }
 

@@ -20,8 +20,8 @@
 //! In homogeneous media surfaces [tow](crate::transport::tow) the volume vertices of rays that meet them: these move
 //! along the ray by a share of D_dot.
 //!
-//! Where a surface is grazed, vertices [hold](crate::transport::hold) to their matter with a share φ, which
-//! adds φ times the material form of their segment.
+//! Where a surface is grazed, and in media that move as a whole, vertices [hold](crate::transport::hold) to their
+//! matter with a share φ, which adds φ times the material form of their segment.
 //!
 //! What these derivatives leave out, jumps of the integrand that move, is in
 //! [`radiative`](crate::radiative).
