@@ -50,7 +50,9 @@ use crate::{Error, tangents};
 /// or not, these are taken, without velocities given along with them. For the same seed forward mode
 /// with the same settings is then the exact transpose, unless shapes touch that move differently: no
 /// field follows both, and the flux through what is left behind is added here. Other kinds of insides
-/// have no transpose here, and count as not asked for.
+/// have no transpose here, and count as not asked for. By [`EstimatorKind::Radiative`] insides stay static
+/// here in any case; there forward mode is the transpose where either of the two kinds is asked for, as without it
+/// homogeneous media go along where all around them moves by one affine field.
 ///
 /// # Errors
 /// When the adjoint's size is not the film's, the scene or a setting is unusable, or tetrahedra that

@@ -19,8 +19,9 @@
 //! In the spatial form (2019 paper, Eq. 16 and 20; theory sheet §3, §6) volume vertices stand at fixed
 //! distances of their rays, u is the velocity of the ray's point at Σ, and every surface beside a
 //! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term, less what this surface and the
-//! one beyond the medium [tow](crate::transport::tow) along, and of what is left the share that vertices there do not [hold](crate::transport::hold). What of the two cancels for every velocity of the ray,
-//! as in a thin layer, is not even traced.
+//! one beyond the medium [tow](crate::transport::tow) along, times the share by which vertices there do not
+//! [hold](crate::transport::hold) to their medium. What of the two cancels for every velocity of the ray, as in a thin
+//! layer, is not even traced.
 //!
 //! What the camera sees [edge on](edge_on) of surfaces, its rays hardly meet: there points are drawn by area.
 //!

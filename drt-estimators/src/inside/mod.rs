@@ -70,15 +70,16 @@ impl Insides {
 }
 
 /// The media that move as wholes: whichever parameter moves anything around one, everything there moves by one
-/// affine field. The others are at rest.
+/// affine field. The others are at rest, as all are in reverse mode, where vertices move one by one.
 pub(crate) fn wholes(world: &World, tangents: &Tangents, asked: &[(usize, InsideKind)]) -> Insides {
     let mut insides = Insides::at_rest(world);
     for surroundings in all(world, tangents, asked) {
         let m = surroundings.medium;
         let moving = (0..tangents.names.len()).filter(|p| surroundings.moves(*p));
         let fields = moving.map(|p| Some((p, Inside::Affine(surroundings.one_affine_field(p)?))));
-        let left = matches!(surroundings.asked, Some(InsideKind::Static));
-        if !left && world.medium(m).homogeneous().is_some() {
+        // Other kinds have a transpose, which reverse mode takes to be what forward mode does.
+        let wanted = matches!(surroundings.asked, None | Some(InsideKind::Affine));
+        if wanted && world.medium(m).homogeneous().is_some() {
             insides.volumes[m] = fields.collect::<Option<_>>().unwrap_or_default();
         }
     }

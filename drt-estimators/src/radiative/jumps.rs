@@ -130,12 +130,13 @@ impl Jumps {
         let points = [a, b].map(|b| world.point(b.prim, [0.0; 2]).0);
         let [sa, sb] = points.map(|p| p.shape as usize);
         let shapes = &world.scene.shapes;
-        let smooth = sa == sb && shapes[sa].mesh.normals.is_some();
-        // What is one-sided is black from behind.
+        let interpolated = [sa, sb].iter().any(|s| shapes[*s].mesh.normals.is_some());
+        let smooth = sa == sb && interpolated;
+        // What is one-sided is black from behind, but where a normal that is interpolated faces the viewer.
         let normals = normals(tangent, [a.across, b.across]);
         let fronts = [0, 1].map(|k| normals[k].dot(points[k].ng) > 0.0);
         let one_sided = points.iter().all(|p| world.bsdf_of(p.shape).is_black_from_behind());
-        let behind = if smooth { BEHIND } else { 0.0 };
+        let behind = if interpolated { BEHIND } else { 0.0 };
         let sides = match fronts {
             _ if !one_sided => [1.0; 2],
             [true, true] => [1.0, behind],

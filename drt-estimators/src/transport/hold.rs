@@ -123,11 +123,12 @@ impl World {
 
     /// True when a shape holds vertices, or bounds a medium that does.
     pub(crate) fn holds_on(&self, shape: u32) -> bool {
-        let inside = |m: usize| self.holds.media.get(m).is_some_and(Option::is_some);
-        let media = 0..self.scene.media.len();
+        let inside = |(m, whole): (usize, &Option<Whole>)| {
+            whole.is_some() && bounds(&self.scene.shapes[shape as usize], m)
+        };
         self.holds_in_view_on(shape)
             || self.lamp(shape as usize).is_some()
-            || media.into_iter().any(|m| inside(m) && bounds(&self.scene.shapes[shape as usize], m))
+            || self.holds.media.iter().enumerate().any(inside)
     }
 
     /// True when it holds what the camera sees of it.

@@ -187,7 +187,7 @@ pub fn surfaces(ball_bsdf: Bsdf, floor_bsdf: Bsdf) -> Scene {
     b.camera(vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0), 5)
 }
 
-/// A floor beside a block of fog that the camera does not see, but in the floor, with a card between the two that hides half of it.
+/// A floor that a block of fog, out of view, shines on, with a card between the two that hides half of the block.
 pub fn glow() -> Scene {
     let mut b = Build::default();
     let bsdf = b.bsdf("floor-bsdf", diffuse(0.6, 0.5, 0.4));
