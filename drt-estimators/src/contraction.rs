@@ -11,7 +11,7 @@ use crate::emitter::EmitterGradient;
 use crate::inside::{Insides, Place};
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
-use crate::surface::BsdfParams;
+use crate::surface::{BsdfParams, BsdfTangent};
 use crate::tangents::Tangents;
 use crate::transport::{MaterialPoint, MediumNeed, Needs, World};
 
@@ -57,9 +57,13 @@ impl Motion {
                 MediumNeed::Nothing
             }
         };
+        let roughens = |tangents: &Vec<(usize, BsdfTangent)>| {
+            tangents.iter().any(|(_, t)| !t.alpha.is_zero())
+        };
         Needs {
             media: self.tangents.media.iter().map(need).collect(),
             bsdfs: self.interest.bsdfs.clone(),
+            roughness: self.tangents.bsdfs.iter().map(roughens).collect(),
         }
     }
 

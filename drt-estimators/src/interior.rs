@@ -16,6 +16,7 @@ use crate::transport::{Carriers, Differentiator, Form, PathRecord, Radiance, Tra
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
 pub(crate) const LINE_STREAM: u64 = 1 << 62;
+const PAIR_STREAM: u64 = 1 << 59;
 const FLUX_STREAM: u64 = 1 << 61;
 pub(crate) const SEQUENCE_STREAM: u64 = 1 << 60;
 /// Numbers of a sample that are spread evenly: image point, and the first vertices.
@@ -220,6 +221,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let width = camera.film()[0];
         self.record.begin([pixel % width, pixel / width], dir, weight);
         self.record.flux.begin(Rng::new(self.seed, FLUX_STREAM | u64::from(pixel), unit));
+        self.record.pairs.begin(Some(Rng::new(self.seed, PAIR_STREAM | u64::from(pixel), unit)));
         self.tracer.trace_camera(dir, weight, &mut self.record);
         values[0] += self.record.value;
         self.recorded += self.record.nodes.len() as u64;
@@ -229,6 +231,13 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             let line = Rng::new(self.seed, LINE_STREAM | u64::from(pixel), unit);
             sink.begin();
             self.differentiator.differentiate(&self.record, s.slope, line, sink);
+            if !self.record.pairs.is_empty() {
+                let mut pairs = core::mem::take(&mut self.record.pairs);
+                pairs.follow(&mut self.tracer, |pair, chance, other| {
+                    self.differentiator.pair(&self.record, pair, chance, other, sink);
+                });
+                self.record.pairs = pairs;
+            }
             sink.finish(&mut values[1..=n]);
         }
         // Each kept apart goes to layers of its own, in the order of `AlongRays::terms`.

@@ -117,6 +117,7 @@ fn gradient_of_share(
     world.prepare_for_derivatives(Needs {
         media: interest.media.iter().map(need).collect(),
         bsdfs: interest.bsdfs.clone(),
+        roughness: interest.bsdfs.clone(),
     });
     let prepared = Prepared::new(world, &interest, &insides.flux_shapes, settings, None)?;
     let run =

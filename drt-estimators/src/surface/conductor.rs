@@ -1,8 +1,9 @@
 use drt_math::{Real, Rgb, Vec3, fm};
 
 use super::angles::{Angles, Slopes};
+use super::counterpart::Counterpart;
 use super::fresnel::{conductor_reflected, conductor_slopes};
-use super::microfacet::{Distribution, LEAST_ALPHA};
+use super::microfacet::{Distribution, LEAST_ALPHA, mirrored};
 use super::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 
 /// A rough metal: the single-scattering microfacet reflection of Cook & Torrance in the form of
@@ -112,7 +113,17 @@ impl RoughConductor {
             return None;
         }
         let m = self.distribution.sample_visible(from, n, self.alpha, [u[0], u[1]]);
-        Some(m * (2.0 * m.dot(from)) - from)
+        Some(mirrored(from, m))
+    }
+
+    #[inline]
+    pub(super) fn counterpart(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Counterpart> {
+        let leave = |m: Vec3| {
+            let (cos, w) = (m.dot(wo), mirrored(wo, m));
+            (cos > 0.0 && n.dot(w) > 0.0).then_some((w, 4.0 * cos))
+        };
+        let m = (wo + wi).normalize();
+        Counterpart::new(self.distribution, self.alpha, [wo, n, m], leave)
     }
 
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {

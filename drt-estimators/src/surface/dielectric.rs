@@ -1,8 +1,9 @@
 use drt_math::{Dual, Real, Rgb, Vec3, fm};
 
 use super::angles::{Angles, Slopes};
+use super::counterpart::Counterpart;
 use super::fresnel::{dielectric_reflected, dielectric_transmitted};
-use super::microfacet::{Distribution, LEAST_ALPHA};
+use super::microfacet::{Distribution, LEAST_ALPHA, mirrored};
 use super::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 
 /// A rough interface between two transparent media: Walter et al. 2007, eq. 20 (reflection) and
@@ -191,14 +192,7 @@ impl RoughDielectric {
 
     #[inline]
     pub(super) fn sample(&self, from: Vec3, n: Vec3, u: [f64; 3]) -> Option<Vec3> {
-        let side = n.dot(from);
-        let (n, eta) = if side > 0.0 {
-            (n, self.eta)
-        } else if side < 0.0 {
-            (-n, 1.0 / self.eta)
-        } else {
-            return None;
-        };
+        let (n, eta) = self.seen_from(from, n)?;
         let m = self.distribution.sample_visible(from, n, self.alpha, [u[0], u[1]]);
         let cos = m.dot(from);
         if cos <= 0.0 {
@@ -206,13 +200,47 @@ impl RoughDielectric {
         }
         let reflects = u[2] < self.reflection_choice(dielectric_reflected(cos, eta));
         let w = if reflects {
-            m * (2.0 * cos) - from
+            mirrored(from, m)
         } else {
-            let cos_t = fm::sqrt((1.0 - (1.0 - cos * cos) / (eta * eta)).max(0.0));
+            let cos_t = fm::sqrt(cos2_refracted(cos, eta).max(0.0));
             m * (cos / eta - cos_t) - from * (1.0 / eta)
         };
         // A reflection to the far side, or a refraction to the near one, has left the model.
         (reflects == (n.dot(w) > 0.0)).then_some(w)
+    }
+
+    #[inline]
+    pub(super) fn counterpart(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Counterpart> {
+        let (n, eta) = self.seen_from(wo, n)?;
+        let reflects = n.dot(wi) > 0.0;
+        let leave = |m: Vec3| {
+            let cos = m.dot(wo);
+            let (w, angle) = if reflects {
+                (mirrored(wo, m), 4.0 * cos)
+            } else {
+                let cos2 = cos2_refracted(cos, eta);
+                let cos_t = fm::sqrt(cos2.max(0.0));
+                let h = cos - eta * cos_t;
+                (m * (cos / eta - cos_t) - wo * (1.0 / eta), h * h / (eta * eta * cos_t))
+            };
+            (cos > 0.0 && angle.is_finite() && reflects == (n.dot(w) > 0.0)).then_some((w, angle))
+        };
+        let h = wo + wi * if reflects { 1.0 } else { eta };
+        let m = if n.dot(h) < 0.0 { -h } else { h };
+        Counterpart::new(self.distribution, self.alpha, [wo, n, m.normalize()], leave)
+    }
+
+    /// The normal on the side of a direction, and the index beyond over the one on that side.
+    #[inline]
+    fn seen_from(&self, from: Vec3, n: Vec3) -> Option<(Vec3, f64)> {
+        let side = n.dot(from);
+        if side > 0.0 {
+            Some((n, self.eta))
+        } else if side < 0.0 {
+            Some((-n, 1.0 / self.eta))
+        } else {
+            None
+        }
     }
 
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
@@ -233,4 +261,10 @@ impl RoughDielectric {
         nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
         nonnegative(Property::SpecularTransmittance, self.specular_transmittance)
     }
+}
+
+/// Squared cosine of refraction, from that of incidence; negative in total reflection.
+#[inline]
+fn cos2_refracted(cos: f64, eta: f64) -> f64 {
+    1.0 - (1.0 - cos * cos) / (eta * eta)
 }

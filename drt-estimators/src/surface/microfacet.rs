@@ -183,6 +183,12 @@ impl Distribution {
     }
 }
 
+/// Where a microfacet with normal `m` reflects what comes from a direction.
+#[inline]
+pub(super) fn mirrored(from: Vec3, m: Vec3) -> Vec3 {
+    m * (2.0 * m.dot(from)) - from
+}
+
 /// A point of the unit hemisphere about z, uniform over its projection along the direction
 /// `(sin, 0, cos)`: the GGX normals that direction sees at roughness one (Heitz 2018, "Sampling the
 /// GGX Distribution of Visible Normals").

@@ -32,6 +32,7 @@
 mod angles;
 mod change;
 mod conductor;
+mod counterpart;
 mod dielectric;
 mod diffuse;
 mod fresnel;
@@ -50,6 +51,7 @@ use drt_math::{Rgb, RgbVec, Vec3, fm};
 use angles::{Angles, Slopes};
 pub use change::{BsdfChange, BsdfParams, BsdfTangent};
 pub use conductor::RoughConductor;
+pub(crate) use counterpart::Counterpart;
 pub use dielectric::RoughDielectric;
 pub use diffuse::Diffuse;
 pub(crate) use lobes::{Lobe, Lobes};
@@ -202,6 +204,17 @@ impl Bsdf {
     pub fn pdf(&self, from: Vec3, to: Vec3, n: Vec3, _given: Given) -> f64 {
         let (bsdf, n) = self.facing(from, n);
         match_model!(bsdf, b => b.pdf(&Angles::new(from, to, n)), _ => 0.0)
+    }
+
+    /// The [`Counterpart`] of `wi` as the surface gets rougher, if it has one.
+    #[inline]
+    pub(crate) fn counterpart(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Counterpart> {
+        let (bsdf, n) = self.facing(wo, n);
+        match bsdf {
+            Self::RoughConductor(b) => b.counterpart(wo, wi, n),
+            Self::RoughDielectric(b) => b.counterpart(wo, wi, n),
+            _ => None,
+        }
     }
 
     /// True for the border of a medium that light crosses unchanged.

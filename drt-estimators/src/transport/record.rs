@@ -4,9 +4,10 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use drt_math::{Rgb, Vec3};
+use drt_math::{Rgb, Rng, Vec3};
 
 use super::hold::Hold;
+use super::pairs::Pairs;
 use super::tow::{self, Tow};
 use super::trace::{Arrival, Connection, Endpoint, Leaving, Observer};
 use super::vertex::{Kind, Vertex};
@@ -32,6 +33,8 @@ pub(crate) struct Node {
     pub(crate) hold: Hold,
     /// What tows it, in the spatial form.
     pub(crate) tows: Range<usize>,
+    /// The part of its scattering's derivative by roughness, relative to the value, that a pair tells of.
+    pub(crate) paired: f64,
 }
 
 impl Node {
@@ -67,6 +70,8 @@ pub(crate) struct PathRecord {
     /// What carries vertices, where that is asked for.
     pub(crate) carriers: Carriers,
     pub(crate) tows: Vec<Tow>,
+    /// Rays beside it, where they are asked for.
+    pub(crate) pairs: Pairs,
 }
 
 impl PathRecord {
@@ -88,6 +93,7 @@ impl PathRecord {
             carried: self.carriers.camera,
             hold: Hold::default(),
             tows: 0..0,
+            paired: 0.0,
         });
     }
 
@@ -165,13 +171,22 @@ impl Observer for PathRecord {
             carried,
             hold,
             tows,
+            paired: 0.0,
         });
         self.nodes.len() as u32 - 1
     }
 
-    fn scatter(&mut self, node: u32, wi: Vec3, value: Rgb, inv_pdf: f64) {
-        let node = &mut self.nodes[node as usize];
-        (node.wi, node.value, node.inv_pdf) = (wi, value, inv_pdf);
+    fn scatter(
+        &mut self,
+        world: &World,
+        leaving: &Leaving,
+        value: Rgb,
+        inv_pdf: f64,
+        rng: &Rng,
+    ) {
+        let node = &mut self.nodes[leaving.node as usize];
+        (node.wi, node.value, node.inv_pdf) = (leaving.dir, value, inv_pdf);
+        node.paired = self.pairs.offer(world, node, leaving, rng).unwrap_or(0.0);
     }
 
     fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {

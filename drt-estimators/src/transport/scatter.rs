@@ -10,7 +10,7 @@
 use drt_math::{Real, Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Phase;
 
-use crate::surface::{Bsdf, BsdfParams, Given, Lobes};
+use crate::surface::{Bsdf, BsdfParams, Counterpart, Given, Lobes};
 
 /// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.
 const FADE: f64 = 0.02;
@@ -26,6 +26,7 @@ pub(crate) enum Scattering<'a> {
 
 /// The gradient of a scattering function.
 pub(crate) struct ScatteringGradient {
+    pub(crate) value: Rgb,
     pub(crate) wo: RgbVec,
     pub(crate) wi: RgbVec,
     /// With respect to the shading normal.
@@ -115,14 +116,17 @@ impl Scattering<'_> {
                     let mut params = BsdfParams::default();
                     params.scatter(&d.params, Rgb::splat(factor));
                     d.params = params;
+                    d.value = d.value * factor;
                 }
                 let params = Some(d.params);
-                ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, ng: by_ng, g: 0.0, params }
+                let (value, wo, wi) = (d.value, d.wo, d.wi);
+                ScatteringGradient { value, wo, wi, ns: d.n, ng: by_ng, g: 0.0, params }
             }
             Self::Volume(phase) => {
                 let c = -wo.dot(wi);
                 let slope = Rgb::splat(-phase.d_cos(c));
                 ScatteringGradient {
+                    value: Rgb::splat(phase.eval(c)),
                     wo: slope.outer(wi),
                     wi: slope.outer(wo),
                     ns: RgbVec::ZERO,
@@ -131,6 +135,14 @@ impl Scattering<'_> {
                     params: None,
                 }
             }
+        }
+    }
+
+    /// The [`Counterpart`] of `wi`, if it has one.
+    pub(crate) fn counterpart(&self, wo: Vec3, wi: Vec3) -> Option<Counterpart> {
+        match self {
+            Self::Surface { bsdf, ns, .. } => bsdf.counterpart(wo, wi, *ns),
+            Self::Volume(_) => None,
         }
     }
 

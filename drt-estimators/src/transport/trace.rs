@@ -92,8 +92,17 @@ pub(crate) trait Observer {
     fn arrive(&mut self, _world: &World, _arrival: &Arrival, _crossings: &[Crossing]) -> u32 {
         0
     }
-    /// The walk leaves `node` along `wi`.
-    fn scatter(&mut self, _node: u32, _wi: Vec3, _value: Rgb, _inv_pdf: f64) {}
+    /// The walk leaves a vertex, with a value of its scattering function and its inverse density; what it draws
+    /// next is `rng`'s.
+    fn scatter(
+        &mut self,
+        _world: &World,
+        _leaving: &Leaving,
+        _value: Rgb,
+        _inv_pdf: f64,
+        _rng: &Rng,
+    ) {
+    }
     /// `node` was connected to a light.
     fn connect(&mut self, _node: u32, _connection: &Connection, _crossings: &[Crossing]) {}
 }
@@ -154,6 +163,13 @@ pub(crate) struct Leaving {
     pub(crate) segments: u32,
 }
 
+impl Leaving {
+    /// Another direction of a given density, nothing before which counts.
+    pub(crate) fn turned(&self, dir: Vec3, pdf: f64) -> Self {
+        Self { node: 0, dir, pdf: Some(pdf), throughput: Rgb::ONE, ..*self }
+    }
+}
+
 /// Everything one walk needs: the scene, its random numbers and reusable buffers.
 pub(crate) struct Tracer<'w> {
     pub(crate) world: &'w World,
@@ -194,7 +210,12 @@ impl<'w> Tracer<'w> {
             alive: Alive::new(Rgb::ONE),
             segments: 0,
         };
-        if let Some(stop) = self.follow(&leaving, observer) {
+        self.radiance_along(&leaving, observer);
+    }
+
+    /// Estimates what comes along a ray, times its throughput.
+    pub(crate) fn radiance_along<O: Observer>(&mut self, leaving: &Leaving, observer: &mut O) {
+        if let Some(stop) = self.follow(leaving, observer) {
             self.walk(stop, observer);
         }
     }
@@ -300,8 +321,7 @@ impl<'w> Tracer<'w> {
             inv_pdf /= survival;
             alive.value *= 1.0 / survival;
         }
-        observer.scatter(stop.node, wi, value, inv_pdf);
-        Some(Leaving {
+        let leaving = Leaving {
             node: stop.node,
             vertex: stop.vertex,
             dir: wi,
@@ -309,7 +329,9 @@ impl<'w> Tracer<'w> {
             throughput: stop.throughput * sigma_s * (value * inv_pdf),
             alive,
             segments: stop.segments,
-        })
+        };
+        observer.scatter(world, &leaving, value, inv_pdf, &self.rng);
+        Some(leaving)
     }
 
     /// MIS weight of connecting to a point light from a vertex that free flight found.

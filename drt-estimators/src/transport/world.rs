@@ -109,6 +109,8 @@ pub(crate) enum MediumNeed {
 pub(crate) struct Needs {
     pub(crate) media: Vec<MediumNeed>,
     pub(crate) bsdfs: Vec<bool>,
+    /// Those whose roughness changes.
+    pub(crate) roughness: Vec<bool>,
 }
 
 /// What tracking may skip in a medium.
@@ -268,6 +270,14 @@ impl World {
             (_, Some(m)) => self.needs.media.get(m).is_some_and(|n| *n != MediumNeed::Nothing),
             _ => false,
         }
+    }
+
+    /// True when a parameter changes how rough the surface at `v` is.
+    pub(crate) fn roughens(&self, v: &Vertex) -> bool {
+        v.surface().is_some_and(|s| {
+            let bsdf = self.scene.shapes[s.shape as usize].bsdf;
+            self.needs.roughness.get(bsdf).copied().unwrap_or(false)
+        })
     }
 
     /// Finds the medium beyond all interfaces and the one around the camera.

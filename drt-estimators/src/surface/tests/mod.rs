@@ -1,6 +1,7 @@
 //! Every model is judged as the same list of cases, from the same directions.
 
 mod changes;
+mod counterparts;
 mod energy;
 mod formulas;
 mod gradients;

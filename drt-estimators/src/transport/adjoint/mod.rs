@@ -34,12 +34,14 @@ use drt_medium::{Coefficients, DepthEstimate};
 
 use emitters::strength;
 
+use super::pairs::Pair;
 use super::record::PathRecord;
 use super::trace::Endpoint;
 use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, Interval, World, intervals};
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
+use crate::surface::BsdfParams;
 
 /// What has been collected for a vertex while its neighbours are processed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -134,6 +136,26 @@ impl<'w> Differentiator<'w> {
                 self.camera_ray(record, self.locals[0].at.u, self.turn, &self.sensor, sink)
             }
         }
+    }
+
+    /// Sends what a [pair](super::pairs) of the record that was swept last of a given `chance` tells, when `other` is r f' C'.
+    pub(crate) fn pair<S: AdjointSink>(
+        &self,
+        record: &PathRecord,
+        pair: &Pair,
+        chance: f64,
+        other: Rgb,
+        sink: &mut S,
+    ) {
+        let node = &record.nodes[pair.node];
+        let (Some(arrival), Some(s)) = (&node.arrival, node.vertex().and_then(Vertex::surface))
+        else {
+            return;
+        };
+        let difference = node.value * self.locals[pair.node].children - other;
+        let params = BsdfParams { alpha: Rgb::splat(pair.slope), ..BsdfParams::default() };
+        let weight = arrival.throughput * difference * (node.inv_pdf / chance);
+        sink.bsdf(self.world.scene.shapes[s.shape as usize].bsdf, &params, weight);
     }
 
     fn node<S: AdjointSink>(&mut self, record: &PathRecord, k: usize, sink: &mut S) {
@@ -240,15 +262,10 @@ impl<'w> Differentiator<'w> {
         if parent.arrival.is_some() {
             let adjoint = theta * value * parent.inv_pdf;
             let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
-            let to_wi = self.scattering(
-                &from,
-                wo,
-                parent.wi,
-                adjoint,
-                self.behind(record, p),
-                &mut there,
-                sink,
-            );
+            let behind = self.behind(record, p);
+            let (wi, paired) = (parent.wi, parent.paired);
+            let to_wi =
+                self.scattering(&from, wo, wi, paired, adjoint, behind, &mut there, sink);
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
                 let g = turn(&(to_wi * self.share(record, k)), parent.wi, arrival.distance);
                 there.u -= g;
@@ -455,14 +472,15 @@ impl<'w> Differentiator<'w> {
     }
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
-    /// behind `wo`, by normals and by materials. Returns that by the direction `wi`, which is the
-    /// caller's.
+    /// behind `wo`, by normals and by materials, where its relative derivative by roughness has a part
+    /// that is `paired`, and not told here. Returns that by the direction `wi`, which is the caller's.
     #[allow(clippy::too_many_arguments)]
     fn scattering<S: AdjointSink>(
         &mut self,
         v: &Vertex,
         wo: Vec3,
         wi: Vec3,
+        paired: f64,
         adjoint: Rgb,
         behind: Option<Behind>,
         here: &mut SurfaceAdjoint,
@@ -482,8 +500,9 @@ impl<'w> Differentiator<'w> {
             Kind::Surface(s) => {
                 here.ns += d.ns * adjoint;
                 here.n += d.ng * adjoint;
-                if material && let Some(params) = &d.params {
-                    sink.bsdf(world.scene.shapes[s.shape as usize].bsdf, params, adjoint);
+                if material && let Some(mut params) = d.params {
+                    params.alpha -= d.value * paired;
+                    sink.bsdf(world.scene.shapes[s.shape as usize].bsdf, &params, adjoint);
                 }
             }
             _ => {
@@ -535,7 +554,7 @@ impl<'w> Differentiator<'w> {
             sum += c.f * rest;
             let light = &c.light;
             let to_wi =
-                self.scattering(vertex, -arrival.dir, light.w, theta * rest, behind, here, sink);
+                self.scattering(vertex, -arrival.dir, light.w, 0.0, theta * rest, behind, here, sink);
             let per_value = theta * c.f * c.transport;
             let path = Stretch {
                 start: vertex.x,

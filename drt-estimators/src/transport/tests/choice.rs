@@ -30,10 +30,11 @@ pub(crate) fn prepare(scene: &Scene, motion: &Parameter, depth: u32) -> (Prepare
         tangents::apply(scene, core::slice::from_ref(motion)).expect("a valid parameter");
     let mut kept = Kept::default();
     let world = World::new(scene, 0, Some(depth), None, Lit::Extended, &mut kept);
-    let world = world.expect("a valid scene");
+    let mut world = world.expect("a valid scene");
     let tangents = tangents.seen_by(0);
     let insides = inside::wholes(&world, &tangents, &[]);
     let motion = Motion::new(tangents, insides);
+    world.prepare_for_derivatives(motion.needs());
     let settings = Settings { estimator: EstimatorKind::Radiative, ..Settings::default() };
     let prepared = Prepared::new(world, &motion.interest, &[], &settings, Some(&motion));
     (prepared.expect("a valid scene"), motion)

@@ -4,6 +4,7 @@ mod changes;
 pub(crate) mod choice;
 mod factors;
 mod moving;
+mod pairs;
 mod records;
 mod replay;
 #[path = "../../../tests/common/mod.rs"]

@@ -1,0 +1,160 @@
+//! Pairs of directions between which light moves as a surface gets rougher.
+//!
+//! The density of microfacet normals m, per area of their slopes, is P(t) / α² with t = slope / α. Of a
+//! scattering, per solid angle of its microfacets, only that depends much on α, and at a fixed direction
+//!
+//! ```text
+//! a = ∂ ln (D cos⁴) / ∂α = (2/α) (e - 1) for Beckmann,  (2/α) (e - 1)/(e + 1) for GGX,    e = |t|².
+//! ```
+//!
+//! Slopes below α lose what those above gain. With p(e) the density of e, exp(-e) or 1/(1 + e)², the half of what
+//! is within e, M(e) = ∫ |a| p de from 0, is
+//!
+//! ```text
+//! (2/α) e exp(-e)    or    (2/α) e/(1 + e)²    for e < 1,
+//! ```
+//!
+//! less from there on. Every slope below α has a *counterpart* above, in the same azimuth, so that |a| p de is
+//! |a'| p' de', by M(e) + M(e') = M(1), both counted in the first form: e' grows from 1 on as e grows from 0.
+//!
+//! A value times the solid angle of directions, f(w) dw, is P(t) K(t) dt with a K that varies slowly. So
+//!
+//! ```text
+//! ∫ a f L dw = ∫ a P K L dt = ∫ s a P [K L - K' L'] dt,    K'/K = r f'/f,    r = (P / P') (dw'/dt') / (dw/dt),
+//! ```
+//!
+//! for any shares s + s' = 1 that a slope and its counterpart have in their difference. With
+//! s = |a'| / (|a| + |a'|), the balance heuristic, s |a| stays below 0.54 · 2/α, and vanishes for what has only just
+//! begun to be sampled. Without pairs a L alone stands for it, which has as much noise as L has, times 2/α.
+
+use drt_math::{Vec3, fm};
+
+use super::microfacet::Distribution;
+
+/// The direction that goes along with another one.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Counterpart {
+    /// Unit, away from the surface.
+    pub(crate) w: Vec3,
+    /// r: what the value there is multiplied by.
+    pub(crate) ratio: f64,
+    /// a of the given direction: what its value changes by, through the density of normals, relative to itself.
+    pub(crate) slope: f64,
+    /// s.
+    pub(crate) share: f64,
+}
+
+/// A microfacet's slope.
+#[derive(Clone, Copy, Debug)]
+struct Steepness {
+    /// e.
+    e: f64,
+    /// a α / 2.
+    slope: f64,
+    /// -ln P, but for a constant.
+    rarity: f64,
+}
+
+impl Counterpart {
+    /// Of the direction that `wo` leaves a microfacet in whose normal is `m`; `leave` gives that direction of any
+    /// normal, with its solid angle by that of the normals.
+    #[inline]
+    pub(super) fn new(
+        distribution: Distribution,
+        alpha: f64,
+        [wo, n, m]: [Vec3; 3],
+        leave: impl Fn(Vec3) -> Option<(Vec3, f64)>,
+    ) -> Option<Self> {
+        let cos = n.dot(m);
+        let across = m.reject(n);
+        let sin = across.length();
+        let tan = sin / (cos * alpha);
+        let own = distribution.steepness(tan * tan);
+        // No azimuth, or no light; `NaN` is neither.
+        if !(cos > 0.0 && tan > 0.0) {
+            return None;
+        }
+        let other = distribution.steepness(distribution.counterpart(own.e)?);
+        let other_m = (n + across * (alpha * fm::sqrt(other.e) / sin)).normalize();
+        let (_, angle) = leave(m)?;
+        let (w, other_angle) = leave(other_m)?;
+        // Solid angle of normals by area of slopes.
+        let other_cos = n.dot(other_m);
+        let cosines = other_cos / cos;
+        let cubed = cosines * cosines * cosines;
+        let ratio = fm::exp(other.rarity - own.rarity) * cubed * other_angle / angle;
+        let often = |s: &Steepness, m: Vec3, cos: f64| wo.dot(m) / (cos * s.slope.abs());
+        let (here, there) = (often(&own, m, cos), often(&other, other_m, other_cos));
+        let share = here / (here + there);
+        let slope = own.slope * 2.0 / alpha;
+        let found = ratio > 0.0 && ratio.is_finite() && share.is_finite();
+        found.then_some(Self { w, ratio, slope, share })
+    }
+}
+
+impl Distribution {
+    #[inline]
+    fn steepness(self, e: f64) -> Steepness {
+        match self {
+            Self::Beckmann => Steepness { e, slope: e - 1.0, rarity: e },
+            Self::Ggx => {
+                Steepness { e, slope: (e - 1.0) / (e + 1.0), rarity: 2.0 * fm::ln(1.0 + e) }
+            }
+        }
+    }
+
+    /// e' of an e, and e of an e'; none where it is so far off that nothing is left there.
+    #[inline]
+    fn counterpart(self, e: f64) -> Option<f64> {
+        match self {
+            Self::Beckmann => beckmann(e),
+            Self::Ggx => Some(ggx(e)),
+        }
+    }
+}
+
+/// Farthest counterpart in units of e, where D has long been below all that matters.
+const FARTHEST: f64 = 100.0;
+
+/// The other root of x exp(-x) = exp(-1) - e exp(-e) than the one on the side of e.
+#[inline]
+fn beckmann(e: f64) -> Option<f64> {
+    // With x = 1 + d it is d - ln(1 + d) = z.
+    let z = -fm::ln_1p(-e * fm::exp(1.0 - e));
+    if !(z < FARTHEST) || e > FARTHEST {
+        return None;
+    }
+    let s = fm::sqrt(2.0 * z);
+    let mut x = if e < 1.0 {
+        1.0 + s + z * (2.0 / 3.0)
+    } else if s < 1.5 {
+        1.0 - s + z * (2.0 / 3.0) - s * z * (1.0 / 18.0)
+    } else {
+        let c = fm::exp(-1.0 - z);
+        c * (1.0 + c)
+    };
+    for _ in 0..NEWTON {
+        let step = (x - 1.0 - fm::ln(x) - z) * x / (x - 1.0);
+        if !step.is_finite() {
+            break;
+        }
+        x -= step;
+        if step.abs() <= 1e-13 * x {
+            break;
+        }
+    }
+    (x > 0.0).then_some(x)
+}
+
+/// Steps of Newton's method, which needs three or four.
+const NEWTON: u32 = 8;
+
+/// The other root of x / (1 + x)² = 1/4 - e / (1 + e)² than the one on the side of e.
+#[inline]
+fn ggx(e: f64) -> f64 {
+    let q = (1.0 - e) / (1.0 + e);
+    // c = q²/4 on the right; sqrt(1 - 4c) is the root below.
+    let (twice, root) = (0.5 * q * q, 2.0 * fm::sqrt(e) / (1.0 + e));
+    let larger = 1.0 - twice + root;
+    if e < 1.0 { larger / twice } else { twice / larger }
+}
