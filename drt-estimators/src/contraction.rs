@@ -57,9 +57,8 @@ impl Motion {
                 MediumNeed::Nothing
             }
         };
-        let roughens = |tangents: &Vec<(usize, BsdfTangent)>| {
-            tangents.iter().any(|(_, t)| !t.alpha.is_zero())
-        };
+        let roughens =
+            |tangents: &Vec<(usize, BsdfTangent)>| tangents.iter().any(|(_, t)| !t.alpha.is_zero());
         Needs {
             media: self.tangents.media.iter().map(need).collect(),
             bsdfs: self.interest.bsdfs.clone(),

@@ -23,9 +23,15 @@
 //! ∫ a f L dw = ∫ a P K L dt = ∫ s a P [K L - K' L'] dt,    K'/K = r f'/f,    r = (P / P') (dw'/dt') / (dw/dt),
 //! ```
 //!
-//! for any shares s + s' = 1 that a slope and its counterpart have in their difference. With
-//! s = |a'| / (|a| + |a'|), the balance heuristic, s |a| stays below 0.54 · 2/α, and vanishes for what has only just
-//! begun to be sampled. Without pairs a L alone stands for it, which has as much noise as L has, times 2/α.
+//! for any shares s + s' = 1 that a slope and its counterpart have in their difference. Those here are the balance
+//! heuristic's, of slopes that are drawn as a direction wo sees them, in proportion to P (m·wo)/(m·n):
+//!
+//! ```text
+//! s = v / (v + v'),    v = (m·wo) / ((m·n) |a|),
+//! ```
+//!
+//! so that a direction is not asked for more than it is drawn. s |a| stays below 0.53 · 2/α where they are seen alike. By
+//! one direction alone, a L stands for all of it, which has the noise of L times 2/α.
 
 use drt_math::{Vec3, fm};
 
@@ -121,7 +127,8 @@ const FARTHEST: f64 = 100.0;
 fn beckmann(e: f64) -> Option<f64> {
     // With x = 1 + d it is d - ln(1 + d) = z.
     let z = -fm::ln_1p(-e * fm::exp(1.0 - e));
-    if !(z < FARTHEST) || e > FARTHEST {
+    let within = z < FARTHEST && e < FARTHEST;
+    if !within {
         return None;
     }
     let s = fm::sqrt(2.0 * z);

@@ -7,8 +7,8 @@ mod geometry;
 pub(crate) mod hold;
 pub(crate) mod importance;
 pub(crate) mod lights;
-pub(crate) mod record;
 pub(crate) mod pairs;
+pub(crate) mod record;
 pub(crate) mod scatter;
 #[cfg(all(test, feature = "std"))]
 pub(crate) mod tests;

@@ -1,21 +1,26 @@
 //! Rays beside those of a path, to which a rougher surface moves light.
 //!
-//! Let a path leave a rough surface along w with the density p, and C be what comes from there. By the roughness α,
-//! the value f changes mostly as the density of microfacet normals does, a f, where a is of the size of 1/α and as often
-//! negative as positive: a f C / p has the noise of C many times over. Each direction has a
-//! [counterpart](crate::surface::Counterpart) w', which gains what it loses, and
+//! Let a path leave a rough surface along w, of density p, and C be what comes from there. As the roughness α grows,
+//! the value f changes mostly as the density of microfacet normals does, by a f, where a is of the size of 1/α and
+//! as often negative as positive: a f C / p has the noise of C many times over. But each direction has a
+//! [counterpart](crate::surface::Counterpart) w', which gains what it loses, and with the symbols of that
 //!
 //! ```text
-//! ∫ a f C dw = E { s a [f C - r f' C'] / p }
+//! s a [f C - r f' C'] / p,
 //! ```
 //!
-//! compares what comes from the two. C' is found by a path of its own that has the random numbers of the first: in
-//! narrow lobes they see much the same, and the difference vanishes with α as 1/a does. What else of f
-//! changes with α, masking, is differentiated as it stands, and so is all of it where w has no counterpart, which is
-//! then not one itself. So are connections to lights; what scattering finds of these is weighted against
-//! connections, C by the density of w and C' by that of w'.
+//! of the same mean, compares what comes from the two. C' is found by a path of its own, with the random numbers of the
+//! first: in narrow lobes both see much the same, and their difference vanishes with α as 1/a does. (Pairs of paths with
+//! derivatives of opposite sign: Zhang et al. 2021, "Antithetic Sampling for Monte Carlo Differentiable
+//! Rendering". There the pair is mirrored, which serves what is odd, as derivatives by place are; by roughness they are
+//! even. That the two signs be sampled apart is from Zeltner et al. 2021, "Monte Carlo Estimators for Differential Light
+//! Transport".)
 //!
-//! Nothing here moves, and nothing has edges.
+//! What else of f changes with α, masking, is differentiated as it stands, and so is all of it where w has no
+//! counterpart: then it is not one itself. So are connections to lights. Where scattering finds a light it is weighted
+//! against connections as ever, C by the density of w and C' by that of w'.
+//!
+//! Nothing moves by this, so that edges have no part in it.
 
 use alloc::vec::Vec;
 
@@ -49,12 +54,12 @@ pub(crate) struct Pair {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pairs {
     list: Vec<Pair>,
-    /// For a choice.
+    /// For choosing among them; without it there are none.
     rng: Option<Rng>,
 }
 
 impl Pairs {
-    /// Forgets those of the last path. With random numbers for choices there will be others.
+    /// Forgets those of the last path. There are none of the next without random numbers to choose by.
     pub(crate) fn begin(&mut self, rng: Option<Rng>) {
         self.list.clear();
         self.rng = rng;
@@ -89,8 +94,12 @@ impl Pairs {
         Some(other.slope)
     }
 
-    /// Follows some of the other rays: tells `found` pairs, their probabilities, and r f' C'.
-    pub(crate) fn follow(&mut self, tracer: &mut Tracer<'_>, mut found: impl FnMut(&Pair, f64, Rgb)) {
+    /// Follows most of the other rays: tells `found` pairs, their probabilities, and r f' C'.
+    pub(crate) fn follow(
+        &mut self,
+        tracer: &mut Tracer<'_>,
+        mut found: impl FnMut(&Pair, f64, Rgb),
+    ) {
         let Some(rng) = &mut self.rng else { return };
         let own = tracer.rng.clone();
         let total: f64 = self.list.iter().map(Pair::weight).sum();

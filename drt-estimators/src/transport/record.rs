@@ -176,14 +176,7 @@ impl Observer for PathRecord {
         self.nodes.len() as u32 - 1
     }
 
-    fn scatter(
-        &mut self,
-        world: &World,
-        leaving: &Leaving,
-        value: Rgb,
-        inv_pdf: f64,
-        rng: &Rng,
-    ) {
+    fn scatter(&mut self, world: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
         let node = &mut self.nodes[leaving.node as usize];
         (node.wi, node.value, node.inv_pdf) = (leaving.dir, value, inv_pdf);
         node.paired = self.pairs.offer(world, node, leaving, rng).unwrap_or(0.0);

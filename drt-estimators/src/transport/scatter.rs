@@ -116,7 +116,7 @@ impl Scattering<'_> {
                     let mut params = BsdfParams::default();
                     params.scatter(&d.params, Rgb::splat(factor));
                     d.params = params;
-                    d.value = d.value * factor;
+                    d.value *= factor;
                 }
                 let params = Some(d.params);
                 let (value, wo, wi) = (d.value, d.wo, d.wi);

@@ -66,7 +66,8 @@ fn derivatives(bsdf: &Bsdf, wo: Vec3, ratio: impl Fn(f64) -> f64) -> [Moments; 2
 fn pairs_tell_the_derivative_by_the_roughness() {
     for bsdf in rough(0.3) {
         // Metal is black from behind.
-        let sides: &[f64] = if bsdf.is_transmissive() { &[20.0, 70.0, 140.0] } else { &[20.0, 70.0] };
+        let sides: &[f64] =
+            if bsdf.is_transmissive() { &[20.0, 70.0, 140.0] } else { &[20.0, 70.0] };
         for &degrees in sides {
             let wo = tilted(degrees);
             let z = |[whole, apart]: [Moments; 2]| {

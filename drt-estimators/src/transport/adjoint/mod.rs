@@ -25,6 +25,7 @@
 //! by the rays that found them.
 
 mod emitters;
+mod pairs;
 mod spatial;
 
 use alloc::vec::Vec;
@@ -34,14 +35,12 @@ use drt_medium::{Coefficients, DepthEstimate};
 
 use emitters::strength;
 
-use super::pairs::Pair;
 use super::record::PathRecord;
 use super::trace::Endpoint;
 use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, Interval, World, intervals};
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
-use crate::surface::BsdfParams;
 
 /// What has been collected for a vertex while its neighbours are processed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -136,26 +135,6 @@ impl<'w> Differentiator<'w> {
                 self.camera_ray(record, self.locals[0].at.u, self.turn, &self.sensor, sink)
             }
         }
-    }
-
-    /// Sends what a [pair](super::pairs) of the record that was swept last of a given `chance` tells, when `other` is r f' C'.
-    pub(crate) fn pair<S: AdjointSink>(
-        &self,
-        record: &PathRecord,
-        pair: &Pair,
-        chance: f64,
-        other: Rgb,
-        sink: &mut S,
-    ) {
-        let node = &record.nodes[pair.node];
-        let (Some(arrival), Some(s)) = (&node.arrival, node.vertex().and_then(Vertex::surface))
-        else {
-            return;
-        };
-        let difference = node.value * self.locals[pair.node].children - other;
-        let params = BsdfParams { alpha: Rgb::splat(pair.slope), ..BsdfParams::default() };
-        let weight = arrival.throughput * difference * (node.inv_pdf / chance);
-        sink.bsdf(self.world.scene.shapes[s.shape as usize].bsdf, &params, weight);
     }
 
     fn node<S: AdjointSink>(&mut self, record: &PathRecord, k: usize, sink: &mut S) {
@@ -264,8 +243,7 @@ impl<'w> Differentiator<'w> {
             let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
             let behind = self.behind(record, p);
             let (wi, paired) = (parent.wi, parent.paired);
-            let to_wi =
-                self.scattering(&from, wo, wi, paired, adjoint, behind, &mut there, sink);
+            let to_wi = self.scattering(&from, wo, wi, paired, adjoint, behind, &mut there, sink);
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
                 let g = turn(&(to_wi * self.share(record, k)), parent.wi, arrival.distance);
                 there.u -= g;
@@ -553,8 +531,16 @@ impl<'w> Differentiator<'w> {
             let rest = c.rest();
             sum += c.f * rest;
             let light = &c.light;
-            let to_wi =
-                self.scattering(vertex, -arrival.dir, light.w, 0.0, theta * rest, behind, here, sink);
+            let to_wi = self.scattering(
+                vertex,
+                -arrival.dir,
+                light.w,
+                0.0,
+                theta * rest,
+                behind,
+                here,
+                sink,
+            );
             let per_value = theta * c.f * c.transport;
             let path = Stretch {
                 start: vertex.x,
