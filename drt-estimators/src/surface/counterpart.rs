@@ -1,21 +1,21 @@
 //! Pairs of directions between which light moves as a surface gets rougher.
 //!
-//! The density of microfacet normals m, per area of their slopes, is P(t) / α² with t = slope / α. Of a
-//! scattering, per solid angle of its microfacets, only that depends much on α, and at a fixed direction
+//! The density of microfacet normals m, per area of their slopes, is D cos⁴ = P(t) / α² with t = slope / α. At fixed
+//! directions m is fixed, and a scattering answers to α mainly by that density (masking, the other part, does where
+//! it is grazed):
 //!
 //! ```text
 //! a = ∂ ln (D cos⁴) / ∂α = (2/α) (e - 1) for Beckmann,  (2/α) (e - 1)/(e + 1) for GGX,    e = |t|².
 //! ```
 //!
-//! Slopes below α lose what those above gain. With p(e) the density of e, exp(-e) or 1/(1 + e)², the half of what
-//! is within e, M(e) = ∫ |a| p de from 0, is
+//! Slopes below α lose what those above gain. With p(e) the density of e, exp(-e) or 1/(1 + e)², what is lost within e is
 //!
 //! ```text
-//! (2/α) e exp(-e)    or    (2/α) e/(1 + e)²    for e < 1,
+//! M(e) = -∫ a p de from 0 = (2/α) e exp(-e)    or    (2/α) e/(1 + e)²,
 //! ```
 //!
-//! less from there on. Every slope below α has a *counterpart* above, in the same azimuth, so that |a| p de is
-//! |a'| p' de', by M(e) + M(e') = M(1), both counted in the first form: e' grows from 1 on as e grows from 0.
+//! which rises up to e = 1 and falls back to 0, as nothing is lost in all. The *counterpart* e' > 1 of e < 1 is where
+//! the gain since 1 is the loss up to e, M(1) - M(e') = M(e), in the same azimuth: |a| p de = |a'| p' de'.
 //!
 //! A value times the solid angle of directions, f(w) dw, is P(t) K(t) dt with a K that varies slowly. So
 //!
@@ -30,10 +30,11 @@
 //! s = v / (v + v'),    v = (m·wo) / ((m·n) |a|),
 //! ```
 //!
-//! so that a direction is not asked for more than it is drawn. s |a| stays below 0.53 · 2/α where they are seen alike. By
-//! one direction alone, a L stands for all of it, which has the noise of L times 2/α.
+//! so that neither direction counts for more than it is drawn. Where both are seen alike, by the same (m·wo)/(m·n), s |a|
+//! stays below 0.53 · 2/α. Without pairs a L stands for all of it, with a standard deviation of 2/α times L even if L is
+//! the same everywhere.
 
-use drt_math::{Vec3, fm};
+use drt_math::{Real, Vec3, fm};
 
 use super::microfacet::Distribution;
 
@@ -119,14 +120,16 @@ impl Distribution {
     }
 }
 
-/// Farthest counterpart in units of e, where D has long been below all that matters.
+/// Farthest e and z; D has long been below all that matters.
 const FARTHEST: f64 = 100.0;
 
 /// The other root of x exp(-x) = exp(-1) - e exp(-e) than the one on the side of e.
 #[inline]
 fn beckmann(e: f64) -> Option<f64> {
-    // With x = 1 + d it is d - ln(1 + d) = z.
-    let z = -fm::ln_1p(-e * fm::exp(1.0 - e));
+    // With x = 1 + d it is d - ln(1 + d) = z = -ln(1 - e exp(1 - e)), without cancellation on either side.
+    let d = 1.0 - e;
+    let g = d + if Real::abs(d) < 0.5 { fm::ln_1p(-d) } else { fm::ln(e) };
+    let z = if g < -0.7 { -fm::ln_1p(-fm::exp(g)) } else { -fm::ln(-fm::exp_m1(g)) };
     let within = z < FARTHEST && e < FARTHEST;
     if !within {
         return None;

@@ -164,9 +164,11 @@ pub(crate) struct Leaving {
 }
 
 impl Leaving {
-    /// Another direction of a given density, nothing before which counts.
-    pub(crate) fn turned(&self, dir: Vec3, pdf: f64) -> Self {
-        Self { node: 0, dir, pdf: Some(pdf), throughput: Rgb::ONE, ..*self }
+    /// Another direction of a given density, whose light counts so many `times` for Russian roulette but is not
+    /// multiplied by anything.
+    pub(crate) fn turned(&self, dir: Vec3, pdf: f64, times: f64) -> Self {
+        let alive = Alive { value: self.alive.value * times, ..self.alive };
+        Self { node: 0, dir, pdf: Some(pdf), throughput: Rgb::ONE, alive, ..*self }
     }
 }
 

@@ -1,3 +1,5 @@
+use alloc::format;
+
 use drt_math::stats::Moments;
 
 use super::*;
@@ -67,7 +69,7 @@ fn pairs_tell_the_derivative_by_the_roughness() {
     for bsdf in rough(0.3) {
         // Metal is black from behind.
         let sides: &[f64] =
-            if bsdf.is_transmissive() { &[20.0, 70.0, 140.0] } else { &[20.0, 70.0] };
+            if bsdf.is_transmissive() { &[20.0, 70.0, 86.0, 140.0] } else { &[20.0, 70.0, 86.0] };
         for &degrees in sides {
             let wo = tilted(degrees);
             let z = |[whole, apart]: [Moments; 2]| {

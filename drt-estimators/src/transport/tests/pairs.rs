@@ -8,7 +8,7 @@ use super::scenes::*;
 use super::setup::{set, trace};
 use crate::contraction::Contraction;
 use crate::scene::Scene;
-use crate::surface::Bsdf;
+use crate::surface::{Bsdf, Distribution, RoughConductor};
 use crate::transport::pairs::Pair;
 use crate::transport::{Differentiator, Form, PathRecord, Tracer};
 
@@ -61,6 +61,19 @@ fn check(ball: Bsdf) {
 #[test]
 fn pairs_of_rays_from_metal() {
     check(metal());
+}
+
+/// In narrow lobes light is found by scattering as well as by connections.
+#[test]
+fn pairs_of_rays_from_narrow_lobes() {
+    let glossy = |alpha| match metal() {
+        Bsdf::RoughConductor(metal) => {
+            let distribution = Distribution::Beckmann;
+            Bsdf::RoughConductor(RoughConductor { alpha, distribution, ..metal })
+        }
+        other => other,
+    };
+    check(glossy(0.07));
 }
 
 #[test]
