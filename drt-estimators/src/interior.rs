@@ -16,9 +16,9 @@ use crate::transport::{Carriers, Differentiator, Form, PathRecord, Radiance, Tra
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
 pub(crate) const LINE_STREAM: u64 = 1 << 62;
-const PAIR_STREAM: u64 = 1 << 59;
 const FLUX_STREAM: u64 = 1 << 61;
 pub(crate) const SEQUENCE_STREAM: u64 = 1 << 60;
+const PAIR_STREAM: u64 = 1 << 59;
 /// Numbers of a sample that are spread evenly: image point, and the first vertices.
 pub(crate) const DIMENSIONS: u32 = SET_DIMENSIONS;
 
@@ -231,13 +231,9 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             let line = Rng::new(self.seed, LINE_STREAM | u64::from(pixel), unit);
             sink.begin();
             self.differentiator.differentiate(&self.record, s.slope, line, sink);
-            if !self.record.pairs.is_empty() {
-                let mut pairs = core::mem::take(&mut self.record.pairs);
-                pairs.follow(&mut self.tracer, |pair, chance, other| {
-                    self.differentiator.pair(&self.record, pair, chance, other, sink);
-                });
-                self.record.pairs = pairs;
-            }
+            self.record.pairs.follow(&mut self.tracer, |pair, chance, other| {
+                self.differentiator.pair(&self.record, pair, chance, other, sink);
+            });
             sink.finish(&mut values[1..=n]);
         }
         // Each kept apart goes to layers of its own, in the order of `AlongRays::terms`.

@@ -75,10 +75,6 @@ impl Pairs {
         self.rng = rng;
     }
 
-    pub(crate) fn is_empty(&self) -> bool {
-        self.list.is_empty()
-    }
-
     /// Adds that of a ray that leaves a node, if it has one. Returns a, of which it is then for the pair to tell.
     pub(crate) fn offer(
         &mut self,
@@ -116,12 +112,8 @@ impl Pairs {
     }
 
     /// Follows most of the other rays: tells `found` pairs, their probabilities, and r f' C'.
-    pub(crate) fn follow(
-        &mut self,
-        tracer: &mut Tracer<'_>,
-        mut found: impl FnMut(&Pair, f64, Rgb),
-    ) {
-        let Some(rng) = &mut self.rng else { return };
+    pub(crate) fn follow(&self, tracer: &mut Tracer<'_>, mut found: impl FnMut(&Pair, f64, Rgb)) {
+        let Some(mut rng) = self.rng.clone().filter(|_| !self.list.is_empty()) else { return };
         let own = tracer.rng.clone();
         let total: f64 = self.list.iter().map(|pair| pair.weight).sum();
         let mut choice = Choice { next: rng.next_f64(), total };

@@ -26,7 +26,6 @@ pub(crate) enum Scattering<'a> {
 
 /// The gradient of a scattering function.
 pub(crate) struct ScatteringGradient {
-    pub(crate) value: Rgb,
     pub(crate) wo: RgbVec,
     pub(crate) wi: RgbVec,
     /// With respect to the shading normal.
@@ -116,17 +115,14 @@ impl Scattering<'_> {
                     let mut params = BsdfParams::default();
                     params.scatter(&d.params, Rgb::splat(factor));
                     d.params = params;
-                    d.value *= factor;
                 }
                 let params = Some(d.params);
-                let (value, wo, wi) = (d.value, d.wo, d.wi);
-                ScatteringGradient { value, wo, wi, ns: d.n, ng: by_ng, g: 0.0, params }
+                ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, ng: by_ng, g: 0.0, params }
             }
             Self::Volume(phase) => {
                 let c = -wo.dot(wi);
                 let slope = Rgb::splat(-phase.d_cos(c));
                 ScatteringGradient {
-                    value: Rgb::splat(phase.eval(c)),
                     wo: slope.outer(wi),
                     wi: slope.outer(wo),
                     ns: RgbVec::ZERO,

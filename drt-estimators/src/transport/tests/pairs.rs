@@ -25,14 +25,11 @@ fn derivatives(scene: &Scene, paths: u32, other: impl Fn(&Pair, Rgb) -> Rgb) -> 
     for (seed, moments) in (20..).zip(&mut moments) {
         for i in 0..paths {
             let choices = (seed == 21).then(|| Rng::new(9, 1, i));
-            let with_pairs = choices.is_some();
             record.pairs.begin(choices);
             let slope = trace(&mut tracer, &mut record, seed, i);
             sink.clear();
             differentiator.differentiate(&record, slope, Rng::new(6, 0, i), &mut sink);
-            let mut pairs = core::mem::take(&mut record.pairs);
-            assert!(with_pairs || pairs.is_empty());
-            pairs.follow(&mut tracer, |pair, chance, light| {
+            record.pairs.follow(&mut tracer, |pair, chance, light| {
                 differentiator.pair(&record, pair, chance, other(pair, light), &mut sink);
             });
             moments.push(sink.rates[0].mean());
