@@ -1,7 +1,7 @@
 use drt_math::{Real, Rgb, Vec3, fm};
 
 use super::angles::{Angles, Slopes};
-use super::counterpart::Counterpart;
+use super::facet::Facet;
 use super::fresnel::{conductor_reflected, conductor_slopes};
 use super::microfacet::{Distribution, LEAST_ALPHA, mirrored};
 use super::property::{Property, Slot, SurfaceError, in_range, nonnegative};
@@ -117,13 +117,8 @@ impl RoughConductor {
     }
 
     #[inline]
-    pub(super) fn counterpart(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Counterpart> {
-        let leave = |m: Vec3| {
-            let (cos, w) = (m.dot(wo), mirrored(wo, m));
-            (cos > 0.0 && n.dot(w) > 0.0).then_some((w, 4.0 * cos))
-        };
-        let m = (wo + wi).normalize();
-        Counterpart::new(self.distribution, self.alpha, [wo, n, m], leave)
+    pub(super) fn facet(&self, directions: [Vec3; 3]) -> Facet {
+        Facet::new((self.distribution, self.alpha), directions, None)
     }
 
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {

@@ -36,6 +36,7 @@
 
 use drt_math::{Real, Vec3, fm};
 
+use super::facet::Facet;
 use super::microfacet::Distribution;
 
 /// The direction that goes along with another one.
@@ -63,30 +64,21 @@ struct Steepness {
 }
 
 impl Counterpart {
-    /// Of the direction that `wo` leaves a microfacet in whose normal is `m`; `leave` gives that direction of any
-    /// normal, with its solid angle by that of the normals.
-    #[inline]
-    pub(super) fn new(
-        distribution: Distribution,
-        alpha: f64,
-        [wo, n, m]: [Vec3; 3],
-        leave: impl Fn(Vec3) -> Option<(Vec3, f64)>,
-    ) -> Option<Self> {
-        let cos = n.dot(m);
-        let across = m.reject(n);
-        let sin = across.length();
-        let tan = sin / (cos * alpha);
-        let own = distribution.steepness(tan * tan);
+    pub(super) fn new(facet: &Facet) -> Option<Self> {
+        let Facet { distribution, alpha, wo, n, m, .. } = *facet;
+        let slope = facet.slope()?;
+        let own = distribution.steepness(slope.length_squared());
         // No azimuth, or no light; `NaN` is neither.
-        if !(cos > 0.0 && tan > 0.0) {
+        let sloping = own.e > 0.0;
+        if !sloping {
             return None;
         }
         let other = distribution.steepness(distribution.counterpart(own.e)?);
-        let other_m = (n + across * (alpha * fm::sqrt(other.e) / sin)).normalize();
-        let (_, angle) = leave(m)?;
-        let (w, other_angle) = leave(other_m)?;
+        let other_m = facet.tilted(slope * fm::sqrt(other.e / own.e));
+        let (_, angle) = facet.leave(m)?;
+        let (w, other_angle) = facet.leave(other_m)?;
         // Solid angle of normals by area of slopes.
-        let other_cos = n.dot(other_m);
+        let (cos, other_cos) = (n.dot(m), n.dot(other_m));
         let cosines = other_cos / cos;
         let cubed = cosines * cosines * cosines;
         let ratio = fm::exp(other.rarity - own.rarity) * cubed * other_angle / angle;

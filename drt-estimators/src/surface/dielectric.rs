@@ -1,7 +1,7 @@
 use drt_math::{Dual, Real, Rgb, Vec3, fm};
 
 use super::angles::{Angles, Slopes};
-use super::counterpart::Counterpart;
+use super::facet::Facet;
 use super::fresnel::{dielectric_reflected, dielectric_transmitted};
 use super::microfacet::{Distribution, LEAST_ALPHA, mirrored};
 use super::property::{Property, Slot, SurfaceError, in_range, nonnegative};
@@ -209,25 +209,17 @@ impl RoughDielectric {
         (reflects == (n.dot(w) > 0.0)).then_some(w)
     }
 
+    /// With the rate of its index by that of the material.
     #[inline]
-    pub(super) fn counterpart(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Counterpart> {
-        let (n, eta) = self.seen_from(wo, n)?;
-        let reflects = n.dot(wi) > 0.0;
-        let leave = |m: Vec3| {
-            let cos = m.dot(wo);
-            let (w, angle) = if reflects {
-                (mirrored(wo, m), 4.0 * cos)
-            } else {
-                let cos2 = cos2_refracted(cos, eta);
-                let cos_t = fm::sqrt(cos2.max(0.0));
-                let h = cos - eta * cos_t;
-                (m * (cos / eta - cos_t) - wo * (1.0 / eta), h * h / (eta * eta * cos_t))
-            };
-            (cos > 0.0 && angle.is_finite() && reflects == (n.dot(w) > 0.0)).then_some((w, angle))
+    pub(super) fn facet(&self, [wo, wi, n]: [Vec3; 3]) -> Option<(Facet, f64)> {
+        let (side, eta) = self.seen_from(wo, n)?;
+        let index = (side.dot(wi) < 0.0).then_some(eta);
+        let by_eta = match index {
+            None => 0.0,
+            Some(_) if side == n => 1.0,
+            Some(eta) => -eta * eta,
         };
-        let h = wo + wi * if reflects { 1.0 } else { eta };
-        let m = if n.dot(h) < 0.0 { -h } else { h };
-        Counterpart::new(self.distribution, self.alpha, [wo, n, m.normalize()], leave)
+        Some((Facet::new((self.distribution, self.alpha), [wo, wi, side], index), by_eta))
     }
 
     /// The normal on the side of a direction, and the index beyond over the one on that side.

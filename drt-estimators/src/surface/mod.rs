@@ -35,9 +35,11 @@ mod conductor;
 mod counterpart;
 mod dielectric;
 mod diffuse;
+mod facet;
 mod fresnel;
 mod lobes;
 mod microfacet;
+mod opposite;
 mod phong;
 mod property;
 #[cfg(test)]
@@ -54,8 +56,10 @@ pub use conductor::RoughConductor;
 pub(crate) use counterpart::Counterpart;
 pub use dielectric::RoughDielectric;
 pub use diffuse::Diffuse;
+use facet::Facet;
 pub(crate) use lobes::{Lobe, Lobes};
 pub use microfacet::Distribution;
+pub(crate) use opposite::{Odd, Opposite};
 pub use phong::Phong;
 pub use property::{Property, SurfaceError};
 
@@ -209,10 +213,22 @@ impl Bsdf {
     /// The [`Counterpart`] of `wi` as the surface gets rougher, if it has one.
     #[inline]
     pub(crate) fn counterpart(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Counterpart> {
+        Counterpart::new(&self.facet(wo, wi, n)?.0)
+    }
+
+    /// The [`Opposite`] of `wi` in its lobe, if it has one.
+    #[inline]
+    pub(crate) fn opposite(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Opposite> {
+        let (facet, by_eta) = self.facet(wo, wi, n)?;
+        Opposite::new(&facet, n, by_eta)
+    }
+
+    /// The microfacets that scatter so, and the rate of their index of refraction by that of the material.
+    fn facet(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<(Facet, f64)> {
         let (bsdf, n) = self.facing(wo, n);
         match bsdf {
-            Self::RoughConductor(b) => b.counterpart(wo, wi, n),
-            Self::RoughDielectric(b) => b.counterpart(wo, wi, n),
+            Self::RoughConductor(b) => Some((b.facet([wo, wi, n]), 0.0)),
+            Self::RoughDielectric(b) => b.facet([wo, wi, n]),
             _ => None,
         }
     }

@@ -5,7 +5,7 @@ use drt_math::stats::Moments;
 use super::*;
 
 /// Rough surfaces of both kinds.
-fn rough(alpha: f64) -> Vec<Bsdf> {
+pub(super) fn rough(alpha: f64) -> Vec<Bsdf> {
     let mut all = Vec::new();
     for distribution in [Distribution::Beckmann, Distribution::Ggx] {
         all.push(Bsdf::RoughConductor(copper(distribution, alpha)));

@@ -2,6 +2,7 @@
 
 mod changes;
 mod counterparts;
+mod opposites;
 mod energy;
 mod formulas;
 mod gradients;
