@@ -57,12 +57,14 @@ impl Motion {
                 MediumNeed::Nothing
             }
         };
-        let roughens =
-            |tangents: &Vec<(usize, BsdfTangent)>| tangents.iter().any(|(_, t)| !t.alpha.is_zero());
+        type Changes = Vec<(usize, BsdfTangent)>;
+        let roughens = |changes: &Changes| changes.iter().any(|(_, t)| !t.alpha.is_zero());
+        let bends = |changes: &Changes| changes.iter().any(|(_, t)| !t.eta.is_zero());
         Needs {
             media: self.tangents.media.iter().map(need).collect(),
             bsdfs: self.interest.bsdfs.clone(),
             roughness: self.tangents.bsdfs.iter().map(roughens).collect(),
+            index: self.tangents.bsdfs.iter().map(bends).collect(),
         }
     }
 

@@ -11,7 +11,8 @@ use crate::flux::{Flux, Reservoir};
 use crate::pixels::Sampler;
 use crate::radiative::{Edged, Look, Radiative};
 use crate::rendering::{Account, Counters, NonFinite, Term};
-use crate::sensitivity::{AdjointSink, Functional, Rate};
+use crate::sensitivity::{AdjointSink, Functional, Rate, SurfaceAdjoint};
+use crate::transport::pairs::Pairs;
 use crate::transport::{Carriers, Differentiator, Form, PathRecord, Radiance, Tracer, World};
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
@@ -30,6 +31,8 @@ pub(crate) struct AlongRays<'a> {
     /// Set in the spatial form.
     pub(crate) radiative: Option<&'a Radiative>,
     pub(crate) looks: Looks,
+    /// Pairs of rays tell how narrow lobes turn.
+    pub(crate) opposites: bool,
 }
 
 /// How often a path looks for edges.
@@ -159,9 +162,10 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         separate: bool,
     ) -> Self {
         let form = if along.radiative.is_some() { Form::Spatial } else { Form::Material };
-        let carriers = match (&sink, form) {
-            (Some(s), Form::Spatial) => s.interest().carriers(),
-            _ => Carriers::default(),
+        let movers = sink.as_ref().map_or_else(Carriers::default, |s| s.interest().carriers());
+        let carriers = match form {
+            Form::Spatial => movers.clone(),
+            Form::Material => Carriers::default(),
         };
         Self {
             world,
@@ -170,6 +174,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             tracer: Tracer::new(world),
             record: PathRecord {
                 flux: Reservoir::new(along.flux),
+                pairs: Pairs::new(along.opposites.then_some((movers, form))),
                 carriers,
                 ..PathRecord::default()
             },
@@ -247,7 +252,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                 sink.begin();
                 f.send(value, sink);
                 let [origin, turn] = [swept.origin, swept.turn].map(|v| value.outer(v));
-                self.differentiator.carry_back(&self.record, swept.node, origin, turn, sink);
+                let at = SurfaceAdjoint { u: origin, ..SurfaceAdjoint::default() };
+                self.differentiator.carry_back(&self.record, swept.node, at, turn, sink);
                 sink.finish(values);
             });
             self.record.flux = flux;
@@ -309,7 +315,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             }
         }
         let viewer = (e.viewer * share).outer(e.n);
-        self.differentiator.carry_back(&self.record, e.node, viewer, RgbVec::ZERO, sink);
+        let at = SurfaceAdjoint { u: viewer, ..SurfaceAdjoint::default() };
+        self.differentiator.carry_back(&self.record, e.node, at, RgbVec::ZERO, sink);
         sink.finish(&mut values[layer..layer + n]);
     }
 

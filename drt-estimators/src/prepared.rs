@@ -26,6 +26,8 @@ pub(crate) struct Prepared {
     pub(crate) sources: Vec<Source>,
     /// Image points come in mirrored pairs.
     pub(crate) antithetic: bool,
+    /// Rays in narrow lobes come in pairs, by the settings.
+    opposites: bool,
     /// Boundary samples of each kind to each sample of a pixel, by the settings alone.
     boundary_ratio: f64,
     /// Of the spatial form.
@@ -72,6 +74,7 @@ impl Prepared {
             edge_on,
             sources,
             antithetic,
+            opposites: settings.antithetic,
         })
     }
 
@@ -112,6 +115,7 @@ impl Prepared {
             boundary: Boundary::default(),
             radiative: Some(radiative),
             antithetic: false,
+            opposites: settings.antithetic,
             world,
             flux,
             edge_on,
@@ -127,6 +131,7 @@ impl Prepared {
             shadows: self.boundary.shadows.as_ref(),
             radiative: self.radiative.as_ref(),
             looks: self.looks,
+            opposites: self.opposites,
         }
     }
 

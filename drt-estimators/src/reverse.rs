@@ -118,6 +118,7 @@ fn gradient_of_share(
         media: interest.media.iter().map(need).collect(),
         bsdfs: interest.bsdfs.clone(),
         roughness: interest.bsdfs.clone(),
+        index: interest.bsdfs.clone(),
     });
     let prepared = Prepared::new(world, &interest, &insides.flux_shapes, settings, None)?;
     let run =

@@ -59,7 +59,7 @@ pub use diffuse::Diffuse;
 use facet::Facet;
 pub(crate) use lobes::{Lobe, Lobes};
 pub use microfacet::Distribution;
-pub(crate) use opposite::{Odd, Opposite};
+pub(crate) use opposite::{Opposite, Turn};
 pub use phong::Phong;
 pub use property::{Property, SurfaceError};
 

@@ -6,25 +6,21 @@
 //! H = h / (h·n) = n + τ. Then α² e = H² - 1, and
 //!
 //! ```text
-//! α² de = 2 H·dH = 2 [ (τ - τ² n)·dh / (h·n) - (1 + τ²) τ·dn ],      dh = dwo + η dwi + wi dη.
+//! d ln P = κ H·dH = κ [ (τ - τ² n)·dh / (h·n) - (1 + τ²) τ·dn ],      dh = dwo + η dwi + wi dη,
+//!
+//! κ = (2/α²) d ln P / de = -2/α² for Beckmann,  -4/(α² (1 + e)) for GGX.
 //! ```
 //!
-//! What is odd in τ is of the size of 1/α, and what one side of the lobe loses the other one gains. The *opposite* w' of a
-//! direction w is that of the microfacets with the slope -t. With functions of the pair in place of what differs little
-//! on its two sides, a bar over means of both,
+//! This is of the size of 1/α, and but for what stays bounded as α falls it is odd in τ: what one side of the lobe loses
+//! the other one gains. The *opposite* w' of a direction w is that of the microfacets with the slope -t. With b = d ln P at
+//! w, b' at w', and the values f and f', as for [counterparts](super::Counterpart)
 //!
 //! ```text
-//! d ln P = κ [ τ·(dwo + η dwi) ‾1/(h·n)‾ + τ·‾wi/(h·n)‾ dη - (1 + τ²) τ·dn ] + rest,      κ = (2/α²) d ln P / de,
+//! ∫ b f L dw = ∫ s [b f L + r b' f' L'] dw,      r = (dw'/dm') / (dw/dm),      s = (m·wo) / (m·wo + m'·wo),
 //! ```
 //!
-//! where the bracket changes its sign from w to w', and the rest does not grow as α falls. So the bracket, b, may be told by
-//! pairs: as for [counterparts](super::Counterpart),
-//!
-//! ```text
-//! ∫ b f L dw = ∫ s b [f L - r f' L'] dw,      r = (dw'/dm') / (dw/dm),      s = (m·wo) / (m·wo + m'·wo),
-//! ```
-//!
-//! and with L(w) times dwi(w) in place of L where wi turns.
+//! in which b and b' nearly cancel. Where dwi depends on what the light comes from, b is of that. When all vectors turn
+//! alike, b and b' vanish.
 
 use drt_math::Vec3;
 
@@ -40,12 +36,13 @@ pub(crate) struct Opposite {
     pub(crate) ratio: f64,
     /// s.
     pub(crate) share: f64,
-    pub(crate) odd: Odd,
+    /// b and b'.
+    pub(crate) turns: [Turn; 2],
 }
 
-/// b, of the given direction: a part of the logarithmic derivative of the scattering function.
+/// The part of the logarithmic derivative of a scattering function that is due to the density of microfacets.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Odd {
+pub(crate) struct Turn {
     /// By the direction `wo`.
     pub(crate) wo: Vec3,
     /// By the direction `wi`.
@@ -64,27 +61,28 @@ impl Opposite {
         let (_, angle) = facet.leave(facet.m)?;
         let (w, other_angle) = facet.leave(other_m)?;
         let [here, there] = [facet.m, other_m].map(|m| m.dot(facet.wo));
-        let ratio = other_angle / angle;
-        let eta = facet.index.unwrap_or(1.0);
-        let per_height = |wi: Vec3| 1.0 / (facet.wo + wi * eta).dot(facet.n);
-        let [own, other] = [facet.wi, w].map(per_height);
+        let (ratio, share) = (other_angle / angle, here / (here + there));
+        let side = if facet.n == n { 1.0 } else { -1.0 };
+        let turns = [(slope, facet.wi), (-slope, w)]
+            .map(|(slope, wi)| Turn::new(facet, slope, wi, [side, by_eta]));
+        let finite = share.is_finite() && turns.iter().all(|t| t.wo.is_finite());
+        (finite && ratio > 0.0 && ratio.is_finite()).then_some(Self { w, ratio, share, turns })
+    }
+}
+
+impl Turn {
+    fn new(facet: &Facet, slope: Vec3, wi: Vec3, [side, by_eta]: [f64; 2]) -> Self {
         let (alpha, e) = (facet.alpha, slope.length_squared());
         let steep = match facet.distribution {
-            Distribution::Beckmann => -1.0,
-            Distribution::Ggx => -2.0 / (1.0 + e),
+            Distribution::Beckmann => -2.0,
+            Distribution::Ggx => -4.0 / (1.0 + e),
         };
-        let tau = slope * alpha;
-        let pull = tau * (2.0 / (alpha * alpha) * steep);
-        let wo = pull * (0.5 * (own + other));
-        let side = if facet.n == n { 1.0 } else { -1.0 };
-        let odd = Odd {
-            wo,
-            wi: wo * eta,
-            n: pull * (-side * (1.0 + tau.length_squared())),
-            eta: by_eta * pull.dot(facet.wi * own + w * other) * 0.5,
-        };
-        let share = here / (here + there);
-        let found = ratio > 0.0 && ratio.is_finite() && share.is_finite() && wo.is_finite();
-        found.then_some(Self { w, ratio, share, odd })
+        let (tau, kappa) = (slope * alpha, steep / (alpha * alpha));
+        let tau2 = tau.length_squared();
+        let eta = facet.index.unwrap_or(1.0);
+        let height = (facet.wo + wi * eta).dot(facet.n);
+        let by_h = (tau - facet.n * tau2) * (kappa / height);
+        let n = tau * (-side * kappa * (1.0 + tau2));
+        Self { wo: by_h, wi: by_h * eta, n, eta: by_eta * by_h.dot(wi) }
     }
 }

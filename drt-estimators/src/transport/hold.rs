@@ -178,7 +178,7 @@ impl World {
         };
         let shape = s.shape as usize;
         if let Some(lamp) = self.lamp(shape) {
-            let width = self.scattering(viewer).map_or(1.0, |s| s.lobe_width());
+            let width = self.lobe_width(viewer);
             return Hold { share: lamp.share_in_lobes(viewer.x, width), slope: Vec3::ZERO };
         }
         let Some(bend) = self.holds.bends.get(shape).filter(|b| **b > 0.0) else {

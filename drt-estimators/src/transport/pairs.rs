@@ -30,28 +30,52 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Rng, Vec3};
 
-use super::record::{Node, Radiance};
-use super::trace::{Leaving, Tracer};
-use super::world::World;
-use crate::surface::Given;
+use super::adjoint::Form;
+use super::record::{Carriers, Node};
+use super::trace::{Arrival, Leaving, Observer, Tracer};
+use super::vertex::Vertex;
+use super::world::{Crossing, World};
+use crate::surface::{Given, Turn};
 
 /// Pairs that a path has at most, so that its cost does not grow with the square of its length; those of little weight are
 /// followed as seldom.
 const MOST: f64 = 8.0;
 
+/// The widest lobes, in radians, of which pairs tell how they turn: in wider ones what the two rays see differs too much
+/// for their cost.
+const NARROW: f64 = 0.2;
+
+/// A part of the logarithmic derivative of a scattering function that pairs tell.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Paired {
+    /// a, by the roughness.
+    pub(crate) alpha: f64,
+    pub(crate) turn: Turn,
+}
+
+/// What a pair tells.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Told {
+    /// a, by the roughness.
+    Roughness(f64),
+    /// b and b', by what turns the lobe.
+    Turns([Turn; 2]),
+}
+
 /// A ray beside that which leaves a node.
 #[derive(Clone, Debug)]
 pub(crate) struct Pair {
     pub(crate) node: usize,
+    pub(crate) told: Told,
+    /// s.
+    pub(crate) share: f64,
     /// The path's ray.
     leaving: Leaving,
     wo: Vec3,
     /// The other one's direction.
-    w: Vec3,
-    /// s a.
-    pub(crate) slope: f64,
+    pub(crate) w: Vec3,
     /// r f'.
-    value: Rgb,
+    pub(crate) value: Rgb,
     /// How many times f that is, at least 1.
     brighter: f64,
     /// Of the difference.
@@ -60,66 +84,131 @@ pub(crate) struct Pair {
     rng: Rng,
 }
 
+/// What the other ray of a pair brings.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Brought {
+    /// C'.
+    pub(crate) light: Rgb,
+    /// Where the ray ends, with the part of C' that comes from there: several where vertices are placed for lights as
+    /// well.
+    pub(crate) ends: Vec<(Arrival, Rgb)>,
+    /// Emitted by the next end, of which the walk tells first.
+    emitted: Rgb,
+    /// Segments to the ends.
+    first: u32,
+}
+
+impl Observer for Brought {
+    const RECORDS: bool = false;
+
+    fn contribution(&mut self, segments: u32, value: Rgb) {
+        self.light += value;
+        match self.ends.last_mut() {
+            Some((_, brought)) if segments > self.first => *brought += value,
+            _ => self.emitted += value,
+        }
+    }
+
+    fn arrive(&mut self, _world: &World, arrival: &Arrival, _crossings: &[Crossing]) -> u32 {
+        if arrival.parent == 0 {
+            self.ends.push((*arrival, core::mem::take(&mut self.emitted)));
+        }
+        1
+    }
+}
+
 /// The pairs of a path.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pairs {
     list: Vec<Pair>,
     /// For choosing among them; without it there are none.
     rng: Option<Rng>,
+    /// What moves and how, where pairs tell how lobes turn.
+    turning: Option<(Carriers, Form)>,
 }
 
 impl Pairs {
+    /// With what moves and how, where turning lobes are to be told by pairs.
+    pub(crate) fn new(turning: Option<(Carriers, Form)>) -> Self {
+        Self { turning, ..Self::default() }
+    }
+
     /// Forgets those of the last path. There are none of the next without random numbers to choose by.
     pub(crate) fn begin(&mut self, rng: Option<Rng>) {
         self.list.clear();
         self.rng = rng;
     }
 
-    /// Adds that of a ray that leaves a node, if it has one. Returns a, of which it is then for the pair to tell.
+    /// Adds those of a ray that leaves a node after a `viewer`. Returns what it is then for them to tell.
     pub(crate) fn offer(
         &mut self,
         world: &World,
-        node: &Node,
+        [viewer, node]: [&Node; 2],
         leaving: &Leaving,
         rng: &Rng,
-    ) -> Option<f64> {
-        if self.rng.is_none() || !world.roughens(&leaving.vertex) {
-            return None;
+    ) -> Paired {
+        let mut paired = Paired::default();
+        let rougher = world.roughens(&leaving.vertex);
+        let turns = self.turns(world, viewer, &leaving.vertex);
+        if self.rng.is_none() || !(rougher || turns) {
+            return paired;
         }
-        let arrival = node.arrival.as_ref()?;
-        let scattering = world.scattering(&leaving.vertex)?;
+        let (Some(arrival), Some(scattering)) = (&node.arrival, world.scattering(&leaving.vertex))
+        else {
+            return paired;
+        };
         let wo = -arrival.dir;
-        let other = scattering.counterpart(wo, leaving.dir)?;
-        let value = scattering.eval(wo, other.w) * other.ratio;
-        let slope = other.share * other.slope;
-        let (own, others) = (node.value.max_abs(), value.max_abs());
-        let brighter = if others > own && own > 0.0 { others / own } else { 1.0 };
-        // Also by f', as the one direction may be seen where the other hardly is.
-        let larger = f64::max(own, others);
-        let weight = arrival.throughput.max_abs() * node.inv_pdf * slope.abs() * larger;
-        self.list.push(Pair {
-            node: leaving.node as usize,
-            leaving: *leaving,
-            wo,
-            w: other.w,
-            slope,
-            value,
-            brighter,
-            weight,
-            rng: rng.clone(),
-        });
-        Some(other.slope)
+        let mut add = |told, size: f64, share, w, ratio: f64| {
+            let value = scattering.eval(wo, w) * ratio;
+            let (own, others) = (node.value.max_abs(), value.max_abs());
+            let brighter = if others > own && own > 0.0 { others / own } else { 1.0 };
+            // Also by f', as the one direction may be seen where the other hardly is.
+            let larger = f64::max(own, others);
+            let weight = arrival.throughput.max_abs() * node.inv_pdf * share * size * larger;
+            let (node, leaving, rng) = (leaving.node as usize, *leaving, rng.clone());
+            let pair = Pair { node, told, share, leaving, wo, w, value, brighter, weight, rng };
+            self.list.push(pair);
+        };
+        if rougher && let Some(c) = scattering.counterpart(wo, leaving.dir) {
+            add(Told::Roughness(c.slope), c.slope.abs(), c.share, c.w, c.ratio);
+            paired.alpha = c.slope;
+        }
+        if turns && let Some(o) = scattering.opposite(wo, leaving.dir) {
+            add(Told::Turns(o.turns), o.turns[0].n.length(), o.share, o.w, o.ratio);
+            paired.turn = o.turns[0];
+        }
+        paired
     }
 
-    /// Follows most of the other rays: tells `found` pairs, their probabilities, and r f' C'.
-    pub(crate) fn follow(&self, tracer: &mut Tracer<'_>, mut found: impl FnMut(&Pair, f64, Rgb)) {
+    /// Whether the lobe at `v` turns as parameters change.
+    fn turns(&self, world: &World, viewer: &Node, v: &Vertex) -> bool {
+        let Some((movers, form)) = &self.turning else { return false };
+        let moves = |v: &Vertex| {
+            v.surface().is_some_and(|s| movers.shapes.get(s.shape as usize) == Some(&true))
+        };
+        // Rays turn with the vertices they leave only where these stay on their matter.
+        let seen = || match viewer.vertex() {
+            Some(viewer) => *form == Form::Material && moves(viewer),
+            None => movers.camera,
+        };
+        (world.bends_light(v) || moves(v) || seen()) && world.lobe_width(v) < NARROW
+    }
+
+    /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring.
+    pub(crate) fn follow(
+        &self,
+        tracer: &mut Tracer<'_>,
+        mut found: impl FnMut(&Pair, f64, &Brought),
+    ) {
         let Some(mut rng) = self.rng.clone().filter(|_| !self.list.is_empty()) else { return };
         let own = tracer.rng.clone();
         let total: f64 = self.list.iter().map(|pair| pair.weight).sum();
         let mut choice = Choice { next: rng.next_f64(), total };
+        let mut brought = Brought::default();
         for pair in &self.list {
             if let Some(chance) = choice.takes(pair.weight) {
-                found(pair, chance, pair.follow(tracer));
+                pair.follow(tracer, &mut brought);
+                found(pair, chance, &brought);
             }
         }
         tracer.rng = own;
@@ -127,19 +216,18 @@ impl Pairs {
 }
 
 impl Pair {
-    /// r f' C'.
-    fn follow(&self, tracer: &mut Tracer<'_>) -> Rgb {
-        let Some(scattering) = tracer.world.scattering(&self.leaving.vertex) else {
-            return Rgb::ZERO;
-        };
+    /// Traces the other ray.
+    fn follow(&self, tracer: &mut Tracer<'_>, brought: &mut Brought) {
+        brought.ends.clear();
+        (brought.light, brought.emitted) = (Rgb::ZERO, Rgb::ZERO);
+        brought.first = self.leaving.segments + 1;
+        let Some(scattering) = tracer.world.scattering(&self.leaving.vertex) else { return };
         let pdf = scattering.pdf(self.wo, self.w, Given::Wo);
         if self.value.is_zero() || pdf.is_nan() || pdf <= 0.0 {
-            return Rgb::ZERO;
+            return;
         }
         tracer.rng = self.rng.clone();
-        let mut light = Radiance::default();
-        tracer.radiance_along(&self.leaving.turned(self.w, pdf, self.brighter), &mut light);
-        self.value * light.0
+        tracer.radiance_along(&self.leaving.turned(self.w, pdf, self.brighter), brought);
     }
 }
 

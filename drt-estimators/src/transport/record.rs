@@ -7,7 +7,7 @@ use core::ops::Range;
 use drt_math::{Rgb, Rng, Vec3};
 
 use super::hold::Hold;
-use super::pairs::Pairs;
+use super::pairs::{Paired, Pairs};
 use super::tow::{self, Tow};
 use super::trace::{Arrival, Connection, Endpoint, Leaving, Observer};
 use super::vertex::{Kind, Vertex};
@@ -33,8 +33,8 @@ pub(crate) struct Node {
     pub(crate) hold: Hold,
     /// What tows it, in the spatial form.
     pub(crate) tows: Range<usize>,
-    /// The part of its scattering's derivative by roughness, relative to the value, that a pair tells of.
-    pub(crate) paired: f64,
+    /// The part of its scattering's derivative, relative to the value, that pairs tell of.
+    pub(crate) paired: Paired,
 }
 
 impl Node {
@@ -93,7 +93,7 @@ impl PathRecord {
             carried: self.carriers.camera,
             hold: Hold::default(),
             tows: 0..0,
-            paired: 0.0,
+            paired: Paired::default(),
         });
     }
 
@@ -171,7 +171,7 @@ impl Observer for PathRecord {
             carried,
             hold,
             tows,
-            paired: 0.0,
+            paired: Paired::default(),
         });
         self.nodes.len() as u32 - 1
     }
@@ -179,7 +179,11 @@ impl Observer for PathRecord {
     fn scatter(&mut self, world: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
         let node = &mut self.nodes[leaving.node as usize];
         (node.wi, node.value, node.inv_pdf) = (leaving.dir, value, inv_pdf);
-        node.paired = self.pairs.offer(world, node, leaving, rng).unwrap_or(0.0);
+        let node = &self.nodes[leaving.node as usize];
+        let viewer = node.arrival.as_ref().map_or(0, |arrival| arrival.parent as usize);
+        let both = [&self.nodes[viewer], node];
+        let paired = self.pairs.offer(world, both, leaving, rng);
+        self.nodes[leaving.node as usize].paired = paired;
     }
 
     fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {

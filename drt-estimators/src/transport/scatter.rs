@@ -10,7 +10,7 @@
 use drt_math::{Real, Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Phase;
 
-use crate::surface::{Bsdf, BsdfParams, Counterpart, Given, Lobes};
+use crate::surface::{Bsdf, BsdfParams, Counterpart, Given, Lobes, Opposite};
 
 /// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.
 const FADE: f64 = 0.02;
@@ -138,6 +138,14 @@ impl Scattering<'_> {
     pub(crate) fn counterpart(&self, wo: Vec3, wi: Vec3) -> Option<Counterpart> {
         match self {
             Self::Surface { bsdf, ns, .. } => bsdf.counterpart(wo, wi, *ns),
+            Self::Volume(_) => None,
+        }
+    }
+
+    /// The [`Opposite`] of `wi`, if it has one.
+    pub(crate) fn opposite(&self, wo: Vec3, wi: Vec3) -> Option<Opposite> {
+        match self {
+            Self::Surface { bsdf, ns, .. } => bsdf.opposite(wo, wi, *ns),
             Self::Volume(_) => None,
         }
     }

@@ -111,6 +111,8 @@ pub(crate) struct Needs {
     pub(crate) bsdfs: Vec<bool>,
     /// Those whose roughness changes.
     pub(crate) roughness: Vec<bool>,
+    /// Those whose index of refraction changes.
+    pub(crate) index: Vec<bool>,
 }
 
 /// What tracking may skip in a medium.
@@ -278,6 +280,19 @@ impl World {
             let bsdf = self.scene.shapes[s.shape as usize].bsdf;
             self.needs.roughness.get(bsdf).copied().unwrap_or(false)
         })
+    }
+
+    /// True when a parameter changes the index of refraction of the surface at `v`.
+    pub(crate) fn bends_light(&self, v: &Vertex) -> bool {
+        v.surface().is_some_and(|s| {
+            let bsdf = self.scene.shapes[s.shape as usize].bsdf;
+            self.needs.index.get(bsdf).copied().unwrap_or(false)
+        })
+    }
+
+    /// About how wide the narrowest lobe at `v` is, in radians; at most 1.
+    pub(crate) fn lobe_width(&self, v: &Vertex) -> f64 {
+        self.scattering(v).map_or(1.0, |scattering| scattering.lobe_width())
     }
 
     /// Finds the medium beyond all interfaces and the one around the camera.

@@ -2,11 +2,11 @@
 
 mod changes;
 mod counterparts;
-mod opposites;
 mod energy;
 mod formulas;
 mod gradients;
 mod lobes;
+mod opposites;
 mod sampling;
 
 use alloc::boxed::Box;

@@ -30,6 +30,7 @@ use drt_medium::Coefficients;
 use emitters::strength;
 use segment::{Far, Stretch};
 
+use super::pairs::Paired;
 use super::record::PathRecord;
 use super::trace::Endpoint;
 use super::vertex::{Kind, Vertex};
@@ -45,12 +46,15 @@ struct Local {
     matter: RgbVec,
     /// C_k, the value of the children per unit of scattering.
     children: Rgb,
+    /// a_k R_k, its part of the parent's C.
+    brought: Rgb,
 }
 
 /// How the vertices of paths move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Form {
     /// With the material points they are, as their medium's inside and their surface do (2021 paper).
+    #[default]
     Material,
     /// With the rays, whose directions and distances stand still (2019 paper).
     Spatial,
@@ -204,6 +208,7 @@ impl<'w> Differentiator<'w> {
         let p = arrival.parent as usize;
         let value = arrival.arrival * received;
         self.locals[p].children += value;
+        self.locals[k].brought = value;
         // What nothing comes back from may still turn.
         let still = || here.is_zero() && self.locals[k].matter == RgbVec::ZERO;
         if value.is_zero() && (self.form == Form::Material || still()) {
@@ -227,7 +232,7 @@ impl<'w> Differentiator<'w> {
             let adjoint = theta * value * parent.inv_pdf;
             let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
             let behind = self.behind(record, p);
-            let (wi, paired) = (parent.wi, parent.value * parent.paired);
+            let (wi, paired) = (parent.wi, Some((&parent.paired, parent.value)));
             let to_wi = self.scattering(&from, wo, wi, paired, adjoint, behind, &mut there, sink);
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
                 let g = turn(&(to_wi * self.share(record, k)), parent.wi, arrival.distance);
@@ -291,15 +296,15 @@ impl<'w> Differentiator<'w> {
     }
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
-    /// behind `wo`, by normals and by materials, where its derivative by roughness has a part that is
-    /// `paired`, and not told here. Returns that by the direction `wi`, which is the caller's.
+    /// behind `wo`, by normals and by materials, but for the part of the logarithmic derivative of a value that is
+    /// `paired`. Returns that by the direction `wi`, which is the caller's.
     #[allow(clippy::too_many_arguments)]
     fn scattering<S: AdjointSink>(
         &mut self,
         v: &Vertex,
         wo: Vec3,
         wi: Vec3,
-        paired: Rgb,
+        paired: Option<(&Paired, Rgb)>,
         adjoint: Rgb,
         behind: Option<Behind>,
         here: &mut SurfaceAdjoint,
@@ -314,13 +319,21 @@ impl<'w> Differentiator<'w> {
         if adjoint.is_zero() || !(material || interest.sensor || geometry_moves(interest)) {
             return None;
         }
-        let d = world.scattering(v)?.gradient(wo, wi);
+        let mut d = world.scattering(v)?.gradient(wo, wi);
+        if let Some((paired, value)) = paired {
+            d.wo -= value.outer(paired.turn.wo);
+            d.wi -= value.outer(paired.turn.wi);
+            d.ns -= value.outer(paired.turn.n);
+            if let Some(params) = &mut d.params {
+                params.alpha -= value * paired.alpha;
+                params.eta -= value * paired.turn.eta;
+            }
+        }
         match &v.kind {
             Kind::Surface(s) => {
                 here.ns += d.ns * adjoint;
                 here.n += d.ng * adjoint;
-                if material && let Some(mut params) = d.params {
-                    params.alpha -= paired;
+                if material && let Some(params) = d.params {
                     sink.bsdf(world.scene.shapes[s.shape as usize].bsdf, &params, adjoint);
                 }
             }
@@ -376,7 +389,7 @@ impl<'w> Differentiator<'w> {
                 vertex,
                 -arrival.dir,
                 light.w,
-                Rgb::ZERO,
+                None,
                 theta * rest,
                 behind,
                 here,

@@ -1,31 +1,131 @@
-//! What [pairs](crate::transport::pairs) of rays tell of roughness.
+//! What [pairs](crate::transport::pairs) of rays tell.
 
-use drt_math::Rgb;
+use drt_math::{Rgb, RgbVec, Vec3};
 
-use super::Differentiator;
-use crate::sensitivity::AdjointSink;
-use crate::surface::BsdfParams;
-use crate::transport::pairs::Pair;
-use crate::transport::record::PathRecord;
+use super::{Differentiator, Form, send, turn};
+use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
+use crate::sensor::SensorGradient;
+use crate::surface::{BsdfParams, Turn};
+use crate::transport::pairs::{Brought, Pair, Told};
+use crate::transport::record::{Node, PathRecord};
+use crate::transport::trace::{Arrival, Endpoint};
 use crate::transport::vertex::Vertex;
 
 impl Differentiator<'_> {
-    /// Sends what a pair tells, which is looked at with a given `chance`; `other` is what its other ray brings,
-    /// r f' C'. The record is the one that was swept last.
+    /// Sends what a pair tells, which is looked at with a given `chance`. The record is the one that was swept last.
     pub(crate) fn pair<S: AdjointSink>(
         &self,
         record: &PathRecord,
         pair: &Pair,
         chance: f64,
-        other: Rgb,
+        other: &Brought,
         sink: &mut S,
     ) {
         let node = &record.nodes[pair.node];
         let surface = node.vertex().and_then(Vertex::surface);
         let (Some(arrival), Some(s)) = (&node.arrival, surface) else { return };
-        let difference = node.value * self.locals[pair.node].children - other;
-        let params = BsdfParams { alpha: Rgb::splat(pair.slope), ..BsdfParams::default() };
-        let weight = arrival.throughput * difference * (node.inv_pdf / chance);
-        sink.bsdf(self.world.scene.shapes[s.shape as usize].bsdf, &params, weight);
+        let each = arrival.throughput * (node.inv_pdf * pair.share / chance);
+        let [own, others] = [node.value, pair.value].map(|value| each * value);
+        let light = [own * self.locals[pair.node].children, others * other.light];
+        let params = match &pair.told {
+            Told::Roughness(slope) => {
+                let alpha = (light[0] - light[1]) * *slope;
+                BsdfParams { alpha, ..BsdfParams::default() }
+            }
+            Told::Turns(turns) => {
+                self.turned(record, pair, turns, light, [own, others], other, sink);
+                let eta = light[0] * turns[0].eta + light[1] * turns[1].eta;
+                BsdfParams { eta, ..BsdfParams::default() }
+            }
+        };
+        let bsdf = self.world.scene.shapes[s.shape as usize].bsdf;
+        if sink.interest().bsdfs[bsdf] {
+            sink.bsdf(bsdf, &params, Rgb::ONE);
+        }
     }
+
+    /// Sends what a lobe brings by its `turns` on either side, with so much `light`, each of them so many times what its ray
+    /// brings.
+    #[allow(clippy::too_many_arguments)]
+    fn turned<S: AdjointSink>(
+        &self,
+        record: &PathRecord,
+        pair: &Pair,
+        turns: &[Turn; 2],
+        light: [Rgb; 2],
+        times: [Rgb; 2],
+        other: &Brought,
+        sink: &mut S,
+    ) {
+        let k = pair.node;
+        let (node, Some(b)) = (&record.nodes[k], self.behind(record, k)) else { return };
+        let Some(vertex) = node.vertex() else { return };
+        let both =
+            |of: fn(&Turn) -> Vec3| light[0].outer(of(&turns[0])) + light[1].outer(of(&turns[1]));
+        let mut here = SurfaceAdjoint { ns: both(|t| t.n), ..SurfaceAdjoint::default() };
+        let own = |c: &Node| c.arrival.as_ref().is_some_and(|a| a.parent as usize == k);
+        for (c, child) in record.nodes.iter().enumerate().skip(k + 1).filter(|(_, c)| own(c)) {
+            let Some(end) = &child.arrival else { continue };
+            let light = times[0] * self.locals[c].brought;
+            here.u -= self.turn_end(end, self.share(record, c), light.outer(turns[0].wi), sink);
+        }
+        for (end, brought) in &other.ends {
+            let share = match (self.form, &end.end) {
+                (Form::Material, _) => 1.0,
+                (Form::Spatial, Endpoint::Surface(v) | Endpoint::Volume(v, _)) => {
+                    self.world.hold(vertex, v, end.dir, end.distance).share
+                }
+                (Form::Spatial, Endpoint::Environment) => 0.0,
+            };
+            let light = times[1] * *brought;
+            here.u -= self.turn_end(end, share, light.outer(turns[1].wi), sink);
+        }
+        let wo = node.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
+        let to_wo = both(|t| t.wo);
+        let g = turn(&(to_wo * b.share), wo, b.distance);
+        let viewer = &record.nodes[b.parent];
+        match self.form {
+            Form::Material => {
+                here.u -= g;
+                send(vertex, &here, sink);
+                match viewer.vertex() {
+                    Some(viewer) => send(viewer, &of_place(g), sink),
+                    None if sink.interest().sensor => {
+                        sink.sensor(&[g.r, g.g, g.b].map(|position| SensorGradient {
+                            position,
+                            ..SensorGradient::default()
+                        }))
+                    }
+                    None => {}
+                }
+            }
+            Form::Spatial => {
+                send(vertex, &of_place(-g), sink);
+                self.carry_back(record, k, here, RgbVec::ZERO, sink);
+                // Only the camera's ray turns by itself.
+                let turn = if b.parent == 0 { to_wo * (b.share - 1.0) } else { RgbVec::ZERO };
+                self.carry_back(record, b.parent, of_place(g), turn, sink);
+            }
+        }
+    }
+
+    /// Turns a ray to where it ends, as far as that moves by itself; returns what the other end loses.
+    fn turn_end<S: AdjointSink>(
+        &self,
+        end: &Arrival,
+        share: f64,
+        to_wi: RgbVec,
+        sink: &mut S,
+    ) -> RgbVec {
+        let (Endpoint::Surface(vertex) | Endpoint::Volume(vertex, _)) = &end.end else {
+            return RgbVec::ZERO;
+        };
+        let g = turn(&(to_wi * share), end.dir, end.distance);
+        send(vertex, &of_place(g), sink);
+        g
+    }
+}
+
+fn of_place(u: RgbVec) -> SurfaceAdjoint {
+    SurfaceAdjoint { u, ..SurfaceAdjoint::default() }
 }

@@ -113,16 +113,17 @@ impl Differentiator<'_> {
         [near, turn]
     }
 
-    /// Sends the sensitivities to the velocity of the ray that left `node` and to the rate of its direction.
+    /// Sends the sensitivities of a `node`, by its place to the velocity of the ray that left it, and to the rate of that
+    /// ray's direction.
     pub(crate) fn carry_back<S: AdjointSink>(
         &self,
         record: &PathRecord,
         node: usize,
-        origin: RgbVec,
+        mut here: SurfaceAdjoint,
         turn: RgbVec,
         sink: &mut S,
     ) {
-        let (mut k, mut u, mut turn) = (node, origin, turn);
+        let (mut k, mut turn) = (node, turn);
         loop {
             let node = &record.nodes[k];
             if !node.carried {
@@ -130,29 +131,29 @@ impl Differentiator<'_> {
             }
             let Some(arrival) = &node.arrival else { break };
             if let Some(Vertex { kind: Kind::Surface(point), .. }) = node.vertex() {
-                let here = SurfaceAdjoint { u, ..SurfaceAdjoint::default() };
                 let (dir, none) = (arrival.dir, RgbVec::ZERO);
                 let free = 1.0 - node.hold.share;
                 let (back, lift) = split(self.world, point, dir, free, &here, none, Rgb::ZERO);
                 if sink.interest().shapes[point.shape as usize] {
                     sink.surface(&point.material(), &lift);
                 }
-                u = back;
+                here = SurfaceAdjoint { u: back, ..SurfaceAdjoint::default() };
             } else if let Some(vertex) = node.vertex() {
-                let held = u * node.hold.share;
+                let held = here.u * node.hold.share;
                 send(vertex, &SurfaceAdjoint { u: held, ..SurfaceAdjoint::default() }, sink);
-                u -= held;
+                here.u -= held;
             }
-            turn = u * arrival.distance;
+            let u = &mut here.u;
+            turn = *u * arrival.distance;
             let along = u.dot(arrival.dir);
             for tow in &record.tows[node.tows.clone()] {
                 let g = pull(tow, arrival.dir, along * tow.share, sink);
-                u -= g;
+                *u -= g;
                 turn -= g * tow.distance;
             }
             k = arrival.parent as usize;
         }
-        self.camera_ray(record, u, turn, &Default::default(), sink);
+        self.camera_ray(record, here.u, turn, &Default::default(), sink);
     }
 
     /// Sends the sensitivities to the camera ray's origin and to the rate of its direction, besides what

@@ -1,25 +1,38 @@
-//! Derivatives by roughness from pairs of rays, against those along single ones.
+//! Derivatives from pairs of rays, against those along single ones.
 
+use drt_math::Rng;
 use drt_math::stats::Moments;
-use drt_math::{Rgb, Rng};
+use drt_motion::Parameter;
 
 use super::choice::prepare;
 use super::scenes::*;
-use super::setup::{set, trace};
+use super::setup::{motion, set, trace};
 use crate::contraction::Contraction;
+use crate::emitter::Emitter;
 use crate::scene::Scene;
-use crate::surface::{Bsdf, Distribution, RoughConductor};
-use crate::transport::pairs::Pair;
+use crate::surface::{Bsdf, Distribution, RoughConductor, RoughDielectric};
+use crate::transport::pairs::{Brought, Pair, Pairs, Told};
 use crate::transport::{Differentiator, Form, PathRecord, Tracer};
 
-/// The derivative of all light of lamps and the sky by the roughness of the ball: along single rays, and from pairs whose other
-/// ray brings what `other` makes of it.
-fn derivatives(scene: &Scene, paths: u32, other: impl Fn(&Pair, Rgb) -> Rgb) -> [Moments; 2] {
-    let (prepared, motion) = prepare(scene, &set("alpha", "ball-bsdf", "alpha", grey(1.0)), 5);
+/// The interior derivative of all light of lamps and the sky: along single rays, and from pairs whose other ray brings what
+/// `other` makes of it.
+fn derivatives(
+    scene: &Scene,
+    parameter: &Parameter,
+    form: Form,
+    paths: u32,
+    other: impl Fn(&Pair, &mut Brought),
+) -> [Moments; 2] {
+    let (prepared, motion) = prepare(scene, parameter, 5);
     let world = &prepared.world;
     let mut tracer = Tracer::new(world);
-    let mut record = PathRecord::default();
-    let mut differentiator = Differentiator::new(world, Form::Material);
+    let movers = motion.interest.carriers();
+    let mut record = PathRecord {
+        pairs: Pairs::new(Some((movers.clone(), form))),
+        carriers: if form == Form::Spatial { movers } else { Default::default() },
+        ..PathRecord::default()
+    };
+    let mut differentiator = Differentiator::new(world, form);
     let mut sink = Contraction::new(world, &motion);
     let mut moments = [Moments::default(); 2];
     for (seed, moments) in (20..).zip(&mut moments) {
@@ -29,8 +42,10 @@ fn derivatives(scene: &Scene, paths: u32, other: impl Fn(&Pair, Rgb) -> Rgb) -> 
             let slope = trace(&mut tracer, &mut record, seed, i);
             sink.clear();
             differentiator.differentiate(&record, slope, Rng::new(6, 0, i), &mut sink);
-            record.pairs.follow(&mut tracer, |pair, chance, light| {
-                differentiator.pair(&record, pair, chance, other(pair, light), &mut sink);
+            record.pairs.follow(&mut tracer, |pair, chance, brought| {
+                let mut brought = brought.clone();
+                other(pair, &mut brought);
+                differentiator.pair(&record, pair, chance, &brought, &mut sink);
             });
             moments.push(sink.rates[0].mean());
         }
@@ -43,16 +58,94 @@ fn z([single, pairs]: [Moments; 2]) -> f64 {
     (single.mean() - pairs.mean()) / f64::sqrt(variance)
 }
 
+fn dimmed(brought: &mut Brought, by: f64) {
+    brought.light *= by;
+    brought.ends.iter_mut().for_each(|(_, light)| *light *= by);
+}
+
 fn check(ball: Bsdf) {
     let scene = surfaces(ball, twosided(phong()));
-    let fair = derivatives(&scene, 400_000, |_, light| light);
+    let rougher = set("alpha", "ball-bsdf", "alpha", grey(1.0));
+    let find = |other: &dyn Fn(&Pair, &mut Brought)| {
+        derivatives(&scene, &rougher, Form::Material, 400_000, other)
+    };
+    let fair = find(&|_, _| {});
     assert!(z(fair).abs() < 4.0, "{fair:?}");
     // Planted: one of the sides is too dark.
-    let faulty = derivatives(&scene, 400_000, |pair, light| match pair.slope < 0.0 {
-        true => light * 0.75,
-        false => light,
+    let faulty = find(&|pair, brought| {
+        if matches!(pair.told, Told::Roughness(slope) if slope < 0.0) {
+            dimmed(brought, 0.75);
+        }
     });
     assert!(z(faulty).abs() > 5.0, "{faulty:?}");
+}
+
+fn narrow(bsdf: Bsdf, alpha: f64) -> Bsdf {
+    let distribution = Distribution::Beckmann;
+    match bsdf {
+        Bsdf::RoughConductor(b) => {
+            Bsdf::RoughConductor(RoughConductor { alpha, distribution, ..b })
+        }
+        Bsdf::RoughDielectric(b) => {
+            Bsdf::RoughDielectric(RoughDielectric { alpha, distribution, ..b })
+        }
+        other => other,
+    }
+}
+
+/// By what turns the lobes of the ball, with much less noise.
+fn turned(ball: Bsdf, parameter: &Parameter, form: Form) {
+    let scene = surfaces(narrow(ball, 0.05), twosided(phong()));
+    let find =
+        |other: &dyn Fn(&Pair, &mut Brought)| derivatives(&scene, parameter, form, 200_000, other);
+    let fair = find(&|_, _| {});
+    let [single, pairs] = fair.map(|m| m.variance_of_mean());
+    println!("{form:?}, {}: {:.2} {:.2}", parameter.name, z(fair), pairs / single);
+    assert!(z(fair).abs() < 4.0, "{fair:?}");
+    // What glass lets through has rare, large samples in the spatial form.
+    let tails = form == Form::Spatial && scene.bsdfs[0].item.is_transmissive();
+    assert!(tails || pairs < 0.5 * single, "{fair:?}");
+    // Planted: the one side of the lobe is dark.
+    let faulty = find(&|pair, brought| {
+        if matches!(&pair.told, Told::Turns([turn, _]) if turn.n.x + turn.eta < 0.0) {
+            dimmed(brought, 0.0);
+        }
+    });
+    assert!(z(faulty).abs() > 5.0, "{faulty:?}");
+}
+
+#[test]
+fn pairs_of_rays_tell_how_lobes_turn() {
+    for form in [Form::Material, Form::Spatial] {
+        turned(metal(), &motion("ball", "shifts", shift()), form);
+        turned(glass(), &motion("ball", "shifts", shift()), form);
+    }
+}
+
+#[test]
+fn pairs_of_rays_tell_how_glass_bends_light() {
+    turned(glass(), &set("eta", "ball-bsdf", "eta", grey(0.1)), Form::Material);
+}
+
+/// When all turns together no path changes, and neither do pairs, whose rays turn to different ends.
+#[test]
+fn pairs_of_rays_turn_with_everything() {
+    for ball in [metal(), glass()] {
+        let mut scene = surfaces(narrow(ball, 0.05), twosided(phong()));
+        // The sky stays where it is.
+        scene.emitters.retain(|e| !matches!(e.item.emitter, Emitter::Constant { .. }));
+        let all = ["ball", "floor", "lamp", "camera"].map(|id| moves(id, turn()));
+        let all = parameter("all turns", 0.0, all.to_vec());
+        let find = |other: &dyn Fn(&Pair, &mut Brought)| {
+            derivatives(&scene, &all, Form::Material, 20_000, other)
+        };
+        let size = |m: &Moments| f64::sqrt(m.mean() * m.mean() + m.variance_of_mean());
+        let [single, pairs] = find(&|_, _| {}).map(|m| size(&m));
+        // Planted: the other rays end nowhere.
+        let [_, faulty] = find(&|_, brought| brought.ends.clear()).map(|m| size(&m));
+        println!("{single:e} {pairs:e} {faulty:e}");
+        assert!(single < 1e-9 && pairs < 1e-9 && faulty > 1e-4);
+    }
 }
 
 #[test]
@@ -63,14 +156,7 @@ fn pairs_of_rays_from_metal() {
 /// In narrow lobes light is found by scattering as well as by connections.
 #[test]
 fn pairs_of_rays_from_narrow_lobes() {
-    let glossy = |alpha| match metal() {
-        Bsdf::RoughConductor(metal) => {
-            let distribution = Distribution::Beckmann;
-            Bsdf::RoughConductor(RoughConductor { alpha, distribution, ..metal })
-        }
-        other => other,
-    };
-    check(glossy(0.07));
+    check(narrow(metal(), 0.07));
 }
 
 #[test]
