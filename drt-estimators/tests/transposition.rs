@@ -7,6 +7,7 @@ use common::pairing::{pair, targets};
 use common::*;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
+use drt_estimators::surface::Bsdf;
 use drt_estimators::{EstimatorKind, InsideKind, Scene, Session, Settings, Unattended, gradient};
 use drt_geom::procedural;
 use drt_math::{Rgb, Rng, ValueChange, Vec3, vec3};
@@ -119,6 +120,29 @@ fn surfaces_everything_at_once() {
         changes("camera", "fov", grey(3.0)),
     ]);
     agree("everything", &scene, effects, &settings());
+}
+
+/// In narrow lobes, where pairs of rays tell of what turns.
+#[test]
+fn narrow_lobes_everything_at_once() {
+    let mut metal = metal();
+    let mut glass = glass();
+    if let Bsdf::RoughConductor(b) = &mut metal {
+        b.alpha = 0.08;
+    }
+    if let Bsdf::RoughDielectric(b) = &mut glass {
+        b.alpha = 0.08;
+    }
+    for ball in [metal, glass] {
+        let scene = surfaces(ball, diffuse(0.6, 0.5, 0.4));
+        let mut effects = wobbles(&scene);
+        effects.extend([
+            changes("ball-bsdf", "alpha", grey(0.3)),
+            changes("ball-bsdf", "eta", grey(0.2)),
+            moves("camera", turn()),
+        ]);
+        agree("narrow", &scene, effects, &settings());
+    }
 }
 
 #[test]

@@ -1,4 +1,6 @@
-//! Rays beside those of a path, to which a rougher surface moves light.
+//! Rays beside those of a path, to which a rougher or turning surface moves light.
+//!
+//! # Roughness
 //!
 //! Let a path leave a rough surface along w, of density p, and C be what comes from there. As the roughness α grows,
 //! the value f changes mainly as the density of microfacet normals does, by a f, where a is of the size of 1/α and of
@@ -15,16 +17,32 @@
 //! Where C is smooth the difference vanishes with α as 1/a does; where it has an edge, only how often it does not
 //! vanish.
 //!
-//! Pairs of paths with derivatives of opposite sign are from Zhang et al. 2021, "Antithetic Sampling for Monte Carlo
-//! Differentiable Rendering". Those are mirrored, which serves what is odd, as derivatives by place are; by roughness they
-//! are even. Zeltner et al. 2021, "Monte Carlo Estimators for Differential Light Transport", sample the two signs apart;
-//! here they are paired.
+//! # Lobes that turn
 //!
-//! What else of f changes with α, masking, is differentiated as it stands, and so is all of it where w has no
-//! counterpart: then it is not one itself. So are connections to lights. Where scattering finds a light it is weighted
+//! With a surface, with the ray that meets it, or with the index of refraction the lobe turns, and f changes by b f, b again
+//! of the size of 1/α. What one side of the lobe loses the other one gains, so the ray beside is the
+//! [opposite](crate::surface::Opposite) one, and b f C / p is replaced by
+//!
+//! ```text
+//! s [b f C + r b' f' C'] / p.
+//! ```
+//!
+//! b has parts by wo, wi, the normal and the index. The first two turn with the ends of their rays, as far as these stay
+//! on their matter: what w' meets is not what w meets, so that C' is kept by where it comes from. Each of the two keeps
+//! its own b, with which a path that turns as a whole does not change at all, and neither does its pair.
+//!
+//! # Both
+//!
+//! Pairs of paths with derivatives of opposite sign are from Zhang et al. 2021, "Antithetic Sampling for Monte Carlo
+//! Differentiable Rendering", who mirror whole paths; derivatives by roughness are even and take other counterparts.
+//! Zeltner et al. 2021, "Monte Carlo Estimators for Differential Light Transport", sample the two signs apart; here they
+//! are paired.
+//!
+//! What else of f changes, masking and Fresnel's factor, is differentiated as it stands, and so is all of it where w has no
+//! ray beside it: then it is not one itself. So are connections to lights. Where scattering finds a light it is weighted
 //! against connections as ever, C by the density of w and C' by that of w'.
 //!
-//! Nothing moves by this, so that edges have no part in it.
+//! The interior term alone is told so, and has the same mean: edges have no part in it.
 
 use alloc::vec::Vec;
 
@@ -37,13 +55,13 @@ use super::vertex::Vertex;
 use super::world::{Crossing, World};
 use crate::surface::{Given, Turn};
 
-/// Pairs that a path has at most, so that its cost does not grow with the square of its length; those of little weight are
-/// followed as seldom.
+/// Pairs of each kind that a path has at most, so that its cost does not grow with the square of its length; those of
+/// little weight are followed as seldom.
 const MOST: f64 = 8.0;
 
 /// The widest lobes, in radians, of which pairs tell how they turn: in wider ones what the two rays see differs too much
 /// for their cost.
-const NARROW: f64 = 0.2;
+const NARROW: f64 = 0.15;
 
 /// A part of the logarithmic derivative of a scattering function that pairs tell.
 #[derive(Clone, Copy, Debug, Default)]
@@ -60,6 +78,15 @@ pub(crate) enum Told {
     Roughness(f64),
     /// b and b', by what turns the lobe.
     Turns([Turn; 2]),
+}
+
+impl Told {
+    fn kind(&self) -> usize {
+        match self {
+            Self::Roughness(_) => 0,
+            Self::Turns(_) => 1,
+        }
+    }
 }
 
 /// A ray beside that which leaves a node.
@@ -202,11 +229,14 @@ impl Pairs {
     ) {
         let Some(mut rng) = self.rng.clone().filter(|_| !self.list.is_empty()) else { return };
         let own = tracer.rng.clone();
-        let total: f64 = self.list.iter().map(|pair| pair.weight).sum();
-        let mut choice = Choice { next: rng.next_f64(), total };
+        let mut totals = [0.0; 2];
+        for pair in &self.list {
+            totals[pair.told.kind()] += pair.weight;
+        }
+        let mut choices = totals.map(|total| Choice { next: rng.next_f64(), total });
         let mut brought = Brought::default();
         for pair in &self.list {
-            if let Some(chance) = choice.takes(pair.weight) {
+            if let Some(chance) = choices[pair.told.kind()].takes(pair.weight) {
                 pair.follow(tracer, &mut brought);
                 found(pair, chance, &brought);
             }

@@ -282,11 +282,11 @@ impl World {
         })
     }
 
-    /// True when a parameter changes the index of refraction of the surface at `v`.
+    /// True when a parameter changes how the surface at `v` refracts.
     pub(crate) fn bends_light(&self, v: &Vertex) -> bool {
         v.surface().is_some_and(|s| {
             let bsdf = self.scene.shapes[s.shape as usize].bsdf;
-            self.needs.index.get(bsdf).copied().unwrap_or(false)
+            self.needs.index.get(bsdf) == Some(&true) && self.bsdf_of(s.shape).is_transmissive()
         })
     }
 
