@@ -64,7 +64,7 @@ pub struct Settings {
     /// Path depth; `None` takes the scene's, `Some(None)` is unlimited.
     pub max_depth: Option<Option<u32>>,
     /// Image points in pairs mirrored at the pixel's centre (theory: 2021 paper, §5.4), and rays in pairs
-    /// mirrored in narrow lobes that turn.
+    /// mirrored in narrow lobes that turn; those by which roughness is told are always in pairs.
     pub antithetic: bool,
     /// Choose samples by what is known of how things move; the expected values do not change. Reverse
     /// mode knows nothing of it, so that without guiding forward mode is its exact transpose.

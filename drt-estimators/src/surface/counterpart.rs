@@ -23,14 +23,14 @@
 //! ∫ a f L dw = ∫ a P K L dt = ∫ s a P [K L - K' L'] dt,    K'/K = r f'/f,    r = (P / P') (dw'/dt') / (dw/dt),
 //! ```
 //!
-//! for any shares s + s' = 1 that a slope and its counterpart have in their difference. Those here are the balance
-//! heuristic's, of slopes that are drawn as a direction wo sees them, in proportion to P (m·wo)/(m·n):
+//! for any shares s + s' = 1 that a slope and its counterpart have in their difference. Those of the balance heuristic,
+//! where directions are drawn with the density p, are
 //!
 //! ```text
-//! s = v / (v + v'),    v = (m·wo) / ((m·n) |a|),
+//! s = v / (v + v'),    v = p (dw/dt) / (P |a|),    v'/v = r (p'/|a'|) / (p/|a|),
 //! ```
 //!
-//! so that neither direction counts for more than it is drawn. Where both are seen alike, by the same (m·wo)/(m·n), s |a|
+//! so that neither direction counts for more than it is drawn. Where both are drawn alike, by the same p (dw/dt) / P, s |a|
 //! stays below 0.53 · 2/α. Without pairs a L stands for all of it, with a standard deviation of 2/α times L even if L is
 //! the same everywhere.
 
@@ -46,10 +46,9 @@ pub(crate) struct Counterpart {
     pub(crate) w: Vec3,
     /// r: what the value there is multiplied by.
     pub(crate) ratio: f64,
-    /// a of the given direction: what its value changes by, through the density of normals, relative to itself.
-    pub(crate) slope: f64,
-    /// s.
-    pub(crate) share: f64,
+    /// a and a': what the value of the given direction and of this one changes by, through the density of normals,
+    /// relative to itself.
+    pub(crate) slopes: [f64; 2],
 }
 
 /// A microfacet's slope.
@@ -65,7 +64,7 @@ struct Steepness {
 
 impl Counterpart {
     pub(super) fn new(facet: &Facet) -> Option<Self> {
-        let Facet { distribution, alpha, wo, n, m, .. } = *facet;
+        let Facet { distribution, alpha, n, m, .. } = *facet;
         let slope = facet.slope()?;
         let own = distribution.steepness(slope.length_squared());
         // No azimuth, or no light; `NaN` is neither.
@@ -82,12 +81,9 @@ impl Counterpart {
         let cosines = other_cos / cos;
         let cubed = cosines * cosines * cosines;
         let ratio = fm::exp(other.rarity - own.rarity) * cubed * other_angle / angle;
-        let often = |s: &Steepness, m: Vec3, cos: f64| wo.dot(m) / (cos * s.slope.abs());
-        let (here, there) = (often(&own, m, cos), often(&other, other_m, other_cos));
-        let share = here / (here + there);
-        let slope = own.slope * 2.0 / alpha;
-        let found = ratio > 0.0 && ratio.is_finite() && share.is_finite();
-        found.then_some(Self { w, ratio, slope, share })
+        let slopes = [own, other].map(|s| s.slope * 2.0 / alpha);
+        let found = ratio > 0.0 && ratio.is_finite();
+        found.then_some(Self { w, ratio, slopes })
     }
 }
 

@@ -16,10 +16,10 @@
 //! w, b' at w', and the values f and f', as for [counterparts](super::Counterpart)
 //!
 //! ```text
-//! ∫ b f L dw = ∫ s [b f L + r b' f' L'] dw,      r = (dw'/dm') / (dw/dm),      s = (m·wo) / (m·wo + m'·wo),
+//! ∫ b f L dw = ∫ s [b f L + r b' f' L'] dw,      r = (dw'/dm') / (dw/dm),      s = p / (p + r p'),
 //! ```
 //!
-//! in which b and b' nearly cancel. Where dwi depends on what the light comes from, b is of that. When all vectors turn
+//! where directions are drawn with the density p, in which b and b' nearly cancel. Where dwi depends on what the light comes from, b is of that. When all vectors turn
 //! alike, b and b' vanish.
 
 use drt_math::Vec3;
@@ -34,8 +34,6 @@ pub(crate) struct Opposite {
     pub(crate) w: Vec3,
     /// r: what the value there is multiplied by.
     pub(crate) ratio: f64,
-    /// s.
-    pub(crate) share: f64,
     /// b and b'.
     pub(crate) turns: [Turn; 2],
 }
@@ -60,13 +58,13 @@ impl Opposite {
         let other_m = facet.tilted(-slope);
         let (_, angle) = facet.leave(facet.m)?;
         let (w, other_angle) = facet.leave(other_m)?;
-        let [here, there] = [facet.m, other_m].map(|m| m.dot(facet.wo));
-        let (ratio, share) = (other_angle / angle, here / (here + there));
+        let ratio = other_angle / angle;
         let side = if facet.n == n { 1.0 } else { -1.0 };
         let turns = [(slope, facet.wi), (-slope, w)]
             .map(|(slope, wi)| Turn::new(facet, slope, wi, [side, by_eta]));
-        let finite = share.is_finite() && turns.iter().all(|t| t.wo.is_finite());
-        (finite && ratio > 0.0 && ratio.is_finite()).then_some(Self { w, ratio, share, turns })
+        let finite = |t: &Turn| t.wo.is_finite() && t.n.is_finite() && t.eta.is_finite();
+        let found = ratio > 0.0 && ratio.is_finite() && turns.iter().all(finite);
+        found.then_some(Self { w, ratio, turns })
     }
 }
 

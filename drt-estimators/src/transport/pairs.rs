@@ -98,9 +98,9 @@ pub(crate) struct Pair {
     pub(crate) share: f64,
     /// The path's ray.
     leaving: Leaving,
-    wo: Vec3,
-    /// The other one's direction.
-    pub(crate) w: Vec3,
+    /// The other one's direction, and its density.
+    w: Vec3,
+    pdf: f64,
     /// r f'.
     pub(crate) value: Rgb,
     /// How many times f that is, at least 1.
@@ -176,7 +176,7 @@ impl Pairs {
     ) -> Paired {
         let mut paired = Paired::default();
         let rougher = world.roughens(&leaving.vertex);
-        let turns = self.turns(world, viewer, &leaving.vertex);
+        let turns = self.turns(world, viewer, node, &leaving.vertex);
         if self.rng.is_none() || !(rougher || turns) {
             return paired;
         }
@@ -185,7 +185,14 @@ impl Pairs {
             return paired;
         };
         let wo = -arrival.dir;
-        let mut add = |told, size: f64, share, w, ratio: f64| {
+        // `often` is how often the other one is drawn for what it tells, by a given density.
+        let mut add = |told, size: f64, w, ratio: f64, often: f64| {
+            let pdf = scattering.pdf(wo, w, Given::Wo);
+            let drawn = leaving.pdf().unwrap_or(0.0);
+            let share = drawn / (drawn + ratio * often * pdf);
+            if !share.is_finite() {
+                return false;
+            }
             let value = scattering.eval(wo, w) * ratio;
             let (own, others) = (node.value.max_abs(), value.max_abs());
             let brighter = if others > own && own > 0.0 { others / own } else { 1.0 };
@@ -193,32 +200,50 @@ impl Pairs {
             let larger = f64::max(own, others);
             let weight = arrival.throughput.max_abs() * node.inv_pdf * share * size * larger;
             let (node, leaving, rng) = (leaving.node as usize, *leaving, rng.clone());
-            let pair = Pair { node, told, share, leaving, wo, w, value, brighter, weight, rng };
-            self.list.push(pair);
+            self.list.push(Pair {
+                node,
+                told,
+                share,
+                leaving,
+                w,
+                pdf,
+                value,
+                brighter,
+                weight,
+                rng,
+            });
+            true
         };
         if rougher && let Some(c) = scattering.counterpart(wo, leaving.dir) {
-            add(Told::Roughness(c.slope), c.slope.abs(), c.share, c.w, c.ratio);
-            paired.alpha = c.slope;
+            let [a, b] = c.slopes.map(f64::abs);
+            if add(Told::Roughness(c.slopes[0]), a, c.w, c.ratio, a / b) {
+                paired.alpha = c.slopes[0];
+            }
         }
-        if turns && let Some(o) = scattering.opposite(wo, leaving.dir) {
-            add(Told::Turns(o.turns), o.turns[0].n.length(), o.share, o.w, o.ratio);
+        if turns
+            && let Some(o) = scattering.opposite(wo, leaving.dir)
+            && add(Told::Turns(o.turns), o.turns[0].n.length(), o.w, o.ratio, 1.0)
+        {
             paired.turn = o.turns[0];
         }
         paired
     }
 
-    /// Whether the lobe at `v` turns as parameters change.
-    fn turns(&self, world: &World, viewer: &Node, v: &Vertex) -> bool {
-        let Some((movers, form)) = &self.turning else { return false };
-        let moves = |v: &Vertex| {
-            v.surface().is_some_and(|s| movers.shapes.get(s.shape as usize) == Some(&true))
+    /// Whether the lobe of a node at `v` may turn as parameters change, or one of its rays. Does not depend on the ray that
+    /// leaves it, which would be another one for the other side.
+    fn turns(&self, world: &World, viewer: &Node, node: &Node, v: &Vertex) -> bool {
+        let (Some((movers, form)), Some(s)) = (&self.turning, v.surface()) else { return false };
+        let moves = || match form {
+            // Rays turn with either of their ends.
+            Form::Material => movers.camera || movers.shapes.contains(&true),
+            // Those of the camera do, and those of vertices that stay on their matter.
+            Form::Spatial => {
+                movers.shapes.get(s.shape as usize) == Some(&true)
+                    || (viewer.arrival.is_none() && movers.camera)
+                    || (node.carried && (node.hold.share > 0.0 || world.is_smooth(s)))
+            }
         };
-        // Rays turn with the vertices they leave only where these stay on their matter.
-        let seen = || match viewer.vertex() {
-            Some(viewer) => *form == Form::Material && moves(viewer),
-            None => movers.camera,
-        };
-        (world.bends_light(v) || moves(v) || seen()) && world.lobe_width(v) < NARROW
+        (world.bends_light(v) || moves()) && world.lobe_width(v) < NARROW
     }
 
     /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring.
@@ -251,13 +276,11 @@ impl Pair {
         brought.ends.clear();
         (brought.light, brought.emitted) = (Rgb::ZERO, Rgb::ZERO);
         brought.first = self.leaving.segments + 1;
-        let Some(scattering) = tracer.world.scattering(&self.leaving.vertex) else { return };
-        let pdf = scattering.pdf(self.wo, self.w, Given::Wo);
-        if self.value.is_zero() || pdf.is_nan() || pdf <= 0.0 {
+        if self.value.is_zero() || self.pdf <= 0.0 {
             return;
         }
         tracer.rng = self.rng.clone();
-        tracer.radiance_along(&self.leaving.turned(self.w, pdf, self.brighter), brought);
+        tracer.radiance_along(&self.leaving.turned(self.w, self.pdf, self.brighter), brought);
     }
 }
 

@@ -164,6 +164,11 @@ pub(crate) struct Leaving {
 }
 
 impl Leaving {
+    /// The density of its direction.
+    pub(crate) fn pdf(&self) -> Option<f64> {
+        self.pdf
+    }
+
     /// Another direction of a given density, whose light counts so many `times` for Russian roulette but is not
     /// multiplied by anything.
     pub(crate) fn turned(&self, dir: Vec3, pdf: f64, times: f64) -> Self {

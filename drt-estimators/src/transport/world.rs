@@ -290,6 +290,11 @@ impl World {
         })
     }
 
+    /// True where normals are interpolated.
+    pub(crate) fn is_smooth(&self, s: &SurfacePoint) -> bool {
+        self.scene.shapes[s.shape as usize].mesh.normals.is_some()
+    }
+
     /// About how wide the narrowest lobe at `v` is, in radians; at most 1.
     pub(crate) fn lobe_width(&self, v: &Vertex) -> f64 {
         self.scattering(v).map_or(1.0, |scattering| scattering.lobe_width())
@@ -413,7 +418,7 @@ impl World {
                 bsdf: self.bsdf_of(s.shape),
                 ng: s.ng,
                 ns: s.ns,
-                smooth: self.scene.shapes[s.shape as usize].mesh.normals.is_some(),
+                smooth: self.is_smooth(s),
             }),
             Kind::Volume(_) => v.medium.map(|m| Scattering::Volume(&self.medium(m).phase)),
             Kind::Point => None,

@@ -33,7 +33,9 @@ impl Differentiator<'_> {
                 BsdfParams { alpha, ..BsdfParams::default() }
             }
             Told::Turns(turns) => {
-                self.turned(record, pair, turns, light, [own, others], other, sink);
+                if sink.interest().moves_geometry() {
+                    self.turned(record, pair, turns, light, [own, others], other, sink);
+                }
                 let eta = light[0] * turns[0].eta + light[1] * turns[1].eta;
                 BsdfParams { eta, ..BsdfParams::default() }
             }

@@ -102,7 +102,7 @@ fn turned(ball: Bsdf, parameter: &Parameter, form: Form) {
     let [single, pairs] = fair.map(|m| m.variance_of_mean());
     println!("{form:?}, {}: {:.2} {:.2}", parameter.name, z(fair), pairs / single);
     assert!(z(fair).abs() < 4.0, "{fair:?}");
-    // What glass lets through has rare, large samples in the spatial form.
+    // In the spatial form what is carried through glass has rare, large samples of its own.
     let tails = form == Form::Spatial && scene.bsdfs[0].item.is_transmissive();
     assert!(tails || pairs < 0.5 * single, "{fair:?}");
     // Planted: the one side of the lobe is dark.
