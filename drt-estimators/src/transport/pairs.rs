@@ -68,7 +68,8 @@ const NARROW: f64 = 0.15;
 pub(crate) struct Paired {
     /// a, by the roughness.
     pub(crate) alpha: f64,
-    pub(crate) turn: Turn,
+    /// Of which pair it is to tell b.
+    turn: Option<u32>,
 }
 
 /// What a pair tells.
@@ -123,6 +124,8 @@ pub(crate) struct Brought {
     emitted: Rgb,
     /// Segments to the ends.
     first: u32,
+    /// Nobody asks for the ends.
+    unasked: bool,
 }
 
 impl Observer for Brought {
@@ -137,7 +140,7 @@ impl Observer for Brought {
     }
 
     fn arrive(&mut self, _world: &World, arrival: &Arrival, _crossings: &[Crossing]) -> u32 {
-        if arrival.parent == 0 {
+        if arrival.parent == 0 && !self.unasked {
             self.ends.push((*arrival, core::mem::take(&mut self.emitted)));
         }
         1
@@ -224,26 +227,35 @@ impl Pairs {
             && let Some(o) = scattering.opposite(wo, leaving.dir)
             && add(Told::Turns(o.turns), o.turns[0].n.length(), o.w, o.ratio, 1.0)
         {
-            paired.turn = o.turns[0];
+            paired.turn = Some(self.list.len() as u32 - 1);
         }
         paired
+    }
+
+    /// b, where a pair tells it.
+    pub(crate) fn turn(&self, paired: &Paired) -> Option<&Turn> {
+        match &self.list.get(paired.turn? as usize)?.told {
+            Told::Turns([turn, _]) => Some(turn),
+            Told::Roughness(_) => None,
+        }
     }
 
     /// Whether the lobe of a node at `v` may turn as parameters change, or one of its rays. Does not depend on the ray that
     /// leaves it, which would be another one for the other side.
     fn turns(&self, world: &World, viewer: &Node, node: &Node, v: &Vertex) -> bool {
         let (Some((movers, form)), Some(s)) = (&self.turning, v.surface()) else { return false };
+        let seen = movers.camera && viewer.arrival.is_none();
         let moves = || match form {
             // Rays turn with either of their ends.
-            Form::Material => movers.camera || movers.shapes.contains(&true),
-            // Those of the camera do, and those of vertices that stay on their matter.
+            Form::Material => movers.shapes.contains(&true),
+            // Rays turn where they end on what vertices are held by, and normals of curved surfaces under those that
+            // slide.
             Form::Spatial => {
                 movers.shapes.get(s.shape as usize) == Some(&true)
-                    || (viewer.arrival.is_none() && movers.camera)
                     || (node.carried && (node.hold.share > 0.0 || world.is_smooth(s)))
             }
         };
-        (world.bends_light(v) || moves()) && world.lobe_width(v) < NARROW
+        (world.bends_light(v) || seen || moves()) && world.lobe_width(v) < NARROW
     }
 
     /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring.
@@ -276,6 +288,7 @@ impl Pair {
         brought.ends.clear();
         (brought.light, brought.emitted) = (Rgb::ZERO, Rgb::ZERO);
         brought.first = self.leaving.segments + 1;
+        brought.unasked = matches!(self.told, Told::Roughness(_));
         if self.value.is_zero() || self.pdf <= 0.0 {
             return;
         }

@@ -28,9 +28,9 @@ use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Coefficients;
 
 use emitters::strength;
+use pairs::Apart;
 use segment::{Far, Stretch};
 
-use super::pairs::Paired;
 use super::record::PathRecord;
 use super::trace::Endpoint;
 use super::vertex::{Kind, Vertex};
@@ -232,7 +232,7 @@ impl<'w> Differentiator<'w> {
             let adjoint = theta * value * parent.inv_pdf;
             let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
             let behind = self.behind(record, p);
-            let (wi, paired) = (parent.wi, Some((&parent.paired, parent.value)));
+            let (wi, paired) = (parent.wi, Some(Apart::of(record, parent)));
             let to_wi = self.scattering(&from, wo, wi, paired, adjoint, behind, &mut there, sink);
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
                 let g = turn(&(to_wi * self.share(record, k)), parent.wi, arrival.distance);
@@ -296,15 +296,14 @@ impl<'w> Differentiator<'w> {
     }
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
-    /// behind `wo`, by normals and by materials, but for the part of the logarithmic derivative of a value that is
-    /// `paired`. Returns that by the direction `wi`, which is the caller's.
+    /// behind `wo`, by normals and by materials, but for what is `paired`. Returns that by the direction `wi`, which is the caller's.
     #[allow(clippy::too_many_arguments)]
     fn scattering<S: AdjointSink>(
         &mut self,
         v: &Vertex,
         wo: Vec3,
         wi: Vec3,
-        paired: Option<(&Paired, Rgb)>,
+        paired: Option<Apart<'_>>,
         adjoint: Rgb,
         behind: Option<Behind>,
         here: &mut SurfaceAdjoint,
@@ -320,14 +319,8 @@ impl<'w> Differentiator<'w> {
             return None;
         }
         let mut d = world.scattering(v)?.gradient(wo, wi);
-        if let Some((paired, value)) = paired {
-            d.wo -= value.outer(paired.turn.wo);
-            d.wi -= value.outer(paired.turn.wi);
-            d.ns -= value.outer(paired.turn.n);
-            if let Some(params) = &mut d.params {
-                params.alpha -= value * paired.alpha;
-                params.eta -= value * paired.turn.eta;
-            }
+        if let Some(apart) = paired {
+            apart.take_from(&mut d);
         }
         match &v.kind {
             Kind::Surface(s) => {

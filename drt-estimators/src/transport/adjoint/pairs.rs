@@ -8,8 +8,39 @@ use crate::sensor::SensorGradient;
 use crate::surface::{BsdfParams, Turn};
 use crate::transport::pairs::{Brought, Pair, Told};
 use crate::transport::record::{Node, PathRecord};
+use crate::transport::scatter::ScatteringGradient;
 use crate::transport::trace::{Arrival, Endpoint};
 use crate::transport::vertex::Vertex;
+
+/// The part of the derivative of a value that pairs tell.
+pub(super) struct Apart<'a> {
+    value: Rgb,
+    /// Of its logarithm, by the roughness.
+    alpha: f64,
+    /// Of its logarithm, by what turns the lobe.
+    turn: Option<&'a Turn>,
+}
+
+impl<'a> Apart<'a> {
+    /// Of the scattering at a node into the ray that left it.
+    pub(super) fn of(record: &'a PathRecord, node: &Node) -> Self {
+        let turn = record.pairs.turn(&node.paired);
+        Self { value: node.value, alpha: node.paired.alpha, turn }
+    }
+
+    pub(super) fn take_from(&self, d: &mut ScatteringGradient) {
+        let value = self.value;
+        if let Some(params) = &mut d.params {
+            params.alpha -= value * self.alpha;
+            params.eta -= value * self.turn.map_or(0.0, |turn| turn.eta);
+        }
+        if let Some(turn) = self.turn {
+            d.wo -= value.outer(turn.wo);
+            d.wi -= value.outer(turn.wi);
+            d.ns -= value.outer(turn.n);
+        }
+    }
+}
 
 impl Differentiator<'_> {
     /// Sends what a pair tells, which is looked at with a given `chance`. The record is the one that was swept last.
