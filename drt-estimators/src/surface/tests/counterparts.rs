@@ -15,28 +15,36 @@ pub(super) fn rough(alpha: f64) -> Vec<Bsdf> {
     all
 }
 
-#[test]
-fn counterparts_go_both_ways() {
-    let mut rng = Rng::new(31, 0, 0);
-    let mut found = 0;
+/// Directions in which light leaves rough surfaces and arrives from, drawn by their densities.
+pub(super) fn scattered(seed: u64, mut each: impl FnMut(f64, &Bsdf, [Vec3; 2])) {
+    let mut rng = Rng::new(seed, 0, 0);
     for alpha in [0.4, 0.05, 1e-3] {
         for bsdf in rough(alpha) {
             for _ in 0..300 {
                 let wo = tilted(160.0 * rng.next_f64());
                 let drawn = bsdf.sample(wo, normal(), random_3d(&mut rng), Given::Wo);
-                let Some(wi) = drawn.map(|s| s.w) else { continue };
-                let Some(there) = bsdf.counterpart(wo, wi, normal()) else { continue };
-                let back = bsdf.counterpart(wo, there.w, normal()).expect("the way back");
-                let message = || format!("{bsdf:?} {wo:?} {wi:?} {there:?} {back:?}");
-                assert!((back.w - wi).length() < 1e-6 * alpha, "{}", message());
-                assert!((back.ratio * there.ratio - 1.0).abs() < 1e-5, "{}", message());
-                let ([a, b], [c, d]) = (there.slopes, back.slopes);
-                let same = |a: f64, b: f64| (a - b).abs() < 1e-5 * (1.0 + a.abs());
-                assert!(a * b <= 0.0 && same(a, d) && same(b, c), "{}", message());
-                found += 1;
+                if let Some(drawn) = drawn {
+                    each(alpha, &bsdf, [wo, drawn.w]);
+                }
             }
         }
     }
+}
+
+#[test]
+fn counterparts_go_both_ways() {
+    let mut found = 0;
+    scattered(31, |alpha, bsdf, [wo, wi]| {
+        let Some(there) = bsdf.counterpart(wo, wi, normal()) else { return };
+        let back = bsdf.counterpart(wo, there.w, normal()).expect("the way back");
+        let message = || format!("{bsdf:?} {wo:?} {wi:?} {there:?} {back:?}");
+        assert!((back.w - wi).length() < 1e-6 * alpha, "{}", message());
+        assert!((back.ratio * there.ratio - 1.0).abs() < 1e-5, "{}", message());
+        let ([a, b], [c, d]) = (there.slopes, back.slopes);
+        let same = |a: f64, b: f64| (a - b).abs() < 1e-5 * (1.0 + a.abs());
+        assert!(a * b <= 0.0 && same(a, d) && same(b, c), "{}", message());
+        found += 1;
+    });
     assert!(found > 4000, "{found}");
 }
 

@@ -2,7 +2,7 @@ use alloc::format;
 
 use drt_math::stats::Moments;
 
-use super::counterparts::rough;
+use super::counterparts::{rough, scattered};
 use super::*;
 
 /// How fast the normal and the direction `wo` turn, and the index changes.
@@ -30,31 +30,23 @@ fn motion(bsdf: &Bsdf, wo: Vec3) -> ([Vec3; 2], f64) {
 
 #[test]
 fn opposites_are_mutual() {
-    let mut rng = Rng::new(41, 0, 0);
     let mut found = 0;
-    for alpha in [0.4, 0.05, 1e-3] {
-        for bsdf in rough(alpha) {
-            for _ in 0..300 {
-                let wo = tilted(160.0 * rng.next_f64());
-                let drawn = bsdf.sample(wo, normal(), random_3d(&mut rng), Given::Wo);
-                let Some(wi) = drawn.map(|s| s.w) else { continue };
-                let Some(there) = bsdf.opposite(wo, wi, normal()) else { continue };
-                let back = bsdf.opposite(wo, there.w, normal()).expect("the way back");
-                let message = || format!("{bsdf:?} {wo:?} {wi:?} {there:?} {back:?}");
-                assert!((back.w - wi).length() < 1e-7 * alpha, "{}", message());
-                assert!((back.ratio * there.ratio - 1.0).abs() < 1e-7, "{}", message());
-                let ([a, b], [c, d]) = (back.turns, there.turns);
-                for (a, b) in [(a, d), (b, c)] {
-                    let size = 1.0 + a.wo.length() + a.n.length();
-                    let vectors = [(a.wo, b.wo), (a.n, b.n), (a.wi, b.wi)];
-                    let apart = vectors.map(|(a, b)| (a - b).length());
-                    assert!(apart.iter().all(|s| *s < 1e-6 * size), "{}", message());
-                    assert!((a.eta - b.eta).abs() < 1e-6 * size, "{}", message());
-                }
-                found += 1;
-            }
+    scattered(41, |alpha, bsdf, [wo, wi]| {
+        let Some(there) = bsdf.opposite(wo, wi, normal()) else { return };
+        let back = bsdf.opposite(wo, there.w, normal()).expect("the way back");
+        let message = || format!("{bsdf:?} {wo:?} {wi:?} {there:?} {back:?}");
+        assert!((back.w - wi).length() < 1e-7 * alpha, "{}", message());
+        assert!((back.ratio * there.ratio - 1.0).abs() < 1e-7, "{}", message());
+        let ([a, b], [c, d]) = (back.turns, there.turns);
+        for (a, b) in [(a, d), (b, c)] {
+            let size = 1.0 + a.wo.length() + a.n.length();
+            let vectors = [(a.wo, b.wo), (a.n, b.n), (a.wi, b.wi)];
+            let apart = vectors.map(|(a, b)| (a - b).length());
+            assert!(apart.iter().all(|s| *s < 1e-6 * size), "{}", message());
+            assert!((a.eta - b.eta).abs() < 1e-6 * size, "{}", message());
         }
-    }
+        found += 1;
+    });
     assert!(found > 3000, "{found}");
 }
 
