@@ -123,6 +123,12 @@ fn pairs_of_rays_tell_how_lobes_turn() {
 }
 
 #[test]
+fn pairs_of_rays_tell_how_cameras_turn_lobes() {
+    turned(metal(), &motion("camera", "shifts", shift()), Form::Spatial);
+    turned(metal(), &motion("camera", "turns", turn()), Form::Spatial);
+}
+
+#[test]
 fn pairs_of_rays_tell_how_glass_bends_light() {
     turned(glass(), &set("eta", "ball-bsdf", "eta", grey(0.1)), Form::Material);
 }
