@@ -12,7 +12,7 @@ use crate::pixels::Sampler;
 use crate::radiative::{Edged, Look, Radiative};
 use crate::rendering::{Account, Counters, NonFinite, Term};
 use crate::sensitivity::{AdjointSink, Functional, Rate, SurfaceAdjoint};
-use crate::transport::pairs::Pairs;
+use crate::transport::pairs::{Brought, Pairs};
 use crate::transport::{Carriers, Differentiator, Form, PathRecord, Radiance, Tracer, World};
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
@@ -141,6 +141,7 @@ pub(crate) struct PixelSampler<'a, S> {
     pub(crate) sink: Option<S>,
     along: AlongRays<'a>,
     shadow_buffers: shadow::Buffers,
+    brought: Brought,
     separate: bool,
     non_finite: Vec<NonFinite>,
     non_finite_count: u64,
@@ -182,6 +183,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             sink,
             along,
             shadow_buffers: shadow::Buffers::default(),
+            brought: Brought::default(),
             separate,
             non_finite: Vec::new(),
             non_finite_count: 0,
@@ -236,7 +238,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             let line = Rng::new(self.seed, LINE_STREAM | u64::from(pixel), unit);
             sink.begin();
             self.differentiator.differentiate(&self.record, s.slope, line, sink);
-            self.record.pairs.follow(&mut self.tracer, |pair, chance, other| {
+            let buffer = &mut self.brought;
+            self.record.pairs.follow(&mut self.tracer, buffer, |pair, chance, other| {
                 self.differentiator.pair(&self.record, pair, chance, other, sink);
             });
             sink.finish(&mut values[1..=n]);

@@ -3,7 +3,7 @@ use drt_math::{Dual, Real, Rgb, Vec3, fm};
 use super::angles::{Angles, Slopes};
 use super::facet::Facet;
 use super::fresnel::{dielectric_reflected, dielectric_transmitted};
-use super::microfacet::{Distribution, LEAST_ALPHA, mirrored};
+use super::microfacet::{Distribution, LEAST_ALPHA, mirrored, refracted};
 use super::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 
 /// A rough interface between two transparent media: Walter et al. 2007, eq. 20 (reflection) and
@@ -199,12 +199,7 @@ impl RoughDielectric {
             return None;
         }
         let reflects = u[2] < self.reflection_choice(dielectric_reflected(cos, eta));
-        let w = if reflects {
-            mirrored(from, m)
-        } else {
-            let cos_t = fm::sqrt(cos2_refracted(cos, eta).max(0.0));
-            m * (cos / eta - cos_t) - from * (1.0 / eta)
-        };
+        let w = if reflects { mirrored(from, m) } else { refracted(from, m, eta)?.0 };
         // A reflection to the far side, or a refraction to the near one, has left the model.
         (reflects == (n.dot(w) > 0.0)).then_some(w)
     }
@@ -253,10 +248,4 @@ impl RoughDielectric {
         nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
         nonnegative(Property::SpecularTransmittance, self.specular_transmittance)
     }
-}
-
-/// Squared cosine of refraction, from that of incidence; negative in total reflection.
-#[inline]
-fn cos2_refracted(cos: f64, eta: f64) -> f64 {
-    1.0 - (1.0 - cos * cos) / (eta * eta)
 }

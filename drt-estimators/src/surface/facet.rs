@@ -1,8 +1,8 @@
 //! The microfacets of a scattering: which normal they have, and where others would send the light.
 
-use drt_math::{Vec3, fm};
+use drt_math::Vec3;
 
-use super::microfacet::{Distribution, mirrored};
+use super::microfacet::{Distribution, mirrored, refracted};
 
 /// The microfacets by which light from `wi` leaves along `wo`.
 #[derive(Clone, Copy, Debug)]
@@ -49,10 +49,8 @@ impl Facet {
         let (w, angle) = match self.index {
             None => (mirrored(self.wo, m), 4.0 * cos),
             Some(eta) => {
-                // Not a number where all is reflected.
-                let cos_t = fm::sqrt(1.0 - (1.0 - cos * cos) / (eta * eta));
+                let (w, cos_t) = refracted(self.wo, m, eta)?;
                 let h = cos - eta * cos_t;
-                let w = m * (cos / eta - cos_t) - self.wo * (1.0 / eta);
                 (w, h * h / (eta * eta * cos_t))
             }
         };

@@ -189,6 +189,16 @@ pub(super) fn mirrored(from: Vec3, m: Vec3) -> Vec3 {
     m * (2.0 * m.dot(from)) - from
 }
 
+/// Where it refracts that, and the cosine there, with the index beyond over that on the side of `from`; `None`
+/// where all is reflected.
+#[inline]
+pub(super) fn refracted(from: Vec3, m: Vec3, eta: f64) -> Option<(Vec3, f64)> {
+    let cos = m.dot(from);
+    let cos2 = 1.0 - (1.0 - cos * cos) / (eta * eta);
+    let cos_t = fm::sqrt(cos2.max(0.0));
+    (cos2 >= 0.0).then(|| (m * (cos / eta - cos_t) - from * (1.0 / eta), cos_t))
+}
+
 /// A point of the unit hemisphere about z, uniform over its projection along the direction
 /// `(sin, 0, cos)`: the GGX normals that direction sees at roughness one (Heitz 2018, "Sampling the
 /// GGX Distribution of Visible Normals").

@@ -155,12 +155,15 @@ pub(crate) struct Pairs {
     rng: Option<Rng>,
     /// What moves and how, where pairs tell how lobes turn.
     turning: Option<(Carriers, Form)>,
+    /// Some shape moves.
+    any_moves: bool,
 }
 
 impl Pairs {
     /// With what moves and how, where turning lobes are to be told by pairs.
     pub(crate) fn new(turning: Option<(Carriers, Form)>) -> Self {
-        Self { turning, ..Self::default() }
+        let any_moves = turning.as_ref().is_some_and(|(movers, _)| movers.shapes.contains(&true));
+        Self { turning, any_moves, ..Self::default() }
     }
 
     /// Forgets those of the last path. There are none of the next without random numbers to choose by.
@@ -247,7 +250,7 @@ impl Pairs {
         let seen = movers.camera && viewer.arrival.is_none();
         let moves = || match form {
             // Rays turn with either of their ends.
-            Form::Material => movers.shapes.contains(&true),
+            Form::Material => self.any_moves,
             // Rays turn where they end on what vertices are held by, and normals of curved surfaces under those that
             // slide.
             Form::Spatial => {
@@ -258,10 +261,12 @@ impl Pairs {
         (world.bends_light(v) || seen || moves()) && world.lobe_width(v) < NARROW
     }
 
-    /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring.
+    /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring; `brought` is a
+    /// buffer.
     pub(crate) fn follow(
         &self,
         tracer: &mut Tracer<'_>,
+        brought: &mut Brought,
         mut found: impl FnMut(&Pair, f64, &Brought),
     ) {
         let Some(mut rng) = self.rng.clone().filter(|_| !self.list.is_empty()) else { return };
@@ -271,11 +276,10 @@ impl Pairs {
             totals[pair.told.kind()] += pair.weight;
         }
         let mut choices = totals.map(|total| Choice { next: rng.next_f64(), total });
-        let mut brought = Brought::default();
         for pair in &self.list {
             if let Some(chance) = choices[pair.told.kind()].takes(pair.weight) {
-                pair.follow(tracer, &mut brought);
-                found(pair, chance, &brought);
+                pair.follow(tracer, brought);
+                found(pair, chance, brought);
             }
         }
         tracer.rng = own;

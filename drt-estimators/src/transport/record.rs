@@ -115,7 +115,12 @@ impl PathRecord {
 }
 
 /// What holds a vertex that was seen from a `viewer`, or from the camera.
-fn hold_of(world: &World, pixel: [u32; 2], viewer: Option<&Vertex>, arrival: &Arrival) -> Hold {
+pub(crate) fn hold_of(
+    world: &World,
+    pixel: [u32; 2],
+    viewer: Option<&Vertex>,
+    arrival: &Arrival,
+) -> Hold {
     match (&arrival.end, viewer) {
         (Endpoint::Surface(v), None) => world.hold_in_pixel(v, pixel),
         (Endpoint::Surface(v) | Endpoint::Volume(v, _), Some(viewer)) => {

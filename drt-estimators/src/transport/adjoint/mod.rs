@@ -51,10 +51,9 @@ struct Local {
 }
 
 /// How the vertices of paths move.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Form {
     /// With the material points they are, as their medium's inside and their surface do (2021 paper).
-    #[default]
     Material,
     /// With the rays, whose directions and distances stand still (2019 paper).
     Spatial,
@@ -296,7 +295,8 @@ impl<'w> Differentiator<'w> {
     }
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
-    /// behind `wo`, by normals and by materials, but for what is `paired`. Returns that by the direction `wi`, which is the caller's.
+    /// behind `wo`, by normals and by materials, but for what is `paired`. Returns that by the direction `wi`,
+    /// which is the caller's.
     #[allow(clippy::too_many_arguments)]
     fn scattering<S: AdjointSink>(
         &mut self,

@@ -7,7 +7,7 @@ use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::surface::{BsdfParams, Turn};
 use crate::transport::pairs::{Brought, Pair, Told};
-use crate::transport::record::{Node, PathRecord};
+use crate::transport::record::{Node, PathRecord, hold_of};
 use crate::transport::scatter::ScatteringGradient;
 use crate::transport::trace::{Arrival, Endpoint};
 use crate::transport::vertex::Vertex;
@@ -103,12 +103,9 @@ impl Differentiator<'_> {
             here.u -= self.turn_end(end, self.share(record, c), light.outer(turns[0].wi), sink);
         }
         for (end, brought) in &other.ends {
-            let share = match (self.form, &end.end) {
-                (Form::Material, _) => 1.0,
-                (Form::Spatial, Endpoint::Surface(v) | Endpoint::Volume(v, _)) => {
-                    self.world.hold(vertex, v, end.dir, end.distance).share
-                }
-                (Form::Spatial, Endpoint::Environment) => 0.0,
+            let share = match self.form {
+                Form::Material => 1.0,
+                Form::Spatial => hold_of(self.world, record.pixel, Some(vertex), end).share,
             };
             let light = times[1] * *brought;
             here.u -= self.turn_end(end, share, light.outer(turns[1].wi), sink);

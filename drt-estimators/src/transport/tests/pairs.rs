@@ -34,7 +34,7 @@ fn derivatives(
     };
     let mut differentiator = Differentiator::new(world, form);
     let mut sink = Contraction::new(world, &motion);
-    let mut moments = [Moments::default(); 2];
+    let (mut buffer, mut moments) = (Brought::default(), [Moments::default(); 2]);
     for (seed, moments) in (20..).zip(&mut moments) {
         for i in 0..paths {
             let choices = (seed == 21).then(|| Rng::new(9, 1, i));
@@ -42,7 +42,7 @@ fn derivatives(
             let slope = trace(&mut tracer, &mut record, seed, i);
             sink.clear();
             differentiator.differentiate(&record, slope, Rng::new(6, 0, i), &mut sink);
-            record.pairs.follow(&mut tracer, |pair, chance, brought| {
+            record.pairs.follow(&mut tracer, &mut buffer, |pair, chance, brought| {
                 let mut brought = brought.clone();
                 other(pair, &mut brought);
                 differentiator.pair(&record, pair, chance, &brought, &mut sink);
