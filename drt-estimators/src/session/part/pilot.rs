@@ -73,10 +73,7 @@ impl Part {
         let size = self.pixels.size();
         let n = self.motion.as_ref().map_or(0, Motion::parameters);
         let mut film = SplatFilm::new(size, n);
-        // Where no sample counts much more than others, few tell enough.
-        let even = self.prepared.sources[i].is_even();
-        let part = if even { 0.25 } else { 1.0 };
-        let per_pixel = part * f64::from(units * self.per_unit()) * self.source_ratio(i);
+        let per_pixel = f64::from(units * self.per_unit()) * self.source_ratio(i);
         let seed = !self.settings.seed;
         let (account, going) = self.splat(&mut film, i, seed, per_pixel, round, |_| {});
         let samples = film.samples();
@@ -84,6 +81,7 @@ impl Part {
         let variance = (0..n).map(|p| per_pixel * film.variance(p)).collect();
         let rays = account.counters.rays as f64 / samples;
         self.account.add(account);
+        let even = self.prepared.sources[i].is_even();
         going.then_some(Observed { variance, rays, even })
     }
 }
