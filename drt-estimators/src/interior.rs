@@ -1,5 +1,6 @@
 //! The interior term, and the plain forward image: one pixel sample at a time.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use drt_math::sobol::{SET_DIMENSIONS, SobolSampler};
@@ -174,7 +175,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             antithetic,
             tracer: Tracer::new(world),
             record: PathRecord {
-                flux: Reservoir::new(along.flux),
+                flux: along.flux.map(|flux| Box::new(Reservoir::new(flux))),
                 pairs: Pairs::new(along.opposites.then_some((movers, form))),
                 carriers,
                 ..PathRecord::default()
@@ -227,7 +228,9 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         };
         let width = camera.film()[0];
         self.record.begin([pixel % width, pixel / width], dir, weight);
-        self.record.flux.begin(Rng::new(self.seed, FLUX_STREAM | u64::from(pixel), unit));
+        if let Some(flux) = &mut self.record.flux {
+            flux.begin(Rng::new(self.seed, FLUX_STREAM | u64::from(pixel), unit));
+        }
         self.record.pairs.begin(Some(Rng::new(self.seed, PAIR_STREAM | u64::from(pixel), unit)));
         self.tracer.trace_camera(dir, weight, &mut self.record);
         values[0] += self.record.value;
@@ -246,20 +249,19 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         }
         // Each kept apart goes to layers of its own, in the order of `AlongRays::terms`.
         let mut at = 1;
-        if self.along.flux.is_some() {
+        if let Some(mut flux) = self.record.flux.take() {
             at += if self.separate { n } else { 0 };
-            let mut flux = core::mem::take(&mut self.record.flux);
             flux.evaluate(&mut self.tracer, |f, swept, value| {
                 let values = &mut values[at..at + n];
                 let Some(swept) = swept else { return sink.functional(f, value, values) };
                 sink.begin();
                 f.send(value, sink);
                 let [origin, turn] = [swept.origin, swept.turn].map(|v| value.outer(v));
-                let at = SurfaceAdjoint { u: origin, ..SurfaceAdjoint::default() };
+                let at = SurfaceAdjoint::of_place(origin);
                 self.differentiator.carry_back(&self.record, swept.node, at, turn, sink);
                 sink.finish(values);
             });
-            self.record.flux = flux;
+            self.record.flux = Some(flux);
         }
         if let (Some(radiative), Some(look)) = (self.along.radiative, look) {
             let from = if self.separate { at + n } else { at };
@@ -318,7 +320,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             }
         }
         let viewer = (e.viewer * share).outer(e.n);
-        let at = SurfaceAdjoint { u: viewer, ..SurfaceAdjoint::default() };
+        let at = SurfaceAdjoint::of_place(viewer);
         self.differentiator.carry_back(&self.record, e.node, at, RgbVec::ZERO, sink);
         sink.finish(&mut values[layer..layer + n]);
     }

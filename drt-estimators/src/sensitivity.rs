@@ -27,6 +27,11 @@ pub(crate) struct SurfaceAdjoint {
 }
 
 impl SurfaceAdjoint {
+    /// Of the position alone.
+    pub(crate) fn of_place(u: RgbVec) -> Self {
+        Self { u, ..Self::default() }
+    }
+
     pub(crate) fn is_zero(&self) -> bool {
         [self.u, self.n, self.ns].into_iter().all(|v| v == RgbVec::ZERO) && self.j.is_zero()
     }
@@ -178,7 +183,7 @@ impl Rate {
         match *self {
             Self::Surface(point, n) => {
                 let u = weight.outer(n);
-                sink.surface(&point, &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
+                sink.surface(&point, &SurfaceAdjoint::of_place(u));
             }
             Self::Volume(medium, x, n) => sink.volume(medium, x, &weight.outer(n), Rgb::ZERO),
             Self::Grid(medium, x, n) => sink.grid(medium, x, &weight.outer(n)),

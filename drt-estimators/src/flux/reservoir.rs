@@ -79,21 +79,21 @@ struct Meeting {
 /// Chooses one meeting per path.
 #[derive(Clone, Debug)]
 pub(crate) struct Reservoir {
-    flux: Option<Flux>,
+    flux: Flux,
     rng: Rng,
     total: f64,
     chosen: Option<Meeting>,
     /// The chosen ray up to the surface.
     part: RayPath,
-    /// The surfaces on the present ray, if some have a flux.
+    /// The surfaces on the present ray that have one.
     met: Vec<Met>,
     functional: Functional,
 }
 
-impl Default for Reservoir {
-    fn default() -> Self {
+impl Reservoir {
+    pub(crate) fn new(flux: &Flux) -> Self {
         Self {
-            flux: None,
+            flux: flux.clone(),
             rng: Rng::new(0, 0, 0),
             total: 0.0,
             chosen: None,
@@ -101,12 +101,6 @@ impl Default for Reservoir {
             met: Vec::new(),
             functional: Functional::default(),
         }
-    }
-}
-
-impl Reservoir {
-    pub(crate) fn new(flux: Option<&Flux>) -> Self {
-        Self { flux: flux.cloned(), ..Self::default() }
     }
 
     pub(crate) fn begin(&mut self, rng: Rng) {
@@ -119,8 +113,8 @@ impl Reservoir {
     pub(crate) fn offer(&mut self, world: &World, leaving: &Leaving, carried: bool, ray: &RayPath) {
         let Leaving { node, throughput, dir, segments, .. } = *leaving;
         let origin = leaving.vertex.x;
+        let flux = &self.flux;
         self.met.clear();
-        let Some(flux) = self.flux.as_ref() else { return };
         list_met(&mut self.met, ray, dir, |point| flux.sweeps(point.shape, carried));
         let strength = throughput.max_abs();
         if strength == 0.0 || segments + 1 >= flux.longest {
@@ -190,7 +184,7 @@ impl Reservoir {
         }
     }
 
-    /// The surfaces on the present ray, if some have a flux.
+    /// The surfaces on the present ray that have a flux.
     pub(crate) fn met(&self) -> &[Met] {
         &self.met
     }
@@ -202,10 +196,10 @@ impl Reservoir {
         tracer: &mut Tracer<'_>,
         mut add: impl FnMut(&Functional, Option<Swept>, Rgb),
     ) {
-        let (Some(m), Some(flux)) = (self.chosen.take(), &self.flux) else { return };
+        let Some(m) = self.chosen.take() else { return };
         let world = tracer.world;
         // What counts for less than a path does is not followed for each.
-        let chance = f64::min(self.total / flux.followed, 1.0);
+        let chance = f64::min(self.total / self.flux.followed, 1.0);
         if m.segments > tracer.max_segments || self.rng.next_f64() >= chance {
             return;
         }
@@ -253,7 +247,7 @@ impl Reservoir {
         if light.0.is_zero() {
             return;
         }
-        let spatial = self.flux.as_ref().is_some_and(|f| f.movers.is_some());
+        let spatial = self.flux.movers.is_some();
         let mut swept = Swept { node: m.node as usize, origin: Vec3::ZERO, turn: Vec3::ZERO };
         let items = &mut self.functional.items;
         items.clear();

@@ -1,5 +1,6 @@
 //! The path record: what a walk leaves behind when its derivative is wanted.
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -65,8 +66,8 @@ pub(crate) struct PathRecord {
     pub(crate) pixel: [u32; 2],
     /// The path's value.
     pub(crate) value: Rgb,
-    /// Where it met surfaces with a flux.
-    pub(crate) flux: Reservoir,
+    /// Where it met surfaces with a flux, if there are such.
+    pub(crate) flux: Option<Box<Reservoir>>,
     /// What carries vertices, where that is asked for.
     pub(crate) carriers: Carriers,
     pub(crate) tows: Vec<Tow>,
@@ -139,7 +140,9 @@ impl Observer for PathRecord {
 
     fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {
         let carried = self.nodes[leaving.node as usize].carried;
-        self.flux.offer(world, leaving, carried, ray);
+        if let Some(flux) = &mut self.flux {
+            flux.offer(world, leaving, carried, ray);
+        }
     }
 
     fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
@@ -156,7 +159,8 @@ impl Observer for PathRecord {
         if let Endpoint::Volume(Vertex { medium: Some(m), .. }, _) = &arrival.end
             && let Some(reach) = world.reach(*m)
         {
-            self.tows.extend(tow::tows(self.flux.met(), arrival.distance, reach));
+            let met = self.flux.as_ref().map_or(&[][..], |flux| flux.met());
+            self.tows.extend(tow::tows(met, arrival.distance, reach));
         }
         let tows = first..self.tows.len();
         let viewer = self.nodes[arrival.parent as usize].vertex();

@@ -265,10 +265,7 @@ impl World {
     /// True when a parameter changes how `v` scatters, so that a zero there may not stay zero.
     pub(crate) fn may_revive(&self, v: &Vertex) -> bool {
         match (&v.kind, v.medium) {
-            (Kind::Surface(s), _) => {
-                let bsdf = self.scene.shapes[s.shape as usize].bsdf;
-                self.needs.bsdfs.get(bsdf).copied().unwrap_or(false)
-            }
+            (Kind::Surface(s), _) => self.needed(&self.needs.bsdfs, s),
             (_, Some(m)) => self.needs.media.get(m).is_some_and(|n| *n != MediumNeed::Nothing),
             _ => false,
         }
@@ -276,18 +273,20 @@ impl World {
 
     /// True when a parameter changes how rough the surface at `v` is.
     pub(crate) fn roughens(&self, v: &Vertex) -> bool {
-        v.surface().is_some_and(|s| {
-            let bsdf = self.scene.shapes[s.shape as usize].bsdf;
-            self.needs.roughness.get(bsdf).copied().unwrap_or(false)
-        })
+        v.surface().is_some_and(|s| self.needed(&self.needs.roughness, s))
     }
 
     /// True when a parameter changes how the surface at `v` refracts.
     pub(crate) fn bends_light(&self, v: &Vertex) -> bool {
-        v.surface().is_some_and(|s| {
-            let bsdf = self.scene.shapes[s.shape as usize].bsdf;
-            self.needs.index.get(bsdf) == Some(&true) && self.bsdf_of(s.shape).is_transmissive()
-        })
+        let bends = |s: &SurfacePoint| {
+            self.needed(&self.needs.index, s) && self.bsdf_of(s.shape).is_transmissive()
+        };
+        v.surface().is_some_and(bends)
+    }
+
+    /// Whether the material of a surface is one of those that something is needed `of`.
+    fn needed(&self, of: &[bool], s: &SurfacePoint) -> bool {
+        of.get(self.scene.shapes[s.shape as usize].bsdf) == Some(&true)
     }
 
     /// True where normals are interpolated.

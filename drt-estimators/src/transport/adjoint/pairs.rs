@@ -119,7 +119,7 @@ impl Differentiator<'_> {
                 here.u -= g;
                 send(vertex, &here, sink);
                 match viewer.vertex() {
-                    Some(viewer) => send(viewer, &of_place(g), sink),
+                    Some(viewer) => send(viewer, &SurfaceAdjoint::of_place(g), sink),
                     None if sink.interest().sensor => {
                         sink.sensor(&[g.r, g.g, g.b].map(|position| SensorGradient {
                             position,
@@ -130,11 +130,11 @@ impl Differentiator<'_> {
                 }
             }
             Form::Spatial => {
-                send(vertex, &of_place(-g), sink);
+                send(vertex, &SurfaceAdjoint::of_place(-g), sink);
                 self.carry_back(record, k, here, RgbVec::ZERO, sink);
                 // Only the camera's ray turns by itself.
                 let turn = if b.parent == 0 { to_wo * (b.share - 1.0) } else { RgbVec::ZERO };
-                self.carry_back(record, b.parent, of_place(g), turn, sink);
+                self.carry_back(record, b.parent, SurfaceAdjoint::of_place(g), turn, sink);
             }
         }
     }
@@ -151,11 +151,7 @@ impl Differentiator<'_> {
             return RgbVec::ZERO;
         };
         let g = turn(&(to_wi * share), end.dir, end.distance);
-        send(vertex, &of_place(g), sink);
+        send(vertex, &SurfaceAdjoint::of_place(g), sink);
         g
     }
-}
-
-fn of_place(u: RgbVec) -> SurfaceAdjoint {
-    SurfaceAdjoint { u, ..SurfaceAdjoint::default() }
 }

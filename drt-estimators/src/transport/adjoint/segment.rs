@@ -158,10 +158,7 @@ impl Differentiator<'_> {
             let n = c.point.ng;
             let g = (weight * -jump).outer(n / n.dot(path.dir));
             if shape_moves {
-                sink.surface(
-                    &c.point.material(),
-                    &SurfaceAdjoint { u: g, ..SurfaceAdjoint::default() },
-                );
+                sink.surface(&c.point.material(), &SurfaceAdjoint::of_place(g));
             }
             along.add(&-g, &(-g * c.t), path.length);
         }

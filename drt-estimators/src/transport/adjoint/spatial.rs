@@ -137,10 +137,10 @@ impl Differentiator<'_> {
                 if sink.interest().shapes[point.shape as usize] {
                     sink.surface(&point.material(), &lift);
                 }
-                here = SurfaceAdjoint { u: back, ..SurfaceAdjoint::default() };
+                here = SurfaceAdjoint::of_place(back);
             } else if let Some(vertex) = node.vertex() {
                 let held = here.u * node.hold.share;
-                send(vertex, &SurfaceAdjoint { u: held, ..SurfaceAdjoint::default() }, sink);
+                send(vertex, &SurfaceAdjoint::of_place(held), sink);
                 here.u -= held;
             }
             let u = &mut here.u;
@@ -189,7 +189,7 @@ fn pull<S: AdjointSink>(tow: &Tow, dir: Vec3, g: Rgb, sink: &mut S) -> RgbVec {
     let n = tow.point.ng;
     let u = g.outer(n / n.dot(dir));
     if sink.interest().shapes[tow.point.shape as usize] {
-        sink.surface(&tow.point.material(), &SurfaceAdjoint { u, ..SurfaceAdjoint::default() });
+        sink.surface(&tow.point.material(), &SurfaceAdjoint::of_place(u));
     }
     u
 }
