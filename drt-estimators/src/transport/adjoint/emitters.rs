@@ -3,9 +3,9 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use super::{Differentiator, Far, Form, Stretch, moves, send, turn};
+use super::{Differentiator, Far, Form, Stretch, send, turn};
 use crate::emitter::EmitterGradient;
-use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
+use crate::sensitivity::{AdjointSink, Interest, SurfaceAdjoint};
 use crate::transport::hold::Hold;
 use crate::transport::lights::{LightKind, LightSample};
 use crate::transport::vertex::{Kind, Vertex};
@@ -33,16 +33,19 @@ impl Differentiator<'_> {
                 if emitter {
                     strength_of(light.emitter, per_value, sink);
                 }
-                let moving = near_moves || moves(&end, sink.interest(), false);
+                let moving = near_moves || light_moves(light, sink.interest());
+                if !moving {
+                    self.segment(path, Far::Direction, false, weight, here, sink);
+                    return;
+                }
                 let hold = match self.form {
                     Form::Material => Hold { share: 1.0, ..Hold::default() },
-                    Form::Spatial if moving => self.world.hold(viewer, &end, path.dir, path.length),
-                    Form::Spatial => Hold::default(),
+                    Form::Spatial => self.world.hold(viewer, &end, path.dir, path.length),
                 };
                 let free = weight * (1.0 - hold.share);
                 self.segment(path, Far::Direction, near_moves, free, here, sink);
                 let mut lit = self.held(path, &end, near_moves, weight * hold.share, here, sink);
-                if moving && let Some(to_wi) = to_wi {
+                if let Some(to_wi) = to_wi {
                     let g = turn(&(to_wi * hold.share), light.w, light.distance);
                     lit.u += g;
                     here.u -= g;
@@ -108,6 +111,14 @@ impl Differentiator<'_> {
             }
             sink.emitter(light.emitter, &gradients);
         }
+    }
+}
+
+/// True when a connection's end at a light may move.
+pub(super) fn light_moves(light: &LightSample, interest: &Interest) -> bool {
+    match &light.kind {
+        LightKind::Area(s) => interest.shapes[s.shape as usize],
+        LightKind::Position | LightKind::Direction => interest.emitters[light.emitter],
     }
 }
 

@@ -27,7 +27,7 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Coefficients;
 
-use emitters::strength;
+use emitters::{light_moves, strength};
 use pairs::Apart;
 use segment::{Far, Stretch};
 
@@ -179,6 +179,12 @@ impl<'w> Differentiator<'w> {
         }
     }
 
+    /// True when a node, or the one before it, moves.
+    fn arrival_moves(&self, record: &PathRecord, k: usize, interest: &Interest) -> bool {
+        let before = record.nodes[k].arrival.as_ref().map(|a| a.parent as usize);
+        before.into_iter().chain([k]).any(|n| self.moves(record, n, interest))
+    }
+
     /// What of a node's motion turns the segment to it.
     fn share(&self, record: &PathRecord, k: usize) -> f64 {
         match self.form {
@@ -225,14 +231,16 @@ impl<'w> Differentiator<'w> {
         };
         let mut there = core::mem::take(&mut self.locals[p].at);
         let vertex = record.nodes[k].vertex();
-        let near_moves = self.moves(record, p, sink.interest());
+        let [near_moves, far_moves] = [p, k].map(|n| self.moves(record, n, sink.interest()));
         // The scattering function of the parent sees the two ends of the segment as a direction.
         if parent.arrival.is_some() {
             let adjoint = theta * value * parent.inv_pdf;
             let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
             let behind = self.behind(record, p);
             let (wi, paired) = (parent.wi, Some(Apart::of(record, parent)));
-            let to_wi = self.scattering(&from, wo, wi, paired, adjoint, behind, &mut there, sink);
+            let moving = far_moves || self.arrival_moves(record, p, sink.interest());
+            let to_wi =
+                self.scattering(&from, wo, wi, paired, adjoint, behind, moving, &mut there, sink);
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
                 let g = turn(&(to_wi * self.share(record, k)), parent.wi, arrival.distance);
                 there.u -= g;
@@ -255,9 +263,13 @@ impl<'w> Differentiator<'w> {
                 if p == 0 {
                     self.seen(vertex, arrival.dir, value, parent.value, here, sink);
                 }
-                let moving = near_moves || self.moves(record, k, sink.interest());
+                let moving = near_moves || far_moves;
                 let far = vertex.map_or(Far::Direction, |v| Far::Vertex(v, here));
                 self.segment(&path, far, moving, weight, &mut there, sink);
+            }
+            // No ray moves; what is between may.
+            (Form::Spatial, _) if !(near_moves || far_moves) => {
+                self.segment(&path, Far::Direction, false, weight, &mut there, sink);
             }
             (Form::Spatial, _) => {
                 let hold = &record.nodes[k].hold;
@@ -296,7 +308,7 @@ impl<'w> Differentiator<'w> {
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
     /// behind `wo`, by normals and by materials, but for what is `paired`. Returns that by the direction `wi`,
-    /// which is the caller's.
+    /// which is the caller's. Unless something of this is `moving`, only the material counts.
     #[allow(clippy::too_many_arguments)]
     fn scattering<S: AdjointSink>(
         &mut self,
@@ -306,6 +318,7 @@ impl<'w> Differentiator<'w> {
         paired: Option<Apart<'_>>,
         adjoint: Rgb,
         behind: Option<Behind>,
+        moving: bool,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
     ) -> Option<RgbVec> {
@@ -315,7 +328,7 @@ impl<'w> Differentiator<'w> {
             Kind::Surface(s) => interest.bsdfs[world.scene.shapes[s.shape as usize].bsdf],
             _ => v.medium.is_some_and(|m| interest.media[m]),
         };
-        if adjoint.is_zero() || !(material || interest.sensor || geometry_moves(interest)) {
+        if adjoint.is_zero() || !(material || moving) {
             return None;
         }
         let mut d = world.scattering(v)?.gradient(wo, wi);
@@ -370,14 +383,13 @@ impl<'w> Differentiator<'w> {
         let node = &record.nodes[k];
         let Some(arrival) = &node.arrival else { return sum };
         let behind = self.behind(record, k);
-        let moving = match self.form {
-            Form::Material => moves(vertex, sink.interest(), false),
-            Form::Spatial => node.carried,
-        };
+        let moving = self.moves(record, k, sink.interest());
+        let arrives = self.arrival_moves(record, k, sink.interest());
         for (c, crossings) in &record.connections[node.connections.clone()] {
             let rest = c.rest();
             sum += c.f * rest;
             let light = &c.light;
+            let turns = arrives || light_moves(light, sink.interest());
             let to_wi = self.scattering(
                 vertex,
                 -arrival.dir,
@@ -385,6 +397,7 @@ impl<'w> Differentiator<'w> {
                 None,
                 theta * rest,
                 behind,
+                turns,
                 here,
                 sink,
             );
@@ -485,10 +498,6 @@ impl<'w> Differentiator<'w> {
 /// Gradient by the far end of a segment, from that by its unit direction `w`.
 fn turn(g: &RgbVec, w: Vec3, distance: f64) -> RgbVec {
     g.map(|g| g.reject(w) / distance)
-}
-
-fn geometry_moves(interest: &Interest) -> bool {
-    [&interest.shapes, &interest.volumes, &interest.emitters].into_iter().any(|l| l.contains(&true))
 }
 
 fn moves(v: &Vertex, interest: &Interest, camera: bool) -> bool {
