@@ -218,7 +218,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let weight = Rgb::splat(s.weight);
         // What places an edge comes before what the path takes an unknown number of.
         let mut rng = rng;
-        let look = self.along.looks.any().then(|| Look::new(&mut rng));
+        let look = self.along.looks.any().then(|| Look::reserve(&mut rng));
         self.tracer.rng = rng;
         let Some(sink) = &mut self.sink else {
             let mut radiance = Radiance::default();
@@ -283,7 +283,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     }
 
     /// Looks for edges; the `first` look has the best numbers.
-    fn edges(&mut self, radiative: &Radiative, first: Look, values: &mut [Rgb]) {
+    fn edges(&mut self, radiative: &Radiative, mut first: Rng, values: &mut [Rgb]) {
         match self.along.looks {
             Looks::Average(looks) => {
                 let mut left = looks;
@@ -291,16 +291,18 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                     // A part of a look is one now and then.
                     let rng = &mut self.tracer.rng;
                     let taken = left >= 1.0 || rng.next_f64() < left;
-                    let look = if left == looks { first } else { Look::new(rng) };
+                    let numbers = if left == looks { &mut first } else { rng };
                     left -= 1.0;
-                    let edge = taken.then(|| radiative.edge(&mut self.tracer, &self.record, &look));
-                    self.send(edge.flatten(), 1.0 / looks, values);
+                    let look = taken.then(|| Look::new(numbers));
+                    let edge =
+                        look.and_then(|look| radiative.edge(&mut self.tracer, &self.record, &look));
+                    self.send(edge, 1.0 / looks, values);
                 }
             }
             Looks::EveryVertex => {
                 for node in 1..self.record.nodes.len() {
                     let rng = &mut self.tracer.rng;
-                    let look = if node == 1 { first } else { Look::new(rng) };
+                    let look = Look::new(if node == 1 { &mut first } else { rng });
                     let edge = radiative.edge_from(&mut self.tracer, &self.record, node, &look);
                     self.send(edge, 1.0, values);
                 }

@@ -92,6 +92,24 @@ impl Rng {
     pub fn next_2d(&mut self) -> [f64; 2] {
         [self.next_f64(), self.next_f64()]
     }
+
+    /// Leaves out so many uniform numbers, at hardly any cost where they are leading ones.
+    ///
+    /// ```
+    /// use drt_math::Rng;
+    /// let (mut rng, mut other) = (Rng::new(1, 2, 3), Rng::new(1, 2, 3));
+    /// rng.skip(2);
+    /// other.next_2d();
+    /// assert_eq!(rng.next_f64(), other.next_f64());
+    /// ```
+    pub fn skip(&mut self, numbers: u32) {
+        let leading = u32::min(numbers, self.leading);
+        self.leading -= leading;
+        self.points.skip(leading);
+        for _ in leading..numbers {
+            self.next_u64();
+        }
+    }
 }
 
 /// The centre of interval `k` of 2^52.
@@ -174,6 +192,20 @@ mod tests {
         assert!(p > SIGNIFICANCE, "{p}");
         let p = square(&mut (0..N).map(|i| [first(2, i % 1000), first(3, i % 1000)]));
         assert!(p < SIGNIFICANCE, "numbers used over and over: {p}");
+    }
+
+    #[test]
+    fn what_is_skipped_is_what_would_be_drawn() {
+        use crate::sobol::SET_DIMENSIONS;
+        let new = || Rng::new(1, 2, 3).led_by(SobolSampler::new(4, 5), SET_DIMENSIONS + 3);
+        for numbers in [0, 1, 7, SET_DIMENSIONS, SET_DIMENSIONS + 2, SET_DIMENSIONS + 9] {
+            let (mut skipped, mut drawn) = (new(), new());
+            skipped.skip(numbers);
+            (0..numbers).for_each(|_| drop(drawn.next_f64()));
+            for _ in 0..5 {
+                assert_eq!(skipped.next_f64(), drawn.next_f64(), "{numbers}");
+            }
+        }
     }
 
     #[test]

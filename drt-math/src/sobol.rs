@@ -62,6 +62,15 @@ impl SobolSampler {
         x
     }
 
+    /// Leaves out so many coordinates.
+    pub(crate) fn skip(&mut self, coordinates: u32) {
+        let set = self.dimension / SET_DIMENSIONS;
+        self.dimension = self.dimension.wrapping_add(coordinates);
+        if self.dimension / SET_DIMENSIONS != set {
+            self.shuffled = shuffled(self.index, self.dimension / SET_DIMENSIONS, self.seed);
+        }
+    }
+
     /// The next two coordinates.
     #[inline]
     pub fn next_2d(&mut self) -> [f64; 2] {

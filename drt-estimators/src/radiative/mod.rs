@@ -108,6 +108,16 @@ pub(crate) struct Look {
 }
 
 impl Look {
+    /// How many numbers it takes.
+    const NUMBERS: u32 = 4;
+
+    /// The generator of a look to be taken later, if at all.
+    pub(crate) fn reserve(rng: &mut Rng) -> Rng {
+        let reserved = rng.clone();
+        rng.skip(Self::NUMBERS);
+        reserved
+    }
+
     pub(crate) fn new(rng: &mut Rng) -> Self {
         Self { vertex: rng.next_f64(), way: rng.next_f64(), point: rng.next_2d() }
     }
