@@ -63,6 +63,9 @@ const MOST: f64 = 8.0;
 /// for their cost.
 const NARROW: f64 = 0.15;
 
+/// The same of mirrors whose rays both end on matter.
+const NARROW_MIRROR: f64 = 0.07;
+
 /// A part of the logarithmic derivative of a scattering function that pairs tell.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Paired {
@@ -258,7 +261,11 @@ impl Pairs {
                     || (node.carried && (node.hold.share > 0.0 || world.is_smooth(s)))
             }
         };
-        (world.bends_light(v) || seen || moves()) && world.lobe_width(v) < NARROW
+        let narrow = match form {
+            Form::Material if !world.bsdf_of(s.shape).is_transmissive() => NARROW_MIRROR,
+            _ => NARROW,
+        };
+        (world.bends_light(v) || seen || moves()) && world.lobe_width(v) < narrow
     }
 
     /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring; `brought` is a
