@@ -65,6 +65,15 @@ impl AlongRays<'_> {
         flux.into_iter().chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
     }
 
+    /// Of so many `layers`, where terms and these are kept apart, the first one of looks; and how many each path
+    /// takes. Looks from every vertex belong to their path, and have none.
+    pub(crate) fn first_of_looks(&self, parameters: usize, layers: usize) -> (usize, f64) {
+        match self.looks {
+            Looks::Average(looks) if looks > 0.0 => (layers - 2 * parameters, looks),
+            _ => (layers, 1.0),
+        }
+    }
+
     /// Layers of a sample: the image, a derivative per parameter, and where terms are kept apart
     /// those of each parameter.
     pub(crate) fn layers(&self, parameters: usize, separate: bool) -> usize {

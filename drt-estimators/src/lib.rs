@@ -32,6 +32,7 @@ mod reverse;
 mod riding;
 mod scene;
 mod scene_gradient;
+mod scouts;
 mod sensitivity;
 pub mod sensor;
 mod session;

@@ -9,6 +9,7 @@ use crate::film::BATCHES;
 use crate::flux::{EdgeOn, Flux};
 use crate::interior::{AlongRays, Looks};
 use crate::radiative::Radiative;
+use crate::scouts;
 use crate::sensitivity::Interest;
 use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::{Source, Splatter};
@@ -30,6 +31,8 @@ pub(crate) struct Prepared {
     opposites: bool,
     /// Boundary samples of each kind to each sample of a pixel, by the settings alone.
     boundary_ratio: f64,
+    /// The part that edges which the camera sees take of theirs.
+    part_of_camera: f64,
     /// Of the spatial form.
     looks: Looks,
 }
@@ -43,10 +46,27 @@ impl Prepared {
         settings: &Settings,
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
+        let prepared = match settings.estimator {
+            EstimatorKind::Radiative if interest.any() => {
+                Self::spatial(world, interest, settings, motion)?
+            }
+            _ => Self::material(world, interest, flux_shapes, settings)?,
+        };
+        // A pilot sees more.
+        let pilot = settings.adaptive && settings.boundary_spp.is_none();
+        let Some(motion) = motion.filter(|_| !pilot) else { return Ok(prepared) };
+        let part_of_camera = scouts::part_of_camera(&prepared, motion, prepared.boundary_ratio);
+        Ok(Self { part_of_camera, ..prepared })
+    }
+
+    /// For the path-space estimator.
+    fn material(
+        world: World,
+        interest: &Interest,
+        flux_shapes: &[usize],
+        settings: &Settings,
+    ) -> Result<Self, Error> {
         let moving = interest.moves_geometry();
-        if settings.estimator == EstimatorKind::Radiative && interest.any() {
-            return Self::spatial(world, interest, settings, motion);
-        }
         let boundary = if moving { Boundary::new(&world, interest)? } else { Boundary::default() };
         let flux = Flux::new(&world, flux_shapes, interest);
         let mut sources = Vec::new();
@@ -66,6 +86,7 @@ impl Prepared {
         let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
         Ok(Self {
             boundary_ratio: boundary_ratio(settings, kinds),
+            part_of_camera: 1.0,
             looks: Looks::default(),
             radiative: None,
             world,
@@ -121,6 +142,7 @@ impl Prepared {
             edge_on,
             sources,
             boundary_ratio,
+            part_of_camera: 1.0,
             looks,
         })
     }
@@ -143,7 +165,9 @@ impl Prepared {
 
     /// Samples of a splatted source to each of a pixel, by the settings alone.
     pub(crate) fn source_ratio(&self, i: usize) -> f64 {
-        self.boundary_ratio * self.sources[i].part()
+        let source = self.sources[i];
+        let part = if scouts::is_of_camera(source) { self.part_of_camera } else { 1.0 };
+        self.boundary_ratio * part * source.part()
     }
 
     /// Samples of each batch of a splatted source that takes so many per pixel.

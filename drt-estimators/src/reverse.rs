@@ -4,8 +4,8 @@
 //! With a_i = dLoss/dI_i at pixel i, the gradient is Σ_i a_i dI_i/dq for every quantity q. The
 //! sensitivities that forward mode contracts with velocities are scattered instead, each times its
 //! pixel's adjoint: to vertices through the transposed jets, those of volume vertices by way of the
-//! vertices of tetrahedra, to voxels through the transposed interpolation. Cost does not grow with the number of quantities. For the same seed
-//! ⟨a, J v⟩ = ⟨Jᵀ a, v⟩ up to rounding.
+//! vertices of tetrahedra, to voxels through the transposed interpolation. Cost does not grow with the number of quantities. For the same seed, without
+//! [`guiding`](Settings::guiding), ⟨a, J v⟩ = ⟨Jᵀ a, v⟩ up to rounding.
 
 use alloc::vec::Vec;
 
@@ -48,7 +48,7 @@ use crate::{Error, tangents};
 ///
 /// If [`Settings::insides`] asks for [`InsideKind::Tetrahedral`](crate::InsideKind::Tetrahedral), given
 /// or not, these are taken, without velocities given along with them. For the same seed forward mode
-/// with the same settings is then the exact transpose, unless shapes touch that move differently: no
+/// with the same settings, without [`guiding`](Settings::guiding), is then the exact transpose, unless shapes touch that move differently: no
 /// field follows both, and the flux through what is left behind is added here. Other kinds of insides
 /// have no transpose here, and count as not asked for. By [`EstimatorKind::Radiative`] insides stay static
 /// here in any case; there forward mode is the transpose where either of the two kinds is asked for, as without it

@@ -60,7 +60,7 @@ pub struct Settings {
     pub spp: u32,
     /// Boundary samples of all kinds together, per pixel on average; `None` is as many as `spp`, or if
     /// [`adaptive`](Self::adaptive) as many of each kind as are worth their time. The kinds share them in equal
-    /// parts, of which edges seen from the camera leave three quarters: they are soon known well.
+    /// parts, of which edges seen from the camera leave up to three quarters where they are soon known well enough.
     pub boundary_spp: Option<u32>,
     /// Path depth; `None` takes the scene's, `Some(None)` is unlimited.
     pub max_depth: Option<Option<u32>>,

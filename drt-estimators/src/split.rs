@@ -25,7 +25,7 @@ const RANGE: [f64; 2] = [0.25, 4.0];
 const FEWEST_EVEN: f64 = 0.03125;
 
 /// What a sample costs besides its rays, in rays: to choose an edge and to look at what is around it.
-const BESIDES: f64 = 1.0;
+pub(crate) const BESIDES: f64 = 1.0;
 
 /// What a pilot has seen of a term.
 #[derive(Clone, Debug)]

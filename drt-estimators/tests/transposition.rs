@@ -16,7 +16,7 @@ use drt_motion::{Effect, GeometryChange, Parameter};
 /// Every inside moves as said.
 fn with(kind: &InsideKind) -> Settings {
     let insides = vec![(0, kind.clone()), (1, kind.clone())];
-    Settings { spp: 16, seed: 3, threads: 1, insides, ..Settings::default() }
+    Settings { spp: 16, seed: 3, threads: 1, guiding: false, insides, ..Settings::default() }
 }
 
 /// Insides stay, and the flux is added.
@@ -71,7 +71,7 @@ fn agree(name: &str, scene: &Scene, effects: Vec<Effect>, settings: &Settings) {
 const EXACT: f64 = 1e-12;
 
 fn radiative(settings: &Settings) -> Settings {
-    Settings { estimator: EstimatorKind::Radiative, guiding: false, ..settings.clone() }
+    Settings { estimator: EstimatorKind::Radiative, ..settings.clone() }
 }
 
 fn by_one_estimator(

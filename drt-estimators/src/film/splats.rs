@@ -72,6 +72,11 @@ impl Splats {
         self.events[layer].push(v);
     }
 
+    /// Calls `each` for every pixel of a layer that something was added to.
+    pub(crate) fn for_each(&self, layer: usize, each: impl FnMut(usize, Rgb)) {
+        self.layers[layer].for_each(each);
+    }
+
     /// To be called after the last sample.
     pub(crate) fn settled(mut self) -> Self {
         for layer in &mut self.layers {

@@ -6,7 +6,6 @@ use super::{Part, Pixels, Round};
 use crate::allocation::Allocation;
 use crate::contraction::Motion;
 use crate::film::{PixelFilm, SplatFilm};
-use crate::interior::Looks;
 use crate::split::{Observed, Split};
 
 /// What a pilot found out.
@@ -27,21 +26,16 @@ impl Part {
     ) -> bool {
         let n = self.motion.as_ref().map_or(0, Motion::parameters);
         let along = self.prepared.along_rays();
-        // Looks from every vertex belong to its path.
-        let (edges, looks) = match along.looks {
-            Looks::Average(looks) if looks > 0.0 => (2, looks),
-            _ => (0, 1.0),
-        };
         let mut film = PixelFilm::new(self.pixels.size(), along.layers(n, true));
+        let (first_look, looks) = along.first_of_looks(n, film.layers());
         let pass = Pixels { seed: !self.settings.seed, separate: true };
         let (account, done) = self.fill(&mut film, pass, round, units, |_, _| {}, progress);
         let observed = self.settings.boundary_spp.is_none().then(|| {
             let samples = f64::from(units * self.per_unit());
-            let looking = if edges > 0 { account.looking } else { 0 };
+            let looking = if first_look < film.layers() { account.looking } else { 0 };
             let rays = [account.counters.rays - looking, looking];
             let seen = Seen { film: &film, samples, parameters: n };
-            let first = film.layers() - edges * n;
-            [(1..first, rays[0], 1.0), (first..film.layers(), rays[1], looks)]
+            [(1..first_look, rays[0], 1.0), (first_look..film.layers(), rays[1], looks)]
                 .map(|(layers, rays, each)| seen.term(layers, rays, each))
         });
         self.account.add(account);
@@ -56,7 +50,6 @@ impl Part {
         }
         // Of one derivative, what is seen at edges counts by how many looks there will be.
         let per_look = split.as_ref().map_or(1.0, |split| looks / split.looks);
-        let first_look = film.layers() - edges * n;
         let layers = film.layers();
         let counted = (1..=n).map(|p| {
             let weight = |l: usize| if l >= first_look { per_look } else { 1.0 };
@@ -73,7 +66,10 @@ impl Part {
         let size = self.pixels.size();
         let n = self.motion.as_ref().map_or(0, Motion::parameters);
         let mut film = SplatFilm::new(size, n);
-        let per_pixel = f64::from(units * self.per_unit()) * self.source_ratio(i);
+        // Where no sample counts much more than others, few tell enough.
+        let even = self.prepared.sources[i].is_even();
+        let part = if even { 0.25 } else { 1.0 };
+        let per_pixel = part * f64::from(units * self.per_unit()) * self.source_ratio(i);
         let seed = !self.settings.seed;
         let (account, going) = self.splat(&mut film, i, seed, per_pixel, round, |_| {});
         let samples = film.samples();
@@ -81,7 +77,6 @@ impl Part {
         let variance = (0..n).map(|p| per_pixel * film.variance(p)).collect();
         let rays = account.counters.rays as f64 / samples;
         self.account.add(account);
-        let even = self.prepared.sources[i].is_even();
         going.then_some(Observed { variance, rays, even })
     }
 }

@@ -1,0 +1,163 @@
+//! How many of the boundary samples go to edges that the camera sees.
+//!
+//! Kinds of boundary samples share [`Settings::boundary_spp`](crate::Settings::boundary_spp). In equal parts those of the
+//! camera often make a hundredth of the noise in a third of the time, as what differs beside an edge is about as noisy as an
+//! image; but where a lamp is in view, and that or the camera moves, they make nearly all of it. So before a run
+//! a few samples of all terms tell which it is. With the variance v and cost c of a sample, and those of paths (v₁, c₁) and of the
+//! other kinds (v_k, c_k), of which there are one and r₀ to a path, [least work](crate::split) for one derivative would be the part
+//!
+//! ```text
+//! p = √(v / c) / max(r₀ √(v₁ / c₁), √(v_k / c_k))
+//! ```
+//!
+//! of an equal one. The camera's edges take a quarter of that, of the derivative that needs them most, but at least 1/4, at most 1, and a power of two
+//! from above. The quarter is for what scouts do not see: other terms have rare samples, which make most of their noise. (In rooms and
+//! fog 256 looks from vertices saw a fifth to a fortieth of the looks' variance.) No other term takes less for
+//! this, and what scouts see has no part in the images.
+
+use alloc::vec::Vec;
+
+use drt_math::sobol::SobolSampler;
+use drt_math::{Real, Rgb};
+
+use crate::boundary::Strategy;
+use crate::contraction::{Contraction, Motion};
+use crate::interior::PixelSampler;
+use crate::pixels::Sampler;
+use crate::prepared::Prepared;
+use crate::splatting::{Checked, Source, ToImages};
+use crate::split::{BESIDES, Observed};
+
+/// Samples of pixels, and of each kind that lands anywhere.
+const SCOUTS: u32 = 256;
+
+/// Their seed: the same whatever samples a run takes.
+const SEED: u64 = 0x7363_6f75_7473;
+
+/// The smallest part that is taken of an equal one.
+const LEAST: f64 = 0.25;
+
+/// This part of what scouts have seen of p counts.
+const UNSEEN: f64 = 0.25;
+
+/// True for the edges that the camera sees.
+pub(crate) fn is_of_camera(source: Source) -> bool {
+    matches!(source, Source::Outlines | Source::Edges(Strategy::Primary))
+}
+
+/// The part that the camera's edges take of an `equal` one, which is in samples to a path.
+pub(crate) fn part_of_camera(prepared: &Prepared, motion: &Motion, equal: f64) -> f64 {
+    let Some(camera) = prepared.sources.iter().position(|s| is_of_camera(*s)) else { return 1.0 };
+    let [paths, looks] = from_pixels(prepared, motion);
+    let seen = |source: &Source| anywhere(prepared, motion, *source);
+    let mut others: Vec<Observed> = prepared.sources.iter().map(seen).collect();
+    let camera = others.swap_remove(camera);
+    others.push(looks);
+    part(&camera, &paths, &others, equal)
+}
+
+/// p, as a power of two.
+fn part(camera: &Observed, paths: &Observed, others: &[Observed], equal: f64) -> f64 {
+    let worth = |term: &Observed, q: usize| Real::sqrt(term.variance[q] / (term.rays + BESIDES));
+    let need = |q: usize| {
+        let most = others.iter().map(|o| worth(o, q)).fold(equal * worth(paths, q), f64::max);
+        // NaN, which is no need, where nothing is noisy.
+        worth(camera, q) / most
+    };
+    let wanted = UNSEEN * (0..paths.variance.len()).map(need).fold(0.0, f64::max);
+    let mut part = 1.0;
+    while part > LEAST && wanted <= 0.5 * part {
+        part *= 0.5;
+    }
+    part
+}
+
+/// What is seen of paths, and of looks from them.
+fn from_pixels(prepared: &Prepared, motion: &Motion) -> [Observed; 2] {
+    let (world, along) = (&prepared.world, prepared.along_rays());
+    let n = motion.parameters();
+    let mut values = alloc::vec![Rgb::ZERO; along.layers(n, true)];
+    let mut squares = alloc::vec![0.0; values.len()];
+    let sink = Some(Contraction::new(world, motion));
+    let mut sampler = PixelSampler::new(world, sink, along, SEED, prepared.antithetic, true);
+    let [w, h] = world.camera.film();
+    for i in 0..SCOUTS {
+        let pixel = u64::from(i) * u64::from(w) * u64::from(h) / u64::from(SCOUTS);
+        sampler.sample(pixel as u32, i, SobolSampler::new(SEED as u32, i), &mut values);
+        squares.iter_mut().zip(&values).for_each(|(sum, v)| *sum += v.dot(*v));
+    }
+    let account = sampler.account();
+    let paths = account.counters.paths as f64;
+    let per_path = paths / f64::from(SCOUTS);
+    let of = |layers: core::ops::Range<usize>, rays: u64, each: f64| {
+        let mut variance = alloc::vec![0.0; n];
+        for l in layers {
+            variance[(l - 1) % n] += each * per_path * squares[l] / f64::from(SCOUTS);
+        }
+        Observed { variance, rays: rays as f64 / (each * paths), even: false }
+    };
+    let (first_look, each) = along.first_of_looks(n, values.len());
+    let looking = if first_look < values.len() { account.looking } else { 0 };
+    [
+        of(1..first_look, account.counters.rays - looking, 1.0),
+        of(first_look..values.len(), looking, each),
+    ]
+}
+
+/// What is seen of samples that land anywhere.
+fn anywhere(prepared: &Prepared, motion: &Motion, source: Source) -> Observed {
+    let world = &prepared.world;
+    let splatter = prepared.splatter(SEED);
+    let mut variance = alloc::vec![0.0; motion.parameters()];
+    let mut rays = 0;
+    // Each pixel is the mean over the samples of all pixels.
+    let [w, h] = world.camera.film();
+    let pixels = f64::from(w) * f64::from(h);
+    let scale = 1.0 / (pixels * pixels * f64::from(SCOUTS));
+    for i in 0..SCOUTS {
+        let mut scout = Checked::new(ToImages::new(world, motion));
+        rays += splatter.run(source, source.stream() + u64::from(i), 1, &mut scout).counters.rays;
+        let splats = scout.inner.splats.settled();
+        for (p, sum) in variance.iter_mut().enumerate() {
+            splats.for_each(p, |_, v| *sum += scale * v.dot(v));
+        }
+    }
+    Observed { variance, rays: rays as f64 / f64::from(SCOUTS), even: source.is_even() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn observed(variance: [f64; 2], cost: f64) -> Observed {
+        Observed { variance: variance.to_vec(), rays: cost - BESIDES, even: false }
+    }
+
+    #[test]
+    fn the_neediest_derivative_decides() {
+        let paths = observed([1.0, 1.0], 4.0);
+        let others = [observed([4.0, 0.1], 4.0), observed([0.0, 0.2], 4.0)];
+        let of = |camera: [f64; 2]| part(&observed(camera, 16.0), &paths, &others, 0.5);
+        // By one derivative p is √(v / 16) / √(4 / 4), by the other √(v / 16) / √(1 / 16).
+        for (camera, expected) in [
+            ([0.01, 0.0], 0.25),
+            ([63.0, 0.0], 0.5),
+            ([65.0, 0.0], 1.0),
+            ([0.01, 0.9], 0.25),
+            ([0.01, 3.9], 0.5),
+            ([0.01, 4.1], 1.0),
+        ] {
+            let own = of(camera);
+            assert_eq!(own, expected, "{camera:?}");
+        }
+    }
+
+    #[test]
+    fn without_other_noise_all_is_taken() {
+        let none = observed([0.0; 2], 4.0);
+        let of = |camera: [f64; 2]| part(&observed(camera, 16.0), &none, &[none.clone()], 0.5);
+        assert_eq!(of([1e-9, 0.0]), 1.0);
+        // There is nothing to sample.
+        assert_eq!(of([0.0; 2]), LEAST);
+    }
+}
