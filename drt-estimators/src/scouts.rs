@@ -76,15 +76,22 @@ fn part(camera: &Observed, paths: &Observed, others: &[Observed], equal: f64) ->
 fn from_pixels(prepared: &Prepared, motion: &Motion) -> [Observed; 2] {
     let (world, along) = (&prepared.world, prepared.along_rays());
     let n = motion.parameters();
-    let mut values = alloc::vec![Rgb::ZERO; along.layers(n, true)];
-    let mut squares = alloc::vec![0.0; values.len()];
+    let layers = along.layers(n, true);
+    let [mut one, mut other] = [0, 1].map(|_| alloc::vec![Rgb::ZERO; layers]);
+    let mut squares = alloc::vec![0.0; layers];
     let sink = Some(Contraction::new(world, motion));
     let mut sampler = PixelSampler::new(world, sink, along, SEED, prepared.antithetic, true);
     let [w, h] = world.camera.film();
-    for i in 0..SCOUTS {
-        let pixel = u64::from(i) * u64::from(w) * u64::from(h) / u64::from(SCOUTS);
-        sampler.sample(pixel as u32, i, SobolSampler::new(SEED as u32, i), &mut values);
-        squares.iter_mut().zip(&values).for_each(|(sum, v)| *sum += v.dot(*v));
+    for i in 0..SCOUTS / 2 {
+        // Two in a pixel differ by their noise alone.
+        let pixel = u64::from(i) * u64::from(w) * u64::from(h) / u64::from(SCOUTS / 2);
+        for (k, values) in (0..).zip([&mut one, &mut other]) {
+            sampler.sample(pixel as u32, k, SobolSampler::new(SEED as u32 + i, k), values);
+        }
+        for (sum, (a, b)) in squares.iter_mut().zip(one.iter().zip(&other)) {
+            let d = *a - *b;
+            *sum += d.dot(d);
+        }
     }
     let account = sampler.account();
     let paths = account.counters.paths as f64;
@@ -96,12 +103,9 @@ fn from_pixels(prepared: &Prepared, motion: &Motion) -> [Observed; 2] {
         }
         Observed { variance, rays: rays as f64 / (each * paths), even: false }
     };
-    let (first_look, each) = along.first_of_looks(n, values.len());
-    let looking = if first_look < values.len() { account.looking } else { 0 };
-    [
-        of(1..first_look, account.counters.rays - looking, 1.0),
-        of(first_look..values.len(), looking, each),
-    ]
+    let (first_look, each) = along.first_of_looks(n, layers);
+    let looking = if first_look < layers { account.looking } else { 0 };
+    [of(1..first_look, account.counters.rays - looking, 1.0), of(first_look..layers, looking, each)]
 }
 
 /// What is seen of samples that land anywhere.
