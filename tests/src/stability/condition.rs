@@ -149,7 +149,7 @@ fn transposed(scene: &Scene, parameter: &Parameter) -> Result<Transposed> {
     let scene = &scene;
     // Reverse mode leaves insides at rest.
     let insides = (0..scene.media.len()).map(|m| (m, InsideKind::Static)).collect();
-    let settings = Settings { threads: 1, spp: 4, insides, ..Settings::default() };
+    let settings = Settings { threads: 1, spp: 4, guiding: false, insides, ..Settings::default() };
     let mut forward = Session::new(scene, core::slice::from_ref(&parameter), &settings)?;
     forward.run(settings.spp, &Unattended);
     let forward = forward.rendering();
