@@ -159,7 +159,9 @@ mod tests {
     #[test]
     fn without_other_noise_all_is_taken() {
         let none = observed([0.0; 2], 4.0);
-        let of = |camera: [f64; 2]| part(&observed(camera, 16.0), &none, &[none.clone()], 0.5);
+        let of = |camera: [f64; 2]| {
+            part(&observed(camera, 16.0), &none, core::slice::from_ref(&none), 0.5)
+        };
         assert_eq!(of([1e-9, 0.0]), 1.0);
         // There is nothing to sample.
         assert_eq!(of([0.0; 2]), LEAST);
