@@ -166,7 +166,7 @@ impl Prepared {
     /// Samples of a splatted source to each of a pixel, by the settings alone.
     pub(crate) fn source_ratio(&self, i: usize) -> f64 {
         let source = self.sources[i];
-        let part = if scouts::is_of_camera(source) { self.part_of_camera } else { 1.0 };
+        let part = if source.is_of_camera() { self.part_of_camera } else { 1.0 };
         self.boundary_ratio * part * source.part()
     }
 

@@ -12,7 +12,7 @@
 //!
 //! of an equal one. The camera's edges take a quarter of that, of the derivative that needs them most, but at least 1/4, at most 1, and a power of two
 //! from above. The quarter is for what scouts do not see: other terms have rare samples, which make most of their noise. (In rooms and
-//! fog 256 looks from vertices saw a fifth to a fortieth of the looks' variance.) No other term takes less for
+//! fog 256 looks from vertices saw a sixth to a fortieth of the looks' variance.) No other term takes less for
 //! this, and what scouts see has no part in the images.
 
 use alloc::vec::Vec;
@@ -20,7 +20,6 @@ use alloc::vec::Vec;
 use drt_math::sobol::SobolSampler;
 use drt_math::{Real, Rgb};
 
-use crate::boundary::Strategy;
 use crate::contraction::{Contraction, Motion};
 use crate::interior::PixelSampler;
 use crate::pixels::Sampler;
@@ -40,14 +39,9 @@ const LEAST: f64 = 0.25;
 /// This part of what scouts have seen of p counts.
 const UNSEEN: f64 = 0.25;
 
-/// True for the edges that the camera sees.
-pub(crate) fn is_of_camera(source: Source) -> bool {
-    matches!(source, Source::Outlines | Source::Edges(Strategy::Primary))
-}
-
 /// The part that the camera's edges take of an `equal` one, which is in samples to a path.
 pub(crate) fn part_of_camera(prepared: &Prepared, motion: &Motion, equal: f64) -> f64 {
-    let Some(camera) = prepared.sources.iter().position(|s| is_of_camera(*s)) else { return 1.0 };
+    let Some(camera) = prepared.sources.iter().position(|s| s.is_of_camera()) else { return 1.0 };
     let [paths, looks] = from_pixels(prepared, motion);
     let seen = |source: &Source| anywhere(prepared, motion, *source);
     let mut others: Vec<Observed> = prepared.sources.iter().map(seen).collect();

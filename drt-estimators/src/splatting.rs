@@ -56,6 +56,11 @@ impl Source {
         if self == Self::EdgeOn { 0.0625 } else { 1.0 }
     }
 
+    /// True for the edges that the camera sees.
+    pub(crate) fn is_of_camera(self) -> bool {
+        matches!(self, Self::Outlines | Self::Edges(Strategy::Primary))
+    }
+
     /// True when no sample counts much more than others.
     pub(crate) fn is_even(self) -> bool {
         matches!(self, Self::Outlines | Self::EdgeOn)
