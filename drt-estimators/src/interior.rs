@@ -1,6 +1,6 @@
 //! The interior term, and the plain forward image: one pixel sample at a time.
 
-use alloc::boxed::Box;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::sobol::{SET_DIMENSIONS, SobolSampler};
@@ -14,7 +14,10 @@ use crate::radiative::{Edged, Look, Radiative};
 use crate::rendering::{Account, Counters, NonFinite, Term};
 use crate::sensitivity::{AdjointSink, Functional, Rate, SurfaceAdjoint};
 use crate::transport::pairs::{Brought, Pairs};
-use crate::transport::{Carriers, Differentiator, Form, PathRecord, Radiance, Tracer, World};
+use crate::transport::trace::{Arrival, Connection, Leaving, Observer};
+use crate::transport::velocity::{Material, Movers, Spatial, VelocityField};
+use crate::transport::world::Crossing;
+use crate::transport::{Differentiator, Radiance, RayPath, RecordedPath, Tracer, World};
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
 pub(crate) const LINE_STREAM: u64 = 1 << 62;
@@ -146,7 +149,10 @@ pub(crate) struct PixelSampler<'a, S> {
     seed: u64,
     antithetic: bool,
     tracer: Tracer<'a>,
-    record: PathRecord,
+    path: RecordedPath,
+    /// Where it met surfaces with a flux, if there are such.
+    flux: Option<Reservoir>,
+    camera_ray: RayPath,
     differentiator: Differentiator<'a>,
     pub(crate) sink: Option<S>,
     along: AlongRays<'a>,
@@ -158,6 +164,44 @@ pub(crate) struct PixelSampler<'a, S> {
     differentiated: u64,
     recorded: u64,
     looking: u64,
+}
+
+/// Listens to the walk of a path whose derivative is wanted.
+struct Recorder<'r> {
+    path: &'r mut RecordedPath,
+    flux: Option<&'r mut Reservoir>,
+    /// Keeps the camera's ray, where that is asked for.
+    camera_ray: Option<&'r mut RayPath>,
+}
+
+impl Observer for Recorder<'_> {
+    const RECORDS: bool = true;
+
+    fn contribution(&mut self, segments: u32, value: Rgb) {
+        self.path.contribution(segments, value);
+    }
+
+    fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {
+        if let (0, Some(kept)) = (leaving.node, &mut self.camera_ray) {
+            kept.clone_from(ray);
+        }
+        if let Some(flux) = &mut self.flux {
+            flux.offer(world, leaving, self.path.velocities.moves(leaving.node as usize), ray);
+        }
+    }
+
+    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
+        let hits = self.flux.as_ref().map_or(&[][..], |flux| flux.hits());
+        self.path.arrive(world, arrival, crossings, hits)
+    }
+
+    fn scatter(&mut self, world: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
+        self.path.scatter(world, leaving, value, inv_pdf, rng);
+    }
+
+    fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
+        self.path.connect(node, connection, crossings);
+    }
 }
 
 /// Non-finite samples that are described one by one.
@@ -172,24 +216,20 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         antithetic: bool,
         separate: bool,
     ) -> Self {
-        let form = if along.radiative.is_some() { Form::Spatial } else { Form::Material };
-        let movers = sink.as_ref().map_or_else(Carriers::default, |s| s.interest().carriers());
-        let carriers = match form {
-            Form::Spatial => movers.clone(),
-            Form::Material => Carriers::default(),
+        let movers = sink.as_ref().map_or_else(Movers::default, |s| Movers::new(s.interest()));
+        let field: Arc<dyn VelocityField> = match along.radiative {
+            Some(_) => Arc::new(Spatial::new(movers)),
+            None => Arc::new(Material::new(movers)),
         };
         Self {
             world,
             seed,
             antithetic,
             tracer: Tracer::new(world),
-            record: PathRecord {
-                flux: along.flux.map(|flux| Box::new(Reservoir::new(flux))),
-                pairs: Pairs::new(along.opposites.then_some((movers, form))),
-                carriers,
-                ..PathRecord::default()
-            },
-            differentiator: Differentiator::new(world, form),
+            path: RecordedPath::new(field, Pairs::new(along.opposites)),
+            flux: along.flux.map(Reservoir::new),
+            camera_ray: RayPath::default(),
+            differentiator: Differentiator::new(world),
             sink,
             along,
             shadow_buffers: shadow::Buffers::default(),
@@ -236,29 +276,33 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             return;
         };
         let width = camera.film()[0];
-        self.record.begin([pixel % width, pixel / width], dir, weight);
-        if let Some(flux) = &mut self.record.flux {
+        self.path.begin([pixel % width, pixel / width], dir, weight);
+        if let Some(flux) = &mut self.flux {
             flux.begin(Rng::new(self.seed, FLUX_STREAM | u64::from(pixel), unit));
         }
-        self.record.pairs.begin(Some(Rng::new(self.seed, PAIR_STREAM | u64::from(pixel), unit)));
-        self.tracer.trace_camera(dir, weight, &mut self.record);
-        values[0] += self.record.value;
-        self.recorded += self.record.nodes.len() as u64;
+        self.path.pairs.begin(Some(Rng::new(self.seed, PAIR_STREAM | u64::from(pixel), unit)));
+        let camera_ray = self.along.shadows.map(|_| &mut self.camera_ray);
+        let mut recorder =
+            Recorder { path: &mut self.path, flux: self.flux.as_mut(), camera_ray };
+        self.tracer.trace_camera(dir, weight, &mut recorder);
+        let record = &self.path.record;
+        values[0] += record.value;
+        self.recorded += record.nodes.len() as u64;
         let n = sink.layers();
         if sink.interest().any() {
             self.differentiated += 1;
             let line = Rng::new(self.seed, LINE_STREAM | u64::from(pixel), unit);
             sink.begin();
-            self.differentiator.differentiate(&self.record, s.slope, line, sink);
+            self.differentiator.differentiate(&self.path, s.slope, line, sink);
             let buffer = &mut self.brought;
-            self.record.pairs.follow(&mut self.tracer, buffer, |pair, chance, other| {
-                self.differentiator.pair(&self.record, pair, chance, other, sink);
+            self.path.pairs.follow(&mut self.tracer, buffer, |pair, chance, other| {
+                self.differentiator.pair(&self.path, pair, chance, other, sink);
             });
             sink.finish(&mut values[1..=n]);
         }
         // Each kept apart goes to layers of its own, in the order of `AlongRays::terms`.
         let mut at = 1;
-        if let Some(mut flux) = self.record.flux.take() {
+        if let Some(flux) = &mut self.flux {
             at += if self.separate { n } else { 0 };
             flux.evaluate(&mut self.tracer, |f, swept, value| {
                 let values = &mut values[at..at + n];
@@ -267,10 +311,9 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                 f.send(value, sink);
                 let [origin, turn] = [swept.origin, swept.turn].map(|v| value.outer(v));
                 let at = SurfaceAdjoint::of_place(origin);
-                self.differentiator.carry_back(&self.record, swept.node, at, turn, sink);
+                self.differentiator.send_back(&self.path, swept.node, at, RgbVec::ZERO, turn, sink);
                 sink.finish(values);
             });
-            self.record.flux = Some(flux);
         }
         if let (Some(radiative), Some(look)) = (self.along.radiative, look) {
             let from = if self.separate { at + n } else { at };
@@ -283,6 +326,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             shadows.along_camera_ray(
                 &mut self.tracer,
                 dir,
+                &self.camera_ray,
                 &mut self.shadow_buffers,
                 |f, value| {
                     sink.functional(f, value * weight, &mut values[at..at + n]);
@@ -304,15 +348,15 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                     left -= 1.0;
                     let look = taken.then(|| Look::new(numbers));
                     let edge =
-                        look.and_then(|look| radiative.edge(&mut self.tracer, &self.record, &look));
+                        look.and_then(|look| radiative.edge(&mut self.tracer, &self.path, &look));
                     self.send(edge, 1.0 / looks, values);
                 }
             }
             Looks::EveryVertex => {
-                for node in 1..self.record.nodes.len() {
+                for node in 1..self.path.record.nodes.len() {
                     let rng = &mut self.tracer.rng;
                     let look = Look::new(if node == 1 { &mut first } else { rng });
-                    let edge = radiative.edge_from(&mut self.tracer, &self.record, node, &look);
+                    let edge = radiative.edge_from(&mut self.tracer, &self.path, node, &look);
                     self.send(edge, 1.0, values);
                 }
             }
@@ -332,7 +376,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         }
         let viewer = (e.viewer * share).outer(e.n);
         let at = SurfaceAdjoint::of_place(viewer);
-        self.differentiator.carry_back(&self.record, e.node, at, RgbVec::ZERO, sink);
+        let none = RgbVec::ZERO;
+        self.differentiator.send_back(&self.path, e.node, at, none, none, sink);
         sink.finish(&mut values[layer..layer + n]);
     }
 
@@ -340,13 +385,14 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     fn report(&mut self, pixel: u32, unit: u32, values: &mut [Rgb]) {
         self.non_finite_count += 1;
         if self.non_finite.len() < DESCRIBED {
-            let last = self.record.nodes.last().and_then(|n| n.vertex()?.surface().map(|s| s.prim));
+            let nodes = &self.path.record.nodes;
+            let last = nodes.last().and_then(|n| n.vertex()?.surface().map(|s| s.prim));
             self.non_finite.push(NonFinite {
                 term: values[0].is_finite().then_some(Term::Interior),
                 seed: self.seed,
                 stream: u64::from(pixel),
                 index: unit,
-                bounces: self.record.nodes.len() as u32,
+                bounces: nodes.len() as u32,
                 primitive: last,
             });
         }

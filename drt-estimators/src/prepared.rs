@@ -107,8 +107,8 @@ impl Prepared {
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
         if interest.moves_geometry() {
-            world.prepare_holds(interest);
-            world.prepare_tows();
+            world.prepare_blends(interest);
+            world.prepare_warps();
         }
         // Grids that move sweep over what stands still.
         let flux = (interest.moves_geometry() || interest.grids.contains(&true))

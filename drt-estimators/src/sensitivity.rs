@@ -11,7 +11,7 @@ use drt_medium::{CoefficientRates, DepthEstimate};
 use crate::emitter::EmitterGradient;
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
-use crate::transport::{Carriers, MaterialPoint, Matter};
+use crate::transport::{MaterialPoint, Matter};
 
 /// Per channel, the change of a value per unit of each entry of a surface point's jet.
 #[derive(Clone, Copy, Debug, Default)]
@@ -105,11 +105,6 @@ impl Interest {
             Matter::Surface(point) => self.shapes[point.shape as usize],
             Matter::Volume(medium, _) => self.volumes[*medium],
         }
-    }
-
-    /// What carries the vertices of paths in the spatial form.
-    pub(crate) fn carriers(&self) -> Carriers {
-        Carriers { shapes: self.shapes.as_slice().into(), camera: self.sensor }
     }
 
     /// True when anything changes.

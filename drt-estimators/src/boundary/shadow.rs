@@ -34,7 +34,6 @@ pub(crate) struct Shadows {
 #[derive(Debug, Default)]
 pub(crate) struct Buffers {
     functional: Functional,
-    ray: RayPath,
     segment: RayPath,
 }
 
@@ -71,11 +70,13 @@ impl Shadows {
         (lit && !edges.is_empty() && edges.len() <= Self::MOST_EDGES).then_some(Self { edges })
     }
 
-    /// Calls `add` with the functional and the weight of each shadow boundary along a camera ray.
+    /// Calls `add` with the functional and the weight of each shadow boundary along a camera ray, which was
+    /// followed along `dir`.
     pub(crate) fn along_camera_ray(
         &self,
         tracer: &mut Tracer<'_>,
         dir: Vec3,
+        ray: &RayPath,
         b: &mut Buffers,
         mut add: impl FnMut(&Functional, Rgb),
     ) -> Option<()> {
@@ -92,16 +93,13 @@ impl Shadows {
                 Source::Point(y, Some(point))
             }
         };
-        let mut ray = core::mem::take(&mut b.ray);
-        world.cast(&eye, dir, &mut ray, &mut tracer.counters);
         for edge in &self.edges {
             if let Some(m) = meet(edge, &source, eye.x, dir)
                 && m.t < ray.length
             {
-                self.shadow(tracer, dir, &ray, edge, &source, &choice, &m, b, &mut add);
+                self.shadow(tracer, dir, ray, edge, &source, &choice, &m, b, &mut add);
             }
         }
-        b.ray = ray;
         Some(())
     }
 

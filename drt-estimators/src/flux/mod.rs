@@ -19,8 +19,8 @@
 //! In the spatial form (2019 paper, Eq. 16 and 20; theory sheet §3, §6) volume vertices stand at fixed
 //! distances of their rays, u is the velocity of the ray's point at Σ, and every surface beside a
 //! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term, less what this surface and the
-//! one beyond the medium [tow](crate::transport::tow) along, times the share by which vertices there do not
-//! [hold](crate::transport::hold) to their medium. What of the two cancels for every velocity of the ray, as in a thin
+//! one beyond the medium [warped](crate::transport::velocity::warp) along, times the share by which vertices there do not
+//! [blend](crate::transport::velocity::blend) to their medium. What of the two cancels for every velocity of the ray, as in a thin
 //! layer, is not even traced.
 //!
 //! What the camera sees [edge on](edge_on) of surfaces, its rays hardly meet: there points are drawn by area.
@@ -40,12 +40,12 @@ pub(crate) use edge_on::{Buffers, EdgeOn};
 pub(crate) use reservoir::Reservoir;
 
 use crate::sensitivity::Interest;
-use crate::transport::tow::NO_GRIP;
+use crate::transport::velocity::warp::GRAZED;
 use crate::transport::world::Tracking;
 use crate::transport::{SurfacePoint, Vertex, World};
 
 /// Cosine of the angle of incidence below which the camera's rays leave the flux to [`EdgeOn`].
-const EDGE_ON: f64 = NO_GRIP;
+const EDGE_ON: f64 = GRAZED;
 
 /// The surfaces with a flux.
 #[derive(Clone, Debug)]

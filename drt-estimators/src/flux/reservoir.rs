@@ -9,7 +9,7 @@ use drt_math::{Real, Rgb, Rng, Vec3};
 
 use super::{EDGE_ON, Flux, filled};
 use crate::sensitivity::{Functional, Rate};
-use crate::transport::tow::{Met, Stretch, list_met};
+use crate::transport::velocity::warp::{SurfaceHit, Stretch, list_hits};
 use crate::transport::trace::{Leaving, Tracer};
 use crate::transport::world::intervals;
 use crate::transport::{MaterialPoint, Radiance, RayPath, SurfacePoint, Vertex, World};
@@ -86,7 +86,7 @@ pub(crate) struct Reservoir {
     /// The chosen ray up to the surface.
     part: RayPath,
     /// The surfaces on the present ray that have one.
-    met: Vec<Met>,
+    met: Vec<SurfaceHit>,
     functional: Functional,
 }
 
@@ -115,7 +115,7 @@ impl Reservoir {
         let origin = leaving.vertex.x;
         let flux = &self.flux;
         self.met.clear();
-        list_met(&mut self.met, ray, dir, |point| flux.sweeps(point.shape, carried));
+        list_hits(&mut self.met, ray, dir, |point| flux.sweeps(point.shape, carried));
         let strength = throughput.max_abs();
         if strength == 0.0 || segments + 1 >= flux.longest {
             return;
@@ -184,8 +184,8 @@ impl Reservoir {
         }
     }
 
-    /// The surfaces on the present ray that have a flux.
-    pub(crate) fn met(&self) -> &[Met] {
+    /// The surfaces on the present ray, if any has a flux.
+    pub(crate) fn hits(&self) -> &[SurfaceHit] {
         &self.met
     }
 
@@ -269,15 +269,15 @@ impl Flux {
         &self,
         world: &World,
         viewer: &Vertex,
-        m: &Met,
-        start: Option<&Met>,
+        m: &SurfaceHit,
+        start: Option<&SurfaceHit>,
         around: Option<usize>,
     ) -> Option<Side> {
         self.side(world, viewer, m, m.cosine < 0.0, around, [start, Some(m)], 1)
     }
 
     /// The medium beyond a surface, up to the `end` of the stretch.
-    fn beyond(&self, world: &World, viewer: &Vertex, m: &Met, end: Option<&Met>) -> Option<Side> {
+    fn beyond(&self, world: &World, viewer: &Vertex, m: &SurfaceHit, end: Option<&SurfaceHit>) -> Option<Side> {
         self.side(world, viewer, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
     }
 
@@ -287,10 +287,10 @@ impl Flux {
         &self,
         world: &World,
         viewer: &Vertex,
-        m: &Met,
+        m: &SurfaceHit,
         front: bool,
         around: Option<usize>,
-        ends: [Option<&Met>; 2],
+        ends: [Option<&SurfaceHit>; 2],
         end: usize,
     ) -> Option<Side> {
         let medium = filled(world, &m.point, front, around)?;
@@ -298,16 +298,16 @@ impl Flux {
         if fullness == 0.0 {
             return None;
         }
-        let left = match world.reach(medium) {
+        let left = match world.warped_free_path(medium) {
             Some(reach) => Stretch::new(ends, reach).left(end),
             None => [1.0, 0.0],
         };
         // What holds to the medium goes with its surfaces.
-        let free = 1.0 - world.hold_inside(viewer, medium);
+        let free = 1.0 - world.blend_inside(viewer, medium);
         let left = left.map(|left| left * free);
         // The medium begins at one surface, and ends at the other.
         let sign = if end == 1 { 1.0 } else { -1.0 };
-        let of = |m: Option<&Met>, left: f64| {
+        let of = |m: Option<&SurfaceHit>, left: f64| {
             let m = m.filter(|m| left != 0.0 && m.cosine != 0.0)?;
             let along = m.point.ng * (sign * left / m.cosine);
             Some(Speed { point: m.point.material(), t: m.distance, along })

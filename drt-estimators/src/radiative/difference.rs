@@ -27,7 +27,7 @@ pub(super) struct Sight<'a> {
 pub(super) struct Side {
     pub(super) light: Rgb,
     /// How much of the velocity of what is seen its place in view has: the share of its
-    /// [hold](crate::transport::hold), over its distance in those of the edge.
+    /// [blend](crate::transport::velocity::blend), over its distance in those of the edge.
     pub(super) hold: f64,
     /// The distance of what is seen.
     pub(super) distance: f64,
@@ -111,10 +111,10 @@ impl<'a> Sight<'a> {
         tracer.radiance_from(vertex, self.w, &mut light);
         let world = tracer.world;
         let hold = match self.viewer.kind {
-            Kind::Point => world.hold_in_view(&vertex),
-            _ => world.hold(self.viewer, &vertex, -self.w, distance),
+            Kind::Point => world.blend_in_view(&vertex),
+            _ => world.blend(self.viewer, &vertex, -self.w, distance),
         };
-        let hold = hold.share * self.distance / distance;
+        let hold = hold.weight * self.distance / distance;
         Side { light: light.0, hold, distance, matter: vertex.matter() }
     }
 

@@ -3,12 +3,12 @@
 //! Radiance L(x, w) is differentiated for a ray whose origin and direction move (2019 paper, Eqs.
 //! 16–32, in the corrected form of theory sheet §3). Every integral over directions and distances is
 //! differentiated at fixed directions and distances, so the record of an ordinary path is enough for
-//! the part without jumps: [`Form::Spatial`](crate::transport::Form) sweeps it backwards. Wherever the
+//! the part without jumps: [`Spatial`](crate::transport::velocity::Spatial) sweeps it backwards. Wherever the
 //! integrand jumps, and the jump moves relative to the ray, Reynolds' theorem adds a term:
 //!
 //! * in distance, at surfaces beside media: D_dot σ_s L^ins of D19.16 and D19.20, on both sides of
 //!   interfaces that do not scatter. That is the [flux](crate::flux), against rays that are carried. In
-//!   homogeneous media most of it is taken in by vertices that surfaces [tow](crate::transport::tow);
+//!   homogeneous media most of it is taken in by vertices that surfaces [warped](crate::transport::velocity::warp);
 //! * in direction, at edges (D19.23): for an edge point y seen from a vertex x along d = (y - x)/r,
 //!   with the edge's tangent t and N = t × (-d) / |t × d|,
 //!
@@ -172,9 +172,9 @@ impl Radiative {
         let eye = world.camera.position();
         let moving_shapes = (0..).zip(&interest.shapes).filter(|(_, moves)| **moves);
         let holding: Vec<u32> =
-            moving_shapes.map(|(s, _)| s).filter(|s| world.holds_on(*s)).collect();
+            moving_shapes.map(|(s, _)| s).filter(|s| world.blends_on(*s)).collect();
         let at_rest = !holding.is_empty();
-        let at_rest_in_view = holding.iter().any(|s| world.holds_in_view_on(*s));
+        let at_rest_in_view = holding.iter().any(|s| world.blends_in_view_on(*s));
         let speeds: Vec<f64> = jumps.list.iter().map(moves).collect();
         let fastest = speeds.iter().copied().fold(0.0, f64::max);
         let relative = |speed: f64| match (interest.sensor, at_rest_in_view) {

@@ -1,14 +1,15 @@
 //! Edges seen from the vertices of a path (2019 paper, Algorithm 2).
 
+use core::ops::Range;
+
 use drt_math::{Rgb, Vec3};
 
 use super::choice::Choice;
 use super::difference::{Side, Sight};
 use super::views::{Views, viewpoint};
 use super::{AT_REST, BY_THROUGHPUT, CARRIED, Look, Radiative};
-use crate::transport::record::{Node, PathRecord};
 use crate::transport::trace::Endpoint;
-use crate::transport::{MaterialPoint, Matter, Tracer, Vertex, World};
+use crate::transport::{MaterialPoint, Matter, RecordedPath, Tracer, Vertex, World};
 
 /// An edge's contribution to a path: a sum of speeds along `n`.
 #[derive(Clone, Copy, Debug)]
@@ -64,10 +65,10 @@ impl Radiative {
     pub(crate) fn edge(
         &self,
         tracer: &mut Tracer<'_>,
-        record: &PathRecord,
+        path: &RecordedPath,
         look: &Look,
     ) -> Option<Edged> {
-        let mut glance = self.glance(tracer, record, look)?;
+        let mut glance = self.glance(tracer, path, look)?;
         let chance = self.worth.chance(glance.weight.max_abs());
         if chance < 1.0 && tracer.rng.next_f64() >= chance {
             return None;
@@ -80,29 +81,35 @@ impl Radiative {
     pub(super) fn glance<'a>(
         &'a self,
         tracer: &mut Tracer<'_>,
-        record: &'a PathRecord,
+        path: &'a RecordedPath,
         look: &Look,
     ) -> Option<Glance<'a>> {
-        let (sought, likely, look) = self.sought(&record.nodes[1..], look);
-        let (node, chance) = self.choose_vertex(tracer, record, sought, look.vertex)?;
-        self.glance_from(tracer, record, node, sought, likely * chance, &look)
+        let nodes = 1..path.record.nodes.len();
+        let (sought, likely, look) = self.sought(path, nodes, look);
+        let (node, chance) = self.choose_vertex(tracer, path, sought, look.vertex)?;
+        self.glance_from(tracer, path, node, sought, likely * chance, &look)
     }
 
     /// The same from a given vertex.
     pub(crate) fn edge_from(
         &self,
         tracer: &mut Tracer<'_>,
-        record: &PathRecord,
+        path: &RecordedPath,
         node: usize,
         look: &Look,
     ) -> Option<Edged> {
-        let (sought, likely, look) = self.sought(&record.nodes[node..=node], look);
-        self.glance_from(tracer, record, node, sought, likely, &look)?.follow(tracer)
+        let (sought, likely, look) = self.sought(path, node..node + 1, look);
+        self.glance_from(tracer, path, node, sought, likely, &look)?.follow(tracer)
     }
 
     /// What a look from one of some vertices is for, its probability, and what is left of the look's numbers.
-    fn sought(&self, nodes: &[Node], look: &Look) -> (Sought, f64, Look) {
-        if self.resting.is_none() || nodes.iter().all(|n| n.carried) {
+    fn sought(
+        &self,
+        path: &RecordedPath,
+        mut nodes: Range<usize>,
+        look: &Look,
+    ) -> (Sought, f64, Look) {
+        if self.resting.is_none() || nodes.all(|n| path.velocities.moves(n)) {
             return (Sought::Moving, 1.0, *look);
         }
         let (sought, from, likely) = match look.way < AT_REST {
@@ -116,12 +123,13 @@ impl Radiative {
     fn glance_from<'a>(
         &'a self,
         tracer: &mut Tracer<'_>,
-        record: &'a PathRecord,
+        path: &'a RecordedPath,
         node: usize,
         sought: Sought,
         chance: f64,
         look: &Look,
     ) -> Option<Glance<'a>> {
+        let (record, moves) = (&path.record, path.velocities.moves(node));
         let recorded = &record.nodes[node];
         let arrival = recorded.arrival.as_ref()?;
         let (vertex, theta) =
@@ -129,7 +137,7 @@ impl Radiative {
         let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
         let wo = -arrival.dir;
         tracer.counters.boundary_samples += 1;
-        let views = self.views(tracer.world, vertex, recorded.carried, sought)?;
+        let views = self.views(tracer.world, vertex, moves, sought)?;
         let around = &viewpoint(tracer.world, vertex, wo);
         let chosen = views.sample(&self.jumps, around, look, &mut tracer.options)?;
         let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex)?;
@@ -181,12 +189,12 @@ impl Radiative {
     fn choose_vertex(
         &self,
         tracer: &mut Tracer<'_>,
-        record: &PathRecord,
+        path: &RecordedPath,
         sought: Sought,
         u: f64,
     ) -> Option<(usize, f64)> {
         let mut choice = Choice::new(u, BY_THROUGHPUT);
-        for (k, node) in record.nodes.iter().enumerate().skip(1) {
+        for (k, node) in path.record.nodes.iter().enumerate().skip(1) {
             let Some(arrival) = node.arrival.as_ref() else { continue };
             if k as u32 >= tracer.max_segments {
                 break;
@@ -200,7 +208,7 @@ impl Radiative {
             if theta == 0.0 || !tracer.world.can_scatter(vertex) {
                 continue;
             }
-            let amount = self.amount(tracer, vertex, -arrival.dir, node.carried, sought);
+            let amount = self.amount(tracer, vertex, -arrival.dir, path.velocities.moves(k), sought);
             if amount > 0.0 {
                 choice.offer(k, [theta, theta * amount]);
             }

@@ -11,11 +11,15 @@
 //!
 //! a mean that neither a rare large weight decides nor how many have next to none. The paths it is of are the same whatever samples a run takes.
 
+use alloc::sync::Arc;
+
 use drt_math::{Real, Rgb, Rng};
 
 use super::{Look, Radiative};
 use crate::sensitivity::Interest;
-use crate::transport::{PathRecord, Tracer, World};
+use crate::transport::pairs::Pairs;
+use crate::transport::velocity::{Movers, Spatial};
+use crate::transport::{RecordedPath, Tracer, World};
 
 /// Paths that look.
 const PATHS: u32 = 256;
@@ -50,7 +54,8 @@ impl Radiative {
     /// Finds out what looks count for.
     pub(crate) fn weigh(&mut self, world: &World, interest: &Interest) {
         let mut tracer = Tracer::new(world);
-        let mut record = PathRecord { carriers: interest.carriers(), ..PathRecord::default() };
+        let field = Arc::new(Spatial::new(Movers::new(interest)));
+        let mut path = RecordedPath::new(field, Pairs::default());
         let [width, height] = world.camera.film();
         let pixels = u64::from(width) * u64::from(height);
         let mut sum = 0.0;
@@ -61,9 +66,9 @@ impl Radiative {
             let look = Look::new(&mut rng);
             tracer.rng = rng;
             let weight = Rgb::splat(view.weight);
-            record.begin([pixel % width, pixel / width], view.direction, weight);
-            tracer.trace_camera(view.direction, weight, &mut record);
-            if let Some(glance) = self.glance(&mut tracer, &record, &look) {
+            path.begin([pixel % width, pixel / width], view.direction, weight);
+            tracer.trace_camera(view.direction, weight, &mut path);
+            if let Some(glance) = self.glance(&mut tracer, &path, &look) {
                 sum += Real::sqrt(glance.weight.max_abs());
             }
         }

@@ -4,7 +4,6 @@
 pub(crate) mod adjoint;
 pub(crate) mod flight;
 mod geometry;
-pub(crate) mod hold;
 pub(crate) mod importance;
 pub(crate) mod lights;
 pub(crate) mod pairs;
@@ -12,15 +11,16 @@ pub(crate) mod record;
 pub(crate) mod scatter;
 #[cfg(all(test, feature = "std"))]
 pub(crate) mod tests;
-pub(crate) mod tow;
 pub(crate) mod trace;
+pub(crate) mod velocity;
 pub(crate) mod vertex;
 pub(crate) mod world;
 
-pub(crate) use adjoint::{Differentiator, Form};
+pub(crate) use adjoint::Differentiator;
 pub(crate) use geometry::Geometry;
 pub(crate) use lights::Lit;
-pub(crate) use record::{Carriers, PathRecord, Radiance, RadianceBySegments};
+pub(crate) use record::{Radiance, RadianceBySegments};
 pub(crate) use trace::Tracer;
+pub(crate) use velocity::RecordedPath;
 pub(crate) use vertex::{Kind, MaterialPoint, Matter, SurfacePoint, Vertex};
 pub(crate) use world::{MediumNeed, Needs, RayPath, World};

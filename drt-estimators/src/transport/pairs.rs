@@ -48,23 +48,15 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Rng, Vec3};
 
-use super::adjoint::Form;
-use super::record::{Carriers, Node};
+use super::record::PathRecord;
 use super::trace::{Arrival, Leaving, Observer, Tracer};
-use super::vertex::Vertex;
+use super::velocity::PathVelocities;
 use super::world::{Crossing, World};
 use crate::surface::{Given, Turn};
 
 /// Pairs of each kind that a path has at most, so that its cost does not grow with the square of its length; those of
 /// little weight are followed as seldom.
 const MOST: f64 = 8.0;
-
-/// The widest lobes, in radians, of which pairs tell how they turn: in wider ones what the two rays see differs too much
-/// for their cost.
-const NARROW: f64 = 0.15;
-
-/// The same of mirrors whose rays both end on matter.
-const NARROW_MIRROR: f64 = 0.07;
 
 /// A part of the logarithmic derivative of a scattering function that pairs tell.
 #[derive(Clone, Copy, Debug, Default)]
@@ -154,45 +146,47 @@ impl Observer for Brought {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Pairs {
     list: Vec<Pair>,
+    /// By node, as far as there are any.
+    paired: Vec<Paired>,
     /// For choosing among them; without it there are none.
     rng: Option<Rng>,
-    /// What moves and how, where pairs tell how lobes turn.
-    turning: Option<(Carriers, Form)>,
-    /// Some shape moves.
-    any_moves: bool,
+    /// They tell how lobes turn, too.
+    turning: bool,
 }
 
 impl Pairs {
-    /// With what moves and how, where turning lobes are to be told by pairs.
-    pub(crate) fn new(turning: Option<(Carriers, Form)>) -> Self {
-        let any_moves = turning.as_ref().is_some_and(|(movers, _)| movers.shapes.contains(&true));
-        Self { turning, any_moves, ..Self::default() }
+    /// Of roughness, and if `turning` of how lobes turn.
+    pub(crate) fn new(turning: bool) -> Self {
+        Self { turning, ..Self::default() }
     }
 
     /// Forgets those of the last path. There are none of the next without random numbers to choose by.
     pub(crate) fn begin(&mut self, rng: Option<Rng>) {
         self.list.clear();
+        self.paired.clear();
         self.rng = rng;
     }
 
-    /// Adds those of a ray that leaves a node after a `viewer`. Returns what it is then for them to tell.
+    /// Adds those of a ray that leaves a node.
     pub(crate) fn offer(
         &mut self,
         world: &World,
-        [viewer, node]: [&Node; 2],
+        record: &PathRecord,
+        velocities: &PathVelocities,
         leaving: &Leaving,
         rng: &Rng,
-    ) -> Paired {
-        let mut paired = Paired::default();
+    ) {
         let rougher = world.roughens(&leaving.vertex);
-        let turns = self.turns(world, viewer, node, &leaving.vertex);
+        let turns = self.turns(world, record, velocities, leaving);
         if self.rng.is_none() || !(rougher || turns) {
-            return paired;
+            return;
         }
+        let node = &record.nodes[leaving.node as usize];
         let (Some(arrival), Some(scattering)) = (&node.arrival, world.scattering(&leaving.vertex))
         else {
-            return paired;
+            return;
         };
+        let mut paired = Paired::default();
         let wo = -arrival.dir;
         // `often` is how often the other one is drawn for what it tells, by a given density.
         let mut add = |told, size: f64, w, ratio: f64, often: f64| {
@@ -235,7 +229,16 @@ impl Pairs {
         {
             paired.turn = Some(self.list.len() as u32 - 1);
         }
-        paired
+        let k = leaving.node as usize;
+        if self.paired.len() <= k {
+            self.paired.resize(k + 1, Paired::default());
+        }
+        self.paired[k] = paired;
+    }
+
+    /// What pairs tell of the ray that leaves a node.
+    pub(crate) fn paired(&self, node: usize) -> Paired {
+        self.paired.get(node).copied().unwrap_or_default()
     }
 
     /// b, where a pair tells it.
@@ -246,26 +249,25 @@ impl Pairs {
         }
     }
 
-    /// Whether the lobe of a node at `v` may turn as parameters change, or one of its rays. Does not depend on the ray that
+    /// Whether the lobe of a node may turn as parameters change, or one of its rays. Does not depend on the ray that
     /// leaves it, which would be another one for the other side.
-    fn turns(&self, world: &World, viewer: &Node, node: &Node, v: &Vertex) -> bool {
-        let (Some((movers, form)), Some(s)) = (&self.turning, v.surface()) else { return false };
-        let seen = movers.camera && viewer.arrival.is_none();
-        let moves = || match form {
-            // Rays turn with either of their ends.
-            Form::Material => self.any_moves,
-            // Rays turn where they end on what vertices are held by, and normals of curved surfaces under those that
-            // slide.
-            Form::Spatial => {
-                movers.shapes.get(s.shape as usize) == Some(&true)
-                    || (node.carried && (node.hold.share > 0.0 || world.is_smooth(s)))
-            }
+    fn turns(
+        &self,
+        world: &World,
+        record: &PathRecord,
+        velocities: &PathVelocities,
+        leaving: &Leaving,
+    ) -> bool {
+        let (v, k) = (&leaving.vertex, leaving.node as usize);
+        let (true, Some(s)) = (self.turning, v.surface()) else { return false };
+        let field = velocities.field();
+        let seen = || {
+            record.nodes[k].arrival.as_ref().is_some_and(|a| a.parent == 0) && velocities.moves(0)
         };
-        let narrow = match form {
-            Form::Material if !world.bsdf_of(s.shape).is_transmissive() => NARROW_MIRROR,
-            _ => NARROW,
-        };
-        (world.bends_light(v) || seen || moves()) && world.lobe_width(v) < narrow
+        let turns =
+            world.bends_light(v) || seen() || field.turns_rays(world, s, velocities.of(k));
+        let transmissive = world.bsdf_of(s.shape).is_transmissive();
+        turns && world.lobe_width(v) < field.widest_paired(transmissive)
     }
 
     /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring; `brought` is a

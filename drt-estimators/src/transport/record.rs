@@ -1,19 +1,13 @@
 //! The path record: what a walk leaves behind when its derivative is wanted.
 
-use alloc::boxed::Box;
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use drt_math::{Rgb, Rng, Vec3};
+use drt_math::{Rgb, Vec3};
 
-use super::hold::Hold;
-use super::pairs::{Paired, Pairs};
-use super::tow::{self, Tow};
 use super::trace::{Arrival, Connection, Endpoint, Leaving, Observer};
-use super::vertex::{Kind, Vertex};
-use super::world::{Crossing, RayPath, World};
-use crate::flux::Reservoir;
+use super::vertex::Vertex;
+use super::world::Crossing;
 
 /// A vertex of the record. Node 0 is the camera; every other knows its parent, which comes before.
 #[derive(Clone, Debug)]
@@ -28,14 +22,6 @@ pub(crate) struct Node {
     pub(crate) value: Rgb,
     /// Its inverse density, Russian roulette included.
     pub(crate) inv_pdf: f64,
-    /// It moves, in the spatial form.
-    pub(crate) carried: bool,
-    /// What keeps it, if it moves, from being carried, in the spatial form.
-    pub(crate) hold: Hold,
-    /// What tows it, in the spatial form.
-    pub(crate) tows: Range<usize>,
-    /// The part of its scattering's derivative, relative to the value, that pairs tell of.
-    pub(crate) paired: Paired,
 }
 
 impl Node {
@@ -48,14 +34,6 @@ impl Node {
     }
 }
 
-/// What carries the vertices of a path in the spatial form.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Carriers {
-    /// Shapes that move.
-    pub(crate) shapes: Arc<[bool]>,
-    pub(crate) camera: bool,
-}
-
 /// A recorded path: a tree, since equiangular side vertices branch off its segments.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PathRecord {
@@ -66,13 +44,6 @@ pub(crate) struct PathRecord {
     pub(crate) pixel: [u32; 2],
     /// The path's value.
     pub(crate) value: Rgb,
-    /// Where it met surfaces with a flux, if there are such.
-    pub(crate) flux: Option<Box<Reservoir>>,
-    /// What carries vertices, where that is asked for.
-    pub(crate) carriers: Carriers,
-    pub(crate) tows: Vec<Tow>,
-    /// Rays beside it, where they are asked for.
-    pub(crate) pairs: Pairs,
 }
 
 impl PathRecord {
@@ -82,7 +53,6 @@ impl PathRecord {
         self.nodes.clear();
         self.crossings.clear();
         self.connections.clear();
-        self.tows.clear();
         self.value = Rgb::ZERO;
         self.nodes.push(Node {
             arrival: None,
@@ -91,10 +61,6 @@ impl PathRecord {
             wi: dir,
             value,
             inv_pdf: 1.0,
-            carried: self.carriers.camera,
-            hold: Hold::default(),
-            tows: 0..0,
-            paired: Paired::default(),
         });
     }
 
@@ -113,63 +79,11 @@ impl PathRecord {
         self.crossings.extend_from_slice(crossings);
         start..self.crossings.len()
     }
-}
 
-/// What holds a vertex that was seen from a `viewer`, or from the camera.
-pub(crate) fn hold_of(
-    world: &World,
-    pixel: [u32; 2],
-    viewer: Option<&Vertex>,
-    arrival: &Arrival,
-) -> Hold {
-    match (&arrival.end, viewer) {
-        (Endpoint::Surface(v), None) => world.hold_in_pixel(v, pixel),
-        (Endpoint::Surface(v) | Endpoint::Volume(v, _), Some(viewer)) => {
-            world.hold(viewer, v, arrival.dir, arrival.distance)
-        }
-        _ => Hold::default(),
-    }
-}
-
-impl Observer for PathRecord {
-    const RECORDS: bool = true;
-
-    fn contribution(&mut self, _segments: u32, value: Rgb) {
-        self.value += value;
-    }
-
-    fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {
-        let carried = self.nodes[leaving.node as usize].carried;
-        if let Some(flux) = &mut self.flux {
-            flux.offer(world, leaving, carried, ray);
-        }
-    }
-
-    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
+    /// Adds a vertex and returns its node.
+    pub(super) fn arrive(&mut self, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
         let crossings = self.keep(crossings);
         let c = self.connections.len();
-        let on_mover = || match &arrival.end {
-            Endpoint::Surface(Vertex { kind: Kind::Surface(s), .. }) => {
-                self.carriers.shapes.get(s.shape as usize) == Some(&true)
-            }
-            _ => false,
-        };
-        let (brought, on_mover) = (self.nodes[arrival.parent as usize].carried, on_mover());
-        let first = self.tows.len();
-        if let Endpoint::Volume(Vertex { medium: Some(m), .. }, _) = &arrival.end
-            && let Some(reach) = world.reach(*m)
-        {
-            let met = self.flux.as_ref().map_or(&[][..], |flux| flux.met());
-            self.tows.extend(tow::tows(met, arrival.distance, reach));
-        }
-        let tows = first..self.tows.len();
-        let viewer = self.nodes[arrival.parent as usize].vertex();
-        let inside = matches!(arrival.end, Endpoint::Volume(..));
-        let hold = match brought || on_mover || inside {
-            true => hold_of(world, self.pixel, viewer, arrival),
-            false => Hold::default(),
-        };
-        let carried = brought || on_mover || !tows.is_empty() || hold.share > 0.0;
         self.nodes.push(Node {
             arrival: Some(*arrival),
             crossings,
@@ -177,25 +91,18 @@ impl Observer for PathRecord {
             wi: Vec3::ZERO,
             value: Rgb::ZERO,
             inv_pdf: 0.0,
-            carried,
-            hold,
-            tows,
-            paired: Paired::default(),
         });
         self.nodes.len() as u32 - 1
     }
 
-    fn scatter(&mut self, world: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
+    /// The walk leaves a node.
+    pub(super) fn scatter(&mut self, leaving: &Leaving, value: Rgb, inv_pdf: f64) {
         let node = &mut self.nodes[leaving.node as usize];
         (node.wi, node.value, node.inv_pdf) = (leaving.dir, value, inv_pdf);
-        let node = &self.nodes[leaving.node as usize];
-        let viewer = node.arrival.as_ref().map_or(0, |arrival| arrival.parent as usize);
-        let both = [&self.nodes[viewer], node];
-        let paired = self.pairs.offer(world, both, leaving, rng);
-        self.nodes[leaving.node as usize].paired = paired;
     }
 
-    fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
+    /// A node was connected to a light.
+    pub(super) fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
         let crossings = self.keep(crossings);
         self.connections.push((*connection, crossings));
         let end = self.connections.len();

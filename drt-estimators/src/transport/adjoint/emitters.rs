@@ -3,11 +3,11 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use super::{Differentiator, Far, Form, Stretch, send, turn};
+use super::{Differentiator, Far, Propagated, Stretch, turn};
 use crate::emitter::EmitterGradient;
 use crate::sensitivity::{AdjointSink, Interest, SurfaceAdjoint};
-use crate::transport::hold::Hold;
 use crate::transport::lights::{LightKind, LightSample};
+use crate::transport::velocity::{PathVelocities, VertexVelocity};
 use crate::transport::vertex::{Kind, Vertex};
 
 impl Differentiator<'_> {
@@ -16,6 +16,7 @@ impl Differentiator<'_> {
     pub(super) fn light_end<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
+        velocities: &PathVelocities,
         viewer: &Vertex,
         near_moves: bool,
         light: &LightSample,
@@ -38,25 +39,22 @@ impl Differentiator<'_> {
                     self.segment(path, Far::Direction, false, weight, here, sink);
                     return;
                 }
-                let hold = match self.form {
-                    Form::Material => Hold { share: 1.0, ..Hold::default() },
-                    Form::Spatial => self.world.hold(viewer, &end, path.dir, path.length),
-                };
-                let free = weight * (1.0 - hold.share);
+                let (dir, distance) = (path.dir, path.length);
+                let blend = velocities.field().blend(self.world, viewer, &end, dir, distance);
+                let phi = blend.weight;
+                let free = weight * (1.0 - phi);
                 self.segment(path, Far::Direction, near_moves, free, here, sink);
-                let mut lit = self.held(path, &end, near_moves, weight * hold.share, here, sink);
+                let mut lit =
+                    self.material_end(path, &end, near_moves, weight * phi, here, sink);
                 if let Some(to_wi) = to_wi {
-                    let g = turn(&(to_wi * hold.share), light.w, light.distance);
+                    let g = turn(&(to_wi * phi), light.w, light.distance);
                     lit.u += g;
                     here.u -= g;
                 }
-                match self.form {
-                    Form::Material => send(&end, &lit, sink),
-                    Form::Spatial => {
-                        let matter = core::mem::take(&mut lit.u);
-                        self.land(path, &end, &hold, &lit, matter, weight, here, sink);
-                    }
-                }
+                let matter = core::mem::take(&mut lit.u);
+                let velocity = &VertexVelocity { moves: true, blend, auxiliary: 0..0 };
+                let end = Propagated { vertex: &end, velocity, weight, matter };
+                self.propagate(path, &end, velocities, &lit, here, sink);
             }
             LightKind::Position => {
                 let moving = near_moves || emitter;

@@ -14,13 +14,13 @@
 //! gradient; by a scattering function Θ_k σ_k C_k / p times its gradient; by σ_k it is Θ_k Q_k. No
 //! quotient by a factor that can vanish is formed. Cost is linear in the number of vertices.
 //!
-//! Vertices move in one of two [`Form`]s: each with the matter it is on, as above, or [carried](spatial)
-//! by the rays that found them.
+//! Vertices move by a [`velocity`](super::velocity) field; what that blends for a vertex says what its
+//! sensitivities are [propagated](propagation) to.
 
 mod emitters;
 mod pairs;
+mod propagation;
 mod segment;
-mod spatial;
 
 use alloc::vec::Vec;
 
@@ -29,10 +29,11 @@ use drt_medium::Coefficients;
 
 use emitters::{light_moves, strength};
 use pairs::Apart;
+use propagation::Propagated;
 use segment::{Far, Stretch};
 
-use super::record::PathRecord;
 use super::trace::Endpoint;
+use super::velocity::RecordedPath;
 use super::vertex::{Kind, Vertex};
 use super::world::World;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
@@ -41,22 +42,14 @@ use crate::sensor::SensorGradient;
 /// What has been collected for a vertex while its neighbours are processed.
 #[derive(Clone, Copy, Debug, Default)]
 struct Local {
+    /// By the vertex's own velocity and normals.
     at: SurfaceAdjoint,
-    /// To the velocity of the matter it is on, where it does not move with that.
+    /// By the velocity of the matter it is on.
     matter: RgbVec,
     /// C_k, the value of the children per unit of scattering.
     children: Rgb,
     /// a_k R_k, its part of the parent's C.
     brought: Rgb,
-}
-
-/// How the vertices of paths move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Form {
-    /// With the material points they are, as their medium's inside and their surface do (2021 paper).
-    Material,
-    /// With the rays, whose directions and distances stand still (2019 paper).
-    Spatial,
 }
 
 /// The segment by which a walk arrived at a node.
@@ -65,30 +58,28 @@ struct Behind {
     node: usize,
     parent: usize,
     distance: f64,
-    /// What of the node's motion turns the segment.
-    share: f64,
+    /// φ of the node, the part of its motion that turns the segment.
+    weight: f64,
 }
 
 /// The backward sweep and its buffers.
 pub(crate) struct Differentiator<'w> {
     world: &'w World,
-    form: Form,
     locals: Vec<Local>,
     points: Vec<(f64, f64)>,
     rng: Rng,
     /// The filter's gradient by the pixel position, over the density.
     filter: [f64; 2],
-    /// By the rate of the camera ray's direction; of the spatial form.
+    /// By the rate of the camera ray's direction.
     turn: RgbVec,
     /// Of the camera's importance and filter, per channel.
     sensor: [SensorGradient; 3],
 }
 
 impl<'w> Differentiator<'w> {
-    pub(crate) fn new(world: &'w World, form: Form) -> Self {
+    pub(crate) fn new(world: &'w World) -> Self {
         Self {
             world,
-            form,
             locals: Vec::new(),
             points: Vec::new(),
             rng: Rng::new(0, 0, 0),
@@ -103,29 +94,27 @@ impl<'w> Differentiator<'w> {
     /// independent of the walk's.
     pub(crate) fn differentiate<S: AdjointSink>(
         &mut self,
-        record: &PathRecord,
+        path: &RecordedPath,
         filter: [f64; 2],
         rng: Rng,
         sink: &mut S,
     ) {
+        let nodes = path.record.nodes.len();
         self.rng = rng;
         self.filter = filter;
         self.turn = RgbVec::ZERO;
         self.sensor = [SensorGradient::default(); 3];
         self.locals.clear();
-        self.locals.resize(record.nodes.len(), Local::default());
-        for k in (1..record.nodes.len()).rev() {
-            self.node(record, k, sink);
+        self.locals.resize(nodes, Local::default());
+        for k in (1..nodes).rev() {
+            self.node(path, k, sink);
         }
-        match self.form {
-            Form::Material => self.camera(sink),
-            Form::Spatial => {
-                self.camera_ray(record, self.locals[0].at.u, self.turn, &self.sensor, sink)
-            }
-        }
+        let Local { at, matter, .. } = self.locals[0];
+        self.camera_ray(&path.record, at.u + matter, self.turn, &self.sensor, sink);
     }
 
-    fn node<S: AdjointSink>(&mut self, record: &PathRecord, k: usize, sink: &mut S) {
+    fn node<S: AdjointSink>(&mut self, path: &RecordedPath, k: usize, sink: &mut S) {
+        let record = &path.record;
         let node = &record.nodes[k];
         let Some(arrival) = &node.arrival else { return };
         let world = self.world;
@@ -140,7 +129,7 @@ impl<'w> Differentiator<'w> {
                 radiance * arrival.emission_weight
             }
             Endpoint::Surface(vertex) => {
-                collected += self.connections(record, k, vertex, theta, &mut here, sink);
+                collected += self.connections(path, k, vertex, theta, &mut here, sink);
                 let Kind::Surface(point) = &vertex.kind else { return };
                 let mut emitted = Rgb::ZERO;
                 if let Some(e) = world.scene.shapes[point.shape as usize].emitter
@@ -154,70 +143,46 @@ impl<'w> Differentiator<'w> {
             }
             Endpoint::Volume(vertex, c) => {
                 let theta_s = theta * c.sigma_s();
-                collected += self.connections(record, k, vertex, theta_s, &mut here, sink);
-                let moving = self.moves(record, k, sink.interest());
+                collected += self.connections(path, k, vertex, theta_s, &mut here, sink);
+                let moving = path.velocities.moves(k);
                 let weight = arrival.emission_weight;
                 self.coefficients(vertex, c, theta, collected, weight, moving, &mut here, sink);
                 c.source() * arrival.emission_weight + c.sigma_s() * collected
             }
         };
-        self.arrive(record, k, received, &mut here, sink);
-        if let (Form::Material, Some(vertex)) = (self.form, node.vertex()) {
-            send(vertex, &here, sink);
-        }
+        self.arrive(path, k, received, &mut here, sink);
     }
 
-    /// True when a node moves.
-    fn moves(&self, record: &PathRecord, k: usize, interest: &Interest) -> bool {
-        let node = &record.nodes[k];
-        match self.form {
-            Form::Spatial => node.carried,
-            Form::Material => match node.vertex() {
-                Some(v) => moves(v, interest, false),
-                None => node.arrival.is_none() && interest.sensor,
-            },
-        }
-    }
-
-    /// True when a node, or the one before it, moves.
-    fn arrival_moves(&self, record: &PathRecord, k: usize, interest: &Interest) -> bool {
-        let before = record.nodes[k].arrival.as_ref().map(|a| a.parent as usize);
-        before.into_iter().chain([k]).any(|n| self.moves(record, n, interest))
-    }
-
-    /// What of a node's motion turns the segment to it.
-    fn share(&self, record: &PathRecord, k: usize) -> f64 {
-        match self.form {
-            Form::Material => 1.0,
-            Form::Spatial => record.nodes[k].hold.share,
-        }
-    }
-
-    fn behind(&self, record: &PathRecord, node: usize) -> Option<Behind> {
-        let arrival = record.nodes[node].arrival.as_ref()?;
-        let (parent, distance) = (arrival.parent as usize, arrival.distance);
-        Some(Behind { node, parent, distance, share: self.share(record, node) })
-    }
-
-    /// The segment from the parent to node `k`, and the parent's scattering into it.
+    /// The segment from the parent to node `k`, and the parent's scattering into it; `here` is what node `k`
+    /// has collected.
     fn arrive<S: AdjointSink>(
         &mut self,
-        record: &PathRecord,
+        recorded: &RecordedPath,
         k: usize,
         received: Rgb,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
     ) {
         let world = self.world;
+        let RecordedPath { record, velocities, .. } = recorded;
         let Some(arrival) = &record.nodes[k].arrival else { return };
         let p = arrival.parent as usize;
         let value = arrival.arrival * received;
         self.locals[p].children += value;
         self.locals[k].brought = value;
-        // What nothing comes back from may still turn.
-        let still = || here.is_zero() && self.locals[k].matter == RgbVec::ZERO;
-        if value.is_zero() && (self.form == Form::Material || still()) {
-            return;
+        let velocity = velocities.of(k);
+        let vertex = record.nodes[k].vertex();
+        let phi = velocity.blend.weight;
+        if value.is_zero() {
+            let matter = self.locals[k].matter;
+            let nothing = here.is_zero() && matter == RgbVec::ZERO;
+            // What nothing comes back from may still move what comes before.
+            if nothing || phi == 1.0 {
+                if let Some(v) = vertex {
+                    send(v, &SurfaceAdjoint { u: here.u + matter, ..*here }, sink);
+                }
+                return;
+            }
         }
         let weight = arrival.throughput * received;
         let parent = &record.nodes[p];
@@ -230,78 +195,73 @@ impl<'w> Differentiator<'w> {
             },
         };
         let mut there = core::mem::take(&mut self.locals[p].at);
-        let vertex = record.nodes[k].vertex();
-        let [near_moves, far_moves] = [p, k].map(|n| self.moves(record, n, sink.interest()));
+        let [near_moves, far_moves] = [p, k].map(|n| velocities.moves(n));
         // The scattering function of the parent sees the two ends of the segment as a direction.
-        if parent.arrival.is_some() {
+        if let Some(behind) = behind(recorded, p) {
             let adjoint = theta * value * parent.inv_pdf;
             let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
-            let behind = self.behind(record, p);
-            let (wi, paired) = (parent.wi, Some(Apart::of(record, parent)));
-            let moving = far_moves || self.arrival_moves(record, p, sink.interest());
-            let to_wi =
-                self.scattering(&from, wo, wi, paired, adjoint, behind, moving, &mut there, sink);
+            let (wi, paired) = (parent.wi, Some(Apart::of(recorded, p)));
+            let moving = far_moves || near_moves || velocities.moves(behind.parent);
+            let to_wi = self.scattering(
+                &from,
+                wo,
+                wi,
+                paired,
+                adjoint,
+                Some(behind),
+                moving,
+                &mut there,
+                sink,
+            );
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
-                let g = turn(&(to_wi * self.share(record, k)), parent.wi, arrival.distance);
+                let g = turn(&(to_wi * phi), parent.wi, arrival.distance);
                 there.u -= g;
-                match self.form {
-                    Form::Material => here.u += g,
-                    Form::Spatial => self.locals[k].matter += g,
-                }
+                self.locals[k].matter += g;
             }
         }
-        let crossings = &record.crossings[record.nodes[k].crossings.clone()];
         let path = Stretch {
             start: from.x,
             dir: arrival.dir,
             length: arrival.distance,
             medium: arrival.start_medium,
-            crossings,
+            crossings: &record.crossings[record.nodes[k].crossings.clone()],
         };
-        match (self.form, vertex) {
-            (Form::Material, _) => {
-                if p == 0 {
-                    self.seen(vertex, arrival.dir, value, parent.value, here, sink);
-                }
-                let moving = near_moves || far_moves;
-                let far = vertex.map_or(Far::Direction, |v| Far::Vertex(v, here));
-                self.segment(&path, far, moving, weight, &mut there, sink);
-            }
-            // No ray moves; what is between may.
-            (Form::Spatial, _) if !(near_moves || far_moves) => {
+        let seen = (p == 0).then_some(parent.value);
+        let mut turned = RgbVec::ZERO;
+        match vertex {
+            // No end moves; what is between may.
+            _ if !(near_moves || far_moves) => {
                 self.segment(&path, Far::Direction, false, weight, &mut there, sink);
             }
-            (Form::Spatial, _) => {
-                let hold = &record.nodes[k].hold;
-                let free = weight * (1.0 - hold.share);
-                let mut turn =
-                    self.segment(&path, Far::Direction, near_moves, free, &mut there, sink);
-                if let Some(v) = vertex {
-                    let mut matter = self.locals[k].matter;
-                    if hold.share > 0.0 {
-                        let mut held =
-                            self.held(&path, v, near_moves, weight * hold.share, &mut there, sink);
-                        if p == 0 {
-                            let seen = value * hold.share;
-                            self.seen(vertex, arrival.dir, seen, parent.value, &mut held, sink);
-                        }
-                        matter += core::mem::take(&mut held.u);
-                        here.n += held.n;
-                        here.j += held.j;
-                    }
-                    let tows = &record.tows[record.nodes[k].tows.clone()];
-                    if !tows.is_empty() {
-                        let free_u = here.u * (1.0 - hold.share);
-                        let [near, turned] = self.tow(tows, &path, v, free_u, free, sink);
-                        there.u += near;
-                        turn += turned;
-                    }
-                    turn += self.land(&path, v, hold, here, matter, weight, &mut there, sink);
+            None => {
+                if let Some(filter) = seen {
+                    let held = &mut SurfaceAdjoint::default();
+                    self.seen(None, arrival.dir, value * phi, filter, held, sink);
                 }
-                if p == 0 {
-                    self.turn += turn;
-                }
+                turned = self.segment(&path, Far::Direction, near_moves, weight, &mut there, sink)
+                    * (1.0 - phi);
             }
+            Some(v) => {
+                let free = weight * (1.0 - phi);
+                turned = self.segment(&path, Far::Direction, near_moves, free, &mut there, sink);
+                let mut matter = self.locals[k].matter;
+                if phi > 0.0 {
+                    let mut fixed =
+                        self.material_end(&path, v, near_moves, weight * phi, &mut there, sink);
+                    if let Some(filter) = seen {
+                        let value = value * phi;
+                        self.seen(vertex, arrival.dir, value, filter, &mut fixed, sink);
+                    }
+                    matter += core::mem::take(&mut fixed.u);
+                    here.n += fixed.n;
+                    here.j += fixed.j;
+                }
+                let end = Propagated { vertex: v, velocity, weight, matter };
+                turned += self.propagate(&path, &end, velocities, here, &mut there, sink);
+            }
+        }
+        if p == 0 {
+            self.turn += turned;
         }
         self.locals[p].at = there;
     }
@@ -355,15 +315,12 @@ impl<'w> Differentiator<'w> {
         }
         if let Some(b) = behind {
             let to_wo = d.wo * adjoint;
-            let g = turn(&(to_wo * b.share), wo, b.distance);
+            let g = turn(&(to_wo * b.weight), wo, b.distance);
             self.locals[b.parent].at.u += g;
-            match self.form {
-                Form::Material => here.u -= g,
-                Form::Spatial => self.locals[b.node].matter -= g,
-            }
+            self.locals[b.node].matter -= g;
             // Only the camera's ray turns by itself.
-            if b.parent == 0 && self.form == Form::Spatial {
-                self.turn -= to_wo * (1.0 - b.share);
+            if b.parent == 0 {
+                self.turn -= to_wo * (1.0 - b.weight);
             }
         }
         Some(d.wi * adjoint)
@@ -372,7 +329,7 @@ impl<'w> Differentiator<'w> {
     /// Next-event connections of a vertex: returns their sum, without the scattering coefficient.
     fn connections<S: AdjointSink>(
         &mut self,
-        record: &PathRecord,
+        recorded: &RecordedPath,
         k: usize,
         vertex: &Vertex,
         theta: Rgb,
@@ -380,11 +337,12 @@ impl<'w> Differentiator<'w> {
         sink: &mut S,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
+        let RecordedPath { record, velocities, .. } = recorded;
         let node = &record.nodes[k];
         let Some(arrival) = &node.arrival else { return sum };
-        let behind = self.behind(record, k);
-        let moving = self.moves(record, k, sink.interest());
-        let arrives = self.arrival_moves(record, k, sink.interest());
+        let behind = behind(recorded, k);
+        let moving = velocities.moves(k);
+        let arrives = moving || velocities.moves(arrival.parent as usize);
         for (c, crossings) in &record.connections[node.connections.clone()] {
             let rest = c.rest();
             sum += c.f * rest;
@@ -409,7 +367,9 @@ impl<'w> Differentiator<'w> {
                 medium: c.start_medium,
                 crossings: &record.crossings[crossings.clone()],
             };
-            self.light_end(&path, vertex, moving, light, to_wi, per_value, here, sink);
+            self.light_end(
+                &path, velocities, vertex, moving, light, to_wi, per_value, here, sink,
+            );
         }
         sum
     }
@@ -462,7 +422,7 @@ impl<'w> Differentiator<'w> {
         sink: &S,
     ) {
         let interest = sink.interest();
-        if !(interest.sensor || vertex.is_some_and(|v| moves(v, interest, false))) {
+        if !(interest.sensor || vertex.is_some_and(|v| moves(v, interest))) {
             return;
         }
         let camera = &self.world.camera;
@@ -482,17 +442,14 @@ impl<'w> Differentiator<'w> {
         }
         here.u += RgbVec { r: at[0], g: at[1], b: at[2] };
     }
+}
 
-    /// What the camera collected.
-    fn camera<S: AdjointSink>(&mut self, sink: &mut S) {
-        if sink.interest().sensor {
-            let position = self.locals[0].at.u;
-            for (g, p) in self.sensor.iter_mut().zip([position.r, position.g, position.b]) {
-                g.position += p;
-            }
-            sink.sensor(&self.sensor);
-        }
-    }
+/// The segment by which a walk arrived at a node; `None` at the camera.
+fn behind(path: &RecordedPath, node: usize) -> Option<Behind> {
+    let arrival = path.record.nodes[node].arrival.as_ref()?;
+    let (parent, distance) = (arrival.parent as usize, arrival.distance);
+    let weight = path.velocities.of(node).blend.weight;
+    Some(Behind { node, parent, distance, weight })
 }
 
 /// Gradient by the far end of a segment, from that by its unit direction `w`.
@@ -500,11 +457,11 @@ fn turn(g: &RgbVec, w: Vec3, distance: f64) -> RgbVec {
     g.map(|g| g.reject(w) / distance)
 }
 
-fn moves(v: &Vertex, interest: &Interest, camera: bool) -> bool {
+fn moves(v: &Vertex, interest: &Interest) -> bool {
     match &v.kind {
         Kind::Surface(s) => interest.shapes[s.shape as usize],
         Kind::Volume(_) => v.medium.is_some_and(|m| interest.volumes[m]),
-        Kind::Point => camera,
+        Kind::Point => false,
     }
 }
 

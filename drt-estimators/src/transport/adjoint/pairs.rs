@@ -2,14 +2,14 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use super::{Differentiator, Form, send, turn};
+use super::{Differentiator, behind, send, turn};
 use crate::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::sensor::SensorGradient;
 use crate::surface::{BsdfParams, Turn};
 use crate::transport::pairs::{Brought, Pair, Told};
-use crate::transport::record::{Node, PathRecord, hold_of};
+use crate::transport::record::Node;
 use crate::transport::scatter::ScatteringGradient;
 use crate::transport::trace::{Arrival, Endpoint};
+use crate::transport::velocity::RecordedPath;
 use crate::transport::vertex::Vertex;
 
 /// The part of the derivative of a value that pairs tell.
@@ -23,9 +23,10 @@ pub(super) struct Apart<'a> {
 
 impl<'a> Apart<'a> {
     /// Of the scattering at a node into the ray that left it.
-    pub(super) fn of(record: &'a PathRecord, node: &Node) -> Self {
-        let turn = record.pairs.turn(&node.paired);
-        Self { value: node.value, alpha: node.paired.alpha, turn }
+    pub(super) fn of(path: &'a RecordedPath, node: usize) -> Self {
+        let paired = path.pairs.paired(node);
+        let turn = path.pairs.turn(&paired);
+        Self { value: path.record.nodes[node].value, alpha: paired.alpha, turn }
     }
 
     pub(super) fn take_from(&self, d: &mut ScatteringGradient) {
@@ -46,13 +47,13 @@ impl Differentiator<'_> {
     /// Sends what a pair tells, which is looked at with a given `chance`. The record is the one that was swept last.
     pub(crate) fn pair<S: AdjointSink>(
         &self,
-        record: &PathRecord,
+        path: &RecordedPath,
         pair: &Pair,
         chance: f64,
         other: &Brought,
         sink: &mut S,
     ) {
-        let node = &record.nodes[pair.node];
+        let node = &path.record.nodes[pair.node];
         let surface = node.vertex().and_then(Vertex::surface);
         let (Some(arrival), Some(s)) = (&node.arrival, surface) else { return };
         let each = arrival.throughput * (node.inv_pdf * pair.share / chance);
@@ -65,7 +66,7 @@ impl Differentiator<'_> {
             }
             Told::Turns(turns) => {
                 if sink.interest().moves_geometry() {
-                    self.turned(record, pair, turns, light, [own, others], other, sink);
+                    self.turned(path, pair, turns, light, [own, others], other, sink);
                 }
                 let eta = light[0] * turns[0].eta + light[1] * turns[1].eta;
                 BsdfParams { eta, ..BsdfParams::default() }
@@ -82,7 +83,7 @@ impl Differentiator<'_> {
     #[allow(clippy::too_many_arguments)]
     fn turned<S: AdjointSink>(
         &self,
-        record: &PathRecord,
+        path: &RecordedPath,
         pair: &Pair,
         turns: &[Turn; 2],
         light: [Rgb; 2],
@@ -91,7 +92,8 @@ impl Differentiator<'_> {
         sink: &mut S,
     ) {
         let k = pair.node;
-        let (node, Some(b)) = (&record.nodes[k], self.behind(record, k)) else { return };
+        let RecordedPath { record, velocities, .. } = path;
+        let (node, Some(b)) = (&record.nodes[k], behind(path, k)) else { return };
         let Some(vertex) = node.vertex() else { return };
         let both =
             |of: fn(&Turn) -> Vec3| light[0].outer(of(&turns[0])) + light[1].outer(of(&turns[1]));
@@ -100,57 +102,36 @@ impl Differentiator<'_> {
         for (c, child) in record.nodes.iter().enumerate().skip(k + 1).filter(|(_, c)| own(c)) {
             let Some(end) = &child.arrival else { continue };
             let light = times[0] * self.locals[c].brought;
-            here.u -= self.turn_end(end, self.share(record, c), light.outer(turns[0].wi), sink);
+            here.u -= self.turn_end(end, velocities.of(c).blend.weight, light.outer(turns[0].wi), sink);
         }
         for (end, brought) in &other.ends {
-            let share = match self.form {
-                Form::Material => 1.0,
-                Form::Spatial => hold_of(self.world, record.pixel, Some(vertex), end).share,
-            };
+            let (Endpoint::Surface(v) | Endpoint::Volume(v, _)) = &end.end else { continue };
+            let blend =
+                velocities.field().blend(self.world, vertex, v, end.dir, end.distance);
             let light = times[1] * *brought;
-            here.u -= self.turn_end(end, share, light.outer(turns[1].wi), sink);
+            here.u -= self.turn_end(end, blend.weight, light.outer(turns[1].wi), sink);
         }
         let wo = node.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
         let to_wo = both(|t| t.wo);
-        let g = turn(&(to_wo * b.share), wo, b.distance);
-        let viewer = &record.nodes[b.parent];
-        match self.form {
-            Form::Material => {
-                here.u -= g;
-                send(vertex, &here, sink);
-                match viewer.vertex() {
-                    Some(viewer) => send(viewer, &SurfaceAdjoint::of_place(g), sink),
-                    None if sink.interest().sensor => {
-                        sink.sensor(&[g.r, g.g, g.b].map(|position| SensorGradient {
-                            position,
-                            ..SensorGradient::default()
-                        }))
-                    }
-                    None => {}
-                }
-            }
-            Form::Spatial => {
-                send(vertex, &SurfaceAdjoint::of_place(-g), sink);
-                self.carry_back(record, k, here, RgbVec::ZERO, sink);
-                // Only the camera's ray turns by itself.
-                let turn = if b.parent == 0 { to_wo * (b.share - 1.0) } else { RgbVec::ZERO };
-                self.carry_back(record, b.parent, SurfaceAdjoint::of_place(g), turn, sink);
-            }
-        }
+        let g = turn(&(to_wo * b.weight), wo, b.distance);
+        self.send_back(path, k, here, -g, RgbVec::ZERO, sink);
+        // Only the camera's ray turns by itself.
+        let rate = if b.parent == 0 { to_wo * (b.weight - 1.0) } else { RgbVec::ZERO };
+        self.send_back(path, b.parent, SurfaceAdjoint::of_place(g), RgbVec::ZERO, rate, sink);
     }
 
     /// Turns a ray to where it ends, as far as that moves by itself; returns what the other end loses.
     fn turn_end<S: AdjointSink>(
         &self,
         end: &Arrival,
-        share: f64,
+        weight: f64,
         to_wi: RgbVec,
         sink: &mut S,
     ) -> RgbVec {
         let (Endpoint::Surface(vertex) | Endpoint::Volume(vertex, _)) = &end.end else {
             return RgbVec::ZERO;
         };
-        let g = turn(&(to_wi * share), end.dir, end.distance);
+        let g = turn(&(to_wi * weight), end.dir, end.distance);
         send(vertex, &SurfaceAdjoint::of_place(g), sink);
         g
     }

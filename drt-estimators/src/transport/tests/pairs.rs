@@ -1,5 +1,7 @@
 //! Derivatives from pairs of rays, against those along single ones.
 
+use alloc::sync::Arc;
+
 use drt_math::Rng;
 use drt_math::stats::Moments;
 use drt_motion::Parameter;
@@ -12,7 +14,15 @@ use crate::emitter::Emitter;
 use crate::scene::Scene;
 use crate::surface::{Bsdf, Distribution, RoughConductor, RoughDielectric};
 use crate::transport::pairs::{Brought, Pair, Pairs, Told};
-use crate::transport::{Differentiator, Form, PathRecord, Tracer};
+use crate::transport::velocity::{Material, Movers, Spatial, VelocityField};
+use crate::transport::{Differentiator, RecordedPath, Tracer};
+
+/// The velocity field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Form {
+    Material,
+    Spatial,
+}
 
 /// The interior derivative of all light of lamps and the sky: along single rays, and from pairs whose other ray brings what
 /// `other` makes of it.
@@ -26,26 +36,26 @@ fn derivatives(
     let (prepared, motion) = prepare(scene, parameter, 5);
     let world = &prepared.world;
     let mut tracer = Tracer::new(world);
-    let movers = motion.interest.carriers();
-    let mut record = PathRecord {
-        pairs: Pairs::new(Some((movers.clone(), form))),
-        carriers: if form == Form::Spatial { movers } else { Default::default() },
-        ..PathRecord::default()
+    let movers = Movers::new(&motion.interest);
+    let field: Arc<dyn VelocityField> = match form {
+        Form::Material => Arc::new(Material::new(movers)),
+        Form::Spatial => Arc::new(Spatial::new(movers)),
     };
-    let mut differentiator = Differentiator::new(world, form);
+    let mut path = RecordedPath::new(field, Pairs::new(true));
+    let mut differentiator = Differentiator::new(world);
     let mut sink = Contraction::new(world, &motion);
     let (mut buffer, mut moments) = (Brought::default(), [Moments::default(); 2]);
     for (seed, moments) in (20..).zip(&mut moments) {
         for i in 0..paths {
             let choices = (seed == 21).then(|| Rng::new(9, 1, i));
-            record.pairs.begin(choices);
-            let slope = trace(&mut tracer, &mut record, seed, i);
+            path.pairs.begin(choices);
+            let slope = trace(&mut tracer, &mut path, seed, i);
             sink.clear();
-            differentiator.differentiate(&record, slope, Rng::new(6, 0, i), &mut sink);
-            record.pairs.follow(&mut tracer, &mut buffer, |pair, chance, brought| {
+            differentiator.differentiate(&path, slope, Rng::new(6, 0, i), &mut sink);
+            path.pairs.follow(&mut tracer, &mut buffer, |pair, chance, brought| {
                 let mut brought = brought.clone();
                 other(pair, &mut brought);
-                differentiator.pair(&record, pair, chance, &brought, &mut sink);
+                differentiator.pair(&path, pair, chance, &brought, &mut sink);
             });
             moments.push(sink.rates[0].mean());
         }

@@ -10,10 +10,10 @@ use super::changes::rates;
 use super::moving::Moving;
 use super::replay::replay;
 use super::scenes::*;
-use super::setup::{Fault, Faulty, coloured, motion, prepare, set, trace};
+use super::setup::{Fault, Faulty, coloured, material, motion, prepare, set, trace};
 use crate::contraction::Contraction;
 use crate::scene::Scene;
-use crate::transport::{Differentiator, Form, PathRecord, Tracer};
+use crate::transport::{Differentiator, Tracer};
 
 /// What has been compared.
 #[derive(Debug, Default)]
@@ -32,16 +32,17 @@ fn compare(scene: &Scene, parameter: &Parameter, fault: Fault) -> Tally {
     let (world, motion) = prepare(scene, parameter);
     let moving = Moving::new(scene, parameter, &world, &motion);
     let mut tracer = Tracer::new(&world);
-    let mut record = PathRecord::default();
-    let mut differentiator = Differentiator::new(&world, Form::Material);
+    let mut path = material(&motion);
+    let mut differentiator = Differentiator::new(&world);
     let mut sink = Faulty(Contraction::new(&world, &motion), fault);
     let mut tally = Tally::default();
     while (tally.paths < 200 || tally.moving < 30) && tally.paths < 20_000 {
         let i = tally.paths;
-        let slope = trace(&mut tracer, &mut record, 5, i);
+        let slope = trace(&mut tracer, &mut path, 5, i);
         sink.0.clear();
-        differentiator.differentiate(&record, slope, Rng::new(6, 0, i), &mut sink);
-        let truth = replay(&moving, &record, slope);
+        differentiator.differentiate(&path, slope, Rng::new(6, 0, i), &mut sink);
+        let record = &path.record;
+        let truth = replay(&moving, record, slope);
         let value = truth.map(|v| v.re);
         let error = (value - record.value).max_abs();
         assert!(error <= 1e-11 * record.value.max_abs(), "path {i}: {value:?} {:?}", record.value);

@@ -12,7 +12,7 @@ use super::fade;
 use super::moving::Moving;
 use crate::emitter::Emitter;
 use crate::surface::tests::value_over;
-use crate::transport::PathRecord;
+use crate::transport::record::PathRecord;
 use crate::transport::lights::{LightKind, LightSample};
 use crate::transport::record::Node;
 use crate::transport::trace::{Connection, Endpoint};

@@ -14,7 +14,8 @@ use crate::scene::Scene;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
-use crate::transport::{Lit, MaterialPoint, PathRecord, Tracer, World};
+use crate::transport::velocity::{Material, Movers};
+use crate::transport::{Lit, MaterialPoint, RecordedPath, Tracer, World};
 use crate::{inside, tangents};
 
 pub(super) fn set(name: &str, id: &str, property: &str, op: ValueChange) -> Parameter {
@@ -43,10 +44,16 @@ pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
     (world, motion)
 }
 
+/// A path in the material form.
+pub(super) fn material(motion: &Motion) -> RecordedPath {
+    let field = Material::new(Movers::new(&motion.interest));
+    RecordedPath::new(alloc::sync::Arc::new(field), Default::default())
+}
+
 /// Traces a path from some pixel; returns the filter's gradient over the density.
 pub(super) fn trace(
     tracer: &mut Tracer<'_>,
-    record: &mut PathRecord,
+    path: &mut RecordedPath,
     seed: u64,
     i: u32,
 ) -> [f64; 2] {
@@ -55,9 +62,9 @@ pub(super) fn trace(
     let view = tracer.world.camera.sample_view(i % pixels, rng.next_2d(), true);
     let weight = Rgb::splat(view.weight);
     let pixel = [i % pixels % FILM[0], i % pixels / FILM[0]];
-    record.begin(pixel, view.direction, weight);
+    path.begin(pixel, view.direction, weight);
     tracer.rng = rng;
-    tracer.trace_camera(view.direction, weight, record);
+    tracer.trace_camera(view.direction, weight, path);
     view.slope
 }
 

@@ -10,10 +10,10 @@ use super::changes::rates;
 use super::moving::Moving;
 use super::replay::replay;
 use super::scenes::*;
-use super::setup::{Fault, Faulty, coloured, motion, prepare, set, trace};
+use super::setup::{Fault, Faulty, coloured, material, motion, prepare, set, trace};
 use crate::contraction::Contraction;
 use crate::scene::Scene;
-use crate::transport::{Differentiator, Form, PathRecord, Tracer};
+use crate::transport::{Differentiator, Tracer};
 
 #[test]
 fn derivatives_on_average() {
@@ -63,22 +63,22 @@ fn mean_deviations(scene: &Scene, parameter: &Parameter, fault: Fault, factor: f
     let (world, motion) = prepare(scene, parameter);
     let moving = Moving::new(scene, parameter, &world, &motion);
     let mut tracer = Tracer::new(&world);
-    let mut record = PathRecord::default();
-    let mut differentiator = Differentiator::new(&world, Form::Material);
+    let mut path = material(&motion);
+    let mut differentiator = Differentiator::new(&world);
     let mut sink = Faulty(Contraction::new(&world, &motion), fault);
     let mut deviations = Vec::new();
     for i in 0..120 {
-        let slope = trace(&mut tracer, &mut record, 15, i);
-        let expected = rates(replay(&moving, &record, slope)).g * factor;
+        let slope = trace(&mut tracer, &mut path, 15, i);
+        let expected = rates(replay(&moving, &path.record, slope)).g * factor;
         let mean: Moments = (0..1000)
             .map(|j| {
                 sink.0.clear();
-                differentiator.differentiate(&record, slope, Rng::new(16, j, i), &mut sink);
+                differentiator.differentiate(&path, slope, Rng::new(16, j, i), &mut sink);
                 sink.0.rates[0].g
             })
             .collect();
         let (error, stderr) = (mean.mean() - expected, mean.standard_error());
-        let rounding = 1e-10 * f64::max(expected.abs(), record.value.g);
+        let rounding = 1e-10 * f64::max(expected.abs(), path.record.value.g);
         if error.abs() > rounding || stderr > rounding {
             deviations.push(error / f64::hypot(stderr, rounding));
         }

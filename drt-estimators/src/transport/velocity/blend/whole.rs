@@ -1,8 +1,8 @@
-//! How lamps hold the points from which they light others, and media that move as a whole their vertices.
+//! φ of lamps, and of media whose boundary moves by one affine field.
 //!
 //! At fixed directions, a lamp that moves changes nothing but its rim: what it lights has a derivative that is
 //! the sum of large terms of either sign, one for each edge. That is by far noisier than the
-//! derivative of the geometric term, which holding the lamp's points gives, but for two cases:
+//! derivative of the geometric term, which φ = 1 on the lamp gives, but for two cases:
 //!
 //! * where light is scattered into lobes narrower than the lamp. These move their peak across its points, while
 //!   its rim is in the dark;
@@ -19,16 +19,16 @@
 //!
 //! At fixed directions and distances the vertices of a medium that moves stand still, and all of the change is where
 //! rays enter and leave it: a [flux](crate::flux) that grows as 1 / cosine where they graze, whose second moment diverges like a
-//! logarithm over all viewers. Vertices that go with their medium, by the field which all that bounds it moves by (see
+//! logarithm over all viewers. Vertices that move with their medium, by the field which all that bounds it moves by (see
 //! [`inside`](crate::inside)), have no flux. The depth of a vertex below the surface changes with the direction it is
-//! seen in, as depth / cosine over the distance, and depths are a mean free path or so. So vertices hold to their medium with
+//! seen in, as depth / cosine over the distance, and depths are a mean free path or so. So
 //!
 //! ```text
-//! φ = min(d² / (0.4 R)², 1),
+//! φ = min(d² / (0.4 R)², 1)
 //! ```
 //!
-//! as seen from outside of it, whatever the lobes. Vertices that see others of the same medium are carried by what holds them:
-//! by all of a translation.
+//! as seen from outside of the medium, whatever the lobes. Vertices that see others of the same medium propagate
+//! the velocity of these: all of it in a translation.
 
 use drt_geom::Aabb;
 use drt_math::Vec3;
@@ -36,12 +36,12 @@ use drt_math::Vec3;
 /// How near is beside it, in radii.
 const NEAR: f64 = 0.4;
 
-/// Where what is held as a whole is.
+/// A lamp or medium, all points of which have the same φ for a viewer.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Whole {
     bounds: Aabb,
     radius2: f64,
-    /// What its shares are multiplied by.
+    /// What φ is multiplied by.
     pub(super) strength: f64,
 }
 
@@ -52,7 +52,7 @@ impl Whole {
     }
 
     /// φ as seen from `x`, of a medium.
-    pub(super) fn share(&self, x: Vec3) -> f64 {
+    pub(super) fn weight(&self, x: Vec3) -> f64 {
         let outside = (x - x.max(self.bounds.min).min(self.bounds.max)).length_squared();
         if outside == 0.0 {
             return 0.0;
@@ -61,13 +61,13 @@ impl Whole {
     }
 
     /// φ as seen from `x`, of a lamp, where light is scattered into lobes of a `width`, of at most 1.
-    pub(super) fn share_in_lobes(&self, x: Vec3, width: f64) -> f64 {
-        let (share, w2) = (self.share(x), width * width);
-        if share == 0.0 || w2 == 0.0 {
+    pub(super) fn weight_in_lobes(&self, x: Vec3, width: f64) -> f64 {
+        let (weight, w2) = (self.weight(x), width * width);
+        if weight == 0.0 || w2 == 0.0 {
             return 0.0;
         }
         let narrow = (1.0 - w2) * self.radius2 / (self.bounds.center() - x).length_squared();
-        share * w2 / (w2 + narrow)
+        weight * w2 / (w2 + narrow)
     }
 }
 
@@ -77,30 +77,30 @@ mod tests {
 
     use super::*;
 
-    /// What points of a lamp pass at, times its share, is bounded beside it and from all around.
+    /// The rate at which points of a lamp pass, times φ, is bounded beside it and from all around.
     #[test]
-    fn what_is_beside_a_lamp_is_not_held() {
+    fn beside_a_lamp_the_weight_vanishes() {
         let lamp = Whole::new(Aabb { min: vec3(-1.0, 0.0, -2.0), max: vec3(1.0, 0.0, 2.0) });
         let radius = 5.0_f64.sqrt();
         for direction in [vec3(0.0, 1.0, 0.0), vec3(0.0, -1.0, 0.0)] {
             for power in -12..4 {
                 let distance = f64::powi(10.0, power);
-                let share = lamp.share(vec3(0.3, 0.0, 1.9) + direction * distance);
-                assert!(share / distance <= 1.0001 / (NEAR * radius), "{distance} {share}");
+                let weight = lamp.weight(vec3(0.3, 0.0, 1.9) + direction * distance);
+                assert!(weight / distance <= 1.0001 / (NEAR * radius), "{distance} {weight}");
             }
         }
-        assert_eq!(lamp.share(vec3(0.2, 0.0, 0.1)), 0.0);
+        assert_eq!(lamp.weight(vec3(0.2, 0.0, 0.1)), 0.0);
     }
 
-    /// Far away it is, unless lobes are narrower than what is seen of it.
+    /// Unless lobes are narrower than what is seen of it.
     #[test]
-    fn what_is_far_from_a_lamp_is_held() {
+    fn far_from_a_lamp_the_weight_is_one() {
         let lamp = Whole::new(Aabb { min: Vec3::ZERO, max: vec3(1.0, 1.0, 0.0) });
         let far = lamp.bounds.center() + vec3(0.0, 0.0, 10.0);
         let angle = 0.5_f64.sqrt() / 10.0;
-        assert_eq!(lamp.share_in_lobes(far, 1.0), 1.0);
-        assert!((lamp.share_in_lobes(far, angle) - 0.5).abs() < 0.01);
-        assert!(lamp.share_in_lobes(far, 0.1 * angle) < 0.011);
-        assert_eq!(lamp.share_in_lobes(far, 0.0), 0.0);
+        assert_eq!(lamp.weight_in_lobes(far, 1.0), 1.0);
+        assert!((lamp.weight_in_lobes(far, angle) - 0.5).abs() < 0.01);
+        assert!(lamp.weight_in_lobes(far, 0.1 * angle) < 0.011);
+        assert_eq!(lamp.weight_in_lobes(far, 0.0), 0.0);
     }
 }

@@ -1,4 +1,4 @@
-//! The holds' algebra, and that they are one choice among many.
+//! Weights and their gradients, and that any choice of them gives the same derivative.
 
 use alloc::sync::Arc;
 use alloc::vec;
@@ -6,16 +6,16 @@ use alloc::vec;
 use drt_math::{Rng, Vec3, vec3};
 use drt_motion::GeometryChange;
 
-use super::super::tests::choice::{self, LIGHT, MOMENT, Sum};
-use super::super::tests::scenes::{
+use crate::transport::tests::choice::{self, LIGHT, MOMENT, Sum};
+use crate::transport::tests::scenes::{
     diffuse, fog, glow, moves, parameter, phong, shift, stretch, surfaces,
 };
-use super::Hold;
+use super::Blend;
 use crate::contraction::Motion;
 use crate::prepared::Prepared;
 use crate::transport::{Kind, SurfacePoint, Vertex};
 
-/// A ball over a floor that moves; the ball's surface holds. It has smooth normals, or `facets`.
+/// A ball over a floor that moves. It has smooth normals, or `facets`.
 fn prepare(facets: bool) -> (Prepared, Motion) {
     let mut scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
     if facets {
@@ -26,31 +26,31 @@ fn prepare(facets: bool) -> (Prepared, Motion) {
     choice::prepare(&scene, &motion, 4)
 }
 
-/// The slope is the gradient of the share, along the surface.
+/// Along the surface.
 #[test]
-fn slopes_are_those_of_shares() {
+fn gradients_are_those_of_weights() {
     let (prepared, _) = prepare(false);
     let world = &prepared.world;
     let mut rng = Rng::new(1, 2, 3);
-    let mut held = [0; 2];
+    let mut counts = [0; 2];
     for _ in 0..20_000 {
         // One of the ball's.
         let prim = (rng.next_f64() * 80.0) as u32;
         let from = vec3(rng.next_f64(), rng.next_f64(), rng.next_f64()) * 6.0 - Vec3::splat(3.0);
         let viewer = Vertex { x: from, medium: None, kind: Kind::Point };
-        let holds: [&dyn Fn(&Vertex) -> Hold; 2] =
-            [&|v| world.hold(&viewer, v, (v.x - from).normalize(), (v.x - from).length()), &|v| {
+        let blends: [&dyn Fn(&Vertex) -> Blend; 2] =
+            [&|v| world.blend(&viewer, v, (v.x - from).normalize(), (v.x - from).length()), &|v| {
                 let pixel = world.camera.view(world.point(prim, [0.3; 2]).1).pixel;
-                world.hold_in_pixel(v, pixel.map(|p| p.clamp(0.0, 4.0) as u32))
+                world.blend_in_pixel(v, pixel.map(|p| p.clamp(0.0, 4.0) as u32))
             }];
         let at = |bary: [f64; 2]| -> (SurfacePoint, Vertex) {
             let (point, x) = world.point(prim, bary);
             (point, Vertex { x, medium: None, kind: Kind::Surface(point) })
         };
-        for (hold, count) in holds.iter().zip(&mut held) {
+        for (blend, count) in blends.iter().zip(&mut counts) {
             let (_, here) = at([0.3; 2]);
-            let Hold { share, slope } = hold(&here);
-            if share == 0.0 || share > 0.999 {
+            let Blend { weight, gradient } = blend(&here);
+            if weight == 0.0 || weight > 0.999 {
                 continue;
             }
             *count += 1;
@@ -59,16 +59,16 @@ fn slopes_are_those_of_shares() {
                 [0.0, step].map(|s| at([0.3 + s, 0.3]).1),
                 [0.0, step].map(|s| at([0.3 - s, 0.3]).1),
             );
-            let difference = hold(&a).share - hold(&b).share;
-            let expected = slope.dot(a.x - b.x);
-            let size = slope.length() * (a.x - b.x).length();
+            let difference = blend(&a).weight - blend(&b).weight;
+            let expected = gradient.dot(a.x - b.x);
+            let size = gradient.length() * (a.x - b.x).length();
             assert!(
                 (difference - expected).abs() < 1e-3 * size + 1e-12,
                 "{difference} {expected} {size}"
             );
         }
     }
-    assert!(held.iter().all(|h| *h > 100), "{held:?}");
+    assert!(counts.iter().all(|c| *c > 100), "{counts:?}");
 }
 
 /// The same of lamps, from surfaces and from fog.
@@ -86,7 +86,7 @@ fn nor_of_lamps() {
         let motion = parameter(moved, 0.0, vec![moves(moved, change)]);
         choice::check(MOMENT, &|strength| {
             let (mut prepared, motion) = choice::prepare(scene, &motion, 4);
-            let lamps = prepared.world.holds.lamps.iter_mut().flatten();
+            let lamps = prepared.world.blends.lamps.iter_mut().flatten();
             lamps.for_each(|lamp| lamp.strength = 2.0 * strength);
             (prepared, motion)
         });
@@ -113,19 +113,19 @@ fn check_medium(sum: Sum, change: GeometryChange) {
     let motion = parameter("block", 0.0, vec![moves("block", change)]);
     choice::check(sum, &|strength| {
         let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
-        let media = &mut prepared.world.holds.media;
+        let media = &mut prepared.world.blends.media;
         assert_eq!(media.iter().flatten().count(), 1);
         media.iter_mut().flatten().for_each(|m| m.strength = strength);
         (prepared, motion)
     });
 }
 
-/// Holds of three strengths.
+/// Weights of three strengths.
 fn check(facets: bool) {
     choice::check(MOMENT, &|strength| {
         let (mut prepared, motion) = prepare(facets);
-        let holds = &mut prepared.world.holds;
-        holds.bends.iter_mut().chain(&mut holds.seen).for_each(|h| *h *= strength);
+        let blends = &mut prepared.world.blends;
+        blends.curvatures.iter_mut().chain(&mut blends.camera_cosines).for_each(|h| *h *= strength);
         (prepared, motion)
     });
 }

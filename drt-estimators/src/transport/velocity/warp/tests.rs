@@ -1,4 +1,4 @@
-//! The tows' algebra, and that they are one choice among many.
+//! The coefficients of warps, and that any choice of them gives the same derivative.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -7,47 +7,48 @@ use drt_geom::procedural;
 use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{Effect, GeometryChange};
 
-use super::super::tests::choice::{self, MOMENT};
-use super::super::tests::scenes::{
+use crate::transport::tests::choice::{self, MOMENT};
+use crate::transport::tests::scenes::{
     Build, ball, diffuse, homogeneous, moves, parameter, placed, shift,
 };
-use super::{Met, Stretch, tows};
+use super::{Stretch, SurfaceHit, warps};
 use crate::Scene;
 use crate::emitter::Emitter;
 use crate::transport::SurfacePoint;
 
-fn met(distance: f64, cosine: f64) -> Met {
+fn hit(distance: f64, cosine: f64) -> SurfaceHit {
     let up = vec3(0.0, 0.0, 1.0);
     let point =
         SurfacePoint { prim: 0, shape: 0, triangle: 0, bary: [0.3; 2], ng: up, ns: Vec3::ZERO };
-    Met { point, x: Vec3::ZERO, distance, cosine, moves: true, after: None }
+    SurfaceHit { point, x: Vec3::ZERO, distance, cosine, moves: true, after: None }
 }
 
-fn at_rest(distance: f64) -> Met {
-    Met { moves: false, ..met(distance, 0.7) }
+fn at_rest(distance: f64) -> SurfaceHit {
+    SurfaceHit { moves: false, ..hit(distance, 0.7) }
 }
 
 /// The share of the surface at `distance` in the speed of the vertex at t, and its slope.
-fn share(met: &[Met], t: f64, reach: f64, distance: f64) -> (f64, f64) {
-    let of: Vec<_> = tows(met, t, reach).filter(|tow| tow.distance == distance).collect();
+fn share(hits: &[SurfaceHit], t: f64, free_path: f64, distance: f64) -> (f64, f64) {
+    let dir = vec3(0.0, 0.0, 1.0);
+    let of: Vec<_> = warps(hits, dir, t, free_path).filter(|a| a.on_ray == Some(distance)).collect();
     assert!(of.len() <= 1);
-    of.first().map_or((0.0, 0.0), |tow| (tow.share, tow.slope))
+    of.first().map_or((0.0, 0.0), |a| (a.displacement.dot(dir), a.divergence))
 }
 
 /// Shares are continuous between two surfaces, have the slope that they say, and at both leave what goes to the
 /// flux; at the ray's start, and at surfaces that do not tow, they vanish.
 #[test]
 fn shares_and_slopes() {
-    let list = [met(1.0, -0.9), met(1.4, 0.2), at_rest(3.0), met(4.0, 0.8), met(4.3, -0.5)];
-    for reach in [0.1, 0.7, 40.0] {
+    let list = [hit(1.0, -0.9), hit(1.4, 0.2), at_rest(3.0), hit(4.0, 0.8), hit(4.3, -0.5)];
+    for free_path in [0.1, 0.7, 40.0] {
         for i in 0..=list.len() {
             let ends = [i.checked_sub(1).map(|i| &list[i]), list.get(i)];
-            let stretch = Stretch::new(ends, reach);
+            let stretch = Stretch::new(ends, free_path);
             let start = ends[0].map_or(0.0, |m| m.distance);
-            let end = ends[1].map_or(start + 4.0 * reach, |m| m.distance);
+            let end = ends[1].map_or(start + 4.0 * free_path, |m| m.distance);
             let of = |end: usize, t: f64| {
                 let moving = ends[end].filter(|m| m.moves);
-                moving.map_or((0.0, 0.0), |m| share(&list, t, reach, m.distance))
+                moving.map_or((0.0, 0.0), |m| share(&list, t, free_path, m.distance))
             };
             for (e, t) in [(0, start + 1e-12), (1, end - 1e-12)] {
                 let left = match ends[e] {
@@ -56,15 +57,15 @@ fn shares_and_slopes() {
                     None => [0.0; 2],
                 };
                 if ends[e].is_some_and(|m| m.moves) {
-                    assert!((of(e, t).0 + left[0] - 1.0).abs() < 1e-9, "{reach} {i} {e}");
+                    assert!((of(e, t).0 + left[0] - 1.0).abs() < 1e-9, "{free_path} {i} {e}");
                 }
-                assert!((of(1 - e, t).0 + left[1]).abs() < 1e-9, "{reach} {i} {e}");
+                assert!((of(1 - e, t).0 + left[1]).abs() < 1e-9, "{free_path} {i} {e}");
             }
             let length = end - start;
             for (e, k) in (1..20).flat_map(|k| [(0, k), (1, k)]) {
                 let (t, h) = (start + length * (0.05 * f64::from(k) + 0.003), 1e-6 * length);
                 let difference = (of(e, t + h).0 - of(e, t - h).0) / (2.0 * h);
-                assert!((difference - of(e, t).1).abs() < 1e-5 / length, "{reach} {i} {e} {k}");
+                assert!((difference - of(e, t).1).abs() < 1e-5 / length, "{free_path} {i} {e} {k}");
             }
         }
     }
@@ -73,7 +74,7 @@ fn shares_and_slopes() {
 /// Before the only surface, transmittance and the rate of distances together are constant.
 #[test]
 fn reparameterised_free_flight() {
-    let (sigma, list) = (1.3, [met(1.7, 1.0)]);
+    let (sigma, list) = (1.3, [hit(1.7, 1.0)]);
     let rate = |t: f64| {
         let (share, slope) = share(&list, t, 1.0 / sigma, 1.7);
         slope - sigma * share
@@ -87,7 +88,7 @@ fn reparameterised_free_flight() {
 /// Where two surfaces move alike, so does the little between them.
 #[test]
 fn thin_layers_go_along() {
-    let list = [met(1.0, 0.8), met(1.1, -0.9)];
+    let list = [hit(1.0, 0.8), hit(1.1, -0.9)];
     for t in [1.01, 1.06, 1.09] {
         let [(a, a_slope), (b, b_slope)] = [1.0, 1.1].map(|d| share(&list, t, 40.0, d));
         assert!((a + b - 1.0).abs() < 1e-4 && (a_slope + b_slope).abs() < 1e-3, "{t}");
@@ -127,14 +128,14 @@ fn ball_in_mist(kind: Ball) -> Scene {
     b.camera(vec3(0.3, 0.9, 4.0), Vec3::ZERO, 4)
 }
 
-/// Tows of three reaches, of none at first.
+/// Warps of three lengths, of none at first.
 fn check(kind: Ball, effects: Vec<Effect>) {
     let scene = ball_in_mist(kind);
     let motion = parameter("ball", 0.0, effects);
     choice::check(MOMENT, &|strength| {
         let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
-        for reach in &mut prepared.world.reaches {
-            *reach = reach.map(|r| r * strength).filter(|r| *r > 0.0);
+        for free_path in &mut prepared.world.free_paths {
+            *free_path = free_path.map(|r| r * strength).filter(|r| *r > 0.0);
         }
         (prepared, motion)
     });
@@ -152,7 +153,7 @@ fn what_is_followed_stands_for_all() {
                 flux.followed = followed;
             }
             // Then all of it is flux.
-            prepared.world.reaches.clear();
+            prepared.world.free_paths.clear();
             (prepared, motion)
         };
         choice::derivative(MOMENT, &prepare, [1.0; 2])
