@@ -282,8 +282,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         }
         self.path.pairs.begin(Some(Rng::new(self.seed, PAIR_STREAM | u64::from(pixel), unit)));
         let camera_ray = self.along.shadows.map(|_| &mut self.camera_ray);
-        let mut recorder =
-            Recorder { path: &mut self.path, flux: self.flux.as_mut(), camera_ray };
+        let mut recorder = Recorder { path: &mut self.path, flux: self.flux.as_mut(), camera_ray };
         self.tracer.trace_camera(dir, weight, &mut recorder);
         let record = &self.path.record;
         values[0] += record.value;

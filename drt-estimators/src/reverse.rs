@@ -188,8 +188,8 @@ impl Reverse<'_> {
         Sums { scene, insides: self.insides.zeros() }
     }
 
-    fn scatter(&self) -> Scatter<'_> {
-        Scatter {
+    fn scatter(&self) -> ScatterSink<'_> {
+        ScatterSink {
             world: &self.prepared.world,
             interest: self.interest,
             insides: self.insides,
@@ -260,7 +260,7 @@ impl Reverse<'_> {
 }
 
 /// Adds sensitivities, weighted by the pixel's adjoint, to the gradient of everything.
-struct Scatter<'a> {
+pub(crate) struct ScatterSink<'a> {
     world: &'a World,
     interest: &'a Interest,
     insides: &'a TransposedInsides,
@@ -268,7 +268,22 @@ struct Scatter<'a> {
     sums: Sums,
 }
 
-impl AdjointSink for Scatter<'_> {
+#[cfg(all(test, feature = "std"))]
+impl<'a> ScatterSink<'a> {
+    /// To what is not inside of media.
+    pub(crate) fn of_surfaces(world: &'a World, interest: &'a Interest, weights: Rgb) -> Self {
+        let insides =
+            alloc::boxed::Box::leak(alloc::boxed::Box::new(TransposedInsides::at_rest(world)));
+        let sums = Sums { scene: SceneGradient::zeros(world, interest), insides: insides.zeros() };
+        Self { world, interest, insides, weights, sums }
+    }
+
+    pub(crate) fn into_gradient(self) -> SceneGradient {
+        self.sums.scene
+    }
+}
+
+impl AdjointSink for ScatterSink<'_> {
     fn interest(&self) -> &Interest {
         self.interest
     }
@@ -352,7 +367,7 @@ impl AdjointSink for Scatter<'_> {
     }
 }
 
-impl PathSink for Scatter<'_> {
+impl PathSink for ScatterSink<'_> {
     fn begin(&mut self) {}
     fn finish(&mut self, _: &mut [Rgb]) {}
     fn functional(&mut self, f: &Functional, value: Rgb, _: &mut [Rgb]) {
@@ -365,7 +380,7 @@ impl PathSink for Scatter<'_> {
 
 /// Collects what a boundary sample splats and scatters its functional once.
 struct ToGradient<'a> {
-    scatter: Scatter<'a>,
+    scatter: ScatterSink<'a>,
     adjoint: &'a [Rgb],
     functional: Functional,
     weight: f64,

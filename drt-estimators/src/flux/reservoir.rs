@@ -9,8 +9,8 @@ use drt_math::{Real, Rgb, Rng, Vec3};
 
 use super::{EDGE_ON, Flux, filled};
 use crate::sensitivity::{Functional, Rate};
-use crate::transport::velocity::warp::{SurfaceHit, Stretch, list_hits};
 use crate::transport::trace::{Leaving, Tracer};
+use crate::transport::velocity::warp::{Stretch, SurfaceHit, list_hits};
 use crate::transport::world::intervals;
 use crate::transport::{MaterialPoint, Radiance, RayPath, SurfacePoint, Vertex, World};
 
@@ -277,7 +277,13 @@ impl Flux {
     }
 
     /// The medium beyond a surface, up to the `end` of the stretch.
-    fn beyond(&self, world: &World, viewer: &Vertex, m: &SurfaceHit, end: Option<&SurfaceHit>) -> Option<Side> {
+    fn beyond(
+        &self,
+        world: &World,
+        viewer: &Vertex,
+        m: &SurfaceHit,
+        end: Option<&SurfaceHit>,
+    ) -> Option<Side> {
         self.side(world, viewer, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
     }
 

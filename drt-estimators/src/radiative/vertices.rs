@@ -208,7 +208,8 @@ impl Radiative {
             if theta == 0.0 || !tracer.world.can_scatter(vertex) {
                 continue;
             }
-            let amount = self.amount(tracer, vertex, -arrival.dir, path.velocities.moves(k), sought);
+            let amount =
+                self.amount(tracer, vertex, -arrival.dir, path.velocities.moves(k), sought);
             if amount > 0.0 {
                 choice.offer(k, [theta, theta * amount]);
             }

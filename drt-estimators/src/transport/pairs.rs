@@ -264,8 +264,7 @@ impl Pairs {
         let seen = || {
             record.nodes[k].arrival.as_ref().is_some_and(|a| a.parent == 0) && velocities.moves(0)
         };
-        let turns =
-            world.bends_light(v) || seen() || field.turns_rays(world, s, velocities.of(k));
+        let turns = world.bends_light(v) || seen() || field.turns_rays(world, s, velocities.of(k));
         let transmissive = world.bsdf_of(s.shape).is_transmissive();
         turns && world.lobe_width(v) < field.widest_paired(transmissive)
     }

@@ -44,8 +44,7 @@ impl Differentiator<'_> {
                 let phi = blend.weight;
                 let free = weight * (1.0 - phi);
                 self.segment(path, Far::Direction, near_moves, free, here, sink);
-                let mut lit =
-                    self.material_end(path, &end, near_moves, weight * phi, here, sink);
+                let mut lit = self.material_end(path, &end, near_moves, weight * phi, here, sink);
                 if let Some(to_wi) = to_wi {
                     let g = turn(&(to_wi * phi), light.w, light.distance);
                     lit.u += g;

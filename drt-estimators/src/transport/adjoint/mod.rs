@@ -367,9 +367,7 @@ impl<'w> Differentiator<'w> {
                 medium: c.start_medium,
                 crossings: &record.crossings[crossings.clone()],
             };
-            self.light_end(
-                &path, velocities, vertex, moving, light, to_wi, per_value, here, sink,
-            );
+            self.light_end(&path, velocities, vertex, moving, light, to_wi, per_value, here, sink);
         }
         sum
     }

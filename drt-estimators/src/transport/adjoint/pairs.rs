@@ -102,12 +102,12 @@ impl Differentiator<'_> {
         for (c, child) in record.nodes.iter().enumerate().skip(k + 1).filter(|(_, c)| own(c)) {
             let Some(end) = &child.arrival else { continue };
             let light = times[0] * self.locals[c].brought;
-            here.u -= self.turn_end(end, velocities.of(c).blend.weight, light.outer(turns[0].wi), sink);
+            here.u -=
+                self.turn_end(end, velocities.of(c).blend.weight, light.outer(turns[0].wi), sink);
         }
         for (end, brought) in &other.ends {
             let (Endpoint::Surface(v) | Endpoint::Volume(v, _)) = &end.end else { continue };
-            let blend =
-                velocities.field().blend(self.world, vertex, v, end.dir, end.distance);
+            let blend = velocities.field().blend(self.world, vertex, v, end.dir, end.distance);
             let light = times[1] * *brought;
             here.u -= self.turn_end(end, blend.weight, light.outer(turns[1].wi), sink);
         }

@@ -10,6 +10,7 @@ mod replay;
 #[path = "../../../tests/common/mod.rs"]
 pub(crate) mod scenes;
 mod setup;
+mod velocity;
 mod voxels;
 
 use drt_math::Real;

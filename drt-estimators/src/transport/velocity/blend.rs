@@ -168,14 +168,21 @@ impl World {
             }
         }
         // Lamps have a φ of their own, which is 0 for what the camera sees of them.
-        for (curvature, _) in curvatures.iter_mut().zip(shapes).filter(|(_, s)| s.emitter.is_some()) {
+        for (curvature, _) in curvatures.iter_mut().zip(shapes).filter(|(_, s)| s.emitter.is_some())
+        {
             *curvature = 0.0;
         }
         curvatures
     }
 
     /// φ of a vertex seen along the unit direction `dir` from a `viewer` at a `distance`.
-    pub(crate) fn blend(&self, viewer: &Vertex, vertex: &Vertex, dir: Vec3, distance: f64) -> Blend {
+    pub(crate) fn blend(
+        &self,
+        viewer: &Vertex,
+        vertex: &Vertex,
+        dir: Vec3,
+        distance: f64,
+    ) -> Blend {
         let s = match &vertex.kind {
             Kind::Surface(s) => s,
             Kind::Volume(_) => {

@@ -6,13 +6,13 @@ use alloc::vec;
 use drt_math::{Rng, Vec3, vec3};
 use drt_motion::GeometryChange;
 
+use super::Blend;
+use crate::contraction::Motion;
+use crate::prepared::Prepared;
 use crate::transport::tests::choice::{self, LIGHT, MOMENT, Sum};
 use crate::transport::tests::scenes::{
     diffuse, fog, glow, moves, parameter, phong, shift, stretch, surfaces,
 };
-use super::Blend;
-use crate::contraction::Motion;
-use crate::prepared::Prepared;
 use crate::transport::{Kind, SurfacePoint, Vertex};
 
 /// A ball over a floor that moves. It has smooth normals, or `facets`.

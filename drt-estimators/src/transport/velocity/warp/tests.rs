@@ -7,14 +7,14 @@ use drt_geom::procedural;
 use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{Effect, GeometryChange};
 
-use crate::transport::tests::choice::{self, MOMENT};
-use crate::transport::tests::scenes::{
-    Build, ball, diffuse, homogeneous, moves, parameter, placed, shift,
-};
 use super::{Stretch, SurfaceHit, warps};
 use crate::Scene;
 use crate::emitter::Emitter;
 use crate::transport::SurfacePoint;
+use crate::transport::tests::choice::{self, MOMENT};
+use crate::transport::tests::scenes::{
+    Build, ball, diffuse, homogeneous, moves, parameter, placed, shift,
+};
 
 fn hit(distance: f64, cosine: f64) -> SurfaceHit {
     let up = vec3(0.0, 0.0, 1.0);
@@ -30,7 +30,8 @@ fn at_rest(distance: f64) -> SurfaceHit {
 /// The share of the surface at `distance` in the speed of the vertex at t, and its slope.
 fn share(hits: &[SurfaceHit], t: f64, free_path: f64, distance: f64) -> (f64, f64) {
     let dir = vec3(0.0, 0.0, 1.0);
-    let of: Vec<_> = warps(hits, dir, t, free_path).filter(|a| a.on_ray == Some(distance)).collect();
+    let of: Vec<_> =
+        warps(hits, dir, t, free_path).filter(|a| a.on_ray == Some(distance)).collect();
     assert!(of.len() <= 1);
     of.first().map_or((0.0, 0.0), |a| (a.displacement.dot(dir), a.divergence))
 }
