@@ -14,7 +14,7 @@ use crate::radiative::{Edged, Look, Radiative};
 use crate::rendering::{Account, Counters, NonFinite, Term};
 use crate::sensitivity::{AdjointSink, Functional, Rate, SurfaceAdjoint};
 use crate::transport::pairs::{Brought, Pairs};
-use crate::transport::trace::{Arrival, Connection, Leaving, Observer};
+use crate::transport::trace::{Arrival, Connection, Leaving, Observer, Pixel};
 use crate::transport::velocity::{Material, Movers, Spatial, VelocityField};
 use crate::transport::world::Crossing;
 use crate::transport::{Differentiator, Radiance, RayPath, RecordedPath, Tracer, World};
@@ -177,8 +177,8 @@ struct Recorder<'r> {
 impl Observer for Recorder<'_> {
     const RECORDS: bool = true;
 
-    fn contribution(&mut self, segments: u32, value: Rgb) {
-        self.path.contribution(segments, value);
+    fn contribution(&mut self, to: Pixel, segments: u32, value: Rgb) {
+        self.path.contribution(to, segments, value);
     }
 
     fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {

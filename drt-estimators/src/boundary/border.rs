@@ -14,7 +14,6 @@ use drt_math::{Rgb, Vec3};
 
 use super::{Buffers, Receiver};
 use crate::sensitivity::Rate;
-use crate::transport::flight::Travel;
 use crate::transport::trace::Tracer;
 use crate::transport::{Kind, Radiance, Vertex};
 
@@ -53,16 +52,8 @@ pub(crate) fn sample<R: Receiver>(
     let mut ray = core::mem::take(&mut b.ray);
     world.cast(&world.eye(), dir, &mut ray, &mut tracer.counters);
     let travel = tracer.travel(camera.position(), dir, &ray, Rgb::ONE);
-    let medium = ray.crossings.last().map_or(ray.medium, |c| c.after);
     b.ray = ray;
-    let (vertex, weight) = match travel {
-        Travel::Volume(v) => (Some(v.vertex), v.arrival),
-        Travel::Surface(p, x, weight) => {
-            (Some(Vertex { x, medium, kind: Kind::Surface(p) }), weight)
-        }
-        Travel::Escape(weight) => (None, weight),
-        Travel::Absorbed => return None,
-    };
+    let (vertex, weight) = travel.end()?;
     let mut along = [0.0; 2];
     along[axis] = 1.0;
     let x = vertex.map_or(camera.position() + dir, |v| v.x);

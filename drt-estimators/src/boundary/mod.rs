@@ -436,9 +436,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
                 weight: v.arrival,
                 flight: span.map(|span| v.flight(span, start.x, w)),
             }),
-            Travel::Surface(point, x, weight) => {
-                let medium = ray.crossings.last().map_or(ray.medium, |c| c.after);
-                let vertex = Vertex { x, medium, kind: Kind::Surface(point) };
+            Travel::Surface(vertex, weight) => {
                 Some(End { vertex: Some(vertex), distance: ray.length, weight, flight: None })
             }
             Travel::Escape(weight) => {

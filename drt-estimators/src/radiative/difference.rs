@@ -4,8 +4,7 @@
 use drt_math::{Rgb, Vec3};
 
 use super::jumps::{Jump, Jumps, Sides};
-use crate::transport::flight::Travel;
-use crate::transport::{Kind, Matter, Radiance, RayPath, Tracer, Vertex};
+use crate::transport::{Kind, Matter, Radiance, Tracer, Vertex};
 
 /// An edge point and a viewer of it.
 pub(super) struct Sight<'a> {
@@ -124,24 +123,14 @@ impl<'a> Sight<'a> {
         let d = -self.w;
         let (x, faces, medium) = (self.x, self.own_faces, self.medium);
         tracer.world.cast_past(x, faces, medium, d, &mut ray, &mut tracer.counters);
-        let travel = tracer.travel(x, d, &ray, Rgb::ONE);
-        let after = |ray: &RayPath| ray.crossings.last().map_or(ray.medium, |c| c.after);
-        let found = match travel {
-            Travel::Volume(v) => Some((v.vertex, v.arrival)),
-            Travel::Surface(point, x, arrival) => {
-                let vertex = Vertex { x, medium: after(&ray), kind: Kind::Surface(point) };
-                Some((vertex, arrival))
-            }
-            Travel::Escape(arrival) => {
-                tracer.ray = Some(ray);
-                let sky = tracer.world.lights.environment();
-                let light = sky.map_or(Rgb::ZERO, |(_, l)| l * arrival);
-                return Side { light, ..Side::default() };
-            }
-            Travel::Absorbed => None,
-        };
+        let end = tracer.travel(x, d, &ray, Rgb::ONE).end();
         tracer.ray = Some(ray);
-        let Some((vertex, arrival)) = found else { return Side::default() };
+        let Some((end, arrival)) = end else { return Side::default() };
+        let Some(vertex) = end else {
+            let sky = tracer.world.lights.environment();
+            let light = sky.map_or(Rgb::ZERO, |(_, l)| l * arrival);
+            return Side { light, ..Side::default() };
+        };
         let side = self.from(tracer, vertex, self.distance + (vertex.x - x).length());
         Side { light: side.light * arrival, ..side }
     }

@@ -5,7 +5,7 @@ use drt_math::{Rgb, Vec3, fm, warp};
 use drt_medium::{Coefficients, DistanceSample, TrackingStats};
 
 use super::trace::Tracer;
-use super::vertex::{Kind, SurfacePoint, Vertex};
+use super::vertex::{Kind, Vertex};
 use super::world::{RayPath, Tracking, World, intervals};
 
 impl Tracer<'_> {
@@ -70,14 +70,37 @@ impl Tracer<'_> {
             }
         }
         match ray.end {
-            Some((point, x)) => Travel::Surface(point, x, passed),
+            Some((point, x)) => {
+                let vertex = Vertex { x, medium: ray.last_medium(), kind: Kind::Surface(point) };
+                Travel::Surface(vertex, passed)
+            }
             None => Travel::Escape(passed),
         }
     }
 
+    /// A volume vertex placed by the angle under which a point is seen along a `span` of a ray; the point is one of
+    /// several whose selection probabilities add up to `total`, and densities are per unit of its own.
+    pub(crate) fn place_towards(
+        &mut self,
+        origin: Vec3,
+        dir: Vec3,
+        ray: &RayPath,
+        (begin, end): (f64, f64),
+        point: Vec3,
+        total: f64,
+    ) -> Option<Flown> {
+        let distances = warp::Equiangular::new(origin, dir, point, begin, end);
+        let t = distances.sample(self.rng.next_f64());
+        let mut part = core::mem::take(&mut self.shadow);
+        part.truncate_from(ray, t);
+        let v = self.place(origin, dir, &part, t, distances.pdf(t) / total);
+        self.shadow = part;
+        v
+    }
+
     /// A volume vertex put at distance `t` with a given density, weighted against free flight;
     /// `part` is the ray up to there.
-    pub(crate) fn place(
+    fn place(
         &mut self,
         origin: Vec3,
         dir: Vec3,
@@ -86,7 +109,7 @@ impl Tracer<'_> {
         density: f64,
     ) -> Option<Flown> {
         let world = self.world;
-        let medium = part.crossings.last().map_or(part.medium, |c| c.after)?;
+        let medium = part.last_medium()?;
         if world.tracking[medium] == Tracking::Attenuation || density.is_nan() || density <= 0.0 {
             return None;
         }
@@ -123,11 +146,23 @@ pub(crate) enum Travel {
     /// At a volume vertex.
     Volume(Flown),
     /// At the ray's end; with the transmittance over the probability of getting there.
-    Surface(SurfacePoint, Vec3, Rgb),
+    Surface(Vertex, Rgb),
     /// Nowhere: past everything.
     Escape(Rgb),
     /// Nothing got through.
     Absorbed,
+}
+
+impl Travel {
+    /// The vertex, or `None` for the environment, with its weight; nothing where nothing got through.
+    pub(crate) fn end(self) -> Option<(Option<Vertex>, Rgb)> {
+        match self {
+            Self::Volume(v) => Some((Some(v.vertex), v.arrival)),
+            Self::Surface(vertex, arrival) => Some((Some(vertex), arrival)),
+            Self::Escape(arrival) => Some((None, arrival)),
+            Self::Absorbed => None,
+        }
+    }
 }
 
 /// A volume vertex reached by free flight.
@@ -142,6 +177,13 @@ pub(crate) struct Flown {
     pub(crate) crossed: usize,
     /// Density of the distance by [`proxy_extinction`], for MIS weights.
     pub(crate) density: f64,
+}
+
+impl Flown {
+    /// How this vertex was found, for MIS against equiangular sampling over `span`.
+    pub(crate) fn flight(&self, span: (f64, f64), origin: Vec3, dir: Vec3) -> Flight {
+        Flight { span, origin, dir, t: self.t, density: self.density }
+    }
 }
 
 /// A distance sampled by free flight, and the span of the ray that equiangular sampling covers.

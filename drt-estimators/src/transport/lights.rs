@@ -100,6 +100,16 @@ pub(crate) struct LightSample {
     pub(crate) pdf: f64,
 }
 
+impl LightSample {
+    /// The point of an area emitter.
+    pub(crate) fn point(&self) -> Option<&SurfacePoint> {
+        match &self.kind {
+            LightKind::Area(point) => Some(point),
+            _ => None,
+        }
+    }
+}
+
 /// The emitters of a scene by power.
 #[derive(Debug, Default)]
 pub(crate) struct LightTable {

@@ -6,6 +6,7 @@ pub(crate) mod flight;
 mod geometry;
 pub(crate) mod importance;
 pub(crate) mod lights;
+mod mode;
 pub(crate) mod pairs;
 pub(crate) mod record;
 pub(crate) mod scatter;
@@ -14,6 +15,7 @@ pub(crate) mod tests;
 pub(crate) mod trace;
 pub(crate) mod velocity;
 pub(crate) mod vertex;
+mod walk;
 pub(crate) mod world;
 
 pub(crate) use adjoint::Differentiator;

@@ -49,7 +49,7 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, Rng, Vec3};
 
 use super::record::PathRecord;
-use super::trace::{Arrival, Leaving, Observer, Tracer};
+use super::trace::{Arrival, Leaving, Observer, Pixel, Tracer};
 use super::velocity::PathVelocities;
 use super::world::{Crossing, World};
 use crate::surface::{Given, Turn};
@@ -126,7 +126,7 @@ pub(crate) struct Brought {
 impl Observer for Brought {
     const RECORDS: bool = false;
 
-    fn contribution(&mut self, segments: u32, value: Rgb) {
+    fn contribution(&mut self, _: Pixel, segments: u32, value: Rgb) {
         self.light += value;
         match self.ends.last_mut() {
             Some((_, brought)) if segments > self.first => *brought += value,

@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use drt_math::{Rgb, Vec3};
 
-use super::trace::{Arrival, Connection, Endpoint, Leaving, Observer};
+use super::trace::{Arrival, Connection, Endpoint, Leaving, Observer, Pixel};
 use super::vertex::Vertex;
 use super::world::Crossing;
 
@@ -121,7 +121,7 @@ pub(crate) struct Radiance(pub(crate) Rgb);
 impl Observer for Radiance {
     const RECORDS: bool = false;
 
-    fn contribution(&mut self, _segments: u32, value: Rgb) {
+    fn contribution(&mut self, _: Pixel, _: u32, value: Rgb) {
         self.0 += value;
     }
 }
@@ -151,7 +151,7 @@ impl RadianceBySegments {
 impl Observer for RadianceBySegments {
     const RECORDS: bool = false;
 
-    fn contribution(&mut self, segments: u32, value: Rgb) {
+    fn contribution(&mut self, _: Pixel, segments: u32, value: Rgb) {
         let i = segments as usize;
         if self.0.len() <= i {
             self.0.resize(i + 1, Rgb::ZERO);

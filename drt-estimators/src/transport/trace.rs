@@ -21,16 +21,16 @@
 
 use alloc::boxed::Box;
 
-use drt_math::{Rgb, Rng, Vec3, warp};
+use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::Coefficients;
 
-use super::flight::{Flight, Flown, Travel, medium_span};
-use super::lights::{LightKind, LightSample, LightTable};
-use super::vertex::{Kind, SurfacePoint, Vertex};
+use super::flight::Flight;
+use super::lights::LightSample;
+use super::mode::RadianceMode;
+use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, RayPath, World};
 use crate::Counters;
 use crate::radiative::Options;
-use crate::surface::Given;
 
 /// Longest path with unlimited depth: far beyond where Russian roulette lets any path go.
 const LONGEST: u32 = 1 << 20;
@@ -80,12 +80,21 @@ impl Connection {
     }
 }
 
+/// The pixel that a contribution goes to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Pixel {
+    /// The one whose path is walked: a contribution from where the walk goes to its start.
+    Own,
+    /// Row by row from the top left: a contribution of importance from the walk's start.
+    At(u32),
+}
+
 /// What listens to a walk.
 pub(crate) trait Observer {
     /// True when zero factors must not end a path, because their derivatives count.
     const RECORDS: bool;
-    /// Light that reached the walk's start over `segments` segments.
-    fn contribution(&mut self, segments: u32, value: Rgb);
+    /// What reached a pixel, or the walk's start, over `segments` segments from the latter.
+    fn contribution(&mut self, to: Pixel, segments: u32, value: Rgb);
     /// The walk is about to follow a ray.
     fn ray(&mut self, _world: &World, _leaving: &Leaving, _ray: &RayPath) {}
     /// The walk arrived somewhere; returns the name by which the walk refers to it.
@@ -109,44 +118,28 @@ pub(crate) trait Observer {
 
 /// A vertex about to scatter.
 #[derive(Clone, Copy, Debug)]
-struct Stop {
-    node: u32,
-    vertex: Vertex,
-    coefficients: Option<Coefficients>,
-    wo: Vec3,
-    throughput: Rgb,
+pub(super) struct Stop {
+    pub(super) node: u32,
+    pub(super) vertex: Vertex,
+    pub(super) coefficients: Option<Coefficients>,
+    /// Unit, away from the vertex, to where the walk comes from.
+    pub(super) from: Vec3,
+    pub(super) throughput: Rgb,
     /// Arrival weight not yet in `alive`.
-    arrival: Rgb,
-    alive: Alive,
-    segments: u32,
+    pub(super) arrival: Rgb,
+    pub(super) alive: Alive,
+    /// Segments walked.
+    pub(super) segments: u32,
     /// How the vertex's distance was sampled, where equiangular sampling competes.
-    flight: Option<Flight>,
+    pub(super) flight: Option<Flight>,
 }
 
 /// The throughput with at most one zero factor per channel left out: what a derivative can still
 /// bring back.
 #[derive(Clone, Copy, Debug)]
-struct Alive {
-    value: Rgb,
-    spared: [bool; 3],
-}
-
-impl Alive {
-    fn new(value: Rgb) -> Self {
-        Self { value, spared: [false; 3] }
-    }
-    fn times(mut self, factor: Rgb, spare: bool) -> Self {
-        let mut v = self.value.to_array();
-        for (c, f) in factor.to_array().into_iter().enumerate() {
-            if f == 0.0 && spare && !self.spared[c] {
-                self.spared[c] = true;
-            } else {
-                v[c] *= f;
-            }
-        }
-        self.value = v.into();
-        self
-    }
+pub(super) struct Alive {
+    pub(super) value: Rgb,
+    pub(super) spared: [bool; 3],
 }
 
 /// A ray about to be followed.
@@ -156,9 +149,9 @@ pub(crate) struct Leaving {
     pub(crate) vertex: Vertex,
     pub(crate) dir: Vec3,
     /// Solid-angle density of `dir`, where next-event estimation competes.
-    pdf: Option<f64>,
+    pub(super) pdf: Option<f64>,
     pub(crate) throughput: Rgb,
-    alive: Alive,
+    pub(super) alive: Alive,
     /// Segments before the ray.
     pub(crate) segments: u32,
 }
@@ -222,8 +215,8 @@ impl<'w> Tracer<'w> {
 
     /// Estimates what comes along a ray, times its throughput.
     pub(crate) fn radiance_along<O: Observer>(&mut self, leaving: &Leaving, observer: &mut O) {
-        if let Some(stop) = self.follow(leaving, observer) {
-            self.walk(stop, observer);
+        if let Some(stop) = self.follow::<RadianceMode, O>(leaving, observer) {
+            self.walk::<RadianceMode, O>(stop, observer);
         }
     }
 
@@ -239,14 +232,14 @@ impl<'w> Tracer<'w> {
             Kind::Surface(s) => {
                 let emitted = self.world.emitted(s, wo);
                 if !emitted.is_zero() {
-                    observer.contribution(0, emitted);
+                    observer.contribution(Pixel::Own, 0, emitted);
                 }
                 None
             }
             Kind::Volume(_) => {
                 let Some(m) = vertex.medium else { return };
                 let c = self.world.coefficients(m, vertex.x);
-                observer.contribution(0, c.source());
+                observer.contribution(Pixel::Own, 0, c.source());
                 Some(c)
             }
             Kind::Point => return,
@@ -255,14 +248,14 @@ impl<'w> Tracer<'w> {
             node: 0,
             vertex,
             coefficients,
-            wo,
+            from: wo,
             throughput: Rgb::ONE,
             arrival: Rgb::ONE,
             alive: Alive::new(Rgb::ONE),
             segments: 0,
             flight: None,
         };
-        self.walk(stop, observer);
+        self.walk::<RadianceMode, O>(stop, observer);
     }
 
     /// The same over at most `longest` segments.
@@ -277,296 +270,4 @@ impl<'w> Tracer<'w> {
         self.radiance_from(vertex, wo, observer);
         self.max_segments = own;
     }
-
-    fn walk<O: Observer>(&mut self, mut stop: Stop, observer: &mut O) {
-        while let Some(leaving) = self.scatter(&stop, observer) {
-            match self.follow(&leaving, observer) {
-                Some(next) => stop = next,
-                None => return,
-            }
-        }
-    }
-
-    /// Connects the vertex to a light and draws where the path goes on.
-    fn scatter<O: Observer>(&mut self, stop: &Stop, observer: &mut O) -> Option<Leaving> {
-        if stop.segments >= self.max_segments {
-            return None;
-        }
-        let world = self.world;
-        let scattering = world.scattering(&stop.vertex)?;
-        let sigma_s = stop.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s);
-        let spare = O::RECORDS && world.may_revive(&stop.vertex);
-        if stop.alive.times(stop.arrival * sigma_s, spare).value.is_zero() {
-            return None;
-        }
-        if let Some(light) = world.lights.sample(world, stop.vertex.x, &mut self.rng) {
-            let weight = match light.kind {
-                LightKind::Position => self.free_flight_weight(stop, &light),
-                LightKind::Direction => 1.0,
-                LightKind::Area(_) => {
-                    let p = scattering.pdf(stop.wo, light.w, Given::Wo);
-                    light.pdf / (light.pdf + p)
-                }
-            };
-            self.connect(stop, &light, weight, sigma_s, observer);
-        }
-        let (wi, pdf) = scattering.sample(stop.wo, Given::Wo, &mut self.rng)?;
-        if pdf.is_nan() || pdf <= 0.0 {
-            return None;
-        }
-        let value = scattering.eval(stop.wo, wi);
-        let mut inv_pdf = 1.0 / pdf;
-        let mut alive = stop.alive.times(stop.arrival * sigma_s * (value * inv_pdf), spare);
-        if alive.value.is_zero() {
-            return None;
-        }
-        if stop.segments >= world.rr_depth {
-            let survival = world.survival(alive.value);
-            if self.rng.next_f64() >= survival {
-                return None;
-            }
-            inv_pdf /= survival;
-            alive.value *= 1.0 / survival;
-        }
-        let leaving = Leaving {
-            node: stop.node,
-            vertex: stop.vertex,
-            dir: wi,
-            pdf: Some(pdf),
-            throughput: stop.throughput * sigma_s * (value * inv_pdf),
-            alive,
-            segments: stop.segments,
-        };
-        observer.scatter(world, &leaving, value, inv_pdf, &self.rng);
-        Some(leaving)
-    }
-
-    /// MIS weight of connecting to a point light from a vertex that free flight found.
-    fn free_flight_weight(&self, stop: &Stop, light: &LightSample) -> f64 {
-        let (lights, total) = self.world.lights.inside();
-        match &stop.flight {
-            Some(flight) if lights.iter().any(|(e, _, _)| *e == light.emitter) => {
-                flight.weight(light.y, total)
-            }
-            _ => 1.0,
-        }
-    }
-
-    /// Adds the light of one sampled emitter point, scattered at `stop`.
-    fn connect<O: Observer>(
-        &mut self,
-        stop: &Stop,
-        light: &LightSample,
-        weight: f64,
-        sigma_s: Rgb,
-        observer: &mut O,
-    ) {
-        let world = self.world;
-        let Some(scattering) = world.scattering(&stop.vertex) else { return };
-        let f = scattering.eval(stop.wo, light.w);
-        let spare = O::RECORDS && world.may_revive(&stop.vertex);
-        if weight == 0.0 || (f.is_zero() && !spare) {
-            return;
-        }
-        let target = match &light.kind {
-            LightKind::Area(s) => Some(s.prim),
-            _ => None,
-        };
-        let (v, w, d) = (&stop.vertex, light.w, light.distance);
-        if !world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
-            return;
-        }
-        let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
-        let transport = tau * (weight * light.inv_pdf);
-        if transport.is_zero() {
-            return;
-        }
-        let start_medium = self.shadow.medium;
-        let connection = Connection { light: *light, start_medium, f, transport };
-        let value = stop.throughput * sigma_s * f * connection.rest();
-        observer.contribution(stop.segments + 1, value);
-        observer.connect(stop.node, &connection, &self.shadow.crossings);
-    }
-
-    /// Follows a ray to its next vertex.
-    fn follow<O: Observer>(&mut self, leaving: &Leaving, observer: &mut O) -> Option<Stop> {
-        let origin = leaving.vertex.x;
-        let mut ray = self.ray.take().unwrap_or_default();
-        self.world.cast(&leaving.vertex, leaving.dir, &mut ray, &mut self.counters);
-        observer.ray(self.world, leaving, &ray);
-        let span = self.equiangular(leaving, &ray, observer);
-        let stop = match self.travel(origin, leaving.dir, &ray, leaving.alive.value) {
-            Travel::Absorbed => None,
-            Travel::Volume(v) => {
-                let flight = span.map(|span| v.flight(span, origin, leaving.dir));
-                Some(self.pause(leaving, &ray, &v, flight, 1.0, observer))
-            }
-            Travel::Surface(point, x, arrival) => {
-                Some(self.land(leaving, &ray, point, x, arrival, observer))
-            }
-            Travel::Escape(arrival) => {
-                self.escape(leaving, &ray, arrival, observer);
-                None
-            }
-        };
-        self.ray = Some(ray);
-        stop
-    }
-
-    /// Arrives at a volume vertex, whose own emission counts by `emission_weight`.
-    fn pause<O: Observer>(
-        &mut self,
-        leaving: &Leaving,
-        ray: &RayPath,
-        v: &Flown,
-        flight: Option<Flight>,
-        emission_weight: f64,
-        observer: &mut O,
-    ) -> Stop {
-        let segments = leaving.segments + 1;
-        let throughput = leaving.throughput * v.arrival;
-        let source = v.coefficients.source() * emission_weight;
-        if !source.is_zero() {
-            observer.contribution(segments, throughput * source);
-        }
-        let record = Arrival {
-            parent: leaving.node,
-            end: Endpoint::Volume(v.vertex, v.coefficients),
-            dir: leaving.dir,
-            distance: v.t,
-            start_medium: ray.medium,
-            arrival: v.arrival,
-            throughput,
-            emission_weight,
-        };
-        let node = observer.arrive(self.world, &record, &ray.crossings[..v.crossed]);
-        Stop {
-            node,
-            vertex: v.vertex,
-            coefficients: Some(v.coefficients),
-            wo: -leaving.dir,
-            throughput,
-            arrival: v.arrival,
-            alive: leaving.alive,
-            segments,
-            flight,
-        }
-    }
-
-    fn land<O: Observer>(
-        &mut self,
-        leaving: &Leaving,
-        ray: &RayPath,
-        point: SurfacePoint,
-        x: Vec3,
-        arrival: Rgb,
-        observer: &mut O,
-    ) -> Stop {
-        let segments = leaving.segments + 1;
-        let medium = ray.crossings.last().map_or(ray.medium, |c| c.after);
-        let vertex = Vertex { x, medium, kind: Kind::Surface(point) };
-        let throughput = leaving.throughput * arrival;
-        let emitted = self.world.emitted(&point, -leaving.dir);
-        let mut emission_weight = 0.0;
-        // A black emitter with a moving radiance must be recorded too, so the weight does not
-        // depend on the value being nonzero.
-        if self.world.scene.shapes[point.shape as usize].emitter.is_some() {
-            let light = self.world.lights.area_pdf(&point, leaving.dir, ray.length);
-            emission_weight = leaving.pdf.map_or(1.0, |p| p / (p + light));
-            observer.contribution(segments, throughput * emitted * emission_weight);
-        }
-        let record = Arrival {
-            parent: leaving.node,
-            end: Endpoint::Surface(vertex),
-            dir: leaving.dir,
-            distance: ray.length,
-            start_medium: ray.medium,
-            arrival,
-            throughput,
-            emission_weight,
-        };
-        let node = observer.arrive(self.world, &record, &ray.crossings);
-        Stop {
-            node,
-            vertex,
-            coefficients: None,
-            wo: -leaving.dir,
-            throughput,
-            arrival,
-            alive: leaving.alive,
-            segments,
-            flight: None,
-        }
-    }
-
-    fn escape<O: Observer>(
-        &mut self,
-        leaving: &Leaving,
-        ray: &RayPath,
-        arrival: Rgb,
-        observer: &mut O,
-    ) {
-        let Some((_, radiance)) = self.world.lights.environment() else { return };
-        let throughput = leaving.throughput * arrival;
-        observer.contribution(leaving.segments + 1, throughput * radiance);
-        let record = Arrival {
-            parent: leaving.node,
-            end: Endpoint::Environment,
-            dir: leaving.dir,
-            distance: f64::INFINITY,
-            start_medium: ray.medium,
-            arrival,
-            throughput,
-            emission_weight: 1.0,
-        };
-        observer.arrive(self.world, &record, &ray.crossings);
-    }
-
-    /// Scatters light of a point light at a distance chosen by the angle it is seen under (Kulla and
-    /// Fajardo 2012): free-flight sampling alone has infinite variance near a light inside a medium
-    /// (theory sheet §14.2). Returns the part of the ray it covers.
-    fn equiangular<O: Observer>(
-        &mut self,
-        leaving: &Leaving,
-        ray: &RayPath,
-        observer: &mut O,
-    ) -> Option<(f64, f64)> {
-        let world = self.world;
-        let (lights, total) = world.lights.inside();
-        if lights.is_empty() || leaving.segments + 2 > self.max_segments {
-            return None;
-        }
-        let span = medium_span(ray)?;
-        let u = [self.rng.next_f64(), self.rng.next_f64()];
-        let (emitter, pmf, at) = pick(lights, total, u[0]);
-        let origin = leaving.vertex.x;
-        let distances = warp::Equiangular::new(origin, leaving.dir, at, span.0, span.1);
-        let t = distances.sample(u[1]);
-        // Per unit of selection probability, as free-flight sampling sees every light.
-        let density = distances.pdf(t) / total;
-        let mut part = core::mem::take(&mut self.shadow);
-        part.truncate_from(ray, t);
-        let placed = self.place(origin, leaving.dir, &part, t, density);
-        // The emission here is left to free flight.
-        let stop = placed.map(|v| self.pause(leaving, &part, &v, None, 0.0, observer));
-        self.shadow = part;
-        if let Some(stop) = stop
-            && let Some(light) = LightTable::delta(world, emitter, stop.vertex.x, pmf)
-        {
-            let sigma_s = stop.coefficients.as_ref().map_or(Rgb::ZERO, Coefficients::sigma_s);
-            self.connect(&stop, &light, 1.0, sigma_s, observer);
-        }
-        Some(span)
-    }
-}
-
-fn pick(lights: &[(usize, f64, Vec3)], total: f64, u: f64) -> (usize, f64, Vec3) {
-    let mut target = u * total;
-    for l in lights {
-        target -= l.1;
-        if target < 0.0 {
-            return *l;
-        }
-    }
-    lights[lights.len() - 1]
 }

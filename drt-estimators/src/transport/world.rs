@@ -52,6 +52,11 @@ impl RayPath {
         self.length = length;
     }
 
+    /// The medium at its end.
+    pub(crate) fn last_medium(&self) -> Option<usize> {
+        self.crossings.last().map_or(self.medium, |c| c.after)
+    }
+
     /// Becomes the first `length` of another ray.
     pub(crate) fn truncate_from(&mut self, other: &Self, length: f64) {
         self.medium = other.medium;
@@ -523,6 +528,11 @@ impl World {
     /// The camera as a vertex.
     pub(crate) fn eye(&self) -> Vertex {
         Vertex { x: self.camera.position(), medium: self.camera_medium, kind: Kind::Point }
+    }
+
+    /// True on an area emitter.
+    pub(crate) fn emits(&self, s: &SurfacePoint) -> bool {
+        self.scene.shapes[s.shape as usize].emitter.is_some()
     }
 
     /// Radiance a surface emits from `s` towards the unit direction `w`.

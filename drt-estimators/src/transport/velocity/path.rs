@@ -8,7 +8,7 @@ use drt_math::{Rgb, Rng, Vec3};
 use super::{Auxiliary, Found, Material, Movers, SurfaceHit, VelocityField, VertexVelocity};
 use crate::transport::pairs::Pairs;
 use crate::transport::record::PathRecord;
-use crate::transport::trace::{Arrival, Connection, Leaving, Observer};
+use crate::transport::trace::{Arrival, Connection, Leaving, Observer, Pixel};
 use crate::transport::world::{Crossing, World};
 
 /// The velocities of a path's vertices, node by node.
@@ -103,7 +103,7 @@ impl Default for RecordedPath {
 impl Observer for RecordedPath {
     const RECORDS: bool = true;
 
-    fn contribution(&mut self, _segments: u32, value: Rgb) {
+    fn contribution(&mut self, _: Pixel, _: u32, value: Rgb) {
         self.record.value += value;
     }
 
