@@ -99,7 +99,7 @@ def main():
     parser.add_argument("names", nargs="*")
     parser.add_argument("--instructions", action="store_true")
     parser.add_argument("--rounding", type=float, default=0.0)
-    args = parser.parse_args()
+    args = parser.parse_intermixed_args()
     different = 0
     with tempfile.TemporaryDirectory() as folder:
         work = pathlib.Path(folder)

@@ -9,7 +9,7 @@ use drt_motion::Parameter;
 use crate::Error;
 use crate::contraction::Contraction;
 use crate::film::{Blocks, PixelFilm};
-use crate::interior::{AlongRays, PixelSampler};
+use crate::interior::PixelSampler;
 use crate::kept::Kept;
 use crate::parallel::Pool;
 use crate::pixels::{Filling, Sampler};
@@ -89,10 +89,8 @@ impl Pair<'_> {
             seed,
             allocation: None,
             sampler: || Sides {
-                samplers: [0, 1].map(|k| {
-                    let along = AlongRays::default();
-                    PixelSampler::new(&self.worlds[k], None, along, seed, false, false)
-                }),
+                samplers: [0, 1]
+                    .map(|k| PixelSampler::new(&self.worlds[k], None, seed, false, false)),
                 scale: 0.5 / self.step,
             },
         };

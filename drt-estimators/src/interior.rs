@@ -1,23 +1,26 @@
 //! The interior term, and the plain forward image: one pixel sample at a time.
 
-use alloc::sync::Arc;
+mod component;
+mod recorder;
+
 use alloc::vec::Vec;
 
 use drt_math::sobol::{SET_DIMENSIONS, SobolSampler};
-use drt_math::{Rgb, RgbVec, Rng};
+use drt_math::{Rgb, Rng};
 
-use crate::boundary::shadow::{self, Shadows};
+pub(crate) use component::Component;
+use component::{Traced, Worker};
+pub(crate) use recorder::{PathView, Recorder};
+
+use crate::boundary::shadow::Shadows;
 use crate::contraction::Contraction;
-use crate::flux::{Flux, Reservoir};
+use crate::flux::Flux;
 use crate::pixels::Sampler;
-use crate::radiative::{Edged, Look, Radiative};
+use crate::radiative::{Look, Radiative};
 use crate::rendering::{Account, Counters, NonFinite, Term};
-use crate::sensitivity::{AdjointSink, Functional, Rate, SurfaceAdjoint};
-use crate::transport::pairs::{Brought, Pairs};
-use crate::transport::trace::{Arrival, Connection, Leaving, Observer, Pixel};
-use crate::transport::velocity::{Material, Movers, Spatial, VelocityField};
-use crate::transport::world::Crossing;
-use crate::transport::{Differentiator, Radiance, RayPath, RecordedPath, Tracer, World};
+use crate::sensitivity::{AdjointSink, Functional};
+use crate::transport::record::PathRecord;
+use crate::transport::{Radiance, RayPath, Tracer, World};
 
 /// Random-number streams are pixels; the top bits tell other uses apart.
 pub(crate) const LINE_STREAM: u64 = 1 << 62;
@@ -149,242 +152,130 @@ pub(crate) struct PixelSampler<'a, S> {
     seed: u64,
     antithetic: bool,
     tracer: Tracer<'a>,
-    path: RecordedPath,
-    /// Where it met surfaces with a flux, if there are such.
-    flux: Option<Reservoir>,
+    record: PathRecord,
     camera_ray: RayPath,
-    differentiator: Differentiator<'a>,
-    pub(crate) sink: Option<S>,
-    along: AlongRays<'a>,
-    shadow_buffers: shadow::Buffers,
-    brought: Brought,
+    /// What differentiates paths, and what each keeps of one.
+    workers: Vec<Worker<'a, S>>,
+    views: Vec<PathView>,
     separate: bool,
     non_finite: Vec<NonFinite>,
     non_finite_count: u64,
-    differentiated: u64,
     recorded: u64,
-    looking: u64,
-}
-
-/// Listens to the walk of a path whose derivative is wanted.
-struct Recorder<'r> {
-    path: &'r mut RecordedPath,
-    flux: Option<&'r mut Reservoir>,
-    /// Keeps the camera's ray, where that is asked for.
-    camera_ray: Option<&'r mut RayPath>,
-}
-
-impl Observer for Recorder<'_> {
-    const RECORDS: bool = true;
-
-    fn contribution(&mut self, to: Pixel, segments: u32, value: Rgb) {
-        self.path.contribution(to, segments, value);
-    }
-
-    fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {
-        if let (0, Some(kept)) = (leaving.node, &mut self.camera_ray) {
-            kept.clone_from(ray);
-        }
-        if let Some(flux) = &mut self.flux {
-            flux.offer(world, leaving, self.path.velocities.moves(leaving.node as usize), ray);
-        }
-    }
-
-    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
-        let hits = self.flux.as_ref().map_or(&[][..], |flux| flux.hits());
-        self.path.arrive(world, arrival, crossings, hits)
-    }
-
-    fn scatter(&mut self, world: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
-        self.path.scatter(world, leaving, value, inv_pdf, rng);
-    }
-
-    fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
-        self.path.connect(node, connection, crossings);
-    }
 }
 
 /// Non-finite samples that are described one by one.
 const DESCRIBED: usize = 8;
 
 impl<'a, S: PathSink> PixelSampler<'a, S> {
+    /// Of paths by all light of a `world`; without components, of the image alone.
     pub(crate) fn new(
         world: &'a World,
-        sink: Option<S>,
-        along: AlongRays<'a>,
+        components: impl IntoIterator<Item = Component<'a, S>>,
         seed: u64,
         antithetic: bool,
         separate: bool,
     ) -> Self {
-        let movers = sink.as_ref().map_or_else(Movers::default, |s| Movers::new(s.interest()));
-        let field: Arc<dyn VelocityField> = match along.radiative {
-            Some(_) => Arc::new(Spatial::new(movers)),
-            None => Arc::new(Material::new(movers)),
-        };
+        let components = components.into_iter().map(|c| Worker::new(c, separate));
+        let (workers, views) = components.unzip();
         Self {
             world,
             seed,
             antithetic,
             tracer: Tracer::new(world),
-            path: RecordedPath::new(field, Pairs::new(along.opposites)),
-            flux: along.flux.map(Reservoir::new),
+            record: PathRecord::default(),
             camera_ray: RayPath::default(),
-            differentiator: Differentiator::new(world),
-            sink,
-            along,
-            shadow_buffers: shadow::Buffers::default(),
-            brought: Brought::default(),
+            workers,
+            views,
             separate,
             non_finite: Vec::new(),
             non_finite_count: 0,
-            differentiated: 0,
             recorded: 0,
-            looking: 0,
         }
+    }
+
+    /// The sinks of the components, in order.
+    pub(crate) fn sinks(&mut self) -> impl Iterator<Item = &mut S> {
+        self.workers.iter_mut().map(|w| &mut w.sink)
     }
 
     /// What the work done so far leaves besides its values.
     pub(crate) fn account(self) -> Account {
-        Account {
+        self.finish().0
+    }
+
+    /// The same, and the sinks of the components.
+    pub(crate) fn finish(self) -> (Account, Vec<S>) {
+        let sum = |of: fn(&Worker<'a, S>) -> u64| self.workers.iter().map(of).sum();
+        let account = Account {
             counters: Counters {
-                differentiated_paths: self.differentiated,
+                differentiated_paths: sum(|w| w.differentiated),
                 recorded_vertices: self.recorded,
                 ..self.tracer.counters
             },
             non_finite: self.non_finite,
             non_finite_count: self.non_finite_count,
-            looking: self.looking,
-        }
+            looking: sum(|w| w.looking),
+        };
+        (account, self.workers.into_iter().map(|w| w.sink).collect())
     }
 
     fn path(&mut self, pixel: u32, unit: u32, u: [f64; 2], rng: Rng, values: &mut [Rgb]) {
         let camera = &self.world.camera;
-        // Only where things move is the filter differentiated.
-        let derivative = self.along.radiative.is_none()
-            && self.sink.as_ref().is_some_and(|s| s.interest().moves_geometry());
+        let derivative = self.workers.iter().any(Worker::differentiates_filter);
         let s = camera.sample_view(pixel, u, derivative);
         let dir = s.direction;
         let weight = Rgb::splat(s.weight);
         // What places an edge comes before what the path takes an unknown number of.
         let mut rng = rng;
-        let look = self.along.looks.any().then(|| Look::reserve(&mut rng));
+        let looks = self.workers.iter().any(|w| w.along.looks.any());
+        let look = looks.then(|| Look::reserve(&mut rng));
         self.tracer.rng = rng;
-        let Some(sink) = &mut self.sink else {
+        if self.workers.is_empty() {
             let mut radiance = Radiance::default();
             self.tracer.trace_camera(dir, weight, &mut radiance);
             values[0] += radiance.0;
             return;
-        };
+        }
         let width = camera.film()[0];
-        self.path.begin([pixel % width, pixel / width], dir, weight);
-        if let Some(flux) = &mut self.flux {
-            flux.begin(Rng::new(self.seed, FLUX_STREAM | u64::from(pixel), unit));
+        for view in &mut self.views {
+            let stream = |of: u64| Rng::new(self.seed, of | u64::from(pixel), unit);
+            view.begin(Some(stream(PAIR_STREAM)), stream(FLUX_STREAM));
         }
-        self.path.pairs.begin(Some(Rng::new(self.seed, PAIR_STREAM | u64::from(pixel), unit)));
-        let camera_ray = self.along.shadows.map(|_| &mut self.camera_ray);
-        let mut recorder = Recorder { path: &mut self.path, flux: self.flux.as_mut(), camera_ray };
+        let shadows = self.workers.iter().any(|w| w.along.shadows.is_some());
+        let mut recorder = Recorder {
+            record: &mut self.record,
+            views: &mut self.views,
+            camera_ray: shadows.then_some(&mut self.camera_ray),
+        };
+        recorder.begin([pixel % width, pixel / width], dir, weight);
         self.tracer.trace_camera(dir, weight, &mut recorder);
-        let record = &self.path.record;
-        values[0] += record.value;
-        self.recorded += record.nodes.len() as u64;
-        let n = sink.layers();
-        if sink.interest().any() {
-            self.differentiated += 1;
-            let line = Rng::new(self.seed, LINE_STREAM | u64::from(pixel), unit);
-            sink.begin();
-            self.differentiator.differentiate(&self.path, s.slope, line, sink);
-            let buffer = &mut self.brought;
-            self.path.pairs.follow(&mut self.tracer, buffer, |pair, chance, other| {
-                self.differentiator.pair(&self.path, pair, chance, other, sink);
-            });
-            sink.finish(&mut values[1..=n]);
-        }
-        // Each kept apart goes to layers of its own, in the order of `AlongRays::terms`.
+        values[0] += self.record.value;
+        self.recorded += self.record.nodes.len() as u64;
+        let path = Traced {
+            record: &self.record,
+            camera_ray: &self.camera_ray,
+            filter: s.slope,
+            seed: self.seed,
+            pixel,
+            unit,
+            look,
+        };
         let mut at = 1;
-        if let Some(flux) = &mut self.flux {
-            at += if self.separate { n } else { 0 };
-            flux.evaluate(&mut self.tracer, |f, swept, value| {
-                let values = &mut values[at..at + n];
-                let Some(swept) = swept else { return sink.functional(f, value, values) };
-                sink.begin();
-                f.send(value, sink);
-                let [origin, turn] = [swept.origin, swept.turn].map(|v| value.outer(v));
-                let at = SurfaceAdjoint::of_place(origin);
-                self.differentiator.send_back(&self.path, swept.node, at, RgbVec::ZERO, turn, sink);
-                sink.finish(values);
-            });
-        }
-        if let (Some(radiative), Some(look)) = (self.along.radiative, look) {
-            let from = if self.separate { at + n } else { at };
-            let before = self.tracer.counters.rays;
-            self.edges(radiative, look, &mut values[from..]);
-            self.looking += self.tracer.counters.rays - before;
-        }
-        if let (Some(shadows), Some(sink)) = (self.along.shadows, &mut self.sink) {
-            at += if self.separate { n } else { 0 };
-            shadows.along_camera_ray(
-                &mut self.tracer,
-                dir,
-                &self.camera_ray,
-                &mut self.shadow_buffers,
-                |f, value| {
-                    sink.functional(f, value * weight, &mut values[at..at + n]);
-                },
-            );
-        }
-    }
-
-    /// Looks for edges; the `first` look has the best numbers.
-    fn edges(&mut self, radiative: &Radiative, mut first: Rng, values: &mut [Rgb]) {
-        match self.along.looks {
-            Looks::Average(looks) => {
-                let mut left = looks;
-                while left > 0.0 {
-                    // A part of a look is one now and then.
-                    let rng = &mut self.tracer.rng;
-                    let taken = left >= 1.0 || rng.next_f64() < left;
-                    let numbers = if left == looks { &mut first } else { rng };
-                    left -= 1.0;
-                    let look = taken.then(|| Look::new(numbers));
-                    let edge =
-                        look.and_then(|look| radiative.edge(&mut self.tracer, &self.path, &look));
-                    self.send(edge, 1.0 / looks, values);
-                }
-            }
-            Looks::EveryVertex => {
-                for node in 1..self.path.record.nodes.len() {
-                    let rng = &mut self.tracer.rng;
-                    let look = Look::new(if node == 1 { &mut first } else { rng });
-                    let edge = radiative.edge_from(&mut self.tracer, &self.path, node, &look);
-                    self.send(edge, 1.0, values);
-                }
+        for (worker, view) in self.workers.iter_mut().zip(&mut self.views) {
+            let n = worker.sink.layers();
+            at = usize::max(at, 1 + n);
+            worker.add(&mut self.tracer, &path, view, at, values);
+            if self.separate {
+                at += n * worker.along.terms().count();
             }
         }
-    }
-
-    /// Contracts a `share` of what an edge contributes; `values` are of the edges' terms.
-    fn send(&mut self, edge: Option<Edged>, share: f64, values: &mut [Rgb]) {
-        let (Some(sink), Some(e)) = (&mut self.sink, edge) else { return };
-        let n = sink.layers();
-        let layer = if self.separate && e.node > 1 { n } else { 0 };
-        sink.begin();
-        for (matter, value) in e.matter.iter().flatten() {
-            if sink.interest().moves(matter) {
-                Rate::of(*matter, e.n).send(*value * share, sink);
-            }
-        }
-        let viewer = (e.viewer * share).outer(e.n);
-        let at = SurfaceAdjoint::of_place(viewer);
-        let none = RgbVec::ZERO;
-        self.differentiator.send_back(&self.path, e.node, at, none, none, sink);
-        sink.finish(&mut values[layer..layer + n]);
     }
 
     /// Notes a sample that is not finite and counts it as zero.
     fn report(&mut self, pixel: u32, unit: u32, values: &mut [Rgb]) {
         self.non_finite_count += 1;
         if self.non_finite.len() < DESCRIBED {
-            let nodes = &self.path.record.nodes;
+            let nodes = &self.record.nodes;
             let last = nodes.last().and_then(|n| n.vertex()?.surface().map(|s| s.prim));
             self.non_finite.push(NonFinite {
                 term: values[0].is_finite().then_some(Term::Interior),

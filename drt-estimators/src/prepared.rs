@@ -7,7 +7,7 @@ use crate::boundary::{Boundary, Strategy};
 use crate::contraction::Motion;
 use crate::film::BATCHES;
 use crate::flux::{EdgeOn, Flux};
-use crate::interior::{AlongRays, Looks};
+use crate::interior::{AlongRays, Component, Looks};
 use crate::radiative::Radiative;
 use crate::scouts;
 use crate::sensitivity::Interest;
@@ -155,6 +155,11 @@ impl Prepared {
             looks: self.looks,
             opposites: self.opposites,
         }
+    }
+
+    /// Its part in the derivatives of paths.
+    pub(crate) fn component<S>(&self, sink: S) -> Component<'_, S> {
+        Component { world: &self.world, along: self.along_rays(), sink }
     }
 
     pub(crate) fn splatter(&self, seed: u64) -> Splatter<'_> {

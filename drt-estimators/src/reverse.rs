@@ -207,8 +207,7 @@ impl Reverse<'_> {
         let at = |c: u32| (n * u64::from(c) / u64::from(chunks)) as u32;
         let mut sampler = PixelSampler::new(
             &self.prepared.world,
-            Some(self.scatter()),
-            self.prepared.along_rays(),
+            [self.prepared.component(self.scatter())],
             self.settings.seed,
             self.prepared.antithetic,
             false,
@@ -217,7 +216,7 @@ impl Reverse<'_> {
         let (seed, film) = (self.settings.seed, self.prepared.world.camera.film());
         let pass = Pass::new(0, units, film);
         for pixel in at(chunk)..at(chunk + 1) {
-            if let Some(sink) = &mut sampler.sink {
+            for sink in sampler.sinks() {
                 sink.weights = self.adjoint[pixel as usize] * scale;
             }
             for run in pass.runs() {
@@ -227,8 +226,8 @@ impl Reverse<'_> {
                 });
             }
         }
-        let mut sums = sampler.sink.take().map_or_else(|| self.zeros(), |sink| sink.sums);
-        let account = sampler.account();
+        let (account, sinks) = sampler.finish();
+        let mut sums = sinks.into_iter().next().map_or_else(|| self.zeros(), |sink| sink.sums);
         sums.scene.counters = account.counters;
         sums.scene.non_finite += account.non_finite_count;
         sums

@@ -73,8 +73,8 @@ fn from_pixels(prepared: &Prepared, motion: &Motion) -> [Observed; 2] {
     let layers = along.layers(n, true);
     let [mut one, mut other] = [0, 1].map(|_| alloc::vec![Rgb::ZERO; layers]);
     let mut squares = alloc::vec![0.0; layers];
-    let sink = Some(Contraction::new(world, motion));
-    let mut sampler = PixelSampler::new(world, sink, along, SEED, prepared.antithetic, true);
+    let component = prepared.component(Contraction::new(world, motion));
+    let mut sampler = PixelSampler::new(world, [component], SEED, prepared.antithetic, true);
     let [w, h] = world.camera.film();
     for i in 0..SCOUTS / 2 {
         // Two in a pixel differ by their noise alone.

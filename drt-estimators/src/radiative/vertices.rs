@@ -65,7 +65,7 @@ impl Radiative {
     pub(crate) fn edge(
         &self,
         tracer: &mut Tracer<'_>,
-        path: &RecordedPath,
+        path: &RecordedPath<'_>,
         look: &Look,
     ) -> Option<Edged> {
         let mut glance = self.glance(tracer, path, look)?;
@@ -81,7 +81,7 @@ impl Radiative {
     pub(super) fn glance<'a>(
         &'a self,
         tracer: &mut Tracer<'_>,
-        path: &'a RecordedPath,
+        path: &RecordedPath<'a>,
         look: &Look,
     ) -> Option<Glance<'a>> {
         let nodes = 1..path.record.nodes.len();
@@ -94,7 +94,7 @@ impl Radiative {
     pub(crate) fn edge_from(
         &self,
         tracer: &mut Tracer<'_>,
-        path: &RecordedPath,
+        path: &RecordedPath<'_>,
         node: usize,
         look: &Look,
     ) -> Option<Edged> {
@@ -105,7 +105,7 @@ impl Radiative {
     /// What a look from one of some vertices is for, its probability, and what is left of the look's numbers.
     fn sought(
         &self,
-        path: &RecordedPath,
+        path: &RecordedPath<'_>,
         mut nodes: Range<usize>,
         look: &Look,
     ) -> (Sought, f64, Look) {
@@ -123,7 +123,7 @@ impl Radiative {
     fn glance_from<'a>(
         &'a self,
         tracer: &mut Tracer<'_>,
-        path: &'a RecordedPath,
+        path: &RecordedPath<'a>,
         node: usize,
         sought: Sought,
         chance: f64,
@@ -189,7 +189,7 @@ impl Radiative {
     fn choose_vertex(
         &self,
         tracer: &mut Tracer<'_>,
-        path: &RecordedPath,
+        path: &RecordedPath<'_>,
         sought: Sought,
         u: f64,
     ) -> Option<(usize, f64)> {

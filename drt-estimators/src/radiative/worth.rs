@@ -16,10 +16,12 @@ use alloc::sync::Arc;
 use drt_math::{Real, Rgb, Rng};
 
 use super::{Look, Radiative};
+use crate::interior::{PathView, Recorder};
 use crate::sensitivity::Interest;
 use crate::transport::pairs::Pairs;
-use crate::transport::velocity::{Movers, Spatial};
-use crate::transport::{RecordedPath, Tracer, World};
+use crate::transport::record::PathRecord;
+use crate::transport::velocity::{Movers, PathVelocities, Spatial};
+use crate::transport::{Tracer, World};
 
 /// Paths that look.
 const PATHS: u32 = 256;
@@ -55,7 +57,9 @@ impl Radiative {
     pub(crate) fn weigh(&mut self, world: &World, interest: &Interest) {
         let mut tracer = Tracer::new(world);
         let field = Arc::new(Spatial::new(Movers::new(interest)));
-        let mut path = RecordedPath::new(field, Pairs::default());
+        let (velocities, pairs) = (PathVelocities::new(field), Pairs::default());
+        let mut views = [PathView { velocities, pairs, flux: None, lit: world.lit }];
+        let mut record = PathRecord::default();
         let [width, height] = world.camera.film();
         let pixels = u64::from(width) * u64::from(height);
         let mut sum = 0.0;
@@ -66,9 +70,13 @@ impl Radiative {
             let look = Look::new(&mut rng);
             tracer.rng = rng;
             let weight = Rgb::splat(view.weight);
-            path.begin([pixel % width, pixel / width], view.direction, weight);
-            tracer.trace_camera(view.direction, weight, &mut path);
-            if let Some(glance) = self.glance(&mut tracer, &path, &look) {
+            views[0].begin(None, Rng::new(0, 0, 0));
+            let (record, views) = (&mut record, &mut views[..]);
+            let mut recorder = Recorder { record, views, camera_ray: None };
+            recorder.begin([pixel % width, pixel / width], view.direction, weight);
+            tracer.trace_camera(view.direction, weight, &mut recorder);
+            let Recorder { record, views, .. } = recorder;
+            if let Some(glance) = self.glance(&mut tracer, &views[0].of(record), &look) {
                 sum += Real::sqrt(glance.weight.max_abs());
             }
         }

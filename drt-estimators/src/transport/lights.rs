@@ -36,9 +36,18 @@ impl Lit {
         }
     }
 
-    /// Whether emission in media counts.
-    pub(crate) fn by_media(self) -> bool {
+    /// Whether the environment and emission of surfaces and in media count.
+    pub(crate) fn by_surroundings(self) -> bool {
         self != Self::Delta
+    }
+
+    /// Whether a sampled emitter counts.
+    pub(crate) fn by_sample(self, light: &LightSample) -> bool {
+        match self {
+            Self::All => true,
+            Self::Extended => light.point().is_some(),
+            Self::Delta => light.point().is_none(),
+        }
     }
 }
 
@@ -111,7 +120,7 @@ impl LightSample {
 }
 
 /// The emitters of a scene by power.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct LightTable {
     entries: Vec<Entry>,
     table: Option<AliasTable>,

@@ -81,7 +81,7 @@ impl PathRecord {
     }
 
     /// Adds a vertex and returns its node.
-    pub(super) fn arrive(&mut self, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
+    pub(crate) fn arrive(&mut self, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
         let crossings = self.keep(crossings);
         let c = self.connections.len();
         self.nodes.push(Node {
@@ -96,13 +96,13 @@ impl PathRecord {
     }
 
     /// The walk leaves a node.
-    pub(super) fn scatter(&mut self, leaving: &Leaving, value: Rgb, inv_pdf: f64) {
+    pub(crate) fn scatter(&mut self, leaving: &Leaving, value: Rgb, inv_pdf: f64) {
         let node = &mut self.nodes[leaving.node as usize];
         (node.wi, node.value, node.inv_pdf) = (leaving.dir, value, inv_pdf);
     }
 
     /// A node was connected to a light.
-    pub(super) fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
+    pub(crate) fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
         let crossings = self.keep(crossings);
         self.connections.push((*connection, crossings));
         let end = self.connections.len();

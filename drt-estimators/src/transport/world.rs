@@ -99,7 +99,7 @@ const STEADY_SURVIVAL: f64 = 0.9;
 const DEFENSIVE: f64 = 0.1;
 
 /// What derivatives need of a medium.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum MediumNeed {
     /// Its coefficients do not change.
     Nothing,
@@ -120,6 +120,19 @@ pub(crate) struct Needs {
     pub(crate) index: Vec<bool>,
 }
 
+impl Needs {
+    /// What either needs.
+    pub(crate) fn union(&self, other: &Self) -> Self {
+        let any = |a: &[bool], b: &[bool]| a.iter().zip(b).map(|(a, b)| *a || *b).collect();
+        Self {
+            media: self.media.iter().zip(&other.media).map(|(a, b)| *a.max(b)).collect(),
+            bsdfs: any(&self.bsdfs, &other.bsdfs),
+            roughness: any(&self.roughness, &other.roughness),
+            index: any(&self.index, &other.index),
+        }
+    }
+}
+
 /// What tracking may skip in a medium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tracking {
@@ -130,8 +143,9 @@ pub(crate) enum Tracking {
 }
 
 /// A scene prepared for light transport.
+#[derive(Clone)]
 pub(crate) struct World {
-    pub(crate) scene: Scene,
+    pub(crate) scene: Arc<Scene>,
     pub(crate) lights: LightTable,
     pub(crate) lit: Lit,
     /// The sensor in use and the medium around it.
@@ -165,13 +179,14 @@ impl World {
     /// repeats: finite differences need both sides to draw alike. What is `kept` is taken where it
     /// is that of the scene.
     pub(crate) fn new(
-        scene: Scene,
+        scene: impl Into<Arc<Scene>>,
         sensor: usize,
         max_depth: Option<u32>,
         like: Option<&Self>,
         lit: Lit,
         kept: &mut Kept,
     ) -> Result<Self, Error> {
+        let scene: Arc<Scene> = scene.into();
         let camera = scene.sensors.get(sensor).ok_or_else(|| Error::Setting {
             setting: "sensor".into(),
             reason: alloc::format!(
@@ -220,6 +235,15 @@ impl World {
             scene,
         };
         world.settle_media(surrounding);
+        Ok(world)
+    }
+
+    /// The same scene by the light of some emitters.
+    pub(crate) fn lit_by(&self, lit: Lit) -> Result<Self, Error> {
+        let first_prim = &self.geometry.first_prim;
+        let lights = LightTable::new(&self.scene, first_prim, self.geometry.radius, None, lit)?;
+        let mut world = Self { lights, lit, ..self.clone() };
+        world.settle_lights();
         Ok(world)
     }
 
@@ -316,6 +340,11 @@ impl World {
             }
             Surrounding::Counted => self.medium_at(eye),
         };
+        self.settle_lights();
+    }
+
+    /// Finds the lights inside of media.
+    fn settle_lights(&mut self) {
         let mut lights = core::mem::take(&mut self.lights);
         lights.keep_inside(|e, x| {
             self.medium_of_emitter(e, x).is_some_and(|m| self.tracking[m] == Tracking::Vertices)
@@ -338,7 +367,7 @@ impl World {
     /// The coefficients of medium `m` at `x`, its emission as far as it counts.
     pub(crate) fn coefficients(&self, m: usize, x: Vec3) -> Coefficients {
         let mut c = self.medium(m).coefficients(x);
-        if !self.lit.by_media() {
+        if !self.lit.by_surroundings() {
             c.emission = Rgb::ZERO;
         }
         c

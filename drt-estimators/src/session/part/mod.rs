@@ -10,7 +10,7 @@ use crate::allocation;
 use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm};
 use crate::inside;
-use crate::interior::{AlongRays, Looks, PixelSampler};
+use crate::interior::{AlongRays, Component, Looks, PixelSampler};
 use crate::kept::Kept;
 use crate::parallel::Pool;
 use crate::pixels::Filling;
@@ -211,7 +211,8 @@ impl Part {
             allocation: self.guidance.as_ref().map(|g| &g.pixels),
             sampler: || {
                 let sink = motion.map(|m| Contraction::new(world, m));
-                PixelSampler::new(world, sink, along, seed, self.plan.antithetic, separate)
+                let component = sink.map(|sink| Component { world, along, sink });
+                PixelSampler::new(world, component, seed, self.plan.antithetic, separate)
             },
         };
         let mut account = Account::default();

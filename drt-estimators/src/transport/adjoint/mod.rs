@@ -32,6 +32,7 @@ use pairs::Apart;
 use propagation::Propagated;
 use segment::{Far, Stretch};
 
+use super::lights::Lit;
 use super::trace::Endpoint;
 use super::velocity::RecordedPath;
 use super::vertex::{Kind, Vertex};
@@ -94,7 +95,7 @@ impl<'w> Differentiator<'w> {
     /// independent of the walk's.
     pub(crate) fn differentiate<S: AdjointSink>(
         &mut self,
-        path: &RecordedPath,
+        path: &RecordedPath<'_>,
         filter: [f64; 2],
         rng: Rng,
         sink: &mut S,
@@ -110,11 +111,11 @@ impl<'w> Differentiator<'w> {
             self.node(path, k, sink);
         }
         let Local { at, matter, .. } = self.locals[0];
-        self.camera_ray(&path.record, at.u + matter, self.turn, &self.sensor, sink);
+        self.camera_ray(path.record, at.u + matter, self.turn, &self.sensor, sink);
     }
 
-    fn node<S: AdjointSink>(&mut self, path: &RecordedPath, k: usize, sink: &mut S) {
-        let record = &path.record;
+    fn node<S: AdjointSink>(&mut self, path: &RecordedPath<'_>, k: usize, sink: &mut S) {
+        let RecordedPath { record, lit, .. } = *path;
         let node = &record.nodes[k];
         let Some(arrival) = &node.arrival else { return };
         let world = self.world;
@@ -124,7 +125,8 @@ impl<'w> Differentiator<'w> {
         let mut here = self.locals[k].at;
         let received = match &arrival.end {
             Endpoint::Environment => {
-                let Some((emitter, radiance)) = world.lights.environment() else { return };
+                let environment = world.lights.environment().filter(|_| lit.by_surroundings());
+                let Some((emitter, radiance)) = environment else { return };
                 strength(emitter, theta * arrival.emission_weight, sink);
                 radiance * arrival.emission_weight
             }
@@ -133,6 +135,7 @@ impl<'w> Differentiator<'w> {
                 let Kind::Surface(point) = &vertex.kind else { return };
                 let mut emitted = Rgb::ZERO;
                 if let Some(e) = world.scene.shapes[point.shape as usize].emitter
+                    && lit.by_surroundings()
                     && arrival.emission_weight > 0.0
                     && point.ng.dot(arrival.dir) < 0.0
                 {
@@ -142,11 +145,17 @@ impl<'w> Differentiator<'w> {
                 emitted + collected
             }
             Endpoint::Volume(vertex, c) => {
+                let c = &Coefficients {
+                    emission: if lit.by_surroundings() { c.emission } else { Rgb::ZERO },
+                    ..*c
+                };
                 let theta_s = theta * c.sigma_s();
                 collected += self.connections(path, k, vertex, theta_s, &mut here, sink);
                 let moving = path.velocities.moves(k);
                 let weight = arrival.emission_weight;
-                self.coefficients(vertex, c, theta, collected, weight, moving, &mut here, sink);
+                self.coefficients(
+                    vertex, c, lit, theta, collected, weight, moving, &mut here, sink,
+                );
                 c.source() * arrival.emission_weight + c.sigma_s() * collected
             }
         };
@@ -157,14 +166,14 @@ impl<'w> Differentiator<'w> {
     /// has collected.
     fn arrive<S: AdjointSink>(
         &mut self,
-        recorded: &RecordedPath,
+        recorded: &RecordedPath<'_>,
         k: usize,
         received: Rgb,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
     ) {
         let world = self.world;
-        let RecordedPath { record, velocities, .. } = recorded;
+        let RecordedPath { record, velocities, .. } = *recorded;
         let Some(arrival) = &record.nodes[k].arrival else { return };
         let p = arrival.parent as usize;
         let value = arrival.arrival * received;
@@ -329,7 +338,7 @@ impl<'w> Differentiator<'w> {
     /// Next-event connections of a vertex: returns their sum, without the scattering coefficient.
     fn connections<S: AdjointSink>(
         &mut self,
-        recorded: &RecordedPath,
+        recorded: &RecordedPath<'_>,
         k: usize,
         vertex: &Vertex,
         theta: Rgb,
@@ -337,16 +346,19 @@ impl<'w> Differentiator<'w> {
         sink: &mut S,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
-        let RecordedPath { record, velocities, .. } = recorded;
+        let RecordedPath { record, velocities, lit, .. } = *recorded;
         let node = &record.nodes[k];
         let Some(arrival) = &node.arrival else { return sum };
         let behind = behind(recorded, k);
         let moving = velocities.moves(k);
         let arrives = moving || velocities.moves(arrival.parent as usize);
         for (c, crossings) in &record.connections[node.connections.clone()] {
+            let light = &c.light;
+            if !lit.by_sample(light) {
+                continue;
+            }
             let rest = c.rest();
             sum += c.f * rest;
-            let light = &c.light;
             let turns = arrives || light_moves(light, sink.interest());
             let to_wi = self.scattering(
                 vertex,
@@ -378,6 +390,7 @@ impl<'w> Differentiator<'w> {
         &mut self,
         vertex: &Vertex,
         c: &Coefficients,
+        lit: Lit,
         theta: Rgb,
         collected: Rgb,
         emission_weight: f64,
@@ -390,7 +403,7 @@ impl<'w> Differentiator<'w> {
         let adjoint = CoefficientAdjoint {
             sigma_t: theta * (c.albedo * collected + (Rgb::ONE - c.albedo) * emission),
             albedo: theta * c.sigma_t * (collected - emission),
-            emission: if self.world.lit.by_media() {
+            emission: if lit.by_surroundings() {
                 theta * c.sigma_a() * emission_weight
             } else {
                 Rgb::ZERO
@@ -443,7 +456,7 @@ impl<'w> Differentiator<'w> {
 }
 
 /// The segment by which a walk arrived at a node; `None` at the camera.
-fn behind(path: &RecordedPath, node: usize) -> Option<Behind> {
+fn behind(path: &RecordedPath<'_>, node: usize) -> Option<Behind> {
     let arrival = path.record.nodes[node].arrival.as_ref()?;
     let (parent, distance) = (arrival.parent as usize, arrival.distance);
     let weight = path.velocities.of(node).blend.weight;

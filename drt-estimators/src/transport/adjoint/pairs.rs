@@ -47,7 +47,7 @@ impl Differentiator<'_> {
     /// Sends what a pair tells, which is looked at with a given `chance`. The record is the one that was swept last.
     pub(crate) fn pair<S: AdjointSink>(
         &self,
-        path: &RecordedPath,
+        path: &RecordedPath<'_>,
         pair: &Pair,
         chance: f64,
         other: &Brought,
@@ -83,7 +83,7 @@ impl Differentiator<'_> {
     #[allow(clippy::too_many_arguments)]
     fn turned<S: AdjointSink>(
         &self,
-        path: &RecordedPath,
+        path: &RecordedPath<'_>,
         pair: &Pair,
         turns: &[Turn; 2],
         light: [Rgb; 2],
@@ -92,7 +92,7 @@ impl Differentiator<'_> {
         sink: &mut S,
     ) {
         let k = pair.node;
-        let RecordedPath { record, velocities, .. } = path;
+        let RecordedPath { record, velocities, .. } = *path;
         let (node, Some(b)) = (&record.nodes[k], behind(path, k)) else { return };
         let Some(vertex) = node.vertex() else { return };
         let both =

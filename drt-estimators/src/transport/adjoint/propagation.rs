@@ -117,14 +117,14 @@ impl Differentiator<'_> {
     /// node or on its area.
     pub(crate) fn send_back<S: AdjointSink>(
         &self,
-        path: &RecordedPath,
+        path: &RecordedPath<'_>,
         node: usize,
         mut here: SurfaceAdjoint,
         mut matter: RgbVec,
         mut turn: RgbVec,
         sink: &mut S,
     ) {
-        let RecordedPath { record, velocities, .. } = path;
+        let RecordedPath { record, velocities, .. } = *path;
         let mut k = node;
         loop {
             let velocity = velocities.of(k);

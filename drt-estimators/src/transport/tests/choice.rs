@@ -68,9 +68,9 @@ pub(crate) fn derivative(
         let mut batches = [Vec::new(), Vec::new()];
         for seed in 0..BATCHES {
             let [mut rays, mut edges] = [0.0; 2];
-            let sink = Some(Contraction::new(&prepared.world, &motion));
+            let component = prepared.component(Contraction::new(&prepared.world, &motion));
             let along = prepared.along_rays();
-            let mut sampler = PixelSampler::new(&prepared.world, sink, along, seed, false, true);
+            let mut sampler = PixelSampler::new(&prepared.world, [component], seed, false, true);
             let mut values = vec![Rgb::ZERO; along.layers(1, true)];
             for pixel in 0..PIXELS {
                 let sequence = sequence_name(seed, pixel, 0);

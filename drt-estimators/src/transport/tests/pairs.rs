@@ -8,14 +8,14 @@ use drt_motion::Parameter;
 
 use super::choice::prepare;
 use super::scenes::*;
-use super::setup::{motion, set, trace};
+use super::setup::{Recording, motion, set, trace};
 use crate::contraction::Contraction;
 use crate::emitter::Emitter;
 use crate::scene::Scene;
 use crate::surface::{Bsdf, Distribution, RoughConductor, RoughDielectric};
 use crate::transport::pairs::{Brought, Pair, Pairs, Told};
 use crate::transport::velocity::{Material, Movers, Spatial, VelocityField};
-use crate::transport::{Differentiator, RecordedPath, Tracer};
+use crate::transport::{Differentiator, Tracer};
 
 /// The velocity field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,21 +41,20 @@ fn derivatives(
         Form::Material => Arc::new(Material::new(movers)),
         Form::Spatial => Arc::new(Spatial::new(movers)),
     };
-    let mut path = RecordedPath::new(field, Pairs::new(true));
+    let mut path = Recording::new(field, Pairs::new(true));
     let mut differentiator = Differentiator::new(world);
     let mut sink = Contraction::new(world, &motion);
     let (mut buffer, mut moments) = (Brought::default(), [Moments::default(); 2]);
     for (seed, moments) in (20..).zip(&mut moments) {
         for i in 0..paths {
             let choices = (seed == 21).then(|| Rng::new(9, 1, i));
-            path.pairs.begin(choices);
-            let slope = trace(&mut tracer, &mut path, seed, i);
+            let slope = trace(&mut tracer, &mut path, choices, seed, i);
             sink.clear();
-            differentiator.differentiate(&path, slope, Rng::new(6, 0, i), &mut sink);
-            path.pairs.follow(&mut tracer, &mut buffer, |pair, chance, brought| {
+            differentiator.differentiate(&path.path(), slope, Rng::new(6, 0, i), &mut sink);
+            path.views[0].pairs.follow(&mut tracer, &mut buffer, |pair, chance, brought| {
                 let mut brought = brought.clone();
                 other(pair, &mut brought);
-                differentiator.pair(&path, pair, chance, &brought, &mut sink);
+                differentiator.pair(&path.path(), pair, chance, &brought, &mut sink);
             });
             moments.push(sink.rates[0].mean());
         }

@@ -10,7 +10,7 @@ use super::changes::rates;
 use super::moving::Moving;
 use super::replay::replay;
 use super::scenes::*;
-use super::setup::{Fault, Faulty, coloured, material, motion, prepare, set, trace};
+use super::setup::{Fault, Faulty, Recording, coloured, motion, prepare, set, trace};
 use crate::contraction::Contraction;
 use crate::scene::Scene;
 use crate::transport::{Differentiator, Tracer};
@@ -32,15 +32,15 @@ fn compare(scene: &Scene, parameter: &Parameter, fault: Fault) -> Tally {
     let (world, motion) = prepare(scene, parameter);
     let moving = Moving::new(scene, parameter, &world, &motion);
     let mut tracer = Tracer::new(&world);
-    let mut path = material(&motion);
+    let mut path = Recording::material(&motion);
     let mut differentiator = Differentiator::new(&world);
     let mut sink = Faulty(Contraction::new(&world, &motion), fault);
     let mut tally = Tally::default();
     while (tally.paths < 200 || tally.moving < 30) && tally.paths < 20_000 {
         let i = tally.paths;
-        let slope = trace(&mut tracer, &mut path, 5, i);
+        let slope = trace(&mut tracer, &mut path, None, 5, i);
         sink.0.clear();
-        differentiator.differentiate(&path, slope, Rng::new(6, 0, i), &mut sink);
+        differentiator.differentiate(&path.path(), slope, Rng::new(6, 0, i), &mut sink);
         let record = &path.record;
         let truth = replay(&moving, record, slope);
         let value = truth.map(|v| v.re);

@@ -1,5 +1,6 @@
 //! A scene prepared for one parameter, paths through it, and mistakes to be found.
 
+use alloc::sync::Arc;
 use alloc::vec;
 
 use drt_math::{Rgb, RgbVec, Rng, ValueChange, Vec3};
@@ -9,12 +10,15 @@ use drt_motion::{GeometryChange, Parameter};
 use super::scenes::*;
 use crate::contraction::{Contraction, Motion};
 use crate::emitter::EmitterGradient;
+use crate::interior::{PathView, Recorder};
 use crate::kept::Kept;
 use crate::scene::Scene;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
-use crate::transport::velocity::{Material, Movers};
+use crate::transport::pairs::Pairs;
+use crate::transport::record::PathRecord;
+use crate::transport::velocity::{Material, Movers, PathVelocities, VelocityField};
 use crate::transport::{Lit, MaterialPoint, RecordedPath, Tracer, World};
 use crate::{inside, tangents};
 
@@ -44,16 +48,35 @@ pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
     (world, motion)
 }
 
-/// A path in the material form.
-pub(super) fn material(motion: &Motion) -> RecordedPath {
-    let field = Material::new(Movers::new(&motion.interest));
-    RecordedPath::new(alloc::sync::Arc::new(field), Default::default())
+/// A path and what is recorded of it.
+pub(super) struct Recording {
+    pub(super) record: PathRecord,
+    pub(super) views: [PathView; 1],
+}
+
+impl Recording {
+    pub(super) fn new(field: Arc<dyn VelocityField>, pairs: Pairs) -> Self {
+        let velocities = PathVelocities::new(field);
+        let view = PathView { velocities, pairs, flux: None, lit: Lit::All };
+        Self { record: PathRecord::default(), views: [view] }
+    }
+
+    /// In the material form.
+    pub(super) fn material(motion: &Motion) -> Self {
+        let field = Material::new(Movers::new(&motion.interest));
+        Self::new(Arc::new(field), Pairs::default())
+    }
+
+    pub(super) fn path(&self) -> RecordedPath<'_> {
+        self.views[0].of(&self.record)
+    }
 }
 
 /// Traces a path from some pixel; returns the filter's gradient over the density.
 pub(super) fn trace(
     tracer: &mut Tracer<'_>,
-    path: &mut RecordedPath,
+    recording: &mut Recording,
+    pairs: Option<Rng>,
     seed: u64,
     i: u32,
 ) -> [f64; 2] {
@@ -62,9 +85,12 @@ pub(super) fn trace(
     let view = tracer.world.camera.sample_view(i % pixels, rng.next_2d(), true);
     let weight = Rgb::splat(view.weight);
     let pixel = [i % pixels % FILM[0], i % pixels / FILM[0]];
-    path.begin(pixel, view.direction, weight);
+    let Recording { record, views } = recording;
+    views[0].begin(pairs, Rng::new(0, 0, 0));
+    let mut recorder = Recorder { record, views, camera_ray: None };
+    recorder.begin(pixel, view.direction, weight);
     tracer.rng = rng;
-    tracer.trace_camera(view.direction, weight, path);
+    tracer.trace_camera(view.direction, weight, &mut recorder);
     view.slope
 }
 

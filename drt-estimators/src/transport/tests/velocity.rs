@@ -13,17 +13,18 @@ use drt_math::{Rgb, Rng, Vec3, vec3};
 use drt_motion::{Parameter, SurfacePoint as PointOfMesh};
 
 use super::scenes::*;
-use super::setup::{motion, prepare, trace};
+use super::setup::{Recording, motion, prepare, trace};
 use crate::contraction::{Contraction, Motion};
 use crate::emitter::Emitter;
 use crate::reverse::ScatterSink;
 use crate::scene::Scene;
+use crate::transport::pairs::Pairs;
 use crate::transport::trace::Endpoint;
 use crate::transport::velocity::{
     Auxiliary, Blend, Found, Material, Movers, VelocityField, VertexVelocity,
 };
 use crate::transport::{
-    Differentiator, MaterialPoint, Matter, RecordedPath, SurfacePoint, Tracer, Vertex, World,
+    Differentiator, MaterialPoint, Matter, SurfacePoint, Tracer, Vertex, World,
 };
 
 /// The material field and a smooth one.
@@ -130,23 +131,23 @@ fn derivatives(
 ) -> (Vec<f64>, f64) {
     let (world, motion) = prepare(scene, parameter);
     let field = field(Material::new(Movers::new(&motion.interest)));
-    let mut path = RecordedPath::new(Arc::new(field), Default::default());
+    let mut path = Recording::new(Arc::new(field), Pairs::default());
     let mut tracer = Tracer::new(&world);
     let mut differentiator = Differentiator::new(&world);
     let mut rates = Contraction::new(&world, &motion);
     let (mut forward, mut apart) = (Vec::new(), 0.0);
     for i in 0..paths {
-        let slope = trace(&mut tracer, &mut path, 31, i);
+        let slope = trace(&mut tracer, &mut path, None, 31, i);
         let column = f64::from(path.record.pixel[0]) - 2.5;
         let rng = Rng::new(6, 0, i);
         rates.clear();
-        differentiator.differentiate(&path, slope, rng.clone(), &mut rates);
+        differentiator.differentiate(&path.path(), slope, rng.clone(), &mut rates);
         let value = rates.rates[0].mean() * column;
         forward.push(value);
         if i < 200 {
             let weights = Rgb::splat(column / 3.0);
             let mut sink = ScatterSink::of_surfaces(&world, &motion.interest, weights);
-            differentiator.differentiate(&path, slope, rng, &mut sink);
+            differentiator.differentiate(&path.path(), slope, rng, &mut sink);
             apart = f64::max(apart, (along(&motion, &world, sink) - value).abs());
         }
     }

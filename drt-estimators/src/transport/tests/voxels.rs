@@ -10,7 +10,7 @@ use super::changes::rates;
 use super::moving::Moving;
 use super::replay::replay;
 use super::scenes::*;
-use super::setup::{Fault, Faulty, coloured, material, motion, prepare, set, trace};
+use super::setup::{Fault, Faulty, Recording, coloured, motion, prepare, set, trace};
 use crate::contraction::Contraction;
 use crate::scene::Scene;
 use crate::transport::{Differentiator, Tracer};
@@ -63,17 +63,17 @@ fn mean_deviations(scene: &Scene, parameter: &Parameter, fault: Fault, factor: f
     let (world, motion) = prepare(scene, parameter);
     let moving = Moving::new(scene, parameter, &world, &motion);
     let mut tracer = Tracer::new(&world);
-    let mut path = material(&motion);
+    let mut path = Recording::material(&motion);
     let mut differentiator = Differentiator::new(&world);
     let mut sink = Faulty(Contraction::new(&world, &motion), fault);
     let mut deviations = Vec::new();
     for i in 0..120 {
-        let slope = trace(&mut tracer, &mut path, 15, i);
+        let slope = trace(&mut tracer, &mut path, None, 15, i);
         let expected = rates(replay(&moving, &path.record, slope)).g * factor;
         let mean: Moments = (0..1000)
             .map(|j| {
                 sink.0.clear();
-                differentiator.differentiate(&path, slope, Rng::new(16, j, i), &mut sink);
+                differentiator.differentiate(&path.path(), slope, Rng::new(16, j, i), &mut sink);
                 sink.0.rates[0].g
             })
             .collect();

@@ -1,15 +1,14 @@
-//! A recorded path with the velocities of its vertices.
+//! The velocities of a recorded path's vertices.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use drt_math::{Rgb, Rng, Vec3};
-
-use super::{Auxiliary, Found, Material, Movers, SurfaceHit, VelocityField, VertexVelocity};
+use super::{Auxiliary, Found, SurfaceHit, VelocityField, VertexVelocity};
+use crate::transport::lights::Lit;
 use crate::transport::pairs::Pairs;
 use crate::transport::record::PathRecord;
-use crate::transport::trace::{Arrival, Connection, Leaving, Observer, Pixel};
-use crate::transport::world::{Crossing, World};
+use crate::transport::trace::Arrival;
+use crate::transport::world::World;
 
 /// The velocities of a path's vertices, node by node.
 #[derive(Clone, Debug)]
@@ -20,10 +19,35 @@ pub(crate) struct PathVelocities {
 }
 
 impl PathVelocities {
-    fn begin(&mut self) {
+    pub(crate) fn new(field: Arc<dyn VelocityField>) -> Self {
+        Self { field, vertices: Vec::new(), auxiliary: Vec::new() }
+    }
+
+    /// Forgets the last path.
+    pub(crate) fn begin(&mut self) {
         self.vertices.clear();
         self.auxiliary.clear();
         self.vertices.push(self.field.camera());
+    }
+
+    /// Adds that of a vertex just recorded, found by a ray that `hits` some surfaces with a flux.
+    pub(crate) fn arrive(
+        &mut self,
+        world: &World,
+        record: &PathRecord,
+        arrival: &Arrival,
+        hits: &[SurfaceHit],
+    ) {
+        let parent = arrival.parent as usize;
+        let found = Found {
+            pixel: record.pixel,
+            viewer: record.nodes[parent].vertex(),
+            velocity: &self.vertices[parent],
+            arrival,
+            hits,
+        };
+        let velocity = self.field.vertex(world, &found, &mut self.auxiliary);
+        self.vertices.push(velocity);
     }
 
     pub(crate) fn field(&self) -> &dyn VelocityField {
@@ -40,84 +64,18 @@ impl PathVelocities {
         self.vertices[node].moves
     }
 
-    /// Its summands from other material points.
+    /// A vertex's summands from other material points.
     pub(crate) fn auxiliary(&self, velocity: &VertexVelocity) -> &[Auxiliary] {
         &self.auxiliary[velocity.auxiliary.clone()]
     }
 }
 
-/// A path that can be differentiated.
-#[derive(Clone, Debug)]
-pub(crate) struct RecordedPath {
-    pub(crate) record: PathRecord,
-    pub(crate) velocities: PathVelocities,
+/// What is to be differentiated of a path: the light of some emitters, by a velocity field.
+#[derive(Clone, Copy)]
+pub(crate) struct RecordedPath<'p> {
+    pub(crate) record: &'p PathRecord,
+    pub(crate) velocities: &'p PathVelocities,
     /// Rays beside it, where they are asked for.
-    pub(crate) pairs: Pairs,
-}
-
-impl RecordedPath {
-    /// Of paths whose vertices move by a field, and whose roughness and narrow lobes are told by `pairs`.
-    pub(crate) fn new(field: Arc<dyn VelocityField>, pairs: Pairs) -> Self {
-        let (vertices, auxiliary) = (Vec::new(), Vec::new());
-        let velocities = PathVelocities { field, vertices, auxiliary };
-        Self { record: PathRecord::default(), velocities, pairs }
-    }
-
-    /// Empties it for a camera ray of a `pixel` along `dir` with filter weight `value`.
-    pub(crate) fn begin(&mut self, pixel: [u32; 2], dir: Vec3, value: Rgb) {
-        self.record.begin(pixel, dir, value);
-        self.velocities.begin();
-    }
-
-    /// Adds a vertex found by a ray that hits some surfaces with a flux; returns its node.
-    pub(crate) fn arrive(
-        &mut self,
-        world: &World,
-        arrival: &Arrival,
-        crossings: &[Crossing],
-        hits: &[SurfaceHit],
-    ) -> u32 {
-        let node = self.record.arrive(arrival, crossings);
-        let parent = arrival.parent as usize;
-        let PathVelocities { field, vertices, auxiliary } = &mut self.velocities;
-        let found = Found {
-            pixel: self.record.pixel,
-            viewer: self.record.nodes[parent].vertex(),
-            velocity: &vertices[parent],
-            arrival,
-            hits,
-        };
-        let velocity = field.vertex(world, &found, auxiliary);
-        vertices.push(velocity);
-        node
-    }
-}
-
-impl Default for RecordedPath {
-    /// In the material form, with nothing that moves.
-    fn default() -> Self {
-        Self::new(Arc::new(Material::new(Movers::default())), Pairs::default())
-    }
-}
-
-impl Observer for RecordedPath {
-    const RECORDS: bool = true;
-
-    fn contribution(&mut self, _: Pixel, _: u32, value: Rgb) {
-        self.record.value += value;
-    }
-
-    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
-        Self::arrive(self, world, arrival, crossings, &[])
-    }
-
-    fn scatter(&mut self, world: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
-        self.record.scatter(leaving, value, inv_pdf);
-        let Self { record, velocities, pairs } = self;
-        pairs.offer(world, record, velocities, leaving, rng);
-    }
-
-    fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
-        self.record.connect(node, connection, crossings);
-    }
+    pub(crate) pairs: &'p Pairs,
+    pub(crate) lit: Lit,
 }

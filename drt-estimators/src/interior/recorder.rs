@@ -1,0 +1,93 @@
+//! Recording a path once for all that differentiates it.
+
+use drt_math::{Rgb, Rng, Vec3};
+
+use crate::flux::Reservoir;
+use crate::transport::lights::Lit;
+use crate::transport::pairs::Pairs;
+use crate::transport::record::PathRecord;
+use crate::transport::trace::{Arrival, Connection, Leaving, Observer, Pixel};
+use crate::transport::velocity::PathVelocities;
+use crate::transport::world::Crossing;
+use crate::transport::{RayPath, RecordedPath, World};
+
+/// A path as one estimator sees it, which differentiates the light of some emitters.
+#[derive(Debug)]
+pub(crate) struct PathView {
+    pub(crate) velocities: PathVelocities,
+    pub(crate) pairs: Pairs,
+    /// One of the surfaces with a flux that the path met, if there are such.
+    pub(crate) flux: Option<Reservoir>,
+    pub(crate) lit: Lit,
+}
+
+impl PathView {
+    /// Forgets the last path; random numbers are for choosing among pairs, and surfaces with a flux.
+    pub(crate) fn begin(&mut self, pairs: Option<Rng>, flux: Rng) {
+        self.velocities.begin();
+        self.pairs.begin(pairs);
+        if let Some(reservoir) = &mut self.flux {
+            reservoir.begin(flux);
+        }
+    }
+
+    /// With the record that it belongs to.
+    pub(crate) fn of<'p>(&'p self, record: &'p PathRecord) -> RecordedPath<'p> {
+        let Self { velocities, pairs, lit, .. } = self;
+        RecordedPath { record, velocities, pairs, lit: *lit }
+    }
+}
+
+/// Listens to the walk of a path whose derivative is wanted.
+pub(crate) struct Recorder<'r> {
+    pub(crate) record: &'r mut PathRecord,
+    pub(crate) views: &'r mut [PathView],
+    /// Keeps the camera's ray, where that is asked for.
+    pub(crate) camera_ray: Option<&'r mut RayPath>,
+}
+
+impl Recorder<'_> {
+    /// Empties the record for a camera ray of a `pixel` along `dir` with filter weight `value`.
+    pub(crate) fn begin(&mut self, pixel: [u32; 2], dir: Vec3, value: Rgb) {
+        self.record.begin(pixel, dir, value);
+    }
+}
+
+impl Observer for Recorder<'_> {
+    const RECORDS: bool = true;
+
+    fn contribution(&mut self, _: Pixel, _: u32, value: Rgb) {
+        self.record.value += value;
+    }
+
+    fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {
+        if let (0, Some(kept)) = (leaving.node, &mut self.camera_ray) {
+            kept.clone_from(ray);
+        }
+        for view in self.views.iter_mut() {
+            if let Some(flux) = &mut view.flux {
+                flux.offer(world, leaving, view.velocities.moves(leaving.node as usize), ray);
+            }
+        }
+    }
+
+    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
+        let node = self.record.arrive(arrival, crossings);
+        for view in self.views.iter_mut() {
+            let hits = view.flux.as_ref().map_or(&[][..], Reservoir::hits);
+            view.velocities.arrive(world, self.record, arrival, hits);
+        }
+        node
+    }
+
+    fn scatter(&mut self, world: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
+        self.record.scatter(leaving, value, inv_pdf);
+        for view in self.views.iter_mut() {
+            view.pairs.offer(world, self.record, &view.velocities, leaving, rng);
+        }
+    }
+
+    fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
+        self.record.connect(node, connection, crossings);
+    }
+}
