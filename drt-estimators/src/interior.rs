@@ -61,6 +61,14 @@ impl Looks {
     fn any(self) -> bool {
         !matches!(self, Self::Average(0.0))
     }
+
+    /// Another average, where there is one.
+    pub(crate) fn or_average(self, queries: Option<f64>) -> Self {
+        match (self, queries) {
+            (Self::Average(_), Some(queries)) => Self::Average(queries),
+            _ => self,
+        }
+    }
 }
 
 impl AlongRays<'_> {
@@ -69,21 +77,6 @@ impl AlongRays<'_> {
         let flux = self.flux.map(|_| Term::Flux);
         let edges = if self.looks.any() { &[Term::Direct, Term::Indirect][..] } else { &[] };
         flux.into_iter().chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
-    }
-
-    /// Of so many `layers`, where terms and these are kept apart, the first one of looks; and how many each path
-    /// takes. Looks from every vertex belong to their path, and have none.
-    pub(crate) fn first_of_looks(&self, parameters: usize, layers: usize) -> (usize, f64) {
-        match self.looks {
-            Looks::Average(looks) if looks > 0.0 => (layers - 2 * parameters, looks),
-            _ => (layers, 1.0),
-        }
-    }
-
-    /// Layers of a sample: the image, a derivative per parameter, and where terms are kept apart
-    /// those of each parameter.
-    pub(crate) fn layers(&self, parameters: usize, separate: bool) -> usize {
-        1 + parameters * (1 + if separate { self.terms().count() } else { 0 })
     }
 }
 
@@ -156,7 +149,7 @@ pub(crate) struct PixelSampler<'a, S> {
     camera_ray: RayPath,
     /// What differentiates paths, and what each keeps of one.
     workers: Vec<Worker<'a, S>>,
-    views: Vec<PathView>,
+    views: Vec<PathView<'a>>,
     separate: bool,
     non_finite: Vec<NonFinite>,
     non_finite_count: u64,

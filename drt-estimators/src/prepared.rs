@@ -9,7 +9,6 @@ use crate::film::BATCHES;
 use crate::flux::{EdgeOn, Flux};
 use crate::interior::{AlongRays, Component, Looks};
 use crate::radiative::Radiative;
-use crate::scouts;
 use crate::sensitivity::Interest;
 use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::{Source, Splatter};
@@ -30,9 +29,9 @@ pub(crate) struct Prepared {
     /// Rays in narrow lobes come in pairs, by the settings.
     opposites: bool,
     /// Boundary samples of each kind to each sample of a pixel, by the settings alone.
-    boundary_ratio: f64,
-    /// The part that edges which the camera sees take of theirs.
-    part_of_camera: f64,
+    pub(crate) boundary_ratio: f64,
+    /// The part of that which edges seen from the camera take.
+    pub(crate) primary_share: f64,
     /// Of the spatial form.
     looks: Looks,
 }
@@ -46,17 +45,12 @@ impl Prepared {
         settings: &Settings,
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
-        let prepared = match settings.estimator {
+        match settings.estimator {
             EstimatorKind::Radiative if interest.any() => {
-                Self::spatial(world, interest, settings, motion)?
+                Self::spatial(world, interest, settings, motion)
             }
-            _ => Self::material(world, interest, flux_shapes, settings)?,
-        };
-        // A pilot sees more.
-        let pilot = settings.adaptive && settings.boundary_spp.is_none();
-        let Some(motion) = motion.filter(|_| !pilot) else { return Ok(prepared) };
-        let part_of_camera = scouts::part_of_camera(&prepared, motion, prepared.boundary_ratio);
-        Ok(Self { part_of_camera, ..prepared })
+            _ => Self::material(world, interest, flux_shapes, settings),
+        }
     }
 
     /// For the path-space estimator.
@@ -86,7 +80,7 @@ impl Prepared {
         let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
         Ok(Self {
             boundary_ratio: boundary_ratio(settings, kinds),
-            part_of_camera: 1.0,
+            primary_share: 1.0,
             looks: Looks::default(),
             radiative: None,
             world,
@@ -137,12 +131,12 @@ impl Prepared {
             radiative: Some(radiative),
             antithetic: false,
             opposites: settings.antithetic,
+            primary_share: 1.0,
             world,
             flux,
             edge_on,
             sources,
             boundary_ratio,
-            part_of_camera: 1.0,
             looks,
         })
     }
@@ -171,7 +165,7 @@ impl Prepared {
     /// Samples of a splatted source to each of a pixel, by the settings alone.
     pub(crate) fn source_ratio(&self, i: usize) -> f64 {
         let source = self.sources[i];
-        let part = if source.is_of_camera() { self.part_of_camera } else { 1.0 };
+        let part = if source.is_of_camera() { self.primary_share } else { 1.0 };
         self.boundary_ratio * part * source.part()
     }
 

@@ -92,21 +92,6 @@ pub struct Derivative {
     pub terms: Vec<(Term, Layer)>,
 }
 
-impl Derivative {
-    /// The sum with an independent estimate of another share of the light.
-    pub(crate) fn plus(&self, o: &Self) -> Self {
-        let mut terms = self.terms.clone();
-        for (term, layer) in &o.terms {
-            match terms.iter_mut().find(|(t, _)| t == term) {
-                Some((_, own)) => *own = own.clone().plus(layer),
-                None => terms.push((*term, layer.clone())),
-            }
-        }
-        terms.sort_by_key(|(t, _)| *t);
-        Self { name: self.name.clone(), total: self.total.clone().plus(&o.total), terms }
-    }
-}
-
 /// Work done, for tests that assert what was skipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

@@ -26,7 +26,7 @@ use crate::scene::{Scene, Target};
 use crate::scene_gradient::SceneGradient;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
-use crate::session::{Control, shares};
+use crate::session::{Control, estimators, seed_of_component};
 use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::Checked;
 use crate::surface::BsdfParams;
@@ -79,65 +79,95 @@ pub fn gradient(
             ),
         });
     }
-    let mut total: Option<SceneGradient> = None;
-    for (settings, lit) in shares(&scene, wanted.iter().copied(), settings) {
-        let part = gradient_of_share(&scene, wanted, &settings, lit, adjoint, control)?;
-        match &mut total {
-            Some(total) => total.add(&part),
-            None => total = Some(part),
+    let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
+    let mut kept = Kept::default();
+    let mut world = World::new(scene.clone(), settings.sensor, depth, None, Lit::All, &mut kept)?;
+    let estimators = estimators(&scene, wanted.iter().copied(), settings).into_iter();
+    let components = estimators
+        .map(|(settings, lit)| Component::new(world.lit_by(lit)?, wanted, &settings))
+        .collect::<Result<Vec<_>, Error>>()?;
+    let needs = components.iter().map(Component::needs);
+    if let Some(needs) = needs.reduce(|all, needs| all.union(&needs)) {
+        world.prepare_for_derivatives(needs);
+    }
+    let antithetic = components.iter().any(|c| c.prepared.antithetic);
+    let run = Reverse { world: &world, components: &components, antithetic, settings, adjoint };
+    let pool = Pool::new(settings.threads);
+    let mut total = run.zeros();
+    let mut merge = |_: u32, parts: Vec<(usize, Sums)>| {
+        parts.iter().for_each(|(c, part)| total[*c].add(part));
+        !control.cancelled()
+    };
+    let chunks = BATCHES as u32;
+    let mut going = pool.ordered(0..chunks, 1, |c| run.pixels(c, chunks), &mut merge);
+    for (c, component) in components.iter().enumerate() {
+        for i in 0..component.prepared.sources.len() {
+            going = going && pool.ordered(0..chunks, 1, |b| run.splats(c, i, b), &mut merge);
         }
     }
-    total
-        .ok_or_else(|| Error::Setting { setting: "estimator".into(), reason: "has no part".into() })
+    let mut gradient = SceneGradient::zeros(&world, &interest(&scene, wanted));
+    for (component, sums) in components.iter().zip(total) {
+        let Sums { mut scene, insides } = sums;
+        component.insides.gather(&component.prepared.world, insides, &mut scene);
+        gradient.add(&scene);
+    }
+    Ok(gradient)
 }
 
-/// The part that one estimator has in a gradient, by the light of some emitters.
-fn gradient_of_share(
-    scene: &Scene,
-    wanted: &[Target],
-    settings: &Settings,
-    lit: Lit,
-    adjoint: &[Rgb],
-    control: &dyn Control,
-) -> Result<SceneGradient, Error> {
-    let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-    let mut world =
-        World::new(scene.clone(), settings.sensor, depth, None, lit, &mut Kept::default())?;
-    let mut interest = interest(&world.scene, wanted);
-    for (e, emitter) in scene.emitters.iter().enumerate() {
-        interest.emitters[e] &= lit.by(&emitter.item.emitter);
-        interest.moving_emitters[e] &= lit.by(&emitter.item.emitter);
+/// One estimator's part in a gradient, by the light of some emitters.
+struct Component {
+    prepared: Prepared,
+    interest: Interest,
+    insides: TransposedInsides,
+}
+
+impl Component {
+    fn new(mut world: World, wanted: &[Target], settings: &Settings) -> Result<Self, Error> {
+        let lit = world.lit;
+        let mut interest = interest(&world.scene, wanted);
+        for (e, emitter) in world.scene.emitters.iter().enumerate() {
+            interest.emitters[e] &= lit.by(&emitter.item.emitter);
+            interest.moving_emitters[e] &= lit.by(&emitter.item.emitter);
+        }
+        let insides = match settings.estimator {
+            EstimatorKind::Radiative => TransposedInsides::at_rest(&world),
+            _ => TransposedInsides::new(&world, &interest, &settings.insides)?,
+        };
+        interest.volumes = insides.volumes();
+        world.prepare_for_derivatives(needs(&interest));
+        let prepared = Prepared::new(world, &interest, &insides.flux_shapes, settings, None)?;
+        Ok(Self { prepared, interest, insides })
     }
-    let insides = match settings.estimator {
-        EstimatorKind::Radiative => TransposedInsides::at_rest(&world),
-        _ => TransposedInsides::new(&world, &interest, &settings.insides)?,
-    };
-    interest.volumes = insides.volumes();
+
+    fn needs(&self) -> Needs {
+        needs(&self.interest)
+    }
+
+    fn zeros(&self) -> Sums {
+        let scene = SceneGradient::zeros(&self.prepared.world, &self.interest);
+        Sums { scene, insides: self.insides.zeros() }
+    }
+
+    fn scatter(&self) -> ScatterSink<'_> {
+        ScatterSink {
+            world: &self.prepared.world,
+            interest: &self.interest,
+            insides: &self.insides,
+            weights: Rgb::ZERO,
+            sums: self.zeros(),
+        }
+    }
+}
+
+/// What must be sampled even where it contributes nothing to the image.
+fn needs(interest: &Interest) -> Needs {
     let need = |w: &bool| if *w { MediumNeed::Vertices } else { MediumNeed::Nothing };
-    world.prepare_for_derivatives(Needs {
+    Needs {
         media: interest.media.iter().map(need).collect(),
         bsdfs: interest.bsdfs.clone(),
         roughness: interest.bsdfs.clone(),
         index: interest.bsdfs.clone(),
-    });
-    let prepared = Prepared::new(world, &interest, &insides.flux_shapes, settings, None)?;
-    let run =
-        Reverse { prepared: &prepared, interest: &interest, insides: &insides, settings, adjoint };
-    let pool = Pool::new(settings.threads);
-    let mut total = run.zeros();
-    let mut merge = |_: u32, part: Sums| {
-        total.add(&part);
-        !control.cancelled()
-    };
-    let chunks = BATCHES as u32;
-    if pool.ordered(0..chunks, 1, |c| run.pixels(c, chunks), &mut merge) {
-        for i in 0..prepared.sources.len() {
-            pool.ordered(0..chunks, 1, |b| run.splats(i, b), &mut merge);
-        }
     }
-    let Sums { mut scene, insides: collected } = total;
-    insides.gather(&prepared.world, collected, &mut scene);
-    Ok(scene)
 }
 
 fn interest(scene: &Scene, wanted: &[Target]) -> Interest {
@@ -162,9 +192,11 @@ fn interest(scene: &Scene, wanted: &[Target]) -> Interest {
 }
 
 struct Reverse<'a> {
-    prepared: &'a Prepared,
-    interest: &'a Interest,
-    insides: &'a TransposedInsides,
+    /// By all light, for paths.
+    world: &'a World,
+    components: &'a [Component],
+    /// Image points come in mirrored pairs.
+    antithetic: bool,
     settings: &'a Settings,
     adjoint: &'a [Rgb],
 }
@@ -183,37 +215,21 @@ impl Sums {
 }
 
 impl Reverse<'_> {
-    fn zeros(&self) -> Sums {
-        let scene = SceneGradient::zeros(&self.prepared.world, self.interest);
-        Sums { scene, insides: self.insides.zeros() }
+    fn zeros(&self) -> Vec<Sums> {
+        self.components.iter().map(Component::zeros).collect()
     }
 
-    fn scatter(&self) -> ScatterSink<'_> {
-        ScatterSink {
-            world: &self.prepared.world,
-            interest: self.interest,
-            insides: self.insides,
-            weights: Rgb::ZERO,
-            sums: self.zeros(),
-        }
-    }
-
-    /// One of `chunks` parts of the pixels.
-    fn pixels(&self, chunk: u32, chunks: u32) -> Sums {
-        let per_unit = if self.prepared.antithetic { 2 } else { 1 };
+    /// One of `chunks` parts of the pixels; what it adds to which component.
+    fn pixels(&self, chunk: u32, chunks: u32) -> Vec<(usize, Sums)> {
+        let per_unit = if self.antithetic { 2 } else { 1 };
         let units = self.settings.spp.div_ceil(per_unit).max(1);
         let scale = 1.0 / f64::from(units * per_unit);
         let n = self.adjoint.len() as u64;
         let at = |c: u32| (n * u64::from(c) / u64::from(chunks)) as u32;
-        let mut sampler = PixelSampler::new(
-            &self.prepared.world,
-            [self.prepared.component(self.scatter())],
-            self.settings.seed,
-            self.prepared.antithetic,
-            false,
-        );
+        let components = self.components.iter().map(|c| c.prepared.component(c.scatter()));
+        let (seed, film) = (self.settings.seed, self.world.camera.film());
+        let mut sampler = PixelSampler::new(self.world, components, seed, self.antithetic, false);
         let mut values = [Rgb::ZERO];
-        let (seed, film) = (self.settings.seed, self.prepared.world.camera.film());
         let pass = Pass::new(0, units, film);
         for pixel in at(chunk)..at(chunk + 1) {
             for sink in sampler.sinks() {
@@ -227,34 +243,38 @@ impl Reverse<'_> {
             }
         }
         let (account, sinks) = sampler.finish();
-        let mut sums = sinks.into_iter().next().map_or_else(|| self.zeros(), |sink| sink.sums);
-        sums.scene.counters = account.counters;
-        sums.scene.non_finite += account.non_finite_count;
+        let mut sums: Vec<_> = sinks.into_iter().map(|sink| sink.sums).enumerate().collect();
+        if let Some((_, first)) = sums.first_mut() {
+            first.scene.counters = account.counters;
+            first.scene.non_finite += account.non_finite_count;
+        }
         sums
     }
 
-    /// One batch of a splatted source.
-    fn splats(&self, i: usize, batch: u32) -> Sums {
-        let source = self.prepared.sources[i];
-        let per_pixel = f64::from(self.settings.spp) * self.prepared.source_ratio(i);
-        let count = self.prepared.samples_per_batch(per_pixel);
+    /// One batch of a source of boundary samples; what it adds to its component.
+    fn splats(&self, c: usize, i: usize, batch: u32) -> Vec<(usize, Sums)> {
+        let component = &self.components[c];
+        let prepared = &component.prepared;
+        let source = prepared.sources[i];
+        let per_pixel = f64::from(self.settings.spp) * prepared.source_ratio(i);
+        let count = prepared.samples_per_batch(per_pixel);
         let scale = 1.0 / (f64::from(count) * BATCHES as f64);
         let mut receiver = Checked::new(ToGradient {
-            scatter: self.scatter(),
+            scatter: component.scatter(),
             adjoint: self.adjoint,
             functional: Functional::default(),
             weight: 0.0,
             scale,
         });
         let stream = source.stream() + u64::from(batch);
-        let splatter = self.prepared.splatter(self.settings.seed);
+        let splatter = prepared.splatter(seed_of_component(self.settings.seed, c));
         let account = splatter.run(source, stream, count, &mut receiver);
         let mut to = receiver.inner;
         to.flush();
         let mut sums = to.scatter.sums;
         sums.scene.counters = account.counters;
         sums.scene.non_finite += account.non_finite_count;
-        sums
+        alloc::vec![(c, sums)]
     }
 }
 

@@ -24,7 +24,6 @@ pub(crate) struct Component<'a, S> {
 
 /// A component at work.
 pub(super) struct Worker<'a, S> {
-    world: &'a World,
     pub(super) along: AlongRays<'a>,
     pub(super) sink: S,
     differentiator: Differentiator<'a>,
@@ -51,7 +50,7 @@ pub(super) struct Traced<'t> {
 
 impl<'a, S: PathSink> Worker<'a, S> {
     /// With what it keeps of each path.
-    pub(super) fn new(component: Component<'a, S>, separate: bool) -> (Self, PathView) {
+    pub(super) fn new(component: Component<'a, S>, separate: bool) -> (Self, PathView<'a>) {
         let Component { world, along, sink } = component;
         let movers = Movers::new(sink.interest());
         let field: Arc<dyn VelocityField> = match along.radiative {
@@ -59,13 +58,12 @@ impl<'a, S: PathSink> Worker<'a, S> {
             None => Arc::new(Material::new(movers)),
         };
         let view = PathView {
+            world,
             velocities: PathVelocities::new(field),
             pairs: Pairs::new(along.opposites),
             flux: along.flux.map(crate::flux::Reservoir::new),
-            lit: world.lit,
         };
         let worker = Self {
-            world,
             along,
             sink,
             differentiator: Differentiator::new(world),
@@ -90,12 +88,12 @@ impl<'a, S: PathSink> Worker<'a, S> {
         &mut self,
         tracer: &mut Tracer<'a>,
         path: &Traced<'_>,
-        view: &mut PathView,
+        view: &mut PathView<'a>,
         mut at: usize,
         values: &mut [Rgb],
     ) {
         // Only some of the light is this estimator's.
-        let all = core::mem::replace(&mut tracer.world, self.world);
+        let all = core::mem::replace(&mut tracer.world, view.world);
         let n = self.sink.layers();
         let mut next = |separate: bool| {
             let layer = if separate { at } else { 1 };
@@ -127,7 +125,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         &mut self,
         tracer: &mut Tracer<'a>,
         path: &Traced<'_>,
-        view: &PathView,
+        view: &PathView<'_>,
         values: &mut [Rgb],
     ) {
         let Self { sink, differentiator, brought, .. } = self;
@@ -149,7 +147,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         &mut self,
         tracer: &mut Tracer<'a>,
         path: &Traced<'_>,
-        view: &mut PathView,
+        view: &mut PathView<'a>,
         values: &mut [Rgb],
     ) {
         let Self { sink, differentiator, .. } = self;
@@ -173,7 +171,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         tracer: &mut Tracer<'a>,
         radiative: &Radiative,
         path: &Traced<'_>,
-        view: &PathView,
+        view: &PathView<'_>,
         mut first: Rng,
         values: &mut [Rgb],
     ) {
@@ -207,7 +205,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
     fn send(
         &mut self,
         record: &PathRecord,
-        view: &PathView,
+        view: &PathView<'_>,
         edge: Option<Edged>,
         share: f64,
         values: &mut [Rgb],

@@ -3,7 +3,6 @@
 use drt_math::{Rgb, Rng, Vec3};
 
 use crate::flux::Reservoir;
-use crate::transport::lights::Lit;
 use crate::transport::pairs::Pairs;
 use crate::transport::record::PathRecord;
 use crate::transport::trace::{Arrival, Connection, Leaving, Observer, Pixel};
@@ -12,16 +11,16 @@ use crate::transport::world::Crossing;
 use crate::transport::{RayPath, RecordedPath, World};
 
 /// A path as one estimator sees it, which differentiates the light of some emitters.
-#[derive(Debug)]
-pub(crate) struct PathView {
+pub(crate) struct PathView<'a> {
+    /// The scene as the estimator has prepared it, lit by what it differentiates.
+    pub(crate) world: &'a World,
     pub(crate) velocities: PathVelocities,
     pub(crate) pairs: Pairs,
     /// One of the surfaces with a flux that the path met, if there are such.
     pub(crate) flux: Option<Reservoir>,
-    pub(crate) lit: Lit,
 }
 
-impl PathView {
+impl PathView<'_> {
     /// Forgets the last path; random numbers are for choosing among pairs, and surfaces with a flux.
     pub(crate) fn begin(&mut self, pairs: Option<Rng>, flux: Rng) {
         self.velocities.begin();
@@ -33,57 +32,57 @@ impl PathView {
 
     /// With the record that it belongs to.
     pub(crate) fn of<'p>(&'p self, record: &'p PathRecord) -> RecordedPath<'p> {
-        let Self { velocities, pairs, lit, .. } = self;
-        RecordedPath { record, velocities, pairs, lit: *lit }
+        let Self { velocities, pairs, .. } = self;
+        RecordedPath { record, velocities, pairs, lit: self.world.lit }
     }
 }
 
 /// Listens to the walk of a path whose derivative is wanted.
-pub(crate) struct Recorder<'r> {
+pub(crate) struct Recorder<'r, 'a> {
     pub(crate) record: &'r mut PathRecord,
-    pub(crate) views: &'r mut [PathView],
+    pub(crate) views: &'r mut [PathView<'a>],
     /// Keeps the camera's ray, where that is asked for.
     pub(crate) camera_ray: Option<&'r mut RayPath>,
 }
 
-impl Recorder<'_> {
+impl Recorder<'_, '_> {
     /// Empties the record for a camera ray of a `pixel` along `dir` with filter weight `value`.
     pub(crate) fn begin(&mut self, pixel: [u32; 2], dir: Vec3, value: Rgb) {
         self.record.begin(pixel, dir, value);
     }
 }
 
-impl Observer for Recorder<'_> {
+impl Observer for Recorder<'_, '_> {
     const RECORDS: bool = true;
 
     fn contribution(&mut self, _: Pixel, _: u32, value: Rgb) {
         self.record.value += value;
     }
 
-    fn ray(&mut self, world: &World, leaving: &Leaving, ray: &RayPath) {
+    fn ray(&mut self, _: &World, leaving: &Leaving, ray: &RayPath) {
         if let (0, Some(kept)) = (leaving.node, &mut self.camera_ray) {
             kept.clone_from(ray);
         }
         for view in self.views.iter_mut() {
             if let Some(flux) = &mut view.flux {
-                flux.offer(world, leaving, view.velocities.moves(leaving.node as usize), ray);
+                flux.offer(view.world, leaving, view.velocities.moves(leaving.node as usize), ray);
             }
         }
     }
 
-    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
+    fn arrive(&mut self, _: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
         let node = self.record.arrive(arrival, crossings);
         for view in self.views.iter_mut() {
             let hits = view.flux.as_ref().map_or(&[][..], Reservoir::hits);
-            view.velocities.arrive(world, self.record, arrival, hits);
+            view.velocities.arrive(view.world, self.record, arrival, hits);
         }
         node
     }
 
-    fn scatter(&mut self, world: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
+    fn scatter(&mut self, _: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
         self.record.scatter(leaving, value, inv_pdf);
         for view in self.views.iter_mut() {
-            view.pairs.offer(world, self.record, &view.velocities, leaving, rng);
+            view.pairs.offer(view.world, self.record, &view.velocities, leaving, rng);
         }
     }
 

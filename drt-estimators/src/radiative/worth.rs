@@ -58,7 +58,7 @@ impl Radiative {
         let mut tracer = Tracer::new(world);
         let field = Arc::new(Spatial::new(Movers::new(interest)));
         let (velocities, pairs) = (PathVelocities::new(field), Pairs::default());
-        let mut views = [PathView { velocities, pairs, flux: None, lit: world.lit }];
+        let mut views = [PathView { world, velocities, pairs, flux: None }];
         let mut record = PathRecord::default();
         let [width, height] = world.camera.film();
         let pixels = u64::from(width) * u64::from(height);

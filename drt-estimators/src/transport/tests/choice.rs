@@ -71,7 +71,7 @@ pub(crate) fn derivative(
             let component = prepared.component(Contraction::new(&prepared.world, &motion));
             let along = prepared.along_rays();
             let mut sampler = PixelSampler::new(&prepared.world, [component], seed, false, true);
-            let mut values = vec![Rgb::ZERO; along.layers(1, true)];
+            let mut values = vec![Rgb::ZERO; 2 + along.terms().count()];
             for pixel in 0..PIXELS {
                 let sequence = sequence_name(seed, pixel, 0);
                 for unit in 0..samples {

@@ -41,7 +41,7 @@ fn derivatives(
         Form::Material => Arc::new(Material::new(movers)),
         Form::Spatial => Arc::new(Spatial::new(movers)),
     };
-    let mut path = Recording::new(field, Pairs::new(true));
+    let mut path = Recording::new(world, field, Pairs::new(true));
     let mut differentiator = Differentiator::new(world);
     let mut sink = Contraction::new(world, &motion);
     let (mut buffer, mut moments) = (Brought::default(), [Moments::default(); 2]);

@@ -32,7 +32,7 @@ fn compare(scene: &Scene, parameter: &Parameter, fault: Fault) -> Tally {
     let (world, motion) = prepare(scene, parameter);
     let moving = Moving::new(scene, parameter, &world, &motion);
     let mut tracer = Tracer::new(&world);
-    let mut path = Recording::material(&motion);
+    let mut path = Recording::material(&world, &motion);
     let mut differentiator = Differentiator::new(&world);
     let mut sink = Faulty(Contraction::new(&world, &motion), fault);
     let mut tally = Tally::default();

@@ -49,22 +49,22 @@ pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
 }
 
 /// A path and what is recorded of it.
-pub(super) struct Recording {
+pub(super) struct Recording<'w> {
     pub(super) record: PathRecord,
-    pub(super) views: [PathView; 1],
+    pub(super) views: [PathView<'w>; 1],
 }
 
-impl Recording {
-    pub(super) fn new(field: Arc<dyn VelocityField>, pairs: Pairs) -> Self {
+impl<'w> Recording<'w> {
+    pub(super) fn new(world: &'w World, field: Arc<dyn VelocityField>, pairs: Pairs) -> Self {
         let velocities = PathVelocities::new(field);
-        let view = PathView { velocities, pairs, flux: None, lit: Lit::All };
+        let view = PathView { world, velocities, pairs, flux: None };
         Self { record: PathRecord::default(), views: [view] }
     }
 
     /// In the material form.
-    pub(super) fn material(motion: &Motion) -> Self {
+    pub(super) fn material(world: &'w World, motion: &Motion) -> Self {
         let field = Material::new(Movers::new(&motion.interest));
-        Self::new(Arc::new(field), Pairs::default())
+        Self::new(world, Arc::new(field), Pairs::default())
     }
 
     pub(super) fn path(&self) -> RecordedPath<'_> {
@@ -75,7 +75,7 @@ impl Recording {
 /// Traces a path from some pixel; returns the filter's gradient over the density.
 pub(super) fn trace(
     tracer: &mut Tracer<'_>,
-    recording: &mut Recording,
+    recording: &mut Recording<'_>,
     pairs: Option<Rng>,
     seed: u64,
     i: u32,

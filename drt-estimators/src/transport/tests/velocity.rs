@@ -131,7 +131,7 @@ fn derivatives(
 ) -> (Vec<f64>, f64) {
     let (world, motion) = prepare(scene, parameter);
     let field = field(Material::new(Movers::new(&motion.interest)));
-    let mut path = Recording::new(Arc::new(field), Pairs::default());
+    let mut path = Recording::new(&world, Arc::new(field), Pairs::default());
     let mut tracer = Tracer::new(&world);
     let mut differentiator = Differentiator::new(&world);
     let mut rates = Contraction::new(&world, &motion);

@@ -63,7 +63,7 @@ fn mean_deviations(scene: &Scene, parameter: &Parameter, fault: Fault, factor: f
     let (world, motion) = prepare(scene, parameter);
     let moving = Moving::new(scene, parameter, &world, &motion);
     let mut tracer = Tracer::new(&world);
-    let mut path = Recording::material(&motion);
+    let mut path = Recording::material(&world, &motion);
     let mut differentiator = Differentiator::new(&world);
     let mut sink = Faulty(Contraction::new(&world, &motion), fault);
     let mut deviations = Vec::new();

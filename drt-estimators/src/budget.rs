@@ -1,6 +1,6 @@
 //! How many samples each term of a derivative takes.
 //!
-//! A derivative is a sum of terms that are sampled apart: those along paths, looks from these at edges, and
+//! A derivative is a sum of terms that are sampled apart: those along paths, edge queries from these, and
 //! boundary samples that land anywhere. Where term k takes r_k samples to each path, of the variance v_k and the
 //! cost c_k each, variance times time is (Σ v_k / r_k) (Σ c_k r_k). That is least for r_k in
 //! proportion to √(v_k / c_k), by Cauchy and Schwarz's inequality, and then (Σ √(v_k c_k))² (Neyman 1934, for
@@ -27,9 +27,9 @@ const FEWEST_EVEN: f64 = 0.03125;
 /// What a sample costs besides its rays, in rays: to choose an edge and to look at what is around it.
 pub(crate) const BESIDES: f64 = 1.0;
 
-/// What a pilot has seen of a term.
+/// Variance and cost of a term, as a pilot has measured them.
 #[derive(Clone, Debug)]
-pub(crate) struct Observed {
+pub(crate) struct TermStatistics {
     /// Of one sample, per derivative.
     pub(crate) variance: Vec<f64>,
     /// Rays of one sample.
@@ -40,32 +40,36 @@ pub(crate) struct Observed {
 
 /// Boundary samples to each path.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Split {
-    /// Looks at edges.
-    pub(crate) looks: f64,
+pub(crate) struct SampleBudget {
+    /// Edge queries.
+    pub(crate) queries: f64,
     /// Of each splatted source.
     pub(crate) sources: Vec<f64>,
 }
 
-impl Split {
-    /// By what a pilot has seen of paths, of looks and of splatted sources.
-    pub(crate) fn new(paths: &Observed, looks: &Observed, sources: &[Observed]) -> Self {
-        let terms = || [paths, looks].into_iter().chain(sources);
+impl SampleBudget {
+    /// By what a pilot has seen of paths, of queries and of splatted sources.
+    pub(crate) fn new(
+        paths: &TermStatistics,
+        queries: &TermStatistics,
+        sources: &[TermStatistics],
+    ) -> Self {
+        let terms = || [paths, queries].into_iter().chain(sources);
         let all: Vec<f64> =
             (0..paths.variance.len()).map(|p| terms().map(|term| term.variance[p]).sum()).collect();
-        let share = |term: &Observed| -> f64 {
+        let share = |term: &TermStatistics| -> f64 {
             let parts = term.variance.iter().zip(&all);
             parts.map(|(v, all)| if *all > 0.0 { v / all } else { 0.0 }).sum()
         };
         let own = share(paths) / (paths.rays + BESIDES);
-        let ratio = |term: &Observed| {
+        let ratio = |term: &TermStatistics| {
             let other = share(term) / (term.rays + BESIDES);
             // Without noise of either there is nothing to choose.
             let ratio = if other == 0.0 && own == 0.0 { 1.0 } else { Real::sqrt(other / own) };
             let [fewest, most] = RANGE;
             ratio.clamp(if term.even { FEWEST_EVEN } else { fewest }, most)
         };
-        Self { looks: ratio(looks), sources: sources.iter().map(ratio).collect() }
+        Self { queries: ratio(queries), sources: sources.iter().map(ratio).collect() }
     }
 }
 
@@ -73,28 +77,28 @@ impl Split {
 mod tests {
     use super::*;
 
-    fn observed(variance: &[f64], cost: f64) -> Observed {
-        Observed { variance: variance.to_vec(), rays: cost - BESIDES, even: false }
+    fn observed(variance: &[f64], cost: f64) -> TermStatistics {
+        TermStatistics { variance: variance.to_vec(), rays: cost - BESIDES, even: false }
     }
 
-    /// Less work than by any other split.
+    /// Less work than by any other budget.
     #[test]
     fn work_is_least() {
         let terms = [(2.0, 10.0), (0.5, 20.0), (3.0, 30.0)];
-        let [paths, looks, source] = terms.map(|(v, c)| observed(&[v], c));
-        let split = Split::new(&paths, &looks, core::slice::from_ref(&source));
+        let [paths, queries, source] = terms.map(|(v, c)| observed(&[v], c));
+        let budget = SampleBudget::new(&paths, &queries, core::slice::from_ref(&source));
         let work = |r: [f64; 3]| {
             let of = |f: &dyn Fn(f64, f64, f64) -> f64| -> f64 {
                 terms.iter().zip(r).map(|((v, c), r)| f(*v, *c, r)).sum()
             };
             of(&|v, _, r| v / r) * of(&|_, c, r| c * r)
         };
-        let best = work([1.0, split.looks, split.sources[0]]);
+        let best = work([1.0, budget.queries, budget.sources[0]]);
         let least: f64 = terms.iter().map(|(v, c)| Real::sqrt(v * c)).sum();
-        assert!((best / (least * least) - 1.0).abs() < 1e-12, "{split:?}");
+        assert!((best / (least * least) - 1.0).abs() < 1e-12, "{budget:?}");
         for factor in [0.8, 1.25] {
-            assert!(work([1.0, factor * split.looks, split.sources[0]]) > 1.002 * best);
-            assert!(work([1.0, split.looks, factor * split.sources[0]]) > 1.002 * best);
+            assert!(work([1.0, factor * budget.queries, budget.sources[0]]) > 1.002 * best);
+            assert!(work([1.0, budget.queries, factor * budget.sources[0]]) > 1.002 * best);
         }
         assert!(work([1.0, 1.0, 1.0]) > 1.02 * best);
     }
@@ -102,18 +106,18 @@ mod tests {
     #[test]
     fn derivatives_count_alike() {
         // What the second one lacks in noise is a matter of its unit.
-        let [paths, looks] = [[1.0, 3e-6], [3.0, 1e-6]].map(|v| observed(&v, 10.0));
-        let split = Split::new(&paths, &looks, &[]);
-        assert!((split.looks - 1.0).abs() < 1e-12, "{split:?}");
+        let [paths, queries] = [[1.0, 3e-6], [3.0, 1e-6]].map(|v| observed(&v, 10.0));
+        let budget = SampleBudget::new(&paths, &queries, &[]);
+        assert!((budget.queries - 1.0).abs() < 1e-12, "{budget:?}");
     }
 
     #[test]
     fn what_is_not_seen_is_not_forgotten() {
-        let [paths, looks] = [[1.0], [0.0]].map(|v| observed(&v, 10.0));
-        assert_eq!(Split::new(&paths, &looks, &[]).looks, RANGE[0]);
-        assert_eq!(Split::new(&looks, &paths, &[]).looks, RANGE[1]);
-        assert_eq!(Split::new(&looks, &looks, &[]).looks, 1.0);
-        let even = Observed { even: true, ..looks };
-        assert_eq!(Split::new(&paths, &even, &[]).looks, FEWEST_EVEN);
+        let [paths, queries] = [[1.0], [0.0]].map(|v| observed(&v, 10.0));
+        assert_eq!(SampleBudget::new(&paths, &queries, &[]).queries, RANGE[0]);
+        assert_eq!(SampleBudget::new(&queries, &paths, &[]).queries, RANGE[1]);
+        assert_eq!(SampleBudget::new(&queries, &queries, &[]).queries, 1.0);
+        let even = TermStatistics { even: true, ..queries };
+        assert_eq!(SampleBudget::new(&paths, &even, &[]).queries, FEWEST_EVEN);
     }
 }
