@@ -1,12 +1,9 @@
 //! A binary tree over boxes, one to a leaf, from which the wide tree is made.
 //!
 //! Built top down by the binned surface area heuristic (Wald 2007, "On fast Construction of
-//! SAH-based Bounding Volume Hierarchies"); with `obvhs` only down to sets that it can take.
+//! SAH-based Bounding Volume Hierarchies"); with `obvhs` only down to sets small enough for it.
 
 use alloc::vec::Vec;
-
-#[cfg(feature = "obvhs")]
-use ::obvhs::bvh2::Bvh2;
 
 use super::frame::Box32;
 #[cfg(feature = "obvhs")]
@@ -66,8 +63,7 @@ impl BinaryTree {
             nodes[index].bounds = union(boxes, range);
             if count > 1 {
                 #[cfg(feature = "obvhs")]
-                if let Some(tree) = ploc.as_mut().and_then(|p| p.build(boxes, range)) {
-                    graft(&mut nodes, index, &tree, boxes, range);
+                if ploc.as_mut().is_some_and(|p| p.grow(&mut nodes, index, boxes, range)) {
                     continue;
                 }
                 let left = split(boxes, &centers, range, depth) as u32;
@@ -86,33 +82,6 @@ impl BinaryTree {
     /// The nodes, the root first and children after their parents.
     pub(super) fn nodes(&self) -> &[Node] {
         &self.nodes
-    }
-}
-
-/// Puts in a node's place the tree over its primitives, which that tree names by place in the range.
-#[cfg(feature = "obvhs")]
-fn graft(nodes: &mut Vec<Node>, root: usize, tree: &Bvh2, boxes: &[Box32], range: &mut [u32]) {
-    let members = range.to_vec();
-    let begin = nodes[root].first;
-    let mut placed = 0;
-    let mut open = alloc::vec![(0, root)];
-    while let Some((from, to)) = open.pop() {
-        let node = &tree.nodes[from];
-        let first = node.first_index as usize;
-        if node.is_leaf() {
-            let prim = members[first];
-            range[placed] = prim;
-            let first = begin + placed as u32;
-            nodes[to] = Node { bounds: boxes[prim as usize], first, count: 1 };
-            placed += 1;
-        } else {
-            let aabb = node.aabb();
-            let bounds = Box32 { min: aabb.min.into(), max: aabb.max.into() };
-            let child = nodes.len();
-            nodes[to] = Node { bounds, first: child as u32, count: 0 };
-            nodes.extend([nodes[to]; 2]);
-            open.extend([(first + 1, child + 1), (first, child)]);
-        }
     }
 }
 

@@ -18,6 +18,7 @@ use ::obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use ::obvhs::bvh2::{Bvh2, DEFAULT_MAX_STACK_DEPTH};
 use ::obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
+use super::binary::Node;
 use super::frame::Box32;
 
 /// Most boxes of a set. Trees over fewer are no worse: what is cut first is cut well.
@@ -45,9 +46,43 @@ impl Ploc {
         Self { clustering, reinsertion, slow: false }
     }
 
-    /// The tree over those of the boxes whose numbers are given, one to a leaf, which it names by
-    /// place in that list.
-    pub(super) fn build(&mut self, boxes: &[Box32], numbers: &[u32]) -> Option<Bvh2> {
+    /// Gives a node that has those primitives the tree over them and brings them in its order; false
+    /// where that might take long, and nothing is changed.
+    pub(super) fn grow(
+        &mut self,
+        nodes: &mut Vec<Node>,
+        root: usize,
+        boxes: &[Box32],
+        prims: &mut [u32],
+    ) -> bool {
+        let Some(tree) = self.build(boxes, prims) else { return false };
+        let unordered = prims.to_vec();
+        let begin = nodes[root].first;
+        let mut placed = 0;
+        let mut open = alloc::vec![(0, root)];
+        while let Some((from, to)) = open.pop() {
+            let node = &tree.nodes[from];
+            let first = node.first_index as usize;
+            if node.is_leaf() {
+                let prim = unordered[first];
+                prims[placed] = prim;
+                let first = begin + placed as u32;
+                nodes[to] = Node { bounds: boxes[prim as usize], first, count: 1 };
+                placed += 1;
+            } else {
+                let aabb = node.aabb();
+                let bounds = Box32 { min: aabb.min.into(), max: aabb.max.into() };
+                let child = nodes.len();
+                nodes[to] = Node { bounds, first: child as u32, count: 0 };
+                nodes.extend([nodes[to]; 2]);
+                open.extend([(first + 1, child + 1), (first, child)]);
+            }
+        }
+        true
+    }
+
+    /// The tree over some of the boxes, one to a leaf, which it names by place among their numbers.
+    fn build(&mut self, boxes: &[Box32], numbers: &[u32]) -> Option<Bvh2> {
         if self.slow || numbers.len() > MOST {
             return None;
         }
