@@ -72,10 +72,11 @@ pub enum ObjErrorKind {
 /// All groups and objects become one mesh; of the statements, `v`, `vn` and `f` are read and the others
 /// (texture coordinates, materials, points, lines, smoothing groups) passed over. Polygons are
 /// triangulated as [`triangulate`](crate::triangulate()) does. Vertices no face uses are left out and vertices with
-/// several normals split; [`Mesh::source_vertices`] keeps the file's order.
+/// several normals split; [`Mesh::source_vertices`] keeps the file's order. Faces may name vertices
+/// that come further down.
 ///
 /// # Errors
-/// For the first line that does not say what it should, and for a file without faces.
+/// For a line that does not say what it should, and for a file without faces.
 pub fn load_obj(bytes: &[u8], name: &str) -> Result<Mesh, ObjError> {
     let fail = |(line, kind)| ObjError { file: name.to_string(), line, kind };
     let mut lines = LogicalLines { rest: bytes, next: 1 };
