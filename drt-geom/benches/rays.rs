@@ -1,11 +1,11 @@
-//! Rays per second, in ratios of one run.
+//! Rays per second and build times, in ratios of one run.
 //!
 //! `cargo bench -p drt-geom --features obj --bench rays -- [MESH.obj] [--peer PROGRAM] [--only NAME]`
 //!
 //! Without a mesh, a bumpy sphere of 82 000 triangles. Contenders take turns on the same short
 //! batches of rays, and each row gives the medians over the batches, so that what else the machine
-//! does meanwhile weighs little. The references are the portable walk, and a peer if there is one: a
-//! program that is given the paths of two files, the triangles (a `u64` count, then nine `f64`
+//! does meanwhile weighs little. The references are the tree by our own builder, the portable walk, and
+//! a peer if there is one: a program that is given the paths of two files, the triangles (a `u64` count, then nine `f64`
 //! each) and the rays (a count, then origin, direction and end), and answers each line
 //! `closest|any FIRST COUNT` with the seconds these rays took and how many of them hit something.
 
@@ -16,22 +16,22 @@ use std::path::Path;
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Instant;
 
-use drt_geom::{Hit, Mesh, Ray, Skip, TriangleBvh, procedural};
+use drt_geom::{BvhBuilder, Hit, Mesh, Ray, Skip, TriangleBvh, procedural};
 use drt_math::{Rng, Vec3, vec3};
 
 /// Rays of a batch: less than a millisecond, so that most batches are not interrupted.
 const BATCH: usize = 1_000;
 const BATCHES: usize = 400;
+const BUILDS: usize = 15;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let options = Options::parse()?;
     let triangles = mesh(options.mesh.as_deref())?.soup();
-    let start = Instant::now();
     let bvh = TriangleBvh::build(&triangles)?;
-    let built = start.elapsed().as_secs_f64();
-    let portable = bvh.clone().portable();
-    println!("{} triangles, built in {:.0} ms", triangles.len(), built * 1e3);
-    println!("rays                  Mrays/s  to portable   to peer   hits");
+    let binned = TriangleBvh::build_by(BvhBuilder::Binned, &triangles)?;
+    let others = [&binned, &bvh.clone().portable()];
+    build_times(&triangles)?;
+    println!("rays                  Mrays/s  to binned  to portable   to peer   hits");
     for (name, rays) in ray_sets(&bvh) {
         if options.only.as_ref().is_some_and(|only| !name.contains(only.as_str())) {
             continue;
@@ -41,11 +41,28 @@ fn main() -> Result<(), Box<dyn Error>> {
             None => None,
         };
         for query in [Query::Closest, Query::Any, Query::Crossings] {
-            let row = measure(query, &rays, &bvh, &portable, peer.as_mut())?;
+            let row = measure(query, &rays, &bvh, others, peer.as_mut())?;
             println!("{name:10} {:9} {row}", query.name());
         }
     }
-    nearest(&bvh, &portable);
+    nearest(&bvh, others);
+    Ok(())
+}
+
+fn build_times(triangles: &[[Vec3; 3]]) -> Result<(), Box<dyn Error>> {
+    let timed = |builder| {
+        let start = Instant::now();
+        black_box(TriangleBvh::build_by(builder, triangles)?);
+        Ok::<_, Box<dyn Error>>(start.elapsed().as_secs_f64())
+    };
+    let (mut own, mut to_binned) = (vec![], vec![]);
+    for _ in 0..BUILDS {
+        let seconds = timed(BvhBuilder::default())?;
+        own.push(seconds * 1e3);
+        to_binned.push(timed(BvhBuilder::Binned)? / seconds);
+    }
+    let (count, own, to_binned) = (triangles.len(), median(own), median(to_binned));
+    println!("{count} triangles, built in {own:.1} ms, to binned {to_binned:.3}");
     Ok(())
 }
 
@@ -146,7 +163,7 @@ fn measure(
     query: Query,
     rays: &[Ray],
     bvh: &TriangleBvh,
-    portable: &TriangleBvh,
+    others: [&TriangleBvh; 2],
     mut peer: Option<&mut Peer>,
 ) -> Result<String, Box<dyn Error>> {
     let mut hits = Vec::new();
@@ -155,11 +172,13 @@ fn measure(
         let hit = query.run(bvh, batch, &mut hits);
         (start.elapsed().as_secs_f64(), hit)
     };
-    let (mut own, mut to_portable, mut to_peer, mut found) = (vec![], vec![], vec![], 0);
+    let (mut own, mut to_others, mut to_peer, mut found) = (vec![], [vec![], vec![]], vec![], 0);
     for (i, batch) in rays.chunks(BATCH).enumerate() {
         let (seconds, hit) = timed(bvh, batch);
         own.push(batch.len() as f64 / seconds * 1e-6);
-        to_portable.push(timed(portable, batch).0 / seconds);
+        for (ratios, other) in to_others.iter_mut().zip(others) {
+            ratios.push(timed(other, batch).0 / seconds);
+        }
         found += hit;
         if let Some(peer) = peer.as_mut().filter(|_| !matches!(query, Query::Crossings)) {
             to_peer.push(peer.seconds(query, i * BATCH, batch.len())? / seconds);
@@ -167,14 +186,15 @@ fn measure(
     }
     let ratio = |r: Vec<f64>| if r.is_empty() { "-".into() } else { format!("{:.3}", median(r)) };
     let hit_rate = found as f64 / rays.len() as f64;
-    let (own, to_portable, to_peer) = (median(own), ratio(to_portable), ratio(to_peer));
-    Ok(format!("{own:8.2} {to_portable:>12} {to_peer:>9}   {hit_rate:.3}"))
+    let ([to_binned, to_portable], to_peer) = (to_others.map(ratio), ratio(to_peer));
+    let own = median(own);
+    Ok(format!("{own:8.2} {to_binned:>10} {to_portable:>12} {to_peer:>9}   {hit_rate:.3}"))
 }
 
-fn nearest(bvh: &TriangleBvh, portable: &TriangleBvh) {
+fn nearest(bvh: &TriangleBvh, others: [&TriangleBvh; 2]) {
     let bounds = bvh.bounds();
     let mut rng = Rng::new(2, 0, 0);
-    let (mut own, mut to_portable) = (vec![], vec![]);
+    let (mut own, mut to_others) = (vec![], [vec![], vec![]]);
     for _ in 0..BATCHES {
         let point = |_| {
             let u = vec3(rng.next_f64(), rng.next_f64(), rng.next_f64()) * 2.0 - Vec3::splat(1.0);
@@ -190,9 +210,12 @@ fn nearest(bvh: &TriangleBvh, portable: &TriangleBvh) {
         };
         let seconds = timed(bvh);
         own.push(points.len() as f64 / seconds * 1e-6);
-        to_portable.push(timed(portable) / seconds);
+        for (ratios, other) in to_others.iter_mut().zip(others) {
+            ratios.push(timed(other) / seconds);
+        }
     }
-    println!("points     nearest   {:8.2} {:12.3}", median(own), median(to_portable));
+    let (own, [to_binned, to_portable]) = (median(own), to_others.map(median));
+    println!("points     nearest   {own:8.2} {to_binned:10.3} {to_portable:12.3}");
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

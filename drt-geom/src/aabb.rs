@@ -19,8 +19,11 @@ impl Aabb {
 
     /// The smallest box around some points.
     #[must_use]
-    pub fn around(points: impl IntoIterator<Item = Vec3>) -> Self {
-        points.into_iter().fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
+    pub fn around(points: impl IntoIterator<Item = impl Into<Vec3>>) -> Self {
+        points
+            .into_iter()
+            .map(Into::into)
+            .fold(Self::EMPTY, |b, p| Self { min: b.min.min(p), max: b.max.max(p) })
     }
     /// The smallest box around two boxes.
     #[must_use]

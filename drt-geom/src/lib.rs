@@ -33,7 +33,7 @@ pub use io::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
 pub use io::{TetFileError, TetFileErrorKind, load_tet_mesh, read_medit, read_tetgen};
 pub use mesh::{Mesh, MeshError};
 pub use query::{
-    BvhError, ClosestPoint, Hit, Ray, Registers, Skip, TriangleBvh, Work, nearest_point,
+    BvhBuilder, BvhError, ClosestPoint, Hit, Ray, Registers, Skip, TriangleBvh, Work, nearest_point,
 };
 pub use tet::{
     ConformityError, SurfacePlace, TetLocator, TetMesh, TetMeshError, TetPoint, TetVertexOrigin,

@@ -1,15 +1,16 @@
-//! Every query, by the machine's own instructions and by portable ones, against each triangle asked alone: the same hits, bit for bit.
+//! Every query, in trees by each builder and by portable instructions, against each triangle asked alone: the same hits, bit for bit.
 
 mod common;
 
 use common::{BruteForce, direction, point, soup};
-use drt_geom::{Hit, Ray, Skip, TriangleBvh};
+use drt_geom::{BvhBuilder, Hit, Ray, Skip, TriangleBvh};
 use drt_math::{Rng, Vec3, vec3};
 
 fn assert_agreement(triangles: &[[Vec3; 3]], rays: impl Iterator<Item = Ray>) -> usize {
     let brute = BruteForce::new(triangles);
-    let trees =
-        [TriangleBvh::build(triangles).unwrap(), TriangleBvh::build(triangles).unwrap().portable()];
+    let built = TriangleBvh::build(triangles).unwrap();
+    let binned = TriangleBvh::build_by(BvhBuilder::Binned, triangles).unwrap();
+    let trees = [built.clone().portable(), built, binned];
     let mut out = Vec::new();
     let mut total = 0;
     for ray in rays {

@@ -147,3 +147,23 @@ fn stored_meshes_come_back_and_are_checked() {
     let json = serde_json::to_string(&topology).unwrap();
     assert_eq!(serde_json::from_str::<Topology>(&json).unwrap(), topology);
 }
+
+#[test]
+fn points_may_be_those_of_glam() {
+    use drt_geom::{Aabb, Ray, Skip, TriangleBvh, nearest_point};
+    use drt_math::glam::DVec3;
+
+    let corners = vec![DVec3::X, DVec3::Y, DVec3::Z];
+    let mesh = Mesh::new(corners.clone(), vec![[0, 1, 2]]).unwrap();
+    assert_eq!(mesh, Mesh::new(vec![Vec3::X, Vec3::Y, Vec3::Z], vec![[0, 1, 2]]).unwrap());
+    let smooth = mesh.clone().with_normals(vec![DVec3::ONE; 3]).unwrap();
+    assert!(smooth.normals.is_some());
+    assert_eq!(Aabb::around(corners.clone()), Aabb::around(mesh.positions.clone()));
+
+    let bvh = TriangleBvh::of(&mesh).unwrap();
+    let hit = bvh.closest(&Ray::new(DVec3::ZERO, [1.0; 3]), Skip::NOTHING).unwrap();
+    assert!((hit.t - 1.0 / 3.0).abs() < 1e-15);
+    assert!(bvh.any(&Ray::segment([0.0; 3], DVec3::ONE), Skip::NOTHING, |_| true));
+    let nearest = bvh.closest_point(DVec3::ZERO).unwrap().point;
+    assert_eq!(nearest, nearest_point([corners[0], corners[1], corners[2]], Vec3::ZERO));
+}

@@ -73,18 +73,42 @@ fn concave_polygons_are_cut_right() {
     assert_eq!(m.surface_area(), 1.5);
 }
 
+#[test]
+fn what_is_not_read_is_passed_over() {
+    let m = load(
+        "# \u{e9}\nv 0 0 0 0\nv 1 0 0 2\nl 7 8\nv 0 1 0 0.5 0.5 0.5\nv 5 5 5 red\n\
+         g x\nf 1 2/1 \\\n 3\no y\nf -4 -3 -2 # 9\nusemtl z\nf 3 2 5\nv 0 0 1\n",
+    )
+    .unwrap();
+    assert_eq!(m.positions, [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z]);
+    assert_eq!(m.triangles, [[0, 1, 2], [0, 1, 2], [2, 1, 3]]);
+    assert_eq!((m.source_vertices, m.source_vertex_count), (Some(vec![0, 1, 2, 4]), 5));
+    let bytes = b"o \xff\xfe\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3 # \xff\n";
+    assert_eq!(load_obj(bytes, "latin").unwrap().triangles, [[0, 1, 2]]);
+}
+
 type Expected = fn(&ObjErrorKind) -> bool;
 
 #[test]
 fn wrong_lines_are_named() {
     let four = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
-    let cases: [(&str, usize, Expected); 18] = [
+    let cases: [(&str, usize, Expected); 24] = [
         ("f 1 2 3 9", 5, |k| matches!(k, ObjErrorKind::MissingItem { index: 9, count: 4, .. })),
         ("f 1 2 -5", 5, |k| matches!(k, ObjErrorKind::MissingItem { index: -5, .. })),
         ("f 1 2 0", 5, |k| matches!(k, ObjErrorKind::BadCorner(_))),
         ("f 1 2 3//1", 5, |k| matches!(k, ObjErrorKind::MissingItem { what: "normal", .. })),
         ("f 1", 5, |k| *k == PolygonError::TooFewCorners(1).into()),
         ("f", 5, |k| *k == PolygonError::TooFewCorners(0).into()),
+        ("f 1 2 3/x/1", 5, |k| matches!(k, ObjErrorKind::BadCorner(_))),
+        ("vn 0 0 1\nf 1 2 3//2", 6, |k| matches!(k, ObjErrorKind::MissingItem { index: 2, .. })),
+        ("vn 0 0 1\nf 1 2 3//-2", 6, |k| matches!(k, ObjErrorKind::MissingItem { count: 1, .. })),
+        ("vn 0 0 1\nf 1 2 3//0", 6, |k| matches!(k, ObjErrorKind::BadCorner(_))),
+        ("f 1 2 3//6148914691236517206\nvn 0 0 1", 5, |k| {
+            matches!(k, ObjErrorKind::MissingItem { what: "normal", .. })
+        }),
+        ("f 1 2 -4\nf 1 2 -5\nv 1 1 1", 6, |k| {
+            matches!(k, ObjErrorKind::MissingItem { index: -5, count: 4, .. })
+        }),
         ("f 1 2 x", 5, |k| matches!(k, ObjErrorKind::BadCorner(_))),
         ("f 1 2 3/1/1/1", 5, |k| matches!(k, ObjErrorKind::BadCorner(_))),
         ("f 1 2 //1", 5, |k| matches!(k, ObjErrorKind::BadCorner(_))),

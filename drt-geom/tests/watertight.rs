@@ -102,7 +102,7 @@ fn rays_along_axes_hit() {
                     for (k, d) in d.into_iter().enumerate() {
                         let mut from = [p.x, p.y, p.z];
                         from[(k + 2) % 3] = -100.0 * z;
-                        let ray = Ray::new(from.into(), d);
+                        let ray = Ray::new(from, d);
                         let mut count = 0;
                         bvh.all(&ray, Skip::NOTHING, |_| count += 1);
                         assert!(count >= 2, "{ray:?}");

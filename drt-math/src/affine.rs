@@ -18,12 +18,13 @@ impl Affine {
 
     /// A translation.
     #[must_use]
-    pub fn translation(t: Vec3) -> Self {
-        Self { linear: Mat3::IDENTITY, translation: t }
+    pub fn translation(t: impl Into<Vec3>) -> Self {
+        Self { linear: Mat3::IDENTITY, translation: t.into() }
     }
     /// A linear map about a fixed point.
     #[must_use]
-    pub fn about(linear: Mat3, pivot: Vec3) -> Self {
+    pub fn about(linear: impl Into<Mat3>, pivot: impl Into<Vec3>) -> Self {
+        let (linear, pivot) = (linear.into(), pivot.into());
         Self { linear, translation: pivot - linear * pivot }
     }
     /// Image of a point.

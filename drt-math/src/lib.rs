@@ -30,6 +30,8 @@ pub use change::{ValueChange, ValueMap};
 pub use discrete::{AliasTable, CdfTable};
 pub use dual::Dual;
 pub use frame::Frame;
+/// The version whose types convert to and from those here.
+pub use glam;
 pub use mat3::Mat3;
 pub use real::Real;
 pub use rgb::{Rgb, RgbVec};

@@ -20,8 +20,8 @@ impl Ray {
     /// The points `origin + t dir`, `0 < t < t_max`.
     #[inline]
     #[must_use]
-    pub fn new(origin: Vec3, dir: Vec3, t_max: f64) -> Self {
-        Self { origin, dir, t_max }
+    pub fn new(origin: impl Into<Vec3>, dir: impl Into<Vec3>, t_max: f64) -> Self {
+        Self { origin: origin.into(), dir: dir.into(), t_max }
     }
     /// The point at distance t.
     #[inline]

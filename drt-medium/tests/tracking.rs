@@ -316,7 +316,7 @@ proptest! {
             2 => dir = vec3(dir.x, dir.y, 1e-17),
             _ => {}
         }
-        let ray = Ray::new(origin.into(), dir.normalize(), 2.0);
+        let ray = Ray::new(origin, dir.normalize(), 2.0);
         let grid = medium.grid().expect("a grid");
         let mut end = None;
         let mut covered = 0.0;

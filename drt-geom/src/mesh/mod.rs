@@ -95,7 +95,11 @@ impl Mesh {
     ///
     /// # Errors
     /// When a coordinate is not finite or a triangle names a missing vertex.
-    pub fn new(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
+    pub fn new(
+        positions: Vec<impl Into<Vec3>>,
+        triangles: Vec<[u32; 3]>,
+    ) -> Result<Self, MeshError> {
+        let positions: Vec<Vec3> = positions.into_iter().map(Into::into).collect();
         for (what, count) in [("vertices", positions.len()), ("triangles", triangles.len())] {
             if count >= crate::NONE as usize {
                 return Err(MeshError::TooLarge { what, count });
@@ -118,7 +122,8 @@ impl Mesh {
     ///
     /// # Errors
     /// When their number differs from the vertices' or one has no direction.
-    pub fn with_normals(mut self, mut normals: Vec<Vec3>) -> Result<Self, MeshError> {
+    pub fn with_normals(mut self, normals: Vec<impl Into<Vec3>>) -> Result<Self, MeshError> {
+        let mut normals: Vec<Vec3> = normals.into_iter().map(Into::into).collect();
         self.expect_per_vertex("normals", normals.len())?;
         for (vertex, n) in normals.iter_mut().enumerate() {
             // Unit normals stay as they are, bit for bit.

@@ -1,16 +1,33 @@
 //! A binary tree over boxes, one to a leaf, from which the wide tree is made.
 //!
 //! Built top down by the binned surface area heuristic (Wald 2007, "On fast Construction of
-//! SAH-based Bounding Volume Hierarchies").
+//! SAH-based Bounding Volume Hierarchies"); with `obvhs` only down to sets small enough for it.
 
 use alloc::vec::Vec;
 
 use super::frame::Box32;
+#[cfg(feature = "obvhs")]
+use super::ploc::Ploc;
 
 const BINS: usize = 16;
 
 /// Below this depth nodes are halved by count, so that no input makes a deep tree.
 const SAH_DEPTH: usize = 60;
+
+/// What builds a tree. Queries give the same hits, bit for bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BvhBuilder {
+    /// Top down by the binned surface area heuristic; needs no `std`.
+    #[cfg_attr(not(feature = "obvhs"), default)]
+    Binned,
+    /// As [`BvhBuilder::Binned`] down to sets of at most 1024 triangles, each then built by `obvhs`
+    /// bottom up, by clustering and reinsertion. From the first set on over which `obvhs` is slow, as
+    /// it is where many boxes coincide or are stacked, it is `Binned` all the way down.
+    #[cfg(feature = "obvhs")]
+    #[default]
+    Obvhs,
+}
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
@@ -29,7 +46,12 @@ pub(super) struct BinaryTree {
 
 impl BinaryTree {
     /// Builds the tree over the boxes and returns it with the boxes' numbers in the tree's order.
-    pub(super) fn build(boxes: &[Box32]) -> (Self, Vec<u32>) {
+    pub(super) fn build(boxes: &[Box32], builder: BvhBuilder) -> (Self, Vec<u32>) {
+        #[cfg(feature = "obvhs")]
+        let mut ploc = (builder == BvhBuilder::Obvhs).then(Ploc::new);
+        #[cfg(not(feature = "obvhs"))]
+        let BvhBuilder::Binned = builder;
+
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
         let centers: Vec<_> = boxes.iter().map(Box32::doubled_center).collect();
         let mut nodes = Vec::with_capacity(boxes.len());
@@ -40,6 +62,10 @@ impl BinaryTree {
             let range = &mut order[first as usize..(first + count) as usize];
             nodes[index].bounds = union(boxes, range);
             if count > 1 {
+                #[cfg(feature = "obvhs")]
+                if ploc.as_mut().is_some_and(|p| p.grow(&mut nodes, index, boxes, range)) {
+                    continue;
+                }
                 let left = split(boxes, &centers, range, depth) as u32;
                 let child = nodes.len();
                 for (first, count) in [(first, left), (first + left, count - left)] {

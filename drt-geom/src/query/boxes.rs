@@ -6,6 +6,7 @@ use core::ops::{ControlFlow, Range};
 use drt_math::Vec3;
 
 use super::Walk;
+use super::binary::BvhBuilder;
 use super::collapse::collapse;
 use super::frame::{Box32, BoxFrame};
 use super::lanes::{Lanes, Machine, Vector};
@@ -50,7 +51,7 @@ impl BoxTree {
         if boxes.is_empty() {
             return (built, Vec::new());
         }
-        let collapsed = collapse(&boxes, BLOCK);
+        let collapsed = collapse(&boxes, BLOCK, BvhBuilder::Binned);
         built.tree = Some(WideTree::new(&collapsed, |b| {
             let Range { start, end } = collapsed.blocks[b];
             let members = &collapsed.order[start as usize..end as usize];

@@ -3,6 +3,7 @@ use alloc::vec::Vec;
 use drt_math::Vec3;
 
 use super::TriangleBvh;
+use super::binary::BvhBuilder;
 use super::block::{BLOCK, Block, Twin};
 use super::collapse::collapse;
 use super::frame::{Box32, BoxFrame};
@@ -50,6 +51,14 @@ impl TriangleBvh {
     /// # Errors
     /// When a coordinate is not finite or beyond 1e100, or there are too many triangles.
     pub fn build(triangles: &[[Vec3; 3]]) -> Result<Self, BvhError> {
+        Self::build_by(BvhBuilder::default(), triangles)
+    }
+
+    /// Builds the tree with a given builder.
+    ///
+    /// # Errors
+    /// As [`TriangleBvh::build`].
+    pub fn build_by(builder: BvhBuilder, triangles: &[[Vec3; 3]]) -> Result<Self, BvhError> {
         if triangles.len() > MOST {
             return Err(BvhError::TooMany { count: triangles.len() });
         }
@@ -62,6 +71,7 @@ impl TriangleBvh {
             blocks: Vec::new(),
             twins: Vec::with_capacity(repeats.len()),
             triangle_count: triangles.len(),
+            builder,
             machine: Machine::detect(),
         };
         if leaves.is_empty() {
@@ -69,7 +79,7 @@ impl TriangleBvh {
         }
         let boxes: Vec<_> =
             leaves.iter().map(|&i| bvh.frame.enclose(&triangles[i as usize])).collect();
-        let collapsed = collapse(&boxes, BLOCK);
+        let collapsed = collapse(&boxes, BLOCK, builder);
         // Where each triangle that has repetitions is.
         let mut places = alloc::vec![NONE; if repeats.is_empty() { 0 } else { triangles.len() }];
         for members in &collapsed.blocks {
@@ -123,7 +133,8 @@ impl TriangleBvh {
         let held: usize = self.blocks.iter().map(Block::len).sum();
         let same_set = held == triangles.len() && triangles.iter().all(has_area);
         let (true, Some(tree)) = (same_set, &mut self.tree) else {
-            *self = Self { machine: self.machine, ..Self::build(triangles)? };
+            let fresh = Self::build_by(self.builder, triangles)?;
+            *self = Self { machine: self.machine, ..fresh };
             return Ok(());
         };
         self.bounds = bounds;

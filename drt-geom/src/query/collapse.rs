@@ -4,7 +4,7 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::binary::BinaryTree;
+use super::binary::{BinaryTree, BvhBuilder};
 use super::frame::Box32;
 use super::wide::{LEAF, NO_CHILD, WIDTH};
 
@@ -37,8 +37,8 @@ pub(super) struct Collapsed {
 }
 
 /// The wide tree over the boxes (at least one) with up to `block_size` in a block.
-pub(super) fn collapse(boxes: &[Box32], block_size: usize) -> Collapsed {
-    let (tree, order) = BinaryTree::build(boxes);
+pub(super) fn collapse(boxes: &[Box32], block_size: usize, builder: BvhBuilder) -> Collapsed {
+    let (tree, order) = BinaryTree::build(boxes, builder);
     let subtrees = costs(&tree, block_size);
     let mut nodes = alloc::vec![[NO_CHILD; WIDTH]];
     let mut blocks = Vec::new();

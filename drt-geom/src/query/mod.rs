@@ -20,12 +20,15 @@ mod ends;
 mod frame;
 mod lanes;
 mod nearest;
+#[cfg(feature = "obvhs")]
+mod ploc;
 mod ray;
 mod registers;
 mod watertight;
 mod wide;
 mod winding;
 
+pub use binary::BvhBuilder;
 pub(crate) use boxes::BoxTree;
 pub use build::BvhError;
 pub use nearest::{ClosestPoint, nearest_point};
@@ -53,6 +56,7 @@ pub struct TriangleBvh {
     blocks: Vec<Block>,
     twins: Vec<Twin>,
     triangle_count: usize,
+    builder: BvhBuilder,
     machine: Machine,
 }
 

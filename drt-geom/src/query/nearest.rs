@@ -27,13 +27,17 @@ impl TriangleBvh {
     /// The point of the surface nearest to `p`; `None` without triangles or for a `p` that is not
     /// finite.
     #[must_use]
-    pub fn closest_point(&self, p: Vec3) -> Option<ClosestPoint> {
+    pub fn closest_point(&self, p: impl Into<Vec3>) -> Option<ClosestPoint> {
         self.closest_point_within(p, f64::INFINITY)
     }
 
     /// [`TriangleBvh::closest_point`] if its distance is less than `radius`: the less, the faster.
     #[must_use]
-    pub fn closest_point_within(&self, p: Vec3, radius: f64) -> Option<ClosestPoint> {
+    pub fn closest_point_within(&self, p: impl Into<Vec3>, radius: f64) -> Option<ClosestPoint> {
+        self.nearest(p.into(), radius)
+    }
+
+    fn nearest(&self, p: Vec3, radius: f64) -> Option<ClosestPoint> {
         if !p.is_finite() || radius.is_nan() {
             return None;
         }
@@ -102,8 +106,8 @@ impl Nearest<'_> {
 
 /// The point of a triangle nearest to `p`.
 #[must_use]
-pub fn nearest_point(triangle: [Vec3; 3], p: Vec3) -> Vec3 {
-    foot_of(triangle.map(|v| v.to_array()), p).point.map(one).into()
+pub fn nearest_point(triangle: [impl Into<Vec3>; 3], p: impl Into<Vec3>) -> Vec3 {
+    foot_of(triangle.map(|v| v.into().to_array()), p.into()).point.map(one).into()
 }
 
 /// The point of a triangle nearest to another.

@@ -21,12 +21,13 @@ pub struct Ray {
 impl Ray {
     /// The ray without end.
     #[must_use]
-    pub const fn new(origin: Vec3, dir: Vec3) -> Self {
-        Self { origin, dir, t_max: f64::INFINITY }
+    pub fn new(origin: impl Into<Vec3>, dir: impl Into<Vec3>) -> Self {
+        Self { origin: origin.into(), dir: dir.into(), t_max: f64::INFINITY }
     }
     /// The open segment between two points.
     #[must_use]
-    pub fn segment(from: Vec3, to: Vec3) -> Self {
+    pub fn segment(from: impl Into<Vec3>, to: impl Into<Vec3>) -> Self {
+        let (from, to) = (from.into(), to.into());
         Self { origin: from, dir: to - from, t_max: 1.0 }
     }
     /// The point at parameter `t`.

@@ -14,7 +14,11 @@ impl TriangleBvh {
     /// Counts signed crossings along a ray, which is exact also through edges and vertices.
     /// Meaningless for a `p` on the surface and for open meshes.
     #[must_use]
-    pub fn winding_number(&self, p: Vec3) -> i32 {
+    pub fn winding_number(&self, p: impl Into<Vec3>) -> i32 {
+        self.winding(p.into())
+    }
+
+    fn winding(&self, p: Vec3) -> i32 {
         let Some(probe) = self.probe(&Ray::new(p, DIRECTION), Skip::NOTHING) else { return 0 };
         let mut sum = 0;
         self.visit(&probe, |_, crossing| {
@@ -26,7 +30,7 @@ impl TriangleBvh {
 
     /// Whether `p` is inside: the surface winds around it.
     #[must_use]
-    pub fn inside(&self, p: Vec3) -> bool {
-        self.winding_number(p) != 0
+    pub fn inside(&self, p: impl Into<Vec3>) -> bool {
+        self.winding(p.into()) != 0
     }
 }
