@@ -151,7 +151,7 @@ impl AdjointSink for Contraction<'_> {
             return;
         }
         let mesh = &self.world.scene.shapes[point.shape as usize].mesh;
-        let element = drt_motion::SurfaceElement::new(mesh, &point.at);
+        let element = drt_motion::surface::SurfaceElement::new(mesh, &point.at);
         for (p, motion) in motions {
             let jet = motion.jet_of(&element);
             self.rates[*p] += adjoint.u.dot(jet.u)

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use drt_geom::Mesh;
 use drt_math::Vec3;
-use drt_motion::TetrahedralField;
+use drt_motion::interior::TetrahedralField;
 
 use crate::Error;
 use crate::scene::Scene;

@@ -11,7 +11,8 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
 use drt_medium::{CoefficientRates, DepthEstimate};
-use drt_motion::{JetAdjoint, VolumeAdjoint};
+use drt_motion::surface::JetAdjoint;
+use drt_motion::volume::VolumeAdjoint;
 
 use crate::boundary::Receiver;
 use crate::emitter::EmitterGradient;

@@ -14,10 +14,11 @@ use core::ops::ControlFlow;
 use drt_geom::{Mesh, TetrahedralizeInput, tetrahedralize};
 use drt_math::{Affine, Mat3, Vec3};
 use drt_medium::{Flow, FlowBasis, GridMedium, Medium, NodeWeights, Ray, SpaceMap};
-use drt_motion::{
-    Applied, Carrier, Deformation, DeformationError, GeometryChange, MotionError, MovedFrame,
-    SurfaceMotion, TetrahedralField, move_affine, move_mesh,
-};
+use drt_motion::deformation::{Deformation, DeformationError};
+use drt_motion::interior::{Carrier, TetrahedralField};
+use drt_motion::parameter::Applied;
+use drt_motion::surface::{MovedFrame, move_affine, move_mesh};
+use drt_motion::{GeometryChange, MotionError, SurfaceMotion};
 
 use crate::inside::MARGIN;
 

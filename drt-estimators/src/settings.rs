@@ -4,7 +4,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_geom::TetMesh;
-use drt_motion::TetVelocities;
+use drt_motion::interior::TetVelocities;
 
 /// How derivatives are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

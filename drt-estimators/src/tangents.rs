@@ -7,10 +7,9 @@ use core::ops::AddAssign;
 
 use drt_math::{Affine, Rgb};
 use drt_medium::{MediumChange, MediumTangent};
-use drt_motion::{
-    Applied, Change, GeometryChange, Parameter, PropertyChange, SmoothNormals, SurfaceMotion,
-    change_value, geometry_changes, move_affine, move_mesh,
-};
+use drt_motion::parameter::{Applied, change_value, geometry_changes};
+use drt_motion::surface::{SmoothNormals, move_affine, move_mesh};
+use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotion};
 
 use crate::Error;
 use crate::emitter::{Emitter, EmitterTangent};
@@ -411,7 +410,7 @@ impl Apply<'_> {
     fn properties(
         &self,
         target: Target,
-        mut change: impl FnMut(&str, &drt_motion::ChangedValue) -> Result<(), String>,
+        mut change: impl FnMut(&str, &drt_motion::parameter::ChangedValue) -> Result<(), String>,
     ) -> Result<(), Error> {
         let mut done: Vec<&str> = Vec::new();
         for (p, _, effect) in effects_on(self.parameters, target) {
@@ -423,7 +422,8 @@ impl Apply<'_> {
                 return Err(self.fail(p, target, "only the grids of a medium have voxels"));
             }
             done.push(&c.property);
-            let changes = drt_motion::property_changes(self.parameters, &target, &c.property);
+            let changes =
+                drt_motion::parameter::property_changes(self.parameters, &target, &c.property);
             let changed = change_value(&changes, None, self.parameters.len())
                 .map_err(|e| self.fail(e.parameter, target, e.cause))?;
             change(&c.property, &changed).map_err(|reason| self.fail(p, target, reason))?;

@@ -1,3 +1,5 @@
+//! Velocity and divergence at points of a volume.
+
 use drt_math::{Affine, Vec3};
 
 /// The velocity field inside a medium for one parameter, at the parameters' current values.

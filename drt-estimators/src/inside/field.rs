@@ -5,10 +5,10 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::{Affine, Vec3};
-use drt_motion::{
-    Blend, SiteWeight, TetVelocities, TetrahedralField, TetrahedralPlace, VolumeJet, VolumeMotion,
-    blend_jet,
+use drt_motion::interior::{
+    Blend, SiteWeight, TetVelocities, TetrahedralField, TetrahedralPlace, blend_jet,
 };
+use drt_motion::volume::{VolumeJet, VolumeMotion};
 
 use super::mean_value::{self, MeanValue};
 

@@ -14,7 +14,8 @@ use alloc::vec::Vec;
 
 use drt_geom::{Aabb, Mesh, procedural};
 use drt_math::{Affine, Mat3, Vec3};
-use drt_motion::{MeanValueField, MeanValueVelocities, MeanValueWeights, VolumeJet};
+use drt_motion::mean_value::{MeanValueField, MeanValueVelocities, MeanValueWeights};
+use drt_motion::volume::VolumeJet;
 
 use super::parts::Part;
 use super::tetrahedra::MARGIN;

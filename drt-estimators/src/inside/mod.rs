@@ -21,7 +21,7 @@ use alloc::vec::Vec;
 use core::fmt::Display;
 
 use drt_math::{Affine, Vec3};
-use drt_motion::Blend;
+use drt_motion::interior::Blend;
 
 use crate::Error;
 use crate::kept::Kept;

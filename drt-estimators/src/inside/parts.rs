@@ -4,7 +4,8 @@ use alloc::vec::Vec;
 
 use drt_geom::TriangleBvh;
 use drt_math::{Affine, Vec3};
-use drt_motion::{Site, SurfaceMotion, triangle_field};
+use drt_motion::SurfaceMotion;
+use drt_motion::interior::{Site, triangle_field};
 
 use super::unusable;
 use crate::Error;

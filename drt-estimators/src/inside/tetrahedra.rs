@@ -8,7 +8,8 @@ use drt_geom::{
     TetrahedralizeInput, tetrahedralize,
 };
 use drt_math::Vec3;
-use drt_motion::{Carrier, SurfaceMotion, TetVelocities, TetrahedralField};
+use drt_motion::SurfaceMotion;
+use drt_motion::interior::{Carrier, TetVelocities, TetrahedralField};
 
 use super::parts::Part;
 use super::unusable;

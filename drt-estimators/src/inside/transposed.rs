@@ -15,7 +15,8 @@
 use alloc::vec::Vec;
 
 use drt_math::Vec3;
-use drt_motion::{TetrahedralField, VolumeAdjoint};
+use drt_motion::interior::TetrahedralField;
+use drt_motion::volume::VolumeAdjoint;
 
 use super::parts::{self, Anchor};
 use super::{adjacency, asked_for, tetrahedra};

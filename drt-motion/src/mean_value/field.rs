@@ -8,8 +8,8 @@ use super::hierarchy::{self, Cluster};
 use super::moments::{Derivatives, Moments};
 use super::triangle::{Triangle, View};
 use super::{BEYOND, MeanValueWeight, orientation, unit_of};
-use crate::VolumeJet;
 use crate::error::Cause;
+use crate::volume::VolumeJet;
 
 /// Distance over radius up to which a cluster counts by its parts alone.
 const NEAR: f64 = 2.5;
@@ -160,10 +160,7 @@ impl MeanValueField {
             let (expected, found) = (self.given, corners.len());
             return Err(Cause::TriangleCount { expected, found });
         }
-        crate::geometry::finite(
-            corners.iter().flatten().all(|v| v.is_finite()),
-            "a vertex velocity",
-        )?;
+        crate::error::finite(corners.iter().flatten().all(|v| v.is_finite()), "a vertex velocity")?;
         let turned = |p: &Placed| {
             let [a, b, c] = corners[p.source as usize];
             if p.swapped { [a, c, b] } else { [a, b, c] }

@@ -5,7 +5,10 @@ use std::sync::Arc;
 use drt_estimators::{GivenTetrahedra, InsideKind, Scene};
 use drt_geom::{Mesh, TetMesh, TetVertexOrigin, Tetrahedralization, TetrahedralizeInput};
 use drt_math::{Rng, Vec3, vec3};
-use drt_motion::{Carrier, Parameter, TetrahedralField, geometry_changes, move_mesh};
+use drt_motion::Parameter;
+use drt_motion::interior::{Carrier, TetrahedralField};
+use drt_motion::parameter::geometry_changes;
+use drt_motion::surface::move_mesh;
 
 use crate::Result;
 
