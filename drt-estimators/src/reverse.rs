@@ -17,9 +17,9 @@ use drt_motion::volume::VolumeAdjoint;
 use crate::boundary::Receiver;
 use crate::emitter::EmitterGradient;
 use crate::film::BATCHES;
-use crate::inside::{InsideGradients, TransposedInsides};
 use crate::interior::{PathSink, PixelSampler};
 use crate::kept::Kept;
+use crate::medium_motion::{InteriorGradients, ReverseMediumMotions};
 use crate::parallel::Pool;
 use crate::pixels::{Pass, Sampler};
 use crate::prepared::Prepared;
@@ -45,9 +45,9 @@ use crate::{Error, tangents};
 /// An inside stays static, and the flux through shapes that are wanted is added, which is right for
 /// every motion too, where no paths have vertices on what is wanted (null and black surfaces), where
 /// shapes pass through each other, so that there are no tetrahedra, and where [`Settings::insides`]
-/// asks for [`InsideKind::Static`](crate::InsideKind::Static).
+/// asks for [`InteriorMotion::Static`](crate::InteriorMotion::Static).
 ///
-/// If [`Settings::insides`] asks for [`InsideKind::Tetrahedral`](crate::InsideKind::Tetrahedral), given
+/// If [`Settings::insides`] asks for [`InteriorMotion::Tetrahedral`](crate::InteriorMotion::Tetrahedral), given
 /// or not, these are taken, without velocities given along with them. For the same seed forward mode
 /// with the same settings, without [`guiding`](Settings::guiding), is then the exact transpose, unless shapes touch that move differently: no
 /// field follows both, and the flux through what is left behind is added here. Other kinds of insides
@@ -110,8 +110,8 @@ fn gradient_of_share(
         interest.moving_emitters[e] &= lit.by(&emitter.item.emitter);
     }
     let insides = match settings.estimator {
-        EstimatorKind::Radiative => TransposedInsides::at_rest(&world),
-        _ => TransposedInsides::new(&world, &interest, &settings.insides)?,
+        EstimatorKind::Radiative => ReverseMediumMotions::at_rest(&world),
+        _ => ReverseMediumMotions::new(&world, &interest, &settings.insides)?,
     };
     interest.volumes = insides.volumes();
     let need = |w: &bool| if *w { MediumNeed::Vertices } else { MediumNeed::Nothing };
@@ -165,7 +165,7 @@ fn interest(scene: &Scene, wanted: &[Target]) -> Interest {
 struct Reverse<'a> {
     prepared: &'a Prepared,
     interest: &'a Interest,
-    insides: &'a TransposedInsides,
+    insides: &'a ReverseMediumMotions,
     settings: &'a Settings,
     adjoint: &'a [Rgb],
 }
@@ -173,7 +173,7 @@ struct Reverse<'a> {
 /// What a piece of work adds to the gradient.
 struct Sums {
     scene: SceneGradient,
-    insides: InsideGradients,
+    insides: InteriorGradients,
 }
 
 impl Sums {
@@ -264,7 +264,7 @@ impl Reverse<'_> {
 struct Scatter<'a> {
     world: &'a World,
     interest: &'a Interest,
-    insides: &'a TransposedInsides,
+    insides: &'a ReverseMediumMotions,
     weights: Rgb,
     sums: Sums,
 }

@@ -13,7 +13,7 @@ use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotio
 
 use crate::Error;
 use crate::emitter::{Emitter, EmitterTangent};
-use crate::riding::{Ride, RideError};
+use crate::grid_deformation::{GridDeformation, GridDeformationError};
 use crate::scene::{Scene, Target};
 use crate::sensor::{Sensor, SensorTangent};
 use crate::surface::{BsdfChange, BsdfTangent, Property};
@@ -249,14 +249,15 @@ impl Apply<'_> {
         match (self.deforming_leader(target)?, medium.grid()) {
             (Some(leader), Some(grid)) => {
                 let shape = &self.given.shapes[leader].mesh;
-                let ride = Ride::new(grid, shape, &changes, n).map_err(|e| match e {
-                    RideError::Motion(e) => self.fail(e.parameter, target, e.cause),
-                    RideError::Shape(p, reason) => self.fail(p, target, reason),
-                })?;
+                let deformation =
+                    GridDeformation::new(grid, shape, &changes, n).map_err(|e| match e {
+                        GridDeformationError::Motion(e) => self.fail(e.parameter, target, e.cause),
+                        GridDeformationError::Shape(p, reason) => self.fail(p, target, reason),
+                    })?;
                 for (p, t) in tangents.iter_mut().enumerate() {
-                    t.flows.extend(Some(ride.flow(p)).filter(|flow| !flow.is_zero()));
+                    t.flows.extend(Some(deformation.flow(p)).filter(|flow| !flow.is_zero()));
                 }
-                ride.carry(&mut medium).map_err(|e| self.fail(first, target, e))?;
+                deformation.apply(&mut medium).map_err(|e| self.fail(first, target, e))?;
             }
             // Surfaces bound it; it has nothing of its own that could deform.
             (Some(_), None) if medium.homogeneous().is_some() => {}

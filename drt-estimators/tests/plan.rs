@@ -4,7 +4,7 @@ mod common;
 
 use common::*;
 use drt_estimators::{
-    Counters, EstimatorKind, InsideKind, Plan, Rendering, Scene, Session, Settings, Target,
+    Counters, EstimatorKind, InteriorMotion, Plan, Rendering, Scene, Session, Settings, Target,
     Unattended, gradient,
 };
 use drt_math::{Rgb, ValueChange};
@@ -142,7 +142,7 @@ fn insides_follow_what_they_can() {
 #[test]
 fn reverse_mode_skips_as_much() {
     let adjoint = vec![Rgb::ONE; (FILM[0] * FILM[1]) as usize];
-    let under = |scene: &Scene, wanted: &[Target], insides: Vec<(usize, InsideKind)>| {
+    let under = |scene: &Scene, wanted: &[Target], insides: Vec<(usize, InteriorMotion)>| {
         let settings = Settings { spp: 8, insides, ..Settings::default() };
         gradient(scene, wanted, &settings, &adjoint, &Unattended).expect("a valid scene")
     };
@@ -160,7 +160,7 @@ fn reverse_mode_skips_as_much() {
     // Insides follow; where they stay, the flux is needed.
     let g = run(&fog(), &[Target::Shape(2)]);
     assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples == 0);
-    let g = under(&fog(), &[Target::Shape(2)], vec![(0, InsideKind::Static)]);
+    let g = under(&fog(), &[Target::Shape(2)], vec![(0, InteriorMotion::Static)]);
     assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples > 0);
     // So it is where surfaces pass through each other, or touch.
     for (at, why) in [(-1.1, "pass through"), (-1.0, "touch")] {

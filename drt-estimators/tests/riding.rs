@@ -5,7 +5,7 @@ mod common;
 use std::sync::Arc;
 
 use common::{moves, parameter, smoke};
-use drt_estimators::{Error, InsideKind, Rendering, Scene, Session, Settings, Unattended};
+use drt_estimators::{Error, InteriorMotion, Rendering, Scene, Session, Settings, Unattended};
 use drt_math::{Affine, Mat3, Vec3, vec3};
 use drt_motion::{Change, Effect, GeometryChange, Parameter};
 
@@ -26,7 +26,7 @@ fn by_vertex(scene: &Scene, field: impl Fn(Vec3) -> Vec3) -> Effect {
 }
 
 fn prepared(scene: &Scene, parameters: &[Parameter]) -> Result<Session, Error> {
-    let insides = vec![(0, InsideKind::Static)];
+    let insides = vec![(0, InteriorMotion::Static)];
     let settings = Settings { spp: 32, insides, ..Settings::default() };
     Session::new(scene, parameters, &settings)
 }

@@ -3,7 +3,7 @@
 //! Nothing scatters at the moving surfaces of most: next to one that does, an inside at rest has the
 //! right mean, and no variance (theory sheet §14.1).
 
-use drt_estimators::InsideKind;
+use drt_estimators::InteriorMotion;
 use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, RoughDielectric};
 use drt_geom::procedural::{bumpy_sphere, cube, icosphere};
@@ -47,12 +47,12 @@ impl Draft {
         let chosen = draft.way("plan", Vec::new());
         let draft = draft.right(chosen);
         draft
-            .by("blend", &InsideKind::Blend)
-            .by("tetrahedra", &InsideKind::Tetrahedral(None))
-            .by("mean values", &InsideKind::MeanValue)
+            .by("blend", &InteriorMotion::Blend)
+            .by("tetrahedra", &InteriorMotion::Tetrahedral(None))
+            .by("mean values", &InteriorMotion::MeanValue)
     }
 
-    fn way(&self, name: &'static str, insides: Vec<(usize, InsideKind)>) -> Way {
+    fn way(&self, name: &'static str, insides: Vec<(usize, InteriorMotion)>) -> Way {
         Way { name, insides, parameter: self.parameter.clone() }
     }
 
@@ -62,18 +62,18 @@ impl Draft {
     }
 
     /// With all media moving by one kind.
-    fn by(self, name: &'static str, kind: &InsideKind) -> Self {
+    fn by(self, name: &'static str, kind: &InteriorMotion) -> Self {
         let media = 0..self.case.scene.media.len();
         let way = self.way(name, media.map(|m| (m, kind.clone())).collect());
         self.right(way)
     }
 
     fn at_rest(self) -> Self {
-        self.by("static with flux", &InsideKind::Static)
+        self.by("static with flux", &InteriorMotion::Static)
     }
 
     fn affine(self) -> Self {
-        self.by("affine", &InsideKind::Affine)
+        self.by("affine", &InteriorMotion::Affine)
     }
 
     /// With tetrahedra of our own around the first medium: those right that are stirred, those wrong
@@ -115,7 +115,7 @@ impl Draft {
         let glows = now.emission.to_array().into_iter().zip(now.albedo.to_array());
         let dims = glows.map(|(e, albedo)| -divergence * e / (1.0 - albedo));
         let dims: Vec<f64> = dims.collect();
-        let mut way = self.way("divergence dropped", vec![(0, InsideKind::Affine)]);
+        let mut way = self.way("divergence dropped", vec![(0, InteriorMotion::Affine)]);
         way.parameter.effects.extend([
             changes(&id, "albedo", ValueChange::Multiply(-divergence)),
             changes(&id, "emission", ValueChange::Add(Rgb::new(dims[0], dims[1], dims[2]))),

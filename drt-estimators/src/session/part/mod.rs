@@ -9,9 +9,9 @@ use super::{Control, FinishedTile};
 use crate::allocation;
 use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, Blocks, PixelFilm, SplatFilm};
-use crate::inside;
 use crate::interior::{AlongRays, Looks, PixelSampler};
 use crate::kept::Kept;
+use crate::medium_motion::MediumMotions;
 use crate::parallel::Pool;
 use crate::pixels::Filling;
 use crate::plan::Plan;
@@ -77,8 +77,10 @@ impl Part {
         let mut motion = None;
         if !tangents.names.is_empty() {
             let insides = match settings.estimator {
-                EstimatorKind::Radiative => inside::wholes(&world, &tangents, &settings.insides),
-                _ => inside::plan(&world, &tangents, &settings.insides, kept)?,
+                EstimatorKind::Radiative => {
+                    MediumMotions::affine(&world, &tangents, &settings.insides)
+                }
+                _ => MediumMotions::plan(&world, &tangents, &settings.insides, kept)?,
             };
             motion = Some(Motion::new(tangents, insides));
         }
