@@ -7,7 +7,7 @@
 //! with `--features tetgen` the given tetrahedra are TetGen's.
 
 use drt_tests::Result;
-use drt_tests::insides::{Case, Table, cases, examine};
+use drt_tests::insides::{Case, Table, cases, examine, sheets};
 
 fn check(case: Result<Case>, noise: f64) {
     let mut case = case.unwrap();
@@ -21,26 +21,27 @@ fn check(case: Result<Case>, noise: f64) {
 }
 
 macro_rules! insides {
-    ($($case:ident: $noise:literal;)*) => {
+    ($($set:ident::$case:ident: $noise:literal;)*) => {
         mod short {
-            $(#[test] fn $case() { super::check(super::cases::$case(), $noise); })*
+            $(#[test] fn $case() { super::check(super::$set::$case(), $noise); })*
         }
         mod precise {
             $(#[test] #[ignore = "minutes"] fn $case() {
-                super::check(super::cases::$case(), 0.01);
+                super::check(super::$set::$case(), 0.01);
             })*
         }
     };
 }
 
 insides! {
-    black_body_in_fog: 0.06;
-    body_around_the_eye: 0.1;
-    bent_slab: 0.05;
-    stretched_slab: 0.04;
-    glass_ball_moves: 0.08;
-    glass_ball_deforms: 0.08;
-    turning_grid: 0.06;
-    blob: 0.04;
-    nested: 0.08;
+    cases::black_body_in_fog: 0.06;
+    cases::body_around_the_eye: 0.1;
+    cases::bent_slab: 0.05;
+    cases::stretched_slab: 0.04;
+    cases::glass_ball_moves: 0.08;
+    cases::glass_ball_deforms: 0.08;
+    cases::turning_grid: 0.06;
+    cases::blob: 0.04;
+    cases::nested: 0.08;
+    sheets::room_of_sheets: 0.08;
 }

@@ -8,6 +8,9 @@
 //! ```text
 //! u(x) = u_c + w (v(x) - u_c),   w = t² (3 - 2t),   t = |x - c| / R < 1.
 //! ```
+//!
+//! Surfaces that are not closed, even with their rims joined, are interpolated from both sides, and enclosed
+//! by a box at rest.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -15,7 +18,8 @@ use alloc::vec::Vec;
 use drt_geom::{Aabb, Mesh, procedural};
 use drt_math::{Affine, Mat3, Vec3};
 
-use super::{InteriorError, Surroundings, enclosing_box};
+use super::{InteriorError, Surroundings, enclosing_box, rims};
+use crate::error::Cause;
 use crate::mean_value::{MeanValueField, MeanValueVelocities, MeanValueWeights};
 use crate::volume::VolumeJet;
 
@@ -23,6 +27,8 @@ use crate::volume::VolumeJet;
 #[derive(Clone, Debug)]
 pub struct Interpolation {
     field: Arc<MeanValueField>,
+    /// Triangles of the surfaces and the box.
+    triangles: usize,
     /// Cameras and point lights, and how far they are from anything else.
     points: Vec<(Vec3, f64)>,
 }
@@ -46,8 +52,8 @@ pub struct InterpolationValues {
 impl Interpolation {
     pub(super) fn new(around: &Surroundings<'_>) -> Result<Self, InteriorError> {
         let mut triangles = Vec::new();
-        for surface in &around.surfaces {
-            triangles.extend(surface.mesh.soup());
+        for mesh in rims::joined(&around.surfaces) {
+            triangles.extend(mesh.soup());
         }
         let points = around.positions();
         let distance = |x: Vec3| {
@@ -56,12 +62,20 @@ impl Interpolation {
             own.chain(others).fold(f64::INFINITY, f64::min)
         };
         let points = points.iter().map(|x| (*x, distance(*x))).collect();
-        if around.unbounded {
-            let bounds = enclosing_box(around.surfaces.iter().map(|s| &**s.mesh));
+        let own = triangles.len();
+        let bounds = enclosing_box(around.surfaces.iter().map(|s| &**s.mesh));
+        if !bounds.is_empty() {
             triangles.extend(box_mesh(&bounds).soup());
         }
-        let field = MeanValueField::new(&triangles).map_err(InteriorError::MeanValue)?;
-        Ok(Self { field: Arc::new(field), points })
+        let closed = if around.unbounded { &triangles } else { &triangles[..own] };
+        let (field, triangles) = match MeanValueField::new(closed) {
+            Err(Cause::OpenSurface { .. } | Cause::OneSidedSurface | Cause::FlatSurface) => {
+                (MeanValueField::two_sided(&triangles), triangles.len())
+            }
+            field => (field, closed.len()),
+        };
+        let field = Arc::new(field.map_err(InteriorError::MeanValue)?);
+        Ok(Self { field, triangles, points })
     }
 
     /// The field of a parameter.
@@ -77,7 +91,7 @@ impl Interpolation {
             corners.extend(mesh.triangles.iter().map(|t| t.map(at)));
         }
         // The enclosing box rests.
-        corners.resize(self.field.triangle_count(), [Vec3::ZERO; 3]);
+        corners.resize(self.triangles, [Vec3::ZERO; 3]);
         let surfaces = self.field.velocities(&corners).map_err(InteriorError::Velocities)?;
         let points = around.point_velocities(parameter);
         Ok(InterpolationVelocities { field: Arc::clone(&self.field), surfaces, points })

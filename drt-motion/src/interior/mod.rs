@@ -61,6 +61,7 @@ mod field;
 mod interpolation;
 mod plan;
 mod reverse;
+mod rims;
 mod sites;
 mod surroundings;
 mod tetrahedra;
@@ -73,6 +74,7 @@ pub use field::{BasisValues, InteriorBasis, InteriorVelocity};
 pub use interpolation::{Interpolation, InterpolationValues, InterpolationVelocities};
 pub use plan::InteriorPlan;
 pub use reverse::{ActiveInputs, ReverseInteriorPlan};
+pub use rims::WELDED;
 pub use surroundings::{InteriorPoint, SurroundingSurface, Surroundings, enclosing_box};
 pub use tetrahedral::{Carrier, TetVelocities, TetrahedralField, TetrahedralPlace};
 

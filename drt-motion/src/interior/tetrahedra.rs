@@ -9,12 +9,14 @@ use drt_geom::{
 
 use super::{
     Carrier, GivenTetrahedra, InteriorError, MARGIN, Surroundings, TetVelocities, TetrahedralField,
+    rims,
 };
 
 impl Surroundings<'_> {
     /// Fills the space around and inside all surfaces, up to the enclosing box, with tetrahedra.
     pub(super) fn tetrahedra(&self) -> Result<TetrahedralField, InteriorError> {
-        let surfaces: Vec<&Mesh> = self.surfaces.iter().map(|s| &**s.mesh).collect();
+        let joined = rims::joined(&self.surfaces);
+        let surfaces: Vec<&Mesh> = joined.iter().map(|mesh| &**mesh).collect();
         let points = self.positions();
         let input = TetrahedralizeInput { surfaces: &surfaces, points: &points, margin: MARGIN };
         let mut made = tetrahedralize(&input).map_err(InteriorError::Unfilled)?;

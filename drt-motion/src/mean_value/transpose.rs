@@ -100,6 +100,7 @@ impl MeanValueField {
                     self.triangles[t as usize].triangle.add_moments(
                         unit,
                         cluster.middle,
+                        self.kernel,
                         &mut piece,
                     );
                     *g += Vec3::from([0, 1, 2].map(|axis| whole[axis].dot(&piece)));

@@ -29,20 +29,27 @@ pub struct Case {
     pub right: Vec<Way>,
     /// Wrong ones.
     pub wrong: Vec<Way>,
+    /// The half step of finite differences, where these are to agree too.
+    pub step: Option<f64>,
 }
 
 /// A case under construction.
-struct Draft {
+pub(super) struct Draft {
     case: Case,
     parameter: Parameter,
 }
 
 impl Draft {
     /// With the plan's choice, a blend, tetrahedra, and mean value coordinates.
-    fn new(name: &'static str, set: Set, effects: impl IntoIterator<Item = Effect>) -> Self {
+    pub(super) fn new(
+        name: &'static str,
+        set: Set,
+        effects: impl IntoIterator<Item = Effect>,
+    ) -> Self {
         let effects = effects.into_iter().collect();
         let parameter = Parameter { name: name.into(), value: 0.0, effects };
-        let case = Case { name, scene: set.scene, right: Vec::new(), wrong: Vec::new() };
+        let case =
+            Case { name, scene: set.scene, right: Vec::new(), wrong: Vec::new(), step: None };
         let draft = Self { case, parameter };
         let chosen = draft.way("plan", Vec::new());
         let draft = draft.right(chosen);
@@ -50,6 +57,16 @@ impl Draft {
             .by("blend", &InteriorMotion::Blend)
             .by("tetrahedra", &InteriorMotion::Tetrahedral(None))
             .by("mean values", &InteriorMotion::MeanValue)
+    }
+
+    pub(super) fn case(self) -> Case {
+        self.case
+    }
+
+    /// With finite differences of this half step.
+    pub(super) fn differences(mut self, step: f64) -> Self {
+        self.case.step = Some(step);
+        self
     }
 
     fn way(&self, name: &'static str, insides: Vec<(usize, InteriorMotion)>) -> Way {
@@ -68,11 +85,11 @@ impl Draft {
         self.right(way)
     }
 
-    fn at_rest(self) -> Self {
+    pub(super) fn at_rest(self) -> Self {
         self.by("static with flux", &InteriorMotion::Static)
     }
 
-    fn affine(self) -> Self {
+    pub(super) fn affine(self) -> Self {
         self.by("affine", &InteriorMotion::Affine)
     }
 
@@ -133,12 +150,12 @@ fn sun() -> Emitter {
     Emitter::Directional { direction: vec3(-0.7, -1.0, 0.6), irradiance: Rgb::new(4.0, 5.0, 6.0) }
 }
 
-fn fog(sigma_t: [f64; 3], albedo: [f64; 3]) -> Result<Homogeneous> {
+pub(super) fn fog(sigma_t: [f64; 3], albedo: [f64; 3]) -> Result<Homogeneous> {
     Ok(Homogeneous::new(sigma_t.into(), albedo.into(), Rgb::ZERO)?)
 }
 
 /// A camera with fewer pixels than the check matrix needs.
-fn seen(origin: Vec3, target: Vec3, fov: f64, depth: u32) -> Result<Set> {
+pub(super) fn seen(origin: Vec3, target: Vec3, fov: f64, depth: u32) -> Result<Set> {
     let mut set = Set::new(origin, target, fov, depth)?;
     let sensor = &mut set.scene.sensors[0].item.sensor;
     *sensor = sensor.with_film([6; 2])?;

@@ -6,6 +6,7 @@
 
 pub mod cases;
 mod examine;
+pub mod sheets;
 mod stirred;
 
 pub use cases::Case;

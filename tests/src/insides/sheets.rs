@@ -1,0 +1,94 @@
+//! Rooms of open sheets full of fog: six rectangles whose rims meet up to rounding, rectangles with gaps
+//! between them, and a room with a wall missing.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use drt_estimators::{MediumBoundary, Surrounding};
+use drt_geom::Mesh;
+use drt_geom::procedural::{icosphere, rectangle};
+use drt_math::{Rgb, Vec3, vec3};
+use drt_medium::Phase;
+use drt_motion::Effect;
+
+use super::cases::{Case, Draft, fog, seen};
+use crate::Result;
+use crate::matrix::Set;
+use crate::matrix::effects::translate;
+use crate::matrix::set::{at, diffuse, placed};
+
+/// Half the room's sides.
+const HALF: Vec3 = vec3(1.1, 0.9, 1.3);
+
+const ONE: Vec3 = vec3(1.0, 1.0, 1.0);
+const SKEW: Vec3 = vec3(0.3, 1.0, 0.2);
+
+/// Where the camera is in the room, and what it looks at.
+const EYE: Vec3 = vec3(0.15, -0.1, 1.05);
+const TARGET: Vec3 = vec3(-0.1, 0.05, 0.0);
+
+/// The six walls with their fronts to the room, `part` of their full sides long. Each is turned into
+/// its place by itself, so that vertices that should be one differ by some ulps.
+fn walls(part: f64) -> Vec<(&'static str, Mesh)> {
+    let turned = |axis: Vec3, angle: f64| {
+        let sheet = at(&rectangle(), vec3(part, part, 1.0), -Vec3::Z);
+        let side = placed(&sheet, ONE, axis, angle, Vec3::ZERO);
+        // Askew and back again.
+        let askew = placed(&side, ONE, SKEW, 0.7, vec3(0.1, 0.2, 0.3));
+        let back = at(&askew, ONE, -vec3(0.1, 0.2, 0.3));
+        at(&placed(&back, ONE, SKEW, -0.7, Vec3::ZERO), HALF, Vec3::ZERO)
+    };
+    vec![
+        ("back", turned(Vec3::X, 0.0)),
+        ("front", turned(Vec3::X, PI)),
+        ("floor", turned(Vec3::X, -FRAC_PI_2)),
+        ("ceiling", turned(Vec3::X, FRAC_PI_2)),
+        ("left", turned(Vec3::Y, FRAC_PI_2)),
+        ("right", turned(Vec3::Y, -FRAC_PI_2)),
+    ]
+}
+
+/// A room of some walls with a lamp, a black body, and the camera in fog. If it is open, the fog goes on
+/// outside.
+fn room(walls: Vec<(&'static str, Mesh)>, is_open: bool) -> Result<Set> {
+    let mut set = seen(EYE, TARGET, 75.0, 3)?.medium(
+        "fog",
+        fog([0.5, 0.7, 0.9], [0.9, 0.8, 0.7])?,
+        Phase::henyey_greenstein(0.3)?,
+    );
+    let outside = if is_open { "fog" } else { "" };
+    for (i, (id, mesh)) in walls.into_iter().enumerate() {
+        let grey = 0.3 + 0.1 * i as f64;
+        set =
+            set.filled(id, mesh, diffuse([grey, 0.5, 0.8 - 0.1 * i as f64]), outside, Some("fog"));
+    }
+    let lamp = placed(&rectangle(), Vec3::splat(0.4), Vec3::X, FRAC_PI_2, vec3(0.1, 0.7, 0.2));
+    let body = at(&icosphere(1), Vec3::splat(0.3), vec3(-0.2, -0.2, -0.1));
+    set = set.lamp("lamp", lamp, Rgb::new(6.0, 7.0, 8.0)).filled(
+        "body",
+        body,
+        diffuse([0.0; 3]),
+        "",
+        Some("fog"),
+    );
+    let is_lamp = set.scene.shapes.iter_mut().find(|s| s.id.as_deref() == Some("lamp"));
+    if let Some(lamp) = is_lamp {
+        lamp.boundary = Some(MediumBoundary { interior: Some(0), exterior: Some(0) });
+    }
+    set.scene.sensors[0].item.medium = Surrounding::Stated(Some(0));
+    Ok(set)
+}
+
+/// What moves the body.
+fn body_moves() -> [Effect; 1] {
+    [translate("body", vec3(0.7, 0.4, -0.3))]
+}
+
+/// A black body moves in a room of six sheets whose rims meet up to rounding.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn room_of_sheets() -> Result<Case> {
+    let draft =
+        Draft::new("body moves in a room of sheets", room(walls(1.0), false)?, body_moves());
+    Ok(draft.at_rest().differences(0.02).case())
+}
