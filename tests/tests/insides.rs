@@ -43,10 +43,10 @@ insides! {
     cases::turning_grid: 0.06;
     cases::blob: 0.04;
     cases::nested: 0.08;
-    sheets::room_of_sheets: 0.16;
-    sheets::lamp_in_room: 0.16;
-    sheets::room_with_gaps: 0.16;
-    sheets::room_without_a_wall: 0.16;
-    sheets::wall_bulges: 0.16;
-    sheets::room_moves_as_one: 0.16;
+    sheets::room_of_sheets: 0.2;
+    sheets::lamp_in_room: 0.2;
+    sheets::room_with_gaps: 0.2;
+    sheets::room_without_a_wall: 0.2;
+    sheets::wall_bulges: 0.2;
+    sheets::room_moves_as_one: 0.2;
 }

@@ -114,7 +114,7 @@ impl Draft {
 
     /// The same, and wrong where vertices on surfaces lag behind. Next to surfaces that scatter that
     /// would hide in noise without bounds.
-    fn stirred_and_lagging(self, surfaces: &[&str], further: &[Vec3]) -> Result<Case> {
+    pub(super) fn stirred_and_lagging(self, surfaces: &[&str], further: &[Vec3]) -> Result<Case> {
         let half = further.len() as u32 / 2;
         let (mut draft, given) = self.stirred(surfaces, None, further, half)?;
         let lagging = draft.way("surfaces at half their speed", vec![given.lagging(0.5).kind()]);
@@ -163,7 +163,7 @@ pub(super) fn seen(origin: Vec3, target: Vec3, fov: f64, depth: u32) -> Result<S
 }
 
 /// Random points in a box around the origin.
-fn scattered(count: usize, half: Vec3) -> Vec<Vec3> {
+pub(super) fn scattered(count: usize, half: Vec3) -> Vec<Vec3> {
     let mut rng = Rng::new(3, 0, 0);
     let mut next = || 2.0 * rng.next_f64() - 1.0;
     (0..count).map(|_| vec3(next() * half.x, next() * half.y, next() * half.z)).collect()

@@ -11,7 +11,7 @@ use drt_math::{Rgb, Vec3, vec3};
 use drt_medium::Phase;
 use drt_motion::{Effect, GeometryChange};
 
-use super::cases::{Case, Draft, fog, seen};
+use super::cases::{Case, Draft, fog, scattered, seen};
 use crate::Result;
 use crate::matrix::Set;
 use crate::matrix::effects::{grow, translate, turn};
@@ -115,7 +115,12 @@ pub fn lamp_in_room() -> Result<Case> {
 pub fn room_with_gaps() -> Result<Case> {
     let set = room(walls(0.85), true)?;
     let draft = Draft::new("body moves between sheets with gaps", set, body_moves());
-    Ok(draft.at_rest().differences(0.02).case())
+    let draft = draft.at_rest().differences(0.02);
+    let surfaces = ["back", "front", "floor", "ceiling", "left", "right", "lamp", "body"];
+    // All below the lamp and before the body.
+    let further = scattered(16, vec3(0.7, 0.2, 0.2));
+    let further: Vec<Vec3> = further.into_iter().map(|p| p + vec3(0.0, 0.0, 0.6)).collect();
+    draft.stirred_and_lagging(&surfaces, &further)
 }
 
 /// The body moves in a room with a wall missing, in fog without end.
