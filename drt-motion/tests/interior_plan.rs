@@ -155,7 +155,7 @@ fn surfaces_that_pass_through_each_other_have_no_tetrahedra() {
     walls.push(placed(&procedural::rectangle(), 1.5, vec3(0.0, 0.0, 0.1)));
     let mut room = Room::new(walls);
     let asked = InteriorMotion::Tetrahedral(None);
-    let error = room.plan(Some(&asked)).err().expect("no tetrahedra");
+    let error = room.plan(Some(&asked)).expect_err("no tetrahedra");
     let named = error.with_names(|s| format!("wall {s}"), |p| format!("p{p}"));
     assert!(
         matches!(error, InteriorError::Unfilled(TetrahedralizeError::Intersection { .. })),

@@ -46,7 +46,7 @@ pub enum Change<T = String> {
     Geometry(GeometryChange),
     /// One of its numbers changes.
     Property(PropertyChange),
-    /// It rides along with whatever this same parameter does to the geometry of another target.
+    /// It follows whatever this same parameter does to the geometry of another target.
     Follow(T),
 }
 
