@@ -131,6 +131,40 @@ fn fields_meet_what_moves_in_rooms_of_sheets() {
 }
 
 #[test]
+fn rims_may_end_on_edges_and_faces_up_to_rounding() {
+    let sheet = |size: Vec3, at: Vec3| {
+        let linear = Mat3::diagonal(size);
+        procedural::rectangle().transform(&Affine { linear, translation: at })
+    };
+    let panels = [
+        sheet(vec3(0.3, 1.0, 1.0), vec3(-0.7, 0.0, -1.0)),
+        sheet(vec3(0.7, 1.0, 1.0), vec3(0.3, 0.0, -1.0)),
+    ];
+    let cases = [
+        ("two panels for a wall", panels.to_vec(), 1),
+        ("a partition", vec![sheet(vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, -0.6))], 0),
+        ("a partition with doors", vec![sheet(vec3(0.4, 1.0, 1.0), vec3(0.1, 0.0, -0.6))], 0),
+        ("a picture on a wall", vec![sheet(vec3(0.3, 0.2, 1.0), vec3(0.1, 0.05, -1.0))], 0),
+        ("a block on a wall", vec![placed(&procedural::cube(), 0.15, vec3(0.1, 0.1, -0.85))], 0),
+    ];
+    for (name, more, replaced) in cases {
+        let mut walls: Vec<Mesh> = sheets(1.0).into_iter().skip(replaced).collect();
+        // With roundings of their own.
+        let turn = |mesh: &Mesh, angle: f64| {
+            let linear = Mat3::rotation(vec3(0.3, 1.0, 0.2).normalize(), angle);
+            mesh.transform(&Affine { linear, translation: Vec3::ZERO })
+        };
+        walls.extend(more.iter().map(|mesh| turn(&turn(mesh, 1.1), -1.1)));
+        let room = Room::new(walls);
+        for asked in [InteriorMotion::Tetrahedral(None), InteriorMotion::MeanValue] {
+            let plan = room.plan(Some(&asked)).expect("any kind works");
+            let worst = room.worst_miss(&plan);
+            assert!(worst < 1e-4 && plan.flux_surfaces.is_empty(), "{name} {asked:?} {worst:e}");
+        }
+    }
+}
+
+#[test]
 fn one_affine_field_takes_everything() {
     let mut room = Room::new(sheets(1.0));
     let asked = Some(InteriorMotion::Affine);

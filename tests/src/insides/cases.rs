@@ -95,7 +95,7 @@ impl Draft {
 
     /// With tetrahedra of our own around the first medium: those right that are stirred, those wrong
     /// that are torn around the first of the further vertices, if any.
-    fn stirred(
+    pub(super) fn stirred(
         mut self,
         surfaces: &[&str],
         eye: Option<Vec3>,
@@ -114,7 +114,7 @@ impl Draft {
 
     /// The same, and wrong where vertices on surfaces lag behind. Next to surfaces that scatter that
     /// would hide in noise without bounds.
-    pub(super) fn stirred_and_lagging(self, surfaces: &[&str], further: &[Vec3]) -> Result<Case> {
+    fn stirred_and_lagging(self, surfaces: &[&str], further: &[Vec3]) -> Result<Case> {
         let half = further.len() as u32 / 2;
         let (mut draft, given) = self.stirred(surfaces, None, further, half)?;
         let lagging = draft.way("surfaces at half their speed", vec![given.lagging(0.5).kind()]);

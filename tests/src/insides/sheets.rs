@@ -120,7 +120,7 @@ pub fn room_with_gaps() -> Result<Case> {
     // All below the lamp and before the body.
     let further = scattered(16, vec3(0.7, 0.2, 0.2));
     let further: Vec<Vec3> = further.into_iter().map(|p| p + vec3(0.0, 0.0, 0.6)).collect();
-    draft.stirred_and_lagging(&surfaces, &further)
+    Ok(draft.stirred(&surfaces, Some(EYE), &further, 8)?.0.case())
 }
 
 /// The body moves in a room with a wall missing, in fog without end.
