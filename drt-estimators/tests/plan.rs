@@ -140,6 +140,19 @@ fn insides_follow_what_they_can() {
 }
 
 #[test]
+fn the_plan_says_why_there_are_no_tetrahedra() {
+    for (bottom, crosses) in [(-1.1, true), (-0.7, false)] {
+        let scene = fog_with_a_block(bottom, 0.5);
+        let r = under(&scene, vec![moves("block", wobble(&scene, "block", 1))]);
+        let said = r.plan.skipped.iter().find(|s| s.starts_with("tetrahedra in fog: "));
+        let names = said.is_some_and(|s| s.contains("of floor and ") && s.contains("of block"));
+        assert_eq!((said.is_some(), names), (crosses, crosses), "{}", r.plan);
+        let kind = if crosses { "blend" } else { "tetrahedral" };
+        assert_eq!(r.plan.media[0].motion[0].1, kind);
+    }
+}
+
+#[test]
 fn reverse_mode_skips_as_much() {
     let adjoint = vec![Rgb::ONE; (FILM[0] * FILM[1]) as usize];
     let under = |scene: &Scene, wanted: &[Target], insides: Vec<(usize, InteriorMotion)>| {
