@@ -18,7 +18,7 @@
 //!
 //! over all of space: as long as W takes two neighbouring values only, D is positive where W is the
 //! larger, negative where it is the smaller, and vanishes nowhere. Surfaces are therefore turned such
-//! that they alternate (see [`orientation`]): nested ones, too, bound one region, seen from both of
+//! that they alternate (see the module `orientation`): nested ones, too, bound one region, seen from both of
 //! its sides.
 //!
 //! Open surfaces, and such that pass through one another, have no such winding. For them the kernel is
