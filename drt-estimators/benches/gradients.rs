@@ -8,7 +8,7 @@
 //! mesh. The work is that sum's variance times the time, over that of the insides that stay; the
 //! largest deviation of a seed, in standard deviations, tells heavy tails.
 
-use drt_estimators::{InsideKind, Scene, Session, Settings, Target, Unattended, gradient};
+use drt_estimators::{InteriorMotion, Scene, Session, Settings, Target, Unattended, gradient};
 use drt_math::{Rgb, Vec3};
 
 mod common;
@@ -58,8 +58,8 @@ fn compare(title: &str, scene: &Scene, shape: &str) {
     let light = image.rendering().image.total.mean.sum();
     let adjoint = [Rgb::splat(1.0 / light / PIXELS); PIXELS as usize];
     let kinds = [
-        ("static", vec![(0, InsideKind::Static)]),
-        ("tetrahedral", vec![(0, InsideKind::Tetrahedral(None))]),
+        ("static", vec![(0, InteriorMotion::Static)]),
+        ("tetrahedral", vec![(0, InteriorMotion::Tetrahedral(None))]),
     ];
     let run = |kind: usize, spp, seed| -> Vec<Vec3> {
         let settings = Settings { spp, seed, insides: kinds[kind].1.clone(), ..settings.clone() };

@@ -8,7 +8,7 @@
 
 use std::time::Instant;
 
-use drt_estimators::{InsideKind, Scene, Session, Settings, Shape, Unattended};
+use drt_estimators::{InteriorMotion, Scene, Session, Settings, Shape, Unattended};
 use drt_motion::{Change, Effect, GeometryChange, Parameter};
 
 mod common;
@@ -56,11 +56,11 @@ fn deformation(scene: &Scene, id: &str) -> Parameter {
 
 fn compare(title: &str, scene: &Scene, parameter: &Parameter) {
     let kinds = [
-        ("tetrahedral", InsideKind::Tetrahedral(None)),
-        ("blend", InsideKind::Blend),
-        ("mean-value", InsideKind::MeanValue),
-        ("affine", InsideKind::Affine),
-        ("static", InsideKind::Static),
+        ("tetrahedral", InteriorMotion::Tetrahedral(None)),
+        ("blend", InteriorMotion::Blend),
+        ("mean-value", InteriorMotion::MeanValue),
+        ("affine", InteriorMotion::Affine),
+        ("static", InteriorMotion::Static),
     ];
     let mut sessions = Vec::new();
     let triangles = |s: &Shape| s.mesh.triangles.len();

@@ -17,9 +17,9 @@ use drt_estimators::{Session, Settings, Unattended};
 use drt_geom::{Mesh, TriangleBvh};
 use drt_math::{Affine, Rgb, Rng, Vec3, vec3};
 use drt_medium::Phase;
-use drt_motion::{
-    Blend, JetAdjoint, Parameter, Site, SurfaceElement, SurfaceMotion, SurfacePoint, VertexGradient,
-};
+use drt_motion::interior::{Blend, Site};
+use drt_motion::surface::{JetAdjoint, SurfaceElement, VertexGradient};
+use drt_motion::{Parameter, SurfaceMotion, SurfacePoint};
 
 mod common;
 use common::scenes::{self, Detail};

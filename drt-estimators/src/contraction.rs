@@ -5,10 +5,11 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, RgbVec, Vec3};
 use drt_medium::{CoefficientGradients, CoefficientRates, DepthEstimate, FlowPlace, MediumTangent};
 use drt_motion::SurfaceMotion;
+use drt_motion::interior::BasisValues;
 
 use crate::boundary::edges::Edge;
 use crate::emitter::EmitterGradient;
-use crate::inside::{Insides, Place};
+use crate::medium_motion::MediumMotions;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::surface::{BsdfParams, BsdfTangent};
@@ -19,18 +20,18 @@ use crate::transport::{MaterialPoint, MediumNeed, Needs, World};
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Motion {
     pub(crate) tangents: Tangents,
-    pub(crate) insides: Insides,
+    pub(crate) insides: MediumMotions,
     pub(crate) interest: Interest,
 }
 
 impl Motion {
-    pub(crate) fn new(tangents: Tangents, insides: Insides) -> Self {
+    pub(crate) fn new(tangents: Tangents, insides: MediumMotions) -> Self {
         fn some<T>(lists: &[Vec<T>]) -> Vec<bool> {
             lists.iter().map(|l| !l.is_empty()).collect()
         }
         let interest = Interest {
             shapes: some(&tangents.shapes),
-            volumes: some(&insides.volumes),
+            volumes: some(&insides.velocities),
             media: some(&tangents.media),
             grids: tangents.media.iter().map(|l| l.iter().any(|(_, t)| t.moves_grids())).collect(),
             bsdfs: some(&tangents.bsdfs),
@@ -104,7 +105,7 @@ pub(crate) struct Contraction<'a> {
     motion: &'a Motion,
     pub(crate) rates: Vec<Rgb>,
     /// What the field of an inside is like at the last point.
-    place: Place,
+    basis: BasisValues,
     /// And that of the flow of grids.
     flow: FlowPlace,
     /// By medium, the rates of what is the same everywhere in it.
@@ -122,7 +123,7 @@ impl<'a> Contraction<'a> {
             world,
             motion,
             rates: alloc::vec![Rgb::ZERO; motion.parameters()],
-            place: Place::default(),
+            basis: BasisValues::default(),
             flow: FlowPlace::default(),
             uniform: uniform.collect(),
         }
@@ -151,7 +152,7 @@ impl AdjointSink for Contraction<'_> {
             return;
         }
         let mesh = &self.world.scene.shapes[point.shape as usize].mesh;
-        let element = drt_motion::SurfaceElement::new(mesh, &point.at);
+        let element = drt_motion::surface::SurfaceElement::new(mesh, &point.at);
         for (p, motion) in motions {
             let jet = motion.jet_of(&element);
             self.rates[*p] += adjoint.u.dot(jet.u)
@@ -163,12 +164,12 @@ impl AdjointSink for Contraction<'_> {
 
     fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb) {
         let insides = &self.motion.insides;
-        let motions = &insides.volumes[medium];
-        if let Some(field) = &insides.fields[medium] {
-            field.place(x, &mut self.place);
+        let motions = &insides.velocities[medium];
+        if let Some(basis) = &insides.bases[medium] {
+            basis.evaluate(x, &mut self.basis);
         }
         for (p, motion) in motions {
-            let jet = motion.jet(x, &self.place);
+            let jet = motion.jet(x, &self.basis);
             self.rates[*p] += u.dot(jet.u) + j * jet.j_dot;
         }
     }

@@ -3,9 +3,7 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use drt_geom::Mesh;
-use drt_math::Vec3;
-use drt_motion::TetrahedralField;
+use drt_motion::interior::TetrahedraCache;
 
 use crate::Error;
 use crate::scene::Scene;
@@ -17,15 +15,7 @@ use crate::transport::Geometry;
 pub(crate) struct Kept {
     geometry: Option<Arc<Geometry>>,
     /// Per medium.
-    tetrahedra: Vec<Option<Tetrahedra>>,
-}
-
-/// Tetrahedra and what they were made from.
-#[derive(Debug)]
-struct Tetrahedra {
-    surfaces: Vec<Arc<Mesh>>,
-    points: Vec<Vec3>,
-    field: Arc<TetrahedralField>,
+    tetrahedra: Vec<TetrahedraCache>,
 }
 
 impl Kept {
@@ -36,35 +26,11 @@ impl Kept {
         Ok(geometry)
     }
 
-    /// The tetrahedra of a medium between some shapes, and with vertices at some points.
-    pub(crate) fn tetrahedra(
-        &mut self,
-        medium: usize,
-        scene: &Scene,
-        shapes: &[usize],
-        points: &[Vec3],
-        make: impl FnOnce() -> Result<TetrahedralField, Error>,
-    ) -> Result<Arc<TetrahedralField>, Error> {
-        let surfaces: Vec<Arc<Mesh>> =
-            shapes.iter().map(|s| scene.shapes[*s].mesh.clone()).collect();
+    /// The tetrahedra of a medium.
+    pub(crate) fn tetrahedra(&mut self, medium: usize) -> &mut TetrahedraCache {
         if self.tetrahedra.len() <= medium {
-            self.tetrahedra.resize_with(medium + 1, || None);
+            self.tetrahedra.resize_with(medium + 1, TetrahedraCache::default);
         }
-        if let Some(known) = &self.tetrahedra[medium]
-            && known.points == points
-            && known.surfaces.len() == surfaces.len()
-            && known.surfaces.iter().zip(&surfaces).all(|(a, b)| same_triangles(a, b))
-        {
-            return Ok(known.field.clone());
-        }
-        let field = Arc::new(make()?);
-        let points = points.to_vec();
-        self.tetrahedra[medium] = Some(Tetrahedra { surfaces, points, field: field.clone() });
-        Ok(field)
+        &mut self.tetrahedra[medium]
     }
-}
-
-/// Whether two meshes are the same but for their normals.
-pub(crate) fn same_triangles(a: &Arc<Mesh>, b: &Arc<Mesh>) -> bool {
-    Arc::ptr_eq(a, b) || (a.triangles == b.triangles && a.positions == b.positions)
 }

@@ -11,14 +11,15 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
 use drt_medium::{CoefficientRates, DepthEstimate};
-use drt_motion::{JetAdjoint, VolumeAdjoint};
+use drt_motion::surface::JetAdjoint;
+use drt_motion::volume::VolumeAdjoint;
 
 use crate::boundary::Receiver;
 use crate::emitter::EmitterGradient;
 use crate::film::BATCHES;
-use crate::inside::{InsideGradients, TransposedInsides};
 use crate::interior::{PathSink, PixelSampler};
 use crate::kept::Kept;
+use crate::medium_motion::{InteriorGradients, ReverseMediumMotions};
 use crate::parallel::Pool;
 use crate::pixels::{Pass, Sampler};
 use crate::prepared::Prepared;
@@ -44,9 +45,9 @@ use crate::{Error, tangents};
 /// An inside stays static, and the flux through shapes that are wanted is added, which is right for
 /// every motion too, where no paths have vertices on what is wanted (null and black surfaces), where
 /// shapes pass through each other, so that there are no tetrahedra, and where [`Settings::insides`]
-/// asks for [`InsideKind::Static`](crate::InsideKind::Static).
+/// asks for [`InteriorMotion::Static`](crate::InteriorMotion::Static).
 ///
-/// If [`Settings::insides`] asks for [`InsideKind::Tetrahedral`](crate::InsideKind::Tetrahedral), given
+/// If [`Settings::insides`] asks for [`InteriorMotion::Tetrahedral`](crate::InteriorMotion::Tetrahedral), given
 /// or not, these are taken, without velocities given along with them. For the same seed forward mode
 /// with the same settings, without [`guiding`](Settings::guiding), is then the exact transpose, unless shapes touch that move differently: no
 /// field follows both, and the flux through what is left behind is added here. Other kinds of insides
@@ -118,7 +119,7 @@ pub fn gradient(
 struct Component {
     prepared: Prepared,
     interest: Interest,
-    insides: TransposedInsides,
+    insides: ReverseMediumMotions,
 }
 
 impl Component {
@@ -130,8 +131,8 @@ impl Component {
             interest.moving_emitters[e] &= lit.by(&emitter.item.emitter);
         }
         let insides = match settings.estimator {
-            EstimatorKind::Radiative => TransposedInsides::at_rest(&world),
-            _ => TransposedInsides::new(&world, &interest, &settings.insides)?,
+            EstimatorKind::Radiative => ReverseMediumMotions::at_rest(&world),
+            _ => ReverseMediumMotions::new(&world, &interest, &settings.insides)?,
         };
         interest.volumes = insides.volumes();
         world.prepare_for_derivatives(needs(&interest));
@@ -204,7 +205,7 @@ struct Reverse<'a> {
 /// What a piece of work adds to the gradient.
 struct Sums {
     scene: SceneGradient,
-    insides: InsideGradients,
+    insides: InteriorGradients,
 }
 
 impl Sums {
@@ -282,7 +283,7 @@ impl Reverse<'_> {
 pub(crate) struct ScatterSink<'a> {
     world: &'a World,
     interest: &'a Interest,
-    insides: &'a TransposedInsides,
+    insides: &'a ReverseMediumMotions,
     weights: Rgb,
     sums: Sums,
 }
@@ -292,7 +293,7 @@ impl<'a> ScatterSink<'a> {
     /// To what is not inside of media.
     pub(crate) fn of_surfaces(world: &'a World, interest: &'a Interest, weights: Rgb) -> Self {
         let insides =
-            alloc::boxed::Box::leak(alloc::boxed::Box::new(TransposedInsides::at_rest(world)));
+            alloc::boxed::Box::leak(alloc::boxed::Box::new(ReverseMediumMotions::at_rest(world)));
         let sums = Sums { scene: SceneGradient::zeros(world, interest), insides: insides.zeros() };
         Self { world, interest, insides, weights, sums }
     }

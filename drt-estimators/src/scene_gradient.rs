@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Vec3};
 use drt_medium::MediumGradient;
-use drt_motion::{SmoothNormals, VertexGradient};
+use drt_motion::surface::{SmoothNormals, VertexGradient};
 
 use crate::emitter::EmitterGradient;
 use crate::rendering::Counters;

@@ -1,10 +1,8 @@
 //! What is asked of an estimator.
 
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use drt_geom::TetMesh;
-use drt_motion::TetVelocities;
+use drt_motion::interior::InteriorMotion;
 
 /// How derivatives are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -17,35 +15,6 @@ pub enum EstimatorKind {
     Radiative,
     /// Central differences with common random numbers.
     FiniteDifference,
-}
-
-/// How surface velocities reach the inside of a medium.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum InsideKind {
-    /// By the one affine field that everything around the medium moves by.
-    Affine,
-    /// Not at all; the flux through moving surfaces is added. Always right, but noisy next to moving
-    /// surfaces that scatter.
-    Static,
-    /// By a blend of the affine fields around it; the flux through others is added.
-    Blend,
-    /// By mean value coordinates with respect to all surfaces that touch it.
-    MeanValue,
-    /// By tetrahedra that fill the space around and inside all surfaces that touch it: those given,
-    /// or our own.
-    Tetrahedral(Option<Arc<GivenTetrahedra>>),
-}
-
-/// Tetrahedra of somebody else's making.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct GivenTetrahedra {
-    /// The tetrahedra, of which every surface that touches the medium must be a union of faces.
-    pub mesh: TetMesh,
-    /// Velocities of all vertices per unit of a parameter, by the parameter's index. For parameters
-    /// that are not listed, vertices move with the surfaces that they lie on.
-    pub velocities: Vec<(usize, TetVelocities)>,
 }
 
 /// Sample budgets and switches of one run.
@@ -88,7 +57,7 @@ pub struct Settings {
     /// Keep each derivative's terms apart as well.
     pub terms: bool,
     /// Insides that do not move as the plan would choose, by the medium's index.
-    pub insides: Vec<(usize, InsideKind)>,
+    pub insides: Vec<(usize, InteriorMotion)>,
 }
 
 impl Default for Settings {

@@ -7,14 +7,13 @@ use core::ops::AddAssign;
 
 use drt_math::{Affine, Rgb};
 use drt_medium::{MediumChange, MediumTangent};
-use drt_motion::{
-    Applied, Change, GeometryChange, Parameter, PropertyChange, SmoothNormals, SurfaceMotion,
-    change_value, geometry_changes, move_affine, move_mesh,
-};
+use drt_motion::parameter::{Applied, change_value, geometry_changes};
+use drt_motion::surface::{SmoothNormals, move_affine, move_mesh};
+use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotion};
 
 use crate::Error;
 use crate::emitter::{Emitter, EmitterTangent};
-use crate::riding::{Ride, RideError};
+use crate::grid_deformation::{GridDeformation, GridDeformationError};
 use crate::scene::{Scene, Target};
 use crate::sensor::{Sensor, SensorTangent};
 use crate::surface::{BsdfChange, BsdfTangent, Property};
@@ -250,14 +249,15 @@ impl Apply<'_> {
         match (self.deforming_leader(target)?, medium.grid()) {
             (Some(leader), Some(grid)) => {
                 let shape = &self.given.shapes[leader].mesh;
-                let ride = Ride::new(grid, shape, &changes, n).map_err(|e| match e {
-                    RideError::Motion(e) => self.fail(e.parameter, target, e.cause),
-                    RideError::Shape(p, reason) => self.fail(p, target, reason),
-                })?;
+                let deformation =
+                    GridDeformation::new(grid, shape, &changes, n).map_err(|e| match e {
+                        GridDeformationError::Motion(e) => self.fail(e.parameter, target, e.cause),
+                        GridDeformationError::Shape(p, reason) => self.fail(p, target, reason),
+                    })?;
                 for (p, t) in tangents.iter_mut().enumerate() {
-                    t.flows.extend(Some(ride.flow(p)).filter(|flow| !flow.is_zero()));
+                    t.flows.extend(Some(deformation.flow(p)).filter(|flow| !flow.is_zero()));
                 }
-                ride.carry(&mut medium).map_err(|e| self.fail(first, target, e))?;
+                deformation.apply(&mut medium).map_err(|e| self.fail(first, target, e))?;
             }
             // Surfaces bound it; it has nothing of its own that could deform.
             (Some(_), None) if medium.homogeneous().is_some() => {}
@@ -411,7 +411,7 @@ impl Apply<'_> {
     fn properties(
         &self,
         target: Target,
-        mut change: impl FnMut(&str, &drt_motion::ChangedValue) -> Result<(), String>,
+        mut change: impl FnMut(&str, &drt_motion::parameter::ChangedValue) -> Result<(), String>,
     ) -> Result<(), Error> {
         let mut done: Vec<&str> = Vec::new();
         for (p, _, effect) in effects_on(self.parameters, target) {
@@ -423,7 +423,8 @@ impl Apply<'_> {
                 return Err(self.fail(p, target, "only the grids of a medium have voxels"));
             }
             done.push(&c.property);
-            let changes = drt_motion::property_changes(self.parameters, &target, &c.property);
+            let changes =
+                drt_motion::parameter::property_changes(self.parameters, &target, &c.property);
             let changed = change_value(&changes, None, self.parameters.len())
                 .map_err(|e| self.fail(e.parameter, target, e.cause))?;
             change(&c.property, &changed).map_err(|reason| self.fail(p, target, reason))?;

@@ -4,7 +4,7 @@
 mod common;
 
 use common::*;
-use drt_estimators::{InsideKind, Scene, Session, Settings, Target, Unattended, gradient};
+use drt_estimators::{InteriorMotion, Scene, Session, Settings, Target, Unattended, gradient};
 use drt_math::{Rgb, Rng, Vec3, vec3};
 use drt_motion::GeometryChange;
 
@@ -15,7 +15,7 @@ const SEEDS: u64 = 48;
 struct Measured(Vec<[f64; 2]>);
 
 impl Measured {
-    fn new(scene: &Scene, kind: InsideKind, velocities: &[Vec<Vec3>]) -> Self {
+    fn new(scene: &Scene, kind: InteriorMotion, velocities: &[Vec<Vec3>]) -> Self {
         let target = scene.find("block").expect("a shape");
         let Target::Shape(shape) = target else { panic!("no shape") };
         let mut rng = Rng::new(5, 0, 0);
@@ -66,8 +66,8 @@ fn velocities(scene: &Scene) -> Vec<Vec<Vec3>> {
 fn agree_where(bottom: f64) {
     let scene = fog_with_a_block(bottom, 0.0);
     let velocities = velocities(&scene);
-    let stays = Measured::new(&scene, InsideKind::Static, &velocities);
-    let moves = Measured::new(&scene, InsideKind::Tetrahedral(None), &velocities);
+    let stays = Measured::new(&scene, InteriorMotion::Static, &velocities);
+    let moves = Measured::new(&scene, InteriorMotion::Tetrahedral(None), &velocities);
     assert!(stays.off(&moves) < 4.0, "{}", stays.off(&moves));
     let larger = Measured(moves.0.iter().map(|[m, e]| [1.2 * m, *e]).collect());
     assert!(larger.off(&moves) > 4.0);
@@ -90,7 +90,7 @@ fn a_block_lifts_off() {
     let scene = fog_with_a_block(-1.0, 0.0);
     let up = moves("block", GeometryChange::Translate(Vec3::Y));
     let lift = parameter("lift", 0.0, vec![up]);
-    let total = |kind: InsideKind| {
+    let total = |kind: InteriorMotion| {
         let insides = vec![(0, kind)];
         let settings = Settings { spp: 16384, seed: 3, insides, ..Settings::default() };
         let mut session = Session::new(&scene, core::slice::from_ref(&lift), &settings);
@@ -99,8 +99,8 @@ fn a_block_lifts_off() {
         let total = session.rendering().derivatives[0].total.total;
         (total.mean.g, total.stderr.g)
     };
-    let (a, e) = total(InsideKind::Static);
-    let (b, f) = total(InsideKind::Tetrahedral(None));
+    let (a, e) = total(InteriorMotion::Static);
+    let (b, f) = total(InteriorMotion::Tetrahedral(None));
     let (off, error) = ((a - b).abs(), e.hypot(f));
     assert!(off < 4.0 * error, "{a} ± {e}, {b} ± {f}");
     assert!(error < 0.04 * a.abs(), "{e} and {f} of {a} is too much noise");

@@ -4,7 +4,7 @@ mod common;
 
 use common::*;
 use drt_estimators::{
-    Counters, EstimatorKind, InsideKind, Plan, Rendering, Scene, Session, Settings, Target,
+    Counters, EstimatorKind, InteriorMotion, Plan, Rendering, Scene, Session, Settings, Target,
     Unattended, gradient,
 };
 use drt_math::{Rgb, ValueChange};
@@ -140,9 +140,22 @@ fn insides_follow_what_they_can() {
 }
 
 #[test]
+fn the_plan_says_why_there_are_no_tetrahedra() {
+    for (bottom, crosses) in [(-1.1, true), (-0.7, false)] {
+        let scene = fog_with_a_block(bottom, 0.5);
+        let r = under(&scene, vec![moves("block", wobble(&scene, "block", 1))]);
+        let said = r.plan.skipped.iter().find(|s| s.starts_with("tetrahedra in fog: "));
+        let names = said.is_some_and(|s| s.contains("of floor and ") && s.contains("of block"));
+        assert_eq!((said.is_some(), names), (crosses, crosses), "{}", r.plan);
+        let kind = if crosses { "blend" } else { "tetrahedral" };
+        assert_eq!(r.plan.media[0].motion[0].1, kind);
+    }
+}
+
+#[test]
 fn reverse_mode_skips_as_much() {
     let adjoint = vec![Rgb::ONE; (FILM[0] * FILM[1]) as usize];
-    let under = |scene: &Scene, wanted: &[Target], insides: Vec<(usize, InsideKind)>| {
+    let under = |scene: &Scene, wanted: &[Target], insides: Vec<(usize, InteriorMotion)>| {
         let settings = Settings { spp: 8, insides, ..Settings::default() };
         gradient(scene, wanted, &settings, &adjoint, &Unattended).expect("a valid scene")
     };
@@ -160,7 +173,7 @@ fn reverse_mode_skips_as_much() {
     // Insides follow; where they stay, the flux is needed.
     let g = run(&fog(), &[Target::Shape(2)]);
     assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples == 0);
-    let g = under(&fog(), &[Target::Shape(2)], vec![(0, InsideKind::Static)]);
+    let g = under(&fog(), &[Target::Shape(2)], vec![(0, InteriorMotion::Static)]);
     assert!(g.counters.boundary_samples > 0 && g.counters.flux_samples > 0);
     // So it is where surfaces pass through each other, or touch.
     for (at, why) in [(-1.1, "pass through"), (-1.0, "touch")] {

@@ -8,25 +8,27 @@ use common::*;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::Bsdf;
-use drt_estimators::{EstimatorKind, InsideKind, Scene, Session, Settings, Unattended, gradient};
+use drt_estimators::{
+    EstimatorKind, InteriorMotion, Scene, Session, Settings, Unattended, gradient,
+};
 use drt_geom::procedural;
 use drt_math::{Rgb, Rng, ValueChange, Vec3, vec3};
 use drt_motion::{Effect, GeometryChange, Parameter};
 
 /// Every inside moves as said.
-fn with(kind: &InsideKind) -> Settings {
+fn with(kind: &InteriorMotion) -> Settings {
     let insides = vec![(0, kind.clone()), (1, kind.clone())];
     Settings { spp: 16, seed: 3, threads: 1, guiding: false, insides, ..Settings::default() }
 }
 
 /// Insides stay, and the flux is added.
 fn settings() -> Settings {
-    with(&InsideKind::Static)
+    with(&InteriorMotion::Static)
 }
 
 /// Insides move with tetrahedra.
 fn carried() -> Settings {
-    with(&InsideKind::Tetrahedral(None))
+    with(&InteriorMotion::Tetrahedral(None))
 }
 
 /// A random number per pixel and channel.

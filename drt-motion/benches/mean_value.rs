@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use drt_geom::{Mesh, TriangleBvh, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3};
-use drt_motion::{MeanValueField, MeanValueVelocities, MeanValueWeights};
+use drt_motion::mean_value::{MeanValueField, MeanValueVelocities, MeanValueWeights};
 
 const BATCHES: usize = 15;
 

@@ -7,10 +7,12 @@ use std::sync::Arc;
 
 use drt_geom::{TetrahedralizeInput, procedural, tetrahedralize};
 use drt_math::{Affine, Mat3, Vec3, vec3};
-use drt_motion::{
-    Applied, Cage, CageWeights, Carrier, GeometryChange, SurfaceMotion, SurfacePoint,
-    TetrahedralField, VertexGradient, VolumeAdjoint, move_mesh,
-};
+use drt_motion::interior::{Carrier, TetrahedralField};
+use drt_motion::mean_value::{Cage, CageWeights};
+use drt_motion::parameter::Applied;
+use drt_motion::surface::{VertexGradient, move_mesh};
+use drt_motion::volume::VolumeAdjoint;
+use drt_motion::{GeometryChange, SurfaceMotion, SurfacePoint};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let stretched = |mesh: &drt_geom::Mesh, size: Vec3| {

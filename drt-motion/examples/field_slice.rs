@@ -9,10 +9,9 @@ use std::fmt::Write;
 use drt_geom::procedural::{bumpy_sphere, cube, icosphere};
 use drt_geom::{Mesh, TetrahedralizeInput, TriangleBvh, tetrahedralize};
 use drt_math::{Affine, Mat3, Vec3, vec3};
-use drt_motion::{
-    Blend, Carrier, MeanValueField, MeanValueWeights, Site, SurfaceMotion, TetrahedralField,
-    blend_jet,
-};
+use drt_motion::SurfaceMotion;
+use drt_motion::interior::{Blend, Carrier, Site, TetrahedralField, blend_jet};
+use drt_motion::mean_value::{MeanValueField, MeanValueWeights};
 
 /// Cells along a side of a panel, and pixels along a side of a cell.
 const CELLS: usize = 84;

@@ -9,8 +9,8 @@ use std::error::Error;
 use drt_geom::Mesh;
 use drt_geom::procedural::{bumpy_sphere, icosphere};
 use drt_math::{Affine, Mat3, Vec3, fm, vec3};
+use drt_motion::mean_value::{Cage, CageWeights};
 use drt_motion::optimize::{Decay, Method, Optimizer, Variable};
-use drt_motion::{Cage, CageWeights};
 
 const ITERATIONS: u32 = 300;
 

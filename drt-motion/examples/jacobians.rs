@@ -6,10 +6,9 @@
 
 use drt_geom::procedural::bumpy_sphere;
 use drt_math::{Affine, Mat3, Vec3, vec3};
-use drt_motion::{
-    Change, Effect, GeometryChange, JetAdjoint, MotionError, MovedMesh, Parameter, SurfacePoint,
-    VertexGradient, geometry_changes, move_mesh,
-};
+use drt_motion::parameter::geometry_changes;
+use drt_motion::surface::{JetAdjoint, MovedMesh, VertexGradient, move_mesh};
+use drt_motion::{Change, Effect, GeometryChange, MotionError, Parameter, SurfacePoint};
 
 fn parameters() -> Vec<Parameter<&'static str>> {
     let on_shape = |change| vec![Effect { target: "shape", change: Change::Geometry(change) }];

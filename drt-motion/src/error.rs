@@ -34,7 +34,7 @@ pub enum Cause {
         /// Vectors given.
         found: usize,
     },
-    /// Velocities of a [field](crate::MeanValueField) with other surfaces.
+    /// Velocities of a [field](crate::mean_value::MeanValueField) with other surfaces.
     #[error("expected the velocities of {expected} triangles' corners, found {found}")]
     TriangleCount {
         /// Triangles of the field.
@@ -107,4 +107,8 @@ pub enum Cause {
     /// Targets that follow each other.
     #[error("targets follow each other in a circle; let one of them carry the motion itself")]
     FollowCycle,
+}
+
+pub(crate) fn finite(ok: bool, what: &'static str) -> Result<(), Cause> {
+    if ok { Ok(()) } else { Err(Cause::NotFinite { what }) }
 }

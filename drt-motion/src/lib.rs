@@ -4,40 +4,17 @@
 
 extern crate alloc;
 
-mod adjoint;
-mod blend;
-mod caged;
-mod deformation;
-mod distances;
-mod element;
+pub mod deformation;
 mod error;
-mod geometry;
-mod mean_value;
-mod moved;
-mod normals;
+pub mod interior;
+pub mod mean_value;
 pub mod optimize;
-mod parameter;
-mod property;
-mod surface;
-mod tetrahedral;
-mod volume;
+pub mod parameter;
+pub mod surface;
+pub mod volume;
 
 pub use drt_math::{ValueChange, ValueMap};
 
-pub use adjoint::{AffineGradient, JetAdjoint, VertexGradient, in_file_order};
-pub use blend::{Blend, Site, SiteWeight, blend_jet, triangle_field};
-pub use deformation::{AffineStretch, Deformation, DeformationError, DeformedPlace};
-pub use element::SurfaceElement;
 pub use error::{Cause, MotionError};
-pub use geometry::GeometryChange;
-pub use mean_value::{
-    Cage, CageWeights, MeanValueField, MeanValueGradient, MeanValueVelocities, MeanValueWeight,
-    MeanValueWeights,
-};
-pub use moved::{MovedFrame, MovedMesh, move_affine, move_mesh};
-pub use normals::SmoothNormals;
-pub use parameter::{Applied, Change, Effect, Parameter, geometry_changes, property_changes};
-pub use property::{ChangedValue, PropertyChange, change_value};
-pub use surface::{SurfaceJet, SurfaceMotion, SurfacePoint};
-pub use tetrahedral::{Carrier, TetVelocities, TetrahedralField, TetrahedralPlace};
-pub use volume::{VolumeAdjoint, VolumeJet, VolumeMotion};
+pub use parameter::{Change, Effect, GeometryChange, Parameter, PropertyChange};
+pub use surface::{SurfaceMotion, SurfacePoint};

@@ -1,8 +1,10 @@
+//! Velocity and divergence at points of a volume.
+
 use drt_math::{Affine, Vec3};
 
 /// The velocity field inside a medium for one parameter, at the parameters' current values.
 ///
-/// Volume vertices ride on it; which field is used cannot matter as long as it has the normal
+/// Volume vertices move with it; which field is used cannot matter as long as it has the normal
 /// velocity of every surface that bounds the medium, or the flux through those surfaces is added.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

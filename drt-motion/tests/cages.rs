@@ -7,9 +7,10 @@ use std::sync::Arc;
 use common::*;
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
-use drt_motion::{
-    Applied, Cage, CageWeights, GeometryChange, JetAdjoint, VertexGradient, move_mesh,
-};
+use drt_motion::GeometryChange;
+use drt_motion::mean_value::{Cage, CageWeights};
+use drt_motion::parameter::Applied;
+use drt_motion::surface::{JetAdjoint, VertexGradient, move_mesh};
 
 /// A cube around everything.
 fn cage() -> Arc<Mesh> {

@@ -6,9 +6,9 @@ mod common;
 use common::*;
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3};
-use drt_motion::{
-    Applied, GeometryChange, MovedMesh, SurfaceMotion, SurfacePoint, move_affine, move_mesh,
-};
+use drt_motion::parameter::Applied;
+use drt_motion::surface::{MovedMesh, move_affine, move_mesh};
+use drt_motion::{GeometryChange, SurfaceMotion, SurfacePoint};
 
 const PARAMETERS: usize = 4;
 
@@ -72,7 +72,7 @@ fn jet(moved: &MovedMesh, parameter: usize, point: &SurfacePoint) -> Vec<Vec3> {
 }
 
 fn state(moved: &MovedMesh, point: &SurfacePoint, area: f64) -> Vec<Vec3> {
-    let element = drt_motion::SurfaceElement::new(&moved.mesh, point);
+    let element = drt_motion::surface::SurfaceElement::new(&moved.mesh, point);
     let ratio = moved.mesh.area(point.triangle) / area;
     vec![element.position(), element.normal(), element.shading_normal(), Vec3::X * ratio]
 }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use drt_geom::procedural::icosphere;
 use drt_geom::{TetMesh, TetrahedralizeInput, tet_barycentric, tetrahedralize};
 use drt_math::{Dual, Mat3, Real, Rng, Vec3, vec3};
-use drt_motion::{Deformation, DeformationError};
+use drt_motion::deformation::{Deformation, DeformationError};
 
 /// A ball in a box, put far from the origin and blown up or down.
 fn tetrahedra(offset: Vec3, size: f64) -> TetMesh {

@@ -5,9 +5,9 @@ mod common;
 use common::*;
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
-use drt_motion::{
-    Applied, Cause, GeometryChange, MotionError, SurfaceMotion, move_affine, move_mesh,
-};
+use drt_motion::parameter::Applied;
+use drt_motion::surface::{move_affine, move_mesh};
+use drt_motion::{Cause, GeometryChange, MotionError, SurfaceMotion};
 
 fn triangle() -> Mesh {
     Mesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).unwrap()

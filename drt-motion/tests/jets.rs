@@ -5,7 +5,8 @@ mod common;
 use common::*;
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Real, Rng, Vec3};
-use drt_motion::{SurfaceElement, SurfaceJet, SurfaceMotion, SurfacePoint};
+use drt_motion::surface::{SurfaceElement, SurfaceJet};
+use drt_motion::{SurfaceMotion, SurfacePoint};
 
 /// The jet by differentiating position, normals and area of the moving triangle itself.
 fn dual_jet(

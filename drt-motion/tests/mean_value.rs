@@ -5,7 +5,7 @@ mod common;
 use common::*;
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Dual, Mat3, Real, Rng, Vec3, fm, vec3};
-use drt_motion::{Cage, MeanValueWeight};
+use drt_motion::mean_value::{Cage, MeanValueWeight};
 
 type D3 = Dual<f64, 3>;
 

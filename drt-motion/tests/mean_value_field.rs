@@ -5,10 +5,11 @@ mod common;
 use common::*;
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
-use drt_motion::{
-    Cause, MeanValueField, MeanValueGradient, MeanValueVelocities, MeanValueWeights, VolumeAdjoint,
-    VolumeJet,
+use drt_motion::Cause;
+use drt_motion::mean_value::{
+    MeanValueField, MeanValueGradient, MeanValueVelocities, MeanValueWeights,
 };
+use drt_motion::volume::{VolumeAdjoint, VolumeJet};
 
 /// A bumpy body and a knot in a box, every third triangle wound the wrong way, with velocities that
 /// know no symmetry, linear on the triangles.

@@ -5,7 +5,7 @@ mod common;
 use common::*;
 use drt_geom::{Mesh, weld};
 use drt_math::{Real, Rng, Vec3, vec3};
-use drt_motion::SmoothNormals;
+use drt_motion::surface::SmoothNormals;
 
 /// Angle-weighted mean normals written for any scalar, with the angles from arc cosines.
 fn mean_normals<T: Real>(mesh: &Mesh, x: &[Vec3<T>]) -> Vec<Vec3<T>> {

@@ -4,10 +4,8 @@
 mod common;
 
 use drt_math::Vec3;
-use drt_motion::{
-    Applied, Cause, Change, Effect, GeometryChange, Parameter, PropertyChange, ValueChange,
-    geometry_changes, property_changes,
-};
+use drt_motion::parameter::{Applied, geometry_changes, property_changes};
+use drt_motion::{Cause, Change, Effect, GeometryChange, Parameter, PropertyChange, ValueChange};
 
 fn effect<T>(target: T, change: Change<T>) -> Effect<T> {
     Effect { target, change }
@@ -79,7 +77,8 @@ fn properties_are_found_by_name() {
 fn files_give_back_what_was_written() {
     use common::*;
     use drt_math::{Rgb, Rng};
-    use drt_motion::{SurfaceMotion, VolumeMotion};
+    use drt_motion::SurfaceMotion;
+    use drt_motion::volume::VolumeMotion;
 
     fn round_trip<T>(value: &T)
     where

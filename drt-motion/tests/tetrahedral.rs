@@ -5,9 +5,10 @@ mod common;
 use common::*;
 use drt_geom::{Mesh, TetrahedralizeInput, procedural, tetrahedralize};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
-use drt_motion::{
-    Carrier, SurfaceMotion, TetrahedralField, VertexGradient, VolumeAdjoint, VolumeJet,
-};
+use drt_motion::SurfaceMotion;
+use drt_motion::interior::{Carrier, TetrahedralField};
+use drt_motion::surface::VertexGradient;
+use drt_motion::volume::{VolumeAdjoint, VolumeJet};
 
 fn sized(mesh: &Mesh, size: f64, at: Vec3) -> Mesh {
     mesh.transform(&Affine { linear: Mat3::IDENTITY * size, translation: at })

@@ -5,10 +5,12 @@ mod common;
 use common::*;
 use drt_geom::Mesh;
 use drt_math::{Affine, Rng, Vec3};
-use drt_motion::{
-    AffineGradient, Applied, GeometryChange, JetAdjoint, SurfaceJet, SurfaceMotion, SurfacePoint,
-    VertexGradient, VolumeAdjoint, VolumeMotion, in_file_order, move_mesh,
+use drt_motion::parameter::Applied;
+use drt_motion::surface::{
+    AffineGradient, JetAdjoint, SurfaceJet, VertexGradient, in_file_order, move_mesh,
 };
+use drt_motion::volume::{VolumeAdjoint, VolumeMotion};
+use drt_motion::{GeometryChange, SurfaceMotion, SurfacePoint};
 
 fn random_adjoint(rng: &mut Rng) -> JetAdjoint {
     JetAdjoint { u: random_vec(rng), n: random_vec(rng), ns: random_vec(rng), j: random_vec(rng).x }

@@ -1,7 +1,8 @@
 //! Changes of numbers and colours, against differences.
 
 use drt_math::Rgb;
-use drt_motion::{Applied, Cause, PropertyChange, ValueChange, change_value};
+use drt_motion::parameter::{Applied, change_value};
+use drt_motion::{Cause, PropertyChange, ValueChange};
 
 fn property(op: ValueChange) -> PropertyChange {
     PropertyChange { property: "sigma_t".into(), op, voxels: None }

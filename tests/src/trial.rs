@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use drt_estimators::{EstimatorKind, InsideKind, SceneEmitter, Session, Settings};
+use drt_estimators::{EstimatorKind, InteriorMotion, SceneEmitter, Session, Settings};
 use drt_motion::{Change, GeometryChange, Parameter};
 
 use crate::Result;
@@ -31,7 +31,7 @@ pub struct Trial {
     /// Size of the largest derivative of the case, in all its rows.
     pub largest_of_case: f64,
     /// How the insides of its media move, where the plan is not to choose.
-    pub insides: Option<InsideKind>,
+    pub insides: Option<InteriorMotion>,
     /// Of its derivatives.
     pub estimator: EstimatorKind,
 }
@@ -76,7 +76,7 @@ impl Trial {
     /// The same with insides that move in one way: `None` where that does not apply, or nothing moves
     /// that bounds a medium.
     #[must_use]
-    pub fn with_insides(&self, name: &str, kind: InsideKind) -> Option<Self> {
+    pub fn with_insides(&self, name: &str, kind: InteriorMotion) -> Option<Self> {
         let mut trial = self.clone();
         trial.name = format!("{}: {name}", self.name);
         trial.insides = Some(kind);

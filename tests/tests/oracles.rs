@@ -5,7 +5,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use drt_estimators::InsideKind;
+use drt_estimators::InteriorMotion;
 use drt_tests::judge::{Row, Table, rows};
 use drt_tests::measure::{Effort, measure};
 use drt_tests::oracle::OracleFile;
@@ -40,11 +40,11 @@ fn judge(trials: &[Trial], effort: &Effort) {
 /// Runs the motions of all cases of some kinds with every kind of inside that applies to them.
 fn check_insides(kinds: &[&str], effort: &Effort) {
     let insides = [
-        ("static", InsideKind::Static),
-        ("affine", InsideKind::Affine),
-        ("blend", InsideKind::Blend),
-        ("tetrahedral", InsideKind::Tetrahedral(None)),
-        ("mean value", InsideKind::MeanValue),
+        ("static", InteriorMotion::Static),
+        ("affine", InteriorMotion::Affine),
+        ("blend", InteriorMotion::Blend),
+        ("tetrahedral", InteriorMotion::Tetrahedral(None)),
+        ("mean value", InteriorMotion::MeanValue),
     ];
     let mut all = Vec::new();
     for (name, inside) in insides {

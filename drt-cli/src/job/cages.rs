@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use drt_geom::Mesh;
-use drt_motion::{Cage, Cause, GeometryChange};
+use drt_motion::mean_value::Cage;
+use drt_motion::{Cause, GeometryChange};
 
 use super::effects::Refusal;
 use super::keys;

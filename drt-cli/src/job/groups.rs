@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use drt_estimators::{Scene, SceneGradient, Target};
 use drt_geom::Mesh;
-use drt_motion::{Cage, CageWeights, in_file_order};
+use drt_motion::mean_value::{Cage, CageWeights};
+use drt_motion::surface::in_file_order;
 use toml::Spanned;
 
 use super::cages::Cages;

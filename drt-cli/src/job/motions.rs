@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use drt_estimators::{GivenTetrahedra, InsideKind, Scene, Target};
+use drt_estimators::{GivenTetrahedra, InteriorMotion, Scene, Target};
 use drt_geom::TetMesh;
 use drt_motion::Parameter;
 use toml::Spanned;
@@ -23,8 +23,8 @@ pub(super) fn insides(
     folder: &Path,
     scene: &Scene,
     parameters: &[Parameter<String>],
-) -> Result<Vec<(usize, InsideKind)>, CliError> {
-    let mut insides: BTreeMap<usize, (InsideKind, Option<PathBuf>)> = BTreeMap::new();
+) -> Result<Vec<(usize, InteriorMotion)>, CliError> {
+    let mut insides: BTreeMap<usize, (InteriorMotion, Option<PathBuf>)> = BTreeMap::new();
     for motion in motions {
         let fail = |message: String| {
             document.error_at(motion.span().start, format!("[[motion]]: {message}"))
@@ -36,14 +36,16 @@ pub(super) fn insides(
         };
         check(keys).map_err(fail)?;
         let mut kind = match (keys.kind, &keys.mesh) {
-            (MotionKind::Affine, _) => InsideKind::Affine,
-            (MotionKind::Static, _) => InsideKind::Static,
-            (MotionKind::MeanValue, _) => InsideKind::MeanValue,
-            (MotionKind::Tetrahedral, None) => InsideKind::Tetrahedral(None),
+            (MotionKind::Affine, _) => InteriorMotion::Affine,
+            (MotionKind::Static, _) => InteriorMotion::Static,
+            (MotionKind::MeanValue, _) => InteriorMotion::MeanValue,
+            (MotionKind::Tetrahedral, None) => InteriorMotion::Tetrahedral(None),
             (MotionKind::Tetrahedral, Some(file)) => {
                 let before = insides.remove(&medium);
                 let mut given = match before {
-                    Some((InsideKind::Tetrahedral(Some(given)), Some(path))) if path == *file => {
+                    Some((InteriorMotion::Tetrahedral(Some(given)), Some(path)))
+                        if path == *file =>
+                    {
                         Arc::unwrap_or_clone(given)
                     }
                     _ => GivenTetrahedra {
@@ -64,11 +66,12 @@ pub(super) fn insides(
                     given.velocities.retain(|(p, _)| *p != parameter);
                     given.velocities.push((parameter, list.into()));
                 }
-                InsideKind::Tetrahedral(Some(Arc::new(given)))
+                InteriorMotion::Tetrahedral(Some(Arc::new(given)))
             }
         };
-        if let (InsideKind::Tetrahedral(None), Some((before, _))) = (&kind, insides.get(&medium))
-            && matches!(before, InsideKind::Tetrahedral(_))
+        if let (InteriorMotion::Tetrahedral(None), Some((before, _))) =
+            (&kind, insides.get(&medium))
+            && matches!(before, InteriorMotion::Tetrahedral(_))
         {
             kind = before.clone();
         }

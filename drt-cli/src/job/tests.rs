@@ -242,7 +242,7 @@ fn keys_of_later_versions_are_read_and_stand_in_the_way_of_derivatives_only() {
     let still = "[[motion]]\nmedium = \"fog\"\nkind = \"static\"";
     let j = job(&text(still), &[]).unwrap();
     j.require_derivatives().unwrap();
-    assert_eq!(j.settings.insides, [(0, drt_estimators::InsideKind::Static)]);
+    assert_eq!(j.settings.insides, [(0, drt_estimators::InteriorMotion::Static)]);
     refused(&text(&still.replace("fog", "cube")), &[], &["`cube` is not a medium"]);
     let fit = text(
         "[optimize]\ntargets = [\"t.exr\"]\nloss = { pyramid-l2 = { levels = 10, weight = 4 } }\n\

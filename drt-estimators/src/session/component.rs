@@ -8,9 +8,9 @@ use super::pilot::primary_share;
 use crate::Error;
 use crate::contraction::{Contraction, Motion};
 use crate::film::{BATCHES, SplatFilm};
-use crate::inside;
 use crate::interior;
 use crate::kept::Kept;
+use crate::medium_motion::MediumMotions;
 use crate::plan::Plan;
 use crate::prepared::Prepared;
 use crate::rendering::{Account, Layer, Term};
@@ -45,8 +45,10 @@ impl Component {
         let mut motion = None;
         if !tangents.names.is_empty() {
             let insides = match settings.estimator {
-                EstimatorKind::Radiative => inside::wholes(&world, &tangents, &settings.insides),
-                _ => inside::plan(&world, &tangents, &settings.insides, kept)?,
+                EstimatorKind::Radiative => {
+                    MediumMotions::affine(&world, &tangents, &settings.insides)
+                }
+                _ => MediumMotions::plan(&world, &tangents, &settings.insides, kept)?,
             };
             motion = Some(Motion::new(tangents, insides));
         }

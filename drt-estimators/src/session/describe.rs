@@ -5,7 +5,6 @@ use alloc::vec::Vec;
 
 use crate::boundary::Strategy;
 use crate::contraction::Motion;
-use crate::inside::Inside;
 use crate::plan::{MediumPlan, Plan};
 use crate::prepared::Prepared;
 use crate::splatting::Source;
@@ -42,6 +41,11 @@ pub(super) fn describe(prepared: &Prepared, motion: Option<&Motion>) -> Plan {
         skip("derivatives: there are no parameters");
         return plan;
     };
+    for (i, reason) in motion.insides.unfilled.iter().enumerate() {
+        if let Some(reason) = reason {
+            skip(&alloc::format!("tetrahedra in {}: {reason}", medium_name(world, i)));
+        }
+    }
     if !motion.interest.moves_geometry() {
         skip("boundary terms: no parameter moves geometry");
     }
@@ -72,8 +76,8 @@ fn medium_plan(world: &World, motion: Option<&Motion>, i: usize) -> MediumPlan {
         let insides = &m.insides;
         (0..m.parameters())
             .filter_map(|p| {
-                let inside = insides.volumes[i].iter().find(|(q, _)| *q == p).map(|(_, m)| m);
-                let name = inside.map_or("static", Inside::name);
+                let inside = insides.velocities[i].iter().find(|(q, _)| *q == p).map(|(_, m)| m);
+                let name = inside.map_or("static", |v| v.name());
                 let how = match (inside, insides.flux[i].contains(&p)) {
                     (None, false) => return None,
                     (_, false) => String::from(name),
@@ -83,9 +87,9 @@ fn medium_plan(world: &World, motion: Option<&Motion>, i: usize) -> MediumPlan {
             })
             .collect()
     });
-    MediumPlan {
-        medium: item.id.clone().unwrap_or_else(|| alloc::format!("medium[{i}]")),
-        tracking: tracking.into(),
-        motion: motions,
-    }
+    MediumPlan { medium: medium_name(world, i), tracking: tracking.into(), motion: motions }
+}
+
+fn medium_name(world: &World, i: usize) -> String {
+    world.scene.media[i].id.clone().unwrap_or_else(|| alloc::format!("medium[{i}]"))
 }

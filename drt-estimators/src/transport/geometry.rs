@@ -8,7 +8,6 @@ use drt_geom::{Mesh, TriangleBvh};
 use drt_math::Vec3;
 
 use crate::Error;
-use crate::kept::same_triangles;
 use crate::scene::{Scene, Shape};
 
 /// A triangle of the soup.
@@ -59,7 +58,7 @@ impl Geometry {
     }
 
     fn is_of(&self, scene: &Scene) -> bool {
-        let same = |(own, shape): (&Arc<Mesh>, &Shape)| same_triangles(own, &shape.mesh);
+        let same = |(own, shape): (&Arc<Mesh>, &Shape)| own.same_triangles(&shape.mesh);
         self.meshes.len() == scene.shapes.len() && self.meshes.iter().zip(&scene.shapes).all(same)
     }
 }

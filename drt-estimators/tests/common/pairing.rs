@@ -5,7 +5,9 @@ use drt_estimators::surface::{BsdfChange, Property};
 use drt_estimators::{Scene, SceneGradient, Target};
 use drt_math::{Affine, Rgb, Vec3};
 use drt_medium::MediumChange;
-use drt_motion::{Applied, Change, GeometryChange, Parameter, PropertyChange, move_mesh};
+use drt_motion::parameter::Applied;
+use drt_motion::surface::move_mesh;
+use drt_motion::{Change, GeometryChange, Parameter, PropertyChange};
 
 /// What the parameter changes.
 pub fn targets(scene: &Scene, parameter: &Parameter) -> Vec<Target> {

@@ -181,6 +181,13 @@ impl Mesh {
         (0..self.triangles.len() as u32).map(|i| self.triangle(i)).collect()
     }
 
+    /// Whether two meshes are the same but for their normals, to the bit.
+    #[must_use]
+    pub fn same_triangles(&self, other: &Self) -> bool {
+        core::ptr::eq(self, other)
+            || (self.triangles == other.triangles && self.positions == other.positions)
+    }
+
     /// Unit geometric normal of a triangle; zero for a triangle without area.
     #[must_use]
     pub fn normal(&self, i: u32) -> Vec3 {

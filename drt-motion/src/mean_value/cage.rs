@@ -5,7 +5,7 @@ use drt_geom::Mesh;
 use drt_math::Vec3;
 
 use super::triangle::{Triangle, View};
-use super::{BEYOND, MeanValueWeight, orientation, unit_of};
+use super::{BEYOND, Kernel, MeanValueWeight, orientation, unit_of};
 use crate::error::Cause;
 
 /// A closed triangle mesh whose vertices carry space with them.
@@ -66,7 +66,7 @@ impl Cage {
         let mut whole = MeanValueWeight::default();
         if (x - self.middle).max_abs() < BEYOND {
             for (triangle, corners) in self.triangles.iter().zip(&self.corners) {
-                match triangle.view(x) {
+                match triangle.view(x, Kernel::MeanValue) {
                     View::Apart(weights) => {
                         for (&v, w) in corners.iter().zip(&weights) {
                             out[v as usize].add(w);

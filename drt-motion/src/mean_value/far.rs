@@ -3,12 +3,12 @@
 
 use drt_math::Vec3;
 
-use super::MeanValueWeight;
 use super::quadrature::GAUSS_5;
 use super::triangle::{Local, Triangle};
+use super::{Kernel, MeanValueWeight};
 
 /// The integrals by a product rule of degree 8: at the distances that come here, to rounding.
-pub(super) fn weights(t: &Triangle, local: &Local) -> [MeanValueWeight; 3] {
+pub(super) fn weights(t: &Triangle, local: &Local, kernel: Kernel) -> [MeanValueWeight; 3] {
     let (h, n) = (local.h, t.normal);
     let mut sums = [(0.0, Vec3::ZERO); 3];
     for (u, wu) in GAUSS_5 {
@@ -23,8 +23,13 @@ pub(super) fn weights(t: &Triangle, local: &Local) -> [MeanValueWeight; 3] {
             }
         }
     }
-    sums.map(|(i4, away)| MeanValueWeight {
-        value: t.double_area * h * i4,
-        gradient: (away * (4.0 * h) - n * i4) * t.double_area,
+    sums.map(|(i4, away)| match kernel {
+        Kernel::MeanValue => MeanValueWeight {
+            value: t.double_area * h * i4,
+            gradient: (away * (4.0 * h) - n * i4) * t.double_area,
+        },
+        Kernel::InverseDistance => {
+            MeanValueWeight { value: t.double_area * i4, gradient: away * (4.0 * t.double_area) }
+        }
     })
 }

@@ -7,9 +7,9 @@ use drt_math::{Vec3, vec3};
 use super::hierarchy::{self, Cluster};
 use super::moments::{Derivatives, Moments};
 use super::triangle::{Triangle, View};
-use super::{BEYOND, MeanValueWeight, orientation, unit_of};
-use crate::VolumeJet;
+use super::{BEYOND, Kernel, MeanValueWeight, orientation, unit_of};
 use crate::error::Cause;
+use crate::volume::VolumeJet;
 
 /// Distance over radius up to which a cluster counts by its parts alone.
 const NEAR: f64 = 2.5;
@@ -28,6 +28,7 @@ pub struct MeanValueField {
     /// How many triangles there were, those that cancel included.
     pub(super) given: usize,
     pub(super) unit: f64,
+    pub(super) kernel: Kernel,
     exact: bool,
 }
 
@@ -95,15 +96,29 @@ impl MeanValueField {
     /// # Errors
     /// When they are not closed or have one side only, or a connected part encloses no volume.
     pub fn new(triangles: &[[Vec3; 3]]) -> Result<Self, Cause> {
-        let positions: Vec<Vec3> = triangles.iter().flatten().copied().collect();
-        let corners = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        let mesh = Mesh::new(positions, corners)
-            .map_err(|_| Cause::NotFinite { what: "a corner of the surface" })?;
-        let turned = orientation::alternating(&mesh)?;
+        let mesh = mesh_of(triangles)?;
+        Ok(Self::of(&mesh, &orientation::alternating(&mesh)?, Kernel::MeanValue))
+    }
+
+    /// A field around any surfaces, open ones and such that pass through one another too, given as
+    /// triangles in any order and winding: with the kernel [`Kernel::InverseDistance`].
+    ///
+    /// Linear velocities do not come back as they do from closed surfaces, constant ones do. At a rim the field is as
+    /// continuous as elsewhere.
+    ///
+    /// # Errors
+    /// When a corner is not finite.
+    pub fn two_sided(triangles: &[[Vec3; 3]]) -> Result<Self, Cause> {
+        let mesh = mesh_of(triangles)?;
+        let all: Vec<orientation::Turned> = (0..).zip(mesh.triangles.iter().copied()).collect();
+        Ok(Self::of(&mesh, &all, Kernel::InverseDistance))
+    }
+
+    fn of(mesh: &Mesh, turned: &[orientation::Turned], kernel: Kernel) -> Self {
         let unit = unit_of(mesh.bounds().extent().max_abs());
         let scaled: Vec<[Vec3; 3]> =
             turned.iter().map(|(_, t)| t.map(|i| mesh.positions[i as usize] * unit)).collect();
-        let (clusters, order) = hierarchy::build(&scaled);
+        let (clusters, order) = hierarchy::build(&scaled, kernel);
         let placed = |&i: &u32| {
             let (source, corners) = turned[i as usize];
             let swapped = corners != mesh.triangles[source as usize];
@@ -111,9 +126,10 @@ impl MeanValueField {
         };
         let triangles = order.iter().map(placed).collect();
         let given = mesh.triangles.len();
-        let mut field = Self { clusters, ones: Vec::new(), triangles, given, unit, exact: false };
+        let ones = Vec::new();
+        let mut field = Self { clusters, ones, triangles, given, unit, kernel, exact: false };
         field.ones = field.moments(|_| [1.0; 3]);
-        Ok(field)
+        field
     }
 
     /// How many triangles the surfaces have.
@@ -142,7 +158,8 @@ impl MeanValueField {
                 }
                 None => {
                     for i in c.triangles.start as usize..c.triangles.end as usize {
-                        self.triangles[i].triangle.add_moments(values(i), c.middle, &mut moments);
+                        let triangle = &self.triangles[i].triangle;
+                        triangle.add_moments(values(i), c.middle, self.kernel, &mut moments);
                     }
                 }
             }
@@ -160,10 +177,7 @@ impl MeanValueField {
             let (expected, found) = (self.given, corners.len());
             return Err(Cause::TriangleCount { expected, found });
         }
-        crate::geometry::finite(
-            corners.iter().flatten().all(|v| v.is_finite()),
-            "a vertex velocity",
-        )?;
+        crate::error::finite(corners.iter().flatten().all(|v| v.is_finite()), "a vertex velocity")?;
         let turned = |p: &Placed| {
             let [a, b, c] = corners[p.source as usize];
             if p.swapped { [a, c, b] } else { [a, b, c] }
@@ -227,7 +241,7 @@ impl MeanValueField {
             return self.visit(first + 1, x, &share, out);
         }
         for triangle in cluster.triangles.clone() {
-            match self.triangles[triangle as usize].triangle.view(x) {
+            match self.triangles[triangle as usize].triangle.view(x, self.kernel) {
                 View::Apart(weights) => {
                     let weights = weights.map(|w| w.times(&share));
                     weights.iter().for_each(|w| out.whole.add(w));
@@ -291,4 +305,11 @@ impl MeanValueField {
         let j_dot = (divergence - u.dot(weights.whole.gradient)) * (inverse * self.unit);
         VolumeJet { u, j_dot }
     }
+}
+
+/// Triangles as a mesh whose corner k of triangle i is vertex 3 i + k.
+fn mesh_of(triangles: &[[Vec3; 3]]) -> Result<Mesh, Cause> {
+    let positions: Vec<Vec3> = triangles.iter().flatten().copied().collect();
+    let corners = (0..triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Mesh::new(positions, corners).map_err(|_| Cause::NotFinite { what: "a corner of the surface" })
 }

@@ -5,6 +5,8 @@ use core::ops::Range;
 use drt_geom::Aabb;
 use drt_math::Vec3;
 
+use super::Kernel;
+
 /// Triangles in a cluster that is not divided.
 const LEAF: usize = 4;
 
@@ -20,10 +22,10 @@ pub(super) struct Cluster {
 }
 
 /// Clusters from the whole down, and the triangles in their order.
-pub(super) fn build(triangles: &[[Vec3; 3]]) -> (Vec<Cluster>, Vec<u32>) {
+pub(super) fn build(triangles: &[[Vec3; 3]], kernel: Kernel) -> (Vec<Cluster>, Vec<u32>) {
     let centers: Vec<Vec3> = triangles.iter().map(|[a, b, c]| (*a + *b + *c) / 3.0).collect();
     let mut order: Vec<u32> = (0..triangles.len() as u32).collect();
-    let mut clusters = vec![cluster(triangles, &order, 0..triangles.len())];
+    let mut clusters = vec![cluster(triangles, &order, 0..triangles.len(), kernel)];
     let mut next = 0;
     while let Some(c) = clusters.get(next) {
         let range = c.triangles.start as usize..c.triangles.end as usize;
@@ -38,7 +40,7 @@ pub(super) fn build(triangles: &[[Vec3; 3]]) -> (Vec<Cluster>, Vec<u32>) {
             let middle = range.start + half;
             let parts = [range.start..middle, middle..range.end];
             let first = clusters.len() as u32;
-            clusters.extend(parts.map(|r| cluster(triangles, &order, r)));
+            clusters.extend(parts.map(|r| cluster(triangles, &order, r, kernel)));
             clusters[next].parts = Some(first);
         }
         next += 1;
@@ -46,9 +48,22 @@ pub(super) fn build(triangles: &[[Vec3; 3]]) -> (Vec<Cluster>, Vec<u32>) {
     (clusters, order)
 }
 
-fn cluster(triangles: &[[Vec3; 3]], order: &[u32], range: Range<usize>) -> Cluster {
-    let corners = || order[range.clone()].iter().flat_map(|&i| triangles[i as usize]);
-    let middle = Aabb::around(corners()).center();
+fn cluster(triangles: &[[Vec3; 3]], order: &[u32], range: Range<usize>, kernel: Kernel) -> Cluster {
+    let all = || order[range.clone()].iter().map(|&i| triangles[i as usize]);
+    let corners = || all().flatten();
+    let middle = match kernel {
+        Kernel::MeanValue => Aabb::around(corners()).center(),
+        // About its centroid the area has no moment of first order, which could have either sign.
+        Kernel::InverseDistance => {
+            let (mut area, mut sum) = (0.0, Vec3::ZERO);
+            for [a, b, c] in all() {
+                let double = (b - a).cross(c - a).length();
+                area += double;
+                sum += (a + b + c) * (double / 3.0);
+            }
+            if area > 0.0 { sum / area } else { Aabb::around(corners()).center() }
+        }
+    };
     let radius = corners().map(|p| (p - middle).length()).fold(0.0, f64::max);
     Cluster { middle, radius, triangles: range.start as u32..range.end as u32, parts: None }
 }

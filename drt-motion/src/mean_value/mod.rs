@@ -18,8 +18,14 @@
 //!
 //! over all of space: as long as W takes two neighbouring values only, D is positive where W is the
 //! larger, negative where it is the smaller, and vanishes nowhere. Surfaces are therefore turned such
-//! that they alternate (see [`orientation`]): nested ones, too, bound one region, seen from both of
+//! that they alternate (see the module `orientation`): nested ones, too, bound one region, seen from both of
 //! its sides.
+//!
+//! Open surfaces, and such that pass through one another, have no such winding. For them the kernel is
+//! K = 1/|y - x|⁴ ([`Kernel::InverseDistance`]): the weights of Shepard (1968), integrated. It is positive, so D
+//! vanishes nowhere, and knows no sides. At a distance d from a surface, D grows like π/d², at a rim like half of that,
+//! while everything else stays bounded: λ takes the piecewise linear values on sheets and rims, and leaves them with
+//! the square of the distance. Constant functions come back everywhere, linear ones do not.
 
 mod cage;
 mod edge;
@@ -38,6 +44,16 @@ use drt_math::Vec3;
 pub use cage::{Cage, CageWeights};
 pub use field::{MeanValueField, MeanValueVelocities, MeanValueWeights};
 pub use transpose::MeanValueGradient;
+
+/// What a piece of surface at y with the normal n weighs at a point x.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kernel {
+    /// n·(y - x) / |y - x|⁴: mean value coordinates of closed surfaces.
+    #[default]
+    MeanValue,
+    /// 1 / |y - x|⁴: inverse distance weights of any surfaces.
+    InverseDistance,
+}
 
 /// How many sizes of a surface away a point is too far to tell its vertices apart.
 const BEYOND: f64 = 1e12;

@@ -5,10 +5,17 @@
 //!
 //! ```text
 //! ∫ u n·(z + ξ) / |z + ξ|⁴ dA ≈ Σ_i M_i ∂_i P + Σ_ij M_ij ∂_ij P + Σ_ijk M_ijk ∂_ijk P,
-//! M_i = ∫ u n_i,   M_ij = ∫ u n_i ξ_j,   M_ijk = ½ ∫ u n_i ξ_j ξ_k,
+//! M_i = ∫ u n_i,   M_ij = ∫ u n_i ξ_j,   M_ijk = ½ ∫ u n_i ξ_j ξ_k.
 //! ```
 //!
-//! of which the symmetric parts count only: they are kept as the coefficients of homogeneous
+//! Without the normals, the kernel is 1 / |z|⁴ = -Σ_i ∂_ii P, so that pieces of area a have moments of the same
+//! kind,
+//!
+//! ```text
+//! M_ij = -δ_ij ∫ u,   M_ijk = -δ_ij ∫ u ξ_k.
+//! ```
+//!
+//! The symmetric parts of moments count only: they are kept as the coefficients of homogeneous
 //! polynomials. Monomial xᵃ yᵇ zᶜ of any degree is number m (m + 1) / 2 + c with m = b + c.
 
 use drt_math::{Vec3, vec3};
@@ -67,6 +74,18 @@ impl Moments {
         self.add_degree(2, &term, 1.0);
         multiply(&mut term, 2, xi);
         self.add_degree(3, &term, 0.5);
+    }
+
+    /// The same of the kernel without normals.
+    pub(super) fn add_scalar(&mut self, amount: f64, xi: Vec3) {
+        let mut term = [0.0; 10];
+        // The squares of the coordinates.
+        for k in [0, 3, 5] {
+            term[k] = -amount;
+        }
+        self.add_degree(2, &term, 1.0);
+        multiply(&mut term, 2, xi);
+        self.add_degree(3, &term, 1.0);
     }
 
     /// Adds the moments of a part whose middle lies at `t`.

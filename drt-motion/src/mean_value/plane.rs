@@ -11,7 +11,7 @@ use super::triangle::{Local, Triangle};
 /// Height over distance, within the plane, below which the closed form is avoided.
 const FLAT: f64 = 0.01;
 
-/// D and its gradient where the closed form would lose digits.
+/// I = D / h and its gradient where the closed form would lose digits.
 ///
 /// In polar coordinates (ρ, φ) around the projected point, with f = 1 / (ρ² + h²) on the triangle's
 /// outline, the integrals over ρ are elementary and
@@ -45,7 +45,7 @@ pub(super) fn integral(t: &Triangle, local: &Local, nearest: f64) -> Option<Mean
         // The flux of 1 / r⁴ through the edge: outward is e × n.
         across += n.cross(t.edges[k]) * edge.length;
     }
-    Some(MeanValueWeight { value: h * i4, gradient: (across - n * (h * rate)) * h - n * i4 })
+    Some(MeanValueWeight { value: i4, gradient: across - n * (h * rate) })
 }
 
 /// Integrals along an edge, with dφ divided by the signed doubled area it spans with the projected

@@ -6,7 +6,7 @@ use drt_math::Vec3;
 use super::MeanValueField;
 use super::field::MeanValueWeights;
 use super::moments::Moments;
-use crate::VolumeAdjoint;
+use crate::volume::VolumeAdjoint;
 
 /// A gradient with respect to the velocities of all surfaces of a [`MeanValueField`]: the transpose
 /// of every [`jet`](MeanValueField::jet) scattered so far.
@@ -100,6 +100,7 @@ impl MeanValueField {
                     self.triangles[t as usize].triangle.add_moments(
                         unit,
                         cluster.middle,
+                        self.kernel,
                         &mut piece,
                     );
                     *g += Vec3::from([0, 1, 2].map(|axis| whole[axis].dot(&piece)));

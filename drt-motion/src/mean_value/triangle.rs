@@ -2,7 +2,7 @@ use drt_math::{Mat3, Vec3};
 
 use super::edge::EdgeView;
 use super::moments::Moments;
-use super::{MeanValueWeight, far, plane};
+use super::{Kernel, MeanValueWeight, far, plane};
 
 /// A point nearer to a triangle than this, relative to its farthest corner, is on it: what rounding
 /// of its coordinates would make of one that is.
@@ -59,9 +59,11 @@ impl Triangle {
     /// The triangle from `x`: for each corner
     ///
     /// ```text
-    /// w = ∫ φ n·(y - x) / |y - x|⁴ dA(y),   φ = 1 at this corner, 0 at the others, linear.
+    /// w = ∫ φ n·(y - x) / |y - x|⁴ dA(y),   φ = 1 at this corner, 0 at the others, linear,
     /// ```
-    pub(super) fn view(&self, x: Vec3) -> View {
+    ///
+    /// or the same without the factor n·(y - x), by the kernel.
+    pub(super) fn view(&self, x: Vec3, kernel: Kernel) -> View {
         let zero = [MeanValueWeight::default(); 3];
         let d = self.corners.map(|p| p - x);
         let lengths = d.map(Vec3::length);
@@ -78,13 +80,19 @@ impl Triangle {
             return View::Apart(zero);
         }
         if lengths[nearest] > FAR * self.longest {
-            return View::Apart(far::weights(self, &local));
+            return View::Apart(far::weights(self, &local, kernel));
         }
-        View::Apart(self.weights(&local, lengths[nearest]))
+        View::Apart(self.weights(&local, lengths[nearest], kernel))
     }
 
     /// Adds the moments about `middle` of the linear function with given values at the corners.
-    pub(super) fn add_moments(&self, values: [f64; 3], middle: Vec3, moments: &mut Moments) {
+    pub(super) fn add_moments(
+        &self,
+        values: [f64; 3],
+        middle: Vec3,
+        kernel: Kernel,
+        moments: &mut Moments,
+    ) {
         // A rule of degree 3: the function times two coordinates.
         for (weight, one, others) in [(-27.0, 1.0 / 3.0, 1.0 / 3.0), (25.0, 0.6, 0.2)] {
             let nodes = if weight < 0.0 { 1 } else { 3 };
@@ -96,7 +104,11 @@ impl Triangle {
                     place += self.corners[l] * lambda[l];
                     value += values[l] * lambda[l];
                 }
-                moments.add(self.normal * (weight / 96.0 * self.double_area * value), place);
+                let amount = weight / 96.0 * self.double_area * value;
+                match kernel {
+                    Kernel::MeanValue => moments.add(self.normal * amount, place),
+                    Kernel::InverseDistance => moments.add_scalar(amount, place),
+                }
             }
         }
     }
@@ -144,12 +156,25 @@ impl Triangle {
     ///
     /// where e_l is the edge opposite to corner l, λ_l the barycentric weight of the projected point
     /// and a_l = 2A λ_l. This is the solution of Σ w_l d_l = m by Ju, Schaefer and Warren 2005 (§3.2)
-    /// written so that nothing but D loses digits near the plane.
-    fn weights(&self, local: &Local, nearest: f64) -> [MeanValueWeight; 3] {
+    /// written so that nothing but D loses digits near the plane. As h is the same all over the triangle,
+    /// the weights without it in the kernel are
+    ///
+    /// ```text
+    /// w_l / h = λ_l I + (e_l · Σ_k g_k e_k) / 4A,   I = ∫ 1 / r⁴ dA = Σ_k g_k a_k / 2h².
+    /// ```
+    fn weights(&self, local: &Local, nearest: f64, kernel: Kernel) -> [MeanValueWeight; 3] {
         let (d, h) = (&local.d, local.h);
         let n = self.normal;
         let views = [0, 1, 2].map(|k| EdgeView::new(d[(k + 1) % 3], d[(k + 2) % 3]));
-        let whole = plane::integral(self, local, nearest).unwrap_or_else(|| {
+        let signed = matches!(kernel, Kernel::MeanValue);
+        let beside = plane::integral(self, local, nearest).map(|i| {
+            if signed {
+                MeanValueWeight { value: h * i.value, gradient: i.gradient * h - n * i.value }
+            } else {
+                i
+            }
+        });
+        let whole = beside.unwrap_or_else(|| {
             let mut sum = 0.0;
             let mut gradient = Vec3::ZERO;
             for (v, e) in views.iter().zip(self.edges) {
@@ -158,7 +183,12 @@ impl Triangle {
                 gradient += v.gradient * a + n.cross(e) * v.g;
             }
             let half = 0.5 / h;
-            MeanValueWeight { value: sum * half, gradient: (gradient + n * (sum / h)) * half }
+            if signed {
+                MeanValueWeight { value: sum * half, gradient: (gradient + n * (sum / h)) * half }
+            } else {
+                let gradient = (gradient + n * (2.0 * sum / h)) * (half / h);
+                MeanValueWeight { value: sum * half / h, gradient }
+            }
         });
         // Summed before it is projected on the edges: only so do the errors of a needle's weights
         // cancel in linear functions.
@@ -174,10 +204,18 @@ impl Triangle {
         [0, 1, 2].map(|l| {
             let opposite = self.edges[l];
             let lambda = n.dot(views[l].cross) * inverse;
-            let value = lambda * whole.value + 0.5 * h * turn.dot(opposite) * inverse;
+            let (turned, turned_gradient) = if signed {
+                let value = 0.5 * h * turn.dot(opposite) * inverse;
+                let gradient = turn_gradient * opposite * h - n * turn.dot(opposite);
+                (value, gradient * (0.5 * inverse))
+            } else {
+                let value = 0.5 * turn.dot(opposite) * inverse;
+                (value, turn_gradient * opposite * (0.5 * inverse))
+            };
+            let value = lambda * whole.value + turned;
             let gradient = whole.gradient * lambda
                 + n.cross(opposite) * (whole.value * inverse)
-                + (turn_gradient * opposite * h - n * turn.dot(opposite)) * (0.5 * inverse);
+                + turned_gradient;
             MeanValueWeight { value, gradient }
         })
     }

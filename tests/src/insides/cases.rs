@@ -3,7 +3,7 @@
 //! Nothing scatters at the moving surfaces of most: next to one that does, an inside at rest has the
 //! right mean, and no variance (theory sheet §14.1).
 
-use drt_estimators::InsideKind;
+use drt_estimators::InteriorMotion;
 use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, RoughDielectric};
 use drt_geom::procedural::{bumpy_sphere, cube, icosphere};
@@ -29,30 +29,47 @@ pub struct Case {
     pub right: Vec<Way>,
     /// Wrong ones.
     pub wrong: Vec<Way>,
+    /// The half step of finite differences, where these are to agree too.
+    pub step: Option<f64>,
 }
 
 /// A case under construction.
-struct Draft {
+pub(super) struct Draft {
     case: Case,
     parameter: Parameter,
 }
 
 impl Draft {
     /// With the plan's choice, a blend, tetrahedra, and mean value coordinates.
-    fn new(name: &'static str, set: Set, effects: impl IntoIterator<Item = Effect>) -> Self {
+    pub(super) fn new(
+        name: &'static str,
+        set: Set,
+        effects: impl IntoIterator<Item = Effect>,
+    ) -> Self {
         let effects = effects.into_iter().collect();
         let parameter = Parameter { name: name.into(), value: 0.0, effects };
-        let case = Case { name, scene: set.scene, right: Vec::new(), wrong: Vec::new() };
+        let case =
+            Case { name, scene: set.scene, right: Vec::new(), wrong: Vec::new(), step: None };
         let draft = Self { case, parameter };
         let chosen = draft.way("plan", Vec::new());
         let draft = draft.right(chosen);
         draft
-            .by("blend", &InsideKind::Blend)
-            .by("tetrahedra", &InsideKind::Tetrahedral(None))
-            .by("mean values", &InsideKind::MeanValue)
+            .by("blend", &InteriorMotion::Blend)
+            .by("tetrahedra", &InteriorMotion::Tetrahedral(None))
+            .by("mean values", &InteriorMotion::MeanValue)
     }
 
-    fn way(&self, name: &'static str, insides: Vec<(usize, InsideKind)>) -> Way {
+    pub(super) fn case(self) -> Case {
+        self.case
+    }
+
+    /// With finite differences of this half step.
+    pub(super) fn differences(mut self, step: f64) -> Self {
+        self.case.step = Some(step);
+        self
+    }
+
+    fn way(&self, name: &'static str, insides: Vec<(usize, InteriorMotion)>) -> Way {
         Way { name, insides, parameter: self.parameter.clone() }
     }
 
@@ -62,23 +79,23 @@ impl Draft {
     }
 
     /// With all media moving by one kind.
-    fn by(self, name: &'static str, kind: &InsideKind) -> Self {
+    fn by(self, name: &'static str, kind: &InteriorMotion) -> Self {
         let media = 0..self.case.scene.media.len();
         let way = self.way(name, media.map(|m| (m, kind.clone())).collect());
         self.right(way)
     }
 
-    fn at_rest(self) -> Self {
-        self.by("static with flux", &InsideKind::Static)
+    pub(super) fn at_rest(self) -> Self {
+        self.by("static with flux", &InteriorMotion::Static)
     }
 
-    fn affine(self) -> Self {
-        self.by("affine", &InsideKind::Affine)
+    pub(super) fn affine(self) -> Self {
+        self.by("affine", &InteriorMotion::Affine)
     }
 
     /// With tetrahedra of our own around the first medium: those right that are stirred, those wrong
     /// that are torn around the first of the further vertices, if any.
-    fn stirred(
+    pub(super) fn stirred(
         mut self,
         surfaces: &[&str],
         eye: Option<Vec3>,
@@ -115,7 +132,7 @@ impl Draft {
         let glows = now.emission.to_array().into_iter().zip(now.albedo.to_array());
         let dims = glows.map(|(e, albedo)| -divergence * e / (1.0 - albedo));
         let dims: Vec<f64> = dims.collect();
-        let mut way = self.way("divergence dropped", vec![(0, InsideKind::Affine)]);
+        let mut way = self.way("divergence dropped", vec![(0, InteriorMotion::Affine)]);
         way.parameter.effects.extend([
             changes(&id, "albedo", ValueChange::Multiply(-divergence)),
             changes(&id, "emission", ValueChange::Add(Rgb::new(dims[0], dims[1], dims[2]))),
@@ -133,12 +150,12 @@ fn sun() -> Emitter {
     Emitter::Directional { direction: vec3(-0.7, -1.0, 0.6), irradiance: Rgb::new(4.0, 5.0, 6.0) }
 }
 
-fn fog(sigma_t: [f64; 3], albedo: [f64; 3]) -> Result<Homogeneous> {
+pub(super) fn fog(sigma_t: [f64; 3], albedo: [f64; 3]) -> Result<Homogeneous> {
     Ok(Homogeneous::new(sigma_t.into(), albedo.into(), Rgb::ZERO)?)
 }
 
 /// A camera with fewer pixels than the check matrix needs.
-fn seen(origin: Vec3, target: Vec3, fov: f64, depth: u32) -> Result<Set> {
+pub(super) fn seen(origin: Vec3, target: Vec3, fov: f64, depth: u32) -> Result<Set> {
     let mut set = Set::new(origin, target, fov, depth)?;
     let sensor = &mut set.scene.sensors[0].item.sensor;
     *sensor = sensor.with_film([6; 2])?;
@@ -146,7 +163,7 @@ fn seen(origin: Vec3, target: Vec3, fov: f64, depth: u32) -> Result<Set> {
 }
 
 /// Random points in a box around the origin.
-fn scattered(count: usize, half: Vec3) -> Vec<Vec3> {
+pub(super) fn scattered(count: usize, half: Vec3) -> Vec<Vec3> {
     let mut rng = Rng::new(3, 0, 0);
     let mut next = || 2.0 * rng.next_f64() - 1.0;
     (0..count).map(|_| vec3(next() * half.x, next() * half.y, next() * half.z)).collect()

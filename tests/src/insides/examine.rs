@@ -3,11 +3,14 @@
 use std::fmt;
 use std::time::Instant;
 
-use drt_estimators::{Agreement, Estimate, Layer, Session, Settings, Unattended, agreement};
+use drt_estimators::{
+    Agreement, Estimate, Layer, Session, Settings, Unattended, agreement, finite_differences,
+};
 use drt_math::Rgb;
 
 use super::{Case, Way};
 use crate::Result;
+use crate::matrix::verdict::plus;
 
 /// Samples per pixel of the first round.
 const ROUND: u32 = 1 << 9;
@@ -17,6 +20,13 @@ const CLEAR: f64 = 2.0;
 
 /// Samples of what is wrong before it counts as unnoticed, over those of the first way.
 const PATIENCE: u32 = 4;
+
+/// Samples per pixel of the first finite differences, and of the last.
+const DIFFERENCES: u32 = 1 << 12;
+const MOST_DIFFERENCES: u32 = 1 << 20;
+
+/// How much noisier than the other ways finite differences may be.
+const COARSER: f64 = 3.0;
 
 /// A derivative image by one way, and whether it is that of the first.
 #[derive(Clone, Debug)]
@@ -44,6 +54,8 @@ pub struct Finding {
     pub right: Vec<Verdict>,
     /// The wrong ones.
     pub wrong: Vec<Verdict>,
+    /// Finite differences, if the case asks for them.
+    pub differences: Option<Verdict>,
     /// Contributions that were no numbers.
     pub non_finite: u64,
 }
@@ -53,7 +65,12 @@ impl Finding {
     #[must_use]
     pub fn holds(&self) -> bool {
         let right = self.right.iter().all(|v| v.agreement.agrees && v.noise <= self.limit);
-        right && !self.wrong.iter().any(|v| v.agreement.agrees) && self.non_finite == 0
+        let differences =
+            self.differences.iter().all(|v| v.agreement.agrees && v.noise <= COARSER * self.limit);
+        right
+            && differences
+            && !self.wrong.iter().any(|v| v.agreement.agrees)
+            && self.non_finite == 0
     }
 }
 
@@ -86,7 +103,49 @@ pub fn examine(case: &Case, noise: f64, samples: u32) -> Result<Finding> {
         }
         wrong.push(run.verdict(way, &first));
     }
-    Ok(Finding { name: case.name, limit: noise, right, wrong, non_finite })
+    let differences = case.step.map(|step| differences(case, step, noise, &first)).transpose()?;
+    Ok(Finding { name: case.name, limit: noise, right, wrong, differences, non_finite })
+}
+
+/// Finite differences by as many samples as the noise takes.
+fn differences(case: &Case, step: f64, noise: f64, first: &Layer) -> Result<Verdict> {
+    let start = Instant::now();
+    let way = &case.right[0];
+    let mut samples = DIFFERENCES;
+    loop {
+        let settings = Settings { threads: 1, seed: 201, spp: samples, ..Settings::default() };
+        let difference = |step: f64| -> Result<Layer> {
+            let parameters = std::slice::from_ref(&way.parameter);
+            let layers = finite_differences(&case.scene, parameters, &settings, step, &Unattended)?;
+            Ok(layers.into_iter().next().ok_or("no finite difference")?)
+        };
+        let half = difference(0.5 * step)?;
+        let relative = relative_noise(&half);
+        if relative > COARSER * noise && samples < MOST_DIFFERENCES {
+            samples *= 4;
+            continue;
+        }
+        let bias = plus(&difference(step)?, -1.0, &half);
+        return Ok(Verdict {
+            way: "finite differences",
+            agreement: compare_biased(first, &half, &bias),
+            noise: relative,
+            samples,
+            seconds: start.elapsed().as_secs_f64(),
+        });
+    }
+}
+
+/// A layer with the blocks in which another sees something.
+fn seen(layer: &Layer, by: &Layer) -> Layer {
+    let pairs = layer.blocks.iter().zip(&by.blocks);
+    let blocks = pairs.filter(|(_, by)| by.mean != Rgb::ZERO).map(|(b, _)| *b).collect();
+    Layer { blocks, ..layer.clone() }
+}
+
+/// The comparison with finite differences that are off by about a bias.
+fn compare_biased(a: &Layer, b: &Layer, bias: &Layer) -> Agreement {
+    agreement(&seen(a, b), &seen(b, b), Some(&seen(bias, b)))
 }
 
 /// The comparison of blocks in which something is seen: images here have fewer pixels than blocks.
@@ -94,6 +153,11 @@ fn compare(a: &Layer, b: &Layer) -> Agreement {
     let seen = |(a, b): &(&Estimate, &Estimate)| a.mean != Rgb::ZERO || b.mean != Rgb::ZERO;
     let (x, y) = a.blocks.iter().zip(&b.blocks).filter(seen).unzip();
     agreement(&Layer { blocks: x, ..a.clone() }, &Layer { blocks: y, ..b.clone() }, None)
+}
+
+/// Of the blocks in which something is seen.
+fn relative_noise(layer: &Layer) -> f64 {
+    seen(layer, layer).relative_noise(None)
 }
 
 /// A derivative image as far as it has been computed.
@@ -127,8 +191,7 @@ impl Run {
 
     /// Relative.
     fn noise(&self) -> f64 {
-        let seen = self.layer.blocks.iter().filter(|b| b.mean != Rgb::ZERO).copied().collect();
-        Layer { blocks: seen, ..self.layer.clone() }.relative_noise(None)
+        relative_noise(&self.layer)
     }
 
     /// Takes as many samples as the noise seen so far says are missing, and a little more, but no
@@ -164,7 +227,8 @@ impl fmt::Display for Table<'_> {
             write!(f, " {head:>7}")?;
         }
         writeln!(f)?;
-        let right = finding.right.iter().map(|v| ("", v, v.agreement.agrees));
+        let right =
+            finding.right.iter().chain(&finding.differences).map(|v| ("", v, v.agreement.agrees));
         let wrong = finding.wrong.iter().map(|v| ("wrong: ", v, !v.agreement.agrees));
         for (kind, v, as_expected) in right.chain(wrong) {
             let a = &v.agreement;

@@ -6,13 +6,14 @@
 
 pub mod cases;
 mod examine;
+pub mod sheets;
 mod stirred;
 
 pub use cases::Case;
 pub use examine::{Finding, Table, Verdict, examine};
 pub use stirred::Stirred;
 
-use drt_estimators::InsideKind;
+use drt_estimators::InteriorMotion;
 use drt_motion::Parameter;
 
 /// How the insides of all media move.
@@ -21,7 +22,7 @@ pub struct Way {
     /// The name in tables.
     pub name: &'static str,
     /// By the medium's index; the plan chooses for others.
-    pub insides: Vec<(usize, InsideKind)>,
+    pub insides: Vec<(usize, InteriorMotion)>,
     /// What is computed with it.
     pub parameter: Parameter,
 }

@@ -2,10 +2,13 @@
 
 use std::sync::Arc;
 
-use drt_estimators::{GivenTetrahedra, InsideKind, Scene};
+use drt_estimators::{GivenTetrahedra, InteriorMotion, Scene};
 use drt_geom::{Mesh, TetMesh, TetVertexOrigin, Tetrahedralization, TetrahedralizeInput};
 use drt_math::{Rng, Vec3, vec3};
-use drt_motion::{Carrier, Parameter, TetrahedralField, geometry_changes, move_mesh};
+use drt_motion::Parameter;
+use drt_motion::interior::{Carrier, TetrahedralField};
+use drt_motion::parameter::geometry_changes;
+use drt_motion::surface::move_mesh;
 
 use crate::Result;
 
@@ -68,10 +71,10 @@ impl Stirred {
 
     /// As what is asked for the first medium.
     #[must_use]
-    pub fn kind(&self) -> (usize, InsideKind) {
+    pub fn kind(&self) -> (usize, InteriorMotion) {
         let (mesh, velocities) = (self.mesh.clone(), self.velocities.as_slice().into());
         let given = GivenTetrahedra { mesh, velocities: vec![(0, velocities)] };
-        (0, InsideKind::Tetrahedral(Some(Arc::new(given))))
+        (0, InteriorMotion::Tetrahedral(Some(Arc::new(given))))
     }
 
     /// Wrong: vertices on surfaces move `factor` times as fast as these.

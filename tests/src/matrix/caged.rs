@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use drt_estimators::InsideKind;
+use drt_estimators::InteriorMotion;
 use drt_estimators::surface::Bsdf;
 use drt_geom::procedural::{bumpy_sphere, cube, icosphere};
 use drt_geom::{Mesh, load_obj, weld};
@@ -62,7 +62,7 @@ pub fn caged_milk() -> Result<Stage> {
 pub fn caged_glass() -> Result<Stage> {
     let half = vec3(0.6, 0.5, 0.55);
     let stage = body("caged glass", block([2, 2, 2], half), glass(), block([2, 1, 1], half * 1.3))?;
-    Ok(inside(stage, 1, &InsideKind::MeanValue))
+    Ok(inside(stage, 1, &InteriorMotion::MeanValue))
 }
 
 /// A solid in fog, and a cage around the solid alone.

@@ -1,6 +1,6 @@
 //! What is compared, and with how many samples.
 
-use drt_estimators::{InsideKind, Named, Scene, SceneEmitter};
+use drt_estimators::{InteriorMotion, Named, Scene, SceneEmitter};
 use drt_motion::{Effect, Parameter};
 
 use super::deforming::sky;
@@ -75,7 +75,7 @@ pub struct Stage {
     /// Boundary samples, per pixel on average.
     pub boundary_samples: u32,
     /// Media, by index, whose insides move otherwise than the plan would choose.
-    pub insides: Vec<(usize, InsideKind)>,
+    pub insides: Vec<(usize, InteriorMotion)>,
     /// One per parameter.
     pub cells: Vec<Cell>,
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, RoughDielectric};
-use drt_estimators::{InsideKind, Scene};
+use drt_estimators::{InteriorMotion, Scene};
 use drt_geom::Mesh;
 use drt_geom::procedural::{bumpy_sphere, cube, icosphere};
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
@@ -46,7 +46,7 @@ pub(super) fn flows(scene: &Scene, shape: &str, velocity: impl Fn(Vec3) -> Vec3)
 }
 
 /// The insides of the first media by one kind.
-pub(super) fn inside(stage: Stage, media: usize, kind: &InsideKind) -> Stage {
+pub(super) fn inside(stage: Stage, media: usize, kind: &InteriorMotion) -> Stage {
     Stage { insides: (0..media).map(|m| (m, kind.clone())).collect(), ..stage }
 }
 
@@ -85,7 +85,7 @@ pub fn wax() -> Result<Stage> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn mean_value_wax() -> Result<Stage> {
-    let mut stage = inside(bar("wax by mean values")?, 1, &InsideKind::MeanValue);
+    let mut stage = inside(bar("wax by mean values")?, 1, &InteriorMotion::MeanValue);
     stage.cells.truncate(2);
     stage.cells[1] = stage.cells[1].clone().at(0.2);
     Ok(stage)
@@ -96,7 +96,7 @@ pub fn mean_value_wax() -> Result<Stage> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn still_wax() -> Result<Stage> {
-    let mut stage = inside(bar("wax at rest")?, 1, &InsideKind::Static);
+    let mut stage = inside(bar("wax at rest")?, 1, &InteriorMotion::Static);
     stage.cells.truncate(3);
     stage.samples *= 2;
     Ok(stage)
@@ -129,7 +129,7 @@ pub fn jelly() -> Result<Stage> {
         Cell::new("jelly shakes", [flows(&scene, "block", shakes)]),
         Cell::new("body slides", [translate("body", vec3(0.8, 0.1, -0.4))]),
     ];
-    Ok(inside(Stage::new("jelly", scene, cells), 1, &InsideKind::Tetrahedral(None)))
+    Ok(inside(Stage::new("jelly", scene, cells), 1, &InteriorMotion::Tetrahedral(None)))
 }
 
 /// Refractive bodies that move as a whole, with the one field that fits.
@@ -155,7 +155,7 @@ pub fn sheared_glass() -> Result<Stage> {
         Cell::new("body sheared", [moves("body", shear)]).representative(),
         Cell::new("body turns", [turn("body", vec3(0.2, 1.0, 0.3), vec3(1.2, 0.0, 0.6))]),
     ];
-    Ok(inside(Stage::new("sheared glass", scene, cells), 1, &InsideKind::Affine))
+    Ok(inside(Stage::new("sheared glass", scene, cells), 1, &InteriorMotion::Affine))
 }
 
 /// A ball of one medium in a box of another.
@@ -179,7 +179,7 @@ pub fn nested() -> Result<Stage> {
         Cell::new("ball moves, box squeezed", [moving, flows(&scene, "box", squeezed)]),
         Cell::new("both deform", [flows(&scene, "ball", bulges), flows(&scene, "box", squeezed)]),
     ];
-    Ok(inside(Stage::new("nested", scene, cells), 2, &InsideKind::Blend))
+    Ok(inside(Stage::new("nested", scene, cells), 2, &InteriorMotion::Blend))
 }
 
 /// Two media that touch, by mean value coordinates.
@@ -187,7 +187,7 @@ pub fn nested() -> Result<Stage> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn touching() -> Result<Stage> {
-    let mut stage = inside(super::media::layers()?, 2, &InsideKind::MeanValue);
+    let mut stage = inside(super::media::layers()?, 2, &InteriorMotion::MeanValue);
     stage.name = "touching";
     // Corners at exactly the same places: mean value coordinates need closed surfaces.
     for shape in &mut stage.scene.shapes {
@@ -231,7 +231,7 @@ pub fn pulse() -> Result<Stage> {
         Cell::new("ball moves", [translate("ball", vec3(0.8, 0.4, -0.3))]),
         Cell::new("border sags", [flows(&scene, "border", sags)]),
     ];
-    Ok(inside(Stage::new("pulse", scene, cells), 1, &InsideKind::Tetrahedral(None)))
+    Ok(inside(Stage::new("pulse", scene, cells), 1, &InteriorMotion::Tetrahedral(None)))
 }
 
 /// A camera in fog that flows.
@@ -321,7 +321,7 @@ pub fn stirred_smoke() -> Result<Stage> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn still_smoke() -> Result<Stage> {
-    let mut stage = inside(stirred_smoke()?, 1, &InsideKind::Static);
+    let mut stage = inside(stirred_smoke()?, 1, &InteriorMotion::Static);
     stage.name = "smoke at rest";
     stage.cells.truncate(2);
     Ok(stage)

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use drt_estimators::InsideKind;
+use drt_estimators::InteriorMotion;
 use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, Phong, RoughDielectric};
 use drt_geom::Mesh;
@@ -92,7 +92,7 @@ pub fn blob() -> Result<Stage> {
 pub fn still_blob() -> Result<Stage> {
     let mut stage = blob()?;
     stage.name = "still blob";
-    stage.insides = vec![(0, InsideKind::Static)];
+    stage.insides = vec![(0, InteriorMotion::Static)];
     stage.cells.retain(|c| ["blob moves", "blob breathes"].contains(&&*c.parameter.name));
     Ok(stage)
 }

@@ -14,7 +14,7 @@ pub mod riding;
 pub mod scale;
 pub(crate) mod set;
 pub mod surfaces;
-mod verdict;
+pub(crate) mod verdict;
 
 pub use cell::{Cell, Stage};
 pub use set::Set;

@@ -1,6 +1,6 @@
 //! Stages in which a grid rides with a box that bends and twists.
 
-use drt_estimators::InsideKind;
+use drt_estimators::InteriorMotion;
 use drt_estimators::emitter::Emitter;
 use drt_geom::Mesh;
 use drt_geom::procedural::cube;
@@ -127,7 +127,7 @@ pub fn riding_inside() -> Result<Stage> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn riding_still() -> Result<Stage> {
-    let insides = vec![(0, InsideKind::Static)];
+    let insides = vec![(0, InteriorMotion::Static)];
     Ok(Stage { insides, ..stage("riding, still inside", 1.0)? })
 }
 
@@ -136,7 +136,7 @@ pub fn riding_still() -> Result<Stage> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn riding_tetrahedral() -> Result<Stage> {
-    let insides = vec![(0, InsideKind::Tetrahedral(None))];
+    let insides = vec![(0, InteriorMotion::Tetrahedral(None))];
     Ok(Stage { insides, ..stage("riding, tetrahedra", HALF)? })
 }
 
@@ -145,6 +145,6 @@ pub fn riding_tetrahedral() -> Result<Stage> {
 /// # Errors
 /// When the library rejects the scene.
 pub fn riding_mean_value() -> Result<Stage> {
-    let insides = vec![(0, InsideKind::MeanValue)];
+    let insides = vec![(0, InteriorMotion::MeanValue)];
     Ok(Stage { insides, ..stage("riding, mean value", HALF)? })
 }

@@ -151,7 +151,7 @@ fn compare(stage: &Stage, cell: &Cell, derivative: &Derivative, radiance: f64) -
 }
 
 /// Block means of `a + factor b`, with the errors of `a`.
-pub(super) fn plus(a: &Layer, factor: f64, b: &Layer) -> Layer {
+pub(crate) fn plus(a: &Layer, factor: f64, b: &Layer) -> Layer {
     let mut sum = a.clone();
     for (s, b) in sum.blocks.iter_mut().zip(&b.blocks) {
         s.mean += b.mean * factor;

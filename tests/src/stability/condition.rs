@@ -3,7 +3,7 @@
 use std::fmt;
 
 use drt_estimators::{
-    InsideKind, Layer, Rendering, Scene, Session, Settings, Target, Unattended, gradient,
+    InteriorMotion, Layer, Rendering, Scene, Session, Settings, Target, Unattended, gradient,
 };
 use drt_math::{Affine, Mat3, Rgb, Vec3};
 use drt_motion::{Change, Effect, GeometryChange, Parameter, ValueChange};
@@ -148,7 +148,7 @@ fn transposed(scene: &Scene, parameter: &Parameter) -> Result<Transposed> {
     }
     let scene = &scene;
     // Reverse mode leaves insides at rest.
-    let insides = (0..scene.media.len()).map(|m| (m, InsideKind::Static)).collect();
+    let insides = (0..scene.media.len()).map(|m| (m, InteriorMotion::Static)).collect();
     let settings = Settings { threads: 1, spp: 4, guiding: false, insides, ..Settings::default() };
     let mut forward = Session::new(scene, core::slice::from_ref(&parameter), &settings)?;
     forward.run(settings.spp, &Unattended);

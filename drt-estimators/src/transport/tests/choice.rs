@@ -12,7 +12,6 @@ use drt_motion::Parameter;
 use super::scenes::FILM;
 use crate::boundary::Receiver;
 use crate::contraction::{Contraction, Motion};
-use crate::inside;
 use crate::interior::{PixelSampler, sequence_name};
 use crate::kept::Kept;
 use crate::pixels::Sampler;
@@ -32,7 +31,7 @@ pub(crate) fn prepare(scene: &Scene, motion: &Parameter, depth: u32) -> (Prepare
     let world = World::new(scene, 0, Some(depth), None, Lit::Extended, &mut kept);
     let mut world = world.expect("a valid scene");
     let tangents = tangents.seen_by(0);
-    let insides = inside::wholes(&world, &tangents, &[]);
+    let insides = crate::medium_motion::MediumMotions::affine(&world, &tangents, &[]);
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());
     let settings = Settings { estimator: EstimatorKind::Radiative, ..Settings::default() };

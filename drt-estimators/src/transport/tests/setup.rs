@@ -12,15 +12,16 @@ use crate::contraction::{Contraction, Motion};
 use crate::emitter::EmitterGradient;
 use crate::interior::{PathView, Recorder};
 use crate::kept::Kept;
+use crate::medium_motion::MediumMotions;
 use crate::scene::Scene;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
 use crate::sensor::SensorGradient;
 use crate::surface::BsdfParams;
+use crate::tangents;
 use crate::transport::pairs::Pairs;
 use crate::transport::record::PathRecord;
 use crate::transport::velocity::{Material, Movers, PathVelocities, VelocityField};
 use crate::transport::{Lit, MaterialPoint, RecordedPath, Tracer, World};
-use crate::{inside, tangents};
 
 pub(super) fn set(name: &str, id: &str, property: &str, op: ValueChange) -> Parameter {
     parameter(name, 0.0, vec![changes(id, property, op)])
@@ -42,7 +43,7 @@ pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
     let depth = scene.integrator.max_depth;
     let mut world =
         World::new(at_value, 0, depth, None, Lit::All, &mut kept).expect("a valid scene");
-    let insides = inside::plan(&world, &tangents, &[], &mut kept).expect("a valid scene");
+    let insides = MediumMotions::plan(&world, &tangents, &[], &mut kept).expect("a valid scene");
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());
     (world, motion)

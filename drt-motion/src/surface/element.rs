@@ -1,8 +1,7 @@
 use drt_geom::Mesh;
 use drt_math::{Affine, Vec3};
 
-use crate::surface::normal_rate;
-use crate::{JetAdjoint, SurfaceJet, SurfacePoint, VertexGradient};
+use super::{JetAdjoint, SurfaceJet, SurfacePoint, VertexGradient, normal_rate};
 
 /// The local geometry of a mesh at a point: what every parameter's [`SurfaceJet`] there has in
 /// common, computed once.

@@ -5,8 +5,9 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::Vec3;
 
-use crate::error::Cause;
-use crate::{Applied, Cage, CageWeights, GeometryChange, MotionError};
+use crate::error::{Cause, MotionError};
+use crate::mean_value::{Cage, CageWeights};
+use crate::parameter::{Applied, GeometryChange};
 
 /// The cages that move a mesh: whatever the number of parameters, the coordinates of its vertices
 /// with respect to each cage are computed once.

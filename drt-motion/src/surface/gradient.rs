@@ -4,9 +4,10 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
-use crate::{SmoothNormals, SurfaceElement, SurfaceMotion, SurfacePoint, VolumeAdjoint};
+use super::{SmoothNormals, SurfaceElement, SurfaceMotion, SurfacePoint};
+use crate::volume::VolumeAdjoint;
 
-/// What multiplies each entry of a [`SurfaceJet`](crate::SurfaceJet) in a derivative.
+/// What multiplies each entry of a [`SurfaceJet`](super::SurfaceJet) in a derivative.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct JetAdjoint {
     /// Multiplies the velocity.
@@ -162,7 +163,7 @@ impl AffineGradient {
         self.linear = self.linear + outer(n, n * n.dot(g) - g);
     }
 
-    /// Adds the transpose of a [`VolumeJet`](crate::VolumeJet) at `x`, applied to `adjoint`.
+    /// Adds the transpose of a [`VolumeJet`](crate::volume::VolumeJet) at `x`, applied to `adjoint`.
     #[inline]
     pub fn scatter(&mut self, x: Vec3, adjoint: &VolumeAdjoint) {
         self.add_velocity(x, adjoint.u);

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use drt_geom::{Mesh, weld};
 use drt_math::{Vec3, fm};
 
-use crate::element::{Unit, area_rate, area_rate_transposed, edges_and_area};
+use super::element::{Unit, area_rate, area_rate_transposed, edges_and_area};
 
 /// Vertex normals recomputed from the positions of a deforming mesh, with their rates and the
 /// transpose of those.

@@ -4,9 +4,8 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, ValueChange, ValueMap};
 
-use crate::error::Cause;
-use crate::geometry::finite;
-use crate::{Applied, MotionError};
+use super::Applied;
+use crate::error::{Cause, MotionError, finite};
 
 /// How a number or colour of a material, medium, light or camera changes with theta.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,12 +1,25 @@
+//! Velocities of moving and deforming surfaces: at a point of a mesh its velocity, how its normals turn
+//! and how its area grows with a parameter, and the transposes of these maps.
+
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_geom::Mesh;
 use drt_math::{Affine, Vec3};
 
-use crate::SurfaceElement;
 use crate::error::Cause;
-use crate::geometry::finite;
+use crate::error::finite;
+
+mod caged;
+mod element;
+mod gradient;
+mod moved;
+mod normals;
+
+pub use element::SurfaceElement;
+pub use gradient::{AffineGradient, JetAdjoint, VertexGradient, in_file_order};
+pub use moved::{MovedFrame, MovedMesh, move_affine, move_mesh};
+pub use normals::SmoothNormals;
 
 /// A point of a mesh: the same material point however the mesh moves.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -15,7 +15,9 @@ use alloc::vec::Vec;
 use drt_geom::{Mesh, TetLocator, TetMesh, TetMeshError, TetVertexOrigin, Tetrahedralization};
 use drt_math::Vec3;
 
-use crate::{SurfaceMotion, SurfacePoint, VertexGradient, VolumeAdjoint, VolumeJet};
+use crate::surface::VertexGradient;
+use crate::volume::{VolumeAdjoint, VolumeJet};
+use crate::{SurfaceMotion, SurfacePoint};
 
 /// Tetrahedra that fill a part of space, and what each vertex belongs to; at rest elsewhere.
 #[derive(Clone, Debug)]

@@ -1,7 +1,16 @@
+//! Parameters as data: a name, a value, and lists of effects on geometry and on properties.
+
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use crate::{GeometryChange, MotionError, PropertyChange, error::Cause};
+use crate::error::{Cause, MotionError};
+
+mod geometry;
+mod property;
+
+pub use geometry::GeometryChange;
+
+pub use property::{ChangedValue, PropertyChange, change_value};
 
 /// One scalar unknown of a scene, theta: a name, the value it has now, and all it changes.
 ///
@@ -37,7 +46,7 @@ pub enum Change<T = String> {
     Geometry(GeometryChange),
     /// One of its numbers changes.
     Property(PropertyChange),
-    /// It rides along with whatever this same parameter does to the geometry of another target.
+    /// It follows whatever this same parameter does to the geometry of another target.
     Follow(T),
 }
 

@@ -4,10 +4,12 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
-use crate::caged::Caged;
+use super::caged::Caged;
+use super::{SmoothNormals, SurfaceMotion};
 use crate::error::Cause;
-use crate::geometry::finite;
-use crate::{Applied, GeometryChange, MotionError, SmoothNormals, SurfaceMotion};
+use crate::error::MotionError;
+use crate::error::finite;
+use crate::parameter::{Applied, GeometryChange};
 
 /// A mesh at the parameters' values, and how it goes on moving from there.
 #[derive(Clone, Debug)]

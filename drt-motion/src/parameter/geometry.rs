@@ -3,7 +3,7 @@ use alloc::sync::Arc;
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3, fm, vec3};
 
-use crate::error::Cause;
+use crate::error::{Cause, finite};
 
 /// How a shape, medium, light or camera moves with theta. Lengths are in scene units per unit of
 /// theta.
@@ -40,7 +40,7 @@ pub enum GeometryChange {
         direction: Vec3,
     },
     /// Every vertex x of the mesh, where the scene file places it, moves by theta times the sum of
-    /// λ(x) v over moving vertices of a [cage](crate::Cage): λ is the vertex's mean value coordinate
+    /// λ(x) v over moving vertices of a [cage](crate::mean_value::Cage): λ is the vertex's mean value coordinate
     /// and v its velocity.
     ///
     /// A mesh vertex outside of the cage moves, too; farther out than about the cage's size, coordinates
@@ -140,10 +140,6 @@ impl GeometryChange {
             None => Ok(()),
         }
     }
-}
-
-pub(crate) fn finite(ok: bool, what: &'static str) -> Result<(), Cause> {
-    if ok { Ok(()) } else { Err(Cause::NotFinite { what }) }
 }
 
 fn check_map(map: &Affine, theta: f64) -> Result<(), Cause> {

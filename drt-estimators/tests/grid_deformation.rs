@@ -1,11 +1,11 @@
-//! Grids that ride with a shape which deforms.
+//! Grids that follow a shape which deforms.
 
 mod common;
 
 use std::sync::Arc;
 
 use common::{moves, parameter, smoke};
-use drt_estimators::{Error, InsideKind, Rendering, Scene, Session, Settings, Unattended};
+use drt_estimators::{Error, InteriorMotion, Rendering, Scene, Session, Settings, Unattended};
 use drt_math::{Affine, Mat3, Vec3, vec3};
 use drt_motion::{Change, Effect, GeometryChange, Parameter};
 
@@ -14,7 +14,7 @@ const FIELD: Affine = Affine {
     translation: vec3(0.1, -0.2, 0.05),
 };
 
-fn rides() -> Effect {
+fn follows() -> Effect {
     Effect { target: "smoke".into(), change: Change::Follow("box".into()) }
 }
 
@@ -26,7 +26,7 @@ fn by_vertex(scene: &Scene, field: impl Fn(Vec3) -> Vec3) -> Effect {
 }
 
 fn prepared(scene: &Scene, parameters: &[Parameter]) -> Result<Session, Error> {
-    let insides = vec![(0, InsideKind::Static)];
+    let insides = vec![(0, InteriorMotion::Static)];
     let settings = Settings { spp: 32, insides, ..Settings::default() };
     Session::new(scene, parameters, &settings)
 }
@@ -43,8 +43,8 @@ fn rendered(scene: &Scene, value: f64, effects: Vec<Effect>) -> Rendering {
 fn an_affine_deformation_is_the_affine_motion() {
     for border in [0.0, 0.2] {
         let scene = smoke(border);
-        let affine = || vec![moves("box", GeometryChange::Matrix(FIELD)), rides()];
-        let vertices = || vec![by_vertex(&scene, |p| FIELD.point(p)), rides()];
+        let affine = || vec![moves("box", GeometryChange::Matrix(FIELD)), follows()];
+        let vertices = || vec![by_vertex(&scene, |p| FIELD.point(p)), follows()];
         for value in [0.0, 0.3] {
             let a = rendered(&scene, value, affine());
             let b = rendered(&scene, value, vertices());
@@ -74,8 +74,8 @@ fn nothing_shows_at_rest() {
     let scene = smoke(0.2);
     let bend = |p: Vec3| vec3(p.y * p.z, 0.3 * p.x, p.x * p.x);
     let alone = rendered(&scene, 0.0, vec![by_vertex(&scene, bend)]);
-    let riding = rendered(&scene, 0.0, vec![by_vertex(&scene, bend), rides()]);
-    assert!(alone.image.pixels.iter().zip(&riding.image.pixels).all(|(a, b)| a.mean == b.mean));
+    let following = rendered(&scene, 0.0, vec![by_vertex(&scene, bend), follows()]);
+    assert!(alone.image.pixels.iter().zip(&following.image.pixels).all(|(a, b)| a.mean == b.mean));
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn what_cannot_ride_says_why() {
         Ok(_) => panic!("it should not work"),
     };
     let twist = || by_vertex(&scene, |p| vec3(5.0 * p.z, 0.0, -5.0 * p.x) * p.y);
-    let far = reason(3.0, vec![twist(), rides()]);
+    let far = reason(3.0, vec![twist(), follows()]);
     assert!(far.contains("deforms too far") && far.contains("nearer to zero"), "{far}");
     let vertex = GeometryChange::Vertex { index: 0, direction: Vec3::X };
     let own = reason(0.1, vec![moves("smoke", vertex)]);

@@ -1,4 +1,4 @@
-//! Grids that ride with a shape which deforms: the deformation of space that carries both.
+//! Grids that follow a shape which deforms: the deformation of space that takes both along.
 //!
 //! Tetrahedra fill the space in the followed shape and around it, up to a box that holds the grid as
 //! well. Their vertices on the shape go where the shape goes; the others go with the affine part of the
@@ -14,30 +14,29 @@ use core::ops::ControlFlow;
 use drt_geom::{Mesh, TetrahedralizeInput, tetrahedralize};
 use drt_math::{Affine, Mat3, Vec3};
 use drt_medium::{Flow, FlowBasis, GridMedium, Medium, NodeWeights, Ray, SpaceMap};
-use drt_motion::{
-    Applied, Carrier, Deformation, DeformationError, GeometryChange, MotionError, MovedFrame,
-    SurfaceMotion, TetrahedralField, move_affine, move_mesh,
-};
+use drt_motion::deformation::{Deformation, DeformationError};
+use drt_motion::interior::{Carrier, MARGIN, TetrahedralField};
+use drt_motion::parameter::Applied;
+use drt_motion::surface::{MovedFrame, move_affine, move_mesh};
+use drt_motion::{GeometryChange, MotionError, SurfaceMotion};
 
-use crate::inside::MARGIN;
-
-/// Why a grid cannot ride.
-pub(crate) enum RideError {
+/// Why a grid cannot follow a shape.
+pub(crate) enum GridDeformationError {
     /// A change is at fault.
     Motion(MotionError),
     /// The shape is, or how far it has gone; with the first parameter that deforms it.
     Shape(usize, String),
 }
 
-impl From<MotionError> for RideError {
+impl From<MotionError> for GridDeformationError {
     fn from(e: MotionError) -> Self {
         Self::Motion(e)
     }
 }
 
-/// What changes do to a grid that rides with a shape.
-pub(crate) struct Ride {
-    deformation: Arc<Deformed>,
+/// What changes do to a grid that follows a shape.
+pub(crate) struct GridDeformation {
+    map: Arc<DeformedSpace>,
     /// The affine part of the changes.
     frame: MovedFrame,
     /// Nothing else has happened yet.
@@ -45,61 +44,62 @@ pub(crate) struct Ride {
     velocities: Vec<Arc<[Vec3]>>,
 }
 
-impl Ride {
-    /// The ride of a grid on a shape, given as it was before any change, that `changes` are made to.
+impl GridDeformation {
+    /// The deformation of a grid that follows a shape, given as it was before any change, that `changes` are made to.
     pub(crate) fn new(
         grid: &GridMedium,
         shape: &Mesh,
         changes: &[Applied<'_, GeometryChange>],
         parameters: usize,
-    ) -> Result<Self, RideError> {
+    ) -> Result<Self, GridDeformationError> {
         let again = changes.iter().map(|c| Applied { ..*c });
         let (affine, deforming): (Vec<_>, Vec<_>) =
             again.partition(|c| c.change.affine(c.theta).is_some());
         let culprit = deforming.first().map_or(0, |c| c.parameter);
         let frame = move_affine(&affine, parameters)?;
         let moved = move_mesh(shape, changes, parameters)?;
-        let field = fill(grid, shape).map_err(|reason| RideError::Shape(culprit, reason))?;
+        let field =
+            fill(grid, shape).map_err(|reason| GridDeformationError::Shape(culprit, reason))?;
         // What vertices on the shape do beyond the affine part; others do nothing beyond it.
         let spread = |own: Vec<Vec3>| {
             let motion = SurfaceMotion::Vertices { positions: own.into(), normals: None };
             field.velocities(&[Carrier { mesh: shape, motion: &motion }], &[])
         };
-        let carried = |p: &Vec3| frame.map.point(*p);
+        let placed = |p: &Vec3| frame.map.point(*p);
         let tets = field.mesh();
         let offsets =
-            shape.positions.iter().zip(&moved.mesh.positions).map(|(p, q)| *q - carried(p));
+            shape.positions.iter().zip(&moved.mesh.positions).map(|(p, q)| *q - placed(p));
         let offsets = spread(offsets.collect());
-        let positions = tets.positions.iter().zip(&*offsets).map(|(p, d)| carried(p) + *d);
+        let positions = tets.positions.iter().zip(&*offsets).map(|(p, d)| placed(p) + *d);
         let deformation = Deformation::new(tets, positions.collect())
-            .map_err(|e| RideError::Shape(culprit, turned_over(&e)))?;
+            .map_err(|e| GridDeformationError::Shape(culprit, turned_over(&e)))?;
         let velocities = moved.motions.iter().zip(&frame.velocities).map(|(motion, affine)| {
             let own = (0..shape.positions.len()).map(|v| {
-                motion.vertex_velocity(&moved.mesh, v) - affine.point(carried(&shape.positions[v]))
+                motion.vertex_velocity(&moved.mesh, v) - affine.point(placed(&shape.positions[v]))
             });
             let own = spread(own.collect());
-            tets.positions.iter().zip(&*own).map(|(p, v)| affine.point(carried(p)) + *v).collect()
+            tets.positions.iter().zip(&*own).map(|(p, v)| affine.point(placed(p)) + *v).collect()
         });
         Ok(Self {
             velocities: velocities.collect(),
             is_affine: deforming.iter().all(|c| c.theta == 0.0),
-            deformation: Arc::new(Deformed(deformation)),
+            map: Arc::new(DeformedSpace(deformation)),
             frame,
         })
     }
 
-    /// Takes the grids of a medium along.
-    pub(crate) fn carry(&self, medium: &mut Medium) -> Result<(), drt_medium::MediumError> {
+    /// Deforms the grids of a medium.
+    pub(crate) fn apply(&self, medium: &mut Medium) -> Result<(), drt_medium::MediumError> {
         if self.is_affine {
             return medium.place(&self.frame.map);
         }
-        medium.deform(self.deformation.clone())
+        medium.deform(self.map.clone())
     }
 
     /// The velocity of the grids by a parameter.
     pub(crate) fn flow(&self, parameter: usize) -> Flow {
         let nodes = self.velocities[parameter].clone();
-        Flow { basis: self.deformation.clone(), nodes }
+        Flow { basis: self.map.clone(), nodes }
     }
 }
 
@@ -131,9 +131,9 @@ fn turned_over(e: &DeformationError) -> String {
 
 /// A deformation as media see it.
 #[derive(Debug)]
-struct Deformed(Deformation);
+struct DeformedSpace(Deformation);
 
-impl SpaceMap for Deformed {
+impl SpaceMap for DeformedSpace {
     fn material(&self, x: Vec3) -> Option<(Vec3, Mat3)> {
         self.0.place(x).map(|place| (place.material, place.inverse))
     }
@@ -144,7 +144,7 @@ impl SpaceMap for Deformed {
     }
 }
 
-impl FlowBasis for Deformed {
+impl FlowBasis for DeformedSpace {
     fn weights(&self, x: Vec3) -> NodeWeights {
         let place = self.0.place(x);
         place.map_or_else(NodeWeights::default, |p| NodeWeights {

@@ -25,8 +25,8 @@ use alloc::vec::Vec;
 use drt_geom::{TriangleBvh, nearest_point};
 use drt_math::{Affine, Mat3, Vec3};
 
-use crate::VolumeJet;
-use crate::distances::Distances;
+use super::distances::Distances;
+use crate::volume::VolumeJet;
 
 /// Something that moves on its own.
 #[derive(Clone, Debug)]
