@@ -158,7 +158,7 @@ fn derivatives(
 /// A scattered gradient along the velocities of the one parameter.
 fn along(motion: &Motion, world: &World, sink: ScatterSink<'_>) -> f64 {
     let gradient = sink.into_gradient();
-    let of = |(s, g): (usize, &Option<drt_motion::transpose::VertexGradient>)| {
+    let of = |(s, g): (usize, &Option<drt_motion::surface::VertexGradient>)| {
         let (g, (_, surface)) = (g.as_ref()?, motion.tangents.shapes[s].first()?);
         Some(g.dot(&world.scene.shapes[s].mesh, surface))
     };
