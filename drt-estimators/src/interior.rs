@@ -254,9 +254,12 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             look,
         };
         let mut at = 1;
+        let numbers = self.tracer.rng.clone();
         for (worker, view) in self.workers.iter_mut().zip(&mut self.views) {
             let n = worker.sink.layers();
             at = usize::max(at, 1 + n);
+            // What one does must not depend on how many numbers another takes.
+            self.tracer.rng = numbers.clone();
             worker.add(&mut self.tracer, &path, view, at, values);
             if self.separate {
                 at += n * worker.along.terms().count();

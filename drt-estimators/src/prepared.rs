@@ -108,7 +108,7 @@ impl Prepared {
         let flux = (interest.moves_geometry() || interest.grids.contains(&true))
             .then(|| Flux::spatial(&world, interest))
             .flatten();
-        let mut radiative = match motion {
+        let radiative = match motion {
             Some(motion) => Radiative::new(&world, interest, motion.speeds(&world))?,
             None => Radiative::new(&world, interest, |_| 1.0)?,
         };
@@ -116,9 +116,6 @@ impl Prepared {
             if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
         let has_edges = radiative.has_edges(&world);
         let looks = has_edges && !settings.every_vertex;
-        if looks {
-            radiative.weigh(&world, interest);
-        }
         let boundary_ratio = boundary_ratio(settings, sources.len() + usize::from(looks));
         let edge_on = seen_edge_on(&world, flux.as_ref(), interest, &mut sources)?;
         let looks = match settings.every_vertex {

@@ -24,7 +24,7 @@
 //! Cost is linear in path length: of all vertices of a path one, mostly in proportion to its throughput
 //! times an estimate of what edges amount to from there, looks for an edge, and of all surfaces met one
 //! is asked for its flux; each traces side paths that
-//! branch no more, more seldom where they [count for little](worth). (The paper does both at every vertex, at a cost that is quadratic;
+//! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
 //! [`every_vertex`](crate::Settings::every_vertex) does so with edges.)
 //!
 //! Light from points and directions does not fit this form: its shadows make radiance jump along lines
@@ -39,7 +39,6 @@ mod outlines;
 mod tree;
 mod vertices;
 mod views;
-mod worth;
 
 use alloc::vec::Vec;
 
@@ -50,7 +49,6 @@ use jumps::{Jump, Jumps};
 pub(crate) use tree::Options;
 pub(crate) use vertices::Edged;
 use views::Views;
-use worth::Worth;
 
 use crate::Error;
 use crate::boundary::edges::Edge;
@@ -71,8 +69,6 @@ pub(crate) struct Radiative {
     /// stands still, too.
     resting: Option<Views>,
     chambers: Chambers,
-    /// Of looks from vertices.
-    worth: Worth,
     /// Edges that can be chosen, and edges in all.
     pub(crate) count: [u64; 2],
 }
@@ -192,7 +188,7 @@ impl Radiative {
         let resting = resting.map(|views| views.before(world, &chambers, &holding));
         let all = views(&|_| 1.0);
         let count = [jumps.list.len() as u64, jumps.all];
-        Ok(Self { jumps, camera, moving, all, resting, chambers, worth: Worth::default(), count })
+        Ok(Self { jumps, camera, moving, all, resting, chambers, count })
     }
 
     /// True when the camera can see something change.

@@ -68,26 +68,10 @@ impl Radiative {
         path: &RecordedPath<'_>,
         look: &Look,
     ) -> Option<Edged> {
-        let mut glance = self.glance(tracer, path, look)?;
-        let chance = self.worth.chance(glance.weight.max_abs());
-        if chance < 1.0 && tracer.rng.next_f64() >= chance {
-            return None;
-        }
-        glance.weight = glance.weight / chance;
-        glance.follow(tracer)
-    }
-
-    /// The same before anything is traced.
-    pub(super) fn glance<'a>(
-        &'a self,
-        tracer: &mut Tracer<'_>,
-        path: &RecordedPath<'a>,
-        look: &Look,
-    ) -> Option<Glance<'a>> {
         let nodes = 1..path.record.nodes.len();
         let (sought, likely, look) = self.sought(path, nodes, look);
         let (node, chance) = self.choose_vertex(tracer, path, sought, look.vertex)?;
-        self.glance_from(tracer, path, node, sought, likely * chance, &look)
+        self.glance_from(tracer, path, node, sought, likely * chance, &look)?.follow(tracer)
     }
 
     /// The same from a given vertex.
