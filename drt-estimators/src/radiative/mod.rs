@@ -31,7 +31,6 @@
 //! on surfaces, which would be edges of the vertex before. A [`Session`](crate::Session) leaves such lights to
 //! the path-space estimator and adds the two.
 
-mod chambers;
 mod choice;
 mod difference;
 mod jumps;
@@ -44,7 +43,6 @@ use alloc::vec::Vec;
 
 use drt_math::{CdfTable, Rng};
 
-use chambers::Chambers;
 use jumps::{Jump, Jumps};
 pub(crate) use tree::Options;
 pub(crate) use vertices::Edged;
@@ -68,7 +66,6 @@ pub(crate) struct Radiative {
     /// At rest, before something that moves and holds what is seen of it: this counts for a vertex that
     /// stands still, too.
     resting: Option<Views>,
-    chambers: Chambers,
     /// Edges that can be chosen, and edges in all.
     pub(crate) count: [u64; 2],
 }
@@ -181,14 +178,13 @@ impl Radiative {
         let seen =
             jumps.list.iter().zip(&speeds).map(|(j, s)| relative(*s) * jumps.seen_from(j, eye));
         let camera = Outlines::new(seen)?;
-        let chambers = Chambers::new(world);
-        let views = |matter: &dyn Fn(&Jump) -> f64| Views::new(world, &chambers, &jumps, matter);
+        let views = |matter: &dyn Fn(&Jump) -> f64| Views::new(world, &jumps, matter);
         let moving = views(&|j| if fastest > 0.0 { moves(j) / fastest } else { 0.0 });
         let resting = at_rest.then(|| views(&|j| if moves(j) > 0.0 { 0.0 } else { 1.0 })).flatten();
-        let resting = resting.map(|views| views.before(world, &chambers, &holding));
+        let resting = resting.map(|views| views.before(world, &holding));
         let all = views(&|_| 1.0);
         let count = [jumps.list.len() as u64, jumps.all];
-        Ok(Self { jumps, camera, moving, all, resting, chambers, count })
+        Ok(Self { jumps, camera, moving, all, resting, count })
     }
 
     /// True when the camera can see something change.

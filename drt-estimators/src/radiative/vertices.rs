@@ -121,7 +121,7 @@ impl Radiative {
         let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
         let wo = -arrival.dir;
         tracer.counters.boundary_samples += 1;
-        let views = self.views(tracer.world, vertex, moves, sought)?;
+        let views = self.views(moves, sought)?;
         let around = &viewpoint(tracer.world, vertex, wo);
         let chosen = views.sample(&self.jumps, around, look, &mut tracer.options)?;
         let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex)?;
@@ -137,20 +137,13 @@ impl Radiative {
     }
 
     /// What edges a vertex may look at.
-    fn views(
-        &self,
-        world: &World,
-        vertex: &Vertex,
-        carried: bool,
-        sought: Sought,
-    ) -> Option<&Views> {
-        let views = match (sought, carried) {
-            (Sought::Moving, true) => return self.all.as_ref(),
-            (Sought::Moving, false) => &self.moving,
-            (Sought::Resting, true) => return None,
-            (Sought::Resting, false) => &self.resting,
-        };
-        views.as_ref().filter(|views| self.chambers.in_sight(world, &views.among, vertex))
+    fn views(&self, moves: bool, sought: Sought) -> Option<&Views> {
+        match (sought, moves) {
+            (Sought::Moving, true) => self.all.as_ref(),
+            (Sought::Moving, false) => self.moving.as_ref(),
+            (Sought::Resting, true) => None,
+            (Sought::Resting, false) => self.resting.as_ref(),
+        }
     }
 
     /// An estimate of how much edges matter to a vertex; 0 only if they do not.
@@ -163,7 +156,7 @@ impl Radiative {
         sought: Sought,
     ) -> f64 {
         let Tracer { world, options, .. } = tracer;
-        let Some(views) = self.views(world, vertex, carried, sought) else { return 0.0 };
+        let Some(views) = self.views(carried, sought) else { return 0.0 };
         let amount = views.amount(&viewpoint(world, vertex, wo), options);
         if carried { CARRIED * amount } else { amount }
     }

@@ -11,7 +11,6 @@ use alloc::vec::Vec;
 use drt_geom::Aabb;
 use drt_math::Vec3;
 
-use super::chambers::{Among, Chambers};
 use super::jumps::{Jump, Jumps};
 use super::tree::{Draw, EdgeTree, MOST_WAYS, Options, Segment, Viewpoint, Way};
 use super::{Chosen, Look};
@@ -40,37 +39,26 @@ pub(super) struct Views {
     /// The part of looks that go towards some spheres, and these.
     share: f64,
     toward: Vec<Sphere>,
-    /// The chambers in which something can be seen of it.
-    pub(super) among: Among,
 }
 
 impl Views {
     /// Of the jumps that `matter`, in proportion to how much; `None` without any.
-    pub(super) fn new(
-        world: &World,
-        chambers: &Chambers,
-        jumps: &Jumps,
-        matter: impl Fn(&Jump) -> f64,
-    ) -> Option<Self> {
+    pub(super) fn new(world: &World, jumps: &Jumps, matter: impl Fn(&Jump) -> f64) -> Option<Self> {
         let weighed = (0..).zip(&jumps.list).map(|(i, jump)| (i, jump, matter(jump)));
         let kept = weighed.filter(|(_, _, weight)| *weight > 0.0);
         let (indices, segments): (Vec<u32>, Vec<Segment>) =
             kept.map(|(i, jump, weight)| (i, segment(jumps, jump, weight))).unzip();
         let tree = EdgeTree::new(&segments)?;
-        let list = indices.iter().map(|i| &jumps.list[*i as usize]);
-        let among = chambers.of_edges(world, jumps, list);
         let toward = lamps(world);
         let share = if toward.is_empty() { 0.0 } else { TOWARD_LAMPS };
-        Some(Self { tree, jumps: indices, share, toward, among })
+        Some(Self { tree, jumps: indices, share, toward })
     }
 
     /// The same, looking only at what may be before some of the shapes.
-    pub(super) fn before(self, world: &World, chambers: &Chambers, shapes: &[u32]) -> Self {
+    pub(super) fn before(self, world: &World, shapes: &[u32]) -> Self {
         let bounds = shapes.iter().map(|s| world.scene.shapes[*s as usize].mesh.bounds());
         let toward = bounds.reduce(|a, b| a.union(&b)).map(|b| Sphere::around(&b));
-        let seen = chambers.of_shapes(world, shapes.iter().copied());
-        let among = self.among.and(&seen);
-        Self { share: 1.0, toward: toward.into_iter().collect(), among, ..self }
+        Self { share: 1.0, toward: toward.into_iter().collect(), ..self }
     }
 
     /// An estimate of how much there is to see: an integral of scattering and edges.
