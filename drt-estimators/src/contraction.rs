@@ -4,10 +4,8 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
 use drt_medium::{CoefficientGradients, CoefficientRates, DepthEstimate, FlowPlace, MediumTangent};
-use drt_motion::SurfaceMotion;
 use drt_motion::interior::BasisValues;
 
-use crate::boundary::edges::Edge;
 use crate::emitter::EmitterGradient;
 use crate::medium_motion::MediumMotions;
 use crate::sensitivity::{AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint};
@@ -66,31 +64,6 @@ impl Motion {
             bsdfs: self.interest.bsdfs.clone(),
             roughness: self.tangents.bsdfs.iter().map(roughens).collect(),
             index: self.tangents.bsdfs.iter().map(bends).collect(),
-        }
-    }
-
-    /// How fast an edge moves across itself, at most and relative to the fastest vertex of each
-    /// parameter: 0 only for edges that stay in their lines.
-    pub(crate) fn speeds<'a>(&'a self, world: &'a World) -> impl Fn(&Edge) -> f64 + 'a {
-        let mut fastest = alloc::vec![0.0; self.parameters()];
-        for (shape, motions) in world.scene.shapes.iter().zip(&self.tangents.shapes) {
-            for (p, motion) in motions {
-                let speeds = (0..shape.mesh.positions.len())
-                    .map(|v| motion.vertex_velocity(&shape.mesh, v).length());
-                fastest[*p] = speeds.fold(fastest[*p], f64::max);
-            }
-        }
-        move |edge| {
-            let shape = edge.shape as usize;
-            let mesh = &world.scene.shapes[shape].mesh;
-            let speed = |(p, motion): &(usize, SurfaceMotion)| {
-                let across = |end: f64| {
-                    let velocity = motion.velocity(mesh, &edge.point(end).1.at);
-                    velocity.reject(edge.tangent).length()
-                };
-                f64::max(across(0.0), across(1.0)) / f64::max(fastest[*p], f64::MIN_POSITIVE)
-            };
-            self.tangents.shapes[shape].iter().map(speed).fold(0.0, f64::max)
         }
     }
 

@@ -5,7 +5,7 @@ mod recorder;
 
 use alloc::vec::Vec;
 
-use drt_math::sobol::{SET_DIMENSIONS, SobolSampler};
+use drt_math::sobol::SobolSampler;
 use drt_math::{Rgb, Rng};
 
 pub(crate) use component::Component;
@@ -19,16 +19,9 @@ use crate::pixels::Sampler;
 use crate::radiative::{Look, Radiative};
 use crate::rendering::{Account, Counters, NonFinite, Term};
 use crate::sensitivity::{AdjointSink, Functional};
+use crate::streams::{DIMENSIONS, FLUX_STREAM, PAIR_STREAM};
 use crate::transport::record::PathRecord;
 use crate::transport::{Radiance, RayPath, Tracer, World};
-
-/// Random-number streams are pixels; the top bits tell other uses apart.
-pub(crate) const LINE_STREAM: u64 = 1 << 62;
-const FLUX_STREAM: u64 = 1 << 61;
-pub(crate) const SEQUENCE_STREAM: u64 = 1 << 60;
-const PAIR_STREAM: u64 = 1 << 59;
-/// Numbers of a sample that are spread evenly: image point, and the first vertices.
-pub(crate) const DIMENSIONS: u32 = SET_DIMENSIONS;
 
 /// Boundary and flux terms that are found along camera rays.
 #[derive(Clone, Copy, Default)]
@@ -78,11 +71,6 @@ impl AlongRays<'_> {
         let edges = if self.looks.any() { &[Term::Direct, Term::Indirect][..] } else { &[] };
         flux.into_iter().chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
     }
-}
-
-/// The name of a Sobol' sequence of a pixel.
-pub(crate) fn sequence_name(seed: u64, pixel: u32, number: u32) -> u32 {
-    Rng::new(seed, SEQUENCE_STREAM | u64::from(pixel), number).next_u32()
 }
 
 /// Where the derivatives of a pixel's paths go.

@@ -38,6 +38,7 @@ pub mod sensor;
 mod session;
 mod settings;
 mod splatting;
+mod streams;
 pub mod surface;
 mod tangents;
 mod transport;

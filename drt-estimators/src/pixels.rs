@@ -8,9 +8,9 @@ use drt_math::sobol::SobolSampler;
 
 use crate::allocation::{Allocation, MOST};
 use crate::film::{PixelFilm, Tile};
-use crate::interior::sequence_name;
 use crate::parallel::Pool;
 use crate::rendering::BLOCKS;
+use crate::streams::sequence_name;
 
 /// Pixels of a tile.
 const TILE: u32 = 256;

@@ -1,8 +1,10 @@
 //! Everything sampling needs that does not depend on how many parameters there are.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use crate::Error;
+use crate::boundary::speeds::speeds;
 use crate::boundary::{Boundary, Strategy};
 use crate::contraction::Motion;
 use crate::film::BATCHES;
@@ -13,6 +15,7 @@ use crate::sensitivity::Interest;
 use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::{Source, Splatter};
 use crate::transport::World;
+use crate::transport::velocity::Spatial;
 
 /// A scene ready to be sampled for what is of interest.
 pub(crate) struct Prepared {
@@ -95,22 +98,19 @@ impl Prepared {
 
     /// For the 2019 estimator.
     fn spatial(
-        mut world: World,
+        world: World,
         interest: &Interest,
         settings: &Settings,
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
-        if interest.moves_geometry() {
-            world.prepare_blends(interest);
-            world.prepare_warps();
-        }
+        let spatial = Arc::new(Spatial::new(&world, interest));
         // Grids that move sweep over what stands still.
         let flux = (interest.moves_geometry() || interest.grids.contains(&true))
-            .then(|| Flux::spatial(&world, interest))
+            .then(|| Flux::spatial(&world, interest, &spatial))
             .flatten();
         let radiative = match motion {
-            Some(motion) => Radiative::new(&world, interest, motion.speeds(&world))?,
-            None => Radiative::new(&world, interest, |_| 1.0)?,
+            Some(motion) => Radiative::new(&world, interest, spatial, speeds(motion, &world))?,
+            None => Radiative::new(&world, interest, spatial, |_| 1.0)?,
         };
         let mut sources =
             if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
@@ -145,6 +145,16 @@ impl Prepared {
             radiative: self.radiative.as_ref(),
             looks: self.looks,
             opposites: self.opposites,
+        }
+    }
+
+    /// Changes how vertices move in the spatial form.
+    #[cfg(all(test, feature = "std"))]
+    pub(crate) fn change_spatial(&mut self, change: impl FnOnce(&mut Spatial)) {
+        let radiative = self.radiative.as_mut().expect("the spatial form");
+        change(Arc::make_mut(&mut radiative.spatial));
+        if let Some(flux) = &mut self.flux {
+            flux.spatial = Some(Arc::clone(&radiative.spatial));
         }
     }
 

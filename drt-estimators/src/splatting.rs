@@ -9,10 +9,10 @@ use crate::boundary::{self, Boundary, Receiver, Strategy};
 use crate::contraction::{Contraction, Motion};
 use crate::film::Splats;
 use crate::flux::{self, EdgeOn};
-use crate::interior::{DIMENSIONS, SEQUENCE_STREAM};
 use crate::radiative::Radiative;
 use crate::rendering::{Account, NonFinite, Term};
 use crate::sensitivity::Functional;
+use crate::streams::{DIMENSIONS, SEQUENCE_STREAM};
 use crate::transport::{Tracer, World};
 
 /// A splatted source of derivatives.

@@ -96,11 +96,6 @@ impl Edge {
         (sum.length_squared() > 1e-8).then(|| sum.normalize())
     }
 
-    /// The angle by which the surface turns, times the length.
-    pub(crate) fn turn(&self) -> (f64, f64) {
-        (if self.faces[0] == self.faces[1] { 0.0 } else { PI - self.between }, self.length)
-    }
-
     /// Normals of the faces' planes. Directions that graze the edge with both faces on one side have
     /// products of the same sign with both.
     pub(super) fn plane_normals(&self) -> [Vec3; 2] {

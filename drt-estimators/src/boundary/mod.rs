@@ -26,6 +26,7 @@ pub(crate) mod contact;
 pub(crate) mod edges;
 mod movers;
 pub(crate) mod shadow;
+pub(crate) mod speeds;
 mod weld;
 
 use alloc::vec::Vec;

@@ -40,6 +40,7 @@ pub(crate) use edge_on::{Buffers, EdgeOn};
 pub(crate) use reservoir::Reservoir;
 
 use crate::sensitivity::Interest;
+use crate::transport::velocity::Spatial;
 use crate::transport::velocity::warp::GRAZED;
 use crate::transport::world::Tracking;
 use crate::transport::{SurfacePoint, Vertex, World};
@@ -60,6 +61,8 @@ pub(crate) struct Flux {
     longest: u32,
     /// In the spatial form: where there is a flux even if the ray stands still.
     movers: Option<Movers>,
+    /// And how vertices move there.
+    pub(crate) spatial: Option<Arc<Spatial>>,
     /// What a flux must count for to be followed for every path, in those.
     pub(crate) followed: f64,
 }
@@ -89,12 +92,17 @@ impl Flux {
             largest: largest(world),
             longest: longest(world),
             movers: None,
+            spatial: None,
             followed: 1.0,
         })
     }
 
     /// Of the spatial form; `None` when no medium has vertices.
-    pub(crate) fn spatial(world: &World, interest: &Interest) -> Option<Self> {
+    pub(crate) fn spatial(
+        world: &World,
+        interest: &Interest,
+        spatial: &Arc<Spatial>,
+    ) -> Option<Self> {
         let media = 0..world.scene.media.len();
         let tracked = |m: usize| world.tracking[m] == Tracking::Vertices;
         let grids = media.clone().map(|m| tracked(m) && ends_inside(world, m)).collect();
@@ -108,6 +116,7 @@ impl Flux {
             largest: largest(world),
             longest: longest(world),
             movers: Some(movers),
+            spatial: Some(Arc::clone(&spatial)),
             followed: 1.0,
         })
     }

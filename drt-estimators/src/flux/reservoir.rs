@@ -3,6 +3,7 @@
 #[cfg(test)]
 mod tests;
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::{Real, Rgb, Rng, Vec3};
@@ -10,6 +11,7 @@ use drt_math::{Real, Rgb, Rng, Vec3};
 use super::{EDGE_ON, Flux, filled};
 use crate::sensitivity::{Functional, Rate};
 use crate::transport::trace::{Leaving, Tracer};
+use crate::transport::velocity::Spatial;
 use crate::transport::velocity::warp::{Stretch, SurfaceHit, list_hits};
 use crate::transport::world::intervals;
 use crate::transport::{MaterialPoint, Radiance, RayPath, SurfacePoint, Vertex, World};
@@ -304,12 +306,13 @@ impl Flux {
         if fullness == 0.0 {
             return None;
         }
-        let left = match world.warped_free_path(medium) {
+        let left = match self.spatial.as_ref().and_then(|s| s.free_path(medium)) {
             Some(reach) => Stretch::new(ends, reach).left(end),
             None => [1.0, 0.0],
         };
         // What holds to the medium goes with its surfaces.
-        let free = 1.0 - world.blend_inside(viewer, medium);
+        let blended = |s: &Arc<Spatial>| s.blends.inside(viewer, medium);
+        let free = 1.0 - self.spatial.as_ref().map_or(0.0, blended);
         let left = left.map(|left| left * free);
         // The medium begins at one surface, and ends at the other.
         let sign = if end == 1 { 1.0 } else { -1.0 };

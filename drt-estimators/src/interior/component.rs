@@ -5,13 +5,14 @@ use alloc::sync::Arc;
 use drt_math::{Rgb, RgbVec, Rng};
 
 use super::recorder::PathView;
-use super::{AlongRays, LINE_STREAM, Looks, PathSink};
+use super::{AlongRays, Looks, PathSink};
 use crate::boundary::shadow;
-use crate::radiative::{Edged, Look, Radiative};
+use crate::radiative::{Edged, Look, Options, Radiative};
 use crate::sensitivity::{Rate, SurfaceAdjoint};
+use crate::streams::LINE_STREAM;
 use crate::transport::pairs::{Brought, Pairs};
 use crate::transport::record::PathRecord;
-use crate::transport::velocity::{Material, Movers, PathVelocities, Spatial, VelocityField};
+use crate::transport::velocity::{Material, Movers, PathVelocities, VelocityField};
 use crate::transport::{Differentiator, RayPath, Tracer, World};
 
 /// What one estimator differentiates of the paths through pixels.
@@ -29,6 +30,8 @@ pub(super) struct Worker<'a, S> {
     differentiator: Differentiator<'a>,
     shadow_buffers: shadow::Buffers,
     brought: Brought,
+    /// Of the edge tree.
+    options: Options,
     separate: bool,
     pub(super) differentiated: u64,
     /// Rays that looks took.
@@ -52,10 +55,9 @@ impl<'a, S: PathSink> Worker<'a, S> {
     /// With what it keeps of each path.
     pub(super) fn new(component: Component<'a, S>, separate: bool) -> (Self, PathView<'a>) {
         let Component { world, along, sink } = component;
-        let movers = Movers::new(sink.interest());
         let field: Arc<dyn VelocityField> = match along.radiative {
-            Some(_) => Arc::new(Spatial::new(movers)),
-            None => Arc::new(Material::new(movers)),
+            Some(radiative) => Arc::clone(&radiative.spatial) as _,
+            None => Arc::new(Material::new(Movers::new(sink.interest()))),
         };
         let view = PathView {
             world,
@@ -69,6 +71,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
             differentiator: Differentiator::new(world),
             shadow_buffers: shadow::Buffers::default(),
             brought: Brought::default(),
+            options: Options::default(),
             separate,
             differentiated: 0,
             looking: 0,
@@ -186,7 +189,9 @@ impl<'a, S: PathSink> Worker<'a, S> {
                     let numbers = if left == looks { &mut first } else { rng };
                     left -= 1.0;
                     let look = taken.then(|| Look::new(numbers));
-                    let edge = look.and_then(|look| radiative.edge(tracer, recorded, &look));
+                    let edge = look.and_then(|look| {
+                        radiative.edge(tracer, recorded, &look, &mut self.options)
+                    });
                     self.send(path.record, view, edge, 1.0 / looks, values);
                 }
             }
@@ -194,7 +199,8 @@ impl<'a, S: PathSink> Worker<'a, S> {
                 for node in 1..path.record.nodes.len() {
                     let rng = &mut tracer.rng;
                     let look = Look::new(if node == 1 { &mut first } else { rng });
-                    let edge = radiative.edge_from(tracer, recorded, node, &look);
+                    let edge =
+                        radiative.edge_from(tracer, recorded, node, &look, &mut self.options);
                     self.send(path.record, view, edge, 1.0, values);
                 }
             }

@@ -3,7 +3,9 @@
 
 use drt_math::{Rgb, Vec3};
 
-use super::jumps::{Jump, Jumps, Sides};
+use super::Radiative;
+use super::jumps::{Jump, Sides};
+use crate::transport::velocity::blend::Blends;
 use crate::transport::{Kind, Matter, Radiance, Tracer, Vertex};
 
 /// An edge point and a viewer of it.
@@ -19,6 +21,7 @@ pub(super) struct Sight<'a> {
     medium: Option<usize>,
     own_faces: [u32; 2],
     viewer: &'a Vertex,
+    blends: &'a Blends,
 }
 
 /// What is seen on one side of an edge.
@@ -38,7 +41,7 @@ impl<'a> Sight<'a> {
     /// Of the point `along` an edge, from a viewer; `None` where the edge is seen end on.
     pub(super) fn new(
         tracer: &Tracer<'_>,
-        jumps: &Jumps,
+        radiative: &'a Radiative,
         jump: &'a Jump,
         along: f64,
         viewer: &'a Vertex,
@@ -47,10 +50,22 @@ impl<'a> Sight<'a> {
         let to = viewer.x - x;
         let distance = to.length();
         let w = to / distance;
+        let Radiative { jumps, spatial, .. } = radiative;
         let sides = jumps.sides(jump, w)?;
         let own_faces = sides.own_faces()?;
         let medium = jump.medium(tracer.world, &sides, x, w);
-        Some(Self { jump, along, x, w, distance, sides, medium, own_faces, viewer })
+        Some(Self {
+            jump,
+            along,
+            x,
+            w,
+            distance,
+            sides,
+            medium,
+            own_faces,
+            viewer,
+            blends: &spatial.blends,
+        })
     }
 
     /// Transmittance to the viewer, if nothing blocks.
@@ -110,8 +125,8 @@ impl<'a> Sight<'a> {
         tracer.radiance_from(vertex, self.w, &mut light);
         let world = tracer.world;
         let hold = match self.viewer.kind {
-            Kind::Point => world.blend_in_view(&vertex),
-            _ => world.blend(self.viewer, &vertex, -self.w, distance),
+            Kind::Point => self.blends.in_view(world, &vertex),
+            _ => self.blends.of(world, self.viewer, &vertex, -self.w, distance),
         };
         let hold = hold.weight * self.distance / distance;
         Side { light: light.0, hold, distance, matter: vertex.matter() }

@@ -39,6 +39,7 @@ mod tree;
 mod vertices;
 mod views;
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::{CdfTable, Rng};
@@ -52,10 +53,13 @@ use crate::Error;
 use crate::boundary::edges::Edge;
 use crate::sensitivity::Interest;
 use crate::transport::World;
+use crate::transport::velocity::Spatial;
 
 /// The edges at which radiance jumps, by what sees them.
 #[derive(Debug)]
 pub(crate) struct Radiative {
+    /// How the vertices of paths move.
+    pub(crate) spatial: Arc<Spatial>,
     jumps: Jumps,
     /// Seen from the camera.
     camera: Option<Outlines>,
@@ -154,6 +158,7 @@ impl Radiative {
     pub(crate) fn new(
         world: &World,
         interest: &Interest,
+        spatial: Arc<Spatial>,
         speed: impl Fn(&Edge) -> f64,
     ) -> Result<Self, Error> {
         // From a vertex on what moves, everything seems to; else no edge is even looked for.
@@ -165,9 +170,9 @@ impl Radiative {
         let eye = world.camera.position();
         let moving_shapes = (0..).zip(&interest.shapes).filter(|(_, moves)| **moves);
         let holding: Vec<u32> =
-            moving_shapes.map(|(s, _)| s).filter(|s| world.blends_on(*s)).collect();
+            moving_shapes.map(|(s, _)| s).filter(|s| spatial.blends.acts_on(world, *s)).collect();
         let at_rest = !holding.is_empty();
-        let at_rest_in_view = holding.iter().any(|s| world.blends_in_view_on(*s));
+        let at_rest_in_view = holding.iter().any(|s| spatial.blends.acts_in_view_on(*s));
         let speeds: Vec<f64> = jumps.list.iter().map(moves).collect();
         let fastest = speeds.iter().copied().fold(0.0, f64::max);
         let relative = |speed: f64| match (interest.sensor, at_rest_in_view) {
@@ -184,7 +189,7 @@ impl Radiative {
         let resting = resting.map(|views| views.before(world, &holding));
         let all = views(&|_| 1.0);
         let count = [jumps.list.len() as u64, jumps.all];
-        Ok(Self { jumps, camera, moving, all, resting, count })
+        Ok(Self { spatial, jumps, camera, moving, all, resting, count })
     }
 
     /// True when the camera can see something change.

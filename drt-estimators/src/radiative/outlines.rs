@@ -19,7 +19,7 @@ impl Radiative {
         let camera = &world.camera;
         let chosen = self.camera.as_ref()?.sample(&self.jumps, &mut tracer.rng);
         let eye = world.eye();
-        let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, &eye)?;
+        let sight = Sight::new(tracer, self, chosen.jump, chosen.along, &eye)?;
         let (x, point) = chosen.jump.point(chosen.along);
         let (_, importance) = tracer.see(&Vertex { x, medium: None, kind: Kind::Point })?;
         let tau = sight.open(tracer)?;

@@ -7,7 +7,7 @@ use drt_math::{Rgb, Vec3};
 use super::choice::Choice;
 use super::difference::{Side, Sight};
 use super::views::{Views, viewpoint};
-use super::{AT_REST, BY_THROUGHPUT, CARRIED, Look, Radiative};
+use super::{AT_REST, BY_THROUGHPUT, CARRIED, Look, Options, Radiative};
 use crate::transport::trace::Endpoint;
 use crate::transport::{MaterialPoint, Matter, RecordedPath, Tracer, Vertex, World};
 
@@ -67,11 +67,13 @@ impl Radiative {
         tracer: &mut Tracer<'_>,
         path: &RecordedPath<'_>,
         look: &Look,
+        options: &mut Options,
     ) -> Option<Edged> {
         let nodes = 1..path.record.nodes.len();
         let (sought, likely, look) = self.sought(path, nodes, look);
-        let (node, chance) = self.choose_vertex(tracer, path, sought, look.vertex)?;
-        self.glance_from(tracer, path, node, sought, likely * chance, &look)?.follow(tracer)
+        let (node, chance) = self.choose_vertex(tracer, path, sought, look.vertex, options)?;
+        self.glance_from(tracer, path, node, sought, likely * chance, &look, options)?
+            .follow(tracer)
     }
 
     /// The same from a given vertex.
@@ -81,9 +83,10 @@ impl Radiative {
         path: &RecordedPath<'_>,
         node: usize,
         look: &Look,
+        options: &mut Options,
     ) -> Option<Edged> {
         let (sought, likely, look) = self.sought(path, node..node + 1, look);
-        self.glance_from(tracer, path, node, sought, likely, &look)?.follow(tracer)
+        self.glance_from(tracer, path, node, sought, likely, &look, options)?.follow(tracer)
     }
 
     /// What a look from one of some vertices is for, its probability, and what is left of the look's numbers.
@@ -112,6 +115,7 @@ impl Radiative {
         sought: Sought,
         chance: f64,
         look: &Look,
+        options: &mut Options,
     ) -> Option<Glance<'a>> {
         let (record, moves) = (&path.record, path.velocities.moves(node));
         let recorded = &record.nodes[node];
@@ -123,8 +127,8 @@ impl Radiative {
         tracer.counters.boundary_samples += 1;
         let views = self.views(moves, sought)?;
         let around = &viewpoint(tracer.world, vertex, wo);
-        let chosen = views.sample(&self.jumps, around, look, &mut tracer.options)?;
-        let sight = Sight::new(tracer, &self.jumps, chosen.jump, chosen.along, vertex)?;
+        let chosen = views.sample(&self.jumps, around, look, options)?;
+        let sight = Sight::new(tracer, self, chosen.jump, chosen.along, vertex)?;
         let scattering = tracer.world.scattering(vertex)?;
         let f = scattering.eval(wo, -sight.w);
         if f.is_zero() {
@@ -149,13 +153,13 @@ impl Radiative {
     /// An estimate of how much edges matter to a vertex; 0 only if they do not.
     fn amount(
         &self,
-        tracer: &mut Tracer<'_>,
+        world: &World,
+        options: &mut Options,
         vertex: &Vertex,
         wo: Vec3,
         carried: bool,
         sought: Sought,
     ) -> f64 {
-        let Tracer { world, options, .. } = tracer;
         let Some(views) = self.views(carried, sought) else { return 0.0 };
         let amount = views.amount(&viewpoint(world, vertex, wo), options);
         if carried { CARRIED * amount } else { amount }
@@ -169,6 +173,7 @@ impl Radiative {
         path: &RecordedPath<'_>,
         sought: Sought,
         u: f64,
+        options: &mut Options,
     ) -> Option<(usize, f64)> {
         let mut choice = Choice::new(u, BY_THROUGHPUT);
         for (k, node) in path.record.nodes.iter().enumerate().skip(1) {
@@ -185,8 +190,14 @@ impl Radiative {
             if theta == 0.0 || !tracer.world.can_scatter(vertex) {
                 continue;
             }
-            let amount =
-                self.amount(tracer, vertex, -arrival.dir, path.velocities.moves(k), sought);
+            let amount = self.amount(
+                tracer.world,
+                options,
+                vertex,
+                -arrival.dir,
+                path.velocities.moves(k),
+                sought,
+            );
             if amount > 0.0 {
                 choice.offer(k, [theta, theta * amount]);
             }

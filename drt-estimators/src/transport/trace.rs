@@ -30,7 +30,6 @@ use super::mode::RadianceMode;
 use super::vertex::{Kind, Vertex};
 use super::world::{Crossing, RayPath, World};
 use crate::Counters;
-use crate::radiative::Options;
 
 /// Longest path with unlimited depth: far beyond where Russian roulette lets any path go.
 const LONGEST: u32 = 1 << 20;
@@ -180,8 +179,6 @@ pub(crate) struct Tracer<'w> {
     /// Boxed, as it is lent out for every segment.
     pub(crate) ray: Option<Box<RayPath>>,
     pub(crate) shadow: RayPath,
-    /// Edges to look at.
-    pub(crate) options: Options,
 }
 
 impl<'w> Tracer<'w> {
@@ -193,7 +190,6 @@ impl<'w> Tracer<'w> {
             max_segments: world.max_depth.min(LONGEST),
             ray: None,
             shadow: RayPath::default(),
-            options: Options::default(),
         }
     }
 

@@ -14,7 +14,6 @@ pub(crate) use rays::short_of;
 use super::geometry::{Geometry, Prim};
 use super::lights::{LightTable, Lit};
 use super::scatter::Scattering;
-use super::velocity::blend::Blends;
 use super::vertex::{Contact, Kind, SurfacePoint, Vertex};
 use crate::Error;
 use crate::kept::Kept;
@@ -158,9 +157,6 @@ pub(crate) struct World {
     needs: Needs,
     /// How far light can go in each medium, at most.
     extent: Vec<f64>,
-    pub(super) blends: Blends,
-    /// Mean free paths, a length, of the media in which distances are warped.
-    pub(super) free_paths: Vec<Option<f64>>,
     /// Where set, no discrete choice depends on values that may differ between this scene and
     /// another: the extinctions by which distances in homogeneous media are drawn instead of their
     /// own.
@@ -222,8 +218,6 @@ impl World {
             defensive: alloc::vec![0.0; scene.media.len()],
             needs: Needs::default(),
             extent: (0..scene.media.len()).map(|m| extent(&scene, m, 2.0 * radius)).collect(),
-            blends: Blends::default(),
-            free_paths: Vec::new(),
             steady: like
                 .map(|w| w.scene.media.iter().map(|m| m.item.homogeneous().copied()).collect()),
             max_depth: depth,

@@ -12,7 +12,7 @@ use drt_motion::Parameter;
 use super::scenes::FILM;
 use crate::boundary::Receiver;
 use crate::contraction::{Contraction, Motion};
-use crate::interior::{PixelSampler, sequence_name};
+use crate::interior::PixelSampler;
 use crate::kept::Kept;
 use crate::pixels::Sampler;
 use crate::prepared::Prepared;
@@ -20,6 +20,7 @@ use crate::scene::Scene;
 use crate::sensitivity::Functional;
 use crate::settings::{EstimatorKind, Settings};
 use crate::splatting::Checked;
+use crate::streams::sequence_name;
 use crate::tangents;
 use crate::transport::{Lit, World};
 

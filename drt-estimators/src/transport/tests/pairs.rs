@@ -36,10 +36,9 @@ fn derivatives(
     let (prepared, motion) = prepare(scene, parameter, 5);
     let world = &prepared.world;
     let mut tracer = Tracer::new(world);
-    let movers = Movers::new(&motion.interest);
     let field: Arc<dyn VelocityField> = match form {
-        Form::Material => Arc::new(Material::new(movers)),
-        Form::Spatial => Arc::new(Spatial::new(movers)),
+        Form::Material => Arc::new(Material::new(Movers::new(&motion.interest))),
+        Form::Spatial => Arc::new(Spatial::new(world, &motion.interest)),
     };
     let mut path = Recording::new(world, field, Pairs::new(true));
     let mut differentiator = Differentiator::new(world);

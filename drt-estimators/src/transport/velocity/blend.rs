@@ -39,12 +39,13 @@ mod whole;
 
 use alloc::vec::Vec;
 
-use drt_geom::{Aabb, Mesh};
-use drt_math::{Real, Vec3};
+use core::f64::consts::PI;
+
+use drt_geom::{Aabb, Edge, EdgeClass, Mesh, NONE, Topology};
+use drt_math::{Real, Vec3, fm};
 
 use whole::Whole;
 
-use crate::boundary::edges::collect;
 use crate::scene::Shape;
 use crate::sensitivity::Interest;
 use crate::transport::vertex::{Kind, SurfacePoint, Vertex};
@@ -102,82 +103,50 @@ impl Blend {
     }
 }
 
-impl World {
-    /// Prepares φ.
-    pub(crate) fn prepare_blends(&mut self, interest: &Interest) {
-        let curvatures = self.curvatures();
-        let camera = &self.camera;
+impl Blends {
+    /// Of a scene in which what is of interest moves.
+    pub(super) fn new(world: &World, interest: &Interest) -> Self {
+        let curvatures = curvatures(world);
+        let camera = &world.camera;
         let cosines: Vec<f64> =
-            (0..).map(|s| GRAZING / self.bsdf_of(s).lobe_width()).take(curvatures.len()).collect();
+            (0..).map(|s| GRAZING / world.bsdf_of(s).lobe_width()).take(curvatures.len()).collect();
         let seen = |(s, curvature): (usize, &f64)| {
-            let center = self.scene.shapes[s].mesh.bounds().center();
+            let center = world.scene.shapes[s].mesh.bounds().center();
             let pixel = camera.pinhole().pixel_size * (center - camera.position()).length();
             f64::min(GRAZING_PIXELS * curvature * pixel, GRAZING)
         };
         let camera_cosines = curvatures.iter().enumerate().map(seen).collect();
-        let shapes = self.scene.shapes.iter();
+        let shapes = world.scene.shapes.iter();
         let lamps = shapes.map(|s| s.emitter.map(|_| Whole::new(s.mesh.bounds()))).collect();
-        let media = (0..self.scene.media.len())
-            .map(|m| if interest.volumes[m] { self.bounds_of(m).map(Whole::new) } else { None })
+        let media = (0..world.scene.media.len())
+            .map(|m| if interest.volumes[m] { bounds_of(world, m).map(Whole::new) } else { None })
             .collect();
-        self.blends = Blends { curvatures, cosines, camera_cosines, lamps, media };
-    }
-
-    /// The box of the surfaces that bound a medium.
-    fn bounds_of(&self, medium: usize) -> Option<Aabb> {
-        let shapes = self.scene.shapes.iter().filter(|s| bounds(s, medium));
-        shapes.map(|s| s.mesh.bounds()).reduce(|a, b| a.union(&b))
+        Self { curvatures, cosines, camera_cosines, lamps, media }
     }
 
     /// True when φ > 0 for some vertices on a shape, or in a medium that it bounds.
-    pub(crate) fn blends_on(&self, shape: u32) -> bool {
+    pub(crate) fn acts_on(&self, world: &World, shape: u32) -> bool {
         let inside = |(m, whole): (usize, &Option<Whole>)| {
-            whole.is_some() && bounds(&self.scene.shapes[shape as usize], m)
+            whole.is_some() && bounds(&world.scene.shapes[shape as usize], m)
         };
-        self.blends_in_view_on(shape)
+        self.acts_in_view_on(shape)
             || self.lamp(shape as usize).is_some()
-            || self.blends.media.iter().enumerate().any(inside)
+            || self.media.iter().enumerate().any(inside)
     }
 
     /// True when φ > 0 for some vertices on it that the camera sees.
-    pub(crate) fn blends_in_view_on(&self, shape: u32) -> bool {
-        self.blends.curvatures.get(shape as usize).is_some_and(|c| *c > 0.0)
+    pub(crate) fn acts_in_view_on(&self, shape: u32) -> bool {
+        self.curvatures.get(shape as usize).is_some_and(|c| *c > 0.0)
     }
 
     fn lamp(&self, shape: usize) -> Option<&Whole> {
-        self.blends.lamps.get(shape)?.as_ref()
-    }
-
-    /// The mean curvatures of the shapes by their shading normals, or by their edges where they have
-    /// none; 1 / scene units.
-    fn curvatures(&self) -> Vec<f64> {
-        let shapes = &self.scene.shapes;
-        let mut curvatures: Vec<f64> = shapes.iter().map(|s| by_normals(&s.mesh)).collect();
-        let faceted = |s: usize| shapes[s].mesh.normals.is_none();
-        if (0..shapes.len()).any(|s| faceted(s) && shapes[s].mesh.triangles.len() >= FACETS) {
-            for edge in collect(self).0 {
-                let (turn, length) = edge.turn();
-                if faceted(edge.shape as usize) && turn < CORNER {
-                    curvatures[edge.shape as usize] += 0.5 * turn * length;
-                }
-            }
-            for (curvature, shape) in
-                curvatures.iter_mut().zip(shapes).filter(|(_, s)| s.mesh.normals.is_none())
-            {
-                *curvature /= f64::max(shape.mesh.surface_area(), f64::MIN_POSITIVE);
-            }
-        }
-        // Lamps have a φ of their own, which is 0 for what the camera sees of them.
-        for (curvature, _) in curvatures.iter_mut().zip(shapes).filter(|(_, s)| s.emitter.is_some())
-        {
-            *curvature = 0.0;
-        }
-        curvatures
+        self.lamps.get(shape)?.as_ref()
     }
 
     /// φ of a vertex seen along the unit direction `dir` from a `viewer` at a `distance`.
-    pub(crate) fn blend(
+    pub(crate) fn of(
         &self,
+        world: &World,
         viewer: &Vertex,
         vertex: &Vertex,
         dir: Vec3,
@@ -186,27 +155,27 @@ impl World {
         let s = match &vertex.kind {
             Kind::Surface(s) => s,
             Kind::Volume(_) => {
-                return Blend::even(vertex.medium.map_or(0.0, |m| self.blend_inside(viewer, m)));
+                return Blend::even(vertex.medium.map_or(0.0, |m| self.inside(viewer, m)));
             }
             Kind::Point => return Blend::default(),
         };
         let shape = s.shape as usize;
         if let Some(lamp) = self.lamp(shape) {
-            let width = self.lobe_width(viewer);
+            let width = world.lobe_width(viewer);
             return Blend::even(lamp.weight_in_lobes(viewer.x, width));
         }
-        let Some(curvature) = self.blends.curvatures.get(shape).filter(|c| **c > 0.0) else {
+        let Some(curvature) = self.curvatures.get(shape).filter(|c| **c > 0.0) else {
             return Blend::default();
         };
-        let graze = self.graze(s, dir, distance, self.blends.cosines[shape]);
+        let graze = graze(world, s, dir, distance, self.cosines[shape]);
         let q = f64::min(curvature * distance, 1.0);
         let (weight, slope) = (q * q * (3.0 - 2.0 * q), 6.0 * q * (1.0 - q) * curvature);
         graze.and(Blend { weight, gradient: dir * slope })
     }
 
     /// φ of all vertices inside of a medium which a `viewer` sees.
-    pub(crate) fn blend_inside(&self, viewer: &Vertex, medium: usize) -> f64 {
-        match (&viewer.kind, self.blends.media.get(medium)) {
+    pub(crate) fn inside(&self, viewer: &Vertex, medium: usize) -> f64 {
+        match (&viewer.kind, self.media.get(medium)) {
             // Not for the camera: its pixels would be edges.
             (Kind::Surface(_) | Kind::Volume(_), Some(Some(whole))) => whole.weight(viewer.x),
             _ => 0.0,
@@ -214,37 +183,60 @@ impl World {
     }
 
     /// φ of a vertex that the camera sees, but for the part that depends on the pixel.
-    pub(crate) fn blend_in_view(&self, vertex: &Vertex) -> Blend {
+    pub(crate) fn in_view(&self, world: &World, vertex: &Vertex) -> Blend {
         let Kind::Surface(s) = &vertex.kind else { return Blend::default() };
-        let cosine = self.blends.camera_cosines.get(s.shape as usize).copied().unwrap_or(0.0);
-        let ray = vertex.x - self.camera.position();
+        let cosine = self.camera_cosines.get(s.shape as usize).copied().unwrap_or(0.0);
+        let ray = vertex.x - world.camera.position();
         let distance = ray.length();
-        self.graze(s, ray / distance, distance, cosine)
+        graze(world, s, ray / distance, distance, cosine)
     }
 
     /// φ of a vertex that the camera sees in one pixel.
-    pub(crate) fn blend_in_pixel(&self, vertex: &Vertex, pixel: [u32; 2]) -> Blend {
-        let blend = self.blend_in_view(vertex);
+    pub(crate) fn in_pixel(&self, world: &World, vertex: &Vertex, pixel: [u32; 2]) -> Blend {
+        let blend = self.in_view(world, vertex);
         if blend.weight == 0.0 {
             return blend;
         }
-        let view = self.camera.view(vertex.x);
-        let (weight, slope) = self.camera.window(pixel, view.pixel);
-        let (gradient, _) = self.camera.view_gradient(&view, slope, 0.0);
+        let view = world.camera.view(vertex.x);
+        let (weight, slope) = world.camera.window(pixel, view.pixel);
+        let (gradient, _) = world.camera.view_gradient(&view, slope, 0.0);
         blend.and(Blend { weight, gradient })
     }
+}
 
-    /// Blends what is seen at less than a `cosine`.
-    fn graze(&self, s: &SurfacePoint, dir: Vec3, distance: f64, cosine: f64) -> Blend {
-        let seen = s.ns.dot(dir);
-        if Real::abs(seen) >= cosine {
-            return Blend::default();
+/// The box of the surfaces that bound a medium.
+fn bounds_of(world: &World, medium: usize) -> Option<Aabb> {
+    let shapes = world.scene.shapes.iter().filter(|s| bounds(s, medium));
+    shapes.map(|s| s.mesh.bounds()).reduce(|a, b| a.union(&b))
+}
+
+/// The mean curvatures of the shapes by their shading normals, or by their edges where they have
+/// none; 1 / scene units.
+fn curvatures(world: &World) -> Vec<f64> {
+    let curvature = |(s, shape): (u32, &Shape)| {
+        // Lamps have a φ of their own, which is 0 for what the camera sees of them.
+        if shape.emitter.is_some() {
+            return 0.0;
         }
-        let q = seen / cosine;
-        let rest = 1.0 - q * q;
-        let turn = self.normal_slide(s, dir) + s.ns.reject(dir) / distance;
-        Blend { weight: rest * rest, gradient: turn * (-4.0 * q * rest / cosine) }
+        match &shape.mesh.normals {
+            Some(_) => by_normals(&shape.mesh),
+            None if world.is_null(s) => 0.0,
+            None => by_edges(&shape.mesh),
+        }
+    };
+    (0..).zip(&world.scene.shapes).map(curvature).collect()
+}
+
+/// The part of φ by the angle of incidence: from 0 at a `cosine` to 1.
+fn graze(world: &World, s: &SurfacePoint, dir: Vec3, distance: f64, cosine: f64) -> Blend {
+    let seen = s.ns.dot(dir);
+    if Real::abs(seen) >= cosine {
+        return Blend::default();
     }
+    let q = seen / cosine;
+    let rest = 1.0 - q * q;
+    let turn = world.normal_slide(s, dir) + s.ns.reject(dir) / distance;
+    Blend { weight: rest * rest, gradient: turn * (-4.0 * q * rest / cosine) }
 }
 
 fn bounds(shape: &Shape, medium: usize) -> bool {
@@ -269,4 +261,23 @@ fn by_normals(mesh: &Mesh) -> f64 {
         }
     }
     if area > 0.0 { turns / area } else { 0.0 }
+}
+
+/// The mean curvature of a mesh by the angles at its edges; zero with few facets.
+fn by_edges(mesh: &Mesh) -> f64 {
+    if mesh.triangles.len() < FACETS {
+        return 0.0;
+    }
+    let turn = |e: &Edge| {
+        let [a, b] = e.vertices.map(|v| mesh.positions[v as usize]);
+        let along = (b - a).normalize();
+        let [f, g] = e.opposite.map(|v| (mesh.positions[v as usize] - a).reject(along));
+        let turn = PI - fm::atan2(f.cross(g).length(), f.dot(g));
+        if turn < CORNER { 0.5 * turn * (b - a).length() } else { 0.0 }
+    };
+    let topology = Topology::of(mesh);
+    let bent =
+        |e: &&Edge| e.faces[1] != NONE && e.class != EdgeClass::Flat && e.can_be_silhouette();
+    let sum: f64 = topology.edges.iter().filter(bent).map(turn).filter(|t| t.is_finite()).sum();
+    sum / f64::max(mesh.surface_area(), f64::MIN_POSITIVE)
 }

@@ -24,8 +24,10 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
-use super::warp::warps;
+use super::blend::Blends;
+use super::warp::{free_paths, warps};
 use super::{Auxiliary, Blend, Found, Movers, VelocityField, VertexVelocity};
+use crate::sensitivity::Interest;
 use crate::transport::trace::Endpoint;
 use crate::transport::vertex::{Matter, SurfacePoint, Vertex};
 use crate::transport::world::World;
@@ -37,11 +39,24 @@ pub(super) const WIDEST_PAIRED: f64 = 0.15;
 #[derive(Clone, Debug)]
 pub(crate) struct Spatial {
     movers: Movers,
+    pub(crate) blends: Blends,
+    /// 1/σ, a length, of the media in which distances are warped.
+    pub(super) free_paths: Vec<Option<f64>>,
 }
 
 impl Spatial {
-    pub(crate) fn new(movers: Movers) -> Self {
-        Self { movers }
+    /// Of a scene in which what is of interest moves.
+    pub(crate) fn new(world: &World, interest: &Interest) -> Self {
+        let movers = Movers::new(interest);
+        if !interest.moves_geometry() {
+            return Self { movers, blends: Blends::default(), free_paths: Vec::new() };
+        }
+        Self { movers, blends: Blends::new(world, interest), free_paths: free_paths(world) }
+    }
+
+    /// 1/σ of a medium in which distances are warped.
+    pub(crate) fn free_path(&self, medium: usize) -> Option<f64> {
+        self.free_paths.get(medium).copied().flatten()
     }
 
     fn moves(&self, s: &SurfacePoint) -> bool {
@@ -63,7 +78,7 @@ impl VelocityField for Spatial {
         let Found { arrival, viewer, .. } = *found;
         let first = auxiliary.len();
         if let Endpoint::Volume(Vertex { medium: Some(m), .. }, _) = &arrival.end
-            && let Some(free_path) = world.warped_free_path(*m)
+            && let Some(free_path) = self.free_path(*m)
         {
             auxiliary.extend(warps(found.hits, arrival.dir, arrival.distance, free_path));
         }
@@ -76,9 +91,9 @@ impl VelocityField for Spatial {
         let blend = match (&arrival.end, viewer) {
             // A point at rest that a ray at rest finds.
             (Endpoint::Surface(_), _) if !(propagated || on_mover) => Blend::default(),
-            (Endpoint::Surface(v), None) => world.blend_in_pixel(v, found.pixel),
+            (Endpoint::Surface(v), None) => self.blends.in_pixel(world, v, found.pixel),
             (Endpoint::Surface(v) | Endpoint::Volume(v, _), Some(viewer)) => {
-                world.blend(viewer, v, arrival.dir, arrival.distance)
+                self.blends.of(world, viewer, v, arrival.dir, arrival.distance)
             }
             _ => Blend::default(),
         };
@@ -94,7 +109,7 @@ impl VelocityField for Spatial {
         dir: Vec3,
         distance: f64,
     ) -> Blend {
-        world.blend(viewer, end, dir, distance)
+        self.blends.of(world, viewer, end, dir, distance)
     }
 
     fn turns_rays(&self, world: &World, s: &SurfacePoint, velocity: &VertexVelocity) -> bool {

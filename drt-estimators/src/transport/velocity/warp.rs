@@ -133,20 +133,13 @@ impl Stretch {
     }
 }
 
-impl World {
-    /// Prepares distance warps.
-    pub(crate) fn prepare_warps(&mut self) {
-        let free_path = |m: usize| {
-            let sigma_t = self.medium(m).homogeneous()?.coefficients().sigma_t.mean();
-            (sigma_t > 0.0).then_some(1.0 / sigma_t)
-        };
-        self.free_paths = (0..self.scene.media.len()).map(free_path).collect();
-    }
-
-    /// 1/σ of a medium in which distances are warped.
-    pub(crate) fn warped_free_path(&self, medium: usize) -> Option<f64> {
-        self.free_paths.get(medium).copied().flatten()
-    }
+/// 1/σ, a length, of the media in which distances are warped.
+pub(super) fn free_paths(world: &World) -> Vec<Option<f64>> {
+    let free_path = |m: usize| {
+        let sigma_t = world.medium(m).homogeneous()?.coefficients().sigma_t.mean();
+        (sigma_t > 0.0).then_some(1.0 / sigma_t)
+    };
+    (0..world.scene.media.len()).map(free_path).collect()
 }
 
 /// From 0 to 1, and no farther.

@@ -6,7 +6,7 @@ use alloc::vec;
 use drt_math::{Rng, Vec3, vec3};
 use drt_motion::GeometryChange;
 
-use super::Blend;
+use super::{Blend, Blends};
 use crate::contraction::Motion;
 use crate::prepared::Prepared;
 use crate::transport::tests::choice::{self, LIGHT, MOMENT, Sum};
@@ -31,6 +31,7 @@ fn prepare(facets: bool) -> (Prepared, Motion) {
 fn gradients_are_those_of_weights() {
     let (prepared, _) = prepare(false);
     let world = &prepared.world;
+    let own = &prepared.radiative.as_ref().expect("the spatial form").spatial.blends;
     let mut rng = Rng::new(1, 2, 3);
     let mut counts = [0; 2];
     for _ in 0..20_000 {
@@ -38,11 +39,13 @@ fn gradients_are_those_of_weights() {
         let prim = (rng.next_f64() * 80.0) as u32;
         let from = vec3(rng.next_f64(), rng.next_f64(), rng.next_f64()) * 6.0 - Vec3::splat(3.0);
         let viewer = Vertex { x: from, medium: None, kind: Kind::Point };
-        let blends: [&dyn Fn(&Vertex) -> Blend; 2] =
-            [&|v| world.blend(&viewer, v, (v.x - from).normalize(), (v.x - from).length()), &|v| {
+        let blends: [&dyn Fn(&Vertex) -> Blend; 2] = [
+            &|v| own.of(world, &viewer, v, (v.x - from).normalize(), (v.x - from).length()),
+            &|v| {
                 let pixel = world.camera.view(world.point(prim, [0.3; 2]).1).pixel;
-                world.blend_in_pixel(v, pixel.map(|p| p.clamp(0.0, 4.0) as u32))
-            }];
+                own.in_pixel(world, v, pixel.map(|p| p.clamp(0.0, 4.0) as u32))
+            },
+        ];
         let at = |bary: [f64; 2]| -> (SurfacePoint, Vertex) {
             let (point, x) = world.point(prim, bary);
             (point, Vertex { x, medium: None, kind: Kind::Surface(point) })
@@ -86,8 +89,10 @@ fn nor_of_lamps() {
         let motion = parameter(moved, 0.0, vec![moves(moved, change)]);
         choice::check(MOMENT, &|strength| {
             let (mut prepared, motion) = choice::prepare(scene, &motion, 4);
-            let lamps = prepared.world.blends.lamps.iter_mut().flatten();
-            lamps.for_each(|lamp| lamp.strength = 2.0 * strength);
+            prepared.change_spatial(|s| {
+                let lamps = s.blends.lamps.iter_mut().flatten();
+                lamps.for_each(|lamp| lamp.strength = 2.0 * strength);
+            });
             (prepared, motion)
         });
     }
@@ -113,9 +118,11 @@ fn check_medium(sum: Sum, change: GeometryChange) {
     let motion = parameter("block", 0.0, vec![moves("block", change)]);
     choice::check(sum, &|strength| {
         let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
-        let media = &mut prepared.world.blends.media;
-        assert_eq!(media.iter().flatten().count(), 1);
-        media.iter_mut().flatten().for_each(|m| m.strength = strength);
+        prepared.change_spatial(|s| {
+            let media = &mut s.blends.media;
+            assert_eq!(media.iter().flatten().count(), 1);
+            media.iter_mut().flatten().for_each(|m| m.strength = strength);
+        });
         (prepared, motion)
     });
 }
@@ -124,8 +131,10 @@ fn check_medium(sum: Sum, change: GeometryChange) {
 fn check(facets: bool) {
     choice::check(MOMENT, &|strength| {
         let (mut prepared, motion) = prepare(facets);
-        let blends = &mut prepared.world.blends;
-        blends.curvatures.iter_mut().chain(&mut blends.camera_cosines).for_each(|h| *h *= strength);
+        prepared.change_spatial(|s| {
+            let Blends { curvatures, camera_cosines, .. } = &mut s.blends;
+            curvatures.iter_mut().chain(camera_cosines).for_each(|b| *b *= strength);
+        });
         (prepared, motion)
     });
 }

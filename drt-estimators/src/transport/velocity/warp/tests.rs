@@ -135,9 +135,11 @@ fn check(kind: Ball, effects: Vec<Effect>) {
     let motion = parameter("ball", 0.0, effects);
     choice::check(MOMENT, &|strength| {
         let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
-        for free_path in &mut prepared.world.free_paths {
-            *free_path = free_path.map(|r| r * strength).filter(|r| *r > 0.0);
-        }
+        prepared.change_spatial(|s| {
+            for free_path in &mut s.free_paths {
+                *free_path = free_path.map(|r| r * strength).filter(|r| *r > 0.0);
+            }
+        });
         (prepared, motion)
     });
 }
@@ -154,7 +156,7 @@ fn what_is_followed_stands_for_all() {
                 flux.followed = followed;
             }
             // Then all of it is flux.
-            prepared.world.free_paths.clear();
+            prepared.change_spatial(|s| s.free_paths.clear());
             (prepared, motion)
         };
         choice::derivative(MOMENT, &prepare, [1.0; 2])

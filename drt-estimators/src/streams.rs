@@ -1,0 +1,17 @@
+//! Names of random numbers: what tells the streams and sequences of all uses apart.
+
+use drt_math::Rng;
+use drt_math::sobol::SET_DIMENSIONS;
+
+/// Random-number streams are pixels; the top bits tell other uses apart.
+pub(crate) const LINE_STREAM: u64 = 1 << 62;
+pub(crate) const FLUX_STREAM: u64 = 1 << 61;
+pub(crate) const SEQUENCE_STREAM: u64 = 1 << 60;
+pub(crate) const PAIR_STREAM: u64 = 1 << 59;
+/// Numbers of a sample that are spread evenly: image point, and the first vertices.
+pub(crate) const DIMENSIONS: u32 = SET_DIMENSIONS;
+
+/// The name of a Sobol' sequence of a pixel.
+pub(crate) fn sequence_name(seed: u64, pixel: u32, number: u32) -> u32 {
+    Rng::new(seed, SEQUENCE_STREAM | u64::from(pixel), number).next_u32()
+}
