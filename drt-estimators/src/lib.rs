@@ -7,53 +7,30 @@ extern crate alloc;
 #[cfg(all(test, feature = "std"))]
 extern crate self as drt_estimators;
 
-mod agreement;
-mod allocation;
-mod boundary;
-mod budget;
-mod contraction;
-pub mod emitter;
-mod error;
-mod film;
-pub mod filter;
-mod finite_difference;
+mod derivative;
+mod edges;
 pub mod fit;
-mod flux;
-mod grid_deformation;
-mod interior;
-mod kept;
-pub mod loss;
-mod medium_motion;
-mod parallel;
-mod pixels;
-mod plan;
-mod prepared;
-mod radiative;
-mod rendering;
-mod reverse;
-mod scene;
-mod scene_gradient;
-mod sensitivity;
-pub mod sensor;
-mod session;
-mod settings;
-mod splatting;
-mod streams;
-pub mod surface;
-mod tangents;
-mod transport;
+mod model;
+mod run;
+mod sampling;
+mod terms;
+mod world;
 
-pub use agreement::{Agreement, agreement};
+pub use derivative::scene_gradient::SceneGradient;
+pub use derivative::tangents::moved;
 pub use drt_motion::interior::{GivenTetrahedra, InteriorMotion};
-pub use error::Error;
-pub use finite_difference::finite_differences;
-pub use plan::{MediumPlan, Plan};
-pub use rendering::{BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term};
-pub use reverse::gradient;
-pub use scene::{
+pub use fit::loss;
+pub use model::agreement::{Agreement, agreement};
+pub use model::error::Error;
+pub use model::plan::{MediumPlan, Plan};
+pub use model::rendering::{
+    BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term,
+};
+pub use model::scene::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding, Target,
 };
-pub use scene_gradient::SceneGradient;
-pub use session::{Control, FinishedTile, Session, Unattended};
-pub use settings::{EstimatorKind, Settings};
-pub use tangents::moved;
+pub use model::settings::{EstimatorKind, Settings};
+pub use model::{emitter, filter, sensor, surface};
+pub use run::finite_difference::finite_differences;
+pub use run::reverse::gradient;
+pub use run::session::{Control, FinishedTile, Session, Unattended};

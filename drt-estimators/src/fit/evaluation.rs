@@ -6,9 +6,9 @@ use alloc::vec::Vec;
 use drt_math::dense::zeros;
 use drt_math::{Rgb, fm};
 
-use super::View;
-use super::linear::{newton_noise, newton_step};
-use crate::loss::{Loss, inner};
+use crate::fit::View;
+use crate::fit::linear::{newton_noise, newton_step};
+use crate::fit::loss::{Loss, inner};
 
 /// Sides of the squares of pixels whose errors are taken together, because filters may spread one
 /// sample over several pixels.

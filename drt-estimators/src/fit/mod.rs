@@ -17,6 +17,7 @@
 
 mod evaluation;
 mod linear;
+pub mod loss;
 mod source;
 mod step;
 
@@ -26,16 +27,16 @@ use alloc::vec::Vec;
 use drt_motion::Parameter;
 
 use crate::Error;
-use crate::kept::Kept;
-use crate::loss::{Loss, Reference};
-use crate::scene::Scene;
-use crate::session::Control;
-use crate::settings::Settings;
+use crate::fit::loss::{Loss, Reference};
+use crate::model::scene::Scene;
+use crate::model::settings::Settings;
+use crate::run::session::Control;
+use crate::world::cache::Kept;
 
-pub use evaluation::Evaluation;
-use evaluation::{Half, Seen};
-use source::{Applied, Source};
-pub use step::{Misstep, check_step};
+pub use crate::fit::evaluation::Evaluation;
+use crate::fit::evaluation::{Half, Seen};
+use crate::fit::source::{Applied, Source};
+pub use crate::fit::step::{Misstep, check_step};
 
 /// A picture that a scene shall look like.
 #[derive(Clone, Debug)]

@@ -5,13 +5,14 @@ use alloc::vec::Vec;
 use drt_math::Rgb;
 use drt_motion::Parameter;
 
-use super::evaluation::Half;
-use crate::kept::Kept;
-use crate::rendering::Layer;
-use crate::scene::Scene;
-use crate::session::{Control, Session};
-use crate::settings::{EstimatorKind, Settings};
-use crate::tangents::{self, Tangents};
+use crate::derivative::tangents;
+use crate::derivative::tangents::Tangents;
+use crate::fit::evaluation::Half;
+use crate::model::rendering::Layer;
+use crate::model::scene::Scene;
+use crate::model::settings::{EstimatorKind, Settings};
+use crate::run::session::{Control, Session};
+use crate::world::cache::Kept;
 use crate::{Error, finite_differences};
 
 /// A scene at its parameters' values, and its rates of change.

@@ -8,8 +8,8 @@ use drt_geom::Mesh;
 use drt_math::Vec3;
 use thiserror::Error;
 
-use crate::scene::{Scene, Shape};
-use crate::surface::Bsdf;
+use crate::model::scene::{Scene, Shape};
+use crate::model::surface::Bsdf;
 
 /// Why one scene cannot have become another by a step of a fit.
 #[derive(Clone, Debug, Error, PartialEq)]

@@ -1,0 +1,164 @@
+//! The emitters' ends of a path: what a contribution owes to a light's strength, place, direction and
+//! falloff.
+
+use drt_math::{Rgb, RgbVec, Vec3};
+
+use crate::derivative::adjoint::{Differentiator, Far, Propagated, Stretch, turn};
+use crate::derivative::sensitivity::{AdjointSink, Interest, SurfaceAdjoint};
+use crate::derivative::velocity::{PathVelocities, VertexVelocity};
+use crate::model::emitter::EmitterGradient;
+use crate::world::lights::{LightKind, LightSample};
+use crate::world::vertex::{Kind, Vertex};
+
+impl Differentiator<'_> {
+    /// The emitter's end of a connection.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn light_end<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        velocities: &PathVelocities,
+        viewer: &Vertex,
+        near_moves: bool,
+        light: &LightSample,
+        to_wi: Option<RgbVec>,
+        per_value: Rgb,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let weight = per_value * light.value;
+        let interest = sink.interest();
+        let emitter = interest.emitters[light.emitter];
+        match &light.kind {
+            LightKind::Area(s) => {
+                let end = Vertex { x: light.y, medium: None, kind: Kind::Surface(*s) };
+                if emitter {
+                    strength_of(light.emitter, per_value, sink);
+                }
+                let moving = near_moves || light_moves(light, sink.interest());
+                if !moving {
+                    self.segment(path, Far::Direction, false, weight, here, sink);
+                    return;
+                }
+                let (dir, distance) = (path.dir, path.length);
+                let blend = velocities.field().blend(self.world, viewer, &end, dir, distance);
+                let phi = blend.weight;
+                let free = weight * (1.0 - phi);
+                self.segment(path, Far::Direction, near_moves, free, here, sink);
+                let mut lit = self.material_end(path, &end, near_moves, weight * phi, here, sink);
+                if let Some(to_wi) = to_wi {
+                    let g = turn(&(to_wi * phi), light.w, light.distance);
+                    lit.u += g;
+                    here.u -= g;
+                }
+                let matter = core::mem::take(&mut lit.u);
+                let velocity = &VertexVelocity { moves: true, blend, auxiliary: 0..0 };
+                let end = Propagated { vertex: &end, velocity, weight, matter };
+                self.propagate(path, &end, velocities, &lit, here, sink);
+            }
+            LightKind::Position => {
+                let moving = near_moves || emitter;
+                let far = Far::Position;
+                let mut at_light = self.segment(path, far, moving, weight, here, sink);
+                if moving && let Some(to_wi) = to_wi {
+                    let g = turn(&to_wi, light.w, light.distance);
+                    at_light += g;
+                    here.u -= g;
+                }
+                self.intensity(path, light, per_value, at_light, here, sink);
+            }
+            LightKind::Direction => {
+                let moving = near_moves || emitter;
+                let turn = self.segment(path, Far::Direction, moving, weight, here, sink);
+                if emitter {
+                    direction(light, to_wi, turn, per_value, sink);
+                }
+            }
+        }
+    }
+
+    /// A point or spot light: its strength, its falloff by direction, its position.
+    fn intensity<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        light: &LightSample,
+        per_value: Rgb,
+        at_light: RgbVec,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let item = &self.world.scene.emitters[light.emitter].item.emitter;
+        let emission = item.emission(-light.w);
+        let per_value = (per_value / (path.length * path.length)).to_array();
+        let mut gradients = [EmitterGradient::default(); 3];
+        let mut to_flow = [Vec3::ZERO; 3];
+        for c in 0..3 {
+            let mut adjoint = [0.0; 3];
+            adjoint[c] = per_value[c];
+            (to_flow[c], gradients[c]) = emission.gradient(adjoint.into());
+        }
+        let to_flow = RgbVec { r: to_flow[0], g: to_flow[1], b: to_flow[2] };
+        // The flow direction runs from the light to the vertex.
+        let g = turn(&to_flow, -light.w, path.length);
+        here.u += g;
+        let at = at_light - g;
+        if sink.interest().emitters[light.emitter] {
+            let at = [at.r, at.g, at.b];
+            for c in 0..3 {
+                gradients[c].position += at[c];
+            }
+            sink.emitter(light.emitter, &gradients);
+        }
+    }
+}
+
+/// True when a connection's end at a light may move.
+pub(super) fn light_moves(light: &LightSample, interest: &Interest) -> bool {
+    match &light.kind {
+        LightKind::Area(s) => interest.shapes[s.shape as usize],
+        LightKind::Position | LightKind::Direction => interest.emitters[light.emitter],
+    }
+}
+
+/// A directional light: its strength, and its direction through the scattering function and
+/// through where the ray crosses interfaces and grids.
+fn direction<S: AdjointSink>(
+    light: &LightSample,
+    to_wi: Option<RgbVec>,
+    turn: RgbVec,
+    per_value: Rgb,
+    sink: &mut S,
+) {
+    // Both directions and points along the ray turn against the direction of travel.
+    let g = -(to_wi.unwrap_or(RgbVec::ZERO) + turn);
+    let mut gradients = [EmitterGradient::default(); 3];
+    let value = per_value.to_array();
+    let direction = [g.r, g.g, g.b];
+    for c in 0..3 {
+        let mut strength = [0.0; 3];
+        strength[c] = value[c];
+        gradients[c].strength = strength.into();
+        gradients[c].direction = direction[c].reject(light.w);
+    }
+    sink.emitter(light.emitter, &gradients);
+}
+
+/// Sensitivity to an emitter's radiance, where it changes.
+pub(super) fn strength<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
+    if sink.interest().emitters[emitter] && !adjoint.is_zero() {
+        strength_of(emitter, adjoint, sink);
+    }
+}
+
+/// Sensitivity to an emitter's radiance, channel by channel.
+fn strength_of<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
+    let gradient =
+        |r, g, b| EmitterGradient { strength: Rgb::new(r, g, b), ..EmitterGradient::default() };
+    sink.emitter(
+        emitter,
+        &[
+            gradient(adjoint.r, 0.0, 0.0),
+            gradient(0.0, adjoint.g, 0.0),
+            gradient(0.0, 0.0, adjoint.b),
+        ],
+    );
+}

@@ -1,0 +1,492 @@
+//! Differentiating a recorded path once: the gradient of its value with respect to every local
+//! quantity, in one backward sweep.
+//!
+//! With the symbols of [`trace`](crate::sampling::trace), let R_k be what reaches vertex k per unit of
+//! throughput and Q_k what its scattering collects:
+//!
+//! ```text
+//! Q_k = NEE_k + s_k C_k,   C_k = sum over children c of a_c R_c,   R_k = e_k + σ_k Q_k
+//! ```
+//!
+//! The path's value is R_0. Its factors, in the material form (2021 paper, Eqs. 23–30; theory sheet
+//! §4), are the geometric term, Jacobian and transmittance of each segment, the scattering functions
+//! and the coefficients. The derivative by a segment's factors is Θ_c R_c times their logarithmic
+//! gradient; by a scattering function Θ_k σ_k C_k / p times its gradient; by σ_k it is Θ_k Q_k. No
+//! quotient by a factor that can vanish is formed. Cost is linear in the number of vertices.
+//!
+//! Vertices move by a [`velocity`](super::velocity) field; what that blends for a vertex says what its
+//! sensitivities are [propagated](propagation) to.
+
+mod emitters;
+mod pairs;
+mod propagation;
+mod segment;
+
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, RgbVec, Rng, Vec3};
+use drt_medium::Coefficients;
+
+use crate::derivative::adjoint::emitters::{light_moves, strength};
+use crate::derivative::adjoint::pairs::Apart;
+use crate::derivative::adjoint::propagation::Propagated;
+use crate::derivative::adjoint::segment::{Far, Stretch};
+
+use crate::derivative::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
+use crate::derivative::velocity::RecordedPath;
+use crate::model::sensor::SensorGradient;
+use crate::sampling::trace::Endpoint;
+use crate::world::World;
+use crate::world::lights::Lit;
+use crate::world::vertex::{Kind, Vertex};
+
+/// What has been collected for a vertex while its neighbours are processed.
+#[derive(Clone, Copy, Debug, Default)]
+struct Local {
+    /// By the vertex's own velocity and normals.
+    at: SurfaceAdjoint,
+    /// By the velocity of the matter it is on.
+    matter: RgbVec,
+    /// C_k, the value of the children per unit of scattering.
+    children: Rgb,
+    /// a_k R_k, its part of the parent's C.
+    brought: Rgb,
+}
+
+/// The segment by which a walk arrived at a node.
+#[derive(Clone, Copy, Debug)]
+struct Behind {
+    node: usize,
+    parent: usize,
+    distance: f64,
+    /// φ of the node, the part of its motion that turns the segment.
+    weight: f64,
+}
+
+/// The backward sweep and its buffers.
+pub(crate) struct Differentiator<'w> {
+    world: &'w World,
+    locals: Vec<Local>,
+    points: Vec<(f64, f64)>,
+    rng: Rng,
+    /// The filter's gradient by the pixel position, over the density.
+    filter: [f64; 2],
+    /// By the rate of the camera ray's direction.
+    turn: RgbVec,
+    /// Of the camera's importance and filter, per channel.
+    sensor: [SensorGradient; 3],
+}
+
+impl<'w> Differentiator<'w> {
+    pub(crate) fn new(world: &'w World) -> Self {
+        Self {
+            world,
+            locals: Vec::new(),
+            points: Vec::new(),
+            rng: Rng::new(0, 0, 0),
+            filter: [0.0; 2],
+            turn: RgbVec::ZERO,
+            sensor: [SensorGradient::default(); 3],
+        }
+    }
+
+    /// Sends the gradient of the record's value to `sink`. `filter` holds the gradient by the pixel
+    /// position of the filter over the density; `rng` serves line integrals through grids and must be
+    /// independent of the walk's.
+    pub(crate) fn differentiate<S: AdjointSink>(
+        &mut self,
+        path: &RecordedPath<'_>,
+        filter: [f64; 2],
+        rng: Rng,
+        sink: &mut S,
+    ) {
+        let nodes = path.record.nodes.len();
+        self.rng = rng;
+        self.filter = filter;
+        self.turn = RgbVec::ZERO;
+        self.sensor = [SensorGradient::default(); 3];
+        self.locals.clear();
+        self.locals.resize(nodes, Local::default());
+        for k in (1..nodes).rev() {
+            self.node(path, k, sink);
+        }
+        let Local { at, matter, .. } = self.locals[0];
+        self.camera_ray(path.record, at.u + matter, self.turn, &self.sensor, sink);
+    }
+
+    fn node<S: AdjointSink>(&mut self, path: &RecordedPath<'_>, k: usize, sink: &mut S) {
+        let RecordedPath { record, lit, .. } = *path;
+        let node = &record.nodes[k];
+        let Some(arrival) = &node.arrival else { return };
+        let world = self.world;
+        let theta = arrival.throughput;
+        let scattered = node.value * node.inv_pdf * self.locals[k].children;
+        let mut collected = scattered;
+        let mut here = self.locals[k].at;
+        let received = match &arrival.end {
+            Endpoint::Environment => {
+                let environment = world.lights.environment().filter(|_| lit.by_surroundings());
+                let Some((emitter, radiance)) = environment else { return };
+                strength(emitter, theta * arrival.emission_weight, sink);
+                radiance * arrival.emission_weight
+            }
+            Endpoint::Surface(vertex) => {
+                collected += self.connections(path, k, vertex, theta, &mut here, sink);
+                let Kind::Surface(point) = &vertex.kind else { return };
+                let mut emitted = Rgb::ZERO;
+                if let Some(e) = world.scene.shapes[point.shape as usize].emitter
+                    && lit.by_surroundings()
+                    && arrival.emission_weight > 0.0
+                    && point.ng.dot(arrival.dir) < 0.0
+                {
+                    emitted = world.emitted(point, -arrival.dir) * arrival.emission_weight;
+                    strength(e, theta * arrival.emission_weight, sink);
+                }
+                emitted + collected
+            }
+            Endpoint::Volume(vertex, c) => {
+                let c = &Coefficients {
+                    emission: if lit.by_surroundings() { c.emission } else { Rgb::ZERO },
+                    ..*c
+                };
+                let theta_s = theta * c.sigma_s();
+                collected += self.connections(path, k, vertex, theta_s, &mut here, sink);
+                let moving = path.velocities.moves(k);
+                let weight = arrival.emission_weight;
+                self.coefficients(
+                    vertex, c, lit, theta, collected, weight, moving, &mut here, sink,
+                );
+                c.source() * arrival.emission_weight + c.sigma_s() * collected
+            }
+        };
+        self.arrive(path, k, received, &mut here, sink);
+    }
+
+    /// The segment from the parent to node `k`, and the parent's scattering into it; `here` is what node `k`
+    /// has collected.
+    fn arrive<S: AdjointSink>(
+        &mut self,
+        recorded: &RecordedPath<'_>,
+        k: usize,
+        received: Rgb,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let world = self.world;
+        let RecordedPath { record, velocities, .. } = *recorded;
+        let Some(arrival) = &record.nodes[k].arrival else { return };
+        let p = arrival.parent as usize;
+        let value = arrival.arrival * received;
+        self.locals[p].children += value;
+        self.locals[k].brought = value;
+        let velocity = velocities.of(k);
+        let vertex = record.nodes[k].vertex();
+        let phi = velocity.blend.weight;
+        if value.is_zero() {
+            let matter = self.locals[k].matter;
+            let nothing = here.is_zero() && matter == RgbVec::ZERO;
+            // What nothing comes back from may still move what comes before.
+            if nothing || phi == 1.0 {
+                if let Some(v) = vertex {
+                    send(v, &SurfaceAdjoint { u: here.u + matter, ..*here }, sink);
+                }
+                return;
+            }
+        }
+        let weight = arrival.throughput * received;
+        let parent = &record.nodes[p];
+        let (from, theta) = match &parent.arrival {
+            None => (world.eye(), Rgb::ONE),
+            Some(a) => match &a.end {
+                Endpoint::Surface(v) => (*v, a.throughput),
+                Endpoint::Volume(v, c) => (*v, a.throughput * c.sigma_s()),
+                Endpoint::Environment => return,
+            },
+        };
+        let mut there = core::mem::take(&mut self.locals[p].at);
+        let [near_moves, far_moves] = [p, k].map(|n| velocities.moves(n));
+        // The scattering function of the parent sees the two ends of the segment as a direction.
+        if let Some(behind) = behind(recorded, p) {
+            let adjoint = theta * value * parent.inv_pdf;
+            let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
+            let (wi, paired) = (parent.wi, Some(Apart::of(recorded, p)));
+            let moving = far_moves || near_moves || velocities.moves(behind.parent);
+            let to_wi = self.scattering(
+                &from,
+                wo,
+                wi,
+                paired,
+                adjoint,
+                Some(behind),
+                moving,
+                &mut there,
+                sink,
+            );
+            if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
+                let g = turn(&(to_wi * phi), parent.wi, arrival.distance);
+                there.u -= g;
+                self.locals[k].matter += g;
+            }
+        }
+        let path = Stretch {
+            start: from.x,
+            dir: arrival.dir,
+            length: arrival.distance,
+            medium: arrival.start_medium,
+            crossings: &record.crossings[record.nodes[k].crossings.clone()],
+        };
+        let seen = (p == 0).then_some(parent.value);
+        let mut turned = RgbVec::ZERO;
+        match vertex {
+            // No end moves; what is between may.
+            _ if !(near_moves || far_moves) => {
+                self.segment(&path, Far::Direction, false, weight, &mut there, sink);
+            }
+            None => {
+                if let Some(filter) = seen {
+                    let held = &mut SurfaceAdjoint::default();
+                    self.seen(None, arrival.dir, value * phi, filter, held, sink);
+                }
+                turned = self.segment(&path, Far::Direction, near_moves, weight, &mut there, sink)
+                    * (1.0 - phi);
+            }
+            Some(v) => {
+                let free = weight * (1.0 - phi);
+                turned = self.segment(&path, Far::Direction, near_moves, free, &mut there, sink);
+                let mut matter = self.locals[k].matter;
+                if phi > 0.0 {
+                    let mut fixed =
+                        self.material_end(&path, v, near_moves, weight * phi, &mut there, sink);
+                    if let Some(filter) = seen {
+                        let value = value * phi;
+                        self.seen(vertex, arrival.dir, value, filter, &mut fixed, sink);
+                    }
+                    matter += core::mem::take(&mut fixed.u);
+                    here.n += fixed.n;
+                    here.j += fixed.j;
+                }
+                let end = Propagated { vertex: v, velocity, weight, matter };
+                turned += self.propagate(&path, &end, velocities, here, &mut there, sink);
+            }
+        }
+        if p == 0 {
+            self.turn += turned;
+        }
+        self.locals[p].at = there;
+    }
+
+    /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
+    /// behind `wo`, by normals and by materials, but for what is `paired`. Returns that by the direction `wi`,
+    /// which is the caller's. Unless something of this is `moving`, only the material counts.
+    #[allow(clippy::too_many_arguments)]
+    fn scattering<S: AdjointSink>(
+        &mut self,
+        v: &Vertex,
+        wo: Vec3,
+        wi: Vec3,
+        paired: Option<Apart<'_>>,
+        adjoint: Rgb,
+        behind: Option<Behind>,
+        moving: bool,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> Option<RgbVec> {
+        let world = self.world;
+        let interest = sink.interest();
+        let material = match &v.kind {
+            Kind::Surface(s) => interest.bsdfs[world.scene.shapes[s.shape as usize].bsdf],
+            _ => v.medium.is_some_and(|m| interest.media[m]),
+        };
+        if adjoint.is_zero() || !(material || moving) {
+            return None;
+        }
+        let mut d = world.scattering(v)?.gradient(wo, wi);
+        if let Some(apart) = paired {
+            apart.take_from(&mut d);
+        }
+        match &v.kind {
+            Kind::Surface(s) => {
+                here.ns += d.ns * adjoint;
+                here.n += d.ng * adjoint;
+                if material && let Some(params) = d.params {
+                    sink.bsdf(world.scene.shapes[s.shape as usize].bsdf, &params, adjoint);
+                }
+            }
+            _ => {
+                if material
+                    && d.g != 0.0
+                    && let Some(m) = v.medium
+                {
+                    let g = adjoint * d.g;
+                    sink.medium(m, v.x, &CoefficientAdjoint { g, ..CoefficientAdjoint::default() });
+                }
+            }
+        }
+        if let Some(b) = behind {
+            let to_wo = d.wo * adjoint;
+            let g = turn(&(to_wo * b.weight), wo, b.distance);
+            self.locals[b.parent].at.u += g;
+            self.locals[b.node].matter -= g;
+            // Only the camera's ray turns by itself.
+            if b.parent == 0 {
+                self.turn -= to_wo * (1.0 - b.weight);
+            }
+        }
+        Some(d.wi * adjoint)
+    }
+
+    /// Next-event connections of a vertex: returns their sum, without the scattering coefficient.
+    fn connections<S: AdjointSink>(
+        &mut self,
+        recorded: &RecordedPath<'_>,
+        k: usize,
+        vertex: &Vertex,
+        theta: Rgb,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        let RecordedPath { record, velocities, lit, .. } = *recorded;
+        let node = &record.nodes[k];
+        let Some(arrival) = &node.arrival else { return sum };
+        let behind = behind(recorded, k);
+        let moving = velocities.moves(k);
+        let arrives = moving || velocities.moves(arrival.parent as usize);
+        for (c, crossings) in &record.connections[node.connections.clone()] {
+            let light = &c.light;
+            if !lit.by_sample(light) {
+                continue;
+            }
+            let rest = c.rest();
+            sum += c.f * rest;
+            let turns = arrives || light_moves(light, sink.interest());
+            let to_wi = self.scattering(
+                vertex,
+                -arrival.dir,
+                light.w,
+                None,
+                theta * rest,
+                behind,
+                turns,
+                here,
+                sink,
+            );
+            let per_value = theta * c.f * c.transport;
+            let path = Stretch {
+                start: vertex.x,
+                dir: light.w,
+                length: light.distance,
+                medium: c.start_medium,
+                crossings: &record.crossings[crossings.clone()],
+            };
+            self.light_end(&path, velocities, vertex, moving, light, to_wi, per_value, here, sink);
+        }
+        sum
+    }
+
+    /// The coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e.
+    #[allow(clippy::too_many_arguments)]
+    fn coefficients<S: AdjointSink>(
+        &mut self,
+        vertex: &Vertex,
+        c: &Coefficients,
+        lit: Lit,
+        theta: Rgb,
+        collected: Rgb,
+        emission_weight: f64,
+        moving: bool,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let Some(m) = vertex.medium else { return };
+        let emission = c.emission * emission_weight;
+        let adjoint = CoefficientAdjoint {
+            sigma_t: theta * (c.albedo * collected + (Rgb::ONE - c.albedo) * emission),
+            albedo: theta * c.sigma_t * (collected - emission),
+            emission: if lit.by_surroundings() {
+                theta * c.sigma_a() * emission_weight
+            } else {
+                Rgb::ZERO
+            },
+            g: Rgb::ZERO,
+        };
+        if sink.interest().media[m] {
+            sink.medium(m, vertex.x, &adjoint);
+        }
+        if moving {
+            let g = self.world.medium(m).gradients(vertex.x);
+            here.u += g.sigma_t * adjoint.sigma_t
+                + g.albedo * adjoint.albedo
+                + g.emission * adjoint.emission;
+        }
+    }
+
+    /// The camera's importance and filter towards a vertex, or the environment, that `value` reaches it
+    /// from per unit of the filter's weight.
+    fn seen<S: AdjointSink>(
+        &mut self,
+        vertex: Option<&Vertex>,
+        dir: Vec3,
+        value: Rgb,
+        weight: Rgb,
+        here: &mut SurfaceAdjoint,
+        sink: &S,
+    ) {
+        let interest = sink.interest();
+        if !(interest.sensor || vertex.is_some_and(|v| moves(v, interest))) {
+            return;
+        }
+        let camera = &self.world.camera;
+        let x = vertex.map_or(camera.position() + dir, |v| v.x);
+        let projection = camera.view(x);
+        let total = (value * weight).to_array();
+        let mut at = [Vec3::ZERO; 3];
+        for (c, v) in value.to_array().into_iter().enumerate() {
+            let filter = self.filter.map(|f| f * v);
+            let (point, mut gradient) = camera.view_gradient(&projection, filter, total[c]);
+            if vertex.is_none() {
+                // A direction has no parallax.
+                gradient.position = Vec3::ZERO;
+            }
+            self.sensor[c] += gradient;
+            at[c] = point;
+        }
+        here.u += RgbVec { r: at[0], g: at[1], b: at[2] };
+    }
+}
+
+/// The segment by which a walk arrived at a node; `None` at the camera.
+fn behind(path: &RecordedPath<'_>, node: usize) -> Option<Behind> {
+    let arrival = path.record.nodes[node].arrival.as_ref()?;
+    let (parent, distance) = (arrival.parent as usize, arrival.distance);
+    let weight = path.velocities.of(node).blend.weight;
+    Some(Behind { node, parent, distance, weight })
+}
+
+/// Gradient by the far end of a segment, from that by its unit direction `w`.
+fn turn(g: &RgbVec, w: Vec3, distance: f64) -> RgbVec {
+    g.map(|g| g.reject(w) / distance)
+}
+
+fn moves(v: &Vertex, interest: &Interest) -> bool {
+    match &v.kind {
+        Kind::Surface(s) => interest.shapes[s.shape as usize],
+        Kind::Volume(_) => v.medium.is_some_and(|m| interest.volumes[m]),
+        Kind::Point => false,
+    }
+}
+
+/// Sends what a vertex collected.
+fn send<S: AdjointSink>(v: &Vertex, adjoint: &SurfaceAdjoint, sink: &mut S) {
+    match (&v.kind, v.medium) {
+        // Nothing reaches the vertex: where it would go needs no looking up.
+        _ if adjoint.is_zero() => {}
+        (Kind::Surface(s), _) if sink.interest().shapes[s.shape as usize] => {
+            sink.surface(&s.material(), adjoint);
+        }
+        (Kind::Volume(_), Some(m)) if sink.interest().volumes[m] => {
+            sink.volume(m, v.x, &adjoint.u, adjoint.j);
+        }
+        _ => {}
+    }
+}

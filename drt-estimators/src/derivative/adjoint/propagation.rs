@@ -1,0 +1,239 @@
+//! Where the sensitivities of a vertex go: to the matter that it moves with, and back along the ray that
+//! found it.
+//!
+//! With the symbols of [`velocity`](crate::derivative::velocity), v = φ u + (1-φ) c + Σ a (b·w) is linear in
+//! the velocities of matter, of the ray's origin and of the rate of its direction, so a sensitivity to v is
+//! one to each of them. Those to the ray are propagated from vertex to vertex to the camera, and leave what
+//! belongs to surfaces on the way. So one backward sweep serves any number of parameters, and has a
+//! transpose.
+
+use drt_math::{Rgb, RgbVec, Vec3};
+
+use crate::derivative::adjoint::{Differentiator, Far, Stretch, moves, send};
+use crate::derivative::sensitivity::{AdjointSink, Rate, SurfaceAdjoint};
+use crate::derivative::velocity::{Auxiliary, PathVelocities, RecordedPath, VertexVelocity};
+use crate::model::sensor::SensorGradient;
+use crate::sampling::record::PathRecord;
+use crate::world::World;
+use crate::world::vertex::{Kind, SurfacePoint, Vertex};
+
+/// A vertex whose sensitivities are sent off.
+pub(super) struct Propagated<'a> {
+    pub(super) vertex: &'a Vertex,
+    pub(super) velocity: &'a VertexVelocity,
+    /// Light that passes.
+    pub(super) weight: Rgb,
+    /// Sensitivities to the velocity of the matter that the vertex is on.
+    pub(super) matter: RgbVec,
+}
+
+impl Differentiator<'_> {
+    /// Sends the sensitivities `here` of the vertex at the far end of a stretch: leaves those of matter, adds
+    /// those of the near end to `near`, and returns those of the direction's rate.
+    pub(super) fn propagate<S: AdjointSink>(
+        &self,
+        path: &Stretch<'_>,
+        end: &Propagated<'_>,
+        velocities: &PathVelocities,
+        here: &SurfaceAdjoint,
+        near: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> RgbVec {
+        let Propagated { vertex, velocity, weight, matter } = *end;
+        let blend = velocity.blend;
+        let free = 1.0 - blend.weight;
+        let mut turn = RgbVec::ZERO;
+        for a in velocities.auxiliary(velocity) {
+            let g = match a.on_ray {
+                // A longer way dims what passes.
+                Some(_) => {
+                    let dims = self.world.sigma_t_at_border(vertex.medium, vertex.x, -path.dir)
+                        * a.displacement.dot(path.dir);
+                    (here.u.dot(a.displacement) - dims * weight) * free
+                        + weight * free * a.divergence
+                }
+                None => self.moved_by(a, vertex, here, matter) + weight * a.divergence,
+            };
+            let [origin, turned] = summand(a, g, sink);
+            near.u += origin;
+            turn += turned;
+        }
+        if free == 0.0 {
+            send(vertex, &SurfaceAdjoint { u: here.u + matter, ..*here }, sink);
+            return turn;
+        }
+        let Kind::Surface(point) = &vertex.kind else {
+            let u = here.u * blend.weight + matter;
+            send(vertex, &SurfaceAdjoint { u, ..*here }, sink);
+            let back = here.u * free;
+            near.u += back;
+            return turn + back * path.length;
+        };
+        let shift = weight.outer(blend.gradient);
+        let medium = path.crossings.last().map_or(path.medium, |c| c.after);
+        let dims = self.world.sigma_t_at_border(medium, vertex.x, -path.dir) * (weight * -free);
+        let (back, mut lift) = split(self.world, point, path.dir, free, here, shift, dims);
+        lift.u += matter;
+        if sink.interest().shapes[point.shape as usize] {
+            sink.surface(&point.material(), &lift);
+        }
+        near.u += back;
+        turn + back * path.length
+    }
+
+    /// The sensitivity to b·w of a summand that moves the vertex itself.
+    fn moved_by(
+        &self,
+        a: &Auxiliary,
+        vertex: &Vertex,
+        here: &SurfaceAdjoint,
+        matter: RgbVec,
+    ) -> Rgb {
+        let slide = match &vertex.kind {
+            Kind::Surface(point) => here.ns.map(|ns| self.world.normal_slide(point, ns)),
+            _ => RgbVec::ZERO,
+        };
+        (here.u + slide + matter).dot(a.displacement)
+    }
+
+    /// A stretch whose far end moves with its matter, `weight` of light passing: the sensitivities of that end.
+    pub(super) fn material_end<S: AdjointSink>(
+        &mut self,
+        path: &Stretch<'_>,
+        end: &Vertex,
+        near_moves: bool,
+        weight: Rgb,
+        near: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) -> SurfaceAdjoint {
+        let mut fixed = SurfaceAdjoint::default();
+        let moving = near_moves || moves(end, sink.interest());
+        self.segment(path, Far::Vertex(end, &mut fixed), moving, weight, near, sink);
+        fixed
+    }
+
+    /// Sends the sensitivities of a node: `here` to its velocity and normals, `matter` to the velocity of what
+    /// it is on, and of the camera, `turn` to the rate of its ray's direction. No light depends on the distance of the
+    /// node or on its area.
+    pub(crate) fn send_back<S: AdjointSink>(
+        &self,
+        path: &RecordedPath<'_>,
+        node: usize,
+        mut here: SurfaceAdjoint,
+        mut matter: RgbVec,
+        mut turn: RgbVec,
+        sink: &mut S,
+    ) {
+        let RecordedPath { record, velocities, .. } = *path;
+        let mut k = node;
+        loop {
+            let velocity = velocities.of(k);
+            let node = &record.nodes[k];
+            let Some(arrival) = &node.arrival else { break };
+            let Some(vertex) = node.vertex() else { return };
+            if !velocity.moves {
+                return send(vertex, &SurfaceAdjoint::of_place(matter), sink);
+            }
+            let free = 1.0 - velocity.blend.weight;
+            let mut back = RgbVec::ZERO;
+            let mut turned = RgbVec::ZERO;
+            for a in velocities.auxiliary(velocity) {
+                let g = match a.on_ray {
+                    Some(_) => here.u.dot(a.displacement) * free,
+                    None => self.moved_by(a, vertex, &here, matter),
+                };
+                let [origin, direction] = summand(a, g, sink);
+                back += origin;
+                turned += direction;
+            }
+            if free == 0.0 {
+                return send(vertex, &SurfaceAdjoint { u: here.u + matter, ..here }, sink);
+            }
+            match &vertex.kind {
+                Kind::Surface(point) => {
+                    let (dir, none) = (arrival.dir, RgbVec::ZERO);
+                    let (own, mut lift) =
+                        split(self.world, point, dir, free, &here, none, Rgb::ZERO);
+                    lift.u += matter;
+                    if sink.interest().shapes[point.shape as usize] {
+                        sink.surface(&point.material(), &lift);
+                    }
+                    back += own;
+                    turned += own * arrival.distance;
+                }
+                _ => {
+                    let u = here.u * velocity.blend.weight + matter;
+                    send(vertex, &SurfaceAdjoint::of_place(u), sink);
+                    let own = here.u * free;
+                    back += own;
+                    turned += own * arrival.distance;
+                }
+            }
+            (here, matter, turn) = (SurfaceAdjoint::of_place(back), RgbVec::ZERO, turned);
+            k = arrival.parent as usize;
+        }
+        self.camera_ray(record, here.u + matter, turn, &Default::default(), sink);
+    }
+
+    /// Sends the sensitivities to the camera ray's origin and to the rate of its direction, besides what
+    /// was `seen` of its own.
+    pub(super) fn camera_ray<S: AdjointSink>(
+        &self,
+        record: &PathRecord,
+        origin: RgbVec,
+        turn: RgbVec,
+        seen: &[SensorGradient; 3],
+        sink: &mut S,
+    ) {
+        if !sink.interest().sensor {
+            return;
+        }
+        let camera = &self.world.camera;
+        let gradient = |origin: Vec3, turn: Vec3, seen: &SensorGradient| {
+            let mut g = camera.ray_gradient(record.nodes[0].wi, origin, turn);
+            g += *seen;
+            g
+        };
+        sink.sensor(&[
+            gradient(origin.r, turn.r, &seen[0]),
+            gradient(origin.g, turn.g, &seen[1]),
+            gradient(origin.b, turn.b, &seen[2]),
+        ]);
+    }
+}
+
+/// Sends the sensitivity `g` to b·w of a summand; returns those to the velocity of the ray's origin and to the
+/// rate of its direction.
+fn summand<S: AdjointSink>(a: &Auxiliary, g: Rgb, sink: &mut S) -> [RgbVec; 2] {
+    if sink.interest().moves(&a.matter) {
+        Rate::of(a.matter, a.functional).send(g, sink);
+    }
+    match a.on_ray {
+        Some(distance) => {
+            let origin = -g.outer(a.functional);
+            [origin, origin * distance]
+        }
+        None => [RgbVec::ZERO; 2],
+    }
+}
+
+/// Sensitivities of a point where a ray along `dir` lands, `shift` to the velocity of matter less that of
+/// the ray there, and `dims` to the ray's length: split into one to the ray's velocity there, and those
+/// of the surface. `free` is 1 - φ.
+fn split(
+    world: &World,
+    point: &SurfacePoint,
+    dir: Vec3,
+    free: f64,
+    here: &SurfaceAdjoint,
+    shift: RgbVec,
+    dims: Rgb,
+) -> (RgbVec, SurfaceAdjoint) {
+    let slide = here.ns.map(|ns| world.normal_slide(point, ns));
+    let by_ray = (here.u + slide) * free - shift;
+    let by_length = by_ray.dot(dir) + dims;
+    let along_normal = by_length.outer(point.ng / point.ng.dot(dir));
+    let u = along_normal + here.u - by_ray;
+    let lift = SurfaceAdjoint { u, ..*here };
+    (by_ray - along_normal, lift)
+}

@@ -1,0 +1,217 @@
+//! Forward mode: sensitivities contracted with the tangents of N parameters, one dot product each.
+
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, RgbVec, Vec3};
+use drt_medium::{CoefficientGradients, CoefficientRates, DepthEstimate, FlowPlace, MediumTangent};
+use drt_motion::interior::BasisValues;
+
+use crate::derivative::medium_motion::MediumMotions;
+use crate::derivative::sensitivity::{
+    AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint,
+};
+use crate::derivative::tangents::Tangents;
+use crate::model::emitter::EmitterGradient;
+use crate::model::sensor::SensorGradient;
+use crate::model::surface::{BsdfParams, BsdfTangent};
+use crate::world::vertex::MaterialPoint;
+use crate::world::{MediumNeed, Needs, World};
+
+/// Everything that changes with the parameters.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Motion {
+    pub(crate) tangents: Tangents,
+    pub(crate) insides: MediumMotions,
+    pub(crate) interest: Interest,
+}
+
+impl Motion {
+    pub(crate) fn new(tangents: Tangents, insides: MediumMotions) -> Self {
+        fn some<T>(lists: &[Vec<T>]) -> Vec<bool> {
+            lists.iter().map(|l| !l.is_empty()).collect()
+        }
+        let interest = Interest {
+            shapes: some(&tangents.shapes),
+            volumes: some(&insides.velocities),
+            media: some(&tangents.media),
+            grids: tangents.media.iter().map(|l| l.iter().any(|(_, t)| t.moves_grids())).collect(),
+            bsdfs: some(&tangents.bsdfs),
+            emitters: some(&tangents.emitters),
+            moving_emitters: tangents
+                .emitters
+                .iter()
+                .map(|l| l.iter().any(|(_, t)| t.moves()))
+                .collect(),
+            sensor: !tangents.sensor.is_empty(),
+        };
+        Self { tangents, insides, interest }
+    }
+
+    /// What must be sampled even where it contributes nothing to the image.
+    pub(crate) fn needs(&self) -> Needs {
+        let need = |tangents: &Vec<(usize, MediumTangent)>| {
+            let any = |f: fn(&MediumTangent) -> bool| tangents.iter().any(|(_, t)| f(t));
+            if any(|t| !t.albedo.is_zero() || !t.emission.is_zero()) {
+                MediumNeed::Vertices
+            } else if any(|t| !t.sigma_t.is_zero()) {
+                MediumNeed::Density
+            } else {
+                MediumNeed::Nothing
+            }
+        };
+        type Changes = Vec<(usize, BsdfTangent)>;
+        let roughens = |changes: &Changes| changes.iter().any(|(_, t)| !t.alpha.is_zero());
+        let bends = |changes: &Changes| changes.iter().any(|(_, t)| !t.eta.is_zero());
+        Needs {
+            media: self.tangents.media.iter().map(need).collect(),
+            bsdfs: self.interest.bsdfs.clone(),
+            roughness: self.tangents.bsdfs.iter().map(roughens).collect(),
+            index: self.tangents.bsdfs.iter().map(bends).collect(),
+        }
+    }
+
+    pub(crate) fn parameters(&self) -> usize {
+        self.tangents.names.len()
+    }
+}
+
+/// The derivative of one value by every parameter.
+pub(crate) struct Contraction<'a> {
+    pub(crate) world: &'a World,
+    motion: &'a Motion,
+    pub(crate) rates: Vec<Rgb>,
+    /// What the field of an inside is like at the last point.
+    basis: BasisValues,
+    /// And that of the flow of grids.
+    flow: FlowPlace,
+    /// By medium, the rates of what is the same everywhere in it.
+    uniform: Vec<Option<Vec<CoefficientRates>>>,
+}
+
+impl<'a> Contraction<'a> {
+    pub(crate) fn new(world: &'a World, motion: &'a Motion) -> Self {
+        let uniform = motion.tangents.media.iter().enumerate().map(|(m, tangents)| {
+            let medium = world.medium(m);
+            medium.homogeneous()?;
+            Some(tangents.iter().map(|(_, t)| t.rates(medium, Vec3::ZERO)).collect())
+        });
+        Self {
+            world,
+            motion,
+            rates: alloc::vec![Rgb::ZERO; motion.parameters()],
+            basis: BasisValues::default(),
+            flow: FlowPlace::default(),
+            uniform: uniform.collect(),
+        }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.rates.fill(Rgb::ZERO);
+    }
+
+    /// The rates of a functional, one number per parameter; false when all vanish.
+    pub(crate) fn evaluate(&mut self, functional: &Functional) -> bool {
+        self.clear();
+        functional.send(Rgb::new(1.0, 0.0, 0.0), self);
+        self.rates.iter().any(|r| r.r != 0.0)
+    }
+}
+
+impl AdjointSink for Contraction<'_> {
+    fn interest(&self) -> &Interest {
+        &self.motion.interest
+    }
+
+    fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint) {
+        let motions = &self.motion.tangents.shapes[point.shape as usize];
+        if motions.is_empty() {
+            return;
+        }
+        let mesh = &self.world.scene.shapes[point.shape as usize].mesh;
+        let element = drt_motion::surface::SurfaceElement::new(mesh, &point.at);
+        for (p, motion) in motions {
+            let jet = motion.jet_of(&element);
+            self.rates[*p] += adjoint.u.dot(jet.u)
+                + adjoint.n.dot(jet.n_dot)
+                + adjoint.ns.dot(jet.ns_dot)
+                + adjoint.j * jet.j_dot;
+        }
+    }
+
+    fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb) {
+        let insides = &self.motion.insides;
+        let motions = &insides.velocities[medium];
+        if let Some(basis) = &insides.bases[medium] {
+            basis.evaluate(x, &mut self.basis);
+        }
+        for (p, motion) in motions {
+            let jet = motion.jet(x, &self.basis);
+            self.rates[*p] += u.dot(jet.u) + j * jet.j_dot;
+        }
+    }
+
+    fn grid(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
+        for (p, tangent) in &self.motion.tangents.media[medium] {
+            self.rates[*p] += u.dot(tangent.grid_velocity(x, &mut self.flow));
+        }
+    }
+
+    fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
+        let tangents = &self.motion.tangents.media[medium];
+        if let Some(uniform) = &self.uniform[medium] {
+            for ((p, _), rates) in tangents.iter().zip(uniform) {
+                self.rates[*p] += adjoint.dot(rates);
+            }
+            return;
+        }
+        if tangents.is_empty() {
+            return;
+        }
+        let moves = self.motion.interest.grids[medium];
+        let medium = self.world.medium(medium);
+        let coefficients = medium.coefficients(x);
+        let gradients = if moves { medium.gradients(x) } else { CoefficientGradients::ZERO };
+        for (p, tangent) in tangents {
+            let velocity = tangent.grid_velocity(x, &mut self.flow);
+            let rates = tangent.rates_given(medium, x, &coefficients, &gradients, velocity);
+            self.rates[*p] += adjoint.dot(&rates);
+        }
+    }
+
+    fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {
+        let tangents = &self.motion.tangents.media[medium];
+        let medium = self.world.medium(medium);
+        for (p, tangent) in tangents {
+            self.rates[*p] += depth.rate_without_flows(medium, tangent) * adjoint;
+        }
+        if tangents.iter().all(|(_, t)| t.flows.is_empty()) {
+            return;
+        }
+        let Self { rates, flow, .. } = self;
+        depth.pulls(medium, |x, pull| {
+            for (p, tangent) in tangents {
+                rates[*p] += pull.dot(tangent.flow(x, flow)) * adjoint;
+            }
+        });
+    }
+
+    fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
+        for (p, tangent) in &self.motion.tangents.bsdfs[bsdf] {
+            self.rates[*p] += params.dot(tangent) * weight;
+        }
+    }
+
+    fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]) {
+        for (p, tangent) in &self.motion.tangents.emitters[emitter] {
+            let rates: [f64; 3] = core::array::from_fn(|c| gradient[c].dot(tangent));
+            self.rates[*p] += Rgb::from(rates);
+        }
+    }
+
+    fn sensor(&mut self, gradient: &[SensorGradient; 3]) {
+        for (p, tangent) in &self.motion.tangents.sensor {
+            let rates: [f64; 3] = core::array::from_fn(|c| gradient[c].dot(tangent));
+            self.rates[*p] += Rgb::from(rates);
+        }
+    }
+}

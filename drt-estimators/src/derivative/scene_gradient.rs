@@ -1,0 +1,83 @@
+//! The gradient of a loss with respect to a scene.
+
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, Vec3};
+use drt_medium::MediumGradient;
+use drt_motion::surface::{SmoothNormals, VertexGradient};
+
+use crate::derivative::sensitivity::Interest;
+use crate::model::emitter::EmitterGradient;
+use crate::model::rendering::Counters;
+use crate::model::scene::Scene;
+use crate::model::sensor::SensorGradient;
+use crate::model::surface::BsdfParams;
+use crate::world::World;
+
+/// The gradient of a loss with respect to a scene. Entries that were not asked for are `None`.
+#[derive(Clone, Debug)]
+pub struct SceneGradient {
+    /// Per shape: with respect to its vertices (in mesh order), and to its vertex normals where it
+    /// has any. [`SceneGradient::vertices`] folds the normals into positions.
+    pub shapes: Vec<Option<VertexGradient>>,
+    /// Per medium: with respect to coefficients and voxels.
+    pub media: Vec<Option<MediumGradient>>,
+    /// Per scattering model: with respect to its parameters (scalars: the sum over channels).
+    pub bsdfs: Vec<Option<BsdfParams>>,
+    /// Per emitter.
+    pub emitters: Vec<Option<EmitterGradient>>,
+    /// With respect to the camera.
+    pub sensor: Option<SensorGradient>,
+    /// Work done.
+    pub counters: Counters,
+    /// Contributions that were not finite; they count as zero.
+    pub non_finite: u64,
+}
+
+impl SceneGradient {
+    pub(crate) fn zeros(world: &World, interest: &Interest) -> Self {
+        let scene = &world.scene;
+        fn some<T>(wanted: &[bool], make: impl Fn(usize) -> T) -> Vec<Option<T>> {
+            wanted.iter().enumerate().map(|(i, w)| w.then(|| make(i))).collect()
+        }
+        Self {
+            shapes: some(&interest.shapes, |i| VertexGradient::zeros(&scene.shapes[i].mesh)),
+            media: some(&interest.media, |i| MediumGradient::zeros(&scene.media[i].item)),
+            bsdfs: some(&interest.bsdfs, |_| BsdfParams::default()),
+            emitters: some(&interest.emitters, |_| EmitterGradient::default()),
+            sensor: interest.sensor.then(SensorGradient::default),
+            counters: Counters::default(),
+            non_finite: 0,
+        }
+    }
+
+    pub(crate) fn add(&mut self, o: &Self) {
+        fn each<T: Clone>(a: &mut [Option<T>], b: &[Option<T>], add: impl Fn(&mut T, &T)) {
+            for (a, b) in a.iter_mut().zip(b) {
+                match (a, b) {
+                    (Some(a), Some(b)) => add(a, b),
+                    (a @ None, Some(b)) => *a = Some(b.clone()),
+                    (_, None) => {}
+                }
+            }
+        }
+        each(&mut self.shapes, &o.shapes, VertexGradient::add);
+        each(&mut self.media, &o.media, MediumGradient::add);
+        each(&mut self.bsdfs, &o.bsdfs, |a, b| a.scatter(b, Rgb::ONE));
+        each(&mut self.emitters, &o.emitters, |a, b| *a += *b);
+        if let (Some(a), Some(b)) = (&mut self.sensor, &o.sensor) {
+            *a += *b;
+        }
+        self.counters.add(&o.counters);
+        self.non_finite += o.non_finite;
+    }
+
+    /// The gradient by a shape's vertex positions, its vertex normals being recomputed from them as
+    /// the vertices move; in mesh order. `None` when it was not asked for.
+    #[must_use]
+    pub fn vertices(&self, scene: &Scene, shape: usize) -> Option<Vec<Vec3>> {
+        let mesh = &scene.shapes.get(shape)?.mesh;
+        let gradient = self.shapes.get(shape)?.as_ref()?;
+        Some(gradient.finish(mesh, &SmoothNormals::new(mesh)))
+    }
+}

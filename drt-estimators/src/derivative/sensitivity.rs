@@ -1,0 +1,189 @@
+//! Where derivatives go. Estimators know only *sensitivities*: how a pixel changes per unit of some
+//! local quantity (the jet of a surface point, a coefficient at a point, the camera's frame …).
+//! Two sinks receive them: a contraction with the tangents of N parameters (forward mode), and a
+//! scatter of one weighted sum into gradients of everything (reverse mode). They are transposes.
+
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, RgbVec, Vec3};
+use drt_medium::{CoefficientRates, DepthEstimate};
+
+use crate::model::emitter::EmitterGradient;
+use crate::model::sensor::SensorGradient;
+use crate::model::surface::BsdfParams;
+use crate::world::vertex::{MaterialPoint, Matter};
+
+/// Per channel, the change of a value per unit of each entry of a surface point's jet.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SurfaceAdjoint {
+    /// Position.
+    pub(crate) u: RgbVec,
+    /// Unit geometric normal.
+    pub(crate) n: RgbVec,
+    /// Unit shading normal.
+    pub(crate) ns: RgbVec,
+    /// Area Jacobian.
+    pub(crate) j: Rgb,
+}
+
+impl SurfaceAdjoint {
+    /// Of the position alone.
+    pub(crate) fn of_place(u: RgbVec) -> Self {
+        Self { u, ..Self::default() }
+    }
+
+    pub(crate) fn is_zero(&self) -> bool {
+        [self.u, self.n, self.ns].into_iter().all(|v| v == RgbVec::ZERO) && self.j.is_zero()
+    }
+}
+
+/// Per channel, the change of a value per unit of each coefficient at a point of a medium.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct CoefficientAdjoint {
+    pub(crate) sigma_t: Rgb,
+    pub(crate) albedo: Rgb,
+    pub(crate) emission: Rgb,
+    /// Of every channel, by the one asymmetry parameter.
+    pub(crate) g: Rgb,
+}
+
+impl CoefficientAdjoint {
+    /// Of the extinction alone.
+    pub(crate) fn of_sigma_t(sigma_t: Rgb) -> Self {
+        Self { sigma_t, ..Self::default() }
+    }
+
+    /// The change along rates of the coefficients.
+    pub(crate) fn dot(&self, r: &CoefficientRates) -> Rgb {
+        self.sigma_t * r.sigma_t
+            + self.albedo * r.albedo
+            + self.emission * r.emission
+            + self.g * r.g
+    }
+
+    /// The channels summed with weights.
+    pub(crate) fn weighted(&self, w: Rgb) -> CoefficientRates {
+        CoefficientRates {
+            sigma_t: self.sigma_t * w,
+            albedo: self.albedo * w,
+            emission: self.emission * w,
+            g: self.g.dot(w),
+        }
+    }
+}
+
+/// Which quantities any parameter (or gradient buffer) depends on: the rest is never computed.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Interest {
+    /// Shapes that move.
+    pub(crate) shapes: Vec<bool>,
+    /// Media whose inside moves.
+    pub(crate) volumes: Vec<bool>,
+    /// Media whose coefficients change.
+    pub(crate) media: Vec<bool>,
+    /// Of those, the ones whose grids move.
+    pub(crate) grids: Vec<bool>,
+    pub(crate) bsdfs: Vec<bool>,
+    pub(crate) emitters: Vec<bool>,
+    /// Emitters whose place or direction changes.
+    pub(crate) moving_emitters: Vec<bool>,
+    pub(crate) sensor: bool,
+}
+
+impl Interest {
+    /// True when a surface, an inside, an emitter or the camera can move: what boundary terms need.
+    pub(crate) fn moves_geometry(&self) -> bool {
+        self.sensor
+            || [&self.shapes, &self.volumes, &self.moving_emitters]
+                .into_iter()
+                .any(|l| l.contains(&true))
+    }
+
+    /// True when a point of matter moves.
+    pub(crate) fn moves(&self, matter: &Matter) -> bool {
+        match matter {
+            Matter::Surface(point) => self.shapes[point.shape as usize],
+            Matter::Volume(medium, _) => self.volumes[*medium],
+        }
+    }
+
+    /// True when anything changes.
+    pub(crate) fn any(&self) -> bool {
+        let lists = [&self.shapes, &self.volumes, &self.media, &self.bsdfs, &self.emitters];
+        self.sensor || lists.into_iter().any(|l| l.contains(&true))
+    }
+}
+
+/// A receiver of sensitivities.
+pub(crate) trait AdjointSink {
+    /// What it depends on.
+    fn interest(&self) -> &Interest;
+    /// Of a surface point.
+    fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint);
+    /// Of the position, and the volume Jacobian, of a material point inside a medium.
+    fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb);
+    /// Of the velocity of a medium's grids at a point of space.
+    fn grid(&mut self, medium: usize, x: Vec3, u: &RgbVec);
+    /// Of a medium's coefficients at a point of space.
+    fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint);
+    /// Of the optical depth of a ray through a medium that varies in space.
+    fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb);
+    /// Of a material's parameters; `weight` multiplies channel by channel.
+    fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb);
+    /// Of an emitter, per channel.
+    fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]);
+    /// Of the camera, per channel.
+    fn sensor(&mut self, gradient: &[SensorGradient; 3]);
+}
+
+/// A weighted sum of velocities: what boundary and flux terms depend on besides light.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Functional {
+    pub(crate) items: Vec<Rate>,
+}
+
+/// A summand of a [`Functional`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Rate {
+    /// Velocity of a surface point, dotted with a vector.
+    Surface(MaterialPoint, Vec3),
+    /// Velocity of the inside of a medium at a point, dotted with a vector.
+    Volume(usize, Vec3, Vec3),
+    /// Velocity of a medium's grids at a point, dotted with a vector.
+    Grid(usize, Vec3, Vec3),
+    /// Change of an emitter.
+    Emitter(usize, EmitterGradient),
+    /// Change of the camera.
+    Sensor(SensorGradient),
+}
+
+impl Functional {
+    /// Sends `weight` times the functional to a sink: the derivative of (weight × functional).
+    pub(crate) fn send<S: AdjointSink>(&self, weight: Rgb, sink: &mut S) {
+        self.items.iter().for_each(|item| item.send(weight, sink));
+    }
+}
+
+impl Rate {
+    /// Of a point, dotted with a vector.
+    pub(crate) fn of(matter: Matter, n: Vec3) -> Self {
+        match matter {
+            Matter::Surface(point) => Self::Surface(point, n),
+            Matter::Volume(medium, x) => Self::Volume(medium, x, n),
+        }
+    }
+
+    /// Sends `weight` times the rate to a sink.
+    pub(crate) fn send<S: AdjointSink>(&self, weight: Rgb, sink: &mut S) {
+        match *self {
+            Self::Surface(point, n) => {
+                let u = weight.outer(n);
+                sink.surface(&point, &SurfaceAdjoint::of_place(u));
+            }
+            Self::Volume(medium, x, n) => sink.volume(medium, x, &weight.outer(n), Rgb::ZERO),
+            Self::Grid(medium, x, n) => sink.grid(medium, x, &weight.outer(n)),
+            Self::Emitter(e, g) => sink.emitter(e, &weight.to_array().map(|w| g.scaled(w))),
+            Self::Sensor(g) => sink.sensor(&weight.to_array().map(|w| g.scaled(w))),
+        }
+    }
+}

@@ -1,0 +1,474 @@
+//! Parameters become tangents: the scene at the parameters' values, and its rate of change by each.
+
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::ops::AddAssign;
+
+use drt_math::{Affine, Rgb};
+use drt_medium::{MediumChange, MediumTangent};
+use drt_motion::parameter::{Applied, change_value, geometry_changes};
+use drt_motion::surface::{SmoothNormals, move_affine, move_mesh};
+use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotion};
+
+use crate::Error;
+use crate::derivative::grid_deformation::{GridDeformation, GridDeformationError};
+use crate::model::emitter::{Emitter, EmitterTangent};
+use crate::model::scene::{Scene, Target};
+use crate::model::sensor::{Sensor, SensorTangent};
+use crate::model::surface::{BsdfChange, BsdfTangent, Property};
+
+/// What changes with each parameter: for every item of the scene, the parameters that change it
+/// (by index) and how.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tangents {
+    pub(crate) names: Vec<String>,
+    pub(crate) shapes: Vec<Vec<(usize, SurfaceMotion)>>,
+    /// Where a deformed shape's normals are recomputed: the map to pull gradients back through.
+    pub(crate) smooth: Vec<Option<SmoothNormals>>,
+    pub(crate) media: Vec<Vec<(usize, MediumTangent)>>,
+    pub(crate) bsdfs: Vec<Vec<(usize, BsdfTangent)>>,
+    pub(crate) emitters: Vec<Vec<(usize, EmitterTangent)>>,
+    /// Of every sensor.
+    sensors: Vec<Vec<(usize, SensorTangent)>>,
+    /// Of the one that is in use.
+    pub(crate) sensor: Vec<(usize, SensorTangent)>,
+}
+
+impl Tangents {
+    /// What changes with any parameter.
+    pub(crate) fn targets(&self) -> impl Iterator<Item = Target> {
+        fn some<T>(lists: &[Vec<T>]) -> impl Iterator<Item = usize> {
+            lists.iter().enumerate().filter(|(_, l)| !l.is_empty()).map(|(i, _)| i)
+        }
+        let shapes = some(&self.shapes).map(Target::Shape);
+        let media = some(&self.media).map(Target::Medium);
+        let emitters = some(&self.emitters).map(Target::Emitter);
+        let sensor = (!self.sensor.is_empty()).then_some(Target::Sensor(0));
+        shapes.chain(media).chain(emitters).chain(sensor)
+    }
+
+    /// The same for one of the sensors; where there is no such sensor, none changes.
+    pub(crate) fn seen_by(&self, sensor: usize) -> Self {
+        let sensor = self.sensors.get(sensor).cloned().unwrap_or_default();
+        Self { sensor, ..self.clone() }
+    }
+}
+
+/// Looks up every effect's target, and follows property effects on a shape to what carries the
+/// property.
+fn resolve(scene: &Scene, parameters: &[Parameter]) -> Result<Vec<Parameter<Target>>, Error> {
+    parameters
+        .iter()
+        .map(|p| {
+            let effects = p
+                .effects
+                .iter()
+                .map(|e| {
+                    let fail = |reason: String| effect_error(p, &e.target, reason);
+                    let mut target = scene.find(&e.target)?;
+                    let change = match &e.change {
+                        Change::Geometry(g) => {
+                            if let Target::Bsdf(_) = target {
+                                return Err(fail("a bsdf does not move".into()));
+                            }
+                            Change::Geometry(g.clone())
+                        }
+                        Change::Property(c) => {
+                            target = carrier(scene, target, c).map_err(fail)?;
+                            Change::Property(c.clone())
+                        }
+                        Change::Follow(leader) => Change::Follow(scene.find(leader)?),
+                    };
+                    Ok(drt_motion::Effect { target, change })
+                })
+                .collect::<Result<_, Error>>()?;
+            Ok(Parameter { name: p.name.clone(), value: p.value, effects })
+        })
+        .collect()
+}
+
+fn carrier(scene: &Scene, target: Target, change: &PropertyChange) -> Result<Target, String> {
+    let Target::Shape(i) = target else { return Ok(target) };
+    let shape = &scene.shapes[i];
+    if change.property == "radiance" {
+        return shape.emitter.map(Target::Emitter).ok_or_else(|| "the shape does not emit".into());
+    }
+    Ok(Target::Bsdf(shape.bsdf))
+}
+
+fn effect_error<T>(p: &Parameter<T>, target: &str, reason: String) -> Error {
+    Error::Effect { parameter: p.name.clone(), target_name: target.into(), reason }
+}
+
+/// The effects on one target, in the order in which they apply.
+fn effects_on(
+    parameters: &[Parameter<Target>],
+    target: Target,
+) -> impl Iterator<Item = (usize, &Parameter<Target>, &Change<Target>)> {
+    parameters.iter().enumerate().flat_map(move |(i, p)| {
+        p.effects.iter().filter(move |e| e.target == target).map(move |e| (i, p, &e.change))
+    })
+}
+
+/// What a target follows by one parameter, directly or not.
+fn leaders(parameter: &Parameter<Target>, target: Target) -> Vec<Target> {
+    let mut found = alloc::vec![target];
+    let mut next = 0;
+    while let Some(&follower) = found.get(next) {
+        for e in parameter.effects.iter().filter(|e| e.target == follower) {
+            if let Change::Follow(leader) = e.change
+                && !found.contains(&leader)
+            {
+                found.push(leader);
+            }
+        }
+        next += 1;
+    }
+    found
+}
+
+/// The scene at its parameters' values.
+///
+/// # Errors
+/// When an effect does not fit its target.
+pub fn moved(scene: &Scene, parameters: &[Parameter]) -> Result<Scene, Error> {
+    apply(scene, parameters).map(|(scene, _)| scene)
+}
+
+/// Applies the parameters to a scene and differentiates it, without a sensor in use.
+pub(crate) fn apply(scene: &Scene, parameters: &[Parameter]) -> Result<(Scene, Tangents), Error> {
+    let parameters = resolve(scene, parameters)?;
+    let mut applied = Apply {
+        scene: scene.clone(),
+        tangents: Tangents {
+            names: parameters.iter().map(|p| p.name.clone()).collect(),
+            ..Tangents::default()
+        },
+        parameters: &parameters,
+        given: scene,
+    };
+    for i in 0..scene.shapes.len() {
+        applied.shape(i)?;
+    }
+    for i in 0..scene.media.len() {
+        applied.medium(i)?;
+    }
+    for i in 0..scene.bsdfs.len() {
+        applied.bsdf(i)?;
+    }
+    for i in 0..scene.emitters.len() {
+        applied.emitter(i)?;
+    }
+    for i in 0..scene.sensors.len() {
+        let tangents = applied.sensor(i)?;
+        applied.tangents.sensors.push(tangents);
+    }
+    Ok((applied.scene, applied.tangents))
+}
+
+struct Apply<'a> {
+    scene: Scene,
+    tangents: Tangents,
+    parameters: &'a [Parameter<Target>],
+    /// The scene before the changes.
+    given: &'a Scene,
+}
+
+impl Apply<'_> {
+    fn name(&self, target: Target) -> String {
+        let (kind, i, id) = match target {
+            Target::Shape(i) => ("shape", i, &self.scene.shapes[i].id),
+            Target::Medium(i) => ("medium", i, &self.scene.media[i].id),
+            Target::Bsdf(i) => ("bsdf", i, &self.scene.bsdfs[i].id),
+            Target::Emitter(i) => ("emitter", i, &self.scene.emitters[i].id),
+            Target::Sensor(i) => ("sensor", i, &self.scene.sensors[i].id),
+        };
+        id.clone().unwrap_or_else(|| alloc::format!("{kind}[{i}]"))
+    }
+
+    fn fail(&self, parameter: usize, target: Target, reason: impl ToString) -> Error {
+        effect_error(&self.parameters[parameter], &self.name(target), reason.to_string())
+    }
+
+    fn geometry(&self, target: Target) -> Result<Vec<Applied<'_, GeometryChange>>, Error> {
+        geometry_changes(self.parameters, &target)
+            .map_err(|e| self.fail(e.parameter, target, e.cause))
+    }
+
+    fn shape(&mut self, i: usize) -> Result<(), Error> {
+        let target = Target::Shape(i);
+        let changes = self.geometry(target)?;
+        let (mut motions, mut smooth) = (Vec::new(), None);
+        if !changes.is_empty() {
+            let moved = move_mesh(&self.scene.shapes[i].mesh, &changes, self.parameters.len())
+                .map_err(|e| self.fail(e.parameter, target, e.cause))?;
+            motions = keep(moved.motions, |m| !m.is_rest());
+            smooth = moved.smooth;
+            // What has not moved yet stays what it is to the last bit.
+            let rests = |c: &Applied<'_, GeometryChange>| {
+                c.theta == 0.0 && c.change.affine(c.theta).is_some()
+            };
+            if !changes.iter().all(rests) {
+                self.scene.shapes[i].mesh = Arc::new(moved.mesh);
+            }
+        }
+        self.tangents.shapes.push(motions);
+        self.tangents.smooth.push(smooth);
+        Ok(())
+    }
+
+    fn medium(&mut self, i: usize) -> Result<(), Error> {
+        let target = Target::Medium(i);
+        let mut tangents = alloc::vec![MediumTangent::zero(); self.parameters.len()];
+        let parameters = self.parameters;
+        for (p, parameter, change) in effects_on(parameters, target) {
+            let theta = parameter.value;
+            let Change::Property(change) = change else { continue };
+            let change = self.medium_change(p, target, change)?;
+            for t in &mut tangents {
+                t.push_through(&change, theta);
+            }
+            let medium = &mut self.scene.media[i].item;
+            let own = medium.apply(&change, theta).and_then(|()| medium.tangent(&change, theta));
+            let own = own.map_err(|e| self.fail(p, target, e))?;
+            tangents[p] = tangents[p].clone().plus(&own);
+        }
+        // Coefficients do not depend on where they are: what moves the grids can come last.
+        self.move_grids(i, &mut tangents)?;
+        self.tangents.media.push(keep(tangents, |t| !t.is_zero()));
+        Ok(())
+    }
+
+    fn move_grids(&mut self, i: usize, tangents: &mut [MediumTangent]) -> Result<(), Error> {
+        let target = Target::Medium(i);
+        let changes = self.geometry(target)?;
+        let Some(first) = changes.first().map(|c| c.parameter) else { return Ok(()) };
+        let n = self.parameters.len();
+        let mut medium = self.scene.media[i].item.clone();
+        match (self.deforming_leader(target)?, medium.grid()) {
+            (Some(leader), Some(grid)) => {
+                let shape = &self.given.shapes[leader].mesh;
+                let deformation =
+                    GridDeformation::new(grid, shape, &changes, n).map_err(|e| match e {
+                        GridDeformationError::Motion(e) => self.fail(e.parameter, target, e.cause),
+                        GridDeformationError::Shape(p, reason) => self.fail(p, target, reason),
+                    })?;
+                for (p, t) in tangents.iter_mut().enumerate() {
+                    t.flows.extend(Some(deformation.flow(p)).filter(|flow| !flow.is_zero()));
+                }
+                deformation.apply(&mut medium).map_err(|e| self.fail(first, target, e))?;
+            }
+            // Surfaces bound it; it has nothing of its own that could deform.
+            (Some(_), None) if medium.homogeneous().is_some() => {}
+            (Some(_), None) => {
+                return Err(self.fail(first, target, drt_medium::MediumError::CustomField));
+            }
+            (None, _) => {
+                let frame = move_affine(&changes, n)
+                    .map_err(|e| self.fail(e.parameter, target, e.cause))?;
+                medium.place(&frame.map).map_err(|e| self.fail(first, target, e))?;
+                if medium.grid().is_some() {
+                    for (t, velocity) in tangents.iter_mut().zip(&frame.velocities) {
+                        t.velocity = *velocity;
+                    }
+                }
+            }
+        }
+        self.scene.media[i].item = medium;
+        Ok(())
+    }
+
+    /// The shape that a target follows while it deforms.
+    fn deforming_leader(&self, target: Target) -> Result<Option<usize>, Error> {
+        let mut found: Option<usize> = None;
+        for (p, parameter) in self.parameters.iter().enumerate() {
+            let deforms = |leader: &Target| {
+                let of = parameter.effects.iter().filter(|e| e.target == *leader);
+                let changes = of.filter_map(|e| match &e.change {
+                    Change::Geometry(g) => Some(g),
+                    _ => None,
+                });
+                changes.into_iter().any(|g| g.affine(parameter.value).is_none())
+            };
+            for leader in leaders(parameter, target).into_iter().filter(deforms) {
+                let Target::Shape(shape) = leader else {
+                    return Err(self.fail(p, leader, drt_motion::Cause::NotAffine));
+                };
+                if found.is_some_and(|other| other != shape) {
+                    let reason = "it follows two shapes that deform; it can follow one";
+                    return Err(self.fail(p, target, reason));
+                }
+                found = Some(shape);
+            }
+        }
+        Ok(found)
+    }
+
+    /// What a property effect does to a medium.
+    fn medium_change(
+        &self,
+        p: usize,
+        target: Target,
+        change: &PropertyChange,
+    ) -> Result<MediumChange, Error> {
+        let (op, voxels) = (change.op, change.voxels);
+        Ok(match change.property.as_str() {
+            "sigma_t" => MediumChange::SigmaT { op, voxels },
+            "albedo" => MediumChange::Albedo { op, voxels },
+            "emission" => MediumChange::Emission { op, voxels },
+            "g" => MediumChange::G(op),
+            other => {
+                let reason = alloc::format!(
+                    "a medium has no property `{other}`; it has sigma_t, albedo, emission and g"
+                );
+                return Err(self.fail(p, target, reason));
+            }
+        })
+    }
+
+    fn bsdf(&mut self, i: usize) -> Result<(), Error> {
+        let target = Target::Bsdf(i);
+        let mut tangents = alloc::vec![BsdfTangent::default(); self.parameters.len()];
+        let parameters = self.parameters;
+        for (p, parameter, change) in effects_on(parameters, target) {
+            let Change::Property(c) = change else {
+                return Err(self.fail(p, target, "a bsdf does not move"));
+            };
+            let theta = parameter.value;
+            let property = Property::from_name(&c.property).map_err(|e| self.fail(p, target, e))?;
+            let change = BsdfChange { property, op: c.op };
+            let bsdf = &mut self.scene.bsdfs[i].item;
+            let own = bsdf.tangent(&change, theta);
+            let own = own.and_then(|t| bsdf.apply(&change, theta).map(|()| t));
+            let own = own.map_err(|e| self.fail(p, target, e))?;
+            for t in &mut tangents {
+                change.carry(t, theta);
+            }
+            let sum = tangents[p].get(property) + own.get(property);
+            *tangents[p].get_mut(property) = sum;
+        }
+        self.tangents.bsdfs.push(keep(tangents, |t| *t != BsdfTangent::default()));
+        Ok(())
+    }
+
+    fn emitter(&mut self, i: usize) -> Result<(), Error> {
+        let target = Target::Emitter(i);
+        let given = self.scene.emitters[i].item.emitter;
+        let emitter = given
+            .checked()
+            .map_err(|e| Error::Element { element: self.name(target), reason: e.to_string() })?;
+        let changes = self.geometry(target)?;
+        if let (Some(first), Emitter::Area { .. } | Emitter::Constant { .. }) =
+            (changes.first(), emitter)
+        {
+            let reason = "this emitter has no place of its own; move its shape";
+            return Err(self.fail(first.parameter, target, reason));
+        }
+        let (emitter, tangents) = self.placed(target, emitter)?;
+        self.scene.emitters[i].item.emitter = emitter;
+        self.tangents.emitters.push(keep(tangents, |t| !t.is_zero()));
+        Ok(())
+    }
+
+    fn sensor(&mut self, i: usize) -> Result<Vec<(usize, SensorTangent)>, Error> {
+        let given = self.scene.sensors[i].item.sensor.clone();
+        let (sensor, tangents) = self.placed(Target::Sensor(i), given)?;
+        self.scene.sensors[i].item.sensor = sensor;
+        Ok(keep(tangents, |t| !t.is_zero()))
+    }
+
+    /// An emitter or sensor at the parameters' values, with its rate of change by each.
+    fn placed<T: Placed>(
+        &self,
+        target: Target,
+        mut item: T,
+    ) -> Result<(T, Vec<T::Tangent>), Error> {
+        let n = self.parameters.len();
+        let mut tangents = alloc::vec![T::Tangent::default(); n];
+        let changes = self.geometry(target)?;
+        if let Some(first) = changes.first() {
+            let frame =
+                move_affine(&changes, n).map_err(|e| self.fail(e.parameter, target, e.cause))?;
+            item =
+                item.at(&frame.map).map_err(|reason| self.fail(first.parameter, target, reason))?;
+            for (t, v) in tangents.iter_mut().zip(&frame.velocities) {
+                *t += item.rate(v);
+            }
+        }
+        self.properties(target, |property, changed| {
+            let before = item.value(property)?;
+            item = item.with(property, changed.map.value(before))?;
+            for (t, rate) in tangents.iter_mut().zip(&changed.rates) {
+                *t += item.rate_of(property, rate.value(before))?;
+            }
+            Ok(())
+        })?;
+        Ok((item, tangents))
+    }
+
+    /// Calls `change` for each property that effects on the target name.
+    fn properties(
+        &self,
+        target: Target,
+        mut change: impl FnMut(&str, &drt_motion::parameter::ChangedValue) -> Result<(), String>,
+    ) -> Result<(), Error> {
+        let mut done: Vec<&str> = Vec::new();
+        for (p, _, effect) in effects_on(self.parameters, target) {
+            let Change::Property(c) = effect else { continue };
+            if done.contains(&c.property.as_str()) {
+                continue;
+            }
+            if c.voxels.is_some() {
+                return Err(self.fail(p, target, "only the grids of a medium have voxels"));
+            }
+            done.push(&c.property);
+            let changes =
+                drt_motion::parameter::property_changes(self.parameters, &target, &c.property);
+            let changed = change_value(&changes, None, self.parameters.len())
+                .map_err(|e| self.fail(e.parameter, target, e.cause))?;
+            change(&c.property, &changed).map_err(|reason| self.fail(p, target, reason))?;
+        }
+        Ok(())
+    }
+}
+
+/// What has a frame and named numbers: emitters and sensors.
+trait Placed: Sized {
+    type Tangent: Clone + Default + AddAssign;
+    fn at(&self, map: &Affine) -> Result<Self, String>;
+    fn rate(&self, field: &Affine) -> Self::Tangent;
+    fn value(&self, property: &str) -> Result<Rgb, String>;
+    fn with(&self, property: &str, value: Rgb) -> Result<Self, String>;
+    fn rate_of(&self, property: &str, rate: Rgb) -> Result<Self::Tangent, String>;
+}
+
+macro_rules! placed {
+    ($($item:ty => $tangent:ty),*) => {$(
+        impl Placed for $item {
+            type Tangent = $tangent;
+            fn at(&self, map: &Affine) -> Result<Self, String> {
+                self.moved(map).map_err(|e| e.to_string())
+            }
+            fn rate(&self, field: &Affine) -> $tangent {
+                self.velocity(field)
+            }
+            fn value(&self, property: &str) -> Result<Rgb, String> {
+                self.property(property).map_err(|e| e.to_string())
+            }
+            fn with(&self, property: &str, value: Rgb) -> Result<Self, String> {
+                self.with_property(property, value).map_err(|e| e.to_string())
+            }
+            fn rate_of(&self, property: &str, rate: Rgb) -> Result<$tangent, String> {
+                self.property_tangent(property, rate).map_err(|e| e.to_string())
+            }
+        }
+    )*};
+}
+
+placed!(Emitter => EmitterTangent, Sensor => SensorTangent);
+
+/// The entries worth keeping, with their parameters' indices.
+fn keep<T>(items: Vec<T>, worth: impl Fn(&T) -> bool) -> Vec<(usize, T)> {
+    items.into_iter().enumerate().filter(|(_, t)| worth(t)).collect()
+}

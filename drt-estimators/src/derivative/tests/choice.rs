@@ -1,0 +1,138 @@
+//! How vertices move in the spatial form is a choice: the sum of all terms does not depend on it, that of
+//! terms which do not choose alike does.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use drt_math::Rgb;
+use drt_math::sobol::SobolSampler;
+use drt_math::stats::Moments;
+use drt_motion::Parameter;
+
+use crate::derivative::contraction::{Contraction, Motion};
+use crate::derivative::sensitivity::Functional;
+use crate::derivative::tangents;
+use crate::derivative::tests::scenes::FILM;
+use crate::model::scene::Scene;
+use crate::model::settings::{EstimatorKind, Settings};
+use crate::sampling::pixels::Sampler;
+use crate::sampling::streams::sequence_name;
+use crate::terms::boundary::Receiver;
+use crate::terms::interior::PixelSampler;
+use crate::terms::prepared::Prepared;
+use crate::terms::splatting::Checked;
+use crate::world::World;
+use crate::world::cache::Kept;
+use crate::world::lights::Lit;
+
+/// A scene prepared for `kind = "radiative"`.
+pub(crate) fn prepare(scene: &Scene, motion: &Parameter, depth: u32) -> (Prepared, Motion) {
+    let (scene, tangents) =
+        tangents::apply(scene, core::slice::from_ref(motion)).expect("a valid parameter");
+    let mut kept = Kept::default();
+    let world = World::new(scene, 0, Some(depth), None, Lit::Extended, &mut kept);
+    let mut world = world.expect("a valid scene");
+    let tangents = tangents.seen_by(0);
+    let insides = crate::derivative::medium_motion::MediumMotions::affine(&world, &tangents, &[]);
+    let motion = Motion::new(tangents, insides);
+    world.prepare_for_derivatives(motion.needs());
+    let settings = Settings { estimator: EstimatorKind::Radiative, ..Settings::default() };
+    let prepared = Prepared::new(world, &motion.interest, &[], &settings, Some(&motion));
+    (prepared.expect("a valid scene"), motion)
+}
+
+/// A weighted sum of the image, and how well it is known.
+#[derive(Clone, Copy)]
+pub(crate) struct Sum {
+    /// By pixel.
+    pub(crate) weight: fn(u32) -> f64,
+    /// Per pixel and batch.
+    pub(crate) samples: u32,
+}
+
+/// The light's moment across the image: some columns gain what others lose.
+pub(crate) const MOMENT: Sum =
+    Sum { weight: |pixel| f64::from(pixel % FILM[0]) - 2.5, samples: 128 };
+
+/// All of it.
+pub(crate) const LIGHT: Sum = Sum { weight: |_| 1.0, samples: 128 };
+
+/// The derivative of a sum: the interior term with a world made by `prepare(strengths[0])`, and all others with
+/// one by `prepare(strengths[1])`.
+pub(crate) fn derivative(
+    Sum { weight, samples }: Sum,
+    prepare: &dyn Fn(f64) -> (Prepared, Motion),
+    strengths: [f64; 2],
+) -> Moments {
+    let [rays, edges] = strengths.map(|strength| {
+        let (prepared, motion) = prepare(strength);
+        let mut batches = [Vec::new(), Vec::new()];
+        for seed in 0..BATCHES {
+            let [mut rays, mut edges] = [0.0; 2];
+            let component = prepared.component(Contraction::new(&prepared.world, &motion));
+            let along = prepared.along_rays();
+            let mut sampler = PixelSampler::new(&prepared.world, [component], seed, false, true);
+            let mut values = vec![Rgb::ZERO; 2 + along.terms().count()];
+            for pixel in 0..PIXELS {
+                let sequence = sequence_name(seed, pixel, 0);
+                for unit in 0..samples {
+                    sampler.sample(pixel, unit, SobolSampler::new(sequence, unit), &mut values);
+                    let weight = weight(pixel) / f64::from(samples);
+                    rays += values[1].mean() * weight;
+                    edges += values[2..].iter().map(|v| v.mean()).sum::<f64>() * weight;
+                }
+            }
+            let contraction = Contraction::new(&prepared.world, &motion);
+            let mut outlines = Checked::new(Total { contraction, weight, sum: 0.0 });
+            for source in &prepared.sources {
+                prepared.splatter(seed).run(
+                    *source,
+                    source.stream(),
+                    samples * PIXELS,
+                    &mut outlines,
+                );
+            }
+            edges += outlines.inner.sum / f64::from(samples * PIXELS);
+            batches[0].push(rays);
+            batches[1].push(edges);
+        }
+        batches
+    });
+    let mut moments = Moments::default();
+    rays[0].iter().zip(&edges[1]).for_each(|(rays, edges)| moments.push(rays + edges));
+    moments
+}
+
+const BATCHES: u64 = 48;
+const PIXELS: u32 = FILM[0] * FILM[1];
+
+/// What lands on any pixel, by a weight of it.
+pub(crate) struct Total<'a> {
+    pub(crate) contraction: Contraction<'a>,
+    pub(crate) weight: fn(u32) -> f64,
+    pub(crate) sum: f64,
+}
+
+impl Receiver for Total<'_> {
+    fn moves(&mut self, functional: &Functional) -> bool {
+        self.contraction.evaluate(functional)
+    }
+
+    fn receive(&mut self, pixel: u32, value: Rgb) {
+        self.sum += (self.weight)(pixel) * value.mean() * self.contraction.rates[0].r;
+    }
+}
+
+/// Compares strengths of what is chosen with each other, and finds out terms that do not choose alike.
+pub(crate) fn check(sum: Sum, prepare: &dyn Fn(f64) -> (Prepared, Motion)) {
+    let reference = derivative(sum, prepare, [1.0; 2]);
+    let compare = |strengths: [f64; 2]| {
+        let m = derivative(sum, prepare, strengths);
+        let error = f64::sqrt(m.variance_of_mean() + reference.variance_of_mean());
+        ((m.mean() - reference.mean()) / error, error / reference.mean())
+    };
+    let alike = [[0.0, 0.0], [3.0, 3.0]].map(compare);
+    assert!(alike.iter().all(|(z, _)| z.abs() < 4.0), "{alike:?}");
+    let unlike = compare([3.0, 0.0]);
+    assert!(unlike.0.abs() > 5.0, "{unlike:?}");
+}

@@ -1,0 +1,150 @@
+//! What velocity the vertices of a path have as parameters change.
+//!
+//! A path integral is differentiated along a velocity field of its vertices, which is free but for its
+//! value at jumps of the integrand (theory sheet §4.1, §9). Every field here gives a vertex at x, found
+//! by a ray that starts at x_p and runs along d over the distance t, the velocity
+//!
+//! ```text
+//! v = φ u + (1 - φ) c + Σ_j a_j (b_j·w_j),
+//! ```
+//!
+//! | symbol | code | meaning |
+//! |---|---|---|
+//! | u | | velocity of the material point at x |
+//! | c | | velocity propagated by the ray: x_p_dot + t d_dot, and D_dot d more on a surface (2019 paper, Eq. 19) |
+//! | φ, ∇φ | [`Blend`] | weight of the material velocity, and its gradient by x |
+//! | w_j | [`Auxiliary::matter`] | velocity of another material point, relative to the ray's at its distance if it is on the ray |
+//! | b_j | [`Auxiliary::functional`] | what of it counts |
+//! | a_j | [`Auxiliary::displacement`] | what it gives to x |
+//!
+//! The field enters a derivative by its values and by its divergence (2023 paper, Eq. 38),
+//!
+//! ```text
+//! div v = φ div u + (1 - φ) div c + ∇φ·(u - c) + Σ_j s_j (b_j·w_j),    s_j = div(a_j b_j·w_j) / (b_j·w_j),
+//! ```
+//!
+//! so that v and div v are linear functionals of the velocities of matter, with coefficients that depend
+//! on the path alone. [`material`] has φ = 1 (2021 paper), [`spatial`] mostly φ = 0 (2019 paper). A field
+//! that is smoothed from auxiliary points (2023 paper, Eqs. 44–47) has φ = 1 and one summand for each.
+//! Nothing but a [`VelocityField`] knows which of these it is.
+
+pub(crate) mod blend;
+mod material;
+mod path;
+pub(crate) mod spatial;
+pub(crate) mod warp;
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+use drt_math::Vec3;
+
+pub(crate) use crate::derivative::velocity::blend::Blend;
+pub(crate) use crate::derivative::velocity::material::Material;
+pub(crate) use crate::derivative::velocity::path::{PathVelocities, RecordedPath};
+pub(crate) use crate::derivative::velocity::spatial::Spatial;
+use crate::derivative::velocity::warp::SurfaceHit;
+
+use crate::derivative::sensitivity::Interest;
+use crate::sampling::trace::Arrival;
+use crate::world::World;
+use crate::world::vertex::{Matter, SurfacePoint, Vertex};
+
+/// The velocity of one vertex of a path, as a functional of the velocities of matter.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct VertexVelocity {
+    /// False where it is zero for every parameter.
+    pub(crate) moves: bool,
+    /// φ and ∇φ.
+    pub(crate) blend: Blend,
+    /// Its summands in [`PathVelocities::auxiliary`].
+    pub(crate) auxiliary: Range<usize>,
+}
+
+/// A part of a vertex's velocity that comes from another material point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Auxiliary {
+    pub(crate) matter: Matter,
+    /// b.
+    pub(crate) functional: Vec3,
+    /// a; scene units per unit of b·w.
+    pub(crate) displacement: Vec3,
+    /// s; 1 / scene units per unit of b·w.
+    pub(crate) divergence: f64,
+    /// The distance of the material point along the ray that found the vertex. The summand then moves the
+    /// ray's point, at fixed direction; else the vertex itself.
+    pub(crate) on_ray: Option<f64>,
+}
+
+/// A vertex as it is found.
+pub(crate) struct Found<'a> {
+    /// Column and row of the pixel that the path serves.
+    pub(crate) pixel: [u32; 2],
+    /// The vertex that the ray started from; `None` at the camera.
+    pub(crate) viewer: Option<&'a Vertex>,
+    /// The viewer's velocity.
+    pub(crate) velocity: &'a VertexVelocity,
+    pub(crate) arrival: &'a Arrival,
+    /// The surfaces on the ray, if any of them has a [flux](crate::terms::flux).
+    pub(crate) hits: &'a [SurfaceHit],
+}
+
+/// A velocity field of the vertices of paths.
+pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
+    /// Of the camera.
+    fn camera(&self) -> VertexVelocity;
+
+    /// Of a vertex of a path, or of the environment that it escaped to; appends its summands.
+    fn vertex(
+        &self,
+        world: &World,
+        found: &Found<'_>,
+        auxiliary: &mut Vec<Auxiliary>,
+    ) -> VertexVelocity;
+
+    /// φ and ∇φ of a point seen from a `viewer` along the unit direction `dir` at a `distance`.
+    fn blend(
+        &self,
+        world: &World,
+        viewer: &Vertex,
+        end: &Vertex,
+        dir: Vec3,
+        distance: f64,
+    ) -> Blend;
+
+    /// Whether rays that scatter at a surface point of some velocity may turn against its normal.
+    fn turns_rays(&self, world: &World, s: &SurfacePoint, velocity: &VertexVelocity) -> bool;
+
+    /// The widest lobes, in radians, whose turning is told by [pairs](super::pairs) of rays.
+    fn widest_paired(&self, transmissive: bool) -> f64;
+}
+
+/// What moves for some parameter.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Movers {
+    /// Shapes.
+    pub(crate) shapes: Arc<[bool]>,
+    /// Media whose inside does.
+    pub(crate) volumes: Arc<[bool]>,
+    pub(crate) camera: bool,
+}
+
+impl Movers {
+    pub(crate) fn new(interest: &Interest) -> Self {
+        Self {
+            shapes: interest.shapes.as_slice().into(),
+            volumes: interest.volumes.as_slice().into(),
+            camera: interest.sensor,
+        }
+    }
+
+    /// Whether a material point does.
+    pub(crate) fn moves(&self, matter: &Matter) -> bool {
+        let of = |list: &[bool], i: usize| list.get(i) == Some(&true);
+        match matter {
+            Matter::Surface(point) => of(&self.shapes, point.shape as usize),
+            Matter::Volume(medium, _) => of(&self.volumes, *medium),
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Edges that rest on another surface: the foot of a block on a floor.
+//!
+//! A segment past such an edge has one end on the floor, right at the edge, and neither which end nor
+//! whether it is in shadow there can be told by rays. But what the edge does is simple: it bounds the
+//! part of the floor that is not covered. With V the speed of that bound away from the faces, relative
+//! to the floor,
+//!
+//! ```text
+//! d/dθ ∫ f dA = - ∫ V f dl,
+//! ```
+//!
+//! where f is everything that paths carry through a floor vertex just outside (the boundary of the
+//! domain in Reynolds' theorem; 2021 paper, Eq. 17, with a jump of f from its value to zero). It is the
+//! limit of the kernel of [boundary segments](crate::terms::boundary) for a gap that closes (l = 0, |t×w| N = cos θ times the
+//! conormal), with segments that end in the shadow of the edge and those that start in it together: so
+//! each path counts once, light and camera both above the floor.
+
+use core::f64::consts::PI;
+
+use drt_geom::{Ray, Skip};
+use drt_math::{Real, Vec3, fm};
+
+use crate::edges::edge::{Edge, EdgePoint};
+use crate::world::World;
+use crate::world::vertex::{Kind, Vertex};
+
+/// How far an edge may be from the surface it rests on, in its own lengths: what coordinates in
+/// files written with single precision are off by.
+const GAP: f64 = 1e-6;
+
+/// Sine of the angle by which faces that lie in the floor may be off.
+const FLAT: f64 = 1e-5;
+
+/// Where along an edge it is found out whether it rests on anything.
+const PROBES: [f64; 5] = [0.01, 0.3, 0.5, 0.7, 0.99];
+
+/// Where an edge rests on a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Contact {
+    /// Unit normal of the floor, on the side of the faces.
+    pub(crate) up: Vec3,
+    /// Unit, in the floor, across the edge.
+    side: Vec3,
+    /// Angles from `side` over `up` between which the edge's faces are.
+    wedge: [f64; 2],
+    /// The floor along `side` and against it, where it goes on.
+    floor: [Option<Vertex>; 2],
+}
+
+impl Contact {
+    /// What the edge rests on at a point of it; `None` nearly everywhere.
+    pub(crate) fn at(world: &World, at: &EdgePoint<'_>) -> Option<Self> {
+        let e = at.edge;
+        if !e.may_rest {
+            return None;
+        }
+        let inward = e.inward()?;
+        let gap = GAP * e.line().1.length();
+        let ray = Ray { origin: at.x + inward * gap, dir: -inward, t_max: 2.0 * gap };
+        let skip = Skip::two(e.faces[0], e.faces[1]);
+        let hit = world.nearest_on(&ray, skip)?;
+        let (below, x) = world.point(hit.prim, hit.bary);
+        if world.is_null(below.shape) || Real::abs(below.ng.dot(e.tangent)) > FLAT {
+            return None;
+        }
+        let up = if below.ng.dot(inward) > 0.0 { below.ng } else { -below.ng };
+        let side = e.tangent.cross(up).normalize();
+        let angles = e.across.map(|h| {
+            let (sine, cosine) = (h.dot(up), h.dot(side));
+            (sine >= -FLAT).then(|| fm::atan2(f64::max(sine, 0.0), cosine))
+        });
+        let [Some(a), Some(b)] = angles else { return None };
+        let wedge = [f64::min(a, b), f64::max(a, b)];
+        // Next to the edge, so that its faces neither touch the floor there nor shade it from outside.
+        let medium = e.medium(world, at.x);
+        let beside = |outward: Vec3| {
+            let x = x + outward * (4.0 * gap);
+            let ray = Ray { origin: x + up * gap, dir: -up, t_max: 2.0 * gap };
+            let hit = world.nearest_on(&ray, skip)?;
+            let (floor, x) = world.point(hit.prim, hit.bary);
+            let medium = world.medium_on_side(&floor, floor.ng.dot(up) > 0.0, medium);
+            let found = Vertex { x, medium, kind: Kind::Surface(floor) };
+            (floor.shape == below.shape && floor.ng.dot(up) * below.ng.dot(up) > 0.0)
+                .then_some(found)
+        };
+        let open = [wedge[0] > FLAT, wedge[1] < PI - FLAT];
+        let floor =
+            [open[0].then(|| beside(side)).flatten(), open[1].then(|| beside(-side)).flatten()];
+        // Without a floor outside, it is another's edge that this one meets.
+        (floor[0].is_some() || floor[1].is_some()).then_some(Self { up, side, wedge, floor })
+    }
+
+    /// True when an edge rests on something somewhere.
+    pub(crate) fn anywhere(world: &World, e: &Edge) -> bool {
+        let mut e = *e;
+        e.may_rest = true;
+        PROBES.into_iter().any(|u| {
+            let (x, point) = e.point(u);
+            Self::at(world, &EdgePoint { edge: &e, x, point, inv_pdf: 1.0 }).is_some()
+        })
+    }
+
+    /// The floor next to the edge on the side from which `w` leaves it, and the unit vector along the
+    /// floor to there; `None` where `w` leaves into the faces.
+    pub(crate) fn beside(&self, w: Vec3) -> Option<(Vertex, Vec3)> {
+        let angle = fm::atan2(w.dot(self.up), w.dot(self.side));
+        let [low, high] = self.wedge;
+        let [along, against] = self.floor;
+        match angle {
+            a if a <= 0.0 => None,
+            a if a < low => Some((along?, self.side)),
+            a if a > high => Some((against?, -self.side)),
+            _ => None,
+        }
+    }
+
+    /// The floor next to the edge on the side to which `w` points, if it goes on there.
+    pub(crate) fn floor_along(&self, w: Vec3) -> Option<Vertex> {
+        self.floor[usize::from(self.side.dot(w) < 0.0)]
+    }
+
+    /// The direction and distance of a point from the contact.
+    pub(crate) fn towards(&self, p: Vec3) -> Option<(Vec3, f64)> {
+        let x = self.floor.iter().flatten().next()?.x;
+        let distance = (p - x).length();
+        Some(((p - x) / distance, distance))
+    }
+}

@@ -1,0 +1,256 @@
+//! Edges of surfaces, each with all faces around it.
+
+use alloc::vec::Vec;
+use core::f64::consts::PI;
+use core::ops::Range;
+
+use drt_math::{Vec3, fm};
+
+use crate::edges::contact::Contact;
+use crate::edges::edge::{Edge, EdgePoint, collect};
+use crate::world::World;
+use crate::world::vertex::{MaterialPoint, SurfacePoint};
+
+/// How much less radiance jumps at a crease of a surface with interpolated normals than its angle tells.
+const SMOOTH: f64 = 0.05;
+
+/// How much less from behind: next to black, and hidden by the front of what is closed.
+const BEHIND: f64 = 0.05;
+
+/// Angle by which two faces may be out of one plane and still go on in it.
+const FLAT: f64 = 1e-6;
+
+/// Distance from an edge at which radiance beside it is taken, in the edge's lengths: on the edge
+/// itself a ray would not tell which face it leaves.
+const BESIDE: f64 = 1e-6;
+
+/// An edge at which radiance jumps.
+#[derive(Clone, Debug)]
+pub(crate) struct Jump {
+    pub(crate) edge: Edge,
+    /// Its faces, in the order in which one goes around it.
+    fan: Range<usize>,
+    /// The medium around its shape, where that bounds none and it is the same everywhere.
+    around: Option<Option<usize>>,
+    /// A face of it bounds a medium.
+    bounds: bool,
+    /// How much a crease jumps, compared to a silhouette, on the side of its faces' [normals](Jumps::normals) and
+    /// on the other.
+    pub(crate) crease: [f64; 2],
+    /// Between faces with interpolated normals.
+    smooth: bool,
+}
+
+/// A face at an edge.
+#[derive(Clone, Copy, Debug)]
+struct Blade {
+    /// Around the edge, from the first face's direction.
+    angle: f64,
+    prim: u32,
+    /// Unit, across the edge into the face.
+    across: Vec3,
+}
+
+/// All edges.
+#[derive(Debug, Default)]
+pub(crate) struct Jumps {
+    pub(crate) list: Vec<Jump>,
+    blades: Vec<Blade>,
+    /// Edges of the scene's meshes in all, flat ones too.
+    pub(crate) all: u64,
+}
+
+/// What is seen on the two sides of an edge.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sides {
+    /// Unit normal of the plane of the edge and the viewer.
+    pub(crate) n: Vec3,
+    /// Sine of the angle between edge and view.
+    pub(crate) sine: f64,
+    /// The face on the side of `n`, and the one on the other side; `None` where one sees past the edge.
+    pub(crate) faces: [Option<(u32, Vec3)>; 2],
+}
+
+impl Sides {
+    /// The faces that rays from the edge ignore.
+    pub(crate) fn own_faces(&self) -> Option<[u32; 2]> {
+        let [a, b] = self.faces.map(|f| f.map(|(prim, _)| prim));
+        Some([a.or(b)?, b.or(a)?])
+    }
+
+    /// To the side on which one sees past the edge.
+    pub(crate) fn outward(&self) -> Vec3 {
+        if self.faces[0].is_none() { self.n } else { -self.n }
+    }
+}
+
+impl Jumps {
+    /// Collects the edges of surfaces that scatter or block. Of edges at one place, that of a shape that
+    /// `moves` tells how the place moves.
+    pub(crate) fn collect(world: &World, moves: &[bool]) -> Self {
+        let (edges, all) = collect(world);
+        let mut places: Vec<_> = edges.iter().zip(0..).map(|(e, i)| (e.place(), i)).collect();
+        places.sort_unstable();
+        let around: Vec<_> =
+            (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
+        let mut jumps = Self { list: Vec::new(), blades: Vec::new(), all };
+        for same in places.chunk_by(|a, b| a.0 == b.0) {
+            let of = |i: &usize| &edges[*i];
+            let indices = || same.iter().map(|(_, i)| *i);
+            let main = indices().find(|i| moves[of(i).shape as usize]).unwrap_or(same[0].1);
+            let edge = &edges[main];
+            let start = jumps.blades.len();
+            for i in indices() {
+                for (angle, prim, across) in edges[i].faces_around(edge) {
+                    if jumps.blades[start..].iter().all(|b| b.prim != prim) {
+                        jumps.blades.push(Blade { angle, prim, across });
+                    }
+                }
+            }
+            let fan = start..jumps.blades.len();
+            jumps.blades[fan.clone()].sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
+            match jumps.crease(world, edge.tangent, &fan) {
+                Some((crease, smooth)) => {
+                    let mut edge = *edge;
+                    edge.may_rest = Contact::anywhere(world, &edge);
+                    let around = around[edge.shape as usize];
+                    let shape = |i: &usize| &world.scene.shapes[of(i).shape as usize];
+                    let bounds = same.iter().any(|(_, i)| shape(i).boundary.is_some());
+                    jumps.list.push(Jump { edge, fan, around, bounds, crease, smooth });
+                }
+                None => jumps.blades.truncate(start),
+            }
+        }
+        jumps
+    }
+
+    /// How much radiance jumps at a crease between faces, and whether these are smooth; `None` where it never does.
+    fn crease(&self, world: &World, tangent: Vec3, fan: &Range<usize>) -> Option<([f64; 2], bool)> {
+        let blades = &self.blades[fan.clone()];
+        let [a, b] = blades else { return Some(([1.0; 2], false)) };
+        let points = [a, b].map(|b| world.point(b.prim, [0.0; 2]).0);
+        let [sa, sb] = points.map(|p| p.shape as usize);
+        let shapes = &world.scene.shapes;
+        let interpolated = [sa, sb].iter().any(|s| shapes[*s].mesh.normals.is_some());
+        let smooth = sa == sb && interpolated;
+        // What is one-sided is black from behind, but where a normal that is interpolated faces the viewer.
+        let normals = normals(tangent, [a.across, b.across]);
+        let fronts = [0, 1].map(|k| normals[k].dot(points[k].ng) > 0.0);
+        let one_sided = points.iter().all(|p| world.bsdf_of(p.shape).is_black_from_behind());
+        let behind = if interpolated { BEHIND } else { 0.0 };
+        let sides = match fronts {
+            _ if !one_sided => [1.0; 2],
+            [true, true] => [1.0, behind],
+            [false, false] => [behind, 1.0],
+            _ => [1.0; 2],
+        };
+        let dull = |s: usize| shapes[s].emitter.is_none();
+        if shapes[sa].bsdf != shapes[sb].bsdf || !dull(sa) || !dull(sb) {
+            return Some((sides, false));
+        }
+        let bend = PI - fm::atan2(a.across.cross(b.across).length(), a.across.dot(b.across));
+        if bend < FLAT {
+            return None;
+        }
+        let jump = f64::min(bend, 1.0) * if smooth { SMOOTH } else { 1.0 };
+        Some((sides.map(|side| side * jump), smooth))
+    }
+
+    /// The faces around an edge, and the unit vectors across it into them.
+    pub(crate) fn faces(&self, jump: &Jump) -> impl Iterator<Item = (u32, Vec3)> {
+        self.blades[jump.fan.clone()].iter().map(|b| (b.prim, b.across))
+    }
+
+    /// Unit normals of the two faces of a crease, on one side of the surface.
+    pub(crate) fn normals(&self, jump: &Jump) -> Option<[Vec3; 2]> {
+        let [a, b] = &self.blades[jump.fan.clone()] else { return None };
+        Some(normals(jump.edge.tangent, [a.across, b.across]))
+    }
+
+    /// Weight of an edge seen from a point: the angle it subtends, less where it is a crease. Samples of its
+    /// two sides, of the same random numbers, seldom differ, but then by all there is: their root mean square
+    /// is that of how often. Where normals are interpolated they differ each time, by little.
+    pub(crate) fn seen_from(&self, jump: &Jump, eye: Vec3) -> f64 {
+        let silhouette = crate::edges::edge::seen_from(&jump.edge, eye);
+        let Some(normals) = self.normals(jump).filter(|_| silhouette == 0.0) else {
+            return silhouette;
+        };
+        let (a, along) = jump.edge.line();
+        let (da, db) = (a - eye, a + along - eye);
+        let crease = jump.crease[usize::from(normals[0].dot(da) > 0.0)];
+        let weight = if jump.smooth { crease } else { fm::sqrt(crease) };
+        weight * fm::atan2(da.cross(db).length(), da.dot(db))
+    }
+
+    /// What a viewer sees of an edge; `w` is unit, from the edge to the viewer.
+    pub(crate) fn sides(&self, jump: &Jump, w: Vec3) -> Option<Sides> {
+        let edge = &jump.edge;
+        let n = edge.tangent.cross(w);
+        let sine = n.length();
+        if sine < 1e-12 {
+            return None;
+        }
+        let blades = &self.blades[jump.fan.clone()];
+        let x = edge.across[0];
+        let y = edge.tangent.cross(x);
+        let view = fm::atan2(w.dot(y), w.dot(x));
+        let turn = |angle: f64| if angle < 0.0 { angle + 2.0 * PI } else { angle };
+        // The first face met on each way around.
+        let first = |turned: fn(f64, f64) -> f64| {
+            let nearest = |b: &Blade| turn(turned(b.angle, view));
+            blades
+                .iter()
+                .min_by(|a, b| nearest(a).total_cmp(&nearest(b)))
+                .filter(|b| nearest(b) < PI)
+                .map(|b| (b.prim, b.across))
+        };
+        let faces = [first(|angle, view| angle - view), first(|angle, view| view - angle)];
+        Some(Sides { n: n / sine, sine, faces })
+    }
+}
+
+/// Unit normals of two faces at an edge, by the directions across it into them, on one side of the surface.
+fn normals(tangent: Vec3, [f, g]: [Vec3; 2]) -> [Vec3; 2] {
+    [tangent.cross(f), g.cross(tangent)]
+}
+
+impl Jump {
+    pub(crate) fn length(&self) -> f64 {
+        self.edge.line().1.length()
+    }
+
+    /// The point `along` the edge.
+    pub(crate) fn point(&self, along: f64) -> (Vec3, MaterialPoint) {
+        self.edge.point(along)
+    }
+
+    /// What the edge rests on at a point of it.
+    pub(crate) fn contact(&self, world: &World, along: f64) -> Option<Contact> {
+        let (x, point) = self.edge.point(along);
+        Contact::at(world, &EdgePoint { edge: &self.edge, x, point, inv_pdf: 1.0 })
+    }
+
+    /// A surface point on a face, beside the point `x` of the edge.
+    pub(crate) fn beside(
+        &self,
+        world: &World,
+        x: Vec3,
+        (prim, across): (u32, Vec3),
+    ) -> (SurfacePoint, Vec3) {
+        world.point_near(prim, x + across * (BESIDE * self.length()))
+    }
+
+    /// The medium around the edge at `x` on the viewer's side, `w` pointing to the viewer.
+    pub(crate) fn medium(&self, world: &World, sides: &Sides, x: Vec3, w: Vec3) -> Option<usize> {
+        // Most bound none: what it takes to tell by a face is seldom in a cache.
+        let faces = sides.faces.iter().flatten().filter(|_| self.bounds);
+        for (prim, _) in faces {
+            let (point, _) = world.point(*prim, [1.0 / 3.0; 2]);
+            let bounds = world.scene.shapes[point.shape as usize].boundary.is_some();
+            if bounds {
+                return world.medium_on_side(&point, point.ng.dot(w) > 0.0, None);
+            }
+        }
+        self.around.unwrap_or_else(|| world.medium_at(x))
+    }
+}

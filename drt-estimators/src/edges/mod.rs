@@ -1,0 +1,10 @@
+//! Edges of the scene at which visibility or radiance can jump: which there are, what is around them, how
+//! fast they move, and which matter to a viewer.
+
+pub(crate) mod contact;
+pub(crate) mod edge;
+pub(crate) mod jumps;
+pub(crate) mod movers;
+pub(crate) mod speeds;
+pub(crate) mod tree;
+pub(crate) mod weld;

@@ -1,0 +1,32 @@
+//! How fast edges move.
+
+use drt_motion::SurfaceMotion;
+
+use crate::derivative::contraction::Motion;
+use crate::edges::edge::Edge;
+use crate::world::World;
+
+/// How fast an edge moves across itself, at most and relative to the fastest vertex of each
+/// parameter: 0 only for edges that stay in their lines.
+pub(crate) fn speeds<'a>(motion: &'a Motion, world: &'a World) -> impl Fn(&Edge) -> f64 + 'a {
+    let mut fastest = alloc::vec![0.0; motion.parameters()];
+    for (shape, motions) in world.scene.shapes.iter().zip(&motion.tangents.shapes) {
+        for (p, of_shape) in motions {
+            let speeds = (0..shape.mesh.positions.len())
+                .map(|v| of_shape.vertex_velocity(&shape.mesh, v).length());
+            fastest[*p] = speeds.fold(fastest[*p], f64::max);
+        }
+    }
+    move |edge| {
+        let shape = edge.shape as usize;
+        let mesh = &world.scene.shapes[shape].mesh;
+        let speed = |(p, of_shape): &(usize, SurfaceMotion)| {
+            let across = |end: f64| {
+                let velocity = of_shape.velocity(mesh, &edge.point(end).1.at);
+                velocity.reject(edge.tangent).length()
+            };
+            f64::max(across(0.0), across(1.0)) / f64::max(fastest[*p], f64::MIN_POSITIVE)
+        };
+        motion.tangents.shapes[shape].iter().map(speed).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,283 @@
+//! Emitters, with Mitsuba's meaning, units and defaults.
+//!
+//! Directions of emission are directions of light *flow*. Delta emitters (point, spot and
+//! directional) keep apart what the path integral keeps apart: the emission towards a direction,
+//! and the 1/r² of the geometric term.
+
+mod emission;
+mod incident;
+mod motion;
+#[cfg(test)]
+mod tests;
+
+use core::f64::consts::PI;
+
+use drt_math::{Frame, Rgb, Vec3, fm, vec3, warp};
+use thiserror::Error;
+
+pub use crate::model::emitter::emission::{Emission, EmitterGradient, EmitterTangent};
+pub use crate::model::emitter::incident::Incident;
+
+/// An emitter that cannot be used.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum EmitterError {
+    /// A direction that does not exist.
+    #[error("the {0} emitter's direction is the zero vector; give a direction, of any length")]
+    ZeroDirection(&'static str),
+    /// A NaN or infinity.
+    #[error("the {kind} emitter's {what} is not finite")]
+    NotFinite {
+        /// Kind of the emitter.
+        kind: &'static str,
+        /// The offending field.
+        what: &'static str,
+    },
+    /// A cone that does not exist.
+    #[error(
+        "the spot emitter's cutoff_angle is {cutoff_angle} and its beam_width {beam_width} \
+         degrees; expected 0 <= beam_width <= cutoff_angle <= 180 and cutoff_angle > 0"
+    )]
+    Cone {
+        /// Cutoff angle in degrees.
+        cutoff_angle: f64,
+        /// Beam width in degrees.
+        beam_width: f64,
+    },
+    /// A motion that flattens the emitter.
+    #[error("the motion takes the {0} emitter's direction to zero; choose a value nearer to zero")]
+    Flattened(&'static str),
+    /// A property that this kind of emitter does not have.
+    #[error("a {kind} emitter has no property `{property}`; it has {known}")]
+    UnknownProperty {
+        /// Kind of the emitter.
+        kind: &'static str,
+        /// The name asked for.
+        property: alloc::string::String,
+        /// Names that exist.
+        known: &'static str,
+    },
+    /// Different numbers for the channels of something that has none.
+    #[error("`{0}` is a single number; give three equal ones")]
+    NotScalar(&'static str),
+}
+
+/// A source of light. [`checked`](Self::checked) makes directions unit vectors; everything else
+/// here relies on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Emitter {
+    /// A shape that glows on its front side.
+    Area {
+        /// Radiance, the same in all directions.
+        radiance: Rgb,
+    },
+    /// A point that shines equally in all directions.
+    Point {
+        /// Where it is.
+        position: Vec3,
+        /// Power per steradian.
+        intensity: Rgb,
+    },
+    /// A point that shines in a cone.
+    Spot {
+        /// Where it is.
+        position: Vec3,
+        /// The cone's axis.
+        direction: Vec3,
+        /// Power per steradian inside the beam.
+        intensity: Rgb,
+        /// Angle from the axis at which the light ends, in radians.
+        cutoff_angle: f64,
+        /// Angle from the axis up to which it is full, in radians; between the two it falls
+        /// linearly with the angle.
+        beam_width: f64,
+    },
+    /// Parallel light from infinitely far away.
+    Directional {
+        /// Where the light flows to.
+        direction: Vec3,
+        /// Power per area perpendicular to the flow.
+        irradiance: Rgb,
+    },
+    /// A sky of the same radiance in all directions.
+    Constant {
+        /// The radiance.
+        radiance: Rgb,
+    },
+}
+
+/// A direction of flow drawn from a point or spot light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FlowSample {
+    /// Unit vector.
+    pub flow: Vec3,
+    /// Density per steradian.
+    pub pdf: f64,
+}
+
+impl Emitter {
+    /// Mitsuba's default cutoff angle of a spot, 20 degrees, in radians.
+    pub const DEFAULT_CUTOFF_ANGLE: f64 = PI / 9.0;
+    /// Mitsuba's default beam width of a spot, as a fraction of the cutoff angle.
+    pub const DEFAULT_BEAM_FRACTION: f64 = 0.75;
+
+    /// The same emitter with unit directions.
+    ///
+    /// # Errors
+    /// Names the field that is not finite, a zero direction, or a cone that is none.
+    pub fn checked(self) -> Result<Self, EmitterError> {
+        let kind = self.kind();
+        let finite =
+            |ok: bool, what| if ok { Ok(()) } else { Err(EmitterError::NotFinite { kind, what }) };
+        let unit = |v: Vec3| {
+            finite(v.is_finite(), "direction")?;
+            let size = v.max_abs();
+            // Scaled by the largest coordinate first, so that no length under- or overflows.
+            let v = v * (1.0 / size);
+            if v.is_finite() { Ok(v.normalize()) } else { Err(EmitterError::ZeroDirection(kind)) }
+        };
+        finite(self.strength().is_finite(), self.strength_name())?;
+        match self {
+            Self::Area { .. } | Self::Constant { .. } => Ok(self),
+            Self::Point { position, .. } => finite(position.is_finite(), "position").map(|()| self),
+            Self::Spot { position, direction, intensity, cutoff_angle, beam_width } => {
+                finite(position.is_finite(), "position")?;
+                let direction = unit(direction)?;
+                let cone = 0.0 <= beam_width && beam_width <= cutoff_angle;
+                if !(cone && 0.0 < cutoff_angle && cutoff_angle <= PI) {
+                    let [cutoff_angle, beam_width] =
+                        [cutoff_angle, beam_width].map(f64::to_degrees);
+                    return Err(EmitterError::Cone { cutoff_angle, beam_width });
+                }
+                Ok(Self::Spot { position, direction, intensity, cutoff_angle, beam_width })
+            }
+            Self::Directional { direction, irradiance } => {
+                Ok(Self::Directional { direction: unit(direction)?, irradiance })
+            }
+        }
+    }
+
+    /// The plugin's name in scene files.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::Area { .. } => "area",
+            Self::Point { .. } => "point",
+            Self::Spot { .. } => "spot",
+            Self::Directional { .. } => "directional",
+            Self::Constant { .. } => "constant",
+        }
+    }
+
+    /// True for point, spot and directional lights, which no ray can hit.
+    #[must_use]
+    pub fn is_delta(&self) -> bool {
+        !matches!(self, Self::Area { .. } | Self::Constant { .. })
+    }
+
+    /// False for a spot that ends with a jump, whose shadow-like rim needs a boundary integral.
+    #[must_use]
+    pub fn is_continuous(&self) -> bool {
+        !matches!(self, Self::Spot { cutoff_angle, beam_width, .. } if cutoff_angle == beam_width)
+    }
+
+    /// Where a point or spot light is.
+    #[inline]
+    #[must_use]
+    pub fn position(&self) -> Option<Vec3> {
+        match *self {
+            Self::Point { position, .. } | Self::Spot { position, .. } => Some(position),
+            _ => None,
+        }
+    }
+
+    /// The radiance of an area emitter.
+    #[inline]
+    #[must_use]
+    pub fn area_radiance(&self) -> Option<Rgb> {
+        match *self {
+            Self::Area { radiance } => Some(radiance),
+            _ => None,
+        }
+    }
+
+    /// Power sent into a scene inside a sphere of `scene_radius`, mean of the channels: what
+    /// emitters are chosen by. That of an area emitter is per unit of area.
+    #[must_use]
+    pub fn power(&self, scene_radius: f64) -> f64 {
+        let disk = PI * scene_radius * scene_radius;
+        let factor = match *self {
+            Self::Area { .. } => PI,
+            Self::Point { .. } => 4.0 * PI,
+            Self::Spot { cutoff_angle, beam_width, .. } => {
+                2.0 * PI * cone_mean(beam_width, cutoff_angle)
+            }
+            Self::Directional { .. } => disk,
+            Self::Constant { .. } => 4.0 * PI * disk,
+        };
+        self.strength().mean() * factor
+    }
+
+    /// Draws a direction of flow from two uniform numbers, uniformly over those that a point or
+    /// spot light shines in; `None` for other emitters.
+    #[must_use]
+    pub fn sample_flow(&self, u: [f64; 2]) -> Option<FlowSample> {
+        let flow = match *self {
+            Self::Point { .. } => warp::uniform_sphere(u),
+            Self::Spot { direction, cutoff_angle, .. } => {
+                let local = warp::uniform_cone(u, fm::cos(cutoff_angle));
+                Frame::from_normal(direction).to_world(local)
+            }
+            _ => return None,
+        };
+        Some(FlowSample { flow, pdf: self.flow_pdf(flow) })
+    }
+
+    /// Density of [`sample_flow`](Self::sample_flow) per steradian.
+    #[must_use]
+    pub fn flow_pdf(&self, flow: Vec3) -> f64 {
+        match *self {
+            Self::Point { .. } => warp::uniform_sphere_pdf(),
+            Self::Spot { direction, cutoff_angle, .. } => {
+                let height = vec3(0.0, 0.0, direction.dot(flow));
+                warp::uniform_cone_pdf(height, fm::cos(cutoff_angle))
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Radiance, intensity or irradiance.
+    #[inline]
+    fn strength(&self) -> Rgb {
+        match *self {
+            Self::Area { radiance } | Self::Constant { radiance } => radiance,
+            Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity,
+            Self::Directional { irradiance, .. } => irradiance,
+        }
+    }
+
+    fn strength_name(&self) -> &'static str {
+        match self {
+            Self::Area { .. } | Self::Constant { .. } => "radiance",
+            Self::Point { .. } | Self::Spot { .. } => "intensity",
+            Self::Directional { .. } => "irradiance",
+        }
+    }
+}
+
+/// Integral over the sphere, over 2 pi, of a spot's falloff from full at the angle b to none at c:
+/// 1 - (sin c - sin b)/(c - b), in terms that do not cancel for narrow cones.
+fn cone_mean(b: f64, c: f64) -> f64 {
+    let half = 0.5 * (c - b);
+    let squared = half * half;
+    // (sin c - sin b)/(c - b) is cos((b + c)/2) sin(half)/half.
+    let lack = if half < 1e-2 {
+        squared / 6.0 * (1.0 - squared / 20.0 * (1.0 - squared / 42.0))
+    } else {
+        1.0 - fm::sin(half) / half
+    };
+    let h = fm::sin(0.25 * (b + c));
+    2.0 * h * h * (1.0 - lack) + lack
+}

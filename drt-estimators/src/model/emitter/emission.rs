@@ -1,0 +1,196 @@
+use core::ops::AddAssign;
+
+use drt_math::{Rgb, Vec3, fm};
+
+use crate::model::emitter::Emitter;
+
+/// What an emitter sends in a direction, and how it changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emission {
+    /// Radiance, intensity times falloff, or irradiance.
+    pub value: Rgb,
+    /// The same without the falloff.
+    strength: Rgb,
+    falloff: Falloff,
+}
+
+/// The fall of a spot light off its axis, with its derivatives.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Falloff {
+    value: f64,
+    flow: Vec3,
+    direction: Vec3,
+    cutoff_angle: f64,
+    beam_width: f64,
+}
+
+/// Rates of change of an emitter with a parameter. Of a direction's rate only the part
+/// perpendicular to it counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EmitterTangent {
+    /// Rate of the radiance, intensity or irradiance.
+    pub strength: Rgb,
+    /// Velocity of a point or spot light.
+    pub position: Vec3,
+    /// Rate of the unit direction of a spot or directional light.
+    pub direction: Vec3,
+    /// Rate of a spot's cutoff angle, in radians.
+    pub cutoff_angle: f64,
+    /// Rate of a spot's beam width, in radians.
+    pub beam_width: f64,
+}
+
+/// Derivatives of a number with respect to what an [`EmitterTangent`] holds the rates of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EmitterGradient {
+    /// With respect to the radiance, intensity or irradiance.
+    pub strength: Rgb,
+    /// With respect to the position.
+    pub position: Vec3,
+    /// With respect to the unit direction, perpendicular to it.
+    pub direction: Vec3,
+    /// With respect to the cutoff angle.
+    pub cutoff_angle: f64,
+    /// With respect to the beam width.
+    pub beam_width: f64,
+}
+
+impl Emitter {
+    /// Emission towards a unit direction of flow: radiance of an area or constant emitter,
+    /// intensity of a point or spot light, irradiance of a directional one (whose flow is its own
+    /// and is not looked at).
+    #[inline]
+    #[must_use]
+    pub fn emission(&self, flow: Vec3) -> Emission {
+        let strength = self.strength();
+        let falloff = match *self {
+            Self::Spot { direction, cutoff_angle, beam_width, .. } => {
+                Falloff::new(direction, flow, cutoff_angle, beam_width)
+            }
+            _ => Falloff { value: 1.0, ..Falloff::default() },
+        };
+        Emission { value: strength * falloff.value, strength, falloff }
+    }
+}
+
+impl Falloff {
+    fn new(axis: Vec3, flow: Vec3, cutoff_angle: f64, beam_width: f64) -> Self {
+        let theta = angle(axis, flow);
+        if theta <= beam_width {
+            return Self { value: 1.0, ..Self::default() };
+        }
+        if theta >= cutoff_angle {
+            return Self::default();
+        }
+        let per_angle = 1.0 / (cutoff_angle - beam_width);
+        let value = (cutoff_angle - theta) * per_angle;
+        Self {
+            value,
+            // Towards the axis along the great circle, and the axis towards the flow.
+            flow: along_circle(flow, axis) * per_angle,
+            direction: along_circle(axis, flow) * per_angle,
+            cutoff_angle: (1.0 - value) * per_angle,
+            beam_width: value * per_angle,
+        }
+    }
+}
+
+impl Emission {
+    /// Rate of [`value`](Self::value) while the flow turns and the emitter changes.
+    #[inline]
+    #[must_use]
+    pub fn rate(&self, flow_rate: Vec3, t: &EmitterTangent) -> Rgb {
+        let f = &self.falloff;
+        let falloff_rate = f.flow.dot(flow_rate)
+            + f.direction.dot(t.direction)
+            + f.cutoff_angle * t.cutoff_angle
+            + f.beam_width * t.beam_width;
+        t.strength * f.value + self.strength * falloff_rate
+    }
+
+    /// Gradient of `adjoint · value`, first with respect to the flow (perpendicular to it), then
+    /// to the emitter.
+    #[inline]
+    #[must_use]
+    pub fn gradient(&self, adjoint: Rgb) -> (Vec3, EmitterGradient) {
+        let f = &self.falloff;
+        let weight = self.strength.dot(adjoint);
+        let emitter = EmitterGradient {
+            strength: adjoint * f.value,
+            position: Vec3::ZERO,
+            direction: f.direction * weight,
+            cutoff_angle: f.cutoff_angle * weight,
+            beam_width: f.beam_width * weight,
+        };
+        (f.flow * weight, emitter)
+    }
+}
+
+impl EmitterTangent {
+    /// True when the emitter's place or direction changes.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        self.position != Vec3::ZERO || self.direction != Vec3::ZERO
+    }
+
+    /// True when nothing changes.
+    #[must_use]
+    pub fn is_zero(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl EmitterGradient {
+    /// A multiple.
+    #[inline]
+    #[must_use]
+    pub fn scaled(&self, w: f64) -> Self {
+        Self {
+            strength: self.strength * w,
+            position: self.position * w,
+            direction: self.direction * w,
+            cutoff_angle: self.cutoff_angle * w,
+            beam_width: self.beam_width * w,
+        }
+    }
+
+    /// The derivative along a tangent.
+    #[inline]
+    #[must_use]
+    pub fn dot(&self, t: &EmitterTangent) -> f64 {
+        self.strength.dot(t.strength)
+            + self.position.dot(t.position)
+            + self.direction.dot(t.direction)
+            + self.cutoff_angle * t.cutoff_angle
+            + self.beam_width * t.beam_width
+    }
+}
+
+macro_rules! sum {
+    ($($type:ident)*) => {$(
+        impl AddAssign for $type {
+            #[inline]
+            fn add_assign(&mut self, o: Self) {
+                self.strength += o.strength;
+                self.position += o.position;
+                self.direction += o.direction;
+                self.cutoff_angle += o.cutoff_angle;
+                self.beam_width += o.beam_width;
+            }
+        }
+    )*};
+}
+sum! { EmitterTangent EmitterGradient }
+
+/// Angle between unit vectors, exact for small angles too.
+fn angle(a: Vec3, b: Vec3) -> f64 {
+    fm::atan2(a.cross(b).length(), a.dot(b))
+}
+
+/// The unit vector at `from`, perpendicular to it, that starts the great circle to `to`; zero
+/// where there is none.
+fn along_circle(from: Vec3, to: Vec3) -> Vec3 {
+    let v = to.reject(from);
+    let length = v.length();
+    if length > 0.0 { v * length.recip() } else { Vec3::ZERO }
+}

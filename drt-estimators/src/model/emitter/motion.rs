@@ -1,0 +1,129 @@
+//! Emitters that move, and whose numbers change.
+
+use drt_math::{Affine, Rgb};
+
+use crate::model::emitter::{Emitter, EmitterError, EmitterTangent};
+
+/// What a property name stands for.
+enum Slot {
+    Strength,
+    CutoffAngle,
+    BeamWidth,
+}
+
+impl Emitter {
+    /// The emitter moved by a map of space: positions go along, directions are mapped as vectors
+    /// and made unit again. An area emitter moves with its shape and a constant one not at all.
+    ///
+    /// # Errors
+    /// When the map takes a direction to zero or is not finite.
+    pub fn moved(&self, map: &Affine) -> Result<Self, EmitterError> {
+        let mut moved = *self;
+        match &mut moved {
+            Self::Area { .. } | Self::Constant { .. } => {}
+            Self::Point { position, .. } => *position = map.point(*position),
+            Self::Spot { position, direction, .. } => {
+                *position = map.point(*position);
+                *direction = map.vector(*direction);
+            }
+            Self::Directional { direction, .. } => *direction = map.vector(*direction),
+        }
+        moved.checked().map_err(|error| match error {
+            EmitterError::ZeroDirection(kind) => EmitterError::Flattened(kind),
+            other => other,
+        })
+    }
+
+    /// The rates of an emitter carried by a velocity field: the derivative of
+    /// [`moved`](Self::moved) at the identity.
+    #[must_use]
+    pub fn velocity(&self, field: &Affine) -> EmitterTangent {
+        let mut tangent = EmitterTangent::default();
+        if let Some(position) = self.position() {
+            tangent.position = field.point(position);
+        }
+        if let Self::Spot { direction, .. } | Self::Directional { direction, .. } = *self {
+            tangent.direction = field.vector(direction).reject(direction);
+        }
+        tangent
+    }
+
+    /// A property that a parameter can change. Names and units are the scene file's: `radiance`,
+    /// `intensity` or `irradiance`, and of a spot `cutoff_angle` and `beam_width` (degrees, three
+    /// equal numbers).
+    ///
+    /// # Errors
+    /// When this kind of emitter has no such property.
+    pub fn property(&self, name: &str) -> Result<Rgb, EmitterError> {
+        let degrees = |a: f64| Rgb::splat(a.to_degrees());
+        Ok(match (self.slot(name)?, *self) {
+            (Slot::CutoffAngle, Self::Spot { cutoff_angle, .. }) => degrees(cutoff_angle),
+            (Slot::BeamWidth, Self::Spot { beam_width, .. }) => degrees(beam_width),
+            _ => self.strength(),
+        })
+    }
+
+    /// The emitter with a property changed.
+    ///
+    /// # Errors
+    /// When there is no such property, or the value is unusable.
+    pub fn with_property(&self, name: &str, value: Rgb) -> Result<Self, EmitterError> {
+        let slot = self.slot(name)?;
+        let mut changed = *self;
+        match (slot, &mut changed) {
+            (Slot::CutoffAngle, Self::Spot { cutoff_angle, .. }) => {
+                *cutoff_angle = radians("cutoff_angle", value)?;
+            }
+            (Slot::BeamWidth, Self::Spot { beam_width, .. }) => {
+                *beam_width = radians("beam_width", value)?;
+            }
+            (_, Self::Area { radiance: strength } | Self::Constant { radiance: strength }) => {
+                *strength = value;
+            }
+            (_, Self::Point { intensity, .. } | Self::Spot { intensity, .. }) => *intensity = value,
+            (_, Self::Directional { irradiance, .. }) => *irradiance = value,
+        }
+        changed.checked()
+    }
+
+    /// The rates of the emitter when a property has the given rate.
+    ///
+    /// # Errors
+    /// When there is no such property, or the rates of a single number differ.
+    pub fn property_tangent(&self, name: &str, rate: Rgb) -> Result<EmitterTangent, EmitterError> {
+        let mut tangent = EmitterTangent::default();
+        match self.slot(name)? {
+            Slot::Strength => tangent.strength = rate,
+            Slot::CutoffAngle => tangent.cutoff_angle = radians("cutoff_angle", rate)?,
+            Slot::BeamWidth => tangent.beam_width = radians("beam_width", rate)?,
+        }
+        Ok(tangent)
+    }
+
+    fn slot(&self, name: &str) -> Result<Slot, EmitterError> {
+        let spot = matches!(self, Self::Spot { .. });
+        match name {
+            _ if name == self.strength_name() => Ok(Slot::Strength),
+            "cutoff_angle" if spot => Ok(Slot::CutoffAngle),
+            "beam_width" if spot => Ok(Slot::BeamWidth),
+            _ => Err(EmitterError::UnknownProperty {
+                kind: self.kind(),
+                property: name.into(),
+                known: if spot {
+                    "intensity, cutoff_angle and beam_width"
+                } else {
+                    self.strength_name()
+                },
+            }),
+        }
+    }
+}
+
+/// An angle given in degrees, three times.
+fn radians(name: &'static str, value: Rgb) -> Result<f64, EmitterError> {
+    if value == Rgb::splat(value.r) {
+        Ok(value.r.to_radians())
+    } else {
+        Err(EmitterError::NotScalar(name))
+    }
+}

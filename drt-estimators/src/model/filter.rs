@@ -1,0 +1,269 @@
+//! Reconstruction filters: how much each point of the image plane counts towards a pixel.
+
+mod sampling;
+#[cfg(test)]
+mod tests;
+
+use drt_math::{Real, fm};
+use thiserror::Error;
+
+pub use crate::model::filter::sampling::FilterSample;
+use crate::model::filter::sampling::HalfProfile;
+
+/// Shape of a filter along one axis. Lengths are in pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum FilterKind {
+    /// Constant on [-radius, radius).
+    Box {
+        /// Half width.
+        radius: f64,
+    },
+    /// Falls linearly to zero at the radius.
+    Tent {
+        /// Half width.
+        radius: f64,
+    },
+    /// A Gaussian lowered by its value at the radius, so that it ends without a jump.
+    Gaussian {
+        /// Half width, from 0.001 to 30 standard deviations.
+        radius: f64,
+        /// Standard deviation before the cut.
+        std_dev: f64,
+    },
+}
+
+impl FilterKind {
+    /// Mitsuba's `box`: every point counts towards the pixel it lies in.
+    pub const BOX: Self = Self::Box { radius: 0.5 };
+    /// Mitsuba's default `tent`.
+    pub const TENT: Self = Self::Tent { radius: 1.0 };
+    /// Mitsuba's default `gaussian`.
+    pub const GAUSSIAN: Self = Self::gaussian(0.5);
+
+    /// Mitsuba's `gaussian` of another standard deviation, cut at four of them.
+    #[must_use]
+    pub const fn gaussian(std_dev: f64) -> Self {
+        Self::Gaussian { radius: 4.0 * std_dev, std_dev }
+    }
+}
+
+impl Default for FilterKind {
+    fn default() -> Self {
+        Self::GAUSSIAN
+    }
+}
+
+/// A filter that cannot be used.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum FilterError {
+    /// A length that is not a positive number.
+    #[error("the reconstruction filter's {what} is {value}; it must be positive and finite")]
+    NotPositive {
+        /// Which length.
+        what: &'static str,
+        /// Its value in pixels.
+        value: f64,
+    },
+    /// A Gaussian cut where nothing of its shape, or no number, is left.
+    #[error(
+        "the gaussian filter's radius {radius} must be between 0.001 and 30 standard deviations \
+         ({std_dev}); 4 are usual"
+    )]
+    Cut {
+        /// Radius in pixels.
+        radius: f64,
+        /// Standard deviation in pixels.
+        std_dev: f64,
+    },
+}
+
+/// A separable filter P(x, y) = p(x) p(y) with unit integral over the plane, in pixel units.
+///
+/// Offsets are image point minus pixel centre. P is per square pixel; to integrate over the image
+/// plane at unit distance it is divided by the squared pixel size there, as
+/// [`Projection::importance`](crate::model::sensor::Projection::importance) does.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "FilterKind", into = "FilterKind"))]
+pub struct Filter {
+    kind: FilterKind,
+    radius: f64,
+    /// Makes the integral of `shape` one.
+    scale: f64,
+    /// A density close to p, with an inverse in closed form.
+    half: HalfProfile,
+}
+
+impl Filter {
+    /// Segments that stand for half a Gaussian when sampling: the density is within 2·10⁻³ of a
+    /// filter cut at four standard deviations in its inner half.
+    const GAUSSIAN_SEGMENTS: usize = 64;
+
+    /// Normalises a filter and prepares to sample it.
+    ///
+    /// # Errors
+    /// When a length is not positive and finite, or a Gaussian's two lengths do not go together.
+    pub fn new(kind: FilterKind) -> Result<Self, FilterError> {
+        let positive = |what, value: f64| {
+            if value > 0.0 && value.is_finite() {
+                Ok(value)
+            } else {
+                Err(FilterError::NotPositive { what, value })
+            }
+        };
+        let (radius, scale, segments) = match kind {
+            FilterKind::Box { radius } => (positive("radius", radius)?, 0.5 / radius, 1),
+            FilterKind::Tent { radius } => (positive("radius", radius)?, 1.0 / radius, 1),
+            FilterKind::Gaussian { radius, std_dev } => {
+                positive("radius", radius)?;
+                positive("standard deviation", std_dev)?;
+                if !(1e-3..=30.0).contains(&(radius / std_dev)) {
+                    return Err(FilterError::Cut { radius, std_dev });
+                }
+                let integral = 2.0 * radius * gaussian_mean(radius / std_dev);
+                (radius, 1.0 / integral, Self::GAUSSIAN_SEGMENTS)
+            }
+        };
+        let half = HalfProfile::new(segments, |t| shape(kind, radius * t));
+        Ok(Self { kind, radius, scale, half })
+    }
+
+    /// What the filter was made from.
+    #[must_use]
+    pub fn kind(&self) -> FilterKind {
+        self.kind
+    }
+
+    /// Half width of the square support, in pixels.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// False when the filter jumps at the edge of its support, so that the material form needs an
+    /// integral along every pixel's border (`theory` §1).
+    #[must_use]
+    pub fn is_continuous(&self) -> bool {
+        !matches!(self.kind, FilterKind::Box { .. })
+    }
+
+    /// P at an offset from the pixel's centre, per square pixel.
+    #[inline]
+    #[must_use]
+    pub fn eval(&self, dx: f64, dy: f64) -> f64 {
+        self.axis(dx) * self.axis(dy)
+    }
+
+    /// Gradient of P with respect to the offset; at a kink, the mean of both sides.
+    #[inline]
+    #[must_use]
+    pub fn gradient(&self, dx: f64, dy: f64) -> [f64; 2] {
+        [self.axis_slope(dx) * self.axis(dy), self.axis(dx) * self.axis_slope(dy)]
+    }
+
+    /// A function of the offset that is 1 at the pixel's centre and falls to 0 where the support ends,
+    /// however the filter does, and its gradient. Its product with P has a slope that P bounds.
+    #[must_use]
+    pub(crate) fn window(&self, offset: [f64; 2]) -> (f64, [f64; 2]) {
+        let [(x, dx), (y, dy)] = offset.map(|o| {
+            let peak = self.axis(0.0);
+            let (height, slope, steepness) = match self.kind {
+                FilterKind::Box { radius } => {
+                    let s = o / radius;
+                    (f64::max(1.0 - s * s, 0.0), -2.0 * s / radius, 2)
+                }
+                _ => (self.axis(o) / peak, self.axis_slope(o) / peak, 6),
+            };
+            let rest = Real::powi(1.0 - height, steepness - 1);
+            (1.0 - rest * (1.0 - height), f64::from(steepness) * rest * slope)
+        });
+        (x * y, [dx * y, x * dy])
+    }
+
+    /// The factor p of one axis, per pixel.
+    #[inline]
+    #[must_use]
+    pub fn axis(&self, x: f64) -> f64 {
+        // Half open, so that box filters of neighbouring pixels tile the plane.
+        if -self.radius <= x && x < self.radius { self.scale * shape(self.kind, x) } else { 0.0 }
+    }
+
+    /// The derivative of the factor p of one axis.
+    #[inline]
+    #[must_use]
+    pub fn axis_slope(&self, x: f64) -> f64 {
+        if x == 0.0 || Real::abs(x) >= self.radius {
+            return 0.0;
+        }
+        match self.kind {
+            FilterKind::Box { .. } => 0.0,
+            FilterKind::Tent { radius } => -self.scale / (if x < 0.0 { -radius } else { radius }),
+            FilterKind::Gaussian { radius, std_dev } => {
+                let v = 1.0 / (std_dev * std_dev);
+                -x * v * self.scale * fm::exp(0.5 * v * (radius - x) * (radius + x))
+            }
+        }
+    }
+}
+
+impl TryFrom<FilterKind> for Filter {
+    type Error = FilterError;
+    fn try_from(kind: FilterKind) -> Result<Self, FilterError> {
+        Self::new(kind)
+    }
+}
+
+impl From<Filter> for FilterKind {
+    fn from(filter: Filter) -> Self {
+        filter.kind
+    }
+}
+
+/// The unnormalised profile inside the support.
+///
+/// A Gaussian is in units of its value at the radius, which keeps the difference to that value
+/// free of cancellation.
+#[inline]
+fn shape(kind: FilterKind, x: f64) -> f64 {
+    match kind {
+        FilterKind::Box { .. } => 1.0,
+        FilterKind::Tent { radius } => 1.0 - Real::abs(x) / radius,
+        FilterKind::Gaussian { radius, std_dev } => {
+            fm::exp_m1(0.5 * (radius - x) * (radius + x) / (std_dev * std_dev))
+        }
+    }
+}
+
+/// The offset at which the profile has fallen to `level` times its peak.
+fn shape_inverse(kind: FilterKind, level: f64) -> f64 {
+    match kind {
+        FilterKind::Box { radius } => radius,
+        FilterKind::Tent { radius } => radius * (1.0 - level),
+        FilterKind::Gaussian { radius, std_dev } => {
+            let v = 2.0 * std_dev * std_dev;
+            let peak = shape(kind, 0.0);
+            fm::sqrt(f64::max(radius * radius - v * fm::ln_1p(level * peak), 0.0))
+        }
+    }
+}
+
+/// Mean over the support of the Gaussian's `shape`, cut at `k` standard deviations:
+/// the sum over n >= 1 of k^2n / (3·5·…·(2n + 1)).
+///
+/// That is the series of the error function (Abramowitz & Stegun 7.1.6) with its first term
+/// taken away by the lowering; all terms are positive.
+fn gaussian_mean(k: f64) -> f64 {
+    let (mut term, mut sum, mut odd) = (1.0, 0.0, 3.0);
+    loop {
+        term *= k * k / odd;
+        let next = sum + term;
+        if next == sum && odd > k * k {
+            return sum;
+        }
+        sum = next;
+        odd += 2.0;
+    }
+}

@@ -1,0 +1,132 @@
+//! Drawing image points in proportion to a filter.
+
+use alloc::vec::Vec;
+
+use drt_math::{Real, fm};
+
+use crate::model::filter::{Filter, FilterKind, shape, shape_inverse};
+
+/// Share of samples drawn in proportion to |p'| where the derivative is wanted too.
+///
+/// With a pdf proportional to p alone, E[(p'/p)²] is infinite for every filter that ends without
+/// a jump (`theory` §14.4). For a tent, a quarter raises the second moment of the value by 3 %
+/// and leaves that of the derivative 30 % above its minimum.
+const SLOPE_SHARE: f64 = 0.25;
+
+/// An image point drawn for a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilterSample {
+    /// Image point minus pixel centre, in pixels.
+    pub offset: [f64; 2],
+    /// P over the density: the factor on whatever is found at the image point.
+    pub weight: f64,
+    /// Density per square pixel.
+    pub pdf: f64,
+}
+
+impl Filter {
+    /// Draws an image point from two uniform numbers in [0, 1).
+    ///
+    /// `derivative` mixes in samples that keep the variance of the filter's gradient finite.
+    /// Without it the weight is 1 (a Gaussian's: within a few per mille where the filter matters).
+    /// Mirrored numbers, 1 - u, give mirrored offsets, for antithetic pairs.
+    #[inline]
+    #[must_use]
+    pub fn sample(&self, u: [f64; 2], derivative: bool) -> FilterSample {
+        let offset = u.map(|u| self.sample_axis(u, derivative));
+        let pdf = self.pdf(offset, derivative);
+        FilterSample { offset, weight: self.eval(offset[0], offset[1]) / pdf, pdf }
+    }
+
+    /// Density of [`sample`](Self::sample) at an offset, per square pixel.
+    #[inline]
+    #[must_use]
+    pub fn pdf(&self, offset: [f64; 2], derivative: bool) -> f64 {
+        let share = self.slope_share(derivative);
+        offset.map(|x| self.pdf_axis(x, share)).iter().product()
+    }
+
+    /// A constant profile has no slope to sample.
+    fn slope_share(&self, derivative: bool) -> f64 {
+        match self.kind {
+            FilterKind::Box { .. } => 0.0,
+            _ if derivative => SLOPE_SHARE,
+            _ => 0.0,
+        }
+    }
+
+    fn sample_axis(&self, u: f64, derivative: bool) -> f64 {
+        let share = self.slope_share(derivative);
+        // The last representable number would give the offset where the density is zero.
+        let v = f64::min(Real::abs(2.0 * u - 1.0), 1.0 - f64::EPSILON);
+        let x = if v < share {
+            shape_inverse(self.kind, 1.0 - v / share)
+        } else {
+            self.radius * self.half.sample((v - share) / (1.0 - share))
+        };
+        if u < 0.5 { -x } else { x }
+    }
+
+    fn pdf_axis(&self, x: f64, share: f64) -> f64 {
+        if x < -self.radius || x >= self.radius {
+            return 0.0;
+        }
+        let profile = 0.5 / self.radius * self.half.pdf(Real::abs(x) / self.radius);
+        if share == 0.0 {
+            return profile;
+        }
+        let peak = self.scale * shape(self.kind, 0.0);
+        profile * (1.0 - share) + Real::abs(self.axis_slope(x)) * (share / (2.0 * peak))
+    }
+}
+
+/// A density on [0, 1], linear between equally spaced knots.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct HalfProfile {
+    /// Densities at the knots.
+    knots: Vec<f64>,
+    /// Probability of everything before each knot.
+    cumulative: Vec<f64>,
+}
+
+impl HalfProfile {
+    /// Interpolates a nonnegative function, positive at 0, given up to a factor.
+    pub(super) fn new(segments: usize, f: impl Fn(f64) -> f64) -> Self {
+        let n = segments as f64;
+        let mut knots: Vec<f64> = (0..=segments).map(|i| f(i as f64 / n)).collect();
+        let total: f64 = knots.windows(2).map(|k| 0.5 * (k[0] + k[1]) / n).sum();
+        for k in &mut knots {
+            *k /= total;
+        }
+        let mut before = 0.0;
+        let mut cumulative = Vec::with_capacity(segments + 1);
+        cumulative.push(0.0);
+        for k in knots.windows(2) {
+            before += 0.5 * (k[0] + k[1]) / n;
+            cumulative.push(before);
+        }
+        // Rounding must not leave a number below one beyond the last knot.
+        cumulative[segments] = 1.0;
+        Self { knots, cumulative }
+    }
+
+    /// Inverts the distribution function; `u` in [0, 1).
+    fn sample(&self, u: f64) -> f64 {
+        let last = self.knots.len() - 2;
+        let i = (self.cumulative.partition_point(|&c| c <= u) - 1).min(last);
+        let (a, b) = (self.knots[i], self.knots[i + 1]);
+        let (below, above) = (self.cumulative[i], self.cumulative[i + 1]);
+        let v = f64::min((u - below) / (above - below), 1.0);
+        // The root of a t + (b - a) t²/2 = v (a + b)/2, in the form without cancellation.
+        let t = v * (a + b) / (a + fm::sqrt(f64::max(a * a + v * (b * b - a * a), 0.0)));
+        (i as f64 + t) / (last + 1) as f64
+    }
+
+    fn pdf(&self, x: f64) -> f64 {
+        let last = self.knots.len() - 2;
+        let at = x * (last + 1) as f64;
+        let i = (at as usize).min(last);
+        let t = at - i as f64;
+        self.knots[i] + (self.knots[i + 1] - self.knots[i]) * t
+    }
+}

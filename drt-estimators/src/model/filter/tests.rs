@@ -1,0 +1,215 @@
+use alloc::vec::Vec;
+
+use drt_math::testing::{SIGNIFICANCE, rectangle_chi_square, z_score};
+use drt_math::{Dual, Moments, Real, Rng};
+
+use crate::model::filter::{Filter, FilterError, FilterKind};
+
+const KINDS: [FilterKind; 7] = [
+    FilterKind::BOX,
+    FilterKind::Box { radius: 1.25 },
+    FilterKind::TENT,
+    FilterKind::Tent { radius: 2.5 },
+    FilterKind::GAUSSIAN,
+    FilterKind::Gaussian { radius: 1.0, std_dev: 0.8 },
+    FilterKind::Gaussian { radius: 6.0, std_dev: 0.3 },
+];
+
+fn filters() -> impl Iterator<Item = Filter> {
+    KINDS.into_iter().map(|kind| Filter::new(kind).unwrap())
+}
+
+/// Simpson's rule on one side of the kink.
+fn half_integral(f: impl Fn(f64) -> f64, radius: f64) -> f64 {
+    let n = 4000;
+    let h = radius / f64::from(n);
+    let weight = |i: i32| if i == 0 || i == n { 1.0 } else { 2.0 + 2.0 * f64::from(i % 2) };
+    // The support is half open.
+    let at = |i: i32| f(f64::min(f64::from(i) * h, radius * (1.0 - 1e-15)));
+    (0..=n).map(|i| weight(i) * at(i)).sum::<f64>() * h / 3.0
+}
+
+/// The definition, written down once more for any scalar and normalised by quadrature.
+fn definition<T: Real>(kind: FilterKind, x: T) -> T {
+    match kind {
+        FilterKind::Box { .. } => T::one(),
+        FilterKind::Tent { radius } => T::one() - x.abs() / radius,
+        FilterKind::Gaussian { radius, std_dev } => {
+            let bell = |x: T| (x.squared() * (-0.5 / (std_dev * std_dev))).exp();
+            bell(x) - bell(T::from(radius))
+        }
+    }
+}
+
+#[test]
+fn filters_integrate_to_one() {
+    for f in filters() {
+        let integral = 2.0 * half_integral(|x| f.axis(x), f.radius());
+        assert!((integral - 1.0).abs() < 1e-11, "{:?}: {integral}", f.kind());
+    }
+}
+
+#[test]
+fn values_and_gradients_follow_the_definition() {
+    let mut rng = Rng::new(1, 0, 0);
+    for f in filters() {
+        let kind = f.kind();
+        let r = f.radius();
+        let norm = 2.0 * half_integral(|x| definition(kind, x), r);
+        for _ in 0..200 {
+            let [x, y] = rng.next_2d().map(|u| r * (2.0 * u - 1.0));
+            let [dx, dy] = [Dual::<f64, 2>::variable(x, 0), Dual::variable(y, 1)];
+            let p = definition(kind, dx) * definition(kind, dy) / (norm * norm);
+            let peak = f.eval(0.0, 0.0);
+            assert!((f.eval(x, y) - p.re).abs() < 1e-11 * peak);
+            for (mine, dual) in f.gradient(x, y).iter().zip(p.eps) {
+                assert!(
+                    (mine - dual).abs() < 1e-10 * (peak + dual.abs()),
+                    "{kind:?} {mine} {dual}"
+                );
+            }
+        }
+        for outside in [[r, 0.0], [0.0, -1.001 * r], [f64::NAN, 0.0], [f64::INFINITY, 0.0]] {
+            assert_eq!(f.eval(outside[0], outside[1]), 0.0);
+        }
+    }
+}
+
+#[test]
+fn only_the_box_jumps_at_its_edge() {
+    for f in filters() {
+        let edge = f.axis(f.radius() * (1.0 - 1e-9)) / f.axis(0.0);
+        assert_eq!(f.is_continuous(), edge < 1e-6);
+    }
+}
+
+/// Values of `rfilter.eval` in Mitsuba 3.9.1; its Gaussian is a polynomial good to 4·10⁻⁴.
+#[test]
+fn profiles_are_those_of_mitsuba() {
+    let ratio = |kind, x: f64| {
+        let f = Filter::new(kind).unwrap();
+        f.axis(x) / f.axis(0.0)
+    };
+    for (x, value) in [(0.25, 0.75), (0.49, 0.51), (1.0, 0.0)] {
+        assert!((ratio(FilterKind::TENT, x) - value).abs() < 1e-12);
+    }
+    assert!((ratio(FilterKind::Tent { radius: 2.0 }, 0.5) - 0.75).abs() < 1e-12);
+    for (x, value) in [(0.25, 0.882167), (0.5, 0.606423), (1.0, 0.13496), (1.5, 0.010758)] {
+        assert!((ratio(FilterKind::GAUSSIAN, x) - value).abs() < 1e-3);
+    }
+    for (x, value) in [(0.5, 0.774714), (1.0, 0.360077), (2.0, 0.016533)] {
+        assert!((ratio(FilterKind::gaussian(0.7), x) - value).abs() < 1e-3);
+    }
+    assert_eq!(Filter::new(FilterKind::gaussian(0.7)).unwrap().radius(), 4.0 * 0.7);
+}
+
+#[test]
+fn samples_follow_their_density() {
+    let mut rng = Rng::new(2, 0, 0);
+    for f in filters() {
+        for derivative in [false, true] {
+            let points: Vec<[f64; 2]> =
+                (0..60_000).map(|_| f.sample(rng.next_2d(), derivative).offset).collect();
+            let r = f.radius();
+            let p_value = |mixed: bool| {
+                let points = points.iter().copied();
+                rectangle_chi_square(points, [-r; 2], [r; 2], |x| f.pdf(x, mixed))
+            };
+            assert!(p_value(derivative) > SIGNIFICANCE, "{:?}", f.kind());
+            // The density of the other mixture is a fault, where the two differ.
+            if f.is_continuous() {
+                assert!(p_value(!derivative) < SIGNIFICANCE, "{:?}", f.kind());
+            }
+        }
+    }
+}
+
+#[test]
+fn weights_are_filter_over_density() {
+    let mut rng = Rng::new(3, 0, 0);
+    for f in filters() {
+        for derivative in [false, true] {
+            for _ in 0..2000 {
+                let s = f.sample(rng.next_2d(), derivative);
+                let [x, y] = s.offset;
+                assert!(s.pdf > 0.0 && s.weight.is_finite());
+                assert!((s.weight * s.pdf - f.eval(x, y)).abs() <= 1e-14 * f.eval(x, y));
+                assert_eq!(s.pdf, f.pdf(s.offset, derivative));
+                // A quarter of each axis' samples goes elsewhere at most.
+                let most = if derivative { 16.0 / 9.0 } else { 1.0 };
+                assert!(s.weight < 1.03 * most, "{:?} {s:?}", f.kind());
+            }
+        }
+    }
+    for kind in [FilterKind::BOX, FilterKind::TENT] {
+        let f = Filter::new(kind).unwrap();
+        for _ in 0..100 {
+            assert!((f.sample(rng.next_2d(), false).weight - 1.0).abs() < 1e-13);
+        }
+    }
+    let f = Filter::new(FilterKind::GAUSSIAN).unwrap();
+    let weights: Moments = (0..20_000).map(|_| f.sample(rng.next_2d(), false).weight).collect();
+    assert!(z_score(&weights, 1.0).abs() < 4.0, "{weights:?}");
+    assert!(weights.variance() < 1e-5, "{weights:?}");
+}
+
+/// By parts, the integral of x dP/dx is -1; and the second moment of (dP/dx)/pdf, infinite for
+/// samples in proportion to a tent, is 8/3 ln 7 (x axis) times 1.0331 (y axis).
+#[test]
+fn derivative_samples_estimate_gradients_with_finite_variance() {
+    let mut rng = Rng::new(4, 0, 0);
+    for f in filters().filter(Filter::is_continuous) {
+        let (mut parts, mut second) = (Moments::ZERO, Moments::ZERO);
+        for _ in 0..100_000 {
+            let s = f.sample(rng.next_2d(), true);
+            let g = f.gradient(s.offset[0], s.offset[1])[0] / s.pdf;
+            parts.push(s.offset[0] * g);
+            second.push(g * g);
+        }
+        assert!(z_score(&parts, -1.0).abs() < 4.0, "{:?} {parts:?}", f.kind());
+        assert!(parts.standard_error() < 0.01);
+        // A flipped gradient is a fault.
+        assert!(z_score(&parts, 1.0).abs() > 4.0);
+        if f.kind() == FilterKind::TENT {
+            let y = 8.0 / 3.0 * (1.0 / 3.0 + 7.0_f64.ln() / 36.0);
+            let expected = 8.0 / 3.0 * 7.0_f64.ln() * y;
+            assert!(z_score(&second, expected).abs() < 4.0, "{second:?} {expected}");
+        }
+    }
+}
+
+#[test]
+fn mirrored_numbers_give_mirrored_offsets() {
+    let mut rng = Rng::new(5, 0, 0);
+    for f in filters() {
+        for derivative in [false, true] {
+            let u = rng.next_2d();
+            let a = f.sample(u, derivative);
+            let b = f.sample(u.map(|u| 1.0 - u), derivative);
+            for k in 0..2 {
+                assert!((a.offset[k] + b.offset[k]).abs() < 1e-12 * f.radius());
+            }
+            assert!((a.weight - b.weight).abs() < 1e-10);
+        }
+        for u in [0.0, 0.5, 1.0 - f64::EPSILON] {
+            let s = f.sample([u, 0.5], true);
+            assert!(s.weight.is_finite() && s.pdf > 0.0 && s.offset[0].abs() <= f.radius());
+        }
+    }
+}
+
+#[test]
+fn unusable_filters_are_named() {
+    for radius in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        for kind in [FilterKind::Box { radius }, FilterKind::Tent { radius }] {
+            let error = Filter::new(kind).unwrap_err();
+            assert!(matches!(error, FilterError::NotPositive { what: "radius", .. }));
+        }
+        let error = Filter::new(FilterKind::Gaussian { radius: 1.0, std_dev: radius }).unwrap_err();
+        assert!(matches!(error, FilterError::NotPositive { what: "standard deviation", .. }));
+    }
+    for std_dev in [0.01, 2000.0] {
+        let kind = FilterKind::Gaussian { radius: 1.0, std_dev };
+        assert_eq!(Filter::new(kind), Err(FilterError::Cut { radius: 1.0, std_dev }));
+    }
+}

@@ -1,0 +1,14 @@
+//! What a scene is made of, what is asked of an estimator, and what comes out.
+//!
+//! Plain data: nothing here follows a ray.
+
+pub(crate) mod agreement;
+pub mod emitter;
+pub(crate) mod error;
+pub mod filter;
+pub(crate) mod plan;
+pub(crate) mod rendering;
+pub(crate) mod scene;
+pub mod sensor;
+pub(crate) mod settings;
+pub mod surface;

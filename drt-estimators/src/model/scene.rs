@@ -1,0 +1,220 @@
+//! What a scene is made of: plain data, the reference configuration every estimator starts from.
+
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_geom::Mesh;
+use drt_medium::Medium;
+
+use crate::model::emitter::Emitter;
+use crate::model::sensor::Sensor;
+use crate::model::surface::Bsdf;
+
+/// A scene: shapes, what they are made of, what lights them, and who looks.
+///
+/// Indices refer to the vectors of the same struct. Everything is in world space.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Scene {
+    /// Surfaces, in file order.
+    pub shapes: Vec<Shape>,
+    /// Surface scattering models.
+    pub bsdfs: Vec<Named<Bsdf>>,
+    /// Participating media.
+    pub media: Vec<Named<Medium>>,
+    /// Emitters; an area emitter is named by the shape that carries it.
+    pub emitters: Vec<Named<SceneEmitter>>,
+    /// Cameras.
+    pub sensors: Vec<Named<SceneSensor>>,
+    /// Path depth and Russian roulette.
+    pub integrator: Integrator,
+}
+
+/// Something a job file can address by id.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Named<T> {
+    /// The id in the scene file, where there is one.
+    pub id: Option<String>,
+    /// The thing itself.
+    pub item: T,
+}
+
+impl<T> Named<T> {
+    /// A thing with an id.
+    pub fn new(id: impl Into<String>, item: T) -> Self {
+        Self { id: Some(id.into()), item }
+    }
+    /// A thing addressed by order alone.
+    pub fn anonymous(item: T) -> Self {
+        Self { id: None, item }
+    }
+}
+
+/// A surface: a triangle mesh, its scattering, and the media on its two sides.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Shape {
+    /// The id in the scene file, where there is one.
+    pub id: Option<String>,
+    /// Geometry in world space. The front of a triangle is where its vertices turn
+    /// counter-clockwise; `interior` is behind it.
+    pub mesh: Arc<Mesh>,
+    /// Index of the scattering model.
+    pub bsdf: usize,
+    /// The media it separates; `None` leaves the medium as it is.
+    pub boundary: Option<MediumBoundary>,
+    /// Index of the area emitter it carries.
+    pub emitter: Option<usize>,
+}
+
+/// The media behind and before a surface; `None` is vacuum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct MediumBoundary {
+    /// Behind the faces.
+    pub interior: Option<usize>,
+    /// Before the faces.
+    pub exterior: Option<usize>,
+}
+
+/// An emitter and the medium it sits in.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SceneEmitter {
+    /// The emitter.
+    pub emitter: Emitter,
+    /// The medium around it (point and spot lights).
+    pub medium: Surrounding,
+}
+
+/// A sensor and the medium it sits in.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct SceneSensor {
+    /// The camera.
+    pub sensor: Sensor,
+    /// The medium around it.
+    pub medium: Surrounding,
+    /// Samples per pixel the scene file asks for.
+    pub sample_count: Option<u32>,
+}
+
+/// Which medium surrounds a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Surrounding {
+    /// Found by counting the interfaces between the point and infinity.
+    #[default]
+    Counted,
+    /// Stated by the scene; `None` is vacuum.
+    Stated(Option<usize>),
+}
+
+/// Path depth and Russian roulette, with Mitsuba's meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Integrator {
+    /// 1 shows emitters only, each real scattering adds one; `None` is unlimited.
+    pub max_depth: Option<u32>,
+    /// The depth from which Russian roulette may end a path.
+    pub rr_depth: u32,
+}
+
+impl Default for Integrator {
+    fn default() -> Self {
+        Self { max_depth: None, rr_depth: 5 }
+    }
+}
+
+/// What an effect acts on, once its name has been looked up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Target {
+    /// A shape.
+    Shape(usize),
+    /// A medium.
+    Medium(usize),
+    /// A scattering model.
+    Bsdf(usize),
+    /// An emitter.
+    Emitter(usize),
+    /// A sensor.
+    Sensor(usize),
+}
+
+impl Scene {
+    /// Checks that indices refer to something and that what emits has an area.
+    ///
+    /// # Errors
+    /// Names the element and what is wrong with it.
+    pub fn check(&self) -> Result<(), crate::Error> {
+        let fail = |element: String, reason: String| Err(crate::Error::Element { element, reason });
+        let missing = |m: Option<usize>| m.is_some_and(|m| m >= self.media.len());
+        for (i, s) in self.shapes.iter().enumerate() {
+            let name = || s.id.clone().unwrap_or_else(|| alloc::format!("shape[{i}]"));
+            if s.bsdf >= self.bsdfs.len() {
+                return fail(name(), alloc::format!("there is no bsdf {}", s.bsdf));
+            }
+            if s.emitter.is_some_and(|e| e >= self.emitters.len()) {
+                return fail(name(), "its emitter does not exist".into());
+            }
+            if s.boundary.is_some_and(|b| missing(b.interior) || missing(b.exterior)) {
+                return fail(name(), "one of its media does not exist".into());
+            }
+            if s.emitter.is_some() && s.mesh.surface_area() <= 0.0 {
+                return fail(name(), "it emits but has no area".into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Finds what a job calls `name`: an id, or kind and order such as `shape[0]`.
+    ///
+    /// # Errors
+    /// A sentence naming what exists when nothing or more than one thing has that name.
+    pub fn find(&self, name: &str) -> Result<Target, crate::Error> {
+        if let Some(target) = self.find_by_order(name) {
+            return Ok(target);
+        }
+        let mut found = self.named().filter(|(id, _)| *id == Some(name)).map(|(_, t)| t);
+        match (found.next(), found.next()) {
+            (Some(t), None) => Ok(t),
+            (None, _) => Err(crate::Error::UnknownTarget {
+                name: name.into(),
+                known: self.named().filter_map(|(id, _)| id.map(String::from)).collect(),
+            }),
+            (Some(_), Some(_)) => Err(crate::Error::AmbiguousTarget { name: name.into() }),
+        }
+    }
+
+    fn find_by_order(&self, name: &str) -> Option<Target> {
+        let (kind, rest) = name.split_once('[')?;
+        let i: usize = rest.strip_suffix(']')?.parse().ok()?;
+        let (len, make): (usize, fn(usize) -> Target) = match kind {
+            "shape" => (self.shapes.len(), Target::Shape),
+            "medium" => (self.media.len(), Target::Medium),
+            "bsdf" => (self.bsdfs.len(), Target::Bsdf),
+            "emitter" => (self.emitters.len(), Target::Emitter),
+            "sensor" => (self.sensors.len(), Target::Sensor),
+            _ => return None,
+        };
+        (i < len).then(|| make(i))
+    }
+
+    fn named(&self) -> impl Iterator<Item = (Option<&str>, Target)> {
+        fn ids<T>(
+            items: &[Named<T>],
+            make: fn(usize) -> Target,
+        ) -> impl Iterator<Item = (Option<&str>, Target)> {
+            items.iter().enumerate().map(move |(i, n)| (n.id.as_deref(), make(i)))
+        }
+        let shapes = self.shapes.iter().enumerate();
+        shapes
+            .map(|(i, s)| (s.id.as_deref(), Target::Shape(i)))
+            .chain(ids(&self.media, Target::Medium))
+            .chain(ids(&self.bsdfs, Target::Bsdf))
+            .chain(ids(&self.emitters, Target::Emitter))
+            .chain(ids(&self.sensors, Target::Sensor))
+    }
+}

@@ -1,0 +1,290 @@
+//! Pinhole cameras: from pixels to rays, from points to pixels, and how both change when the
+//! camera moves.
+//!
+//! Axes: `right` and `up` span the image plane, `forward` looks into the scene; the image point of
+//! x is a = (d·right)/(d·forward), b = (d·up)/(d·forward) with d = x - position, on the plane at
+//! distance one. Pixel coordinates have their origin at the film's top left corner, x to the right
+//! and y down, and pixel (i, j) covers [i, i+1) × [j, j+1).
+//!
+//! Placements mean what they mean in Mitsuba: the camera looks along the local +z axis with +y up
+//! and +x to the *left* of the image, so that `right` is minus the first axis of `to_world`.
+
+mod footprint;
+mod lens;
+mod motion;
+mod pinhole;
+#[cfg(test)]
+mod tests;
+mod view;
+
+use drt_math::{Affine, Mat3, Vec3, fm};
+use thiserror::Error;
+
+use crate::model::filter::{Filter, FilterError};
+
+pub use crate::model::sensor::footprint::{Footprint, PixelWeight};
+pub use crate::model::sensor::lens::{FovAxis, Lens};
+pub use crate::model::sensor::pinhole::{Pinhole, Projection, SensorGradient, SensorTangent};
+pub use crate::model::sensor::view::{Response, ViewSample};
+
+/// A camera that cannot be used.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SensorError {
+    /// A field of view that no plane image can have.
+    #[error("the field of view is {0} degrees; it must lie strictly between 0 and 180")]
+    FieldOfView(f64),
+    /// A film without pixels.
+    #[error("the film is {}x{} pixels; both sides need at least one", .0[0], .0[1])]
+    FilmSize([u32; 2]),
+    /// Clip planes that leave nothing to see.
+    #[error("the clip planes are at {near} and {far}; expected 0 < near < far")]
+    Clip {
+        /// Distance of the near plane along the forward axis.
+        near: f64,
+        /// Distance of the far plane.
+        far: f64,
+    },
+    /// A placement that changes lengths or angles.
+    #[error(
+        "the camera's to_world scales or shears; only rotations, reflections and translations \
+         keep a camera a camera"
+    )]
+    NotRigid,
+    /// A motion that flattens the camera.
+    #[error("the motion flattens the camera's axes; choose a value nearer to zero")]
+    Flattened,
+    /// A viewing direction that does not exist.
+    #[error("look_at: origin and target are the same point")]
+    NoDirection,
+    /// An upward direction that does not exist.
+    #[error("look_at: `up` is zero or parallel to the viewing direction")]
+    NoUp,
+    /// A NaN or infinity.
+    #[error("the camera's {0} is not finite")]
+    NotFinite(&'static str),
+    /// A property that cameras do not have.
+    #[error(
+        "a camera has no property `{0}` to differentiate; it has fov, \
+         principal_point_offset_x and principal_point_offset_y"
+    )]
+    UnknownProperty(alloc::string::String),
+    /// Different numbers for the channels of something that has none.
+    #[error("`{0}` is a single number; give three equal ones")]
+    NotScalar(&'static str),
+    /// The reconstruction filter is unusable.
+    #[error(transparent)]
+    Filter(#[from] FilterError),
+}
+
+/// A perspective pinhole camera with its film.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "Parts", into = "Parts"))]
+pub struct Sensor {
+    pinhole: Pinhole,
+    lens: Lens,
+    film: [u32; 2],
+    filter: Filter,
+    response: Response,
+}
+
+/// A ray into the scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraRay {
+    /// The pinhole.
+    pub origin: Vec3,
+    /// Unit vector into the scene; light flows against it.
+    pub direction: Vec3,
+    /// Distances along the ray at which it crosses the near and the far clip plane.
+    pub range: [f64; 2],
+}
+
+/// The placement that looks from `origin` at `target`: columns left, up, forward, as Mitsuba's
+/// `lookat`.
+///
+/// # Errors
+/// When the three do not determine a direction and an upright.
+pub fn look_at(origin: Vec3, target: Vec3, up: Vec3) -> Result<Affine, SensorError> {
+    for (v, what) in [(origin, "origin"), (target, "target"), (up, "up direction")] {
+        finite(v.is_finite(), what)?;
+    }
+    let forward = unit(target - origin).ok_or(SensorError::NoDirection)?;
+    // Parallel up to rounding leaves a cross product of rounding errors: no direction either.
+    let left = unit(up)
+        .map(|up| up.cross(forward))
+        .filter(|l| l.length_squared() > 1e-24)
+        .and_then(unit)
+        .ok_or(SensorError::NoUp)?;
+    let linear = Mat3 { cols: [left, forward.cross(left), forward] };
+    Ok(Affine { linear, translation: origin })
+}
+
+impl Sensor {
+    /// A camera placed by a camera-to-world map, `film` pixels wide and high.
+    ///
+    /// Reflections are kept (they mirror the image). Deviations from orthonormal axes up to 10⁻³,
+    /// as printed matrices have, are removed.
+    ///
+    /// # Errors
+    /// Names what is not finite, empty, or not a camera.
+    pub fn from_to_world(
+        to_world: &Affine,
+        lens: Lens,
+        film: [u32; 2],
+        filter: Filter,
+    ) -> Result<Self, SensorError> {
+        finite(to_world.is_finite(), "to_world")?;
+        let m = to_world.linear;
+        let gram = m.transpose() * m + Mat3::IDENTITY * -1.0;
+        if gram.cols.iter().any(|c| c.max_abs() > 1e-3) {
+            return Err(SensorError::NotRigid);
+        }
+        let [left, up, forward] = m.cols;
+        let [right, up, forward] =
+            motion::orthonormalize([-left, up, forward]).ok_or(SensorError::NotRigid)?;
+        let pixel_size = lens.pixel_size(film)?;
+        let principal = lens.principal_point(film);
+        let position = to_world.translation;
+        let pinhole = Pinhole { position, right, up, forward, pixel_size, principal };
+        Ok(Self { pinhole, lens, film, filter, response: Response::Perspective })
+    }
+
+    /// A camera at `origin` that looks at `target`; see [`look_at`].
+    ///
+    /// # Errors
+    /// As [`look_at`] and [`Sensor::from_to_world`].
+    pub fn look_at(
+        [origin, target, up]: [Vec3; 3],
+        lens: Lens,
+        film: [u32; 2],
+        filter: Filter,
+    ) -> Result<Self, SensorError> {
+        Self::from_to_world(&look_at(origin, target, up)?, lens, film, filter)
+    }
+
+    /// The same camera with another number of pixels.
+    ///
+    /// # Errors
+    /// When a side is zero.
+    pub fn with_film(&self, film: [u32; 2]) -> Result<Self, SensorError> {
+        self.with(self.lens, film)
+    }
+
+    /// The same sensor with another lens and film.
+    fn with(&self, lens: Lens, film: [u32; 2]) -> Result<Self, SensorError> {
+        let camera = Self::from_to_world(&self.to_world(), lens, film, self.filter.clone())?;
+        Ok(Self { response: self.response, ..camera })
+    }
+
+    /// The same camera with another filter.
+    #[must_use]
+    pub fn with_filter(self, filter: Filter) -> Self {
+        Self { filter, ..self }
+    }
+
+    /// The camera-to-world map.
+    #[must_use]
+    pub fn to_world(&self) -> Affine {
+        let Pinhole { position, right, up, forward, .. } = self.pinhole;
+        Affine { linear: Mat3 { cols: [-right, up, forward] }, translation: position }
+    }
+
+    /// The centre of projection.
+    #[inline]
+    #[must_use]
+    pub fn position(&self) -> Vec3 {
+        self.pinhole.position
+    }
+
+    /// Position, axes and image coordinates.
+    #[must_use]
+    pub fn pinhole(&self) -> &Pinhole {
+        &self.pinhole
+    }
+
+    /// Field of view, principal point and clip planes.
+    #[must_use]
+    pub fn lens(&self) -> &Lens {
+        &self.lens
+    }
+
+    /// Pixels per row, and rows.
+    #[must_use]
+    pub fn film(&self) -> [u32; 2] {
+        self.film
+    }
+
+    /// The reconstruction filter.
+    #[must_use]
+    pub fn filter(&self) -> &Filter {
+        &self.filter
+    }
+
+    /// The ray through an image point, in pixel coordinates.
+    #[inline]
+    #[must_use]
+    pub fn ray(&self, pixel: [f64; 2]) -> CameraRay {
+        let v = self.pinhole.view(pixel);
+        let length = v.length();
+        CameraRay {
+            origin: self.pinhole.position,
+            direction: v / length,
+            range: [self.lens.near * length, self.lens.far * length],
+        }
+    }
+
+    /// Where the camera sees the point x, visibility apart; `None` beyond a clip plane.
+    #[inline]
+    #[must_use]
+    pub fn project(&self, x: Vec3) -> Option<Projection> {
+        let depth = (x - self.pinhole.position).dot(self.pinhole.forward);
+        (self.lens.near <= depth && depth <= self.lens.far).then(|| self.pinhole.project(x))
+    }
+
+    /// The pixels whose filters reach an image point.
+    #[must_use]
+    pub fn footprint(&self, pixel: [f64; 2]) -> Footprint<'_> {
+        Footprint::new(&self.filter, self.film, pixel)
+    }
+}
+
+/// What determines a sensor, for storage.
+#[cfg(feature = "serde")]
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Parts {
+    to_world: Affine,
+    lens: Lens,
+    film: [u32; 2],
+    filter: Filter,
+    response: Response,
+}
+
+#[cfg(feature = "serde")]
+impl TryFrom<Parts> for Sensor {
+    type Error = SensorError;
+    fn try_from(p: Parts) -> Result<Self, SensorError> {
+        let camera = Self::from_to_world(&p.to_world, p.lens, p.film, p.filter)?;
+        Ok(Self { response: p.response, ..camera })
+    }
+}
+
+#[cfg(feature = "serde")]
+impl From<Sensor> for Parts {
+    fn from(s: Sensor) -> Self {
+        let (to_world, response) = (s.to_world(), s.response);
+        Self { to_world, lens: s.lens, film: s.film, filter: s.filter, response }
+    }
+}
+
+fn finite(ok: bool, what: &'static str) -> Result<(), SensorError> {
+    if ok { Ok(()) } else { Err(SensorError::NotFinite(what)) }
+}
+
+/// `None` for the zero vector. Scaled by the largest coordinate first, so that no length under- or
+/// overflows.
+fn unit(v: Vec3) -> Option<Vec3> {
+    let size = v.max_abs();
+    let v = v * (1.0 / size);
+    (size > 0.0 && v.is_finite()).then(|| v * (1.0 / fm::sqrt(v.length_squared())))
+}

@@ -1,0 +1,110 @@
+//! Cameras that move, and whose numbers change.
+
+use drt_math::{Affine, Rgb, Vec3};
+
+use crate::model::sensor::{Lens, Sensor, SensorError, SensorTangent, unit};
+
+/// Gram–Schmidt on (right, up, forward), forward first and right last.
+///
+/// The result depends only on the map applied to the axes, however it is split into steps,
+/// because each step's matrix is triangular in the axes.
+pub(super) fn orthonormalize([right, up, forward]: [Vec3; 3]) -> Option<[Vec3; 3]> {
+    let forward = unit(forward)?;
+    let up = unit(up.reject(forward))?;
+    let right = unit(right.reject(forward).reject(up))?;
+    Some([right, up, forward])
+}
+
+impl Sensor {
+    /// The camera moved by a map of space.
+    ///
+    /// Under a map that is not rigid the viewing line and the upright plane go along as material
+    /// ones would and the axes are made orthonormal again; the image stays one of square pixels
+    /// with the same field of view. Clip distances do not change.
+    ///
+    /// # Errors
+    /// When the map is singular or not finite.
+    pub fn moved(&self, map: &Affine) -> Result<Self, SensorError> {
+        let p = &self.pinhole;
+        let axes = [p.right, p.up, p.forward].map(|v| map.vector(v));
+        let [right, up, forward] = orthonormalize(axes).ok_or(SensorError::Flattened)?;
+        let position = map.point(p.position);
+        super::finite(position.is_finite(), "position after the motion")?;
+        let pinhole = super::Pinhole { position, right, up, forward, ..*p };
+        Ok(Self { pinhole, ..self.clone() })
+    }
+
+    /// The rates of a camera carried by a velocity field: the derivative of
+    /// [`moved`](Self::moved) at the identity.
+    #[must_use]
+    pub fn velocity(&self, field: &Affine) -> SensorTangent {
+        let p = &self.pinhole;
+        let [u, f] = [p.up, p.forward].map(|v| field.vector(v));
+        // Rates of rotation of forward towards up and right, and of up towards right.
+        let (up_of_f, right_of_f) = (f.dot(p.up), f.dot(p.right));
+        let right_of_u = u.dot(p.right);
+        SensorTangent {
+            position: field.point(p.position),
+            right: -(p.forward * right_of_f) - p.up * right_of_u,
+            up: p.right * right_of_u - p.forward * up_of_f,
+            forward: p.up * up_of_f + p.right * right_of_f,
+            ..SensorTangent::default()
+        }
+    }
+
+    /// A property that a parameter can change, three equal numbers. Names and units are the scene
+    /// file's: `fov` (degrees, along its axis), `principal_point_offset_x` and `_y`.
+    ///
+    /// # Errors
+    /// When cameras have no such property.
+    pub fn property(&self, name: &str) -> Result<Rgb, SensorError> {
+        let mut lens = self.lens;
+        Ok(Rgb::splat(*slot(&mut lens, name)?.1))
+    }
+
+    /// The camera with a property changed.
+    ///
+    /// # Errors
+    /// When there is no such property, or the value is unusable.
+    pub fn with_property(&self, name: &str, value: Rgb) -> Result<Self, SensorError> {
+        let mut lens = self.lens;
+        let (known, number) = slot(&mut lens, name)?;
+        *number = scalar(known, value)?;
+        self.with(lens, self.film)
+    }
+
+    /// The rates of the camera when a property has the given rate.
+    ///
+    /// # Errors
+    /// When there is no such property, or the rates differ.
+    pub fn property_tangent(&self, name: &str, rate: Rgb) -> Result<SensorTangent, SensorError> {
+        let mut lens = Lens { fov: 0.0, principal_point_offset: [0.0, 0.0], ..self.lens };
+        let (known, number) = slot(&mut lens, name)?;
+        *number = scalar(known, rate)?;
+        let [x, y] = lens.principal_point_offset;
+        Ok(SensorTangent {
+            pixel_size: lens.fov * self.lens.pixel_size_slope(self.film),
+            principal: [-x * f64::from(self.film[0]), -y * f64::from(self.film[1])],
+            ..SensorTangent::default()
+        })
+    }
+}
+
+/// The number a property name stands for.
+fn slot<'a>(lens: &'a mut Lens, name: &str) -> Result<(&'static str, &'a mut f64), SensorError> {
+    match name {
+        "fov" => Ok(("fov", &mut lens.fov)),
+        "principal_point_offset_x" => {
+            Ok(("principal_point_offset_x", &mut lens.principal_point_offset[0]))
+        }
+        "principal_point_offset_y" => {
+            Ok(("principal_point_offset_y", &mut lens.principal_point_offset[1]))
+        }
+        _ => Err(SensorError::UnknownProperty(name.into())),
+    }
+}
+
+fn scalar(name: &'static str, value: Rgb) -> Result<f64, SensorError> {
+    super::finite(value.is_finite(), name)?;
+    if value == Rgb::splat(value.r) { Ok(value.r) } else { Err(SensorError::NotScalar(name)) }
+}

@@ -1,0 +1,182 @@
+use drt_math::{Rgb, ValueChange};
+
+use crate::model::surface::Bsdf;
+use crate::model::surface::property::{Property, Slot, SurfaceError, names};
+
+/// One number per channel for every property of a BSDF.
+///
+/// As part of a [`BsdfGradient`](super::BsdfGradient) it holds the derivative of each channel of the
+/// value with respect to the same channel of the property, or to the property itself when that is a
+/// scalar. Properties a BSDF lacks are zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BsdfParams {
+    /// Albedo of the diffuse lobe.
+    pub reflectance: Rgb,
+    /// Weight of the glossy reflection.
+    pub specular_reflectance: Rgb,
+    /// Weight of the glossy refraction.
+    pub specular_transmittance: Rgb,
+    /// Roughness.
+    pub alpha: Rgb,
+    /// Relative index of refraction.
+    pub eta: Rgb,
+    /// Imaginary part of the index.
+    pub k: Rgb,
+    /// Sharpness of the Phong lobe.
+    pub exponent: Rgb,
+}
+
+/// A velocity of a BSDF's properties (a scalar's in every channel alike), or the gradient of a
+/// number with respect to them (a scalar's is then the sum over its three channels).
+pub type BsdfTangent = BsdfParams;
+
+impl BsdfParams {
+    /// Rate of change of the value along a velocity of the properties.
+    #[inline]
+    #[must_use]
+    pub fn dot(&self, velocity: &BsdfTangent) -> Rgb {
+        self.reflectance * velocity.reflectance
+            + self.specular_reflectance * velocity.specular_reflectance
+            + self.specular_transmittance * velocity.specular_transmittance
+            + self.alpha * velocity.alpha
+            + self.eta * velocity.eta
+            + self.k * velocity.k
+            + self.exponent * velocity.exponent
+    }
+
+    /// Adds `weight` times the derivatives `params`: the transpose of [`BsdfParams::dot`], so that
+    /// `weight · params.dot(v)` is what a gradient collected from zero gives along `v`.
+    #[inline]
+    pub fn scatter(&mut self, params: &BsdfParams, weight: Rgb) {
+        self.reflectance += params.reflectance * weight;
+        self.specular_reflectance += params.specular_reflectance * weight;
+        self.specular_transmittance += params.specular_transmittance * weight;
+        self.alpha += params.alpha * weight;
+        self.eta += params.eta * weight;
+        self.k += params.k * weight;
+        self.exponent += params.exponent * weight;
+    }
+
+    /// The entry of a property.
+    #[must_use]
+    pub fn get(&self, property: Property) -> Rgb {
+        match property {
+            Property::Reflectance => self.reflectance,
+            Property::SpecularReflectance => self.specular_reflectance,
+            Property::SpecularTransmittance => self.specular_transmittance,
+            Property::Alpha => self.alpha,
+            Property::Eta => self.eta,
+            Property::K => self.k,
+            Property::Exponent => self.exponent,
+        }
+    }
+
+    /// The entry of a property, to change it.
+    pub fn get_mut(&mut self, property: Property) -> &mut Rgb {
+        match property {
+            Property::Reflectance => &mut self.reflectance,
+            Property::SpecularReflectance => &mut self.specular_reflectance,
+            Property::SpecularTransmittance => &mut self.specular_transmittance,
+            Property::Alpha => &mut self.alpha,
+            Property::Eta => &mut self.eta,
+            Property::K => &mut self.k,
+            Property::Exponent => &mut self.exponent,
+        }
+    }
+}
+
+/// A parameter's effect on one property of a BSDF.
+///
+/// ```
+/// use drt_estimators::surface::{Bsdf, BsdfChange, Diffuse, Property};
+/// use drt_math::{Rgb, ValueChange};
+///
+/// let mut wall = Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.4) });
+/// let redder = BsdfChange {
+///     property: Property::from_name("reflectance")?,
+///     op: ValueChange::Add(Rgb::new(1.0, 0.0, 0.0)),
+/// };
+/// let velocity = wall.tangent(&redder, 0.1)?;
+/// wall.apply(&redder, 0.1)?;
+/// assert_eq!(velocity.reflectance, Rgb::new(1.0, 0.0, 0.0));
+/// assert_eq!(wall, Bsdf::Diffuse(Diffuse { reflectance: Rgb::new(0.5, 0.4, 0.4) }));
+/// # Ok::<(), drt_estimators::surface::SurfaceError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BsdfChange {
+    /// What changes.
+    pub property: Property,
+    /// How it depends on theta.
+    pub op: ValueChange,
+}
+
+impl BsdfChange {
+    /// Carries a velocity that an earlier effect gave the BSDF through this later change.
+    pub fn carry(&self, velocity: &mut BsdfTangent, theta: f64) {
+        *velocity.get_mut(self.property) *= self.op.map(theta).factor;
+    }
+}
+
+impl Bsdf {
+    /// Makes a change for the parameter's value `theta`.
+    ///
+    /// # Errors
+    /// When the BSDF has no such property or the new value is not allowed; it is then unchanged.
+    pub fn apply(&mut self, change: &BsdfChange, theta: f64) -> Result<(), SurfaceError> {
+        let mut changed = self.clone();
+        let slot = changed.slot(change)?;
+        let value = change.op.at(slot.value(), theta);
+        slot.set(value);
+        changed.validate()?;
+        *self = changed;
+        Ok(())
+    }
+
+    /// Velocity of the properties, at the parameter's value `theta`, under a change of this (still
+    /// unchanged) BSDF. Effects follow one another: after later changes, [`BsdfChange::carry`] it.
+    ///
+    /// # Errors
+    /// When the BSDF has no such property.
+    pub fn tangent(&self, change: &BsdfChange, theta: f64) -> Result<BsdfTangent, SurfaceError> {
+        let mut base = self.clone();
+        let mut velocity = BsdfTangent::default();
+        let value = base.slot(change)?.value();
+        *velocity.get_mut(change.property) = change.op.map_rate(theta).value(value);
+        Ok(velocity)
+    }
+
+    fn property(&mut self, property: Property) -> Option<Slot<'_>> {
+        match self {
+            Self::Null => None,
+            Self::Diffuse(b) => b.slot(property),
+            Self::Phong(b) => b.slot(property),
+            Self::RoughConductor(b) => b.slot(property),
+            Self::RoughDielectric(b) => b.slot(property),
+            Self::TwoSided(b) => b.front.property(property),
+        }
+    }
+
+    fn lacks(&mut self, property: Property) -> SurfaceError {
+        let mut available =
+            names(Property::ALL.into_iter().filter(|&p| self.property(p).is_some()));
+        if available.is_empty() {
+            available.push_str("nothing that can change");
+        }
+        SurfaceError::NoSuchProperty { bsdf: self.name(), property, available }
+    }
+
+    fn slot(&mut self, change: &BsdfChange) -> Result<Slot<'_>, SurfaceError> {
+        let property = change.property;
+        if matches!(self, Self::TwoSided(b) if b.back.is_some()) {
+            return Err(SurfaceError::DifferentSides { property });
+        }
+        let lacks = self.lacks(property);
+        let slot = self.property(property).ok_or(lacks)?;
+        match (&slot, change.op) {
+            (Slot::Scalar(_), ValueChange::Add(a)) if !change.op.is_scalar() => {
+                Err(SurfaceError::NotUniform { property, r: a.r, g: a.g, b: a.b })
+            }
+            _ => Ok(slot),
+        }
+    }
+}

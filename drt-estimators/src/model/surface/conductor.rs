@@ -1,0 +1,144 @@
+use drt_math::{Real, Rgb, Vec3, fm};
+
+use crate::model::surface::angles::{Angles, Slopes};
+use crate::model::surface::facet::Facet;
+use crate::model::surface::fresnel::{conductor_reflected, conductor_slopes};
+use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, mirrored};
+use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
+
+/// A rough metal: the single-scattering microfacet reflection of Cook & Torrance in the form of
+/// Walter et al. 2007, eq. 20, with separable Smith masking; black from behind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RoughConductor<T = f64> {
+    /// Distribution of the microfacets; default Beckmann.
+    pub distribution: Distribution,
+    /// Roughness, at least 1e-4 (about the rms slope times sqrt 2); default 0.1.
+    pub alpha: T,
+    /// Real part of the index of refraction over the exterior's; default 0.
+    pub eta: Rgb<T>,
+    /// Imaginary part (absorption) of the same; default 1, which with `eta` 0 reflects everything.
+    pub k: Rgb<T>,
+    /// Factor of the reflection; default 1.
+    pub specular_reflectance: Rgb<T>,
+}
+
+impl Default for RoughConductor {
+    fn default() -> Self {
+        Self {
+            distribution: Distribution::Beckmann,
+            alpha: 0.1,
+            eta: Rgb::ZERO,
+            k: Rgb::ONE,
+            specular_reflectance: Rgb::ONE,
+        }
+    }
+}
+
+impl<T: Real> RoughConductor<T> {
+    #[inline]
+    pub(super) fn value(&self, a: &Angles<T>) -> Rgb<T> {
+        if !a.in_front() {
+            return Rgb::splat(T::zero());
+        }
+        let facets = self.distribution.facets(a, T::one(), self.alpha);
+        // Also where |h| = 0, which the rest could not be differentiated at.
+        if facets.re() == 0.0 {
+            return Rgb::splat(T::zero());
+        }
+        let cos = a.h2.sqrt() * 0.5;
+        let fresnel = Rgb::new(
+            conductor_reflected(cos, self.eta.r, self.k.r),
+            conductor_reflected(cos, self.eta.g, self.k.g),
+            conductor_reflected(cos, self.eta.b, self.k.b),
+        );
+        self.specular_reflectance * fresnel * (facets * reflection_jacobian(a.h2))
+    }
+}
+
+/// `|h|⁴ / 4`
+#[inline]
+fn reflection_jacobian<T: Real>(h2: T) -> T {
+    h2.squared() * 0.25
+}
+
+impl RoughConductor {
+    #[inline]
+    pub(super) fn slopes(&self, a: &Angles) -> Slopes {
+        let mut s = Slopes::default();
+        if !a.in_front() {
+            return s;
+        }
+        let Some(facets) = self.distribution.facet_slopes(a, 1.0, self.alpha) else {
+            return s;
+        };
+        let cos = 0.5 * fm::sqrt(a.h2);
+        let (mut by_cos, mut by_eta, mut by_k) = (Rgb::ZERO, Rgb::ZERO, Rgb::ZERO);
+        let fresnel = Rgb::new(
+            conductor_reflected(cos, self.eta.r, self.k.r),
+            conductor_reflected(cos, self.eta.g, self.k.g),
+            conductor_reflected(cos, self.eta.b, self.k.b),
+        );
+        [by_cos.r, by_eta.r, by_k.r] = conductor_slopes(cos, self.eta.r, self.k.r);
+        [by_cos.g, by_eta.g, by_k.g] = conductor_slopes(cos, self.eta.g, self.k.g);
+        [by_cos.b, by_eta.b, by_k.b] = conductor_slopes(cos, self.eta.b, self.k.b);
+
+        let jacobian = reflection_jacobian(a.h2);
+        let grey = facets.value * jacobian;
+        let scale = self.specular_reflectance * grey;
+        let colour = self.specular_reflectance * fresnel;
+        s.value = colour * grey;
+        s.cos_o = colour * (facets.cos_o * jacobian);
+        s.cos_i = colour * (facets.cos_i * jacobian);
+        s.h2 = colour * (facets.h2 * jacobian + facets.value * 0.5 * a.h2)
+            + scale * by_cos * (0.125 / cos);
+        s.params.alpha = colour * (facets.alpha * jacobian);
+        s.params.eta = scale * by_eta;
+        s.params.k = scale * by_k;
+        s.params.specular_reflectance = fresnel * grey;
+        s
+    }
+
+    #[inline]
+    pub(super) fn pdf(&self, a: &Angles) -> f64 {
+        if !a.in_front() {
+            return 0.0;
+        }
+        reflection_jacobian(a.h2) * self.distribution.visible_density(a, 1.0, self.alpha)
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, from: Vec3, n: Vec3, u: [f64; 3]) -> Option<Vec3> {
+        if n.dot(from) <= 0.0 {
+            return None;
+        }
+        let m = self.distribution.sample_visible(from, n, self.alpha, [u[0], u[1]]);
+        Some(mirrored(from, m))
+    }
+
+    #[inline]
+    pub(super) fn facet(&self, directions: [Vec3; 3]) -> Facet {
+        Facet::new((self.distribution, self.alpha), directions, None)
+    }
+
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Alpha => Some(Slot::Scalar(&mut self.alpha)),
+            Property::Eta => Some(Slot::Color(&mut self.eta)),
+            Property::K => Some(Slot::Color(&mut self.k)),
+            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
+            _ => None,
+        }
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+        in_range(Property::Alpha, self.alpha, self.alpha >= LEAST_ALPHA, "at least 1e-4")?;
+        nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
+        nonnegative(Property::Eta, self.eta)?;
+        nonnegative(Property::K, self.k)?;
+        let indices = self.eta + self.k;
+        indices.to_array().into_iter().try_for_each(|sum| {
+            in_range(Property::K, sum, sum > 0.0, "above 0 in channels where eta is 0")
+        })
+    }
+}

@@ -1,0 +1,251 @@
+use drt_math::{Dual, Real, Rgb, Vec3, fm};
+
+use crate::model::surface::angles::{Angles, Slopes};
+use crate::model::surface::facet::Facet;
+use crate::model::surface::fresnel::{dielectric_reflected, dielectric_transmitted};
+use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, mirrored, refracted};
+use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
+
+/// A rough interface between two transparent media: Walter et al. 2007, eq. 20 (reflection) and
+/// eq. 21 (refraction). The normal points to the exterior.
+///
+/// Radiance is transported: refraction carries the squared ratio of the indices, so that radiance
+/// over squared index is what the surface conserves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct RoughDielectric<T = f64> {
+    /// Distribution of the microfacets; default Beckmann.
+    pub distribution: Distribution,
+    /// Roughness, at least 1e-4; default 0.1.
+    pub alpha: T,
+    /// Index of the interior over that of the exterior, not one; default glass (BK7) in air.
+    pub eta: T,
+    /// Factor of the reflection; default 1.
+    pub specular_reflectance: Rgb<T>,
+    /// Factor of the refraction; default 1.
+    pub specular_transmittance: Rgb<T>,
+}
+
+impl Default for RoughDielectric {
+    fn default() -> Self {
+        Self {
+            distribution: Distribution::Beckmann,
+            alpha: 0.1,
+            eta: 1.5046 / 1.000_277,
+            specular_reflectance: Rgb::ONE,
+            specular_transmittance: Rgb::ONE,
+        }
+    }
+}
+
+/// Nearest an index may come to one, where refraction has no half vector.
+const LEAST_CONTRAST: f64 = 1e-6;
+
+/// The angles seen with the first direction in front, and the index beyond the interface over the
+/// index on that direction's side.
+#[derive(Clone, Copy)]
+struct Passage<T> {
+    a: Angles<T>,
+    eta: T,
+}
+
+/// Products of `h = wo + eta wi` with `wo` and `-wi`, once `h` is turned to the side of the normal.
+/// They are |h| times the cosines of incidence and refraction.
+struct FacetCosines<T> {
+    o: T,
+    i: T,
+}
+
+impl<T: Real> Passage<T> {
+    /// None where a direction lies in the surface.
+    #[inline]
+    fn new(a: &Angles<T>, eta: T) -> Option<Self> {
+        if a.cos_i.re() == 0.0 || a.cos_o.re() == 0.0 {
+            None
+        } else if a.cos_o.re() > 0.0 {
+            Some(Self { a: *a, eta })
+        } else {
+            Some(Self { a: a.flipped(), eta: eta.recip() })
+        }
+    }
+
+    #[inline]
+    fn reflects(&self) -> bool {
+        self.a.cos_i.re() > 0.0
+    }
+
+    /// Scale of `wi` in the half vector.
+    #[inline]
+    fn index(&self) -> T {
+        if self.reflects() { T::one() } else { self.eta }
+    }
+
+    /// None for pairs of directions that no refraction at the front of a microfacet joins.
+    #[inline]
+    fn refraction_cosines(&self) -> Option<FacetCosines<T>> {
+        let n_dot_h = self.a.cos_o.re() + self.eta.re() * self.a.cos_i.re();
+        let side = if n_dot_h < 0.0 { -1.0 } else { 1.0 };
+        let contrast = T::one() - self.eta;
+        let o = (contrast + self.eta * self.a.h2 * 0.5) * side;
+        let i = (contrast - self.a.h2 * 0.5) * side;
+        (o.re() > 0.0 && i.re() > 0.0).then_some(FacetCosines { o, i })
+    }
+
+    /// What the value has besides [`Distribution::facets`]: Fresnel's factor, and `|h|⁴ / 4` in
+    /// reflections or `|h·wo| |h·wi|` in refractions. A function of h2 and eta alone.
+    #[inline]
+    fn facet_share(&self) -> T {
+        let h2 = self.a.h2;
+        if self.reflects() {
+            dielectric_reflected(h2.sqrt() * 0.5, self.eta) * h2.squared() * 0.25
+        } else if let Some(cos) = self.refraction_cosines() {
+            dielectric_transmitted(cos.o, cos.i, self.eta) * cos.o * cos.i
+        } else {
+            T::zero()
+        }
+    }
+}
+
+impl<T: Real> RoughDielectric<T> {
+    #[inline]
+    pub(super) fn value(&self, a: &Angles<T>) -> Rgb<T> {
+        let black = Rgb::splat(T::zero());
+        let Some(passage) = Passage::new(a, self.eta) else { return black };
+        let facets = self.distribution.facets(&passage.a, passage.index(), self.alpha);
+        // Also where |h| = 0, which the rest could not be differentiated at.
+        if facets.re() == 0.0 {
+            return black;
+        }
+        self.colour(passage.reflects()) * (facets * passage.facet_share())
+    }
+
+    #[inline]
+    fn colour(&self, reflects: bool) -> Rgb<T> {
+        if reflects { self.specular_reflectance } else { self.specular_transmittance }
+    }
+}
+
+impl RoughDielectric {
+    #[inline]
+    pub(super) fn slopes(&self, a: &Angles) -> Slopes {
+        let mut s = Slopes::default();
+        let Some(Passage { a: seen, eta }) = Passage::new(a, self.eta) else { return s };
+        let reflects = seen.cos_i > 0.0;
+        let index = if reflects { 1.0 } else { eta };
+        let Some(facets) = self.distribution.facet_slopes(&seen, index, self.alpha) else {
+            return s;
+        };
+        let share = Passage::<Dual<f64, 2>> {
+            a: Angles {
+                cos_o: Dual::from(seen.cos_o),
+                cos_i: Dual::from(seen.cos_i),
+                h2: Dual::variable(seen.h2, 0),
+            },
+            eta: Dual::variable(eta, 1),
+        }
+        .facet_share();
+
+        let colour = self.colour(reflects);
+        // Seen from behind, the cosines are turned over and the index is inverted.
+        let (side, inversion) = if a.cos_o > 0.0 { (1.0, 1.0) } else { (-1.0, -eta * eta) };
+        let by_index = if reflects { 0.0 } else { facets.index * share.re };
+        let value = facets.value * share.re;
+        s.value = colour * value;
+        s.cos_o = colour * (side * facets.cos_o * share.re);
+        s.cos_i = colour * (side * facets.cos_i * share.re);
+        s.h2 = colour * (facets.h2 * share.re + facets.value * share.eps[0]);
+        s.params.alpha = colour * (facets.alpha * share.re);
+        s.params.eta = colour * (inversion * (by_index + facets.value * share.eps[1]));
+        if reflects {
+            s.params.specular_reflectance = Rgb::splat(value);
+        } else {
+            s.params.specular_transmittance = Rgb::splat(value);
+        }
+        s
+    }
+
+    /// Probability of reflecting at a microfacet that reflects the part `fresnel`: by the lobes'
+    /// colours, with a share that ignores them, since a black lobe still has derivatives.
+    #[inline]
+    fn reflection_choice(&self, fresnel: f64) -> f64 {
+        let reflected = fresnel * self.specular_reflectance.mean();
+        let sum = reflected + (1.0 - fresnel) * self.specular_transmittance.mean();
+        let share = if sum > 0.0 { reflected / sum } else { fresnel };
+        0.8 * share + 0.2 * fresnel
+    }
+
+    #[inline]
+    pub(super) fn pdf(&self, a: &Angles) -> f64 {
+        let Some(passage) = Passage::new(a, self.eta) else { return 0.0 };
+        let Passage { a, eta } = passage;
+        let (probability, jacobian) = if passage.reflects() {
+            let fresnel = dielectric_reflected(0.5 * fm::sqrt(a.h2), eta);
+            (self.reflection_choice(fresnel), 0.25 * a.h2 * a.h2)
+        } else if let Some(cos) = passage.refraction_cosines() {
+            let fresnel = 1.0 - dielectric_transmitted(cos.o, cos.i, eta);
+            (1.0 - self.reflection_choice(fresnel), eta * eta * cos.o * cos.i)
+        } else {
+            return 0.0;
+        };
+        probability * jacobian * self.distribution.visible_density(&a, passage.index(), self.alpha)
+    }
+
+    #[inline]
+    pub(super) fn sample(&self, from: Vec3, n: Vec3, u: [f64; 3]) -> Option<Vec3> {
+        let (n, eta) = self.seen_from(from, n)?;
+        let m = self.distribution.sample_visible(from, n, self.alpha, [u[0], u[1]]);
+        let cos = m.dot(from);
+        if cos <= 0.0 {
+            return None;
+        }
+        let reflects = u[2] < self.reflection_choice(dielectric_reflected(cos, eta));
+        let w = if reflects { mirrored(from, m) } else { refracted(from, m, eta)?.0 };
+        // A reflection to the far side, or a refraction to the near one, has left the model.
+        (reflects == (n.dot(w) > 0.0)).then_some(w)
+    }
+
+    /// With the rate of its index by that of the material.
+    #[inline]
+    pub(super) fn facet(&self, [wo, wi, n]: [Vec3; 3]) -> Option<(Facet, f64)> {
+        let (side, eta) = self.seen_from(wo, n)?;
+        let index = (side.dot(wi) < 0.0).then_some(eta);
+        let by_eta = match index {
+            None => 0.0,
+            Some(_) if side == n => 1.0,
+            Some(eta) => -eta * eta,
+        };
+        Some((Facet::new((self.distribution, self.alpha), [wo, wi, side], index), by_eta))
+    }
+
+    /// The normal on the side of a direction, and the index beyond over the one on that side.
+    #[inline]
+    fn seen_from(&self, from: Vec3, n: Vec3) -> Option<(Vec3, f64)> {
+        let side = n.dot(from);
+        if side > 0.0 {
+            Some((n, self.eta))
+        } else if side < 0.0 {
+            Some((-n, 1.0 / self.eta))
+        } else {
+            None
+        }
+    }
+
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Alpha => Some(Slot::Scalar(&mut self.alpha)),
+            Property::Eta => Some(Slot::Scalar(&mut self.eta)),
+            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
+            Property::SpecularTransmittance => Some(Slot::Color(&mut self.specular_transmittance)),
+            _ => None,
+        }
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+        in_range(Property::Alpha, self.alpha, self.alpha >= LEAST_ALPHA, "at least 1e-4")?;
+        let contrast = (self.eta - 1.0).abs();
+        let allowed = self.eta > 0.0 && contrast >= LEAST_CONTRAST;
+        in_range(Property::Eta, self.eta, allowed, "positive and not 1 (use a null BSDF there)")?;
+        nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
+        nonnegative(Property::SpecularTransmittance, self.specular_transmittance)
+    }
+}

@@ -1,0 +1,308 @@
+//! How surfaces scatter light: values, sampling, densities and derivatives.
+//!
+//! Conventions: `wo` points towards the camera side, `wi` towards the light side, both away from the
+//! surface; `n` is the shading normal; all three have length one. The geometric normal plays no
+//! part: telling which side of the true surface a direction is on is the caller's. Values *include*
+//! the cosine at the light, `fs(wo, wi) |n·wi|`, and transport radiance: a refraction carries the
+//! squared ratio of the indices on the sides of `wo` and `wi`. Nothing here is a delta function, but
+//! for [`Bsdf::Null`], which scatters nothing and which light crosses unchanged.
+//!
+//! The models, their parameters and their defaults are those of the Mitsuba plugins `diffuse`,
+//! `phong`, `roughconductor`, `roughdielectric`, `twosided` and `null`.
+//!
+//! ```
+//! use drt_estimators::surface::{Bsdf, Given, RoughConductor};
+//! use drt_math::{Rgb, Vec3, vec3};
+//!
+//! let metal = Bsdf::RoughConductor(RoughConductor { alpha: 0.3, ..Default::default() });
+//! metal.validate()?;
+//! let (n, wo) = (Vec3::Z, vec3(0.6, 0.0, 0.8));
+//! let s = metal.sample(wo, n, [0.3, 0.7, 0.5], Given::Wo).expect("not lost below the surface");
+//! assert_eq!(s.pdf, metal.pdf(wo, s.w, n, Given::Wo));
+//!
+//! // How the value answers to a sharper surface, and to a light direction that turns.
+//! let g = metal.gradient(wo, s.w, n);
+//! assert_eq!(g.value, metal.eval(wo, s.w, n));
+//! let velocity = Vec3::Y.reject(s.w);
+//! let rate: Rgb = g.wi.dot(velocity) + g.params.alpha * -0.01;
+//! assert!(rate.is_finite());
+//! # Ok::<(), drt_estimators::surface::SurfaceError>(())
+//! ```
+
+mod angles;
+mod change;
+mod conductor;
+mod counterpart;
+mod dielectric;
+mod diffuse;
+mod facet;
+mod fresnel;
+mod lobes;
+mod microfacet;
+mod opposite;
+mod phong;
+mod property;
+#[cfg(test)]
+pub(crate) mod tests;
+mod visible_slope;
+
+use alloc::boxed::Box;
+
+use drt_math::{Rgb, RgbVec, Vec3, fm};
+
+use crate::model::surface::angles::{Angles, Slopes};
+pub use crate::model::surface::change::{BsdfChange, BsdfParams, BsdfTangent};
+pub use crate::model::surface::conductor::RoughConductor;
+pub(crate) use crate::model::surface::counterpart::Counterpart;
+pub use crate::model::surface::dielectric::RoughDielectric;
+pub use crate::model::surface::diffuse::Diffuse;
+use crate::model::surface::facet::Facet;
+pub(crate) use crate::model::surface::lobes::{Lobe, Lobes};
+pub use crate::model::surface::microfacet::Distribution;
+pub(crate) use crate::model::surface::opposite::{Opposite, Turn};
+pub use crate::model::surface::phong::Phong;
+pub use crate::model::surface::property::{Property, SurfaceError};
+
+/// A bidirectional scattering distribution function.
+///
+/// Fields are plain data: [`Bsdf::validate`] says whether they make sense, and everything else
+/// relies on it.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Bsdf {
+    /// No surface at all: the border of a medium.
+    Null,
+    /// A Lambertian reflector.
+    Diffuse(Diffuse),
+    /// A modified Phong reflector.
+    Phong(Phong),
+    /// A rough metal.
+    RoughConductor(RoughConductor),
+    /// A rough interface of two transparent media.
+    RoughDielectric(RoughDielectric),
+    /// A reflector on both sides.
+    TwoSided(Box<TwoSided>),
+}
+
+/// One-sided reflectors used on both sides of a surface: from behind, the normal is turned over.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct TwoSided {
+    /// The side the normal points to.
+    pub front: Bsdf,
+    /// The other side; `None` for the same again.
+    pub back: Option<Bsdf>,
+}
+
+/// Which of the two directions a sample starts from.
+///
+/// For every model here the same density serves both walks, as all of them treat the two
+/// directions alike up to the factors a weight contains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Given {
+    /// `wo` is known and `wi` drawn: a walk from the camera.
+    Wo,
+    /// `wi` is known and `wo` drawn: a walk from a light.
+    Wi,
+}
+
+/// A direction drawn at random.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DirectionSample {
+    /// The direction, away from the surface, of length one.
+    pub w: Vec3,
+    /// Its density per steradian; positive and finite.
+    pub pdf: f64,
+}
+
+/// A value `fs(wo, wi) |n·wi|` with its derivatives.
+///
+/// Derivatives with respect to the three vectors are those of one smooth extension of the value to
+/// vectors of any length. Only their contraction with velocities that keep the length, orthogonal
+/// to the respective vector, has a meaning of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BsdfGradient {
+    /// The value, as [`Bsdf::eval`] gives it.
+    pub value: Rgb,
+    /// Derivative with respect to `wo`.
+    pub wo: RgbVec,
+    /// Derivative with respect to `wi`.
+    pub wi: RgbVec,
+    /// Derivative with respect to the shading normal.
+    pub n: RgbVec,
+    /// Derivative with respect to the material's properties.
+    pub params: BsdfParams,
+}
+
+/// Applies an expression to the model of a one-sided BSDF, another to anything else.
+macro_rules! match_model {
+    ($bsdf:expr, $model:ident => $body:expr, _ => $nothing:expr) => {
+        match $bsdf {
+            Bsdf::Diffuse($model) => $body,
+            Bsdf::Phong($model) => $body,
+            Bsdf::RoughConductor($model) => $body,
+            Bsdf::RoughDielectric($model) => $body,
+            Bsdf::Null | Bsdf::TwoSided(_) => $nothing,
+        }
+    };
+}
+
+impl Bsdf {
+    /// True when nothing is scattered, as of now: a null interface, or no reflectance on any side.
+    #[must_use]
+    pub(crate) fn is_black(&self) -> bool {
+        match self {
+            Self::Null => true,
+            Self::Diffuse(d) => d.reflectance.is_zero(),
+            Self::TwoSided(t) => t.front.is_black() && t.back.as_ref().is_none_or(Self::is_black),
+            _ => false,
+        }
+    }
+
+    /// The value `fs(wo, wi) |n·wi|` per channel; zero where the model is black.
+    #[inline]
+    #[must_use]
+    pub fn eval(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
+        let (bsdf, n) = self.facing(wo, n);
+        match_model!(bsdf, b => b.value(&Angles::new(wo, wi, n)), _ => Rgb::ZERO)
+    }
+
+    /// The value and all its derivatives.
+    #[inline]
+    #[must_use]
+    pub fn gradient(&self, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        let (bsdf, facing) = self.facing(wo, n);
+        let angles = Angles::new(wo, wi, facing);
+        let slopes = match_model!(bsdf, b => b.slopes(&angles), _ => Slopes::default());
+        let mut gradient = slopes.pull_back(wo, wi, facing);
+        if facing != n {
+            gradient.n = -gradient.n;
+        }
+        gradient
+    }
+
+    /// Draws the direction that `from` is scattered to, or `None` for a sample lost below the
+    /// surface (or a BSDF that scatters nothing).
+    ///
+    /// `u` holds independent uniform numbers of (0, 1); the last one chooses between lobes. The
+    /// density is positive wherever the value, or its derivative with respect to a property, is not
+    /// zero, even where the property itself is.
+    #[inline]
+    #[must_use]
+    pub fn sample(
+        &self,
+        from: Vec3,
+        n: Vec3,
+        u: [f64; 3],
+        given: Given,
+    ) -> Option<DirectionSample> {
+        let (bsdf, facing) = self.facing(from, n);
+        let w = match_model!(bsdf, b => b.sample(from, facing, u), _ => None)?;
+        let pdf = self.pdf(from, w, n, given);
+        (pdf > 0.0 && pdf.is_finite()).then_some(DirectionSample { w, pdf })
+    }
+
+    /// Density per steradian with which [`Bsdf::sample`] draws `to`.
+    #[inline]
+    #[must_use]
+    pub fn pdf(&self, from: Vec3, to: Vec3, n: Vec3, _given: Given) -> f64 {
+        let (bsdf, n) = self.facing(from, n);
+        match_model!(bsdf, b => b.pdf(&Angles::new(from, to, n)), _ => 0.0)
+    }
+
+    /// The [`Counterpart`] of `wi` as the surface gets rougher, if it has one.
+    #[inline]
+    pub(crate) fn counterpart(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Counterpart> {
+        Counterpart::new(&self.facet(wo, wi, n)?.0)
+    }
+
+    /// The [`Opposite`] of `wi` in its lobe, if it has one.
+    #[inline]
+    pub(crate) fn opposite(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Opposite> {
+        let (facet, by_eta) = self.facet(wo, wi, n)?;
+        Opposite::new(&facet, n, by_eta)
+    }
+
+    /// The microfacets that scatter so, and the rate of their index of refraction by that of the material.
+    fn facet(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<(Facet, f64)> {
+        let (bsdf, n) = self.facing(wo, n);
+        match bsdf {
+            Self::RoughConductor(b) => Some((b.facet([wo, wi, n]), 0.0)),
+            Self::RoughDielectric(b) => b.facet([wo, wi, n]),
+            _ => None,
+        }
+    }
+
+    /// True for the border of a medium that light crosses unchanged.
+    #[inline]
+    #[must_use]
+    pub fn is_null(&self) -> bool {
+        matches!(self, Self::Null)
+    }
+
+    /// True when light is scattered through the surface, to the other side; not for [`Bsdf::Null`],
+    /// which scatters nothing.
+    #[inline]
+    #[must_use]
+    pub fn is_transmissive(&self) -> bool {
+        matches!(self, Self::RoughDielectric(_))
+    }
+
+    /// True when nothing is scattered where both directions are on the back of the surface.
+    pub(crate) fn is_black_from_behind(&self) -> bool {
+        matches!(self, Self::Diffuse(_) | Self::Phong(_) | Self::RoughConductor(_))
+    }
+
+    /// About how far the half vector of its sharpest lobe is from the normal, in slopes; at most 1.
+    pub(crate) fn lobe_width(&self) -> f64 {
+        let width = match self {
+            Self::Null | Self::Diffuse(_) => 1.0,
+            Self::Phong(b) => 1.0 / fm::sqrt(1.0 + 0.5 * b.exponent),
+            Self::RoughConductor(b) => b.alpha,
+            Self::RoughDielectric(b) => b.alpha,
+            Self::TwoSided(b) => {
+                let back = b.back.as_ref().map_or(1.0, Self::lobe_width);
+                f64::min(b.front.lobe_width(), back)
+            }
+        };
+        f64::min(width, 1.0)
+    }
+
+    /// The name of the plugin this BSDF follows.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Null => "null",
+            Self::Diffuse(_) => "diffuse",
+            Self::Phong(_) => "phong",
+            Self::RoughConductor(_) => "roughconductor",
+            Self::RoughDielectric(_) => "roughdielectric",
+            Self::TwoSided(_) => "twosided",
+        }
+    }
+
+    /// Checks every number.
+    ///
+    /// # Errors
+    /// The first property out of its range, or a two-sided BSDF around anything but a reflector.
+    pub fn validate(&self) -> Result<(), SurfaceError> {
+        if let Self::TwoSided(b) = self {
+            return [Some(&b.front), b.back.as_ref()].into_iter().flatten().try_for_each(|side| {
+                match side {
+                    Self::Null | Self::RoughDielectric(_) | Self::TwoSided(_) => {
+                        Err(SurfaceError::NotReflective { bsdf: side.name() })
+                    }
+                    reflector => reflector.validate(),
+                }
+            });
+        }
+        match_model!(self, b => b.validate(), _ => Ok(()))
+    }
+
+    /// The one-sided BSDF that a direction meets, and the normal it goes with.
+    #[inline]
+    fn facing(&self, from: Vec3, n: Vec3) -> (&Self, Vec3) {
+        let Self::TwoSided(b) = self else { return (self, n) };
+        if n.dot(from) >= 0.0 { (&b.front, n) } else { (b.back.as_ref().unwrap_or(&b.front), -n) }
+    }
+}

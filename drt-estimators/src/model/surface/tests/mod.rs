@@ -1,0 +1,134 @@
+//! Every model is judged as the same list of cases, from the same directions.
+
+mod changes;
+mod counterparts;
+mod energy;
+mod formulas;
+mod gradients;
+mod lobes;
+mod opposites;
+mod sampling;
+
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use drt_math::{Real, Rgb, Rng, Vec3, vec3, warp};
+
+use crate::model::surface::angles::Angles;
+use crate::model::surface::*;
+
+/// The value of a BSDF over another scalar, by the generic code of `eval`: `lift` turns the value of
+/// a property into one of that scalar (a number's into three equal ones).
+pub(crate) fn value_over<T: Real>(
+    bsdf: &Bsdf,
+    wo: Vec3<T>,
+    wi: Vec3<T>,
+    n: Vec3<T>,
+    lift: &mut impl FnMut(Property, Rgb) -> Rgb<T>,
+) -> Rgb<T> {
+    let a = Angles::new(wo, wi, n);
+    match bsdf {
+        Bsdf::Null => Rgb::splat(T::zero()),
+        Bsdf::Diffuse(b) => {
+            Diffuse { reflectance: lift(Property::Reflectance, b.reflectance) }.value(&a)
+        }
+        Bsdf::Phong(b) => Phong {
+            reflectance: lift(Property::Reflectance, b.reflectance),
+            specular_reflectance: lift(Property::SpecularReflectance, b.specular_reflectance),
+            exponent: lift(Property::Exponent, Rgb::splat(b.exponent)).r,
+        }
+        .value(&a),
+        Bsdf::RoughConductor(b) => RoughConductor {
+            distribution: b.distribution,
+            alpha: lift(Property::Alpha, Rgb::splat(b.alpha)).r,
+            eta: lift(Property::Eta, b.eta),
+            k: lift(Property::K, b.k),
+            specular_reflectance: lift(Property::SpecularReflectance, b.specular_reflectance),
+        }
+        .value(&a),
+        Bsdf::RoughDielectric(b) => RoughDielectric {
+            distribution: b.distribution,
+            alpha: lift(Property::Alpha, Rgb::splat(b.alpha)).r,
+            eta: lift(Property::Eta, Rgb::splat(b.eta)).r,
+            specular_reflectance: lift(Property::SpecularReflectance, b.specular_reflectance),
+            specular_transmittance: lift(Property::SpecularTransmittance, b.specular_transmittance),
+        }
+        .value(&a),
+        Bsdf::TwoSided(b) if a.cos_o.re() >= 0.0 => value_over(&b.front, wo, wi, n, lift),
+        Bsdf::TwoSided(b) => value_over(b.back.as_ref().unwrap_or(&b.front), wo, wi, -n, lift),
+    }
+}
+
+/// A normal along no axis.
+fn normal() -> Vec3 {
+    vec3(0.48, -0.6, 0.64)
+}
+
+/// The direction at a polar angle in degrees from [`normal`], at some azimuth.
+fn tilted(degrees: f64) -> Vec3 {
+    let frame = drt_math::Frame::from_normal(normal());
+    let (polar, azimuth) = (degrees.to_radians(), 0.7_f64);
+    let (sin, cos) = polar.sin_cos();
+    frame.to_world(vec3(sin * azimuth.cos(), sin * azimuth.sin(), cos))
+}
+
+fn random_direction(rng: &mut Rng) -> Vec3 {
+    warp::uniform_sphere(rng.next_2d())
+}
+
+fn random_3d(rng: &mut Rng) -> [f64; 3] {
+    [rng.next_f64(), rng.next_f64(), rng.next_f64()]
+}
+
+fn copper(distribution: Distribution, alpha: f64) -> RoughConductor {
+    RoughConductor {
+        distribution,
+        alpha,
+        eta: Rgb::new(0.2, 0.92, 1.1),
+        k: Rgb::new(3.91, 2.45, 2.14),
+        specular_reflectance: Rgb::new(1.0, 0.9, 0.8),
+    }
+}
+
+fn glass(distribution: Distribution, alpha: f64, eta: f64) -> RoughDielectric {
+    RoughDielectric { distribution, alpha, eta, ..Default::default() }
+}
+
+/// All models, smooth enough for quadrature.
+fn cases() -> Vec<Bsdf> {
+    use Distribution::{Beckmann, Ggx};
+    let phong = Phong { reflectance: Rgb::new(0.5, 0.3, 0.1), ..Default::default() };
+    let copper_front = TwoSided {
+        front: Bsdf::RoughConductor(copper(Ggx, 0.4)),
+        back: Some(Bsdf::Diffuse(Diffuse::default())),
+    };
+    alloc::vec![
+        Bsdf::Diffuse(Diffuse::default()),
+        Bsdf::Phong(phong),
+        Bsdf::Phong(Phong { specular_reflectance: Rgb::ZERO, exponent: 2.5, ..phong }),
+        Bsdf::RoughConductor(RoughConductor::default()),
+        Bsdf::RoughConductor(copper(Beckmann, 0.5)),
+        Bsdf::RoughConductor(copper(Ggx, 0.2)),
+        Bsdf::RoughDielectric(glass(Beckmann, 0.3, 1.5)),
+        Bsdf::RoughDielectric(glass(Ggx, 0.2, 1.2)),
+        Bsdf::RoughDielectric(glass(Beckmann, 0.2, 1.0 / 1.33)),
+        Bsdf::RoughDielectric(RoughDielectric {
+            specular_transmittance: Rgb::ZERO,
+            ..glass(Ggx, 0.5, 1.8)
+        }),
+        Bsdf::TwoSided(Box::new(TwoSided { front: Bsdf::Phong(phong), back: None })),
+        Bsdf::TwoSided(Box::new(copper_front)),
+    ]
+}
+
+/// Mirror-like surfaces, too sharp for quadrature.
+fn sharp_cases() -> Vec<Bsdf> {
+    let mut cases = Vec::new();
+    for distribution in [Distribution::Beckmann, Distribution::Ggx] {
+        for alpha in [1e-3, 1e-2] {
+            cases.push(Bsdf::RoughConductor(copper(distribution, alpha)));
+            cases.push(Bsdf::RoughDielectric(glass(distribution, alpha, 1.5)));
+        }
+    }
+    cases
+}

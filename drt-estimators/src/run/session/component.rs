@@ -1,0 +1,155 @@
+//! One estimator's part of a run: what it differentiates of which light.
+
+use alloc::vec::Vec;
+
+use crate::Error;
+use crate::derivative::contraction::{Contraction, Motion};
+use crate::derivative::medium_motion::MediumMotions;
+use crate::derivative::sensitivity::Interest;
+use crate::derivative::tangents::Tangents;
+use crate::model::plan::Plan;
+use crate::model::rendering::{Account, Layer, Term};
+use crate::model::settings::{EstimatorKind, Settings};
+use crate::run::session::describe::describe;
+use crate::run::session::pass::Pass;
+use crate::run::session::pilot::primary_share;
+use crate::sampling::film::{BATCHES, SplatFilm};
+use crate::terms::interior;
+use crate::terms::prepared::Prepared;
+use crate::terms::splatting::{Checked, ToImages};
+use crate::world::World;
+use crate::world::cache::Kept;
+
+/// A scene prepared for one estimator, and its boundary terms so far.
+pub(super) struct Component {
+    pub(super) prepared: Prepared,
+    pub(super) motion: Option<Motion>,
+    pub(super) plan: Plan,
+    /// One film per source of boundary samples, with a layer per parameter.
+    splats: Vec<SplatFilm>,
+}
+
+impl Component {
+    /// Prepares a world at the parameters' values for the light that it is lit by.
+    pub(super) fn new(
+        mut world: World,
+        mut tangents: Tangents,
+        settings: &Settings,
+        kept: &mut Kept,
+    ) -> Result<Self, Error> {
+        for (e, emitter) in world.scene.emitters.iter().enumerate() {
+            if !world.lit.by(&emitter.item.emitter) {
+                tangents.emitters[e].clear();
+            }
+        }
+        let mut motion = None;
+        if !tangents.names.is_empty() {
+            let insides = match settings.estimator {
+                EstimatorKind::Radiative => {
+                    MediumMotions::affine(&world, &tangents, &settings.insides)
+                }
+                _ => MediumMotions::plan(&world, &tangents, &settings.insides, kept)?,
+            };
+            motion = Some(Motion::new(tangents, insides));
+        }
+        if let Some(motion) = &motion {
+            world.prepare_for_derivatives(motion.needs());
+        }
+        let nothing = Interest::default();
+        let interest = motion.as_ref().map_or(&nothing, |m| &m.interest);
+        let flux_shapes = motion.as_ref().map_or(&[][..], |m| &m.insides.flux_shapes);
+        let guide = motion.as_ref().filter(|_| settings.guiding);
+        let mut prepared = Prepared::new(world, interest, flux_shapes, settings, guide)?;
+        // Else the pilot of a run measures more.
+        let measures = !settings.adaptive || settings.boundary_spp.is_some();
+        if let Some(motion) = guide.filter(|_| measures) {
+            prepared.primary_share = primary_share(&prepared, motion, prepared.boundary_ratio);
+        }
+        let plan = describe(&prepared, motion.as_ref());
+        let parameters = motion.as_ref().map_or(0, Motion::parameters);
+        let size = prepared.world.camera.film();
+        let splats = prepared.sources.iter().map(|_| SplatFilm::new(size, parameters)).collect();
+        Ok(Self { prepared, motion, plan, splats })
+    }
+
+    /// Forgets what has been accumulated.
+    pub(super) fn clear(&mut self) {
+        self.splats.iter_mut().for_each(SplatFilm::clear);
+    }
+
+    /// Its part in the derivatives of paths, if there are any; with so many edge queries to each path, where
+    /// that is known better.
+    pub(super) fn of_paths(
+        &self,
+        queries: Option<f64>,
+    ) -> Option<interior::Component<'_, Contraction<'_>>> {
+        let world = &self.prepared.world;
+        let mut along = self.prepared.along_rays();
+        along.looks = along.looks.or_average(queries);
+        let sink = Contraction::new(world, self.motion.as_ref()?);
+        Some(interior::Component { world, along, sink })
+    }
+
+    /// Adds samples of one source of boundary samples, so many per pixel; false when cancelled.
+    pub(super) fn run_source(
+        &mut self,
+        i: usize,
+        seed: u64,
+        per_pixel: f64,
+        pass: &Pass<'_>,
+        progress: impl Fn(f64),
+    ) -> (Account, bool) {
+        let mut film = core::mem::take(&mut self.splats[i]);
+        let result = self.sample_source(&mut film, i, seed, per_pixel, pass, progress);
+        self.splats[i] = film;
+        result
+    }
+
+    /// The same to a `film`, in as many batches as error bars need.
+    pub(super) fn sample_source(
+        &self,
+        film: &mut SplatFilm,
+        i: usize,
+        seed: u64,
+        per_pixel: f64,
+        pass: &Pass<'_>,
+        progress: impl Fn(f64),
+    ) -> (Account, bool) {
+        let (mut account, mut finished) = (Account::default(), 0.0);
+        let Some(motion) = &self.motion else { return (account, true) };
+        let source = self.prepared.sources[i];
+        let per_batch = self.prepared.samples_per_batch(per_pixel);
+        let splatter = self.prepared.splatter(seed);
+        let mut sums = film.begin();
+        let first = pass.before * BATCHES as u32;
+        let going = pass.pool.ordered(
+            first..first + BATCHES as u32,
+            1,
+            |b| {
+                let mut receiver = Checked::new(ToImages::new(&self.prepared.world, motion));
+                let stream = source.stream() + u64::from(b);
+                let account = splatter.run(source, stream, per_batch, &mut receiver);
+                (receiver.inner.splats.settled(), account)
+            },
+            |b, (splats, of_batch)| {
+                sums.add(&splats, f64::from(per_batch), pass.blocks);
+                account.add(of_batch);
+                finished += f64::from(per_batch);
+                progress(f64::from(b - first + 1) / BATCHES as f64);
+                !pass.control.cancelled()
+            },
+        );
+        film.finish(&sums, finished);
+        (account, going)
+    }
+
+    /// The boundary terms so far of a parameter.
+    pub(super) fn boundary_layers<'a>(
+        &'a self,
+        parameter: usize,
+        pass_blocks: &'a crate::sampling::film::Blocks,
+    ) -> impl Iterator<Item = (Term, Layer)> + 'a {
+        let terms = self.prepared.sources.iter().zip(&self.splats);
+        terms.map(move |(source, film)| (source.term(), film.layer(parameter, pass_blocks)))
+    }
+}

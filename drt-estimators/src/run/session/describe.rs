@@ -1,0 +1,96 @@
+//! What a prepared scene's plan says.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use crate::derivative::contraction::Motion;
+use crate::model::plan::{MediumPlan, Plan};
+use crate::terms::boundary::Strategy;
+use crate::terms::prepared::Prepared;
+use crate::terms::splatting::Source;
+use crate::world::World;
+use crate::world::lights::Lit;
+
+pub(super) fn describe(prepared: &Prepared, motion: Option<&Motion>) -> Plan {
+    let world = &prepared.world;
+    let has = |s: Source| prepared.sources.contains(&s);
+    let radiative = prepared.radiative.as_ref();
+    let light = match world.lit {
+        Lit::All => "all light",
+        Lit::Extended => "light of surfaces, media and the sky",
+        Lit::Delta => "light of points and directions",
+    };
+    let estimator = if radiative.is_some() { "radiative" } else { "path-space" };
+    let sees_edges = radiative.is_some_and(|r| r.has_edges(world));
+    let mut plan = Plan {
+        media: (0..world.scene.media.len()).map(|i| medium_plan(world, motion, i)).collect(),
+        edges: radiative.map_or(prepared.boundary.count, |r| r.count),
+        primary: has(Source::Edges(Strategy::Primary)) || has(Source::Outlines),
+        direct: has(Source::Edges(Strategy::Direct))
+            || prepared.boundary.shadows.is_some()
+            || sees_edges,
+        indirect: has(Source::Edges(Strategy::Indirect)) || sees_edges,
+        borders: has(Source::Borders),
+        antithetic: prepared.antithetic,
+        ..Plan::default()
+    };
+    let mut skip = |what: &str| plan.skipped.push(String::from(what));
+    if !world.has_media() {
+        skip("tracking: the scene has no media");
+    }
+    let Some(motion) = motion else {
+        skip("derivatives: there are no parameters");
+        return plan;
+    };
+    for (i, reason) in motion.insides.unfilled.iter().enumerate() {
+        if let Some(reason) = reason {
+            skip(&alloc::format!("tetrahedra in {}: {reason}", medium_name(world, i)));
+        }
+    }
+    if !motion.interest.moves_geometry() {
+        skip("boundary terms: no parameter moves geometry");
+    }
+    if prepared.flux.is_none() {
+        skip("flux: every inside follows its surfaces");
+    }
+    plan.estimators = alloc::vec![alloc::format!("{estimator}, {light}")];
+    plan.record = motion.interest.any();
+    plan.moving_shapes = motion
+        .interest
+        .shapes
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| **m)
+        .map(|(i, _)| world.shape_name(i))
+        .collect();
+    plan.flux_shapes = motion.insides.flux_shapes.iter().map(|s| world.shape_name(*s)).collect();
+    plan
+}
+
+fn medium_plan(world: &World, motion: Option<&Motion>, i: usize) -> MediumPlan {
+    let item = &world.scene.media[i];
+    let tracking = match item.item.homogeneous() {
+        Some(_) => "closed form",
+        None => "delta tracking",
+    };
+    let motions = motion.map_or_else(Vec::new, |m| {
+        let insides = &m.insides;
+        (0..m.parameters())
+            .filter_map(|p| {
+                let inside = insides.velocities[i].iter().find(|(q, _)| *q == p).map(|(_, m)| m);
+                let name = inside.map_or("static", |v| v.name());
+                let how = match (inside, insides.flux[i].contains(&p)) {
+                    (None, false) => return None,
+                    (_, false) => String::from(name),
+                    (_, true) => alloc::format!("{name} with flux"),
+                };
+                Some((m.tangents.names[p].clone(), how))
+            })
+            .collect()
+    });
+    MediumPlan { medium: medium_name(world, i), tracking: tracking.into(), motion: motions }
+}
+
+fn medium_name(world: &World, i: usize) -> String {
+    world.scene.media[i].id.clone().unwrap_or_else(|| alloc::format!("medium[{i}]"))
+}

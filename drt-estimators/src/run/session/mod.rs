@@ -1,0 +1,369 @@
+//! A run: a scene prepared once, sampled in passes, with its results available at any time.
+
+mod component;
+mod describe;
+mod pass;
+mod pilot;
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_motion::Parameter;
+
+use crate::run::session::component::Component;
+use crate::run::session::pass::Pass;
+use crate::run::session::pilot::Pilot;
+
+use crate::derivative::tangents;
+use crate::derivative::tangents::Tangents;
+use crate::model::plan::Plan;
+use crate::model::rendering::{Account, Derivative, Layer, Rendering, Term};
+use crate::model::scene::{Scene, Target};
+use crate::model::settings::{EstimatorKind, Settings};
+use crate::sampling::allocation;
+use crate::sampling::film::{Blocks, PixelFilm};
+use crate::sampling::parallel::Pool;
+use crate::sampling::pixels::Filling;
+use crate::terms::interior::PixelSampler;
+use crate::world::World;
+use crate::world::cache::Kept;
+use crate::world::lights::Lit;
+use crate::{Error, Estimate};
+
+/// Watches and steers a run. Every method has a default that does nothing.
+pub trait Control: Sync {
+    /// True to stop soon; what is finished is kept.
+    fn cancelled(&self) -> bool {
+        false
+    }
+    /// Called with the part of the current call to [`Session::run`] that is done, from 0 to 1.
+    fn progress(&self, _done: f64) {}
+    /// Called with each finished piece of the image, in order.
+    fn tile(&self, _tile: &FinishedTile<'_>) {}
+}
+
+/// No control: run to the end in silence.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unattended;
+impl Control for Unattended {}
+
+/// Some neighbouring pixels after another round of samples.
+#[derive(Clone, Copy, Debug)]
+pub struct FinishedTile<'a> {
+    /// First pixel and one past the last, row by row from the top left.
+    pub pixels: (u32, u32),
+    /// The forward image there so far.
+    pub image: &'a [Estimate],
+}
+
+/// A prepared scene and what has been accumulated for it.
+pub struct Session {
+    /// By all light, for paths.
+    world: World,
+    /// Each differentiates the light of some emitters.
+    components: Vec<Component>,
+    settings: Settings,
+    plan: Plan,
+    /// The image, and the terms of derivatives that are found along paths.
+    film: PixelFilm,
+    pilot: Option<Pilot>,
+    account: Account,
+    blocks: Arc<Blocks>,
+    samples: u32,
+    passes: u32,
+    complete: bool,
+    pool: Arc<Pool>,
+}
+
+/// Between the seeds of the boundary samples of components, whose errors must not depend on each other.
+const SEED_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// The seed of a component's boundary samples.
+pub(crate) fn seed_of_component(seed: u64, i: usize) -> u64 {
+    seed.wrapping_add(SEED_STEP.wrapping_mul(i as u64))
+}
+
+impl Session {
+    /// Prepares `scene` at the parameters' values; without parameters, only the image is computed.
+    ///
+    /// # Errors
+    /// When an effect does not fit its target, or the scene or a setting is unusable.
+    pub fn new(
+        scene: &Scene,
+        parameters: &[Parameter],
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        scene.check()?;
+        let (scene, tangents) = tangents::apply(scene, parameters)?;
+        Self::prepared(&scene, &tangents, settings, &mut Kept::default())
+    }
+
+    /// Prepares a scene at the parameters' values, with what earlier ones left to be used again.
+    pub(crate) fn prepared(
+        scene: &Scene,
+        tangents: &Tangents,
+        settings: &Settings,
+        kept: &mut Kept,
+    ) -> Result<Self, Error> {
+        settings.check()?;
+        let tangents = tangents.seen_by(settings.sensor);
+        let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
+        let mut world = World::new(scene.clone(), settings.sensor, depth, None, Lit::All, kept)?;
+        let mut components = Vec::new();
+        for (settings, lit) in estimators(scene, tangents.targets(), settings) {
+            let world = world.lit_by(lit)?;
+            components.push(Component::new(world, tangents.clone(), &settings, kept)?);
+        }
+        let needs = components.iter().filter_map(|c| Some(c.motion.as_ref()?.needs()));
+        if let Some(needs) = needs.reduce(|all, needs| all.union(&needs)) {
+            world.prepare_for_derivatives(needs);
+        }
+        let plan = Plan::together(components.iter().map(|c| &c.plan));
+        let size = world.camera.film();
+        let mut session = Self {
+            film: PixelFilm::new(size, 1),
+            blocks: Arc::new(Blocks::new(size)),
+            pool: Arc::new(Pool::new(settings.threads)),
+            settings: settings.clone(),
+            pilot: None,
+            account: Account::default(),
+            samples: 0,
+            passes: 0,
+            complete: true,
+            world,
+            components,
+            plan,
+        };
+        session.film = PixelFilm::new(size, session.layers(settings.terms));
+        Ok(session)
+    }
+
+    /// What will run and what is skipped.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Forgets all images, and goes on as if prepared with this seed: what comes is independent of what
+    /// was.
+    pub fn restart(&mut self, seed: u64) {
+        self.film.clear();
+        self.components.iter_mut().for_each(Component::clear);
+        (self.pilot, self.account) = (None, Account::default());
+        self.settings.seed = seed;
+        (self.samples, self.passes, self.complete) = (0, 0, true);
+    }
+
+    /// Adds `spp` samples per pixel, and boundary samples in proportion. Returns false when `control`
+    /// cancelled it; the result then holds what was finished.
+    pub fn run(&mut self, spp: u32, control: &dyn Control) -> bool {
+        let (pool, blocks) = (Arc::clone(&self.pool), Arc::clone(&self.blocks));
+        let pass = Pass { pool: &pool, blocks: &blocks, spp, before: self.passes, control };
+        let (samples, going) = self.run_pass(&pass);
+        self.samples += samples;
+        self.passes += 1;
+        self.complete &= going;
+        going
+    }
+
+    /// Returns how many samples each pixel took, and false when it was cancelled.
+    fn run_pass(&mut self, pass: &Pass<'_>) -> (u32, bool) {
+        let units = pass.spp.div_ceil(self.per_unit());
+        let sources = self.sources();
+        // The part of the work that is done when the pixels are.
+        let part = if sources.is_empty() { 1.0 } else { 0.5 };
+        let done = self.run_pixels(pass, units, |done| pass.control.progress(part * done));
+        let mut going = done == units;
+        for (k, (c, i)) in sources.iter().copied().enumerate() {
+            if !going {
+                break;
+            }
+            let seed = seed_of_component(self.settings.seed, c);
+            let per_pixel = f64::from(pass.spp) * self.source_ratio(c, i);
+            let progress = |done: f64| {
+                let before = (k as f64 + done) / sources.len() as f64;
+                pass.control.progress(part + (1.0 - part) * before);
+            };
+            let (account, finished) =
+                self.components[c].run_source(i, seed, per_pixel, pass, progress);
+            self.account.add(account);
+            going = finished;
+        }
+        (done * self.per_unit(), going)
+    }
+
+    /// Samples every pixel `units` times more, or so on average; returns how often each was.
+    fn run_pixels(&mut self, pass: &Pass<'_>, units: u32, progress: impl Fn(f64)) -> u32 {
+        let wanted = self.settings.adaptive && self.pilot.is_none();
+        let pilot = allocation::pilot(units).filter(|_| wanted).unwrap_or(0);
+        let begun = f64::from(pilot) / f64::from(units.max(1));
+        if pilot > 0 && !self.fly_pilot(pass, pilot, |part| progress(begun * part)) {
+            return 0;
+        }
+        let tile = |film: &PixelFilm, pixels: core::ops::Range<u32>| {
+            let image = film.estimates(pixels.clone());
+            let pixels = (pixels.start, pixels.end);
+            pass.control.tile(&FinishedTile { pixels, image: &image });
+        };
+        let mut film = core::mem::take(&mut self.film);
+        let rest = |part| progress(begun + (1.0 - begun) * part);
+        let (seed, terms) = (self.settings.seed, self.settings.terms);
+        let (account, done) = self.fill(&mut film, seed, terms, pass, units - pilot, tile, rest);
+        self.account.add(account);
+        self.film = film;
+        done + pilot
+    }
+
+    /// Takes samples of pixels; returns how many of each were finished.
+    #[allow(clippy::too_many_arguments)]
+    fn fill(
+        &self,
+        film: &mut PixelFilm,
+        seed: u64,
+        terms: bool,
+        pass: &Pass<'_>,
+        units: u32,
+        tile: impl FnMut(&PixelFilm, core::ops::Range<u32>),
+        progress: impl Fn(f64),
+    ) -> (Account, u32) {
+        let queries = self.pilot.as_ref().and_then(|p| p.budget.as_ref()).map(|b| b.queries);
+        let filling = Filling {
+            pool: pass.pool,
+            seed,
+            allocation: self.pilot.as_ref().map(|p| &p.pixels),
+            sampler: || {
+                let components = self.components.iter().filter_map(|c| c.of_paths(queries));
+                PixelSampler::new(&self.world, components, seed, self.plan.antithetic, terms)
+            },
+        };
+        let mut account = Account::default();
+        let finished = |sampler: PixelSampler<'_, _>, part| {
+            account.add(sampler.account());
+            progress(part);
+            !pass.control.cancelled()
+        };
+        let done = filling.fill(film, units, finished, tile);
+        (account, done)
+    }
+
+    /// Paths of a sample of a pixel.
+    fn per_unit(&self) -> u32 {
+        if self.plan.antithetic { 2 } else { 1 }
+    }
+
+    /// All sources of boundary samples: component, and index among its own.
+    fn sources(&self) -> Vec<(usize, usize)> {
+        let of = |(c, component): (usize, &Component)| {
+            (0..component.prepared.sources.len()).map(move |i| (c, i))
+        };
+        self.components.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// Samples of a source to each of a pixel.
+    fn source_ratio(&self, c: usize, i: usize) -> f64 {
+        let budget = self.pilot.as_ref().and_then(|pilot| pilot.budget.as_ref());
+        budget.map_or_else(
+            || self.components[c].prepared.source_ratio(i),
+            |budget| budget.sources[self.sources().iter().position(|s| *s == (c, i)).unwrap_or(0)],
+        )
+    }
+
+    fn parameters(&self) -> usize {
+        self.components[0].motion.as_ref().map_or(0, |m| m.parameters())
+    }
+
+    /// Terms found along paths, in the order of their layers.
+    fn terms(&self) -> impl Iterator<Item = Term> {
+        self.components.iter().flat_map(|c| c.prepared.along_rays().terms().collect::<Vec<_>>())
+    }
+
+    /// Layers of a pixel's samples: the image, a derivative per parameter, and if terms are kept apart one per
+    /// term and parameter.
+    fn layers(&self, terms: bool) -> usize {
+        let apart = if terms { self.terms().count() } else { 0 };
+        1 + self.parameters() * (1 + apart)
+    }
+
+    /// The images so far.
+    #[must_use]
+    pub fn rendering(&self) -> Rendering {
+        Rendering {
+            image: self.film.layer(0, &self.blocks),
+            derivatives: self.derivatives(),
+            plan: self.plan.clone(),
+            counters: self.account.counters,
+            non_finite: self.account.non_finite_count,
+            non_finite_examples: self.account.non_finite.clone(),
+            spp: self.samples,
+            complete: self.complete,
+        }
+    }
+
+    fn derivatives(&self) -> Vec<Derivative> {
+        let Some(motion) = &self.components[0].motion else { return Vec::new() };
+        let n = motion.parameters();
+        let apart: Vec<Term> = self.terms().filter(|_| self.settings.terms).collect();
+        let layer = |l: usize| self.film.layer(l, &self.blocks);
+        let derivative = |p: usize| {
+            let mut parts = alloc::vec![(Term::Interior, layer(1 + p))];
+            let along = apart.iter().enumerate();
+            parts.extend(along.map(|(i, term)| (*term, layer(1 + (i + 1) * n + p))));
+            for component in &self.components {
+                parts.extend(component.boundary_layers(p, &self.blocks));
+            }
+            let total = sum(parts.iter().map(|(_, l)| l)).unwrap_or_else(|| parts[0].1.clone());
+            let mut terms = Vec::new();
+            if self.settings.terms {
+                for term in Term::ALL {
+                    let own = parts.iter().filter(|(t, _)| *t == term).map(|(_, l)| l);
+                    terms.extend(sum(own).map(|l| (term, l)));
+                }
+            }
+            Derivative { name: motion.tangents.names[p].clone(), total, terms }
+        };
+        (0..n).map(derivative).collect()
+    }
+}
+
+fn sum<'a>(layers: impl Iterator<Item = &'a Layer>) -> Option<Layer> {
+    layers.fold(None, |sum, l| {
+        Some(match sum {
+            None => l.clone(),
+            Some(s) => s.plus(l),
+        })
+    })
+}
+
+/// Which estimator differentiates which light: points and directions do not fit the 2019 form (theory sheet
+/// §3), which leaves them to path space where one of the targets may move.
+pub(crate) fn estimators(
+    scene: &Scene,
+    targets: impl IntoIterator<Item = Target>,
+    settings: &Settings,
+) -> Vec<(Settings, Lit)> {
+    let may_move = |target| match target {
+        Target::Shape(_) | Target::Sensor(_) => true,
+        Target::Bsdf(_) => false,
+        Target::Medium(m) => scene.media.get(m).is_some_and(|m| m.item.homogeneous().is_none()),
+        Target::Emitter(e) => scene.emitters.get(e).is_some_and(|e| e.item.emitter.is_delta()),
+    };
+    let emitters = || scene.emitters.iter().map(|e| &e.item.emitter);
+    let mut shares = Vec::new();
+    if settings.estimator == EstimatorKind::Radiative
+        && emitters().any(|e| e.is_delta())
+        && targets.into_iter().any(may_move)
+    {
+        shares.push((EstimatorKind::PathSpace, Lit::Delta));
+        let media = scene.media.iter().any(|m| m.item.is_emissive());
+        if media || emitters().any(|e| !e.is_delta()) {
+            shares.push((EstimatorKind::Radiative, Lit::Extended));
+        }
+    } else {
+        shares.push((settings.estimator, Lit::All));
+    }
+    // They share what is said of boundary samples; what is not, each finds out.
+    let said = settings.boundary_spp.or((!settings.adaptive).then_some(settings.spp));
+    let boundary_spp = said.map(|all| all.div_ceil(shares.len() as u32));
+    let own = |(estimator, lit)| (Settings { estimator, boundary_spp, ..settings.clone() }, lit);
+    shares.into_iter().map(own).collect()
+}

@@ -1,0 +1,563 @@
+//! Accumulating images with their variance.
+//!
+//! Two kinds of film. A [`PixelFilm`] takes values that belong to one pixel: each pixel samples its
+//! own filter, so pixels are independent, and their variances add up to those of blocks and of the
+//! mean. A [`SplatFilm`] takes values that land anywhere, in batches: 32 independent ones a pass,
+//! whose scatter gives the variance of every pixel, block and mean with all correlations between
+//! pixels in it.
+//!
+//! Rare events spoil such errors: what saw none of them claims to know its mean exactly. So every
+//! standard error of a block or of the whole contains one event more of the layer's typical size
+//! Σx² / Σ|x| ([`Events`]), which is lost among many and honest among few.
+
+mod splats;
+
+use alloc::vec::Vec;
+
+use drt_math::{Real, Rgb};
+
+pub(crate) use crate::sampling::film::splats::Splats;
+
+use crate::model::rendering::{BLOCKS, Estimate, Layer};
+
+/// Independent batches that the standard error of a splatted term is estimated from.
+pub(crate) const BATCHES: usize = 32;
+
+/// Cell of the block grid that a pixel lies in, along one axis of `n` pixels.
+fn cell(i: u32, n: u32) -> usize {
+    // The cell k with floor(k n / 8) <= i < floor((k + 1) n / 8).
+    (0..BLOCKS).rev().find(|k| (*k as u32 * n) / BLOCKS as u32 <= i).unwrap_or(0)
+}
+
+/// Block of each pixel, and pixels per block.
+#[derive(Clone, Debug)]
+pub(crate) struct Blocks {
+    of: Vec<u8>,
+    count: [u32; BLOCKS * BLOCKS],
+}
+
+impl Blocks {
+    pub(crate) fn new([w, h]: [u32; 2]) -> Self {
+        let mut count = [0; BLOCKS * BLOCKS];
+        let mut of = Vec::with_capacity((w * h) as usize);
+        for y in 0..h {
+            for x in 0..w {
+                let b = cell(y, h) * BLOCKS + cell(x, w);
+                count[b] += 1;
+                of.push(b as u8);
+            }
+        }
+        Self { of, count }
+    }
+}
+
+/// Sums over the blocks of an image, and over all of it.
+#[derive(Clone, Debug)]
+struct BlockSums([Rgb; BLOCKS * BLOCKS + 1]);
+
+impl BlockSums {
+    const ZERO: Self = Self([Rgb::ZERO; BLOCKS * BLOCKS + 1]);
+
+    fn add(&mut self, block: u8, v: Rgb) {
+        self.0[block as usize] += v;
+        self.0[BLOCKS * BLOCKS] += v;
+    }
+}
+
+/// Sizes of a layer's contributions.
+#[derive(Clone, Copy, Debug)]
+struct Events {
+    absolute: Rgb,
+    squares: Rgb,
+}
+
+impl Events {
+    const NONE: Self = Self { absolute: Rgb::ZERO, squares: Rgb::ZERO };
+
+    fn push(&mut self, v: Rgb) {
+        self.absolute += v.abs();
+        self.squares += v * v;
+    }
+
+    fn add(&mut self, o: &Self) {
+        self.absolute += o.absolute;
+        self.squares += o.squares;
+    }
+
+    /// Widens the errors of blocks and total by one event over the samples that each saw.
+    fn widen(&self, image: &mut Layer, blocks: &Blocks, per_pixel: f64) {
+        let inverse = self.absolute.map(|a| if a > 0.0 { 1.0 / a } else { 0.0 });
+        let size = self.squares * inverse;
+        let all: u32 = blocks.count.iter().sum();
+        let estimates = image.blocks.iter_mut().zip(blocks.count);
+        for (e, pixels) in estimates.chain([(&mut image.total, all)]) {
+            let one = size * (1.0 / (f64::from(pixels.max(1)) * per_pixel));
+            e.stderr = (e.stderr * e.stderr + one * one).map(Real::sqrt);
+        }
+    }
+}
+
+/// Sums over some neighbouring pixels, before they are merged into the film.
+#[derive(Debug)]
+pub(crate) struct Tile {
+    /// First pixel, row by row.
+    start: u32,
+    layers: usize,
+    sums: Vec<Rgb>,
+    events: Vec<Events>,
+}
+
+impl Tile {
+    pub(crate) fn new(pixels: core::ops::Range<u32>, layers: usize) -> Self {
+        Self {
+            start: pixels.start,
+            layers,
+            sums: alloc::vec![Rgb::ZERO; pixels.len() * layers],
+            events: alloc::vec![Events::NONE; layers],
+        }
+    }
+
+    /// Adds one sample of a pixel: a value per layer.
+    pub(crate) fn push(&mut self, pixel: u32, values: &[Rgb]) {
+        let at = (pixel - self.start) as usize * self.layers;
+        for ((sum, event), v) in self.sums[at..].iter_mut().zip(&mut self.events).zip(values) {
+            *sum += *v;
+            event.push(*v);
+        }
+    }
+}
+
+/// Images whose pixels are sampled one by one.
+///
+/// In a pass, each pixel takes its samples in runs whose means are independent
+/// ([`Pass`](crate::sampling::pixels::Pass)); passes are weighted by their samples. A pass of a single run
+/// knows nothing of its error, and takes that of the others.
+#[derive(Debug, Default)]
+pub(crate) struct PixelFilm {
+    size: [u32; 2],
+    layers: usize,
+    /// Passes before the last one; empty when there are none.
+    passes: Vec<Passes>,
+    before: Count,
+    /// The last pass, and of its current run what is finished.
+    runs: Vec<Runs>,
+    partial: Vec<Rgb>,
+    run_count: u32,
+    run_units: u32,
+    partial_units: u32,
+    events: Vec<Events>,
+}
+
+/// Samples of each pixel in some passes, and how many of them have a known error.
+#[derive(Clone, Copy, Debug, Default)]
+struct Count {
+    units: u32,
+    known: u32,
+}
+
+/// Σ N mean over passes of N samples, and Σ N² variance over those whose errors are known.
+#[derive(Clone, Copy, Debug)]
+struct Passes {
+    sum: Rgb,
+    variance: Rgb,
+}
+
+impl Passes {
+    const NONE: Self = Self { sum: Rgb::ZERO, variance: Rgb::ZERO };
+}
+
+/// Mean of the means of runs, each weighted by its length, and the weighted sum of their squared
+/// deviations from it (West 1979, "Updating mean and variance estimates").
+#[derive(Clone, Copy, Debug)]
+struct Runs {
+    mean: Rgb,
+    m2: [f32; 3],
+}
+
+impl Runs {
+    const NONE: Self = Self { mean: Rgb::ZERO, m2: [0.0; 3] };
+
+    /// Takes in a run of a given length that makes the length of all `total`.
+    fn push(&mut self, x: Rgb, length: f64, total: f64) {
+        let delta = x - self.mean;
+        self.mean += delta * (length / total);
+        let m2 = (delta * (x - self.mean) * length).to_array();
+        for (sum, m2) in self.m2.iter_mut().zip(m2) {
+            *sum += m2 as f32;
+        }
+    }
+}
+
+impl PixelFilm {
+    pub(crate) fn new(size: [u32; 2], layers: usize) -> Self {
+        let n = (size[0] * size[1]) as usize * layers;
+        Self {
+            size,
+            layers,
+            passes: Vec::new(),
+            before: Count::default(),
+            runs: alloc::vec![Runs::NONE; n],
+            partial: alloc::vec![Rgb::ZERO; n],
+            run_count: 0,
+            run_units: 0,
+            partial_units: 0,
+            events: alloc::vec![Events::NONE; layers],
+        }
+    }
+
+    pub(crate) fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    pub(crate) fn layers(&self) -> usize {
+        self.layers
+    }
+
+    /// Samples that every pixel has received.
+    pub(crate) fn units(&self) -> u32 {
+        self.before.units + self.run_units + self.partial_units
+    }
+
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
+        self.passes.clear();
+        self.before = Count::default();
+        self.runs.fill(Runs::NONE);
+        self.partial.fill(Rgb::ZERO);
+        (self.run_count, self.run_units, self.partial_units) = (0, 0, 0);
+        self.events.fill(Events::NONE);
+    }
+
+    /// Begins a pass.
+    pub(crate) fn begin(&mut self) {
+        let count = self.count();
+        if count.units == 0 {
+            return;
+        }
+        self.passes.resize(self.runs.len(), Passes::NONE);
+        for i in 0..self.runs.len() {
+            self.passes[i] = self.passes_with_last(i);
+        }
+        self.before = count;
+        self.runs.fill(Runs::NONE);
+        self.partial.fill(Rgb::ZERO);
+        (self.run_count, self.run_units, self.partial_units) = (0, 0, 0);
+    }
+
+    /// Merges a tile; the order of merging is part of the result's bits.
+    pub(crate) fn merge(&mut self, tile: &Tile) {
+        let at = tile.start as usize * self.layers;
+        for (sum, t) in self.partial[at..].iter_mut().zip(&tile.sums) {
+            *sum += *t;
+        }
+        for (e, t) in self.events.iter_mut().zip(&tile.events) {
+            e.add(t);
+        }
+    }
+
+    /// Counts samples that every pixel has received; with them a run may end.
+    pub(crate) fn advance(&mut self, units: u32, ends_run: bool) {
+        self.partial_units += units;
+        if !ends_run {
+            return;
+        }
+        self.run_count += 1;
+        self.run_units += self.partial_units;
+        let (length, total) = (f64::from(self.partial_units), f64::from(self.run_units));
+        for (runs, sum) in self.runs.iter_mut().zip(&mut self.partial) {
+            runs.push(*sum * (1.0 / length), length, total);
+            *sum = Rgb::ZERO;
+        }
+        self.partial_units = 0;
+    }
+
+    /// Samples of all passes, the last one included.
+    fn count(&self) -> Count {
+        let last = self.run_units + self.partial_units;
+        let known = if self.run_count < 2 { 0 } else { last };
+        Count { units: self.before.units + last, known: self.before.known + known }
+    }
+
+    /// The sums of all passes, the last one included.
+    fn passes_with_last(&self, i: usize) -> Passes {
+        let mut passes = self.passes.get(i).copied().unwrap_or(Passes::NONE);
+        let units = f64::from(self.run_units);
+        passes.sum += self.runs[i].mean * units + self.partial[i];
+        if self.run_count >= 2 {
+            // The unfinished run is as uncertain, by its length, as those before it.
+            let all = units + f64::from(self.partial_units);
+            let scale = all / f64::from(self.run_count - 1);
+            passes.variance += Rgb::from(self.runs[i].m2.map(f64::from)) * scale;
+        }
+        passes
+    }
+
+    fn estimate(&self, i: usize) -> Estimate {
+        let count = self.count();
+        if count.units == 0 {
+            return Estimate { mean: Rgb::ZERO, stderr: Rgb::splat(f64::INFINITY) };
+        }
+        let passes = self.passes_with_last(i);
+        let (units, known) = (f64::from(count.units), f64::from(count.known));
+        let stderr = match count.known {
+            0 => Rgb::splat(f64::INFINITY),
+            _ => (passes.variance * (1.0 / (known * units))).map(Real::sqrt),
+        };
+        Estimate { mean: passes.sum * (1.0 / units), stderr }
+    }
+
+    /// The variance of a pixel's mean in one layer, averaged over colours.
+    pub(crate) fn variance(&self, pixel: u32, layer: usize) -> f64 {
+        let stderr = self.estimate(pixel as usize * self.layers + layer).stderr;
+        (stderr * stderr).mean()
+    }
+
+    /// The first layer of some pixels.
+    pub(crate) fn estimates(&self, pixels: core::ops::Range<u32>) -> Vec<Estimate> {
+        pixels.map(|p| self.estimate(p as usize * self.layers)).collect()
+    }
+
+    /// One layer as an image.
+    pub(crate) fn layer(&self, l: usize, blocks: &Blocks) -> Layer {
+        let pixels = (l..self.runs.len()).step_by(self.layers).map(|i| self.estimate(i)).collect();
+        let mut image = Layer::from_pixels(self.size, pixels, blocks);
+        self.events[l].widen(&mut image, blocks, f64::from(self.units().max(1)));
+        image
+    }
+}
+
+/// Images whose samples land anywhere.
+#[derive(Debug, Default)]
+pub(crate) struct SplatFilm {
+    size: [u32; 2],
+    /// Samples of all finished passes.
+    weight: f64,
+    layers: Vec<SplatLayer>,
+}
+
+/// Σ N mean and Σ N² variance over passes of N samples; the last entries are blocks and total.
+#[derive(Clone, Debug)]
+struct SplatLayer {
+    sum: Vec<Rgb>,
+    variance: Vec<Rgb>,
+    events: Events,
+}
+
+/// A pass in progress: sums and sums of squares over batches.
+#[derive(Debug)]
+pub(crate) struct SplatPass {
+    batches: u32,
+    layers: Vec<(Vec<Rgb>, Vec<Rgb>)>,
+    events: Vec<Events>,
+}
+
+impl SplatFilm {
+    pub(crate) fn new(size: [u32; 2], layers: usize) -> Self {
+        let n = (size[0] * size[1]) as usize + BLOCKS * BLOCKS + 1;
+        let zero = alloc::vec![Rgb::ZERO; n];
+        let layer = SplatLayer { sum: zero.clone(), variance: zero, events: Events::NONE };
+        Self { size, weight: 0.0, layers: alloc::vec![layer; layers] }
+    }
+
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
+        self.weight = 0.0;
+        for layer in &mut self.layers {
+            layer.sum.fill(Rgb::ZERO);
+            layer.variance.fill(Rgb::ZERO);
+            layer.events = Events::NONE;
+        }
+    }
+
+    /// Samples so far.
+    pub(crate) fn samples(&self) -> f64 {
+        self.weight
+    }
+
+    /// The variance of one layer's pixels, averaged over them and over colours.
+    pub(crate) fn variance(&self, l: usize) -> f64 {
+        let pixels = (self.size[0] * self.size[1]) as usize;
+        let sum: f64 = self.layers[l].variance[..pixels].iter().map(|v| v.mean()).sum();
+        sum / (pixels as f64 * self.weight * self.weight)
+    }
+
+    pub(crate) fn begin(&self) -> SplatPass {
+        let zero = alloc::vec![Rgb::ZERO; self.layers.first().map_or(0, |l| l.sum.len())];
+        let layers = alloc::vec![(zero.clone(), zero); self.layers.len()];
+        SplatPass { batches: 0, events: alloc::vec![Events::NONE; layers.len()], layers }
+    }
+
+    /// Ends a pass of `samples` samples in all.
+    pub(crate) fn finish(&mut self, pass: &SplatPass, samples: f64) {
+        let n = f64::from(pass.batches);
+        if n < 2.0 || samples == 0.0 {
+            return;
+        }
+        self.weight += samples;
+        for (layer, events) in self.layers.iter_mut().zip(&pass.events) {
+            layer.events.add(events);
+        }
+        for (layer, (sum, squares)) in self.layers.iter_mut().zip(&pass.layers) {
+            for i in 0..sum.len() {
+                let mean = sum[i] * (1.0 / n);
+                // Of the mean over batches.
+                let variance = (squares[i] * (1.0 / n) - mean * mean) * (1.0 / (n - 1.0));
+                layer.sum[i] += mean * samples;
+                layer.variance[i] += variance.map(|v| f64::max(v, 0.0)) * (samples * samples);
+            }
+        }
+    }
+
+    /// One layer as an image.
+    pub(crate) fn layer(&self, l: usize, blocks: &Blocks) -> Layer {
+        let n = (self.size[0] * self.size[1]) as usize;
+        let scale = if self.weight > 0.0 { 1.0 / self.weight } else { 0.0 };
+        let estimate = |i: usize| Estimate {
+            mean: self.layers[l].sum[i] * scale,
+            stderr: (self.layers[l].variance[i] * (scale * scale)).map(Real::sqrt),
+        };
+        let mut image = Layer {
+            size: self.size,
+            pixels: (0..n).map(estimate).collect(),
+            blocks: (n..n + BLOCKS * BLOCKS).map(estimate).collect(),
+            total: estimate(n + BLOCKS * BLOCKS),
+        };
+        // A sample is one of all that were spread over the film.
+        self.layers[l].events.widen(&mut image, blocks, f64::max(self.weight, 1.0));
+        image
+    }
+}
+
+impl SplatPass {
+    /// Adds a batch of `samples` samples, each a sum over what it splatted.
+    pub(crate) fn add(&mut self, batch: &Splats, samples: f64, blocks: &Blocks) {
+        self.batches += 1;
+        let scale = 1.0 / samples;
+        let all: u32 = blocks.count.iter().sum();
+        for (e, b) in self.events.iter_mut().zip(&batch.events) {
+            e.add(b);
+        }
+        for ((sum, squares), image) in self.layers.iter_mut().zip(&batch.layers) {
+            let mut sums = BlockSums::ZERO;
+            image.for_each(|i, v| {
+                let v = v * scale;
+                sum[i] += v;
+                squares[i] += v * v;
+                sums.add(blocks.of[i], v);
+            });
+            for (k, s) in sums.0.iter().enumerate() {
+                let pixels = blocks.count.get(k).copied().unwrap_or(all);
+                let v = *s * (1.0 / f64::from(pixels.max(1)));
+                sum[blocks.of.len() + k] += v;
+                squares[blocks.of.len() + k] += v * v;
+            }
+        }
+    }
+}
+
+impl Layer {
+    /// An image of independent pixels.
+    pub(crate) fn from_pixels(size: [u32; 2], pixels: Vec<Estimate>, blocks: &Blocks) -> Self {
+        let mut mean = BlockSums::ZERO;
+        let mut variance = BlockSums::ZERO;
+        for (p, b) in pixels.iter().zip(&blocks.of) {
+            mean.add(*b, p.mean);
+            variance.add(*b, p.stderr * p.stderr);
+        }
+        let estimate = |k: usize, n: u32| {
+            let scale = 1.0 / f64::from(n.max(1));
+            Estimate { mean: mean.0[k] * scale, stderr: variance.0[k].map(Real::sqrt) * scale }
+        };
+        let all: u32 = blocks.count.iter().sum();
+        Self {
+            size,
+            blocks: (0..BLOCKS * BLOCKS).map(|k| estimate(k, blocks.count[k])).collect(),
+            total: estimate(BLOCKS * BLOCKS, all),
+            pixels,
+        }
+    }
+
+    /// The sum of two independent estimates.
+    pub(crate) fn plus(mut self, other: &Self) -> Self {
+        let own = self.pixels.iter_mut().chain(&mut self.blocks);
+        for (a, b) in own.zip(other.pixels.iter().chain(&other.blocks)) {
+            *a = a.plus(b);
+        }
+        self.total = self.total.plus(&other.total);
+        self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A block that saw nothing is as uncertain as one event among its samples.
+    #[test]
+    fn errors_hold_one_event_more() {
+        let (size, units) = ([8, 8], 64);
+        let blocks = Blocks::new(size);
+        let mut film = PixelFilm::new(size, 1);
+        film.begin();
+        for unit in 0..units {
+            let mut tile = Tile::new(0..64, 1);
+            for pixel in 0..64 {
+                let seen = pixel == 5 && unit == 7;
+                tile.push(pixel, &[Rgb::splat(if seen { -3.0 } else { 0.0 })]);
+            }
+            film.merge(&tile);
+            film.advance(1, true);
+        }
+        let image = film.layer(0, &blocks);
+        let one = 3.0 / f64::from(units);
+        assert!((image.blocks[40].stderr.g - one).abs() < 1e-12);
+        assert!(image.blocks[5].stderr.g > 1.3 * one);
+        assert!((image.blocks[5].mean.g + one).abs() < 1e-12);
+    }
+    /// Values of a pixel in passes, as a film sees them and as a plain list.
+    fn filled(passes: &[&[&[f64]]]) -> (PixelFilm, f64) {
+        let mut film = PixelFilm::new([1, 1], 1);
+        let (mut sum, mut count) = (0.0, 0.0);
+        for pass in passes {
+            film.begin();
+            for run in *pass {
+                for x in *run {
+                    let mut tile = Tile::new(0..1, 1);
+                    tile.push(0, &[Rgb::splat(*x)]);
+                    film.merge(&tile);
+                    film.advance(1, core::ptr::eq(x, &run[run.len() - 1]));
+                    (sum, count) = (sum + x, count + 1.0);
+                }
+            }
+        }
+        (film, sum / count)
+    }
+
+    #[test]
+    fn means_are_of_all_samples_and_errors_of_runs() {
+        let (film, mean) = filled(&[&[&[1.0, 3.0], &[4.0, 2.0], &[0.0, 8.0]]]);
+        let e = film.estimate(0);
+        assert_eq!(film.units(), 6);
+        assert!((e.mean.g - mean).abs() < 1e-15);
+        // Means of runs are 2, 3, 4: their variance is 1, that of their mean 1/3.
+        assert!((e.stderr.g - f64::sqrt(1.0 / 3.0)).abs() < 1e-7);
+
+        // A pass of a single run adds to the mean, and is as uncertain as the others.
+        let (film, mean) = filled(&[&[&[7.0, 1.0]], &[&[1.0, 3.0], &[4.0, 2.0], &[0.0, 8.0]]]);
+        let e = film.estimate(0);
+        assert!((e.mean.g - mean).abs() < 1e-15);
+        assert!((e.stderr.g - f64::sqrt(1.0 / 3.0 * 6.0 / 8.0)).abs() < 1e-7);
+
+        // Passes of 2 and 4 samples with variances 4 and 1/4 of their means.
+        let (film, _) = filled(&[&[&[1.0], &[5.0]], &[&[1.0, 2.0], &[2.0, 3.0]]]);
+        let expected = f64::sqrt((4.0 * 4.0 + 16.0 * 0.25) / 36.0);
+        assert!((film.estimate(0).stderr.g - expected).abs() < 1e-7);
+    }
+
+    #[test]
+    fn single_samples_have_no_error_bar() {
+        let (film, _) = filled(&[&[&[1.0]], &[&[5.0]]]);
+        assert_eq!(film.estimate(0).mean.g, 3.0);
+        assert_eq!(film.estimate(0).stderr.g, f64::INFINITY);
+    }
+}

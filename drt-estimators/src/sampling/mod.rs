@@ -1,0 +1,15 @@
+//! Sampling in plain numbers: the walk and its record, the samples of pixels, and where they are added up.
+
+pub(crate) mod allocation;
+pub(crate) mod budget;
+pub(crate) mod film;
+pub(crate) mod flight;
+pub(crate) mod importance;
+mod mode;
+pub(crate) mod parallel;
+pub(crate) mod pixels;
+mod radiance;
+pub(crate) mod record;
+pub(crate) mod streams;
+pub(crate) mod trace;
+mod walk;

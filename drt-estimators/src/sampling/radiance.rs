@@ -1,0 +1,83 @@
+//! Walks of radiance.
+
+use drt_math::{Rgb, Vec3};
+
+use crate::sampling::mode::RadianceMode;
+use crate::sampling::trace::{Alive, Leaving, Observer, Pixel, Stop, Tracer};
+use crate::world::vertex::{Kind, Vertex};
+
+impl Tracer<'_> {
+    /// Traces a camera ray; `weight` is the filter over the density of the image point.
+    pub(crate) fn trace_camera<O: Observer>(&mut self, dir: Vec3, weight: Rgb, observer: &mut O) {
+        self.counters.paths += 1;
+        let leaving = Leaving {
+            node: 0,
+            vertex: self.world.eye(),
+            dir,
+            pdf: None,
+            throughput: weight,
+            // Roulette must not end paths for the filter's sake: its derivative needs them.
+            alive: Alive::new(Rgb::ONE),
+            segments: 0,
+        };
+        self.radiance_along(&leaving, observer);
+    }
+
+    /// Estimates what comes along a ray, times its throughput.
+    pub(crate) fn radiance_along<O: Observer>(&mut self, leaving: &Leaving, observer: &mut O) {
+        if let Some(stop) = self.follow::<RadianceMode, O>(leaving, observer) {
+            self.walk::<RadianceMode, O>(stop, observer);
+        }
+    }
+
+    /// Estimates what leaves `vertex` along the unit direction `wo`: radiance at a surface, radiance
+    /// per length (scattered and emitted) at a volume vertex.
+    pub(crate) fn radiance_from<O: Observer>(
+        &mut self,
+        vertex: Vertex,
+        wo: Vec3,
+        observer: &mut O,
+    ) {
+        let coefficients = match &vertex.kind {
+            Kind::Surface(s) => {
+                let emitted = self.world.emitted(s, wo);
+                if !emitted.is_zero() {
+                    observer.contribution(Pixel::Own, 0, emitted);
+                }
+                None
+            }
+            Kind::Volume(_) => {
+                let Some(m) = vertex.medium else { return };
+                let c = self.world.coefficients(m, vertex.x);
+                observer.contribution(Pixel::Own, 0, c.source());
+                Some(c)
+            }
+            Kind::Point => return,
+        };
+        let stop = Stop {
+            node: 0,
+            vertex,
+            coefficients,
+            from: wo,
+            throughput: Rgb::ONE,
+            arrival: Rgb::ONE,
+            alive: Alive::new(Rgb::ONE),
+            segments: 0,
+            flight: None,
+        };
+        self.walk::<RadianceMode, O>(stop, observer);
+    }
+
+    /// The same over at most `longest` segments.
+    pub(crate) fn radiance_within<O: Observer>(
+        &mut self,
+        longest: u32,
+        vertex: Vertex,
+        wo: Vec3,
+        observer: &mut O,
+    ) {
+        let own = core::mem::replace(&mut self.max_segments, longest);
+        self.radiance_from(vertex, wo, observer);
+        self.max_segments = own;
+    }
+}

@@ -1,0 +1,291 @@
+//! The one random walk, in either [`TransportMode`]: connect, scatter, follow a ray, arrive.
+
+use drt_math::Rgb;
+use drt_medium::Coefficients;
+
+use crate::sampling::flight::{Flown, Travel, medium_span};
+use crate::sampling::mode::TransportMode;
+use crate::sampling::trace::{
+    Alive, Arrival, Connection, Endpoint, Flight, Leaving, Observer, Pixel, Stop, Tracer,
+};
+use crate::world::RayPath;
+use crate::world::lights::LightSample;
+use crate::world::vertex::Vertex;
+
+impl Tracer<'_> {
+    pub(super) fn walk<M: TransportMode, O: Observer>(&mut self, mut stop: Stop, observer: &mut O) {
+        while let Some(leaving) = self.scatter::<M, O>(&stop, observer) {
+            match self.follow::<M, O>(&leaving, observer) {
+                Some(next) => stop = next,
+                None => return,
+            }
+        }
+    }
+
+    /// Connects the vertex to the other end of paths and draws where this one goes on.
+    fn scatter<M: TransportMode, O: Observer>(
+        &mut self,
+        stop: &Stop,
+        observer: &mut O,
+    ) -> Option<Leaving> {
+        if stop.segments >= self.max_segments {
+            return None;
+        }
+        let world = self.world;
+        let scattering = world.scattering(&stop.vertex)?;
+        let sigma_s = stop.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s);
+        let spare = O::RECORDS && world.may_revive(&stop.vertex);
+        if stop.alive.times(stop.arrival * sigma_s, spare).value.is_zero() {
+            return None;
+        }
+        M::connect(self, stop, &scattering, sigma_s, observer);
+        if stop.segments + 1 >= self.max_segments && !M::EMISSION {
+            return None;
+        }
+        let (to, pdf) = scattering.sample(stop.from, M::GIVEN, &mut self.rng)?;
+        if pdf.is_nan() || pdf <= 0.0 {
+            return None;
+        }
+        let value = M::value(&scattering, stop.from, to);
+        let mut inv_pdf = 1.0 / pdf;
+        let mut alive = stop.alive.times(stop.arrival * sigma_s * (value * inv_pdf), spare);
+        if alive.value.is_zero() {
+            return None;
+        }
+        if stop.segments >= world.rr_depth {
+            let survival = world.survival(alive.value);
+            if self.rng.next_f64() >= survival {
+                return None;
+            }
+            inv_pdf /= survival;
+            alive.value *= 1.0 / survival;
+        }
+        let leaving = Leaving {
+            node: stop.node,
+            vertex: stop.vertex,
+            dir: to,
+            pdf: Some(pdf),
+            throughput: stop.throughput * sigma_s * (value * inv_pdf),
+            alive,
+            segments: stop.segments,
+        };
+        observer.scatter(world, &leaving, value, inv_pdf, &self.rng);
+        Some(leaving)
+    }
+
+    /// Follows a ray to its next vertex.
+    pub(super) fn follow<M: TransportMode, O: Observer>(
+        &mut self,
+        leaving: &Leaving,
+        observer: &mut O,
+    ) -> Option<Stop> {
+        let origin = leaving.vertex.x;
+        let mut ray = self.ray.take().unwrap_or_default();
+        self.world.cast(&leaving.vertex, leaving.dir, &mut ray, &mut self.counters);
+        observer.ray(self.world, leaving, &ray);
+        let span = self.equiangular::<M, O>(leaving, &ray, observer);
+        let stop = match self.travel(origin, leaving.dir, &ray, leaving.alive.value) {
+            Travel::Absorbed => None,
+            Travel::Volume(v) => {
+                let flight = span.map(|span| v.flight(span, origin, leaving.dir));
+                Some(self.at_volume::<M, O>(leaving, &ray, &v, flight, 1.0, observer))
+            }
+            Travel::Surface(vertex, arrival) => {
+                Some(self.at_surface::<M, O>(leaving, &ray, vertex, arrival, observer))
+            }
+            Travel::Escape(arrival) => {
+                self.escape::<M, O>(leaving, &ray, arrival, observer);
+                None
+            }
+        };
+        self.ray = Some(ray);
+        stop
+    }
+
+    /// Arrives at a volume vertex, whose own emission counts by `emission_weight`.
+    fn at_volume<M: TransportMode, O: Observer>(
+        &mut self,
+        leaving: &Leaving,
+        ray: &RayPath,
+        v: &Flown,
+        flight: Option<Flight>,
+        emission_weight: f64,
+        observer: &mut O,
+    ) -> Stop {
+        let segments = leaving.segments + 1;
+        let throughput = leaving.throughput * v.arrival;
+        if M::EMISSION {
+            let source = v.coefficients.source() * emission_weight;
+            if !source.is_zero() {
+                observer.contribution(Pixel::Own, segments, throughput * source);
+            }
+        }
+        let record = Arrival {
+            parent: leaving.node,
+            end: Endpoint::Volume(v.vertex, v.coefficients),
+            dir: leaving.dir,
+            distance: v.t,
+            start_medium: ray.medium,
+            arrival: v.arrival,
+            throughput,
+            emission_weight,
+        };
+        let node = observer.arrive(self.world, &record, &ray.crossings[..v.crossed]);
+        Stop {
+            node,
+            vertex: v.vertex,
+            coefficients: Some(v.coefficients),
+            from: -leaving.dir,
+            throughput,
+            arrival: v.arrival,
+            alive: leaving.alive,
+            segments,
+            flight,
+        }
+    }
+
+    /// Arrives at a surface.
+    fn at_surface<M: TransportMode, O: Observer>(
+        &mut self,
+        leaving: &Leaving,
+        ray: &RayPath,
+        vertex: Vertex,
+        arrival: Rgb,
+        observer: &mut O,
+    ) -> Stop {
+        let segments = leaving.segments + 1;
+        let throughput = leaving.throughput * arrival;
+        let mut emission_weight = 0.0;
+        // A black emitter with a moving radiance must be recorded too, so the weight does not
+        // depend on the value being nonzero.
+        if let Some(point) = vertex.surface().filter(|s| M::EMISSION && self.world.emits(s)) {
+            let light = self.world.lights.area_pdf(point, leaving.dir, ray.length);
+            emission_weight = leaving.pdf.map_or(1.0, |p| p / (p + light));
+            let emitted = self.world.emitted(point, -leaving.dir);
+            observer.contribution(Pixel::Own, segments, throughput * emitted * emission_weight);
+        }
+        let record = Arrival {
+            parent: leaving.node,
+            end: Endpoint::Surface(vertex),
+            dir: leaving.dir,
+            distance: ray.length,
+            start_medium: ray.medium,
+            arrival,
+            throughput,
+            emission_weight,
+        };
+        let node = observer.arrive(self.world, &record, &ray.crossings);
+        Stop {
+            node,
+            vertex,
+            coefficients: None,
+            from: -leaving.dir,
+            throughput,
+            arrival,
+            alive: leaving.alive,
+            segments,
+            flight: None,
+        }
+    }
+
+    /// Leaves the scene.
+    fn escape<M: TransportMode, O: Observer>(
+        &mut self,
+        leaving: &Leaving,
+        ray: &RayPath,
+        arrival: Rgb,
+        observer: &mut O,
+    ) {
+        let environment = self.world.lights.environment().filter(|_| M::EMISSION);
+        let Some((_, radiance)) = environment else { return };
+        let throughput = leaving.throughput * arrival;
+        observer.contribution(Pixel::Own, leaving.segments + 1, throughput * radiance);
+        let record = Arrival {
+            parent: leaving.node,
+            end: Endpoint::Environment,
+            dir: leaving.dir,
+            distance: f64::INFINITY,
+            start_medium: ray.medium,
+            arrival,
+            throughput,
+            emission_weight: 1.0,
+        };
+        observer.arrive(self.world, &record, &ray.crossings);
+    }
+
+    /// Connects a volume vertex to a point, the vertex being at a distance chosen by the angle it is seen under
+    /// (Kulla and Fajardo 2012): free-flight sampling alone has infinite variance near a point inside a medium
+    /// (theory sheet §14.2). Returns the part of the ray it covers.
+    fn equiangular<M: TransportMode, O: Observer>(
+        &mut self,
+        leaving: &Leaving,
+        ray: &RayPath,
+        observer: &mut O,
+    ) -> Option<(f64, f64)> {
+        if leaving.segments + 2 > self.max_segments || !M::has_points(self.world) {
+            return None;
+        }
+        let span = medium_span(ray)?;
+        let point = M::choose_point(self);
+        let (origin, dir) = (leaving.vertex.x, leaving.dir);
+        let placed = self.place_towards(origin, dir, ray, span, point.at, point.total);
+        // The emission here is left to free flight.
+        let stop = placed.map(|v| self.at_volume::<M, O>(leaving, ray, &v, None, 0.0, observer));
+        if let Some(stop) = stop {
+            M::connect_to_point(self, &stop, &point, observer);
+        }
+        Some(span)
+    }
+
+    /// Adds the light of one sampled emitter point, scattered at `stop`.
+    pub(super) fn connect_light<O: Observer>(
+        &mut self,
+        stop: &Stop,
+        light: &LightSample,
+        weight: f64,
+        sigma_s: Rgb,
+        observer: &mut O,
+    ) {
+        let world = self.world;
+        let Some(scattering) = world.scattering(&stop.vertex) else { return };
+        let f = scattering.eval(stop.from, light.w);
+        let spare = O::RECORDS && world.may_revive(&stop.vertex);
+        if weight == 0.0 || (f.is_zero() && !spare) {
+            return;
+        }
+        let (v, w, d) = (&stop.vertex, light.w, light.distance);
+        let target = light.point().map(|s| s.prim);
+        if !world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
+            return;
+        }
+        let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
+        let transport = tau * (weight * light.inv_pdf);
+        if transport.is_zero() {
+            return;
+        }
+        let start_medium = self.shadow.medium;
+        let connection = Connection { light: *light, start_medium, f, transport };
+        let value = stop.throughput * sigma_s * f * connection.rest();
+        observer.contribution(Pixel::Own, stop.segments + 1, value);
+        observer.connect(stop.node, &connection, &self.shadow.crossings);
+    }
+}
+
+impl Alive {
+    pub(super) fn new(value: Rgb) -> Self {
+        Self { value, spared: [false; 3] }
+    }
+
+    fn times(mut self, factor: Rgb, spare: bool) -> Self {
+        let mut v = self.value.to_array();
+        for (c, f) in factor.to_array().into_iter().enumerate() {
+            if f == 0.0 && spare && !self.spared[c] {
+                self.spared[c] = true;
+            } else {
+                v[c] *= f;
+            }
+        }
+        self.value = v.into();
+        self
+    }
+}

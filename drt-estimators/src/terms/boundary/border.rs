@@ -1,0 +1,98 @@
+//! Jumps of a box filter: what leaves one pixel enters its neighbour.
+//!
+//! In material form the filter moves over the image with the material seen. A filter that jumps at
+//! the border of its support then adds, for each pixel (theory sheet §1),
+//!
+//! ```text
+//! - ∫_border P_in L q_dot·n dl,
+//! ```
+//!
+//! n outward in the image and q_dot the image velocity of the material point seen. One sample serves
+//! both pixels of a shared border, so that sums over pixels stay exact.
+
+use drt_math::{Rgb, Vec3};
+
+use crate::derivative::sensitivity::Rate;
+use crate::sampling::record::Radiance;
+use crate::sampling::trace::Tracer;
+use crate::terms::boundary::{Buffers, Receiver};
+use crate::world::vertex::{Kind, Vertex};
+
+/// Takes one sample of all pixel borders.
+pub(crate) fn sample<R: Receiver>(
+    tracer: &mut Tracer<'_>,
+    b: &mut Buffers,
+    receiver: &mut R,
+) -> Option<()> {
+    tracer.counters.border_samples += 1;
+    let world = tracer.world;
+    let camera = &world.camera;
+    let film = camera.film();
+    let radius = camera.filter().radius();
+    // A side of a pixel's support, and a point on it.
+    let pixel = [0, 1].map(|k| index(tracer.rng.next_f64(), film[k]));
+    let axis = usize::from(tracer.rng.next_f64() < 0.5);
+    let outward = if tracer.rng.next_f64() < 0.5 { 1.0 } else { -1.0 };
+    let mut q = pixel.map(|p| f64::from(p) + 0.5);
+    q[axis] += outward * radius;
+    q[1 - axis] += radius * (2.0 * tracer.rng.next_f64() - 1.0);
+    let mut neighbour = None;
+    if radius == 0.5 {
+        let mut other = pixel;
+        let next = f64::from(pixel[axis]) + outward;
+        if next >= 0.0 && next < f64::from(film[axis]) {
+            other[axis] = next as u32;
+            neighbour = Some(other);
+        }
+    }
+    let sides = 4.0 * f64::from(film[0]) * f64::from(film[1]);
+    let chosen_by = if neighbour.is_some() { 2.0 } else { 1.0 };
+    let inv_pdf = 2.0 * radius * sides / chosen_by;
+
+    let dir = camera.ray(q).direction;
+    let mut ray = core::mem::take(&mut b.ray);
+    world.cast(&world.eye(), dir, &mut ray, &mut tracer.counters);
+    let travel = tracer.travel(camera.position(), dir, &ray, Rgb::ONE);
+    b.ray = ray;
+    let (vertex, weight) = travel.end()?;
+    let mut along = [0.0; 2];
+    along[axis] = 1.0;
+    let x = vertex.map_or(camera.position() + dir, |v| v.x);
+    let (point, mut sensor) = camera.view_gradient(&camera.view(x), along, 0.0);
+    let items = &mut b.functional.items;
+    items.clear();
+    match vertex {
+        Some(Vertex { kind: Kind::Surface(s), .. }) => {
+            items.push(Rate::Surface(s.material(), point))
+        }
+        Some(Vertex { medium: Some(m), x, .. }) => items.push(Rate::Volume(m, x, point)),
+        _ => sensor.position = Vec3::ZERO,
+    }
+    items.push(Rate::Sensor(sensor));
+    if !receiver.moves(&b.functional) {
+        return None;
+    }
+    let light = match vertex {
+        Some(vertex) => {
+            let mut light = Radiance::default();
+            let longest = tracer.max_segments.checked_sub(1)?;
+            tracer.radiance_within(longest, vertex, -dir, &mut light);
+            light.0
+        }
+        None => world.lights.environment().map_or(Rgb::ZERO, |(_, l)| l),
+    };
+    let inside = 1.0 / (4.0 * radius * radius);
+    let value = light * weight * (inside * inv_pdf);
+    if value.is_zero() {
+        return None;
+    }
+    receiver.receive(pixel[1] * film[0] + pixel[0], value * -outward);
+    if let Some([x, y]) = neighbour {
+        receiver.receive(y * film[0] + x, value * outward);
+    }
+    Some(())
+}
+
+fn index(u: f64, n: u32) -> u32 {
+    u32::min((u * f64::from(n)) as u32, n - 1)
+}

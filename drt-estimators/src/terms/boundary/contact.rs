@@ -1,0 +1,57 @@
+//! Boundary segments of edges that [rest](crate::edges::contact) on a surface.
+
+use core::f64::consts::PI;
+
+use drt_math::{Frame, Rgb, Vec3, warp};
+
+use super::{End, Receiver, Sampler, Start};
+use crate::edges::contact::Contact;
+use crate::edges::edge::EdgePoint;
+
+impl<R: Receiver> Sampler<'_, '_, R> {
+    /// The camera sees the floor next to the edge.
+    pub(super) fn contact_with_camera(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
+        let world = self.tracer.world;
+        let (w, distance) = c.towards(world.camera.position())?;
+        let (s, start) = self.contact(at, c, w)?;
+        let transport = self.seen(&start)?;
+        let tau = self.open(&start, w, distance)?;
+        if !self.receiver.moves(&self.b.functional) {
+            return None;
+        }
+        let light = self.light_from(&s, w, world.max_depth.checked_sub(1)?);
+        let cosine = w.dot(c.up);
+        self.show(start.x, light * tau * (cosine * at.inv_pdf * transport));
+        Some(())
+    }
+
+    /// Another vertex sees it.
+    pub(super) fn contact_with_others(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
+        let world = self.tracer.world;
+        let u = self.tracer.rng.next_2d();
+        let w = Frame::from_normal(c.up).to_world(warp::cosine_hemisphere(u));
+        let (s, start) = self.contact(at, c, w)?;
+        if !self.receiver.moves(&self.b.functional) {
+            return None;
+        }
+        let beyond = self.beyond(&start, w, Rgb::ONE);
+        self.light_from(&s, w, world.max_depth.checked_sub(2)?);
+        for (d, only_camera) in beyond.into_iter().flatten() {
+            // The density of w is cos θ / π.
+            self.deliver(&d, only_camera, true, w, Rgb::splat(PI * at.inv_pdf));
+        }
+        Some(())
+    }
+
+    /// The floor as the source end of a segment along `w`, where that starts, and how it moves.
+    fn contact(&mut self, at: &EdgePoint<'_>, c: &Contact, w: Vec3) -> Option<(End, Start)> {
+        let (vertex, outward) = c.beside(w)?;
+        let prim = vertex.surface()?.prim;
+        let start = Start { x: vertex.x, faces: [prim, prim], medium: vertex.medium };
+        let s = End { vertex: Some(vertex), distance: 0.0, weight: Rgb::ONE, flight: None };
+        self.b.functional.items.clear();
+        self.edge_rate(at, -outward);
+        self.end_rate(&s, outward);
+        Some((s, start))
+    }
+}

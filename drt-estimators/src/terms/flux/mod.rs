@@ -1,0 +1,188 @@
+//! The flux term: scattering carried through deforming surfaces around an inside that does not
+//! follow them (theory sheet §4.1).
+//!
+//! For every surface Σ with unit normal n from its back (-) to its front (+) and a medium whose
+//! field u does not match the surface's velocity u_Σ,
+//!
+//! ```text
+//! ∫_Σ [f(-) - f(+)] n·(u_Σ - u) dA,
+//! ```
+//!
+//! f being the contribution of paths with a volume vertex on that side of Σ (0 inside an opaque
+//! body). Seen from the vertex before it, dA = r² dω / |n·w|: every ray that a camera path follows
+//! and that meets Σ gives one term, throughput × τ × Lout / |n·w|. So the term is gathered on the
+//! camera's own paths, however small the pixel. To keep the cost linear in path length, one of a
+//! path's meetings is chosen in proportion to its throughput over the cosine (weighted reservoir
+//! sampling), and Lout traced for it alone. In a grid it counts by the extinction there: where a cloud fades
+//! out inside of its box, nothing is traced.
+//!
+//! In the spatial form (2019 paper, Eq. 16 and 20; theory sheet §3, §6) volume vertices stand at fixed
+//! distances of their rays, u is the velocity of the ray's point at Σ, and every surface beside a
+//! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term, less what this surface and the
+//! one beyond the medium [warped](crate::derivative::velocity::warp) along, times the share by which vertices there do not
+//! [blend](crate::derivative::velocity::blend) to their medium. What of the two cancels for every velocity of the ray, as in a thin
+//! layer, is not even traced.
+//!
+//! What the camera sees [edge on](edge_on) of surfaces, its rays hardly meet: there points are drawn by area.
+//!
+//! A grid ends at its box, where coefficients jump to zero. Faces of the box that lie inside the medium
+//! are such surfaces too, with f(+) = 0 and the velocity of the grid for u_Σ.
+
+mod edge_on;
+mod reservoir;
+
+use alloc::sync::Arc;
+
+use drt_math::Vec3;
+use drt_medium::MediumKind;
+
+pub(crate) use crate::terms::flux::edge_on::{Buffers, EdgeOn};
+pub(crate) use crate::terms::flux::reservoir::Reservoir;
+
+use crate::derivative::sensitivity::Interest;
+use crate::derivative::velocity::Spatial;
+use crate::derivative::velocity::warp::GRAZED;
+use crate::world::Tracking;
+use crate::world::World;
+use crate::world::vertex::{SurfacePoint, Vertex};
+
+/// Cosine of the angle of incidence below which the camera's rays leave the flux to [`EdgeOn`].
+const EDGE_ON: f64 = GRAZED;
+
+/// The surfaces with a flux.
+#[derive(Clone, Debug)]
+pub(crate) struct Flux {
+    /// Of the material form.
+    shapes: Arc<[bool]>,
+    /// Media in which the faces of a grid's box have a flux.
+    grids: Arc<[bool]>,
+    /// The largest extinctions of media that are grids.
+    largest: Arc<[Option<f64>]>,
+    /// Segments at which a volume vertex can no longer send anything.
+    longest: u32,
+    /// In the spatial form: where there is a flux even if the ray stands still.
+    movers: Option<Movers>,
+    /// And how vertices move there.
+    pub(crate) spatial: Option<Arc<Spatial>>,
+    /// What a flux must count for to be followed for every path, in those.
+    pub(crate) followed: f64,
+}
+
+/// What moves by itself.
+#[derive(Clone, Debug)]
+struct Movers {
+    shapes: Arc<[bool]>,
+    grids: Arc<[bool]>,
+}
+
+impl Flux {
+    /// Of the material form; `None` when nothing has a flux.
+    pub(crate) fn new(world: &World, shapes: &[usize], interest: &Interest) -> Option<Self> {
+        let flags = (0..world.scene.shapes.len()).map(|s| shapes.contains(&s)).collect();
+        let moves = |m: usize| {
+            let of = |list: &[bool]| list.get(m).copied().unwrap_or(false);
+            (of(&interest.grids) || of(&interest.volumes))
+                && world.tracking[m] == Tracking::Vertices
+                && ends_inside(world, m)
+        };
+        let grids: Arc<[bool]> = (0..world.scene.media.len()).map(moves).collect();
+        let any = !shapes.is_empty() || grids.contains(&true);
+        any.then_some(Self {
+            shapes: flags,
+            grids,
+            largest: largest(world),
+            longest: longest(world),
+            movers: None,
+            spatial: None,
+            followed: 1.0,
+        })
+    }
+
+    /// Of the spatial form; `None` when no medium has vertices.
+    pub(crate) fn spatial(
+        world: &World,
+        interest: &Interest,
+        spatial: &Arc<Spatial>,
+    ) -> Option<Self> {
+        let media = 0..world.scene.media.len();
+        let tracked = |m: usize| world.tracking[m] == Tracking::Vertices;
+        let grids = media.clone().map(|m| tracked(m) && ends_inside(world, m)).collect();
+        let movers = Movers {
+            shapes: interest.shapes.as_slice().into(),
+            grids: interest.grids.as_slice().into(),
+        };
+        media.clone().any(tracked).then(|| Self {
+            shapes: Arc::default(),
+            grids,
+            largest: largest(world),
+            longest: longest(world),
+            movers: Some(movers),
+            spatial: Some(Arc::clone(&spatial)),
+            followed: 1.0,
+        })
+    }
+
+    /// True when a shape sweeps over the points of a ray, which may itself be `carried`.
+    fn sweeps(&self, shape: u32, carried: bool) -> bool {
+        (carried && self.movers.is_some()) || self.moves(shape)
+    }
+
+    /// The same of a ray at rest.
+    fn moves(&self, shape: u32) -> bool {
+        self.movers.as_ref().map_or(&self.shapes, |m| &m.shapes)[shape as usize]
+    }
+
+    /// The same of the faces of a grid.
+    fn sweeps_grid(&self, medium: usize, carried: bool) -> bool {
+        let moves = |m: &Movers| carried || m.grids[medium];
+        self.grids[medium] && self.movers.as_ref().is_none_or(moves)
+    }
+
+    /// The extinction at a volume vertex over the largest in its grid: nothing where a cloud fades out inside of
+    /// its box. 1 in other media.
+    fn fullness(&self, world: &World, vertex: &Vertex) -> f64 {
+        let Some(medium) = vertex.medium else { return 0.0 };
+        match self.largest[medium] {
+            Some(0.0) => 0.0,
+            Some(largest) => world.medium(medium).sigma_t(vertex.x).max_abs() / largest,
+            None => 1.0,
+        }
+    }
+}
+
+/// Segments at which a volume vertex can no longer send anything: one that is the path's last sends
+/// light only if it emits.
+fn longest(world: &World) -> u32 {
+    let emissive = world.scene.media.iter().any(|m| m.item.is_emissive());
+    world.max_depth.saturating_add(u32::from(emissive))
+}
+
+fn largest(world: &World) -> Arc<[Option<f64>]> {
+    let of = |m: usize| Some(world.medium(m).grid()?.largest_sigma_t());
+    (0..world.scene.media.len()).map(of).collect()
+}
+
+/// Whether a medium's grid may end inside of it: not all around the medium is in the grid's box.
+fn ends_inside(world: &World, medium: usize) -> bool {
+    let grid = match &world.medium(medium).kind {
+        MediumKind::Grid(grid) => grid.density(),
+        MediumKind::Deformed(_) => return true,
+        MediumKind::Homogeneous(_) | MediumKind::Custom(_) => return false,
+    };
+    let shapes = &world.scene.shapes;
+    let mut around =
+        shapes.iter().filter(|s| s.boundary.is_some_and(|b| b.interior == Some(medium))).peekable();
+    let beyond = |x: &Vec3| (grid.from_world().point(*x) - Vec3::splat(0.5)).max_abs() > 0.5 + 1e-9;
+    around.peek().is_none() || around.any(|s| s.mesh.positions.iter().any(beyond))
+}
+
+/// The medium on one side of a surface, if paths have vertices in it.
+fn filled(
+    world: &World,
+    point: &SurfacePoint,
+    front: bool,
+    around: Option<usize>,
+) -> Option<usize> {
+    let medium = world.medium_on_side(point, front, around)?;
+    (world.tracking[medium] == Tracking::Vertices).then_some(medium)
+}

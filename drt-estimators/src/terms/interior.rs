@@ -1,0 +1,279 @@
+//! The interior term, and the plain forward image: one pixel sample at a time.
+
+mod component;
+mod recorder;
+
+use alloc::vec::Vec;
+
+use drt_math::sobol::SobolSampler;
+use drt_math::{Rgb, Rng};
+
+pub(crate) use crate::terms::interior::component::Component;
+use crate::terms::interior::component::{Traced, Worker};
+pub(crate) use crate::terms::interior::recorder::{PathView, Recorder};
+
+use crate::derivative::contraction::Contraction;
+use crate::derivative::sensitivity::{AdjointSink, Functional};
+use crate::model::rendering::{Account, Counters, NonFinite, Term};
+use crate::sampling::pixels::Sampler;
+use crate::sampling::record::PathRecord;
+use crate::sampling::record::Radiance;
+use crate::sampling::streams::{DIMENSIONS, FLUX_STREAM, PAIR_STREAM};
+use crate::sampling::trace::Tracer;
+use crate::terms::boundary::shadow::Shadows;
+use crate::terms::flux::Flux;
+use crate::terms::radiative::{Look, Radiative};
+use crate::world::{RayPath, World};
+
+/// Boundary and flux terms that are found along camera rays.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct AlongRays<'a> {
+    pub(crate) flux: Option<&'a Flux>,
+    pub(crate) shadows: Option<&'a Shadows>,
+    /// Set in the spatial form.
+    pub(crate) radiative: Option<&'a Radiative>,
+    pub(crate) looks: Looks,
+    /// Pairs of rays tell how narrow lobes turn.
+    pub(crate) opposites: bool,
+}
+
+/// How often a path looks for edges.
+#[derive(Clone, Copy)]
+pub(crate) enum Looks {
+    /// So many times on average, each time from one of its vertices.
+    Average(f64),
+    /// Once from each of its vertices.
+    EveryVertex,
+}
+
+impl Default for Looks {
+    fn default() -> Self {
+        Self::Average(0.0)
+    }
+}
+
+impl Looks {
+    fn any(self) -> bool {
+        !matches!(self, Self::Average(0.0))
+    }
+
+    /// Another average, where there is one.
+    pub(crate) fn or_average(self, queries: Option<f64>) -> Self {
+        match (self, queries) {
+            (Self::Average(_), Some(queries)) => Self::Average(queries),
+            _ => self,
+        }
+    }
+}
+
+impl AlongRays<'_> {
+    /// The terms kept in layers of their own, where terms are kept apart.
+    pub(crate) fn terms(&self) -> impl Iterator<Item = Term> {
+        let flux = self.flux.map(|_| Term::Flux);
+        let edges = if self.looks.any() { &[Term::Direct, Term::Indirect][..] } else { &[] };
+        flux.into_iter().chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
+    }
+}
+
+/// Where the derivatives of a pixel's paths go.
+pub(crate) trait PathSink: AdjointSink {
+    /// A path's sensitivities follow.
+    fn begin(&mut self);
+    /// They are complete; layers of `values` may be added to.
+    fn finish(&mut self, values: &mut [Rgb]);
+    /// A boundary or flux contribution found along the camera ray.
+    fn functional(&mut self, f: &Functional, value: Rgb, values: &mut [Rgb]);
+    /// Layers that each separately kept term takes.
+    fn layers(&self) -> usize;
+}
+
+impl PathSink for Contraction<'_> {
+    fn begin(&mut self) {
+        self.clear();
+    }
+    fn finish(&mut self, values: &mut [Rgb]) {
+        for (v, r) in values.iter_mut().zip(&self.rates) {
+            *v += *r;
+        }
+    }
+    fn functional(&mut self, f: &Functional, value: Rgb, values: &mut [Rgb]) {
+        if self.evaluate(f) {
+            for (v, r) in values.iter_mut().zip(&self.rates) {
+                *v += value * r.r;
+            }
+        }
+    }
+    fn layers(&self) -> usize {
+        self.rates.len()
+    }
+}
+
+impl<S: PathSink> Sampler for PixelSampler<'_, S> {
+    /// A path, or a pair of paths mirrored at the pixel's centre.
+    fn sample(&mut self, pixel: u32, unit: u32, points: SobolSampler, values: &mut [Rgb]) {
+        values.fill(Rgb::ZERO);
+        let mut rng = Rng::new(self.seed, u64::from(pixel), unit).led_by(points, DIMENSIONS);
+        let u = rng.next_2d();
+        if self.antithetic {
+            self.path(pixel, unit, u, rng.clone(), values);
+            self.path(pixel, unit, u.map(|u| 1.0 - u), rng, values);
+            for v in values.iter_mut() {
+                *v *= 0.5;
+            }
+        } else {
+            self.path(pixel, unit, u, rng, values);
+        }
+        if values.iter().any(|v| !v.is_finite()) {
+            self.report(pixel, unit, values);
+        }
+    }
+}
+
+/// Samples pixels and differentiates what it traces.
+pub(crate) struct PixelSampler<'a, S> {
+    world: &'a World,
+    seed: u64,
+    antithetic: bool,
+    tracer: Tracer<'a>,
+    record: PathRecord,
+    camera_ray: RayPath,
+    /// What differentiates paths, and what each keeps of one.
+    workers: Vec<Worker<'a, S>>,
+    views: Vec<PathView<'a>>,
+    separate: bool,
+    non_finite: Vec<NonFinite>,
+    non_finite_count: u64,
+    recorded: u64,
+}
+
+/// Non-finite samples that are described one by one.
+const DESCRIBED: usize = 8;
+
+impl<'a, S: PathSink> PixelSampler<'a, S> {
+    /// Of paths by all light of a `world`; without components, of the image alone.
+    pub(crate) fn new(
+        world: &'a World,
+        components: impl IntoIterator<Item = Component<'a, S>>,
+        seed: u64,
+        antithetic: bool,
+        separate: bool,
+    ) -> Self {
+        let components = components.into_iter().map(|c| Worker::new(c, separate));
+        let (workers, views) = components.unzip();
+        Self {
+            world,
+            seed,
+            antithetic,
+            tracer: Tracer::new(world),
+            record: PathRecord::default(),
+            camera_ray: RayPath::default(),
+            workers,
+            views,
+            separate,
+            non_finite: Vec::new(),
+            non_finite_count: 0,
+            recorded: 0,
+        }
+    }
+
+    /// The sinks of the components, in order.
+    pub(crate) fn sinks(&mut self) -> impl Iterator<Item = &mut S> {
+        self.workers.iter_mut().map(|w| &mut w.sink)
+    }
+
+    /// What the work done so far leaves besides its values.
+    pub(crate) fn account(self) -> Account {
+        self.finish().0
+    }
+
+    /// The same, and the sinks of the components.
+    pub(crate) fn finish(self) -> (Account, Vec<S>) {
+        let sum = |of: fn(&Worker<'a, S>) -> u64| self.workers.iter().map(of).sum();
+        let account = Account {
+            counters: Counters {
+                differentiated_paths: sum(|w| w.differentiated),
+                recorded_vertices: self.recorded,
+                ..self.tracer.counters
+            },
+            non_finite: self.non_finite,
+            non_finite_count: self.non_finite_count,
+            looking: sum(|w| w.looking),
+        };
+        (account, self.workers.into_iter().map(|w| w.sink).collect())
+    }
+
+    fn path(&mut self, pixel: u32, unit: u32, u: [f64; 2], rng: Rng, values: &mut [Rgb]) {
+        let camera = &self.world.camera;
+        let derivative = self.workers.iter().any(Worker::differentiates_filter);
+        let s = camera.sample_view(pixel, u, derivative);
+        let dir = s.direction;
+        let weight = Rgb::splat(s.weight);
+        // What places an edge comes before what the path takes an unknown number of.
+        let mut rng = rng;
+        let looks = self.workers.iter().any(|w| w.along.looks.any());
+        let look = looks.then(|| Look::reserve(&mut rng));
+        self.tracer.rng = rng;
+        if self.workers.is_empty() {
+            let mut radiance = Radiance::default();
+            self.tracer.trace_camera(dir, weight, &mut radiance);
+            values[0] += radiance.0;
+            return;
+        }
+        let width = camera.film()[0];
+        for view in &mut self.views {
+            let stream = |of: u64| Rng::new(self.seed, of | u64::from(pixel), unit);
+            view.begin(Some(stream(PAIR_STREAM)), stream(FLUX_STREAM));
+        }
+        let shadows = self.workers.iter().any(|w| w.along.shadows.is_some());
+        let mut recorder = Recorder {
+            record: &mut self.record,
+            views: &mut self.views,
+            camera_ray: shadows.then_some(&mut self.camera_ray),
+        };
+        recorder.begin([pixel % width, pixel / width], dir, weight);
+        self.tracer.trace_camera(dir, weight, &mut recorder);
+        values[0] += self.record.value;
+        self.recorded += self.record.nodes.len() as u64;
+        let path = Traced {
+            record: &self.record,
+            camera_ray: &self.camera_ray,
+            filter: s.slope,
+            seed: self.seed,
+            pixel,
+            unit,
+            look,
+        };
+        let mut at = 1;
+        let numbers = self.tracer.rng.clone();
+        for (worker, view) in self.workers.iter_mut().zip(&mut self.views) {
+            let n = worker.sink.layers();
+            at = usize::max(at, 1 + n);
+            // What one does must not depend on how many numbers another takes.
+            self.tracer.rng = numbers.clone();
+            worker.add(&mut self.tracer, &path, view, at, values);
+            if self.separate {
+                at += n * worker.along.terms().count();
+            }
+        }
+    }
+
+    /// Notes a sample that is not finite and counts it as zero.
+    fn report(&mut self, pixel: u32, unit: u32, values: &mut [Rgb]) {
+        self.non_finite_count += 1;
+        if self.non_finite.len() < DESCRIBED {
+            let nodes = &self.record.nodes;
+            let last = nodes.last().and_then(|n| n.vertex()?.surface().map(|s| s.prim));
+            self.non_finite.push(NonFinite {
+                term: values[0].is_finite().then_some(Term::Interior),
+                seed: self.seed,
+                stream: u64::from(pixel),
+                index: unit,
+                bounces: nodes.len() as u32,
+                primitive: last,
+            });
+        }
+        for v in values.iter_mut().filter(|v| !v.is_finite()) {
+            *v = Rgb::ZERO;
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! Recording a path once for all that differentiates it.
+
+use drt_math::{Rgb, Rng, Vec3};
+
+use crate::derivative::pairs::Pairs;
+use crate::derivative::velocity::PathVelocities;
+use crate::derivative::velocity::RecordedPath;
+use crate::sampling::record::PathRecord;
+use crate::sampling::trace::{Arrival, Connection, Leaving, Observer, Pixel};
+use crate::terms::flux::Reservoir;
+use crate::world::Crossing;
+use crate::world::{RayPath, World};
+
+/// A path as one estimator sees it, which differentiates the light of some emitters.
+pub(crate) struct PathView<'a> {
+    /// The scene as the estimator has prepared it, lit by what it differentiates.
+    pub(crate) world: &'a World,
+    pub(crate) velocities: PathVelocities,
+    pub(crate) pairs: Pairs,
+    /// One of the surfaces with a flux that the path met, if there are such.
+    pub(crate) flux: Option<Reservoir>,
+}
+
+impl PathView<'_> {
+    /// Forgets the last path; random numbers are for choosing among pairs, and surfaces with a flux.
+    pub(crate) fn begin(&mut self, pairs: Option<Rng>, flux: Rng) {
+        self.velocities.begin();
+        self.pairs.begin(pairs);
+        if let Some(reservoir) = &mut self.flux {
+            reservoir.begin(flux);
+        }
+    }
+
+    /// With the record that it belongs to.
+    pub(crate) fn of<'p>(&'p self, record: &'p PathRecord) -> RecordedPath<'p> {
+        let Self { velocities, pairs, .. } = self;
+        RecordedPath { record, velocities, pairs, lit: self.world.lit }
+    }
+}
+
+/// Listens to the walk of a path whose derivative is wanted.
+pub(crate) struct Recorder<'r, 'a> {
+    pub(crate) record: &'r mut PathRecord,
+    pub(crate) views: &'r mut [PathView<'a>],
+    /// Keeps the camera's ray, where that is asked for.
+    pub(crate) camera_ray: Option<&'r mut RayPath>,
+}
+
+impl Recorder<'_, '_> {
+    /// Empties the record for a camera ray of a `pixel` along `dir` with filter weight `value`.
+    pub(crate) fn begin(&mut self, pixel: [u32; 2], dir: Vec3, value: Rgb) {
+        self.record.begin(pixel, dir, value);
+    }
+}
+
+impl Observer for Recorder<'_, '_> {
+    const RECORDS: bool = true;
+
+    fn contribution(&mut self, _: Pixel, _: u32, value: Rgb) {
+        self.record.value += value;
+    }
+
+    fn ray(&mut self, _: &World, leaving: &Leaving, ray: &RayPath) {
+        if let (0, Some(kept)) = (leaving.node, &mut self.camera_ray) {
+            kept.clone_from(ray);
+        }
+        for view in self.views.iter_mut() {
+            if let Some(flux) = &mut view.flux {
+                flux.offer(view.world, leaving, view.velocities.moves(leaving.node as usize), ray);
+            }
+        }
+    }
+
+    fn arrive(&mut self, _: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
+        let node = self.record.arrive(arrival, crossings);
+        for view in self.views.iter_mut() {
+            let hits = view.flux.as_ref().map_or(&[][..], Reservoir::hits);
+            view.velocities.arrive(view.world, self.record, arrival, hits);
+        }
+        node
+    }
+
+    fn scatter(&mut self, _: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
+        self.record.scatter(leaving, value, inv_pdf);
+        for view in self.views.iter_mut() {
+            view.pairs.offer(view.world, self.record, &view.velocities, leaving, rng);
+        }
+    }
+
+    fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
+        self.record.connect(node, connection, crossings);
+    }
+}

@@ -1,0 +1,8 @@
+//! The terms of a derivative: the interior, boundary segments, edges seen from vertices, and flux.
+
+pub(crate) mod boundary;
+pub(crate) mod flux;
+pub(crate) mod interior;
+pub(crate) mod prepared;
+pub(crate) mod radiative;
+pub(crate) mod splatting;

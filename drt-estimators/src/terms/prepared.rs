@@ -1,0 +1,206 @@
+//! Everything sampling needs that does not depend on how many parameters there are.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use crate::Error;
+use crate::derivative::contraction::Motion;
+use crate::derivative::sensitivity::Interest;
+use crate::derivative::velocity::Spatial;
+use crate::edges::speeds::speeds;
+use crate::model::settings::{EstimatorKind, Settings};
+use crate::sampling::film::BATCHES;
+use crate::terms::boundary::{Boundary, Strategy};
+use crate::terms::flux::{EdgeOn, Flux};
+use crate::terms::interior::{AlongRays, Component, Looks};
+use crate::terms::radiative::Radiative;
+use crate::terms::splatting::{Source, Splatter};
+use crate::world::World;
+
+/// A scene ready to be sampled for what is of interest.
+pub(crate) struct Prepared {
+    pub(crate) world: World,
+    pub(crate) boundary: Boundary,
+    pub(crate) flux: Option<Flux>,
+    edge_on: Option<EdgeOn>,
+    /// Set in the spatial form.
+    pub(crate) radiative: Option<Radiative>,
+    /// Splatted terms that can contribute.
+    pub(crate) sources: Vec<Source>,
+    /// Image points come in mirrored pairs.
+    pub(crate) antithetic: bool,
+    /// Rays in narrow lobes come in pairs, by the settings.
+    opposites: bool,
+    /// Boundary samples of each kind to each sample of a pixel, by the settings alone.
+    pub(crate) boundary_ratio: f64,
+    /// The part of that which edges seen from the camera take.
+    pub(crate) primary_share: f64,
+    /// Of the spatial form.
+    looks: Looks,
+}
+
+impl Prepared {
+    /// `motion` tells which edges move how fast, where that is known.
+    pub(crate) fn new(
+        world: World,
+        interest: &Interest,
+        flux_shapes: &[usize],
+        settings: &Settings,
+        motion: Option<&Motion>,
+    ) -> Result<Self, Error> {
+        match settings.estimator {
+            EstimatorKind::Radiative if interest.any() => {
+                Self::spatial(world, interest, settings, motion)
+            }
+            _ => Self::material(world, interest, flux_shapes, settings),
+        }
+    }
+
+    /// For the path-space estimator.
+    fn material(
+        world: World,
+        interest: &Interest,
+        flux_shapes: &[usize],
+        settings: &Settings,
+    ) -> Result<Self, Error> {
+        let moving = interest.moves_geometry();
+        let boundary = if moving { Boundary::new(&world, interest)? } else { Boundary::default() };
+        let flux = Flux::new(&world, flux_shapes, interest);
+        let mut sources = Vec::new();
+        if moving {
+            for strategy in [Strategy::Primary, Strategy::Direct, Strategy::Indirect] {
+                if boundary.offers(&world, strategy) {
+                    sources.push(Source::Edges(strategy));
+                }
+            }
+            if world.camera.has_borders() {
+                sources.push(Source::Borders);
+            }
+        }
+        let kinds = sources.len();
+        let edge_on = seen_edge_on(&world, flux.as_ref(), interest, &mut sources)?;
+        // The filter's rate is what mirrored pairs cancel; without it they only cost.
+        let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
+        Ok(Self {
+            boundary_ratio: boundary_ratio(settings, kinds),
+            primary_share: 1.0,
+            looks: Looks::default(),
+            radiative: None,
+            world,
+            boundary,
+            flux,
+            edge_on,
+            sources,
+            antithetic,
+            opposites: settings.antithetic,
+        })
+    }
+
+    /// For the 2019 estimator.
+    fn spatial(
+        world: World,
+        interest: &Interest,
+        settings: &Settings,
+        motion: Option<&Motion>,
+    ) -> Result<Self, Error> {
+        let spatial = Arc::new(Spatial::new(&world, interest));
+        // Grids that move sweep over what stands still.
+        let flux = (interest.moves_geometry() || interest.grids.contains(&true))
+            .then(|| Flux::spatial(&world, interest, &spatial))
+            .flatten();
+        let radiative = match motion {
+            Some(motion) => Radiative::new(&world, interest, spatial, speeds(motion, &world))?,
+            None => Radiative::new(&world, interest, spatial, |_| 1.0)?,
+        };
+        let mut sources =
+            if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
+        let has_edges = radiative.has_edges(&world);
+        let looks = has_edges && !settings.every_vertex;
+        let boundary_ratio = boundary_ratio(settings, sources.len() + usize::from(looks));
+        let edge_on = seen_edge_on(&world, flux.as_ref(), interest, &mut sources)?;
+        let looks = match settings.every_vertex {
+            _ if !has_edges => Looks::default(),
+            true => Looks::EveryVertex,
+            false => Looks::Average(boundary_ratio),
+        };
+        Ok(Self {
+            boundary: Boundary::default(),
+            radiative: Some(radiative),
+            antithetic: false,
+            opposites: settings.antithetic,
+            primary_share: 1.0,
+            world,
+            flux,
+            edge_on,
+            sources,
+            boundary_ratio,
+            looks,
+        })
+    }
+
+    pub(crate) fn along_rays(&self) -> AlongRays<'_> {
+        AlongRays {
+            flux: self.flux.as_ref(),
+            shadows: self.boundary.shadows.as_ref(),
+            radiative: self.radiative.as_ref(),
+            looks: self.looks,
+            opposites: self.opposites,
+        }
+    }
+
+    /// Changes how vertices move in the spatial form.
+    #[cfg(all(test, feature = "std"))]
+    pub(crate) fn change_spatial(&mut self, change: impl FnOnce(&mut Spatial)) {
+        let radiative = self.radiative.as_mut().expect("the spatial form");
+        change(Arc::make_mut(&mut radiative.spatial));
+        if let Some(flux) = &mut self.flux {
+            flux.spatial = Some(Arc::clone(&radiative.spatial));
+        }
+    }
+
+    /// Its part in the derivatives of paths.
+    pub(crate) fn component<S>(&self, sink: S) -> Component<'_, S> {
+        Component { world: &self.world, along: self.along_rays(), sink }
+    }
+
+    pub(crate) fn splatter(&self, seed: u64) -> Splatter<'_> {
+        let radiative = self.radiative.as_ref();
+        let edge_on = self.edge_on.as_ref();
+        Splatter { world: &self.world, boundary: &self.boundary, radiative, edge_on, seed }
+    }
+
+    /// Samples of a splatted source to each of a pixel, by the settings alone.
+    pub(crate) fn source_ratio(&self, i: usize) -> f64 {
+        let source = self.sources[i];
+        let part = if source.is_of_camera() { self.primary_share } else { 1.0 };
+        self.boundary_ratio * part * source.part()
+    }
+
+    /// Samples of each batch of a splatted source that takes so many per pixel.
+    pub(crate) fn samples_per_batch(&self, per_pixel: f64) -> u32 {
+        let [w, h] = self.world.camera.film();
+        let samples = per_pixel * f64::from(w) * f64::from(h);
+        f64::max(samples / BATCHES as f64, 1.0) as u32
+    }
+}
+
+/// What the camera sees edge on of surfaces with a flux, as one more source.
+fn seen_edge_on(
+    world: &World,
+    flux: Option<&Flux>,
+    interest: &Interest,
+    sources: &mut Vec<Source>,
+) -> Result<Option<EdgeOn>, Error> {
+    let Some(flux) = flux else { return Ok(None) };
+    let seen = EdgeOn::new(world, flux, interest)?;
+    sources.extend(seen.is_some().then_some(Source::EdgeOn));
+    Ok(seen)
+}
+
+/// Samples of each of some kinds of boundary samples to each sample of a pixel; never none, which would
+/// drop a term.
+fn boundary_ratio(settings: &Settings, kinds: usize) -> f64 {
+    let all =
+        settings.boundary_spp.map_or(1.0, |b| f64::from(b.max(1)) / f64::from(settings.spp.max(1)));
+    all / kinds.max(1) as f64
+}

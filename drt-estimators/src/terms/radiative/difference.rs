@@ -1,0 +1,154 @@
+//! How much radiance jumps at an edge, by side paths (2019 paper, Algorithm 3, in the corrected form of
+//! theory sheet §3).
+
+use drt_math::{Rgb, Vec3};
+
+use crate::derivative::velocity::blend::Blends;
+use crate::edges::jumps::{Jump, Sides};
+use crate::sampling::record::Radiance;
+use crate::sampling::trace::Tracer;
+use crate::terms::radiative::Radiative;
+use crate::world::vertex::{Kind, Matter, Vertex};
+
+/// An edge point and a viewer of it.
+pub(super) struct Sight<'a> {
+    pub(super) jump: &'a Jump,
+    along: f64,
+    /// The edge point.
+    pub(super) x: Vec3,
+    /// Unit, to the viewer.
+    pub(super) w: Vec3,
+    pub(super) distance: f64,
+    pub(super) sides: Sides,
+    medium: Option<usize>,
+    own_faces: [u32; 2],
+    viewer: &'a Vertex,
+    blends: &'a Blends,
+}
+
+/// What is seen on one side of an edge.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Side {
+    pub(super) light: Rgb,
+    /// How much of the velocity of what is seen its place in view has: the share of its
+    /// [blend](crate::derivative::velocity::blend), over its distance in those of the edge.
+    pub(super) hold: f64,
+    /// The distance of what is seen.
+    pub(super) distance: f64,
+    /// What is seen; `None` for what stands still.
+    pub(super) matter: Option<Matter>,
+}
+
+impl<'a> Sight<'a> {
+    /// Of the point `along` an edge, from a viewer; `None` where the edge is seen end on.
+    pub(super) fn new(
+        tracer: &Tracer<'_>,
+        radiative: &'a Radiative,
+        jump: &'a Jump,
+        along: f64,
+        viewer: &'a Vertex,
+    ) -> Option<Self> {
+        let (x, _) = jump.point(along);
+        let to = viewer.x - x;
+        let distance = to.length();
+        let w = to / distance;
+        let Radiative { jumps, spatial, .. } = radiative;
+        let sides = jumps.sides(jump, w)?;
+        let own_faces = sides.own_faces()?;
+        let medium = jump.medium(tracer.world, &sides, x, w);
+        Some(Self {
+            jump,
+            along,
+            x,
+            w,
+            distance,
+            sides,
+            medium,
+            own_faces,
+            viewer,
+            blends: &spatial.blends,
+        })
+    }
+
+    /// Transmittance to the viewer, if nothing blocks.
+    pub(super) fn open(&self, tracer: &mut Tracer<'_>) -> Option<Rgb> {
+        let mut ray = core::mem::take(&mut tracer.shadow);
+        let Tracer { world, rng, counters, .. } = tracer;
+        let open = world.connect_past(
+            self.x,
+            self.own_faces,
+            self.medium,
+            self.w,
+            self.distance,
+            &mut ray,
+            counters,
+        );
+        let tau = open.then(|| world.transmittance(self.x, self.w, &ray, rng, counters));
+        tracer.shadow = ray;
+        tau.filter(|t| !t.is_zero())
+    }
+
+    /// What is seen on the sides of -n and n, over at most `longest` segments beyond the edge.
+    pub(super) fn sides(&self, tracer: &mut Tracer<'_>, longest: u32) -> [Side; 2] {
+        let own = core::mem::replace(&mut tracer.max_segments, longest);
+        let [plus, minus] = self.sides.faces;
+        let numbers = tracer.rng.clone();
+        let first = self.side(tracer, minus);
+        if plus.is_some() && minus.is_some() {
+            // Both sides of a crease see much the same: the same numbers for both.
+            tracer.rng = numbers;
+        }
+        let second = self.side(tracer, plus);
+        tracer.max_segments = own;
+        [first, second]
+    }
+
+    /// What comes from one side of the edge.
+    fn side(&self, tracer: &mut Tracer<'_>, face: Option<(u32, Vec3)>) -> Side {
+        match face {
+            Some(face) => {
+                let (point, x) = self.jump.beside(tracer.world, self.x, face);
+                let vertex = Vertex { x, medium: self.medium, kind: Kind::Surface(point) };
+                self.from(tracer, vertex, self.distance)
+            }
+            None => match self.jump.contact(tracer.world, self.along) {
+                Some(contact) => {
+                    let floor = contact.floor_along(self.sides.outward());
+                    floor.map_or_else(Side::default, |v| self.from(tracer, v, self.distance))
+                }
+                None => self.beyond(tracer),
+            },
+        }
+    }
+
+    /// What leaves a vertex, at a `distance` from the viewer.
+    fn from(&self, tracer: &mut Tracer<'_>, vertex: Vertex, distance: f64) -> Side {
+        let mut light = Radiance::default();
+        tracer.radiance_from(vertex, self.w, &mut light);
+        let world = tracer.world;
+        let hold = match self.viewer.kind {
+            Kind::Point => self.blends.in_view(world, &vertex),
+            _ => self.blends.of(world, self.viewer, &vertex, -self.w, distance),
+        };
+        let hold = hold.weight * self.distance / distance;
+        Side { light: light.0, hold, distance, matter: vertex.matter() }
+    }
+
+    /// What comes from behind the edge.
+    fn beyond(&self, tracer: &mut Tracer<'_>) -> Side {
+        let mut ray = tracer.ray.take().unwrap_or_default();
+        let d = -self.w;
+        let (x, faces, medium) = (self.x, self.own_faces, self.medium);
+        tracer.world.cast_past(x, faces, medium, d, &mut ray, &mut tracer.counters);
+        let end = tracer.travel(x, d, &ray, Rgb::ONE).end();
+        tracer.ray = Some(ray);
+        let Some((end, arrival)) = end else { return Side::default() };
+        let Some(vertex) = end else {
+            let sky = tracer.world.lights.environment();
+            let light = sky.map_or(Rgb::ZERO, |(_, l)| l * arrival);
+            return Side { light, ..Side::default() };
+        };
+        let side = self.from(tracer, vertex, self.distance + (vertex.x - x).length());
+        Side { light: side.light * arrival, ..side }
+    }
+}

@@ -1,0 +1,201 @@
+//! The 2019 estimator: the derivative of radiance itself, along the rays that carry it.
+//!
+//! Radiance L(x, w) is differentiated for a ray whose origin and direction move (2019 paper, Eqs.
+//! 16–32, in the corrected form of theory sheet §3). Every integral over directions and distances is
+//! differentiated at fixed directions and distances, so the record of an ordinary path is enough for
+//! the part without jumps: [`Spatial`] sweeps it backwards. Wherever the
+//! integrand jumps, and the jump moves relative to the ray, Reynolds' theorem adds a term:
+//!
+//! * in distance, at surfaces beside media: D_dot σ_s L^ins of D19.16 and D19.20, on both sides of
+//!   interfaces that do not scatter. That is the [flux](crate::terms::flux), against rays that are carried. In
+//!   homogeneous media most of it is taken in by vertices that surfaces [warped](crate::derivative::velocity::warp);
+//! * in direction, at edges (D19.23): for an edge point y seen from a vertex x along d = (y - x)/r,
+//!   with the edge's tangent t and N = t × (-d) / |t × d|,
+//!
+//!   ```text
+//!   ∫ f(x, d) τ(x, y) [L(-N) - L(+N)] N·(y_dot - x_dot) |t × d| / r²  dl(y),
+//!   ```
+//!
+//!   L(±N) being the radiance that leaves y towards x just beside the edge on either side, or comes
+//!   from behind the edge where that side is open (D19.52–53). Silhouettes, borders and creases are
+//!   one case: going around the edge from x's direction, a side is a face if one is met within half a
+//!   turn. At the camera f is the filter and importance, and d turns with the image point.
+//!
+//! Cost is linear in path length: of all vertices of a path one, mostly in proportion to its throughput
+//! times an estimate of what edges amount to from there, looks for an edge, and of all surfaces met one
+//! is asked for its flux; each traces side paths that
+//! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
+//! [`every_vertex`](crate::Settings::every_vertex) does so with edges.)
+//!
+//! Light from points and directions does not fit this form: its shadows make radiance jump along lines
+//! on surfaces, which would be edges of the vertex before. A [`Session`](crate::Session) leaves such lights to
+//! the path-space estimator and adds the two.
+
+mod choice;
+mod difference;
+mod outlines;
+mod vertices;
+mod views;
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_math::{CdfTable, Rng};
+
+use crate::edges::jumps::{Jump, Jumps};
+pub(crate) use crate::terms::radiative::vertices::Edged;
+use crate::terms::radiative::views::Views;
+
+use crate::Error;
+use crate::derivative::sensitivity::Interest;
+use crate::derivative::velocity::Spatial;
+use crate::edges::edge::Edge;
+use crate::world::World;
+
+/// The edges at which radiance jumps, by what sees them.
+#[derive(Debug)]
+pub(crate) struct Radiative {
+    /// How the vertices of paths move.
+    pub(crate) spatial: Arc<Spatial>,
+    jumps: Jumps,
+    /// Seen from the camera.
+    camera: Option<Outlines>,
+    /// Seen from a vertex that stands still.
+    moving: Option<Views>,
+    /// Seen from a vertex that moves.
+    all: Option<Views>,
+    /// At rest, before something that moves and holds what is seen of it: this counts for a vertex that
+    /// stands still, too.
+    resting: Option<Views>,
+    /// Edges that can be chosen, and edges in all.
+    pub(crate) count: [u64; 2],
+}
+
+/// A choice of edges by how much of them the camera sees, and of points on them by length.
+#[derive(Debug)]
+struct Outlines {
+    jumps: Vec<u32>,
+    table: CdfTable,
+}
+
+/// How much an edge at rest matters before something that moves, to what stands still, compared to one
+/// that moves; and the part of looks for such.
+const AT_REST: f64 = 0.1;
+
+/// How much more edges matter to a vertex that moves: it moves faster than what it lands on where it
+/// grazes, and what is held by others it sees wholly.
+const CARRIED: f64 = 4.0;
+
+/// The part of choices among vertices that look at throughput alone, in case edges matter more to one
+/// than it seems.
+const BY_THROUGHPUT: f64 = 0.2;
+
+/// Uniform numbers for a look from a path at an edge.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Look {
+    /// For the vertex.
+    vertex: f64,
+    /// For where to look.
+    way: f64,
+    /// For the edge, and the point on it.
+    point: [f64; 2],
+}
+
+impl Look {
+    /// How many numbers it takes.
+    const NUMBERS: u32 = 4;
+
+    /// The generator of a look to be taken later, if at all.
+    pub(crate) fn reserve(rng: &mut Rng) -> Rng {
+        let reserved = rng.clone();
+        rng.skip(Self::NUMBERS);
+        reserved
+    }
+
+    pub(crate) fn new(rng: &mut Rng) -> Self {
+        Self { vertex: rng.next_f64(), way: rng.next_f64(), point: rng.next_2d() }
+    }
+}
+
+/// A point on an edge.
+struct Chosen<'a> {
+    jump: &'a Jump,
+    /// How far along the edge.
+    along: f64,
+    /// 1 over the density per length.
+    inv_pdf: f64,
+}
+
+impl Outlines {
+    /// Of all edges with their weights.
+    fn new(weights: impl Iterator<Item = f64>) -> Result<Option<Self>, Error> {
+        let weighed = (0..).zip(weights);
+        let (indices, weights): (Vec<u32>, Vec<f64>) = weighed.filter(|(_, w)| *w > 0.0).unzip();
+        if indices.is_empty() {
+            return Ok(None);
+        }
+        let table = CdfTable::new(&weights).map_err(|e| Error::Element {
+            element: "edges".into(),
+            reason: alloc::format!("cannot be sampled: {e}"),
+        })?;
+        Ok(Some(Self { jumps: indices, table }))
+    }
+
+    fn sample<'a>(&self, jumps: &'a Jumps, rng: &mut Rng) -> Chosen<'a> {
+        // Monotone: one number places the point among all edges.
+        let s = self.table.sample(rng.next_f64());
+        let jump = &jumps.list[self.jumps[s.index] as usize];
+        Chosen { jump, along: s.residual, inv_pdf: jump.length() / s.pmf }
+    }
+}
+
+impl Radiative {
+    /// The edges at which something can change of what is of interest, which move with some relative
+    /// `speed`.
+    pub(crate) fn new(
+        world: &World,
+        interest: &Interest,
+        spatial: Arc<Spatial>,
+        speed: impl Fn(&Edge) -> f64,
+    ) -> Result<Self, Error> {
+        // From a vertex on what moves, everything seems to; else no edge is even looked for.
+        let any = interest.sensor || interest.shapes.contains(&true);
+        let jumps = if any { Jumps::collect(world, &interest.shapes) } else { Jumps::default() };
+        let moves = |j: &Jump| {
+            if interest.shapes[j.edge.shape as usize] { speed(&j.edge) } else { 0.0 }
+        };
+        let eye = world.camera.position();
+        let moving_shapes = (0..).zip(&interest.shapes).filter(|(_, moves)| **moves);
+        let holding: Vec<u32> =
+            moving_shapes.map(|(s, _)| s).filter(|s| spatial.blends.acts_on(world, *s)).collect();
+        let at_rest = !holding.is_empty();
+        let at_rest_in_view = holding.iter().any(|s| spatial.blends.acts_in_view_on(*s));
+        let speeds: Vec<f64> = jumps.list.iter().map(moves).collect();
+        let fastest = speeds.iter().copied().fold(0.0, f64::max);
+        let relative = |speed: f64| match (interest.sensor, at_rest_in_view) {
+            (true, _) => 1.0,
+            (_, true) => f64::max(speed, AT_REST * fastest),
+            _ => speed,
+        };
+        let seen =
+            jumps.list.iter().zip(&speeds).map(|(j, s)| relative(*s) * jumps.seen_from(j, eye));
+        let camera = Outlines::new(seen)?;
+        let views = |matter: &dyn Fn(&Jump) -> f64| Views::new(world, &jumps, matter);
+        let moving = views(&|j| if fastest > 0.0 { moves(j) / fastest } else { 0.0 });
+        let resting = at_rest.then(|| views(&|j| if moves(j) > 0.0 { 0.0 } else { 1.0 })).flatten();
+        let resting = resting.map(|views| views.before(world, &holding));
+        let all = views(&|_| 1.0);
+        let count = [jumps.list.len() as u64, jumps.all];
+        Ok(Self { spatial, jumps, camera, moving, all, resting, count })
+    }
+
+    /// True when the camera can see something change.
+    pub(crate) fn has_outlines(&self) -> bool {
+        self.camera.is_some()
+    }
+
+    /// True when a vertex can.
+    pub(crate) fn has_edges(&self, world: &World) -> bool {
+        world.max_depth >= 2 && self.all.is_some()
+    }
+}

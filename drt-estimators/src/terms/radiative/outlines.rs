@@ -1,0 +1,55 @@
+//! Edges seen from the camera (2019 paper, Eq. 41, at fixed image points).
+
+use crate::derivative::sensitivity::{Functional, Rate};
+use crate::sampling::trace::Tracer;
+use crate::terms::boundary::Receiver;
+use crate::terms::radiative::Radiative;
+use crate::terms::radiative::difference::Sight;
+use crate::world::vertex::{Kind, Matter, Vertex};
+
+impl Radiative {
+    /// Takes one sample of the camera's edges.
+    pub(crate) fn outline<R: Receiver>(
+        &self,
+        tracer: &mut Tracer<'_>,
+        functional: &mut Functional,
+        receiver: &mut R,
+    ) -> Option<()> {
+        tracer.counters.boundary_samples += 1;
+        let world = tracer.world;
+        let camera = &world.camera;
+        let chosen = self.camera.as_ref()?.sample(&self.jumps, &mut tracer.rng);
+        let eye = world.eye();
+        let sight = Sight::new(tracer, self, chosen.jump, chosen.along, &eye)?;
+        let (x, point) = chosen.jump.point(chosen.along);
+        let (_, importance) = tracer.see(&Vertex { x, medium: None, kind: Kind::Point })?;
+        let tau = sight.open(tracer)?;
+        let [minus, plus] = sight.sides(tracer, tracer.max_segments.checked_sub(1)?);
+        let weight = tau * (sight.sides.sine * chosen.inv_pdf * importance);
+        let [minus_light, plus_light] = [weight * minus.light, weight * -plus.light];
+        // What is held moves in view by itself.
+        let parts = [
+            (Some(Matter::Surface(point)), sight.distance, minus_light + plus_light, false),
+            (minus.matter, minus.distance, minus_light * -minus.hold, true),
+            (plus.matter, plus.distance, plus_light * -plus.hold, true),
+        ];
+        let width = camera.film()[0];
+        let image_point = camera.view(x).pixel;
+        for (matter, distance, value, held) in parts {
+            let n = sight.sides.n;
+            // A camera that turns takes its image points with it.
+            let gradient = camera.ray_gradient(-sight.w, -n, n * -distance);
+            functional.items.clear();
+            functional.items.extend(matter.map(|matter| Rate::of(matter, n)));
+            functional.items.push(Rate::Sensor(gradient));
+            if value.is_zero() || !receiver.moves(functional) {
+                continue;
+            }
+            for p in camera.footprint(image_point) {
+                let share = if held { camera.window(p.pixel, image_point).0 } else { 1.0 };
+                receiver.receive(p.pixel[1] * width + p.pixel[0], value * (p.weight * share));
+            }
+        }
+        Some(())
+    }
+}

@@ -1,0 +1,224 @@
+//! Edges seen from the vertices of a path (2019 paper, Algorithm 2).
+
+use core::ops::Range;
+
+use drt_math::{Rgb, Vec3};
+
+use crate::derivative::velocity::RecordedPath;
+use crate::edges::tree::Options;
+use crate::sampling::trace::Endpoint;
+use crate::sampling::trace::Tracer;
+use crate::terms::radiative::choice::Choice;
+use crate::terms::radiative::difference::{Side, Sight};
+use crate::terms::radiative::views::{Views, viewpoint};
+use crate::terms::radiative::{AT_REST, BY_THROUGHPUT, CARRIED, Look, Radiative};
+use crate::world::World;
+use crate::world::vertex::{MaterialPoint, Matter, Vertex};
+
+/// An edge's contribution to a path: a sum of speeds along `n`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edged {
+    /// The vertex that sees the edge.
+    pub(crate) node: usize,
+    pub(crate) n: Vec3,
+    /// What multiplies the speed of the vertex.
+    pub(crate) viewer: Rgb,
+    /// What multiplies those of the edge, and of what is seen on its two sides.
+    pub(crate) matter: [Option<(Matter, Rgb)>; 3],
+}
+
+/// What a look may find.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sought {
+    /// An edge that moves, or any from a vertex that does.
+    Moving,
+    /// An edge at rest, before something that moves and is held, from a vertex at rest.
+    Resting,
+}
+
+/// A point of an edge and the vertex that looks at it.
+pub(super) struct Glance<'a> {
+    node: usize,
+    sight: Sight<'a>,
+    point: MaterialPoint,
+    /// Of what the two sides differ by, all but the transmittance.
+    pub(super) weight: Rgb,
+    /// Segments beyond the edge.
+    longest: u32,
+}
+
+impl Glance<'_> {
+    /// What is seen.
+    fn follow(self, tracer: &mut Tracer<'_>) -> Option<Edged> {
+        let Self { node, sight, point, weight, longest } = self;
+        let weight = weight * sight.open(tracer)?;
+        let [minus, plus] = sight.sides(tracer, longest);
+        let lights = [weight * minus.light, weight * -plus.light];
+        let held = [lights[0] * minus.hold, lights[1] * plus.hold];
+        let [edge, viewer] = [lights, held].map(|[a, b]| a + b);
+        let of = |side: &Side, held: Rgb| side.matter.map(|m| (m, -held));
+        let matter =
+            [Some((Matter::Surface(point), edge)), of(&minus, held[0]), of(&plus, held[1])];
+        let dark = lights.iter().all(|l| l.is_zero());
+        (!dark).then_some(Edged { node, n: sight.sides.n, viewer: viewer - edge, matter })
+    }
+}
+
+impl Radiative {
+    /// Takes one sample: one of the path's vertices, an edge that it sees.
+    pub(crate) fn edge(
+        &self,
+        tracer: &mut Tracer<'_>,
+        path: &RecordedPath<'_>,
+        look: &Look,
+        options: &mut Options,
+    ) -> Option<Edged> {
+        let nodes = 1..path.record.nodes.len();
+        let (sought, likely, look) = self.sought(path, nodes, look);
+        let (node, chance) = self.choose_vertex(tracer, path, sought, look.vertex, options)?;
+        self.glance_from(tracer, path, node, sought, likely * chance, &look, options)?
+            .follow(tracer)
+    }
+
+    /// The same from a given vertex.
+    pub(crate) fn edge_from(
+        &self,
+        tracer: &mut Tracer<'_>,
+        path: &RecordedPath<'_>,
+        node: usize,
+        look: &Look,
+        options: &mut Options,
+    ) -> Option<Edged> {
+        let (sought, likely, look) = self.sought(path, node..node + 1, look);
+        self.glance_from(tracer, path, node, sought, likely, &look, options)?.follow(tracer)
+    }
+
+    /// What a look from one of some vertices is for, its probability, and what is left of the look's numbers.
+    fn sought(
+        &self,
+        path: &RecordedPath<'_>,
+        mut nodes: Range<usize>,
+        look: &Look,
+    ) -> (Sought, f64, Look) {
+        if self.resting.is_none() || nodes.all(|n| path.velocities.moves(n)) {
+            return (Sought::Moving, 1.0, *look);
+        }
+        let (sought, from, likely) = match look.way < AT_REST {
+            true => (Sought::Resting, 0.0, AT_REST),
+            false => (Sought::Moving, AT_REST, 1.0 - AT_REST),
+        };
+        (sought, likely, Look { way: (look.way - from) / likely, ..*look })
+    }
+
+    /// A look from a vertex for what is `sought`, which both have a given `chance`.
+    fn glance_from<'a>(
+        &'a self,
+        tracer: &mut Tracer<'_>,
+        path: &RecordedPath<'a>,
+        node: usize,
+        sought: Sought,
+        chance: f64,
+        look: &Look,
+        options: &mut Options,
+    ) -> Option<Glance<'a>> {
+        let (record, moves) = (&path.record, path.velocities.moves(node));
+        let recorded = &record.nodes[node];
+        let arrival = recorded.arrival.as_ref()?;
+        let (vertex, theta) =
+            scattering_vertex(recorded.vertex()?, &arrival.end, arrival.throughput)?;
+        let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
+        let wo = -arrival.dir;
+        tracer.counters.boundary_samples += 1;
+        let views = self.views(moves, sought)?;
+        let around = &viewpoint(tracer.world, vertex, wo);
+        let chosen = views.sample(&self.jumps, around, look, options)?;
+        let sight = Sight::new(tracer, self, chosen.jump, chosen.along, vertex)?;
+        let scattering = tracer.world.scattering(vertex)?;
+        let f = scattering.eval(wo, -sight.w);
+        if f.is_zero() {
+            return None;
+        }
+        let kernel = sight.sides.sine / (sight.distance * sight.distance);
+        let weight = theta * f * (kernel * chosen.inv_pdf / chance);
+        let (_, point) = chosen.jump.point(chosen.along);
+        Some(Glance { node, sight, point, weight, longest })
+    }
+
+    /// What edges a vertex may look at.
+    fn views(&self, moves: bool, sought: Sought) -> Option<&Views> {
+        match (sought, moves) {
+            (Sought::Moving, true) => self.all.as_ref(),
+            (Sought::Moving, false) => self.moving.as_ref(),
+            (Sought::Resting, true) => None,
+            (Sought::Resting, false) => self.resting.as_ref(),
+        }
+    }
+
+    /// An estimate of how much edges matter to a vertex; 0 only if they do not.
+    fn amount(
+        &self,
+        world: &World,
+        options: &mut Options,
+        vertex: &Vertex,
+        wo: Vec3,
+        carried: bool,
+        sought: Sought,
+    ) -> f64 {
+        let Some(views) = self.views(carried, sought) else { return 0.0 };
+        let amount = views.amount(&viewpoint(world, vertex, wo), options);
+        if carried { CARRIED * amount } else { amount }
+    }
+
+    /// Chooses a vertex that can see an edge change: mostly in proportion to what passes it and to how
+    /// much there is to see from it, at times to the former alone.
+    fn choose_vertex(
+        &self,
+        tracer: &mut Tracer<'_>,
+        path: &RecordedPath<'_>,
+        sought: Sought,
+        u: f64,
+        options: &mut Options,
+    ) -> Option<(usize, f64)> {
+        let mut choice = Choice::new(u, BY_THROUGHPUT);
+        for (k, node) in path.record.nodes.iter().enumerate().skip(1) {
+            let Some(arrival) = node.arrival.as_ref() else { continue };
+            if k as u32 >= tracer.max_segments {
+                break;
+            }
+            let Some(vertex) = node.vertex() else { continue };
+            let Some((_, theta)) = scattering_vertex(vertex, &arrival.end, arrival.throughput)
+            else {
+                continue;
+            };
+            let theta = theta.max_abs();
+            if theta == 0.0 || !tracer.world.can_scatter(vertex) {
+                continue;
+            }
+            let amount = self.amount(
+                tracer.world,
+                options,
+                vertex,
+                -arrival.dir,
+                path.velocities.moves(k),
+                sought,
+            );
+            if amount > 0.0 {
+                choice.offer(k, [theta, theta * amount]);
+            }
+        }
+        choice.made()
+    }
+}
+
+/// A vertex with the throughput to its scattering function.
+fn scattering_vertex<'v>(
+    vertex: &'v Vertex,
+    end: &Endpoint,
+    throughput: Rgb,
+) -> Option<(&'v Vertex, Rgb)> {
+    match end {
+        Endpoint::Surface(_) => Some((vertex, throughput)),
+        Endpoint::Volume(_, c) => Some((vertex, throughput * c.sigma_s())),
+        Endpoint::Environment => None,
+    }
+}

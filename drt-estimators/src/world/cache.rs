@@ -1,0 +1,36 @@
+//! What a preparation can take from an earlier one of nearly the same scene.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_motion::interior::TetrahedraCache;
+
+use crate::Error;
+use crate::model::scene::Scene;
+use crate::world::geometry::Geometry;
+
+/// Things that depend on geometry alone and cost more to make than to compare. What is taken from here
+/// is what would be made anew, to the bit.
+#[derive(Debug, Default)]
+pub(crate) struct Kept {
+    geometry: Option<Arc<Geometry>>,
+    /// Per medium.
+    tetrahedra: Vec<TetrahedraCache>,
+}
+
+impl Kept {
+    /// The surfaces of a scene, prepared for ray queries.
+    pub(crate) fn geometry(&mut self, scene: &Scene) -> Result<Arc<Geometry>, Error> {
+        let geometry = Geometry::new(scene, self.geometry.as_ref())?;
+        self.geometry = Some(geometry.clone());
+        Ok(geometry)
+    }
+
+    /// The tetrahedra of a medium.
+    pub(crate) fn tetrahedra(&mut self, medium: usize) -> &mut TetrahedraCache {
+        if self.tetrahedra.len() <= medium {
+            self.tetrahedra.resize_with(medium + 1, TetrahedraCache::default);
+        }
+        &mut self.tetrahedra[medium]
+    }
+}

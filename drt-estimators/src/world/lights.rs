@@ -1,0 +1,345 @@
+//! Choosing emitters for next-event estimation.
+//!
+//! The constant environment is not among them: scattering finds it by itself, with densities
+//! proportional to all that varies but visibility, and no light sample would improve on that.
+
+use alloc::vec::Vec;
+
+use drt_math::{AliasTable, Rgb, Rng, Vec3, warp};
+
+use crate::Error;
+use crate::model::emitter::Emitter;
+use crate::model::scene::Scene;
+use crate::world::World;
+use crate::world::vertex::SurfacePoint;
+
+/// The emitters whose light is looked at. Light adds up, so that an estimator may leave some of it to
+/// another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Lit {
+    /// By all.
+    #[default]
+    All,
+    /// By surfaces, media and the environment.
+    Extended,
+    /// By points and directions.
+    Delta,
+}
+
+impl Lit {
+    /// Whether an emitter counts.
+    pub(crate) fn by(self, emitter: &Emitter) -> bool {
+        match self {
+            Self::All => true,
+            Self::Extended => !emitter.is_delta(),
+            Self::Delta => emitter.is_delta(),
+        }
+    }
+
+    /// Whether the environment and emission of surfaces and in media count.
+    pub(crate) fn by_surroundings(self) -> bool {
+        self != Self::Delta
+    }
+
+    /// Whether a sampled emitter counts.
+    pub(crate) fn by_sample(self, light: &LightSample) -> bool {
+        match self {
+            Self::All => true,
+            Self::Extended => light.point().is_some(),
+            Self::Delta => light.point().is_none(),
+        }
+    }
+}
+
+/// One choice of the table.
+#[derive(Clone, Copy, Debug)]
+enum Entry {
+    /// A triangle of an area emitter, by its index in the soup.
+    Triangle { emitter: u32, prim: u32, area: f64 },
+    /// A point, spot or directional light.
+    Delta { emitter: u32 },
+}
+
+/// An emitter chosen by the table, not yet a point of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Choice {
+    /// The emitter, when it is a delta light.
+    pub(crate) delta: Option<usize>,
+    pub(crate) pmf: f64,
+    entry: Entry,
+}
+
+impl Choice {
+    /// 1 over the density per area of a point of a chosen area emitter.
+    pub(crate) fn inverse_area_pdf(&self) -> f64 {
+        match self.entry {
+            Entry::Triangle { area, .. } => area / self.pmf,
+            _ => 0.0,
+        }
+    }
+}
+
+/// What was sampled.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum LightKind {
+    /// A point of an area emitter.
+    Area(SurfacePoint),
+    /// A point or spot light.
+    Position,
+    /// A directional light.
+    Direction,
+}
+
+/// A sampled point or direction of an emitter, seen from somewhere.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightSample {
+    pub(crate) emitter: usize,
+    pub(crate) kind: LightKind,
+    /// Unit, towards the light.
+    pub(crate) w: Vec3,
+    /// The light's point; meaningless for directions.
+    pub(crate) y: Vec3,
+    /// Infinite for directions.
+    pub(crate) distance: f64,
+    /// Radiance (area), I/r² (position) or irradiance (direction).
+    pub(crate) value: Rgb,
+    /// 1 over the density: solid angle for areas, selection probability for delta lights.
+    pub(crate) inv_pdf: f64,
+    /// Solid-angle density; 0 for delta lights, which nothing else can hit.
+    pub(crate) pdf: f64,
+}
+
+impl LightSample {
+    /// The point of an area emitter.
+    pub(crate) fn point(&self) -> Option<&SurfacePoint> {
+        match &self.kind {
+            LightKind::Area(point) => Some(point),
+            _ => None,
+        }
+    }
+}
+
+/// The emitters of a scene by power.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LightTable {
+    entries: Vec<Entry>,
+    table: Option<AliasTable>,
+    /// Radiance of each area emitter, zero for others.
+    area_radiance: Vec<Rgb>,
+    /// Selection probability per unit area of each soup triangle's emitter.
+    density: Vec<f64>,
+    environment: Option<(usize, Rgb)>,
+    /// Lights with a position inside a scattering medium: emitter index, selection probability,
+    /// position; and the sum of the probabilities.
+    inside: (Vec<(usize, f64, Vec3)>, f64),
+}
+
+impl LightTable {
+    /// The emitters of a scene, chosen with the probabilities of `like` where that is given: a scene
+    /// that differs from this one in values alone.
+    pub(crate) fn new(
+        scene: &Scene,
+        first_prim: &[u32],
+        radius: f64,
+        like: Option<&Self>,
+        lit: Lit,
+    ) -> Result<Self, Error> {
+        let mut entries = Vec::new();
+        let mut weights = Vec::new();
+        let count: usize = scene.shapes.iter().map(|s| s.mesh.triangles.len()).sum();
+        let mut environment = None;
+        let mut area_radiance = alloc::vec![Rgb::ZERO; scene.emitters.len()];
+        for (i, shape) in scene.shapes.iter().enumerate() {
+            let Some(e) = shape.emitter else { continue };
+            if !lit.by(&scene.emitters[e].item.emitter) {
+                continue;
+            }
+            let Emitter::Area { radiance } = scene.emitters[e].item.emitter else { continue };
+            area_radiance[e] = radiance;
+            let surface = shape.mesh.surface_area();
+            for t in 0..shape.mesh.triangles.len() as u32 {
+                let area = shape.mesh.area(t);
+                let emitter = e as u32;
+                entries.push(Entry::Triangle { emitter, prim: first_prim[i] + t, area });
+                weights.push((area * core::f64::consts::PI * radiance.mean(), area / surface));
+            }
+        }
+        for (e, named) in scene.emitters.iter().enumerate() {
+            let emitter = e as u32;
+            if !lit.by(&named.item.emitter) {
+                continue;
+            }
+            match named.item.emitter {
+                Emitter::Area { .. } => continue,
+                Emitter::Constant { radiance } => {
+                    environment = Some((e, radiance));
+                    continue;
+                }
+                _ => entries.push(Entry::Delta { emitter }),
+            }
+            weights.push((named.item.emitter.power(radius), 1.0));
+        }
+        // Half by power, half by the number of emitters: a narrow spot has little power and is the
+        // brightest thing where it shines; a light that is off still has a derivative.
+        let power: f64 = weights.iter().map(|w| w.0).sum();
+        let number: f64 = weights.iter().map(|w| w.1).sum();
+        let weights: Vec<f64> = weights
+            .iter()
+            .map(|(p, n)| if power > 0.0 { p / power + n / number } else { *n })
+            .collect();
+        let table = if let Some(like) = like {
+            like.table.clone()
+        } else if weights.is_empty() {
+            None
+        } else {
+            Some(AliasTable::new(&weights).map_err(|e| Error::Element {
+                element: "emitters".into(),
+                reason: alloc::format!("powers cannot be sampled: {e}"),
+            })?)
+        };
+        let mut lights = Self {
+            entries,
+            table,
+            area_radiance,
+            density: alloc::vec![0.0; count],
+            environment,
+            inside: (Vec::new(), 0.0),
+        };
+        for (i, entry) in lights.entries.iter().enumerate() {
+            let pmf = lights.table.as_ref().map_or(0.0, |t| t.pmf(i));
+            match *entry {
+                Entry::Triangle { prim, area, .. } => lights.density[prim as usize] = pmf / area,
+                Entry::Delta { emitter } => {
+                    let e = emitter as usize;
+                    if let Some(at) = scene.emitters[e].item.emitter.position() {
+                        lights.inside.0.push((e, pmf, at));
+                    }
+                }
+            }
+        }
+        Ok(lights)
+    }
+
+    pub(crate) fn area_radiance(&self, emitter: usize) -> Rgb {
+        self.area_radiance[emitter]
+    }
+
+    /// The environment: emitter index and radiance.
+    pub(crate) fn environment(&self) -> Option<(usize, Rgb)> {
+        self.environment
+    }
+
+    /// Lights with a position inside a scattering medium, for equiangular sampling: emitter index,
+    /// selection probability and position; and the sum of the probabilities.
+    pub(crate) fn inside(&self) -> (&[(usize, f64, Vec3)], f64) {
+        (&self.inside.0, self.inside.1)
+    }
+
+    /// Keeps the lights for which `scatters(emitter, position)` holds around them.
+    pub(crate) fn keep_inside(&mut self, scatters: impl Fn(usize, Vec3) -> bool) {
+        self.inside.0.retain(|(e, pmf, x)| *pmf > 0.0 && scatters(*e, *x));
+        self.inside.1 = self.inside.0.iter().map(|l| l.1).sum();
+    }
+
+    /// Solid-angle density with which [`LightTable::sample`] finds the emitting point `s` at
+    /// `distance` along the unit direction `w`.
+    pub(crate) fn area_pdf(&self, s: &SurfacePoint, w: Vec3, distance: f64) -> f64 {
+        let cosine = -s.ng.dot(w);
+        if cosine <= 0.0 {
+            return 0.0;
+        }
+        self.density[s.prim as usize] * distance * distance / cosine
+    }
+
+    /// True when some surface emits.
+    pub(crate) fn has_areas(&self) -> bool {
+        self.density.iter().any(|d| *d > 0.0)
+    }
+
+    /// Chooses an emitter, or a triangle of one.
+    pub(crate) fn choose(&self, rng: &mut Rng) -> Option<Choice> {
+        let i = self.table.as_ref()?.sample(rng.next_f64()).index;
+        let entry = self.entries[i];
+        let delta = match entry {
+            Entry::Delta { emitter } => Some(emitter as usize),
+            Entry::Triangle { .. } => None,
+        };
+        let pmf = self.table.as_ref().map_or(0.0, |t| t.pmf(i));
+        Some(Choice { delta, pmf, entry })
+    }
+
+    /// Samples a point of a chosen area emitter.
+    pub(crate) fn point_of(
+        &self,
+        world: &World,
+        choice: &Choice,
+        rng: &mut Rng,
+    ) -> Option<(SurfacePoint, Vec3)> {
+        let Entry::Triangle { prim, .. } = choice.entry else { return None };
+        Some(world.point(prim, triangle_bary(rng.next_2d())))
+    }
+
+    /// Samples a point of a chosen area emitter, as seen from `x`.
+    pub(crate) fn sample_area(
+        &self,
+        world: &World,
+        choice: &Choice,
+        x: Vec3,
+        rng: &mut Rng,
+    ) -> Option<LightSample> {
+        let Entry::Triangle { emitter, .. } = choice.entry else { return None };
+        let (point, y) = self.point_of(world, choice, rng)?;
+        let d = y - x;
+        let distance = d.length();
+        let w = d / distance;
+        let pdf = self.area_pdf(&point, w, distance);
+        if pdf.is_nan() || pdf <= 0.0 {
+            return None;
+        }
+        Some(LightSample {
+            emitter: emitter as usize,
+            kind: LightKind::Area(point),
+            w,
+            y,
+            distance,
+            value: self.area_radiance[emitter as usize],
+            inv_pdf: 1.0 / pdf,
+            pdf,
+        })
+    }
+
+    /// Samples an emitter as seen from `x`.
+    pub(crate) fn sample(&self, world: &World, x: Vec3, rng: &mut Rng) -> Option<LightSample> {
+        let choice = self.choose(rng)?;
+        match choice.entry {
+            Entry::Triangle { .. } => self.sample_area(world, &choice, x, rng),
+            Entry::Delta { emitter } => Self::delta(world, emitter as usize, x, choice.pmf),
+        }
+    }
+
+    /// A delta light as seen from `x`, chosen with probability `pmf`.
+    pub(crate) fn delta(world: &World, emitter: usize, x: Vec3, pmf: f64) -> Option<LightSample> {
+        let light = &world.scene.emitters[emitter].item.emitter;
+        let incident = light.incident(x)?;
+        let (kind, y) = match light.position() {
+            Some(p) => (LightKind::Position, p),
+            None => (LightKind::Direction, Vec3::ZERO),
+        };
+        Some(LightSample {
+            emitter,
+            kind,
+            w: incident.w,
+            y,
+            distance: incident.distance,
+            value: incident.value,
+            inv_pdf: 1.0 / pmf,
+            pdf: 0.0,
+        })
+    }
+}
+
+/// Uniform barycentric weights of a triangle's second and third vertex.
+pub(crate) fn triangle_bary(u: [f64; 2]) -> [f64; 2] {
+    let [_, b1, b2] = warp::uniform_triangle(u);
+    [b1, b2]
+}

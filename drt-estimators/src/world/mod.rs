@@ -1,0 +1,590 @@
+//! A scene prepared for ray queries: one soup of triangles under one tree, media by side.
+
+pub(crate) mod cache;
+mod geometry;
+pub(crate) mod lights;
+mod rays;
+pub(crate) mod scatter;
+pub(crate) mod vertex;
+
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+pub(crate) use crate::world::rays::short_of;
+use drt_geom::{Aabb, Hit, Mesh, Ray, Skip};
+use drt_math::{Rgb, Vec3};
+use drt_medium::{Coefficients, Homogeneous, Medium};
+
+use crate::Error;
+use crate::model::scene::{Scene, Shape, Surrounding};
+use crate::model::surface::Bsdf;
+use crate::world::cache::Kept;
+use crate::world::geometry::{Geometry, Prim};
+use crate::world::lights::{LightTable, Lit};
+use crate::world::scatter::Scattering;
+use crate::world::vertex::{Contact, Kind, SurfacePoint, Vertex};
+
+/// A null interface on a ray.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Crossing {
+    pub(crate) point: SurfacePoint,
+    pub(crate) x: Vec3,
+    /// Distance from the ray's start.
+    pub(crate) t: f64,
+    pub(crate) after: Option<usize>,
+}
+
+/// What lies along a ray up to the first surface that scatters.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct RayPath {
+    /// The medium the ray starts in.
+    pub(crate) medium: Option<usize>,
+    pub(crate) crossings: Vec<Crossing>,
+    /// The surface it ends on; `None` when it escapes.
+    pub(crate) end: Option<(SurfacePoint, Vec3)>,
+    /// Its length; infinite when it escapes.
+    pub(crate) length: f64,
+    hits: Vec<Hit>,
+}
+
+impl RayPath {
+    /// Ends the ray at `length`.
+    pub(crate) fn cut(&mut self, length: f64) {
+        self.crossings.retain(|c| c.t < length);
+        self.end = None;
+        self.length = length;
+    }
+
+    /// The medium at its end.
+    pub(crate) fn last_medium(&self) -> Option<usize> {
+        self.crossings.last().map_or(self.medium, |c| c.after)
+    }
+
+    /// Becomes the first `length` of another ray.
+    pub(crate) fn truncate_from(&mut self, other: &Self, length: f64) {
+        self.medium = other.medium;
+        self.crossings.clear();
+        self.crossings.extend(other.crossings.iter().take_while(|c| c.t < length));
+        self.end = None;
+        self.length = length;
+    }
+}
+
+/// A piece of a ray inside one medium.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Interval {
+    pub(crate) medium: Option<usize>,
+    pub(crate) start: f64,
+    pub(crate) end: f64,
+}
+
+/// The pieces a ray is cut into by its crossings.
+pub(crate) fn intervals(
+    medium: Option<usize>,
+    crossings: &[Crossing],
+    length: f64,
+) -> impl Iterator<Item = Interval> + '_ {
+    (0..=crossings.len()).map(move |i| Interval {
+        medium: if i == 0 { medium } else { crossings[i - 1].after },
+        start: if i == 0 { 0.0 } else { crossings[i - 1].t },
+        end: crossings.get(i).map_or(length, |c| c.t),
+    })
+}
+
+/// Largest probability of going on under Russian roulette. Below one it also ends paths that lose
+/// nothing, at the price of weights that grow with every vertex.
+const MOST_SURVIVAL: f64 = 0.99;
+/// What comes off something dark may still move fast: a survivor counts ten times at most.
+const LEAST_SURVIVAL: f64 = 0.1;
+/// The probability where it must not depend on what a path carries.
+const STEADY_SURVIVAL: f64 = 0.9;
+/// Least probability of a scattering vertex per tentative collision where coefficients change.
+const DEFENSIVE: f64 = 0.1;
+
+/// What derivatives need of a medium.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum MediumNeed {
+    /// Its coefficients do not change.
+    Nothing,
+    /// They change.
+    Density,
+    /// So does what happens at vertices, even if nothing does now.
+    Vertices,
+}
+
+/// What derivatives need beyond the image.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Needs {
+    pub(crate) media: Vec<MediumNeed>,
+    pub(crate) bsdfs: Vec<bool>,
+    /// Those whose roughness changes.
+    pub(crate) roughness: Vec<bool>,
+    /// Those whose index of refraction changes.
+    pub(crate) index: Vec<bool>,
+}
+
+impl Needs {
+    /// What either needs.
+    pub(crate) fn union(&self, other: &Self) -> Self {
+        let any = |a: &[bool], b: &[bool]| a.iter().zip(b).map(|(a, b)| *a || *b).collect();
+        Self {
+            media: self.media.iter().zip(&other.media).map(|(a, b)| *a.max(b)).collect(),
+            bsdfs: any(&self.bsdfs, &other.bsdfs),
+            roughness: any(&self.roughness, &other.roughness),
+            index: any(&self.index, &other.index),
+        }
+    }
+}
+
+/// What tracking may skip in a medium.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tracking {
+    /// Vertices are sampled inside.
+    Vertices,
+    /// It only absorbs: segments are attenuated, no vertex is sampled.
+    Attenuation,
+}
+
+/// A scene prepared for light transport.
+#[derive(Clone)]
+pub(crate) struct World {
+    pub(crate) scene: Arc<Scene>,
+    pub(crate) lights: LightTable,
+    pub(crate) lit: Lit,
+    /// The sensor in use and the medium around it.
+    pub(crate) camera: crate::model::sensor::Sensor,
+    pub(crate) camera_medium: Option<usize>,
+    pub(crate) tracking: Vec<Tracking>,
+    /// Least probability of a scattering vertex per tentative collision, per medium: nonzero
+    /// where derivatives need vertices in empty or thin space.
+    pub(crate) defensive: Vec<f64>,
+    needs: Needs,
+    /// How far light can go in each medium, at most.
+    extent: Vec<f64>,
+    /// Where set, no discrete choice depends on values that may differ between this scene and
+    /// another: the extinctions by which distances in homogeneous media are drawn instead of their
+    /// own.
+    steady: Option<Vec<Option<Homogeneous>>>,
+    pub(crate) max_depth: u32,
+    pub(crate) rr_depth: u32,
+    pub(crate) geometry: Arc<Geometry>,
+    null: Vec<bool>,
+    any_null: bool,
+    /// The medium beyond every interface.
+    ambient: Option<usize>,
+}
+
+impl World {
+    /// Prepares a scene. `like` is the same scene at other values, whose discrete choices this one
+    /// repeats: finite differences need both sides to draw alike. What is `kept` is taken where it
+    /// is that of the scene.
+    pub(crate) fn new(
+        scene: impl Into<Arc<Scene>>,
+        sensor: usize,
+        max_depth: Option<u32>,
+        like: Option<&Self>,
+        lit: Lit,
+        kept: &mut Kept,
+    ) -> Result<Self, Error> {
+        let scene: Arc<Scene> = scene.into();
+        let camera = scene.sensors.get(sensor).ok_or_else(|| Error::Setting {
+            setting: "sensor".into(),
+            reason: alloc::format!(
+                "there is no sensor {sensor}; the scene has {}",
+                scene.sensors.len()
+            ),
+        })?;
+        let (camera_item, surrounding) = (camera.item.sensor.clone(), camera.item.medium);
+        let geometry = kept.geometry(&scene)?;
+        let radius = geometry.radius;
+        let null: Vec<bool> =
+            scene.shapes.iter().map(|s| scene.bsdfs[s.bsdf].item.is_null()).collect();
+        let tracking = scene
+            .media
+            .iter()
+            .map(|m| {
+                if m.item.is_scattering() || m.item.is_emissive() {
+                    Tracking::Vertices
+                } else {
+                    Tracking::Attenuation
+                }
+            })
+            .collect();
+        let lights =
+            LightTable::new(&scene, &geometry.first_prim, radius, like.map(|w| &w.lights), lit)?;
+        let depth = max_depth.or(scene.integrator.max_depth).unwrap_or(u32::MAX);
+        let mut world = Self {
+            lights,
+            lit,
+            camera: camera_item,
+            camera_medium: None,
+            tracking,
+            defensive: alloc::vec![0.0; scene.media.len()],
+            needs: Needs::default(),
+            extent: (0..scene.media.len()).map(|m| extent(&scene, m, 2.0 * radius)).collect(),
+            steady: like
+                .map(|w| w.scene.media.iter().map(|m| m.item.homogeneous().copied()).collect()),
+            max_depth: depth,
+            rr_depth: scene.integrator.rr_depth,
+            any_null: null.iter().any(|n| *n),
+            geometry,
+            null,
+            ambient: None,
+            scene,
+        };
+        world.settle_media(surrounding);
+        Ok(world)
+    }
+
+    /// The same scene by the light of some emitters.
+    pub(crate) fn lit_by(&self, lit: Lit) -> Result<Self, Error> {
+        let first_prim = &self.geometry.first_prim;
+        let lights = LightTable::new(&self.scene, first_prim, self.geometry.radius, None, lit)?;
+        let mut world = Self { lights, lit, ..self.clone() };
+        world.settle_lights();
+        Ok(world)
+    }
+
+    /// Makes sure that what derivatives need is sampled where its value is zero (theory sheet §14.5):
+    /// vertices in media whose coefficients change, and paths over materials that change.
+    pub(crate) fn prepare_for_derivatives(&mut self, needs: Needs) {
+        for (m, need) in needs.media.iter().enumerate() {
+            if *need == MediumNeed::Nothing {
+                continue;
+            }
+            self.defensive[m] = match self.medium(m).homogeneous() {
+                Some(h) => self.defensive_where_thin(m, h),
+                None => DEFENSIVE,
+            };
+            if *need == MediumNeed::Vertices {
+                self.tracking[m] = Tracking::Vertices;
+            }
+        }
+        self.needs = needs;
+    }
+
+    /// The least probability of a vertex per flight through a homogeneous filling of medium `m`: zero
+    /// where free flights stop inside more often than that by themselves.
+    pub(crate) fn defensive_where_thin(&self, m: usize, filling: &Homogeneous) -> f64 {
+        let sigma_t = filling.coefficients().sigma_t.to_array();
+        let thin = |s: f64| s * self.extent[m] < DEFENSIVE;
+        if sigma_t.into_iter().any(thin) { DEFENSIVE } else { 0.0 }
+    }
+
+    /// The medium by whose extinction distances are drawn, and its extinction less the medium's own;
+    /// `None` when that is the medium itself.
+    pub(crate) fn drawn_by(&self, m: usize) -> Option<(&Homogeneous, Rgb)> {
+        let other = self.steady.as_ref()?.get(m)?.as_ref()?;
+        let own = self.medium(m).homogeneous()?;
+        Some((other, other.coefficients().sigma_t - own.coefficients().sigma_t))
+    }
+
+    /// Probability that Russian roulette lets a path go on which carries `throughput`.
+    pub(crate) fn survival(&self, throughput: Rgb) -> f64 {
+        if self.steady.is_some() {
+            STEADY_SURVIVAL
+        } else {
+            let carried = throughput.max_channel();
+            if carried > 0.0 { carried.clamp(LEAST_SURVIVAL, MOST_SURVIVAL) } else { 0.0 }
+        }
+    }
+
+    /// True when a parameter changes how `v` scatters, so that a zero there may not stay zero.
+    pub(crate) fn may_revive(&self, v: &Vertex) -> bool {
+        match (&v.kind, v.medium) {
+            (Kind::Surface(s), _) => self.needed(&self.needs.bsdfs, s),
+            (_, Some(m)) => self.needs.media.get(m).is_some_and(|n| *n != MediumNeed::Nothing),
+            _ => false,
+        }
+    }
+
+    /// True when a parameter changes how rough the surface at `v` is.
+    pub(crate) fn roughens(&self, v: &Vertex) -> bool {
+        v.surface().is_some_and(|s| self.needed(&self.needs.roughness, s))
+    }
+
+    /// True when a parameter changes how the surface at `v` refracts.
+    pub(crate) fn bends_light(&self, v: &Vertex) -> bool {
+        let bends = |s: &SurfacePoint| {
+            self.needed(&self.needs.index, s) && self.bsdf_of(s.shape).is_transmissive()
+        };
+        v.surface().is_some_and(bends)
+    }
+
+    /// Whether the material of a surface is one of those that something is needed `of`.
+    fn needed(&self, of: &[bool], s: &SurfacePoint) -> bool {
+        of.get(self.scene.shapes[s.shape as usize].bsdf) == Some(&true)
+    }
+
+    /// True where normals are interpolated.
+    pub(crate) fn is_smooth(&self, s: &SurfacePoint) -> bool {
+        self.scene.shapes[s.shape as usize].mesh.normals.is_some()
+    }
+
+    /// About how wide the narrowest lobe at `v` is, in radians; at most 1.
+    pub(crate) fn lobe_width(&self, v: &Vertex) -> f64 {
+        self.scattering(v).map_or(1.0, |scattering| scattering.lobe_width())
+    }
+
+    /// Finds the medium beyond all interfaces and the one around the camera.
+    fn settle_media(&mut self, camera: Surrounding) {
+        let eye = self.camera.position();
+        self.camera_medium = match camera {
+            Surrounding::Stated(m) => {
+                if self.first_boundary(eye).is_none() {
+                    self.ambient = m;
+                }
+                m
+            }
+            Surrounding::Counted => self.medium_at(eye),
+        };
+        self.settle_lights();
+    }
+
+    /// Finds the lights inside of media.
+    fn settle_lights(&mut self) {
+        let mut lights = core::mem::take(&mut self.lights);
+        lights.keep_inside(|e, x| {
+            self.medium_of_emitter(e, x).is_some_and(|m| self.tracking[m] == Tracking::Vertices)
+        });
+        self.lights = lights;
+    }
+
+    /// The medium around an emitter at `x`.
+    pub(crate) fn medium_of_emitter(&self, emitter: usize, x: Vec3) -> Option<usize> {
+        match self.scene.emitters[emitter].item.medium {
+            Surrounding::Stated(m) => m,
+            Surrounding::Counted => self.medium_at(x),
+        }
+    }
+
+    pub(crate) fn medium(&self, m: usize) -> &Medium {
+        &self.scene.media[m].item
+    }
+
+    /// The coefficients of medium `m` at `x`, its emission as far as it counts.
+    pub(crate) fn coefficients(&self, m: usize, x: Vec3) -> Coefficients {
+        let mut c = self.medium(m).coefficients(x);
+        if !self.lit.by_surroundings() {
+            c.emission = Rgb::ZERO;
+        }
+        c
+    }
+
+    pub(crate) fn bsdf_of(&self, shape: u32) -> &Bsdf {
+        &self.scene.bsdfs[self.scene.shapes[shape as usize].bsdf].item
+    }
+
+    pub(crate) fn is_null(&self, shape: u32) -> bool {
+        self.null[shape as usize]
+    }
+
+    pub(crate) fn has_media(&self) -> bool {
+        !self.scene.media.is_empty()
+    }
+
+    /// True when light can leave a vertex by scattering.
+    pub(crate) fn can_scatter(&self, v: &Vertex) -> bool {
+        v.surface().is_none_or(|s| !self.bsdf_of(s.shape).is_black())
+    }
+
+    /// True when paths have vertices on a shape: it scatters or emits.
+    pub(crate) fn scatters(&self, shape: usize) -> bool {
+        !self.bsdf_of(shape as u32).is_black() || self.scene.shapes[shape].emitter.is_some()
+    }
+
+    pub(crate) fn prim_of(&self, shape: usize, triangle: u32) -> u32 {
+        self.geometry.first_prim[shape] + triangle
+    }
+
+    pub(crate) fn shape_name(&self, shape: usize) -> String {
+        let id = self.scene.shapes[shape].id.clone();
+        id.unwrap_or_else(|| alloc::format!("shape[{shape}]"))
+    }
+
+    /// The point of a triangle at given barycentric weights.
+    pub(crate) fn point(&self, prim: u32, bary: [f64; 2]) -> (SurfacePoint, Vec3) {
+        let Prim { shape, triangle } = self.geometry.prims[prim as usize];
+        let mesh = &self.scene.shapes[shape as usize].mesh;
+        let [a, b, c] = mesh.triangle(triangle);
+        let (e1, e2) = (b - a, c - a);
+        let ng = e1.cross(e2).normalize();
+        let ns = match &mesh.normals {
+            None => ng,
+            Some(normals) => {
+                let [i, j, k] = mesh.triangles[triangle as usize].map(|v| normals[v as usize]);
+                (i * (1.0 - bary[0] - bary[1]) + j * bary[0] + k * bary[1]).normalize()
+            }
+        };
+        let x = a * (1.0 - bary[0] - bary[1]) + b * bary[0] + c * bary[1];
+        (SurfacePoint { prim, shape, triangle, bary, ng, ns }, x)
+    }
+
+    /// The point of a triangle's plane nearest to `x`, moved into the triangle.
+    pub(crate) fn point_near(&self, prim: u32, x: Vec3) -> (SurfacePoint, Vec3) {
+        let Prim { shape, triangle } = self.geometry.prims[prim as usize];
+        let [a, b, c] = self.scene.shapes[shape as usize].mesh.triangle(triangle);
+        let [g1, g2] = barycentric_gradients(b - a, c - a);
+        let [b1, b2] = [g1, g2].map(|g| g.dot(x - a).clamp(0.0, 1.0));
+        let sum = f64::max(b1 + b2, 1.0);
+        self.point(prim, [b1 / sum, b2 / sum])
+    }
+
+    /// The gradient of `adjoint · shading normal` by the place of the point in its triangle.
+    pub(crate) fn normal_slide(&self, s: &SurfacePoint, adjoint: Vec3) -> Vec3 {
+        let mesh = &self.scene.shapes[s.shape as usize].mesh;
+        let Some(normals) = &mesh.normals else { return Vec3::ZERO };
+        let [i, j, k] = mesh.triangles[s.triangle as usize].map(|v| normals[v as usize]);
+        let sum = i * (1.0 - s.bary[0] - s.bary[1]) + j * s.bary[0] + k * s.bary[1];
+        let adjoint = adjoint.reject(s.ns) / sum.length();
+        let [a, b, c] = mesh.triangle(s.triangle);
+        let [g1, g2] = barycentric_gradients(b - a, c - a);
+        g1 * adjoint.dot(j - i) + g2 * adjoint.dot(k - i)
+    }
+
+    /// The scattering function at a vertex; `None` at points.
+    pub(crate) fn scattering(&self, v: &Vertex) -> Option<Scattering<'_>> {
+        match &v.kind {
+            Kind::Surface(s) => Some(Scattering::Surface {
+                bsdf: self.bsdf_of(s.shape),
+                ng: s.ng,
+                ns: s.ns,
+                smooth: self.is_smooth(s),
+            }),
+            Kind::Volume(_) => v.medium.map(|m| Scattering::Volume(&self.medium(m).phase)),
+            Kind::Point => None,
+        }
+    }
+
+    /// The medium on one side of a surface; `through` is the medium of surfaces that separate none.
+    pub(crate) fn medium_on_side(
+        &self,
+        s: &SurfacePoint,
+        front: bool,
+        through: Option<usize>,
+    ) -> Option<usize> {
+        match self.scene.shapes[s.shape as usize].boundary {
+            Some(b) if front => b.exterior,
+            Some(b) => b.interior,
+            None => through,
+        }
+    }
+
+    /// The medium a ray leaving `v` along `dir` starts in.
+    pub(crate) fn medium_toward(&self, v: &Vertex, dir: Vec3) -> Option<usize> {
+        match &v.kind {
+            Kind::Surface(s) => self.medium_on_side(s, s.ng.dot(dir) > 0.0, v.medium),
+            _ => v.medium,
+        }
+    }
+
+    /// The side of the first surface around `x` that bounds media, in a fixed direction.
+    fn first_boundary(&self, x: Vec3) -> Option<(SurfacePoint, bool)> {
+        // Any direction serves; an irrational one avoids edges and axis-aligned faces.
+        let dir = drt_math::vec3(0.577_215_66, 0.414_213_56, 0.703_818_4).normalize();
+        let ray = Ray { origin: x, dir, t_max: f64::INFINITY };
+        let bounds = |prim: u32| {
+            let shape = self.geometry.prims[prim as usize].shape as usize;
+            self.scene.shapes[shape].boundary.is_some()
+        };
+        let hit =
+            self.geometry.bvh.closest_through(&ray, Skip::NOTHING, bounds, &mut Vec::new())?;
+        let (point, _) = self.point(hit.prim, hit.bary);
+        Some((point, point.ng.dot(dir) < 0.0))
+    }
+
+    /// The medium around a point off all surfaces: that on the near side of the first interface
+    /// met on the way to infinity.
+    pub(crate) fn medium_at(&self, x: Vec3) -> Option<usize> {
+        if !self.has_media() {
+            return None;
+        }
+        match self.first_boundary(x) {
+            Some((point, front)) => self.medium_on_side(&point, front, None),
+            None => self.ambient,
+        }
+    }
+
+    /// The medium around a shape that bounds none itself, where no interface comes near it: then the
+    /// same everywhere around it.
+    pub(crate) fn medium_around(&self, shape: usize) -> Option<Option<usize>> {
+        if !self.has_media() {
+            return Some(None);
+        }
+        let bounds = self.scene.shapes[shape].mesh.bounds();
+        let near = |mesh: &Mesh| {
+            let triangles = 0..mesh.triangles.len() as u32;
+            mesh.bounds().meets(&bounds)
+                && triangles.map(|t| Aabb::around(mesh.triangle(t))).any(|b| b.meets(&bounds))
+        };
+        let mut interfaces = self.scene.shapes.iter().filter(|s| s.boundary.is_some());
+        (!interfaces.any(|s| near(&s.mesh))).then(|| self.medium_at(bounds.center()))
+    }
+
+    /// How far inside a medium its values at its own border are taken: a grid ends at its box, on
+    /// which surfaces and their rounded points lie.
+    fn border(&self, medium: usize) -> f64 {
+        self.medium(medium).grid().map_or(0.0, |g| 2e-9 * g.density().world_extent().max_abs())
+    }
+
+    /// The extinction at a point of an interface, on the side that the unit vector `towards` points to.
+    pub(crate) fn sigma_t_at_border(&self, medium: Option<usize>, x: Vec3, towards: Vec3) -> Rgb {
+        let Some(m) = medium else { return Rgb::ZERO };
+        self.medium(m).sigma_t(x + towards * self.border(m))
+    }
+
+    /// A volume vertex touching a surface on one side.
+    pub(crate) fn touching(
+        &self,
+        point: SurfacePoint,
+        x: Vec3,
+        front: bool,
+        medium: usize,
+    ) -> Vertex {
+        let contact = Contact { point, front };
+        let x = x + point.ng * (self.border(medium) * if front { 1.0 } else { -1.0 });
+        Vertex { x, medium: Some(medium), kind: Kind::Volume(Some(contact)) }
+    }
+
+    /// A volume vertex at a face of a grid's box with the outward normal `n`, where the grid still is.
+    pub(crate) fn inside_grid(&self, medium: usize, x: Vec3, n: Vec3) -> Vertex {
+        let x = x - n * self.border(medium);
+        Vertex { x, medium: Some(medium), kind: Kind::Volume(None) }
+    }
+
+    /// The camera as a vertex.
+    pub(crate) fn eye(&self) -> Vertex {
+        Vertex { x: self.camera.position(), medium: self.camera_medium, kind: Kind::Point }
+    }
+
+    /// True on an area emitter.
+    pub(crate) fn emits(&self, s: &SurfacePoint) -> bool {
+        self.scene.shapes[s.shape as usize].emitter.is_some()
+    }
+
+    /// Radiance a surface emits from `s` towards the unit direction `w`.
+    pub(crate) fn emitted(&self, s: &SurfacePoint, w: Vec3) -> Rgb {
+        match self.scene.shapes[s.shape as usize].emitter {
+            Some(e) if s.ng.dot(w) > 0.0 => self.lights.area_radiance(e),
+            _ => Rgb::ZERO,
+        }
+    }
+}
+
+/// The gradients, in a triangle's plane, of the barycentric weights of its second and third vertex, by
+/// its edges from the first.
+fn barycentric_gradients(e1: Vec3, e2: Vec3) -> [Vec3; 2] {
+    let n = e1.cross(e2);
+    let per_area = 1.0 / n.length_squared();
+    [e2.cross(n) * per_area, n.cross(e1) * per_area]
+}
+
+/// The diagonal of the box around the surfaces that hold a medium; `all` where none do.
+fn extent(scene: &Scene, medium: usize, all: f64) -> f64 {
+    let holds = |s: &&Shape| s.boundary.is_some_and(|b| b.interior == Some(medium));
+    let meshes = scene.shapes.iter().filter(holds).map(|s| &s.mesh);
+    let corners = meshes.map(|m| m.bounds()).flat_map(|b| [b.min, b.max]);
+    let bounds = Aabb::around(corners);
+    if bounds.is_empty() { all } else { (bounds.max - bounds.min).length() }
+}

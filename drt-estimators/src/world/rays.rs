@@ -1,0 +1,212 @@
+//! Rays through a prepared scene: followed to the first surface that scatters, or up to a point.
+
+use drt_geom::{Hit, Ray, Skip};
+use drt_math::{Rgb, Rng, Vec3};
+use drt_medium::TrackingStats;
+
+use crate::Counters;
+use crate::world::vertex::{Kind, Vertex};
+use crate::world::{Crossing, RayPath, World, intervals};
+
+impl World {
+    fn skip_of(v: &Vertex) -> Skip {
+        match &v.kind {
+            Kind::Surface(s) => Skip::one(s.prim),
+            Kind::Volume(Some(c)) => Skip::one(c.point.prim),
+            _ => Skip::NOTHING,
+        }
+    }
+
+    /// Follows a ray from `v` along the unit direction `dir` to the first surface that scatters.
+    pub(crate) fn cast(&self, v: &Vertex, dir: Vec3, path: &mut RayPath, counters: &mut Counters) {
+        path.medium = self.medium_toward(v, dir);
+        self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v);
+    }
+
+    /// As [`World::cast`] from a point on an edge, past the edge's own faces.
+    pub(crate) fn cast_past(
+        &self,
+        x: Vec3,
+        faces: [u32; 2],
+        medium: Option<usize>,
+        dir: Vec3,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) {
+        path.medium = medium;
+        let v = Vertex { x, medium, kind: Kind::Point };
+        self.cast_from(x, Skip::two(faces[0], faces[1]), dir, path, counters, &v);
+    }
+
+    fn cast_from(
+        &self,
+        origin: Vec3,
+        skip: Skip,
+        dir: Vec3,
+        path: &mut RayPath,
+        counters: &mut Counters,
+        v: &Vertex,
+    ) {
+        path.crossings.clear();
+        path.end = None;
+        path.length = f64::INFINITY;
+        let mut medium = path.medium;
+        // A volume vertex that touches a surface meets it at once when it looks into it.
+        if let Kind::Volume(Some(c)) = &v.kind
+            && (c.point.ng.dot(dir) > 0.0) != c.front
+        {
+            if !self.is_null(c.point.shape) {
+                path.end = Some((c.point, v.x));
+                path.length = 0.0;
+                return;
+            }
+            medium = self.medium_on_side(&c.point, !c.front, medium);
+            path.crossings.push(Crossing { point: c.point, x: v.x, t: 0.0, after: medium });
+        }
+        counters.rays += 1;
+        let ray = Ray { origin, dir, t_max: f64::INFINITY };
+        let end = if self.any_null {
+            let blocks = |prim: u32| !self.is_null(self.geometry.prims[prim as usize].shape);
+            let end = self.geometry.bvh.closest_through(&ray, skip, blocks, &mut path.hits);
+            self.cross(path, dir, medium);
+            end
+        } else {
+            self.geometry.bvh.closest(&ray, skip)
+        };
+        if let Some(hit) = end {
+            path.end = Some(self.point(hit.prim, hit.bary));
+            path.length = hit.t;
+        }
+    }
+
+    /// Crosses the interfaces that a path's hits are on.
+    fn cross(&self, path: &mut RayPath, dir: Vec3, mut medium: Option<usize>) {
+        for hit in &path.hits {
+            let (point, x) = self.point(hit.prim, hit.bary);
+            medium = self.medium_on_side(&point, point.ng.dot(dir) > 0.0, medium);
+            path.crossings.push(Crossing { point, x, t: hit.t, after: medium });
+        }
+    }
+
+    /// The first hit of a ray, whatever it is on.
+    pub(crate) fn nearest_on(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
+        self.geometry.bvh.closest(ray, skip)
+    }
+
+    /// The null interfaces between `v` and a point at `distance` along the unit direction `dir`;
+    /// false when a surface blocks. `target` is excluded from blocking.
+    pub(crate) fn connect(
+        &self,
+        v: &Vertex,
+        dir: Vec3,
+        distance: f64,
+        target: Option<u32>,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) -> bool {
+        path.medium = self.medium_toward(v, dir);
+        let Skip([start, _]) = Self::skip_of(v);
+        let skip = target.map_or(Skip::one(start), |end| Skip::two(start, end));
+        self.connect_from(v, skip, dir, distance, path, counters)
+    }
+
+    /// As [`World::connect`] from a point on an edge, past the edge's own faces.
+    #[allow(clippy::too_many_arguments)]
+    pub(crate) fn connect_past(
+        &self,
+        x: Vec3,
+        faces: [u32; 2],
+        medium: Option<usize>,
+        dir: Vec3,
+        distance: f64,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) -> bool {
+        path.medium = medium;
+        let v = Vertex { x, medium, kind: Kind::Point };
+        self.connect_from(&v, Skip::two(faces[0], faces[1]), dir, distance, path, counters)
+    }
+
+    fn connect_from(
+        &self,
+        v: &Vertex,
+        skip: Skip,
+        dir: Vec3,
+        distance: f64,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) -> bool {
+        path.crossings.clear();
+        path.end = None;
+        path.length = distance;
+        let mut medium = path.medium;
+        if let Kind::Volume(Some(c)) = &v.kind
+            && (c.point.ng.dot(dir) > 0.0) != c.front
+        {
+            if !self.is_null(c.point.shape) {
+                return false;
+            }
+            medium = self.medium_on_side(&c.point, !c.front, medium);
+            path.crossings.push(Crossing { point: c.point, x: v.x, t: 0.0, after: medium });
+        }
+        counters.rays += 1;
+        let ray = Ray { origin: v.x, dir, t_max: short_of(v.x, distance) };
+        if !self.any_null {
+            return !self.geometry.bvh.any(&ray, skip, |_| true);
+        }
+        path.hits.clear();
+        let blocks = |prim: u32| !self.is_null(self.geometry.prims[prim as usize].shape);
+        if self.geometry.bvh.crossings(&ray, skip, blocks, &mut path.hits) {
+            return false;
+        }
+        self.cross(path, dir, medium);
+        true
+    }
+
+    /// Transmittance along a ray that [`World::connect`] or [`World::cast`] has followed.
+    pub(crate) fn transmittance(
+        &self,
+        origin: Vec3,
+        dir: Vec3,
+        path: &RayPath,
+        rng: &mut Rng,
+        counters: &mut Counters,
+    ) -> Rgb {
+        let mut tau = Rgb::ONE;
+        if !self.has_media() {
+            return tau;
+        }
+        for i in intervals(path.medium, &path.crossings, path.length) {
+            if let Some(m) = i.medium {
+                let mut stats = TrackingStats::default();
+                let start = origin + dir * i.start;
+                tau *= self.medium(m).transmittance(start, dir, i.end - i.start, rng, &mut stats);
+                counters.tracking_steps += stats.lookups;
+                if tau.is_zero() {
+                    break;
+                }
+            }
+        }
+        tau
+    }
+}
+
+/// A distance from `x`, less what rounding may add to it: a surface in which a camera or light sits
+/// does not hide it.
+pub(crate) fn short_of(x: Vec3, distance: f64) -> f64 {
+    // The sky stays infinitely far.
+    distance * (1.0 - 8.0 * f64::EPSILON) - 8.0 * f64::EPSILON * x.length()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distances_give_way_by_rounding_alone() {
+        let x = drt_math::vec3(1e6, -2.0, 3.0);
+        assert_eq!(short_of(x, f64::INFINITY), f64::INFINITY);
+        let given = 1.5 - short_of(x, 1.5);
+        assert!(given > 1e-10 && given < 1e-8, "{given}");
+    }
+}
