@@ -77,14 +77,14 @@ fn compare(title: &str, scene: &Scene, shape: &str) {
         Box::new(|| drop(run(1, 1, 0))),
         Box::new(|| of_tetrahedral.push(run(1, SPP, of_tetrahedral.len() as u64))),
     ];
-    let [image, fixed, whole, fixed_too, whole_too] = take_turns(SEEDS - 1, tasks);
-    let times = [(fixed, whole), (fixed_too, whole_too)];
+    let [image, fixed, region, fixed_too, whole_too] = take_turns(SEEDS - 1, tasks);
+    let times = [(fixed, region), (fixed_too, whole_too)];
     let mut first = None;
-    for (((name, _), runs), (fixed, whole)) in kinds.iter().zip(&runs).zip(times) {
+    for (((name, _), runs), (fixed, region)) in kinds.iter().zip(&runs).zip(times) {
         let sums: Vec<Vec<Vec3>> =
             runs.iter().map(|g| vec![g.iter().fold(Vec3::ZERO, |s, v| s + *v)]).collect();
         let [(noise, _), (shift, largest)] = [runs, &sums].map(|r| spread(r));
-        let samples = whole.without(1.0, &fixed);
+        let samples = region.without(1.0, &fixed);
         let work = shift * shift * samples.median();
         println!(
             "{title:18} {name:12} {:8} {:11.3} {:16.2} {noise:9.4} {shift:9.4} {largest:9.1} {:9.4}",

@@ -61,11 +61,11 @@ fn looks_are_worth_their_rays() {
         let variance: f64 = found.derivatives[0].total.pixels.iter().map(error).sum();
         (variance * c.rays as f64, c.boundary_samples as f64 / c.paths as f64)
     };
-    let (work, looks) = run(true, None);
+    let (work, queries) = run(true, None);
     // Two looks from vertices to each path, and half a one from the camera or more.
     let (many, all) = run(true, Some(256));
-    println!("{work:.0} at {looks:.2} a path, {many:.0} at {all:.2}");
-    assert!(work < 0.9 * many && looks < 0.7 * all, "{work} {many}");
+    println!("{work:.0} at {queries:.2} a path, {many:.0} at {all:.2}");
+    assert!(work < 0.9 * many && queries < 0.7 * all, "{work} {many}");
 }
 
 /// Boundary samples of all kinds are no more than is said, with lights that take two estimators and with those

@@ -76,7 +76,7 @@ pub struct Topology {
 
 /// One side of one face, keyed by the welded ends of its edge.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
+struct HalfEdge {
     ends: [u32; 2],
     face: u32,
     corner: u32,
@@ -95,7 +95,7 @@ impl Topology {
                 for k in 0..3 {
                     let (a, b) = (w[k], w[(k + 1) % 3]);
                     let ends = [u32::min(a, b), u32::max(a, b)];
-                    sides.push(Side { ends, face: face as u32, corner: k as u32 });
+                    sides.push(HalfEdge { ends, face: face as u32, corner: k as u32 });
                 }
             }
         }
@@ -121,7 +121,7 @@ impl Topology {
         topology
     }
 
-    fn runs_forward(&self, mesh: &Mesh, s: &Side) -> bool {
+    fn runs_forward(&self, mesh: &Mesh, s: &HalfEdge) -> bool {
         self.welded[mesh.triangles[s.face as usize][s.corner as usize] as usize] == s.ends[0]
     }
 
@@ -141,12 +141,12 @@ impl Topology {
 }
 
 /// The edge's ends and opposite vertex as one face sees them.
-fn corners(mesh: &Mesh, s: &Side) -> [u32; 3] {
+fn corners(mesh: &Mesh, s: &HalfEdge) -> [u32; 3] {
     let t = mesh.triangles[s.face as usize];
     [0, 1, 2].map(|j| t[(s.corner as usize + j) % 3])
 }
 
-fn edge(mesh: &Mesh, around: &[Side]) -> Edge {
+fn edge(mesh: &Mesh, around: &[HalfEdge]) -> Edge {
     let [a, b, o] = corners(mesh, &around[0]);
     if around.len() == 1 {
         return Edge {
@@ -191,16 +191,17 @@ fn edge(mesh: &Mesh, around: &[Side]) -> Edge {
 /// The angle at which each face leaves the edge, and its place in `around`: measured from the first
 /// face through the side its normal points to, in [0, 2 pi). A face without width counts as the
 /// flat continuation of the first.
-fn angles_around(mesh: &Mesh, around: &[Side]) -> Vec<(f64, usize)> {
+fn angles_around(mesh: &Mesh, around: &[HalfEdge]) -> Vec<(f64, usize)> {
     let position = |v: u32| mesh.positions[v as usize];
     let [a, b, _] = corners(mesh, &around[0]);
     let along = direction(position(b) - position(a)).unwrap_or(Vec3::ZERO);
-    let width = |s: &Side| direction((position(corners(mesh, s)[2]) - position(a)).reject(along));
+    let width =
+        |s: &HalfEdge| direction((position(corners(mesh, s)[2]) - position(a)).reject(along));
     let Some(first) = width(&around[0]) else {
         return (0..around.len()).map(|i| (if i == 0 { 0.0 } else { PI }, i)).collect();
     };
     let outward = along.cross(first);
-    let angle = |s: &Side| {
+    let angle = |s: &HalfEdge| {
         let w = width(s)?;
         let phi = fm::atan2(w.dot(outward), w.dot(first));
         Some(if phi < 0.0 { phi + TAU } else { phi })

@@ -32,7 +32,7 @@ use crate::error::{Warning, read_text};
 use element::Element;
 use index::Index;
 pub use source::Defaults;
-use source::Source;
+use source::SceneFiles;
 
 /// Reads a scene file; `defaults` override its `<default>` values.
 ///
@@ -72,7 +72,7 @@ fn parse_scene(
     text: &str,
     defaults: &Defaults,
 ) -> Result<(Scene, Vec<Warning>), CliError> {
-    let root = Source::new(defaults).read(path, text)?;
+    let root = SceneFiles::new(defaults).read(path, text)?;
     let loader = Loader { index: Index::new(&root)?, warnings: RefCell::default() };
     let scene = loader.scene(&root)?;
     Ok((scene, loader.warnings.into_inner()))

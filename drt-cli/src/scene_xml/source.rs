@@ -25,7 +25,7 @@ const MAX_ELEMENTS: usize = 1 << 20;
 const MAX_TEXT: usize = 1 << 16;
 
 /// Reads one scene file and all it includes.
-pub(super) struct Source {
+pub(super) struct SceneFiles {
     /// Values given from outside, which win over the file's defaults.
     given: Defaults,
     /// Values seen so far.
@@ -39,7 +39,7 @@ pub(super) struct Source {
     elements: usize,
 }
 
-impl Source {
+impl SceneFiles {
     pub(super) fn new(given: &Defaults) -> Self {
         let (given, known) = (given.clone(), given.clone());
         Self { given, known, used: BTreeSet::new(), open: Vec::new(), files: 0, elements: 0 }

@@ -55,12 +55,12 @@ fn radiative() {
     println!(" {:>9}", "64 / 16");
     for misty in [false, true] {
         for (name, every_vertex) in [("one vertex looks", false), ("every vertex does", true)] {
-            let looks = Settings {
+            let queries = Settings {
                 estimator: EstimatorKind::Radiative,
                 every_vertex,
                 ..Settings::default()
             };
-            let task = |depth| with(Job::DerivativeImage, misty, depth, &looks);
+            let task = |depth| with(Job::DerivativeImage, misty, depth, &queries);
             let times = take_turns(TURNS, RADIATIVE_DEPTHS.map(task));
             print!("{:6} {name:17}", if misty { "misty" } else { "clear" });
             for t in &times {

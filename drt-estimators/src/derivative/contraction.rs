@@ -8,21 +8,21 @@ use drt_motion::interior::BasisValues;
 
 use crate::derivative::medium_motion::MediumMotions;
 use crate::derivative::sensitivity::{
-    AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint,
+    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, VelocityFunctional,
 };
 use crate::derivative::tangents::Tangents;
 use crate::model::emitter::EmitterGradient;
 use crate::model::sensor::SensorGradient;
 use crate::model::surface::{BsdfParams, BsdfTangent};
 use crate::world::vertex::MaterialPoint;
-use crate::world::{MediumNeed, Needs, World};
+use crate::world::{ActiveFactors, MediumActivity, World};
 
 /// Everything that changes with the parameters.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Motion {
     pub(crate) tangents: Tangents,
     pub(crate) insides: MediumMotions,
-    pub(crate) interest: Interest,
+    pub(crate) active: ActiveInputs,
 }
 
 impl Motion {
@@ -30,7 +30,7 @@ impl Motion {
         fn some<T>(lists: &[Vec<T>]) -> Vec<bool> {
             lists.iter().map(|l| !l.is_empty()).collect()
         }
-        let interest = Interest {
+        let active = ActiveInputs {
             shapes: some(&tangents.shapes),
             volumes: some(&insides.velocities),
             media: some(&tangents.media),
@@ -44,27 +44,27 @@ impl Motion {
                 .collect(),
             sensor: !tangents.sensor.is_empty(),
         };
-        Self { tangents, insides, interest }
+        Self { tangents, insides, active }
     }
 
     /// What must be sampled even where it contributes nothing to the image.
-    pub(crate) fn needs(&self) -> Needs {
+    pub(crate) fn needs(&self) -> ActiveFactors {
         let need = |tangents: &Vec<(usize, MediumTangent)>| {
             let any = |f: fn(&MediumTangent) -> bool| tangents.iter().any(|(_, t)| f(t));
             if any(|t| !t.albedo.is_zero() || !t.emission.is_zero()) {
-                MediumNeed::Vertices
+                MediumActivity::Vertices
             } else if any(|t| !t.sigma_t.is_zero()) {
-                MediumNeed::Density
+                MediumActivity::Density
             } else {
-                MediumNeed::Nothing
+                MediumActivity::Nothing
             }
         };
         type Changes = Vec<(usize, BsdfTangent)>;
         let roughens = |changes: &Changes| changes.iter().any(|(_, t)| !t.alpha.is_zero());
         let bends = |changes: &Changes| changes.iter().any(|(_, t)| !t.eta.is_zero());
-        Needs {
+        ActiveFactors {
             media: self.tangents.media.iter().map(need).collect(),
-            bsdfs: self.interest.bsdfs.clone(),
+            bsdfs: self.active.bsdfs.clone(),
             roughness: self.tangents.bsdfs.iter().map(roughens).collect(),
             index: self.tangents.bsdfs.iter().map(bends).collect(),
         }
@@ -110,7 +110,7 @@ impl<'a> Contraction<'a> {
     }
 
     /// The rates of a functional, one number per parameter; false when all vanish.
-    pub(crate) fn evaluate(&mut self, functional: &Functional) -> bool {
+    pub(crate) fn evaluate(&mut self, functional: &VelocityFunctional) -> bool {
         self.clear();
         functional.send(Rgb::new(1.0, 0.0, 0.0), self);
         self.rates.iter().any(|r| r.r != 0.0)
@@ -118,8 +118,8 @@ impl<'a> Contraction<'a> {
 }
 
 impl AdjointSink for Contraction<'_> {
-    fn interest(&self) -> &Interest {
-        &self.motion.interest
+    fn active(&self) -> &ActiveInputs {
+        &self.motion.active
     }
 
     fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint) {
@@ -167,7 +167,7 @@ impl AdjointSink for Contraction<'_> {
         if tangents.is_empty() {
             return;
         }
-        let moves = self.motion.interest.grids[medium];
+        let moves = self.motion.active.grids[medium];
         let medium = self.world.medium(medium);
         let coefficients = medium.coefficients(x);
         let gradients = if moves { medium.gradients(x) } else { CoefficientGradients::ZERO };

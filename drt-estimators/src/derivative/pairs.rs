@@ -5,7 +5,7 @@
 //! Let a path leave a rough surface along w, of density p, and C be what comes from there. As the roughness α grows,
 //! the value f changes mainly as the density of microfacet normals does, by a f, where a is of the size of 1/α and of
 //! mean zero: a f C / p has the noise of C many times over. But each direction has a
-//! [counterpart](crate::model::surface::Counterpart) w', which gains what it loses. With the symbols of that, a f C / p is
+//! [counterpart](crate::model::surface::RoughnessPartner) w', which gains what it loses. With the symbols of that, a f C / p is
 //! replaced by
 //!
 //! ```text
@@ -21,7 +21,7 @@
 //!
 //! With a surface, with the ray that meets it, or with the index of refraction the lobe turns, and f changes by b f, b again
 //! of the size of 1/α. What one side of the lobe loses the other one gains, so the ray beside is the
-//! [opposite](crate::model::surface::Opposite) one, and b f C / p is replaced by
+//! [opposite](crate::model::surface::DirectionPartner) one, and b f C / p is replaced by
 //!
 //! ```text
 //! s [b f C + r b' f' C'] / p.
@@ -51,7 +51,7 @@ use drt_math::{Rgb, Rng, Vec3};
 use crate::derivative::velocity::PathVelocities;
 use crate::model::surface::{Given, Turn};
 use crate::sampling::record::PathRecord;
-use crate::sampling::trace::{Arrival, Leaving, Observer, Pixel, Tracer};
+use crate::sampling::trace::{Arrival, Observer, OutgoingRay, Pixel, Tracer};
 use crate::world::{Crossing, World};
 
 /// Pairs of each kind that a path has at most, so that its cost does not grow with the square of its length; those of
@@ -60,7 +60,7 @@ const MOST: f64 = 8.0;
 
 /// A part of the logarithmic derivative of a scattering function that pairs tell.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Paired {
+pub(crate) struct PairedPart {
     /// a, by the roughness.
     pub(crate) alpha: f64,
     /// Of which pair it is to tell b.
@@ -69,14 +69,14 @@ pub(crate) struct Paired {
 
 /// What a pair tells.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Told {
+pub(crate) enum PairKind {
     /// a, by the roughness.
     Roughness(f64),
     /// b and b', by what turns the lobe.
     Turns([Turn; 2]),
 }
 
-impl Told {
+impl PairKind {
     fn kind(&self) -> usize {
         match self {
             Self::Roughness(_) => 0,
@@ -87,13 +87,13 @@ impl Told {
 
 /// A ray beside that which leaves a node.
 #[derive(Clone, Debug)]
-pub(crate) struct Pair {
+pub(crate) struct AntitheticPair {
     pub(crate) node: usize,
-    pub(crate) told: Told,
+    pub(crate) told: PairKind,
     /// s.
     pub(crate) share: f64,
     /// The path's ray.
-    leaving: Leaving,
+    leaving: OutgoingRay,
     /// The other one's direction, and its density.
     w: Vec3,
     pdf: f64,
@@ -109,7 +109,7 @@ pub(crate) struct Pair {
 
 /// What the other ray of a pair brings.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Brought {
+pub(crate) struct PairedRadiance {
     /// C'.
     pub(crate) light: Rgb,
     /// Where the ray ends, with the part of C' that comes from there: several where vertices are placed for lights as
@@ -123,13 +123,13 @@ pub(crate) struct Brought {
     unasked: bool,
 }
 
-impl Observer for Brought {
+impl Observer for PairedRadiance {
     const RECORDS: bool = false;
 
     fn contribution(&mut self, _: Pixel, segments: u32, value: Rgb) {
         self.light += value;
         match self.ends.last_mut() {
-            Some((_, brought)) if segments > self.first => *brought += value,
+            Some((_, incoming)) if segments > self.first => *incoming += value,
             _ => self.emitted += value,
         }
     }
@@ -144,17 +144,17 @@ impl Observer for Brought {
 
 /// The pairs of a path.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Pairs {
-    list: Vec<Pair>,
+pub(crate) struct AntitheticPairs {
+    list: Vec<AntitheticPair>,
     /// By node, as far as there are any.
-    paired: Vec<Paired>,
+    paired: Vec<PairedPart>,
     /// For choosing among them; without it there are none.
     rng: Option<Rng>,
     /// They tell how lobes turn, too.
     turning: bool,
 }
 
-impl Pairs {
+impl AntitheticPairs {
     /// Of roughness, and if `turning` of how lobes turn.
     pub(crate) fn new(turning: bool) -> Self {
         Self { turning, ..Self::default() }
@@ -173,7 +173,7 @@ impl Pairs {
         world: &World,
         record: &PathRecord,
         velocities: &PathVelocities,
-        leaving: &Leaving,
+        leaving: &OutgoingRay,
         rng: &Rng,
     ) {
         let rougher = world.roughens(&leaving.vertex);
@@ -186,7 +186,7 @@ impl Pairs {
         else {
             return;
         };
-        let mut paired = Paired::default();
+        let mut paired = PairedPart::default();
         let wo = -arrival.dir;
         // `often` is how often the other one is drawn for what it tells, by a given density.
         let mut add = |told, size: f64, w, ratio: f64, often: f64| {
@@ -203,7 +203,7 @@ impl Pairs {
             let larger = f64::max(own, others);
             let weight = arrival.throughput.max_abs() * node.inv_pdf * share * size * larger;
             let (node, leaving, rng) = (leaving.node as usize, *leaving, rng.clone());
-            self.list.push(Pair {
+            self.list.push(AntitheticPair {
                 node,
                 told,
                 share,
@@ -217,35 +217,35 @@ impl Pairs {
             });
             true
         };
-        if rougher && let Some(c) = scattering.counterpart(wo, leaving.dir) {
+        if rougher && let Some(c) = scattering.roughness_partner(wo, leaving.dir) {
             let [a, b] = c.slopes.map(f64::abs);
-            if add(Told::Roughness(c.slopes[0]), a, c.w, c.ratio, a / b) {
+            if add(PairKind::Roughness(c.slopes[0]), a, c.w, c.ratio, a / b) {
                 paired.alpha = c.slopes[0];
             }
         }
         if turns
-            && let Some(o) = scattering.opposite(wo, leaving.dir)
-            && add(Told::Turns(o.turns), o.turns[0].n.length(), o.w, o.ratio, 1.0)
+            && let Some(o) = scattering.direction_partner(wo, leaving.dir)
+            && add(PairKind::Turns(o.turns), o.turns[0].n.length(), o.w, o.ratio, 1.0)
         {
             paired.turn = Some(self.list.len() as u32 - 1);
         }
         let k = leaving.node as usize;
         if self.paired.len() <= k {
-            self.paired.resize(k + 1, Paired::default());
+            self.paired.resize(k + 1, PairedPart::default());
         }
         self.paired[k] = paired;
     }
 
     /// What pairs tell of the ray that leaves a node.
-    pub(crate) fn paired(&self, node: usize) -> Paired {
+    pub(crate) fn paired(&self, node: usize) -> PairedPart {
         self.paired.get(node).copied().unwrap_or_default()
     }
 
     /// b, where a pair tells it.
-    pub(crate) fn turn(&self, paired: &Paired) -> Option<&Turn> {
+    pub(crate) fn turn(&self, paired: &PairedPart) -> Option<&Turn> {
         match &self.list.get(paired.turn? as usize)?.told {
-            Told::Turns([turn, _]) => Some(turn),
-            Told::Roughness(_) => None,
+            PairKind::Turns([turn, _]) => Some(turn),
+            PairKind::Roughness(_) => None,
         }
     }
 
@@ -256,7 +256,7 @@ impl Pairs {
         world: &World,
         record: &PathRecord,
         velocities: &PathVelocities,
-        leaving: &Leaving,
+        leaving: &OutgoingRay,
     ) -> bool {
         let (v, k) = (&leaving.vertex, leaving.node as usize);
         let (true, Some(s)) = (self.turning, v.surface()) else { return false };
@@ -269,13 +269,13 @@ impl Pairs {
         turns && world.lobe_width(v) < field.widest_paired(transmissive)
     }
 
-    /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring; `brought` is a
+    /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring; `incoming` is a
     /// buffer.
     pub(crate) fn follow(
         &self,
         tracer: &mut Tracer<'_>,
-        brought: &mut Brought,
-        mut found: impl FnMut(&Pair, f64, &Brought),
+        incoming: &mut PairedRadiance,
+        mut found: impl FnMut(&AntitheticPair, f64, &PairedRadiance),
     ) {
         let Some(mut rng) = self.rng.clone().filter(|_| !self.list.is_empty()) else { return };
         let own = tracer.rng.clone();
@@ -286,26 +286,26 @@ impl Pairs {
         let mut choices = totals.map(|total| Choice { next: rng.next_f64(), total });
         for pair in &self.list {
             if let Some(chance) = choices[pair.told.kind()].takes(pair.weight) {
-                pair.follow(tracer, brought);
-                found(pair, chance, brought);
+                pair.follow(tracer, incoming);
+                found(pair, chance, incoming);
             }
         }
         tracer.rng = own;
     }
 }
 
-impl Pair {
+impl AntitheticPair {
     /// Traces the other ray.
-    fn follow(&self, tracer: &mut Tracer<'_>, brought: &mut Brought) {
-        brought.ends.clear();
-        (brought.light, brought.emitted) = (Rgb::ZERO, Rgb::ZERO);
-        brought.first = self.leaving.segments + 1;
-        brought.unasked = matches!(self.told, Told::Roughness(_));
+    fn follow(&self, tracer: &mut Tracer<'_>, incoming: &mut PairedRadiance) {
+        incoming.ends.clear();
+        (incoming.light, incoming.emitted) = (Rgb::ZERO, Rgb::ZERO);
+        incoming.first = self.leaving.segments + 1;
+        incoming.unasked = matches!(self.told, PairKind::Roughness(_));
         if self.value.is_zero() || self.pdf <= 0.0 {
             return;
         }
         tracer.rng = self.rng.clone();
-        tracer.radiance_along(&self.leaving.turned(self.w, self.pdf, self.brighter), brought);
+        tracer.radiance_along(&self.leaving.turned(self.w, self.pdf, self.brighter), incoming);
     }
 }
 

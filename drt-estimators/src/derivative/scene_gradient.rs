@@ -6,7 +6,7 @@ use drt_math::{Rgb, Vec3};
 use drt_medium::MediumGradient;
 use drt_motion::surface::{SmoothNormals, VertexGradient};
 
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::model::emitter::EmitterGradient;
 use crate::model::rendering::Counters;
 use crate::model::scene::Scene;
@@ -35,17 +35,17 @@ pub struct SceneGradient {
 }
 
 impl SceneGradient {
-    pub(crate) fn zeros(world: &World, interest: &Interest) -> Self {
+    pub(crate) fn zeros(world: &World, active: &ActiveInputs) -> Self {
         let scene = &world.scene;
         fn some<T>(wanted: &[bool], make: impl Fn(usize) -> T) -> Vec<Option<T>> {
             wanted.iter().enumerate().map(|(i, w)| w.then(|| make(i))).collect()
         }
         Self {
-            shapes: some(&interest.shapes, |i| VertexGradient::zeros(&scene.shapes[i].mesh)),
-            media: some(&interest.media, |i| MediumGradient::zeros(&scene.media[i].item)),
-            bsdfs: some(&interest.bsdfs, |_| BsdfParams::default()),
-            emitters: some(&interest.emitters, |_| EmitterGradient::default()),
-            sensor: interest.sensor.then(SensorGradient::default),
+            shapes: some(&active.shapes, |i| VertexGradient::zeros(&scene.shapes[i].mesh)),
+            media: some(&active.media, |i| MediumGradient::zeros(&scene.media[i].item)),
+            bsdfs: some(&active.bsdfs, |_| BsdfParams::default()),
+            emitters: some(&active.emitters, |_| EmitterGradient::default()),
+            sensor: active.sensor.then(SensorGradient::default),
             counters: Counters::default(),
             non_finite: 0,
         }

@@ -74,7 +74,7 @@ impl CoefficientAdjoint {
 
 /// Which quantities any parameter (or gradient buffer) depends on: the rest is never computed.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Interest {
+pub(crate) struct ActiveInputs {
     /// Shapes that move.
     pub(crate) shapes: Vec<bool>,
     /// Media whose inside moves.
@@ -90,7 +90,7 @@ pub(crate) struct Interest {
     pub(crate) sensor: bool,
 }
 
-impl Interest {
+impl ActiveInputs {
     /// True when a surface, an inside, an emitter or the camera can move: what boundary terms need.
     pub(crate) fn moves_geometry(&self) -> bool {
         self.sensor
@@ -117,7 +117,7 @@ impl Interest {
 /// A receiver of sensitivities.
 pub(crate) trait AdjointSink {
     /// What it depends on.
-    fn interest(&self) -> &Interest;
+    fn active(&self) -> &ActiveInputs;
     /// Of a surface point.
     fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint);
     /// Of the position, and the volume Jacobian, of a material point inside a medium.
@@ -138,13 +138,13 @@ pub(crate) trait AdjointSink {
 
 /// A weighted sum of velocities: what boundary and flux terms depend on besides light.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Functional {
-    pub(crate) items: Vec<Rate>,
+pub(crate) struct VelocityFunctional {
+    pub(crate) items: Vec<VelocityTerm>,
 }
 
-/// A summand of a [`Functional`].
+/// A summand of a [`VelocityFunctional`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Rate {
+pub(crate) enum VelocityTerm {
     /// Velocity of a surface point, dotted with a vector.
     Surface(MaterialPoint, Vec3),
     /// Velocity of the inside of a medium at a point, dotted with a vector.
@@ -157,14 +157,14 @@ pub(crate) enum Rate {
     Sensor(SensorGradient),
 }
 
-impl Functional {
+impl VelocityFunctional {
     /// Sends `weight` times the functional to a sink: the derivative of (weight × functional).
     pub(crate) fn send<S: AdjointSink>(&self, weight: Rgb, sink: &mut S) {
         self.items.iter().for_each(|item| item.send(weight, sink));
     }
 }
 
-impl Rate {
+impl VelocityTerm {
     /// Of a point, dotted with a vector.
     pub(crate) fn of(matter: Matter, n: Vec3) -> Self {
         match matter {

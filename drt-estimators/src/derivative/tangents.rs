@@ -11,9 +11,9 @@ use drt_motion::parameter::{Applied, change_value, geometry_changes};
 use drt_motion::surface::{SmoothNormals, move_affine, move_mesh};
 use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotion};
 
-use crate::Error;
 use crate::derivative::grid_deformation::{GridDeformation, GridDeformationError};
 use crate::model::emitter::{Emitter, EmitterTangent};
+use crate::model::error::Error;
 use crate::model::scene::{Scene, Target};
 use crate::model::sensor::{Sensor, SensorTangent};
 use crate::model::surface::{BsdfChange, BsdfTangent, Property};

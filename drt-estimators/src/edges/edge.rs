@@ -7,7 +7,7 @@ use core::f64::consts::PI;
 use drt_geom::{EdgeClass, NONE, Topology};
 use drt_math::{CdfTable, Real, Rng, Vec3, fm, warp};
 
-use crate::Error;
+use crate::model::error::Error;
 use crate::world::World;
 use crate::world::vertex::MaterialPoint;
 
@@ -30,7 +30,7 @@ pub(crate) struct Edge {
     triangle: u32,
     corners: [u8; 2],
     /// Where segments that graze the edge run: before the faces, behind them, or on an open edge.
-    side: Side,
+    side: GrazedSide,
     /// The medium in which they run, where that is the same all along the edge.
     medium: Option<Option<usize>>,
     /// Something is so near that the edge may rest on it.
@@ -39,7 +39,7 @@ pub(crate) struct Edge {
 
 /// The side of an edge's faces on which it can be grazed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Side {
+pub(crate) enum GrazedSide {
     Front,
     Back,
     Unknown,
@@ -65,7 +65,7 @@ impl Edge {
         faces: [u32; 2],
         shape: u32,
         corners: [u8; 2],
-        side: Side,
+        side: GrazedSide,
     ) -> Option<Self> {
         let [a, b] = ends;
         let length = (b - a).length();
@@ -177,7 +177,7 @@ impl Edge {
         let beside = if first.0 == self.faces[0] { second.0 } else { first.0 };
         let faces = if own { self.faces } else { [self.faces[0], beside] };
         let across = [first.1, second.1];
-        Self { faces, across, between, side: Side::Unknown, ..*self }
+        Self { faces, across, between, side: GrazedSide::Unknown, ..*self }
     }
 
     /// The point at `u` of the way along the edge.
@@ -194,9 +194,9 @@ impl Edge {
     pub(crate) fn settle_medium(&mut self, world: &World, around: Option<Option<usize>>) {
         let boundary = world.scene.shapes[self.shape as usize].boundary;
         self.medium = match (boundary, self.side) {
-            (Some(b), Side::Front) => Some(b.exterior),
-            (Some(b), Side::Back) => Some(b.interior),
-            (Some(_), Side::Unknown) => None,
+            (Some(b), GrazedSide::Front) => Some(b.exterior),
+            (Some(b), GrazedSide::Back) => Some(b.interior),
+            (Some(_), GrazedSide::Unknown) => None,
             (None, _) => around,
         };
     }
@@ -295,9 +295,9 @@ pub(crate) fn collect(world: &World) -> (Vec<Edge>, u64) {
             let opposite = [0, second].map(|k| mesh.positions[e.opposite[k] as usize]);
             let faces = [0, second].map(|k| world.prim_of(i, e.faces[k]));
             let side = match e.class {
-                EdgeClass::Convex => Side::Front,
-                EdgeClass::Concave => Side::Back,
-                _ => Side::Unknown,
+                EdgeClass::Convex => GrazedSide::Front,
+                EdgeClass::Concave => GrazedSide::Back,
+                _ => GrazedSide::Unknown,
             };
             let corners = [ca as u8, cb as u8];
             let edge = Edge::new([a, b], opposite, faces, i as u32, corners, side);

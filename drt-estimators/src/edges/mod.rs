@@ -2,8 +2,8 @@
 //! fast they move, and which matter to a viewer.
 
 pub(crate) mod contact;
+pub(crate) mod discontinuities;
 pub(crate) mod edge;
-pub(crate) mod jumps;
 pub(crate) mod movers;
 pub(crate) mod speeds;
 pub(crate) mod tree;

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use drt_geom::Aabb;
 use drt_math::{Real, Vec3};
 
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::edges::edge::Edge;
 use crate::world::World;
 
@@ -22,7 +22,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// What moves in a scene.
 pub(crate) struct Movers<'a> {
-    interest: &'a Interest,
+    active: &'a ActiveInputs,
     /// Around each surface that moves.
     boxes: Vec<Aabb>,
     /// Some medium's inside moves: segments can end on it anywhere.
@@ -30,8 +30,8 @@ pub(crate) struct Movers<'a> {
 }
 
 impl<'a> Movers<'a> {
-    pub(crate) fn new(world: &World, interest: &'a Interest) -> Self {
-        let shapes = world.scene.shapes.iter().zip(&interest.shapes);
+    pub(crate) fn new(world: &World, active: &'a ActiveInputs) -> Self {
+        let shapes = world.scene.shapes.iter().zip(&active.shapes);
         let boxes: Vec<_> =
             shapes.filter(|(_, moves)| **moves).map(|(s, _)| s.mesh.bounds()).collect();
         let boxes = if boxes.len() > MOST_BOXES {
@@ -39,12 +39,12 @@ impl<'a> Movers<'a> {
         } else {
             boxes
         };
-        Self { interest, boxes, insides: interest.volumes.contains(&true) }
+        Self { active, boxes, insides: active.volumes.contains(&true) }
     }
 
     /// True when visibility past an edge can change at all.
     pub(crate) fn matter_to(&self, e: &Edge) -> bool {
-        self.interest.sensor || self.interest.moving_emitters.contains(&true) || self.pass(e)
+        self.active.sensor || self.active.moving_emitters.contains(&true) || self.pass(e)
     }
 
     /// True when an edge moves, or segments between any two points that graze it can end on what
@@ -55,7 +55,7 @@ impl<'a> Movers<'a> {
 
     /// True when an edge can matter to segments that start at the camera.
     pub(crate) fn pass_camera(&self, e: &Edge, eye: Vec3) -> bool {
-        self.interest.sensor || self.pass_beyond(e, |x| x - eye)
+        self.active.sensor || self.pass_beyond(e, |x| x - eye)
     }
 
     /// True when an edge can matter to segments that start on an emitter, which leave it at `x`
@@ -66,20 +66,20 @@ impl<'a> Movers<'a> {
         emitter: usize,
         onward: impl Fn(Vec3) -> Vec3,
     ) -> bool {
-        self.interest.moving_emitters[emitter] || self.pass_beyond(e, onward)
+        self.active.moving_emitters[emitter] || self.pass_beyond(e, onward)
     }
 
     /// True when what an edge hides from lights can change in media, wherever they are.
     pub(crate) fn pass_lights(&self, world: &World, e: &Edge) -> bool {
-        let mut shapes = world.scene.shapes.iter().zip(&self.interest.shapes);
+        let mut shapes = world.scene.shapes.iter().zip(&self.active.shapes);
         self.always(e)
-            || self.interest.moving_emitters.contains(&true)
+            || self.active.moving_emitters.contains(&true)
             || shapes.any(|(s, moves)| *moves && s.emitter.is_some())
     }
 
     /// True when the edge itself moves.
     pub(crate) fn moves(&self, e: &Edge) -> bool {
-        self.interest.shapes[e.shape as usize]
+        self.active.shapes[e.shape as usize]
     }
 
     /// The edge or an inside moves.
@@ -151,7 +151,7 @@ mod tests {
     use drt_math::{Rng, vec3};
 
     use super::*;
-    use crate::edges::edge::Side;
+    use crate::edges::edge::GrazedSide;
 
     fn point(rng: &mut Rng, size: f64) -> Vec3 {
         vec3(rng.next_f64() - 0.5, rng.next_f64() - 0.5, rng.next_f64() - 0.5) * (2.0 * size)
@@ -167,7 +167,7 @@ mod tests {
         let mut rng = Rng::new(5, 0, 0);
         for _ in 0..20_000 {
             let [a, b, c, d] = [0; 4].map(|_| point(&mut rng, 1.0));
-            let e = Edge::new([a, b], [c, d], [0, 1], 0, [0, 1], Side::Unknown).unwrap();
+            let e = Edge::new([a, b], [c, d], [0, 1], 0, [0, 1], GrazedSide::Unknown).unwrap();
             let x = a + (b - a) * rng.next_f64();
             test(&mut rng, &e, x);
         }

@@ -59,7 +59,7 @@ mod tests {
     use drt_math::{Affine, Frame, Mat3, vec3};
 
     use super::*;
-    use crate::edges::edge::Side;
+    use crate::edges::edge::GrazedSide;
 
     /// An open edge along z with its face at an angle, in a random place.
     fn sheet(angle: f64, prim: u32, backwards: bool) -> Edge {
@@ -72,7 +72,7 @@ mod tests {
         }
         let opposite = place.point(vec3(angle.cos(), angle.sin(), 0.2));
         let corners = if backwards { [1, 0] } else { [0, 1] };
-        Edge::new(ends, [opposite; 2], [prim; 2], prim, corners, Side::Unknown).unwrap()
+        Edge::new(ends, [opposite; 2], [prim; 2], prim, corners, GrazedSide::Unknown).unwrap()
     }
 
     fn joined(angles: &[f64]) -> Vec<Edge> {
@@ -117,7 +117,8 @@ mod tests {
         let mut apart = joined(&[0.1]);
         apart.extend([vec3(0.0, 0.0, 0.1), vec3(0.1, 0.0, 0.0)].map(|d| {
             let ends = [vec3(0.0, 0.0, -1.0), vec3(0.0, 0.0, 1.0)].map(|p| p + d);
-            Edge::new(ends, [vec3(1.0, 0.0, 0.0); 2], [7; 2], 7, [0, 1], Side::Unknown).unwrap()
+            Edge::new(ends, [vec3(1.0, 0.0, 0.0); 2], [7; 2], 7, [0, 1], GrazedSide::Unknown)
+                .unwrap()
         }));
         assert_eq!(weld(apart, |_| false).len(), 3);
     }

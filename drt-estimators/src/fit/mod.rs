@@ -26,16 +26,16 @@ use alloc::vec::Vec;
 
 use drt_motion::Parameter;
 
-use crate::Error;
 use crate::fit::loss::{Loss, Reference};
+use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
 use crate::run::session::Control;
-use crate::world::cache::Kept;
+use crate::world::cache::PreparedCache;
 
 pub use crate::fit::evaluation::Evaluation;
 use crate::fit::evaluation::{Half, Seen};
-use crate::fit::source::{Applied, Source};
+use crate::fit::source::{Applied, ImageSource};
 pub use crate::fit::step::{Misstep, check_step};
 
 /// A picture that a scene shall look like.
@@ -57,7 +57,7 @@ pub struct Fit {
     /// The scene at the values that were asked for last.
     applied: Option<Arc<Applied>>,
     /// From the last evaluation.
-    kept: Kept,
+    kept: PreparedCache,
 }
 
 /// Between the seeds of the halves of an iteration, those of iterations being small steps apart.
@@ -95,7 +95,7 @@ impl Fit {
                 ));
             }
         }
-        let (views, applied, kept) = (views.into(), None, Kept::default());
+        let (views, applied, kept) = (views.into(), None, PreparedCache::default());
         Ok(Self { scene, parameters, views, loss, settings, applied, kept })
     }
 
@@ -173,7 +173,7 @@ impl Fit {
     ) -> Result<Option<[Half; 2]>, Error> {
         let settings = Settings { sensor, terms: false, ..self.settings.clone() };
         let mut source =
-            Source::new(&self.scene, &self.parameters, applied, settings, &mut self.kept)?;
+            ImageSource::new(&self.scene, &self.parameters, applied, settings, &mut self.kept)?;
         let mut half = |k: usize, seed| {
             let progress = |done| control.progress(0.5 * (k as f64 + done));
             source.half(spp, seed, &Watched { control, progress })

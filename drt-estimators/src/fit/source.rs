@@ -8,12 +8,13 @@ use drt_motion::Parameter;
 use crate::derivative::tangents;
 use crate::derivative::tangents::Tangents;
 use crate::fit::evaluation::Half;
+use crate::model::error::Error;
 use crate::model::rendering::Layer;
 use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, Settings};
+use crate::run::finite_difference::finite_differences;
 use crate::run::session::{Control, Session};
-use crate::world::cache::Kept;
-use crate::{Error, finite_differences};
+use crate::world::cache::PreparedCache;
 
 /// A scene at its parameters' values, and its rates of change.
 pub(super) struct Applied {
@@ -29,20 +30,20 @@ impl Applied {
 }
 
 /// A scene prepared at its parameters' values.
-pub(super) struct Source<'a> {
+pub(super) struct ImageSource<'a> {
     session: Session,
     /// Set where derivatives are differences of images.
     differences: Option<(&'a Scene, &'a [Parameter])>,
     settings: Settings,
 }
 
-impl<'a> Source<'a> {
+impl<'a> ImageSource<'a> {
     pub(super) fn new(
         scene: &'a Scene,
         parameters: &'a [Parameter],
         applied: &Applied,
         settings: Settings,
-        kept: &mut Kept,
+        kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         let Applied { scene: moved, tangents } = applied;
         if settings.estimator == EstimatorKind::FiniteDifference {

@@ -154,7 +154,7 @@ pub(crate) struct Account {
     pub(crate) non_finite: Vec<NonFinite>,
     pub(crate) non_finite_count: u64,
     /// Rays of looks at edges.
-    pub(crate) looking: u64,
+    pub(crate) query_rays: u64,
 }
 
 impl Account {
@@ -164,7 +164,7 @@ impl Account {
     pub(crate) fn add(&mut self, o: Self) {
         self.counters.add(&o.counters);
         self.non_finite_count += o.non_finite_count;
-        self.looking += o.looking;
+        self.query_rays += o.query_rays;
         let room = Self::DESCRIBED.saturating_sub(self.non_finite.len());
         self.non_finite.extend(o.non_finite.into_iter().take(room));
     }

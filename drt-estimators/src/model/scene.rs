@@ -148,8 +148,10 @@ impl Scene {
     ///
     /// # Errors
     /// Names the element and what is wrong with it.
-    pub fn check(&self) -> Result<(), crate::Error> {
-        let fail = |element: String, reason: String| Err(crate::Error::Element { element, reason });
+    pub fn check(&self) -> Result<(), crate::model::error::Error> {
+        let fail = |element: String, reason: String| {
+            Err(crate::model::error::Error::Element { element, reason })
+        };
         let missing = |m: Option<usize>| m.is_some_and(|m| m >= self.media.len());
         for (i, s) in self.shapes.iter().enumerate() {
             let name = || s.id.clone().unwrap_or_else(|| alloc::format!("shape[{i}]"));
@@ -173,18 +175,20 @@ impl Scene {
     ///
     /// # Errors
     /// A sentence naming what exists when nothing or more than one thing has that name.
-    pub fn find(&self, name: &str) -> Result<Target, crate::Error> {
+    pub fn find(&self, name: &str) -> Result<Target, crate::model::error::Error> {
         if let Some(target) = self.find_by_order(name) {
             return Ok(target);
         }
         let mut found = self.named().filter(|(id, _)| *id == Some(name)).map(|(_, t)| t);
         match (found.next(), found.next()) {
             (Some(t), None) => Ok(t),
-            (None, _) => Err(crate::Error::UnknownTarget {
+            (None, _) => Err(crate::model::error::Error::UnknownTarget {
                 name: name.into(),
                 known: self.named().filter_map(|(id, _)| id.map(String::from)).collect(),
             }),
-            (Some(_), Some(_)) => Err(crate::Error::AmbiguousTarget { name: name.into() }),
+            (Some(_), Some(_)) => {
+                Err(crate::model::error::Error::AmbiguousTarget { name: name.into() })
+            }
         }
     }
 

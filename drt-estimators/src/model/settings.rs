@@ -86,11 +86,11 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting.
-    pub(crate) fn check(&self) -> Result<(), crate::Error> {
+    pub(crate) fn check(&self) -> Result<(), crate::model::error::Error> {
         if self.step > 0.0 && self.step.is_finite() {
             return Ok(());
         }
-        Err(crate::Error::Setting {
+        Err(crate::model::error::Error::Setting {
             setting: "step".into(),
             reason: alloc::format!("is {}; expected a positive number", self.step),
         })

@@ -6,9 +6,9 @@ use drt_math::Rgb;
 use drt_math::sobol::SobolSampler;
 use drt_motion::Parameter;
 
-use crate::Error;
 use crate::derivative::contraction::Contraction;
 use crate::derivative::tangents;
+use crate::model::error::Error;
 use crate::model::rendering::Layer;
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
@@ -18,8 +18,8 @@ use crate::sampling::parallel::Pool;
 use crate::sampling::pixels::{Filling, Sampler};
 use crate::terms::interior::PixelSampler;
 use crate::world::World;
-use crate::world::cache::Kept;
-use crate::world::lights::Lit;
+use crate::world::cache::PreparedCache;
+use crate::world::lights::EmitterMask;
 
 /// Central differences of the image by each parameter, in the order of `parameters`: the difference
 /// of the images at value ± `step`, over 2 `step`.
@@ -51,11 +51,18 @@ pub fn finite_differences(
             moved[p].value += offset;
             let (scene, _) = tangents::apply(scene, &moved)?;
             let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-            World::new(scene, settings.sensor, depth, middle, Lit::All, &mut Kept::default())
+            World::new(
+                scene,
+                settings.sensor,
+                depth,
+                middle,
+                EmitterMask::All,
+                &mut PreparedCache::default(),
+            )
         };
         let middle = at(0.0, None)?;
         let worlds = [at(-step, Some(&middle))?, at(step, Some(&middle))?];
-        let pair = Pair { worlds, step, settings };
+        let pair = AntitheticPair { worlds, step, settings };
         let progress = |done: f64| {
             control.progress((p as f64 + done) / parameters.len() as f64);
         };
@@ -68,13 +75,13 @@ pub fn finite_differences(
 }
 
 /// A scene displaced both ways.
-struct Pair<'a> {
+struct AntitheticPair<'a> {
     worlds: [World; 2],
     step: f64,
     settings: &'a Settings,
 }
 
-impl Pair<'_> {
+impl AntitheticPair<'_> {
     fn difference(
         &self,
         pool: &Pool,
@@ -89,13 +96,13 @@ impl Pair<'_> {
             pool,
             seed,
             allocation: None,
-            sampler: || Sides {
+            sampler: || StepPair {
                 samplers: [0, 1]
                     .map(|k| PixelSampler::new(&self.worlds[k], None, seed, false, false)),
                 scale: 0.5 / self.step,
             },
         };
-        let going = |_: Sides<'_>, part| {
+        let going = |_: StepPair<'_>, part| {
             progress(part);
             !control.cancelled()
         };
@@ -105,12 +112,12 @@ impl Pair<'_> {
 }
 
 /// Samples both displaced scenes alike.
-struct Sides<'a> {
+struct StepPair<'a> {
     samplers: [PixelSampler<'a, Contraction<'a>>; 2],
     scale: f64,
 }
 
-impl Sampler for Sides<'_> {
+impl Sampler for StepPair<'_> {
     fn sample(&mut self, pixel: u32, unit: u32, points: SobolSampler, values: &mut [Rgb]) {
         let [low, high] = &mut self.samplers;
         let mut below = [Rgb::ZERO];

@@ -14,14 +14,14 @@ use drt_medium::{CoefficientRates, DepthEstimate};
 use drt_motion::surface::JetAdjoint;
 use drt_motion::volume::VolumeAdjoint;
 
-use crate::Error;
 use crate::derivative::medium_motion::{InteriorGradients, ReverseMediumMotions};
 use crate::derivative::scene_gradient::SceneGradient;
 use crate::derivative::sensitivity::{
-    AdjointSink, CoefficientAdjoint, Functional, Interest, SurfaceAdjoint,
+    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, VelocityFunctional,
 };
 use crate::derivative::tangents;
 use crate::model::emitter::EmitterGradient;
+use crate::model::error::Error;
 use crate::model::scene::{Scene, Target};
 use crate::model::sensor::SensorGradient;
 use crate::model::settings::{EstimatorKind, Settings};
@@ -30,14 +30,14 @@ use crate::run::session::{Control, estimators, seed_of_component};
 use crate::sampling::film::BATCHES;
 use crate::sampling::parallel::Pool;
 use crate::sampling::pixels::{Pass, Sampler};
-use crate::terms::boundary::Receiver;
+use crate::terms::boundary::BoundarySink;
 use crate::terms::interior::{PathSink, PixelSampler};
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::Checked;
-use crate::world::cache::Kept;
-use crate::world::lights::Lit;
+use crate::world::cache::PreparedCache;
+use crate::world::lights::EmitterMask;
 use crate::world::vertex::MaterialPoint;
-use crate::world::{MediumNeed, Needs, World};
+use crate::world::{ActiveFactors, MediumActivity, World};
 
 /// The gradient of a loss by the items `wanted`, with `adjoint` holding dLoss/dI for every pixel (row
 /// by row from the top left, per channel).
@@ -86,8 +86,9 @@ pub fn gradient(
         });
     }
     let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-    let mut kept = Kept::default();
-    let mut world = World::new(scene.clone(), settings.sensor, depth, None, Lit::All, &mut kept)?;
+    let mut kept = PreparedCache::default();
+    let mut world =
+        World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, &mut kept)?;
     let estimators = estimators(&scene, wanted.iter().copied(), settings).into_iter();
     let components = estimators
         .map(|(settings, lit)| Component::new(world.lit_by(lit)?, wanted, &settings))
@@ -111,7 +112,7 @@ pub fn gradient(
             going = going && pool.ordered(0..chunks, 1, |b| run.splats(c, i, b), &mut merge);
         }
     }
-    let mut gradient = SceneGradient::zeros(&world, &interest(&scene, wanted));
+    let mut gradient = SceneGradient::zeros(&world, &active(&scene, wanted));
     for (component, sums) in components.iter().zip(total) {
         let Sums { mut scene, insides } = sums;
         component.insides.gather(&component.prepared.world, insides, &mut scene);
@@ -123,41 +124,41 @@ pub fn gradient(
 /// One estimator's part in a gradient, by the light of some emitters.
 struct Component {
     prepared: Prepared,
-    interest: Interest,
+    active: ActiveInputs,
     insides: ReverseMediumMotions,
 }
 
 impl Component {
     fn new(mut world: World, wanted: &[Target], settings: &Settings) -> Result<Self, Error> {
         let lit = world.lit;
-        let mut interest = interest(&world.scene, wanted);
+        let mut active = active(&world.scene, wanted);
         for (e, emitter) in world.scene.emitters.iter().enumerate() {
-            interest.emitters[e] &= lit.by(&emitter.item.emitter);
-            interest.moving_emitters[e] &= lit.by(&emitter.item.emitter);
+            active.emitters[e] &= lit.by(&emitter.item.emitter);
+            active.moving_emitters[e] &= lit.by(&emitter.item.emitter);
         }
         let insides = match settings.estimator {
             EstimatorKind::Radiative => ReverseMediumMotions::at_rest(&world),
-            _ => ReverseMediumMotions::new(&world, &interest, &settings.insides)?,
+            _ => ReverseMediumMotions::new(&world, &active, &settings.insides)?,
         };
-        interest.volumes = insides.volumes();
-        world.prepare_for_derivatives(needs(&interest));
-        let prepared = Prepared::new(world, &interest, &insides.flux_shapes, settings, None)?;
-        Ok(Self { prepared, interest, insides })
+        active.volumes = insides.volumes();
+        world.prepare_for_derivatives(needs(&active));
+        let prepared = Prepared::new(world, &active, &insides.flux_shapes, settings, None)?;
+        Ok(Self { prepared, active, insides })
     }
 
-    fn needs(&self) -> Needs {
-        needs(&self.interest)
+    fn needs(&self) -> ActiveFactors {
+        needs(&self.active)
     }
 
     fn zeros(&self) -> Sums {
-        let scene = SceneGradient::zeros(&self.prepared.world, &self.interest);
+        let scene = SceneGradient::zeros(&self.prepared.world, &self.active);
         Sums { scene, insides: self.insides.zeros() }
     }
 
     fn scatter(&self) -> ScatterSink<'_> {
         ScatterSink {
             world: &self.prepared.world,
-            interest: &self.interest,
+            active: &self.active,
             insides: &self.insides,
             weights: Rgb::ZERO,
             sums: self.zeros(),
@@ -166,17 +167,17 @@ impl Component {
 }
 
 /// What must be sampled even where it contributes nothing to the image.
-fn needs(interest: &Interest) -> Needs {
-    let need = |w: &bool| if *w { MediumNeed::Vertices } else { MediumNeed::Nothing };
-    Needs {
-        media: interest.media.iter().map(need).collect(),
-        bsdfs: interest.bsdfs.clone(),
-        roughness: interest.bsdfs.clone(),
-        index: interest.bsdfs.clone(),
+fn needs(active: &ActiveInputs) -> ActiveFactors {
+    let need = |w: &bool| if *w { MediumActivity::Vertices } else { MediumActivity::Nothing };
+    ActiveFactors {
+        media: active.media.iter().map(need).collect(),
+        bsdfs: active.bsdfs.clone(),
+        roughness: active.bsdfs.clone(),
+        index: active.bsdfs.clone(),
     }
 }
 
-fn interest(scene: &Scene, wanted: &[Target]) -> Interest {
+fn active(scene: &Scene, wanted: &[Target]) -> ActiveInputs {
     fn flags(n: usize, wanted: &[Target], of: impl Fn(usize) -> Target) -> Vec<bool> {
         (0..n).map(|i| wanted.contains(&of(i))).collect()
     }
@@ -185,7 +186,7 @@ fn interest(scene: &Scene, wanted: &[Target]) -> Interest {
         let emitter = &scene.emitters[e].item.emitter;
         emitter.is_delta()
     };
-    Interest {
+    ActiveInputs {
         shapes: flags(scene.shapes.len(), wanted, Target::Shape),
         volumes: alloc::vec![false; scene.media.len()],
         media: flags(scene.media.len(), wanted, Target::Medium),
@@ -268,7 +269,7 @@ impl Reverse<'_> {
         let mut receiver = Checked::new(ToGradient {
             scatter: component.scatter(),
             adjoint: self.adjoint,
-            functional: Functional::default(),
+            functional: VelocityFunctional::default(),
             weight: 0.0,
             scale,
         });
@@ -287,7 +288,7 @@ impl Reverse<'_> {
 /// Adds sensitivities, weighted by the pixel's adjoint, to the gradient of everything.
 pub(crate) struct ScatterSink<'a> {
     world: &'a World,
-    interest: &'a Interest,
+    active: &'a ActiveInputs,
     insides: &'a ReverseMediumMotions,
     weights: Rgb,
     sums: Sums,
@@ -296,11 +297,11 @@ pub(crate) struct ScatterSink<'a> {
 #[cfg(all(test, feature = "std"))]
 impl<'a> ScatterSink<'a> {
     /// To what is not inside of media.
-    pub(crate) fn of_surfaces(world: &'a World, interest: &'a Interest, weights: Rgb) -> Self {
+    pub(crate) fn of_surfaces(world: &'a World, active: &'a ActiveInputs, weights: Rgb) -> Self {
         let insides =
             alloc::boxed::Box::leak(alloc::boxed::Box::new(ReverseMediumMotions::at_rest(world)));
-        let sums = Sums { scene: SceneGradient::zeros(world, interest), insides: insides.zeros() };
-        Self { world, interest, insides, weights, sums }
+        let sums = Sums { scene: SceneGradient::zeros(world, active), insides: insides.zeros() };
+        Self { world, active, insides, weights, sums }
     }
 
     pub(crate) fn into_gradient(self) -> SceneGradient {
@@ -309,8 +310,8 @@ impl<'a> ScatterSink<'a> {
 }
 
 impl AdjointSink for ScatterSink<'_> {
-    fn interest(&self) -> &Interest {
-        self.interest
+    fn active(&self) -> &ActiveInputs {
+        self.active
     }
 
     fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint) {
@@ -395,7 +396,7 @@ impl AdjointSink for ScatterSink<'_> {
 impl PathSink for ScatterSink<'_> {
     fn begin(&mut self) {}
     fn finish(&mut self, _: &mut [Rgb]) {}
-    fn functional(&mut self, f: &Functional, value: Rgb, _: &mut [Rgb]) {
+    fn functional(&mut self, f: &VelocityFunctional, value: Rgb, _: &mut [Rgb]) {
         f.send(value, self);
     }
     fn layers(&self) -> usize {
@@ -407,7 +408,7 @@ impl PathSink for ScatterSink<'_> {
 struct ToGradient<'a> {
     scatter: ScatterSink<'a>,
     adjoint: &'a [Rgb],
-    functional: Functional,
+    functional: VelocityFunctional,
     weight: f64,
     scale: f64,
 }
@@ -422,8 +423,8 @@ impl ToGradient<'_> {
     }
 }
 
-impl Receiver for ToGradient<'_> {
-    fn moves(&mut self, functional: &Functional) -> bool {
+impl BoundarySink for ToGradient<'_> {
+    fn moves(&mut self, functional: &VelocityFunctional) -> bool {
         self.flush();
         self.functional.clone_from(functional);
         true

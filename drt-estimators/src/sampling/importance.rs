@@ -11,7 +11,7 @@ use drt_math::{Rgb, Vec3};
 
 use crate::sampling::flight::{Flown, medium_span};
 use crate::sampling::mode::{ImportanceMode, TransportMode};
-use crate::sampling::trace::{Alive, Flight, Observer, Pixel, Stop, Tracer};
+use crate::sampling::trace::{Alive, Flight, Observer, PathState, Pixel, Tracer};
 use crate::world::RayPath;
 use crate::world::vertex::{Kind, Vertex};
 
@@ -50,7 +50,7 @@ impl Tracer<'_> {
             (Kind::Volume(_), Some(m)) => Some(self.world.medium(m).coefficients(start.x)),
             _ => None,
         };
-        let stop = Stop {
+        let stop = PathState {
             node: 0,
             vertex: start,
             coefficients,

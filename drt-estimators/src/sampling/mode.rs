@@ -16,7 +16,7 @@ use drt_math::{Rgb, Vec3};
 use drt_medium::Coefficients;
 
 use crate::model::surface::Given;
-use crate::sampling::trace::{Observer, Stop, Tracer};
+use crate::sampling::trace::{Observer, PathState, Tracer};
 use crate::world::lights::{LightKind, LightSample, LightTable};
 use crate::world::scatter::Scattering;
 use crate::world::{Tracking, World};
@@ -45,7 +45,7 @@ pub(crate) trait TransportMode {
     /// Connects a vertex to the other end of paths; `sigma_s` is its scattering coefficient, 1 on surfaces.
     fn connect<O: Observer>(
         tracer: &mut Tracer<'_>,
-        stop: &Stop,
+        stop: &PathState,
         scattering: &Scattering<'_>,
         sigma_s: Rgb,
         observer: &mut O,
@@ -60,7 +60,7 @@ pub(crate) trait TransportMode {
     /// Connects a vertex that was placed for it.
     fn connect_to_point<O: Observer>(
         tracer: &mut Tracer<'_>,
-        stop: &Stop,
+        stop: &PathState,
         point: &ConnectionPoint,
         observer: &mut O,
     );
@@ -82,7 +82,7 @@ impl TransportMode for RadianceMode {
 
     fn connect<O: Observer>(
         tracer: &mut Tracer<'_>,
-        stop: &Stop,
+        stop: &PathState,
         scattering: &Scattering<'_>,
         sigma_s: Rgb,
         observer: &mut O,
@@ -120,7 +120,7 @@ impl TransportMode for RadianceMode {
 
     fn connect_to_point<O: Observer>(
         tracer: &mut Tracer<'_>,
-        stop: &Stop,
+        stop: &PathState,
         point: &ConnectionPoint,
         observer: &mut O,
     ) {
@@ -142,7 +142,7 @@ impl TransportMode for ImportanceMode {
 
     fn connect<O: Observer>(
         tracer: &mut Tracer<'_>,
-        stop: &Stop,
+        stop: &PathState,
         _: &Scattering<'_>,
         sigma_s: Rgb,
         observer: &mut O,
@@ -164,7 +164,7 @@ impl TransportMode for ImportanceMode {
 
     fn connect_to_point<O: Observer>(
         tracer: &mut Tracer<'_>,
-        stop: &Stop,
+        stop: &PathState,
         _: &ConnectionPoint,
         observer: &mut O,
     ) {
@@ -175,7 +175,7 @@ impl TransportMode for ImportanceMode {
 }
 
 /// MIS weight of connecting to a point light from a vertex that free flight found.
-fn free_flight_weight(world: &World, stop: &Stop, light: &LightSample) -> f64 {
+fn free_flight_weight(world: &World, stop: &PathState, light: &LightSample) -> f64 {
     let (lights, total) = world.lights.inside();
     match &stop.flight {
         Some(flight) if lights.iter().any(|(e, _, _)| *e == light.emitter) => {

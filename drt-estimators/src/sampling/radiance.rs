@@ -3,14 +3,14 @@
 use drt_math::{Rgb, Vec3};
 
 use crate::sampling::mode::RadianceMode;
-use crate::sampling::trace::{Alive, Leaving, Observer, Pixel, Stop, Tracer};
+use crate::sampling::trace::{Alive, Observer, OutgoingRay, PathState, Pixel, Tracer};
 use crate::world::vertex::{Kind, Vertex};
 
 impl Tracer<'_> {
     /// Traces a camera ray; `weight` is the filter over the density of the image point.
     pub(crate) fn trace_camera<O: Observer>(&mut self, dir: Vec3, weight: Rgb, observer: &mut O) {
         self.counters.paths += 1;
-        let leaving = Leaving {
+        let leaving = OutgoingRay {
             node: 0,
             vertex: self.world.eye(),
             dir,
@@ -24,7 +24,7 @@ impl Tracer<'_> {
     }
 
     /// Estimates what comes along a ray, times its throughput.
-    pub(crate) fn radiance_along<O: Observer>(&mut self, leaving: &Leaving, observer: &mut O) {
+    pub(crate) fn radiance_along<O: Observer>(&mut self, leaving: &OutgoingRay, observer: &mut O) {
         if let Some(stop) = self.follow::<RadianceMode, O>(leaving, observer) {
             self.walk::<RadianceMode, O>(stop, observer);
         }
@@ -54,7 +54,7 @@ impl Tracer<'_> {
             }
             Kind::Point => return,
         };
-        let stop = Stop {
+        let stop = PathState {
             node: 0,
             vertex,
             coefficients,

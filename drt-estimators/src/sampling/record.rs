@@ -5,7 +5,7 @@ use core::ops::Range;
 
 use drt_math::{Rgb, Vec3};
 
-use crate::sampling::trace::{Arrival, Connection, Endpoint, Leaving, Observer, Pixel};
+use crate::sampling::trace::{Arrival, Connection, Endpoint, Observer, OutgoingRay, Pixel};
 use crate::world::Crossing;
 use crate::world::vertex::Vertex;
 
@@ -96,7 +96,7 @@ impl PathRecord {
     }
 
     /// The walk leaves a node.
-    pub(crate) fn scatter(&mut self, leaving: &Leaving, value: Rgb, inv_pdf: f64) {
+    pub(crate) fn scatter(&mut self, leaving: &OutgoingRay, value: Rgb, inv_pdf: f64) {
         let node = &mut self.nodes[leaving.node as usize];
         (node.wi, node.value, node.inv_pdf) = (leaving.dir, value, inv_pdf);
     }

@@ -24,7 +24,7 @@ use alloc::boxed::Box;
 use drt_math::{Rgb, Rng, Vec3, warp};
 use drt_medium::Coefficients;
 
-use crate::Counters;
+use crate::model::rendering::Counters;
 use crate::world::lights::LightSample;
 use crate::world::vertex::Vertex;
 use crate::world::{Crossing, RayPath, World};
@@ -93,7 +93,7 @@ pub(crate) trait Observer {
     /// What reached a pixel, or the walk's start, over `segments` segments from the latter.
     fn contribution(&mut self, to: Pixel, segments: u32, value: Rgb);
     /// The walk is about to follow a ray.
-    fn ray(&mut self, _world: &World, _leaving: &Leaving, _ray: &RayPath) {}
+    fn ray(&mut self, _world: &World, _leaving: &OutgoingRay, _ray: &RayPath) {}
     /// The walk arrived somewhere; returns the name by which the walk refers to it.
     fn arrive(&mut self, _world: &World, _arrival: &Arrival, _crossings: &[Crossing]) -> u32 {
         0
@@ -103,7 +103,7 @@ pub(crate) trait Observer {
     fn scatter(
         &mut self,
         _world: &World,
-        _leaving: &Leaving,
+        _leaving: &OutgoingRay,
         _value: Rgb,
         _inv_pdf: f64,
         _rng: &Rng,
@@ -115,7 +115,7 @@ pub(crate) trait Observer {
 
 /// A vertex about to scatter.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stop {
+pub(super) struct PathState {
     pub(super) node: u32,
     pub(super) vertex: Vertex,
     pub(super) coefficients: Option<Coefficients>,
@@ -141,7 +141,7 @@ pub(super) struct Alive {
 
 /// A ray about to be followed.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Leaving {
+pub(crate) struct OutgoingRay {
     pub(crate) node: u32,
     pub(crate) vertex: Vertex,
     pub(crate) dir: Vec3,
@@ -153,7 +153,7 @@ pub(crate) struct Leaving {
     pub(crate) segments: u32,
 }
 
-impl Leaving {
+impl OutgoingRay {
     /// The density of its direction.
     pub(crate) fn pdf(&self) -> Option<f64> {
         self.pdf

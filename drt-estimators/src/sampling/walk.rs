@@ -6,14 +6,18 @@ use drt_medium::Coefficients;
 use crate::sampling::flight::{Flown, Travel, medium_span};
 use crate::sampling::mode::TransportMode;
 use crate::sampling::trace::{
-    Alive, Arrival, Connection, Endpoint, Flight, Leaving, Observer, Pixel, Stop, Tracer,
+    Alive, Arrival, Connection, Endpoint, Flight, Observer, OutgoingRay, PathState, Pixel, Tracer,
 };
 use crate::world::RayPath;
 use crate::world::lights::LightSample;
 use crate::world::vertex::Vertex;
 
 impl Tracer<'_> {
-    pub(super) fn walk<M: TransportMode, O: Observer>(&mut self, mut stop: Stop, observer: &mut O) {
+    pub(super) fn walk<M: TransportMode, O: Observer>(
+        &mut self,
+        mut stop: PathState,
+        observer: &mut O,
+    ) {
         while let Some(leaving) = self.scatter::<M, O>(&stop, observer) {
             match self.follow::<M, O>(&leaving, observer) {
                 Some(next) => stop = next,
@@ -25,9 +29,9 @@ impl Tracer<'_> {
     /// Connects the vertex to the other end of paths and draws where this one goes on.
     fn scatter<M: TransportMode, O: Observer>(
         &mut self,
-        stop: &Stop,
+        stop: &PathState,
         observer: &mut O,
-    ) -> Option<Leaving> {
+    ) -> Option<OutgoingRay> {
         if stop.segments >= self.max_segments {
             return None;
         }
@@ -60,7 +64,7 @@ impl Tracer<'_> {
             inv_pdf /= survival;
             alive.value *= 1.0 / survival;
         }
-        let leaving = Leaving {
+        let leaving = OutgoingRay {
             node: stop.node,
             vertex: stop.vertex,
             dir: to,
@@ -76,9 +80,9 @@ impl Tracer<'_> {
     /// Follows a ray to its next vertex.
     pub(super) fn follow<M: TransportMode, O: Observer>(
         &mut self,
-        leaving: &Leaving,
+        leaving: &OutgoingRay,
         observer: &mut O,
-    ) -> Option<Stop> {
+    ) -> Option<PathState> {
         let origin = leaving.vertex.x;
         let mut ray = self.ray.take().unwrap_or_default();
         self.world.cast(&leaving.vertex, leaving.dir, &mut ray, &mut self.counters);
@@ -105,13 +109,13 @@ impl Tracer<'_> {
     /// Arrives at a volume vertex, whose own emission counts by `emission_weight`.
     fn at_volume<M: TransportMode, O: Observer>(
         &mut self,
-        leaving: &Leaving,
+        leaving: &OutgoingRay,
         ray: &RayPath,
         v: &Flown,
         flight: Option<Flight>,
         emission_weight: f64,
         observer: &mut O,
-    ) -> Stop {
+    ) -> PathState {
         let segments = leaving.segments + 1;
         let throughput = leaving.throughput * v.arrival;
         if M::EMISSION {
@@ -131,7 +135,7 @@ impl Tracer<'_> {
             emission_weight,
         };
         let node = observer.arrive(self.world, &record, &ray.crossings[..v.crossed]);
-        Stop {
+        PathState {
             node,
             vertex: v.vertex,
             coefficients: Some(v.coefficients),
@@ -147,12 +151,12 @@ impl Tracer<'_> {
     /// Arrives at a surface.
     fn at_surface<M: TransportMode, O: Observer>(
         &mut self,
-        leaving: &Leaving,
+        leaving: &OutgoingRay,
         ray: &RayPath,
         vertex: Vertex,
         arrival: Rgb,
         observer: &mut O,
-    ) -> Stop {
+    ) -> PathState {
         let segments = leaving.segments + 1;
         let throughput = leaving.throughput * arrival;
         let mut emission_weight = 0.0;
@@ -175,7 +179,7 @@ impl Tracer<'_> {
             emission_weight,
         };
         let node = observer.arrive(self.world, &record, &ray.crossings);
-        Stop {
+        PathState {
             node,
             vertex,
             coefficients: None,
@@ -191,7 +195,7 @@ impl Tracer<'_> {
     /// Leaves the scene.
     fn escape<M: TransportMode, O: Observer>(
         &mut self,
-        leaving: &Leaving,
+        leaving: &OutgoingRay,
         ray: &RayPath,
         arrival: Rgb,
         observer: &mut O,
@@ -218,7 +222,7 @@ impl Tracer<'_> {
     /// (theory sheet §14.2). Returns the part of the ray it covers.
     fn equiangular<M: TransportMode, O: Observer>(
         &mut self,
-        leaving: &Leaving,
+        leaving: &OutgoingRay,
         ray: &RayPath,
         observer: &mut O,
     ) -> Option<(f64, f64)> {
@@ -240,7 +244,7 @@ impl Tracer<'_> {
     /// Adds the light of one sampled emitter point, scattered at `stop`.
     pub(super) fn connect_light<O: Observer>(
         &mut self,
-        stop: &Stop,
+        stop: &PathState,
         light: &LightSample,
         weight: f64,
         sigma_s: Rgb,

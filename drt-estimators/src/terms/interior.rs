@@ -13,7 +13,7 @@ use crate::terms::interior::component::{Traced, Worker};
 pub(crate) use crate::terms::interior::recorder::{PathView, Recorder};
 
 use crate::derivative::contraction::Contraction;
-use crate::derivative::sensitivity::{AdjointSink, Functional};
+use crate::derivative::sensitivity::{AdjointSink, VelocityFunctional};
 use crate::model::rendering::{Account, Counters, NonFinite, Term};
 use crate::sampling::pixels::Sampler;
 use crate::sampling::record::PathRecord;
@@ -22,7 +22,7 @@ use crate::sampling::streams::{DIMENSIONS, FLUX_STREAM, PAIR_STREAM};
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary::shadow::Shadows;
 use crate::terms::flux::Flux;
-use crate::terms::radiative::{Look, Radiative};
+use crate::terms::radiative::{EdgeQuery, Radiative};
 use crate::world::{RayPath, World};
 
 /// Boundary and flux terms that are found along camera rays.
@@ -32,27 +32,27 @@ pub(crate) struct AlongRays<'a> {
     pub(crate) shadows: Option<&'a Shadows>,
     /// Set in the spatial form.
     pub(crate) radiative: Option<&'a Radiative>,
-    pub(crate) looks: Looks,
+    pub(crate) queries: EdgeQueries,
     /// Pairs of rays tell how narrow lobes turn.
-    pub(crate) opposites: bool,
+    pub(crate) lobe_pairs: bool,
 }
 
 /// How often a path looks for edges.
 #[derive(Clone, Copy)]
-pub(crate) enum Looks {
+pub(crate) enum EdgeQueries {
     /// So many times on average, each time from one of its vertices.
     Average(f64),
     /// Once from each of its vertices.
     EveryVertex,
 }
 
-impl Default for Looks {
+impl Default for EdgeQueries {
     fn default() -> Self {
         Self::Average(0.0)
     }
 }
 
-impl Looks {
+impl EdgeQueries {
     fn any(self) -> bool {
         !matches!(self, Self::Average(0.0))
     }
@@ -70,7 +70,7 @@ impl AlongRays<'_> {
     /// The terms kept in layers of their own, where terms are kept apart.
     pub(crate) fn terms(&self) -> impl Iterator<Item = Term> {
         let flux = self.flux.map(|_| Term::Flux);
-        let edges = if self.looks.any() { &[Term::Direct, Term::Indirect][..] } else { &[] };
+        let edges = if self.queries.any() { &[Term::Direct, Term::Indirect][..] } else { &[] };
         flux.into_iter().chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
     }
 }
@@ -82,7 +82,7 @@ pub(crate) trait PathSink: AdjointSink {
     /// They are complete; layers of `values` may be added to.
     fn finish(&mut self, values: &mut [Rgb]);
     /// A boundary or flux contribution found along the camera ray.
-    fn functional(&mut self, f: &Functional, value: Rgb, values: &mut [Rgb]);
+    fn functional(&mut self, f: &VelocityFunctional, value: Rgb, values: &mut [Rgb]);
     /// Layers that each separately kept term takes.
     fn layers(&self) -> usize;
 }
@@ -96,7 +96,7 @@ impl PathSink for Contraction<'_> {
             *v += *r;
         }
     }
-    fn functional(&mut self, f: &Functional, value: Rgb, values: &mut [Rgb]) {
+    fn functional(&mut self, f: &VelocityFunctional, value: Rgb, values: &mut [Rgb]) {
         if self.evaluate(f) {
             for (v, r) in values.iter_mut().zip(&self.rates) {
                 *v += value * r.r;
@@ -197,7 +197,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             },
             non_finite: self.non_finite,
             non_finite_count: self.non_finite_count,
-            looking: sum(|w| w.looking),
+            query_rays: sum(|w| w.query_rays),
         };
         (account, self.workers.into_iter().map(|w| w.sink).collect())
     }
@@ -210,8 +210,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let weight = Rgb::splat(s.weight);
         // What places an edge comes before what the path takes an unknown number of.
         let mut rng = rng;
-        let looks = self.workers.iter().any(|w| w.along.looks.any());
-        let look = looks.then(|| Look::reserve(&mut rng));
+        let queries = self.workers.iter().any(|w| w.along.queries.any());
+        let query = queries.then(|| EdgeQuery::reserve(&mut rng));
         self.tracer.rng = rng;
         if self.workers.is_empty() {
             let mut radiance = Radiance::default();
@@ -241,7 +241,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             seed: self.seed,
             pixel,
             unit,
-            look,
+            query,
         };
         let mut at = 1;
         let numbers = self.tracer.rng.clone();

@@ -3,18 +3,18 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use crate::Error;
 use crate::derivative::contraction::Motion;
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
 use crate::edges::speeds::speeds;
+use crate::model::error::Error;
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::sampling::film::BATCHES;
 use crate::terms::boundary::{Boundary, Strategy};
-use crate::terms::flux::{EdgeOn, Flux};
-use crate::terms::interior::{AlongRays, Component, Looks};
+use crate::terms::flux::{Flux, GrazingFlux};
+use crate::terms::interior::{AlongRays, Component, EdgeQueries};
 use crate::terms::radiative::Radiative;
-use crate::terms::splatting::{Source, Splatter};
+use crate::terms::splatting::{BoundarySource, Splatter};
 use crate::world::World;
 
 /// A scene ready to be sampled for what is of interest.
@@ -22,119 +22,122 @@ pub(crate) struct Prepared {
     pub(crate) world: World,
     pub(crate) boundary: Boundary,
     pub(crate) flux: Option<Flux>,
-    edge_on: Option<EdgeOn>,
+    grazing: Option<GrazingFlux>,
     /// Set in the spatial form.
     pub(crate) radiative: Option<Radiative>,
     /// Splatted terms that can contribute.
-    pub(crate) sources: Vec<Source>,
+    pub(crate) sources: Vec<BoundarySource>,
     /// Image points come in mirrored pairs.
     pub(crate) antithetic: bool,
     /// Rays in narrow lobes come in pairs, by the settings.
-    opposites: bool,
+    lobe_pairs: bool,
     /// Boundary samples of each kind to each sample of a pixel, by the settings alone.
     pub(crate) boundary_ratio: f64,
     /// The part of that which edges seen from the camera take.
     pub(crate) primary_share: f64,
     /// Of the spatial form.
-    looks: Looks,
+    queries: EdgeQueries,
 }
 
 impl Prepared {
     /// `motion` tells which edges move how fast, where that is known.
     pub(crate) fn new(
         world: World,
-        interest: &Interest,
+        active: &ActiveInputs,
         flux_shapes: &[usize],
         settings: &Settings,
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
         match settings.estimator {
-            EstimatorKind::Radiative if interest.any() => {
-                Self::spatial(world, interest, settings, motion)
+            EstimatorKind::Radiative if active.any() => {
+                Self::spatial(world, active, settings, motion)
             }
-            _ => Self::material(world, interest, flux_shapes, settings),
+            _ => Self::material(world, active, flux_shapes, settings),
         }
     }
 
     /// For the path-space estimator.
     fn material(
         world: World,
-        interest: &Interest,
+        active: &ActiveInputs,
         flux_shapes: &[usize],
         settings: &Settings,
     ) -> Result<Self, Error> {
-        let moving = interest.moves_geometry();
-        let boundary = if moving { Boundary::new(&world, interest)? } else { Boundary::default() };
-        let flux = Flux::new(&world, flux_shapes, interest);
+        let moving = active.moves_geometry();
+        let boundary = if moving { Boundary::new(&world, active)? } else { Boundary::default() };
+        let flux = Flux::new(&world, flux_shapes, active);
         let mut sources = Vec::new();
         if moving {
             for strategy in [Strategy::Primary, Strategy::Direct, Strategy::Indirect] {
                 if boundary.offers(&world, strategy) {
-                    sources.push(Source::Edges(strategy));
+                    sources.push(BoundarySource::Edges(strategy));
                 }
             }
             if world.camera.has_borders() {
-                sources.push(Source::Borders);
+                sources.push(BoundarySource::Borders);
             }
         }
         let kinds = sources.len();
-        let edge_on = seen_edge_on(&world, flux.as_ref(), interest, &mut sources)?;
+        let grazing = grazing_flux(&world, flux.as_ref(), active, &mut sources)?;
         // The filter's rate is what mirrored pairs cancel; without it they only cost.
         let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
         Ok(Self {
             boundary_ratio: boundary_ratio(settings, kinds),
             primary_share: 1.0,
-            looks: Looks::default(),
+            queries: EdgeQueries::default(),
             radiative: None,
             world,
             boundary,
             flux,
-            edge_on,
+            grazing,
             sources,
             antithetic,
-            opposites: settings.antithetic,
+            lobe_pairs: settings.antithetic,
         })
     }
 
     /// For the 2019 estimator.
     fn spatial(
         world: World,
-        interest: &Interest,
+        active: &ActiveInputs,
         settings: &Settings,
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
-        let spatial = Arc::new(Spatial::new(&world, interest));
+        let spatial = Arc::new(Spatial::new(&world, active));
         // Grids that move sweep over what stands still.
-        let flux = (interest.moves_geometry() || interest.grids.contains(&true))
-            .then(|| Flux::spatial(&world, interest, &spatial))
+        let flux = (active.moves_geometry() || active.grids.contains(&true))
+            .then(|| Flux::spatial(&world, active, &spatial))
             .flatten();
         let radiative = match motion {
-            Some(motion) => Radiative::new(&world, interest, spatial, speeds(motion, &world))?,
-            None => Radiative::new(&world, interest, spatial, |_| 1.0)?,
+            Some(motion) => Radiative::new(&world, active, spatial, speeds(motion, &world))?,
+            None => Radiative::new(&world, active, spatial, |_| 1.0)?,
         };
-        let mut sources =
-            if radiative.has_outlines() { alloc::vec![Source::Outlines] } else { Vec::new() };
+        let mut sources = if radiative.has_primary_edges() {
+            alloc::vec![BoundarySource::PrimaryEdges]
+        } else {
+            Vec::new()
+        };
         let has_edges = radiative.has_edges(&world);
-        let looks = has_edges && !settings.every_vertex;
-        let boundary_ratio = boundary_ratio(settings, sources.len() + usize::from(looks));
-        let edge_on = seen_edge_on(&world, flux.as_ref(), interest, &mut sources)?;
-        let looks = match settings.every_vertex {
-            _ if !has_edges => Looks::default(),
-            true => Looks::EveryVertex,
-            false => Looks::Average(boundary_ratio),
+        let queries = has_edges && !settings.every_vertex;
+        let boundary_ratio = boundary_ratio(settings, sources.len() + usize::from(queries));
+        let grazing = grazing_flux(&world, flux.as_ref(), active, &mut sources)?;
+        let queries = match settings.every_vertex {
+            _ if !has_edges => EdgeQueries::default(),
+            true => EdgeQueries::EveryVertex,
+            false => EdgeQueries::Average(boundary_ratio),
         };
         Ok(Self {
             boundary: Boundary::default(),
             radiative: Some(radiative),
             antithetic: false,
-            opposites: settings.antithetic,
+            lobe_pairs: settings.antithetic,
             primary_share: 1.0,
             world,
             flux,
-            edge_on,
+            grazing,
             sources,
             boundary_ratio,
-            looks,
+            queries,
         })
     }
 
@@ -143,8 +146,8 @@ impl Prepared {
             flux: self.flux.as_ref(),
             shadows: self.boundary.shadows.as_ref(),
             radiative: self.radiative.as_ref(),
-            looks: self.looks,
-            opposites: self.opposites,
+            queries: self.queries,
+            lobe_pairs: self.lobe_pairs,
         }
     }
 
@@ -165,8 +168,8 @@ impl Prepared {
 
     pub(crate) fn splatter(&self, seed: u64) -> Splatter<'_> {
         let radiative = self.radiative.as_ref();
-        let edge_on = self.edge_on.as_ref();
-        Splatter { world: &self.world, boundary: &self.boundary, radiative, edge_on, seed }
+        let grazing = self.grazing.as_ref();
+        Splatter { world: &self.world, boundary: &self.boundary, radiative, grazing, seed }
     }
 
     /// Samples of a splatted source to each of a pixel, by the settings alone.
@@ -185,15 +188,15 @@ impl Prepared {
 }
 
 /// What the camera sees edge on of surfaces with a flux, as one more source.
-fn seen_edge_on(
+fn grazing_flux(
     world: &World,
     flux: Option<&Flux>,
-    interest: &Interest,
-    sources: &mut Vec<Source>,
-) -> Result<Option<EdgeOn>, Error> {
+    active: &ActiveInputs,
+    sources: &mut Vec<BoundarySource>,
+) -> Result<Option<GrazingFlux>, Error> {
     let Some(flux) = flux else { return Ok(None) };
-    let seen = EdgeOn::new(world, flux, interest)?;
-    sources.extend(seen.is_some().then_some(Source::EdgeOn));
+    let seen = GrazingFlux::new(world, flux, active)?;
+    sources.extend(seen.is_some().then_some(BoundarySource::GrazingFlux));
     Ok(seen)
 }
 

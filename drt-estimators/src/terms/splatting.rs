@@ -6,38 +6,38 @@ use drt_math::sobol::SobolSampler;
 use drt_math::{Rgb, Rng};
 
 use crate::derivative::contraction::{Contraction, Motion};
-use crate::derivative::sensitivity::Functional;
+use crate::derivative::sensitivity::VelocityFunctional;
 use crate::model::rendering::{Account, NonFinite, Term};
 use crate::sampling::film::Splats;
 use crate::sampling::streams::{DIMENSIONS, SEQUENCE_STREAM};
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary;
-use crate::terms::boundary::{Boundary, Receiver, Strategy};
+use crate::terms::boundary::{Boundary, BoundarySink, Strategy};
 use crate::terms::flux;
-use crate::terms::flux::EdgeOn;
+use crate::terms::flux::GrazingFlux;
 use crate::terms::radiative::Radiative;
 use crate::world::World;
 
 /// A splatted source of derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Source {
+pub(crate) enum BoundarySource {
     /// Boundary segments found by a strategy.
     Edges(Strategy),
     /// Jumps of a box filter.
     Borders,
     /// Edges seen from the camera, in the spatial form.
-    Outlines,
+    PrimaryEdges,
     /// The flux through what the camera sees edge on.
-    EdgeOn,
+    GrazingFlux,
 }
 
-impl Source {
+impl BoundarySource {
     pub(crate) fn term(self) -> Term {
         match self {
-            Self::Edges(Strategy::Primary) | Self::Borders | Self::Outlines => Term::Primary,
+            Self::Edges(Strategy::Primary) | Self::Borders | Self::PrimaryEdges => Term::Primary,
             Self::Edges(Strategy::Direct) => Term::Direct,
             Self::Edges(Strategy::Indirect) => Term::Indirect,
-            Self::EdgeOn => Term::Flux,
+            Self::GrazingFlux => Term::Flux,
         }
     }
 
@@ -48,25 +48,25 @@ impl Source {
             Self::Edges(Strategy::Direct) => 2,
             Self::Edges(Strategy::Indirect) => 3,
             Self::Borders => 4,
-            Self::Outlines => 5,
-            Self::EdgeOn => 6,
+            Self::PrimaryEdges => 5,
+            Self::GrazingFlux => 6,
         };
         id << 40
     }
 
     /// Samples of it to one of other sources.
     pub(crate) fn part(self) -> f64 {
-        if self == Self::EdgeOn { 0.0625 } else { 1.0 }
+        if self == Self::GrazingFlux { 0.0625 } else { 1.0 }
     }
 
     /// True for the edges that the camera sees.
     pub(crate) fn is_of_camera(self) -> bool {
-        matches!(self, Self::Outlines | Self::Edges(Strategy::Primary))
+        matches!(self, Self::PrimaryEdges | Self::Edges(Strategy::Primary))
     }
 
     /// True when no sample counts much more than others.
     pub(crate) fn is_even(self) -> bool {
-        matches!(self, Self::Outlines | Self::EdgeOn)
+        matches!(self, Self::PrimaryEdges | Self::GrazingFlux)
     }
 }
 
@@ -75,24 +75,24 @@ pub(crate) struct Splatter<'a> {
     pub(crate) world: &'a World,
     pub(crate) boundary: &'a Boundary,
     pub(crate) radiative: Option<&'a Radiative>,
-    pub(crate) edge_on: Option<&'a EdgeOn>,
+    pub(crate) grazing: Option<&'a GrazingFlux>,
     pub(crate) seed: u64,
 }
 
 impl Splatter<'_> {
     /// Samples `count` times from a source and hands everything to `receiver`. The stream is unique
     /// to the batch.
-    pub(crate) fn run<R: Receiver>(
+    pub(crate) fn run<R: BoundarySink>(
         &self,
-        source: Source,
+        source: BoundarySource,
         stream: u64,
         count: u32,
         receiver: &mut Checked<R>,
     ) -> Account {
         let mut tracer = Tracer::new(self.world);
         let mut edges = boundary::Buffers::default();
-        let mut functional = Functional::default();
-        let mut edge_on = flux::Buffers::default();
+        let mut functional = VelocityFunctional::default();
+        let mut grazing = flux::Buffers::default();
         receiver.term = Some(source.term());
         receiver.seed = self.seed;
         receiver.stream = stream;
@@ -103,20 +103,20 @@ impl Splatter<'_> {
             tracer.rng = Rng::new(self.seed, stream, index).led_by(points, DIMENSIONS);
             receiver.index = index;
             match source {
-                Source::Edges(strategy) => {
+                BoundarySource::Edges(strategy) => {
                     self.boundary.sample(strategy, &mut tracer, &mut edges, receiver);
                 }
-                Source::Borders => {
+                BoundarySource::Borders => {
                     boundary::border::sample(&mut tracer, &mut edges, receiver);
                 }
-                Source::Outlines => {
+                BoundarySource::PrimaryEdges => {
                     if let Some(radiative) = self.radiative {
-                        radiative.outline(&mut tracer, &mut functional, receiver);
+                        radiative.primary_edge(&mut tracer, &mut functional, receiver);
                     }
                 }
-                Source::EdgeOn => {
-                    if let Some(seen) = self.edge_on {
-                        seen.sample(&mut tracer, &mut edge_on, receiver);
+                BoundarySource::GrazingFlux => {
+                    if let Some(seen) = self.grazing {
+                        seen.sample(&mut tracer, &mut grazing, receiver);
                     }
                 }
             }
@@ -125,7 +125,7 @@ impl Splatter<'_> {
             counters: tracer.counters,
             non_finite: core::mem::take(&mut receiver.found),
             non_finite_count: receiver.count,
-            looking: 0,
+            query_rays: 0,
         }
     }
 }
@@ -147,8 +147,8 @@ impl<R> Checked<R> {
     }
 }
 
-impl<R: Receiver> Receiver for Checked<R> {
-    fn moves(&mut self, functional: &Functional) -> bool {
+impl<R: BoundarySink> BoundarySink for Checked<R> {
+    fn moves(&mut self, functional: &VelocityFunctional) -> bool {
         self.inner.moves(functional)
     }
 
@@ -186,8 +186,8 @@ impl<'a> ToImages<'a> {
     }
 }
 
-impl Receiver for ToImages<'_> {
-    fn moves(&mut self, functional: &Functional) -> bool {
+impl BoundarySink for ToImages<'_> {
+    fn moves(&mut self, functional: &VelocityFunctional) -> bool {
         self.contraction.evaluate(functional)
     }
 

@@ -5,20 +5,20 @@ use alloc::vec::Vec;
 
 use drt_motion::interior::TetrahedraCache;
 
-use crate::Error;
+use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::world::geometry::Geometry;
 
 /// Things that depend on geometry alone and cost more to make than to compare. What is taken from here
 /// is what would be made anew, to the bit.
 #[derive(Debug, Default)]
-pub(crate) struct Kept {
+pub(crate) struct PreparedCache {
     geometry: Option<Arc<Geometry>>,
     /// Per medium.
     tetrahedra: Vec<TetrahedraCache>,
 }
 
-impl Kept {
+impl PreparedCache {
     /// The surfaces of a scene, prepared for ray queries.
     pub(crate) fn geometry(&mut self, scene: &Scene) -> Result<Arc<Geometry>, Error> {
         let geometry = Geometry::new(scene, self.geometry.as_ref())?;

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use drt_geom::{Mesh, TriangleBvh};
 use drt_math::Vec3;
 
-use crate::Error;
+use crate::model::error::Error;
 use crate::model::scene::{Scene, Shape};
 
 /// A triangle of the soup.

@@ -7,8 +7,8 @@ use alloc::vec::Vec;
 
 use drt_math::{AliasTable, Rgb, Rng, Vec3, warp};
 
-use crate::Error;
 use crate::model::emitter::Emitter;
+use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::world::World;
 use crate::world::vertex::SurfacePoint;
@@ -16,7 +16,7 @@ use crate::world::vertex::SurfacePoint;
 /// The emitters whose light is looked at. Light adds up, so that an estimator may leave some of it to
 /// another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Lit {
+pub(crate) enum EmitterMask {
     /// By all.
     #[default]
     All,
@@ -26,7 +26,7 @@ pub(crate) enum Lit {
     Delta,
 }
 
-impl Lit {
+impl EmitterMask {
     /// Whether an emitter counts.
     pub(crate) fn by(self, emitter: &Emitter) -> bool {
         match self {
@@ -142,7 +142,7 @@ impl LightTable {
         first_prim: &[u32],
         radius: f64,
         like: Option<&Self>,
-        lit: Lit,
+        lit: EmitterMask,
     ) -> Result<Self, Error> {
         let mut entries = Vec::new();
         let mut weights = Vec::new();

@@ -16,12 +16,12 @@ use drt_geom::{Aabb, Hit, Mesh, Ray, Skip};
 use drt_math::{Rgb, Vec3};
 use drt_medium::{Coefficients, Homogeneous, Medium};
 
-use crate::Error;
+use crate::model::error::Error;
 use crate::model::scene::{Scene, Shape, Surrounding};
 use crate::model::surface::Bsdf;
-use crate::world::cache::Kept;
+use crate::world::cache::PreparedCache;
 use crate::world::geometry::{Geometry, Prim};
-use crate::world::lights::{LightTable, Lit};
+use crate::world::lights::{EmitterMask, LightTable};
 use crate::world::scatter::Scattering;
 use crate::world::vertex::{Contact, Kind, SurfacePoint, Vertex};
 
@@ -104,7 +104,7 @@ const DEFENSIVE: f64 = 0.1;
 
 /// What derivatives need of a medium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum MediumNeed {
+pub(crate) enum MediumActivity {
     /// Its coefficients do not change.
     Nothing,
     /// They change.
@@ -115,8 +115,8 @@ pub(crate) enum MediumNeed {
 
 /// What derivatives need beyond the image.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Needs {
-    pub(crate) media: Vec<MediumNeed>,
+pub(crate) struct ActiveFactors {
+    pub(crate) media: Vec<MediumActivity>,
     pub(crate) bsdfs: Vec<bool>,
     /// Those whose roughness changes.
     pub(crate) roughness: Vec<bool>,
@@ -124,7 +124,7 @@ pub(crate) struct Needs {
     pub(crate) index: Vec<bool>,
 }
 
-impl Needs {
+impl ActiveFactors {
     /// What either needs.
     pub(crate) fn union(&self, other: &Self) -> Self {
         let any = |a: &[bool], b: &[bool]| a.iter().zip(b).map(|(a, b)| *a || *b).collect();
@@ -151,7 +151,7 @@ pub(crate) enum Tracking {
 pub(crate) struct World {
     pub(crate) scene: Arc<Scene>,
     pub(crate) lights: LightTable,
-    pub(crate) lit: Lit,
+    pub(crate) lit: EmitterMask,
     /// The sensor in use and the medium around it.
     pub(crate) camera: crate::model::sensor::Sensor,
     pub(crate) camera_medium: Option<usize>,
@@ -159,7 +159,7 @@ pub(crate) struct World {
     /// Least probability of a scattering vertex per tentative collision, per medium: nonzero
     /// where derivatives need vertices in empty or thin space.
     pub(crate) defensive: Vec<f64>,
-    needs: Needs,
+    needs: ActiveFactors,
     /// How far light can go in each medium, at most.
     extent: Vec<f64>,
     /// Where set, no discrete choice depends on values that may differ between this scene and
@@ -184,8 +184,8 @@ impl World {
         sensor: usize,
         max_depth: Option<u32>,
         like: Option<&Self>,
-        lit: Lit,
-        kept: &mut Kept,
+        lit: EmitterMask,
+        kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         let scene: Arc<Scene> = scene.into();
         let camera = scene.sensors.get(sensor).ok_or_else(|| Error::Setting {
@@ -221,7 +221,7 @@ impl World {
             camera_medium: None,
             tracking,
             defensive: alloc::vec![0.0; scene.media.len()],
-            needs: Needs::default(),
+            needs: ActiveFactors::default(),
             extent: (0..scene.media.len()).map(|m| extent(&scene, m, 2.0 * radius)).collect(),
             steady: like
                 .map(|w| w.scene.media.iter().map(|m| m.item.homogeneous().copied()).collect()),
@@ -238,7 +238,7 @@ impl World {
     }
 
     /// The same scene by the light of some emitters.
-    pub(crate) fn lit_by(&self, lit: Lit) -> Result<Self, Error> {
+    pub(crate) fn lit_by(&self, lit: EmitterMask) -> Result<Self, Error> {
         let first_prim = &self.geometry.first_prim;
         let lights = LightTable::new(&self.scene, first_prim, self.geometry.radius, None, lit)?;
         let mut world = Self { lights, lit, ..self.clone() };
@@ -248,16 +248,16 @@ impl World {
 
     /// Makes sure that what derivatives need is sampled where its value is zero (theory sheet §14.5):
     /// vertices in media whose coefficients change, and paths over materials that change.
-    pub(crate) fn prepare_for_derivatives(&mut self, needs: Needs) {
+    pub(crate) fn prepare_for_derivatives(&mut self, needs: ActiveFactors) {
         for (m, need) in needs.media.iter().enumerate() {
-            if *need == MediumNeed::Nothing {
+            if *need == MediumActivity::Nothing {
                 continue;
             }
             self.defensive[m] = match self.medium(m).homogeneous() {
                 Some(h) => self.defensive_where_thin(m, h),
                 None => DEFENSIVE,
             };
-            if *need == MediumNeed::Vertices {
+            if *need == MediumActivity::Vertices {
                 self.tracking[m] = Tracking::Vertices;
             }
         }
@@ -285,8 +285,8 @@ impl World {
         if self.steady.is_some() {
             STEADY_SURVIVAL
         } else {
-            let carried = throughput.max_channel();
-            if carried > 0.0 { carried.clamp(LEAST_SURVIVAL, MOST_SURVIVAL) } else { 0.0 }
+            let moves = throughput.max_channel();
+            if moves > 0.0 { moves.clamp(LEAST_SURVIVAL, MOST_SURVIVAL) } else { 0.0 }
         }
     }
 
@@ -294,7 +294,7 @@ impl World {
     pub(crate) fn may_revive(&self, v: &Vertex) -> bool {
         match (&v.kind, v.medium) {
             (Kind::Surface(s), _) => self.needed(&self.needs.bsdfs, s),
-            (_, Some(m)) => self.needs.media.get(m).is_some_and(|n| *n != MediumNeed::Nothing),
+            (_, Some(m)) => self.needs.media.get(m).is_some_and(|n| *n != MediumActivity::Nothing),
             _ => false,
         }
     }

@@ -4,7 +4,7 @@ use drt_geom::{Hit, Ray, Skip};
 use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::TrackingStats;
 
-use crate::Counters;
+use crate::model::rendering::Counters;
 use crate::world::vertex::{Kind, Vertex};
 use crate::world::{Crossing, RayPath, World, intervals};
 

@@ -10,7 +10,7 @@
 use drt_math::{Real, Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Phase;
 
-use crate::model::surface::{Bsdf, BsdfParams, Counterpart, Given, Lobes, Opposite};
+use crate::model::surface::{Bsdf, BsdfParams, DirectionPartner, Given, Lobes, RoughnessPartner};
 
 /// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.
 const FADE: f64 = 0.02;
@@ -134,18 +134,18 @@ impl Scattering<'_> {
         }
     }
 
-    /// The [`Counterpart`] of `wi`, if it has one.
-    pub(crate) fn counterpart(&self, wo: Vec3, wi: Vec3) -> Option<Counterpart> {
+    /// The [`RoughnessPartner`] of `wi`, if it has one.
+    pub(crate) fn roughness_partner(&self, wo: Vec3, wi: Vec3) -> Option<RoughnessPartner> {
         match self {
-            Self::Surface { bsdf, ns, .. } => bsdf.counterpart(wo, wi, *ns),
+            Self::Surface { bsdf, ns, .. } => bsdf.roughness_partner(wo, wi, *ns),
             Self::Volume(_) => None,
         }
     }
 
-    /// The [`Opposite`] of `wi`, if it has one.
-    pub(crate) fn opposite(&self, wo: Vec3, wi: Vec3) -> Option<Opposite> {
+    /// The [`DirectionPartner`] of `wi`, if it has one.
+    pub(crate) fn direction_partner(&self, wo: Vec3, wi: Vec3) -> Option<DirectionPartner> {
         match self {
-            Self::Surface { bsdf, ns, .. } => bsdf.opposite(wo, wi, *ns),
+            Self::Surface { bsdf, ns, .. } => bsdf.direction_partner(wo, wi, *ns),
             Self::Volume(_) => None,
         }
     }

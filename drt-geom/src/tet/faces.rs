@@ -8,7 +8,7 @@ const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
 /// One face of one tetrahedron, keyed by its vertices in ascending order.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
+struct TetFace {
     key: [u32; 3],
     tet: u32,
     face: u32,
@@ -38,7 +38,7 @@ impl TetMesh {
                 }
                 let mut key = self.face(tet, k);
                 key.sort_unstable();
-                sides.push(Side { key, tet, face: k as u32 });
+                sides.push(TetFace { key, tet, face: k as u32 });
             }
         }
         sides.sort_unstable();
@@ -47,7 +47,7 @@ impl TetMesh {
             match shared {
                 [] | [_] => {}
                 [a, b] => {
-                    let even = |s: &Side| is_even(self.face(s.tet, s.face as usize));
+                    let even = |s: &TetFace| is_even(self.face(s.tet, s.face as usize));
                     if even(a) == even(b) {
                         return Err(TetMeshError::Overlap { tets: [a.tet, b.tet] });
                     }

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
-use super::faces::{FaceTable, Side};
+use super::faces::{FaceTable, TetCorner};
 use super::predicates::orient;
 use crate::NONE;
 
@@ -125,7 +125,7 @@ impl Complex {
                         let n = &self.tets[outer as usize].neighbors;
                         n.iter().position(|&b| b == t).expect("neighbours know each other")
                     });
-                    let side = Side { tet: outer, corner: back.unwrap_or(0) as u32 };
+                    let side = TetCorner { tet: outer, corner: back.unwrap_or(0) as u32 };
                     self.table.take_or_insert(tet.face(corner), side);
                 }
             }
@@ -138,7 +138,7 @@ impl Complex {
             let t = self.place(vertices);
             for corner in 0..4 {
                 let face = self.tets[t as usize].face(corner);
-                let side = Side { tet: t, corner: corner as u32 };
+                let side = TetCorner { tet: t, corner: corner as u32 };
                 if let Some(other) = self.table.take_or_insert(face, side) {
                     self.tets[t as usize].neighbors[corner] = other.tet;
                     if other.tet != NONE {

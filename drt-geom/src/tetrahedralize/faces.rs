@@ -6,7 +6,7 @@ use crate::NONE;
 
 /// One side of a face: a tetrahedron ([`NONE`] outside the box) and the corner across from it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Side {
+pub(super) struct TetCorner {
     pub(super) tet: u32,
     pub(super) corner: u32,
 }
@@ -14,11 +14,11 @@ pub(super) struct Side {
 /// Open addressing with linear probing; entries stay until all are cleared.
 #[derive(Debug, Default)]
 pub(super) struct FaceTable {
-    slots: Vec<([u32; 3], Side)>,
+    slots: Vec<([u32; 3], TetCorner)>,
     used: Vec<u32>,
 }
 
-const VACANT: ([u32; 3], Side) = ([NONE; 3], Side { tet: NONE, corner: 0 });
+const VACANT: ([u32; 3], TetCorner) = ([NONE; 3], TetCorner { tet: NONE, corner: 0 });
 
 impl FaceTable {
     pub(super) fn clear(&mut self) {
@@ -28,7 +28,7 @@ impl FaceTable {
     }
 
     /// The side that came first, or `side` stays and waits for the other.
-    pub(super) fn take_or_insert(&mut self, face: [u32; 3], side: Side) -> Option<Side> {
+    pub(super) fn take_or_insert(&mut self, face: [u32; 3], side: TetCorner) -> Option<TetCorner> {
         if 2 * self.used.len() >= self.slots.len() {
             self.grow();
         }

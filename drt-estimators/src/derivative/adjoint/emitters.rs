@@ -4,7 +4,7 @@
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::{Differentiator, Far, Propagated, Stretch, turn};
-use crate::derivative::sensitivity::{AdjointSink, Interest, SurfaceAdjoint};
+use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, SurfaceAdjoint};
 use crate::derivative::velocity::{PathVelocities, VertexVelocity};
 use crate::model::emitter::EmitterGradient;
 use crate::world::lights::{LightKind, LightSample};
@@ -26,15 +26,15 @@ impl Differentiator<'_> {
         sink: &mut S,
     ) {
         let weight = per_value * light.value;
-        let interest = sink.interest();
-        let emitter = interest.emitters[light.emitter];
+        let active = sink.active();
+        let emitter = active.emitters[light.emitter];
         match &light.kind {
             LightKind::Area(s) => {
                 let end = Vertex { x: light.y, medium: None, kind: Kind::Surface(*s) };
                 if emitter {
                     strength_of(light.emitter, per_value, sink);
                 }
-                let moving = near_moves || light_moves(light, sink.interest());
+                let moving = near_moves || light_moves(light, sink.active());
                 if !moving {
                     self.segment(path, Far::Direction, false, weight, here, sink);
                     return;
@@ -101,7 +101,7 @@ impl Differentiator<'_> {
         let g = turn(&to_flow, -light.w, path.length);
         here.u += g;
         let at = at_light - g;
-        if sink.interest().emitters[light.emitter] {
+        if sink.active().emitters[light.emitter] {
             let at = [at.r, at.g, at.b];
             for c in 0..3 {
                 gradients[c].position += at[c];
@@ -112,10 +112,10 @@ impl Differentiator<'_> {
 }
 
 /// True when a connection's end at a light may move.
-pub(super) fn light_moves(light: &LightSample, interest: &Interest) -> bool {
+pub(super) fn light_moves(light: &LightSample, active: &ActiveInputs) -> bool {
     match &light.kind {
-        LightKind::Area(s) => interest.shapes[s.shape as usize],
-        LightKind::Position | LightKind::Direction => interest.emitters[light.emitter],
+        LightKind::Area(s) => active.shapes[s.shape as usize],
+        LightKind::Position | LightKind::Direction => active.emitters[light.emitter],
     }
 }
 
@@ -144,7 +144,7 @@ fn direction<S: AdjointSink>(
 
 /// Sensitivity to an emitter's radiance, where it changes.
 pub(super) fn strength<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
-    if sink.interest().emitters[emitter] && !adjoint.is_zero() {
+    if sink.active().emitters[emitter] && !adjoint.is_zero() {
         strength_of(emitter, adjoint, sink);
     }
 }

@@ -32,12 +32,14 @@ use crate::derivative::adjoint::pairs::Apart;
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 
-use crate::derivative::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
+use crate::derivative::sensitivity::{
+    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint,
+};
 use crate::derivative::velocity::RecordedPath;
 use crate::model::sensor::SensorGradient;
 use crate::sampling::trace::Endpoint;
 use crate::world::World;
-use crate::world::lights::Lit;
+use crate::world::lights::EmitterMask;
 use crate::world::vertex::{Kind, Vertex};
 
 /// What has been collected for a vertex while its neighbours are processed.
@@ -50,7 +52,7 @@ struct Local {
     /// C_k, the value of the children per unit of scattering.
     children: Rgb,
     /// a_k R_k, its part of the parent's C.
-    brought: Rgb,
+    incoming: Rgb,
 }
 
 /// The segment by which a walk arrived at a node.
@@ -178,7 +180,7 @@ impl<'w> Differentiator<'w> {
         let p = arrival.parent as usize;
         let value = arrival.arrival * received;
         self.locals[p].children += value;
-        self.locals[k].brought = value;
+        self.locals[k].incoming = value;
         let velocity = velocities.of(k);
         let vertex = record.nodes[k].vertex();
         let phi = velocity.blend.weight;
@@ -292,10 +294,10 @@ impl<'w> Differentiator<'w> {
         sink: &mut S,
     ) -> Option<RgbVec> {
         let world = self.world;
-        let interest = sink.interest();
+        let active = sink.active();
         let material = match &v.kind {
-            Kind::Surface(s) => interest.bsdfs[world.scene.shapes[s.shape as usize].bsdf],
-            _ => v.medium.is_some_and(|m| interest.media[m]),
+            Kind::Surface(s) => active.bsdfs[world.scene.shapes[s.shape as usize].bsdf],
+            _ => v.medium.is_some_and(|m| active.media[m]),
         };
         if adjoint.is_zero() || !(material || moving) {
             return None;
@@ -359,7 +361,7 @@ impl<'w> Differentiator<'w> {
             }
             let rest = c.rest();
             sum += c.f * rest;
-            let turns = arrives || light_moves(light, sink.interest());
+            let turns = arrives || light_moves(light, sink.active());
             let to_wi = self.scattering(
                 vertex,
                 -arrival.dir,
@@ -390,7 +392,7 @@ impl<'w> Differentiator<'w> {
         &mut self,
         vertex: &Vertex,
         c: &Coefficients,
-        lit: Lit,
+        lit: EmitterMask,
         theta: Rgb,
         collected: Rgb,
         emission_weight: f64,
@@ -410,7 +412,7 @@ impl<'w> Differentiator<'w> {
             },
             g: Rgb::ZERO,
         };
-        if sink.interest().media[m] {
+        if sink.active().media[m] {
             sink.medium(m, vertex.x, &adjoint);
         }
         if moving {
@@ -432,8 +434,8 @@ impl<'w> Differentiator<'w> {
         here: &mut SurfaceAdjoint,
         sink: &S,
     ) {
-        let interest = sink.interest();
-        if !(interest.sensor || vertex.is_some_and(|v| moves(v, interest))) {
+        let active = sink.active();
+        if !(active.sensor || vertex.is_some_and(|v| moves(v, active))) {
             return;
         }
         let camera = &self.world.camera;
@@ -468,10 +470,10 @@ fn turn(g: &RgbVec, w: Vec3, distance: f64) -> RgbVec {
     g.map(|g| g.reject(w) / distance)
 }
 
-fn moves(v: &Vertex, interest: &Interest) -> bool {
+fn moves(v: &Vertex, active: &ActiveInputs) -> bool {
     match &v.kind {
-        Kind::Surface(s) => interest.shapes[s.shape as usize],
-        Kind::Volume(_) => v.medium.is_some_and(|m| interest.volumes[m]),
+        Kind::Surface(s) => active.shapes[s.shape as usize],
+        Kind::Volume(_) => v.medium.is_some_and(|m| active.volumes[m]),
         Kind::Point => false,
     }
 }
@@ -481,10 +483,10 @@ fn send<S: AdjointSink>(v: &Vertex, adjoint: &SurfaceAdjoint, sink: &mut S) {
     match (&v.kind, v.medium) {
         // Nothing reaches the vertex: where it would go needs no looking up.
         _ if adjoint.is_zero() => {}
-        (Kind::Surface(s), _) if sink.interest().shapes[s.shape as usize] => {
+        (Kind::Surface(s), _) if sink.active().shapes[s.shape as usize] => {
             sink.surface(&s.material(), adjoint);
         }
-        (Kind::Volume(_), Some(m)) if sink.interest().volumes[m] => {
+        (Kind::Volume(_), Some(m)) if sink.active().volumes[m] => {
             sink.volume(m, v.x, &adjoint.u, adjoint.j);
         }
         _ => {}

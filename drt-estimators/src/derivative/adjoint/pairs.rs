@@ -3,7 +3,7 @@
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::{Differentiator, behind, send, turn};
-use crate::derivative::pairs::{Brought, Pair, Told};
+use crate::derivative::pairs::{AntitheticPair, PairKind, PairedRadiance};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::derivative::velocity::RecordedPath;
 use crate::model::surface::{BsdfParams, Turn};
@@ -48,9 +48,9 @@ impl Differentiator<'_> {
     pub(crate) fn pair<S: AdjointSink>(
         &self,
         path: &RecordedPath<'_>,
-        pair: &Pair,
+        pair: &AntitheticPair,
         chance: f64,
-        other: &Brought,
+        other: &PairedRadiance,
         sink: &mut S,
     ) {
         let node = &path.record.nodes[pair.node];
@@ -60,12 +60,12 @@ impl Differentiator<'_> {
         let [own, others] = [node.value, pair.value].map(|value| each * value);
         let light = [own * self.locals[pair.node].children, others * other.light];
         let params = match &pair.told {
-            Told::Roughness(slope) => {
+            PairKind::Roughness(slope) => {
                 let alpha = (light[0] - light[1]) * *slope;
                 BsdfParams { alpha, ..BsdfParams::default() }
             }
-            Told::Turns(turns) => {
-                if sink.interest().moves_geometry() {
+            PairKind::Turns(turns) => {
+                if sink.active().moves_geometry() {
                     self.turned(path, pair, turns, light, [own, others], other, sink);
                 }
                 let eta = light[0] * turns[0].eta + light[1] * turns[1].eta;
@@ -73,7 +73,7 @@ impl Differentiator<'_> {
             }
         };
         let bsdf = self.world.scene.shapes[s.shape as usize].bsdf;
-        if sink.interest().bsdfs[bsdf] {
+        if sink.active().bsdfs[bsdf] {
             sink.bsdf(bsdf, &params, Rgb::ONE);
         }
     }
@@ -84,11 +84,11 @@ impl Differentiator<'_> {
     fn turned<S: AdjointSink>(
         &self,
         path: &RecordedPath<'_>,
-        pair: &Pair,
+        pair: &AntitheticPair,
         turns: &[Turn; 2],
         light: [Rgb; 2],
         times: [Rgb; 2],
-        other: &Brought,
+        other: &PairedRadiance,
         sink: &mut S,
     ) {
         let k = pair.node;
@@ -101,14 +101,14 @@ impl Differentiator<'_> {
         let own = |c: &Node| c.arrival.as_ref().is_some_and(|a| a.parent as usize == k);
         for (c, child) in record.nodes.iter().enumerate().skip(k + 1).filter(|(_, c)| own(c)) {
             let Some(end) = &child.arrival else { continue };
-            let light = times[0] * self.locals[c].brought;
+            let light = times[0] * self.locals[c].incoming;
             here.u -=
                 self.turn_end(end, velocities.of(c).blend.weight, light.outer(turns[0].wi), sink);
         }
-        for (end, brought) in &other.ends {
+        for (end, incoming) in &other.ends {
             let (Endpoint::Surface(v) | Endpoint::Volume(v, _)) = &end.end else { continue };
             let blend = velocities.field().blend(self.world, vertex, v, end.dir, end.distance);
-            let light = times[1] * *brought;
+            let light = times[1] * *incoming;
             here.u -= self.turn_end(end, blend.weight, light.outer(turns[1].wi), sink);
         }
         let wo = node.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);

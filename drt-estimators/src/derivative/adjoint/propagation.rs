@@ -10,7 +10,7 @@
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::{Differentiator, Far, Stretch, moves, send};
-use crate::derivative::sensitivity::{AdjointSink, Rate, SurfaceAdjoint};
+use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint, VelocityTerm};
 use crate::derivative::velocity::{Auxiliary, PathVelocities, RecordedPath, VertexVelocity};
 use crate::model::sensor::SensorGradient;
 use crate::sampling::record::PathRecord;
@@ -74,7 +74,7 @@ impl Differentiator<'_> {
         let dims = self.world.sigma_t_at_border(medium, vertex.x, -path.dir) * (weight * -free);
         let (back, mut lift) = split(self.world, point, path.dir, free, here, shift, dims);
         lift.u += matter;
-        if sink.interest().shapes[point.shape as usize] {
+        if sink.active().shapes[point.shape as usize] {
             sink.surface(&point.material(), &lift);
         }
         near.u += back;
@@ -107,7 +107,7 @@ impl Differentiator<'_> {
         sink: &mut S,
     ) -> SurfaceAdjoint {
         let mut fixed = SurfaceAdjoint::default();
-        let moving = near_moves || moves(end, sink.interest());
+        let moving = near_moves || moves(end, sink.active());
         self.segment(path, Far::Vertex(end, &mut fixed), moving, weight, near, sink);
         fixed
     }
@@ -155,7 +155,7 @@ impl Differentiator<'_> {
                     let (own, mut lift) =
                         split(self.world, point, dir, free, &here, none, Rgb::ZERO);
                     lift.u += matter;
-                    if sink.interest().shapes[point.shape as usize] {
+                    if sink.active().shapes[point.shape as usize] {
                         sink.surface(&point.material(), &lift);
                     }
                     back += own;
@@ -185,7 +185,7 @@ impl Differentiator<'_> {
         seen: &[SensorGradient; 3],
         sink: &mut S,
     ) {
-        if !sink.interest().sensor {
+        if !sink.active().sensor {
             return;
         }
         let camera = &self.world.camera;
@@ -205,8 +205,8 @@ impl Differentiator<'_> {
 /// Sends the sensitivity `g` to b·w of a summand; returns those to the velocity of the ray's origin and to the
 /// rate of its direction.
 fn summand<S: AdjointSink>(a: &Auxiliary, g: Rgb, sink: &mut S) -> [RgbVec; 2] {
-    if sink.interest().moves(&a.matter) {
-        Rate::of(a.matter, a.functional).send(g, sink);
+    if sink.active().moves(&a.matter) {
+        VelocityTerm::of(a.matter, a.functional).send(g, sink);
     }
     match a.on_ray {
         Some(distance) => {

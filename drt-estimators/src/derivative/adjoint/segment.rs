@@ -130,7 +130,7 @@ impl Differentiator<'_> {
             if !length.is_finite() && world.medium(m).homogeneous().is_some() {
                 continue;
             }
-            let changes = sink.interest().media[m];
+            let changes = sink.active().media[m];
             let start = path.start + path.dir * i.start;
             if let Some(h) = world.medium(m).homogeneous() {
                 if changes {
@@ -148,15 +148,15 @@ impl Differentiator<'_> {
         }
         let mut before = path.medium;
         for c in path.crossings {
-            let jump = world.sigma_t_at_border(before, c.x, -path.dir)
+            let discontinuity = world.sigma_t_at_border(before, c.x, -path.dir)
                 - world.sigma_t_at_border(c.after, c.x, path.dir);
             before = c.after;
-            let shape_moves = sink.interest().shapes[c.point.shape as usize];
-            if jump.is_zero() || !(moving || shape_moves) {
+            let shape_moves = sink.active().shapes[c.point.shape as usize];
+            if discontinuity.is_zero() || !(moving || shape_moves) {
                 continue;
             }
             let n = c.point.ng;
-            let g = (weight * -jump).outer(n / n.dot(path.dir));
+            let g = (weight * -discontinuity).outer(n / n.dot(path.dir));
             if shape_moves {
                 sink.surface(&c.point.material(), &SurfaceAdjoint::of_place(g));
             }
@@ -178,13 +178,13 @@ impl Differentiator<'_> {
         sink: &mut S,
     ) -> Rgb {
         let medium = self.world.medium(m);
-        let changes = sink.interest().media[m];
+        let changes = sink.active().media[m];
         let (start, length) = (path.start + path.dir * i.start, i.end - i.start);
         let mut points = core::mem::take(&mut self.points);
         points.clear();
         medium.line_points(start, path.dir, length, &mut self.rng, &mut points);
         let ray = drt_medium::Ray::new(start, path.dir, length);
-        let relative = moving || (changes && sink.interest().grids[m]);
+        let relative = moving || (changes && sink.active().grids[m]);
         let mut depth = DepthEstimate::inside(medium, ray, &points, relative);
         if relative {
             depth = depth.with_faces(medium);

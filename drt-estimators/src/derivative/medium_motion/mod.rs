@@ -8,10 +8,10 @@ use alloc::vec::Vec;
 
 use drt_motion::interior::{InteriorBasis, InteriorError, InteriorMotion, InteriorVelocity};
 
-use crate::Error;
 use crate::derivative::tangents::Tangents;
+use crate::model::error::Error;
 use crate::world::World;
-use crate::world::cache::Kept;
+use crate::world::cache::PreparedCache;
 
 mod adjacency;
 mod reverse;
@@ -75,7 +75,7 @@ impl MediumMotions {
         world: &World,
         tangents: &Tangents,
         asked: &[(usize, InteriorMotion)],
-        kept: &mut Kept,
+        kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         let mut motions = Self::at_rest(world.scene.media.len());
         for (m, around) in surroundings(world, Some(tangents)).enumerate() {

@@ -4,14 +4,14 @@
 use alloc::vec::Vec;
 
 use drt_math::Vec3;
-use drt_motion::interior::{ActiveInputs, InteriorMotion, TetrahedralField};
+use drt_motion::interior::{self, InteriorMotion, TetrahedralField};
 use drt_motion::volume::VolumeAdjoint;
 
-use crate::Error;
 use crate::derivative::medium_motion::surroundings::{Anchor, surroundings};
 use crate::derivative::medium_motion::{asked_for, unusable};
 use crate::derivative::scene_gradient::SceneGradient;
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
+use crate::model::error::Error;
 use crate::world::World;
 
 /// The tetrahedra of all media whose insides move, and the shapes whose flux must be added.
@@ -44,14 +44,14 @@ impl ReverseMediumMotions {
     /// Chooses for every medium. Affine, blended and mean value insides count as not asked for.
     pub(crate) fn new(
         world: &World,
-        interest: &Interest,
+        active: &ActiveInputs,
         asked: &[(usize, InteriorMotion)],
     ) -> Result<Self, Error> {
         let mut motions = Self::default();
         for (m, around) in surroundings(world, None).enumerate() {
-            let active = ActiveInputs {
-                surfaces: around.shapes.iter().map(|s| interest.shapes[*s]).collect(),
-                points: around.anchors.iter().map(|a| a.is_active(interest)).collect(),
+            let active = interior::ActiveInputs {
+                surfaces: around.shapes.iter().map(|s| active.shapes[*s]).collect(),
+                points: around.anchors.iter().map(|a| a.is_active(active)).collect(),
             };
             let plan = around.inputs.plan_reverse(&active, asked_for(asked, m)).map_err(|e| {
                 let surface = |s: usize| world.shape_name(around.shapes[s]);
@@ -125,10 +125,10 @@ impl ReverseMediumMotions {
 
 impl Anchor {
     /// Whether its position is asked for.
-    fn is_active(self, interest: &Interest) -> bool {
+    fn is_active(self, active: &ActiveInputs) -> bool {
         match self {
-            Self::Camera => interest.sensor,
-            Self::Emitter(e) => interest.emitters[e],
+            Self::Camera => active.sensor,
+            Self::Emitter(e) => active.emitters[e],
         }
     }
 }

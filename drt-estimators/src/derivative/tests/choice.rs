@@ -10,34 +10,34 @@ use drt_math::stats::Moments;
 use drt_motion::Parameter;
 
 use crate::derivative::contraction::{Contraction, Motion};
-use crate::derivative::sensitivity::Functional;
+use crate::derivative::sensitivity::VelocityFunctional;
 use crate::derivative::tangents;
 use crate::derivative::tests::scenes::FILM;
 use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::sampling::pixels::Sampler;
 use crate::sampling::streams::sequence_name;
-use crate::terms::boundary::Receiver;
+use crate::terms::boundary::BoundarySink;
 use crate::terms::interior::PixelSampler;
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::Checked;
 use crate::world::World;
-use crate::world::cache::Kept;
-use crate::world::lights::Lit;
+use crate::world::cache::PreparedCache;
+use crate::world::lights::EmitterMask;
 
 /// A scene prepared for `kind = "radiative"`.
 pub(crate) fn prepare(scene: &Scene, motion: &Parameter, depth: u32) -> (Prepared, Motion) {
     let (scene, tangents) =
         tangents::apply(scene, core::slice::from_ref(motion)).expect("a valid parameter");
-    let mut kept = Kept::default();
-    let world = World::new(scene, 0, Some(depth), None, Lit::Extended, &mut kept);
+    let mut kept = PreparedCache::default();
+    let world = World::new(scene, 0, Some(depth), None, EmitterMask::Extended, &mut kept);
     let mut world = world.expect("a valid scene");
     let tangents = tangents.seen_by(0);
     let insides = crate::derivative::medium_motion::MediumMotions::affine(&world, &tangents, &[]);
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());
     let settings = Settings { estimator: EstimatorKind::Radiative, ..Settings::default() };
-    let prepared = Prepared::new(world, &motion.interest, &[], &settings, Some(&motion));
+    let prepared = Prepared::new(world, &motion.active, &[], &settings, Some(&motion));
     (prepared.expect("a valid scene"), motion)
 }
 
@@ -83,16 +83,16 @@ pub(crate) fn derivative(
                 }
             }
             let contraction = Contraction::new(&prepared.world, &motion);
-            let mut outlines = Checked::new(Total { contraction, weight, sum: 0.0 });
+            let mut primary = Checked::new(Total { contraction, weight, sum: 0.0 });
             for source in &prepared.sources {
                 prepared.splatter(seed).run(
                     *source,
                     source.stream(),
                     samples * PIXELS,
-                    &mut outlines,
+                    &mut primary,
                 );
             }
-            edges += outlines.inner.sum / f64::from(samples * PIXELS);
+            edges += primary.inner.sum / f64::from(samples * PIXELS);
             batches[0].push(rays);
             batches[1].push(edges);
         }
@@ -113,8 +113,8 @@ pub(crate) struct Total<'a> {
     pub(crate) sum: f64,
 }
 
-impl Receiver for Total<'_> {
-    fn moves(&mut self, functional: &Functional) -> bool {
+impl BoundarySink for Total<'_> {
+    fn moves(&mut self, functional: &VelocityFunctional) -> bool {
         self.contraction.evaluate(functional)
     }
 

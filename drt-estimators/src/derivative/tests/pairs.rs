@@ -8,7 +8,7 @@ use drt_motion::Parameter;
 
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::contraction::Contraction;
-use crate::derivative::pairs::{Brought, Pair, Pairs, Told};
+use crate::derivative::pairs::{AntitheticPair, AntitheticPairs, PairKind, PairedRadiance};
 use crate::derivative::tests::choice::prepare;
 use crate::derivative::tests::scenes::*;
 use crate::derivative::tests::setup::{Recording, motion, set, trace};
@@ -32,29 +32,29 @@ fn derivatives(
     parameter: &Parameter,
     form: Form,
     paths: u32,
-    other: impl Fn(&Pair, &mut Brought),
+    other: impl Fn(&AntitheticPair, &mut PairedRadiance),
 ) -> [Moments; 2] {
     let (prepared, motion) = prepare(scene, parameter, 5);
     let world = &prepared.world;
     let mut tracer = Tracer::new(world);
     let field: Arc<dyn VelocityField> = match form {
-        Form::Material => Arc::new(Material::new(Movers::new(&motion.interest))),
-        Form::Spatial => Arc::new(Spatial::new(world, &motion.interest)),
+        Form::Material => Arc::new(Material::new(Movers::new(&motion.active))),
+        Form::Spatial => Arc::new(Spatial::new(world, &motion.active)),
     };
-    let mut path = Recording::new(world, field, Pairs::new(true));
+    let mut path = Recording::new(world, field, AntitheticPairs::new(true));
     let mut differentiator = Differentiator::new(world);
     let mut sink = Contraction::new(world, &motion);
-    let (mut buffer, mut moments) = (Brought::default(), [Moments::default(); 2]);
+    let (mut buffer, mut moments) = (PairedRadiance::default(), [Moments::default(); 2]);
     for (seed, moments) in (20..).zip(&mut moments) {
         for i in 0..paths {
             let choices = (seed == 21).then(|| Rng::new(9, 1, i));
             let slope = trace(&mut tracer, &mut path, choices, seed, i);
             sink.clear();
             differentiator.differentiate(&path.path(), slope, Rng::new(6, 0, i), &mut sink);
-            path.views[0].pairs.follow(&mut tracer, &mut buffer, |pair, chance, brought| {
-                let mut brought = brought.clone();
-                other(pair, &mut brought);
-                differentiator.pair(&path.path(), pair, chance, &brought, &mut sink);
+            path.views[0].pairs.follow(&mut tracer, &mut buffer, |pair, chance, incoming| {
+                let mut incoming = incoming.clone();
+                other(pair, &mut incoming);
+                differentiator.pair(&path.path(), pair, chance, &incoming, &mut sink);
             });
             moments.push(sink.rates[0].mean());
         }
@@ -67,23 +67,23 @@ fn z([single, pairs]: [Moments; 2]) -> f64 {
     (single.mean() - pairs.mean()) / f64::sqrt(variance)
 }
 
-fn dimmed(brought: &mut Brought, by: f64) {
-    brought.light *= by;
-    brought.ends.iter_mut().for_each(|(_, light)| *light *= by);
+fn dimmed(incoming: &mut PairedRadiance, by: f64) {
+    incoming.light *= by;
+    incoming.ends.iter_mut().for_each(|(_, light)| *light *= by);
 }
 
 fn check(ball: Bsdf) {
     let scene = surfaces(ball, twosided(phong()));
     let rougher = set("alpha", "ball-bsdf", "alpha", grey(1.0));
-    let find = |other: &dyn Fn(&Pair, &mut Brought)| {
+    let find = |other: &dyn Fn(&AntitheticPair, &mut PairedRadiance)| {
         derivatives(&scene, &rougher, Form::Material, 400_000, other)
     };
     let fair = find(&|_, _| {});
     assert!(z(fair).abs() < 4.0, "{fair:?}");
     // Planted: one of the sides is too dark.
-    let faulty = find(&|pair, brought| {
-        if matches!(pair.told, Told::Roughness(slope) if slope < 0.0) {
-            dimmed(brought, 0.75);
+    let faulty = find(&|pair, incoming| {
+        if matches!(pair.told, PairKind::Roughness(slope) if slope < 0.0) {
+            dimmed(incoming, 0.75);
         }
     });
     assert!(z(faulty).abs() > 5.0, "{faulty:?}");
@@ -105,8 +105,9 @@ fn narrow(bsdf: Bsdf, alpha: f64) -> Bsdf {
 /// By what turns the lobes of the ball, with much less noise.
 fn turned(ball: Bsdf, parameter: &Parameter, form: Form) {
     let scene = surfaces(narrow(ball, 0.05), twosided(phong()));
-    let find =
-        |other: &dyn Fn(&Pair, &mut Brought)| derivatives(&scene, parameter, form, 200_000, other);
+    let find = |other: &dyn Fn(&AntitheticPair, &mut PairedRadiance)| {
+        derivatives(&scene, parameter, form, 200_000, other)
+    };
     let fair = find(&|_, _| {});
     let [single, pairs] = fair.map(|m| m.variance_of_mean());
     println!("{form:?}, {}: {:.2} {:.2}", parameter.name, z(fair), pairs / single);
@@ -115,9 +116,9 @@ fn turned(ball: Bsdf, parameter: &Parameter, form: Form) {
     let tails = form == Form::Spatial && scene.bsdfs[0].item.is_transmissive();
     assert!(tails || pairs < 0.5 * single, "{fair:?}");
     // Planted: the one side of the lobe is dark.
-    let faulty = find(&|pair, brought| {
-        if matches!(&pair.told, Told::Turns([turn, _]) if turn.n.x + turn.eta < 0.0) {
-            dimmed(brought, 0.0);
+    let faulty = find(&|pair, incoming| {
+        if matches!(&pair.told, PairKind::Turns([turn, _]) if turn.n.x + turn.eta < 0.0) {
+            dimmed(incoming, 0.0);
         }
     });
     assert!(z(faulty).abs() > 5.0, "{faulty:?}");
@@ -151,13 +152,13 @@ fn pairs_of_rays_turn_with_everything() {
         scene.emitters.retain(|e| !matches!(e.item.emitter, Emitter::Constant { .. }));
         let all = ["ball", "floor", "lamp", "camera"].map(|id| moves(id, turn()));
         let all = parameter("all turns", 0.0, all.to_vec());
-        let find = |other: &dyn Fn(&Pair, &mut Brought)| {
+        let find = |other: &dyn Fn(&AntitheticPair, &mut PairedRadiance)| {
             derivatives(&scene, &all, Form::Material, 20_000, other)
         };
         let size = |m: &Moments| f64::sqrt(m.mean() * m.mean() + m.variance_of_mean());
         let [single, pairs] = find(&|_, _| {}).map(|m| size(&m));
         // Planted: the other rays end nowhere.
-        let [_, faulty] = find(&|_, brought| brought.ends.clear()).map(|m| size(&m));
+        let [_, faulty] = find(&|_, incoming| incoming.ends.clear()).map(|m| size(&m));
         println!("{single:e} {pairs:e} {faulty:e}");
         assert!(single < 1e-9 && pairs < 1e-9 && faulty > 1e-4);
     }

@@ -9,8 +9,10 @@ use drt_motion::{GeometryChange, Parameter};
 
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::medium_motion::MediumMotions;
-use crate::derivative::pairs::Pairs;
-use crate::derivative::sensitivity::{AdjointSink, CoefficientAdjoint, Interest, SurfaceAdjoint};
+use crate::derivative::pairs::AntitheticPairs;
+use crate::derivative::sensitivity::{
+    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint,
+};
 use crate::derivative::tangents;
 use crate::derivative::tests::scenes::*;
 use crate::derivative::velocity::RecordedPath;
@@ -23,8 +25,8 @@ use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Tracer;
 use crate::terms::interior::{PathView, Recorder};
 use crate::world::World;
-use crate::world::cache::Kept;
-use crate::world::lights::Lit;
+use crate::world::cache::PreparedCache;
+use crate::world::lights::EmitterMask;
 use crate::world::vertex::MaterialPoint;
 
 pub(super) fn set(name: &str, id: &str, property: &str, op: ValueChange) -> Parameter {
@@ -43,10 +45,10 @@ pub(super) fn coloured() -> ValueChange {
 pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
     let (at_value, tangents) =
         tangents::apply(scene, core::slice::from_ref(parameter)).expect("a valid parameter");
-    let (tangents, mut kept) = (tangents.seen_by(0), Kept::default());
+    let (tangents, mut kept) = (tangents.seen_by(0), PreparedCache::default());
     let depth = scene.integrator.max_depth;
     let mut world =
-        World::new(at_value, 0, depth, None, Lit::All, &mut kept).expect("a valid scene");
+        World::new(at_value, 0, depth, None, EmitterMask::All, &mut kept).expect("a valid scene");
     let insides = MediumMotions::plan(&world, &tangents, &[], &mut kept).expect("a valid scene");
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());
@@ -60,7 +62,11 @@ pub(super) struct Recording<'w> {
 }
 
 impl<'w> Recording<'w> {
-    pub(super) fn new(world: &'w World, field: Arc<dyn VelocityField>, pairs: Pairs) -> Self {
+    pub(super) fn new(
+        world: &'w World,
+        field: Arc<dyn VelocityField>,
+        pairs: AntitheticPairs,
+    ) -> Self {
         let velocities = PathVelocities::new(field);
         let view = PathView { world, velocities, pairs, flux: None };
         Self { record: PathRecord::default(), views: [view] }
@@ -68,8 +74,8 @@ impl<'w> Recording<'w> {
 
     /// In the material form.
     pub(super) fn material(world: &'w World, motion: &Motion) -> Self {
-        let field = Material::new(Movers::new(&motion.interest));
-        Self::new(world, Arc::new(field), Pairs::default())
+        let field = Material::new(Movers::new(&motion.active));
+        Self::new(world, Arc::new(field), AntitheticPairs::default())
     }
 
     pub(super) fn path(&self) -> RecordedPath<'_> {
@@ -119,8 +125,8 @@ pub(super) enum Fault {
 pub(super) struct Faulty<'a>(pub(super) Contraction<'a>, pub(super) Fault);
 
 impl AdjointSink for Faulty<'_> {
-    fn interest(&self) -> &Interest {
-        self.0.interest()
+    fn active(&self) -> &ActiveInputs {
+        self.0.active()
     }
     fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint) {
         let mut a = *adjoint;

@@ -14,7 +14,7 @@ use drt_motion::{Parameter, SurfacePoint as PointOfMesh};
 
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::contraction::{Contraction, Motion};
-use crate::derivative::pairs::Pairs;
+use crate::derivative::pairs::AntitheticPairs;
 use crate::derivative::tests::scenes::*;
 use crate::derivative::tests::setup::{Recording, motion, prepare, trace};
 use crate::derivative::velocity::{
@@ -131,8 +131,8 @@ fn derivatives(
     field: &dyn Fn(Material) -> Smooth,
 ) -> (Vec<f64>, f64) {
     let (world, motion) = prepare(scene, parameter);
-    let field = field(Material::new(Movers::new(&motion.interest)));
-    let mut path = Recording::new(&world, Arc::new(field), Pairs::default());
+    let field = field(Material::new(Movers::new(&motion.active)));
+    let mut path = Recording::new(&world, Arc::new(field), AntitheticPairs::default());
     let mut tracer = Tracer::new(&world);
     let mut differentiator = Differentiator::new(&world);
     let mut rates = Contraction::new(&world, &motion);
@@ -147,7 +147,7 @@ fn derivatives(
         forward.push(value);
         if i < 200 {
             let weights = Rgb::splat(column / 3.0);
-            let mut sink = ScatterSink::of_surfaces(&world, &motion.interest, weights);
+            let mut sink = ScatterSink::of_surfaces(&world, &motion.active, weights);
             differentiator.differentiate(&path.path(), slope, rng, &mut sink);
             apart = f64::max(apart, (along(&motion, &world, sink) - value).abs());
         }

@@ -14,7 +14,7 @@
 //! v = (1 - φ) c + φ u,
 //! ```
 //!
-//! with φ = 1 where a curved surface is grazed, and mostly on [lamps and in media that move rigidly](whole). With
+//! with φ = 1 where a curved surface is grazed, and mostly on [lamps and in media that move rigidly](region). With
 //! div v = (1-φ) div c + φ div u + ∇φ·(u - c), the derivative of ∫ F dA, F holding the geometric term,
 //! scattering and transmittance, becomes
 //!
@@ -33,9 +33,9 @@
 //! takes the length's place, φ is nonzero only within about a pixel of an outline, less towards
 //! the borders of the filter's support.
 
+mod region;
 #[cfg(all(test, feature = "std"))]
 mod tests;
-mod whole;
 
 use alloc::vec::Vec;
 
@@ -44,9 +44,9 @@ use core::f64::consts::PI;
 use drt_geom::{Aabb, Edge, EdgeClass, Mesh, NONE, Topology};
 use drt_math::{Real, Vec3, fm};
 
-use crate::derivative::velocity::blend::whole::Whole;
+use crate::derivative::velocity::blend::region::BlendRegion;
 
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::model::scene::Shape;
 use crate::world::World;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
@@ -82,9 +82,9 @@ pub(crate) struct Blends {
     /// The same for rays of the camera.
     camera_cosines: Vec<f64>,
     /// Of the shapes that are lamps.
-    lamps: Vec<Option<Whole>>,
+    lamps: Vec<Option<BlendRegion>>,
     /// Of the media whose boundary moves by one affine field.
-    media: Vec<Option<Whole>>,
+    media: Vec<Option<BlendRegion>>,
 }
 
 impl Blend {
@@ -105,7 +105,7 @@ impl Blend {
 
 impl Blends {
     /// Of a scene in which what is of interest moves.
-    pub(super) fn new(world: &World, interest: &Interest) -> Self {
+    pub(super) fn new(world: &World, active: &ActiveInputs) -> Self {
         let curvatures = curvatures(world);
         let camera = &world.camera;
         let cosines: Vec<f64> =
@@ -117,17 +117,20 @@ impl Blends {
         };
         let camera_cosines = curvatures.iter().enumerate().map(seen).collect();
         let shapes = world.scene.shapes.iter();
-        let lamps = shapes.map(|s| s.emitter.map(|_| Whole::new(s.mesh.bounds()))).collect();
-        let media = (0..world.scene.media.len())
-            .map(|m| if interest.volumes[m] { bounds_of(world, m).map(Whole::new) } else { None })
-            .collect();
+        let lamps = shapes.map(|s| s.emitter.map(|_| BlendRegion::new(s.mesh.bounds()))).collect();
+        let media =
+            (0..world.scene.media.len())
+                .map(|m| {
+                    if active.volumes[m] { bounds_of(world, m).map(BlendRegion::new) } else { None }
+                })
+                .collect();
         Self { curvatures, cosines, camera_cosines, lamps, media }
     }
 
     /// True when φ > 0 for some vertices on a shape, or in a medium that it bounds.
     pub(crate) fn acts_on(&self, world: &World, shape: u32) -> bool {
-        let inside = |(m, whole): (usize, &Option<Whole>)| {
-            whole.is_some() && bounds(&world.scene.shapes[shape as usize], m)
+        let inside = |(m, region): (usize, &Option<BlendRegion>)| {
+            region.is_some() && bounds(&world.scene.shapes[shape as usize], m)
         };
         self.acts_in_view_on(shape)
             || self.lamp(shape as usize).is_some()
@@ -139,7 +142,7 @@ impl Blends {
         self.curvatures.get(shape as usize).is_some_and(|c| *c > 0.0)
     }
 
-    fn lamp(&self, shape: usize) -> Option<&Whole> {
+    fn lamp(&self, shape: usize) -> Option<&BlendRegion> {
         self.lamps.get(shape)?.as_ref()
     }
 
@@ -177,7 +180,7 @@ impl Blends {
     pub(crate) fn inside(&self, viewer: &Vertex, medium: usize) -> f64 {
         match (&viewer.kind, self.media.get(medium)) {
             // Not for the camera: its pixels would be edges.
-            (Kind::Surface(_) | Kind::Volume(_), Some(Some(whole))) => whole.weight(viewer.x),
+            (Kind::Surface(_) | Kind::Volume(_), Some(Some(region))) => region.weight(viewer.x),
             _ => 0.0,
         }
     }

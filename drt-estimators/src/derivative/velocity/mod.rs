@@ -46,7 +46,7 @@ pub(crate) use crate::derivative::velocity::path::{PathVelocities, RecordedPath}
 pub(crate) use crate::derivative::velocity::spatial::Spatial;
 use crate::derivative::velocity::warp::SurfaceHit;
 
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::sampling::trace::Arrival;
 use crate::world::World;
 use crate::world::vertex::{Matter, SurfacePoint, Vertex};
@@ -131,11 +131,11 @@ pub(crate) struct Movers {
 }
 
 impl Movers {
-    pub(crate) fn new(interest: &Interest) -> Self {
+    pub(crate) fn new(active: &ActiveInputs) -> Self {
         Self {
-            shapes: interest.shapes.as_slice().into(),
-            volumes: interest.volumes.as_slice().into(),
-            camera: interest.sensor,
+            shapes: active.shapes.as_slice().into(),
+            volumes: active.volumes.as_slice().into(),
+            camera: active.sensor,
         }
     }
 

@@ -3,12 +3,12 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use crate::derivative::pairs::Pairs;
+use crate::derivative::pairs::AntitheticPairs;
 use crate::derivative::velocity::{Auxiliary, Found, SurfaceHit, VelocityField, VertexVelocity};
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Arrival;
 use crate::world::World;
-use crate::world::lights::Lit;
+use crate::world::lights::EmitterMask;
 
 /// The velocities of a path's vertices, node by node.
 #[derive(Clone, Debug)]
@@ -76,6 +76,6 @@ pub(crate) struct RecordedPath<'p> {
     pub(crate) record: &'p PathRecord,
     pub(crate) velocities: &'p PathVelocities,
     /// Rays beside it, where they are asked for.
-    pub(crate) pairs: &'p Pairs,
-    pub(crate) lit: Lit,
+    pub(crate) pairs: &'p AntitheticPairs,
+    pub(crate) lit: EmitterMask,
 }

@@ -24,7 +24,7 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::blend::Blends;
 use crate::derivative::velocity::warp::{free_paths, warps};
 use crate::derivative::velocity::{Auxiliary, Blend, Found, Movers, VelocityField, VertexVelocity};
@@ -46,12 +46,12 @@ pub(crate) struct Spatial {
 
 impl Spatial {
     /// Of a scene in which what is of interest moves.
-    pub(crate) fn new(world: &World, interest: &Interest) -> Self {
-        let movers = Movers::new(interest);
-        if !interest.moves_geometry() {
+    pub(crate) fn new(world: &World, active: &ActiveInputs) -> Self {
+        let movers = Movers::new(active);
+        if !active.moves_geometry() {
             return Self { movers, blends: Blends::default(), free_paths: Vec::new() };
         }
-        Self { movers, blends: Blends::new(world, interest), free_paths: free_paths(world) }
+        Self { movers, blends: Blends::new(world, active), free_paths: free_paths(world) }
     }
 
     /// 1/σ of a medium in which distances are warped.

@@ -114,14 +114,14 @@ impl Stretch {
     /// derivatives by the point's distance.
     fn shares(&self, away: [f64; 2]) -> [[f64; 2]; 2] {
         let last = fm::exp(-self.depth);
-        let whole = f64::max(1.0 - last, f64::MIN_POSITIVE);
+        let region = f64::max(1.0 - last, f64::MIN_POSITIVE);
         let falls = [(away[0], -1.0), (away[1], 1.0)].map(|(away, sign)| {
             let here = fm::exp(-away / self.free_path);
             if here > last { [here - last, sign * here] } else { [0.0; 2] }
         });
         let [falling, even] = self.parts.map(|part| self.strengths.map(|strength| part * strength));
         core::array::from_fn(|end| {
-            let [share, slope] = falls[end].map(|f| f / whole * falling[end]);
+            let [share, slope] = falls[end].map(|f| f / region * falling[end]);
             [share + even[end], slope / self.free_path]
         })
     }

@@ -19,7 +19,7 @@ pub(super) struct Bundle {
     length: Eight,
     faces: [Vectors; 2],
     /// As parts of the `unit`; those of open edges are the same in all.
-    jump: Eight,
+    discontinuity: Eight,
     crease: [Eight; 2],
     /// In this the weights count.
     pub(super) unit: f64,
@@ -46,8 +46,8 @@ impl Bundle {
         let [low, high] = range(list.clone().flat_map(|p| p.line.ends()));
         let place = Place::new(low, high);
         let priors = |p: &Piece| {
-            let [front, back] = if p.open { [p.jump; 2] } else { p.crease };
-            [p.jump, front, back]
+            let [front, back] = if p.open { [p.discontinuity; 2] } else { p.crease };
+            [p.discontinuity, front, back]
         };
         let largest = list.clone().flat_map(priors).fold(0.0, f64::max);
         let part = |prior: f64| if prior > 0.0 { (prior / largest).max(LEAST_WEIGHT) } else { 0.0 };
@@ -58,7 +58,7 @@ impl Bundle {
             tangent: vectors(list.clone().map(|p| p.line.tangent)),
             length: Eight::gather(list.clone().map(|p| p.line.length * place.scale)),
             faces: [0, 1].map(|k| vectors(list.clone().map(|p| p.faces[k]))),
-            jump: prior(0),
+            discontinuity: prior(0),
             crease: [prior(1), prior(2)],
             unit: largest * place.scale,
             first: first as u32,
@@ -110,7 +110,7 @@ impl Bundle {
         let front1 = side1.less(tolerance, Eight::ONE, Eight::ZERO);
         let back0 = (Eight::ZERO - tolerance).less(side0, Eight::ONE, Eight::ZERO);
         let back1 = (Eight::ZERO - tolerance).less(side1, Eight::ONE, Eight::ZERO);
-        self.jump * (front0 * back1).max(back0 * front1)
+        self.discontinuity * (front0 * back1).max(back0 * front1)
             + self.crease[0] * (front0 * front1)
             + self.crease[1] * (back0 * back1)
     }

@@ -13,7 +13,7 @@
 
 use crate::edges::tree::eight::Eight;
 use crate::edges::tree::node::Child;
-use crate::edges::tree::options::{Group, Options};
+use crate::edges::tree::options::{NodeGroup, TreeScratch};
 use crate::edges::tree::seen::{Seen, Toward};
 use crate::edges::tree::view::{MOST_WAYS, Viewpoint, Way};
 use crate::edges::tree::{ARITY, EdgeTree, LEAF};
@@ -54,17 +54,17 @@ impl EdgeTree {
     pub(super) fn cut(
         &self,
         child: Child,
-        looking: &Looking,
+        query_rays: &Looking,
         mut open: bool,
-        options: &mut Options,
+        options: &mut TreeScratch,
     ) {
-        options.clear(looking.count);
+        options.clear(query_rays.count);
         let mut next = Some(child);
         while let Some(child) = next {
             if child.bundles > 0 {
-                self.add_bundles(child, looking, options);
+                self.add_bundles(child, query_rays, options);
             } else {
-                self.add_family(child.first, looking, open, options);
+                self.add_family(child.first, query_rays, open, options);
             }
             next = options.opened.pop();
             open = true;
@@ -72,26 +72,26 @@ impl EdgeTree {
     }
 
     #[inline(always)]
-    fn add_bundles(&self, child: Child, looking: &Looking, options: &mut Options) {
+    fn add_bundles(&self, child: Child, query_rays: &Looking, options: &mut TreeScratch) {
         for index in child.first..child.first + child.bundles {
             let (bundle, mut all) = (&self.bundles[index as usize], [Eight::ZERO; MOST_WAYS]);
-            let (weight, lines) = bundle.weigh(&looking.seen);
-            for (w, way) in all.iter_mut().zip(looking.ways()) {
-                *w = bundle.toward(way, &looking.seen, weight, &lines);
+            let (weight, lines) = bundle.weigh(&query_rays.seen);
+            for (w, way) in all.iter_mut().zip(query_rays.ways()) {
+                *w = bundle.toward(way, &query_rays.seen, weight, &lines);
             }
-            options.add(Group::Bundle(index), bundle.unit, &all[..looking.count]);
+            options.add(NodeGroup::Bundle(index), bundle.unit, &all[..query_rays.count]);
         }
     }
 
     #[inline(always)]
-    fn add_family(&self, index: u32, looking: &Looking, open: bool, options: &mut Options) {
+    fn add_family(&self, index: u32, query_rays: &Looking, open: bool, options: &mut TreeScratch) {
         let (family, mut all) = (&self.families[index as usize], [Eight::ZERO; MOST_WAYS]);
-        let (weight, boxes) = family.weigh(&looking.seen);
-        for (w, way) in all.iter_mut().zip(looking.ways()) {
+        let (weight, boxes) = family.weigh(&query_rays.seen);
+        for (w, way) in all.iter_mut().zip(query_rays.ways()) {
             *w = family.toward(way, weight, &boxes);
         }
-        let all = &mut all[..looking.count];
-        let few = looking.finely && family.count as usize > MANY;
+        let all = &mut all[..query_rays.count];
+        let few = query_rays.finely && family.count as usize > MANY;
         if open || few {
             let near = if open { family.near(&boxes) } else { Eight::ZERO };
             let mut room = MOST.saturating_sub(options.groups().len() + 1);
@@ -105,6 +105,6 @@ impl EdgeTree {
                 }
             }
         }
-        options.add(Group::Family(index), family.unit, all);
+        options.add(NodeGroup::Family(index), family.unit, all);
     }
 }

@@ -64,8 +64,8 @@ use drt_math::Vec3;
 use crate::edges::tree::bundle::Bundle;
 use crate::edges::tree::cut::Looking;
 use crate::edges::tree::node::{Child, Family};
-use crate::edges::tree::options::Group;
-pub(crate) use crate::edges::tree::options::Options;
+use crate::edges::tree::options::NodeGroup;
+pub(crate) use crate::edges::tree::options::TreeScratch;
 use crate::edges::tree::piece::{Line, Stretch};
 pub(crate) use crate::edges::tree::view::{MOST_WAYS, Viewpoint, Way};
 
@@ -80,7 +80,7 @@ pub(crate) struct Segment {
     /// One face only: always a silhouette.
     pub(crate) open: bool,
     /// What to expect of the jump where the edge is a silhouette.
-    pub(crate) jump: f64,
+    pub(crate) discontinuity: f64,
     /// The same where both faces are seen from the front, and where both are from the back.
     pub(crate) crease: [f64; 2],
 }
@@ -136,13 +136,13 @@ impl EdgeTree {
         view: &Viewpoint,
         ways: &[Way],
         draw: &Draw,
-        options: &mut Options,
+        options: &mut TreeScratch,
     ) -> Option<Chosen> {
         self.registers.run(Sampling { tree: self, view, ways, draw, options })
     }
 
     /// An estimate of the integral over all segments of kernel, scattering and weight, looking one way.
-    pub(crate) fn amount(&self, view: &Viewpoint, way: &Way, options: &mut Options) -> f64 {
+    pub(crate) fn amount(&self, view: &Viewpoint, way: &Way, options: &mut TreeScratch) -> f64 {
         self.registers.run(Summing { tree: self, view, way, options })
     }
 
@@ -164,25 +164,25 @@ impl EdgeTree {
         &self,
         view: &Viewpoint,
         ways: &[Way],
-        options: &mut Options,
-        mut choose: impl FnMut(&Options, &[f64]) -> Option<(usize, usize)>,
+        options: &mut TreeScratch,
+        mut choose: impl FnMut(&TreeScratch, &[f64]) -> Option<(usize, usize)>,
     ) -> Option<(&Line, [f64; MOST_WAYS])> {
-        let looking = Looking::new(view, ways, self.slack(view), true)?;
-        let (mut child, mut open) = (self.root, looking.seen.normal.is_none());
+        let query_rays = Looking::new(view, ways, self.slack(view), true)?;
+        let (mut child, mut open) = (self.root, query_rays.seen.normal.is_none());
         let mut so_far = None;
         loop {
-            self.cut(child, &looking, open, options);
+            self.cut(child, &query_rays, open, options);
             let chances = so_far.get_or_insert_with(|| first_chances(ways, options));
             let (group, lane) = choose(options, &chances[..ways.len()])?;
             for (way, chance) in chances[..ways.len()].iter_mut().enumerate() {
                 *chance *= options.chance(way, (group, lane));
             }
             match options.groups()[group] {
-                Group::Family(f) => {
+                NodeGroup::Family(f) => {
                     child = self.families[f as usize].children[lane];
                     open = false;
                 }
-                Group::Bundle(b) => {
+                NodeGroup::Bundle(b) => {
                     let place = self.bundles[b as usize].first as usize + lane;
                     return Some((&self.lines[place], *chances));
                 }
@@ -197,7 +197,7 @@ struct Sampling<'a> {
     view: &'a Viewpoint,
     ways: &'a [Way],
     draw: &'a Draw,
-    options: &'a mut Options,
+    options: &'a mut TreeScratch,
 }
 
 impl Work for Sampling<'_> {
@@ -228,7 +228,7 @@ struct Summing<'a> {
     tree: &'a EdgeTree,
     view: &'a Viewpoint,
     way: &'a Way,
-    options: &'a mut Options,
+    options: &'a mut TreeScratch,
 }
 
 impl Work for Summing<'_> {
@@ -238,16 +238,16 @@ impl Work for Summing<'_> {
     fn run(self) -> f64 {
         let Self { tree, view, way, options } = self;
         let slack = tree.slack(view);
-        let Some(looking) = Looking::new(view, core::slice::from_ref(way), slack, false) else {
+        let Some(query_rays) = Looking::new(view, core::slice::from_ref(way), slack, false) else {
             return 0.0;
         };
-        tree.cut(tree.root, &looking, looking.seen.normal.is_none(), options);
+        tree.cut(tree.root, &query_rays, query_rays.seen.normal.is_none(), options);
         options.sum(0)
     }
 }
 
 /// The chances of ways that have something to choose.
-fn first_chances(ways: &[Way], options: &Options) -> [f64; MOST_WAYS] {
+fn first_chances(ways: &[Way], options: &TreeScratch) -> [f64; MOST_WAYS] {
     let mut chances = [0.0; MOST_WAYS];
     for (k, way) in ways.iter().enumerate() {
         chances[k] = if options.sum(k) > 0.0 { way.chance } else { 0.0 };

@@ -70,9 +70,9 @@ impl Node {
         let sum =
             |weight: fn(&Piece) -> f64| pieces.clone().map(|p| weight(p) * p.line.length).sum();
         let sums = [
-            sum(|p| if p.open { p.jump } else { 0.0 }),
-            sum(|p| if p.open { 0.0 } else { p.jump }),
-            sum(|p| 0.5 * p.jump * (p.faces[1] - p.faces[0]).length()),
+            sum(|p| if p.open { p.discontinuity } else { 0.0 }),
+            sum(|p| if p.open { 0.0 } else { p.discontinuity }),
+            sum(|p| 0.5 * p.discontinuity * (p.faces[1] - p.faces[0]).length()),
             sum(|p| if p.open { 0.0 } else { p.crease[0] }),
             sum(|p| if p.open { 0.0 } else { p.crease[1] }),
         ];
@@ -99,7 +99,7 @@ pub(super) struct Family {
     offset: [Eight; 2],
     /// As parts of the `unit`.
     open: Eight,
-    jump: Eight,
+    discontinuity: Eight,
     crease: [Eight; 2],
     /// Half the distance of two faces' normals, in the mean.
     turning: Eight,
@@ -140,7 +140,7 @@ impl Family {
             normal: [0, 1].map(|k| vectors(nodes_only.clone().map(|n| n.normal[k]))),
             offset: [scaled(|n| n.offset[0]), scaled(|n| n.offset[1])],
             open: sums(0),
-            jump: sums(1),
+            discontinuity: sums(1),
             crease: [sums(3), sums(4)],
             turning: Eight::gather(nodes_only.clone().map(turning)),
             unit: largest * place.scale * place.scale,
@@ -212,7 +212,7 @@ impl Family {
         let [front, back] = [(at + 1.0) * 0.5, (Eight::ONE - at) * 0.5];
         let peak = (Eight::ONE - at.abs()).max(Eight::splat(LEAST_DENSITY));
         let split = (self.turning * distance * peak / half).max(least).min(Eight::ONE);
-        let both = Eight::ZERO.less(front.min(back), self.jump * split, Eight::ZERO);
+        let both = Eight::ZERO.less(front.min(back), self.discontinuity * split, Eight::ZERO);
         let fronts = self.crease[0] * front.max(least).min(Eight::ONE);
         let fronts = Eight::ZERO.less(front, fronts, Eight::ZERO);
         let backs = self.crease[1] * back.max(least).min(Eight::ONE);

@@ -10,7 +10,7 @@ use crate::edges::tree::view::MOST_WAYS;
 
 /// A group of eight parts of a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Group {
+pub(super) enum NodeGroup {
     /// The children of a node.
     Family(u32),
     /// Segments.
@@ -19,19 +19,19 @@ pub(super) enum Group {
 
 /// Memory for choices, to be used again and again.
 #[derive(Debug, Default)]
-pub(crate) struct Options {
-    groups: Vec<Group>,
+pub(crate) struct TreeScratch {
+    groups: Vec<NodeGroup>,
     /// Children that are to be judged by what is below them.
     pub(super) opened: Vec<Child>,
     /// What each group has to offer, for one way after the other.
-    offers: Vec<Offer>,
+    offers: Vec<GroupWeights>,
     totals: [Total; MOST_WAYS],
     ways: usize,
 }
 
 /// A group's weights for one way.
 #[derive(Clone, Copy, Debug)]
-struct Offer {
+struct GroupWeights {
     weights: Eight,
     unit: f64,
     sum: f64,
@@ -45,7 +45,7 @@ struct Total {
     judged: u32,
 }
 
-impl Options {
+impl TreeScratch {
     #[inline(always)]
     pub(super) fn clear(&mut self, ways: usize) {
         self.groups.clear();
@@ -56,24 +56,24 @@ impl Options {
     }
 
     #[inline(always)]
-    pub(super) fn groups(&self) -> &[Group] {
+    pub(super) fn groups(&self) -> &[NodeGroup] {
         &self.groups
     }
 
     /// Adds a group with its weights for all ways, in a unit.
     #[inline(always)]
-    pub(super) fn add(&mut self, group: Group, unit: f64, weights: &[Eight]) {
+    pub(super) fn add(&mut self, group: NodeGroup, unit: f64, weights: &[Eight]) {
         self.groups.push(group);
         for (total, weights) in self.totals.iter_mut().zip(weights) {
             let judged = match group {
-                Group::Family(_) => weights.positive(),
+                NodeGroup::Family(_) => weights.positive(),
                 // Segments are known too well to need it.
-                Group::Bundle(_) => 0,
+                NodeGroup::Bundle(_) => 0,
             };
             let sum = f64::from(weights.sum()) * unit;
             total.sum += sum;
             total.judged += judged;
-            self.offers.push(Offer { weights: *weights, unit, sum, judged });
+            self.offers.push(GroupWeights { weights: *weights, unit, sum, judged });
         }
     }
 
@@ -128,7 +128,7 @@ impl Options {
     }
 }
 
-impl Offer {
+impl GroupWeights {
     /// One's weight, and an equal `share` of what is judged as a whole.
     #[inline(always)]
     fn weight(&self, lane: usize, share: f64) -> f64 {

@@ -16,7 +16,7 @@ pub(super) struct Piece {
     pub(super) line: Line,
     pub(super) faces: [Vec3; 2],
     pub(super) open: bool,
-    pub(super) jump: f64,
+    pub(super) discontinuity: f64,
     pub(super) crease: [f64; 2],
 }
 
@@ -45,11 +45,11 @@ pub(super) struct Stretch {
 impl Piece {
     /// `None` for a segment on which nothing ever counts, or one that is not finite.
     pub(super) fn new(segment: &Segment, edge: u32) -> Option<Self> {
-        let &Segment { a, b, faces, open, jump, crease } = segment;
+        let &Segment { a, b, faces, open, discontinuity, crease } = segment;
         let length = (b - a).length();
         let tangent = (b - a) / length;
         let crease = if open { [0.0; 2] } else { crease };
-        let priors = [jump, crease[0], crease[1]];
+        let priors = [discontinuity, crease[0], crease[1]];
         let faces = if open { [faces[0]; 2] } else { faces };
         let usable = tangent.is_finite()
             && length > 0.0
@@ -57,12 +57,12 @@ impl Piece {
             && priors.iter().all(|p| p.is_finite() && *p >= 0.0)
             && priors.iter().any(|p| *p > 0.0);
         let line = Line { a, tangent, length, edge };
-        usable.then_some(Self { line, faces, open, jump, crease })
+        usable.then_some(Self { line, faces, open, discontinuity, crease })
     }
 
     /// Its length times what it counts for at most.
     pub(super) fn most(&self) -> f64 {
-        self.line.length * self.jump.max(self.crease[0]).max(self.crease[1])
+        self.line.length * self.discontinuity.max(self.crease[0]).max(self.crease[1])
     }
 }
 

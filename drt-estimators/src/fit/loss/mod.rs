@@ -11,8 +11,8 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, fm};
 
-use crate::Error;
 use crate::fit::loss::pyramid::Pyramid;
+use crate::model::error::Error;
 
 /// A distance between images. With d the difference of two images, times the mask where there is one:
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

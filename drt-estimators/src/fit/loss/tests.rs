@@ -117,7 +117,7 @@ fn dark_pixels_count_as_much_as_bright_ones() {
 
 #[test]
 fn what_cannot_be_meant_is_refused() {
-    let fail = |r: Result<Reference, crate::Error>, part: &str| {
+    let fail = |r: Result<Reference, crate::model::error::Error>, part: &str| {
         let message = alloc::string::ToString::to_string(&r.unwrap_err());
         assert!(message.contains(part), "{message}");
     };

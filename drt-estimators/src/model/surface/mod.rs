@@ -32,16 +32,16 @@
 mod angles;
 mod change;
 mod conductor;
-mod counterpart;
 mod dielectric;
 mod diffuse;
+mod direction_partner;
 mod facet;
 mod fresnel;
 mod lobes;
 mod microfacet;
-mod opposite;
 mod phong;
 mod property;
+mod roughness_partner;
 #[cfg(test)]
 pub(crate) mod tests;
 mod visible_slope;
@@ -53,15 +53,15 @@ use drt_math::{Rgb, RgbVec, Vec3, fm};
 use crate::model::surface::angles::{Angles, Slopes};
 pub use crate::model::surface::change::{BsdfChange, BsdfParams, BsdfTangent};
 pub use crate::model::surface::conductor::RoughConductor;
-pub(crate) use crate::model::surface::counterpart::Counterpart;
 pub use crate::model::surface::dielectric::RoughDielectric;
 pub use crate::model::surface::diffuse::Diffuse;
+pub(crate) use crate::model::surface::direction_partner::{DirectionPartner, Turn};
 use crate::model::surface::facet::Facet;
 pub(crate) use crate::model::surface::lobes::{Lobe, Lobes};
 pub use crate::model::surface::microfacet::Distribution;
-pub(crate) use crate::model::surface::opposite::{Opposite, Turn};
 pub use crate::model::surface::phong::Phong;
 pub use crate::model::surface::property::{Property, SurfaceError};
+pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
 
 /// A bidirectional scattering distribution function.
 ///
@@ -210,17 +210,27 @@ impl Bsdf {
         match_model!(bsdf, b => b.pdf(&Angles::new(from, to, n)), _ => 0.0)
     }
 
-    /// The [`Counterpart`] of `wi` as the surface gets rougher, if it has one.
+    /// The [`RoughnessPartner`] of `wi` as the surface gets rougher, if it has one.
     #[inline]
-    pub(crate) fn counterpart(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Counterpart> {
-        Counterpart::new(&self.facet(wo, wi, n)?.0)
+    pub(crate) fn roughness_partner(
+        &self,
+        wo: Vec3,
+        wi: Vec3,
+        n: Vec3,
+    ) -> Option<RoughnessPartner> {
+        RoughnessPartner::new(&self.facet(wo, wi, n)?.0)
     }
 
-    /// The [`Opposite`] of `wi` in its lobe, if it has one.
+    /// The [`DirectionPartner`] of `wi` in its lobe, if it has one.
     #[inline]
-    pub(crate) fn opposite(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<Opposite> {
+    pub(crate) fn direction_partner(
+        &self,
+        wo: Vec3,
+        wi: Vec3,
+        n: Vec3,
+    ) -> Option<DirectionPartner> {
         let (facet, by_eta) = self.facet(wo, wi, n)?;
-        Opposite::new(&facet, n, by_eta)
+        DirectionPartner::new(&facet, n, by_eta)
     }
 
     /// The microfacets that scatter so, and the rate of their index of refraction by that of the material.

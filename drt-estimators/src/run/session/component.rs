@@ -2,11 +2,11 @@
 
 use alloc::vec::Vec;
 
-use crate::Error;
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::medium_motion::MediumMotions;
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::tangents::Tangents;
+use crate::model::error::Error;
 use crate::model::plan::Plan;
 use crate::model::rendering::{Account, Layer, Term};
 use crate::model::settings::{EstimatorKind, Settings};
@@ -18,7 +18,7 @@ use crate::terms::interior;
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::{Checked, ToImages};
 use crate::world::World;
-use crate::world::cache::Kept;
+use crate::world::cache::PreparedCache;
 
 /// A scene prepared for one estimator, and its boundary terms so far.
 pub(super) struct Component {
@@ -35,7 +35,7 @@ impl Component {
         mut world: World,
         mut tangents: Tangents,
         settings: &Settings,
-        kept: &mut Kept,
+        kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         for (e, emitter) in world.scene.emitters.iter().enumerate() {
             if !world.lit.by(&emitter.item.emitter) {
@@ -55,11 +55,11 @@ impl Component {
         if let Some(motion) = &motion {
             world.prepare_for_derivatives(motion.needs());
         }
-        let nothing = Interest::default();
-        let interest = motion.as_ref().map_or(&nothing, |m| &m.interest);
+        let nothing = ActiveInputs::default();
+        let active = motion.as_ref().map_or(&nothing, |m| &m.active);
         let flux_shapes = motion.as_ref().map_or(&[][..], |m| &m.insides.flux_shapes);
         let guide = motion.as_ref().filter(|_| settings.guiding);
-        let mut prepared = Prepared::new(world, interest, flux_shapes, settings, guide)?;
+        let mut prepared = Prepared::new(world, active, flux_shapes, settings, guide)?;
         // Else the pilot of a run measures more.
         let measures = !settings.adaptive || settings.boundary_spp.is_some();
         if let Some(motion) = guide.filter(|_| measures) {
@@ -85,7 +85,7 @@ impl Component {
     ) -> Option<interior::Component<'_, Contraction<'_>>> {
         let world = &self.prepared.world;
         let mut along = self.prepared.along_rays();
-        along.looks = along.looks.or_average(queries);
+        along.queries = along.queries.or_average(queries);
         let sink = Contraction::new(world, self.motion.as_ref()?);
         Some(interior::Component { world, along, sink })
     }

@@ -7,30 +7,30 @@ use crate::derivative::contraction::Motion;
 use crate::model::plan::{MediumPlan, Plan};
 use crate::terms::boundary::Strategy;
 use crate::terms::prepared::Prepared;
-use crate::terms::splatting::Source;
+use crate::terms::splatting::BoundarySource;
 use crate::world::World;
-use crate::world::lights::Lit;
+use crate::world::lights::EmitterMask;
 
 pub(super) fn describe(prepared: &Prepared, motion: Option<&Motion>) -> Plan {
     let world = &prepared.world;
-    let has = |s: Source| prepared.sources.contains(&s);
+    let has = |s: BoundarySource| prepared.sources.contains(&s);
     let radiative = prepared.radiative.as_ref();
     let light = match world.lit {
-        Lit::All => "all light",
-        Lit::Extended => "light of surfaces, media and the sky",
-        Lit::Delta => "light of points and directions",
+        EmitterMask::All => "all light",
+        EmitterMask::Extended => "light of surfaces, media and the sky",
+        EmitterMask::Delta => "light of points and directions",
     };
     let estimator = if radiative.is_some() { "radiative" } else { "path-space" };
     let sees_edges = radiative.is_some_and(|r| r.has_edges(world));
     let mut plan = Plan {
         media: (0..world.scene.media.len()).map(|i| medium_plan(world, motion, i)).collect(),
         edges: radiative.map_or(prepared.boundary.count, |r| r.count),
-        primary: has(Source::Edges(Strategy::Primary)) || has(Source::Outlines),
-        direct: has(Source::Edges(Strategy::Direct))
+        primary: has(BoundarySource::Edges(Strategy::Primary)) || has(BoundarySource::PrimaryEdges),
+        direct: has(BoundarySource::Edges(Strategy::Direct))
             || prepared.boundary.shadows.is_some()
             || sees_edges,
-        indirect: has(Source::Edges(Strategy::Indirect)) || sees_edges,
-        borders: has(Source::Borders),
+        indirect: has(BoundarySource::Edges(Strategy::Indirect)) || sees_edges,
+        borders: has(BoundarySource::Borders),
         antithetic: prepared.antithetic,
         ..Plan::default()
     };
@@ -47,16 +47,16 @@ pub(super) fn describe(prepared: &Prepared, motion: Option<&Motion>) -> Plan {
             skip(&alloc::format!("tetrahedra in {}: {reason}", medium_name(world, i)));
         }
     }
-    if !motion.interest.moves_geometry() {
+    if !motion.active.moves_geometry() {
         skip("boundary terms: no parameter moves geometry");
     }
     if prepared.flux.is_none() {
         skip("flux: every inside follows its surfaces");
     }
     plan.estimators = alloc::vec![alloc::format!("{estimator}, {light}")];
-    plan.record = motion.interest.any();
+    plan.record = motion.active.any();
     plan.moving_shapes = motion
-        .interest
+        .active
         .shapes
         .iter()
         .enumerate()

@@ -16,7 +16,9 @@ use crate::run::session::pilot::Pilot;
 
 use crate::derivative::tangents;
 use crate::derivative::tangents::Tangents;
+use crate::model::error::Error;
 use crate::model::plan::Plan;
+use crate::model::rendering::Estimate;
 use crate::model::rendering::{Account, Derivative, Layer, Rendering, Term};
 use crate::model::scene::{Scene, Target};
 use crate::model::settings::{EstimatorKind, Settings};
@@ -26,9 +28,8 @@ use crate::sampling::parallel::Pool;
 use crate::sampling::pixels::Filling;
 use crate::terms::interior::PixelSampler;
 use crate::world::World;
-use crate::world::cache::Kept;
-use crate::world::lights::Lit;
-use crate::{Error, Estimate};
+use crate::world::cache::PreparedCache;
+use crate::world::lights::EmitterMask;
 
 /// Watches and steers a run. Every method has a default that does nothing.
 pub trait Control: Sync {
@@ -95,7 +96,7 @@ impl Session {
     ) -> Result<Self, Error> {
         scene.check()?;
         let (scene, tangents) = tangents::apply(scene, parameters)?;
-        Self::prepared(&scene, &tangents, settings, &mut Kept::default())
+        Self::prepared(&scene, &tangents, settings, &mut PreparedCache::default())
     }
 
     /// Prepares a scene at the parameters' values, with what earlier ones left to be used again.
@@ -103,12 +104,13 @@ impl Session {
         scene: &Scene,
         tangents: &Tangents,
         settings: &Settings,
-        kept: &mut Kept,
+        kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         settings.check()?;
         let tangents = tangents.seen_by(settings.sensor);
         let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
-        let mut world = World::new(scene.clone(), settings.sensor, depth, None, Lit::All, kept)?;
+        let mut world =
+            World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, kept)?;
         let mut components = Vec::new();
         for (settings, lit) in estimators(scene, tangents.targets(), settings) {
             let world = world.lit_by(lit)?;
@@ -340,7 +342,7 @@ pub(crate) fn estimators(
     scene: &Scene,
     targets: impl IntoIterator<Item = Target>,
     settings: &Settings,
-) -> Vec<(Settings, Lit)> {
+) -> Vec<(Settings, EmitterMask)> {
     let may_move = |target| match target {
         Target::Shape(_) | Target::Sensor(_) => true,
         Target::Bsdf(_) => false,
@@ -353,13 +355,13 @@ pub(crate) fn estimators(
         && emitters().any(|e| e.is_delta())
         && targets.into_iter().any(may_move)
     {
-        shares.push((EstimatorKind::PathSpace, Lit::Delta));
+        shares.push((EstimatorKind::PathSpace, EmitterMask::Delta));
         let media = scene.media.iter().any(|m| m.item.is_emissive());
         if media || emitters().any(|e| !e.is_delta()) {
-            shares.push((EstimatorKind::Radiative, Lit::Extended));
+            shares.push((EstimatorKind::Radiative, EmitterMask::Extended));
         }
     } else {
-        shares.push((settings.estimator, Lit::All));
+        shares.push((settings.estimator, EmitterMask::All));
     }
     // They share what is said of boundary samples; what is not, each finds out.
     let said = settings.boundary_spp.or((!settings.adaptive).then_some(settings.spp));

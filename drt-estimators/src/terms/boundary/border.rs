@@ -12,14 +12,14 @@
 
 use drt_math::{Rgb, Vec3};
 
-use crate::derivative::sensitivity::Rate;
+use crate::derivative::sensitivity::VelocityTerm;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary::{Buffers, Receiver};
+use crate::terms::boundary::{BoundarySink, Buffers};
 use crate::world::vertex::{Kind, Vertex};
 
 /// Takes one sample of all pixel borders.
-pub(crate) fn sample<R: Receiver>(
+pub(crate) fn sample<R: BoundarySink>(
     tracer: &mut Tracer<'_>,
     b: &mut Buffers,
     receiver: &mut R,
@@ -63,12 +63,12 @@ pub(crate) fn sample<R: Receiver>(
     items.clear();
     match vertex {
         Some(Vertex { kind: Kind::Surface(s), .. }) => {
-            items.push(Rate::Surface(s.material(), point))
+            items.push(VelocityTerm::Surface(s.material(), point))
         }
-        Some(Vertex { medium: Some(m), x, .. }) => items.push(Rate::Volume(m, x, point)),
+        Some(Vertex { medium: Some(m), x, .. }) => items.push(VelocityTerm::Volume(m, x, point)),
         _ => sensor.position = Vec3::ZERO,
     }
-    items.push(Rate::Sensor(sensor));
+    items.push(VelocityTerm::Sensor(sensor));
     if !receiver.moves(&b.functional) {
         return None;
     }

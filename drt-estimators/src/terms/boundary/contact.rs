@@ -4,11 +4,11 @@ use core::f64::consts::PI;
 
 use drt_math::{Frame, Rgb, Vec3, warp};
 
-use super::{End, Receiver, Sampler, Start};
+use super::{BoundarySink, End, Sampler, Start};
 use crate::edges::contact::Contact;
 use crate::edges::edge::EdgePoint;
 
-impl<R: Receiver> Sampler<'_, '_, R> {
+impl<R: BoundarySink> Sampler<'_, '_, R> {
     /// The camera sees the floor next to the edge.
     pub(super) fn contact_with_camera(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
         let world = self.tracer.world;

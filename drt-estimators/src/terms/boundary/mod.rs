@@ -9,7 +9,7 @@
 //! ∫ dl(x_B) ∫ dσ(w) [dr_S] [dr_D] τ(x_S, x_D) |t×w| N·(u_B - (1-l) u_S - l u_D) Lout(S→D) Wout(D→S)
 //! ```
 //!
-//! It is linear in the velocities, which is why a sample is a [`Functional`] times light. Delta ends
+//! It is linear in the velocities, which is why a sample is a [`VelocityFunctional`] times light. Delta ends
 //! (camera, point and directional lights) replace dσ by 1/r² and drop their dr. The strategies:
 //!
 //! | strategy | edge | direction | S | D |
@@ -35,9 +35,9 @@ use crate::edges::movers::Movers;
 use crate::edges::weld::weld;
 use crate::terms::boundary::shadow::Shadows;
 
-use crate::Error;
-use crate::derivative::sensitivity::{Functional, Interest, Rate};
+use crate::derivative::sensitivity::{ActiveInputs, VelocityFunctional, VelocityTerm};
 use crate::model::emitter::{Emitter, EmitterGradient};
+use crate::model::error::Error;
 use crate::model::sensor::SensorGradient;
 use crate::sampling::flight::Travel;
 use crate::sampling::importance::Splat;
@@ -74,9 +74,9 @@ pub(crate) struct Boundary {
 }
 
 /// What a sample's value is handed to.
-pub(crate) trait Receiver {
+pub(crate) trait BoundarySink {
     /// Evaluates how the sample's geometry moves; false when it does not, which ends the sample.
-    fn moves(&mut self, functional: &Functional) -> bool;
+    fn moves(&mut self, functional: &VelocityFunctional) -> bool;
     /// The last functional times `value` goes to `pixel`.
     fn receive(&mut self, pixel: u32, value: Rgb);
 }
@@ -102,7 +102,7 @@ struct End {
 /// Reusable buffers of a boundary worker.
 #[derive(Debug, Default)]
 pub(crate) struct Buffers {
-    functional: Functional,
+    functional: VelocityFunctional,
     light: RadianceBySegments,
     splats: Vec<Splat>,
     ray: RayPath,
@@ -110,8 +110,8 @@ pub(crate) struct Buffers {
 
 impl Boundary {
     /// The edges at which something can change of what is of interest.
-    pub(crate) fn new(world: &World, interest: &Interest) -> Result<Self, Error> {
-        let movers = Movers::new(world, interest);
+    pub(crate) fn new(world: &World, active: &ActiveInputs) -> Result<Self, Error> {
+        let movers = Movers::new(world, active);
         let (edges, all) = collect(world);
         let mut edges = weld(edges, |e| movers.moves(e));
         edges.retain(|e| movers.matter_to(e));
@@ -159,7 +159,7 @@ impl Boundary {
     }
 
     /// Takes one sample.
-    pub(crate) fn sample<R: Receiver>(
+    pub(crate) fn sample<R: BoundarySink>(
         &self,
         strategy: Strategy,
         tracer: &mut Tracer<'_>,
@@ -195,7 +195,7 @@ struct Sampler<'s, 'w, R> {
     receiver: &'s mut R,
 }
 
-impl<'w, R: Receiver> Sampler<'_, 'w, R> {
+impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
     /// Camera segments: D is the pinhole.
     fn primary(&mut self) -> Option<()> {
         let world = self.tracer.world;
@@ -219,7 +219,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
         self.end_rate(&s, n * -(1.0 - l));
         let position = n * -l;
         let gradient = SensorGradient { position, ..SensorGradient::default() };
-        self.b.functional.items.push(Rate::Sensor(gradient));
+        self.b.functional.items.push(VelocityTerm::Sensor(gradient));
         if !self.receiver.moves(&self.b.functional) {
             return None;
         }
@@ -313,7 +313,7 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
                 }
                 _ => EmitterGradient { direction: n * d.0.distance, ..EmitterGradient::default() },
             };
-            self.b.functional.items.push(Rate::Emitter(emitter, gradient));
+            self.b.functional.items.push(VelocityTerm::Emitter(emitter, gradient));
             self.end_rate(&d.0, n * -l);
             self.deliver(&d.0, d.1, true, w, s.weight * scale);
         }
@@ -478,14 +478,18 @@ impl<'w, R: Receiver> Sampler<'_, 'w, R> {
     }
 
     fn edge_rate(&mut self, at: &EdgePoint<'_>, n: Vec3) {
-        self.b.functional.items.push(Rate::Surface(at.point, n));
+        self.b.functional.items.push(VelocityTerm::Surface(at.point, n));
     }
 
     fn end_rate(&mut self, end: &End, n: Vec3) {
         let Some(v) = &end.vertex else { return };
         match (&v.kind, v.medium) {
-            (Kind::Surface(p), _) => self.b.functional.items.push(Rate::Surface(p.material(), n)),
-            (Kind::Volume(_), Some(m)) => self.b.functional.items.push(Rate::Volume(m, v.x, n)),
+            (Kind::Surface(p), _) => {
+                self.b.functional.items.push(VelocityTerm::Surface(p.material(), n))
+            }
+            (Kind::Volume(_), Some(m)) => {
+                self.b.functional.items.push(VelocityTerm::Volume(m, v.x, n))
+            }
             _ => {}
         }
     }

@@ -17,7 +17,7 @@ use alloc::vec::Vec;
 
 use drt_math::{Real, Rgb, Vec3};
 
-use crate::derivative::sensitivity::{Functional, Rate};
+use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
 use crate::edges::edge::Edge;
 use crate::model::emitter::{Emitter, EmitterGradient};
 use crate::sampling::trace::Tracer;
@@ -34,12 +34,12 @@ pub(crate) struct Shadows {
 /// Reusable buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Buffers {
-    functional: Functional,
+    functional: VelocityFunctional,
     segment: RayPath,
 }
 
 /// The light's end of a shadow.
-enum Source {
+enum ShadowLight {
     /// A point, with its surface point where it lies on one.
     Point(Vec3, Option<SurfacePoint>),
     /// A direction of travel.
@@ -47,7 +47,7 @@ enum Source {
 }
 
 /// Where a camera ray meets the shadow surface of an edge.
-struct Meeting {
+struct FluxSample {
     t: f64,
     /// Position along the edge, from 0 to 1.
     s: f64,
@@ -79,19 +79,19 @@ impl Shadows {
         dir: Vec3,
         ray: &RayPath,
         b: &mut Buffers,
-        mut add: impl FnMut(&Functional, Rgb),
+        mut add: impl FnMut(&VelocityFunctional, Rgb),
     ) -> Option<()> {
         let world = tracer.world;
         let choice = world.lights.choose(&mut tracer.rng)?;
         let eye = world.eye();
         let source = match choice.delta {
             Some(e) => match world.scene.emitters[e].item.emitter {
-                Emitter::Directional { direction, .. } => Source::Direction(direction),
-                ref other => Source::Point(other.position()?, None),
+                Emitter::Directional { direction, .. } => ShadowLight::Direction(direction),
+                ref other => ShadowLight::Point(other.position()?, None),
             },
             None => {
                 let (point, y) = world.lights.point_of(world, &choice, &mut tracer.rng)?;
-                Source::Point(y, Some(point))
+                ShadowLight::Point(y, Some(point))
             }
         };
         for edge in &self.edges {
@@ -111,11 +111,11 @@ impl Shadows {
         dir: Vec3,
         ray: &RayPath,
         edge: &Edge,
-        source: &Source,
+        source: &ShadowLight,
         choice: &crate::world::lights::Choice,
-        m: &Meeting,
+        m: &FluxSample,
         b: &mut Buffers,
-        add: &mut impl FnMut(&Functional, Rgb),
+        add: &mut impl FnMut(&VelocityFunctional, Rgb),
     ) -> Option<()> {
         let world = tracer.world;
         let n = edge.occluded_side(m.w)?;
@@ -138,24 +138,24 @@ impl Shadows {
                 x_edge,
                 around,
                 m.w,
-                &Source::Point(x, None),
+                &ShadowLight::Point(x, None),
                 (x - x_edge).length(),
                 b,
             )?;
         let (strength, fall) = match source {
-            Source::Point(_, Some(s)) => {
+            ShadowLight::Point(_, Some(s)) => {
                 let cosine = s.ng.dot(m.w);
                 (
                     world.emitted(s, m.w) * (f64::max(cosine, 0.0) * choice.inverse_area_pdf()),
                     m.r_edge * m.r_point,
                 )
             }
-            Source::Point(_, None) => {
+            ShadowLight::Point(_, None) => {
                 let e = choice.delta?;
                 let light = &world.scene.emitters[e].item.emitter;
                 (light.emission(m.w).value * (1.0 / choice.pmf), m.r_edge * m.r_point)
             }
-            Source::Direction(_) => {
+            ShadowLight::Direction(_) => {
                 let e = choice.delta?;
                 (world.scene.emitters[e].item.emitter.emission(m.w).value * (1.0 / choice.pmf), 1.0)
             }
@@ -170,32 +170,32 @@ impl Shadows {
         let seen = world.transmittance(eye, dir, &b.segment, &mut tracer.rng, &mut tracer.counters);
         let items = &mut b.functional.items;
         items.clear();
-        items.push(Rate::Surface(point, n));
+        items.push(VelocityTerm::Surface(point, n));
         let l = match source {
-            Source::Point(..) => m.r_edge / m.r_point,
-            Source::Direction(_) => 1.0,
+            ShadowLight::Point(..) => m.r_edge / m.r_point,
+            ShadowLight::Direction(_) => 1.0,
         };
         match (source, choice.delta) {
-            (Source::Point(_, Some(s)), _) => {
-                items.push(Rate::Surface(s.material(), n * -(1.0 - l)))
+            (ShadowLight::Point(_, Some(s)), _) => {
+                items.push(VelocityTerm::Surface(s.material(), n * -(1.0 - l)))
             }
-            (Source::Point(_, None), Some(e)) => {
+            (ShadowLight::Point(_, None), Some(e)) => {
                 let position = n * -(1.0 - l);
-                items.push(Rate::Emitter(
+                items.push(VelocityTerm::Emitter(
                     e,
                     EmitterGradient { position, ..EmitterGradient::default() },
                 ));
             }
-            (Source::Direction(_), Some(e)) => {
+            (ShadowLight::Direction(_), Some(e)) => {
                 let direction = n * (x - x_edge).length();
-                items.push(Rate::Emitter(
+                items.push(VelocityTerm::Emitter(
                     e,
                     EmitterGradient { direction, ..EmitterGradient::default() },
                 ));
             }
             _ => {}
         }
-        items.push(Rate::Volume(medium, x, n * -l));
+        items.push(VelocityTerm::Volume(medium, x, n * -l));
         add(&b.functional, value * seen);
         Some(())
     }
@@ -209,14 +209,14 @@ impl Shadows {
         x: Vec3,
         medium: Option<usize>,
         w: Vec3,
-        to: &Source,
+        to: &ShadowLight,
         distance: f64,
         b: &mut Buffers,
     ) -> Option<Rgb> {
         let world = tracer.world;
         world.cast_past(x, edge.faces, medium, w, &mut b.segment, &mut tracer.counters);
         let reached = match to {
-            Source::Point(_, Some(s)) => {
+            ShadowLight::Point(_, Some(s)) => {
                 b.segment.end.as_ref().is_some_and(|(p, _)| p.prim == s.prim)
             }
             _ => b.segment.length >= short_of(x, distance),
@@ -231,10 +231,10 @@ impl Shadows {
 }
 
 /// Intersects a camera ray with the shadow surface of an edge.
-fn meet(edge: &Edge, source: &Source, eye: Vec3, dir: Vec3) -> Option<Meeting> {
+fn meet(edge: &Edge, source: &ShadowLight, eye: Vec3, dir: Vec3) -> Option<FluxSample> {
     let (a, along) = edge.line();
     match source {
-        Source::Point(y, _) => {
+        ShadowLight::Point(y, _) => {
             let q = a - *y;
             let plane = q.cross(along);
             let t = -plane.dot(eye - *y) / plane.dot(dir);
@@ -243,7 +243,7 @@ fn meet(edge: &Edge, source: &Source, eye: Vec3, dir: Vec3) -> Option<Meeting> {
             let to_edge = q + along * s;
             let (r_edge, r_point) = (to_edge.length(), p.length());
             let between = to_edge.dot(p) > 0.0 && r_edge < r_point;
-            (t > 0.0 && t.is_finite() && (0.0..1.0).contains(&s) && between).then(|| Meeting {
+            (t > 0.0 && t.is_finite() && (0.0..1.0).contains(&s) && between).then(|| FluxSample {
                 t,
                 s,
                 w: p / r_point,
@@ -251,13 +251,13 @@ fn meet(edge: &Edge, source: &Source, eye: Vec3, dir: Vec3) -> Option<Meeting> {
                 r_point,
             })
         }
-        Source::Direction(w) => {
+        ShadowLight::Direction(w) => {
             let plane = along.cross(*w);
             let t = plane.dot(a - eye) / plane.dot(dir);
             let p = eye + dir * t - a;
             let s = plane.dot(p.cross(*w)) / plane.length_squared();
             let behind = (p - along * s).dot(*w) > 0.0;
-            (t > 0.0 && t.is_finite() && (0.0..1.0).contains(&s) && behind).then_some(Meeting {
+            (t > 0.0 && t.is_finite() && (0.0..1.0).contains(&s) && behind).then_some(FluxSample {
                 t,
                 s,
                 w: *w,

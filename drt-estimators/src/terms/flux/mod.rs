@@ -23,12 +23,12 @@
 //! [blend](crate::derivative::velocity::blend) to their medium. What of the two cancels for every velocity of the ray, as in a thin
 //! layer, is not even traced.
 //!
-//! What the camera sees [edge on](edge_on) of surfaces, its rays hardly meet: there points are drawn by area.
+//! What the camera sees [edge on](grazing) of surfaces, its rays hardly meet: there points are drawn by area.
 //!
 //! A grid ends at its box, where coefficients jump to zero. Faces of the box that lie inside the medium
 //! are such surfaces too, with f(+) = 0 and the velocity of the grid for u_Σ.
 
-mod edge_on;
+mod grazing;
 mod reservoir;
 
 use alloc::sync::Arc;
@@ -36,17 +36,17 @@ use alloc::sync::Arc;
 use drt_math::Vec3;
 use drt_medium::MediumKind;
 
-pub(crate) use crate::terms::flux::edge_on::{Buffers, EdgeOn};
+pub(crate) use crate::terms::flux::grazing::{Buffers, GrazingFlux};
 pub(crate) use crate::terms::flux::reservoir::Reservoir;
 
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
 use crate::derivative::velocity::warp::GRAZED;
 use crate::world::Tracking;
 use crate::world::World;
 use crate::world::vertex::{SurfacePoint, Vertex};
 
-/// Cosine of the angle of incidence below which the camera's rays leave the flux to [`EdgeOn`].
+/// Cosine of the angle of incidence below which the camera's rays leave the flux to [`GrazingFlux`].
 const EDGE_ON: f64 = GRAZED;
 
 /// The surfaces with a flux.
@@ -77,11 +77,11 @@ struct Movers {
 
 impl Flux {
     /// Of the material form; `None` when nothing has a flux.
-    pub(crate) fn new(world: &World, shapes: &[usize], interest: &Interest) -> Option<Self> {
+    pub(crate) fn new(world: &World, shapes: &[usize], active: &ActiveInputs) -> Option<Self> {
         let flags = (0..world.scene.shapes.len()).map(|s| shapes.contains(&s)).collect();
         let moves = |m: usize| {
             let of = |list: &[bool]| list.get(m).copied().unwrap_or(false);
-            (of(&interest.grids) || of(&interest.volumes))
+            (of(&active.grids) || of(&active.volumes))
                 && world.tracking[m] == Tracking::Vertices
                 && ends_inside(world, m)
         };
@@ -101,15 +101,15 @@ impl Flux {
     /// Of the spatial form; `None` when no medium has vertices.
     pub(crate) fn spatial(
         world: &World,
-        interest: &Interest,
+        active: &ActiveInputs,
         spatial: &Arc<Spatial>,
     ) -> Option<Self> {
         let media = 0..world.scene.media.len();
         let tracked = |m: usize| world.tracking[m] == Tracking::Vertices;
         let grids = media.clone().map(|m| tracked(m) && ends_inside(world, m)).collect();
         let movers = Movers {
-            shapes: interest.shapes.as_slice().into(),
-            grids: interest.grids.as_slice().into(),
+            shapes: active.shapes.as_slice().into(),
+            grids: active.grids.as_slice().into(),
         };
         media.clone().any(tracked).then(|| Self {
             shapes: Arc::default(),
@@ -122,9 +122,9 @@ impl Flux {
         })
     }
 
-    /// True when a shape sweeps over the points of a ray, which may itself be `carried`.
-    fn sweeps(&self, shape: u32, carried: bool) -> bool {
-        (carried && self.movers.is_some()) || self.moves(shape)
+    /// True when a shape sweeps over the points of a ray, which may itself be `moves`.
+    fn sweeps(&self, shape: u32, moves: bool) -> bool {
+        (moves && self.movers.is_some()) || self.moves(shape)
     }
 
     /// The same of a ray at rest.
@@ -133,8 +133,8 @@ impl Flux {
     }
 
     /// The same of the faces of a grid.
-    fn sweeps_grid(&self, medium: usize, carried: bool) -> bool {
-        let moves = |m: &Movers| carried || m.grids[medium];
+    fn sweeps_grid(&self, medium: usize, moves: bool) -> bool {
+        let moves = |m: &Movers| moves || m.grids[medium];
         self.grids[medium] && self.movers.as_ref().is_none_or(moves)
     }
 

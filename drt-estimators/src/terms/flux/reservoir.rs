@@ -8,11 +8,11 @@ use alloc::vec::Vec;
 
 use drt_math::{Real, Rgb, Rng, Vec3};
 
-use crate::derivative::sensitivity::{Functional, Rate};
+use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
 use crate::derivative::velocity::Spatial;
 use crate::derivative::velocity::warp::{Stretch, SurfaceHit, list_hits};
 use crate::sampling::record::Radiance;
-use crate::sampling::trace::{Leaving, Tracer};
+use crate::sampling::trace::{OutgoingRay, Tracer};
 use crate::terms::flux::{EDGE_ON, Flux, filled};
 use crate::world::intervals;
 use crate::world::vertex::{MaterialPoint, SurfacePoint, Vertex};
@@ -24,7 +24,7 @@ const ROUNDING: f64 = 1e-12;
 /// A ray of a path whose points surfaces sweep over, in the spatial form. The flux's value times these are the
 /// sensitivities of the flux.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Swept {
+pub(crate) struct FluxRay {
     /// The record's node that the ray left.
     pub(crate) node: usize,
     /// To the velocity that the ray's origin has.
@@ -43,7 +43,7 @@ enum Face {
 
 /// The medium on one side of a surface that a ray meets.
 #[derive(Clone, Copy, Debug)]
-struct Side {
+struct MediumSide {
     medium: usize,
     /// It is on the surface's front.
     front: bool,
@@ -65,14 +65,14 @@ struct Speed {
 
 /// One of the meetings of a path with surfaces that have a flux.
 #[derive(Clone, Copy, Debug)]
-struct Meeting {
+struct FluxSample {
     node: u32,
     t: f64,
     origin: Vec3,
     dir: Vec3,
     face: Face,
     /// What lies before and beyond a surface.
-    sides: [Option<Side>; 2],
+    sides: [Option<MediumSide>; 2],
     x: Vec3,
     throughput: Rgb,
     /// Segments up to the surface.
@@ -86,12 +86,12 @@ pub(crate) struct Reservoir {
     flux: Flux,
     rng: Rng,
     total: f64,
-    chosen: Option<Meeting>,
+    chosen: Option<FluxSample>,
     /// The chosen ray up to the surface.
     part: RayPath,
     /// The surfaces on the present ray that have one.
     met: Vec<SurfaceHit>,
-    functional: Functional,
+    functional: VelocityFunctional,
 }
 
 impl Reservoir {
@@ -103,7 +103,7 @@ impl Reservoir {
             chosen: None,
             part: RayPath::default(),
             met: Vec::new(),
-            functional: Functional::default(),
+            functional: VelocityFunctional::default(),
         }
     }
 
@@ -114,19 +114,25 @@ impl Reservoir {
     }
 
     /// Offers the surfaces that a ray meets.
-    pub(crate) fn offer(&mut self, world: &World, leaving: &Leaving, carried: bool, ray: &RayPath) {
-        let Leaving { node, throughput, dir, segments, .. } = *leaving;
+    pub(crate) fn offer(
+        &mut self,
+        world: &World,
+        leaving: &OutgoingRay,
+        moves: bool,
+        ray: &RayPath,
+    ) {
+        let OutgoingRay { node, throughput, dir, segments, .. } = *leaving;
         let origin = leaving.vertex.x;
         let flux = &self.flux;
         self.met.clear();
-        list_hits(&mut self.met, ray, dir, |point| flux.sweeps(point.shape, carried));
+        list_hits(&mut self.met, ray, dir, |point| flux.sweeps(point.shape, moves));
         let strength = throughput.max_abs();
         if strength == 0.0 || segments + 1 >= flux.longest {
             return;
         }
         let (total, rng) = (&mut self.total, &mut self.rng);
         let (chosen, kept) = (&mut self.chosen, &mut self.part);
-        let mut meet = |face: Face, sides: [Option<Side>; 2], most: f64, x: Vec3, t: f64| {
+        let mut meet = |face: Face, sides: [Option<MediumSide>; 2], most: f64, x: Vec3, t: f64| {
             let weight = strength * most;
             if weight == 0.0 {
                 return;
@@ -134,7 +140,7 @@ impl Reservoir {
             *total += weight;
             if rng.next_f64() * *total < weight {
                 let segments = segments + 1;
-                *chosen = Some(Meeting {
+                *chosen = Some(FluxSample {
                     node,
                     t,
                     origin,
@@ -163,7 +169,7 @@ impl Reservoir {
                 world.is_null(m.point.shape).then(|| flux.beyond(world, viewer, m, others[1]));
             let sides = [near, far.flatten()];
             // Only what moves by itself, and the camera, moves a ray's points at different velocities.
-            let rigid = |side: &Side| {
+            let rigid = |side: &MediumSide| {
                 let moves = |s: &Speed| flux.moves(s.point.shape);
                 node > 0 && !side.speeds.iter().flatten().any(moves)
             };
@@ -174,7 +180,7 @@ impl Reservoir {
             return;
         }
         for i in intervals(ray.medium, &ray.crossings, ray.length) {
-            let Some(m) = i.medium.filter(|m| flux.sweeps_grid(*m, carried)) else { continue };
+            let Some(m) = i.medium.filter(|m| flux.sweeps_grid(*m, moves)) else { continue };
             let part = drt_medium::Ray::new(origin + dir * i.start, dir, i.end - i.start);
             world.medium(m).crossings(&part, |c| {
                 let cosine = Real::abs(c.normal.dot(dir));
@@ -198,7 +204,7 @@ impl Reservoir {
     pub(crate) fn evaluate(
         &mut self,
         tracer: &mut Tracer<'_>,
-        mut add: impl FnMut(&Functional, Option<Swept>, Rgb),
+        mut add: impl FnMut(&VelocityFunctional, Option<FluxRay>, Rgb),
     ) {
         let Some(m) = self.chosen.take() else { return };
         let world = tracer.world;
@@ -218,7 +224,7 @@ impl Reservoir {
             Face::Grid(medium, n) => {
                 let vertex = world.inside_grid(medium, m.x, n);
                 let along = n / Real::abs(n.dot(m.dir));
-                let rate = Rate::Grid(medium, m.x, along);
+                let rate = VelocityTerm::Grid(medium, m.x, along);
                 self.send(tracer, &m, vertex, &[Some((rate, along, m.t))], weight, &mut add);
             }
             Face::Surface(point) => {
@@ -226,7 +232,7 @@ impl Reservoir {
                     let vertex = world.touching(point, m.x, side.front, side.medium);
                     let rates = side.speeds.map(|speed| {
                         let Speed { point, t, along } = speed?;
-                        Some((Rate::Surface(point, along), along, t))
+                        Some((VelocityTerm::Surface(point, along), along, t))
                     });
                     self.send(tracer, &m, vertex, &rates, weight, &mut add);
                 }
@@ -239,11 +245,11 @@ impl Reservoir {
     fn send(
         &mut self,
         tracer: &mut Tracer<'_>,
-        m: &Meeting,
+        m: &FluxSample,
         vertex: Vertex,
-        rates: &[Option<(Rate, Vec3, f64)>],
+        rates: &[Option<(VelocityTerm, Vec3, f64)>],
         weight: Rgb,
-        add: &mut impl FnMut(&Functional, Option<Swept>, Rgb),
+        add: &mut impl FnMut(&VelocityFunctional, Option<FluxRay>, Rgb),
     ) {
         let mut light = Radiance::default();
         let longest = tracer.max_segments - m.segments;
@@ -252,7 +258,7 @@ impl Reservoir {
             return;
         }
         let spatial = self.flux.movers.is_some();
-        let mut swept = Swept { node: m.node as usize, origin: Vec3::ZERO, turn: Vec3::ZERO };
+        let mut swept = FluxRay { node: m.node as usize, origin: Vec3::ZERO, turn: Vec3::ZERO };
         let items = &mut self.functional.items;
         items.clear();
         for (rate, along, t) in rates.iter().flatten() {
@@ -261,7 +267,7 @@ impl Reservoir {
             swept.turn -= *along * *t;
         }
         if let (false, Some(medium)) = (spatial, vertex.medium) {
-            items.push(Rate::Volume(medium, m.x, swept.origin));
+            items.push(VelocityTerm::Volume(medium, m.x, swept.origin));
         }
         add(&self.functional, spatial.then_some(swept), light.0 * weight);
     }
@@ -276,7 +282,7 @@ impl Flux {
         m: &SurfaceHit,
         start: Option<&SurfaceHit>,
         around: Option<usize>,
-    ) -> Option<Side> {
+    ) -> Option<MediumSide> {
         self.side(world, viewer, m, m.cosine < 0.0, around, [start, Some(m)], 1)
     }
 
@@ -287,7 +293,7 @@ impl Flux {
         viewer: &Vertex,
         m: &SurfaceHit,
         end: Option<&SurfaceHit>,
-    ) -> Option<Side> {
+    ) -> Option<MediumSide> {
         self.side(world, viewer, m, m.cosine > 0.0, m.after, [Some(m), end], 0)
     }
 
@@ -302,7 +308,7 @@ impl Flux {
         around: Option<usize>,
         ends: [Option<&SurfaceHit>; 2],
         end: usize,
-    ) -> Option<Side> {
+    ) -> Option<MediumSide> {
         let medium = filled(world, &m.point, front, around)?;
         let fullness = self.fullness(world, &world.touching(m.point, m.x, front, medium));
         if fullness == 0.0 {
@@ -324,11 +330,11 @@ impl Flux {
             Some(Speed { point: m.point.material(), t: m.distance, along })
         };
         let speeds = [of(Some(m), left[0]), of(ends[1 - end], left[1])];
-        Some(Side { medium, front, fullness, speeds })
+        Some(MediumSide { medium, front, fullness, speeds })
     }
 }
 
-impl Side {
+impl MediumSide {
     /// What counts at most: of all velocities of the ray alone, if it is `rigid`.
     fn most(&self, rigid: bool) -> f64 {
         let alongs = || self.speeds.iter().flatten().map(|s| s.along);

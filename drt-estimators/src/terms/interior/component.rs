@@ -5,17 +5,17 @@ use alloc::sync::Arc;
 use drt_math::{Rgb, RgbVec, Rng};
 
 use crate::derivative::adjoint::Differentiator;
-use crate::derivative::pairs::{Brought, Pairs};
-use crate::derivative::sensitivity::{Rate, SurfaceAdjoint};
+use crate::derivative::pairs::{AntitheticPairs, PairedRadiance};
+use crate::derivative::sensitivity::{SurfaceAdjoint, VelocityTerm};
 use crate::derivative::velocity::{Material, Movers, PathVelocities, VelocityField};
-use crate::edges::tree::Options;
+use crate::edges::tree::TreeScratch;
 use crate::sampling::record::PathRecord;
 use crate::sampling::streams::LINE_STREAM;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary::shadow;
 use crate::terms::interior::recorder::PathView;
-use crate::terms::interior::{AlongRays, Looks, PathSink};
-use crate::terms::radiative::{Edged, Look, Radiative};
+use crate::terms::interior::{AlongRays, EdgeQueries, PathSink};
+use crate::terms::radiative::{EdgeContribution, EdgeQuery, Radiative};
 use crate::world::{RayPath, World};
 
 /// What one estimator differentiates of the paths through pixels.
@@ -32,13 +32,13 @@ pub(super) struct Worker<'a, S> {
     pub(super) sink: S,
     differentiator: Differentiator<'a>,
     shadow_buffers: shadow::Buffers,
-    brought: Brought,
+    incoming: PairedRadiance,
     /// Of the edge tree.
-    options: Options,
+    options: TreeScratch,
     separate: bool,
     pub(super) differentiated: u64,
     /// Rays that looks took.
-    pub(super) looking: u64,
+    pub(super) query_rays: u64,
 }
 
 /// A path just traced.
@@ -51,7 +51,7 @@ pub(super) struct Traced<'t> {
     pub(super) pixel: u32,
     pub(super) unit: u32,
     /// The numbers of a look at edges.
-    pub(super) look: Option<Rng>,
+    pub(super) query: Option<Rng>,
 }
 
 impl<'a, S: PathSink> Worker<'a, S> {
@@ -60,12 +60,12 @@ impl<'a, S: PathSink> Worker<'a, S> {
         let Component { world, along, sink } = component;
         let field: Arc<dyn VelocityField> = match along.radiative {
             Some(radiative) => Arc::clone(&radiative.spatial) as _,
-            None => Arc::new(Material::new(Movers::new(sink.interest()))),
+            None => Arc::new(Material::new(Movers::new(sink.active()))),
         };
         let view = PathView {
             world,
             velocities: PathVelocities::new(field),
-            pairs: Pairs::new(along.opposites),
+            pairs: AntitheticPairs::new(along.lobe_pairs),
             flux: along.flux.map(crate::terms::flux::Reservoir::new),
         };
         let worker = Self {
@@ -73,11 +73,11 @@ impl<'a, S: PathSink> Worker<'a, S> {
             sink,
             differentiator: Differentiator::new(world),
             shadow_buffers: shadow::Buffers::default(),
-            brought: Brought::default(),
-            options: Options::default(),
+            incoming: PairedRadiance::default(),
+            options: TreeScratch::default(),
             separate,
             differentiated: 0,
-            looking: 0,
+            query_rays: 0,
         };
         (worker, view)
     }
@@ -85,7 +85,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
     /// Whether derivatives of the filter are needed.
     pub(super) fn differentiates_filter(&self) -> bool {
         // At fixed image points they are not.
-        self.along.radiative.is_none() && self.sink.interest().moves_geometry()
+        self.along.radiative.is_none() && self.sink.active().moves_geometry()
     }
 
     /// Adds what a path tells: of the interior to the first layers of a derivative, and of each term found along
@@ -110,11 +110,11 @@ impl<'a, S: PathSink> Worker<'a, S> {
         if view.flux.is_some() {
             self.flux(tracer, path, view, &mut values[next(self.separate)]);
         }
-        if let (Some(radiative), Some(look)) = (self.along.radiative, path.look.clone()) {
+        if let (Some(radiative), Some(query)) = (self.along.radiative, path.query.clone()) {
             let from = next(self.separate).start;
             let before = tracer.counters.rays;
-            self.edges(tracer, radiative, path, view, look, &mut values[from..]);
-            self.looking += tracer.counters.rays - before;
+            self.edges(tracer, radiative, path, view, query, &mut values[from..]);
+            self.query_rays += tracer.counters.rays - before;
         }
         if let Some(shadows) = self.along.shadows {
             let values = &mut values[next(self.separate)];
@@ -134,8 +134,8 @@ impl<'a, S: PathSink> Worker<'a, S> {
         view: &PathView<'_>,
         values: &mut [Rgb],
     ) {
-        let Self { sink, differentiator, brought, .. } = self;
-        if !sink.interest().any() {
+        let Self { sink, differentiator, incoming, .. } = self;
+        if !sink.active().any() {
             return;
         }
         self.differentiated += 1;
@@ -143,7 +143,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         sink.begin();
         let recorded = view.of(path.record);
         differentiator.differentiate(&recorded, path.filter, line, sink);
-        view.pairs.follow(tracer, brought, |pair, chance, other| {
+        view.pairs.follow(tracer, incoming, |pair, chance, other| {
             differentiator.pair(&recorded, pair, chance, other, sink);
         });
         sink.finish(values);
@@ -182,28 +182,28 @@ impl<'a, S: PathSink> Worker<'a, S> {
         values: &mut [Rgb],
     ) {
         let recorded = &view.of(path.record);
-        match self.along.looks {
-            Looks::Average(looks) => {
-                let mut left = looks;
+        match self.along.queries {
+            EdgeQueries::Average(queries) => {
+                let mut left = queries;
                 while left > 0.0 {
                     // A part of a look is one now and then.
                     let rng = &mut tracer.rng;
                     let taken = left >= 1.0 || rng.next_f64() < left;
-                    let numbers = if left == looks { &mut first } else { rng };
+                    let numbers = if left == queries { &mut first } else { rng };
                     left -= 1.0;
-                    let look = taken.then(|| Look::new(numbers));
-                    let edge = look.and_then(|look| {
-                        radiative.edge(tracer, recorded, &look, &mut self.options)
+                    let query = taken.then(|| EdgeQuery::new(numbers));
+                    let edge = query.and_then(|query| {
+                        radiative.edge(tracer, recorded, &query, &mut self.options)
                     });
-                    self.send(path.record, view, edge, 1.0 / looks, values);
+                    self.send(path.record, view, edge, 1.0 / queries, values);
                 }
             }
-            Looks::EveryVertex => {
+            EdgeQueries::EveryVertex => {
                 for node in 1..path.record.nodes.len() {
                     let rng = &mut tracer.rng;
-                    let look = Look::new(if node == 1 { &mut first } else { rng });
+                    let query = EdgeQuery::new(if node == 1 { &mut first } else { rng });
                     let edge =
-                        radiative.edge_from(tracer, recorded, node, &look, &mut self.options);
+                        radiative.edge_from(tracer, recorded, node, &query, &mut self.options);
                     self.send(path.record, view, edge, 1.0, values);
                 }
             }
@@ -215,7 +215,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         &mut self,
         record: &PathRecord,
         view: &PathView<'_>,
-        edge: Option<Edged>,
+        edge: Option<EdgeContribution>,
         share: f64,
         values: &mut [Rgb],
     ) {
@@ -225,8 +225,8 @@ impl<'a, S: PathSink> Worker<'a, S> {
         let layer = if self.separate && e.node > 1 { n } else { 0 };
         sink.begin();
         for (matter, value) in e.matter.iter().flatten() {
-            if sink.interest().moves(matter) {
-                Rate::of(*matter, e.n).send(*value * share, sink);
+            if sink.active().moves(matter) {
+                VelocityTerm::of(*matter, e.n).send(*value * share, sink);
             }
         }
         let viewer = (e.viewer * share).outer(e.n);

@@ -2,11 +2,11 @@
 
 use drt_math::{Rgb, Rng, Vec3};
 
-use crate::derivative::pairs::Pairs;
+use crate::derivative::pairs::AntitheticPairs;
 use crate::derivative::velocity::PathVelocities;
 use crate::derivative::velocity::RecordedPath;
 use crate::sampling::record::PathRecord;
-use crate::sampling::trace::{Arrival, Connection, Leaving, Observer, Pixel};
+use crate::sampling::trace::{Arrival, Connection, Observer, OutgoingRay, Pixel};
 use crate::terms::flux::Reservoir;
 use crate::world::Crossing;
 use crate::world::{RayPath, World};
@@ -16,7 +16,7 @@ pub(crate) struct PathView<'a> {
     /// The scene as the estimator has prepared it, lit by what it differentiates.
     pub(crate) world: &'a World,
     pub(crate) velocities: PathVelocities,
-    pub(crate) pairs: Pairs,
+    pub(crate) pairs: AntitheticPairs,
     /// One of the surfaces with a flux that the path met, if there are such.
     pub(crate) flux: Option<Reservoir>,
 }
@@ -60,7 +60,7 @@ impl Observer for Recorder<'_, '_> {
         self.record.value += value;
     }
 
-    fn ray(&mut self, _: &World, leaving: &Leaving, ray: &RayPath) {
+    fn ray(&mut self, _: &World, leaving: &OutgoingRay, ray: &RayPath) {
         if let (0, Some(kept)) = (leaving.node, &mut self.camera_ray) {
             kept.clone_from(ray);
         }
@@ -80,7 +80,7 @@ impl Observer for Recorder<'_, '_> {
         node
     }
 
-    fn scatter(&mut self, _: &World, leaving: &Leaving, value: Rgb, inv_pdf: f64, rng: &Rng) {
+    fn scatter(&mut self, _: &World, leaving: &OutgoingRay, value: Rgb, inv_pdf: f64, rng: &Rng) {
         self.record.scatter(leaving, value, inv_pdf);
         for view in self.views.iter_mut() {
             view.pairs.offer(view.world, self.record, &view.velocities, leaving, rng);

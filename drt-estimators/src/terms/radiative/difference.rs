@@ -4,22 +4,22 @@
 use drt_math::{Rgb, Vec3};
 
 use crate::derivative::velocity::blend::Blends;
-use crate::edges::jumps::{Jump, Sides};
+use crate::edges::discontinuities::{DiscontinuityEdge, EdgeSides};
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
 use crate::terms::radiative::Radiative;
 use crate::world::vertex::{Kind, Matter, Vertex};
 
 /// An edge point and a viewer of it.
-pub(super) struct Sight<'a> {
-    pub(super) jump: &'a Jump,
+pub(super) struct EdgeView<'a> {
+    pub(super) discontinuity: &'a DiscontinuityEdge,
     along: f64,
     /// The edge point.
     pub(super) x: Vec3,
     /// Unit, to the viewer.
     pub(super) w: Vec3,
     pub(super) distance: f64,
-    pub(super) sides: Sides,
+    pub(super) sides: EdgeSides,
     medium: Option<usize>,
     own_faces: [u32; 2],
     viewer: &'a Vertex,
@@ -28,7 +28,7 @@ pub(super) struct Sight<'a> {
 
 /// What is seen on one side of an edge.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Side {
+pub(super) struct SideRadiance {
     pub(super) light: Rgb,
     /// How much of the velocity of what is seen its place in view has: the share of its
     /// [blend](crate::derivative::velocity::blend), over its distance in those of the edge.
@@ -39,25 +39,25 @@ pub(super) struct Side {
     pub(super) matter: Option<Matter>,
 }
 
-impl<'a> Sight<'a> {
+impl<'a> EdgeView<'a> {
     /// Of the point `along` an edge, from a viewer; `None` where the edge is seen end on.
     pub(super) fn new(
         tracer: &Tracer<'_>,
         radiative: &'a Radiative,
-        jump: &'a Jump,
+        discontinuity: &'a DiscontinuityEdge,
         along: f64,
         viewer: &'a Vertex,
     ) -> Option<Self> {
-        let (x, _) = jump.point(along);
+        let (x, _) = discontinuity.point(along);
         let to = viewer.x - x;
         let distance = to.length();
         let w = to / distance;
-        let Radiative { jumps, spatial, .. } = radiative;
-        let sides = jumps.sides(jump, w)?;
+        let Radiative { discontinuities, spatial, .. } = radiative;
+        let sides = discontinuities.sides(discontinuity, w)?;
         let own_faces = sides.own_faces()?;
-        let medium = jump.medium(tracer.world, &sides, x, w);
+        let medium = discontinuity.medium(tracer.world, &sides, x, w);
         Some(Self {
-            jump,
+            discontinuity,
             along,
             x,
             w,
@@ -89,7 +89,7 @@ impl<'a> Sight<'a> {
     }
 
     /// What is seen on the sides of -n and n, over at most `longest` segments beyond the edge.
-    pub(super) fn sides(&self, tracer: &mut Tracer<'_>, longest: u32) -> [Side; 2] {
+    pub(super) fn sides(&self, tracer: &mut Tracer<'_>, longest: u32) -> [SideRadiance; 2] {
         let own = core::mem::replace(&mut tracer.max_segments, longest);
         let [plus, minus] = self.sides.faces;
         let numbers = tracer.rng.clone();
@@ -104,17 +104,18 @@ impl<'a> Sight<'a> {
     }
 
     /// What comes from one side of the edge.
-    fn side(&self, tracer: &mut Tracer<'_>, face: Option<(u32, Vec3)>) -> Side {
+    fn side(&self, tracer: &mut Tracer<'_>, face: Option<(u32, Vec3)>) -> SideRadiance {
         match face {
             Some(face) => {
-                let (point, x) = self.jump.beside(tracer.world, self.x, face);
+                let (point, x) = self.discontinuity.beside(tracer.world, self.x, face);
                 let vertex = Vertex { x, medium: self.medium, kind: Kind::Surface(point) };
                 self.from(tracer, vertex, self.distance)
             }
-            None => match self.jump.contact(tracer.world, self.along) {
+            None => match self.discontinuity.contact(tracer.world, self.along) {
                 Some(contact) => {
                     let floor = contact.floor_along(self.sides.outward());
-                    floor.map_or_else(Side::default, |v| self.from(tracer, v, self.distance))
+                    floor
+                        .map_or_else(SideRadiance::default, |v| self.from(tracer, v, self.distance))
                 }
                 None => self.beyond(tracer),
             },
@@ -122,7 +123,7 @@ impl<'a> Sight<'a> {
     }
 
     /// What leaves a vertex, at a `distance` from the viewer.
-    fn from(&self, tracer: &mut Tracer<'_>, vertex: Vertex, distance: f64) -> Side {
+    fn from(&self, tracer: &mut Tracer<'_>, vertex: Vertex, distance: f64) -> SideRadiance {
         let mut light = Radiance::default();
         tracer.radiance_from(vertex, self.w, &mut light);
         let world = tracer.world;
@@ -131,24 +132,24 @@ impl<'a> Sight<'a> {
             _ => self.blends.of(world, self.viewer, &vertex, -self.w, distance),
         };
         let hold = hold.weight * self.distance / distance;
-        Side { light: light.0, hold, distance, matter: vertex.matter() }
+        SideRadiance { light: light.0, hold, distance, matter: vertex.matter() }
     }
 
     /// What comes from behind the edge.
-    fn beyond(&self, tracer: &mut Tracer<'_>) -> Side {
+    fn beyond(&self, tracer: &mut Tracer<'_>) -> SideRadiance {
         let mut ray = tracer.ray.take().unwrap_or_default();
         let d = -self.w;
         let (x, faces, medium) = (self.x, self.own_faces, self.medium);
         tracer.world.cast_past(x, faces, medium, d, &mut ray, &mut tracer.counters);
         let end = tracer.travel(x, d, &ray, Rgb::ONE).end();
         tracer.ray = Some(ray);
-        let Some((end, arrival)) = end else { return Side::default() };
+        let Some((end, arrival)) = end else { return SideRadiance::default() };
         let Some(vertex) = end else {
             let sky = tracer.world.lights.environment();
             let light = sky.map_or(Rgb::ZERO, |(_, l)| l * arrival);
-            return Side { light, ..Side::default() };
+            return SideRadiance { light, ..SideRadiance::default() };
         };
         let side = self.from(tracer, vertex, self.distance + (vertex.x - x).length());
-        Side { light: side.light * arrival, ..side }
+        SideRadiance { light: side.light * arrival, ..side }
     }
 }

@@ -33,7 +33,7 @@
 
 mod choice;
 mod difference;
-mod outlines;
+mod primary;
 mod vertices;
 mod views;
 
@@ -42,14 +42,14 @@ use alloc::vec::Vec;
 
 use drt_math::{CdfTable, Rng};
 
-use crate::edges::jumps::{Jump, Jumps};
-pub(crate) use crate::terms::radiative::vertices::Edged;
-use crate::terms::radiative::views::Views;
+use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
+pub(crate) use crate::terms::radiative::vertices::EdgeContribution;
+use crate::terms::radiative::views::EdgeSampler;
 
-use crate::Error;
-use crate::derivative::sensitivity::Interest;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
 use crate::edges::edge::Edge;
+use crate::model::error::Error;
 use crate::world::World;
 
 /// The edges at which radiance jumps, by what sees them.
@@ -57,24 +57,24 @@ use crate::world::World;
 pub(crate) struct Radiative {
     /// How the vertices of paths move.
     pub(crate) spatial: Arc<Spatial>,
-    jumps: Jumps,
+    discontinuities: DiscontinuityEdges,
     /// Seen from the camera.
-    camera: Option<Outlines>,
+    camera: Option<PrimaryEdges>,
     /// Seen from a vertex that stands still.
-    moving: Option<Views>,
+    moving: Option<EdgeSampler>,
     /// Seen from a vertex that moves.
-    all: Option<Views>,
+    all: Option<EdgeSampler>,
     /// At rest, before something that moves and holds what is seen of it: this counts for a vertex that
     /// stands still, too.
-    resting: Option<Views>,
+    resting: Option<EdgeSampler>,
     /// Edges that can be chosen, and edges in all.
     pub(crate) count: [u64; 2],
 }
 
 /// A choice of edges by how much of them the camera sees, and of points on them by length.
 #[derive(Debug)]
-struct Outlines {
-    jumps: Vec<u32>,
+struct PrimaryEdges {
+    discontinuities: Vec<u32>,
     table: CdfTable,
 }
 
@@ -92,7 +92,7 @@ const BY_THROUGHPUT: f64 = 0.2;
 
 /// Uniform numbers for a look from a path at an edge.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Look {
+pub(crate) struct EdgeQuery {
     /// For the vertex.
     vertex: f64,
     /// For where to look.
@@ -101,7 +101,7 @@ pub(crate) struct Look {
     point: [f64; 2],
 }
 
-impl Look {
+impl EdgeQuery {
     /// How many numbers it takes.
     const NUMBERS: u32 = 4;
 
@@ -119,14 +119,14 @@ impl Look {
 
 /// A point on an edge.
 struct Chosen<'a> {
-    jump: &'a Jump,
+    discontinuity: &'a DiscontinuityEdge,
     /// How far along the edge.
     along: f64,
     /// 1 over the density per length.
     inv_pdf: f64,
 }
 
-impl Outlines {
+impl PrimaryEdges {
     /// Of all edges with their weights.
     fn new(weights: impl Iterator<Item = f64>) -> Result<Option<Self>, Error> {
         let weighed = (0..).zip(weights);
@@ -138,14 +138,14 @@ impl Outlines {
             element: "edges".into(),
             reason: alloc::format!("cannot be sampled: {e}"),
         })?;
-        Ok(Some(Self { jumps: indices, table }))
+        Ok(Some(Self { discontinuities: indices, table }))
     }
 
-    fn sample<'a>(&self, jumps: &'a Jumps, rng: &mut Rng) -> Chosen<'a> {
+    fn sample<'a>(&self, discontinuities: &'a DiscontinuityEdges, rng: &mut Rng) -> Chosen<'a> {
         // Monotone: one number places the point among all edges.
         let s = self.table.sample(rng.next_f64());
-        let jump = &jumps.list[self.jumps[s.index] as usize];
-        Chosen { jump, along: s.residual, inv_pdf: jump.length() / s.pmf }
+        let discontinuity = &discontinuities.list[self.discontinuities[s.index] as usize];
+        Chosen { discontinuity, along: s.residual, inv_pdf: discontinuity.length() / s.pmf }
     }
 }
 
@@ -154,43 +154,52 @@ impl Radiative {
     /// `speed`.
     pub(crate) fn new(
         world: &World,
-        interest: &Interest,
+        active: &ActiveInputs,
         spatial: Arc<Spatial>,
         speed: impl Fn(&Edge) -> f64,
     ) -> Result<Self, Error> {
         // From a vertex on what moves, everything seems to; else no edge is even looked for.
-        let any = interest.sensor || interest.shapes.contains(&true);
-        let jumps = if any { Jumps::collect(world, &interest.shapes) } else { Jumps::default() };
-        let moves = |j: &Jump| {
-            if interest.shapes[j.edge.shape as usize] { speed(&j.edge) } else { 0.0 }
+        let any = active.sensor || active.shapes.contains(&true);
+        let discontinuities = if any {
+            DiscontinuityEdges::collect(world, &active.shapes)
+        } else {
+            DiscontinuityEdges::default()
+        };
+        let moves = |j: &DiscontinuityEdge| {
+            if active.shapes[j.edge.shape as usize] { speed(&j.edge) } else { 0.0 }
         };
         let eye = world.camera.position();
-        let moving_shapes = (0..).zip(&interest.shapes).filter(|(_, moves)| **moves);
+        let moving_shapes = (0..).zip(&active.shapes).filter(|(_, moves)| **moves);
         let holding: Vec<u32> =
             moving_shapes.map(|(s, _)| s).filter(|s| spatial.blends.acts_on(world, *s)).collect();
         let at_rest = !holding.is_empty();
         let at_rest_in_view = holding.iter().any(|s| spatial.blends.acts_in_view_on(*s));
-        let speeds: Vec<f64> = jumps.list.iter().map(moves).collect();
+        let speeds: Vec<f64> = discontinuities.list.iter().map(moves).collect();
         let fastest = speeds.iter().copied().fold(0.0, f64::max);
-        let relative = |speed: f64| match (interest.sensor, at_rest_in_view) {
+        let relative = |speed: f64| match (active.sensor, at_rest_in_view) {
             (true, _) => 1.0,
             (_, true) => f64::max(speed, AT_REST * fastest),
             _ => speed,
         };
-        let seen =
-            jumps.list.iter().zip(&speeds).map(|(j, s)| relative(*s) * jumps.seen_from(j, eye));
-        let camera = Outlines::new(seen)?;
-        let views = |matter: &dyn Fn(&Jump) -> f64| Views::new(world, &jumps, matter);
+        let seen = discontinuities
+            .list
+            .iter()
+            .zip(&speeds)
+            .map(|(j, s)| relative(*s) * discontinuities.seen_from(j, eye));
+        let camera = PrimaryEdges::new(seen)?;
+        let views = |matter: &dyn Fn(&DiscontinuityEdge) -> f64| {
+            EdgeSampler::new(world, &discontinuities, matter)
+        };
         let moving = views(&|j| if fastest > 0.0 { moves(j) / fastest } else { 0.0 });
         let resting = at_rest.then(|| views(&|j| if moves(j) > 0.0 { 0.0 } else { 1.0 })).flatten();
         let resting = resting.map(|views| views.before(world, &holding));
         let all = views(&|_| 1.0);
-        let count = [jumps.list.len() as u64, jumps.all];
-        Ok(Self { spatial, jumps, camera, moving, all, resting, count })
+        let count = [discontinuities.list.len() as u64, discontinuities.all];
+        Ok(Self { spatial, discontinuities, camera, moving, all, resting, count })
     }
 
     /// True when the camera can see something change.
-    pub(crate) fn has_outlines(&self) -> bool {
+    pub(crate) fn has_primary_edges(&self) -> bool {
         self.camera.is_some()
     }
 

@@ -5,19 +5,19 @@ use core::ops::Range;
 use drt_math::{Rgb, Vec3};
 
 use crate::derivative::velocity::RecordedPath;
-use crate::edges::tree::Options;
+use crate::edges::tree::TreeScratch;
 use crate::sampling::trace::Endpoint;
 use crate::sampling::trace::Tracer;
 use crate::terms::radiative::choice::Choice;
-use crate::terms::radiative::difference::{Side, Sight};
-use crate::terms::radiative::views::{Views, viewpoint};
-use crate::terms::radiative::{AT_REST, BY_THROUGHPUT, CARRIED, Look, Radiative};
+use crate::terms::radiative::difference::{EdgeView, SideRadiance};
+use crate::terms::radiative::views::{EdgeSampler, viewpoint};
+use crate::terms::radiative::{AT_REST, BY_THROUGHPUT, CARRIED, EdgeQuery, Radiative};
 use crate::world::World;
 use crate::world::vertex::{MaterialPoint, Matter, Vertex};
 
 /// An edge's contribution to a path: a sum of speeds along `n`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Edged {
+pub(crate) struct EdgeContribution {
     /// The vertex that sees the edge.
     pub(crate) node: usize,
     pub(crate) n: Vec3,
@@ -29,7 +29,7 @@ pub(crate) struct Edged {
 
 /// What a look may find.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sought {
+enum QueryTarget {
     /// An edge that moves, or any from a vertex that does.
     Moving,
     /// An edge at rest, before something that moves and is held, from a vertex at rest.
@@ -37,9 +37,9 @@ enum Sought {
 }
 
 /// A point of an edge and the vertex that looks at it.
-pub(super) struct Glance<'a> {
+pub(super) struct EdgeSample<'a> {
     node: usize,
-    sight: Sight<'a>,
+    sight: EdgeView<'a>,
     point: MaterialPoint,
     /// Of what the two sides differ by, all but the transmittance.
     pub(super) weight: Rgb,
@@ -47,20 +47,25 @@ pub(super) struct Glance<'a> {
     longest: u32,
 }
 
-impl Glance<'_> {
+impl EdgeSample<'_> {
     /// What is seen.
-    fn follow(self, tracer: &mut Tracer<'_>) -> Option<Edged> {
+    fn follow(self, tracer: &mut Tracer<'_>) -> Option<EdgeContribution> {
         let Self { node, sight, point, weight, longest } = self;
         let weight = weight * sight.open(tracer)?;
         let [minus, plus] = sight.sides(tracer, longest);
         let lights = [weight * minus.light, weight * -plus.light];
         let held = [lights[0] * minus.hold, lights[1] * plus.hold];
         let [edge, viewer] = [lights, held].map(|[a, b]| a + b);
-        let of = |side: &Side, held: Rgb| side.matter.map(|m| (m, -held));
+        let of = |side: &SideRadiance, held: Rgb| side.matter.map(|m| (m, -held));
         let matter =
             [Some((Matter::Surface(point), edge)), of(&minus, held[0]), of(&plus, held[1])];
         let dark = lights.iter().all(|l| l.is_zero());
-        (!dark).then_some(Edged { node, n: sight.sides.n, viewer: viewer - edge, matter })
+        (!dark).then_some(EdgeContribution {
+            node,
+            n: sight.sides.n,
+            viewer: viewer - edge,
+            matter,
+        })
     }
 }
 
@@ -70,13 +75,13 @@ impl Radiative {
         &self,
         tracer: &mut Tracer<'_>,
         path: &RecordedPath<'_>,
-        look: &Look,
-        options: &mut Options,
-    ) -> Option<Edged> {
+        query: &EdgeQuery,
+        options: &mut TreeScratch,
+    ) -> Option<EdgeContribution> {
         let nodes = 1..path.record.nodes.len();
-        let (sought, likely, look) = self.sought(path, nodes, look);
-        let (node, chance) = self.choose_vertex(tracer, path, sought, look.vertex, options)?;
-        self.glance_from(tracer, path, node, sought, likely * chance, &look, options)?
+        let (sought, likely, query) = self.sought(path, nodes, query);
+        let (node, chance) = self.choose_vertex(tracer, path, sought, query.vertex, options)?;
+        self.sample_from(tracer, path, node, sought, likely * chance, &query, options)?
             .follow(tracer)
     }
 
@@ -86,11 +91,11 @@ impl Radiative {
         tracer: &mut Tracer<'_>,
         path: &RecordedPath<'_>,
         node: usize,
-        look: &Look,
-        options: &mut Options,
-    ) -> Option<Edged> {
-        let (sought, likely, look) = self.sought(path, node..node + 1, look);
-        self.glance_from(tracer, path, node, sought, likely, &look, options)?.follow(tracer)
+        query: &EdgeQuery,
+        options: &mut TreeScratch,
+    ) -> Option<EdgeContribution> {
+        let (sought, likely, query) = self.sought(path, node..node + 1, query);
+        self.sample_from(tracer, path, node, sought, likely, &query, options)?.follow(tracer)
     }
 
     /// What a look from one of some vertices is for, its probability, and what is left of the look's numbers.
@@ -98,29 +103,29 @@ impl Radiative {
         &self,
         path: &RecordedPath<'_>,
         mut nodes: Range<usize>,
-        look: &Look,
-    ) -> (Sought, f64, Look) {
+        query: &EdgeQuery,
+    ) -> (QueryTarget, f64, EdgeQuery) {
         if self.resting.is_none() || nodes.all(|n| path.velocities.moves(n)) {
-            return (Sought::Moving, 1.0, *look);
+            return (QueryTarget::Moving, 1.0, *query);
         }
-        let (sought, from, likely) = match look.way < AT_REST {
-            true => (Sought::Resting, 0.0, AT_REST),
-            false => (Sought::Moving, AT_REST, 1.0 - AT_REST),
+        let (sought, from, likely) = match query.way < AT_REST {
+            true => (QueryTarget::Resting, 0.0, AT_REST),
+            false => (QueryTarget::Moving, AT_REST, 1.0 - AT_REST),
         };
-        (sought, likely, Look { way: (look.way - from) / likely, ..*look })
+        (sought, likely, EdgeQuery { way: (query.way - from) / likely, ..*query })
     }
 
     /// A look from a vertex for what is `sought`, which both have a given `chance`.
-    fn glance_from<'a>(
+    fn sample_from<'a>(
         &'a self,
         tracer: &mut Tracer<'_>,
         path: &RecordedPath<'a>,
         node: usize,
-        sought: Sought,
+        sought: QueryTarget,
         chance: f64,
-        look: &Look,
-        options: &mut Options,
-    ) -> Option<Glance<'a>> {
+        query: &EdgeQuery,
+        options: &mut TreeScratch,
+    ) -> Option<EdgeSample<'a>> {
         let (record, moves) = (&path.record, path.velocities.moves(node));
         let recorded = &record.nodes[node];
         let arrival = recorded.arrival.as_ref()?;
@@ -131,8 +136,8 @@ impl Radiative {
         tracer.counters.boundary_samples += 1;
         let views = self.views(moves, sought)?;
         let around = &viewpoint(tracer.world, vertex, wo);
-        let chosen = views.sample(&self.jumps, around, look, options)?;
-        let sight = Sight::new(tracer, self, chosen.jump, chosen.along, vertex)?;
+        let chosen = views.sample(&self.discontinuities, around, query, options)?;
+        let sight = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, vertex)?;
         let scattering = tracer.world.scattering(vertex)?;
         let f = scattering.eval(wo, -sight.w);
         if f.is_zero() {
@@ -140,17 +145,17 @@ impl Radiative {
         }
         let kernel = sight.sides.sine / (sight.distance * sight.distance);
         let weight = theta * f * (kernel * chosen.inv_pdf / chance);
-        let (_, point) = chosen.jump.point(chosen.along);
-        Some(Glance { node, sight, point, weight, longest })
+        let (_, point) = chosen.discontinuity.point(chosen.along);
+        Some(EdgeSample { node, sight, point, weight, longest })
     }
 
     /// What edges a vertex may look at.
-    fn views(&self, moves: bool, sought: Sought) -> Option<&Views> {
+    fn views(&self, moves: bool, sought: QueryTarget) -> Option<&EdgeSampler> {
         match (sought, moves) {
-            (Sought::Moving, true) => self.all.as_ref(),
-            (Sought::Moving, false) => self.moving.as_ref(),
-            (Sought::Resting, true) => None,
-            (Sought::Resting, false) => self.resting.as_ref(),
+            (QueryTarget::Moving, true) => self.all.as_ref(),
+            (QueryTarget::Moving, false) => self.moving.as_ref(),
+            (QueryTarget::Resting, true) => None,
+            (QueryTarget::Resting, false) => self.resting.as_ref(),
         }
     }
 
@@ -158,15 +163,15 @@ impl Radiative {
     fn amount(
         &self,
         world: &World,
-        options: &mut Options,
+        options: &mut TreeScratch,
         vertex: &Vertex,
         wo: Vec3,
-        carried: bool,
-        sought: Sought,
+        moves: bool,
+        sought: QueryTarget,
     ) -> f64 {
-        let Some(views) = self.views(carried, sought) else { return 0.0 };
+        let Some(views) = self.views(moves, sought) else { return 0.0 };
         let amount = views.amount(&viewpoint(world, vertex, wo), options);
-        if carried { CARRIED * amount } else { amount }
+        if moves { CARRIED * amount } else { amount }
     }
 
     /// Chooses a vertex that can see an edge change: mostly in proportion to what passes it and to how
@@ -175,9 +180,9 @@ impl Radiative {
         &self,
         tracer: &mut Tracer<'_>,
         path: &RecordedPath<'_>,
-        sought: Sought,
+        sought: QueryTarget,
         u: f64,
-        options: &mut Options,
+        options: &mut TreeScratch,
     ) -> Option<(usize, f64)> {
         let mut choice = Choice::new(u, BY_THROUGHPUT);
         for (k, node) in path.record.nodes.iter().enumerate().skip(1) {

@@ -11,10 +11,10 @@ use alloc::vec::Vec;
 use drt_geom::Aabb;
 use drt_math::Vec3;
 
-use crate::edges::jumps::{Jump, Jumps};
-use crate::edges::tree::{Draw, EdgeTree, MOST_WAYS, Options, Segment, Viewpoint, Way};
+use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::edges::tree::{Draw, EdgeTree, MOST_WAYS, Segment, TreeScratch, Viewpoint, Way};
 use crate::model::surface::Lobes;
-use crate::terms::radiative::{Chosen, Look};
+use crate::terms::radiative::{Chosen, EdgeQuery};
 use crate::world::World;
 use crate::world::vertex::{Kind, Vertex};
 
@@ -33,26 +33,33 @@ pub(super) struct Sphere {
 
 /// Edges to look at, and where to look.
 #[derive(Debug)]
-pub(super) struct Views {
+pub(super) struct EdgeSampler {
     tree: EdgeTree,
     /// The jumps that the tree's segments are.
-    jumps: Vec<u32>,
+    discontinuities: Vec<u32>,
     /// The part of looks that go towards some spheres, and these.
     share: f64,
     toward: Vec<Sphere>,
 }
 
-impl Views {
+impl EdgeSampler {
     /// Of the jumps that `matter`, in proportion to how much; `None` without any.
-    pub(super) fn new(world: &World, jumps: &Jumps, matter: impl Fn(&Jump) -> f64) -> Option<Self> {
-        let weighed = (0..).zip(&jumps.list).map(|(i, jump)| (i, jump, matter(jump)));
+    pub(super) fn new(
+        world: &World,
+        discontinuities: &DiscontinuityEdges,
+        matter: impl Fn(&DiscontinuityEdge) -> f64,
+    ) -> Option<Self> {
+        let weighed = (0..)
+            .zip(&discontinuities.list)
+            .map(|(i, discontinuity)| (i, discontinuity, matter(discontinuity)));
         let kept = weighed.filter(|(_, _, weight)| *weight > 0.0);
-        let (indices, segments): (Vec<u32>, Vec<Segment>) =
-            kept.map(|(i, jump, weight)| (i, segment(jumps, jump, weight))).unzip();
+        let (indices, segments): (Vec<u32>, Vec<Segment>) = kept
+            .map(|(i, discontinuity, weight)| (i, segment(discontinuities, discontinuity, weight)))
+            .unzip();
         let tree = EdgeTree::new(&segments)?;
         let toward = lamps(world);
         let share = if toward.is_empty() { 0.0 } else { TOWARD_LAMPS };
-        Some(Self { tree, jumps: indices, share, toward })
+        Some(Self { tree, discontinuities: indices, share, toward })
     }
 
     /// The same, looking only at what may be before some of the shapes.
@@ -63,7 +70,7 @@ impl Views {
     }
 
     /// An estimate of how much there is to see: an integral of scattering and edges.
-    pub(super) fn amount(&self, around: &Viewpoint, options: &mut Options) -> f64 {
+    pub(super) fn amount(&self, around: &Viewpoint, options: &mut TreeScratch) -> f64 {
         let way = match &self.toward[..] {
             [all] if self.share == 1.0 => around.toward(1.0, all.center, all.radius),
             _ => Way::anywhere(1.0),
@@ -74,10 +81,10 @@ impl Views {
     /// Draws a point of an edge that can be seen from a viewpoint.
     pub(super) fn sample<'a>(
         &self,
-        jumps: &'a Jumps,
+        discontinuities: &'a DiscontinuityEdges,
         around: &Viewpoint,
-        look: &Look,
-        options: &mut Options,
+        query: &EdgeQuery,
+        options: &mut TreeScratch,
     ) -> Option<Chosen<'a>> {
         let (mut ways, mut count) = ([Way::anywhere(1.0 - self.share); MOST_WAYS], 0);
         let each = self.share / self.toward.len().max(1) as f64;
@@ -86,10 +93,10 @@ impl Views {
             count += 1;
         }
         count += usize::from(self.share < 1.0);
-        let draw = Draw { way: look.way, point: look.point };
+        let draw = Draw { way: query.way, point: query.point };
         let chosen = self.tree.sample(around, &ways[..count], &draw, options)?;
-        let jump = &jumps.list[self.jumps[chosen.edge] as usize];
-        Some(Chosen { jump, along: chosen.u, inv_pdf: chosen.inv_pdf })
+        let discontinuity = &discontinuities.list[self.discontinuities[chosen.edge] as usize];
+        Some(Chosen { discontinuity, along: chosen.u, inv_pdf: chosen.inv_pdf })
     }
 }
 
@@ -112,18 +119,22 @@ pub(super) fn viewpoint(world: &World, vertex: &Vertex, wo: Vec3) -> Viewpoint {
     Viewpoint::new(vertex.x, normal).scattering(lobes)
 }
 
-fn segment(jumps: &Jumps, jump: &Jump, weight: f64) -> Segment {
-    let (a, along) = jump.edge.line();
-    let (faces, open) = match jumps.normals(jump) {
+fn segment(
+    discontinuities: &DiscontinuityEdges,
+    discontinuity: &DiscontinuityEdge,
+    weight: f64,
+) -> Segment {
+    let (a, along) = discontinuity.edge.line();
+    let (faces, open) = match discontinuities.normals(discontinuity) {
         Some(normals) => (normals, false),
         // What is seen of three faces and more depends on where from.
         None => {
-            let across = jumps.faces(jump).map(|(_, across)| across).next();
-            ([jump.edge.tangent.cross(across.unwrap_or_default()); 2], true)
+            let across = discontinuities.faces(discontinuity).map(|(_, across)| across).next();
+            ([discontinuity.edge.tangent.cross(across.unwrap_or_default()); 2], true)
         }
     };
-    let crease = jump.crease.map(|crease| crease * weight);
-    Segment { a, b: a + along, faces, open, jump: weight, crease }
+    let crease = discontinuity.crease.map(|crease| crease * weight);
+    Segment { a, b: a + along, faces, open, discontinuity: weight, crease }
 }
 
 /// The spheres around the surfaces that emit most.

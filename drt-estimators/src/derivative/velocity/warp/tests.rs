@@ -7,7 +7,6 @@ use drt_geom::procedural;
 use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{Effect, GeometryChange};
 
-use crate::Scene;
 use crate::derivative::tests::choice;
 use crate::derivative::tests::choice::MOMENT;
 use crate::derivative::tests::scenes::{
@@ -15,6 +14,7 @@ use crate::derivative::tests::scenes::{
 };
 use crate::derivative::velocity::warp::{Stretch, SurfaceHit, warps};
 use crate::model::emitter::Emitter;
+use crate::model::scene::Scene;
 use crate::world::vertex::SurfacePoint;
 
 fn hit(distance: f64, cosine: f64) -> SurfaceHit {

@@ -71,8 +71,8 @@ fn scenes(rng: &mut Rng) -> Vec<(f64, Vec<Segment>)> {
         let b = a + in_cube(rng) * 0.3;
         let normal = |rng: &mut Rng| direction(rng).cross(b - a).normalize();
         let faces = [normal(rng), normal(rng)];
-        let jump = f64::powi(10.0, -(i % 40));
-        Segment { a, b, faces, open: i % 7 == 0, jump, crease: [jump, 0.5] }
+        let discontinuity = f64::powi(10.0, -(i % 40));
+        Segment { a, b, faces, open: i % 7 == 0, discontinuity, crease: [discontinuity, 0.5] }
     });
     let soup: Vec<Segment> = soup.collect();
     [(3.0, still_life()), (2.0, ball), (2.0, segments(&far, PRIORS)), (3.0, cubes), (2.0, soup)]
@@ -165,9 +165,9 @@ fn segments_without_use_are_left_out() {
         Segment { b: good.a, ..good },
         Segment { a: vec3(f64::NAN, 0.0, 0.0), ..good },
         Segment { faces: [good.faces[0], Vec3::ZERO / 0.0], ..good },
-        Segment { jump: 0.0, crease: [0.0; 2], ..good },
-        Segment { jump: f64::INFINITY, ..good },
-        Segment { jump: -1.0, ..good },
+        Segment { discontinuity: 0.0, crease: [0.0; 2], ..good },
+        Segment { discontinuity: f64::INFINITY, ..good },
+        Segment { discontinuity: -1.0, ..good },
     ];
     assert!(EdgeTree::new(&[]).is_none());
     assert!(EdgeTree::new(&bad).is_none());

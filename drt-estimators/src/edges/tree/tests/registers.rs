@@ -27,7 +27,7 @@ fn all_registers_give_the_same_bits() {
         let ways = [toward, Way::anywhere(0.4)];
         let draw = Draw { way: rng.next_f64(), point: rng.next_2d() };
         let [wide, plain]: [Vec<u64>; 2] = [&widest, &portable].map(|tree| {
-            let options = &mut Options::default();
+            let options = &mut TreeScratch::default();
             let amounts = ways.iter().map(|way| tree.amount(&view, way, options).to_bits());
             let mut bits: Vec<u64> = amounts.collect();
             if let Some(c) = tree.sample(&view, &ways, &draw, options) {

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use drt_geom::{EdgeClass, Mesh, NONE, Topology, procedural};
 use drt_math::{Rng, Vec3, vec3, warp};
 
-use crate::edges::tree::options::Group;
+use crate::edges::tree::options::NodeGroup;
 use crate::edges::tree::*;
 
 /// Looking at all edges.
@@ -14,9 +14,9 @@ pub(super) const ALL: [Way; 1] = [Way::anywhere(1.0)];
 /// Draws points with memory of its own.
 pub(super) struct Drawing<'a> {
     tree: &'a EdgeTree,
-    options: Options,
+    options: TreeScratch,
     /// Where each piece is in the tree.
-    paths: Vec<Vec<(Group, usize)>>,
+    paths: Vec<Vec<(NodeGroup, usize)>>,
     /// The piece of each edge.
     pieces: Vec<Option<usize>>,
 }
@@ -30,7 +30,7 @@ impl<'a> Drawing<'a> {
         for (k, p) in tree.lines.iter().enumerate() {
             pieces[p.edge as usize] = Some(k);
         }
-        Self { tree, options: Options::default(), paths, pieces }
+        Self { tree, options: TreeScratch::default(), paths, pieces }
     }
 
     pub(super) fn sample(
@@ -48,7 +48,7 @@ impl<'a> Drawing<'a> {
         let Some(Some(piece)) = self.pieces.get(edge) else { return 0.0 };
         let path = &self.paths[*piece];
         let found = self.tree.descend(view, ways, &mut self.options, |options, _| {
-            let place = |group: Group| options.groups().iter().position(|g| *g == group);
+            let place = |group: NodeGroup| options.groups().iter().position(|g| *g == group);
             path.iter().rev().find_map(|(group, lane)| Some((place(*group)?, *lane)))
         });
         let slack = self.tree.slack(view);
@@ -62,14 +62,14 @@ impl<'a> Drawing<'a> {
 fn find(
     tree: &EdgeTree,
     child: Child,
-    path: &mut Vec<(Group, usize)>,
-    paths: &mut [Vec<(Group, usize)>],
+    path: &mut Vec<(NodeGroup, usize)>,
+    paths: &mut [Vec<(NodeGroup, usize)>],
 ) {
     if child.bundles == 0 {
         for (lane, below) in tree.families[child.first as usize].children.iter().enumerate() {
             // What there is not is of the first family, as only the root is.
             if below.bundles > 0 || below.first > 0 {
-                path.push((Group::Family(child.first), lane));
+                path.push((NodeGroup::Family(child.first), lane));
                 find(tree, *below, path, paths);
                 path.pop();
             }
@@ -80,7 +80,7 @@ fn find(
         // A leaf's last may have less, which the next one's first overwrite.
         for lane in 0..(tree.lines.len() - first).min(8) {
             paths[first + lane] = path.clone();
-            paths[first + lane].push((Group::Bundle(b), lane));
+            paths[first + lane].push((NodeGroup::Bundle(b), lane));
         }
     }
 }
@@ -89,7 +89,7 @@ fn find(
 pub(super) const PRIORS: (f64, [f64; 2]) = (1.0, [0.3, 0.15]);
 
 /// All edges of a mesh that are not flat.
-pub(super) fn segments(mesh: &Mesh, (jump, crease): (f64, [f64; 2])) -> Vec<Segment> {
+pub(super) fn segments(mesh: &Mesh, (discontinuity, crease): (f64, [f64; 2])) -> Vec<Segment> {
     let normal = |f: u32| {
         let [a, b, c] = mesh.triangles[f as usize].map(|v| mesh.positions[v as usize]);
         (b - a).cross(c - a).normalize()
@@ -100,7 +100,7 @@ pub(super) fn segments(mesh: &Mesh, (jump, crease): (f64, [f64; 2])) -> Vec<Segm
         let [a, b] = e.vertices.map(|v| mesh.positions[v as usize]);
         let open = e.faces[1] == NONE;
         let faces = [normal(e.faces[0]), if open { Vec3::ZERO } else { normal(e.faces[1]) }];
-        Segment { a, b, faces, open, jump, crease }
+        Segment { a, b, faces, open, discontinuity, crease }
     };
     edges.map(segment).collect()
 }
@@ -108,12 +108,12 @@ pub(super) fn segments(mesh: &Mesh, (jump, crease): (f64, [f64; 2])) -> Vec<Segm
 /// The weight with which a segment counts, seen from `x`.
 fn prior(s: &Segment, x: Vec3) -> f64 {
     if s.open {
-        return s.jump;
+        return s.discontinuity;
     }
     match s.faces.map(|n| n.dot(x - s.a) > 0.0) {
         [true, true] => s.crease[0],
         [false, false] => s.crease[1],
-        _ => s.jump,
+        _ => s.discontinuity,
     }
 }
 

@@ -17,20 +17,20 @@ fn cost(
     density: impl Fn(Vec3) -> f64,
 ) -> f64 {
     let mut rng = Rng::new(3, 0, 0);
-    let (mut light, mut whole, mut second) = (0.0, 0.0, 0.0);
+    let (mut light, mut region, mut second) = (0.0, 0.0, 0.0);
     for i in 0..SAMPLES {
         let w = if i % 2 == 0 { like_f(&mut rng) } else { Some(random_direction(&mut rng)) };
         let Some(w) = w else { continue };
         let inv_pdf = 2.0 / (density(w) + 0.25 * FRAC_1_PI);
         let (value, guess) = (f(w), sketch(w));
         light += value * inv_pdf;
-        whole += guess * inv_pdf;
+        region += guess * inv_pdf;
         if value > 0.0 {
             assert!(guess > 0.0, "{w:?}");
             second += value * value / guess * inv_pdf;
         }
     }
-    second * whole / (light * light)
+    second * region / (light * light)
 }
 
 /// What a sketch says of a direction seen at a `cosine` to the normal.

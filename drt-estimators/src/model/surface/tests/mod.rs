@@ -1,12 +1,12 @@
 //! Every model is judged as the same list of cases, from the same directions.
 
 mod changes;
-mod counterparts;
+mod direction_partners;
 mod energy;
 mod formulas;
 mod gradients;
 mod lobes;
-mod opposites;
+mod roughness_partners;
 mod sampling;
 
 use alloc::boxed::Box;

@@ -8,7 +8,7 @@ use crate::run::session::{Component, Pass, Session, seed_of_component};
 use crate::sampling::allocation::Allocation;
 use crate::sampling::budget::{SampleBudget, TermStatistics};
 use crate::sampling::film::{PixelFilm, SplatFilm};
-use crate::terms::interior::Looks;
+use crate::terms::interior::EdgeQueries;
 
 pub(super) use crate::run::session::pilot::terms::primary_share;
 
@@ -35,7 +35,7 @@ impl Session {
         let (account, done) = self.fill(&mut film, seed, true, pass, units, |_, _| {}, progress);
         let along = self.settings.boundary_spp.is_none().then(|| {
             let samples = f64::from(units * self.per_unit());
-            let of_queries = if first_query < film.layers() { account.looking } else { 0 };
+            let of_queries = if first_query < film.layers() { account.query_rays } else { 0 };
             let rays = [account.counters.rays - of_queries, of_queries];
             let pixels = Pixels { film: &film, samples, parameters: n };
             [(1..first_query, rays[0], 1.0), (first_query..film.layers(), rays[1], queries)]
@@ -67,8 +67,8 @@ impl Session {
     /// Of so many `layers`, with terms apart, the first one of edge queries; and how many each path takes. Queries
     /// from every vertex belong to their path, and have none.
     fn queries(&self, layers: usize) -> (usize, f64) {
-        let average = |c: &Component| match c.prepared.along_rays().looks {
-            Looks::Average(queries) if queries > 0.0 => Some(queries),
+        let average = |c: &Component| match c.prepared.along_rays().queries {
+            EdgeQueries::Average(queries) if queries > 0.0 => Some(queries),
             _ => None,
         };
         match self.components.iter().find_map(average) {

@@ -23,9 +23,9 @@ use drt_math::{Real, Rgb};
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::sampling::budget::{BESIDES, TermStatistics};
 use crate::sampling::pixels::Sampler;
-use crate::terms::interior::{Looks, PixelSampler};
+use crate::terms::interior::{EdgeQueries, PixelSampler};
 use crate::terms::prepared::Prepared;
-use crate::terms::splatting::{Checked, Source, ToImages};
+use crate::terms::splatting::{BoundarySource, Checked, ToImages};
 
 /// Samples of pixels, and of each kind that lands anywhere.
 const SAMPLES: u32 = 256;
@@ -47,7 +47,7 @@ pub(in crate::run::session) fn primary_share(
 ) -> f64 {
     let Some(camera) = prepared.sources.iter().position(|s| s.is_of_camera()) else { return 1.0 };
     let [paths, queries] = along_paths(prepared, motion);
-    let measured = |source: &Source| of_source(prepared, motion, *source);
+    let measured = |source: &BoundarySource| of_source(prepared, motion, *source);
     let mut others: Vec<TermStatistics> = prepared.sources.iter().map(measured).collect();
     let camera = others.swap_remove(camera);
     others.push(queries);
@@ -108,16 +108,16 @@ fn along_paths(prepared: &Prepared, motion: &Motion) -> [TermStatistics; 2] {
         TermStatistics { variance, rays: rays as f64 / (each * paths), even: false }
     };
     // Those of queries are the last ones, of two terms.
-    let (first, each) = match along.looks {
-        Looks::Average(queries) if queries > 0.0 => (layers - 2 * n, queries),
+    let (first, each) = match along.queries {
+        EdgeQueries::Average(queries) if queries > 0.0 => (layers - 2 * n, queries),
         _ => (layers, 1.0),
     };
-    let rays = if first < layers { account.looking } else { 0 };
+    let rays = if first < layers { account.query_rays } else { 0 };
     [of(1..first, account.counters.rays - rays, 1.0), of(first..layers, rays, each)]
 }
 
 /// Of a source of boundary samples.
-fn of_source(prepared: &Prepared, motion: &Motion, source: Source) -> TermStatistics {
+fn of_source(prepared: &Prepared, motion: &Motion, source: BoundarySource) -> TermStatistics {
     let world = &prepared.world;
     let splatter = prepared.splatter(SEED);
     let mut variance = alloc::vec![0.0; motion.parameters()];

@@ -3,14 +3,14 @@
 use drt_math::{Vec3, vec3};
 use drt_motion::SurfacePoint;
 
-use crate::terms::flux::reservoir::{Side, Speed};
+use crate::terms::flux::reservoir::{MediumSide, Speed};
 use crate::world::vertex::MaterialPoint;
 
-fn side(alongs: [Vec3; 2]) -> Side {
+fn side(alongs: [Vec3; 2]) -> MediumSide {
     let at = SurfacePoint { triangle: 0, bary: [0.3; 2] };
     let point = MaterialPoint { shape: 0, at };
     let speeds = alongs.map(|along| Some(Speed { point, t: 1.0, along }));
-    Side { medium: 0, front: true, fullness: 1.0, speeds }
+    MediumSide { medium: 0, front: true, fullness: 1.0, speeds }
 }
 
 /// The sides of a parallel layer cancel for a ray that is carried, not where they move by themselves.

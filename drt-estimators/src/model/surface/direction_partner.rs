@@ -1,7 +1,7 @@
 //! Pairs of directions between which light moves as a lobe turns.
 //!
 //! With the slope t of microfacets over the roughness α, and e = |t|², their density per area of slopes is P(e)/α²
-//! (see [`Counterpart`](super::Counterpart)). When the surface turns, or the directions do, or the index of refraction
+//! (see [`RoughnessPartner`](super::RoughnessPartner)). When the surface turns, or the directions do, or the index of refraction
 //! changes, a scattering answers by the change of t. Let h = wo + η wi, with η = 1 in reflections, and τ = α t, so that
 //! H = h / (h·n) = n + τ. Then α² e = H² - 1, and
 //!
@@ -13,7 +13,7 @@
 //!
 //! This is of the size of 1/α, and but for what stays bounded as α falls it is odd in τ: what one side of the lobe loses
 //! the other one gains. The *opposite* w' of a direction w is that of the microfacets with the slope -t. With b = d ln P at
-//! w, b' at w', and the values f and f', as for [counterparts](super::Counterpart)
+//! w, b' at w', and the values f and f', as for [counterparts](super::RoughnessPartner)
 //!
 //! ```text
 //! ∫ b f L dw = ∫ s [b f L + r b' f' L'] dw,      r = (dw'/dm') / (dw/dm),      s = p / (p + r p'),
@@ -29,7 +29,7 @@ use crate::model::surface::microfacet::Distribution;
 
 /// The direction on the other side of a lobe.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Opposite {
+pub(crate) struct DirectionPartner {
     /// Unit, away from the surface.
     pub(crate) w: Vec3,
     /// r: what the value there is multiplied by.
@@ -51,7 +51,7 @@ pub(crate) struct Turn {
     pub(crate) eta: f64,
 }
 
-impl Opposite {
+impl DirectionPartner {
     /// Of a scattering at a surface with the normal `n`; `by_eta` is the rate of its index by that of the material.
     pub(super) fn new(facet: &Facet, n: Vec3, by_eta: f64) -> Option<Self> {
         let slope = facet.slope()?;

@@ -35,8 +35,8 @@ pub(super) fn scattered(seed: u64, mut each: impl FnMut(f64, &Bsdf, [Vec3; 2])) 
 fn counterparts_go_both_ways() {
     let mut found = 0;
     scattered(31, |alpha, bsdf, [wo, wi]| {
-        let Some(there) = bsdf.counterpart(wo, wi, normal()) else { return };
-        let back = bsdf.counterpart(wo, there.w, normal()).expect("the way back");
+        let Some(there) = bsdf.roughness_partner(wo, wi, normal()) else { return };
+        let back = bsdf.roughness_partner(wo, there.w, normal()).expect("the way back");
         let message = || format!("{bsdf:?} {wo:?} {wi:?} {there:?} {back:?}");
         assert!((back.w - wi).length() < 1e-6 * alpha, "{}", message());
         assert!((back.ratio * there.ratio - 1.0).abs() < 1e-5, "{}", message());
@@ -61,16 +61,16 @@ fn derivatives(bsdf: &Bsdf, wo: Vec3, ratio: impl Fn(f64) -> f64) -> [Moments; 2
             continue;
         };
         let g = bsdf.gradient(wo, s.w, normal());
-        let whole = g.params.alpha.g * light(s.w);
-        let apart = bsdf.counterpart(wo, s.w, normal()).map_or(whole, |c| {
+        let region = g.params.alpha.g * light(s.w);
+        let apart = bsdf.roughness_partner(wo, s.w, normal()).map_or(region, |c| {
             let there = ratio(c.ratio) * bsdf.eval(wo, c.w, normal()).g * light(c.w);
             let difference = g.value.g * light(s.w) - there;
             let there = c.ratio * bsdf.pdf(wo, c.w, normal(), Given::Wo) / c.slopes[1].abs();
             let here = s.pdf / c.slopes[0].abs();
             let share = here / (here + there);
-            whole + c.slopes[0] * (share * difference - g.value.g * light(s.w))
+            region + c.slopes[0] * (share * difference - g.value.g * light(s.w))
         });
-        moments[0].push(whole / s.pdf);
+        moments[0].push(region / s.pdf);
         moments[1].push(apart / s.pdf);
     }
     moments
@@ -84,9 +84,9 @@ fn pairs_tell_the_derivative_by_the_roughness() {
             if bsdf.is_transmissive() { &[20.0, 70.0, 86.0, 140.0] } else { &[20.0, 70.0, 86.0] };
         for &degrees in sides {
             let wo = tilted(degrees);
-            let z = |[whole, apart]: [Moments; 2]| {
-                let variance = whole.variance_of_mean() + apart.variance_of_mean();
-                (whole.mean() - apart.mean()) / f64::sqrt(variance)
+            let z = |[region, apart]: [Moments; 2]| {
+                let variance = region.variance_of_mean() + apart.variance_of_mean();
+                (region.mean() - apart.mean()) / f64::sqrt(variance)
             };
             let fair = derivatives(&bsdf, wo, |ratio| ratio);
             assert!(z(fair).abs() < 4.0, "{bsdf:?} at {degrees} degrees: {fair:?}");

@@ -26,7 +26,7 @@ const BESIDE: f64 = 1e-6;
 
 /// An edge at which radiance jumps.
 #[derive(Clone, Debug)]
-pub(crate) struct Jump {
+pub(crate) struct DiscontinuityEdge {
     pub(crate) edge: Edge,
     /// Its faces, in the order in which one goes around it.
     fan: Range<usize>,
@@ -34,7 +34,7 @@ pub(crate) struct Jump {
     around: Option<Option<usize>>,
     /// A face of it bounds a medium.
     bounds: bool,
-    /// How much a crease jumps, compared to a silhouette, on the side of its faces' [normals](Jumps::normals) and
+    /// How much a crease jumps, compared to a silhouette, on the side of its faces' [normals](DiscontinuityEdges::normals) and
     /// on the other.
     pub(crate) crease: [f64; 2],
     /// Between faces with interpolated normals.
@@ -43,7 +43,7 @@ pub(crate) struct Jump {
 
 /// A face at an edge.
 #[derive(Clone, Copy, Debug)]
-struct Blade {
+struct FanFace {
     /// Around the edge, from the first face's direction.
     angle: f64,
     prim: u32,
@@ -53,16 +53,16 @@ struct Blade {
 
 /// All edges.
 #[derive(Debug, Default)]
-pub(crate) struct Jumps {
-    pub(crate) list: Vec<Jump>,
-    blades: Vec<Blade>,
+pub(crate) struct DiscontinuityEdges {
+    pub(crate) list: Vec<DiscontinuityEdge>,
+    faces_of_fans: Vec<FanFace>,
     /// Edges of the scene's meshes in all, flat ones too.
     pub(crate) all: u64,
 }
 
 /// What is seen on the two sides of an edge.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sides {
+pub(crate) struct EdgeSides {
     /// Unit normal of the plane of the edge and the viewer.
     pub(crate) n: Vec3,
     /// Sine of the angle between edge and view.
@@ -71,7 +71,7 @@ pub(crate) struct Sides {
     pub(crate) faces: [Option<(u32, Vec3)>; 2],
 }
 
-impl Sides {
+impl EdgeSides {
     /// The faces that rays from the edge ignore.
     pub(crate) fn own_faces(&self) -> Option<[u32; 2]> {
         let [a, b] = self.faces.map(|f| f.map(|(prim, _)| prim));
@@ -84,7 +84,7 @@ impl Sides {
     }
 }
 
-impl Jumps {
+impl DiscontinuityEdges {
     /// Collects the edges of surfaces that scatter or block. Of edges at one place, that of a shape that
     /// `moves` tells how the place moves.
     pub(crate) fn collect(world: &World, moves: &[bool]) -> Self {
@@ -93,41 +93,49 @@ impl Jumps {
         places.sort_unstable();
         let around: Vec<_> =
             (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
-        let mut jumps = Self { list: Vec::new(), blades: Vec::new(), all };
+        let mut discontinuities = Self { list: Vec::new(), faces_of_fans: Vec::new(), all };
         for same in places.chunk_by(|a, b| a.0 == b.0) {
             let of = |i: &usize| &edges[*i];
             let indices = || same.iter().map(|(_, i)| *i);
             let main = indices().find(|i| moves[of(i).shape as usize]).unwrap_or(same[0].1);
             let edge = &edges[main];
-            let start = jumps.blades.len();
+            let start = discontinuities.faces_of_fans.len();
             for i in indices() {
                 for (angle, prim, across) in edges[i].faces_around(edge) {
-                    if jumps.blades[start..].iter().all(|b| b.prim != prim) {
-                        jumps.blades.push(Blade { angle, prim, across });
+                    if discontinuities.faces_of_fans[start..].iter().all(|b| b.prim != prim) {
+                        discontinuities.faces_of_fans.push(FanFace { angle, prim, across });
                     }
                 }
             }
-            let fan = start..jumps.blades.len();
-            jumps.blades[fan.clone()].sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
-            match jumps.crease(world, edge.tangent, &fan) {
+            let fan = start..discontinuities.faces_of_fans.len();
+            discontinuities.faces_of_fans[fan.clone()]
+                .sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
+            match discontinuities.crease(world, edge.tangent, &fan) {
                 Some((crease, smooth)) => {
                     let mut edge = *edge;
                     edge.may_rest = Contact::anywhere(world, &edge);
                     let around = around[edge.shape as usize];
                     let shape = |i: &usize| &world.scene.shapes[of(i).shape as usize];
                     let bounds = same.iter().any(|(_, i)| shape(i).boundary.is_some());
-                    jumps.list.push(Jump { edge, fan, around, bounds, crease, smooth });
+                    discontinuities.list.push(DiscontinuityEdge {
+                        edge,
+                        fan,
+                        around,
+                        bounds,
+                        crease,
+                        smooth,
+                    });
                 }
-                None => jumps.blades.truncate(start),
+                None => discontinuities.faces_of_fans.truncate(start),
             }
         }
-        jumps
+        discontinuities
     }
 
     /// How much radiance jumps at a crease between faces, and whether these are smooth; `None` where it never does.
     fn crease(&self, world: &World, tangent: Vec3, fan: &Range<usize>) -> Option<([f64; 2], bool)> {
-        let blades = &self.blades[fan.clone()];
-        let [a, b] = blades else { return Some(([1.0; 2], false)) };
+        let faces_of_fans = &self.faces_of_fans[fan.clone()];
+        let [a, b] = faces_of_fans else { return Some(([1.0; 2], false)) };
         let points = [a, b].map(|b| world.point(b.prim, [0.0; 2]).0);
         let [sa, sb] = points.map(|p| p.shape as usize);
         let shapes = &world.scene.shapes;
@@ -152,60 +160,63 @@ impl Jumps {
         if bend < FLAT {
             return None;
         }
-        let jump = f64::min(bend, 1.0) * if smooth { SMOOTH } else { 1.0 };
-        Some((sides.map(|side| side * jump), smooth))
+        let discontinuity = f64::min(bend, 1.0) * if smooth { SMOOTH } else { 1.0 };
+        Some((sides.map(|side| side * discontinuity), smooth))
     }
 
     /// The faces around an edge, and the unit vectors across it into them.
-    pub(crate) fn faces(&self, jump: &Jump) -> impl Iterator<Item = (u32, Vec3)> {
-        self.blades[jump.fan.clone()].iter().map(|b| (b.prim, b.across))
+    pub(crate) fn faces(
+        &self,
+        discontinuity: &DiscontinuityEdge,
+    ) -> impl Iterator<Item = (u32, Vec3)> {
+        self.faces_of_fans[discontinuity.fan.clone()].iter().map(|b| (b.prim, b.across))
     }
 
     /// Unit normals of the two faces of a crease, on one side of the surface.
-    pub(crate) fn normals(&self, jump: &Jump) -> Option<[Vec3; 2]> {
-        let [a, b] = &self.blades[jump.fan.clone()] else { return None };
-        Some(normals(jump.edge.tangent, [a.across, b.across]))
+    pub(crate) fn normals(&self, discontinuity: &DiscontinuityEdge) -> Option<[Vec3; 2]> {
+        let [a, b] = &self.faces_of_fans[discontinuity.fan.clone()] else { return None };
+        Some(normals(discontinuity.edge.tangent, [a.across, b.across]))
     }
 
     /// Weight of an edge seen from a point: the angle it subtends, less where it is a crease. Samples of its
     /// two sides, of the same random numbers, seldom differ, but then by all there is: their root mean square
     /// is that of how often. Where normals are interpolated they differ each time, by little.
-    pub(crate) fn seen_from(&self, jump: &Jump, eye: Vec3) -> f64 {
-        let silhouette = crate::edges::edge::seen_from(&jump.edge, eye);
-        let Some(normals) = self.normals(jump).filter(|_| silhouette == 0.0) else {
+    pub(crate) fn seen_from(&self, discontinuity: &DiscontinuityEdge, eye: Vec3) -> f64 {
+        let silhouette = crate::edges::edge::seen_from(&discontinuity.edge, eye);
+        let Some(normals) = self.normals(discontinuity).filter(|_| silhouette == 0.0) else {
             return silhouette;
         };
-        let (a, along) = jump.edge.line();
+        let (a, along) = discontinuity.edge.line();
         let (da, db) = (a - eye, a + along - eye);
-        let crease = jump.crease[usize::from(normals[0].dot(da) > 0.0)];
-        let weight = if jump.smooth { crease } else { fm::sqrt(crease) };
+        let crease = discontinuity.crease[usize::from(normals[0].dot(da) > 0.0)];
+        let weight = if discontinuity.smooth { crease } else { fm::sqrt(crease) };
         weight * fm::atan2(da.cross(db).length(), da.dot(db))
     }
 
     /// What a viewer sees of an edge; `w` is unit, from the edge to the viewer.
-    pub(crate) fn sides(&self, jump: &Jump, w: Vec3) -> Option<Sides> {
-        let edge = &jump.edge;
+    pub(crate) fn sides(&self, discontinuity: &DiscontinuityEdge, w: Vec3) -> Option<EdgeSides> {
+        let edge = &discontinuity.edge;
         let n = edge.tangent.cross(w);
         let sine = n.length();
         if sine < 1e-12 {
             return None;
         }
-        let blades = &self.blades[jump.fan.clone()];
+        let faces_of_fans = &self.faces_of_fans[discontinuity.fan.clone()];
         let x = edge.across[0];
         let y = edge.tangent.cross(x);
         let view = fm::atan2(w.dot(y), w.dot(x));
         let turn = |angle: f64| if angle < 0.0 { angle + 2.0 * PI } else { angle };
         // The first face met on each way around.
         let first = |turned: fn(f64, f64) -> f64| {
-            let nearest = |b: &Blade| turn(turned(b.angle, view));
-            blades
+            let nearest = |b: &FanFace| turn(turned(b.angle, view));
+            faces_of_fans
                 .iter()
                 .min_by(|a, b| nearest(a).total_cmp(&nearest(b)))
                 .filter(|b| nearest(b) < PI)
                 .map(|b| (b.prim, b.across))
         };
         let faces = [first(|angle, view| angle - view), first(|angle, view| view - angle)];
-        Some(Sides { n: n / sine, sine, faces })
+        Some(EdgeSides { n: n / sine, sine, faces })
     }
 }
 
@@ -214,7 +225,7 @@ fn normals(tangent: Vec3, [f, g]: [Vec3; 2]) -> [Vec3; 2] {
     [tangent.cross(f), g.cross(tangent)]
 }
 
-impl Jump {
+impl DiscontinuityEdge {
     pub(crate) fn length(&self) -> f64 {
         self.edge.line().1.length()
     }
@@ -241,7 +252,13 @@ impl Jump {
     }
 
     /// The medium around the edge at `x` on the viewer's side, `w` pointing to the viewer.
-    pub(crate) fn medium(&self, world: &World, sides: &Sides, x: Vec3, w: Vec3) -> Option<usize> {
+    pub(crate) fn medium(
+        &self,
+        world: &World,
+        sides: &EdgeSides,
+        x: Vec3,
+        w: Vec3,
+    ) -> Option<usize> {
         // Most bound none: what it takes to tell by a face is seldom in a cache.
         let faces = sides.faces.iter().flatten().filter(|_| self.bounds);
         for (prim, _) in faces {

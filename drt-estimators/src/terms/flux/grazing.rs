@@ -19,19 +19,19 @@ use alloc::vec::Vec;
 
 use drt_math::{CdfTable, Real};
 
-use crate::Error;
-use crate::derivative::sensitivity::{Functional, Interest, Rate};
+use crate::derivative::sensitivity::{ActiveInputs, VelocityFunctional, VelocityTerm};
+use crate::model::error::Error;
 use crate::sampling::importance::Splat;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary::Receiver;
+use crate::terms::boundary::BoundarySink;
 use crate::terms::flux::{EDGE_ON, Flux, filled};
 use crate::world::World;
 use crate::world::lights::triangle_bary;
 
 /// The triangles with a flux that are seen edge on.
 #[derive(Debug)]
-pub(crate) struct EdgeOn {
+pub(crate) struct GrazingFlux {
     triangles: Vec<Triangle>,
     table: CdfTable,
     /// Of the spatial form, where the camera's rays move with it.
@@ -52,21 +52,21 @@ const IN_PLANE: f64 = 1e-9;
 /// Buffers of a sample.
 #[derive(Debug, Default)]
 pub(crate) struct Buffers {
-    functional: Functional,
+    functional: VelocityFunctional,
     splats: Vec<Splat>,
 }
 
-impl EdgeOn {
+impl GrazingFlux {
     /// `None` where nothing is seen so.
     pub(crate) fn new(
         world: &World,
         flux: &Flux,
-        interest: &Interest,
+        active: &ActiveInputs,
     ) -> Result<Option<Self>, Error> {
         let eye = world.camera.position();
         let (mut triangles, mut weights) = (Vec::new(), Vec::new());
         for (s, shape) in (0..).zip(&world.scene.shapes) {
-            if !flux.sweeps(s, interest.sensor) {
+            if !flux.sweeps(s, active.sensor) {
                 continue;
             }
             // What bounds media knows both of them.
@@ -98,7 +98,7 @@ impl EdgeOn {
     }
 
     /// Takes one sample.
-    pub(crate) fn sample<R: Receiver>(
+    pub(crate) fn sample<R: BoundarySink>(
         &self,
         tracer: &mut Tracer<'_>,
         b: &mut Buffers,
@@ -128,12 +128,12 @@ impl EdgeOn {
             let vertex = world.touching(point, x, front, medium);
             let Some((w, transport)) = tracer.see(&vertex) else { continue };
             b.functional.items.clear();
-            b.functional.items.push(Rate::Surface(point.material(), n));
+            b.functional.items.push(VelocityTerm::Surface(point.material(), n));
             if self.spatial {
                 let gradient = world.camera.ray_gradient(-w, -n, n * -to.length());
-                b.functional.items.push(Rate::Sensor(gradient));
+                b.functional.items.push(VelocityTerm::Sensor(gradient));
             } else {
-                b.functional.items.push(Rate::Volume(medium, x, -n));
+                b.functional.items.push(VelocityTerm::Volume(medium, x, -n));
             }
             if !receiver.moves(&b.functional) {
                 continue;

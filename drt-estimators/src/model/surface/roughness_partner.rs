@@ -41,7 +41,7 @@ use crate::model::surface::microfacet::Distribution;
 
 /// The direction that goes along with another one.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Counterpart {
+pub(crate) struct RoughnessPartner {
     /// Unit, away from the surface.
     pub(crate) w: Vec3,
     /// r: what the value there is multiplied by.
@@ -62,7 +62,7 @@ struct Steepness {
     rarity: f64,
 }
 
-impl Counterpart {
+impl RoughnessPartner {
     pub(super) fn new(facet: &Facet) -> Option<Self> {
         let Facet { distribution, alpha, n, m, .. } = *facet;
         let slope = facet.slope()?;
@@ -72,7 +72,7 @@ impl Counterpart {
         if !sloping {
             return None;
         }
-        let other = distribution.steepness(distribution.counterpart(own.e)?);
+        let other = distribution.steepness(distribution.roughness_partner(own.e)?);
         let other_m = facet.tilted(slope * fm::sqrt(other.e / own.e));
         let (_, angle) = facet.leave(m)?;
         let (w, other_angle) = facet.leave(other_m)?;
@@ -100,7 +100,7 @@ impl Distribution {
 
     /// e' of an e, and e of an e'; none where it is so far off that nothing is left there.
     #[inline]
-    fn counterpart(self, e: f64) -> Option<f64> {
+    fn roughness_partner(self, e: f64) -> Option<f64> {
         match self {
             Self::Beckmann => beckmann(e),
             Self::Ggx => Some(ggx(e)),

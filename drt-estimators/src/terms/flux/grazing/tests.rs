@@ -11,8 +11,12 @@ use crate::derivative::contraction::Contraction;
 use crate::derivative::tests::choice;
 use crate::derivative::tests::scenes::{Build, FILM, homogeneous, moves, parameter, placed};
 use crate::model::emitter::Emitter;
-use crate::terms::splatting::{Checked, Source};
-use crate::{EstimatorKind, Scene, Session, Settings, Unattended};
+use crate::model::scene::Scene;
+use crate::model::settings::EstimatorKind;
+use crate::model::settings::Settings;
+use crate::run::session::Session;
+use crate::run::session::Unattended;
+use crate::terms::splatting::{BoundarySource, Checked};
 
 /// A cube of milk, lit by a lamp and the sky, whose top is a little lower than the camera.
 fn milk() -> (Scene, Parameter) {
@@ -32,7 +36,7 @@ fn milk() -> (Scene, Parameter) {
 const PIXELS: u32 = FILM[0] * FILM[1];
 
 /// The derivative of the mean of all pixels, of what is seen edge on alone.
-fn seen_edge_on() -> Moments {
+fn grazing_flux() -> Moments {
     let (scene, motion) = milk();
     let (prepared, motion) = choice::prepare(&scene, &motion, 5);
     let mut moments = Moments::default();
@@ -40,7 +44,12 @@ fn seen_edge_on() -> Moments {
         let contraction = Contraction::new(&prepared.world, &motion);
         let mut mean = Checked::new(choice::Total { contraction, weight: |_| 1.0, sum: 0.0 });
         let count = 1 << 12;
-        prepared.splatter(seed).run(Source::EdgeOn, Source::EdgeOn.stream(), count, &mut mean);
+        prepared.splatter(seed).run(
+            BoundarySource::GrazingFlux,
+            BoundarySource::GrazingFlux.stream(),
+            count,
+            &mut mean,
+        );
         moments.push(mean.inner.sum / f64::from(count * PIXELS));
     }
     moments
@@ -59,7 +68,7 @@ fn faces_seen_edge_on() {
         session.rendering().derivatives.swap_remove(0).total.total
     };
     let [path_space, radiative] = [EstimatorKind::PathSpace, EstimatorKind::Radiative].map(run);
-    let part = seen_edge_on();
+    let part = grazing_flux();
     let error = path_space.stderr.mean().hypot(radiative.stderr.mean());
     let off = radiative.mean.mean() - path_space.mean.mean();
     assert!(off.abs() < 4.0 * error, "{off} ± {error}");

@@ -1,27 +1,27 @@
 //! Edges seen from the camera (2019 paper, Eq. 41, at fixed image points).
 
-use crate::derivative::sensitivity::{Functional, Rate};
+use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary::Receiver;
+use crate::terms::boundary::BoundarySink;
 use crate::terms::radiative::Radiative;
-use crate::terms::radiative::difference::Sight;
+use crate::terms::radiative::difference::EdgeView;
 use crate::world::vertex::{Kind, Matter, Vertex};
 
 impl Radiative {
     /// Takes one sample of the camera's edges.
-    pub(crate) fn outline<R: Receiver>(
+    pub(crate) fn primary_edge<R: BoundarySink>(
         &self,
         tracer: &mut Tracer<'_>,
-        functional: &mut Functional,
+        functional: &mut VelocityFunctional,
         receiver: &mut R,
     ) -> Option<()> {
         tracer.counters.boundary_samples += 1;
         let world = tracer.world;
         let camera = &world.camera;
-        let chosen = self.camera.as_ref()?.sample(&self.jumps, &mut tracer.rng);
+        let chosen = self.camera.as_ref()?.sample(&self.discontinuities, &mut tracer.rng);
         let eye = world.eye();
-        let sight = Sight::new(tracer, self, chosen.jump, chosen.along, &eye)?;
-        let (x, point) = chosen.jump.point(chosen.along);
+        let sight = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, &eye)?;
+        let (x, point) = chosen.discontinuity.point(chosen.along);
         let (_, importance) = tracer.see(&Vertex { x, medium: None, kind: Kind::Point })?;
         let tau = sight.open(tracer)?;
         let [minus, plus] = sight.sides(tracer, tracer.max_segments.checked_sub(1)?);
@@ -40,8 +40,8 @@ impl Radiative {
             // A camera that turns takes its image points with it.
             let gradient = camera.ray_gradient(-sight.w, -n, n * -distance);
             functional.items.clear();
-            functional.items.extend(matter.map(|matter| Rate::of(matter, n)));
-            functional.items.push(Rate::Sensor(gradient));
+            functional.items.extend(matter.map(|matter| VelocityTerm::of(matter, n)));
+            functional.items.push(VelocityTerm::Sensor(gradient));
             if value.is_zero() || !receiver.moves(functional) {
                 continue;
             }

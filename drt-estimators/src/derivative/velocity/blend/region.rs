@@ -38,14 +38,14 @@ const NEAR: f64 = 0.4;
 
 /// A lamp or medium, all points of which have the same φ for a viewer.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Whole {
+pub(super) struct BlendRegion {
     bounds: Aabb,
     radius2: f64,
     /// What φ is multiplied by.
     pub(super) strength: f64,
 }
 
-impl Whole {
+impl BlendRegion {
     pub(super) fn new(bounds: Aabb) -> Self {
         let radius2 = 0.25 * (bounds.max - bounds.min).length_squared();
         Self { bounds, radius2, strength: 1.0 }
@@ -80,7 +80,7 @@ mod tests {
     /// The rate at which points of a lamp pass, times φ, is bounded beside it and from all around.
     #[test]
     fn beside_a_lamp_the_weight_vanishes() {
-        let lamp = Whole::new(Aabb { min: vec3(-1.0, 0.0, -2.0), max: vec3(1.0, 0.0, 2.0) });
+        let lamp = BlendRegion::new(Aabb { min: vec3(-1.0, 0.0, -2.0), max: vec3(1.0, 0.0, 2.0) });
         let radius = 5.0_f64.sqrt();
         for direction in [vec3(0.0, 1.0, 0.0), vec3(0.0, -1.0, 0.0)] {
             for power in -12..4 {
@@ -95,7 +95,7 @@ mod tests {
     /// Unless lobes are narrower than what is seen of it.
     #[test]
     fn far_from_a_lamp_the_weight_is_one() {
-        let lamp = Whole::new(Aabb { min: Vec3::ZERO, max: vec3(1.0, 1.0, 0.0) });
+        let lamp = BlendRegion::new(Aabb { min: Vec3::ZERO, max: vec3(1.0, 1.0, 0.0) });
         let far = lamp.bounds.center() + vec3(0.0, 0.0, 10.0);
         let angle = 0.5_f64.sqrt() / 10.0;
         assert_eq!(lamp.weight_in_lobes(far, 1.0), 1.0);

@@ -2,7 +2,7 @@ use alloc::format;
 
 use drt_math::stats::Moments;
 
-use crate::model::surface::tests::counterparts::{rough, scattered};
+use crate::model::surface::tests::roughness_partners::{rough, scattered};
 use crate::model::surface::tests::*;
 
 /// How fast the normal and the direction `wo` turn, and the index changes.
@@ -10,7 +10,7 @@ const TURN: [Vec3; 2] = [Vec3 { x: 0.4, y: 0.3, z: -0.6 }, Vec3 { x: -0.2, y: 0.
 const INDEX: f64 = 0.3;
 
 /// A derivative relative to the value.
-fn whole(bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> f64 {
+fn region(bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> f64 {
     let g = bsdf.gradient(wo, wi, normal());
     let ([dn, dwo], index) = motion(bsdf, wo);
     (g.n.g.dot(dn) + g.wo.g.dot(dwo) + g.params.eta.g * index) / g.value.g
@@ -32,8 +32,8 @@ fn motion(bsdf: &Bsdf, wo: Vec3) -> ([Vec3; 2], f64) {
 fn opposites_are_mutual() {
     let mut found = 0;
     scattered(41, |alpha, bsdf, [wo, wi]| {
-        let Some(there) = bsdf.opposite(wo, wi, normal()) else { return };
-        let back = bsdf.opposite(wo, there.w, normal()).expect("the way back");
+        let Some(there) = bsdf.direction_partner(wo, wi, normal()) else { return };
+        let back = bsdf.direction_partner(wo, there.w, normal()).expect("the way back");
         let message = || format!("{bsdf:?} {wo:?} {wi:?} {there:?} {back:?}");
         assert!((back.w - wi).length() < 1e-7 * alpha, "{}", message());
         assert!((back.ratio * there.ratio - 1.0).abs() < 1e-7, "{}", message());
@@ -60,12 +60,12 @@ fn most_of_it_is_told_and_odd() {
             for _ in 0..50 {
                 let drawn = bsdf.sample(wo, normal(), random_3d(&mut rng), Given::Wo);
                 let Some(wi) = drawn.map(|s| s.w) else { continue };
-                let Some(other) = bsdf.opposite(wo, wi, normal()) else { continue };
-                let whole = whole(&bsdf, wo, wi);
+                let Some(other) = bsdf.direction_partner(wo, wi, normal()) else { continue };
+                let region = region(&bsdf, wo, wi);
                 let [here, there] = other.turns.map(|turn| told(&bsdf, wo, &turn));
                 let small = 40.0 + 0.01 * here.abs();
-                let close = (whole - here).abs() < small && (here + there).abs() < small;
-                assert!(close, "{bsdf:?} {degrees} {whole} {here} {there}");
+                let close = (region - here).abs() < small && (here + there).abs() < small;
+                assert!(close, "{bsdf:?} {degrees} {region} {here} {there}");
             }
         }
     }
@@ -82,9 +82,9 @@ fn derivatives(bsdf: &Bsdf, wo: Vec3, ratio: impl Fn(f64) -> f64) -> [Moments; 2
             moments.iter_mut().for_each(|m| m.push(0.0));
             continue;
         };
-        let other = bsdf.opposite(wo, s.w, normal());
+        let other = bsdf.direction_partner(wo, s.w, normal());
         let own = bsdf.eval(wo, s.w, normal()).g * light(s.w);
-        let single = whole(bsdf, wo, s.w) * own;
+        let single = region(bsdf, wo, s.w) * own;
         let apart = other.map_or(single, |o| {
             let others = ratio(o.ratio) * bsdf.eval(wo, o.w, normal()).g * light(o.w);
             let [here, there] = o.turns.map(|turn| told(bsdf, wo, &turn));
@@ -99,9 +99,9 @@ fn derivatives(bsdf: &Bsdf, wo: Vec3, ratio: impl Fn(f64) -> f64) -> [Moments; 2
 
 #[test]
 fn pairs_tell_how_lobes_turn() {
-    let z = |[whole, apart]: [Moments; 2]| {
-        let variance = whole.variance_of_mean() + apart.variance_of_mean();
-        (whole.mean() - apart.mean()) / f64::sqrt(variance)
+    let z = |[region, apart]: [Moments; 2]| {
+        let variance = region.variance_of_mean() + apart.variance_of_mean();
+        (region.mean() - apart.mean()) / f64::sqrt(variance)
     };
     for bsdf in rough(0.3) {
         // Metal is black from behind.
