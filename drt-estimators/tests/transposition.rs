@@ -27,7 +27,7 @@ fn settings() -> Settings {
 }
 
 /// Insides move with tetrahedra.
-fn moves() -> Settings {
+fn with_tetrahedra() -> Settings {
     with(&InteriorMotion::Tetrahedral(None))
 }
 
@@ -198,7 +198,7 @@ fn fog_with_a_solid() {
 
 #[test]
 fn fog_carried_by_a_solid() {
-    fog_with_a_solid_in(&moves());
+    fog_with_a_solid_in(&with_tetrahedra());
 }
 
 #[test]
@@ -255,7 +255,7 @@ fn voxels() {
     agree("with motions", &scene, effects.clone(), &settings());
     agree("carried", &scene, vec![moves("smoke", turn())], &settings());
     effects.extend([moves("box", wobble(&scene, "box", 2)), moves("smoke", turn())]);
-    agree("in a moving box", &scene, effects, &moves());
+    agree("in a moving box", &scene, effects, &with_tetrahedra());
 }
 
 #[test]
