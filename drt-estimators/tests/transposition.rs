@@ -204,7 +204,7 @@ fn fog_carried_by_a_solid() {
 #[test]
 fn fog_bent_by_cages() {
     let scene = fog();
-    for (name, settings) in [("static", settings()), ("carried", moves())] {
+    for (name, settings) in [("static", settings()), ("with tetrahedra", with_tetrahedra())] {
         for (shape, size) in [("ball", 0.9), ("blob", 1.5), ("box", 2.5)] {
             let effects = vec![moves(shape, bend(size))];
             agree(&format!("{shape}, {name}"), &scene, effects, &settings);
@@ -221,7 +221,7 @@ fn a_camera_and_a_light_in_the_fog() {
     let sensor = Sensor::look_at(eye, Lens::with_fov(70.0), FILM, filter);
     scene.sensors[0].item.sensor = sensor.expect("a valid camera");
     let camera = moves("camera", turn());
-    for settings in [settings(), moves()] {
+    for settings in [settings(), with_tetrahedra()] {
         agree("camera", &scene, vec![camera.clone()], &settings);
         agree("bulb", &scene, vec![moves("bulb", shift())], &settings);
         let mut effects = wobbles(&scene);
@@ -253,7 +253,7 @@ fn voxels() {
     effects.push(moves("lamp", wobble(&scene, "lamp", 1)));
     effects.push(moves("camera", shift()));
     agree("with motions", &scene, effects.clone(), &settings());
-    agree("carried", &scene, vec![moves("smoke", turn())], &settings());
+    agree("grid turns", &scene, vec![moves("smoke", turn())], &settings());
     effects.extend([moves("box", wobble(&scene, "box", 2)), moves("smoke", turn())]);
     agree("in a moving box", &scene, effects, &with_tetrahedra());
 }

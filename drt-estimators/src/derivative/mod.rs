@@ -2,10 +2,10 @@
 //! sensitivities go.
 
 pub(crate) mod adjoint;
+pub(crate) mod antithetic;
 pub(crate) mod contraction;
 pub(crate) mod grid_deformation;
 pub(crate) mod medium_motion;
-pub(crate) mod pairs;
 pub(crate) mod scene_gradient;
 pub(crate) mod sensitivity;
 pub(crate) mod tangents;

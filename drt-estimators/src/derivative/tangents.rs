@@ -468,7 +468,7 @@ macro_rules! placed {
 
 placed!(Emitter => EmitterTangent, Sensor => SensorTangent);
 
-/// The entries worth keeping, with their parameters' indices.
+/// The entries to keep, with their parameters' indices.
 fn keep<T>(items: Vec<T>, worth: impl Fn(&T) -> bool) -> Vec<(usize, T)> {
     items.into_iter().enumerate().filter(|(_, t)| worth(t)).collect()
 }

@@ -1,7 +1,7 @@
 //! Edges that rest on another surface: the foot of a block on a floor.
 //!
 //! A segment past such an edge has one end on the floor, right at the edge, and neither which end nor
-//! whether it is in shadow there can be told by rays. But what the edge does is simple: it bounds the
+//! whether it is in shadow there can be found by rays. But what the edge does is simple: it bounds the
 //! part of the floor that is not covered. With V the speed of that bound away from the faces, relative
 //! to the floor,
 //!

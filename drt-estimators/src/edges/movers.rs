@@ -14,7 +14,7 @@ use crate::derivative::sensitivity::ActiveInputs;
 use crate::edges::edge::Edge;
 use crate::world::World;
 
-/// Boxes that are told apart; more become one around all.
+/// Boxes that are kept apart; more become one around all.
 const MOST_BOXES: usize = 64;
 
 /// Relative rounding errors of a point's distance from a plane.
@@ -173,7 +173,7 @@ mod tests {
         }
     }
 
-    /// No edge is dropped past which a segment ends in the box; boxes elsewhere are told apart.
+    /// No edge is dropped past which a segment ends in the box; boxes elsewhere are kept apart.
     #[test]
     fn edges_that_are_grazed_stay() {
         let (seen, dropped) = (core::cell::Cell::new(0), core::cell::Cell::new(0));
@@ -201,7 +201,7 @@ mod tests {
             let parallel = Beyond { ends, onward: [eye, eye] };
             assert!(from_eye.can_meet(&around(rng, x + (x - eye) * far)));
             assert!(parallel.can_meet(&around(rng, x + eye * far)));
-            // Anywhere else, nearly all are told apart.
+            // Anywhere else, nearly all are kept apart.
             let centre = point(rng, 3.0);
             let elsewhere = around(rng, centre);
             let kept = [&from_eye, &parallel].map(|r| u32::from(r.can_meet(&elsewhere)));

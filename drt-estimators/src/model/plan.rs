@@ -20,7 +20,7 @@ pub struct MediumPlan {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plan {
-    /// The estimators of derivatives, and the light that each looks at.
+    /// The estimators of derivatives, and the light that each differentiates.
     pub estimators: Vec<String>,
     /// Media that a path can meet.
     pub media: Vec<MediumPlan>,

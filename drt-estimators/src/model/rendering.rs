@@ -153,7 +153,7 @@ pub(crate) struct Account {
     /// The first contributions that were not finite.
     pub(crate) non_finite: Vec<NonFinite>,
     pub(crate) non_finite_count: u64,
-    /// Rays of looks at edges.
+    /// Rays of edge queries.
     pub(crate) query_rays: u64,
 }
 

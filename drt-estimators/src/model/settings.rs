@@ -28,20 +28,20 @@ pub struct Settings {
     /// Interior (and forward) samples per pixel.
     pub spp: u32,
     /// Boundary samples of all kinds together, per pixel on average; `None` is as many as `spp`, or if
-    /// [`adaptive`](Self::adaptive) as many of each kind as are worth their time. The kinds share them in equal
+    /// [`adaptive`](Self::adaptive) as many of each kind as pay for their time. The kinds share them in equal
     /// parts, of which edges seen from the camera leave up to three quarters where they are soon known well enough.
     pub boundary_spp: Option<u32>,
     /// Path depth; `None` takes the scene's, `Some(None)` is unlimited.
     pub max_depth: Option<Option<u32>>,
     /// Image points in pairs mirrored at the pixel's centre (theory: 2021 paper, §5.4), and rays in pairs
-    /// mirrored in narrow lobes that turn; those by which roughness is told are always in pairs.
+    /// mirrored in narrow lobes that turn; those that estimate derivatives by roughness are always in pairs.
     pub antithetic: bool,
     /// Choose samples by what is known of how things move; the expected values do not change. Reverse
     /// mode knows nothing of it, so that without guiding forward mode is its exact transpose.
     pub guiding: bool,
-    /// Of [`EstimatorKind::Radiative`]: look for an edge from every vertex of a path, as the 2019 paper
+    /// Of [`EstimatorKind::Radiative`]: query an edge from every vertex of a path, as the 2019 paper
     /// does, at a cost that grows with the square of its length; `boundary_spp` then tells the camera's
-    /// edges alone. Else one of a path's vertices looks, chosen by its throughput.
+    /// edges alone. Else one of a path's vertices does, chosen by its throughput.
     pub every_vertex: bool,
     /// Pixels whose derivatives are noisier take more of the samples, by a pilot that takes an eighth of them
     /// and is then forgotten; `spp` is the mean. The image, where no derivative is asked for. Where

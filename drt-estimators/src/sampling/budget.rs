@@ -24,7 +24,7 @@ const RANGE: [f64; 2] = [0.25, 4.0];
 /// The fewest of one whose samples are all of a size.
 const FEWEST_EVEN: f64 = 0.03125;
 
-/// What a sample costs besides its rays, in rays: to choose an edge and to look at what is around it.
+/// What a sample costs besides its rays, in rays: to choose an edge and to find what is around it.
 pub(crate) const BESIDES: f64 = 1.0;
 
 /// Variance and cost of a term, as a pilot has measured them.

@@ -66,7 +66,7 @@ impl Tracer<'_> {
         self.max_segments = own;
     }
 
-    /// The part of a ray that equiangular sampling towards the camera covers, if it is worth it.
+    /// The part of a ray that equiangular sampling towards the camera covers, if that pays.
     pub(crate) fn camera_span(&self, ray: &RayPath) -> Option<(f64, f64)> {
         if ImportanceMode::has_points(self.world) { medium_span(ray) } else { None }
     }

@@ -37,7 +37,7 @@ pub(crate) struct AlongRays<'a> {
     pub(crate) lobe_pairs: bool,
 }
 
-/// How often a path looks for edges.
+/// How often a path queries edges.
 #[derive(Clone, Copy)]
 pub(crate) enum EdgeQueries {
     /// So many times on average, each time from one of its vertices.

@@ -17,8 +17,8 @@
 //! Vertices move by a [`velocity`](super::velocity) field; what that blends for a vertex says what its
 //! sensitivities are [propagated](propagation) to.
 
+mod antithetic;
 mod emitters;
-mod pairs;
 mod propagation;
 mod segment;
 
@@ -27,8 +27,8 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Coefficients;
 
+use crate::derivative::adjoint::antithetic::Apart;
 use crate::derivative::adjoint::emitters::{light_moves, strength};
-use crate::derivative::adjoint::pairs::Apart;
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 

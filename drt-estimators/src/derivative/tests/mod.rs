@@ -1,10 +1,10 @@
 //! The derivative of a recorded path and of each of its factors, against dual numbers.
 
+mod antithetic;
 mod changes;
 pub(crate) mod choice;
 mod factors;
 mod moving;
-mod pairs;
 mod records;
 mod replay;
 #[path = "../../../tests/common/mod.rs"]

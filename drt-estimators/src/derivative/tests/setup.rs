@@ -7,9 +7,9 @@ use drt_math::{Rgb, RgbVec, Rng, ValueChange, Vec3};
 use drt_medium::DepthEstimate;
 use drt_motion::{GeometryChange, Parameter};
 
+use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::medium_motion::MediumMotions;
-use crate::derivative::pairs::AntitheticPairs;
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint,
 };

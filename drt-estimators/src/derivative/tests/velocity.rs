@@ -13,8 +13,8 @@ use drt_math::{Rgb, Rng, Vec3, vec3};
 use drt_motion::{Parameter, SurfacePoint as PointOfMesh};
 
 use crate::derivative::adjoint::Differentiator;
+use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::contraction::{Contraction, Motion};
-use crate::derivative::pairs::AntitheticPairs;
 use crate::derivative::tests::scenes::*;
 use crate::derivative::tests::setup::{Recording, motion, prepare, trace};
 use crate::derivative::velocity::{

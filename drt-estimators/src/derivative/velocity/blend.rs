@@ -30,7 +30,7 @@
 //! its radius of curvature, and is 1 farther away: c - u along the ray is 1 / (n·d) as
 //! well, and must not meet a slope of φ there. A glossy surface turns its lobes with its normals, so that φ
 //! rises from steeper angles on, as lobes are narrow. Of what the camera sees, where a filter's slope
-//! takes the length's place, φ is nonzero only within about a pixel of an outline, less towards
+//! takes the length's place, φ is nonzero only within about a pixel of a silhouette, less towards
 //! the borders of the filter's support.
 
 mod region;

@@ -116,7 +116,7 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
     /// Whether rays that scatter at a surface point of some velocity may turn against its normal.
     fn turns_rays(&self, world: &World, s: &SurfacePoint, velocity: &VertexVelocity) -> bool;
 
-    /// The widest lobes, in radians, whose turning is told by [pairs](super::pairs) of rays.
+    /// The widest lobes, in radians, whose turning is estimated by [antithetic pairs](super::antithetic) of rays.
     fn widest_paired(&self, transmissive: bool) -> f64;
 }
 

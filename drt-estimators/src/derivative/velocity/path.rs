@@ -3,7 +3,7 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use crate::derivative::pairs::AntitheticPairs;
+use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::velocity::{Auxiliary, Found, SurfaceHit, VelocityField, VertexVelocity};
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Arrival;

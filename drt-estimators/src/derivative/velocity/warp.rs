@@ -3,7 +3,7 @@
 //!
 //! In the spatial form a volume vertex stands at a fixed distance t of its ray. Where the ray meets a surface that
 //! moves, the domain of t ends or begins elsewhere: a flux, D_dot times what scatters there (2019 paper, Eqs. 16 and
-//! 20). And a vertex at rest at the height h over a curved surface is as near as √h to its outline, which moves:
+//! 20). And a vertex at rest at the height h over a curved surface is as near as √h to its silhouette, which moves:
 //! what it sees of that grows like 1 / √h, whose second moment is infinite like a logarithm.
 //!
 //! Distances are integration variables. They may move at any speed s(t) that is continuous between surfaces: with

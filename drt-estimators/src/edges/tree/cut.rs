@@ -24,7 +24,7 @@ const MOST: usize = 64;
 /// Of a node with more segments than this, children without nodes of their own are opened, too.
 const MANY: usize = ARITY * LEAF;
 
-/// A look, ready for groups of eight.
+/// A query, ready for groups of eight.
 pub(super) struct Looking {
     pub(super) seen: Seen,
     ways: [Toward; MOST_WAYS],

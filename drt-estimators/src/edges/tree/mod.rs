@@ -35,7 +35,7 @@
 //! density is what it is, with an integral below one: an estimate that takes such a sample for zero
 //! is unbiased.
 //!
-//! There are several [ways](Way) to look, as towards a light: at what is in the cone of directions to a
+//! There are several [ways](Way) to sample, as towards a light: at what is in the cone of directions to a
 //! sphere around it, with edges cut to their part in the cone. One way is drawn for each sample, but
 //! on the way down the probabilities of all are known, since all weigh the same nodes and differ only by
 //! how much of them is in a cone. So the density is that of all ways together, at the cost of one

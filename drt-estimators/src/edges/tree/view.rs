@@ -13,17 +13,17 @@ pub(crate) struct Viewpoint {
     pub(super) lobes: Lobes,
 }
 
-/// One of several ways to look from a viewpoint.
+/// One of several cones of directions to sample edges in.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Way {
-    /// The part of looks that go this way.
+    /// The part of queries that go this way.
     pub(super) chance: f64,
     pub(super) cone: Option<Cone>,
     /// Edges farther away do not matter.
     pub(super) reach: f64,
 }
 
-/// Most ways of a look.
+/// Most ways of a query.
 pub(crate) const MOST_WAYS: usize = 5;
 
 /// A cone of directions less than a right angle wide on either side.

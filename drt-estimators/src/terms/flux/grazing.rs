@@ -9,7 +9,7 @@
 //!
 //! x being the eye and h_P the pixel's filter and importance. So where c is small, points are drawn on
 //! triangles that may be seen so, in proportion to the angle they would fill if they faced the eye, and camera rays leave
-//! those out. Nothing [warped](crate::derivative::velocity::warp) there. (Of a face in the very plane of the eye, flux, outlines and
+//! those out. Nothing is [warped](crate::derivative::velocity::warp) there. (Of a face in the very plane of the eye, flux, primary edges and
 //! what is dimmed depend on each other: none is sampled.)
 
 #[cfg(all(test, feature = "std"))]

@@ -1,4 +1,4 @@
-//! The flux term: scattering carried through deforming surfaces around an inside that does not
+//! The flux term: scattering swept through by deforming surfaces around an inside that does not
 //! follow them (theory sheet §4.1).
 //!
 //! For every surface Σ with unit normal n from its back (-) to its front (+) and a medium whose

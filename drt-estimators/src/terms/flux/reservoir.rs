@@ -318,7 +318,7 @@ impl Flux {
             Some(reach) => Stretch::new(ends, reach).left(end),
             None => [1.0, 0.0],
         };
-        // What holds to the medium goes with its surfaces.
+        // What has a blend weight moves with the surfaces of the medium.
         let blended = |s: &Arc<Spatial>| s.blends.inside(viewer, medium);
         let free = 1.0 - self.spatial.as_ref().map_or(0.0, blended);
         let left = left.map(|left| left * free);

@@ -5,7 +5,7 @@ use alloc::sync::Arc;
 use drt_math::{Rgb, RgbVec, Rng};
 
 use crate::derivative::adjoint::Differentiator;
-use crate::derivative::pairs::{AntitheticPairs, PairedRadiance};
+use crate::derivative::antithetic::{AntitheticPairs, PairedRadiance};
 use crate::derivative::sensitivity::{SurfaceAdjoint, VelocityTerm};
 use crate::derivative::velocity::{Material, Movers, PathVelocities, VelocityField};
 use crate::edges::tree::TreeScratch;
@@ -20,7 +20,7 @@ use crate::world::{RayPath, World};
 
 /// What one estimator differentiates of the paths through pixels.
 pub(crate) struct Component<'a, S> {
-    /// The scene, lit by what this estimator looks at.
+    /// The scene, lit by what this estimator differentiates.
     pub(crate) world: &'a World,
     pub(crate) along: AlongRays<'a>,
     pub(crate) sink: S,
@@ -37,7 +37,7 @@ pub(super) struct Worker<'a, S> {
     options: TreeScratch,
     separate: bool,
     pub(super) differentiated: u64,
-    /// Rays that looks took.
+    /// Rays of edge queries.
     pub(super) query_rays: u64,
 }
 
@@ -50,7 +50,7 @@ pub(super) struct Traced<'t> {
     pub(super) seed: u64,
     pub(super) pixel: u32,
     pub(super) unit: u32,
-    /// The numbers of a look at edges.
+    /// The numbers of an edge query.
     pub(super) query: Option<Rng>,
 }
 
@@ -171,7 +171,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         view.flux = Some(flux);
     }
 
-    /// Looks for edges; the `first` look has the best numbers.
+    /// Queries edges; the first query has the best numbers.
     fn edges(
         &mut self,
         tracer: &mut Tracer<'a>,
@@ -186,7 +186,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
             EdgeQueries::Average(queries) => {
                 let mut left = queries;
                 while left > 0.0 {
-                    // A part of a look is one now and then.
+                    // A part of a query is one now and then.
                     let rng = &mut tracer.rng;
                     let taken = left >= 1.0 || rng.next_f64() < left;
                     let numbers = if left == queries { &mut first } else { rng };

@@ -2,7 +2,7 @@
 
 use drt_math::{Rgb, Rng, Vec3};
 
-use crate::derivative::pairs::AntitheticPairs;
+use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::velocity::PathVelocities;
 use crate::derivative::velocity::RecordedPath;
 use crate::sampling::record::PathRecord;

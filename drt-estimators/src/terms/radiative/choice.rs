@@ -1,7 +1,7 @@
 //! One of many, chosen while they come by.
 
 /// A choice among items with two weights each: mostly in proportion to the second, which is a guess of
-/// what they are worth, and at times to the first, as a guess may be too low by any factor.
+/// an estimate of their contributions, and at times to the first, as a guess may be too low by any factor.
 pub(super) struct Choice<T> {
     /// Uniform; what is left of it is uniform again.
     u: f64,

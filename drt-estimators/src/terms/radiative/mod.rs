@@ -7,7 +7,7 @@
 //! integrand jumps, and the jump moves relative to the ray, Reynolds' theorem adds a term:
 //!
 //! * in distance, at surfaces beside media: D_dot σ_s L^ins of D19.16 and D19.20, on both sides of
-//!   interfaces that do not scatter. That is the [flux](crate::terms::flux), against rays that are carried. In
+//!   interfaces that do not scatter. That is the [flux](crate::terms::flux), against rays that move. In
 //!   homogeneous media most of it is taken in by vertices that surfaces [warped](crate::derivative::velocity::warp);
 //! * in direction, at edges (D19.23): for an edge point y seen from a vertex x along d = (y - x)/r,
 //!   with the edge's tangent t and N = t × (-d) / |t × d|,
@@ -22,7 +22,7 @@
 //!   turn. At the camera f is the filter and importance, and d turns with the image point.
 //!
 //! Cost is linear in path length: of all vertices of a path one, mostly in proportion to its throughput
-//! times an estimate of what edges amount to from there, looks for an edge, and of all surfaces met one
+//! times an estimate of what edges amount to from there, queries an edge, and of all surfaces met one
 //! is asked for its flux; each traces side paths that
 //! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
 //! [`every_vertex`](crate::Settings::every_vertex) does so with edges.)
@@ -33,9 +33,9 @@
 
 mod choice;
 mod difference;
+mod edge_sampler;
 mod primary;
 mod vertices;
-mod views;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -43,8 +43,8 @@ use alloc::vec::Vec;
 use drt_math::{CdfTable, Rng};
 
 use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::terms::radiative::edge_sampler::EdgeSampler;
 pub(crate) use crate::terms::radiative::vertices::EdgeContribution;
-use crate::terms::radiative::views::EdgeSampler;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
@@ -64,7 +64,7 @@ pub(crate) struct Radiative {
     moving: Option<EdgeSampler>,
     /// Seen from a vertex that moves.
     all: Option<EdgeSampler>,
-    /// At rest, before something that moves and holds what is seen of it: this counts for a vertex that
+    /// At rest, before something that moves and whose vertices have a blend weight: this counts for a vertex that
     /// stands still, too.
     resting: Option<EdgeSampler>,
     /// Edges that can be chosen, and edges in all.
@@ -79,23 +79,23 @@ struct PrimaryEdges {
 }
 
 /// How much an edge at rest matters before something that moves, to what stands still, compared to one
-/// that moves; and the part of looks for such.
+/// that moves; and the part of queries for such.
 const AT_REST: f64 = 0.1;
 
 /// How much more edges matter to a vertex that moves: it moves faster than what it lands on where it
-/// grazes, and what is held by others it sees wholly.
+/// grazes, and what moves with its matter it sees wholly.
 const CARRIED: f64 = 4.0;
 
-/// The part of choices among vertices that look at throughput alone, in case edges matter more to one
+/// The part of choices among vertices by throughput alone, in case edges matter more to one
 /// than it seems.
 const BY_THROUGHPUT: f64 = 0.2;
 
-/// Uniform numbers for a look from a path at an edge.
+/// Uniform numbers of an edge query.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EdgeQuery {
     /// For the vertex.
     vertex: f64,
-    /// For where to look.
+    /// For the direction.
     way: f64,
     /// For the edge, and the point on it.
     point: [f64; 2],
@@ -105,7 +105,7 @@ impl EdgeQuery {
     /// How many numbers it takes.
     const NUMBERS: u32 = 4;
 
-    /// The generator of a look to be taken later, if at all.
+    /// The generator of a query to be made later, if at all.
     pub(crate) fn reserve(rng: &mut Rng) -> Rng {
         let reserved = rng.clone();
         rng.skip(Self::NUMBERS);

@@ -27,7 +27,7 @@ impl Radiative {
         let [minus, plus] = sight.sides(tracer, tracer.max_segments.checked_sub(1)?);
         let weight = tau * (sight.sides.sine * chosen.inv_pdf * importance);
         let [minus_light, plus_light] = [weight * minus.light, weight * -plus.light];
-        // What is held moves in view by itself.
+        // What has a blend weight moves in view by itself.
         let parts = [
             (Some(Matter::Surface(point)), sight.distance, minus_light + plus_light, false),
             (minus.matter, minus.distance, minus_light * -minus.hold, true),

@@ -10,7 +10,7 @@ use crate::sampling::trace::Endpoint;
 use crate::sampling::trace::Tracer;
 use crate::terms::radiative::choice::Choice;
 use crate::terms::radiative::difference::{EdgeView, SideRadiance};
-use crate::terms::radiative::views::{EdgeSampler, viewpoint};
+use crate::terms::radiative::edge_sampler::{EdgeSampler, viewpoint};
 use crate::terms::radiative::{AT_REST, BY_THROUGHPUT, CARRIED, EdgeQuery, Radiative};
 use crate::world::World;
 use crate::world::vertex::{MaterialPoint, Matter, Vertex};
@@ -27,16 +27,16 @@ pub(crate) struct EdgeContribution {
     pub(crate) matter: [Option<(Matter, Rgb)>; 3],
 }
 
-/// What a look may find.
+/// What a query is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum QueryTarget {
     /// An edge that moves, or any from a vertex that does.
     Moving,
-    /// An edge at rest, before something that moves and is held, from a vertex at rest.
+    /// An edge at rest, before something that moves and has a blend weight, from a vertex at rest.
     Resting,
 }
 
-/// A point of an edge and the vertex that looks at it.
+/// A point of an edge and the vertex that sees it.
 pub(super) struct EdgeSample<'a> {
     node: usize,
     sight: EdgeView<'a>,
@@ -98,7 +98,7 @@ impl Radiative {
         self.sample_from(tracer, path, node, sought, likely, &query, options)?.follow(tracer)
     }
 
-    /// What a look from one of some vertices is for, its probability, and what is left of the look's numbers.
+    /// What a query from one of some vertices is for, its probability, and what is left of its numbers.
     fn sought(
         &self,
         path: &RecordedPath<'_>,
@@ -115,7 +115,7 @@ impl Radiative {
         (sought, likely, EdgeQuery { way: (query.way - from) / likely, ..*query })
     }
 
-    /// A look from a vertex for what is `sought`, which both have a given `chance`.
+    /// A query from a vertex for what is `sought`, which both have a given `chance`.
     fn sample_from<'a>(
         &'a self,
         tracer: &mut Tracer<'_>,
@@ -149,7 +149,7 @@ impl Radiative {
         Some(EdgeSample { node, sight, point, weight, longest })
     }
 
-    /// What edges a vertex may look at.
+    /// What edges a vertex may sample.
     fn views(&self, moves: bool, sought: QueryTarget) -> Option<&EdgeSampler> {
         match (sought, moves) {
             (QueryTarget::Moving, true) => self.all.as_ref(),

@@ -42,7 +42,7 @@
 //! ray beside it: then it is not one itself. So are connections to lights. Where scattering finds a light it is weighted
 //! against connections as ever, C by the density of w and C' by that of w'.
 //!
-//! The interior term alone is told so, and has the same mean: edges have no part in it.
+//! The interior term alone is estimated so, and has the same mean: edges have no part in it.
 
 use alloc::vec::Vec;
 

@@ -7,8 +7,8 @@ use drt_math::stats::Moments;
 use drt_motion::Parameter;
 
 use crate::derivative::adjoint::Differentiator;
+use crate::derivative::antithetic::{AntitheticPair, AntitheticPairs, PairKind, PairedRadiance};
 use crate::derivative::contraction::Contraction;
-use crate::derivative::pairs::{AntitheticPair, AntitheticPairs, PairKind, PairedRadiance};
 use crate::derivative::tests::choice::prepare;
 use crate::derivative::tests::scenes::*;
 use crate::derivative::tests::setup::{Recording, motion, set, trace};

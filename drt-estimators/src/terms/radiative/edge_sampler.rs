@@ -1,9 +1,9 @@
-//! Which edge a vertex looks at: the [tree](crate::edges::tree), asked in several ways at once.
+//! Sampling edges from a vertex: the [tree](crate::edges::tree), asked in several ways at once.
 //!
-//! Radiance jumps most where a lamp is behind an edge. So some looks go towards the spheres around the
+//! Radiance jumps most where a lamp is behind an edge. So some queries go towards the spheres around the
 //! lamps, and the rest anywhere.
 //!
-//! An edge at rest matters to a vertex at rest only where something that moves holds what is seen right
+//! An edge at rest matters to a vertex at rest only where the vertices of something that moves have a blend weight right
 //! beside it: in the direction of a sphere around all that does, and no farther than its far side.
 
 use alloc::vec::Vec;
@@ -18,7 +18,7 @@ use crate::terms::radiative::{Chosen, EdgeQuery};
 use crate::world::World;
 use crate::world::vertex::{Kind, Vertex};
 
-/// The part of looks that go towards lamps.
+/// The part of queries that go towards lamps.
 const TOWARD_LAMPS: f64 = 0.5;
 
 /// Lamps looked towards on purpose.
@@ -31,19 +31,19 @@ pub(super) struct Sphere {
     radius: f64,
 }
 
-/// Edges to look at, and where to look.
+/// Edges to sample, and in which directions.
 #[derive(Debug)]
 pub(super) struct EdgeSampler {
     tree: EdgeTree,
-    /// The jumps that the tree's segments are.
+    /// Indices of the edges that the tree's segments are.
     discontinuities: Vec<u32>,
-    /// The part of looks that go towards some spheres, and these.
+    /// The part of queries that go towards some spheres, and these.
     share: f64,
     toward: Vec<Sphere>,
 }
 
 impl EdgeSampler {
-    /// Of the jumps that `matter`, in proportion to how much; `None` without any.
+    /// Of the edges that `matter`, in proportion to how much; `None` without any.
     pub(super) fn new(
         world: &World,
         discontinuities: &DiscontinuityEdges,

@@ -1,9 +1,9 @@
-//! What [pairs](crate::derivative::pairs) of rays tell.
+//! What [pairs](crate::derivative::antithetic) of rays tell.
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::{Differentiator, behind, send, turn};
-use crate::derivative::pairs::{AntitheticPair, PairKind, PairedRadiance};
+use crate::derivative::antithetic::{AntitheticPair, PairKind, PairedRadiance};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::derivative::velocity::RecordedPath;
 use crate::model::surface::{BsdfParams, Turn};
