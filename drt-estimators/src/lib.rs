@@ -29,7 +29,7 @@ pub use model::rendering::{
 pub use model::scene::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding, Target,
 };
-pub use model::settings::{EstimatorKind, Settings};
+pub use model::settings::{Depth, EstimatorKind, Settings};
 pub use model::{emitter, filter, sensor, surface};
 pub use run::finite_difference::finite_differences;
 pub use run::reverse::gradient;

@@ -271,7 +271,7 @@ fn other_settings() {
     };
     let other = Settings { antithetic: false, spp: 5, boundary_spp: Some(20), ..settings() };
     agree("unpaired", &scene, effects(), &other);
-    let other = Settings { seed: 77, max_depth: Some(Some(2)), ..settings() };
+    let other = Settings { seed: 77, max_depth: drt_estimators::Depth::AtMost(2), ..settings() };
     agree("single scattering", &scene, effects(), &other);
     let other = Settings { spp: 7, ..settings() };
     agree("odd number of samples", &scene, effects(), &other);

@@ -32,7 +32,7 @@ fn describe(job: &Job) -> String {
         text = format!("job {}\n{text}", job.path.display());
     }
     let Integrator { max_depth, rr_depth } = scene.integrator;
-    let depth = job.settings.max_depth.unwrap_or(max_depth);
+    let depth = job.settings.max_depth.within(max_depth);
     let depth = depth.map_or("unlimited".into(), |d| d.to_string());
     text += &format!("depth {depth}, Russian roulette from {rr_depth}\n\n");
     text += &shapes(scene).to_string();

@@ -59,7 +59,7 @@ pub(super) fn open_changed(input: &Path, changes: &Changes) -> Result<Job, CliEr
     settings.threads = changes.threads.map_or(settings.threads, usize::from);
     if let Some(value) = changes.max_depth {
         let depth = depth(value).map_err(|e| CliError::argument(format!("--max-depth: {e}")))?;
-        settings.max_depth = Some(depth);
+        settings.max_depth = depth;
     }
     Ok(job)
 }

@@ -14,7 +14,7 @@ mod velocities;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use drt_estimators::{EstimatorKind, Scene, Settings, Target};
+use drt_estimators::{Depth, EstimatorKind, Scene, Settings, Target};
 use drt_motion::Parameter;
 use toml::Spanned;
 
@@ -250,9 +250,8 @@ fn settings(
         settings.boundary_spp = Some(count("boundary_spp", n)?);
     }
     if let Some(n) = max_depth {
-        settings.max_depth = Some(
-            depth(*n.get_ref()).map_err(|message| document.error_at(n.span().start, message))?,
-        );
+        settings.max_depth =
+            depth(*n.get_ref()).map_err(|message| document.error_at(n.span().start, message))?;
     }
     settings.insides = motions::insides(document, &keys.motion, folder, scene, parameters)?;
     settings.antithetic = antithetic.unwrap_or(settings.antithetic);
@@ -270,10 +269,10 @@ fn settings(
 }
 
 /// A path depth, where -1 is unlimited.
-pub(crate) fn depth(value: i64) -> Result<Option<u32>, String> {
+pub(crate) fn depth(value: i64) -> Result<Depth, String> {
     match (value, u32::try_from(value)) {
-        (-1, _) => Ok(None),
-        (_, Ok(depth)) => Ok(Some(depth)),
+        (-1, _) => Ok(Depth::Unlimited),
+        (_, Ok(depth)) => Ok(Depth::AtMost(depth)),
         _ => Err(format!("`max_depth` is {value}; expected -1 (unlimited), 0 or more")),
     }
 }

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use drt_estimators::EstimatorKind;
+use drt_estimators::{Depth, EstimatorKind};
 use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{Change, GeometryChange, PropertyChange, ValueChange};
 
@@ -52,7 +52,7 @@ fn change(effect: &str) -> Change {
 fn defaults_are_the_contracts() {
     let j = job("scene = \"scene.xml\"", &[]).unwrap();
     let s = &j.settings;
-    assert_eq!((s.sensor, s.spp, s.boundary_spp, s.max_depth), (0, 64, None, None));
+    assert_eq!((s.sensor, s.spp, s.boundary_spp, s.max_depth), (0, 64, None, Depth::OfScene));
     assert_eq!((s.estimator, s.antithetic, s.step), (EstimatorKind::PathSpace, true, 1e-3));
     assert!(j.parameters.is_empty());
     j.require_derivatives().unwrap();
@@ -74,7 +74,7 @@ fn every_estimator_key() {
         step = 0.5
     "#;
     let s = job(text, &[]).unwrap().settings;
-    assert_eq!((s.sensor, s.spp, s.boundary_spp, s.max_depth), (1, 3, Some(5), Some(None)));
+    assert_eq!((s.sensor, s.spp, s.boundary_spp, s.max_depth), (1, 3, Some(5), Depth::Unlimited));
     assert_eq!((s.estimator, s.antithetic, s.step), (EstimatorKind::FiniteDifference, false, 0.5));
 }
 

@@ -77,7 +77,7 @@ pub(crate) enum PairKind {
 }
 
 impl PairKind {
-    fn kind(&self) -> usize {
+    fn index(&self) -> usize {
         match self {
             Self::Roughness(_) => 0,
             Self::Turns(_) => 1,
@@ -89,7 +89,7 @@ impl PairKind {
 #[derive(Clone, Debug)]
 pub(crate) struct AntitheticPair {
     pub(crate) node: usize,
-    pub(crate) told: PairKind,
+    pub(crate) kind: PairKind,
     /// s.
     pub(crate) share: f64,
     /// The path's ray.
@@ -189,7 +189,7 @@ impl AntitheticPairs {
         let mut paired = PairedPart::default();
         let wo = -arrival.dir;
         // `often` is how often the other one is drawn for what it tells, by a given density.
-        let mut add = |told, size: f64, w, ratio: f64, often: f64| {
+        let mut add = |kind, size: f64, w, ratio: f64, often: f64| {
             let pdf = scattering.pdf(wo, w, Given::Wo);
             let drawn = leaving.pdf().unwrap_or(0.0);
             let share = drawn / (drawn + ratio * often * pdf);
@@ -205,7 +205,7 @@ impl AntitheticPairs {
             let (node, leaving, rng) = (leaving.node as usize, *leaving, rng.clone());
             self.list.push(AntitheticPair {
                 node,
-                told,
+                kind,
                 share,
                 leaving,
                 w,
@@ -243,7 +243,7 @@ impl AntitheticPairs {
 
     /// b, where a pair tells it.
     pub(crate) fn turn(&self, paired: &PairedPart) -> Option<&Turn> {
-        match &self.list.get(paired.turn? as usize)?.told {
+        match &self.list.get(paired.turn? as usize)?.kind {
             PairKind::Turns([turn, _]) => Some(turn),
             PairKind::Roughness(_) => None,
         }
@@ -281,11 +281,11 @@ impl AntitheticPairs {
         let own = tracer.rng.clone();
         let mut totals = [0.0; 2];
         for pair in &self.list {
-            totals[pair.told.kind()] += pair.weight;
+            totals[pair.kind.index()] += pair.weight;
         }
         let mut choices = totals.map(|total| Choice { next: rng.next_f64(), total });
         for pair in &self.list {
-            if let Some(chance) = choices[pair.told.kind()].takes(pair.weight) {
+            if let Some(chance) = choices[pair.kind.index()].takes(pair.weight) {
                 pair.follow(tracer, incoming);
                 found(pair, chance, incoming);
             }
@@ -300,7 +300,7 @@ impl AntitheticPair {
         incoming.ends.clear();
         (incoming.light, incoming.emitted) = (Rgb::ZERO, Rgb::ZERO);
         incoming.first = self.leaving.segments + 1;
-        incoming.unasked = matches!(self.told, PairKind::Roughness(_));
+        incoming.unasked = matches!(self.kind, PairKind::Roughness(_));
         if self.value.is_zero() || self.pdf <= 0.0 {
             return;
         }

@@ -469,6 +469,6 @@ macro_rules! placed {
 placed!(Emitter => EmitterTangent, Sensor => SensorTangent);
 
 /// The entries to keep, with their parameters' indices.
-fn keep<T>(items: Vec<T>, worth: impl Fn(&T) -> bool) -> Vec<(usize, T)> {
-    items.into_iter().enumerate().filter(|(_, t)| worth(t)).collect()
+fn keep<T>(items: Vec<T>, kept: impl Fn(&T) -> bool) -> Vec<(usize, T)> {
+    items.into_iter().enumerate().filter(|(_, t)| kept(t)).collect()
 }

@@ -8,8 +8,8 @@ use drt_math::{Vec3, fm};
 
 use crate::edges::contact::Contact;
 use crate::edges::edge::{Edge, EdgePoint, collect};
-use crate::world::World;
 use crate::world::vertex::{MaterialPoint, SurfacePoint};
+use crate::world::{SurroundingMedium, World};
 
 /// How much less radiance jumps at a crease of a surface with interpolated normals than its angle tells.
 const SMOOTH: f64 = 0.05;
@@ -31,7 +31,7 @@ pub(crate) struct DiscontinuityEdge {
     /// Its faces, in the order in which one goes around it.
     fan: Range<usize>,
     /// The medium around its shape, where that bounds none and it is the same everywhere.
-    around: Option<Option<usize>>,
+    around: SurroundingMedium,
     /// A face of it bounds a medium.
     bounds: bool,
     /// How much a crease jumps, compared to a silhouette, on the side of its faces' [normals](DiscontinuityEdges::normals) and
@@ -268,6 +268,6 @@ impl DiscontinuityEdge {
                 return world.medium_on_side(&point, point.ng.dot(w) > 0.0, None);
             }
         }
-        self.around.unwrap_or_else(|| world.medium_at(x))
+        self.around.at(world, x)
     }
 }

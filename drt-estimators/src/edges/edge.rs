@@ -8,8 +8,8 @@ use drt_geom::{EdgeClass, NONE, Topology};
 use drt_math::{CdfTable, Real, Rng, Vec3, fm, warp};
 
 use crate::model::error::Error;
-use crate::world::World;
 use crate::world::vertex::MaterialPoint;
+use crate::world::{SurroundingMedium, World};
 
 /// An edge of a surface that blocks.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,7 @@ pub(crate) struct Edge {
     /// Where segments that graze the edge run: before the faces, behind them, or on an open edge.
     side: GrazedSide,
     /// The medium in which they run, where that is the same all along the edge.
-    medium: Option<Option<usize>>,
+    medium: SurroundingMedium,
     /// Something is so near that the edge may rest on it.
     pub(crate) may_rest: bool,
 }
@@ -86,7 +86,7 @@ impl Edge {
             triangle: 0,
             corners,
             side,
-            medium: None,
+            medium: SurroundingMedium::Varies,
             may_rest: false,
         })
     }
@@ -191,19 +191,19 @@ impl Edge {
 
     /// Looks up the medium around the edge where one answer holds for all of it; `around` is the one
     /// around its shape, as [`World::medium_around`] has it.
-    pub(crate) fn settle_medium(&mut self, world: &World, around: Option<Option<usize>>) {
+    pub(crate) fn settle_medium(&mut self, world: &World, around: SurroundingMedium) {
         let boundary = world.scene.shapes[self.shape as usize].boundary;
         self.medium = match (boundary, self.side) {
-            (Some(b), GrazedSide::Front) => Some(b.exterior),
-            (Some(b), GrazedSide::Back) => Some(b.interior),
-            (Some(_), GrazedSide::Unknown) => None,
+            (Some(b), GrazedSide::Front) => SurroundingMedium::Uniform(b.exterior),
+            (Some(b), GrazedSide::Back) => SurroundingMedium::Uniform(b.interior),
+            (Some(_), GrazedSide::Unknown) => SurroundingMedium::Varies,
             (None, _) => around,
         };
     }
 
     /// The medium in which segments graze the edge at `x`.
     pub(crate) fn medium(&self, world: &World, x: Vec3) -> Option<usize> {
-        self.medium.unwrap_or_else(|| world.medium_at(x))
+        self.medium.at(world, x)
     }
 
     /// True when the edge can be a silhouette seen along `w`.

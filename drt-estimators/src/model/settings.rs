@@ -17,6 +17,31 @@ pub enum EstimatorKind {
     FiniteDifference,
 }
 
+/// The longest paths: 1 shows emitters only, each real scattering adds one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Depth {
+    /// As the scene's integrator has it.
+    #[default]
+    OfScene,
+    /// Ended by Russian roulette alone.
+    Unlimited,
+    /// So many at most.
+    AtMost(u32),
+}
+
+impl Depth {
+    /// The depth in a scene whose own is given; `None` is unlimited.
+    #[must_use]
+    pub fn within(self, scene: Option<u32>) -> Option<u32> {
+        match self {
+            Self::OfScene => scene,
+            Self::Unlimited => None,
+            Self::AtMost(depth) => Some(depth),
+        }
+    }
+}
+
 /// Sample budgets and switches of one run.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -31,8 +56,8 @@ pub struct Settings {
     /// [`adaptive`](Self::adaptive) as many of each kind as pay for their time. The kinds share them in equal
     /// parts, of which edges seen from the camera leave up to three quarters where they are soon known well enough.
     pub boundary_spp: Option<u32>,
-    /// Path depth; `None` takes the scene's, `Some(None)` is unlimited.
-    pub max_depth: Option<Option<u32>>,
+    /// Path depth.
+    pub max_depth: Depth,
     /// Image points in pairs mirrored at the pixel's centre (theory: 2021 paper, §5.4), and rays in pairs
     /// mirrored in narrow lobes that turn; those that estimate derivatives by roughness are always in pairs.
     pub antithetic: bool,
@@ -67,7 +92,7 @@ impl Default for Settings {
             sensor: 0,
             spp: 64,
             boundary_spp: None,
-            max_depth: None,
+            max_depth: Depth::OfScene,
             antithetic: true,
             guiding: true,
             every_vertex: false,

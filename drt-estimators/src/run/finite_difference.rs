@@ -50,7 +50,7 @@ pub fn finite_differences(
             let mut moved = parameters.to_vec();
             moved[p].value += offset;
             let (scene, _) = tangents::apply(scene, &moved)?;
-            let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
+            let depth = settings.max_depth.within(scene.integrator.max_depth);
             World::new(
                 scene,
                 settings.sensor,

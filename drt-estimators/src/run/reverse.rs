@@ -85,7 +85,7 @@ pub fn gradient(
             ),
         });
     }
-    let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
+    let depth = settings.max_depth.within(scene.integrator.max_depth);
     let mut kept = PreparedCache::default();
     let mut world =
         World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, &mut kept)?;

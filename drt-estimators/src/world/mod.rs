@@ -146,6 +146,25 @@ pub(crate) enum Tracking {
     Attenuation,
 }
 
+/// The medium around something; `None` is vacuum.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum SurroundingMedium {
+    /// The same everywhere around it.
+    Uniform(Option<usize>),
+    /// Different at different points.
+    Varies,
+}
+
+impl SurroundingMedium {
+    /// At a point.
+    pub(crate) fn at(self, world: &World, x: Vec3) -> Option<usize> {
+        match self {
+            Self::Uniform(medium) => medium,
+            Self::Varies => world.medium_at(x),
+        }
+    }
+}
+
 /// A scene prepared for light transport.
 #[derive(Clone)]
 pub(crate) struct World {
@@ -506,11 +525,10 @@ impl World {
         }
     }
 
-    /// The medium around a shape that bounds none itself, where no interface comes near it: then the
-    /// same everywhere around it.
-    pub(crate) fn medium_around(&self, shape: usize) -> Option<Option<usize>> {
+    /// The medium around a shape that bounds none itself: the same everywhere where no interface comes near it.
+    pub(crate) fn medium_around(&self, shape: usize) -> SurroundingMedium {
         if !self.has_media() {
-            return Some(None);
+            return SurroundingMedium::Uniform(None);
         }
         let bounds = self.scene.shapes[shape].mesh.bounds();
         let near = |mesh: &Mesh| {
@@ -519,7 +537,11 @@ impl World {
                 && triangles.map(|t| Aabb::around(mesh.triangle(t))).any(|b| b.meets(&bounds))
         };
         let mut interfaces = self.scene.shapes.iter().filter(|s| s.boundary.is_some());
-        (!interfaces.any(|s| near(&s.mesh))).then(|| self.medium_at(bounds.center()))
+        if interfaces.any(|s| near(&s.mesh)) {
+            SurroundingMedium::Varies
+        } else {
+            SurroundingMedium::Uniform(self.medium_at(bounds.center()))
+        }
     }
 
     /// How far inside a medium its values at its own border are taken: a grid ends at its box, on
@@ -582,8 +604,8 @@ fn barycentric_gradients(e1: Vec3, e2: Vec3) -> [Vec3; 2] {
 
 /// The diagonal of the box around the surfaces that hold a medium; `all` where none do.
 fn extent(scene: &Scene, medium: usize, all: f64) -> f64 {
-    let holds = |s: &&Shape| s.boundary.is_some_and(|b| b.interior == Some(medium));
-    let meshes = scene.shapes.iter().filter(holds).map(|s| &s.mesh);
+    let bounds = |s: &&Shape| s.boundary.is_some_and(|b| b.interior == Some(medium));
+    let meshes = scene.shapes.iter().filter(bounds).map(|s| &s.mesh);
     let corners = meshes.map(|m| m.bounds()).flat_map(|b| [b.min, b.max]);
     let bounds = Aabb::around(corners);
     if bounds.is_empty() { all } else { (bounds.max - bounds.min).length() }

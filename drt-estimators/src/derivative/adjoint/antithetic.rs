@@ -59,7 +59,7 @@ impl Differentiator<'_> {
         let each = arrival.throughput * (node.inv_pdf * pair.share / chance);
         let [own, others] = [node.value, pair.value].map(|value| each * value);
         let light = [own * self.locals[pair.node].children, others * other.light];
-        let params = match &pair.told {
+        let params = match &pair.kind {
             PairKind::Roughness(slope) => {
                 let alpha = (light[0] - light[1]) * *slope;
                 BsdfParams { alpha, ..BsdfParams::default() }

@@ -82,7 +82,7 @@ fn check(ball: Bsdf) {
     assert!(z(fair).abs() < 4.0, "{fair:?}");
     // Planted: one of the sides is too dark.
     let faulty = find(&|pair, incoming| {
-        if matches!(pair.told, PairKind::Roughness(slope) if slope < 0.0) {
+        if matches!(pair.kind, PairKind::Roughness(slope) if slope < 0.0) {
             dimmed(incoming, 0.75);
         }
     });
@@ -117,7 +117,7 @@ fn turned(ball: Bsdf, parameter: &Parameter, form: Form) {
     assert!(tails || pairs < 0.5 * single, "{fair:?}");
     // Planted: the one side of the lobe is dark.
     let faulty = find(&|pair, incoming| {
-        if matches!(&pair.told, PairKind::Turns([turn, _]) if turn.n.x + turn.eta < 0.0) {
+        if matches!(&pair.kind, PairKind::Turns([turn, _]) if turn.n.x + turn.eta < 0.0) {
             dimmed(incoming, 0.0);
         }
     });

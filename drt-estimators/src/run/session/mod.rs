@@ -88,13 +88,20 @@ impl Session {
     /// Prepares `scene` at the parameters' values; without parameters, only the image is computed.
     ///
     /// # Errors
-    /// When an effect does not fit its target, or the scene or a setting is unusable.
+    /// When an effect does not fit its target, the scene or a setting is unusable, or parameters are to be
+    /// differentiated by [`finite_differences`](crate::finite_differences), which have no session.
     pub fn new(
         scene: &Scene,
         parameters: &[Parameter],
         settings: &Settings,
     ) -> Result<Self, Error> {
         scene.check()?;
+        if settings.estimator == EstimatorKind::FiniteDifference && !parameters.is_empty() {
+            return Err(Error::Setting {
+                setting: "estimator".into(),
+                reason: "finite differences have no session; call `finite_differences`".into(),
+            });
+        }
         let (scene, tangents) = tangents::apply(scene, parameters)?;
         Self::prepared(&scene, &tangents, settings, &mut PreparedCache::default())
     }
@@ -108,7 +115,7 @@ impl Session {
     ) -> Result<Self, Error> {
         settings.check()?;
         let tangents = tangents.seen_by(settings.sensor);
-        let depth = settings.max_depth.unwrap_or(scene.integrator.max_depth);
+        let depth = settings.max_depth.within(scene.integrator.max_depth);
         let mut world =
             World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, kept)?;
         let mut components = Vec::new();

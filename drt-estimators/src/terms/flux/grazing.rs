@@ -26,8 +26,8 @@ use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary::BoundarySink;
 use crate::terms::flux::{EDGE_ON, Flux, filled};
-use crate::world::World;
 use crate::world::lights::triangle_bary;
+use crate::world::{SurroundingMedium, World};
 
 /// The triangles with a flux that are seen edge on.
 #[derive(Debug)]
@@ -43,7 +43,7 @@ struct Triangle {
     prim: u32,
     area: f64,
     /// The medium around its shape, where that is the same everywhere.
-    around: Option<Option<usize>>,
+    around: SurroundingMedium,
 }
 
 /// Cosine below which rounding decides what is seen of a face.
@@ -70,7 +70,7 @@ impl GrazingFlux {
                 continue;
             }
             // What bounds media knows both of them.
-            let mut around = shape.boundary.map(|_| Some(None));
+            let mut around = shape.boundary.map(|_| SurroundingMedium::Uniform(None));
             for t in 0..shape.mesh.triangles.len() as u32 {
                 let corners = shape.mesh.triangle(t);
                 let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
@@ -115,7 +115,7 @@ impl GrazingFlux {
             return None;
         }
         let inv_pdf = area / chosen.pmf;
-        let around = around.unwrap_or_else(|| world.medium_at(x));
+        let around = around.at(world, x);
         let longest = tracer.max_segments.checked_sub(1)?;
         for front in [true, false] {
             let faces = (cosine > 0.0) == front;

@@ -258,18 +258,19 @@ impl Reservoir {
             return;
         }
         let spatial = self.flux.movers.is_some();
-        let mut swept = FluxRay { node: m.node as usize, origin: Vec3::ZERO, turn: Vec3::ZERO };
+        let mut ray_of_flux =
+            FluxRay { node: m.node as usize, origin: Vec3::ZERO, turn: Vec3::ZERO };
         let items = &mut self.functional.items;
         items.clear();
         for (rate, along, t) in rates.iter().flatten() {
             items.push(*rate);
-            swept.origin -= *along;
-            swept.turn -= *along * *t;
+            ray_of_flux.origin -= *along;
+            ray_of_flux.turn -= *along * *t;
         }
         if let (false, Some(medium)) = (spatial, vertex.medium) {
-            items.push(VelocityTerm::Volume(medium, m.x, swept.origin));
+            items.push(VelocityTerm::Volume(medium, m.x, ray_of_flux.origin));
         }
-        add(&self.functional, spatial.then_some(swept), light.0 * weight);
+        add(&self.functional, spatial.then_some(ray_of_flux), light.0 * weight);
     }
 }
 

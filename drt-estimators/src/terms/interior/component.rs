@@ -159,13 +159,13 @@ impl<'a, S: PathSink> Worker<'a, S> {
         let Self { sink, differentiator, .. } = self;
         let Some(mut flux) = view.flux.take() else { return };
         let recorded = view.of(path.record);
-        flux.evaluate(tracer, |f, swept, value| {
-            let Some(swept) = swept else { return sink.functional(f, value, values) };
+        flux.evaluate(tracer, |f, ray_of_flux, value| {
+            let Some(ray_of_flux) = ray_of_flux else { return sink.functional(f, value, values) };
             sink.begin();
             f.send(value, sink);
-            let [origin, turn] = [swept.origin, swept.turn].map(|v| value.outer(v));
+            let [origin, turn] = [ray_of_flux.origin, ray_of_flux.turn].map(|v| value.outer(v));
             let at = SurfaceAdjoint::of_place(origin);
-            differentiator.send_back(&recorded, swept.node, at, RgbVec::ZERO, turn, sink);
+            differentiator.send_back(&recorded, ray_of_flux.node, at, RgbVec::ZERO, turn, sink);
             sink.finish(values);
         });
         view.flux = Some(flux);

@@ -32,7 +32,7 @@ pub(super) struct SideRadiance {
     pub(super) light: Rgb,
     /// How much of the velocity of what is seen its place in view has: the share of its
     /// [blend](crate::derivative::velocity::blend), over its distance in those of the edge.
-    pub(super) hold: f64,
+    pub(super) blend: f64,
     /// The distance of what is seen.
     pub(super) distance: f64,
     /// What is seen; `None` for what stands still.
@@ -127,12 +127,12 @@ impl<'a> EdgeView<'a> {
         let mut light = Radiance::default();
         tracer.radiance_from(vertex, self.w, &mut light);
         let world = tracer.world;
-        let hold = match self.viewer.kind {
+        let blend = match self.viewer.kind {
             Kind::Point => self.blends.in_view(world, &vertex),
             _ => self.blends.of(world, self.viewer, &vertex, -self.w, distance),
         };
-        let hold = hold.weight * self.distance / distance;
-        SideRadiance { light: light.0, hold, distance, matter: vertex.matter() }
+        let blend = blend.weight * self.distance / distance;
+        SideRadiance { light: light.0, blend, distance, matter: vertex.matter() }
     }
 
     /// What comes from behind the edge.

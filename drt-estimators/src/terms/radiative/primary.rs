@@ -20,25 +20,25 @@ impl Radiative {
         let camera = &world.camera;
         let chosen = self.camera.as_ref()?.sample(&self.discontinuities, &mut tracer.rng);
         let eye = world.eye();
-        let sight = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, &eye)?;
+        let view = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, &eye)?;
         let (x, point) = chosen.discontinuity.point(chosen.along);
         let (_, importance) = tracer.see(&Vertex { x, medium: None, kind: Kind::Point })?;
-        let tau = sight.open(tracer)?;
-        let [minus, plus] = sight.sides(tracer, tracer.max_segments.checked_sub(1)?);
-        let weight = tau * (sight.sides.sine * chosen.inv_pdf * importance);
+        let tau = view.open(tracer)?;
+        let [minus, plus] = view.sides(tracer, tracer.max_segments.checked_sub(1)?);
+        let weight = tau * (view.sides.sine * chosen.inv_pdf * importance);
         let [minus_light, plus_light] = [weight * minus.light, weight * -plus.light];
         // What has a blend weight moves in view by itself.
         let parts = [
-            (Some(Matter::Surface(point)), sight.distance, minus_light + plus_light, false),
-            (minus.matter, minus.distance, minus_light * -minus.hold, true),
-            (plus.matter, plus.distance, plus_light * -plus.hold, true),
+            (Some(Matter::Surface(point)), view.distance, minus_light + plus_light, false),
+            (minus.matter, minus.distance, minus_light * -minus.blend, true),
+            (plus.matter, plus.distance, plus_light * -plus.blend, true),
         ];
         let width = camera.film()[0];
         let image_point = camera.view(x).pixel;
         for (matter, distance, value, held) in parts {
-            let n = sight.sides.n;
+            let n = view.sides.n;
             // A camera that turns takes its image points with it.
-            let gradient = camera.ray_gradient(-sight.w, -n, n * -distance);
+            let gradient = camera.ray_gradient(-view.w, -n, n * -distance);
             functional.items.clear();
             functional.items.extend(matter.map(|matter| VelocityTerm::of(matter, n)));
             functional.items.push(VelocityTerm::Sensor(gradient));

@@ -39,7 +39,7 @@ enum QueryTarget {
 /// A point of an edge and the vertex that sees it.
 pub(super) struct EdgeSample<'a> {
     node: usize,
-    sight: EdgeView<'a>,
+    view: EdgeView<'a>,
     point: MaterialPoint,
     /// Of what the two sides differ by, all but the transmittance.
     pub(super) weight: Rgb,
@@ -50,22 +50,17 @@ pub(super) struct EdgeSample<'a> {
 impl EdgeSample<'_> {
     /// What is seen.
     fn follow(self, tracer: &mut Tracer<'_>) -> Option<EdgeContribution> {
-        let Self { node, sight, point, weight, longest } = self;
-        let weight = weight * sight.open(tracer)?;
-        let [minus, plus] = sight.sides(tracer, longest);
+        let Self { node, view, point, weight, longest } = self;
+        let weight = weight * view.open(tracer)?;
+        let [minus, plus] = view.sides(tracer, longest);
         let lights = [weight * minus.light, weight * -plus.light];
-        let held = [lights[0] * minus.hold, lights[1] * plus.hold];
+        let held = [lights[0] * minus.blend, lights[1] * plus.blend];
         let [edge, viewer] = [lights, held].map(|[a, b]| a + b);
         let of = |side: &SideRadiance, held: Rgb| side.matter.map(|m| (m, -held));
         let matter =
             [Some((Matter::Surface(point), edge)), of(&minus, held[0]), of(&plus, held[1])];
         let dark = lights.iter().all(|l| l.is_zero());
-        (!dark).then_some(EdgeContribution {
-            node,
-            n: sight.sides.n,
-            viewer: viewer - edge,
-            matter,
-        })
+        (!dark).then_some(EdgeContribution { node, n: view.sides.n, viewer: viewer - edge, matter })
     }
 }
 
@@ -137,16 +132,16 @@ impl Radiative {
         let views = self.views(moves, sought)?;
         let around = &viewpoint(tracer.world, vertex, wo);
         let chosen = views.sample(&self.discontinuities, around, query, options)?;
-        let sight = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, vertex)?;
+        let view = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, vertex)?;
         let scattering = tracer.world.scattering(vertex)?;
-        let f = scattering.eval(wo, -sight.w);
+        let f = scattering.eval(wo, -view.w);
         if f.is_zero() {
             return None;
         }
-        let kernel = sight.sides.sine / (sight.distance * sight.distance);
+        let kernel = view.sides.sine / (view.distance * view.distance);
         let weight = theta * f * (kernel * chosen.inv_pdf / chance);
         let (_, point) = chosen.discontinuity.point(chosen.along);
-        Some(EdgeSample { node, sight, point, weight, longest })
+        Some(EdgeSample { node, view, point, weight, longest })
     }
 
     /// What edges a vertex may sample.

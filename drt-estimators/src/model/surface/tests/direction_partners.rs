@@ -17,7 +17,7 @@ fn region(bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> f64 {
 }
 
 /// The part of it that pairs tell.
-fn told(bsdf: &Bsdf, wo: Vec3, turn: &Turn) -> f64 {
+fn found(bsdf: &Bsdf, wo: Vec3, turn: &Turn) -> f64 {
     let ([dn, dwo], index) = motion(bsdf, wo);
     turn.n.dot(dn) + turn.wo.dot(dwo) + turn.eta * index
 }
@@ -50,7 +50,7 @@ fn opposites_are_mutual() {
     assert!(found > 3000, "{found}");
 }
 
-/// What is not told by pairs does not grow as lobes narrow.
+/// What is not found by pairs does not grow as lobes narrow.
 #[test]
 fn most_of_it_is_told_and_odd() {
     let mut rng = Rng::new(42, 0, 0);
@@ -62,7 +62,7 @@ fn most_of_it_is_told_and_odd() {
                 let Some(wi) = drawn.map(|s| s.w) else { continue };
                 let Some(other) = bsdf.direction_partner(wo, wi, normal()) else { continue };
                 let region = region(&bsdf, wo, wi);
-                let [here, there] = other.turns.map(|turn| told(&bsdf, wo, &turn));
+                let [here, there] = other.turns.map(|turn| found(&bsdf, wo, &turn));
                 let small = 40.0 + 0.01 * here.abs();
                 let close = (region - here).abs() < small && (here + there).abs() < small;
                 assert!(close, "{bsdf:?} {degrees} {region} {here} {there}");
@@ -87,7 +87,7 @@ fn derivatives(bsdf: &Bsdf, wo: Vec3, ratio: impl Fn(f64) -> f64) -> [Moments; 2
         let single = region(bsdf, wo, s.w) * own;
         let apart = other.map_or(single, |o| {
             let others = ratio(o.ratio) * bsdf.eval(wo, o.w, normal()).g * light(o.w);
-            let [here, there] = o.turns.map(|turn| told(bsdf, wo, &turn));
+            let [here, there] = o.turns.map(|turn| found(bsdf, wo, &turn));
             let share = s.pdf / (s.pdf + o.ratio * bsdf.pdf(wo, o.w, normal(), Given::Wo));
             single + share * (here * own + there * others) - here * own
         });

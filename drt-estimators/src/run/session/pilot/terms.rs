@@ -61,12 +61,12 @@ fn part(
     others: &[TermStatistics],
     equal: f64,
 ) -> f64 {
-    let worth =
+    let value =
         |term: &TermStatistics, q: usize| Real::sqrt(term.variance[q] / (term.rays + BESIDES));
     let need = |q: usize| {
-        let most = others.iter().map(|o| worth(o, q)).fold(equal * worth(paths, q), f64::max);
+        let most = others.iter().map(|o| value(o, q)).fold(equal * value(paths, q), f64::max);
         // NaN, which is no need, where nothing is noisy.
-        worth(camera, q) / most
+        value(camera, q) / most
     };
     let wanted = TAKEN * (0..paths.variance.len()).map(need).fold(0.0, f64::max);
     let mut part = 1.0;
