@@ -10,7 +10,7 @@
 
 use std::path::{Path, PathBuf};
 
-use drt_estimators::{Scene, Session, Settings, Unattended};
+use drt_estimators::{Depth, Scene, Session, Settings, Unattended};
 use drt_geom::{Mesh, Ray, Skip, TetLocator, TetMesh, TriangleBvh};
 use drt_math::{Vec3, vec3};
 use drt_motion::Parameter;
@@ -51,7 +51,7 @@ pub fn use_scene(mut scene: Scene, parameters: &[Parameter], settings: &Settings
         let small = sensor.item.sensor.with_film([3, 2]);
         sensor.item.sensor = small.expect("two sides that are not zero");
     }
-    let settings = Settings { spp: 2, max_depth: Some(Some(3)), threads: 1, ..settings.clone() };
+    let settings = Settings { spp: 2, max_depth: Depth::AtMost(3), threads: 1, ..settings.clone() };
     if let Ok(mut session) = Session::new(&scene, parameters, &settings) {
         session.run(settings.spp, &Unattended);
         let rendering = session.rendering();

@@ -1,6 +1,6 @@
 //! Runs a scene of one pixel and judges its numbers in standard errors.
 
-use drt_estimators::{Estimate, Scene, Session, Settings, Unattended};
+use drt_estimators::{Depth, Estimate, Scene, Session, Settings, Unattended};
 use drt_motion::Parameter;
 
 /// Standard errors within which an estimate must lie.
@@ -16,7 +16,7 @@ const SAMPLES: u32 = 1 << 21;
 pub(crate) fn judge(scene: &Scene, value: f64, parameters: &[(Parameter, f64)], depth: u32) {
     let (parameters, exact): (Vec<_>, Vec<_>) = parameters.iter().cloned().unzip();
     let settings =
-        Settings { spp: SAMPLES, max_depth: Some(Some(depth)), seed: 11, ..Settings::default() };
+        Settings { spp: SAMPLES, max_depth: Depth::AtMost(depth), seed: 11, ..Settings::default() };
     let mut session = Session::new(scene, &parameters, &settings).expect("the scene is usable");
     assert!(session.run(SAMPLES, &Unattended));
     let rendering = session.rendering();

@@ -117,7 +117,7 @@ impl Flux {
             largest: largest(world),
             longest: longest(world),
             movers: Some(movers),
-            spatial: Some(Arc::clone(&spatial)),
+            spatial: Some(Arc::clone(spatial)),
             followed: 1.0,
         })
     }

@@ -7,7 +7,7 @@ use drt_math::{Rgb, RgbVec, Rng};
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::antithetic::{AntitheticPairs, PairedRadiance};
 use crate::derivative::sensitivity::{SurfaceAdjoint, VelocityTerm};
-use crate::derivative::velocity::{Material, Movers, PathVelocities, VelocityField};
+use crate::derivative::velocity::{Material, Movers, PathVelocities, RecordedPath, VelocityField};
 use crate::edges::tree::TreeScratch;
 use crate::sampling::record::PathRecord;
 use crate::sampling::streams::LINE_STREAM;
@@ -157,8 +157,10 @@ impl<'a, S: PathSink> Worker<'a, S> {
         values: &mut [Rgb],
     ) {
         let Self { sink, differentiator, .. } = self;
-        let Some(mut flux) = view.flux.take() else { return };
-        let recorded = view.of(path.record);
+        let PathView { world, velocities, pairs, flux } = view;
+        let Some(flux) = flux else { return };
+        let record = path.record;
+        let recorded = RecordedPath { record, velocities, pairs, lit: world.lit };
         flux.evaluate(tracer, |f, ray_of_flux, value| {
             let Some(ray_of_flux) = ray_of_flux else { return sink.functional(f, value, values) };
             sink.begin();
@@ -168,7 +170,6 @@ impl<'a, S: PathSink> Worker<'a, S> {
             differentiator.send_back(&recorded, ray_of_flux.node, at, RgbVec::ZERO, turn, sink);
             sink.finish(values);
         });
-        view.flux = Some(flux);
     }
 
     /// Queries edges; the first query has the best numbers.

@@ -111,6 +111,7 @@ impl Radiative {
     }
 
     /// A query from a vertex for what is `sought`, which both have a given `chance`.
+    #[allow(clippy::too_many_arguments)]
     fn sample_from<'a>(
         &'a self,
         tracer: &mut Tracer<'_>,
