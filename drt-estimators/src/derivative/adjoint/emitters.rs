@@ -53,7 +53,7 @@ impl Differentiator<'_> {
                 let matter = core::mem::take(&mut lit.u);
                 let velocity = &VertexVelocity { moves: true, blend, auxiliary: 0..0 };
                 let end = Propagated { vertex: &end, velocity, weight, matter };
-                self.propagate(path, &end, velocities, &lit, here, sink);
+                self.propagate(path, &end, velocities, &mut lit, here, sink);
             }
             LightKind::Position => {
                 let moving = near_moves || emitter;

@@ -190,7 +190,8 @@ impl<'w> Differentiator<'w> {
             // What nothing comes back from may still move what comes before.
             if nothing || phi == 1.0 {
                 if let Some(v) = vertex {
-                    send(v, &SurfaceAdjoint { u: here.u + matter, ..*here }, sink);
+                    here.u += matter;
+                    send(v, here, sink);
                 }
                 return;
             }
@@ -253,19 +254,29 @@ impl<'w> Differentiator<'w> {
                     * (1.0 - phi);
             }
             Some(v) => {
-                let free = weight * (1.0 - phi);
-                turned = self.segment(&path, Far::Direction, near_moves, free, &mut there, sink);
                 let mut matter = self.locals[k].matter;
-                if phi > 0.0 {
-                    let mut fixed =
-                        self.material_end(&path, v, near_moves, weight * phi, &mut there, sink);
+                if phi == 1.0 {
                     if let Some(filter) = seen {
-                        let value = value * phi;
-                        self.seen(vertex, arrival.dir, value, filter, &mut fixed, sink);
+                        self.seen(vertex, arrival.dir, value, filter, here, sink);
                     }
-                    matter += core::mem::take(&mut fixed.u);
-                    here.n += fixed.n;
-                    here.j += fixed.j;
+                    let moving = near_moves || moves(v, sink.active());
+                    self.segment(&path, Far::Vertex(v, here), moving, weight, &mut there, sink);
+                } else {
+                    let free = weight * (1.0 - phi);
+                    turned =
+                        self.segment(&path, Far::Direction, near_moves, free, &mut there, sink);
+                    if phi > 0.0 {
+                        let part = weight * phi;
+                        let mut fixed =
+                            self.material_end(&path, v, near_moves, part, &mut there, sink);
+                        if let Some(filter) = seen {
+                            let value = value * phi;
+                            self.seen(vertex, arrival.dir, value, filter, &mut fixed, sink);
+                        }
+                        matter += core::mem::take(&mut fixed.u);
+                        here.n += fixed.n;
+                        here.j += fixed.j;
+                    }
                 }
                 let end = Propagated { vertex: v, velocity, weight, matter };
                 turned += self.propagate(&path, &end, velocities, here, &mut there, sink);

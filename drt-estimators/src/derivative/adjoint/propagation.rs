@@ -35,7 +35,7 @@ impl Differentiator<'_> {
         path: &Stretch<'_>,
         end: &Propagated<'_>,
         velocities: &PathVelocities,
-        here: &SurfaceAdjoint,
+        here: &mut SurfaceAdjoint,
         near: &mut SurfaceAdjoint,
         sink: &mut S,
     ) -> RgbVec {
@@ -59,7 +59,8 @@ impl Differentiator<'_> {
             turn += turned;
         }
         if free == 0.0 {
-            send(vertex, &SurfaceAdjoint { u: here.u + matter, ..*here }, sink);
+            here.u += matter;
+            send(vertex, here, sink);
             return turn;
         }
         let Kind::Surface(point) = &vertex.kind else {
