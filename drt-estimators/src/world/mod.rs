@@ -465,12 +465,10 @@ impl World {
     /// The scattering function at a vertex; `None` at points.
     pub(crate) fn scattering(&self, v: &Vertex) -> Option<Scattering<'_>> {
         match &v.kind {
-            Kind::Surface(s) => Some(Scattering::Surface {
-                bsdf: self.bsdf_of(s.shape),
-                ng: s.ng,
-                ns: s.ns,
-                smooth: self.is_smooth(s),
-            }),
+            Kind::Surface(s) => {
+                let bsdf = self.bsdf_of(s.shape).at(s.ng, s.ns, self.is_smooth(s));
+                Some(Scattering::Surface(bsdf))
+            }
             Kind::Volume(_) => v.medium.map(|m| Scattering::Volume(&self.medium(m).phase)),
             Kind::Point => None,
         }

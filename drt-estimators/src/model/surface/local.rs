@@ -1,0 +1,116 @@
+//! A BSDF at a point of a surface.
+//!
+//! With interpolated normals the shading normal decides sides, as in Mitsuba. The contribution then
+//! jumps where the camera's direction crosses the shading horizon while the surface is still in view,
+//! and where the light's direction sinks under the facet while the shading normal still sees it:
+//! jumps that no boundary term knows. So the value fades to zero over the last [`FADE`] of both
+//! cosines, and the measurement contribution has no jumps besides visibility, which its derivative
+//! relies on.
+
+use drt_math::{Real, Rgb, RgbVec, Vec3};
+
+use crate::model::surface::{
+    Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given, Lobes,
+    RoughnessPartner,
+};
+
+/// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.
+const FADE: f64 = 0.02;
+
+/// A BSDF with the unit normals of a point. Directions are unit, away from the surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocalBsdf<'a> {
+    bsdf: &'a Bsdf,
+    /// Geometric normal.
+    ng: Vec3,
+    /// Shading normal.
+    ns: Vec3,
+    /// The shading normal is interpolated, and the value fades at both horizons.
+    interpolated: bool,
+}
+
+impl Bsdf {
+    /// The BSDF at a point with the geometric normal `ng` and the shading normal `ns`.
+    pub(crate) fn at(&self, ng: Vec3, ns: Vec3, interpolated: bool) -> LocalBsdf<'_> {
+        LocalBsdf { bsdf: self, ng, ns, interpolated }
+    }
+}
+
+/// The fading factor, and its derivative by the cosine.
+fn fade(cosine: f64) -> (f64, f64) {
+    let c = Real::abs(cosine) / FADE;
+    if c < 1.0 { (c, cosine.signum() / FADE) } else { (1.0, 0.0) }
+}
+
+impl LocalBsdf<'_> {
+    /// The value times the cosine of `wi` with the shading normal.
+    #[inline]
+    pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Rgb {
+        let value = self.bsdf.eval(wo, wi, self.ns);
+        if self.interpolated {
+            value * (fade(self.ns.dot(wo)).0 * fade(self.ng.dot(wi)).0)
+        } else {
+            value
+        }
+    }
+
+    /// The value with its derivatives, and that by the geometric normal.
+    #[inline]
+    pub(crate) fn gradient(&self, wo: Vec3, wi: Vec3) -> (BsdfGradient, RgbVec) {
+        let mut d = self.bsdf.gradient(wo, wi, self.ns);
+        let mut by_ng = RgbVec::ZERO;
+        if self.interpolated {
+            let ((a, da), (b, db)) = (fade(self.ns.dot(wo)), fade(self.ng.dot(wi)));
+            let (factor, by_wo, by_wi) = (a * b, d.value * (da * b), d.value * (a * db));
+            d.wo = d.wo * factor + by_wo.outer(self.ns);
+            d.n = d.n * factor + by_wo.outer(wo);
+            d.wi = d.wi * factor + by_wi.outer(self.ng);
+            by_ng = by_wi.outer(wi);
+            let mut params = BsdfParams::default();
+            params.scatter(&d.params, Rgb::splat(factor));
+            d.params = params;
+            d.value *= factor;
+        }
+        (d, by_ng)
+    }
+
+    /// Draws the direction that is not given; see [`Bsdf::sample`].
+    #[inline]
+    pub(crate) fn sample(&self, from: Vec3, u: [f64; 3], given: Given) -> Option<DirectionSample> {
+        self.bsdf.sample(from, self.ns, u, given)
+    }
+
+    /// Density per steradian with which [`Self::sample`] draws `to`.
+    #[inline]
+    pub(crate) fn pdf(&self, from: Vec3, to: Vec3, given: Given) -> f64 {
+        self.bsdf.pdf(from, to, self.ns, given)
+    }
+
+    /// What an importance path multiplies the value by, per solid angle of `wo`: it arrives by
+    /// the area measure seen from `wi` and leaves by that seen from `wo` (geometric normals).
+    #[inline]
+    pub(crate) fn adjoint_correction(&self, wo: Vec3, wi: Vec3) -> f64 {
+        let arriving = self.ng.dot(wi).abs();
+        if arriving > 0.0 { Real::abs(self.ng.dot(wo)) / arriving } else { 0.0 }
+    }
+
+    /// A sketch of [`Self::eval`] by `wi`.
+    pub(crate) fn lobes(&self, wo: Vec3) -> Lobes {
+        self.bsdf.lobes(wo, self.ns)
+    }
+
+    /// About how wide the narrowest lobe is, in radians; at most 1.
+    pub(crate) fn lobe_width(&self) -> f64 {
+        self.bsdf.lobe_width()
+    }
+
+    /// The [`RoughnessPartner`] of `wi`, if it has one.
+    pub(crate) fn roughness_partner(&self, wo: Vec3, wi: Vec3) -> Option<RoughnessPartner> {
+        self.bsdf.roughness_partner(wo, wi, self.ns)
+    }
+
+    /// The [`DirectionPartner`] of `wi`, if it has one.
+    pub(crate) fn direction_partner(&self, wo: Vec3, wi: Vec3) -> Option<DirectionPartner> {
+        self.bsdf.direction_partner(wo, wi, self.ns)
+    }
+}
