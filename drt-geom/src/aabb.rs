@@ -1,4 +1,7 @@
-use drt_math::{Vec3, vec3};
+use drt_math::{Real, Vec3, vec3};
+
+/// Relative rounding errors of a point's distance from a plane.
+const ROUNDING: f64 = 1e-9;
 
 /// An axis-aligned box; empty when `min > max`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +52,21 @@ impl Aabb {
     #[must_use]
     pub fn meets(&self, o: &Self) -> bool {
         (0..3).all(|k| self.min[k] <= o.max[k] && o.min[k] <= self.max[k])
+    }
+    /// The least and greatest signed distance n·(x - `at`) of its points, times the length of `n`; moved
+    /// apart by rounding errors.
+    #[must_use]
+    pub fn signed_distances(&self, at: Vec3, n: Vec3) -> (f64, f64) {
+        let (centre, half) = (self.center() - at, self.extent() * 0.5);
+        let sum = |v: Vec3| {
+            Real::abs(n.x) * Real::abs(v.x)
+                + Real::abs(n.y) * Real::abs(v.y)
+                + Real::abs(n.z) * Real::abs(v.z)
+        };
+        let (middle, reach) = (n.dot(centre), sum(half));
+        // Of the coordinates themselves, which may be much larger than their differences.
+        let rounding = ROUNDING * (sum(at) + sum(self.center()) + reach);
+        (middle - reach - rounding, middle + reach + rounding)
     }
     /// True when the point lies inside or on the boundary.
     #[must_use]

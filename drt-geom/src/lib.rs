@@ -7,6 +7,7 @@ extern crate alloc;
 
 mod aabb;
 mod crossing;
+pub mod edges;
 mod intersect;
 #[cfg(any(feature = "obj", feature = "ply", feature = "tet"))]
 mod io;
@@ -32,9 +33,7 @@ pub use io::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
 #[cfg(feature = "tet")]
 pub use io::{TetFileError, TetFileErrorKind, load_tet_mesh, read_medit, read_tetgen};
 pub use mesh::{Mesh, MeshError};
-pub use query::{
-    BvhBuilder, BvhError, ClosestPoint, Hit, Ray, Registers, Skip, TriangleBvh, Work, nearest_point,
-};
+pub use query::{BvhBuilder, BvhError, ClosestPoint, Hit, Ray, Skip, TriangleBvh, nearest_point};
 pub use tet::{
     ConformityError, SurfacePlace, TetLocator, TetMesh, TetMeshError, TetPoint, TetVertexOrigin,
     tet_barycentric,

@@ -54,18 +54,18 @@ impl Contact {
         if !e.may_rest {
             return None;
         }
-        let inward = e.inward()?;
-        let gap = GAP * e.line().1.length();
+        let inward = e.wedge.inward()?;
+        let gap = GAP * e.wedge.length;
         let ray = Ray { origin: at.x + inward * gap, dir: -inward, t_max: 2.0 * gap };
-        let skip = Skip::two(e.faces[0], e.faces[1]);
+        let skip = Skip::two(e.wedge.faces[0], e.wedge.faces[1]);
         let hit = world.nearest_on(&ray, skip)?;
         let (below, x) = world.point(hit.prim, hit.bary);
-        if world.is_null(below.shape) || Real::abs(below.ng.dot(e.tangent)) > FLAT {
+        if world.is_null(below.shape) || Real::abs(below.ng.dot(e.wedge.tangent)) > FLAT {
             return None;
         }
         let up = if below.ng.dot(inward) > 0.0 { below.ng } else { -below.ng };
-        let side = e.tangent.cross(up).normalize();
-        let angles = e.across.map(|h| {
+        let side = e.wedge.tangent.cross(up).normalize();
+        let angles = e.wedge.across.map(|h| {
             let (sine, cosine) = (h.dot(up), h.dot(side));
             (sine >= -FLAT).then(|| fm::atan2(f64::max(sine, 0.0), cosine))
         });

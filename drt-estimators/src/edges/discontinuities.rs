@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 use core::f64::consts::PI;
 use core::ops::Range;
 
+use drt_geom::edges::{Coincident, EdgeSides, Fan, FanFace, faces_around};
 use drt_math::{Vec3, fm};
 
 use crate::edges::contact::Contact;
@@ -41,16 +42,6 @@ pub(crate) struct DiscontinuityEdge {
     smooth: bool,
 }
 
-/// A face at an edge.
-#[derive(Clone, Copy, Debug)]
-struct FanFace {
-    /// Around the edge, from the first face's direction.
-    angle: f64,
-    prim: u32,
-    /// Unit, across the edge into the face.
-    across: Vec3,
-}
-
 /// All edges.
 #[derive(Debug, Default)]
 pub(crate) struct DiscontinuityEdges {
@@ -60,83 +51,38 @@ pub(crate) struct DiscontinuityEdges {
     pub(crate) all: u64,
 }
 
-/// What is seen on the two sides of an edge.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct EdgeSides {
-    /// Unit normal of the plane of the edge and the viewer.
-    pub(crate) n: Vec3,
-    /// Sine of the angle between edge and view.
-    pub(crate) sine: f64,
-    /// The face on the side of `n`, and the one on the other side; `None` where one sees past the edge.
-    pub(crate) faces: [Option<(u32, Vec3)>; 2],
-}
-
-impl EdgeSides {
-    /// The faces that rays from the edge ignore.
-    pub(crate) fn own_faces(&self) -> Option<[u32; 2]> {
-        let [a, b] = self.faces.map(|f| f.map(|(prim, _)| prim));
-        Some([a.or(b)?, b.or(a)?])
-    }
-
-    /// To the side on which one sees past the edge.
-    pub(crate) fn outward(&self) -> Vec3 {
-        if self.faces[0].is_none() { self.n } else { -self.n }
-    }
-}
-
 impl DiscontinuityEdges {
     /// Collects the edges of surfaces that scatter or block. Of edges at one place, that of a shape that
     /// `moves` tells how the place moves.
     pub(crate) fn collect(world: &World, moves: &[bool]) -> Self {
         let (edges, all) = collect(world);
-        let mut places: Vec<_> = edges.iter().zip(0..).map(|(e, i)| (e.place(), i)).collect();
-        places.sort_unstable();
         let around: Vec<_> =
             (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
         let mut discontinuities = Self { list: Vec::new(), faces_of_fans: Vec::new(), all };
-        for same in places.chunk_by(|a, b| a.0 == b.0) {
+        for same in Coincident::among(edges.iter().map(|e| &e.wedge)).groups() {
             let of = |i: &usize| &edges[*i];
-            let indices = || same.iter().map(|(_, i)| *i);
-            let main = indices().find(|i| moves[of(i).shape as usize]).unwrap_or(same[0].1);
-            let edge = &edges[main];
+            let moving = same.iter().find(|i| moves[of(i).shape as usize]);
+            let mut edge = *of(moving.unwrap_or(&same[0]));
+            let faces = faces_around(&edge.wedge, same.iter().map(|i| &of(i).wedge));
+            let kind = Self::crease(world, edge.wedge.tangent, &faces);
+            let Some((crease, smooth)) = kind else { continue };
+            edge.may_rest = Contact::anywhere(world, &edge);
             let start = discontinuities.faces_of_fans.len();
-            for i in indices() {
-                for (angle, prim, across) in edges[i].faces_around(edge) {
-                    if discontinuities.faces_of_fans[start..].iter().all(|b| b.prim != prim) {
-                        discontinuities.faces_of_fans.push(FanFace { angle, prim, across });
-                    }
-                }
-            }
+            discontinuities.faces_of_fans.extend(faces);
             let fan = start..discontinuities.faces_of_fans.len();
-            discontinuities.faces_of_fans[fan.clone()]
-                .sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
-            match discontinuities.crease(world, edge.tangent, &fan) {
-                Some((crease, smooth)) => {
-                    let mut edge = *edge;
-                    edge.may_rest = Contact::anywhere(world, &edge);
-                    let around = around[edge.shape as usize];
-                    let shape = |i: &usize| &world.scene.shapes[of(i).shape as usize];
-                    let bounds = same.iter().any(|(_, i)| shape(i).boundary.is_some());
-                    discontinuities.list.push(DiscontinuityEdge {
-                        edge,
-                        fan,
-                        around,
-                        bounds,
-                        crease,
-                        smooth,
-                    });
-                }
-                None => discontinuities.faces_of_fans.truncate(start),
-            }
+            let around = around[edge.shape as usize];
+            let shape = |i: &usize| &world.scene.shapes[of(i).shape as usize];
+            let bounds = same.iter().any(|i| shape(i).boundary.is_some());
+            let found = DiscontinuityEdge { edge, fan, around, bounds, crease, smooth };
+            discontinuities.list.push(found);
         }
         discontinuities
     }
 
     /// How much radiance jumps at a crease between faces, and whether these are smooth; `None` where it never does.
-    fn crease(&self, world: &World, tangent: Vec3, fan: &Range<usize>) -> Option<([f64; 2], bool)> {
-        let faces_of_fans = &self.faces_of_fans[fan.clone()];
-        let [a, b] = faces_of_fans else { return Some(([1.0; 2], false)) };
-        let points = [a, b].map(|b| world.point(b.prim, [0.0; 2]).0);
+    fn crease(world: &World, tangent: Vec3, faces: &[FanFace]) -> Option<([f64; 2], bool)> {
+        let [a, b] = faces else { return Some(([1.0; 2], false)) };
+        let points = [a, b].map(|f| world.point(f.face, [0.0; 2]).0);
         let [sa, sb] = points.map(|p| p.shape as usize);
         let shapes = &world.scene.shapes;
         let interpolated = [sa, sb].iter().any(|s| shapes[*s].mesh.normals.is_some());
@@ -169,25 +115,24 @@ impl DiscontinuityEdges {
         &self,
         discontinuity: &DiscontinuityEdge,
     ) -> impl Iterator<Item = (u32, Vec3)> {
-        self.faces_of_fans[discontinuity.fan.clone()].iter().map(|b| (b.prim, b.across))
+        self.faces_of_fans[discontinuity.fan.clone()].iter().map(|f| (f.face, f.across))
     }
 
     /// Unit normals of the two faces of a crease, on one side of the surface.
     pub(crate) fn normals(&self, discontinuity: &DiscontinuityEdge) -> Option<[Vec3; 2]> {
         let [a, b] = &self.faces_of_fans[discontinuity.fan.clone()] else { return None };
-        Some(normals(discontinuity.edge.tangent, [a.across, b.across]))
+        Some(normals(discontinuity.edge.wedge.tangent, [a.across, b.across]))
     }
 
     /// Weight of an edge seen from a point: the angle it subtends, less where it is a crease. Samples of its
     /// two sides, of the same random numbers, seldom differ, but then by all there is: their root mean square
     /// is that of how often. Where normals are interpolated they differ each time, by little.
     pub(crate) fn seen_from(&self, discontinuity: &DiscontinuityEdge, eye: Vec3) -> f64 {
-        let silhouette = crate::edges::edge::seen_from(&discontinuity.edge, eye);
+        let silhouette = discontinuity.edge.wedge.subtended_angle(eye);
         let Some(normals) = self.normals(discontinuity).filter(|_| silhouette == 0.0) else {
             return silhouette;
         };
-        let (a, along) = discontinuity.edge.line();
-        let (da, db) = (a - eye, a + along - eye);
+        let [da, db] = discontinuity.edge.wedge.ends.map(|p| p - eye);
         let crease = discontinuity.crease[usize::from(normals[0].dot(da) > 0.0)];
         let weight = if discontinuity.smooth { crease } else { fm::sqrt(crease) };
         weight * fm::atan2(da.cross(db).length(), da.dot(db))
@@ -195,28 +140,8 @@ impl DiscontinuityEdges {
 
     /// What a viewer sees of an edge; `w` is unit, from the edge to the viewer.
     pub(crate) fn sides(&self, discontinuity: &DiscontinuityEdge, w: Vec3) -> Option<EdgeSides> {
-        let edge = &discontinuity.edge;
-        let n = edge.tangent.cross(w);
-        let sine = n.length();
-        if sine < 1e-12 {
-            return None;
-        }
-        let faces_of_fans = &self.faces_of_fans[discontinuity.fan.clone()];
-        let x = edge.across[0];
-        let y = edge.tangent.cross(x);
-        let view = fm::atan2(w.dot(y), w.dot(x));
-        let turn = |angle: f64| if angle < 0.0 { angle + 2.0 * PI } else { angle };
-        // The first face met on each way around.
-        let first = |turned: fn(f64, f64) -> f64| {
-            let nearest = |b: &FanFace| turn(turned(b.angle, view));
-            faces_of_fans
-                .iter()
-                .min_by(|a, b| nearest(a).total_cmp(&nearest(b)))
-                .filter(|b| nearest(b) < PI)
-                .map(|b| (b.prim, b.across))
-        };
-        let faces = [first(|angle, view| angle - view), first(|angle, view| view - angle)];
-        Some(EdgeSides { n: n / sine, sine, faces })
+        let faces = &self.faces_of_fans[discontinuity.fan.clone()];
+        Fan { edge: &discontinuity.edge.wedge, faces }.sides(w)
     }
 }
 
@@ -227,7 +152,7 @@ fn normals(tangent: Vec3, [f, g]: [Vec3; 2]) -> [Vec3; 2] {
 
 impl DiscontinuityEdge {
     pub(crate) fn length(&self) -> f64 {
-        self.edge.line().1.length()
+        self.edge.wedge.length
     }
 
     /// The point `along` the edge.

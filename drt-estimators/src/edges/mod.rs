@@ -6,5 +6,3 @@ pub(crate) mod discontinuities;
 pub(crate) mod edge;
 pub(crate) mod movers;
 pub(crate) mod speeds;
-pub(crate) mod tree;
-pub(crate) mod weld;

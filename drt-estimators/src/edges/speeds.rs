@@ -23,7 +23,7 @@ pub(crate) fn speeds<'a>(motion: &'a Motion, world: &'a World) -> impl Fn(&Edge)
         let speed = |(p, of_shape): &(usize, SurfaceMotion)| {
             let across = |end: f64| {
                 let velocity = of_shape.velocity(mesh, &edge.point(end).1.at);
-                velocity.reject(edge.tangent).length()
+                velocity.reject(edge.wedge.tangent).length()
             };
             f64::max(across(0.0), across(1.0)) / f64::max(fastest[*p], f64::MIN_POSITIVE)
         };

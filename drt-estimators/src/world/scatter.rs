@@ -1,11 +1,10 @@
 //! Scattering at a vertex, surface or volume, under one roof.
 
+use drt_geom::edges::Lobes;
 use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Phase;
 
-use crate::model::surface::{
-    BsdfParams, DirectionPartner, Given, LocalBsdf, Lobes, RoughnessPartner,
-};
+use crate::model::surface::{BsdfParams, DirectionPartner, Given, LocalBsdf, RoughnessPartner};
 
 /// The local scattering function of a vertex.
 #[derive(Clone, Copy, Debug)]

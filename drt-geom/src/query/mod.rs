@@ -33,7 +33,7 @@ pub(crate) use boxes::BoxTree;
 pub use build::BvhError;
 pub use nearest::{ClosestPoint, nearest_point};
 pub use ray::{Hit, Ray, Skip};
-pub use registers::{Registers, Work};
+pub(crate) use registers::{Registers, Work};
 
 /// A bounding volume hierarchy over triangles, for rays and nearest points.
 ///

@@ -1,16 +1,8 @@
 //! Where a surface sends light, in a few numbers.
 //!
 //! Choosing among many directions in proportion to a BSDF needs its value for each, and for cones of
-//! them at once. A sketch is enough there: diffuse light, and a lobe around each direction that an even
-//! surface would send light to,
-//!
-//! ```text
-//! f(d) ≈ e |n·d| + Σ s w² / (π (w² + c²)²),    c² = 2 (1 - a·d),
-//! ```
-//!
-//! with the axis a, the solid angle π w² and the light s of a lobe. This is the distribution of Trowbridge
-//! and Reitz over the directions about a, has integral s for a narrow lobe, and is spread over a cone of
-//! the mean squared angle σ² by taking w² + σ² for w²: no exponential, and never zero.
+//! them at once. [`Lobes`] are enough there: diffuse light, and a lobe around each direction that an even
+//! surface would send light to, with the solid angle π w² and the light s.
 //!
 //! The solid angle of a lobe of reflections is that of the microfacets, π α² of slopes, by the Jacobian of
 //! Walter et al. 2007 (eq. 14) for facets along the normal: with the cosine o,
@@ -38,67 +30,14 @@
 //! Of the light that is let through, half is what n and half what m lets through. Towards grazing angles, where lobes
 //! are wide in one direction only, cosines count as α at least.
 
-use core::f64::consts::{FRAC_1_PI, PI};
-use core::ops::{Add, Div, Mul};
+use core::f64::consts::FRAC_1_PI;
 
+use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Vec3, fm};
 
 use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA};
 use crate::model::surface::{Bsdf, Phong, RoughConductor, RoughDielectric};
-
-/// The part of a lobe's light that may be anywhere: the sketch is of its middle.
-const ANYWHERE: f64 = 0.1;
-
-/// A sketch of a scattering function with one direction given.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Lobes {
-    /// The value towards the normal, apart from lobes; in volumes, that in all directions.
-    pub(crate) even: f64,
-    pub(crate) lobes: [Lobe; 2],
-}
-
-/// Light around a direction.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Lobe {
-    /// Unit.
-    pub(crate) axis: Vec3,
-    /// w².
-    pub(crate) width2: f64,
-    /// s / π.
-    pub(crate) height: f64,
-}
-
-impl Lobe {
-    /// Of the light `share` around `axis`, with w² = `width2`.
-    pub(crate) fn new(axis: Vec3, width2: f64, share: f64) -> Self {
-        Self { axis, width2: width2.max(f64::MIN_POSITIVE), height: share * FRAC_1_PI }
-    }
-
-    /// The light of a lobe of that height and w² (or w² + σ²) where a direction is off its axis by a
-    /// vector of the squared length `off2`.
-    #[inline(always)]
-    pub(crate) fn value<T>(height: T, width2: T, off2: T) -> T
-    where
-        T: Copy + Add<Output = T> + Mul<Output = T> + Div<Output = T>,
-    {
-        let off = width2 + off2;
-        height * width2 / (off * off)
-    }
-}
-
-impl Lobes {
-    /// The same in all directions, but for the cosine.
-    pub(crate) fn even(value: f64) -> Self {
-        Self { even: value, lobes: [Lobe::default(); 2] }
-    }
-
-    /// With lobes, and a part of their light anywhere.
-    fn glossy(even: f64, lobes: [Lobe; 2]) -> Self {
-        let light: f64 = lobes.iter().map(|l| l.height).sum();
-        Self { even: even + ANYWHERE * light, lobes }
-    }
-}
 
 impl Bsdf {
     /// The sketch of the light that leaves to `wo`, by where it comes from.
@@ -178,18 +117,4 @@ impl Facet {
 
 fn mirrored(w: Vec3, n: Vec3) -> Vec3 {
     n * (2.0 * n.dot(w)) - w
-}
-
-impl Lobes {
-    /// Of a phase function with the value `across` at a right angle to the given direction, and `peak`
-    /// at its maximum, which is along `axis`.
-    pub(crate) fn around(axis: Vec3, across: f64, peak: f64) -> Self {
-        let rest = f64::max(1.0 - 4.0 * PI * across, 0.0);
-        if peak <= across || rest == 0.0 {
-            return Self::even(across);
-        }
-        // s / (π w²) is the height of the peak.
-        let width2 = rest * FRAC_1_PI / (peak - across);
-        Self { even: across, lobes: [Lobe::new(axis, width2, rest), Lobe::default()] }
-    }
 }

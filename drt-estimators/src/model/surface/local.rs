@@ -7,11 +7,11 @@
 //! cosines, and the measurement contribution has no jumps besides visibility, which its derivative
 //! relies on.
 
+use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, RgbVec, Vec3};
 
 use crate::model::surface::{
-    Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given, Lobes,
-    RoughnessPartner,
+    Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given, RoughnessPartner,
 };
 
 /// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.

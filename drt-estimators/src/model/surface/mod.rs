@@ -58,7 +58,6 @@ pub use crate::model::surface::dielectric::RoughDielectric;
 pub use crate::model::surface::diffuse::Diffuse;
 pub(crate) use crate::model::surface::direction_partner::{DirectionPartner, Turn};
 use crate::model::surface::facet::Facet;
-pub(crate) use crate::model::surface::lobes::{Lobe, Lobes};
 pub(crate) use crate::model::surface::local::LocalBsdf;
 pub use crate::model::surface::microfacet::Distribution;
 pub use crate::model::surface::phong::Phong;

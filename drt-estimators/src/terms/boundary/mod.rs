@@ -30,9 +30,8 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, Vec3};
 
 use crate::edges::contact::Contact;
-use crate::edges::edge::{EdgePoint, EdgeTable, collect, seen_along, seen_from, sine};
+use crate::edges::edge::{EdgePoint, EdgeTable, collect, merge_coincident};
 use crate::edges::movers::Movers;
-use crate::edges::weld::weld;
 use crate::terms::boundary::shadow::Shadows;
 
 use crate::derivative::sensitivity::{ActiveInputs, VelocityFunctional, VelocityTerm};
@@ -113,7 +112,7 @@ impl Boundary {
     pub(crate) fn new(world: &World, active: &ActiveInputs) -> Result<Self, Error> {
         let movers = Movers::new(world, active);
         let (edges, all) = collect(world);
-        let mut edges = weld(edges, |e| movers.moves(e));
+        let mut edges = merge_coincident(edges, |e| movers.moves(e));
         edges.retain(|e| movers.matter_to(e));
         let around: Vec<_> =
             (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
@@ -123,17 +122,21 @@ impl Boundary {
         }
         let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
         let eye = world.camera.position();
-        let camera = EdgeTable::new(&edges, |e| movers.pass_camera(e, eye), |e| seen_from(e, eye))?;
+        let camera = EdgeTable::new(
+            &edges,
+            |e| movers.pass_camera(e, eye),
+            |e| e.wedge.subtended_angle(eye),
+        )?;
         let light = |i: usize, emitter: &Emitter| match *emitter {
             Emitter::Point { position, .. } | Emitter::Spot { position, .. } => EdgeTable::new(
                 &edges,
                 |e| movers.pass_emitter(e, i, |x| x - position),
-                |e| seen_from(e, position),
+                |e| e.wedge.subtended_angle(position),
             ),
             Emitter::Directional { direction, .. } => EdgeTable::new(
                 &edges,
                 |e| movers.pass_emitter(e, i, |_| direction),
-                |e| seen_along(e, direction),
+                |e| e.wedge.projected_length(direction),
             ),
             _ => Ok(None),
         };
@@ -179,7 +182,7 @@ impl Boundary {
 impl Start {
     /// On an edge that nothing touches.
     fn on(world: &World, at: &EdgePoint<'_>) -> Self {
-        Self { x: at.x, faces: at.edge.faces, medium: at.edge.medium(world, at.x) }
+        Self { x: at.x, faces: at.edge.wedge.faces, medium: at.edge.medium(world, at.x) }
     }
 
     /// Follows a ray to the first surface that scatters.
@@ -207,7 +210,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let d = camera.position() - at.x;
         let distance = d.length();
         let w = d / distance;
-        let n = at.edge.occluded_side(w)?;
+        let n = at.edge.wedge.occluded_side(w)?;
         let start = Start::on(world, &at);
         let transport = self.seen(&start)?;
         // The camera's side must be open.
@@ -224,7 +227,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
             return None;
         }
         let light = self.light_from(&s, w, world.max_depth.checked_sub(1)?);
-        let value = light * s.weight * tau * (sine(at.edge, w) * at.inv_pdf * transport);
+        let value = light * s.weight * tau * (at.edge.wedge.sine(w) * at.inv_pdf * transport);
         self.show(at.x, value);
         Some(())
     }
@@ -263,11 +266,11 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let light = world.lights.sample_area(world, &choice, at.x, &mut self.tracer.rng)?;
         let LightKind::Area(emitting) = light.kind else { return None };
         let w = -light.w;
-        let n = at.edge.occluded_side(w)?;
+        let n = at.edge.wedge.occluded_side(w)?;
         let start = Start::on(world, &at);
         let tau = self.open_to(&start, light.w, &emitting)?;
         let vertex = Vertex { x: light.y, medium: None, kind: Kind::Surface(emitting) };
-        let mis = light.pdf / (light.pdf + at.edge.direction_pdf(w));
+        let mis = light.pdf / (light.pdf + at.edge.wedge.direction_pdf(w));
         let s = End {
             vertex: Some(vertex),
             distance: light.distance,
@@ -276,7 +279,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         };
         self.b.light.0.clear();
         self.b.light.0.push(world.emitted(&emitting, w));
-        let scale = sine(at.edge, w) * at.inv_pdf;
+        let scale = at.edge.wedge.sine(w) * at.inv_pdf;
         self.detector(&at, &start, w, n, &s, scale)
     }
 
@@ -290,7 +293,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         }
         let light = LightTable::delta(world, emitter, at.x, pmf)?;
         let w = -light.w;
-        let n = at.edge.occluded_side(w)?;
+        let n = at.edge.wedge.occluded_side(w)?;
         let start = Start::on(world, &at);
         let tau = self.open(&start, light.w, light.distance)?;
         let s = End {
@@ -301,7 +304,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         };
         self.b.light.0.clear();
         self.b.light.0.push(light.value);
-        let scale = sine(at.edge, w) * at.inv_pdf;
+        let scale = at.edge.wedge.sine(w) * at.inv_pdf;
         let beyond = self.beyond(&start, w, s.weight);
         for d in beyond.into_iter().flatten() {
             let l = self.share(&s, d.0.distance);
@@ -327,11 +330,12 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         if let Some(contact) = Contact::at(world, &at) {
             return self.contact_with_others(&at, &contact);
         }
-        let (w, inv_pdf) = at.edge.sample_direction(&mut self.tracer.rng);
-        let n = at.edge.occluded_side(w)?;
+        let u = [self.tracer.rng.next_f64(), self.tracer.rng.next_f64()];
+        let (w, inv_pdf) = at.edge.wedge.sample_direction(u);
+        let n = at.edge.wedge.occluded_side(w)?;
         let start = Start::on(world, &at);
         let s = self.end(&start, -w, Rgb::ONE).filter(|s| !self.is_dark(s))?;
-        let scale = sine(at.edge, w) * at.inv_pdf * inv_pdf;
+        let scale = at.edge.wedge.sine(w) * at.inv_pdf * inv_pdf;
         let mut lit = false;
         let beyond = self.beyond(&start, w, s.weight);
         for (d, only_camera) in beyond.into_iter().flatten() {

@@ -118,7 +118,7 @@ impl Shadows {
         add: &mut impl FnMut(&VelocityFunctional, Rgb),
     ) -> Option<()> {
         let world = tracer.world;
-        let n = edge.occluded_side(m.w)?;
+        let n = edge.wedge.occluded_side(m.w)?;
         let part = intervals(ray.medium, &ray.crossings, ray.length)
             .find(|i| i.start <= m.t && m.t < i.end)?;
         let medium = part.medium?;
@@ -214,7 +214,7 @@ impl Shadows {
         b: &mut Buffers,
     ) -> Option<Rgb> {
         let world = tracer.world;
-        world.cast_past(x, edge.faces, medium, w, &mut b.segment, &mut tracer.counters);
+        world.cast_past(x, edge.wedge.faces, medium, w, &mut b.segment, &mut tracer.counters);
         let reached = match to {
             ShadowLight::Point(_, Some(s)) => {
                 b.segment.end.as_ref().is_some_and(|(p, _)| p.prim == s.prim)
@@ -232,7 +232,8 @@ impl Shadows {
 
 /// Intersects a camera ray with the shadow surface of an edge.
 fn meet(edge: &Edge, source: &ShadowLight, eye: Vec3, dir: Vec3) -> Option<FluxSample> {
-    let (a, along) = edge.line();
+    let [a, b] = edge.wedge.ends;
+    let along = b - a;
     match source {
         ShadowLight::Point(y, _) => {
             let q = a - *y;

@@ -2,13 +2,13 @@
 
 use alloc::sync::Arc;
 
+use drt_geom::edges::tree::TreeScratch;
 use drt_math::{Rgb, RgbVec, Rng};
 
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::antithetic::{AntitheticPairs, PairedRadiance};
 use crate::derivative::sensitivity::{SurfaceAdjoint, VelocityTerm};
 use crate::derivative::velocity::{Material, Movers, PathVelocities, RecordedPath, VelocityField};
-use crate::edges::tree::TreeScratch;
 use crate::sampling::record::PathRecord;
 use crate::sampling::streams::LINE_STREAM;
 use crate::sampling::trace::Tracer;

@@ -1,10 +1,11 @@
 //! How much radiance jumps at an edge, by side paths (2019 paper, Algorithm 3, in the corrected form of
 //! theory sheet §3).
 
+use drt_geom::edges::EdgeSides;
 use drt_math::{Rgb, Vec3};
 
 use crate::derivative::velocity::blend::Blends;
-use crate::edges::discontinuities::{DiscontinuityEdge, EdgeSides};
+use crate::edges::discontinuities::DiscontinuityEdge;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
 use crate::terms::radiative::Radiative;

@@ -1,4 +1,4 @@
-//! Sampling edges from a vertex: the [tree](crate::edges::tree), asked in several ways at once.
+//! Sampling edges from a vertex: the [tree](drt_geom::edges::tree), asked in several ways at once.
 //!
 //! Radiance jumps most where a lamp is behind an edge. So some queries go towards the spheres around the
 //! lamps, and the rest anywhere.
@@ -9,11 +9,11 @@
 use alloc::vec::Vec;
 
 use drt_geom::Aabb;
+use drt_geom::edges::Lobes;
+use drt_geom::edges::tree::{Draw, EdgeTree, MOST_WAYS, Segment, TreeScratch, Viewpoint, Way};
 use drt_math::Vec3;
 
 use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
-use crate::edges::tree::{Draw, EdgeTree, MOST_WAYS, Segment, TreeScratch, Viewpoint, Way};
-use crate::model::surface::Lobes;
 use crate::terms::radiative::{Chosen, EdgeQuery};
 use crate::world::World;
 use crate::world::vertex::{Kind, Vertex};
@@ -124,17 +124,17 @@ fn segment(
     discontinuity: &DiscontinuityEdge,
     weight: f64,
 ) -> Segment {
-    let (a, along) = discontinuity.edge.line();
+    let [a, b] = discontinuity.edge.wedge.ends;
     let (faces, open) = match discontinuities.normals(discontinuity) {
         Some(normals) => (normals, false),
         // What is seen of three faces and more depends on where from.
         None => {
             let across = discontinuities.faces(discontinuity).map(|(_, across)| across).next();
-            ([discontinuity.edge.tangent.cross(across.unwrap_or_default()); 2], true)
+            ([discontinuity.edge.wedge.tangent.cross(across.unwrap_or_default()); 2], true)
         }
     };
     let crease = discontinuity.crease.map(|crease| crease * weight);
-    Segment { a, b: a + along, faces, open, discontinuity: weight, crease }
+    Segment { a, b, faces, open, discontinuity: weight, crease }
 }
 
 /// The spheres around the surfaces that emit most.

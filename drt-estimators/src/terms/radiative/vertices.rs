@@ -2,10 +2,10 @@
 
 use core::ops::Range;
 
+use drt_geom::edges::tree::TreeScratch;
 use drt_math::{Rgb, Vec3};
 
 use crate::derivative::velocity::RecordedPath;
-use crate::edges::tree::TreeScratch;
 use crate::sampling::trace::Endpoint;
 use crate::sampling::trace::Tracer;
 use crate::terms::radiative::choice::Choice;

@@ -1,6 +1,7 @@
 //! Sketches are like what they are of.
 
 use core::f64::consts::{FRAC_1_PI, PI};
+use drt_geom::edges::{Lobe, Lobes};
 
 use drt_medium::Phase;
 

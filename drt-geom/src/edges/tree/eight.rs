@@ -1,6 +1,6 @@
 //! Eight numbers of single precision at a time: what is only estimated needs no more, and machines
 //! compute with as many at once. Plain arrays, so that all of them get the same bits: by AVX2 they are
-//! one register each in what is inlined where [`Registers`](drt_geom::Registers) are asked for. So closures here are only for
+//! one register each in what is inlined where [`Registers`](crate::query::Registers) are asked for. So closures here are only for
 //! functions that are always inlined, and never for `map` of an array or an option.
 
 use core::ops::{Add, Div, Mul, Sub};

@@ -5,9 +5,9 @@ use alloc::vec::Vec;
 use drt_math::testing::{SIGNIFICANCE, chi_square};
 use drt_math::{Rng, vec3};
 
+use crate::edges::Lobes;
 use crate::edges::tree::tests::setup::*;
 use crate::edges::tree::*;
-use crate::model::surface::Lobes;
 
 const SAMPLES: u32 = 40_000;
 

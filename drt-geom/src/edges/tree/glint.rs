@@ -10,7 +10,7 @@
 //! ```
 //!
 //! A being the difference of atan((φ - φ₀) / s) between the ends. That is sampled exactly and has longer tails
-//! than the [lobe](crate::model::surface::Lobe) itself. Kernel and lobes are mixed by what is scattered from them.
+//! than the [lobe](crate::edges::Lobe) itself. Kernel and lobes are mixed by what is scattered from them.
 //!
 //! [kernel]: super::kernel
 
@@ -18,9 +18,9 @@ use core::f64::consts::FRAC_2_PI;
 
 use drt_math::{Real, Vec3, fm};
 
+use crate::edges::Lobe;
 use crate::edges::tree::kernel::Kernel;
 use crate::edges::tree::view::Viewpoint;
-use crate::model::surface::Lobe;
 
 /// The part of points that the kernel draws at least.
 const LEAST_EVEN: f64 = 0.25;
@@ -163,7 +163,7 @@ mod tests {
     use drt_math::{Rng, vec3};
 
     use super::*;
-    use crate::model::surface::Lobes;
+    use crate::edges::Lobes;
 
     /// Integrals over lines, by points drawn and their density.
     #[test]

@@ -9,7 +9,8 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use drt_geom::{Aabb, Registers};
+use crate::Aabb;
+use crate::query::Registers;
 use drt_math::fm;
 
 use crate::edges::tree::bundle::Bundle;
@@ -21,7 +22,8 @@ use crate::edges::tree::{ARITY, EdgeTree, LEAF, Segment};
 impl EdgeTree {
     /// A tree over the segments that can count. `None` when there are none: when each is without
     /// length or weight, or not finite.
-    pub(crate) fn new(segments: &[Segment]) -> Option<Self> {
+    #[must_use]
+    pub fn new(segments: &[Segment]) -> Option<Self> {
         let mut pieces: Vec<Piece> =
             segments.iter().zip(0..).filter_map(|(s, edge)| Piece::new(s, edge)).collect();
         if pieces.is_empty() {

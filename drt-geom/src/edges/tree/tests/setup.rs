@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use drt_geom::{EdgeClass, Mesh, NONE, Topology, procedural};
+use crate::{EdgeClass, Mesh, NONE, Topology, procedural};
 use drt_math::{Rng, Vec3, vec3, warp};
 
 use crate::edges::tree::options::NodeGroup;
@@ -96,7 +96,7 @@ pub(super) fn segments(mesh: &Mesh, (discontinuity, crease): (f64, [f64; 2])) ->
     };
     let topology = Topology::of(mesh);
     let edges = topology.edges.iter().filter(|e| e.class != EdgeClass::Flat);
-    let segment = |e: &drt_geom::Edge| {
+    let segment = |e: &crate::Edge| {
         let [a, b] = e.vertices.map(|v| mesh.positions[v as usize]);
         let open = e.faces[1] == NONE;
         let faces = [normal(e.faces[0]), if open { Vec3::ZERO } else { normal(e.faces[1]) }];

@@ -2,12 +2,12 @@
 
 use alloc::vec::Vec;
 
-use drt_geom::procedural;
+use crate::procedural;
 use drt_math::{Rng, Vec3};
 
 use crate::edges::tree::tests::setup::*;
 use crate::edges::tree::*;
-use crate::model::surface::{Lobe, Lobes};
+use crate::edges::{Lobe, Lobes};
 
 #[test]
 fn all_registers_give_the_same_bits() {

@@ -3,7 +3,7 @@
 use std::time::Instant;
 use std::{eprintln, vec::Vec};
 
-use drt_geom::{Mesh, procedural};
+use crate::{Mesh, procedural};
 use drt_math::{CdfTable, Moments, Rng};
 
 use crate::edges::tree::tests::setup::*;

@@ -21,14 +21,14 @@
 //! sum over its edges: weight × length × P(counts as silhouette or crease) × f / r^2,
 //! ```
 //!
-//! f being a [sketch](crate::model::surface::Lobes) of how x scatters: a cosine with the normal of a surface,
-//! and lobes, as wide as the node is seen besides their own width. The estimate ([`node`]) is positive
+//! f being a [sketch](crate::edges::Lobes) of how x scatters: a cosine with the normal of a surface,
+//! and lobes, as wide as the node is seen besides their own width. The estimate (`node`) is positive
 //! wherever an edge below may count, so nothing is lost, and 0 where it is proved that none does.
-//! Near x nodes are opened first, down to their edges ([`cut`]), and the first choice is among all that
+//! Near x nodes are opened first, down to their edges (`cut`), and the first choice is among all that
 //! this leaves. Nodes have eight children, as each choice adds its error and a wide tree has few of
-//! them, and as eight are [judged at once](eight); leaves weigh their edges one by one, eight at once too
-//! ([`bundle`]). On the edge the density is sin / r^2, exactly ([`kernel`]), mixed with that of lobes that are narrow
-//! along it ([`glint`]). A sample costs time
+//! them, and as eight are judged at once (`eight`); leaves weigh their edges one by one, eight at once too
+//! (`bundle`). On the edge the density is sin / r^2, exactly (`kernel`), mixed with that of lobes that are narrow
+//! along it (`glint`). A sample costs time
 //! logarithmic in the number of edges.
 //!
 //! A node may turn out to hold nothing that counts after all. Then there is no sample, and the
@@ -41,6 +41,27 @@
 //! how much of them is in a cone. So the density is that of all ways together, at the cost of one
 //! descent (balance heuristic of one sample; Veach & Guibas 1995). Ways that have nothing to choose
 //! from leave their part to the others.
+//!
+//! ```
+//! use drt_geom::edges::tree::{Draw, EdgeTree, Segment, TreeScratch, Viewpoint, Way};
+//! use drt_math::{Vec3, vec3};
+//!
+//! // The rim of a sheet along x, seen from a point in space that scatters evenly.
+//! let rim = Segment {
+//!     a: vec3(-1.0, 0.0, 0.0),
+//!     b: vec3(1.0, 0.0, 0.0),
+//!     faces: [Vec3::Z; 2],
+//!     open: true,
+//!     discontinuity: 1.0,
+//!     crease: [1.0; 2],
+//! };
+//! let tree = EdgeTree::new(&[rim]).expect("has a length");
+//! let from = Viewpoint::new(vec3(0.0, 0.0, 2.0), None);
+//! let draw = Draw { way: 0.5, point: [0.5, 0.5] };
+//! let mut scratch = TreeScratch::default();
+//! let found = tree.sample(&from, &[Way::anywhere(1.0)], &draw, &mut scratch).expect("in sight");
+//! assert!(found.edge == 0 && (found.u - 0.5).abs() < 1e-12 && found.inv_pdf > 0.0);
+//! ```
 
 mod build;
 mod bundle;
@@ -58,46 +79,49 @@ mod view;
 
 use alloc::vec::Vec;
 
-use drt_geom::{Registers, Work};
+use crate::query::{Registers, Work};
 use drt_math::Vec3;
 
 use crate::edges::tree::bundle::Bundle;
 use crate::edges::tree::cut::Looking;
 use crate::edges::tree::node::{Child, Family};
 use crate::edges::tree::options::NodeGroup;
-pub(crate) use crate::edges::tree::options::TreeScratch;
+pub use crate::edges::tree::options::TreeScratch;
 use crate::edges::tree::piece::{Line, Stretch};
-pub(crate) use crate::edges::tree::view::{MOST_WAYS, Viewpoint, Way};
+pub use crate::edges::tree::view::{MOST_WAYS, Viewpoint, Way};
 
 /// An edge of a surface at which the radiance may jump that arrives at a point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Segment {
-    pub(crate) a: Vec3,
-    pub(crate) b: Vec3,
+pub struct Segment {
+    /// Its first end.
+    pub a: Vec3,
+    /// Its second end.
+    pub b: Vec3,
     /// Unit normals of the two faces, on the sides that are one side of the surface; only the first
     /// is looked at of an open edge.
-    pub(crate) faces: [Vec3; 2],
+    pub faces: [Vec3; 2],
     /// One face only: always a silhouette.
-    pub(crate) open: bool,
+    pub open: bool,
     /// What to expect of the jump where the edge is a silhouette.
-    pub(crate) discontinuity: f64,
+    pub discontinuity: f64,
     /// The same where both faces are seen from the front, and where both are from the back.
-    pub(crate) crease: [f64; 2],
+    pub crease: [f64; 2],
 }
 
 /// A point on an edge.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Chosen {
-    pub(crate) edge: usize,
+pub struct Chosen {
+    /// Index among the edges that the tree was built of.
+    pub edge: usize,
     /// How far it is from the edge's first end, as a part of its length.
-    pub(crate) u: f64,
+    pub u: f64,
     /// 1 over the density per length.
-    pub(crate) inv_pdf: f64,
+    pub inv_pdf: f64,
 }
 
-/// Edges to choose from.
+/// Edges to choose from; see the [module](self).
 #[derive(Debug)]
-pub(crate) struct EdgeTree {
+pub struct EdgeTree {
     root: Child,
     /// The children of nodes.
     families: Vec<Family>,
@@ -121,17 +145,17 @@ const LEAF: usize = 32;
 
 /// Uniform numbers to draw a point with.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Draw {
+pub struct Draw {
     /// For the way of looking.
-    pub(crate) way: f64,
+    pub way: f64,
     /// For the edge: what each choice leaves of it serves for the next. And for the place on it.
-    pub(crate) point: [f64; 2],
+    pub point: [f64; 2],
 }
 
 impl EdgeTree {
     /// Draws a point by looking one of several ways; its density is that of all of them together.
     /// `None` where nothing counts, or nothing is found (see [above](self)).
-    pub(crate) fn sample(
+    pub fn sample(
         &self,
         view: &Viewpoint,
         ways: &[Way],
@@ -142,7 +166,7 @@ impl EdgeTree {
     }
 
     /// An estimate of the integral over all segments of kernel, scattering and weight, looking one way.
-    pub(crate) fn amount(&self, view: &Viewpoint, way: &Way, options: &mut TreeScratch) -> f64 {
+    pub fn amount(&self, view: &Viewpoint, way: &Way, options: &mut TreeScratch) -> f64 {
         self.registers.run(Summing { tree: self, view, way, options })
     }
 

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use drt_geom::procedural;
+use crate::procedural;
 use drt_math::{Rng, Vec3, vec3};
 
 use crate::edges::tree::tests::setup::*;

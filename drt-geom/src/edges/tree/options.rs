@@ -19,7 +19,7 @@ pub(super) enum NodeGroup {
 
 /// Memory for choices, to be used again and again.
 #[derive(Debug, Default)]
-pub(crate) struct TreeScratch {
+pub struct TreeScratch {
     groups: Vec<NodeGroup>,
     /// Children that are to be judged by what is below them.
     pub(super) opened: Vec<Child>,

@@ -10,7 +10,7 @@ use drt_math::{Vec3, fm};
 
 use crate::edges::tree::eight::{Eight, Vectors, along, dot, each, pairs, same, single};
 use crate::edges::tree::view::{Cone, Viewpoint, Way};
-use crate::model::surface::{Lobe, Lobes};
+use crate::edges::{Lobe, Lobes};
 
 /// What has the sign of a bound may be beyond it by this part of distances.
 const TOLERANCE: f32 = 2e-6;

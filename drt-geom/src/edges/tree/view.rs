@@ -2,11 +2,11 @@
 
 use drt_math::{Real, Vec3};
 
-use crate::model::surface::Lobes;
+use crate::edges::Lobes;
 
 /// A point at which light scatters, as edges matter to it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Viewpoint {
+pub struct Viewpoint {
     pub(super) x: Vec3,
     pub(super) normal: Option<(Vec3, bool)>,
     /// What is scattered from where.
@@ -15,7 +15,7 @@ pub(crate) struct Viewpoint {
 
 /// One of several cones of directions to sample edges in.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Way {
+pub struct Way {
     /// The part of queries that go this way.
     pub(super) chance: f64,
     pub(super) cone: Option<Cone>,
@@ -24,7 +24,7 @@ pub(crate) struct Way {
 }
 
 /// Most ways of a query.
-pub(crate) const MOST_WAYS: usize = 5;
+pub const MOST_WAYS: usize = 5;
 
 /// A cone of directions less than a right angle wide on either side.
 #[derive(Clone, Copy, Debug)]
@@ -40,12 +40,14 @@ impl Viewpoint {
     /// A point `x` on a surface with the unit `normal`, or in a volume where there is none. With the
     /// normal goes whether light from below counts too; where it does not, what lies below the
     /// plane through `x` does not matter.
-    pub(crate) fn new(x: Vec3, normal: Option<(Vec3, bool)>) -> Self {
+    #[must_use]
+    pub fn new(x: Vec3, normal: Option<(Vec3, bool)>) -> Self {
         Self { x, normal, lobes: Lobes::even(1.0) }
     }
 
-    /// The same, where light scatters as in a sketch.
-    pub(crate) fn scattering(self, lobes: Lobes) -> Self {
+    /// The same, where directions count by their `lobes`.
+    #[must_use]
+    pub fn scattering(self, lobes: Lobes) -> Self {
         Self { lobes, ..self }
     }
 
@@ -54,9 +56,10 @@ impl Viewpoint {
         self.normal.map_or(1.0, |(n, _)| Real::abs(n.dot(w)))
     }
 
-    /// Looking only at what may be before a sphere: in the cone of directions that meet it, up to its
+    /// Looking only at what may be before a sphere, in the part `chance` of queries: in the cone of directions that meet it, up to its
     /// far side. From inside the sphere these are all directions.
-    pub(crate) fn toward(&self, chance: f64, center: Vec3, radius: f64) -> Way {
+    #[must_use]
+    pub fn toward(&self, chance: f64, center: Vec3, radius: f64) -> Way {
         let to = center - self.x;
         let distance = to.length();
         let sin = radius / distance;
@@ -69,8 +72,9 @@ impl Viewpoint {
 }
 
 impl Way {
-    /// Looking at all edges there are.
-    pub(crate) const fn anywhere(chance: f64) -> Self {
+    /// Looking at all edges there are, in the part `chance` of queries.
+    #[must_use]
+    pub const fn anywhere(chance: f64) -> Self {
         Self { chance, cone: None, reach: f64::INFINITY }
     }
 }
