@@ -21,13 +21,14 @@ pub use derivative::tangents::moved;
 pub use drt_motion::interior::{GivenTetrahedra, InteriorMotion};
 pub use fit::loss;
 pub use model::agreement::{Agreement, agreement};
-pub use model::error::Error;
+pub use model::error::{EffectError, ElementError, Error, SettingError};
 pub use model::plan::{MediumPlan, Plan};
 pub use model::rendering::{
     BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term,
 };
 pub use model::scene::{
-    Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding, Target,
+    Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding,
+    Target, TargetName,
 };
 pub use model::settings::{Depth, EstimatorKind, Settings};
 pub use model::{emitter, filter, sensor, surface};

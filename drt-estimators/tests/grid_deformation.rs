@@ -87,7 +87,7 @@ fn what_cannot_ride_says_why() {
     ) {
         Err(Error::Effect { parameter, reason, .. }) => {
             assert_eq!(parameter, "p");
-            reason
+            reason.to_string()
         }
         Err(other) => panic!("{other}"),
         Ok(_) => panic!("it should not work"),

@@ -27,7 +27,7 @@ pub mod warp;
 
 pub use affine::Affine;
 pub use change::{ValueChange, ValueMap};
-pub use discrete::{AliasTable, CdfTable};
+pub use discrete::{AliasTable, CdfTable, WeightsError};
 pub use dual::Dual;
 pub use frame::Frame;
 /// The version whose types convert to and from those here.

@@ -55,6 +55,7 @@ fn too_bright_a_light_is_rejected() {
                 | Emitter::Point { intensity: strength, .. }
                 | Emitter::Spot { intensity: strength, .. }
                 | Emitter::Directional { irradiance: strength, .. } => *strength *= 2.0,
+                other => panic!("{} is not known here", other.kind()),
             }
         }
         for row in judged(&trial) {

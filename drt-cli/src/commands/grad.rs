@@ -31,12 +31,12 @@ pub(super) fn derivatives(
     part: f64,
 ) -> Result<Rendering, CliError> {
     match job.settings.estimator {
-        EstimatorKind::PathSpace | EstimatorKind::Radiative => {
+        EstimatorKind::FiniteDifference => by_differences(job, options, monitor, part),
+        _ => {
             let mut session = run::prepare(job, &job.parameters)?;
             monitor.stage("grad", 0.0, part);
             Ok(run::sample(&mut session, options, job.settings.spp, monitor))
         }
-        EstimatorKind::FiniteDifference => by_differences(job, options, monitor, part),
     }
 }
 

@@ -1,6 +1,5 @@
 //! `drt info`: what is in a scene or job, and what a run would do.
 
-use drt_estimators::emitter::Emitter;
 use drt_estimators::{Integrator, MediumBoundary, Scene, Shape, Surrounding};
 use drt_geom::{EdgeClass, Topology};
 use drt_medium::{Medium, MediumKind, Phase};
@@ -111,13 +110,7 @@ fn media(scene: &Scene) -> Table<4> {
 
 fn emitters(scene: &Scene) -> Table<3> {
     let rows = scene.emitters.iter().enumerate().map(|(i, e)| {
-        let (kind, strength) = match e.item.emitter {
-            Emitter::Area { radiance } => ("area", radiance),
-            Emitter::Point { intensity, .. } => ("point", intensity),
-            Emitter::Spot { intensity, .. } => ("spot", intensity),
-            Emitter::Directional { irradiance, .. } => ("directional", irradiance),
-            Emitter::Constant { radiance } => ("constant", radiance),
-        };
+        let (kind, strength) = (e.item.emitter.kind(), e.item.emitter.strength());
         [name(e.id.as_ref(), "emitter", i), kind.into(), format!("{:?}", strength.to_array())]
     });
     Table::new(["emitter", "kind", "strength"], rows)

@@ -259,7 +259,7 @@ fn errors_of_the_estimators_get_the_place_of_their_cause() {
     let j = job(text, &[]).unwrap();
     let blame = |parameter: &str| {
         let (parameter, target_name) = (parameter.into(), "cube".into());
-        let reason = "no".into();
+        let reason = drt_estimators::EffectError::NotMovable;
         j.blame(&drt_estimators::Error::Effect { parameter, target_name, reason }).to_string()
     };
     assert!(blame("p").contains("job.toml:2"));

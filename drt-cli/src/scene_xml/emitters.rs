@@ -51,20 +51,11 @@ impl<'a> Loader<'a> {
         };
         p.finish()?;
         let emitter = emitter.checked().map_err(|err| e.error(err))?;
-        if is_negative(&emitter) {
+        if emitter.strength().to_array().iter().any(|v| *v < 0.0) {
             return Err(e.error("an emitter's colour must not be negative"));
         }
         Ok(Named { id: e.id().map(Into::into), item: SceneEmitter { emitter, medium } })
     }
-}
-
-fn is_negative(emitter: &Emitter) -> bool {
-    let (Emitter::Area { radiance: c }
-    | Emitter::Constant { radiance: c }
-    | Emitter::Point { intensity: c, .. }
-    | Emitter::Spot { intensity: c, .. }
-    | Emitter::Directional { irradiance: c, .. }) = emitter;
-    c.to_array().iter().any(|v| *v < 0.0)
 }
 
 /// `position`, or the image of the origin under `to_world`.

@@ -5,8 +5,6 @@
 //! changes alone, so that the deformation dies out towards the box. A grid is as deformed as the space
 //! it lies in, and its faces stay on the shape's where they lie on them.
 
-use alloc::format;
-use alloc::string::{String, ToString};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
@@ -14,18 +12,20 @@ use core::ops::ControlFlow;
 use drt_geom::{Mesh, TetrahedralizeInput, tetrahedralize};
 use drt_math::{Affine, Mat3, Vec3};
 use drt_medium::{Flow, FlowBasis, GridMedium, Medium, NodeWeights, Ray, SpaceMap};
-use drt_motion::deformation::{Deformation, DeformationError};
+use drt_motion::deformation::Deformation;
 use drt_motion::interior::{Carrier, MARGIN, TetrahedralField};
 use drt_motion::parameter::Applied;
 use drt_motion::surface::{MovedFrame, move_affine, move_mesh};
 use drt_motion::{GeometryChange, MotionError, SurfaceMotion};
+
+use crate::model::error::EffectError;
 
 /// Why a grid cannot follow a shape.
 pub(crate) enum GridDeformationError {
     /// A change is at fault.
     Motion(MotionError),
     /// The shape is, or how far it has gone; with the first parameter that deforms it.
-    Shape(usize, String),
+    Shape(usize, EffectError),
 }
 
 impl From<MotionError> for GridDeformationError {
@@ -72,7 +72,7 @@ impl GridDeformation {
         let offsets = spread(offsets.collect());
         let positions = tets.positions.iter().zip(&*offsets).map(|(p, d)| placed(p) + *d);
         let deformation = Deformation::new(tets, positions.collect())
-            .map_err(|e| GridDeformationError::Shape(culprit, turned_over(&e)))?;
+            .map_err(|e| GridDeformationError::Shape(culprit, e.into()))?;
         let velocities = moved.motions.iter().zip(&frame.velocities).map(|(motion, affine)| {
             let own = (0..shape.positions.len()).map(|v| {
                 motion.vertex_velocity(&moved.mesh, v) - affine.point(placed(&shape.positions[v]))
@@ -104,29 +104,16 @@ impl GridDeformation {
 }
 
 /// Tetrahedra in a shape and around it.
-fn fill(grid: &GridMedium, shape: &Mesh) -> Result<TetrahedralField, String> {
+fn fill(grid: &GridMedium, shape: &Mesh) -> Result<TetrahedralField, EffectError> {
     let bounds = shape.bounds();
     let [min, max] = grid.density().world_bounds();
     let beyond = (bounds.min - min).max(max - bounds.max).max(Vec3::ZERO).max_abs();
     let diagonal = bounds.extent().length();
     let margin = MARGIN + if diagonal > 0.0 { beyond / diagonal } else { 0.0 };
     let input = TetrahedralizeInput { surfaces: &[shape], points: &[], margin };
-    let fail = |e: &dyn core::fmt::Display| {
-        format!("no tetrahedra fill the space around the shape that it follows: {e}")
-    };
-    let mut made = tetrahedralize(&input).map_err(|e| fail(&e))?;
+    let mut made = tetrahedralize(&input).map_err(EffectError::Surroundings)?;
     made.remove_slivers(&[shape]);
-    TetrahedralField::new(made).map_err(|e| fail(&e))
-}
-
-fn turned_over(e: &DeformationError) -> String {
-    match e {
-        DeformationError::TurnedOver { at: [x, y, z], .. } => format!(
-            "the shape that it follows deforms too far: around ({x:.3}, {y:.3}, {z:.3}) space would be \
-             turned inside out; choose a value nearer to zero"
-        ),
-        other => other.to_string(),
-    }
+    Ok(TetrahedralField::new(made)?)
 }
 
 /// A deformation as media see it.

@@ -1,6 +1,6 @@
 //! Parameters become tangents: the scene at the parameters' values, and its rate of change by each.
 
-use alloc::string::{String, ToString};
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::AddAssign;
@@ -13,7 +13,7 @@ use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotio
 
 use crate::derivative::grid_deformation::{GridDeformation, GridDeformationError};
 use crate::model::emitter::{Emitter, EmitterTangent};
-use crate::model::error::Error;
+use crate::model::error::{EffectError, Error};
 use crate::model::scene::{Scene, Target};
 use crate::model::sensor::{Sensor, SensorTangent};
 use crate::model::surface::{BsdfChange, BsdfTangent, Property};
@@ -65,12 +65,12 @@ fn resolve(scene: &Scene, parameters: &[Parameter]) -> Result<Vec<Parameter<Targ
                 .effects
                 .iter()
                 .map(|e| {
-                    let fail = |reason: String| effect_error(p, &e.target, reason);
+                    let fail = |reason| effect_error(p, &e.target, reason);
                     let mut target = scene.find(&e.target)?;
                     let change = match &e.change {
                         Change::Geometry(g) => {
                             if let Target::Bsdf(_) = target {
-                                return Err(fail("a bsdf does not move".into()));
+                                return Err(fail(EffectError::NotMovable));
                             }
                             Change::Geometry(g.clone())
                         }
@@ -88,16 +88,16 @@ fn resolve(scene: &Scene, parameters: &[Parameter]) -> Result<Vec<Parameter<Targ
         .collect()
 }
 
-fn carrier(scene: &Scene, target: Target, change: &PropertyChange) -> Result<Target, String> {
+fn carrier(scene: &Scene, target: Target, change: &PropertyChange) -> Result<Target, EffectError> {
     let Target::Shape(i) = target else { return Ok(target) };
     let shape = &scene.shapes[i];
     if change.property == "radiance" {
-        return shape.emitter.map(Target::Emitter).ok_or_else(|| "the shape does not emit".into());
+        return shape.emitter.map(Target::Emitter).ok_or(EffectError::NotEmitting);
     }
     Ok(Target::Bsdf(shape.bsdf))
 }
 
-fn effect_error<T>(p: &Parameter<T>, target: &str, reason: String) -> Error {
+fn effect_error<T>(p: &Parameter<T>, target: &str, reason: EffectError) -> Error {
     Error::Effect { parameter: p.name.clone(), target_name: target.into(), reason }
 }
 
@@ -187,8 +187,8 @@ impl Apply<'_> {
         id.clone().unwrap_or_else(|| alloc::format!("{kind}[{i}]"))
     }
 
-    fn fail(&self, parameter: usize, target: Target, reason: impl ToString) -> Error {
-        effect_error(&self.parameters[parameter], &self.name(target), reason.to_string())
+    fn fail(&self, parameter: usize, target: Target, reason: impl Into<EffectError>) -> Error {
+        effect_error(&self.parameters[parameter], &self.name(target), reason.into())
     }
 
     fn geometry(&self, target: Target) -> Result<Vec<Applied<'_, GeometryChange>>, Error> {
@@ -296,8 +296,7 @@ impl Apply<'_> {
                     return Err(self.fail(p, leader, drt_motion::Cause::NotAffine));
                 };
                 if found.is_some_and(|other| other != shape) {
-                    let reason = "it follows two shapes that deform; it can follow one";
-                    return Err(self.fail(p, target, reason));
+                    return Err(self.fail(p, target, EffectError::TwoLeaders));
                 }
                 found = Some(shape);
             }
@@ -319,10 +318,7 @@ impl Apply<'_> {
             "emission" => MediumChange::Emission { op, voxels },
             "g" => MediumChange::G(op),
             other => {
-                let reason = alloc::format!(
-                    "a medium has no property `{other}`; it has sigma_t, albedo, emission and g"
-                );
-                return Err(self.fail(p, target, reason));
+                return Err(self.fail(p, target, EffectError::MediumProperty(other.into())));
             }
         })
     }
@@ -333,7 +329,7 @@ impl Apply<'_> {
         let parameters = self.parameters;
         for (p, parameter, change) in effects_on(parameters, target) {
             let Change::Property(c) = change else {
-                return Err(self.fail(p, target, "a bsdf does not move"));
+                return Err(self.fail(p, target, EffectError::NotMovable));
             };
             let theta = parameter.value;
             let property = Property::from_name(&c.property).map_err(|e| self.fail(p, target, e))?;
@@ -357,13 +353,12 @@ impl Apply<'_> {
         let given = self.scene.emitters[i].item.emitter;
         let emitter = given
             .checked()
-            .map_err(|e| Error::Element { element: self.name(target), reason: e.to_string() })?;
+            .map_err(|e| Error::Element { element: self.name(target), reason: e.into() })?;
         let changes = self.geometry(target)?;
         if let (Some(first), Emitter::Area { .. } | Emitter::Constant { .. }) =
             (changes.first(), emitter)
         {
-            let reason = "this emitter has no place of its own; move its shape";
-            return Err(self.fail(first.parameter, target, reason));
+            return Err(self.fail(first.parameter, target, EffectError::NoPlace));
         }
         let (emitter, tangents) = self.placed(target, emitter)?;
         self.scene.emitters[i].item.emitter = emitter;
@@ -411,7 +406,7 @@ impl Apply<'_> {
     fn properties(
         &self,
         target: Target,
-        mut change: impl FnMut(&str, &drt_motion::parameter::ChangedValue) -> Result<(), String>,
+        mut change: impl FnMut(&str, &drt_motion::parameter::ChangedValue) -> Result<(), EffectError>,
     ) -> Result<(), Error> {
         let mut done: Vec<&str> = Vec::new();
         for (p, _, effect) in effects_on(self.parameters, target) {
@@ -420,7 +415,7 @@ impl Apply<'_> {
                 continue;
             }
             if c.voxels.is_some() {
-                return Err(self.fail(p, target, "only the grids of a medium have voxels"));
+                return Err(self.fail(p, target, EffectError::NoVoxels));
             }
             done.push(&c.property);
             let changes =
@@ -436,31 +431,31 @@ impl Apply<'_> {
 /// What has a frame and named numbers: emitters and sensors.
 trait Placed: Sized {
     type Tangent: Clone + Default + AddAssign;
-    fn at(&self, map: &Affine) -> Result<Self, String>;
+    fn at(&self, map: &Affine) -> Result<Self, EffectError>;
     fn rate(&self, field: &Affine) -> Self::Tangent;
-    fn value(&self, property: &str) -> Result<Rgb, String>;
-    fn with(&self, property: &str, value: Rgb) -> Result<Self, String>;
-    fn rate_of(&self, property: &str, rate: Rgb) -> Result<Self::Tangent, String>;
+    fn value(&self, property: &str) -> Result<Rgb, EffectError>;
+    fn with(&self, property: &str, value: Rgb) -> Result<Self, EffectError>;
+    fn rate_of(&self, property: &str, rate: Rgb) -> Result<Self::Tangent, EffectError>;
 }
 
 macro_rules! placed {
     ($($item:ty => $tangent:ty),*) => {$(
         impl Placed for $item {
             type Tangent = $tangent;
-            fn at(&self, map: &Affine) -> Result<Self, String> {
-                self.moved(map).map_err(|e| e.to_string())
+            fn at(&self, map: &Affine) -> Result<Self, EffectError> {
+                self.moved(map).map_err(Into::into)
             }
             fn rate(&self, field: &Affine) -> $tangent {
                 self.velocity(field)
             }
-            fn value(&self, property: &str) -> Result<Rgb, String> {
-                self.property(property).map_err(|e| e.to_string())
+            fn value(&self, property: &str) -> Result<Rgb, EffectError> {
+                self.property(property).map_err(Into::into)
             }
-            fn with(&self, property: &str, value: Rgb) -> Result<Self, String> {
-                self.with_property(property, value).map_err(|e| e.to_string())
+            fn with(&self, property: &str, value: Rgb) -> Result<Self, EffectError> {
+                self.with_property(property, value).map_err(Into::into)
             }
-            fn rate_of(&self, property: &str, rate: Rgb) -> Result<$tangent, String> {
-                self.property_tangent(property, rate).map_err(|e| e.to_string())
+            fn rate_of(&self, property: &str, rate: Rgb) -> Result<$tangent, EffectError> {
+                self.property_tangent(property, rate).map_err(Into::into)
             }
         }
     )*};

@@ -134,10 +134,8 @@ impl EdgeTable {
             return Ok(None);
         }
         let weights: Vec<f64> = kept.iter().map(|(_, w)| *w).collect();
-        let table = CdfTable::new(&weights).map_err(|e| Error::Element {
-            element: "edges".into(),
-            reason: alloc::format!("cannot be sampled: {e}"),
-        })?;
+        let table = CdfTable::new(&weights)
+            .map_err(|e| Error::Element { element: "edges".into(), reason: e.into() })?;
         Ok(Some(Self { edges: kept.into_iter().map(|(e, _)| e).collect(), table }))
     }
 

@@ -27,7 +27,7 @@ use alloc::vec::Vec;
 use drt_motion::Parameter;
 
 use crate::fit::loss::{Loss, Reference};
-use crate::model::error::Error;
+use crate::model::error::{Error, SettingError};
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
 use crate::run::session::Control;
@@ -77,22 +77,19 @@ impl Fit {
         loss: Loss,
         settings: Settings,
     ) -> Result<Self, Error> {
-        let fail = |reason: alloc::string::String| {
-            Err(Error::Setting { setting: "target".into(), reason })
-        };
+        let fail = |reason| Err(Error::Setting { setting: "target", reason });
         loss.check()?;
         if views.is_empty() {
-            return fail("is missing: there is nothing to fit to".into());
+            return fail(SettingError::NoTarget);
         }
         for view in &views {
             let Some(sensor) = scene.sensors.get(view.sensor) else {
-                return fail(alloc::format!("is of sensor {}, which does not exist", view.sensor));
+                let count = scene.sensors.len();
+                return fail(SettingError::NoSensor { index: view.sensor, count });
             };
-            let ([w, h], [fw, fh]) = (view.reference.size(), sensor.item.sensor.film());
-            if [w, h] != [fw, fh] {
-                return fail(alloc::format!(
-                    "has {w}x{h} pixels; the film of its sensor has {fw}x{fh}"
-                ));
+            let (found, film) = (view.reference.size(), sensor.item.sensor.film());
+            if found != film {
+                return fail(SettingError::FilmSize { found, film });
             }
         }
         let (views, applied, kept) = (views.into(), None, PreparedCache::default());
@@ -110,14 +107,9 @@ impl Fit {
 
     fn apply(&mut self, values: &[f64]) -> Result<Arc<Applied>, Error> {
         if values.len() != self.parameters.len() {
-            return Err(Error::Setting {
-                setting: "values".into(),
-                reason: alloc::format!(
-                    "has {} numbers; there are {} parameters",
-                    values.len(),
-                    self.parameters.len()
-                ),
-            });
+            let (found, parameters) = (values.len(), self.parameters.len());
+            let reason = SettingError::ValueCount { found, parameters };
+            return Err(Error::Setting { setting: "values", reason });
         }
         for (parameter, value) in self.parameters.iter_mut().zip(values) {
             if parameter.value.to_bits() != value.to_bits() {

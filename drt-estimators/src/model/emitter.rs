@@ -67,6 +67,7 @@ pub enum EmitterError {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
 pub enum Emitter {
     /// A shape that glows on its front side.
     Area {
@@ -250,7 +251,8 @@ impl Emitter {
 
     /// Radiance, intensity or irradiance.
     #[inline]
-    fn strength(&self) -> Rgb {
+    #[must_use]
+    pub fn strength(&self) -> Rgb {
         match *self {
             Self::Area { radiance } | Self::Constant { radiance } => radiance,
             Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity,

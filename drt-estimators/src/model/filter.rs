@@ -14,6 +14,7 @@ use crate::model::filter::sampling::HalfProfile;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
 pub enum FilterKind {
     /// Constant on [-radius, radius).
     Box {

@@ -48,6 +48,7 @@ pub struct Layer {
 /// The parts a derivative image is the sum of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Term {
     /// Differentiated contributions of material paths.
     Interior,

@@ -8,6 +8,7 @@ use drt_geom::Mesh;
 use drt_medium::Medium;
 
 use crate::model::emitter::Emitter;
+use crate::model::error::{ElementError, Error};
 use crate::model::sensor::Sensor;
 use crate::model::surface::Bsdf;
 
@@ -143,29 +144,70 @@ pub enum Target {
     Sensor(usize),
 }
 
+/// What names an item of a scene: its id, its kind and order such as `shape[0]`, or the [`Target`] itself.
+pub trait TargetName {
+    /// The item.
+    ///
+    /// # Errors
+    /// When nothing or more than one thing has that name.
+    fn find_in(&self, scene: &Scene) -> Result<Target, Error>;
+}
+
+impl TargetName for Target {
+    fn find_in(&self, _: &Scene) -> Result<Target, Error> {
+        Ok(*self)
+    }
+}
+
+impl TargetName for &str {
+    fn find_in(&self, scene: &Scene) -> Result<Target, Error> {
+        scene.find(self)
+    }
+}
+
+impl TargetName for String {
+    fn find_in(&self, scene: &Scene) -> Result<Target, Error> {
+        scene.find(self)
+    }
+}
+
 impl Scene {
-    /// Checks that indices refer to something and that what emits has an area.
+    /// Checks that indices refer to something, that what emits has an area, and the numbers of scattering models
+    /// and emitters. Media, sensors and meshes check theirs when they are made.
     ///
     /// # Errors
     /// Names the element and what is wrong with it.
-    pub fn check(&self) -> Result<(), crate::model::error::Error> {
-        let fail = |element: String, reason: String| {
-            Err(crate::model::error::Error::Element { element, reason })
-        };
+    pub fn check(&self) -> Result<(), Error> {
         let missing = |m: Option<usize>| m.is_some_and(|m| m >= self.media.len());
+        let stated = |s: Surrounding| matches!(s, Surrounding::Stated(m) if missing(m));
         for (i, s) in self.shapes.iter().enumerate() {
-            let name = || s.id.clone().unwrap_or_else(|| alloc::format!("shape[{i}]"));
+            let fail = |reason| unusable(&s.id, "shape", i, reason);
             if s.bsdf >= self.bsdfs.len() {
-                return fail(name(), alloc::format!("there is no bsdf {}", s.bsdf));
+                return Err(fail(ElementError::NoBsdf(s.bsdf)));
             }
             if s.emitter.is_some_and(|e| e >= self.emitters.len()) {
-                return fail(name(), "its emitter does not exist".into());
+                return Err(fail(ElementError::NoEmitter));
             }
             if s.boundary.is_some_and(|b| missing(b.interior) || missing(b.exterior)) {
-                return fail(name(), "one of its media does not exist".into());
+                return Err(fail(ElementError::NoMedium));
             }
             if s.emitter.is_some() && s.mesh.surface_area() <= 0.0 {
-                return fail(name(), "it emits but has no area".into());
+                return Err(fail(ElementError::NoArea));
+            }
+        }
+        for (i, b) in self.bsdfs.iter().enumerate() {
+            b.item.validate().map_err(|e| unusable(&b.id, "bsdf", i, e.into()))?;
+        }
+        for (i, e) in self.emitters.iter().enumerate() {
+            let fail = |reason| unusable(&e.id, "emitter", i, reason);
+            e.item.emitter.checked().map_err(|e| fail(e.into()))?;
+            if stated(e.item.medium) {
+                return Err(fail(ElementError::NoMedium));
+            }
+        }
+        for (i, s) in self.sensors.iter().enumerate() {
+            if stated(s.item.medium) {
+                return Err(unusable(&s.id, "sensor", i, ElementError::NoMedium));
             }
         }
         Ok(())
@@ -175,20 +217,18 @@ impl Scene {
     ///
     /// # Errors
     /// A sentence naming what exists when nothing or more than one thing has that name.
-    pub fn find(&self, name: &str) -> Result<Target, crate::model::error::Error> {
+    pub fn find(&self, name: &str) -> Result<Target, Error> {
         if let Some(target) = self.find_by_order(name) {
             return Ok(target);
         }
         let mut found = self.named().filter(|(id, _)| *id == Some(name)).map(|(_, t)| t);
         match (found.next(), found.next()) {
             (Some(t), None) => Ok(t),
-            (None, _) => Err(crate::model::error::Error::UnknownTarget {
+            (None, _) => Err(Error::UnknownTarget {
                 name: name.into(),
                 known: self.named().filter_map(|(id, _)| id.map(String::from)).collect(),
             }),
-            (Some(_), Some(_)) => {
-                Err(crate::model::error::Error::AmbiguousTarget { name: name.into() })
-            }
+            (Some(_), Some(_)) => Err(Error::AmbiguousTarget { name: name.into() }),
         }
     }
 
@@ -220,5 +260,75 @@ impl Scene {
             .chain(ids(&self.bsdfs, Target::Bsdf))
             .chain(ids(&self.emitters, Target::Emitter))
             .chain(ids(&self.sensors, Target::Sensor))
+    }
+}
+
+fn unusable(id: &Option<String>, kind: &str, i: usize, reason: ElementError) -> Error {
+    Error::Element { element: id.clone().unwrap_or_else(|| alloc::format!("{kind}[{i}]")), reason }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::string::ToString;
+
+    use drt_geom::procedural;
+    use drt_math::{Rgb, Vec3};
+
+    use super::*;
+    use crate::model::surface::{Diffuse, RoughConductor};
+
+    fn scene() -> Scene {
+        let light = Emitter::Point { position: Vec3::Z, intensity: Rgb::ONE };
+        Scene {
+            shapes: alloc::vec![Shape {
+                id: None,
+                mesh: Arc::new(procedural::cube()),
+                bsdf: 0,
+                boundary: None,
+                emitter: None,
+            }],
+            bsdfs: alloc::vec![Named::new("grey", Bsdf::Diffuse(Diffuse::default()))],
+            emitters: alloc::vec![Named::new(
+                "bulb",
+                SceneEmitter { emitter: light, medium: Surrounding::Counted }
+            )],
+            ..Scene::default()
+        }
+    }
+
+    #[test]
+    fn every_element_is_checked() {
+        scene().check().unwrap();
+        let fails = |change: &dyn Fn(&mut Scene), part: &str| {
+            let mut scene = scene();
+            change(&mut scene);
+            let message = scene.check().unwrap_err().to_string();
+            assert!(message.contains(part), "{message}");
+        };
+        fails(&|s| s.shapes[0].bsdf = 1, "shape[0]: there is no bsdf 1");
+        fails(&|s| s.shapes[0].emitter = Some(1), "its emitter does not exist");
+        let media = MediumBoundary { interior: Some(0), exterior: None };
+        fails(&|s| s.shapes[0].boundary = Some(media), "one of its media");
+        let albedo = |r| Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(r) });
+        for wrong in [f64::NAN, -0.1, 1.5] {
+            fails(&|s| s.bsdfs[0].item = albedo(wrong), "grey: ");
+        }
+        let metal = |alpha| Bsdf::RoughConductor(RoughConductor { alpha, ..Default::default() });
+        for wrong in [f64::NAN, 0.0, -1.0] {
+            fails(&|s| s.bsdfs[0].item = metal(wrong), "alpha");
+        }
+        for wrong in [f64::NAN, f64::INFINITY] {
+            let light = |at: f64| Emitter::Point { position: Vec3::Z * at, intensity: Rgb::ONE };
+            fails(&|s| s.emitters[0].item.emitter = light(wrong), "bulb: ");
+        }
+        let sun = Emitter::Directional { direction: Vec3::ZERO, irradiance: Rgb::ONE };
+        fails(&|s| s.emitters[0].item.emitter = sun, "zero vector");
+        fails(&|s| s.emitters[0].item.medium = Surrounding::Stated(Some(3)), "one of its media");
+        let flat = |s: &mut Scene| {
+            let mut mesh = (*s.shapes[0].mesh).clone();
+            mesh.positions.iter_mut().for_each(|p| *p = Vec3::ZERO);
+            (s.shapes[0].mesh, s.shapes[0].emitter) = (Arc::new(mesh), Some(0));
+        };
+        fails(&flat, "it emits but has no area");
     }
 }

@@ -4,9 +4,12 @@ use alloc::vec::Vec;
 
 use drt_motion::interior::InteriorMotion;
 
+use crate::model::error::{Error, SettingError};
+
 /// How derivatives are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum EstimatorKind {
     /// Material-form path integrals, interior and boundary (2021 paper).
     #[default]
@@ -50,38 +53,39 @@ pub struct Settings {
     pub estimator: EstimatorKind,
     /// Index of the sensor.
     pub sensor: usize,
-    /// Interior (and forward) samples per pixel.
+    /// Paths per pixel: of the image, and of the terms of derivatives found along paths. A
+    /// [`Session`](crate::Session) is told by each run how many it takes; there this is what
+    /// `boundary_spp` is in proportion to.
     pub spp: u32,
-    /// Boundary samples of all kinds together, per pixel on average; `None` is as many as `spp`, or if
-    /// [`adaptive`](Self::adaptive) as many of each kind as pay for their time. The kinds share them in equal
-    /// parts, of which edges seen from the camera leave up to three quarters where they are soon known well enough.
+    /// Boundary samples of all kinds together, per pixel on average. They share them in equal parts, of which edges
+    /// seen from the camera leave up to three quarters where a pilot finds them known well enough. `None` is as many as
+    /// `spp`; with [`adaptive`](Self::adaptive), for each kind as many as make the noise least for the time, between
+    /// a quarter of `spp` and four times as many.
     pub boundary_spp: Option<u32>,
     /// Path depth.
     pub max_depth: Depth,
-    /// Image points in pairs mirrored at the pixel's centre (theory: 2021 paper, §5.4), and rays in pairs
-    /// mirrored in narrow lobes that turn; those that estimate derivatives by roughness are always in pairs.
+    /// Samples in antithetic pairs: image points mirrored at the pixel's centre (2021 paper, §5.4), and rays
+    /// mirrored in narrow lobes that turn. Derivatives by roughness are always estimated by pairs.
     pub antithetic: bool,
-    /// Choose samples by what is known of how things move; the expected values do not change. Reverse
-    /// mode knows nothing of it, so that without guiding forward mode is its exact transpose.
+    /// Choose samples by how things move. Expected values do not change. Reverse mode does not
+    /// know it: forward mode is its exact transpose only without.
     pub guiding: bool,
-    /// Of [`EstimatorKind::Radiative`]: query an edge from every vertex of a path, as the 2019 paper
-    /// does, at a cost that grows with the square of its length; `boundary_spp` then tells the camera's
-    /// edges alone. Else one of a path's vertices does, chosen by its throughput.
+    /// Of [`EstimatorKind::Radiative`]: query an edge from every vertex of a path (2019 paper), at a cost
+    /// quadratic in its length; `boundary_spp` then counts the camera's edges alone. Else one vertex of each path
+    /// queries, chosen by its throughput.
     pub every_vertex: bool,
-    /// Pixels whose derivatives are noisier take more of the samples, by a pilot that takes an eighth of them
-    /// and is then forgotten; `spp` is the mean. The image, where no derivative is asked for. Where
-    /// `boundary_spp` is not given, each boundary term takes as many as make the noise least for the time,
-    /// between a quarter of `spp` and four times as many.
+    /// Give more of the samples to pixels whose derivatives (without parameters, whose image) are noisier; `spp` is
+    /// the mean. A pilot takes an eighth of the samples and is then forgotten.
     pub adaptive: bool,
-    /// Finite-difference half step, in units of each parameter.
+    /// Half step of finite differences, in units of each parameter.
     pub step: f64,
     /// Names the random numbers: same seed, same pixel data.
     pub seed: u64,
-    /// Threads; 0 takes all cores. Without the feature `parallel`, one.
+    /// Threads; 0 is all cores. Without the feature `parallel`, one.
     pub threads: usize,
     /// Keep each derivative's terms apart as well.
     pub terms: bool,
-    /// Insides that do not move as the plan would choose, by the medium's index.
+    /// How the insides of media move, by the medium's index, where not as the plan chooses.
     pub insides: Vec<(usize, InteriorMotion)>,
 }
 
@@ -111,13 +115,10 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting.
-    pub(crate) fn check(&self) -> Result<(), crate::model::error::Error> {
+    pub(crate) fn check(&self) -> Result<(), Error> {
         if self.step > 0.0 && self.step.is_finite() {
             return Ok(());
         }
-        Err(crate::model::error::Error::Setting {
-            setting: "step".into(),
-            reason: alloc::format!("is {}; expected a positive number", self.step),
-        })
+        Err(Error::Setting { setting: "step", reason: SettingError::NotPositive(self.step) })
     }
 }

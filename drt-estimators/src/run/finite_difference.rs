@@ -8,7 +8,7 @@ use drt_motion::Parameter;
 
 use crate::derivative::contraction::Contraction;
 use crate::derivative::tangents;
-use crate::model::error::Error;
+use crate::model::error::{Error, SettingError};
 use crate::model::rendering::Layer;
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
@@ -37,10 +37,8 @@ pub fn finite_differences(
     control: &dyn Control,
 ) -> Result<Vec<Layer>, Error> {
     if !(step > 0.0 && step.is_finite()) {
-        return Err(Error::Setting {
-            setting: "step".into(),
-            reason: alloc::format!("is {step}; expected a positive number"),
-        });
+        let reason = SettingError::NotPositive(step);
+        return Err(Error::Setting { setting: "step", reason });
     }
     scene.check()?;
     let pool = Pool::new(settings.threads);

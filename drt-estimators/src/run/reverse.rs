@@ -1,11 +1,12 @@
-//! Reverse mode: the gradient of a loss with respect to everything, from the same paths, records and
-//! boundary samples as the derivative images.
+//! Reverse mode: the gradient of a loss by everything, from the same paths, records and boundary samples as
+//! derivative images.
 //!
-//! With a_i = dLoss/dI_i at pixel i, the gradient is Σ_i a_i dI_i/dq for every quantity q. The
-//! sensitivities that forward mode contracts with velocities are scattered instead, each times its
-//! pixel's adjoint: to vertices through the transposed jets, those of volume vertices by way of the
-//! vertices of tetrahedra, to voxels through the transposed interpolation. Cost does not grow with the number of quantities. For the same seed, without
-//! [`guiding`](Settings::guiding), ⟨a, J v⟩ = ⟨Jᵀ a, v⟩ up to rounding.
+//! With a_i = ∂Loss/∂I_i at pixel i, the gradient by a quantity q is Σ_i a_i ∂I_i/∂q. Forward mode contracts
+//! sensitivities (to positions, normals, coefficients) with the tangents of its parameters. Here each is
+//! multiplied by its pixel's adjoint and added up where it belongs: at mesh vertices, through the transposed jets
+//! of surface points; for points inside a medium, at the vertices of its tetrahedra and from there at those
+//! of the shapes around it; at voxels, through the transposed interpolation. The cost does not grow with the number
+//! of quantities. With the same seed and without [`guiding`](Settings::guiding), ⟨a, J v⟩ = ⟨Jᵀ a, v⟩ to rounding.
 
 use alloc::vec::Vec;
 
@@ -21,8 +22,8 @@ use crate::derivative::sensitivity::{
 };
 use crate::derivative::tangents;
 use crate::model::emitter::EmitterGradient;
-use crate::model::error::Error;
-use crate::model::scene::{Scene, Target};
+use crate::model::error::{Error, SettingError};
+use crate::model::scene::{Scene, Target, TargetName};
 use crate::model::sensor::SensorGradient;
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::surface::BsdfParams;
@@ -39,51 +40,42 @@ use crate::world::lights::EmitterMask;
 use crate::world::vertex::MaterialPoint;
 use crate::world::{ActiveFactors, MediumActivity, World};
 
-/// The gradient of a loss by the items `wanted`, with `adjoint` holding dLoss/dI for every pixel (row
-/// by row from the top left, per channel).
+/// The gradient of a loss by the items `wanted`. `adjoint` holds ∂Loss/∂I per pixel and channel, row by row
+/// from the top left.
 ///
-/// The inside of a medium moves with tetrahedra between the shapes that touch it, and the cameras and
-/// point lights in it, if paths have vertices on any of them that is wanted; what the tetrahedra
-/// collect is added to the gradients of those. So rates stay finite next to surfaces that scatter.
-/// Tetrahedra are made anew by every call, in 0.05 to 0.25 s per 1000 vertices around the medium.
+/// How the inside of a medium moves with what is around it:
 ///
-/// An inside stays static, and the flux through shapes that are wanted is added, which is right for
-/// every motion too, where no paths have vertices on what is wanted (null and black surfaces), where
-/// shapes pass through each other, so that there are no tetrahedra, and where [`Settings::insides`]
-/// asks for [`InteriorMotion::Static`](crate::InteriorMotion::Static).
+/// * By default it is filled with tetrahedra between the shapes that touch it and the cameras and point lights in it. Their
+///   gradients are added to those of the shapes. Tetrahedra are made anew by every call, in 0.05 to 0.25 s per 1000 vertices.
+/// * It stays at rest, and the flux through the shapes that are wanted is added, where no paths have vertices on what
+///   is wanted (null and black surfaces), where shapes pass through each other, where [`Settings::insides`]
+///   asks for [`InteriorMotion::Static`](crate::InteriorMotion::Static), and by [`EstimatorKind::Radiative`].
+/// * Tetrahedra that [`Settings::insides`] gives are taken, without the velocities given along with them. Other kinds
+///   of motion count as not asked for.
 ///
-/// If [`Settings::insides`] asks for [`InteriorMotion::Tetrahedral`](crate::InteriorMotion::Tetrahedral), given
-/// or not, these are taken, without velocities given along with them. For the same seed forward mode
-/// with the same settings, without [`guiding`](Settings::guiding), is then the exact transpose, unless shapes touch that move differently: no
-/// field follows both, and the flux through what is left behind is added here. Other kinds of insides
-/// have no transpose here, and count as not asked for. By [`EstimatorKind::Radiative`] insides stay static
-/// here in any case; there forward mode is the transpose where either of the two kinds is asked for, as without it
-/// homogeneous media go along where all around them moves by one affine field.
+/// All of these have the same expected value. Forward mode is the exact transpose with the same seed and settings, without
+/// [`guiding`](Settings::guiding), and with one of the kinds above asked for in both. An exception are shapes that touch and
+/// move differently: no field follows both, and the flux through what is left behind is added here.
 ///
 /// # Errors
-/// When the adjoint's size is not the film's, the scene or a setting is unusable, or tetrahedra that
-/// [`Settings::insides`] asks for cannot be made.
+/// When a name is not that of one item, the adjoint's size is not the film's, the scene or a setting is unusable, or
+/// tetrahedra that [`Settings::insides`] asks for cannot be made.
 pub fn gradient(
     scene: &Scene,
-    wanted: &[Target],
+    wanted: &[impl TargetName],
     settings: &Settings,
     adjoint: &[Rgb],
     control: &dyn Control,
 ) -> Result<SceneGradient, Error> {
     settings.check()?;
     scene.check()?;
+    let wanted = wanted.iter().map(|w| w.find_in(scene)).collect::<Result<Vec<_>, _>>()?;
+    let wanted = &wanted[..];
     let (scene, _) = tangents::apply(scene, &[])?;
     let film = scene.sensors[settings.sensor].item.sensor.film();
     if adjoint.len() != (film[0] * film[1]) as usize {
-        return Err(Error::Setting {
-            setting: "adjoint".into(),
-            reason: alloc::format!(
-                "has {} pixels; the film has {}x{}",
-                adjoint.len(),
-                film[0],
-                film[1]
-            ),
-        });
+        let reason = SettingError::PixelCount { found: adjoint.len(), expected: film };
+        return Err(Error::Setting { setting: "adjoint", reason });
     }
     let depth = settings.max_depth.within(scene.integrator.max_depth);
     let mut kept = PreparedCache::default();

@@ -1,6 +1,5 @@
 //! All triangles of a scene under one tree.
 
-use alloc::string::ToString;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
@@ -43,10 +42,8 @@ impl Geometry {
                 prims.push(Prim { shape: i as u32, triangle: t });
             }
         }
-        let bvh = TriangleBvh::build(&soup).map_err(|e| Error::Element {
-            element: "scene geometry".into(),
-            reason: e.to_string(),
-        })?;
+        let bvh = TriangleBvh::build(&soup)
+            .map_err(|e| Error::Element { element: "scene geometry".into(), reason: e.into() })?;
         let (mut lo, mut hi) = (Vec3::splat(f64::INFINITY), Vec3::splat(f64::NEG_INFINITY));
         for p in soup.iter().flatten() {
             lo = lo.min(*p);

@@ -192,10 +192,10 @@ impl LightTable {
         } else if weights.is_empty() {
             None
         } else {
-            Some(AliasTable::new(&weights).map_err(|e| Error::Element {
-                element: "emitters".into(),
-                reason: alloc::format!("powers cannot be sampled: {e}"),
-            })?)
+            Some(
+                AliasTable::new(&weights)
+                    .map_err(|e| Error::Element { element: "emitters".into(), reason: e.into() })?,
+            )
         };
         let mut lights = Self {
             entries,

@@ -117,7 +117,8 @@ impl Similarity {
                 *position = self.map().point(*position);
                 *intensity *= self.scale * self.scale;
             }
-            Emitter::Area { .. } | Emitter::Directional { .. } | Emitter::Constant { .. } => {}
+            // The others have no position.
+            _ => {}
         }
     }
 

@@ -33,7 +33,7 @@ pub(super) fn job(
     let by_paths = match job.settings.estimator {
         EstimatorKind::Radiative => "radiative",
         // Differences are measured in any case.
-        EstimatorKind::PathSpace | EstimatorKind::FiniteDifference => "path-space",
+        _ => "path-space",
     };
     let derivatives = bench.session(by_paths, |job| run::prepare(job, &job.parameters))?;
     // The image comes along; it is measured by itself already.

@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use drt_motion::interior::{InteriorBasis, InteriorError, InteriorMotion, InteriorVelocity};
 
 use crate::derivative::tangents::Tangents;
-use crate::model::error::Error;
+use crate::model::error::{ElementError, Error};
 use crate::world::World;
 use crate::world::cache::PreparedCache;
 
@@ -86,7 +86,7 @@ impl MediumMotions {
             let plan = around
                 .inputs
                 .plan(asked_for(asked, m), kept.tetrahedra(m))
-                .map_err(|e| unusable(world, m, named(&e)))?;
+                .map_err(|e| unusable(world, m, e, named(&e)))?;
             motions.velocities[m] = plan.velocities;
             motions.bases[m] = plan.basis;
             motions.flux[m] = plan.flux;
@@ -104,7 +104,8 @@ fn asked_for(asked: &[(usize, InteriorMotion)], medium: usize) -> Option<&Interi
     asked.iter().rev().find(|(m, _)| *m == medium).map(|(_, kind)| kind)
 }
 
-fn unusable(world: &World, medium: usize, reason: String) -> Error {
+fn unusable(world: &World, medium: usize, error: InteriorError, message: String) -> Error {
     let name = world.scene.media[medium].id.clone();
-    Error::Element { element: name.unwrap_or_else(|| alloc::format!("medium[{medium}]")), reason }
+    let element = name.unwrap_or_else(|| alloc::format!("medium[{medium}]"));
+    Error::Element { element, reason: ElementError::Interior { error, message } }
 }

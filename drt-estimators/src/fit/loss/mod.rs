@@ -6,13 +6,12 @@ mod pyramid;
 #[cfg(test)]
 mod tests;
 
-use alloc::string::String;
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, fm};
 
 use crate::fit::loss::pyramid::Pyramid;
-use crate::model::error::Error;
+use crate::model::error::{Error, SettingError};
 
 /// A distance between images. With d the difference of two images, times the mask where there is one:
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -59,7 +58,10 @@ impl Reference {
         check_length("target", size, pixels.len())?;
         match pixels.iter().position(|p| !p.is_finite()) {
             None => Ok(Self { size, pixels, mask: None }),
-            Some(i) => Err(unusable("target", alloc::format!("{} is not finite", at(size, i)))),
+            Some(i) => {
+                let [column, row] = at(size, i);
+                Err(unusable("target", SettingError::PixelNotFinite { column, row }))
+            }
         }
     }
 
@@ -70,11 +72,12 @@ impl Reference {
     pub fn with_mask(self, mask: Vec<f64>) -> Result<Self, Error> {
         check_length("mask", self.size, mask.len())?;
         if let Some(i) = mask.iter().position(|m| !(*m >= 0.0 && m.is_finite())) {
-            let reason = alloc::format!("{} is {}; expected 0 or more", at(self.size, i), mask[i]);
+            let [column, row] = at(self.size, i);
+            let reason = SettingError::MaskPixel { column, row, value: mask[i] };
             return Err(unusable("mask", reason));
         }
         if mask.iter().all(|m| *m == 0.0) {
-            return Err(unusable("mask", "is zero everywhere, which leaves nothing to fit".into()));
+            return Err(unusable("mask", SettingError::EmptyMask));
         }
         Ok(Self { mask: Some(mask), ..self })
     }
@@ -87,16 +90,15 @@ impl Reference {
     /// When the part is not positive, or the image is black or has negative pixels.
     pub fn relative(self, part: f64) -> Result<Self, Error> {
         if !(part > 0.0 && part.is_finite()) {
-            let reason = alloc::format!("is {part}; expected a positive number");
-            return Err(unusable("relative", reason));
+            return Err(unusable("relative", SettingError::NotPositive(part)));
         }
         let mean = self.pixels.iter().map(|p| p.mean()).sum::<f64>() / self.pixels.len() as f64;
         if let Some(i) = self.pixels.iter().position(|p| p.mean() < 0.0) {
-            let reason = alloc::format!("{} of the target is negative", at(self.size, i));
-            return Err(unusable("relative", reason));
+            let [column, row] = at(self.size, i);
+            return Err(unusable("relative", SettingError::NegativePixel { column, row }));
         }
         if mean == 0.0 {
-            return Err(unusable("relative", "has no meaning for a black target".into()));
+            return Err(unusable("relative", SettingError::BlackTarget));
         }
         let pixels = self.pixels.iter().enumerate();
         let factors = pixels.map(|(i, p)| self.factor(i) * mean / (p.mean() + part * mean));
@@ -123,7 +125,7 @@ impl Reference {
     pub fn reduced(&self, factor: u32) -> Result<Self, Error> {
         let [w, h] = self.size;
         if factor == 0 || w % factor != 0 || h % factor != 0 {
-            let reason = alloc::format!("{w}x{h} pixels cannot be divided by {factor}");
+            let reason = SettingError::Indivisible { size: self.size, factor };
             return Err(unusable("target", reason));
         }
         let size = [w / factor, h / factor];
@@ -156,12 +158,9 @@ impl Loss {
     /// Names the number.
     pub fn check(&self) -> Result<(), Error> {
         match *self {
-            Self::PyramidL2 { levels: 0, .. } => {
-                Err(unusable("loss", "has 0 levels; expected at least 1".into()))
-            }
+            Self::PyramidL2 { levels: 0, .. } => Err(unusable("loss", SettingError::NoLevels)),
             Self::PyramidL2 { weight, .. } if !(weight > 0.0 && weight.is_finite()) => {
-                let reason = alloc::format!("has weight {weight}; expected a positive number");
-                Err(unusable("loss", reason))
+                Err(unusable("loss", SettingError::Weight(weight)))
             }
             _ => Ok(()),
         }
@@ -266,18 +265,19 @@ fn sign(v: f64) -> f64 {
     if v == 0.0 { 0.0 } else { v.signum() }
 }
 
-fn check_length(setting: &str, size: [u32; 2], found: usize) -> Result<(), Error> {
+fn check_length(setting: &'static str, size: [u32; 2], found: usize) -> Result<(), Error> {
     let [w, h] = size;
     if found == w as usize * h as usize && found > 0 {
         return Ok(());
     }
-    Err(unusable(setting, alloc::format!("has {found} pixels; expected {w}x{h}")))
+    Err(unusable(setting, SettingError::PixelCount { found, expected: size }))
 }
 
-fn at([w, _]: [u32; 2], i: usize) -> String {
-    alloc::format!("the pixel in column {}, row {}", i % w as usize, i / w as usize)
+/// Column and row of a pixel.
+fn at([w, _]: [u32; 2], i: usize) -> [u32; 2] {
+    [i as u32 % w, i as u32 / w]
 }
 
-fn unusable(setting: &str, reason: String) -> Error {
-    Error::Setting { setting: setting.into(), reason }
+fn unusable(setting: &'static str, reason: SettingError) -> Error {
+    Error::Setting { setting, reason }
 }

@@ -70,6 +70,7 @@ pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
 /// relies on it.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum Bsdf {
     /// No surface at all: the border of a medium.
     Null,

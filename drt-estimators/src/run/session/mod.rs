@@ -16,7 +16,7 @@ use crate::run::session::pilot::Pilot;
 
 use crate::derivative::tangents;
 use crate::derivative::tangents::Tangents;
-use crate::model::error::Error;
+use crate::model::error::{Error, SettingError};
 use crate::model::plan::Plan;
 use crate::model::rendering::Estimate;
 use crate::model::rendering::{Account, Derivative, Layer, Rendering, Term};
@@ -97,10 +97,7 @@ impl Session {
     ) -> Result<Self, Error> {
         scene.check()?;
         if settings.estimator == EstimatorKind::FiniteDifference && !parameters.is_empty() {
-            return Err(Error::Setting {
-                setting: "estimator".into(),
-                reason: "finite differences have no session; call `finite_differences`".into(),
-            });
+            return Err(Error::Setting { setting: "estimator", reason: SettingError::NoSession });
         }
         let (scene, tangents) = tangents::apply(scene, parameters)?;
         Self::prepared(&scene, &tangents, settings, &mut PreparedCache::default())

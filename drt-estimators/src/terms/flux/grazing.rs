@@ -91,7 +91,7 @@ impl GrazingFlux {
         }
         let table = CdfTable::new(&weights).map_err(|e| Error::Element {
             element: "triangles seen edge on".into(),
-            reason: alloc::format!("cannot be sampled: {e}"),
+            reason: e.into(),
         })?;
         let spatial = flux.movers.is_some();
         Ok(Some(Self { triangles, table, spatial }))

@@ -134,10 +134,8 @@ impl PrimaryEdges {
         if indices.is_empty() {
             return Ok(None);
         }
-        let table = CdfTable::new(&weights).map_err(|e| Error::Element {
-            element: "edges".into(),
-            reason: alloc::format!("cannot be sampled: {e}"),
-        })?;
+        let table = CdfTable::new(&weights)
+            .map_err(|e| Error::Element { element: "edges".into(), reason: e.into() })?;
         Ok(Some(Self { discontinuities: indices, table }))
     }
 
