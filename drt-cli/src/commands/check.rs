@@ -2,12 +2,13 @@
 
 use drt_estimators::{Layer, Rendering, agreement};
 
+use super::derivatives::derivatives;
 use super::monitor::Monitor;
 use super::noise::relative_noise;
 use super::options::Options;
 use super::outputs::Outputs;
 use super::table::Table;
-use super::{Outcome, grad, run};
+use super::{Outcome, run};
 use crate::digest::Verdict;
 use crate::{CliError, Job};
 
@@ -21,7 +22,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     }
     let outputs = Outputs::new(options, "check")?;
     let monitor = Monitor::new(options.changes.quiet);
-    let mut rendering = grad::derivatives(&job, options, &monitor, 0.4)?;
+    let mut rendering = derivatives(&job, options, &monitor, 0.4)?;
     let differences = match rendering.complete {
         true => two_steps(&job, rendering.spp, &monitor)?,
         false => None,

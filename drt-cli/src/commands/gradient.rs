@@ -7,9 +7,10 @@ use drt_estimators::loss::{Loss, Reference};
 use drt_estimators::{Target, gradient, moved};
 use drt_math::Rgb;
 
+use super::derivatives::derivatives;
 use super::monitor::Monitor;
 use super::options::GradOptions;
-use super::{Outcome, grad, run};
+use super::{Outcome, run};
 use crate::error::Place;
 use crate::image::read_picture;
 use crate::npy::write_npy;
@@ -104,7 +105,7 @@ fn of_adjoint(
 ) -> Result<Option<Vec<f64>>, CliError> {
     let mut numbers = Vec::new();
     if !job.parameters.is_empty() {
-        let rendering = grad::derivatives(job, &options.common, monitor, 0.6)?;
+        let rendering = derivatives(job, &options.common, monitor, 0.6)?;
         if !rendering.complete {
             return Ok(None);
         }

@@ -3,6 +3,7 @@
 mod bench;
 mod check;
 mod clock;
+mod derivatives;
 mod grad;
 mod gradient;
 mod info;

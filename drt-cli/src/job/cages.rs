@@ -8,8 +8,8 @@ use drt_geom::Mesh;
 use drt_motion::mean_value::Cage;
 use drt_motion::{Cause, GeometryChange};
 
-use super::effects::Refusal;
 use super::keys;
+use super::refusal::Refusal;
 use crate::CliError;
 use crate::error::Place;
 

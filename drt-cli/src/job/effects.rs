@@ -7,22 +7,8 @@ use drt_motion::{Change, Effect, GeometryChange, PropertyChange, ValueChange};
 
 use super::cages::Cages;
 use super::keys::{self, Voxels};
+use super::refusal::Refusal;
 use super::velocities;
-use crate::CliError;
-
-/// Why an effect cannot be used.
-pub(super) enum Refusal {
-    /// Its keys do not make sense together; told with the place of the effect.
-    Keys(String),
-    /// A file it names is unusable.
-    File(CliError),
-}
-
-impl From<String> for Refusal {
-    fn from(message: String) -> Self {
-        Self::Keys(message)
-    }
-}
 
 /// Keys of which an effect has exactly one.
 const KINDS: &str =

@@ -7,6 +7,7 @@ mod groups;
 mod keys;
 mod motions;
 mod optimize;
+mod refusal;
 #[cfg(test)]
 mod tests;
 mod velocities;
@@ -23,9 +24,9 @@ use crate::scene_xml::read_scene;
 use crate::{CliError, Defaults};
 use cages::Cages;
 use document::Document;
-use effects::Refusal;
 pub use groups::ParameterGroup;
 pub use optimize::Optimize;
+use refusal::Refusal;
 
 /// What the command line lays over a job or scene.
 #[derive(Clone, Debug, Default)]

@@ -10,6 +10,7 @@ mod element;
 mod emitters;
 mod index;
 mod media;
+mod numbers;
 mod properties;
 mod sensors;
 mod shapes;

@@ -3,7 +3,7 @@
 use drt_math::Rgb;
 
 use super::element::Element;
-use super::properties::{numbers, plain_value};
+use super::numbers::{numbers, plain_value};
 use crate::CliError;
 
 /// Tags that can give a colour.

@@ -4,7 +4,7 @@ use drt_estimators::sensor::look_at;
 use drt_math::{Affine, Frame, Mat3, Vec3, vec3};
 
 use super::element::Element;
-use super::properties::{number, numbers, triple};
+use super::numbers::{number, numbers, triple};
 use crate::CliError;
 
 const VECTOR: &[&str] = &["x", "y", "z", "value"];

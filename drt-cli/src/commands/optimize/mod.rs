@@ -14,10 +14,11 @@ mod watch;
 
 use drt_estimators::fit::Evaluation;
 
+use super::derivatives::derivatives;
 use super::monitor::Monitor;
 use super::options::OptimizeOptions;
 use super::outputs::Outputs;
-use super::{Outcome, grad, run};
+use super::{Outcome, run};
 use crate::{CliError, Job};
 use descent::Descent;
 use problem::Problem;
@@ -65,7 +66,7 @@ fn write(
         parameter.value = *value;
     }
     let by_count = super::options::Options { seconds: None, ..options.common.clone() };
-    let rendering = grad::derivatives(&job, &by_count, monitor, 1.0)?;
+    let rendering = derivatives(&job, &by_count, monitor, 1.0)?;
     outputs.write(&job, &rendering, &[], &[])
 }
 

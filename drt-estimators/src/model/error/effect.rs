@@ -1,0 +1,78 @@
+use alloc::string::String;
+
+use drt_geom::{TetMeshError, TetrahedralizeError};
+use drt_medium::MediumError;
+use drt_motion::Cause;
+use drt_motion::deformation::DeformationError;
+use thiserror::Error;
+
+use crate::model::emitter::EmitterError;
+use crate::model::sensor::SensorError;
+use crate::model::surface::SurfaceError;
+
+/// Why an effect does not apply to its target.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum EffectError {
+    /// Geometry of a scattering model.
+    #[error("a bsdf does not move")]
+    NotMovable,
+    /// Radiance of a shape without an emitter.
+    #[error("the shape does not emit")]
+    NotEmitting,
+    /// Geometry of an area or constant emitter.
+    #[error("this emitter has no place of its own; move its shape")]
+    NoPlace,
+    /// Voxels of anything but a medium.
+    #[error("only the grids of a medium have voxels")]
+    NoVoxels,
+    /// A medium that follows more than one shape that deforms.
+    #[error("it follows two shapes that deform; it can follow one")]
+    TwoLeaders,
+    /// A property that media do not have.
+    #[error("a medium has no property `{0}`; it has sigma_t, albedo, emission and g")]
+    MediumProperty(String),
+    /// A grid cannot follow a shape that no tetrahedra surround.
+    #[error("no tetrahedra fill the space around the shape that it follows: {0}")]
+    Surroundings(#[source] TetrahedralizeError),
+    /// Those around it cannot be used.
+    #[error("no tetrahedra fill the space around the shape that it follows: {0}")]
+    Tetrahedra(#[from] TetMeshError),
+    /// A grid cannot follow a shape that deforms too far.
+    #[error(
+        "the shape that it follows deforms too far: around ({:.3}, {:.3}, {:.3}) space would be \
+         turned inside out; choose a value nearer to zero",
+        .at[0], .at[1], .at[2]
+    )]
+    TurnedOver {
+        /// Where, in world space.
+        at: [f64; 3],
+    },
+    /// A grid cannot follow a shape otherwise.
+    #[error(transparent)]
+    Deformation(DeformationError),
+    /// A change that cannot be made.
+    #[error(transparent)]
+    Motion(#[from] Cause),
+    /// A property of a scattering model.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// A property or place of an emitter.
+    #[error(transparent)]
+    Emitter(#[from] EmitterError),
+    /// A property or place of a sensor.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
+    /// A property or place of a medium.
+    #[error(transparent)]
+    Medium(#[from] MediumError),
+}
+
+impl From<DeformationError> for EffectError {
+    fn from(e: DeformationError) -> Self {
+        match e {
+            DeformationError::TurnedOver { at, .. } => Self::TurnedOver { at },
+            other => Self::Deformation(other),
+        }
+    }
+}

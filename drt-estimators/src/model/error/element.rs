@@ -1,0 +1,46 @@
+use alloc::string::String;
+
+use drt_geom::BvhError;
+use drt_motion::interior::InteriorError;
+use thiserror::Error;
+
+use crate::model::emitter::EmitterError;
+use crate::model::surface::SurfaceError;
+
+/// What is wrong with an element of a scene.
+#[derive(Clone, Debug, Error)]
+#[non_exhaustive]
+pub enum ElementError {
+    /// A shape's scattering model does not exist.
+    #[error("there is no bsdf {0}")]
+    NoBsdf(usize),
+    /// A shape's emitter does not exist.
+    #[error("its emitter does not exist")]
+    NoEmitter,
+    /// A medium of a shape, emitter or sensor does not exist.
+    #[error("one of its media does not exist")]
+    NoMedium,
+    /// A shape that emits and has no area.
+    #[error("it emits but has no area")]
+    NoArea,
+    /// A scattering model's properties.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    /// An emitter's properties.
+    #[error(transparent)]
+    Emitter(#[from] EmitterError),
+    /// Triangles that cannot be searched.
+    #[error(transparent)]
+    Geometry(#[from] BvhError),
+    /// Powers, areas or edges that make no distribution.
+    #[error("cannot be sampled: {0}")]
+    Distribution(#[from] drt_math::WeightsError),
+    /// A medium's inside cannot move as asked for.
+    #[error("{message}")]
+    Interior {
+        /// Why not; surfaces and parameters by their indices.
+        error: InteriorError,
+        /// The same with names.
+        message: String,
+    },
+}

@@ -1,0 +1,97 @@
+use thiserror::Error;
+
+/// What is wrong with a setting.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum SettingError {
+    /// A number that must be positive and finite.
+    #[error("is {0}; expected a positive number")]
+    NotPositive(f64),
+    /// A sensor that does not exist.
+    #[error("there is no sensor {index}; the scene has {count}")]
+    NoSensor {
+        /// The one asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// Finite differences where a session is asked for.
+    #[error("finite differences have no session; call `finite_differences`")]
+    NoSession,
+    /// A list of pixels of the wrong length.
+    #[error("has {found} pixels; expected {}x{}", .expected[0], .expected[1])]
+    PixelCount {
+        /// Its length.
+        found: usize,
+        /// Width and height.
+        expected: [u32; 2],
+    },
+    /// An image of another size than the film.
+    #[error(
+        "has {}x{} pixels; the film of its sensor has {}x{}",
+        .found[0], .found[1], .film[0], .film[1]
+    )]
+    FilmSize {
+        /// Width and height of the image.
+        found: [u32; 2],
+        /// Width and height of the film.
+        film: [u32; 2],
+    },
+    /// No target to fit to.
+    #[error("is missing: there is nothing to fit to")]
+    NoTarget,
+    /// Values that are not one per parameter.
+    #[error("has {found} numbers; there are {parameters} parameters")]
+    ValueCount {
+        /// Numbers given.
+        found: usize,
+        /// Parameters.
+        parameters: usize,
+    },
+    /// A pixel that is NaN or infinite.
+    #[error("the pixel in column {column}, row {row} is not finite")]
+    PixelNotFinite {
+        /// From the left.
+        column: u32,
+        /// From the top.
+        row: u32,
+    },
+    /// A mask's pixel that is negative or not finite.
+    #[error("the pixel in column {column}, row {row} is {value}; expected 0 or more")]
+    MaskPixel {
+        /// From the left.
+        column: u32,
+        /// From the top.
+        row: u32,
+        /// What it holds.
+        value: f64,
+    },
+    /// A negative pixel of a target where differences are relative.
+    #[error("the pixel in column {column}, row {row} of the target is negative")]
+    NegativePixel {
+        /// From the left.
+        column: u32,
+        /// From the top.
+        row: u32,
+    },
+    /// A mask of zeros.
+    #[error("is zero everywhere, which leaves nothing to fit")]
+    EmptyMask,
+    /// A black target where differences are relative.
+    #[error("has no meaning for a black target")]
+    BlackTarget,
+    /// An image that cannot be reduced by a factor.
+    #[error("{}x{} pixels cannot be divided by {factor}", .size[0], .size[1])]
+    Indivisible {
+        /// Width and height.
+        size: [u32; 2],
+        /// The factor.
+        factor: u32,
+    },
+    /// A pyramid without levels.
+    #[error("has 0 levels; expected at least 1")]
+    NoLevels,
+    /// A weight that is not positive and finite.
+    #[error("has weight {0}; expected a positive number")]
+    Weight(f64),
+}
