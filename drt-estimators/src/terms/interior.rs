@@ -222,7 +222,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let width = camera.film()[0];
         for view in &mut self.views {
             let stream = |of: u64| Rng::new(self.seed, of | u64::from(pixel), unit);
-            view.begin(Some(stream(PAIR_STREAM)), stream(FLUX_STREAM));
+            view.begin(Some(stream(PAIR_STREAM)), || stream(FLUX_STREAM));
         }
         let shadows = self.workers.iter().any(|w| w.along.shadows.is_some());
         let mut recorder = Recorder {
@@ -244,12 +244,15 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             query,
         };
         let mut at = 1;
-        let numbers = self.tracer.rng.clone();
+        let several = self.workers.len() > 1;
+        let numbers = several.then(|| self.tracer.rng.clone());
         for (worker, view) in self.workers.iter_mut().zip(&mut self.views) {
             let n = worker.sink.layers();
             at = usize::max(at, 1 + n);
             // What one does must not depend on how many numbers another takes.
-            self.tracer.rng = numbers.clone();
+            if let Some(numbers) = &numbers {
+                self.tracer.rng.clone_from(numbers);
+            }
             worker.add(&mut self.tracer, &path, view, at, values);
             if self.separate {
                 at += n * worker.along.terms().count();

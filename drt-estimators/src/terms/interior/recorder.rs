@@ -23,11 +23,11 @@ pub(crate) struct PathView<'a> {
 
 impl PathView<'_> {
     /// Forgets the last path; random numbers are for choosing among pairs, and surfaces with a flux.
-    pub(crate) fn begin(&mut self, pairs: Option<Rng>, flux: Rng) {
+    pub(crate) fn begin(&mut self, pairs: Option<Rng>, flux: impl FnOnce() -> Rng) {
         self.velocities.begin();
         self.pairs.begin(pairs);
         if let Some(reservoir) = &mut self.flux {
-            reservoir.begin(flux);
+            reservoir.begin(flux());
         }
     }
 
