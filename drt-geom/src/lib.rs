@@ -53,3 +53,11 @@ pub use weld::weld;
 
 /// The index that stands for "none" where a face or primitive may be absent.
 pub const NONE: u32 = u32::MAX;
+
+/// Largest coordinate a scene may have: products of three stay in the range of `f64`.
+const LARGEST: f64 = 1e100;
+
+/// Whether a point can be computed with.
+fn is_usable(p: drt_math::Vec3) -> bool {
+    p.is_finite() && p.max_abs() <= LARGEST
+}

@@ -10,7 +10,7 @@ fn unusable_arrays_are_refused() {
     for bad in [f64::NAN, f64::INFINITY] {
         let mut q = p.clone();
         q[1].z = bad;
-        assert_eq!(Mesh::new(q, vec![[0, 1, 2]]), Err(MeshError::NonFinitePosition { vertex: 1 }));
+        assert_eq!(Mesh::new(q, vec![[0, 1, 2]]), Err(MeshError::BadPosition { vertex: 1 }));
     }
     let error = Mesh::new(p.clone(), vec![[0, 1, 2], [0, 3, 1]]).unwrap_err();
     assert_eq!(error, MeshError::IndexOutOfRange { triangle: 1, index: 3, count: 3 });

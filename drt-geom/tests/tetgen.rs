@@ -225,7 +225,7 @@ fn nonsense_is_refused() {
     let mut bad = cube.clone();
     bad.positions[3].y = f64::NAN;
     let error = make(&[&cube, &bad], &[]).unwrap_err();
-    let vertex = MeshError::NonFinitePosition { vertex: 3 };
+    let vertex = MeshError::BadPosition { vertex: 3 };
     assert!(matches!(&error, TetgenError::BadSurface { surface: 1, source } if *source == vertex));
     let mut bad = cube.clone();
     bad.triangles[2][1] = 8;

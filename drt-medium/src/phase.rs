@@ -31,14 +31,24 @@ impl Phase {
     /// # Errors
     /// When `g` does not lie in (-1, 1).
     pub fn henyey_greenstein(g: f64) -> Result<Self, MediumError> {
-        if g > -1.0 && g < 1.0 {
-            Ok(Self::HenyeyGreenstein { g })
-        } else {
-            Err(MediumError::OutOfRange {
-                property: crate::Property::G,
-                value: g,
-                expected: "between -1 and 1, both excluded",
-            })
+        let phase = Self::HenyeyGreenstein { g };
+        phase.validate().map(|()| phase)
+    }
+
+    /// Checks the mean cosine.
+    ///
+    /// # Errors
+    /// When it does not lie in (-1, 1).
+    pub fn validate(&self) -> Result<(), MediumError> {
+        match *self {
+            Self::HenyeyGreenstein { g } if !(g > -1.0 && g < 1.0) => {
+                Err(MediumError::OutOfRange {
+                    property: crate::Property::G,
+                    value: g,
+                    expected: "between -1 and 1, both excluded",
+                })
+            }
+            _ => Ok(()),
         }
     }
 

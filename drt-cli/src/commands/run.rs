@@ -14,8 +14,6 @@ use crate::{CliError, Job, load_job};
 
 /// Samples per pixel of the first pass where time or noise decides when to stop; later ones double.
 const FIRST_PASS: u32 = 4;
-/// Most pixels of an image.
-const MAX_PIXELS: u64 = 1 << 28;
 
 /// Opens the input and lays the options over it.
 pub(super) fn open(options: &Options) -> Result<Job, CliError> {
@@ -47,12 +45,6 @@ pub(super) fn open_changed(input: &Path, changes: &Changes) -> Result<Job, CliEr
     {
         let resized = sensor.item.sensor.with_film(film);
         sensor.item.sensor = resized.map_err(|e| CliError::argument(format!("--size: {e}")))?;
-    }
-    if let Some(sensor) = job.scene.sensors.get(job.settings.sensor) {
-        let [w, h] = sensor.item.sensor.film();
-        if u64::from(w) * u64::from(h) > MAX_PIXELS {
-            return Err(CliError::argument(format!("{w}x{h} pixels are more than {MAX_PIXELS}")));
-        }
     }
     let settings = &mut job.settings;
     settings.seed = changes.seed.unwrap_or(settings.seed);

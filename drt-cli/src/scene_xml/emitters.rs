@@ -50,10 +50,8 @@ impl<'a> Loader<'a> {
             }
         };
         p.finish()?;
-        let emitter = emitter.checked().map_err(|err| e.error(err))?;
-        if emitter.strength().to_array().iter().any(|v| *v < 0.0) {
-            return Err(e.error("an emitter's colour must not be negative"));
-        }
+        let emitter =
+            emitter.validate().and_then(|()| emitter.checked()).map_err(|err| e.error(err))?;
         Ok(Named { id: e.id().map(Into::into), item: SceneEmitter { emitter, medium } })
     }
 }

@@ -12,10 +12,6 @@ use crate::CliError;
 
 /// Widest and highest film, in pixels.
 const MAX_FILM: i64 = 65_536;
-/// Widest filter, in pixels: each sample touches every pixel within this radius.
-const MAX_RADIUS: f64 = 256.0;
-/// Most pixels of a film.
-const MAX_PIXELS: u64 = 1 << 28;
 
 impl<'a> Loader<'a> {
     pub(super) fn sensor(&self, e: &'a Element) -> Result<Named<SceneSensor>, CliError> {
@@ -48,10 +44,7 @@ impl<'a> Loader<'a> {
         }
         let width = p.integer_in("width", 1..=MAX_FILM)?.unwrap_or(default[0]);
         let height = p.integer_in("height", 1..=MAX_FILM)?.unwrap_or(default[1]);
-        if u64::from(width) * u64::from(height) > MAX_PIXELS {
-            let message = format!("{width}x{height} pixels are more than {MAX_PIXELS}");
-            return Err(film.target.error(message));
-        }
+        Sensor::check_film([width, height]).map_err(|err| film.target.error(err))?;
         let filter = match self.index.single(&p, "rfilter", None)? {
             Some(f) => filter(f.target)?,
             None => default_filter(&p)?,
@@ -128,12 +121,7 @@ fn filter(e: &Element) -> Result<Filter, CliError> {
         }
     };
     p.finish()?;
-    let filter = Filter::new(kind).map_err(|err| e.error(err))?;
-    if filter.radius() > MAX_RADIUS {
-        let radius = filter.radius();
-        return Err(e.error(format!("reaches {radius} pixels far; at most {MAX_RADIUS}")));
-    }
-    Ok(filter)
+    Filter::new(kind).map_err(|err| e.error(err))
 }
 
 /// Path depths of an integrator; which method it names does not matter.

@@ -18,8 +18,6 @@ use crate::CliError;
 const SPHERE_RESOLUTION: u32 = 64;
 /// Corners of a disk where none are given.
 const DISK_RESOLUTION: u32 = 128;
-/// Largest coordinate: products of three stay finite.
-const LARGEST: f64 = 1e100;
 
 /// A shape before its placement.
 struct Model {
@@ -156,10 +154,7 @@ fn place(p: &Properties<'_>, model: Model) -> Result<Mesh, CliError> {
         return Err(p.element.error(message));
     }
     let mut mesh = model.mesh.transform(&to_world);
-    if mesh.positions.iter().any(|v| !v.is_finite() || v.max_abs() > LARGEST) {
-        let message = format!("a vertex has a coordinate that is not a number below {LARGEST:e}");
-        return Err(p.element.error(message));
-    }
+    mesh.validate().map_err(|err| p.element.error(err))?;
     let mirrored_inside_out = determinant < 0.0 && model.turns;
     if mirrored_inside_out != p.boolean("flip_normals")?.unwrap_or(false) {
         mesh.flip();

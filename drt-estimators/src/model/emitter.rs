@@ -33,6 +33,16 @@ pub enum EmitterError {
         /// The offending field.
         what: &'static str,
     },
+    /// Light below zero.
+    #[error("the {kind} emitter's {what} has a channel of {value}; it must not be negative")]
+    Negative {
+        /// Kind of the emitter.
+        kind: &'static str,
+        /// The offending field.
+        what: &'static str,
+        /// The channel's value.
+        value: f64,
+    },
     /// A cone that does not exist.
     #[error(
         "the spot emitter's cutoff_angle is {cutoff_angle} and its beam_width {beam_width} \
@@ -123,6 +133,20 @@ impl Emitter {
     pub const DEFAULT_CUTOFF_ANGLE: f64 = PI / 9.0;
     /// Mitsuba's default beam width of a spot, as a fraction of the cutoff angle.
     pub const DEFAULT_BEAM_FRACTION: f64 = 0.75;
+
+    /// Checks an emitter of a scene. Changes of a parameter may push its light below zero later: a
+    /// central difference around a light that is off does.
+    ///
+    /// # Errors
+    /// As [`checked`](Self::checked), and names light that is negative.
+    pub fn validate(&self) -> Result<(), EmitterError> {
+        self.checked()?;
+        let (kind, what) = (self.kind(), self.strength_name());
+        match self.strength().to_array().into_iter().find(|v| *v < 0.0) {
+            Some(value) => Err(EmitterError::Negative { kind, what, value }),
+            None => Ok(()),
+        }
+    }
 
     /// The same emitter with unit directions.
     ///

@@ -68,6 +68,12 @@ pub enum FilterError {
         /// Its value in pixels.
         value: f64,
     },
+    /// A support over which samples would have to be spread for too long.
+    #[error("the reconstruction filter reaches {radius} pixels far; at most 256")]
+    TooWide {
+        /// Radius in pixels.
+        radius: f64,
+    },
     /// A Gaussian cut where nothing of its shape, or no number, is left.
     #[error(
         "the gaussian filter's radius {radius} must be between 0.001 and 30 standard deviations \
@@ -102,11 +108,14 @@ impl Filter {
     /// Segments that stand for half a Gaussian when sampling: the density is within 2·10⁻³ of a
     /// filter cut at four standard deviations in its inner half.
     const GAUSSIAN_SEGMENTS: usize = 64;
+    /// Largest radius in pixels: each sample touches every pixel within it.
+    pub const MAX_RADIUS: f64 = 256.0;
 
     /// Normalises a filter and prepares to sample it.
     ///
     /// # Errors
-    /// When a length is not positive and finite, or a Gaussian's two lengths do not go together.
+    /// When a length is not positive and finite, the radius exceeds [`MAX_RADIUS`](Self::MAX_RADIUS), or a
+    /// Gaussian's two lengths do not go together.
     pub fn new(kind: FilterKind) -> Result<Self, FilterError> {
         let positive = |what, value: f64| {
             if value > 0.0 && value.is_finite() {
@@ -128,6 +137,9 @@ impl Filter {
                 (radius, 1.0 / integral, Self::GAUSSIAN_SEGMENTS)
             }
         };
+        if radius > Self::MAX_RADIUS {
+            return Err(FilterError::TooWide { radius });
+        }
         let half = HalfProfile::new(segments, |t| shape(kind, radius * t));
         Ok(Self { kind, radius, scale, half })
     }

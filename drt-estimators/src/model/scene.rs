@@ -8,7 +8,7 @@ use drt_geom::Mesh;
 use drt_medium::Medium;
 
 use crate::model::emitter::Emitter;
-use crate::model::error::{ElementError, Error};
+use crate::model::error::{ElementError, Error, SettingError};
 use crate::model::sensor::Sensor;
 use crate::model::surface::Bsdf;
 
@@ -154,8 +154,15 @@ pub trait TargetName {
 }
 
 impl TargetName for Target {
-    fn find_in(&self, _: &Scene) -> Result<Target, Error> {
-        Ok(*self)
+    fn find_in(&self, scene: &Scene) -> Result<Target, Error> {
+        let (kind, i, count) = match *self {
+            Self::Shape(i) => ("shape", i, scene.shapes.len()),
+            Self::Medium(i) => ("medium", i, scene.media.len()),
+            Self::Bsdf(i) => ("bsdf", i, scene.bsdfs.len()),
+            Self::Emitter(i) => ("emitter", i, scene.emitters.len()),
+            Self::Sensor(i) => ("sensor", i, scene.sensors.len()),
+        };
+        if i < count { Ok(*self) } else { scene.find(&alloc::format!("{kind}[{i}]")) }
     }
 }
 
@@ -172,8 +179,8 @@ impl TargetName for String {
 }
 
 impl Scene {
-    /// Checks that indices refer to something, that what emits has an area, and the numbers of scattering models
-    /// and emitters. Media, sensors and meshes check theirs when they are made.
+    /// Checks that indices refer to something, that what emits has an area, and the numbers of meshes, scattering
+    /// models, phase functions and emitters. Coefficients, sensors and filters are checked where they are made.
     ///
     /// # Errors
     /// Names the element and what is wrong with it.
@@ -182,11 +189,16 @@ impl Scene {
         let stated = |s: Surrounding| matches!(s, Surrounding::Stated(m) if missing(m));
         for (i, s) in self.shapes.iter().enumerate() {
             let fail = |reason| unusable(&s.id, "shape", i, reason);
+            s.mesh.validate().map_err(|e| fail(e.into()))?;
             if s.bsdf >= self.bsdfs.len() {
                 return Err(fail(ElementError::NoBsdf(s.bsdf)));
             }
-            if s.emitter.is_some_and(|e| e >= self.emitters.len()) {
-                return Err(fail(ElementError::NoEmitter));
+            if let Some(e) = s.emitter {
+                let emitter = self.emitters.get(e).ok_or_else(|| fail(ElementError::NoEmitter))?;
+                let emitter = &emitter.item.emitter;
+                if emitter.area_radiance().is_none() {
+                    return Err(fail(ElementError::NotAnArea(emitter.kind())));
+                }
             }
             if s.boundary.is_some_and(|b| missing(b.interior) || missing(b.exterior)) {
                 return Err(fail(ElementError::NoMedium));
@@ -198,9 +210,12 @@ impl Scene {
         for (i, b) in self.bsdfs.iter().enumerate() {
             b.item.validate().map_err(|e| unusable(&b.id, "bsdf", i, e.into()))?;
         }
+        for (i, m) in self.media.iter().enumerate() {
+            m.item.phase.validate().map_err(|e| unusable(&m.id, "medium", i, e.into()))?;
+        }
         for (i, e) in self.emitters.iter().enumerate() {
             let fail = |reason| unusable(&e.id, "emitter", i, reason);
-            e.item.emitter.checked().map_err(|e| fail(e.into()))?;
+            e.item.emitter.validate().map_err(|e| fail(e.into()))?;
             if stated(e.item.medium) {
                 return Err(fail(ElementError::NoMedium));
             }
@@ -211,6 +226,12 @@ impl Scene {
             }
         }
         Ok(())
+    }
+
+    /// The sensor that a setting names.
+    pub(crate) fn sensor(&self, index: usize) -> Result<&Named<SceneSensor>, Error> {
+        let reason = SettingError::NoSensor { index, count: self.sensors.len() };
+        self.sensors.get(index).ok_or(Error::Setting { setting: "sensor", reason })
     }
 
     /// Finds what a job calls `name`: an id, or kind and order such as `shape[0]`.
@@ -310,7 +331,7 @@ mod tests {
         let media = MediumBoundary { interior: Some(0), exterior: None };
         fails(&|s| s.shapes[0].boundary = Some(media), "one of its media");
         let albedo = |r| Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(r) });
-        for wrong in [f64::NAN, -0.1, 1.5] {
+        for wrong in [f64::NAN, -0.1, f64::INFINITY] {
             fails(&|s| s.bsdfs[0].item = albedo(wrong), "grey: ");
         }
         let metal = |alpha| Bsdf::RoughConductor(RoughConductor { alpha, ..Default::default() });
@@ -328,6 +349,7 @@ mod tests {
             let mut mesh = (*s.shapes[0].mesh).clone();
             mesh.positions.iter_mut().for_each(|p| *p = Vec3::ZERO);
             (s.shapes[0].mesh, s.shapes[0].emitter) = (Arc::new(mesh), Some(0));
+            s.emitters[0].item.emitter = Emitter::Area { radiance: Rgb::ONE };
         };
         fails(&flat, "it emits but has no area");
     }

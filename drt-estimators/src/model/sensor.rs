@@ -37,6 +37,9 @@ pub enum SensorError {
     /// A film without pixels.
     #[error("the film is {}x{} pixels; both sides need at least one", .0[0], .0[1])]
     FilmSize([u32; 2]),
+    /// A film of too many pixels.
+    #[error("the film is {}x{} pixels; at most 268435456 in all", .0[0], .0[1])]
+    TooManyPixels([u32; 2]),
     /// Clip planes that leave nothing to see.
     #[error("the clip planes are at {near} and {far}; expected 0 < near < far")]
     Clip {
@@ -121,6 +124,23 @@ pub fn look_at(origin: Vec3, target: Vec3, up: Vec3) -> Result<Affine, SensorErr
 }
 
 impl Sensor {
+    /// Most pixels of a film.
+    pub const MAX_PIXELS: u64 = 1 << 28;
+
+    /// Checks the width and height of a film.
+    ///
+    /// # Errors
+    /// When a side is zero, or there are more than [`MAX_PIXELS`](Self::MAX_PIXELS).
+    pub fn check_film(film: [u32; 2]) -> Result<(), SensorError> {
+        if film.contains(&0) {
+            return Err(SensorError::FilmSize(film));
+        }
+        if u64::from(film[0]) * u64::from(film[1]) > Self::MAX_PIXELS {
+            return Err(SensorError::TooManyPixels(film));
+        }
+        Ok(())
+    }
+
     /// A camera placed by a camera-to-world map, `film` pixels wide and high.
     ///
     /// Reflections are kept (they mirror the image). Deviations from orthonormal axes up to 10⁻³,
@@ -166,7 +186,7 @@ impl Sensor {
     /// The same camera with another number of pixels.
     ///
     /// # Errors
-    /// When a side is zero.
+    /// When a side is zero, or there are more than [`MAX_PIXELS`](Self::MAX_PIXELS).
     pub fn with_film(&self, film: [u32; 2]) -> Result<Self, SensorError> {
         self.with(self.lens, film)
     }

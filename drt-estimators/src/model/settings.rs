@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use drt_motion::interior::InteriorMotion;
 
 use crate::model::error::{Error, SettingError};
+use crate::model::scene::Scene;
 
 /// How derivatives are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,10 +116,15 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting.
-    pub(crate) fn check(&self) -> Result<(), Error> {
-        if self.step > 0.0 && self.step.is_finite() {
-            return Ok(());
+    pub(crate) fn check(&self, scene: &Scene) -> Result<(), Error> {
+        let fail = |setting, reason| Err(Error::Setting { setting, reason });
+        if !(self.step > 0.0 && self.step.is_finite()) {
+            return fail("step", SettingError::NotPositive(self.step));
         }
-        Err(Error::Setting { setting: "step", reason: SettingError::NotPositive(self.step) })
+        let count = scene.media.len();
+        if let Some(&(index, _)) = self.insides.iter().find(|(m, _)| *m >= count) {
+            return fail("insides", SettingError::NoMedium { index, count });
+        }
+        scene.sensor(self.sensor).map(|_| ())
     }
 }

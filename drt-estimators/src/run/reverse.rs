@@ -67,8 +67,8 @@ pub fn gradient(
     adjoint: &[Rgb],
     control: &dyn Control,
 ) -> Result<SceneGradient, Error> {
-    settings.check()?;
     scene.check()?;
+    settings.check(scene)?;
     let wanted = wanted.iter().map(|w| w.find_in(scene)).collect::<Result<Vec<_>, _>>()?;
     let wanted = &wanted[..];
     let (scene, _) = tangents::apply(scene, &[])?;

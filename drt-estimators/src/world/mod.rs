@@ -16,7 +16,7 @@ use drt_geom::{Aabb, Hit, Mesh, Ray, Skip};
 use drt_math::{Rgb, Vec3};
 use drt_medium::{Coefficients, Homogeneous, Medium};
 
-use crate::model::error::{Error, SettingError};
+use crate::model::error::Error;
 use crate::model::scene::{Scene, Shape, Surrounding};
 use crate::model::surface::Bsdf;
 use crate::world::cache::PreparedCache;
@@ -207,11 +207,7 @@ impl World {
         kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         let scene: Arc<Scene> = scene.into();
-        let count = scene.sensors.len();
-        let camera = scene.sensors.get(sensor).ok_or(Error::Setting {
-            setting: "sensor",
-            reason: SettingError::NoSensor { index: sensor, count },
-        })?;
+        let camera = scene.sensor(sensor)?;
         let (camera_item, surrounding) = (camera.item.sensor.clone(), camera.item.medium);
         let geometry = kept.geometry(&scene)?;
         let radius = geometry.radius;

@@ -36,9 +36,9 @@ pub struct Mesh {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// A coordinate is NaN or infinite.
-    #[error("vertex {vertex} (from 0) has a coordinate that is not a finite number")]
-    NonFinitePosition {
+    /// A coordinate is NaN, infinite or beyond 1e100.
+    #[error("vertex {vertex} (from 0) has a coordinate that is not a number below 1e100")]
+    BadPosition {
         /// Which vertex.
         vertex: usize,
     },
@@ -94,28 +94,51 @@ impl Mesh {
     /// A mesh without shading normals.
     ///
     /// # Errors
-    /// When a coordinate is not finite or a triangle names a missing vertex.
+    /// When a coordinate is not finite or beyond 1e100, or a triangle names a missing vertex.
     pub fn new(
         positions: Vec<impl Into<Vec3>>,
         triangles: Vec<[u32; 3]>,
     ) -> Result<Self, MeshError> {
         let positions: Vec<Vec3> = positions.into_iter().map(Into::into).collect();
-        for (what, count) in [("vertices", positions.len()), ("triangles", triangles.len())] {
+        let source_vertex_count = positions.len() as u32;
+        let mesh = Self {
+            positions,
+            triangles,
+            normals: None,
+            source_vertices: None,
+            source_vertex_count,
+        };
+        mesh.validate()?;
+        Ok(mesh)
+    }
+
+    /// Checks what rays and derivatives rely on: coordinates, indices and shading normals.
+    ///
+    /// # Errors
+    /// When a coordinate is not finite or beyond 1e100, a triangle names a missing vertex, or there are shading
+    /// normals but not one per vertex with a direction.
+    pub fn validate(&self) -> Result<(), MeshError> {
+        let (count, triangles) = (self.positions.len(), self.triangles.len());
+        for (what, count) in [("vertices", count), ("triangles", triangles)] {
             if count >= crate::NONE as usize {
                 return Err(MeshError::TooLarge { what, count });
             }
         }
-        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
-            return Err(MeshError::NonFinitePosition { vertex });
+        if let Some(vertex) = self.positions.iter().position(|p| !crate::is_usable(*p)) {
+            return Err(MeshError::BadPosition { vertex });
         }
-        let count = positions.len();
-        for (triangle, corners) in triangles.iter().enumerate() {
+        for (triangle, corners) in self.triangles.iter().enumerate() {
             if let Some(&index) = corners.iter().find(|&&i| i as usize >= count) {
                 return Err(MeshError::IndexOutOfRange { triangle, index, count });
             }
         }
-        let source_vertex_count = count as u32;
-        Ok(Self { positions, triangles, normals: None, source_vertices: None, source_vertex_count })
+        let Some(normals) = &self.normals else { return Ok(()) };
+        self.expect_per_vertex("normals", normals.len())?;
+        let directed = |n: &Vec3| n.is_finite() && n.max_abs() > 0.0;
+        match normals.iter().position(|n| !directed(n)) {
+            Some(vertex) => Err(MeshError::BadNormal { vertex }),
+            None => Ok(()),
+        }
     }
 
     /// The same mesh with the given shading normals, brought to unit length where they are not.

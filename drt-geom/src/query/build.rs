@@ -11,10 +11,7 @@ use super::lanes::Machine;
 use super::watertight::corners;
 use super::wide::WideTree;
 use crate::weld::lexicographic;
-use crate::{Aabb, Mesh, NONE};
-
-/// Largest coordinate a scene may have: products of three stay in the range of `f64`.
-const LARGEST: f64 = 1e100;
+use crate::{Aabb, Mesh, NONE, is_usable};
 
 /// Most triangles: blocks of them have 31 bits in the tree.
 const MOST: usize = (1 << 31) - 1;
@@ -155,7 +152,7 @@ impl TriangleBvh {
 }
 
 fn usable_bounds(triangles: &[[Vec3; 3]]) -> Result<Aabb, BvhError> {
-    let usable = |t: &[Vec3; 3]| t.iter().all(|v| v.is_finite() && v.max_abs() <= LARGEST);
+    let usable = |t: &[Vec3; 3]| t.iter().copied().all(is_usable);
     match triangles.iter().position(|t| !usable(t)) {
         Some(prim) => Err(BvhError::BadCoordinate { prim: prim as u32 }),
         None => Ok(Aabb::around(triangles.iter().flatten().copied())),

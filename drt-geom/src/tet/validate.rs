@@ -3,10 +3,7 @@ use alloc::vec::Vec;
 use super::double::EdgeFrame;
 use super::faces::is_even;
 use super::{TetLocator, TetMesh, TetMeshError};
-use crate::weld;
-
-/// Largest coordinate: products of three stay in the range of `f64`.
-const LARGEST: f64 = 1e100;
+use crate::{is_usable, weld};
 
 /// Most tetrahedra, and vertices: 30 bits name them.
 pub(super) const MOST: usize = (1 << 30) - 1;
@@ -85,8 +82,7 @@ impl TetMesh {
                 return Err(TetMeshError::TooLarge { what, count });
             }
         }
-        let usable = |p: &drt_math::Vec3| p.is_finite() && p.max_abs() <= LARGEST;
-        if let Some(vertex) = self.positions.iter().position(|p| !usable(p)) {
+        if let Some(vertex) = self.positions.iter().position(|p| !is_usable(*p)) {
             return Err(TetMeshError::BadPosition { vertex: vertex as u32 });
         }
         for (tet, corners) in (0..).zip(&self.tets) {

@@ -1,6 +1,7 @@
 use alloc::string::String;
 
-use drt_geom::BvhError;
+use drt_geom::{BvhError, MeshError};
+use drt_medium::MediumError;
 use drt_motion::interior::InteriorError;
 use thiserror::Error;
 
@@ -23,6 +24,15 @@ pub enum ElementError {
     /// A shape that emits and has no area.
     #[error("it emits but has no area")]
     NoArea,
+    /// A shape carries an emitter of another kind than area.
+    #[error("it carries an emitter of type `{0}`; only those of type `area` belong on shapes")]
+    NotAnArea(&'static str),
+    /// A shape's arrays.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// A medium's properties.
+    #[error(transparent)]
+    Medium(#[from] MediumError),
     /// A scattering model's properties.
     #[error(transparent)]
     Surface(#[from] SurfaceError),

@@ -15,6 +15,14 @@ pub enum SettingError {
         /// How many there are.
         count: usize,
     },
+    /// A medium that does not exist.
+    #[error("there is no medium {index}; the scene has {count}")]
+    NoMedium {
+        /// The one asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
     /// Finite differences where a session is asked for.
     #[error("finite differences have no session; call `finite_differences`")]
     NoSession,

@@ -208,6 +208,8 @@ fn unusable_filters_are_named() {
         let error = Filter::new(FilterKind::Gaussian { radius: 1.0, std_dev: radius }).unwrap_err();
         assert!(matches!(error, FilterError::NotPositive { what: "standard deviation", .. }));
     }
+    let wide = Filter::new(FilterKind::Tent { radius: 257.0 });
+    assert_eq!(wide, Err(FilterError::TooWide { radius: 257.0 }));
     for std_dev in [0.01, 2000.0] {
         let kind = FilterKind::Gaussian { radius: 1.0, std_dev };
         assert_eq!(Filter::new(kind), Err(FilterError::Cut { radius: 1.0, std_dev }));

@@ -1,6 +1,6 @@
 use drt_math::fm;
 
-use crate::model::sensor::{SensorError, finite};
+use crate::model::sensor::{Sensor, SensorError, finite};
 
 /// The side of the film that the field of view is measured along.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,9 +60,7 @@ impl Lens {
 
     /// Checks the lens against a film and gives the side of a pixel on the plane at distance one.
     pub(super) fn pixel_size(&self, film: [u32; 2]) -> Result<f64, SensorError> {
-        if film.contains(&0) {
-            return Err(SensorError::FilmSize(film));
-        }
+        Sensor::check_film(film)?;
         if !(self.fov > 0.0 && self.fov < 180.0) {
             return Err(SensorError::FieldOfView(self.fov));
         }

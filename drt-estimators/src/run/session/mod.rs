@@ -110,7 +110,7 @@ impl Session {
         settings: &Settings,
         kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
-        settings.check()?;
+        settings.check(scene)?;
         let tangents = tangents.seen_by(settings.sensor);
         let depth = settings.max_depth.within(scene.integrator.max_depth);
         let mut world =
