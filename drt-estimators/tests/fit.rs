@@ -271,6 +271,6 @@ fn targets_must_fit_the_film() {
         Fit::new(scene.clone(), vec![], views, Loss::L2, settings()).err().unwrap().to_string()
     };
     assert!(fail(vec![view(0, [3, 5])]).contains("3x5 pixels; the film of its sensor has 6x5"));
-    assert!(fail(vec![view(1, FILM)]).contains("sensor 1, which does not exist"));
+    assert!(fail(vec![view(1, FILM)]).contains("there is no sensor 1"));
     assert!(fail(vec![]).contains("nothing to fit to"));
 }
