@@ -42,6 +42,9 @@ fn adjoint(scene: &Scene) -> Vec<Rgb> {
 /// Both sides, and the sum of the absolute values of the left one's summands.
 fn sides(scene: &Scene, parameter: &Parameter, settings: &Settings) -> (f64, f64, f64) {
     let a = adjoint(scene);
+    let mut settings = settings.clone();
+    settings.insides.retain(|(m, _)| *m < scene.media.len());
+    let settings = &settings;
     let mut session =
         Session::new(scene, core::slice::from_ref(parameter), settings).expect("a valid scene");
     assert!(session.run(settings.spp, &Unattended));
