@@ -46,7 +46,6 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
             common.input.display()
         )));
     }
-    job.require_gradient()?;
     let monitor = Monitor::new(common.changes.quiet);
     let gradient = match (&options.loss, &options.adjoint) {
         (Some(target), _) => of_loss(&mut job, options, target, &monitor)?,

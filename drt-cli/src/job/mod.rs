@@ -60,8 +60,7 @@ pub struct Job {
     optimize: Result<Option<Optimize>, CliError>,
     /// Parameters that only gradients know, after those of [`parameters`](Self::parameters).
     pub groups: Vec<ParameterGroup>,
-    /// What stands in the way of derivatives, and of those but by a gradient.
-    refused: Option<CliError>,
+    /// What stands in the way of derivative images, but not of a gradient.
     grouped: Option<CliError>,
 }
 
@@ -81,7 +80,7 @@ pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
     let settings = settings(&document, &keys, folder, &scene, &parameters)?;
     let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters);
     let groups = groups::groups(&document, &keys.parameter_group, folder, &scene)?;
-    let [refused, grouped] = refused(&document, &keys);
+    let grouped = grouped(&document, &keys);
     let path = path.into();
     let text = Some(text);
     Ok(Job {
@@ -95,7 +94,6 @@ pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
         warnings,
         places,
         groups,
-        refused,
         grouped,
     })
 }
@@ -118,7 +116,6 @@ impl Job {
             warnings,
             places: Vec::new(),
             groups: Vec::new(),
-            refused: None,
             grouped: None,
         };
         job.take_sample_count();
@@ -157,21 +154,12 @@ impl Job {
         Ok(())
     }
 
-    /// Refuses what would change derivatives and is not supported yet.
+    /// Refuses what has a gradient, but no derivative images.
     ///
     /// # Errors
     /// Names the key.
     pub fn require_derivatives(&self) -> Result<(), CliError> {
-        self.require_gradient()?;
         self.grouped.clone().map_or(Ok(()), Err)
-    }
-
-    /// Refuses what would change gradients and is not supported yet.
-    ///
-    /// # Errors
-    /// Names the key.
-    pub fn require_gradient(&self) -> Result<(), CliError> {
-        self.refused.clone().map_or(Ok(()), Err)
     }
 
     /// How the parameters are fitted to target images, where the job says so.
@@ -232,6 +220,7 @@ fn settings(
     settings.estimator = match kind.as_ref().map(Spanned::get_ref) {
         Some(keys::Kind::FiniteDifference) => EstimatorKind::FiniteDifference,
         Some(keys::Kind::Radiative) => EstimatorKind::Radiative,
+        Some(keys::Kind::Warped) => EstimatorKind::Warped,
         _ => EstimatorKind::PathSpace,
     };
     if let Some(s) = sampling.as_ref().filter(|s| *s.get_ref() == keys::Sampling::Bidirectional) {
@@ -320,16 +309,10 @@ fn parameters(
     Ok((parameters, places))
 }
 
-/// Keys that ask for derivatives in a way that is not there yet, and that ask for more parameters than
-/// there can be images.
-fn refused(document: &Document<'_>, keys: &keys::Job) -> [Option<CliError>; 2] {
-    let kind = keys.estimator.kind.as_ref().filter(|k| *k.get_ref() == keys::Kind::Warped);
-    let kind = kind
-        .map(|k| (k.span().start, "the estimator kind `warped` is not supported yet".to_owned()));
-    let group = keys.parameter_group.first().map(|g| {
-        let message = "[[parameter_group]] has a gradient (`drt grad --loss` or `--adjoint`), but \
-                       no derivative images, and is not fitted yet";
-        (g.span().start, message.to_owned())
-    });
-    [kind, group].map(|found| found.map(|(at, message)| document.error_at(at, message)))
+/// A key that asks for more parameters than there can be images.
+fn grouped(document: &Document<'_>, keys: &keys::Job) -> Option<CliError> {
+    let group = keys.parameter_group.first()?;
+    let message = "[[parameter_group]] has a gradient (`drt grad --loss` or `--adjoint`), but \
+                   no derivative images, and is not fitted yet";
+    Some(document.error_at(group.span().start, message))
 }

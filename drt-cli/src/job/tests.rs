@@ -223,7 +223,7 @@ fn assignments_reach_every_key() {
 fn keys_of_later_versions_are_read_and_stand_in_the_way_of_derivatives_only() {
     let text = |more: &str| format!("scene = \"scene.xml\"\n{more}");
     for (more, part) in [
-        ("[estimator]\nkind = \"warped\"", "`warped` is not supported yet"),
+
         ("[[parameter_group]]\ntarget = \"cube\"\nvertices = \"all\"", "[[parameter_group]]"),
     ] {
         let j = job(&text(more), &[]).unwrap();

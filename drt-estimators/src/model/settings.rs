@@ -17,6 +17,8 @@ pub enum EstimatorKind {
     PathSpace,
     /// The derivative of radiance along rays, with edges seen from every vertex (2019 paper).
     Radiative,
+    /// Rays that turn with the edges beside them, so that no edge has to be sampled (2023 paper).
+    Warped,
     /// Central differences with common random numbers.
     FiniteDifference,
 }

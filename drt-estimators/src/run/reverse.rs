@@ -129,7 +129,9 @@ impl Component {
             active.moving_emitters[e] &= lit.by(&emitter.item.emitter);
         }
         let insides = match settings.estimator {
-            EstimatorKind::Radiative => ReverseMediumMotions::at_rest(&world),
+            EstimatorKind::Radiative | EstimatorKind::Warped => {
+                ReverseMediumMotions::at_rest(&world)
+            }
             _ => ReverseMediumMotions::new(&world, &active, &settings.insides)?,
         };
         active.volumes = insides.volumes();

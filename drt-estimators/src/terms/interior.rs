@@ -3,6 +3,7 @@
 mod component;
 mod recorder;
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::sobol::SobolSampler;
@@ -23,6 +24,7 @@ use crate::sampling::trace::Tracer;
 use crate::terms::boundary::shadow::Shadows;
 use crate::terms::flux::Flux;
 use crate::terms::radiative::{EdgeQuery, Radiative};
+use crate::terms::warped::Warped;
 use crate::world::{RayPath, World};
 
 /// Boundary and flux terms that are found along camera rays.
@@ -32,6 +34,8 @@ pub(crate) struct AlongRays<'a> {
     pub(crate) shadows: Option<&'a Shadows>,
     /// Set in the spatial form.
     pub(crate) radiative: Option<&'a Radiative>,
+    /// Set where rays turn with edges.
+    pub(crate) warped: Option<&'a Arc<Warped>>,
     pub(crate) queries: EdgeQueries,
     /// Pairs of rays tell how narrow lobes turn.
     pub(crate) lobe_pairs: bool,

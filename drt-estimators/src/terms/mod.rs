@@ -6,3 +6,4 @@ pub(crate) mod interior;
 pub(crate) mod prepared;
 pub(crate) mod radiative;
 pub(crate) mod splatting;
+pub(crate) mod warped;

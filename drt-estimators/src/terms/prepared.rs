@@ -15,6 +15,7 @@ use crate::terms::flux::{Flux, GrazingFlux};
 use crate::terms::interior::{AlongRays, Component, EdgeQueries};
 use crate::terms::radiative::Radiative;
 use crate::terms::splatting::{BoundarySource, Splatter};
+use crate::terms::warped::Warped;
 use crate::world::World;
 
 /// A scene ready to be sampled for what is of interest.
@@ -25,6 +26,8 @@ pub(crate) struct Prepared {
     grazing: Option<GrazingFlux>,
     /// Set in the spatial form.
     pub(crate) radiative: Option<Radiative>,
+    /// Set where rays turn with edges.
+    pub(crate) warped: Option<Arc<Warped>>,
     /// Splatted terms that can contribute.
     pub(crate) sources: Vec<BoundarySource>,
     /// Image points come in mirrored pairs.
@@ -52,6 +55,7 @@ impl Prepared {
             EstimatorKind::Radiative if active.any() => {
                 Self::spatial(world, active, settings, motion)
             }
+            EstimatorKind::Warped if active.any() => Ok(Self::warped(world, active, settings)),
             _ => Self::material(world, active, flux_shapes, settings),
         }
     }
@@ -86,6 +90,7 @@ impl Prepared {
             primary_share: 1.0,
             queries: EdgeQueries::default(),
             radiative: None,
+            warped: None,
             world,
             boundary,
             flux,
@@ -129,6 +134,7 @@ impl Prepared {
         Ok(Self {
             boundary: Boundary::default(),
             radiative: Some(radiative),
+            warped: None,
             antithetic: false,
             lobe_pairs: settings.antithetic,
             primary_share: 1.0,
@@ -141,11 +147,37 @@ impl Prepared {
         })
     }
 
+    /// For the 2023 estimator.
+    fn warped(world: World, active: &ActiveInputs, settings: &Settings) -> Self {
+        let mut spatial = Spatial::new(&world, active);
+        spatial.blends.leave_media();
+        let spatial = Arc::new(spatial);
+        let flux = (active.moves_geometry() || active.grids.contains(&true))
+            .then(|| Flux::spatial(&world, active, &spatial))
+            .flatten();
+        let warped = Arc::new(Warped::new(&world, active, spatial));
+        Self {
+            boundary: Boundary::default(),
+            radiative: None,
+            warped: Some(warped),
+            antithetic: false,
+            lobe_pairs: settings.antithetic,
+            primary_share: 1.0,
+            world,
+            flux: flux.map(Flux::along_rays),
+            grazing: None,
+            sources: Vec::new(),
+            boundary_ratio: 1.0,
+            queries: EdgeQueries::default(),
+        }
+    }
+
     pub(crate) fn along_rays(&self) -> AlongRays<'_> {
         AlongRays {
             flux: self.flux.as_ref(),
             shadows: self.boundary.shadows.as_ref(),
             radiative: self.radiative.as_ref(),
+            warped: self.warped.as_ref(),
             queries: self.queries,
             lobe_pairs: self.lobe_pairs,
         }

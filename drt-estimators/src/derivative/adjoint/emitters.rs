@@ -1,30 +1,58 @@
 //! The emitters' ends of a path: what a contribution owes to a light's strength, place, direction and
 //! falloff.
 
+use alloc::vec::Vec;
+
 use drt_math::{Rgb, RgbVec, Vec3};
 
+use crate::derivative::adjoint::turning::send_turn;
 use crate::derivative::adjoint::{Differentiator, Far, Propagated, Stretch, turn};
 use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::{PathVelocities, VertexVelocity};
+use crate::derivative::velocity::{
+    PathVelocities, RayTurn, TurnPart, TurningRay, VelocityField, VertexVelocity,
+};
 use crate::model::emitter::EmitterGradient;
 use crate::world::lights::{LightKind, LightSample};
 use crate::world::vertex::{Kind, Vertex};
 
+/// The emitter's end of a connection.
+pub(super) struct LightEnd<'a> {
+    pub(super) viewer: &'a Vertex,
+    pub(super) near_moves: bool,
+    pub(super) light: &'a LightSample,
+    /// Sensitivity of scattering to the direction.
+    pub(super) to_wi: Option<RgbVec>,
+    /// How the ray to it turns.
+    pub(super) turn: Option<(&'a RayTurn, &'a [TurnPart])>,
+}
+
 impl Differentiator<'_> {
-    /// The emitter's end of a connection.
-    #[allow(clippy::too_many_arguments)]
+    /// How the ray of a connection turns.
+    pub(super) fn turn_to_light(
+        &self,
+        viewer: &Vertex,
+        moves: bool,
+        light: &LightSample,
+        field: &dyn VelocityField,
+        parts: &mut Vec<TurnPart>,
+    ) -> Option<RayTurn> {
+        let LightKind::Area(s) = &light.kind else { return None };
+        let (dir, distance, end) = (light.w, light.distance, Some(s));
+        let ray = TurningRay { viewer, moves, pixel: None, dir, distance, end };
+        field.turn(self.world, &ray, parts)
+    }
+
+    /// Sensitivities at the emitter's end of a connection.
     pub(super) fn light_end<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
         velocities: &PathVelocities,
-        viewer: &Vertex,
-        near_moves: bool,
-        light: &LightSample,
-        to_wi: Option<RgbVec>,
+        end: &LightEnd<'_>,
         per_value: Rgb,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
     ) {
+        let LightEnd { viewer, near_moves, light, to_wi, turn: turn_of_ray } = *end;
         let weight = per_value * light.value;
         let active = sink.active();
         let emitter = active.emitters[light.emitter];
@@ -34,26 +62,37 @@ impl Differentiator<'_> {
                 if emitter {
                     strength_of(light.emitter, per_value, sink);
                 }
-                let moving = near_moves || light_moves(light, sink.active());
-                if !moving {
+                let ray_moves = near_moves || turn_of_ray.is_some();
+                if !(ray_moves || light_moves(light, sink.active())) {
                     self.segment(path, Far::Direction, false, weight, here, sink);
                     return;
                 }
                 let (dir, distance) = (path.dir, path.length);
-                let blend = velocities.field().blend(self.world, viewer, &end, dir, distance);
+                let mut blend = velocities.field().blend(self.world, viewer, &end, dir, distance);
+                let mut turned = RgbVec::ZERO;
+                if let Some((turn, _)) = turn_of_ray {
+                    blend = blend.and(turn.rest(distance));
+                    turned = self.landing(path, &end, &SurfaceAdjoint::default(), weight);
+                    turned += to_wi.unwrap_or(RgbVec::ZERO);
+                }
                 let phi = blend.weight;
                 let free = weight * (1.0 - phi);
-                self.segment(path, Far::Direction, near_moves, free, here, sink);
-                let mut lit = self.material_end(path, &end, near_moves, weight * phi, here, sink);
+                turned += self.segment(path, Far::Direction, ray_moves, free, here, sink);
+                let part = weight * phi;
+                let (mut lit, along) = self.material_end(path, &end, ray_moves, part, here, sink);
+                turned += along;
                 if let Some(to_wi) = to_wi {
                     let g = turn(&(to_wi * phi), light.w, light.distance);
                     lit.u += g;
                     here.u -= g;
                 }
                 let matter = core::mem::take(&mut lit.u);
-                let velocity = &VertexVelocity { moves: true, blend, auxiliary: 0..0 };
+                let velocity = &VertexVelocity { moves: true, blend, ..VertexVelocity::default() };
                 let end = Propagated { vertex: &end, velocity, weight, matter };
                 self.propagate(path, &end, velocities, &mut lit, here, sink);
+                if let Some((_, parts)) = turn_of_ray {
+                    here.u -= send_turn(parts, dir, &turned, weight, sink);
+                }
             }
             LightKind::Position => {
                 let moving = near_moves || emitter;

@@ -21,6 +21,7 @@ mod antithetic;
 mod emitters;
 mod propagation;
 mod segment;
+mod turning;
 
 use alloc::vec::Vec;
 
@@ -28,14 +29,15 @@ use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Coefficients;
 
 use crate::derivative::adjoint::antithetic::Apart;
-use crate::derivative::adjoint::emitters::{light_moves, strength};
+use crate::derivative::adjoint::emitters::{LightEnd, light_moves, strength};
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint,
 };
-use crate::derivative::velocity::RecordedPath;
+use crate::derivative::adjoint::turning::send_turn;
+use crate::derivative::velocity::{RecordedPath, TurnPart};
 use crate::model::sensor::SensorGradient;
 use crate::sampling::trace::Endpoint;
 use crate::world::World;
@@ -53,6 +55,8 @@ struct Local {
     children: Rgb,
     /// a_k R_k, its part of the parent's C.
     incoming: Rgb,
+    /// By the rate of the direction of the ray that found the vertex, as far as its scattering sees that.
+    turn: RgbVec,
 }
 
 /// The segment by which a walk arrived at a node.
@@ -77,6 +81,8 @@ pub(crate) struct Differentiator<'w> {
     turn: RgbVec,
     /// Of the camera's importance and filter, per channel.
     sensor: [SensorGradient; 3],
+    /// Summands of the turns of rays to lights.
+    parts: Vec<TurnPart>,
 }
 
 impl<'w> Differentiator<'w> {
@@ -89,6 +95,7 @@ impl<'w> Differentiator<'w> {
             filter: [0.0; 2],
             turn: RgbVec::ZERO,
             sensor: [SensorGradient::default(); 3],
+            parts: Vec::new(),
         }
     }
 
@@ -184,11 +191,12 @@ impl<'w> Differentiator<'w> {
         let velocity = velocities.of(k);
         let vertex = record.nodes[k].vertex();
         let phi = velocity.blend.weight;
+        let turn_of_ray = velocities.turn(velocity.turn);
         if value.is_zero() {
-            let matter = self.locals[k].matter;
-            let nothing = here.is_zero() && matter == RgbVec::ZERO;
+            let Local { matter, turn, .. } = self.locals[k];
+            let nothing = here.is_zero() && [matter, turn] == [RgbVec::ZERO; 2];
             // What nothing comes back from may still move what comes before.
-            if nothing || phi == 1.0 {
+            if nothing || (phi == 1.0 && turn_of_ray.is_none()) {
                 if let Some(v) = vertex {
                     here.u += matter;
                     send(v, here, sink);
@@ -208,6 +216,9 @@ impl<'w> Differentiator<'w> {
         };
         let mut there = core::mem::take(&mut self.locals[p].at);
         let [near_moves, far_moves] = [p, k].map(|n| velocities.moves(n));
+        let ray_moves = near_moves || turn_of_ray.is_some();
+        // As far as this is not the camera's importance.
+        let mut turned_wholly = self.locals[k].turn;
         // The scattering function of the parent sees the two ends of the segment as a direction.
         if let Some(behind) = behind(recorded, p) {
             let adjoint = theta * value * parent.inv_pdf;
@@ -230,6 +241,7 @@ impl<'w> Differentiator<'w> {
                 there.u -= g;
                 self.locals[k].matter += g;
             }
+            turned_wholly += to_wi.unwrap_or(RgbVec::ZERO);
         }
         let path = Stretch {
             start: from.x,
@@ -242,45 +254,67 @@ impl<'w> Differentiator<'w> {
         let mut turned = RgbVec::ZERO;
         match vertex {
             // No end moves; what is between may.
-            _ if !(near_moves || far_moves) => {
+            _ if !(near_moves || far_moves || ray_moves) => {
                 self.segment(&path, Far::Direction, false, weight, &mut there, sink);
             }
             None => {
-                if let Some(filter) = seen {
-                    let held = &mut SurfaceAdjoint::default();
-                    self.seen(None, arrival.dir, value * phi, filter, held, sink);
+                if let Some(filter) = seen.filter(|_| sink.active().sensor) {
+                    let by_view = self.seen(None, arrival.dir, value, filter);
+                    self.by_sensor(&by_view, phi);
                 }
-                turned = self.segment(&path, Far::Direction, near_moves, weight, &mut there, sink)
-                    * (1.0 - phi);
+                let along = self.segment(&path, Far::Direction, ray_moves, weight, &mut there, sink);
+                turned_wholly += along;
+                turned = along * (1.0 - phi);
             }
             Some(v) => {
                 let mut matter = self.locals[k].matter;
+                let slides = !velocity.auxiliary.is_empty() || moves(v, sink.active());
+                let view = seen.filter(|_| phi > 0.0 && (sink.active().sensor || slides));
+                let by_view = view.map(|filter| self.seen(vertex, arrival.dir, value, filter));
+                if let Some(by_view) = &by_view {
+                    self.by_sensor(by_view, phi);
+                }
+                let by_place = by_view.map_or(RgbVec::ZERO, |v| v.place * phi);
+                if turn_of_ray.is_some() {
+                    turned_wholly += self.landing(&path, v, here, weight);
+                }
                 if phi == 1.0 {
-                    if let Some(filter) = seen {
-                        self.seen(vertex, arrival.dir, value, filter, here, sink);
-                    }
-                    let moving = near_moves || moves(v, sink.active());
-                    self.segment(&path, Far::Vertex(v, here), moving, weight, &mut there, sink);
+                    here.u += by_place;
+                    let moving = ray_moves || moves(v, sink.active());
+                    turned_wholly += self.segment(&path, Far::Vertex(v, here), moving, weight, &mut there, sink);
                 } else {
                     let free = weight * (1.0 - phi);
-                    turned =
-                        self.segment(&path, Far::Direction, near_moves, free, &mut there, sink);
+                    turned = self.segment(&path, Far::Direction, ray_moves, free, &mut there, sink);
+                    turned_wholly += turned;
                     if phi > 0.0 {
                         let part = weight * phi;
-                        let mut fixed =
-                            self.material_end(&path, v, near_moves, part, &mut there, sink);
-                        if let Some(filter) = seen {
-                            let value = value * phi;
-                            self.seen(vertex, arrival.dir, value, filter, &mut fixed, sink);
-                        }
+                        let (mut fixed, along) =
+                            self.material_end(&path, v, ray_moves, part, &mut there, sink);
+                        turned_wholly += along;
+                        fixed.u += by_place;
                         matter += core::mem::take(&mut fixed.u);
                         here.n += fixed.n;
                         here.j += fixed.j;
                     }
                 }
                 let end = Propagated { vertex: v, velocity, weight, matter };
-                turned += self.propagate(&path, &end, velocities, here, &mut there, sink);
+                let back = self.propagate(&path, &end, velocities, here, &mut there, sink);
+                turned_wholly += back.by_surfaces;
+                turned += back.by_surfaces + back.by_ray;
             }
+        }
+        if let Some(turn) = turn_of_ray {
+            let mut all = turned_wholly;
+            if let Some(filter) = seen {
+                let by_view = self.seen(vertex, arrival.dir, value, filter);
+                self.by_sensor(&by_view, turn.weight);
+                let distance = if vertex.is_some() { arrival.distance } else { 1.0 };
+                all += by_view.place * distance;
+                // What the camera's image point does is replaced.
+                turned -= turned_wholly * turn.weight + weight.outer(turn.gradient);
+            }
+            let parts = velocities.turn_parts(turn);
+            there.u -= send_turn(parts, arrival.dir, &all, weight, sink);
         }
         if p == 0 {
             self.turn += turned;
@@ -340,6 +374,7 @@ impl<'w> Differentiator<'w> {
             let g = turn(&(to_wo * b.weight), wo, b.distance);
             self.locals[b.parent].at.u += g;
             self.locals[b.node].matter -= g;
+            self.locals[b.node].turn -= to_wo;
             // Only the camera's ray turns by itself.
             if b.parent == 0 {
                 self.turn -= to_wo * (1.0 - b.weight);
@@ -364,6 +399,7 @@ impl<'w> Differentiator<'w> {
         let Some(arrival) = &node.arrival else { return sum };
         let behind = behind(recorded, k);
         let moving = velocities.moves(k);
+        let mut parts = core::mem::take(&mut self.parts);
         let arrives = moving || velocities.moves(arrival.parent as usize);
         for (c, crossings) in &record.connections[node.connections.clone()] {
             let light = &c.light;
@@ -372,7 +408,9 @@ impl<'w> Differentiator<'w> {
             }
             let rest = c.rest();
             sum += c.f * rest;
-            let turns = arrives || light_moves(light, sink.active());
+            parts.clear();
+            let turn = self.turn_to_light(vertex, moving, light, velocities.field(), &mut parts);
+            let turns = arrives || turn.is_some() || light_moves(light, sink.active());
             let to_wi = self.scattering(
                 vertex,
                 -arrival.dir,
@@ -392,8 +430,11 @@ impl<'w> Differentiator<'w> {
                 medium: c.start_medium,
                 crossings: &record.crossings[crossings.clone()],
             };
-            self.light_end(&path, velocities, vertex, moving, light, to_wi, per_value, here, sink);
+            let turn = turn.as_ref().map(|turn| (turn, &parts[..]));
+            let end = LightEnd { viewer: vertex, near_moves: moving, light, to_wi, turn };
+            self.light_end(&path, velocities, &end, per_value, here, sink);
         }
+        self.parts = parts;
         sum
     }
 
@@ -436,36 +477,38 @@ impl<'w> Differentiator<'w> {
 
     /// The camera's importance and filter towards a vertex, or the environment, that `value` reaches it
     /// from per unit of the filter's weight.
-    fn seen<S: AdjointSink>(
-        &mut self,
-        vertex: Option<&Vertex>,
-        dir: Vec3,
-        value: Rgb,
-        weight: Rgb,
-        here: &mut SurfaceAdjoint,
-        sink: &S,
-    ) {
-        let active = sink.active();
-        if !(active.sensor || vertex.is_some_and(|v| moves(v, active))) {
-            return;
-        }
+    fn seen(&self, vertex: Option<&Vertex>, dir: Vec3, value: Rgb, weight: Rgb) -> ByView {
         let camera = &self.world.camera;
         let x = vertex.map_or(camera.position() + dir, |v| v.x);
         let projection = camera.view(x);
         let total = (value * weight).to_array();
         let mut at = [Vec3::ZERO; 3];
+        let mut sensor = [SensorGradient::default(); 3];
         for (c, v) in value.to_array().into_iter().enumerate() {
             let filter = self.filter.map(|f| f * v);
-            let (point, mut gradient) = camera.view_gradient(&projection, filter, total[c]);
+            (at[c], sensor[c]) = camera.view_gradient(&projection, filter, total[c]);
             if vertex.is_none() {
                 // A direction has no parallax.
-                gradient.position = Vec3::ZERO;
+                sensor[c].position = Vec3::ZERO;
             }
-            self.sensor[c] += gradient;
-            at[c] = point;
         }
-        here.u += RgbVec { r: at[0], g: at[1], b: at[2] };
+        ByView { place: RgbVec { r: at[0], g: at[1], b: at[2] }, sensor }
     }
+
+    /// Adds a share of what the camera's importance and filter owe to the camera.
+    fn by_sensor(&mut self, by_view: &ByView, share: f64) {
+        for (sum, gradient) in self.sensor.iter_mut().zip(&by_view.sensor) {
+            *sum += gradient.scaled(share);
+        }
+    }
+}
+
+/// Gradient of the camera's importance and filter.
+struct ByView {
+    /// By the point seen.
+    place: RgbVec,
+    /// By the camera, per channel.
+    sensor: [SensorGradient; 3],
 }
 
 /// The segment by which a walk arrived at a node; `None` at the camera.

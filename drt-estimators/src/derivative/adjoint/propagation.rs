@@ -9,6 +9,7 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
+use crate::derivative::adjoint::turning::send_turn;
 use crate::derivative::adjoint::{Differentiator, Far, Stretch, moves, send};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint, VelocityTerm};
 use crate::derivative::velocity::{Auxiliary, PathVelocities, RecordedPath, VertexVelocity};
@@ -27,6 +28,14 @@ pub(super) struct Propagated<'a> {
     pub(super) matter: RgbVec,
 }
 
+/// Sensitivities to the rate of the direction of the ray that found a vertex.
+pub(super) struct TurnedBack {
+    /// As surfaces beside the vertex move along the ray.
+    pub(super) by_surfaces: RgbVec,
+    /// As the vertex moves with the ray.
+    pub(super) by_ray: RgbVec,
+}
+
 impl Differentiator<'_> {
     /// Sends the sensitivities `here` of the vertex at the far end of a stretch: leaves those of matter, adds
     /// those of the near end to `near`, and returns those of the direction's rate.
@@ -38,11 +47,11 @@ impl Differentiator<'_> {
         here: &mut SurfaceAdjoint,
         near: &mut SurfaceAdjoint,
         sink: &mut S,
-    ) -> RgbVec {
+    ) -> TurnedBack {
         let Propagated { vertex, velocity, weight, matter } = *end;
         let blend = velocity.blend;
         let free = 1.0 - blend.weight;
-        let mut turn = RgbVec::ZERO;
+        let mut by_surfaces = RgbVec::ZERO;
         for a in velocities.auxiliary(velocity) {
             let g = match a.on_ray {
                 // A longer way dims what passes.
@@ -56,30 +65,48 @@ impl Differentiator<'_> {
             };
             let [origin, turned] = summand(a, g, sink);
             near.u += origin;
-            turn += turned;
+            by_surfaces += turned;
         }
         if free == 0.0 {
             here.u += matter;
             send(vertex, here, sink);
-            return turn;
+            return TurnedBack { by_surfaces, by_ray: RgbVec::ZERO };
         }
         let Kind::Surface(point) = &vertex.kind else {
             let u = here.u * blend.weight + matter;
             send(vertex, &SurfaceAdjoint { u, ..*here }, sink);
             let back = here.u * free;
             near.u += back;
-            return turn + back * path.length;
+            return TurnedBack { by_surfaces, by_ray: back * path.length };
         };
         let shift = weight.outer(blend.gradient);
-        let medium = path.crossings.last().map_or(path.medium, |c| c.after);
-        let dims = self.world.sigma_t_at_border(medium, vertex.x, -path.dir) * (weight * -free);
+        let dims = self.dims(path, vertex, weight * free);
         let (back, mut lift) = split(self.world, point, path.dir, free, here, shift, dims);
         lift.u += matter;
         if sink.active().shapes[point.shape as usize] {
             sink.surface(&point.material(), &lift);
         }
         near.u += back;
-        turn + back * path.length
+        TurnedBack { by_surfaces, by_ray: back * path.length }
+    }
+
+    /// Sensitivity to the length of a stretch that ends at a surface, at fixed direction.
+    fn dims(&self, path: &Stretch<'_>, end: &Vertex, weight: Rgb) -> Rgb {
+        let medium = path.crossings.last().map_or(path.medium, |c| c.after);
+        self.world.sigma_t_at_border(medium, end.x, -path.dir) * -weight
+    }
+
+    /// Sensitivity to the rate of a stretch's direction by where it ends, `here` being what is known of the end.
+    pub(super) fn landing(
+        &self,
+        path: &Stretch<'_>,
+        end: &Vertex,
+        here: &SurfaceAdjoint,
+        weight: Rgb,
+    ) -> RgbVec {
+        let Kind::Surface(point) = &end.kind else { return here.u * path.length };
+        let dims = self.dims(path, end, weight);
+        split(self.world, point, path.dir, 1.0, here, RgbVec::ZERO, dims).0 * path.length
     }
 
     /// The sensitivity to b·w of a summand that moves the vertex itself.
@@ -97,20 +124,43 @@ impl Differentiator<'_> {
         (here.u + slide + matter).dot(a.displacement)
     }
 
-    /// A stretch whose far end moves with its matter, `weight` of light passing: the sensitivities of that end.
+    /// A stretch whose far end moves with its matter, `weight` of light passing: the sensitivities of that end,
+    /// and that of transmittance to the rate of the direction.
     pub(super) fn material_end<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
         end: &Vertex,
-        near_moves: bool,
+        ray_moves: bool,
         weight: Rgb,
         near: &mut SurfaceAdjoint,
         sink: &mut S,
-    ) -> SurfaceAdjoint {
+    ) -> (SurfaceAdjoint, RgbVec) {
         let mut fixed = SurfaceAdjoint::default();
-        let moving = near_moves || moves(end, sink.active());
-        self.segment(path, Far::Vertex(end, &mut fixed), moving, weight, near, sink);
-        fixed
+        let moving = ray_moves || moves(end, sink.active());
+        let along = self.segment(path, Far::Vertex(end, &mut fixed), moving, weight, near, sink);
+        (fixed, along)
+    }
+
+    /// Sends the sensitivities of a ray along `dir` from a node: to the velocity of its `origin`, and to the rate of its
+    /// direction, `turn`. `turns` is its index among the rays that turn.
+    #[allow(clippy::too_many_arguments)]
+    pub(crate) fn send_back_ray<S: AdjointSink>(
+        &self,
+        path: &RecordedPath<'_>,
+        node: usize,
+        dir: Vec3,
+        turns: Option<u32>,
+        mut origin: RgbVec,
+        mut turn: RgbVec,
+        sink: &mut S,
+    ) {
+        if let Some(of_ray) = path.velocities.turn(turns) {
+            let parts = path.velocities.turn_parts(of_ray);
+            origin -= send_turn(parts, dir, &turn, Rgb::ZERO, sink);
+            turn -= turn * of_ray.weight;
+        }
+        let at = SurfaceAdjoint::of_place(origin);
+        self.send_back(path, node, at, RgbVec::ZERO, turn, sink);
     }
 
     /// Sends the sensitivities of a node: `here` to its velocity and normals, `matter` to the velocity of what
@@ -138,6 +188,7 @@ impl Differentiator<'_> {
             let free = 1.0 - velocity.blend.weight;
             let mut back = RgbVec::ZERO;
             let mut turned = RgbVec::ZERO;
+            let mut turned_wholly = RgbVec::ZERO;
             for a in velocities.auxiliary(velocity) {
                 let g = match a.on_ray {
                     Some(_) => here.u.dot(a.displacement) * free,
@@ -146,6 +197,19 @@ impl Differentiator<'_> {
                 let [origin, direction] = summand(a, g, sink);
                 back += origin;
                 turned += direction;
+                turned_wholly += direction;
+            }
+            if let Some(turn) = velocities.turn(velocity.turn) {
+                let (dir, distance, none) = (arrival.dir, arrival.distance, RgbVec::ZERO);
+                turned_wholly += match &vertex.kind {
+                    Kind::Surface(point) => {
+                        split(self.world, point, dir, 1.0, &here, none, Rgb::ZERO).0 * distance
+                    }
+                    _ => here.u * distance,
+                };
+                let parts = velocities.turn_parts(turn);
+                back -= send_turn(parts, dir, &turned_wholly, Rgb::ZERO, sink);
+                turned -= turned_wholly * turn.weight;
             }
             if free == 0.0 {
                 return send(vertex, &SurfaceAdjoint { u: here.u + matter, ..here }, sink);

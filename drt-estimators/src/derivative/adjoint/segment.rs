@@ -62,8 +62,8 @@ pub(super) struct Stretch<'a> {
 impl Differentiator<'_> {
     /// Sensitivities of one stretch between two ends: geometric term, far-end Jacobian and
     /// transmittance, all weighted by the contributions that pass. The near end's go to `near`; the
-    /// far end's to its own receiver, or back to the caller for a point light's position or the rate
-    /// of a fixed direction.
+    /// far end's to its own receiver. Returns that of a point light's position, else what transmittance owes to the rate of
+    /// the direction.
     pub(super) fn segment<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
@@ -87,6 +87,7 @@ impl Differentiator<'_> {
         match far {
             Far::Vertex(v, receiver) => {
                 receiver.u += along.far;
+                let turn = along.far * path.length;
                 // ln(|n·d| / R^3) on a surface, ln(1/R^2) in a volume.
                 let mut g = path.dir * (-2.0 / path.length);
                 if let Kind::Surface(s) = &v.kind {
@@ -98,7 +99,7 @@ impl Differentiator<'_> {
                 let g = weight.outer(g);
                 receiver.u += g;
                 near.u -= g;
-                RgbVec::ZERO
+                turn
             }
             Far::Position => {
                 let g = weight.outer(path.dir * (-2.0 / path.length));

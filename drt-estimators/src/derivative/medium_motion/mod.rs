@@ -39,7 +39,7 @@ pub(crate) struct MediumMotions {
 
 impl MediumMotions {
     /// Nothing moves, and nothing else makes up for it.
-    fn at_rest(media: usize) -> Self {
+    pub(crate) fn at_rest(media: usize) -> Self {
         Self {
             velocities: alloc::vec![Vec::new(); media],
             bases: alloc::vec![None; media],

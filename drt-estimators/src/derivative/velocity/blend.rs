@@ -97,7 +97,7 @@ impl Blend {
     }
 
     /// The product of two weights.
-    fn and(self, other: Self) -> Self {
+    pub(crate) fn and(self, other: Self) -> Self {
         let gradient = self.gradient * other.weight + other.gradient * self.weight;
         Self { weight: self.weight * other.weight, gradient }
     }
@@ -125,6 +125,11 @@ impl Blends {
                 })
                 .collect();
         Self { curvatures, cosines, camera_cosines, lamps, media }
+    }
+
+    /// Gives all vertices inside of media no weight.
+    pub(crate) fn leave_media(&mut self) {
+        self.media.fill_with(|| None);
     }
 
     /// True when φ > 0 for some vertices on a shape, or in a medium that it bounds.

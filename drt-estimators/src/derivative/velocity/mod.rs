@@ -32,6 +32,7 @@ pub(crate) mod blend;
 mod material;
 mod path;
 pub(crate) mod spatial;
+mod turn;
 pub(crate) mod warp;
 
 use alloc::sync::Arc;
@@ -44,6 +45,7 @@ pub(crate) use crate::derivative::velocity::blend::Blend;
 pub(crate) use crate::derivative::velocity::material::Material;
 pub(crate) use crate::derivative::velocity::path::{PathVelocities, RecordedPath};
 pub(crate) use crate::derivative::velocity::spatial::Spatial;
+pub(crate) use crate::derivative::velocity::turn::{RayTurn, TurnPart, TurningRay};
 use crate::derivative::velocity::warp::SurfaceHit;
 
 use crate::derivative::sensitivity::ActiveInputs;
@@ -60,6 +62,8 @@ pub(crate) struct VertexVelocity {
     pub(crate) blend: Blend,
     /// Its summands in [`PathVelocities::auxiliary`].
     pub(crate) auxiliary: Range<usize>,
+    /// Which of the path's rays that turn found it, if it was one.
+    pub(crate) turn: Option<u32>,
 }
 
 /// A part of a vertex's velocity that comes from another material point.
@@ -83,8 +87,10 @@ pub(crate) struct Found<'a> {
     pub(crate) pixel: [u32; 2],
     /// The vertex that the ray started from; `None` at the camera.
     pub(crate) viewer: Option<&'a Vertex>,
-    /// The viewer's velocity.
-    pub(crate) velocity: &'a VertexVelocity,
+    /// The ray moves: its origin, or its direction.
+    pub(crate) ray_moves: bool,
+    /// How the ray turns, beyond what the camera's image point does.
+    pub(crate) turn: Option<&'a RayTurn>,
     pub(crate) arrival: &'a Arrival,
     /// The surfaces on the ray, if any of them has a [flux](crate::terms::flux).
     pub(crate) hits: &'a [SurfaceHit],
@@ -102,6 +108,16 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         found: &Found<'_>,
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity;
+
+    /// How a ray turns, beyond what the camera's image point does; appends the summands.
+    fn turn(
+        &self,
+        _world: &World,
+        _ray: &TurningRay<'_>,
+        _parts: &mut Vec<TurnPart>,
+    ) -> Option<RayTurn> {
+        None
+    }
 
     /// φ and ∇φ of a point seen from a `viewer` along the unit direction `dir` at a `distance`.
     fn blend(

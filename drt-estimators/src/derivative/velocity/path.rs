@@ -4,10 +4,12 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use crate::derivative::antithetic::AntitheticPairs;
-use crate::derivative::velocity::{Auxiliary, Found, SurfaceHit, VelocityField, VertexVelocity};
+use crate::derivative::velocity::{
+    Auxiliary, Found, RayTurn, SurfaceHit, TurnPart, TurningRay, VelocityField, VertexVelocity,
+};
 use crate::sampling::record::PathRecord;
-use crate::sampling::trace::Arrival;
-use crate::world::World;
+use crate::sampling::trace::{Arrival, OutgoingRay};
+use crate::world::{RayPath, World};
 use crate::world::lights::EmitterMask;
 
 /// The velocities of a path's vertices, node by node.
@@ -16,18 +18,60 @@ pub(crate) struct PathVelocities {
     field: Arc<dyn VelocityField>,
     vertices: Vec<VertexVelocity>,
     auxiliary: Vec<Auxiliary>,
+    /// Rays that turn, the present one last if it is one.
+    turns: Vec<RayTurn>,
+    turn_parts: Vec<TurnPart>,
+    /// Of the present ray.
+    present: Option<u32>,
 }
 
 impl PathVelocities {
     pub(crate) fn new(field: Arc<dyn VelocityField>) -> Self {
-        Self { field, vertices: Vec::new(), auxiliary: Vec::new() }
+        Self {
+            field,
+            vertices: Vec::new(),
+            auxiliary: Vec::new(),
+            turns: Vec::new(),
+            turn_parts: Vec::new(),
+            present: None,
+        }
     }
 
     /// Forgets the last path.
     pub(crate) fn begin(&mut self) {
         self.vertices.clear();
         self.auxiliary.clear();
+        self.turns.clear();
+        self.turn_parts.clear();
+        self.present = None;
         self.vertices.push(self.field.camera());
+    }
+
+    /// A ray is about to be followed, on which vertices may be recorded next.
+    pub(crate) fn ray(
+        &mut self,
+        world: &World,
+        record: &PathRecord,
+        leaving: &OutgoingRay,
+        ray: &RayPath,
+    ) {
+        let node = leaving.node as usize;
+        let turning = TurningRay {
+            viewer: &leaving.vertex,
+            moves: self.vertices[node].moves,
+            pixel: (node == 0).then_some(record.pixel),
+            dir: leaving.dir,
+            distance: ray.length,
+            end: ray.end.as_ref().map(|(point, _)| point),
+        };
+        let turn = self.field.turn(world, &turning, &mut self.turn_parts);
+        self.present = turn.is_some().then_some(self.turns.len() as u32);
+        self.turns.extend(turn);
+    }
+
+    /// How the present ray turns, if it does, by its index.
+    pub(crate) fn present_turn(&self) -> Option<u32> {
+        self.present
     }
 
     /// Adds that of a vertex just recorded, found by a ray that `hits` some surfaces with a flux.
@@ -42,12 +86,13 @@ impl PathVelocities {
         let found = Found {
             pixel: record.pixel,
             viewer: record.nodes[parent].vertex(),
-            velocity: &self.vertices[parent],
+            ray_moves: self.vertices[parent].moves || self.present.is_some(),
+            turn: self.present.map(|i| &self.turns[i as usize]),
             arrival,
             hits,
         };
         let velocity = self.field.vertex(world, &found, &mut self.auxiliary);
-        self.vertices.push(velocity);
+        self.vertices.push(VertexVelocity { turn: self.present, ..velocity });
     }
 
     pub(crate) fn field(&self) -> &dyn VelocityField {
@@ -62,6 +107,16 @@ impl PathVelocities {
     /// True when a node moves.
     pub(crate) fn moves(&self, node: usize) -> bool {
         self.vertices[node].moves
+    }
+
+    /// A ray that turns.
+    pub(crate) fn turn(&self, index: Option<u32>) -> Option<&RayTurn> {
+        self.turns.get(index? as usize)
+    }
+
+    /// Its summands.
+    pub(crate) fn turn_parts(&self, turn: &RayTurn) -> &[TurnPart] {
+        &self.turn_parts[turn.parts.clone()]
     }
 
     /// A vertex's summands from other material points.

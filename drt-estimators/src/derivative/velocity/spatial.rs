@@ -83,7 +83,7 @@ impl VelocityField for Spatial {
             auxiliary.extend(warps(found.hits, arrival.dir, arrival.distance, free_path));
         }
         let auxiliary = first..auxiliary.len();
-        let propagated = found.velocity.moves;
+        let propagated = found.ray_moves;
         let on_mover = match &arrival.end {
             Endpoint::Surface(v) => v.surface().is_some_and(|s| self.moves(s)),
             _ => false,
@@ -98,7 +98,7 @@ impl VelocityField for Spatial {
             _ => Blend::default(),
         };
         let moves = propagated || on_mover || !auxiliary.is_empty() || blend.weight > 0.0;
-        VertexVelocity { moves, blend, auxiliary }
+        VertexVelocity { moves, blend, auxiliary, turn: None }
     }
 
     fn blend(

@@ -45,6 +45,7 @@ impl Component {
         let mut motion = None;
         if !tangents.names.is_empty() {
             let insides = match settings.estimator {
+                EstimatorKind::Warped => MediumMotions::at_rest(world.scene.media.len()),
                 EstimatorKind::Radiative => {
                     MediumMotions::affine(&world, &tangents, &settings.insides)
                 }

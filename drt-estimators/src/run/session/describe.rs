@@ -20,11 +20,20 @@ pub(super) fn describe(prepared: &Prepared, motion: Option<&Motion>) -> Plan {
         EmitterMask::Extended => "light of surfaces, media and the sky",
         EmitterMask::Delta => "light of points and directions",
     };
-    let estimator = if radiative.is_some() { "radiative" } else { "path-space" };
+    let warped = prepared.warped.as_ref();
+    let estimator = match (radiative, warped) {
+        (Some(_), _) => "radiative",
+        (_, Some(_)) => "warped",
+        _ => "path-space",
+    };
     let sees_edges = radiative.is_some_and(|r| r.has_edges(world));
     let mut plan = Plan {
         media: (0..world.scene.media.len()).map(|i| medium_plan(world, motion, i)).collect(),
-        edges: radiative.map_or(prepared.boundary.count, |r| r.count),
+        edges: match (radiative, warped) {
+            (Some(r), _) => r.count,
+            (_, Some(w)) => w.count,
+            _ => prepared.boundary.count,
+        },
         primary: has(BoundarySource::Edges(Strategy::Primary)) || has(BoundarySource::PrimaryEdges),
         direct: has(BoundarySource::Edges(Strategy::Direct))
             || prepared.boundary.shadows.is_some()

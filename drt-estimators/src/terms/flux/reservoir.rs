@@ -13,7 +13,7 @@ use crate::derivative::velocity::Spatial;
 use crate::derivative::velocity::warp::{Stretch, SurfaceHit, list_hits};
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::{OutgoingRay, Tracer};
-use crate::terms::flux::{EDGE_ON, Flux, filled};
+use crate::terms::flux::{Flux, filled};
 use crate::world::intervals;
 use crate::world::vertex::{MaterialPoint, SurfacePoint, Vertex};
 use crate::world::{RayPath, World};
@@ -31,6 +31,9 @@ pub(crate) struct FluxRay {
     pub(crate) origin: Vec3,
     /// To the rate of its direction.
     pub(crate) turn: Vec3,
+    /// Its direction, and which of the path's rays that turn it is.
+    pub(crate) dir: Vec3,
+    pub(crate) turns: Option<u32>,
 }
 
 /// What a path meets.
@@ -67,6 +70,7 @@ struct Speed {
 #[derive(Clone, Copy, Debug)]
 struct FluxSample {
     node: u32,
+    turns: Option<u32>,
     t: f64,
     origin: Vec3,
     dir: Vec3,
@@ -113,14 +117,16 @@ impl Reservoir {
         self.chosen = None;
     }
 
-    /// Offers the surfaces that a ray meets.
+    /// Offers the surfaces that a ray meets, whose origin `moves` or which `turns`.
     pub(crate) fn offer(
         &mut self,
         world: &World,
         leaving: &OutgoingRay,
         moves: bool,
+        turns: Option<u32>,
         ray: &RayPath,
     ) {
+        let moves = moves || turns.is_some();
         let OutgoingRay { node, throughput, dir, segments, .. } = *leaving;
         let origin = leaving.vertex.x;
         let flux = &self.flux;
@@ -142,6 +148,7 @@ impl Reservoir {
                 let segments = segments + 1;
                 *chosen = Some(FluxSample {
                     node,
+                    turns,
                     t,
                     origin,
                     dir,
@@ -158,7 +165,7 @@ impl Reservoir {
         let mut before = ray.medium;
         for (i, m) in self.met.iter().enumerate() {
             let around = core::mem::replace(&mut before, m.after);
-            let left_out = node == 0 && Real::abs(m.cosine) < EDGE_ON;
+            let left_out = node == 0 && Real::abs(m.cosine) < flux.edge_on;
             if !m.moves || left_out {
                 continue;
             }
@@ -168,10 +175,10 @@ impl Reservoir {
             let far =
                 world.is_null(m.point.shape).then(|| flux.beyond(world, viewer, m, others[1]));
             let sides = [near, far.flatten()];
-            // Only what moves by itself, and the camera, moves a ray's points at different velocities.
+            // Only what moves by itself, the camera, and a turn move a ray's points at different velocities.
             let rigid = |side: &MediumSide| {
                 let moves = |s: &Speed| flux.moves(s.point.shape);
-                node > 0 && !side.speeds.iter().flatten().any(moves)
+                node > 0 && turns.is_none() && !side.speeds.iter().flatten().any(moves)
             };
             let most = sides.iter().flatten().map(|side| side.most(rigid(side)));
             meet(Face::Surface(m.point), sides, most.fold(0.0, f64::max), m.x, m.distance);
@@ -258,8 +265,13 @@ impl Reservoir {
             return;
         }
         let spatial = self.flux.movers.is_some();
-        let mut ray_of_flux =
-            FluxRay { node: m.node as usize, origin: Vec3::ZERO, turn: Vec3::ZERO };
+        let mut ray_of_flux = FluxRay {
+            node: m.node as usize,
+            origin: Vec3::ZERO,
+            turn: Vec3::ZERO,
+            dir: m.dir,
+            turns: m.turns,
+        };
         let items = &mut self.functional.items;
         items.clear();
         for (rate, along, t) in rates.iter().flatten() {

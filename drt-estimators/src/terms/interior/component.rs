@@ -13,6 +13,7 @@ use crate::sampling::record::PathRecord;
 use crate::sampling::streams::LINE_STREAM;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary::shadow;
+use crate::terms::flux::FluxRay;
 use crate::terms::interior::recorder::PathView;
 use crate::terms::interior::{AlongRays, EdgeQueries, PathSink};
 use crate::terms::radiative::{EdgeContribution, EdgeQuery, Radiative};
@@ -58,9 +59,10 @@ impl<'a, S: PathSink> Worker<'a, S> {
     /// With what it keeps of each path.
     pub(super) fn new(component: Component<'a, S>, separate: bool) -> (Self, PathView<'a>) {
         let Component { world, along, sink } = component;
-        let field: Arc<dyn VelocityField> = match along.radiative {
-            Some(radiative) => Arc::clone(&radiative.spatial) as _,
-            None => Arc::new(Material::new(Movers::new(sink.active()))),
+        let field: Arc<dyn VelocityField> = match (along.radiative, along.warped) {
+            (Some(radiative), _) => Arc::clone(&radiative.spatial) as _,
+            (_, Some(warped)) => Arc::clone(warped) as _,
+            _ => Arc::new(Material::new(Movers::new(sink.active()))),
         };
         let view = PathView {
             world,
@@ -166,8 +168,8 @@ impl<'a, S: PathSink> Worker<'a, S> {
             sink.begin();
             f.send(value, sink);
             let [origin, turn] = [ray_of_flux.origin, ray_of_flux.turn].map(|v| value.outer(v));
-            let at = SurfaceAdjoint::of_place(origin);
-            differentiator.send_back(&recorded, ray_of_flux.node, at, RgbVec::ZERO, turn, sink);
+            let FluxRay { node, dir, turns, .. } = ray_of_flux;
+            differentiator.send_back_ray(&recorded, node, dir, turns, origin, turn, sink);
             sink.finish(values);
         });
     }

@@ -64,9 +64,11 @@ impl Observer for Recorder<'_, '_> {
         if let (0, Some(kept)) = (leaving.node, &mut self.camera_ray) {
             kept.clone_from(ray);
         }
-        for view in self.views.iter_mut() {
-            if let Some(flux) = &mut view.flux {
-                flux.offer(view.world, leaving, view.velocities.moves(leaving.node as usize), ray);
+        for PathView { world, velocities, flux, .. } in self.views.iter_mut() {
+            velocities.ray(world, self.record, leaving, ray);
+            if let Some(flux) = flux {
+                let moves = velocities.moves(leaving.node as usize);
+                flux.offer(world, leaving, moves, velocities.present_turn(), ray);
             }
         }
     }

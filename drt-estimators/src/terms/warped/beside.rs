@@ -1,0 +1,121 @@
+//! How near a direction is to an edge, as it is seen from a point.
+
+use drt_math::Vec3;
+
+/// An edge as a viewer sees it, beside a direction ω. Gradients are by ω, across it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Beside {
+    /// Squared sine of the angle between ω and the edge.
+    pub(super) square: f64,
+    pub(super) square_gradient: Vec3,
+    /// How far along the edge its nearest point is, from 0 to 1.
+    pub(super) along: f64,
+    pub(super) along_gradient: Vec3,
+    /// Distance of that point from the viewer, in scene units.
+    pub(super) distance: f64,
+    pub(super) distance_gradient: Vec3,
+}
+
+impl Beside {
+    /// Of an edge by its ends less the viewer's place, and the unit direction ω; `None` at right angles and more.
+    pub(super) fn new(ends: [Vec3; 2], w: Vec3) -> Option<Self> {
+        let [a, b] = ends;
+        let side = b - a;
+        let n = a.cross(b);
+        let flat = n.length();
+        if flat > 1e-12 * (a.length_squared() + b.length_squared()) {
+            let n = n / flat;
+            // The plane of edge and viewer meets ω's half-plane across it where (a + s side) × ω has no part along n.
+            let (to_start, to_side) = (a.cross(n), side.cross(n));
+            let (start, rate) = (w.dot(to_start), w.dot(to_side));
+            let s = -start / rate;
+            let at = a + side * s;
+            if (0.0..=1.0).contains(&s) && at.dot(w) > 0.0 {
+                let sine = n.dot(w);
+                let across = |g: Vec3| g - w * g.dot(w);
+                let along_gradient = across((to_start + to_side * s) * (-1.0 / rate));
+                let distance = at.length();
+                return Some(Self {
+                    square: sine * sine,
+                    square_gradient: across(n * (2.0 * sine)),
+                    along: s,
+                    along_gradient,
+                    distance,
+                    distance_gradient: along_gradient * (at.dot(side) / distance),
+                });
+            }
+        }
+        let [ra, rb] = [a.length(), b.length()];
+        let [ca, cb] = [a.dot(w) / ra, b.dot(w) / rb];
+        let (end, distance, cosine, along) =
+            if ca >= cb { (a / ra, ra, ca, 0.0) } else { (b / rb, rb, cb, 1.0) };
+        // Squared as a product, the sine keeps its digits.
+        let square = end.cross(w).length_squared();
+        (cosine > 0.0).then(|| Self {
+            square,
+            square_gradient: (end - w * cosine) * (-2.0 * cosine),
+            along,
+            along_gradient: Vec3::ZERO,
+            distance,
+            distance_gradient: Vec3::ZERO,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use drt_math::{Frame, Rng, vec3};
+
+    use super::*;
+
+    fn point(rng: &mut Rng) -> Vec3 {
+        vec3(rng.next_f64() - 0.5, rng.next_f64() - 0.5, rng.next_f64() - 0.5) * 4.0
+    }
+
+    /// The angle is that to the nearest point, and gradients are those of differences.
+    #[test]
+    fn gradients_are_differences() {
+        let mut rng = Rng::new(11, 0, 0);
+        let mut ends_nearest = 0;
+        for _ in 0..500 {
+            let ends = [point(&mut rng), point(&mut rng)];
+            let w = point(&mut rng).normalize();
+            let Some(found) = Beside::new(ends, w) else { continue };
+            let sampled = (0..=20_000).map(|i| {
+                let at = ends[0] + (ends[1] - ends[0]) * (f64::from(i) / 20_000.0);
+                at.dot(w) / at.length()
+            });
+            let nearest = sampled.fold(-1.0, f64::max);
+            assert!((1.0 - found.square - nearest * nearest).abs() < 1e-6);
+            ends_nearest += i32::from(found.along_gradient == Vec3::ZERO);
+            let frame = Frame::from_normal(w);
+            for t in [frame.s, frame.t] {
+                let h = 1e-6;
+                let at = |h: f64| Beside::new(ends, (w + t * h).normalize());
+                let (Some(p), Some(m)) = (at(h), at(-h)) else { continue };
+                // Ends become nearest at kinks.
+                if (p.along_gradient == Vec3::ZERO) != (m.along_gradient == Vec3::ZERO) {
+                    continue;
+                }
+                for (g, difference) in [
+                    (found.square_gradient, p.square - m.square),
+                    (found.along_gradient, p.along - m.along),
+                    (found.distance_gradient, p.distance - m.distance),
+                ] {
+                    let difference = difference / (2.0 * h);
+                    let scale = 1.0 + difference.abs();
+                    assert!((g.dot(t) - difference).abs() < 1e-4 * scale * scale, "{g:?} {difference}");
+                }
+            }
+        }
+        assert!(ends_nearest > 50, "{ends_nearest}");
+    }
+
+    #[test]
+    fn seen_end_on_an_edge_is_a_point() {
+        let w = vec3(0.1, 0.0, 1.0).normalize();
+        let found = Beside::new([vec3(0.0, 0.0, 1.0), vec3(0.0, 0.0, 3.0)], w).unwrap();
+        assert!((found.square - 0.01 / 1.01).abs() < 1e-12);
+        assert!(Beside::new([vec3(0.0, 0.0, -1.0), vec3(0.0, 0.0, -3.0)], w).is_none());
+    }
+}

@@ -1,0 +1,208 @@
+//! The edges that turn rays.
+
+use alloc::vec::Vec;
+
+use drt_geom::edges::{Cone, ConeTree};
+use drt_math::{Vec3, fm};
+
+use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay};
+use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::terms::warped::beside::Beside;
+use crate::world::vertex::MaterialPoint;
+
+/// How far behind the surface where a ray ends edges turn it, over the distance of that.
+const BEHIND: f64 = 0.25;
+
+/// An edge at which radiance jumps.
+#[derive(Clone, Debug)]
+pub(super) struct TurningEdge {
+    ends: [Vec3; 2],
+    points: [MaterialPoint; 2],
+    moves: bool,
+    /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
+    crease: Option<([Vec3; 2], [bool; 2])>,
+}
+
+impl TurningEdge {
+    fn new(edges: &DiscontinuityEdges, edge: &DiscontinuityEdge, moves: bool) -> Self {
+        let [(a, from), (b, to)] = [0.0, 1.0].map(|along| edge.point(along));
+        let jumps = edge.crease.map(|part| part > 0.0);
+        let crease = edges.normals(edge).map(|normals| (normals, jumps));
+        Self { ends: [a, b], points: [from, to], moves, crease }
+    }
+
+    /// Whether radiance jumps there, seen along a vector.
+    fn jumps(&self, view: Vec3) -> bool {
+        let Some((normals, jumps)) = &self.crease else { return true };
+        let [front, other] = normals.map(|n| n.dot(view) > 0.0);
+        front != other || jumps[usize::from(front)]
+    }
+}
+
+/// The edges of a scene in trees of spheres.
+#[derive(Debug, Default)]
+pub(super) struct TurningEdges {
+    list: Vec<TurningEdge>,
+    all: ConeTree,
+    moving: ConeTree,
+}
+
+/// What the weight of an edge depends on besides the edge.
+struct Near<'a> {
+    ray: &'a TurningRay<'a>,
+    /// Squared sine of the cone's angle.
+    square: f64,
+    cone: Cone,
+    /// The unit normal of the surface that the viewer is on, towards the ray's side.
+    horizon: Option<Vec3>,
+    /// Gradient of the logarithm of the ray's length by its direction.
+    length_gradient: Vec3,
+}
+
+/// A weight and its gradient by the direction.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Weight {
+    pub(super) value: f64,
+    pub(super) gradient: Vec3,
+}
+
+impl TurningEdges {
+    pub(super) fn new(edges: &DiscontinuityEdges, moves: impl Fn(u32) -> bool) -> Self {
+        let list: Vec<_> = edges
+            .list
+            .iter()
+            .map(|edge| TurningEdge::new(edges, edge, moves(edge.edge.shape)))
+            .collect();
+        let tree = |of: &dyn Fn(&TurningEdge) -> bool| {
+            let segments = list.iter().zip(0..).filter(|(edge, _)| of(edge));
+            ConeTree::new(&segments.map(|(edge, i)| (edge.ends, i)).collect::<Vec<_>>())
+        };
+        let (all, moving) = (tree(&|_| true), tree(&|edge| edge.moves));
+        Self { list, all, moving }
+    }
+
+    /// True when something moves.
+    pub(super) fn any_moves(&self) -> bool {
+        !self.moving.is_empty()
+    }
+
+    /// How edges within an `angle` of a ray turn it, besides what does not turn with a weight of `rest` beside 1. Without any
+    /// that moves, unless `always` or the viewer moves, they do not.
+    pub(super) fn turn(
+        &self,
+        ray: &TurningRay<'_>,
+        angle: f64,
+        rest: Weight,
+        always: bool,
+        parts: &mut Vec<TurnPart>,
+    ) -> Option<RayTurn> {
+        let near = Near::new(ray, angle);
+        if !(ray.moves || always) {
+            let mut any = false;
+            self.moving.visit(&near.cone, |i| {
+                any = any || near.weight(&self.list[i as usize]).is_some();
+            });
+            if !any {
+                return None;
+            }
+        }
+        let first = parts.len();
+        let mut sum = Weight::default();
+        let mut resting = TurnPart { matter: None, rate: 0.0, divergence: Vec3::ZERO };
+        self.all.visit(&near.cone, |i| {
+            let edge = &self.list[i as usize];
+            let Some((beside, weight)) = near.weight(edge) else { return };
+            sum.value += weight.value;
+            sum.gradient += weight.gradient;
+            // Of one of the ends, whose part in the nearest point is so much.
+            let mut add = |matter, part: f64, slope: f64| {
+                let rate = weight.value * part / beside.distance;
+                let divergence = (weight.gradient * part
+                    + beside.along_gradient * (weight.value * slope))
+                    / beside.distance
+                    - beside.distance_gradient * (rate / beside.distance);
+                match matter {
+                    Some(_) => parts.push(TurnPart { matter, rate, divergence }),
+                    None => {
+                        resting.rate += rate;
+                        resting.divergence += divergence;
+                    }
+                }
+            };
+            if edge.moves {
+                let [from, to] = edge.points;
+                add(Some(from), 1.0 - beside.along, -1.0);
+                add(Some(to), beside.along, 1.0);
+            } else if ray.moves {
+                add(None, 1.0, 0.0);
+            }
+        });
+        if sum.value == 0.0 {
+            return None;
+        }
+        if resting.rate > 0.0 {
+            parts.push(resting);
+        }
+        let total = 1.0 + sum.value + rest.value;
+        let slope = sum.gradient + rest.gradient;
+        for part in &mut parts[first..] {
+            part.rate /= total;
+            // What is across the ray turns along it as the ray turns.
+            part.divergence = (part.divergence - slope * part.rate) / total
+                - ray.dir * (2.0 * part.rate);
+        }
+        let weight = sum.value / total;
+        let gradient = (sum.gradient - slope * weight) / total;
+        Some(RayTurn { weight, gradient, parts: first..parts.len() })
+    }
+}
+
+impl<'a> Near<'a> {
+    fn new(ray: &'a TurningRay<'a>, angle: f64) -> Self {
+        let TurningRay { viewer, dir, distance, end, .. } = *ray;
+        let reach = distance * (1.0 + BEHIND);
+        let cone = Cone::new(viewer.x, dir, angle, reach);
+        let sine = fm::sin(angle);
+        let horizon = viewer.surface().map(|s| if s.ng.dot(dir) < 0.0 { -s.ng } else { s.ng });
+        let length_gradient = match end {
+            Some(point) => point.ng.reject(dir) * (-1.0 / point.ng.dot(dir)),
+            None => Vec3::ZERO,
+        };
+        Self { ray, square: sine * sine, cone, horizon, length_gradient }
+    }
+
+    /// An edge beside the ray and its weight; `None` where it has none.
+    fn weight(&self, edge: &TurningEdge) -> Option<(Beside, Weight)> {
+        let from = self.ray.viewer.x;
+        let ends = edge.ends.map(|p| p - from);
+        let below = |n: Vec3| ends.iter().all(|p| n.dot(*p) <= 1e-9 * p.length());
+        if !edge.jumps(ends[0]) || self.horizon.is_some_and(below) {
+            return None;
+        }
+        let beside = Beside::new(ends, self.ray.dir)?;
+        if beside.square >= self.square {
+            return None;
+        }
+        // On the edge itself the weight is as good as infinite.
+        let square = f64::max(beside.square, f64::MIN_POSITIVE.sqrt());
+        let mut weight = Weight {
+            value: self.square / square - 1.0,
+            gradient: beside.square_gradient * (-self.square / (square * square)),
+        };
+        if beside.distance > self.ray.distance {
+            let ratio = beside.distance / self.ray.distance;
+            let q = (ratio - 1.0) / BEHIND;
+            if q >= 1.0 {
+                return None;
+            }
+            let rest = 1.0 - q * q;
+            let by_ratio = -4.0 * q * rest / BEHIND;
+            let ratio_gradient =
+                beside.distance_gradient / self.ray.distance - self.length_gradient * ratio;
+            weight.gradient =
+                weight.gradient * (rest * rest) + ratio_gradient * (weight.value * by_ratio);
+            weight.value *= rest * rest;
+        }
+        Some((beside, weight))
+    }
+}
