@@ -13,11 +13,18 @@ use drt_tests::matrix::estimators::{Effort, Pairs, compare};
 use drt_tests::matrix::{Stage, caged, deforming, lights, media, riding, surfaces};
 
 fn run(stage: Result<Stage>, effort: Effort) {
-    let pairs = compare(&stage.unwrap(), EstimatorKind::Radiative, effort).unwrap();
+    let pairs = compare(&stage.unwrap(), kind(), effort).unwrap();
     println!("{}", Pairs(&pairs));
     assert!(!pairs.is_empty(), "the stage has no such cells");
     let failing = pairs.iter().filter(|pair| !pair.passes()).count();
     assert_eq!(failing, 0, "{failing} of {} derivatives fail", pairs.len());
+}
+
+fn kind() -> EstimatorKind {
+    match std::env::var("DRT_KIND").as_deref() {
+        Ok("warped") => EstimatorKind::Warped,
+        _ => EstimatorKind::Radiative,
+    }
 }
 
 /// Seconds that each estimator has for a stage, unless `DRT_SECONDS` says otherwise.

@@ -306,10 +306,10 @@ impl<'w> Differentiator<'w> {
         if let Some(turn) = turn_of_ray {
             let mut all = turned_wholly;
             if let Some(filter) = seen {
-                let by_view = self.seen(vertex, arrival.dir, value, filter);
+                // A direction has no parallax.
+                let by_view = self.seen(None, arrival.dir, value, filter);
                 self.by_sensor(&by_view, turn.weight);
-                let distance = if vertex.is_some() { arrival.distance } else { 1.0 };
-                all += by_view.place * distance;
+                all += by_view.place;
                 // What the camera's image point does is replaced.
                 turned -= turned_wholly * turn.weight + weight.outer(turn.gradient);
             }

@@ -86,9 +86,10 @@ impl VelocityField for Warped {
                 let view = camera.view(camera.position() + ray.dir);
                 let (window, slope) = camera.window(pixel, view.pixel);
                 let (slope, _) = camera.view_gradient(&view, slope, 0.0);
+                // As edges do it rises with the inverse square of the distance.
                 rest = Weight {
-                    value: 1.0 / window - 1.0,
-                    gradient: slope.reject(ray.dir) * (-1.0 / (window * window)),
+                    value: 1.0 / (window * window) - 1.0,
+                    gradient: slope.reject(ray.dir) * (-2.0 / (window * window * window)),
                 };
             }
         }
