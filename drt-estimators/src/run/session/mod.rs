@@ -369,7 +369,9 @@ pub(crate) fn estimators(
     }
     // They share what is said of boundary samples; what is not, each finds out.
     let said = settings.boundary_spp.or((!settings.adaptive).then_some(settings.spp));
-    let boundary_spp = said.map(|all| all.div_ceil(shares.len() as u32));
-    let own = |(estimator, lit)| (Settings { estimator, boundary_spp, ..settings.clone() }, lit);
+    let spp = settings.spp.saturating_mul(shares.len() as u32);
+    let own = |(estimator, lit)| {
+        (Settings { estimator, spp, boundary_spp: said, ..settings.clone() }, lit)
+    };
     shares.into_iter().map(own).collect()
 }
