@@ -52,7 +52,7 @@ fn main() {
 fn compare(title: &str, scene: &Scene, shape: &str) {
     let target = scene.find(shape).expect("a shape");
     let Target::Shape(shape) = target else { panic!("{title}: no shape") };
-    let settings = Settings { spp: SPP, threads: 1, ..Settings::default() };
+    let settings = Settings { threads: 1, ..Settings::default() };
     let mut image = Session::new(scene, &[], &settings).expect("a valid scene");
     image.run(SPP, &Unattended);
     let light = image.rendering().image.total.mean.sum();
@@ -62,8 +62,8 @@ fn compare(title: &str, scene: &Scene, shape: &str) {
         ("tetrahedral", vec![(0, InteriorMotion::Tetrahedral(None))]),
     ];
     let run = |kind: usize, spp, seed| -> Vec<Vec3> {
-        let settings = Settings { spp, seed, insides: kinds[kind].1.clone(), ..settings.clone() };
-        let g = gradient(scene, &[target], &settings, &adjoint, &Unattended);
+        let settings = Settings { seed, insides: kinds[kind].1.clone(), ..settings.clone() };
+        let g = gradient(scene, &[target], &settings, spp, &adjoint, &Unattended);
         g.expect("a valid scene").vertices(scene, shape).expect("asked for")
     };
     let mut runs = [Vec::new(), Vec::new()];

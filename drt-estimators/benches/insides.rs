@@ -71,7 +71,7 @@ fn compare(title: &str, scene: &Scene, parameter: &Parameter) {
             continue;
         }
         let insides = vec![(0, kind)];
-        let settings = Settings { spp: SPP, threads: 1, seed: 5, insides, ..Settings::default() };
+        let settings = Settings { threads: 1, seed: 5, insides, ..Settings::default() };
         let start = Instant::now();
         match Session::new(scene, core::slice::from_ref(parameter), &settings) {
             Ok(session) => sessions.push((name, start.elapsed().as_secs_f64(), session)),

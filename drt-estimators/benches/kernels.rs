@@ -187,8 +187,9 @@ fn paths() {
         let subject = scenes::furnace(misty, DEPTH).with_film(FILM);
         for (kind, ten) in &subject.parameters {
             let task = |parameters: &[Parameter]| -> Task<'_> {
-                let settings =
-                    Settings { spp: SPP, boundary_spp: Some(0), threads: 1, ..Settings::default() };
+                // Next to no boundary samples.
+                let boundary_ratio = Some(1.0 / f64::from(SPP));
+                let settings = Settings { boundary_ratio, threads: 1, ..Settings::default() };
                 let mut session =
                     Session::new(&subject.scene, parameters, &settings).expect("a valid scene");
                 Box::new(move || {

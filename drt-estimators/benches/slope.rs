@@ -54,7 +54,7 @@ fn scatter(subject: &Subject, parameters: &[drt_motion::Parameter], spp: u32) ->
     let runs = u32::min(2 * SAMPLES[SAMPLES.len() - 1] / spp, 256);
     let mut moments = vec![Vec::new(); 1 + parameters.len()];
     for seed in 0..u64::from(runs) {
-        let settings = Settings { spp, seed, threads: 1, ..Settings::default() };
+        let settings = Settings { seed, threads: 1, ..Settings::default() };
         let mut session =
             Session::new(&subject.scene, parameters, &settings).expect("a valid scene");
         session.run(spp, &Unattended);

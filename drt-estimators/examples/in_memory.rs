@@ -48,8 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             change: Change::Geometry(GeometryChange::Translate(vec3(1.0, 0.0, 0.0))),
         }],
     };
-    let settings = Settings { spp: 64, ..Settings::default() };
-    let mut session = Session::new(&scene, &[slide], &settings)?;
+    let mut session = Session::new(&scene, &[slide], &Settings::default())?;
     print!("{}", session.plan());
 
     let watch = Watch::default();

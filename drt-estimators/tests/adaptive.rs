@@ -50,9 +50,9 @@ fn scaled(layer: &Layer) -> Layer {
 fn looks_are_worth_their_rays() {
     let scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
     let parameters: [Parameter<_>; 1] = [parameter("ball", 0.0, vec![moves("ball", shift())])];
-    let run = |adaptive, boundary_spp| {
+    let run = |adaptive, boundary_ratio| {
         let estimator = EstimatorKind::Radiative;
-        let settings = Settings { estimator, adaptive, boundary_spp, ..Settings::default() };
+        let settings = Settings { estimator, adaptive, boundary_ratio, ..Settings::default() };
         let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
         session.run(1 << 11, &Unattended);
         let found = session.rendering();
@@ -63,7 +63,7 @@ fn looks_are_worth_their_rays() {
     };
     let (work, queries) = run(true, None);
     // Two looks from vertices to each path, and half a one from the camera or more.
-    let (many, all) = run(true, Some(256));
+    let (many, all) = run(true, Some(4.0));
     println!("{work:.0} at {queries:.2} a path, {many:.0} at {all:.2}");
     assert!(work < 0.9 * many && queries < 0.7 * all, "{work} {many}");
 }
@@ -74,10 +74,10 @@ fn looks_are_worth_their_rays() {
 fn boundary_samples_are_shared() {
     let mut scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
     let parameters: [Parameter<_>; 1] = [parameter("ball", 0.0, vec![moves("ball", shift())])];
-    let said = 32;
+    let said = 0.5;
     let settings = Settings {
         estimator: EstimatorKind::Radiative,
-        boundary_spp: Some(said),
+        boundary_ratio: Some(said),
         ..Settings::default()
     };
     for lights in ["all", "extended"] {
@@ -87,11 +87,12 @@ fn boundary_samples_are_shared() {
             assert!((1..before).contains(&scene.emitters.len()));
         }
         let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
-        session.run(settings.spp, &Unattended);
+        session.run(64, &Unattended);
         let found = session.rendering();
-        let taken = found.counters.boundary_samples as f64 / found.image.pixels.len() as f64;
+        let samples = f64::from(found.spp) * found.image.pixels.len() as f64;
+        let taken = found.counters.boundary_samples as f64 / samples;
         // A path that sees no edge does not look.
-        let part = taken / f64::from(said);
+        let part = taken / said;
         assert!((0.4..1.01).contains(&part), "{taken} with {lights} lights");
     }
 }

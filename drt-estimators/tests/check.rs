@@ -131,7 +131,7 @@ fn settings_and_targets() {
     let scene = fog();
     let adjoint = vec![Rgb::ONE; (FILM[0] * FILM[1]) as usize];
     let reverse = |wanted: &[Target], settings: &Settings| {
-        let gradient = gradient(&scene, wanted, settings, &adjoint, &Unattended);
+        let gradient = gradient(&scene, wanted, settings, 1, &adjoint, &Unattended);
         gradient.expect_err("an error").to_string()
     };
     let insides = vec![(7, InteriorMotion::Static)];
@@ -139,6 +139,7 @@ fn settings_and_targets() {
         (Settings { sensor: 3, ..Settings::default() }, "there is no sensor 3; the scene has 1"),
         (Settings { insides, ..Settings::default() }, "there is no medium 7"),
         (Settings { step: 0.0, ..Settings::default() }, "is 0; expected a positive number"),
+        (Settings { boundary_ratio: Some(NAN), ..Settings::default() }, "`boundary_ratio`: is NaN"),
     ] {
         let forward = Session::new(&scene, &[], &settings).err().expect("an error").to_string();
         assert_eq!(forward, reverse(&[], &settings));

@@ -10,8 +10,10 @@ use drt_estimators::{
 use drt_math::{Rgb, vec3};
 use drt_motion::{GeometryChange, Parameter};
 
+const SPP: u32 = 20;
+
 fn settings(threads: usize, seed: u64) -> Settings {
-    Settings { spp: 20, seed, threads, terms: true, ..Settings::default() }
+    Settings { seed, threads, terms: true, ..Settings::default() }
 }
 
 /// Scenes with a bit of everything, each with parameters that move and change it.
@@ -38,7 +40,7 @@ fn cases() -> Vec<(Scene, Vec<Parameter>)> {
 
 fn rendered(scene: &Scene, parameters: &[Parameter], settings: &Settings) -> Rendering {
     let mut session = Session::new(scene, parameters, settings).expect("a valid scene");
-    assert!(session.run(settings.spp, &Unattended));
+    assert!(session.run(SPP, &Unattended));
     session.rendering()
 }
 
@@ -65,7 +67,7 @@ fn gradients(scene: &Scene, parameters: &[Parameter], settings: &Settings) -> Sc
     wanted.dedup();
     let pixels = FILM[0] * FILM[1];
     let adjoint: Vec<Rgb> = (0..pixels).map(|i| Rgb::splat(f64::from(i % 7) - 3.0)).collect();
-    gradient(scene, &wanted, settings, &adjoint, &Unattended).expect("a valid scene")
+    gradient(scene, &wanted, settings, SPP, &adjoint, &Unattended).expect("a valid scene")
 }
 
 fn same_gradient(a: &SceneGradient, b: &SceneGradient) -> bool {
@@ -135,7 +137,7 @@ fn interior_samples_continue_where_they_stopped() {
     let mut session = Session::new(&scene, &parameters, &settings(1, 5)).expect("a valid scene");
     assert!([6, 2, 12].into_iter().all(|spp| session.run(spp, &Unattended)));
     let in_parts = session.rendering();
-    assert_eq!((at_once.spp, in_parts.spp), (20, 20));
+    assert_eq!((at_once.spp, in_parts.spp), (SPP, SPP));
     for (a, b) in layers(&at_once).into_iter().zip(layers(&in_parts)) {
         let (a, b) = (&a.total, &b.total);
         let error = (a.stderr * a.stderr + b.stderr * b.stderr).map(f64::sqrt);

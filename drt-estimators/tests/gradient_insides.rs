@@ -23,9 +23,8 @@ impl Measured {
             (0..FILM[0] * FILM[1]).map(|_| Rgb::splat(0.5 + rng.next_f64())).collect();
         let insides = vec![(0, kind)];
         let products = (0..SEEDS).map(|seed| -> Vec<f64> {
-            let settings =
-                Settings { spp: 256, seed, insides: insides.clone(), ..Settings::default() };
-            let g = gradient(scene, &[target], &settings, &adjoint, &Unattended);
+            let settings = Settings { seed, insides: insides.clone(), ..Settings::default() };
+            let g = gradient(scene, &[target], &settings, 256, &adjoint, &Unattended);
             let g = g.expect("a valid scene").vertices(scene, shape).expect("wanted");
             velocities.iter().map(|v| g.iter().zip(v).map(|(g, v)| g.dot(*v)).sum()).collect()
         });
@@ -92,10 +91,10 @@ fn a_block_lifts_off() {
     let lift = parameter("lift", 0.0, vec![up]);
     let total = |kind: InteriorMotion| {
         let insides = vec![(0, kind)];
-        let settings = Settings { spp: 16384, seed: 3, insides, ..Settings::default() };
+        let settings = Settings { seed: 3, insides, ..Settings::default() };
         let mut session = Session::new(&scene, core::slice::from_ref(&lift), &settings);
         let session = session.as_mut().expect("a valid scene");
-        session.run(settings.spp, &Unattended);
+        session.run(16384, &Unattended);
         let total = session.rendering().derivatives[0].total.total;
         (total.mean.g, total.stderr.g)
     };

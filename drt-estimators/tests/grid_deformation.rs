@@ -27,7 +27,7 @@ fn by_vertex(scene: &Scene, field: impl Fn(Vec3) -> Vec3) -> Effect {
 
 fn prepared(scene: &Scene, parameters: &[Parameter]) -> Result<Session, Error> {
     let insides = vec![(0, InteriorMotion::Static)];
-    let settings = Settings { spp: 32, insides, ..Settings::default() };
+    let settings = Settings { insides, ..Settings::default() };
     Session::new(scene, parameters, &settings)
 }
 

@@ -11,9 +11,9 @@ use drt_math::{Rgb, ValueChange};
 use drt_motion::{Effect, Parameter};
 
 fn rendered(scene: &Scene, parameters: &[Parameter]) -> Rendering {
-    let settings = Settings { spp: 8, terms: true, ..Settings::default() };
+    let settings = Settings { terms: true, ..Settings::default() };
     let mut session = Session::new(scene, parameters, &settings).expect("a valid scene");
-    assert!(session.run(settings.spp, &Unattended));
+    assert!(session.run(8, &Unattended));
     session.rendering()
 }
 
@@ -156,8 +156,8 @@ fn the_plan_says_why_there_are_no_tetrahedra() {
 fn reverse_mode_skips_as_much() {
     let adjoint = vec![Rgb::ONE; (FILM[0] * FILM[1]) as usize];
     let under = |scene: &Scene, wanted: &[Target], insides: Vec<(usize, InteriorMotion)>| {
-        let settings = Settings { spp: 8, insides, ..Settings::default() };
-        gradient(scene, wanted, &settings, &adjoint, &Unattended).expect("a valid scene")
+        let settings = Settings { insides, ..Settings::default() };
+        gradient(scene, wanted, &settings, 8, &adjoint, &Unattended).expect("a valid scene")
     };
     let run = |scene: &Scene, wanted: &[Target]| under(scene, wanted, Vec::new());
     let scene = surfaces(phong(), phong());
@@ -187,9 +187,9 @@ fn reverse_mode_skips_as_much() {
 
 fn by_rays(scene: &Scene, parameters: &[Parameter]) -> Rendering {
     let estimator = EstimatorKind::Radiative;
-    let settings = Settings { spp: 8, terms: true, estimator, ..Settings::default() };
+    let settings = Settings { terms: true, estimator, ..Settings::default() };
     let mut session = Session::new(scene, parameters, &settings).expect("a valid scene");
-    assert!(session.run(settings.spp, &Unattended));
+    assert!(session.run(8, &Unattended));
     session.rendering()
 }
 

@@ -149,8 +149,7 @@ fn rendered_by(
     parameters: &[Parameter],
     spp: u32,
 ) -> Rendering {
-    let settings =
-        Settings { estimator, spp, terms: true, threads: 1, seed: 3, ..Settings::default() };
+    let settings = Settings { estimator, terms: true, threads: 1, seed: 3, ..Settings::default() };
     let mut session = Session::new(scene, parameters, &settings).expect("a valid scene");
     assert!(session.run(spp, &Unattended));
     let r = session.rendering();

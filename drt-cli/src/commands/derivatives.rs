@@ -19,7 +19,7 @@ pub(super) fn derivatives(
         _ => {
             let mut session = run::prepare(job, &job.parameters)?;
             monitor.stage("grad", 0.0, part);
-            Ok(run::sample(&mut session, options, job.settings.spp, monitor))
+            Ok(run::sample(&mut session, options, job.spp(), monitor))
         }
     }
 }
@@ -32,7 +32,7 @@ fn by_differences(
 ) -> Result<Rendering, CliError> {
     let mut session = run::prepare_forward(job)?;
     monitor.stage("image", 0.0, 0.3 * part);
-    let mut rendering = run::sample(&mut session, options, job.settings.spp, monitor);
+    let mut rendering = run::sample(&mut session, options, job.spp(), monitor);
     rendering.derivatives.clear();
     if !rendering.complete {
         return Ok(rendering);

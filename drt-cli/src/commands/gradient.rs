@@ -78,7 +78,7 @@ fn of_loss(
         // Image and gradient need independent samples.
         let mut session = run::prepare_forward(job)?;
         monitor.stage("image", 0.0, 0.3);
-        let rendering = run::sample(&mut session, &options.common, job.settings.spp, monitor);
+        let rendering = run::sample(&mut session, &options.common, job.spp(), monitor);
         if !rendering.complete {
             return Ok(None);
         }
@@ -91,7 +91,7 @@ fn of_loss(
         .map_err(|e| job.blame(&e))?;
     let values: Vec<f64> = job.parameters.iter().map(|p| p.value).collect();
     monitor.stage("gradient", 0.0, 1.0);
-    let seen = fit.evaluate(&values, job.settings.spp, job.settings.seed, monitor);
+    let seen = fit.evaluate(&values, job.spp(), job.settings.seed, monitor);
     Ok(seen.map_err(|e| job.blame(&e))?.map(|seen| seen.gradient()))
 }
 
@@ -116,7 +116,7 @@ fn of_adjoint(
         monitor.stage("gradient in reverse", 0.6, 1.0);
         let scene = moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
         let wanted: Vec<Target> = job.groups.iter().map(|g| g.target).collect();
-        let gradient = gradient(&scene, &wanted, &job.settings, adjoint, monitor);
+        let gradient = gradient(&scene, &wanted, &job.settings, job.spp(), adjoint, monitor);
         let gradient = gradient.map_err(|e| job.blame(&e))?;
         for group in &job.groups {
             group.collect(&job.scene, &scene, &gradient, &mut numbers);

@@ -12,7 +12,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     let mut session = run::prepare_forward(&job)?;
     let monitor = Monitor::new(options.changes.quiet);
     monitor.stage("render", 0.0, 1.0);
-    let mut rendering = run::sample(&mut session, options, job.settings.spp, &monitor);
+    let mut rendering = run::sample(&mut session, options, job.spp(), &monitor);
     monitor.finish();
     rendering.derivatives.clear();
     outputs.write(&job, &rendering, &[], &[])?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use drt_estimators::{Layer, Rendering, Session, Settings, finite_differences};
+use drt_estimators::{Layer, Rendering, Session, finite_differences};
 use drt_motion::Parameter;
 
 use super::monitor::Monitor;
@@ -18,7 +18,9 @@ const FIRST_PASS: u32 = 4;
 /// Opens the input and lays the options over it.
 pub(super) fn open(options: &Options) -> Result<Job, CliError> {
     let mut job = open_changed(&options.input, &options.changes)?;
-    job.settings.spp = options.spp.unwrap_or(job.settings.spp);
+    if let Some(spp) = options.spp {
+        job.set_spp(spp);
+    }
     Ok(job)
 }
 
@@ -95,8 +97,7 @@ pub(super) fn differences(
     step: f64,
     monitor: &Monitor,
 ) -> Result<Option<Vec<Layer>>, CliError> {
-    let settings = Settings { spp, ..job.settings.clone() };
-    let layers = finite_differences(&job.scene, &job.parameters, &settings, step, monitor)
+    let layers = finite_differences(&job.scene, &job.parameters, &job.settings, spp, step, monitor)
         .map_err(|e| job.blame(&e))?;
     Ok((layers.len() == job.parameters.len()).then_some(layers))
 }

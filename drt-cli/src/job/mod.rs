@@ -37,6 +37,9 @@ pub struct Overrides {
     pub defaults: Defaults,
 }
 
+/// Samples per pixel, where neither job nor scene says how many.
+const DEFAULT_SPP: u32 = 64;
+
 /// A scene with what is to be estimated in it.
 #[derive(Clone, Debug)]
 pub struct Job {
@@ -50,8 +53,11 @@ pub struct Job {
     pub scene: Scene,
     /// What is differentiated with respect to, in file order.
     pub parameters: Vec<Parameter<String>>,
-    /// Budgets and switches.
+    /// How images and derivatives are estimated.
     pub settings: Settings,
+    spp: u32,
+    /// Boundary samples, per pixel on average, where the job says how many.
+    boundary_spp: Option<u32>,
     /// What in the scene is passed over.
     pub warnings: Vec<Warning>,
     /// Where each parameter stands.
@@ -78,24 +84,29 @@ pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
     let (scene, warnings) = read_scene(&scene_path, &overrides.defaults)?;
     let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
     let settings = settings(&document, &keys, folder, &scene, &parameters)?;
+    let [spp, boundary_spp] = sample_counts(&document, &keys.estimator)?;
     let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters);
     let groups = groups::groups(&document, &keys.parameter_group, folder, &scene)?;
     let grouped = grouped(&document, &keys);
     let path = path.into();
     let text = Some(text);
-    Ok(Job {
+    let mut job = Job {
         path,
         text,
         scene_path,
         scene,
         parameters,
         settings,
+        spp: DEFAULT_SPP,
+        boundary_spp,
         optimize,
         warnings,
         places,
         groups,
         grouped,
-    })
+    };
+    job.set_spp(spp.unwrap_or(DEFAULT_SPP));
+    Ok(job)
 }
 
 impl Job {
@@ -112,6 +123,8 @@ impl Job {
             scene,
             parameters: Vec::new(),
             settings: Settings::default(),
+            spp: DEFAULT_SPP,
+            boundary_spp: None,
             optimize: Ok(None),
             warnings,
             places: Vec::new(),
@@ -126,8 +139,22 @@ impl Job {
     fn take_sample_count(&mut self) {
         let sensor = self.scene.sensors.get(self.settings.sensor);
         if let (None, Some(count)) = (&self.text, sensor.and_then(|s| s.item.sample_count)) {
-            self.settings.spp = count;
+            self.set_spp(count);
         }
+    }
+
+    /// Samples per pixel.
+    #[must_use]
+    pub fn spp(&self) -> u32 {
+        self.spp
+    }
+
+    /// Changes the number of samples per pixel. Boundary samples stay as many as the job says; where it does not,
+    /// they change in proportion.
+    pub fn set_spp(&mut self, spp: u32) {
+        self.spp = spp;
+        let ratio = |boundary: u32| f64::from(boundary) / f64::from(spp.max(1));
+        self.settings.boundary_ratio = self.boundary_spp.map(ratio);
     }
 
     /// What to call it among others: the file's name, or that of its folder where the file's says
@@ -202,8 +229,6 @@ fn settings(
     let keys::Estimator {
         kind,
         sampling,
-        spp,
-        boundary_spp,
         max_depth,
         antithetic,
         guiding,
@@ -228,17 +253,6 @@ fn settings(
             document.error_at(s.span().start, "bidirectional sampling is not supported yet")
         );
     }
-    let count = |key: &str, value: &Spanned<i64>| {
-        let fits = u32::try_from(*value.get_ref()).ok().filter(|n| *n >= 1);
-        let message = format!("`{key}` is {}; expected at least 1", value.get_ref());
-        fits.ok_or_else(|| document.error_at(value.span().start, message))
-    };
-    if let Some(n) = spp {
-        settings.spp = count("spp", n)?;
-    }
-    if let Some(n) = boundary_spp {
-        settings.boundary_spp = Some(count("boundary_spp", n)?);
-    }
     if let Some(n) = max_depth {
         settings.max_depth =
             depth(*n.get_ref()).map_err(|message| document.error_at(n.span().start, message))?;
@@ -256,6 +270,20 @@ fn settings(
         }
     }
     Ok(settings)
+}
+
+/// Samples per pixel, and boundary samples per pixel on average, where they are said.
+fn sample_counts(
+    document: &Document<'_>,
+    keys: &keys::Estimator,
+) -> Result<[Option<u32>; 2], CliError> {
+    let count = |key: &str, value: &Option<Spanned<i64>>| {
+        let Some(value) = value else { return Ok(None) };
+        let fits = u32::try_from(*value.get_ref()).ok().filter(|n| *n >= 1);
+        let message = format!("`{key}` is {}; expected at least 1", value.get_ref());
+        fits.ok_or_else(|| document.error_at(value.span().start, message)).map(Some)
+    };
+    Ok([count("spp", &keys.spp)?, count("boundary_spp", &keys.boundary_spp)?])
 }
 
 /// A path depth, where -1 is unlimited.

@@ -52,7 +52,7 @@ fn change(effect: &str) -> Change {
 fn defaults_are_the_contracts() {
     let j = job("scene = \"scene.xml\"", &[]).unwrap();
     let s = &j.settings;
-    assert_eq!((s.sensor, s.spp, s.boundary_spp, s.max_depth), (0, 64, None, Depth::OfScene));
+    assert_eq!((s.sensor, j.spp(), s.boundary_ratio, s.max_depth), (0, 64, None, Depth::OfScene));
     assert_eq!((s.estimator, s.antithetic, s.step), (EstimatorKind::PathSpace, true, 1e-3));
     assert!(j.parameters.is_empty());
     j.require_derivatives().unwrap();
@@ -73,9 +73,14 @@ fn every_estimator_key() {
         guiding = false
         step = 0.5
     "#;
-    let s = job(text, &[]).unwrap().settings;
-    assert_eq!((s.sensor, s.spp, s.boundary_spp, s.max_depth), (1, 3, Some(5), Depth::Unlimited));
+    let mut j = job(text, &[]).unwrap();
+    let s = &j.settings;
+    let ratio = Some(5.0 / 3.0);
+    assert_eq!((s.sensor, j.spp(), s.boundary_ratio, s.max_depth), (1, 3, ratio, Depth::Unlimited));
     assert_eq!((s.estimator, s.antithetic, s.step), (EstimatorKind::FiniteDifference, false, 0.5));
+    // Boundary samples stay as many as the job says.
+    j.set_spp(10);
+    assert_eq!((j.spp(), j.settings.boundary_ratio), (10, Some(0.5)));
 }
 
 #[test]
@@ -205,7 +210,7 @@ fn assignments_reach_every_key() {
     assert_eq!(j.parameters.iter().map(|p| p.value).collect::<Vec<_>>(), [0.5, 2.0]);
     let translated = Change::Geometry(GeometryChange::Translate(vec3(0.0, 0.0, 4.0)));
     assert_eq!(j.parameters[1].effects[0].change, translated);
-    assert_eq!((j.settings.spp, j.settings.sensor), (7, 1));
+    assert_eq!((j.spp(), j.settings.sensor), (7, 1));
     assert_eq!(j.settings.estimator, EstimatorKind::FiniteDifference);
     for (key, value, parts) in [
         ("estimator.ssp", "7", ["--set estimator.ssp", "unknown field `ssp`"]),
@@ -271,9 +276,9 @@ fn a_scene_alone_brings_its_own_sample_count() {
     let folder = Folder::new();
     let file: PathBuf = folder.file("s.xml", SCENE);
     let mut j = Job::from_scene(&file, &Defaults::new()).unwrap();
-    assert_eq!(j.settings.spp, 64);
+    assert_eq!(j.spp(), 64);
     j.select_sensor("cam").unwrap();
-    assert_eq!((j.settings.sensor, j.settings.spp), (1, 9));
+    assert_eq!((j.settings.sensor, j.spp()), (1, 9));
     assert!(j.select_sensor("cube").is_err());
     assert_eq!(j.scene.sensors[1].item.sensor.film()[0], 8);
 }

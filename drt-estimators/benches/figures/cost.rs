@@ -20,26 +20,26 @@ const FILM: [u32; 2] = [16, 16];
 struct Way {
     name: &'static str,
     estimator: EstimatorKind,
-    boundary_spp: u32,
+    boundary_ratio: f64,
     /// With the lights that shine from a point, for which `radiative` needs `path-space` as well.
     points: bool,
 }
 
 const WAYS: [Way; 4] = [
-    Way::new("path-space", EstimatorKind::PathSpace, SPP, true),
-    Way::new("radiative", EstimatorKind::Radiative, SPP, false),
-    Way::new("and a bulb", EstimatorKind::Radiative, SPP, true),
-    Way::new("its 1/8", EstimatorKind::Radiative, SPP / 8, true),
+    Way::new("path-space", EstimatorKind::PathSpace, 1.0, true),
+    Way::new("radiative", EstimatorKind::Radiative, 1.0, false),
+    Way::new("and a bulb", EstimatorKind::Radiative, 1.0, true),
+    Way::new("its 1/8", EstimatorKind::Radiative, 0.125, true),
 ];
 
 impl Way {
     const fn new(
         name: &'static str,
         estimator: EstimatorKind,
-        boundary_spp: u32,
+        boundary_ratio: f64,
         points: bool,
     ) -> Self {
-        Self { name, estimator, boundary_spp, points }
+        Self { name, estimator, boundary_ratio, points }
     }
 }
 
@@ -80,7 +80,7 @@ pub(crate) fn print() {
 }
 
 fn settings() -> Settings {
-    Settings { spp: SPP, threads: 1, seed: 3, ..Settings::default() }
+    Settings { threads: 1, seed: 3, ..Settings::default() }
 }
 
 fn session(scene: &Scene, parameters: &[Parameter], settings: &Settings) -> Session {
@@ -104,11 +104,11 @@ fn parameters(
     subject: &Subject,
     kind: &str,
     ten: &[Parameter],
-    &Way { name, estimator, boundary_spp, points }: &Way,
+    &Way { name, estimator, boundary_ratio, points }: &Way,
 ) {
     let mut scene = subject.scene.clone();
     scene.emitters.retain(|e| points || !e.item.emitter.is_delta());
-    let settings = Settings { estimator, boundary_spp: Some(boundary_spp), ..settings() };
+    let settings = Settings { estimator, boundary_ratio: Some(boundary_ratio), ..settings() };
     let [mut image, mut one, mut all] =
         [&[][..], &ten[..1], ten].map(|parameters| session(&scene, parameters, &settings));
     let [forward, single, tenfold] =
@@ -130,21 +130,19 @@ fn vertices(subject: &Subject) {
     let target = scene.find(subject.vertices_of).expect("a shape");
     let Target::Shape(shape) = target else { panic!("{} is no shape", subject.vertices_of) };
     let adjoint = [Rgb::ONE; PIXELS];
-    let call = |settings: &Settings| {
-        gradient(scene, &[target], settings, &adjoint, &Unattended).expect("a valid scene")
+    let call = |spp| {
+        gradient(scene, &[target], &settings(), spp, &adjoint, &Unattended).expect("a valid scene")
     };
     // What a call does whatever the number of samples: the least it can be asked for.
     const LEAST: u32 = 2;
-    let least = Settings { spp: LEAST, ..settings() };
-    let full = Settings { spp: SPP + LEAST, ..least.clone() };
     let mut image = session(scene, &[], &settings());
     let [forward, fixed, all] = take_turns(
         TURNS,
-        [more(&mut image), Box::new(|| drop(call(&least))), Box::new(|| drop(call(&full)))],
+        [more(&mut image), Box::new(|| drop(call(LEAST))), Box::new(|| drop(call(SPP + LEAST)))],
     );
     let samples = all.without(1.0, &fixed);
     let preparation = fixed.without(f64::from(LEAST) / f64::from(SPP), &samples);
-    let counters = call(&full).counters;
+    let counters = call(SPP + LEAST).counters;
     println!(
         "{:9} {:11} {:8} {:15.2} {:6.1} {:13.1}",
         subject.name,

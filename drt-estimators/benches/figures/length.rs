@@ -89,7 +89,8 @@ fn with(job: Job, misty: bool, depth: u32, settings: &Settings) -> Task<'static>
             .filter(|s| s.id.as_deref() == Some("ball"))
             .for_each(|s| s.emitter = Some(0));
     }
-    let settings = Settings { spp: VERTICES / depth, threads: 1, ..settings.clone() };
+    let settings = Settings { threads: 1, ..settings.clone() };
+    let spp = VERTICES / depth;
     let parameters = match job {
         Job::Image => vec![],
         Job::DerivativeImage => subject.parameters[0].1[..1].to_vec(),
@@ -97,12 +98,13 @@ fn with(job: Job, misty: bool, depth: u32, settings: &Settings) -> Task<'static>
             let target: Target = scene.find(subject.vertices_of).expect("a shape");
             let adjoint = [Rgb::ONE; PIXELS as usize];
             return Box::new(move || {
-                gradient(&scene, &[target], &settings, &adjoint, &Unattended).expect("a gradient");
+                gradient(&scene, &[target], &settings, spp, &adjoint, &Unattended)
+                    .expect("a gradient");
             });
         }
     };
     let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
     Box::new(move || {
-        session.run(settings.spp, &Unattended);
+        session.run(spp, &Unattended);
     })
 }

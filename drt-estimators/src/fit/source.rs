@@ -70,8 +70,9 @@ impl<'a> ImageSource<'a> {
         let mut derivatives: Vec<_> =
             rendering.derivatives.iter().map(|d| means(&d.total)).collect();
         if let Some((scene, parameters)) = self.differences {
-            let settings = Settings { seed, spp, ..self.settings.clone() };
-            let layers = finite_differences(scene, parameters, &settings, settings.step, control)?;
+            let settings = Settings { seed, ..self.settings.clone() };
+            let step = settings.step;
+            let layers = finite_differences(scene, parameters, &settings, spp, step, control)?;
             if layers.len() < parameters.len() {
                 return Ok(None);
             }

@@ -48,7 +48,7 @@ impl Depth {
     }
 }
 
-/// Sample budgets and switches of one run.
+/// How images and derivatives are estimated, whatever the number of samples: that is told by each call.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
@@ -56,15 +56,11 @@ pub struct Settings {
     pub estimator: EstimatorKind,
     /// Index of the sensor.
     pub sensor: usize,
-    /// Paths per pixel: of the image, and of the terms of derivatives found along paths. A
-    /// [`Session`](crate::Session) is told by each run how many it takes; there this is what
-    /// `boundary_spp` is in proportion to.
-    pub spp: u32,
-    /// Boundary samples of all kinds together, per pixel on average. They share them in equal parts, of which edges
-    /// seen from the camera leave up to three quarters where a pilot finds them known well enough. `None` is as many as
-    /// `spp`; with [`adaptive`](Self::adaptive), for each kind as many as make the noise least for the time, between
-    /// a quarter of `spp` and four times as many.
-    pub boundary_spp: Option<u32>,
+    /// Boundary samples of all kinds together to each sample of a pixel, on average; positive. They share them in equal
+    /// parts, of which edges seen from the camera leave up to three quarters where a pilot finds them known well enough.
+    /// `None` is 1; with [`adaptive`](Self::adaptive), for each kind what makes the noise least for the time, between
+    /// 1/4 and 4.
+    pub boundary_ratio: Option<f64>,
     /// Path depth.
     pub max_depth: Depth,
     /// Samples in antithetic pairs: image points mirrored at the pixel's centre (2021 paper, §5.4), and rays
@@ -74,11 +70,11 @@ pub struct Settings {
     /// know it: forward mode is its exact transpose only without.
     pub guiding: bool,
     /// Of [`EstimatorKind::Radiative`]: query an edge from every vertex of a path (2019 paper), at a cost
-    /// quadratic in its length; `boundary_spp` then counts the camera's edges alone. Else one vertex of each path
+    /// quadratic in its length; `boundary_ratio` then counts the camera's edges alone. Else one vertex of each path
     /// queries, chosen by its throughput.
     pub every_vertex: bool,
-    /// Give more of the samples to pixels whose derivatives (without parameters, whose image) are noisier; `spp` is
-    /// the mean. A pilot takes an eighth of the samples and is then forgotten.
+    /// Give more of the samples to pixels whose derivatives (without parameters, whose image) are noisier; the
+    /// mean stays. A pilot takes an eighth of the samples and is then forgotten.
     pub adaptive: bool,
     /// Half step of finite differences, in units of each parameter.
     pub step: f64,
@@ -97,8 +93,7 @@ impl Default for Settings {
         Self {
             estimator: EstimatorKind::default(),
             sensor: 0,
-            spp: 64,
-            boundary_spp: None,
+            boundary_ratio: None,
             max_depth: Depth::OfScene,
             antithetic: true,
             guiding: true,
@@ -122,6 +117,10 @@ impl Settings {
         let fail = |setting, reason| Err(Error::Setting { setting, reason });
         if !(self.step > 0.0 && self.step.is_finite()) {
             return fail("step", SettingError::NotPositive(self.step));
+        }
+        // Without boundary samples a term would be missing.
+        if let Some(ratio) = self.boundary_ratio.filter(|r| !(*r > 0.0 && r.is_finite())) {
+            return fail("boundary_ratio", SettingError::NotPositive(ratio));
         }
         let count = scene.media.len();
         if let Some(&(index, _)) = self.insides.iter().find(|(m, _)| *m >= count) {

@@ -22,7 +22,7 @@ use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
 
 /// Central differences of the image by each parameter, in the order of `parameters`: the difference
-/// of the images at value ± `step`, over 2 `step`.
+/// of the images at value ± `step`, over 2 `step`, from `spp` samples per pixel of each.
 ///
 /// Both images see the same random numbers, and the standard errors are those of the difference.
 /// Returns fewer layers than parameters when `control` cancelled the run.
@@ -33,6 +33,7 @@ pub fn finite_differences(
     scene: &Scene,
     parameters: &[Parameter],
     settings: &Settings,
+    spp: u32,
     step: f64,
     control: &dyn Control,
 ) -> Result<Vec<Layer>, Error> {
@@ -60,7 +61,7 @@ pub fn finite_differences(
         };
         let middle = at(0.0, None)?;
         let worlds = [at(-step, Some(&middle))?, at(step, Some(&middle))?];
-        let pair = AntitheticPair { worlds, step, settings };
+        let pair = AntitheticPair { worlds, step, spp, seed: settings.seed };
         let progress = |done: f64| {
             control.progress((p as f64 + done) / parameters.len() as f64);
         };
@@ -73,13 +74,14 @@ pub fn finite_differences(
 }
 
 /// A scene displaced both ways.
-struct AntitheticPair<'a> {
+struct AntitheticPair {
     worlds: [World; 2],
     step: f64,
-    settings: &'a Settings,
+    spp: u32,
+    seed: u64,
 }
 
-impl AntitheticPair<'_> {
+impl AntitheticPair {
     fn difference(
         &self,
         pool: &Pool,
@@ -88,8 +90,7 @@ impl AntitheticPair<'_> {
     ) -> Option<Layer> {
         let size = self.worlds[0].camera.film();
         let mut film = PixelFilm::new(size, 1);
-        let units = self.settings.spp.max(1);
-        let seed = self.settings.seed;
+        let (units, seed) = (self.spp.max(1), self.seed);
         let filling = Filling {
             pool,
             seed,

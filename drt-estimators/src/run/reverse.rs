@@ -40,7 +40,8 @@ use crate::world::lights::EmitterMask;
 use crate::world::vertex::MaterialPoint;
 use crate::world::{ActiveFactors, MediumActivity, World};
 
-/// The gradient of a loss by the items `wanted`. `adjoint` holds ∂Loss/∂I per pixel and channel, row by row
+/// The gradient of a loss by the items `wanted`, from `spp` samples per pixel, and boundary samples in
+/// [proportion](Settings::boundary_ratio). `adjoint` holds ∂Loss/∂I per pixel and channel, row by row
 /// from the top left.
 ///
 /// How the inside of a medium moves with what is around it:
@@ -53,8 +54,8 @@ use crate::world::{ActiveFactors, MediumActivity, World};
 /// * Tetrahedra that [`Settings::insides`] gives are taken, without the velocities given along with them. Other kinds
 ///   of motion count as not asked for.
 ///
-/// All of these have the same expected value. Forward mode is the exact transpose with the same seed and settings, without
-/// [`guiding`](Settings::guiding), and with one of the kinds above asked for in both. An exception are shapes that touch and
+/// All of these have the same expected value. Forward mode is the exact transpose with the same seed, settings and
+/// `spp`, without [`guiding`](Settings::guiding), and with one of the kinds above asked for in both. An exception are shapes that touch and
 /// move differently: no field follows both, and the flux through what is left behind is added here.
 ///
 /// # Errors
@@ -64,6 +65,7 @@ pub fn gradient(
     scene: &Scene,
     wanted: &[impl TargetName],
     settings: &Settings,
+    spp: u32,
     adjoint: &[Rgb],
     control: &dyn Control,
 ) -> Result<SceneGradient, Error> {
@@ -90,7 +92,8 @@ pub fn gradient(
         world.prepare_for_derivatives(needs);
     }
     let antithetic = components.iter().any(|c| c.prepared.antithetic);
-    let run = Reverse { world: &world, components: &components, antithetic, settings, adjoint };
+    let (components, seed) = (&components[..], settings.seed);
+    let run = Reverse { world: &world, components, antithetic, seed, spp, adjoint };
     let pool = Pool::new(settings.threads);
     let mut total = run.zeros();
     let mut merge = |_: u32, parts: Vec<(usize, Sums)>| {
@@ -198,7 +201,8 @@ struct Reverse<'a> {
     components: &'a [Component],
     /// Image points come in mirrored pairs.
     antithetic: bool,
-    settings: &'a Settings,
+    seed: u64,
+    spp: u32,
     adjoint: &'a [Rgb],
 }
 
@@ -223,12 +227,12 @@ impl Reverse<'_> {
     /// One of `chunks` parts of the pixels; what it adds to which component.
     fn pixels(&self, chunk: u32, chunks: u32) -> Vec<(usize, Sums)> {
         let per_unit = if self.antithetic { 2 } else { 1 };
-        let units = self.settings.spp.div_ceil(per_unit).max(1);
+        let units = self.spp.div_ceil(per_unit).max(1);
         let scale = 1.0 / f64::from(units * per_unit);
         let n = self.adjoint.len() as u64;
         let at = |c: u32| (n * u64::from(c) / u64::from(chunks)) as u32;
         let components = self.components.iter().map(|c| c.prepared.component(c.scatter()));
-        let (seed, film) = (self.settings.seed, self.world.camera.film());
+        let (seed, film) = (self.seed, self.world.camera.film());
         let mut sampler = PixelSampler::new(self.world, components, seed, self.antithetic, false);
         let mut values = [Rgb::ZERO];
         let pass = Pass::new(0, units, film);
@@ -257,7 +261,7 @@ impl Reverse<'_> {
         let component = &self.components[c];
         let prepared = &component.prepared;
         let source = prepared.sources[i];
-        let per_pixel = f64::from(self.settings.spp) * prepared.source_ratio(i);
+        let per_pixel = f64::from(self.spp) * prepared.source_ratio(i);
         let count = prepared.samples_per_batch(per_pixel);
         let scale = 1.0 / (f64::from(count) * BATCHES as f64);
         let mut receiver = Checked::new(ToGradient {
@@ -268,7 +272,7 @@ impl Reverse<'_> {
             scale,
         });
         let stream = source.stream() + u64::from(batch);
-        let splatter = prepared.splatter(seed_of_component(self.settings.seed, c));
+        let splatter = prepared.splatter(seed_of_component(self.seed, c));
         let account = splatter.run(source, stream, count, &mut receiver);
         let mut to = receiver.inner;
         to.flush();

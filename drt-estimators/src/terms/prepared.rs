@@ -232,10 +232,7 @@ fn grazing_flux(
     Ok(seen)
 }
 
-/// Samples of each of some kinds of boundary samples to each sample of a pixel; never none, which would
-/// drop a term.
+/// Samples of each of some kinds of boundary samples to each sample of a pixel.
 fn boundary_ratio(settings: &Settings, kinds: usize) -> f64 {
-    let all =
-        settings.boundary_spp.map_or(1.0, |b| f64::from(b.max(1)) / f64::from(settings.spp.max(1)));
-    all / kinds.max(1) as f64
+    settings.boundary_ratio.unwrap_or(1.0) / kinds.max(1) as f64
 }

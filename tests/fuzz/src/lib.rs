@@ -51,9 +51,9 @@ pub fn use_scene(mut scene: Scene, parameters: &[Parameter], settings: &Settings
         let small = sensor.item.sensor.with_film([3, 2]);
         sensor.item.sensor = small.expect("two sides that are not zero");
     }
-    let settings = Settings { spp: 2, max_depth: Depth::AtMost(3), threads: 1, ..settings.clone() };
+    let settings = Settings { max_depth: Depth::AtMost(3), threads: 1, ..settings.clone() };
     if let Ok(mut session) = Session::new(&scene, parameters, &settings) {
-        session.run(settings.spp, &Unattended);
+        session.run(2, &Unattended);
         let rendering = session.rendering();
         let layers = rendering.derivatives.iter().map(|d| &d.total);
         for pixel in layers.chain([&rendering.image]).flat_map(|l| &l.pixels) {

@@ -15,8 +15,7 @@ const SAMPLES: u32 = 1 << 21;
 /// numbers, and disagree with numbers that are 10 % off.
 pub(crate) fn judge(scene: &Scene, value: f64, parameters: &[(Parameter, f64)], depth: u32) {
     let (parameters, exact): (Vec<_>, Vec<_>) = parameters.iter().cloned().unzip();
-    let settings =
-        Settings { spp: SAMPLES, max_depth: Depth::AtMost(depth), seed: 11, ..Settings::default() };
+    let settings = Settings { max_depth: Depth::AtMost(depth), seed: 11, ..Settings::default() };
     let mut session = Session::new(scene, &parameters, &settings).expect("the scene is usable");
     assert!(session.run(SAMPLES, &Unattended));
     let rendering = session.rendering();

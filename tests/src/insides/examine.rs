@@ -111,12 +111,13 @@ pub fn examine(case: &Case, noise: f64, samples: u32) -> Result<Finding> {
 fn differences(case: &Case, step: f64, noise: f64, first: &Layer) -> Result<Verdict> {
     let start = Instant::now();
     let way = &case.right[0];
+    let settings = Settings { threads: 1, seed: 201, ..Settings::default() };
     let mut samples = DIFFERENCES;
     loop {
-        let settings = Settings { threads: 1, seed: 201, spp: samples, ..Settings::default() };
         let difference = |step: f64| -> Result<Layer> {
             let parameters = std::slice::from_ref(&way.parameter);
-            let layers = finite_differences(&case.scene, parameters, &settings, step, &Unattended)?;
+            let layers =
+                finite_differences(&case.scene, parameters, &settings, samples, step, &Unattended)?;
             Ok(layers.into_iter().next().ok_or("no finite difference")?)
         };
         let half = difference(0.5 * step)?;

@@ -76,8 +76,7 @@ pub fn check(stage: &Stage) -> Result<Vec<Row>> {
         let settings = Settings {
             threads: 1,
             seed: 7,
-            spp: stage.samples,
-            boundary_spp: Some(stage.boundary_samples),
+            boundary_ratio: Some(f64::from(stage.boundary_samples) / f64::from(stage.samples)),
             terms: true,
             insides: stage.insides.clone(),
             ..Settings::default()
@@ -100,10 +99,12 @@ pub fn check(stage: &Stage) -> Result<Vec<Row>> {
 /// Judges a derivative of an image of about the given radiance.
 fn compare(stage: &Stage, cell: &Cell, derivative: &Derivative, radiance: f64) -> Result<Row> {
     let start = Instant::now();
-    let settings = Settings { threads: 1, seed: 11, spp: cell.samples, ..Settings::default() };
+    let settings = Settings { threads: 1, seed: 11, ..Settings::default() };
     let parameters = [cell.parameter.clone()];
     let difference = |step: f64| -> Result<Layer> {
-        let layers = finite_differences(&stage.scene, &parameters, &settings, step, &Unattended)?;
+        let Stage { scene, .. } = stage;
+        let layers =
+            finite_differences(scene, &parameters, &settings, cell.samples, step, &Unattended)?;
         Ok(layers.into_iter().next().ok_or("no finite difference")?)
     };
     let (whole, mut half) = (difference(cell.step)?, difference(0.5 * cell.step)?);

@@ -149,16 +149,17 @@ fn transposed(scene: &Scene, parameter: &Parameter) -> Result<Transposed> {
     let scene = &scene;
     // Reverse mode leaves insides at rest.
     let insides = (0..scene.media.len()).map(|m| (m, InteriorMotion::Static)).collect();
-    let settings = Settings { threads: 1, spp: 4, guiding: false, insides, ..Settings::default() };
+    let settings = Settings { threads: 1, guiding: false, insides, ..Settings::default() };
+    let spp = 4;
     let mut forward = Session::new(scene, core::slice::from_ref(&parameter), &settings)?;
-    forward.run(settings.spp, &Unattended);
+    forward.run(spp, &Unattended);
     let forward = forward.rendering();
     let pixels = &forward.derivatives[0].total.pixels;
     let sum: f64 = pixels.iter().map(|p| p.mean.sum()).sum();
     let size: f64 = pixels.iter().map(|p| (p.mean.abs() + p.stderr).sum()).sum();
     let ones = vec![Rgb::ONE; pixels.len()];
     let wanted = targets(scene, &parameter);
-    let gradient = gradient(scene, &wanted, &settings, &ones, &Unattended)?;
+    let gradient = gradient(scene, &wanted, &settings, spp, &ones, &Unattended)?;
     let reverse = pair(scene, &parameter, &gradient);
     let off = (reverse - sum).abs();
     Ok(Transposed {

@@ -39,7 +39,7 @@ impl<'a> Problem<'a> {
         }
         let spp = match options.common.spp {
             Some(spp) => Stages::new(spp, Vec::new()),
-            None => Stages::new(job.settings.spp, plan.spp.clone()),
+            None => Stages::new(job.spp(), plan.spp.clone()),
         };
         let iterations = options.iterations.unwrap_or(plan.iterations);
         let views = views(job, plan)?;

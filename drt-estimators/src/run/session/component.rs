@@ -62,7 +62,7 @@ impl Component {
         let guide = motion.as_ref().filter(|_| settings.guiding);
         let mut prepared = Prepared::new(world, active, flux_shapes, settings, guide)?;
         // Else the pilot of a run measures more.
-        let measures = !settings.adaptive || settings.boundary_spp.is_some();
+        let measures = !settings.adaptive || settings.boundary_ratio.is_some();
         if let Some(motion) = guide.filter(|_| measures) {
             prepared.primary_share = primary_share(&prepared, motion, prepared.boundary_ratio);
         }

@@ -160,8 +160,8 @@ impl Session {
         (self.samples, self.passes, self.complete) = (0, 0, true);
     }
 
-    /// Adds `spp` samples per pixel, and boundary samples in proportion. Returns false when `control`
-    /// cancelled it; the result then holds what was finished.
+    /// Adds `spp` samples per pixel, and boundary samples in [proportion](Settings::boundary_ratio).
+    /// Returns false when `control` cancelled it; the result then holds what was finished.
     pub fn run(&mut self, spp: u32, control: &dyn Control) -> bool {
         let (pool, blocks) = (Arc::clone(&self.pool), Arc::clone(&self.blocks));
         let pass = Pass { pool: &pool, blocks: &blocks, spp, before: self.passes, control };
@@ -369,8 +369,8 @@ pub(crate) fn estimators(
         shares.push((settings.estimator, EmitterMask::All));
     }
     // They share what is said of boundary samples; what is not, each finds out.
-    let said = settings.boundary_spp.or((!settings.adaptive).then_some(settings.spp));
-    let boundary_spp = said.map(|all| all.div_ceil(shares.len() as u32));
-    let own = |(estimator, lit)| (Settings { estimator, boundary_spp, ..settings.clone() }, lit);
+    let said = settings.boundary_ratio.or((!settings.adaptive).then_some(1.0));
+    let boundary_ratio = said.map(|all| all / shares.len() as f64);
+    let own = |(estimator, lit)| (Settings { estimator, boundary_ratio, ..settings.clone() }, lit);
     shares.into_iter().map(own).collect()
 }

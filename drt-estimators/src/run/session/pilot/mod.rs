@@ -33,7 +33,7 @@ impl Session {
         let (first_query, queries) = self.queries(film.layers());
         let seed = !self.settings.seed;
         let (account, done) = self.fill(&mut film, seed, true, pass, units, |_, _| {}, progress);
-        let along = self.settings.boundary_spp.is_none().then(|| {
+        let along = self.settings.boundary_ratio.is_none().then(|| {
             let samples = f64::from(units * self.per_unit());
             let of_queries = if first_query < film.layers() { account.query_rays } else { 0 };
             let rays = [account.counters.rays - of_queries, of_queries];

@@ -1,6 +1,6 @@
 //! A pilot of few samples: how many of the boundary samples go to edges that the camera sees.
 //!
-//! Kinds of boundary samples share [`Settings::boundary_spp`](crate::Settings::boundary_spp). In equal parts those of the
+//! Kinds of boundary samples share [`Settings::boundary_ratio`](crate::Settings::boundary_ratio). In equal parts those of the
 //! camera's edges often make a hundredth of the noise in a third of the time, as radiance differs beside an edge by about as
 //! much as an image does; but where a lamp is in view, and that or the camera moves, they make nearly all of it. So before a run
 //! a few samples of all terms tell which it is. With the variance v and cost c of a sample, and those of paths (v₁, c₁) and of the
