@@ -77,8 +77,10 @@ fn agree_from(spp: u32, name: &str, scene: &Scene, effects: Vec<Effect>, setting
     // Normals that are computed anew differ in their last bits. That tips the choice between edges of
     // next to no weight, those in the plane of the face that looks: of 182 events of the ball one then
     // had 1e-5 for 1e-12.
-    let name = format!("{name}, radiative");
-    by_one_estimator(&name, scene, effects, &radiative(settings), spp, 1e-4);
+    let named = format!("{name}, radiative");
+    by_one_estimator(&named, scene, effects.clone(), &radiative(settings), spp, 1e-4);
+    let warped = Settings { estimator: EstimatorKind::Warped, ..settings.clone() };
+    by_one_estimator(&format!("{name}, warped"), scene, effects, &warped, spp, 1e-9);
 }
 
 const EXACT: f64 = 1e-12;

@@ -90,11 +90,11 @@ impl Trial {
         moves.then_some(trial)
     }
 
-    /// The same by the 2019 estimator; `None` where no light fits it, and path space does it all.
+    /// The same by an estimator other than path space; `None` where no light fits that, and path space does it all.
     #[must_use]
-    pub fn by_radiative(mut self) -> Option<Self> {
-        self.name = format!("{}: radiative", self.name);
-        self.estimator = EstimatorKind::Radiative;
+    pub fn by(mut self, estimator: EstimatorKind) -> Option<Self> {
+        self.name = format!("{}: {estimator:?}", self.name);
+        self.estimator = estimator;
         let delta = |e: &SceneEmitter| e.emitter.is_delta();
         let emitters = self.built.scene.emitters.iter();
         let emissive = self.built.scene.media.iter().any(|m| m.item.is_emissive());

@@ -5,7 +5,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use drt_estimators::InteriorMotion;
+use drt_estimators::{EstimatorKind, InteriorMotion};
 use drt_tests::judge::{Row, Table, rows};
 use drt_tests::measure::{Effort, measure};
 use drt_tests::oracle::OracleFile;
@@ -94,17 +94,16 @@ const MOVING: [&str; 8] = [
 
 #[test]
 fn quickly_by_every_inside() {
-    let quick = Effort { noise: 0.02, near_zero: 1.0, of_case: false, samples: 1 << 20 };
-    check_insides(&MOVING[1..], &quick);
+    check_insides(&MOVING[1..], &QUICK);
 }
 
-/// The cases whose light fits the 2019 form. In the furnace filled with a medium all derivatives
+/// The cases whose light fits an estimator that goes along rays. In the furnace filled with a medium all derivatives
 /// vanish by cancellation along endless paths: there the material form is the one to use.
-fn by_radiative(effort: &Effort) {
+fn by(estimator: EstimatorKind, effort: &Effort) {
     let file = OracleFile::read().unwrap();
     let cases = file.cases.iter().filter(|c| c.kind != "furnace_closed_enclosure");
     let all = cases.flat_map(|c| Trial::of_case(c).unwrap());
-    let trials: Vec<Trial> = all.filter_map(Trial::by_radiative).collect();
+    let trials: Vec<Trial> = all.filter_map(|t| t.by(estimator)).collect();
     assert!(trials.len() > 10, "{} cases", trials.len());
     judge(&trials, effort);
 }
@@ -113,12 +112,25 @@ fn by_radiative(effort: &Effort) {
 #[test]
 #[ignore = "takes minutes"]
 fn to_a_percent_by_radiative() {
-    by_radiative(&Effort { noise: 0.01, ..STRICT });
+    by(EstimatorKind::Radiative, &Effort { noise: 0.01, ..STRICT });
 }
 
 #[test]
+#[ignore = "takes minutes"]
+fn to_a_percent_by_warped() {
+    by(EstimatorKind::Warped, &Effort { noise: 0.01, ..STRICT });
+}
+
+const QUICK: Effort = Effort { noise: 0.02, near_zero: 1.0, of_case: false, samples: 1 << 20 };
+
+#[test]
 fn quickly_by_radiative() {
-    by_radiative(&Effort { noise: 0.02, near_zero: 1.0, of_case: false, samples: 1 << 20 });
+    by(EstimatorKind::Radiative, &QUICK);
+}
+
+#[test]
+fn quickly_by_warped() {
+    by(EstimatorKind::Warped, &QUICK);
 }
 
 macro_rules! kinds {
@@ -143,7 +155,7 @@ macro_rules! kinds {
             #[test]
             #[ignore = "takes minutes"]
             fn by_radiative() {
-                super::by_radiative(&super::STRICT);
+                super::by(super::EstimatorKind::Radiative, &super::STRICT);
             }
 
             $(

@@ -227,10 +227,9 @@ fn assignments_reach_every_key() {
 #[test]
 fn keys_of_later_versions_are_read_and_stand_in_the_way_of_derivatives_only() {
     let text = |more: &str| format!("scene = \"scene.xml\"\n{more}");
-    for (more, part) in [
-
-        ("[[parameter_group]]\ntarget = \"cube\"\nvertices = \"all\"", "[[parameter_group]]"),
-    ] {
+    for (more, part) in
+        [("[[parameter_group]]\ntarget = \"cube\"\nvertices = \"all\"", "[[parameter_group]]")]
+    {
         let j = job(&text(more), &[]).unwrap();
         let message = j.require_derivatives().unwrap_err().to_string();
         assert!(message.contains(part) && message.contains("job.toml:"), "{message}");

@@ -83,8 +83,7 @@ impl Prepared {
         }
         let kinds = sources.len();
         let grazing = grazing_flux(&world, flux.as_ref(), active, &mut sources)?;
-        // The filter's rate is what mirrored pairs cancel; without it they only cost.
-        let antithetic = settings.antithetic && moving && world.camera.filter().is_continuous();
+        let antithetic = mirrors(&world, active, settings);
         Ok(Self {
             boundary_ratio: boundary_ratio(settings, kinds),
             primary_share: 1.0,
@@ -160,7 +159,7 @@ impl Prepared {
             boundary: Boundary::default(),
             radiative: None,
             warped: Some(warped),
-            antithetic: false,
+            antithetic: mirrors(&world, active, settings),
             lobe_pairs: settings.antithetic,
             primary_share: 1.0,
             world,
@@ -217,6 +216,11 @@ impl Prepared {
         let samples = per_pixel * f64::from(w) * f64::from(h);
         f64::max(samples / BATCHES as f64, 1.0) as u32
     }
+}
+
+/// Whether image points come in mirrored pairs. The filter's rate is what they cancel; without it they only cost.
+fn mirrors(world: &World, active: &ActiveInputs, settings: &Settings) -> bool {
+    settings.antithetic && active.moves_geometry() && world.camera.filter().is_continuous()
 }
 
 /// What the camera sees edge on of surfaces with a flux, as one more source.

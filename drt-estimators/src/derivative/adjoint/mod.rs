@@ -33,10 +33,10 @@ use crate::derivative::adjoint::emitters::{LightEnd, light_moves, strength};
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 
+use crate::derivative::adjoint::turning::send_turn;
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint,
 };
-use crate::derivative::adjoint::turning::send_turn;
 use crate::derivative::velocity::{RecordedPath, TurnPart};
 use crate::model::sensor::SensorGradient;
 use crate::sampling::trace::Endpoint;
@@ -262,7 +262,8 @@ impl<'w> Differentiator<'w> {
                     let by_view = self.seen(None, arrival.dir, value, filter);
                     self.by_sensor(&by_view, phi);
                 }
-                let along = self.segment(&path, Far::Direction, ray_moves, weight, &mut there, sink);
+                let along =
+                    self.segment(&path, Far::Direction, ray_moves, weight, &mut there, sink);
                 turned_wholly += along;
                 turned = along * (1.0 - phi);
             }
@@ -281,7 +282,8 @@ impl<'w> Differentiator<'w> {
                 if phi == 1.0 {
                     here.u += by_place;
                     let moving = ray_moves || moves(v, sink.active());
-                    turned_wholly += self.segment(&path, Far::Vertex(v, here), moving, weight, &mut there, sink);
+                    turned_wholly +=
+                        self.segment(&path, Far::Vertex(v, here), moving, weight, &mut there, sink);
                 } else {
                     let free = weight * (1.0 - phi);
                     turned = self.segment(&path, Far::Direction, ray_moves, free, &mut there, sink);

@@ -9,8 +9,8 @@ use crate::derivative::velocity::{
 };
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::{Arrival, OutgoingRay};
-use crate::world::{RayPath, World};
 use crate::world::lights::EmitterMask;
+use crate::world::{RayPath, World};
 
 /// The velocities of a path's vertices, node by node.
 #[derive(Clone, Debug)]

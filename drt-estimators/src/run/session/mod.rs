@@ -356,10 +356,7 @@ pub(crate) fn estimators(
     let emitters = || scene.emitters.iter().map(|e| &e.item.emitter);
     let mut shares = Vec::new();
     let along_rays = matches!(settings.estimator, EstimatorKind::Radiative | EstimatorKind::Warped);
-    if along_rays
-        && emitters().any(|e| e.is_delta())
-        && targets.into_iter().any(may_move)
-    {
+    if along_rays && emitters().any(|e| e.is_delta()) && targets.into_iter().any(may_move) {
         shares.push((EstimatorKind::PathSpace, EmitterMask::Delta));
         let media = scene.media.iter().any(|m| m.item.is_emissive());
         if media || emitters().any(|e| !e.is_delta()) {

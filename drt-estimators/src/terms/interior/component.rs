@@ -86,7 +86,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
 
     /// Whether derivatives of the filter are needed.
     pub(super) fn differentiates_filter(&self) -> bool {
-        // At fixed image points they are not.
+        // At fixed image points without turns they are not.
         self.along.radiative.is_none() && self.sink.active().moves_geometry()
     }
 

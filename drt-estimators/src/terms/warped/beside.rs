@@ -14,6 +14,8 @@ pub(super) struct Beside {
     /// Distance of that point from the viewer, in scene units.
     pub(super) distance: f64,
     pub(super) distance_gradient: Vec3,
+    /// The point, less the viewer's place.
+    pub(super) place: Vec3,
 }
 
 impl Beside {
@@ -42,6 +44,7 @@ impl Beside {
                     along_gradient,
                     distance,
                     distance_gradient: along_gradient * (at.dot(side) / distance),
+                    place: at,
                 });
             }
         }
@@ -58,6 +61,7 @@ impl Beside {
             along_gradient: Vec3::ZERO,
             distance,
             distance_gradient: Vec3::ZERO,
+            place: end * distance,
         })
     }
 }
@@ -104,7 +108,10 @@ mod tests {
                 ] {
                     let difference = difference / (2.0 * h);
                     let scale = 1.0 + difference.abs();
-                    assert!((g.dot(t) - difference).abs() < 1e-4 * scale * scale, "{g:?} {difference}");
+                    assert!(
+                        (g.dot(t) - difference).abs() < 1e-4 * scale * scale,
+                        "{g:?} {difference}"
+                    );
                 }
             }
         }

@@ -10,8 +10,8 @@ use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::terms::warped::beside::Beside;
 use crate::world::vertex::MaterialPoint;
 
-/// How far behind the surface where a ray ends edges turn it, over the distance of that.
-const BEHIND: f64 = 0.25;
+/// How far behind the plane of the surface where a ray ends edges turn it, over their distances.
+const BEHIND: f64 = 0.02;
 
 /// An edge at which radiance jumps.
 #[derive(Clone, Debug)]
@@ -55,8 +55,10 @@ struct Near<'a> {
     cone: Cone,
     /// The unit normal of the surface that the viewer is on, towards the ray's side.
     horizon: Option<Vec3>,
-    /// Gradient of the logarithm of the ray's length by its direction.
-    length_gradient: Vec3,
+    /// Unit normal of the surface where the ray ends, away from the viewer; zero where it does not. And the viewer's distance
+    /// from its plane.
+    normal: Vec3,
+    depth: f64,
 }
 
 /// A weight and its gradient by the direction.
@@ -148,8 +150,8 @@ impl TurningEdges {
         for part in &mut parts[first..] {
             part.rate /= total;
             // What is across the ray turns along it as the ray turns.
-            part.divergence = (part.divergence - slope * part.rate) / total
-                - ray.dir * (2.0 * part.rate);
+            part.divergence =
+                (part.divergence - slope * part.rate) / total - ray.dir * (2.0 * part.rate);
         }
         let weight = sum.value / total;
         let gradient = (sum.gradient - slope * weight) / total;
@@ -160,15 +162,19 @@ impl TurningEdges {
 impl<'a> Near<'a> {
     fn new(ray: &'a TurningRay<'a>, angle: f64) -> Self {
         let TurningRay { viewer, dir, distance, end, .. } = *ray;
-        let reach = distance * (1.0 + BEHIND);
+        let normal = end.map_or(Vec3::ZERO, |s| if s.ng.dot(dir) < 0.0 { -s.ng } else { s.ng });
+        // Nothing is behind the sky.
+        let depth = if end.is_some() { normal.dot(dir) * distance } else { 0.0 };
+        let reach = f64::INFINITY;
         let cone = Cone::new(viewer.x, dir, angle, reach);
         let sine = fm::sin(angle);
         let horizon = viewer.surface().map(|s| if s.ng.dot(dir) < 0.0 { -s.ng } else { s.ng });
-        let length_gradient = match end {
-            Some(point) => point.ng.reject(dir) * (-1.0 / point.ng.dot(dir)),
-            None => Vec3::ZERO,
-        };
-        Self { ray, square: sine * sine, cone, horizon, length_gradient }
+        Self { ray, square: sine * sine, cone, horizon, normal, depth }
+    }
+
+    /// How far a point, less the viewer's place, is behind the plane of the surface where the ray ends.
+    fn behind(&self, place: Vec3) -> f64 {
+        self.normal.dot(place) - self.depth
     }
 
     /// An edge beside the ray and its weight; `None` where it has none.
@@ -189,18 +195,18 @@ impl<'a> Near<'a> {
             value: self.square / square - 1.0,
             gradient: beside.square_gradient * (-self.square / (square * square)),
         };
-        if beside.distance > self.ray.distance {
-            let ratio = beside.distance / self.ray.distance;
-            let q = (ratio - 1.0) / BEHIND;
+        let behind = self.behind(beside.place);
+        if behind > 0.0 {
+            let q = behind / (BEHIND * beside.distance);
             if q >= 1.0 {
                 return None;
             }
             let rest = 1.0 - q * q;
-            let by_ratio = -4.0 * q * rest / BEHIND;
-            let ratio_gradient =
-                beside.distance_gradient / self.ray.distance - self.length_gradient * ratio;
+            let q_gradient = beside.along_gradient
+                * (self.normal.dot(edge.ends[1] - edge.ends[0]) / (BEHIND * beside.distance))
+                - beside.distance_gradient * (q / beside.distance);
             weight.gradient =
-                weight.gradient * (rest * rest) + ratio_gradient * (weight.value * by_ratio);
+                weight.gradient * (rest * rest) - q_gradient * (4.0 * q * rest * weight.value);
             weight.value *= rest * rest;
         }
         Some((beside, weight))

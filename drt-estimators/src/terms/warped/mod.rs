@@ -18,7 +18,7 @@ use crate::world::World;
 use crate::world::vertex::{SurfacePoint, Vertex};
 
 /// Radians.
-const ANGLE: f64 = 0.2;
+const ANGLE: f64 = 0.1;
 /// Pixels.
 const PIXELS: f64 = 2.0;
 
@@ -42,7 +42,8 @@ impl Warped {
         };
         let count = [found.list.len() as u64, found.all];
         let edges = TurningEdges::new(&found, |shape| active.shapes[shape as usize]);
-        let blended = (0..).zip(&active.shapes).map(|(s, moves)| *moves && spatial.blends.acts_on(world, s));
+        let blended =
+            (0..).zip(&active.shapes).map(|(s, moves)| *moves && spatial.blends.acts_on(world, s));
         let blended = blended.collect();
         Self { spatial, edges, blended, count }
     }
