@@ -36,6 +36,8 @@ pub(super) struct Estimator {
     pub(super) guiding: Option<bool>,
     /// Of `radiative`: every vertex of a path looks for an edge, not one of them.
     pub(super) every_vertex: Option<bool>,
+    /// Of `warped`: how vertices move with edges.
+    pub(super) warp: Option<Spanned<Warp>>,
     /// Noisier pixels take more samples.
     pub(super) adaptive: Option<bool>,
     pub(super) step: Option<Spanned<f64>>,
@@ -48,6 +50,34 @@ pub(super) enum Kind {
     PathSpace,
     Warped,
     FiniteDifference,
+}
+
+/// How vertices move with edges; all but `by` are of auxiliary samples.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Warp {
+    pub(super) by: WarpBy,
+    pub(super) samples: Option<u32>,
+    pub(super) kernel: Option<WarpKernel>,
+    pub(super) debiased: Option<bool>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum WarpBy {
+    Edges,
+    Points,
+    Directions,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+pub(super) enum WarpKernel {
+    #[serde(rename = "corrected")]
+    Corrected,
+    #[serde(rename = "2023")]
+    Year2023,
+    #[serde(rename = "2020")]
+    Year2020,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]

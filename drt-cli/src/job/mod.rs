@@ -15,7 +15,9 @@ mod velocities;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use drt_estimators::{Depth, EstimatorKind, Scene, Settings, Target};
+use drt_estimators::{
+    AuxiliarySamples, Depth, EstimatorKind, Scene, Settings, Target, Warp, WarpKernel,
+};
 use drt_motion::Parameter;
 use toml::Spanned;
 
@@ -233,6 +235,7 @@ fn settings(
         antithetic,
         guiding,
         every_vertex,
+        warp,
         adaptive,
         step,
         ..
@@ -261,6 +264,10 @@ fn settings(
     settings.antithetic = antithetic.unwrap_or(settings.antithetic);
     settings.guiding = guiding.unwrap_or(settings.guiding);
     settings.every_vertex = every_vertex.unwrap_or(settings.every_vertex);
+    if let Some(w) = warp {
+        settings.warp = self::warp(w.get_ref())
+            .map_err(|message| document.error_at(w.span().start, message))?;
+    }
     settings.adaptive = adaptive.unwrap_or(settings.adaptive);
     if let Some(s) = step {
         settings.step = *s.get_ref();
@@ -270,6 +277,30 @@ fn settings(
         }
     }
     Ok(settings)
+}
+
+/// How vertices move with edges.
+fn warp(keys: &keys::Warp) -> Result<Warp, &'static str> {
+    let keys::Warp { by, samples, kernel, debiased } = *keys;
+    let mut asked = AuxiliarySamples::default();
+    asked.count = samples.unwrap_or(asked.count);
+    asked.debiased = debiased.unwrap_or(asked.debiased);
+    asked.kernel = match kernel {
+        None | Some(keys::WarpKernel::Corrected) => WarpKernel::Corrected,
+        Some(keys::WarpKernel::Year2023) => WarpKernel::Year2023,
+        Some(keys::WarpKernel::Year2020) => WarpKernel::Year2020,
+    };
+    if asked.count == 0 {
+        return Err("`samples` is 0; expected at least 1");
+    }
+    match by {
+        keys::WarpBy::Points => Ok(Warp::Points(asked)),
+        keys::WarpBy::Directions => Ok(Warp::Directions(asked)),
+        keys::WarpBy::Edges if (samples, kernel, debiased) == (None, None, None) => Ok(Warp::Edges),
+        keys::WarpBy::Edges => {
+            Err("edges have no auxiliary samples; expected no other key than `by`")
+        }
+    }
 }
 
 /// Samples per pixel, and boundary samples per pixel on average, where they are said.

@@ -23,6 +23,53 @@ pub enum EstimatorKind {
     FiniteDifference,
 }
 
+/// How rays turn, or vertices move, with the edges beside them, by [`EstimatorKind::Warped`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Warp {
+    /// By the edges themselves: without auxiliary rays, and without bias.
+    #[default]
+    Edges,
+    /// By auxiliary points around each vertex, as published in 2023. Surfaces only.
+    Points(AuxiliarySamples),
+    /// By auxiliary directions around each ray, as published in 2020. Surfaces only.
+    Directions(AuxiliarySamples),
+}
+
+/// Auxiliary samples of a [`Warp`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct AuxiliarySamples {
+    /// Of each vertex or ray; the bias falls with its inverse.
+    pub count: u32,
+    /// Their weights.
+    pub kernel: WarpKernel,
+    /// Without bias, by random truncation of a sum over doubled counts, at some four times the cost.
+    pub debiased: bool,
+}
+
+impl Default for AuxiliarySamples {
+    fn default() -> Self {
+        Self { count: 8, kernel: WarpKernel::default(), debiased: false }
+    }
+}
+
+/// Weights of auxiliary samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum WarpKernel {
+    /// Converges on triangle meshes: boundary tests by distance from silhouettes, open and sharp edges, and the cube of
+    /// distance and test together.
+    #[default]
+    Corrected,
+    /// The distance of Eq. 16 of the 2023 paper, cubed, and tests as printed there.
+    Year2023,
+    /// The distance of Eq. 57 of the 2023 paper, which is that of 2020.
+    Year2020,
+}
+
 /// The longest paths: 1 shows emitters only, each real scattering adds one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -76,6 +123,8 @@ pub struct Settings {
     /// Give more of the samples to pixels whose derivatives (without parameters, whose image) are noisier; the
     /// mean stays. A pilot takes an eighth of the samples and is then forgotten.
     pub adaptive: bool,
+    /// Of [`EstimatorKind::Warped`].
+    pub warp: Warp,
     /// Half step of finite differences, in units of each parameter.
     pub step: f64,
     /// Names the random numbers: same seed, same pixel data.
@@ -99,6 +148,7 @@ impl Default for Settings {
             guiding: true,
             every_vertex: false,
             adaptive: false,
+            warp: Warp::default(),
             step: 1e-3,
             seed: 0,
             threads: 0,

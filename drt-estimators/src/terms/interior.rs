@@ -3,7 +3,6 @@
 mod component;
 mod recorder;
 
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::sobol::SobolSampler;
@@ -19,7 +18,7 @@ use crate::model::rendering::{Account, Counters, NonFinite, Term};
 use crate::sampling::pixels::Sampler;
 use crate::sampling::record::PathRecord;
 use crate::sampling::record::Radiance;
-use crate::sampling::streams::{DIMENSIONS, FLUX_STREAM, PAIR_STREAM};
+use crate::sampling::streams::{DIMENSIONS, FLUX_STREAM, PAIR_STREAM, VELOCITY_STREAM};
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary::shadow::Shadows;
 use crate::terms::flux::Flux;
@@ -35,7 +34,7 @@ pub(crate) struct AlongRays<'a> {
     /// Set in the spatial form.
     pub(crate) radiative: Option<&'a Radiative>,
     /// Set where rays turn with edges.
-    pub(crate) warped: Option<&'a Arc<Warped>>,
+    pub(crate) warped: Option<&'a Warped>,
     pub(crate) queries: EdgeQueries,
     /// Pairs of rays tell how narrow lobes turn.
     pub(crate) lobe_pairs: bool,
@@ -193,10 +192,13 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     /// The same, and the sinks of the components.
     pub(crate) fn finish(self) -> (Account, Vec<S>) {
         let sum = |of: fn(&Worker<'a, S>) -> u64| self.workers.iter().map(of).sum();
+        let of_paths: u64 = self.views.iter().map(|v| v.velocities.rays()).sum();
+        let probes = of_paths + sum(|w| w.differentiator.rays());
         let account = Account {
             counters: Counters {
                 differentiated_paths: sum(|w| w.differentiated),
                 recorded_vertices: self.recorded,
+                rays: self.tracer.counters.rays + probes,
                 ..self.tracer.counters
             },
             non_finite: self.non_finite,
@@ -226,7 +228,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let width = camera.film()[0];
         for view in &mut self.views {
             let stream = |of: u64| Rng::new(self.seed, of | u64::from(pixel), unit);
-            view.begin(Some(stream(PAIR_STREAM)), || stream(FLUX_STREAM));
+            let velocities = stream(VELOCITY_STREAM);
+            view.begin(Some(stream(PAIR_STREAM)), velocities, || stream(FLUX_STREAM));
         }
         let shadows = self.workers.iter().any(|w| w.along.shadows.is_some());
         let mut recorder = Recorder {

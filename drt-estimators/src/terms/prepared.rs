@@ -27,7 +27,7 @@ pub(crate) struct Prepared {
     /// Set in the spatial form.
     pub(crate) radiative: Option<Radiative>,
     /// Set where rays turn with edges.
-    pub(crate) warped: Option<Arc<Warped>>,
+    pub(crate) warped: Option<Warped>,
     /// Splatted terms that can contribute.
     pub(crate) sources: Vec<BoundarySource>,
     /// Image points come in mirrored pairs.
@@ -55,7 +55,7 @@ impl Prepared {
             EstimatorKind::Radiative if active.any() => {
                 Self::spatial(world, active, settings, motion)
             }
-            EstimatorKind::Warped if active.any() => Ok(Self::warped(world, active, settings)),
+            EstimatorKind::Warped if active.any() => Self::warped(world, active, settings),
             _ => Self::material(world, active, flux_shapes, settings),
         }
     }
@@ -147,28 +147,31 @@ impl Prepared {
     }
 
     /// For the 2023 estimator.
-    fn warped(world: World, active: &ActiveInputs, settings: &Settings) -> Self {
-        let mut spatial = Spatial::new(&world, active);
-        spatial.blends.leave_media();
-        let spatial = Arc::new(spatial);
-        let flux = (active.moves_geometry() || active.grids.contains(&true))
-            .then(|| Flux::spatial(&world, active, &spatial))
-            .flatten();
-        let warped = Arc::new(Warped::new(&world, active, spatial));
-        Self {
+    fn warped(world: World, active: &ActiveInputs, settings: &Settings) -> Result<Self, Error> {
+        let warped = Warped::new(&world, active, settings)?;
+        let flux = warped
+            .spatial
+            .as_ref()
+            .filter(|_| active.moves_geometry() || active.grids.contains(&true));
+        let flux = flux.and_then(|spatial| Flux::spatial(&world, active, spatial));
+        let mut sources = Vec::new();
+        if warped.spatial.is_none() && active.moves_geometry() && world.camera.has_borders() {
+            sources.push(BoundarySource::Borders);
+        }
+        Ok(Self {
             boundary: Boundary::default(),
             radiative: None,
             warped: Some(warped),
             antithetic: mirrors(&world, active, settings),
             lobe_pairs: settings.antithetic,
             primary_share: 1.0,
+            boundary_ratio: boundary_ratio(settings, sources.len()),
             world,
             flux: flux.map(Flux::along_rays),
             grazing: None,
-            sources: Vec::new(),
-            boundary_ratio: 1.0,
+            sources,
             queries: EdgeQueries::default(),
-        }
+        })
     }
 
     pub(crate) fn along_rays(&self) -> AlongRays<'_> {

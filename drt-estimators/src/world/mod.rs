@@ -3,7 +3,7 @@
 pub(crate) mod cache;
 mod geometry;
 pub(crate) mod lights;
-mod rays;
+pub(crate) mod rays;
 pub(crate) mod scatter;
 pub(crate) mod vertex;
 
@@ -189,7 +189,7 @@ pub(crate) struct World {
     pub(crate) rr_depth: u32,
     pub(crate) geometry: Arc<Geometry>,
     null: Vec<bool>,
-    any_null: bool,
+    pub(crate) any_null: bool,
     /// The medium beyond every interface.
     ambient: Option<usize>,
 }

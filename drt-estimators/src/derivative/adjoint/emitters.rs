@@ -1,97 +1,109 @@
 //! The emitters' ends of a path: what a contribution owes to a light's strength, place, direction and
 //! falloff.
 
-use alloc::vec::Vec;
-
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::turning::send_turn;
 use crate::derivative::adjoint::{Differentiator, Far, Propagated, Stretch, turn};
 use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::{
-    PathVelocities, RayTurn, TurnPart, TurningRay, VelocityField, VertexVelocity,
-};
+use crate::derivative::velocity::{RayTurn, TurningRay, VelocityField, VertexVelocity};
 use crate::model::emitter::EmitterGradient;
 use crate::world::lights::{LightKind, LightSample};
 use crate::world::vertex::{Kind, Vertex};
 
 /// The emitter's end of a connection.
 pub(super) struct LightEnd<'a> {
-    pub(super) viewer: &'a Vertex,
     pub(super) near_moves: bool,
     pub(super) light: &'a LightSample,
     /// Sensitivity of scattering to the direction.
     pub(super) to_wi: Option<RgbVec>,
-    /// How the ray to it turns.
-    pub(super) turn: Option<(&'a RayTurn, &'a [TurnPart])>,
+    pub(super) motion: Option<&'a LightMotion>,
+}
+
+/// How a point on an emitter moves.
+pub(super) struct LightMotion {
+    end: Vertex,
+    velocity: VertexVelocity,
+    /// Of the ray to it.
+    turn: Option<RayTurn>,
 }
 
 impl Differentiator<'_> {
-    /// How the ray of a connection turns.
-    pub(super) fn turn_to_light(
-        &self,
+    /// How the emitter's point of a connection moves, and how the ray to it turns; `None` of a point without a surface, and
+    /// where nothing moves.
+    pub(super) fn light_motion(
+        &mut self,
         viewer: &Vertex,
-        moves: bool,
+        near_moves: bool,
         light: &LightSample,
         field: &dyn VelocityField,
-        parts: &mut Vec<TurnPart>,
-    ) -> Option<RayTurn> {
+        active: &ActiveInputs,
+    ) -> Option<LightMotion> {
         let LightKind::Area(s) = &light.kind else { return None };
         let (dir, distance, end) = (light.w, light.distance, Some(s));
-        let ray = TurningRay { viewer, moves, pixel: None, dir, distance, end };
-        field.turn(self.world, &ray, parts)
+        let ray = TurningRay { viewer, moves: near_moves, pixel: None, dir, distance, end };
+        let Self { world, parts, auxiliary, probe, .. } = self;
+        parts.clear();
+        auxiliary.clear();
+        let turn = field.turn(world, &ray, probe, parts);
+        let moves = near_moves || turn.is_some() || light_moves(light, active);
+        if !(moves || field.looks_around()) {
+            return None;
+        }
+        let end = Vertex { x: light.y, medium: None, kind: Kind::Surface(*s) };
+        let mut velocity =
+            field.light(world, viewer, &end, dir, distance, near_moves, probe, auxiliary);
+        if let Some(turn) = &turn {
+            velocity.blend = velocity.blend.and(turn.rest(distance));
+        }
+        (moves || !auxiliary.is_empty()).then_some(LightMotion { end, velocity, turn })
     }
 
     /// Sensitivities at the emitter's end of a connection.
     pub(super) fn light_end<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
-        velocities: &PathVelocities,
         end: &LightEnd<'_>,
         per_value: Rgb,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
     ) {
-        let LightEnd { viewer, near_moves, light, to_wi, turn: turn_of_ray } = *end;
+        let LightEnd { near_moves, light, to_wi, motion } = *end;
         let weight = per_value * light.value;
         let active = sink.active();
         let emitter = active.emitters[light.emitter];
         match &light.kind {
-            LightKind::Area(s) => {
-                let end = Vertex { x: light.y, medium: None, kind: Kind::Surface(*s) };
+            LightKind::Area(_) => {
                 if emitter {
                     strength_of(light.emitter, per_value, sink);
                 }
-                let ray_moves = near_moves || turn_of_ray.is_some();
-                if !(ray_moves || light_moves(light, sink.active())) {
+                let Some(LightMotion { end, velocity, turn: turn_of_ray }) = motion else {
                     self.segment(path, Far::Direction, false, weight, here, sink);
                     return;
-                }
-                let (dir, distance) = (path.dir, path.length);
-                let mut blend = velocities.field().blend(self.world, viewer, &end, dir, distance);
-                let mut turned = RgbVec::ZERO;
-                if let Some((turn, _)) = turn_of_ray {
-                    blend = blend.and(turn.rest(distance));
-                    turned = self.landing(path, &end, &SurfaceAdjoint::default(), weight);
-                    turned += to_wi.unwrap_or(RgbVec::ZERO);
-                }
-                let phi = blend.weight;
+                };
+                let ray_moves = near_moves || turn_of_ray.is_some();
+                let phi = velocity.blend.weight;
                 let free = weight * (1.0 - phi);
-                turned += self.segment(path, Far::Direction, ray_moves, free, here, sink);
+                let mut turned = self.segment(path, Far::Direction, ray_moves, free, here, sink);
                 let part = weight * phi;
-                let (mut lit, along) = self.material_end(path, &end, ray_moves, part, here, sink);
+                let slides = ray_moves || !velocity.auxiliary.is_empty();
+                let (mut lit, along) = self.material_end(path, end, slides, part, here, sink);
                 turned += along;
                 if let Some(to_wi) = to_wi {
                     let g = turn(&(to_wi * phi), light.w, light.distance);
                     lit.u += g;
                     here.u -= g;
+                    turned += to_wi;
+                }
+                if turn_of_ray.is_some() {
+                    turned += self.landing(path, end, &SurfaceAdjoint::default(), weight);
                 }
                 let matter = core::mem::take(&mut lit.u);
-                let velocity = &VertexVelocity { moves: true, blend, ..VertexVelocity::default() };
-                let end = Propagated { vertex: &end, velocity, weight, matter };
-                self.propagate(path, &end, velocities, &mut lit, here, sink);
-                if let Some((_, parts)) = turn_of_ray {
-                    here.u -= send_turn(parts, dir, &turned, weight, sink);
+                let auxiliary = &self.auxiliary[..];
+                let at = Propagated { vertex: end, velocity, auxiliary, weight, matter };
+                self.propagate(path, &at, &mut lit, here, sink);
+                if turn_of_ray.is_some() {
+                    here.u -= send_turn(&self.parts, light.w, &turned, weight, sink);
                 }
             }
             LightKind::Position => {

@@ -37,7 +37,7 @@ use crate::derivative::adjoint::turning::send_turn;
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint,
 };
-use crate::derivative::velocity::{RecordedPath, TurnPart};
+use crate::derivative::velocity::{Auxiliary, Probe, RecordedPath, TurnPart};
 use crate::model::sensor::SensorGradient;
 use crate::sampling::trace::Endpoint;
 use crate::world::World;
@@ -81,8 +81,10 @@ pub(crate) struct Differentiator<'w> {
     turn: RgbVec,
     /// Of the camera's importance and filter, per channel.
     sensor: [SensorGradient; 3],
-    /// Summands of the turns of rays to lights.
+    /// Summands of the turns of rays to lights, and of the velocities of points on these.
     parts: Vec<TurnPart>,
+    auxiliary: Vec<Auxiliary>,
+    probe: Probe,
 }
 
 impl<'w> Differentiator<'w> {
@@ -96,7 +98,14 @@ impl<'w> Differentiator<'w> {
             turn: RgbVec::ZERO,
             sensor: [SensorGradient::default(); 3],
             parts: Vec::new(),
+            auxiliary: Vec::new(),
+            probe: Probe::new(Rng::new(0, 0, 0)),
         }
+    }
+
+    /// Rays that velocity fields cast for connections.
+    pub(crate) fn rays(&self) -> u64 {
+        self.probe.rays
     }
 
     /// Sends the gradient of the record's value to `sink`. `filter` holds the gradient by the pixel
@@ -110,6 +119,9 @@ impl<'w> Differentiator<'w> {
         sink: &mut S,
     ) {
         let nodes = path.record.nodes.len();
+        self.probe.rng = rng.clone();
+        // What fields look at and line integrals are told apart.
+        self.probe.rng.skip(1 << 20);
         self.rng = rng;
         self.filter = filter;
         self.turn = RgbVec::ZERO;
@@ -299,8 +311,9 @@ impl<'w> Differentiator<'w> {
                         here.j += fixed.j;
                     }
                 }
-                let end = Propagated { vertex: v, velocity, weight, matter };
-                let back = self.propagate(&path, &end, velocities, here, &mut there, sink);
+                let auxiliary = velocities.auxiliary(velocity);
+                let end = Propagated { vertex: v, velocity, auxiliary, weight, matter };
+                let back = self.propagate(&path, &end, here, &mut there, sink);
                 turned_wholly += back.by_surfaces;
                 turned += back.by_surfaces + back.by_ray;
             }
@@ -401,7 +414,6 @@ impl<'w> Differentiator<'w> {
         let Some(arrival) = &node.arrival else { return sum };
         let behind = behind(recorded, k);
         let moving = velocities.moves(k);
-        let mut parts = core::mem::take(&mut self.parts);
         let arrives = moving || velocities.moves(arrival.parent as usize);
         for (c, crossings) in &record.connections[node.connections.clone()] {
             let light = &c.light;
@@ -410,9 +422,9 @@ impl<'w> Differentiator<'w> {
             }
             let rest = c.rest();
             sum += c.f * rest;
-            parts.clear();
-            let turn = self.turn_to_light(vertex, moving, light, velocities.field(), &mut parts);
-            let turns = arrives || turn.is_some() || light_moves(light, sink.active());
+            let field = velocities.field();
+            let motion = self.light_motion(vertex, moving, light, field, sink.active());
+            let turns = arrives || motion.is_some() || light_moves(light, sink.active());
             let to_wi = self.scattering(
                 vertex,
                 -arrival.dir,
@@ -432,11 +444,10 @@ impl<'w> Differentiator<'w> {
                 medium: c.start_medium,
                 crossings: &record.crossings[crossings.clone()],
             };
-            let turn = turn.as_ref().map(|turn| (turn, &parts[..]));
-            let end = LightEnd { viewer: vertex, near_moves: moving, light, to_wi, turn };
-            self.light_end(&path, velocities, &end, per_value, here, sink);
+            let motion = motion.as_ref();
+            let end = LightEnd { near_moves: moving, light, to_wi, motion };
+            self.light_end(&path, &end, per_value, here, sink);
         }
-        self.parts = parts;
         sum
     }
 

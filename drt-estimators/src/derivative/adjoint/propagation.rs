@@ -12,7 +12,7 @@ use drt_math::{Rgb, RgbVec, Vec3};
 use crate::derivative::adjoint::turning::send_turn;
 use crate::derivative::adjoint::{Differentiator, Far, Stretch, moves, send};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint, VelocityTerm};
-use crate::derivative::velocity::{Auxiliary, PathVelocities, RecordedPath, VertexVelocity};
+use crate::derivative::velocity::{Auxiliary, Moved, RecordedPath, VertexVelocity};
 use crate::model::sensor::SensorGradient;
 use crate::sampling::record::PathRecord;
 use crate::world::World;
@@ -22,6 +22,7 @@ use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 pub(super) struct Propagated<'a> {
     pub(super) vertex: &'a Vertex,
     pub(super) velocity: &'a VertexVelocity,
+    pub(super) auxiliary: &'a [Auxiliary],
     /// Light that passes.
     pub(super) weight: Rgb,
     /// Sensitivities to the velocity of the matter that the vertex is on.
@@ -43,25 +44,24 @@ impl Differentiator<'_> {
         &self,
         path: &Stretch<'_>,
         end: &Propagated<'_>,
-        velocities: &PathVelocities,
         here: &mut SurfaceAdjoint,
         near: &mut SurfaceAdjoint,
         sink: &mut S,
     ) -> TurnedBack {
-        let Propagated { vertex, velocity, weight, matter } = *end;
+        let Propagated { vertex, velocity, auxiliary, weight, matter } = *end;
         let blend = velocity.blend;
         let free = 1.0 - blend.weight;
         let mut by_surfaces = RgbVec::ZERO;
-        for a in velocities.auxiliary(velocity) {
-            let g = match a.on_ray {
+        for a in auxiliary {
+            let g = match a.moved {
                 // A longer way dims what passes.
-                Some(_) => {
+                Moved::RayPoint(_) => {
                     let dims = self.world.sigma_t_at_border(vertex.medium, vertex.x, -path.dir)
                         * a.displacement.dot(path.dir);
                     (here.u.dot(a.displacement) - dims * weight) * free
                         + weight * free * a.divergence
                 }
-                None => self.moved_by(a, vertex, here, matter) + weight * a.divergence,
+                _ => self.moved_by(a, vertex, here, matter) + weight * a.divergence,
             };
             let [origin, turned] = summand(a, g, sink);
             near.u += origin;
@@ -190,9 +190,9 @@ impl Differentiator<'_> {
             let mut turned = RgbVec::ZERO;
             let mut turned_wholly = RgbVec::ZERO;
             for a in velocities.auxiliary(velocity) {
-                let g = match a.on_ray {
-                    Some(_) => here.u.dot(a.displacement) * free,
-                    None => self.moved_by(a, vertex, &here, matter),
+                let g = match a.moved {
+                    Moved::RayPoint(_) => here.u.dot(a.displacement) * free,
+                    _ => self.moved_by(a, vertex, &here, matter),
                 };
                 let [origin, direction] = summand(a, g, sink);
                 back += origin;
@@ -211,10 +211,13 @@ impl Differentiator<'_> {
                 back -= send_turn(parts, dir, &turned_wholly, Rgb::ZERO, sink);
                 turned -= turned_wholly * turn.weight;
             }
-            if free == 0.0 {
-                return send(vertex, &SurfaceAdjoint { u: here.u + matter, ..here }, sink);
-            }
             match &vertex.kind {
+                _ if free == 0.0 => {
+                    send(vertex, &SurfaceAdjoint { u: here.u + matter, ..here }, sink);
+                    if back == RgbVec::ZERO {
+                        return;
+                    }
+                }
                 Kind::Surface(point) => {
                     let (dir, none) = (arrival.dir, RgbVec::ZERO);
                     let (own, mut lift) =
@@ -273,12 +276,11 @@ fn summand<S: AdjointSink>(a: &Auxiliary, g: Rgb, sink: &mut S) -> [RgbVec; 2] {
     if sink.active().moves(&a.matter) {
         VelocityTerm::of(a.matter, a.functional).send(g, sink);
     }
-    match a.on_ray {
-        Some(distance) => {
-            let origin = -g.outer(a.functional);
-            [origin, origin * distance]
-        }
-        None => [RgbVec::ZERO; 2],
+    let origin = -g.outer(a.functional);
+    match a.moved {
+        Moved::RayPoint(distance) => [origin, origin * distance],
+        Moved::FromViewer => [origin, RgbVec::ZERO],
+        Moved::Vertex => [RgbVec::ZERO; 2],
     }
 }
 

@@ -18,7 +18,7 @@ use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::tests::scenes::*;
 use crate::derivative::tests::setup::{Recording, motion, prepare, trace};
 use crate::derivative::velocity::{
-    Auxiliary, Blend, Found, Material, Movers, VelocityField, VertexVelocity,
+    Auxiliary, Blend, Found, Material, Moved, Movers, Probe, VelocityField, VertexVelocity,
 };
 use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
@@ -51,9 +51,10 @@ impl VelocityField for Smooth {
         &self,
         world: &World,
         found: &Found<'_>,
+        probe: &mut Probe,
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity {
-        let own = self.material.vertex(world, found, auxiliary);
+        let own = self.material.vertex(world, found, probe, auxiliary);
         let first = auxiliary.len();
         if let (true, Endpoint::Surface(v) | Endpoint::Volume(v, _)) =
             (own.moves, &found.arrival.end)
@@ -64,7 +65,7 @@ impl VelocityField for Smooth {
                 functional: self.direction,
                 displacement: self.direction * c,
                 divergence: gradient.dot(self.direction) * self.divergence,
-                on_ray: None,
+                moved: Moved::Vertex,
             });
         }
         VertexVelocity { auxiliary: first..auxiliary.len(), ..own }

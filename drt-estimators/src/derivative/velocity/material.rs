@@ -5,7 +5,9 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
-use crate::derivative::velocity::{Auxiliary, Blend, Found, Movers, VelocityField, VertexVelocity};
+use crate::derivative::velocity::{
+    Auxiliary, Blend, Found, Movers, Probe, VelocityField, VertexVelocity,
+};
 use crate::sampling::trace::Endpoint;
 use crate::world::World;
 use crate::world::vertex::{SurfacePoint, Vertex};
@@ -31,7 +33,13 @@ impl VelocityField for Material {
         VertexVelocity { moves: self.movers.camera, blend: Blend::MATERIAL, ..Default::default() }
     }
 
-    fn vertex(&self, _: &World, found: &Found<'_>, _: &mut Vec<Auxiliary>) -> VertexVelocity {
+    fn vertex(
+        &self,
+        _: &World,
+        found: &Found<'_>,
+        _: &mut Probe,
+        _: &mut Vec<Auxiliary>,
+    ) -> VertexVelocity {
         let moves = match &found.arrival.end {
             Endpoint::Surface(v) | Endpoint::Volume(v, _) => {
                 v.matter().is_some_and(|matter| self.movers.moves(&matter))

@@ -13,7 +13,7 @@
 //! | u | | velocity of the material point at x |
 //! | c | | velocity propagated by the ray: x_p_dot + t d_dot, and D_dot d more on a surface (2019 paper, Eq. 19) |
 //! | φ, ∇φ | [`Blend`] | weight of the material velocity, and its gradient by x |
-//! | w_j | [`Auxiliary::matter`] | velocity of another material point, relative to the ray's at its distance if it is on the ray |
+//! | w_j | [`Auxiliary::matter`] | velocity of another material point, or what it [is more](Moved) than that of the ray |
 //! | b_j | [`Auxiliary::functional`] | what of it counts |
 //! | a_j | [`Auxiliary::displacement`] | what it gives to x |
 //!
@@ -39,7 +39,8 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use drt_math::Vec3;
+use drt_geom::Hit;
+use drt_math::{Rng, Vec3};
 
 pub(crate) use crate::derivative::velocity::blend::Blend;
 pub(crate) use crate::derivative::velocity::material::Material;
@@ -76,9 +77,19 @@ pub(crate) struct Auxiliary {
     pub(crate) displacement: Vec3,
     /// s; 1 / scene units per unit of b·w.
     pub(crate) divergence: f64,
-    /// The distance of the material point along the ray that found the vertex. The summand then moves the
-    /// ray's point, at fixed direction; else the vertex itself.
-    pub(crate) on_ray: Option<f64>,
+    pub(crate) moved: Moved,
+}
+
+/// What a summand of a velocity moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Moved {
+    /// The vertex, by the velocity of the material point.
+    Vertex,
+    /// The vertex, by how much faster the material point is than the vertex before.
+    FromViewer,
+    /// The point of the ray that found the vertex, at fixed direction, by how much faster the material point is than the
+    /// ray's at its distance.
+    RayPoint(f64),
 }
 
 /// A vertex as it is found.
@@ -96,6 +107,23 @@ pub(crate) struct Found<'a> {
     pub(crate) hits: &'a [SurfaceHit],
 }
 
+/// What a field needs to look around.
+#[derive(Clone, Debug)]
+pub(crate) struct Probe {
+    /// Independent of the walk's.
+    pub(crate) rng: Rng,
+    /// Rays cast.
+    pub(crate) rays: u64,
+    /// Of one of them.
+    pub(crate) hits: Vec<Hit>,
+}
+
+impl Probe {
+    pub(crate) fn new(rng: Rng) -> Self {
+        Self { rng, rays: 0, hits: Vec::new() }
+    }
+}
+
 /// A velocity field of the vertices of paths.
 pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
     /// Of the camera.
@@ -106,14 +134,40 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         &self,
         world: &World,
         found: &Found<'_>,
+        probe: &mut Probe,
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity;
+
+    /// Whether points on emitters may move though neither they nor the ray does.
+    fn looks_around(&self) -> bool {
+        false
+    }
+
+    /// Of a point on an emitter to which a `viewer` is connected along the unit direction `dir` over a `distance`; appends
+    /// its summands.
+    #[allow(clippy::too_many_arguments)]
+    fn light(
+        &self,
+        world: &World,
+        viewer: &Vertex,
+        end: &Vertex,
+        dir: Vec3,
+        distance: f64,
+        _viewer_moves: bool,
+        _probe: &mut Probe,
+        auxiliary: &mut Vec<Auxiliary>,
+    ) -> VertexVelocity {
+        let blend = self.blend(world, viewer, end, dir, distance);
+        let last = auxiliary.len();
+        VertexVelocity { moves: true, blend, auxiliary: last..last, turn: None }
+    }
 
     /// How a ray turns, beyond what the camera's image point does; appends the summands.
     fn turn(
         &self,
         _world: &World,
         _ray: &TurningRay<'_>,
+        _probe: &mut Probe,
         _parts: &mut Vec<TurnPart>,
     ) -> Option<RayTurn> {
         None

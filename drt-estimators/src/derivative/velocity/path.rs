@@ -3,9 +3,12 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
+use drt_math::Rng;
+
 use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::velocity::{
-    Auxiliary, Found, RayTurn, SurfaceHit, TurnPart, TurningRay, VelocityField, VertexVelocity,
+    Auxiliary, Found, Probe, RayTurn, SurfaceHit, TurnPart, TurningRay, VelocityField,
+    VertexVelocity,
 };
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::{Arrival, OutgoingRay};
@@ -23,6 +26,7 @@ pub(crate) struct PathVelocities {
     turn_parts: Vec<TurnPart>,
     /// Of the present ray.
     present: Option<u32>,
+    probe: Probe,
 }
 
 impl PathVelocities {
@@ -34,11 +38,13 @@ impl PathVelocities {
             turns: Vec::new(),
             turn_parts: Vec::new(),
             present: None,
+            probe: Probe::new(Rng::new(0, 0, 0)),
         }
     }
 
-    /// Forgets the last path.
-    pub(crate) fn begin(&mut self) {
+    /// Forgets the last path; random numbers are for fields that look around.
+    pub(crate) fn begin(&mut self, rng: Rng) {
+        self.probe.rng = rng;
         self.vertices.clear();
         self.auxiliary.clear();
         self.turns.clear();
@@ -64,7 +70,7 @@ impl PathVelocities {
             distance: ray.length,
             end: ray.end.as_ref().map(|(point, _)| point),
         };
-        let turn = self.field.turn(world, &turning, &mut self.turn_parts);
+        let turn = self.field.turn(world, &turning, &mut self.probe, &mut self.turn_parts);
         self.present = turn.is_some().then_some(self.turns.len() as u32);
         self.turns.extend(turn);
     }
@@ -91,8 +97,13 @@ impl PathVelocities {
             arrival,
             hits,
         };
-        let velocity = self.field.vertex(world, &found, &mut self.auxiliary);
+        let velocity = self.field.vertex(world, &found, &mut self.probe, &mut self.auxiliary);
         self.vertices.push(VertexVelocity { turn: self.present, ..velocity });
+    }
+
+    /// Rays that the field cast.
+    pub(crate) fn rays(&self) -> u64 {
+        self.probe.rays
     }
 
     pub(crate) fn field(&self) -> &dyn VelocityField {

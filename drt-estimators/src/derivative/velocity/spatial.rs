@@ -27,7 +27,9 @@ use drt_math::Vec3;
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::blend::Blends;
 use crate::derivative::velocity::warp::{free_paths, warps};
-use crate::derivative::velocity::{Auxiliary, Blend, Found, Movers, VelocityField, VertexVelocity};
+use crate::derivative::velocity::{
+    Auxiliary, Blend, Found, Movers, Probe, VelocityField, VertexVelocity,
+};
 use crate::sampling::trace::Endpoint;
 use crate::world::World;
 use crate::world::vertex::{Matter, SurfacePoint, Vertex};
@@ -73,6 +75,7 @@ impl VelocityField for Spatial {
         &self,
         world: &World,
         found: &Found<'_>,
+        _: &mut Probe,
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity {
         let Found { arrival, viewer, .. } = *found;

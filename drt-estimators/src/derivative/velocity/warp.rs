@@ -50,7 +50,7 @@ use alloc::vec::Vec;
 
 use drt_math::{Real, Vec3, fm};
 
-use crate::derivative::velocity::Auxiliary;
+use crate::derivative::velocity::{Auxiliary, Moved};
 use crate::world::vertex::{Matter, SurfacePoint};
 use crate::world::{RayPath, World};
 
@@ -188,7 +188,7 @@ pub(super) fn warps(
             functional: n / n.dot(dir),
             displacement: dir * share,
             divergence: slope,
-            on_ray: Some(hit.distance),
+            moved: Moved::RayPoint(hit.distance),
         })
     })
 }

@@ -45,6 +45,14 @@ pub enum SettingError {
         /// Width and height of the film.
         film: [u32; 2],
     },
+    /// A [`Warp`](crate::Warp) by auxiliary samples where there are media.
+    #[error(
+        "auxiliary points and directions are for surfaces alone; here are media or index-matched interfaces"
+    )]
+    SurfacesOnly,
+    /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
+    #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
+    JumpingFilter,
     /// No target to fit to.
     #[error("is missing: there is nothing to fit to")]
     NoTarget,

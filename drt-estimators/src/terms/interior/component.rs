@@ -31,7 +31,7 @@ pub(crate) struct Component<'a, S> {
 pub(super) struct Worker<'a, S> {
     pub(super) along: AlongRays<'a>,
     pub(super) sink: S,
-    differentiator: Differentiator<'a>,
+    pub(super) differentiator: Differentiator<'a>,
     shadow_buffers: shadow::Buffers,
     incoming: PairedRadiance,
     /// Of the edge tree.
@@ -61,7 +61,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         let Component { world, along, sink } = component;
         let field: Arc<dyn VelocityField> = match (along.radiative, along.warped) {
             (Some(radiative), _) => Arc::clone(&radiative.spatial) as _,
-            (_, Some(warped)) => Arc::clone(warped) as _,
+            (_, Some(warped)) => Arc::clone(&warped.field),
             _ => Arc::new(Material::new(Movers::new(sink.active()))),
         };
         let view = PathView {

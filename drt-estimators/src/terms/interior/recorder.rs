@@ -22,9 +22,14 @@ pub(crate) struct PathView<'a> {
 }
 
 impl PathView<'_> {
-    /// Forgets the last path; random numbers are for choosing among pairs, and surfaces with a flux.
-    pub(crate) fn begin(&mut self, pairs: Option<Rng>, flux: impl FnOnce() -> Rng) {
-        self.velocities.begin();
+    /// Forgets the last path; random numbers are for choosing among pairs, for velocities, and for surfaces with a flux.
+    pub(crate) fn begin(
+        &mut self,
+        pairs: Option<Rng>,
+        velocities: Rng,
+        flux: impl FnOnce() -> Rng,
+    ) {
+        self.velocities.begin(velocities);
         self.pairs.begin(pairs);
         if let Some(reservoir) = &mut self.flux {
             reservoir.begin(flux());

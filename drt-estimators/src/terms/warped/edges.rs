@@ -8,7 +8,7 @@ use drt_math::{Vec3, fm};
 use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay};
 use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::terms::warped::beside::Beside;
-use crate::world::vertex::MaterialPoint;
+use crate::world::vertex::{MaterialPoint, Vertex};
 
 /// How far behind the plane of the surface where a ray ends edges turn it, over their distances.
 const BEHIND: f64 = 0.02;
@@ -86,6 +86,21 @@ impl TurningEdges {
     /// True when something moves.
     pub(super) fn any_moves(&self) -> bool {
         !self.moving.is_empty()
+    }
+
+    /// Whether anything may move within an `angle` of a ray from a viewer: an edge, or all of them if the viewer does.
+    pub(super) fn any_near(
+        &self,
+        viewer: &Vertex,
+        dir: Vec3,
+        angle: f64,
+        viewer_moves: bool,
+    ) -> bool {
+        let cone = Cone::new(viewer.x, dir, angle, f64::INFINITY);
+        let mut any = false;
+        let tree = if viewer_moves { &self.all } else { &self.moving };
+        tree.visit(&cone, |_| any = true);
+        any
     }
 
     /// How edges within an `angle` of a ray turn it, besides what does not turn with a weight of `rest` beside 1. Without any

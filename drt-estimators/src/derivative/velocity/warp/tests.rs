@@ -12,6 +12,7 @@ use crate::derivative::tests::choice::MOMENT;
 use crate::derivative::tests::scenes::{
     Build, ball, diffuse, homogeneous, moves, parameter, placed, shift,
 };
+use crate::derivative::velocity::Moved;
 use crate::derivative::velocity::warp::{Stretch, SurfaceHit, warps};
 use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
@@ -32,7 +33,7 @@ fn at_rest(distance: f64) -> SurfaceHit {
 fn share(hits: &[SurfaceHit], t: f64, free_path: f64, distance: f64) -> (f64, f64) {
     let dir = vec3(0.0, 0.0, 1.0);
     let of: Vec<_> =
-        warps(hits, dir, t, free_path).filter(|a| a.on_ray == Some(distance)).collect();
+        warps(hits, dir, t, free_path).filter(|a| a.moved == Moved::RayPoint(distance)).collect();
     assert!(of.len() <= 1);
     of.first().map_or((0.0, 0.0), |a| (a.displacement.dot(dir), a.divergence))
 }

@@ -1,0 +1,112 @@
+//! The velocity field of rays that turn with edges.
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_math::Vec3;
+
+use crate::derivative::sensitivity::ActiveInputs;
+use crate::derivative::velocity::{
+    Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurningRay, VelocityField,
+    VertexVelocity,
+};
+use crate::terms::warped::edges::{TurningEdges, Weight};
+use crate::world::World;
+use crate::world::vertex::{SurfacePoint, Vertex};
+
+/// Radians.
+const ANGLE: f64 = 0.1;
+/// Pixels.
+const PIXELS: f64 = 2.0;
+
+/// The spatial form, with rays that turn.
+#[derive(Debug)]
+pub(super) struct EdgeTurns {
+    spatial: Arc<Spatial>,
+    edges: TurningEdges,
+    /// Shapes that move and on which vertices may have a blend weight.
+    blended: Vec<bool>,
+}
+
+impl EdgeTurns {
+    pub(super) fn new(
+        world: &World,
+        active: &ActiveInputs,
+        spatial: Arc<Spatial>,
+        edges: TurningEdges,
+    ) -> Self {
+        let blends = |s: u32| spatial.blends.acts_on(world, s);
+        let blended = (0..).zip(&active.shapes).map(|(s, moves)| *moves && blends(s)).collect();
+        Self { spatial, edges, blended }
+    }
+}
+
+impl VelocityField for EdgeTurns {
+    fn camera(&self) -> VertexVelocity {
+        self.spatial.camera()
+    }
+
+    fn vertex(
+        &self,
+        world: &World,
+        found: &Found<'_>,
+        probe: &mut Probe,
+        auxiliary: &mut Vec<Auxiliary>,
+    ) -> VertexVelocity {
+        let mut velocity = self.spatial.vertex(world, found, probe, auxiliary);
+        if let Some(turn) = found.turn {
+            velocity.moves = true;
+            velocity.blend = velocity.blend.and(turn.rest(found.arrival.distance));
+        }
+        velocity
+    }
+
+    fn turn(
+        &self,
+        world: &World,
+        ray: &TurningRay<'_>,
+        _: &mut Probe,
+        parts: &mut Vec<TurnPart>,
+    ) -> Option<RayTurn> {
+        let always = ray.end.is_some_and(|s| self.blended[s.shape as usize]);
+        if !(ray.moves || always || self.edges.any_moves()) {
+            return None;
+        }
+        let mut angle = ANGLE;
+        let mut rest = Weight::default();
+        if let Some(pixel) = ray.pixel {
+            let camera = &world.camera;
+            angle = f64::min(PIXELS * camera.pinhole().pixel_size, ANGLE);
+            if camera.has_borders() {
+                let view = camera.view(camera.position() + ray.dir);
+                let (window, slope) = camera.window(pixel, view.pixel);
+                let (slope, _) = camera.view_gradient(&view, slope, 0.0);
+                // As edges do it rises with the inverse square of the distance.
+                rest = Weight {
+                    value: 1.0 / (window * window) - 1.0,
+                    gradient: slope.reject(ray.dir) * (-2.0 / (window * window * window)),
+                };
+            }
+        }
+        self.edges.turn(ray, angle, rest, always, parts)
+    }
+
+    fn blend(
+        &self,
+        world: &World,
+        viewer: &Vertex,
+        end: &Vertex,
+        dir: Vec3,
+        distance: f64,
+    ) -> Blend {
+        self.spatial.blend(world, viewer, end, dir, distance)
+    }
+
+    fn turns_rays(&self, _: &World, _: &SurfacePoint, _: &VertexVelocity) -> bool {
+        false
+    }
+
+    fn widest_paired(&self, _: bool) -> f64 {
+        0.0
+    }
+}
