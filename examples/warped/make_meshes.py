@@ -4,9 +4,9 @@
     python3 examples/warped/make_meshes.py
 
 Needs the standard library only. Every shape is drawn here: profiles that are turned about the y axis, and
-bodies that are a level set of a function. All are closed but the flat star and the squares of the board, with normals that point
-outward; the script stops where one is not. There are no normals in the files: readers make smooth
-ones of the faces around a vertex, and flat ones where the scene says `face_normals`.
+bodies that are a level set of a function. All are closed but the flat star and the squares of the board, with
+normals that point outward; the script stops where one is not. There are no normals in the files: readers
+make smooth ones of the faces around a vertex, and flat ones where the scene says `face_normals`.
 """
 
 import collections
@@ -255,7 +255,7 @@ def net(f, low, high, cell):
                 crossings[c].append(lerp(point(i), point(other), t))
             quads.append(cells if value < 0 else cells[::-1])
     index = {c: n for n, c in enumerate(crossings)}
-    vertices = [[sum(x) / len(at) for x in zip(*at)] for at in crossings.values()]
+    vertices = [mean(at) for at in crossings.values()]
     quads = [[index[c] for c in quad] for quad in quads]
 
     beside = collections.defaultdict(set)
@@ -263,7 +263,7 @@ def net(f, low, high, cell):
         for n in range(4):
             beside[quad[n]].update((quad[n - 1], quad[(n + 1) % 4]))
     for _ in range(6):
-        means = [[sum(x) / len(beside[n]) for x in zip(*(vertices[m] for m in beside[n]))] for n in range(len(vertices))]
+        means = [mean([vertices[m] for m in beside[n]]) for n in range(len(vertices))]
         vertices = [drawn(f, lerp(v, m, 0.5)) for v, m in zip(vertices, means)]
 
     faces = []
@@ -275,6 +275,10 @@ def net(f, low, high, cell):
 
 def moved(i, axis, by):
     return tuple(n + by * (k == axis) for k, n in enumerate(i))
+
+
+def mean(points):
+    return tuple(sum(x) / len(points) for x in zip(*points))
 
 
 def lerp(a, b, t):

@@ -39,6 +39,7 @@ use crate::derivative::sensitivity::{
 };
 use crate::derivative::velocity::{Auxiliary, Probe, RecordedPath, TurnPart};
 use crate::model::sensor::SensorGradient;
+use crate::sampling::streams::VELOCITY_STREAM;
 use crate::sampling::trace::Endpoint;
 use crate::world::World;
 use crate::world::lights::EmitterMask;
@@ -119,9 +120,9 @@ impl<'w> Differentiator<'w> {
         sink: &mut S,
     ) {
         let nodes = path.record.nodes.len();
-        self.probe.rng = rng.clone();
-        // What fields look at and line integrals are told apart.
-        self.probe.rng.skip(1 << 20);
+        // What fields look at has numbers of its own.
+        let mut name = rng.clone();
+        self.probe.rng = Rng::new(u64::from(name.next_u32()), VELOCITY_STREAM, name.next_u32());
         self.rng = rng;
         self.filter = filter;
         self.turn = RgbVec::ZERO;
