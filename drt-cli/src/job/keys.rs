@@ -74,9 +74,9 @@ pub(super) enum WarpBy {
 pub(super) enum WarpKernel {
     #[serde(rename = "corrected")]
     Corrected,
-    #[serde(rename = "2023")]
+    #[serde(rename = "year-2023")]
     Year2023,
-    #[serde(rename = "2020")]
+    #[serde(rename = "year-2020")]
     Year2020,
 }
 

@@ -61,12 +61,14 @@ pub enum Term {
     Indirect,
     /// Flux of scattering through moving surfaces around a static inside.
     Flux,
+    /// What vertices owe to the edges that they move with, by [`EstimatorKind::Warped`](crate::EstimatorKind::Warped).
+    Warp,
 }
 
 impl Term {
     /// Every term, in the order they are stored.
-    pub const ALL: [Self; 5] =
-        [Self::Interior, Self::Primary, Self::Direct, Self::Indirect, Self::Flux];
+    pub const ALL: [Self; 6] =
+        [Self::Interior, Self::Primary, Self::Direct, Self::Indirect, Self::Flux, Self::Warp];
 
     /// The name used in layer names.
     #[must_use]
@@ -77,6 +79,7 @@ impl Term {
             Self::Direct => "direct",
             Self::Indirect => "indirect",
             Self::Flux => "flux",
+            Self::Warp => "warp",
         }
     }
 }

@@ -72,9 +72,11 @@ impl EdgeQueries {
 impl AlongRays<'_> {
     /// The terms kept in layers of their own, where terms are kept apart.
     pub(crate) fn terms(&self) -> impl Iterator<Item = Term> {
+        let warp = self.warped.map(|_| Term::Warp);
         let flux = self.flux.map(|_| Term::Flux);
         let edges = if self.queries.any() { &[Term::Direct, Term::Indirect][..] } else { &[] };
-        flux.into_iter().chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
+        let along = warp.into_iter().chain(flux);
+        along.chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
     }
 }
 

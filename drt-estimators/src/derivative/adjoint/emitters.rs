@@ -102,7 +102,7 @@ impl Differentiator<'_> {
                 let auxiliary = &self.auxiliary[..];
                 let at = Propagated { vertex: end, velocity, auxiliary, weight, matter };
                 self.propagate(path, &at, &mut lit, here, sink);
-                if turn_of_ray.is_some() {
+                if turn_of_ray.is_some() && !self.edges_at_rest {
                     here.u -= send_turn(&self.parts, light.w, &turned, weight, sink);
                 }
             }

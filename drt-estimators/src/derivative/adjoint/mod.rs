@@ -73,6 +73,8 @@ struct Behind {
 /// The backward sweep and its buffers.
 pub(crate) struct Differentiator<'w> {
     world: &'w World,
+    /// Rays do not turn, and vertices do not move with what auxiliary rays find: to tell how much that is.
+    pub(crate) edges_at_rest: bool,
     locals: Vec<Local>,
     points: Vec<(f64, f64)>,
     rng: Rng,
@@ -92,6 +94,7 @@ impl<'w> Differentiator<'w> {
     pub(crate) fn new(world: &'w World) -> Self {
         Self {
             world,
+            edges_at_rest: false,
             locals: Vec::new(),
             points: Vec::new(),
             rng: Rng::new(0, 0, 0),
@@ -319,7 +322,7 @@ impl<'w> Differentiator<'w> {
                 turned += back.by_surfaces + back.by_ray;
             }
         }
-        if let Some(turn) = turn_of_ray {
+        if let Some(turn) = turn_of_ray.filter(|_| !self.edges_at_rest) {
             let mut all = turned_wholly;
             if let Some(filter) = seen {
                 // A direction has no parallax.

@@ -52,7 +52,8 @@ impl Differentiator<'_> {
         let blend = velocity.blend;
         let free = 1.0 - blend.weight;
         let mut by_surfaces = RgbVec::ZERO;
-        for a in auxiliary {
+        let still = |a: &&Auxiliary| self.edges_at_rest && a.moved == Moved::FromViewer;
+        for a in auxiliary.iter().filter(|a| !still(a)) {
             let g = match a.moved {
                 // A longer way dims what passes.
                 Moved::RayPoint(_) => {
@@ -280,7 +281,6 @@ fn summand<S: AdjointSink>(a: &Auxiliary, g: Rgb, sink: &mut S) -> [RgbVec; 2] {
     match a.moved {
         Moved::RayPoint(distance) => [origin, origin * distance],
         Moved::FromViewer => [origin, RgbVec::ZERO],
-        Moved::Vertex => [RgbVec::ZERO; 2],
     }
 }
 

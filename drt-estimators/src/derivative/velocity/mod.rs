@@ -13,7 +13,7 @@
 //! | u | | velocity of the material point at x |
 //! | c | | velocity propagated by the ray: x_p_dot + t d_dot, and D_dot d more on a surface (2019 paper, Eq. 19) |
 //! | φ, ∇φ | [`Blend`] | weight of the material velocity, and its gradient by x |
-//! | w_j | [`Auxiliary::matter`] | velocity of another material point, or what it [is more](Moved) than that of the ray |
+//! | w_j | [`Auxiliary::matter`] | velocity of another material point, less that of the [ray](Moved) |
 //! | b_j | [`Auxiliary::functional`] | what of it counts |
 //! | a_j | [`Auxiliary::displacement`] | what it gives to x |
 //!
@@ -83,8 +83,6 @@ pub(crate) struct Auxiliary {
 /// What a summand of a velocity moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Moved {
-    /// The vertex, by the velocity of the material point.
-    Vertex,
     /// The vertex, by how much faster the material point is than the vertex before.
     FromViewer,
     /// The point of the ray that found the vertex, at fixed direction, by how much faster the material point is than the

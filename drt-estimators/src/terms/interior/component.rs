@@ -108,7 +108,20 @@ impl<'a, S: PathSink> Worker<'a, S> {
             at += n;
             layer..layer + n
         };
-        self.interior(tracer, path, view, &mut values[1..=n]);
+        if self.along.warped.is_some() && self.separate {
+            let mut parts = [alloc::vec![Rgb::ZERO; n], alloc::vec![Rgb::ZERO; n]];
+            for (at_rest, part) in [true, false].into_iter().zip(&mut parts) {
+                self.differentiator.edges_at_rest = at_rest;
+                self.interior(tracer, path, view, part);
+            }
+            let warp = next(true).start;
+            for (k, (at_rest, all)) in parts[0].iter().zip(&parts[1]).enumerate() {
+                values[1 + k] += *at_rest;
+                values[warp + k] += *all - *at_rest;
+            }
+        } else {
+            self.interior(tracer, path, view, &mut values[1..=n]);
+        }
         if view.flux.is_some() {
             self.flux(tracer, path, view, &mut values[next(self.separate)]);
         }

@@ -15,15 +15,14 @@ use crate::derivative::velocity::{
     VertexVelocity,
 };
 use crate::model::settings::{AuxiliarySamples, WarpKernel};
-use crate::terms::warped::auxiliary::kernel::{Distance, SIGMA, weight};
+use crate::terms::warped::auxiliary::kernel::{Distance, SIGMA, WIDE, weight};
 use crate::terms::warped::auxiliary::rims::Rims;
 use crate::terms::warped::auxiliary::{Sample, plan, ratio};
 use crate::terms::warped::edges::TurningEdges;
 use crate::world::World;
 use crate::world::vertex::{MaterialPoint, SurfacePoint, Vertex};
 
-/// Standard deviation of auxiliary directions in radians; of the camera's in pixels.
-const SPREAD: f64 = 0.05;
+/// Standard deviation of the camera's auxiliary directions at most, in pixels.
 const PIXELS: f64 = 1.0;
 
 /// Standard deviations within which something must move.
@@ -115,7 +114,11 @@ impl VelocityField for AuxiliaryDirections {
         parts: &mut Vec<TurnPart>,
     ) -> Option<RayTurn> {
         let pixel = world.camera.pinhole().pixel_size;
-        let spread = if ray.pixel.is_some() { f64::min(PIXELS * pixel, SPREAD) } else { SPREAD };
+        let spread = match self.asked.kernel {
+            WarpKernel::Year2020 => WIDE,
+            _ => SIGMA,
+        };
+        let spread = if ray.pixel.is_some() { f64::min(PIXELS * pixel, spread) } else { spread };
         if !self.edges.any_near(ray.viewer, ray.dir, NEAR * spread, ray.moves) {
             return None;
         }

@@ -7,6 +7,9 @@ use crate::model::settings::WarpKernel;
 /// σ_0 of the 2023 paper, over half the diagonal of the scene's box.
 pub(super) const SIGMA: f64 = 0.006;
 
+/// Standard deviation in radians of samples for the distance of 2020, which knows no length.
+pub(super) const WIDE: f64 = 0.05;
+
 /// A distance between a vertex and a sample, D, and its gradient by the vertex or the direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Distance {

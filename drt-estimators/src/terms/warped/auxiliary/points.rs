@@ -23,7 +23,7 @@ use crate::derivative::velocity::{
 };
 use crate::model::settings::{AuxiliarySamples, WarpKernel};
 use crate::sampling::trace::Endpoint;
-use crate::terms::warped::auxiliary::kernel::{Distance, SIGMA, weight};
+use crate::terms::warped::auxiliary::kernel::{Distance, SIGMA, WIDE, weight};
 use crate::terms::warped::auxiliary::rims::Rims;
 use crate::terms::warped::auxiliary::{Sample, plan, ratio};
 use crate::terms::warped::edges::TurningEdges;
@@ -79,7 +79,10 @@ impl AuxiliaryPoints {
     ) {
         let length = world.geometry.radius;
         let sigma = SIGMA * length;
-        let spread = Real::sqrt(0.5 * distance * sigma);
+        let spread = match self.asked.kernel {
+            WarpKernel::Year2020 => WIDE * distance,
+            _ => sigma,
+        };
         let dir = (x - viewer.x) / distance;
         let angle = f64::min(NEAR * spread / distance, 1.5);
         if !self.edges.any_near(viewer, dir, angle, viewer_moves) {
