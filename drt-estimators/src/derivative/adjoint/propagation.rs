@@ -281,6 +281,8 @@ fn summand<S: AdjointSink>(a: &Auxiliary, g: Rgb, sink: &mut S) -> [RgbVec; 2] {
     match a.moved {
         Moved::RayPoint(distance) => [origin, origin * distance],
         Moved::FromViewer => [origin, RgbVec::ZERO],
+        #[cfg(test)]
+        Moved::Vertex => [RgbVec::ZERO; 2],
     }
 }
 

@@ -83,6 +83,9 @@ pub(crate) struct Auxiliary {
 /// What a summand of a velocity moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Moved {
+    /// The vertex, by the velocity of the material point.
+    #[cfg(test)]
+    Vertex,
     /// The vertex, by how much faster the material point is than the vertex before.
     FromViewer,
     /// The point of the ray that found the vertex, at fixed direction, by how much faster the material point is than the
