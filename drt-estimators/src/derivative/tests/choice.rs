@@ -27,6 +27,16 @@ use crate::world::lights::EmitterMask;
 
 /// A scene prepared for `kind = "radiative"`.
 pub(crate) fn prepare(scene: &Scene, motion: &Parameter, depth: u32) -> (Prepared, Motion) {
+    prepare_for(EstimatorKind::Radiative, scene, motion, depth)
+}
+
+/// A scene prepared for the light that fits an estimator that goes along rays.
+pub(crate) fn prepare_for(
+    estimator: EstimatorKind,
+    scene: &Scene,
+    motion: &Parameter,
+    depth: u32,
+) -> (Prepared, Motion) {
     let (scene, tangents) =
         tangents::apply(scene, core::slice::from_ref(motion)).expect("a valid parameter");
     let mut kept = PreparedCache::default();
@@ -36,7 +46,7 @@ pub(crate) fn prepare(scene: &Scene, motion: &Parameter, depth: u32) -> (Prepare
     let insides = crate::derivative::medium_motion::MediumMotions::affine(&world, &tangents, &[]);
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());
-    let settings = Settings { estimator: EstimatorKind::Radiative, ..Settings::default() };
+    let settings = Settings { estimator, ..Settings::default() };
     let prepared = Prepared::new(world, &motion.active, &[], &settings, Some(&motion));
     (prepared.expect("a valid scene"), motion)
 }

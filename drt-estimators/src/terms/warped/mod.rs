@@ -3,6 +3,8 @@
 mod auxiliary;
 mod beside;
 mod edges;
+#[cfg(all(test, feature = "std"))]
+mod tests;
 mod turning;
 
 use alloc::sync::Arc;
