@@ -1,30 +1,24 @@
-//! Derivatives by the 2019 estimator against those by path space: every cell of the check matrix.
+//! Derivatives by the 2019 and the 2023 estimators against those by path space: every cell of the check matrix.
 //!
 //! The short check runs the representative cells, to the noise that a few seconds reach. All of them,
 //! for four seconds each, to know what either estimator costs:
 //! `cargo test --release -p drt-tests --test estimators -- --ignored all:: --nocapture`
 //!
 //! All that the 2019 theory covers, with the scale of each derivative known to 1 % or for ten minutes each:
-//! `cargo test --release -p drt-tests --test estimators -- --ignored covered:: --nocapture`
+//! `cargo test --release -p drt-tests --test estimators -- --ignored covered:: --nocapture`, and `warped::` for the 2023
+//! estimator.
 
-use drt_estimators::EstimatorKind;
+use drt_estimators::EstimatorKind::{self, Radiative, Warped};
 use drt_tests::Result;
 use drt_tests::matrix::estimators::{Effort, Pairs, compare};
 use drt_tests::matrix::{Stage, caged, deforming, lights, media, riding, surfaces};
 
-fn run(stage: Result<Stage>, effort: Effort) {
-    let pairs = compare(&stage.unwrap(), kind(), effort).unwrap();
+fn run(stage: Result<Stage>, kind: EstimatorKind, effort: Effort) {
+    let pairs = compare(&stage.unwrap(), kind, effort).unwrap();
     println!("{}", Pairs(&pairs));
     assert!(!pairs.is_empty(), "the stage has no such cells");
     let failing = pairs.iter().filter(|pair| !pair.passes()).count();
     assert_eq!(failing, 0, "{failing} of {} derivatives fail", pairs.len());
-}
-
-fn kind() -> EstimatorKind {
-    match std::env::var("DRT_KIND").as_deref() {
-        Ok("warped") => EstimatorKind::Warped,
-        _ => EstimatorKind::Radiative,
-    }
 }
 
 /// Seconds that each estimator has for a stage, unless `DRT_SECONDS` says otherwise.
@@ -48,18 +42,31 @@ macro_rules! stages {
     ($($room:ident: $($stage:ident)*;)*) => {
         mod short {
             $($(#[test] fn $stage() {
-                super::run(super::$room::$stage().map(super::Stage::short), super::short());
+                let stage = super::$room::$stage().map(super::Stage::short);
+                super::run(stage, super::Radiative, super::short());
             })*)*
         }
         mod all {
             $($(#[test] #[ignore = "minutes"] fn $stage() {
-                super::run(super::$room::$stage(), super::costs());
+                super::run(super::$room::$stage(), super::Radiative, super::costs());
             })*)*
         }
         mod covered {
             $($(#[test] #[ignore = "hours"] fn $stage() {
                 let stage = super::$room::$stage().map(super::Stage::in_extended_light);
-                super::run(stage, super::precise());
+                super::run(stage, super::Radiative, super::precise());
+            })*)*
+        }
+        mod warped_short {
+            $($(#[test] fn $stage() {
+                let stage = super::$room::$stage().map(super::Stage::short);
+                super::run(stage, super::Warped, super::short());
+            })*)*
+        }
+        mod warped {
+            $($(#[test] #[ignore = "hours"] fn $stage() {
+                let stage = super::$room::$stage().map(super::Stage::in_extended_light);
+                super::run(stage, super::Warped, super::precise());
             })*)*
         }
     };
