@@ -13,12 +13,17 @@ use crate::world::vertex::{MaterialPoint, Vertex};
 /// How far behind the plane of the surface where a ray ends edges turn it, over their distances.
 const BEHIND: f64 = 0.02;
 
+/// How far creases between faces with interpolated normals turn rays, where radiance hardly jumps, over what other edges do.
+const NARROW: f64 = 0.1;
+
 /// An edge at which radiance jumps.
 #[derive(Clone, Debug)]
 pub(super) struct TurningEdge {
     ends: [Vec3; 2],
     points: [MaterialPoint; 2],
     moves: bool,
+    /// Between faces with interpolated normals.
+    smooth: bool,
     /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
     crease: Option<([Vec3; 2], [bool; 2])>,
 }
@@ -28,15 +33,29 @@ impl TurningEdge {
         let [(a, from), (b, to)] = [0.0, 1.0].map(|along| edge.point(along));
         let jumps = edge.crease.map(|part| part > 0.0);
         let crease = edges.normals(edge).map(|normals| (normals, jumps));
-        Self { ends: [a, b], points: [from, to], moves, crease }
+        Self { ends: [a, b], points: [from, to], moves, smooth: edge.smooth, crease }
     }
 
-    /// Whether radiance jumps there, seen along a vector.
-    fn jumps(&self, view: Vec3) -> bool {
-        let Some((normals, jumps)) = &self.crease else { return true };
+    /// What radiance does there, seen along a vector.
+    fn jump(&self, view: Vec3) -> Jump {
+        let Some((normals, jumps)) = &self.crease else { return Jump::Wide };
         let [front, other] = normals.map(|n| n.dot(view) > 0.0);
-        front != other || jumps[usize::from(front)]
+        match jumps[usize::from(front)] {
+            _ if front != other => Jump::Wide,
+            false => Jump::None,
+            true if self.smooth => Jump::Narrow,
+            true => Jump::Wide,
+        }
     }
+}
+
+/// What radiance does at an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Jump {
+    None,
+    /// It hardly jumps, between faces with interpolated normals.
+    Narrow,
+    Wide,
 }
 
 /// The edges of a scene in trees of spheres.
@@ -197,18 +216,23 @@ impl<'a> Near<'a> {
         let from = self.ray.viewer.x;
         let ends = edge.ends.map(|p| p - from);
         let below = |n: Vec3| ends.iter().all(|p| n.dot(*p) <= 1e-9 * p.length());
-        if !edge.jumps(ends[0]) || self.horizon.is_some_and(below) {
+        let widest = match edge.jump(ends[0]) {
+            Jump::None => return None,
+            Jump::Narrow => self.square * (NARROW * NARROW),
+            Jump::Wide => self.square,
+        };
+        if self.horizon.is_some_and(below) {
             return None;
         }
         let beside = Beside::new(ends, self.ray.dir)?;
-        if beside.square >= self.square {
+        if beside.square >= widest {
             return None;
         }
         // On the edge itself the weight is as good as infinite.
         let square = f64::max(beside.square, f64::MIN_POSITIVE.sqrt());
         let mut weight = Weight {
-            value: self.square / square - 1.0,
-            gradient: beside.square_gradient * (-self.square / (square * square)),
+            value: widest / square - 1.0,
+            gradient: beside.square_gradient * (-widest / (square * square)),
         };
         let behind = self.behind(beside.place);
         if behind > 0.0 {

@@ -11,6 +11,7 @@ use crate::derivative::velocity::{
     VertexVelocity,
 };
 use crate::terms::warped::edges::{TurningEdges, Weight};
+use crate::sampling::trace::Endpoint;
 use crate::world::World;
 use crate::world::vertex::{SurfacePoint, Vertex};
 
@@ -26,6 +27,8 @@ pub(super) struct EdgeTurns {
     edges: TurningEdges,
     /// Shapes that move and on which vertices may have a blend weight.
     blended: Vec<bool>,
+    /// Shapes that move and have interpolated normals: their vertices move with them.
+    smooth: Vec<bool>,
 }
 
 impl EdgeTurns {
@@ -36,8 +39,11 @@ impl EdgeTurns {
         edges: TurningEdges,
     ) -> Self {
         let blends = |s: u32| spatial.blends.acts_on(world, s);
-        let blended = (0..).zip(&active.shapes).map(|(s, moves)| *moves && blends(s)).collect();
-        Self { spatial, edges, blended }
+        let blended = (0..).zip(&active.shapes).map(|(s, moves)| *moves && (blends(s) || world.scene.shapes[s as usize].mesh.normals.is_some())).collect();
+        let smooth = world.scene.shapes.iter().zip(&active.shapes);
+        let smooth: Vec<bool> =
+            smooth.map(|(s, moves)| *moves && s.mesh.normals.is_some()).collect();
+        Self { spatial, edges, blended, smooth }
     }
 }
 
@@ -54,6 +60,11 @@ impl VelocityField for EdgeTurns {
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity {
         let mut velocity = self.spatial.vertex(world, found, probe, auxiliary);
+        if let Endpoint::Surface(v) = &found.arrival.end
+            && v.surface().is_some_and(|s| self.smooth[s.shape as usize])
+        {
+            velocity.blend = Blend::MATERIAL;
+        }
         if let Some(turn) = found.turn {
             velocity.moves = true;
             velocity.blend = velocity.blend.and(turn.rest(found.arrival.distance));
@@ -99,7 +110,10 @@ impl VelocityField for EdgeTurns {
         dir: Vec3,
         distance: f64,
     ) -> Blend {
-        self.spatial.blend(world, viewer, end, dir, distance)
+        match end.surface() {
+            Some(s) if self.smooth[s.shape as usize] => Blend::MATERIAL,
+            _ => self.spatial.blend(world, viewer, end, dir, distance),
+        }
     }
 
     fn turns_rays(&self, _: &World, _: &SurfacePoint, _: &VertexVelocity) -> bool {
