@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_geom::edges::{Cone, ConeTree};
-use drt_math::{Vec3, fm};
+use drt_math::{Real, Vec3, fm};
 
 use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay};
 use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
@@ -20,6 +20,8 @@ const NARROW: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub(super) struct TurningEdge {
     ends: [Vec3; 2],
+    /// Half its length.
+    half: f64,
     points: [MaterialPoint; 2],
     moves: bool,
     /// Between faces with interpolated normals.
@@ -33,7 +35,8 @@ impl TurningEdge {
         let [(a, from), (b, to)] = [0.0, 1.0].map(|along| edge.point(along));
         let jumps = edge.crease.map(|part| part > 0.0);
         let crease = edges.normals(edge).map(|normals| (normals, jumps));
-        Self { ends: [a, b], points: [from, to], moves, smooth: edge.smooth, crease }
+        let (ends, half) = ([a, b], 0.5 * edge.length());
+        Self { ends, half, points: [from, to], moves, smooth: edge.smooth, crease }
     }
 
     /// What radiance does there, seen along a vector.
@@ -213,18 +216,27 @@ impl<'a> Near<'a> {
 
     /// An edge beside the ray and its weight; `None` where it has none.
     fn weight(&self, edge: &TurningEdge) -> Option<(Beside, Weight)> {
-        let from = self.ray.viewer.x;
-        let ends = edge.ends.map(|p| p - from);
+        let (from, w) = (self.ray.viewer.x, self.ray.dir);
+        let [a, b] = edge.ends;
+        let ends = [a - from, b - from];
         let below = |n: Vec3| ends.iter().all(|p| n.dot(*p) <= 1e-9 * p.length());
         let widest = match edge.jump(ends[0]) {
             Jump::None => return None,
             Jump::Narrow => self.square * (NARROW * NARROW),
             Jump::Wide => self.square,
         };
-        if self.horizon.is_some_and(below) {
+        // Most edges are farther away, by a sphere around them.
+        let middle = (ends[0] + ends[1]) * 0.5;
+        let along = middle.dot(w);
+        let reach = along + edge.half;
+        let across = middle.length_squared() - along * along;
+        let least = Real::sqrt(f64::max(across, 0.0)) - edge.half;
+        // Of what is nearer than a right angle the tangent is at most that of the sine.
+        let outside = least > 0.0 && least * least * (1.0 - widest) > widest * reach * reach;
+        if reach <= 0.0 || outside || self.horizon.is_some_and(below) {
             return None;
         }
-        let beside = Beside::new(ends, self.ray.dir)?;
+        let beside = Beside::new(ends, w)?;
         if beside.square >= widest {
             return None;
         }
