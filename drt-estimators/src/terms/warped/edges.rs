@@ -240,12 +240,7 @@ impl<'a> Near<'a> {
         if beside.square >= widest {
             return None;
         }
-        // On the edge itself the weight is as good as infinite.
-        let square = f64::max(beside.square, f64::MIN_POSITIVE.sqrt());
-        let mut weight = Weight {
-            value: widest / square - 1.0,
-            gradient: beside.square_gradient * (-widest / (square * square)),
-        };
+        let mut shown = Weight { value: 1.0, gradient: Vec3::ZERO };
         let behind = self.behind(beside.place);
         if behind > 0.0 {
             let q = behind / (BEHIND * beside.distance);
@@ -254,12 +249,22 @@ impl<'a> Near<'a> {
             }
             let rest = 1.0 - q * q;
             let q_gradient = beside.along_gradient
-                * (self.normal.dot(edge.ends[1] - edge.ends[0]) / (BEHIND * beside.distance))
+                * (self.normal.dot(b - a) / (BEHIND * beside.distance))
                 - beside.distance_gradient * (q / beside.distance);
-            weight.gradient =
-                weight.gradient * (rest * rest) - q_gradient * (4.0 * q * rest * weight.value);
-            weight.value *= rest * rest;
+            shown.value = rest * rest;
+            shown.gradient = q_gradient * (-4.0 * q * rest);
         }
+        // Of an edge that is not hidden the weight diverges where the ray meets it.
+        let rise = shown.value * (widest - beside.square);
+        let fall = beside.square + (1.0 - shown.value) * widest;
+        let fall = f64::max(fall, f64::MIN_POSITIVE.sqrt());
+        let rise_gradient =
+            shown.gradient * (widest - beside.square) - beside.square_gradient * shown.value;
+        let fall_gradient = beside.square_gradient - shown.gradient * widest;
+        let weight = Weight {
+            value: rise / fall,
+            gradient: (rise_gradient - fall_gradient * (rise / fall)) / fall,
+        };
         Some((beside, weight))
     }
 }

@@ -10,8 +10,8 @@ use crate::derivative::velocity::{
     Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurningRay, VelocityField,
     VertexVelocity,
 };
-use crate::terms::warped::edges::{TurningEdges, Weight};
 use crate::sampling::trace::Endpoint;
+use crate::terms::warped::edges::{TurningEdges, Weight};
 use crate::world::World;
 use crate::world::vertex::{SurfacePoint, Vertex};
 
@@ -39,7 +39,12 @@ impl EdgeTurns {
         edges: TurningEdges,
     ) -> Self {
         let blends = |s: u32| spatial.blends.acts_on(world, s);
-        let blended = (0..).zip(&active.shapes).map(|(s, moves)| *moves && (blends(s) || world.scene.shapes[s as usize].mesh.normals.is_some())).collect();
+        let blended = (0..)
+            .zip(&active.shapes)
+            .map(|(s, moves)| {
+                *moves && (blends(s) || world.scene.shapes[s as usize].mesh.normals.is_some())
+            })
+            .collect();
         let smooth = world.scene.shapes.iter().zip(&active.shapes);
         let smooth: Vec<bool> =
             smooth.map(|(s, moves)| *moves && s.mesh.normals.is_some()).collect();
