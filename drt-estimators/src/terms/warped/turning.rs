@@ -27,7 +27,7 @@ pub(super) struct EdgeTurns {
     edges: TurningEdges,
     /// Shapes that move and on which vertices may have a blend weight.
     blended: Vec<bool>,
-    /// Shapes that move and have interpolated normals: their vertices move with them.
+    /// Shapes with interpolated normals: vertices on them move with their matter.
     smooth: Vec<bool>,
 }
 
@@ -45,9 +45,7 @@ impl EdgeTurns {
                 *moves && (blends(s) || world.scene.shapes[s as usize].mesh.normals.is_some())
             })
             .collect();
-        let smooth = world.scene.shapes.iter().zip(&active.shapes);
-        let smooth: Vec<bool> =
-            smooth.map(|(s, moves)| *moves && s.mesh.normals.is_some()).collect();
+        let smooth = world.scene.shapes.iter().map(|s| s.mesh.normals.is_some()).collect();
         Self { spatial, edges, blended, smooth }
     }
 }
