@@ -65,7 +65,7 @@ pub(crate) struct Flux {
     /// And how vertices move there.
     pub(crate) spatial: Option<Arc<Spatial>>,
     /// Cosine of the angle of incidence below which the camera's rays leave the flux to [`GrazingFlux`].
-    edge_on: f64,
+    least_cosine: f64,
     /// What a flux must count for to be followed for every path, in those.
     pub(crate) followed: f64,
 }
@@ -96,7 +96,7 @@ impl Flux {
             longest: longest(world),
             movers: None,
             spatial: None,
-            edge_on: EDGE_ON,
+            least_cosine: EDGE_ON,
             followed: 1.0,
         })
     }
@@ -121,14 +121,14 @@ impl Flux {
             longest: longest(world),
             movers: Some(movers),
             spatial: Some(Arc::clone(spatial)),
-            edge_on: EDGE_ON,
+            least_cosine: EDGE_ON,
             followed: 1.0,
         })
     }
 
     /// The same with all of the flux left to rays.
     pub(crate) fn along_rays(self) -> Self {
-        Self { edge_on: 0.0, ..self }
+        Self { least_cosine: 0.0, ..self }
     }
 
     /// True when a shape sweeps over the points of a ray, which may itself be `moves`.

@@ -165,7 +165,7 @@ impl Reservoir {
         let mut before = ray.medium;
         for (i, m) in self.met.iter().enumerate() {
             let around = core::mem::replace(&mut before, m.after);
-            let left_out = node == 0 && Real::abs(m.cosine) < flux.edge_on;
+            let left_out = node == 0 && Real::abs(m.cosine) < flux.least_cosine;
             if !m.moves || left_out {
                 continue;
             }

@@ -13,7 +13,7 @@ use crate::world::vertex::{MaterialPoint, Vertex};
 /// How far behind the plane of the surface where a ray ends edges turn it, over their distances.
 const BEHIND: f64 = 0.02;
 
-/// How far creases between faces with interpolated normals turn rays, where radiance hardly jumps, over what other edges do.
+/// How far creases between faces with interpolated normals turn rays, where radiance hardly discontinuous, over what other edges do.
 const NARROW: f64 = 0.1;
 
 /// An edge at which radiance jumps.
@@ -33,32 +33,32 @@ pub(super) struct TurningEdge {
 impl TurningEdge {
     fn new(edges: &DiscontinuityEdges, edge: &DiscontinuityEdge, moves: bool) -> Self {
         let [(a, from), (b, to)] = [0.0, 1.0].map(|along| edge.point(along));
-        let jumps = edge.crease.map(|part| part > 0.0);
-        let crease = edges.normals(edge).map(|normals| (normals, jumps));
+        let discontinuous = edge.crease.map(|part| part > 0.0);
+        let crease = edges.normals(edge).map(|normals| (normals, discontinuous));
         let (ends, half) = ([a, b], 0.5 * edge.length());
         Self { ends, half, points: [from, to], moves, smooth: edge.smooth, crease }
     }
 
     /// What radiance does there, seen along a vector.
-    fn jump(&self, view: Vec3) -> Jump {
-        let Some((normals, jumps)) = &self.crease else { return Jump::Wide };
+    fn discontinuity(&self, view: Vec3) -> Discontinuity {
+        let Some((normals, discontinuous)) = &self.crease else { return Discontinuity::Full };
         let [front, other] = normals.map(|n| n.dot(view) > 0.0);
-        match jumps[usize::from(front)] {
-            _ if front != other => Jump::Wide,
-            false => Jump::None,
-            true if self.smooth => Jump::Narrow,
-            true => Jump::Wide,
+        match discontinuous[usize::from(front)] {
+            _ if front != other => Discontinuity::Full,
+            false => Discontinuity::None,
+            true if self.smooth => Discontinuity::Slight,
+            true => Discontinuity::Full,
         }
     }
 }
 
 /// What radiance does at an edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Jump {
+enum Discontinuity {
     None,
     /// It hardly jumps, between faces with interpolated normals.
-    Narrow,
-    Wide,
+    Slight,
+    Full,
 }
 
 /// The edges of a scene in trees of spheres.
@@ -220,10 +220,10 @@ impl<'a> Near<'a> {
         let [a, b] = edge.ends;
         let ends = [a - from, b - from];
         let below = |n: Vec3| ends.iter().all(|p| n.dot(*p) <= 1e-9 * p.length());
-        let widest = match edge.jump(ends[0]) {
-            Jump::None => return None,
-            Jump::Narrow => self.square * (NARROW * NARROW),
-            Jump::Wide => self.square,
+        let widest = match edge.discontinuity(ends[0]) {
+            Discontinuity::None => return None,
+            Discontinuity::Slight => self.square * (NARROW * NARROW),
+            Discontinuity::Full => self.square,
         };
         // Most edges are farther away, by a sphere around them.
         let middle = (ends[0] + ends[1]) * 0.5;

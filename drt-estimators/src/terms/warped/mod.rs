@@ -1,4 +1,67 @@
-//! The warped estimator: no edge is sampled, vertices move with them.
+//! The 2023 estimator: no edge is sampled, vertices move with the edges beside them.
+//!
+//! Of an integral whose integrand jumps, the boundary term of the derivative becomes an interior one when points move
+//! by a velocity field v that has the boundary's velocity where the integrand jumps (2023 paper, Eqs. 10 and 38; theory sheet
+//! §9):
+//!
+//! ```text
+//! d/dθ ∫ f dp = ∫ [∂f + div(f v)] dp.
+//! ```
+//!
+//! v is free elsewhere. The paper smooths a discontinuous velocity, which auxiliary points tell, in the plane of each vertex.
+//! That is [here](auxiliary) to compare with; its mean of ratios is biased, it needs rays, and knows surfaces only.
+//!
+//! # By edges
+//!
+//! The default takes the edges themselves. In the spatial form (theory sheet §3, §10 route B) a path is a function
+//! of directions, and radiance jumps at directions in which an edge is seen from the ray's origin x: silhouettes, borders, and
+//! creases between faces of different radiance. A ray along ω [turns](crate::derivative::velocity::RayTurn) at the rate
+//!
+//! ```text
+//! T(ω) = Σ_e λ_e (1 - ω ω^T) (u_e - x_dot) / r_e,    λ_e = w_e / (1 + Σ w),
+//! ```
+//!
+//! summed over all edges within an angle Δ of ω, e being the nearest point of an edge, u_e its velocity and r_e its distance
+//! from x. With q the squared sine of the angle between ω and e,
+//!
+//! ```text
+//! w_e = s (sin² Δ - q) / (q + (1 - s) sin² Δ).
+//! ```
+//!
+//! s is 1 for edges before the plane of the surface where the ray ends, and falls to 0 behind it. So a single edge has λ = 1 - q / sin² Δ:
+//! on an edge that is seen the ray turns just as fast as the edge does, T is continuous wherever radiance is, and its
+//! divergence is a closed form. There are no auxiliary rays, and there is no bias.
+//!
+//! | requirement (theory sheet §9) | why it holds |
+//! |---|---|
+//! | T is the velocity of each visible edge | w diverges there, and no other weight does but at points where edges cross |
+//! | T is continuous elsewhere | which edges count, as silhouettes or at all, depends on x alone; w is continuous in ω, and s on a face |
+//! | s may differ on the two sides of a crease or silhouette | there T is that edge's velocity on both sides |
+//! | nothing at horizons | scattered light vanishes there; edges below them are left out |
+//! | x moves by its whole velocity | x_dot is that of the vertex before, its own turn included: each vertex is conditioned on the one before (theory sheet §9.3) |
+//!
+//! Where edges cross in projection T has a direction-dependent limit: its divergence grows as one over the distance, whose mean
+//! is finite and whose second moment diverges like a logarithm. That is so of every field of this kind.
+//!
+//! Vertices on surfaces with interpolated normals have their matter's velocity as far as edges leave room,
+//! v = λ_0 u + ..., with λ_0 = 1 - Σ λ. Their creases then turn only rays that all but meet them.
+//!
+//! # In volumes
+//!
+//! A vertex in a medium stands at a fixed distance of its ray, and turns with it; so does what dims the ray. All points of a ray
+//! turn alike, so that the condition on edges before a vertex holds for those behind it as well. Surfaces beside media keep the
+//! [flux](crate::terms::flux) of the spatial form, against rays that turn. Nothing else is needed: interfaces, grids, emission
+//! and several media are as in the 2019 estimator, whose edge queries this field replaces.
+//!
+//! # The camera
+//!
+//! Its rays keep their image points (2019 paper) but where they turn with an edge. Where a filter jumps, the borders
+//! of its support are edges at rest in the image.
+//!
+//! # What is left to boundary samples
+//!
+//! Light of points and directions jumps along lines on surfaces that no edge is seen along. A [`Session`](crate::Session)
+//! leaves it to the path-space estimator, where something moves, and says so in its plan.
 
 mod auxiliary;
 mod beside;
