@@ -25,11 +25,12 @@ struct Way {
     points: bool,
 }
 
-const WAYS: [Way; 4] = [
+const WAYS: [Way; 5] = [
     Way::new("path-space", EstimatorKind::PathSpace, 1.0, true),
     Way::new("radiative", EstimatorKind::Radiative, 1.0, false),
     Way::new("and a bulb", EstimatorKind::Radiative, 1.0, true),
     Way::new("its 1/8", EstimatorKind::Radiative, 0.125, true),
+    Way::new("warped", EstimatorKind::Warped, 1.0, false),
 ];
 
 impl Way {
@@ -52,7 +53,9 @@ pub(crate) fn print() {
     println!(
         "eighth of the latter (\"rays\" are those of a sample of a pixel; a gradient is that by all"
     );
-    println!("vertices of the mesh named; for \"radiative\" the bulb is out, unless it says so)");
+    println!(
+        "vertices of the mesh named; for \"radiative\" and \"warped\" the bulb is out, unless it says so)"
+    );
     println!();
     println!(
         "{:9} {:11} {:13} {:>8} {:>6} {:>12} {:>6} {:>13}",

@@ -48,18 +48,19 @@ pub(crate) fn print() {
     radiative();
 }
 
-/// The 2019 form: one vertex of a path looks for an edge, or all do.
+/// The 2019 form, where one vertex of a path looks for an edge, or all do; and that in which rays turn with edges.
 fn radiative() {
     print!("{:6} {:17}", "room", "radiative, depth");
     RADIATIVE_DEPTHS.iter().for_each(|d| print!(" {d:>6}"));
     println!(" {:>9}", "64 / 16");
     for misty in [false, true] {
-        for (name, every_vertex) in [("one vertex looks", false), ("every vertex does", true)] {
-            let queries = Settings {
-                estimator: EstimatorKind::Radiative,
-                every_vertex,
-                ..Settings::default()
-            };
+        let radiative = EstimatorKind::Radiative;
+        for (name, estimator, every_vertex) in [
+            ("one vertex looks", radiative, false),
+            ("every vertex does", radiative, true),
+            ("warped", EstimatorKind::Warped, false),
+        ] {
+            let queries = Settings { estimator, every_vertex, ..Settings::default() };
             let task = |depth| with(Job::DerivativeImage, misty, depth, &queries);
             let times = take_turns(TURNS, RADIATIVE_DEPTHS.map(task));
             print!("{:6} {name:17}", if misty { "misty" } else { "clear" });
@@ -80,7 +81,7 @@ fn task(job: Job, misty: bool, depth: u32) -> Task<'static> {
 fn with(job: Job, misty: bool, depth: u32, settings: &Settings) -> Task<'static> {
     let subject = scenes::furnace(misty, depth).with_film(FILM);
     let mut scene = subject.scene;
-    if settings.estimator == EstimatorKind::Radiative {
+    if settings.estimator != EstimatorKind::PathSpace {
         // Points of light are not for the 2019 form: the ball glows instead.
         scene.emitters[0].item.emitter = Emitter::Area { radiance: Rgb::ONE };
         scene
