@@ -41,7 +41,7 @@ pub enum Warp {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AuxiliarySamples {
-    /// Of each vertex or ray; the bias falls with its inverse.
+    /// Of each vertex or ray; the more, the less bias.
     pub count: u32,
     /// Their weights.
     pub kernel: WarpKernel,

@@ -41,6 +41,18 @@ impl Cone {
     }
 }
 
+/// A segment of a [`ConeTree`].
+#[derive(Clone, Copy, Debug)]
+pub struct ConeSegment {
+    /// Its ends.
+    pub ends: [Vec3; 2],
+    /// The number it is to be known by.
+    pub name: u32,
+    /// Of an edge that matters within a narrow cone only, unless it is a silhouette: unit normals of its two faces on one
+    /// side of the surface.
+    pub facets: Option<[Vec3; 2]>,
+}
+
 /// Segments in a tree of spheres, to find those that may be in a [`Cone`].
 #[derive(Clone, Debug, Default)]
 pub struct ConeTree {
@@ -57,18 +69,64 @@ struct Node {
     next: u32,
     /// In `order`; none for an inner node.
     leaf: [u32; 2],
+    normals: Normals,
+}
+
+/// A cone around the normals of facets, on either side: its axis, and the sine and cosine of its angle; a right one where there
+/// are other segments.
+#[derive(Clone, Copy, Debug)]
+struct Normals {
+    axis: Vec3,
+    turn: [f64; 2],
+}
+
+impl Normals {
+    const ANY: Self = Self { axis: Vec3::ZERO, turn: [1.0, 0.0] };
+
+    fn new(facets: impl Iterator<Item = Option<[Vec3; 2]>> + Clone) -> Self {
+        let Some(Some([first, _])) = facets.clone().next() else { return Self::ANY };
+        let (mut sum, mut least) = (Vec3::ZERO, 1.0);
+        for pair in facets.clone() {
+            let Some([n, m]) = pair else { return Self::ANY };
+            sum += if n.dot(first) < 0.0 { -n - m } else { n + m };
+        }
+        let axis = sum.normalize();
+        for [n, m] in facets.flatten() {
+            let side = if n.dot(first) < 0.0 { -1.0 } else { 1.0 };
+            least = f64::min(least, f64::min(n.dot(axis) * side, m.dot(axis) * side));
+        }
+        if least > 0.0 && axis.is_finite() {
+            Self { axis, turn: [Real::sqrt(1.0 - least * least), least] }
+        } else {
+            Self::ANY
+        }
+    }
+
+    /// False when all facets in a sphere are seen from one side.
+    fn may_be_silhouettes(&self, apex: Vec3, center: Vec3, radius: f64) -> bool {
+        let view = center - apex;
+        let distance = view.length();
+        let sine = radius / distance;
+        let [spread, narrow] = self.turn;
+        // The sum of both angles must be less than a right one, and the view nearer to the axis than what is left.
+        if sine.is_nan() || sine >= narrow {
+            return true;
+        }
+        let both = spread * Real::sqrt(1.0 - sine * sine) + narrow * sine;
+        Real::abs(self.axis.dot(view)) <= both * distance
+    }
 }
 
 impl ConeTree {
-    /// Of segments, each by its ends and the number it is to be known by.
+    /// Of segments.
     #[must_use]
-    pub fn new(segments: &[([Vec3; 2], u32)]) -> Self {
+    pub fn new(segments: &[ConeSegment]) -> Self {
         let mut order: Vec<u32> = (0..segments.len() as u32).collect();
         let mut tree = Self::default();
         if !order.is_empty() {
             tree.split(segments, &mut order, 0);
         }
-        tree.order = order.into_iter().map(|i| segments[i as usize].1).collect();
+        tree.order = order.into_iter().map(|i| segments[i as usize].name).collect();
         tree
     }
 
@@ -78,10 +136,10 @@ impl ConeTree {
         self.nodes.is_empty()
     }
 
-    fn split(&mut self, segments: &[([Vec3; 2], u32)], order: &mut [u32], first: u32) {
+    fn split(&mut self, segments: &[ConeSegment], order: &mut [u32], first: u32) {
         let (mut low, mut high) = (Vec3::splat(f64::INFINITY), Vec3::splat(f64::NEG_INFINITY));
         for i in order.iter() {
-            for end in segments[*i as usize].0 {
+            for end in segments[*i as usize].ends {
                 (low, high) = (low.min(end), high.max(end));
             }
         }
@@ -89,12 +147,13 @@ impl ConeTree {
         let at = self.nodes.len();
         let end = first + order.len() as u32;
         let leaf = if order.len() <= LEAF { [first, end] } else { [0; 2] };
-        self.nodes.push(Node { center, radius: 0.5 * size.length(), next: 0, leaf });
+        let normals = Normals::new(order.iter().map(|i| segments[*i as usize].facets));
+        self.nodes.push(Node { center, radius: 0.5 * size.length(), next: 0, leaf, normals });
         if order.len() > LEAF {
             let size = size.to_array();
             let axis = (0..3).fold(0, |best, k| if size[k] > size[best] { k } else { best });
             let middle = |i: &u32| {
-                let [a, b] = segments[*i as usize].0;
+                let [a, b] = segments[*i as usize].ends;
                 (a + b).to_array()[axis]
             };
             let half = order.len() / 2;
@@ -106,11 +165,16 @@ impl ConeTree {
         self.nodes[at].next = self.nodes.len() as u32;
     }
 
-    /// Tells the numbers of all segments in a cone, and of some beside it.
-    pub fn visit(&self, cone: &Cone, mut found: impl FnMut(u32)) {
+    /// Tells the numbers of all segments in a cone, and of some beside it. Of facets' edges that are no silhouettes only those
+    /// in a `narrow` one around the same axis must be told.
+    pub fn visit(&self, cone: &Cone, narrow: &Cone, mut found: impl FnMut(u32)) {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
-            if !cone.may_meet(node.center, node.radius) {
+            let Node { center, radius, .. } = *node;
+            let met = cone.may_meet(center, radius)
+                && (narrow.may_meet(center, radius)
+                    || node.normals.may_be_silhouettes(cone.apex, center, radius));
+            if !met {
                 at = node.next as usize;
                 continue;
             }
@@ -138,7 +202,8 @@ mod tests {
         let segments: Vec<_> = (0..300)
             .map(|i| {
                 let a = point(&mut rng);
-                ([a, a + point(&mut rng) * 0.1], i)
+                let ends = [a, a + point(&mut rng) * 0.1];
+                ConeSegment { ends, name: i, facets: None }
             })
             .collect();
         let tree = ConeTree::new(&segments);
@@ -147,8 +212,9 @@ mod tests {
             let (apex, axis) = (point(&mut rng) * 1.5, point(&mut rng).normalize());
             let (angle, reach) = (0.3 * rng.next_f64(), 0.5 + rng.next_f64());
             let mut found = [false; 300];
-            tree.visit(&Cone::new(apex, axis, angle, reach), |i| found[i as usize] = true);
-            for ([a, b], i) in &segments {
+            let cone = Cone::new(apex, axis, angle, reach);
+            tree.visit(&cone, &cone, |i| found[i as usize] = true);
+            for ConeSegment { ends: [a, b], name: i, .. } in &segments {
                 let seen = |k: u32| {
                     let to = *a + (*b - *a) * (f64::from(k) / 20.0) - apex;
                     to.length() < reach && to.normalize().dot(axis) > angle.cos()
@@ -161,8 +227,40 @@ mod tests {
             told += found.iter().filter(|f| **f).count();
         }
         assert!(inside > 100 && told < 20 * inside, "{inside} {told}");
-        ConeTree::default().visit(&Cone::new(Vec3::ZERO, vec3(0.0, 0.0, 1.0), 0.1, 1.0), |_| {
-            panic!("there are none");
-        });
+        let cone = Cone::new(Vec3::ZERO, vec3(0.0, 0.0, 1.0), 0.1, 1.0);
+        ConeTree::default().visit(&cone, &cone, |_| panic!("there are none"));
+    }
+
+    /// Of a sphere, all silhouettes in the wide cone are told, and few others.
+    #[test]
+    fn silhouettes_of_spheres_are_told() {
+        let mut rng = Rng::new(9, 0, 0);
+        let segments: Vec<_> = (0..4000)
+            .map(|name| {
+                let n = point(&mut rng).normalize();
+                let m = (n + point(&mut rng) * 0.02).normalize();
+                let side = n.cross(m).normalize() * 0.02;
+                let facets = if name % 2 == 0 { [n, m] } else { [-n, -m] };
+                ConeSegment { ends: [n - side, n + side], name, facets: Some(facets) }
+            })
+            .collect();
+        let tree = ConeTree::new(&segments);
+        let (mut silhouettes, mut told) = (0, 0);
+        for _ in 0..100 {
+            let apex = point(&mut rng).normalize() * 3.0;
+            let axis = (point(&mut rng) * 0.5 - apex).normalize();
+            let [wide, narrow] = [0.3, 0.01].map(|a| Cone::new(apex, axis, a, f64::INFINITY));
+            let mut found = alloc::vec![false; segments.len()];
+            tree.visit(&wide, &narrow, |i| found[i as usize] = true);
+            told += found.iter().filter(|f| **f).count();
+            for s in &segments {
+                let [n, m] = s.facets.unwrap().map(|n| n.dot(s.ends[0] - apex) > 0.0);
+                if n != m && (s.ends[0] - apex).normalize().dot(axis) > f64::cos(0.29) {
+                    silhouettes += 1;
+                    assert!(found[s.name as usize]);
+                }
+            }
+        }
+        assert!(silhouettes > 300 && told < 30_000, "{silhouettes} {told}");
     }
 }

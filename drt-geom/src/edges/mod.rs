@@ -30,7 +30,7 @@ pub mod tree;
 mod wedge;
 
 pub use crate::edges::coincident::Coincident;
-pub use crate::edges::cone::{Cone, ConeTree};
+pub use crate::edges::cone::{Cone, ConeSegment, ConeTree};
 pub use crate::edges::fan::{EdgeSides, Fan, FanFace, Gap, faces_around};
 pub use crate::edges::lobes::{Lobe, Lobes};
 pub use crate::edges::wedge::Wedge;

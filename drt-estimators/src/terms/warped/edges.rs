@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use drt_geom::edges::{Cone, ConeTree};
+use drt_geom::edges::{Cone, ConeSegment, ConeTree};
 use drt_math::{Real, Vec3, fm};
 
 use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay};
@@ -13,7 +13,7 @@ use crate::world::vertex::{MaterialPoint, Vertex};
 /// How far behind the plane of the surface where a ray ends edges turn it, over their distances.
 const BEHIND: f64 = 0.02;
 
-/// How far creases between faces with interpolated normals turn rays, where radiance hardly discontinuous, over what other edges do.
+/// How far creases between the faces of curved surfaces turn rays, over what other edges do.
 const NARROW: f64 = 0.1;
 
 /// An edge at which radiance jumps.
@@ -24,19 +24,26 @@ pub(super) struct TurningEdge {
     half: f64,
     points: [MaterialPoint; 2],
     moves: bool,
-    /// Between faces with interpolated normals.
-    smooth: bool,
+    /// Between faces of a curved surface, on which vertices move with their matter.
+    facets: bool,
     /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
     crease: Option<([Vec3; 2], [bool; 2])>,
 }
 
 impl TurningEdge {
-    fn new(edges: &DiscontinuityEdges, edge: &DiscontinuityEdge, moves: bool) -> Self {
+    fn new(
+        edges: &DiscontinuityEdges,
+        edge: &DiscontinuityEdge,
+        moves: bool,
+        curved: bool,
+    ) -> Self {
         let [(a, from), (b, to)] = [0.0, 1.0].map(|along| edge.point(along));
         let discontinuous = edge.crease.map(|part| part > 0.0);
         let crease = edges.normals(edge).map(|normals| (normals, discontinuous));
         let (ends, half) = ([a, b], 0.5 * edge.length());
-        Self { ends, half, points: [from, to], moves, smooth: edge.smooth, crease }
+        // Of a fold as sharp as a corner, or between materials, a part is 1.
+        let facets = curved && edge.crease.iter().all(|part| *part < 1.0);
+        Self { ends, half, points: [from, to], moves, facets, crease }
     }
 
     /// What radiance does there, seen along a vector.
@@ -46,7 +53,7 @@ impl TurningEdge {
         match discontinuous[usize::from(front)] {
             _ if front != other => Discontinuity::Full,
             false => Discontinuity::None,
-            true if self.smooth => Discontinuity::Slight,
+            true if self.facets => Discontinuity::Facets,
             true => Discontinuity::Full,
         }
     }
@@ -56,8 +63,8 @@ impl TurningEdge {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Discontinuity {
     None,
-    /// It hardly jumps, between faces with interpolated normals.
-    Slight,
+    /// Between faces of a curved surface that are both seen from one side.
+    Facets,
     Full,
 }
 
@@ -75,6 +82,8 @@ struct Near<'a> {
     /// Squared sine of the cone's angle.
     square: f64,
     cone: Cone,
+    /// For creases of curved surfaces.
+    narrow: Cone,
     /// The unit normal of the surface that the viewer is on, towards the ray's side.
     horizon: Option<Vec3>,
     /// Unit normal of the surface where the ray ends, away from the viewer; zero where it does not. And the viewer's distance
@@ -91,15 +100,27 @@ pub(super) struct Weight {
 }
 
 impl TurningEdges {
-    pub(super) fn new(edges: &DiscontinuityEdges, moves: impl Fn(u32) -> bool) -> Self {
+    /// Of those that `moves` says of their shape to move, and `curved` to be on a curved surface.
+    pub(super) fn new(
+        edges: &DiscontinuityEdges,
+        moves: impl Fn(u32) -> bool,
+        curved: impl Fn(u32) -> bool,
+    ) -> Self {
         let list: Vec<_> = edges
             .list
             .iter()
-            .map(|edge| TurningEdge::new(edges, edge, moves(edge.edge.shape)))
+            .map(|edge| {
+                let shape = edge.edge.shape;
+                TurningEdge::new(edges, edge, moves(shape), curved(shape))
+            })
             .collect();
         let tree = |of: &dyn Fn(&TurningEdge) -> bool| {
             let segments = list.iter().zip(0..).filter(|(edge, _)| of(edge));
-            ConeTree::new(&segments.map(|(edge, i)| (edge.ends, i)).collect::<Vec<_>>())
+            let segment = |(edge, name): (&TurningEdge, u32)| {
+                let facets = edge.crease.filter(|_| edge.facets).map(|(normals, _)| normals);
+                ConeSegment { ends: edge.ends, name, facets }
+            };
+            ConeTree::new(&segments.map(segment).collect::<Vec<_>>())
         };
         let (all, moving) = (tree(&|_| true), tree(&|edge| edge.moves));
         Self { list, all, moving }
@@ -121,7 +142,7 @@ impl TurningEdges {
         let cone = Cone::new(viewer.x, dir, angle, f64::INFINITY);
         let mut any = false;
         let tree = if viewer_moves { &self.all } else { &self.moving };
-        tree.visit(&cone, |_| any = true);
+        tree.visit(&cone, &cone, |_| any = true);
         any
     }
 
@@ -138,7 +159,7 @@ impl TurningEdges {
         let near = Near::new(ray, angle);
         if !(ray.moves || always) {
             let mut any = false;
-            self.moving.visit(&near.cone, |i| {
+            self.moving.visit(&near.cone, &near.narrow, |i| {
                 any = any || near.weight(&self.list[i as usize]).is_some();
             });
             if !any {
@@ -148,7 +169,7 @@ impl TurningEdges {
         let first = parts.len();
         let mut sum = Weight::default();
         let mut resting = TurnPart { matter: None, rate: 0.0, divergence: Vec3::ZERO };
-        self.all.visit(&near.cone, |i| {
+        self.all.visit(&near.cone, &near.narrow, |i| {
             let edge = &self.list[i as usize];
             let Some((beside, weight)) = near.weight(edge) else { return };
             sum.value += weight.value;
@@ -206,7 +227,8 @@ impl<'a> Near<'a> {
         let cone = Cone::new(viewer.x, dir, angle, reach);
         let sine = fm::sin(angle);
         let horizon = viewer.surface().map(|s| if s.ng.dot(dir) < 0.0 { -s.ng } else { s.ng });
-        Self { ray, square: sine * sine, cone, horizon, normal, depth }
+        let narrow = Cone::new(viewer.x, dir, NARROW * angle, reach);
+        Self { ray, square: sine * sine, cone, narrow, horizon, normal, depth }
     }
 
     /// How far a point, less the viewer's place, is behind the plane of the surface where the ray ends.
@@ -222,7 +244,7 @@ impl<'a> Near<'a> {
         let below = |n: Vec3| ends.iter().all(|p| n.dot(*p) <= 1e-9 * p.length());
         let widest = match edge.discontinuity(ends[0]) {
             Discontinuity::None => return None,
-            Discontinuity::Slight => self.square * (NARROW * NARROW),
+            Discontinuity::Facets => self.square * (NARROW * NARROW),
             Discontinuity::Full => self.square,
         };
         // Most edges are farther away, by a sphere around them.

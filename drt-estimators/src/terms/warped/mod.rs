@@ -43,8 +43,9 @@
 //! Where edges cross in projection T has a direction-dependent limit: its divergence grows as one over the distance, whose mean
 //! is finite and whose second moment diverges like a logarithm. That is so of every field of this kind.
 //!
-//! Vertices on surfaces with interpolated normals have their matter's velocity as far as edges leave room,
-//! v = λ_0 u + ..., with λ_0 = 1 - Σ λ. Their creases then turn only rays that all but meet them.
+//! Vertices on curved surfaces, by their normals or their facets, have their matter's velocity as far as edges leave room,
+//! v = λ_0 u + ..., with λ_0 = 1 - Σ λ. Creases between their facets then turn only rays that all but meet them, and are found
+//! in a [tree](drt_geom::edges::ConeTree) that passes over facets which are seen from one side.
 //!
 //! # In volumes
 //!
@@ -71,6 +72,7 @@ mod tests;
 mod turning;
 
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::{Spatial, VelocityField};
@@ -107,18 +109,19 @@ impl Warped {
             DiscontinuityEdges::default()
         };
         let count = [found.list.len() as u64, found.all];
-        let edges = TurningEdges::new(&found, |shape| active.shapes[shape as usize]);
-        let spatial = || {
-            let mut spatial = Spatial::new(world, active);
-            spatial.blends.leave_media();
-            Arc::new(spatial)
-        };
+        let mut spatial = Spatial::new(world, active);
+        spatial.blends.leave_media();
+        let curved: Vec<bool> = (0..world.scene.shapes.len() as u32)
+            .map(|s| spatial.blends.acts_in_view_on(s))
+            .collect();
+        let moves = |shape| active.shapes[shape as usize];
+        let edges = TurningEdges::new(&found, moves, |shape| curved[shape as usize]);
+        let spatial = Arc::new(spatial);
         let refused = |reason| Err(Error::Setting { setting: "warp", reason });
         let surfaces_only = !(world.has_media() || world.any_null);
         match settings.warp {
             Warp::Edges => {
-                let spatial = spatial();
-                let field = EdgeTurns::new(world, active, Arc::clone(&spatial), edges);
+                let field = EdgeTurns::new(world, active, Arc::clone(&spatial), edges, curved);
                 Ok(Self { field: Arc::new(field), spatial: Some(spatial), count })
             }
             Warp::Points(_) | Warp::Directions(_) if !surfaces_only => {
@@ -132,7 +135,6 @@ impl Warped {
                 Ok(Self { field: Arc::new(field), spatial: None, count })
             }
             Warp::Directions(samples) => {
-                let spatial = spatial();
                 let field = AuxiliaryDirections::new(world, Arc::clone(&spatial), edges, samples);
                 Ok(Self { field: Arc::new(field), spatial: Some(spatial), count })
             }

@@ -27,8 +27,8 @@ pub(super) struct EdgeTurns {
     edges: TurningEdges,
     /// Shapes that move and on which vertices may have a blend weight.
     blended: Vec<bool>,
-    /// Shapes with interpolated normals: vertices on them move with their matter.
-    smooth: Vec<bool>,
+    /// Shapes with curved surfaces: vertices on them move with their matter.
+    curved: Vec<bool>,
 }
 
 impl EdgeTurns {
@@ -37,16 +37,14 @@ impl EdgeTurns {
         active: &ActiveInputs,
         spatial: Arc<Spatial>,
         edges: TurningEdges,
+        curved: Vec<bool>,
     ) -> Self {
         let blends = |s: u32| spatial.blends.acts_on(world, s);
         let blended = (0..)
             .zip(&active.shapes)
-            .map(|(s, moves)| {
-                *moves && (blends(s) || world.scene.shapes[s as usize].mesh.normals.is_some())
-            })
+            .map(|(s, moves)| *moves && (blends(s) || curved[s as usize]))
             .collect();
-        let smooth = world.scene.shapes.iter().map(|s| s.mesh.normals.is_some()).collect();
-        Self { spatial, edges, blended, smooth }
+        Self { spatial, edges, blended, curved }
     }
 }
 
@@ -64,7 +62,7 @@ impl VelocityField for EdgeTurns {
     ) -> VertexVelocity {
         let mut velocity = self.spatial.vertex(world, found, probe, auxiliary);
         if let Endpoint::Surface(v) = &found.arrival.end
-            && v.surface().is_some_and(|s| self.smooth[s.shape as usize])
+            && v.surface().is_some_and(|s| self.curved[s.shape as usize])
         {
             velocity.blend = Blend::MATERIAL;
         }
@@ -114,7 +112,7 @@ impl VelocityField for EdgeTurns {
         distance: f64,
     ) -> Blend {
         match end.surface() {
-            Some(s) if self.smooth[s.shape as usize] => Blend::MATERIAL,
+            Some(s) if self.curved[s.shape as usize] => Blend::MATERIAL,
             _ => self.spatial.blend(world, viewer, end, dir, distance),
         }
     }

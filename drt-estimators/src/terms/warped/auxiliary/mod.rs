@@ -9,7 +9,7 @@
 //! ```
 //!
 //! (Eqs. 44–47 and 58–62), with gradients by the vertex at fixed samples: the summand w div v_dis of Eq. 61 must be left out
-//! (theory sheet §12.32). A ratio of two estimates is biased by O(1/N) for N samples, however many paths there are. It is
+//! (theory sheet §12.32). A ratio of two estimates is biased, by O(1/N) for many samples N, however many paths there are. It is
 //! debiased by a sum over doubled numbers of samples, of which one term is drawn: with r(S) the ratio by a set S of samples,
 //!
 //! ```text
