@@ -4,8 +4,8 @@ mod common;
 
 use common::*;
 use drt_estimators::{
-    Counters, EstimatorKind, InteriorMotion, Plan, Rendering, Scene, Session, Settings, Target,
-    Unattended, gradient,
+    AuxiliarySamples, Counters, EstimatorKind, InteriorMotion, Plan, Rendering, Scene, Session,
+    Settings, Target, Term, Unattended, Warp, gradient,
 };
 use drt_math::{Rgb, ValueChange};
 use drt_motion::{Effect, Parameter};
@@ -186,7 +186,10 @@ fn reverse_mode_skips_as_much() {
 }
 
 fn by_rays(scene: &Scene, parameters: &[Parameter]) -> Rendering {
-    let estimator = EstimatorKind::Radiative;
+    by(EstimatorKind::Radiative, scene, parameters)
+}
+
+fn by(estimator: EstimatorKind, scene: &Scene, parameters: &[Parameter]) -> Rendering {
     let settings = Settings { terms: true, estimator, ..Settings::default() };
     let mut session = Session::new(scene, parameters, &settings).expect("a valid scene");
     assert!(session.run(8, &Unattended));
@@ -213,4 +216,37 @@ fn each_light_has_one_estimator() {
     assert_eq!((named("radiative"), named("path-space")), (1, 1), "{plan}");
     let plan = rendered(&surfaces(phong(), phong()), &shift()).plan;
     assert_eq!(plan.estimators, ["path-space, all light"]);
+}
+
+/// Neither boundary samples nor auxiliary rays: the paths are those of the image.
+#[test]
+fn rays_that_turn_need_no_others() {
+    let warped =
+        |scene: &Scene, parameters: &[Parameter]| by(EstimatorKind::Warped, scene, parameters);
+    let moving = [parameter("p", 0.0, vec![moves("card", shift())])];
+    let [image, derivative] = [&[][..], &moving].map(|p| warped(&glow(), p));
+    let c = &derivative.counters;
+    assert_eq!((c.boundary_samples, c.border_samples), (0, 0));
+    assert!(c.recorded_vertices > 0 && c.rays < image.counters.rays * 2, "{c:?}");
+    let layers = derivative.derivatives[0].terms.iter().map(|(term, _)| *term);
+    assert!(layers.eq([Term::Interior, Term::Flux, Term::Warp]));
+    let share = derivative.derivatives[0].terms[2].1.rms_value();
+    assert!(share > 0.2 * derivative.derivatives[0].total.rms_value(), "{share}");
+    let plan =
+        warped(&surfaces(phong(), phong()), &[parameter("p", 0.0, vec![moves("ball", shift())])]);
+    let named = |what: &str| plan.plan.estimators.iter().any(|e| e.starts_with(what));
+    assert!(named("warped") && named("path-space"), "{}", plan.plan);
+}
+
+#[test]
+fn auxiliary_samples_are_for_surfaces() {
+    let moving = [parameter("p", 0.0, vec![moves("card", shift())])];
+    for warp in
+        [Warp::Points(AuxiliarySamples::default()), Warp::Directions(AuxiliarySamples::default())]
+    {
+        let estimator = EstimatorKind::Warped;
+        let settings = Settings { estimator, warp, ..Settings::default() };
+        let refused = Session::new(&glow(), &moving, &settings).err().expect("there is fog");
+        assert!(refused.to_string().contains("surfaces alone"), "{refused}");
+    }
 }

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use drt_estimators::{Depth, EstimatorKind};
+use drt_estimators::{AuxiliarySamples, Depth, EstimatorKind, Warp, WarpKernel};
 use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{Change, GeometryChange, PropertyChange, ValueChange};
 
@@ -227,13 +227,10 @@ fn assignments_reach_every_key() {
 #[test]
 fn keys_of_later_versions_are_read_and_stand_in_the_way_of_derivatives_only() {
     let text = |more: &str| format!("scene = \"scene.xml\"\n{more}");
-    for (more, part) in
-        [("[[parameter_group]]\ntarget = \"cube\"\nvertices = \"all\"", "[[parameter_group]]")]
-    {
-        let j = job(&text(more), &[]).unwrap();
-        let message = j.require_derivatives().unwrap_err().to_string();
-        assert!(message.contains(part) && message.contains("job.toml:"), "{message}");
-    }
+    let group = "[[parameter_group]]\ntarget = \"cube\"\nvertices = \"all\"";
+    let j = job(&text(group), &[]).unwrap();
+    let message = j.require_derivatives().unwrap_err().to_string();
+    assert!(message.contains("[[parameter_group]]") && message.contains("job.toml:"), "{message}");
     refused(&text("[estimator]\nsampling = \"bidirectional\""), &[], &["bidirectional"]);
     refused(&text("[[motion]]\nmedium = \"fog\"\nkind = \"liquid\""), &[], &["`liquid`"]);
     let motion = |more: &str| text(&format!("[[motion]]\nmedium = \"fog\"\n{more}"));
@@ -280,4 +277,22 @@ fn a_scene_alone_brings_its_own_sample_count() {
     assert_eq!((j.settings.sensor, j.spp()), (1, 9));
     assert!(j.select_sensor("cube").is_err());
     assert_eq!(j.scene.sensors[1].item.sensor.film()[0], 8);
+}
+
+#[test]
+fn edges_move_vertices_by_one_of_three_ways() {
+    let text =
+        |warp: &str| format!("scene = \"scene.xml\"\n[estimator]\nkind = \"warped\"\n{warp}");
+    let settings = |warp: &str| job(&text(warp), &[]).unwrap().settings;
+    let plain = settings("");
+    assert_eq!((plain.estimator, plain.warp), (EstimatorKind::Warped, Warp::Edges));
+    let eight = AuxiliarySamples::default();
+    assert_eq!(settings("warp.by = \"points\"").warp, Warp::Points(eight));
+    let asked =
+        "warp = { by = \"directions\", samples = 3, kernel = \"year-2020\", debiased = true }";
+    let samples = AuxiliarySamples { count: 3, kernel: WarpKernel::Year2020, debiased: true };
+    assert_eq!(settings(asked).warp, Warp::Directions(samples));
+    refused(&text("warp.by = \"nothing\""), &[], &["job.toml:4", "`nothing`"]);
+    refused(&text("warp = { by = \"points\", samples = 0 }"), &[], &["`samples` is 0"]);
+    refused(&text("warp = { by = \"edges\", samples = 3 }"), &[], &["no auxiliary samples"]);
 }
