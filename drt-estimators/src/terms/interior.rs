@@ -230,7 +230,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let width = camera.film()[0];
         for view in &mut self.views {
             let stream = |of: u64| Rng::new(self.seed, of | u64::from(pixel), unit);
-            let velocities = stream(VELOCITY_STREAM);
+            let velocities = || stream(VELOCITY_STREAM);
             view.begin(Some(stream(PAIR_STREAM)), velocities, || stream(FLUX_STREAM));
         }
         let shadows = self.workers.iter().any(|w| w.along.shadows.is_some());

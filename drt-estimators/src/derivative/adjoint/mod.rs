@@ -124,8 +124,10 @@ impl<'w> Differentiator<'w> {
     ) {
         let nodes = path.record.nodes.len();
         // What fields look at has numbers of its own.
-        let mut name = rng.clone();
-        self.probe.rng = Rng::new(u64::from(name.next_u32()), VELOCITY_STREAM, name.next_u32());
+        if path.velocities.field().is_random() {
+            let mut name = rng.clone();
+            self.probe.rng = Rng::new(u64::from(name.next_u32()), VELOCITY_STREAM, name.next_u32());
+        }
         self.rng = rng;
         self.filter = filter;
         self.turn = RgbVec::ZERO;
@@ -276,7 +278,7 @@ impl<'w> Differentiator<'w> {
             None => {
                 if let Some(filter) = seen.filter(|_| sink.active().sensor) {
                     let by_view = self.seen(None, arrival.dir, value, filter);
-                    self.by_sensor(&by_view, phi);
+                    self.by_sensor(&by_view, phi, sink.active());
                 }
                 let along =
                     self.segment(&path, Far::Direction, ray_moves, weight, &mut there, sink);
@@ -289,7 +291,7 @@ impl<'w> Differentiator<'w> {
                 let view = seen.filter(|_| phi > 0.0 && (sink.active().sensor || slides));
                 let by_view = view.map(|filter| self.seen(vertex, arrival.dir, value, filter));
                 if let Some(by_view) = &by_view {
-                    self.by_sensor(by_view, phi);
+                    self.by_sensor(by_view, phi, sink.active());
                 }
                 let by_place = by_view.map_or(RgbVec::ZERO, |v| v.place * phi);
                 if turn_of_ray.is_some() {
@@ -327,7 +329,7 @@ impl<'w> Differentiator<'w> {
             if let Some(filter) = seen {
                 // A direction has no parallax.
                 let by_view = self.seen(None, arrival.dir, value, filter);
-                self.by_sensor(&by_view, turn.weight);
+                self.by_sensor(&by_view, turn.weight, sink.active());
                 all += by_view.place;
                 // What the camera's image point does is replaced.
                 turned -= turned_wholly * turn.weight + weight.outer(turn.gradient);
@@ -513,7 +515,10 @@ impl<'w> Differentiator<'w> {
     }
 
     /// Adds a share of what the camera's importance and filter owe to the camera.
-    fn by_sensor(&mut self, by_view: &ByView, share: f64) {
+    fn by_sensor(&mut self, by_view: &ByView, share: f64, active: &ActiveInputs) {
+        if !active.sensor {
+            return;
+        }
         for (sum, gradient) in self.sensor.iter_mut().zip(&by_view.sensor) {
             *sum += gradient.scaled(share);
         }

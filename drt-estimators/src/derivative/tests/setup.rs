@@ -97,7 +97,7 @@ pub(super) fn trace(
     let weight = Rgb::splat(view.weight);
     let pixel = [i % pixels % FILM[0], i % pixels / FILM[0]];
     let Recording { record, views } = recording;
-    views[0].begin(pairs, Rng::new(0, 0, 0), || Rng::new(0, 0, 0));
+    views[0].begin(pairs, || Rng::new(0, 0, 0), || Rng::new(0, 0, 0));
     let mut recorder = Recorder { record, views, camera_ray: None };
     recorder.begin(pixel, view.direction, weight);
     tracer.rng = rng;

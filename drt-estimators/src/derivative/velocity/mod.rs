@@ -139,6 +139,11 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity;
 
+    /// Whether it draws random numbers.
+    fn is_random(&self) -> bool {
+        false
+    }
+
     /// Whether points on emitters may move though neither they nor the ray does.
     fn looks_around(&self) -> bool {
         false

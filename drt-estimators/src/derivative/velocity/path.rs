@@ -42,9 +42,11 @@ impl PathVelocities {
         }
     }
 
-    /// Forgets the last path; random numbers are for fields that look around.
-    pub(crate) fn begin(&mut self, rng: Rng) {
-        self.probe.rng = rng;
+    /// Forgets the last path; random numbers are for fields that draw some.
+    pub(crate) fn begin(&mut self, rng: impl FnOnce() -> Rng) {
+        if self.field.is_random() {
+            self.probe.rng = rng();
+        }
         self.vertices.clear();
         self.auxiliary.clear();
         self.turns.clear();

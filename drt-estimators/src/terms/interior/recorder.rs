@@ -26,7 +26,7 @@ impl PathView<'_> {
     pub(crate) fn begin(
         &mut self,
         pairs: Option<Rng>,
-        velocities: Rng,
+        velocities: impl FnOnce() -> Rng,
         flux: impl FnOnce() -> Rng,
     ) {
         self.velocities.begin(velocities);

@@ -156,6 +156,10 @@ impl VelocityField for AuxiliaryDirections {
         Some(turn)
     }
 
+    fn is_random(&self) -> bool {
+        true
+    }
+
     fn blend(&self, _: &World, _: &Vertex, _: &Vertex, _: Vec3, _: f64) -> Blend {
         Blend::default()
     }

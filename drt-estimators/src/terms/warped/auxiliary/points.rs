@@ -261,6 +261,10 @@ impl VelocityField for AuxiliaryPoints {
         VertexVelocity { moves: true, blend: Blend::MATERIAL, auxiliary, turn: None }
     }
 
+    fn is_random(&self) -> bool {
+        true
+    }
+
     fn blend(&self, _: &World, _: &Vertex, _: &Vertex, _: Vec3, _: f64) -> Blend {
         Blend::MATERIAL
     }
