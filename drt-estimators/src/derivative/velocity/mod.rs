@@ -190,10 +190,14 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
     ) -> Blend;
 
     /// Whether rays that scatter at a surface point of some velocity may turn against its normal.
-    fn turns_rays(&self, world: &World, s: &SurfacePoint, velocity: &VertexVelocity) -> bool;
+    fn turns_rays(&self, _world: &World, _s: &SurfacePoint, _velocity: &VertexVelocity) -> bool {
+        false
+    }
 
     /// The widest lobes, in radians, whose turning is estimated by [antithetic pairs](super::antithetic) of rays.
-    fn widest_paired(&self, transmissive: bool) -> f64;
+    fn widest_paired(&self, _transmissive: bool) -> f64 {
+        0.0
+    }
 }
 
 /// What moves for some parameter.

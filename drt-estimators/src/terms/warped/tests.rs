@@ -17,7 +17,7 @@ use crate::model::scene::Scene;
 use crate::model::settings::EstimatorKind;
 use crate::terms::prepared::Prepared;
 use crate::world::World;
-use crate::world::vertex::{SurfacePoint, Vertex};
+use crate::world::vertex::Vertex;
 
 /// What is wrong with a field.
 #[derive(Clone, Copy, Debug)]
@@ -80,14 +80,6 @@ impl VelocityField for Faulty {
 
     fn blend(&self, world: &World, viewer: &Vertex, end: &Vertex, dir: Vec3, d: f64) -> Blend {
         self.field.blend(world, viewer, end, dir, d)
-    }
-
-    fn turns_rays(&self, world: &World, s: &SurfacePoint, velocity: &VertexVelocity) -> bool {
-        self.field.turns_rays(world, s, velocity)
-    }
-
-    fn widest_paired(&self, transmissive: bool) -> f64 {
-        self.field.widest_paired(transmissive)
     }
 }
 

@@ -13,7 +13,7 @@ use crate::derivative::velocity::{
 use crate::sampling::trace::Endpoint;
 use crate::terms::warped::edges::{TurningEdges, Weight};
 use crate::world::World;
-use crate::world::vertex::{SurfacePoint, Vertex};
+use crate::world::vertex::Vertex;
 
 /// Radians.
 const ANGLE: f64 = 0.1;
@@ -115,13 +115,5 @@ impl VelocityField for EdgeTurns {
             Some(s) if self.curved[s.shape as usize] => Blend::MATERIAL,
             _ => self.spatial.blend(world, viewer, end, dir, distance),
         }
-    }
-
-    fn turns_rays(&self, _: &World, _: &SurfacePoint, _: &VertexVelocity) -> bool {
-        false
-    }
-
-    fn widest_paired(&self, _: bool) -> f64 {
-        0.0
     }
 }

@@ -20,7 +20,7 @@ use crate::terms::warped::auxiliary::rims::Rims;
 use crate::terms::warped::auxiliary::{Sample, plan, ratio};
 use crate::terms::warped::edges::TurningEdges;
 use crate::world::World;
-use crate::world::vertex::{MaterialPoint, SurfacePoint, Vertex};
+use crate::world::vertex::{MaterialPoint, Vertex};
 
 /// Standard deviation of the camera's auxiliary directions at most, in pixels.
 const PIXELS: f64 = 1.0;
@@ -162,13 +162,5 @@ impl VelocityField for AuxiliaryDirections {
 
     fn blend(&self, _: &World, _: &Vertex, _: &Vertex, _: Vec3, _: f64) -> Blend {
         Blend::default()
-    }
-
-    fn turns_rays(&self, _: &World, _: &SurfacePoint, _: &VertexVelocity) -> bool {
-        false
-    }
-
-    fn widest_paired(&self, _: bool) -> f64 {
-        0.0
     }
 }

@@ -268,12 +268,4 @@ impl VelocityField for AuxiliaryPoints {
     fn blend(&self, _: &World, _: &Vertex, _: &Vertex, _: Vec3, _: f64) -> Blend {
         Blend::MATERIAL
     }
-
-    fn turns_rays(&self, _: &World, _: &SurfacePoint, _: &VertexVelocity) -> bool {
-        false
-    }
-
-    fn widest_paired(&self, _: bool) -> f64 {
-        0.0
-    }
 }
