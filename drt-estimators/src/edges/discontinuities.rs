@@ -39,7 +39,7 @@ pub(crate) struct DiscontinuityEdge {
     /// on the other.
     pub(crate) crease: [f64; 2],
     /// Between faces with interpolated normals.
-    pub(crate) smooth: bool,
+    smooth: bool,
 }
 
 /// All edges.
