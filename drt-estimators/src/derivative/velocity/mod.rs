@@ -25,7 +25,8 @@
 //!
 //! so that v and div v are linear functionals of the velocities of matter, with coefficients that depend
 //! on the path alone. [`material`] has φ = 1 (2021 paper), [`spatial`] mostly φ = 0 (2019 paper). A field
-//! that is smoothed from auxiliary points (2023 paper, Eqs. 44–47) has φ = 1 and one summand for each.
+//! that is smoothed from auxiliary points (2023 paper, Eqs. 44–47) has φ = 1 and summands for each. Rays may also
+//! [turn], with edges beside them.
 //! Nothing but a [`VelocityField`] knows which of these it is.
 
 pub(crate) mod blend;
