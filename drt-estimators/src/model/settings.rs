@@ -60,8 +60,8 @@ impl Default for AuxiliarySamples {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum WarpKernel {
-    /// Converges on triangle meshes: boundary tests by distance from silhouettes, open and sharp edges, and the cube of
-    /// distance and test together.
+    /// Boundary tests by distance from silhouettes, open and sharp edges of triangle meshes, and the cube of distance and
+    /// test together (theory sheet §9.1).
     #[default]
     Corrected,
     /// The distance of Eq. 16 of the 2023 paper, cubed, and tests as printed there.
