@@ -232,10 +232,12 @@ fn rays_that_turn_need_no_others() {
     assert!(layers.eq([Term::Interior, Term::Flux, Term::Warp]));
     let share = derivative.derivatives[0].terms[2].1.rms_value();
     assert!(share > 0.2 * derivative.derivatives[0].total.rms_value(), "{share}");
-    let plan =
-        warped(&surfaces(phong(), phong()), &[parameter("p", 0.0, vec![moves("ball", shift())])]);
-    let named = |what: &str| plan.plan.estimators.iter().any(|e| e.starts_with(what));
-    assert!(named("warped") && named("path-space"), "{}", plan.plan);
+    // Light of points and directions, on surfaces and in fog.
+    for (scene, others) in [(surfaces(phong(), phong()), false), (fog(), true)] {
+        let plan = warped(&scene, &[parameter("p", 0.0, vec![moves("ball", shift())])]).plan;
+        let named = |what: &str| plan.estimators.iter().any(|e| e.starts_with(what));
+        assert!(named("warped") && named("path-space") == others, "{plan}");
+    }
 }
 
 #[test]

@@ -7,10 +7,11 @@ use drt_math::{Real, Vec3, fm};
 /// Segments in a leaf of the tree.
 const LEAF: usize = 4;
 
-/// All points that a viewer sees within an angle of a direction, up to a distance.
+/// All points that a viewer sees within an angle of a direction, up to a distance; or, for a viewer at infinity, all within
+/// a distance of a line.
 #[derive(Clone, Copy, Debug)]
 pub struct Cone {
-    /// The viewer.
+    /// The viewer, or a point of the line.
     pub apex: Vec3,
     /// Unit, the direction.
     pub axis: Vec3,
@@ -18,6 +19,8 @@ pub struct Cone {
     turn: [f64; 2],
     /// The distance.
     reach: f64,
+    /// From the line; none of a viewer that is not at infinity.
+    radius: Option<f64>,
 }
 
 impl Cone {
@@ -25,7 +28,13 @@ impl Cone {
     #[must_use]
     pub fn new(apex: Vec3, axis: Vec3, angle: f64, reach: f64) -> Self {
         let (sine, cosine) = fm::sin_cos(angle);
-        Self { apex, axis, turn: [sine, cosine], reach }
+        Self { apex, axis, turn: [sine, cosine], reach, radius: None }
+    }
+
+    /// Of a `radius` around the line through a point along the unit direction `axis`.
+    #[must_use]
+    pub fn cylinder(through: Vec3, axis: Vec3, radius: f64) -> Self {
+        Self { apex: through, axis, turn: [0.0, 1.0], reach: f64::INFINITY, radius: Some(radius) }
     }
 
     /// False when no point of a sphere is in the cone.
@@ -37,7 +46,8 @@ impl Cone {
         let across = Real::sqrt(f64::max(square - along * along, 0.0));
         let [sine, cosine] = self.turn;
         let farthest = self.reach + radius;
-        across * cosine - along * sine <= radius && square <= farthest * farthest
+        let beside = across * cosine - along * sine <= radius + self.radius.unwrap_or(0.0);
+        beside && square <= farthest * farthest
     }
 }
 
@@ -102,11 +112,12 @@ impl Normals {
         }
     }
 
-    /// False when all facets in a sphere are seen from one side.
-    fn may_be_silhouettes(&self, apex: Vec3, center: Vec3, radius: f64) -> bool {
-        let view = center - apex;
+    /// False when the viewer sees all facets in a sphere from one side.
+    fn may_be_silhouettes(&self, cone: &Cone, center: Vec3, radius: f64) -> bool {
+        let at_infinity = cone.radius.is_some();
+        let view = if at_infinity { cone.axis } else { center - cone.apex };
         let distance = view.length();
-        let sine = radius / distance;
+        let sine = if at_infinity { 0.0 } else { radius / distance };
         let [spread, narrow] = self.turn;
         // The sum of both angles must be less than a right one, and the view nearer to the axis than what is left.
         if sine.is_nan() || sine >= narrow {
@@ -173,7 +184,7 @@ impl ConeTree {
             let Node { center, radius, .. } = *node;
             let met = cone.may_meet(center, radius)
                 && (narrow.may_meet(center, radius)
-                    || node.normals.may_be_silhouettes(cone.apex, center, radius));
+                    || node.normals.may_be_silhouettes(cone, center, radius));
             if !met {
                 at = node.next as usize;
                 continue;

@@ -3,7 +3,7 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use crate::derivative::adjoint::turning::send_turn;
+use crate::derivative::adjoint::turning::RayMotion;
 use crate::derivative::adjoint::{Differentiator, Far, Propagated, Stretch, turn};
 use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, SurfaceAdjoint};
 use crate::derivative::velocity::{RayTurn, TurningRay, VelocityField, VertexVelocity};
@@ -102,8 +102,10 @@ impl Differentiator<'_> {
                 let auxiliary = &self.auxiliary[..];
                 let at = Propagated { vertex: end, velocity, auxiliary, weight, matter };
                 self.propagate(path, &at, &mut lit, here, sink);
-                if turn_of_ray.is_some() && !self.edges_at_rest {
-                    here.u -= send_turn(&self.parts, light.w, &turned, weight, sink);
+                if let Some(turn) = turn_of_ray.as_ref().filter(|_| !self.edges_at_rest) {
+                    let parts = &self.parts[..];
+                    let ray = RayMotion { turn, parts, shadows: &[], light: None };
+                    here.u -= ray.send(light.w, &turned, weight, sink);
                 }
             }
             LightKind::Position => {

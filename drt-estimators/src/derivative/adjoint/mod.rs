@@ -21,6 +21,7 @@ mod antithetic;
 mod emitters;
 mod propagation;
 mod segment;
+mod shadows;
 mod turning;
 
 use alloc::vec::Vec;
@@ -32,18 +33,19 @@ use crate::derivative::adjoint::antithetic::Apart;
 use crate::derivative::adjoint::emitters::{LightEnd, light_moves, strength};
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
-
-use crate::derivative::adjoint::turning::send_turn;
+use crate::derivative::adjoint::turning::RayMotion;
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint,
 };
-use crate::derivative::velocity::{Auxiliary, Probe, RecordedPath, TurnPart};
+use crate::derivative::velocity::{
+    Auxiliary, Probe, RayTurn, RecordedPath, TurnPart, TurnParts, VertexVelocity,
+};
 use crate::model::sensor::SensorGradient;
 use crate::sampling::streams::VELOCITY_STREAM;
-use crate::sampling::trace::Endpoint;
-use crate::world::World;
+use crate::sampling::trace::{Connection, Endpoint};
 use crate::world::lights::EmitterMask;
 use crate::world::vertex::{Kind, Vertex};
+use crate::world::{Crossing, World};
 
 /// What has been collected for a vertex while its neighbours are processed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -70,6 +72,29 @@ struct Behind {
     weight: f64,
 }
 
+/// How a node moves, and the ray that found it.
+#[derive(Clone, Copy)]
+struct NodeMotion<'a> {
+    velocity: &'a VertexVelocity,
+    auxiliary: &'a [Auxiliary],
+    ray: Option<RayMotion<'a>>,
+}
+
+impl<'p> RecordedPath<'p> {
+    /// A ray that turns, by its index.
+    fn ray_motion(&self, turn: Option<u32>) -> Option<RayMotion<'p>> {
+        let turn = self.velocities.turn(turn)?;
+        let parts = self.velocities.turn_parts(turn);
+        Some(RayMotion { turn, parts, shadows: &[], light: None })
+    }
+
+    fn motion(&self, node: usize) -> NodeMotion<'p> {
+        let velocity = self.velocities.of(node);
+        let auxiliary = self.velocities.auxiliary(velocity);
+        NodeMotion { velocity, auxiliary, ray: self.ray_motion(velocity.turn) }
+    }
+}
+
 /// The backward sweep and its buffers.
 pub(crate) struct Differentiator<'w> {
     world: &'w World,
@@ -87,6 +112,8 @@ pub(crate) struct Differentiator<'w> {
     /// Summands of the turns of rays to lights, and of the velocities of points on these.
     parts: Vec<TurnPart>,
     auxiliary: Vec<Auxiliary>,
+    /// Of rays that turn with shadows.
+    with_shadows: TurnParts,
     probe: Probe,
 }
 
@@ -103,6 +130,7 @@ impl<'w> Differentiator<'w> {
             sensor: [SensorGradient::default(); 3],
             parts: Vec::new(),
             auxiliary: Vec::new(),
+            with_shadows: TurnParts::default(),
             probe: Probe::new(Rng::new(0, 0, 0)),
         }
     }
@@ -186,15 +214,16 @@ impl<'w> Differentiator<'w> {
                 c.source() * arrival.emission_weight + c.sigma_s() * collected
             }
         };
-        self.arrive(path, k, received, &mut here, sink);
+        self.arrive(path, k, &path.motion(k), received, &mut here, sink);
     }
 
-    /// The segment from the parent to node `k`, and the parent's scattering into it; `here` is what node `k`
-    /// has collected.
+    /// The segment from the parent to node `k`, and the parent's scattering into it, for what is `received` there by a
+    /// motion of the node; `here` is what it has collected.
     fn arrive<S: AdjointSink>(
         &mut self,
         recorded: &RecordedPath<'_>,
         k: usize,
+        motion: &NodeMotion<'_>,
         received: Rgb,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
@@ -205,11 +234,10 @@ impl<'w> Differentiator<'w> {
         let p = arrival.parent as usize;
         let value = arrival.arrival * received;
         self.locals[p].children += value;
-        self.locals[k].incoming = value;
-        let velocity = velocities.of(k);
+        self.locals[k].incoming += value;
+        let NodeMotion { velocity, auxiliary, ray: turn_of_ray } = *motion;
         let vertex = record.nodes[k].vertex();
         let phi = velocity.blend.weight;
-        let turn_of_ray = velocities.turn(velocity.turn);
         if value.is_zero() {
             let Local { matter, turn, .. } = self.locals[k];
             let nothing = here.is_zero() && [matter, turn] == [RgbVec::ZERO; 2];
@@ -233,7 +261,7 @@ impl<'w> Differentiator<'w> {
             },
         };
         let mut there = core::mem::take(&mut self.locals[p].at);
-        let [near_moves, far_moves] = [p, k].map(|n| velocities.moves(n));
+        let (near_moves, far_moves) = (velocities.moves(p), velocity.moves);
         let ray_moves = near_moves || turn_of_ray.is_some();
         // As far as this is not the camera's importance.
         let mut turned_wholly = self.locals[k].turn;
@@ -317,25 +345,24 @@ impl<'w> Differentiator<'w> {
                         here.j += fixed.j;
                     }
                 }
-                let auxiliary = velocities.auxiliary(velocity);
                 let end = Propagated { vertex: v, velocity, auxiliary, weight, matter };
                 let back = self.propagate(&path, &end, here, &mut there, sink);
                 turned_wholly += back.by_surfaces;
                 turned += back.by_surfaces + back.by_ray;
             }
         }
-        if let Some(turn) = turn_of_ray.filter(|_| !self.edges_at_rest) {
+        if let Some(ray) = turn_of_ray.filter(|_| !self.edges_at_rest) {
+            let RayTurn { weight: share, gradient, .. } = *ray.turn;
             let mut all = turned_wholly;
             if let Some(filter) = seen {
                 // A direction has no parallax.
                 let by_view = self.seen(None, arrival.dir, value, filter);
-                self.by_sensor(&by_view, turn.weight, sink.active());
+                self.by_sensor(&by_view, share, sink.active());
                 all += by_view.place;
                 // What the camera's image point does is replaced.
-                turned -= turned_wholly * turn.weight + weight.outer(turn.gradient);
+                turned -= turned_wholly * share + weight.outer(gradient);
             }
-            let parts = velocities.turn_parts(turn);
-            there.u -= send_turn(parts, arrival.dir, &all, weight, sink);
+            there.u -= ray.send(arrival.dir, &all, weight, sink);
         }
         if p == 0 {
             self.turn += turned;
@@ -422,39 +449,47 @@ impl<'w> Differentiator<'w> {
         let moving = velocities.moves(k);
         let arrives = moving || velocities.moves(arrival.parent as usize);
         for (c, crossings) in &record.connections[node.connections.clone()] {
-            let light = &c.light;
-            if !lit.by_sample(light) {
+            if !lit.by_sample(&c.light) {
                 continue;
             }
-            let rest = c.rest();
-            sum += c.f * rest;
-            let field = velocities.field();
-            let motion = self.light_motion(vertex, moving, light, field, sink.active());
-            let turns = arrives || motion.is_some() || light_moves(light, sink.active());
-            let to_wi = self.scattering(
-                vertex,
-                -arrival.dir,
-                light.w,
-                None,
-                theta * rest,
-                behind,
-                turns,
-                here,
-                sink,
-            );
-            let per_value = theta * c.f * c.transport;
-            let path = Stretch {
-                start: vertex.x,
-                dir: light.w,
-                length: light.distance,
-                medium: c.start_medium,
-                crossings: &record.crossings[crossings.clone()],
-            };
-            let motion = motion.as_ref();
-            let end = LightEnd { near_moves: moving, light, to_wi, motion };
-            self.light_end(&path, &end, per_value, here, sink);
+            let crossings = &record.crossings[crossings.clone()];
+            let event = NextEvent { c, crossings, theta, behind, moving, arrives };
+            if !self.connect_with_shadows(recorded, k, vertex, &event, sink) {
+                sum += c.f * c.rest();
+                self.connect(recorded, -arrival.dir, vertex, &event, here, sink);
+            }
         }
         sum
+    }
+
+    /// One of them.
+    fn connect<S: AdjointSink>(
+        &mut self,
+        recorded: &RecordedPath<'_>,
+        wo: Vec3,
+        vertex: &Vertex,
+        event: &NextEvent<'_>,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let NextEvent { c, crossings, theta, behind, moving, arrives } = *event;
+        let light = &c.light;
+        let field = recorded.velocities.field();
+        let motion = self.light_motion(vertex, moving, light, field, sink.active());
+        let turns = arrives || motion.is_some() || light_moves(light, sink.active());
+        let rest = theta * c.rest();
+        let to_wi = self.scattering(vertex, wo, light.w, None, rest, behind, turns, here, sink);
+        let per_value = theta * c.f * c.transport;
+        let path = Stretch {
+            start: vertex.x,
+            dir: light.w,
+            length: light.distance,
+            medium: c.start_medium,
+            crossings,
+        };
+        let motion = motion.as_ref();
+        let end = LightEnd { near_moves: moving, light, to_wi, motion };
+        self.light_end(&path, &end, per_value, here, sink);
     }
 
     /// The coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e.
@@ -523,6 +558,20 @@ impl<'w> Differentiator<'w> {
             *sum += gradient.scaled(share);
         }
     }
+}
+
+/// A next-event connection.
+#[derive(Clone, Copy)]
+struct NextEvent<'a> {
+    c: &'a Connection,
+    crossings: &'a [Crossing],
+    /// What multiplies it.
+    theta: Rgb,
+    behind: Option<Behind>,
+    /// The vertex moves.
+    moving: bool,
+    /// Or the one before.
+    arrives: bool,
 }
 
 /// Gradient of the camera's importance and filter.

@@ -9,7 +9,6 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use crate::derivative::adjoint::turning::send_turn;
 use crate::derivative::adjoint::{Differentiator, Far, Stretch, moves, send};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint, VelocityTerm};
 use crate::derivative::velocity::{Auxiliary, Moved, RecordedPath, VertexVelocity};
@@ -155,10 +154,9 @@ impl Differentiator<'_> {
         mut turn: RgbVec,
         sink: &mut S,
     ) {
-        if let Some(of_ray) = path.velocities.turn(turns) {
-            let parts = path.velocities.turn_parts(of_ray);
-            origin -= send_turn(parts, dir, &turn, Rgb::ZERO, sink);
-            turn -= turn * of_ray.weight;
+        if let Some(ray) = path.ray_motion(turns) {
+            origin -= ray.send(dir, &turn, Rgb::ZERO, sink);
+            turn -= turn * ray.turn.weight;
         }
         let at = SurfaceAdjoint::of_place(origin);
         self.send_back(path, node, at, RgbVec::ZERO, turn, sink);
@@ -200,7 +198,7 @@ impl Differentiator<'_> {
                 turned += direction;
                 turned_wholly += direction;
             }
-            if let Some(turn) = velocities.turn(velocity.turn) {
+            if let Some(ray) = path.ray_motion(velocity.turn) {
                 let (dir, distance, none) = (arrival.dir, arrival.distance, RgbVec::ZERO);
                 turned_wholly += match &vertex.kind {
                     Kind::Surface(point) => {
@@ -208,9 +206,8 @@ impl Differentiator<'_> {
                     }
                     _ => here.u * distance,
                 };
-                let parts = velocities.turn_parts(turn);
-                back -= send_turn(parts, dir, &turned_wholly, Rgb::ZERO, sink);
-                turned -= turned_wholly * turn.weight;
+                back -= ray.send(dir, &turned_wholly, Rgb::ZERO, sink);
+                turned -= turned_wholly * ray.turn.weight;
             }
             match &vertex.kind {
                 _ if free == 0.0 => {

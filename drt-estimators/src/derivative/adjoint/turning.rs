@@ -3,26 +3,94 @@
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::TurnPart;
-use crate::world::vertex::Matter;
+use crate::derivative::velocity::{RayTurn, ShadowPart, ShadowTurn, TurnPart, Weight};
+use crate::model::emitter::EmitterGradient;
+use crate::world::lights::{LightKind, LightSample};
+use crate::world::vertex::{MaterialPoint, Matter};
 
-/// Sends the sensitivity `turned` to the rate of a ray's unit direction `dir`, and a `weight` of light that multiplies the
-/// divergence of the rate; returns what the velocity of the ray's origin is to lose.
-pub(super) fn send_turn<S: AdjointSink>(
-    parts: &[TurnPart],
-    dir: Vec3,
-    turned: &RgbVec,
-    weight: Rgb,
-    sink: &mut S,
-) -> RgbVec {
-    let across = turned.map(|g| g.reject(dir));
-    let mut origin = RgbVec::ZERO;
-    for part in parts {
-        let g = across * part.rate + weight.outer(part.divergence);
-        if let Some(point) = part.matter.filter(|p| sink.active().moves(&Matter::Surface(*p))) {
-            sink.surface(&point, &SurfaceAdjoint::of_place(g));
+/// How a ray turns.
+#[derive(Clone, Copy)]
+pub(super) struct RayMotion<'a> {
+    pub(super) turn: &'a RayTurn,
+    pub(super) parts: &'a [TurnPart],
+    /// Of shadows.
+    pub(super) shadows: &'a [ShadowPart],
+    /// That which casts them.
+    pub(super) light: Option<&'a LightSample>,
+}
+
+impl RayMotion<'_> {
+    /// Sends the sensitivity `turned` to the rate of the ray's unit direction `dir`, and a `weight` of light that multiplies the
+    /// divergence of the rate; returns what the velocity of the ray's origin is to lose.
+    pub(super) fn send<S: AdjointSink>(
+        &self,
+        dir: Vec3,
+        turned: &RgbVec,
+        weight: Rgb,
+        sink: &mut S,
+    ) -> RgbVec {
+        let across = turned.map(|g| g.reject(dir));
+        let mut origin = RgbVec::ZERO;
+        for part in self.parts {
+            let g = across * part.rate + weight.outer(part.divergence);
+            if let Some(point) = part.matter {
+                send_to(point, g, sink);
+            }
+            origin += g;
         }
-        origin += g;
+        if let (Some(shadow), Some(light)) = (&self.turn.shadow, self.light) {
+            origin += self.send_shadow(shadow, light, &across, weight, sink);
+        }
+        origin
     }
-    origin
+
+    fn send_shadow<S: AdjointSink>(
+        &self,
+        shadow: &ShadowTurn,
+        light: &LightSample,
+        across: &RgbVec,
+        weight: Rgb,
+        sink: &mut S,
+    ) -> RgbVec {
+        let at = &shadow.at;
+        let projected = across.map(|g| at.project(g)) + weight.outer(at.projection_divergence());
+        // Of a summand of v.
+        let by = |share: &Weight| {
+            let along = at.project(share.gradient);
+            projected * share.value + weight.outer(along)
+        };
+        for part in self.shadows {
+            send_to(part.matter, by(&part.share), sink);
+        }
+        if sink.active().emitters[light.emitter] {
+            send_to_light(light, &by(&shadow.by_light), sink);
+        }
+        let (lift, lift_divergence) = at.lift();
+        let Weight { value, gradient } = shadow.weight;
+        let lifted =
+            across.dot(lift) * value + weight * (gradient.dot(lift) + value * lift_divergence);
+        send_to(at.matter, lifted.outer(at.normal), sink);
+        let inv = 1.0 / at.distance;
+        let rate =
+            gradient * inv + at.inv_distance_gradient() * value - at.dir * (2.0 * value * inv);
+        *across * (value * inv) + weight.outer(rate)
+    }
+}
+
+fn send_to<S: AdjointSink>(point: MaterialPoint, g: RgbVec, sink: &mut S) {
+    if sink.active().moves(&Matter::Surface(point)) {
+        sink.surface(&point, &SurfaceAdjoint::of_place(g));
+    }
+}
+
+/// To the position of a light, or its direction.
+fn send_to_light<S: AdjointSink>(light: &LightSample, g: &RgbVec, sink: &mut S) {
+    let mut gradients = [EmitterGradient::default(); 3];
+    for (gradient, g) in gradients.iter_mut().zip([g.r, g.g, g.b]) {
+        match light.kind {
+            LightKind::Direction => gradient.direction = g.reject(light.w),
+            _ => gradient.position = g,
+        }
+    }
+    sink.emitter(light.emitter, &gradients);
 }

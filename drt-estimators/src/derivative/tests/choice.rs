@@ -37,10 +37,21 @@ pub(crate) fn prepare_for(
     motion: &Parameter,
     depth: u32,
 ) -> (Prepared, Motion) {
+    prepare_lit(estimator, EmitterMask::Extended, scene, motion, depth)
+}
+
+/// A scene prepared for the light of some emitters.
+pub(crate) fn prepare_lit(
+    estimator: EstimatorKind,
+    lit: EmitterMask,
+    scene: &Scene,
+    motion: &Parameter,
+    depth: u32,
+) -> (Prepared, Motion) {
     let (scene, tangents) =
         tangents::apply(scene, core::slice::from_ref(motion)).expect("a valid parameter");
     let mut kept = PreparedCache::default();
-    let world = World::new(scene, 0, Some(depth), None, EmitterMask::Extended, &mut kept);
+    let world = World::new(scene, 0, Some(depth), None, lit, &mut kept);
     let mut world = world.expect("a valid scene");
     let tangents = tangents.seen_by(0);
     let insides = crate::derivative::medium_motion::MediumMotions::affine(&world, &tangents, &[]);

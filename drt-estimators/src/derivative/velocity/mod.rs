@@ -32,6 +32,7 @@
 pub(crate) mod blend;
 mod material;
 mod path;
+mod shadow;
 pub(crate) mod spatial;
 mod turn;
 pub(crate) mod warp;
@@ -46,13 +47,17 @@ use drt_math::{Rng, Vec3};
 pub(crate) use crate::derivative::velocity::blend::Blend;
 pub(crate) use crate::derivative::velocity::material::Material;
 pub(crate) use crate::derivative::velocity::path::{PathVelocities, RecordedPath};
+pub(crate) use crate::derivative::velocity::shadow::{ShadowPart, ShadowPlace, ShadowTurn};
 pub(crate) use crate::derivative::velocity::spatial::Spatial;
-pub(crate) use crate::derivative::velocity::turn::{RayTurn, TurnPart, TurningRay};
+pub(crate) use crate::derivative::velocity::turn::{
+    RayTurn, TurnPart, TurnParts, TurningRay, Weight,
+};
 use crate::derivative::velocity::warp::SurfaceHit;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::sampling::trace::Arrival;
 use crate::world::World;
+use crate::world::lights::LightSample;
 use crate::world::vertex::{Matter, SurfacePoint, Vertex};
 
 /// The velocity of one vertex of a path, as a functional of the velocities of matter.
@@ -176,6 +181,19 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         _ray: &TurningRay<'_>,
         _probe: &mut Probe,
         _parts: &mut Vec<TurnPart>,
+    ) -> Option<RayTurn> {
+        None
+    }
+
+    /// How a ray turns for what it sees by a point or directional emitter, where that differs: also with the
+    /// shadows beside the point where it ends. `light_moves` tells that the emitter or that point may. Appends the summands.
+    fn turn_with_shadows(
+        &self,
+        _world: &World,
+        _ray: &TurningRay<'_>,
+        _light: &LightSample,
+        _light_moves: bool,
+        _parts: &mut TurnParts,
     ) -> Option<RayTurn> {
         None
     }

@@ -16,11 +16,12 @@
 //!
 //! d_dot being the rate of the camera ray's direction at its image point, which T replaces as far as Σ λ goes.
 
-use core::ops::Range;
+use alloc::vec::Vec;
+use core::ops::{Add, AddAssign, Div, Mul, Range, Sub};
 
 use drt_math::Vec3;
 
-use crate::derivative::velocity::Blend;
+use crate::derivative::velocity::{Blend, ShadowPart, ShadowTurn};
 use crate::world::vertex::{MaterialPoint, SurfacePoint, Vertex};
 
 /// A summand of the rate of a ray's direction, linear in the velocity w of a point beside the ray less that of the ray's
@@ -35,21 +36,95 @@ pub(crate) struct TurnPart {
     pub(crate) divergence: Vec3,
 }
 
+/// A weight and its gradient by a ray's unit direction, across it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Weight {
+    pub(crate) value: f64,
+    pub(crate) gradient: Vec3,
+}
+
+impl Weight {
+    pub(crate) const fn constant(value: f64) -> Self {
+        Self { value, gradient: Vec3::ZERO }
+    }
+
+    /// By something else that the direction depends on.
+    pub(crate) fn map_gradient(self, f: impl FnOnce(Vec3) -> Vec3) -> Self {
+        Self { gradient: f(self.gradient), ..self }
+    }
+}
+
+impl Add for Weight {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { value: self.value + other.value, gradient: self.gradient + other.gradient }
+    }
+}
+
+impl Sub for Weight {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        self + other * Self::constant(-1.0)
+    }
+}
+
+impl AddAssign for Weight {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl Mul for Weight {
+    type Output = Self;
+
+    fn mul(self, other: Self) -> Self {
+        let gradient = self.gradient * other.value + other.gradient * self.value;
+        Self { value: self.value * other.value, gradient }
+    }
+}
+
+impl Div for Weight {
+    type Output = Self;
+
+    fn div(self, other: Self) -> Self {
+        let value = self.value / other.value;
+        Self { value, gradient: (self.gradient - other.gradient * value) / other.value }
+    }
+}
+
 /// The rate T of a ray's direction.
 #[derive(Clone, Debug)]
 pub(crate) struct RayTurn {
-    /// Σ λ.
+    /// Σ λ, of shadows too.
     pub(crate) weight: f64,
     /// Its gradient by the direction, across it.
     pub(crate) gradient: Vec3,
     /// Its summands.
     pub(crate) parts: Range<usize>,
+    /// What shadows add, for the light of one emitter.
+    pub(crate) shadow: Option<ShadowTurn>,
 }
 
 impl RayTurn {
     /// 1 - Σ λ, what is left of other velocities at a distance along the ray.
     pub(crate) fn rest(&self, distance: f64) -> Blend {
         Blend { weight: 1.0 - self.weight, gradient: -self.gradient / distance }
+    }
+}
+
+/// The summands of rays that turn with shadows.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TurnParts {
+    pub(crate) edges: Vec<TurnPart>,
+    pub(crate) shadows: Vec<ShadowPart>,
+}
+
+impl TurnParts {
+    pub(crate) fn clear(&mut self) {
+        self.edges.clear();
+        self.shadows.clear();
     }
 }
 

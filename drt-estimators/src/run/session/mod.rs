@@ -21,7 +21,7 @@ use crate::model::plan::Plan;
 use crate::model::rendering::Estimate;
 use crate::model::rendering::{Account, Derivative, Layer, Rendering, Term};
 use crate::model::scene::{Scene, Target};
-use crate::model::settings::{EstimatorKind, Settings};
+use crate::model::settings::{EstimatorKind, Settings, Warp};
 use crate::sampling::allocation;
 use crate::sampling::film::{Blocks, PixelFilm};
 use crate::sampling::parallel::Pool;
@@ -341,7 +341,8 @@ fn sum<'a>(layers: impl Iterator<Item = &'a Layer>) -> Option<Layer> {
 }
 
 /// Which estimator differentiates which light: points and directions do not fit the 2019 form (theory sheet
-/// §3), which leaves them to path space where one of the targets may move.
+/// §3), which leaves them to path space where one of the targets may move. Rays that turn with edges turn with their shadows as
+/// well, but on surfaces alone.
 pub(crate) fn estimators(
     scene: &Scene,
     targets: impl IntoIterator<Item = Target>,
@@ -355,8 +356,13 @@ pub(crate) fn estimators(
     };
     let emitters = || scene.emitters.iter().map(|e| &e.item.emitter);
     let mut shares = Vec::new();
-    let along_rays = matches!(settings.estimator, EstimatorKind::Radiative | EstimatorKind::Warped);
-    if along_rays && emitters().any(|e| e.is_delta()) && targets.into_iter().any(may_move) {
+    let volumes = !scene.media.is_empty() || scene.bsdfs.iter().any(|b| b.item.is_null());
+    let fits = match settings.estimator {
+        EstimatorKind::Radiative => false,
+        EstimatorKind::Warped => !volumes && matches!(settings.warp, Warp::Edges),
+        _ => true,
+    };
+    if !fits && emitters().any(|e| e.is_delta()) && targets.into_iter().any(may_move) {
         shares.push((EstimatorKind::PathSpace, EmitterMask::Delta));
         let media = scene.media.iter().any(|m| m.item.is_emissive());
         if media || emitters().any(|e| !e.is_delta()) {

@@ -2,18 +2,17 @@
 
 use drt_math::Vec3;
 
+use crate::derivative::velocity::Weight;
+
 /// An edge as a viewer sees it, beside a direction ω. Gradients are by ω, across it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Beside {
     /// Squared sine of the angle between ω and the edge.
-    pub(super) square: f64,
-    pub(super) square_gradient: Vec3,
+    pub(super) square: Weight,
     /// How far along the edge its nearest point is, from 0 to 1.
-    pub(super) along: f64,
-    pub(super) along_gradient: Vec3,
+    pub(super) along: Weight,
     /// Distance of that point from the viewer, in scene units.
-    pub(super) distance: f64,
-    pub(super) distance_gradient: Vec3,
+    pub(super) distance: Weight,
     /// The point, less the viewer's place.
     pub(super) place: Vec3,
 }
@@ -34,16 +33,15 @@ impl Beside {
             let at = a + side * s;
             if (0.0..=1.0).contains(&s) && at.dot(w) > 0.0 {
                 let sine = n.dot(w);
-                let across = |g: Vec3| g - w * g.dot(w);
-                let along_gradient = across((to_start + to_side * s) * (-1.0 / rate));
+                let along = (to_start + to_side * s).reject(w) * (-1.0 / rate);
                 let distance = at.length();
                 return Some(Self {
-                    square: sine * sine,
-                    square_gradient: across(n * (2.0 * sine)),
-                    along: s,
-                    along_gradient,
-                    distance,
-                    distance_gradient: along_gradient * (at.dot(side) / distance),
+                    square: Weight { value: sine * sine, gradient: n.reject(w) * (2.0 * sine) },
+                    along: Weight { value: s, gradient: along },
+                    distance: Weight {
+                        value: distance,
+                        gradient: along * (at.dot(side) / distance),
+                    },
                     place: at,
                 });
             }
@@ -55,14 +53,33 @@ impl Beside {
         // Squared as a product, the sine keeps its digits.
         let square = end.cross(w).length_squared();
         (cosine > 0.0).then(|| Self {
-            square,
-            square_gradient: (end - w * cosine) * (-2.0 * cosine),
-            along,
-            along_gradient: Vec3::ZERO,
-            distance,
-            distance_gradient: Vec3::ZERO,
+            square: Weight { value: square, gradient: (end - w * cosine) * (-2.0 * cosine) },
+            along: Weight::constant(along),
+            distance: Weight::constant(distance),
             place: end * distance,
         })
+    }
+
+    /// Seen from infinity along the unit direction ω, beside the line through a point x. `ends` and `place` are less x,
+    /// `distance` is the `scale`, and so far does x move across ω to each radian.
+    pub(super) fn from_infinity(ends: [Vec3; 2], w: Vec3, scale: f64) -> Self {
+        let [a, b] = ends;
+        let side = b - a;
+        let across = side.reject(w);
+        let s = -a.dot(across) / across.length_squared();
+        let (along, slope) = match s {
+            _ if s > 0.0 && s < 1.0 => (s, across * (scale / across.length_squared())),
+            _ if s >= 1.0 => (1.0, Vec3::ZERO),
+            _ => (0.0, Vec3::ZERO),
+        };
+        let place = a + side * along;
+        let beside = place.reject(w) / scale;
+        Self {
+            square: Weight { value: beside.length_squared(), gradient: beside * -2.0 },
+            along: Weight { value: along, gradient: slope },
+            distance: Weight::constant(scale),
+            place,
+        }
     }
 }
 
@@ -90,21 +107,21 @@ mod tests {
                 at.dot(w) / at.length()
             });
             let nearest = sampled.fold(-1.0, f64::max);
-            assert!((1.0 - found.square - nearest * nearest).abs() < 1e-6);
-            ends_nearest += i32::from(found.along_gradient == Vec3::ZERO);
+            assert!((1.0 - found.square.value - nearest * nearest).abs() < 1e-6);
+            ends_nearest += i32::from(found.along.gradient == Vec3::ZERO);
             let frame = Frame::from_normal(w);
             for t in [frame.s, frame.t] {
                 let h = 1e-6;
                 let at = |h: f64| Beside::new(ends, (w + t * h).normalize());
                 let (Some(p), Some(m)) = (at(h), at(-h)) else { continue };
                 // Ends become nearest at kinks.
-                if (p.along_gradient == Vec3::ZERO) != (m.along_gradient == Vec3::ZERO) {
+                if (p.along.gradient == Vec3::ZERO) != (m.along.gradient == Vec3::ZERO) {
                     continue;
                 }
                 for (g, difference) in [
-                    (found.square_gradient, p.square - m.square),
-                    (found.along_gradient, p.along - m.along),
-                    (found.distance_gradient, p.distance - m.distance),
+                    (found.square.gradient, p.square.value - m.square.value),
+                    (found.along.gradient, p.along.value - m.along.value),
+                    (found.distance.gradient, p.distance.value - m.distance.value),
                 ] {
                     let difference = difference / (2.0 * h);
                     let scale = 1.0 + difference.abs();
@@ -122,7 +139,7 @@ mod tests {
     fn seen_end_on_an_edge_is_a_point() {
         let w = vec3(0.1, 0.0, 1.0).normalize();
         let found = Beside::new([vec3(0.0, 0.0, 1.0), vec3(0.0, 0.0, 3.0)], w).unwrap();
-        assert!((found.square - 0.01 / 1.01).abs() < 1e-12);
+        assert!((found.square.value - 0.01 / 1.01).abs() < 1e-12);
         assert!(Beside::new([vec3(0.0, 0.0, -1.0), vec3(0.0, 0.0, -3.0)], w).is_none());
     }
 }

@@ -3,70 +3,14 @@
 use alloc::vec::Vec;
 
 use drt_geom::edges::{Cone, ConeSegment, ConeTree};
-use drt_math::{Real, Vec3, fm};
+use drt_math::Vec3;
 
-use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay};
-use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay, Weight};
+use crate::edges::discontinuities::DiscontinuityEdges;
 use crate::terms::warped::beside::Beside;
-use crate::world::vertex::{MaterialPoint, Vertex};
-
-/// How far behind the plane of the surface where a ray ends edges turn it, over their distances.
-const BEHIND: f64 = 0.02;
-
-/// How far creases between the faces of curved surfaces turn rays, over what other edges do.
-const NARROW: f64 = 0.1;
-
-/// An edge at which radiance jumps.
-#[derive(Clone, Debug)]
-pub(super) struct TurningEdge {
-    ends: [Vec3; 2],
-    /// Half its length.
-    half: f64,
-    points: [MaterialPoint; 2],
-    moves: bool,
-    /// Between faces of a curved surface, on which vertices move with their matter.
-    facets: bool,
-    /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
-    crease: Option<([Vec3; 2], [bool; 2])>,
-}
-
-impl TurningEdge {
-    fn new(
-        edges: &DiscontinuityEdges,
-        edge: &DiscontinuityEdge,
-        moves: bool,
-        curved: bool,
-    ) -> Self {
-        let [(a, from), (b, to)] = [0.0, 1.0].map(|along| edge.point(along));
-        let discontinuous = edge.crease.map(|part| part > 0.0);
-        let crease = edges.normals(edge).map(|normals| (normals, discontinuous));
-        let (ends, half) = ([a, b], 0.5 * edge.length());
-        // Of a fold as sharp as a corner, or between materials, a part is 1.
-        let facets = curved && edge.crease.iter().all(|part| *part < 1.0);
-        Self { ends, half, points: [from, to], moves, facets, crease }
-    }
-
-    /// What radiance does there, seen along a vector.
-    fn discontinuity(&self, view: Vec3) -> Discontinuity {
-        let Some((normals, discontinuous)) = &self.crease else { return Discontinuity::Full };
-        let [front, other] = normals.map(|n| n.dot(view) > 0.0);
-        match discontinuous[usize::from(front)] {
-            _ if front != other => Discontinuity::Full,
-            false => Discontinuity::None,
-            true if self.facets => Discontinuity::Facets,
-            true => Discontinuity::Full,
-        }
-    }
-}
-
-/// What radiance does at an edge.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Discontinuity {
-    None,
-    /// Between faces of a curved surface that are both seen from one side.
-    Facets,
-    Full,
-}
+use crate::terms::warped::edge::TurningEdge;
+use crate::terms::warped::near::Near;
+use crate::world::vertex::Vertex;
 
 /// The edges of a scene in trees of spheres.
 #[derive(Debug, Default)]
@@ -74,29 +18,6 @@ pub(super) struct TurningEdges {
     list: Vec<TurningEdge>,
     all: ConeTree,
     moving: ConeTree,
-}
-
-/// What the weight of an edge depends on besides the edge.
-struct Near<'a> {
-    ray: &'a TurningRay<'a>,
-    /// Squared sine of the cone's angle.
-    square: f64,
-    cone: Cone,
-    /// For creases of curved surfaces.
-    narrow: Cone,
-    /// The unit normal of the surface that the viewer is on, towards the ray's side.
-    horizon: Option<Vec3>,
-    /// Unit normal of the surface where the ray ends, away from the viewer; zero where it does not. And the viewer's distance
-    /// from its plane.
-    normal: Vec3,
-    depth: f64,
-}
-
-/// A weight and its gradient by the direction.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Weight {
-    pub(super) value: f64,
-    pub(super) gradient: Vec3,
 }
 
 impl TurningEdges {
@@ -156,7 +77,7 @@ impl TurningEdges {
         always: bool,
         parts: &mut Vec<TurnPart>,
     ) -> Option<RayTurn> {
-        let near = Near::new(ray, angle);
+        let near = Near::of_ray(ray, angle);
         if !(ray.moves || always) {
             let mut any = false;
             self.moving.visit(&near.cone, &near.narrow, |i| {
@@ -167,20 +88,30 @@ impl TurningEdges {
             }
         }
         let first = parts.len();
+        let sum = self.gather(&near, ray.moves, parts);
+        if sum.value == 0.0 {
+            return None;
+        }
+        let total = Weight::constant(1.0) + sum + rest;
+        divide(&mut parts[first..], ray.dir, total);
+        let Weight { value: weight, gradient } = sum / total;
+        Some(RayTurn { weight, gradient, parts: first..parts.len(), shadow: None })
+    }
+
+    /// Adds up the weights of edges, and what they turn a ray by if these were divided by 1.
+    pub(super) fn gather(
+        &self,
+        near: &Near,
+        viewer_moves: bool,
+        parts: &mut Vec<TurnPart>,
+    ) -> Weight {
         let mut sum = Weight::default();
         let mut resting = TurnPart { matter: None, rate: 0.0, divergence: Vec3::ZERO };
-        self.all.visit(&near.cone, &near.narrow, |i| {
-            let edge = &self.list[i as usize];
-            let Some((beside, weight)) = near.weight(edge) else { return };
-            sum.value += weight.value;
-            sum.gradient += weight.gradient;
+        self.visit(near, |edge, beside, weight| {
+            sum += weight;
             // Of one of the ends, whose part in the nearest point is so much.
-            let mut add = |matter, part: f64, slope: f64| {
-                let rate = weight.value * part / beside.distance;
-                let divergence = (weight.gradient * part
-                    + beside.along_gradient * (weight.value * slope))
-                    / beside.distance
-                    - beside.distance_gradient * (rate / beside.distance);
+            let mut add = |matter, part: Weight| {
+                let Weight { value: rate, gradient: divergence } = weight * part / beside.distance;
                 match matter {
                     Some(_) => parts.push(TurnPart { matter, rate, divergence }),
                     None => {
@@ -189,104 +120,38 @@ impl TurningEdges {
                     }
                 }
             };
+            let one = Weight::constant(1.0);
             if edge.moves {
                 let [from, to] = edge.points;
-                add(Some(from), 1.0 - beside.along, -1.0);
-                add(Some(to), beside.along, 1.0);
-            } else if ray.moves {
-                add(None, 1.0, 0.0);
+                add(Some(from), one - beside.along);
+                add(Some(to), beside.along);
+            } else if viewer_moves {
+                add(None, one);
             }
         });
-        if sum.value == 0.0 {
-            return None;
-        }
         if resting.rate > 0.0 {
             parts.push(resting);
         }
-        let total = 1.0 + sum.value + rest.value;
-        let slope = sum.gradient + rest.gradient;
-        for part in &mut parts[first..] {
-            part.rate /= total;
-            // What is across the ray turns along it as the ray turns.
-            part.divergence =
-                (part.divergence - slope * part.rate) / total - ray.dir * (2.0 * part.rate);
-        }
-        let weight = sum.value / total;
-        let gradient = (sum.gradient - slope * weight) / total;
-        Some(RayTurn { weight, gradient, parts: first..parts.len() })
+        sum
+    }
+
+    /// Tells all edges that have a weight, and how near they are.
+    pub(super) fn visit(&self, near: &Near, mut found: impl FnMut(&TurningEdge, &Beside, Weight)) {
+        self.all.visit(&near.cone, &near.narrow, |i| {
+            let edge = &self.list[i as usize];
+            if let Some((beside, weight)) = near.weight(edge) {
+                found(edge, &beside, weight);
+            }
+        });
     }
 }
 
-impl<'a> Near<'a> {
-    fn new(ray: &'a TurningRay<'a>, angle: f64) -> Self {
-        let TurningRay { viewer, dir, distance, end, .. } = *ray;
-        let normal = end.map_or(Vec3::ZERO, |s| if s.ng.dot(dir) < 0.0 { -s.ng } else { s.ng });
-        // Nothing is behind the sky.
-        let depth = if end.is_some() { normal.dot(dir) * distance } else { 0.0 };
-        let reach = f64::INFINITY;
-        let cone = Cone::new(viewer.x, dir, angle, reach);
-        let sine = fm::sin(angle);
-        let horizon = viewer.surface().map(|s| if s.ng.dot(dir) < 0.0 { -s.ng } else { s.ng });
-        let narrow = Cone::new(viewer.x, dir, NARROW * angle, reach);
-        Self { ray, square: sine * sine, cone, narrow, horizon, normal, depth }
-    }
-
-    /// How far a point, less the viewer's place, is behind the plane of the surface where the ray ends.
-    fn behind(&self, place: Vec3) -> f64 {
-        self.normal.dot(place) - self.depth
-    }
-
-    /// An edge beside the ray and its weight; `None` where it has none.
-    fn weight(&self, edge: &TurningEdge) -> Option<(Beside, Weight)> {
-        let (from, w) = (self.ray.viewer.x, self.ray.dir);
-        let [a, b] = edge.ends;
-        let ends = [a - from, b - from];
-        let below = |n: Vec3| ends.iter().all(|p| n.dot(*p) <= 1e-9 * p.length());
-        let widest = match edge.discontinuity(ends[0]) {
-            Discontinuity::None => return None,
-            Discontinuity::Facets => self.square * (NARROW * NARROW),
-            Discontinuity::Full => self.square,
-        };
-        // Most edges are farther away, by a sphere around them.
-        let middle = (ends[0] + ends[1]) * 0.5;
-        let along = middle.dot(w);
-        let reach = along + edge.half;
-        let across = middle.length_squared() - along * along;
-        let least = Real::sqrt(f64::max(across, 0.0)) - edge.half;
-        // Of what is nearer than a right angle the tangent is at most that of the sine.
-        let outside = least > 0.0 && least * least * (1.0 - widest) > widest * reach * reach;
-        if reach <= 0.0 || outside || self.horizon.is_some_and(below) {
-            return None;
-        }
-        let beside = Beside::new(ends, w)?;
-        if beside.square >= widest {
-            return None;
-        }
-        let mut shown = Weight { value: 1.0, gradient: Vec3::ZERO };
-        let behind = self.behind(beside.place);
-        if behind > 0.0 {
-            let q = behind / (BEHIND * beside.distance);
-            if q >= 1.0 {
-                return None;
-            }
-            let rest = 1.0 - q * q;
-            let q_gradient = beside.along_gradient
-                * (self.normal.dot(b - a) / (BEHIND * beside.distance))
-                - beside.distance_gradient * (q / beside.distance);
-            shown.value = rest * rest;
-            shown.gradient = q_gradient * (-4.0 * q * rest);
-        }
-        // Of an edge that is not hidden the weight diverges where the ray meets it.
-        let rise = shown.value * (widest - beside.square);
-        let fall = beside.square + (1.0 - shown.value) * widest;
-        let fall = f64::max(fall, f64::MIN_POSITIVE.sqrt());
-        let rise_gradient =
-            shown.gradient * (widest - beside.square) - beside.square_gradient * shown.value;
-        let fall_gradient = beside.square_gradient - shown.gradient * widest;
-        let weight = Weight {
-            value: rise / fall,
-            gradient: (rise_gradient - fall_gradient * (rise / fall)) / fall,
-        };
-        Some((beside, weight))
+/// Divides what turns a ray by the sum of all weights.
+pub(super) fn divide(parts: &mut [TurnPart], dir: Vec3, total: Weight) {
+    for part in parts {
+        let share = Weight { value: part.rate, gradient: part.divergence } / total;
+        part.rate = share.value;
+        // What is across the ray turns along it as the ray turns.
+        part.divergence = share.gradient - dir * (2.0 * share.value);
     }
 }

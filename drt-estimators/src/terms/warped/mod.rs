@@ -59,14 +59,26 @@
 //! Its rays keep their image points (2019 paper) but where they turn with an edge. Where a filter jumps, the borders
 //! of its support are edges at rest in the image.
 //!
+//! # Points and directions
+//!
+//! Their light jumps along lines on surfaces that no edge is seen along, the shadows of edges. A next-event connection to
+//! such an emitter gives the ray that found its vertex a rate of its own, in which
+//! [shadows](crate::derivative::velocity::ShadowTurn) of edges near the connection have weights beside those of edges near
+//! the ray. They are as above, of the squared distance of a shadow over that of what the ray sees within Δ (and the light,
+//! added as resistances are). Only silhouettes count, as the light sees them. Each such connection is differentiated by
+//! itself, in one more step of the backward sweep.
+//!
 //! # What is left to boundary samples
 //!
-//! Light of points and directions jumps along lines on surfaces that no edge is seen along. A [`Session`](crate::Session)
-//! leaves it to the path-space estimator, where something moves, and says so in its plan.
+//! Light of points and directions in scenes with media or null interfaces, where lines of shadow become sheets in the volume. A
+//! [`Session`](crate::Session) leaves it to the path-space estimator, where something moves, and says so in its plan.
 
 mod auxiliary;
 mod beside;
+mod edge;
 mod edges;
+mod near;
+mod shadows;
 #[cfg(all(test, feature = "std"))]
 mod tests;
 mod turning;
@@ -102,7 +114,8 @@ impl Warped {
         active: &ActiveInputs,
         settings: &Settings,
     ) -> Result<Self, Error> {
-        let any = active.sensor || active.shapes.contains(&true);
+        let lights = &active.moving_emitters;
+        let any = active.sensor || active.shapes.contains(&true) || lights.contains(&true);
         let found = if any {
             DiscontinuityEdges::collect(world, &active.shapes)
         } else {

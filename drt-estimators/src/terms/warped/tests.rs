@@ -3,20 +3,24 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
+use drt_geom::procedural;
 use drt_math::stats::Moments;
-use drt_math::{Vec3, vec3};
+use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_motion::{GeometryChange, Parameter};
 
 use crate::derivative::contraction::Motion;
-use crate::derivative::tests::choice::{LIGHT, MOMENT, Sum, derivative, prepare_for};
+use crate::derivative::tests::choice::{LIGHT, MOMENT, Sum, derivative, prepare_lit};
 use crate::derivative::tests::scenes::*;
 use crate::derivative::velocity::{
-    Auxiliary, Blend, Found, Probe, RayTurn, TurnPart, TurningRay, VelocityField, VertexVelocity,
+    Auxiliary, Blend, Found, Probe, RayTurn, TurnPart, TurnParts, TurningRay, VelocityField,
+    VertexVelocity, Weight,
 };
+use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
 use crate::model::settings::EstimatorKind;
 use crate::terms::prepared::Prepared;
 use crate::world::World;
+use crate::world::lights::{EmitterMask, LightSample};
 use crate::world::vertex::Vertex;
 
 /// What is wrong with a field.
@@ -78,14 +82,45 @@ impl VelocityField for Faulty {
         Some(turn)
     }
 
+    fn turn_with_shadows(
+        &self,
+        world: &World,
+        ray: &TurningRay<'_>,
+        light: &LightSample,
+        light_moves: bool,
+        parts: &mut TurnParts,
+    ) -> Option<RayTurn> {
+        let mut turn = self.field.turn_with_shadows(world, ray, light, light_moves, parts)?;
+        let shadow = turn.shadow.as_mut().expect("a shadow");
+        let mut shares: Vec<_> = parts.shadows.iter_mut().map(|part| &mut part.share).collect();
+        shares.push(&mut shadow.by_light);
+        for share in shares {
+            match self.fault {
+                Fault::Divergence => share.gradient = Vec3::ZERO,
+                Fault::Sign => *share = *share * Weight::constant(-1.0),
+                Fault::Weight => *share = *share * Weight::constant(0.8),
+                Fault::Direction => shadow.at.inv_range = 0.0,
+            }
+        }
+        Some(turn)
+    }
+
     fn blend(&self, world: &World, viewer: &Vertex, end: &Vertex, dir: Vec3, d: f64) -> Blend {
         self.field.blend(world, viewer, end, dir, d)
     }
 }
 
 fn compare(scene: &Scene, motion: &Parameter, sum: Sum, faults: &[Fault]) {
-    let by = |kind| move |_| prepare_for(kind, scene, motion, 4);
-    let reference = derivative(sum, &by(EstimatorKind::Radiative), [1.0; 2]);
+    compare_lit(EmitterMask::Extended, scene, motion, sum, faults);
+}
+
+fn compare_lit(lit: EmitterMask, scene: &Scene, motion: &Parameter, sum: Sum, faults: &[Fault]) {
+    let (other, depth) = match lit {
+        EmitterMask::Delta => (EstimatorKind::PathSpace, 2),
+        _ => (EstimatorKind::Radiative, 4),
+    };
+    let by = |kind| move |_| prepare_lit(kind, lit, scene, motion, depth);
+    let reference = derivative(sum, &by(other), [1.0; 2]);
     let off = |prepare: &dyn Fn(f64) -> (Prepared, Motion)| {
         let own: Moments = derivative(sum, prepare, [1.0; 2]);
         let error = f64::sqrt(own.variance_of_mean() + reference.variance_of_mean());
@@ -95,7 +130,8 @@ fn compare(scene: &Scene, motion: &Parameter, sum: Sum, faults: &[Fault]) {
     assert!(fair.0.abs() < 4.0 && fair.1.abs() < 0.1, "{fair:?}");
     for fault in faults {
         let faulty = off(&|_| {
-            let (mut prepared, motion) = prepare_for(EstimatorKind::Warped, scene, motion, 4);
+            let (mut prepared, motion) =
+                prepare_lit(EstimatorKind::Warped, lit, scene, motion, depth);
             let warped = prepared.warped.as_mut().expect("the warped form");
             let field = Arc::clone(&warped.field);
             warped.field = Arc::new(Faulty { field, fault: *fault });
@@ -111,6 +147,38 @@ fn on_surfaces() {
     let motion = parameter("ball", 0.0, alloc::vec![moves("ball", shift())]);
     let faults = [Fault::Divergence, Fault::Sign, Fault::Weight];
     compare(&scene, &motion, MOMENT, &faults);
+}
+
+/// The shadows that a card, out of view, casts on a floor, by a bulb and the sun.
+fn shadows() -> Scene {
+    let mut b = Build::default();
+    let bsdf = b.bsdf("bsdf", diffuse(0.6, 0.5, 0.4));
+    let up = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 4.0;
+    let at = |shift: f64| Affine { linear: up, translation: vec3(0.0, shift, 0.0) };
+    b.shape("floor", procedural::grid(2, 2).transform(&at(-1.0)), bsdf);
+    let card = placed(procedural::cube(), vec3(0.3, 0.2, 0.3), 0.5, vec3(0.1, 0.9, 0.2));
+    b.shape("card", card, bsdf);
+    let position = vec3(-0.3, 2.3, 0.4);
+    b.light("bulb", Emitter::Point { position, intensity: Rgb::new(3.0, 4.0, 2.0) });
+    let direction = vec3(0.3, -1.0, -0.3);
+    b.light("sun", Emitter::Directional { direction, irradiance: Rgb::new(0.7, 0.6, 0.5) });
+    b.camera(vec3(0.3, 0.3, 3.5), vec3(0.0, -1.0, 0.0), 4)
+}
+
+#[test]
+fn in_shadows_of_points_and_directions() {
+    let turn = GeometryChange::Rotate { axis: vec3(0.3, 0.1, 0.9), pivot: Vec3::ZERO };
+    let up = GeometryChange::Translate(Vec3::Y);
+    let all = [Fault::Divergence, Fault::Sign, Fault::Weight];
+    for (name, change, sum, faults) in [
+        ("card", shift(), MOMENT, &all[..]),
+        ("bulb", shift(), MOMENT, &all[..]),
+        ("card", up, LIGHT, &[Fault::Direction]),
+        ("sun", turn, LIGHT, &[Fault::Divergence]),
+    ] {
+        let motion = parameter(name, 0.0, alloc::vec![moves(name, change)]);
+        compare_lit(EmitterMask::Delta, &shadows(), &motion, sum, faults);
+    }
 }
 
 /// What approaches changes most by the divergence of what is the same everywhere.

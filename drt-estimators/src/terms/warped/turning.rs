@@ -7,16 +7,17 @@ use drt_math::Vec3;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::{
-    Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurningRay, VelocityField,
-    VertexVelocity,
+    Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurnParts, TurningRay,
+    VelocityField, VertexVelocity, Weight,
 };
 use crate::sampling::trace::Endpoint;
-use crate::terms::warped::edges::{TurningEdges, Weight};
+use crate::terms::warped::edges::TurningEdges;
+use crate::terms::warped::near::ANGLE;
+use crate::terms::warped::shadows::Flow;
 use crate::world::World;
+use crate::world::lights::LightSample;
 use crate::world::vertex::Vertex;
 
-/// Radians.
-const ANGLE: f64 = 0.1;
 /// Pixels.
 const PIXELS: f64 = 2.0;
 
@@ -84,23 +85,24 @@ impl VelocityField for EdgeTurns {
         if !(ray.moves || always || self.edges.any_moves()) {
             return None;
         }
-        let mut angle = ANGLE;
-        let mut rest = Weight::default();
-        if let Some(pixel) = ray.pixel {
-            let camera = &world.camera;
-            angle = f64::min(PIXELS * camera.pinhole().pixel_size, ANGLE);
-            if camera.has_borders() {
-                let view = camera.view(camera.position() + ray.dir);
-                let (window, slope) = camera.window(pixel, view.pixel);
-                let (slope, _) = camera.view_gradient(&view, slope, 0.0);
-                // As edges do it rises with the inverse square of the distance.
-                rest = Weight {
-                    value: 1.0 / (window * window) - 1.0,
-                    gradient: slope.reject(ray.dir) * (-2.0 / (window * window * window)),
-                };
-            }
-        }
+        let (angle, rest) = around(world, ray);
         self.edges.turn(ray, angle, rest, always, parts)
+    }
+
+    fn turn_with_shadows(
+        &self,
+        world: &World,
+        ray: &TurningRay<'_>,
+        light: &LightSample,
+        light_moves: bool,
+        parts: &mut TurnParts,
+    ) -> Option<RayTurn> {
+        if !(ray.moves || light_moves || self.edges.any_moves()) {
+            return None;
+        }
+        let (angle, rest) = around(world, ray);
+        let flow = Flow::new(ray, ray.end?, light, angle, world.geometry.radius)?;
+        self.edges.turn_with_shadows(ray, &flow, angle, rest, light_moves, parts)
     }
 
     fn blend(
@@ -116,4 +118,20 @@ impl VelocityField for EdgeTurns {
             _ => self.spatial.blend(world, viewer, end, dir, distance),
         }
     }
+}
+
+/// Within which angle edges turn a ray, and the weight of what does not turn with it.
+fn around(world: &World, ray: &TurningRay<'_>) -> (f64, Weight) {
+    let Some(pixel) = ray.pixel else { return (ANGLE, Weight::default()) };
+    let camera = &world.camera;
+    let angle = f64::min(PIXELS * camera.pinhole().pixel_size, ANGLE);
+    if !camera.has_borders() {
+        return (angle, Weight::default());
+    }
+    let view = camera.view(camera.position() + ray.dir);
+    let (window, slope) = camera.window(pixel, view.pixel);
+    let (slope, _) = camera.view_gradient(&view, slope, 0.0);
+    // As edges do it rises with the inverse square of the distance.
+    let gradient = slope.reject(ray.dir) * (-2.0 / (window * window * window));
+    (angle, Weight { value: 1.0 / (window * window) - 1.0, gradient })
 }

@@ -1,0 +1,65 @@
+//! Connections to points and directions whose shadows move.
+
+use alloc::vec::Vec;
+
+use crate::derivative::adjoint::turning::RayMotion;
+use crate::derivative::adjoint::{Behind, Differentiator, NextEvent, NodeMotion};
+use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
+use crate::derivative::velocity::{Found, RecordedPath, TurningRay};
+use crate::world::vertex::Vertex;
+
+impl Differentiator<'_> {
+    /// A connection by which the vertex of a node has a velocity of its own, with the shadows of the light; false where it does not.
+    /// Then what it gives to the node is differentiated alone, as if of a path that ends there.
+    pub(super) fn connect_with_shadows<S: AdjointSink>(
+        &mut self,
+        recorded: &RecordedPath<'_>,
+        k: usize,
+        vertex: &Vertex,
+        event: &NextEvent<'_>,
+        sink: &mut S,
+    ) -> bool {
+        let RecordedPath { record, velocities, .. } = *recorded;
+        let (world, field, light) = (self.world, velocities.field(), &event.c.light);
+        let Some(arrival) = record.nodes[k].arrival.as_ref() else { return false };
+        let fits = light.point().is_none() && !self.edges_at_rest;
+        let Some(s) = vertex.surface().filter(|_| fits) else { return false };
+        let parent = arrival.parent as usize;
+        let eye = world.eye();
+        let viewer = record.nodes[parent].vertex();
+        let ray = TurningRay {
+            viewer: viewer.unwrap_or(&eye),
+            moves: velocities.moves(parent),
+            pixel: (parent == 0).then_some(record.pixel),
+            dir: arrival.dir,
+            distance: arrival.distance,
+            end: Some(s),
+        };
+        let moves = event.moving || sink.active().moving_emitters[light.emitter];
+        let mut parts = core::mem::take(&mut self.with_shadows);
+        parts.clear();
+        let turn = field.turn_with_shadows(world, &ray, light, moves, &mut parts);
+        if let Some(turn) = &turn {
+            let (pixel, turn_of_ray) = (record.pixel, Some(turn));
+            let found =
+                Found { pixel, viewer, ray_moves: true, turn: turn_of_ray, arrival, hits: &[] };
+            let mut auxiliary = Vec::new();
+            let velocity = field.vertex(world, &found, &mut self.probe, &mut auxiliary);
+            let weight = velocity.blend.weight;
+            let behind = event.behind.map(|b| Behind { weight, ..b });
+            let event = NextEvent { behind, moving: true, arrives: true, ..*event };
+            let ordinary = core::mem::take(&mut self.locals[k]);
+            let mut here = SurfaceAdjoint::default();
+            self.connect(recorded, -arrival.dir, vertex, &event, &mut here, sink);
+            let light = Some(light);
+            let ray = RayMotion { turn, parts: &parts.edges, shadows: &parts.shadows, light };
+            let motion = NodeMotion { velocity: &velocity, auxiliary: &auxiliary, ray: Some(ray) };
+            let received = event.c.f * event.c.rest();
+            self.arrive(recorded, k, &motion, received, &mut here, sink);
+            let own = core::mem::replace(&mut self.locals[k], ordinary);
+            self.locals[k].incoming += own.incoming;
+        }
+        self.with_shadows = parts;
+        turn.is_some()
+    }
+}

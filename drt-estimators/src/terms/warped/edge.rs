@@ -1,0 +1,60 @@
+//! An edge that turns rays.
+
+use drt_math::Vec3;
+
+use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::world::vertex::MaterialPoint;
+
+/// An edge at which radiance jumps.
+#[derive(Clone, Debug)]
+pub(super) struct TurningEdge {
+    pub(super) ends: [Vec3; 2],
+    /// Half its length.
+    pub(super) half: f64,
+    pub(super) points: [MaterialPoint; 2],
+    pub(super) moves: bool,
+    /// Between faces of a curved surface, on which vertices move with their matter.
+    pub(super) facets: bool,
+    /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
+    pub(super) crease: Option<([Vec3; 2], [bool; 2])>,
+}
+
+impl TurningEdge {
+    pub(super) fn new(
+        edges: &DiscontinuityEdges,
+        edge: &DiscontinuityEdge,
+        moves: bool,
+        curved: bool,
+    ) -> Self {
+        let [(a, from), (b, to)] = [0.0, 1.0].map(|along| edge.point(along));
+        let discontinuous = edge.crease.map(|part| part > 0.0);
+        let crease = edges.normals(edge).map(|normals| (normals, discontinuous));
+        let (ends, half) = ([a, b], 0.5 * edge.length());
+        // Of a fold as sharp as a corner, or between materials, a part is 1.
+        let facets = curved && edge.crease.iter().all(|part| *part < 1.0);
+        Self { ends, half, points: [from, to], moves, facets, crease }
+    }
+
+    /// What radiance does there, seen along a vector.
+    pub(super) fn discontinuity(&self, view: Vec3) -> Discontinuity {
+        let Some((normals, discontinuous)) = &self.crease else { return Discontinuity::Silhouette };
+        let [front, other] = normals.map(|n| n.dot(view) > 0.0);
+        match discontinuous[usize::from(front)] {
+            _ if front != other => Discontinuity::Silhouette,
+            false => Discontinuity::None,
+            true if self.facets => Discontinuity::Facets,
+            true => Discontinuity::Crease,
+        }
+    }
+}
+
+/// What radiance does at an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Discontinuity {
+    None,
+    /// Between faces of a curved surface that are both seen from one side.
+    Facets,
+    /// Between other such faces.
+    Crease,
+    Silhouette,
+}

@@ -1,0 +1,156 @@
+//! The weights of edges beside a ray, or beside what lights a point.
+
+use drt_geom::edges::Cone;
+use drt_math::{Real, Vec3, fm};
+
+use crate::derivative::velocity::{TurningRay, Weight};
+use crate::terms::warped::beside::Beside;
+use crate::terms::warped::edge::{Discontinuity, TurningEdge};
+
+/// Within which angle edges turn a ray, in radians.
+pub(super) const ANGLE: f64 = 0.1;
+
+/// How far behind the plane of the surface where a ray ends edges turn it, over their distances.
+const BEHIND: f64 = 0.02;
+
+/// How far creases between the faces of curved surfaces turn rays, over what other edges do.
+const NARROW: f64 = 0.1;
+
+/// What the weight of an edge depends on besides the edge.
+pub(super) struct Near {
+    /// The viewer; where that is at infinity, a point on the ray.
+    from: Vec3,
+    /// Unit, of the ray.
+    dir: Vec3,
+    /// Scene units to each radian, of a viewer at infinity.
+    at_infinity: Option<f64>,
+    /// Squared sine of the cone's angle.
+    square: Weight,
+    pub(super) cone: Cone,
+    /// For creases of curved surfaces.
+    pub(super) narrow: Cone,
+    /// The unit normal of the surface that the viewer is on, towards the ray's side.
+    horizon: Option<Vec3>,
+    /// Unit normal of the surface where the ray ends, away from the viewer; zero where it does not. And the distance of `from`
+    /// from its plane.
+    normal: Vec3,
+    depth: f64,
+    /// Creases do not count.
+    silhouettes_only: bool,
+}
+
+impl Near {
+    /// Of a ray.
+    pub(super) fn of_ray(ray: &TurningRay<'_>, angle: f64) -> Self {
+        let TurningRay { viewer, dir, distance, end, .. } = *ray;
+        let along = |n: Vec3| if n.dot(dir) < 0.0 { -n } else { n };
+        let normal = end.map_or(Vec3::ZERO, |s| along(s.ng));
+        let sine = fm::sin(angle);
+        Self {
+            from: viewer.x,
+            dir,
+            at_infinity: None,
+            square: Weight::constant(sine * sine),
+            cone: Cone::new(viewer.x, dir, angle, f64::INFINITY),
+            narrow: Cone::new(viewer.x, dir, NARROW * angle, f64::INFINITY),
+            horizon: viewer.surface().map(|s| along(s.ng)),
+            normal,
+            // Nothing is behind the sky.
+            depth: if end.is_some() { normal.dot(dir) * distance } else { 0.0 },
+            silhouettes_only: false,
+        }
+    }
+
+    /// Of what flows along the unit direction `dir` to a point x of a plane, with the unit `normal` along the flow. It comes
+    /// from a point at the distance `range`, or from infinity, where a radian is taken as that distance. `square` is that of
+    /// the cone's sine. Gradients are by x, times the range.
+    pub(super) fn of_flow(
+        x: Vec3,
+        dir: Vec3,
+        range: f64,
+        at_infinity: bool,
+        normal: Vec3,
+        square: Weight,
+    ) -> Self {
+        let sine = Real::sqrt(square.value);
+        let from = if at_infinity { x } else { x - dir * range };
+        let cone = |sine: f64| match at_infinity {
+            true => Cone::cylinder(x, dir, sine * range),
+            false => Cone::new(from, dir, fm::asin(sine), f64::INFINITY),
+        };
+        Self {
+            from,
+            dir,
+            at_infinity: at_infinity.then_some(range),
+            square,
+            cone: cone(sine),
+            narrow: cone(0.0),
+            horizon: None,
+            normal,
+            depth: normal.dot(x - from),
+            silhouettes_only: true,
+        }
+    }
+
+    /// How far a point, less the viewer's place, is behind the plane of the surface where the ray ends.
+    fn behind(&self, place: Vec3) -> f64 {
+        self.normal.dot(place) - self.depth
+    }
+
+    /// An edge beside the ray and its weight; `None` where it has none.
+    pub(super) fn weight(&self, edge: &TurningEdge) -> Option<(Beside, Weight)> {
+        let (from, w) = (self.from, self.dir);
+        let [a, b] = edge.ends;
+        let ends = [a - from, b - from];
+        let below = |n: Vec3| ends.iter().all(|p| n.dot(*p) <= 1e-9 * p.length());
+        let view = if self.at_infinity.is_some() { w } else { ends[0] };
+        let widest = match edge.discontinuity(view) {
+            Discontinuity::Silhouette => self.square,
+            _ if self.silhouettes_only => return None,
+            Discontinuity::None => return None,
+            Discontinuity::Facets => self.square * Weight::constant(NARROW * NARROW),
+            Discontinuity::Crease => self.square,
+        };
+        // Most edges are farther away, by a sphere around them.
+        let middle = (ends[0] + ends[1]) * 0.5;
+        let along = middle.dot(w);
+        let across = middle.length_squared() - along * along;
+        let least = Real::sqrt(f64::max(across, 0.0)) - edge.half;
+        let beside = if let Some(scale) = self.at_infinity {
+            if least > 0.0 && least * least > widest.value * (scale * scale) {
+                return None;
+            }
+            Beside::from_infinity(ends, w, scale)
+        } else {
+            // Of what is nearer than a right angle the tangent is at most that of the sine.
+            let reach = along + edge.half;
+            let square = widest.value;
+            let outside = least > 0.0 && least * least * (1.0 - square) > square * reach * reach;
+            if reach <= 0.0 || outside || self.horizon.is_some_and(below) {
+                return None;
+            }
+            Beside::new(ends, w)?
+        };
+        let square = beside.square;
+        if square.value >= widest.value {
+            return None;
+        }
+        let mut shown = Weight::constant(1.0);
+        let behind = self.behind(beside.place);
+        if behind > 0.0 {
+            let slope = beside.along.gradient * self.normal.dot(b - a);
+            let q = Weight { value: behind, gradient: slope }
+                / (beside.distance * Weight::constant(BEHIND));
+            if q.value >= 1.0 {
+                return None;
+            }
+            let rest = Weight::constant(1.0) - q * q;
+            shown = rest * rest;
+        }
+        // Of an edge that is not hidden the weight diverges where the ray meets it.
+        let rise = shown * (widest - square);
+        let mut fall = square + (Weight::constant(1.0) - shown) * widest;
+        fall.value = f64::max(fall.value, f64::MIN_POSITIVE.sqrt());
+        Some((beside, rise / fall))
+    }
+}

@@ -1,0 +1,122 @@
+//! Rays that turn with the [shadows](crate::derivative::velocity::ShadowTurn) of points and directions.
+
+use drt_math::{Vec3, fm};
+
+use crate::derivative::velocity::{
+    RayTurn, ShadowPart, ShadowPlace, ShadowTurn, TurnParts, TurningRay, Weight,
+};
+use crate::terms::warped::beside::Beside;
+use crate::terms::warped::edges::{TurningEdges, divide};
+use crate::terms::warped::near::{ANGLE, Near};
+use crate::world::lights::{LightKind, LightSample};
+use crate::world::vertex::SurfacePoint;
+
+/// The flow of a light to a point on a surface.
+pub(super) struct Flow {
+    place: ShadowPlace,
+    near: Near,
+    /// How far the point moves across the flow to each radian of the light's view, in scene units.
+    range: f64,
+    at_infinity: bool,
+}
+
+impl Flow {
+    /// To where a ray ends, at the surface point `s`. Shadows count within a distance of what the ray sees within an `angle`
+    /// there, and within [`ANGLE`] as seen by the light, which at infinity is taken as seen from the distance `scale`. `None`
+    /// for emitters with an area.
+    pub(super) fn new(
+        ray: &TurningRay<'_>,
+        s: &SurfacePoint,
+        light: &LightSample,
+        angle: f64,
+        scale: f64,
+    ) -> Option<Self> {
+        let at_infinity = match light.kind {
+            LightKind::Area(_) => return None,
+            LightKind::Position => false,
+            LightKind::Direction => true,
+        };
+        let flow = -light.w;
+        let normal = if s.ng.dot(flow) < 0.0 { -s.ng } else { s.ng };
+        let range = if at_infinity { scale } else { light.distance };
+        let inv_range = if at_infinity { 0.0 } else { 1.0 / range };
+        let TurningRay { dir, distance, .. } = *ray;
+        let x = ray.viewer.x + dir * distance;
+        // Squared sines, added as resistances are.
+        let of_light = 1.0 / (fm::sin(ANGLE) * fm::sin(ANGLE));
+        let seen =
+            Weight { value: distance, gradient: dir * range } * Weight::constant(fm::sin(angle));
+        let far =
+            Weight { value: range, gradient: if at_infinity { Vec3::ZERO } else { flow * range } };
+        let square =
+            Weight::constant(1.0) / (Weight::constant(of_light) + far * far / (seen * seen));
+        let near = Near::of_flow(x, flow, range, at_infinity, normal, square);
+        let place = ShadowPlace { matter: s.material(), normal, dir, distance, flow, inv_range };
+        Some(Self { place, near, range, at_infinity })
+    }
+
+    /// How far the shadow of a point beside the flow goes with the point, and how far with the light, with gradients by the place
+    /// where it falls. `side` is what the point moves by as it goes along its edge.
+    fn cast(&self, beside: &Beside, side: Vec3) -> [Weight; 2] {
+        let Self { place: ShadowPlace { flow, .. }, range, .. } = *self;
+        let one = Weight::constant(1.0);
+        let by_place = |w: Weight| w.map_gradient(|g| g / range);
+        if self.at_infinity {
+            let gradient = flow - by_place(beside.along).gradient * side.dot(flow);
+            [one, Weight { value: -beside.place.dot(flow), gradient }]
+        } else {
+            let k = Weight { value: range, gradient: flow } / by_place(beside.distance);
+            [k, one - k]
+        }
+    }
+}
+
+impl TurningEdges {
+    /// As [`turn`](Self::turn) does, and with the shadows that edges cast where the ray ends. `None` without any, and where neither
+    /// edges nor the ray nor, by `moves`, the light or the surface moves.
+    pub(super) fn turn_with_shadows(
+        &self,
+        ray: &TurningRay<'_>,
+        flow: &Flow,
+        angle: f64,
+        rest: Weight,
+        moves: bool,
+        parts: &mut TurnParts,
+    ) -> Option<RayTurn> {
+        let TurnParts { edges, shadows } = parts;
+        let [first, first_shadow] = [edges.len(), shadows.len()];
+        let mut any = moves || ray.moves;
+        let [mut weight, mut by_light] = [Weight::default(); 2];
+        let place = &flow.place;
+        let by_direction = |w: Weight| w.map_gradient(|g| place.by_direction(g));
+        self.visit(&flow.near, |edge, beside, of_edge| {
+            let by_place = |w: Weight| w.map_gradient(|g| g / flow.range);
+            let [a, b] = edge.ends;
+            let [with_edge, with_light] = flow.cast(beside, b - a);
+            let own = by_place(of_edge);
+            weight += by_direction(own);
+            by_light += by_direction(own * with_light);
+            if edge.moves {
+                any = true;
+                let along = by_place(beside.along);
+                let [from, to] = edge.points;
+                for (matter, part) in [(from, Weight::constant(1.0) - along), (to, along)] {
+                    let share = by_direction(own * with_edge * part);
+                    shadows.push(ShadowPart { matter, share });
+                }
+            }
+        });
+        if !(any && weight.value > 0.0) {
+            return None;
+        }
+        let turned = self.gather(&Near::of_ray(ray, angle), ray.moves, edges);
+        let total = Weight::constant(1.0) + turned + rest + weight;
+        divide(&mut edges[first..], ray.dir, total);
+        for part in &mut shadows[first_shadow..] {
+            part.share = part.share / total;
+        }
+        let shadow = ShadowTurn { at: *place, weight: weight / total, by_light: by_light / total };
+        let Weight { value: weight, gradient } = (turned + weight) / total;
+        Some(RayTurn { weight, gradient, parts: first..edges.len(), shadow: Some(shadow) })
+    }
+}
