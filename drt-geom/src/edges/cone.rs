@@ -1,6 +1,7 @@
 //! Segments near a direction.
 
 use alloc::vec::Vec;
+use core::ops::ControlFlow;
 
 use drt_math::{Real, Vec3, fm};
 
@@ -40,14 +41,34 @@ impl Cone {
     /// False when no point of a sphere is in the cone.
     #[must_use]
     pub fn may_meet(&self, center: Vec3, radius: f64) -> bool {
-        let to = center - self.apex;
-        let along = to.dot(self.axis);
-        let square = to.length_squared();
-        let across = Real::sqrt(f64::max(square - along * along, 0.0));
+        self.may_meet_at(&Place::new(self, center), radius)
+    }
+
+    fn may_meet_at(&self, place: &Place, radius: f64) -> bool {
         let [sine, cosine] = self.turn;
         let farthest = self.reach + radius;
-        let beside = across * cosine - along * sine <= radius + self.radius.unwrap_or(0.0);
-        beside && square <= farthest * farthest
+        // Without roots: how far the sphere's centre is outside, of which neither side is negative.
+        let beside = radius + self.radius.unwrap_or(0.0) + place.along * sine;
+        beside >= 0.0
+            && place.across * (cosine * cosine) <= beside * beside
+            && place.square <= farthest * farthest
+    }
+}
+
+/// Where a point is, as cones of one apex and axis see it.
+struct Place {
+    along: f64,
+    /// Squared distances, from the axis and from the apex.
+    across: f64,
+    square: f64,
+}
+
+impl Place {
+    fn new(cone: &Cone, point: Vec3) -> Self {
+        let to = point - cone.apex;
+        let along = to.dot(cone.axis);
+        let square = to.length_squared();
+        Self { along, across: square - along * along, square }
     }
 }
 
@@ -161,13 +182,12 @@ impl ConeTree {
         let normals = Normals::new(order.iter().map(|i| segments[*i as usize].facets));
         self.nodes.push(Node { center, radius: 0.5 * size.length(), next: 0, leaf, normals });
         if order.len() > LEAF {
-            let size = size.to_array();
-            let axis = (0..3).fold(0, |best, k| if size[k] > size[best] { k } else { best });
+            let half = order.len() / 2;
+            let axis = widest(size);
             let middle = |i: &u32| {
                 let [a, b] = segments[*i as usize].ends;
                 (a + b).to_array()[axis]
             };
-            let half = order.len() / 2;
             order.select_nth_unstable_by(half, |a, b| middle(a).total_cmp(&middle(b)));
             let (left, right) = order.split_at_mut(half);
             self.split(segments, left, first);
@@ -176,24 +196,37 @@ impl ConeTree {
         self.nodes[at].next = self.nodes.len() as u32;
     }
 
-    /// Tells the numbers of all segments in a cone, and of some beside it. Of facets' edges that are no silhouettes only those
-    /// in a `narrow` one around the same axis must be told.
-    pub fn visit(&self, cone: &Cone, narrow: &Cone, mut found: impl FnMut(u32)) {
+    /// Tells the numbers of all segments in a cone, and of some beside it, until `found` says to stop. Of facets' edges that
+    /// are no silhouettes only those in a `narrow` one with the same apex and axis must be told.
+    pub fn visit<B>(
+        &self,
+        cone: &Cone,
+        narrow: &Cone,
+        mut found: impl FnMut(u32) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at) {
             let Node { center, radius, .. } = *node;
-            let met = cone.may_meet(center, radius)
-                && (narrow.may_meet(center, radius)
+            let place = Place::new(cone, center);
+            let met = cone.may_meet_at(&place, radius)
+                && (narrow.may_meet_at(&place, radius)
                     || node.normals.may_be_silhouettes(cone, center, radius));
             if !met {
                 at = node.next as usize;
                 continue;
             }
             let [first, end] = node.leaf;
-            self.order[first as usize..end as usize].iter().for_each(|i| found(*i));
+            self.order[first as usize..end as usize].iter().try_for_each(|i| found(*i))?;
             at += 1;
         }
+        ControlFlow::Continue(())
     }
+}
+
+/// The axis along which a box is longest.
+fn widest(size: Vec3) -> usize {
+    let size = size.to_array();
+    (0..3).fold(0, |best, k| if size[k] > size[best] { k } else { best })
 }
 
 #[cfg(test)]
@@ -204,6 +237,13 @@ mod tests {
 
     fn point(rng: &mut Rng) -> Vec3 {
         vec3(rng.next_f64() - 0.5, rng.next_f64() - 0.5, rng.next_f64() - 0.5) * 2.0
+    }
+
+    fn all(tree: &ConeTree, cone: &Cone, narrow: &Cone, found: &mut [bool]) -> ControlFlow<()> {
+        tree.visit(cone, narrow, |i| {
+            found[i as usize] = true;
+            ControlFlow::Continue(())
+        })
     }
 
     /// Every segment of which some point is in the cone is told, and far from all are.
@@ -224,7 +264,7 @@ mod tests {
             let (angle, reach) = (0.3 * rng.next_f64(), 0.5 + rng.next_f64());
             let mut found = [false; 300];
             let cone = Cone::new(apex, axis, angle, reach);
-            tree.visit(&cone, &cone, |i| found[i as usize] = true);
+            let _ = all(&tree, &cone, &cone, &mut found);
             for ConeSegment { ends: [a, b], name: i, .. } in &segments {
                 let seen = |k: u32| {
                     let to = *a + (*b - *a) * (f64::from(k) / 20.0) - apex;
@@ -239,7 +279,7 @@ mod tests {
         }
         assert!(inside > 100 && told < 20 * inside, "{inside} {told}");
         let cone = Cone::new(Vec3::ZERO, vec3(0.0, 0.0, 1.0), 0.1, 1.0);
-        ConeTree::default().visit(&cone, &cone, |_| panic!("there are none"));
+        assert!(all(&ConeTree::default(), &cone, &cone, &mut []).is_continue());
     }
 
     /// Of a sphere, all silhouettes in the wide cone are told, and few others.
@@ -262,7 +302,7 @@ mod tests {
             let axis = (point(&mut rng) * 0.5 - apex).normalize();
             let [wide, narrow] = [0.3, 0.01].map(|a| Cone::new(apex, axis, a, f64::INFINITY));
             let mut found = alloc::vec![false; segments.len()];
-            tree.visit(&wide, &narrow, |i| found[i as usize] = true);
+            let _ = all(&tree, &wide, &narrow, &mut found);
             told += found.iter().filter(|f| **f).count();
             for s in &segments {
                 let [n, m] = s.facets.unwrap().map(|n| n.dot(s.ends[0] - apex) > 0.0);

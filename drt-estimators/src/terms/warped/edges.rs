@@ -1,6 +1,8 @@
 //! The edges that turn rays.
 
 use alloc::vec::Vec;
+use core::convert::Infallible;
+use core::ops::ControlFlow;
 
 use drt_geom::edges::{Cone, ConeSegment, ConeTree};
 use drt_math::Vec3;
@@ -61,10 +63,8 @@ impl TurningEdges {
         viewer_moves: bool,
     ) -> bool {
         let cone = Cone::new(viewer.x, dir, angle, f64::INFINITY);
-        let mut any = false;
         let tree = if viewer_moves { &self.all } else { &self.moving };
-        tree.visit(&cone, &cone, |_| any = true);
-        any
+        tree.visit(&cone, &cone, |_| ControlFlow::Break(())).is_break()
     }
 
     /// How edges within an `angle` of a ray turn it, besides what does not turn with a weight of `rest` beside 1. Without any
@@ -79,11 +79,13 @@ impl TurningEdges {
     ) -> Option<RayTurn> {
         let near = Near::of_ray(ray, angle);
         if !(ray.moves || always) {
-            let mut any = false;
-            self.moving.visit(&near.cone, &near.narrow, |i| {
-                any = any || near.weight(&self.list[i as usize]).is_some();
+            let any = self.moving.visit(&near.cone, &near.narrow, |i| {
+                match near.weight(&self.list[i as usize]) {
+                    Some(_) => ControlFlow::Break(()),
+                    None => ControlFlow::Continue(()),
+                }
             });
-            if !any {
+            if any.is_continue() {
                 return None;
             }
         }
@@ -137,12 +139,14 @@ impl TurningEdges {
 
     /// Tells all edges that have a weight, and how near they are.
     pub(super) fn visit(&self, near: &Near, mut found: impl FnMut(&TurningEdge, &Beside, Weight)) {
-        self.all.visit(&near.cone, &near.narrow, |i| {
+        let all = self.all.visit::<Infallible>(&near.cone, &near.narrow, |i| {
             let edge = &self.list[i as usize];
             if let Some((beside, weight)) = near.weight(edge) {
                 found(edge, &beside, weight);
             }
+            ControlFlow::Continue(())
         });
+        debug_assert!(all.is_continue());
     }
 }
 

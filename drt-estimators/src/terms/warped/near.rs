@@ -135,22 +135,24 @@ impl Near {
         if square.value >= widest.value {
             return None;
         }
-        let mut shown = Weight::constant(1.0);
+        let least = f64::MIN_POSITIVE.sqrt();
         let behind = self.behind(beside.place);
-        if behind > 0.0 {
-            let slope = beside.along.gradient * self.normal.dot(b - a);
-            let q = Weight { value: behind, gradient: slope }
-                / (beside.distance * Weight::constant(BEHIND));
-            if q.value >= 1.0 {
-                return None;
-            }
-            let rest = Weight::constant(1.0) - q * q;
-            shown = rest * rest;
-        }
         // Of an edge that is not hidden the weight diverges where the ray meets it.
+        if behind <= 0.0 {
+            let square = Weight { value: f64::max(square.value, least), ..square };
+            return Some((beside, widest / square - Weight::constant(1.0)));
+        }
+        let slope = beside.along.gradient * self.normal.dot(b - a);
+        let reach = beside.distance * Weight::constant(BEHIND);
+        let q = Weight { value: behind, gradient: slope } / reach;
+        if q.value >= 1.0 {
+            return None;
+        }
+        let rest = Weight::constant(1.0) - q * q;
+        let shown = rest * rest;
         let rise = shown * (widest - square);
         let mut fall = square + (Weight::constant(1.0) - shown) * widest;
-        fall.value = f64::max(fall.value, f64::MIN_POSITIVE.sqrt());
+        fall.value = f64::max(fall.value, least);
         Some((beside, rise / fall))
     }
 }
