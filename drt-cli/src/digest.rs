@@ -84,6 +84,7 @@ struct PlanSummary<'a> {
     indirect: bool,
     flux_shapes: &'a [String],
     antithetic: bool,
+    splatting: bool,
     skipped: &'a [String],
 }
 
@@ -112,6 +113,7 @@ impl<'a> From<&'a Plan> for PlanSummary<'a> {
             indirect: plan.indirect,
             flux_shapes: &plan.flux_shapes,
             antithetic: plan.antithetic,
+            splatting: plan.splatting,
             skipped: &plan.skipped,
         }
     }

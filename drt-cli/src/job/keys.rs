@@ -38,6 +38,8 @@ pub(super) struct Estimator {
     pub(super) every_vertex: Option<bool>,
     /// Of `warped`: how vertices move with edges.
     pub(super) warp: Option<Spanned<Warp>>,
+    /// Paths of the image count for all pixels that they reach.
+    pub(super) splatting: Option<bool>,
     /// Noisier pixels take more samples.
     pub(super) adaptive: Option<bool>,
     pub(super) step: Option<Spanned<f64>>,

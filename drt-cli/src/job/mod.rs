@@ -236,6 +236,7 @@ fn settings(
         guiding,
         every_vertex,
         warp,
+        splatting,
         adaptive,
         step,
         ..
@@ -268,6 +269,7 @@ fn settings(
         settings.warp = self::warp(w.get_ref())
             .map_err(|message| document.error_at(w.span().start, message))?;
     }
+    settings.splatting = splatting.unwrap_or(settings.splatting);
     settings.adaptive = adaptive.unwrap_or(settings.adaptive);
     if let Some(s) = step {
         settings.step = *s.get_ref();

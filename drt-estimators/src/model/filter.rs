@@ -4,6 +4,8 @@ mod sampling;
 #[cfg(test)]
 mod tests;
 
+use core::ops::Range;
+
 use drt_math::{Real, fm};
 use thiserror::Error;
 
@@ -154,6 +156,14 @@ impl Filter {
     #[must_use]
     pub fn radius(&self) -> f64 {
         self.radius
+    }
+
+    /// The pixels of a row of `n` whose supports hold the coordinate `at`.
+    pub(crate) fn reached(&self, at: f64, n: u32) -> Range<u32> {
+        // Centres i + 1/2 not farther than the radius; the casts saturate.
+        let first = fm::ceil(at - self.radius - 0.5) as u32;
+        let last = fm::floor(at + self.radius - 0.5);
+        first..((last + 1.0) as u32).min(n)
     }
 
     /// False when the filter jumps at the edge of its support, so that the material form needs an

@@ -42,6 +42,8 @@ pub struct Plan {
     pub flux_shapes: Vec<String>,
     /// Image points come in mirrored pairs.
     pub antithetic: bool,
+    /// Paths of the image count for every pixel that they reach.
+    pub splatting: bool,
     /// What is skipped, and why.
     pub skipped: Vec<String>,
 }
@@ -57,6 +59,7 @@ impl Plan {
                 (&mut all.direct, one.direct),
                 (&mut all.indirect, one.indirect),
                 (&mut all.antithetic, one.antithetic),
+                (&mut all.splatting, one.splatting),
             ] {
                 *own |= other;
             }
@@ -92,10 +95,15 @@ impl fmt::Display for Plan {
             }
         }
         let yes = |on: bool| if on { "yes" } else { "no" };
+        let image = match self.splatting {
+            true => "every path counts for all pixels that it reaches",
+            false => "each pixel has paths of its own",
+        };
+        writeln!(f, "image: {image}")?;
         writeln!(f, "path record: {}", yes(self.record))?;
         if self.record {
             let pairs = if self.antithetic { ", mirrored pairs" } else { "" };
-            writeln!(f, "interior term: yes{pairs}")?;
+            writeln!(f, "interior term: yes, each pixel by paths of its own{pairs}")?;
         }
         if !self.moving_shapes.is_empty() {
             writeln!(f, "moving shapes: {}", self.moving_shapes.join(", "))?;

@@ -123,6 +123,10 @@ pub struct Settings {
     /// Give more of the samples to pixels whose derivatives (without parameters, whose image) are noisier; the
     /// mean stays. A pilot takes an eighth of the samples and is then forgotten.
     pub adaptive: bool,
+    /// Let every path of the image count for all pixels whose filters reach it, where these reach neighbours: less
+    /// noise of pixels, which have it in common with those around. Else each pixel draws its paths from its own filter, for
+    /// itself, as derivatives always do; filters of more than 8 pixels' radius are left to that.
+    pub splatting: bool,
     /// Of [`EstimatorKind::Warped`].
     pub warp: Warp,
     /// Half step of finite differences, in units of each parameter.
@@ -148,6 +152,7 @@ impl Default for Settings {
             guiding: true,
             every_vertex: false,
             adaptive: false,
+            splatting: true,
             warp: Warp::default(),
             step: 1e-3,
             seed: 0,

@@ -2,7 +2,8 @@
 //!
 //! Two kinds of film. A [`PixelFilm`] takes values that belong to one pixel: each pixel samples its
 //! own filter, so pixels are independent, and their variances add up to those of blocks and of the
-//! mean. A [`SplatFilm`] takes values that land anywhere, in batches: 32 independent ones a pass,
+//! mean. Its first layer, the image, may be [`splatted`](PixelFilm::splatted) instead: then every sample counts
+//! for all the pixels whose filters reach it. A [`SplatFilm`] takes values that land anywhere, in batches: 32 independent ones a pass,
 //! whose scatter gives the variance of every pixel, block and mean with all correlations between
 //! pixels in it.
 //!
@@ -11,14 +12,20 @@
 //! Σx² / Σ|x| ([`Events`]), which is lost among many and honest among few.
 
 mod splats;
+mod splatting;
+mod sums;
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::{Real, Rgb};
 
 pub(crate) use crate::sampling::film::splats::Splats;
+pub(crate) use crate::sampling::film::splatting::{Raster, Splat, SplatTile};
 
 use crate::model::rendering::{BLOCKS, Estimate, Layer};
+use crate::sampling::film::splatting::SplattedImage;
+use crate::sampling::film::sums::RunSums;
 
 /// Independent batches that the standard error of a splatted term is estimated from.
 pub(crate) const BATCHES: usize = 32;
@@ -129,80 +136,33 @@ impl Tile {
 
 /// Images whose pixels are sampled one by one.
 ///
-/// In a pass, each pixel takes its samples in runs whose means are independent
-/// ([`Pass`](crate::sampling::pixels::Pass)); passes are weighted by their samples. A pass of a single run
-/// knows nothing of its error, and takes that of the others.
+/// Values of pixels are added up in runs ([`RunSums`]). Where the first layer, the image, is
+/// [splatted](crate::sampling::film::splatting), pixels have samples in common.
 #[derive(Debug, Default)]
 pub(crate) struct PixelFilm {
     size: [u32; 2],
     layers: usize,
-    /// Passes before the last one; empty when there are none.
-    passes: Vec<Passes>,
-    before: Count,
-    /// The last pass, and of its current run what is finished.
-    runs: Vec<Runs>,
-    partial: Vec<Rgb>,
-    run_count: u32,
-    run_units: u32,
-    partial_units: u32,
+    /// Layer by layer of each pixel.
+    sums: RunSums,
     events: Vec<Events>,
-}
-
-/// Samples of each pixel in some passes, and how many of them have a known error.
-#[derive(Clone, Copy, Debug, Default)]
-struct Count {
-    units: u32,
-    known: u32,
-}
-
-/// Σ N mean over passes of N samples, and Σ N² variance over those whose errors are known.
-#[derive(Clone, Copy, Debug)]
-struct Passes {
-    sum: Rgb,
-    variance: Rgb,
-}
-
-impl Passes {
-    const NONE: Self = Self { sum: Rgb::ZERO, variance: Rgb::ZERO };
-}
-
-/// Mean of the means of runs, each weighted by its length, and the weighted sum of their squared
-/// deviations from it (West 1979, "Updating mean and variance estimates").
-#[derive(Clone, Copy, Debug)]
-struct Runs {
-    mean: Rgb,
-    m2: [f32; 3],
-}
-
-impl Runs {
-    const NONE: Self = Self { mean: Rgb::ZERO, m2: [0.0; 3] };
-
-    /// Takes in a run of a given length that makes the length of all `total`.
-    fn push(&mut self, x: Rgb, length: f64, total: f64) {
-        let delta = x - self.mean;
-        self.mean += delta * (length / total);
-        let m2 = (delta * (x - self.mean) * length).to_array();
-        for (sum, m2) in self.m2.iter_mut().zip(m2) {
-            *sum += m2 as f32;
-        }
-    }
+    image: Option<SplattedImage>,
 }
 
 impl PixelFilm {
     pub(crate) fn new(size: [u32; 2], layers: usize) -> Self {
-        let n = (size[0] * size[1]) as usize * layers;
         Self {
             size,
             layers,
-            passes: Vec::new(),
-            before: Count::default(),
-            runs: alloc::vec![Runs::NONE; n],
-            partial: alloc::vec![Rgb::ZERO; n],
-            run_count: 0,
-            run_units: 0,
-            partial_units: 0,
+            sums: RunSums::new((size[0] * size[1]) as usize * layers),
             events: alloc::vec![Events::NONE; layers],
+            image: None,
         }
+    }
+
+    /// Of a camera's film, whose first layer is splatted.
+    pub(crate) fn splatted(raster: Raster, layers: usize) -> Self {
+        let film = Self::new(raster.size(), layers);
+        Self { image: Some(SplattedImage::new(raster)), ..film }
     }
 
     pub(crate) fn size(&self) -> [u32; 2] {
@@ -213,43 +173,44 @@ impl PixelFilm {
         self.layers
     }
 
+    /// Where splats of the first layer go, if it is made of such.
+    pub(crate) fn raster(&self) -> Option<&Arc<Raster>> {
+        self.image.as_ref().map(SplattedImage::raster)
+    }
+
     /// Samples that every pixel has received.
     pub(crate) fn units(&self) -> u32 {
-        self.before.units + self.run_units + self.partial_units
+        self.sums.units()
     }
 
     /// Forgets all samples.
     pub(crate) fn clear(&mut self) {
-        self.passes.clear();
-        self.before = Count::default();
-        self.runs.fill(Runs::NONE);
-        self.partial.fill(Rgb::ZERO);
-        (self.run_count, self.run_units, self.partial_units) = (0, 0, 0);
+        self.sums.clear();
         self.events.fill(Events::NONE);
+        if let Some(image) = &mut self.image {
+            image.clear();
+        }
     }
 
     /// Begins a pass.
     pub(crate) fn begin(&mut self) {
-        let count = self.count();
-        if count.units == 0 {
-            return;
+        self.sums.begin();
+        if let Some(image) = &mut self.image {
+            image.begin();
         }
-        self.passes.resize(self.runs.len(), Passes::NONE);
-        for i in 0..self.runs.len() {
-            self.passes[i] = self.passes_with_last(i);
+    }
+
+    /// Takes in what a tile has splatted, which is added with the next samples that are counted; the order is part
+    /// of the result's bits.
+    pub(crate) fn splat(&mut self, tile: &SplatTile) {
+        if let Some(image) = &mut self.image {
+            image.add(tile);
         }
-        self.before = count;
-        self.runs.fill(Runs::NONE);
-        self.partial.fill(Rgb::ZERO);
-        (self.run_count, self.run_units, self.partial_units) = (0, 0, 0);
     }
 
     /// Merges a tile; the order of merging is part of the result's bits.
     pub(crate) fn merge(&mut self, tile: &Tile) {
-        let at = tile.start as usize * self.layers;
-        for (sum, t) in self.partial[at..].iter_mut().zip(&tile.sums) {
-            *sum += *t;
-        }
+        self.sums.add(tile.start as usize * self.layers, &tile.sums);
         for (e, t) in self.events.iter_mut().zip(&tile.events) {
             e.add(t);
         }
@@ -257,70 +218,33 @@ impl PixelFilm {
 
     /// Counts samples that every pixel has received; with them a run may end.
     pub(crate) fn advance(&mut self, units: u32, ends_run: bool) {
-        self.partial_units += units;
-        if !ends_run {
-            return;
+        if let Some(image) = &mut self.image {
+            image.advance(units, ends_run, &mut self.events[0], |pixel, sum| {
+                self.sums.add(pixel * self.layers, core::slice::from_ref(&sum));
+            });
         }
-        self.run_count += 1;
-        self.run_units += self.partial_units;
-        let (length, total) = (f64::from(self.partial_units), f64::from(self.run_units));
-        for (runs, sum) in self.runs.iter_mut().zip(&mut self.partial) {
-            runs.push(*sum * (1.0 / length), length, total);
-            *sum = Rgb::ZERO;
-        }
-        self.partial_units = 0;
-    }
-
-    /// Samples of all passes, the last one included.
-    fn count(&self) -> Count {
-        let last = self.run_units + self.partial_units;
-        let known = if self.run_count < 2 { 0 } else { last };
-        Count { units: self.before.units + last, known: self.before.known + known }
-    }
-
-    /// The sums of all passes, the last one included.
-    fn passes_with_last(&self, i: usize) -> Passes {
-        let mut passes = self.passes.get(i).copied().unwrap_or(Passes::NONE);
-        let units = f64::from(self.run_units);
-        passes.sum += self.runs[i].mean * units + self.partial[i];
-        if self.run_count >= 2 {
-            // The unfinished run is as uncertain, by its length, as those before it.
-            let all = units + f64::from(self.partial_units);
-            let scale = all / f64::from(self.run_count - 1);
-            passes.variance += Rgb::from(self.runs[i].m2.map(f64::from)) * scale;
-        }
-        passes
-    }
-
-    fn estimate(&self, i: usize) -> Estimate {
-        let count = self.count();
-        if count.units == 0 {
-            return Estimate { mean: Rgb::ZERO, stderr: Rgb::splat(f64::INFINITY) };
-        }
-        let passes = self.passes_with_last(i);
-        let (units, known) = (f64::from(count.units), f64::from(count.known));
-        let stderr = match count.known {
-            0 => Rgb::splat(f64::INFINITY),
-            _ => (passes.variance * (1.0 / (known * units))).map(Real::sqrt),
-        };
-        Estimate { mean: passes.sum * (1.0 / units), stderr }
+        self.sums.advance(units, ends_run);
     }
 
     /// The variance of a pixel's mean in one layer, averaged over colours.
     pub(crate) fn variance(&self, pixel: u32, layer: usize) -> f64 {
-        let stderr = self.estimate(pixel as usize * self.layers + layer).stderr;
+        let stderr = self.sums.estimate(pixel as usize * self.layers + layer).stderr;
         (stderr * stderr).mean()
     }
 
     /// The first layer of some pixels.
     pub(crate) fn estimates(&self, pixels: core::ops::Range<u32>) -> Vec<Estimate> {
-        pixels.map(|p| self.estimate(p as usize * self.layers)).collect()
+        pixels.map(|p| self.sums.estimate(p as usize * self.layers)).collect()
     }
 
     /// One layer as an image.
     pub(crate) fn layer(&self, l: usize, blocks: &Blocks) -> Layer {
-        let pixels = (l..self.runs.len()).step_by(self.layers).map(|i| self.estimate(i)).collect();
+        let entries = (l..self.sums.len()).step_by(self.layers);
+        let pixels = entries.map(|i| self.sums.estimate(i)).collect();
         let mut image = Layer::from_pixels(self.size, pixels, blocks);
+        if let Some(splatted) = self.image.as_ref().filter(|_| l == 0) {
+            splatted.set_errors(&mut image, blocks);
+        }
         self.events[l].widen(&mut image, blocks, f64::from(self.units().max(1)));
         image
     }
@@ -536,7 +460,7 @@ mod tests {
     #[test]
     fn means_are_of_all_samples_and_errors_of_runs() {
         let (film, mean) = filled(&[&[&[1.0, 3.0], &[4.0, 2.0], &[0.0, 8.0]]]);
-        let e = film.estimate(0);
+        let e = film.sums.estimate(0);
         assert_eq!(film.units(), 6);
         assert!((e.mean.g - mean).abs() < 1e-15);
         // Means of runs are 2, 3, 4: their variance is 1, that of their mean 1/3.
@@ -544,20 +468,20 @@ mod tests {
 
         // A pass of a single run adds to the mean, and is as uncertain as the others.
         let (film, mean) = filled(&[&[&[7.0, 1.0]], &[&[1.0, 3.0], &[4.0, 2.0], &[0.0, 8.0]]]);
-        let e = film.estimate(0);
+        let e = film.sums.estimate(0);
         assert!((e.mean.g - mean).abs() < 1e-15);
         assert!((e.stderr.g - f64::sqrt(1.0 / 3.0 * 6.0 / 8.0)).abs() < 1e-7);
 
         // Passes of 2 and 4 samples with variances 4 and 1/4 of their means.
         let (film, _) = filled(&[&[&[1.0], &[5.0]], &[&[1.0, 2.0], &[2.0, 3.0]]]);
         let expected = f64::sqrt((4.0 * 4.0 + 16.0 * 0.25) / 36.0);
-        assert!((film.estimate(0).stderr.g - expected).abs() < 1e-7);
+        assert!((film.sums.estimate(0).stderr.g - expected).abs() < 1e-7);
     }
 
     #[test]
     fn single_samples_have_no_error_bar() {
         let (film, _) = filled(&[&[&[1.0]], &[&[5.0]]]);
-        assert_eq!(film.estimate(0).mean.g, 3.0);
-        assert_eq!(film.estimate(0).stderr.g, f64::INFINITY);
+        assert_eq!(film.sums.estimate(0).mean.g, 3.0);
+        assert_eq!(film.sums.estimate(0).stderr.g, f64::INFINITY);
     }
 }

@@ -8,7 +8,7 @@ use drt_math::sobol::SobolSampler;
 
 use crate::model::rendering::BLOCKS;
 use crate::sampling::allocation::{Allocation, MOST};
-use crate::sampling::film::{PixelFilm, Tile};
+use crate::sampling::film::{PixelFilm, Splat, SplatTile, Tile};
 use crate::sampling::parallel::Pool;
 use crate::sampling::streams::sequence_name;
 
@@ -60,6 +60,11 @@ impl Pass {
 pub(crate) trait Sampler {
     /// Sample `unit` of a pixel, with the leading random numbers `points`: fills in a value per layer.
     fn sample(&mut self, pixel: u32, unit: u32, points: SobolSampler, values: &mut [Rgb]);
+
+    /// What the last sample splats on the first layer, besides its value for the pixel.
+    fn splats(&self) -> &[Splat] {
+        &[]
+    }
 }
 
 impl Pass {
@@ -147,14 +152,19 @@ impl<W> Filling<'_, W> {
         let works = tiles * cuts;
         let all = works.saturating_mul(rounds.len() as u32);
         let spread = if self.allocation.is_some() { MOST } else { 1 };
+        let raster = film.raster().cloned();
         let work = |i: u32| {
             let (round, t, cut) = (&rounds[(i / works) as usize], i / cuts % tiles, i % cuts);
             let start = round.units.start - pass.units(round.run).start;
             let given = round.units.len() as u32;
             let mut tile = Tile::new(range(t), layers);
+            let mut image = raster.as_ref().map(|raster| SplatTile::new(raster, range(t)));
             let mut sampler = (self.sampler)();
             let mut values = alloc::vec![Rgb::ZERO; layers];
             for pixel in range(t) {
+                if let Some(image) = &mut image {
+                    image.begin(pixel);
+                }
                 let taken = self.allocation.map_or(given, |a| a.taken(pixel, given));
                 let at =
                     |cut: u32| start + (u64::from(taken) * u64::from(cut) / u64::from(cuts)) as u32;
@@ -166,15 +176,23 @@ impl<W> Filling<'_, W> {
                         values.iter_mut().for_each(|v| *v *= weight);
                     }
                     tile.push(pixel, &values);
+                    if let Some(image) = &mut image {
+                        for Splat { point, value } in sampler.splats() {
+                            image.add(&Splat { point: *point, value: *value * weight });
+                        }
+                    }
                 });
             }
-            (tile, sampler)
+            (tile, image, sampler)
         };
         let mut waiting = Vec::new();
         let before = film.units();
         film.begin();
-        self.pool.ordered(0..all, 4, work, |i, (tile, sampler)| {
+        self.pool.ordered(0..all, 4, work, |i, (tile, image, sampler)| {
             waiting.push(tile);
+            if let Some(image) = &image {
+                film.splat(image);
+            }
             let going = finished(sampler, f64::from(i + 1) / f64::from(all));
             if (i + 1) % works == 0 {
                 let round = &rounds[(i / works) as usize];

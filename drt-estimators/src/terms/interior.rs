@@ -15,6 +15,8 @@ pub(crate) use crate::terms::interior::recorder::{PathView, Recorder};
 use crate::derivative::contraction::Contraction;
 use crate::derivative::sensitivity::{AdjointSink, VelocityFunctional};
 use crate::model::rendering::{Account, Counters, NonFinite, Term};
+use crate::model::sensor::ViewSample;
+use crate::sampling::film::Splat;
 use crate::sampling::pixels::Sampler;
 use crate::sampling::record::PathRecord;
 use crate::sampling::record::Radiance;
@@ -117,21 +119,39 @@ impl<S: PathSink> Sampler for PixelSampler<'_, S> {
     /// A path, or a pair of paths mirrored at the pixel's centre.
     fn sample(&mut self, pixel: u32, unit: u32, points: SobolSampler, values: &mut [Rgb]) {
         values.fill(Rgb::ZERO);
+        self.splats.clear();
         let mut rng = Rng::new(self.seed, u64::from(pixel), unit).led_by(points, DIMENSIONS);
         let u = rng.next_2d();
         if self.antithetic {
             self.path(pixel, unit, u, rng.clone(), values);
             self.path(pixel, unit, u.map(|u| 1.0 - u), rng, values);
-            for v in values.iter_mut() {
+            let splats = self.splats.iter_mut().map(|s| &mut s.value);
+            for v in values.iter_mut().chain(splats) {
                 *v *= 0.5;
             }
         } else {
             self.path(pixel, unit, u, rng, values);
         }
-        if values.iter().any(|v| !v.is_finite()) {
+        let splats = self.splats.iter().map(|s| &s.value);
+        if values.iter().chain(splats).any(|v| !v.is_finite()) {
             self.report(pixel, unit, values);
         }
     }
+
+    fn splats(&self) -> &[Splat] {
+        &self.splats
+    }
+}
+
+/// Which pixels a path of the image counts for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ImageSampling {
+    /// The one whose filter its image point was drawn from.
+    OwnPixel,
+    /// All that its point reaches. Points are drawn from the filters of all pixels, as derivatives want them.
+    SharedFilters,
+    /// All that its point reaches. Points are drawn evenly.
+    Squares,
 }
 
 /// Samples pixels and differentiates what it traces.
@@ -146,6 +166,8 @@ pub(crate) struct PixelSampler<'a, S> {
     workers: Vec<Worker<'a, S>>,
     views: Vec<PathView<'a>>,
     separate: bool,
+    image: ImageSampling,
+    splats: Vec<Splat>,
     non_finite: Vec<NonFinite>,
     non_finite_count: u64,
     recorded: u64,
@@ -175,10 +197,17 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             workers,
             views,
             separate,
+            image: ImageSampling::OwnPixel,
+            splats: Vec::new(),
             non_finite: Vec::new(),
             non_finite_count: 0,
             recorded: 0,
         }
+    }
+
+    /// The same with an image that is splatted.
+    pub(crate) fn with_image(self, image: ImageSampling) -> Self {
+        Self { image, ..self }
     }
 
     /// The sinks of the components, in order.
@@ -213,7 +242,10 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     fn path(&mut self, pixel: u32, unit: u32, u: [f64; 2], rng: Rng, values: &mut [Rgb]) {
         let camera = &self.world.camera;
         let derivative = self.workers.iter().any(Worker::differentiates_filter);
-        let s = camera.sample_view(pixel, u, derivative);
+        let s = match self.image {
+            ImageSampling::Squares => camera.sample_square(pixel, u),
+            _ => camera.sample_view(pixel, u, derivative),
+        };
         let dir = s.direction;
         let weight = Rgb::splat(s.weight);
         // What places an edge comes before what the path takes an unknown number of.
@@ -224,7 +256,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         if self.workers.is_empty() {
             let mut radiance = Radiance::default();
             self.tracer.trace_camera(dir, weight, &mut radiance);
-            values[0] += radiance.0;
+            self.to_image(&s, derivative, radiance.0, values);
             return;
         }
         let width = camera.film()[0];
@@ -241,7 +273,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         };
         recorder.begin([pixel % width, pixel / width], dir, weight);
         self.tracer.trace_camera(dir, weight, &mut recorder);
-        values[0] += self.record.value;
+        self.to_image(&s, derivative, self.record.value, values);
         self.recorded += self.record.nodes.len() as u64;
         let path = Traced {
             record: &self.record,
@@ -269,14 +301,34 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         }
     }
 
+    /// Adds the light of a path to the image.
+    fn to_image(&mut self, s: &ViewSample, derivative: bool, light: Rgb, values: &mut [Rgb]) {
+        let value = match self.image {
+            ImageSampling::OwnPixel => {
+                values[0] += light;
+                return;
+            }
+            ImageSampling::Squares => light,
+            // At the very end of a filter there is no weight to take out; no path is there.
+            ImageSampling::SharedFilters if s.weight == 0.0 => return,
+            // As by the balance heuristic for all pixels (Veach 1997, §9.2.2).
+            ImageSampling::SharedFilters => {
+                let density = self.world.camera.view_density(s.point, derivative);
+                light * (1.0 / (s.weight * density))
+            }
+        };
+        self.splats.push(Splat { point: s.point, value });
+    }
+
     /// Notes a sample that is not finite and counts it as zero.
     fn report(&mut self, pixel: u32, unit: u32, values: &mut [Rgb]) {
         self.non_finite_count += 1;
         if self.non_finite.len() < DESCRIBED {
             let nodes = &self.record.nodes;
             let last = nodes.last().and_then(|n| n.vertex()?.surface().map(|s| s.prim));
+            let mut image = values.iter().take(1).chain(self.splats.iter().map(|s| &s.value));
             self.non_finite.push(NonFinite {
-                term: values[0].is_finite().then_some(Term::Interior),
+                term: image.all(|v| v.is_finite()).then_some(Term::Interior),
                 seed: self.seed,
                 stream: u64::from(pixel),
                 index: unit,
@@ -284,7 +336,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                 primitive: last,
             });
         }
-        for v in values.iter_mut().filter(|v| !v.is_finite()) {
+        let splats = self.splats.iter_mut().map(|s| &mut s.value);
+        for v in values.iter_mut().chain(splats).filter(|v| !v.is_finite()) {
             *v = Rgb::ZERO;
         }
     }

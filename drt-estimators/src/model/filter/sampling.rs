@@ -46,6 +46,59 @@ impl Filter {
         offset.map(|x| self.pdf_axis(x, share)).iter().product()
     }
 
+    /// The density at a coordinate of the samples of all `n` pixels of a row, each of which draws one from its
+    /// own filter.
+    pub(crate) fn row_density(&self, at: f64, n: u32, derivative: bool) -> f64 {
+        let share = self.slope_share(derivative);
+        self.reached(at, n).map(|i| self.pdf_axis(at - (f64::from(i) + 0.5), share)).sum()
+    }
+
+    /// Draws a coordinate evenly from the unit interval of pixel `i` out of a row of `n`; with its density. What
+    /// filters see before the first interval is drawn along with it, in proportion to the first pixel's filter: no
+    /// other counts for more there. So it is behind the last one.
+    pub(crate) fn sample_interval(&self, i: u32, n: u32, u: f64) -> (f64, f64) {
+        let ends = [i == 0, i + 1 == n];
+        if !ends[0] && !ends[1] {
+            return (f64::from(i) + u, 1.0);
+        }
+        let (tail, part) = self.beyond();
+        let [before, behind] = ends.map(|end| if end { part } else { 0.0 });
+        let inside = 1.0 - before - behind;
+        // Half a pixel or more from the centre; `v` is 0 at the end of the filter, 1 where the interval begins.
+        let outside = |v: f64| {
+            // The last representable number would give the offset where the density is zero.
+            let below = f64::min(1.0 - 2.0 * tail * v, 1.0 - f64::EPSILON);
+            let x = self.radius * self.half.sample(below);
+            (x, self.pdf_axis(-x, 0.0) * part / tail)
+        };
+        let [start, centre] = [f64::from(i), f64::from(i) + 0.5];
+        if u < before {
+            let (x, pdf) = outside(u / part);
+            (centre - x, pdf)
+        } else if u < before + inside {
+            (start + (u - before) / inside, inside)
+        } else {
+            let (x, pdf) = outside((1.0 - u) / part);
+            (centre + x, pdf)
+        }
+    }
+
+    /// Of the filter's samples, the part that is farther than half a pixel to one side; and the part of those of an
+    /// interval at an end of a row that goes there: of the former and the interval together, rounded to a power of
+    /// two, as points of a Sobol' sequence are shared out evenly then.
+    fn beyond(&self) -> (f64, f64) {
+        let edge = 0.5 / self.radius;
+        if edge >= 1.0 {
+            return (0.0, 0.0);
+        }
+        let tail = 0.5 * (1.0 - self.half.distribution(edge));
+        let mut part = 0.25;
+        while 0.75 * part * (1.0 + tail) > tail {
+            part *= 0.5;
+        }
+        (tail, part)
+    }
+
     /// A constant profile has no slope to sample.
     fn slope_share(&self, derivative: bool) -> f64 {
         match self.kind {
@@ -120,6 +173,14 @@ impl HalfProfile {
         // The root of a t + (b - a) t²/2 = v (a + b)/2, in the form without cancellation.
         let t = v * (a + b) / (a + fm::sqrt(f64::max(a * a + v * (b * b - a * a), 0.0)));
         (i as f64 + t) / (last + 1) as f64
+    }
+
+    /// The probability of everything before `x`.
+    fn distribution(&self, x: f64) -> f64 {
+        let n = (self.knots.len() - 1) as f64;
+        let i = ((x * n) as usize).min(self.knots.len() - 2);
+        let t = x * n - i as f64;
+        self.cumulative[i] + 0.5 * t * (self.knots[i] + self.pdf(x)) / n
     }
 
     fn pdf(&self, x: f64) -> f64 {

@@ -215,3 +215,50 @@ fn unusable_filters_are_named() {
         assert_eq!(Filter::new(kind), Err(FilterError::Cut { radius: 1.0, std_dev }));
     }
 }
+
+/// Every pixel of a row gets its filter's integral from the samples of all, with and without derivatives, and
+/// from those of the intervals.
+#[test]
+fn samples_of_a_row_are_shared() {
+    let mut rng = Rng::new(6, 0, 0);
+    for f in filters() {
+        for n in [1, 2, 7] {
+            for how in [None, Some(false), Some(true)] {
+                let mut sums = alloc::vec![Moments::ZERO; n as usize];
+                let mut planted = sums.clone();
+                for _ in 0..4000 {
+                    let mut values = alloc::vec![[0.0; 2]; n as usize];
+                    for i in 0..n {
+                        let u = rng.next_f64();
+                        let (at, pdf) = match how {
+                            None => f.sample_interval(i, n, u),
+                            Some(derivative) => {
+                                let at =
+                                    f64::from(i) + 0.5 + f.sample([u, 0.5], derivative).offset[0];
+                                (at, f.row_density(at, n, derivative))
+                            }
+                        };
+                        for (j, v) in (0..).zip(&mut values) {
+                            let offset = at - (f64::from(j) + 0.5);
+                            v[0] += f.axis(offset) / pdf;
+                            // As if nothing were beyond the row.
+                            v[1] += if at < 0.0 { 0.0 } else { f.axis(offset) / pdf };
+                        }
+                    }
+                    for (j, v) in values.iter().enumerate() {
+                        sums[j].push(v[0]);
+                        planted[j].push(v[1]);
+                    }
+                }
+                let wide = f.radius() > 0.5;
+                for sum in &sums {
+                    // A box's samples of its own have no noise.
+                    let error = f64::max(sum.standard_error(), 1e-12);
+                    assert!((sum.mean() - 1.0).abs() < 4.2 * error, "{:?} {sum:?}", f.kind());
+                    assert!(error < 0.05, "{:?} {sum:?}", f.kind());
+                }
+                assert!(!wide || z_score(&planted[0], 1.0).abs() > 4.2, "{:?}", f.kind());
+            }
+        }
+    }
+}

@@ -1,5 +1,3 @@
-use drt_math::fm;
-
 use crate::model::filter::Filter;
 
 /// A pixel reached by an image point, and how much the point counts there.
@@ -29,10 +27,8 @@ pub struct Footprint<'a> {
 impl<'a> Footprint<'a> {
     pub(super) fn new(filter: &'a Filter, film: [u32; 2], point: [f64; 2]) -> Self {
         let [columns, rows] = [0, 1].map(|k| {
-            // Centres i + 1/2 not farther than the radius; the casts saturate.
-            let first = fm::ceil(point[k] - filter.radius() - 0.5);
-            let last = fm::floor(point[k] + filter.radius() - 0.5);
-            [first as u32, ((last + 1.0) as u32).min(film[k])]
+            let reached = filter.reached(point[k], film[k]);
+            [reached.start, reached.end]
         });
         // An empty range of columns leaves nothing in any row.
         let rows = if columns[0] < columns[1] { rows } else { [0, 0] };

@@ -9,6 +9,9 @@ use drt_math::{Affine, Frame, Vec3, warp};
 use crate::model::filter::{Filter, FilterKind};
 use crate::model::sensor::{Lens, Projection, Sensor, SensorError, SensorGradient, unit};
 
+/// The largest radius of a filter, in pixels, whose samples are shared: each touches (2 × 8)² pixels.
+const MOST_SHARED: f64 = 8.0;
+
 /// How a sensor weighs directions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -25,6 +28,8 @@ pub enum Response {
 pub struct ViewSample {
     /// Unit, into the scene.
     pub direction: Vec3,
+    /// The image point, in pixels; the middle of an irradiance meter's one pixel.
+    pub point: [f64; 2],
     /// P h over the density of the direction.
     pub weight: f64,
     /// Gradient of P by the image point, times h over the density.
@@ -64,8 +69,10 @@ impl Sensor {
                 let s = self.filter.sample(u, derivative);
                 let width = self.film[0];
                 let [x, y] = [pixel % width, pixel / width].map(|p| f64::from(p) + 0.5);
+                let point = [x + s.offset[0], y + s.offset[1]];
                 ViewSample {
-                    direction: self.ray([x + s.offset[0], y + s.offset[1]]).direction,
+                    direction: self.ray(point).direction,
+                    point,
                     weight: s.weight,
                     slope: self.filter.gradient(s.offset[0], s.offset[1]).map(|g| g / s.pdf),
                 }
@@ -75,11 +82,38 @@ impl Sensor {
                 let w = warp::cosine_hemisphere(u);
                 ViewSample {
                     direction: p.right * w.x + p.up * w.y + p.forward * w.z,
+                    point: [0.5; 2],
                     weight: core::f64::consts::PI,
                     slope: [0.0; 2],
                 }
             }
         }
+    }
+
+    /// True when an image point counts for several pixels, but not for so many that telling each would cost more
+    /// than its path.
+    pub(crate) fn shares_points(&self) -> bool {
+        let radius = self.filter.radius();
+        self.response == Response::Perspective && 0.5 < radius && radius <= MOST_SHARED
+    }
+
+    /// Draws a direction evenly from the square of a pixel, for a film on which it counts for every pixel that it
+    /// reaches: its weight is one over the density of the image point per square pixel, without any pixel's filter. Squares
+    /// at the film's border reach out as far as filters do.
+    pub(crate) fn sample_square(&self, pixel: u32, u: [f64; 2]) -> ViewSample {
+        let [w, h] = self.film;
+        let (x, of_x) = self.filter.sample_interval(pixel % w, w, u[0]);
+        let (y, of_y) = self.filter.sample_interval(pixel / w, h, u[1]);
+        let point = [x, y];
+        let direction = self.ray(point).direction;
+        ViewSample { direction, point, weight: 1.0 / (of_x * of_y), slope: [0.0; 2] }
+    }
+
+    /// The density at an image point, per square pixel, of what [`sample_view`](Self::sample_view) draws for all pixels
+    /// together, once for each.
+    pub(crate) fn view_density(&self, point: [f64; 2], derivative: bool) -> f64 {
+        let along = |k: usize| self.filter.row_density(point[k], self.film[k], derivative);
+        along(0) * along(1)
     }
 
     /// Where and how strongly the sensor sees a point, visibility and clip planes apart. Points of

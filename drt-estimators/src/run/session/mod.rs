@@ -23,10 +23,10 @@ use crate::model::rendering::{Account, Derivative, Layer, Rendering, Term};
 use crate::model::scene::{Scene, Target};
 use crate::model::settings::{EstimatorKind, Settings, Warp};
 use crate::sampling::allocation;
-use crate::sampling::film::{Blocks, PixelFilm};
+use crate::sampling::film::{Blocks, PixelFilm, Raster};
 use crate::sampling::parallel::Pool;
 use crate::sampling::pixels::Filling;
-use crate::terms::interior::PixelSampler;
+use crate::terms::interior::{ImageSampling, PixelSampler};
 use crate::world::World;
 use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
@@ -124,7 +124,8 @@ impl Session {
         if let Some(needs) = needs.reduce(|all, needs| all.union(&needs)) {
             world.prepare_for_derivatives(needs);
         }
-        let plan = Plan::together(components.iter().map(|c| &c.plan));
+        let mut plan = Plan::together(components.iter().map(|c| &c.plan));
+        plan.splatting = settings.splatting && world.camera.shares_points();
         let size = world.camera.film();
         let mut session = Self {
             film: PixelFilm::new(size, 1),
@@ -140,8 +141,28 @@ impl Session {
             components,
             plan,
         };
-        session.film = PixelFilm::new(size, session.layers(settings.terms));
+        session.film = session.new_film(settings.terms);
         Ok(session)
+    }
+
+    /// An empty film, with terms apart or not.
+    fn new_film(&self, terms: bool) -> PixelFilm {
+        let camera = &self.world.camera;
+        let layers = self.layers(terms);
+        if self.plan.splatting {
+            PixelFilm::splatted(Raster::new(camera.filter().clone(), camera.film()), layers)
+        } else {
+            PixelFilm::new(camera.film(), layers)
+        }
+    }
+
+    /// How the paths of the image are drawn.
+    fn image_sampling(&self) -> ImageSampling {
+        match (self.plan.splatting, self.parameters()) {
+            (false, _) => ImageSampling::OwnPixel,
+            (true, 0) => ImageSampling::Squares,
+            _ => ImageSampling::SharedFilters,
+        }
     }
 
     /// What will run and what is skipped.
@@ -240,6 +261,7 @@ impl Session {
             sampler: || {
                 let components = self.components.iter().filter_map(|c| c.of_paths(queries));
                 PixelSampler::new(&self.world, components, seed, self.plan.antithetic, terms)
+                    .with_image(self.image_sampling())
             },
         };
         let mut account = Account::default();

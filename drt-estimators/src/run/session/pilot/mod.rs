@@ -29,7 +29,7 @@ impl Session {
         progress: impl Fn(f64),
     ) -> bool {
         let n = self.parameters();
-        let mut film = PixelFilm::new(self.film.size(), self.layers(true));
+        let mut film = self.new_film(true);
         let (first_query, queries) = self.queries(film.layers());
         let seed = !self.settings.seed;
         let (account, done) = self.fill(&mut film, seed, true, pass, units, |_, _| {}, progress);
