@@ -30,7 +30,9 @@ pub use model::scene::{
     Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding,
     Target, TargetName,
 };
-pub use model::settings::{AuxiliarySamples, Depth, EstimatorKind, Settings, Warp, WarpKernel};
+pub use model::settings::{
+    AuxiliarySamples, Depth, EstimatorKind, PathSampling, Settings, Warp, WarpKernel,
+};
 pub use model::{emitter, filter, sensor, surface};
 pub use run::finite_difference::finite_differences;
 pub use run::reverse::gradient;

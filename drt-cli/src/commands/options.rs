@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 
+use crate::job::Sampling;
 use crate::{CliError, Overrides};
 
 /// Differentiable rendering of surfaces and participating media.
@@ -53,6 +54,9 @@ pub(super) struct Options {
     /// Stop when the relative noise of every image is below this.
     #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     pub(super) target_error: Option<f64>,
+    /// How paths are found, instead of as the job says; bidirectional for images alone.
+    #[arg(long, value_name = "KIND")]
+    pub(super) sampling: Option<Sampling>,
     #[command(flatten)]
     pub(super) changes: Changes,
 }

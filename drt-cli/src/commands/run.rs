@@ -21,6 +21,9 @@ pub(super) fn open(options: &Options) -> Result<Job, CliError> {
     if let Some(spp) = options.spp {
         job.set_spp(spp);
     }
+    if let Some(sampling) = options.sampling {
+        job.settings.sampling = sampling.into();
+    }
     Ok(job)
 }
 

@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use clap::ValueEnum;
+use drt_estimators::PathSampling;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -27,7 +29,7 @@ pub(super) struct Job {
 #[serde(deny_unknown_fields)]
 pub(super) struct Estimator {
     pub(super) kind: Option<Spanned<Kind>>,
-    pub(super) sampling: Option<Spanned<Sampling>>,
+    pub(super) sampling: Option<Sampling>,
     pub(super) spp: Option<Spanned<i64>>,
     pub(super) boundary_spp: Option<Spanned<i64>>,
     pub(super) max_depth: Option<Spanned<i64>>,
@@ -82,11 +84,23 @@ pub(super) enum WarpKernel {
     Year2020,
 }
 
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+/// How paths are found, as jobs and commands name it.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum Sampling {
+pub(crate) enum Sampling {
+    /// From the camera.
     Unidirectional,
+    /// From the camera and from emitters.
     Bidirectional,
+}
+
+impl From<Sampling> for PathSampling {
+    fn from(sampling: Sampling) -> Self {
+        match sampling {
+            Sampling::Unidirectional => Self::Unidirectional,
+            Sampling::Bidirectional => Self::Bidirectional,
+        }
+    }
 }
 
 #[derive(Debug, Deserialize)]

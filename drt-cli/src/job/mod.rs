@@ -27,6 +27,7 @@ use crate::{CliError, Defaults};
 use cages::Cages;
 use document::Document;
 pub use groups::ParameterGroup;
+pub(crate) use keys::Sampling;
 pub use optimize::Optimize;
 use refusal::Refusal;
 
@@ -252,10 +253,8 @@ fn settings(
         Some(keys::Kind::Warped) => EstimatorKind::Warped,
         _ => EstimatorKind::PathSpace,
     };
-    if let Some(s) = sampling.as_ref().filter(|s| *s.get_ref() == keys::Sampling::Bidirectional) {
-        return Err(
-            document.error_at(s.span().start, "bidirectional sampling is not supported yet")
-        );
+    if let Some(s) = sampling {
+        settings.sampling = (*s).into();
     }
     if let Some(n) = max_depth {
         settings.max_depth =

@@ -44,6 +44,8 @@ pub struct Plan {
     pub antithetic: bool,
     /// Paths of the image count for every pixel that they reach.
     pub splatting: bool,
+    /// Paths of the image come from emitters, too.
+    pub bidirectional: bool,
     /// What is skipped, and why.
     pub skipped: Vec<String>,
 }
@@ -60,6 +62,7 @@ impl Plan {
                 (&mut all.indirect, one.indirect),
                 (&mut all.antithetic, one.antithetic),
                 (&mut all.splatting, one.splatting),
+                (&mut all.bidirectional, one.bidirectional),
             ] {
                 *own |= other;
             }
@@ -99,7 +102,8 @@ impl fmt::Display for Plan {
             true => "every path counts for all pixels that it reaches",
             false => "each pixel has paths of its own",
         };
-        writeln!(f, "image: {image}")?;
+        let ends = if self.bidirectional { ", from the camera and from emitters" } else { "" };
+        writeln!(f, "image: {image}{ends}")?;
         writeln!(f, "path record: {}", yes(self.record))?;
         if self.record {
             let pairs = if self.antithetic { ", mirrored pairs" } else { "" };

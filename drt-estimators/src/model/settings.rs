@@ -95,12 +95,26 @@ impl Depth {
     }
 }
 
+/// How paths are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum PathSampling {
+    /// From the camera, with next-event estimation.
+    #[default]
+    Unidirectional,
+    /// From the camera and from emitters, joined in every way. Of images alone.
+    Bidirectional,
+}
+
 /// How images and derivatives are estimated, whatever the number of samples: that is told by each call.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
     /// How derivatives are estimated.
     pub estimator: EstimatorKind,
+    /// How paths are found.
+    pub sampling: PathSampling,
     /// Index of the sensor.
     pub sensor: usize,
     /// Boundary samples of all kinds together to each sample of a pixel, on average; positive. They share them in equal
@@ -145,6 +159,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             estimator: EstimatorKind::default(),
+            sampling: PathSampling::default(),
             sensor: 0,
             boundary_ratio: None,
             max_depth: Depth::OfScene,
@@ -168,7 +183,7 @@ impl Settings {
     ///
     /// # Errors
     /// Names the setting.
-    pub(crate) fn check(&self, scene: &Scene) -> Result<(), Error> {
+    pub(crate) fn check(&self, scene: &Scene, derivatives: bool) -> Result<(), Error> {
         let fail = |setting, reason| Err(Error::Setting { setting, reason });
         if !(self.step > 0.0 && self.step.is_finite()) {
             return fail("step", SettingError::NotPositive(self.step));
@@ -180,6 +195,9 @@ impl Settings {
         let count = scene.media.len();
         if let Some(&(index, _)) = self.insides.iter().find(|(m, _)| *m >= count) {
             return fail("insides", SettingError::NoMedium { index, count });
+        }
+        if derivatives && self.sampling == PathSampling::Bidirectional {
+            return fail("sampling", SettingError::ImagesOnly);
         }
         scene.sensor(self.sensor).map(|_| ())
     }

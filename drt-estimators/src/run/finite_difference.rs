@@ -42,6 +42,7 @@ pub fn finite_differences(
         return Err(Error::Setting { setting: "step", reason });
     }
     scene.check()?;
+    settings.check(scene, true)?;
     let pool = Pool::new(settings.threads);
     let mut layers = Vec::new();
     for p in 0..parameters.len() {

@@ -70,7 +70,7 @@ pub fn gradient(
     control: &dyn Control,
 ) -> Result<SceneGradient, Error> {
     scene.check()?;
-    settings.check(scene)?;
+    settings.check(scene, true)?;
     let wanted = wanted.iter().map(|w| w.find_in(scene)).collect::<Result<Vec<_>, _>>()?;
     let wanted = &wanted[..];
     let (scene, _) = tangents::apply(scene, &[])?;

@@ -6,7 +6,7 @@ use drt_medium::{Coefficients, DistanceSample, TrackingStats};
 
 use crate::sampling::trace::{Flight, Tracer};
 use crate::world::vertex::{Kind, Vertex};
-use crate::world::{RayPath, Tracking, World, intervals};
+use crate::world::{Crossing, Interval, RayPath, Tracking, World, intervals};
 
 impl Tracer<'_> {
     /// Samples where along a followed ray the path stops, by free flight. `channels` weighs the
@@ -195,6 +195,25 @@ fn proxy_extinction(world: &World, medium: usize, at: Option<Vec3>) -> f64 {
         (None, Some(x)) => m.sigma_t(x).mean(),
         (None, None) => 0.0,
     }
+}
+
+/// What stands for the transmittance of a segment where densities are compared: exact in one colour and homogeneous media.
+pub(crate) fn proxy_attenuation(
+    world: &World,
+    medium: Option<usize>,
+    crossings: &[Crossing],
+    length: f64,
+) -> f64 {
+    if !world.has_media() {
+        return 1.0;
+    }
+    let depth = |i: Interval| match i.medium {
+        Some(m) => proxy_extinction(world, m, None) * (i.end - i.start),
+        None => 0.0,
+    };
+    // Beyond that squares of densities are not finite.
+    let depth: f64 = intervals(medium, crossings, length).map(depth).sum();
+    fm::exp(-f64::min(depth, 100.0))
 }
 
 /// The hull of the intervals inside media.

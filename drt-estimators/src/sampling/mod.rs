@@ -1,6 +1,7 @@
 //! Sampling in plain numbers: the walk and its record, the samples of pixels, and where they are added up.
 
 pub(crate) mod allocation;
+pub(crate) mod bidirectional;
 pub(crate) mod budget;
 pub(crate) mod film;
 pub(crate) mod flight;

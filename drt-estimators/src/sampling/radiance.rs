@@ -9,18 +9,14 @@ use crate::world::vertex::{Kind, Vertex};
 impl Tracer<'_> {
     /// Traces a camera ray; `weight` is the filter over the density of the image point.
     pub(crate) fn trace_camera<O: Observer>(&mut self, dir: Vec3, weight: Rgb, observer: &mut O) {
-        self.counters.paths += 1;
-        let leaving = OutgoingRay {
-            node: 0,
-            vertex: self.world.eye(),
-            dir,
-            pdf: None,
-            throughput: weight,
-            // Roulette must not end paths for the filter's sake: its derivative needs them.
-            alive: Alive::new(Rgb::ONE),
-            segments: 0,
-        };
+        let leaving = self.camera_ray(dir, weight);
         self.radiance_along(&leaving, observer);
+    }
+
+    /// The first ray of a path from the camera.
+    pub(super) fn camera_ray(&mut self, dir: Vec3, weight: Rgb) -> OutgoingRay {
+        self.counters.paths += 1;
+        OutgoingRay::starting(self.world.eye(), dir, weight)
     }
 
     /// Estimates what comes along a ray, times its throughput.

@@ -154,6 +154,13 @@ pub(crate) struct OutgoingRay {
 }
 
 impl OutgoingRay {
+    /// The first one of a path.
+    pub(super) fn starting(vertex: Vertex, dir: Vec3, throughput: Rgb) -> Self {
+        // Roulette must not end paths for the filter's sake: its derivative needs them.
+        let alive = Alive::new(Rgb::ONE);
+        Self { node: 0, vertex, dir, pdf: None, throughput, alive, segments: 0 }
+    }
+
     /// The density of its direction.
     pub(crate) fn pdf(&self) -> Option<f64> {
         self.pdf

@@ -16,6 +16,7 @@ use crate::derivative::contraction::Contraction;
 use crate::derivative::sensitivity::{AdjointSink, VelocityFunctional};
 use crate::model::rendering::{Account, Counters, NonFinite, Term};
 use crate::model::sensor::ViewSample;
+use crate::sampling::bidirectional::{Bidirectional, EmissionSampler};
 use crate::sampling::film::Splat;
 use crate::sampling::pixels::Sampler;
 use crate::sampling::record::PathRecord;
@@ -167,6 +168,7 @@ pub(crate) struct PixelSampler<'a, S> {
     views: Vec<PathView<'a>>,
     separate: bool,
     image: ImageSampling,
+    bidirectional: Option<Bidirectional<'a>>,
     splats: Vec<Splat>,
     non_finite: Vec<NonFinite>,
     non_finite_count: u64,
@@ -198,6 +200,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             views,
             separate,
             image: ImageSampling::OwnPixel,
+            bidirectional: None,
             splats: Vec::new(),
             non_finite: Vec::new(),
             non_finite_count: 0,
@@ -208,6 +211,12 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     /// The same with an image that is splatted.
     pub(crate) fn with_image(self, image: ImageSampling) -> Self {
         Self { image, ..self }
+    }
+
+    /// The same with paths of light, where these start from something.
+    pub(crate) fn from_both_ends(self, emission: Option<&'a EmissionSampler>) -> Self {
+        let bidirectional = emission.map(|emission| Bidirectional::new(self.world, emission));
+        Self { bidirectional, ..self }
     }
 
     /// The sinks of the components, in order.
@@ -254,9 +263,14 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let query = queries.then(|| EdgeQuery::reserve(&mut rng));
         self.tracer.rng = rng;
         if self.workers.is_empty() {
-            let mut radiance = Radiance::default();
-            self.tracer.trace_camera(dir, weight, &mut radiance);
-            self.to_image(&s, derivative, radiance.0, values);
+            let light = if let Some(both) = &mut self.bidirectional {
+                both.trace(&mut self.tracer, dir, weight, &mut self.splats)
+            } else {
+                let mut radiance = Radiance::default();
+                self.tracer.trace_camera(dir, weight, &mut radiance);
+                radiance.0
+            };
+            self.to_image(&s, derivative, light, values);
             return;
         }
         let width = camera.film()[0];

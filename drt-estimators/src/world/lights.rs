@@ -251,6 +251,11 @@ impl LightTable {
         self.density[s.prim as usize] * distance * distance / cosine
     }
 
+    /// Density per area with which [`LightTable::choose`] and [`LightTable::point_of`] find an emitting point.
+    pub(crate) fn area_density(&self, s: &SurfacePoint) -> f64 {
+        self.density[s.prim as usize]
+    }
+
     /// True when some surface emits.
     pub(crate) fn has_areas(&self) -> bool {
         self.density.iter().any(|d| *d > 0.0)

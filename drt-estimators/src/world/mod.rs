@@ -517,6 +517,11 @@ impl World {
         }
     }
 
+    /// The medium outside of everything.
+    pub(crate) fn ambient(&self) -> Option<usize> {
+        self.ambient
+    }
+
     /// The medium around a shape that bounds none itself: the same everywhere where no interface comes near it.
     pub(crate) fn medium_around(&self, shape: usize) -> SurroundingMedium {
         if !self.has_media() {

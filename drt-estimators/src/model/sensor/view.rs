@@ -101,6 +101,9 @@ impl Sensor {
     /// reaches: its weight is one over the density of the image point per square pixel, without any pixel's filter. Squares
     /// at the film's border reach out as far as filters do.
     pub(crate) fn sample_square(&self, pixel: u32, u: [f64; 2]) -> ViewSample {
+        if self.response == Response::Irradiance {
+            return self.sample_view(pixel, u, false);
+        }
         let [w, h] = self.film;
         let (x, of_x) = self.filter.sample_interval(pixel % w, w, u[0]);
         let (y, of_y) = self.filter.sample_interval(pixel / w, h, u[1]);

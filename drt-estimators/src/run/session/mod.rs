@@ -21,8 +21,9 @@ use crate::model::plan::Plan;
 use crate::model::rendering::Estimate;
 use crate::model::rendering::{Account, Derivative, Layer, Rendering, Term};
 use crate::model::scene::{Scene, Target};
-use crate::model::settings::{EstimatorKind, Settings, Warp};
+use crate::model::settings::{EstimatorKind, PathSampling, Settings, Warp};
 use crate::sampling::allocation;
+use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::{Blocks, PixelFilm, Raster};
 use crate::sampling::parallel::Pool;
 use crate::sampling::pixels::Filling;
@@ -65,6 +66,8 @@ pub struct Session {
     components: Vec<Component>,
     settings: Settings,
     plan: Plan,
+    /// Where paths of light start, if there are any.
+    emission: Option<EmissionSampler>,
     /// The image, and the terms of derivatives that are found along paths.
     film: PixelFilm,
     pilot: Option<Pilot>,
@@ -110,7 +113,7 @@ impl Session {
         settings: &Settings,
         kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
-        settings.check(scene)?;
+        settings.check(scene, tangents.targets().into_iter().next().is_some())?;
         let tangents = tangents.seen_by(settings.sensor);
         let depth = settings.max_depth.within(scene.integrator.max_depth);
         let mut world =
@@ -125,7 +128,11 @@ impl Session {
             world.prepare_for_derivatives(needs);
         }
         let mut plan = Plan::together(components.iter().map(|c| &c.plan));
-        plan.splatting = settings.splatting && world.camera.shares_points();
+        let bidirectional = settings.sampling == PathSampling::Bidirectional;
+        plan.bidirectional = bidirectional;
+        // Light's paths reach any pixel.
+        plan.splatting = bidirectional || (settings.splatting && world.camera.shares_points());
+        let emission = bidirectional.then(|| EmissionSampler::new(&world));
         let size = world.camera.film();
         let mut session = Self {
             film: PixelFilm::new(size, 1),
@@ -140,6 +147,7 @@ impl Session {
             world,
             components,
             plan,
+            emission,
         };
         session.film = session.new_film(settings.terms);
         Ok(session)
@@ -262,6 +270,7 @@ impl Session {
                 let components = self.components.iter().filter_map(|c| c.of_paths(queries));
                 PixelSampler::new(&self.world, components, seed, self.plan.antithetic, terms)
                     .with_image(self.image_sampling())
+                    .from_both_ends(self.emission.as_ref())
             },
         };
         let mut account = Account::default();

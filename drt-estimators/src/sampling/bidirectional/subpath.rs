@@ -1,0 +1,216 @@
+//! Paths from one end.
+
+use alloc::vec::Vec;
+use core::marker::PhantomData;
+
+use drt_math::{Rgb, Rng, Vec3};
+use drt_medium::Coefficients;
+
+use crate::model::surface::Given;
+use crate::sampling::flight::proxy_attenuation;
+use crate::sampling::mode::{ConnectionPoint, TransportMode};
+use crate::sampling::trace::{Arrival, Endpoint, Observer, OutgoingRay, PathState, Pixel, Tracer};
+use crate::world::scatter::Scattering;
+use crate::world::vertex::{Kind, Vertex};
+use crate::world::{Crossing, World};
+
+/// A transport mode whose walks connect to nothing on their way.
+pub(super) struct Unconnected<M>(PhantomData<M>);
+
+impl<M: TransportMode> TransportMode for Unconnected<M> {
+    const GIVEN: Given = M::GIVEN;
+    const EMISSION: bool = M::EMISSION;
+
+    fn value(scattering: &Scattering<'_>, from: Vec3, to: Vec3) -> Rgb {
+        M::value(scattering, from, to)
+    }
+
+    fn connect<O: Observer>(
+        _: &mut Tracer<'_>,
+        _: &PathState,
+        _: &Scattering<'_>,
+        _: Rgb,
+        _: &mut O,
+    ) {
+    }
+
+    fn has_points(_: &World) -> bool {
+        false
+    }
+
+    fn choose_point(tracer: &mut Tracer<'_>) -> ConnectionPoint {
+        M::choose_point(tracer)
+    }
+
+    fn connect_to_point<O: Observer>(
+        _: &mut Tracer<'_>,
+        _: &PathState,
+        _: &ConnectionPoint,
+        _: &mut O,
+    ) {
+    }
+}
+
+/// The sums over strategies of the module's table, before a ray or at a vertex.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Ratios {
+    /// d.
+    pub(super) last: f64,
+    /// e.
+    pub(super) earlier: f64,
+}
+
+impl Ratios {
+    /// e p'² + d, all that is weighed by the density of the vertex itself.
+    pub(super) fn all(&self, back: f64) -> f64 {
+        self.earlier * square(back) + self.last
+    }
+
+    /// Leaving a vertex with a `cosine` there, the density of the direction and of the one `back`.
+    fn scatter(&self, cosine: f64, pdf: f64, back: f64) -> Self {
+        Self { last: 1.0 / square(pdf), earlier: square(cosine / pdf) * self.all(back) }
+    }
+
+    /// Arriving, `spread` being the squared distance, or 1 of what comes from infinity.
+    fn arrive(&self, spread: f64, cosine: f64, attenuation: f64) -> Self {
+        Self {
+            last: self.last * square(spread / (cosine * attenuation)),
+            earlier: self.earlier / square(cosine),
+        }
+    }
+}
+
+pub(super) fn square(x: f64) -> f64 {
+    x * x
+}
+
+/// A vertex of a path from one end.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SubpathVertex {
+    pub(super) vertex: Vertex,
+    pub(super) coefficients: Option<Coefficients>,
+    /// Unit, to where the path comes from.
+    pub(super) from: Vec3,
+    /// All before the vertex scatters.
+    pub(super) throughput: Rgb,
+    pub(super) ratios: Ratios,
+    /// Segments from the path's start.
+    pub(super) segments: u32,
+}
+
+impl SubpathVertex {
+    /// The throughput, with the scattering coefficient of a volume.
+    pub(super) fn weight(&self) -> Rgb {
+        self.throughput * self.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s)
+    }
+
+    /// |n·w| of the geometric normal; 1 in a volume.
+    pub(super) fn cosine(&self, w: Vec3) -> f64 {
+        cosine(&self.vertex, w)
+    }
+}
+
+fn cosine(vertex: &Vertex, w: Vec3) -> f64 {
+    match &vertex.kind {
+        Kind::Surface(s) => s.ng.dot(w).abs(),
+        _ => 1.0,
+    }
+}
+
+/// A path from one end, as a walk tells it.
+#[derive(Debug)]
+pub(super) struct Subpath {
+    pub(super) vertices: Vec<SubpathVertex>,
+    /// The directions that walks of its mode are given.
+    given: Given,
+    /// Of the ray about to be followed.
+    ratios: Ratios,
+    finite: bool,
+    /// Light that came in from outside, or from inside of a medium.
+    pub(super) met: Rgb,
+    #[cfg(all(test, feature = "std"))]
+    pub(super) never_back: bool,
+}
+
+impl Subpath {
+    pub(super) fn new(given: Given) -> Self {
+        Self {
+            vertices: Vec::new(),
+            given,
+            ratios: Ratios::default(),
+            finite: true,
+            met: Rgb::ZERO,
+            #[cfg(all(test, feature = "std"))]
+            never_back: false,
+        }
+    }
+
+    /// Forgets the last path. Where the next one starts is at a point of the scene, or at infinity.
+    pub(super) fn begin(&mut self, ratios: Ratios, finite: bool) {
+        self.vertices.clear();
+        (self.ratios, self.finite, self.met) = (ratios, finite, Rgb::ZERO);
+    }
+
+    /// The density of the direction back, from one that the other end's walk would come from.
+    pub(super) fn back(&self, scattering: &Scattering<'_>, to: Vec3, from: Vec3) -> f64 {
+        #[cfg(all(test, feature = "std"))]
+        if self.never_back {
+            return 0.0;
+        }
+        let given = match self.given {
+            Given::Wo => Given::Wi,
+            Given::Wi => Given::Wo,
+        };
+        scattering.pdf(to, from, given)
+    }
+}
+
+impl Observer for Subpath {
+    const RECORDS: bool = false;
+
+    // Emission is weighed by who knows all strategies.
+    fn contribution(&mut self, _: Pixel, _: u32, _: Rgb) {}
+
+    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
+        let (vertex, coefficients) = match &arrival.end {
+            Endpoint::Environment => {
+                if let Some((_, radiance)) = world.lights.environment() {
+                    self.met += arrival.throughput * radiance;
+                }
+                return u32::MAX;
+            }
+            Endpoint::Surface(v) => (*v, None),
+            Endpoint::Volume(v, c) => {
+                self.met += arrival.throughput * c.source();
+                (*v, Some(*c))
+            }
+        };
+        let spread = if self.finite { square(arrival.distance) } else { 1.0 };
+        let medium = arrival.start_medium;
+        let attenuation = proxy_attenuation(world, medium, crossings, arrival.distance);
+        let name = self.vertices.len() as u32;
+        let ratios = self.ratios.arrive(spread, cosine(&vertex, arrival.dir), attenuation);
+        let segments = match self.vertices.get(arrival.parent as usize) {
+            Some(parent) if name > 0 => parent.segments + 1,
+            _ => 1,
+        };
+        self.vertices.push(SubpathVertex {
+            vertex,
+            coefficients,
+            from: -arrival.dir,
+            throughput: arrival.throughput,
+            ratios,
+            segments,
+        });
+        self.finite = true;
+        name
+    }
+
+    fn scatter(&mut self, world: &World, leaving: &OutgoingRay, _: Rgb, _: f64, _: &Rng) {
+        let Some(v) = self.vertices.get(leaving.node as usize) else { return };
+        let Some(scattering) = world.scattering(&v.vertex) else { return };
+        let back = self.back(&scattering, leaving.dir, v.from);
+        let pdf = leaving.pdf().unwrap_or(1.0);
+        self.ratios = v.ratios.scatter(v.cosine(leaving.dir), pdf, back);
+    }
+}
