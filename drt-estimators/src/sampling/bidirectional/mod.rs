@@ -175,8 +175,7 @@ impl<'w> Bidirectional<'w> {
             return Rgb::ZERO;
         }
         let target = light.point().map(|s| s.prim);
-        let Some((passed, attenuation)) =
-            tracer.passed(&z.vertex, light.w, light.distance, target)
+        let Some((passed, attenuation)) = tracer.passed(&z.vertex, light.w, light.distance, target)
         else {
             return Rgb::ZERO;
         };
@@ -193,6 +192,10 @@ impl<'w> Bidirectional<'w> {
 
     /// Of a vertex of the camera's path with one of the light's.
     fn connection(&self, tracer: &mut Tracer<'w>, z: &SubpathVertex, y: &SubpathVertex) -> Rgb {
+        #[cfg(all(test, feature = "std"))]
+        if self.fault == Some(tests::Fault::NoConnections) {
+            return Rgb::ZERO;
+        }
         let world = self.world;
         let (of_z, of_y) = (world.scattering(&z.vertex), world.scattering(&y.vertex));
         let (Some(of_z), Some(of_y)) = (of_z, of_y) else { return Rgb::ZERO };
@@ -223,6 +226,10 @@ impl<'w> Bidirectional<'w> {
 
     /// A vertex of the light's path as the camera sees it.
     fn seen(&self, tracer: &mut Tracer<'w>, y: &SubpathVertex) -> Option<Splat> {
+        #[cfg(all(test, feature = "std"))]
+        if self.fault == Some(tests::Fault::NoSplats) {
+            return None;
+        }
         let world = self.world;
         let scattering = world.scattering(&y.vertex)?;
         let (wo, transport) = tracer.see(&y.vertex)?;
