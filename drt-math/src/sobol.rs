@@ -78,20 +78,19 @@ impl SobolSampler {
     }
 }
 
-/// The index permuted within its power-of-two blocks, with the highest bit lowest.
+/// The index permuted within its power-of-two blocks.
 #[inline]
 fn shuffled(index: u32, set: u32, seed: u32) -> u32 {
     // The complement keeps the seeds of sets and of dimensions apart.
-    nested_uniform_scramble(index.reverse_bits(), mix(seed, !set))
+    nested_uniform_scramble(index.reverse_bits(), mix(seed, !set)).reverse_bits()
 }
 
 #[inline]
 fn coordinate(shuffled: u32, dimension: u32, seed: u32) -> f64 {
-    let index = shuffled.reverse_bits();
     let table = &BY_NIBBLE[(dimension % SET_DIMENSIONS) as usize];
     let mut digits = 0;
     for (k, row) in table.iter().enumerate() {
-        digits ^= row[(index >> (4 * k) & 15) as usize];
+        digits ^= row[(shuffled >> (4 * k) & 15) as usize];
     }
     let digits = nested_uniform_scramble(digits, mix(seed, dimension)).reverse_bits();
     (f64::from(digits) + 0.5) * (1.0 / 4_294_967_296.0)
