@@ -16,8 +16,9 @@ pub(super) const LEAF: u32 = 1 << 31;
 /// Stands where a node has no child.
 pub(super) const NO_CHILD: u32 = u32::MAX;
 
-/// Entries of the stack before it goes on in the heap: enough unless a tree is huge or very uneven.
-const STACK: usize = 64;
+/// Entries of the stack before it goes on in the heap: enough unless a tree is huge or very uneven, and few
+/// enough to be cleared without a call.
+const STACK: usize = 32;
 
 /// An inner node, four lines of cache.
 #[derive(Clone, Copy, Debug)]
