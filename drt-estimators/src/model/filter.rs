@@ -102,6 +102,8 @@ pub struct Filter {
     radius: f64,
     /// Makes the integral of `shape` one.
     scale: f64,
+    /// The factor p of one axis at the centre.
+    peak: f64,
     /// A density close to p, with an inverse in closed form.
     half: HalfProfile,
 }
@@ -143,7 +145,8 @@ impl Filter {
             return Err(FilterError::TooWide { radius });
         }
         let half = HalfProfile::new(segments, |t| shape(kind, radius * t));
-        Ok(Self { kind, radius, scale, half })
+        let peak = scale * shape(kind, 0.0);
+        Ok(Self { kind, radius, scale, peak, half })
     }
 
     /// What the filter was made from.
@@ -184,7 +187,8 @@ impl Filter {
     #[inline]
     #[must_use]
     pub fn gradient(&self, dx: f64, dy: f64) -> [f64; 2] {
-        [self.axis_slope(dx) * self.axis(dy), self.axis(dx) * self.axis_slope(dy)]
+        let [(x, sx), (y, sy)] = [dx, dy].map(|o| self.axis_with_slope(o));
+        [sx * y, x * sy]
     }
 
     /// A function of the offset that is 1 at the pixel's centre and falls to 0 where the support ends,
@@ -192,13 +196,15 @@ impl Filter {
     #[must_use]
     pub(crate) fn window(&self, offset: [f64; 2]) -> (f64, [f64; 2]) {
         let [(x, dx), (y, dy)] = offset.map(|o| {
-            let peak = self.axis(0.0);
             let (height, slope, steepness) = match self.kind {
                 FilterKind::Box { radius } => {
                     let s = o / radius;
                     (f64::max(1.0 - s * s, 0.0), -2.0 * s / radius, 2)
                 }
-                _ => (self.axis(o) / peak, self.axis_slope(o) / peak, 6),
+                _ => {
+                    let (height, slope) = self.axis_with_slope(o);
+                    (height / self.peak, slope / self.peak, 6)
+                }
             };
             let rest = Real::powi(1.0 - height, steepness - 1);
             (1.0 - rest * (1.0 - height), f64::from(steepness) * rest * slope)
@@ -210,25 +216,27 @@ impl Filter {
     #[inline]
     #[must_use]
     pub fn axis(&self, x: f64) -> f64 {
-        // Half open, so that box filters of neighbouring pixels tile the plane.
-        if -self.radius <= x && x < self.radius { self.scale * shape(self.kind, x) } else { 0.0 }
+        self.axis_with_slope(x).0
     }
 
-    /// The derivative of the factor p of one axis.
+    /// The factor p of one axis, and its derivative; at a kink, the mean of both sides.
     #[inline]
-    #[must_use]
-    pub fn axis_slope(&self, x: f64) -> f64 {
-        if x == 0.0 || Real::abs(x) >= self.radius {
-            return 0.0;
+    pub(crate) fn axis_with_slope(&self, x: f64) -> (f64, f64) {
+        // Half open, so that box filters of neighbouring pixels tile the plane.
+        let inside = -self.radius <= x && x < self.radius;
+        if !inside {
+            return (0.0, 0.0);
         }
-        match self.kind {
+        let shape = shape(self.kind, x);
+        let slope = match self.kind {
+            _ if x == 0.0 => 0.0,
             FilterKind::Box { .. } => 0.0,
             FilterKind::Tent { radius } => -self.scale / (if x < 0.0 { -radius } else { radius }),
-            FilterKind::Gaussian { radius, std_dev } => {
-                let v = 1.0 / (std_dev * std_dev);
-                -x * v * self.scale * fm::exp(0.5 * v * (radius - x) * (radius + x))
+            FilterKind::Gaussian { std_dev, .. } => {
+                -x * (1.0 / (std_dev * std_dev)) * self.scale * (1.0 + shape)
             }
-        }
+        };
+        (self.scale * shape, slope)
     }
 }
 

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use drt_math::{Real, fm};
 
-use crate::model::filter::{Filter, FilterKind, shape, shape_inverse};
+use crate::model::filter::{Filter, FilterKind, shape_inverse};
 
 /// Share of samples drawn in proportion to |p'| where the derivative is wanted too.
 ///
@@ -20,6 +20,8 @@ pub struct FilterSample {
     pub offset: [f64; 2],
     /// P over the density: the factor on whatever is found at the image point.
     pub weight: f64,
+    /// Gradient of P by the offset, over the density.
+    pub slope: [f64; 2],
     /// Density per square pixel.
     pub pdf: f64,
 }
@@ -34,8 +36,11 @@ impl Filter {
     #[must_use]
     pub fn sample(&self, u: [f64; 2], derivative: bool) -> FilterSample {
         let offset = u.map(|u| self.sample_axis(u, derivative));
-        let pdf = self.pdf(offset, derivative);
-        FilterSample { offset, weight: self.eval(offset[0], offset[1]) / pdf, pdf }
+        let share = self.slope_share(derivative);
+        let [(x, sx), (y, sy)] = offset.map(|o| self.axis_with_slope(o));
+        let pdf = self.pdf_axis(offset[0], sx, share) * self.pdf_axis(offset[1], sy, share);
+        let slope = [sx * y, x * sy].map(|g| g / pdf);
+        FilterSample { offset, weight: x * y / pdf, slope, pdf }
     }
 
     /// Density of [`sample`](Self::sample) at an offset, per square pixel.
@@ -43,7 +48,7 @@ impl Filter {
     #[must_use]
     pub fn pdf(&self, offset: [f64; 2], derivative: bool) -> f64 {
         let share = self.slope_share(derivative);
-        offset.map(|x| self.pdf_axis(x, share)).iter().product()
+        offset.map(|x| self.pdf_axis(x, self.axis_with_slope(x).1, share)).iter().product()
     }
 
     /// The density at a coordinate of the samples of all `n` pixels of a row, each of which draws one from its
@@ -120,7 +125,7 @@ impl Filter {
         if u < 0.5 { -x } else { x }
     }
 
-    fn pdf_axis(&self, x: f64, share: f64) -> f64 {
+    fn pdf_axis(&self, x: f64, slope: f64, share: f64) -> f64 {
         if x < -self.radius || x >= self.radius {
             return 0.0;
         }
@@ -128,8 +133,7 @@ impl Filter {
         if share == 0.0 {
             return profile;
         }
-        let peak = self.scale * shape(self.kind, 0.0);
-        profile * (1.0 - share) + Real::abs(self.axis_slope(x)) * (share / (2.0 * peak))
+        profile * (1.0 - share) + Real::abs(slope) * (share / (2.0 * self.peak))
     }
 }
 

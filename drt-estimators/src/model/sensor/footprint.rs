@@ -51,8 +51,7 @@ impl Iterator for Footprint<'_> {
         };
         let dx = self.point[0] - (f64::from(column) + 0.5);
         let dy = self.point[1] - (f64::from(row) + 0.5);
-        let [x, y] = [self.filter.axis(dx), self.filter.axis(dy)];
-        let gradient = [self.filter.axis_slope(dx) * y, x * self.filter.axis_slope(dy)];
-        Some(PixelWeight { pixel: [column, row], weight: x * y, gradient })
+        let [(x, sx), (y, sy)] = [dx, dy].map(|o| self.filter.axis_with_slope(o));
+        Some(PixelWeight { pixel: [column, row], weight: x * y, gradient: [sx * y, x * sy] })
     }
 }

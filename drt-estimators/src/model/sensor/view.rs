@@ -74,7 +74,7 @@ impl Sensor {
                     direction: self.ray(point).direction,
                     point,
                     weight: s.weight,
-                    slope: self.filter.gradient(s.offset[0], s.offset[1]).map(|g| g / s.pdf),
+                    slope: s.slope,
                 }
             }
             Response::Irradiance => {
