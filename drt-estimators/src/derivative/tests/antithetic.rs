@@ -25,15 +25,18 @@ enum Form {
     Spatial,
 }
 
-/// The interior derivative of all light of lamps and the sky: along single rays, and from pairs whose other ray brings what
-/// `other` makes of it.
+/// What the other ray of a pair brings, as a test changes it.
+type Change<'a> = &'a dyn Fn(&AntitheticPair, &mut PairedRadiance);
+
+/// The interior derivative of all light of lamps and the sky: along single rays, from pairs, and from pairs whose other
+/// ray brings what a planted `fault` makes of it.
 fn derivatives(
     scene: &Scene,
     parameter: &Parameter,
     form: Form,
     paths: u32,
-    other: impl Fn(&AntitheticPair, &mut PairedRadiance),
-) -> [Moments; 2] {
+    fault: Change<'_>,
+) -> [Moments; 3] {
     let (prepared, motion) = prepare(scene, parameter, 5);
     let world = &prepared.world;
     let mut tracer = Tracer::new(world);
@@ -44,25 +47,26 @@ fn derivatives(
     let mut path = Recording::new(world, field, AntitheticPairs::new(true));
     let mut differentiator = Differentiator::new(world);
     let mut sink = Contraction::new(world, &motion);
-    let (mut buffer, mut moments) = (PairedRadiance::default(), [Moments::default(); 2]);
-    for (seed, moments) in (20..).zip(&mut moments) {
-        for i in 0..paths {
-            let choices = (seed == 21).then(|| Rng::new(9, 1, i));
+    let mut buffer = PairedRadiance::default();
+    let mut of = |seed: u64, paired: bool, change: Change<'_>| -> Moments {
+        let one = |i| {
+            let choices = paired.then(|| Rng::new(9, 1, i));
             let slope = trace(&mut tracer, &mut path, choices, seed, i);
             sink.clear();
             differentiator.differentiate(&path.path(), slope, Rng::new(6, 0, i), &mut sink);
             path.views[0].pairs.follow(&mut tracer, &mut buffer, |pair, chance, incoming| {
                 let mut incoming = incoming.clone();
-                other(pair, &mut incoming);
+                change(pair, &mut incoming);
                 differentiator.pair(&path.path(), pair, chance, &incoming, &mut sink);
             });
-            moments.push(sink.rates[0].mean());
-        }
-    }
-    moments
+            sink.rates[0].mean()
+        };
+        (0..paths).map(one).collect()
+    };
+    [of(20, false, &|_, _| {}), of(21, true, &|_, _| {}), of(21, true, fault)]
 }
 
-fn z([single, pairs]: [Moments; 2]) -> f64 {
+fn z([single, pairs]: [&Moments; 2]) -> f64 {
     let variance = single.variance_of_mean() + pairs.variance_of_mean();
     (single.mean() - pairs.mean()) / f64::sqrt(variance)
 }
@@ -75,18 +79,15 @@ fn dimmed(incoming: &mut PairedRadiance, by: f64) {
 fn check(ball: Bsdf) {
     let scene = surfaces(ball, twosided(phong()));
     let rougher = set("alpha", "ball-bsdf", "alpha", grey(1.0));
-    let find = |other: &dyn Fn(&AntitheticPair, &mut PairedRadiance)| {
-        derivatives(&scene, &rougher, Form::Material, 400_000, other)
-    };
-    let fair = find(&|_, _| {});
-    assert!(z(fair).abs() < 4.0, "{fair:?}");
     // Planted: one of the sides is too dark.
-    let faulty = find(&|pair, incoming| {
+    let fault: Change<'_> = &|pair, incoming| {
         if matches!(pair.kind, PairKind::Roughness(slope) if slope < 0.0) {
             dimmed(incoming, 0.75);
         }
-    });
-    assert!(z(faulty).abs() > 5.0, "{faulty:?}");
+    };
+    let [single, pairs, faulty] = derivatives(&scene, &rougher, Form::Material, 400_000, fault);
+    assert!(z([&single, &pairs]).abs() < 4.0, "{single:?} {pairs:?}");
+    assert!(z([&single, &faulty]).abs() > 5.0, "{single:?} {faulty:?}");
 }
 
 fn narrow(bsdf: Bsdf, alpha: f64) -> Bsdf {
@@ -105,23 +106,21 @@ fn narrow(bsdf: Bsdf, alpha: f64) -> Bsdf {
 /// By what turns the lobes of the ball, with much less noise.
 fn turned(ball: Bsdf, parameter: &Parameter, form: Form) {
     let scene = surfaces(narrow(ball, 0.05), twosided(phong()));
-    let find = |other: &dyn Fn(&AntitheticPair, &mut PairedRadiance)| {
-        derivatives(&scene, parameter, form, 200_000, other)
-    };
-    let fair = find(&|_, _| {});
-    let [single, pairs] = fair.map(|m| m.variance_of_mean());
-    println!("{form:?}, {}: {:.2} {:.2}", parameter.name, z(fair), pairs / single);
-    assert!(z(fair).abs() < 4.0, "{fair:?}");
-    // In the spatial form what is carried through glass has rare, large samples of its own.
-    let tails = form == Form::Spatial && scene.bsdfs[0].item.is_transmissive();
-    assert!(tails || pairs < 0.5 * single, "{fair:?}");
     // Planted: the one side of the lobe is dark.
-    let faulty = find(&|pair, incoming| {
+    let fault: Change<'_> = &|pair, incoming| {
         if matches!(&pair.kind, PairKind::Turns([turn, _]) if turn.n.x + turn.eta < 0.0) {
             dimmed(incoming, 0.0);
         }
-    });
-    assert!(z(faulty).abs() > 5.0, "{faulty:?}");
+    };
+    let [single, pairs, faulty] = derivatives(&scene, parameter, form, 200_000, fault);
+    let (z, unlike) = (z([&single, &pairs]), z([&single, &faulty]));
+    let noise = pairs.variance_of_mean() / single.variance_of_mean();
+    println!("{form:?}, {}: {z:.2} {noise:.2}; {unlike:.2}", parameter.name);
+    assert!(z.abs() < 4.0, "{single:?} {pairs:?}");
+    // In the spatial form what is carried through glass has rare, large samples of its own.
+    let tails = form == Form::Spatial && scene.bsdfs[0].item.is_transmissive();
+    assert!(tails || noise < 0.5, "{single:?} {pairs:?}");
+    assert!(unlike.abs() > 5.0, "{single:?} {faulty:?}");
 }
 
 #[test]
@@ -152,13 +151,10 @@ fn pairs_of_rays_turn_with_everything() {
         scene.emitters.retain(|e| !matches!(e.item.emitter, Emitter::Constant { .. }));
         let all = ["ball", "floor", "lamp", "camera"].map(|id| moves(id, turn()));
         let all = parameter("all turns", 0.0, all.to_vec());
-        let find = |other: &dyn Fn(&AntitheticPair, &mut PairedRadiance)| {
-            derivatives(&scene, &all, Form::Material, 20_000, other)
-        };
-        let size = |m: &Moments| f64::sqrt(m.mean() * m.mean() + m.variance_of_mean());
-        let [single, pairs] = find(&|_, _| {}).map(|m| size(&m));
         // Planted: the other rays end nowhere.
-        let [_, faulty] = find(&|_, incoming| incoming.ends.clear()).map(|m| size(&m));
+        let fault: Change<'_> = &|_, incoming| incoming.ends.clear();
+        let [single, pairs, faulty] = derivatives(&scene, &all, Form::Material, 20_000, fault)
+            .map(|m| f64::sqrt(m.mean() * m.mean() + m.variance_of_mean()));
         println!("{single:e} {pairs:e} {faulty:e}");
         assert!(single < 1e-9 && pairs < 1e-9 && faulty > 1e-4);
     }
