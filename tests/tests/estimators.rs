@@ -13,8 +13,8 @@ use drt_tests::Result;
 use drt_tests::matrix::estimators::{Effort, Pairs, compare};
 use drt_tests::matrix::{Stage, caged, deforming, lights, media, riding, surfaces};
 
-fn run(stage: Result<Stage>, kind: EstimatorKind, effort: Effort) {
-    let pairs = compare(&stage.unwrap(), kind, effort).unwrap();
+fn run(stage: Result<Stage>, kinds: &[EstimatorKind], effort: Effort) {
+    let pairs = compare(&stage.unwrap(), kinds, effort).unwrap();
     println!("{}", Pairs(&pairs));
     assert!(!pairs.is_empty(), "the stage has no such cells");
     let failing = pairs.iter().filter(|pair| !pair.passes()).count();
@@ -43,30 +43,24 @@ macro_rules! stages {
         mod short {
             $($(#[test] fn $stage() {
                 let stage = super::$room::$stage().map(super::Stage::short);
-                super::run(stage, super::Radiative, super::short());
+                super::run(stage, &[super::Radiative, super::Warped], super::short());
             })*)*
         }
         mod all {
             $($(#[test] #[ignore = "minutes"] fn $stage() {
-                super::run(super::$room::$stage(), super::Radiative, super::costs());
+                super::run(super::$room::$stage(), &[super::Radiative], super::costs());
             })*)*
         }
         mod covered {
             $($(#[test] #[ignore = "hours"] fn $stage() {
                 let stage = super::$room::$stage().map(super::Stage::in_extended_light);
-                super::run(stage, super::Radiative, super::precise());
-            })*)*
-        }
-        mod warped_short {
-            $($(#[test] fn $stage() {
-                let stage = super::$room::$stage().map(super::Stage::short);
-                super::run(stage, super::Warped, super::short());
+                super::run(stage, &[super::Radiative], super::precise());
             })*)*
         }
         mod warped {
             $($(#[test] #[ignore = "hours"] fn $stage() {
                 let stage = super::$room::$stage().map(super::Stage::in_extended_light);
-                super::run(stage, super::Warped, super::precise());
+                super::run(stage, &[super::Warped], super::precise());
             })*)*
         }
     };

@@ -1,4 +1,4 @@
-//! Derivatives by one estimator against those by another.
+//! Derivatives by one estimator against those by others.
 
 use std::fmt;
 use std::time::Instant;
@@ -45,6 +45,8 @@ pub struct Pair {
     pub stage: &'static str,
     /// Name of the parameter.
     pub parameter: String,
+    /// The estimator in question.
+    pub kind: EstimatorKind,
     /// The comparison.
     pub agreement: Agreement,
     /// How much larger the one in question is than the other.
@@ -78,21 +80,24 @@ impl Pair {
     }
 }
 
-/// Compares every derivative of a stage by `kind` with that by path space. Of hundreds of comparisons
+/// Compares every derivative of a stage by each of `kinds` with that by path space. Of hundreds of comparisons
 /// some exceed by chance what one in a thousand does: what fails is measured once more, by other random
 /// numbers alone, and the second verdict counts.
 ///
 /// # Errors
 /// When the library rejects the scene or a parameter.
-pub fn compare(stage: &Stage, kind: EstimatorKind, effort: Effort) -> Result<Vec<Pair>> {
-    let mut pairs = compare_once(stage, kind, effort, [7, 19])?;
-    let again = |pair: &Pair| !pair.passes();
-    if pairs.iter().any(again) {
+pub fn compare(stage: &Stage, kinds: &[EstimatorKind], effort: Effort) -> Result<Vec<Pair>> {
+    let mut pairs = compare_once(stage, kinds, effort, [7, 19])?;
+    for kind in kinds {
+        let again = |pair: &Pair| pair.kind == *kind && !pair.passes();
+        if !pairs.iter().any(again) {
+            continue;
+        }
         let mut failing = stage.clone();
         failing
             .cells
             .retain(|c| pairs.iter().any(|pair| again(pair) && pair.parameter == c.parameter.name));
-        let second = compare_once(&failing, kind, effort, [107, 119])?;
+        let second = compare_once(&failing, &[*kind], effort, [107, 119])?;
         for pair in pairs.iter_mut().filter(|pair| again(pair)) {
             if let Some(other) = second.iter().find(|s| s.parameter == pair.parameter) {
                 *pair = other.clone();
@@ -104,7 +109,7 @@ pub fn compare(stage: &Stage, kind: EstimatorKind, effort: Effort) -> Result<Vec
 
 fn compare_once(
     stage: &Stage,
-    kind: EstimatorKind,
+    kinds: &[EstimatorKind],
     effort: Effort,
     seeds: [u64; 2],
 ) -> Result<Vec<Pair>> {
@@ -115,34 +120,49 @@ fn compare_once(
         let run = |kind, seed| sample(stage, &parameters, kind, seed, effort);
         // Other random numbers, so that the errors are independent.
         let reference = run(EstimatorKind::PathSpace, seeds[0])?;
-        let own = run(kind, seeds[1])?;
-        for (k, (a, b)) in own.all.derivatives.iter().zip(&reference.all.derivatives).enumerate() {
-            let size = b.total.rms_value();
-            let part = reference.part(k);
-            let noise = [&a.total, &b.total].map(|l| l.relative_noise(Some(size)) * part);
-            let terms: Vec<(Term, f64)> =
-                a.terms.iter().map(|(t, l)| (*t, l.rms_value() / size * part)).collect();
-            let plant = |((term, part), (_, layer)): (&(Term, f64), &(Term, Layer))| {
-                (*part >= SIGNIFICANT).then(|| Fault {
-                    term: *term,
-                    factor: -1.0,
-                    agreement: agreement(&plus(&a.total, -2.0, layer), &b.total, None),
-                })
-            };
-            pairs.push(Pair {
-                stage: stage.name,
-                parameter: a.name.clone(),
-                agreement: agreement(&a.total, &b.total, None),
-                scale: Scale::new(own.halves(k), reference.halves(k)) * part,
-                noise,
-                work: (noise[0] / noise[1]).powi(2) * own.seconds / reference.seconds,
-                faults: terms.iter().zip(&a.terms).filter_map(plant).collect(),
-                terms,
-                non_finite: own.all.non_finite,
-            });
+        for kind in kinds {
+            let own = run(*kind, seeds[1])?;
+            pairs.extend(pairs_of(stage.name, *kind, &own, &reference));
         }
     }
     Ok(pairs)
+}
+
+/// The comparisons of all derivatives that two estimators have sampled.
+fn pairs_of(
+    stage: &'static str,
+    kind: EstimatorKind,
+    own: &Sampled,
+    reference: &Sampled,
+) -> Vec<Pair> {
+    let mut pairs = Vec::new();
+    for (k, (a, b)) in own.all.derivatives.iter().zip(&reference.all.derivatives).enumerate() {
+        let size = b.total.rms_value();
+        let part = reference.part(k);
+        let noise = [&a.total, &b.total].map(|l| l.relative_noise(Some(size)) * part);
+        let terms: Vec<(Term, f64)> =
+            a.terms.iter().map(|(t, l)| (*t, l.rms_value() / size * part)).collect();
+        let plant = |((term, part), (_, layer)): (&(Term, f64), &(Term, Layer))| {
+            (*part >= SIGNIFICANT).then(|| Fault {
+                term: *term,
+                factor: -1.0,
+                agreement: agreement(&plus(&a.total, -2.0, layer), &b.total, None),
+            })
+        };
+        pairs.push(Pair {
+            stage,
+            parameter: a.name.clone(),
+            kind,
+            agreement: agreement(&a.total, &b.total, None),
+            scale: Scale::new(own.halves(k), reference.halves(k)) * part,
+            noise,
+            work: (noise[0] / noise[1]).powi(2) * own.seconds / reference.seconds,
+            faults: terms.iter().zip(&a.terms).filter_map(plant).collect(),
+            terms,
+            non_finite: own.all.non_finite,
+        });
+    }
+    pairs
 }
 
 /// What has been sampled.
@@ -219,13 +239,13 @@ impl fmt::Display for Pairs<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "\n{:<44}  rms z  max z  limit  noise   path            scale    work  terms; faults and their rms z",
+            "\n{:<54}  rms z  max z  limit  noise   path            scale    work  terms; faults and their rms z",
             ""
         )?;
         for pair in self.0 {
-            let name = format!("{}: {}", pair.stage, pair.parameter);
+            let name = format!("{}: {}, {:?}", pair.stage, pair.parameter, pair.kind);
             let a = &pair.agreement;
-            write!(f, "{name:<44} {:>6.2} {:>6.2} {:>6.2}", a.rms_z, a.max_z, a.limit)?;
+            write!(f, "{name:<54} {:>6.2} {:>6.2} {:>6.2}", a.rms_z, a.max_z, a.limit)?;
             for noise in pair.noise {
                 write!(f, " {:>5.1}%", 100.0 * noise)?;
             }
