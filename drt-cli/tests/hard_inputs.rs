@@ -518,16 +518,17 @@ fn dropped_triangles_are_told() {
     assert_eq!(job.scene.shapes[0].mesh.triangles.len(), 2);
 }
 
+/// Of those that cannot be merged each ray at one meets all: their cost is quadratic, and shows with few.
 #[test]
-fn ten_thousand_coincident_triangles() {
+fn thousands_of_coincident_triangles() {
     let repeated = "f 1 2 3\nf 1 3 4\n".repeat(5000);
     // On one another, but no two alike: what cannot be merged.
     let mut shifted = String::from("v -1 -1 0\nv 1 -1 0\n");
-    // One edge that ten thousand share.
+    // One edge that all of them share.
     let mut fan = shifted.clone();
-    for i in 0..10_000 {
+    for i in 0..3_000 {
         let _ = writeln!(shifted, "v {} 1 0\nf 1 2 {}", 1e-9 * f64::from(i), i + 3);
-        let angle = f64::from(i) * 3e-4;
+        let angle = f64::from(i) * 1e-3;
         let _ = writeln!(fan, "v 0 {} {}\nf 1 2 {}", angle.cos() - 1.0, angle.sin(), i + 3);
     }
     let job = job("target = \"mesh\"\ntranslate = [0, 0, 1]");
