@@ -176,19 +176,8 @@ struct Apply<'a> {
 }
 
 impl Apply<'_> {
-    fn name(&self, target: Target) -> String {
-        let (kind, i, id) = match target {
-            Target::Shape(i) => ("shape", i, &self.scene.shapes[i].id),
-            Target::Medium(i) => ("medium", i, &self.scene.media[i].id),
-            Target::Bsdf(i) => ("bsdf", i, &self.scene.bsdfs[i].id),
-            Target::Emitter(i) => ("emitter", i, &self.scene.emitters[i].id),
-            Target::Sensor(i) => ("sensor", i, &self.scene.sensors[i].id),
-        };
-        id.clone().unwrap_or_else(|| alloc::format!("{kind}[{i}]"))
-    }
-
     fn fail(&self, parameter: usize, target: Target, reason: impl Into<EffectError>) -> Error {
-        effect_error(&self.parameters[parameter], &self.name(target), reason.into())
+        effect_error(&self.parameters[parameter], &self.scene.name_of(target), reason.into())
     }
 
     fn geometry(&self, target: Target) -> Result<Vec<Applied<'_, GeometryChange>>, Error> {
@@ -351,9 +340,10 @@ impl Apply<'_> {
     fn emitter(&mut self, i: usize) -> Result<(), Error> {
         let target = Target::Emitter(i);
         let given = self.scene.emitters[i].item.emitter;
-        let emitter = given
-            .checked()
-            .map_err(|e| Error::Element { element: self.name(target), reason: e.into() })?;
+        let emitter = given.checked().map_err(|e| Error::Element {
+            element: self.scene.name_of(target),
+            reason: e.into(),
+        })?;
         let changes = self.geometry(target)?;
         if let (Some(first), Emitter::Area { .. } | Emitter::Constant { .. }) =
             (changes.first(), emitter)

@@ -179,6 +179,19 @@ impl TargetName for String {
 }
 
 impl Scene {
+    /// Refuses derivatives with respect to `parameter` where light meets smooth surfaces: they move
+    /// light along them, which no term here samples.
+    pub(crate) fn refuse_smooth(&self, parameter: &str) -> Result<(), Error> {
+        for (i, s) in self.shapes.iter().enumerate() {
+            let bsdf = &self.bsdfs[s.bsdf].item;
+            if bsdf.is_smooth() {
+                let (bsdf, parameter) = (bsdf.name(), parameter.into());
+                return Err(unusable(&s.id, "shape", i, ElementError::Smooth { bsdf, parameter }));
+            }
+        }
+        Ok(())
+    }
+
     /// Checks that indices refer to something, that what emits has an area, and the numbers of meshes, scattering
     /// models, phase functions and emitters. Coefficients, sensors and filters are checked where they are made.
     ///
@@ -267,6 +280,18 @@ impl Scene {
         (i < len).then(|| make(i))
     }
 
+    /// Id, or kind and order, of something that exists.
+    pub(crate) fn name_of(&self, target: Target) -> String {
+        let (kind, i, id) = match target {
+            Target::Shape(i) => ("shape", i, &self.shapes[i].id),
+            Target::Medium(i) => ("medium", i, &self.media[i].id),
+            Target::Bsdf(i) => ("bsdf", i, &self.bsdfs[i].id),
+            Target::Emitter(i) => ("emitter", i, &self.emitters[i].id),
+            Target::Sensor(i) => ("sensor", i, &self.sensors[i].id),
+        };
+        id.clone().unwrap_or_else(|| alloc::format!("{kind}[{i}]"))
+    }
+
     fn named(&self) -> impl Iterator<Item = (Option<&str>, Target)> {
         fn ids<T>(
             items: &[Named<T>],
@@ -296,7 +321,9 @@ mod tests {
     use drt_math::{Rgb, Vec3};
 
     use super::*;
-    use crate::model::surface::{Diffuse, RoughConductor};
+    use crate::model::filter::{Filter, FilterKind};
+    use crate::model::sensor::{Lens, Sensor};
+    use crate::model::surface::{Dielectric, Diffuse, RoughConductor};
 
     fn scene() -> Scene {
         let light = Emitter::Point { position: Vec3::Z, intensity: Rgb::ONE };
@@ -352,5 +379,33 @@ mod tests {
             s.emitters[0].item.emitter = Emitter::Area { radiance: Rgb::ONE };
         };
         fails(&flat, "it emits but has no area");
+    }
+
+    #[test]
+    fn smooth_surfaces_refuse_derivatives_by_name() {
+        let mut scene = scene();
+        assert!(scene.refuse_smooth("spin").is_ok());
+        scene.bsdfs.push(Named::new("glass", Bsdf::Dielectric(Dielectric::default())));
+        // One that no shape has does no harm.
+        assert!(scene.refuse_smooth("spin").is_ok());
+        let shape = scene.shapes.len() - 1;
+        scene.shapes[shape].bsdf = scene.bsdfs.len() - 1;
+        let parameters = [drt_motion::Parameter {
+            name: "spin".into(),
+            value: 0.0,
+            effects: alloc::vec::Vec::new(),
+        }];
+        let name = scene.name_of(Target::Shape(shape));
+        let filter = Filter::new(FilterKind::BOX).expect("a filter");
+        let at = [Vec3::Z * 5.0, Vec3::ZERO, Vec3::Y];
+        let sensor = Sensor::look_at(at, Lens::default(), [2, 2], filter).expect("a camera");
+        let item = SceneSensor { sensor, medium: Surrounding::Counted, sample_count: None };
+        scene.sensors.push(Named::new("camera", item));
+        let message = crate::Session::new(&scene, &parameters, &crate::Settings::default());
+        let message = message.err().expect("a refusal").to_string();
+        assert!(message.contains(&name) && message.contains("dielectric"), "{message}");
+        assert!(message.contains("`spin` cannot be differentiated"), "{message}");
+        // The image is nobody's derivative.
+        assert!(crate::Session::new(&scene, &[], &crate::Settings::default()).is_ok());
     }
 }

@@ -72,6 +72,7 @@ pub fn gradient(
     scene.check()?;
     settings.check(scene, true)?;
     let wanted = wanted.iter().map(|w| w.find_in(scene)).collect::<Result<Vec<_>, _>>()?;
+    wanted.first().map_or(Ok(()), |target| scene.refuse_smooth(&scene.name_of(*target)))?;
     let wanted = &wanted[..];
     let (scene, _) = tangents::apply(scene, &[])?;
     let film = scene.sensors[settings.sensor].item.sensor.film();

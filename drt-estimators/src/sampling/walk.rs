@@ -10,6 +10,7 @@ use crate::sampling::trace::{
 };
 use crate::world::RayPath;
 use crate::world::lights::LightSample;
+use crate::world::scatter::Drawn;
 use crate::world::vertex::Vertex;
 
 impl Tracer<'_> {
@@ -46,12 +47,19 @@ impl Tracer<'_> {
         if stop.segments + 1 >= self.max_segments && !M::EMISSION {
             return None;
         }
-        let (to, pdf) = scattering.sample(stop.from, M::GIVEN, &mut self.rng)?;
-        if pdf.is_nan() || pdf <= 0.0 {
-            return None;
-        }
-        let value = M::value(&scattering, stop.from, to);
-        let mut inv_pdf = 1.0 / pdf;
+        let mut segments = stop.segments;
+        let (to, pdf, value) = match scattering.sample(stop.from, M::GIVEN, &mut self.rng)? {
+            Drawn::Spread(to, pdf) if pdf > 0.0 => {
+                (to, Some(pdf), M::value(&scattering, stop.from, to))
+            }
+            Drawn::Spread(..) => return None,
+            Drawn::Specular(s) => {
+                // Like a null interface, a pane that light goes straight through adds no depth.
+                segments -= u32::from(s.straight && segments > 0);
+                (s.w, None, s.weight)
+            }
+        };
+        let mut inv_pdf = pdf.map_or(1.0, f64::recip);
         let mut alive = stop.alive.times(stop.arrival * sigma_s * (value * inv_pdf), spare);
         if alive.value.is_zero() {
             return None;
@@ -68,10 +76,10 @@ impl Tracer<'_> {
             node: stop.node,
             vertex: stop.vertex,
             dir: to,
-            pdf: Some(pdf),
+            pdf,
             throughput: stop.throughput * sigma_s * (value * inv_pdf),
             alive,
-            segments: stop.segments,
+            segments,
         };
         observer.scatter(world, &leaving, value, inv_pdf, &self.rng);
         Some(leaving)

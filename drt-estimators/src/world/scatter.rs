@@ -4,7 +4,9 @@ use drt_geom::edges::Lobes;
 use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Phase;
 
-use crate::model::surface::{BsdfParams, DirectionPartner, Given, LocalBsdf, RoughnessPartner};
+use crate::model::surface::{
+    BsdfParams, DirectionPartner, Given, LocalBsdf, RoughnessPartner, SpecularSample,
+};
 
 /// The local scattering function of a vertex.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +15,14 @@ pub(crate) enum Scattering<'a> {
     Surface(LocalBsdf<'a>),
     /// Phase function; the scattering coefficient is not in it.
     Volume(&'a Phase),
+}
+
+/// A direction drawn at random.
+pub(crate) enum Drawn {
+    /// With its solid-angle density.
+    Spread(Vec3, f64),
+    /// One of the single directions of a smooth surface.
+    Specular(SpecularSample),
 }
 
 /// The gradient of a scattering function.
@@ -38,18 +48,21 @@ impl Scattering<'_> {
         }
     }
 
-    /// Draws the direction that is not given; returns it with its solid-angle density.
-    pub(crate) fn sample(&self, from: Vec3, given: Given, rng: &mut Rng) -> Option<(Vec3, f64)> {
+    /// Draws the direction that is not given.
+    pub(crate) fn sample(&self, from: Vec3, given: Given, rng: &mut Rng) -> Option<Drawn> {
         match self {
             Self::Surface(bsdf) => {
                 let u = [rng.next_f64(), rng.next_f64(), rng.next_f64()];
-                bsdf.sample(from, u, given).map(|s| (s.w, s.pdf))
+                match bsdf.sample_specular(from, u[2], given) {
+                    Some(s) => Some(Drawn::Specular(s)),
+                    None => bsdf.sample(from, u, given).map(|s| Drawn::Spread(s.w, s.pdf)),
+                }
             }
             Self::Volume(phase) => {
                 // Both phase functions here depend on the angle alone, so which of the two
                 // directions is given makes no difference.
                 let (flow, pdf) = phase.sample(-from, rng.next_2d());
-                Some((flow, pdf))
+                Some(Drawn::Spread(flow, pdf))
             }
         }
     }

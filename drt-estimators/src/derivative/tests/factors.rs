@@ -7,7 +7,7 @@ use crate::derivative::tests::fade;
 use crate::derivative::tests::scenes::{diffuse, glass, metal, phong, twosided};
 use crate::model::surface::tests::value_over;
 use crate::model::surface::{Bsdf, Given};
-use crate::world::scatter::Scattering;
+use crate::world::scatter::{Drawn, Scattering};
 
 /// The coordinates of `wo`, `wi`, the shading and the geometric normal.
 type D = Dual<f64, 12>;
@@ -109,7 +109,7 @@ fn samples_have_the_density_they_claim() {
             for given in [Given::Wo, Given::Wi] {
                 for _ in 0..200 {
                     let from = random(&mut rng);
-                    if let Some((w, pdf)) = s.sample(from, given, &mut rng) {
+                    if let Some(Drawn::Spread(w, pdf)) = s.sample(from, given, &mut rng) {
                         assert!((s.pdf(from, w, given) - pdf).abs() <= 1e-12 * pdf);
                     }
                 }

@@ -27,6 +27,17 @@ pub enum ElementError {
     /// A shape carries an emitter of another kind than area.
     #[error("it carries an emitter of type `{0}`; only those of type `area` belong on shapes")]
     NotAnArea(&'static str),
+    /// A smooth surface where something is to be differentiated.
+    #[error(
+        "its BSDF, {bsdf}, is smooth, and `{parameter}` cannot be differentiated where light may be \
+         reflected or refracted by it; make it rough, or use finite differences"
+    )]
+    Smooth {
+        /// Kind of BSDF, by its plugin name.
+        bsdf: &'static str,
+        /// The parameter, or what else was to be differentiated by.
+        parameter: String,
+    },
     /// A shape's arrays.
     #[error(transparent)]
     Mesh(#[from] MeshError),

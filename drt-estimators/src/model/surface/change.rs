@@ -147,11 +147,12 @@ impl Bsdf {
 
     fn property(&mut self, property: Property) -> Option<Slot<'_>> {
         match self {
-            Self::Null => None,
+            Self::Null | Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => None,
             Self::Diffuse(b) => b.slot(property),
             Self::Phong(b) => b.slot(property),
             Self::RoughConductor(b) => b.slot(property),
             Self::RoughDielectric(b) => b.slot(property),
+            Self::Plastic(b) => b.slot(property),
             Self::TwoSided(b) => b.front.property(property),
         }
     }

@@ -37,7 +37,7 @@ use drt_math::{Vec3, fm};
 
 use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA};
-use crate::model::surface::{Bsdf, Phong, RoughConductor, RoughDielectric};
+use crate::model::surface::{Bsdf, Phong, Plastic, RoughConductor, RoughDielectric};
 
 impl Bsdf {
     /// The sketch of the light that leaves to `wo`, by where it comes from.
@@ -48,7 +48,12 @@ impl Bsdf {
             Self::Phong(b) => phong(b, wo, n),
             Self::RoughConductor(b) => conductor(b, wo, n),
             Self::RoughDielectric(b) => dielectric(b, wo, n),
-            Self::Null | Self::TwoSided(_) => Lobes::even(0.0),
+            Self::Plastic(b) => plastic(b, wo, n),
+            Self::Null
+            | Self::Conductor(_)
+            | Self::Dielectric(_)
+            | Self::ThinDielectric(_)
+            | Self::TwoSided(_) => Lobes::even(0.0),
         }
     }
 }
@@ -66,6 +71,18 @@ fn conductor(b: &RoughConductor, wo: Vec3, n: Vec3) -> Lobes {
     let fresnel = conductor_reflected(cos, b.eta.mean(), b.k.mean());
     let share = b.specular_reflectance.mean() * fresnel;
     Lobes::glossy(0.0, [reflection(wo, n, b.alpha, share), Lobe::default()])
+}
+
+fn plastic(b: &Plastic, wo: Vec3, n: Vec3) -> Lobes {
+    let through = b.coating.let_through(n.dot(wo).clamp(1e-6, 1.0));
+    let even = b.reflectance.mean() * through * FRAC_1_PI;
+    match b.coating.facets() {
+        Some((_, alpha)) => {
+            let share = b.specular_reflectance.mean() * (1.0 - through);
+            Lobes::glossy(even, [reflection(wo, n, alpha, share), Lobe::default()])
+        }
+        None => Lobes::even(even),
+    }
 }
 
 fn dielectric(b: &RoughDielectric, wo: Vec3, n: Vec3) -> Lobes {

@@ -12,6 +12,7 @@ use drt_math::{Real, Rgb, RgbVec, Vec3};
 
 use crate::model::surface::{
     Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given, RoughnessPartner,
+    SpecularSample,
 };
 
 /// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.
@@ -78,6 +79,22 @@ impl LocalBsdf<'_> {
     #[inline]
     pub(crate) fn sample(&self, from: Vec3, u: [f64; 3], given: Given) -> Option<DirectionSample> {
         self.bsdf.sample(from, self.ns, u, given)
+    }
+
+    /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`].
+    #[inline]
+    pub(crate) fn sample_specular(
+        &self,
+        from: Vec3,
+        choice: f64,
+        given: Given,
+    ) -> Option<SpecularSample> {
+        let mut s = self.bsdf.sample_specular(from, self.ns, choice, given)?;
+        if self.interpolated {
+            // As the value fades where there is one.
+            s.weight *= fade(self.ns.dot(from)).0 * fade(self.ng.dot(s.w)).0;
+        }
+        Some(s)
     }
 
     /// Density per steradian with which [`Self::sample`] draws `to`.

@@ -4,11 +4,13 @@
 //! surface; `n` is the shading normal; all three have length one. The geometric normal plays no
 //! part: telling which side of the true surface a direction is on is the caller's. Values *include*
 //! the cosine at the light, `fs(wo, wi) |n·wi|`, and transport radiance: a refraction carries the
-//! squared ratio of the indices on the sides of `wo` and `wi`. Nothing here is a delta function, but
-//! for [`Bsdf::Null`], which scatters nothing and which light crosses unchanged.
+//! squared ratio of the indices on the sides of `wo` and `wi`. What smooth surfaces scatter into
+//! single directions is not in the value and has no density; [`Bsdf::sample_specular`] draws it.
+//! [`Bsdf::Null`] scatters nothing, and light crosses it unchanged.
 //!
 //! The models, their parameters and their defaults are those of the Mitsuba plugins `diffuse`,
-//! `phong`, `roughconductor`, `roughdielectric`, `twosided` and `null`.
+//! `phong`, `plastic`, `roughplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`,
+//! `roughdielectric`, `twosided` and `null`.
 //!
 //! ```
 //! use drt_estimators::surface::{Bsdf, Given, RoughConductor};
@@ -31,6 +33,7 @@
 
 mod angles;
 mod change;
+mod coating;
 mod conductor;
 mod dielectric;
 mod diffuse;
@@ -41,8 +44,10 @@ mod lobes;
 mod local;
 mod microfacet;
 mod phong;
+mod plastic;
 mod property;
 mod roughness_partner;
+mod smooth;
 #[cfg(test)]
 pub(crate) mod tests;
 mod visible_slope;
@@ -53,6 +58,7 @@ use drt_math::{Rgb, RgbVec, Vec3, fm};
 
 use crate::model::surface::angles::{Angles, Slopes};
 pub use crate::model::surface::change::{BsdfChange, BsdfParams, BsdfTangent};
+pub use crate::model::surface::coating::Coating;
 pub use crate::model::surface::conductor::RoughConductor;
 pub use crate::model::surface::dielectric::RoughDielectric;
 pub use crate::model::surface::diffuse::Diffuse;
@@ -61,8 +67,10 @@ use crate::model::surface::facet::Facet;
 pub(crate) use crate::model::surface::local::LocalBsdf;
 pub use crate::model::surface::microfacet::Distribution;
 pub use crate::model::surface::phong::Phong;
+pub use crate::model::surface::plastic::Plastic;
 pub use crate::model::surface::property::{Property, SurfaceError};
 pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
+pub use crate::model::surface::smooth::{Conductor, Dielectric, ThinDielectric};
 
 /// A bidirectional scattering distribution function.
 ///
@@ -82,6 +90,14 @@ pub enum Bsdf {
     RoughConductor(RoughConductor),
     /// A rough interface of two transparent media.
     RoughDielectric(RoughDielectric),
+    /// A diffuse base under a coating, smooth or rough.
+    Plastic(Box<Plastic>),
+    /// A smooth metal.
+    Conductor(Conductor),
+    /// A smooth interface of two transparent media.
+    Dielectric(Dielectric),
+    /// A thin pane.
+    ThinDielectric(ThinDielectric),
     /// A reflector on both sides.
     TwoSided(Box<TwoSided>),
 }
@@ -117,6 +133,17 @@ pub struct DirectionSample {
     pub pdf: f64,
 }
 
+/// A direction that a smooth surface scatters to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpecularSample {
+    /// The direction, away from the surface, of length one.
+    pub w: Vec3,
+    /// What is scattered there, over the probability of choosing it.
+    pub weight: Rgb,
+    /// It goes on straight, as if there were no surface.
+    pub straight: bool,
+}
+
 /// A value `fs(wo, wi) |n·wi|` with its derivatives.
 ///
 /// Derivatives with respect to the three vectors are those of one smooth extension of the value to
@@ -144,7 +171,12 @@ macro_rules! match_model {
             Bsdf::Phong($model) => $body,
             Bsdf::RoughConductor($model) => $body,
             Bsdf::RoughDielectric($model) => $body,
-            Bsdf::Null | Bsdf::TwoSided(_) => $nothing,
+            Bsdf::Plastic($model) => $body,
+            Bsdf::Null
+            | Bsdf::Conductor(_)
+            | Bsdf::Dielectric(_)
+            | Bsdf::ThinDielectric(_)
+            | Bsdf::TwoSided(_) => $nothing,
         }
     };
 }
@@ -204,6 +236,41 @@ impl Bsdf {
         (pdf > 0.0 && pdf.is_finite()).then_some(DirectionSample { w, pdf })
     }
 
+    /// Draws one of the single directions that a smooth surface scatters `from` to. `None` where
+    /// `choice`, the last of the numbers that [`Bsdf::sample`] takes, chooses what has a density: that
+    /// one then draws it, with a density that counts the choice.
+    #[inline]
+    #[must_use]
+    pub fn sample_specular(
+        &self,
+        from: Vec3,
+        n: Vec3,
+        choice: f64,
+        given: Given,
+    ) -> Option<SpecularSample> {
+        let (bsdf, n) = self.facing(from, n);
+        match bsdf {
+            Self::Plastic(b) => b.sample_specular(from, n, choice),
+            Self::Conductor(b) => b.sample(from, n),
+            Self::Dielectric(b) => b.sample(from, n, choice, given),
+            Self::ThinDielectric(b) => b.sample(from, n, choice),
+            _ => None,
+        }
+    }
+
+    /// True where light is scattered into single directions, which no derivative here knows of.
+    #[must_use]
+    pub fn is_smooth(&self) -> bool {
+        match self {
+            Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
+            Self::Plastic(b) => b.is_smooth(),
+            Self::TwoSided(b) => {
+                b.front.is_smooth() || b.back.as_ref().is_some_and(Self::is_smooth)
+            }
+            _ => false,
+        }
+    }
+
     /// Density per steradian with which [`Bsdf::sample`] draws `to`.
     #[inline]
     #[must_use]
@@ -257,12 +324,19 @@ impl Bsdf {
     #[inline]
     #[must_use]
     pub fn is_transmissive(&self) -> bool {
-        matches!(self, Self::RoughDielectric(_))
+        matches!(self, Self::RoughDielectric(_) | Self::Dielectric(_) | Self::ThinDielectric(_))
     }
 
     /// True when nothing is scattered where both directions are on the back of the surface.
     pub(crate) fn is_black_from_behind(&self) -> bool {
-        matches!(self, Self::Diffuse(_) | Self::Phong(_) | Self::RoughConductor(_))
+        matches!(
+            self,
+            Self::Diffuse(_)
+                | Self::Phong(_)
+                | Self::RoughConductor(_)
+                | Self::Plastic(_)
+                | Self::Conductor(_)
+        )
     }
 
     /// About how far the half vector of its sharpest lobe is from the normal, in slopes; at most 1.
@@ -272,6 +346,8 @@ impl Bsdf {
             Self::Phong(b) => 1.0 / fm::sqrt(1.0 + 0.5 * b.exponent),
             Self::RoughConductor(b) => b.alpha,
             Self::RoughDielectric(b) => b.alpha,
+            Self::Plastic(b) => b.coating.facets().map_or(0.0, |(_, alpha)| alpha),
+            Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => 0.0,
             Self::TwoSided(b) => {
                 let back = b.back.as_ref().map_or(1.0, Self::lobe_width);
                 f64::min(b.front.lobe_width(), back)
@@ -289,6 +365,11 @@ impl Bsdf {
             Self::Phong(_) => "phong",
             Self::RoughConductor(_) => "roughconductor",
             Self::RoughDielectric(_) => "roughdielectric",
+            Self::Plastic(b) if b.is_smooth() => "plastic",
+            Self::Plastic(_) => "roughplastic",
+            Self::Conductor(_) => "conductor",
+            Self::Dielectric(_) => "dielectric",
+            Self::ThinDielectric(_) => "thindielectric",
             Self::TwoSided(_) => "twosided",
         }
     }
@@ -301,14 +382,21 @@ impl Bsdf {
         if let Self::TwoSided(b) = self {
             return [Some(&b.front), b.back.as_ref()].into_iter().flatten().try_for_each(|side| {
                 match side {
-                    Self::Null | Self::RoughDielectric(_) | Self::TwoSided(_) => {
-                        Err(SurfaceError::NotReflective { bsdf: side.name() })
-                    }
+                    Self::Null
+                    | Self::RoughDielectric(_)
+                    | Self::Dielectric(_)
+                    | Self::ThinDielectric(_)
+                    | Self::TwoSided(_) => Err(SurfaceError::NotReflective { bsdf: side.name() }),
                     reflector => reflector.validate(),
                 }
             });
         }
-        match_model!(self, b => b.validate(), _ => Ok(()))
+        match self {
+            Self::Conductor(b) => b.validate(),
+            Self::Dielectric(b) => b.validate(),
+            Self::ThinDielectric(b) => b.validate(),
+            _ => match_model!(self, b => b.validate(), _ => Ok(())),
+        }
     }
 
     /// The one-sided BSDF that a direction meets, and the normal it goes with.

@@ -8,6 +8,7 @@ mod gradients;
 mod lobes;
 mod roughness_partners;
 mod sampling;
+mod smooth;
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -28,7 +29,14 @@ pub(crate) fn value_over<T: Real>(
 ) -> Rgb<T> {
     let a = Angles::new(wo, wi, n);
     match bsdf {
-        Bsdf::Null => Rgb::splat(T::zero()),
+        Bsdf::Null | Bsdf::Conductor(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => {
+            Rgb::splat(T::zero())
+        }
+        Bsdf::Plastic(b) => b.value_with(
+            &a,
+            lift(Property::Reflectance, b.reflectance),
+            lift(Property::SpecularReflectance, b.specular_reflectance),
+        ),
         Bsdf::Diffuse(b) => {
             Diffuse { reflectance: lift(Property::Reflectance, b.reflectance) }.value(&a)
         }
@@ -94,6 +102,16 @@ fn glass(distribution: Distribution, alpha: f64, eta: f64) -> RoughDielectric {
     RoughDielectric { distribution, alpha, eta, ..Default::default() }
 }
 
+fn rough_plastic(distribution: Distribution, alpha: f64, eta: f64) -> Plastic {
+    let coating = Coating::rough(distribution, alpha, eta).expect("a coating");
+    Plastic { reflectance: Rgb::new(0.1, 0.27, 0.36), ..Plastic::new(coating) }
+}
+
+fn smooth_plastic(eta: f64) -> Plastic {
+    let coating = Coating::smooth(eta).expect("a coating");
+    Plastic { reflectance: Rgb::new(0.1, 0.27, 0.36), ..Plastic::new(coating) }
+}
+
 /// All models, smooth enough for quadrature.
 fn cases() -> Vec<Bsdf> {
     use Distribution::{Beckmann, Ggx};
@@ -116,6 +134,13 @@ fn cases() -> Vec<Bsdf> {
             specular_transmittance: Rgb::ZERO,
             ..glass(Ggx, 0.5, 1.8)
         }),
+        Bsdf::Plastic(Box::new(rough_plastic(Beckmann, 0.3, 1.9))),
+        Bsdf::Plastic(Box::new(Plastic {
+            nonlinear: true,
+            specular_reflectance: Rgb::new(0.9, 0.4, 0.0),
+            ..rough_plastic(Ggx, 0.2, 1.5)
+        })),
+        Bsdf::Plastic(Box::new(smooth_plastic(1.5))),
         Bsdf::TwoSided(Box::new(TwoSided { front: Bsdf::Phong(phong), back: None })),
         Bsdf::TwoSided(Box::new(copper_front)),
     ]
