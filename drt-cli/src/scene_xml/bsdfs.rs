@@ -1,13 +1,15 @@
-//! Surface scattering: diffuse, phong, roughconductor, roughdielectric, twosided, null.
+//! Surface scattering.
 
 use drt_estimators::surface::{
-    Bsdf, Diffuse, Distribution, Phong, RoughConductor, RoughDielectric, TwoSided,
+    Bsdf, Coating, Conductor, Dielectric, Diffuse, Distribution, Phong, Plastic, RoughConductor,
+    RoughDielectric, ThinDielectric, TwoSided,
 };
 use drt_math::Rgb;
 
 use super::Loader;
 use super::element::Element;
 use super::properties::Properties;
+use super::spectrum::conductors;
 use crate::CliError;
 
 impl<'a> Loader<'a> {
@@ -17,12 +19,17 @@ impl<'a> Loader<'a> {
             "null" => Bsdf::Null,
             "diffuse" => Bsdf::Diffuse(diffuse(&p)?),
             "phong" => Bsdf::Phong(phong(&p)?),
+            "plastic" | "roughplastic" => Bsdf::Plastic(Box::new(plastic(&p)?)),
+            "conductor" => Bsdf::Conductor(smooth_conductor(&p)?),
             "roughconductor" => Bsdf::RoughConductor(conductor(&p)?),
+            "dielectric" => Bsdf::Dielectric(smooth_dielectric(&p)?),
+            "thindielectric" => Bsdf::ThinDielectric(thin_dielectric(&p)?),
             "roughdielectric" => Bsdf::RoughDielectric(dielectric(&p)?),
             "twosided" => Bsdf::TwoSided(Box::new(self.two_sided(&p)?)),
             other => {
                 return Err(e.error(format!(
-                    "the bsdf type `{other}` is not supported; expected diffuse, roughconductor, \
+                    "the bsdf type `{other}` is not supported; expected diffuse, plastic, \
+                     roughplastic, conductor, roughconductor, dielectric, thindielectric, \
                      roughdielectric, phong, twosided or null"
                 )));
             }
@@ -78,25 +85,68 @@ fn phong(p: &Properties<'_>) -> Result<Phong, CliError> {
 
 fn conductor(p: &Properties<'_>) -> Result<RoughConductor, CliError> {
     let default = RoughConductor::default();
-    let (eta, k) = match (p.color("eta")?, p.color("k")?, p.string("material")?) {
-        (None, None, Some("none")) => (default.eta, default.k),
-        // The default material of 0.6 is copper, which is given by measured spectra.
-        (None, None, None) if p.element.is_legacy() => {
-            return Err(p.element.error("give `eta` and `k` as numbers"));
-        }
-        (eta, k, None) => (eta.unwrap_or(default.eta), k.unwrap_or(default.k)),
-        (_, _, Some(name)) => {
-            return Err(p.element.error(format!(
-                "the material `{name}` is not supported; give `eta` and `k` as numbers"
-            )));
-        }
-    };
+    let (eta, k) = index(p, (default.eta, default.k))?;
     Ok(RoughConductor {
         distribution: distribution(p)?,
         alpha: alpha(p, default.alpha)?,
         eta,
         k,
         specular_reflectance: reflectance(p, &["specular_reflectance"], Rgb::ONE)?,
+    })
+}
+
+/// The index of a metal: `eta` and `k`, or that of a `material`.
+fn index(p: &Properties<'_>, default: (Rgb, Rgb)) -> Result<(Rgb, Rgb), CliError> {
+    // The default material of 0.6 is copper.
+    let copper = if p.element.is_legacy() { Some("Cu") } else { None };
+    let exterior = if p.element.is_legacy() { ior(p, "ext_eta", AIR)? } else { 1.0 };
+    let (eta, k) = match (p.color("eta")?, p.color("k")?, p.string("material")?) {
+        (None, None, Some("none")) => return Ok(default),
+        (None, None, name) => match name.or(copper) {
+            None => default,
+            Some(name) => conductors::conductor(name).ok_or_else(|| {
+                let known = conductors::names();
+                p.element.error(format!("`material` is `{name}`; expected none, {known}"))
+            })?,
+        },
+        (eta, k, None) => (eta.unwrap_or(default.0), k.unwrap_or(default.1)),
+        _ => return Err(p.element.error("give `material`, or `eta` and `k`, not both")),
+    };
+    Ok((eta * exterior.recip(), k * exterior.recip()))
+}
+
+fn smooth_conductor(p: &Properties<'_>) -> Result<Conductor, CliError> {
+    let default = Conductor::default();
+    let (eta, k) = index(p, (default.eta, default.k))?;
+    let specular_reflectance = reflectance(p, &["specular_reflectance"], Rgb::ONE)?;
+    Ok(Conductor { eta, k, specular_reflectance })
+}
+
+fn smooth_dielectric(p: &Properties<'_>) -> Result<Dielectric, CliError> {
+    Ok(Dielectric {
+        eta: ior(p, "int_ior", BK7)? / ior(p, "ext_ior", AIR)?,
+        specular_reflectance: reflectance(p, &["specular_reflectance"], Rgb::ONE)?,
+        specular_transmittance: reflectance(p, &["specular_transmittance"], Rgb::ONE)?,
+    })
+}
+
+fn thin_dielectric(p: &Properties<'_>) -> Result<ThinDielectric, CliError> {
+    let Dielectric { eta, specular_reflectance, specular_transmittance } = smooth_dielectric(p)?;
+    Ok(ThinDielectric { eta, specular_reflectance, specular_transmittance })
+}
+
+fn plastic(p: &Properties<'_>) -> Result<Plastic, CliError> {
+    let eta = ior(p, "int_ior", POLYPROPYLENE)? / ior(p, "ext_ior", AIR)?;
+    let coating = match p.kind()? {
+        "plastic" => Coating::smooth(eta),
+        _ => Coating::rough(distribution(p)?, alpha(p, 0.1)?, eta),
+    };
+    let default = Plastic::new(coating.map_err(|err| p.element.error(err))?);
+    Ok(Plastic {
+        reflectance: reflectance(p, &["diffuse_reflectance"], default.reflectance)?,
+        specular_reflectance: reflectance(p, &["specular_reflectance"], Rgb::ONE)?,
+        nonlinear: p.boolean("nonlinear")?.unwrap_or(false),
+        ..default
     })
 }
 
@@ -132,6 +182,7 @@ fn alpha(p: &Properties<'_>, default: f64) -> Result<f64, CliError> {
 }
 
 const BK7: f64 = 1.5046;
+const POLYPROPYLENE: f64 = 1.49;
 const AIR: f64 = 1.000_277;
 
 /// Indices of refraction at visible wavelengths by the names Mitsuba knows.
@@ -153,7 +204,7 @@ const INDICES: [(&str, f64); 23] = [
     ("fused quartz", 1.458),
     ("pyrex", 1.47),
     ("acrylic glass", 1.49),
-    ("polypropylene", 1.49),
+    ("polypropylene", POLYPROPYLENE),
     ("bk7", BK7),
     ("sodium chloride", 1.544),
     ("amber", 1.55),

@@ -1,14 +1,15 @@
 //! The tree of a scene file after substitution: defaults filled in, includes spliced, names in one
 //! spelling. Nothing after this knows of several files or several spellings.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::CliError;
 use crate::error::Place;
 use crate::scene_xml::dialect::Dialect;
 
 /// One XML element.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Element {
     /// The tag, such as `shape` or `float`.
     pub(super) tag: String,
@@ -19,6 +20,8 @@ pub(super) struct Element {
     pub(super) place: Place,
     /// The dialect of its file.
     pub(super) dialect: Dialect,
+    /// Folders in which its files are searched after that of its own file.
+    folders: Arc<[PathBuf]>,
     /// Its number in document order: an identity.
     pub(super) ordinal: usize,
 }
@@ -31,13 +34,14 @@ impl Element {
         mut attributes: Vec<(String, String)>,
         place: Place,
         dialect: Dialect,
+        folders: Arc<[PathBuf]>,
     ) -> Self {
         for (key, value) in &mut attributes {
             if key == "name" && tag != "default" {
                 *value = dialect.property_name(value);
             }
         }
-        Self { tag, attributes, children: Vec::new(), place, dialect, ordinal: 0 }
+        Self { tag, attributes, children: Vec::new(), place, dialect, folders, ordinal: 0 }
     }
 
     /// An attribute's text.
@@ -74,9 +78,37 @@ impl Element {
         CliError::input(&self.place, format!("{self}: {message}"))
     }
 
-    /// A path in an attribute, relative to the file in which the element stands.
-    pub(super) fn resolve(&self, path: &str) -> std::path::PathBuf {
-        self.place.file.parent().unwrap_or(Path::new("")).join(path)
+    /// The file (or folder) that a path means: in the folder of the scene file in which the element
+    /// stands, in those of the files that include that one, or in one that a `<path>` names.
+    ///
+    /// # Errors
+    /// When none of them has it.
+    pub(super) fn resolve(&self, path: &str) -> Result<PathBuf, CliError> {
+        let own = self.place.file.parent().unwrap_or(Path::new(""));
+        let folders = || std::iter::once(own).chain(self.folders.iter().map(PathBuf::as_path));
+        let found = folders().map(|folder| folder.join(path)).find(|file| file.exists());
+        found.ok_or_else(|| {
+            let mut searched: Vec<String> = Vec::new();
+            for folder in folders() {
+                let folder = if folder == Path::new("") { Path::new(".") } else { folder };
+                let name = folder.display().to_string();
+                if !searched.contains(&name) {
+                    searched.push(name);
+                }
+            }
+            self.error(format!("there is no file `{path}`; searched {}", searched.join(", ")))
+        })
+    }
+
+    /// Gives it the `name` of the place it is used in, and no id.
+    pub(super) fn call(&mut self, name: Option<&str>) {
+        self.attributes.retain(|(key, _)| key != "id" && key != "name");
+        self.attributes.extend(name.map(|n| ("name".into(), n.into())));
+    }
+
+    /// How many elements it is, with all inside.
+    pub(super) fn count(&self) -> usize {
+        1 + self.children.iter().map(Element::count).sum::<usize>()
     }
 
     /// Numbers the tree in document order.

@@ -1,16 +1,14 @@
 //! Who is called what, and in which order things are counted.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use super::element::Element;
 use super::properties::Properties;
+use super::values::MAX_ALIASES;
 use crate::CliError;
 
 /// The kinds of things that jobs can address, by tag.
 const COUNTED: [&str; 5] = ["shape", "bsdf", "medium", "emitter", "sensor"];
-
-/// Aliases of aliases beyond this length are taken for a circle.
-const MAX_ALIASES: usize = 64;
 
 /// The elements of a scene by id and by order.
 pub(super) struct Index<'a> {
@@ -41,6 +39,7 @@ impl<'a> Index<'a> {
         };
         index.register(root, true)?;
         index.check_references(root)?;
+        index.check_circles(root)?;
         Ok(index)
     }
 
@@ -100,6 +99,35 @@ impl<'a> Index<'a> {
                     self.resolve(child, child.required("id")?)?;
                 }
                 _ => self.check_references(child)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses what refers to itself, over others or not.
+    fn check_circles(&self, root: &'a Element) -> Result<(), CliError> {
+        // Depth first, on a stack of its own: a chain of references may be as long as the scene.
+        // Each entry is an element and how many of its children were followed.
+        let mut stack = vec![(root, 0)];
+        let (mut open, mut done) = (HashSet::from([root.ordinal]), HashSet::new());
+        while let Some((e, next)) = stack.last_mut() {
+            let Some(child) = e.children.get(*next) else {
+                open.remove(&e.ordinal);
+                done.insert(e.ordinal);
+                stack.pop();
+                continue;
+            };
+            *next += 1;
+            let target = match child.tag.as_str() {
+                "ref" => self.resolve(child, child.required("id")?)?,
+                _ => child,
+            };
+            if open.contains(&target.ordinal) {
+                return Err(child.error(format!("refers to {target}, which it is part of")));
+            }
+            if !done.contains(&target.ordinal) {
+                open.insert(target.ordinal);
+                stack.push((target, 0));
             }
         }
         Ok(())

@@ -19,9 +19,11 @@ mod spectrum;
 #[cfg(test)]
 mod tests;
 mod transform;
+mod values;
 mod volumes;
 
 use std::cell::RefCell;
+use std::collections::HashSet;
 use std::path::Path;
 
 use drt_estimators::surface::{Bsdf, Diffuse};
@@ -32,6 +34,7 @@ use crate::CliError;
 use crate::error::{Warning, read_text};
 use element::Element;
 use index::Index;
+use properties::Properties;
 pub use source::Defaults;
 use source::SceneFiles;
 
@@ -101,8 +104,7 @@ impl<'a> Loader<'a> {
             scene.bsdfs.push(Named { id: e.id().map(Into::into), item: self.bsdf(e)? });
         }
         let shapes = self.index.all("shape");
-        let carried: Vec<usize> =
-            shapes.iter().flat_map(|s| &s.children).map(|child| child.ordinal).collect();
+        let carried = self.carried_emitters(shapes)?;
         for e in self.index.all("emitter") {
             scene.emitters.push(self.emitter(e, carried.contains(&e.ordinal))?);
         }
@@ -117,6 +119,20 @@ impl<'a> Loader<'a> {
         Ok(scene)
     }
 
+    /// The emitters on shapes, nested there or referred to, by ordinal.
+    fn carried_emitters(&self, shapes: &[&'a Element]) -> Result<HashSet<usize>, CliError> {
+        let mut carried = HashSet::new();
+        for shape in shapes {
+            for emitter in self.index.inner(&Properties::of(shape)?, "emitter", None) {
+                if !carried.insert(emitter.target.ordinal) {
+                    let message = "an emitter can only be on one shape, and this one is on another";
+                    return Err(emitter.child.error(message));
+                }
+            }
+        }
+        Ok(carried)
+    }
+
     /// Everything else that stands directly in the scene.
     fn top_level(&self, root: &'a Element, scene: &mut Scene) -> Result<(), CliError> {
         let mut integrators = 0;
@@ -126,6 +142,12 @@ impl<'a> Loader<'a> {
                 // Read for their own sake, so that mistakes in unused ones are found too.
                 "phase" => drop(self.phase(e)?),
                 "volume" => drop(self.volume(e)?),
+                "texture" | "spectrum" | "rgb" | "srgb" if e.id().is_some() => {
+                    spectrum::reflected(e)?;
+                }
+                "rfilter" => drop(sensors::filter(e)?),
+                // Read where they are referred to.
+                "film" | "sampler" if e.id().is_some() => {}
                 "integrator" => {
                     integrators += 1;
                     if integrators > 1 {

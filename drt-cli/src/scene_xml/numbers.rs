@@ -7,7 +7,7 @@ use crate::CliError;
 
 /// The `value` of a property that has nothing else.
 pub(super) fn plain_value(e: &Element) -> Result<&str, CliError> {
-    e.only_attributes(&["name", "value"])?;
+    e.only_attributes(&["name", "value", "id"])?;
     if let Some(child) = e.children.first() {
         return Err(child.error(format!("not supported inside {e}")));
     }

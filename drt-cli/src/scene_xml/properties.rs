@@ -117,9 +117,9 @@ impl<'a> Properties<'a> {
         self.value(name, &["string"], plain_value)
     }
 
-    /// A file, relative to the scene file.
+    /// A file that exists, wherever it is found.
     pub(super) fn path(&self, name: &'static str) -> Result<Option<PathBuf>, CliError> {
-        Ok(self.string(name)?.map(|s| self.element.resolve(s)))
+        self.string(name)?.map(|s| self.element.resolve(s)).transpose()
     }
 
     /// One of several words, as what it stands for.

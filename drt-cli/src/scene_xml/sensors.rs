@@ -16,8 +16,11 @@ const MAX_FILM: i64 = 65_536;
 impl<'a> Loader<'a> {
     pub(super) fn sensor(&self, e: &'a Element) -> Result<Named<SceneSensor>, CliError> {
         let p = Properties::of(e)?;
-        if p.kind()? != "perspective" {
-            return Err(e.error("only the sensor type `perspective` is supported"));
+        let kind = p.kind()?;
+        if kind != "perspective" {
+            let message =
+                format!("the sensor type `{kind}` is not supported; expected perspective");
+            return Err(e.error(message));
         }
         let (film, filter) = self.film(&p)?;
         let lens = lens(&p)?;
@@ -39,8 +42,10 @@ impl<'a> Loader<'a> {
             return Ok((default, default_filter(sensor)?));
         };
         let p = Properties::of(film.target)?;
-        if p.kind()? != "hdrfilm" {
-            return Err(film.child.error("only the film type `hdrfilm` is supported"));
+        let kind = p.kind()?;
+        if kind != "hdrfilm" {
+            let message = format!("the film type `{kind}` is not supported; expected hdrfilm");
+            return Err(film.child.error(message));
         }
         let width = p.integer_in("width", 1..=MAX_FILM)?.unwrap_or(default[0]);
         let height = p.integer_in("height", 1..=MAX_FILM)?.unwrap_or(default[1]);
@@ -108,7 +113,7 @@ fn default_filter(p: &Properties<'_>) -> Result<Filter, CliError> {
     Filter::new(FilterKind::default()).map_err(|err| p.element.error(err))
 }
 
-fn filter(e: &Element) -> Result<Filter, CliError> {
+pub(super) fn filter(e: &Element) -> Result<Filter, CliError> {
     let p = Properties::of(e)?;
     let kind = match p.kind()? {
         "box" => FilterKind::BOX,
@@ -124,19 +129,59 @@ fn filter(e: &Element) -> Result<Filter, CliError> {
     Filter::new(kind).map_err(|err| e.error(err))
 }
 
+/// Integrators whose expected image is that of all paths up to a depth.
+const PATHS: [&str; 16] = [
+    "path",
+    "volpath",
+    "volpathmis",
+    "volpath_simple",
+    "bdpt",
+    "ptracer",
+    "prb",
+    "prb_basic",
+    "prbvolpath",
+    "prb_projective",
+    "pssmlt",
+    "mlt",
+    "erpt",
+    "prb_threepoint",
+    "pathAD",
+    "volpathAD",
+];
+/// Integrators of paths with one scattering at most.
+const DIRECT: [&str; 3] = ["direct", "direct_projective", "direct_reparam"];
+/// Integrators that say more about the image of another one, inside them.
+const AROUND: [&str; 2] = ["moment", "aov"];
+
 /// Path depths of an integrator; which method it names does not matter.
 pub(super) fn integrator(e: &Element) -> Result<Integrator, CliError> {
     let p = Properties::of(e)?;
     let kind = p.kind()?;
-    let paths = ["path", "prb", "bdpt", "ptracer"];
-    if !paths.iter().any(|name| kind.contains(name)) {
-        return Err(e.error(format!(
-            "the integrator type `{kind}` is not supported; expected one that traces paths, such \
-             as path or volpath"
-        )));
+    if AROUND.contains(&kind) {
+        let inner = p.children(|child| child.tag == "integrator");
+        p.accept(&["aovs"]);
+        p.finish()?;
+        return match inner[..] {
+            [inner] => integrator(inner),
+            _ => Err(e.error(format!("expected one integrator inside, found {}", inner.len()))),
+        };
+    }
+    let direct = DIRECT.contains(&kind);
+    if !direct && !PATHS.contains(&kind) {
+        let message = format!(
+            "the integrator type `{kind}` is not supported; expected one that traces paths ({}), one \
+             for direct light ({}), or {} around one of them",
+            PATHS.join(", "),
+            DIRECT.join(", "),
+            AROUND.join(" or ")
+        );
+        return Err(e.error(message));
     }
     let mut integrator = Integrator::default();
-    if let Some(depth) = p.integer_in::<i64>("max_depth", -1..=i64::from(u32::MAX))? {
+    if direct {
+        integrator.max_depth = Some(2);
+        p.accept(&["shading_samples", "emitter_samples", "bsdf_samples"]);
+    } else if let Some(depth) = p.integer_in::<i64>("max_depth", -1..=i64::from(u32::MAX))? {
         integrator.max_depth = u32::try_from(depth).ok();
     }
     if let Some(depth) = p.integer_in("rr_depth", 1..=i64::from(u32::MAX))? {

@@ -1,13 +1,14 @@
 //! Shapes: meshes from files and tessellated primitives, with what they are made of.
 
 mod mesh_file;
+mod serialized;
 
 use std::sync::Arc;
 
 use drt_estimators::surface::Bsdf;
 use drt_estimators::{MediumBoundary, Named, Shape};
 use drt_geom::{Mesh, procedural};
-use drt_math::{Affine, Mat3, Vec3};
+use drt_math::{Affine, Frame, Mat3, Vec3};
 
 use super::element::Element;
 use super::properties::Properties;
@@ -18,6 +19,8 @@ use crate::CliError;
 const SPHERE_RESOLUTION: u32 = 64;
 /// Corners of a disk where none are given.
 const DISK_RESOLUTION: u32 = 128;
+/// Sides of a cylinder where none are given.
+const CYLINDER_RESOLUTION: u32 = 128;
 
 /// A shape before its placement.
 struct Model {
@@ -99,6 +102,10 @@ fn model(p: &Properties<'_>) -> Result<Model, CliError> {
     let mut model = match p.kind()? {
         "obj" => from_file(p, face_normals, mesh_file::obj)?,
         "ply" => from_file(p, face_normals, mesh_file::ply)?,
+        "serialized" => {
+            let index = p.integer_in("shape_index", 0..=i64::from(u32::MAX))?.unwrap_or(0);
+            from_file(p, face_normals, |e, path| serialized::read(e, path, index))?
+        }
         "cube" => Model::faceted(procedural::cube()),
         "rectangle" => Model::faceted(procedural::rectangle()),
         "disk" => {
@@ -106,10 +113,16 @@ fn model(p: &Properties<'_>) -> Result<Model, CliError> {
             Model::faceted(procedural::disk(corners))
         }
         "sphere" => sphere(p)?,
+        "cylinder" => cylinder(p)?,
         other => {
+            let why = match other {
+                "bsplinecurve" | "linearcurve" => ": curves are no triangles",
+                "sdfgrid" => ": a distance field is no triangles",
+                _ => "",
+            };
             return Err(p.element.error(format!(
-                "the shape type `{other}` is not supported; expected obj, ply, rectangle, cube, \
-                 sphere or disk"
+                "the shape type `{other}` is not supported{why}; expected obj, ply, serialized, \
+                 rectangle, cube, sphere, disk or cylinder"
             )));
         }
     };
@@ -122,7 +135,7 @@ fn model(p: &Properties<'_>) -> Result<Model, CliError> {
 fn from_file(
     p: &Properties<'_>,
     face_normals: bool,
-    read: fn(&Element, &std::path::Path) -> Result<Mesh, CliError>,
+    read: impl FnOnce(&Element, &std::path::Path) -> Result<Mesh, CliError>,
 ) -> Result<Model, CliError> {
     let path = p.path("filename")?.ok_or_else(|| p.element.error("`filename` is missing"))?;
     // There are no textures, and silhouettes are sampled in another way.
@@ -142,6 +155,30 @@ fn sphere(p: &Properties<'_>) -> Result<Model, CliError> {
     }
     let map = Affine { linear: Mat3::IDENTITY * radius, translation: center };
     let mesh = procedural::uv_sphere(bands).transform(&map);
+    Ok(Model { mesh, turns: true, smooth: false })
+}
+
+/// From `p0` to `p1` about the line between them, without its ends.
+fn cylinder(p: &Properties<'_>) -> Result<Model, CliError> {
+    let sides = p.integer_in("resolution", 3..=1 << 20)?.unwrap_or(CYLINDER_RESOLUTION);
+    let (from, to) = (p.vector("p0")?.unwrap_or(Vec3::ZERO), p.vector("p1")?.unwrap_or(Vec3::Z));
+    let radius = p.float("radius")?.unwrap_or(1.0);
+    if radius <= 0.0 {
+        return Err(p.element.error(format!("`radius` is {radius}; it must be positive")));
+    }
+    let axis = to - from;
+    if axis.max_abs() == 0.0 {
+        return Err(p.element.error("`p0` and `p1` are the same point"));
+    }
+    let frame = Frame::from_normal(axis.normalize());
+    let columns = [frame.s * radius, frame.t * radius, axis];
+    let row = |axis: Vec3| {
+        let [a, b, c] = columns.map(|column| column.dot(axis));
+        drt_math::vec3(a, b, c)
+    };
+    let linear = Mat3::from_rows(row(Vec3::X), row(Vec3::Y), row(Vec3::Z));
+    let mesh = procedural::cylinder(sides).transform(&Affine { linear, translation: from });
+    mesh.validate().map_err(|err| p.element.error(err))?;
     Ok(Model { mesh, turns: true, smooth: false })
 }
 

@@ -1,4 +1,4 @@
-//! From text to one tree: parsing, `<default>` and `$name`, `<include>`.
+//! From text to one tree: parsing, `<default>` and `$name`, `<include>`, `<path>`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -8,6 +8,7 @@ use roxmltree::{Document, Node};
 
 use super::dialect::Dialect;
 use super::element::Element;
+use super::values;
 use crate::CliError;
 use crate::error::{Place, read_text};
 
@@ -20,7 +21,7 @@ const MAX_NESTING: usize = 64;
 /// More files are refused: a few that include each other again and again can stand for billions.
 const MAX_FILES: usize = 4096;
 /// More elements are refused, all included files together.
-const MAX_ELEMENTS: usize = 1 << 20;
+pub(super) const MAX_ELEMENTS: usize = 1 << 20;
 /// Longest text, in bytes, that values of `$name` may make; each can double the one before.
 const MAX_TEXT: usize = 1 << 16;
 
@@ -34,6 +35,10 @@ pub(super) struct SceneFiles {
     used: BTreeSet<String>,
     /// The files being read, outermost first.
     open: Vec<PathBuf>,
+    /// Folders that `<path>` elements have named, the latest first.
+    paths: Vec<PathBuf>,
+    /// Where files are searched at this place, after the folder of the file being read.
+    folders: Arc<[PathBuf]>,
     /// Files and elements read so far.
     files: usize,
     elements: usize,
@@ -42,7 +47,9 @@ pub(super) struct SceneFiles {
 impl SceneFiles {
     pub(super) fn new(given: &Defaults) -> Self {
         let (given, known) = (given.clone(), given.clone());
-        Self { given, known, used: BTreeSet::new(), open: Vec::new(), files: 0, elements: 0 }
+        let (used, open, paths, folders) =
+            (BTreeSet::new(), Vec::new(), Vec::new(), Arc::default());
+        Self { given, known, used, open, paths, folders, files: 0, elements: 0 }
     }
 
     /// The tree of a scene's text; `path` names it in messages and anchors relative paths.
@@ -54,6 +61,7 @@ impl SceneFiles {
                 format!("-D {name}: the scene has neither <default name=\"{name}\"> nor ${name}"),
             ));
         }
+        values::substitute(&mut root)?;
         root.number();
         Ok(root)
     }
@@ -85,9 +93,11 @@ impl SceneFiles {
             )
         })?;
         let dialect = Dialect::of_version(version, &place)?;
-        self.open.push(path.canonicalize().unwrap_or_else(|_| path.into()));
+        self.open.push(path.into());
+        self.search();
         let scene = self.element(&file, root, dialect, depth)?;
         self.open.pop();
+        self.search();
         scene.only_attributes(&["version"])?;
         Ok(scene)
     }
@@ -113,7 +123,8 @@ impl SceneFiles {
             .attributes()
             .map(|a| Ok((a.name().to_owned(), self.substitute(a.value(), &place)?)))
             .collect::<Result<_, CliError>>()?;
-        let mut element = Element::new(node.tag_name().name().into(), attributes, place, dialect);
+        let tag = node.tag_name().name().into();
+        let mut element = Element::new(tag, attributes, place, dialect, self.folders.clone());
         for child in node.children() {
             if child.is_text() && !child.text().unwrap_or("").trim().is_empty() {
                 return Err(element.error("text inside an element; expected elements only"));
@@ -142,15 +153,35 @@ impl SceneFiles {
                 child.only_attributes(&["filename"])?;
                 parent.children.extend(self.include(&child, depth)?.children);
             }
+            "path" => {
+                child.only_attributes(&["value"])?;
+                let folder = child.resolve(child.required("value")?)?;
+                if !folder.is_dir() {
+                    return Err(child.error(format!("{} is not a folder", folder.display())));
+                }
+                self.paths.insert(0, folder);
+                self.search();
+            }
             _ => parent.children.push(child),
         }
         Ok(())
     }
 
+    /// Lists the folders in which files are searched from here on: those of the files that include
+    /// this one, innermost first, and those of `<path>` elements.
+    fn search(&mut self) {
+        let including = self.open.iter().rev().skip(1);
+        let including = including.map(|file| file.parent().unwrap_or(Path::new("")).to_path_buf());
+        self.folders = including.chain(self.paths.iter().cloned()).collect();
+    }
+
     fn include(&mut self, at: &Element, depth: usize) -> Result<Element, CliError> {
-        let path = at.resolve(at.required("filename")?);
+        let path = at.resolve(at.required("filename")?)?;
         let text = read_text(&path, Some(&at.place))?;
-        if self.open.contains(&path.canonicalize().unwrap_or_else(|_| path.clone())) {
+        let same = |a: &Path, b: &Path| {
+            a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
+        };
+        if self.open.iter().any(|open| same(open, &path)) {
             return Err(at.error(format!("{} includes itself", path.display())));
         }
         self.parse(&path, &text, depth)

@@ -9,6 +9,7 @@ use drt_math::{Vec3, fm};
 
 use crate::Mesh;
 
+mod cylinder;
 mod flat;
 mod knot;
 mod solid;
@@ -17,6 +18,7 @@ mod tet_grid;
 mod tree;
 mod tube;
 
+pub use cylinder::cylinder;
 pub use flat::{disk, grid, rectangle, star};
 pub use knot::{TorusKnot, torus_knot};
 pub use solid::cube;

@@ -18,7 +18,7 @@ pub(super) fn ply(e: &Element, path: &Path) -> Result<Mesh, CliError> {
     drt_geom::load_ply(&bytes(e, path)?, &path.to_string_lossy()).map_err(|err| e.error(err))
 }
 
-fn bytes(e: &Element, path: &Path) -> Result<Vec<u8>, CliError> {
+pub(super) fn bytes(e: &Element, path: &Path) -> Result<Vec<u8>, CliError> {
     std::fs::read(path).map_err(|err| e.error(format!("cannot read {}: {err}", path.display())))
 }
 

@@ -65,6 +65,110 @@ fn included_files_have_their_own_folder_dialect_and_lines() {
     refused("<include filename=\"nowhere.xml\"/>", &[":2:", "nowhere.xml"]);
 }
 
+/// Files are searched in the folder of their own scene file, in those of the files that include it,
+/// and in folders that a `<path>` named, the latest first.
+#[test]
+fn files_are_searched_as_mitsuba_does() {
+    let folder = Folder::new();
+    for name in ["parts", "parts/deep", "common", "other"] {
+        std::fs::create_dir(folder.path().join(name)).unwrap();
+    }
+    let mesh = |name: &str| {
+        format!("<shape type=\"obj\"><string name=\"filename\" value=\"{name}\"/></shape>")
+    };
+    let part = |body: &str| format!("<scene version=\"3.0.0\">{body}</scene>");
+    folder.file("parts/own.obj", crate::testing::TETRAHEDRON);
+    folder.file("main.obj", crate::testing::TETRAHEDRON);
+    folder.file("common/far.obj", crate::testing::TETRAHEDRON);
+    folder.file("common/both.obj", "not read");
+    folder.file("other/both.obj", crate::testing::TETRAHEDRON);
+    let include = "<include filename=\"parts/deep/b.xml\"/>";
+    let paths = "<path value=\"../common\"/><path value=\"other\"/>";
+    let a = [paths, &mesh("own.obj"), include].concat();
+    folder.file("parts/a.xml", &part(&a));
+    folder.file(
+        "parts/deep/b.xml",
+        &part(&[mesh("main.obj"), mesh("far.obj"), mesh("both.obj")].concat()),
+    );
+    let file = folder.file("s.xml", &part("<include filename=\"parts/a.xml\"/>"));
+    assert_eq!(load_scene(&file, &Defaults::new()).unwrap().shapes.len(), 4);
+
+    let file = folder.file("s.xml", &part(&["<path value=\"common\"/>", &mesh("no.obj")].concat()));
+    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    assert!(message.contains("no file `no.obj`; searched"), "{message}");
+    assert!(message.contains("s.xml:1") && message.contains("common"), "{message}");
+    refused("<path value=\"nowhere\"/>", &[":2", "no file `nowhere`"]);
+    let file = folder.file("s.xml", &part("<path value=\"main.obj\"/>"));
+    let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
+    assert!(message.contains("is not a folder"), "{message}");
+}
+
+#[test]
+fn everything_can_be_referred_to() {
+    let s = scene(
+        r#"<spectrum id="grey" value="0.25"/>
+           <texture type="srgb" id="red"><rgb name="color" value="0.5 0 0"/></texture>
+           <alias id="red" as="crimson"/>
+           <bsdf type="diffuse" id="a"><ref name="reflectance" id="grey"/></bsdf>
+           <bsdf type="diffuse" id="b"><ref name="reflectance" id="crimson"/></bsdf>
+           <phase type="hg" id="forward"><float name="g" value="0.5"/></phase>
+           <volume type="constvolume" id="fog"><rgb name="value" value="0.5"/></volume>
+           <medium type="homogeneous" id="m"><ref id="forward"/><ref name="sigma_t" id="fog"/></medium>
+           <emitter type="area" id="lamp"><ref name="radiance" id="red"/></emitter>
+           <film type="hdrfilm" id="film"><integer name="width" value="5"/><ref id="filter"/></film>
+           <rfilter type="box" id="filter"/>
+           <sensor type="perspective"><ref id="film"/></sensor>
+           <shape type="cube"><ref id="a"/><ref id="lamp"/><ref name="interior" id="m"/></shape>
+           <shape type="cube"><ref id="b"/></shape>"#,
+    );
+    assert_eq!(reflectance(&s.bsdfs[0].item), Rgb::splat(0.25));
+    assert_eq!(reflectance(&s.bsdfs[1].item), Rgb::new(0.5, 0.0, 0.0));
+    assert_eq!(s.shapes[0].emitter, Some(0));
+    assert_eq!(s.shapes[0].boundary.unwrap().interior, Some(0));
+    assert!(s.media[0].item.phase.mean_cosine_parameter().is_some());
+    refused(
+        "<emitter type=\"area\" id=\"lamp\"/><shape type=\"cube\"><ref id=\"lamp\"/></shape>\n\
+         <shape type=\"cube\"><ref id=\"lamp\"/></shape>",
+        &[":3", "only be on one shape"],
+    );
+    refused("<emitter type=\"area\" id=\"lamp\"/>", &["belongs inside a <shape>"]);
+}
+
+#[test]
+fn circles_of_references_are_refused() {
+    refused(
+        r#"<texture type="srgb" id="a"><ref name="color" id="b"/></texture>
+           <texture type="srgb" id="b"><ref name="color" id="a"/></texture>"#,
+        &["refers to itself"],
+    );
+    refused(
+        r#"<bsdf type="twosided" id="a"><ref id="b"/></bsdf>
+           <bsdf type="twosided" id="b"><ref id="a"/></bsdf>"#,
+        &["which it is part of"],
+    );
+    // Each doubles the one before.
+    let mut body = String::from(
+        "<texture type=\"srgb\" id=\"t0\"><rgb name=\"color\" value=\"1\"/></texture>",
+    );
+    for i in 1..40 {
+        let last = format!("<ref name=\"color\" id=\"t{}\"/>", i - 1);
+        body += &format!("<texture type=\"srgb\" id=\"t{i}\">{last}{last}</texture>");
+    }
+    refused(&body, &["elements"]);
+}
+
+#[test]
+fn integrators_around_others_and_of_direct_light() {
+    let depth = |body: &str| scene(body).integrator.max_depth;
+    let path = r#"<integrator type="path"><integer name="max_depth" value="3"/></integrator>"#;
+    assert_eq!(depth(path), Some(3));
+    assert_eq!(depth(&format!("<integrator type=\"moment\">{path}</integrator>")), Some(3));
+    assert_eq!(depth("<integrator type=\"direct\"/>"), Some(2));
+    refused("<integrator type=\"sppm\"/>", &["`sppm` is not supported", "volpath"]);
+    refused("<integrator type=\"moment\"/>", &["one integrator inside, found 0"]);
+    refused("<integrator type=\"path\"><float name=\"foo\" value=\"1\"/></integrator>", &["foo"]);
+}
+
 #[test]
 fn references_aliases_and_order() {
     let s = scene(

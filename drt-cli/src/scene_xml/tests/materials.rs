@@ -20,15 +20,32 @@ fn diffuse_and_its_colours() {
     assert_eq!(color(r#"<rgb name="reflectance" value="0.4"/>"#), Rgb::splat(0.4));
     assert_eq!(color(r#"<spectrum name="reflectance" value="0.4"/>"#), Rgb::splat(0.4));
     assert_eq!(color(r#"<float name="reflectance" value="0.4"/>"#), Rgb::splat(0.4));
+    assert_eq!(color(r##"<rgb name="reflectance" value="#ff0033"/>"##), Rgb::new(1.0, 0.0, 0.2));
+    let gray = color(r##"<srgb name="reflectance" value="#808080"/>"##);
+    assert!((gray.r - 0.215_860_5).abs() < 1e-6 && gray.r == gray.b);
+    // As a diffuse BSDF of Mitsuba 3.9.1 (scalar_rgb) holds it.
+    let pairs =
+        color(r#"<spectrum name="reflectance" value="400:0.1, 500:0.3, 600:0.9, 700:0.2"/>"#);
+    assert!((pairs - Rgb::new(0.887_608_5, 0.562_839_4, 0.155_488_1)).max_abs() < 1e-6);
+    let irregular = r#"<spectrum name="reflectance" type="irregular">
+        <string name="wavelengths" value="400, 500, 600, 700"/>
+        <string name="values" value="0.1, 0.3, 0.9, 0.2"/></spectrum>"#;
+    assert_eq!(color(irregular), pairs);
+    let uniform = "<texture name=\"reflectance\" type=\"uniform\"><float name=\"value\" value=\"0.3\"/></texture>";
+    assert_eq!(color(uniform), Rgb::splat(0.3));
     let property = |inside: &str| format!("<bsdf type=\"diffuse\">\n{inside}</bsdf>");
     for (inside, part) in [
         (r#"<rgb name="reflectance" value="0.1 0.2"/>"#, "one number or three"),
         (r#"<rgb name="reflectance" value="nan"/>"#, "finite number"),
         (r#"<rgb name="reflectance" value="-1"/>"#, "reflectance"),
-        (r##"<rgb name="reflectance" value="#ffffff"/>"##, "finite number"),
-        (r#"<spectrum name="reflectance" value="400:1, 700:2"/>"#, "sampled spectra"),
+        (r##"<rgb name="reflectance" value="#fffff"/>"##, "#rrggbb"),
+        (r#"<spectrum name="reflectance" value="400:1, 300:2"/>"#, "increasing wavelengths"),
+        (r#"<spectrum name="reflectance" value="400:1, 2"/>"#, "pair of wavelength"),
+        (r#"<spectrum name="reflectance" filename="no.spd"/>"#, "no file `no.spd`"),
+        (r#"<spectrum name="reflectance" type="blackbody"/>"#, "`temperature` is missing"),
+        (r#"<spectrum name="reflectance" type="laser"/>"#, "`laser` is not supported"),
         (r#"<spectrum name="reflectance" value="1, 1, 1"/>"#, "need an <rgb>"),
-        (r#"<texture name="reflectance" type="bitmap"/>"#, "must be a <rgb>"),
+        (r#"<texture name="reflectance" type="bitmap"/>"#, "`bitmap` is not supported"),
         (r#"<rgb name="diffuse_reflectance" value="1"/>"#, "which takes reflectance"),
     ] {
         refused(&property(inside), &[part]);
@@ -75,8 +92,19 @@ fn rough_conductor() {
     let Bsdf::RoughConductor(c) = bsdf("roughconductor", inside) else { panic!() };
     assert_eq!((c.alpha, c.eta.g, c.k.b), (0.3, 0.9, 2.1));
     assert_eq!(c.distribution, Distribution::Ggx);
+    let copper = bsdf("roughconductor", r#"<string name="material" value="Cu"/>"#);
+    assert!(matches!(copper, Bsdf::RoughConductor(c) if c.eta.g == 0.92375 && c.k.g == 2.45305));
+    let old = old_scene(r#"<bsdf type="roughconductor"/>"#).bsdfs.remove(0).item;
+    assert!(matches!(old, Bsdf::RoughConductor(c) if c.eta.g == 0.92375 * 1.000_277_f64.recip()));
     for (inside, part) in [
-        (r#"<string name="material" value="Cu"/>"#, "material `Cu`"),
+        (
+            r#"<string name="material" value="cheese"/>"#,
+            "`material` is `cheese`; expected none, a-C",
+        ),
+        (
+            r#"<string name="material" value="Cu"/><rgb name="k" value="1"/>"#,
+            "give `material`, or `eta` and `k`",
+        ),
         (r#"<string name="distribution" value="phong"/>"#, "expected beckmann, ggx"),
         (r#"<float name="alpha_u" value="0.3"/>"#, "`alpha_u` and `alpha_v`"),
         (
@@ -109,6 +137,34 @@ fn rough_dielectric() {
 }
 
 #[test]
+fn smooth_surfaces() {
+    let Bsdf::Conductor(c) = bsdf("conductor", r#"<string name="material" value="Au"/>"#) else {
+        panic!()
+    };
+    assert!(c.eta.r < c.eta.b && c.k.r > c.k.b);
+    let diamond = r#"<string name="int_ior" value="diamond"/><string name="ext_ior" value="air"/>"#;
+    assert!(
+        matches!(bsdf("dielectric", diamond), Bsdf::Dielectric(d) if d.eta == 2.419 / 1.000_277)
+    );
+    let pane = bsdf("thindielectric", r#"<rgb name="specular_reflectance" value="0.5"/>"#);
+    assert!(matches!(pane, Bsdf::ThinDielectric(d) if d.specular_reflectance.g == 0.5));
+    refused("<bsdf type=\"dielectric\"><float name=\"alpha\" value=\"0.1\"/></bsdf>", &["alpha"]);
+}
+
+#[test]
+fn plastics() {
+    let Bsdf::Plastic(smooth) = bsdf("plastic", "") else { panic!() };
+    assert_eq!((smooth.reflectance, smooth.nonlinear), (Rgb::splat(0.5), false));
+    assert!((smooth.coating.eta() - 1.489_587_3).abs() < 1e-6 && smooth.coating.facets().is_none());
+    let inside = r#"<float name="alpha" value="0.2"/><boolean name="nonlinear" value="true"/>
+                    <string name="distribution" value="ggx"/><float name="int_ior" value="1.9"/>"#;
+    let Bsdf::Plastic(rough) = bsdf("roughplastic", inside) else { panic!() };
+    assert!(rough.nonlinear && rough.coating.facets() == Some((Distribution::Ggx, 0.2)));
+    let thin = "<bsdf type=\"plastic\"><float name=\"int_ior\" value=\"1\"/></bsdf>";
+    refused(thin, &["\"eta\" is 0.99", "above 1"]);
+}
+
+#[test]
 fn two_sided() {
     let one = bsdf("twosided", "<bsdf type=\"diffuse\"/>");
     assert!(matches!(one, Bsdf::TwoSided(t) if t.back.is_none()));
@@ -120,5 +176,5 @@ fn two_sided() {
     assert!(matches!((&t.front, &t.back), (Bsdf::Diffuse(_), Some(Bsdf::Phong(_)))));
     refused("<bsdf type=\"twosided\"/>", &["one or two bsdfs inside, found 0"]);
     refused("<bsdf type=\"twosided\"><bsdf type=\"null\"/></bsdf>", &["null"]);
-    refused("<bsdf type=\"plastic\"/>", &["`plastic` is not supported", "diffuse"]);
+    refused("<bsdf type=\"hair\"/>", &["`hair` is not supported", "diffuse"]);
 }

@@ -4,6 +4,7 @@ mod materials;
 mod media;
 mod sensors;
 mod shapes;
+mod support;
 
 use std::path::Path;
 

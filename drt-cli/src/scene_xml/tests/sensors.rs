@@ -92,7 +92,7 @@ fn integrators() {
     );
     assert_eq!(old.integrator.rr_depth, 9);
     for (body, part) in [
-        (r#"<integrator type="aov"/>"#, "traces paths"),
+        (r#"<integrator type="aov"/>"#, "one integrator inside"),
         (r#"<integrator type="path"><integer name="max_depth" value="-2"/></integrator>"#, "-2"),
         (
             r#"<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>"#,

@@ -36,6 +36,116 @@ fn primitives_stand_where_mitsuba_has_them() {
 }
 
 #[test]
+fn cylinders_stand_between_their_ends() {
+    let cylinder = shape(
+        r#"<shape type="cylinder"><float name="radius" value="2"/><point name="p0" value="1 0 0"/>
+           <point name="p1" value="1 0 3"/></shape>"#,
+    );
+    let exact = 12.0 * std::f64::consts::PI;
+    assert!((cylinder.mesh.surface_area() / exact - 1.0).abs() < 2e-3);
+    let normals = cylinder.mesh.normals.as_ref().unwrap();
+    for (p, n) in cylinder.mesh.positions.iter().zip(normals) {
+        let out = (*p - vec3(1.0, 0.0, 0.0)).reject(Vec3::Z);
+        assert!((*n - out / 2.0).max_abs() < 1e-12 && (p.z == 0.0 || (p.z - 3.0).abs() < 1e-12));
+    }
+    let flat = cylinder.mesh.normal(0);
+    assert!(flat.dot(normals[0]) > 0.9, "faces outward");
+    let inward =
+        shape(r#"<shape type="cylinder"><boolean name="flip_normals" value="true"/></shape>"#);
+    assert!(inward.mesh.normals.as_ref().unwrap()[0].x < 0.0);
+    let same = r#"<shape type="cylinder"><point name="p1" value="0 0 0"/></shape>"#;
+    refused(same, &["same point"]);
+    refused(r#"<shape type="sdfgrid"/>"#, &["`sdfgrid` is not supported", "cylinder"]);
+    refused(r#"<shape type="linearcurve"/>"#, &["curves are no triangles"]);
+}
+
+/// A file of one or two meshes: the unit right triangle at the heights given.
+fn serialized(version: u16, flags: u32, heights: &[f32]) -> Vec<u8> {
+    use std::io::Write;
+    let (mut file, mut offsets) = (Vec::new(), Vec::new());
+    for z in heights {
+        offsets.push(file.len() as u64);
+        file.extend([0x041C_u16, version].iter().flat_map(|v| v.to_le_bytes()));
+        let mut out = flate2::write::ZlibEncoder::new(&mut file, flate2::Compression::fast());
+        out.write_all(&flags.to_le_bytes()).unwrap();
+        if version == 4 {
+            out.write_all(b"name\0").unwrap();
+        }
+        for count in [3_u64, 1] {
+            out.write_all(&count.to_le_bytes()).unwrap();
+        }
+        let mut floats = |values: &[f32]| {
+            for v in values {
+                if flags & 0x2000 == 0 {
+                    out.write_all(&v.to_le_bytes()).unwrap();
+                } else {
+                    out.write_all(&f64::from(*v).to_le_bytes()).unwrap();
+                }
+            }
+        };
+        floats(&[0.0, 0.0, *z, 1.0, 0.0, *z, 0.0, 1.0, *z]);
+        if flags & 1 != 0 {
+            floats(&[0.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
+        }
+        if flags & 2 != 0 {
+            floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+        }
+        for i in [0_u32, 1, 2] {
+            out.write_all(&i.to_le_bytes()).unwrap();
+        }
+        out.finish().unwrap();
+    }
+    for offset in &offsets {
+        let bytes = offset.to_le_bytes();
+        file.extend(&bytes[..if version == 3 { 4 } else { 8 }]);
+    }
+    file.extend((heights.len() as u32).to_le_bytes());
+    file
+}
+
+#[test]
+fn serialized_files() {
+    let folder = Folder::new();
+    let read = |bytes: &[u8], inside: &str| {
+        folder.file("m.serialized", bytes);
+        let body = format!(
+            "<scene version=\"3.0.0\"><shape type=\"serialized\"><string name=\"filename\" \
+             value=\"m.serialized\"/>{inside}</shape></scene>"
+        );
+        load_scene(&folder.file("s.xml", body), &Defaults::new())
+    };
+    let second = r#"<integer name="shape_index" value="1"/>"#;
+    for (version, flags) in [(3, 0x1003), (4, 0x1003), (4, 0x2003), (4, 0x1000)] {
+        let file = serialized(version, flags, &[1.0, 2.0]);
+        let mesh = read(&file, second).unwrap().shapes.remove(0).mesh;
+        assert_eq!(mesh.positions[1], vec3(1.0, 0.0, 2.0));
+        assert_eq!(mesh.triangles, [[0, 1, 2]]);
+        let y = if flags & 1 != 0 { 0.5_f64.sqrt() } else { 0.0 };
+        assert!((mesh.normals.as_ref().unwrap()[0].y - y).abs() < 1e-12);
+    }
+    let flat =
+        read(&serialized(4, 0x1013, &[1.0]), r#"<boolean name="face_normals" value="true"/>"#);
+    assert!(flat.unwrap().shapes[0].mesh.normals.is_none());
+
+    let refused = |bytes: &[u8], inside: &str, part: &str| {
+        let message = read(bytes, inside).unwrap_err().to_string();
+        assert!(message.contains(part), "expected `{part}` in: {message}");
+    };
+    let good = serialized(4, 0x1003, &[1.0]);
+    refused(&good, second, "`shape_index` is 1, but the file has 1 meshes");
+    refused(b"v 0 0 0\n", "", "not a .serialized file");
+    refused(&[0x1c, 4, 9, 0, 0, 0, 0, 0], "", "version 9");
+    refused(&good[..3], "", "cut short");
+    // Whatever is broken, it is read or refused.
+    for i in 0..good.len() {
+        let mut bytes = good.clone();
+        bytes[i] ^= 0x55;
+        drop(read(&bytes, ""));
+        drop(read(&good[..i], ""));
+    }
+}
+
+#[test]
 fn transform_steps_apply_in_file_order() {
     let first = |steps: &str| {
         let body = format!(
@@ -134,10 +244,10 @@ fn unusable_files_name_scene_line_and_cause() {
     }
     refused(
         r#"<shape type="ply"><string name="filename" value="no.ply"/></shape>"#,
-        &[":2", "cannot read dir/no.ply"],
+        &[":2", "no file `no.ply`; searched dir"],
     );
     refused(r#"<shape type="obj"/>"#, &["`filename` is missing"]);
-    refused(r#"<shape type="cylinder"/>"#, &["`cylinder` is not supported", "rectangle"]);
+    refused(r#"<shape type="cone"/>"#, &["`cone` is not supported", "rectangle"]);
 }
 
 #[test]

@@ -1,0 +1,214 @@
+//! Renders scenes of Mitsuba's test suite and compares them with the references beside them:
+//!
+//! ```sh
+//! cargo build --release -p drt-cli
+//! cargo run --release -p drt-cli --example scene_table -- --scenes DIR
+//! ```
+//!
+//! A scene `DIR/…/NAME_INTEGRATOR.xml` has its reference in `refs/NAME_ref_rgb.exr` and the variance of
+//! one sample of a pixel in `refs/NAME_ref_rgb_var.exr`, both as Mitsuba's own tests write them. The
+//! table says of each whether it loads, the rms and the largest z of 8×8 block means, their bias in
+//! percent of the image's mean, and seconds. It exits with 1 where a scene does not load or disagrees.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::time::Instant;
+
+use clap::Parser;
+use drt_cli::{ExrFile, read_exr};
+
+/// Width of the blocks whose means are compared.
+const BLOCK: u32 = 8;
+
+#[derive(Parser)]
+#[command(about = "Compares images of Mitsuba's test scenes with their references")]
+struct Arguments {
+    /// The folder to search, with all below it.
+    #[arg(long)]
+    scenes: PathBuf,
+    /// Only scenes whose path holds this.
+    #[arg(long, default_value = "")]
+    only: String,
+    /// Samples per pixel; by default two million in all, as Mitsuba's tests take.
+    #[arg(long)]
+    spp: Option<u32>,
+    /// Samples per pixel of the references.
+    #[arg(long, default_value_t = 32_000.0)]
+    reference_spp: f64,
+    /// Where to keep the images, as NAME.exr; by default nowhere.
+    #[arg(long)]
+    keep: Option<PathBuf>,
+    /// The program to render with; by default `drt` of the same build.
+    #[arg(long)]
+    drt: Option<PathBuf>,
+}
+
+struct Scene {
+    path: PathBuf,
+    name: String,
+    reference: PathBuf,
+    variance: PathBuf,
+}
+
+/// Of the block means, over the three channels.
+struct Comparison {
+    rms_z: f64,
+    max_z: f64,
+    /// Mean difference over the mean of the reference.
+    bias: f64,
+    agrees: bool,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let mut scenes = Vec::new();
+    find(&arguments.scenes, &mut scenes);
+    scenes.sort_by(|a, b| a.path.cmp(&b.path));
+    scenes.retain(|s| s.path.to_string_lossy().contains(&arguments.only));
+    println!("{:44} {:>8} {:>8} {:>8} {:>8}", "scene", "rms z", "max z", "bias %", "seconds");
+    let mut agreeing = 0;
+    for scene in &scenes {
+        let start = Instant::now();
+        match compare(scene, &arguments) {
+            Ok(c) => {
+                agreeing += usize::from(c.agrees);
+                let (bias, seconds) = (100.0 * c.bias, start.elapsed().as_secs_f64());
+                let mark = if c.agrees { "" } else { "  disagrees" };
+                let [rms, max] = [c.rms_z, c.max_z];
+                println!("{:44} {rms:8.2} {max:8.2} {bias:8.2} {seconds:8.1}{mark}", scene.name);
+            }
+            Err(message) => println!("{:44} {message}", scene.name),
+        }
+    }
+    println!("{agreeing} of {} agree", scenes.len());
+    if agreeing == scenes.len() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Collects the scenes with references below a folder.
+fn find(folder: &Path, scenes: &mut Vec<Scene>) {
+    let Ok(entries) = std::fs::read_dir(folder) else { return };
+    for path in entries.flatten().map(|e| e.path()) {
+        if path.is_dir() {
+            find(&path, scenes);
+        } else if path.extension().is_some_and(|e| e == "xml") {
+            scenes.extend(with_reference(path));
+        }
+    }
+}
+
+fn with_reference(path: PathBuf) -> Option<Scene> {
+    let stem = path.file_stem()?.to_str()?;
+    let base = stem.rsplit_once('_').map_or(stem, |(base, _)| base);
+    let folder = path.parent()?;
+    let file = |end: &str| folder.join("refs").join(format!("{base}_ref_rgb{end}.exr"));
+    let (reference, variance) = (file(""), file("_var"));
+    let name = format!("{}/{stem}", folder.file_name()?.to_str()?);
+    (reference.exists() && variance.exists()).then_some(Scene { path, name, reference, variance })
+}
+
+fn compare(scene: &Scene, arguments: &Arguments) -> Result<Comparison, String> {
+    let read = |path: &Path| read_exr(path).map_err(|e| e.to_string());
+    let (reference, variance) = (read(&scene.reference)?, read(&scene.variance)?);
+    let pixels = reference.size[0] * reference.size[1];
+    let spp = arguments.spp.unwrap_or_else(|| (2_000_000 / pixels.max(1)).max(1));
+    let image = render(scene, spp, arguments)?;
+    if image.size != reference.size {
+        return Err(format!("the image is {:?}, the reference {:?}", image.size, reference.size));
+    }
+    let plain = |file: &ExrFile, layer: &str| {
+        file.layers.get(layer).cloned().ok_or_else(|| format!("no layer `{layer}`"))
+    };
+    let (mean, error) = (plain(&image, "")?, plain(&image, "stderr")?);
+    let (expected, spread) = (plain(&reference, "")?, plain(&variance, "")?);
+    let sample = |i: usize, c: usize| {
+        // Means and variances are stored in other colours than they were taken in, so that a
+        // variance can come out below zero.
+        let of_one = f64::from(spread[i][c]).max(0.0);
+        Sample {
+            difference: f64::from(mean[i][c]) - f64::from(expected[i][c]),
+            expected: f64::from(expected[i][c]),
+            variance: f64::from(error[i][c]).powi(2),
+            of_reference: of_one / arguments.reference_spp,
+            of_as_many: of_one / f64::from(spp),
+        }
+    };
+    Ok(judge(reference.size, &sample))
+}
+
+#[derive(Default)]
+struct Sample {
+    difference: f64,
+    expected: f64,
+    variance: f64,
+    of_reference: f64,
+    /// What the reference's variance would be with as many samples as the image has.
+    of_as_many: f64,
+}
+
+/// From this relative standard error on, a block's own variance is no good estimate of itself: few
+/// samples make up its mean. That of the reference is taken there if it is larger.
+const NOISY: f64 = 0.1;
+
+fn judge(size: [u32; 2], sample: &dyn Fn(usize, usize) -> Sample) -> Comparison {
+    let [width, height] = size;
+    let blocks: Vec<[u32; 2]> = (0..height.div_ceil(BLOCK))
+        .flat_map(|y| (0..width.div_ceil(BLOCK)).map(move |x| [x * BLOCK, y * BLOCK]))
+        .collect();
+    let (mut squares, mut max_z, mut difference, mut expected) = (0.0, 0.0_f64, 0.0, 0.0);
+    for [x0, y0] in &blocks {
+        for c in 0..3 {
+            let mut sum = Sample::default();
+            for y in *y0..(y0 + BLOCK).min(height) {
+                for x in *x0..(x0 + BLOCK).min(width) {
+                    let s = sample((y * width + x) as usize, c);
+                    sum.difference += s.difference;
+                    sum.expected += s.expected;
+                    sum.variance += s.variance;
+                    sum.of_reference += s.of_reference;
+                    sum.of_as_many += s.of_as_many;
+                }
+            }
+            difference += sum.difference;
+            expected += sum.expected;
+            // Both images are stored in single precision.
+            let rounding = (1e-6 * sum.expected).powi(2);
+            let noisy = sum.variance.max(sum.of_as_many).sqrt() > NOISY * sum.expected;
+            let own = if noisy { sum.variance.max(sum.of_as_many) } else { sum.variance };
+            let z = match own + sum.of_reference + rounding {
+                0.0 if sum.difference == 0.0 => 0.0,
+                variance => sum.difference.abs() / variance.sqrt(),
+            };
+            squares += z * z;
+            max_z = max_z.max(z);
+        }
+    }
+    let rms_z = (squares / (3 * blocks.len()).max(1) as f64).sqrt();
+    // Of 108 numbers, the size of most references, chance passes 4.9 once in ten thousand images.
+    Comparison { rms_z, max_z, bias: difference / expected, agrees: rms_z <= 1.3 && max_z < 5.0 }
+}
+
+fn render(scene: &Scene, spp: u32, arguments: &Arguments) -> Result<ExrFile, String> {
+    let temporary = std::env::temp_dir().join(format!("drt-scene-table-{}", std::process::id()));
+    let folder = arguments.keep.as_ref().unwrap_or(&temporary);
+    std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
+    let output = folder.join(format!("{}.exr", scene.name.replace('/', "_")));
+    let beside = std::env::current_exe().ok().and_then(|e| Some(e.parent()?.parent()?.join("drt")));
+    let program = arguments.drt.clone().or(beside).unwrap_or_else(|| "drt".into());
+    let run = Command::new(&program)
+        .arg("render")
+        .arg(&scene.path)
+        .args(["--quiet", "--spp", &spp.to_string(), "-o"])
+        .arg(&output)
+        .output()
+        .map_err(|e| format!("cannot run {}: {e}", program.display()))?;
+    let image = if run.status.success() {
+        read_exr(&output).map_err(|e| e.to_string())
+    } else {
+        let message = String::from_utf8_lossy(&run.stderr);
+        Err(message.lines().next().unwrap_or("failed without a message").to_owned())
+    };
+    if arguments.keep.is_none() {
+        drop(std::fs::remove_dir_all(&temporary));
+    }
+    image
+}
