@@ -71,6 +71,11 @@ impl Ratios {
         Self { last: 1.0 / square(pdf), earlier: square(cosine / pdf) * self.all(back) }
     }
 
+    /// Leaving in the only direction of a smooth surface, to which nothing can be connected. Its probability is that of the way back.
+    fn reflect(&self, cosine: f64) -> Self {
+        Self { last: 0.0, earlier: self.earlier * square(cosine) }
+    }
+
     /// Arriving, `spread` being the squared distance, or 1 of what comes from infinity.
     fn arrive(&self, spread: f64, cosine: f64, attenuation: f64) -> Self {
         Self {
@@ -125,6 +130,8 @@ pub(super) struct Subpath {
     given: Given,
     /// Of the ray about to be followed.
     ratios: Ratios,
+    /// Segments with it.
+    segments: u32,
     finite: bool,
     /// Light that came in from outside, or from inside of a medium.
     pub(super) met: Rgb,
@@ -138,6 +145,7 @@ impl Subpath {
             vertices: Vec::new(),
             given,
             ratios: Ratios::default(),
+            segments: 1,
             finite: true,
             met: Rgb::ZERO,
             #[cfg(all(test, feature = "std"))]
@@ -148,7 +156,8 @@ impl Subpath {
     /// Forgets the last path. Where the next one starts is at a point of the scene, or at infinity.
     pub(super) fn begin(&mut self, ratios: Ratios, finite: bool) {
         self.vertices.clear();
-        (self.ratios, self.finite, self.met) = (ratios, finite, Rgb::ZERO);
+        (self.ratios, self.segments) = (ratios, 1);
+        (self.finite, self.met) = (finite, Rgb::ZERO);
     }
 
     /// The density of the direction back, from one that the other end's walk would come from.
@@ -190,17 +199,13 @@ impl Observer for Subpath {
         let attenuation = proxy_attenuation(world, medium, crossings, arrival.distance);
         let name = self.vertices.len() as u32;
         let ratios = self.ratios.arrive(spread, cosine(&vertex, arrival.dir), attenuation);
-        let segments = match self.vertices.get(arrival.parent as usize) {
-            Some(parent) if name > 0 => parent.segments + 1,
-            _ => 1,
-        };
         self.vertices.push(SubpathVertex {
             vertex,
             coefficients,
             from: -arrival.dir,
             throughput: arrival.throughput,
             ratios,
-            segments,
+            segments: self.segments,
         });
         self.finite = true;
         name
@@ -209,8 +214,11 @@ impl Observer for Subpath {
     fn scatter(&mut self, world: &World, leaving: &OutgoingRay, _: Rgb, _: f64, _: &Rng) {
         let Some(v) = self.vertices.get(leaving.node as usize) else { return };
         let Some(scattering) = world.scattering(&v.vertex) else { return };
-        let back = self.back(&scattering, leaving.dir, v.from);
-        let pdf = leaving.pdf().unwrap_or(1.0);
-        self.ratios = v.ratios.scatter(v.cosine(leaving.dir), pdf, back);
+        let cosine = v.cosine(leaving.dir);
+        self.segments = leaving.segments + 1;
+        self.ratios = match leaving.pdf() {
+            Some(pdf) => v.ratios.scatter(cosine, pdf, self.back(&scattering, leaving.dir, v.from)),
+            None => v.ratios.reflect(cosine),
+        };
     }
 }
