@@ -28,8 +28,8 @@ fn camera(kind: FilterKind) -> Sensor {
 
 /// A factor of the light: it rises, and jumps within a pixel and beyond the film.
 fn along(axis: usize, at: f64) -> f64 {
-    let jump = [7.0, 5.6][axis];
-    0.5 + 0.05 * at + if at < jump { 0.0 } else { 1.0 } + if at < -0.2 { 0.7 } else { 0.0 }
+    let edge = [7.0, 5.6][axis];
+    0.5 + 0.05 * at + if at < edge { 0.0 } else { 1.0 } + if at < -0.2 { 0.7 } else { 0.0 }
 }
 
 /// The image of that, in closed form but for the quadrature.
