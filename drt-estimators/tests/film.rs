@@ -90,7 +90,7 @@ fn even_light_is_nearly_free_of_noise() {
     let mut scene = surfaces(phong(), phong());
     scene.shapes.clear();
     scene.emitters.retain(|e| e.id.as_deref() == Some("sky"));
-    for (kind, most) in [(FilterKind::TENT, 0.02), (FilterKind::GAUSSIAN, 0.02)] {
+    for (kind, most) in [(FilterKind::TENT, 2e-3), (FilterKind::GAUSSIAN, 2e-3)] {
         scene.sensors = self::scene(kind).sensors;
         let image = rendered(&scene, &[], &Settings::default()).image;
         for e in &image.pixels {

@@ -142,7 +142,7 @@ impl Tile {
 pub(crate) struct PixelFilm {
     size: [u32; 2],
     layers: usize,
-    /// Layer by layer of each pixel.
+    /// Layer by layer of each pixel; of the first one nothing where that is splatted.
     sums: RunSums,
     events: Vec<Events>,
     image: Option<SplattedImage>,
@@ -219,32 +219,37 @@ impl PixelFilm {
     /// Counts samples that every pixel has received; with them a run may end.
     pub(crate) fn advance(&mut self, units: u32, ends_run: bool) {
         if let Some(image) = &mut self.image {
-            image.advance(units, ends_run, &mut self.events[0], |pixel, sum| {
-                self.sums.add(pixel * self.layers, core::slice::from_ref(&sum));
-            });
+            image.advance(units, ends_run);
         }
         self.sums.advance(units, ends_run);
     }
 
+    fn estimate(&self, pixel: usize, layer: usize) -> Estimate {
+        match &self.image {
+            Some(image) if layer == 0 => image.estimate(pixel),
+            _ => self.sums.estimate(pixel * self.layers + layer),
+        }
+    }
+
     /// The variance of a pixel's mean in one layer, averaged over colours.
     pub(crate) fn variance(&self, pixel: u32, layer: usize) -> f64 {
-        let stderr = self.sums.estimate(pixel as usize * self.layers + layer).stderr;
+        let stderr = self.estimate(pixel as usize, layer).stderr;
         (stderr * stderr).mean()
     }
 
     /// The first layer of some pixels.
     pub(crate) fn estimates(&self, pixels: core::ops::Range<u32>) -> Vec<Estimate> {
-        pixels.map(|p| self.sums.estimate(p as usize * self.layers)).collect()
+        pixels.map(|p| self.estimate(p as usize, 0)).collect()
     }
 
     /// One layer as an image.
     pub(crate) fn layer(&self, l: usize, blocks: &Blocks) -> Layer {
+        if let Some(splatted) = self.image.as_ref().filter(|_| l == 0) {
+            return splatted.layer(blocks);
+        }
         let entries = (l..self.sums.len()).step_by(self.layers);
         let pixels = entries.map(|i| self.sums.estimate(i)).collect();
         let mut image = Layer::from_pixels(self.size, pixels, blocks);
-        if let Some(splatted) = self.image.as_ref().filter(|_| l == 0) {
-            splatted.set_errors(&mut image, blocks);
-        }
         self.events[l].widen(&mut image, blocks, f64::from(self.units().max(1)));
         image
     }

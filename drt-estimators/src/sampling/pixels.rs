@@ -177,8 +177,8 @@ impl<W> Filling<'_, W> {
                     }
                     tile.push(pixel, &values);
                     if let Some(image) = &mut image {
-                        for Splat { point, value } in sampler.splats() {
-                            image.add(&Splat { point: *point, value: *value * weight });
+                        for splat in sampler.splats() {
+                            image.add(&splat.scaled(weight));
                         }
                     }
                 });

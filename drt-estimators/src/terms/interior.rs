@@ -126,9 +126,11 @@ impl<S: PathSink> Sampler for PixelSampler<'_, S> {
         if self.antithetic {
             self.path(pixel, unit, u, rng.clone(), values);
             self.path(pixel, unit, u.map(|u| 1.0 - u), rng, values);
-            let splats = self.splats.iter_mut().map(|s| &mut s.value);
-            for v in values.iter_mut().chain(splats) {
+            for v in values.iter_mut() {
                 *v *= 0.5;
+            }
+            for splat in &mut self.splats {
+                *splat = splat.scaled(0.5);
             }
         } else {
             self.path(pixel, unit, u, rng, values);
@@ -317,21 +319,21 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
 
     /// Adds the light of a path to the image.
     fn to_image(&mut self, s: &ViewSample, derivative: bool, light: Rgb, values: &mut [Rgb]) {
-        let value = match self.image {
+        let (value, weight) = match self.image {
             ImageSampling::OwnPixel => {
                 values[0] += light;
                 return;
             }
-            ImageSampling::Squares => light,
+            ImageSampling::Squares => (light, s.weight),
             // At the very end of a filter there is no weight to take out; no path is there.
             ImageSampling::SharedFilters if s.weight == 0.0 => return,
             // As by the balance heuristic for all pixels (Veach 1997, §9.2.2).
             ImageSampling::SharedFilters => {
-                let density = self.world.camera.view_density(s.point, derivative);
-                light * (1.0 / (s.weight * density))
+                let weight = 1.0 / self.world.camera.view_density(s.point, derivative);
+                (light * (weight / s.weight), weight)
             }
         };
-        self.splats.push(Splat { point: s.point, value });
+        self.splats.push(Splat { point: s.point, value, weight });
     }
 
     /// Notes a sample that is not finite and counts it as zero.

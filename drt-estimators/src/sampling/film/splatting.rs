@@ -7,10 +7,9 @@
 //! I_i = (1/N) Σ_s Σ_k P_i(q) f / p,      P_i the pixel's filter.
 //! ```
 //!
-//! That has the right mean for any N. Its weights add up to 1 on average only: dividing by their sum would take out what
-//! noise they have, at the price of a bias of order 1/N and of sums that can't be merged with others. As points
-//! are even in each square, that noise is small: for 16 points under a tent its variance is 0.0024 f² / 16, a 180th of that of
-//! paths whose standard deviation is f.
+//! That has the right mean for any N. Its weights P_i / p add up to 1 on average only. As points are even in each square, the
+//! noise of that is small: for runs of 16 points under a tent its variance is 0.0024 f² / N, a 180th of that of paths whose
+//! standard deviation is f, but in a plain background nothing else is seen. So it is taken out without bias ([`RunSums`]).
 //!
 //! A [`Splat`] is a point of the image and what arrives there over its density. Whether a pixel's own path
 //! puts it there or a connection of a light path to the camera makes no difference: its stratum is that of the random numbers
@@ -30,7 +29,7 @@ use core::ops::Range;
 use drt_math::{Real, Rgb, fm};
 
 use crate::model::filter::Filter;
-use crate::model::rendering::{BLOCKS, Layer};
+use crate::model::rendering::{BLOCKS, Estimate, Layer};
 use crate::sampling::film::sums::RunSums;
 use crate::sampling::film::{Blocks, Events, cell};
 
@@ -47,7 +46,20 @@ pub(crate) struct Splat {
     pub(crate) point: [f64; 2],
     /// The light that arrives there, over the density of the point per square pixel.
     pub(crate) value: Rgb,
+    /// One over that density, of points that every pixel's filter sees with the density 1 in the mean over a sample
+    /// of each pixel; of others 0.
+    pub(crate) weight: f64,
 }
+
+impl Splat {
+    /// One of several that share what they stand for.
+    pub(crate) fn scaled(&self, share: f64) -> Self {
+        Self { point: self.point, value: self.value * share, weight: self.weight * share }
+    }
+}
+
+/// Sums of values and of weights.
+type Sums = (Rgb, f64);
 
 /// Which pixels and blocks a point reaches.
 #[derive(Clone, Debug)]
@@ -126,13 +138,13 @@ pub(crate) struct SplatTile {
     raster: Arc<Raster>,
     /// Pixels around those whose paths these are, and their sums.
     window: [Range<u32>; 2],
-    sums: Vec<Rgb>,
+    sums: Vec<Sums>,
     /// Splats on other pixels.
-    beyond: Vec<(u32, Rgb)>,
+    beyond: Vec<(u32, Sums)>,
     /// The group of the present stratum, and what that has added to which block.
     group: u32,
-    present: Vec<(u8, Rgb)>,
-    blocks: Vec<(u32, u8, Rgb)>,
+    present: Vec<(u8, Sums)>,
+    blocks: Vec<(u32, u8, Sums)>,
     events: Events,
     taps: [Taps; 2],
 }
@@ -145,7 +157,7 @@ impl SplatTile {
         Self {
             raster: Arc::clone(raster),
             window,
-            sums: alloc::vec![Rgb::ZERO; w * h],
+            sums: alloc::vec![(Rgb::ZERO, 0.0); w * h],
             beyond: Vec::new(),
             group: 0,
             present: Vec::new(),
@@ -170,28 +182,30 @@ impl SplatTile {
         let [columns, rows] = &self.window;
         let last = x.first + x.pixels.len() as u32;
         for (row, of_row) in (y.first..).zip(&y.pixels) {
-            let value = splat.value * *of_row;
+            let Splat { value, weight, .. } = splat.scaled(*of_row);
             if rows.contains(&row) && columns.start <= x.first && last <= columns.end {
                 let start = (row - rows.start) as usize * columns.len();
                 let at = start + (x.first - columns.start) as usize;
-                for (sum, weight) in self.sums[at..].iter_mut().zip(&x.pixels) {
-                    *sum += value * *weight;
+                for (sum, tap) in self.sums[at..].iter_mut().zip(&x.pixels) {
+                    sum.0 += value * *tap;
+                    sum.1 += weight * *tap;
                 }
             } else {
                 let at = row * self.raster.size[0] + x.first;
-                self.beyond.extend((at..).zip(&x.pixels).map(|(i, weight)| (i, value * *weight)));
+                let taps = (at..).zip(&x.pixels);
+                self.beyond.extend(taps.map(|(i, tap)| (i, (value * *tap, weight * *tap))));
             }
         }
         let mut all = 0.0;
         for (row, of_row) in &y.blocks {
             for (column, of_column) in &x.blocks {
                 let block = row * BLOCKS as u8 + column;
-                let weight = of_row * of_column;
-                let value = splat.value * weight;
-                all += weight;
+                let tap = of_row * of_column;
+                let Splat { value, weight, .. } = splat.scaled(tap);
+                all += tap;
                 match self.present.iter_mut().find(|(own, _)| *own == block) {
-                    Some((_, sum)) => *sum += value,
-                    None => self.present.push((block, value)),
+                    Some((_, sum)) => *sum = (sum.0 + value, sum.1 + weight),
+                    None => self.present.push((block, (value, weight))),
                 }
             }
         }
@@ -199,28 +213,63 @@ impl SplatTile {
     }
 }
 
-/// The sums of a splatted image besides those of its pixels.
+/// An image that is splatted.
 #[derive(Debug)]
 pub(super) struct SplattedImage {
     raster: Arc<Raster>,
-    /// What tiles have added since samples were last counted: to pixels, and to blocks by groups.
-    pixels: Vec<Rgb>,
-    blocks: Vec<Rgb>,
-    events: Events,
-    /// Blocks and the whole by groups, over all samples.
+    pixels: RunSums,
+    /// Blocks and the whole by groups.
     groups: RunSums,
+    events: Events,
+    /// What tiles have added since samples were last counted.
+    new_pixels: Pending,
+    new_groups: Pending,
+    new_events: Events,
+}
+
+/// Sums that do not count yet.
+#[derive(Debug)]
+struct Pending {
+    values: Vec<Rgb>,
+    weights: Vec<f64>,
+}
+
+impl Pending {
+    fn new(n: usize) -> Self {
+        Self { values: alloc::vec![Rgb::ZERO; n], weights: alloc::vec![0.0; n] }
+    }
+
+    fn add(&mut self, at: usize, sums: Sums) {
+        self.values[at] += sums.0;
+        self.weights[at] += sums.1;
+    }
+
+    fn forget(&mut self) {
+        self.values.fill(Rgb::ZERO);
+        self.weights.fill(0.0);
+    }
+
+    fn count(&mut self, sums: &mut RunSums, units: u32, ends_run: bool) {
+        sums.add(0, &self.values);
+        sums.add_weights(&self.weights);
+        sums.advance(units, ends_run);
+        self.forget();
+    }
 }
 
 impl SplattedImage {
     pub(super) fn new(raster: Raster) -> Self {
         let [w, h] = raster.size;
+        let pixels = (w * h) as usize;
         let groups = (GROUPS * GROUPS) as usize * SUMS;
         Self {
             raster: Arc::new(raster),
-            pixels: alloc::vec![Rgb::ZERO; (w * h) as usize],
-            blocks: alloc::vec![Rgb::ZERO; groups],
+            pixels: RunSums::weighted(pixels),
+            groups: RunSums::weighted(groups),
             events: Events::NONE,
-            groups: RunSums::new(groups),
+            new_pixels: Pending::new(pixels),
+            new_groups: Pending::new(groups),
+            new_events: Events::NONE,
         }
     }
 
@@ -230,19 +279,22 @@ impl SplattedImage {
 
     pub(super) fn clear(&mut self) {
         self.forget();
+        self.pixels.clear();
         self.groups.clear();
+        self.events = Events::NONE;
     }
 
     pub(super) fn begin(&mut self) {
         // What a pass that was cut short has left.
         self.forget();
+        self.pixels.begin();
         self.groups.begin();
     }
 
     fn forget(&mut self) {
-        self.pixels.fill(Rgb::ZERO);
-        self.blocks.fill(Rgb::ZERO);
-        self.events = Events::NONE;
+        self.new_pixels.forget();
+        self.new_groups.forget();
+        self.new_events = Events::NONE;
     }
 
     pub(super) fn add(&mut self, tile: &SplatTile) {
@@ -250,49 +302,50 @@ impl SplattedImage {
         let [columns, rows] = &tile.window;
         for (row, sums) in rows.clone().zip(tile.sums.chunks(columns.len().max(1))) {
             let at = row as usize * width + columns.start as usize;
-            for (sum, t) in self.pixels[at..].iter_mut().zip(sums) {
-                *sum += *t;
+            for (i, sums) in (at..).zip(sums) {
+                self.new_pixels.add(i, *sums);
             }
         }
-        for (pixel, value) in &tile.beyond {
-            self.pixels[*pixel as usize] += *value;
+        for (pixel, sums) in &tile.beyond {
+            self.new_pixels.add(*pixel as usize, *sums);
         }
-        let present = tile.present.iter().map(|(block, sum)| (tile.group, *block, *sum));
-        for (group, block, sum) in tile.blocks.iter().copied().chain(present) {
-            let of_group = &mut self.blocks[group as usize * SUMS..][..SUMS];
-            of_group[block as usize] += sum;
-            of_group[SUMS - 1] += sum;
+        let present = tile.present.iter().map(|(block, sums)| (tile.group, *block, *sums));
+        for (group, block, sums) in tile.blocks.iter().copied().chain(present) {
+            let of_group = group as usize * SUMS;
+            self.new_groups.add(of_group + block as usize, sums);
+            self.new_groups.add(of_group + SUMS - 1, sums);
         }
-        self.events.add(&tile.events);
+        self.new_events.add(&tile.events);
     }
 
-    /// Counts samples, with what they have added to pixels.
-    pub(super) fn advance(
-        &mut self,
-        units: u32,
-        ends_run: bool,
-        events: &mut Events,
-        mut to_pixel: impl FnMut(usize, Rgb),
-    ) {
-        self.pixels.iter().enumerate().for_each(|(i, sum)| to_pixel(i, *sum));
-        self.groups.add(0, &self.blocks);
-        self.groups.advance(units, ends_run);
-        events.add(&self.events);
-        self.forget();
+    /// Counts samples, with what they have added.
+    pub(super) fn advance(&mut self, units: u32, ends_run: bool) {
+        self.new_pixels.count(&mut self.pixels, units, ends_run);
+        self.new_groups.count(&mut self.groups, units, ends_run);
+        self.events.add(&core::mem::replace(&mut self.new_events, Events::NONE));
     }
 
-    /// The standard errors of blocks and of the whole.
-    pub(super) fn set_errors(&self, image: &mut Layer, blocks: &Blocks) {
+    pub(super) fn estimate(&self, pixel: usize) -> Estimate {
+        self.pixels.estimate(pixel)
+    }
+
+    /// The image, with the errors of its blocks and of the whole.
+    pub(super) fn layer(&self, blocks: &Blocks) -> Layer {
+        let pixels = (0..self.pixels.len()).map(|i| self.estimate(i)).collect();
+        let mut image = Layer::from_pixels(self.raster.size, pixels, blocks);
         let all: u32 = blocks.count.iter().sum();
         let counts = blocks.count.into_iter().chain([all]);
         let estimates = image.blocks.iter_mut().chain([&mut image.total]);
         for ((k, estimate), pixels) in estimates.enumerate().zip(counts) {
             let of_groups = (k..self.groups.len()).step_by(SUMS);
             let variance = of_groups.fold(Rgb::ZERO, |sum, i| {
-                let stderr = self.groups.estimate(i).stderr;
+                // As if each pixel of a block had taken its mean from the weights.
+                let stderr = self.groups.stderr(i, estimate.mean);
                 sum + stderr * stderr
             });
             estimate.stderr = variance.map(Real::sqrt) * (1.0 / f64::from(pixels.max(1)));
         }
+        self.events.widen(&mut image, blocks, f64::from(self.pixels.units().max(1)));
+        image
     }
 }

@@ -8,6 +8,16 @@ use crate::model::rendering::Estimate;
 
 /// Means of many numbers at once, with their standard errors: plain arrays with an entry for each.
 ///
+/// Where samples have weights whose sum W has the mean 1, as of a pixel's filter, the noise of that is taken out of
+/// their sum S: over the R runs of a pass, with c_r from all but run r,
+///
+/// ```text
+/// (1/N) Σ_r N_r (S_r - c_r (W_r - 1)),     c_r = R/(R - 1) (1/N) Σ_{s≠r} N_s S_s,     N = Σ_r N_r.
+/// ```
+///
+/// As runs are independent, that has the mean of S for any N: the unbiased estimator of a ratio by Hartley and Ross (1954,
+/// "Unbiased ratio estimators"). S / W is as good, but has a bias of order 1/N.
+///
 /// In a pass, every number takes its samples in runs whose means are independent
 /// ([`Pass`](crate::sampling::pixels::Pass)); passes are weighted by their samples. A pass of a single run
 /// knows nothing of its error, and takes that of the others.
@@ -15,10 +25,13 @@ use crate::model::rendering::Estimate;
 pub(super) struct RunSums {
     /// Passes before the last one; empty when there are none.
     passes: Vec<Passes>,
+    /// Of weights, where there are such.
+    pass_weights: Vec<PassWeights>,
     before: Count,
     /// The last pass, and of its current run what is finished.
     runs: Vec<Runs>,
     partial: Vec<Rgb>,
+    weights: Vec<RunWeights>,
     run_count: u32,
     run_units: u32,
     partial_units: u32,
@@ -40,6 +53,53 @@ struct Passes {
 
 impl Passes {
     const NONE: Self = Self { sum: Rgb::ZERO, variance: Rgb::ZERO };
+}
+
+/// The same of weights: Σ N² covariance with them, and variance of them.
+#[derive(Clone, Copy, Debug)]
+struct PassWeights {
+    with: Rgb,
+    own: f64,
+}
+
+impl PassWeights {
+    const NONE: Self = Self { with: Rgb::ZERO, own: 0.0 };
+}
+
+/// Of weights: the sum in the current run, the mean of runs, the sum of deviations times those of samples
+/// and times themselves, and Σ N_r² S_r (W_r - 1).
+#[derive(Clone, Copy, Debug)]
+struct RunWeights {
+    partial: f64,
+    mean: f64,
+    with: [f32; 3],
+    own: f32,
+    products: Rgb,
+}
+
+impl RunWeights {
+    const NONE: Self =
+        Self { partial: 0.0, mean: 0.0, with: [0.0; 3], own: 0.0, products: Rgb::ZERO };
+
+    /// Ends a run of samples of the mean `x`, of which those before it have the mean `before`.
+    fn push(&mut self, x: Rgb, before: Rgb, length: f64, total: f64) {
+        let w = self.partial / length;
+        let delta = w - self.mean;
+        self.mean += delta * (length / total);
+        let rest = (w - self.mean) * length;
+        for (sum, delta) in self.with.iter_mut().zip((x - before).to_array()) {
+            *sum += (delta * rest) as f32;
+        }
+        self.own += (delta * rest) as f32;
+        self.products += x * ((w - 1.0) * length * length);
+        self.partial = 0.0;
+    }
+
+    /// What is to be added to the mean of `runs` runs of `units` samples.
+    fn correction(&self, mean: Rgb, runs: f64, units: f64) -> Rgb {
+        let plain = mean * (self.mean - 1.0) - self.products * (1.0 / (units * units));
+        plain * (-runs / (runs - 1.0))
+    }
 }
 
 /// Mean of the means of runs, each weighted by its length, and the weighted sum of their squared
@@ -73,6 +133,11 @@ impl RunSums {
         }
     }
 
+    /// With weights.
+    pub(super) fn weighted(n: usize) -> Self {
+        Self { weights: alloc::vec![RunWeights::NONE; n], ..Self::new(n) }
+    }
+
     /// How many numbers there are.
     pub(super) fn len(&self) -> usize {
         self.runs.len()
@@ -86,6 +151,7 @@ impl RunSums {
     /// Forgets all samples.
     pub(super) fn clear(&mut self) {
         self.passes.clear();
+        self.pass_weights.clear();
         self.before = Count::default();
         self.clear_last();
     }
@@ -93,6 +159,7 @@ impl RunSums {
     fn clear_last(&mut self) {
         self.runs.fill(Runs::NONE);
         self.partial.fill(Rgb::ZERO);
+        self.weights.fill(RunWeights::NONE);
         (self.run_count, self.run_units, self.partial_units) = (0, 0, 0);
     }
 
@@ -103,8 +170,13 @@ impl RunSums {
             return;
         }
         self.passes.resize(self.runs.len(), Passes::NONE);
+        self.pass_weights.resize(self.weights.len(), PassWeights::NONE);
         for i in 0..self.runs.len() {
-            self.passes[i] = self.passes_with_last(i);
+            let (passes, weights) = self.passes_with_last(i);
+            self.passes[i] = passes;
+            if let Some(own) = self.pass_weights.get_mut(i) {
+                *own = weights;
+            }
         }
         self.before = count;
         self.clear_last();
@@ -117,6 +189,13 @@ impl RunSums {
         }
     }
 
+    /// Adds sums of the weights of samples.
+    pub(super) fn add_weights(&mut self, sums: &[f64]) {
+        for (weights, t) in self.weights.iter_mut().zip(sums) {
+            weights.partial += *t;
+        }
+    }
+
     /// Counts samples that every number has received; with them a run may end.
     pub(super) fn advance(&mut self, units: u32, ends_run: bool) {
         self.partial_units += units;
@@ -126,8 +205,12 @@ impl RunSums {
         self.run_count += 1;
         self.run_units += self.partial_units;
         let (length, total) = (f64::from(self.partial_units), f64::from(self.run_units));
-        for (runs, sum) in self.runs.iter_mut().zip(&mut self.partial) {
-            runs.push(*sum * (1.0 / length), length, total);
+        for (i, (runs, sum)) in self.runs.iter_mut().zip(&mut self.partial).enumerate() {
+            let (mean, before) = (*sum * (1.0 / length), runs.mean);
+            runs.push(mean, length, total);
+            if let Some(weights) = self.weights.get_mut(i) {
+                weights.push(mean, before, length, total);
+            }
             *sum = Rgb::ZERO;
         }
         self.partial_units = 0;
@@ -141,31 +224,49 @@ impl RunSums {
     }
 
     /// The sums of all passes, the last one included.
-    fn passes_with_last(&self, i: usize) -> Passes {
+    fn passes_with_last(&self, i: usize) -> (Passes, PassWeights) {
         let mut passes = self.passes.get(i).copied().unwrap_or(Passes::NONE);
+        let mut of_weights = self.pass_weights.get(i).copied().unwrap_or(PassWeights::NONE);
         let units = f64::from(self.run_units);
-        passes.sum += self.runs[i].mean * units + self.partial[i];
+        let mut mean = self.runs[i].mean;
         if self.run_count >= 2 {
+            let runs = f64::from(self.run_count);
             // The unfinished run is as uncertain, by its length, as those before it.
             let all = units + f64::from(self.partial_units);
-            let scale = all / f64::from(self.run_count - 1);
+            let scale = all / (runs - 1.0);
             passes.variance += Rgb::from(self.runs[i].m2.map(f64::from)) * scale;
+            if let Some(weights) = self.weights.get(i) {
+                of_weights.with += Rgb::from(weights.with.map(f64::from)) * scale;
+                of_weights.own += f64::from(weights.own) * scale;
+                mean += weights.correction(mean, runs, units);
+            }
         }
-        passes
+        passes.sum += mean * units + self.partial[i];
+        (passes, of_weights)
     }
 
     /// One of the numbers.
     pub(super) fn estimate(&self, i: usize) -> Estimate {
-        let count = self.count();
-        if count.units == 0 {
+        let units = self.count().units;
+        if units == 0 {
             return Estimate { mean: Rgb::ZERO, stderr: Rgb::splat(f64::INFINITY) };
         }
-        let passes = self.passes_with_last(i);
-        let (units, known) = (f64::from(count.units), f64::from(count.known));
-        let stderr = match count.known {
-            0 => Rgb::splat(f64::INFINITY),
-            _ => (passes.variance * (1.0 / (known * units))).map(Real::sqrt),
-        };
-        Estimate { mean: passes.sum * (1.0 / units), stderr }
+        let mean = self.passes_with_last(i).0.sum * (1.0 / f64::from(units));
+        Estimate { mean, stderr: self.stderr(i, mean) }
+    }
+
+    /// The standard error of one of the numbers from whose samples `c` times their weights is taken away.
+    pub(super) fn stderr(&self, i: usize, c: Rgb) -> Rgb {
+        let count = self.count();
+        if count.known == 0 {
+            return Rgb::splat(f64::INFINITY);
+        }
+        let (passes, weights) = self.passes_with_last(i);
+        let mut variance = passes.variance;
+        if !self.weights.is_empty() {
+            variance += c * (c * weights.own - weights.with * 2.0);
+        }
+        let scale = 1.0 / (f64::from(count.known) * f64::from(count.units));
+        (variance * scale).map(|v| Real::sqrt(f64::max(v, 0.0)))
     }
 }
