@@ -37,3 +37,4 @@ pub use model::{emitter, filter, sensor, surface};
 pub use run::finite_difference::finite_differences;
 pub use run::reverse::gradient;
 pub use run::session::{Control, FinishedTile, Session, Unattended};
+pub use world::cache::PreparedCache;

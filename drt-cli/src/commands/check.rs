@@ -22,7 +22,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     }
     let outputs = Outputs::new(options, "check")?;
     let monitor = Monitor::new(options.changes.quiet);
-    let mut rendering = derivatives(&job, options, &monitor, 0.4)?;
+    let mut rendering = derivatives(&job, options, &monitor, 0.4, &mut run::Shared::default())?;
     let differences = match rendering.complete {
         true => two_steps(&job, rendering.spp, &monitor)?,
         false => None,

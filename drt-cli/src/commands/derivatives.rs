@@ -4,7 +4,7 @@ use drt_estimators::{Derivative, EstimatorKind, Rendering};
 
 use super::monitor::Monitor;
 use super::options::Options;
-use super::run;
+use super::run::{self, Shared};
 use crate::{CliError, Job};
 
 /// Image and derivatives by the job's estimator, filling the first `part` of the progress bar.
@@ -13,11 +13,12 @@ pub(super) fn derivatives(
     options: &Options,
     monitor: &Monitor,
     part: f64,
+    shared: &mut Shared,
 ) -> Result<Rendering, CliError> {
     match job.settings.estimator {
-        EstimatorKind::FiniteDifference => by_differences(job, options, monitor, part),
+        EstimatorKind::FiniteDifference => by_differences(job, options, monitor, part, shared),
         _ => {
-            let mut session = run::prepare(job, &job.parameters)?;
+            let mut session = run::prepare(job, &job.parameters, shared)?;
             monitor.stage("grad", 0.0, part);
             Ok(run::sample(&mut session, options, job.spp(), monitor))
         }
@@ -29,8 +30,9 @@ fn by_differences(
     options: &Options,
     monitor: &Monitor,
     part: f64,
+    shared: &mut Shared,
 ) -> Result<Rendering, CliError> {
-    let mut session = run::prepare_forward(job)?;
+    let mut session = run::prepare_forward(job, shared)?;
     monitor.stage("image", 0.0, 0.3 * part);
     let mut rendering = run::sample(&mut session, options, job.spp(), monitor);
     rendering.derivatives.clear();

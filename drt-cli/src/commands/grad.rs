@@ -4,7 +4,7 @@ use super::derivatives::derivatives;
 use super::monitor::Monitor;
 use super::options::GradOptions;
 use super::outputs::Outputs;
-use super::{Outcome, gradient, run};
+use super::{Outcome, gradient, noted, run};
 use crate::CliError;
 
 pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
@@ -16,8 +16,8 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     job.settings.terms = options.terms;
     let outputs = Outputs::new(common, "grad")?;
     let monitor = Monitor::new(common.changes.quiet);
-    let rendering = derivatives(&job, common, &monitor, 1.0)?;
+    let rendering = derivatives(&job, common, &monitor, 1.0, &mut run::Shared::default())?;
     monitor.finish();
     outputs.write(&job, &rendering, &[], &[])?;
-    Ok(if rendering.complete { Outcome::Done } else { Outcome::Interrupted })
+    Ok(noted(&rendering))
 }

@@ -76,7 +76,7 @@ fn of_loss(
     let loss = job.optimize()?.map_or(Loss::L2, |o| o.loss);
     if !job.groups.is_empty() {
         // Image and gradient need independent samples.
-        let mut session = run::prepare_forward(job)?;
+        let mut session = run::prepare_forward(job, &mut run::Shared::default())?;
         monitor.stage("image", 0.0, 0.3);
         let rendering = run::sample(&mut session, &options.common, job.spp(), monitor);
         if !rendering.complete {
@@ -104,7 +104,8 @@ fn of_adjoint(
 ) -> Result<Option<Vec<f64>>, CliError> {
     let mut numbers = Vec::new();
     if !job.parameters.is_empty() {
-        let rendering = derivatives(job, &options.common, monitor, 0.6)?;
+        let rendering =
+            derivatives(job, &options.common, monitor, 0.6, &mut run::Shared::default())?;
         if !rendering.complete {
             return Ok(None);
         }

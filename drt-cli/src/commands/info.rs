@@ -19,7 +19,10 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     } else if let Err(e) = job.require_derivatives() {
         println!("no plan: {e}");
     } else {
-        print!("plan\n{}", run::prepare(&job, &job.parameters)?.plan());
+        print!(
+            "plan\n{}",
+            run::prepare(&job, &job.parameters, &mut run::Shared::default())?.plan()
+        );
     }
     Ok(Outcome::Done)
 }

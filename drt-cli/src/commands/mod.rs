@@ -1,5 +1,6 @@
 //! The commands of `drt`, from arguments to an exit code.
 
+mod batch;
 mod bench;
 mod check;
 mod clock;
@@ -45,6 +46,11 @@ impl Outcome {
     }
 }
 
+/// How a command that has written a rendering ended.
+fn noted(rendering: &drt_estimators::Rendering) -> Outcome {
+    if rendering.complete { Outcome::Done } else { Outcome::Interrupted }
+}
+
 /// Runs the command line `args`, the first of which is the program's name, and returns its exit
 /// code: 0 done, 1 a check failed, 2 unusable input or arguments, 3 failure while writing, 130
 /// stopped by Ctrl-C.
@@ -87,5 +93,6 @@ fn dispatch(command: &Command) -> Result<Outcome, CliError> {
         Command::Info(options) => info::run(options),
         Command::Optimize(options) => optimize::run(options),
         Command::Bench(options) => bench::run(options),
+        Command::Batch(options) => batch::run(options),
     }
 }

@@ -15,8 +15,17 @@ const RESOLUTION: f64 = 1000.0;
 /// Shows progress and passes on the wish to stop.
 pub(super) struct Monitor {
     bar: ProgressBar,
-    /// The part of the bar that the current stage fills.
-    stage: Mutex<[f64; 2]>,
+    place: Mutex<Place>,
+}
+
+/// Where on the bar the present work is.
+struct Place {
+    /// The job, where there are several.
+    job: String,
+    /// The part of the bar that the job fills.
+    of_job: [f64; 2],
+    /// The part of the bar that its current stage fills.
+    stage: [f64; 2],
 }
 
 impl Monitor {
@@ -39,14 +48,24 @@ impl Monitor {
         if let Ok(style) = ProgressStyle::with_template(style) {
             bar.set_style(style.progress_chars("=> "));
         }
-        Self { bar, stage: Mutex::new([0.0, 1.0]) }
+        let whole = [0.0, 1.0];
+        Self { bar, place: Mutex::new(Place { job: String::new(), of_job: whole, stage: whole }) }
+    }
+
+    /// What the next stages belong to, and the part of the bar they fill together.
+    pub(super) fn job(&self, name: &str, from: f64, to: f64) {
+        if let Ok(mut place) = self.place.lock() {
+            (place.job, place.of_job) = (format!("{name} "), [from, to]);
+        }
+        self.stage("", 0.0, 1.0);
     }
 
     /// What the next calls work on, and the part of the bar they fill.
     pub(super) fn stage(&self, name: &str, from: f64, to: f64) {
-        self.bar.set_message(name.to_owned());
-        if let Ok(mut stage) = self.stage.lock() {
-            *stage = [from.clamp(0.0, 1.0), to.clamp(0.0, 1.0)];
+        if let Ok(mut place) = self.place.lock() {
+            let [start, end] = place.of_job;
+            place.stage = [from, to].map(|x| start + (end - start) * x.clamp(0.0, 1.0));
+            self.bar.set_message(format!("{}{name}", place.job));
         }
         self.progress(0.0);
     }
@@ -66,8 +85,8 @@ impl Control for Monitor {
     }
 
     fn progress(&self, done: f64) {
-        if let Ok(stage) = self.stage.lock() {
-            let [from, to] = *stage;
+        if let Ok(place) = self.place.lock() {
+            let [from, to] = place.stage;
             self.bar.set_position(((from + (to - from) * done) * RESOLUTION) as u64);
         }
     }

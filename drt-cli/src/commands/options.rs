@@ -27,6 +27,8 @@ pub(super) enum Command {
     Optimize(OptimizeOptions),
     /// Measure error against run time at doubling sample counts.
     Bench(BenchOptions),
+    /// Render many scenes and jobs, each into files of its own; go on where a killed run stopped.
+    Batch(BatchOptions),
     /// Show what a scene or job holds, and what will run.
     Info(Options),
 }
@@ -62,7 +64,7 @@ pub(super) struct Options {
 }
 
 /// What every command may change about a scene or job.
-#[derive(Args, Clone, Debug)]
+#[derive(Args, Clone, Debug, Default)]
 pub(super) struct Changes {
     /// Same seed, same pixels.
     #[arg(long, value_name = "N")]
@@ -141,7 +143,70 @@ pub(super) struct BenchOptions {
     pub(super) changes: Changes,
 }
 
+#[derive(Args, Debug)]
+pub(super) struct BatchOptions {
+    /// Scenes (.xml), which are rendered, and jobs (.toml), which are differentiated where they have parameters.
+    #[arg(required_unless_present = "list")]
+    pub(super) inputs: Vec<PathBuf>,
+    /// A file with a scene or job a line, with options of its own: `job.toml --set parameter.x.value=0.3 -o x3.exr`.
+    #[arg(long, value_name = "FILE")]
+    pub(super) list: Option<PathBuf>,
+    /// The folder of the results NAME.exr and NAME.json, and of the log batch.jsonl.
+    #[arg(short, long, value_name = "FOLDER", default_value = ".")]
+    pub(super) output: PathBuf,
+    /// Write pictures to look at, NAME.png, too.
+    #[arg(long)]
+    pub(super) previews: bool,
+    /// Only images, no derivatives.
+    #[arg(long)]
+    pub(super) forward: bool,
+    /// Samples per pixel.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) spp: Option<u32>,
+    #[command(flatten)]
+    pub(super) changes: Changes,
+}
+
+/// What a line of a list may say.
+#[derive(Debug, Parser)]
+#[command(no_binary_name = true, disable_help_flag = true)]
+pub(super) struct ListLine {
+    #[command(flatten)]
+    pub(super) options: Options,
+}
+
+impl Options {
+    /// A scene or job without options.
+    pub(super) fn of(input: PathBuf) -> Self {
+        Self {
+            input,
+            output: None,
+            digest: None,
+            preview: None,
+            spp: None,
+            seconds: None,
+            target_error: None,
+            changes: Changes::default(),
+        }
+    }
+}
+
 impl Changes {
+    /// These changes where they are said, and else `general` ones.
+    pub(super) fn over(self, general: &Self) -> Self {
+        let both = |a: &[_], b: Vec<_>| a.iter().cloned().chain(b).collect();
+        Self {
+            seed: self.seed.or(general.seed),
+            threads: self.threads.or(general.threads),
+            size: self.size.or(general.size),
+            max_depth: self.max_depth.or(general.max_depth),
+            sensor: self.sensor.or_else(|| general.sensor.clone()),
+            quiet: self.quiet || general.quiet,
+            defaults: both(&general.defaults, self.defaults),
+            set: both(&general.set, self.set),
+        }
+    }
+
     pub(super) fn overrides(&self) -> Overrides {
         Overrides { set: self.set.clone(), defaults: self.defaults.iter().cloned().collect() }
     }

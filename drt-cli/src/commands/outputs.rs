@@ -15,6 +15,8 @@ pub(super) struct Outputs<'a> {
     options: &'a Options,
     command: &'static str,
     clock: Clock,
+    /// The hash of the inputs, where the image shall tell.
+    inputs: Option<String>,
 }
 
 impl<'a> Outputs<'a> {
@@ -24,7 +26,12 @@ impl<'a> Outputs<'a> {
         for path in files.into_iter().flatten().filter(|p| p.as_os_str() != "-") {
             check_target(path)?;
         }
-        Ok(Self { options, command, clock: Clock::start() })
+        Ok(Self { options, command, clock: Clock::start(), inputs: None })
+    }
+
+    /// Marks the image as the result of inputs with this hash.
+    pub(super) fn of_inputs(self, inputs: String) -> Self {
+        Self { inputs: Some(inputs), ..self }
     }
 
     /// True when the standard output belongs to the digest.
@@ -55,20 +62,22 @@ impl<'a> Outputs<'a> {
             cpu_seconds: self.clock.cpu_seconds(),
             threads,
         };
+        if let Some(path) = &self.options.preview {
+            write_preview(path, rendering, further)?;
+        }
+        if let Some(path) = &self.options.digest {
+            write_digest(path, &digest(rendering, &facts, checks))?;
+        }
+        // The image comes last: what has it has everything.
         if let Some(path) = &self.options.output {
             let provenance = Provenance {
                 scene: facts.scene.clone(),
                 job: facts.job.clone().zip(job.text.clone()),
                 seed: facts.seed,
                 seconds,
+                inputs: self.inputs.clone(),
             };
             write_exr(path, rendering, further, &provenance)?;
-        }
-        if let Some(path) = &self.options.preview {
-            write_preview(path, rendering, further)?;
-        }
-        if let Some(path) = &self.options.digest {
-            write_digest(path, &digest(rendering, &facts, checks))?;
         }
         if !self.options.changes.quiet {
             summarize(rendering, seconds);

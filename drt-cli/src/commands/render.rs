@@ -1,20 +1,34 @@
 //! `drt render`: the image alone.
 
+use drt_estimators::Rendering;
+
 use super::monitor::Monitor;
 use super::options::Options;
 use super::outputs::Outputs;
-use super::{Outcome, run};
-use crate::CliError;
+use super::run::{self, Shared};
+use super::{Outcome, noted};
+use crate::{CliError, Job};
 
 pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     let job = run::open(options)?;
     let outputs = Outputs::new(options, "render")?;
-    let mut session = run::prepare_forward(&job)?;
     let monitor = Monitor::new(options.changes.quiet);
-    monitor.stage("render", 0.0, 1.0);
-    let mut rendering = run::sample(&mut session, options, job.spp(), &monitor);
+    let rendering = image(&job, options, &monitor, &mut Shared::default())?;
     monitor.finish();
-    rendering.derivatives.clear();
     outputs.write(&job, &rendering, &[], &[])?;
-    Ok(if rendering.complete { Outcome::Done } else { Outcome::Interrupted })
+    Ok(noted(&rendering))
+}
+
+/// The image of a job at its parameters' values.
+pub(super) fn image(
+    job: &Job,
+    options: &Options,
+    monitor: &Monitor,
+    shared: &mut Shared,
+) -> Result<Rendering, CliError> {
+    let mut session = run::prepare_forward(job, shared)?;
+    monitor.stage("render", 0.0, 1.0);
+    let mut rendering = run::sample(&mut session, options, job.spp(), monitor);
+    rendering.derivatives.clear();
+    Ok(rendering)
 }

@@ -3,21 +3,34 @@
 use std::path::Path;
 use std::time::Instant;
 
-use drt_estimators::{Layer, Rendering, Session, finite_differences};
+use drt_estimators::{Layer, PreparedCache, Rendering, Session, finite_differences};
 use drt_motion::Parameter;
 
 use super::monitor::Monitor;
 use super::noise::largest_noise;
 use super::options::{Changes, Options};
-use crate::job::depth;
-use crate::{CliError, Job, load_job};
+use crate::job::{depth, read_job};
+use crate::scene_xml::SceneReader;
+use crate::{CliError, Job};
 
 /// Samples per pixel of the first pass where time or noise decides when to stop; later ones double.
 const FIRST_PASS: u32 = 4;
 
+/// What jobs of one scene in a row share: its files are read once, and what was prepared is used again.
+#[derive(Default)]
+pub(super) struct Shared {
+    scenes: SceneReader,
+    prepared: PreparedCache,
+}
+
 /// Opens the input and lays the options over it.
 pub(super) fn open(options: &Options) -> Result<Job, CliError> {
-    let mut job = open_changed(&options.input, &options.changes)?;
+    open_shared(options, &mut Shared::default())
+}
+
+/// The same, with what an earlier job may have read.
+pub(super) fn open_shared(options: &Options, shared: &mut Shared) -> Result<Job, CliError> {
+    let mut job = read_changed(&options.input, &options.changes, &mut shared.scenes)?;
     if let Some(spp) = options.spp {
         job.set_spp(spp);
     }
@@ -29,13 +42,21 @@ pub(super) fn open(options: &Options) -> Result<Job, CliError> {
 
 /// Opens a scene or job with changes.
 pub(super) fn open_changed(input: &Path, changes: &Changes) -> Result<Job, CliError> {
+    read_changed(input, changes, &mut SceneReader::default())
+}
+
+fn read_changed(
+    input: &Path,
+    changes: &Changes,
+    scenes: &mut SceneReader,
+) -> Result<Job, CliError> {
     let overrides = changes.overrides();
     let is_job = input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
     let mut job = if is_job {
-        load_job(input, &overrides)?
+        read_job(input, &overrides, scenes)?
     } else {
         changes.refuse_set(input)?;
-        Job::from_scene(input, &overrides.defaults)?
+        Job::read_scene(input, &overrides.defaults, scenes)?
     };
     if !changes.quiet {
         for warning in &job.warnings {
@@ -75,22 +96,27 @@ pub(super) fn open_with_parameters(options: &Options) -> Result<Job, CliError> {
 }
 
 /// Prepares a job with derivatives by some of its parameters.
-pub(super) fn prepare(job: &Job, parameters: &[Parameter<String>]) -> Result<Session, CliError> {
+pub(super) fn prepare(
+    job: &Job,
+    parameters: &[Parameter<String>],
+    shared: &mut Shared,
+) -> Result<Session, CliError> {
     if job.scene.sensors.is_empty() {
         let place = crate::error::Place::file(&job.scene_path);
         return Err(CliError::input(&place, "the scene has no <sensor>"));
     }
-    Session::new(&job.scene, parameters, &job.settings).map_err(|e| job.blame(&e))
+    Session::with_cache(&job.scene, parameters, &job.settings, &mut shared.prepared)
+        .map_err(|e| job.blame(&e))
 }
 
 /// Prepares the image alone, at the parameters' values.
-pub(super) fn prepare_forward(job: &Job) -> Result<Session, CliError> {
+pub(super) fn prepare_forward(job: &Job, shared: &mut Shared) -> Result<Session, CliError> {
     let at_rest = job.parameters.iter().all(|p| p.value == 0.0);
     if at_rest {
-        return prepare(job, &[]);
+        return prepare(job, &[], shared);
     }
     let scene = drt_estimators::moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
-    Session::new(&scene, &[], &job.settings).map_err(|e| job.blame(&e))
+    Session::with_cache(&scene, &[], &job.settings, &mut shared.prepared).map_err(|e| job.blame(&e))
 }
 
 /// Finite differences of every parameter; `None` when they were interrupted.

@@ -28,6 +28,8 @@ pub struct Provenance {
     pub seed: u64,
     /// Wall time spent.
     pub seconds: f64,
+    /// A hash of all inputs, where somebody may ask whether they have changed.
+    pub inputs: Option<String>,
 }
 
 /// An EXR file as read: colours by layer name, the plain `R`, `G`, `B` under the empty name.
@@ -39,6 +41,23 @@ pub struct ExrFile {
     pub layers: BTreeMap<String, Vec<[f32; 3]>>,
     /// Attributes, as text.
     pub attributes: BTreeMap<String, String>,
+}
+
+/// Attributes that tell what a file is the result of, and whether all of it.
+const INPUTS: &str = "drt_inputs";
+const COMPLETE: &str = "drt_complete";
+
+/// True where a file is a complete result of inputs with this hash, by this version of the program.
+pub(crate) fn is_result_of(path: &Path, inputs: &str) -> bool {
+    let Ok(meta) = exr::meta::MetaData::read_from_file(path, false) else { return false };
+    meta.headers.iter().any(|header| {
+        let attributes = &header.own_attributes;
+        let is =
+            |name: &str, value: AttributeValue| attributes.other.get(&text(name)) == Some(&value);
+        attributes.software_name == Some(text(crate::PROGRAM))
+            && is(INPUTS, AttributeValue::Text(text(inputs)))
+            && is(COMPLETE, AttributeValue::I32(1))
+    })
 }
 
 const CHANNELS: [&str; 3] = ["R", "G", "B"];
@@ -106,8 +125,9 @@ fn attributes(rendering: &Rendering, provenance: &Provenance) -> LayerAttributes
         ("drt_seed", string(&provenance.seed.to_string())),
         ("drt_spp", string(&rendering.spp.to_string())),
         ("drt_seconds", AttributeValue::F64(provenance.seconds)),
-        ("drt_complete", AttributeValue::I32(i32::from(rendering.complete))),
+        (COMPLETE, AttributeValue::I32(i32::from(rendering.complete))),
     ];
+    own.extend(provenance.inputs.iter().map(|hash| (INPUTS, string(hash))));
     if let Some((job, job_text)) = &provenance.job {
         own.push(("drt_job", string(job)));
         own.push(("drt_job_text", string(job_text)));

@@ -46,6 +46,7 @@ fn exr_round_trip() {
         job: Some(("j.toml".into(), "scene = \"s.xml\" # ü".into())),
         seed: u64::MAX,
         seconds: 1.5,
+        inputs: None,
     };
     let differences = layer([5, 3], 400.0);
     write_exr(&path, &rendering, &[("fd_cube-x".into(), &differences)], &provenance).unwrap();

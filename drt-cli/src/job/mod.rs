@@ -22,7 +22,7 @@ use drt_motion::Parameter;
 use toml::Spanned;
 
 use crate::error::{Place, Warning, read_text};
-use crate::scene_xml::read_scene;
+use crate::scene_xml::SceneReader;
 use crate::{CliError, Defaults};
 use cages::Cages;
 use document::Document;
@@ -79,12 +79,21 @@ pub struct Job {
 /// Names the file, line and key, or the `--set`, of what is malformed, unknown, missing or not
 /// supported.
 pub fn load_job(path: &Path, overrides: &Overrides) -> Result<Job, CliError> {
+    read_job(path, overrides, &mut SceneReader::default())
+}
+
+/// As [`load_job`], with a reader that may know the scene.
+pub(crate) fn read_job(
+    path: &Path,
+    overrides: &Overrides,
+    scenes: &mut SceneReader,
+) -> Result<Job, CliError> {
     let text = read_text(path, None)?;
     let document = Document::new(path, &text, &overrides.set);
     let keys: keys::Job = document.parse()?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let scene_path = folder.join(&keys.scene);
-    let (scene, warnings) = read_scene(&scene_path, &overrides.defaults)?;
+    let (scene, warnings) = scenes.read(&scene_path, &overrides.defaults)?;
     let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
     let settings = settings(&document, &keys, folder, &scene, &parameters)?;
     let [spp, boundary_spp] = sample_counts(&document, &keys.estimator)?;
@@ -118,7 +127,16 @@ impl Job {
     /// # Errors
     /// As [`load_scene`](crate::load_scene).
     pub fn from_scene(path: &Path, defaults: &Defaults) -> Result<Self, CliError> {
-        let (scene, warnings) = read_scene(path, defaults)?;
+        Self::read_scene(path, defaults, &mut SceneReader::default())
+    }
+
+    /// As [`Job::from_scene`], with a reader that may know the scene.
+    pub(crate) fn read_scene(
+        path: &Path,
+        defaults: &Defaults,
+        scenes: &mut SceneReader,
+    ) -> Result<Self, CliError> {
+        let (scene, warnings) = scenes.read(path, defaults)?;
         let mut job = Self {
             path: path.into(),
             text: None,
@@ -164,13 +182,7 @@ impl Job {
     /// nothing.
     #[must_use]
     pub fn name(&self) -> String {
-        let folder = self.path.parent().and_then(Path::file_name);
-        let name = match (self.path.file_stem(), folder) {
-            (Some(stem), Some(folder)) if stem == "job" || stem == "scene" => folder,
-            (Some(stem), _) => stem,
-            (None, _) => self.path.as_os_str(),
-        };
-        name.to_string_lossy().into_owned()
+        name_of(&self.path)
     }
 
     /// Chooses the sensor of an id, or of kind and order such as `sensor[1]`.
@@ -213,6 +225,17 @@ impl Job {
         };
         CliError::input(&place.unwrap_or_else(|| Place::file(&self.path)), error)
     }
+}
+
+/// What to call a file among others, as [`Job::name`] does.
+pub(crate) fn name_of(path: &Path) -> String {
+    let folder = path.parent().and_then(Path::file_name);
+    let name = match (path.file_stem(), folder) {
+        (Some(stem), Some(folder)) if stem == "job" || stem == "scene" => folder,
+        (Some(stem), _) => stem,
+        (None, _) => path.as_os_str(),
+    };
+    name.to_string_lossy().into_owned()
 }
 
 fn find_sensor(scene: &Scene, name: &str) -> Result<usize, String> {

@@ -24,7 +24,7 @@ mod volumes;
 
 use std::cell::RefCell;
 use std::collections::HashSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use drt_estimators::surface::{Bsdf, Diffuse};
 use drt_estimators::{Named, Scene};
@@ -43,15 +43,32 @@ use source::SceneFiles;
 /// # Errors
 /// Names the file, line and element of what is malformed, missing or not supported.
 pub fn load_scene(path: &Path, defaults: &Defaults) -> Result<Scene, CliError> {
-    read_scene(path, defaults).map(|(scene, _)| scene)
+    SceneReader::default().read(path, defaults).map(|(scene, _)| scene)
 }
 
-/// As [`load_scene`], with what was passed over.
-pub(crate) fn read_scene(
-    path: &Path,
-    defaults: &Defaults,
-) -> Result<(Scene, Vec<Warning>), CliError> {
-    parse_scene(path, &read_text(path, None)?, defaults)
+/// Reads scenes, and remembers the last one: jobs of one scene in a row read its files once.
+#[derive(Default)]
+pub(crate) struct SceneReader {
+    last: Option<(PathBuf, Defaults, Read)>,
+}
+
+/// A scene, and what in it was passed over.
+type Read = (Scene, Vec<Warning>);
+
+impl SceneReader {
+    /// As [`load_scene`], with what was passed over.
+    pub(crate) fn read(&mut self, path: &Path, defaults: &Defaults) -> Result<Read, CliError> {
+        if let Some((_, _, read)) =
+            self.last.as_ref().filter(|(p, d, _)| p == path && d == defaults)
+        {
+            return Ok(read.clone());
+        }
+        // The old one is not kept beside the new one.
+        self.last = None;
+        let read = parse_scene(path, &read_text(path, None)?, defaults)?;
+        self.last = Some((path.into(), defaults.clone(), read.clone()));
+        Ok(read)
+    }
 }
 
 /// Reads a scene from text; relative file names start from `base_dir`.

@@ -24,7 +24,8 @@ pub(super) fn job(
     monitor: &Monitor,
 ) -> Result<Vec<Series>, CliError> {
     let bench = Bench { job, reference, budget, monitor };
-    let mut all = bench.session("forward", run::prepare_forward)?;
+    let mut all =
+        bench.session("forward", |job| run::prepare_forward(job, &mut run::Shared::default()))?;
     // Away from zero the parameters come along.
     all.retain(|s| s.image == IMAGE);
     if job.parameters.is_empty() || monitor.interrupted() {
@@ -36,7 +37,8 @@ pub(super) fn job(
         // Differences are measured in any case.
         _ => "path-space",
     };
-    let derivatives = bench.session(by_paths, |job| run::prepare(job, &job.parameters))?;
+    let derivatives = bench
+        .session(by_paths, |job| run::prepare(job, &job.parameters, &mut run::Shared::default()))?;
     // The image comes along; it is measured by itself already.
     let derivatives = derivatives.into_iter().filter(|s| s.image != IMAGE);
     let derivatives: Vec<Series> = derivatives.collect();

@@ -8,34 +8,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::atomic::write_atomically;
 use crate::error::{Place, read_text};
+use crate::fingerprint::Fingerprint;
 use crate::{CliError, PROGRAM};
 
 /// The name of the file. It is replaced last: what else is in the folder is at least as new, and what
 /// is newer is made anew.
 const FILE: &str = "checkpoint.json";
 
-/// Tells problems apart: the FNV-1a hash (Fowler, Noll and Vo) of all that decides a run's steps.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
-pub(super) struct Fingerprint(u64);
-
-impl Default for Fingerprint {
-    fn default() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
-    }
-}
-
-impl Fingerprint {
-    pub(super) fn add(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.0 = (self.0 ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
-        }
-    }
-}
-
 /// The state after some steps.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(super) struct Checkpoint {
     pub(super) program: String,
+    /// Of all that decides the run's steps.
     pub(super) fingerprint: Fingerprint,
     pub(super) optimizer: State,
     /// Iterations in a row in which each parameter changed nothing.

@@ -7,7 +7,7 @@ use std::time::Instant;
 use drt_estimators::fit::{Evaluation, Fit};
 use drt_motion::optimize::{Method, Observation, OptimizeError, Optimizer, Outlook};
 
-use super::checkpoint::{Checkpoint, Fingerprint};
+use super::checkpoint::Checkpoint;
 use super::gallery::Gallery;
 use super::history::{History, LOSSES, PARAMETERS};
 use super::problem::Problem;
@@ -18,6 +18,7 @@ use crate::commands::Outcome;
 use crate::commands::clock::Clock;
 use crate::commands::monitor::Monitor;
 use crate::error::Place;
+use crate::fingerprint::Fingerprint;
 use crate::{CliError, PROGRAM};
 
 /// Seconds after which a checkpoint is written, however few iterations have passed.

@@ -66,7 +66,7 @@ fn write(
         parameter.value = *value;
     }
     let by_count = super::options::Options { seconds: None, ..options.common.clone() };
-    let rendering = derivatives(&job, &by_count, monitor, 1.0)?;
+    let rendering = derivatives(&job, &by_count, monitor, 1.0, &mut run::Shared::default())?;
     outputs.write(&job, &rendering, &[], &[])
 }
 

@@ -8,9 +8,9 @@ use drt_estimators::loss::Reference;
 use drt_math::Rng;
 use drt_motion::optimize::Stages;
 
-use super::checkpoint::Fingerprint;
 use crate::commands::options::OptimizeOptions;
 use crate::error::{Place, read_text};
+use crate::fingerprint::Fingerprint;
 use crate::image::read_picture;
 use crate::job::Optimize;
 use crate::{CliError, Job};

@@ -98,12 +98,26 @@ impl Session {
         parameters: &[Parameter],
         settings: &Settings,
     ) -> Result<Self, Error> {
+        Self::with_cache(scene, parameters, settings, &mut PreparedCache::default())
+    }
+
+    /// As [`Session::new`], with what earlier sessions of nearly the same scene left to be used again. The
+    /// results are the same to the bit.
+    ///
+    /// # Errors
+    /// As [`Session::new`].
+    pub fn with_cache(
+        scene: &Scene,
+        parameters: &[Parameter],
+        settings: &Settings,
+        kept: &mut PreparedCache,
+    ) -> Result<Self, Error> {
         scene.check()?;
         if settings.estimator == EstimatorKind::FiniteDifference && !parameters.is_empty() {
             return Err(Error::Setting { setting: "estimator", reason: SettingError::NoSession });
         }
         let (scene, tangents) = tangents::apply(scene, parameters)?;
-        Self::prepared(&scene, &tangents, settings, &mut PreparedCache::default())
+        Self::prepared(&scene, &tangents, settings, kept)
     }
 
     /// Prepares a scene at the parameters' values, with what earlier ones left to be used again.
