@@ -55,7 +55,8 @@ impl Filter {
     /// own filter.
     pub(crate) fn row_density(&self, at: f64, n: u32, derivative: bool) -> f64 {
         let share = self.slope_share(derivative);
-        self.reached(at, n).map(|i| self.pdf_axis(at - (f64::from(i) + 0.5), share)).sum()
+        let density = |x| self.pdf_axis(x, self.axis_with_slope(x).1, share);
+        self.reached(at, n).map(|i| density(at - (f64::from(i) + 0.5))).sum()
     }
 
     /// Draws a coordinate evenly from the unit interval of pixel `i` out of a row of `n`; with its density. What
@@ -74,7 +75,7 @@ impl Filter {
             // The last representable number would give the offset where the density is zero.
             let below = f64::min(1.0 - 2.0 * tail * v, 1.0 - f64::EPSILON);
             let x = self.radius * self.half.sample(below);
-            (x, self.pdf_axis(-x, 0.0) * part / tail)
+            (x, self.pdf_axis(-x, 0.0, 0.0) * part / tail)
         };
         let [start, centre] = [f64::from(i), f64::from(i) + 0.5];
         if u < before {

@@ -26,6 +26,7 @@
 //! ```text
 //! at the start      d = p_connect / p_start,                  e = c_0 / p_start (0 of what has no area)
 //! scattering        e ← (c/p) (e p' + d),                     d ← 1/p
+//! smooth surfaces   e ← c e,                                  d ← 0
 //! arriving          d ← d r² / (c τ),                         e ← e / c
 //! ```
 //!
@@ -102,9 +103,9 @@ impl<'w> Bidirectional<'w> {
         self.trace_camera(tracer, dir, weight);
         let mut sum = self.camera.met;
         self.trace_light(tracer);
-        for z in 0..self.camera.vertices.len() {
-            let z = self.camera.vertices[z];
-            sum += self.met(&z);
+        for k in 0..self.camera.vertices.len() {
+            let z = self.camera.vertices[k];
+            sum += self.met(&z, k == 0);
             if z.segments >= tracer.max_segments {
                 continue;
             }
@@ -151,11 +152,11 @@ impl<'w> Bidirectional<'w> {
         }
     }
 
-    /// The emission of a surface that the camera's path meets.
-    fn met(&self, z: &SubpathVertex) -> Rgb {
+    /// The emission of a surface that the camera's path meets, at once or later.
+    fn met(&self, z: &SubpathVertex, at_once: bool) -> Rgb {
         let Some(s) = z.vertex.surface().filter(|s| self.world.emits(s)) else { return Rgb::ZERO };
         let value = z.throughput * self.world.emitted(s, z.from);
-        if value.is_zero() || z.segments == 1 {
+        if value.is_zero() || at_once {
             return value;
         }
         let per_area = self.world.lights.area_density(s);
@@ -245,7 +246,7 @@ impl<'w> Bidirectional<'w> {
         let others = square(film * attenuation) * y.ratios.all(back);
         let weight = 1.0 / (1.0 + others);
         let value = carried * passed * (transport * weight / self.light_paths);
-        Some(Splat { point: world.camera.view(y.vertex.x).pixel, value })
+        Some(Splat { point: world.camera.view(y.vertex.x).pixel, value, weight: 0.0 })
     }
 }
 

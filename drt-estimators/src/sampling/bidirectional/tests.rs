@@ -57,7 +57,7 @@ fn light(scene: &Scene, fault: Option<Fault>, both: bool) -> Moments {
                     tracer.trace_camera(s.direction, filter, &mut radiance);
                     radiance.0
                 };
-                splats.push(Splat { point: s.point, value });
+                splats.push(Splat { point: s.point, value, weight: s.weight });
                 for splat in &splats {
                     for p in camera.footprint(splat.point) {
                         sum += weight(p.pixel[0]) * p.weight * splat.value.mean();
