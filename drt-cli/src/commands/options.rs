@@ -186,6 +186,7 @@ impl Options {
             spp: None,
             seconds: None,
             target_error: None,
+            sampling: None,
             changes: Changes::default(),
         }
     }
