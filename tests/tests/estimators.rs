@@ -6,9 +6,13 @@
 //!
 //! All that the 2019 theory covers, with the scale of each derivative known to 1 % or for ten minutes each:
 //! `cargo test --release -p drt-tests --test estimators -- --ignored covered:: --nocapture`, and `warped::` for the 2023
-//! estimator.
+//! estimator. Images by paths from both ends against those from the camera:
+//! `cargo test --release -p drt-tests --test estimators -- --ignored images:: --nocapture`
+
+use std::time::Instant;
 
 use drt_estimators::EstimatorKind::{self, Radiative, Warped};
+use drt_estimators::{Depth, PathSampling, Session, Settings, Unattended, agreement};
 use drt_tests::Result;
 use drt_tests::matrix::estimators::{Effort, Pairs, compare};
 use drt_tests::matrix::{Stage, caged, deforming, lights, media, riding, surfaces};
@@ -38,6 +42,39 @@ fn precise() -> Effort {
     Effort { noise: 0.01, scale: 0.01, seconds: seconds(600.0) }
 }
 
+/// Doubles samples until both images are known to 1/2 %, or time is over.
+fn images(stage: &Stage) {
+    let run = |sampling, seed| {
+        let settings =
+            Settings { sampling, seed, max_depth: Depth::OfScene, ..Settings::default() };
+        let mut session = Session::new(&stage.scene, &[], &settings).unwrap();
+        let (started, most) = (Instant::now(), seconds(4.0));
+        let mut spp = 64;
+        loop {
+            session.run(spp, &Unattended);
+            let rendering = session.rendering();
+            let noise = rendering.image.relative_noise(None);
+            if noise < 0.005 || started.elapsed().as_secs_f64() > most {
+                return (rendering, noise, started.elapsed().as_secs_f64());
+            }
+            spp = rendering.spp;
+        }
+    };
+    let (one, one_noise, one_seconds) = run(PathSampling::Unidirectional, 1);
+    let (both, both_noise, both_seconds) = run(PathSampling::Bidirectional, 2);
+    let found = agreement(&both.image, &one.image, None);
+    println!(
+        "{:18} rms z {:5.2} max z {:5.2} noise {:.4} {:.4}  work {:.2}",
+        stage.name,
+        found.rms_z,
+        found.max_z,
+        one_noise,
+        both_noise,
+        (both_noise / one_noise).powi(2) * both_seconds / one_seconds,
+    );
+    assert!(found.agrees && both.non_finite == 0);
+}
+
 macro_rules! stages {
     ($($room:ident: $($stage:ident)*;)*) => {
         mod short {
@@ -59,8 +96,12 @@ macro_rules! stages {
         }
         mod warped {
             $($(#[test] #[ignore = "hours"] fn $stage() {
-                let stage = super::$room::$stage().map(super::Stage::in_extended_light);
-                super::run(stage, &[super::Warped], super::precise());
+                super::run(super::$room::$stage(), &[super::Warped], super::precise());
+            })*)*
+        }
+        mod images {
+            $($(#[test] #[ignore = "minutes"] fn $stage() {
+                super::images(&super::$room::$stage().unwrap());
             })*)*
         }
     };

@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use drt_estimators::{AuxiliarySamples, Depth, EstimatorKind, Warp, WarpKernel};
+use drt_estimators::{AuxiliarySamples, Depth, EstimatorKind, PathSampling, Warp, WarpKernel};
 use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{Change, GeometryChange, PropertyChange, ValueChange};
 
@@ -231,7 +231,9 @@ fn keys_of_later_versions_are_read_and_stand_in_the_way_of_derivatives_only() {
     let j = job(&text(group), &[]).unwrap();
     let message = j.require_derivatives().unwrap_err().to_string();
     assert!(message.contains("[[parameter_group]]") && message.contains("job.toml:"), "{message}");
-    refused(&text("[estimator]\nsampling = \"bidirectional\""), &[], &["bidirectional"]);
+    refused(&text("[estimator]\nsampling = \"both\""), &[], &["`both`"]);
+    let j = job(&text("[estimator]\nsampling = \"bidirectional\""), &[]).unwrap();
+    assert_eq!(j.settings.sampling, PathSampling::Bidirectional);
     refused(&text("[[motion]]\nmedium = \"fog\"\nkind = \"liquid\""), &[], &["`liquid`"]);
     let motion = |more: &str| text(&format!("[[motion]]\nmedium = \"fog\"\n{more}"));
     refused(&motion("kind = \"affine\"\nmesh = \"a.mesh\""), &[], &["`tetrahedral`"]);

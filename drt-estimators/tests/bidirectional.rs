@@ -1,0 +1,57 @@
+//! Images by paths from both ends.
+
+mod common;
+
+use common::*;
+use drt_estimators::{
+    PathSampling, Rendering, Scene, Session, Settings, Unattended, agreement, finite_differences,
+    gradient,
+};
+use drt_math::Rgb;
+
+fn settings(sampling: PathSampling, seed: u64, threads: usize) -> Settings {
+    Settings { sampling, seed, threads, ..Settings::default() }
+}
+
+fn rendered(scene: &Scene, settings: &Settings) -> Rendering {
+    let mut session = Session::new(scene, &[], settings).expect("a valid scene");
+    assert!(session.run(64, &Unattended) && session.run(192, &Unattended));
+    session.rendering()
+}
+
+#[test]
+fn images_are_those_from_the_camera() {
+    for scene in [surfaces(phong(), metal()), fog(), smoke(1.0), glow()] {
+        let [one, both] = [PathSampling::Unidirectional, PathSampling::Bidirectional]
+            .map(|sampling| rendered(&scene, &settings(sampling, sampling as u64, 0)));
+        let found = agreement(&both.image, &one.image, None);
+        assert!(found.agrees, "{found:?}");
+        assert!(both.image.relative_noise(None) < 0.1);
+        assert!(both.plan.bidirectional && !one.plan.bidirectional);
+    }
+}
+
+#[test]
+fn threads_make_no_difference() {
+    let by = |threads| rendered(&fog(), &settings(PathSampling::Bidirectional, 3, threads));
+    let one = by(1);
+    for threads in [2, 3] {
+        assert!(one.image.pixels == by(threads).image.pixels, "{threads} threads");
+    }
+}
+
+#[test]
+fn derivatives_are_refused() {
+    let (scene, settings) = (fog(), settings(PathSampling::Bidirectional, 0, 1));
+    let moving = [parameter("p", 0.0, vec![moves("ball", shift())])];
+    let pixels = (FILM[0] * FILM[1]) as usize;
+    let adjoint = vec![Rgb::ONE; pixels];
+    for refused in [
+        Session::new(&scene, &moving, &settings).err(),
+        gradient(&scene, &["ball"], &settings, 1, &adjoint, &Unattended).err(),
+        finite_differences(&scene, &moving, &settings, 1, 1e-3, &Unattended).err(),
+    ] {
+        let message = refused.expect("a refusal").to_string();
+        assert!(message.contains("bidirectional") && message.contains("sampling"), "{message}");
+    }
+}
