@@ -11,6 +11,9 @@ use crate::{Mesh, NONE, weld};
 /// fraction 1e-6 / pi of all directions, so nothing measurable is lost.
 const FLAT: f64 = 1e-6;
 
+/// Height of a face over its longest edge below which its corners are on one line.
+const NO_WIDTH: f64 = 1e-12;
+
 /// What the faces around an edge look like, seen from outside the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -60,7 +63,8 @@ impl Edge {
 /// How the triangles of a mesh hang together, seen on welded positions.
 ///
 /// Corners at equal positions are one vertex (see [`weld()`](crate::weld)). A face with two such
-/// corners has no edges here; run [`Mesh::drop_degenerate`] first where that matters.
+/// corners has no edges here; run [`Mesh::drop_degenerate`] first where that matters. A face whose corners are on one line
+/// counts at an edge only where it closes the gap beside a single other face.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Topology {
@@ -108,7 +112,15 @@ impl Topology {
             closed: !sides.is_empty(),
             oriented: true,
         };
+        let mut broad = Vec::new();
         for around in sides.chunk_by(|a, b| a.ends == b.ends) {
+            broad.clear();
+            broad.extend(around.iter().filter(|s| has_area(mesh, s.face)).copied());
+            let around = match broad.len() {
+                0 => continue,
+                1 => around,
+                _ => &broad[..],
+            };
             let index = topology.edges.len() as u32;
             for s in around {
                 topology.face_edges[s.face as usize][s.corner as usize] = index;
@@ -138,6 +150,14 @@ impl Topology {
     pub fn is_consistently_oriented(&self) -> bool {
         self.oriented
     }
+}
+
+/// False where the corners of a face are on one line, to rounding.
+fn has_area(mesh: &Mesh, face: u32) -> bool {
+    let [a, b, c] = mesh.triangle(face);
+    let [u, v, w] = [b - a, c - b, a - c];
+    let longest = [u, v, w].into_iter().fold(0.0, |most, e| f64::max(most, e.length_squared()));
+    u.cross(v).length() > NO_WIDTH * longest
 }
 
 /// The edge's ends and opposite vertex as one face sees them.

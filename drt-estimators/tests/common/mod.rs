@@ -269,7 +269,7 @@ pub fn fog_with_a_block(bottom: f64, reflectance: f64) -> Scene {
     b.camera(vec3(0.4, 0.8, 4.2), vec3(0.0, -0.2, 0.0), 4)
 }
 
-fn scaled(size: f64, at: Vec3) -> Affine {
+pub fn scaled(size: f64, at: Vec3) -> Affine {
     Affine { linear: Mat3::IDENTITY * size, translation: at }
 }
 
