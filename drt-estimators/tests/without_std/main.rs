@@ -1,10 +1,7 @@
 //! Four of the oracles in the configuration that bare targets get: elementary functions from libm,
-//! the compact BVH, one thread. The crates here are compiled without their `std`, only this test
-//! harness has it.
+//! the compact BVH, one thread. Meant for `--no-default-features --features libm`, when only this test harness has std.
 //!
 //! The numbers are those of `tests/data/oracles.json`, where their derivation is described.
-
-#![cfg(test)]
 
 mod judge;
 mod oracles;
