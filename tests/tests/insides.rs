@@ -36,13 +36,13 @@ macro_rules! insides {
 insides! {
     cases::black_body_in_fog: 0.06, 0.01;
     cases::body_around_the_eye: 0.1, 0.01;
-    cases::bent_slab: 0.05, 0.01;
-    cases::stretched_slab: 0.04, 0.01;
-    cases::glass_ball_moves: 0.08, 0.01;
-    cases::glass_ball_deforms: 0.08, 0.01;
-    cases::turning_grid: 0.06, 0.01;
-    cases::blob: 0.04, 0.01;
-    cases::nested: 0.08, 0.01;
+    cases::bent_slab: 0.08, 0.01;
+    cases::stretched_slab: 0.08, 0.01;
+    cases::glass_ball_moves: 0.1, 0.01;
+    cases::glass_ball_deforms: 0.1, 0.01;
+    cases::turning_grid: 0.1, 0.01;
+    cases::blob: 0.08, 0.01;
+    cases::nested: 0.1, 0.01;
     sheets::room_of_sheets: 0.2, 0.04;
     sheets::lamp_in_room: 0.2, 0.04;
     sheets::room_with_gaps: 0.2, 0.04;
