@@ -272,7 +272,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
                 self.tracer.trace_camera(dir, weight, &mut radiance);
                 radiance.0
             };
-            self.to_image(&s, derivative, light, values);
+            self.add_to_image(&s, derivative, light, values);
             return;
         }
         let width = camera.film()[0];
@@ -289,7 +289,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         };
         recorder.begin([pixel % width, pixel / width], dir, weight);
         self.tracer.trace_camera(dir, weight, &mut recorder);
-        self.to_image(&s, derivative, self.record.value, values);
+        self.add_to_image(&s, derivative, self.record.value, values);
         self.recorded += self.record.nodes.len() as u64;
         let path = Traced {
             record: &self.record,
@@ -318,7 +318,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     }
 
     /// Adds the light of a path to the image.
-    fn to_image(&mut self, s: &ViewSample, derivative: bool, light: Rgb, values: &mut [Rgb]) {
+    fn add_to_image(&mut self, s: &ViewSample, derivative: bool, light: Rgb, values: &mut [Rgb]) {
         let (value, weight) = match self.image {
             ImageSampling::OwnPixel => {
                 values[0] += light;
