@@ -221,11 +221,11 @@ fn a_descent_arrives() {
     let (n, decay) = (60, Decay::Cosine { end: 0.02 });
     let at = |values: &[f64]| [values[0], values[1], values[2]];
     for i in 0..n {
-        let seen = evaluate(&mut fit, at(optimizer.values()), 128, u64::from(i));
+        let seen = evaluate(&mut fit, at(optimizer.values()), 256, u64::from(i));
         optimizer.step(&seen.gradient(), decay.factor(i, n)).unwrap();
     }
     let values = at(optimizer.values());
-    let known = evaluate(&mut fit, values, 128, 999).uncertainty().expect("they differ");
+    let known = evaluate(&mut fit, values, 256, 999).uncertainty().expect("they differ");
     for k in 0..2 {
         let error = (values[k] - target[k]).abs();
         assert!(error < 0.1 * target[k] && error < 3.0 * known[k], "{values:?} ± {known:?}");

@@ -181,10 +181,10 @@ impl Session {
 
     /// How the paths of the image are drawn.
     fn image_sampling(&self) -> ImageSampling {
-        match (self.plan.splatting, self.parameters()) {
+        match (self.plan.splatting, self.plan.record) {
             (false, _) => ImageSampling::OwnPixel,
-            (true, 0) => ImageSampling::Squares,
-            _ => ImageSampling::SharedFilters,
+            (true, false) => ImageSampling::Squares,
+            (true, true) => ImageSampling::SharedFilters,
         }
     }
 
