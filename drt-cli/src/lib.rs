@@ -10,6 +10,7 @@ mod image;
 mod job;
 mod npy;
 mod scene_xml;
+mod shard_file;
 #[cfg(test)]
 mod testing;
 

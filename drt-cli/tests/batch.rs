@@ -54,7 +54,7 @@ fn broken_jobs_stop_no_others_and_finished_ones_are_skipped() {
     let line = format!("batch {} -o out --previews", names.join(" "));
     let out = folder.run(&line);
     let summary = "4 finished, 0 were finished before, 2 failed";
-    expect(&out, 1, &["1.toml: 1.toml:8", "4.toml: 4.toml:8", "lmap", summary]);
+    expect(&out, 1, &["1.toml: 1.toml:7", "4.toml: 4.toml:7", "lmap", summary]);
     for i in [0, 2, 3, 5] {
         assert_eq!(folder.json(&format!("out/{i}.json"))["command"], "grad");
         assert!(folder.exr(&format!("out/{i}.exr")).layers.contains_key("d_x"));

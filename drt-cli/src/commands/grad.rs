@@ -4,7 +4,7 @@ use super::derivatives::derivatives;
 use super::monitor::Monitor;
 use super::options::GradOptions;
 use super::outputs::Outputs;
-use super::{Outcome, gradient, noted, run};
+use super::{Outcome, gradient, noted, run, shard};
 use crate::CliError;
 
 pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
@@ -14,6 +14,9 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     let common = &options.common;
     let mut job = run::open_with_parameters(common)?;
     job.settings.terms = options.terms;
+    if let Some(shard) = options.shard {
+        return shard::images(&job, common, "grad", shard);
+    }
     let outputs = Outputs::new(common, "grad")?;
     let monitor = Monitor::new(common.changes.quiet);
     let rendering = derivatives(&job, common, &monitor, 1.0, &mut run::Shared::default())?;

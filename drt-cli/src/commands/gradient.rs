@@ -4,16 +4,21 @@ use std::path::Path;
 
 use drt_estimators::fit::{Fit, View};
 use drt_estimators::loss::{Loss, Reference};
-use drt_estimators::{Target, gradient, moved};
+use drt_estimators::{
+    Derivative, GradientBatch, Rendering, SceneGradient, Shard, Target, gradient_in_batches, moved,
+};
 use drt_math::Rgb;
 
 use super::derivatives::derivatives;
 use super::monitor::Monitor;
 use super::options::GradOptions;
-use super::{Outcome, run};
+use super::outputs::Outputs;
+use super::{Outcome, run, shard};
 use crate::error::Place;
+use crate::fingerprint::Fingerprint;
 use crate::image::read_picture;
-use crate::npy::write_npy;
+use crate::npy::{write_npy, write_npy_bytes};
+use crate::shard_file::{Batch, ShardFile, Sums, Total};
 use crate::{CliError, Job, check_target};
 
 /// Between the seeds of an image and of the gradient by what it says.
@@ -46,19 +51,48 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
             common.input.display()
         )));
     }
-    let monitor = Monitor::new(common.changes.quiet);
-    let gradient = match (&options.loss, &options.adjoint) {
+    let shard = options.shard;
+    if shard.is_some() {
+        shard::check(&job, common, "grad")?;
+    }
+    let (monitor, start) = (Monitor::new(common.changes.quiet), Outputs::new(common, "grad")?);
+    // Before the seed is changed for the gradient's own samples.
+    let asked = job.clone();
+    let found = match (&options.loss, &options.adjoint) {
         (Some(target), _) => of_loss(&mut job, options, target, &monitor)?,
         (None, Some(adjoint)) => {
             let adjoint = picture(&job, adjoint)?;
-            of_adjoint(&mut job, options, &adjoint, &monitor)?
+            of_adjoint(&mut job, options, adjoint, &monitor)?
         }
         (None, None) => None,
     };
     monitor.finish();
-    let Some(gradient) = gradient else { return Ok(Outcome::Interrupted) };
-    write_npy(output, &gradient)?;
+    match (found, shard) {
+        (None, _) => return Ok(Outcome::Interrupted),
+        (Some(Found::Numbers(gradient)), _) => write_npy(output, &gradient)?,
+        (Some(Found::Sums(sums, picture)), Some(shard)) => {
+            let inputs = Fingerprint::of_job(&asked, "grad", &[&picture])?;
+            let mut file = ShardFile::new(&asked, shard, inputs, "grad", *sums);
+            start.measure(&mut file);
+            write_npy_bytes(output, &file.bytes()?)?;
+        }
+        (Some(Found::Sums(..)), None) => {}
+    }
     Ok(Outcome::Done)
+}
+
+/// What a gradient, or a shard of one, is.
+enum Found {
+    Numbers(Vec<f64>),
+    /// With a hash of the picture that it is about.
+    Sums(Box<Sums>, String),
+}
+
+fn hash(loss: &str, pixels: &[Rgb]) -> String {
+    let mut sum = Fingerprint::default();
+    sum.add(loss.as_bytes());
+    pixels.iter().flat_map(|p| p.to_array()).for_each(|v| sum.add(&v.to_le_bytes()));
+    sum.to_string()
 }
 
 /// By the job's own loss, where it names one.
@@ -67,13 +101,14 @@ fn of_loss(
     options: &GradOptions,
     target: &Path,
     monitor: &Monitor,
-) -> Result<Option<Vec<f64>>, CliError> {
+) -> Result<Option<Found>, CliError> {
     let fail = |e| CliError::input(&Place::file(target), e);
     let pixels = picture(job, target)?;
     let sensor = job.settings.sensor;
     let size = job.scene.sensors[sensor].item.sensor.film();
-    let reference = Reference::new(size, pixels).map_err(fail)?;
     let loss = job.optimize()?.map_or(Loss::L2, |o| o.loss);
+    let hash = hash(&format!("{loss:?}"), &pixels);
+    let reference = Reference::new(size, pixels).map_err(fail)?;
     if !job.groups.is_empty() {
         // Image and gradient need independent samples.
         let mut session = run::prepare_forward(job, &mut run::Shared::default())?;
@@ -84,46 +119,112 @@ fn of_loss(
         }
         let image: Vec<Rgb> = rendering.image.pixels.iter().map(|p| p.mean).collect();
         job.settings.seed = job.settings.seed.wrapping_add(INDEPENDENT);
-        return of_adjoint(job, options, &loss.adjoint(&image, &reference), monitor);
+        return of_adjoint(job, options, loss.adjoint(&image, &reference), monitor);
     }
-    let (scene, views) = (job.scene.clone(), vec![View { sensor, reference }]);
+    let (scene, views) = (job.scene.clone(), vec![View { sensor, reference: reference.clone() }]);
     let mut fit = Fit::new(scene, job.parameters.clone(), views, loss, job.settings.clone())
         .map_err(|e| job.blame(&e))?;
     let values: Vec<f64> = job.parameters.iter().map(|p| p.value).collect();
+    let (spp, seed) = (job.spp(), job.settings.seed);
+    if let Some(shard) = options.shard {
+        let mut half = |k: usize| {
+            monitor.stage("gradient", 0.5 * k as f64, 0.5 * (k + 1) as f64);
+            fit.half_shard(&values, spp, seed, 0, k, shard, monitor).map_err(|e| job.blame(&e))
+        };
+        let Some((a, b)) = half(0)?.zip(half(1)?) else { return Ok(None) };
+        let sums = Sums::Halves { halves: Box::new([a, b]), loss, target: reference };
+        return Ok(Some(Found::Sums(Box::new(sums), hash)));
+    }
     monitor.stage("gradient", 0.0, 1.0);
-    let seen = fit.evaluate(&values, job.spp(), job.settings.seed, monitor);
-    Ok(seen.map_err(|e| job.blame(&e))?.map(|seen| seen.gradient()))
+    let seen = fit.evaluate(&values, spp, seed, monitor).map_err(|e| job.blame(&e))?;
+    Ok(seen.map(|seen| Found::Numbers(seen.gradient())))
 }
 
 /// Forward for the parameters, in reverse for the groups.
 fn of_adjoint(
     job: &mut Job,
     options: &GradOptions,
-    adjoint: &[Rgb],
+    adjoint: Vec<Rgb>,
     monitor: &Monitor,
-) -> Result<Option<Vec<f64>>, CliError> {
-    let mut numbers = Vec::new();
+) -> Result<Option<Found>, CliError> {
+    let (mut numbers, mut images) = (Vec::new(), None);
     if !job.parameters.is_empty() {
-        let rendering =
-            derivatives(job, &options.common, monitor, 0.6, &mut run::Shared::default())?;
-        if !rendering.complete {
-            return Ok(None);
+        let shared = &mut run::Shared::default();
+        if let Some(shard) = options.shard {
+            let mut session = run::prepare(job, &job.parameters, shared)?;
+            let Some(sums) = shard::sums(&mut session, job, shard, "gradient", monitor)? else {
+                return Ok(None);
+            };
+            images = Some(sums);
+        } else {
+            let rendering = derivatives(job, &options.common, monitor, 0.6, shared)?;
+            if !rendering.complete {
+                return Ok(None);
+            }
+            numbers.extend(by_parameters(&rendering, &adjoint));
         }
-        numbers.extend(rendering.derivatives.iter().map(|d| -> f64 {
-            d.total.pixels.iter().zip(adjoint).map(|(p, a)| p.mean.dot(*a)).sum()
-        }));
     }
+    let mut batches = Vec::new();
     if !job.groups.is_empty() {
         monitor.stage("gradient in reverse", 0.6, 1.0);
-        let scene = moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
-        let wanted: Vec<Target> = job.groups.iter().map(|g| g.target).collect();
-        let gradient = gradient(&scene, &wanted, &job.settings, job.spp(), adjoint, monitor);
-        let gradient = gradient.map_err(|e| job.blame(&e))?;
-        for group in &job.groups {
-            group.collect(&job.scene, &scene, &gradient, &mut numbers);
+        let mut total = Total::default();
+        let each = |batch| match options.shard {
+            Some(_) => batches.push(batch),
+            None => drop(total.add(batch)),
+        };
+        if !in_reverse(job, options.shard, &adjoint, monitor, each)? {
+            return Ok(None);
         }
+        numbers.extend(total.numbers());
     }
-    Ok((!monitor.interrupted()).then_some(numbers))
+    if monitor.interrupted() {
+        return Ok(None);
+    }
+    Ok(Some(match options.shard {
+        None => Found::Numbers(numbers),
+        Some(_) => {
+            let hash = hash("", &adjoint);
+            Found::Sums(Box::new(Sums::Gradient { adjoint, images, batches }), hash)
+        }
+    }))
+}
+
+/// The gradient by the parameters of a loss with this derivative by every pixel.
+pub(super) fn by_parameters(rendering: &Rendering, adjoint: &[Rgb]) -> Vec<f64> {
+    let product = |d: &Derivative| -> f64 {
+        d.total.pixels.iter().zip(adjoint).map(|(p, a)| p.mean.dot(*a)).sum()
+    };
+    rendering.derivatives.iter().map(product).collect()
+}
+
+/// The gradient by the groups, batch by batch; false when it was interrupted.
+fn in_reverse(
+    job: &Job,
+    shard: Option<Shard>,
+    adjoint: &[Rgb],
+    monitor: &Monitor,
+    mut each: impl FnMut(Batch),
+) -> Result<bool, CliError> {
+    let scene = moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
+    let wanted: Vec<Target> = job.groups.iter().map(|g| g.target).collect();
+    let groups: Vec<_> = job.groups.iter().map(|g| g.collector(&job.scene, &scene)).collect();
+    let numbers = |gradient: &SceneGradient| {
+        let mut numbers = Vec::new();
+        groups.iter().for_each(|group| group.collect(gradient, &mut numbers));
+        numbers
+    };
+    let mut collect = |batch: GradientBatch| {
+        each(Batch {
+            number: batch.number,
+            pixels: numbers(&batch.pixels),
+            of_pixels: batch.of_pixels,
+            boundary: numbers(&batch.boundary),
+            of_boundary: batch.of_boundary,
+        });
+    };
+    let (settings, spp) = (&job.settings, job.spp());
+    gradient_in_batches(&scene, &wanted, settings, spp, adjoint, shard, monitor, &mut collect)
+        .map_err(|e| job.blame(&e))
 }
 
 /// An image of the film's size.

@@ -9,6 +9,7 @@ mod grad;
 mod gradient;
 mod info;
 mod markup;
+mod merge;
 mod monitor;
 mod noise;
 mod optimize;
@@ -16,6 +17,7 @@ mod options;
 mod outputs;
 mod render;
 mod run;
+mod shard;
 mod table;
 
 use std::ffi::OsString;
@@ -94,5 +96,6 @@ fn dispatch(command: &Command) -> Result<Outcome, CliError> {
         Command::Optimize(options) => optimize::run(options),
         Command::Bench(options) => bench::run(options),
         Command::Batch(options) => batch::run(options),
+        Command::Merge(options) => merge::run(options),
     }
 }

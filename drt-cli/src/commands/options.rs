@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Parser, Subcommand};
+use drt_estimators::Shard;
 
 use crate::job::Sampling;
 use crate::{CliError, Overrides};
@@ -18,7 +19,7 @@ pub(super) struct CommandLine {
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
     /// Render a scene, or a job's scene at its parameters' values.
-    Render(Options),
+    Render(RenderOptions),
     /// Render a job's scene and its derivative with respect to each parameter.
     Grad(GradOptions),
     /// Compare derivatives with finite differences; exit 1 when they disagree.
@@ -29,6 +30,8 @@ pub(super) enum Command {
     Bench(BenchOptions),
     /// Render many scenes and jobs, each into files of its own; go on where a killed run stopped.
     Batch(BatchOptions),
+    /// Merge the shards of a render or gradient into the result of the run in one piece.
+    Merge(MergeOptions),
     /// Show what a scene or job holds, and what will run.
     Info(Options),
 }
@@ -93,9 +96,43 @@ pub(super) struct Changes {
 }
 
 #[derive(Args, Debug)]
+pub(super) struct RenderOptions {
+    #[command(flatten)]
+    pub(super) common: Options,
+    /// Take only this part of the samples, to be merged with the others: `3/8` is the third of eight.
+    #[arg(long, value_name = "K/N", value_parser = shard)]
+    pub(super) shard: Option<Shard>,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct MergeOptions {
+    /// What `drt render` or `drt grad` wrote with `--shard`, in any order.
+    #[arg(required = true)]
+    pub(super) shards: Vec<PathBuf>,
+    /// Where to write the result: an OpenEXR file of images, an NPY file of a gradient.
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+    /// Where to write a summary, as JSON; `-` is the standard output.
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) digest: Option<PathBuf>,
+    /// Where to write a picture to look at.
+    #[arg(long, value_name = "FILE.png")]
+    pub(super) preview: Option<PathBuf>,
+    /// Merge what there is, though shards are missing: unbiased, with wider errors.
+    #[arg(long)]
+    pub(super) partial: bool,
+    /// No summary.
+    #[arg(long)]
+    pub(super) quiet: bool,
+}
+
+#[derive(Args, Debug)]
 pub(super) struct GradOptions {
     #[command(flatten)]
     pub(super) common: Options,
+    /// Take only this part of the samples, to be merged with the others: `3/8` is the third of eight.
+    #[arg(long, value_name = "K/N", value_parser = shard)]
+    pub(super) shard: Option<Shard>,
     /// Store each term of a derivative in a layer of its own.
     #[arg(long)]
     pub(super) terms: bool,
@@ -231,6 +268,12 @@ fn assignment(text: &str) -> Result<(String, String), String> {
         }
         _ => Err("expected NAME=VALUE".into()),
     }
+}
+
+fn shard(text: &str) -> Result<Shard, String> {
+    let number = |s: &str| s.parse::<u32>().ok();
+    let shard = text.split_once('/').and_then(|(k, n)| Shard::new(number(k)?, number(n)?));
+    shard.ok_or_else(|| "expected one of several parts, from 1, such as 3/8".into())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -1,6 +1,6 @@
 //! What a command leaves behind.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use drt_estimators::{Layer, Rendering};
 
@@ -8,6 +8,7 @@ use super::clock::Clock;
 use super::noise::largest_noise;
 use super::options::Options;
 use crate::digest::{RunFacts, Verdict, digest, write_digest};
+use crate::shard_file::ShardFile;
 use crate::{CliError, Job, Provenance, check_target, write_exr, write_preview};
 
 /// Measures a command from its start and writes its results.
@@ -17,21 +18,33 @@ pub(super) struct Outputs<'a> {
     clock: Clock,
     /// The hash of the inputs, where the image shall tell.
     inputs: Option<String>,
+    /// What of a shard goes along with the image.
+    attachment: Option<Vec<u8>>,
 }
 
 impl<'a> Outputs<'a> {
     /// Starts the clock and refuses places that cannot be written.
     pub(super) fn new(options: &'a Options, command: &'static str) -> Result<Self, CliError> {
-        let files = [&options.output, &options.digest, &options.preview];
-        for path in files.into_iter().flatten().filter(|p| p.as_os_str() != "-") {
-            check_target(path)?;
-        }
-        Ok(Self { options, command, clock: Clock::start(), inputs: None })
+        let Options { output, digest, preview, .. } = options;
+        Files { output, digest, preview }.check()?;
+        Ok(Self { options, command, clock: Clock::start(), inputs: None, attachment: None })
     }
 
     /// Marks the image as the result of inputs with this hash.
     pub(super) fn of_inputs(self, inputs: String) -> Self {
         Self { inputs: Some(inputs), ..self }
+    }
+
+    /// Puts what a shard has added up into the image's file.
+    pub(super) fn with_shard(self, mut shard: ShardFile) -> Result<Self, CliError> {
+        self.measure(&mut shard);
+        Ok(Self { attachment: Some(shard.bytes()?), ..self })
+    }
+
+    /// Notes what a shard has cost so far.
+    pub(super) fn measure(&self, shard: &mut ShardFile) {
+        (shard.seconds, shard.cpu_seconds) = (self.clock.seconds(), self.clock.cpu_seconds());
+        shard.threads = threads(self.options.changes.threads.map_or(0, usize::from));
     }
 
     /// True when the standard output belongs to the digest.
@@ -49,10 +62,7 @@ impl<'a> Outputs<'a> {
         checks: &[Verdict],
     ) -> Result<(), CliError> {
         let seconds = self.clock.seconds();
-        let threads = match job.settings.threads {
-            0 => std::thread::available_parallelism().map_or(1, usize::from),
-            n => n,
-        };
+        let threads = threads(job.settings.threads);
         let facts = RunFacts {
             command: self.command,
             scene: job.scene_path.display().to_string(),
@@ -62,23 +72,17 @@ impl<'a> Outputs<'a> {
             cpu_seconds: self.clock.cpu_seconds(),
             threads,
         };
-        if let Some(path) = &self.options.preview {
-            write_preview(path, rendering, further)?;
-        }
-        if let Some(path) = &self.options.digest {
-            write_digest(path, &digest(rendering, &facts, checks))?;
-        }
-        // The image comes last: what has it has everything.
-        if let Some(path) = &self.options.output {
-            let provenance = Provenance {
-                scene: facts.scene.clone(),
-                job: facts.job.clone().zip(job.text.clone()),
-                seed: facts.seed,
-                seconds,
-                inputs: self.inputs.clone(),
-            };
-            write_exr(path, rendering, further, &provenance)?;
-        }
+        let provenance = Provenance {
+            scene: facts.scene.clone(),
+            job: facts.job.clone().zip(job.text.clone()),
+            seed: facts.seed,
+            seconds,
+            inputs: self.inputs.clone(),
+            attachment: self.attachment.clone(),
+        };
+        let Options { output, digest, preview, .. } = self.options;
+        let files = Files { output, digest, preview };
+        files.write(rendering, further, checks, &facts, &provenance)?;
         if !self.options.changes.quiet {
             summarize(rendering, seconds);
         }
@@ -86,7 +90,55 @@ impl<'a> Outputs<'a> {
     }
 }
 
-fn summarize(rendering: &Rendering, seconds: f64) {
+/// Where results go.
+pub(super) struct Files<'a> {
+    pub(super) output: &'a Option<PathBuf>,
+    pub(super) digest: &'a Option<PathBuf>,
+    pub(super) preview: &'a Option<PathBuf>,
+}
+
+impl Files<'_> {
+    /// Refuses places that cannot be written.
+    pub(super) fn check(&self) -> Result<(), CliError> {
+        let files = [self.output, self.digest, self.preview];
+        files
+            .into_iter()
+            .flatten()
+            .filter(|p| p.as_os_str() != "-")
+            .try_for_each(|p| check_target(p))
+    }
+
+    pub(super) fn write(
+        &self,
+        rendering: &Rendering,
+        further: &[(String, &Layer)],
+        checks: &[Verdict],
+        facts: &RunFacts,
+        provenance: &Provenance,
+    ) -> Result<(), CliError> {
+        if let Some(path) = self.preview {
+            write_preview(path, rendering, further)?;
+        }
+        if let Some(path) = self.digest {
+            write_digest(path, &digest(rendering, facts, checks))?;
+        }
+        // The image comes last: what has it has everything.
+        if let Some(path) = self.output {
+            write_exr(path, rendering, further, provenance)?;
+        }
+        Ok(())
+    }
+}
+
+/// Threads that are meant, where 0 is all.
+fn threads(asked: usize) -> usize {
+    match asked {
+        0 => std::thread::available_parallelism().map_or(1, usize::from),
+        n => n,
+    }
+}
+
+pub(super) fn summarize(rendering: &Rendering, seconds: f64) {
     let [w, h] = rendering.image.size;
     let noise = 100.0 * largest_noise(rendering);
     let complete = if rendering.complete { "" } else { ", incomplete" };

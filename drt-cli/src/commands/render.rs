@@ -3,14 +3,18 @@
 use drt_estimators::Rendering;
 
 use super::monitor::Monitor;
-use super::options::Options;
+use super::options::{Options, RenderOptions};
 use super::outputs::Outputs;
 use super::run::{self, Shared};
-use super::{Outcome, noted};
+use super::{Outcome, noted, shard};
 use crate::{CliError, Job};
 
-pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
+pub(super) fn run(options: &RenderOptions) -> Result<Outcome, CliError> {
+    let (shard, options) = (options.shard, &options.common);
     let job = run::open(options)?;
+    if let Some(shard) = shard {
+        return shard::images(&job, options, "render", shard);
+    }
     let outputs = Outputs::new(options, "render")?;
     let monitor = Monitor::new(options.changes.quiet);
     let rendering = image(&job, options, &monitor, &mut Shared::default())?;

@@ -30,6 +30,8 @@ pub struct Provenance {
     pub seconds: f64,
     /// A hash of all inputs, where somebody may ask whether they have changed.
     pub inputs: Option<String>,
+    /// What a shard leaves to be merged.
+    pub attachment: Option<Vec<u8>>,
 }
 
 /// An EXR file as read: colours by layer name, the plain `R`, `G`, `B` under the empty name.
@@ -46,6 +48,28 @@ pub struct ExrFile {
 /// Attributes that tell what a file is the result of, and whether all of it.
 const INPUTS: &str = "drt_inputs";
 const COMPLETE: &str = "drt_complete";
+/// The attribute of what a shard leaves.
+const ATTACHMENT: &str = "drt_shard";
+/// Most bytes that the format's headers hold in one.
+const MOST_BYTES: usize = i32::MAX as usize;
+
+/// What a shard has left in a file; `None` where it is of no shard.
+///
+/// # Errors
+/// When it cannot be read or is malformed.
+pub(crate) fn read_attachment(path: &Path) -> Result<Option<Vec<u8>>, CliError> {
+    let meta = exr::meta::MetaData::read_from_file(path, false)
+        .map_err(|e| CliError::input(&Place::file(path), e))?;
+    let of = |header: exr::meta::header::Header| match header
+        .own_attributes
+        .other
+        .get(&text(ATTACHMENT))
+    {
+        Some(AttributeValue::Custom { bytes, .. }) => Some(bytes.to_vec()),
+        _ => None,
+    };
+    Ok(meta.headers.into_iter().find_map(of))
+}
 
 /// True where a file is a complete result of inputs with this hash, by this version of the program.
 pub(crate) fn is_result_of(path: &Path, inputs: &str) -> bool {
@@ -73,6 +97,13 @@ pub fn write_exr(
     provenance: &Provenance,
 ) -> Result<(), CliError> {
     let [width, height] = rendering.image.size;
+    if let Some(bytes) = provenance.attachment.as_ref().filter(|b| b.len() > MOST_BYTES) {
+        let message = format!(
+            "a shard of {} bytes does not fit; OpenEXR holds up to {MOST_BYTES}: make more shards",
+            bytes.len()
+        );
+        return Err(CliError::write(path, message));
+    }
     let mut channels: SmallVec<[_; 4]> = SmallVec::new();
     for (name, layer) in layers(rendering, further) {
         let errors = if name.is_empty() { "stderr".into() } else { format!("{name}_stderr") };
@@ -128,6 +159,10 @@ fn attributes(rendering: &Rendering, provenance: &Provenance) -> LayerAttributes
         (COMPLETE, AttributeValue::I32(i32::from(rendering.complete))),
     ];
     own.extend(provenance.inputs.iter().map(|hash| (INPUTS, string(hash))));
+    if let Some(bytes) = &provenance.attachment {
+        let (kind, bytes) = (text("drt"), SmallVec::from_slice(bytes));
+        own.push((ATTACHMENT, AttributeValue::Custom { kind, bytes }));
+    }
     if let Some((job, job_text)) = &provenance.job {
         own.push(("drt_job", string(job)));
         own.push(("drt_job_text", string(job_text)));

@@ -47,6 +47,7 @@ fn exr_round_trip() {
         seed: u64::MAX,
         seconds: 1.5,
         inputs: None,
+        attachment: None,
     };
     let differences = layer([5, 3], 400.0);
     write_exr(&path, &rendering, &[("fd_cube-x".into(), &differences)], &provenance).unwrap();

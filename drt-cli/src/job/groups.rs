@@ -6,7 +6,7 @@ use std::sync::Arc;
 use drt_estimators::{Scene, SceneGradient, Target};
 use drt_geom::Mesh;
 use drt_motion::mean_value::{Cage, CageWeights};
-use drt_motion::surface::in_file_order;
+use drt_motion::surface::{SmoothNormals, in_file_order};
 use toml::Spanned;
 
 use super::cages::Cages;
@@ -78,18 +78,50 @@ fn property(name: Option<&str>) -> Result<drt_medium::Property, String> {
 }
 
 impl ParameterGroup {
-    /// Adds the group's part to the gradient of a loss. `given` is the scene as the file has it,
-    /// `scene` the one that was differentiated.
-    pub(crate) fn collect(
-        &self,
-        given: &Scene,
-        scene: &Scene,
-        gradient: &SceneGradient,
-        out: &mut Vec<f64>,
-    ) {
+    /// What adds the group's part to gradients of a loss. `given` is the scene as the file has it, `scene` the one that
+    /// is differentiated.
+    pub(crate) fn collector(&self, given: &Scene, scene: &Scene) -> Collector {
         match (&self.kind, self.target) {
-            (GroupKind::Voxels(property), Target::Medium(m)) => {
-                let Some(of) = &gradient.media[m] else { return };
+            (GroupKind::Voxels(property), Target::Medium(m)) => Collector::Voxels(m, *property),
+            (kind, Target::Shape(s)) => {
+                let (file, mesh) = (given.shapes[s].mesh.clone(), scene.shapes[s].mesh.clone());
+                let weights = match kind {
+                    // It was loaded as a cage.
+                    GroupKind::Cage(cage) => match Cage::new(cage) {
+                        Ok(cage) => Some(CageWeights::new(&cage, &file.positions)),
+                        Err(_) => return Collector::Nothing,
+                    },
+                    _ => None,
+                };
+                let normals = SmoothNormals::new(&mesh);
+                Collector::Shape { shape: s, file, mesh, normals, weights }
+            }
+            _ => Collector::Nothing,
+        }
+    }
+}
+
+/// Takes a group's part out of gradients.
+pub(crate) enum Collector {
+    Voxels(usize, drt_medium::Property),
+    Shape {
+        shape: usize,
+        /// As the file has it.
+        file: Arc<Mesh>,
+        mesh: Arc<Mesh>,
+        normals: SmoothNormals,
+        /// Of a cage's vertices.
+        weights: Option<CageWeights>,
+    },
+    Nothing,
+}
+
+impl Collector {
+    /// Adds the group's part to the gradient of a loss.
+    pub(crate) fn collect(&self, gradient: &SceneGradient, out: &mut Vec<f64>) {
+        match self {
+            Self::Voxels(m, property) => {
+                let Some(of) = &gradient.media[*m] else { return };
                 match property {
                     drt_medium::Property::SigmaT => out.extend(&of.sigma_t.voxels),
                     drt_medium::Property::Albedo => out.extend(&of.albedo.voxels),
@@ -98,20 +130,16 @@ impl ParameterGroup {
                     drt_medium::Property::G => {}
                 }
             }
-            (kind, Target::Shape(s)) => {
-                let Some(vertices) = gradient.vertices(scene, s) else { return };
-                let mesh = &given.shapes[s].mesh;
-                let vectors = match kind {
-                    GroupKind::Cage(cage) => {
-                        // It was loaded as a cage.
-                        let Ok(cage) = Cage::new(cage) else { return };
-                        CageWeights::new(&cage, &mesh.positions).gather(&vertices)
-                    }
-                    _ => in_file_order(mesh, &vertices),
+            Self::Shape { shape, file, mesh, normals, weights } => {
+                let Some(of) = &gradient.shapes[*shape] else { return };
+                let vertices = of.finish(mesh, normals);
+                let vectors = match weights {
+                    Some(weights) => weights.gather(&vertices),
+                    None => in_file_order(file, &vertices),
                 };
                 out.extend(vectors.iter().flat_map(|v| [v.x, v.y, v.z]));
             }
-            _ => {}
+            Self::Nothing => {}
         }
     }
 }

@@ -9,18 +9,35 @@ use drt_math::{Rgb, fm};
 use crate::fit::View;
 use crate::fit::linear::{newton_noise, newton_step};
 use crate::fit::loss::{Loss, inner};
+use crate::model::error::{Error, SettingError};
+use crate::model::rendering::{Layer, Rendering};
 
 /// Sides of the squares of pixels whose errors are taken together, because filters may spread one
 /// sample over several pixels.
 const SQUARE: u32 = 4;
 
-/// Image and derivatives from half of the samples.
-#[derive(Clone, Debug)]
-pub(super) struct Half {
-    pub(super) image: Vec<Rgb>,
-    /// Per parameter.
-    pub(super) derivatives: Vec<Vec<Rgb>>,
-    pub(super) non_finite: u64,
+/// Image and derivatives of a view from half of the samples.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Half {
+    /// Row by row from the top left.
+    pub image: Vec<Rgb>,
+    /// An image per parameter.
+    pub derivatives: Vec<Vec<Rgb>>,
+    /// Contributions that were not finite.
+    pub non_finite: u64,
+}
+
+impl From<&Rendering> for Half {
+    fn from(rendering: &Rendering) -> Self {
+        let derivatives = rendering.derivatives.iter().map(|d| means(&d.total)).collect();
+        let (image, non_finite) = (means(&rendering.image), rendering.non_finite);
+        Self { image, derivatives, non_finite }
+    }
+}
+
+pub(super) fn means(layer: &Layer) -> Vec<Rgb> {
+    layer.pixels.iter().map(|p| p.mean).collect()
 }
 
 /// One view by both halves.
@@ -51,8 +68,29 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
-    pub(super) fn new(loss: Loss, views: Arc<[View]>, seen: Vec<Seen>, parameters: usize) -> Self {
-        Self { loss, views, seen, parameters }
+    /// What halves of all views' samples tell by a loss; by one of `parameters` there is a derivative each.
+    ///
+    /// # Errors
+    /// When their number, sizes or derivatives are others than the views' and parameters'.
+    pub fn of(
+        loss: Loss,
+        views: impl Into<Arc<[View]>>,
+        halves: Vec<[Half; 2]>,
+        parameters: usize,
+    ) -> Result<Self, Error> {
+        let views = views.into();
+        let fits = |view: &View, half: &Half| {
+            let [w, h] = view.reference.size();
+            let n = w as usize * h as usize;
+            half.derivatives.len() == parameters
+                && [&half.image].into_iter().chain(&half.derivatives).all(|i| i.len() == n)
+        };
+        let all = views.iter().zip(&halves).all(|(v, seen)| seen.iter().all(|h| fits(v, h)));
+        if halves.len() != views.len() || !all {
+            return Err(Error::Setting { setting: "halves", reason: SettingError::ForeignHalves });
+        }
+        let seen = halves.into_iter().map(|halves| Seen { halves }).collect();
+        Ok(Self { loss, views, seen, parameters })
     }
 
     fn pairs(&self) -> impl Iterator<Item = (&View, &Seen)> {

@@ -23,6 +23,7 @@ mod step;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use drt_motion::Parameter;
 
@@ -30,11 +31,11 @@ use crate::fit::loss::{Loss, Reference};
 use crate::model::error::{Error, SettingError};
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
-use crate::run::session::Control;
+use crate::model::shard::Shard;
+use crate::run::session::{Control, ShardSums};
 use crate::world::cache::PreparedCache;
 
-pub use crate::fit::evaluation::Evaluation;
-use crate::fit::evaluation::{Half, Seen};
+pub use crate::fit::evaluation::{Evaluation, Half};
 use crate::fit::source::{Applied, ImageSource};
 pub use crate::fit::step::{Misstep, check_step};
 
@@ -139,41 +140,106 @@ impl Fit {
         seed: u64,
         control: &dyn Control,
     ) -> Result<Option<Evaluation>, Error> {
-        let mut seen = Vec::new();
-        let views = self.views.clone();
-        self.scene.check()?;
-        let applied = self.apply(values)?;
-        for (v, view) in views.iter().enumerate() {
-            let progress = |done| control.progress((v as f64 + done) / views.len() as f64);
+        let mut halves = Vec::new();
+        let count = self.views.len();
+        for view in 0..count {
+            let progress = |done| control.progress((view as f64 + done) / count as f64);
             let control = Watched { control, progress };
-            match self.halves(&applied, view.sensor, spp.div_ceil(2), seed, &control)? {
-                Some(halves) => seen.push(Seen { halves }),
+            let seen = self.halves(values, spp, seed, view, 0..2, &control)?;
+            match seen.and_then(|seen| <[Half; 2]>::try_from(seen).ok()) {
+                Some(seen) => halves.push(seen),
                 None => return Ok(None),
             }
         }
-        Ok(Some(Evaluation::new(self.loss, views, seen, values.len())))
+        self.together(halves).map(Some)
     }
 
-    /// Image and derivatives by one sensor, twice independently.
-    fn halves(
+    /// What one view's images tell: some of its two halves, as [`evaluate`](Self::evaluate) takes them. `None` when `control`
+    /// cancelled it.
+    ///
+    /// # Errors
+    /// As [`evaluate`](Self::evaluate), and when there is no such view or half.
+    pub fn halves(
         &mut self,
-        applied: &Applied,
-        sensor: usize,
+        values: &[f64],
         spp: u32,
         seed: u64,
+        view: usize,
+        wanted: Range<usize>,
         control: &dyn Control,
-    ) -> Result<Option<[Half; 2]>, Error> {
-        let settings = Settings { sensor, terms: false, ..self.settings.clone() };
-        let mut source =
-            ImageSource::new(&self.scene, &self.parameters, applied, settings, &mut self.kept)?;
-        let mut half = |k: usize, seed| {
-            let progress = |done| control.progress(0.5 * (k as f64 + done));
-            source.half(spp, seed, &Watched { control, progress })
-        };
-        let Some(a) = half(0, seed)? else { return Ok(None) };
-        let b = half(1, seed.wrapping_add(HALF))?;
-        Ok(b.map(|b| [a, b]))
+    ) -> Result<Option<Vec<Half>>, Error> {
+        let count = wanted.len().max(1) as f64;
+        let mut halves = Vec::new();
+        let first = wanted.start;
+        let mut source = self.source(values, view, wanted.end)?;
+        for k in wanted {
+            let progress = |done| control.progress(((k - first) as f64 + done) / count);
+            let control = Watched { control, progress };
+            match source.half(spp.div_ceil(2), half_seed(seed, k), &control)? {
+                Some(half) => halves.push(half),
+                None => return Ok(None),
+            }
+        }
+        Ok(Some(halves))
     }
+
+    /// One shard of the samples of a half of a view. `None` when `control` cancelled it.
+    ///
+    /// # Errors
+    /// As [`halves`](Self::halves), when there are more shards than strata of samples, or for finite differences, which
+    /// have none.
+    #[allow(clippy::too_many_arguments)]
+    pub fn half_shard(
+        &mut self,
+        values: &[f64],
+        spp: u32,
+        seed: u64,
+        view: usize,
+        half: usize,
+        shard: Shard,
+        control: &dyn Control,
+    ) -> Result<Option<ShardSums>, Error> {
+        let mut source = self.source(values, view, half + 1)?;
+        source.half_shard(spp.div_ceil(2), half_seed(seed, half), shard, control)
+    }
+
+    /// Shards that [`half_shard`](Self::half_shard) can make of a half of a view.
+    ///
+    /// # Errors
+    /// As [`halves`](Self::halves).
+    pub fn most_shards(&mut self, values: &[f64], spp: u32, view: usize) -> Result<u32, Error> {
+        Ok(self.source(values, view, 0)?.most_shards(spp.div_ceil(2)))
+    }
+
+    /// What the halves of all views tell together, as [`evaluate`](Self::evaluate) finds them.
+    ///
+    /// # Errors
+    /// When they are not those of this fit.
+    pub fn together(&self, halves: Vec<[Half; 2]>) -> Result<Evaluation, Error> {
+        Evaluation::of(self.loss, self.views.clone(), halves, self.parameters.len())
+    }
+
+    fn source(
+        &mut self,
+        values: &[f64],
+        view: usize,
+        halves: usize,
+    ) -> Result<ImageSource<'_>, Error> {
+        self.scene.check()?;
+        let count = self.views.len();
+        let Some(sensor) = self.views.get(view).filter(|_| halves <= 2).map(|v| v.sensor) else {
+            let reason = SettingError::NoSensor { index: view, count };
+            return Err(Error::Setting { setting: "view", reason });
+        };
+        let applied = self.apply(values)?;
+        let settings = Settings { sensor, terms: false, ..self.settings.clone() };
+        ImageSource::new(&self.scene, &self.parameters, &applied, settings, &mut self.kept)
+    }
+}
+
+/// The seed of one of the two halves of an iteration's samples.
+fn half_seed(seed: u64, half: usize) -> u64 {
+    if half == 0 { seed } else { seed.wrapping_add(HALF) }
 }
 
 /// Watches a part of a longer run.

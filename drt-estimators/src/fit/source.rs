@@ -1,19 +1,16 @@
 //! Where images and derivatives come from.
 
-use alloc::vec::Vec;
-
-use drt_math::Rgb;
 use drt_motion::Parameter;
 
 use crate::derivative::tangents;
 use crate::derivative::tangents::Tangents;
-use crate::fit::evaluation::Half;
-use crate::model::error::Error;
-use crate::model::rendering::Layer;
+use crate::fit::evaluation::{Half, means};
+use crate::model::error::{Error, SettingError};
 use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, Settings};
+use crate::model::shard::Shard;
 use crate::run::finite_difference::finite_differences;
-use crate::run::session::{Control, Session};
+use crate::run::session::{Control, Session, ShardSums};
 use crate::world::cache::PreparedCache;
 
 /// A scene at its parameters' values, and its rates of change.
@@ -66,9 +63,7 @@ impl<'a> ImageSource<'a> {
         if !self.session.run(spp, control) {
             return Ok(None);
         }
-        let rendering = self.session.rendering();
-        let mut derivatives: Vec<_> =
-            rendering.derivatives.iter().map(|d| means(&d.total)).collect();
+        let mut half = Half::from(&self.session.rendering());
         if let Some((scene, parameters)) = self.differences {
             let settings = Settings { seed, ..self.settings.clone() };
             let step = settings.step;
@@ -76,13 +71,27 @@ impl<'a> ImageSource<'a> {
             if layers.len() < parameters.len() {
                 return Ok(None);
             }
-            derivatives = layers.iter().map(means).collect();
+            half.derivatives = layers.iter().map(means).collect();
         }
-        let (image, non_finite) = (means(&rendering.image), rendering.non_finite);
-        Ok(Some(Half { image, derivatives, non_finite }))
+        Ok(Some(half))
     }
-}
 
-fn means(layer: &Layer) -> Vec<Rgb> {
-    layer.pixels.iter().map(|p| p.mean).collect()
+    /// Shards that there can be of that.
+    pub(super) fn most_shards(&self, spp: u32) -> u32 {
+        if self.differences.is_some() { 1 } else { self.session.most_shards(spp) }
+    }
+
+    /// One shard of that.
+    pub(super) fn half_shard(
+        &mut self,
+        spp: u32,
+        seed: u64,
+        shard: Shard,
+        control: &dyn Control,
+    ) -> Result<Option<ShardSums>, Error> {
+        if self.differences.is_some() {
+            return Err(Error::Setting { setting: "estimator", reason: SettingError::NoShards });
+        }
+        self.session.run_shard(spp, seed, shard, control)
+    }
 }

@@ -11,4 +11,5 @@ pub(crate) mod rendering;
 pub(crate) mod scene;
 pub mod sensor;
 pub(crate) mod settings;
+pub(crate) mod shard;
 pub mod surface;

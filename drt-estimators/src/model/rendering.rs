@@ -152,6 +152,7 @@ pub struct NonFinite {
 
 /// What work leaves besides its images.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Account {
     pub(crate) counters: Counters,
     /// The first contributions that were not finite.

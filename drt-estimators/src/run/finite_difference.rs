@@ -96,6 +96,7 @@ impl AntitheticPair {
             pool,
             seed,
             allocation: None,
+            shard: None,
             sampler: || StepPair {
                 samplers: [0, 1]
                     .map(|k| PixelSampler::new(&self.worlds[k], None, seed, false, false)),

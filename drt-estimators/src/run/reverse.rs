@@ -9,6 +9,7 @@
 //! of quantities. With the same seed and without [`guiding`](Settings::guiding), ⟨a, J v⟩ = ⟨Jᵀ a, v⟩ to rounding.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use drt_math::{Rgb, RgbVec, Vec3};
 use drt_medium::{CoefficientRates, DepthEstimate};
@@ -26,11 +27,12 @@ use crate::model::error::{Error, SettingError};
 use crate::model::scene::{Scene, Target, TargetName};
 use crate::model::sensor::SensorGradient;
 use crate::model::settings::{EstimatorKind, Settings};
+use crate::model::shard::Shard;
 use crate::model::surface::BsdfParams;
 use crate::run::session::{Control, estimators, seed_of_component};
 use crate::sampling::film::BATCHES;
 use crate::sampling::parallel::Pool;
-use crate::sampling::pixels::{Pass, Sampler};
+use crate::sampling::pixels::{Part, Pass, Sampler};
 use crate::terms::boundary::BoundarySink;
 use crate::terms::interior::{PathSink, PixelSampler};
 use crate::terms::prepared::Prepared;
@@ -69,11 +71,72 @@ pub fn gradient(
     adjoint: &[Rgb],
     control: &dyn Control,
 ) -> Result<SceneGradient, Error> {
+    let mut sums: Option<[SceneGradient; 2]> = None;
+    let wanted = targets(scene, wanted)?;
+    gradient_in_batches(scene, &wanted, settings, spp, adjoint, None, control, &mut |batch| {
+        let parts = [batch.pixels, batch.boundary];
+        match &mut sums {
+            None => sums = Some(parts),
+            Some(sums) => sums.iter_mut().zip(&parts).for_each(|(sum, part)| sum.add(part)),
+        }
+    })?;
+    if let Some([mut pixels, boundary]) = sums {
+        pixels.add(&boundary);
+        return Ok(pixels);
+    }
+    // It was cancelled before anything was done.
+    let (scene, _) = tangents::apply(scene, &[])?;
+    let world = World::new(
+        scene.clone(),
+        settings.sensor,
+        None,
+        None,
+        EmitterMask::All,
+        &mut PreparedCache::default(),
+    )?;
+    Ok(SceneGradient::zeros(&world, &active(&scene, &wanted)))
+}
+
+fn targets(scene: &Scene, wanted: &[impl TargetName]) -> Result<Vec<Target>, Error> {
+    wanted.iter().map(|w| w.find_in(scene)).collect()
+}
+
+/// What one batch of samples adds to a [`gradient`].
+#[derive(Clone, Debug)]
+pub struct GradientBatch {
+    /// Its number, from 0. The gradient is the sum over all batches in this order: of their pixels and of their boundary
+    /// samples, and then of both.
+    pub number: u32,
+    /// By the paths of pixels.
+    pub pixels: SceneGradient,
+    /// Samples of each pixel, and those that each has in all batches together.
+    pub of_pixels: [u32; 2],
+    /// By boundary samples.
+    pub boundary: SceneGradient,
+    /// Batches of boundary samples, and those of all batches.
+    pub of_boundary: [u32; 2],
+}
+
+/// A [`gradient`] in parts: calls `each` with every batch of samples, or with those of a shard, as they are finished, in
+/// order. The batches do not depend on who takes them. False when `control` cancelled it.
+///
+/// # Errors
+/// As [`gradient`], and when there are more shards than batches.
+#[allow(clippy::too_many_arguments)]
+pub fn gradient_in_batches(
+    scene: &Scene,
+    wanted: &[impl TargetName],
+    settings: &Settings,
+    spp: u32,
+    adjoint: &[Rgb],
+    shard: Option<Shard>,
+    control: &dyn Control,
+    each: &mut dyn FnMut(GradientBatch),
+) -> Result<bool, Error> {
     scene.check()?;
     settings.check(scene, true)?;
-    let wanted = wanted.iter().map(|w| w.find_in(scene)).collect::<Result<Vec<_>, _>>()?;
+    let wanted = &targets(scene, wanted)?[..];
     wanted.first().map_or(Ok(()), |target| scene.refuse_smooth(&scene.name_of(*target)))?;
-    let wanted = &wanted[..];
     let (scene, _) = tangents::apply(scene, &[])?;
     let film = scene.sensors[settings.sensor].item.sensor.film();
     if adjoint.len() != (film[0] * film[1]) as usize {
@@ -94,27 +157,45 @@ pub fn gradient(
     }
     let antithetic = components.iter().any(|c| c.prepared.antithetic);
     let (components, seed) = (&components[..], settings.seed);
-    let run = Reverse { world: &world, components, antithetic, seed, spp, adjoint };
+    let units = spp.div_ceil(if antithetic { 2 } else { 1 }).max(1);
+    let pass = Pass::new(0, units, film);
+    if let Some(shard) = shard.filter(|s| s.count() > pass.parts()) {
+        let reason = SettingError::TooManyShards { count: shard.count(), most: pass.parts() };
+        return Err(Error::Setting { setting: "shard", reason });
+    }
+    let run = Reverse { world: &world, components, antithetic, seed, pass, spp, adjoint };
+    let pieces = run.pieces(shard);
     let pool = Pool::new(settings.threads);
-    let mut total = run.zeros();
-    let mut merge = |_: u32, parts: Vec<(usize, Sums)>| {
-        parts.iter().for_each(|(c, part)| total[*c].add(part));
-        !control.cancelled()
-    };
-    let chunks = BATCHES as u32;
-    let mut going = pool.ordered(0..chunks, 1, |c| run.pixels(c, chunks), &mut merge);
-    for (c, component) in components.iter().enumerate() {
-        for i in 0..component.prepared.sources.len() {
-            going = going && pool.ordered(0..chunks, 1, |b| run.splats(c, i, b), &mut merge);
+    let mut sums = [run.zeros(), run.zeros()];
+    let finish = |sums: Vec<Sums>| {
+        let mut gradient = SceneGradient::zeros(&world, &active(&scene, wanted));
+        for (component, Sums { scene: mut sum, insides }) in components.iter().zip(sums) {
+            component.insides.gather(&component.prepared.world, insides, &mut sum);
+            gradient.add(&sum);
         }
-    }
-    let mut gradient = SceneGradient::zeros(&world, &active(&scene, wanted));
-    for (component, sums) in components.iter().zip(total) {
-        let Sums { mut scene, insides } = sums;
-        component.insides.gather(&component.prepared.world, insides, &mut scene);
-        gradient.add(&scene);
-    }
-    Ok(gradient)
+        gradient
+    };
+    let work = |i: u32| run.piece(&pieces[i as usize]);
+    Ok(pool.ordered(0..pieces.len() as u32, 1, work, |i, parts| {
+        let piece = &pieces[i as usize];
+        let [of_pixels, of_boundary] = &mut sums;
+        let to = if matches!(piece.work, Work::Pixels(_)) { of_pixels } else { of_boundary };
+        parts.iter().for_each(|(c, part)| to[*c].add(part));
+        if piece.last {
+            let [pixels, boundary] =
+                core::mem::replace(&mut sums, [run.zeros(), run.zeros()]).map(finish);
+            let number = piece.part.number;
+            let batches = run.batches(number);
+            each(GradientBatch {
+                number,
+                pixels,
+                of_pixels: [piece.part.units[1] - piece.part.units[0], units],
+                boundary,
+                of_boundary: [batches.len() as u32, BATCHES as u32],
+            });
+        }
+        !control.cancelled()
+    }))
 }
 
 /// One estimator's part in a gradient, by the light of some emitters.
@@ -203,8 +284,25 @@ struct Reverse<'a> {
     /// Image points come in mirrored pairs.
     antithetic: bool,
     seed: u64,
+    pass: Pass,
     spp: u32,
     adjoint: &'a [Rgb],
+}
+
+/// A piece of work.
+struct Piece {
+    /// What of the samples of pixels its batch has.
+    part: Part,
+    work: Work,
+    /// The last one of its batch.
+    last: bool,
+}
+
+enum Work {
+    /// Of the pixels from the first one on, up to the second one.
+    Pixels([u32; 2]),
+    /// Component, source and batch.
+    Splats(usize, usize, u32),
 }
 
 /// What a piece of work adds to the gradient.
@@ -225,28 +323,60 @@ impl Reverse<'_> {
         self.components.iter().map(Component::zeros).collect()
     }
 
-    /// One of `chunks` parts of the pixels; what it adds to which component.
-    fn pixels(&self, chunk: u32, chunks: u32) -> Vec<(usize, Sums)> {
-        let per_unit = if self.antithetic { 2 } else { 1 };
-        let units = self.spp.div_ceil(per_unit).max(1);
-        let scale = 1.0 / f64::from(units * per_unit);
+    /// The batches of boundary samples that go with a part of those of pixels.
+    fn batches(&self, part: u32) -> Range<u32> {
+        let at = |k: u32| k * BATCHES as u32 / self.pass.parts();
+        at(part)..at(part + 1)
+    }
+
+    /// The work of all batches, or of those of a shard, in order.
+    fn pieces(&self, shard: Option<Shard>) -> Vec<Piece> {
+        let mut parts: Vec<Part> = self.pass.strata(shard).collect();
+        parts.sort_by_key(|part| part.number);
+        let chunks = (BATCHES as u32).div_ceil(self.pass.parts());
         let n = self.adjoint.len() as u64;
         let at = |c: u32| (n * u64::from(c) / u64::from(chunks)) as u32;
+        let mut pieces = Vec::new();
+        for part in parts {
+            let mut push = |work| pieces.push(Piece { part, work, last: false });
+            (0..chunks).for_each(|c| push(Work::Pixels([at(c), at(c + 1)])));
+            for (c, component) in self.components.iter().enumerate() {
+                for source in 0..component.prepared.sources.len() {
+                    self.batches(part.number).for_each(|b| push(Work::Splats(c, source, b)));
+                }
+            }
+            if let Some(piece) = pieces.last_mut() {
+                piece.last = true;
+            }
+        }
+        pieces
+    }
+
+    /// What a piece of work adds to which component.
+    fn piece(&self, piece: &Piece) -> Vec<(usize, Sums)> {
+        match piece.work {
+            Work::Pixels(pixels) => self.pixels(&piece.part, pixels),
+            Work::Splats(component, source, batch) => self.splats(component, source, batch),
+        }
+    }
+
+    /// Samples of some pixels; what they add to which component.
+    fn pixels(&self, part: &Part, [first, last]: [u32; 2]) -> Vec<(usize, Sums)> {
+        let per_unit = if self.antithetic { 2 } else { 1 };
+        let scale = 1.0 / f64::from(self.pass.all() * per_unit);
         let components = self.components.iter().map(|c| c.prepared.component(c.scatter()));
-        let (seed, film) = (self.seed, self.world.camera.film());
+        let seed = self.seed;
+        let start = self.pass.units(part.run).start;
+        let units = part.units[0] - start..part.units[1] - start;
         let mut sampler = PixelSampler::new(self.world, components, seed, self.antithetic, false);
         let mut values = [Rgb::ZERO];
-        let pass = Pass::new(0, units, film);
-        for pixel in at(chunk)..at(chunk + 1) {
+        for pixel in first..last {
             for sink in sampler.sinks() {
                 sink.weights = self.adjoint[pixel as usize] * scale;
             }
-            for run in pass.runs() {
-                let units = 0..pass.units(run).len() as u32;
-                pass.sample(seed, pixel, run, units, 1, |unit, points| {
-                    sampler.sample(pixel, unit, points, &mut values);
-                });
-            }
+            self.pass.sample(seed, pixel, part.run, units.clone(), 1, |unit, points| {
+                sampler.sample(pixel, unit, points, &mut values);
+            });
         }
         let (account, sinks) = sampler.finish();
         let mut sums: Vec<_> = sinks.into_iter().map(|sink| sink.sums).enumerate().collect();

@@ -13,6 +13,7 @@
 
 mod splats;
 mod splatting;
+mod strata;
 mod sums;
 
 use alloc::sync::Arc;
@@ -22,6 +23,7 @@ use drt_math::{Real, Rgb};
 
 pub(crate) use crate::sampling::film::splats::Splats;
 pub(crate) use crate::sampling::film::splatting::{Raster, Splat, SplatTile};
+pub(crate) use crate::sampling::film::strata::Stratum;
 
 use crate::model::rendering::{BLOCKS, Estimate, Layer};
 use crate::sampling::film::splatting::SplattedImage;
@@ -72,7 +74,8 @@ impl BlockSums {
 }
 
 /// Sizes of a layer's contributions.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Events {
     absolute: Rgb,
     squares: Rgb,
@@ -145,7 +148,21 @@ pub(crate) struct PixelFilm {
     /// Layer by layer of each pixel; of the first one nothing where that is splatted.
     sums: RunSums,
     events: Vec<Events>,
+    /// Of the stratum that has not ended.
+    open_events: Vec<Events>,
+    raster: Option<Arc<Raster>>,
     image: Option<SplattedImage>,
+    /// Strata that are kept apart, by their number.
+    kept: Vec<(u32, Stratum)>,
+}
+
+/// What ends with some samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ends {
+    Nothing,
+    Stratum,
+    /// And its last stratum.
+    Run,
 }
 
 impl PixelFilm {
@@ -155,14 +172,23 @@ impl PixelFilm {
             layers,
             sums: RunSums::new((size[0] * size[1]) as usize * layers),
             events: alloc::vec![Events::NONE; layers],
+            open_events: alloc::vec![Events::NONE; layers],
+            raster: None,
             image: None,
+            kept: Vec::new(),
         }
     }
 
     /// Of a camera's film, whose first layer is splatted.
     pub(crate) fn splatted(raster: Raster, layers: usize) -> Self {
-        let film = Self::new(raster.size(), layers);
-        Self { image: Some(SplattedImage::new(raster)), ..film }
+        let film = Self::of_strata(raster.size(), layers, true);
+        Self { raster: Some(Arc::new(raster)), ..film }
+    }
+
+    /// For strata that were kept, of films whose first layer was splatted or not.
+    pub(crate) fn of_strata(size: [u32; 2], layers: usize, splatted: bool) -> Self {
+        let image = splatted.then(|| SplattedImage::new(size));
+        Self { image, ..Self::new(size, layers) }
     }
 
     pub(crate) fn size(&self) -> [u32; 2] {
@@ -175,7 +201,7 @@ impl PixelFilm {
 
     /// Where splats of the first layer go, if it is made of such.
     pub(crate) fn raster(&self) -> Option<&Arc<Raster>> {
-        self.image.as_ref().map(SplattedImage::raster)
+        self.raster.as_ref()
     }
 
     /// Samples that every pixel has received.
@@ -186,7 +212,9 @@ impl PixelFilm {
     /// Forgets all samples.
     pub(crate) fn clear(&mut self) {
         self.sums.clear();
+        self.kept.clear();
         self.events.fill(Events::NONE);
+        self.open_events.fill(Events::NONE);
         if let Some(image) = &mut self.image {
             image.clear();
         }
@@ -195,6 +223,7 @@ impl PixelFilm {
     /// Begins a pass.
     pub(crate) fn begin(&mut self) {
         self.sums.begin();
+        self.open_events.fill(Events::NONE);
         if let Some(image) = &mut self.image {
             image.begin();
         }
@@ -210,18 +239,69 @@ impl PixelFilm {
 
     /// Merges a tile; the order of merging is part of the result's bits.
     pub(crate) fn merge(&mut self, tile: &Tile) {
-        self.sums.add(tile.start as usize * self.layers, &tile.sums);
-        for (e, t) in self.events.iter_mut().zip(&tile.events) {
+        self.sums.add_from(tile.start as usize * self.layers, &tile.sums);
+        for (e, t) in self.open_events.iter_mut().zip(&tile.events) {
             e.add(t);
         }
     }
 
-    /// Counts samples that every pixel has received; with them a run may end.
-    pub(crate) fn advance(&mut self, units: u32, ends_run: bool) {
+    /// Counts samples that every pixel has received, and what ends with them.
+    pub(crate) fn advance(&mut self, units: u32, ends: Ends) {
         if let Some(image) = &mut self.image {
-            image.advance(units, ends_run);
+            image.advance(units, ends);
         }
-        self.sums.advance(units, ends_run);
+        self.sums.advance(units, ends);
+        if ends != Ends::Nothing {
+            for (e, open) in self.events.iter_mut().zip(&mut self.open_events) {
+                e.add(&core::mem::replace(open, Events::NONE));
+            }
+        }
+    }
+
+    /// Instead of counting samples, keeps the stratum that ends with them apart, under a number.
+    pub(crate) fn keep(&mut self, number: u32, ends: Ends) {
+        let image = self.image.as_mut().map(|image| image.keep(ends));
+        if ends == Ends::Nothing {
+            return;
+        }
+        let events =
+            core::mem::replace(&mut self.open_events, alloc::vec![Events::NONE; self.layers]);
+        let stratum = Stratum { sums: self.sums.take_open(), events, image: image.flatten() };
+        self.kept.push((number, stratum));
+    }
+
+    /// The strata that were kept.
+    pub(crate) fn take_kept(&mut self) -> Vec<(u32, Stratum)> {
+        core::mem::take(&mut self.kept)
+    }
+
+    /// Adds a stratum that was kept, to the current run.
+    pub(crate) fn put_back(&mut self, stratum: &Stratum, units: u32) {
+        if let (Some(image), Some(sums)) = (&mut self.image, &stratum.image) {
+            image.put_back(sums);
+        }
+        self.sums.add(&stratum.sums);
+        for (e, s) in self.open_events.iter_mut().zip(&stratum.events) {
+            e.add(s);
+        }
+        self.advance(units, Ends::Stratum);
+    }
+
+    /// Forgets a run that was not finished.
+    pub(crate) fn abandon_run(&mut self) {
+        if let Some(image) = &mut self.image {
+            image.abandon_run();
+        }
+        self.sums.abandon_run();
+        self.open_events.fill(Events::NONE);
+    }
+
+    /// Ends the current run, unless it has no samples.
+    pub(crate) fn end_run(&mut self) {
+        if let Some(image) = &mut self.image {
+            image.end_run();
+        }
+        self.sums.end_run();
     }
 
     fn estimate(&self, pixel: usize, layer: usize) -> Estimate {
@@ -250,7 +330,9 @@ impl PixelFilm {
         let entries = (l..self.sums.len()).step_by(self.layers);
         let pixels = entries.map(|i| self.sums.estimate(i)).collect();
         let mut image = Layer::from_pixels(self.size, pixels, blocks);
-        self.events[l].widen(&mut image, blocks, f64::from(self.units().max(1)));
+        let mut events = self.events[l];
+        events.add(&self.open_events[l]);
+        events.widen(&mut image, blocks, f64::from(self.units().max(1)));
         image
     }
 }
@@ -262,6 +344,8 @@ pub(crate) struct SplatFilm {
     /// Samples of all finished passes.
     weight: f64,
     layers: Vec<SplatLayer>,
+    /// Batches that are kept apart, by their number.
+    kept: Vec<(u32, Splats)>,
 }
 
 /// Σ N mean and Σ N² variance over passes of N samples; the last entries are blocks and total.
@@ -285,17 +369,28 @@ impl SplatFilm {
         let n = (size[0] * size[1]) as usize + BLOCKS * BLOCKS + 1;
         let zero = alloc::vec![Rgb::ZERO; n];
         let layer = SplatLayer { sum: zero.clone(), variance: zero, events: Events::NONE };
-        Self { size, weight: 0.0, layers: alloc::vec![layer; layers] }
+        Self { size, weight: 0.0, layers: alloc::vec![layer; layers], kept: Vec::new() }
     }
 
     /// Forgets all samples.
     pub(crate) fn clear(&mut self) {
         self.weight = 0.0;
+        self.kept.clear();
         for layer in &mut self.layers {
             layer.sum.fill(Rgb::ZERO);
             layer.variance.fill(Rgb::ZERO);
             layer.events = Events::NONE;
         }
+    }
+
+    /// Keeps a batch apart, under a number.
+    pub(crate) fn keep(&mut self, number: u32, batch: Splats) {
+        self.kept.push((number, batch));
+    }
+
+    /// The batches that were kept.
+    pub(crate) fn take_kept(&mut self) -> Vec<(u32, Splats)> {
+        core::mem::take(&mut self.kept)
     }
 
     /// Samples so far.
@@ -435,7 +530,7 @@ mod tests {
                 tile.push(pixel, &[Rgb::splat(if seen { -3.0 } else { 0.0 })]);
             }
             film.merge(&tile);
-            film.advance(1, true);
+            film.advance(1, Ends::Run);
         }
         let image = film.layer(0, &blocks);
         let one = 3.0 / f64::from(units);
@@ -454,7 +549,8 @@ mod tests {
                     let mut tile = Tile::new(0..1, 1);
                     tile.push(0, &[Rgb::splat(*x)]);
                     film.merge(&tile);
-                    film.advance(1, core::ptr::eq(x, &run[run.len() - 1]));
+                    let last = core::ptr::eq(x, &run[run.len() - 1]);
+                    film.advance(1, if last { Ends::Run } else { Ends::Stratum });
                     (sum, count) = (sum + x, count + 1.0);
                 }
             }

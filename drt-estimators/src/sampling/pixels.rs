@@ -7,8 +7,9 @@ use drt_math::Rgb;
 use drt_math::sobol::SobolSampler;
 
 use crate::model::rendering::BLOCKS;
+use crate::model::shard::{Shard, has};
 use crate::sampling::allocation::{Allocation, MOST};
-use crate::sampling::film::{PixelFilm, Splat, SplatTile, Tile};
+use crate::sampling::film::{BATCHES, Ends, PixelFilm, Splat, SplatTile, Tile};
 use crate::sampling::parallel::Pool;
 use crate::sampling::streams::sequence_name;
 
@@ -36,13 +37,54 @@ pub(crate) struct Pass {
     first: u32,
     units: u32,
     runs: u32,
+    /// Parts of a run that are added up by themselves.
+    strata: u32,
+}
+
+/// A part of the samples that is added up by itself.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Part {
+    /// Its number: the first ones are those of all runs, and so on, so that some neighbours see every run.
+    pub(crate) number: u32,
+    pub(crate) run: u32,
+    /// First sample and one past the last, counted from the start of the pass.
+    pub(crate) units: [u32; 2],
+    ends_run: bool,
 }
 
 impl Pass {
     pub(crate) fn new(first: u32, units: u32, [w, h]: [u32; 2]) -> Self {
         let per_block = (w * h / (BLOCKS * BLOCKS) as u32).max(1);
         let runs = (OF_A_BLOCK / per_block).clamp(FEWEST, OF_A_BLOCK / 2);
-        Self { first, units, runs: u32::min(runs, units) }
+        let runs = u32::min(runs, units);
+        let strata = (BATCHES as u32 / runs.max(1)).clamp(1, (units / runs.max(1)).max(1));
+        Self { first, units, runs, strata }
+    }
+
+    /// Samples of each pixel.
+    pub(crate) fn all(&self) -> u32 {
+        self.units
+    }
+
+    /// How many parts there are, at most [`BATCHES`].
+    pub(crate) fn parts(&self) -> u32 {
+        self.runs * self.strata
+    }
+
+    /// All parts, or those of a shard, in the order in which they are added up.
+    pub(crate) fn strata(&self, shard: Option<Shard>) -> impl Iterator<Item = Part> {
+        let pass = *self;
+        let parts = pass.runs().flat_map(move |run| (0..pass.strata).map(move |s| (run, s)));
+        let part = move |(run, s)| {
+            let of_run = pass.units(run);
+            let at = |s: u32| {
+                let n = u64::from(of_run.end - of_run.start);
+                of_run.start + (n * u64::from(s) / u64::from(pass.strata)) as u32
+            };
+            let (number, ends_run) = (s * pass.runs + run, s + 1 == pass.strata);
+            Part { number, run, units: [at(s), at(s + 1)], ends_run }
+        };
+        parts.map(part).filter(move |part| has(shard, pass.parts(), part.number))
     }
 
     pub(crate) fn runs(&self) -> Range<u32> {
@@ -53,6 +95,13 @@ impl Pass {
     pub(crate) fn units(&self, run: u32) -> Range<u32> {
         let at = |r: u32| (u64::from(self.units) * u64::from(r) / u64::from(self.runs)) as u32;
         at(run)..at(run + 1)
+    }
+}
+
+impl Part {
+    /// True for the last part of a run.
+    pub(crate) fn ends_run(&self) -> bool {
+        self.ends_run
     }
 }
 
@@ -91,19 +140,23 @@ impl Pass {
 /// A part of a run that every pixel takes before any takes more, or is left out: one that was cut
 /// short would leave pixels with different numbers of samples.
 struct Round {
-    run: u32,
+    part: Part,
     units: Range<u32>,
-    ends_run: bool,
+    ends: Ends,
 }
 
-fn rounds(pass: &Pass, most: u32) -> Vec<Round> {
+fn rounds(pass: &Pass, most: u32, shard: Option<Shard>) -> Vec<Round> {
     let mut rounds = Vec::new();
-    for run in pass.runs() {
-        let of_run = pass.units(run);
-        let mut start = of_run.start;
-        while start < of_run.end {
-            let end = u32::min(start.saturating_add(most), of_run.end);
-            rounds.push(Round { run, units: start..end, ends_run: end == of_run.end });
+    for part in pass.strata(shard) {
+        let [mut start, last] = part.units;
+        while start < last {
+            let end = u32::min(start.saturating_add(most), last);
+            let ends = match end == last {
+                false => Ends::Nothing,
+                true if part.ends_run => Ends::Run,
+                true => Ends::Stratum,
+            };
+            rounds.push(Round { part, units: start..end, ends });
             start = end;
         }
     }
@@ -116,6 +169,8 @@ pub(crate) struct Filling<'a, W> {
     pub(crate) seed: u64,
     /// What of the samples each pixel takes; as many as any other by default.
     pub(crate) allocation: Option<&'a Allocation>,
+    /// The part of the samples that is taken, into strata that the film keeps apart; all where it is not said.
+    pub(crate) shard: Option<Shard>,
     /// Makes the sampler of a piece of work.
     pub(crate) sampler: W,
 }
@@ -123,7 +178,8 @@ pub(crate) struct Filling<'a, W> {
 impl<W> Filling<'_, W> {
     /// Takes a pass of samples. `finished` gets every sampler after its work, in order, and says
     /// whether to go on, with the part of the work that is done; `shown` gets the film and each range
-    /// of pixels that a round has added to. Returns the samples of each pixel that were finished.
+    /// of pixels that a round has added to. Returns the samples of each pixel that were finished; of a shard all
+    /// that there would be in one piece, or none.
     pub(crate) fn fill<S: Sampler + Send>(
         &self,
         film: &mut PixelFilm,
@@ -137,12 +193,12 @@ impl<W> Filling<'_, W> {
         let [w, h] = film.size();
         let (count, layers) = (w * h, film.layers());
         let pass = Pass::new(film.units(), units, [w, h]);
-        // Pixels that take different numbers take whole runs.
+        // Pixels that take different numbers are equal only after whole runs.
         let most = match self.allocation {
             None => (units / 16).clamp(1, u32::max(32, SLICE / count)),
             Some(_) => u32::MAX,
         };
-        let rounds = rounds(&pass, most);
+        let rounds = rounds(&pass, most, self.shard);
         let tiles = count.div_ceil(TILE);
         let range = |t: u32| t * TILE..u32::min(count, (t + 1) * TILE);
         // A film of few pixels is cut into samples as well.
@@ -155,8 +211,9 @@ impl<W> Filling<'_, W> {
         let raster = film.raster().cloned();
         let work = |i: u32| {
             let (round, t, cut) = (&rounds[(i / works) as usize], i / cuts % tiles, i % cuts);
-            let start = round.units.start - pass.units(round.run).start;
-            let given = round.units.len() as u32;
+            let of_run = pass.units(round.part.run);
+            let [start, end] = [round.units.start, round.units.end].map(|u| u - of_run.start);
+            let given = of_run.len() as u32;
             let mut tile = Tile::new(range(t), layers);
             let mut image = raster.as_ref().map(|raster| SplatTile::new(raster, range(t)));
             let mut sampler = (self.sampler)();
@@ -166,11 +223,13 @@ impl<W> Filling<'_, W> {
                     image.begin(pixel);
                 }
                 let taken = self.allocation.map_or(given, |a| a.taken(pixel, given));
-                let at =
-                    |cut: u32| start + (u64::from(taken) * u64::from(cut) / u64::from(cuts)) as u32;
+                let part =
+                    |n: u32, i: u32, of: u32| (u64::from(n) * u64::from(i) / u64::from(of)) as u32;
+                let [first, last] = [start, end].map(|u| part(taken, u, given));
+                let at = |cut: u32| first + part(last - first, cut, cuts);
                 let weight = f64::from(given) / f64::from(taken);
                 let units = at(cut)..at(cut + 1);
-                pass.sample(self.seed, pixel, round.run, units, spread, |unit, points| {
+                pass.sample(self.seed, pixel, round.part.run, units, spread, |unit, points| {
                     sampler.sample(pixel, unit, points, &mut values);
                     if taken != given {
                         values.iter_mut().for_each(|v| *v *= weight);
@@ -188,7 +247,7 @@ impl<W> Filling<'_, W> {
         let mut waiting = Vec::new();
         let before = film.units();
         film.begin();
-        self.pool.ordered(0..all, 4, work, |i, (tile, image, sampler)| {
+        let going = self.pool.ordered(0..all, 4, work, |i, (tile, image, sampler)| {
             waiting.push(tile);
             if let Some(image) = &image {
                 film.splat(image);
@@ -199,14 +258,28 @@ impl<W> Filling<'_, W> {
                 for tile in waiting.drain(..) {
                     film.merge(&tile);
                 }
-                film.advance(round.units.len() as u32, round.ends_run);
-                for t in 0..tiles {
-                    shown(film, range(t));
+                match self.shard {
+                    None => film.advance(round.units.len() as u32, round.ends),
+                    Some(_) => film.keep(round.part.number, round.ends),
+                }
+                if self.shard.is_none() && (self.allocation.is_none() || round.ends == Ends::Run) {
+                    for t in 0..tiles {
+                        shown(film, range(t));
+                    }
                 }
             }
             going
         });
-        film.units() - before
+        match self.shard {
+            Some(_) if going => units,
+            Some(_) => 0,
+            None => {
+                if !going && self.allocation.is_some() {
+                    film.abandon_run();
+                }
+                film.units() - before
+            }
+        }
     }
 }
 
@@ -226,7 +299,7 @@ mod tests {
             }
             assert_eq!(next, units);
             let lengths: Vec<u32> =
-                rounds(&pass, 13).iter().map(|r| r.units.len() as u32).collect();
+                rounds(&pass, 13, None).iter().map(|r| r.units.len() as u32).collect();
             assert_eq!(lengths.iter().sum::<u32>(), units);
         }
     }

@@ -107,6 +107,22 @@ pub enum SettingError {
         /// The factor.
         factor: u32,
     },
+    /// Images that are not of the views of a fit.
+    #[error("are not of the views and parameters of this fit")]
+    ForeignHalves,
+    /// Finite differences in shards.
+    #[error("cannot be finite differences, which are not made in shards")]
+    NoShards,
+    /// More shards than strata of samples.
+    #[error(
+        "is one of {count}; so few samples have at most {most} strata, and a shard takes whole ones"
+    )]
+    TooManyShards {
+        /// Shards asked for.
+        count: u32,
+        /// Strata.
+        most: u32,
+    },
     /// A pyramid without levels.
     #[error("has 0 levels; expected at least 1")]
     NoLevels,

@@ -8,7 +8,7 @@ use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::tangents::Tangents;
 use crate::model::error::Error;
 use crate::model::plan::Plan;
-use crate::model::rendering::{Account, Layer, Term};
+use crate::model::rendering::{Account, Term};
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::run::session::describe::describe;
 use crate::run::session::pass::Pass;
@@ -123,34 +123,45 @@ impl Component {
         let splatter = self.prepared.splatter(seed);
         let mut sums = film.begin();
         let first = pass.before * BATCHES as u32;
+        let own = pass.shard.map_or(0..BATCHES as u32, |shard| shard.of(BATCHES as u32));
+        let count = own.len() as f64;
         let going = pass.pool.ordered(
-            first..first + BATCHES as u32,
+            own.clone(),
             1,
             |b| {
                 let mut receiver = Checked::new(ToImages::new(&self.prepared.world, motion));
-                let stream = source.stream() + u64::from(b);
+                let stream = source.stream() + u64::from(first + b);
                 let account = splatter.run(source, stream, per_batch, &mut receiver);
                 (receiver.inner.splats.settled(), account)
             },
             |b, (splats, of_batch)| {
-                sums.add(&splats, f64::from(per_batch), pass.blocks);
                 account.add(of_batch);
+                match pass.shard {
+                    None => sums.add(&splats, f64::from(per_batch), pass.blocks),
+                    Some(_) => film.keep(b, splats),
+                }
                 finished += f64::from(per_batch);
-                progress(f64::from(b - first + 1) / BATCHES as f64);
+                progress(f64::from(b - own.start + 1) / count);
                 !pass.control.cancelled()
             },
         );
-        film.finish(&sums, finished);
+        if pass.shard.is_none() {
+            film.finish(&sums, finished);
+        }
         (account, going)
     }
 
-    /// The boundary terms so far of a parameter.
-    pub(super) fn boundary_layers<'a>(
-        &'a self,
-        parameter: usize,
-        pass_blocks: &'a crate::sampling::film::Blocks,
-    ) -> impl Iterator<Item = (Term, Layer)> + 'a {
-        let terms = self.prepared.sources.iter().zip(&self.splats);
-        terms.map(move |(source, film)| (source.term(), film.layer(parameter, pass_blocks)))
+    /// The terms that its sources of boundary samples belong to.
+    pub(super) fn terms(&self) -> impl Iterator<Item = Term> {
+        self.prepared.sources.iter().map(|source| source.term())
+    }
+
+    /// The films of its sources.
+    pub(super) fn splats(&self) -> impl Iterator<Item = &SplatFilm> {
+        self.splats.iter()
+    }
+
+    pub(super) fn splats_mut(&mut self) -> impl Iterator<Item = &mut SplatFilm> {
+        self.splats.iter_mut()
     }
 }

@@ -2,24 +2,29 @@
 
 mod component;
 mod describe;
+mod legend;
 mod pass;
 mod pilot;
+mod shard;
 
+use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_motion::Parameter;
 
 use crate::run::session::component::Component;
+use crate::run::session::legend::Legend;
 use crate::run::session::pass::Pass;
 use crate::run::session::pilot::Pilot;
+pub use crate::run::session::shard::{Merged, ShardError, ShardSums};
 
 use crate::derivative::tangents;
 use crate::derivative::tangents::Tangents;
 use crate::model::error::{Error, SettingError};
 use crate::model::plan::Plan;
 use crate::model::rendering::Estimate;
-use crate::model::rendering::{Account, Derivative, Layer, Rendering, Term};
+use crate::model::rendering::{Account, Rendering, Term};
 use crate::model::scene::{Scene, Target};
 use crate::model::settings::{EstimatorKind, PathSampling, Settings, Warp};
 use crate::sampling::allocation;
@@ -208,7 +213,8 @@ impl Session {
     /// Returns false when `control` cancelled it; the result then holds what was finished.
     pub fn run(&mut self, spp: u32, control: &dyn Control) -> bool {
         let (pool, blocks) = (Arc::clone(&self.pool), Arc::clone(&self.blocks));
-        let pass = Pass { pool: &pool, blocks: &blocks, spp, before: self.passes, control };
+        let before = self.passes;
+        let pass = Pass { pool: &pool, blocks: &blocks, spp, before, shard: None, control };
         let (samples, going) = self.run_pass(&pass);
         self.samples += samples;
         self.passes += 1;
@@ -244,10 +250,11 @@ impl Session {
 
     /// Samples every pixel `units` times more, or so on average; returns how often each was.
     fn run_pixels(&mut self, pass: &Pass<'_>, units: u32, progress: impl Fn(f64)) -> u32 {
-        let wanted = self.settings.adaptive && self.pilot.is_none();
-        let pilot = allocation::pilot(units).filter(|_| wanted).unwrap_or(0);
+        let pilot = self.pilot_units(units);
         let begun = f64::from(pilot) / f64::from(units.max(1));
-        if pilot > 0 && !self.fly_pilot(pass, pilot, |part| progress(begun * part)) {
+        // Of a shard, too, it is all of the pilot that decides.
+        let whole = Pass { shard: None, ..*pass };
+        if pilot > 0 && !self.fly_pilot(&whole, pilot, |part| progress(begun * part)) {
             return 0;
         }
         let tile = |film: &PixelFilm, pixels: core::ops::Range<u32>| {
@@ -262,6 +269,12 @@ impl Session {
         self.account.add(account);
         self.film = film;
         done + pilot
+    }
+
+    /// Units of each pixel that the pilot takes of these, where there is one to come.
+    fn pilot_units(&self, units: u32) -> u32 {
+        let wanted = self.settings.adaptive && self.pilot.is_none();
+        allocation::pilot(units).filter(|_| wanted).unwrap_or(0)
     }
 
     /// Takes samples of pixels; returns how many of each were finished.
@@ -281,6 +294,7 @@ impl Session {
             pool: pass.pool,
             seed,
             allocation: self.pilot.as_ref().map(|p| &p.pixels),
+            shard: pass.shard,
             sampler: || {
                 let components = self.components.iter().filter_map(|c| c.of_paths(queries));
                 PixelSampler::new(&self.world, components, seed, self.plan.antithetic, terms)
@@ -320,6 +334,12 @@ impl Session {
         )
     }
 
+    /// Samples of a batch of a source, in a pass of so many of each pixel.
+    fn per_batch(&self, spp: u32, c: usize, i: usize) -> u32 {
+        let per_pixel = f64::from(spp) * self.source_ratio(c, i);
+        self.components[c].prepared.samples_per_batch(per_pixel)
+    }
+
     fn parameters(&self) -> usize {
         self.components[0].motion.as_ref().map_or(0, |m| m.parameters())
     }
@@ -341,7 +361,11 @@ impl Session {
     pub fn rendering(&self) -> Rendering {
         Rendering {
             image: self.film.layer(0, &self.blocks),
-            derivatives: self.derivatives(),
+            derivatives: self.legend().derivatives(
+                &self.film,
+                self.components.iter().flat_map(Component::splats),
+                &self.blocks,
+            ),
             plan: self.plan.clone(),
             counters: self.account.counters,
             non_finite: self.account.non_finite_count,
@@ -351,39 +375,21 @@ impl Session {
         }
     }
 
-    fn derivatives(&self) -> Vec<Derivative> {
-        let Some(motion) = &self.components[0].motion else { return Vec::new() };
-        let n = motion.parameters();
-        let apart: Vec<Term> = self.terms().filter(|_| self.settings.terms).collect();
-        let layer = |l: usize| self.film.layer(l, &self.blocks);
-        let derivative = |p: usize| {
-            let mut parts = alloc::vec![(Term::Interior, layer(1 + p))];
-            let along = apart.iter().enumerate();
-            parts.extend(along.map(|(i, term)| (*term, layer(1 + (i + 1) * n + p))));
-            for component in &self.components {
-                parts.extend(component.boundary_layers(p, &self.blocks));
-            }
-            let total = sum(parts.iter().map(|(_, l)| l)).unwrap_or_else(|| parts[0].1.clone());
-            let mut terms = Vec::new();
-            if self.settings.terms {
-                for term in Term::ALL {
-                    let own = parts.iter().filter(|(t, _)| *t == term).map(|(_, l)| l);
-                    terms.extend(sum(own).map(|l| (term, l)));
-                }
-            }
-            Derivative { name: motion.tangents.names[p].clone(), total, terms }
-        };
-        (0..n).map(derivative).collect()
+    fn legend(&self) -> Legend {
+        let components = self.components.iter();
+        Legend {
+            size: self.film.size(),
+            splatted: self.plan.splatting,
+            parameters: self.names(),
+            along: self.terms().filter(|_| self.settings.terms).collect(),
+            sources: components.flat_map(Component::terms).collect(),
+            apart: self.settings.terms,
+        }
     }
-}
 
-fn sum<'a>(layers: impl Iterator<Item = &'a Layer>) -> Option<Layer> {
-    layers.fold(None, |sum, l| {
-        Some(match sum {
-            None => l.clone(),
-            Some(s) => s.plus(l),
-        })
-    })
+    fn names(&self) -> Vec<String> {
+        self.components[0].motion.as_ref().map_or_else(Vec::new, |m| m.tangents.names.clone())
+    }
 }
 
 /// Which estimator differentiates which light: points and directions do not fit the 2019 form (theory sheet

@@ -10,14 +10,16 @@ use crate::sampling::film::Events;
 const FEW: usize = 4;
 
 /// One batch of a splatted term: a sum per pixel and layer.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Splats {
     pub(super) layers: Vec<Splatted>,
     pub(super) events: Vec<Events>,
 }
 
 /// Sums per pixel. Batches of few samples leave most pixels alone: then only what they touch costs.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Splatted {
     pixels: usize,
     /// What each sample added to which pixel; empty once there is a sum for every pixel.
@@ -75,6 +77,17 @@ impl Splats {
     /// Calls `each` for every pixel of a layer that something was added to.
     pub(crate) fn for_each(&self, layer: usize, each: impl FnMut(usize, Rgb)) {
         self.layers[layer].for_each(each);
+    }
+
+    /// True for sums over so many pixels and layers.
+    pub(crate) fn is_of(&self, [w, h]: [u32; 2], layers: usize) -> bool {
+        let n = u64::from(w) * u64::from(h);
+        let fits = |s: &Splatted| {
+            s.pixels as u64 == n
+                && (s.sums.is_empty() || s.sums.len() == s.pixels)
+                && s.list.iter().all(|(pixel, _)| u64::from(*pixel) < n)
+        };
+        self.layers.len() == layers && self.events.len() == layers && self.layers.iter().all(fits)
     }
 
     /// To be called after the last sample.

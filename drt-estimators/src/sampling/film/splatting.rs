@@ -30,14 +30,9 @@ use drt_math::{Real, Rgb, fm};
 
 use crate::model::filter::Filter;
 use crate::model::rendering::{BLOCKS, Estimate, Layer};
+use crate::sampling::film::strata::{GROUPS, OF_GROUP, SplatSums};
 use crate::sampling::film::sums::RunSums;
-use crate::sampling::film::{Blocks, Events, cell};
-
-/// Groups of strata along one axis.
-const GROUPS: u32 = 8;
-
-/// Sums of a group: blocks, and the whole.
-const SUMS: usize = BLOCKS * BLOCKS + 1;
+use crate::sampling::film::{Blocks, Ends, Events, cell};
 
 /// What a sample puts on the image.
 #[derive(Clone, Copy, Debug)]
@@ -216,113 +211,113 @@ impl SplatTile {
 /// An image that is splatted.
 #[derive(Debug)]
 pub(super) struct SplattedImage {
-    raster: Arc<Raster>,
+    size: [u32; 2],
     pixels: RunSums,
     /// Blocks and the whole by groups.
     groups: RunSums,
     events: Events,
+    /// Of the stratum that has not ended.
+    open_events: Events,
     /// What tiles have added since samples were last counted.
-    new_pixels: Pending,
-    new_groups: Pending,
-    new_events: Events,
-}
-
-/// Sums that do not count yet.
-#[derive(Debug)]
-struct Pending {
-    values: Vec<Rgb>,
-    weights: Vec<f64>,
-}
-
-impl Pending {
-    fn new(n: usize) -> Self {
-        Self { values: alloc::vec![Rgb::ZERO; n], weights: alloc::vec![0.0; n] }
-    }
-
-    fn add(&mut self, at: usize, sums: Sums) {
-        self.values[at] += sums.0;
-        self.weights[at] += sums.1;
-    }
-
-    fn forget(&mut self) {
-        self.values.fill(Rgb::ZERO);
-        self.weights.fill(0.0);
-    }
-
-    fn count(&mut self, sums: &mut RunSums, units: u32, ends_run: bool) {
-        sums.add(0, &self.values);
-        sums.add_weights(&self.weights);
-        sums.advance(units, ends_run);
-        self.forget();
-    }
+    new: SplatSums,
 }
 
 impl SplattedImage {
-    pub(super) fn new(raster: Raster) -> Self {
-        let [w, h] = raster.size;
-        let pixels = (w * h) as usize;
-        let groups = (GROUPS * GROUPS) as usize * SUMS;
+    pub(super) fn new(size: [u32; 2]) -> Self {
+        let pixels = (size[0] * size[1]) as usize;
+        let new = SplatSums::new(pixels);
         Self {
-            raster: Arc::new(raster),
+            size,
             pixels: RunSums::weighted(pixels),
-            groups: RunSums::weighted(groups),
+            groups: RunSums::weighted(new.groups.values.len()),
             events: Events::NONE,
-            new_pixels: Pending::new(pixels),
-            new_groups: Pending::new(groups),
-            new_events: Events::NONE,
+            open_events: Events::NONE,
+            new,
         }
     }
 
-    pub(super) fn raster(&self) -> &Arc<Raster> {
-        &self.raster
-    }
-
     pub(super) fn clear(&mut self) {
-        self.forget();
+        self.new.clear();
         self.pixels.clear();
         self.groups.clear();
-        self.events = Events::NONE;
+        (self.events, self.open_events) = (Events::NONE, Events::NONE);
     }
 
     pub(super) fn begin(&mut self) {
         // What a pass that was cut short has left.
-        self.forget();
+        self.new.clear();
+        self.open_events = Events::NONE;
         self.pixels.begin();
         self.groups.begin();
     }
 
-    fn forget(&mut self) {
-        self.new_pixels.forget();
-        self.new_groups.forget();
-        self.new_events = Events::NONE;
-    }
-
     pub(super) fn add(&mut self, tile: &SplatTile) {
-        let width = self.raster.size[0] as usize;
+        let width = self.size[0] as usize;
         let [columns, rows] = &tile.window;
+        let SplatSums { pixels, groups, events } = &mut self.new;
         for (row, sums) in rows.clone().zip(tile.sums.chunks(columns.len().max(1))) {
             let at = row as usize * width + columns.start as usize;
             for (i, sums) in (at..).zip(sums) {
-                self.new_pixels.add(i, *sums);
+                pixels.add_to(i, *sums);
             }
         }
         for (pixel, sums) in &tile.beyond {
-            self.new_pixels.add(*pixel as usize, *sums);
+            pixels.add_to(*pixel as usize, *sums);
         }
         let present = tile.present.iter().map(|(block, sums)| (tile.group, *block, *sums));
         for (group, block, sums) in tile.blocks.iter().copied().chain(present) {
-            let of_group = group as usize * SUMS;
-            self.new_groups.add(of_group + block as usize, sums);
-            self.new_groups.add(of_group + SUMS - 1, sums);
+            let of_group = group as usize * OF_GROUP;
+            groups.add_to(of_group + block as usize, sums);
+            groups.add_to(of_group + OF_GROUP - 1, sums);
         }
-        self.new_events.add(&tile.events);
+        events.add(&tile.events);
     }
 
-    /// Counts samples, with what they have added.
-    pub(super) fn advance(&mut self, units: u32, ends_run: bool) {
-        self.new_pixels.count(&mut self.pixels, units, ends_run);
-        self.new_groups.count(&mut self.groups, units, ends_run);
-        self.events.add(&core::mem::replace(&mut self.new_events, Events::NONE));
+    /// Adds to the stratum what tiles have added.
+    fn settle(&mut self) {
+        self.pixels.add(&self.new.pixels);
+        self.groups.add(&self.new.groups);
+        self.open_events.add(&self.new.events);
+        self.new.clear();
+    }
+
+    /// Counts samples, with what they have added, and what ends with them.
+    pub(super) fn advance(&mut self, units: u32, ends: Ends) {
+        self.settle();
+        self.pixels.advance(units, ends);
+        self.groups.advance(units, ends);
+        if ends != Ends::Nothing {
+            self.events.add(&core::mem::replace(&mut self.open_events, Events::NONE));
+        }
+    }
+
+    /// The stratum so far, where that has ended, which is not counted.
+    pub(super) fn keep(&mut self, ends: Ends) -> Option<SplatSums> {
+        self.settle();
+        (ends != Ends::Nothing).then(|| SplatSums {
+            pixels: self.pixels.take_open(),
+            groups: self.groups.take_open(),
+            events: core::mem::replace(&mut self.open_events, Events::NONE),
+        })
+    }
+
+    /// Adds a stratum that was kept.
+    pub(super) fn put_back(&mut self, stratum: &SplatSums) {
+        self.pixels.add(&stratum.pixels);
+        self.groups.add(&stratum.groups);
+        self.open_events.add(&stratum.events);
+    }
+
+    pub(super) fn abandon_run(&mut self) {
+        self.new.clear();
+        self.open_events = Events::NONE;
+        self.pixels.abandon_run();
+        self.groups.abandon_run();
+    }
+
+    pub(super) fn end_run(&mut self) {
+        self.pixels.end_run();
+        self.groups.end_run();
     }
 
     pub(super) fn estimate(&self, pixel: usize) -> Estimate {
@@ -332,12 +327,12 @@ impl SplattedImage {
     /// The image, with the errors of its blocks and of the whole.
     pub(super) fn layer(&self, blocks: &Blocks) -> Layer {
         let pixels = (0..self.pixels.len()).map(|i| self.estimate(i)).collect();
-        let mut image = Layer::from_pixels(self.raster.size, pixels, blocks);
+        let mut image = Layer::from_pixels(self.size, pixels, blocks);
         let all: u32 = blocks.count.iter().sum();
         let counts = blocks.count.into_iter().chain([all]);
         let estimates = image.blocks.iter_mut().chain([&mut image.total]);
         for ((k, estimate), pixels) in estimates.enumerate().zip(counts) {
-            let of_groups = (k..self.groups.len()).step_by(SUMS);
+            let of_groups = (k..self.groups.len()).step_by(OF_GROUP);
             let variance = of_groups.fold(Rgb::ZERO, |sum, i| {
                 // As if each pixel of a block had taken its mean from the weights.
                 let stderr = self.groups.stderr(i, estimate.mean);
@@ -345,7 +340,9 @@ impl SplattedImage {
             });
             estimate.stderr = variance.map(Real::sqrt) * (1.0 / f64::from(pixels.max(1)));
         }
-        self.events.widen(&mut image, blocks, f64::from(self.pixels.units().max(1)));
+        let mut events = self.events;
+        events.add(&self.open_events);
+        events.widen(&mut image, blocks, f64::from(self.pixels.units().max(1)));
         image
     }
 }

@@ -5,6 +5,8 @@ use alloc::vec::Vec;
 use drt_math::{Real, Rgb};
 
 use crate::model::rendering::Estimate;
+use crate::sampling::film::Ends;
+use crate::sampling::film::strata::SampleSums;
 
 /// Means of many numbers at once, with their standard errors: plain arrays with an entry for each.
 ///
@@ -20,7 +22,8 @@ use crate::model::rendering::Estimate;
 ///
 /// In a pass, every number takes its samples in runs whose means are independent
 /// ([`Pass`](crate::sampling::pixels::Pass)); passes are weighted by their samples. A pass of a single run
-/// knows nothing of its error, and takes that of the others.
+/// knows nothing of its error, and takes that of the others. The samples of a run are added up in strata, and the
+/// sums of these in order: so where they were taken does not matter.
 #[derive(Debug, Default)]
 pub(super) struct RunSums {
     /// Passes before the last one; empty when there are none.
@@ -28,10 +31,11 @@ pub(super) struct RunSums {
     /// Of weights, where there are such.
     pass_weights: Vec<PassWeights>,
     before: Count,
-    /// The last pass, and of its current run what is finished.
+    /// The last pass, and of its current run the strata that are finished and the one that is not.
     runs: Vec<Runs>,
     partial: Vec<Rgb>,
     weights: Vec<RunWeights>,
+    open: SampleSums,
     run_count: u32,
     run_units: u32,
     partial_units: u32,
@@ -66,7 +70,7 @@ impl PassWeights {
     const NONE: Self = Self { with: Rgb::ZERO, own: 0.0 };
 }
 
-/// Of weights: the sum in the current run, the mean of runs, the sum of deviations times those of samples
+/// Of weights: the sum over the finished strata of the current run, the mean of runs, the sum of deviations times those of samples
 /// and times themselves, and Σ N_r² S_r (W_r - 1).
 #[derive(Clone, Copy, Debug)]
 struct RunWeights {
@@ -129,13 +133,18 @@ impl RunSums {
         Self {
             runs: alloc::vec![Runs::NONE; n],
             partial: alloc::vec![Rgb::ZERO; n],
+            open: SampleSums::new(n),
             ..Self::default()
         }
     }
 
     /// With weights.
     pub(super) fn weighted(n: usize) -> Self {
-        Self { weights: alloc::vec![RunWeights::NONE; n], ..Self::new(n) }
+        Self {
+            weights: alloc::vec![RunWeights::NONE; n],
+            open: SampleSums::weighted(n),
+            ..Self::new(n)
+        }
     }
 
     /// How many numbers there are.
@@ -160,6 +169,7 @@ impl RunSums {
         self.runs.fill(Runs::NONE);
         self.partial.fill(Rgb::ZERO);
         self.weights.fill(RunWeights::NONE);
+        self.open.clear();
         (self.run_count, self.run_units, self.partial_units) = (0, 0, 0);
     }
 
@@ -183,23 +193,52 @@ impl RunSums {
     }
 
     /// Adds sums of samples to the numbers from `at` on; the order of adding is part of the result's bits.
-    pub(super) fn add(&mut self, at: usize, sums: &[Rgb]) {
-        for (sum, t) in self.partial[at..].iter_mut().zip(sums) {
+    pub(super) fn add_from(&mut self, at: usize, sums: &[Rgb]) {
+        for (sum, t) in self.open.values[at..].iter_mut().zip(sums) {
             *sum += *t;
         }
     }
 
-    /// Adds sums of the weights of samples.
-    pub(super) fn add_weights(&mut self, sums: &[f64]) {
-        for (weights, t) in self.weights.iter_mut().zip(sums) {
-            weights.partial += *t;
+    /// The same to all numbers, and their weights.
+    pub(super) fn add(&mut self, sums: &SampleSums) {
+        self.open.add(sums);
+    }
+
+    /// What the stratum that has not ended holds; it begins anew.
+    pub(super) fn take_open(&mut self) -> SampleSums {
+        let empty = self.open.empty();
+        core::mem::replace(&mut self.open, empty)
+    }
+
+    /// Counts samples that every number has received, and what ends with them.
+    pub(super) fn advance(&mut self, units: u32, ends: Ends) {
+        self.partial_units += units;
+        if ends == Ends::Nothing {
+            return;
+        }
+        for (sum, v) in self.partial.iter_mut().zip(&self.open.values) {
+            *sum += *v;
+        }
+        for (weights, w) in self.weights.iter_mut().zip(&self.open.weights) {
+            weights.partial += *w;
+        }
+        self.open.clear();
+        if ends == Ends::Run {
+            self.end_run();
         }
     }
 
-    /// Counts samples that every number has received; with them a run may end.
-    pub(super) fn advance(&mut self, units: u32, ends_run: bool) {
-        self.partial_units += units;
-        if !ends_run {
+    /// Forgets a run that was not finished.
+    pub(super) fn abandon_run(&mut self) {
+        self.partial.fill(Rgb::ZERO);
+        self.weights.iter_mut().for_each(|w| w.partial = 0.0);
+        self.open.clear();
+        self.partial_units = 0;
+    }
+
+    /// Ends the current run, unless it has no samples.
+    pub(super) fn end_run(&mut self) {
+        if self.partial_units == 0 {
             return;
         }
         self.run_count += 1;
@@ -241,7 +280,7 @@ impl RunSums {
                 mean += weights.correction(mean, runs, units);
             }
         }
-        passes.sum += mean * units + self.partial[i];
+        passes.sum += mean * units + (self.partial[i] + self.open.values[i]);
         (passes, of_weights)
     }
 

@@ -9,9 +9,10 @@ use super::*;
 use crate::model::filter::FilterKind;
 use crate::model::rendering::{Estimate, Layer};
 use crate::model::sensor::{Lens, Sensor};
+use crate::model::shard::Shard;
 use crate::sampling::film::{Blocks, PixelFilm};
 use crate::sampling::parallel::Pool;
-use crate::sampling::pixels::{Filling, Sampler};
+use crate::sampling::pixels::{Filling, Pass, Sampler};
 
 const SIZE: [u32; 2] = [19, 13];
 const FILTERS: [FilterKind; 3] =
@@ -97,6 +98,7 @@ fn rendered(paths: &Paths<'_>, raster: Raster, threads: usize) -> Layer {
         pool: &pool,
         seed: paths.seed,
         allocation: None,
+        shard: None,
         sampler: || Paths { splats: Vec::new(), ..*paths },
     };
     for _ in 0..2 {
@@ -201,6 +203,50 @@ fn threads_make_no_difference() {
     }
 }
 
+/// All strata in shards, put back in order, are the film in one piece; any that is not there is missed.
+#[test]
+fn strata_put_back_make_the_same_image() {
+    let camera = camera(FilterKind::GAUSSIAN);
+    let paths = paths(&camera, From::Squares, 5);
+    let pool = Pool::new(2);
+    let units = 200;
+    let filled = |shard| {
+        let mut film = PixelFilm::splatted(raster(&camera), 1);
+        let sampler = || Paths { splats: Vec::new(), ..paths };
+        let filling = Filling { pool: &pool, seed: 5, allocation: None, shard, sampler };
+        assert_eq!(filling.fill(&mut film, units, |_, _| true, |_, _| {}), units);
+        film
+    };
+    let pass = Pass::new(0, units, SIZE);
+    let whole = filled(None).layer(0, &Blocks::new(SIZE));
+    let mut strata = Vec::new();
+    for i in 1..=3 {
+        let mut film = filled(Shard::new(i, 3));
+        assert_eq!(film.units(), 0);
+        strata.extend(film.take_kept());
+    }
+    assert_eq!(strata.len(), pass.parts() as usize);
+    let together = |without: Option<u32>| {
+        let mut film = PixelFilm::of_strata(SIZE, 1, true);
+        film.begin();
+        for part in pass.strata(None) {
+            let own = strata.iter().find(|(n, _)| *n == part.number && Some(*n) != without);
+            if let Some((_, stratum)) = own {
+                assert!(stratum.is_of(SIZE, 1, true) && !stratum.is_of(SIZE, 1, false));
+                film.put_back(stratum, part.units[1] - part.units[0]);
+            }
+            if part.ends_run() {
+                film.end_run();
+            }
+        }
+        film.layer(0, &Blocks::new(SIZE))
+    };
+    let same =
+        |a: &Layer, b: &Layer| (&a.pixels, &a.blocks, a.total) == (&b.pixels, &b.blocks, b.total);
+    assert!(same(&whole, &together(None)));
+    assert!(!same(&whole, &together(Some(5))));
+}
+
 /// Every tap of every pixel, wherever a splat lands: on the tile's own pixels or not.
 #[test]
 fn splats_reach_the_pixels_of_their_footprint() {
@@ -208,7 +254,7 @@ fn splats_reach_the_pixels_of_their_footprint() {
     for kind in FILTERS {
         let camera = camera(kind);
         let raster = Arc::new(raster(&camera));
-        let mut image = SplattedImage::new(raster.as_ref().clone());
+        let mut image = SplattedImage::new(SIZE);
         let mut expected = alloc::vec![0.0; (SIZE[0] * SIZE[1]) as usize];
         for _ in 0..20 {
             let start = rng.next_u32() % (SIZE[0] * SIZE[1]);
@@ -224,7 +270,7 @@ fn splats_reach_the_pixels_of_their_footprint() {
             }
             image.add(&tile);
         }
-        image.advance(1, true);
+        image.advance(1, Ends::Run);
         for (i, expected) in expected.iter().enumerate() {
             let found = image.estimate(i).mean.g;
             assert!((found - expected).abs() < 1e-12, "{kind:?} {found} {expected}");

@@ -1,0 +1,155 @@
+//! What a shard leaves to be merged: sums to the last bit, inside an ordinary file.
+//!
+//! Images are OpenEXR with the shard's own image to look at, and the sums in an attribute. Gradients are NPY,
+//! an array of bytes. The bytes are those of [postcard](https://postcard.jamesmunns.com), whose layout only
+//! the same version of the program is sure to know: so its name comes first.
+
+use std::path::Path;
+
+use drt_estimators::fit::View;
+use drt_estimators::loss::{Loss, Reference};
+use drt_estimators::{Shard, ShardSums};
+use drt_math::Rgb;
+use serde::{Deserialize, Serialize};
+
+use crate::error::Place;
+use crate::fingerprint::Fingerprint;
+use crate::image::read_attachment;
+use crate::npy::{is_npy, read_npy_bytes};
+use crate::{CliError, PROGRAM};
+
+/// Everything that a shard knows.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub(crate) struct ShardFile {
+    /// The version of the program; first, so that others can read it.
+    program: String,
+    pub(crate) shard: Shard,
+    /// Of the job and all options that decide its result.
+    pub(crate) inputs: Fingerprint,
+    pub(crate) seed: u64,
+    pub(crate) command: String,
+    pub(crate) scene: String,
+    /// The job file and its text, where there was one.
+    pub(crate) job: Option<(String, String)>,
+    pub(crate) seconds: f64,
+    pub(crate) cpu_seconds: f64,
+    pub(crate) threads: usize,
+    pub(crate) sums: Sums,
+}
+
+/// What was added up.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub(crate) enum Sums {
+    /// Of images and derivatives.
+    Images(ShardSums),
+    /// Of images by two independent halves of the samples, and the loss that they go into.
+    Halves { halves: Box<[ShardSums; 2]>, loss: Loss, target: Reference },
+    /// Of the gradient of a loss that is known by its derivative by every pixel.
+    Gradient {
+        adjoint: Vec<Rgb>,
+        /// By the parameters, where there are any.
+        images: Option<ShardSums>,
+        /// By the parameter groups.
+        batches: Vec<Batch>,
+    },
+}
+
+/// What one batch of samples adds to a gradient by parameter groups.
+#[derive(Clone, Debug, Default, Deserialize, Serialize)]
+pub(crate) struct Batch {
+    pub(crate) number: u32,
+    /// By the paths of pixels; and the samples of each pixel, and of all batches.
+    pub(crate) pixels: Vec<f64>,
+    pub(crate) of_pixels: [u32; 2],
+    /// By boundary samples; and their batches, and those of all.
+    pub(crate) boundary: Vec<f64>,
+    pub(crate) of_boundary: [u32; 2],
+}
+
+/// Batches added up, in order.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Total(Option<Batch>);
+
+impl Total {
+    /// Adds the next batch; false for one that is not of this gradient.
+    pub(crate) fn add(&mut self, batch: Batch) -> bool {
+        let Some(sum) = &mut self.0 else {
+            self.0 = Some(batch);
+            return true;
+        };
+        let fits = sum.pixels.len() == batch.pixels.len()
+            && sum.boundary.len() == batch.boundary.len()
+            && sum.of_pixels[1] == batch.of_pixels[1]
+            && sum.of_boundary[1] == batch.of_boundary[1];
+        for (sum, b) in [(&mut sum.pixels, &batch.pixels), (&mut sum.boundary, &batch.boundary)] {
+            sum.iter_mut().zip(b).for_each(|(sum, b)| *sum += b);
+        }
+        sum.of_pixels[0] += batch.of_pixels[0];
+        sum.of_boundary[0] += batch.of_boundary[0];
+        fits
+    }
+
+    /// The gradient; what is missing counts as what is there.
+    pub(crate) fn numbers(self) -> Vec<f64> {
+        let sum = self.0.unwrap_or_default();
+        // Exactly 1 where nothing is missing.
+        let scale = |[there, all]: [u32; 2]| f64::from(all) / f64::from(there);
+        let (a, b) = (scale(sum.of_pixels), scale(sum.of_boundary));
+        sum.pixels.iter().zip(&sum.boundary).map(|(p, s)| p * a + s * b).collect()
+    }
+}
+
+impl ShardFile {
+    /// Of this version of the program.
+    #[allow(clippy::too_many_arguments)]
+    pub(crate) fn new(
+        job: &crate::Job,
+        shard: Shard,
+        inputs: Fingerprint,
+        command: &str,
+        sums: Sums,
+    ) -> Self {
+        Self {
+            program: PROGRAM.into(),
+            shard,
+            inputs,
+            seed: job.settings.seed,
+            command: command.into(),
+            scene: job.scene_path.display().to_string(),
+            job: job.text.clone().map(|text| (job.path.display().to_string(), text)),
+            seconds: 0.0,
+            cpu_seconds: 0.0,
+            threads: 0,
+            sums,
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> Result<Vec<u8>, CliError> {
+        postcard::to_allocvec(self).map_err(|e| CliError::argument(format!("a shard: {e}")))
+    }
+
+    /// Reads what a shard has left in an EXR or NPY file.
+    pub(crate) fn read(path: &Path) -> Result<Self, CliError> {
+        let fail = |message: String| CliError::input(&Place::file(path), message);
+        let bytes = match is_npy(path)? {
+            true => read_npy_bytes(path)?,
+            false => read_attachment(path)?,
+        };
+        let expected = "expected a file that `drt render` or `drt grad` wrote with --shard";
+        let bytes = bytes.ok_or_else(|| fail(format!("it is not a shard; {expected}")))?;
+        let (program, _) = postcard::take_from_bytes::<String>(&bytes)
+            .map_err(|e| fail(format!("it is not a shard: {e}; {expected}")))?;
+        if program != PROGRAM {
+            return Err(fail(format!(
+                "it was written by {program}, and this is {PROGRAM}; shards are merged by the \
+                 version that made them"
+            )));
+        }
+        postcard::from_bytes(&bytes).map_err(|e| fail(format!("it is damaged: {e}")))
+    }
+}
+
+/// The only view of a gradient of a loss.
+pub(crate) fn view(target: Reference) -> View {
+    View { sensor: 0, reference: target }
+}
