@@ -36,6 +36,8 @@ enum Outcome {
     Failed,
     /// Stopped by the user; what was finished is written.
     Interrupted,
+    /// Failed with this exit code, of which another process tells.
+    Silent(u8),
 }
 
 impl Outcome {
@@ -44,6 +46,7 @@ impl Outcome {
             Self::Done => 0,
             Self::Failed => 1,
             Self::Interrupted => 130,
+            Self::Silent(code) => code,
         }
     }
 }

@@ -12,6 +12,7 @@ use super::gallery::Gallery;
 use super::history::{History, LOSSES, PARAMETERS};
 use super::problem::Problem;
 use super::report::{self, Report};
+use super::team::Team;
 use super::watch::Watch;
 use crate::atomic::{remove_drafts, write_atomically};
 use crate::commands::Outcome;
@@ -29,6 +30,7 @@ const PICTURE_SECONDS: f64 = 10.0;
 /// A fit on its way.
 pub(super) struct Descent<'a> {
     problem: &'a Problem<'a>,
+    team: &'a Team,
     fingerprint: Fingerprint,
     optimizer: Optimizer,
     history: History,
@@ -43,7 +45,11 @@ pub(super) struct Descent<'a> {
 
 impl<'a> Descent<'a> {
     /// Begins, or goes on from the checkpoint unless told to `restart`.
-    pub(super) fn begin(problem: &'a Problem<'a>, restart: bool) -> Result<Self, CliError> {
+    pub(super) fn begin(
+        problem: &'a Problem<'a>,
+        team: &'a Team,
+        restart: bool,
+    ) -> Result<Self, CliError> {
         let (clock, plan) = (Clock::start(), problem.plan);
         let fingerprint = problem.fingerprint()?;
         let refuse = |e| CliError::input(&Place::file(&problem.job.path), e);
@@ -72,11 +78,28 @@ impl<'a> Descent<'a> {
         };
         let optimizer = optimizer.map_err(refuse)?;
         let watch = Watch::new(problem, blind);
+        let folder = folder.filter(|_| team.leads());
         if let Some(folder) = folder {
             remove_drafts(folder);
         }
         let gallery = folder.map(|folder| Gallery::new(problem, folder));
-        Ok(Self { problem, fingerprint, optimizer, history, watch, gallery, clock, before, again })
+        Ok(Self {
+            problem,
+            team,
+            fingerprint,
+            optimizer,
+            history,
+            watch,
+            gallery,
+            clock,
+            before,
+            again,
+        })
+    }
+
+    /// Where it writes, if it does.
+    fn folder(&self) -> Option<&Path> {
+        self.problem.plan.checkpoint.as_deref().filter(|_| self.team.leads())
     }
 
     /// Steps taken.
@@ -120,7 +143,7 @@ impl<'a> Descent<'a> {
                 return Ok((Outcome::Done, Some(evaluation)));
             }
             self.step(i, &evaluation, &mut fit)?;
-            let out_of_time = seconds.is_some_and(|s| self.clock.seconds() >= s);
+            let out_of_time = seconds.is_some_and(|s| self.team.decide(self.clock.seconds() >= s));
             let waited = |since: Option<Instant>, s| {
                 since.is_none_or(|since: Instant| since.elapsed().as_secs_f64() >= s)
             };
@@ -150,8 +173,7 @@ impl<'a> Descent<'a> {
         };
         let part = |i: u32| f64::from(i) / f64::from(n + 1);
         monitor.stage(&name, part(i), part(i + 1));
-        fit.evaluate(self.values(), self.problem.spp(i), self.problem.seed(i), monitor)
-            .map_err(|e| self.problem.job.blame(&e))
+        self.team.evaluate(self.problem, i, self.values(), fit, monitor)
     }
 
     /// Takes down what iteration `i` saw.
@@ -166,7 +188,7 @@ impl<'a> Descent<'a> {
         judged?;
         let Some(gallery) = &self.gallery else { return Ok(()) };
         if i == 0 {
-            create(self.problem.plan.checkpoint.as_deref())?;
+            create(self.folder())?;
             gallery.clear();
             gallery.targets()?;
         }
@@ -215,14 +237,14 @@ impl<'a> Descent<'a> {
 
     /// Stores how far it came before it failed.
     fn fail(&mut self, evaluation: &Evaluation, error: &CliError) -> Result<(), CliError> {
-        create(self.problem.plan.checkpoint.as_deref())?;
+        create(self.folder())?;
         self.store()?;
         self.picture(evaluation, Some(&error.to_string()))
     }
 
     /// Writes what is needed to go on from here, and the tables.
     fn store(&self) -> Result<(), CliError> {
-        let Some(folder) = &self.problem.plan.checkpoint else { return Ok(()) };
+        let Some(folder) = self.folder() else { return Ok(()) };
         create(Some(folder))?;
         for (name, text) in [
             (PARAMETERS, self.history.parameters(self.problem.names())),

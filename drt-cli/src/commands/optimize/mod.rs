@@ -10,6 +10,7 @@ mod gallery;
 mod history;
 mod problem;
 mod report;
+mod team;
 mod watch;
 
 use drt_estimators::fit::Evaluation;
@@ -22,6 +23,7 @@ use super::{Outcome, run};
 use crate::{CliError, Job};
 use descent::Descent;
 use problem::Problem;
+use team::Team;
 
 pub(super) fn run(options: &OptimizeOptions) -> Result<Outcome, CliError> {
     let common = &options.common;
@@ -30,13 +32,29 @@ pub(super) fn run(options: &OptimizeOptions) -> Result<Outcome, CliError> {
             "--target-error: a fit ends after its iterations, or --seconds",
         ));
     }
-    let job = run::open_with_parameters(common)?;
-    let outputs = Outputs::new(common, "optimize")?;
-    let problem = Problem::new(&job, options)?;
-    let monitor = Monitor::new(common.changes.quiet);
-    let mut descent = Descent::begin(&problem, options.restart)?;
+    let team = Team::join()?;
+    match together(options, &team) {
+        // One of them speaks for all.
+        Err(e) if !team.leads() => Ok(Outcome::Silent(e.exit_code())),
+        result => result,
+    }
+}
+
+fn together(options: &OptimizeOptions, team: &Team) -> Result<Outcome, CliError> {
+    let common = &options.common;
+    let job = team.agree(run::open_with_parameters(common))?;
+    let outputs = team.agree(Outputs::new(common, "optimize"))?;
+    let problem = team.agree(Problem::new(&job, options))?;
+    let monitor = Monitor::new(common.changes.quiet || !team.leads());
+    let mut descent = team.agree(Descent::begin(&problem, team, options.restart))?;
     let ran = descent.run(common.seconds, &monitor);
-    let (outcome, last) = ran.inspect_err(|_| monitor.finish())?;
+    let (outcome, last) = ran.inspect_err(|e| {
+        monitor.finish();
+        team.give_up(e);
+    })?;
+    if !team.leads() {
+        return Ok(outcome);
+    }
     if outcome == Outcome::Done
         && (common.output.is_some() || common.digest.is_some() || common.preview.is_some())
     {
