@@ -66,7 +66,7 @@ impl EdgeQueries {
     /// Another average, where there is one.
     pub(crate) fn or_average(self, queries: Option<f64>) -> Self {
         match (self, queries) {
-            (Self::Average(_), Some(queries)) => Self::Average(queries),
+            (Self::Average(own), Some(queries)) if own > 0.0 => Self::Average(queries),
             _ => self,
         }
     }
