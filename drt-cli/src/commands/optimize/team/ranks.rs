@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 use std::ops::Range;
+use std::path::Path;
 
 use drt_estimators::fit::{Evaluation, Fit, Half};
 use drt_estimators::{Shard, ShardSums};
@@ -230,7 +231,13 @@ impl Ranks {
             Ok(false) => Found::Stopped,
             Err(e) => Found::Failed(e.exit_code(), e.to_string()),
         };
-        let Some(all) = gather(&team, &own)? else {
+        let gathered = match gather(&team, &own) {
+            Err(e) if !matches!(e, CliError::Write { .. }) => {
+                return Ok(Found::Failed(e.exit_code(), e.to_string()));
+            }
+            gathered => gathered?,
+        };
+        let Some(all) = gathered else {
             return Ok(Found::Done((values.to_vec(), Vec::new())));
         };
         let mut shards = Vec::new();
@@ -301,7 +308,7 @@ impl Ranks {
         let n = self.count();
         let mut counts = vec![0_i32; n];
         self.world.all_gather_into(&(bytes.len() as i32), &mut counts[..]);
-        let (starts, total) = starts(&counts);
+        let (starts, total) = starts(&counts)?;
         let mut buffer = vec![0_u8; total];
         {
             let mut parts = PartitionMut::new(&mut buffer[..], &counts[..], &starts[..]);
@@ -327,12 +334,12 @@ fn gather<T: Serialize + DeserializeOwned>(
     let bytes = encode(own)?;
     let mut counts = vec![0_i32; team.size() as usize];
     team.all_gather_into(&(bytes.len() as i32), &mut counts[..]);
+    let (starts, total) = starts(&counts)?;
     let first = team.process_at_rank(0);
     if team.rank() != 0 {
         first.gather_varcount_into(&bytes[..]);
         return Ok(None);
     }
-    let (starts, total) = starts(&counts);
     let mut buffer = vec![0_u8; total];
     {
         let mut parts = PartitionMut::new(&mut buffer[..], &counts[..], &starts[..]);
@@ -346,17 +353,22 @@ fn encode<T: Serialize>(value: &T) -> Result<Vec<u8>, CliError> {
     // MPI counts in 32 bits with a sign.
     match i32::try_from(bytes.len()) {
         Ok(_) => Ok(bytes),
-        Err(_) => Err(CliError::unsolved("images this large do not fit into a message of MPI")),
+        // The others wait for it, so this ends them as a file that cannot be written does.
+        Err(_) => Err(CliError::write(Path::new("a message of MPI"), "its images are too large")),
     }
 }
 
-fn starts(counts: &[i32]) -> (Vec<i32>, usize) {
-    let mut next = 0;
-    let starts = counts.iter().map(|n| {
-        next += n;
-        next - n
-    });
-    (starts.collect(), counts.iter().map(|n| *n as usize).sum())
+/// Where each message starts, and the length of all; the same on all ranks that exchange them.
+fn starts(counts: &[i32]) -> Result<(Vec<i32>, usize), CliError> {
+    let mut next = 0_i32;
+    let mut starts = Vec::new();
+    for n in counts {
+        starts.push(next);
+        next = next.checked_add(*n).ok_or_else(|| {
+            CliError::unsolved("the images of all ranks do not fit into a message of MPI (2 GB)")
+        })?;
+    }
+    Ok((starts, next as usize))
 }
 
 fn decode<T: DeserializeOwned>(buffer: &[u8], counts: &[i32]) -> Result<Vec<T>, CliError> {
