@@ -216,7 +216,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     }
 
     /// The same with paths of light, where these start from something.
-    pub(crate) fn from_both_ends(self, emission: Option<&'a EmissionSampler>) -> Self {
+    pub(crate) fn with_light_paths(self, emission: Option<&'a EmissionSampler>) -> Self {
         let bidirectional = emission.map(|emission| Bidirectional::new(self.world, emission));
         Self { bidirectional, ..self }
     }

@@ -85,20 +85,20 @@ fn files_are_searched_as_mitsuba_does() {
     let include = "<include filename=\"parts/deep/b.xml\"/>";
     let paths = "<path value=\"../common\"/><path value=\"other\"/>";
     let a = [paths, &mesh("own.obj"), include].concat();
-    folder.file("parts/a.xml", &part(&a));
+    folder.file("parts/a.xml", part(&a));
     folder.file(
         "parts/deep/b.xml",
-        &part(&[mesh("main.obj"), mesh("far.obj"), mesh("both.obj")].concat()),
+        part(&[mesh("main.obj"), mesh("far.obj"), mesh("both.obj")].concat()),
     );
-    let file = folder.file("s.xml", &part("<include filename=\"parts/a.xml\"/>"));
+    let file = folder.file("s.xml", part("<include filename=\"parts/a.xml\"/>"));
     assert_eq!(load_scene(&file, &Defaults::new()).unwrap().shapes.len(), 4);
 
-    let file = folder.file("s.xml", &part(&["<path value=\"common\"/>", &mesh("no.obj")].concat()));
+    let file = folder.file("s.xml", part(&["<path value=\"common\"/>", &mesh("no.obj")].concat()));
     let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
     assert!(message.contains("no file `no.obj`; searched"), "{message}");
     assert!(message.contains("s.xml:1") && message.contains("common"), "{message}");
     refused("<path value=\"nowhere\"/>", &[":2", "no file `nowhere`"]);
-    let file = folder.file("s.xml", &part("<path value=\"main.obj\"/>"));
+    let file = folder.file("s.xml", part("<path value=\"main.obj\"/>"));
     let message = load_scene(&file, &Defaults::new()).unwrap_err().to_string();
     assert!(message.contains("is not a folder"), "{message}");
 }

@@ -132,7 +132,7 @@ impl Session {
         settings: &Settings,
         kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
-        settings.check(scene, tangents.targets().into_iter().next().is_some())?;
+        settings.check(scene, tangents.targets().next().is_some())?;
         tangents.names.first().map_or(Ok(()), |name| scene.refuse_smooth(name))?;
         let tangents = tangents.seen_by(settings.sensor);
         let depth = settings.max_depth.within(scene.integrator.max_depth);
@@ -299,7 +299,7 @@ impl Session {
                 let components = self.components.iter().filter_map(|c| c.of_paths(queries));
                 PixelSampler::new(&self.world, components, seed, self.plan.antithetic, terms)
                     .with_image(self.image_sampling())
-                    .from_both_ends(self.emission.as_ref())
+                    .with_light_paths(self.emission.as_ref())
             },
         };
         let mut account = Account::default();

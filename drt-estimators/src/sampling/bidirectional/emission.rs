@@ -65,7 +65,7 @@ impl EmissionSampler {
     pub(super) fn sample(&self, world: &World, rng: &mut Rng) -> Option<EmittedRay> {
         let choice = world.lights.choose(rng)?;
         if let Some(emitter) = choice.delta {
-            return self.from_delta(world, emitter, choice.pmf, rng);
+            return self.sample_delta(world, emitter, choice.pmf, rng);
         }
         let (s, x) = world.lights.point_of(world, &choice, rng)?;
         let local = warp::cosine_hemisphere(rng.next_2d());
@@ -86,7 +86,7 @@ impl EmissionSampler {
         })
     }
 
-    fn from_delta(
+    fn sample_delta(
         &self,
         world: &World,
         emitter: usize,

@@ -20,7 +20,7 @@
 //! segments alone. In grids it has no closed form: there, and for colours, a [proxy](proxy_attenuation) takes its place, in
 //! all strategies alike, so that weights add up to 1 for any medium, and are best where it is exact.
 //!
-//! Sums over strategies are carried from vertex to vertex (Georgiev 2012; van Antwerpen 2011): with p the density of the direction that
+//! Sums over strategies are light from vertex to vertex (Georgiev 2012; van Antwerpen 2011): with p the density of the direction that
 //! left a vertex, p' that of the one back, and c the cosine at the vertex that is arrived at,
 //!
 //! ```text
@@ -202,14 +202,14 @@ impl<'w> Bidirectional<'w> {
         let (Some(of_z), Some(of_y)) = (of_z, of_y) else { return Rgb::ZERO };
         let d = y.vertex.x - z.vertex.x;
         let r2 = d.length_squared();
-        let r = Real::sqrt(r2);
-        let w = d / r;
-        if !(r > 0.0) {
+        if r2 == 0.0 {
             return Rgb::ZERO;
         }
+        let r = Real::sqrt(r2);
+        let w = d / r;
         let f = RadianceMode::value(&of_z, z.from, w) * ImportanceMode::value(&of_y, y.from, -w);
-        let carried = z.weight() * y.weight() * f;
-        if carried.is_zero() {
+        let light = z.weight() * y.weight() * f;
+        if light.is_zero() {
             return Rgb::ZERO;
         }
         let target = y.vertex.surface().map(|s| s.prim);
@@ -222,7 +222,7 @@ impl<'w> Bidirectional<'w> {
         let of_light = square(of_z.pdf(z.from, w, Given::Wo) * at_y) * y.ratios.all(back_y);
         let of_camera = square(of_y.pdf(y.from, -w, Given::Wi) * at_z) * z.ratios.all(back_z);
         let weight = 1.0 / (1.0 + square(attenuation) * (of_light + of_camera));
-        carried * passed * (weight / r2)
+        light * passed * (weight / r2)
     }
 
     /// A vertex of the light's path as the camera sees it.
@@ -235,8 +235,8 @@ impl<'w> Bidirectional<'w> {
         let scattering = world.scattering(&y.vertex)?;
         let (wo, transport) = tracer.see(&y.vertex)?;
         let f = ImportanceMode::value(&scattering, y.from, wo);
-        let carried = y.weight() * f;
-        if carried.is_zero() {
+        let light = y.weight() * f;
+        if light.is_zero() {
             return None;
         }
         let distance = (world.camera.position() - y.vertex.x).length();
@@ -245,7 +245,7 @@ impl<'w> Bidirectional<'w> {
         let film = transport * y.cosine(wo) / self.light_paths;
         let others = square(film * attenuation) * y.ratios.all(back);
         let weight = 1.0 / (1.0 + others);
-        let value = carried * passed * (transport * weight / self.light_paths);
+        let value = light * passed * (transport * weight / self.light_paths);
         Some(Splat { point: world.camera.view(y.vertex.x).pixel, value, weight: 0.0 })
     }
 }
