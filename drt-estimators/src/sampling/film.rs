@@ -222,8 +222,8 @@ impl PixelFilm {
 
     /// Begins a pass.
     pub(crate) fn begin(&mut self) {
+        self.end_events();
         self.sums.begin();
-        self.open_events.fill(Events::NONE);
         if let Some(image) = &mut self.image {
             image.begin();
         }
@@ -252,9 +252,13 @@ impl PixelFilm {
         }
         self.sums.advance(units, ends);
         if ends != Ends::Nothing {
-            for (e, open) in self.events.iter_mut().zip(&mut self.open_events) {
-                e.add(&core::mem::replace(open, Events::NONE));
-            }
+            self.end_events();
+        }
+    }
+
+    fn end_events(&mut self) {
+        for (e, open) in self.events.iter_mut().zip(&mut self.open_events) {
+            e.add(&core::mem::replace(open, Events::NONE));
         }
     }
 

@@ -246,7 +246,7 @@ impl SplattedImage {
     pub(super) fn begin(&mut self) {
         // What a pass that was cut short has left.
         self.new.clear();
-        self.open_events = Events::NONE;
+        self.end_events();
         self.pixels.begin();
         self.groups.begin();
     }
@@ -287,8 +287,12 @@ impl SplattedImage {
         self.pixels.advance(units, ends);
         self.groups.advance(units, ends);
         if ends != Ends::Nothing {
-            self.events.add(&core::mem::replace(&mut self.open_events, Events::NONE));
+            self.end_events();
         }
+    }
+
+    fn end_events(&mut self) {
+        self.events.add(&core::mem::replace(&mut self.open_events, Events::NONE));
     }
 
     /// The stratum so far, where that has ended, which is not counted.
