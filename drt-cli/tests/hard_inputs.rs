@@ -197,7 +197,7 @@ fn elements_that_do_not_fit() {
             "<bsdf type=\"twosided\" id=\"a\"><ref id=\"a\"/></bsdf>",
             &["s.xml:6", "twosided"],
         ),
-        in_scene("ring", ring, &["s.xml:6", "twosided"]),
+        in_scene("ring", ring, &["s.xml:7", "twosided"]),
         in_scene(
             "alias ring",
             "<alias id=\"a\" as=\"b\"/><alias id=\"b\" as=\"a\"/>",
