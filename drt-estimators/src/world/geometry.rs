@@ -24,7 +24,8 @@ pub(crate) struct Geometry {
     pub(crate) prims: Vec<Prim>,
     /// Per shape, the number of its first triangle.
     pub(crate) first_prim: Vec<u32>,
-    /// Half the diagonal of the bounding box; 1 where nothing is.
+    /// Of the bounding box: the middle, and half the diagonal. The origin and 1 where nothing is.
+    pub(crate) center: Vec3,
     pub(crate) radius: f64,
 }
 
@@ -49,9 +50,12 @@ impl Geometry {
             lo = lo.min(*p);
             hi = hi.max(*p);
         }
-        let radius = if soup.is_empty() { 1.0 } else { (hi - lo).length() * 0.5 };
+        let (center, radius) = match soup.is_empty() {
+            true => (Vec3::ZERO, 1.0),
+            false => ((lo + hi) * 0.5, (hi - lo).length() * 0.5),
+        };
         let meshes = scene.shapes.iter().map(|s| s.mesh.clone()).collect();
-        Ok(Arc::new(Self { meshes, bvh, prims, first_prim, radius }))
+        Ok(Arc::new(Self { meshes, bvh, prims, first_prim, center, radius }))
     }
 
     fn is_of(&self, scene: &Scene) -> bool {

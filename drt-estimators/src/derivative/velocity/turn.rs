@@ -16,6 +16,7 @@
 //!
 //! d_dot being the rate of the camera ray's direction at its image point, which T replaces as far as Σ λ goes.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::ops::{Add, AddAssign, Div, Mul, Range, Sub};
 
@@ -103,8 +104,8 @@ pub(crate) struct RayTurn {
     pub(crate) gradient: Vec3,
     /// Its summands.
     pub(crate) parts: Range<usize>,
-    /// What shadows add, for the light of one emitter.
-    pub(crate) shadow: Option<ShadowTurn>,
+    /// What shadows add, for the light of one emitter. Few rays have one, and turns are moved about.
+    pub(crate) shadow: Option<Box<ShadowTurn>>,
 }
 
 impl RayTurn {

@@ -44,19 +44,11 @@ impl EmissionSampler {
     pub(crate) fn new(world: &World) -> Self {
         let scene = &world.scene;
         let at_point = |emitter: &Emitter| emitter.position().and_then(|x| world.medium_at(x));
-        let boxes = || scene.shapes.iter().map(|shape| shape.mesh.bounds());
-        let low = boxes().fold(Vec3::splat(f64::INFINITY), |low, b| low.min(b.min));
-        let high = boxes().fold(Vec3::splat(f64::NEG_INFINITY), |high, b| high.max(b.max));
-        let (center, radius) = if low.x <= high.x {
-            ((low + high) * 0.5, 0.5 * (high - low).length())
-        } else {
-            (Vec3::ZERO, 1.0)
-        };
         Self {
             around: (0..scene.shapes.len()).map(|s| world.medium_around(s)).collect(),
             at_points: scene.emitters.iter().map(|e| at_point(&e.item.emitter)).collect(),
-            center,
-            radius: f64::max(radius, f64::MIN_POSITIVE) * 1.001,
+            center: world.geometry.center,
+            radius: f64::max(world.geometry.radius, f64::MIN_POSITIVE) * 1.001,
             outside: world.ambient(),
         }
     }

@@ -1,5 +1,7 @@
 //! Rays that turn with the [shadows](crate::derivative::velocity::ShadowTurn) of points and directions.
 
+use alloc::boxed::Box;
+
 use drt_math::{Vec3, fm};
 
 use crate::derivative::velocity::{
@@ -117,6 +119,11 @@ impl TurningEdges {
         }
         let shadow = ShadowTurn { at: *place, weight: weight / total, by_light: by_light / total };
         let Weight { value: weight, gradient } = (turned + weight) / total;
-        Some(RayTurn { weight, gradient, parts: first..edges.len(), shadow: Some(shadow) })
+        Some(RayTurn {
+            weight,
+            gradient,
+            parts: first..edges.len(),
+            shadow: Some(Box::new(shadow)),
+        })
     }
 }
