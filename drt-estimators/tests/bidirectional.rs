@@ -4,10 +4,11 @@ mod common;
 
 use common::*;
 use drt_estimators::{
-    PathSampling, Rendering, Scene, Session, Settings, Unattended, agreement, finite_differences,
+    EstimatorKind, PathSampling, Rendering, Scene, Session, Settings, Unattended, agreement, finite_differences,
     gradient,
 };
 use drt_math::Rgb;
+use drt_motion::Effect;
 
 fn settings(sampling: PathSampling, seed: u64, threads: usize) -> Settings {
     Settings { sampling, seed, threads, ..Settings::default() }
@@ -40,15 +41,45 @@ fn threads_make_no_difference() {
     }
 }
 
+/// Derivatives by paths from both ends, over the bars of those from the camera.
+fn check(name: &str, scene: &Scene, effects: Vec<Effect>, spp: u32) {
+    let moving = [parameter(name, 0.0, effects)];
+    let [one, both] = [PathSampling::Unidirectional, PathSampling::Bidirectional].map(|sampling| {
+        let settings = settings(sampling, 7 + sampling as u64, 0);
+        let mut session = Session::new(scene, &moving, &settings).expect("a valid scene");
+        assert!(session.run(spp, &Unattended));
+        let rendering = session.rendering();
+        assert_eq!(rendering.non_finite, 0);
+        rendering
+    });
+    for (what, one, both) in [
+        ("image", &one.image, &both.image),
+        ("derivative", &one.derivatives[0].total, &both.derivatives[0].total),
+    ] {
+        let found = agreement(both, one, None);
+        let noise = [one, both].map(|layer| layer.relative_noise(None));
+        println!("{name} {what}: {found:?} {noise:?}");
+        assert!(found.agrees, "{name} {what}: {found:?}");
+    }
+}
+
 #[test]
-fn derivatives_are_refused() {
+fn derivatives_are_those_from_the_camera() {
+    let scene = surfaces(metal(), phong());
+    check("albedo", &scene, vec![changes("floor-bsdf", "reflectance", grey(0.3))], 256);
+    check("ball", &scene, vec![moves("ball", shift())], 256);
+}
+
+#[test]
+fn derivatives_are_refused_by_other_kinds() {
     let (scene, settings) = (fog(), settings(PathSampling::Bidirectional, 0, 1));
     let moving = [parameter("p", 0.0, vec![moves("ball", shift())])];
     let pixels = (FILM[0] * FILM[1]) as usize;
     let adjoint = vec![Rgb::ONE; pixels];
+    let warped = Settings { estimator: EstimatorKind::Warped, ..settings.clone() };
     for refused in [
-        Session::new(&scene, &moving, &settings).err(),
-        gradient(&scene, &["ball"], &settings, 1, &adjoint, &Unattended).err(),
+        Session::new(&scene, &moving, &warped).err(),
+        gradient(&scene, &["ball"], &warped, 1, &adjoint, &Unattended).err(),
         finite_differences(&scene, &moving, &settings, 1, 1e-3, &Unattended).err(),
     ] {
         let message = refused.expect("a refusal").to_string();

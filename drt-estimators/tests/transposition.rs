@@ -9,7 +9,7 @@ use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::Bsdf;
 use drt_estimators::{
-    EstimatorKind, InteriorMotion, Scene, Session, Settings, Unattended, gradient,
+    EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Unattended, gradient,
 };
 use drt_geom::procedural;
 use drt_math::{Rgb, Rng, ValueChange, Vec3, vec3};
@@ -77,6 +77,8 @@ fn agree_from(spp: u32, name: &str, scene: &Scene, effects: Vec<Effect>, setting
     // Normals that are computed anew differ in their last bits. That tips the choice between edges of
     // next to no weight, those in the plane of the face that looks: of 182 events of the ball one then
     // had 1e-5 for 1e-12.
+    let both = Settings { sampling: PathSampling::Bidirectional, ..settings.clone() };
+    by_one_estimator(&format!("{name}, from both ends"), scene, effects.clone(), &both, spp, EXACT);
     let named = format!("{name}, radiative");
     by_one_estimator(&named, scene, effects.clone(), &radiative(settings), spp, 1e-4);
     let warped = Settings { estimator: EstimatorKind::Warped, ..settings.clone() };

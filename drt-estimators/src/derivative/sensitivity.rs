@@ -32,6 +32,12 @@ impl SurfaceAdjoint {
         Self { u, ..Self::default() }
     }
 
+    /// Multiplied channel by channel.
+    pub(crate) fn times(&self, by: Rgb) -> Self {
+        let Self { u, n, ns, j } = *self;
+        Self { u: u * by, n: n * by, ns: ns * by, j: j * by }
+    }
+
     pub(crate) fn is_zero(&self) -> bool {
         [self.u, self.n, self.ns].into_iter().all(|v| v == RgbVec::ZERO) && self.j.is_zero()
     }
@@ -134,6 +140,54 @@ pub(crate) trait AdjointSink {
     fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]);
     /// Of the camera, per channel.
     fn sensor(&mut self, gradient: &[SensorGradient; 3]);
+}
+
+/// Passes sensitivities on, multiplied channel by channel.
+pub(crate) struct Scaled<'a> {
+    pub(crate) sink: &'a mut dyn AdjointSink,
+    pub(crate) by: Rgb,
+}
+
+impl AdjointSink for Scaled<'_> {
+    fn active(&self) -> &ActiveInputs {
+        self.sink.active()
+    }
+
+    fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint) {
+        self.sink.surface(point, &adjoint.times(self.by));
+    }
+
+    fn volume(&mut self, medium: usize, x: Vec3, u: &RgbVec, j: Rgb) {
+        self.sink.volume(medium, x, &(*u * self.by), j * self.by);
+    }
+
+    fn grid(&mut self, medium: usize, x: Vec3, u: &RgbVec) {
+        self.sink.grid(medium, x, &(*u * self.by));
+    }
+
+    fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
+        let CoefficientAdjoint { sigma_t, albedo, emission, g } = *adjoint;
+        let [sigma_t, albedo, emission, g] = [sigma_t, albedo, emission, g].map(|v| v * self.by);
+        self.sink.medium(medium, x, &CoefficientAdjoint { sigma_t, albedo, emission, g });
+    }
+
+    fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {
+        self.sink.depth(medium, depth, adjoint * self.by);
+    }
+
+    fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
+        self.sink.bsdf(bsdf, params, weight * self.by);
+    }
+
+    fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]) {
+        let by = self.by.to_array();
+        self.sink.emitter(emitter, &core::array::from_fn(|c| gradient[c].scaled(by[c])));
+    }
+
+    fn sensor(&mut self, gradient: &[SensorGradient; 3]) {
+        let by = self.by.to_array();
+        self.sink.sensor(&core::array::from_fn(|c| gradient[c].scaled(by[c])));
+    }
 }
 
 /// A weighted sum of velocities: what boundary and flux terms depend on besides light.

@@ -103,7 +103,7 @@ pub enum PathSampling {
     /// From the camera, with next-event estimation.
     #[default]
     Unidirectional,
-    /// From the camera and from emitters, joined in every way. Of images alone.
+    /// From the camera and from emitters, joined in every way. Of images, and of derivatives by [`EstimatorKind::PathSpace`].
     Bidirectional,
 }
 
@@ -196,8 +196,9 @@ impl Settings {
         if let Some(&(index, _)) = self.insides.iter().find(|(m, _)| *m >= count) {
             return fail("insides", SettingError::NoMedium { index, count });
         }
-        if derivatives && self.sampling == PathSampling::Bidirectional {
-            return fail("sampling", SettingError::ImagesOnly);
+        let has_both_ends = self.estimator == EstimatorKind::PathSpace;
+        if derivatives && self.sampling == PathSampling::Bidirectional && !has_both_ends {
+            return fail("sampling", SettingError::PathSpaceOnly);
         }
         scene.sensor(self.sensor).map(|_| ())
     }

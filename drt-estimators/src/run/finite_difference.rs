@@ -11,7 +11,7 @@ use crate::derivative::tangents;
 use crate::model::error::{Error, SettingError};
 use crate::model::rendering::Layer;
 use crate::model::scene::Scene;
-use crate::model::settings::Settings;
+use crate::model::settings::{PathSampling, Settings};
 use crate::run::session::Control;
 use crate::sampling::film::{Blocks, PixelFilm};
 use crate::sampling::parallel::Pool;
@@ -43,6 +43,10 @@ pub fn finite_differences(
     }
     scene.check()?;
     settings.check(scene, true)?;
+    if settings.sampling == PathSampling::Bidirectional {
+        let reason = SettingError::PathSpaceOnly;
+        return Err(Error::Setting { setting: "sampling", reason });
+    }
     let pool = Pool::new(settings.threads);
     let mut layers = Vec::new();
     for p in 0..parameters.len() {

@@ -26,10 +26,11 @@ use crate::model::emitter::EmitterGradient;
 use crate::model::error::{Error, SettingError};
 use crate::model::scene::{Scene, Target, TargetName};
 use crate::model::sensor::SensorGradient;
-use crate::model::settings::{EstimatorKind, Settings};
+use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::model::shard::Shard;
 use crate::model::surface::BsdfParams;
 use crate::run::session::{Control, estimators, seed_of_component};
+use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::BATCHES;
 use crate::sampling::parallel::Pool;
 use crate::sampling::pixels::{Part, Pass, Sampler};
@@ -163,7 +164,10 @@ pub fn gradient_in_batches(
         let reason = SettingError::TooManyShards { count: shard.count(), most: pass.parts() };
         return Err(Error::Setting { setting: "shard", reason });
     }
-    let run = Reverse { world: &world, components, antithetic, seed, pass, spp, adjoint };
+    let bidirectional = settings.sampling == PathSampling::Bidirectional;
+    let emission = bidirectional.then(|| EmissionSampler::new(&world));
+    let emission = emission.as_ref();
+    let run = Reverse { world: &world, components, emission, antithetic, seed, pass, spp, adjoint };
     let pieces = run.pieces(shard);
     let pool = Pool::new(settings.threads);
     let mut sums = [run.zeros(), run.zeros()];
@@ -281,6 +285,8 @@ struct Reverse<'a> {
     /// By all light, for paths.
     world: &'a World,
     components: &'a [Component],
+    /// Where paths of light start, if there are any.
+    emission: Option<&'a EmissionSampler>,
     /// Image points come in mirrored pairs.
     antithetic: bool,
     seed: u64,
@@ -368,7 +374,8 @@ impl Reverse<'_> {
         let seed = self.seed;
         let start = self.pass.units(part.run).start;
         let units = part.units[0] - start..part.units[1] - start;
-        let mut sampler = PixelSampler::new(self.world, components, seed, self.antithetic, false);
+        let mut sampler = PixelSampler::new(self.world, components, seed, self.antithetic, false)
+            .with_light_paths(self.emission);
         let mut values = [Rgb::ZERO];
         for pixel in first..last {
             for sink in sampler.sinks() {
@@ -552,7 +559,7 @@ impl ToGradient<'_> {
     }
 }
 
-impl BoundarySink for ToGradient<'_> {
+impl<'a> BoundarySink for ToGradient<'a> {
     fn moves(&mut self, functional: &VelocityFunctional) -> bool {
         self.flush();
         self.functional.clone_from(functional);
@@ -561,6 +568,20 @@ impl BoundarySink for ToGradient<'_> {
 
     fn receive(&mut self, pixel: u32, value: Rgb) {
         self.weight += self.adjoint[pixel as usize].dot(value) * self.scale;
+    }
+
+    type Sink = ScatterSink<'a>;
+
+    fn sink(&self) -> &ScatterSink<'a> {
+        &self.scatter
+    }
+
+    fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut ScatterSink<'a>)) -> bool {
+        self.flush();
+        let weights = pixels.iter().map(|(pixel, weight)| self.adjoint[*pixel as usize] * *weight);
+        self.scatter.weights = weights.fold(Rgb::ZERO, |sum, w| sum + w) * self.scale;
+        send(&mut self.scatter);
+        true
     }
 }
 

@@ -1,10 +1,15 @@
 //! The path record: what a walk leaves behind when its derivative is wanted.
 
+mod light;
+
 use alloc::vec::Vec;
 use core::ops::Range;
 
 use drt_math::{Rgb, Vec3};
 
+pub(crate) use crate::sampling::record::light::{
+    Joint, LightPath, LightVertex, Scattered, SeenVertex,
+};
 use crate::sampling::trace::{Arrival, Connection, Endpoint, Observer, OutgoingRay, Pixel};
 use crate::world::Crossing;
 use crate::world::vertex::Vertex;
@@ -22,6 +27,23 @@ pub(crate) struct Node {
     pub(crate) value: Rgb,
     /// Its inverse density, Russian roulette included.
     pub(crate) inv_pdf: f64,
+    pub(crate) role: Role,
+    /// Index of the vertex of a light path that the node is, where it is one.
+    pub(crate) light: u32,
+}
+
+/// What made a node.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Role {
+    /// The walk from the camera.
+    Walked,
+    /// A connection with a vertex of a light path, to which the parent scatters like this.
+    Joined(Scattered),
+    /// A vertex of a light path as the next one sees it, with the throughput from there. So much of what the next one scatters
+    /// comes from the camera.
+    OfLight { passed: Rgb },
+    /// The last vertex of a light path that anything is connected with.
+    LastOfLight,
 }
 
 impl Node {
@@ -44,6 +66,9 @@ pub(crate) struct PathRecord {
     pub(crate) pixel: [u32; 2],
     /// The path's value.
     pub(crate) value: Rgb,
+    /// By vertex of a light path: what it scatters of what comes from the camera; its node as the next one sees it, or 0.
+    scattered: Vec<Option<Rgb>>,
+    behind: Vec<u32>,
 }
 
 impl PathRecord {
@@ -54,6 +79,8 @@ impl PathRecord {
         self.crossings.clear();
         self.connections.clear();
         self.value = Rgb::ZERO;
+        self.scattered.clear();
+        self.behind.clear();
         self.nodes.push(Node {
             arrival: None,
             crossings: 0..0,
@@ -61,6 +88,8 @@ impl PathRecord {
             wi: dir,
             value,
             inv_pdf: 1.0,
+            role: Role::Walked,
+            light: 0,
         });
     }
 
@@ -91,6 +120,8 @@ impl PathRecord {
             wi: Vec3::ZERO,
             value: Rgb::ZERO,
             inv_pdf: 0.0,
+            role: Role::Walked,
+            light: 0,
         });
         self.nodes.len() as u32 - 1
     }

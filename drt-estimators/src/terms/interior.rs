@@ -266,7 +266,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         self.tracer.rng = rng;
         if self.workers.is_empty() {
             let light = if let Some(both) = &mut self.bidirectional {
-                both.trace(&mut self.tracer, dir, weight, &mut self.splats)
+                both.trace(&mut self.tracer, dir, weight, &mut self.splats, &mut Radiance::default())
             } else {
                 let mut radiance = Radiance::default();
                 self.tracer.trace_camera(dir, weight, &mut radiance);
@@ -279,7 +279,9 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         for view in &mut self.views {
             let stream = |of: u64| Rng::new(self.seed, of | u64::from(pixel), unit);
             let velocities = || stream(VELOCITY_STREAM);
-            view.begin(Some(stream(PAIR_STREAM)), velocities, || stream(FLUX_STREAM));
+            // What they see would have to be weighed as the path's light is.
+            let pairs = self.bidirectional.is_none().then(|| stream(PAIR_STREAM));
+            view.begin(pairs, velocities, || stream(FLUX_STREAM));
         }
         let shadows = self.workers.iter().any(|w| w.along.shadows.is_some());
         let mut recorder = Recorder {
@@ -288,8 +290,13 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             camera_ray: shadows.then_some(&mut self.camera_ray),
         };
         recorder.begin([pixel % width, pixel / width], dir, weight);
-        self.tracer.trace_camera(dir, weight, &mut recorder);
-        self.add_to_image(&s, derivative, self.record.value, values);
+        let light = if let Some(both) = &mut self.bidirectional {
+            both.trace(&mut self.tracer, dir, weight, &mut self.splats, &mut recorder)
+        } else {
+            self.tracer.trace_camera(dir, weight, &mut recorder);
+            self.record.value
+        };
+        self.add_to_image(&s, derivative, light, values);
         self.recorded += self.record.nodes.len() as u64;
         let path = Traced {
             record: &self.record,

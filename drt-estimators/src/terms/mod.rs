@@ -3,6 +3,7 @@
 pub(crate) mod boundary;
 pub(crate) mod flux;
 pub(crate) mod interior;
+pub(crate) mod light_paths;
 pub(crate) mod prepared;
 pub(crate) mod radiative;
 pub(crate) mod splatting;

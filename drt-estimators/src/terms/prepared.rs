@@ -8,7 +8,8 @@ use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
 use crate::edges::speeds::speeds;
 use crate::model::error::Error;
-use crate::model::settings::{EstimatorKind, Settings};
+use crate::model::settings::{EstimatorKind, PathSampling, Settings};
+use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::BATCHES;
 use crate::terms::boundary::{Boundary, Strategy};
 use crate::terms::flux::{Flux, GrazingFlux};
@@ -28,6 +29,8 @@ pub(crate) struct Prepared {
     pub(crate) radiative: Option<Radiative>,
     /// Set where rays turn with edges.
     pub(crate) warped: Option<Warped>,
+    /// Where paths of light start, if there are any.
+    emission: Option<EmissionSampler>,
     /// Splatted terms that can contribute.
     pub(crate) sources: Vec<BoundarySource>,
     /// Image points come in mirrored pairs.
@@ -84,7 +87,11 @@ impl Prepared {
         let kinds = sources.len();
         let grazing = grazing_flux(&world, flux.as_ref(), active, &mut sources)?;
         let antithetic = mirrors(&world, active, settings);
+        let bidirectional = settings.sampling == PathSampling::Bidirectional && active.any();
+        let emission = bidirectional.then(|| EmissionSampler::new(&world));
+        sources.extend(bidirectional.then_some(BoundarySource::LightPaths));
         Ok(Self {
+            emission,
             boundary_ratio: boundary_ratio(settings, kinds),
             primary_share: 1.0,
             queries: EdgeQueries::default(),
@@ -96,7 +103,7 @@ impl Prepared {
             grazing,
             sources,
             antithetic,
-            lobe_pairs: settings.antithetic,
+            lobe_pairs: settings.antithetic && !bidirectional,
         })
     }
 
@@ -131,6 +138,7 @@ impl Prepared {
             false => EdgeQueries::Average(boundary_ratio),
         };
         Ok(Self {
+            emission: None,
             boundary: Boundary::default(),
             radiative: Some(radiative),
             warped: None,
@@ -159,6 +167,7 @@ impl Prepared {
             sources.push(BoundarySource::Borders);
         }
         Ok(Self {
+            emission: None,
             boundary: Boundary::default(),
             radiative: None,
             warped: Some(warped),
@@ -202,13 +211,17 @@ impl Prepared {
 
     pub(crate) fn splatter(&self, seed: u64) -> Splatter<'_> {
         let radiative = self.radiative.as_ref();
-        let grazing = self.grazing.as_ref();
-        Splatter { world: &self.world, boundary: &self.boundary, radiative, grazing, seed }
+        let (grazing, emission) = (self.grazing.as_ref(), self.emission.as_ref());
+        let (world, boundary) = (&self.world, &self.boundary);
+        Splatter { world, boundary, radiative, grazing, emission, seed }
     }
 
     /// Samples of a splatted source to each of a pixel, by the settings alone.
     pub(crate) fn source_ratio(&self, i: usize) -> f64 {
         let source = self.sources[i];
+        if source == BoundarySource::LightPaths {
+            return 1.0;
+        }
         let part = if source.is_of_camera() { self.primary_share } else { 1.0 };
         self.boundary_ratio * part * source.part()
     }

@@ -8,13 +8,15 @@ use drt_math::{Rgb, Rng};
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::sensitivity::VelocityFunctional;
 use crate::model::rendering::{Account, NonFinite, Term};
+use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::Splats;
-use crate::sampling::streams::{DIMENSIONS, SEQUENCE_STREAM};
+use crate::sampling::streams::{DIMENSIONS, LINE_STREAM, SEQUENCE_STREAM};
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary;
 use crate::terms::boundary::{Boundary, BoundarySink, Strategy};
 use crate::terms::flux;
 use crate::terms::flux::GrazingFlux;
+use crate::terms::light_paths::LightPaths;
 use crate::terms::radiative::Radiative;
 use crate::world::World;
 
@@ -29,6 +31,8 @@ pub(crate) enum BoundarySource {
     PrimaryEdges,
     /// The flux through what the camera sees edge on.
     GrazingFlux,
+    /// Light paths that are connected to the camera.
+    LightPaths,
 }
 
 impl BoundarySource {
@@ -38,6 +42,7 @@ impl BoundarySource {
             Self::Edges(Strategy::Direct) => Term::Direct,
             Self::Edges(Strategy::Indirect) => Term::Indirect,
             Self::GrazingFlux => Term::Flux,
+            Self::LightPaths => Term::Interior,
         }
     }
 
@@ -50,6 +55,7 @@ impl BoundarySource {
             Self::Borders => 4,
             Self::PrimaryEdges => 5,
             Self::GrazingFlux => 6,
+            Self::LightPaths => 7,
         };
         id << 40
     }
@@ -76,6 +82,7 @@ pub(crate) struct Splatter<'a> {
     pub(crate) boundary: &'a Boundary,
     pub(crate) radiative: Option<&'a Radiative>,
     pub(crate) grazing: Option<&'a GrazingFlux>,
+    pub(crate) emission: Option<&'a EmissionSampler>,
     pub(crate) seed: u64,
 }
 
@@ -93,6 +100,8 @@ impl Splatter<'_> {
         let mut edges = boundary::Buffers::default();
         let mut functional = VelocityFunctional::default();
         let mut grazing = flux::Buffers::default();
+        let emission = self.emission.filter(|_| source == BoundarySource::LightPaths);
+        let mut light_paths = emission.map(|e| LightPaths::new(self.world, e, receiver.sink()));
         receiver.term = Some(source.term());
         receiver.seed = self.seed;
         receiver.stream = stream;
@@ -117,6 +126,12 @@ impl Splatter<'_> {
                 BoundarySource::GrazingFlux => {
                     if let Some(seen) = self.grazing {
                         seen.sample(&mut tracer, &mut grazing, receiver);
+                    }
+                }
+                BoundarySource::LightPaths => {
+                    if let Some(paths) = &mut light_paths {
+                        let line = Rng::new(self.seed, LINE_STREAM | stream, index);
+                        paths.sample(&mut tracer, &line, receiver);
                     }
                 }
             }
@@ -157,6 +172,27 @@ impl<R: BoundarySink> BoundarySink for Checked<R> {
             self.inner.receive(pixel, value);
             return;
         }
+        self.report();
+    }
+
+    type Sink = R::Sink;
+
+    fn sink(&self) -> &R::Sink {
+        self.inner.sink()
+    }
+
+    fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut R::Sink)) -> bool {
+        let finite = self.inner.spread(pixels, send);
+        if !finite {
+            self.report();
+        }
+        finite
+    }
+}
+
+impl<R> Checked<R> {
+    /// Notes a value that is not finite.
+    fn report(&mut self) {
         self.count += 1;
         if self.found.len() < 8 {
             self.found.push(NonFinite {
@@ -186,7 +222,7 @@ impl<'a> ToImages<'a> {
     }
 }
 
-impl BoundarySink for ToImages<'_> {
+impl<'a> BoundarySink for ToImages<'a> {
     fn moves(&mut self, functional: &VelocityFunctional) -> bool {
         self.contraction.evaluate(functional)
     }
@@ -197,5 +233,24 @@ impl BoundarySink for ToImages<'_> {
                 self.splats.add(layer, pixel, value * rate.r);
             }
         }
+    }
+
+    type Sink = Contraction<'a>;
+
+    fn sink(&self) -> &Contraction<'a> {
+        &self.contraction
+    }
+
+    fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut Contraction<'a>)) -> bool {
+        self.contraction.clear();
+        send(&mut self.contraction);
+        let rates = &self.contraction.rates;
+        let finite = rates.iter().all(|rate| rate.is_finite());
+        for (layer, rate) in rates.iter().enumerate().filter(|(_, r)| finite && !r.is_zero()) {
+            for (pixel, weight) in pixels {
+                self.splats.add(layer, *pixel, *rate * *weight);
+            }
+        }
+        finite
     }
 }

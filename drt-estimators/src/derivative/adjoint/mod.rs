@@ -14,11 +14,14 @@
 //! gradient; by a scattering function Θ_k σ_k C_k / p times its gradient; by σ_k it is Θ_k Q_k. No
 //! quotient by a factor that can vanish is formed. Cost is linear in the number of vertices.
 //!
+//! Where paths from the camera are [connected](light) with light's, several nodes have the same children.
+//!
 //! Vertices move by a [`velocity`](super::velocity) field; what that blends for a vertex says what its
 //! sensitivities are [propagated](propagation) to.
 
 mod antithetic;
 mod emitters;
+mod light;
 mod propagation;
 mod segment;
 mod shadows;
@@ -35,12 +38,13 @@ use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 use crate::derivative::adjoint::turning::RayMotion;
 use crate::derivative::sensitivity::{
-    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint,
+    ActiveInputs, AdjointSink, CoefficientAdjoint, Scaled, SurfaceAdjoint,
 };
 use crate::derivative::velocity::{
     Auxiliary, Probe, RayTurn, RecordedPath, TurnPart, TurnParts, VertexVelocity,
 };
 use crate::model::sensor::SensorGradient;
+use crate::sampling::record::{Role, Scattered};
 use crate::sampling::streams::VELOCITY_STREAM;
 use crate::sampling::trace::{Connection, Endpoint};
 use crate::world::lights::EmitterMask;
@@ -56,6 +60,8 @@ struct Local {
     matter: RgbVec,
     /// C_k, the value of the children per unit of scattering.
     children: Rgb,
+    /// What scattering into connections with a light path collects.
+    joined: Rgb,
     /// a_k R_k, its part of the parent's C.
     incoming: Rgb,
     /// By the rate of the direction of the ray that found the vertex, as far as its scattering sees that.
@@ -170,14 +176,26 @@ impl<'w> Differentiator<'w> {
     }
 
     fn node<S: AdjointSink>(&mut self, path: &RecordedPath<'_>, k: usize, sink: &mut S) {
+        match path.record.nodes[k].role {
+            Role::Walked | Role::Joined(_) => self.sweep(path, k, sink),
+            Role::OfLight { passed } => self.sweep(path, k, &mut Scaled { sink, by: passed }),
+            Role::LastOfLight => {}
+        }
+    }
+
+    fn sweep<S: AdjointSink>(&mut self, path: &RecordedPath<'_>, k: usize, sink: &mut S) {
         let RecordedPath { record, lit, .. } = *path;
         let node = &record.nodes[k];
         let Some(arrival) = &node.arrival else { return };
         let world = self.world;
         let theta = arrival.throughput;
-        let scattered = node.value * node.inv_pdf * self.locals[k].children;
-        let mut collected = scattered;
-        let mut here = self.locals[k].at;
+        let (mut collected, mut here) = match node.role {
+            Role::Walked => {
+                let Local { children, joined, at, .. } = self.locals[k];
+                (node.value * node.inv_pdf * children + joined, at)
+            }
+            _ => self.behind_joint(path, k, sink),
+        };
         let received = match &arrival.end {
             Endpoint::Environment => {
                 let environment = world.lights.environment().filter(|_| lit.by_surroundings());
@@ -233,7 +251,14 @@ impl<'w> Differentiator<'w> {
         let Some(arrival) = &record.nodes[k].arrival else { return };
         let p = arrival.parent as usize;
         let value = arrival.arrival * received;
-        self.locals[p].children += value;
+        let joined = match record.nodes[k].role {
+            Role::Joined(leaving) => Some(leaving),
+            _ => None,
+        };
+        match joined {
+            Some(Scattered { value: f, inv_pdf }) => self.locals[p].joined += f * inv_pdf * value,
+            None => self.locals[p].children += value,
+        }
         self.locals[k].incoming += value;
         let NodeMotion { velocity, auxiliary, ray: turn_of_ray } = *motion;
         let vertex = record.nodes[k].vertex();
@@ -265,11 +290,16 @@ impl<'w> Differentiator<'w> {
         let ray_moves = near_moves || turn_of_ray.is_some();
         // As far as this is not the camera's importance.
         let mut turned_wholly = self.locals[k].turn;
-        // The scattering function of the parent sees the two ends of the segment as a direction.
-        if let Some(behind) = behind(recorded, p) {
-            let adjoint = theta * value * parent.inv_pdf;
+        // The scattering function of the parent sees the two ends of the segment as a direction; on a light path
+        // it depends on who looks.
+        let of_light = matches!(record.nodes[k].role, Role::OfLight { .. });
+        if let Some(behind) = behind(recorded, p).filter(|_| !of_light) {
+            let (wi, inv_pdf, paired) = match joined {
+                Some(leaving) => (arrival.dir, leaving.inv_pdf, None),
+                None => (parent.wi, parent.inv_pdf, Some(Apart::of(recorded, p))),
+            };
+            let adjoint = theta * value * inv_pdf;
             let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
-            let (wi, paired) = (parent.wi, Some(Apart::of(recorded, p)));
             let moving = far_moves || near_moves || velocities.moves(behind.parent);
             let to_wi = self.scattering(
                 &from,
@@ -283,7 +313,7 @@ impl<'w> Differentiator<'w> {
                 sink,
             );
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
-                let g = turn(&(to_wi * phi), parent.wi, arrival.distance);
+                let g = turn(&(to_wi * phi), wi, arrival.distance);
                 there.u -= g;
                 self.locals[k].matter += g;
             }

@@ -140,13 +140,27 @@ pub(crate) struct Total<'a> {
     pub(crate) sum: f64,
 }
 
-impl BoundarySink for Total<'_> {
+impl<'a> BoundarySink for Total<'a> {
     fn moves(&mut self, functional: &VelocityFunctional) -> bool {
         self.contraction.evaluate(functional)
     }
 
     fn receive(&mut self, pixel: u32, value: Rgb) {
         self.sum += (self.weight)(pixel) * value.mean() * self.contraction.rates[0].r;
+    }
+
+    type Sink = Contraction<'a>;
+
+    fn sink(&self) -> &Contraction<'a> {
+        &self.contraction
+    }
+
+    fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut Contraction<'a>)) -> bool {
+        self.contraction.clear();
+        send(&mut self.contraction);
+        let rate = self.contraction.rates[0].mean();
+        self.sum += pixels.iter().map(|(p, w)| (self.weight)(*p) * w * rate).sum::<f64>();
+        true
     }
 }
 

@@ -50,9 +50,9 @@ pub enum SettingError {
         "auxiliary points and directions are for surfaces alone; here are media or index-matched interfaces"
     )]
     SurfacesOnly,
-    /// A [`PathSampling`](crate::PathSampling) of images that is asked for derivatives.
-    #[error("bidirectional sampling finds images alone; derivatives have no such estimator yet")]
-    ImagesOnly,
+    /// A [`PathSampling`](crate::PathSampling) that the estimator of derivatives does not have.
+    #[error("bidirectional sampling is for images, and for derivatives by path-space alone")]
+    PathSpaceOnly,
     /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
     #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
     JumpingFilter,

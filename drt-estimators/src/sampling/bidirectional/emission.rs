@@ -6,7 +6,7 @@ use core::f64::consts::{FRAC_1_PI, PI};
 use drt_math::{Frame, Rgb, Rng, Vec3, warp};
 
 use crate::model::emitter::Emitter;
-use crate::world::lights::{LightKind, LightSample};
+use crate::world::lights::{LightKind, LightSample, LightTable};
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{SurroundingMedium, World};
 
@@ -16,6 +16,9 @@ pub(super) struct EmittedRay {
     pub(super) vertex: Vertex,
     /// Unit.
     pub(super) dir: Vec3,
+    pub(super) emitter: usize,
+    /// 1 over the density of the ray, times the cosine at an area.
+    pub(super) inv_pdf: f64,
     /// What it carries over its density.
     pub(super) throughput: Rgb,
     /// Density of the direction, and of a directional emitter that of the point, per unit of area across the flow.
@@ -38,6 +41,31 @@ pub(crate) struct EmissionSampler {
     radius: f64,
     /// Medium outside.
     outside: Option<usize>,
+}
+
+impl EmittedRay {
+    /// Where it starts, as a point or direction from which light reaches x, and what multiplies its
+    /// [value](LightSample::value) there.
+    pub(super) fn seen_from(&self, world: &World, x: Vec3) -> Option<(LightSample, f64)> {
+        let Kind::Surface(point) = self.vertex.kind else {
+            let light = LightTable::delta(world, self.emitter, x, 1.0)?;
+            let spread = if self.finite { light.distance * light.distance } else { 1.0 };
+            return Some((light, self.inv_pdf * spread));
+        };
+        let d = self.vertex.x - x;
+        let distance = d.length();
+        let light = LightSample {
+            emitter: self.emitter,
+            kind: LightKind::Area(point),
+            w: d / distance,
+            y: self.vertex.x,
+            distance,
+            value: world.lights.area_radiance(self.emitter),
+            inv_pdf: 1.0,
+            pdf: 0.0,
+        };
+        Some((light, self.inv_pdf))
+    }
 }
 
 impl EmissionSampler {
@@ -71,6 +99,8 @@ impl EmissionSampler {
         Some(EmittedRay {
             vertex: Vertex { x, medium, kind: Kind::Surface(s) },
             dir,
+            emitter: world.scene.shapes[s.shape as usize].emitter?,
+            inv_pdf: PI / per_area,
             throughput: world.emitted(&s, dir) * (PI / per_area),
             pdf: cosine * FRAC_1_PI,
             inv_start: PI / per_area,
@@ -103,6 +133,8 @@ impl EmissionSampler {
         Some(EmittedRay {
             vertex: Vertex { x, medium, kind: Kind::Point },
             dir,
+            emitter,
+            inv_pdf: 1.0 / (pmf * pdf),
             throughput: light.emission(dir).value / (pmf * pdf),
             pdf,
             inv_start: 0.0,

@@ -48,20 +48,24 @@ mod subpath;
 mod tests;
 
 use alloc::vec::Vec;
+use core::marker::PhantomData;
 
 use drt_math::{Real, Rgb, Vec3};
 
 use crate::model::surface::Given;
 pub(crate) use crate::sampling::bidirectional::emission::EmissionSampler;
-use crate::sampling::bidirectional::emission::area_flow_pdf;
+use crate::sampling::bidirectional::emission::{EmittedRay, area_flow_pdf};
 use crate::sampling::bidirectional::subpath::{
-    Ratios, Subpath, SubpathVertex, Unconnected, square,
+    Observed, Ratios, Segment, Subpath, SubpathVertex, Unconnected, Unobserved, square,
 };
 use crate::sampling::film::Splat;
 use crate::sampling::flight::proxy_attenuation;
 use crate::sampling::mode::{ImportanceMode, RadianceMode, TransportMode};
-use crate::sampling::trace::{OutgoingRay, Tracer};
-use crate::world::World;
+use crate::sampling::record::{
+    Joint, LightPath, LightVertex, Radiance, Scattered, SeenVertex,
+};
+use crate::sampling::trace::{Arrival, Connection, Observer, OutgoingRay, Tracer};
+use crate::world::{Crossing, World};
 use crate::world::lights::LightKind;
 use crate::world::vertex::Vertex;
 
@@ -73,6 +77,8 @@ pub(crate) struct Bidirectional<'w> {
     light_paths: f64,
     camera: Subpath,
     light: Subpath,
+    /// The light path as it is recorded.
+    recorded: LightPath,
     #[cfg(all(test, feature = "std"))]
     fault: Option<tests::Fault>,
 }
@@ -86,58 +92,91 @@ impl<'w> Bidirectional<'w> {
             light_paths: f64::from(width) * f64::from(height),
             camera: Subpath::new(RadianceMode::GIVEN),
             light: Subpath::new(ImportanceMode::GIVEN),
+            recorded: LightPath::default(),
             #[cfg(all(test, feature = "std"))]
             fault: None,
         }
     }
 
     /// Traces a path from either end. Returns what comes along the camera's ray, times its `weight`; what reaches the film elsewhere is
-    /// added to `splats`.
-    pub(crate) fn trace(
+    /// added to `splats`. The observer is told of all but these.
+    pub(crate) fn trace<O: Observer>(
         &mut self,
         tracer: &mut Tracer<'w>,
         dir: Vec3,
         weight: Rgb,
         splats: &mut Vec<Splat>,
+        observer: &mut O,
     ) -> Rgb {
-        self.trace_camera(tracer, dir, weight);
+        self.trace_camera(tracer, dir, weight, observer);
         let mut sum = self.camera.met;
-        self.trace_light(tracer);
+        self.trace_light::<O>(tracer);
         for k in 0..self.camera.vertices.len() {
             let z = self.camera.vertices[k];
-            sum += self.met(&z, k == 0);
+            sum += self.met(&z, k, observer);
             if z.segments >= tracer.max_segments {
                 continue;
             }
-            sum += self.next_event(tracer, &z);
+            sum += self.next_event(tracer, &z, k, observer);
             for y in 0..self.light.vertices.len() {
-                let y = self.light.vertices[y];
-                if z.segments + y.segments < tracer.max_segments {
-                    sum += self.connection(tracer, &z, &y);
+                if z.segments + self.light.vertices[y].segments < tracer.max_segments {
+                    sum += self.connection(tracer, &z, [k, y], observer);
                 }
             }
         }
+        observer.joined(self.world, &self.recorded);
         for y in 0..self.light.vertices.len() {
-            let y = self.light.vertices[y];
-            splats.extend(self.seen(tracer, &y));
+            let seen = self.seen::<Radiance>(tracer, y);
+            splats.extend(seen.map(|seen| seen.splat(self.light_paths)));
         }
         sum
     }
 
-    fn trace_camera(&mut self, tracer: &mut Tracer<'w>, dir: Vec3, weight: Rgb) {
+    /// Traces a light path alone, as `O` would observe it, and adds the vertices that the camera sees.
+    pub(crate) fn trace_to_camera<O: Observer>(
+        &mut self,
+        tracer: &mut Tracer<'w>,
+        seen: &mut Vec<SeenFromCamera>,
+    ) {
+        tracer.counters.paths += 1;
+        self.trace_light::<O>(tracer);
+        for y in 0..self.light.vertices.len() {
+            seen.extend(self.seen::<O>(tracer, y));
+        }
+    }
+
+    /// Tells an observer, which has begun with the camera, of a vertex that it sees of the last light path.
+    pub(crate) fn record_seen<O: Observer>(&self, seen: &SeenFromCamera, observer: &mut O) {
+        let leaving = Scattered { value: Rgb::ONE, inv_pdf: 1.0 };
+        let SeenFromCamera { vertex, arrival, scattered, ref crossings, .. } = *seen;
+        let joint = Joint { vertex, leaving, arrival, crossings, scattered };
+        observer.join(self.world, &joint, &self.recorded);
+        observer.joined(self.world, &self.recorded);
+    }
+
+    fn trace_camera<O: Observer>(
+        &mut self,
+        tracer: &mut Tracer<'w>,
+        dir: Vec3,
+        weight: Rgb,
+        observer: &mut O,
+    ) {
         let leaving = tracer.camera_ray(dir, weight);
         let world = self.world;
         let film = world.camera.view(world.camera.position() + dir).importance;
         let ratios = Ratios { last: square(self.light_paths / film), earlier: 0.0 };
         self.camera.begin(ratios, true);
         type Mode = Unconnected<RadianceMode>;
-        if let Some(first) = tracer.follow::<Mode, _>(&leaving, &mut self.camera) {
-            tracer.walk::<Mode, _>(first, &mut self.camera);
+        let mut observed = Observed { subpath: &mut self.camera, observer };
+        if let Some(first) = tracer.follow::<Mode, _>(&leaving, &mut observed) {
+            tracer.walk::<Mode, _>(first, &mut observed);
         }
     }
 
-    fn trace_light(&mut self, tracer: &mut Tracer<'w>) {
+    /// Traces a light path, as `O` would observe paths.
+    fn trace_light<O: Observer>(&mut self, tracer: &mut Tracer<'w>) {
         self.light.begin(Ratios::default(), true);
+        self.recorded.clear();
         // Walks of importance end a segment earlier than what they are connected to.
         if tracer.max_segments < 2 {
             return;
@@ -147,32 +186,73 @@ impl<'w> Bidirectional<'w> {
         self.light.begin(ratios, start.finite);
         let leaving = OutgoingRay::starting(start.vertex, start.dir, start.throughput);
         type Mode = Unconnected<ImportanceMode>;
-        if let Some(first) = tracer.follow::<Mode, _>(&leaving, &mut self.light) {
-            tracer.walk::<Mode, _>(first, &mut self.light);
+        let observer = &mut Unobserved::<O>(PhantomData);
+        let mut observed = Observed { subpath: &mut self.light, observer };
+        if let Some(first) = tracer.follow::<Mode, _>(&leaving, &mut observed) {
+            tracer.walk::<Mode, _>(first, &mut observed);
+        }
+        if O::RECORDS {
+            self.record_light(&start);
+        }
+    }
+
+    /// Turns the light path round.
+    fn record_light(&mut self, start: &EmittedRay) {
+        let Self { world, light, recorded, .. } = self;
+        for (i, (v, segment)) in light.vertices.iter().zip(&light.arrivals).enumerate() {
+            let Segment { arrival, distance, start_medium, .. } = *segment;
+            let crossings = &light.crossings[segment.crossings.clone()];
+            let (crossings, medium) = recorded.turn_round(crossings, start_medium, distance);
+            let before = i.checked_sub(1).and_then(|i| Some((i, recorded.vertices.get_mut(i)?)));
+            if let Some((i, before)) = before {
+                let y = &light.vertices[i];
+                let scattering = world.scattering(&y.vertex);
+                before.seen = scattering.map(|scattering| SeenVertex {
+                    dir: v.from,
+                    distance,
+                    start_medium: medium,
+                    crossings,
+                    arrival,
+                    scattered: y.scattered(&scattering, -v.from, light.arrivals[i].inv_pdf),
+                });
+            } else if let Some((light, inv_pdf)) = start.seen_from(world, v.vertex.x) {
+                let transport = arrival * inv_pdf;
+                let emission = Connection { light, start_medium: medium, f: Rgb::ZERO, transport };
+                (recorded.emission, recorded.crossed) = (Some(emission), crossings);
+            }
+            recorded.vertices.push(LightVertex { end: v.end(), wi: v.from, seen: None });
         }
     }
 
     /// The emission of a surface that the camera's path meets, at once or later.
-    fn met(&self, z: &SubpathVertex, at_once: bool) -> Rgb {
+    fn met<O: Observer>(&self, z: &SubpathVertex, index: usize, observer: &mut O) -> Rgb {
         let Some(s) = z.vertex.surface().filter(|s| self.world.emits(s)) else { return Rgb::ZERO };
-        let value = z.throughput * self.world.emitted(s, z.from);
-        if value.is_zero() || at_once {
-            return value;
+        let mut weight = 1.0;
+        // Nothing else finds what is seen at once.
+        if index > 0 {
+            let per_area = self.world.lights.area_density(s);
+            let start = per_area * area_flow_pdf(s, z.from);
+            let others = square(per_area) * z.ratios.last + square(start) * z.ratios.earlier;
+            weight = 1.0 / (1.0 + others);
         }
-        let per_area = self.world.lights.area_density(s);
-        let start = per_area * area_flow_pdf(s, z.from);
-        let others = square(per_area) * z.ratios.last + square(start) * z.ratios.earlier;
-        value * (1.0 / (1.0 + others))
+        observer.emission(name(index), weight);
+        z.throughput * self.world.emitted(s, z.from) * weight
     }
 
     /// Next-event estimation.
-    fn next_event(&self, tracer: &mut Tracer<'w>, z: &SubpathVertex) -> Rgb {
+    fn next_event<O: Observer>(
+        &self,
+        tracer: &mut Tracer<'w>,
+        z: &SubpathVertex,
+        index: usize,
+        observer: &mut O,
+    ) -> Rgb {
         let world = self.world;
         let Some(scattering) = world.scattering(&z.vertex) else { return Rgb::ZERO };
         let light = world.lights.sample(world, z.vertex.x, &mut tracer.rng);
         let Some(light) = light else { return Rgb::ZERO };
         let f = RadianceMode::value(&scattering, z.from, light.w);
-        if f.is_zero() {
+        if f.is_zero() && !(O::RECORDS && world.may_revive(&z.vertex)) {
             return Rgb::ZERO;
         }
         let target = light.point().map(|s| s.prim);
@@ -188,18 +268,28 @@ impl<'w> Bidirectional<'w> {
         let flow = self.emission.flow_pdf(world, &light) * z.cosine(light.w);
         let others = square(hit) + square(flow) * z.ratios.all(back);
         let weight = 1.0 / (1.0 + square(attenuation) * others);
-        z.weight() * f * passed * light.value * (light.inv_pdf * weight)
+        let transport = passed * (light.inv_pdf * weight);
+        let connection = Connection { light, start_medium: tracer.shadow.medium, f, transport };
+        observer.connect(name(index), &connection, &tracer.shadow.crossings);
+        z.weight() * f * connection.rest()
     }
 
     /// Of a vertex of the camera's path with one of the light's.
-    fn connection(&self, tracer: &mut Tracer<'w>, z: &SubpathVertex, y: &SubpathVertex) -> Rgb {
+    fn connection<O: Observer>(
+        &self,
+        tracer: &mut Tracer<'w>,
+        z: &SubpathVertex,
+        [of_camera, of_light]: [usize; 2],
+        observer: &mut O,
+    ) -> Rgb {
+        let y = &self.light.vertices[of_light];
         #[cfg(all(test, feature = "std"))]
         if self.fault == Some(tests::Fault::NoConnections) {
             return Rgb::ZERO;
         }
         let world = self.world;
-        let (of_z, of_y) = (world.scattering(&z.vertex), world.scattering(&y.vertex));
-        let (Some(of_z), Some(of_y)) = (of_z, of_y) else { return Rgb::ZERO };
+        let at = [&z.vertex, &y.vertex].map(|v| world.scattering(v));
+        let [Some(of_z), Some(of_y)] = at else { return Rgb::ZERO };
         let d = y.vertex.x - z.vertex.x;
         let r2 = d.length_squared();
         if r2 == 0.0 {
@@ -207,9 +297,9 @@ impl<'w> Bidirectional<'w> {
         }
         let r = Real::sqrt(r2);
         let w = d / r;
-        let f = RadianceMode::value(&of_z, z.from, w) * ImportanceMode::value(&of_y, y.from, -w);
-        let light = z.weight() * y.weight() * f;
-        if light.is_zero() {
+        let (f, scattered) = (RadianceMode::value(&of_z, z.from, w), y.scattered(&of_y, -w, 1.0));
+        let light = z.weight() * y.weight() * f * (scattered.value * scattered.inv_pdf);
+        if light.is_zero() && !(O::RECORDS && self.may_revive(z, y)) {
             return Rgb::ZERO;
         }
         let target = y.vertex.surface().map(|s| s.prim);
@@ -219,14 +309,37 @@ impl<'w> Bidirectional<'w> {
         let [at_z, at_y] = [z.cosine(w) / r2, y.cosine(w) / r2];
         let [back_z, back_y] =
             [self.camera.back(&of_z, w, z.from), self.light.back(&of_y, -w, y.from)];
-        let of_light = square(of_z.pdf(z.from, w, Given::Wo) * at_y) * y.ratios.all(back_y);
-        let of_camera = square(of_y.pdf(y.from, -w, Given::Wi) * at_z) * z.ratios.all(back_z);
-        let weight = 1.0 / (1.0 + square(attenuation) * (of_light + of_camera));
-        light * passed * (weight / r2)
+        let by_camera = square(of_z.pdf(z.from, w, Given::Wo) * at_y) * y.ratios.all(back_y);
+        let by_light = square(of_y.pdf(y.from, -w, Given::Wi) * at_z) * z.ratios.all(back_z);
+        let weight = 1.0 / (1.0 + square(attenuation) * (by_camera + by_light));
+        let leaving = Scattered { value: f, inv_pdf: weight / r2 };
+        let arrival = Arrival {
+            parent: name(of_camera),
+            end: y.end(),
+            dir: w,
+            distance: r,
+            start_medium: tracer.shadow.medium,
+            arrival: passed,
+            throughput: z.weight() * passed * (f * leaving.inv_pdf),
+            emission_weight: 0.0,
+        };
+        let crossings = &tracer.shadow.crossings[..];
+        let joint = Joint { vertex: of_light, leaving, arrival, crossings, scattered };
+        observer.join(world, &joint, &self.recorded);
+        light * passed * leaving.inv_pdf
+    }
+
+    /// Derivatives of a connection may not vanish where it does.
+    fn may_revive(&self, z: &SubpathVertex, y: &SubpathVertex) -> bool {
+        let revives = |v: &SubpathVertex| {
+            v.throughput.is_zero() || self.world.may_revive(&v.vertex)
+        };
+        revives(z) || revives(y)
     }
 
     /// A vertex of the light's path as the camera sees it.
-    fn seen(&self, tracer: &mut Tracer<'w>, y: &SubpathVertex) -> Option<Splat> {
+    fn seen<O: Observer>(&self, tracer: &mut Tracer<'w>, vertex: usize) -> Option<SeenFromCamera> {
+        let y = &self.light.vertices[vertex];
         #[cfg(all(test, feature = "std"))]
         if self.fault == Some(tests::Fault::NoSplats) {
             return None;
@@ -234,20 +347,70 @@ impl<'w> Bidirectional<'w> {
         let world = self.world;
         let scattering = world.scattering(&y.vertex)?;
         let (wo, transport) = tracer.see(&y.vertex)?;
-        let f = ImportanceMode::value(&scattering, y.from, wo);
-        let light = y.weight() * f;
-        if light.is_zero() {
+        let scattered = y.scattered(&scattering, wo, 1.0);
+        let light = y.weight() * (scattered.value * scattered.inv_pdf);
+        let revives = || y.throughput.is_zero() || world.may_revive(&y.vertex);
+        if light.is_zero() && !(O::RECORDS && revives()) {
             return None;
         }
         let distance = (world.camera.position() - y.vertex.x).length();
-        let (passed, attenuation) = tracer.passed(&y.vertex, wo, distance, None)?;
+        let target = y.vertex.surface().map(|s| s.prim);
+        let (passed, attenuation) = tracer.passed(&world.eye(), -wo, distance, target)?;
         let back = self.light.back(&scattering, wo, y.from);
         let film = transport * y.cosine(wo) / self.light_paths;
         let others = square(film * attenuation) * y.ratios.all(back);
         let weight = 1.0 / (1.0 + others);
-        let value = light * passed * (transport * weight / self.light_paths);
-        Some(Splat { point: world.camera.view(y.vertex.x).pixel, value, weight: 0.0 })
+        let weight = transport * weight;
+        let arrival = Arrival {
+            parent: 0,
+            end: y.end(),
+            dir: -wo,
+            distance,
+            start_medium: tracer.shadow.medium,
+            arrival: passed,
+            throughput: passed * weight,
+            emission_weight: 0.0,
+        };
+        Some(SeenFromCamera {
+            vertex,
+            point: world.camera.view(y.vertex.x).pixel,
+            dir: -wo,
+            weight,
+            value: light * arrival.throughput,
+            arrival,
+            crossings: if O::RECORDS { tracer.shadow.crossings.clone() } else { Vec::new() },
+            scattered,
+        })
     }
+}
+
+/// A vertex of a light path as the camera sees it.
+pub(crate) struct SeenFromCamera {
+    vertex: usize,
+    /// The image point, in pixels.
+    pub(crate) point: [f64; 2],
+    /// Unit, from the camera.
+    pub(crate) dir: Vec3,
+    /// The camera's importance without a filter, over the squared distance and times the MIS weight.
+    pub(crate) weight: f64,
+    /// What arrives.
+    value: Rgb,
+    arrival: Arrival,
+    /// On the way, where it is recorded.
+    crossings: Vec<Crossing>,
+    scattered: Scattered,
+}
+
+impl SeenFromCamera {
+    /// On the film, of one of so many light paths.
+    fn splat(&self, light_paths: f64) -> Splat {
+        Splat { point: self.point, value: self.value * (1.0 / light_paths), weight: 0.0 }
+    }
+}
+
+/// Of a vertex of the camera's path in what observes the walk.
+fn name(vertex: usize) -> u32 {
+    vertex as u32 + 1
 }
 
 impl Tracer<'_> {

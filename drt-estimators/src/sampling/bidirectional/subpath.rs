@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 use core::marker::PhantomData;
+use core::ops::Range;
 
 use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::Coefficients;
@@ -9,10 +10,11 @@ use drt_medium::Coefficients;
 use crate::model::surface::Given;
 use crate::sampling::flight::proxy_attenuation;
 use crate::sampling::mode::{ConnectionPoint, TransportMode};
+use crate::sampling::record::Scattered;
 use crate::sampling::trace::{Arrival, Endpoint, Observer, OutgoingRay, PathState, Pixel, Tracer};
 use crate::world::scatter::Scattering;
 use crate::world::vertex::{Kind, Vertex};
-use crate::world::{Crossing, World};
+use crate::world::{Crossing, RayPath, World};
 
 /// A transport mode whose walks connect to nothing on their way.
 pub(super) struct Unconnected<M>(PhantomData<M>);
@@ -109,6 +111,20 @@ impl SubpathVertex {
         self.throughput * self.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s)
     }
 
+    /// As the end of a segment.
+    pub(super) fn end(&self) -> Endpoint {
+        match self.coefficients {
+            Some(c) => Endpoint::Volume(self.vertex, c),
+            None => Endpoint::Surface(self.vertex),
+        }
+    }
+
+    /// How a vertex of a light path scatters to the unit direction `wo`, over a density.
+    pub(super) fn scattered(&self, own: &Scattering<'_>, wo: Vec3, inv_pdf: f64) -> Scattered {
+        let inv_pdf = inv_pdf * own.adjoint_correction(wo, self.from);
+        Scattered { value: own.eval(wo, self.from), inv_pdf }
+    }
+
     /// |n·w| of the geometric normal; 1 in a volume.
     pub(super) fn cosine(&self, w: Vec3) -> f64 {
         cosine(&self.vertex, w)
@@ -122,10 +138,25 @@ fn cosine(vertex: &Vertex, w: Vec3) -> f64 {
     }
 }
 
+/// The segment by which a walk arrived at a vertex, and how it went on.
+#[derive(Clone, Debug)]
+pub(super) struct Segment {
+    /// Transmittance over the density of the distance.
+    pub(super) arrival: Rgb,
+    pub(super) distance: f64,
+    pub(super) start_medium: Option<usize>,
+    pub(super) crossings: Range<usize>,
+    /// 1 over the density of the direction in which the walk left, Russian roulette included.
+    pub(super) inv_pdf: f64,
+}
+
 /// A path from one end, as a walk tells it.
 #[derive(Debug)]
 pub(super) struct Subpath {
     pub(super) vertices: Vec<SubpathVertex>,
+    /// By vertex, where paths are recorded.
+    pub(super) arrivals: Vec<Segment>,
+    pub(super) crossings: Vec<Crossing>,
     /// The directions that walks of its mode are given.
     given: Given,
     /// Of the ray about to be followed.
@@ -143,6 +174,8 @@ impl Subpath {
     pub(super) fn new(given: Given) -> Self {
         Self {
             vertices: Vec::new(),
+            arrivals: Vec::new(),
+            crossings: Vec::new(),
             given,
             ratios: Ratios::default(),
             segments: 1,
@@ -156,6 +189,8 @@ impl Subpath {
     /// Forgets the last path. Where the next one starts is at a point of the scene, or at infinity.
     pub(super) fn begin(&mut self, ratios: Ratios, finite: bool) {
         self.vertices.clear();
+        self.arrivals.clear();
+        self.crossings.clear();
         (self.ratios, self.segments) = (ratios, 1);
         (self.finite, self.met) = (finite, Rgb::ZERO);
     }
@@ -174,19 +209,60 @@ impl Subpath {
     }
 }
 
-impl Observer for Subpath {
-    const RECORDS: bool = false;
+/// Makes a [`Subpath`] of a walk that something else observes as well.
+pub(super) struct Observed<'a, O> {
+    pub(super) subpath: &'a mut Subpath,
+    pub(super) observer: &'a mut O,
+}
+
+/// Observes nothing, of paths that are recorded if `O` records.
+pub(super) struct Unobserved<O>(pub(super) PhantomData<O>);
+
+impl<O: Observer> Observer for Unobserved<O> {
+    const RECORDS: bool = O::RECORDS;
+
+    fn contribution(&mut self, _: Pixel, _: u32, _: Rgb) {}
+}
+
+impl<O: Observer> Observer for Observed<'_, O> {
+    const RECORDS: bool = O::RECORDS;
 
     // Emission is weighed by who knows all strategies.
     fn contribution(&mut self, _: Pixel, _: u32, _: Rgb) {}
 
+    fn ray(&mut self, world: &World, leaving: &OutgoingRay, ray: &RayPath) {
+        self.observer.ray(world, leaving, ray);
+    }
+
     fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
+        self.subpath.arrive(world, arrival, crossings);
+        if O::RECORDS {
+            self.subpath.keep(arrival, crossings);
+        }
+        self.observer.arrive(world, arrival, crossings)
+    }
+
+    fn scatter(
+        &mut self,
+        world: &World,
+        leaving: &OutgoingRay,
+        value: Rgb,
+        inv_pdf: f64,
+        rng: &Rng,
+    ) {
+        self.subpath.scatter(world, leaving, inv_pdf);
+        self.observer.scatter(world, leaving, value, inv_pdf, rng);
+    }
+}
+
+impl Subpath {
+    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) {
         let (vertex, coefficients) = match &arrival.end {
             Endpoint::Environment => {
                 if let Some((_, radiance)) = world.lights.environment() {
                     self.met += arrival.throughput * radiance;
                 }
-                return u32::MAX;
+                return;
             }
             Endpoint::Surface(v) => (*v, None),
             Endpoint::Volume(v, c) => {
@@ -197,7 +273,6 @@ impl Observer for Subpath {
         let spread = if self.finite { square(arrival.distance) } else { 1.0 };
         let medium = arrival.start_medium;
         let attenuation = proxy_attenuation(world, medium, crossings, arrival.distance);
-        let name = self.vertices.len() as u32;
         let ratios = self.ratios.arrive(spread, cosine(&vertex, arrival.dir), attenuation);
         self.vertices.push(SubpathVertex {
             vertex,
@@ -208,11 +283,25 @@ impl Observer for Subpath {
             segments: self.segments,
         });
         self.finite = true;
-        name
     }
 
-    fn scatter(&mut self, world: &World, leaving: &OutgoingRay, _: Rgb, _: f64, _: &Rng) {
-        let Some(v) = self.vertices.get(leaving.node as usize) else { return };
+    fn keep(&mut self, arrival: &Arrival, crossings: &[Crossing]) {
+        let first = self.crossings.len();
+        self.crossings.extend_from_slice(crossings);
+        self.arrivals.push(Segment {
+            arrival: arrival.arrival,
+            distance: arrival.distance,
+            start_medium: arrival.start_medium,
+            crossings: first..self.crossings.len(),
+            inv_pdf: 0.0,
+        });
+    }
+
+    fn scatter(&mut self, world: &World, leaving: &OutgoingRay, inv_pdf: f64) {
+        if let Some(arrival) = self.arrivals.last_mut() {
+            arrival.inv_pdf = inv_pdf;
+        }
+        let Some(v) = self.vertices.last() else { return };
         let Some(scattering) = world.scattering(&v.vertex) else { return };
         let cosine = v.cosine(leaving.dir);
         self.segments = leaving.segments + 1;

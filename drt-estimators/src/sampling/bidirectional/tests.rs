@@ -51,7 +51,7 @@ fn light(scene: &Scene, fault: Option<Fault>, both: bool) -> Moments {
                 let filter = Rgb::splat(s.weight);
                 splats.clear();
                 let value = if both {
-                    from_both.trace(&mut tracer, s.direction, filter, &mut splats)
+                    from_both.trace(&mut tracer, s.direction, filter, &mut splats, &mut Radiance::default())
                 } else {
                     let mut radiance = Radiance::default();
                     tracer.trace_camera(s.direction, filter, &mut radiance);

@@ -34,7 +34,9 @@ use crate::edges::edge::{EdgePoint, EdgeTable, collect, merge_coincident};
 use crate::edges::movers::Movers;
 use crate::terms::boundary::shadow::Shadows;
 
-use crate::derivative::sensitivity::{ActiveInputs, VelocityFunctional, VelocityTerm};
+use crate::derivative::sensitivity::{
+    ActiveInputs, AdjointSink, VelocityFunctional, VelocityTerm,
+};
 use crate::model::emitter::{Emitter, EmitterGradient};
 use crate::model::error::Error;
 use crate::model::sensor::SensorGradient;
@@ -74,10 +76,16 @@ pub(crate) struct Boundary {
 
 /// What a sample's value is handed to.
 pub(crate) trait BoundarySink {
+    /// Where sensitivities go.
+    type Sink: AdjointSink;
     /// Evaluates how the sample's geometry moves; false when it does not, which ends the sample.
     fn moves(&mut self, functional: &VelocityFunctional) -> bool;
     /// The last functional times `value` goes to `pixel`.
     fn receive(&mut self, pixel: u32, value: Rgb);
+    /// What sensitivities are wanted for.
+    fn sink(&self) -> &Self::Sink;
+    /// What is sent goes to each of some pixels, times its weight. False when it is not finite.
+    fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut Self::Sink)) -> bool;
 }
 
 /// Where a segment's rays start.

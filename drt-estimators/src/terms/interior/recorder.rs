@@ -5,7 +5,7 @@ use drt_math::{Rgb, Rng, Vec3};
 use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::velocity::PathVelocities;
 use crate::derivative::velocity::RecordedPath;
-use crate::sampling::record::PathRecord;
+use crate::sampling::record::{Joint, LightPath, PathRecord};
 use crate::sampling::trace::{Arrival, Connection, Observer, OutgoingRay, Pixel};
 use crate::terms::flux::Reservoir;
 use crate::world::Crossing;
@@ -52,6 +52,14 @@ pub(crate) struct Recorder<'r, 'a> {
 }
 
 impl Recorder<'_, '_> {
+    /// A node has been added that no walk arrived at.
+    fn found(&mut self, node: usize) {
+        let Some(arrival) = self.record.nodes[node].arrival else { return };
+        for view in self.views.iter_mut() {
+            view.velocities.arrive(view.world, self.record, &arrival, &[]);
+        }
+    }
+
     /// Empties the record for a camera ray of a `pixel` along `dir` with filter weight `value`.
     pub(crate) fn begin(&mut self, pixel: [u32; 2], dir: Vec3, value: Rgb) {
         self.record.begin(pixel, dir, value);
@@ -96,5 +104,23 @@ impl Observer for Recorder<'_, '_> {
 
     fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
         self.record.connect(node, connection, crossings);
+    }
+
+    fn emission(&mut self, node: u32, weight: f64) {
+        let arrival = self.record.nodes.get_mut(node as usize).and_then(|n| n.arrival.as_mut());
+        if let Some(arrival) = arrival {
+            arrival.emission_weight = weight;
+        }
+    }
+
+    fn join(&mut self, _: &World, joint: &Joint<'_>, path: &LightPath) {
+        let node = self.record.join(joint, path);
+        self.found(node);
+    }
+
+    fn joined(&mut self, _: &World, path: &LightPath) {
+        for node in self.record.add_light_path(path) {
+            self.found(node);
+        }
     }
 }
