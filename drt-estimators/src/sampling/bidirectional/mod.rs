@@ -51,6 +51,7 @@ use alloc::vec::Vec;
 use core::marker::PhantomData;
 
 use drt_math::{Real, Rgb, Vec3};
+use drt_medium::Coefficients;
 
 use crate::model::surface::Given;
 pub(crate) use crate::sampling::bidirectional::emission::EmissionSampler;
@@ -299,7 +300,8 @@ impl<'w> Bidirectional<'w> {
         let w = d / r;
         let (f, scattered) = (RadianceMode::value(&of_z, z.from, w), y.scattered(&of_y, -w, 1.0));
         let light = z.weight() * y.weight() * f * (scattered.value * scattered.inv_pdf);
-        if light.is_zero() && !(O::RECORDS && self.may_revive(z, y)) {
+        let ends = [(z, f), (y, scattered.value)];
+        if light.is_zero() && (!O::RECORDS || ends.iter().any(|(v, f)| self.is_dead(v, *f))) {
             return Rgb::ZERO;
         }
         let target = y.vertex.surface().map(|s| s.prim);
@@ -329,12 +331,10 @@ impl<'w> Bidirectional<'w> {
         light * passed * leaving.inv_pdf
     }
 
-    /// Derivatives of a connection may not vanish where it does.
-    fn may_revive(&self, z: &SubpathVertex, y: &SubpathVertex) -> bool {
-        let revives = |v: &SubpathVertex| {
-            v.throughput.is_zero() || self.world.may_revive(&v.vertex)
-        };
-        revives(z) || revives(y)
+    /// A vertex scatters nothing, with the value `f` of its scattering function, and no derivative of that counts.
+    fn is_dead(&self, v: &SubpathVertex, f: Rgb) -> bool {
+        let sigma_s = v.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s);
+        (sigma_s * f).is_zero() && !self.world.may_revive(&v.vertex)
     }
 
     /// A vertex of the light's path as the camera sees it.
@@ -349,8 +349,7 @@ impl<'w> Bidirectional<'w> {
         let (wo, transport) = tracer.see(&y.vertex)?;
         let scattered = y.scattered(&scattering, wo, 1.0);
         let light = y.weight() * (scattered.value * scattered.inv_pdf);
-        let revives = || y.throughput.is_zero() || world.may_revive(&y.vertex);
-        if light.is_zero() && !(O::RECORDS && revives()) {
+        if light.is_zero() && (!O::RECORDS || self.is_dead(y, scattered.value)) {
             return None;
         }
         let distance = (world.camera.position() - y.vertex.x).length();
