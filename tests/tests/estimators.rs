@@ -6,19 +6,19 @@
 //!
 //! All that the 2019 theory covers, with the scale of each derivative known to 1 % or for ten minutes each:
 //! `cargo test --release -p drt-tests --test estimators -- --ignored covered:: --nocapture`, and `warped::` for the 2023
-//! estimator. Images by paths from both ends against those from the camera:
+//! estimator, `both_ends::` for paths from both ends. Images by these against those from the camera:
 //! `cargo test --release -p drt-tests --test estimators -- --ignored images:: --nocapture`
 
 use std::time::Instant;
 
-use drt_estimators::EstimatorKind::{self, Radiative, Warped};
+use drt_estimators::EstimatorKind::{Radiative, Warped};
 use drt_estimators::{Depth, PathSampling, Session, Settings, Unattended, agreement};
 use drt_tests::Result;
-use drt_tests::matrix::estimators::{Effort, Pairs, compare};
+use drt_tests::matrix::estimators::{Effort, Method, Pairs, compare};
 use drt_tests::matrix::{Stage, caged, deforming, lights, media, riding, surfaces};
 
-fn run(stage: Result<Stage>, kinds: &[EstimatorKind], effort: Effort) {
-    let pairs = compare(&stage.unwrap(), kinds, effort).unwrap();
+fn run(stage: Result<Stage>, methods: &[Method], effort: Effort) {
+    let pairs = compare(&stage.unwrap(), methods, effort).unwrap();
     println!("{}", Pairs(&pairs));
     assert!(!pairs.is_empty(), "the stage has no such cells");
     let failing = pairs.iter().filter(|pair| !pair.passes()).count();
@@ -80,23 +80,28 @@ macro_rules! stages {
         mod short {
             $($(#[test] fn $stage() {
                 let stage = super::$room::$stage().map(super::Stage::short);
-                super::run(stage, &[super::Radiative, super::Warped], super::short());
+                super::run(stage, &[super::Radiative.into(), super::Warped.into()], super::short());
             })*)*
         }
         mod all {
             $($(#[test] #[ignore = "minutes"] fn $stage() {
-                super::run(super::$room::$stage(), &[super::Radiative], super::costs());
+                super::run(super::$room::$stage(), &[super::Radiative.into()], super::costs());
             })*)*
         }
         mod covered {
             $($(#[test] #[ignore = "hours"] fn $stage() {
                 let stage = super::$room::$stage().map(super::Stage::in_extended_light);
-                super::run(stage, &[super::Radiative], super::precise());
+                super::run(stage, &[super::Radiative.into()], super::precise());
             })*)*
         }
         mod warped {
             $($(#[test] #[ignore = "hours"] fn $stage() {
-                super::run(super::$room::$stage(), &[super::Warped], super::precise());
+                super::run(super::$room::$stage(), &[super::Warped.into()], super::precise());
+            })*)*
+        }
+        mod both_ends {
+            $($(#[test] #[ignore = "hours"] fn $stage() {
+                super::run(super::$room::$stage(), &[super::Method::BOTH_ENDS], super::precise());
             })*)*
         }
         mod images {

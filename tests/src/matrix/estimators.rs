@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Instant;
 
 use drt_estimators::{
-    Agreement, Derivative, EstimatorKind, Layer, Rendering, Session, Settings, Term, Unattended,
+    Agreement, Derivative, EstimatorKind, Layer, PathSampling, Rendering, Session, Settings, Term, Unattended,
     agreement,
 };
 use drt_motion::Parameter;
@@ -27,6 +27,23 @@ const NEAR_ZERO: f64 = 0.05;
 /// A single number agrees within this many standard errors.
 const MOST_ERRORS: f64 = 4.0;
 
+/// An estimator of derivatives, and how it finds paths.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Method(pub EstimatorKind, pub PathSampling);
+
+impl Method {
+    /// What others are compared with.
+    pub const REFERENCE: Self = Self(EstimatorKind::PathSpace, PathSampling::Unidirectional);
+    /// By paths from both ends.
+    pub const BOTH_ENDS: Self = Self(EstimatorKind::PathSpace, PathSampling::Bidirectional);
+}
+
+impl From<EstimatorKind> for Method {
+    fn from(kind: EstimatorKind) -> Self {
+        Self(kind, PathSampling::Unidirectional)
+    }
+}
+
 /// How far to go.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
@@ -46,7 +63,7 @@ pub struct Pair {
     /// Name of the parameter.
     pub parameter: String,
     /// The estimator in question.
-    pub kind: EstimatorKind,
+    pub method: Method,
     /// The comparison.
     pub agreement: Agreement,
     /// How much larger the one in question is than the other.
@@ -80,16 +97,16 @@ impl Pair {
     }
 }
 
-/// Compares every derivative of a stage by each of `kinds` with that by path space. Of hundreds of comparisons
+/// Compares every derivative of a stage by each of some `methods` with that by path space. Of hundreds of comparisons
 /// some exceed by chance what one in a thousand does: what fails is measured once more, by other random
 /// numbers alone, and the second verdict counts.
 ///
 /// # Errors
 /// When the library rejects the scene or a parameter.
-pub fn compare(stage: &Stage, kinds: &[EstimatorKind], effort: Effort) -> Result<Vec<Pair>> {
-    let mut pairs = compare_once(stage, kinds, effort, [7, 19])?;
-    for kind in kinds {
-        let again = |pair: &Pair| pair.kind == *kind && !pair.passes();
+pub fn compare(stage: &Stage, methods: &[Method], effort: Effort) -> Result<Vec<Pair>> {
+    let mut pairs = compare_once(stage, methods, effort, [7, 19])?;
+    for method in methods {
+        let again = |pair: &Pair| pair.method == *method && !pair.passes();
         if !pairs.iter().any(again) {
             continue;
         }
@@ -97,7 +114,7 @@ pub fn compare(stage: &Stage, kinds: &[EstimatorKind], effort: Effort) -> Result
         failing
             .cells
             .retain(|c| pairs.iter().any(|pair| again(pair) && pair.parameter == c.parameter.name));
-        let second = compare_once(&failing, &[*kind], effort, [107, 119])?;
+        let second = compare_once(&failing, &[*method], effort, [107, 119])?;
         for pair in pairs.iter_mut().filter(|pair| again(pair)) {
             if let Some(other) = second.iter().find(|s| s.parameter == pair.parameter) {
                 *pair = other.clone();
@@ -109,7 +126,7 @@ pub fn compare(stage: &Stage, kinds: &[EstimatorKind], effort: Effort) -> Result
 
 fn compare_once(
     stage: &Stage,
-    kinds: &[EstimatorKind],
+    methods: &[Method],
     effort: Effort,
     seeds: [u64; 2],
 ) -> Result<Vec<Pair>> {
@@ -117,12 +134,12 @@ fn compare_once(
     let at_rest = |c: &Cell| c.parameter.value == 0.0;
     for cells in stage.cells.chunk_by(|a, b| at_rest(a) && at_rest(b)) {
         let parameters: Vec<Parameter> = cells.iter().map(|c| c.parameter.clone()).collect();
-        let run = |kind, seed| sample(stage, &parameters, kind, seed, effort);
+        let run = |method, seed| sample(stage, &parameters, method, seed, effort);
         // Other random numbers, so that the errors are independent.
-        let reference = run(EstimatorKind::PathSpace, seeds[0])?;
-        for kind in kinds {
-            let own = run(*kind, seeds[1])?;
-            pairs.extend(pairs_of(stage.name, *kind, &own, &reference));
+        let reference = run(Method::REFERENCE, seeds[0])?;
+        for method in methods {
+            let own = run(*method, seeds[1])?;
+            pairs.extend(pairs_of(stage.name, *method, &own, &reference));
         }
     }
     Ok(pairs)
@@ -131,7 +148,7 @@ fn compare_once(
 /// The comparisons of all derivatives that two estimators have sampled.
 fn pairs_of(
     stage: &'static str,
-    kind: EstimatorKind,
+    method: Method,
     own: &Sampled,
     reference: &Sampled,
 ) -> Vec<Pair> {
@@ -152,7 +169,7 @@ fn pairs_of(
         pairs.push(Pair {
             stage,
             parameter: a.name.clone(),
-            kind,
+            method,
             agreement: agreement(&a.total, &b.total, None),
             scale: Scale::new(own.halves(k), reference.halves(k)) * part,
             noise,
@@ -202,7 +219,7 @@ impl Sampled {
 fn sample(
     stage: &Stage,
     parameters: &[Parameter],
-    estimator: EstimatorKind,
+    Method(estimator, sampling): Method,
     seed: u64,
     effort: Effort,
 ) -> Result<Sampled> {
@@ -210,6 +227,7 @@ fn sample(
         threads: 1,
         seed,
         estimator,
+        sampling,
         terms: true,
         insides: stage.insides.clone(),
         ..Settings::default()
@@ -243,7 +261,9 @@ impl fmt::Display for Pairs<'_> {
             ""
         )?;
         for pair in self.0 {
-            let name = format!("{}: {}, {:?}", pair.stage, pair.parameter, pair.kind);
+            let Method(kind, sampling) = pair.method;
+            let ends = if sampling == PathSampling::Bidirectional { ", both ends" } else { "" };
+            let name = format!("{}: {}, {kind:?}{ends}", pair.stage, pair.parameter);
             let a = &pair.agreement;
             write!(f, "{name:<54} {:>6.2} {:>6.2} {:>6.2}", a.rms_z, a.max_z, a.limit)?;
             for noise in pair.noise {
