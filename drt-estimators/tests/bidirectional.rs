@@ -44,8 +44,12 @@ fn threads_make_no_difference() {
 /// Derivatives by paths from both ends, over the bars of those from the camera.
 fn check(name: &str, scene: &Scene, effects: Vec<Effect>, spp: u32) {
     let moving = [parameter(name, 0.0, effects)];
-    let [one, both] = [PathSampling::Unidirectional, PathSampling::Bidirectional].map(|sampling| {
-        let settings = settings(sampling, 7 + sampling as u64, 0);
+    use EstimatorKind::{PathSpace, Warped};
+    use PathSampling::{Bidirectional, Unidirectional};
+    let ways = [(PathSpace, Unidirectional), (PathSpace, Bidirectional), (Warped, Bidirectional)];
+    let [one, both, warped] = ways.map(|(estimator, sampling)| {
+        let seed = 7 + sampling as u64 + estimator as u64;
+        let settings = Settings { estimator, ..settings(sampling, seed, 0) };
         let mut session = Session::new(scene, &moving, &settings).expect("a valid scene");
         assert!(session.run(spp, &Unattended));
         let rendering = session.rendering();
@@ -55,6 +59,7 @@ fn check(name: &str, scene: &Scene, effects: Vec<Effect>, spp: u32) {
     for (what, one, both) in [
         ("image", &one.image, &both.image),
         ("derivative", &one.derivatives[0].total, &both.derivatives[0].total),
+        ("warped", &one.derivatives[0].total, &warped.derivatives[0].total),
     ] {
         let found = agreement(both, one, None);
         let noise = [one, both].map(|layer| layer.relative_noise(None));
@@ -76,10 +81,10 @@ fn derivatives_are_refused_by_other_kinds() {
     let moving = [parameter("p", 0.0, vec![moves("ball", shift())])];
     let pixels = (FILM[0] * FILM[1]) as usize;
     let adjoint = vec![Rgb::ONE; pixels];
-    let warped = Settings { estimator: EstimatorKind::Warped, ..settings.clone() };
+    let radiative = Settings { estimator: EstimatorKind::Radiative, ..settings.clone() };
     for refused in [
-        Session::new(&scene, &moving, &warped).err(),
-        gradient(&scene, &["ball"], &warped, 1, &adjoint, &Unattended).err(),
+        Session::new(&scene, &moving, &radiative).err(),
+        gradient(&scene, &["ball"], &radiative, 1, &adjoint, &Unattended).err(),
         finite_differences(&scene, &moving, &settings, 1, 1e-3, &Unattended).err(),
     ] {
         let message = refused.expect("a refusal").to_string();

@@ -52,7 +52,7 @@ fn sides(scene: &Scene, parameter: &Parameter, settings: &Settings, spp: u32) ->
         Session::new(scene, core::slice::from_ref(parameter), settings).expect("a valid scene");
     assert!(session.run(spp, &Unattended));
     let rendering = session.rendering();
-    assert_eq!(rendering.non_finite, 0);
+    assert_eq!(rendering.non_finite, 0, "{:?}", rendering.non_finite_examples);
     let products: Vec<Rgb> = rendering.derivatives[0]
         .total
         .pixels
@@ -82,7 +82,9 @@ fn agree_from(spp: u32, name: &str, scene: &Scene, effects: Vec<Effect>, setting
     let named = format!("{name}, radiative");
     by_one_estimator(&named, scene, effects.clone(), &radiative(settings), spp, 1e-4);
     let warped = Settings { estimator: EstimatorKind::Warped, ..settings.clone() };
-    by_one_estimator(&format!("{name}, warped"), scene, effects, &warped, spp, 1e-9);
+    by_one_estimator(&format!("{name}, warped"), scene, effects.clone(), &warped, spp, 1e-9);
+    let both = Settings { sampling: PathSampling::Bidirectional, ..warped };
+    by_one_estimator(&format!("{name}, warped, from both ends"), scene, effects, &both, spp, 1e-9);
 }
 
 const EXACT: f64 = 1e-12;

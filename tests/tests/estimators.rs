@@ -101,7 +101,7 @@ macro_rules! stages {
         }
         mod both_ends {
             $($(#[test] #[ignore = "hours"] fn $stage() {
-                super::run(super::$room::$stage(), &[super::Method::BOTH_ENDS], super::precise());
+                super::run(super::$room::$stage(), &super::Method::BOTH_ENDS, super::precise());
             })*)*
         }
         mod images {

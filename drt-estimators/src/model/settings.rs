@@ -103,7 +103,8 @@ pub enum PathSampling {
     /// From the camera, with next-event estimation.
     #[default]
     Unidirectional,
-    /// From the camera and from emitters, joined in every way. Of images, and of derivatives by [`EstimatorKind::PathSpace`].
+    /// From the camera and from emitters, joined in every way. Of images, and of derivatives by [`EstimatorKind::PathSpace`]
+    /// and by [`EstimatorKind::Warped`] with edges.
     Bidirectional,
 }
 
@@ -196,9 +197,13 @@ impl Settings {
         if let Some(&(index, _)) = self.insides.iter().find(|(m, _)| *m >= count) {
             return fail("insides", SettingError::NoMedium { index, count });
         }
-        let has_both_ends = self.estimator == EstimatorKind::PathSpace;
+        let has_both_ends = match self.estimator {
+            EstimatorKind::PathSpace => true,
+            EstimatorKind::Warped => self.warp == Warp::Edges,
+            _ => false,
+        };
         if derivatives && self.sampling == PathSampling::Bidirectional && !has_both_ends {
-            return fail("sampling", SettingError::PathSpaceOnly);
+            return fail("sampling", SettingError::OtherKinds);
         }
         scene.sensor(self.sensor).map(|_| ())
     }

@@ -44,7 +44,7 @@ pub fn finite_differences(
     scene.check()?;
     settings.check(scene, true)?;
     if settings.sampling == PathSampling::Bidirectional {
-        let reason = SettingError::PathSpaceOnly;
+        let reason = SettingError::OtherKinds;
         return Err(Error::Setting { setting: "sampling", reason });
     }
     let pool = Pool::new(settings.threads);

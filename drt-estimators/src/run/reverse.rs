@@ -410,7 +410,7 @@ impl Reverse<'_> {
             scale,
         });
         let stream = source.stream() + u64::from(batch);
-        let splatter = prepared.splatter(seed_of_component(self.seed, c));
+        let splatter = prepared.splatter(self.world, seed_of_component(self.seed, c));
         let account = splatter.run(source, stream, count, &mut receiver);
         let mut to = receiver.inner;
         to.flush();

@@ -3,6 +3,7 @@
 mod component;
 mod recorder;
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::sobol::SobolSampler;
@@ -13,7 +14,8 @@ use crate::terms::interior::component::{Traced, Worker};
 pub(crate) use crate::terms::interior::recorder::{PathView, Recorder};
 
 use crate::derivative::contraction::Contraction;
-use crate::derivative::sensitivity::{AdjointSink, VelocityFunctional};
+use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, VelocityFunctional};
+use crate::derivative::velocity::{Material, Movers, VelocityField};
 use crate::model::rendering::{Account, Counters, NonFinite, Term};
 use crate::model::sensor::ViewSample;
 use crate::sampling::bidirectional::{Bidirectional, EmissionSampler};
@@ -73,6 +75,15 @@ impl EdgeQueries {
 }
 
 impl AlongRays<'_> {
+    /// The velocity field of the estimator.
+    pub(crate) fn field(&self, active: &ActiveInputs) -> Arc<dyn VelocityField> {
+        match (self.radiative, self.warped) {
+            (Some(radiative), _) => Arc::clone(&radiative.spatial) as _,
+            (_, Some(warped)) => Arc::clone(&warped.field),
+            _ => Arc::new(Material::new(Movers::new(active))),
+        }
+    }
+
     /// The terms kept in layers of their own, where terms are kept apart.
     pub(crate) fn terms(&self) -> impl Iterator<Item = Term> {
         let warp = self.warped.map(|_| Term::Warp);

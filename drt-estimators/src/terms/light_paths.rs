@@ -11,21 +11,20 @@
 //! so that a path has three values for all pixels that it reaches: ∂f, and f times the rates of the image point's column and
 //! row. There is no record but that of the light path: each vertex is the end of a connection from the camera.
 
+use alloc::vec::Vec;
+
 use drt_math::{Rgb, Rng};
 
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::sensitivity::AdjointSink;
-use crate::derivative::velocity::{Material, Movers, PathVelocities};
+use crate::derivative::velocity::PathVelocities;
 use crate::sampling::bidirectional::{Bidirectional, EmissionSampler, SeenFromCamera};
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary::BoundarySink;
-use crate::terms::interior::{PathView, Recorder};
+use crate::terms::interior::{AlongRays, PathView, Recorder};
 use crate::world::World;
-
-use alloc::sync::Arc;
-use alloc::vec::Vec;
 
 /// Light paths at work.
 pub(crate) struct LightPaths<'a> {
@@ -40,22 +39,19 @@ pub(crate) struct LightPaths<'a> {
 }
 
 impl<'a> LightPaths<'a> {
-    /// For derivatives that go to `sink`.
+    /// In the light of `all` emitters, for derivatives by those that light a `world`, which go to `sink`.
     pub(crate) fn new(
-        world: &'a World,
+        all: &'a World,
         emission: &'a EmissionSampler,
+        world: &'a World,
+        along: &AlongRays<'_>,
         sink: &impl AdjointSink,
     ) -> Self {
-        let field = Arc::new(Material::new(Movers::new(sink.active())));
-        let view = PathView {
-            world,
-            velocities: PathVelocities::new(field),
-            pairs: AntitheticPairs::new(false),
-            flux: None,
-        };
+        let velocities = PathVelocities::new(along.field(sink.active()));
+        let view = PathView::new(world, velocities, AntitheticPairs::new(false), along.flux);
         Self {
             world,
-            paths: Bidirectional::new(world, emission),
+            paths: Bidirectional::new(all, emission),
             record: PathRecord::default(),
             views: [view],
             differentiator: Differentiator::new(world),
@@ -92,8 +88,11 @@ impl<'a> LightPaths<'a> {
         for p in world.camera.footprint(seen.point) {
             let pixel = p.pixel[1] * width + p.pixel[0];
             for (list, weight) in pixels.iter_mut().zip([p.weight, p.gradient[0], p.gradient[1]]) {
-                list.push((pixel, weight));
+                list.extend((weight != 0.0).then_some((pixel, weight)));
             }
+        }
+        if pixels.iter().all(Vec::is_empty) {
+            return;
         }
         let column_and_row = [0, 1].map(|k| {
             let inside = f64::max(seen.point[k], 0.0) as u32;
@@ -109,7 +108,7 @@ impl<'a> LightPaths<'a> {
             differentiator.differentiate(&recorded, [0.0; 2], line, sink);
         });
         let moves = views[0].velocities.moves(0) || views[0].velocities.moves(1);
-        for (axis, pixels) in slopes.iter().enumerate().filter(|_| moves) {
+        for (axis, pixels) in slopes.iter().enumerate().filter(|(_, p)| moves && !p.is_empty()) {
             receiver.spread(pixels, |sink| differentiator.image_point(&recorded, axis, sink));
         }
     }

@@ -87,10 +87,9 @@ impl Prepared {
         let kinds = sources.len();
         let grazing = grazing_flux(&world, flux.as_ref(), active, &mut sources)?;
         let antithetic = mirrors(&world, active, settings);
-        let bidirectional = settings.sampling == PathSampling::Bidirectional && active.any();
-        let emission = bidirectional.then(|| EmissionSampler::new(&world));
-        sources.extend(bidirectional.then_some(BoundarySource::LightPaths));
+        let emission = emission(&world, active, settings, &mut sources);
         Ok(Self {
+            lobe_pairs: settings.antithetic && emission.is_none(),
             emission,
             boundary_ratio: boundary_ratio(settings, kinds),
             primary_share: 1.0,
@@ -103,7 +102,6 @@ impl Prepared {
             grazing,
             sources,
             antithetic,
-            lobe_pairs: settings.antithetic && !bidirectional,
         })
     }
 
@@ -166,15 +164,17 @@ impl Prepared {
         if warped.spatial.is_none() && active.moves_geometry() && world.camera.has_borders() {
             sources.push(BoundarySource::Borders);
         }
+        let boundary_ratio = boundary_ratio(settings, sources.len());
+        let emission = emission(&world, active, settings, &mut sources);
         Ok(Self {
-            emission: None,
+            lobe_pairs: settings.antithetic && emission.is_none(),
+            emission,
             boundary: Boundary::default(),
             radiative: None,
             warped: Some(warped),
             antithetic: mirrors(&world, active, settings),
-            lobe_pairs: settings.antithetic,
             primary_share: 1.0,
-            boundary_ratio: boundary_ratio(settings, sources.len()),
+            boundary_ratio,
             world,
             flux: flux.map(Flux::along_rays),
             grazing: None,
@@ -209,11 +209,13 @@ impl Prepared {
         Component { world: &self.world, along: self.along_rays(), sink }
     }
 
-    pub(crate) fn splatter(&self, seed: u64) -> Splatter<'_> {
+    /// `all` is the world lit by all emitters.
+    pub(crate) fn splatter<'a>(&'a self, all: &'a World, seed: u64) -> Splatter<'a> {
         let radiative = self.radiative.as_ref();
         let (grazing, emission) = (self.grazing.as_ref(), self.emission.as_ref());
         let (world, boundary) = (&self.world, &self.boundary);
-        Splatter { world, boundary, radiative, grazing, emission, seed }
+        let along = self.along_rays();
+        Splatter { world, all, along, boundary, radiative, grazing, emission, seed }
     }
 
     /// Samples of a splatted source to each of a pixel, by the settings alone.
@@ -237,6 +239,18 @@ impl Prepared {
 /// Whether image points come in mirrored pairs. The filter's rate is what they cancel; without it they only cost.
 fn mirrors(world: &World, active: &ActiveInputs, settings: &Settings) -> bool {
     settings.antithetic && active.moves_geometry() && world.camera.filter().is_continuous()
+}
+
+/// Where paths of light start, if there are any; those that the camera sees are one more source.
+fn emission(
+    world: &World,
+    active: &ActiveInputs,
+    settings: &Settings,
+    sources: &mut Vec<BoundarySource>,
+) -> Option<EmissionSampler> {
+    let bidirectional = settings.sampling == PathSampling::Bidirectional && active.any();
+    sources.extend(bidirectional.then_some(BoundarySource::LightPaths));
+    bidirectional.then(|| EmissionSampler::new(world))
 }
 
 /// What the camera sees edge on of surfaces with a flux, as one more source.

@@ -16,6 +16,7 @@ use crate::terms::boundary;
 use crate::terms::boundary::{Boundary, BoundarySink, Strategy};
 use crate::terms::flux;
 use crate::terms::flux::GrazingFlux;
+use crate::terms::interior::AlongRays;
 use crate::terms::light_paths::LightPaths;
 use crate::terms::radiative::Radiative;
 use crate::world::World;
@@ -79,6 +80,9 @@ impl BoundarySource {
 /// What splatted terms are sampled from.
 pub(crate) struct Splatter<'a> {
     pub(crate) world: &'a World,
+    /// Lit by all emitters.
+    pub(crate) all: &'a World,
+    pub(crate) along: AlongRays<'a>,
     pub(crate) boundary: &'a Boundary,
     pub(crate) radiative: Option<&'a Radiative>,
     pub(crate) grazing: Option<&'a GrazingFlux>,
@@ -96,12 +100,14 @@ impl Splatter<'_> {
         count: u32,
         receiver: &mut Checked<R>,
     ) -> Account {
-        let mut tracer = Tracer::new(self.world);
+        let from_light = source == BoundarySource::LightPaths;
+        let mut tracer = Tracer::new(if from_light { self.all } else { self.world });
         let mut edges = boundary::Buffers::default();
         let mut functional = VelocityFunctional::default();
         let mut grazing = flux::Buffers::default();
-        let emission = self.emission.filter(|_| source == BoundarySource::LightPaths);
-        let mut light_paths = emission.map(|e| LightPaths::new(self.world, e, receiver.sink()));
+        let mut light_paths = self.emission.filter(|_| from_light).map(|emission| {
+            LightPaths::new(self.all, emission, self.world, &self.along, receiver.sink())
+        });
         receiver.term = Some(source.term());
         receiver.seed = self.seed;
         receiver.stream = stream;

@@ -35,7 +35,12 @@ impl Method {
     /// What others are compared with.
     pub const REFERENCE: Self = Self(EstimatorKind::PathSpace, PathSampling::Unidirectional);
     /// By paths from both ends.
-    pub const BOTH_ENDS: Self = Self(EstimatorKind::PathSpace, PathSampling::Bidirectional);
+    pub const BOTH_ENDS: [Self; 2] =
+        [Self::both_ends(EstimatorKind::PathSpace), Self::both_ends(EstimatorKind::Warped)];
+
+    const fn both_ends(kind: EstimatorKind) -> Self {
+        Self(kind, PathSampling::Bidirectional)
+    }
 }
 
 impl From<EstimatorKind> for Method {

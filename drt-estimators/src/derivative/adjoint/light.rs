@@ -33,7 +33,14 @@ impl Differentiator<'_> {
         send(vertex, &SurfaceAdjoint::of_place(by_view.place * phi), sink);
         self.sensor = Default::default();
         self.by_sensor(&by_view, phi, sink.active());
-        self.camera_ray(record, RgbVec::ZERO, RgbVec::ZERO, &self.sensor.clone(), sink);
+        let mut origin = RgbVec::ZERO;
+        if let Some(ray) = path.ray_motion(velocities.of(1).turn) {
+            let by_view = self.seen(None, arrival.dir, value, Rgb::ZERO);
+            self.by_sensor(&by_view, ray.turn.weight, sink.active());
+            origin -= ray.send(arrival.dir, &by_view.place, Rgb::ZERO, sink);
+        }
+        let sensor = self.sensor;
+        self.camera_ray(record, origin, RgbVec::ZERO, &sensor, sink);
     }
 
     /// Node `k` being a vertex of a light path as something sees it: what its scattering collects from behind, and the
@@ -74,6 +81,11 @@ impl Differentiator<'_> {
             let g = turn(&(to_wi * phi), wi, end.distance);
             here.u -= g;
             send(v, &SurfaceAdjoint::of_place(g), sink);
+            if let Some(ray) = path.ray_motion(velocities.of(next).turn)
+                && !self.edges_at_rest
+            {
+                here.u -= ray.send(wi, &to_wi, Rgb::ZERO, sink);
+            }
         }
         (node.value * node.inv_pdf * children, here)
     }

@@ -68,7 +68,7 @@ impl<'w> Recording<'w> {
         pairs: AntitheticPairs,
     ) -> Self {
         let velocities = PathVelocities::new(field);
-        let view = PathView { world, velocities, pairs, flux: None };
+        let view = PathView::new(world, velocities, pairs, None);
         Self { record: PathRecord::default(), views: [view] }
     }
 

@@ -49,6 +49,10 @@ impl VelocityField for Material {
         VertexVelocity { moves, blend: Blend::MATERIAL, ..Default::default() }
     }
 
+    fn follows_rays(&self) -> bool {
+        false
+    }
+
     fn blend(&self, _: &World, _: &Vertex, _: &Vertex, _: Vec3, _: f64) -> Blend {
         Blend::MATERIAL
     }

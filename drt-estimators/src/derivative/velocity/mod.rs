@@ -145,6 +145,16 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity;
 
+    /// Whether it looks at the rays that find vertices, to where they end.
+    fn follows_rays(&self) -> bool {
+        true
+    }
+
+    /// Whether a vertex may move, however it is found.
+    fn may_move(&self) -> bool {
+        true
+    }
+
     /// Whether it draws random numbers.
     fn is_random(&self) -> bool {
         false
@@ -236,6 +246,11 @@ impl Movers {
             volumes: active.volumes.as_slice().into(),
             camera: active.sensor,
         }
+    }
+
+    /// Whether anything does.
+    pub(crate) fn any(&self) -> bool {
+        self.camera || [&self.shapes, &self.volumes].iter().any(|list| list.contains(&true))
     }
 
     /// Whether a material point does.

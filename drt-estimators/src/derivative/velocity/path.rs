@@ -3,7 +3,7 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use drt_math::Rng;
+use drt_math::{Rng, Vec3};
 
 use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::velocity::{
@@ -11,8 +11,9 @@ use crate::derivative::velocity::{
     VertexVelocity,
 };
 use crate::sampling::record::PathRecord;
-use crate::sampling::trace::{Arrival, OutgoingRay};
+use crate::sampling::trace::Arrival;
 use crate::world::lights::EmitterMask;
+use crate::world::vertex::Vertex;
 use crate::world::{RayPath, World};
 
 /// The velocities of a path's vertices, node by node.
@@ -55,26 +56,38 @@ impl PathVelocities {
         self.vertices.push(self.field.camera());
     }
 
-    /// A ray is about to be followed, on which vertices may be recorded next.
+    /// A ray from a node, at the `viewer`, along the unit vector `dir`, on which vertices may be recorded next.
     pub(crate) fn ray(
         &mut self,
         world: &World,
         record: &PathRecord,
-        leaving: &OutgoingRay,
+        node: usize,
+        viewer: &Vertex,
+        dir: Vec3,
         ray: &RayPath,
     ) {
-        let node = leaving.node as usize;
         let turning = TurningRay {
-            viewer: &leaving.vertex,
+            viewer,
             moves: self.vertices[node].moves,
             pixel: (node == 0).then_some(record.pixel),
-            dir: leaving.dir,
+            dir,
             distance: ray.length,
             end: ray.end.as_ref().map(|(point, _)| point),
         };
         let turn = self.field.turn(world, &turning, &mut self.probe, &mut self.turn_parts);
         self.present = turn.is_some().then_some(self.turns.len() as u32);
         self.turns.extend(turn);
+    }
+
+    /// Adds that of a vertex that no ray of the record has found.
+    pub(crate) fn unseen(&mut self) {
+        let moves = self.field.may_move();
+        self.vertices.push(VertexVelocity { moves, ..Default::default() });
+    }
+
+    /// Counts rays that were cast for the field.
+    pub(crate) fn count(&mut self, rays: u64) {
+        self.probe.rays += rays;
     }
 
     /// How the present ray turns, if it does, by its index.

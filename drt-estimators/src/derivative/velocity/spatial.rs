@@ -104,6 +104,10 @@ impl VelocityField for Spatial {
         VertexVelocity { moves, blend, auxiliary, turn: None }
     }
 
+    fn may_move(&self) -> bool {
+        self.movers.any()
+    }
+
     fn blend(
         &self,
         world: &World,

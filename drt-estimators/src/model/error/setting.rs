@@ -51,8 +51,10 @@ pub enum SettingError {
     )]
     SurfacesOnly,
     /// A [`PathSampling`](crate::PathSampling) that the estimator of derivatives does not have.
-    #[error("bidirectional sampling is for images, and for derivatives by path-space alone")]
-    PathSpaceOnly,
+    #[error(
+        "bidirectional sampling is for images, and for derivatives by path-space and warped (with edges) alone"
+    )]
+    OtherKinds,
     /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
     #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
     JumpingFilter,

@@ -91,28 +91,32 @@ impl Component {
         Some(interior::Component { world, along, sink })
     }
 
-    /// Adds samples of one source of boundary samples, so many per pixel; false when cancelled.
+    /// Adds samples of one source of boundary samples, so many per pixel, in a world lit by all emitters; false when cancelled.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn run_source(
         &mut self,
         i: usize,
         seed: u64,
         per_pixel: f64,
+        all: &World,
         pass: &Pass<'_>,
         progress: impl Fn(f64),
     ) -> (Account, bool) {
         let mut film = core::mem::take(&mut self.splats[i]);
-        let result = self.sample_source(&mut film, i, seed, per_pixel, pass, progress);
+        let result = self.sample_source(&mut film, i, seed, per_pixel, all, pass, progress);
         self.splats[i] = film;
         result
     }
 
     /// The same to a `film`, in as many batches as error bars need.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn sample_source(
         &self,
         film: &mut SplatFilm,
         i: usize,
         seed: u64,
         per_pixel: f64,
+        all: &World,
         pass: &Pass<'_>,
         progress: impl Fn(f64),
     ) -> (Account, bool) {
@@ -120,7 +124,7 @@ impl Component {
         let Some(motion) = &self.motion else { return (account, true) };
         let source = self.prepared.sources[i];
         let per_batch = self.prepared.samples_per_batch(per_pixel);
-        let splatter = self.prepared.splatter(seed);
+        let splatter = self.prepared.splatter(all, seed);
         let mut sums = film.begin();
         let first = pass.before * BATCHES as u32;
         let own = pass.shard.map_or(0..BATCHES as u32, |shard| shard.of(BATCHES as u32));

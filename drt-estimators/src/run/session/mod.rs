@@ -241,7 +241,7 @@ impl Session {
                 pass.control.progress(part + (1.0 - part) * before);
             };
             let (account, finished) =
-                self.components[c].run_source(i, seed, per_pixel, pass, progress);
+                self.components[c].run_source(i, seed, per_pixel, &self.world, pass, progress);
             self.account.add(account);
             going = finished;
         }
@@ -411,7 +411,11 @@ pub(crate) fn estimators(
     let volumes = !scene.media.is_empty() || scene.bsdfs.iter().any(|b| b.item.is_null());
     let fits = match settings.estimator {
         EstimatorKind::Radiative => false,
-        EstimatorKind::Warped => !volumes && matches!(settings.warp, Warp::Edges),
+        // What lies behind a connection turns alike for all light that it brings.
+        EstimatorKind::Warped => {
+            let from_camera = settings.sampling == PathSampling::Unidirectional;
+            !volumes && matches!(settings.warp, Warp::Edges) && from_camera
+        }
         _ => true,
     };
     if !fits && emitters().any(|e| e.is_delta()) && targets.into_iter().any(may_move) {

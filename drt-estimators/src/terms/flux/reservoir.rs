@@ -117,6 +117,12 @@ impl Reservoir {
         self.chosen = None;
     }
 
+    /// Lists the surfaces that a ray meets along the unit vector `dir`, whose points move or not.
+    pub(crate) fn meet(&mut self, ray: &RayPath, dir: Vec3, moves: bool) {
+        let flux = &self.flux;
+        list_hits(&mut self.met, ray, dir, |point| flux.sweeps(point.shape, moves));
+    }
+
     /// Offers the surfaces that a ray meets, whose origin `moves` or which `turns`.
     pub(crate) fn offer(
         &mut self,
@@ -129,9 +135,8 @@ impl Reservoir {
         let moves = moves || turns.is_some();
         let OutgoingRay { node, throughput, dir, segments, .. } = *leaving;
         let origin = leaving.vertex.x;
+        self.meet(ray, dir, moves);
         let flux = &self.flux;
-        self.met.clear();
-        list_hits(&mut self.met, ray, dir, |point| flux.sweeps(point.shape, moves));
         let strength = throughput.max_abs();
         if strength == 0.0 || segments + 1 >= flux.longest {
             return;

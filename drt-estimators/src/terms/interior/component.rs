@@ -1,6 +1,5 @@
 //! One estimator's part in the derivative of a path: the light of some emitters, by a velocity field.
 
-use alloc::sync::Arc;
 
 use drt_geom::edges::tree::TreeScratch;
 use drt_math::{Rgb, RgbVec, Rng};
@@ -8,7 +7,7 @@ use drt_math::{Rgb, RgbVec, Rng};
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::antithetic::{AntitheticPairs, PairedRadiance};
 use crate::derivative::sensitivity::{SurfaceAdjoint, VelocityTerm};
-use crate::derivative::velocity::{Material, Movers, PathVelocities, RecordedPath, VelocityField};
+use crate::derivative::velocity::{PathVelocities, RecordedPath};
 use crate::sampling::record::PathRecord;
 use crate::sampling::streams::LINE_STREAM;
 use crate::sampling::trace::Tracer;
@@ -59,17 +58,9 @@ impl<'a, S: PathSink> Worker<'a, S> {
     /// With what it keeps of each path.
     pub(super) fn new(component: Component<'a, S>, separate: bool) -> (Self, PathView<'a>) {
         let Component { world, along, sink } = component;
-        let field: Arc<dyn VelocityField> = match (along.radiative, along.warped) {
-            (Some(radiative), _) => Arc::clone(&radiative.spatial) as _,
-            (_, Some(warped)) => Arc::clone(&warped.field),
-            _ => Arc::new(Material::new(Movers::new(sink.active()))),
-        };
-        let view = PathView {
-            world,
-            velocities: PathVelocities::new(field),
-            pairs: AntitheticPairs::new(along.lobe_pairs),
-            flux: along.flux.map(crate::terms::flux::Reservoir::new),
-        };
+        let velocities = PathVelocities::new(along.field(sink.active()));
+        let pairs = AntitheticPairs::new(along.lobe_pairs);
+        let view = PathView::new(world, velocities, pairs, along.flux);
         let worker = Self {
             along,
             sink,
@@ -172,7 +163,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         values: &mut [Rgb],
     ) {
         let Self { sink, differentiator, .. } = self;
-        let PathView { world, velocities, pairs, flux } = view;
+        let PathView { world, velocities, pairs, flux, .. } = view;
         let Some(flux) = flux else { return };
         let record = path.record;
         let recorded = RecordedPath { record, velocities, pairs, lit: world.lit };

@@ -5,9 +5,10 @@ use drt_math::{Rgb, Rng, Vec3};
 use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::velocity::PathVelocities;
 use crate::derivative::velocity::RecordedPath;
-use crate::sampling::record::{Joint, LightPath, PathRecord};
+use crate::model::rendering::Counters;
+use crate::sampling::record::{Joint, LightPath, Node, PathRecord, Role};
 use crate::sampling::trace::{Arrival, Connection, Observer, OutgoingRay, Pixel};
-use crate::terms::flux::Reservoir;
+use crate::terms::flux::{Flux, Reservoir};
 use crate::world::Crossing;
 use crate::world::{RayPath, World};
 
@@ -19,9 +20,21 @@ pub(crate) struct PathView<'a> {
     pub(crate) pairs: AntitheticPairs,
     /// One of the surfaces with a flux that the path met, if there are such.
     pub(crate) flux: Option<Reservoir>,
+    /// A ray that was looked at for nothing else.
+    looked: RayPath,
 }
 
-impl PathView<'_> {
+impl<'a> PathView<'a> {
+    pub(crate) fn new(
+        world: &'a World,
+        velocities: PathVelocities,
+        pairs: AntitheticPairs,
+        flux: Option<&Flux>,
+    ) -> Self {
+        let flux = flux.map(Reservoir::new);
+        Self { world, velocities, pairs, flux, looked: RayPath::default() }
+    }
+
     /// Forgets the last path; random numbers are for choosing among pairs, for velocities, and for surfaces with a flux.
     pub(crate) fn begin(
         &mut self,
@@ -54,9 +67,30 @@ pub(crate) struct Recorder<'r, 'a> {
 impl Recorder<'_, '_> {
     /// A node has been added that no walk arrived at.
     fn found(&mut self, node: usize) {
-        let Some(arrival) = self.record.nodes[node].arrival else { return };
-        for view in self.views.iter_mut() {
-            view.velocities.arrive(view.world, self.record, &arrival, &[]);
+        let Node { arrival: Some(arrival), role, .. } = &self.record.nodes[node] else { return };
+        let parent = arrival.parent as usize;
+        let dir = arrival.dir;
+        for PathView { world, velocities, flux, looked, .. } in self.views.iter_mut() {
+            let follows = velocities.field().follows_rays();
+            if follows && matches!(role, Role::LastOfLight) {
+                velocities.unseen();
+                continue;
+            }
+            let mut hits = &[][..];
+            if follows {
+                let eye = world.eye();
+                let viewer = self.record.nodes[parent].vertex().unwrap_or(&eye);
+                let mut counters = Counters::default();
+                world.cast(viewer, dir, looked, &mut counters);
+                velocities.count(counters.rays);
+                velocities.ray(world, self.record, parent, viewer, dir, looked);
+                if let Some(flux) = flux {
+                    let turns = velocities.present_turn().is_some();
+                    flux.meet(looked, dir, turns || velocities.moves(parent));
+                    hits = flux.hits();
+                }
+            }
+            velocities.arrive(world, self.record, arrival, hits);
         }
     }
 
@@ -78,9 +112,10 @@ impl Observer for Recorder<'_, '_> {
             kept.clone_from(ray);
         }
         for PathView { world, velocities, flux, .. } in self.views.iter_mut() {
-            velocities.ray(world, self.record, leaving, ray);
+            let node = leaving.node as usize;
+            velocities.ray(world, self.record, node, &leaving.vertex, leaving.dir, ray);
             if let Some(flux) = flux {
-                let moves = velocities.moves(leaving.node as usize);
+                let moves = velocities.moves(node);
                 flux.offer(world, leaving, moves, velocities.present_turn(), ray);
             }
         }

@@ -74,6 +74,10 @@ impl VelocityField for EdgeTurns {
         velocity
     }
 
+    fn may_move(&self) -> bool {
+        self.spatial.may_move()
+    }
+
     fn turn(
         &self,
         world: &World,

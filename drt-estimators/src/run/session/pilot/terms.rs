@@ -119,7 +119,7 @@ fn along_paths(prepared: &Prepared, motion: &Motion) -> [TermStatistics; 2] {
 /// Of a source of boundary samples.
 fn of_source(prepared: &Prepared, motion: &Motion, source: BoundarySource) -> TermStatistics {
     let world = &prepared.world;
-    let splatter = prepared.splatter(SEED);
+    let splatter = prepared.splatter(world, SEED);
     let mut variance = alloc::vec![0.0; motion.parameters()];
     let mut rays = 0;
     // Each pixel is the mean over the samples of all pixels.

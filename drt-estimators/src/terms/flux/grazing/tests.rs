@@ -44,7 +44,7 @@ fn grazing_flux() -> Moments {
         let contraction = Contraction::new(&prepared.world, &motion);
         let mut mean = Checked::new(choice::Total { contraction, weight: |_| 1.0, sum: 0.0 });
         let count = 1 << 12;
-        prepared.splatter(seed).run(
+        prepared.splatter(&prepared.world, seed).run(
             BoundarySource::GrazingFlux,
             BoundarySource::GrazingFlux.stream(),
             count,
