@@ -56,7 +56,10 @@ impl Differentiator<'_> {
         if let Some(turn) = &turn {
             velocity.blend = velocity.blend.and(turn.rest(distance));
         }
-        (moves || !auxiliary.is_empty()).then_some(LightMotion { end, velocity, turn })
+        if !moves && auxiliary.is_empty() {
+            return None;
+        }
+        Some(LightMotion { end, velocity, turn })
     }
 
     /// Sensitivities at the emitter's end of a connection.

@@ -277,15 +277,16 @@ impl<'w> Differentiator<'w> {
         }
         let weight = arrival.throughput * received;
         let parent = &record.nodes[p];
+        let eye = world.eye();
         let (from, theta) = match &parent.arrival {
-            None => (world.eye(), Rgb::ONE),
+            None => (&eye, Rgb::ONE),
             Some(a) => match &a.end {
-                Endpoint::Surface(v) => (*v, a.throughput),
-                Endpoint::Volume(v, c) => (*v, a.throughput * c.sigma_s()),
+                Endpoint::Surface(v) => (v, a.throughput),
+                Endpoint::Volume(v, c) => (v, a.throughput * c.sigma_s()),
                 Endpoint::Environment => return,
             },
         };
-        let mut there = core::mem::take(&mut self.locals[p].at);
+        let mut there = self.locals[p].at;
         let (near_moves, far_moves) = (velocities.moves(p), velocity.moves);
         let ray_moves = near_moves || turn_of_ray.is_some();
         // As far as this is not the camera's importance.
@@ -301,17 +302,9 @@ impl<'w> Differentiator<'w> {
             let adjoint = theta * value * inv_pdf;
             let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
             let moving = far_moves || near_moves || velocities.moves(behind.parent);
-            let to_wi = self.scattering(
-                &from,
-                wo,
-                wi,
-                paired,
-                adjoint,
-                Some(behind),
-                moving,
-                &mut there,
-                sink,
-            );
+            let behind = Some(behind);
+            let to_wi = self
+                .scattering(from, wo, wi, paired, adjoint, behind, moving, &mut there, sink);
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
                 let g = turn(&(to_wi * phi), wi, arrival.distance);
                 there.u -= g;
