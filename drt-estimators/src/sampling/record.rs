@@ -133,6 +133,7 @@ impl PathRecord {
     }
 
     /// A node was connected to a light.
+    #[inline]
     pub(crate) fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
         let crossings = self.keep(crossings);
         self.connections.push((*connection, crossings));

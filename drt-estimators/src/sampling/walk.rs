@@ -250,6 +250,7 @@ impl Tracer<'_> {
     }
 
     /// Adds the light of one sampled emitter point, scattered at `stop`.
+    #[inline]
     pub(super) fn connect_light<O: Observer>(
         &mut self,
         stop: &PathState,

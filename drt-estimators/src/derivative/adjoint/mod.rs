@@ -94,6 +94,7 @@ impl<'p> RecordedPath<'p> {
         Some(RayMotion { turn, parts, shadows: &[], light: None })
     }
 
+    #[inline]
     fn motion(&self, node: usize) -> NodeMotion<'p> {
         let velocity = self.velocities.of(node);
         let auxiliary = self.velocities.auxiliary(velocity);

@@ -57,6 +57,7 @@ impl PathVelocities {
     }
 
     /// A ray from a node, at the `viewer`, along the unit vector `dir`, on which vertices may be recorded next.
+    #[inline]
     pub(crate) fn ray(
         &mut self,
         world: &World,
@@ -96,6 +97,7 @@ impl PathVelocities {
     }
 
     /// Adds that of a vertex just recorded, found by a ray that `hits` some surfaces with a flux.
+    #[inline]
     pub(crate) fn arrive(
         &mut self,
         world: &World,
