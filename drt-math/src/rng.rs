@@ -61,13 +61,19 @@ impl Rng {
     #[inline]
     pub fn next_u32(&mut self) -> u32 {
         if self.used == 4 {
-            self.block = philox4x32(self.counter, self.key);
-            self.counter[0] = self.counter[0].wrapping_add(1);
-            self.used = 0;
+            self.refill();
         }
         let v = self.block[self.used as usize];
         self.used += 1;
         v
+    }
+
+    /// The next block of bits: not in line, as its many registers would be saved for leading numbers, too.
+    #[inline(never)]
+    fn refill(&mut self) {
+        self.block = philox4x32(self.counter, self.key);
+        self.counter[0] = self.counter[0].wrapping_add(1);
+        self.used = 0;
     }
 
     /// 64 random bits.

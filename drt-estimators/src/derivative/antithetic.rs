@@ -264,9 +264,10 @@ impl AntitheticPairs {
         let seen = || {
             record.nodes[k].arrival.as_ref().is_some_and(|a| a.parent == 0) && velocities.moves(0)
         };
-        let turns = world.bends_light(v) || seen() || field.turns_rays(world, s, velocities.of(k));
         let transmissive = world.bsdf_of(s.shape).is_transmissive();
-        turns && world.lobe_width(v) < field.widest_paired(transmissive)
+        // Most lobes are wide.
+        world.lobe_width(v) < field.widest_paired(transmissive)
+            && (world.bends_light(v) || seen() || field.turns_rays(world, s, velocities.of(k)))
     }
 
     /// Follows most of the other rays: tells `found` pairs, their probabilities, and what they bring; `incoming` is a
