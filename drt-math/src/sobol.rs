@@ -57,9 +57,14 @@ impl SobolSampler {
         let x = coordinate(self.shuffled, self.dimension, self.seed);
         self.dimension = self.dimension.wrapping_add(1);
         if self.dimension.is_multiple_of(SET_DIMENSIONS) {
-            self.shuffled = shuffled(self.index, self.dimension / SET_DIMENSIONS, self.seed);
+            self.enter_set();
         }
         x
+    }
+
+    #[cold]
+    fn enter_set(&mut self) {
+        self.shuffled = shuffled(self.index, self.dimension / SET_DIMENSIONS, self.seed);
     }
 
     /// Leaves out so many coordinates.
@@ -67,7 +72,7 @@ impl SobolSampler {
         let set = self.dimension / SET_DIMENSIONS;
         self.dimension = self.dimension.wrapping_add(coordinates);
         if self.dimension / SET_DIMENSIONS != set {
-            self.shuffled = shuffled(self.index, self.dimension / SET_DIMENSIONS, self.seed);
+            self.enter_set();
         }
     }
 

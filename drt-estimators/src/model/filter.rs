@@ -163,10 +163,12 @@ impl Filter {
 
     /// The pixels of a row of `n` whose supports hold the coordinate `at`.
     pub(crate) fn reached(&self, at: f64, n: u32) -> Range<u32> {
-        // Centres i + 1/2 not farther than the radius; the casts saturate.
-        let first = fm::ceil(at - self.radius - 0.5) as u32;
-        let last = fm::floor(at + self.radius - 0.5);
-        first..((last + 1.0) as u32).min(n)
+        // Centres i + 1/2 not farther than the radius. Casts saturate, and are no calls as rounding is on many machines.
+        let [first, last] = [at - self.radius - 0.5, at + self.radius - 0.5];
+        let start = first as u32;
+        let start = start.saturating_add(u32::from(f64::from(start) < first));
+        let end = if last >= 0.0 { (last as u32).saturating_add(1) } else { 0 };
+        start..end.min(n)
     }
 
     /// False when the filter jumps at the edge of its support, so that the material form needs an

@@ -191,7 +191,7 @@ impl HalfProfile {
     fn pdf(&self, x: f64) -> f64 {
         let last = self.knots.len() - 2;
         let at = x * (last + 1) as f64;
-        let i = (at as usize).min(last);
+        let i = (at as u32 as usize).min(last);
         let t = at - i as f64;
         self.knots[i] + (self.knots[i + 1] - self.knots[i]) * t
     }
