@@ -304,8 +304,8 @@ impl<'w> Differentiator<'w> {
             let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
             let moving = far_moves || near_moves || velocities.moves(behind.parent);
             let behind = Some(behind);
-            let to_wi = self
-                .scattering(from, wo, wi, paired, adjoint, behind, moving, &mut there, sink);
+            let to_wi =
+                self.scattering(from, wo, wi, paired, adjoint, behind, moving, &mut there, sink);
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
                 let g = turn(&(to_wi * phi), wi, arrival.distance);
                 there.u -= g;
