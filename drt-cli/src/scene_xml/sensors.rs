@@ -17,20 +17,25 @@ impl<'a> Loader<'a> {
     pub(super) fn sensor(&self, e: &'a Element) -> Result<Named<SceneSensor>, CliError> {
         let p = Properties::of(e)?;
         let kind = p.kind()?;
-        if kind != "perspective" {
-            let message =
-                format!("the sensor type `{kind}` is not supported; expected perspective");
-            return Err(e.error(message));
-        }
+        let parallel = match kind {
+            "perspective" => false,
+            "orthographic" => true,
+            _ => {
+                return Err(e.error(format!(
+                    "the sensor type `{kind}` is not supported; expected perspective or orthographic"
+                )));
+            }
+        };
         let (film, filter) = self.film(&p)?;
-        let lens = lens(&p)?;
+        let lens = if parallel { clipped(&p, Lens::default())? } else { lens(&p)? };
         let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
         let medium = self.surrounding(&p)?;
         let sample_count = self.sampler(&p)?;
-        // A pinhole in a scene at rest has neither focus nor shutter.
+        // A camera without aperture in a scene at rest has neither focus nor shutter.
         p.accept(&["focus_distance", "shutter_open", "shutter_close"]);
         p.finish()?;
-        let sensor = Sensor::from_to_world(&to_world, lens, film, filter);
+        let place = if parallel { Sensor::orthographic } else { Sensor::from_to_world };
+        let sensor = place(&to_world, lens, film, filter);
         let sensor = sensor.map_err(|err| e.error(err))?;
         let item = SceneSensor { sensor, medium, sample_count };
         Ok(Named { id: e.id().map(Into::into), item })
@@ -84,9 +89,13 @@ fn lens(p: &Properties<'_>) -> Result<Lens, CliError> {
     let offset = |name| Ok::<f64, CliError>(p.float(name)?.unwrap_or(0.0));
     lens.principal_point_offset =
         [offset("principal_point_offset_x")?, offset("principal_point_offset_y")?];
-    lens.near = p.float("near_clip")?.unwrap_or(lens.near);
-    lens.far = p.float("far_clip")?.unwrap_or(lens.far);
-    Ok(lens)
+    clipped(p, lens)
+}
+
+fn clipped(p: &Properties<'_>, lens: Lens) -> Result<Lens, CliError> {
+    let near = p.float("near_clip")?.unwrap_or(lens.near);
+    let far = p.float("far_clip")?.unwrap_or(lens.far);
+    Ok(Lens { near, far, ..lens })
 }
 
 fn fov_axis(p: &Properties<'_>) -> Result<FovAxis, CliError> {

@@ -378,6 +378,7 @@ impl Apply<'_> {
             item =
                 item.at(&frame.map).map_err(|reason| self.fail(first.parameter, target, reason))?;
             for (t, v) in tangents.iter_mut().zip(&frame.velocities) {
+                item.check_rate(v).map_err(|reason| self.fail(first.parameter, target, reason))?;
                 *t += item.rate(v);
             }
         }
@@ -422,6 +423,10 @@ impl Apply<'_> {
 trait Placed: Sized {
     type Tangent: Clone + Default + AddAssign;
     fn at(&self, map: &Affine) -> Result<Self, EffectError>;
+    /// Whether it stays what it is under a velocity field.
+    fn check_rate(&self, _field: &Affine) -> Result<(), EffectError> {
+        Ok(())
+    }
     fn rate(&self, field: &Affine) -> Self::Tangent;
     fn value(&self, property: &str) -> Result<Rgb, EffectError>;
     fn with(&self, property: &str, value: Rgb) -> Result<Self, EffectError>;
@@ -429,12 +434,13 @@ trait Placed: Sized {
 }
 
 macro_rules! placed {
-    ($($item:ty => $tangent:ty),*) => {$(
+    ($($item:ty => $tangent:ty { $($check:item)* })*) => {$(
         impl Placed for $item {
             type Tangent = $tangent;
             fn at(&self, map: &Affine) -> Result<Self, EffectError> {
                 self.moved(map).map_err(Into::into)
             }
+            $($check)*
             fn rate(&self, field: &Affine) -> $tangent {
                 self.velocity(field)
             }
@@ -451,7 +457,14 @@ macro_rules! placed {
     )*};
 }
 
-placed!(Emitter => EmitterTangent, Sensor => SensorTangent);
+placed! {
+    Emitter => EmitterTangent {}
+    Sensor => SensorTangent {
+        fn check_rate(&self, field: &Affine) -> Result<(), EffectError> {
+            self.check_velocity(field).map_err(Into::into)
+        }
+    }
+}
 
 /// The entries to keep, with their parameters' indices.
 fn keep<T>(items: Vec<T>, kept: impl Fn(&T) -> bool) -> Vec<(usize, T)> {

@@ -119,10 +119,11 @@ impl Contact {
         self.floor[usize::from(self.side.dot(w) < 0.0)]
     }
 
-    /// The direction and distance of a point from the contact.
-    pub(crate) fn towards(&self, p: Vec3) -> Option<(Vec3, f64)> {
+    /// The direction and distance from the contact to the point from which it is seen.
+    pub(crate) fn towards(&self, eye_of: impl Fn(Vec3) -> Vec3) -> Option<(Vec3, f64)> {
         let x = self.floor.iter().flatten().next()?.x;
-        let distance = (p - x).length();
-        Some(((p - x) / distance, distance))
+        let d = eye_of(x) - x;
+        let distance = d.length();
+        Some((d / distance, distance))
     }
 }

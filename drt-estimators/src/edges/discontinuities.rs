@@ -9,6 +9,7 @@ use drt_math::{Vec3, fm};
 
 use crate::edges::contact::Contact;
 use crate::edges::edge::{Edge, EdgePoint, collect};
+use crate::model::sensor::Sensor;
 use crate::world::vertex::{MaterialPoint, SurfacePoint};
 use crate::world::{SurroundingMedium, World};
 
@@ -127,15 +128,23 @@ impl DiscontinuityEdges {
     /// Weight of an edge seen from a point: the angle it subtends, less where it is a crease. Samples of its
     /// two sides, of the same random numbers, seldom differ, but then by all there is: their root mean square
     /// is that of how often. Where normals are interpolated they differ each time, by little.
-    pub(crate) fn seen_from(&self, discontinuity: &DiscontinuityEdge, eye: Vec3) -> f64 {
-        let silhouette = discontinuity.edge.wedge.subtended_angle(eye);
+    pub(crate) fn seen_from(&self, discontinuity: &DiscontinuityEdge, camera: &Sensor) -> f64 {
+        let wedge = &discontinuity.edge.wedge;
+        let (eye, forward) = (camera.position(), camera.pinhole().forward);
+        let parallel = camera.is_orthographic();
+        let silhouette =
+            if parallel { wedge.projected_length(forward) } else { wedge.subtended_angle(eye) };
         let Some(normals) = self.normals(discontinuity).filter(|_| silhouette == 0.0) else {
             return silhouette;
         };
-        let [da, db] = discontinuity.edge.wedge.ends.map(|p| p - eye);
+        let [da, db] = wedge.ends.map(|p| if parallel { forward } else { p - eye });
         let crease = discontinuity.crease[usize::from(normals[0].dot(da) > 0.0)];
         let weight = if discontinuity.smooth { crease } else { fm::sqrt(crease) };
-        weight * fm::atan2(da.cross(db).length(), da.dot(db))
+        let size = match parallel {
+            true => wedge.length * wedge.sine(forward),
+            false => fm::atan2(da.cross(db).length(), da.dot(db)),
+        };
+        weight * size
     }
 
     /// What a viewer sees of an edge; `w` is unit, from the edge to the viewer.

@@ -12,6 +12,7 @@ use drt_math::Vec3;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::edges::edge::Edge;
+use crate::model::sensor::Sensor;
 use crate::world::World;
 
 /// Boxes that are kept apart; more become one around all.
@@ -51,8 +52,11 @@ impl<'a> Movers<'a> {
     }
 
     /// True when an edge can matter to segments that start at the camera.
-    pub(crate) fn pass_camera(&self, e: &Edge, eye: Vec3) -> bool {
-        self.active.sensor || self.pass_beyond(e, |x| x - eye)
+    pub(crate) fn pass_camera(&self, e: &Edge, camera: &Sensor) -> bool {
+        let onward = |x| {
+            if camera.is_orthographic() { camera.pinhole().forward } else { x - camera.position() }
+        };
+        self.active.sensor || self.pass_beyond(e, onward)
     }
 
     /// True when an edge can matter to segments that start on an emitter, which leave it at `x`

@@ -1,10 +1,9 @@
-//! Pinhole cameras: from pixels to rays, from points to pixels, and how both change when the
-//! camera moves.
+//! Cameras: from pixels to rays, from points to pixels, and how both change when the camera moves.
 //!
 //! Axes: `right` and `up` span the image plane, `forward` looks into the scene; the image point of
 //! x is a = (d·right)/(d·forward), b = (d·up)/(d·forward) with d = x - position, on the plane at
 //! distance one. Pixel coordinates have their origin at the film's top left corner, x to the right
-//! and y down, and pixel (i, j) covers [i, i+1) × [j, j+1).
+//! and y down, and pixel (i, j) covers [i, i+1) × [j, j+1). [Orthographic](orthographic) cameras have a = d·right, b = d·up.
 //!
 //! Placements mean what they mean in Mitsuba: the camera looks along the local +z axis with +y up
 //! and +x to the *left* of the image, so that `right` is minus the first axis of `to_world`.
@@ -12,6 +11,7 @@
 mod footprint;
 mod lens;
 mod motion;
+mod orthographic;
 mod pinhole;
 #[cfg(test)]
 mod tests;
@@ -54,6 +54,17 @@ pub enum SensorError {
          keep a camera a camera"
     )]
     NotRigid,
+    /// A film of an orthographic camera that is no square pixels.
+    #[error(
+        "the orthographic camera's film is stretched along one axis or sheared; its pixels stay square \
+         under rotations, reflections, translations and scales that are the same along all axes"
+    )]
+    Oblong,
+    /// A property asked of a camera that has none.
+    #[error(
+        "an orthographic camera has no property to differentiate, and none named `{0}`; move or scale it"
+    )]
+    NoProperties(alloc::string::String),
     /// A motion that flattens the camera.
     #[error("the motion flattens the camera's axes; choose a value nearer to zero")]
     Flattened,
@@ -80,7 +91,7 @@ pub enum SensorError {
     Filter(#[from] FilterError),
 }
 
-/// A perspective pinhole camera with its film.
+/// A camera with its film, perspective or orthographic, or a meter of irradiance.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Parts", into = "Parts"))]
@@ -95,7 +106,7 @@ pub struct Sensor {
 /// A ray into the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraRay {
-    /// The pinhole.
+    /// The pinhole, or the point of an orthographic camera's film.
     pub origin: Vec3,
     /// Unit vector into the scene; light flows against it.
     pub direction: Vec3,
@@ -193,8 +204,22 @@ impl Sensor {
 
     /// The same sensor with another lens and film.
     fn with(&self, lens: Lens, film: [u32; 2]) -> Result<Self, SensorError> {
-        let camera = Self::from_to_world(&self.to_world(), lens, film, self.filter.clone())?;
-        Ok(Self { response: self.response, ..camera })
+        let (to_world, filter) = (self.to_world(), self.filter.clone());
+        Self::of_response(self.response, &to_world, lens, film, filter)
+    }
+
+    /// A sensor that its placement and the rest determine.
+    fn of_response(
+        response: Response,
+        to_world: &Affine,
+        lens: Lens,
+        film: [u32; 2],
+        filter: Filter,
+    ) -> Result<Self, SensorError> {
+        match response {
+            Response::Orthographic => Self::orthographic(to_world, lens, film, filter),
+            _ => Ok(Self { response, ..Self::from_to_world(to_world, lens, film, filter)? }),
+        }
     }
 
     /// The same camera with another filter.
@@ -206,11 +231,14 @@ impl Sensor {
     /// The camera-to-world map.
     #[must_use]
     pub fn to_world(&self) -> Affine {
+        if self.is_orthographic() {
+            return self.orthographic_to_world();
+        }
         let Pinhole { position, right, up, forward, .. } = self.pinhole;
         Affine { linear: Mat3 { cols: [-right, up, forward] }, translation: position }
     }
 
-    /// The centre of projection.
+    /// The centre of projection; of an orthographic camera, a point on its film.
     #[inline]
     #[must_use]
     pub fn position(&self) -> Vec3 {
@@ -245,6 +273,9 @@ impl Sensor {
     #[inline]
     #[must_use]
     pub fn ray(&self, pixel: [f64; 2]) -> CameraRay {
+        if self.is_orthographic() {
+            return self.parallel_ray(pixel);
+        }
         let v = self.pinhole.view(pixel);
         let length = v.length();
         CameraRay {
@@ -258,8 +289,12 @@ impl Sensor {
     #[inline]
     #[must_use]
     pub fn project(&self, x: Vec3) -> Option<Projection> {
-        let depth = (x - self.pinhole.position).dot(self.pinhole.forward);
-        (self.lens.near <= depth && depth <= self.lens.far).then(|| self.pinhole.project(x))
+        let seen = self.view(x);
+        let [near, far] = [self.lens.near, self.lens.far];
+        // The film of an orthographic camera is in its near plane.
+        let from = if self.is_orthographic() { near } else { 0.0 };
+        let depth = seen.depth + from;
+        (near <= depth && depth <= far).then_some(seen)
     }
 
     /// The pixels whose filters reach an image point.
@@ -284,8 +319,7 @@ struct Parts {
 impl TryFrom<Parts> for Sensor {
     type Error = SensorError;
     fn try_from(p: Parts) -> Result<Self, SensorError> {
-        let camera = Self::from_to_world(&p.to_world, p.lens, p.film, p.filter)?;
-        Ok(Self { response: p.response, ..camera })
+        Self::of_response(p.response, &p.to_world, p.lens, p.film, p.filter)
     }
 }
 

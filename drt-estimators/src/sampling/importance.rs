@@ -110,7 +110,7 @@ impl Tracer<'_> {
         if !(projection.depth > 0.0 && inside(x, film[0]) && inside(y, film[1])) {
             return None;
         }
-        let d = camera.position() - v.x;
+        let d = camera.eye_of(v.x) - v.x;
         let r2 = d.length_squared();
         Some((d.normalize(), projection.importance / r2))
     }
@@ -129,7 +129,7 @@ impl Tracer<'_> {
             return;
         }
         let world = self.world;
-        let eye = world.camera.position();
+        let eye = world.camera.eye_of(v.x);
         let distance = (eye - v.x).length();
         if !world.connect(v, wo, distance, None, &mut self.shadow, &mut self.counters) {
             return;

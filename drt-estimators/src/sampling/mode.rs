@@ -153,8 +153,10 @@ impl TransportMode for ImportanceMode {
         tracer.connect_camera(&stop.vertex, stop.from, value, stop.segments + 1, observer);
     }
 
+    // Parallel rays do not crowd anywhere.
     fn has_points(world: &World) -> bool {
-        world.camera_medium.is_some_and(|m| world.tracking[m] == Tracking::Vertices)
+        !world.camera.is_orthographic()
+            && world.camera_medium.is_some_and(|m| world.tracking[m] == Tracking::Vertices)
     }
 
     fn choose_point(tracer: &mut Tracer<'_>) -> ConnectionPoint {

@@ -2,21 +2,27 @@
 
 use drt_math::{Rgb, Vec3};
 
+use crate::model::sensor::ViewSample;
 use crate::sampling::mode::RadianceMode;
 use crate::sampling::trace::{Alive, Observer, OutgoingRay, PathState, Pixel, Tracer};
 use crate::world::vertex::{Kind, Vertex};
 
 impl Tracer<'_> {
     /// Traces a camera ray; `weight` is the filter over the density of the image point.
-    pub(crate) fn trace_camera<O: Observer>(&mut self, dir: Vec3, weight: Rgb, observer: &mut O) {
-        let leaving = self.camera_ray(dir, weight);
+    pub(crate) fn trace_camera<O: Observer>(
+        &mut self,
+        view: &ViewSample,
+        weight: Rgb,
+        observer: &mut O,
+    ) {
+        let leaving = self.camera_ray(view, weight);
         self.radiance_along(&leaving, observer);
     }
 
     /// The first ray of a path from the camera.
-    pub(super) fn camera_ray(&mut self, dir: Vec3, weight: Rgb) -> OutgoingRay {
+    pub(super) fn camera_ray(&mut self, view: &ViewSample, weight: Rgb) -> OutgoingRay {
         self.counters.paths += 1;
-        OutgoingRay::starting(self.world.eye(), dir, weight)
+        OutgoingRay::starting(self.world.eye_at(view.origin), view.direction, weight)
     }
 
     /// Estimates what comes along a ray, times its throughput.

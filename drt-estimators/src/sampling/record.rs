@@ -7,6 +7,7 @@ use core::ops::Range;
 
 use drt_math::{Rgb, Vec3};
 
+use crate::model::sensor::ViewSample;
 pub(crate) use crate::sampling::record::light::{
     Joint, LightPath, LightVertex, Scattered, SeenVertex,
 };
@@ -59,6 +60,8 @@ impl Node {
 /// A recorded path: a tree, since equiangular side vertices branch off its segments.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PathRecord {
+    /// Where the camera's ray starts.
+    pub(crate) origin: Vec3,
     pub(crate) nodes: Vec<Node>,
     pub(crate) crossings: Vec<Crossing>,
     pub(crate) connections: Vec<(Connection, Range<usize>)>,
@@ -72,9 +75,9 @@ pub(crate) struct PathRecord {
 }
 
 impl PathRecord {
-    /// Empties the record for a camera ray of a `pixel` along `dir` with filter weight `value`.
-    pub(crate) fn begin(&mut self, pixel: [u32; 2], dir: Vec3, value: Rgb) {
-        self.pixel = pixel;
+    /// Empties the record for a camera ray of a `pixel` with filter weight `value`.
+    pub(crate) fn begin(&mut self, pixel: [u32; 2], view: &ViewSample, value: Rgb) {
+        (self.pixel, self.origin) = (pixel, view.origin);
         self.nodes.clear();
         self.crossings.clear();
         self.connections.clear();
@@ -85,7 +88,7 @@ impl PathRecord {
             arrival: None,
             crossings: 0..0,
             connections: 0..0,
-            wi: dir,
+            wi: view.direction,
             value,
             inv_pdf: 1.0,
             role: Role::Walked,

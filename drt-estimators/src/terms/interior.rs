@@ -268,7 +268,6 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             ImageSampling::Squares => camera.sample_square(pixel, u),
             _ => camera.sample_view(pixel, u, derivative),
         };
-        let dir = s.direction;
         let weight = Rgb::splat(s.weight);
         // What places an edge comes before what the path takes an unknown number of.
         let mut rng = rng;
@@ -277,10 +276,10 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         self.tracer.rng = rng;
         if self.workers.is_empty() {
             let light = if let Some(both) = &mut self.bidirectional {
-                both.trace(&mut self.tracer, dir, weight, &mut self.splats, &mut Radiance::default())
+                both.trace(&mut self.tracer, &s, weight, &mut self.splats, &mut Radiance::default())
             } else {
                 let mut radiance = Radiance::default();
-                self.tracer.trace_camera(dir, weight, &mut radiance);
+                self.tracer.trace_camera(&s, weight, &mut radiance);
                 radiance.0
             };
             self.add_to_image(&s, derivative, light, values);
@@ -300,11 +299,11 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             views: &mut self.views,
             camera_ray: shadows.then_some(&mut self.camera_ray),
         };
-        recorder.begin([pixel % width, pixel / width], dir, weight);
+        recorder.begin([pixel % width, pixel / width], &s, weight);
         let light = if let Some(both) = &mut self.bidirectional {
-            both.trace(&mut self.tracer, dir, weight, &mut self.splats, &mut recorder)
+            both.trace(&mut self.tracer, &s, weight, &mut self.splats, &mut recorder)
         } else {
-            self.tracer.trace_camera(dir, weight, &mut recorder);
+            self.tracer.trace_camera(&s, weight, &mut recorder);
             self.record.value
         };
         self.add_to_image(&s, derivative, light, values);

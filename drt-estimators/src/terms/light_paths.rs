@@ -85,7 +85,7 @@ impl<'a> LightPaths<'a> {
         let Self { world, record, views, differentiator, pixels, .. } = self;
         let [width, height] = world.camera.film();
         pixels.iter_mut().for_each(Vec::clear);
-        for p in world.camera.footprint(seen.point) {
+        for p in world.camera.footprint(seen.view.point) {
             let pixel = p.pixel[1] * width + p.pixel[0];
             for (list, weight) in pixels.iter_mut().zip([p.weight, p.gradient[0], p.gradient[1]]) {
                 list.extend((weight != 0.0).then_some((pixel, weight)));
@@ -95,12 +95,12 @@ impl<'a> LightPaths<'a> {
             return;
         }
         let column_and_row = [0, 1].map(|k| {
-            let inside = f64::max(seen.point[k], 0.0) as u32;
+            let inside = f64::max(seen.view.point[k], 0.0) as u32;
             u32::min(inside, [width, height][k].saturating_sub(1))
         });
         views[0].begin(None, || line.clone(), || line.clone());
         let mut recorder = Recorder { record, views, camera_ray: None };
-        recorder.begin(column_and_row, seen.dir, Rgb::splat(seen.weight));
+        recorder.begin(column_and_row, &seen.view, Rgb::splat(seen.view.weight));
         self.paths.record_seen(seen, &mut recorder);
         let recorded = views[0].of(record);
         let [of_filter, slopes @ ..] = pixels;

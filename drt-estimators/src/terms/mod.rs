@@ -1,6 +1,7 @@
 //! The terms of a derivative: the interior, boundary segments, edges seen from vertices, and flux.
 
 pub(crate) mod boundary;
+mod film_plane;
 pub(crate) mod flux;
 pub(crate) mod interior;
 pub(crate) mod light_paths;

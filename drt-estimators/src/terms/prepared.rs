@@ -12,6 +12,7 @@ use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::BATCHES;
 use crate::terms::boundary::{Boundary, Strategy};
+use crate::terms::film_plane;
 use crate::terms::flux::{Flux, GrazingFlux};
 use crate::terms::interior::{AlongRays, Component, EdgeQueries};
 use crate::terms::radiative::Radiative;
@@ -54,6 +55,7 @@ impl Prepared {
         settings: &Settings,
         motion: Option<&Motion>,
     ) -> Result<Self, Error> {
+        film_plane::check(&world, active, settings)?;
         match settings.estimator {
             EstimatorKind::Radiative if active.any() => {
                 Self::spatial(world, active, settings, motion)

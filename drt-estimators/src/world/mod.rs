@@ -174,6 +174,8 @@ pub(crate) struct World {
     /// The sensor in use and the medium around it.
     pub(crate) camera: crate::model::sensor::Sensor,
     pub(crate) camera_medium: Option<usize>,
+    /// That around the film, where rays of an orthographic camera start.
+    pub(crate) film_medium: SurroundingMedium,
     pub(crate) tracking: Vec<Tracking>,
     /// Least probability of a scattering vertex per tentative collision, per medium: nonzero
     /// where derivatives need vertices in empty or thin space.
@@ -232,6 +234,7 @@ impl World {
             lit,
             camera: camera_item,
             camera_medium: None,
+            film_medium: SurroundingMedium::Uniform(None),
             tracking,
             defensive: alloc::vec![0.0; scene.media.len()],
             needs: ActiveFactors::default(),
@@ -351,6 +354,12 @@ impl World {
                 m
             }
             Surrounding::Counted => self.medium_at(eye),
+        };
+        self.film_medium = match camera {
+            Surrounding::Counted if self.camera.is_orthographic() => {
+                self.medium_near(&Aabb::around(self.camera.film_corners()))
+            }
+            _ => SurroundingMedium::Uniform(self.camera_medium),
         };
         self.settle_lights();
     }
@@ -524,14 +533,18 @@ impl World {
 
     /// The medium around a shape that bounds none itself: the same everywhere where no interface comes near it.
     pub(crate) fn medium_around(&self, shape: usize) -> SurroundingMedium {
+        self.medium_near(&self.scene.shapes[shape].mesh.bounds())
+    }
+
+    /// The medium of all points of a box that are off shapes, if no interface comes near it.
+    fn medium_near(&self, bounds: &Aabb) -> SurroundingMedium {
         if !self.has_media() {
             return SurroundingMedium::Uniform(None);
         }
-        let bounds = self.scene.shapes[shape].mesh.bounds();
         let near = |mesh: &Mesh| {
             let triangles = 0..mesh.triangles.len() as u32;
-            mesh.bounds().meets(&bounds)
-                && triangles.map(|t| Aabb::around(mesh.triangle(t))).any(|b| b.meets(&bounds))
+            mesh.bounds().meets(bounds)
+                && triangles.map(|t| Aabb::around(mesh.triangle(t))).any(|b| b.meets(bounds))
         };
         let mut interfaces = self.scene.shapes.iter().filter(|s| s.boundary.is_some());
         if interfaces.any(|s| near(&s.mesh)) {
@@ -572,9 +585,14 @@ impl World {
         Vertex { x, medium: Some(medium), kind: Kind::Volume(None) }
     }
 
-    /// The camera as a vertex.
-    pub(crate) fn eye(&self) -> Vertex {
-        Vertex { x: self.camera.position(), medium: self.camera_medium, kind: Kind::Point }
+    /// The camera as a vertex, where a ray starts.
+    pub(crate) fn eye_at(&self, x: Vec3) -> Vertex {
+        Vertex { x, medium: self.film_medium.at(self, x), kind: Kind::Point }
+    }
+
+    /// The camera as a vertex, where it sees the point x from.
+    pub(crate) fn eye_of(&self, x: Vec3) -> Vertex {
+        self.eye_at(self.camera.eye_of(x))
     }
 
     /// True on an area emitter.

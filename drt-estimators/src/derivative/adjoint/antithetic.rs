@@ -2,7 +2,7 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use crate::derivative::adjoint::{Differentiator, behind, send, turn};
+use crate::derivative::adjoint::{Differentiator, send, turn};
 use crate::derivative::antithetic::{AntitheticPair, PairKind, PairedRadiance};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::derivative::velocity::RecordedPath;
@@ -93,7 +93,7 @@ impl Differentiator<'_> {
     ) {
         let k = pair.node;
         let RecordedPath { record, velocities, .. } = *path;
-        let (node, Some(b)) = (&record.nodes[k], behind(path, k)) else { return };
+        let (node, Some(b)) = (&record.nodes[k], self.behind(path, k)) else { return };
         let Some(vertex) = node.vertex() else { return };
         let both =
             |of: fn(&Turn) -> Vec3| light[0].outer(of(&turns[0])) + light[1].outer(of(&turns[1]));

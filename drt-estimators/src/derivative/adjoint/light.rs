@@ -8,7 +8,7 @@
 
 use drt_math::{Rgb, RgbVec};
 
-use crate::derivative::adjoint::{Differentiator, behind, send, turn};
+use crate::derivative::adjoint::{Differentiator, send, turn};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::derivative::velocity::RecordedPath;
 use crate::sampling::trace::Endpoint;
@@ -72,7 +72,7 @@ impl Differentiator<'_> {
         let mut here = self.locals[own].at.times(passes);
         let adjoint = theta * node.inv_pdf * children;
         let moving = [k, next, arrival.parent as usize].iter().any(|n| velocities.moves(*n));
-        let (wo, wi, behind) = (-arrival.dir, node.wi, behind(path, k));
+        let (wo, wi, behind) = (-arrival.dir, node.wi, self.behind(path, k));
         let to_wi =
             self.scattering(vertex, wo, wi, None, adjoint, behind, moving, &mut here, sink);
         let end = record.nodes[next].arrival.as_ref();

@@ -114,6 +114,8 @@ pub(crate) struct Differentiator<'w> {
     filter: [f64; 2],
     /// By the rate of the camera ray's direction.
     turn: RgbVec,
+    /// By the velocity of the point where an orthographic camera's ray starts, at its image point.
+    origin: RgbVec,
     /// Of the camera's importance and filter, per channel.
     sensor: [SensorGradient; 3],
     /// Summands of the turns of rays to lights, and of the velocities of points on these.
@@ -134,6 +136,7 @@ impl<'w> Differentiator<'w> {
             rng: Rng::new(0, 0, 0),
             filter: [0.0; 2],
             turn: RgbVec::ZERO,
+            origin: RgbVec::ZERO,
             sensor: [SensorGradient::default(); 3],
             parts: Vec::new(),
             auxiliary: Vec::new(),
@@ -165,7 +168,7 @@ impl<'w> Differentiator<'w> {
         }
         self.rng = rng;
         self.filter = filter;
-        self.turn = RgbVec::ZERO;
+        (self.turn, self.origin) = (RgbVec::ZERO, RgbVec::ZERO);
         self.sensor = [SensorGradient::default(); 3];
         self.locals.clear();
         self.locals.resize(nodes, Local::default());
@@ -173,7 +176,7 @@ impl<'w> Differentiator<'w> {
             self.node(path, k, sink);
         }
         let Local { at, matter, .. } = self.locals[0];
-        self.camera_ray(path.record, at.u + matter, self.turn, &self.sensor, sink);
+        self.camera_ray(path.record, at.u + matter + self.origin, self.turn, &self.sensor, sink);
     }
 
     fn node<S: AdjointSink>(&mut self, path: &RecordedPath<'_>, k: usize, sink: &mut S) {
@@ -263,7 +266,10 @@ impl<'w> Differentiator<'w> {
         self.locals[k].incoming += value;
         let NodeMotion { velocity, auxiliary, ray: turn_of_ray } = *motion;
         let vertex = record.nodes[k].vertex();
-        let phi = velocity.blend.weight;
+        // Parallel rays start on the film, at a point that moves with what it sees, as far as that is matter's.
+        let parallel = p == 0 && world.camera.is_orthographic();
+        let fixed = parallel && vertex.is_none();
+        let phi = if fixed { 0.0 } else { velocity.blend.weight };
         if value.is_zero() {
             let Local { matter, turn, .. } = self.locals[k];
             let nothing = here.is_zero() && [matter, turn] == [RgbVec::ZERO; 2];
@@ -278,7 +284,7 @@ impl<'w> Differentiator<'w> {
         }
         let weight = arrival.throughput * received;
         let parent = &record.nodes[p];
-        let eye = world.eye();
+        let eye = world.eye_at(record.origin);
         let (from, theta) = match &parent.arrival {
             None => (&eye, Rgb::ONE),
             Some(a) => match &a.end {
@@ -295,7 +301,7 @@ impl<'w> Differentiator<'w> {
         // The scattering function of the parent sees the two ends of the segment as a direction; on a light path
         // it depends on who looks.
         let of_light = matches!(record.nodes[k].role, Role::OfLight { .. });
-        if let Some(behind) = behind(recorded, p).filter(|_| !of_light) {
+        if let Some(behind) = self.behind(recorded, p).filter(|_| !of_light) {
             let (wi, inv_pdf, paired) = match joined {
                 Some(leaving) => (arrival.dir, leaving.inv_pdf, None),
                 None => (parent.wi, parent.inv_pdf, Some(Apart::of(recorded, p))),
@@ -349,21 +355,25 @@ impl<'w> Differentiator<'w> {
                 if turn_of_ray.is_some() {
                     turned_wholly += self.landing(&path, v, here, weight);
                 }
+                let mut film = SurfaceAdjoint::default();
+                let start = if parallel { &mut film } else { &mut there };
                 if phi == 1.0 {
                     here.u += by_place;
                     let moving = ray_moves || moves(v, sink.active());
                     turned_wholly +=
-                        self.segment(&path, Far::Vertex(v, here), moving, weight, &mut there, sink);
+                        self.segment(&path, Far::Vertex(v, here), moving, weight, start, sink);
+                    here.u += self.by_film(v, film.u, sink.active());
                 } else {
                     let free = weight * (1.0 - phi);
                     turned = self.segment(&path, Far::Direction, ray_moves, free, &mut there, sink);
                     turned_wholly += turned;
                     if phi > 0.0 {
                         let part = weight * phi;
+                        let start = if parallel { &mut film } else { &mut there };
                         let (mut fixed, along) =
-                            self.material_end(&path, v, ray_moves, part, &mut there, sink);
+                            self.material_end(&path, v, ray_moves, part, start, sink);
                         turned_wholly += along;
-                        fixed.u += by_place;
+                        fixed.u += by_place + self.by_film(v, film.u, sink.active());
                         matter += core::mem::take(&mut fixed.u);
                         here.n += fixed.n;
                         here.j += fixed.j;
@@ -390,6 +400,9 @@ impl<'w> Differentiator<'w> {
         }
         if p == 0 {
             self.turn += turned;
+        }
+        if parallel {
+            self.origin += core::mem::take(&mut there.u);
         }
         self.locals[p].at = there;
     }
@@ -469,7 +482,7 @@ impl<'w> Differentiator<'w> {
         let RecordedPath { record, velocities, lit, .. } = *recorded;
         let node = &record.nodes[k];
         let Some(arrival) = &node.arrival else { return sum };
-        let behind = behind(recorded, k);
+        let behind = self.behind(recorded, k);
         let moving = velocities.moves(k);
         let arrives = moving || velocities.moves(arrival.parent as usize);
         for (c, crossings) in &record.connections[node.connections.clone()] {
@@ -573,6 +586,28 @@ impl<'w> Differentiator<'w> {
         ByView { place: RgbVec { r: at[0], g: at[1], b: at[2] }, sensor }
     }
 
+    /// What the velocity of the film's point from which an orthographic camera sees a vertex owes to the vertex; its debt
+    /// to the camera is added to that.
+    fn by_film(&mut self, vertex: &Vertex, film: RgbVec, active: &ActiveInputs) -> RgbVec {
+        if film == RgbVec::ZERO {
+            return film;
+        }
+        let camera = &self.world.camera;
+        let seen = camera.view(vertex.x);
+        let [r, g, b] = [film.r, film.g, film.b].map(|g| camera.film_gradient(&seen, g));
+        if active.sensor {
+            for (sum, gradient) in self.sensor.iter_mut().zip([r.1, g.1, b.1]) {
+                *sum += gradient;
+            }
+        }
+        RgbVec { r: r.0, g: g.0, b: b.0 }
+    }
+
+    /// The segment by which a walk arrived at a node; `None` at the camera.
+    fn behind(&self, path: &RecordedPath<'_>, node: usize) -> Option<Behind> {
+        behind(path, node, self.world.camera.is_orthographic())
+    }
+
     /// Adds a share of what the camera's importance and filter owe to the camera.
     fn by_sensor(&mut self, by_view: &ByView, share: f64, active: &ActiveInputs) {
         if !active.sensor {
@@ -606,11 +641,13 @@ struct ByView {
     sensor: [SensorGradient; 3],
 }
 
-/// The segment by which a walk arrived at a node; `None` at the camera.
-fn behind(path: &RecordedPath<'_>, node: usize) -> Option<Behind> {
+/// The segment by which a walk arrived at a node; `None` at the camera. Where its rays are `parallel`, nothing that it sees
+/// turns them.
+fn behind(path: &RecordedPath<'_>, node: usize, parallel: bool) -> Option<Behind> {
     let arrival = path.record.nodes[node].arrival.as_ref()?;
     let (parent, distance) = (arrival.parent as usize, arrival.distance);
-    let weight = path.velocities.of(node).blend.weight;
+    let turned = !(parallel && parent == 0);
+    let weight = if turned { path.velocities.of(node).blend.weight } else { 0.0 };
     Some(Behind { node, parent, distance, weight })
 }
 

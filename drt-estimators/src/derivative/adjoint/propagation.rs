@@ -256,7 +256,7 @@ impl Differentiator<'_> {
         }
         let camera = &self.world.camera;
         let gradient = |origin: Vec3, turn: Vec3, seen: &SensorGradient| {
-            let mut g = camera.ray_gradient(record.nodes[0].wi, origin, turn);
+            let mut g = camera.ray_gradient(record.origin, record.nodes[0].wi, origin, turn);
             g += *seen;
             g
         };

@@ -25,7 +25,7 @@ impl Differentiator<'_> {
         let fits = light.point().is_none() && !self.edges_at_rest;
         let Some(s) = vertex.surface().filter(|_| fits) else { return false };
         let parent = arrival.parent as usize;
-        let eye = world.eye();
+        let eye = world.eye_at(record.origin);
         let viewer = record.nodes[parent].vertex();
         let ray = TurningRay {
             viewer: viewer.unwrap_or(&eye),

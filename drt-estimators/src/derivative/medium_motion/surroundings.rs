@@ -61,7 +61,8 @@ fn points(
     let point =
         |position: Vec3, velocities: Vec<(usize, Vec3)>| InteriorPoint { position, velocities };
     let mut found = Vec::new();
-    if world.camera_medium == Some(medium) {
+    // Only where rays meet in a point does what is around it have to move along.
+    if world.camera_medium == Some(medium) && !world.camera.is_orthographic() {
         let moves = tangents.iter().flat_map(|t| &t.sensor).map(|(p, t)| (*p, t.position));
         found.push((Anchor::Camera, point(world.camera.position(), moves.collect())));
     }

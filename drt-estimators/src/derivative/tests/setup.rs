@@ -99,9 +99,9 @@ pub(super) fn trace(
     let Recording { record, views } = recording;
     views[0].begin(pairs, || Rng::new(0, 0, 0), || Rng::new(0, 0, 0));
     let mut recorder = Recorder { record, views, camera_ray: None };
-    recorder.begin(pixel, view.direction, weight);
+    recorder.begin(pixel, &view, weight);
     tracer.rng = rng;
-    tracer.trace_camera(view.direction, weight, &mut recorder);
+    tracer.trace_camera(&view, weight, &mut recorder);
     view.slope
 }
 

@@ -112,7 +112,9 @@ impl Blends {
             (0..).map(|s| GRAZING / world.bsdf_of(s).lobe_width()).take(curvatures.len()).collect();
         let seen = |(s, curvature): (usize, &f64)| {
             let center = world.scene.shapes[s].mesh.bounds().center();
-            let pixel = camera.pinhole().pixel_size * (center - camera.position()).length();
+            let far = (center - camera.position()).length();
+            let pixel =
+                camera.pinhole().pixel_size * if camera.is_orthographic() { 1.0 } else { far };
             f64::min(GRAZING_PIXELS * curvature * pixel, GRAZING)
         };
         let camera_cosines = curvatures.iter().enumerate().map(seen).collect();
@@ -194,9 +196,11 @@ impl Blends {
     pub(crate) fn in_view(&self, world: &World, vertex: &Vertex) -> Blend {
         let Kind::Surface(s) = &vertex.kind else { return Blend::default() };
         let cosine = self.camera_cosines.get(s.shape as usize).copied().unwrap_or(0.0);
-        let ray = vertex.x - world.camera.position();
+        let ray = vertex.x - world.camera.eye_of(vertex.x);
         let distance = ray.length();
-        graze(world, s, ray / distance, distance, cosine)
+        // Parallel rays are those of a viewer infinitely far.
+        let apart = if world.camera.is_orthographic() { f64::INFINITY } else { distance };
+        graze(world, s, ray / distance, apart, cosine)
     }
 
     /// φ of a vertex that the camera sees in one pixel.

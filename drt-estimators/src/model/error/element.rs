@@ -38,6 +38,24 @@ pub enum ElementError {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
+    /// A kind of derivative that turns rays, by a camera whose rays are parallel.
+    #[error(
+        "it is orthographic, and `warped` has no derivatives of what moves in its view: its rays cannot turn; \
+         `path-space` and `radiative` have them"
+    )]
+    ParallelRays,
+    /// Derivatives in material form by an orthographic camera whose film is in a medium.
+    #[error(
+        "its film is in a medium that scatters, and it or the medium's inside moves: `path-space` has no \
+         term for what crosses the film; `radiative` needs none, or move the film out of the medium"
+    )]
+    FilmInMedium,
+    /// A surface that an orthographic camera's film cuts in two.
+    #[error(
+        "the surface `{0}` goes through its film, and something moves: the border of what is before the film \
+         has no derivative; move the film back"
+    )]
+    FilmCut(String),
     /// A shape's arrays.
     #[error(transparent)]
     Mesh(#[from] MeshError),

@@ -20,13 +20,17 @@ impl Sensor {
     ///
     /// Under a map that is not rigid the viewing line and the upright plane go along as material
     /// ones would and the axes are made orthonormal again; the image stays one of square pixels
-    /// with the same field of view. Clip distances do not change.
+    /// with the same field of view. Clip distances do not change. The film of an orthographic camera scales with the map,
+    /// and so do its clip distances.
     ///
     /// # Errors
-    /// When the map is singular or not finite.
+    /// When the map is singular or not finite, or makes pixels of an orthographic camera oblong.
     pub fn moved(&self, map: &Affine) -> Result<Self, SensorError> {
         let p = &self.pinhole;
         let axes = [p.right, p.up, p.forward].map(|v| map.vector(v));
+        if self.is_orthographic() {
+            return self.moved_film(map, axes);
+        }
         let [right, up, forward] = orthonormalize(axes).ok_or(SensorError::Flattened)?;
         let position = map.point(p.position);
         super::finite(position.is_finite(), "position after the motion")?;
@@ -43,11 +47,13 @@ impl Sensor {
         // Rates of rotation of forward towards up and right, and of up towards right.
         let (up_of_f, right_of_f) = (f.dot(p.up), f.dot(p.right));
         let right_of_u = u.dot(p.right);
+        let grows = if self.is_orthographic() { u.dot(p.up) } else { 0.0 };
         SensorTangent {
             position: field.point(p.position),
             right: -(p.forward * right_of_f) - p.up * right_of_u,
             up: p.right * right_of_u - p.forward * up_of_f,
             forward: p.up * up_of_f + p.right * right_of_f,
+            pixel_size: p.pixel_size * grows,
             ..SensorTangent::default()
         }
     }
@@ -58,6 +64,7 @@ impl Sensor {
     /// # Errors
     /// When cameras have no such property.
     pub fn property(&self, name: &str) -> Result<Rgb, SensorError> {
+        self.has_properties(name)?;
         let mut lens = self.lens;
         Ok(Rgb::splat(*slot(&mut lens, name)?.1))
     }
@@ -67,6 +74,7 @@ impl Sensor {
     /// # Errors
     /// When there is no such property, or the value is unusable.
     pub fn with_property(&self, name: &str, value: Rgb) -> Result<Self, SensorError> {
+        self.has_properties(name)?;
         let mut lens = self.lens;
         let (known, number) = slot(&mut lens, name)?;
         *number = scalar(known, value)?;
@@ -78,6 +86,7 @@ impl Sensor {
     /// # Errors
     /// When there is no such property, or the rates differ.
     pub fn property_tangent(&self, name: &str, rate: Rgb) -> Result<SensorTangent, SensorError> {
+        self.has_properties(name)?;
         let mut lens = Lens { fov: 0.0, principal_point_offset: [0.0, 0.0], ..self.lens };
         let (known, number) = slot(&mut lens, name)?;
         *number = scalar(known, rate)?;
@@ -87,6 +96,12 @@ impl Sensor {
             principal: [-x * f64::from(self.film[0]), -y * f64::from(self.film[1])],
             ..SensorTangent::default()
         })
+    }
+}
+
+impl Sensor {
+    fn has_properties(&self, name: &str) -> Result<(), SensorError> {
+        if self.is_orthographic() { Err(SensorError::NoProperties(name.into())) } else { Ok(()) }
     }
 }
 

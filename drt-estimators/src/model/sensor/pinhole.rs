@@ -16,7 +16,7 @@ pub struct Pinhole<T = f64> {
     pub up: Vec3<T>,
     /// Into the scene.
     pub forward: Vec3<T>,
-    /// Side s of a pixel on the plane at distance one.
+    /// Side s of a pixel on the plane at distance one, or on an orthographic camera's film.
     pub pixel_size: T,
     /// Pixel coordinates of the forward axis.
     pub principal: [T; 2],
@@ -28,14 +28,15 @@ pub struct Projection<T = f64> {
     /// Pixel coordinates.
     pub pixel: [T; 2],
     /// 1/(s² cos³), cos = depth over distance: with the filter P, the importance We = P/(s² cos³)
-    /// that goes with a geometric term without cosine at the pinhole (2021 paper, Eq. 22).
+    /// that goes with a geometric term without cosine at the pinhole (2021 paper, Eq. 22). Of an orthographic
+    /// camera r²/s², which takes the distance r out of the geometric term.
     pub importance: T,
     /// Distance along the forward axis.
     pub depth: T,
     /// The point less the pinhole.
     pub(super) offset: Vec3<T>,
-    /// Coordinates (a, b) on the plane at distance one.
-    plane: [T; 2],
+    /// Coordinates (a, b) on the plane at distance one, or on an orthographic camera's film.
+    pub(super) plane: [T; 2],
 }
 
 /// Rates of change of a camera with a parameter.
@@ -98,7 +99,7 @@ impl<T: Real> Pinhole<T> {
     }
 
     /// Coordinates (a, b) on the plane at distance one.
-    fn plane(&self, [x, y]: [T; 2]) -> [T; 2] {
+    pub(super) fn plane(&self, [x, y]: [T; 2]) -> [T; 2] {
         let s = self.pixel_size;
         [(x - self.principal[0]) * s, (self.principal[1] - y) * s]
     }

@@ -1,5 +1,6 @@
 mod mitsuba;
 mod motion;
+mod orthographic;
 
 use alloc::vec::Vec;
 

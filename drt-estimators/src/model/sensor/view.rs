@@ -1,13 +1,16 @@
-//! What a sensor responds to, camera or irradiance meter, under one set of calls.
+//! What a sensor responds to, cameras or irradiance meter, under one set of calls.
 //!
 //! A pixel's value is ∫ P(q(w)) h(w) L(w) dw over directions, with the filter P over image points q
 //! and the *importance* h: 1/(s² cos³) for a pinhole (2021 paper, Eq. 22), the cosine to its normal
-//! for an irradiance meter, whose one pixel has P = 1.
+//! for an irradiance meter, whose one pixel has P = 1. An [orthographic](super::orthographic) camera
+//! sees one direction, and h stands for the delta in it.
 
 use drt_math::{Affine, Frame, Vec3, warp};
 
 use crate::model::filter::{Filter, FilterKind};
-use crate::model::sensor::{Lens, Projection, Sensor, SensorError, SensorGradient, unit};
+use crate::model::sensor::{
+    CameraRay, Lens, Projection, Sensor, SensorError, SensorGradient, orthographic, unit,
+};
 
 /// The largest radius of a filter, in pixels, whose samples are shared: each touches (2 × 8)² pixels.
 const MOST_SHARED: f64 = 8.0;
@@ -19,6 +22,8 @@ pub enum Response {
     /// A pinhole camera.
     #[default]
     Perspective,
+    /// A camera of parallel rays.
+    Orthographic,
     /// The cosine over the hemisphere around the forward axis; one pixel.
     Irradiance,
 }
@@ -26,6 +31,8 @@ pub enum Response {
 /// A direction drawn for a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewSample {
+    /// Where the ray starts: the pinhole, the meter, or the point of an orthographic camera's film.
+    pub origin: Vec3,
     /// Unit, into the scene.
     pub direction: Vec3,
     /// The image point, in pixels; the middle of an irradiance meter's one pixel.
@@ -65,22 +72,19 @@ impl Sensor {
     #[must_use]
     pub fn sample_view(&self, pixel: u32, u: [f64; 2], derivative: bool) -> ViewSample {
         match self.response {
-            Response::Perspective => {
+            Response::Perspective | Response::Orthographic => {
                 let s = self.filter.sample(u, derivative);
                 let width = self.film[0];
                 let [x, y] = [pixel % width, pixel / width].map(|p| f64::from(p) + 0.5);
                 let point = [x + s.offset[0], y + s.offset[1]];
-                ViewSample {
-                    direction: self.ray(point).direction,
-                    point,
-                    weight: s.weight,
-                    slope: s.slope,
-                }
+                let CameraRay { origin, direction, .. } = self.ray(point);
+                ViewSample { origin, direction, point, weight: s.weight, slope: s.slope }
             }
             Response::Irradiance => {
                 let p = &self.pinhole;
                 let w = warp::cosine_hemisphere(u);
                 ViewSample {
+                    origin: p.position,
                     direction: p.right * w.x + p.up * w.y + p.forward * w.z,
                     point: [0.5; 2],
                     weight: core::f64::consts::PI,
@@ -94,7 +98,7 @@ impl Sensor {
     /// than its path.
     pub(crate) fn shares_points(&self) -> bool {
         let radius = self.filter.radius();
-        self.response == Response::Perspective && 0.5 < radius && radius <= MOST_SHARED
+        self.response != Response::Irradiance && 0.5 < radius && radius <= MOST_SHARED
     }
 
     /// Draws a direction evenly from the square of a pixel, for a film on which it counts for every pixel that it
@@ -108,8 +112,8 @@ impl Sensor {
         let (x, of_x) = self.filter.sample_interval(pixel % w, w, u[0]);
         let (y, of_y) = self.filter.sample_interval(pixel / w, h, u[1]);
         let point = [x, y];
-        let direction = self.ray(point).direction;
-        ViewSample { direction, point, weight: 1.0 / (of_x * of_y), slope: [0.0; 2] }
+        let CameraRay { origin, direction, .. } = self.ray(point);
+        ViewSample { origin, direction, point, weight: 1.0 / (of_x * of_y), slope: [0.0; 2] }
     }
 
     /// The density at an image point, per square pixel, of what [`sample_view`](Self::sample_view) draws for all pixels
@@ -123,6 +127,9 @@ impl Sensor {
     /// depth 0 or less are behind it.
     #[must_use]
     pub fn view(&self, x: Vec3) -> Projection {
+        if self.is_orthographic() {
+            return orthographic::project(&self.pinhole, x);
+        }
         let mut projection = self.pinhole.project(x);
         if self.response == Response::Irradiance {
             projection.pixel = [0.5, 0.5];
@@ -144,6 +151,12 @@ impl Sensor {
             Response::Perspective => {
                 self.pinhole.projection_gradient(p, pixel_adjoint, importance_adjoint)
             }
+            Response::Orthographic => orthographic::projection_gradient(
+                &self.pinhole,
+                p,
+                pixel_adjoint,
+                importance_adjoint,
+            ),
             Response::Irradiance => {
                 let along = p.offset / p.offset.length_squared();
                 let point = (self.pinhole.forward / p.depth - along) * importance_adjoint;
@@ -157,9 +170,18 @@ impl Sensor {
         }
     }
 
-    /// The gradient by the sensor of a number whose gradients by the origin and by the unit direction of the ray
-    /// of one and the same image point are given.
-    pub(crate) fn ray_gradient(&self, direction: Vec3, origin: Vec3, turn: Vec3) -> SensorGradient {
+    /// The gradient by the sensor of a number whose gradients by the origin, which is at `eye`, and by the unit direction
+    /// of the ray of one and the same image point are given.
+    pub(crate) fn ray_gradient(
+        &self,
+        eye: Vec3,
+        direction: Vec3,
+        origin: Vec3,
+        turn: Vec3,
+    ) -> SensorGradient {
+        if self.is_orthographic() {
+            return orthographic::ray_gradient(&self.pinhole, eye, origin, turn);
+        }
         let mut gradient = self.direction_gradient(direction, turn);
         gradient.position += origin;
         gradient
@@ -172,6 +194,10 @@ impl Sensor {
         let p = &self.pinhole;
         match self.response {
             Response::Perspective => p.direction_gradient(direction, adjoint),
+            // All image points have the same.
+            Response::Orthographic => {
+                SensorGradient { forward: adjoint, ..SensorGradient::default() }
+            }
             Response::Irradiance => SensorGradient {
                 right: adjoint * direction.dot(p.right),
                 up: adjoint * direction.dot(p.up),
@@ -190,7 +216,7 @@ impl Sensor {
     /// True when the filter jumps at the borders of pixels.
     #[must_use]
     pub fn has_borders(&self) -> bool {
-        self.response == Response::Perspective && !self.filter.is_continuous()
+        self.response != Response::Irradiance && !self.filter.is_continuous()
     }
 }
 

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | 0, t | the camera's path meets an emitter, emission in a medium, or leaves the scene |
 //! | 1, t | next-event estimation: a point chosen for the vertex |
-//! | s, 1 | the light's vertex is connected to the camera, and splatted |
+//! | s, 1 | the light's vertex is connected to the camera, and splatted; along the one direction of an orthographic one |
 //! | s, t | the vertices are connected |
 //!
 //! # Weights
@@ -40,7 +40,7 @@
 //! emission met      a_z = p_light² d_z + p_start² e_z
 //! ```
 //!
-//! n being the number of light paths to one sample of each pixel, as many as pixels. Russian roulette is left out of all of it.
+//! n being the number of light paths to one sample of each pixel, as many as pixels; p_film c/r² is density per area, whatever the camera. Russian roulette is left out of all of it.
 
 mod emission;
 mod subpath;
@@ -53,6 +53,7 @@ use core::marker::PhantomData;
 use drt_math::{Real, Rgb, Vec3};
 use drt_medium::Coefficients;
 
+use crate::model::sensor::ViewSample;
 use crate::model::surface::Given;
 pub(crate) use crate::sampling::bidirectional::emission::EmissionSampler;
 use crate::sampling::bidirectional::emission::{EmittedRay, area_flow_pdf};
@@ -104,12 +105,12 @@ impl<'w> Bidirectional<'w> {
     pub(crate) fn trace<O: Observer>(
         &mut self,
         tracer: &mut Tracer<'w>,
-        dir: Vec3,
+        view: &ViewSample,
         weight: Rgb,
         splats: &mut Vec<Splat>,
         observer: &mut O,
     ) -> Rgb {
-        self.trace_camera(tracer, dir, weight, observer);
+        self.trace_camera(tracer, view, weight, observer);
         let mut sum = self.camera.met;
         self.trace_light::<O>(tracer);
         for k in 0..self.camera.vertices.len() {
@@ -158,15 +159,17 @@ impl<'w> Bidirectional<'w> {
     fn trace_camera<O: Observer>(
         &mut self,
         tracer: &mut Tracer<'w>,
-        dir: Vec3,
+        view: &ViewSample,
         weight: Rgb,
         observer: &mut O,
     ) {
-        let leaving = tracer.camera_ray(dir, weight);
+        let leaving = tracer.camera_ray(view, weight);
         let world = self.world;
-        let film = world.camera.view(world.camera.position() + dir).importance;
+        let camera = &world.camera;
+        let film = camera.view(view.origin + view.direction).importance;
         let ratios = Ratios { last: square(self.light_paths / film), earlier: 0.0 };
-        self.camera.begin(ratios, true);
+        // Parallel rays are drawn by area, as if they came from infinity.
+        self.camera.begin(ratios, !camera.is_orthographic());
         type Mode = Unconnected<RadianceMode>;
         let mut observed = Observed { subpath: &mut self.camera, observer };
         if let Some(first) = tracer.follow::<Mode, _>(&leaving, &mut observed) {
@@ -352,9 +355,10 @@ impl<'w> Bidirectional<'w> {
         if light.is_zero() && (!O::RECORDS || self.is_dead(y, scattered.value)) {
             return None;
         }
-        let distance = (world.camera.position() - y.vertex.x).length();
+        let eye = world.eye_of(y.vertex.x);
+        let distance = (eye.x - y.vertex.x).length();
         let target = y.vertex.surface().map(|s| s.prim);
-        let (passed, attenuation) = tracer.passed(&world.eye(), -wo, distance, target)?;
+        let (passed, attenuation) = tracer.passed(&eye, -wo, distance, target)?;
         let back = self.light.back(&scattering, wo, y.from);
         let film = transport * y.cosine(wo) / self.light_paths;
         let others = square(film * attenuation) * y.ratios.all(back);
@@ -372,9 +376,13 @@ impl<'w> Bidirectional<'w> {
         };
         Some(SeenFromCamera {
             vertex,
-            point: world.camera.view(y.vertex.x).pixel,
-            dir: -wo,
-            weight,
+            view: ViewSample {
+                origin: eye.x,
+                direction: -wo,
+                point: world.camera.view(y.vertex.x).pixel,
+                weight,
+                slope: [0.0; 2],
+            },
             value: light * arrival.throughput,
             arrival,
             crossings: if O::RECORDS { tracer.shadow.crossings.clone() } else { Vec::new() },
@@ -386,12 +394,8 @@ impl<'w> Bidirectional<'w> {
 /// A vertex of a light path as the camera sees it.
 pub(crate) struct SeenFromCamera {
     vertex: usize,
-    /// The image point, in pixels.
-    pub(crate) point: [f64; 2],
-    /// Unit, from the camera.
-    pub(crate) dir: Vec3,
-    /// The camera's importance without a filter, over the squared distance and times the MIS weight.
-    pub(crate) weight: f64,
+    /// Its ray; the weight is the camera's importance without a filter, over the squared distance and times the MIS weight.
+    pub(crate) view: ViewSample,
     /// What arrives.
     value: Rgb,
     arrival: Arrival,
@@ -403,7 +407,7 @@ pub(crate) struct SeenFromCamera {
 impl SeenFromCamera {
     /// On the film, of one of so many light paths.
     fn splat(&self, light_paths: f64) -> Splat {
-        Splat { point: self.point, value: self.value * (1.0 / light_paths), weight: 0.0 }
+        Splat { point: self.view.point, value: self.value * (1.0 / light_paths), weight: 0.0 }
     }
 }
 

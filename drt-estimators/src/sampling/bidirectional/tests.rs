@@ -51,10 +51,10 @@ fn light(scene: &Scene, fault: Option<Fault>, both: bool) -> Moments {
                 let filter = Rgb::splat(s.weight);
                 splats.clear();
                 let value = if both {
-                    from_both.trace(&mut tracer, s.direction, filter, &mut splats, &mut Radiance::default())
+                    from_both.trace(&mut tracer, &s, filter, &mut splats, &mut Radiance::default())
                 } else {
                     let mut radiance = Radiance::default();
-                    tracer.trace_camera(s.direction, filter, &mut radiance);
+                    tracer.trace_camera(&s, filter, &mut radiance);
                     radiance.0
                 };
                 splats.push(Splat { point: s.point, value, weight: s.weight });

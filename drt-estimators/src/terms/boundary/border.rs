@@ -13,6 +13,7 @@
 use drt_math::{Rgb, Vec3};
 
 use crate::derivative::sensitivity::VelocityTerm;
+use crate::model::sensor::CameraRay;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary::{BoundarySink, Buffers};
@@ -49,15 +50,15 @@ pub(crate) fn sample<R: BoundarySink>(
     let chosen_by = if neighbour.is_some() { 2.0 } else { 1.0 };
     let inv_pdf = 2.0 * radius * sides / chosen_by;
 
-    let dir = camera.ray(q).direction;
+    let CameraRay { origin, direction: dir, .. } = camera.ray(q);
     let mut ray = core::mem::take(&mut b.ray);
-    world.cast(&world.eye(), dir, &mut ray, &mut tracer.counters);
-    let travel = tracer.travel(camera.position(), dir, &ray, Rgb::ONE);
+    world.cast(&world.eye_at(origin), dir, &mut ray, &mut tracer.counters);
+    let travel = tracer.travel(origin, dir, &ray, Rgb::ONE);
     b.ray = ray;
     let (vertex, weight) = travel.end()?;
     let mut along = [0.0; 2];
     along[axis] = 1.0;
-    let x = vertex.map_or(camera.position() + dir, |v| v.x);
+    let x = vertex.map_or(origin + dir, |v| v.x);
     let (point, mut sensor) = camera.view_gradient(&camera.view(x), along, 0.0);
     let items = &mut b.functional.items;
     items.clear();
@@ -66,6 +67,8 @@ pub(crate) fn sample<R: BoundarySink>(
             items.push(VelocityTerm::Surface(s.material(), point))
         }
         Some(Vertex { medium: Some(m), x, .. }) => items.push(VelocityTerm::Volume(m, x, point)),
+        // What has no place keeps its image point, or its direction.
+        _ if camera.is_orthographic() => return None,
         _ => sensor.position = Vec3::ZERO,
     }
     items.push(VelocityTerm::Sensor(sensor));

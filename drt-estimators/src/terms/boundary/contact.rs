@@ -12,7 +12,7 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
     /// The camera sees the floor next to the edge.
     pub(super) fn contact_with_camera(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
         let world = self.tracer.world;
-        let (w, distance) = c.towards(world.camera.position())?;
+        let (w, distance) = c.towards(|x| world.camera.eye_of(x))?;
         let (s, start) = self.contact(at, c, w)?;
         let transport = self.seen(&start)?;
         let tau = self.open(&start, w, distance)?;

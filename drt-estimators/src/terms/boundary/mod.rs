@@ -30,7 +30,7 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, Vec3};
 
 use crate::edges::contact::Contact;
-use crate::edges::edge::{EdgePoint, EdgeTable, collect, merge_coincident};
+use crate::edges::edge::{Edge, EdgePoint, EdgeTable, collect, merge_coincident};
 use crate::edges::movers::Movers;
 use crate::terms::boundary::shadow::Shadows;
 
@@ -129,12 +129,12 @@ impl Boundary {
             e.may_rest = Contact::anywhere(world, e);
         }
         let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
-        let eye = world.camera.position();
-        let camera = EdgeTable::new(
-            &edges,
-            |e| movers.pass_camera(e, eye),
-            |e| e.wedge.subtended_angle(eye),
-        )?;
+        let camera = &world.camera;
+        let in_view = |e: &Edge| match camera.is_orthographic() {
+            true => e.wedge.projected_length(camera.pinhole().forward),
+            false => e.wedge.subtended_angle(camera.position()),
+        };
+        let camera = EdgeTable::new(&edges, |e| movers.pass_camera(e, camera), in_view)?;
         let light = |i: usize, emitter: &Emitter| match *emitter {
             Emitter::Point { position, .. } | Emitter::Spot { position, .. } => EdgeTable::new(
                 &edges,
@@ -207,7 +207,7 @@ struct Sampler<'s, 'w, R> {
 }
 
 impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
-    /// Camera segments: D is the pinhole.
+    /// Camera segments: D is the pinhole, or the point of an [orthographic](crate::model::sensor) camera's film.
     fn primary(&mut self) -> Option<()> {
         let world = self.tracer.world;
         let at = self.boundary.camera.as_ref()?.sample(&mut self.tracer.rng);
@@ -215,7 +215,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         if let Some(contact) = Contact::at(world, &at) {
             return self.contact_with_camera(&at, &contact);
         }
-        let d = camera.position() - at.x;
+        let d = camera.eye_of(at.x) - at.x;
         let distance = d.length();
         let w = d / distance;
         let n = at.edge.wedge.occluded_side(w)?;
@@ -224,12 +224,19 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         // The camera's side must be open.
         let tau = self.open(&start, w, distance)?;
         let s = self.end(&start, -w, Rgb::ONE).filter(|s| !self.is_dark(s))?;
-        let l = self.share(&s, distance);
         self.b.functional.items.clear();
         self.edge_rate(&at, n);
-        self.end_rate(&s, n * -(1.0 - l));
-        let position = n * -l;
-        let gradient = SensorGradient { position, ..SensorGradient::default() };
+        let gradient = if camera.is_orthographic() {
+            self.end_rate(&s, -n);
+            match s.vertex {
+                Some(_) => SensorGradient { forward: n * s.distance, ..SensorGradient::default() },
+                None => camera.ray_gradient(at.x + d, -w, -n, n * -distance),
+            }
+        } else {
+            let l = self.share(&s, distance);
+            self.end_rate(&s, n * -(1.0 - l));
+            SensorGradient { position: n * -l, ..SensorGradient::default() }
+        };
         self.b.functional.items.push(VelocityTerm::Sensor(gradient));
         if !self.receiver.moves(&self.b.functional) {
             return None;

@@ -72,10 +72,12 @@ impl Shadows {
     }
 
     /// Calls `add` with the functional and the weight of each shadow boundary along a camera ray, which was
-    /// followed along `dir`.
+    /// followed from `eye` along `dir`.
+    #[allow(clippy::too_many_arguments)]
     pub(crate) fn along_camera_ray(
         &self,
         tracer: &mut Tracer<'_>,
+        eye: Vec3,
         dir: Vec3,
         ray: &RayPath,
         b: &mut Buffers,
@@ -83,7 +85,6 @@ impl Shadows {
     ) -> Option<()> {
         let world = tracer.world;
         let choice = world.lights.choose(&mut tracer.rng)?;
-        let eye = world.eye();
         let source = match choice.delta {
             Some(e) => match world.scene.emitters[e].item.emitter {
                 Emitter::Directional { direction, .. } => ShadowLight::Direction(direction),
@@ -95,10 +96,10 @@ impl Shadows {
             }
         };
         for edge in &self.edges {
-            if let Some(m) = meet(edge, &source, eye.x, dir)
+            if let Some(m) = meet(edge, &source, eye, dir)
                 && m.t < ray.length
             {
-                self.shadow(tracer, dir, ray, edge, &source, &choice, &m, b, &mut add);
+                self.shadow(tracer, eye, dir, ray, edge, &source, &choice, &m, b, &mut add);
             }
         }
         Some(())
@@ -108,6 +109,7 @@ impl Shadows {
     fn shadow(
         &self,
         tracer: &mut Tracer<'_>,
+        eye: Vec3,
         dir: Vec3,
         ray: &RayPath,
         edge: &Edge,
@@ -126,7 +128,6 @@ impl Shadows {
             return None;
         }
         tracer.counters.boundary_samples += 1;
-        let eye = world.eye().x;
         let x = eye + dir * m.t;
         let (x_edge, point) = edge.point(m.s);
         let around = edge.medium(world, x_edge);

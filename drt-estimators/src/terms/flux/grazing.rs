@@ -63,7 +63,8 @@ impl GrazingFlux {
         flux: &Flux,
         active: &ActiveInputs,
     ) -> Result<Option<Self>, Error> {
-        let eye = world.camera.position();
+        let camera = &world.camera;
+        let eye = camera.position();
         let (mut triangles, mut weights) = (Vec::new(), Vec::new());
         for (s, shape) in (0..).zip(&world.scene.shapes) {
             if !flux.sweeps(s, active.sensor) {
@@ -75,14 +76,20 @@ impl GrazingFlux {
                 let corners = shape.mesh.triangle(t);
                 let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
                 let area = 0.5 * across.length();
-                let height = Real::abs(across.normalize().dot(corners[0] - eye));
-                let farthest = corners.iter().map(|c| (*c - eye).length()).fold(0.0, f64::max);
-                let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - eye;
-                let r2 = f64::max(middle.length_squared(), area);
-                if area > 0.0 && height < EDGE_ON * farthest {
+                let n = across.normalize();
+                let (seen, per_area) = if camera.is_orthographic() {
+                    (Real::abs(n.dot(camera.pinhole().forward)) < EDGE_ON, 1.0)
+                } else {
+                    let height = Real::abs(n.dot(corners[0] - eye));
+                    let farthest = corners.iter().map(|c| (*c - eye).length()).fold(0.0, f64::max);
+                    let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - eye;
+                    let r2 = f64::max(middle.length_squared(), area);
+                    (height < EDGE_ON * farthest, 1.0 / r2)
+                };
+                if area > 0.0 && seen {
                     let around = *around.get_or_insert_with(|| world.medium_around(s as usize));
                     triangles.push(Triangle { prim: world.prim_of(s as usize, t), area, around });
-                    weights.push(area / r2);
+                    weights.push(area * per_area);
                 }
             }
         }
@@ -109,7 +116,8 @@ impl GrazingFlux {
         let chosen = self.table.sample(tracer.rng.next_f64());
         let Triangle { prim, area, around } = self.triangles[chosen.index];
         let (point, x) = world.point(prim, triangle_bary(tracer.rng.next_2d()));
-        let to = world.camera.position() - x;
+        let eye = world.camera.eye_of(x);
+        let to = eye - x;
         let cosine = point.ng.dot(to) / to.length();
         if !(IN_PLANE..EDGE_ON).contains(&Real::abs(cosine)) {
             return None;
@@ -130,7 +138,7 @@ impl GrazingFlux {
             b.functional.items.clear();
             b.functional.items.push(VelocityTerm::Surface(point.material(), n));
             if self.spatial {
-                let gradient = world.camera.ray_gradient(-w, -n, n * -to.length());
+                let gradient = world.camera.ray_gradient(eye, -w, -n, n * -to.length());
                 b.functional.items.push(VelocityTerm::Sensor(gradient));
             } else {
                 b.functional.items.push(VelocityTerm::Volume(medium, x, -n));

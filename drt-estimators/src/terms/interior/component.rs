@@ -126,9 +126,17 @@ impl<'a, S: PathSink> Worker<'a, S> {
             let values = &mut values[next(self.separate)];
             let (dir, weight) = (path.record.nodes[0].wi, path.record.nodes[0].value);
             let Self { sink, shadow_buffers, .. } = self;
-            shadows.along_camera_ray(tracer, dir, path.camera_ray, shadow_buffers, |f, value| {
-                sink.functional(f, value * weight, values);
-            });
+            let eye = path.record.origin;
+            shadows.along_camera_ray(
+                tracer,
+                eye,
+                dir,
+                path.camera_ray,
+                shadow_buffers,
+                |f, value| {
+                    sink.functional(f, value * weight, values);
+                },
+            );
         }
         tracer.world = all;
     }

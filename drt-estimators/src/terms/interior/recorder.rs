@@ -1,11 +1,12 @@
 //! Recording a path once for all that differentiates it.
 
-use drt_math::{Rgb, Rng, Vec3};
+use drt_math::{Rgb, Rng};
 
 use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::velocity::PathVelocities;
 use crate::derivative::velocity::RecordedPath;
 use crate::model::rendering::Counters;
+use crate::model::sensor::ViewSample;
 use crate::sampling::record::{Joint, LightPath, Node, PathRecord, Role};
 use crate::sampling::trace::{Arrival, Connection, Observer, OutgoingRay, Pixel};
 use crate::terms::flux::{Flux, Reservoir};
@@ -78,7 +79,7 @@ impl Recorder<'_, '_> {
             }
             let mut hits = &[][..];
             if follows {
-                let eye = world.eye();
+                let eye = world.eye_at(self.record.origin);
                 let viewer = self.record.nodes[parent].vertex().unwrap_or(&eye);
                 let mut counters = Counters::default();
                 world.cast(viewer, dir, looked, &mut counters);
@@ -94,9 +95,9 @@ impl Recorder<'_, '_> {
         }
     }
 
-    /// Empties the record for a camera ray of a `pixel` along `dir` with filter weight `value`.
-    pub(crate) fn begin(&mut self, pixel: [u32; 2], dir: Vec3, value: Rgb) {
-        self.record.begin(pixel, dir, value);
+    /// Empties the record for a camera ray of a `pixel` with filter weight `value`.
+    pub(crate) fn begin(&mut self, pixel: [u32; 2], view: &ViewSample, value: Rgb) {
+        self.record.begin(pixel, view, value);
     }
 }
 

@@ -166,7 +166,6 @@ impl Radiative {
         let moves = |j: &DiscontinuityEdge| {
             if active.shapes[j.edge.shape as usize] { speed(&j.edge) } else { 0.0 }
         };
-        let eye = world.camera.position();
         let moving_shapes = (0..).zip(&active.shapes).filter(|(_, moves)| **moves);
         let holding: Vec<u32> =
             moving_shapes.map(|(s, _)| s).filter(|s| spatial.blends.acts_on(world, *s)).collect();
@@ -183,7 +182,7 @@ impl Radiative {
             .list
             .iter()
             .zip(&speeds)
-            .map(|(j, s)| relative(*s) * discontinuities.seen_from(j, eye));
+            .map(|(j, s)| relative(*s) * discontinuities.seen_from(j, &world.camera));
         let camera = PrimaryEdges::new(seen)?;
         let views = |matter: &dyn Fn(&DiscontinuityEdge) -> f64| {
             EdgeSampler::new(world, &discontinuities, matter)

@@ -19,9 +19,9 @@ impl Radiative {
         let world = tracer.world;
         let camera = &world.camera;
         let chosen = self.camera.as_ref()?.sample(&self.discontinuities, &mut tracer.rng);
-        let eye = world.eye();
-        let view = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, &eye)?;
         let (x, point) = chosen.discontinuity.point(chosen.along);
+        let eye = world.eye_of(x);
+        let view = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, &eye)?;
         let (_, importance) = tracer.see(&Vertex { x, medium: None, kind: Kind::Point })?;
         let tau = view.open(tracer)?;
         let [minus, plus] = view.sides(tracer, tracer.max_segments.checked_sub(1)?);
@@ -38,7 +38,7 @@ impl Radiative {
         for (matter, distance, value, held) in parts {
             let n = view.sides.n;
             // A camera that turns takes its image points with it.
-            let gradient = camera.ray_gradient(-view.w, -n, n * -distance);
+            let gradient = camera.ray_gradient(eye.x, -view.w, -n, n * -distance);
             functional.items.clear();
             functional.items.extend(matter.map(|matter| VelocityTerm::of(matter, n)));
             functional.items.push(VelocityTerm::Sensor(gradient));

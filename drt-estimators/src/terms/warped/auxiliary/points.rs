@@ -228,7 +228,7 @@ impl VelocityField for AuxiliaryPoints {
             && let Some(s) = v.surface()
         {
             moves = self.movers.moves(&Matter::Surface(s.material()));
-            let eye = world.eye();
+            let eye = world.eye_of(v.x);
             let viewer = found.viewer.unwrap_or(&eye);
             let at = (s, v.x);
             self.smooth(world, viewer, found.ray_moves, at, arrival.distance, probe, auxiliary);
