@@ -132,7 +132,12 @@ fn sensors(job: &Job) -> Table<6> {
             name(s.id.as_ref(), "sensor", i),
             format!("{w}x{h}"),
             format!("{:?}", s.item.sensor.filter().kind()),
-            format!("{} degrees", lens.fov),
+            if s.item.sensor.is_orthographic() {
+                let width = s.item.sensor.pinhole().pixel_size * f64::from(w);
+                format!("orthographic, {width:.4} wide")
+            } else {
+                format!("{} degrees", lens.fov)
+            },
             medium,
             if i == job.settings.sensor { "used" } else { "" }.into(),
         ]

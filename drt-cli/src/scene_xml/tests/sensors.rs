@@ -65,7 +65,32 @@ fn unusable_sensors() {
     wrong(r#"<film type="hdrfilm"><rfilter type="lanczos"/></film>"#, "lanczos");
     wrong(r#"<transform name="to_world"><scale value="2"/></transform>"#, "scales or shears");
     wrong(r#"<sampler type="independent"><integer name="sample_count" value="0"/></sampler>"#, "0");
-    refused("<sensor type=\"thinlens\"/>", &["perspective"]);
+    refused("<sensor type=\"thinlens\"/>", &["perspective or orthographic"]);
+    for (inside, part) in [
+        (r#"<float name="fov" value="30"/>"#, "fov"),
+        (r#"<transform name="to_world"><scale x="2"/></transform>"#, "stretched along one axis"),
+        (r#"<float name="near_clip" value="0"/>"#, "clip planes"),
+    ] {
+        refused(&format!("<sensor type=\"orthographic\">\n{inside}</sensor>"), &[part]);
+    }
+}
+
+#[test]
+fn orthographic_films_scale_with_to_world() {
+    let s = scene(
+        r#"<sensor type="orthographic"><float name="near_clip" value="0.5"/>
+           <transform name="to_world"><scale x="3" y="3"/>
+             <lookat origin="1 2 3" target="1 2 0" up="0 1 0"/></transform>
+           <film type="hdrfilm"><integer name="width" value="40"/><integer name="height" value="30"/>
+           </film></sensor>"#,
+    );
+    let sensor = &s.sensors[0].item.sensor;
+    assert!(sensor.is_orthographic());
+    for (pixel, x, y) in [([0.0, 0.0], -2.0, 4.25), ([40.0, 30.0], 4.0, -0.25)] {
+        let ray = sensor.ray(pixel);
+        assert!((ray.origin - vec3(x, y, 2.5)).max_abs() < 1e-12, "{ray:?}");
+        assert!((ray.direction + Vec3::Z).max_abs() < 1e-12);
+    }
 }
 
 #[test]
