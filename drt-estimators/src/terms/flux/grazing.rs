@@ -77,19 +77,19 @@ impl GrazingFlux {
                 let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
                 let area = 0.5 * across.length();
                 let n = across.normalize();
-                let (seen, per_area) = if camera.is_orthographic() {
+                let (seen, r2) = if camera.is_orthographic() {
                     (Real::abs(n.dot(camera.pinhole().forward)) < EDGE_ON, 1.0)
                 } else {
                     let height = Real::abs(n.dot(corners[0] - eye));
                     let farthest = corners.iter().map(|c| (*c - eye).length()).fold(0.0, f64::max);
                     let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - eye;
                     let r2 = f64::max(middle.length_squared(), area);
-                    (height < EDGE_ON * farthest, 1.0 / r2)
+                    (height < EDGE_ON * farthest, r2)
                 };
                 if area > 0.0 && seen {
                     let around = *around.get_or_insert_with(|| world.medium_around(s as usize));
                     triangles.push(Triangle { prim: world.prim_of(s as usize, t), area, around });
-                    weights.push(area * per_area);
+                    weights.push(area / r2);
                 }
             }
         }
