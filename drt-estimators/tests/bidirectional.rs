@@ -7,7 +7,8 @@ use drt_estimators::{
     EstimatorKind, PathSampling, Rendering, Scene, Session, Settings, Unattended, agreement, finite_differences,
     gradient,
 };
-use drt_math::Rgb;
+use drt_geom::procedural;
+use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::Effect;
 
 fn settings(sampling: PathSampling, seed: u64, threads: usize) -> Settings {
@@ -39,6 +40,52 @@ fn threads_make_no_difference() {
     for threads in [2, 3] {
         assert!(one.image.pixels == by(threads).image.pixels, "{threads} threads");
     }
+}
+
+/// A small lamp in thick fog, and lights in plain view.
+#[test]
+fn a_pilot_chooses_what_takes_less_work() {
+    for (scene, both) in [(surfaces(phong(), metal()), false), (lamp_in_fog(), true)] {
+        let by = |sampling, threads| {
+            let mut session = Session::new(&scene, &[], &settings(sampling, 5, threads));
+            let session = session.as_mut().expect("a valid scene");
+            assert!(session.run(8, &Unattended));
+            session.rendering()
+        };
+        let found = by(PathSampling::Auto, 1);
+        let why = found.plan.sampling.clone().expect("a reason");
+        assert_eq!(found.plan.bidirectional, both, "{why}");
+        assert!(why.contains("pilot"), "{why}");
+        // The image is that of the one chosen, and the choice is no matter of threads.
+        let chosen = [PathSampling::Unidirectional, PathSampling::Bidirectional][usize::from(both)];
+        assert!(found.image.pixels == by(chosen, 1).image.pixels);
+        let again = by(PathSampling::Auto, 3);
+        assert!(again.image.pixels == found.image.pixels && again.plan.sampling == Some(why));
+    }
+    let mut dark = surfaces(phong(), metal());
+    dark.emitters.retain(|e| e.id.as_deref() == Some("sky"));
+    dark.shapes.iter_mut().for_each(|s| s.emitter = None);
+    let session = Session::new(&dark, &[], &settings(PathSampling::Auto, 0, 1));
+    let plan = session.expect("a valid scene").plan().clone();
+    assert!(!plan.bidirectional && plan.sampling.expect("a reason").contains("no light paths"));
+    let moving = [parameter("p", 0.0, vec![moves("ball", shift())])];
+    let session = Session::new(&lamp_in_fog(), &moving, &settings(PathSampling::Auto, 0, 1));
+    let plan = session.expect("a valid scene").plan().clone();
+    assert!(!plan.bidirectional && plan.sampling.expect("a reason").contains("images alone"));
+}
+
+/// A ball in thick fog, with a small lamp beside it.
+fn lamp_in_fog() -> Scene {
+    let mut b = Build::default();
+    let fog = homogeneous(Rgb::splat(1.2), Rgb::splat(0.97), Rgb::ZERO, 0.0);
+    let fog = b.medium("fog", fog);
+    let tub = placed(procedural::cube(), Vec3::splat(2.0), 0.0, Vec3::ZERO);
+    b.interface("tub", tub, fog, None);
+    let bsdf = b.bsdf("ball-bsdf", diffuse(0.6, 0.5, 0.4));
+    b.shape("ball", ball(0.5, vec3(0.6, -0.5, 0.0)), bsdf);
+    let lamp = placed(procedural::rectangle(), Vec3::splat(0.05), 0.4, vec3(-0.7, 0.6, -0.3));
+    b.lamp(lamp, Rgb::splat(900.0));
+    b.camera(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 8)
 }
 
 /// Derivatives by paths from both ends, over the bars of those from the camera.

@@ -31,6 +31,9 @@ pub(super) fn image(
     shared: &mut Shared,
 ) -> Result<Rendering, CliError> {
     let mut session = run::prepare_forward(job, shared)?;
+    if let Some(why) = session.plan().sampling.as_ref().filter(|_| !options.changes.quiet) {
+        eprintln!("drt: sampling is {why}");
+    }
     monitor.stage("render", 0.0, 1.0);
     let mut rendering = run::sample(&mut session, options, job.spp(), monitor);
     rendering.derivatives.clear();

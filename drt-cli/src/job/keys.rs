@@ -92,6 +92,8 @@ pub(crate) enum Sampling {
     Unidirectional,
     /// From the camera and from emitters.
     Bidirectional,
+    /// What a pilot finds to take less work.
+    Auto,
 }
 
 impl From<Sampling> for PathSampling {
@@ -99,6 +101,7 @@ impl From<Sampling> for PathSampling {
         match sampling {
             Sampling::Unidirectional => Self::Unidirectional,
             Sampling::Bidirectional => Self::Bidirectional,
+            Sampling::Auto => Self::Auto,
         }
     }
 }

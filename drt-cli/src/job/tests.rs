@@ -234,6 +234,8 @@ fn keys_of_later_versions_are_read_and_stand_in_the_way_of_derivatives_only() {
     refused(&text("[estimator]\nsampling = \"both\""), &[], &["`both`"]);
     let j = job(&text("[estimator]\nsampling = \"bidirectional\""), &[]).unwrap();
     assert_eq!(j.settings.sampling, PathSampling::Bidirectional);
+    let j = job(&text("[estimator]\nsampling = \"auto\""), &[]).unwrap();
+    assert_eq!(j.settings.sampling, PathSampling::Auto);
     refused(&text("[[motion]]\nmedium = \"fog\"\nkind = \"liquid\""), &[], &["`liquid`"]);
     let motion = |more: &str| text(&format!("[[motion]]\nmedium = \"fog\"\n{more}"));
     refused(&motion("kind = \"affine\"\nmesh = \"a.mesh\""), &[], &["`tetrahedral`"]);

@@ -46,6 +46,8 @@ pub struct Plan {
     pub splatting: bool,
     /// Paths of the image come from emitters, too.
     pub bidirectional: bool,
+    /// Which of the two was chosen and why, where that was left open.
+    pub sampling: Option<String>,
     /// What is skipped, and why.
     pub skipped: Vec<String>,
 }
@@ -104,6 +106,9 @@ impl fmt::Display for Plan {
         };
         let ends = if self.bidirectional { ", from the camera and from emitters" } else { "" };
         writeln!(f, "image: {image}{ends}")?;
+        if let Some(sampling) = &self.sampling {
+            writeln!(f, "sampling: {sampling}")?;
+        }
         writeln!(f, "path record: {}", yes(self.record))?;
         if self.record {
             let pairs = if self.antithetic { ", mirrored pairs" } else { "" };

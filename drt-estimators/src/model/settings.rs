@@ -106,6 +106,8 @@ pub enum PathSampling {
     /// From the camera and from emitters, joined in every way. Of images, and of derivatives by [`EstimatorKind::PathSpace`]
     /// and by [`EstimatorKind::Warped`] with edges.
     Bidirectional,
+    /// Whichever of the two finds the image with less work, by a pilot of few samples. Derivatives take the first.
+    Auto,
 }
 
 /// How images and derivatives are estimated, whatever the number of samples: that is told by each call.

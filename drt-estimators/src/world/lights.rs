@@ -256,6 +256,11 @@ impl LightTable {
         self.density[s.prim as usize]
     }
 
+    /// True when light comes from somewhere in particular, where paths of light can start.
+    pub(crate) fn start_paths(&self) -> bool {
+        self.table.is_some()
+    }
+
     /// True when some surface emits.
     pub(crate) fn has_areas(&self) -> bool {
         self.density.iter().any(|d| *d > 0.0)

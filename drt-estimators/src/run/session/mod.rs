@@ -1,5 +1,6 @@
 //! A run: a scene prepared once, sampled in passes, with its results available at any time.
 
+mod choice;
 mod component;
 mod describe;
 mod legend;
@@ -138,6 +139,9 @@ impl Session {
         let depth = settings.max_depth.within(scene.integrator.max_depth);
         let mut world =
             World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, kept)?;
+        let derivatives = tangents.targets().next().is_some();
+        let (settings, sampling) = choice::chosen(&world, scene, settings, derivatives, kept)?;
+        let settings = &settings;
         let mut components = Vec::new();
         for (settings, lit) in estimators(scene, tangents.targets(), settings) {
             let world = world.lit_by(lit)?;
@@ -149,7 +153,7 @@ impl Session {
         }
         let mut plan = Plan::together(components.iter().map(|c| &c.plan));
         let bidirectional = settings.sampling == PathSampling::Bidirectional;
-        plan.bidirectional = bidirectional;
+        (plan.bidirectional, plan.sampling) = (bidirectional, sampling);
         // Light's paths reach any pixel.
         plan.splatting = bidirectional || (settings.splatting && world.camera.shares_points());
         let emission = bidirectional.then(|| EmissionSampler::new(&world));
