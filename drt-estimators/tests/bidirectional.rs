@@ -4,8 +4,8 @@ mod common;
 
 use common::*;
 use drt_estimators::{
-    EstimatorKind, PathSampling, Rendering, Scene, Session, Settings, Unattended, agreement, finite_differences,
-    gradient,
+    EstimatorKind, PathSampling, Rendering, Scene, Session, Settings, Unattended, agreement,
+    finite_differences, gradient,
 };
 use drt_geom::procedural;
 use drt_math::{Rgb, Vec3, vec3};
@@ -71,7 +71,7 @@ fn a_pilot_chooses_what_takes_less_work() {
     let moving = [parameter("p", 0.0, vec![moves("ball", shift())])];
     let session = Session::new(&lamp_in_fog(), &moving, &settings(PathSampling::Auto, 0, 1));
     let plan = session.expect("a valid scene").plan().clone();
-    assert!(!plan.bidirectional && plan.sampling.expect("a reason").contains("images alone"));
+    assert!(!plan.bidirectional && plan.sampling.expect("a reason").contains("for images"));
 }
 
 /// A ball in thick fog, with a small lamp beside it.

@@ -59,7 +59,7 @@ pub(super) struct Options {
     /// Stop when the relative noise of every image is below this.
     #[arg(long, value_name = "E", value_parser = positive, allow_negative_numbers = true)]
     pub(super) target_error: Option<f64>,
-    /// How paths are found, instead of as the job says; bidirectional for images alone.
+    /// How paths are found, instead of as the job says.
     #[arg(long, value_name = "KIND")]
     pub(super) sampling: Option<Sampling>,
     #[command(flatten)]

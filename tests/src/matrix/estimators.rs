@@ -4,8 +4,8 @@ use std::fmt;
 use std::time::Instant;
 
 use drt_estimators::{
-    Agreement, Derivative, EstimatorKind, Layer, PathSampling, Rendering, Session, Settings, Term, Unattended,
-    agreement,
+    Agreement, Derivative, EstimatorKind, Layer, PathSampling, Rendering, Session, Settings, Term,
+    Unattended, agreement,
 };
 use drt_motion::Parameter;
 
@@ -151,12 +151,7 @@ fn compare_once(
 }
 
 /// The comparisons of all derivatives that two estimators have sampled.
-fn pairs_of(
-    stage: &'static str,
-    method: Method,
-    own: &Sampled,
-    reference: &Sampled,
-) -> Vec<Pair> {
+fn pairs_of(stage: &'static str, method: Method, own: &Sampled, reference: &Sampled) -> Vec<Pair> {
     let mut pairs = Vec::new();
     for (k, (a, b)) in own.all.derivatives.iter().zip(&reference.all.derivatives).enumerate() {
         let size = b.total.rms_value();

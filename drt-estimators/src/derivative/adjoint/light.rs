@@ -73,8 +73,7 @@ impl Differentiator<'_> {
         let adjoint = theta * node.inv_pdf * children;
         let moving = [k, next, arrival.parent as usize].iter().any(|n| velocities.moves(*n));
         let (wo, wi, behind) = (-arrival.dir, node.wi, self.behind(path, k));
-        let to_wi =
-            self.scattering(vertex, wo, wi, None, adjoint, behind, moving, &mut here, sink);
+        let to_wi = self.scattering(vertex, wo, wi, None, adjoint, behind, moving, &mut here, sink);
         let end = record.nodes[next].arrival.as_ref();
         if let (Some(to_wi), Some(end), Some(v)) = (to_wi, end, record.nodes[next].vertex()) {
             let phi = velocities.of(next).blend.weight;

@@ -104,7 +104,12 @@ fn parts(Sum { weight, samples }: Sum, (prepared, motion): &(Prepared, Motion)) 
         let contraction = Contraction::new(&prepared.world, motion);
         let mut primary = Checked::new(Total { contraction, weight, sum: 0.0 });
         for source in &prepared.sources {
-            prepared.splatter(&prepared.world, seed).run(*source, source.stream(), samples * PIXELS, &mut primary);
+            prepared.splatter(&prepared.world, seed).run(
+                *source,
+                source.stream(),
+                samples * PIXELS,
+                &mut primary,
+            );
         }
         edges += primary.inner.sum / f64::from(samples * PIXELS);
         parts.rays.push(rays);

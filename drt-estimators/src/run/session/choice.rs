@@ -47,7 +47,9 @@ pub(super) fn chosen(
     let plain = with(PathSampling::Unidirectional);
     let without = |why: &str| Ok((plain.clone(), Some(format!("unidirectional: {why}"))));
     if derivatives {
-        return without("`auto` chooses for images alone");
+        return without(
+            "`auto` chooses for images; derivatives have paths from both ends where these are asked for",
+        );
     }
     if world.max_depth < 2 || !world.lights.start_paths() {
         return without("there are no light paths to join");

@@ -63,13 +63,11 @@ use crate::sampling::bidirectional::subpath::{
 use crate::sampling::film::Splat;
 use crate::sampling::flight::proxy_attenuation;
 use crate::sampling::mode::{ImportanceMode, RadianceMode, TransportMode};
-use crate::sampling::record::{
-    Joint, LightPath, LightVertex, Radiance, Scattered, SeenVertex,
-};
+use crate::sampling::record::{Joint, LightPath, LightVertex, Radiance, Scattered, SeenVertex};
 use crate::sampling::trace::{Arrival, Connection, Observer, OutgoingRay, Tracer};
-use crate::world::{Crossing, World};
 use crate::world::lights::LightKind;
 use crate::world::vertex::Vertex;
+use crate::world::{Crossing, World};
 
 /// Joins paths from both ends.
 pub(crate) struct Bidirectional<'w> {

@@ -34,9 +34,7 @@ use crate::edges::edge::{Edge, EdgePoint, EdgeTable, collect, merge_coincident};
 use crate::edges::movers::Movers;
 use crate::terms::boundary::shadow::Shadows;
 
-use crate::derivative::sensitivity::{
-    ActiveInputs, AdjointSink, VelocityFunctional, VelocityTerm,
-};
+use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, VelocityFunctional, VelocityTerm};
 use crate::model::emitter::{Emitter, EmitterGradient};
 use crate::model::error::Error;
 use crate::model::sensor::SensorGradient;

@@ -1,6 +1,5 @@
 //! One estimator's part in the derivative of a path: the light of some emitters, by a velocity field.
 
-
 use drt_geom::edges::tree::TreeScratch;
 use drt_math::{Rgb, RgbVec, Rng};
 

@@ -94,7 +94,8 @@ impl Session {
         let per_pixel = part * f64::from(units * self.per_unit()) * self.source_ratio(c, i);
         let seed = !seed_of_component(self.settings.seed, c);
         let component = &self.components[c];
-        let (account, going) = component.sample_source(&mut film, i, seed, per_pixel, &self.world, pass, |_| {});
+        let (account, going) =
+            component.sample_source(&mut film, i, seed, per_pixel, &self.world, pass, |_| {});
         let samples = film.samples();
         let per_pixel = samples / (f64::from(size[0]) * f64::from(size[1]));
         let variance = (0..n).map(|p| per_pixel * film.variance(p)).collect();
