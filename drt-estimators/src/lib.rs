@@ -34,7 +34,7 @@ pub use model::settings::{
     AuxiliarySamples, Depth, EstimatorKind, PathSampling, Settings, Warp, WarpKernel,
 };
 pub use model::shard::Shard;
-pub use model::{emitter, filter, sensor, surface};
+pub use model::{emitter, filter, sensor, surface, texture};
 pub use run::finite_difference::finite_differences;
 pub use run::reverse::{GradientBatch, gradient, gradient_in_batches};
 pub use run::session::{Control, FinishedTile, Merged, Session, ShardError, ShardSums, Unattended};

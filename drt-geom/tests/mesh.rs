@@ -167,3 +167,39 @@ fn points_may_be_those_of_glam() {
     let nearest = bvh.closest_point(DVec3::ZERO).unwrap().point;
     assert_eq!(nearest, nearest_point([corners[0], corners[1], corners[2]], Vec3::ZERO));
 }
+
+#[test]
+fn texture_coordinates_stay_with_their_corners() {
+    let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+    let triangles = vec![[0, 1, 2], [0, 1, 1], [1, 3, 2]];
+    let mesh = Mesh::new(positions.to_vec(), triangles).unwrap();
+    let uv = |corners: [u32; 3]| {
+        corners.map(|v| [positions[v as usize][0], 10.0 * positions[v as usize][1]])
+    };
+    let texcoords = mesh.triangles.iter().map(|t| uv(*t)).collect::<Vec<_>>();
+    let mesh = mesh.with_texcoords(texcoords.clone()).unwrap();
+    // Between the corners, by the weights of the second and the third.
+    let [u, v] = mesh.texcoord(2, [0.25, 0.5]);
+    assert!((u - 0.5).abs() < 1e-15 && (v - 7.5).abs() < 1e-14);
+    let matches = |m: &Mesh| {
+        m.triangles.iter().zip(m.texcoords.as_ref().unwrap()).all(|(t, corners)| *corners == uv(*t))
+    };
+    let mut flipped = mesh.clone();
+    flipped.flip();
+    let (clean, dropped) = mesh.drop_degenerate();
+    assert_eq!((dropped, clean.triangles.len()), (1, 2));
+    assert!(matches(&mesh) && matches(&flipped) && matches(&clean));
+    let mirror =
+        drt_math::Affine::about(drt_math::Mat3::diagonal(vec3(-1.0, 1.0, 1.0)), Vec3::ZERO);
+    assert!(matches(&mesh.transform(&mirror)));
+
+    let plain = || Mesh { texcoords: None, ..mesh.clone() };
+    let mut bad = texcoords.clone();
+    bad[1][2][0] = f64::NAN;
+    let error = plain().with_texcoords(bad).unwrap_err();
+    assert_eq!(error, drt_geom::MeshError::BadTexcoords { triangle: 1 });
+    let error = plain().with_texcoords(texcoords[..2].to_vec()).unwrap_err();
+    assert_eq!(error, drt_geom::MeshError::BadTexcoords { triangle: 2 });
+    // Without any they are the weights, as in Mitsuba.
+    assert_eq!(plain().texcoord(0, [0.2, 0.3]), [0.2, 0.3]);
+}

@@ -1,10 +1,11 @@
 //! Surface scattering.
 
 use drt_estimators::surface::{
-    Bsdf, Coating, Conductor, Dielectric, Diffuse, Distribution, Phong, Plastic, RoughConductor,
-    RoughDielectric, ThinDielectric, TwoSided,
+    Bsdf, BsdfChange, Coating, Conductor, Dielectric, Diffuse, Distribution, Phong, Plastic,
+    Property, RoughConductor, RoughDielectric, ThinDielectric, TwoSided,
 };
-use drt_math::Rgb;
+use drt_estimators::texture::Texture;
+use drt_math::{Rgb, ValueChange};
 
 use super::Loader;
 use super::element::Element;
@@ -12,9 +13,14 @@ use super::properties::Properties;
 use super::spectrum::conductors;
 use crate::CliError;
 
+/// Textures, each with the property it stands for.
+type Textures = Vec<(Property, Texture)>;
+
 impl<'a> Loader<'a> {
-    pub(super) fn bsdf(&self, e: &'a Element) -> Result<Bsdf, CliError> {
+    /// A BSDF, with the textures that stand for its properties.
+    pub(super) fn bsdf(&self, e: &'a Element) -> Result<(Bsdf, Textures), CliError> {
         let p = Properties::of(e)?;
+        let mut textures = Textures::new();
         let bsdf = match p.kind()? {
             "null" => Bsdf::Null,
             "diffuse" => Bsdf::Diffuse(diffuse(&p)?),
@@ -25,7 +31,11 @@ impl<'a> Loader<'a> {
             "dielectric" => Bsdf::Dielectric(smooth_dielectric(&p)?),
             "thindielectric" => Bsdf::ThinDielectric(thin_dielectric(&p)?),
             "roughdielectric" => Bsdf::RoughDielectric(dielectric(&p)?),
-            "twosided" => Bsdf::TwoSided(Box::new(self.two_sided(&p)?)),
+            "twosided" => {
+                let (two_sided, of_both) = self.two_sided(&p)?;
+                textures = of_both;
+                Bsdf::TwoSided(Box::new(two_sided))
+            }
             other => {
                 return Err(e.error(format!(
                     "the bsdf type `{other}` is not supported; expected diffuse, plastic, \
@@ -34,12 +44,22 @@ impl<'a> Loader<'a> {
                 )));
             }
         };
+        for (name, texture) in p.take_textures() {
+            let property = Property::from_name(name).map_err(|_| {
+                e.error(format!("a texture of `{name}` is not supported; give a number"))
+            })?;
+            let same = BsdfChange { property, op: ValueChange::Multiply(1.0) };
+            bsdf.tangent(&same, 0.0).map_err(|_| {
+                e.error(format!("a texture of `{name}` is not supported by this type of BSDF"))
+            })?;
+            textures.push((property, texture));
+        }
         p.finish()?;
         bsdf.validate().map_err(|err| e.error(err))?;
-        Ok(bsdf)
+        Ok((bsdf, textures))
     }
 
-    fn two_sided(&self, p: &Properties<'a>) -> Result<TwoSided, CliError> {
+    fn two_sided(&self, p: &Properties<'a>) -> Result<(TwoSided, Textures), CliError> {
         let sides = self.index.inner(p, "bsdf", None);
         // Also what keeps a reference to itself from being followed for ever.
         if let Some(s) = sides.iter().find(|s| s.target.attribute("type") == Some("twosided")) {
@@ -49,7 +69,16 @@ impl<'a> Loader<'a> {
         }
         let side = |i: usize| sides.get(i).map(|s| self.bsdf(s.target)).transpose();
         match (side(0)?, sides.len()) {
-            (Some(front), 1 | 2) => Ok(TwoSided { front, back: side(1)? }),
+            (Some((front, textures)), 1) => Ok((TwoSided { front, back: None }, textures)),
+            (Some((front, textures)), 2) => {
+                let (back, of_back) =
+                    side(1)?.map_or((None, Textures::new()), |(b, t)| (Some(b), t));
+                if !(textures.is_empty() && of_back.is_empty()) {
+                    let message = "textures need the same bsdf on both sides; give one";
+                    return Err(p.element.error(message));
+                }
+                Ok((TwoSided { front, back }, textures))
+            }
             (_, n) => Err(p.element.error(format!("expected one or two bsdfs inside, found {n}"))),
         }
     }

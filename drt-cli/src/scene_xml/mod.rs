@@ -18,6 +18,7 @@ mod source;
 mod spectrum;
 #[cfg(test)]
 mod tests;
+mod textures;
 mod transform;
 mod values;
 mod volumes;
@@ -27,6 +28,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use drt_estimators::surface::{Bsdf, Diffuse};
+use drt_estimators::texture::BsdfTexture;
 use drt_estimators::{Named, Scene};
 use drt_math::Rgb;
 
@@ -118,7 +120,15 @@ impl<'a> Loader<'a> {
             scene.media.push(self.medium(e)?);
         }
         for e in self.index.all("bsdf") {
-            scene.bsdfs.push(Named { id: e.id().map(Into::into), item: self.bsdf(e)? });
+            let (item, textures) = self.bsdf(e)?;
+            let bsdf = scene.bsdfs.len();
+            let own = textures.into_iter();
+            scene.textures.extend(own.map(|(property, texture)| BsdfTexture {
+                bsdf,
+                property,
+                texture,
+            }));
+            scene.bsdfs.push(Named { id: e.id().map(Into::into), item });
         }
         let shapes = self.index.all("shape");
         let carried = self.carried_emitters(shapes)?;
@@ -159,6 +169,7 @@ impl<'a> Loader<'a> {
                 // Read for their own sake, so that mistakes in unused ones are found too.
                 "phase" => drop(self.phase(e)?),
                 "volume" => drop(self.volume(e)?),
+                "texture" if e.id().is_some() && textures::varies(e) => drop(textures::read(e)?),
                 "texture" | "spectrum" | "rgb" | "srgb" if e.id().is_some() => {
                     spectrum::reflected(e)?;
                 }

@@ -4,11 +4,12 @@
 use std::cell::RefCell;
 use std::path::PathBuf;
 
+use drt_estimators::texture::Texture;
 use drt_math::{Affine, Rgb, Vec3, vec3};
 
 use super::element::Element;
 use super::numbers::{number, plain_numbers, plain_value, triple};
-use super::{spectrum, transform};
+use super::{spectrum, textures, transform};
 use crate::CliError;
 
 /// The children of an element, each to be asked for once.
@@ -18,6 +19,8 @@ pub(super) struct Properties<'a> {
     used: RefCell<Vec<bool>>,
     /// Property names asked for, for the message about those that were not.
     asked: RefCell<Vec<&'static str>>,
+    /// Textures that vary, by the property they stand for; whoever can use them takes them.
+    textures: RefCell<Vec<(&'static str, Texture)>>,
 }
 
 impl<'a> Properties<'a> {
@@ -30,7 +33,7 @@ impl<'a> Properties<'a> {
             return Err(twice[1].1.error("given twice"));
         }
         let used = RefCell::new(vec![false; element.children.len()]);
-        Ok(Self { element, used, asked: RefCell::default() })
+        Ok(Self { element, used, asked: RefCell::default(), textures: RefCell::default() })
     }
 
     /// The plugin's type.
@@ -70,7 +73,13 @@ impl<'a> Properties<'a> {
     }
 
     /// A finite number.
+    ///
+    /// Of a texture that varies it is the mean, and the texture is kept.
     pub(super) fn float(&self, name: &'static str) -> Result<Option<f64>, CliError> {
+        if let Some((e, texture)) = self.texture(name)? {
+            let texture = textures::luminance(texture).map_err(|reason| e.error(reason))?;
+            return Ok(Some(self.keep(name, texture).r));
+        }
         self.value(name, &["float", "integer"], |e| match *plain_numbers(e)? {
             [v] => Ok(v),
             _ => Err(e.error("expected one number")),
@@ -157,13 +166,43 @@ impl<'a> Properties<'a> {
     }
 
     /// A colour of something that reflects, refracts or absorbs.
+    ///
+    /// Of a texture that varies it is the mean, and the texture is kept.
     pub(super) fn color(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
+        if let Some((_, texture)) = self.texture(name)? {
+            return Ok(Some(self.keep(name, texture)));
+        }
         self.value(name, spectrum::TAGS, spectrum::reflected)
     }
 
     /// A colour of light.
     pub(super) fn light(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
+        if let Some((e, _)) = self.texture(name)? {
+            let message = format!("a texture cannot stand for `{name}` here; only BSDFs have them");
+            return Err(e.error(message));
+        }
         self.value(name, spectrum::TAGS, spectrum::emitted)
+    }
+
+    fn texture(&self, name: &'static str) -> Result<Option<(&'a Element, Texture)>, CliError> {
+        let is_named = |e: &&Element| property_name(e).is_some_and(|(n, _)| n == name);
+        let Some(e) = self.element.children.iter().find(is_named) else { return Ok(None) };
+        if !textures::varies(e) {
+            return Ok(None);
+        }
+        self.property(name);
+        Ok(Some((e, textures::read(e)?)))
+    }
+
+    fn keep(&self, name: &'static str, texture: Texture) -> Rgb {
+        let mean = texture.mean();
+        self.textures.borrow_mut().push((name, texture));
+        mean
+    }
+
+    /// The textures kept so far.
+    pub(super) fn take_textures(&self) -> Vec<(&'static str, Texture)> {
+        self.textures.take()
     }
 
     /// Accepts properties that do not change the expected image.
@@ -180,6 +219,10 @@ impl<'a> Properties<'a> {
 
     /// Refuses what nobody asked for.
     pub(super) fn finish(&self) -> Result<(), CliError> {
+        if let Some((name, _)) = self.textures.borrow().first() {
+            let message = format!("a texture cannot stand for `{name}` here; only BSDFs have them");
+            return Err(self.element.error(message));
+        }
         let used = self.used.borrow();
         let Some(i) = used.iter().position(|u| !u) else { return Ok(()) };
         let child = &self.element.children[i];

@@ -2,6 +2,7 @@
 
 mod mesh_file;
 mod serialized;
+mod texcoords;
 
 use std::sync::Arc;
 
@@ -100,17 +101,18 @@ impl<'a> Loader<'a> {
 fn model(p: &Properties<'_>) -> Result<Model, CliError> {
     let face_normals = p.boolean("face_normals")?.unwrap_or(false);
     let mut model = match p.kind()? {
-        "obj" => from_file(p, face_normals, mesh_file::obj)?,
-        "ply" => from_file(p, face_normals, mesh_file::ply)?,
+        // Wavefront's images begin at the bottom.
+        "obj" => from_file(p, face_normals, true, mesh_file::obj)?,
+        "ply" => from_file(p, face_normals, false, mesh_file::ply)?,
         "serialized" => {
             let index = p.integer_in("shape_index", 0..=i64::from(u32::MAX))?.unwrap_or(0);
-            from_file(p, face_normals, |e, path| serialized::read(e, path, index))?
+            from_file(p, face_normals, false, |e, path| serialized::read(e, path, index))?
         }
-        "cube" => Model::faceted(procedural::cube()),
-        "rectangle" => Model::faceted(procedural::rectangle()),
+        "cube" => Model::faceted(texcoords::cube(procedural::cube())),
+        "rectangle" => Model::faceted(texcoords::rectangle(procedural::rectangle())),
         "disk" => {
             let corners = p.integer_in("resolution", 3..=1 << 20)?.unwrap_or(DISK_RESOLUTION);
-            Model::faceted(procedural::disk(corners))
+            Model::faceted(texcoords::disk(procedural::disk(corners)))
         }
         "sphere" => sphere(p)?,
         "cylinder" => cylinder(p)?,
@@ -135,12 +137,17 @@ fn model(p: &Properties<'_>) -> Result<Model, CliError> {
 fn from_file(
     p: &Properties<'_>,
     face_normals: bool,
+    upside_down: bool,
     read: impl FnOnce(&Element, &std::path::Path) -> Result<Mesh, CliError>,
 ) -> Result<Model, CliError> {
     let path = p.path("filename")?.ok_or_else(|| p.element.error("`filename` is missing"))?;
-    // There are no textures, and silhouettes are sampled in another way.
-    p.accept(&["flip_tex_coords", "silhouette_sampling_weight"]);
-    let mesh = read(p.element, &path)?;
+    let flip = p.boolean("flip_tex_coords")?.unwrap_or(upside_down);
+    // Silhouettes are sampled in another way.
+    p.accept(&["silhouette_sampling_weight"]);
+    let mut mesh = read(p.element, &path)?;
+    for [_, v] in mesh.texcoords.iter_mut().flatten().flatten().filter(|_| flip) {
+        *v = 1.0 - *v;
+    }
     let turns = face_normals || mesh.normals.is_none();
     let smooth = !face_normals && mesh.normals.is_none();
     Ok(Model { mesh, turns, smooth })
@@ -154,7 +161,7 @@ fn sphere(p: &Properties<'_>) -> Result<Model, CliError> {
         return Err(p.element.error(format!("`radius` is {radius}; it must be positive")));
     }
     let map = Affine { linear: Mat3::IDENTITY * radius, translation: center };
-    let mesh = procedural::uv_sphere(bands).transform(&map);
+    let mesh = texcoords::sphere(procedural::uv_sphere(bands)).transform(&map);
     Ok(Model { mesh, turns: true, smooth: false })
 }
 
@@ -177,7 +184,8 @@ fn cylinder(p: &Properties<'_>) -> Result<Model, CliError> {
         drt_math::vec3(a, b, c)
     };
     let linear = Mat3::from_rows(row(Vec3::X), row(Vec3::Y), row(Vec3::Z));
-    let mesh = procedural::cylinder(sides).transform(&Affine { linear, translation: from });
+    let mesh = texcoords::cylinder(procedural::cylinder(sides));
+    let mesh = mesh.transform(&Affine { linear, translation: from });
     mesh.validate().map_err(|err| p.element.error(err))?;
     Ok(Model { mesh, turns: true, smooth: false })
 }

@@ -13,3 +13,4 @@ pub mod sensor;
 pub(crate) mod settings;
 pub(crate) mod shard;
 pub mod surface;
+pub mod texture;

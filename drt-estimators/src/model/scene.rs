@@ -11,6 +11,7 @@ use crate::model::emitter::Emitter;
 use crate::model::error::{ElementError, Error, SettingError};
 use crate::model::sensor::Sensor;
 use crate::model::surface::Bsdf;
+use crate::model::texture::BsdfTexture;
 
 /// A scene: shapes, what they are made of, what lights them, and who looks.
 ///
@@ -22,6 +23,9 @@ pub struct Scene {
     pub shapes: Vec<Shape>,
     /// Surface scattering models.
     pub bsdfs: Vec<Named<Bsdf>>,
+    /// Textures that stand for properties of these.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub textures: Vec<BsdfTexture>,
     /// Participating media.
     pub media: Vec<Named<Medium>>,
     /// Emitters; an area emitter is named by the shape that carries it.
@@ -179,14 +183,18 @@ impl TargetName for String {
 }
 
 impl Scene {
-    /// Refuses derivatives with respect to `parameter` where light meets smooth surfaces: they move
-    /// light along them, which no term here samples.
-    pub(crate) fn refuse_smooth(&self, parameter: &str) -> Result<(), Error> {
+    /// Refuses derivatives with respect to `parameter` where light meets smooth surfaces, which move
+    /// light along them, or textured ones, whose values move with them: no term here knows of either.
+    pub(crate) fn refuse_derivatives(&self, parameter: &str) -> Result<(), Error> {
         for (i, s) in self.shapes.iter().enumerate() {
             let bsdf = &self.bsdfs[s.bsdf].item;
             if bsdf.is_smooth() {
                 let (bsdf, parameter) = (bsdf.name(), parameter.into());
                 return Err(unusable(&s.id, "shape", i, ElementError::Smooth { bsdf, parameter }));
+            }
+            if self.textures.iter().any(|t| t.bsdf == s.bsdf) {
+                let parameter = parameter.into();
+                return Err(unusable(&s.id, "shape", i, ElementError::Textured { parameter }));
             }
         }
         Ok(())
@@ -222,6 +230,19 @@ impl Scene {
         }
         for (i, b) in self.bsdfs.iter().enumerate() {
             b.item.validate().map_err(|e| unusable(&b.id, "bsdf", i, e.into()))?;
+        }
+        for BsdfTexture { bsdf: i, property, texture } in &self.textures {
+            let b = self
+                .bsdfs
+                .get(*i)
+                .ok_or_else(|| unusable(&None, "bsdf", *i, ElementError::NoBsdf(*i)))?;
+            for bound in texture.bounds() {
+                let property = *property;
+                let fail = |reason| {
+                    unusable(&b.id, "bsdf", *i, ElementError::Texture { property, reason })
+                };
+                b.item.with(property, bound).map_err(fail)?;
+            }
         }
         for (i, m) in self.media.iter().enumerate() {
             m.item.phase.validate().map_err(|e| unusable(&m.id, "medium", i, e.into()))?;
@@ -323,7 +344,8 @@ mod tests {
     use super::*;
     use crate::model::filter::{Filter, FilterKind};
     use crate::model::sensor::{Lens, Sensor};
-    use crate::model::surface::{Dielectric, Diffuse, RoughConductor};
+    use crate::model::surface::{Dielectric, Diffuse, Property, RoughConductor};
+    use crate::model::texture::Texture;
 
     fn scene() -> Scene {
         let light = Emitter::Point { position: Vec3::Z, intensity: Rgb::ONE };
@@ -365,6 +387,21 @@ mod tests {
         for wrong in [f64::NAN, 0.0, -1.0] {
             fails(&|s| s.bsdfs[0].item = metal(wrong), "alpha");
         }
+        let squares = |bsdf, property, value| BsdfTexture {
+            bsdf,
+            property,
+            texture: Texture::Checkerboard {
+                colours: [Rgb::splat(0.5), Rgb::splat(value)],
+                to_uv: crate::texture::UvMap::IDENTITY,
+            },
+        };
+        let reflectance = Property::Reflectance;
+        for wrong in [f64::NAN, -0.1, f64::INFINITY] {
+            let part = "grey: the texture of its \"reflectance\"";
+            fails(&|s| s.textures.push(squares(0, reflectance, wrong)), part);
+        }
+        fails(&|s| s.textures.push(squares(0, Property::Alpha, 0.5)), "has no \"alpha\"");
+        fails(&|s| s.textures.push(squares(7, reflectance, 0.5)), "there is no bsdf 7");
         for wrong in [f64::NAN, f64::INFINITY] {
             let light = |at: f64| Emitter::Point { position: Vec3::Z * at, intensity: Rgb::ONE };
             fails(&|s| s.emitters[0].item.emitter = light(wrong), "bulb: ");
@@ -382,12 +419,12 @@ mod tests {
     }
 
     #[test]
-    fn smooth_surfaces_refuse_derivatives_by_name() {
+    fn smooth_and_textured_surfaces_refuse_derivatives_by_name() {
         let mut scene = scene();
-        assert!(scene.refuse_smooth("spin").is_ok());
+        assert!(scene.refuse_derivatives("spin").is_ok());
         scene.bsdfs.push(Named::new("glass", Bsdf::Dielectric(Dielectric::default())));
         // One that no shape has does no harm.
-        assert!(scene.refuse_smooth("spin").is_ok());
+        assert!(scene.refuse_derivatives("spin").is_ok());
         let shape = scene.shapes.len() - 1;
         scene.shapes[shape].bsdf = scene.bsdfs.len() - 1;
         let parameters = [drt_motion::Parameter {
@@ -405,6 +442,26 @@ mod tests {
         let message = message.err().expect("a refusal").to_string();
         assert!(message.contains(&name) && message.contains("dielectric"), "{message}");
         assert!(message.contains("`spin` cannot be differentiated"), "{message}");
+        // Nor are textured ones differentiated, nor what a texture stands for changed.
+        scene.shapes[shape].bsdf = 0;
+        assert!(scene.refuse_derivatives("spin").is_ok());
+        let texture = Texture::Checkerboard {
+            colours: [Rgb::splat(0.2), Rgb::splat(0.8)],
+            to_uv: crate::texture::UvMap::IDENTITY,
+        };
+        scene.textures.push(BsdfTexture { bsdf: 0, property: Property::Reflectance, texture });
+        let message = crate::Session::new(&scene, &parameters, &crate::Settings::default());
+        let message = message.err().expect("a refusal").to_string();
+        assert!(message.contains(&name) && message.contains("has a texture"), "{message}");
+        let op = drt_motion::ValueChange::Add(Rgb::ONE);
+        let change =
+            drt_motion::PropertyChange { property: "reflectance".into(), op, voxels: None };
+        let change = drt_motion::Change::Property(change);
+        let effects = alloc::vec![drt_motion::Effect { target: "grey".into(), change }];
+        let bleach = [drt_motion::Parameter { name: "bleach".into(), value: 0.0, effects }];
+        let message = crate::Session::new(&scene, &bleach, &crate::Settings::default());
+        let message = message.err().expect("a refusal").to_string();
+        assert!(message.contains("`bleach`") && message.contains("texture stands"), "{message}");
         // The image is nobody's derivative.
         assert!(crate::Session::new(&scene, &[], &crate::Settings::default()).is_ok());
     }

@@ -137,7 +137,7 @@ pub fn gradient_in_batches(
     scene.check()?;
     settings.check(scene, true)?;
     let wanted = &targets(scene, wanted)?[..];
-    wanted.first().map_or(Ok(()), |target| scene.refuse_smooth(&scene.name_of(*target)))?;
+    wanted.first().map_or(Ok(()), |target| scene.refuse_derivatives(&scene.name_of(*target)))?;
     let (scene, _) = tangents::apply(scene, &[])?;
     let film = scene.sensors[settings.sensor].item.sensor.film();
     if adjoint.len() != (film[0] * film[1]) as usize {

@@ -12,7 +12,11 @@ pub(super) struct Polygons {
     pub(super) positions: Vec<Vec3>,
     /// Shading normals of any length, in an order of their own.
     pub(super) normals: Vec<Vec3>,
+    /// Texture coordinates, in an order of their own.
+    pub(super) texcoords: Vec<[f64; 2]>,
     corners: Vec<Corner>,
+    /// Of each corner, its texture coordinates by index; [`NONE`] where the file gives none.
+    corner_texcoords: Vec<u32>,
     /// Where each polygon's corners end.
     ends: Vec<usize>,
 }
@@ -33,8 +37,9 @@ pub(super) enum AssembleError {
 
 impl Polygons {
     /// Adds a corner to the polygon under construction.
-    pub(super) fn corner(&mut self, corner: Corner) {
+    pub(super) fn corner(&mut self, corner: Corner, texcoord: u32) {
         self.corners.push(corner);
+        self.corner_texcoords.push(texcoord);
     }
 
     /// Ends the polygon under construction and returns its number of corners.
@@ -50,7 +55,7 @@ impl Polygons {
 
     /// The triangulated mesh, of the vertices that polygons use, in the file's order. A vertex with
     /// several normals becomes several. Once any corner has a normal, those without (or with one of
-    /// length zero) take their polygon's.
+    /// length zero) take their polygon's. Once any has texture coordinates, those without are at (0, 0).
     pub(super) fn assemble(mut self) -> Result<Mesh, AssembleError> {
         if self.corners.iter().any(|c| c.normal != NONE) {
             self.complete_normals();
@@ -61,18 +66,29 @@ impl Polygons {
         let place = |c: &Corner| vertices.partition_point(|v| v < c) as u32;
 
         let mut triangles = Vec::with_capacity(self.corners.len());
+        let textured = self.corner_texcoords.iter().any(|t| *t != NONE);
+        let texcoord = |corner: usize| {
+            let i = self.corner_texcoords[corner] as usize;
+            self.texcoords.get(i).copied().unwrap_or_default()
+        };
+        let (mut texcoords, mut begin) = (Vec::new(), 0);
         for (index, corners) in self.polygons().enumerate() {
             let points: Vec<_> =
                 corners.iter().map(|c| self.positions[c.vertex as usize]).collect();
             let pieces =
                 triangulate(&points).map_err(|error| AssembleError::Polygon { index, error })?;
             triangles.extend(pieces.iter().map(|t| t.map(|k| place(&corners[k as usize]))));
+            if textured {
+                texcoords.extend(pieces.iter().map(|t| t.map(|k| texcoord(begin + k as usize))));
+            }
+            begin += corners.len();
         }
 
         let positions = vertices.iter().map(|c| self.positions[c.vertex as usize]).collect();
         let source = vertices.iter().map(|c| c.vertex).collect();
         let mesh = Mesh::new(positions, triangles)
             .and_then(|m| m.with_source(source, self.positions.len() as u32));
+        let mesh = if textured { mesh.and_then(|m| m.with_texcoords(texcoords)) } else { mesh };
         let has_normals = vertices.first().is_some_and(|c| c.normal != NONE);
         let mesh = if has_normals {
             let normals = vertices.iter().map(|c| self.normals[c.normal as usize]).collect();

@@ -27,6 +27,8 @@ impl Mesh {
 
         let triangles: Vec<_> = order.iter().map(|&i| self.triangles[i as usize]).collect();
         let dropped = self.triangles.len() - triangles.len();
-        (Self { triangles, ..self.clone() }, dropped)
+        let texcoords = self.texcoords.as_ref();
+        let texcoords = texcoords.map(|t| order.iter().map(|&i| t[i as usize]).collect());
+        (Self { triangles, texcoords, ..self.clone() }, dropped)
     }
 }

@@ -25,6 +25,9 @@ pub struct Mesh {
     pub normals: Option<Vec<Vec3>>,
     /// Vertex indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
+    /// Texture coordinates (u, v) of each corner of each triangle: of corners, not of vertices, so
+    /// that seams need no vertices of their own.
+    pub texcoords: Option<Vec<[[f64; 2]; 3]>>,
     /// The index of each vertex in the order of the file it came from, where the loader split
     /// vertices (a position with several normals) or left some out. `None` is the identity.
     pub source_vertices: Option<Vec<u32>>,
@@ -57,6 +60,14 @@ pub enum MeshError {
         index: u32,
         /// How many vertices there are.
         count: usize,
+    },
+    /// Texture coordinates are not one finite pair for each corner of each triangle.
+    #[error(
+        "triangle {triangle} (from 0) has no finite texture coordinates, or there are too many"
+    )]
+    BadTexcoords {
+        /// Which triangle.
+        triangle: usize,
     },
     /// An array with one entry per vertex has another length.
     #[error("{what} has {found} entries; it needs one for each of the {expected} vertices")]
@@ -105,6 +116,7 @@ impl Mesh {
             positions,
             triangles,
             normals: None,
+            texcoords: None,
             source_vertices: None,
             source_vertex_count,
         };
@@ -132,6 +144,14 @@ impl Mesh {
                 return Err(MeshError::IndexOutOfRange { triangle, index, count });
             }
         }
+        if let Some(texcoords) = &self.texcoords {
+            let bad = |t: &[[f64; 2]; 3]| !t.iter().flatten().all(|c| c.is_finite());
+            let first = texcoords.iter().position(bad);
+            let wrong = (texcoords.len() != triangles).then_some(texcoords.len().min(triangles));
+            if let Some(triangle) = first.or(wrong) {
+                return Err(MeshError::BadTexcoords { triangle });
+            }
+        }
         let Some(normals) = &self.normals else { return Ok(()) };
         self.expect_per_vertex("normals", normals.len())?;
         let directed = |n: &Vec3| n.is_finite() && n.max_abs() > 0.0;
@@ -157,6 +177,26 @@ impl Mesh {
         }
         self.normals = Some(normals);
         Ok(self)
+    }
+
+    /// The same mesh with texture coordinates for each corner of each triangle.
+    ///
+    /// # Errors
+    /// When there is not one finite pair for each corner.
+    pub fn with_texcoords(mut self, texcoords: Vec<[[f64; 2]; 3]>) -> Result<Self, MeshError> {
+        self.texcoords = Some(texcoords);
+        self.validate()?;
+        Ok(self)
+    }
+
+    /// The texture coordinates at a point of a triangle, given by the weights of its second and third
+    /// corner; the weights themselves where the mesh has no coordinates.
+    #[inline]
+    #[must_use]
+    pub fn texcoord(&self, i: u32, [s, t]: [f64; 2]) -> [f64; 2] {
+        let Some(texcoords) = &self.texcoords else { return [s, t] };
+        let [a, b, c] = texcoords[i as usize];
+        core::array::from_fn(|k| a[k] * (1.0 - s - t) + b[k] * s + c[k] * t)
     }
 
     /// The same mesh, remembering which of a file's `count` vertices each vertex is.
@@ -288,6 +328,9 @@ impl Mesh {
         for t in &mut self.triangles {
             t.swap(1, 2);
         }
+        for t in self.texcoords.iter_mut().flatten() {
+            t.swap(1, 2);
+        }
     }
 }
 
@@ -307,6 +350,8 @@ mod unchecked {
         positions: Vec<Vec3>,
         normals: Option<Vec<Vec3>>,
         triangles: Vec<[u32; 3]>,
+        #[serde(default)]
+        texcoords: Option<Vec<[[f64; 2]; 3]>>,
         source_vertices: Option<Vec<u32>>,
         source_vertex_count: u32,
     }
@@ -317,6 +362,10 @@ mod unchecked {
             let mesh = Self::new(m.positions, m.triangles)?;
             let mesh = match m.source_vertices {
                 Some(v) => mesh.with_source(v, m.source_vertex_count)?,
+                None => mesh,
+            };
+            let mesh = match m.texcoords {
+                Some(t) => mesh.with_texcoords(t)?,
                 None => mesh,
             };
             match m.normals {

@@ -72,17 +72,24 @@ fn mesh((version, deflated): (u16, &[u8])) -> Result<Mesh, String> {
         0 => None,
         _ => Some(triples(&stream.floats(vertices, 3, double)?)),
     };
-    for (flag, numbers) in [(HAS_TEXTURE_COORDINATES, 2), (HAS_COLOURS, 3)] {
-        if flags & flag != 0 {
-            stream.floats(vertices, numbers, double)?;
-        }
+    let texcoords = match flags & HAS_TEXTURE_COORDINATES {
+        0 => Vec::new(),
+        _ => stream.floats(vertices, 2, double)?,
+    };
+    if flags & HAS_COLOURS != 0 {
+        stream.floats(vertices, 3, double)?;
     }
     // Wider indices come with more vertices than a mesh can have.
     let indices = stream.bytes(triangles, 12)?;
     let indices: Vec<u32> =
         indices.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
     let triangles = indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-    let mesh = Mesh::new(positions, triangles).map_err(|err| err.to_string())?;
+    let mut mesh = Mesh::new(positions, triangles).map_err(|err| err.to_string())?;
+    if !texcoords.is_empty() {
+        let at = |v: u32| [0, 1].map(|k| texcoords[2 * v as usize + k]);
+        let corners = mesh.triangles.iter().map(|t| t.map(at)).collect();
+        mesh = mesh.with_texcoords(corners).map_err(|err| err.to_string())?;
+    }
     match normals.filter(|_| flags & FACE_NORMALS == 0) {
         Some(normals) => mesh.with_normals(normals).map_err(|err| err.to_string()),
         None => Ok(mesh),

@@ -45,7 +45,8 @@ fn diffuse_and_its_colours() {
         (r#"<spectrum name="reflectance" type="blackbody"/>"#, "`temperature` is missing"),
         (r#"<spectrum name="reflectance" type="laser"/>"#, "`laser` is not supported"),
         (r#"<spectrum name="reflectance" value="1, 1, 1"/>"#, "need an <rgb>"),
-        (r#"<texture name="reflectance" type="bitmap"/>"#, "`bitmap` is not supported"),
+        (r#"<texture name="reflectance" type="bitmap"/>"#, "`filename` is missing"),
+        (r#"<texture name="reflectance" type="marble"/>"#, "`marble` is not supported"),
         (r#"<rgb name="diffuse_reflectance" value="1"/>"#, "which takes reflectance"),
     ] {
         refused(&property(inside), &[part]);

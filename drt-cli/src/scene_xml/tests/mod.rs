@@ -5,6 +5,7 @@ mod media;
 mod sensors;
 mod shapes;
 mod support;
+mod textures;
 
 use std::path::Path;
 

@@ -56,6 +56,22 @@ pub enum ElementError {
          has no derivative; move the film back"
     )]
     FilmCut(String),
+    /// A textured surface where something is to be differentiated.
+    #[error(
+        "its BSDF has a texture, past which `{parameter}` cannot be differentiated yet; use finite differences"
+    )]
+    Textured {
+        /// The parameter, or what else was to be differentiated by.
+        parameter: String,
+    },
+    /// A texture whose values, or some of them, the BSDF does not take.
+    #[error("the texture of its \"{property}\": {reason}")]
+    Texture {
+        /// What it stands for.
+        property: crate::model::surface::Property,
+        /// What is wrong.
+        reason: SurfaceError,
+    },
     /// A shape's arrays.
     #[error(transparent)]
     Mesh(#[from] MeshError),

@@ -145,6 +145,26 @@ impl Bsdf {
         Ok(velocity)
     }
 
+    /// The same with another value of a property, of both sides where it is two-sided.
+    ///
+    /// # Errors
+    /// When it has no such property or the value is not allowed.
+    pub(crate) fn with(&self, property: Property, value: Rgb) -> Result<Self, SurfaceError> {
+        let change = BsdfChange { property, op: ValueChange::Add(Rgb::ZERO) };
+        let mut changed = self.clone();
+        changed.slot(&change)?.set(value);
+        changed.validate()?;
+        Ok(changed)
+    }
+
+    /// The same, of a property and a value that [`Bsdf::with`] takes.
+    #[inline]
+    pub(crate) fn set(&mut self, property: Property, value: Rgb) {
+        if let Some(slot) = self.property(property) {
+            slot.set(value);
+        }
+    }
+
     fn property(&mut self, property: Property) -> Option<Slot<'_>> {
         match self {
             Self::Null | Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => None,

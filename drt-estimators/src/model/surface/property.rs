@@ -5,6 +5,7 @@ use drt_math::Rgb;
 
 /// A number or colour of a BSDF that a parameter can move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Property {
     /// Albedo of the diffuse lobe.
     Reflectance,

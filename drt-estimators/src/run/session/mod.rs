@@ -134,7 +134,7 @@ impl Session {
         kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         settings.check(scene, tangents.targets().next().is_some())?;
-        tangents.names.first().map_or(Ok(()), |name| scene.refuse_smooth(name))?;
+        tangents.names.first().map_or(Ok(()), |name| scene.refuse_derivatives(name))?;
         let tangents = tangents.seen_by(settings.sensor);
         let depth = settings.max_depth.within(scene.integrator.max_depth);
         let mut world =

@@ -69,8 +69,9 @@ pub enum ObjErrorKind {
 
 /// Reads a Wavefront OBJ file, given as its bytes and the name that errors should call it by.
 ///
-/// All groups and objects become one mesh; of the statements, `v`, `vn` and `f` are read and the others
-/// (texture coordinates, materials, points, lines, smoothing groups) passed over. Polygons are
+/// All groups and objects become one mesh; of the statements, `v`, `vn`, `vt` and `f` are read and the
+/// others (materials, points, lines, smoothing groups) passed over. Texture coordinates are as in the
+/// file, which often means v = 0 at the bottom of images. Polygons are
 /// triangulated as [`triangulate`](crate::triangulate()) does. Vertices no face uses are left out and vertices with
 /// several normals split; [`Mesh::source_vertices`] keeps the file's order. Faces may name vertices
 /// that come further down.
@@ -89,13 +90,19 @@ pub fn load_obj(bytes: &[u8], name: &str) -> Result<Mesh, ObjError> {
     let (vertices, corner_normals);
     (polygons.positions, vertices) = file.positions.load().map_err(fail)?;
     (polygons.normals, corner_normals) = file.normals.load().map_err(fail)?;
-    let mut corner_normals = corner_normals.into_iter();
-    let mut corners = vertices.into_iter().zip(file.has_normal).map(|(vertex, has_normal)| {
-        let normal = if has_normal { corner_normals.next() } else { None };
-        Corner { vertex, normal: normal.unwrap_or(NONE) }
+    let (texcoords, corner_texcoords) = file.texcoords.load().map_err(fail)?;
+    polygons.texcoords = texcoords.iter().map(|t| [t.x, t.y]).collect();
+    let (mut corner_normals, mut corner_texcoords) =
+        (corner_normals.into_iter(), corner_texcoords.into_iter());
+    let mut corners = vertices.into_iter().zip(file.has).map(|(vertex, [textured, normal])| {
+        let normal = if normal { corner_normals.next() } else { None };
+        let texcoord = if textured { corner_texcoords.next() } else { None };
+        (Corner { vertex, normal: normal.unwrap_or(NONE) }, texcoord.unwrap_or(NONE))
     });
     for &(_, count) in &file.faces {
-        corners.by_ref().take(count).for_each(|corner| polygons.corner(corner));
+        corners.by_ref().take(count).for_each(|(corner, texcoord)| {
+            polygons.corner(corner, texcoord);
+        });
         polygons.end_polygon();
     }
     if polygons.is_empty() {
@@ -147,16 +154,18 @@ impl LogicalLines<'_> {
 struct Statements {
     positions: Table,
     normals: Table,
+    texcoords: Table,
     /// The line of each face and its number of corners.
     faces: Vec<(usize, usize)>,
-    /// Of each corner of each face.
-    has_normal: Vec<bool>,
+    /// Whether each corner of each face has texture coordinates and a normal.
+    has: Vec<[bool; 2]>,
 }
 
 impl Statements {
     fn new() -> Self {
         let (positions, normals) = (Table::new("v", "vertex"), Table::new("vn", "normal"));
-        Self { positions, normals, faces: Vec::new(), has_normal: Vec::new() }
+        let texcoords = Table::new("vt", "texture coordinate");
+        Self { positions, normals, texcoords, faces: Vec::new(), has: Vec::new() }
     }
 
     fn read(&mut self, line: usize, text: &str) -> Result<(), ObjErrorKind> {
@@ -165,15 +174,18 @@ impl Statements {
             // What may follow (a weight, a colour) is not used.
             Some("v") => self.positions.vector(line, words.take(3)),
             Some("vn") => self.normals.vector(line, words.take(3)),
+            // v may be left out, and a third coordinate is not used.
+            Some("vt") => self.texcoords.vector(line, words.chain(["0", "0"]).take(3)),
             Some("f") => {
                 let corners = words.map(indices).collect::<Result<Vec<_>, _>>()?;
                 if corners.len() < 3 {
                     return Err(PolygonError::TooFewCorners(corners.len()).into());
                 }
                 self.faces.push((line, corners.len()));
-                self.has_normal.extend(corners.iter().map(|(_, normal)| normal.is_some()));
-                self.positions.face(line, corners.iter().map(|(vertex, _)| *vertex));
-                self.normals.face(line, corners.iter().filter_map(|(_, normal)| *normal));
+                self.has.extend(corners.iter().map(|(_, t, n)| [t.is_some(), n.is_some()]));
+                self.positions.face(line, corners.iter().map(|(vertex, ..)| *vertex));
+                self.texcoords.face(line, corners.iter().filter_map(|(_, texcoord, _)| *texcoord));
+                self.normals.face(line, corners.iter().filter_map(|(.., normal)| *normal));
             }
             _ => {}
         }
@@ -181,15 +193,15 @@ impl Statements {
     }
 }
 
-/// The words for vertex and normal of a corner.
-fn indices(corner: &str) -> Result<(&str, Option<&str>), ObjErrorKind> {
+/// The words for vertex, texture coordinates and normal of a corner.
+fn indices(corner: &str) -> Result<(&str, Option<&str>, Option<&str>), ObjErrorKind> {
     let mut parts = corner.split('/');
     let mut part = || parts.next().filter(|p| !p.is_empty());
     let (vertex, texture, normal) = (part(), part(), part());
     let is_index = |word: &str| word.parse::<i64>().is_ok_and(|i| i != 0);
     match vertex {
         Some(vertex) if texture.is_none_or(is_index) && parts.next().is_none() => {
-            Ok((vertex, normal))
+            Ok((vertex, texture, normal))
         }
         _ => Err(ObjErrorKind::BadCorner(corner.to_string())),
     }

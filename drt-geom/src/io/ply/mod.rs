@@ -74,7 +74,7 @@ type Failure = (String, PlyErrorKind);
 /// should call it by.
 ///
 /// The mesh needs an element `vertex` with `x y z`, and `face` with a list `vertex_indices` or
-/// `vertex_index`; `nx ny nz` become shading normals and all else is passed over. Polygons are
+/// `vertex_index`; `nx ny nz` become shading normals, `u v` or `s t` texture coordinates, and all else is passed over. Polygons are
 /// triangulated as [`triangulate`](crate::triangulate()) does, and vertices no face uses left out
 /// ([`Mesh::source_vertices`] keeps the file's order).
 ///
@@ -101,7 +101,7 @@ fn read_mesh(bytes: &[u8]) -> Result<Mesh, Failure> {
         match element.name.as_str() {
             "vertex" => {
                 let vertices = read_vertices(element, &mut body)?;
-                (polygons.positions, polygons.normals) = vertices;
+                (polygons.positions, polygons.normals, polygons.texcoords) = vertices;
             }
             "face" => read_faces(element, &mut body, &mut polygons)?,
             _ => element.each(&mut body, |_, _| Ok(()))?,
@@ -131,8 +131,11 @@ fn place(element: &str, index: usize) -> String {
     alloc::format!("{element} {index} (from 0)")
 }
 
-/// Positions, and normals where the file has them.
-fn read_vertices(element: &Element, body: &mut Body) -> Result<(Vec<Vec3>, Vec<Vec3>), Failure> {
+/// Positions, normals, texture coordinates.
+type Vertices = (Vec<Vec3>, Vec<Vec3>, Vec<[f64; 2]>);
+
+/// Positions, with normals and texture coordinates where the file has them.
+fn read_vertices(element: &Element, body: &mut Body) -> Result<Vertices, Failure> {
     let column = |name: &str| element.properties.iter().position(|p| p.name == name);
     let columns = |names: [&str; 3]| {
         let [a, b, c] = names.map(column);
@@ -145,13 +148,15 @@ fn read_vertices(element: &Element, body: &mut Body) -> Result<(Vec<Vec3>, Vec<V
         ));
     };
     let normal = columns(["nx", "ny", "nz"]);
-    let (mut positions, mut normals) = (Vec::new(), Vec::new());
+    let pair = |[u, v]: [&str; 2]| Some([column(u)?, column(v)?]);
+    let texcoord = pair(["u", "v"]).or_else(|| pair(["s", "t"]));
+    let (mut positions, mut normals, mut texcoords) = (Vec::new(), Vec::new(), Vec::new());
     element.each(body, |_, values| {
+        let scalar = |c: usize| match values[c][..] {
+            [x] => x,
+            _ => f64::NAN,
+        };
         let vector = |columns: [usize; 3]| {
-            let scalar = |c: usize| match values[c][..] {
-                [x] => x,
-                _ => f64::NAN,
-            };
             let v = Vec3::from(columns.map(scalar));
             if v.is_finite() { Ok(v) } else { Err(PlyErrorKind::NotFinite) }
         };
@@ -159,9 +164,17 @@ fn read_vertices(element: &Element, body: &mut Body) -> Result<(Vec<Vec3>, Vec<V
         if let Some(columns) = normal {
             normals.push(vector(columns)?);
         }
+        if let Some(columns) = texcoord {
+            let [u, v] = columns.map(scalar);
+            texcoords.push(if u.is_finite() && v.is_finite() {
+                [u, v]
+            } else {
+                return Err(PlyErrorKind::NotFinite);
+            });
+        }
         Ok(())
     })?;
-    Ok((positions, normals))
+    Ok((positions, normals, texcoords))
 }
 
 fn read_faces(element: &Element, body: &mut Body, polygons: &mut Polygons) -> Result<(), Failure> {
@@ -172,6 +185,7 @@ fn read_faces(element: &Element, body: &mut Body, polygons: &mut Polygons) -> Re
     };
     let count = polygons.positions.len();
     let has_normals = !polygons.normals.is_empty();
+    let has_texcoords = !polygons.texcoords.is_empty();
     element.each(body, |_, values| {
         for &v in &values[list] {
             // Integers up to 2^32 are exact in f64.
@@ -179,7 +193,8 @@ fn read_faces(element: &Element, body: &mut Body, polygons: &mut Polygons) -> Re
                 return Err(PlyErrorKind::MissingVertex { index: v as i64, count });
             }
             let vertex = v as u32;
-            polygons.corner(Corner { vertex, normal: if has_normals { vertex } else { NONE } });
+            let given = |there| if there { vertex } else { NONE };
+            polygons.corner(Corner { vertex, normal: given(has_normals) }, given(has_texcoords));
         }
         match polygons.end_polygon() {
             n @ 0..3 => Err(PolygonError::TooFewCorners(n).into()),

@@ -1,0 +1,207 @@
+//! Textures, and texture coordinates of shapes.
+
+use drt_estimators::Scene;
+use drt_estimators::surface::{Bsdf, Property};
+use drt_estimators::texture::Texture;
+use drt_geom::Mesh;
+use drt_math::{Rgb, Vec3, vec3};
+
+use super::{refused, scene};
+use crate::testing::Folder;
+use crate::{CliError, Defaults, load_scene};
+
+fn load(folder: &Folder, body: &str) -> Result<Scene, CliError> {
+    let file = folder.file("s.xml", format!("<scene version=\"3.0.0\">\n{body}</scene>"));
+    load_scene(&file, &Defaults::new())
+}
+
+/// Black, red, white and a grey of half the code value.
+fn picture(folder: &Folder) {
+    let pixels = [[0, 0, 0], [255, 0, 0], [255, 255, 255], [128, 128, 128]];
+    let image = image::RgbImage::from_fn(2, 2, |x, y| image::Rgb(pixels[(2 * y + x) as usize]));
+    image.save(folder.path().join("four.png")).unwrap();
+}
+
+fn bitmap(inside: &str) -> String {
+    format!(
+        "<texture name=\"reflectance\" type=\"bitmap\"><string name=\"filename\" \
+         value=\"four.png\"/>{inside}</texture>"
+    )
+}
+
+#[test]
+fn checkerboards_and_what_they_stand_for() {
+    let s = scene(
+        r#"<bsdf type="diffuse"/>
+           <bsdf type="twosided"><bsdf type="roughconductor">
+             <texture name="alpha" type="checkerboard"><float name="color0" value="0.1"/>
+               <float name="color1" value="0.3"/>
+               <transform name="to_uv"><scale x="10" y="5"/></transform></texture>
+           </bsdf></bsdf>"#,
+    );
+    let [t] = &s.textures[..] else { panic!("{:?}", s.textures) };
+    assert_eq!((t.bsdf, t.property), (1, Property::Alpha));
+    for (uv, value) in [([0.01, 0.01], 0.1), ([0.07, 0.01], 0.3), ([0.07, 0.15], 0.1)] {
+        assert!((t.texture.at(uv).r - value).abs() < 1e-12, "{uv:?}");
+    }
+    let Bsdf::TwoSided(two) = &s.bsdfs[1].item else { panic!() };
+    assert!(matches!(&two.front, Bsdf::RoughConductor(c) if (c.alpha - 0.2).abs() < 1e-12));
+}
+
+#[test]
+fn images_are_linear_unless_raw() {
+    let folder = Folder::new();
+    picture(&folder);
+    let texture = |inside: &str| {
+        let body = format!("<bsdf type=\"diffuse\">{}</bsdf>", bitmap(inside));
+        load(&folder, &body).unwrap().textures.remove(0).texture
+    };
+    let plain = texture("");
+    assert_eq!(plain.at([0.75, 0.25]), Rgb::new(1.0, 0.0, 0.0));
+    assert!((plain.at([0.75, 0.75]).g - 0.215_860_5).abs() < 1e-6);
+    let raw = texture(r#"<boolean name="raw" value="true"/>"#);
+    assert!((raw.at([0.75, 0.75]).g - 128.0 / 255.0).abs() < 1e-6);
+    assert_eq!(plain.at([0.5, 0.25]).r, 0.5);
+    let nearest = texture(
+        r#"<string name="filter_type" value="nearest"/><string name="wrap_mode" value="clamp"/>
+           <transform name="to_uv"><scale value="2"/><translate x="-0.5"/></transform>"#,
+    );
+    // u = 2 · 0.6 - 0.5
+    assert_eq!(nearest.at([0.6, 0.1]), Rgb::new(1.0, 0.0, 0.0));
+    assert_eq!(nearest.at([9.0, 0.1]), Rgb::new(1.0, 0.0, 0.0));
+    // By a name, for a number: luminance.
+    let body = "<texture id=\"t\" type=\"bitmap\"><string name=\"filename\" value=\"four.png\"/>\
+                <boolean name=\"raw\" value=\"true\"/></texture><bsdf type=\"phong\">\
+                <ref name=\"specular_reflectance\" id=\"t\"/><ref name=\"exponent\" id=\"t\"/></bsdf>";
+    let s = load(&folder, body).unwrap();
+    assert_eq!(s.textures.len(), 2);
+    let exponent = s.textures.iter().find(|t| t.property == Property::Exponent).unwrap();
+    assert!((exponent.texture.at([0.75, 0.25]).r - 0.212_671).abs() < 1e-6);
+}
+
+#[test]
+fn stored_images_are_counted() {
+    let folder = Folder::new();
+    picture(&folder);
+    let body = format!("<bsdf type=\"diffuse\">{}</bsdf>", bitmap(""));
+    let texture = load(&folder, &body).unwrap().textures.remove(0).texture;
+    let json = serde_json::to_string(&texture).unwrap();
+    assert_eq!(serde_json::from_str::<Texture>(&json).unwrap(), texture);
+    let broken = json.replace("[2,2]", "[3,2]");
+    let error = serde_json::from_str::<Texture>(&broken).unwrap_err().to_string();
+    assert!(error.contains("3x2 texels were expected, found 4"), "{error}");
+}
+
+#[test]
+fn unusable_textures_are_told() {
+    let folder = Folder::new();
+    picture(&folder);
+    folder.file("text.png", "no image");
+    let refused_there = |body: &str, parts: &[&str]| {
+        let message = load(&folder, body).map(|_| ()).unwrap_err().to_string();
+        for part in parts {
+            assert!(message.contains(part), "expected `{part}` in: {message}");
+        }
+    };
+    let diffuse = |t: &str| format!("<bsdf type=\"diffuse\">{t}</bsdf>");
+    refused_there(&diffuse(&bitmap("").replace("four", "text")), &[":2", "text.png"]);
+    refused_there(&diffuse(&bitmap("").replace("four", "none")), &["no file `none.png`"]);
+    refused_there(
+        &diffuse(&bitmap("<string name=\"wrap_mode\" value=\"twist\"/>")),
+        &["expected repeat, mirror, clamp"],
+    );
+    let light = bitmap("").replace("reflectance", "radiance");
+    let body = format!("<shape type=\"cube\"><emitter type=\"area\">{light}</emitter></shape>");
+    refused_there(&body, &["cannot stand for `radiance` here"]);
+    let board = |name: &str| format!("<texture name=\"{name}\" type=\"checkerboard\"/>");
+    refused(
+        &format!("<bsdf type=\"roughconductor\">{}{}</bsdf>", board("alpha_u"), board("alpha_v")),
+        &["a texture of `alpha_u` is not supported"],
+    );
+    refused(
+        &format!("<bsdf type=\"roughplastic\">{}</bsdf>", board("alpha")),
+        &["`alpha` is not supported by this type"],
+    );
+    refused(
+        &format!(
+            "<bsdf type=\"twosided\"><bsdf type=\"diffuse\">{}</bsdf><bsdf type=\"diffuse\"/></bsdf>",
+            board("reflectance")
+        ),
+        &["the same bsdf on both sides"],
+    );
+    // Values that the BSDF does not take are found when the scene is checked.
+    let dark = "<bsdf type=\"roughconductor\"><texture name=\"alpha\" type=\"checkerboard\">\
+                <float name=\"color0\" value=\"0\"/></texture></bsdf>";
+    let message = scene(dark).check().unwrap_err().to_string();
+    assert!(message.contains("texture of its \"alpha\"") && message.contains("1e-4"), "{message}");
+}
+
+/// The coordinates of the surface's point nearest to `p`, flat triangles standing for curved ones.
+fn uv(mesh: &Mesh, p: Vec3) -> [f64; 2] {
+    let nearest = (0..mesh.triangles.len() as u32).map(|i| {
+        let [a, b, c] = mesh.triangle(i);
+        let (n, q) = ((b - a).cross(c - a), p - a);
+        let weights = [q.cross(c - a).dot(n), (b - a).cross(q).dot(n)].map(|w| w / n.dot(n));
+        let outside = weights.iter().map(|w| (-w).max(0.0)).sum::<f64>()
+            + (weights[0] + weights[1] - 1.0).max(0.0);
+        let off = q.dot(n.normalize()).abs() + outside;
+        (off, mesh.texcoord(i, weights))
+    });
+    nearest.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a triangle").1
+}
+
+/// What Mitsuba 3.9.1 says of the same points.
+#[test]
+fn primitives_have_mitsubas_coordinates() {
+    let mesh = |kind: &str| scene(&format!("<shape type=\"{kind}\"/>")).shapes.remove(0).mesh;
+    let cases = [
+        ("rectangle", vec3(-0.5, -0.5, 0.0), [0.25, 0.25]),
+        ("rectangle", vec3(0.5, 0.25, 0.0), [0.75, 0.625]),
+        ("disk", vec3(0.0, 0.5, 0.0), [0.5, 0.25]),
+        ("disk", vec3(-0.3, -0.3, 0.0), [0.4243, 0.625]),
+        ("sphere", vec3(0.5, 0.1, 0.8602), [0.0314, 0.1703]),
+        ("sphere", vec3(-0.3, 0.3, 0.9055), [0.375, 0.1395]),
+        ("cylinder", vec3(0.866, 0.5, 0.25), [0.0833, 0.25]),
+        ("cylinder", vec3(0.866, -0.5, 0.75), [0.9167, 0.75]),
+        ("cube", vec3(0.5, 0.25, 1.0), [0.625, 0.75]),
+        ("cube", vec3(0.5, 0.25, -1.0), [0.375, 0.75]),
+        ("cube", vec3(1.0, 0.5, 0.25), [0.75, 0.375]),
+        ("cube", vec3(-1.0, 0.5, 0.25), [0.75, 0.625]),
+        ("cube", vec3(0.5, 1.0, 0.25), [0.25, 0.375]),
+        ("cube", vec3(0.5, -1.0, 0.25), [0.625, 0.75]),
+    ];
+    for (kind, p, expected) in cases {
+        let found = uv(&mesh(kind), p);
+        let off = (found[0] - expected[0]).abs().max((found[1] - expected[1]).abs());
+        assert!(off < 3e-3, "{kind} {p:?}: {found:?}, not {expected:?}");
+    }
+}
+
+#[test]
+fn files_bring_their_coordinates() {
+    let folder = Folder::new();
+    folder.file("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0.25\nvt 0.5 1\nf 1/1 2/2 3/3\n");
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+               property float z\nproperty float s\nproperty float t\nelement face 1\n\
+               property list uchar int vertex_indices\nend_header\n\
+               0 0 0 0 0\n1 0 0 1 0.25\n0 1 0 0.5 1\n3 0 1 2\n";
+    folder.file("a.ply", ply);
+    let corners = |kind: &str, inside: &str| {
+        let body = format!(
+            "<shape type=\"{kind}\"><string name=\"filename\" value=\"a.{kind}\"/>{inside}</shape>"
+        );
+        load(&folder, &body).unwrap().shapes[0].mesh.texcoords.clone().unwrap()[0]
+    };
+    let upright = [[0.0, 0.0], [1.0, 0.25], [0.5, 1.0]];
+    let flipped = [[0.0, 1.0], [1.0, 0.75], [0.5, 0.0]];
+    let no = r#"<boolean name="flip_tex_coords" value="false"/>"#;
+    assert_eq!(corners("obj", ""), flipped);
+    assert_eq!(corners("obj", no), upright);
+    assert_eq!(corners("ply", ""), upright);
+    // What turns triangles over takes their corners along.
+    let mirrored = "<transform name=\"to_world\"><scale x=\"-1\"/></transform>\
+                    <boolean name=\"face_normals\" value=\"true\"/>";
+    let [a, b, c] = corners("ply", mirrored);
+    assert_eq!(a, upright[0]);
+    assert!([b, c] == [upright[1], upright[2]] || [c, b] == [upright[1], upright[2]]);
+}

@@ -1,0 +1,108 @@
+//! Textures that vary over surfaces: `bitmap` and `checkerboard`.
+
+use std::path::Path;
+
+use drt_estimators::texture::{Bitmap, Texture, TextureFilter, TextureWrap, UvMap};
+use drt_math::{Affine, Rgb};
+
+use super::element::Element;
+use super::properties::Properties;
+use super::spectrum::srgb_to_linear;
+use crate::{CliError, read_exr};
+
+/// Textures of these types vary; all others are one colour.
+const VARYING: [&str; 2] = ["bitmap", "checkerboard"];
+/// Images of more texels are refused: they would take gigabytes.
+const MAX_TEXELS: u64 = 1 << 26;
+
+/// True for a texture that is not the same everywhere.
+pub(super) fn varies(e: &Element) -> bool {
+    e.tag == "texture" && e.attribute("type").is_some_and(|kind| VARYING.contains(&kind))
+}
+
+/// A texture that [`varies`], of colours.
+pub(super) fn read(e: &Element) -> Result<Texture, CliError> {
+    let p = Properties::of(e)?;
+    let to_uv = uv_map(&p.transform("to_uv")?.unwrap_or(Affine::IDENTITY));
+    let texture = if p.kind()? == "checkerboard" {
+        let colour =
+            |name, default| Ok::<_, CliError>(p.color(name)?.unwrap_or(Rgb::splat(default)));
+        Texture::Checkerboard { colours: [colour("color0", 0.4)?, colour("color1", 0.2)?], to_uv }
+    } else {
+        bitmap(&p, to_uv)?
+    };
+    p.finish()?;
+    Ok(texture)
+}
+
+/// The same with the luminance of every colour in all channels, as numbers take it.
+pub(super) fn luminance(texture: Texture) -> Result<Texture, String> {
+    let grey = |[r, g, b]: [f64; 3]| 0.212_671 * r + 0.715_160 * g + 0.072_169 * b;
+    Ok(match texture {
+        Texture::Checkerboard { colours, to_uv } => {
+            let colours = colours.map(|c| Rgb::splat(grey(c.to_array())));
+            Texture::Checkerboard { colours, to_uv }
+        }
+        Texture::Bitmap(image) => Texture::Bitmap(image.map(|t| {
+            let [r, g, b] = t.map(f64::from);
+            // Exact for what is grey already.
+            if t[0] == t[1] && t[1] == t[2] { t } else { [grey([r, g, b]) as f32; 3] }
+        })?),
+    })
+}
+
+fn uv_map(map: &Affine) -> UvMap {
+    let [x, y, _] = map.linear.cols;
+    let t = map.translation;
+    UvMap([[x.x, y.x, t.x], [x.y, y.y, t.y]])
+}
+
+fn bitmap(p: &Properties<'_>, to_uv: UvMap) -> Result<Texture, CliError> {
+    let e = p.element;
+    let path = p.path("filename")?.ok_or_else(|| e.error("`filename` is missing"))?;
+    let filters = [("bilinear", TextureFilter::Bilinear), ("nearest", TextureFilter::Nearest)];
+    let wraps = [
+        ("repeat", TextureWrap::Repeat),
+        ("mirror", TextureWrap::Mirror),
+        ("clamp", TextureWrap::Clamp),
+    ];
+    let filter = p.choice("filter_type", &filters)?.unwrap_or_default();
+    let wrap = p.choice("wrap_mode", &wraps)?.unwrap_or_default();
+    let raw = p.boolean("raw")?.unwrap_or(false);
+    // How it is stored and looked up.
+    p.accept(&["accel", "format"]);
+    let fail = |reason: String| e.error(format!("{}: {reason}", path.display()));
+    let (size, texels) = pixels(&path, raw).map_err(fail)?;
+    let mut image = Bitmap::new(size, texels).map_err(fail)?;
+    (image.filter, image.wrap, image.to_uv) = (filter, wrap, to_uv);
+    Ok(Texture::Bitmap(image))
+}
+
+type Pixels = ([u32; 2], Vec<[f32; 3]>);
+
+/// Linear pixels of an image file, or those it holds where it is `raw`.
+fn pixels(path: &Path, raw: bool) -> Result<Pixels, String> {
+    if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr")) {
+        let mut file = read_exr(path).map_err(|err| err.to_string())?;
+        let texels = file.layers.remove("").ok_or("it has no channels R, G, B")?;
+        return small(file.size).map(|size| (size, texels));
+    }
+    let reader = image::ImageReader::open(path).and_then(image::ImageReader::with_guessed_format);
+    let reader = reader.map_err(|err| err.to_string())?;
+    // Only Radiance's format holds linear values.
+    let linear = raw || reader.format() == Some(image::ImageFormat::Hdr);
+    let image = reader.decode().map_err(|err| err.to_string())?;
+    let size = small([image.width(), image.height()])?;
+    let image = image.into_rgb32f();
+    let value = |v: f32| if linear { v } else { srgb_to_linear(f64::from(v)) as f32 };
+    Ok((size, image.pixels().map(|p| p.0.map(value)).collect()))
+}
+
+fn small(size: [u32; 2]) -> Result<[u32; 2], String> {
+    let [width, height] = size.map(u64::from);
+    if width * height <= MAX_TEXELS {
+        Ok(size)
+    } else {
+        Err(format!("{width}x{height} pixels are too many; at most {MAX_TEXELS} fit"))
+    }
+}

@@ -1,0 +1,296 @@
+//! Values that vary over surfaces, by texture coordinates.
+
+use alloc::string::String;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_math::{Rgb, fm};
+
+use crate::model::surface::Property;
+
+/// A colour (or a number, in every channel alike) over texture coordinates.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Texture {
+    /// Squares of two colours, half a unit wide.
+    Checkerboard {
+        /// That of the square at the origin, and that of its neighbours.
+        colours: [Rgb; 2],
+        /// What is done to coordinates first.
+        to_uv: UvMap,
+    },
+    /// An image.
+    Bitmap(Bitmap),
+}
+
+/// An affine map of texture coordinates, by rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct UvMap(pub [[f64; 3]; 2]);
+
+/// An image over the unit square, its first row at v = 0.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "unchecked::Bitmap"))]
+pub struct Bitmap {
+    size: [u32; 2],
+    /// Row by row; shared by the copies of a scene.
+    texels: Arc<Vec<[f32; 3]>>,
+    /// Values between the middles of texels.
+    pub filter: TextureFilter,
+    /// Values beyond the unit square.
+    pub wrap: TextureWrap,
+    /// What is done to coordinates first.
+    pub to_uv: UvMap,
+}
+
+/// Values between the middles of texels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum TextureFilter {
+    /// Those of the nearest texel.
+    Nearest,
+    /// Interpolated linearly along both axes.
+    #[default]
+    Bilinear,
+}
+
+/// Values beyond the unit square.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum TextureWrap {
+    /// The image again.
+    #[default]
+    Repeat,
+    /// The image again, every second one mirrored.
+    Mirror,
+    /// Those of its border.
+    Clamp,
+}
+
+/// A texture that stands for a property of a BSDF (of both sides of a two-sided one).
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct BsdfTexture {
+    /// Index of the BSDF in its scene.
+    pub bsdf: usize,
+    /// What it stands for.
+    pub property: Property,
+    /// The values; of a scalar property, the first channel counts.
+    pub texture: Texture,
+}
+
+impl UvMap {
+    /// Coordinates as they are.
+    pub const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+
+    #[inline]
+    fn apply(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        self.0.map(|[a, b, c]| a * u + b * v + c)
+    }
+}
+
+impl Bitmap {
+    /// An image of `size` columns and rows, row by row, with the default filter and wrap mode.
+    ///
+    /// # Errors
+    /// When there is not one texel per place, there is none, or one is not finite.
+    pub fn new(size: [u32; 2], texels: Vec<[f32; 3]>) -> Result<Self, String> {
+        let [width, height] = size.map(|n| n as usize);
+        let expected = width.checked_mul(height).filter(|n| *n > 0);
+        if expected != Some(texels.len()) {
+            let found = texels.len();
+            return Err(alloc::format!("{width}x{height} texels were expected, found {found}"));
+        }
+        if let Some(i) = texels.iter().position(|t| !t.iter().all(|c| c.is_finite())) {
+            let (x, y) = (i % width, i / width);
+            return Err(alloc::format!("the texel in column {x}, row {y} is not finite"));
+        }
+        let (filter, wrap) = (TextureFilter::default(), TextureWrap::default());
+        Ok(Self { size, texels: Arc::new(texels), filter, wrap, to_uv: UvMap::IDENTITY })
+    }
+
+    /// The same image of other texels.
+    ///
+    /// # Errors
+    /// When one is not finite.
+    pub fn map(self, texel: impl Fn([f32; 3]) -> [f32; 3]) -> Result<Self, String> {
+        let image = Self::new(self.size, self.texels.iter().map(|t| texel(*t)).collect())?;
+        Ok(Self { texels: image.texels, ..self })
+    }
+
+    fn texel(&self, at: [i64; 2]) -> Rgb {
+        let [x, y] = [0, 1].map(|axis| {
+            let n = i64::from(self.size[axis]);
+            let place = match self.wrap {
+                TextureWrap::Repeat => at[axis].rem_euclid(n),
+                TextureWrap::Clamp => at[axis].clamp(0, n - 1),
+                TextureWrap::Mirror => {
+                    let place = at[axis].rem_euclid(2 * n);
+                    place.min(2 * n - 1 - place)
+                }
+            };
+            place as usize
+        });
+        let [r, g, b] = self.texels[y * self.size[0] as usize + x].map(f64::from);
+        Rgb::new(r, g, b)
+    }
+
+    fn at(&self, uv: [f64; 2]) -> Rgb {
+        let mapped = self.to_uv.apply(uv);
+        let scaled = [0, 1].map(|i| {
+            let place = mapped[i] * f64::from(self.size[i]);
+            // Coordinates that are no numbers, or whose texels cannot be told apart.
+            if place.abs() < 1e15 { place } else { 0.0 }
+        });
+        match self.filter {
+            TextureFilter::Nearest => self.texel(scaled.map(|s| fm::floor(s) as i64)),
+            TextureFilter::Bilinear => {
+                let corner = scaled.map(|s| fm::floor(s - 0.5));
+                let [s, t] = [0, 1].map(|i| scaled[i] - 0.5 - corner[i]);
+                let [x, y] = corner.map(|c| c as i64);
+                let row = |y| self.texel([x, y]) * (1.0 - s) + self.texel([x + 1, y]) * s;
+                row(y) * (1.0 - t) + row(y + 1) * t
+            }
+        }
+    }
+}
+
+impl Texture {
+    /// The value at texture coordinates.
+    #[must_use]
+    pub fn at(&self, uv: [f64; 2]) -> Rgb {
+        match self {
+            Self::Checkerboard { colours, to_uv } => {
+                let [u, v] = to_uv.apply(uv).map(|x| x - fm::floor(x) > 0.5);
+                colours[usize::from(u != v)]
+            }
+            Self::Bitmap(image) => image.at(uv),
+        }
+    }
+
+    /// Values, per channel, between which all others are; of a checkerboard its two colours.
+    #[must_use]
+    pub fn bounds(&self) -> [Rgb; 2] {
+        let join = |[low, high]: [Rgb; 2], c: Rgb| {
+            let by =
+                |f: fn(f64, f64) -> f64, a: Rgb| Rgb::new(f(a.r, c.r), f(a.g, c.g), f(a.b, c.b));
+            [by(f64::min, low), by(f64::max, high)]
+        };
+        let none = [f64::INFINITY, f64::NEG_INFINITY].map(Rgb::splat);
+        match self {
+            Self::Checkerboard { colours, .. } => *colours,
+            Self::Bitmap(image) => image.texels.iter().fold(none, |b, t| {
+                let [r, g, b2] = t.map(f64::from);
+                join(b, Rgb::new(r, g, b2))
+            }),
+        }
+    }
+
+    /// The mean of all values over the texture's own period.
+    #[must_use]
+    pub fn mean(&self) -> Rgb {
+        match self {
+            Self::Checkerboard { colours: [a, b], .. } => (*a + *b) * 0.5,
+            Self::Bitmap(image) => {
+                let sum = image
+                    .texels
+                    .iter()
+                    .fold([0.0; 3], |s, t| core::array::from_fn(|c| s[c] + f64::from(t[c])));
+                Rgb::from(sum) * (image.texels.len() as f64).recip()
+            }
+        }
+    }
+}
+
+#[cfg(feature = "serde")]
+mod unchecked {
+    use super::{String, TextureFilter, TextureWrap, UvMap, Vec};
+
+    /// An image as stored, before its texels are counted.
+    #[derive(serde::Deserialize)]
+    pub(super) struct Bitmap {
+        size: [u32; 2],
+        texels: Vec<[f32; 3]>,
+        filter: TextureFilter,
+        wrap: TextureWrap,
+        to_uv: UvMap,
+    }
+
+    impl TryFrom<Bitmap> for super::Bitmap {
+        type Error = String;
+        fn try_from(b: Bitmap) -> Result<Self, String> {
+            let image = Self::new(b.size, b.texels)?;
+            Ok(Self { filter: b.filter, wrap: b.wrap, to_uv: b.to_uv, ..image })
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two columns and two rows: 1 2 over 3 4.
+    fn image(filter: TextureFilter, wrap: TextureWrap) -> Texture {
+        let texels = [1.0, 2.0, 3.0, 4.0].map(|v| [v, 10.0 * v, 0.0]).to_vec();
+        Texture::Bitmap(Bitmap { filter, wrap, ..Bitmap::new([2, 2], texels).expect("an image") })
+    }
+
+    fn red(t: &Texture, u: f64, v: f64) -> f64 {
+        t.at([u, v]).r
+    }
+
+    #[test]
+    fn texels_are_where_their_middles_are() {
+        for filter in [TextureFilter::Nearest, TextureFilter::Bilinear] {
+            let t = image(filter, TextureWrap::Repeat);
+            for (u, v, value) in [(0.25, 0.25, 1.0), (0.75, 0.25, 2.0), (0.25, 0.75, 3.0)] {
+                assert_eq!(t.at([u, v]), Rgb::new(value, 10.0 * value, 0.0));
+            }
+        }
+        let t = image(TextureFilter::Bilinear, TextureWrap::Repeat);
+        assert_eq!(red(&t, 0.5, 0.25), 1.5);
+        assert_eq!(red(&t, 0.5, 0.5), 2.5);
+        assert!((red(&t, 0.35, 0.4) - (1.0 + 0.2 + 0.6)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn images_go_on_beyond_the_unit_square() {
+        let at = |wrap, u| red(&image(TextureFilter::Nearest, wrap), u, 0.25);
+        for (u, repeat, mirror, clamp) in
+            [(1.25, 1.0, 2.0, 2.0), (1.75, 2.0, 1.0, 2.0), (-0.25, 2.0, 1.0, 1.0)]
+        {
+            assert_eq!(at(TextureWrap::Repeat, u), repeat, "{u}");
+            assert_eq!(at(TextureWrap::Mirror, u), mirror, "{u}");
+            assert_eq!(at(TextureWrap::Clamp, u), clamp, "{u}");
+        }
+        // Between the last and the first column.
+        assert_eq!(red(&image(TextureFilter::Bilinear, TextureWrap::Repeat), 1.0, 0.25), 1.5);
+        assert_eq!(red(&image(TextureFilter::Bilinear, TextureWrap::Clamp), 1.0, 0.25), 2.0);
+        for u in [f64::NAN, f64::INFINITY, -1e300] {
+            assert!(red(&image(TextureFilter::Bilinear, TextureWrap::Mirror), u, u).is_finite());
+        }
+    }
+
+    #[test]
+    fn squares_alternate() {
+        let colours = [Rgb::splat(0.2), Rgb::splat(0.4)];
+        let to_uv = UvMap([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
+        let t = Texture::Checkerboard { colours, to_uv };
+        for (u, v, first) in
+            [(0.1, 0.1, true), (0.3, 0.1, false), (0.3, 0.3, true), (-0.1, 0.1, false)]
+        {
+            assert_eq!(t.at([u, v]) == colours[0], first, "{u} {v}");
+        }
+        assert!((t.mean().r - 0.3).abs() < 1e-15);
+        assert_eq!(t.bounds(), colours);
+    }
+
+    #[test]
+    fn broken_images_are_refused() {
+        assert!(Bitmap::new([2, 2], alloc::vec![[0.0; 3]; 3]).is_err());
+        assert!(Bitmap::new([0, 2], Vec::new()).is_err());
+        let nan = Bitmap::new([2, 1], alloc::vec![[0.0; 3], [0.0, f32::NAN, 0.0]]);
+        assert!(nan.unwrap_err().contains("column 1, row 0"));
+    }
+}
