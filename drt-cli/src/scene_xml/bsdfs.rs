@@ -1,11 +1,10 @@
 //! Surface scattering.
 
 use drt_estimators::surface::{
-    Bsdf, BsdfChange, Coating, Conductor, Dielectric, Diffuse, Distribution, Phong, Plastic,
-    Property, RoughConductor, RoughDielectric, ThinDielectric, TwoSided,
+    Bsdf, Coating, Conductor, Dielectric, Diffuse, Distribution, Phong, Plastic, Property,
+    RoughConductor, RoughDielectric, Textured, ThinDielectric, TwoSided,
 };
-use drt_estimators::texture::Texture;
-use drt_math::{Rgb, ValueChange};
+use drt_math::Rgb;
 
 use super::Loader;
 use super::element::Element;
@@ -13,29 +12,20 @@ use super::properties::Properties;
 use super::spectrum::conductors;
 use crate::CliError;
 
-/// Textures, each with the property it stands for.
-type Textures = Vec<(Property, Texture)>;
-
 impl<'a> Loader<'a> {
-    /// A BSDF, with the textures that stand for its properties.
-    pub(super) fn bsdf(&self, e: &'a Element) -> Result<(Bsdf, Textures), CliError> {
+    pub(super) fn bsdf(&self, e: &'a Element) -> Result<Bsdf, CliError> {
         let p = Properties::of(e)?;
-        let mut textures = Textures::new();
         let bsdf = match p.kind()? {
             "null" => Bsdf::Null,
             "diffuse" => Bsdf::Diffuse(diffuse(&p)?),
             "phong" => Bsdf::Phong(phong(&p)?),
-            "plastic" | "roughplastic" => Bsdf::Plastic(Box::new(plastic(&p)?)),
+            "plastic" | "roughplastic" => Bsdf::Plastic(plastic(&p)?),
             "conductor" => Bsdf::Conductor(smooth_conductor(&p)?),
             "roughconductor" => Bsdf::RoughConductor(conductor(&p)?),
             "dielectric" => Bsdf::Dielectric(smooth_dielectric(&p)?),
             "thindielectric" => Bsdf::ThinDielectric(thin_dielectric(&p)?),
             "roughdielectric" => Bsdf::RoughDielectric(dielectric(&p)?),
-            "twosided" => {
-                let (two_sided, of_both) = self.two_sided(&p)?;
-                textures = of_both;
-                Bsdf::TwoSided(Box::new(two_sided))
-            }
+            "twosided" => Bsdf::TwoSided(Box::new(self.two_sided(&p)?)),
             other => {
                 return Err(e.error(format!(
                     "the bsdf type `{other}` is not supported; expected diffuse, plastic, \
@@ -44,22 +34,22 @@ impl<'a> Loader<'a> {
                 )));
             }
         };
+        let mut textures = Vec::new();
         for (name, texture) in p.take_textures() {
             let property = Property::from_name(name).map_err(|_| {
                 e.error(format!("a texture of `{name}` is not supported; give a number"))
             })?;
-            let same = BsdfChange { property, op: ValueChange::Multiply(1.0) };
-            bsdf.tangent(&same, 0.0).map_err(|_| {
-                e.error(format!("a texture of `{name}` is not supported by this type of BSDF"))
-            })?;
             textures.push((property, texture));
         }
         p.finish()?;
-        bsdf.validate().map_err(|err| e.error(err))?;
-        Ok((bsdf, textures))
+        if textures.is_empty() {
+            return bsdf.validate().map(|()| bsdf).map_err(|err| e.error(err));
+        }
+        let textured = Textured::new(bsdf, textures).map_err(|err| e.error(err))?;
+        Ok(Bsdf::Textured(Box::new(textured)))
     }
 
-    fn two_sided(&self, p: &Properties<'a>) -> Result<(TwoSided, Textures), CliError> {
+    fn two_sided(&self, p: &Properties<'a>) -> Result<TwoSided, CliError> {
         let sides = self.index.inner(p, "bsdf", None);
         // Also what keeps a reference to itself from being followed for ever.
         if let Some(s) = sides.iter().find(|s| s.target.attribute("type") == Some("twosided")) {
@@ -69,16 +59,7 @@ impl<'a> Loader<'a> {
         }
         let side = |i: usize| sides.get(i).map(|s| self.bsdf(s.target)).transpose();
         match (side(0)?, sides.len()) {
-            (Some((front, textures)), 1) => Ok((TwoSided { front, back: None }, textures)),
-            (Some((front, textures)), 2) => {
-                let (back, of_back) =
-                    side(1)?.map_or((None, Textures::new()), |(b, t)| (Some(b), t));
-                if !(textures.is_empty() && of_back.is_empty()) {
-                    let message = "textures need the same bsdf on both sides; give one";
-                    return Err(p.element.error(message));
-                }
-                Ok((TwoSided { front, back }, textures))
-            }
+            (Some(front), 1 | 2) => Ok(TwoSided { front, back: side(1)? }),
             (_, n) => Err(p.element.error(format!("expected one or two bsdfs inside, found {n}"))),
         }
     }

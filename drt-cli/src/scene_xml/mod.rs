@@ -28,7 +28,6 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use drt_estimators::surface::{Bsdf, Diffuse};
-use drt_estimators::texture::BsdfTexture;
 use drt_estimators::{Named, Scene};
 use drt_math::Rgb;
 
@@ -120,15 +119,7 @@ impl<'a> Loader<'a> {
             scene.media.push(self.medium(e)?);
         }
         for e in self.index.all("bsdf") {
-            let (item, textures) = self.bsdf(e)?;
-            let bsdf = scene.bsdfs.len();
-            let own = textures.into_iter();
-            scene.textures.extend(own.map(|(property, texture)| BsdfTexture {
-                bsdf,
-                property,
-                texture,
-            }));
-            scene.bsdfs.push(Named { id: e.id().map(Into::into), item });
+            scene.bsdfs.push(Named { id: e.id().map(Into::into), item: self.bsdf(e)? });
         }
         let shapes = self.index.all("shape");
         let carried = self.carried_emitters(shapes)?;

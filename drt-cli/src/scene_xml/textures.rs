@@ -35,12 +35,14 @@ pub(super) fn read(e: &Element) -> Result<Texture, CliError> {
     Ok(texture)
 }
 
-/// The same with the luminance of every colour in all channels, as numbers take it.
+/// The same as a number: the luminance of every colour in all channels.
 pub(super) fn luminance(texture: Texture) -> Result<Texture, String> {
     let grey = |[r, g, b]: [f64; 3]| 0.212_671 * r + 0.715_160 * g + 0.072_169 * b;
     Ok(match texture {
         Texture::Checkerboard { colours, to_uv } => {
-            let colours = colours.map(|c| Rgb::splat(grey(c.to_array())));
+            let [a, b] = colours.map(|c| Rgb::splat(grey(c.to_array())));
+            // Where it stands for a number, Mitsuba 3's checkerboard has its colours the other way round.
+            let colours = [b, a];
             Texture::Checkerboard { colours, to_uv }
         }
         Texture::Bitmap(image) => Texture::Bitmap(image.map(|t| {

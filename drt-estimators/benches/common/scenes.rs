@@ -173,7 +173,6 @@ fn stage() -> Scene {
             emitter("glow", Emitter::Area { radiance }),
             emitter("bulb", Emitter::Point { position, intensity }),
         ],
-        textures: Vec::new(),
         sensors: vec![Named::new("camera", SceneSensor { sensor, medium, sample_count: None })],
         integrator: Integrator { max_depth: Some(6), rr_depth: 4 },
     }

@@ -322,9 +322,6 @@ impl Apply<'_> {
             };
             let theta = parameter.value;
             let property = Property::from_name(&c.property).map_err(|e| self.fail(p, target, e))?;
-            if self.scene.textures.iter().any(|t| t.bsdf == i && t.property == property) {
-                return Err(self.fail(p, target, EffectError::Textured(property)));
-            }
             let change = BsdfChange { property, op: c.op };
             let bsdf = &mut self.scene.bsdfs[i].item;
             let own = bsdf.tangent(&change, theta);

@@ -11,7 +11,6 @@ use crate::model::emitter::Emitter;
 use crate::model::error::{ElementError, Error, SettingError};
 use crate::model::sensor::Sensor;
 use crate::model::surface::Bsdf;
-use crate::model::texture::BsdfTexture;
 
 /// A scene: shapes, what they are made of, what lights them, and who looks.
 ///
@@ -23,9 +22,6 @@ pub struct Scene {
     pub shapes: Vec<Shape>,
     /// Surface scattering models.
     pub bsdfs: Vec<Named<Bsdf>>,
-    /// Textures that stand for properties of these.
-    #[cfg_attr(feature = "serde", serde(default))]
-    pub textures: Vec<BsdfTexture>,
     /// Participating media.
     pub media: Vec<Named<Medium>>,
     /// Emitters; an area emitter is named by the shape that carries it.
@@ -192,7 +188,7 @@ impl Scene {
                 let (bsdf, parameter) = (bsdf.name(), parameter.into());
                 return Err(unusable(&s.id, "shape", i, ElementError::Smooth { bsdf, parameter }));
             }
-            if self.textures.iter().any(|t| t.bsdf == s.bsdf) {
+            if bsdf.is_textured() {
                 let parameter = parameter.into();
                 return Err(unusable(&s.id, "shape", i, ElementError::Textured { parameter }));
             }
@@ -230,19 +226,6 @@ impl Scene {
         }
         for (i, b) in self.bsdfs.iter().enumerate() {
             b.item.validate().map_err(|e| unusable(&b.id, "bsdf", i, e.into()))?;
-        }
-        for BsdfTexture { bsdf: i, property, texture } in &self.textures {
-            let b = self
-                .bsdfs
-                .get(*i)
-                .ok_or_else(|| unusable(&None, "bsdf", *i, ElementError::NoBsdf(*i)))?;
-            for bound in texture.bounds() {
-                let property = *property;
-                let fail = |reason| {
-                    unusable(&b.id, "bsdf", *i, ElementError::Texture { property, reason })
-                };
-                b.item.with(property, bound).map_err(fail)?;
-            }
         }
         for (i, m) in self.media.iter().enumerate() {
             m.item.phase.validate().map_err(|e| unusable(&m.id, "medium", i, e.into()))?;
@@ -344,7 +327,7 @@ mod tests {
     use super::*;
     use crate::model::filter::{Filter, FilterKind};
     use crate::model::sensor::{Lens, Sensor};
-    use crate::model::surface::{Dielectric, Diffuse, Property, RoughConductor};
+    use crate::model::surface::{Dielectric, Diffuse, Property, RoughConductor, Textured};
     use crate::model::texture::Texture;
 
     fn scene() -> Scene {
@@ -387,21 +370,6 @@ mod tests {
         for wrong in [f64::NAN, 0.0, -1.0] {
             fails(&|s| s.bsdfs[0].item = metal(wrong), "alpha");
         }
-        let squares = |bsdf, property, value| BsdfTexture {
-            bsdf,
-            property,
-            texture: Texture::Checkerboard {
-                colours: [Rgb::splat(0.5), Rgb::splat(value)],
-                to_uv: crate::texture::UvMap::IDENTITY,
-            },
-        };
-        let reflectance = Property::Reflectance;
-        for wrong in [f64::NAN, -0.1, f64::INFINITY] {
-            let part = "grey: the texture of its \"reflectance\"";
-            fails(&|s| s.textures.push(squares(0, reflectance, wrong)), part);
-        }
-        fails(&|s| s.textures.push(squares(0, Property::Alpha, 0.5)), "has no \"alpha\"");
-        fails(&|s| s.textures.push(squares(7, reflectance, 0.5)), "there is no bsdf 7");
         for wrong in [f64::NAN, f64::INFINITY] {
             let light = |at: f64| Emitter::Point { position: Vec3::Z * at, intensity: Rgb::ONE };
             fails(&|s| s.emitters[0].item.emitter = light(wrong), "bulb: ");
@@ -449,7 +417,9 @@ mod tests {
             colours: [Rgb::splat(0.2), Rgb::splat(0.8)],
             to_uv: crate::texture::UvMap::IDENTITY,
         };
-        scene.textures.push(BsdfTexture { bsdf: 0, property: Property::Reflectance, texture });
+        let bsdf = scene.bsdfs[0].item.clone();
+        let textured = Textured::new(bsdf, alloc::vec![(Property::Reflectance, texture)]);
+        scene.bsdfs[0].item = Bsdf::Textured(alloc::boxed::Box::new(textured.expect("a texture")));
         let message = crate::Session::new(&scene, &parameters, &crate::Settings::default());
         let message = message.err().expect("a refusal").to_string();
         assert!(message.contains(&name) && message.contains("has a texture"), "{message}");

@@ -4,9 +4,8 @@ use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
+use drt_geom::Mesh;
 use drt_math::{Rgb, fm};
-
-use crate::model::surface::Property;
 
 /// A colour (or a number, in every channel alike) over texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,16 +67,19 @@ pub enum TextureWrap {
     Clamp,
 }
 
-/// A texture that stands for a property of a BSDF (of both sides of a two-sided one).
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct BsdfTexture {
-    /// Index of the BSDF in its scene.
-    pub bsdf: usize,
-    /// What it stands for.
-    pub property: Property,
-    /// The values; of a scalar property, the first channel counts.
-    pub texture: Texture,
+/// A point of a shape, where textures are looked up.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TexturePoint<'a> {
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) triangle: u32,
+    /// Weights of the triangle's second and third vertex.
+    pub(crate) bary: [f64; 2],
+}
+
+impl TexturePoint<'_> {
+    pub(crate) fn uv(&self) -> [f64; 2] {
+        self.mesh.texcoord(self.triangle, self.bary)
+    }
 }
 
 impl UvMap {

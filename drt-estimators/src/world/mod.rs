@@ -18,7 +18,8 @@ use drt_medium::{Coefficients, Homogeneous, Medium};
 
 use crate::model::error::Error;
 use crate::model::scene::{Scene, Shape, Surrounding};
-use crate::model::surface::{Bsdf, LocalBsdf};
+use crate::model::surface::Bsdf;
+use crate::model::texture::TexturePoint;
 use crate::world::cache::PreparedCache;
 use crate::world::geometry::{Geometry, Prim};
 use crate::world::lights::{EmitterMask, LightTable};
@@ -465,27 +466,19 @@ impl World {
         g1 * adjoint.dot(j - i) + g2 * adjoint.dot(k - i)
     }
 
-    /// A BSDF with what its textures say at a point. Out of the way of scenes without any.
-    #[cold]
-    #[inline(never)]
-    fn textured<'a>(&self, s: &SurfacePoint, bsdf: LocalBsdf<'a>) -> LocalBsdf<'a> {
-        let shape = &self.scene.shapes[s.shape as usize];
-        let own = || self.scene.textures.iter().filter(|t| t.bsdf == shape.bsdf);
-        if own().next().is_none() {
-            return bsdf;
-        }
-        let uv = shape.mesh.texcoord(s.triangle, s.bary);
-        bsdf.textured(own().map(|t| (t.property, t.texture.at(uv))))
-    }
-
     /// The scattering function at a vertex; `None` at points.
-    #[inline]
     pub(crate) fn scattering(&self, v: &Vertex) -> Option<Scattering<'_>> {
         match &v.kind {
             Kind::Surface(s) => {
-                let bsdf = self.bsdf_of(s.shape).at(s.ng, s.ns, self.is_smooth(s));
-                let plain = self.scene.textures.is_empty();
-                Some(Scattering::Surface(if plain { bsdf } else { self.textured(s, bsdf) }))
+                let shape = &self.scene.shapes[s.shape as usize];
+                let at = TexturePoint { mesh: &shape.mesh, triangle: s.triangle, bary: s.bary };
+                let bsdf = &self.scene.bsdfs[shape.bsdf].item;
+                Some(Scattering::Surface(bsdf.at(
+                    Some(at),
+                    s.ng,
+                    s.ns,
+                    shape.mesh.normals.is_some(),
+                )))
             }
             Kind::Volume(_) => v.medium.map(|m| Scattering::Volume(&self.medium(m).phase)),
             Kind::Point => None,

@@ -9,7 +9,7 @@ use crate::model::surface::{
 };
 
 /// The local scattering function of a vertex.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Scattering<'a> {
     /// BSDF times the cosine on the light's side.
     Surface(LocalBsdf<'a>),

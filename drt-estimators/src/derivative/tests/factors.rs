@@ -59,7 +59,7 @@ fn surfaces_also_where_they_fade() {
                 wi = near_horizon(wi, ng, &mut rng);
             }
             for smooth in [false, true] {
-                let scattering = Scattering::Surface(bsdf.at(ng, ns, smooth));
+                let scattering = Scattering::Surface(bsdf.at(None, ng, ns, smooth));
                 let [o, i, n, facet] =
                     [(wo, 0), (wi, 3), (ns, 6), (ng, 9)].map(|(v, lane)| seeded(v, lane));
                 let mut truth = value_over(bsdf, o, i, n, &mut |_, v: Rgb| v.map(D::from));
@@ -105,7 +105,7 @@ fn samples_have_the_density_they_claim() {
         let bsdf: &Bsdf = &bsdf;
         let (ng, ns) = (random(&mut rng), random(&mut rng));
         for smooth in [false, true] {
-            let s = Scattering::Surface(bsdf.at(ng, ns, smooth));
+            let s = Scattering::Surface(bsdf.at(None, ng, ns, smooth));
             for given in [Given::Wo, Given::Wi] {
                 for _ in 0..200 {
                     let from = random(&mut rng);

@@ -108,8 +108,10 @@ impl Blends {
     pub(super) fn new(world: &World, active: &ActiveInputs) -> Self {
         let curvatures = curvatures(world);
         let camera = &world.camera;
-        let cosines: Vec<f64> =
-            (0..).map(|s| GRAZING / world.bsdf_of(s).lobe_width()).take(curvatures.len()).collect();
+        let cosines: Vec<f64> = (0..)
+            .map(|s| GRAZING / world.bsdf_of(s).lobe_width(None))
+            .take(curvatures.len())
+            .collect();
         let seen = |(s, curvature): (usize, &f64)| {
             let center = world.scene.shapes[s].mesh.bounds().center();
             let far = (center - camera.position()).length();

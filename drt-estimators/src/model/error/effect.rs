@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use crate::model::emitter::EmitterError;
 use crate::model::sensor::SensorError;
-use crate::model::surface::{Property, SurfaceError};
+use crate::model::surface::SurfaceError;
 
 /// Why an effect does not apply to its target.
 #[derive(Clone, Debug, Error)]
@@ -17,9 +17,6 @@ pub enum EffectError {
     /// Geometry of a scattering model.
     #[error("a bsdf does not move")]
     NotMovable,
-    /// A property that a texture stands for.
-    #[error("a texture stands for its \"{0}\", and texels do not change yet")]
-    Textured(Property),
     /// Radiance of a shape without an emitter.
     #[error("the shape does not emit")]
     NotEmitting,

@@ -64,14 +64,6 @@ pub enum ElementError {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
-    /// A texture whose values, or some of them, the BSDF does not take.
-    #[error("the texture of its \"{property}\": {reason}")]
-    Texture {
-        /// What it stands for.
-        property: crate::model::surface::Property,
-        /// What is wrong.
-        reason: SurfaceError,
-    },
     /// A shape's arrays.
     #[error(transparent)]
     Mesh(#[from] MeshError),

@@ -2,6 +2,7 @@ use drt_math::{Rgb, ValueChange};
 
 use crate::model::surface::Bsdf;
 use crate::model::surface::property::{Property, Slot, SurfaceError, names};
+use crate::model::texture::Texture;
 
 /// One number per channel for every property of a BSDF.
 ///
@@ -145,35 +146,40 @@ impl Bsdf {
         Ok(velocity)
     }
 
-    /// The same with another value of a property, of both sides where it is two-sided.
+    /// Sets a property, to a value that may not be allowed; a scalar's to the first channel.
     ///
     /// # Errors
-    /// When it has no such property or the value is not allowed.
-    pub(crate) fn with(&self, property: Property, value: Rgb) -> Result<Self, SurfaceError> {
-        let change = BsdfChange { property, op: ValueChange::Add(Rgb::ZERO) };
-        let mut changed = self.clone();
-        changed.slot(&change)?.set(value);
-        changed.validate()?;
-        Ok(changed)
-    }
-
-    /// The same, of a property and a value that [`Bsdf::with`] takes.
-    #[inline]
-    pub(crate) fn set(&mut self, property: Property, value: Rgb) {
-        if let Some(slot) = self.property(property) {
-            slot.set(value);
+    /// When the BSDF has no such property.
+    pub(super) fn set(&mut self, property: Property, value: Rgb) -> Result<(), SurfaceError> {
+        match self.property(property) {
+            Some(slot) => slot.set(value),
+            None => return Err(self.lacks(property)),
         }
+        Ok(())
     }
 
     fn property(&mut self, property: Property) -> Option<Slot<'_>> {
         match self {
-            Self::Null | Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => None,
+            Self::Null => None,
             Self::Diffuse(b) => b.slot(property),
             Self::Phong(b) => b.slot(property),
             Self::RoughConductor(b) => b.slot(property),
             Self::RoughDielectric(b) => b.slot(property),
             Self::Plastic(b) => b.slot(property),
+            Self::Conductor(b) => b.slot(property),
+            Self::Dielectric(b) => b.slot(property),
+            Self::ThinDielectric(b) => b.slot(property),
             Self::TwoSided(b) => b.front.property(property),
+            Self::Textured(b) => b.bsdf.property(property),
+        }
+    }
+
+    /// The texture that stands for a property.
+    pub(crate) fn texture(&self, property: Property) -> Option<&Texture> {
+        match self {
+            Self::Textured(b) => b.texture(property),
+            Self::TwoSided(b) => b.front.texture(property),
+            _ => None,
         }
     }
 
@@ -190,6 +196,9 @@ impl Bsdf {
         let property = change.property;
         if matches!(self, Self::TwoSided(b) if b.back.is_some()) {
             return Err(SurfaceError::DifferentSides { property });
+        }
+        if self.texture(property).is_some() {
+            return Err(SurfaceError::StoodFor { property });
         }
         let lacks = self.lacks(property);
         let slot = self.property(property).ok_or(lacks)?;

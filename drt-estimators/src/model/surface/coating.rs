@@ -1,5 +1,6 @@
 //! What a dielectric coating lets through to what is below it, and back.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
@@ -20,7 +21,7 @@ pub struct Coating {
     /// Microfacets and their roughness; a smooth coating has none.
     facets: Option<(Distribution, f64)>,
     /// Of a rough one: the part let through at [`COSINES`] cosines from 0 to 1.
-    transmittance: Vec<f64>,
+    transmittance: Arc<[f64]>,
     /// The part of diffuse light from below that is reflected back down.
     internal_reflectance: f64,
 }
@@ -49,7 +50,7 @@ impl Coating {
             sum += dielectric_reflected(cos, eta.recip()) * 2.0 * t / f64::from(steps);
         }
         let internal_reflectance = critical2 + (1.0 - critical2) * sum;
-        Ok(Self { eta, facets: None, transmittance: Vec::new(), internal_reflectance })
+        Ok(Self { eta, facets: None, transmittance: Arc::new([]), internal_reflectance })
     }
 
     /// A coating with microfacets.

@@ -37,11 +37,11 @@ use drt_math::{Vec3, fm};
 
 use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA};
-use crate::model::surface::{Bsdf, Phong, Plastic, RoughConductor, RoughDielectric};
+use crate::model::surface::{At, Bsdf, Phong, Plastic, RoughConductor, RoughDielectric};
 
 impl Bsdf {
     /// The sketch of the light that leaves to `wo`, by where it comes from.
-    pub(crate) fn lobes(&self, wo: Vec3, n: Vec3) -> Lobes {
+    pub(crate) fn lobes(&self, at: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
         let (bsdf, n) = self.facing(wo, n);
         match bsdf {
             Self::Diffuse(b) => Lobes::even(b.reflectance.mean() * FRAC_1_PI),
@@ -54,6 +54,7 @@ impl Bsdf {
             | Self::Dielectric(_)
             | Self::ThinDielectric(_)
             | Self::TwoSided(_) => Lobes::even(0.0),
+            Self::Textured(b) => b.at(at).lobes(None, wo, n),
         }
     }
 }

@@ -7,25 +7,23 @@
 //! cosines, and the measurement contribution has no jumps besides visibility, which its derivative
 //! relies on.
 
-use alloc::boxed::Box;
-
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, RgbVec, Vec3};
 
 use crate::model::surface::{
-    Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given, Property,
-    RoughnessPartner, SpecularSample,
+    Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given, RoughnessPartner,
+    SpecularSample,
 };
+use crate::model::texture::TexturePoint;
 
 /// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.
 const FADE: f64 = 0.02;
 
 /// A BSDF with the unit normals of a point. Directions are unit, away from the surface.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalBsdf<'a> {
     bsdf: &'a Bsdf,
-    /// What textures make of it here.
-    textured: Option<Box<Bsdf>>,
+    at: Option<TexturePoint<'a>>,
     /// Geometric normal.
     ng: Vec3,
     /// Shading normal.
@@ -36,8 +34,15 @@ pub(crate) struct LocalBsdf<'a> {
 
 impl Bsdf {
     /// The BSDF at a point with the geometric normal `ng` and the shading normal `ns`.
-    pub(crate) fn at(&self, ng: Vec3, ns: Vec3, interpolated: bool) -> LocalBsdf<'_> {
-        LocalBsdf { bsdf: self, textured: None, ng, ns, interpolated }
+    #[inline]
+    pub(crate) fn at<'a>(
+        &'a self,
+        at: Option<TexturePoint<'a>>,
+        ng: Vec3,
+        ns: Vec3,
+        interpolated: bool,
+    ) -> LocalBsdf<'a> {
+        LocalBsdf { bsdf: self, at, ng, ns, interpolated }
     }
 }
 
@@ -48,22 +53,10 @@ fn fade(cosine: f64) -> (f64, f64) {
 }
 
 impl LocalBsdf<'_> {
-    /// The same with the values that textures have here.
-    pub(crate) fn textured(self, values: impl Iterator<Item = (Property, Rgb)>) -> Self {
-        let mut own = Box::new(self.bsdf.clone());
-        values.for_each(|(property, value)| own.set(property, value));
-        Self { textured: Some(own), ..self }
-    }
-
-    #[inline]
-    fn bsdf(&self) -> &Bsdf {
-        self.textured.as_deref().unwrap_or(self.bsdf)
-    }
-
     /// The value times the cosine of `wi` with the shading normal.
     #[inline]
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Rgb {
-        let value = self.bsdf().eval(wo, wi, self.ns);
+        let value = self.bsdf.eval_at(self.at.as_ref(), wo, wi, self.ns);
         if self.interpolated {
             value * (fade(self.ns.dot(wo)).0 * fade(self.ng.dot(wi)).0)
         } else {
@@ -74,7 +67,7 @@ impl LocalBsdf<'_> {
     /// The value with its derivatives, and that by the geometric normal.
     #[inline]
     pub(crate) fn gradient(&self, wo: Vec3, wi: Vec3) -> (BsdfGradient, RgbVec) {
-        let mut d = self.bsdf().gradient(wo, wi, self.ns);
+        let mut d = self.bsdf.gradient_at(self.at.as_ref(), wo, wi, self.ns);
         let mut by_ng = RgbVec::ZERO;
         if self.interpolated {
             let ((a, da), (b, db)) = (fade(self.ns.dot(wo)), fade(self.ng.dot(wi)));
@@ -94,7 +87,7 @@ impl LocalBsdf<'_> {
     /// Draws the direction that is not given; see [`Bsdf::sample`].
     #[inline]
     pub(crate) fn sample(&self, from: Vec3, u: [f64; 3], given: Given) -> Option<DirectionSample> {
-        self.bsdf().sample(from, self.ns, u, given)
+        self.bsdf.sample_at(self.at.as_ref(), from, self.ns, u, given)
     }
 
     /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`].
@@ -105,7 +98,7 @@ impl LocalBsdf<'_> {
         choice: f64,
         given: Given,
     ) -> Option<SpecularSample> {
-        let mut s = self.bsdf().sample_specular(from, self.ns, choice, given)?;
+        let mut s = self.bsdf.sample_specular_at(self.at.as_ref(), from, self.ns, choice, given)?;
         if self.interpolated {
             // As the value fades where there is one.
             s.weight *= fade(self.ns.dot(from)).0 * fade(self.ng.dot(s.w)).0;
@@ -116,7 +109,7 @@ impl LocalBsdf<'_> {
     /// Density per steradian with which [`Self::sample`] draws `to`.
     #[inline]
     pub(crate) fn pdf(&self, from: Vec3, to: Vec3, given: Given) -> f64 {
-        self.bsdf().pdf(from, to, self.ns, given)
+        self.bsdf.pdf_at(self.at.as_ref(), from, to, self.ns, given)
     }
 
     /// What an importance path multiplies the value by, per solid angle of `wo`: it arrives by
@@ -129,21 +122,21 @@ impl LocalBsdf<'_> {
 
     /// A sketch of [`Self::eval`] by `wi`.
     pub(crate) fn lobes(&self, wo: Vec3) -> Lobes {
-        self.bsdf().lobes(wo, self.ns)
+        self.bsdf.lobes(self.at.as_ref(), wo, self.ns)
     }
 
     /// About how wide the narrowest lobe is, in radians; at most 1.
     pub(crate) fn lobe_width(&self) -> f64 {
-        self.bsdf().lobe_width()
+        self.bsdf.lobe_width(self.at.as_ref())
     }
 
     /// The [`RoughnessPartner`] of `wi`, if it has one.
     pub(crate) fn roughness_partner(&self, wo: Vec3, wi: Vec3) -> Option<RoughnessPartner> {
-        self.bsdf().roughness_partner(wo, wi, self.ns)
+        self.bsdf.roughness_partner(self.at.as_ref(), wo, wi, self.ns)
     }
 
     /// The [`DirectionPartner`] of `wi`, if it has one.
     pub(crate) fn direction_partner(&self, wo: Vec3, wi: Vec3) -> Option<DirectionPartner> {
-        self.bsdf().direction_partner(wo, wi, self.ns)
+        self.bsdf.direction_partner(self.at.as_ref(), wo, wi, self.ns)
     }
 }

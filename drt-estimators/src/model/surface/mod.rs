@@ -50,6 +50,7 @@ mod roughness_partner;
 mod smooth;
 #[cfg(test)]
 pub(crate) mod tests;
+mod textured;
 mod visible_slope;
 
 use alloc::boxed::Box;
@@ -71,6 +72,8 @@ pub use crate::model::surface::plastic::Plastic;
 pub use crate::model::surface::property::{Property, SurfaceError};
 pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
 pub use crate::model::surface::smooth::{Conductor, Dielectric, ThinDielectric};
+pub use crate::model::surface::textured::Textured;
+use crate::model::texture::TexturePoint;
 
 /// A bidirectional scattering distribution function.
 ///
@@ -91,7 +94,7 @@ pub enum Bsdf {
     /// A rough interface of two transparent media.
     RoughDielectric(RoughDielectric),
     /// A diffuse base under a coating, smooth or rough.
-    Plastic(Box<Plastic>),
+    Plastic(Plastic),
     /// A smooth metal.
     Conductor(Conductor),
     /// A smooth interface of two transparent media.
@@ -100,6 +103,8 @@ pub enum Bsdf {
     ThinDielectric(ThinDielectric),
     /// A reflector on both sides.
     TwoSided(Box<TwoSided>),
+    /// Any of the above with textures.
+    Textured(Box<Textured>),
 }
 
 /// One-sided reflectors used on both sides of a surface: from behind, the normal is turned over.
@@ -163,6 +168,9 @@ pub struct BsdfGradient {
     pub params: BsdfParams,
 }
 
+/// Where textures are looked up; `None` takes their means.
+type At<'a> = Option<&'a TexturePoint<'a>>;
+
 /// Applies an expression to the model of a one-sided BSDF, another to anything else.
 macro_rules! match_model {
     ($bsdf:expr, $model:ident => $body:expr, _ => $nothing:expr) => {
@@ -176,7 +184,8 @@ macro_rules! match_model {
             | Bsdf::Conductor(_)
             | Bsdf::Dielectric(_)
             | Bsdf::ThinDielectric(_)
-            | Bsdf::TwoSided(_) => $nothing,
+            | Bsdf::TwoSided(_)
+            | Bsdf::Textured(_) => $nothing,
         }
     };
 }
@@ -188,31 +197,61 @@ impl Bsdf {
         match self {
             Self::Null => true,
             Self::Diffuse(d) => d.reflectance.is_zero(),
+            Self::Textured(t) => t.bsdf.is_black(),
             Self::TwoSided(t) => t.front.is_black() && t.back.as_ref().is_none_or(Self::is_black),
             _ => false,
         }
     }
 
-    /// The value `fs(wo, wi) |n·wi|` per channel; zero where the model is black.
+    /// The value `fs(wo, wi) |n·wi|` per channel; zero where the model is black. Like all that does
+    /// not say where on a shape it is, this takes textures by their means.
     #[inline]
     #[must_use]
     pub fn eval(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
+        self.eval_at(None, wo, wi, n)
+    }
+
+    #[inline]
+    pub(crate) fn eval_at(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
         let (bsdf, n) = self.facing(wo, n);
-        match_model!(bsdf, b => b.value(&Angles::new(wo, wi, n)), _ => Rgb::ZERO)
+        match_model!(
+            bsdf,
+            b => b.value(&Angles::new(wo, wi, n)),
+            _ => bsdf.textured(at, |b| b.eval(wo, wi, n)).unwrap_or(Rgb::ZERO)
+        )
     }
 
     /// The value and all its derivatives.
     #[inline]
     #[must_use]
     pub fn gradient(&self, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        self.gradient_at(None, wo, wi, n)
+    }
+
+    #[inline]
+    pub(crate) fn gradient_at(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
         let (bsdf, facing) = self.facing(wo, n);
         let angles = Angles::new(wo, wi, facing);
-        let slopes = match_model!(bsdf, b => b.slopes(&angles), _ => Slopes::default());
+        let slopes = match_model!(
+            bsdf,
+            b => b.slopes(&angles),
+            _ => bsdf.textured(at, |b| b.slopes(&angles)).unwrap_or_default()
+        );
         let mut gradient = slopes.pull_back(wo, wi, facing);
         if facing != n {
             gradient.n = -gradient.n;
         }
         gradient
+    }
+
+    /// A direction that a one-sided BSDF without textures scatters to.
+    fn direction(&self, from: Vec3, n: Vec3, u: [f64; 3]) -> Option<Vec3> {
+        match_model!(self, b => b.sample(from, n, u), _ => None)
+    }
+
+    /// Of a one-sided BSDF without textures.
+    fn slopes(&self, a: &Angles) -> Slopes {
+        match_model!(self, b => b.slopes(a), _ => Slopes::default())
     }
 
     /// Draws the direction that `from` is scattered to, or `None` for a sample lost below the
@@ -230,9 +269,25 @@ impl Bsdf {
         u: [f64; 3],
         given: Given,
     ) -> Option<DirectionSample> {
+        self.sample_at(None, from, n, u, given)
+    }
+
+    #[inline]
+    pub(crate) fn sample_at(
+        &self,
+        at: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        u: [f64; 3],
+        given: Given,
+    ) -> Option<DirectionSample> {
         let (bsdf, facing) = self.facing(from, n);
-        let w = match_model!(bsdf, b => b.sample(from, facing, u), _ => None)?;
-        let pdf = self.pdf(from, w, n, given);
+        let w = match_model!(
+            bsdf,
+            b => b.sample(from, facing, u),
+            _ => bsdf.textured(at, |b| b.direction(from, facing, u)).flatten()
+        )?;
+        let pdf = self.pdf_at(at, from, w, n, given);
         (pdf > 0.0 && pdf.is_finite()).then_some(DirectionSample { w, pdf })
     }
 
@@ -248,12 +303,27 @@ impl Bsdf {
         choice: f64,
         given: Given,
     ) -> Option<SpecularSample> {
+        self.sample_specular_at(None, from, n, choice, given)
+    }
+
+    #[inline]
+    pub(crate) fn sample_specular_at(
+        &self,
+        at: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        choice: f64,
+        given: Given,
+    ) -> Option<SpecularSample> {
         let (bsdf, n) = self.facing(from, n);
         match bsdf {
             Self::Plastic(b) => b.sample_specular(from, n, choice),
             Self::Conductor(b) => b.sample(from, n),
             Self::Dielectric(b) => b.sample(from, n, choice, given),
             Self::ThinDielectric(b) => b.sample(from, n, choice),
+            Self::Textured(_) => {
+                bsdf.textured(at, |b| b.sample_specular(from, n, choice, given)).flatten()
+            }
             _ => None,
         }
     }
@@ -264,8 +334,20 @@ impl Bsdf {
         match self {
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
             Self::Plastic(b) => b.is_smooth(),
+            Self::Textured(b) => b.bsdf.is_smooth(),
             Self::TwoSided(b) => {
                 b.front.is_smooth() || b.back.as_ref().is_some_and(Self::is_smooth)
+            }
+            _ => false,
+        }
+    }
+
+    /// True where a texture stands for some property.
+    pub(crate) fn is_textured(&self) -> bool {
+        match self {
+            Self::Textured(_) => true,
+            Self::TwoSided(b) => {
+                b.front.is_textured() || b.back.as_ref().is_some_and(Self::is_textured)
             }
             _ => false,
         }
@@ -274,40 +356,59 @@ impl Bsdf {
     /// Density per steradian with which [`Bsdf::sample`] draws `to`.
     #[inline]
     #[must_use]
-    pub fn pdf(&self, from: Vec3, to: Vec3, n: Vec3, _given: Given) -> f64 {
+    pub fn pdf(&self, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
+        self.pdf_at(None, from, to, n, given)
+    }
+
+    #[inline]
+    pub(crate) fn pdf_at(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
         let (bsdf, n) = self.facing(from, n);
-        match_model!(bsdf, b => b.pdf(&Angles::new(from, to, n)), _ => 0.0)
+        match_model!(
+            bsdf,
+            b => b.pdf(&Angles::new(from, to, n)),
+            _ => bsdf.textured(at, |b| b.pdf(from, to, n, given)).unwrap_or(0.0)
+        )
+    }
+
+    /// What `f` says of what textures make of this BSDF; `None` where it has none.
+    #[cold]
+    fn textured<R>(&self, at: At<'_>, f: impl FnOnce(&Self) -> R) -> Option<R> {
+        let Self::Textured(t) = self else { return None };
+        Some(f(&t.at(at)))
     }
 
     /// The [`RoughnessPartner`] of `wi` as the surface gets rougher, if it has one.
     #[inline]
     pub(crate) fn roughness_partner(
         &self,
+        at: At<'_>,
         wo: Vec3,
         wi: Vec3,
         n: Vec3,
     ) -> Option<RoughnessPartner> {
-        RoughnessPartner::new(&self.facet(wo, wi, n)?.0)
+        RoughnessPartner::new(&self.facet(at, wo, wi, n)?.0)
     }
 
     /// The [`DirectionPartner`] of `wi` in its lobe, if it has one.
     #[inline]
     pub(crate) fn direction_partner(
         &self,
+        at: At<'_>,
         wo: Vec3,
         wi: Vec3,
         n: Vec3,
     ) -> Option<DirectionPartner> {
-        let (facet, by_eta) = self.facet(wo, wi, n)?;
+        let (facet, by_eta) = self.facet(at, wo, wi, n)?;
         DirectionPartner::new(&facet, n, by_eta)
     }
 
     /// The microfacets that scatter so, and the rate of their index of refraction by that of the material.
-    fn facet(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<(Facet, f64)> {
+    fn facet(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<(Facet, f64)> {
         let (bsdf, n) = self.facing(wo, n);
         match bsdf {
             Self::RoughConductor(b) => Some((b.facet([wo, wi, n]), 0.0)),
             Self::RoughDielectric(b) => b.facet([wo, wi, n]),
+            Self::Textured(_) => bsdf.textured(at, |b| b.facet(None, wo, wi, n)).flatten(),
             _ => None,
         }
     }
@@ -324,23 +425,28 @@ impl Bsdf {
     #[inline]
     #[must_use]
     pub fn is_transmissive(&self) -> bool {
-        matches!(self, Self::RoughDielectric(_) | Self::Dielectric(_) | Self::ThinDielectric(_))
+        match self {
+            Self::RoughDielectric(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
+            Self::Textured(b) => b.bsdf.is_transmissive(),
+            _ => false,
+        }
     }
 
     /// True when nothing is scattered where both directions are on the back of the surface.
     pub(crate) fn is_black_from_behind(&self) -> bool {
-        matches!(
-            self,
+        match self {
             Self::Diffuse(_)
-                | Self::Phong(_)
-                | Self::RoughConductor(_)
-                | Self::Plastic(_)
-                | Self::Conductor(_)
-        )
+            | Self::Phong(_)
+            | Self::RoughConductor(_)
+            | Self::Plastic(_)
+            | Self::Conductor(_) => true,
+            Self::Textured(b) => b.bsdf.is_black_from_behind(),
+            _ => false,
+        }
     }
 
     /// About how far the half vector of its sharpest lobe is from the normal, in slopes; at most 1.
-    pub(crate) fn lobe_width(&self) -> f64 {
+    pub(crate) fn lobe_width(&self, at: At<'_>) -> f64 {
         let width = match self {
             Self::Null | Self::Diffuse(_) => 1.0,
             Self::Phong(b) => 1.0 / fm::sqrt(1.0 + 0.5 * b.exponent),
@@ -349,9 +455,10 @@ impl Bsdf {
             Self::Plastic(b) => b.coating.facets().map_or(0.0, |(_, alpha)| alpha),
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => 0.0,
             Self::TwoSided(b) => {
-                let back = b.back.as_ref().map_or(1.0, Self::lobe_width);
-                f64::min(b.front.lobe_width(), back)
+                let back = b.back.as_ref().map_or(1.0, |b| b.lobe_width(at));
+                f64::min(b.front.lobe_width(at), back)
             }
+            Self::Textured(b) => b.at(at).lobe_width(None),
         };
         f64::min(width, 1.0)
     }
@@ -371,6 +478,7 @@ impl Bsdf {
             Self::Dielectric(_) => "dielectric",
             Self::ThinDielectric(_) => "thindielectric",
             Self::TwoSided(_) => "twosided",
+            Self::Textured(b) => b.bsdf.name(),
         }
     }
 
@@ -381,13 +489,10 @@ impl Bsdf {
     pub fn validate(&self) -> Result<(), SurfaceError> {
         if let Self::TwoSided(b) = self {
             return [Some(&b.front), b.back.as_ref()].into_iter().flatten().try_for_each(|side| {
-                match side {
-                    Self::Null
-                    | Self::RoughDielectric(_)
-                    | Self::Dielectric(_)
-                    | Self::ThinDielectric(_)
-                    | Self::TwoSided(_) => Err(SurfaceError::NotReflective { bsdf: side.name() }),
-                    reflector => reflector.validate(),
+                if side.is_transmissive() || matches!(side, Self::Null | Self::TwoSided(_)) {
+                    Err(SurfaceError::NotReflective { bsdf: side.name() })
+                } else {
+                    side.validate()
                 }
             });
         }
@@ -395,6 +500,7 @@ impl Bsdf {
             Self::Conductor(b) => b.validate(),
             Self::Dielectric(b) => b.validate(),
             Self::ThinDielectric(b) => b.validate(),
+            Self::Textured(b) => b.validate(),
             _ => match_model!(self, b => b.validate(), _ => Ok(())),
         }
     }

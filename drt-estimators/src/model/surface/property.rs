@@ -1,3 +1,4 @@
+use alloc::boxed::Box;
 use alloc::string::String;
 use core::fmt;
 
@@ -122,6 +123,26 @@ pub enum SurfaceError {
         g: f64,
         /// Third number.
         b: f64,
+    },
+    /// A property that a texture stands for.
+    #[error("a texture stands for \"{property}\"")]
+    StoodFor {
+        /// The property.
+        property: Property,
+    },
+    /// Values of a texture, or some of them, that the BSDF does not take.
+    #[error("the texture of \"{property}\": {reason}")]
+    Texture {
+        /// What it stands for.
+        property: Property,
+        /// What is wrong.
+        reason: Box<SurfaceError>,
+    },
+    /// Textures around something that is no plain BSDF.
+    #[error("a {bsdf} BSDF takes no textures; give them to what is in it")]
+    TexturedTwice {
+        /// Kind of that BSDF, by its plugin name.
+        bsdf: &'static str,
     },
     /// Only plain reflectors have two equal sides.
     #[error("a twosided BSDF cannot hold a {bsdf} BSDF; use it without twosided")]

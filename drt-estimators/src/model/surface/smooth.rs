@@ -5,7 +5,7 @@ use drt_math::{Rgb, Vec3};
 
 use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
 use crate::model::surface::microfacet::{mirrored, refracted};
-use crate::model::surface::property::{Property, SurfaceError, in_range, nonnegative};
+use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 use crate::model::surface::{Given, SpecularSample};
 
 /// A smooth metal: Mitsuba's `conductor`. Black from behind.
@@ -85,6 +85,15 @@ impl Conductor {
         })
     }
 
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Eta => Some(Slot::Color(&mut self.eta)),
+            Property::K => Some(Slot::Color(&mut self.k)),
+            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
+            _ => None,
+        }
+    }
+
     pub(super) fn validate(&self) -> Result<(), SurfaceError> {
         nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
         nonnegative(Property::Eta, self.eta)?;
@@ -124,6 +133,15 @@ impl Dielectric {
         Some(SpecularSample { w, weight: self.specular_transmittance * scale, straight: false })
     }
 
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Eta => Some(Slot::Scalar(&mut self.eta)),
+            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
+            Property::SpecularTransmittance => Some(Slot::Color(&mut self.specular_transmittance)),
+            _ => None,
+        }
+    }
+
     pub(super) fn validate(&self) -> Result<(), SurfaceError> {
         check(self.eta, self.specular_reflectance, self.specular_transmittance)
     }
@@ -144,6 +162,15 @@ impl ThinDielectric {
         } else {
             SpecularSample { w: -from, weight: self.specular_transmittance, straight: true }
         })
+    }
+
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Eta => Some(Slot::Scalar(&mut self.eta)),
+            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
+            Property::SpecularTransmittance => Some(Slot::Color(&mut self.specular_transmittance)),
+            _ => None,
+        }
     }
 
     pub(super) fn validate(&self) -> Result<(), SurfaceError> {

@@ -32,8 +32,8 @@ fn motion(bsdf: &Bsdf, wo: Vec3) -> ([Vec3; 2], f64) {
 fn opposites_are_mutual() {
     let mut found = 0;
     scattered(41, |alpha, bsdf, [wo, wi]| {
-        let Some(there) = bsdf.direction_partner(wo, wi, normal()) else { return };
-        let back = bsdf.direction_partner(wo, there.w, normal()).expect("the way back");
+        let Some(there) = bsdf.direction_partner(None, wo, wi, normal()) else { return };
+        let back = bsdf.direction_partner(None, wo, there.w, normal()).expect("the way back");
         let message = || format!("{bsdf:?} {wo:?} {wi:?} {there:?} {back:?}");
         assert!((back.w - wi).length() < 1e-7 * alpha, "{}", message());
         assert!((back.ratio * there.ratio - 1.0).abs() < 1e-7, "{}", message());
@@ -60,7 +60,7 @@ fn most_of_it_is_told_and_odd() {
             for _ in 0..50 {
                 let drawn = bsdf.sample(wo, normal(), random_3d(&mut rng), Given::Wo);
                 let Some(wi) = drawn.map(|s| s.w) else { continue };
-                let Some(other) = bsdf.direction_partner(wo, wi, normal()) else { continue };
+                let Some(other) = bsdf.direction_partner(None, wo, wi, normal()) else { continue };
                 let region = region(&bsdf, wo, wi);
                 let [here, there] = other.turns.map(|turn| found(&bsdf, wo, &turn));
                 let small = 40.0 + 0.01 * here.abs();
@@ -82,7 +82,7 @@ fn derivatives(bsdf: &Bsdf, wo: Vec3, ratio: impl Fn(f64) -> f64) -> [Moments; 2
             moments.iter_mut().for_each(|m| m.push(0.0));
             continue;
         };
-        let other = bsdf.direction_partner(wo, s.w, normal());
+        let other = bsdf.direction_partner(None, wo, s.w, normal());
         let own = bsdf.eval(wo, s.w, normal()).g * light(s.w);
         let single = region(bsdf, wo, s.w) * own;
         let apart = other.map_or(single, |o| {

@@ -44,7 +44,7 @@ fn toward(lobes: &Lobes, w: Vec3, cosine: f64) -> f64 {
 
 fn cost_of(bsdf: &Bsdf, wo: Vec3, sketched: Vec3) -> f64 {
     let n = normal();
-    let lobes = bsdf.lobes(sketched, n);
+    let lobes = bsdf.lobes(None, sketched, n);
     let below = bsdf.is_transmissive();
     let sketch = |w: Vec3| {
         let cosine = n.dot(w) * n.dot(wo).signum();

@@ -9,6 +9,7 @@ mod lobes;
 mod roughness_partners;
 mod sampling;
 mod smooth;
+mod textured;
 
 use alloc::boxed::Box;
 use alloc::vec::Vec;
@@ -62,6 +63,7 @@ pub(crate) fn value_over<T: Real>(
             specular_transmittance: lift(Property::SpecularTransmittance, b.specular_transmittance),
         }
         .value(&a),
+        Bsdf::Textured(b) => value_over(&b.bsdf, wo, wi, n, lift),
         Bsdf::TwoSided(b) if a.cos_o.re() >= 0.0 => value_over(&b.front, wo, wi, n, lift),
         Bsdf::TwoSided(b) => value_over(b.back.as_ref().unwrap_or(&b.front), wo, wi, -n, lift),
     }
@@ -134,13 +136,13 @@ fn cases() -> Vec<Bsdf> {
             specular_transmittance: Rgb::ZERO,
             ..glass(Ggx, 0.5, 1.8)
         }),
-        Bsdf::Plastic(Box::new(rough_plastic(Beckmann, 0.3, 1.9))),
-        Bsdf::Plastic(Box::new(Plastic {
+        Bsdf::Plastic(rough_plastic(Beckmann, 0.3, 1.9)),
+        Bsdf::Plastic(Plastic {
             nonlinear: true,
             specular_reflectance: Rgb::new(0.9, 0.4, 0.0),
             ..rough_plastic(Ggx, 0.2, 1.5)
-        })),
-        Bsdf::Plastic(Box::new(smooth_plastic(1.5))),
+        }),
+        Bsdf::Plastic(smooth_plastic(1.5)),
         Bsdf::TwoSided(Box::new(TwoSided { front: Bsdf::Phong(phong), back: None })),
         Bsdf::TwoSided(Box::new(copper_front)),
     ]

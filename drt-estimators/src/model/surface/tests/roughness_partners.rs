@@ -35,8 +35,8 @@ pub(super) fn scattered(seed: u64, mut each: impl FnMut(f64, &Bsdf, [Vec3; 2])) 
 fn counterparts_go_both_ways() {
     let mut found = 0;
     scattered(31, |alpha, bsdf, [wo, wi]| {
-        let Some(there) = bsdf.roughness_partner(wo, wi, normal()) else { return };
-        let back = bsdf.roughness_partner(wo, there.w, normal()).expect("the way back");
+        let Some(there) = bsdf.roughness_partner(None, wo, wi, normal()) else { return };
+        let back = bsdf.roughness_partner(None, wo, there.w, normal()).expect("the way back");
         let message = || format!("{bsdf:?} {wo:?} {wi:?} {there:?} {back:?}");
         assert!((back.w - wi).length() < 1e-6 * alpha, "{}", message());
         assert!((back.ratio * there.ratio - 1.0).abs() < 1e-5, "{}", message());
@@ -62,7 +62,7 @@ fn derivatives(bsdf: &Bsdf, wo: Vec3) -> [Moments; 3] {
         };
         let g = bsdf.gradient(wo, s.w, normal());
         let region = g.params.alpha.g * light(s.w);
-        let partner = bsdf.roughness_partner(wo, s.w, normal());
+        let partner = bsdf.roughness_partner(None, wo, s.w, normal());
         let [apart, uncompared] = partner.map_or([region; 2], |c| {
             let beside = bsdf.eval(wo, c.w, normal()).g * light(c.w);
             let there = c.ratio * bsdf.pdf(wo, c.w, normal(), Given::Wo) / c.slopes[1].abs();

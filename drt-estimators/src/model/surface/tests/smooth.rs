@@ -125,8 +125,8 @@ fn smooth_plastic_is_the_limit_of_rough_plastic() {
     // As tabulated for 1.5: 0.596 (Egan and Hilgeman 1973).
     assert!((Coating::smooth(1.5).expect("glass").internal_reflectance() - 0.596).abs() < 1e-3);
 
-    let smooth = Bsdf::Plastic(Box::new(black(smooth_plastic(1.9))));
-    let rough = Bsdf::Plastic(Box::new(black(sharp)));
+    let smooth = Bsdf::Plastic(black(smooth_plastic(1.9)));
+    let rough = Bsdf::Plastic(black(sharp));
     for degrees in [0.0, 45.0, 75.0] {
         let [a, b] = [&smooth, &rough].map(|bsdf| albedo(bsdf, tilted(degrees), |_| 1.0));
         let error = (a.variance_of_mean() + b.variance_of_mean()).sqrt();
@@ -183,7 +183,7 @@ fn plastics_are_mitsubas() {
     ];
     let directions = [[20.0, 50.0, 1.0], [70.0, 10.0, 2.5], [45.0, 45.0, PI], [80.0, 75.0, 3.0]];
     for (plastic, values) in cases {
-        let bsdf = Bsdf::Plastic(Box::new(plastic));
+        let bsdf = Bsdf::Plastic(plastic);
         for ([to, ti, azimuth], value) in directions.into_iter().zip(values) {
             let at = |degrees: f64, azimuth: f64| {
                 let (sin, cos) = degrees.to_radians().sin_cos();

@@ -1,0 +1,83 @@
+use alloc::boxed::Box;
+use alloc::vec::Vec;
+
+use drt_math::Rgb;
+
+use crate::model::surface::microfacet::LEAST_ALPHA;
+use crate::model::surface::property::{Property, SurfaceError};
+use crate::model::surface::{At, Bsdf};
+use crate::model::texture::Texture;
+
+/// A one-sided BSDF some of whose properties vary over the surface.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Textured {
+    /// The BSDF with the means of its textures.
+    pub bsdf: Bsdf,
+    /// Textures, each with what it stands for; of a scalar property their first channel counts, and
+    /// roughness is no less than microfacets can have.
+    pub textures: Vec<(Property, Texture)>,
+}
+
+impl Textured {
+    /// A BSDF with textures, which take the place of its own values.
+    ///
+    /// # Errors
+    /// When it is null, two-sided or textured already, lacks a property, or some texture has a value
+    /// that it does not take.
+    pub fn new(mut bsdf: Bsdf, textures: Vec<(Property, Texture)>) -> Result<Self, SurfaceError> {
+        for (property, texture) in &textures {
+            bsdf.set(*property, allowed(*property, texture.mean()))?;
+        }
+        let textured = Self { bsdf, textures };
+        textured.validate()?;
+        Ok(textured)
+    }
+
+    /// The BSDF at a point.
+    #[inline]
+    pub(super) fn at(&self, at: At<'_>) -> Bsdf {
+        let mut bsdf = self.bsdf.clone();
+        if let Some(at) = at {
+            for (property, texture) in &self.textures {
+                // Only properties that there are can have got a texture.
+                let _ = bsdf.set(*property, allowed(*property, texture.at(at.uv())));
+            }
+        }
+        bsdf
+    }
+
+    /// The texture that stands for a property.
+    pub(crate) fn texture(&self, property: Property) -> Option<&Texture> {
+        self.textures.iter().find(|(p, _)| *p == property).map(|(_, texture)| texture)
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+        if matches!(self.bsdf, Bsdf::Textured(_) | Bsdf::TwoSided(_)) {
+            return Err(SurfaceError::TexturedTwice { bsdf: self.bsdf.name() });
+        }
+        self.bsdf.validate()?;
+        for (property, texture) in &self.textures {
+            for bound in texture.bounds() {
+                let fail = |reason| SurfaceError::Texture {
+                    property: *property,
+                    reason: Box::new(reason),
+                };
+                let mut bsdf = self.bsdf.clone();
+                bsdf.set(*property, allowed(*property, bound))?;
+                bsdf.validate().map_err(fail)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What a texture's value makes of a property.
+#[inline]
+fn allowed(property: Property, value: Rgb) -> Rgb {
+    match property {
+        // Not `max`, which would take what is no number for allowed.
+        Property::Alpha => value.map(|a| if a < LEAST_ALPHA { LEAST_ALPHA } else { a }),
+        _ => value,
+    }
+}
