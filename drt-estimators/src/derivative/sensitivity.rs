@@ -24,6 +24,8 @@ pub(crate) struct SurfaceAdjoint {
     pub(crate) ns: RgbVec,
     /// Area Jacobian.
     pub(crate) j: Rgb,
+    /// Place on the surface, at rest itself.
+    pub(crate) slide: RgbVec,
 }
 
 impl SurfaceAdjoint {
@@ -39,7 +41,8 @@ impl SurfaceAdjoint {
     }
 
     pub(crate) fn is_zero(&self) -> bool {
-        [self.u, self.n, self.ns].into_iter().all(|v| v == RgbVec::ZERO) && self.j.is_zero()
+        [self.u, self.n, self.ns, self.slide].into_iter().all(|v| v == RgbVec::ZERO)
+            && self.j.is_zero()
     }
 }
 

@@ -179,18 +179,19 @@ impl TargetName for String {
 }
 
 impl Scene {
-    /// Refuses derivatives with respect to `parameter` where light meets smooth surfaces, which move
-    /// light along them, or textured ones, whose values move with them: no term here knows of either.
-    pub(crate) fn refuse_derivatives(&self, parameter: &str) -> Result<(), Error> {
+    /// Refuses derivatives with respect to `parameter` where light meets smooth surfaces: they move
+    /// light along them, which no term here samples. Where vertices `slide` over surfaces, jumps of textures move under them,
+    /// which no term here samples, either.
+    pub(crate) fn refuse_derivatives(&self, parameter: &str, slide: bool) -> Result<(), Error> {
         for (i, s) in self.shapes.iter().enumerate() {
             let bsdf = &self.bsdfs[s.bsdf].item;
             if bsdf.is_smooth() {
                 let (bsdf, parameter) = (bsdf.name(), parameter.into());
                 return Err(unusable(&s.id, "shape", i, ElementError::Smooth { bsdf, parameter }));
             }
-            if bsdf.is_textured() {
+            if slide && bsdf.jumps_on(&s.mesh) {
                 let parameter = parameter.into();
-                return Err(unusable(&s.id, "shape", i, ElementError::Textured { parameter }));
+                return Err(unusable(&s.id, "shape", i, ElementError::Jumps { parameter }));
             }
         }
         Ok(())
@@ -389,10 +390,10 @@ mod tests {
     #[test]
     fn smooth_and_textured_surfaces_refuse_derivatives_by_name() {
         let mut scene = scene();
-        assert!(scene.refuse_derivatives("spin").is_ok());
+        assert!(scene.refuse_derivatives("spin", true).is_ok());
         scene.bsdfs.push(Named::new("glass", Bsdf::Dielectric(Dielectric::default())));
         // One that no shape has does no harm.
-        assert!(scene.refuse_derivatives("spin").is_ok());
+        assert!(scene.refuse_derivatives("spin", true).is_ok());
         let shape = scene.shapes.len() - 1;
         scene.shapes[shape].bsdf = scene.bsdfs.len() - 1;
         let parameters = [drt_motion::Parameter {
@@ -410,9 +411,9 @@ mod tests {
         let message = message.err().expect("a refusal").to_string();
         assert!(message.contains(&name) && message.contains("dielectric"), "{message}");
         assert!(message.contains("`spin` cannot be differentiated"), "{message}");
-        // Nor are textured ones differentiated, nor what a texture stands for changed.
+        // Where vertices slide over surfaces, textures must not jump; nor is what a texture stands for changed.
         scene.shapes[shape].bsdf = 0;
-        assert!(scene.refuse_derivatives("spin").is_ok());
+        assert!(scene.refuse_derivatives("spin", true).is_ok());
         let texture = Texture::Checkerboard {
             colours: [Rgb::splat(0.2), Rgb::splat(0.8)],
             to_uv: crate::texture::UvMap::IDENTITY,
@@ -420,9 +421,9 @@ mod tests {
         let bsdf = scene.bsdfs[0].item.clone();
         let textured = Textured::new(bsdf, alloc::vec![(Property::Reflectance, texture)]);
         scene.bsdfs[0].item = Bsdf::Textured(alloc::boxed::Box::new(textured.expect("a texture")));
-        let message = crate::Session::new(&scene, &parameters, &crate::Settings::default());
-        let message = message.err().expect("a refusal").to_string();
-        assert!(message.contains(&name) && message.contains("has a texture"), "{message}");
+        assert!(scene.refuse_derivatives("spin", false).is_ok());
+        let message = scene.refuse_derivatives("spin", true).unwrap_err().to_string();
+        assert!(message.contains(&name) && message.contains("texture with jumps"), "{message}");
         let op = drt_motion::ValueChange::Add(Rgb::ONE);
         let change =
             drt_motion::PropertyChange { property: "reflectance".into(), op, voxels: None };

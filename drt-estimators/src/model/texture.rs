@@ -1,11 +1,12 @@
 //! Values that vary over surfaces, by texture coordinates.
 
+use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_geom::Mesh;
-use drt_math::{Rgb, fm};
+use drt_math::{Rgb, Vec3, fm};
 
 /// A colour (or a number, in every channel alike) over texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,6 +81,14 @@ impl TexturePoint<'_> {
     pub(crate) fn uv(&self) -> [f64; 2] {
         self.mesh.texcoord(self.triangle, self.bary)
     }
+
+    /// The gradients of both coordinates by place, in the triangle's plane.
+    pub(crate) fn uv_gradients(&self) -> [Vec3; 2] {
+        let at = |bary| self.mesh.texcoord(self.triangle, bary);
+        let [[u, v], by_s, by_t] = [at([0.0, 0.0]), at([1.0, 0.0]), at([0.0, 1.0])];
+        let [s, t] = self.mesh.barycentric_gradients(self.triangle);
+        [s * (by_s[0] - u) + t * (by_t[0] - u), s * (by_s[1] - v) + t * (by_t[1] - v)]
+    }
 }
 
 impl UvMap {
@@ -138,23 +147,48 @@ impl Bitmap {
         Rgb::new(r, g, b)
     }
 
-    fn at(&self, uv: [f64; 2]) -> Rgb {
+    /// Columns and rows, in texels.
+    fn place(&self, uv: [f64; 2]) -> [f64; 2] {
         let mapped = self.to_uv.apply(uv);
-        let scaled = [0, 1].map(|i| {
+        [0, 1].map(|i| {
             let place = mapped[i] * f64::from(self.size[i]);
             // Coordinates that are no numbers, or whose texels cannot be told apart.
             if place.abs() < 1e15 { place } else { 0.0 }
-        });
+        })
+    }
+
+    /// The four texels around a place, by rows, and how far it is from the first of them.
+    fn around(&self, place: [f64; 2]) -> ([[Rgb; 2]; 2], [f64; 2]) {
+        let corner = place.map(|s| fm::floor(s - 0.5));
+        let [x, y] = corner.map(|c| c as i64);
+        let row = |y| [self.texel([x, y]), self.texel([x + 1, y])];
+        ([row(y), row(y + 1)], [0, 1].map(|i| place[i] - 0.5 - corner[i]))
+    }
+
+    fn at(&self, uv: [f64; 2]) -> Rgb {
+        let place = self.place(uv);
         match self.filter {
-            TextureFilter::Nearest => self.texel(scaled.map(|s| fm::floor(s) as i64)),
+            TextureFilter::Nearest => self.texel(place.map(|s| fm::floor(s) as i64)),
             TextureFilter::Bilinear => {
-                let corner = scaled.map(|s| fm::floor(s - 0.5));
-                let [s, t] = [0, 1].map(|i| scaled[i] - 0.5 - corner[i]);
-                let [x, y] = corner.map(|c| c as i64);
-                let row = |y| self.texel([x, y]) * (1.0 - s) + self.texel([x + 1, y]) * s;
-                row(y) * (1.0 - t) + row(y + 1) * t
+                let (rows, [s, t]) = self.around(place);
+                let [a, b] = rows.map(|[a, b]| a * (1.0 - s) + b * s);
+                a * (1.0 - t) + b * t
             }
         }
+    }
+
+    /// The derivatives by both coordinates.
+    fn slopes(&self, uv: [f64; 2]) -> [Rgb; 2] {
+        if self.filter == TextureFilter::Nearest {
+            return [Rgb::ZERO; 2];
+        }
+        let (rows, [s, t]) = self.around(self.place(uv));
+        let [[a, b], [c, d]] = rows;
+        let [width, height] = self.size.map(f64::from);
+        let by_x = ((b - a) * (1.0 - t) + (d - c) * t) * width;
+        let by_y = ((c - a) * (1.0 - s) + (d - b) * s) * height;
+        let [x, y] = self.to_uv.0;
+        [0, 1].map(|i| by_x * x[i] + by_y * y[i])
     }
 }
 
@@ -169,6 +203,44 @@ impl Texture {
             }
             Self::Bitmap(image) => image.at(uv),
         }
+    }
+
+    /// The derivatives of the value by both coordinates, but for jumps.
+    #[must_use]
+    pub fn slopes(&self, uv: [f64; 2]) -> [Rgb; 2] {
+        match self {
+            Self::Checkerboard { .. } => [Rgb::ZERO; 2],
+            Self::Bitmap(image) => image.slopes(uv),
+        }
+    }
+
+    /// False where the value jumps, though coordinates do not.
+    #[must_use]
+    pub fn is_continuous(&self) -> bool {
+        matches!(self, Self::Bitmap(image) if image.filter == TextureFilter::Bilinear)
+    }
+
+    /// True where the value does not jump on a mesh: at none of the edges that triangles share, either.
+    pub(crate) fn is_continuous_on(&self, mesh: &Mesh) -> bool {
+        if !self.is_continuous() {
+            return false;
+        }
+        let mut sides = BTreeMap::new();
+        (0..mesh.triangles.len() as u32).all(|triangle| {
+            let corners = mesh.triangles[triangle as usize];
+            // Without coordinates of their own, triangles have the same ones from corner to corner.
+            let weights = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+            (0..3).all(|k| {
+                let (i, j) = (k, (k + 1) % 3);
+                let (i, j) = if corners[i] < corners[j] { (i, j) } else { (j, i) };
+                let along = [0.0, 0.381, 0.618, 1.0].map(|w: f64| {
+                    let bary = [0, 1].map(|c| weights[i][c] * (1.0 - w) + weights[j][c] * w);
+                    self.at(mesh.texcoord(triangle, bary))
+                });
+                let first = *sides.entry([corners[i], corners[j]]).or_insert(along);
+                along.iter().zip(&first).all(|(a, b)| (*a - *b).max_abs() <= 1e-9)
+            })
+        })
     }
 
     /// Values, per channel, between which all others are; of a checkerboard its two colours.

@@ -29,7 +29,7 @@ use crate::model::sensor::SensorGradient;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::model::shard::Shard;
 use crate::model::surface::BsdfParams;
-use crate::run::session::{Control, estimators, seed_of_component};
+use crate::run::session::{Control, estimators, seed_of_component, slides};
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::BATCHES;
 use crate::sampling::parallel::Pool;
@@ -137,7 +137,10 @@ pub fn gradient_in_batches(
     scene.check()?;
     settings.check(scene, true)?;
     let wanted = &targets(scene, wanted)?[..];
-    wanted.first().map_or(Ok(()), |target| scene.refuse_derivatives(&scene.name_of(*target)))?;
+    if let Some(target) = wanted.first() {
+        let slide = slides(scene, wanted.iter().copied(), settings);
+        scene.refuse_derivatives(&scene.name_of(*target), slide)?;
+    }
     let (scene, _) = tangents::apply(scene, &[])?;
     let film = scene.sensors[settings.sensor].item.sensor.film();
     if adjoint.len() != (film[0] * film[1]) as usize {

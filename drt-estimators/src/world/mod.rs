@@ -447,8 +447,9 @@ impl World {
     /// The point of a triangle's plane nearest to `x`, moved into the triangle.
     pub(crate) fn point_near(&self, prim: u32, x: Vec3) -> (SurfacePoint, Vec3) {
         let Prim { shape, triangle } = self.geometry.prims[prim as usize];
-        let [a, b, c] = self.scene.shapes[shape as usize].mesh.triangle(triangle);
-        let [g1, g2] = barycentric_gradients(b - a, c - a);
+        let mesh = &self.scene.shapes[shape as usize].mesh;
+        let [a, ..] = mesh.triangle(triangle);
+        let [g1, g2] = mesh.barycentric_gradients(triangle);
         let [b1, b2] = [g1, g2].map(|g| g.dot(x - a).clamp(0.0, 1.0));
         let sum = f64::max(b1 + b2, 1.0);
         self.point(prim, [b1 / sum, b2 / sum])
@@ -461,8 +462,7 @@ impl World {
         let [i, j, k] = mesh.triangles[s.triangle as usize].map(|v| normals[v as usize]);
         let sum = i * (1.0 - s.bary[0] - s.bary[1]) + j * s.bary[0] + k * s.bary[1];
         let adjoint = adjoint.reject(s.ns) / sum.length();
-        let [a, b, c] = mesh.triangle(s.triangle);
-        let [g1, g2] = barycentric_gradients(b - a, c - a);
+        let [g1, g2] = mesh.barycentric_gradients(s.triangle);
         g1 * adjoint.dot(j - i) + g2 * adjoint.dot(k - i)
     }
 
@@ -615,14 +615,6 @@ impl World {
             _ => Rgb::ZERO,
         }
     }
-}
-
-/// The gradients, in a triangle's plane, of the barycentric weights of its second and third vertex, by
-/// its edges from the first.
-fn barycentric_gradients(e1: Vec3, e2: Vec3) -> [Vec3; 2] {
-    let n = e1.cross(e2);
-    let per_area = 1.0 / n.length_squared();
-    [e2.cross(n) * per_area, n.cross(e1) * per_area]
 }
 
 /// The diagonal of the box around the surfaces that hold a medium; `all` where none do.

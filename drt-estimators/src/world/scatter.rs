@@ -33,6 +33,8 @@ pub(crate) struct ScatteringGradient {
     pub(crate) ns: RgbVec,
     /// With respect to the geometric normal.
     pub(crate) ng: RgbVec,
+    /// With respect to the place of the point on its surface, where textures change.
+    pub(crate) slide: RgbVec,
     /// With respect to the phase function's asymmetry.
     pub(crate) g: f64,
     /// With respect to the material, on surfaces.
@@ -99,8 +101,8 @@ impl Scattering<'_> {
         match self {
             Self::Surface(bsdf) => {
                 let (d, ng) = bsdf.gradient(wo, wi);
-                let params = Some(d.params);
-                ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, ng, g: 0.0, params }
+                let (slide, params) = (bsdf.slide(wo, &d.params), Some(d.params));
+                ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, ng, slide, g: 0.0, params }
             }
             Self::Volume(phase) => {
                 let c = -wo.dot(wi);
@@ -110,6 +112,7 @@ impl Scattering<'_> {
                     wi: slope.outer(wo),
                     ns: RgbVec::ZERO,
                     ng: RgbVec::ZERO,
+                    slide: RgbVec::ZERO,
                     g: phase.d_g(c),
                     params: None,
                 }

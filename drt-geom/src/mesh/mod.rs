@@ -237,6 +237,17 @@ impl Mesh {
         self.triangles[i as usize].map(|v| self.positions[v as usize])
     }
 
+    /// The gradients by place, in the plane of a triangle, of the weights of its second and third corner;
+    /// not finite where it has no area.
+    #[must_use]
+    pub fn barycentric_gradients(&self, i: u32) -> [Vec3; 2] {
+        let [a, b, c] = self.triangle(i);
+        let (e1, e2) = (b - a, c - a);
+        let n = e1.cross(e2);
+        let per_area = 1.0 / n.length_squared();
+        [e2.cross(n) * per_area, n.cross(e1) * per_area]
+    }
+
     /// All triangles by their corners, in order: what [`TriangleBvh::build`](crate::TriangleBvh::build)
     /// takes.
     #[must_use]

@@ -440,6 +440,7 @@ impl<'w> Differentiator<'w> {
             Kind::Surface(s) => {
                 here.ns += d.ns * adjoint;
                 here.n += d.ng * adjoint;
+                here.slide += d.slide * adjoint;
                 if material && let Some(params) = d.params {
                     sink.bsdf(world.scene.shapes[s.shape as usize].bsdf, &params, adjoint);
                 }

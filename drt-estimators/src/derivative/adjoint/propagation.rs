@@ -118,7 +118,7 @@ impl Differentiator<'_> {
         matter: RgbVec,
     ) -> Rgb {
         let slide = match &vertex.kind {
-            Kind::Surface(point) => here.ns.map(|ns| self.world.normal_slide(point, ns)),
+            Kind::Surface(point) => slide(self.world, point, here),
             _ => RgbVec::ZERO,
         };
         (here.u + slide + matter).dot(a.displacement)
@@ -283,6 +283,11 @@ fn summand<S: AdjointSink>(a: &Auxiliary, g: Rgb, sink: &mut S) -> [RgbVec; 2] {
     }
 }
 
+/// Sensitivity to the place of a point on its surface, by what changes there.
+fn slide(world: &World, point: &SurfacePoint, here: &SurfaceAdjoint) -> RgbVec {
+    here.ns.map(|ns| world.normal_slide(point, ns)) + here.slide
+}
+
 /// Sensitivities of a point where a ray along `dir` lands, `shift` to the velocity of matter less that of
 /// the ray there, and `dims` to the ray's length: split into one to the ray's velocity there, and those
 /// of the surface. `free` is 1 - φ.
@@ -295,8 +300,7 @@ fn split(
     shift: RgbVec,
     dims: Rgb,
 ) -> (RgbVec, SurfaceAdjoint) {
-    let slide = here.ns.map(|ns| world.normal_slide(point, ns));
-    let by_ray = (here.u + slide) * free - shift;
+    let by_ray = (here.u + slide(world, point, here)) * free - shift;
     let by_length = by_ray.dot(dir) + dims;
     let along_normal = by_length.outer(point.ng / point.ng.dot(dir));
     let u = along_normal + here.u - by_ray;

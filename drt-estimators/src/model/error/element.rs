@@ -56,11 +56,12 @@ pub enum ElementError {
          has no derivative; move the film back"
     )]
     FilmCut(String),
-    /// A textured surface where something is to be differentiated.
+    /// A texture that jumps, where points slide over its surface.
     #[error(
-        "its BSDF has a texture, past which `{parameter}` cannot be differentiated yet; use finite differences"
+        "its BSDF has a texture with jumps, past which `{parameter}` can only be differentiated by the \
+         estimator path-space, or by finite differences"
     )]
-    Textured {
+    Jumps {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },

@@ -84,6 +84,12 @@ impl LocalBsdf<'_> {
         (d, by_ng)
     }
 
+    /// The gradient of the value by the place of the point, as far as textures change there; `params` holds its
+    /// derivatives by properties.
+    pub(crate) fn slide(&self, wo: Vec3, params: &BsdfParams) -> RgbVec {
+        self.bsdf.slide(self.at.as_ref(), wo, self.ns, params)
+    }
+
     /// Draws the direction that is not given; see [`Bsdf::sample`].
     #[inline]
     pub(crate) fn sample(&self, from: Vec3, u: [f64; 3], given: Given) -> Option<DirectionSample> {

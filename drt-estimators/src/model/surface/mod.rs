@@ -55,6 +55,7 @@ mod visible_slope;
 
 use alloc::boxed::Box;
 
+use drt_geom::Mesh;
 use drt_math::{Rgb, RgbVec, Vec3, fm};
 
 use crate::model::surface::angles::{Angles, Slopes};
@@ -342,12 +343,20 @@ impl Bsdf {
         }
     }
 
-    /// True where a texture stands for some property.
-    pub(crate) fn is_textured(&self) -> bool {
+    /// The gradient of a value by the place of its point, as far as textures change there.
+    pub(crate) fn slide(&self, at: At<'_>, wo: Vec3, n: Vec3, params: &BsdfParams) -> RgbVec {
+        match (self.facing(wo, n).0, at) {
+            (Self::Textured(b), Some(at)) => b.slide(at, params),
+            _ => RgbVec::ZERO,
+        }
+    }
+
+    /// True where textures jump on a mesh.
+    pub(crate) fn jumps_on(&self, mesh: &Mesh) -> bool {
         match self {
-            Self::Textured(_) => true,
+            Self::Textured(b) => b.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh)),
             Self::TwoSided(b) => {
-                b.front.is_textured() || b.back.as_ref().is_some_and(Self::is_textured)
+                b.front.jumps_on(mesh) || b.back.as_ref().is_some_and(|b| b.jumps_on(mesh))
             }
             _ => false,
         }

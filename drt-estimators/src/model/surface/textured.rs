@@ -1,12 +1,12 @@
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use drt_math::Rgb;
+use drt_math::{Rgb, RgbVec};
 
 use crate::model::surface::microfacet::LEAST_ALPHA;
 use crate::model::surface::property::{Property, SurfaceError};
-use crate::model::surface::{At, Bsdf};
-use crate::model::texture::Texture;
+use crate::model::surface::{At, Bsdf, BsdfParams};
+use crate::model::texture::{Texture, TexturePoint};
 
 /// A one-sided BSDF some of whose properties vary over the surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +45,21 @@ impl Textured {
             }
         }
         bsdf
+    }
+
+    /// The gradient of a value by the place of its point, in the plane of the triangle there: through the properties that
+    /// textures stand for, by which the value has the derivatives `params`.
+    pub(super) fn slide(&self, at: &TexturePoint<'_>, params: &BsdfParams) -> RgbVec {
+        let (uv, [by_u, by_v]) = (at.uv(), at.uv_gradients());
+        let mut sum = RgbVec::ZERO;
+        for (property, texture) in &self.textures {
+            let value = texture.at(uv);
+            if allowed(*property, value) == value {
+                let [u, v] = texture.slopes(uv).map(|slope| slope * params.get(*property));
+                sum += u.outer(by_u) + v.outer(by_v);
+            }
+        }
+        sum
     }
 
     /// The texture that stands for a property.

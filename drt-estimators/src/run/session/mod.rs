@@ -134,8 +134,10 @@ impl Session {
         kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         settings.check(scene, tangents.targets().next().is_some())?;
-        tangents.names.first().map_or(Ok(()), |name| scene.refuse_derivatives(name))?;
         let tangents = tangents.seen_by(settings.sensor);
+        if let Some(name) = tangents.names.first() {
+            scene.refuse_derivatives(name, slides(scene, tangents.targets(), settings))?;
+        }
         let depth = settings.max_depth.within(scene.integrator.max_depth);
         let mut world =
             World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, kept)?;
@@ -396,6 +398,26 @@ impl Session {
     }
 }
 
+/// Whether what a target changes may move.
+fn may_move(scene: &Scene, target: Target) -> bool {
+    match target {
+        Target::Shape(_) | Target::Sensor(_) => true,
+        Target::Bsdf(_) => false,
+        Target::Medium(m) => scene.media.get(m).is_some_and(|m| m.item.homogeneous().is_none()),
+        Target::Emitter(e) => scene.emitters.get(e).is_some_and(|e| e.item.emitter.is_delta()),
+    }
+}
+
+/// Whether vertices of paths slide over surfaces as the targets change.
+pub(crate) fn slides(
+    scene: &Scene,
+    targets: impl IntoIterator<Item = Target>,
+    settings: &Settings,
+) -> bool {
+    let material = settings.estimator == EstimatorKind::PathSpace;
+    !material && targets.into_iter().any(|target| may_move(scene, target))
+}
+
 /// Which estimator differentiates which light: points and directions do not fit the 2019 form (theory sheet
 /// §3), which leaves them to path space where one of the targets may move. Rays that turn with edges turn with their shadows as
 /// well, but on surfaces alone.
@@ -404,12 +426,7 @@ pub(crate) fn estimators(
     targets: impl IntoIterator<Item = Target>,
     settings: &Settings,
 ) -> Vec<(Settings, EmitterMask)> {
-    let may_move = |target| match target {
-        Target::Shape(_) | Target::Sensor(_) => true,
-        Target::Bsdf(_) => false,
-        Target::Medium(m) => scene.media.get(m).is_some_and(|m| m.item.homogeneous().is_none()),
-        Target::Emitter(e) => scene.emitters.get(e).is_some_and(|e| e.item.emitter.is_delta()),
-    };
+    let may_move = |target| may_move(scene, target);
     let emitters = || scene.emitters.iter().map(|e| &e.item.emitter);
     let mut shares = Vec::new();
     let volumes = !scene.media.is_empty() || scene.bsdfs.iter().any(|b| b.item.is_null());
