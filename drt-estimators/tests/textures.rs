@@ -100,7 +100,7 @@ fn jumps_that_slide_are_refused() {
         let settings = Settings { estimator, ..Settings::default() };
         let message = Session::new(&scene, &parameters, &settings).err().expect("a refusal");
         let message = message.to_string();
-        assert!(message.contains("floor: its BSDF has a texture with jumps"), "{message}");
+        assert!(message.contains("floor: its BSDF has a discontinuous texture"), "{message}");
         // What moves nothing slides nothing.
         let sky = [parameter("sky", 0.0, vec![changes("sky", "radiance", grey(1.0))])];
         assert!(Session::new(&scene, &sky, &settings).is_ok());

@@ -189,9 +189,14 @@ impl Scene {
                 let (bsdf, parameter) = (bsdf.name(), parameter.into());
                 return Err(unusable(&s.id, "shape", i, ElementError::Smooth { bsdf, parameter }));
             }
-            if slide && bsdf.jumps_on(&s.mesh) {
+            if slide && bsdf.is_discontinuous_on(&s.mesh) {
                 let parameter = parameter.into();
-                return Err(unusable(&s.id, "shape", i, ElementError::Jumps { parameter }));
+                return Err(unusable(
+                    &s.id,
+                    "shape",
+                    i,
+                    ElementError::DiscontinuousTexture { parameter },
+                ));
             }
         }
         Ok(())
@@ -423,7 +428,7 @@ mod tests {
         scene.bsdfs[0].item = Bsdf::Textured(alloc::boxed::Box::new(textured.expect("a texture")));
         assert!(scene.refuse_derivatives("spin", false).is_ok());
         let message = scene.refuse_derivatives("spin", true).unwrap_err().to_string();
-        assert!(message.contains(&name) && message.contains("texture with jumps"), "{message}");
+        assert!(message.contains(&name) && message.contains("discontinuous texture"), "{message}");
         let op = drt_motion::ValueChange::Add(Rgb::ONE);
         let change =
             drt_motion::PropertyChange { property: "reflectance".into(), op, voxels: None };

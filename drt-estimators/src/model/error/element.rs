@@ -56,12 +56,12 @@ pub enum ElementError {
          has no derivative; move the film back"
     )]
     FilmCut(String),
-    /// A texture that jumps, where points slide over its surface.
+    /// A discontinuous texture where points slide over its surface.
     #[error(
-        "its BSDF has a texture with jumps, past which `{parameter}` can only be differentiated by the \
+        "its BSDF has a discontinuous texture, past which `{parameter}` can only be differentiated by the \
          estimator path-space, or by finite differences"
     )]
-    Jumps {
+    DiscontinuousTexture {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },

@@ -352,11 +352,12 @@ impl Bsdf {
     }
 
     /// True where textures jump on a mesh.
-    pub(crate) fn jumps_on(&self, mesh: &Mesh) -> bool {
+    pub(crate) fn is_discontinuous_on(&self, mesh: &Mesh) -> bool {
         match self {
             Self::Textured(b) => b.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh)),
             Self::TwoSided(b) => {
-                b.front.jumps_on(mesh) || b.back.as_ref().is_some_and(|b| b.jumps_on(mesh))
+                b.front.is_discontinuous_on(mesh)
+                    || b.back.as_ref().is_some_and(|b| b.is_discontinuous_on(mesh))
             }
             _ => false,
         }
