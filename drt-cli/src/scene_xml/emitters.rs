@@ -1,12 +1,15 @@
-//! Emitters: area, point, spot, directional, constant.
+//! Emitters: area, point, spot, directional, constant, envmap.
 
-use drt_estimators::emitter::Emitter;
+use std::sync::Arc;
+
+use drt_estimators::emitter::{Emitter, EnvironmentMap};
 use drt_estimators::{Named, SceneEmitter, Surrounding};
 use drt_math::{Affine, Rgb, Vec3};
 
 use super::Loader;
 use super::element::Element;
 use super::properties::Properties;
+use super::textures;
 use crate::CliError;
 
 impl<'a> Loader<'a> {
@@ -30,6 +33,7 @@ impl<'a> Loader<'a> {
         let emitter = match kind {
             "area" => Emitter::Area { radiance: light("radiance")? },
             "constant" => Emitter::Constant { radiance: light("radiance")? },
+            "envmap" => envmap(&p)?,
             "point" => {
                 medium = self.surrounding(&p)?;
                 Emitter::Point { position: position(&p)?, intensity: light("intensity")? }
@@ -45,7 +49,7 @@ impl<'a> Loader<'a> {
             other => {
                 return Err(e.error(format!(
                     "the emitter type `{other}` is not supported; expected area, point, spot, \
-                     directional or constant"
+                     directional, constant or envmap"
                 )));
             }
         };
@@ -54,6 +58,20 @@ impl<'a> Loader<'a> {
             emitter.validate().and_then(|()| emitter.checked()).map_err(|err| e.error(err))?;
         Ok(Named { id: e.id().map(Into::into), item: SceneEmitter { emitter, medium } })
     }
+}
+
+/// The image of a file, turned by `to_world`.
+fn envmap(p: &Properties<'_>) -> Result<Emitter, CliError> {
+    let e = p.element;
+    let path = p.path("filename")?.ok_or_else(|| e.error("`filename` is missing"))?;
+    let radiance = Rgb::splat(p.float("scale")?.unwrap_or(1.0));
+    let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY).linear;
+    // How directions are drawn.
+    p.accept(&["mis_compensation"]);
+    let fail = |reason: String| e.error(format!("{}: {reason}", path.display()));
+    let (size, texels) = textures::pixels(&path, false).map_err(fail)?;
+    let map = EnvironmentMap::new(size, texels, to_world).map_err(fail)?;
+    Ok(Emitter::Envmap { radiance, map: Arc::new(map) })
 }
 
 /// `position`, or the image of the origin under `to_world`.

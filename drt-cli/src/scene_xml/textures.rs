@@ -80,10 +80,11 @@ fn bitmap(p: &Properties<'_>, to_uv: UvMap) -> Result<Texture, CliError> {
     Ok(Texture::Bitmap(image))
 }
 
-type Pixels = ([u32; 2], Vec<[f32; 3]>);
+/// Columns and rows, and values row by row from the top.
+pub(super) type Pixels = ([u32; 2], Vec<[f32; 3]>);
 
 /// Linear pixels of an image file, or those it holds where it is `raw`.
-fn pixels(path: &Path, raw: bool) -> Result<Pixels, String> {
+pub(super) fn pixels(path: &Path, raw: bool) -> Result<Pixels, String> {
     if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr")) {
         let mut file = read_exr(path).map_err(|err| err.to_string())?;
         let texels = file.layers.remove("").ok_or("it has no channels R, G, B")?;

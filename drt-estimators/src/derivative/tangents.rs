@@ -339,15 +339,14 @@ impl Apply<'_> {
 
     fn emitter(&mut self, i: usize) -> Result<(), Error> {
         let target = Target::Emitter(i);
-        let given = self.scene.emitters[i].item.emitter;
+        let given = self.scene.emitters[i].item.emitter.clone();
         let emitter = given.checked().map_err(|e| Error::Element {
             element: self.scene.name_of(target),
             reason: e.into(),
         })?;
         let changes = self.geometry(target)?;
-        if let (Some(first), Emitter::Area { .. } | Emitter::Constant { .. }) =
-            (changes.first(), emitter)
-        {
+        let placeless = emitter.is_environment() || matches!(emitter, Emitter::Area { .. });
+        if let Some(first) = changes.first().filter(|_| placeless) {
             return Err(self.fail(first.parameter, target, EffectError::NoPlace));
         }
         let (emitter, tangents) = self.placed(target, emitter)?;

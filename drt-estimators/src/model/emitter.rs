@@ -5,17 +5,20 @@
 //! and the 1/r² of the geometric term.
 
 mod emission;
+mod environment;
 mod incident;
 mod motion;
 #[cfg(test)]
 mod tests;
 
+use alloc::sync::Arc;
 use core::f64::consts::PI;
 
 use drt_math::{Frame, Rgb, Vec3, fm, vec3, warp};
 use thiserror::Error;
 
 pub use crate::model::emitter::emission::{Emission, EmitterGradient, EmitterTangent};
+pub use crate::model::emitter::environment::EnvironmentMap;
 pub use crate::model::emitter::incident::Incident;
 
 /// An emitter that cannot be used.
@@ -74,7 +77,7 @@ pub enum EmitterError {
 
 /// A source of light. [`checked`](Self::checked) makes directions unit vectors; everything else
 /// here relies on it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
@@ -117,6 +120,13 @@ pub enum Emitter {
         /// The radiance.
         radiance: Rgb,
     },
+    /// A sky that an image tells the radiance of.
+    Envmap {
+        /// Factor of the image.
+        radiance: Rgb,
+        /// The image.
+        map: Arc<EnvironmentMap>,
+    },
 }
 
 /// A direction of flow drawn from a point or spot light.
@@ -152,7 +162,7 @@ impl Emitter {
     ///
     /// # Errors
     /// Names the field that is not finite, a zero direction, or a cone that is none.
-    pub fn checked(self) -> Result<Self, EmitterError> {
+    pub fn checked(&self) -> Result<Self, EmitterError> {
         let kind = self.kind();
         let finite =
             |ok: bool, what| if ok { Ok(()) } else { Err(EmitterError::NotFinite { kind, what }) };
@@ -164,9 +174,11 @@ impl Emitter {
             if v.is_finite() { Ok(v.normalize()) } else { Err(EmitterError::ZeroDirection(kind)) }
         };
         finite(self.strength().is_finite(), self.strength_name())?;
-        match self {
-            Self::Area { .. } | Self::Constant { .. } => Ok(self),
-            Self::Point { position, .. } => finite(position.is_finite(), "position").map(|()| self),
+        match *self {
+            Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. } => Ok(self.clone()),
+            Self::Point { position, .. } => {
+                finite(position.is_finite(), "position").map(|()| self.clone())
+            }
             Self::Spot { position, direction, intensity, cutoff_angle, beam_width } => {
                 finite(position.is_finite(), "position")?;
                 let direction = unit(direction)?;
@@ -193,13 +205,14 @@ impl Emitter {
             Self::Spot { .. } => "spot",
             Self::Directional { .. } => "directional",
             Self::Constant { .. } => "constant",
+            Self::Envmap { .. } => "envmap",
         }
     }
 
     /// True for point, spot and directional lights, which no ray can hit.
     #[must_use]
     pub fn is_delta(&self) -> bool {
-        !matches!(self, Self::Area { .. } | Self::Constant { .. })
+        !matches!(self, Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. })
     }
 
     /// False for a spot that ends with a jump, whose shadow-like rim needs a boundary integral.
@@ -228,19 +241,20 @@ impl Emitter {
         }
     }
 
-    /// Power sent into a scene inside a sphere of `scene_radius`, mean of the channels: what
+    /// Power sent into a scene inside a sphere of `scene_radius`, mean of the channels (of an image's factor and its mean apart): what
     /// emitters are chosen by. That of an area emitter is per unit of area.
     #[must_use]
     pub fn power(&self, scene_radius: f64) -> f64 {
         let disk = PI * scene_radius * scene_radius;
-        let factor = match *self {
+        let factor = match self {
             Self::Area { .. } => PI,
             Self::Point { .. } => 4.0 * PI,
             Self::Spot { cutoff_angle, beam_width, .. } => {
-                2.0 * PI * cone_mean(beam_width, cutoff_angle)
+                2.0 * PI * cone_mean(*beam_width, *cutoff_angle)
             }
             Self::Directional { .. } => disk,
             Self::Constant { .. } => 4.0 * PI * disk,
+            Self::Envmap { map, .. } => map.power() * disk,
         };
         self.strength().mean() * factor
     }
@@ -278,15 +292,28 @@ impl Emitter {
     #[must_use]
     pub fn strength(&self) -> Rgb {
         match *self {
-            Self::Area { radiance } | Self::Constant { radiance } => radiance,
+            Self::Area { radiance }
+            | Self::Constant { radiance }
+            | Self::Envmap { radiance, .. } => radiance,
             Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity,
             Self::Directional { irradiance, .. } => irradiance,
         }
     }
 
+    /// True for surroundings, which are infinitely far away in all directions.
+    #[must_use]
+    pub fn is_environment(&self) -> bool {
+        matches!(self, Self::Constant { .. } | Self::Envmap { .. })
+    }
+
+    /// True for surroundings of different light from different directions.
+    pub(crate) fn varies(&self) -> bool {
+        matches!(self, Self::Envmap { .. })
+    }
+
     fn strength_name(&self) -> &'static str {
         match self {
-            Self::Area { .. } | Self::Constant { .. } => "radiance",
+            Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. } => "radiance",
             Self::Point { .. } | Self::Spot { .. } => "intensity",
             Self::Directional { .. } => "irradiance",
         }

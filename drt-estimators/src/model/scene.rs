@@ -199,6 +199,10 @@ impl Scene {
                 ));
             }
         }
+        if slide && let Some(i) = self.emitters.iter().position(|e| e.item.emitter.varies()) {
+            let (id, parameter) = (&self.emitters[i].id, parameter.into());
+            return Err(unusable(id, "emitter", i, ElementError::VaryingSky { parameter }));
+        }
         Ok(())
     }
 
@@ -381,7 +385,7 @@ mod tests {
             fails(&|s| s.emitters[0].item.emitter = light(wrong), "bulb: ");
         }
         let sun = Emitter::Directional { direction: Vec3::ZERO, irradiance: Rgb::ONE };
-        fails(&|s| s.emitters[0].item.emitter = sun, "zero vector");
+        fails(&|s| s.emitters[0].item.emitter = sun.clone(), "zero vector");
         fails(&|s| s.emitters[0].item.medium = Surrounding::Stated(Some(3)), "one of its media");
         let flat = |s: &mut Scene| {
             let mut mesh = (*s.shapes[0].mesh).clone();

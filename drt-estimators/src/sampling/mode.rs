@@ -94,7 +94,7 @@ impl TransportMode for RadianceMode {
         let weight = match light.kind {
             LightKind::Position => free_flight_weight(world, stop, &light),
             LightKind::Direction => 1.0,
-            LightKind::Area(_) => {
+            LightKind::Area(_) | LightKind::Environment => {
                 let p = scattering.pdf(stop.from, light.w, Given::Wo);
                 light.pdf / (light.pdf + p)
             }

@@ -209,8 +209,13 @@ impl Tracer<'_> {
         observer: &mut O,
     ) {
         let environment = self.world.lights.environment().filter(|_| M::EMISSION);
-        let Some((_, radiance)) = environment else { return };
+        let Some(environment) = environment else { return };
         let throughput = leaving.throughput * arrival;
+        let emission_weight = match leaving.pdf {
+            Some(p) => p / (p + environment.pdf(leaving.dir)),
+            None => 1.0,
+        };
+        let radiance = environment.radiance(leaving.dir) * emission_weight;
         observer.contribution(Pixel::Own, leaving.segments + 1, throughput * radiance);
         let record = Arrival {
             parent: leaving.node,
@@ -220,7 +225,7 @@ impl Tracer<'_> {
             start_medium: ray.medium,
             arrival,
             throughput,
-            emission_weight: 1.0,
+            emission_weight,
         };
         observer.arrive(self.world, &record, &ray.crossings);
     }

@@ -1,13 +1,15 @@
 //! Choosing emitters for next-event estimation.
 //!
-//! The constant environment is not among them: scattering finds it by itself, with densities
-//! proportional to all that varies but visibility, and no light sample would improve on that.
+//! A constant environment is not among them: scattering finds it by itself, with densities
+//! proportional to all that varies but visibility, and no light sample would improve on that. One that an image
+//! tells is.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::{AliasTable, Rgb, Rng, Vec3, warp};
 
-use crate::model::emitter::Emitter;
+use crate::model::emitter::{Emitter, EnvironmentMap};
 use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::world::World;
@@ -45,8 +47,8 @@ impl EmitterMask {
     pub(crate) fn by_sample(self, light: &LightSample) -> bool {
         match self {
             Self::All => true,
-            Self::Extended => light.point().is_some(),
-            Self::Delta => light.point().is_none(),
+            Self::Extended => light.pdf > 0.0,
+            Self::Delta => light.pdf == 0.0,
         }
     }
 }
@@ -58,6 +60,8 @@ enum Entry {
     Triangle { emitter: u32, prim: u32, area: f64 },
     /// A point, spot or directional light.
     Delta { emitter: u32 },
+    /// The environment.
+    Environment,
 }
 
 /// An emitter chosen by the table, not yet a point of it.
@@ -88,6 +92,8 @@ pub(crate) enum LightKind {
     Position,
     /// A directional light.
     Direction,
+    /// A direction of the environment.
+    Environment,
 }
 
 /// A sampled point or direction of an emitter, seen from somewhere.
@@ -101,9 +107,9 @@ pub(crate) struct LightSample {
     pub(crate) y: Vec3,
     /// Infinite for directions.
     pub(crate) distance: f64,
-    /// Radiance (area), I/r² (position) or irradiance (direction).
+    /// Radiance (area, environment), I/r² (position) or irradiance (direction).
     pub(crate) value: Rgb,
-    /// 1 over the density: solid angle for areas, selection probability for delta lights.
+    /// 1 over the density: solid angle for areas and environments, selection probability for delta lights.
     pub(crate) inv_pdf: f64,
     /// Solid-angle density; 0 for delta lights, which nothing else can hit.
     pub(crate) pdf: f64,
@@ -119,6 +125,56 @@ impl LightSample {
     }
 }
 
+/// The light that comes from outside.
+#[derive(Clone, Debug)]
+pub(crate) struct Environment {
+    pub(crate) emitter: usize,
+    strength: Rgb,
+    map: Option<Arc<EnvironmentMap>>,
+    /// Probability of choosing it; 0 where scattering finds it alone.
+    pmf: f64,
+}
+
+impl Environment {
+    /// The radiance from a unit direction per unit of the emitter's own.
+    pub(crate) fn shape(&self, w: Vec3) -> Rgb {
+        self.map.as_ref().map_or(Rgb::ONE, |map| map.at(w))
+    }
+
+    /// The radiance from a unit direction.
+    #[inline]
+    pub(crate) fn radiance(&self, w: Vec3) -> Rgb {
+        match &self.map {
+            None => self.strength,
+            Some(map) => self.strength * map.at(w),
+        }
+    }
+
+    /// Density per steradian with which light samples have a unit direction.
+    #[inline]
+    pub(crate) fn pdf(&self, w: Vec3) -> f64 {
+        match &self.map {
+            None => 0.0,
+            Some(map) => self.pmf * map.pdf(w),
+        }
+    }
+
+    fn sample(&self, rng: &mut Rng) -> Option<LightSample> {
+        let (w, pdf) = self.map.as_ref()?.sample(rng.next_f64(), rng.next_2d())?;
+        let pdf = self.pmf * pdf;
+        (pdf > 0.0).then(|| LightSample {
+            emitter: self.emitter,
+            kind: LightKind::Environment,
+            w,
+            y: Vec3::ZERO,
+            distance: f64::INFINITY,
+            value: self.radiance(w),
+            inv_pdf: 1.0 / pdf,
+            pdf,
+        })
+    }
+}
+
 /// The emitters of a scene by power.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LightTable {
@@ -128,7 +184,7 @@ pub(crate) struct LightTable {
     area_radiance: Vec<Rgb>,
     /// Selection probability per unit area of each soup triangle's emitter.
     density: Vec<f64>,
-    environment: Option<(usize, Rgb)>,
+    environment: Option<Environment>,
     /// Lights with a position inside a scattering medium: emitter index, selection probability,
     /// position; and the sum of the probabilities.
     inside: (Vec<(usize, f64, Vec3)>, f64),
@@ -154,7 +210,7 @@ impl LightTable {
             if !lit.by(&scene.emitters[e].item.emitter) {
                 continue;
             }
-            let Emitter::Area { radiance } = scene.emitters[e].item.emitter else { continue };
+            let Some(radiance) = scene.emitters[e].item.emitter.area_radiance() else { continue };
             area_radiance[e] = radiance;
             let surface = shape.mesh.surface_area();
             for t in 0..shape.mesh.triangles.len() as u32 {
@@ -169,11 +225,18 @@ impl LightTable {
             if !lit.by(&named.item.emitter) {
                 continue;
             }
-            match named.item.emitter {
+            match &named.item.emitter {
                 Emitter::Area { .. } => continue,
                 Emitter::Constant { radiance } => {
-                    environment = Some((e, radiance));
+                    environment =
+                        Some(Environment { emitter: e, strength: *radiance, map: None, pmf: 0.0 });
                     continue;
+                }
+                Emitter::Envmap { radiance, map } => {
+                    let map = Some(Arc::clone(map));
+                    environment =
+                        Some(Environment { emitter: e, strength: *radiance, map, pmf: 0.0 });
+                    entries.push(Entry::Environment);
                 }
                 _ => entries.push(Entry::Delta { emitter }),
             }
@@ -215,6 +278,11 @@ impl LightTable {
                         lights.inside.0.push((e, pmf, at));
                     }
                 }
+                Entry::Environment => {
+                    if let Some(environment) = &mut lights.environment {
+                        environment.pmf = pmf;
+                    }
+                }
             }
         }
         Ok(lights)
@@ -224,9 +292,8 @@ impl LightTable {
         self.area_radiance[emitter]
     }
 
-    /// The environment: emitter index and radiance.
-    pub(crate) fn environment(&self) -> Option<(usize, Rgb)> {
-        self.environment
+    pub(crate) fn environment(&self) -> Option<&Environment> {
+        self.environment.as_ref()
     }
 
     /// Lights with a position inside a scattering medium, for equiangular sampling: emitter index,
@@ -272,7 +339,7 @@ impl LightTable {
         let entry = self.entries[i];
         let delta = match entry {
             Entry::Delta { emitter } => Some(emitter as usize),
-            Entry::Triangle { .. } => None,
+            Entry::Triangle { .. } | Entry::Environment => None,
         };
         let pmf = self.table.as_ref().map_or(0.0, |t| t.pmf(i));
         Some(Choice { delta, pmf, entry })
@@ -324,6 +391,7 @@ impl LightTable {
         match choice.entry {
             Entry::Triangle { .. } => self.sample_area(world, &choice, x, rng),
             Entry::Delta { emitter } => Self::delta(world, emitter as usize, x, choice.pmf),
+            Entry::Environment => self.environment.as_ref()?.sample(rng),
         }
     }
 

@@ -87,7 +87,8 @@ fn media_around_lights() {
 
 #[test]
 fn unusable_lights() {
-    refused("<emitter type=\"envmap\"/>", &["`envmap` is not supported", "constant"]);
+    refused("<emitter type=\"sunsky\"/>", &["`sunsky` is not supported", "constant"]);
+    refused("<emitter type=\"envmap\"/>", &["`filename` is missing"]);
     for (kind, inside, part) in [
         ("point", r#"<rgb name="intensity" value="-1"/>"#, "negative"),
         ("point", r#"<rgb name="radiance" value="1"/>"#, "which takes intensity"),
@@ -101,4 +102,42 @@ fn unusable_lights() {
     ] {
         refused(&format!("<emitter type=\"{kind}\">{inside}</emitter>"), &[":2", part]);
     }
+}
+
+#[test]
+fn environments_are_images() {
+    let folder = crate::testing::Folder::new();
+    let pixel = |x, y| (f32::from(x as u8 + 2 * y as u8), 0.5_f32, if y == 2 { -1.0 } else { 0.0 });
+    let write = |name: &str, height| {
+        exr::prelude::write_rgb_file(folder.path().join(name), 2, height, pixel).unwrap();
+    };
+    write("sky.exr", 2);
+    write("dark.exr", 3);
+    write("flat.exr", 1);
+    let load = |name: &str, inside: &str| {
+        let body = format!(
+            "<scene version=\"3.0.0\"><emitter type=\"envmap\" id=\"sky\">\
+             <string name=\"filename\" value=\"{name}\"/>{inside}</emitter></scene>"
+        );
+        crate::load_scene(&folder.file("s.xml", body), &crate::Defaults::new())
+    };
+    let turned = "<float name=\"scale\" value=\"2\"/><transform name=\"to_world\">\
+                  <rotate x=\"1\" angle=\"180\"/></transform>";
+    let scene = load("sky.exr", turned).unwrap();
+    let Emitter::Envmap { radiance, map } = &scene.emitters[0].item.emitter else { panic!() };
+    assert_eq!(*radiance, Rgb::splat(2.0));
+    // Upside down: the last row is above, half of both columns straight up.
+    assert!((map.at(Vec3::Y).r - 2.5).abs() < 1e-5);
+    let refused = |name: &str, inside: &str, part: &str| {
+        let message = load(name, inside).map(|_| ()).unwrap_err().to_string();
+        assert!(
+            message.contains(":1: <emitter type=\"envmap\"") && message.contains(part),
+            "{message}"
+        );
+    };
+    refused("dark.exr", "", "column 0, row 2 is negative or not finite");
+    refused("flat.exr", "", "one row");
+    refused("none.exr", "", "no file `none.exr`");
+    let scaled = "<transform name=\"to_world\"><scale x=\"2\"/></transform>";
+    refused("sky.exr", scaled, "not scaled or sheared");
 }

@@ -122,6 +122,14 @@ impl Differentiator<'_> {
                 }
                 self.intensity(path, light, per_value, at_light, here, sink);
             }
+            LightKind::Environment => {
+                let environment = self.world.lights.environment().filter(|_| emitter);
+                if let Some(environment) = environment {
+                    let adjoint = per_value * environment.shape(light.w);
+                    strength_of(light.emitter, adjoint, sink);
+                }
+                self.segment(path, Far::Direction, near_moves, weight, here, sink);
+            }
             LightKind::Direction => {
                 let moving = near_moves || emitter;
                 let turn = self.segment(path, Far::Direction, moving, weight, here, sink);
@@ -172,6 +180,7 @@ pub(super) fn light_moves(light: &LightSample, active: &ActiveInputs) -> bool {
     match &light.kind {
         LightKind::Area(s) => active.shapes[s.shape as usize],
         LightKind::Position | LightKind::Direction => active.emitters[light.emitter],
+        LightKind::Environment => false,
     }
 }
 

@@ -203,9 +203,10 @@ impl<'w> Differentiator<'w> {
         let received = match &arrival.end {
             Endpoint::Environment => {
                 let environment = world.lights.environment().filter(|_| lit.by_surroundings());
-                let Some((emitter, radiance)) = environment else { return };
-                strength(emitter, theta * arrival.emission_weight, sink);
-                radiance * arrival.emission_weight
+                let Some(environment) = environment else { return };
+                let seen = environment.shape(arrival.dir) * arrival.emission_weight;
+                strength(environment.emitter, theta * seen, sink);
+                environment.radiance(arrival.dir) * arrival.emission_weight
             }
             Endpoint::Surface(vertex) => {
                 collected += self.connections(path, k, vertex, theta, &mut here, sink);

@@ -172,7 +172,7 @@ impl<'a> Moving<'a> {
             }
         }
         let name = match self.original.emitters[i].item.emitter {
-            Emitter::Area { .. } | Emitter::Constant { .. } => "radiance",
+            Emitter::Area { .. } | Emitter::Constant { .. } | Emitter::Envmap { .. } => "radiance",
             Emitter::Point { .. } | Emitter::Spot { .. } => "intensity",
             Emitter::Directional { .. } => "irradiance",
         };
@@ -356,9 +356,9 @@ fn light(emitter: &Emitter) -> Light {
         beam_width: D::zero(),
     };
     match *emitter {
-        Emitter::Area { radiance } | Emitter::Constant { radiance } => {
-            Light { strength: rgb(radiance), ..still }
-        }
+        Emitter::Area { radiance }
+        | Emitter::Constant { radiance }
+        | Emitter::Envmap { radiance, .. } => Light { strength: rgb(radiance), ..still },
         Emitter::Point { position, intensity } => {
             Light { strength: rgb(intensity), position: position.lift(), ..still }
         }

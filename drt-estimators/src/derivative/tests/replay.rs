@@ -142,8 +142,8 @@ impl Replay<'_> {
         let scene = self.scene;
         match &arrival.end {
             Endpoint::Environment => {
-                let (e, _) = scene.world.lights.environment().expect("it was met");
-                scene.lights[e].strength * seen
+                let sky = scene.world.lights.environment().expect("it was met");
+                scene.lights[sky.emitter].strength * seen
             }
             Endpoint::Surface(v) => {
                 let s = v.surface().expect("a surface");
@@ -221,6 +221,7 @@ impl Replay<'_> {
                 path.dir = -moving.direction;
                 moving.strength
             }
+            LightKind::Environment => moving.strength,
         };
         let transport = rgb(c.transport) * self.transmittance(&path);
         self.scattering(v, wo, path.dir) * transport * incident

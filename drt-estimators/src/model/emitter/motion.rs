@@ -13,14 +13,14 @@ enum Slot {
 
 impl Emitter {
     /// The emitter moved by a map of space: positions go along, directions are mapped as vectors
-    /// and made unit again. An area emitter moves with its shape and a constant one not at all.
+    /// and made unit again. An area emitter moves with its shape and an environment not at all.
     ///
     /// # Errors
     /// When the map takes a direction to zero or is not finite.
     pub fn moved(&self, map: &Affine) -> Result<Self, EmitterError> {
-        let mut moved = *self;
+        let mut moved = self.clone();
         match &mut moved {
-            Self::Area { .. } | Self::Constant { .. } => {}
+            Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. } => {}
             Self::Point { position, .. } => *position = map.point(*position),
             Self::Spot { position, direction, .. } => {
                 *position = map.point(*position);
@@ -56,9 +56,9 @@ impl Emitter {
     /// When this kind of emitter has no such property.
     pub fn property(&self, name: &str) -> Result<Rgb, EmitterError> {
         let degrees = |a: f64| Rgb::splat(a.to_degrees());
-        Ok(match (self.slot(name)?, *self) {
-            (Slot::CutoffAngle, Self::Spot { cutoff_angle, .. }) => degrees(cutoff_angle),
-            (Slot::BeamWidth, Self::Spot { beam_width, .. }) => degrees(beam_width),
+        Ok(match (self.slot(name)?, self) {
+            (Slot::CutoffAngle, Self::Spot { cutoff_angle, .. }) => degrees(*cutoff_angle),
+            (Slot::BeamWidth, Self::Spot { beam_width, .. }) => degrees(*beam_width),
             _ => self.strength(),
         })
     }
@@ -69,7 +69,7 @@ impl Emitter {
     /// When there is no such property, or the value is unusable.
     pub fn with_property(&self, name: &str, value: Rgb) -> Result<Self, EmitterError> {
         let slot = self.slot(name)?;
-        let mut changed = *self;
+        let mut changed = self.clone();
         match (slot, &mut changed) {
             (Slot::CutoffAngle, Self::Spot { cutoff_angle, .. }) => {
                 *cutoff_angle = radians("cutoff_angle", value)?;
@@ -77,9 +77,12 @@ impl Emitter {
             (Slot::BeamWidth, Self::Spot { beam_width, .. }) => {
                 *beam_width = radians("beam_width", value)?;
             }
-            (_, Self::Area { radiance: strength } | Self::Constant { radiance: strength }) => {
-                *strength = value;
-            }
+            (
+                _,
+                Self::Area { radiance }
+                | Self::Constant { radiance }
+                | Self::Envmap { radiance, .. },
+            ) => *radiance = value,
             (_, Self::Point { intensity, .. } | Self::Spot { intensity, .. }) => *intensity = value,
             (_, Self::Directional { irradiance, .. }) => *irradiance = value,
         }

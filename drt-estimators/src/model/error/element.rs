@@ -65,6 +65,15 @@ pub enum ElementError {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
+    /// An environment that differs by direction where rays turn.
+    #[error(
+        "an environment of an image, under which `{parameter}` can only be differentiated by the estimator \
+         path-space, or by finite differences"
+    )]
+    VaryingSky {
+        /// The parameter, or what else was to be differentiated by.
+        parameter: String,
+    },
     /// A shape's arrays.
     #[error(transparent)]
     Mesh(#[from] MeshError),

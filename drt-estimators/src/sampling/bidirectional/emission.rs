@@ -158,6 +158,8 @@ impl EmissionSampler {
                 emitter.flow_pdf(-light.w) / square
             }
             LightKind::Direction => self.per_area(),
+            // No path starts there.
+            LightKind::Environment => 0.0,
         }
     }
 }

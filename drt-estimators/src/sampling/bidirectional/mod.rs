@@ -263,7 +263,9 @@ impl<'w> Bidirectional<'w> {
             return Rgb::ZERO;
         };
         let hit = match light.kind {
-            LightKind::Area(_) => scattering.pdf(z.from, light.w, Given::Wo) * light.inv_pdf,
+            LightKind::Area(_) | LightKind::Environment => {
+                scattering.pdf(z.from, light.w, Given::Wo) * light.inv_pdf
+            }
             _ => 0.0,
         };
         let back = self.camera.back(&scattering, light.w, z.from);

@@ -259,8 +259,19 @@ impl Subpath {
     fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) {
         let (vertex, coefficients) = match &arrival.end {
             Endpoint::Environment => {
-                if let Some((_, radiance)) = world.lights.environment() {
-                    self.met += arrival.throughput * radiance;
+                if let Some(environment) = world.lights.environment() {
+                    let dir = arrival.dir;
+                    // Of light samples, which the camera itself has none of.
+                    let others = if self.vertices.is_empty() {
+                        0.0
+                    } else {
+                        let medium = arrival.start_medium;
+                        let passed = proxy_attenuation(world, medium, crossings, f64::INFINITY);
+                        let other = environment.pdf(dir) / passed;
+                        square(other) * self.ratios.last
+                    };
+                    let weight = if others > 0.0 { 1.0 / (1.0 + others) } else { 1.0 };
+                    self.met += arrival.throughput * environment.radiance(dir) * weight;
                 }
                 return;
             }

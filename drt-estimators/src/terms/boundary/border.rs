@@ -82,7 +82,7 @@ pub(crate) fn sample<R: BoundarySink>(
             tracer.radiance_within(longest, vertex, -dir, &mut light);
             light.0
         }
-        None => world.lights.environment().map_or(Rgb::ZERO, |(_, l)| l),
+        None => world.lights.environment().map_or(Rgb::ZERO, |sky| sky.radiance(dir)),
     };
     let inside = 1.0 / (4.0 * radius * radius);
     let value = light * weight * (inside * inv_pdf);

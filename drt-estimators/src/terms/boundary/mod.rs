@@ -521,7 +521,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
             }
             None => {
                 let sky = self.tracer.world.lights.environment();
-                self.b.light.0.push(sky.map_or(Rgb::ZERO, |(_, l)| l));
+                self.b.light.0.push(sky.map_or(Rgb::ZERO, |sky| sky.radiance(-w)));
             }
         }
         self.b.light.within(longest)

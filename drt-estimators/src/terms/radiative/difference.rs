@@ -147,7 +147,7 @@ impl<'a> EdgeView<'a> {
         let Some((end, arrival)) = end else { return SideRadiance::default() };
         let Some(vertex) = end else {
             let sky = tracer.world.lights.environment();
-            let light = sky.map_or(Rgb::ZERO, |(_, l)| l * arrival);
+            let light = sky.map_or(Rgb::ZERO, |sky| sky.radiance(d) * arrival);
             return SideRadiance { light, ..SideRadiance::default() };
         };
         let side = self.from(tracer, vertex, self.distance + (vertex.x - x).length());

@@ -34,7 +34,7 @@ impl Flow {
         scale: f64,
     ) -> Option<Self> {
         let at_infinity = match light.kind {
-            LightKind::Area(_) => return None,
+            LightKind::Area(_) | LightKind::Environment => return None,
             LightKind::Position => false,
             LightKind::Direction => true,
         };

@@ -1,0 +1,84 @@
+//! Light of an image around a scene.
+
+mod common;
+
+use std::sync::Arc;
+
+use common::*;
+use drt_estimators::emitter::{Emitter, EnvironmentMap};
+use drt_estimators::{
+    EstimatorKind, Layer, PathSampling, Scene, Session, Settings, Unattended, finite_differences,
+};
+use drt_geom::procedural;
+use drt_math::{Mat3, Rgb, Rng, Vec3, vec3};
+
+/// Metal and a ball under a sky with a bright spot.
+fn outside() -> Scene {
+    let mut rng = Rng::new(5, 0, 0);
+    let mut texels: Vec<[f32; 3]> =
+        (0..32).map(|_| [0; 3].map(|_| 0.3 * rng.next_f64() as f32)).collect();
+    texels[10] = [9.0, 7.0, 5.0];
+    let frame = Mat3::rotation(vec3(0.2, 1.0, 0.1).normalize(), 0.8);
+    let map = Arc::new(EnvironmentMap::new([8, 4], texels, frame).expect("a map"));
+    let mut b = Build::default();
+    let floor = b.bsdf("floor-bsdf", metal());
+    let mesh = placed(procedural::rectangle(), vec3(4.0, 4.0, 4.0), 0.0, vec3(0.0, 0.0, -1.0));
+    b.shape("floor", mesh, floor);
+    let grey = b.bsdf("ball-bsdf", diffuse(0.7, 0.6, 0.5));
+    b.shape("ball", ball(0.8, Vec3::ZERO), grey);
+    b.light("sky", Emitter::Envmap { radiance: Rgb::new(1.0, 0.9, 0.8), map });
+    b.camera(vec3(0.4, 0.8, 6.0), Vec3::ZERO, 3)
+}
+
+fn sum(layer: &Layer) -> [f64; 2] {
+    let mean = layer.pixels.iter().map(|p| p.mean.sum()).sum();
+    let variance: f64 = layer.pixels.iter().map(|p| (p.stderr * p.stderr).sum()).sum();
+    [mean, variance.sqrt()]
+}
+
+#[test]
+fn paths_from_both_ends_see_the_same_sky() {
+    let images = [PathSampling::Unidirectional, PathSampling::Bidirectional].map(|sampling| {
+        let settings = Settings { sampling, threads: 1, ..Settings::default() };
+        let mut session = Session::new(&outside(), &[], &settings).expect("a valid scene");
+        assert!(session.run(4096, &Unattended));
+        sum(&session.rendering().image)
+    });
+    let [[a, error], [b, other]] = images;
+    let error = error.hypot(other);
+    assert!((a - b).abs() < 4.0 * error && error < 0.005 * a, "{a} {b} +- {error}");
+}
+
+#[test]
+fn derivatives_under_a_sky() {
+    let scene = outside();
+    let parameters = [
+        parameter("ball", 0.0, vec![moves("ball", shift())]),
+        parameter("camera", 0.0, vec![moves("camera", turn())]),
+        parameter("sky", 0.0, vec![changes("sky", "radiance", grey(1.0))]),
+    ];
+    let settings = Settings { threads: 1, ..Settings::default() };
+    let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
+    assert!(session.run(4096, &Unattended));
+    let rendering = session.rendering();
+    let settings = Settings { estimator: EstimatorKind::FiniteDifference, ..settings };
+    let differences = finite_differences(&scene, &parameters, &settings, 4096, 0.01, &Unattended);
+    for (d, f) in rendering.derivatives.iter().zip(&differences.expect("a valid scene")) {
+        let ([own, error], [other, other_error]) = (sum(&d.total), sum(f));
+        let error = error.hypot(other_error);
+        assert!((own - other).abs() < 4.0 * error, "{own} {other} +- {error}");
+    }
+    // Rays that turn would see another part of it; nor does it turn itself yet.
+    for estimator in [EstimatorKind::Radiative, EstimatorKind::Warped] {
+        let settings = Settings { estimator, ..Settings::default() };
+        let refusal = |parameter: usize| {
+            Session::new(&scene, &parameters[parameter..=parameter], &settings).err()
+        };
+        let message = refusal(0).expect("a refusal").to_string();
+        assert!(message.contains("sky: an environment of an image"), "{message}");
+        assert!(refusal(2).is_none());
+    }
+    let turns = [parameter("turn", 0.0, vec![moves("sky", turn())])];
+    let message = Session::new(&scene, &turns, &Settings::default()).err().expect("a refusal");
+    assert!(message.to_string().contains("sky"), "{message}");
+}
