@@ -108,7 +108,7 @@ fn grows(built: &Built) -> Vec<Effect> {
     let mut effects = moves_everything(built, &field);
     effects.extend(thins(built));
     for e in &built.scene.emitters {
-        if let (Emitter::Point { .. }, Some(id)) = (e.item.emitter, &e.id) {
+        if let (Emitter::Point { .. }, Some(id)) = (&e.item.emitter, &e.id) {
             effects.push(changes(id, "intensity", ValueChange::Multiply(2.0)));
         }
     }

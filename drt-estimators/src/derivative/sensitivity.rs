@@ -36,8 +36,8 @@ impl SurfaceAdjoint {
 
     /// Multiplied channel by channel.
     pub(crate) fn times(&self, by: Rgb) -> Self {
-        let Self { u, n, ns, j } = *self;
-        Self { u: u * by, n: n * by, ns: ns * by, j: j * by }
+        let Self { u, n, ns, j, slide } = *self;
+        Self { u: u * by, n: n * by, ns: ns * by, j: j * by, slide: slide * by }
     }
 
     pub(crate) fn is_zero(&self) -> bool {

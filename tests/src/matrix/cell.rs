@@ -131,7 +131,7 @@ mod tests {
         {
             let lamps = |stage: &Stage| {
                 let shapes = stage.scene.shapes.iter().filter_map(|s| s.emitter);
-                let radiance = shapes.map(|e| stage.scene.emitters[e].item.emitter);
+                let radiance = shapes.map(|e| stage.scene.emitters[e].item.emitter.clone());
                 radiance.collect::<Vec<Emitter>>()
             };
             let (before, cells) = (lamps(&stage), stage.cells.len());

@@ -235,11 +235,15 @@ impl<O: Observer> Observer for Observed<'_, O> {
     }
 
     fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
-        self.subpath.arrive(world, arrival, crossings);
+        let emission = self.subpath.arrive(world, arrival, crossings);
         if O::RECORDS {
             self.subpath.keep(arrival, crossings);
         }
-        self.observer.arrive(world, arrival, crossings)
+        let node = self.observer.arrive(world, arrival, crossings);
+        if let Some(weight) = emission {
+            self.observer.emission(node, weight);
+        }
+        node
     }
 
     fn scatter(
@@ -256,24 +260,23 @@ impl<O: Observer> Observer for Observed<'_, O> {
 }
 
 impl Subpath {
-    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) {
+    /// Returns the MIS weight of what comes from the environment, where the walk escapes to it.
+    fn arrive(&mut self, world: &World, arrival: &Arrival, crossings: &[Crossing]) -> Option<f64> {
         let (vertex, coefficients) = match &arrival.end {
             Endpoint::Environment => {
-                if let Some(environment) = world.lights.environment() {
-                    let dir = arrival.dir;
-                    // Of light samples, which the camera itself has none of.
-                    let others = if self.vertices.is_empty() {
-                        0.0
-                    } else {
-                        let medium = arrival.start_medium;
-                        let passed = proxy_attenuation(world, medium, crossings, f64::INFINITY);
-                        let other = environment.pdf(dir) / passed;
-                        square(other) * self.ratios.last
-                    };
-                    let weight = if others > 0.0 { 1.0 / (1.0 + others) } else { 1.0 };
-                    self.met += arrival.throughput * environment.radiance(dir) * weight;
-                }
-                return;
+                let environment = world.lights.environment()?;
+                let dir = arrival.dir;
+                // Of light samples, which the camera itself has none of.
+                let others = if self.vertices.is_empty() {
+                    0.0
+                } else {
+                    let medium = arrival.start_medium;
+                    let passed = proxy_attenuation(world, medium, crossings, f64::INFINITY);
+                    square(environment.pdf(dir) / passed) * self.ratios.last
+                };
+                let weight = if others > 0.0 { 1.0 / (1.0 + others) } else { 1.0 };
+                self.met += arrival.throughput * environment.radiance(dir) * weight;
+                return Some(weight);
             }
             Endpoint::Surface(v) => (*v, None),
             Endpoint::Volume(v, c) => {
@@ -294,6 +297,7 @@ impl Subpath {
             segments: self.segments,
         });
         self.finite = true;
+        None
     }
 
     fn keep(&mut self, arrival: &Arrival, crossings: &[Crossing]) {
