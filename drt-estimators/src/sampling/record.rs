@@ -9,7 +9,7 @@ use drt_math::{Rgb, Vec3};
 
 use crate::model::sensor::ViewSample;
 pub(crate) use crate::sampling::record::light::{
-    Joint, LightPath, LightVertex, Scattered, SeenVertex,
+    Joint, JointObserver, LightPath, LightVertex, Scattered, SeenVertex,
 };
 use crate::sampling::trace::{Arrival, Connection, Endpoint, Observer, OutgoingRay, Pixel};
 use crate::world::Crossing;
@@ -160,6 +160,8 @@ impl Observer for Radiance {
         self.0 += value;
     }
 }
+
+impl JointObserver for Radiance {}
 
 /// Light by the number of segments it took.
 #[derive(Clone, Debug, Default)]

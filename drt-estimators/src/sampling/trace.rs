@@ -25,7 +25,6 @@ use drt_math::{Rgb, Rng, Vec3, warp};
 use drt_medium::Coefficients;
 
 use crate::model::rendering::Counters;
-use crate::sampling::record::{Joint, LightPath};
 use crate::world::lights::LightSample;
 use crate::world::vertex::Vertex;
 use crate::world::{Crossing, RayPath, World};
@@ -112,12 +111,6 @@ pub(crate) trait Observer {
     }
     /// `node` was connected to a light.
     fn connect(&mut self, _node: u32, _connection: &Connection, _crossings: &[Crossing]) {}
-    /// Emission that was met at `node` has another MIS weight than the walk gave it.
-    fn emission(&mut self, _node: u32, _weight: f64) {}
-    /// A node was connected with a vertex of a light path.
-    fn join(&mut self, _world: &World, _joint: &Joint<'_>, _path: &LightPath) {}
-    /// All connections with a light path have been made.
-    fn joined(&mut self, _world: &World, _path: &LightPath) {}
 }
 
 /// A vertex about to scatter.

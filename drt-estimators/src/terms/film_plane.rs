@@ -72,9 +72,10 @@ fn cuts(camera: &Sensor, triangle: [Vec3; 3]) -> bool {
     // The part of the cut between two lines of the film's border, and then two more.
     let radius = camera.filter().radius();
     let [mut from, mut to] = [0.0, 1.0];
-    for i in 0..2 {
-        let (start, along) = (ends[0][i], ends[1][i] - ends[0][i]);
-        let border = [-radius, f64::from(camera.film()[i]) + radius];
+    let [first, second] = ends;
+    for ((start, end), size) in first.into_iter().zip(second).zip(camera.film()) {
+        let along = end - start;
+        let border = [-radius, f64::from(size) + radius];
         if along == 0.0 {
             if start < border[0] || start > border[1] {
                 return false;

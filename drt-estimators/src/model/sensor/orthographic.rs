@@ -167,7 +167,9 @@ fn square(right: Vec3, up: Vec3, forward: Vec3) -> Result<f64, SensorError> {
         || sheared(right, up, a * b)
         || sheared(right, forward, a * c)
         || sheared(up, forward, b * c);
-    if off || !(a * b * c > 0.0) { Err(SensorError::Oblong) } else { Ok(b) }
+    let volume = a * b * c;
+    let usable = !off && volume.is_finite() && volume > 0.0;
+    if usable { Ok(b) } else { Err(SensorError::Oblong) }
 }
 
 /// Projects a point along the forward axis.

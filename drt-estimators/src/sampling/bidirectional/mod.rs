@@ -63,8 +63,10 @@ use crate::sampling::bidirectional::subpath::{
 use crate::sampling::film::Splat;
 use crate::sampling::flight::proxy_attenuation;
 use crate::sampling::mode::{ImportanceMode, RadianceMode, TransportMode};
-use crate::sampling::record::{Joint, LightPath, LightVertex, Radiance, Scattered, SeenVertex};
-use crate::sampling::trace::{Arrival, Connection, Observer, OutgoingRay, Tracer};
+use crate::sampling::record::{
+    Joint, JointObserver, LightPath, LightVertex, Radiance, Scattered, SeenVertex,
+};
+use crate::sampling::trace::{Arrival, Connection, OutgoingRay, Tracer};
 use crate::world::lights::LightKind;
 use crate::world::vertex::Vertex;
 use crate::world::{Crossing, World};
@@ -100,7 +102,7 @@ impl<'w> Bidirectional<'w> {
 
     /// Traces a path from either end. Returns what comes along the camera's ray, times its `weight`; what reaches the film elsewhere is
     /// added to `splats`. The observer is told of all but these.
-    pub(crate) fn trace<O: Observer>(
+    pub(crate) fn trace<O: JointObserver>(
         &mut self,
         tracer: &mut Tracer<'w>,
         view: &ViewSample,
@@ -124,7 +126,7 @@ impl<'w> Bidirectional<'w> {
                 }
             }
         }
-        observer.joined(self.world, &self.recorded);
+        observer.joined(&self.recorded);
         for y in 0..self.light.vertices.len() {
             let seen = self.seen::<Radiance>(tracer, y);
             splats.extend(seen.map(|seen| seen.splat(self.light_paths)));
@@ -133,7 +135,7 @@ impl<'w> Bidirectional<'w> {
     }
 
     /// Traces a light path alone, as `O` would observe it, and adds the vertices that the camera sees.
-    pub(crate) fn trace_to_camera<O: Observer>(
+    pub(crate) fn trace_to_camera<O: JointObserver>(
         &mut self,
         tracer: &mut Tracer<'w>,
         seen: &mut Vec<SeenFromCamera>,
@@ -146,15 +148,15 @@ impl<'w> Bidirectional<'w> {
     }
 
     /// Tells an observer, which has begun with the camera, of a vertex that it sees of the last light path.
-    pub(crate) fn record_seen<O: Observer>(&self, seen: &SeenFromCamera, observer: &mut O) {
+    pub(crate) fn record_seen<O: JointObserver>(&self, seen: &SeenFromCamera, observer: &mut O) {
         let leaving = Scattered { value: Rgb::ONE, inv_pdf: 1.0 };
         let SeenFromCamera { vertex, arrival, scattered, ref crossings, .. } = *seen;
         let joint = Joint { vertex, leaving, arrival, crossings, scattered };
-        observer.join(self.world, &joint, &self.recorded);
-        observer.joined(self.world, &self.recorded);
+        observer.join(&joint, &self.recorded);
+        observer.joined(&self.recorded);
     }
 
-    fn trace_camera<O: Observer>(
+    fn trace_camera<O: JointObserver>(
         &mut self,
         tracer: &mut Tracer<'w>,
         view: &ViewSample,
@@ -176,7 +178,7 @@ impl<'w> Bidirectional<'w> {
     }
 
     /// Traces a light path, as `O` would observe paths.
-    fn trace_light<O: Observer>(&mut self, tracer: &mut Tracer<'w>) {
+    fn trace_light<O: JointObserver>(&mut self, tracer: &mut Tracer<'w>) {
         self.light.begin(Ratios::default(), true);
         self.recorded.clear();
         // Walks of importance end a segment earlier than what they are connected to.
@@ -227,7 +229,7 @@ impl<'w> Bidirectional<'w> {
     }
 
     /// The emission of a surface that the camera's path meets, at once or later.
-    fn met<O: Observer>(&self, z: &SubpathVertex, index: usize, observer: &mut O) -> Rgb {
+    fn met<O: JointObserver>(&self, z: &SubpathVertex, index: usize, observer: &mut O) -> Rgb {
         let Some(s) = z.vertex.surface().filter(|s| self.world.emits(s)) else { return Rgb::ZERO };
         let mut weight = 1.0;
         // Nothing else finds what is seen at once.
@@ -242,7 +244,7 @@ impl<'w> Bidirectional<'w> {
     }
 
     /// Next-event estimation.
-    fn next_event<O: Observer>(
+    fn next_event<O: JointObserver>(
         &self,
         tracer: &mut Tracer<'w>,
         z: &SubpathVertex,
@@ -279,7 +281,7 @@ impl<'w> Bidirectional<'w> {
     }
 
     /// Of a vertex of the camera's path with one of the light's.
-    fn connection<O: Observer>(
+    fn connection<O: JointObserver>(
         &self,
         tracer: &mut Tracer<'w>,
         z: &SubpathVertex,
@@ -330,7 +332,7 @@ impl<'w> Bidirectional<'w> {
         };
         let crossings = &tracer.shadow.crossings[..];
         let joint = Joint { vertex: of_light, leaving, arrival, crossings, scattered };
-        observer.join(world, &joint, &self.recorded);
+        observer.join(&joint, &self.recorded);
         light * passed * leaving.inv_pdf
     }
 
@@ -341,7 +343,11 @@ impl<'w> Bidirectional<'w> {
     }
 
     /// A vertex of the light's path as the camera sees it.
-    fn seen<O: Observer>(&self, tracer: &mut Tracer<'w>, vertex: usize) -> Option<SeenFromCamera> {
+    fn seen<O: JointObserver>(
+        &self,
+        tracer: &mut Tracer<'w>,
+        vertex: usize,
+    ) -> Option<SeenFromCamera> {
         let y = &self.light.vertices[vertex];
         #[cfg(all(test, feature = "std"))]
         if self.fault == Some(tests::Fault::NoSplats) {

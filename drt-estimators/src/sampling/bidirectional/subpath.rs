@@ -10,7 +10,7 @@ use drt_medium::Coefficients;
 use crate::model::surface::Given;
 use crate::sampling::flight::proxy_attenuation;
 use crate::sampling::mode::{ConnectionPoint, TransportMode};
-use crate::sampling::record::Scattered;
+use crate::sampling::record::{JointObserver, Scattered};
 use crate::sampling::trace::{Arrival, Endpoint, Observer, OutgoingRay, PathState, Pixel, Tracer};
 use crate::world::scatter::Scattering;
 use crate::world::vertex::{Kind, Vertex};
@@ -224,7 +224,9 @@ impl<O: Observer> Observer for Unobserved<O> {
     fn contribution(&mut self, _: Pixel, _: u32, _: Rgb) {}
 }
 
-impl<O: Observer> Observer for Observed<'_, O> {
+impl<O: Observer> JointObserver for Unobserved<O> {}
+
+impl<O: JointObserver> Observer for Observed<'_, O> {
     const RECORDS: bool = O::RECORDS;
 
     // Emission is weighed by who knows all strategies.

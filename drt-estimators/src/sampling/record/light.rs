@@ -13,7 +13,7 @@ use drt_math::{Rgb, Vec3};
 use drt_medium::Coefficients;
 
 use crate::sampling::record::{Node, PathRecord, Role};
-use crate::sampling::trace::{Arrival, Connection, Endpoint};
+use crate::sampling::trace::{Arrival, Connection, Endpoint, Observer};
 use crate::world::Crossing;
 
 /// A light path as the camera's side sees it.
@@ -73,6 +73,16 @@ pub(crate) struct Joint<'a> {
     pub(crate) crossings: &'a [Crossing],
     /// Scattering there.
     pub(crate) scattered: Scattered,
+}
+
+/// What listens to a walk and to how it is connected with a light path.
+pub(crate) trait JointObserver: Observer {
+    /// Emission that was met at `node` has another MIS weight than the walk gave it.
+    fn emission(&mut self, _node: u32, _weight: f64) {}
+    /// A node was connected with a vertex of a light path.
+    fn join(&mut self, _joint: &Joint<'_>, _path: &LightPath) {}
+    /// All connections with a light path have been made.
+    fn joined(&mut self, _path: &LightPath) {}
 }
 
 impl LightPath {

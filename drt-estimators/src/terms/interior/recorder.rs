@@ -7,7 +7,7 @@ use crate::derivative::velocity::PathVelocities;
 use crate::derivative::velocity::RecordedPath;
 use crate::model::rendering::Counters;
 use crate::model::sensor::ViewSample;
-use crate::sampling::record::{Joint, LightPath, Node, PathRecord, Role};
+use crate::sampling::record::{Joint, JointObserver, LightPath, Node, PathRecord, Role};
 use crate::sampling::trace::{Arrival, Connection, Observer, OutgoingRay, Pixel};
 use crate::terms::flux::{Flux, Reservoir};
 use crate::world::Crossing;
@@ -141,7 +141,9 @@ impl Observer for Recorder<'_, '_> {
     fn connect(&mut self, node: u32, connection: &Connection, crossings: &[Crossing]) {
         self.record.connect(node, connection, crossings);
     }
+}
 
+impl JointObserver for Recorder<'_, '_> {
     fn emission(&mut self, node: u32, weight: f64) {
         let arrival = self.record.nodes.get_mut(node as usize).and_then(|n| n.arrival.as_mut());
         if let Some(arrival) = arrival {
@@ -149,12 +151,12 @@ impl Observer for Recorder<'_, '_> {
         }
     }
 
-    fn join(&mut self, _: &World, joint: &Joint<'_>, path: &LightPath) {
+    fn join(&mut self, joint: &Joint<'_>, path: &LightPath) {
         let node = self.record.join(joint, path);
         self.found(node);
     }
 
-    fn joined(&mut self, _: &World, path: &LightPath) {
+    fn joined(&mut self, path: &LightPath) {
         for node in self.record.add_light_path(path) {
             self.found(node);
         }

@@ -49,8 +49,8 @@ fn projection_inverts_rays() {
         let t = ray.range[1] * rng.next_f64();
         let x = ray.origin + ray.direction * t;
         let seen = sensor.project(x).unwrap();
-        for k in 0..2 {
-            assert!((seen.pixel[k] - pixel[k]).abs() < 1e-9 * (1.0 + pixel[k]));
+        for (seen, pixel) in seen.pixel.iter().zip(pixel) {
+            assert!((seen - pixel).abs() < 1e-9 * (1.0 + pixel));
         }
         assert!((seen.depth - t).abs() < 1e-12 * (1.0 + t));
         assert!((sensor.eye_of(x) - ray.origin).max_abs() < 1e-12);
