@@ -120,6 +120,7 @@ fn derivatives_are_those_from_the_camera() {
     let scene = surfaces(metal(), phong());
     check("albedo", &scene, vec![changes("floor-bsdf", "reflectance", grey(0.3))], 256);
     check("ball", &scene, vec![moves("ball", shift())], 256);
+    check("extinction", &fog(), vec![changes("thin", "sigma_t", grey(0.3))], 512);
 }
 
 #[test]

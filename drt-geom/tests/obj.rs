@@ -77,7 +77,7 @@ fn concave_polygons_are_cut_right() {
 fn what_is_not_read_is_passed_over() {
     let m = load(
         "# \u{e9}\nv 0 0 0 0\nv 1 0 0 2\nl 7 8\nv 0 1 0 0.5 0.5 0.5\nv 5 5 5 red\n\
-         g x\nf 1 2/1 \\\n 3\no y\nf -4 -3 -2 # 9\nusemtl z\nf 3 2 5\nv 0 0 1\n",
+         g x\nf 1 2 \\\n 3\no y\nf -4 -3 -2 # 9\nusemtl z\nf 3 2 5\nv 0 0 1\n",
     )
     .unwrap();
     assert_eq!(m.positions, [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z]);

@@ -44,7 +44,7 @@ pub struct Plan {
     pub antithetic: bool,
     /// Paths of the image count for every pixel that they reach.
     pub splatting: bool,
-    /// Paths of the image come from emitters, too.
+    /// Paths of the image, and of the interior term, come from emitters, too.
     pub bidirectional: bool,
     /// Which of the two was chosen and why, where that was left open.
     pub sampling: Option<String>,
@@ -112,7 +112,11 @@ impl fmt::Display for Plan {
         writeln!(f, "path record: {}", yes(self.record))?;
         if self.record {
             let pairs = if self.antithetic { ", mirrored pairs" } else { "" };
-            writeln!(f, "interior term: yes, each pixel by paths of its own{pairs}")?;
+            let paths = match self.bidirectional {
+                true => "each pixel by paths of its own from both ends, and all by light paths",
+                false => "each pixel by paths of its own",
+            };
+            writeln!(f, "interior term: yes, {paths}{pairs}")?;
         }
         if !self.moving_shapes.is_empty() {
             writeln!(f, "moving shapes: {}", self.moving_shapes.join(", "))?;

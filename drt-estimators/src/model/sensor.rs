@@ -3,7 +3,7 @@
 //! Axes: `right` and `up` span the image plane, `forward` looks into the scene; the image point of
 //! x is a = (d·right)/(d·forward), b = (d·up)/(d·forward) with d = x - position, on the plane at
 //! distance one. Pixel coordinates have their origin at the film's top left corner, x to the right
-//! and y down, and pixel (i, j) covers [i, i+1) × [j, j+1). [Orthographic](orthographic) cameras have a = d·right, b = d·up.
+//! and y down, and pixel (i, j) covers [i, i+1) × [j, j+1). Orthographic cameras have a = d·right, b = d·up.
 //!
 //! Placements mean what they mean in Mitsuba: the camera looks along the local +z axis with +y up
 //! and +x to the *left* of the image, so that `right` is minus the first axis of `to_world`.

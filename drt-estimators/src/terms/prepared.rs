@@ -31,7 +31,7 @@ pub(crate) struct Prepared {
     /// Set where rays turn with edges.
     pub(crate) warped: Option<Warped>,
     /// Where paths of light start, if there are any.
-    emission: Option<EmissionSampler>,
+    pub(crate) emission: Option<EmissionSampler>,
     /// Splatted terms that can contribute.
     pub(crate) sources: Vec<BoundarySource>,
     /// Image points come in mirrored pairs.

@@ -48,6 +48,17 @@ pub(crate) fn prepare_lit(
     motion: &Parameter,
     depth: u32,
 ) -> (Prepared, Motion) {
+    prepare_by(&Settings { estimator, ..Settings::default() }, lit, scene, motion, depth)
+}
+
+/// The same by some settings.
+pub(crate) fn prepare_by(
+    settings: &Settings,
+    lit: EmitterMask,
+    scene: &Scene,
+    motion: &Parameter,
+    depth: u32,
+) -> (Prepared, Motion) {
     let (scene, tangents) =
         tangents::apply(scene, core::slice::from_ref(motion)).expect("a valid parameter");
     let mut kept = PreparedCache::default();
@@ -57,8 +68,7 @@ pub(crate) fn prepare_lit(
     let insides = crate::derivative::medium_motion::MediumMotions::affine(&world, &tangents, &[]);
     let motion = Motion::new(tangents, insides);
     world.prepare_for_derivatives(motion.needs());
-    let settings = Settings { estimator, ..Settings::default() };
-    let prepared = Prepared::new(world, &motion.active, &[], &settings, Some(&motion));
+    let prepared = Prepared::new(world, &motion.active, &[], settings, Some(&motion));
     (prepared.expect("a valid scene"), motion)
 }
 
@@ -90,7 +100,8 @@ fn parts(Sum { weight, samples }: Sum, (prepared, motion): &(Prepared, Motion)) 
         let [mut rays, mut edges] = [0.0; 2];
         let component = prepared.component(Contraction::new(&prepared.world, motion));
         let along = prepared.along_rays();
-        let mut sampler = PixelSampler::new(&prepared.world, [component], seed, false, true);
+        let mut sampler = PixelSampler::new(&prepared.world, [component], seed, false, true)
+            .with_light_paths(prepared.emission.as_ref());
         let mut values = vec![Rgb::ZERO; 2 + along.terms().count()];
         for pixel in 0..PIXELS {
             let sequence = sequence_name(seed, pixel, 0);

@@ -1,6 +1,7 @@
 //! The derivative of a recorded path and of each of its factors, against dual numbers.
 
 mod antithetic;
+mod both_ends;
 mod changes;
 pub(crate) mod choice;
 mod factors;

@@ -54,6 +54,7 @@ impl EmittedRay {
         };
         let d = self.vertex.x - x;
         let distance = d.length();
+        let pdf = world.lights.area_pdf(&point, d / distance, distance);
         let light = LightSample {
             emitter: self.emitter,
             kind: LightKind::Area(point),
@@ -61,8 +62,8 @@ impl EmittedRay {
             y: self.vertex.x,
             distance,
             value: world.lights.area_radiance(self.emitter),
-            inv_pdf: 1.0,
-            pdf: 0.0,
+            inv_pdf: 1.0 / pdf,
+            pdf,
         };
         Some((light, self.inv_pdf))
     }

@@ -1,4 +1,4 @@
-//! Images by paths from both ends (Veach 1997, chapter 10; Lafortune and Willems 1993).
+//! Paths from both ends (Veach 1997, chapter 10; Lafortune and Willems 1993).
 //!
 //! A path z_0 … z_{t-1} from the camera and one y_0 … y_{s-1} from an emitter are joined in every way: by each prefix of one with
 //! each of the other. A light path of n segments is found by n + 1 of these strategies (s, t), whose contributions
@@ -41,6 +41,13 @@
 //! ```
 //!
 //! n being the number of light paths to one sample of each pixel, as many as pixels; p_film c/r² is density per area, whatever the camera. Russian roulette is left out of all of it.
+//!
+//! # Records
+//!
+//! What is to be differentiated is told to a [`JointObserver`]: the camera's walk, next-event connections, and each connection
+//! with a vertex of the light path, which is turned round as a [`LightPath`]. Weights are functions of the path alone; so they
+//! are in the transport of connections, as densities are, and have no derivative. Vertices of light paths that the camera sees are
+//! recorded one by one, for the pixels that they land on.
 
 mod emission;
 mod subpath;

@@ -1,0 +1,35 @@
+//! Derivatives by paths from both ends are those from the camera, and need what the camera sees of light paths.
+
+use crate::derivative::tests::choice::{LIGHT, derivative, prepare_by};
+use crate::derivative::tests::scenes::*;
+use crate::model::settings::EstimatorKind::{PathSpace, Warped};
+use crate::model::settings::{PathSampling, Settings};
+use crate::terms::splatting::BoundarySource;
+use crate::world::lights::EmitterMask::{All, Extended};
+
+#[test]
+fn light_paths_that_the_camera_sees_are_needed() {
+    let scene = fog();
+    let brightens = parameter("brightens", 0.0, vec![changes("thin", "albedo", grey(0.3))]);
+    for (estimator, mask) in [(PathSpace, All), (Warped, Extended)] {
+        let by = |sampling| {
+            let settings = Settings { estimator, sampling, ..Settings::default() };
+            prepare_by(&settings, mask, &scene, &brightens, 5)
+        };
+        let sum = |prepare: &dyn Fn() -> _| derivative(LIGHT, &|_| prepare(), [1.0; 2]);
+        let reference = sum(&|| by(PathSampling::Unidirectional));
+        let off = |prepare: &dyn Fn() -> _| {
+            let own = sum(prepare);
+            let error = f64::sqrt(own.variance_of_mean() + reference.variance_of_mean());
+            ((own.mean() - reference.mean()) / error, error / reference.mean().abs())
+        };
+        let fair = off(&|| by(PathSampling::Bidirectional));
+        assert!(fair.0.abs() < 4.0 && fair.1 < 0.02, "{estimator:?} {fair:?}");
+        let without = off(&|| {
+            let mut both = by(PathSampling::Bidirectional);
+            both.0.sources.retain(|s| *s != BoundarySource::LightPaths);
+            both
+        });
+        assert!(without.0.abs() > 5.0, "{estimator:?} {without:?}");
+    }
+}
