@@ -310,6 +310,10 @@ impl<'w> Bidirectional<'w> {
         }
         let r = Real::sqrt(r2);
         let w = d / r;
+        // Points of one plane do not see each other.
+        if [z, y].iter().any(|v| v.cosine(w) == 0.0) {
+            return Rgb::ZERO;
+        }
         let (f, scattered) = (RadianceMode::value(&of_z, z.from, w), y.scattered(&of_y, -w, 1.0));
         let light = z.weight() * y.weight() * f * (scattered.value * scattered.inv_pdf);
         let ends = [(z, f), (y, scattered.value)];
@@ -363,6 +367,9 @@ impl<'w> Bidirectional<'w> {
         let world = self.world;
         let scattering = world.scattering(&y.vertex)?;
         let (wo, transport) = tracer.see(&y.vertex)?;
+        if y.cosine(wo) == 0.0 {
+            return None;
+        }
         let scattered = y.scattered(&scattering, wo, 1.0);
         let light = y.weight() * (scattered.value * scattered.inv_pdf);
         if light.is_zero() && (!O::RECORDS || self.is_dead(y, scattered.value)) {
