@@ -78,6 +78,9 @@ use crate::world::lights::LightKind;
 use crate::world::vertex::Vertex;
 use crate::world::{Crossing, World};
 
+/// The cosine of what lies in a surface's plane, but for rounding.
+const IN_PLANE: f64 = 1e-12;
+
 /// Joins paths from both ends.
 pub(crate) struct Bidirectional<'w> {
     world: &'w World,
@@ -311,7 +314,7 @@ impl<'w> Bidirectional<'w> {
         let r = Real::sqrt(r2);
         let w = d / r;
         // Points of one plane do not see each other.
-        if [z, y].iter().any(|v| v.cosine(w) == 0.0) {
+        if [z, y].iter().any(|v| v.cosine(w) < IN_PLANE) {
             return Rgb::ZERO;
         }
         let (f, scattered) = (RadianceMode::value(&of_z, z.from, w), y.scattered(&of_y, -w, 1.0));
@@ -367,7 +370,7 @@ impl<'w> Bidirectional<'w> {
         let world = self.world;
         let scattering = world.scattering(&y.vertex)?;
         let (wo, transport) = tracer.see(&y.vertex)?;
-        if y.cosine(wo) == 0.0 {
+        if y.cosine(wo) < IN_PLANE {
             return None;
         }
         let scattered = y.scattered(&scattering, wo, 1.0);
