@@ -4,6 +4,7 @@
     python3 -m venv target/mitsuba && target/mitsuba/bin/pip install mitsuba numpy
     cargo build --release -p drt-cli
     target/mitsuba/bin/python examples/compare_mitsuba.py
+    target/mitsuba/bin/python examples/compare_mitsuba.py --sampling bidirectional --integrator ptracer star knot
 
 Each scene is rendered by both programs from the same file. The image is cut into 8 x 8 blocks;
 compared are the means of the inner 6 x 6, in standard errors: Mitsuba's film divides by the sum of
@@ -18,6 +19,7 @@ import pathlib
 import subprocess
 import sys
 import time
+import xml.etree.ElementTree as ET
 
 import numpy as np
 
@@ -41,6 +43,8 @@ def arguments():
     parser.add_argument("--spp", type=int, default=512, help="samples per pixel of drt")
     parser.add_argument("--passes", type=int, default=32, help="independent passes of Mitsuba")
     parser.add_argument("--pass-spp", type=int, default=16, help="samples per pixel and pass of Mitsuba")
+    parser.add_argument("--sampling", help="how drt finds paths; as the scene has it by default")
+    parser.add_argument("--integrator", help="Mitsuba's integrator in place of the scene's, such as ptracer or volpath")
     parser.add_argument("-D", action="append", default=[], metavar="NAME=VALUE", help="a <default> of the scenes")
     return parser.parse_args()
 
@@ -55,9 +59,16 @@ def blocks(image):
 def by_mitsuba(mi, path, defaults, options):
     # Merging shapes would hide which one a difference belongs to.
     scene = mi.load_file(str(path), optimize=False, **defaults)
+    integrator = scene.integrator()
+    if options.integrator:
+        root = ET.parse(path).find("integrator")
+        # Versions before 2 have these names in camelCase.
+        snake = {"maxDepth": "max_depth", "rrDepth": "rr_depth"}
+        depths = {snake.get(i.get("name"), i.get("name")): int(i.get("value")) for i in root.findall("integer")}
+        integrator = mi.load_dict({"type": options.integrator, **depths})
     passes = []
     for seed in range(options.passes):
-        image = np.array(mi.render(scene, seed=seed, spp=options.pass_spp))
+        image = np.array(mi.render(scene, integrator=integrator, seed=seed, spp=options.pass_spp))
         passes.append(blocks(image[:, :, :3]))
     passes = np.array(passes)
     return passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(len(passes))
@@ -75,7 +86,8 @@ def digest(drt, path, defaults, options):
 
 
 def by_drt(path, defaults, options):
-    grid = digest(options.drt, path, defaults, ["--spp", options.spp])["image"]["blocks"]
+    extra = ["--sampling", options.sampling] if options.sampling else []
+    grid = digest(options.drt, path, defaults, ["--spp", options.spp, *extra])["image"]["blocks"]
     return (np.array(grid[key]).reshape(CELLS, CELLS, 3) for key in ("mean", "stderr"))
 
 
