@@ -59,6 +59,16 @@ pub(crate) enum Endpoint {
     Environment,
 }
 
+impl Endpoint {
+    /// The scattering coefficient of a volume vertex; 1 elsewhere.
+    pub(crate) fn sigma_s(&self) -> Rgb {
+        match self {
+            Self::Volume(_, c) => c.sigma_s(),
+            _ => Rgb::ONE,
+        }
+    }
+}
+
 /// A next-event connection.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Connection {

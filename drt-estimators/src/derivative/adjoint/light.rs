@@ -63,10 +63,7 @@ impl Differentiator<'_> {
         let (Endpoint::Surface(vertex) | Endpoint::Volume(vertex, _)) = &arrival.end else {
             return nothing;
         };
-        let theta = match &arrival.end {
-            Endpoint::Volume(_, c) => arrival.throughput * c.sigma_s(),
-            _ => arrival.throughput,
-        };
+        let theta = arrival.throughput * arrival.end.sigma_s();
         let children = self.locals[own].children;
         let passes = theta * (node.value * node.inv_pdf);
         let mut here = self.locals[own].at.times(passes);

@@ -58,7 +58,6 @@ use alloc::vec::Vec;
 use core::marker::PhantomData;
 
 use drt_math::{Real, Rgb, Vec3};
-use drt_medium::Coefficients;
 
 use crate::model::sensor::ViewSample;
 use crate::model::surface::Given;
@@ -352,8 +351,7 @@ impl<'w> Bidirectional<'w> {
 
     /// A vertex scatters nothing, with the value `f` of its scattering function, and no derivative of that counts.
     fn is_dead(&self, v: &SubpathVertex, f: Rgb) -> bool {
-        let sigma_s = v.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s);
-        (sigma_s * f).is_zero() && !self.world.may_revive(&v.vertex)
+        (v.sigma_s() * f).is_zero() && !self.world.may_revive(&v.vertex)
     }
 
     /// A vertex of the light's path as the camera sees it.

@@ -106,9 +106,14 @@ pub(super) struct SubpathVertex {
 }
 
 impl SubpathVertex {
+    /// The scattering coefficient of a volume; 1 on a surface.
+    pub(super) fn sigma_s(&self) -> Rgb {
+        self.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s)
+    }
+
     /// The throughput, with the scattering coefficient of a volume.
     pub(super) fn weight(&self) -> Rgb {
-        self.throughput * self.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s)
+        self.throughput * self.sigma_s()
     }
 
     /// As the end of a segment.

@@ -10,7 +10,6 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use drt_math::{Rgb, Vec3};
-use drt_medium::Coefficients;
 
 use crate::sampling::record::{Node, PathRecord, Role};
 use crate::sampling::trace::{Arrival, Connection, Endpoint, Observer};
@@ -109,14 +108,6 @@ impl LightPath {
     }
 }
 
-/// σ_s in a volume, 1 on surfaces.
-fn scattering_coefficient(end: &Endpoint) -> Rgb {
-    match end {
-        Endpoint::Volume(_, c) => Coefficients::sigma_s(c),
-        _ => Rgb::ONE,
-    }
-}
-
 impl PathRecord {
     /// Adds a connection with a vertex of a light path; returns its end.
     pub(crate) fn join(&mut self, joint: &Joint<'_>, path: &LightPath) -> usize {
@@ -191,7 +182,7 @@ impl PathRecord {
         let passed = if let Role::OfLight { passed } = role { *passed } else { Rgb::ONE };
         let onward = passed
             * arrival.throughput
-            * scattering_coefficient(&arrival.end)
+            * arrival.end.sigma_s()
             * (scattered.value * scattered.inv_pdf);
         if self.scattered.len() <= v {
             self.scattered.resize(v + 1, None);
