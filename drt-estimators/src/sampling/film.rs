@@ -22,7 +22,7 @@ use alloc::vec::Vec;
 use drt_math::{Real, Rgb};
 
 pub(crate) use crate::sampling::film::splats::Splats;
-pub(crate) use crate::sampling::film::splatting::{Raster, Splat, SplatTile};
+pub(crate) use crate::sampling::film::splatting::{Raster, Splat, SplatDensity, SplatTile};
 pub(crate) use crate::sampling::film::strata::Stratum;
 
 use crate::model::rendering::{BLOCKS, Estimate, Layer};

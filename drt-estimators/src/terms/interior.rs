@@ -19,7 +19,7 @@ use crate::derivative::velocity::{Material, Movers, VelocityField};
 use crate::model::rendering::{Account, Counters, NonFinite, Term};
 use crate::model::sensor::ViewSample;
 use crate::sampling::bidirectional::{Bidirectional, EmissionSampler};
-use crate::sampling::film::Splat;
+use crate::sampling::film::{Splat, SplatDensity};
 use crate::sampling::pixels::Sampler;
 use crate::sampling::record::PathRecord;
 use crate::sampling::record::Radiance;
@@ -336,21 +336,19 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
 
     /// Adds the light of a path to the image.
     fn add_to_image(&mut self, s: &ViewSample, derivative: bool, light: Rgb, values: &mut [Rgb]) {
-        let (value, weight) = match self.image {
+        let (value, weight, density) = match self.image {
             ImageSampling::OwnPixel => {
                 values[0] += light;
                 return;
             }
-            ImageSampling::Squares => (light, s.weight),
+            ImageSampling::Squares => (light, s.weight, SplatDensity::Known),
             // At the very end of a filter there is no weight to take out; no path is there.
             ImageSampling::SharedFilters if s.weight == 0.0 => return,
-            // As by the balance heuristic for all pixels (Veach 1997, §9.2.2).
             ImageSampling::SharedFilters => {
-                let weight = 1.0 / self.world.camera.view_density(s.point, derivative);
-                (light * (weight / s.weight), weight)
+                (light * (1.0 / s.weight), 1.0, SplatDensity::OfFilters { derivative })
             }
         };
-        self.splats.push(Splat { point: s.point, value, weight });
+        self.splats.push(Splat { point: s.point, value, weight, density });
     }
 
     /// Notes a sample that is not finite and counts it as zero.

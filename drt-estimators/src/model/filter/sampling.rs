@@ -51,12 +51,11 @@ impl Filter {
         offset.map(|x| self.pdf_axis(x, self.axis_with_slope(x).1, share)).iter().product()
     }
 
-    /// The density at a coordinate of the samples of all `n` pixels of a row, each of which draws one from its
-    /// own filter.
-    pub(crate) fn row_density(&self, at: f64, n: u32, derivative: bool) -> f64 {
-        let share = self.slope_share(derivative);
-        let density = |x| self.pdf_axis(x, self.axis_with_slope(x).1, share);
-        self.reached(at, n).map(|i| density(at - (f64::from(i) + 0.5))).sum()
+    /// The factor of one axis, and that of the density of [`sample`](Self::sample).
+    #[inline]
+    pub(crate) fn axis_with_density(&self, x: f64, derivative: bool) -> (f64, f64) {
+        let (p, slope) = self.axis_with_slope(x);
+        (p, self.pdf_axis(x, slope, self.slope_share(derivative)))
     }
 
     /// Draws a coordinate evenly from the unit interval of pixel `i` out of a row of `n`; with its density. What

@@ -235,7 +235,11 @@ fn samples_of_a_row_are_shared() {
                             Some(derivative) => {
                                 let at =
                                     f64::from(i) + 0.5 + f.sample([u, 0.5], derivative).offset[0];
-                                (at, f.row_density(at, n, derivative))
+                                let density = |j| {
+                                    let offset = at - (f64::from(j) + 0.5);
+                                    f.axis_with_density(offset, derivative).1
+                                };
+                                (at, (0..n).map(density).sum())
                             }
                         };
                         for (j, v) in (0..).zip(&mut values) {

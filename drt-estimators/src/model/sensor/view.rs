@@ -116,13 +116,6 @@ impl Sensor {
         ViewSample { origin, direction, point, weight: 1.0 / (of_x * of_y), slope: [0.0; 2] }
     }
 
-    /// The density at an image point, per square pixel, of what [`sample_view`](Self::sample_view) draws for all pixels
-    /// together, once for each.
-    pub(crate) fn view_density(&self, point: [f64; 2], derivative: bool) -> f64 {
-        let along = |k: usize| self.filter.row_density(point[k], self.film[k], derivative);
-        along(0) * along(1)
-    }
-
     /// Where and how strongly the sensor sees a point, visibility and clip planes apart. Points of
     /// depth 0 or less are behind it.
     #[must_use]

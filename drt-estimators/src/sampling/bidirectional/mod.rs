@@ -66,7 +66,7 @@ use crate::sampling::bidirectional::emission::{EmittedRay, area_flow_pdf};
 use crate::sampling::bidirectional::subpath::{
     Observed, Ratios, Segment, Subpath, SubpathVertex, Unconnected, Unobserved, square,
 };
-use crate::sampling::film::Splat;
+use crate::sampling::film::{Splat, SplatDensity};
 use crate::sampling::flight::proxy_attenuation;
 use crate::sampling::mode::{ImportanceMode, RadianceMode, TransportMode};
 use crate::sampling::record::{
@@ -428,7 +428,12 @@ pub(crate) struct SeenFromCamera {
 impl SeenFromCamera {
     /// On the film, of one of so many light paths.
     fn splat(&self, light_paths: f64) -> Splat {
-        Splat { point: self.view.point, value: self.value * (1.0 / light_paths), weight: 0.0 }
+        Splat {
+            point: self.view.point,
+            value: self.value * (1.0 / light_paths),
+            weight: 0.0,
+            density: SplatDensity::Known,
+        }
     }
 }
 

@@ -57,7 +57,12 @@ fn light(scene: &Scene, fault: Option<Fault>, both: bool) -> Moments {
                     tracer.trace_camera(&s, filter, &mut radiance);
                     radiance.0
                 };
-                splats.push(Splat { point: s.point, value, weight: s.weight });
+                splats.push(Splat {
+                    point: s.point,
+                    value,
+                    weight: s.weight,
+                    density: SplatDensity::Known,
+                });
                 for splat in &splats {
                     for p in camera.footprint(splat.point) {
                         sum += weight(p.pixel[0]) * p.weight * splat.value.mean();

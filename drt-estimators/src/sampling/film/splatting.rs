@@ -44,12 +44,27 @@ pub(crate) struct Splat {
     /// One over that density, of points that every pixel's filter sees with the density 1 in the mean over a sample
     /// of each pixel; of others 0.
     pub(crate) weight: f64,
+    /// What `value` and `weight` are still to be divided by.
+    pub(crate) density: SplatDensity,
+}
+
+/// A factor of a point's density that only a film can tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum SplatDensity {
+    /// None.
+    Known,
+    /// That of the [samples](Filter::sample) of all pixels together, one of each filter: the balance heuristic for
+    /// all pixels (Veach 1997, §9.2.2).
+    OfFilters {
+        /// Whether these are for derivatives.
+        derivative: bool,
+    },
 }
 
 impl Splat {
     /// One of several that share what they stand for.
     pub(crate) fn scaled(&self, share: f64) -> Self {
-        Self { point: self.point, value: self.value * share, weight: self.weight * share }
+        Self { value: self.value * share, weight: self.weight * share, ..*self }
     }
 }
 
@@ -107,16 +122,32 @@ struct Taps {
     pixels: Vec<f64>,
     /// Of blocks.
     blocks: Vec<(u8, f64)>,
+    /// What values are divided by.
+    density: f64,
 }
 
 impl Taps {
-    fn set(&mut self, raster: &Raster, axis: usize, at: f64) {
+    fn set(&mut self, raster: &Raster, axis: usize, splat: &Splat) {
+        let at = splat.point[axis];
         let reached = raster.filter.reached(at, raster.size[axis]);
         self.first = reached.start;
         self.pixels.clear();
         self.blocks.clear();
+        let derivative = match splat.density {
+            SplatDensity::Known => None,
+            SplatDensity::OfFilters { derivative } => Some(derivative),
+        };
+        self.density = if derivative.is_some() { 0.0 } else { 1.0 };
         for i in reached {
-            let weight = raster.filter.axis(at - (f64::from(i) + 0.5));
+            let offset = at - (f64::from(i) + 0.5);
+            let weight = match derivative {
+                None => raster.filter.axis(offset),
+                Some(derivative) => {
+                    let (weight, density) = raster.filter.axis_with_density(offset, derivative);
+                    self.density += density;
+                    weight
+                }
+            };
             self.pixels.push(weight);
             let block = raster.blocks[axis][i as usize];
             match self.blocks.last_mut() {
@@ -172,8 +203,14 @@ impl SplatTile {
     /// Adds a splat to all pixels that it reaches.
     pub(crate) fn add(&mut self, splat: &Splat) {
         let [x, y] = &mut self.taps;
-        x.set(&self.raster, 0, splat.point[0]);
-        y.set(&self.raster, 1, splat.point[1]);
+        x.set(&self.raster, 0, splat);
+        y.set(&self.raster, 1, splat);
+        let density = x.density * y.density;
+        // At the very end of all filters there is no weight to take out, and no path.
+        if density == 0.0 {
+            return;
+        }
+        let splat = &splat.scaled(1.0 / density);
         let [columns, rows] = &self.window;
         let last = x.first + x.pixels.len() as u32;
         for (row, of_row) in (y.first..).zip(&y.pixels) {

@@ -60,29 +60,30 @@ struct Paths<'a> {
 impl Sampler for Paths<'_> {
     fn sample(&mut self, pixel: u32, unit: u32, mut points: SobolSampler, _: &mut [Rgb]) {
         let u = points.next_2d();
-        let (point, value) = match self.from {
+        let (point, value, density) = match self.from {
             From::Squares => {
                 let s = self.camera.sample_square(pixel, u);
-                (s.point, s.weight)
+                (s.point, s.weight, SplatDensity::Known)
             }
             From::Filters { derivative } => {
                 let s = self.camera.sample_view(pixel, u, derivative);
-                (s.point, 1.0 / self.camera.view_density(s.point, derivative))
+                (s.point, 1.0, SplatDensity::OfFilters { derivative })
             }
         };
         let mut rng = Rng::new(self.seed, u64::from(pixel), unit);
         let light = along(0, point[0]) * along(1, point[1]) * (2.0 * rng.next_f64());
         self.splats.clear();
-        let mut put = |point: [f64; 2], value, weight| {
+        let mut put = |point: [f64; 2], value, weight, density| {
             let point = [point[0] + self.shift, point[1]];
-            self.splats.push(Splat { point, value: Rgb::splat(value), weight });
+            self.splats.push(Splat { point, value: Rgb::splat(value), weight, density });
         };
-        put(point, 0.75 * value * light, value);
+        put(point, 0.75 * value * light, value, density);
         // Even over an area that holds the supports of all filters.
         let [w, h] = SIZE.map(f64::from);
         let [u, v] = rng.next_2d();
         let (far, area) = ([(w + 6.0) * u - 3.0, (h + 6.0) * v - 3.0], (w + 6.0) * (h + 6.0));
-        put(far, 0.25 * along(0, far[0]) * along(1, far[1]) * area / (w * h), 0.0);
+        let of_far = 0.25 * along(0, far[0]) * along(1, far[1]) * area / (w * h);
+        put(far, of_far, 0.0, SplatDensity::Known);
     }
 
     fn splats(&self) -> &[Splat] {
@@ -263,7 +264,8 @@ fn splats_reach_the_pixels_of_their_footprint() {
             for _ in 0..20 {
                 let [x, y] = rng.next_2d();
                 let point = [x * 25.0 - 3.0, y * 19.0 - 3.0];
-                tile.add(&Splat { point, value: Rgb::splat(1.5), weight: 1.0 });
+                let value = Rgb::splat(1.5);
+                tile.add(&Splat { point, value, weight: 1.0, density: SplatDensity::Known });
                 for p in camera.footprint(point) {
                     expected[(p.pixel[1] * SIZE[0] + p.pixel[0]) as usize] += 1.5 * p.weight;
                 }
