@@ -107,6 +107,6 @@ fn fog_with_ball() -> Result<Scene, Box<dyn std::error::Error>> {
                 sample_count: None,
             },
         )],
-        integrator: Integrator { max_depth: Some(6), rr_depth: 5 },
+        integrator: Integrator { max_depth: Some(6), ..Integrator::default() },
     })
 }

@@ -33,10 +33,11 @@ fn describe(job: &Job) -> String {
     if job.text.is_some() {
         text = format!("job {}\n{text}", job.path.display());
     }
-    let Integrator { max_depth, rr_depth } = scene.integrator;
+    let Integrator { max_depth, rr_depth, hide_emitters } = scene.integrator;
     let depth = job.settings.max_depth.within(max_depth);
     let depth = depth.map_or("unlimited".into(), |d| d.to_string());
-    text += &format!("depth {depth}, Russian roulette from {rr_depth}\n\n");
+    let hidden = if hide_emitters { ", emitters hidden from the camera" } else { "" };
+    text += &format!("depth {depth}, Russian roulette from {rr_depth}{hidden}\n\n");
     text += &shapes(scene).to_string();
     text += &media(scene).to_string();
     text += &emitters(scene).to_string();
@@ -136,7 +137,10 @@ fn sensors(job: &Job) -> Table<6> {
                 let width = s.item.sensor.pinhole().pixel_size * f64::from(w);
                 format!("orthographic, {width:.4} wide")
             } else {
-                format!("{} degrees", lens.fov)
+                let aperture = s.item.sensor.aperture().map_or_else(String::new, |a| {
+                    format!(", a lens of radius {} sharp at {}", a.radius, a.focus_distance)
+                });
+                format!("{} degrees{aperture}", lens.fov)
             },
             medium,
             if i == job.settings.sensor { "used" } else { "" }.into(),

@@ -1,7 +1,7 @@
 //! Sensors with their film, filter and sampler, and the integrator.
 
 use drt_estimators::filter::{Filter, FilterKind};
-use drt_estimators::sensor::{FovAxis, Lens, Sensor};
+use drt_estimators::sensor::{Aperture, FovAxis, Lens, Sensor, SensorError};
 use drt_estimators::{Integrator, Named, SceneSensor};
 use drt_math::Affine;
 
@@ -18,16 +18,17 @@ impl<'a> Loader<'a> {
         let p = Properties::of(e)?;
         let kind = p.kind()?;
         let parallel = match kind {
-            "perspective" => false,
+            "perspective" | "thinlens" => false,
             "orthographic" => true,
             _ => {
                 return Err(e.error(format!(
-                    "the sensor type `{kind}` is not supported; expected perspective or orthographic"
+                    "the sensor type `{kind}` is not supported; expected perspective, thinlens or orthographic"
                 )));
             }
         };
         let (film, filter) = self.film(&p)?;
-        let lens = if parallel { clipped(&p, Lens::default())? } else { lens(&p)? };
+        let lens = if parallel { clipped(&p, Lens::default())? } else { lens(&p, kind)? };
+        let aperture = if kind == "thinlens" { aperture(&p, &lens)? } else { None };
         let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
         let medium = self.surrounding(&p)?;
         let sample_count = self.sampler(&p)?;
@@ -35,16 +36,25 @@ impl<'a> Loader<'a> {
         p.accept(&["focus_distance", "shutter_open", "shutter_close"]);
         p.finish()?;
         let place = if parallel { Sensor::orthographic } else { Sensor::from_to_world };
-        let sensor = place(&to_world, lens, film, filter);
-        let sensor = sensor.map_err(|err| e.error(err))?;
+        let sensor = || -> Result<Sensor, SensorError> {
+            let mut sensor = place(&to_world, lens, film.size, filter)?;
+            if let Some([offset, size]) = film.crop {
+                sensor = sensor.cropped(offset, size)?;
+            }
+            match aperture {
+                Some(aperture) => sensor.with_aperture(aperture),
+                None => Ok(sensor),
+            }
+        };
+        let sensor = sensor().map_err(|err| e.error(err))?;
         let item = SceneSensor { sensor, medium, sample_count };
         Ok(Named { id: e.id().map(Into::into), item })
     }
 
-    fn film(&self, sensor: &Properties<'a>) -> Result<([u32; 2], Filter), CliError> {
+    fn film(&self, sensor: &Properties<'a>) -> Result<(Film, Filter), CliError> {
         let default = [768, 576];
         let Some(film) = self.index.single(sensor, "film", None)? else {
-            return Ok((default, default_filter(sensor)?));
+            return Ok((Film { size: default, crop: None }, default_filter(sensor)?));
         };
         let p = Properties::of(film.target)?;
         let kind = p.kind()?;
@@ -59,11 +69,12 @@ impl<'a> Loader<'a> {
             Some(f) => filter(f.target)?,
             None => default_filter(&p)?,
         };
+        let crop = crop(&p, [width, height])?;
         // How Mitsuba stores the image; none of it changes expected values.
         p.accept(&["file_format", "pixel_format", "component_format", "sample_border"]);
         p.accept(&["compensate", "high_quality_edges", "banner", "attach_log"]);
         p.finish()?;
-        Ok(([width, height], filter))
+        Ok((Film { size: [width, height], crop }, filter))
     }
 
     fn sampler(&self, sensor: &Properties<'a>) -> Result<Option<u32>, CliError> {
@@ -76,7 +87,35 @@ impl<'a> Loader<'a> {
     }
 }
 
-fn lens(p: &Properties<'_>) -> Result<Lens, CliError> {
+/// Width and height of a film, and the part of it that is wanted.
+struct Film {
+    size: [u32; 2],
+    /// Column and row of its top left pixel, and its size.
+    crop: Option<[[u32; 2]; 2]>,
+}
+
+/// A crop window, which reaches to the film's end where its size is not given.
+fn crop(p: &Properties<'_>, film: [u32; 2]) -> Result<Option<[[u32; 2]; 2]>, CliError> {
+    let number = |name, least| p.integer_in(name, least..=MAX_FILM);
+    let offset = [number("crop_offset_x", 0)?, number("crop_offset_y", 0)?];
+    let size = [number("crop_width", 1)?, number("crop_height", 1)?];
+    if offset.iter().chain(&size).all(Option::is_none) {
+        return Ok(None);
+    }
+    let offset: [u32; 2] = offset.map(Option::unwrap_or_default);
+    let rest = |k: usize| film[k].saturating_sub(offset[k]);
+    Ok(Some([offset, [size[0].unwrap_or(rest(0)), size[1].unwrap_or(rest(1))]]))
+}
+
+/// The lens of a `thinlens`; one without radius is a pinhole.
+fn aperture(p: &Properties<'_>, lens: &Lens) -> Result<Option<Aperture>, CliError> {
+    let radius = p.float("aperture_radius")?;
+    let radius = radius.ok_or_else(|| p.element.error("`aperture_radius` is missing"))?;
+    let focus_distance = p.float("focus_distance")?.unwrap_or(lens.far);
+    Ok((radius != 0.0).then_some(Aperture { radius, focus_distance }))
+}
+
+fn lens(p: &Properties<'_>, kind: &str) -> Result<Lens, CliError> {
     let mut lens = match (p.float("fov")?, p.string("focal_length")?) {
         (Some(_), Some(_)) => {
             return Err(p.element.error("give `fov` or `focal_length`, not both"));
@@ -87,8 +126,10 @@ fn lens(p: &Properties<'_>) -> Result<Lens, CliError> {
         (None, None) => Lens::default(),
     };
     let offset = |name| Ok::<f64, CliError>(p.float(name)?.unwrap_or(0.0));
-    lens.principal_point_offset =
-        [offset("principal_point_offset_x")?, offset("principal_point_offset_y")?];
+    if kind == "perspective" {
+        lens.principal_point_offset =
+            [offset("principal_point_offset_x")?, offset("principal_point_offset_y")?];
+    }
     clipped(p, lens)
 }
 
@@ -196,10 +237,9 @@ pub(super) fn integrator(e: &Element) -> Result<Integrator, CliError> {
     if let Some(depth) = p.integer_in("rr_depth", 1..=i64::from(u32::MAX))? {
         integrator.rr_depth = depth;
     }
-    for name in ["hide_emitters", "strict_normals"] {
-        if p.boolean(name)? == Some(true) {
-            return Err(e.error(format!("`{name}` = true is not supported")));
-        }
+    integrator.hide_emitters = p.boolean("hide_emitters")?.unwrap_or(false);
+    if p.boolean("strict_normals")? == Some(true) {
+        return Err(e.error("`strict_normals` = true is not supported"));
     }
     // How the work is cut up.
     p.accept(&["samples_per_pass", "block_size", "timeout"]);

@@ -134,7 +134,8 @@ pub(crate) fn furnace(misty: bool, max_depth: u32) -> Subject {
     scene.bsdfs[0] = Named::new("white", Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE }));
     scene.shapes.push(shape("walls", walls(), 0));
     scene.shapes.push(shape("ball", sized(&procedural::icosphere(2), 1.0, vec3(0.0, 0.0, 1.2)), 0));
-    scene.integrator = Integrator { max_depth: Some(max_depth), rr_depth: u32::MAX };
+    scene.integrator =
+        Integrator { max_depth: Some(max_depth), rr_depth: u32::MAX, ..Integrator::default() };
     let mut parameters = vec![
         ("moves", ten(|i| moves(&["ball"], i))),
         ("colour", ten(|i| paints("white", "reflectance", i))),
@@ -174,7 +175,7 @@ fn stage() -> Scene {
             emitter("bulb", Emitter::Point { position, intensity }),
         ],
         sensors: vec![Named::new("camera", SceneSensor { sensor, medium, sample_count: None })],
-        integrator: Integrator { max_depth: Some(6), rr_depth: 4 },
+        integrator: Integrator { max_depth: Some(6), rr_depth: 4, ..Integrator::default() },
     }
 }
 

@@ -56,7 +56,11 @@ impl<'a> Movers<'a> {
         let onward = |x| {
             if camera.is_orthographic() { camera.pinhole().forward } else { x - camera.position() }
         };
-        self.active.sensor || self.pass_beyond(e, onward)
+        match camera.aperture() {
+            // They start anywhere on the lens.
+            Some(_) => self.active.sensor || self.pass(e),
+            None => self.active.sensor || self.pass_beyond(e, onward),
+        }
     }
 
     /// True when an edge can matter to segments that start on an emitter, which leave it at `x`

@@ -121,11 +121,14 @@ pub struct Integrator {
     pub max_depth: Option<u32>,
     /// The depth from which Russian roulette may end a path.
     pub rr_depth: u32,
+    /// Rays from the camera pass area emitters, and see no environment.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub hide_emitters: bool,
 }
 
 impl Default for Integrator {
     fn default() -> Self {
-        Self { max_depth: None, rr_depth: 5 }
+        Self { max_depth: None, rr_depth: 5, hide_emitters: false }
     }
 }
 
@@ -199,6 +202,10 @@ impl Scene {
                 ));
             }
         }
+        if self.hides_something() {
+            let reason = ElementError::HiddenEmitters { parameter: parameter.into() };
+            return Err(Error::Element { element: "integrator".into(), reason });
+        }
         if slide && let Some(i) = self.emitters.iter().position(|e| e.item.emitter.varies()) {
             let (id, parameter) = (&self.emitters[i].id, parameter.into());
             return Err(unusable(id, "emitter", i, ElementError::VaryingSky { parameter }));
@@ -253,6 +260,12 @@ impl Scene {
             }
         }
         Ok(())
+    }
+
+    /// True when the camera sees less than there is, as the integrator hides emitters.
+    pub(crate) fn hides_something(&self) -> bool {
+        let delta = |e: &Named<SceneEmitter>| e.item.emitter.is_delta();
+        self.integrator.hide_emitters && !self.emitters.iter().all(delta)
     }
 
     /// The sensor that a setting names.

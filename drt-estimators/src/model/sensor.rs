@@ -8,6 +8,7 @@
 //! Placements mean what they mean in Mitsuba: the camera looks along the local +z axis with +y up
 //! and +x to the *left* of the image, so that `right` is minus the first axis of `to_world`.
 
+mod aperture;
 mod footprint;
 mod lens;
 mod motion;
@@ -16,16 +17,19 @@ mod pinhole;
 #[cfg(test)]
 mod tests;
 mod view;
+mod window;
 
 use drt_math::{Affine, Mat3, Vec3, fm};
 use thiserror::Error;
 
 use crate::model::filter::{Filter, FilterError};
 
+pub use crate::model::sensor::aperture::Aperture;
 pub use crate::model::sensor::footprint::{Footprint, PixelWeight};
 pub use crate::model::sensor::lens::{FovAxis, Lens};
 pub use crate::model::sensor::pinhole::{Pinhole, Projection, SensorGradient, SensorTangent};
 pub use crate::model::sensor::view::{Response, ViewSample};
+use crate::model::sensor::window::Window;
 
 /// A camera that cannot be used.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -40,6 +44,30 @@ pub enum SensorError {
     /// A film of too many pixels.
     #[error("the film is {}x{} pixels; at most 268435456 in all", .0[0], .0[1])]
     TooManyPixels([u32; 2]),
+    /// A part of a film that is not in it.
+    #[error(
+        "the crop window is {}x{} pixels at ({}, {}), which is not inside the film of {}x{} pixels",
+        .size[0], .size[1], .offset[0], .offset[1], .film[0], .film[1]
+    )]
+    Crop {
+        /// Its width and height.
+        size: [u32; 2],
+        /// Column and row of its top left pixel.
+        offset: [u32; 2],
+        /// Width and height of the film.
+        film: [u32; 2],
+    },
+    /// A lens that is none.
+    #[error("`{what}` is {value}; expected a positive number")]
+    Aperture {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A lens on what is no perspective camera.
+    #[error("only a perspective camera has a lens")]
+    NoLens,
     /// Clip planes that leave nothing to see.
     #[error("the clip planes are at {near} and {far}; expected 0 < near < far")]
     Clip {
@@ -79,8 +107,8 @@ pub enum SensorError {
     NotFinite(&'static str),
     /// A property that cameras do not have.
     #[error(
-        "a camera has no property `{0}` to differentiate; it has fov, \
-         principal_point_offset_x and principal_point_offset_y"
+        "a camera has no property `{0}` to differentiate; it has fov, principal_point_offset_x and \
+         principal_point_offset_y, and where it has a lens aperture_radius and focus_distance"
     )]
     UnknownProperty(alloc::string::String),
     /// Different numbers for the channels of something that has none.
@@ -99,8 +127,11 @@ pub struct Sensor {
     pinhole: Pinhole,
     lens: Lens,
     film: [u32; 2],
+    window: Window,
     filter: Filter,
     response: Response,
+    /// `None` of a pinhole.
+    aperture: Option<Aperture>,
 }
 
 /// A ray into the scene.
@@ -174,11 +205,14 @@ impl Sensor {
         let [left, up, forward] = m.cols;
         let [right, up, forward] =
             motion::orthonormalize([-left, up, forward]).ok_or(SensorError::NotRigid)?;
-        let pixel_size = lens.pixel_size(film)?;
-        let principal = lens.principal_point(film);
+        Self::check_film(film)?;
+        let window = Window::of(film);
+        let pixel_size = lens.pixel_size(window.whole)?;
+        let principal = lens.principal_point(window.whole);
         let position = to_world.translation;
         let pinhole = Pinhole { position, right, up, forward, pixel_size, principal };
-        Ok(Self { pinhole, lens, film, filter, response: Response::Perspective })
+        let response = Response::Perspective;
+        Ok(Self { pinhole, lens, film, window, filter, response, aperture: None })
     }
 
     /// A camera at `origin` that looks at `target`; see [`look_at`].
@@ -194,32 +228,20 @@ impl Sensor {
         Self::from_to_world(&look_at(origin, target, up)?, lens, film, filter)
     }
 
-    /// The same camera with another number of pixels.
+    /// The same view with another number of pixels.
     ///
     /// # Errors
     /// When a side is zero, or there are more than [`MAX_PIXELS`](Self::MAX_PIXELS).
     pub fn with_film(&self, film: [u32; 2]) -> Result<Self, SensorError> {
-        self.with(self.lens, film)
+        Self::check_film(film)?;
+        self.with(self.lens, film, self.window.resized(self.film, film))
     }
 
     /// The same sensor with another lens and film.
-    fn with(&self, lens: Lens, film: [u32; 2]) -> Result<Self, SensorError> {
-        let (to_world, filter) = (self.to_world(), self.filter.clone());
-        Self::of_response(self.response, &to_world, lens, film, filter)
-    }
-
-    /// A sensor that its placement and the rest determine.
-    fn of_response(
-        response: Response,
-        to_world: &Affine,
-        lens: Lens,
-        film: [u32; 2],
-        filter: Filter,
-    ) -> Result<Self, SensorError> {
-        match response {
-            Response::Orthographic => Self::orthographic(to_world, lens, film, filter),
-            _ => Ok(Self { response, ..Self::from_to_world(to_world, lens, film, filter)? }),
-        }
+    fn with(&self, lens: Lens, film: [u32; 2], window: Window) -> Result<Self, SensorError> {
+        let (to_world, filter, response) = (self.to_world(), self.filter.clone(), self.response);
+        let (window, aperture) = (Some(window), self.aperture);
+        Parts { to_world, lens, film, window, filter, response, aperture }.sensor()
     }
 
     /// The same camera with another filter.
@@ -304,22 +326,47 @@ impl Sensor {
     }
 }
 
-/// What determines a sensor, for storage.
-#[cfg(feature = "serde")]
-#[derive(serde::Serialize, serde::Deserialize)]
+/// What determines a sensor.
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Parts {
     to_world: Affine,
     lens: Lens,
     film: [u32; 2],
+    /// `None` where the film is whole.
+    #[cfg_attr(feature = "serde", serde(default))]
+    window: Option<Window>,
     filter: Filter,
     response: Response,
+    /// `None` of a pinhole.
+    #[cfg_attr(feature = "serde", serde(default))]
+    aperture: Option<Aperture>,
+}
+
+impl Parts {
+    fn sensor(self) -> Result<Sensor, SensorError> {
+        let Self { to_world, lens, film, window, filter, response, aperture } = self;
+        let mut sensor = match response {
+            Response::Orthographic => Sensor::orthographic(&to_world, lens, film, filter)?,
+            _ => {
+                let camera = Sensor::from_to_world(&to_world, lens, film, filter)?;
+                Sensor { response, ..camera }
+            }
+        };
+        if let Some(window) = window {
+            sensor = sensor.seen_in(window)?;
+        }
+        match aperture {
+            Some(aperture) => sensor.with_aperture(aperture),
+            None => Ok(sensor),
+        }
+    }
 }
 
 #[cfg(feature = "serde")]
 impl TryFrom<Parts> for Sensor {
     type Error = SensorError;
     fn try_from(p: Parts) -> Result<Self, SensorError> {
-        Self::of_response(p.response, &p.to_world, p.lens, p.film, p.filter)
+        p.sensor()
     }
 }
 
@@ -327,7 +374,16 @@ impl TryFrom<Parts> for Sensor {
 impl From<Sensor> for Parts {
     fn from(s: Sensor) -> Self {
         let (to_world, response) = (s.to_world(), s.response);
-        Self { to_world, lens: s.lens, film: s.film, filter: s.filter, response }
+        let window = (s.window != Window::of(s.film)).then_some(s.window);
+        Self {
+            to_world,
+            lens: s.lens,
+            film: s.film,
+            window,
+            filter: s.filter,
+            response,
+            aperture: s.aperture,
+        }
     }
 }
 

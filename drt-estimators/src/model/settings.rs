@@ -207,6 +207,12 @@ impl Settings {
         if derivatives && self.sampling == PathSampling::Bidirectional && !has_both_ends {
             return fail("sampling", SettingError::OtherKinds);
         }
-        scene.sensor(self.sensor).map(|_| ())
+        let camera = &scene.sensor(self.sensor)?.item.sensor;
+        if self.sampling == PathSampling::Bidirectional
+            && (camera.aperture().is_some() || scene.hides_something())
+        {
+            return fail("sampling", SettingError::NoLightPaths);
+        }
+        Ok(())
     }
 }

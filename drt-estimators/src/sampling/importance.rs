@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Vec3};
 
+use crate::model::sensor::Sensor;
 use crate::sampling::flight::{Flown, medium_span};
 use crate::sampling::mode::{ImportanceMode, TransportMode};
 use crate::sampling::trace::{Alive, Flight, Observer, PathState, Pixel, Tracer};
@@ -32,6 +33,22 @@ impl Observer for Vec<Splat> {
             self.push(Splat { pixel, segments, value });
         }
     }
+}
+
+/// Direction from a vertex to the camera, and importance without filter over squared distance;
+/// `None` when no pixel can see the point.
+pub(crate) fn see(camera: &Sensor, v: &Vertex) -> Option<(Vec3, f64)> {
+    let projection = camera.view(v.x);
+    let r = camera.filter().radius();
+    let film = camera.film().map(f64::from);
+    let inside = |q: f64, n: f64| q > -r && q < n + r;
+    let [x, y] = projection.pixel;
+    if !(projection.depth > 0.0 && inside(x, film[0]) && inside(y, film[1])) {
+        return None;
+    }
+    let d = camera.eye_of(v.x) - v.x;
+    let r2 = d.length_squared();
+    Some((d.normalize(), projection.importance / r2))
 }
 
 impl Tracer<'_> {
@@ -93,31 +110,20 @@ impl Tracer<'_> {
         observer: &mut O,
     ) {
         let Some(scattering) = self.world.scattering(v) else { return };
-        let Some((wo, transport)) = self.see(v) else { return };
+        let world = self.world;
+        let lens = world.camera.draw_lens(&mut self.rng);
+        let camera = &*world.camera.at_lens(lens);
+        let Some((wo, transport)) = see(camera, v) else { return };
         let f = ImportanceMode::value(&scattering, wi, wo);
-        self.spread(v, value * f, transport, wo, segments, observer);
+        self.spread(camera, v, value * f, transport, wo, segments, observer);
     }
 
-    /// Direction from a vertex to the camera, and importance without filter over squared distance;
-    /// `None` when no pixel can see the point.
-    pub(crate) fn see(&self, v: &Vertex) -> Option<(Vec3, f64)> {
-        let camera = &self.world.camera;
-        let projection = camera.view(v.x);
-        let r = camera.filter().radius();
-        let film = camera.film().map(f64::from);
-        let inside = |q: f64, n: f64| q > -r && q < n + r;
-        let [x, y] = projection.pixel;
-        if !(projection.depth > 0.0 && inside(x, film[0]) && inside(y, film[1])) {
-            return None;
-        }
-        let d = camera.eye_of(v.x) - v.x;
-        let r2 = d.length_squared();
-        Some((d.normalize(), projection.importance / r2))
-    }
-
-    /// Adds `value · transport · transmittance` to the pixels around a vertex's image.
+    /// Adds `value · transport · transmittance` to the pixels around a vertex's image by the camera, or the pinhole that it
+    /// is at a point of its lens.
+    #[allow(clippy::too_many_arguments)]
     pub(crate) fn spread<O: Observer>(
         &mut self,
+        camera: &Sensor,
         v: &Vertex,
         value: Rgb,
         transport: f64,
@@ -129,16 +135,16 @@ impl Tracer<'_> {
             return;
         }
         let world = self.world;
-        let eye = world.camera.eye_of(v.x);
+        let eye = camera.eye_of(v.x);
         let distance = (eye - v.x).length();
         if !world.connect(v, wo, distance, None, &mut self.shadow, &mut self.counters) {
             return;
         }
         let tau = world.transmittance(v.x, wo, &self.shadow, &mut self.rng, &mut self.counters);
         let value = value * tau * transport;
-        let pixel = world.camera.view(v.x).pixel;
-        let width = world.camera.film()[0];
-        for p in world.camera.footprint(pixel) {
+        let pixel = camera.view(v.x).pixel;
+        let width = camera.film()[0];
+        for p in camera.footprint(pixel) {
             let [x, y] = p.pixel;
             observer.contribution(Pixel::At(y * width + x), segments, value * p.weight);
         }

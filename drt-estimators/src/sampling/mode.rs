@@ -153,9 +153,10 @@ impl TransportMode for ImportanceMode {
         tracer.connect_camera(&stop.vertex, stop.from, value, stop.segments + 1, observer);
     }
 
-    // Parallel rays do not crowd anywhere.
+    // Parallel rays do not crowd anywhere, and those of a lens not in one point.
     fn has_points(world: &World) -> bool {
         !world.camera.is_orthographic()
+            && world.camera.aperture().is_none()
             && world.camera_medium.is_some_and(|m| world.tracking[m] == Tracking::Vertices)
     }
 

@@ -62,6 +62,8 @@ impl Node {
 pub(crate) struct PathRecord {
     /// Where the camera's ray starts.
     pub(crate) origin: Vec3,
+    /// The point of the lens where it does, as [`ViewSample::lens`].
+    pub(crate) lens: [f64; 2],
     pub(crate) nodes: Vec<Node>,
     pub(crate) crossings: Vec<Crossing>,
     pub(crate) connections: Vec<(Connection, Range<usize>)>,
@@ -77,7 +79,7 @@ pub(crate) struct PathRecord {
 impl PathRecord {
     /// Empties the record for a camera ray of a `pixel` with filter weight `value`.
     pub(crate) fn begin(&mut self, pixel: [u32; 2], view: &ViewSample, value: Rgb) {
-        (self.pixel, self.origin) = (pixel, view.origin);
+        (self.pixel, self.origin, self.lens) = (pixel, view.origin, view.lens);
         self.nodes.clear();
         self.crossings.clear();
         self.connections.clear();

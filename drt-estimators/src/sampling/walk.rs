@@ -93,7 +93,12 @@ impl Tracer<'_> {
     ) -> Option<PathState> {
         let origin = leaving.vertex.x;
         let mut ray = self.ray.take().unwrap_or_default();
-        self.world.cast(&leaving.vertex, leaving.dir, &mut ray, &mut self.counters);
+        let (world, counters) = (self.world, &mut self.counters);
+        if world.hides_emitters && M::EMISSION && leaving.segments == 0 {
+            world.cast_past_emitters(&leaving.vertex, leaving.dir, &mut ray, counters);
+        } else {
+            world.cast(&leaving.vertex, leaving.dir, &mut ray, counters);
+        }
         observer.ray(self.world, leaving, &ray);
         let span = self.equiangular::<M, O>(leaving, &ray, observer);
         let stop = match self.travel(origin, leaving.dir, &ray, leaving.alive.value) {
@@ -210,6 +215,9 @@ impl Tracer<'_> {
     ) {
         let environment = self.world.lights.environment().filter(|_| M::EMISSION);
         let Some(environment) = environment else { return };
+        if self.world.hides_emitters && leaving.segments == 0 {
+            return;
+        }
         let throughput = leaving.throughput * arrival;
         let emission_weight = match leaving.pdf {
             Some(p) => p / (p + environment.pdf(leaving.dir)),

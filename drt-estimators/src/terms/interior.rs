@@ -262,15 +262,17 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     }
 
     fn path(&mut self, pixel: u32, unit: u32, u: [f64; 2], rng: Rng, values: &mut [Rgb]) {
-        let camera = &self.world.camera;
+        let mut rng = rng;
+        // What places an edge, or a point of the lens, comes before what the path takes an unknown number of.
+        let lens = self.world.camera.draw_lens(&mut rng);
+        let camera = &*self.world.camera.at_lens(lens);
         let derivative = self.workers.iter().any(Worker::differentiates_filter);
         let s = match self.image {
             ImageSampling::Squares => camera.sample_square(pixel, u),
             _ => camera.sample_view(pixel, u, derivative),
         };
+        let s = ViewSample { lens, ..s };
         let weight = Rgb::splat(s.weight);
-        // What places an edge comes before what the path takes an unknown number of.
-        let mut rng = rng;
         let queries = self.workers.iter().any(|w| w.along.queries.any());
         let query = queries.then(|| EdgeQuery::reserve(&mut rng));
         self.tracer.rng = rng;

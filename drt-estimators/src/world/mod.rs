@@ -175,7 +175,7 @@ pub(crate) struct World {
     /// The sensor in use and the medium around it.
     pub(crate) camera: crate::model::sensor::Sensor,
     pub(crate) camera_medium: Option<usize>,
-    /// That around the film, where rays of an orthographic camera start.
+    /// That around the film or the lens, where rays of an orthographic camera, or one with an aperture, start.
     pub(crate) film_medium: SurroundingMedium,
     pub(crate) tracking: Vec<Tracking>,
     /// Least probability of a scattering vertex per tentative collision, per medium: nonzero
@@ -190,6 +190,8 @@ pub(crate) struct World {
     steady: Option<Vec<Option<Homogeneous>>>,
     pub(crate) max_depth: u32,
     pub(crate) rr_depth: u32,
+    /// Rays from the camera pass area emitters, and see no environment.
+    pub(crate) hides_emitters: bool,
     pub(crate) geometry: Arc<Geometry>,
     null: Vec<bool>,
     pub(crate) any_null: bool,
@@ -244,6 +246,7 @@ impl World {
                 .map(|w| w.scene.media.iter().map(|m| m.item.homogeneous().copied()).collect()),
             max_depth: depth,
             rr_depth: scene.integrator.rr_depth,
+            hides_emitters: scene.hides_something(),
             any_null: null.iter().any(|n| *n),
             geometry,
             null,
@@ -359,6 +362,11 @@ impl World {
         self.film_medium = match camera {
             Surrounding::Counted if self.camera.is_orthographic() => {
                 self.medium_near(&Aabb::around(self.camera.film_corners()))
+            }
+            Surrounding::Counted if self.camera.aperture().is_some() => {
+                let square = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
+                let corner = |at| self.camera.at_lens(at).position();
+                self.medium_near(&Aabb::around(square.map(corner)))
             }
             _ => SurroundingMedium::Uniform(self.camera_medium),
         };

@@ -20,7 +20,19 @@ impl World {
     /// Follows a ray from `v` along the unit direction `dir` to the first surface that scatters.
     pub(crate) fn cast(&self, v: &Vertex, dir: Vec3, path: &mut RayPath, counters: &mut Counters) {
         path.medium = self.medium_toward(v, dir);
-        self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v);
+        self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v, false);
+    }
+
+    /// As [`World::cast`], past area emitters as if they were null interfaces.
+    pub(crate) fn cast_past_emitters(
+        &self,
+        v: &Vertex,
+        dir: Vec3,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) {
+        path.medium = self.medium_toward(v, dir);
+        self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v, true);
     }
 
     /// As [`World::cast`] from a point on an edge, past the edge's own faces.
@@ -35,9 +47,11 @@ impl World {
     ) {
         path.medium = medium;
         let v = Vertex { x, medium, kind: Kind::Point };
-        self.cast_from(x, Skip::two(faces[0], faces[1]), dir, path, counters, &v);
+        self.cast_from(x, Skip::two(faces[0], faces[1]), dir, path, counters, &v, false);
     }
 
+    #[allow(clippy::too_many_arguments)]
+    #[inline]
     fn cast_from(
         &self,
         origin: Vec3,
@@ -46,6 +60,7 @@ impl World {
         path: &mut RayPath,
         counters: &mut Counters,
         v: &Vertex,
+        past_emitters: bool,
     ) {
         path.crossings.clear();
         path.end = None;
@@ -65,8 +80,12 @@ impl World {
         }
         counters.rays += 1;
         let ray = Ray { origin, dir, t_max: f64::INFINITY };
-        let end = if self.any_null {
-            let blocks = |prim: u32| !self.is_null(self.geometry.prims[prim as usize].shape);
+        let end = if self.any_null || past_emitters {
+            let blocks = |prim: u32| {
+                let shape = self.geometry.prims[prim as usize].shape;
+                let passed = past_emitters && self.scene.shapes[shape as usize].emitter.is_some();
+                !(self.is_null(shape) || passed)
+            };
             let end = self.geometry.bvh.closest_through(&ray, skip, blocks, &mut path.hits);
             self.cross(path, dir, medium);
             end

@@ -76,7 +76,8 @@ impl Build {
             sample_count: None,
         };
         self.0.sensors.push(Named::new("camera", item));
-        self.0.integrator = Integrator { max_depth: Some(max_depth), rr_depth: 3 };
+        self.0.integrator =
+            Integrator { max_depth: Some(max_depth), rr_depth: 3, ..Integrator::default() };
         self.0
     }
 }

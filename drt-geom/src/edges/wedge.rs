@@ -131,6 +131,25 @@ impl Wedge {
         fm::atan2(da.cross(db).length(), da.dot(db))
     }
 
+    /// About the largest angle in radians that the edge subtends from points within a `radius` of `eye`, if it is a
+    /// silhouette from any; never 0 then, whichever it is.
+    #[must_use]
+    pub fn most_subtended(&self, eye: Vec3, radius: f64) -> f64 {
+        // From all such points both faces' planes, and so the faces, are on the same or on different sides.
+        let apart = |n: Vec3| (eye - self.ends[0]).dot(n);
+        let [s0, s1] = self.plane_normals().map(apart);
+        if s0 * s1 < 0.0 && f64::min(Real::abs(s0), Real::abs(s1)) > radius {
+            return 0.0;
+        }
+        let [da, db] = self.ends.map(|p| p - eye);
+        let near = f64::max(da.length(), db.length()) * 1e-3;
+        let angle = fm::atan2(da.cross(db).length(), da.dot(db));
+        f64::max(
+            angle,
+            self.length * radius / (da.length_squared() + radius * radius + near * near),
+        )
+    }
+
     /// The edge's length seen along the unit direction `w`; 0 where it is no silhouette.
     #[must_use]
     pub fn projected_length(&self, w: Vec3) -> f64 {

@@ -38,7 +38,8 @@ impl Set {
         let lens = Lens::with_fov(fov);
         let sensor = Sensor::look_at([origin, target, up], lens, [SIZE; 2], filter)?;
         let sensor = SceneSensor { sensor, medium: Surrounding::Counted, sample_count: None };
-        let integrator = Integrator { max_depth: Some(depth), rr_depth: depth };
+        let integrator =
+            Integrator { max_depth: Some(depth), rr_depth: depth, ..Integrator::default() };
         let sensors = vec![Named::new("camera", sensor)];
         Ok(Self { scene: Scene { sensors, integrator, ..Scene::default() } })
     }

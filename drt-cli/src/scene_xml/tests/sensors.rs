@@ -1,5 +1,5 @@
 use drt_estimators::filter::FilterKind;
-use drt_estimators::sensor::FovAxis;
+use drt_estimators::sensor::{Aperture, FovAxis};
 use drt_estimators::{Integrator, SceneSensor, Surrounding};
 use drt_math::{Vec3, vec3};
 
@@ -61,11 +61,34 @@ fn unusable_sensors() {
     wrong(r#"<string name="focal_length" value="far"/>"#, "50mm");
     wrong(r#"<film type="ldrfilm"/>"#, "hdrfilm");
     wrong(r#"<film type="hdrfilm"><integer name="width" value="0"/></film>"#, "`width` is 0");
-    wrong(r#"<film type="hdrfilm"><integer name="crop_width" value="3"/></film>"#, "crop_width");
+    for (name, value, part) in [
+        ("crop_width", 0, "`crop_width` is 0"),
+        ("crop_width", 769, "769x576 pixels at (0, 0), which is not inside the film of 768x576"),
+        ("crop_offset_y", 576, "at (0, 576), which is not inside"),
+        ("crop_offset_x", -1, "`crop_offset_x` is -1"),
+    ] {
+        let crop = format!(r#"<integer name="{name}" value="{value}"/>"#);
+        wrong(&format!(r#"<film type="hdrfilm">{crop}</film>"#), part);
+    }
     wrong(r#"<film type="hdrfilm"><rfilter type="lanczos"/></film>"#, "lanczos");
     wrong(r#"<transform name="to_world"><scale value="2"/></transform>"#, "scales or shears");
     wrong(r#"<sampler type="independent"><integer name="sample_count" value="0"/></sampler>"#, "0");
-    refused("<sensor type=\"thinlens\"/>", &["perspective or orthographic"]);
+    refused("<sensor type=\"distant\"/>", &["perspective, thinlens or orthographic"]);
+    for (inside, part) in [
+        ("", "`aperture_radius` is missing"),
+        (r#"<float name="aperture_radius" value="-1"/>"#, "`aperture_radius` is -1"),
+        (
+            r#"<float name="aperture_radius" value="1"/><float name="focus_distance" value="0"/>"#,
+            "`focus_distance` is 0",
+        ),
+        (
+            r#"<float name="aperture_radius" value="1"/>
+               <float name="principal_point_offset_x" value="0"/>"#,
+            "principal_point_offset_x",
+        ),
+    ] {
+        refused(&format!("<sensor type=\"thinlens\">\n{inside}</sensor>"), &[part]);
+    }
     for (inside, part) in [
         (r#"<float name="fov" value="30"/>"#, "fov"),
         (r#"<transform name="to_world"><scale x="2"/></transform>"#, "stretched along one axis"),
@@ -73,6 +96,32 @@ fn unusable_sensors() {
     ] {
         refused(&format!("<sensor type=\"orthographic\">\n{inside}</sensor>"), &[part]);
     }
+}
+
+#[test]
+fn crop_windows_and_lenses() {
+    let film = |crop: &str| {
+        format!(
+            r#"<film type="hdrfilm"><integer name="width" value="40"/>
+               <integer name="height" value="30"/>{crop}</film>"#
+        )
+    };
+    let crop = r#"<integer name="crop_offset_x" value="10"/><integer name="crop_offset_y" value="3"/>
+                  <integer name="crop_width" value="8"/><integer name="crop_height" value="9"/>"#;
+    let (whole, part) = (sensor(&film("")).sensor, sensor(&film(crop)).sensor);
+    assert_eq!(part.film(), [8, 9]);
+    assert_eq!(part.ray([2.5, 4.0]), whole.ray([12.5, 7.0]));
+    let rest = sensor(&film(r#"<integer name="crop_offset_x" value="10"/>"#)).sensor;
+    assert_eq!(rest.film(), [30, 30]);
+    let lens = |inside: &str| {
+        let text = format!("<sensor type=\"thinlens\">{inside}</sensor>");
+        scene(&text).sensors.remove(0).item.sensor.aperture()
+    };
+    let radius = r#"<float name="aperture_radius" value="0.5"/>"#;
+    assert_eq!(lens(radius), Some(Aperture { radius: 0.5, focus_distance: 1e4 }));
+    let near = format!(r#"{radius}<float name="focus_distance" value="3"/>"#);
+    assert_eq!(lens(&near), Some(Aperture { radius: 0.5, focus_distance: 3.0 }));
+    assert_eq!(lens(r#"<float name="aperture_radius" value="0"/>"#), None);
 }
 
 #[test]
@@ -107,11 +156,16 @@ fn integrators() {
     let read = |inside: &str| {
         scene(&format!("<integrator type=\"volpathmis\">{inside}</integrator>")).integrator
     };
-    assert_eq!(scene("").integrator, Integrator { max_depth: None, rr_depth: 5 });
+    assert_eq!(
+        scene("").integrator,
+        Integrator { max_depth: None, rr_depth: 5, hide_emitters: false }
+    );
     assert_eq!(read("").max_depth, None);
     assert_eq!(read(r#"<integer name="max_depth" value="-1"/>"#).max_depth, None);
     let both = r#"<integer name="max_depth" value="7"/><integer name="rr_depth" value="3"/>"#;
-    assert_eq!(read(both), Integrator { max_depth: Some(7), rr_depth: 3 });
+    let read_both = Integrator { max_depth: Some(7), rr_depth: 3, hide_emitters: false };
+    assert_eq!(read(both), read_both);
+    assert!(read(r#"<boolean name="hide_emitters" value="true"/>"#).hide_emitters);
     let old = old_scene(
         r#"<integrator type="volpathAD"><integer name="rrDepth" value="9"/></integrator>"#,
     );
@@ -120,8 +174,8 @@ fn integrators() {
         (r#"<integrator type="aov"/>"#, "one integrator inside"),
         (r#"<integrator type="path"><integer name="max_depth" value="-2"/></integrator>"#, "-2"),
         (
-            r#"<integrator type="path"><boolean name="hide_emitters" value="true"/></integrator>"#,
-            "hide_emitters",
+            r#"<integrator type="path"><boolean name="strict_normals" value="true"/></integrator>"#,
+            "strict_normals",
         ),
         (r#"<integrator type="path"/><integrator type="path"/>"#, "only one integrator"),
     ] {

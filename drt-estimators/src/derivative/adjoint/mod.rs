@@ -27,6 +27,7 @@ mod segment;
 mod shadows;
 mod turning;
 
+use alloc::borrow::Cow;
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Rng, Vec3};
@@ -43,7 +44,7 @@ use crate::derivative::sensitivity::{
 use crate::derivative::velocity::{
     Auxiliary, Probe, RayTurn, RecordedPath, TurnPart, TurnParts, VertexVelocity,
 };
-use crate::model::sensor::SensorGradient;
+use crate::model::sensor::{Sensor, SensorGradient};
 use crate::sampling::record::{Role, Scattered};
 use crate::sampling::streams::VELOCITY_STREAM;
 use crate::sampling::trace::{Connection, Endpoint};
@@ -105,6 +106,8 @@ impl<'p> RecordedPath<'p> {
 /// The backward sweep and its buffers.
 pub(crate) struct Differentiator<'w> {
     world: &'w World,
+    /// The camera, at the path's point of its lens.
+    camera: Cow<'w, Sensor>,
     /// Rays do not turn, and vertices do not move with what auxiliary rays find: to tell how much that is.
     pub(crate) edges_at_rest: bool,
     locals: Vec<Local>,
@@ -130,6 +133,7 @@ impl<'w> Differentiator<'w> {
     pub(crate) fn new(world: &'w World) -> Self {
         Self {
             world,
+            camera: Cow::Borrowed(&world.camera),
             edges_at_rest: false,
             locals: Vec::new(),
             points: Vec::new(),
@@ -168,6 +172,7 @@ impl<'w> Differentiator<'w> {
         }
         self.rng = rng;
         self.filter = filter;
+        self.camera = self.world.camera.at_lens(path.record.lens);
         (self.turn, self.origin) = (RgbVec::ZERO, RgbVec::ZERO);
         self.sensor = [SensorGradient::default(); 3];
         self.locals.clear();
@@ -571,7 +576,7 @@ impl<'w> Differentiator<'w> {
     /// The camera's importance and filter towards a vertex, or the environment, that `value` reaches it
     /// from per unit of the filter's weight.
     fn seen(&self, vertex: Option<&Vertex>, dir: Vec3, value: Rgb, weight: Rgb) -> ByView {
-        let camera = &self.world.camera;
+        let camera = &*self.camera;
         let x = vertex.map_or(camera.position() + dir, |v| v.x);
         let projection = camera.view(x);
         let total = (value * weight).to_array();

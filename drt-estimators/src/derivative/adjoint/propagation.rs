@@ -254,11 +254,10 @@ impl Differentiator<'_> {
         if !sink.active().sensor {
             return;
         }
-        let camera = &self.world.camera;
         let gradient = |origin: Vec3, turn: Vec3, seen: &SensorGradient| {
-            let mut g = camera.ray_gradient(record.origin, record.nodes[0].wi, origin, turn);
+            let mut g = self.camera.ray_gradient(record.origin, record.nodes[0].wi, origin, turn);
             g += *seen;
-            g
+            self.world.camera.lens_gradient(record.lens, g)
         };
         sink.sensor(&[
             gradient(origin.r, turn.r, &seen[0]),

@@ -44,6 +44,20 @@ pub enum ElementError {
          `path-space` and `radiative` have them"
     )]
     ParallelRays,
+    /// A lens where edges are to be followed in view.
+    #[error(
+        "it has an aperture, and only `path-space` and finite differences have derivatives of what moves in the view of a lens"
+    )]
+    Lens,
+    /// Derivatives where the camera does not see emitters.
+    #[error(
+        "`hide_emitters` is true, and `{parameter}` can only be differentiated by finite differences where the \
+         camera sees through emitters"
+    )]
+    HiddenEmitters {
+        /// The parameter, or what else was to be differentiated by.
+        parameter: String,
+    },
     /// Derivatives in material form by an orthographic camera whose film is in a medium.
     #[error(
         "its film is in a medium that scatters, and it or the medium's inside moves: `path-space` has no \

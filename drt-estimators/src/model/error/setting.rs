@@ -55,6 +55,12 @@ pub enum SettingError {
         "bidirectional sampling is for images, and for derivatives by path-space and warped (with edges) alone"
     )]
     OtherKinds,
+    /// Paths from both ends, by a camera to which light paths are not connected.
+    #[error(
+        "bidirectional sampling has no lenses and no hidden emitters: the sensor has an aperture, or the \
+         integrator hides emitters; use unidirectional"
+    )]
+    NoLightPaths,
     /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
     #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
     JumpingFilter,

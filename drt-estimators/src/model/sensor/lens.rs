@@ -1,6 +1,6 @@
 use drt_math::fm;
 
-use crate::model::sensor::{Sensor, SensorError, finite};
+use crate::model::sensor::{SensorError, finite};
 
 /// The side of the film that the field of view is measured along.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,9 +58,8 @@ impl Lens {
         2.0 * fm::atan(fm::sqrt(36.0 * 36.0 + 24.0 * 24.0) / (2.0 * millimetres)).to_degrees()
     }
 
-    /// Checks the lens against a film and gives the side of a pixel on the plane at distance one.
-    pub(super) fn pixel_size(&self, film: [u32; 2]) -> Result<f64, SensorError> {
-        Sensor::check_film(film)?;
+    /// Checks the lens and gives the side of a pixel on the plane at distance one, for a film of a width and height in pixels.
+    pub(super) fn pixel_size(&self, film: [f64; 2]) -> Result<f64, SensorError> {
         if !(self.fov > 0.0 && self.fov < 180.0) {
             return Err(SensorError::FieldOfView(self.fov));
         }
@@ -73,22 +72,21 @@ impl Lens {
     }
 
     /// Derivative of the pixel size with respect to the field of view in degrees.
-    pub(super) fn pixel_size_slope(&self, film: [u32; 2]) -> f64 {
+    pub(super) fn pixel_size_slope(&self, film: [f64; 2]) -> f64 {
         let t = fm::tan(self.half_angle());
         1.0_f64.to_radians() * (1.0 + t * t) / self.pixels_along_axis(film)
     }
 
     /// Pixel coordinates of the forward axis.
-    pub(super) fn principal_point(&self, film: [u32; 2]) -> [f64; 2] {
-        [0, 1].map(|k| f64::from(film[k]) * (0.5 - self.principal_point_offset[k]))
+    pub(super) fn principal_point(&self, film: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| film[k] * (0.5 - self.principal_point_offset[k]))
     }
 
     fn half_angle(&self) -> f64 {
         0.5 * self.fov.to_radians()
     }
 
-    fn pixels_along_axis(&self, film: [u32; 2]) -> f64 {
-        let [w, h] = film.map(f64::from);
+    fn pixels_along_axis(&self, [w, h]: [f64; 2]) -> f64 {
         match self.fov_axis {
             FovAxis::X => w,
             FovAxis::Y => h,

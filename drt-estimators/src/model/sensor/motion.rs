@@ -2,7 +2,7 @@
 
 use drt_math::{Affine, Rgb, Vec3};
 
-use crate::model::sensor::{Lens, Sensor, SensorError, SensorTangent, unit};
+use crate::model::sensor::{Aperture, Lens, Sensor, SensorError, SensorTangent, unit};
 
 /// Gram–Schmidt on (right, up, forward), forward first and right last.
 ///
@@ -59,14 +59,15 @@ impl Sensor {
     }
 
     /// A property that a parameter can change, three equal numbers. Names and units are the scene
-    /// file's: `fov` (degrees, along its axis), `principal_point_offset_x` and `_y`.
+    /// file's: `fov` (degrees, along its axis), `principal_point_offset_x` and `_y`; of a thin lens `aperture_radius`
+    /// and `focus_distance`, too.
     ///
     /// # Errors
     /// When cameras have no such property.
     pub fn property(&self, name: &str) -> Result<Rgb, SensorError> {
         self.has_properties(name)?;
-        let mut lens = self.lens;
-        Ok(Rgb::splat(*slot(&mut lens, name)?.1))
+        let mut numbers = (self.lens, self.aperture);
+        Ok(Rgb::splat(*slot(&mut numbers, name)?.1))
     }
 
     /// The camera with a property changed.
@@ -75,10 +76,15 @@ impl Sensor {
     /// When there is no such property, or the value is unusable.
     pub fn with_property(&self, name: &str, value: Rgb) -> Result<Self, SensorError> {
         self.has_properties(name)?;
-        let mut lens = self.lens;
-        let (known, number) = slot(&mut lens, name)?;
+        let mut numbers = (self.lens, self.aperture);
+        let (known, number) = slot(&mut numbers, name)?;
         *number = scalar(known, value)?;
-        self.with(lens, self.film)
+        let (lens, aperture) = numbers;
+        let camera = self.with(lens, self.film, self.window)?;
+        match aperture {
+            Some(aperture) => camera.with_aperture(aperture),
+            None => Ok(camera),
+        }
     }
 
     /// The rates of the camera when a property has the given rate.
@@ -87,13 +93,18 @@ impl Sensor {
     /// When there is no such property, or the rates differ.
     pub fn property_tangent(&self, name: &str, rate: Rgb) -> Result<SensorTangent, SensorError> {
         self.has_properties(name)?;
-        let mut lens = Lens { fov: 0.0, principal_point_offset: [0.0, 0.0], ..self.lens };
-        let (known, number) = slot(&mut lens, name)?;
+        let lens = Lens { fov: 0.0, principal_point_offset: [0.0, 0.0], ..self.lens };
+        let none = Aperture { radius: 0.0, focus_distance: 0.0 };
+        let mut numbers = (lens, self.aperture.map(|_| none));
+        let (known, number) = slot(&mut numbers, name)?;
         *number = scalar(known, rate)?;
+        let (lens, aperture) = (numbers.0, numbers.1.unwrap_or(none));
         let [x, y] = lens.principal_point_offset;
         Ok(SensorTangent {
-            pixel_size: lens.fov * self.lens.pixel_size_slope(self.film),
-            principal: [-x * f64::from(self.film[0]), -y * f64::from(self.film[1])],
+            pixel_size: lens.fov * self.lens.pixel_size_slope(self.window.whole),
+            principal: [-x * self.window.whole[0], -y * self.window.whole[1]],
+            aperture_radius: aperture.radius,
+            focus_distance: aperture.focus_distance,
             ..SensorTangent::default()
         })
     }
@@ -106,7 +117,15 @@ impl Sensor {
 }
 
 /// The number a property name stands for.
-fn slot<'a>(lens: &'a mut Lens, name: &str) -> Result<(&'static str, &'a mut f64), SensorError> {
+fn slot<'a>(
+    (lens, aperture): &'a mut (Lens, Option<Aperture>),
+    name: &str,
+) -> Result<(&'static str, &'a mut f64), SensorError> {
+    match (name, aperture) {
+        ("aperture_radius", Some(a)) => return Ok(("aperture_radius", &mut a.radius)),
+        ("focus_distance", Some(a)) => return Ok(("focus_distance", &mut a.focus_distance)),
+        _ => {}
+    }
     match name {
         "fov" => Ok(("fov", &mut lens.fov)),
         "principal_point_offset_x" => {

@@ -33,8 +33,8 @@ use drt_math::{Affine, Mat3, Real, Vec3};
 
 use crate::model::filter::Filter;
 use crate::model::sensor::{
-    CameraRay, Lens, Pinhole, Projection, Response, Sensor, SensorError, SensorGradient, finite,
-    motion,
+    CameraRay, Lens, Pinhole, Projection, Response, Sensor, SensorError, SensorGradient, Window,
+    finite, motion,
 };
 
 /// How much more one axis of a film may be stretched than the other, or sheared: what printed matrices are off by.
@@ -56,8 +56,10 @@ impl Sensor {
         filter: Filter,
     ) -> Result<Self, SensorError> {
         finite(to_world.is_finite(), "to_world")?;
-        // Checks the film and the clip planes.
-        lens.pixel_size(film)?;
+        Self::check_film(film)?;
+        let window = Window::of(film);
+        // Checks the clip planes.
+        lens.pixel_size(window.whole)?;
         let [left, up, forward] = to_world.linear.cols;
         let scale = square(-left, up, forward)?;
         let axes = motion::orthonormalize([-left, up, forward]);
@@ -72,7 +74,8 @@ impl Sensor {
             pixel_size: 2.0 * scale / f64::from(film[0]),
             principal: film.map(|n| 0.5 * f64::from(n)),
         };
-        Ok(Self { pinhole, lens, film, filter, response: Response::Orthographic })
+        let response = Response::Orthographic;
+        Ok(Self { pinhole, lens, film, window, filter, response, aperture: None })
     }
 
     /// True of a camera of parallel rays.
@@ -121,7 +124,7 @@ impl Sensor {
 
     pub(super) fn orthographic_to_world(&self) -> Affine {
         let Pinhole { position, right, up, forward, pixel_size, .. } = self.pinhole;
-        let scale = 0.5 * pixel_size * f64::from(self.film[0]);
+        let scale = 0.5 * pixel_size * self.window.whole[0];
         Affine {
             linear: Mat3 { cols: [right * -scale, up * scale, forward] },
             translation: position - forward * self.lens.near,
@@ -206,6 +209,7 @@ pub(super) fn projection_gradient(
         pixel_size: -per_size
             * (along_a * p.plane[0] + along_b * p.plane[1] + 2.0 * importance_adjoint),
         principal: pixel_adjoint,
+        ..SensorGradient::default()
     };
     (point, gradient)
 }
@@ -229,5 +233,6 @@ pub(super) fn ray_gradient(
         forward: turn,
         pixel_size: (to_a * a + to_b * b) / s,
         principal: [-s * to_a, s * to_b],
+        ..SensorGradient::default()
     }
 }

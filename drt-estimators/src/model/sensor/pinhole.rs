@@ -54,6 +54,10 @@ pub struct SensorTangent {
     pub pixel_size: f64,
     /// Rate of the principal point, in pixels.
     pub principal: [f64; 2],
+    /// Rate of the lens's radius.
+    pub aperture_radius: f64,
+    /// Rate of the depth that is sharp.
+    pub focus_distance: f64,
 }
 
 /// Derivatives of a number with respect to what a [`SensorTangent`] holds the rates of.
@@ -71,6 +75,10 @@ pub struct SensorGradient {
     pub pixel_size: f64,
     /// With respect to the principal point.
     pub principal: [f64; 2],
+    /// With respect to the lens's radius.
+    pub aperture_radius: f64,
+    /// With respect to the depth that is sharp.
+    pub focus_distance: f64,
 }
 
 impl<T: Real> Pinhole<T> {
@@ -139,6 +147,7 @@ impl Pinhole {
                     + pixel_adjoint[1] * (p.pixel[1] - self.principal[1])
                     + 2.0 * importance_adjoint),
             principal: pixel_adjoint,
+            ..SensorGradient::default()
         };
         (point, camera)
     }
@@ -176,6 +185,7 @@ impl Pinhole {
             forward,
             pixel_size: (to_a * a + to_b * b) / self.pixel_size,
             principal: [-self.pixel_size * to_a, self.pixel_size * to_b],
+            ..SensorGradient::default()
         }
     }
 }
@@ -200,6 +210,8 @@ impl SensorGradient {
             forward: self.forward * w,
             pixel_size: self.pixel_size * w,
             principal: self.principal.map(|p| p * w),
+            aperture_radius: self.aperture_radius * w,
+            focus_distance: self.focus_distance * w,
         }
     }
 
@@ -214,6 +226,8 @@ impl SensorGradient {
             + self.pixel_size * t.pixel_size
             + self.principal[0] * t.principal[0]
             + self.principal[1] * t.principal[1]
+            + self.aperture_radius * t.aperture_radius
+            + self.focus_distance * t.focus_distance
     }
 }
 
@@ -229,6 +243,8 @@ macro_rules! sum {
                 self.pixel_size += o.pixel_size;
                 self.principal[0] += o.principal[0];
                 self.principal[1] += o.principal[1];
+                self.aperture_radius += o.aperture_radius;
+                self.focus_distance += o.focus_distance;
             }
         }
     )*};

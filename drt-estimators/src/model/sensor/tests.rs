@@ -1,3 +1,4 @@
+mod lens;
 mod mitsuba;
 mod motion;
 mod orthographic;
@@ -182,6 +183,7 @@ fn random_tangent(rng: &mut Rng) -> SensorTangent {
         forward: random_vec(rng),
         pixel_size: rng.next_f64(),
         principal: rng.next_2d(),
+        ..SensorTangent::default()
     }
 }
 
@@ -205,6 +207,7 @@ fn direction_rates_are_those_of_duals() {
                 forward: v(12),
                 pixel_size: e[15],
                 principal: [e[16], e[17]],
+                ..SensorGradient::default()
             };
             let expected = gradient.dot(&tangent);
             assert!((mine - expected).abs() < 1e-10 * (1.0 + expected.abs()));

@@ -41,6 +41,9 @@ pub struct ViewSample {
     pub weight: f64,
     /// Gradient of P by the image point, times h over the density.
     pub slope: [f64; 2],
+    /// The point of the lens on the unit disk, of a camera that has one: this is a view of the pinhole
+    /// [`at_lens`](Sensor::at_lens).
+    pub lens: [f64; 2],
 }
 
 impl Sensor {
@@ -78,7 +81,14 @@ impl Sensor {
                 let [x, y] = [pixel % width, pixel / width].map(|p| f64::from(p) + 0.5);
                 let point = [x + s.offset[0], y + s.offset[1]];
                 let CameraRay { origin, direction, .. } = self.ray(point);
-                ViewSample { origin, direction, point, weight: s.weight, slope: s.slope }
+                ViewSample {
+                    origin,
+                    direction,
+                    point,
+                    weight: s.weight,
+                    slope: s.slope,
+                    lens: [0.0; 2],
+                }
             }
             Response::Irradiance => {
                 let p = &self.pinhole;
@@ -89,6 +99,7 @@ impl Sensor {
                     point: [0.5; 2],
                     weight: core::f64::consts::PI,
                     slope: [0.0; 2],
+                    lens: [0.0; 2],
                 }
             }
         }
@@ -113,7 +124,8 @@ impl Sensor {
         let (y, of_y) = self.filter.sample_interval(pixel / w, h, u[1]);
         let point = [x, y];
         let CameraRay { origin, direction, .. } = self.ray(point);
-        ViewSample { origin, direction, point, weight: 1.0 / (of_x * of_y), slope: [0.0; 2] }
+        let weight = 1.0 / (of_x * of_y);
+        ViewSample { origin, direction, point, weight, slope: [0.0; 2], lens: [0.0; 2] }
     }
 
     /// Where and how strongly the sensor sees a point, visibility and clip planes apart. Points of

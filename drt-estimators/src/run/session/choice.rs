@@ -51,6 +51,9 @@ pub(super) fn chosen(
             "`auto` chooses for images; derivatives have paths from both ends where these are asked for",
         );
     }
+    if world.camera.aperture().is_some() || world.hides_emitters {
+        return without("light paths are connected to no lens, and do not know what is hidden");
+    }
     if world.max_depth < 2 || !world.lights.start_paths() {
         return without("there are no light paths to join");
     }

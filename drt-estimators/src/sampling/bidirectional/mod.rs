@@ -68,6 +68,7 @@ use crate::sampling::bidirectional::subpath::{
 };
 use crate::sampling::film::{Splat, SplatDensity};
 use crate::sampling::flight::proxy_attenuation;
+use crate::sampling::importance::see;
 use crate::sampling::mode::{ImportanceMode, RadianceMode, TransportMode};
 use crate::sampling::record::{
     Joint, JointObserver, LightPath, LightVertex, Radiance, Scattered, SeenVertex,
@@ -367,7 +368,7 @@ impl<'w> Bidirectional<'w> {
         }
         let world = self.world;
         let scattering = world.scattering(&y.vertex)?;
-        let (wo, transport) = tracer.see(&y.vertex)?;
+        let (wo, transport) = see(&world.camera, &y.vertex)?;
         if y.cosine(wo) < IN_PLANE {
             return None;
         }
@@ -403,6 +404,7 @@ impl<'w> Bidirectional<'w> {
                 point: world.camera.view(y.vertex.x).pixel,
                 weight,
                 slope: [0.0; 2],
+                lens: [0.0; 2],
             },
             value: light * arrival.throughput,
             arrival,

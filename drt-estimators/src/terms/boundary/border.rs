@@ -27,7 +27,8 @@ pub(crate) fn sample<R: BoundarySink>(
 ) -> Option<()> {
     tracer.counters.border_samples += 1;
     let world = tracer.world;
-    let camera = &world.camera;
+    let lens = world.camera.draw_lens(&mut tracer.rng);
+    let camera = &*world.camera.at_lens(lens);
     let film = camera.film();
     let radius = camera.filter().radius();
     // A side of a pixel's support, and a point on it.
@@ -71,7 +72,7 @@ pub(crate) fn sample<R: BoundarySink>(
         _ if camera.is_orthographic() => return None,
         _ => sensor.position = Vec3::ZERO,
     }
-    items.push(VelocityTerm::Sensor(sensor));
+    items.push(VelocityTerm::Sensor(world.camera.lens_gradient(lens, sensor)));
     if !receiver.moves(&b.functional) {
         return None;
     }

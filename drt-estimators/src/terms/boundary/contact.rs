@@ -4,24 +4,30 @@ use core::f64::consts::PI;
 
 use drt_math::{Frame, Rgb, Vec3, warp};
 
-use super::{BoundarySink, End, Sampler, Start};
+use super::{BoundarySink, End, Sampler, Start, seen};
 use crate::edges::contact::Contact;
 use crate::edges::edge::EdgePoint;
+use crate::model::sensor::Sensor;
 
 impl<R: BoundarySink> Sampler<'_, '_, R> {
     /// The camera sees the floor next to the edge.
-    pub(super) fn contact_with_camera(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
+    pub(super) fn contact_with_camera(
+        &mut self,
+        camera: &Sensor,
+        at: &EdgePoint<'_>,
+        c: &Contact,
+    ) -> Option<()> {
         let world = self.tracer.world;
-        let (w, distance) = c.towards(|x| world.camera.eye_of(x))?;
+        let (w, distance) = c.towards(|x| camera.eye_of(x))?;
         let (s, start) = self.contact(at, c, w)?;
-        let transport = self.seen(&start)?;
+        let transport = seen(camera, &start)?;
         let tau = self.open(&start, w, distance)?;
         if !self.receiver.moves(&self.b.functional) {
             return None;
         }
         let light = self.light_from(&s, w, world.max_depth.checked_sub(1)?);
         let cosine = w.dot(c.up);
-        self.show(start.x, light * tau * (cosine * at.inv_pdf * transport));
+        self.show(camera, start.x, light * tau * (cosine * at.inv_pdf * transport));
         Some(())
     }
 

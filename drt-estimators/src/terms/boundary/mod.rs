@@ -37,9 +37,9 @@ use crate::terms::boundary::shadow::Shadows;
 use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, VelocityFunctional, VelocityTerm};
 use crate::model::emitter::{Emitter, EmitterGradient};
 use crate::model::error::Error;
-use crate::model::sensor::SensorGradient;
+use crate::model::sensor::{Sensor, SensorGradient};
 use crate::sampling::flight::Travel;
-use crate::sampling::importance::Splat;
+use crate::sampling::importance::{Splat, see};
 use crate::sampling::record::RadianceBySegments;
 use crate::sampling::trace::{Flight, Tracer};
 use crate::world::lights::{LightKind, LightTable};
@@ -128,9 +128,10 @@ impl Boundary {
         }
         let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
         let camera = &world.camera;
-        let in_view = |e: &Edge| match camera.is_orthographic() {
-            true => e.wedge.projected_length(camera.pinhole().forward),
-            false => e.wedge.subtended_angle(camera.position()),
+        let in_view = |e: &Edge| match (camera.is_orthographic(), camera.aperture()) {
+            (true, _) => e.wedge.projected_length(camera.pinhole().forward),
+            (false, None) => e.wedge.subtended_angle(camera.position()),
+            (false, Some(lens)) => e.wedge.most_subtended(camera.position(), lens.radius),
         };
         let camera = EdgeTable::new(&edges, |e| movers.pass_camera(e, camera), in_view)?;
         let light = |i: usize, emitter: &Emitter| match *emitter {
@@ -197,6 +198,12 @@ impl Start {
     }
 }
 
+/// A camera's importance at a point per area across the segment, where the point is seen.
+fn seen(camera: &Sensor, start: &Start) -> Option<f64> {
+    let view = Vertex { x: start.x, medium: start.medium, kind: Kind::Point };
+    Some(see(camera, &view)?.1)
+}
+
 struct Sampler<'s, 'w, R> {
     boundary: &'s Boundary,
     tracer: &'s mut Tracer<'w>,
@@ -209,16 +216,17 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
     fn primary(&mut self) -> Option<()> {
         let world = self.tracer.world;
         let at = self.boundary.camera.as_ref()?.sample(&mut self.tracer.rng);
-        let camera = &world.camera;
+        let lens = world.camera.draw_lens(&mut self.tracer.rng);
+        let camera = &*world.camera.at_lens(lens);
         if let Some(contact) = Contact::at(world, &at) {
-            return self.contact_with_camera(&at, &contact);
+            return self.contact_with_camera(camera, &at, &contact);
         }
         let d = camera.eye_of(at.x) - at.x;
         let distance = d.length();
         let w = d / distance;
         let n = at.edge.wedge.occluded_side(w)?;
         let start = Start::on(world, &at);
-        let transport = self.seen(&start)?;
+        let transport = seen(camera, &start)?;
         // The camera's side must be open.
         let tau = self.open(&start, w, distance)?;
         let s = self.end(&start, -w, Rgb::ONE).filter(|s| !self.is_dark(s))?;
@@ -235,28 +243,22 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
             self.end_rate(&s, n * -(1.0 - l));
             SensorGradient { position: n * -l, ..SensorGradient::default() }
         };
+        let gradient = world.camera.lens_gradient(lens, gradient);
         self.b.functional.items.push(VelocityTerm::Sensor(gradient));
         if !self.receiver.moves(&self.b.functional) {
             return None;
         }
         let light = self.light_from(&s, w, world.max_depth.checked_sub(1)?);
         let value = light * s.weight * tau * (at.edge.wedge.sine(w) * at.inv_pdf * transport);
-        self.show(at.x, value);
+        self.show(camera, at.x, value);
         Some(())
     }
 
-    /// The camera's importance at a point per area across the segment, where the point is seen.
-    fn seen(&self, start: &Start) -> Option<f64> {
-        let view = Vertex { x: start.x, medium: start.medium, kind: Kind::Point };
-        Some(self.tracer.see(&view)?.1)
-    }
-
     /// Hands a value to the pixels around the image of `x`.
-    fn show(&mut self, x: Vec3, value: Rgb) {
+    fn show(&mut self, camera: &Sensor, x: Vec3, value: Rgb) {
         if value.is_zero() {
             return;
         }
-        let camera = &self.tracer.world.camera;
         let pixel = camera.view(x).pixel;
         let width = camera.film()[0];
         for p in camera.footprint(pixel) {

@@ -21,7 +21,7 @@ use drt_math::{CdfTable, Real};
 
 use crate::derivative::sensitivity::{ActiveInputs, VelocityFunctional, VelocityTerm};
 use crate::model::error::Error;
-use crate::sampling::importance::Splat;
+use crate::sampling::importance::{Splat, see};
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary::BoundarySink;
@@ -65,6 +65,8 @@ impl GrazingFlux {
     ) -> Result<Option<Self>, Error> {
         let camera = &world.camera;
         let eye = camera.position();
+        // How far rays start from there.
+        let apart = camera.aperture().map_or(0.0, |lens| lens.radius);
         let (mut triangles, mut weights) = (Vec::new(), Vec::new());
         for (s, shape) in (0..).zip(&world.scene.shapes) {
             if !flux.sweeps(s, active.sensor) {
@@ -84,7 +86,7 @@ impl GrazingFlux {
                     let farthest = corners.iter().map(|c| (*c - eye).length()).fold(0.0, f64::max);
                     let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - eye;
                     let r2 = f64::max(middle.length_squared(), area);
-                    (height < EDGE_ON * farthest, r2)
+                    (height - apart < EDGE_ON * (farthest + apart), r2)
                 };
                 if area > 0.0 && seen {
                     let around = *around.get_or_insert_with(|| world.medium_around(s as usize));
@@ -116,7 +118,9 @@ impl GrazingFlux {
         let chosen = self.table.sample(tracer.rng.next_f64());
         let Triangle { prim, area, around } = self.triangles[chosen.index];
         let (point, x) = world.point(prim, triangle_bary(tracer.rng.next_2d()));
-        let eye = world.camera.eye_of(x);
+        let lens = world.camera.draw_lens(&mut tracer.rng);
+        let camera = &*world.camera.at_lens(lens);
+        let eye = camera.eye_of(x);
         let to = eye - x;
         let cosine = point.ng.dot(to) / to.length();
         if !(IN_PLANE..EDGE_ON).contains(&Real::abs(cosine)) {
@@ -134,11 +138,12 @@ impl GrazingFlux {
             // From the medium's side across.
             let n = if front { -point.ng } else { point.ng };
             let vertex = world.touching(point, x, front, medium);
-            let Some((w, transport)) = tracer.see(&vertex) else { continue };
+            let Some((w, transport)) = see(camera, &vertex) else { continue };
             b.functional.items.clear();
             b.functional.items.push(VelocityTerm::Surface(point.material(), n));
             if self.spatial {
-                let gradient = world.camera.ray_gradient(eye, -w, -n, n * -to.length());
+                let gradient = camera.ray_gradient(eye, -w, -n, n * -to.length());
+                let gradient = world.camera.lens_gradient(lens, gradient);
                 b.functional.items.push(VelocityTerm::Sensor(gradient));
             } else {
                 b.functional.items.push(VelocityTerm::Volume(medium, x, -n));
@@ -149,7 +154,7 @@ impl GrazingFlux {
             let mut light = Radiance::default();
             tracer.radiance_within(longest, vertex, w, &mut light);
             b.splats.clear();
-            tracer.spread(&vertex, light.0 * inv_pdf, transport, w, 1, &mut b.splats);
+            tracer.spread(camera, &vertex, light.0 * inv_pdf, transport, w, 1, &mut b.splats);
             for splat in &b.splats {
                 receiver.receive(splat.pixel, splat.value);
             }

@@ -1,6 +1,7 @@
 //! Edges seen from the camera (2019 paper, Eq. 41, at fixed image points).
 
 use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
+use crate::sampling::importance::see;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary::BoundarySink;
 use crate::terms::radiative::Radiative;
@@ -22,7 +23,7 @@ impl Radiative {
         let (x, point) = chosen.discontinuity.point(chosen.along);
         let eye = world.eye_of(x);
         let view = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, &eye)?;
-        let (_, importance) = tracer.see(&Vertex { x, medium: None, kind: Kind::Point })?;
+        let (_, importance) = see(camera, &Vertex { x, medium: None, kind: Kind::Point })?;
         let tau = view.open(tracer)?;
         let [minus, plus] = view.sides(tracer, tracer.max_segments.checked_sub(1)?);
         let weight = tau * (view.sides.sine * chosen.inv_pdf * importance);
