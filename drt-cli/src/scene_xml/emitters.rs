@@ -2,15 +2,19 @@
 
 use std::sync::Arc;
 
-use drt_estimators::emitter::{Emitter, EnvironmentMap};
+use drt_estimators::emitter::{Emitter, EnvironmentMap, Slide};
+use drt_estimators::texture::Texture;
 use drt_estimators::{Named, SceneEmitter, Surrounding};
-use drt_math::{Affine, Rgb, Vec3};
+use drt_math::{Affine, Mat3, Rgb, Vec3};
 
 use super::Loader;
 use super::element::Element;
 use super::properties::Properties;
+use super::sensors::view;
 use super::textures;
 use crate::CliError;
+
+const EMITTERS: &str = "area, point, spot, projector, directional, constant or envmap";
 
 impl<'a> Loader<'a> {
     /// One emitter; an area emitter only where it is `on_shape`.
@@ -43,13 +47,20 @@ impl<'a> Loader<'a> {
                 let intensity = light("intensity")?;
                 spot(&p, intensity)?
             }
+            "projector" => projector(&p)?,
+            "sunsky" | "timed_sunsky" => {
+                return Err(e.error(format!(
+                    "the emitter type `{kind}` is not supported: the model of its sky is a table of spectra that is \
+                     not part of this program; render the sky to an image with Mitsuba and use it as an envmap; \
+                     otherwise expected {EMITTERS}"
+                )));
+            }
             "directional" => {
                 Emitter::Directional { direction: direction(&p)?, irradiance: light("irradiance")? }
             }
             other => {
                 return Err(e.error(format!(
-                    "the emitter type `{other}` is not supported; expected area, point, spot, \
-                     directional, constant or envmap"
+                    "the emitter type `{other}` is not supported; expected {EMITTERS}"
                 )));
             }
         };
@@ -99,6 +110,13 @@ fn spot(p: &Properties<'_>, intensity: Rgb) -> Result<Emitter, CliError> {
     let cutoff_angle = radians("cutoff_angle")?.unwrap_or(Emitter::DEFAULT_CUTOFF_ANGLE);
     let beam_width =
         radians("beam_width")?.unwrap_or(Emitter::DEFAULT_BEAM_FRACTION * cutoff_angle);
+    if let Some(texture) = p.texture("texture")? {
+        let (e, texture) = texture;
+        let slide = Slide::spot(texture, cutoff_angle, beam_width).map_err(|err| e.error(err))?;
+        return thrown(p, &to_world, intensity, slide);
+    }
+    // One that does not vary.
+    let intensity = intensity * p.color("texture")?.unwrap_or(Rgb::ONE);
     Ok(Emitter::Spot {
         position: to_world.translation,
         direction: to_world.vector(Vec3::Z),
@@ -106,4 +124,40 @@ fn spot(p: &Properties<'_>, intensity: Rgb) -> Result<Emitter, CliError> {
         cutoff_angle,
         beam_width,
     })
+}
+
+/// A picture thrown from the origin of `to_world` along its +z axis.
+fn thrown(
+    p: &Properties<'_>,
+    to_world: &Affine,
+    strength: Rgb,
+    slide: Slide,
+) -> Result<Emitter, CliError> {
+    let frame = to_world.linear;
+    let gram = frame.transpose() * frame + Mat3::IDENTITY * -1.0;
+    if gram.cols.iter().any(|c| c.max_abs() > 1e-3 || !c.is_finite()) {
+        let message = "its `to_world` may turn, mirror and move it, not scale or shear it";
+        return Err(p.element.error(message));
+    }
+    let (position, slide) = (to_world.translation, Arc::new(slide));
+    Ok(Emitter::Projector { position, frame, strength, slide })
+}
+
+/// A `projector`: the reverse of a camera, whose film is the image of its texture.
+fn projector(p: &Properties<'_>) -> Result<Emitter, CliError> {
+    let scale = p.float("scale")?.unwrap_or(1.0);
+    let (texture, strength) = match p.texture("irradiance")? {
+        Some((_, texture)) => (Some(texture), Rgb::ONE),
+        None => (None, p.light("irradiance")?.unwrap_or(Rgb::ONE)),
+    };
+    let size = match &texture {
+        Some(Texture::Bitmap(image)) => image.size(),
+        _ => [1, 1],
+    };
+    let lens = view(p)?;
+    let pixel = lens.pixel_size(size.map(f64::from)).map_err(|err| p.element.error(err))?;
+    let half = size.map(|n| 0.5 * pixel * f64::from(n));
+    let slide = Slide::projector(texture, half).map_err(|err| p.element.error(err))?;
+    let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
+    thrown(p, &to_world, strength * scale, slide)
 }

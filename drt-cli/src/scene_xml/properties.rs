@@ -184,7 +184,11 @@ impl<'a> Properties<'a> {
         self.value(name, spectrum::TAGS, spectrum::emitted)
     }
 
-    fn texture(&self, name: &'static str) -> Result<Option<(&'a Element, Texture)>, CliError> {
+    /// A texture that varies, with its element; whatever else has the name is not asked for.
+    pub(super) fn texture(
+        &self,
+        name: &'static str,
+    ) -> Result<Option<(&'a Element, Texture)>, CliError> {
         let is_named = |e: &&Element| property_name(e).is_some_and(|(n, _)| n == name);
         let Some(e) = self.element.children.iter().find(is_named) else { return Ok(None) };
         if !textures::varies(e) {

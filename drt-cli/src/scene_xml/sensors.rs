@@ -115,16 +115,19 @@ fn aperture(p: &Properties<'_>, lens: &Lens) -> Result<Option<Aperture>, CliErro
     Ok((radius != 0.0).then_some(Aperture { radius, focus_distance }))
 }
 
-fn lens(p: &Properties<'_>, kind: &str) -> Result<Lens, CliError> {
-    let mut lens = match (p.float("fov")?, p.string("focal_length")?) {
-        (Some(_), Some(_)) => {
-            return Err(p.element.error("give `fov` or `focal_length`, not both"));
-        }
-        (Some(fov), None) => Lens { fov_axis: fov_axis(p)?, ..Lens::with_fov(fov) },
+/// A field of view, given as such or by a focal length.
+pub(super) fn view(p: &Properties<'_>) -> Result<Lens, CliError> {
+    match (p.float("fov")?, p.string("focal_length")?) {
+        (Some(_), Some(_)) => Err(p.element.error("give `fov` or `focal_length`, not both")),
+        (Some(fov), None) => Ok(Lens { fov_axis: fov_axis(p)?, ..Lens::with_fov(fov) }),
         // A focal length is about the diagonal of the film, so `fov_axis` is not asked for.
-        (None, Some(text)) => Lens { fov: focal_length(p, text)?, ..Lens::default() },
-        (None, None) => Lens::default(),
-    };
+        (None, Some(text)) => Ok(Lens { fov: focal_length(p, text)?, ..Lens::default() }),
+        (None, None) => Ok(Lens::default()),
+    }
+}
+
+fn lens(p: &Properties<'_>, kind: &str) -> Result<Lens, CliError> {
+    let mut lens = view(p)?;
     let offset = |name| Ok::<f64, CliError>(p.float(name)?.unwrap_or(0.0));
     if kind == "perspective" {
         lens.principal_point_offset =

@@ -48,6 +48,14 @@ impl Tangents {
         shapes.chain(media).chain(emitters).chain(sensor)
     }
 
+    /// True when matter or an emitter moves.
+    pub(crate) fn move_light(&self) -> bool {
+        let of_media = |t: &MediumTangent| t.velocity != Affine::ZERO || !t.flows.is_empty();
+        self.shapes.iter().any(|s| !s.is_empty())
+            || self.media.iter().flatten().any(|(_, t)| of_media(t))
+            || self.emitters.iter().flatten().any(|(_, t)| t.moves())
+    }
+
     /// The same for one of the sensors; where there is no such sensor, none changes.
     pub(crate) fn seen_by(&self, sensor: usize) -> Self {
         let sensor = self.sensors.get(sensor).cloned().unwrap_or_default();

@@ -8,18 +8,20 @@ mod emission;
 mod environment;
 mod incident;
 mod motion;
+mod slide;
 #[cfg(test)]
 mod tests;
 
 use alloc::sync::Arc;
 use core::f64::consts::PI;
 
-use drt_math::{Frame, Rgb, Vec3, fm, vec3, warp};
+use drt_math::{Frame, Mat3, Rgb, Vec3, fm, vec3, warp};
 use thiserror::Error;
 
 pub use crate::model::emitter::emission::{Emission, EmitterGradient, EmitterTangent};
 pub use crate::model::emitter::environment::EnvironmentMap;
 pub use crate::model::emitter::incident::Incident;
+pub use crate::model::emitter::slide::Slide;
 
 /// An emitter that cannot be used.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -108,6 +110,17 @@ pub enum Emitter {
         /// linearly with the angle.
         beam_width: f64,
     },
+    /// A point that throws a picture: Mitsuba's `projector`, and its `spot` with a texture.
+    Projector {
+        /// Where it is.
+        position: Vec3,
+        /// Its axes, which light leaves along the last of; they may be mirrored.
+        frame: Mat3,
+        /// Factor of the picture.
+        strength: Rgb,
+        /// The picture.
+        slide: Arc<Slide>,
+    },
     /// Parallel light from infinitely far away.
     Directional {
         /// Where the light flows to.
@@ -190,6 +203,12 @@ impl Emitter {
                 }
                 Ok(Self::Spot { position, direction, intensity, cutoff_angle, beam_width })
             }
+            Self::Projector { position, frame, strength, ref slide } => {
+                finite(position.is_finite(), "position")?;
+                finite(frame.cols.iter().all(|c| c.is_finite()), "frame")?;
+                let frame = slide::orthonormal(&frame).ok_or(EmitterError::ZeroDirection(kind))?;
+                Ok(Self::Projector { position, frame, strength, slide: Arc::clone(slide) })
+            }
             Self::Directional { direction, irradiance } => {
                 Ok(Self::Directional { direction: unit(direction)?, irradiance })
             }
@@ -203,30 +222,38 @@ impl Emitter {
             Self::Area { .. } => "area",
             Self::Point { .. } => "point",
             Self::Spot { .. } => "spot",
+            Self::Projector { slide, .. } if slide.is_spot() => "spot",
+            Self::Projector { .. } => "projector",
             Self::Directional { .. } => "directional",
             Self::Constant { .. } => "constant",
             Self::Envmap { .. } => "envmap",
         }
     }
 
-    /// True for point, spot and directional lights, which no ray can hit.
+    /// True for lights of points and directions, which no ray can hit.
     #[must_use]
     pub fn is_delta(&self) -> bool {
         !matches!(self, Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. })
     }
 
-    /// False for a spot that ends with a jump, whose shadow-like rim needs a boundary integral.
+    /// False for a spot or projector whose light ends with a jump, or jumps inside: its rims need a boundary integral.
     #[must_use]
     pub fn is_continuous(&self) -> bool {
-        !matches!(self, Self::Spot { cutoff_angle, beam_width, .. } if cutoff_angle == beam_width)
+        match self {
+            Self::Spot { cutoff_angle, beam_width, .. } => cutoff_angle != beam_width,
+            Self::Projector { slide, .. } => slide.is_continuous(),
+            _ => true,
+        }
     }
 
-    /// Where a point or spot light is.
+    /// Where a light that is a point is.
     #[inline]
     #[must_use]
     pub fn position(&self) -> Option<Vec3> {
         match *self {
-            Self::Point { position, .. } | Self::Spot { position, .. } => Some(position),
+            Self::Point { position, .. }
+            | Self::Spot { position, .. }
+            | Self::Projector { position, .. } => Some(position),
             _ => None,
         }
     }
@@ -252,6 +279,7 @@ impl Emitter {
             Self::Spot { cutoff_angle, beam_width, .. } => {
                 2.0 * PI * cone_mean(*beam_width, *cutoff_angle)
             }
+            Self::Projector { slide, .. } => slide.power(),
             Self::Directional { .. } => disk,
             Self::Constant { .. } => 4.0 * PI * disk,
             Self::Envmap { map, .. } => map.power() * disk,
@@ -260,7 +288,7 @@ impl Emitter {
     }
 
     /// Draws a direction of flow from two uniform numbers, uniformly over those that a point or
-    /// spot light shines in; `None` for other emitters.
+    /// spot light shines in, or evenly over a projector's picture; `None` for other emitters.
     #[must_use]
     pub fn sample_flow(&self, u: [f64; 2]) -> Option<FlowSample> {
         let flow = match *self {
@@ -269,6 +297,7 @@ impl Emitter {
                 let local = warp::uniform_cone(u, fm::cos(cutoff_angle));
                 Frame::from_normal(direction).to_world(local)
             }
+            Self::Projector { frame, ref slide, .. } => frame * slide.sample(u),
             _ => return None,
         };
         Some(FlowSample { flow, pdf: self.flow_pdf(flow) })
@@ -283,6 +312,7 @@ impl Emitter {
                 let height = vec3(0.0, 0.0, direction.dot(flow));
                 warp::uniform_cone_pdf(height, fm::cos(cutoff_angle))
             }
+            Self::Projector { frame, ref slide, .. } => slide.pdf(frame.transpose_mul(flow)),
             _ => 0.0,
         }
     }
@@ -296,6 +326,7 @@ impl Emitter {
             | Self::Constant { radiance }
             | Self::Envmap { radiance, .. } => radiance,
             Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity,
+            Self::Projector { strength, .. } => strength,
             Self::Directional { irradiance, .. } => irradiance,
         }
     }
@@ -315,7 +346,8 @@ impl Emitter {
         match self {
             Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. } => "radiance",
             Self::Point { .. } | Self::Spot { .. } => "intensity",
-            Self::Directional { .. } => "irradiance",
+            Self::Projector { slide, .. } if slide.is_spot() => "intensity",
+            Self::Directional { .. } | Self::Projector { .. } => "irradiance",
         }
     }
 }

@@ -262,6 +262,15 @@ impl Scene {
         Ok(())
     }
 
+    /// Refuses derivatives with respect to `parameter`, which moves matter or lights, where light jumps.
+    pub(crate) fn refuse_rims(&self, parameter: &str) -> Result<(), Error> {
+        let Some(i) = self.emitters.iter().position(|e| !e.item.emitter.is_continuous()) else {
+            return Ok(());
+        };
+        let reason = ElementError::Rim { parameter: parameter.into() };
+        Err(unusable(&self.emitters[i].id, "emitter", i, reason))
+    }
+
     /// True when the camera sees less than there is, as the integrator hides emitters.
     pub(crate) fn hides_something(&self) -> bool {
         let delta = |e: &Named<SceneEmitter>| e.item.emitter.is_delta();

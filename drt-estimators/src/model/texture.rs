@@ -130,6 +130,23 @@ impl Bitmap {
         Ok(Self { texels: image.texels, ..self })
     }
 
+    /// Columns and rows.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// True when all texels at the border of the image are zero.
+    pub(crate) fn is_black_around(&self) -> bool {
+        let [width, height] = self.size.map(|n| n as usize);
+        let at_border = |i: usize| {
+            let (x, y) = (i % width, i / width);
+            x == 0 || y == 0 || x + 1 == width || y + 1 == height
+        };
+        let black = |(i, t): (usize, &[f32; 3])| !at_border(i) || *t == [0.0; 3];
+        self.to_uv == UvMap::IDENTITY && self.texels.iter().enumerate().all(black)
+    }
+
     fn texel(&self, at: [i64; 2]) -> Rgb {
         let [x, y] = [0, 1].map(|axis| {
             let n = i64::from(self.size[axis]);

@@ -29,7 +29,7 @@ use crate::model::sensor::SensorGradient;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::model::shard::Shard;
 use crate::model::surface::BsdfParams;
-use crate::run::session::{Control, estimators, seed_of_component, slides};
+use crate::run::session::{Control, estimators, may_move, seed_of_component, slides};
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::BATCHES;
 use crate::sampling::parallel::Pool;
@@ -140,6 +140,10 @@ pub fn gradient_in_batches(
     if let Some(target) = wanted.first() {
         let slide = slides(scene, wanted.iter().copied(), settings);
         scene.refuse_derivatives(&scene.name_of(*target), slide)?;
+        let moves = |t: &Target| !matches!(t, Target::Sensor(_)) && may_move(scene, *t);
+        if let Some(target) = wanted.iter().find(|t| moves(t)) {
+            scene.refuse_rims(&scene.name_of(*target))?;
+        }
     }
     let (scene, _) = tangents::apply(scene, &[])?;
     let film = scene.sensors[settings.sensor].item.sensor.film();

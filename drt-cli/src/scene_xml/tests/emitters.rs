@@ -87,7 +87,19 @@ fn media_around_lights() {
 
 #[test]
 fn unusable_lights() {
-    refused("<emitter type=\"sunsky\"/>", &["`sunsky` is not supported", "constant"]);
+    refused("<emitter type=\"sunsky\"/>", &["`sunsky` is not supported", "as an envmap"]);
+    let scaled = "<transform name=\"to_world\"><scale value=\"2\"/></transform>";
+    for (inside, part) in [
+        (scaled, "not scale or shear"),
+        (r#"<float name="fov" value="180"/>"#, "field of view"),
+        (r#"<rgb name="intensity" value="1"/>"#, "which takes"),
+        (r#"<rgb name="irradiance" value="-1"/>"#, "negative"),
+    ] {
+        refused(&format!("<emitter type=\"projector\">{inside}</emitter>"), &[":2", part]);
+    }
+    let board = r#"<texture type="checkerboard" name="texture"/>"#;
+    let wide = format!(r#"{board}<float name="cutoff_angle" value="90"/>"#);
+    refused(&format!("<emitter type=\"spot\">{wide}</emitter>"), &[":2", "< 90"]);
     refused("<emitter type=\"envmap\"/>", &["`filename` is missing"]);
     for (kind, inside, part) in [
         ("point", r#"<rgb name="intensity" value="-1"/>"#, "negative"),
@@ -140,4 +152,38 @@ fn environments_are_images() {
     refused("none.exr", "", "no file `none.exr`");
     let scaled = "<transform name=\"to_world\"><scale x=\"2\"/></transform>";
     refused("sky.exr", scaled, "not scaled or sheared");
+}
+
+/// Intensities over π along directions of Mitsuba's camera: columns go to the local -x, rows to -y.
+#[test]
+fn pictures_are_upright() {
+    let folder = crate::testing::Folder::new();
+    let image = image::RgbImage::from_fn(4, 2, |x, y| image::Rgb([60 * x as u8, 200 * y as u8, 9]));
+    image.save(folder.path().join("p.png")).unwrap();
+    let load = |kind: &str, name: &str, inside: &str| {
+        let body = format!(
+            "<scene version=\"3.0.0\"><emitter type=\"{kind}\">\
+             <texture type=\"bitmap\" name=\"{name}\"><string name=\"filename\" value=\"p.png\"/>\
+             <boolean name=\"raw\" value=\"true\"/><string name=\"filter_type\" value=\"nearest\"/>\
+             </texture>{inside}</emitter></scene>"
+        );
+        let scene = crate::load_scene(&folder.file("s.xml", body), &crate::Defaults::new());
+        scene.unwrap().emitters.remove(0).item.emitter
+    };
+    let towards = |e: &Emitter, x: f64, y: f64| {
+        let d = vec3(x, y, 1.0).normalize();
+        e.emission(d).value * (d.z.powi(3) / std::f64::consts::PI)
+    };
+    // 90 degrees along columns: half as high as wide.
+    let e = load("projector", "irradiance", "<float name=\"fov\" value=\"90\"/>");
+    for (x, y, column, row) in [(0.9, 0.4, 0, 0), (-0.9, 0.4, 3, 0), (0.4, -0.4, 1, 1)] {
+        let expected = [60 * column, 200 * row, 9].map(|v| f64::from(v) / 255.0);
+        let found = towards(&e, x, y);
+        assert!((found - Rgb::from(expected)).max_abs() < 1e-6, "{x} {y} {found:?}");
+    }
+    assert_eq!(towards(&e, 0.9, 0.6), Rgb::ZERO);
+    let e = load("spot", "texture", "<float name=\"cutoff_angle\" value=\"45\"/>");
+    let d = vec3(0.3, 0.3, 1.0).normalize();
+    assert!((e.emission(d).value.r - 120.0 / 255.0).abs() < 1e-6, "{:?}", e.emission(d));
+    assert!((e.emission(d).value.g - 200.0 / 255.0).abs() < 1e-6);
 }

@@ -174,7 +174,7 @@ impl<'a> Moving<'a> {
         let name = match self.original.emitters[i].item.emitter {
             Emitter::Area { .. } | Emitter::Constant { .. } | Emitter::Envmap { .. } => "radiance",
             Emitter::Point { .. } | Emitter::Spot { .. } => "intensity",
-            Emitter::Directional { .. } => "irradiance",
+            Emitter::Directional { .. } | Emitter::Projector { .. } => "irradiance",
         };
         l.strength = self.changed(target, name, l.strength.map(Real::re));
         let radians = |name: &str, angle: D| {
@@ -372,6 +372,7 @@ fn light(emitter: &Emitter) -> Light {
         Emitter::Directional { direction, irradiance } => {
             Light { strength: rgb(irradiance), direction: direction.lift(), ..still }
         }
+        Emitter::Projector { .. } => unreachable!("these scenes have none"),
     }
 }
 

@@ -1,6 +1,6 @@
 use core::ops::AddAssign;
 
-use drt_math::{Rgb, Vec3, fm};
+use drt_math::{Rgb, RgbVec, Vec3, fm};
 
 use crate::model::emitter::Emitter;
 
@@ -12,13 +12,23 @@ pub struct Emission {
     /// The same without the falloff.
     strength: Rgb,
     falloff: Falloff,
+    picture: Option<Picture>,
+}
+
+/// The light of a projector per strength, with its gradient by the flow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Picture {
+    value: Rgb,
+    slope: RgbVec,
+    flow: Vec3,
 }
 
 /// The fall of a spot light off its axis, with its derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Falloff {
-    value: f64,
-    flow: Vec3,
+pub(super) struct Falloff {
+    pub(super) value: f64,
+    /// Perpendicular to the flow.
+    pub(super) flow: Vec3,
     direction: Vec3,
     cutoff_angle: f64,
     beam_width: f64,
@@ -38,6 +48,8 @@ pub struct EmitterTangent {
     pub cutoff_angle: f64,
     /// Rate of a spot's beam width, in radians.
     pub beam_width: f64,
+    /// Angular velocity of a projector, in radians.
+    pub spin: Vec3,
 }
 
 /// Derivatives of a number with respect to what an [`EmitterTangent`] holds the rates of.
@@ -53,6 +65,8 @@ pub struct EmitterGradient {
     pub cutoff_angle: f64,
     /// With respect to the beam width.
     pub beam_width: f64,
+    /// With respect to a turn about each axis of space.
+    pub spin: Vec3,
 }
 
 impl Emitter {
@@ -67,14 +81,21 @@ impl Emitter {
             Self::Spot { direction, cutoff_angle, beam_width, .. } => {
                 Falloff::new(direction, flow, cutoff_angle, beam_width)
             }
+            Self::Projector { frame, ref slide, .. } => {
+                let (value, slope) = slide.towards(frame.transpose_mul(flow));
+                let picture = Picture { value, slope: slope.map(|s| frame * s), flow };
+                let falloff = Falloff::default();
+                let value = strength * value;
+                return Emission { value, strength, falloff, picture: Some(picture) };
+            }
             _ => Falloff { value: 1.0, ..Falloff::default() },
         };
-        Emission { value: strength * falloff.value, strength, falloff }
+        Emission { value: strength * falloff.value, strength, falloff, picture: None }
     }
 }
 
 impl Falloff {
-    fn new(axis: Vec3, flow: Vec3, cutoff_angle: f64, beam_width: f64) -> Self {
+    pub(super) fn new(axis: Vec3, flow: Vec3, cutoff_angle: f64, beam_width: f64) -> Self {
         let theta = angle(axis, flow);
         if theta <= beam_width {
             return Self { value: 1.0, ..Self::default() };
@@ -105,7 +126,14 @@ impl Emission {
             + f.direction.dot(t.direction)
             + f.cutoff_angle * t.cutoff_angle
             + f.beam_width * t.beam_width;
-        t.strength * f.value + self.strength * falloff_rate
+        let rate = t.strength * f.value + self.strength * falloff_rate;
+        match &self.picture {
+            None => rate,
+            Some(p) => {
+                let turned = flow_rate - t.spin.cross(p.flow);
+                t.strength * p.value + self.strength * p.slope.dot(turned)
+            }
+        }
     }
 
     /// Gradient of `adjoint · value`, first with respect to the flow (perpendicular to it), then
@@ -121,8 +149,17 @@ impl Emission {
             direction: f.direction * weight,
             cutoff_angle: f.cutoff_angle * weight,
             beam_width: f.beam_width * weight,
+            spin: Vec3::ZERO,
         };
-        (f.flow * weight, emitter)
+        match &self.picture {
+            None => (f.flow * weight, emitter),
+            Some(p) => {
+                let slope = p.slope.weighted(self.strength * adjoint).reject(p.flow);
+                let strength = adjoint * p.value;
+                let spin = slope.cross(p.flow);
+                (slope, EmitterGradient { strength, spin, ..EmitterGradient::default() })
+            }
+        }
     }
 }
 
@@ -130,7 +167,7 @@ impl EmitterTangent {
     /// True when the emitter's place or direction changes.
     #[must_use]
     pub fn moves(&self) -> bool {
-        self.position != Vec3::ZERO || self.direction != Vec3::ZERO
+        [self.position, self.direction, self.spin].iter().any(|v| *v != Vec3::ZERO)
     }
 
     /// True when nothing changes.
@@ -151,6 +188,7 @@ impl EmitterGradient {
             direction: self.direction * w,
             cutoff_angle: self.cutoff_angle * w,
             beam_width: self.beam_width * w,
+            spin: self.spin * w,
         }
     }
 
@@ -163,6 +201,7 @@ impl EmitterGradient {
             + self.direction.dot(t.direction)
             + self.cutoff_angle * t.cutoff_angle
             + self.beam_width * t.beam_width
+            + self.spin.dot(t.spin)
     }
 }
 
@@ -176,6 +215,7 @@ macro_rules! sum {
                 self.direction += o.direction;
                 self.cutoff_angle += o.cutoff_angle;
                 self.beam_width += o.beam_width;
+                self.spin += o.spin;
             }
         }
     )*};

@@ -24,7 +24,9 @@ impl Emitter {
     #[must_use]
     pub fn incident(&self, x: Vec3) -> Option<Incident> {
         let (w, distance, inverse_square) = match *self {
-            Self::Point { position, .. } | Self::Spot { position, .. } => {
+            Self::Point { position, .. }
+            | Self::Spot { position, .. }
+            | Self::Projector { position, .. } => {
                 let offset = position - x;
                 let distance = offset.length();
                 (offset / distance, distance, 1.0 / (distance * distance))

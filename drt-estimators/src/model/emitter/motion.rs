@@ -2,7 +2,7 @@
 
 use drt_math::{Affine, Rgb};
 
-use crate::model::emitter::{Emitter, EmitterError, EmitterTangent};
+use crate::model::emitter::{Emitter, EmitterError, EmitterTangent, slide};
 
 /// What a property name stands for.
 enum Slot {
@@ -26,6 +26,10 @@ impl Emitter {
                 *position = map.point(*position);
                 *direction = map.vector(*direction);
             }
+            Self::Projector { position, frame, .. } => {
+                *position = map.point(*position);
+                frame.cols = frame.cols.map(|axis| map.vector(axis));
+            }
             Self::Directional { direction, .. } => *direction = map.vector(*direction),
         }
         moved.checked().map_err(|error| match error {
@@ -44,6 +48,9 @@ impl Emitter {
         }
         if let Self::Spot { direction, .. } | Self::Directional { direction, .. } = *self {
             tangent.direction = field.vector(direction).reject(direction);
+        }
+        if let Self::Projector { frame, .. } = self {
+            tangent.spin = slide::spin(frame, field);
         }
         tangent
     }
@@ -84,6 +91,7 @@ impl Emitter {
                 | Self::Envmap { radiance, .. },
             ) => *radiance = value,
             (_, Self::Point { intensity, .. } | Self::Spot { intensity, .. }) => *intensity = value,
+            (_, Self::Projector { strength, .. }) => *strength = value,
             (_, Self::Directional { irradiance, .. }) => *irradiance = value,
         }
         changed.checked()

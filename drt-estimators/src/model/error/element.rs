@@ -44,6 +44,15 @@ pub enum ElementError {
          `path-space` and `radiative` have them"
     )]
     ParallelRays,
+    /// A light that jumps, where something moves in it.
+    #[error(
+        "its light ends or jumps at an edge, and `{parameter}` moves it or what may be in it; only finite differences follow such \
+         edges, or let it fall off (a spot by a `beam_width` below its `cutoff_angle`, a projector by a black border of its bitmap)"
+    )]
+    Rim {
+        /// The parameter, or what else was to be differentiated by.
+        parameter: String,
+    },
     /// A lens where edges are to be followed in view.
     #[error(
         "it has an aperture, and only `path-space` and finite differences have derivatives of what moves in the view of a lens"

@@ -59,7 +59,10 @@ impl Lens {
     }
 
     /// Checks the lens and gives the side of a pixel on the plane at distance one, for a film of a width and height in pixels.
-    pub(super) fn pixel_size(&self, film: [f64; 2]) -> Result<f64, SensorError> {
+    ///
+    /// # Errors
+    /// When the field of view, the clip planes or the principal point cannot be used.
+    pub fn pixel_size(&self, film: [f64; 2]) -> Result<f64, SensorError> {
         if !(self.fov > 0.0 && self.fov < 180.0) {
             return Err(SensorError::FieldOfView(self.fov));
         }

@@ -137,6 +137,9 @@ impl Session {
         let tangents = tangents.seen_by(settings.sensor);
         if let Some(name) = tangents.names.first() {
             scene.refuse_derivatives(name, slides(scene, tangents.targets(), settings))?;
+            if tangents.move_light() {
+                scene.refuse_rims(name)?;
+            }
         }
         let depth = settings.max_depth.within(scene.integrator.max_depth);
         let mut world =
@@ -399,7 +402,7 @@ impl Session {
 }
 
 /// Whether what a target changes may move.
-fn may_move(scene: &Scene, target: Target) -> bool {
+pub(crate) fn may_move(scene: &Scene, target: Target) -> bool {
     match target {
         Target::Shape(_) | Target::Sensor(_) => true,
         Target::Bsdf(_) => false,

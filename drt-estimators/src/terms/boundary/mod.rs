@@ -135,7 +135,9 @@ impl Boundary {
         };
         let camera = EdgeTable::new(&edges, |e| movers.pass_camera(e, camera), in_view)?;
         let light = |i: usize, emitter: &Emitter| match *emitter {
-            Emitter::Point { position, .. } | Emitter::Spot { position, .. } => EdgeTable::new(
+            Emitter::Point { position, .. }
+            | Emitter::Spot { position, .. }
+            | Emitter::Projector { position, .. } => EdgeTable::new(
                 &edges,
                 |e| movers.pass_emitter(e, i, |x| x - position),
                 |e| e.wedge.subtended_angle(position),
