@@ -27,8 +27,8 @@ pub use model::rendering::{
     BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term,
 };
 pub use model::scene::{
-    Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding,
-    Target, TargetName,
+    Instance, Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape,
+    Surrounding, Target, TargetName,
 };
 pub use model::settings::{
     AuxiliarySamples, Depth, EstimatorKind, PathSampling, Settings, Warp, WarpKernel,

@@ -6,7 +6,7 @@ use common::*;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor, look_at};
 use drt_estimators::{
-    EstimatorKind, Layer, PathSampling, Scene, Session, Settings, Unattended, agreement,
+    EstimatorKind, PathSampling, Scene, Session, Settings, Unattended, agreement,
     finite_differences, gradient,
 };
 use drt_math::{Affine, Rgb, Vec3, vec3};
@@ -32,17 +32,6 @@ fn parameters() -> Vec<Parameter> {
         parameter("turn", 0.0, vec![moves("camera", turn)]),
         parameter("grow", 0.0, vec![moves("camera", grow)]),
     ]
-}
-
-fn rendered(
-    scene: &Scene,
-    parameters: &[Parameter],
-    settings: &Settings,
-    spp: u32,
-) -> drt_estimators::Rendering {
-    let mut session = Session::new(scene, parameters, settings).expect("a valid scene");
-    assert!(session.run(spp, &Unattended));
-    session.rendering()
 }
 
 fn scenes() -> [Scene; 2] {
@@ -71,16 +60,10 @@ fn derivatives_agree(times: u32) {
             }
             // As if half of it were missing.
             if faulty {
-                assert!(!agreement(&scaled(&a.total, 0.5), &b.total, None).agrees, "{}", a.name);
+                assert!(!agreement(&multiple(&a.total, 0.5), &b.total, None).agrees, "{}", a.name);
             }
         }
     }
-}
-
-fn scaled(layer: &Layer, by: f64) -> Layer {
-    let mut layer = layer.clone();
-    layer.blocks.iter_mut().for_each(|b| b.mean *= by);
-    layer
 }
 
 #[test]

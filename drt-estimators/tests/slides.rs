@@ -8,7 +8,7 @@ use common::*;
 use drt_estimators::emitter::{Emitter, Slide};
 use drt_estimators::texture::{Bitmap, Texture};
 use drt_estimators::{
-    EstimatorKind, Layer, Scene, Session, Settings, Unattended, agreement, finite_differences,
+    EstimatorKind, Scene, Session, Settings, Unattended, agreement, finite_differences,
 };
 use drt_geom::procedural;
 use drt_math::{Mat3, Rgb, Rng, Vec3, vec3};
@@ -59,9 +59,7 @@ fn derivatives_agree() {
         let scene = scene(slide.expect("a picture"));
         let by = |estimator, seed| {
             let settings = Settings { estimator, seed, ..Settings::default() };
-            let mut session = Session::new(&scene, &parameters(name), &settings).expect("valid");
-            assert!(session.run(2000, &Unattended));
-            session.rendering().derivatives
+            rendered(&scene, &parameters(name), &settings, 2000).derivatives
         };
         let settings = Settings { seed: 3, ..Settings::default() };
         let differences =
@@ -71,17 +69,11 @@ fn derivatives_agree() {
             for (a, b) in by(estimator, seed).iter().zip(&differences) {
                 let found = agreement(&a.total, b, None);
                 assert!(found.agrees, "{estimator:?} {} {found:?}", a.name);
-                let half = scaled_layer(&a.total, 0.5);
+                let half = multiple(&a.total, 0.5);
                 assert!(!agreement(&half, b, None).agrees, "{estimator:?} {}", a.name);
             }
         }
     }
-}
-
-fn scaled_layer(layer: &Layer, by: f64) -> Layer {
-    let mut layer = layer.clone();
-    layer.blocks.iter_mut().for_each(|b| b.mean *= by);
-    layer
 }
 
 /// Of what moves in it; its strength is as ever.
@@ -93,7 +85,7 @@ fn light_that_jumps_is_refused_by_name() {
         |p: &[Parameter], scene: &Scene| Session::new(scene, p, &Settings::default()).map(|_| ());
     for p in [&parameters[..1], &parameters[1..2]] {
         let message = session(p, &white).expect_err("refused").to_string();
-        let parts = ["lamp: its light ends or jumps", &format!("`{}`", p[0].name)];
+        let parts = ["lamp: its light is discontinuous", &format!("`{}`", p[0].name)];
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     }
     session(&parameters[2..], &white).expect("nothing moves");
@@ -103,5 +95,5 @@ fn light_that_jumps_is_refused_by_name() {
     }
     let ball = [parameter("ball", 0.0, vec![moves("ball", shift())])];
     let message = session(&ball, &sharp).expect_err("refused").to_string();
-    assert!(message.contains("spot: its light ends"), "{message}");
+    assert!(message.contains("spot: its light is discontinuous"), "{message}");
 }

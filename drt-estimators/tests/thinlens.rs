@@ -7,7 +7,7 @@ use std::sync::Arc;
 use common::*;
 use drt_estimators::sensor::{Aperture, Sensor};
 use drt_estimators::{
-    Estimate, EstimatorKind, Layer, PathSampling, Scene, Session, Settings, Unattended, agreement,
+    Estimate, EstimatorKind, PathSampling, Scene, Session, Settings, Unattended, agreement,
     finite_differences, gradient,
 };
 use drt_geom::procedural;
@@ -38,17 +38,6 @@ fn parameters() -> Vec<Parameter> {
     ]
 }
 
-fn rendered(
-    scene: &Scene,
-    parameters: &[Parameter],
-    settings: &Settings,
-    spp: u32,
-) -> drt_estimators::Rendering {
-    let mut session = Session::new(scene, parameters, settings).expect("a valid scene");
-    assert!(session.run(spp, &Unattended));
-    session.rendering()
-}
-
 fn derivatives_agree(times: u32) {
     for (scene, faulty) in scenes().iter().zip([true, false]) {
         let settings = Settings { seed: 1, ..Settings::default() };
@@ -61,16 +50,10 @@ fn derivatives_agree(times: u32) {
             assert!(found.agrees, "{} {found:?}", a.name);
             // What the lens itself does is small beside the noise of a short run.
             if faulty && (times > 1 || ["ball", "turn"].contains(&&*a.name)) {
-                assert!(!agreement(&scaled_layer(&a.total, 0.5), b, None).agrees, "{}", a.name);
+                assert!(!agreement(&multiple(&a.total, 0.5), b, None).agrees, "{}", a.name);
             }
         }
     }
-}
-
-fn scaled_layer(layer: &Layer, by: f64) -> Layer {
-    let mut layer = layer.clone();
-    layer.blocks.iter_mut().for_each(|b| b.mean *= by);
-    layer
 }
 
 #[test]

@@ -55,7 +55,7 @@ const TETGEN: &str = "5 3 1 1\n1 0 0 0 .5 1\n2 1 0 0 .5 1\n3 0 1 0 .5 1\n4 0 0 1
 
 fn main() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in ["obj", "ply", "tet", "vol", "xml", "toml"] {
+    for target in ["obj", "ply", "tet", "vol", "xml", "toml", "serialized", "bitmap", "spectrum"] {
         std::fs::create_dir_all(corpus.join(target)).expect("the corpus folder can be written");
     }
     meshes(&corpus);
@@ -71,7 +71,73 @@ fn main() {
         );
         write(&corpus.join(format!("toml/{i}.toml")), job.as_bytes());
     }
+    write(&corpus.join("spectrum/pairs.txt"), b"# wavelength value\n400 0.1\n550, 0.8\n700 0.3\n");
+    write(&corpus.join("spectrum/value.txt"), b"400:0.1, 500:0.7, 700:0.2");
+    images(&corpus.join("bitmap"));
+    for version in [3, 4] {
+        write(&corpus.join(format!("serialized/{version}.serialized")), &serialized(version));
+    }
     examples(&corpus);
+}
+
+/// Small images of every kind, after a byte that tells it.
+fn images(folder: &Path) {
+    use image::ImageFormat::{Bmp, Hdr, Jpeg, Png};
+    for (kind, format) in (0_u8..).zip([Png, Jpeg, Bmp, Hdr]) {
+        let colours =
+            image::RgbImage::from_fn(4, 3, |x, y| image::Rgb([60 * x as u8, 80 * y as u8, 9]));
+        let image = match format {
+            Hdr => image::DynamicImage::ImageRgb8(colours).into_rgb32f().into(),
+            _ => image::DynamicImage::ImageRgb8(colours),
+        };
+        let mut file = std::io::Cursor::new(vec![kind]);
+        file.set_position(1);
+        image.write_to(&mut file, format).expect("a small image");
+        write(&folder.join(format!("{kind}")), &file.into_inner());
+    }
+    let path = folder.join("4");
+    let pixel = |x, y| (x as f32, y as f32, 0.5_f32);
+    exr::prelude::write_rgb_file(&path, 3, 2, pixel).expect("a small image");
+    let bytes = std::fs::read(&path).expect("what was just written");
+    write(&path, &[&[4], &bytes[..]].concat());
+}
+
+/// Two meshes of a triangle, with normals and texture coordinates.
+fn serialized(version: u16) -> Vec<u8> {
+    let mut part = vec![];
+    part.extend(3_u32.to_le_bytes());
+    if version == 4 {
+        part.extend(b"name\0");
+    }
+    part.extend(3_u64.to_le_bytes());
+    part.extend(1_u64.to_le_bytes());
+    let corners = [0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let normals = [0.0_f32, 0.0, 1.0].repeat(3);
+    let numbers = corners.into_iter().chain(normals).chain([0.0, 0.0, 1.0, 0.0, 0.0, 1.0]);
+    part.extend(numbers.flat_map(f32::to_le_bytes));
+    part.extend([0_u32, 1, 2].into_iter().flat_map(u32::to_le_bytes));
+    let deflated = || {
+        let level = flate2::Compression::default();
+        let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), level);
+        std::io::Write::write_all(&mut encoder, &part).expect("memory");
+        encoder.finish().expect("memory")
+    };
+    let mut file = Vec::new();
+    let mut offsets = Vec::new();
+    for _ in 0..2 {
+        offsets.push(file.len() as u64);
+        file.extend(0x041C_u16.to_le_bytes());
+        file.extend(version.to_le_bytes());
+        file.extend(deflated());
+    }
+    for offset in offsets {
+        match version {
+            3 => file.extend((offset as u32).to_le_bytes()),
+            _ => file.extend(offset.to_le_bytes()),
+        }
+    }
+    file.extend(2_u32.to_le_bytes());
+    file
 }
 
 /// The files of the repository's examples that are small enough to mutate.

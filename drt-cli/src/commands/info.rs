@@ -1,7 +1,10 @@
 //! `drt info`: what is in a scene or job, and what a run would do.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use drt_estimators::{Integrator, MediumBoundary, Scene, Shape, Surrounding};
-use drt_geom::{EdgeClass, Topology};
+use drt_geom::{EdgeClass, Mesh, Topology};
 use drt_medium::{Medium, MediumKind, Phase};
 use drt_motion::{Change, Parameter};
 
@@ -57,8 +60,10 @@ fn medium_name(scene: &Scene, medium: Option<usize>) -> String {
 }
 
 fn shapes(scene: &Scene) -> Table<8> {
+    // Instances share their meshes.
+    let mut known: HashMap<*const Mesh, Topology> = HashMap::new();
     let row = |(i, s): (usize, &Shape)| {
-        let topology = Topology::of(&s.mesh);
+        let topology = known.entry(Arc::as_ptr(&s.mesh)).or_insert_with(|| Topology::of(&s.mesh));
         let rims = topology.edges.iter().filter(|e| e.class == EdgeClass::Boundary).count();
         let edges = match rims {
             0 => topology.edges.len().to_string(),
@@ -78,7 +83,11 @@ fn shapes(scene: &Scene) -> Table<8> {
             if s.mesh.normals.is_some() { "smooth" } else { "faceted" }.into(),
             format!("{}{id}", bsdf.item.name()),
             s.boundary.map_or(String::new(), between),
-            s.emitter.map_or(String::new(), |_| "emits".into()),
+            match (s.emitter, scene.placement(i)) {
+                (Some(_), _) => "emits".into(),
+                (None, Some(_)) => "instance".into(),
+                (None, None) => String::new(),
+            },
         ]
     };
     let heads =

@@ -93,7 +93,11 @@ pub(crate) fn read_job(
     let keys: keys::Job = document.parse()?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let scene_path = folder.join(&keys.scene);
-    let (scene, warnings) = scenes.read(&scene_path, &overrides.defaults)?;
+    let (mut scene, warnings) = scenes.read(&scene_path, &overrides.defaults)?;
+    if !(keys.parameter.is_empty() && keys.parameter_group.is_empty()) {
+        let expanded = scene.expanded().map(std::borrow::Cow::into_owned);
+        scene = expanded.map_err(|e| CliError::input(&Place::file(&scene_path), e))?;
+    }
     let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
     let settings = settings(&document, &keys, folder, &scene, &parameters)?;
     let [spp, boundary_spp] = sample_counts(&document, &keys.estimator)?;
@@ -383,7 +387,7 @@ fn parameters(
                 Refusal::Keys(message) => fail(message),
                 Refusal::File(error) => error,
             })?;
-            scene.find(&effect.target).map_err(|e| fail(e.to_string()))?;
+            scene.find_all(&effect.target).map_err(|e| fail(e.to_string()))?;
             effects.push(effect);
         }
         parameters.push(Parameter { name: name.clone(), value: parameter.value, effects });

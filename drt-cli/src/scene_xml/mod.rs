@@ -126,7 +126,12 @@ impl<'a> Loader<'a> {
         for e in self.index.all("emitter") {
             scene.emitters.push(self.emitter(e, carried.contains(&e.ordinal))?);
         }
-        for e in shapes {
+        let groups = self.groups(shapes, &mut scene.bsdfs)?;
+        for e in shapes.iter().filter(|e| !groups.have(e)) {
+            if e.attribute("type") == Some("instance") {
+                self.instance(e, &groups, &mut scene)?;
+                continue;
+            }
             let shape = self.shape(e, &mut scene.bsdfs)?;
             scene.shapes.push(shape);
         }

@@ -1,5 +1,6 @@
 //! Shapes: meshes from files and tessellated primitives, with what they are made of.
 
+mod instances;
 mod mesh_file;
 mod serialized;
 mod texcoords;
@@ -124,7 +125,7 @@ fn model(p: &Properties<'_>) -> Result<Model, CliError> {
             };
             return Err(p.element.error(format!(
                 "the shape type `{other}` is not supported{why}; expected obj, ply, serialized, \
-                 rectangle, cube, sphere, disk or cylinder"
+                 rectangle, cube, sphere, disk, cylinder, shapegroup or instance"
             )));
         }
     };

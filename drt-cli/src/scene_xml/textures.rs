@@ -86,19 +86,55 @@ pub(super) type Pixels = ([u32; 2], Vec<[f32; 3]>);
 /// Linear pixels of an image file, or those it holds where it is `raw`.
 pub(super) fn pixels(path: &Path, raw: bool) -> Result<Pixels, String> {
     if path.extension().is_some_and(|end| end.eq_ignore_ascii_case("exr")) {
-        let mut file = read_exr(path).map_err(|err| err.to_string())?;
-        let texels = file.layers.remove("").ok_or("it has no channels R, G, B")?;
-        return small(file.size).map(|size| (size, texels));
+        return exr_pixels(path);
     }
     let reader = image::ImageReader::open(path).and_then(image::ImageReader::with_guessed_format);
     let reader = reader.map_err(|err| err.to_string())?;
     // Only Radiance's format holds linear values.
     let linear = raw || reader.format() == Some(image::ImageFormat::Hdr);
-    let image = reader.decode().map_err(|err| err.to_string())?;
-    let size = small([image.width(), image.height()])?;
+    // Sizes are known before anything is made room for.
+    let decoder = reader.into_decoder().map_err(|err| err.to_string())?;
+    let (width, height) = image::ImageDecoder::dimensions(&decoder);
+    let size = small([width, height])?;
+    let image = image::DynamicImage::from_decoder(decoder).map_err(|err| err.to_string())?;
     let image = image.into_rgb32f();
     let value = |v: f32| if linear { v } else { srgb_to_linear(f64::from(v)) as f32 };
     Ok((size, image.pixels().map(|p| p.0.map(value)).collect()))
+}
+
+/// The channels R, G and B, or Y in place of all three.
+fn exr_pixels(path: &Path) -> Result<Pixels, String> {
+    use exr::prelude::{ReadChannels as _, ReadLayers as _};
+
+    let meta = exr::meta::MetaData::read_from_file(path, false).map_err(|err| err.to_string())?;
+    let header = meta.headers.first().ok_or("there is no image in it")?;
+    let size = [header.layer_size.width(), header.layer_size.height()];
+    small(size.map(|n| u32::try_from(n).unwrap_or(u32::MAX)))?;
+    let names: Vec<String> = header.channels.list.iter().map(|c| c.name.to_string()).collect();
+    let has = |name: &str| names.iter().any(|n| n == name);
+    if ["R", "G", "B"].into_iter().all(has) {
+        let mut file = read_exr(path).map_err(|err| err.to_string())?;
+        let texels = file.layers.remove("").ok_or("it has no channels R, G, B")?;
+        return Ok((file.size, texels));
+    }
+    if !has("Y") || has("RY") || has("BY") {
+        let names = names.join(", ");
+        return Err(format!("its channels are {names}; expected R, G and B, or Y"));
+    }
+    let file = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_file(path)
+        .map_err(|err| err.to_string())?;
+    let layer = file.layer_data;
+    let grey = layer.channel_data.list.iter().find(|c| c.name.eq("Y"));
+    let grey = grey.ok_or("it has no channel Y")?.sample_data.values_as_f32();
+    let size = [layer.size.width() as u32, layer.size.height() as u32];
+    Ok((size, grey.map(|v| [v; 3]).collect()))
 }
 
 fn small(size: [u32; 2]) -> Result<[u32; 2], String> {

@@ -1,5 +1,6 @@
 //! Parameters become tangents: the scene at the parameters' values, and its rate of change by each.
 
+use alloc::borrow::Cow;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -72,9 +73,12 @@ fn resolve(scene: &Scene, parameters: &[Parameter]) -> Result<Vec<Parameter<Targ
             let effects = p
                 .effects
                 .iter()
-                .map(|e| {
+                .map(|e| Ok((e, scene.find_all(&e.target)?)))
+                .collect::<Result<Vec<_>, Error>>()?
+                .into_iter()
+                .flat_map(|(e, targets)| targets.into_iter().map(move |target| (e, target)))
+                .map(|(e, mut target)| {
                     let fail = |reason| effect_error(p, &e.target, reason);
-                    let mut target = scene.find(&e.target)?;
                     let change = match &e.change {
                         Change::Geometry(g) => {
                             if let Target::Bsdf(_) = target {
@@ -86,7 +90,8 @@ fn resolve(scene: &Scene, parameters: &[Parameter]) -> Result<Vec<Parameter<Targ
                             target = carrier(scene, target, c).map_err(fail)?;
                             Change::Property(c.clone())
                         }
-                        Change::Follow(leader) => Change::Follow(scene.find(leader)?),
+                        // All shapes of an instance move alike.
+                        Change::Follow(leader) => Change::Follow(scene.find_all(leader)?[0]),
                     };
                     Ok(drt_motion::Effect { target, change })
                 })
@@ -146,6 +151,7 @@ pub fn moved(scene: &Scene, parameters: &[Parameter]) -> Result<Scene, Error> {
 
 /// Applies the parameters to a scene and differentiates it, without a sensor in use.
 pub(crate) fn apply(scene: &Scene, parameters: &[Parameter]) -> Result<(Scene, Tangents), Error> {
+    let scene = &*if parameters.is_empty() { Cow::Borrowed(scene) } else { scene.expanded()? };
     let parameters = resolve(scene, parameters)?;
     let mut applied = Apply {
         scene: scene.clone(),

@@ -1,10 +1,13 @@
 //! What a scene is made of: plain data, the reference configuration every estimator starts from.
 
+use alloc::borrow::Cow;
+use alloc::collections::BTreeSet;
 use alloc::string::String;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use drt_geom::Mesh;
+use drt_geom::{Aabb, Mesh};
+use drt_math::{Affine, Vec3};
 use drt_medium::Medium;
 
 use crate::model::emitter::Emitter;
@@ -14,12 +17,15 @@ use crate::model::surface::Bsdf;
 
 /// A scene: shapes, what they are made of, what lights them, and who looks.
 ///
-/// Indices refer to the vectors of the same struct. Everything is in world space.
+/// Indices refer to the vectors of the same struct. Everything is in world space but the meshes of instances.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scene {
     /// Surfaces, in file order.
     pub shapes: Vec<Shape>,
+    /// Those of them that are instances, by shape in increasing order.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub instances: Vec<Instance>,
     /// Surface scattering models.
     pub bsdfs: Vec<Named<Bsdf>>,
     /// Participating media.
@@ -59,7 +65,7 @@ impl<T> Named<T> {
 pub struct Shape {
     /// The id in the scene file, where there is one.
     pub id: Option<String>,
-    /// Geometry in world space. The front of a triangle is where its vertices turn
+    /// Geometry, in world space unless the shape is an [`Instance`]. The front of a triangle is where its vertices turn
     /// counter-clockwise; `interior` is behind it.
     pub mesh: Arc<Mesh>,
     /// Index of the scattering model.
@@ -68,6 +74,16 @@ pub struct Shape {
     pub boundary: Option<MediumBoundary>,
     /// Index of the area emitter it carries.
     pub emitter: Option<usize>,
+}
+
+/// A shape whose mesh is in a space of its own, so that many shapes can share it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Instance {
+    /// Index of the shape.
+    pub shape: usize,
+    /// From the space of its mesh to the world. The front of a surface stays its front where this mirrors.
+    pub to_world: Affine,
 }
 
 /// The media behind and before a surface; `None` is vacuum.
@@ -221,9 +237,14 @@ impl Scene {
     pub fn check(&self) -> Result<(), Error> {
         let missing = |m: Option<usize>| m.is_some_and(|m| m >= self.media.len());
         let stated = |s: Surrounding| matches!(s, Surrounding::Stated(m) if missing(m));
+        self.check_instances()?;
+        let mut checked = BTreeSet::new();
         for (i, s) in self.shapes.iter().enumerate() {
             let fail = |reason| unusable(&s.id, "shape", i, reason);
-            s.mesh.validate().map_err(|e| fail(e.into()))?;
+            // Instances share theirs.
+            if checked.insert(Arc::as_ptr(&s.mesh)) {
+                s.mesh.validate().map_err(|e| fail(e.into()))?;
+            }
             if s.bsdf >= self.bsdfs.len() {
                 return Err(fail(ElementError::NoBsdf(s.bsdf)));
             }
@@ -302,6 +323,26 @@ impl Scene {
         }
     }
 
+    /// Finds all that a job calls `name`: as [`find`](Self::find), or all shapes of an instance of several, whose ids are that
+    /// of the instance, a slash and what each is called in its group.
+    ///
+    /// # Errors
+    /// As [`find`](Self::find).
+    pub fn find_all(&self, name: &str) -> Result<Vec<Target>, Error> {
+        let of_instance =
+            |id: &str| id.strip_prefix(name).is_some_and(|rest| rest.starts_with('/'));
+        let members = || {
+            let shapes = self.shapes.iter().enumerate();
+            shapes.filter(|(_, s)| s.id.as_deref().is_some_and(of_instance))
+        };
+        match self.find(name) {
+            Err(Error::UnknownTarget { .. }) if members().next().is_some() => {
+                Ok(members().map(|(i, _)| Target::Shape(i)).collect())
+            }
+            found => Ok(alloc::vec![found?]),
+        }
+    }
+
     fn find_by_order(&self, name: &str) -> Option<Target> {
         let (kind, rest) = name.split_once('[')?;
         let i: usize = rest.strip_suffix(']')?.parse().ok()?;
@@ -342,6 +383,81 @@ impl Scene {
             .chain(ids(&self.bsdfs, Target::Bsdf))
             .chain(ids(&self.emitters, Target::Emitter))
             .chain(ids(&self.sensors, Target::Sensor))
+    }
+}
+
+/// Most triangles of the copies that derivatives make of instances.
+const MOST_COPIED: u64 = 1 << 25;
+
+impl Scene {
+    /// The map from the space of a shape's mesh to the world, of an instance.
+    #[must_use]
+    pub fn placement(&self, shape: usize) -> Option<&Affine> {
+        let found = self.instances.binary_search_by_key(&shape, |i| i.shape);
+        found.ok().map(|i| &self.instances[i].to_world)
+    }
+
+    /// The corners of a shape's triangles in the world.
+    pub(crate) fn world_triangles(&self, shape: usize) -> impl Iterator<Item = [Vec3; 3]> {
+        let (mesh, placement) = (&self.shapes[shape].mesh, self.placement(shape));
+        (0..mesh.triangles.len() as u32).map(move |t| {
+            let triangle = mesh.triangle(t);
+            placement.map_or(triangle, |map| triangle.map(|p| map.point(p)))
+        })
+    }
+
+    /// A box around a shape in the world.
+    pub(crate) fn world_bounds(&self, shape: usize) -> Aabb {
+        let b = self.shapes[shape].mesh.bounds();
+        let Some(map) = self.placement(shape).filter(|_| !b.is_empty()) else { return b };
+        let corner = |i: u32| {
+            let pick = |k: usize| if i >> k & 1 == 0 { b.min[k] } else { b.max[k] };
+            map.point(drt_math::vec3(pick(0), pick(1), pick(2)))
+        };
+        Aabb::around((0..8).map(corner))
+    }
+
+    /// The same scene with a mesh in world space for every instance: what derivatives are made of, as each of its edges and vertices
+    /// moves by itself.
+    ///
+    /// # Errors
+    /// When these would have more than 33 million triangles.
+    pub fn expanded(&self) -> Result<Cow<'_, Self>, Error> {
+        let Some(first) = self.instances.first() else { return Ok(Cow::Borrowed(self)) };
+        self.check_instances()?;
+        let triangles = |i: &Instance| self.shapes[i.shape].mesh.triangles.len() as u64;
+        let count: u64 = self.instances.iter().map(triangles).sum();
+        if count > MOST_COPIED {
+            let reason = ElementError::Copies { count, most: MOST_COPIED };
+            return Err(unusable(&self.shapes[first.shape].id, "shape", first.shape, reason));
+        }
+        let mut scene = self.clone();
+        for Instance { shape, to_world } in core::mem::take(&mut scene.instances) {
+            let shape = &mut scene.shapes[shape];
+            shape.mesh = Arc::new(shape.mesh.transform(&to_world));
+        }
+        Ok(Cow::Owned(scene))
+    }
+
+    fn check_instances(&self) -> Result<(), Error> {
+        for (i, instance) in self.instances.iter().enumerate() {
+            let Some(shape) = self.shapes.get(instance.shape) else {
+                let element = alloc::format!("instance {i}");
+                return Err(Error::Element { element, reason: ElementError::NoShape });
+            };
+            let fail = |reason| Err(unusable(&shape.id, "shape", instance.shape, reason));
+            if i > 0 && self.instances[i - 1].shape >= instance.shape {
+                return fail(ElementError::InstanceOrder);
+            }
+            let map = &instance.to_world;
+            if !(map.is_finite() && map.inverse().is_finite()) {
+                return fail(ElementError::FlatInstance);
+            }
+            if shape.emitter.is_some() {
+                return fail(ElementError::GlowingInstance);
+            }
+        }
+        Ok(())
     }
 }
 

@@ -136,6 +136,7 @@ pub fn gradient_in_batches(
 ) -> Result<bool, Error> {
     scene.check()?;
     settings.check(scene, true)?;
+    let scene = &*scene.expanded()?;
     let wanted = &targets(scene, wanted)?[..];
     if let Some(target) = wanted.first() {
         let slide = slides(scene, wanted.iter().copied(), settings);

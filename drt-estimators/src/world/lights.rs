@@ -11,7 +11,7 @@ use drt_math::{AliasTable, Rgb, Rng, Vec3, warp};
 
 use crate::model::emitter::{Emitter, EnvironmentMap};
 use crate::model::error::Error;
-use crate::model::scene::Scene;
+use crate::model::scene::{Scene, Shape};
 use crate::world::World;
 use crate::world::vertex::SurfacePoint;
 
@@ -202,7 +202,10 @@ impl LightTable {
     ) -> Result<Self, Error> {
         let mut entries = Vec::new();
         let mut weights = Vec::new();
-        let count: usize = scene.shapes.iter().map(|s| s.mesh.triangles.len()).sum();
+        // Instances do not emit, and come last.
+        let own = |(i, _): &(usize, &Shape)| scene.placement(*i).is_none();
+        let shapes = scene.shapes.iter().enumerate().filter(own);
+        let count: usize = shapes.map(|(_, s)| s.mesh.triangles.len()).sum();
         let mut environment = None;
         let mut area_radiance = alloc::vec![Rgb::ZERO; scene.emitters.len()];
         for (i, shape) in scene.shapes.iter().enumerate() {

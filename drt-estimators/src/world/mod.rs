@@ -12,7 +12,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 pub(crate) use crate::world::rays::short_of;
-use drt_geom::{Aabb, Hit, Mesh, Ray, Skip};
+use drt_geom::{Aabb, Hit, Ray, Skip};
 use drt_math::{Rgb, Vec3};
 use drt_medium::{Coefficients, Homogeneous, Medium};
 
@@ -436,7 +436,28 @@ impl World {
 
     /// The point of a triangle at given barycentric weights.
     pub(crate) fn point(&self, prim: u32, bary: [f64; 2]) -> (SurfacePoint, Vec3) {
-        let Prim { shape, triangle } = self.geometry.prims[prim as usize];
+        match self.geometry.prims.get(prim as usize) {
+            Some(place) => self.point_of_mesh(prim, *place, bary),
+            None => self.point_of_instance(prim, bary),
+        }
+    }
+
+    #[cold]
+    fn point_of_instance(&self, prim: u32, bary: [f64; 2]) -> (SurfacePoint, Vec3) {
+        let (place, placed) = self.geometry.of_instance(prim);
+        let (point, x) = self.point_of_mesh(prim, place, bary);
+        let [ng, ns] = [point.ng, point.ns].map(|n| (placed.normals * n).normalize());
+        (SurfacePoint { ng, ns, ..point }, placed.to_world.point(x))
+    }
+
+    /// The point in the space of the mesh.
+    #[inline]
+    fn point_of_mesh(
+        &self,
+        prim: u32,
+        Prim { shape, triangle }: Prim,
+        bary: [f64; 2],
+    ) -> (SurfacePoint, Vec3) {
         let mesh = &self.scene.shapes[shape as usize].mesh;
         let [a, b, c] = mesh.triangle(triangle);
         let (e1, e2) = (b - a, c - a);
@@ -454,7 +475,7 @@ impl World {
 
     /// The point of a triangle's plane nearest to `x`, moved into the triangle.
     pub(crate) fn point_near(&self, prim: u32, x: Vec3) -> (SurfacePoint, Vec3) {
-        let Prim { shape, triangle } = self.geometry.prims[prim as usize];
+        let Prim { shape, triangle } = self.geometry.prim(prim);
         let mesh = &self.scene.shapes[shape as usize].mesh;
         let [a, ..] = mesh.triangle(triangle);
         let [g1, g2] = mesh.barycentric_gradients(triangle);
@@ -521,7 +542,7 @@ impl World {
         let dir = drt_math::vec3(0.577_215_66, 0.414_213_56, 0.703_818_4).normalize();
         let ray = Ray { origin: x, dir, t_max: f64::INFINITY };
         let bounds = |prim: u32| {
-            let shape = self.geometry.prims[prim as usize].shape as usize;
+            let shape = self.geometry.prim(prim).shape as usize;
             self.scene.shapes[shape].boundary.is_some()
         };
         let hit =
@@ -549,7 +570,7 @@ impl World {
 
     /// The medium around a shape that bounds none itself: the same everywhere where no interface comes near it.
     pub(crate) fn medium_around(&self, shape: usize) -> SurroundingMedium {
-        self.medium_near(&self.scene.shapes[shape].mesh.bounds())
+        self.medium_near(&self.scene.world_bounds(shape))
     }
 
     /// The medium of all points of a box that are off shapes, if no interface comes near it.
@@ -557,13 +578,13 @@ impl World {
         if !self.has_media() {
             return SurroundingMedium::Uniform(None);
         }
-        let near = |mesh: &Mesh| {
-            let triangles = 0..mesh.triangles.len() as u32;
-            mesh.bounds().meets(bounds)
-                && triangles.map(|t| Aabb::around(mesh.triangle(t))).any(|b| b.meets(bounds))
+        let near = |shape: usize| {
+            let mut triangles = self.scene.world_triangles(shape);
+            self.scene.world_bounds(shape).meets(bounds)
+                && triangles.any(|t| Aabb::around(t).meets(bounds))
         };
-        let mut interfaces = self.scene.shapes.iter().filter(|s| s.boundary.is_some());
-        if interfaces.any(|s| near(&s.mesh)) {
+        let mut shapes = 0..self.scene.shapes.len();
+        if shapes.any(|s| self.scene.shapes[s].boundary.is_some() && near(s)) {
             SurroundingMedium::Varies
         } else {
             SurroundingMedium::Uniform(self.medium_at(bounds.center()))
@@ -627,9 +648,9 @@ impl World {
 
 /// The diagonal of the box around the surfaces that hold a medium; `all` where none do.
 fn extent(scene: &Scene, medium: usize, all: f64) -> f64 {
-    let bounds = |s: &&Shape| s.boundary.is_some_and(|b| b.interior == Some(medium));
-    let meshes = scene.shapes.iter().filter(bounds).map(|s| &s.mesh);
-    let corners = meshes.map(|m| m.bounds()).flat_map(|b| [b.min, b.max]);
+    let bounds = |s: &Shape| s.boundary.is_some_and(|b| b.interior == Some(medium));
+    let shapes = (0..scene.shapes.len()).filter(|i| bounds(&scene.shapes[*i]));
+    let corners = shapes.map(|i| scene.world_bounds(i)).flat_map(|b| [b.min, b.max]);
     let bounds = Aabb::around(corners);
     if bounds.is_empty() { all } else { (bounds.max - bounds.min).length() }
 }

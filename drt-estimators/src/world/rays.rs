@@ -82,7 +82,7 @@ impl World {
         let ray = Ray { origin, dir, t_max: f64::INFINITY };
         let end = if self.any_null || past_emitters {
             let blocks = |prim: u32| {
-                let shape = self.geometry.prims[prim as usize].shape;
+                let shape = self.geometry.prim(prim).shape;
                 let passed = past_emitters && self.scene.shapes[shape as usize].emitter.is_some();
                 !(self.is_null(shape) || passed)
             };
@@ -174,7 +174,7 @@ impl World {
             return !self.geometry.bvh.any(&ray, skip, |_| true);
         }
         path.hits.clear();
-        let blocks = |prim: u32| !self.is_null(self.geometry.prims[prim as usize].shape);
+        let blocks = |prim: u32| !self.is_null(self.geometry.prim(prim).shape);
         if self.geometry.bvh.crossings(&ray, skip, blocks, &mut path.hits) {
             return false;
         }

@@ -12,7 +12,8 @@ use drt_estimators::surface::{
     Bsdf, Diffuse, Distribution, Phong, RoughConductor, RoughDielectric, TwoSided,
 };
 use drt_estimators::{
-    Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding,
+    Integrator, Layer, MediumBoundary, Named, Rendering, Scene, SceneEmitter, SceneSensor, Session,
+    Settings, Shape, Surrounding, Unattended,
 };
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
@@ -362,4 +363,23 @@ pub fn wobble(scene: &Scene, shape: &str, seed: u64) -> GeometryChange {
     let mut signed = || 2.0 * rng.next_f64() - 1.0;
     let velocities = (0..mesh.source_vertex_count).map(|_| vec3(signed(), signed(), signed()));
     GeometryChange::VertexVelocity(velocities.collect())
+}
+
+/// The image and derivatives of so many samples per pixel.
+pub fn rendered(
+    scene: &Scene,
+    parameters: &[Parameter],
+    settings: &Settings,
+    spp: u32,
+) -> Rendering {
+    let mut session = Session::new(scene, parameters, settings).expect("a valid scene");
+    assert!(session.run(spp, &Unattended));
+    session.rendering()
+}
+
+/// A multiple of what blocks of a layer hold.
+pub fn multiple(layer: &Layer, by: f64) -> Layer {
+    let mut layer = layer.clone();
+    layer.blocks.iter_mut().for_each(|b| b.mean *= by);
+    layer
 }

@@ -32,6 +32,14 @@ pub enum BvhError {
         /// How many there are.
         count: usize,
     },
+    /// An instance's map, or what it does to its tree, cannot be used.
+    #[error(
+        "instance {instance} (from 0) is placed by a map that flattens it, is not finite, or takes it beyond 1e100"
+    )]
+    BadInstance {
+        /// Which instance.
+        instance: u32,
+    },
     /// A refit with another number of triangles than the tree was built over.
     #[error("the tree was built over {expected} triangles and cannot be refitted to {found}")]
     CountChanged {

@@ -15,7 +15,7 @@ use super::watertight::Corners;
 const U: f64 = f64::EPSILON / 2.0;
 
 /// `n u / (1 - n u)`: bound of the relative error of `n` roundings (Higham 2002, Lemma 3.1).
-const fn gamma(n: f64) -> f64 {
+pub(super) const fn gamma(n: f64) -> f64 {
     n * U / (1.0 - n * U)
 }
 
@@ -37,6 +37,11 @@ impl End {
     #[inline]
     pub(super) fn origin(origin: [f64; 3]) -> Self {
         Self { point: origin, error: [0.0; 3] }
+    }
+
+    /// A point with an error of its own.
+    pub(super) fn with_error(point: [f64; 3], error: [f64; 3]) -> Self {
+        Self { point, error }
     }
 
     /// The point `origin + t dir`, whose terms were rounded, `dir` perhaps by a subtraction.

@@ -18,6 +18,7 @@ mod build;
 mod collapse;
 mod ends;
 mod frame;
+mod instanced;
 mod lanes;
 mod nearest;
 #[cfg(feature = "obvhs")]
@@ -31,6 +32,7 @@ mod winding;
 pub use binary::BvhBuilder;
 pub(crate) use boxes::BoxTree;
 pub use build::BvhError;
+pub use instanced::{InstancePlacement, InstancedBvh};
 pub use nearest::{ClosestPoint, nearest_point};
 pub use ray::{Hit, Ray, Skip};
 pub(crate) use registers::{Registers, Work};
@@ -80,9 +82,18 @@ impl TriangleBvh {
     /// The first hit along a ray.
     #[must_use]
     pub fn closest(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
-        let probe = self.probe(ray, skip)?;
+        self.closest_of(&self.probe(ray, skip)?)
+    }
+
+    /// The same of a ray whose ends, start and end, have errors of their own.
+    fn closest_from(&self, ray: &Ray, skip: Skip, ends: [Option<End>; 2]) -> Option<Hit> {
+        self.closest_of(&self.probe(ray, skip)?.with_ends(ends))
+    }
+
+    #[inline(always)]
+    fn closest_of(&self, probe: &Probe) -> Option<Hit> {
         let mut best: Option<(f64, u32, Crossing)> = None;
-        self.visit(&probe, |prim, crossing| {
+        self.visit(probe, |prim, crossing| {
             if best.is_none_or(|(t, p, _)| (crossing.t, prim) < (t, p)) {
                 best = Some((crossing.t, prim, *crossing));
                 return ControlFlow::Continue(probe.boxes.limit(crossing.t));
@@ -94,10 +105,27 @@ impl TriangleBvh {
 
     /// Whether a triangle that `blocks` meets the ray. `blocks` is asked in no particular order and
     /// no more after it has said yes.
-    pub fn any(&self, ray: &Ray, skip: Skip, mut blocks: impl FnMut(u32) -> bool) -> bool {
+    pub fn any(&self, ray: &Ray, skip: Skip, blocks: impl FnMut(u32) -> bool) -> bool {
         let Some(probe) = self.probe(ray, skip) else { return false };
+        self.any_of(&probe, blocks)
+    }
+
+    /// The same of a ray whose ends have errors of their own.
+    fn any_from(
+        &self,
+        ray: &Ray,
+        skip: Skip,
+        ends: [Option<End>; 2],
+        blocks: impl FnMut(u32) -> bool,
+    ) -> bool {
+        let Some(probe) = self.probe(ray, skip) else { return false };
+        self.any_of(&probe.with_ends(ends), blocks)
+    }
+
+    #[inline(always)]
+    fn any_of(&self, probe: &Probe, mut blocks: impl FnMut(u32) -> bool) -> bool {
         let mut blocked = false;
-        self.visit(&probe, |prim, _| {
+        self.visit(probe, |prim, _| {
             blocked = blocks(prim);
             if blocked { ControlFlow::Break(()) } else { ControlFlow::Continue(f32::INFINITY) }
         });
@@ -107,7 +135,18 @@ impl TriangleBvh {
     /// Calls `visit` with every hit along the ray, in no particular order.
     pub fn all(&self, ray: &Ray, skip: Skip, mut visit: impl FnMut(Hit)) {
         let Some(probe) = self.probe(ray, skip) else { return };
-        self.visit(&probe, |prim, crossing| {
+        self.all_of(&probe, &mut visit);
+    }
+
+    /// The same of a ray whose ends have errors of their own.
+    fn all_from(&self, ray: &Ray, skip: Skip, ends: [Option<End>; 2], visit: impl FnMut(Hit)) {
+        let Some(probe) = self.probe(ray, skip) else { return };
+        self.all_of(&probe.with_ends(ends), visit);
+    }
+
+    #[inline(always)]
+    fn all_of(&self, probe: &Probe, mut visit: impl FnMut(Hit)) {
+        self.visit(probe, |prim, crossing| {
             visit(hit(prim, crossing));
             ControlFlow::Continue(f32::INFINITY)
         });
@@ -262,6 +301,11 @@ impl<F: FnMut(u32, &Crossing) -> ControlFlow<(), f32>> Hits<'_, F> {
 }
 
 impl Probe {
+    /// With ends whose rounding errors are larger than those of a ray made in this space.
+    fn with_ends(self, [start, end]: [Option<End>; 2]) -> Self {
+        Self { start: start.unwrap_or(self.start), end: end.or(self.end), ..self }
+    }
+
     /// The crossing with a triangle, if it is a hit of this query.
     #[inline]
     fn meet(&self, prim: u32, triangle: &Corners) -> Option<Crossing> {

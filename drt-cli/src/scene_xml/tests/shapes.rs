@@ -277,3 +277,70 @@ fn shapes_hold_materials_lights_and_media() {
     refused("<shape type=\"cube\"><emitter type=\"point\"/></shape>", &["type `area`"]);
     refused("<emitter type=\"area\"/>", &["belongs inside a <shape>"]);
 }
+
+const GROUP: &str = r#"<shape type="shapegroup" id="group">
+    <shape type="cube" id="box"/><shape type="sphere"><integer name="resolution" value="8"/></shape>
+    <ref id="extra"/></shape><shape type="disk" id="extra"/>"#;
+
+#[test]
+fn instances_share_the_meshes_of_their_group() {
+    let s = scene(&format!(
+        r#"<shape type="instance" id="a"><ref id="group"/></shape>{GROUP}
+           <shape type="instance"><ref id="group"/><transform name="to_world"><scale value="2"/>
+             <translate x="1"/></transform></shape>
+           <shape type="shapegroup" id="single"><shape type="cube"/></shape>
+           <shape type="instance" id="b"><ref id="single"/></shape>"#
+    ));
+    let ids: Vec<_> = s.shapes.iter().map(|s| s.id.as_deref()).collect();
+    let a = [Some("a/box"), Some("a/1"), Some("a/extra")];
+    assert_eq!(ids[..3], a);
+    // A shape that a group refers to is there, too; one in it is not.
+    assert_eq!(ids[3..], [Some("extra"), None, None, None, Some("b")]);
+    assert_eq!(s.instances.iter().map(|i| i.shape).collect::<Vec<_>>(), [0, 1, 2, 4, 5, 6, 7]);
+    for (i, j) in [(0, 4), (1, 5), (2, 6)] {
+        assert!(std::sync::Arc::ptr_eq(&s.shapes[i].mesh, &s.shapes[j].mesh));
+    }
+    let map = &s.instances[3].to_world;
+    assert_eq!(map.point(Vec3::splat(1.0)), vec3(3.0, 2.0, 2.0));
+    s.check().unwrap();
+}
+
+#[test]
+fn groups_hold_shapes_and_instances_refer_to_groups() {
+    for (body, parts) in [
+        (
+            r#"<shape type="shapegroup"><shape type="instance"><ref id="group"/></shape></shape>"#,
+            &["shapegroup", "instances of instances"][..],
+        ),
+        (
+            r#"<shape type="shapegroup"><ref id="group"/></shape>"#,
+            &["<ref id=\"group\"", "instances of instances"],
+        ),
+        (
+            r#"<shape type="instance"><ref id="extra"/></shape>"#,
+            &["of a shapegroup, not of", "extra"],
+        ),
+        (r#"<shape type="instance"/>"#, &["refers to a shapegroup"]),
+        (
+            r#"<shape type="instance" id="i"><ref id="j"/></shape>
+               <shape type="instance" id="j"><ref id="i"/></shape>"#,
+            &["which it is part of"],
+        ),
+        (
+            r#"<shape type="instance"><ref id="group"/><transform name="to_world">
+               <scale x="0"/></transform></shape>"#,
+            &["flattens"],
+        ),
+        (
+            r#"<shape type="instance"><ref id="group"/><bsdf type="diffuse"/></shape>"#,
+            &["not supported inside"],
+        ),
+        (r#"<shape type="shapegroup"/>"#, &["there is no shape"]),
+        (
+            r#"<shape type="shapegroup"><shape type="cube"><emitter type="area"/></shape></shape>"#,
+            &["cannot carry an emitter"],
+        ),
+    ] {
+        refused(&format!("{GROUP}{body}"), parts);
+    }
+}

@@ -140,6 +140,84 @@ fn unusable_textures_are_told() {
 }
 
 /// The coordinates of the surface's point nearest to `p`, flat triangles standing for curved ones.
+fn value(folder: &Folder, name: &str) -> Rgb {
+    let body = format!("<bsdf type=\"diffuse\">{}</bsdf>", bitmap("").replace("four.png", name));
+    let scene = load(folder, &body).unwrap();
+    let [(_, texture)] = textures(&scene.bsdfs[0].item) else { panic!() };
+    texture.at([0.3, 0.8])
+}
+
+fn exr_file(folder: &Folder, name: &str, size: usize, channels: &[(&str, f32)]) {
+    use exr::prelude::*;
+    let channel = |(name, v): &(&str, f32)| {
+        AnyChannel::new(Text::from(*name), FlatSamples::F32(vec![*v; size * size]))
+    };
+    let channels = AnyChannels::sort(channels.iter().map(channel).collect());
+    let image = Image::from_channels((size, size), channels);
+    image.write().to_file(folder.path().join(name)).unwrap();
+}
+
+#[test]
+fn images_of_one_texel_and_of_few_channels_are_right() {
+    let folder = Folder::new();
+    let at = |name: &str| folder.path().join(name);
+    image::GrayImage::from_pixel(1, 1, image::Luma([255])).save(at("one.png")).unwrap();
+    assert_eq!(value(&folder, "one.png"), Rgb::ONE);
+    let grey = image::ImageBuffer::from_pixel(3, 2, image::LumaA([65_535_u16, 7]));
+    grey.save(at("grey.png")).unwrap();
+    assert_eq!(value(&folder, "grey.png"), Rgb::ONE);
+    let see_through = image::RgbaImage::from_pixel(2, 2, image::Rgba([255, 0, 255, 3]));
+    see_through.save(at("rgba.png")).unwrap();
+    assert_eq!(value(&folder, "rgba.png"), Rgb::new(1.0, 0.0, 1.0));
+    exr_file(&folder, "one.exr", 1, &[("R", 0.25), ("G", 0.5), ("B", 0.75), ("A", 0.1)]);
+    assert_eq!(value(&folder, "one.exr"), Rgb::new(0.25, 0.5, 0.75));
+    exr_file(&folder, "grey.exr", 2, &[("Y", 0.5)]);
+    assert_eq!(value(&folder, "grey.exr"), Rgb::splat(0.5));
+}
+
+/// Bytes of a PNG or EXR that say that it is 16384 texels wide and high.
+#[test]
+fn broken_and_huge_images_are_told_at_once() {
+    let folder = Folder::new();
+    let body = |name: &str| {
+        format!("<bsdf type=\"diffuse\">{}</bsdf>", bitmap("").replace("four.png", name))
+    };
+    let refused = |name: &str, bytes: &[u8], part: &str| {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+        let message = load(&folder, &body(name)).map(|_| ()).unwrap_err().to_string();
+        assert!([":2", name, part].iter().all(|p| message.contains(p)), "{message}");
+    };
+    picture(&folder);
+    let png = std::fs::read(folder.path().join("four.png")).unwrap();
+    refused("cut.png", &png[..png.len() / 2], "");
+    refused("empty.png", &[], "");
+    let mut huge = png.clone();
+    for at in [16, 20] {
+        huge[at..at + 4].copy_from_slice(&16_384_u32.to_be_bytes());
+    }
+    // The checksum of what was changed.
+    let crc = huge[12..29].iter().fold(!0_u32, |c, b| {
+        (0..8).fold(c ^ u32::from(*b), |c, _| (c >> 1) ^ (0xedb8_8320 * (c & 1)))
+    });
+    huge[29..33].copy_from_slice(&(!crc).to_be_bytes());
+    refused("huge.png", &huge, "16384x16384 pixels are too many; at most 67108864 fit");
+    exr_file(&folder, "two.exr", 2, &[("R", 0.25), ("G", 0.5), ("B", 0.75)]);
+    let exr = std::fs::read(folder.path().join("two.exr")).unwrap();
+    refused("cut.exr", &exr[..exr.len() - 9], "");
+    refused("no.exr", b"v/1\x01 not one", "");
+    let mut huge = exr;
+    for name in [&b"dataWindow\0box2i\0"[..], b"displayWindow\0box2i\0"] {
+        let at = huge.windows(name.len()).position(|w| w == name).unwrap() + name.len() + 4 + 8;
+        for at in [at, at + 4] {
+            huge[at..at + 4].copy_from_slice(&16_383_u32.to_le_bytes());
+        }
+    }
+    refused("huge.exr", &huge, "16384x16384 pixels are too many");
+    exr_file(&folder, "few.exr", 2, &[("R", 0.25), ("G", 0.5)]);
+    let few = std::fs::read(folder.path().join("few.exr")).unwrap();
+    refused("few.exr", &few, "its channels are G, R; expected R, G and B, or Y");
+}
+
 fn uv(mesh: &Mesh, p: Vec3) -> [f64; 2] {
     let nearest = (0..mesh.triangles.len() as u32).map(|i| {
         let [a, b, c] = mesh.triangle(i);

@@ -42,14 +42,12 @@ pub struct EmitterTangent {
     pub strength: Rgb,
     /// Velocity of a point or spot light.
     pub position: Vec3,
-    /// Rate of the unit direction of a spot or directional light.
+    /// Rate of the unit direction of a spot or directional light; of a projector its angular velocity, in radians.
     pub direction: Vec3,
     /// Rate of a spot's cutoff angle, in radians.
     pub cutoff_angle: f64,
     /// Rate of a spot's beam width, in radians.
     pub beam_width: f64,
-    /// Angular velocity of a projector, in radians.
-    pub spin: Vec3,
 }
 
 /// Derivatives of a number with respect to what an [`EmitterTangent`] holds the rates of.
@@ -59,14 +57,12 @@ pub struct EmitterGradient {
     pub strength: Rgb,
     /// With respect to the position.
     pub position: Vec3,
-    /// With respect to the unit direction, perpendicular to it.
+    /// With respect to the unit direction, perpendicular to it; of a projector to its turn about each axis of space.
     pub direction: Vec3,
     /// With respect to the cutoff angle.
     pub cutoff_angle: f64,
     /// With respect to the beam width.
     pub beam_width: f64,
-    /// With respect to a turn about each axis of space.
-    pub spin: Vec3,
 }
 
 impl Emitter {
@@ -130,7 +126,7 @@ impl Emission {
         match &self.picture {
             None => rate,
             Some(p) => {
-                let turned = flow_rate - t.spin.cross(p.flow);
+                let turned = flow_rate - t.direction.cross(p.flow);
                 t.strength * p.value + self.strength * p.slope.dot(turned)
             }
         }
@@ -149,15 +145,14 @@ impl Emission {
             direction: f.direction * weight,
             cutoff_angle: f.cutoff_angle * weight,
             beam_width: f.beam_width * weight,
-            spin: Vec3::ZERO,
         };
         match &self.picture {
             None => (f.flow * weight, emitter),
             Some(p) => {
                 let slope = p.slope.weighted(self.strength * adjoint).reject(p.flow);
                 let strength = adjoint * p.value;
-                let spin = slope.cross(p.flow);
-                (slope, EmitterGradient { strength, spin, ..EmitterGradient::default() })
+                let direction = slope.cross(p.flow);
+                (slope, EmitterGradient { strength, direction, ..EmitterGradient::default() })
             }
         }
     }
@@ -167,7 +162,7 @@ impl EmitterTangent {
     /// True when the emitter's place or direction changes.
     #[must_use]
     pub fn moves(&self) -> bool {
-        [self.position, self.direction, self.spin].iter().any(|v| *v != Vec3::ZERO)
+        self.position != Vec3::ZERO || self.direction != Vec3::ZERO
     }
 
     /// True when nothing changes.
@@ -188,7 +183,6 @@ impl EmitterGradient {
             direction: self.direction * w,
             cutoff_angle: self.cutoff_angle * w,
             beam_width: self.beam_width * w,
-            spin: self.spin * w,
         }
     }
 
@@ -201,7 +195,6 @@ impl EmitterGradient {
             + self.direction.dot(t.direction)
             + self.cutoff_angle * t.cutoff_angle
             + self.beam_width * t.beam_width
-            + self.spin.dot(t.spin)
     }
 }
 
@@ -215,7 +208,6 @@ macro_rules! sum {
                 self.direction += o.direction;
                 self.cutoff_angle += o.cutoff_angle;
                 self.beam_width += o.beam_width;
-                self.spin += o.spin;
             }
         }
     )*};

@@ -50,7 +50,7 @@ impl Emitter {
             tangent.direction = field.vector(direction).reject(direction);
         }
         if let Self::Projector { frame, .. } = self {
-            tangent.spin = slide::spin(frame, field);
+            tangent.direction = slide::spin(frame, field);
         }
         tangent
     }

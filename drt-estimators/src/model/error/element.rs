@@ -44,9 +44,31 @@ pub enum ElementError {
          `path-space` and `radiative` have them"
     )]
     ParallelRays,
+    /// An instance of a shape that does not exist.
+    #[error("its shape does not exist")]
+    NoShape,
+    /// Instances that are not in the order of their shapes, or two of one shape.
+    #[error("it is an instance twice, or instances are not in the order of shapes")]
+    InstanceOrder,
+    /// An instance in a plane, a line or a point, or nowhere.
+    #[error("its instance is placed by a map that flattens it or is not finite")]
+    FlatInstance,
+    /// An instance that is an emitter.
+    #[error("it is an instance, which cannot emit")]
+    GlowingInstance,
+    /// Too many instances to be copied.
+    #[error(
+        "derivatives copy the triangles of instances, and all instances together have {count}; at most {most} fit"
+    )]
+    Copies {
+        /// Triangles of all instances.
+        count: u64,
+        /// How many may be copied.
+        most: u64,
+    },
     /// A light that jumps, where something moves in it.
     #[error(
-        "its light ends or jumps at an edge, and `{parameter}` moves it or what may be in it; only finite differences follow such \
+        "its light is discontinuous, and `{parameter}` moves it or what may be in it; only finite differences follow its \
          edges, or let it fall off (a spot by a `beam_width` below its `cutoff_angle`, a projector by a black border of its bitmap)"
     )]
     Rim {
