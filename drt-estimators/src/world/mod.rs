@@ -451,7 +451,7 @@ impl World {
     }
 
     /// The point in the space of the mesh.
-    #[inline]
+    #[inline(always)]
     fn point_of_mesh(
         &self,
         prim: u32,
