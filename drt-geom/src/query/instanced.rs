@@ -134,7 +134,10 @@ impl InstancedBvh {
         if blocked {
             out.clear();
         } else {
-            instances.all(ray, skip, |hit| out.push(hit));
+            instances.all(ray, ray.t_max, skip, |hit| {
+                out.push(hit);
+                ray.t_max
+            });
             sort(out);
         }
         blocked
@@ -150,12 +153,14 @@ impl InstancedBvh {
     ) -> Option<Hit> {
         let mut best = self.triangles.closest_through(ray, skip, &blocks, out);
         let Some(instances) = &self.instances else { return best };
-        instances.all(ray, skip, |hit| {
+        let far = best.map_or(ray.t_max, |b| b.t.next_up());
+        instances.all(ray, far, skip, |hit| {
             if !blocks(hit.prim) {
                 out.push(hit);
             } else if best.is_none_or(|b| hit.is_before(&b)) {
                 best = Some(hit);
             }
+            best.map_or(ray.t_max, |b| b.t.next_up())
         });
         if let Some(best) = &best {
             out.retain(|h| h.is_before(best));
@@ -209,27 +214,18 @@ impl Instances {
     /// The first hit, if it is before the one given.
     fn closest(&self, ray: &Ray, skip: Skip, known: Option<Hit>) -> Option<Hit> {
         let mut best = known;
-        let mut ray = *ray;
-        let shorten = |ray: &mut Ray, best: &Option<Hit>| {
-            if let Some(hit) = best {
-                // Up to the hit itself: another at the same t may have a lower number.
-                ray.t_max = f64::min(ray.t_max, hit.t.next_up());
-            }
-        };
-        shorten(&mut ray, &best);
-        let whole = ray;
-        self.visit(&whole, |p| {
-            let probe = p.probe(&ray, skip);
-            if let Some(hit) =
-                probe.and_then(|(local, skip, ends)| p.tree.closest_from(&local, skip, ends))
+        // Up to the hit itself: another at the same t may have a lower number.
+        let end = |best: &Option<Hit>| best.map_or(ray.t_max, |hit| hit.t.next_up());
+        let mut far = end(&best);
+        self.visit(&Ray { t_max: far, ..*ray }, |p| {
+            let (local, skip, ends) = p.probe(ray, far, skip);
+            if let Some(hit) = p.tree.closest_from(&local, skip, ends).map(|hit| p.named(hit))
+                && best.is_none_or(|b| hit.is_before(&b))
             {
-                let hit = p.named(hit);
-                if best.is_none_or(|b| hit.is_before(&b)) {
-                    best = Some(hit);
-                    shorten(&mut ray, &best);
-                }
+                best = Some(hit);
+                far = end(&best);
             }
-            ControlFlow::Continue(ray.t_max)
+            ControlFlow::Continue(far)
         });
         best
     }
@@ -237,20 +233,19 @@ impl Instances {
     fn any(&self, ray: &Ray, skip: Skip, mut blocks: impl FnMut(u32) -> bool) -> bool {
         let mut blocked = false;
         self.visit(ray, |p| {
-            if let Some((local, skip, ends)) = p.probe(ray, skip) {
-                blocked = p.tree.any_from(&local, skip, ends, |prim| blocks(p.first + prim));
-            }
+            let (local, skip, ends) = p.probe(ray, ray.t_max, skip);
+            blocked = p.tree.any_from(&local, skip, ends, |prim| blocks(p.first + prim));
             if blocked { ControlFlow::Break(()) } else { ControlFlow::Continue(f64::INFINITY) }
         });
         blocked
     }
 
-    fn all(&self, ray: &Ray, skip: Skip, mut found: impl FnMut(Hit)) {
-        self.visit(ray, |p| {
-            if let Some((local, skip, ends)) = p.probe(ray, skip) {
-                p.tree.all_from(&local, skip, ends, |hit| found(p.named(hit)));
-            }
-            ControlFlow::Continue(f64::INFINITY)
+    /// Calls `found` with all hits before `far`, which is where it says from then on; some that are behind may be among them.
+    fn all(&self, ray: &Ray, mut far: f64, skip: Skip, mut found: impl FnMut(Hit) -> f64) {
+        self.visit(&Ray { t_max: far, ..*ray }, |p| {
+            let (local, skip, ends) = p.probe(ray, far, skip);
+            p.tree.all_from(&local, skip, ends, |hit| far = found(p.named(hit)));
+            ControlFlow::Continue(far)
         });
     }
 }
@@ -269,11 +264,10 @@ impl Placed {
         Aabb::around((0..8).map(corner))
     }
 
-    /// The ray, the triangles that it skips and its ends, in the space of the tree.
-    fn probe(&self, ray: &Ray, skip: Skip) -> Option<(Ray, Skip, [Option<End>; 2])> {
+    /// The ray cut off at `far`, the triangles that it skips and its ends, in the space of the tree.
+    fn probe(&self, ray: &Ray, far: f64, skip: Skip) -> (Ray, Skip, (End, Option<End>)) {
         let origin = self.to_local.point(ray.origin);
         let dir = self.to_local.vector(ray.dir);
-        let local = Ray { origin, dir, t_max: ray.t_max };
         let own = |prim: u32| {
             let place = prim.wrapping_sub(self.first);
             if prim != NONE && (place as usize) < self.tree.triangle_count { place } else { NONE }
@@ -282,12 +276,12 @@ impl Placed {
         let end = |x: Vec3, world: Vec3| {
             End::with_error(x.to_array(), (self.rounding(x, world) * MAPPED).to_array())
         };
-        let far = (ray.t_max < f64::INFINITY).then(|| {
+        let last = (ray.t_max < f64::INFINITY).then(|| {
             let reach = absolute(ray.origin) + absolute(ray.dir) * ray.t_max;
-            end(local.at(ray.t_max), reach)
+            end(origin + dir * ray.t_max, reach)
         });
-        let start = Some(end(origin, absolute(ray.origin)));
-        Some((local, Skip::two(own(a), own(b)), [start, far]))
+        let ends = (end(origin, absolute(ray.origin)), last);
+        (Ray { origin, dir, t_max: far }, Skip::two(own(a), own(b)), ends)
     }
 
     /// The size of what is added up in mapping a point of the tree's space to the world and back.

@@ -86,7 +86,7 @@ impl TriangleBvh {
     }
 
     /// The same of a ray whose ends, start and end, have errors of their own.
-    fn closest_from(&self, ray: &Ray, skip: Skip, ends: [Option<End>; 2]) -> Option<Hit> {
+    fn closest_from(&self, ray: &Ray, skip: Skip, ends: (End, Option<End>)) -> Option<Hit> {
         self.closest_of(&self.probe(ray, skip)?.with_ends(ends))
     }
 
@@ -115,7 +115,7 @@ impl TriangleBvh {
         &self,
         ray: &Ray,
         skip: Skip,
-        ends: [Option<End>; 2],
+        ends: (End, Option<End>),
         blocks: impl FnMut(u32) -> bool,
     ) -> bool {
         let Some(probe) = self.probe(ray, skip) else { return false };
@@ -139,7 +139,7 @@ impl TriangleBvh {
     }
 
     /// The same of a ray whose ends have errors of their own.
-    fn all_from(&self, ray: &Ray, skip: Skip, ends: [Option<End>; 2], visit: impl FnMut(Hit)) {
+    fn all_from(&self, ray: &Ray, skip: Skip, ends: (End, Option<End>), visit: impl FnMut(Hit)) {
         let Some(probe) = self.probe(ray, skip) else { return };
         self.all_of(&probe.with_ends(ends), visit);
     }
@@ -301,9 +301,9 @@ impl<F: FnMut(u32, &Crossing) -> ControlFlow<(), f32>> Hits<'_, F> {
 }
 
 impl Probe {
-    /// With ends whose rounding errors are larger than those of a ray made in this space.
-    fn with_ends(self, [start, end]: [Option<End>; 2]) -> Self {
-        Self { start: start.unwrap_or(self.start), end: end.or(self.end), ..self }
+    /// With ends that may have larger rounding errors than those of a ray made in this space, and are not where it was cut off.
+    fn with_ends(self, (start, end): (End, Option<End>)) -> Self {
+        Self { start, end, ..self }
     }
 
     /// The crossing with a triangle, if it is a hit of this query.

@@ -1,7 +1,7 @@
 use alloc::string::String;
 use core::f64::consts::PI;
 
-use drt_math::{Affine, Mat3, Rgb, RgbVec, Vec3, fm, vec3};
+use drt_math::{Affine, Mat3, Real, Rgb, RgbVec, Vec3, fm, vec3};
 
 use crate::model::emitter::emission::Falloff;
 use crate::model::texture::Texture;
@@ -147,8 +147,8 @@ impl Slide {
             Some([cutoff, _]) => drt_math::warp::uniform_cone_pdf(d, fm::cos(cutoff)),
             None => {
                 let inside = d.z > 0.0
-                    && (d.x / d.z).abs() <= self.half[0]
-                    && (d.y / d.z).abs() <= self.half[1];
+                    && Real::abs(d.x / d.z) <= self.half[0]
+                    && Real::abs(d.y / d.z) <= self.half[1];
                 if inside { 1.0 / (self.area() * d.z * d.z * d.z) } else { 0.0 }
             }
         }
