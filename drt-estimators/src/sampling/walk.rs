@@ -33,26 +33,34 @@ impl Tracer<'_> {
         stop: &PathState,
         observer: &mut O,
     ) -> Option<OutgoingRay> {
-        if stop.segments >= self.max_segments {
+        let world = self.world;
+        // Going straight on adds no depth, so that the last vertex may do that.
+        let mut straight_only = stop.segments >= self.max_segments;
+        if straight_only && !world.passes_straight(&stop.vertex) {
             return None;
         }
-        let world = self.world;
         let scattering = world.scattering(&stop.vertex)?;
         let sigma_s = stop.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s);
         let spare = O::RECORDS && world.may_revive(&stop.vertex);
         if stop.alive.times(stop.arrival * sigma_s, spare).value.is_zero() {
             return None;
         }
-        M::connect(self, stop, &scattering, sigma_s, observer);
+        if !straight_only {
+            M::connect(self, stop, &scattering, sigma_s, observer);
+        }
         if stop.segments + 1 >= self.max_segments && !M::EMISSION {
-            return None;
+            if !world.passes_straight(&stop.vertex) {
+                return None;
+            }
+            straight_only = true;
         }
         let mut segments = stop.segments;
         let (to, pdf, value) = match scattering.sample(stop.from, M::GIVEN, &mut self.rng)? {
-            Drawn::Spread(to, pdf) if pdf > 0.0 => {
+            Drawn::Spread(to, pdf) if pdf > 0.0 && !straight_only => {
                 (to, Some(pdf), M::value(&scattering, stop.from, to))
             }
             Drawn::Spread(..) => return None,
+            Drawn::Specular(s) if straight_only && !s.straight => return None,
             Drawn::Specular(s) => {
                 // Like a null interface, a pane that light goes straight through adds no depth.
                 segments -= u32::from(s.straight && segments > 0);
@@ -273,11 +281,18 @@ impl Tracer<'_> {
         }
         let (v, w, d) = (&stop.vertex, light.w, light.distance);
         let target = light.point().map(|s| s.prim);
-        if !world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
+        let mut part = Rgb::ONE;
+        if world.any_straight && light.is_delta() {
+            // All other lights are found by paths that go straight through.
+            part = world.connect_straight(v, w, d, &mut self.shadow, &mut self.counters);
+            if part.is_zero() {
+                return;
+            }
+        } else if !world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
             return;
         }
         let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
-        let transport = tau * (weight * light.inv_pdf);
+        let transport = tau * part * (weight * light.inv_pdf);
         if transport.is_zero() {
             return;
         }

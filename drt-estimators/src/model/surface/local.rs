@@ -86,8 +86,10 @@ impl LocalBsdf<'_> {
 
     /// The gradient of the value by the place of the point, as far as textures change there; `params` holds its
     /// derivatives by properties.
-    pub(crate) fn slide(&self, wo: Vec3, params: &BsdfParams) -> RgbVec {
-        self.bsdf.slide(self.at.as_ref(), wo, self.ns, params)
+    pub(crate) fn slide(&self, wo: Vec3, wi: Vec3, params: &BsdfParams) -> RgbVec {
+        let factor =
+            if self.interpolated { fade(self.ns.dot(wo)).0 * fade(self.ng.dot(wi)).0 } else { 1.0 };
+        self.bsdf.slide(self.at.as_ref(), [wo, wi, self.ns], params, factor)
     }
 
     /// Draws the direction that is not given; see [`Bsdf::sample`].
@@ -105,8 +107,8 @@ impl LocalBsdf<'_> {
         given: Given,
     ) -> Option<SpecularSample> {
         let mut s = self.bsdf.sample_specular_at(self.at.as_ref(), from, self.ns, choice, given)?;
-        if self.interpolated {
-            // As the value fades where there is one.
+        // What goes straight on has met nothing; all else fades as the value does where there is one.
+        if self.interpolated && !s.straight {
             s.weight *= fade(self.ns.dot(from)).0 * fade(self.ng.dot(s.w)).0;
         }
         Some(s)
