@@ -141,8 +141,19 @@ fn compare(scene: &Scene, arguments: &Arguments) -> Result<Comparison, String> {
             of_as_many: of_one / f64::from(spp),
         }
     };
-    let rounding =
-        |i: usize, c: usize| (expected[i], precision.rounding(expected[i], spread[i])[c]);
+    let rounding = |pixels: &[usize], c: usize| {
+        // Pixels that are equal: how many, and one of them.
+        let mut equal: BTreeMap<[u32; 3], (f64, usize)> = BTreeMap::new();
+        for i in pixels {
+            equal.entry(expected[*i].map(f32::to_bits)).or_insert((0.0, *i)).0 += 1.0;
+        }
+        let variance = |(n, i): &(f64, usize)| {
+            let widest = spread[*i].iter().fold(0.0, |m, v| f64::max(m, f64::from(*v)));
+            let spread = if *n > 1.0 { 0.0 } else { widest.sqrt() };
+            n * n * precision.rounding(expected[*i], spread)[c]
+        };
+        equal.values().map(variance).sum()
+    };
     Ok(judge(reference.size, &sample, &rounding))
 }
 

@@ -106,7 +106,7 @@ pub(crate) struct TexturePoint<'a> {
     /// Weights of the triangle's second and third vertex.
     pub(crate) bary: [f64; 2],
     /// The direction that frames follow instead of that in which u grows.
-    pub(crate) tangent: Option<Vec3>,
+    pub(crate) tangent: Option<&'a Vec3>,
 }
 
 impl<'a> TexturePoint<'a> {

@@ -36,7 +36,7 @@ impl Tracer<'_> {
         let world = self.world;
         // Going straight on adds no depth, so that the last vertex may do that.
         let mut straight_only = stop.segments >= self.max_segments;
-        if straight_only && !world.passes_straight(&stop.vertex) {
+        if straight_only && !(world.any_straight && world.passes_straight(&stop.vertex)) {
             return None;
         }
         let scattering = world.scattering(&stop.vertex)?;
@@ -49,7 +49,7 @@ impl Tracer<'_> {
             M::connect(self, stop, &scattering, sigma_s, observer);
         }
         if stop.segments + 1 >= self.max_segments && !M::EMISSION {
-            if !world.passes_straight(&stop.vertex) {
+            if !(world.any_straight && world.passes_straight(&stop.vertex)) {
                 return None;
             }
             straight_only = true;
@@ -281,18 +281,19 @@ impl Tracer<'_> {
         }
         let (v, w, d) = (&stop.vertex, light.w, light.distance);
         let target = light.point().map(|s| s.prim);
-        let mut part = Rgb::ONE;
-        if world.any_straight && light.is_delta() {
+        let part = if world.any_straight && light.is_delta() {
             // All other lights are found by paths that go straight through.
-            part = world.connect_straight(v, w, d, &mut self.shadow, &mut self.counters);
-            if part.is_zero() {
-                return;
-            }
-        } else if !world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
+            Some(world.connect_straight(v, w, d, &mut self.shadow, &mut self.counters))
+        } else if world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
+            None
+        } else {
             return;
-        }
+        };
         let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
-        let transport = tau * part * (weight * light.inv_pdf);
+        let mut transport = tau * (weight * light.inv_pdf);
+        if let Some(part) = part {
+            transport *= part;
+        }
         if transport.is_zero() {
             return;
         }

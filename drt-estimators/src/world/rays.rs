@@ -113,7 +113,7 @@ impl World {
 
     /// Begins a path of a given length, with the surface that its start touches. The medium it goes on in; `None` where that
     /// surface blocks.
-    #[inline]
+    #[inline(always)]
     fn begin(
         &self,
         v: &Vertex,
@@ -139,6 +139,7 @@ impl World {
 
     /// As [`World::connect`], through all that lets light go straight on, and how much of it that does; zero where something
     /// blocks.
+    #[cold]
     pub(crate) fn connect_straight(
         &self,
         v: &Vertex,

@@ -8,17 +8,16 @@
 //! α(w)² sin² = α_u² w_x² + α_v² w_y².
 //! ```
 //!
-//! All vectors are in the frame of [`shading_frame`].
+//! All vectors are in the frame of [`Framed`].
 
-use drt_math::{Dual, Real, Rgb, Vec3, fm, vec3};
+use drt_math::{Real, Rgb, Vec3, fm, vec3};
 
 use crate::model::surface::angles::Angles;
-use crate::model::surface::composed::Composed;
 use crate::model::surface::dielectric::Passage;
+use crate::model::surface::framed::Framed;
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, LEAST_COS2, mirrored};
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
-use crate::model::surface::shading_frame::shading_frame;
-use crate::model::surface::{At, Bsdf, BsdfGradient, BsdfParams, Given, RoughConductor};
+use crate::model::surface::{Bsdf, RoughConductor};
 
 /// A [`RoughConductor`] or [`RoughDielectric`](super::RoughDielectric) of uneven roughness: `alpha_u` and `alpha_v` of
 /// Mitsuba's plugins.
@@ -106,8 +105,29 @@ impl Anisotropic {
         StretchedFacets { distribution, alpha: self.alpha.map(T::from) }
     }
 
-    /// The value in the frame of the surface.
-    pub(super) fn value<T: Real>(&self, wo: Vec3<T>, wi: Vec3<T>) -> Rgb<T> {
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::AlphaU => Some(Slot::Scalar(&mut self.alpha[0])),
+            Property::AlphaV => Some(Slot::Scalar(&mut self.alpha[1])),
+            Property::Alpha => None,
+            _ => self.base.property(property),
+        }
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+        if !matches!(self.base, Bsdf::RoughConductor(_) | Bsdf::RoughDielectric(_)) {
+            let bsdf = self.base.name();
+            return Err(SurfaceError::CannotHold { outer: "anisotropic", bsdf });
+        }
+        for (property, alpha) in [Property::AlphaU, Property::AlphaV].into_iter().zip(self.alpha) {
+            in_range(property, alpha, alpha >= LEAST_ALPHA, "at least 1e-4")?;
+        }
+        self.base.validate()
+    }
+}
+
+impl Framed for Anisotropic {
+    fn value<T: Real>(&self, wo: Vec3<T>, wi: Vec3<T>) -> Rgb<T> {
         let a = Angles::new(wo, wi, Vec3::Z.lift());
         let black = Rgb::splat(T::zero());
         match &self.base {
@@ -137,79 +157,23 @@ impl Anisotropic {
         }
     }
 
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        match property {
-            Property::AlphaU => Some(Slot::Scalar(&mut self.alpha[0])),
-            Property::AlphaV => Some(Slot::Scalar(&mut self.alpha[1])),
-            Property::Alpha => None,
-            _ => self.base.property(property),
-        }
-    }
-
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        if !matches!(self.base, Bsdf::RoughConductor(_) | Bsdf::RoughDielectric(_)) {
-            let bsdf = self.base.name();
-            return Err(SurfaceError::CannotHold { outer: "anisotropic", bsdf });
-        }
-        for (property, alpha) in [Property::AlphaU, Property::AlphaV].into_iter().zip(self.alpha) {
-            in_range(property, alpha, alpha >= LEAST_ALPHA, "at least 1e-4")?;
-        }
-        self.base.validate()
-    }
-}
-
-/// The gradient of a value in the frame of its surface, with respect to the directions and the normal that the frame is about.
-pub(super) fn gradient_in_frame(
-    at: At<'_>,
-    [wo, wi, n]: [Vec3; 3],
-    value: impl FnOnce(Vec3<Dual<f64, 9>>, Vec3<Dual<f64, 9>>) -> Rgb<Dual<f64, 9>>,
-) -> BsdfGradient {
-    let variable = |v: Vec3, first: usize| {
-        let [x, y, z] = v.to_array();
-        vec3(Dual::variable(x, first), Dual::variable(y, first + 1), Dual::variable(z, first + 2))
-    };
-    let frame = shading_frame(at, variable(n, 6));
-    let value = value(frame.to_local(variable(wo, 0)), frame.to_local(variable(wi, 3)));
-    let by = |first: usize| {
-        let axis = |k: usize| value.map(|c| c.eps[first + k]);
-        axis(0).outer(Vec3::X) + axis(1).outer(Vec3::Y) + axis(2).outer(Vec3::Z)
-    };
-    let params = BsdfParams::default();
-    BsdfGradient { value: value.map(|c| c.re), wo: by(0), wi: by(3), n: by(6), params }
-}
-
-impl Composed for Anisotropic {
-    fn eval(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
-        let frame = shading_frame(at, n);
-        self.value(frame.to_local(wo), frame.to_local(wi))
-    }
-
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        gradient_in_frame(at, [wo, wi, n], |wo, wi| self.value(wo, wi))
-    }
-
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        let frame = shading_frame(at, n);
+    fn direction(&self, from: Vec3, u: [f64; 3]) -> Option<Vec3> {
         let facets: StretchedFacets = self.facets();
-        let local = frame.to_local(from);
-        let w = match &self.base {
-            Bsdf::RoughConductor(_) if local.z > 0.0 => {
-                mirrored(local, facets.sample_visible(local, [u[0], u[1]]))
+        match &self.base {
+            Bsdf::RoughConductor(_) if from.z > 0.0 => {
+                Some(mirrored(from, facets.sample_visible(from, [u[0], u[1]])))
             }
             Bsdf::RoughDielectric(b) => {
-                let (n, eta) = b.seen_from(local, Vec3::Z)?;
-                let m = facets.sample_visible(local * n.z, [u[0], u[1]]) * n.z;
-                b.sample_by(m, local, n, eta, u[2])?
+                let (n, eta) = b.seen_from(from, Vec3::Z)?;
+                let m = facets.sample_visible(from * n.z, [u[0], u[1]]) * n.z;
+                b.sample_by(m, from, n, eta, u[2])
             }
-            _ => return None,
-        };
-        Some(frame.to_world(w))
+            _ => None,
+        }
     }
 
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        let frame = shading_frame(at, n);
+    fn density(&self, from: Vec3, to: Vec3) -> f64 {
         let facets: StretchedFacets = self.facets();
-        let [from, to] = [from, to].map(|w| frame.to_local(w));
         let a = Angles::new(from, to, Vec3::Z);
         match &self.base {
             Bsdf::RoughConductor(_) if a.in_front() => {
@@ -223,7 +187,7 @@ impl Composed for Anisotropic {
         }
     }
 
-    fn lobe_width(&self, _: At<'_>) -> f64 {
+    fn narrowest(&self) -> f64 {
         f64::min(self.alpha[0], self.alpha[1])
     }
 }

@@ -45,7 +45,7 @@ impl<T: Real> RoughConductor<T> {
     }
 
     /// The value by [`Distribution::facets`] of any kind.
-    #[inline]
+    #[inline(always)]
     pub(super) fn value_of(&self, a: &Angles<T>, facets: T) -> Rgb<T> {
         // Also where |h| = 0, which the rest could not be differentiated at.
         if facets.re() == 0.0 {
@@ -113,7 +113,7 @@ impl RoughConductor {
     }
 
     /// The density by [`Distribution::visible_density`] of any kind.
-    #[inline]
+    #[inline(always)]
     pub(super) fn pdf_of(a: &Angles, visible: f64) -> f64 {
         reflection_jacobian(a.h2) * visible
     }

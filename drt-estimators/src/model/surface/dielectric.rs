@@ -115,7 +115,7 @@ impl<T: Real> RoughDielectric<T> {
     }
 
     /// The value by [`Distribution::facets`] of any kind.
-    #[inline]
+    #[inline(always)]
     pub(super) fn value_of(&self, passage: &Passage<T>, facets: T) -> Rgb<T> {
         // Also where |h| = 0, which the rest could not be differentiated at.
         if facets.re() == 0.0 {
@@ -187,7 +187,7 @@ impl RoughDielectric {
     }
 
     /// The density by [`Distribution::visible_density`] of any kind.
-    #[inline]
+    #[inline(always)]
     pub(super) fn pdf_of(&self, passage: &Passage<f64>, visible: f64) -> f64 {
         let Passage { a, eta } = *passage;
         let (probability, jacobian) = if passage.reflects() {
@@ -211,7 +211,7 @@ impl RoughDielectric {
 
     /// The direction into which a facet with the normal `m` sends light, by a number that chooses between reflection and
     /// refraction; `n` is on the side of `from`, and `eta` the index beyond over that on that side.
-    #[inline]
+    #[inline(always)]
     pub(super) fn sample_by(
         &self,
         m: Vec3,

@@ -43,6 +43,7 @@ mod dielectric;
 mod diffuse;
 mod direction_partner;
 mod facet;
+mod framed;
 mod fresnel;
 mod lobes;
 mod local;
@@ -399,8 +400,15 @@ impl Bsdf {
         a.into_iter().chain(b)
     }
 
+    /// True where the value may depend on the place of its point.
+    #[inline]
+    pub(crate) fn varies(&self) -> bool {
+        matches!(self, Self::Textured(_) | Self::Blend(_) | Self::TwoSided(_))
+    }
+
     /// The gradient of a value by the place of its point, as far as textures change there; `params` are the value's
     /// derivatives by properties, times a `factor`, as the gradient is to be.
+    #[cold]
     pub(crate) fn slide(
         &self,
         at: At<'_>,
@@ -507,10 +515,22 @@ impl Bsdf {
     #[must_use]
     pub fn is_transmissive(&self) -> bool {
         match self {
-            Self::RoughDielectric(_)
-            | Self::Dielectric(_)
-            | Self::ThinDielectric(_)
-            | Self::PrincipledThin(_) => true,
+            Self::RoughDielectric(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
+            Self::Null
+            | Self::Diffuse(_)
+            | Self::Phong(_)
+            | Self::RoughConductor(_)
+            | Self::Plastic(_)
+            | Self::Conductor(_) => false,
+            _ => self.is_any_transmissive(),
+        }
+    }
+
+    /// Of BSDFs that are no plain models.
+    #[cold]
+    fn is_any_transmissive(&self) -> bool {
+        match self {
+            Self::PrincipledThin(_) => true,
             Self::Principled(b) => b.is_transmissive(),
             Self::Anisotropic(b) => b.base.is_transmissive(),
             // A texture may stand for how much goes through.

@@ -48,8 +48,9 @@ struct Tilt<'a> {
 
 /// One normal that scatters.
 struct Facet<'a> {
-    /// The point, with the tangent that nested frames follow.
-    at: TexturePoint<'a>,
+    point: TexturePoint<'a>,
+    /// What nested frames follow.
+    tangent: Vec3,
     /// Unit, in the world.
     normal: Vec3,
     /// Squared tangent of its angle to the surface's.
@@ -73,7 +74,8 @@ impl Tilt<'_> {
         let along = if along.max_abs() > 0.0 { along.normalize() } else { Vec3::Y };
         let cos2 = normal.z * normal.z;
         Facet {
-            at: TexturePoint { tangent: Some(self.frame.to_world(along)), ..self.at },
+            point: self.at,
+            tangent: self.frame.to_world(along),
             normal: self.frame.to_world(normal),
             tan2: if cos2 > 0.0 { (1.0 - cos2).max(0.0) / cos2 } else { f64::INFINITY },
             surface: self.frame.n,
@@ -82,6 +84,11 @@ impl Tilt<'_> {
 }
 
 impl Facet<'_> {
+    /// The point with the tangent that nested frames follow.
+    fn at(&self) -> TexturePoint<'_> {
+        TexturePoint { tangent: Some(&self.tangent), ..self.point }
+    }
+
     /// Both normals see the direction from the same side.
     fn sees(&self, w: Vec3) -> bool {
         self.normal.dot(w) * self.surface.dot(w) > 0.0
@@ -162,7 +169,7 @@ impl Composed for Perturbed {
         if !facet.sees(wi) {
             return Rgb::ZERO;
         }
-        self.bsdf.eval_at(Some(&facet.at), wo, wi, facet.normal) * self.shadowing(&facet, wi).0
+        self.bsdf.eval_at(Some(&facet.at()), wo, wi, facet.normal) * self.shadowing(&facet, wi).0
     }
 
     /// With respect to the surface's normal there is none: nothing that moves is differentiated here.
@@ -173,7 +180,7 @@ impl Composed for Perturbed {
         if !facet.sees(wi) {
             return BsdfGradient::default();
         }
-        let d = self.bsdf.gradient_at(Some(&facet.at), wo, wi, facet.normal);
+        let d = self.bsdf.gradient_at(Some(&facet.at()), wo, wi, facet.normal);
         let (shadowing, by_cos) = self.shadowing(&facet, wi);
         let mut params = BsdfParams::default();
         params.scatter(&d.params, Rgb::splat(shadowing));
@@ -201,7 +208,7 @@ impl Composed for Perturbed {
             }
         };
         let u = [u[0], u[1], choice];
-        let w = self.bsdf.direction(Some(&facet.at), from, facet.normal, u, given)?;
+        let w = self.bsdf.direction(Some(&facet.at()), from, facet.normal, u, given)?;
         facet.sees(w).then_some(w)
     }
 
@@ -218,7 +225,8 @@ impl Composed for Perturbed {
         };
         let tilt = self.tilt(at, n);
         let facet = self.seen_from(&tilt, from);
-        let s = self.bsdf.sample_specular_at(Some(&facet.at), from, facet.normal, choice, given)?;
+        let s =
+            self.bsdf.sample_specular_at(Some(&facet.at()), from, facet.normal, choice, given)?;
         let shadowing = match given {
             _ if !facet.sees(s.w) => 0.0,
             Given::Wo => self.shadowing(&facet, s.w).0,
@@ -232,7 +240,7 @@ impl Composed for Perturbed {
         let tilt = self.tilt(at, n);
         let by = |facet: &Facet<'_>| {
             if facet.sees(to) {
-                self.bsdf.pdf_at(Some(&facet.at), from, to, facet.normal, given)
+                self.bsdf.pdf_at(Some(&facet.at()), from, to, facet.normal, given)
             } else {
                 0.0
             }

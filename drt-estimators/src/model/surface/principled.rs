@@ -17,15 +17,13 @@
 
 use core::f64::consts::{FRAC_1_PI, PI, TAU};
 
-use drt_math::{Frame, Real, Rgb, Vec3, fm, vec3, warp};
+use drt_math::{Real, Rgb, Vec3, fm, vec3, warp};
 
-use crate::model::surface::anisotropic::{StretchedFacets, gradient_in_frame};
-use crate::model::surface::composed::Composed;
+use crate::model::surface::anisotropic::StretchedFacets;
+use crate::model::surface::framed::Framed;
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::microfacet::{Distribution, LEAST_COS2, mirrored, refracted};
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, part};
-use crate::model::surface::shading_frame::shading_frame;
-use crate::model::surface::{At, BsdfGradient, Given};
 
 /// Burley's principled BSDF. All but colour and index are numbers from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -190,43 +188,6 @@ impl Principled {
         LongTails(lerp(0.1, 0.001, self.clearcoat_gloss))
     }
 
-    /// The value in the frame of the surface.
-    pub(super) fn value<T: Real>(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
-        let mut sum = Rgb::splat(T::zero());
-        let Some(pair) = Pair::new(o, i, self.eta) else { return sum };
-        let Pair { h, oh, ih, front, reflects, eta, .. } = pair;
-        let fresnel = pair.fresnel();
-        if pair.is_joined() {
-            let facets = stretched::<T>(self.roughness, self.anisotropic);
-            let light = facets.density(h) * facets.masking(o) * facets.masking(i) * i.z.abs();
-            if reflects {
-                sum += self.reflectance(fresnel, oh, front) * (light * 0.25);
-            } else if fresnel.re() < 1.0 {
-                let bent = (oh + ih * eta).squared();
-                let through = (T::one() - fresnel) * (oh * ih).abs() / bent * self.refractive();
-                sum += self.base_color.map(fm::sqrt).map(T::from) * (light * through);
-            }
-        }
-        if !(front && reflects) {
-            return sum;
-        }
-        if self.clearcoat > 0.0 && pair.is_joined() {
-            let reflected = schlick(Rgb::splat(T::from(0.04)), oh, self.eta).r;
-            let alpha = T::from(COAT_MASKING);
-            let masking = |w: Vec3<T>| Distribution::Ggx.masking(w.z, alpha) * w.z;
-            let light = reflected * self.coat().density(h.z) * masking(o) * masking(i) * i.z;
-            sum += Rgb::splat(light * (0.25 * self.clearcoat));
-        }
-        let lobe = diffuse_lobe([o.z, i.z, ih], self.roughness, self.flatness);
-        sum += self.base_color.map(T::from) * (lobe * i.z * (self.diffuse() * FRAC_1_PI));
-        if self.sheen > 0.0 {
-            let colour =
-                tint(self.base_color) * self.sheen_tint + Rgb::splat(1.0 - self.sheen_tint);
-            sum += colour.map(T::from) * (grazing(ih) * i.z * (self.sheen * (1.0 - self.metallic)));
-        }
-        sum
-    }
-
     fn reflectance<T: Real>(&self, fresnel: T, cos: T, front: bool) -> Rgb<T> {
         if !front {
             return Rgb::splat(fresnel * self.refractive());
@@ -254,65 +215,6 @@ impl Principled {
     /// The probability that a facet refracts, where it does not reflect all.
     fn refracts(&self, fresnel: f64, front: bool) -> f64 {
         (1.0 - fresnel) * if front { self.refractive() } else { 1.0 }
-    }
-
-    fn density(&self, o: Vec3, i: Vec3) -> f64 {
-        let Some(pair) = Pair::new(o, i, self.eta) else { return 0.0 };
-        let Pair { h, oh, ih, front, reflects, eta, .. } = pair;
-        if !front && self.refractive() <= 0.0 {
-            return 0.0;
-        }
-        let lobes =
-            if front { self.lobes() } else { Lobes { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
-        let mut sum = 0.0;
-        if pair.is_joined() {
-            let facets = stretched(self.roughness, self.anisotropic);
-            let visible = facets.visible_density(h, o) * oh.abs() * lobes.facets;
-            let refracts = self.refracts(pair.fresnel(), front);
-            sum += if reflects {
-                (1.0 - refracts) * visible / (4.0 * ih.abs())
-            } else {
-                let bent = oh + eta * ih;
-                refracts * visible * eta * eta * ih.abs() / (bent * bent)
-            };
-            if front && reflects {
-                sum += lobes.coat * self.coat().density(h.z) * h.z / (4.0 * ih.abs());
-            }
-        }
-        if front && reflects {
-            sum += lobes.diffuse * i.z * FRAC_1_PI;
-        }
-        sum
-    }
-
-    fn direction(&self, o: Vec3, [u, v, choice]: [f64; 3]) -> Option<Vec3> {
-        let front = o.z > 0.0;
-        if !front && (self.refractive() <= 0.0 || o.z == 0.0) {
-            return None;
-        }
-        let lobes =
-            if front { self.lobes() } else { Lobes { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
-        if choice < lobes.diffuse {
-            return Some(warp::cosine_hemisphere([u, v]));
-        }
-        let choice = choice - lobes.diffuse;
-        if choice < lobes.coat {
-            let i = mirrored(o, self.coat().sample([u, v]));
-            return (i.z > 0.0).then_some(i);
-        }
-        let choice = (choice - lobes.coat) / lobes.facets;
-        let side = o.z.signum();
-        let facets = stretched(self.roughness, self.anisotropic);
-        let m = facets.sample_visible(o * side, [u, v]) * side;
-        let eta = if front { self.eta } else { 1.0 / self.eta };
-        let cos = m.dot(o);
-        if cos <= 0.0 {
-            return None;
-        }
-        let fresnel = dielectric_reflected(cos.min(1.0), eta);
-        let refracts = choice < self.refracts(fresnel, front);
-        let i = if refracts { refracted(o, m, eta)?.0 } else { mirrored(o, m) };
-        (refracts == (i.z * side < 0.0)).then_some(i)
     }
 
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
@@ -399,27 +301,103 @@ impl<T: Real> Pair<T> {
     }
 }
 
-impl Composed for Principled {
-    fn eval(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
-        let frame = shading_frame(at, n);
-        self.value(frame.to_local(wo), frame.to_local(wi))
+impl Framed for Principled {
+    fn value<T: Real>(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
+        let mut sum = Rgb::splat(T::zero());
+        let Some(pair) = Pair::new(o, i, self.eta) else { return sum };
+        let Pair { h, oh, ih, front, reflects, eta, .. } = pair;
+        let fresnel = pair.fresnel();
+        if pair.is_joined() {
+            let facets = stretched::<T>(self.roughness, self.anisotropic);
+            let light = facets.density(h) * facets.masking(o) * facets.masking(i) * i.z.abs();
+            if reflects {
+                sum += self.reflectance(fresnel, oh, front) * (light * 0.25);
+            } else if fresnel.re() < 1.0 {
+                let bent = (oh + ih * eta).squared();
+                let through = (T::one() - fresnel) * (oh * ih).abs() / bent * self.refractive();
+                sum += self.base_color.map(fm::sqrt).map(T::from) * (light * through);
+            }
+        }
+        if !(front && reflects) {
+            return sum;
+        }
+        if self.clearcoat > 0.0 && pair.is_joined() {
+            let reflected = schlick(Rgb::splat(T::from(0.04)), oh, self.eta).r;
+            let alpha = T::from(COAT_MASKING);
+            let masking = |w: Vec3<T>| Distribution::Ggx.masking(w.z, alpha) * w.z;
+            let light = reflected * self.coat().density(h.z) * masking(o) * masking(i) * i.z;
+            sum += Rgb::splat(light * (0.25 * self.clearcoat));
+        }
+        let lobe = diffuse_lobe([o.z, i.z, ih], self.roughness, self.flatness);
+        sum += self.base_color.map(T::from) * (lobe * i.z * (self.diffuse() * FRAC_1_PI));
+        if self.sheen > 0.0 {
+            let colour =
+                tint(self.base_color) * self.sheen_tint + Rgb::splat(1.0 - self.sheen_tint);
+            sum += colour.map(T::from) * (grazing(ih) * i.z * (self.sheen * (1.0 - self.metallic)));
+        }
+        sum
     }
 
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        gradient_in_frame(at, [wo, wi, n], |wo, wi| self.value(wo, wi))
+    fn density(&self, o: Vec3, i: Vec3) -> f64 {
+        let Some(pair) = Pair::new(o, i, self.eta) else { return 0.0 };
+        let Pair { h, oh, ih, front, reflects, eta, .. } = pair;
+        if !front && self.refractive() <= 0.0 {
+            return 0.0;
+        }
+        let lobes =
+            if front { self.lobes() } else { Lobes { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
+        let mut sum = 0.0;
+        if pair.is_joined() {
+            let facets = stretched(self.roughness, self.anisotropic);
+            let visible = facets.visible_density(h, o) * oh.abs() * lobes.facets;
+            let refracts = self.refracts(pair.fresnel(), front);
+            sum += if reflects {
+                (1.0 - refracts) * visible / (4.0 * ih.abs())
+            } else {
+                let bent = oh + eta * ih;
+                refracts * visible * eta * eta * ih.abs() / (bent * bent)
+            };
+            if front && reflects {
+                sum += lobes.coat * self.coat().density(h.z) * h.z / (4.0 * ih.abs());
+            }
+        }
+        if front && reflects {
+            sum += lobes.diffuse * i.z * FRAC_1_PI;
+        }
+        sum
     }
 
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        let frame: Frame = shading_frame(at, n);
-        Some(frame.to_world(self.direction(frame.to_local(from), u)?))
+    fn direction(&self, o: Vec3, [u, v, choice]: [f64; 3]) -> Option<Vec3> {
+        let front = o.z > 0.0;
+        if !front && (self.refractive() <= 0.0 || o.z == 0.0) {
+            return None;
+        }
+        let lobes =
+            if front { self.lobes() } else { Lobes { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
+        if choice < lobes.diffuse {
+            return Some(warp::cosine_hemisphere([u, v]));
+        }
+        let choice = choice - lobes.diffuse;
+        if choice < lobes.coat {
+            let i = mirrored(o, self.coat().sample([u, v]));
+            return (i.z > 0.0).then_some(i);
+        }
+        let choice = (choice - lobes.coat) / lobes.facets;
+        let side = o.z.signum();
+        let facets = stretched(self.roughness, self.anisotropic);
+        let m = facets.sample_visible(o * side, [u, v]) * side;
+        let eta = if front { self.eta } else { 1.0 / self.eta };
+        let cos = m.dot(o);
+        if cos <= 0.0 {
+            return None;
+        }
+        let fresnel = dielectric_reflected(cos.min(1.0), eta);
+        let refracts = choice < self.refracts(fresnel, front);
+        let i = if refracts { refracted(o, m, eta)?.0 } else { mirrored(o, m) };
+        (refracts == (i.z * side < 0.0)).then_some(i)
     }
 
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        let frame = shading_frame(at, n);
-        self.density(frame.to_local(from), frame.to_local(to))
-    }
-
-    fn lobe_width(&self, _: At<'_>) -> f64 {
+    fn narrowest(&self) -> f64 {
         let [u, v] = stretched::<f64>(self.roughness, self.anisotropic).alpha;
         f64::min(u, v)
     }

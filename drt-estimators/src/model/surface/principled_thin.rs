@@ -12,18 +12,16 @@
 
 use core::f64::consts::FRAC_1_PI;
 
-use drt_math::{Frame, Real, Rgb, Vec3, vec3, warp};
+use drt_math::{Real, Rgb, Vec3, vec3, warp};
 
-use crate::model::surface::anisotropic::{StretchedFacets, gradient_in_frame};
-use crate::model::surface::composed::Composed;
+use crate::model::surface::anisotropic::StretchedFacets;
+use crate::model::surface::framed::Framed;
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::microfacet::{LEAST_COS2, mirrored};
 use crate::model::surface::principled::{
     check_colour, diffuse_lobe, grazing, lerp, normal_reflectance, schlick, stretched, tint,
 };
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, part};
-use crate::model::surface::shading_frame::shading_frame;
-use crate::model::surface::{At, BsdfGradient, Given};
 
 /// Burley's principled BSDF of thin sheets. Numbers are from 0 to 1 where nothing else is said.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,8 +83,48 @@ impl PrincipledThin {
         stretched((0.65 * self.eta - 0.35) * self.roughness, self.anisotropic)
     }
 
-    /// The value in the frame of the surface.
-    pub(super) fn value<T: Real>(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
+    /// Probabilities of reflection, of going on, and of diffuse light on this side; the rest is for that on the other one.
+    fn lobes(&self) -> [f64; 3] {
+        let half = 0.5 * self.spec_trans;
+        [half, half, (1.0 - self.spec_trans) * (1.0 - 0.5 * self.diff_trans)]
+    }
+
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        Some(Slot::Scalar(match property {
+            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
+            Property::Roughness => &mut self.roughness,
+            Property::Anisotropic => &mut self.anisotropic,
+            Property::SpecTrans => &mut self.spec_trans,
+            Property::Eta => &mut self.eta,
+            Property::SpecTint => &mut self.spec_tint,
+            Property::Sheen => &mut self.sheen,
+            Property::SheenTint => &mut self.sheen_tint,
+            Property::Flatness => &mut self.flatness,
+            Property::DiffTrans => &mut self.diff_trans,
+            _ => return None,
+        }))
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+        check_colour(self.base_color)?;
+        in_range(Property::Eta, self.eta, self.eta > 0.0, "above 0")?;
+        let part_of_two = (0.0..=2.0).contains(&self.diff_trans);
+        in_range(Property::DiffTrans, self.diff_trans, part_of_two, "from 0 to 2")?;
+        let parts = [
+            (Property::Roughness, self.roughness),
+            (Property::Anisotropic, self.anisotropic),
+            (Property::SpecTrans, self.spec_trans),
+            (Property::SpecTint, self.spec_tint),
+            (Property::Sheen, self.sheen),
+            (Property::SheenTint, self.sheen_tint),
+            (Property::Flatness, self.flatness),
+        ];
+        parts.into_iter().try_for_each(|(property, value)| part(property, value))
+    }
+}
+
+impl Framed for PrincipledThin {
+    fn value<T: Real>(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
         let mut sum = Rgb::splat(T::zero());
         let Some([o, i, h]) = pair(o, i) else { return sum };
         let colour = self.base_color.map(T::from);
@@ -122,12 +160,6 @@ impl PrincipledThin {
             sum += colour * (i.z.abs() * (diffuse * across * FRAC_1_PI));
         }
         sum
-    }
-
-    /// Probabilities of reflection, of going on, and of diffuse light on this side; the rest is for that on the other one.
-    fn lobes(&self) -> [f64; 3] {
-        let half = 0.5 * self.spec_trans;
-        [half, half, (1.0 - self.spec_trans) * (1.0 - 0.5 * self.diff_trans)]
     }
 
     fn density(&self, o: Vec3, i: Vec3) -> f64 {
@@ -172,61 +204,7 @@ impl PrincipledThin {
         Some(i * side)
     }
 
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        Some(Slot::Scalar(match property {
-            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
-            Property::Roughness => &mut self.roughness,
-            Property::Anisotropic => &mut self.anisotropic,
-            Property::SpecTrans => &mut self.spec_trans,
-            Property::Eta => &mut self.eta,
-            Property::SpecTint => &mut self.spec_tint,
-            Property::Sheen => &mut self.sheen,
-            Property::SheenTint => &mut self.sheen_tint,
-            Property::Flatness => &mut self.flatness,
-            Property::DiffTrans => &mut self.diff_trans,
-            _ => return None,
-        }))
-    }
-
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        check_colour(self.base_color)?;
-        in_range(Property::Eta, self.eta, self.eta > 0.0, "above 0")?;
-        let part_of_two = (0.0..=2.0).contains(&self.diff_trans);
-        in_range(Property::DiffTrans, self.diff_trans, part_of_two, "from 0 to 2")?;
-        let parts = [
-            (Property::Roughness, self.roughness),
-            (Property::Anisotropic, self.anisotropic),
-            (Property::SpecTrans, self.spec_trans),
-            (Property::SpecTint, self.spec_tint),
-            (Property::Sheen, self.sheen),
-            (Property::SheenTint, self.sheen_tint),
-            (Property::Flatness, self.flatness),
-        ];
-        parts.into_iter().try_for_each(|(property, value)| part(property, value))
-    }
-}
-
-impl Composed for PrincipledThin {
-    fn eval(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
-        let frame = shading_frame(at, n);
-        self.value(frame.to_local(wo), frame.to_local(wi))
-    }
-
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        gradient_in_frame(at, [wo, wi, n], |wo, wi| self.value(wo, wi))
-    }
-
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        let frame: Frame = shading_frame(at, n);
-        Some(frame.to_world(self.direction(frame.to_local(from), u)?))
-    }
-
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        let frame = shading_frame(at, n);
-        self.density(frame.to_local(from), frame.to_local(to))
-    }
-
-    fn lobe_width(&self, _: At<'_>) -> f64 {
+    fn narrowest(&self) -> f64 {
         if self.spec_trans == 0.0 {
             return 1.0;
         }

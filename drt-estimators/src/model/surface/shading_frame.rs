@@ -9,7 +9,7 @@ use crate::model::texture::TexturePoint;
 /// right-handed frame on the front of the surface, and is the same on its back, where the normal is turned over.
 pub(super) fn shading_frame<T: Real>(at: At<'_>, n: Vec3<T>) -> Frame<T> {
     let Some(at) = at else { return Frame::from_normal(n) };
-    let along = at.tangent.unwrap_or_else(|| by_coordinates(at)[0]);
+    let along = at.tangent.copied().unwrap_or_else(|| by_coordinates(at)[0]);
     let across = along.reject(n.re());
     // Where u does not grow along the surface any frame will do.
     if across.length_squared() <= 1e-24 * along.length_squared() || !across.is_finite() {

@@ -19,6 +19,7 @@ use alloc::vec::Vec;
 use drt_math::{Frame, Real, Rgb, Rng, Vec3, vec3, warp};
 
 use crate::model::surface::angles::Angles;
+use crate::model::surface::framed::Framed;
 use crate::model::surface::*;
 
 /// The value of a BSDF over another scalar, by the generic code of `eval`: `lift` turns the value of
