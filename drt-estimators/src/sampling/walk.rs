@@ -1,6 +1,6 @@
 //! The one random walk, in either [`TransportMode`]: connect, scatter, follow a ray, arrive.
 
-use drt_math::Rgb;
+use drt_math::{Rgb, Vec3};
 use drt_medium::Coefficients;
 
 use crate::sampling::flight::{Flown, Travel, medium_span};
@@ -281,19 +281,19 @@ impl Tracer<'_> {
         }
         let (v, w, d) = (&stop.vertex, light.w, light.distance);
         let target = light.point().map(|s| s.prim);
-        let part = if world.any_straight && light.is_delta() {
+        let tau = if world.any_straight && light.is_delta() {
             // All other lights are found by paths that go straight through.
-            Some(world.connect_straight(v, w, d, &mut self.shadow, &mut self.counters))
-        } else if world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
-            None
+            match self.straight_transmittance(v, w, d) {
+                Some(tau) => tau,
+                None => return,
+            }
         } else {
-            return;
+            if !world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
+                return;
+            }
+            world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters)
         };
-        let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
-        let mut transport = tau * (weight * light.inv_pdf);
-        if let Some(part) = part {
-            transport *= part;
-        }
+        let transport = tau * (weight * light.inv_pdf);
         if transport.is_zero() {
             return;
         }
@@ -302,6 +302,19 @@ impl Tracer<'_> {
         let value = stop.throughput * sigma_s * f * connection.rest();
         observer.contribution(Pixel::Own, stop.segments + 1, value);
         observer.connect(stop.node, &connection, &self.shadow.crossings);
+    }
+
+    /// The part of the light that arrives at a vertex along a direction from a distance, surfaces that it goes straight
+    /// through included; `None` where something blocks.
+    #[cold]
+    fn straight_transmittance(&mut self, v: &Vertex, w: Vec3, d: f64) -> Option<Rgb> {
+        let world = self.world;
+        let part = world.connect_straight(v, w, d, &mut self.shadow, &mut self.counters);
+        if part.is_zero() {
+            return None;
+        }
+        let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
+        Some(tau * part)
     }
 }
 

@@ -181,7 +181,7 @@ impl Framed for Anisotropic {
             }
             Bsdf::RoughDielectric(b) => Passage::new(&a, b.eta).map_or(0.0, |passage| {
                 let h = from + to * passage.index();
-                b.pdf_of(&passage, facets.visible_density(h, from))
+                b.pdf_of(&passage, || facets.visible_density(h, from))
             }),
             _ => 0.0,
         }

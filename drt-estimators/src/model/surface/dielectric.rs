@@ -182,13 +182,14 @@ impl RoughDielectric {
     #[inline]
     pub(super) fn pdf(&self, a: &Angles) -> f64 {
         let Some(passage) = Passage::new(a, self.eta) else { return 0.0 };
-        let visible = self.distribution.visible_density(&passage.a, passage.index(), self.alpha);
-        self.pdf_of(&passage, visible)
+        let Passage { a, .. } = &passage;
+        let index = passage.index();
+        self.pdf_of(&passage, || self.distribution.visible_density(a, index, self.alpha))
     }
 
     /// The density by [`Distribution::visible_density`] of any kind.
     #[inline(always)]
-    pub(super) fn pdf_of(&self, passage: &Passage<f64>, visible: f64) -> f64 {
+    pub(super) fn pdf_of(&self, passage: &Passage<f64>, visible: impl FnOnce() -> f64) -> f64 {
         let Passage { a, eta } = *passage;
         let (probability, jacobian) = if passage.reflects() {
             let fresnel = dielectric_reflected(0.5 * fm::sqrt(a.h2), eta);
@@ -199,7 +200,7 @@ impl RoughDielectric {
         } else {
             return 0.0;
         };
-        probability * jacobian * visible
+        probability * jacobian * visible()
     }
 
     #[inline]

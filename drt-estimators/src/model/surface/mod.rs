@@ -330,18 +330,31 @@ impl Bsdf {
         choice: f64,
         given: Given,
     ) -> Option<SpecularSample> {
+        match self {
+            Self::Null
+            | Self::Diffuse(_)
+            | Self::Phong(_)
+            | Self::RoughConductor(_)
+            | Self::RoughDielectric(_) => None,
+            _ => self.specular_of_any(at, from, n, choice, given),
+        }
+    }
+
+    /// Of BSDFs that may have smooth parts.
+    fn specular_of_any(
+        &self,
+        at: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        choice: f64,
+        given: Given,
+    ) -> Option<SpecularSample> {
         let (bsdf, n) = self.facing(from, n);
         match bsdf {
             Self::Plastic(b) => b.sample_specular(from, n, choice),
             Self::Conductor(b) => b.sample(from, n),
             Self::Dielectric(b) => b.sample(from, n, choice, given),
             Self::ThinDielectric(b) => b.sample(from, n, choice),
-            Self::Null
-            | Self::Diffuse(_)
-            | Self::Phong(_)
-            | Self::RoughConductor(_)
-            | Self::RoughDielectric(_)
-            | Self::TwoSided(_) => None,
             _ => bsdf.composed(|b| b.sample_specular(at, from, n, choice, given)).flatten(),
         }
     }
@@ -564,13 +577,21 @@ impl Bsdf {
             Self::RoughDielectric(b) => b.alpha,
             Self::Plastic(b) => b.coating.facets().map_or(0.0, |(_, alpha)| alpha),
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => 0.0,
+            _ => self.width_of_any(at),
+        };
+        f64::min(width, 1.0)
+    }
+
+    /// Of BSDFs that are no plain models.
+    #[cold]
+    fn width_of_any(&self, at: At<'_>) -> f64 {
+        match self {
             Self::TwoSided(b) => {
                 let back = b.back.as_ref().map_or(1.0, |b| b.lobe_width(at));
                 f64::min(b.front.lobe_width(at), back)
             }
             _ => self.composed(|b| b.lobe_width(at)).unwrap_or(1.0),
-        };
-        f64::min(width, 1.0)
+        }
     }
 
     /// The name of the plugin this BSDF follows.
