@@ -9,7 +9,15 @@
 //! one sample of a pixel in `refs/NAME_ref_rgb_var.exr`, both as Mitsuba's own tests write them. The
 //! table says of each whether it loads, the rms and the largest z of 8×8 block means, their bias in
 //! percent of the image's mean, and seconds. It exits with 1 where a scene does not load or disagrees.
+//!
+//! What a reference's own numbers cannot show does not count. They are XYZ in single precision, to which samples were added
+//! one by one: with steps of the size e at the sum of N samples, this adds an error of e²/12 for each sample where these vary by
+//! more than e, but one that is the same each time where all are equal, even within N e/4 (32000 times 0.950456, the X of
+//! white, gives 0.950745, which is in the reference of a white sky). Samples are all equal where several pixels are, to the bit. Some were then kept in half precision: every one of their
+//! pixels is a triple of such numbers once it is taken back to XYZ, off by up to half a step. These errors are the same for equal
+//! pixels, and independent for others.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::time::Instant;
@@ -120,6 +128,7 @@ fn compare(scene: &Scene, arguments: &Arguments) -> Result<Comparison, String> {
     };
     let (mean, error) = (plain(&image, "")?, plain(&image, "stderr")?);
     let (expected, spread) = (plain(&reference, "")?, plain(&variance, "")?);
+    let precision = Precision::of(&expected, arguments.reference_spp);
     let sample = |i: usize, c: usize| {
         // Means and variances are stored in other colours than they were taken in, so that a
         // variance can come out below zero.
@@ -132,7 +141,79 @@ fn compare(scene: &Scene, arguments: &Arguments) -> Result<Comparison, String> {
             of_as_many: of_one / f64::from(spp),
         }
     };
-    Ok(judge(reference.size, &sample))
+    let rounding = |pixels: &[usize], c: usize| {
+        // Pixels that are equal: how many, and one of them.
+        let mut equal: BTreeMap<[u32; 3], (f64, usize)> = BTreeMap::new();
+        for i in pixels {
+            equal.entry(expected[*i].map(f32::to_bits)).or_insert((0.0, *i)).0 += 1.0;
+        }
+        let variance = |(n, i): &(f64, usize)| {
+            let widest = spread[*i].iter().fold(0.0, |m, v| f64::max(m, f64::from(*v)));
+            let spread = if *n > 1.0 { 0.0 } else { widest.sqrt() };
+            n * n * precision.rounding(expected[*i], spread)[c]
+        };
+        equal.values().map(variance).sum()
+    };
+    Ok(judge(reference.size, &sample, &rounding))
+}
+
+/// How precise the numbers of a reference are.
+struct Precision {
+    /// Samples that were added up.
+    samples: f64,
+    /// The means were kept in half precision.
+    half: bool,
+}
+
+/// From linear sRGB to XYZ, and back.
+const TO_XYZ: [[f64; 3]; 3] = [
+    [0.412453, 0.357580, 0.180423],
+    [0.212671, 0.715160, 0.072169],
+    [0.019334, 0.119193, 0.950227],
+];
+const FROM_XYZ: [[f64; 3]; 3] = [
+    [3.240479, -1.537150, -0.498535],
+    [-0.969256, 1.875991, 0.041556],
+    [0.055648, -0.204043, 1.057311],
+];
+
+fn xyz(pixel: [f32; 3]) -> [f64; 3] {
+    TO_XYZ.map(|row| (0..3).map(|c| row[c] * f64::from(pixel[c])).sum())
+}
+
+/// The distance of neighbouring half-precision numbers about a number.
+fn half_step(x: f64) -> f64 {
+    let exponent = x.abs().max(f64::MIN_POSITIVE).log2().floor().max(-14.0);
+    2_f64.powf(exponent - 10.0)
+}
+
+impl Precision {
+    fn of(pixels: &[[f32; 3]], samples: f64) -> Self {
+        // The matrices are known to six digits.
+        let is_half = |x: f64| {
+            let step = half_step(x);
+            (x / step - (x / step).round()).abs() * step <= 2e-6 * x.abs() + 1e-9
+        };
+        let values = || pixels.iter().flat_map(|p| xyz(*p));
+        let half = values().filter(|x| is_half(*x)).count();
+        // By chance about one in a hundred would be.
+        Self { samples, half: half * 10 >= values().count() * 9 }
+    }
+
+    /// Variance of the rounding of each channel of a pixel whose samples vary by a `spread`.
+    fn rounding(&self, pixel: [f32; 3], spread: f64) -> [f64; 3] {
+        let variance = xyz(pixel).map(|x| {
+            // Of the sum, over the number of samples.
+            let step = x.abs() * f64::from(f32::EPSILON);
+            let added = if spread > self.samples * step {
+                step * step * self.samples / 12.0
+            } else {
+                (self.samples * step / 4.0).powi(2) / 3.0
+            };
+            added + if self.half { half_step(x).powi(2) / 12.0 } else { 0.0 }
+        });
+        FROM_XYZ.map(|row| (0..3).map(|c| row[c] * row[c] * variance[c]).sum())
+    }
 }
 
 #[derive(Default)]
@@ -149,7 +230,12 @@ struct Sample {
 /// samples make up its mean. That of the reference is taken there if it is larger.
 const NOISY: f64 = 0.1;
 
-fn judge(size: [u32; 2], sample: &dyn Fn(usize, usize) -> Sample) -> Comparison {
+/// Compares images of a `size` by their samples; `rounding` gives the variance of the sum of some pixels by the reference's precision.
+fn judge(
+    size: [u32; 2],
+    sample: &dyn Fn(usize, usize) -> Sample,
+    rounding: &dyn Fn(&[usize], usize) -> f64,
+) -> Comparison {
     let [width, height] = size;
     let blocks: Vec<[u32; 2]> = (0..height.div_ceil(BLOCK))
         .flat_map(|y| (0..width.div_ceil(BLOCK)).map(move |x| [x * BLOCK, y * BLOCK]))
@@ -158,9 +244,12 @@ fn judge(size: [u32; 2], sample: &dyn Fn(usize, usize) -> Sample) -> Comparison 
     for [x0, y0] in &blocks {
         for c in 0..3 {
             let mut sum = Sample::default();
+            let mut pixels = Vec::new();
             for y in *y0..(y0 + BLOCK).min(height) {
                 for x in *x0..(x0 + BLOCK).min(width) {
-                    let s = sample((y * width + x) as usize, c);
+                    let i = (y * width + x) as usize;
+                    let s = sample(i, c);
+                    pixels.push(i);
                     sum.difference += s.difference;
                     sum.expected += s.expected;
                     sum.variance += s.variance;
@@ -171,7 +260,7 @@ fn judge(size: [u32; 2], sample: &dyn Fn(usize, usize) -> Sample) -> Comparison 
             difference += sum.difference;
             expected += sum.expected;
             // Both images are stored in single precision.
-            let rounding = (1e-6 * sum.expected).powi(2);
+            let rounding = (1e-6 * sum.expected).powi(2) + rounding(&pixels, c);
             let noisy = sum.variance.max(sum.of_as_many).sqrt() > NOISY * sum.expected;
             let own = if noisy { sum.variance.max(sum.of_as_many) } else { sum.variance };
             let z = match own + sum.of_reference + rounding {

@@ -32,7 +32,7 @@ pub use io::{ObjError, ObjErrorKind, load_obj};
 pub use io::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
 #[cfg(feature = "tet")]
 pub use io::{TetFileError, TetFileErrorKind, load_tet_mesh, read_medit, read_tetgen};
-pub use mesh::{Mesh, MeshError};
+pub use mesh::{Mesh, MeshAttribute, MeshError};
 pub use query::{
     BvhBuilder, BvhError, ClosestPoint, Hit, InstancePlacement, InstancedBvh, Ray, Skip,
     TriangleBvh, nearest_point,

@@ -112,6 +112,40 @@ fn unused_vertices_are_left_out() {
     assert_eq!(m.source_vertex_count, 5);
 }
 
+#[test]
+fn other_columns_become_attributes() {
+    let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+                property float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+                property float quality\nproperty float two_a\nproperty float two_b\n\
+                element face 1\nproperty list uchar int vertex_indices\nproperty float heat_0\n\
+                end_header\n0 0 0 1 2 3 9 0 0\n1 0 0 4 5 6 9 0 0\n1 1 0 7 8 9 9 0 0\n\
+                0 1 0 0 1 0 9 0 0\n4 0 1 2 3 0.5\n";
+    let mut m = load_ply(text.as_bytes(), "a.ply").unwrap();
+    let names: Vec<_> = m.attributes.iter().map(|a| a.name.as_str()).collect();
+    // Neither lone columns nor pairs.
+    assert_eq!(names, ["vertex_color", "face_heat"]);
+    let red = |m: &drt_geom::Mesh, i: u32| {
+        let corners = m.triangles[i as usize].map(|v| m.positions[v as usize]);
+        let at = |bary| m.attribute("vertex_color").unwrap().at(i, bary)[0];
+        (corners, [at([0.0, 0.0]), at([1.0, 0.0]), at([0.0, 1.0])])
+    };
+    let check = |m: &drt_geom::Mesh| {
+        for i in 0..2 {
+            let (corners, values) = red(m, i);
+            for (p, value) in corners.into_iter().zip(values) {
+                assert_eq!(value, [[1.0, 4.0], [0.0, 7.0]][p.y as usize][p.x as usize]);
+            }
+            assert_eq!(m.attribute("face_heat").unwrap().at(i, [0.3, 0.3])[2], 0.5);
+        }
+    };
+    check(&m);
+    m.flip();
+    check(&m);
+    check(&m.drop_degenerate().0);
+    m.attributes[0].values.pop();
+    assert!(m.validate().unwrap_err().to_string().contains("`vertex_color`"));
+}
+
 type Expected = fn(&PlyErrorKind) -> bool;
 
 #[test]

@@ -1,8 +1,13 @@
 //! Surface scattering.
 
+mod composed;
+mod principled;
+
+use std::cell::Cell;
+
 use drt_estimators::surface::{
-    Bsdf, Coating, Conductor, Dielectric, Diffuse, Distribution, Phong, Plastic, Property,
-    RoughConductor, RoughDielectric, Textured, ThinDielectric, TwoSided,
+    Anisotropic, Bsdf, Coating, Conductor, Dielectric, Diffuse, Distribution, Phong, Plastic,
+    Property, RoughConductor, RoughDielectric, Textured, ThinDielectric, TwoSided,
 };
 use drt_math::Rgb;
 
@@ -12,8 +17,18 @@ use super::properties::Properties;
 use super::spectrum::conductors;
 use crate::CliError;
 
+/// So many BSDFs may be inside of one: references could make trees of any size.
+const MOST_PARTS: u32 = 64;
+
 impl<'a> Loader<'a> {
     pub(super) fn bsdf(&self, e: &'a Element) -> Result<Bsdf, CliError> {
+        self.part(e, &Cell::new(MOST_PARTS))
+    }
+
+    /// A BSDF that is inside of one which may still have so many `parts`.
+    fn part(&self, e: &'a Element, parts: &Cell<u32>) -> Result<Bsdf, CliError> {
+        let left = parts.get().checked_sub(1);
+        parts.set(left.ok_or_else(|| e.error(format!("more than {MOST_PARTS} bsdfs in one")))?);
         let p = Properties::of(e)?;
         let bsdf = match p.kind()? {
             "null" => Bsdf::Null,
@@ -21,16 +36,24 @@ impl<'a> Loader<'a> {
             "phong" => Bsdf::Phong(phong(&p)?),
             "plastic" | "roughplastic" => Bsdf::Plastic(plastic(&p)?),
             "conductor" => Bsdf::Conductor(smooth_conductor(&p)?),
-            "roughconductor" => Bsdf::RoughConductor(conductor(&p)?),
+            "pplastic" => Bsdf::Plastic(unpolarized_plastic(&p)?),
+            "roughconductor" => rough(&p, Bsdf::RoughConductor(conductor(&p)?))?,
             "dielectric" => Bsdf::Dielectric(smooth_dielectric(&p)?),
             "thindielectric" => Bsdf::ThinDielectric(thin_dielectric(&p)?),
-            "roughdielectric" => Bsdf::RoughDielectric(dielectric(&p)?),
-            "twosided" => Bsdf::TwoSided(Box::new(self.two_sided(&p)?)),
+            "roughdielectric" => rough(&p, Bsdf::RoughDielectric(dielectric(&p)?))?,
+            "principled" => Bsdf::Principled(Box::new(principled::thick(&p)?)),
+            "principledthin" => Bsdf::PrincipledThin(Box::new(principled::thin(&p)?)),
+            "twosided" => Bsdf::TwoSided(Box::new(self.two_sided(&p, parts)?)),
+            "mask" => Bsdf::Mask(Box::new(self.mask(&p, parts)?)),
+            "blendbsdf" => Bsdf::Blend(Box::new(self.blend(&p, parts)?)),
+            "normalmap" => Bsdf::Perturbed(Box::new(self.normal_map(&p, parts)?)),
+            "bumpmap" => Bsdf::Perturbed(Box::new(self.bump_map(&p, parts)?)),
             other => {
                 return Err(e.error(format!(
                     "the bsdf type `{other}` is not supported; expected diffuse, plastic, \
-                     roughplastic, conductor, roughconductor, dielectric, thindielectric, \
-                     roughdielectric, phong, twosided or null"
+                     roughplastic, pplastic, conductor, roughconductor, dielectric, \
+                     thindielectric, roughdielectric, phong, principled, principledthin, \
+                     blendbsdf, mask, normalmap, bumpmap, twosided or null"
                 )));
             }
         };
@@ -49,7 +72,7 @@ impl<'a> Loader<'a> {
         Ok(Bsdf::Textured(Box::new(textured)))
     }
 
-    fn two_sided(&self, p: &Properties<'a>) -> Result<TwoSided, CliError> {
+    fn two_sided(&self, p: &Properties<'a>, parts: &Cell<u32>) -> Result<TwoSided, CliError> {
         let sides = self.index.inner(p, "bsdf", None);
         // Also what keeps a reference to itself from being followed for ever.
         if let Some(s) = sides.iter().find(|s| s.target.attribute("type") == Some("twosided")) {
@@ -57,7 +80,7 @@ impl<'a> Loader<'a> {
                 .child
                 .error("a twosided bsdf cannot be a side of another one, or its own"));
         }
-        let side = |i: usize| sides.get(i).map(|s| self.bsdf(s.target)).transpose();
+        let side = |i: usize| sides.get(i).map(|s| self.part(s.target, parts)).transpose();
         match (side(0)?, sides.len()) {
             (Some(front), 1 | 2) => Ok(TwoSided { front, back: side(1)? }),
             (_, n) => Err(p.element.error(format!("expected one or two bsdfs inside, found {n}"))),
@@ -98,7 +121,7 @@ fn conductor(p: &Properties<'_>) -> Result<RoughConductor, CliError> {
     let (eta, k) = index(p, (default.eta, default.k))?;
     Ok(RoughConductor {
         distribution: distribution(p)?,
-        alpha: alpha(p, default.alpha)?,
+        alpha: default.alpha,
         eta,
         k,
         specular_reflectance: reflectance(p, &["specular_reflectance"], Rgb::ONE)?,
@@ -160,12 +183,24 @@ fn plastic(p: &Properties<'_>) -> Result<Plastic, CliError> {
     })
 }
 
+/// `pplastic`, whose polarisation nothing here sees.
+fn unpolarized_plastic(p: &Properties<'_>) -> Result<Plastic, CliError> {
+    let eta = ior(p, "int_ior", POLYPROPYLENE)? / ior(p, "ext_ior", AIR)?;
+    let coating = Coating::unmixed(distribution(p)?, alpha(p, 0.1)?, eta);
+    let default = Plastic::new(coating.map_err(|err| p.element.error(err))?);
+    Ok(Plastic {
+        reflectance: reflectance(p, &["diffuse_reflectance"], default.reflectance)?,
+        specular_reflectance: reflectance(p, &["specular_reflectance"], Rgb::ONE)?,
+        ..default
+    })
+}
+
 fn dielectric(p: &Properties<'_>) -> Result<RoughDielectric, CliError> {
     let default = RoughDielectric::default();
     let (int_ior, ext_ior) = (ior(p, "int_ior", BK7)?, ior(p, "ext_ior", AIR)?);
     Ok(RoughDielectric {
         distribution: distribution(p)?,
-        alpha: alpha(p, default.alpha)?,
+        alpha: default.alpha,
         eta: int_ior / ext_ior,
         specular_reflectance: reflectance(p, &["specular_reflectance"], Rgb::ONE)?,
         specular_transmittance: reflectance(p, &["specular_transmittance"], Rgb::ONE)?,
@@ -179,15 +214,37 @@ fn distribution(p: &Properties<'_>) -> Result<Distribution, CliError> {
     Ok(p.choice("distribution", &choices)?.unwrap_or(Distribution::Beckmann))
 }
 
+/// A rough metal or interface with its roughness, even or not.
+fn rough(p: &Properties<'_>, mut bsdf: Bsdf) -> Result<Bsdf, CliError> {
+    let alphas = (p.float("alpha")?, p.float("alpha_u")?, p.float("alpha_v")?);
+    let (Bsdf::RoughConductor(RoughConductor { alpha, .. })
+    | Bsdf::RoughDielectric(RoughDielectric { alpha, .. })) = &mut bsdf
+    else {
+        return Ok(bsdf);
+    };
+    let textured = ["alpha_u", "alpha_v"].into_iter().any(|name| p.is_textured(name));
+    match alphas {
+        (even, None, None) => *alpha = even.unwrap_or(*alpha),
+        (None, Some(u), Some(v)) if u == v && !textured => *alpha = u,
+        (None, Some(u), Some(v)) => {
+            return Ok(Bsdf::Anisotropic(Box::new(Anisotropic { base: bsdf, alpha: [u, v] })));
+        }
+        _ => return Err(p.element.error(ONE_ROUGHNESS)),
+    }
+    Ok(bsdf)
+}
+
+const ONE_ROUGHNESS: &str = "give `alpha` alone, or `alpha_u` and `alpha_v`";
+
 /// `alpha`, or `alpha_u` and `alpha_v` where they are equal.
 fn alpha(p: &Properties<'_>, default: f64) -> Result<f64, CliError> {
     match (p.float("alpha")?, p.float("alpha_u")?, p.float("alpha_v")?) {
         (alpha, None, None) => Ok(alpha.unwrap_or(default)),
         (None, Some(u), Some(v)) if u == v => Ok(u),
         (None, Some(_), Some(_)) => Err(p.element.error(
-            "anisotropic roughness is not supported; `alpha_u` and `alpha_v` must be equal",
+            "a coating cannot have anisotropic roughness; `alpha_u` and `alpha_v` must be equal",
         )),
-        _ => Err(p.element.error("give `alpha` alone, or `alpha_u` and `alpha_v`")),
+        _ => Err(p.element.error(ONE_ROUGHNESS)),
     }
 }
 

@@ -53,6 +53,11 @@ impl<'a> Properties<'a> {
         found
     }
 
+    /// Whether an element is the property of a name.
+    pub(super) fn is_property(&self, e: &Element, name: &str) -> bool {
+        property_name(e).is_some_and(|(n, _)| n == name)
+    }
+
     /// The property of a name, whatever its tag.
     pub(super) fn property(&self, name: &'static str) -> Option<&'a Element> {
         self.asked.borrow_mut().push(name);
@@ -202,6 +207,18 @@ impl<'a> Properties<'a> {
         let mean = texture.mean();
         self.textures.borrow_mut().push((name, texture));
         mean
+    }
+
+    /// True where a texture that varies was kept for a property.
+    pub(super) fn is_textured(&self, name: &str) -> bool {
+        self.textures.borrow().iter().any(|(n, _)| *n == name)
+    }
+
+    /// The texture kept for a property, to be used by whoever takes it.
+    pub(super) fn take_texture(&self, name: &str) -> Option<Texture> {
+        let mut textures = self.textures.borrow_mut();
+        let i = textures.iter().position(|(n, _)| *n == name)?;
+        Some(textures.remove(i).1)
     }
 
     /// The textures kept so far.

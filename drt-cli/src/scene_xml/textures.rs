@@ -1,8 +1,10 @@
-//! Textures that vary over surfaces: `bitmap` and `checkerboard`.
+//! Textures that vary over surfaces: `bitmap`, `checkerboard` and `mesh_attribute`.
 
 use std::path::Path;
 
-use drt_estimators::texture::{Bitmap, Texture, TextureFilter, TextureWrap, UvMap};
+use drt_estimators::texture::{
+    AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap, UvMap,
+};
 use drt_math::{Affine, Rgb};
 
 use super::element::Element;
@@ -11,7 +13,7 @@ use super::spectrum::srgb_to_linear;
 use crate::{CliError, read_exr};
 
 /// Textures of these types vary; all others are one colour.
-const VARYING: [&str; 2] = ["bitmap", "checkerboard"];
+const VARYING: [&str; 3] = ["bitmap", "checkerboard", "mesh_attribute"];
 /// Images of more texels are refused: they would take gigabytes.
 const MAX_TEXELS: u64 = 1 << 26;
 
@@ -23,6 +25,11 @@ pub(super) fn varies(e: &Element) -> bool {
 /// A texture that [`varies`], of colours.
 pub(super) fn read(e: &Element) -> Result<Texture, CliError> {
     let p = Properties::of(e)?;
+    if p.kind()? == "mesh_attribute" {
+        let texture = attribute(&p)?;
+        p.finish()?;
+        return Ok(texture);
+    }
     let to_uv = uv_map(&p.transform("to_uv")?.unwrap_or(Affine::IDENTITY));
     let texture = if p.kind()? == "checkerboard" {
         let colour =
@@ -37,7 +44,6 @@ pub(super) fn read(e: &Element) -> Result<Texture, CliError> {
 
 /// The same as a number: the luminance of every colour in all channels.
 pub(super) fn luminance(texture: Texture) -> Result<Texture, String> {
-    let grey = |[r, g, b]: [f64; 3]| 0.212_671 * r + 0.715_160 * g + 0.072_169 * b;
     Ok(match texture {
         Texture::Checkerboard { colours, to_uv } => {
             let [a, b] = colours.map(|c| Rgb::splat(grey(c.to_array())));
@@ -45,12 +51,29 @@ pub(super) fn luminance(texture: Texture) -> Result<Texture, String> {
             let colours = [b, a];
             Texture::Checkerboard { colours, to_uv }
         }
+        Texture::Attribute(a) => Texture::Attribute(AttributeTexture { grey: true, ..a }),
         Texture::Bitmap(image) => Texture::Bitmap(image.map(|t| {
             let [r, g, b] = t.map(f64::from);
             // Exact for what is grey already.
             if t[0] == t[1] && t[1] == t[2] { t } else { [grey([r, g, b]) as f32; 3] }
         })?),
     })
+}
+
+fn attribute(p: &Properties<'_>) -> Result<Texture, CliError> {
+    let e = p.element;
+    let name = p.string("name")?.ok_or_else(|| e.error("`name` is missing"))?;
+    if !["vertex_", "face_"].iter().any(|start| name.starts_with(start)) {
+        let message = format!("`name` is `{name}`; expected it to begin with vertex_ or face_");
+        return Err(e.error(message));
+    }
+    let scale = p.float("scale")?.unwrap_or(1.0);
+    Ok(Texture::Attribute(AttributeTexture { name: name.into(), scale, grey: false }))
+}
+
+/// The luminance of a colour.
+pub(super) fn grey([r, g, b]: [f64; 3]) -> f64 {
+    0.212_671 * r + 0.715_160 * g + 0.072_169 * b
 }
 
 fn uv_map(map: &Affine) -> UvMap {

@@ -344,8 +344,9 @@ impl Apply<'_> {
             for t in &mut tangents {
                 change.carry(t, theta);
             }
-            let sum = tangents[p].get(property) + own.get(property);
-            *tangents[p].get_mut(property) = sum;
+            if let Some(sum) = tangents[p].get_mut(property) {
+                *sum += own.get(property);
+            }
         }
         self.tangents.bsdfs.push(keep(tangents, |t| *t != BsdfTangent::default()));
         Ok(())

@@ -208,6 +208,11 @@ impl Scene {
                 let (bsdf, parameter) = (bsdf.name(), parameter.into());
                 return Err(unusable(&s.id, "shape", i, ElementError::Smooth { bsdf, parameter }));
             }
+            if let Some(bsdf) = bsdf.undifferentiable() {
+                let parameter = parameter.into();
+                let reason = ElementError::NoDerivatives { bsdf, parameter };
+                return Err(unusable(&s.id, "shape", i, reason));
+            }
             if slide && bsdf.is_discontinuous_on(&s.mesh) {
                 let parameter = parameter.into();
                 return Err(unusable(
@@ -264,6 +269,10 @@ impl Scene {
         }
         for (i, b) in self.bsdfs.iter().enumerate() {
             b.item.validate().map_err(|e| unusable(&b.id, "bsdf", i, e.into()))?;
+        }
+        for (i, s) in self.shapes.iter().enumerate() {
+            let bsdf = &self.bsdfs[s.bsdf].item;
+            bsdf.validate_on(&s.mesh).map_err(|e| unusable(&s.id, "shape", i, e.into()))?;
         }
         for (i, m) in self.media.iter().enumerate() {
             m.item.phase.validate().map_err(|e| unusable(&m.id, "medium", i, e.into()))?;
@@ -475,7 +484,11 @@ mod tests {
     use super::*;
     use crate::model::filter::{Filter, FilterKind};
     use crate::model::sensor::{Lens, Sensor};
-    use crate::model::surface::{Dielectric, Diffuse, Property, RoughConductor, Textured};
+    use crate::model::settings::EstimatorKind;
+    use crate::model::surface::{
+        Anisotropic, Blend, Dielectric, Diffuse, Mask, Perturbation, Perturbed, Property,
+        RoughConductor, Textured,
+    };
     use crate::model::texture::Texture;
 
     fn scene() -> Scene {
@@ -534,6 +547,11 @@ mod tests {
         fails(&flat, "it emits but has no area");
     }
 
+    fn blended(bsdf: Bsdf) -> Bsdf {
+        let bsdfs = [Bsdf::Diffuse(Default::default()), bsdf];
+        Bsdf::Blend(alloc::boxed::Box::new(Blend { bsdfs, weight: 0.5 }))
+    }
+
     #[test]
     fn smooth_and_textured_surfaces_refuse_derivatives_by_name() {
         let mut scene = scene();
@@ -580,6 +598,49 @@ mod tests {
         let message = crate::Session::new(&scene, &bleach, &crate::Settings::default());
         let message = message.err().expect("a refusal").to_string();
         assert!(message.contains("`bleach`") && message.contains("texture stands"), "{message}");
+        // BSDFs that nothing is differentiated at, in any estimator.
+        let inner = || Bsdf::Diffuse(Default::default());
+        let map = crate::texture::Bitmap::new([1, 1], alloc::vec![[0.5, 0.5, 1.0]]).expect("a map");
+        let perturbed = |perturbation| {
+            let map = Texture::Bitmap(map.clone());
+            let (flip_invalid_normals, use_shadowing_function) = (true, true);
+            Perturbed {
+                bsdf: inner(),
+                map,
+                perturbation,
+                flip_invalid_normals,
+                use_shadowing_function,
+            }
+        };
+        let boxed = |p| Bsdf::Perturbed(alloc::boxed::Box::new(p));
+        let uneven =
+            Anisotropic { base: Bsdf::RoughConductor(Default::default()), alpha: [0.1, 0.2] };
+        for bsdf in [
+            Bsdf::Mask(alloc::boxed::Box::new(Mask { bsdf: inner(), opacity: 0.5 })),
+            boxed(perturbed(Perturbation::Normals)),
+            boxed(perturbed(Perturbation::Heights(1.0))),
+            Bsdf::Anisotropic(alloc::boxed::Box::new(uneven)),
+            Bsdf::Principled(Default::default()),
+            Bsdf::PrincipledThin(Default::default()),
+        ] {
+            let kind = bsdf.name();
+            // Also inside of others.
+            for bsdf in [bsdf.clone(), blended(bsdf)] {
+                if bsdf.validate().is_err() {
+                    continue;
+                }
+                scene.bsdfs[0].item = bsdf;
+                for estimator in
+                    [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped]
+                {
+                    let settings = crate::Settings { estimator, ..Default::default() };
+                    let message = crate::Session::new(&scene, &parameters, &settings);
+                    let message = message.err().expect("a refusal").to_string();
+                    let wanted = ["`spin`", kind, "by finite differences", name.as_str()];
+                    assert!(wanted.iter().all(|part| message.contains(part)), "{message}");
+                }
+            }
+        }
         // The image is nobody's derivative.
         assert!(crate::Session::new(&scene, &[], &crate::Settings::default()).is_ok());
     }

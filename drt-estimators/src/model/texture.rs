@@ -6,7 +6,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_geom::Mesh;
-use drt_math::{Rgb, Vec3, fm};
+use drt_math::{Rgb, RgbVec, Vec3, fm};
 
 /// A colour (or a number, in every channel alike) over texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +21,36 @@ pub enum Texture {
     },
     /// An image.
     Bitmap(Bitmap),
+    /// Values that the mesh brings along, whatever its texture coordinates.
+    Attribute(AttributeTexture),
+}
+
+/// An attribute of the meshes it is on; see [`drt_geom::MeshAttribute`].
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct AttributeTexture {
+    /// The attribute's name.
+    pub name: String,
+    /// Its values are multiplied by this.
+    pub scale: f64,
+    /// Their luminance counts, in every channel.
+    pub grey: bool,
+}
+
+impl AttributeTexture {
+    fn value(&self, channels: [f64; 3]) -> Rgb {
+        let value = Rgb::from(channels) * self.scale;
+        if self.grey {
+            Rgb::splat(Rgb::new(0.212_671, 0.715_160, 0.072_169).dot(value))
+        } else {
+            value
+        }
+    }
+
+    fn corners(&self, mesh: &Mesh, triangle: u32) -> Option<[Rgb; 3]> {
+        let corners = mesh.attribute(&self.name)?.values[triangle as usize];
+        Some(corners.map(|c| self.value(c.map(f64::from))))
+    }
 }
 
 /// An affine map of texture coordinates, by rows.
@@ -75,9 +105,24 @@ pub(crate) struct TexturePoint<'a> {
     pub(crate) triangle: u32,
     /// Weights of the triangle's second and third vertex.
     pub(crate) bary: [f64; 2],
+    /// The direction that frames follow instead of that in which u grows.
+    pub(crate) tangent: Option<&'a Vec3>,
 }
 
-impl TexturePoint<'_> {
+impl<'a> TexturePoint<'a> {
+    #[inline]
+    pub(crate) fn new(mesh: &'a Mesh, triangle: u32, bary: [f64; 2]) -> Self {
+        Self { mesh, triangle, bary, tangent: None }
+    }
+
+    /// The shading normal, on the front of the surface.
+    pub(crate) fn normal(&self) -> Vec3 {
+        let Some(normals) = &self.mesh.normals else { return self.mesh.normal(self.triangle) };
+        let [i, j, k] = self.mesh.triangles[self.triangle as usize].map(|v| normals[v as usize]);
+        let [s, t] = self.bary;
+        (i * (1.0 - s - t) + j * s + k * t).normalize()
+    }
+
     pub(crate) fn uv(&self) -> [f64; 2] {
         self.mesh.texcoord(self.triangle, self.bary)
     }
@@ -210,7 +255,50 @@ impl Bitmap {
 }
 
 impl Texture {
-    /// The value at texture coordinates.
+    /// The value at a point; black on meshes without the attribute that is wanted.
+    pub(crate) fn at_point(&self, point: &TexturePoint<'_>) -> Rgb {
+        let Self::Attribute(a) = self else { return self.at(point.uv()) };
+        let attribute = point.mesh.attribute(&a.name);
+        attribute.map_or(Rgb::ZERO, |v| a.value(v.at(point.triangle, point.bary)))
+    }
+
+    /// The gradient of the value by the place of a point in its triangle, but for jumps.
+    pub(crate) fn gradient(&self, point: &TexturePoint<'_>) -> RgbVec {
+        let ([by_s, by_t], [s, t]) = match self {
+            Self::Attribute(a) => {
+                let Some([p, q, r]) = a.corners(point.mesh, point.triangle) else {
+                    return RgbVec::ZERO;
+                };
+                ([q - p, r - p], point.mesh.barycentric_gradients(point.triangle))
+            }
+            _ => (self.slopes(point.uv()), point.uv_gradients()),
+        };
+        by_s.outer(s) + by_t.outer(t)
+    }
+
+    /// Values, per channel, between which all others on a mesh are; `None` where it lacks the attribute that is wanted.
+    pub(crate) fn bounds_on(&self, mesh: &Mesh) -> Option<[Rgb; 2]> {
+        let Self::Attribute(a) = self else { return Some(self.bounds()) };
+        let values = mesh.attribute(&a.name)?.values.iter().flatten();
+        let mut bounds = [f64::INFINITY, f64::NEG_INFINITY].map(Rgb::splat);
+        for value in values.map(|c| a.value(c.map(f64::from))) {
+            if !value.is_finite() {
+                return Some([value; 2]);
+            }
+            bounds = widened(bounds, value);
+        }
+        Some(bounds)
+    }
+
+    /// The attribute of meshes that is wanted.
+    pub(crate) fn attribute(&self) -> Option<&str> {
+        match self {
+            Self::Attribute(a) => Some(&a.name),
+            _ => None,
+        }
+    }
+
+    /// The value at texture coordinates; of an attribute, which has none, [`Texture::mean`].
     #[must_use]
     pub fn at(&self, uv: [f64; 2]) -> Rgb {
         match self {
@@ -219,6 +307,7 @@ impl Texture {
                 colours[usize::from(u != v)]
             }
             Self::Bitmap(image) => image.at(uv),
+            Self::Attribute(_) => self.mean(),
         }
     }
 
@@ -226,7 +315,7 @@ impl Texture {
     #[must_use]
     pub fn slopes(&self, uv: [f64; 2]) -> [Rgb; 2] {
         match self {
-            Self::Checkerboard { .. } => [Rgb::ZERO; 2],
+            Self::Checkerboard { .. } | Self::Attribute(_) => [Rgb::ZERO; 2],
             Self::Bitmap(image) => image.slopes(uv),
         }
     }
@@ -234,7 +323,11 @@ impl Texture {
     /// False where the value jumps, though coordinates do not.
     #[must_use]
     pub fn is_continuous(&self) -> bool {
-        matches!(self, Self::Bitmap(image) if image.filter == TextureFilter::Bilinear)
+        match self {
+            Self::Checkerboard { .. } => false,
+            Self::Bitmap(image) => image.filter == TextureFilter::Bilinear,
+            Self::Attribute(a) => a.name.starts_with("vertex_"),
+        }
     }
 
     /// True where the value does not jump on a mesh: at none of the edges that triangles share, either.
@@ -252,7 +345,7 @@ impl Texture {
                 let (i, j) = if corners[i] < corners[j] { (i, j) } else { (j, i) };
                 let along = [0.0, 0.381, 0.618, 1.0].map(|w: f64| {
                     let bary = [0, 1].map(|c| weights[i][c] * (1.0 - w) + weights[j][c] * w);
-                    self.at(mesh.texcoord(triangle, bary))
+                    self.at_point(&TexturePoint::new(mesh, triangle, bary))
                 });
                 let first = *sides.entry([corners[i], corners[j]]).or_insert(along);
                 along.iter().zip(&first).all(|(a, b)| (*a - *b).max_abs() <= 1e-9)
@@ -260,29 +353,26 @@ impl Texture {
         })
     }
 
-    /// Values, per channel, between which all others are; of a checkerboard its two colours.
+    /// Values, per channel, between which all others are; of a checkerboard its two colours, of an attribute its mean.
     #[must_use]
     pub fn bounds(&self) -> [Rgb; 2] {
-        let join = |[low, high]: [Rgb; 2], c: Rgb| {
-            let by =
-                |f: fn(f64, f64) -> f64, a: Rgb| Rgb::new(f(a.r, c.r), f(a.g, c.g), f(a.b, c.b));
-            [by(f64::min, low), by(f64::max, high)]
-        };
         let none = [f64::INFINITY, f64::NEG_INFINITY].map(Rgb::splat);
         match self {
             Self::Checkerboard { colours, .. } => *colours,
             Self::Bitmap(image) => image.texels.iter().fold(none, |b, t| {
                 let [r, g, b2] = t.map(f64::from);
-                join(b, Rgb::new(r, g, b2))
+                widened(b, Rgb::new(r, g, b2))
             }),
+            Self::Attribute(_) => [self.mean(); 2],
         }
     }
 
-    /// The mean of all values over the texture's own period.
+    /// The mean of all values over the texture's own period; for an attribute, which depends on the mesh, that of 0 and 1.
     #[must_use]
     pub fn mean(&self) -> Rgb {
         match self {
             Self::Checkerboard { colours: [a, b], .. } => (*a + *b) * 0.5,
+            Self::Attribute(a) => Rgb::splat(0.5 * a.scale),
             Self::Bitmap(image) => {
                 let sum = image
                     .texels
@@ -292,6 +382,12 @@ impl Texture {
             }
         }
     }
+}
+
+/// Bounds that hold another colour, too.
+fn widened([low, high]: [Rgb; 2], c: Rgb) -> [Rgb; 2] {
+    let by = |f: fn(f64, f64) -> f64, a: Rgb| Rgb::new(f(a.r, c.r), f(a.g, c.g), f(a.b, c.b));
+    [by(f64::min, low), by(f64::max, high)]
 }
 
 #[cfg(feature = "serde")]

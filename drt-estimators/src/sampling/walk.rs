@@ -1,6 +1,6 @@
 //! The one random walk, in either [`TransportMode`]: connect, scatter, follow a ray, arrive.
 
-use drt_math::Rgb;
+use drt_math::{Rgb, Vec3};
 use drt_medium::Coefficients;
 
 use crate::sampling::flight::{Flown, Travel, medium_span};
@@ -33,26 +33,34 @@ impl Tracer<'_> {
         stop: &PathState,
         observer: &mut O,
     ) -> Option<OutgoingRay> {
-        if stop.segments >= self.max_segments {
+        let world = self.world;
+        // Going straight on adds no depth, so that the last vertex may do that.
+        let mut straight_only = stop.segments >= self.max_segments;
+        if straight_only && !(world.any_straight && world.passes_straight(&stop.vertex)) {
             return None;
         }
-        let world = self.world;
         let scattering = world.scattering(&stop.vertex)?;
         let sigma_s = stop.coefficients.as_ref().map_or(Rgb::ONE, Coefficients::sigma_s);
         let spare = O::RECORDS && world.may_revive(&stop.vertex);
         if stop.alive.times(stop.arrival * sigma_s, spare).value.is_zero() {
             return None;
         }
-        M::connect(self, stop, &scattering, sigma_s, observer);
+        if !straight_only {
+            M::connect(self, stop, &scattering, sigma_s, observer);
+        }
         if stop.segments + 1 >= self.max_segments && !M::EMISSION {
-            return None;
+            if !(world.any_straight && world.passes_straight(&stop.vertex)) {
+                return None;
+            }
+            straight_only = true;
         }
         let mut segments = stop.segments;
         let (to, pdf, value) = match scattering.sample(stop.from, M::GIVEN, &mut self.rng)? {
-            Drawn::Spread(to, pdf) if pdf > 0.0 => {
+            Drawn::Spread(to, pdf) if pdf > 0.0 && !straight_only => {
                 (to, Some(pdf), M::value(&scattering, stop.from, to))
             }
             Drawn::Spread(..) => return None,
+            Drawn::Specular(s) if straight_only && !s.straight => return None,
             Drawn::Specular(s) => {
                 // Like a null interface, a pane that light goes straight through adds no depth.
                 segments -= u32::from(s.straight && segments > 0);
@@ -281,10 +289,18 @@ impl Tracer<'_> {
         }
         let (v, w, d) = (&stop.vertex, light.w, light.distance);
         let target = light.point().map(|s| s.prim);
-        if !world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
-            return;
-        }
-        let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
+        let tau = if world.any_straight && light.is_delta() {
+            // All other lights are found by paths that go straight through.
+            match self.straight_transmittance(v, w, d) {
+                Some(tau) => tau,
+                None => return,
+            }
+        } else {
+            if !world.connect(v, w, d, target, &mut self.shadow, &mut self.counters) {
+                return;
+            }
+            world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters)
+        };
         let transport = tau * (weight * light.inv_pdf);
         if transport.is_zero() {
             return;
@@ -294,6 +310,19 @@ impl Tracer<'_> {
         let value = stop.throughput * sigma_s * f * connection.rest();
         observer.contribution(Pixel::Own, stop.segments + 1, value);
         observer.connect(stop.node, &connection, &self.shadow.crossings);
+    }
+
+    /// The part of the light that arrives at a vertex along a direction from a distance, surfaces that it goes straight
+    /// through included; `None` where something blocks.
+    #[cold]
+    fn straight_transmittance(&mut self, v: &Vertex, w: Vec3, d: f64) -> Option<Rgb> {
+        let world = self.world;
+        let part = world.connect_straight(v, w, d, &mut self.shadow, &mut self.counters);
+        if part.is_zero() {
+            return None;
+        }
+        let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
+        Some(tau * part)
     }
 }
 

@@ -116,6 +116,11 @@ pub(crate) struct LightSample {
 }
 
 impl LightSample {
+    /// True of light from a point or a direction, which no path meets by chance.
+    pub(crate) fn is_delta(&self) -> bool {
+        matches!(self.kind, LightKind::Position | LightKind::Direction)
+    }
+
     /// The point of an area emitter.
     pub(crate) fn point(&self) -> Option<&SurfacePoint> {
         match &self.kind {

@@ -195,6 +195,8 @@ pub(crate) struct World {
     pub(crate) geometry: Arc<Geometry>,
     null: Vec<bool>,
     pub(crate) any_null: bool,
+    /// Some surfaces let light go straight through.
+    pub(crate) any_straight: bool,
     /// The medium beyond every interface.
     ambient: Option<usize>,
 }
@@ -248,6 +250,7 @@ impl World {
             rr_depth: scene.integrator.rr_depth,
             hides_emitters: scene.hides_something(),
             any_null: null.iter().any(|n| *n),
+            any_straight: scene.shapes.iter().any(|s| scene.bsdfs[s.bsdf].item.passes_straight()),
             geometry,
             null,
             ambient: None,
@@ -411,6 +414,12 @@ impl World {
         self.null[shape as usize]
     }
 
+    /// True where some light goes straight through the surface that a vertex is on.
+    #[cold]
+    pub(crate) fn passes_straight(&self, v: &Vertex) -> bool {
+        v.surface().is_some_and(|s| self.bsdf_of(s.shape).passes_straight())
+    }
+
     pub(crate) fn has_media(&self) -> bool {
         !self.scene.media.is_empty()
     }
@@ -500,7 +509,7 @@ impl World {
         match &v.kind {
             Kind::Surface(s) => {
                 let shape = &self.scene.shapes[s.shape as usize];
-                let at = TexturePoint { mesh: &shape.mesh, triangle: s.triangle, bary: s.bary };
+                let at = TexturePoint::new(&shape.mesh, s.triangle, s.bary);
                 let bsdf = &self.scene.bsdfs[shape.bsdf].item;
                 Some(Scattering::Surface(bsdf.at(
                     Some(at),

@@ -5,7 +5,8 @@ use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::TrackingStats;
 
 use crate::model::rendering::Counters;
-use crate::world::vertex::{Kind, Vertex};
+use crate::model::texture::TexturePoint;
+use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{Crossing, RayPath, World, intervals};
 
 impl World {
@@ -129,6 +130,66 @@ impl World {
         self.connect_from(v, skip, dir, distance, path, counters)
     }
 
+    /// Begins a path of a given length, with the surface that its start touches. The medium it goes on in; `None` where that
+    /// surface blocks.
+    #[inline(always)]
+    fn begin(
+        &self,
+        v: &Vertex,
+        dir: Vec3,
+        distance: f64,
+        path: &mut RayPath,
+    ) -> Option<Option<usize>> {
+        path.crossings.clear();
+        path.end = None;
+        path.length = distance;
+        let mut medium = path.medium;
+        if let Kind::Volume(Some(c)) = &v.kind
+            && (c.point.ng.dot(dir) > 0.0) != c.front
+        {
+            if !self.is_null(c.point.shape) {
+                return None;
+            }
+            medium = self.medium_on_side(&c.point, !c.front, medium);
+            path.crossings.push(Crossing { point: c.point, x: v.x, t: 0.0, after: medium });
+        }
+        Some(medium)
+    }
+
+    /// As [`World::connect`], through all that lets light go straight on, and how much of it that does; zero where something
+    /// blocks.
+    #[cold]
+    pub(crate) fn connect_straight(
+        &self,
+        v: &Vertex,
+        dir: Vec3,
+        distance: f64,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) -> Rgb {
+        path.medium = self.medium_toward(v, dir);
+        let Some(medium) = self.begin(v, dir, distance, path) else { return Rgb::ZERO };
+        counters.rays += 1;
+        let ray = Ray { origin: v.x, dir, t_max: short_of(v.x, distance) };
+        path.hits.clear();
+        let blocks = |prim: u32| {
+            let shape = self.geometry.prims[prim as usize].shape;
+            !self.is_null(shape) && !self.bsdf_of(shape).passes_straight()
+        };
+        if self.geometry.bvh.crossings(&ray, Self::skip_of(v), blocks, &mut path.hits) {
+            return Rgb::ZERO;
+        }
+        let met = path.crossings.len();
+        self.cross(path, dir, medium);
+        let through = |s: &SurfacePoint| {
+            let mesh = &self.scene.shapes[s.shape as usize].mesh;
+            let at = TexturePoint::new(mesh, s.triangle, s.bary);
+            self.bsdf_of(s.shape).straight(Some(&at), s.ns.dot(dir).abs())
+        };
+        let crossed = path.crossings[met..].iter().filter(|c| !self.is_null(c.point.shape));
+        crossed.fold(Rgb::ONE, |part, c| part * through(&c.point))
+    }
+
     /// As [`World::connect`] from a point on an edge, past the edge's own faces.
     #[allow(clippy::too_many_arguments)]
     pub(crate) fn connect_past(
@@ -155,19 +216,7 @@ impl World {
         path: &mut RayPath,
         counters: &mut Counters,
     ) -> bool {
-        path.crossings.clear();
-        path.end = None;
-        path.length = distance;
-        let mut medium = path.medium;
-        if let Kind::Volume(Some(c)) = &v.kind
-            && (c.point.ng.dot(dir) > 0.0) != c.front
-        {
-            if !self.is_null(c.point.shape) {
-                return false;
-            }
-            medium = self.medium_on_side(&c.point, !c.front, medium);
-            path.crossings.push(Crossing { point: c.point, x: v.x, t: 0.0, after: medium });
-        }
+        let Some(medium) = self.begin(v, dir, distance, path) else { return false };
         counters.rays += 1;
         let ray = Ray { origin: v.x, dir, t_max: short_of(v.x, distance) };
         if !self.any_null {

@@ -101,7 +101,7 @@ impl Scattering<'_> {
         match self {
             Self::Surface(bsdf) => {
                 let (d, ng) = bsdf.gradient(wo, wi);
-                let (slide, params) = (bsdf.slide(wo, &d.params), Some(d.params));
+                let (slide, params) = (bsdf.slide(wo, wi, &d.params), Some(d.params));
                 ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, ng, slide, g: 0.0, params }
             }
             Self::Volume(phase) => {

@@ -1,10 +1,11 @@
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
 use crate::mesh::direction;
 use crate::triangulate::{PolygonError, newell_normal, triangulate};
-use crate::{Mesh, MeshError, NONE};
+use crate::{Mesh, MeshAttribute, MeshError, NONE};
 
 /// A file's vertices and polygons before they become a mesh.
 #[derive(Default)]
@@ -14,12 +15,18 @@ pub(super) struct Polygons {
     pub(super) normals: Vec<Vec3>,
     /// Texture coordinates, in an order of their own.
     pub(super) texcoords: Vec<[f64; 2]>,
+    /// Values per vertex, and per polygon, by name.
+    pub(super) vertex_attributes: Vec<Values>,
+    pub(super) face_attributes: Vec<Values>,
     corners: Vec<Corner>,
     /// Of each corner, its texture coordinates by index; [`NONE`] where the file gives none.
     corner_texcoords: Vec<u32>,
     /// Where each polygon's corners end.
     ends: Vec<usize>,
 }
+
+/// A name, and values in the order of what they are of.
+pub(super) type Values = (String, Vec<[f32; 3]>);
 
 /// A polygon's vertex and normal, both by index and in range.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -71,6 +78,10 @@ impl Polygons {
             let i = self.corner_texcoords[corner] as usize;
             self.texcoords.get(i).copied().unwrap_or_default()
         };
+        let named = self.vertex_attributes.iter().chain(&self.face_attributes);
+        let mut attributes: Vec<MeshAttribute> =
+            named.map(|a| MeshAttribute { name: a.0.clone(), values: Vec::new() }).collect();
+        let (of_vertices, of_faces) = attributes.split_at_mut(self.vertex_attributes.len());
         let (mut texcoords, mut begin) = (Vec::new(), 0);
         for (index, corners) in self.polygons().enumerate() {
             let points: Vec<_> =
@@ -81,6 +92,13 @@ impl Polygons {
             if textured {
                 texcoords.extend(pieces.iter().map(|t| t.map(|k| texcoord(begin + k as usize))));
             }
+            for (a, (_, values)) in of_vertices.iter_mut().zip(&self.vertex_attributes) {
+                let value = |k: u32| values[corners[k as usize].vertex as usize];
+                a.values.extend(pieces.iter().map(|t| t.map(value)));
+            }
+            for (a, (_, values)) in of_faces.iter_mut().zip(&self.face_attributes) {
+                a.values.extend(pieces.iter().map(|_| [values[index]; 3]));
+            }
             begin += corners.len();
         }
 
@@ -89,6 +107,7 @@ impl Polygons {
         let mesh = Mesh::new(positions, triangles)
             .and_then(|m| m.with_source(source, self.positions.len() as u32));
         let mesh = if textured { mesh.and_then(|m| m.with_texcoords(texcoords)) } else { mesh };
+        let mesh = mesh.and_then(|m| m.with_attributes(attributes));
         let has_normals = vertices.first().is_some_and(|c| c.normal != NONE);
         let mesh = if has_normals {
             let normals = vertices.iter().map(|c| self.normals[c.normal as usize]).collect();

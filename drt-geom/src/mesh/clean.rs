@@ -29,6 +29,10 @@ impl Mesh {
         let dropped = self.triangles.len() - triangles.len();
         let texcoords = self.texcoords.as_ref();
         let texcoords = texcoords.map(|t| order.iter().map(|&i| t[i as usize]).collect());
-        (Self { triangles, texcoords, ..self.clone() }, dropped)
+        let mut attributes = self.attributes.clone();
+        for a in &mut attributes {
+            a.values = order.iter().map(|&i| a.values[i as usize]).collect();
+        }
+        (Self { triangles, texcoords, attributes, ..self.clone() }, dropped)
     }
 }

@@ -1,11 +1,15 @@
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use drt_math::{Affine, Mat3, Vec3};
 
 use crate::Aabb;
 
+mod attribute;
 mod clean;
 mod smooth;
+
+pub use self::attribute::MeshAttribute;
 
 /// A triangle mesh: positions, triangles, and shading normals where the surface has them.
 ///
@@ -28,6 +32,8 @@ pub struct Mesh {
     /// Texture coordinates (u, v) of each corner of each triangle: of corners, not of vertices, so
     /// that seams need no vertices of their own.
     pub texcoords: Option<Vec<[[f64; 2]; 3]>>,
+    /// Other values over the surface.
+    pub attributes: Vec<MeshAttribute>,
     /// The index of each vertex in the order of the file it came from, where the loader split
     /// vertices (a position with several normals) or left some out. `None` is the identity.
     pub source_vertices: Option<Vec<u32>>,
@@ -36,7 +42,7 @@ pub struct Mesh {
 }
 
 /// Why a mesh cannot be made of the given arrays.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
     /// A coordinate is NaN, infinite or beyond 1e100.
@@ -69,6 +75,9 @@ pub enum MeshError {
         /// Which triangle.
         triangle: usize,
     },
+    /// An attribute has not three values for each triangle.
+    #[error("the attribute `{0}` has not as many entries as there are triangles")]
+    BadAttribute(String),
     /// An array with one entry per vertex has another length.
     #[error("{what} has {found} entries; it needs one for each of the {expected} vertices")]
     WrongLength {
@@ -117,6 +126,7 @@ impl Mesh {
             triangles,
             normals: None,
             texcoords: None,
+            attributes: Vec::new(),
             source_vertices: None,
             source_vertex_count,
         };
@@ -151,6 +161,9 @@ impl Mesh {
             if let Some(triangle) = first.or(wrong) {
                 return Err(MeshError::BadTexcoords { triangle });
             }
+        }
+        if let Some(a) = self.attributes.iter().find(|a| a.values.len() != triangles) {
+            return Err(MeshError::BadAttribute(a.name.clone()));
         }
         let Some(normals) = &self.normals else { return Ok(()) };
         self.expect_per_vertex("normals", normals.len())?;
@@ -187,6 +200,22 @@ impl Mesh {
         self.texcoords = Some(texcoords);
         self.validate()?;
         Ok(self)
+    }
+
+    /// The same mesh with other values over its surface.
+    ///
+    /// # Errors
+    /// When one has not as many entries as there are triangles.
+    pub fn with_attributes(mut self, attributes: Vec<MeshAttribute>) -> Result<Self, MeshError> {
+        self.attributes = attributes;
+        self.validate()?;
+        Ok(self)
+    }
+
+    /// The attribute of a name.
+    #[must_use]
+    pub fn attribute(&self, name: &str) -> Option<&MeshAttribute> {
+        self.attributes.iter().find(|a| a.name == name)
     }
 
     /// The texture coordinates at a point of a triangle, given by the weights of its second and third
@@ -342,6 +371,9 @@ impl Mesh {
         for t in self.texcoords.iter_mut().flatten() {
             t.swap(1, 2);
         }
+        for t in self.attributes.iter_mut().flat_map(|a| &mut a.values) {
+            t.swap(1, 2);
+        }
     }
 }
 
@@ -353,7 +385,7 @@ pub(crate) fn direction(v: Vec3) -> Option<Vec3> {
 
 #[cfg(feature = "serde")]
 mod unchecked {
-    use super::{MeshError, Vec, Vec3};
+    use super::{MeshAttribute, MeshError, Vec, Vec3};
 
     /// A mesh as stored, before its arrays are checked against each other.
     #[derive(serde::Deserialize)]
@@ -363,6 +395,8 @@ mod unchecked {
         triangles: Vec<[u32; 3]>,
         #[serde(default)]
         texcoords: Option<Vec<[[f64; 2]; 3]>>,
+        #[serde(default)]
+        attributes: Vec<MeshAttribute>,
         source_vertices: Option<Vec<u32>>,
         source_vertex_count: u32,
     }
@@ -379,6 +413,7 @@ mod unchecked {
                 Some(t) => mesh.with_texcoords(t)?,
                 None => mesh,
             };
+            let mesh = mesh.with_attributes(m.attributes)?;
             match m.normals {
                 Some(n) => mesh.with_normals(n),
                 None => Ok(mesh),

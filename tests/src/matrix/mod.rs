@@ -25,7 +25,7 @@ pub use verdict::{Fault, Row, Table, check};
 macro_rules! every_stage {
     ($with:ident) => {
         $with! {
-            surfaces: room room_box_filter standing knot gloss near_lamp;
+            surfaces: room room_box_filter standing knot gloss blend near_lamp;
             lights: spot point_and_sun;
             media: fog_box blob still_blob shade smoke glass dented_glass beam layers sheet ember;
             deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed

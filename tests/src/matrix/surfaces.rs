@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::FilterKind;
-use drt_estimators::surface::{Bsdf, Distribution, Phong, RoughConductor};
+use drt_estimators::surface::{Blend, Bsdf, Distribution, Phong, RoughConductor};
 use drt_geom::procedural::{TorusKnot, cube, grid, rectangle, torus_knot, uv_sphere};
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_motion::{Effect, GeometryChange};
@@ -178,6 +178,29 @@ pub fn gloss() -> Result<Stage> {
         Cell::new("specular reflectance", [add("ball", "specular_reflectance", [1.0, 0.5, 0.2])]),
     ];
     Ok(Stage::new("gloss", scene, cells))
+}
+
+/// A ball between paint and metal before a wall.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn blend() -> Result<Stage> {
+    let ball = at(&uv_sphere(8), Vec3::splat(0.6), Vec3::ZERO).with_smooth_normals();
+    let metal = RoughConductor { alpha: 0.4, ..RoughConductor::default() };
+    let bsdfs = [diffuse([0.6, 0.3, 0.1]), Bsdf::RoughConductor(metal)];
+    let wall = placed(&rectangle(), vec3(2.0, 2.0, 1.0), Vec3::X, PI, vec3(0.0, 0.0, 1.2));
+    let lamp = placed(&rectangle(), vec3(0.5, 0.4, 1.0), Vec3::X, FRAC_PI_2, vec3(-0.5, 1.6, -0.9));
+    let scene = Set::new(vec3(0.3, 0.4, -2.6), Vec3::ZERO, 40.0, 3)?
+        .shape("ball", ball, Bsdf::Blend(Box::new(Blend { bsdfs, weight: 0.4 })))
+        .shape("wall", wall, diffuse([0.6, 0.5, 0.4]))
+        .lamp("lamp", lamp, Rgb::new(8.0, 7.0, 6.0))
+        .scene;
+    let cells = vec![
+        Cell::new("weight", [raise("ball", "weight", 1.0)]).samples(512).representative(),
+        Cell::new("ball moves", [translate("ball", vec3(0.7, 0.3, -0.4))]),
+        Cell::new("ball turns", [turn("ball", vec3(0.2, 1.0, 0.3), vec3(0.2, 0.1, 0.0))]),
+    ];
+    Ok(Stage::new("blend", scene, cells))
 }
 
 /// A small lamp close above a floor and beside a post.

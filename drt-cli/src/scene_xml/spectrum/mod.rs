@@ -115,7 +115,7 @@ fn plugin(e: &Element, of: Of) -> Result<Rgb, CliError> {
         other => {
             let message = format!(
                 "the {} type `{other}` is not supported; expected uniform, d65, srgb, rawconstant, \
-                 blackbody, regular, irregular, bitmap or checkerboard",
+                 blackbody, regular, irregular, bitmap, checkerboard or mesh_attribute",
                 e.tag
             );
             return Err(e.error(message));

@@ -1,4 +1,4 @@
-use drt_estimators::surface::{Bsdf, Distribution};
+use drt_estimators::surface::{Bsdf, Distribution, Perturbation, Principled};
 use drt_math::Rgb;
 
 use super::{old_scene, refused, scene};
@@ -108,13 +108,88 @@ fn rough_conductor() {
         ),
         (r#"<string name="distribution" value="phong"/>"#, "expected beckmann, ggx"),
         (r#"<float name="alpha_u" value="0.3"/>"#, "`alpha_u` and `alpha_v`"),
-        (
-            r#"<float name="alpha_u" value="0.3"/><float name="alpha_v" value="0.2"/>"#,
-            "anisotropic",
-        ),
     ] {
         refused(&format!("<bsdf type=\"roughconductor\">{inside}</bsdf>"), &[part]);
     }
+}
+
+#[test]
+fn anisotropic() {
+    let uneven = r#"<float name="alpha_u" value="0.3"/><float name="alpha_v" value="0.2"/>"#;
+    for kind in ["roughconductor", "roughdielectric"] {
+        let Bsdf::Anisotropic(a) = bsdf(kind, uneven) else { panic!("{kind}") };
+        assert_eq!((a.alpha, a.base.name()), ([0.3, 0.2], kind));
+    }
+    let squares = |name: &str| {
+        format!(
+            "<texture name=\"{name}\" type=\"checkerboard\"><float name=\"color0\" value=\"0.1\"/>\
+             </texture>"
+        )
+    };
+    let both = squares("alpha_u") + &squares("alpha_v");
+    let Bsdf::Textured(t) = bsdf("roughconductor", &both) else { panic!() };
+    assert!(matches!(t.bsdf, Bsdf::Anisotropic(_)) && t.textures.len() == 2);
+    refused(&format!("<bsdf type=\"roughplastic\">{uneven}</bsdf>"), &["must be equal"]);
+}
+
+#[test]
+fn principled() {
+    let Bsdf::Principled(p) = bsdf("principled", "") else { panic!() };
+    assert_eq!(*p, Principled::default());
+    assert!((p.eta - 1.5).abs() < 1e-12);
+    let inside = r#"<rgb name="base_color" value="0.2 0.8 0.1"/><float name="eta" value="1"/>
+                    <float name="spec_trans" value="0.5"/><float name="metallic" value="0.25"/>
+                    <float name="main_specular_sampling_rate" value="2"/>"#;
+    let Bsdf::Principled(p) = bsdf("principled", inside) else { panic!() };
+    assert_eq!((p.base_color.g, p.spec_trans, p.metallic, p.eta), (0.8, 0.5, 0.25, 1.001));
+    let Bsdf::PrincipledThin(p) =
+        bsdf("principledthin", r#"<float name="diff_trans" value="1.5"/>"#)
+    else {
+        panic!()
+    };
+    assert_eq!((p.diff_trans, p.eta), (1.5, 1.5));
+    for (inside, part) in [
+        (r#"<float name="eta" value="1.4"/><float name="specular" value="0.4"/>"#, "not both"),
+        (r#"<float name="roughness" value="1.5"/>"#, "\"roughness\" is 1.5"),
+        (r#"<float name="subsurface" value="1"/>"#, "not supported by"),
+    ] {
+        refused(&format!("<bsdf type=\"principled\">{inside}</bsdf>"), &[part]);
+    }
+}
+
+#[test]
+fn bsdfs_made_of_others() {
+    let Bsdf::Mask(m) = bsdf("mask", r#"<bsdf type="diffuse"/>"#) else { panic!() };
+    assert_eq!(m.opacity, 0.5);
+    let colour = r#"<rgb name="opacity" value="1 0 0"/><bsdf type="diffuse"/>"#;
+    assert!(matches!(bsdf("mask", colour), Bsdf::Mask(m) if (m.opacity - 0.212_671).abs() < 1e-12));
+    let two = r#"<float name="weight" value="0.25"/><bsdf type="diffuse"/><bsdf type="phong"/>"#;
+    let Bsdf::Blend(b) = bsdf("blendbsdf", two) else { panic!() };
+    assert_eq!((b.weight, b.bsdfs[0].name(), b.bsdfs[1].name()), (0.25, "diffuse", "phong"));
+    let map = r#"<texture name="any" type="checkerboard"/><bsdf type="diffuse"/>
+                 <float name="scale" value="0.1"/>"#;
+    let Bsdf::Perturbed(b) = bsdf("bumpmap", map) else { panic!() };
+    assert!(b.perturbation == Perturbation::Heights(0.1) && b.use_shadowing_function);
+    let map = r#"<texture name="normalmap" type="rawconstant"><vector name="value" value="0.5 0.5 1"/>
+                 </texture><bsdf type="diffuse"/><boolean name="flip_invalid_normals" value="false"/>"#;
+    let Bsdf::Perturbed(b) = bsdf("normalmap", map) else { panic!() };
+    assert!(b.perturbation == Perturbation::Normals && !b.flip_invalid_normals);
+    assert_eq!(b.map.at([0.3, 0.3]), Rgb::new(0.5, 0.5, 1.0));
+    refused("<bsdf type=\"mask\"/>", &["expected a bsdf inside"]);
+    refused("<bsdf type=\"mask\"><bsdf type=\"null\"/></bsdf>", &["cannot hold a null"]);
+    refused("<bsdf type=\"blendbsdf\"><bsdf type=\"diffuse\"/></bsdf>", &["two bsdfs", "found 1"]);
+    refused("<bsdf type=\"bumpmap\"><bsdf type=\"diffuse\"/></bsdf>", &["one texture", "found 0"]);
+    refused(
+        "<bsdf type=\"normalmap\"><bsdf type=\"diffuse\"/></bsdf>",
+        &["`normalmap` is missing"],
+    );
+    // Doubled at each step, this would not end.
+    let mut tree = String::from("<bsdf type=\"diffuse\" id=\"b0\"/>");
+    for i in 1..40 {
+        let inner = format!("<ref id=\"b{}\"/>", i - 1);
+        tree += &format!("<bsdf type=\"blendbsdf\" id=\"b{i}\">{inner}{inner}</bsdf>");
+    }
+    refused(&tree, &["more than 64 bsdfs in one"]);
 }
 
 #[test]

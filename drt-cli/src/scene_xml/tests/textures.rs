@@ -286,3 +286,36 @@ fn files_bring_their_coordinates() {
     assert_eq!(a, upright[0]);
     assert!([b, c] == [upright[1], upright[2]] || [c, b] == [upright[1], upright[2]]);
 }
+
+#[test]
+fn attributes_of_meshes() {
+    let folder = Folder::new();
+    folder.file(
+        "t.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+         property float tone_0\nproperty float tone_1\nproperty float tone_2\nelement face 1\n\
+         property list uchar int vertex_indices\nproperty float gloss_0\nend_header\n\
+         0 0 0 0.1 0.2 0.3\n1 0 0 0.5 0.2 0.3\n0 1 0 0.1 0.6 -1\n3 0 1 2 0.7\n",
+    );
+    let body = |name: &str| {
+        format!(
+            "<shape type=\"ply\"><string name=\"filename\" value=\"t.ply\"/><bsdf type=\"diffuse\">\
+             <texture name=\"reflectance\" type=\"mesh_attribute\"><string name=\"name\" value=\"{name}\"/>\
+             <float name=\"scale\" value=\"0.5\"/></texture></bsdf></shape>"
+        )
+    };
+    let s = load(&folder, &body("face_gloss")).unwrap();
+    let attribute = s.shapes[0].mesh.attribute("face_gloss").unwrap();
+    assert!((attribute.at(0, [0.2, 0.2])[1] - 0.7).abs() < 1e-6);
+    let tone = s.shapes[0].mesh.attribute("vertex_tone").unwrap().at(0, [0.5, 0.25]);
+    assert!((tone[0] - 0.3).abs() < 1e-6 && (tone[1] - 0.3).abs() < 1e-6);
+    assert!(s.check().is_ok());
+    let fails = |name: &str, part: &str| {
+        let loaded = load(&folder, &body(name)).map_err(|e| e.to_string());
+        let message = loaded.and_then(|s| s.check().map_err(|e| e.to_string())).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    };
+    fails("vertex_tone", "\"reflectance\" is -0.5");
+    fails("vertex_nothing", "the attribute `vertex_nothing`, which its mesh does not have");
+    fails("tone", "begin with vertex_ or face_");
+}

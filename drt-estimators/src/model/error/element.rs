@@ -38,6 +38,17 @@ pub enum ElementError {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
+    /// A BSDF that no derivative here knows of.
+    #[error(
+        "its BSDF, {bsdf}, has no derivatives, nor has light that meets it: `{parameter}` can only be \
+         differentiated by finite differences"
+    )]
+    NoDerivatives {
+        /// Kind of BSDF, by its plugin name.
+        bsdf: &'static str,
+        /// The parameter, or what else was to be differentiated by.
+        parameter: String,
+    },
     /// A kind of derivative that turns rays, by a camera whose rays are parallel.
     #[error(
         "it is orthographic, and `warped` has no derivatives of what moves in its view: its rays cannot turn; \

@@ -23,7 +23,7 @@ pub struct BsdfParams {
     pub eta: Rgb,
     /// Imaginary part of the index.
     pub k: Rgb,
-    /// Sharpness of the Phong lobe.
+    /// Sharpness of the Phong lobe; of a blend, which has none, the weight of its second BSDF.
     pub exponent: Rgb,
 }
 
@@ -58,31 +58,25 @@ impl BsdfParams {
         self.exponent += params.exponent * weight;
     }
 
-    /// The entry of a property.
+    /// The entry of a property; zero of those that nothing is differentiated by.
     #[must_use]
     pub fn get(&self, property: Property) -> Rgb {
-        match property {
-            Property::Reflectance => self.reflectance,
-            Property::SpecularReflectance => self.specular_reflectance,
-            Property::SpecularTransmittance => self.specular_transmittance,
-            Property::Alpha => self.alpha,
-            Property::Eta => self.eta,
-            Property::K => self.k,
-            Property::Exponent => self.exponent,
-        }
+        let mut own = *self;
+        own.get_mut(property).copied().unwrap_or(Rgb::ZERO)
     }
 
-    /// The entry of a property, to change it.
-    pub fn get_mut(&mut self, property: Property) -> &mut Rgb {
-        match property {
+    /// The entry of a property, to change it; `None` of those that nothing is differentiated by.
+    pub fn get_mut(&mut self, property: Property) -> Option<&mut Rgb> {
+        Some(match property {
             Property::Reflectance => &mut self.reflectance,
             Property::SpecularReflectance => &mut self.specular_reflectance,
             Property::SpecularTransmittance => &mut self.specular_transmittance,
             Property::Alpha => &mut self.alpha,
             Property::Eta => &mut self.eta,
             Property::K => &mut self.k,
-            Property::Exponent => &mut self.exponent,
-        }
+            Property::Exponent | Property::Weight => &mut self.exponent,
+            _ => return None,
+        })
     }
 }
 
@@ -114,7 +108,9 @@ pub struct BsdfChange {
 impl BsdfChange {
     /// Carries a velocity that an earlier effect gave the BSDF through this later change.
     pub fn carry(&self, velocity: &mut BsdfTangent, theta: f64) {
-        *velocity.get_mut(self.property) *= self.op.map(theta).factor;
+        if let Some(entry) = velocity.get_mut(self.property) {
+            *entry *= self.op.map(theta).factor;
+        }
     }
 }
 
@@ -142,7 +138,9 @@ impl Bsdf {
         let mut base = self.clone();
         let mut velocity = BsdfTangent::default();
         let value = base.slot(change)?.value();
-        *velocity.get_mut(change.property) = change.op.map_rate(theta).value(value);
+        if let Some(entry) = velocity.get_mut(change.property) {
+            *entry = change.op.map_rate(theta).value(value);
+        }
         Ok(velocity)
     }
 
@@ -158,7 +156,7 @@ impl Bsdf {
         Ok(())
     }
 
-    fn property(&mut self, property: Property) -> Option<Slot<'_>> {
+    pub(super) fn property(&mut self, property: Property) -> Option<Slot<'_>> {
         match self {
             Self::Null => None,
             Self::Diffuse(b) => b.slot(property),
@@ -171,6 +169,12 @@ impl Bsdf {
             Self::ThinDielectric(b) => b.slot(property),
             Self::TwoSided(b) => b.front.property(property),
             Self::Textured(b) => b.bsdf.property(property),
+            Self::Mask(b) => b.slot(property),
+            Self::Blend(b) => b.slot(property),
+            Self::Perturbed(b) => b.bsdf.property(property),
+            Self::Anisotropic(b) => b.slot(property),
+            Self::Principled(b) => b.slot(property),
+            Self::PrincipledThin(b) => b.slot(property),
         }
     }
 
@@ -179,6 +183,8 @@ impl Bsdf {
         match self {
             Self::Textured(b) => b.texture(property),
             Self::TwoSided(b) => b.front.texture(property),
+            Self::Mask(b) => b.bsdf.texture(property),
+            Self::Perturbed(b) => b.bsdf.texture(property),
             _ => None,
         }
     }

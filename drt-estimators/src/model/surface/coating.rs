@@ -20,7 +20,7 @@ pub struct Coating {
     eta: f64,
     /// Microfacets and their roughness; a smooth coating has none.
     facets: Option<(Distribution, f64)>,
-    /// Of a rough one: the part let through at [`COSINES`] cosines from 0 to 1.
+    /// Of a rough one: the part let through at [`COSINES`] cosines from 0 to 1. Without, it is that of a smooth one.
     transmittance: Arc<[f64]>,
     /// The part of diffuse light from below that is reflected back down.
     internal_reflectance: f64,
@@ -80,6 +80,21 @@ impl Coating {
         Ok(Self { eta, facets: Some((distribution, alpha)), transmittance, internal_reflectance })
     }
 
+    /// A coating with microfacets that reflect, but lets through to a diffuse base what a smooth one does, each way once, and
+    /// none of it comes back: Mitsuba's `pplastic`, after Baek et al. 2018, "Simultaneous Acquisition of Polarimetric SVBRDF
+    /// and Normals", without polarisation.
+    ///
+    /// # Errors
+    /// When `eta` is not above 1 or `alpha` below 1e-4.
+    pub fn unmixed(distribution: Distribution, alpha: f64, eta: f64) -> Result<Self, SurfaceError> {
+        check_index(eta)?;
+        in_range(Property::Alpha, alpha, alpha >= LEAST_ALPHA, "at least 1e-4")?;
+        // With this the factors of light inside, 1 / ((1 - r) eta²), are one.
+        let internal_reflectance = 1.0 - 1.0 / (eta * eta);
+        let facets = Some((distribution, alpha));
+        Ok(Self { eta, facets, transmittance: Arc::new([]), internal_reflectance })
+    }
+
     /// The index of refraction over that of the outside.
     #[must_use]
     pub fn eta(&self) -> f64 {
@@ -112,8 +127,8 @@ impl Coating {
     pub(super) fn validate(&self) -> Result<(), SurfaceError> {
         check_index(self.eta)?;
         let length = self.transmittance.len();
-        let expected = if self.facets.is_some() { COSINES } else { 0 };
-        in_range(Property::Alpha, length as f64, length == expected, "a coating's table")
+        let fits = length == 0 || (self.facets.is_some() && length == COSINES);
+        in_range(Property::Alpha, length as f64, fits, "a coating's table")
     }
 }
 

@@ -41,7 +41,12 @@ impl<T: Real> RoughConductor<T> {
         if !a.in_front() {
             return Rgb::splat(T::zero());
         }
-        let facets = self.distribution.facets(a, T::one(), self.alpha);
+        self.value_of(a, self.distribution.facets(a, T::one(), self.alpha))
+    }
+
+    /// The value by [`Distribution::facets`] of any kind.
+    #[inline(always)]
+    pub(super) fn value_of(&self, a: &Angles<T>, facets: T) -> Rgb<T> {
         // Also where |h| = 0, which the rest could not be differentiated at.
         if facets.re() == 0.0 {
             return Rgb::splat(T::zero());
@@ -104,7 +109,13 @@ impl RoughConductor {
         if !a.in_front() {
             return 0.0;
         }
-        reflection_jacobian(a.h2) * self.distribution.visible_density(a, 1.0, self.alpha)
+        Self::pdf_of(a, self.distribution.visible_density(a, 1.0, self.alpha))
+    }
+
+    /// The density by [`Distribution::visible_density`] of any kind.
+    #[inline(always)]
+    pub(super) fn pdf_of(a: &Angles, visible: f64) -> f64 {
+        reflection_jacobian(a.h2) * visible
     }
 
     #[inline]

@@ -44,8 +44,8 @@ const LEAST_CONTRAST: f64 = 1e-6;
 /// The angles seen with the first direction in front, and the index beyond the interface over the
 /// index on that direction's side.
 #[derive(Clone, Copy)]
-struct Passage<T> {
-    a: Angles<T>,
+pub(super) struct Passage<T> {
+    pub(super) a: Angles<T>,
     eta: T,
 }
 
@@ -59,7 +59,7 @@ struct FacetCosines<T> {
 impl<T: Real> Passage<T> {
     /// None where a direction lies in the surface.
     #[inline]
-    fn new(a: &Angles<T>, eta: T) -> Option<Self> {
+    pub(super) fn new(a: &Angles<T>, eta: T) -> Option<Self> {
         if a.cos_i.re() == 0.0 || a.cos_o.re() == 0.0 {
             None
         } else if a.cos_o.re() > 0.0 {
@@ -70,13 +70,13 @@ impl<T: Real> Passage<T> {
     }
 
     #[inline]
-    fn reflects(&self) -> bool {
+    pub(super) fn reflects(&self) -> bool {
         self.a.cos_i.re() > 0.0
     }
 
     /// Scale of `wi` in the half vector.
     #[inline]
-    fn index(&self) -> T {
+    pub(super) fn index(&self) -> T {
         if self.reflects() { T::one() } else { self.eta }
     }
 
@@ -109,12 +109,17 @@ impl<T: Real> Passage<T> {
 impl<T: Real> RoughDielectric<T> {
     #[inline]
     pub(super) fn value(&self, a: &Angles<T>) -> Rgb<T> {
-        let black = Rgb::splat(T::zero());
-        let Some(passage) = Passage::new(a, self.eta) else { return black };
+        let Some(passage) = Passage::new(a, self.eta) else { return Rgb::splat(T::zero()) };
         let facets = self.distribution.facets(&passage.a, passage.index(), self.alpha);
+        self.value_of(&passage, facets)
+    }
+
+    /// The value by [`Distribution::facets`] of any kind.
+    #[inline(always)]
+    pub(super) fn value_of(&self, passage: &Passage<T>, facets: T) -> Rgb<T> {
         // Also where |h| = 0, which the rest could not be differentiated at.
         if facets.re() == 0.0 {
-            return black;
+            return Rgb::splat(T::zero());
         }
         self.colour(passage.reflects()) * (facets * passage.facet_share())
     }
@@ -177,7 +182,15 @@ impl RoughDielectric {
     #[inline]
     pub(super) fn pdf(&self, a: &Angles) -> f64 {
         let Some(passage) = Passage::new(a, self.eta) else { return 0.0 };
-        let Passage { a, eta } = passage;
+        let Passage { a, .. } = &passage;
+        let index = passage.index();
+        self.pdf_of(&passage, || self.distribution.visible_density(a, index, self.alpha))
+    }
+
+    /// The density by [`Distribution::visible_density`] of any kind.
+    #[inline(always)]
+    pub(super) fn pdf_of(&self, passage: &Passage<f64>, visible: impl FnOnce() -> f64) -> f64 {
+        let Passage { a, eta } = *passage;
         let (probability, jacobian) = if passage.reflects() {
             let fresnel = dielectric_reflected(0.5 * fm::sqrt(a.h2), eta);
             (self.reflection_choice(fresnel), 0.25 * a.h2 * a.h2)
@@ -187,18 +200,32 @@ impl RoughDielectric {
         } else {
             return 0.0;
         };
-        probability * jacobian * self.distribution.visible_density(&a, passage.index(), self.alpha)
+        probability * jacobian * visible()
     }
 
     #[inline]
     pub(super) fn sample(&self, from: Vec3, n: Vec3, u: [f64; 3]) -> Option<Vec3> {
         let (n, eta) = self.seen_from(from, n)?;
         let m = self.distribution.sample_visible(from, n, self.alpha, [u[0], u[1]]);
+        self.sample_by(m, from, n, eta, u[2])
+    }
+
+    /// The direction into which a facet with the normal `m` sends light, by a number that chooses between reflection and
+    /// refraction; `n` is on the side of `from`, and `eta` the index beyond over that on that side.
+    #[inline(always)]
+    pub(super) fn sample_by(
+        &self,
+        m: Vec3,
+        from: Vec3,
+        n: Vec3,
+        eta: f64,
+        choice: f64,
+    ) -> Option<Vec3> {
         let cos = m.dot(from);
         if cos <= 0.0 {
             return None;
         }
-        let reflects = u[2] < self.reflection_choice(dielectric_reflected(cos, eta));
+        let reflects = choice < self.reflection_choice(dielectric_reflected(cos, eta));
         let w = if reflects { mirrored(from, m) } else { refracted(from, m, eta)?.0 };
         // A reflection to the far side, or a refraction to the near one, has left the model.
         (reflects == (n.dot(w) > 0.0)).then_some(w)
@@ -219,7 +246,7 @@ impl RoughDielectric {
 
     /// The normal on the side of a direction, and the index beyond over the one on that side.
     #[inline]
-    fn seen_from(&self, from: Vec3, n: Vec3) -> Option<(Vec3, f64)> {
+    pub(super) fn seen_from(&self, from: Vec3, n: Vec3) -> Option<(Vec3, f64)> {
         let side = n.dot(from);
         if side > 0.0 {
             Some((n, self.eta))

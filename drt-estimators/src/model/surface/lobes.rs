@@ -49,12 +49,10 @@ impl Bsdf {
             Self::RoughConductor(b) => conductor(b, wo, n),
             Self::RoughDielectric(b) => dielectric(b, wo, n),
             Self::Plastic(b) => plastic(b, wo, n),
-            Self::Null
-            | Self::Conductor(_)
-            | Self::Dielectric(_)
-            | Self::ThinDielectric(_)
-            | Self::TwoSided(_) => Lobes::even(0.0),
             Self::Textured(b) => b.at(at).lobes(None, wo, n),
+            Self::Blend(b) => b.lobes(at, wo, n),
+            // Nothing is differentiated at all others.
+            _ => Lobes::even(0.0),
         }
     }
 }

@@ -86,8 +86,13 @@ impl LocalBsdf<'_> {
 
     /// The gradient of the value by the place of the point, as far as textures change there; `params` holds its
     /// derivatives by properties.
-    pub(crate) fn slide(&self, wo: Vec3, params: &BsdfParams) -> RgbVec {
-        self.bsdf.slide(self.at.as_ref(), wo, self.ns, params)
+    pub(crate) fn slide(&self, wo: Vec3, wi: Vec3, params: &BsdfParams) -> RgbVec {
+        if !self.bsdf.varies() {
+            return RgbVec::ZERO;
+        }
+        let factor =
+            if self.interpolated { fade(self.ns.dot(wo)).0 * fade(self.ng.dot(wi)).0 } else { 1.0 };
+        self.bsdf.slide(self.at.as_ref(), [wo, wi, self.ns], params, factor)
     }
 
     /// Draws the direction that is not given; see [`Bsdf::sample`].
@@ -96,7 +101,8 @@ impl LocalBsdf<'_> {
         self.bsdf.sample_at(self.at.as_ref(), from, self.ns, u, given)
     }
 
-    /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`].
+    /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`]. These do not fade: nothing is
+    /// differentiated there, and light that goes about in glass meets so many horizons that it would lose one percent.
     #[inline]
     pub(crate) fn sample_specular(
         &self,
@@ -104,12 +110,7 @@ impl LocalBsdf<'_> {
         choice: f64,
         given: Given,
     ) -> Option<SpecularSample> {
-        let mut s = self.bsdf.sample_specular_at(self.at.as_ref(), from, self.ns, choice, given)?;
-        if self.interpolated {
-            // As the value fades where there is one.
-            s.weight *= fade(self.ns.dot(from)).0 * fade(self.ng.dot(s.w)).0;
-        }
-        Some(s)
+        self.bsdf.sample_specular_at(self.at.as_ref(), from, self.ns, choice, given)
     }
 
     /// Density per steradian with which [`Self::sample`] draws `to`.

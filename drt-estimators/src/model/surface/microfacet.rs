@@ -24,7 +24,7 @@ pub enum Distribution {
 pub(super) const LEAST_ALPHA: f64 = 1e-4;
 
 /// Least squared `n·h`: below it `h` lies in the surface or vanishes, and its powers underflow.
-const LEAST_COS2: f64 = 1e-40;
+pub(super) const LEAST_COS2: f64 = 1e-40;
 
 /// From this ratio of cotangent to roughness on, Walter's rational fit of Beckmann's masking is one:
 /// the smaller root of `0.396 a² - 1.259 a + 1`.
@@ -93,7 +93,7 @@ impl Distribution {
     /// `D(h/|h|) / |h|⁴` of a half vector `h`, per steradian, from `n·h` and `|h|²`. Even in `h`;
     /// zero where it underflows.
     #[inline]
-    fn density<T: Real>(self, n_dot_h: T, h2: T, alpha: T) -> T {
+    pub(super) fn density<T: Real>(self, n_dot_h: T, h2: T, alpha: T) -> T {
         let cos2 = n_dot_h.squared();
         let sin2 = (h2 - cos2).max(T::zero());
         let alpha2 = alpha.squared();
@@ -125,7 +125,13 @@ impl Distribution {
     #[inline]
     pub(super) fn masking<T: Real>(self, cos: T, alpha: T) -> T {
         let cos2 = cos.squared();
-        let spread2 = alpha.squared() * (T::one() - cos2);
+        self.masking_by(cos, alpha.squared() * (T::one() - cos2))
+    }
+
+    /// As [`Distribution::masking`] with the squared sine times roughness, `spread2`.
+    #[inline]
+    pub(super) fn masking_by<T: Real>(self, cos: T, spread2: T) -> T {
+        let cos2 = cos.squared();
         match self {
             Self::Beckmann => {
                 if cos2.re() >= UNMASKED * UNMASKED * spread2.re() {
@@ -145,11 +151,21 @@ impl Distribution {
     pub(super) fn exact_masking(self, cos: f64, alpha: f64) -> f64 {
         match self {
             Self::Beckmann => {
-                let spread = alpha * fm::sqrt((1.0 - cos * cos).max(0.0));
+                self.exact_masking_by(cos, alpha * fm::sqrt((1.0 - cos * cos).max(0.0)))
+            }
+            Self::Ggx => self.masking(cos, alpha),
+        }
+    }
+
+    /// As [`Distribution::exact_masking`] with the sine times roughness, `spread`.
+    #[inline]
+    pub(super) fn exact_masking_by(self, cos: f64, spread: f64) -> f64 {
+        match self {
+            Self::Beckmann => {
                 let stretched = fm::sqrt(cos * cos + spread * spread);
                 1.0 / (visible_area(cos / stretched, spread / stretched) * stretched)
             }
-            Self::Ggx => self.masking(cos, alpha),
+            Self::Ggx => self.masking_by(cos, spread * spread),
         }
     }
 
@@ -174,12 +190,18 @@ impl Distribution {
         let y = n.cross(x);
         // Seen from the stretched direction the microfacets have roughness one.
         let stretched = fm::sqrt(cos * cos + alpha * alpha * sin * sin);
-        let (cos, sin) = (cos / stretched, alpha * sin / stretched);
-        let [p, q, up] = match self {
+        let [p, q, up] = self.sample_stretched(cos / stretched, alpha * sin / stretched, u);
+        (x * (alpha * p) + y * (alpha * q) + n * up).normalize()
+    }
+
+    /// Draws a microfacet normal, of any length, as seen at roughness one from the direction of that cosine and sine: its
+    /// parts towards the direction, across it, and along the surface's normal.
+    #[inline]
+    pub(super) fn sample_stretched(self, cos: f64, sin: f64, u: [f64; 2]) -> [f64; 3] {
+        match self {
             Self::Beckmann => [visible_slope(cos, sin, u[0]), visible_slope(1.0, 0.0, u[1]), 1.0],
             Self::Ggx => visible_hemisphere_point(cos, sin, u),
-        };
-        (x * (alpha * p) + y * (alpha * q) + n * up).normalize()
+        }
     }
 }
 

@@ -9,8 +9,9 @@
 //! [`Bsdf::Null`] scatters nothing, and light crosses it unchanged.
 //!
 //! The models, their parameters and their defaults are those of the Mitsuba plugins `diffuse`,
-//! `phong`, `plastic`, `roughplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`,
-//! `roughdielectric`, `twosided` and `null`.
+//! `phong`, `plastic`, `roughplastic`, `pplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`,
+//! `roughdielectric`, `principled`, `principledthin`, `blendbsdf`, `mask`, `normalmap`, `bumpmap`, `twosided`
+//! and `null`.
 //!
 //! ```
 //! use drt_estimators::surface::{Bsdf, Given, RoughConductor};
@@ -32,21 +33,30 @@
 //! ```
 
 mod angles;
+mod anisotropic;
+mod blend;
 mod change;
 mod coating;
+mod composed;
 mod conductor;
 mod dielectric;
 mod diffuse;
 mod direction_partner;
 mod facet;
+mod framed;
 mod fresnel;
 mod lobes;
 mod local;
+mod mask;
 mod microfacet;
+mod perturbed;
 mod phong;
 mod plastic;
+mod principled;
+mod principled_thin;
 mod property;
 mod roughness_partner;
+mod shading_frame;
 mod smooth;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -58,18 +68,25 @@ use alloc::boxed::Box;
 use drt_geom::Mesh;
 use drt_math::{Rgb, RgbVec, Vec3, fm};
 
-use crate::model::surface::angles::{Angles, Slopes};
+use crate::model::surface::angles::Angles;
+pub use crate::model::surface::anisotropic::Anisotropic;
+pub use crate::model::surface::blend::Blend;
 pub use crate::model::surface::change::{BsdfChange, BsdfParams, BsdfTangent};
 pub use crate::model::surface::coating::Coating;
+use crate::model::surface::composed::Composed;
 pub use crate::model::surface::conductor::RoughConductor;
 pub use crate::model::surface::dielectric::RoughDielectric;
 pub use crate::model::surface::diffuse::Diffuse;
 pub(crate) use crate::model::surface::direction_partner::{DirectionPartner, Turn};
 use crate::model::surface::facet::Facet;
 pub(crate) use crate::model::surface::local::LocalBsdf;
+pub use crate::model::surface::mask::Mask;
 pub use crate::model::surface::microfacet::Distribution;
+pub use crate::model::surface::perturbed::{Perturbation, Perturbed};
 pub use crate::model::surface::phong::Phong;
 pub use crate::model::surface::plastic::Plastic;
+pub use crate::model::surface::principled::Principled;
+pub use crate::model::surface::principled_thin::PrincipledThin;
 pub use crate::model::surface::property::{Property, SurfaceError};
 pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
 pub use crate::model::surface::smooth::{Conductor, Dielectric, ThinDielectric};
@@ -104,8 +121,20 @@ pub enum Bsdf {
     ThinDielectric(ThinDielectric),
     /// A reflector on both sides.
     TwoSided(Box<TwoSided>),
-    /// Any of the above with textures.
+    /// Any but these two with textures.
     Textured(Box<Textured>),
+    /// One that is there in part only.
+    Mask(Box<Mask>),
+    /// Something between two others.
+    Blend(Box<Blend>),
+    /// One whose normals are not those of the surface.
+    Perturbed(Box<Perturbed>),
+    /// A rough metal or interface whose lobes are longer than wide.
+    Anisotropic(Box<Anisotropic>),
+    /// Burley's model of many materials.
+    Principled(Box<Principled>),
+    /// The same for thin sheets.
+    PrincipledThin(Box<PrincipledThin>),
 }
 
 /// One-sided reflectors used on both sides of a surface: from behind, the normal is turned over.
@@ -181,12 +210,7 @@ macro_rules! match_model {
             Bsdf::RoughConductor($model) => $body,
             Bsdf::RoughDielectric($model) => $body,
             Bsdf::Plastic($model) => $body,
-            Bsdf::Null
-            | Bsdf::Conductor(_)
-            | Bsdf::Dielectric(_)
-            | Bsdf::ThinDielectric(_)
-            | Bsdf::TwoSided(_)
-            | Bsdf::Textured(_) => $nothing,
+            _ => $nothing,
         }
     };
 }
@@ -200,6 +224,8 @@ impl Bsdf {
             Self::Diffuse(d) => d.reflectance.is_zero(),
             Self::Textured(t) => t.bsdf.is_black(),
             Self::TwoSided(t) => t.front.is_black() && t.back.as_ref().is_none_or(Self::is_black),
+            Self::Blend(b) => b.bsdfs.iter().all(Self::is_black),
+            Self::Perturbed(b) => b.bsdf.is_black(),
             _ => false,
         }
     }
@@ -218,7 +244,7 @@ impl Bsdf {
         match_model!(
             bsdf,
             b => b.value(&Angles::new(wo, wi, n)),
-            _ => bsdf.textured(at, |b| b.eval(wo, wi, n)).unwrap_or(Rgb::ZERO)
+            _ => bsdf.composed(|b| b.eval(at, wo, wi, n)).unwrap_or(Rgb::ZERO)
         )
     }
 
@@ -232,27 +258,15 @@ impl Bsdf {
     #[inline]
     pub(crate) fn gradient_at(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
         let (bsdf, facing) = self.facing(wo, n);
-        let angles = Angles::new(wo, wi, facing);
-        let slopes = match_model!(
+        let mut gradient = match_model!(
             bsdf,
-            b => b.slopes(&angles),
-            _ => bsdf.textured(at, |b| b.slopes(&angles)).unwrap_or_default()
+            b => b.slopes(&Angles::new(wo, wi, facing)).pull_back(wo, wi, facing),
+            _ => bsdf.composed(|b| b.gradient(at, wo, wi, facing)).unwrap_or_default()
         );
-        let mut gradient = slopes.pull_back(wo, wi, facing);
         if facing != n {
             gradient.n = -gradient.n;
         }
         gradient
-    }
-
-    /// A direction that a one-sided BSDF without textures scatters to.
-    fn direction(&self, from: Vec3, n: Vec3, u: [f64; 3]) -> Option<Vec3> {
-        match_model!(self, b => b.sample(from, n, u), _ => None)
-    }
-
-    /// Of a one-sided BSDF without textures.
-    fn slopes(&self, a: &Angles) -> Slopes {
-        match_model!(self, b => b.slopes(a), _ => Slopes::default())
     }
 
     /// Draws the direction that `from` is scattered to, or `None` for a sample lost below the
@@ -286,7 +300,7 @@ impl Bsdf {
         let w = match_model!(
             bsdf,
             b => b.sample(from, facing, u),
-            _ => bsdf.textured(at, |b| b.direction(from, facing, u)).flatten()
+            _ => bsdf.composed(|b| b.sample(at, from, facing, u, given)).flatten()
         )?;
         let pdf = self.pdf_at(at, from, w, n, given);
         (pdf > 0.0 && pdf.is_finite()).then_some(DirectionSample { w, pdf })
@@ -316,16 +330,32 @@ impl Bsdf {
         choice: f64,
         given: Given,
     ) -> Option<SpecularSample> {
+        match self {
+            Self::Null
+            | Self::Diffuse(_)
+            | Self::Phong(_)
+            | Self::RoughConductor(_)
+            | Self::RoughDielectric(_) => None,
+            _ => self.specular_of_any(at, from, n, choice, given),
+        }
+    }
+
+    /// Of BSDFs that may have smooth parts.
+    fn specular_of_any(
+        &self,
+        at: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        choice: f64,
+        given: Given,
+    ) -> Option<SpecularSample> {
         let (bsdf, n) = self.facing(from, n);
         match bsdf {
             Self::Plastic(b) => b.sample_specular(from, n, choice),
             Self::Conductor(b) => b.sample(from, n),
             Self::Dielectric(b) => b.sample(from, n, choice, given),
             Self::ThinDielectric(b) => b.sample(from, n, choice),
-            Self::Textured(_) => {
-                bsdf.textured(at, |b| b.sample_specular(from, n, choice, given)).flatten()
-            }
-            _ => None,
+            _ => bsdf.composed(|b| b.sample_specular(at, from, n, choice, given)).flatten(),
         }
     }
 
@@ -335,18 +365,76 @@ impl Bsdf {
         match self {
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
             Self::Plastic(b) => b.is_smooth(),
-            Self::Textured(b) => b.bsdf.is_smooth(),
-            Self::TwoSided(b) => {
-                b.front.is_smooth() || b.back.as_ref().is_some_and(Self::is_smooth)
-            }
-            _ => false,
+            _ => self.inner().any(Self::is_smooth),
         }
     }
 
-    /// The gradient of a value by the place of its point, as far as textures change there.
-    pub(crate) fn slide(&self, at: At<'_>, wo: Vec3, n: Vec3, params: &BsdfParams) -> RgbVec {
-        match (self.facing(wo, n).0, at) {
-            (Self::Textured(b), Some(at)) => b.slide(at, params),
+    /// True where some light goes straight on, as through nothing.
+    pub(crate) fn passes_straight(&self) -> bool {
+        match self {
+            Self::Mask(_) | Self::ThinDielectric(_) => true,
+            _ => self.inner().any(Self::passes_straight),
+        }
+    }
+
+    /// The part of the light that goes straight through at a point, as if there was no surface, at a cosine to its normal.
+    pub(crate) fn straight(&self, at: At<'_>, cos: f64) -> Rgb {
+        match self {
+            Self::Mask(b) => Rgb::splat(1.0 - b.opaque()),
+            Self::ThinDielectric(b) => b.straight(cos),
+            Self::Textured(b) if b.bsdf.passes_straight() => b.at(at).straight(None, cos),
+            _ => Rgb::ZERO,
+        }
+    }
+
+    /// The name of the first BSDF in this one that nothing is differentiated at: it jumps where no term samples it, or its
+    /// frame follows motions in ways that no term knows.
+    pub(crate) fn undifferentiable(&self) -> Option<&'static str> {
+        match self {
+            Self::Mask(_)
+            | Self::Perturbed(_)
+            | Self::Anisotropic(_)
+            | Self::Principled(_)
+            | Self::PrincipledThin(_) => Some(self.name()),
+            _ => self.inner().find_map(Self::undifferentiable),
+        }
+    }
+
+    /// The BSDFs that this one is made of.
+    fn inner(&self) -> impl Iterator<Item = &Self> {
+        let [a, b] = match self {
+            Self::TwoSided(b) => [Some(&b.front), b.back.as_ref()],
+            Self::Textured(b) => [Some(&b.bsdf), None],
+            Self::Mask(b) => [Some(&b.bsdf), None],
+            Self::Blend(b) => b.bsdfs.each_ref().map(Some),
+            Self::Perturbed(b) => [Some(&b.bsdf), None],
+            _ => [None; 2],
+        };
+        a.into_iter().chain(b)
+    }
+
+    /// True where the value may depend on the place of its point.
+    #[inline]
+    pub(crate) fn varies(&self) -> bool {
+        matches!(self, Self::Textured(_) | Self::Blend(_) | Self::TwoSided(_))
+    }
+
+    /// The gradient of a value by the place of its point, as far as textures change there; `params` are the value's
+    /// derivatives by properties, times a `factor`, as the gradient is to be.
+    #[cold]
+    pub(crate) fn slide(
+        &self,
+        at: At<'_>,
+        [wo, wi, n]: [Vec3; 3],
+        params: &BsdfParams,
+        factor: f64,
+    ) -> RgbVec {
+        let (bsdf, n) = self.facing(wo, n);
+        match (bsdf, at) {
+            (Self::Textured(b), Some(at)) => {
+                b.slide(at, params) + b.at(Some(at)).slide(Some(at), [wo, wi, n], params, factor)
+            }
+            (Self::Blend(b), Some(_)) => b.slide(at, [wo, wi, n], factor),
             _ => RgbVec::ZERO,
         }
     }
@@ -354,12 +442,8 @@ impl Bsdf {
     /// True where textures jump on a mesh.
     pub(crate) fn is_discontinuous_on(&self, mesh: &Mesh) -> bool {
         match self {
-            Self::Textured(b) => b.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh)),
-            Self::TwoSided(b) => {
-                b.front.is_discontinuous_on(mesh)
-                    || b.back.as_ref().is_some_and(|b| b.is_discontinuous_on(mesh))
-            }
-            _ => false,
+            Self::Textured(b) if b.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh)) => true,
+            _ => self.inner().any(|b| b.is_discontinuous_on(mesh)),
         }
     }
 
@@ -376,15 +460,23 @@ impl Bsdf {
         match_model!(
             bsdf,
             b => b.pdf(&Angles::new(from, to, n)),
-            _ => bsdf.textured(at, |b| b.pdf(from, to, n, given)).unwrap_or(0.0)
+            _ => bsdf.composed(|b| b.pdf(at, from, to, n, given)).unwrap_or(0.0)
         )
     }
 
-    /// What `f` says of what textures make of this BSDF; `None` where it has none.
+    /// What `f` says of a BSDF that is no plain model; `None` of one that is.
     #[cold]
-    fn textured<R>(&self, at: At<'_>, f: impl FnOnce(&Self) -> R) -> Option<R> {
-        let Self::Textured(t) = self else { return None };
-        Some(f(&t.at(at)))
+    fn composed<R>(&self, f: impl FnOnce(&dyn Composed) -> R) -> Option<R> {
+        Some(f(match self {
+            Self::Textured(b) => &**b,
+            Self::Mask(b) => &**b,
+            Self::Blend(b) => &**b,
+            Self::Perturbed(b) => &**b,
+            Self::Anisotropic(b) => &**b,
+            Self::Principled(b) => &**b,
+            Self::PrincipledThin(b) => &**b,
+            _ => return None,
+        }))
     }
 
     /// The [`RoughnessPartner`] of `wi` as the surface gets rougher, if it has one.
@@ -418,7 +510,7 @@ impl Bsdf {
         match bsdf {
             Self::RoughConductor(b) => Some((b.facet([wo, wi, n]), 0.0)),
             Self::RoughDielectric(b) => b.facet([wo, wi, n]),
-            Self::Textured(_) => bsdf.textured(at, |b| b.facet(None, wo, wi, n)).flatten(),
+            Self::Textured(b) => b.at(at).facet(None, wo, wi, n),
             _ => None,
         }
     }
@@ -437,8 +529,28 @@ impl Bsdf {
     pub fn is_transmissive(&self) -> bool {
         match self {
             Self::RoughDielectric(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
-            Self::Textured(b) => b.bsdf.is_transmissive(),
-            _ => false,
+            Self::Null
+            | Self::Diffuse(_)
+            | Self::Phong(_)
+            | Self::RoughConductor(_)
+            | Self::Plastic(_)
+            | Self::Conductor(_) => false,
+            _ => self.is_any_transmissive(),
+        }
+    }
+
+    /// Of BSDFs that are no plain models.
+    #[cold]
+    fn is_any_transmissive(&self) -> bool {
+        match self {
+            Self::PrincipledThin(_) => true,
+            Self::Principled(b) => b.is_transmissive(),
+            Self::Anisotropic(b) => b.base.is_transmissive(),
+            // A texture may stand for how much goes through.
+            Self::Textured(b) => {
+                b.bsdf.is_transmissive() || b.texture(Property::SpecTrans).is_some()
+            }
+            _ => self.inner().any(Self::is_transmissive),
         }
     }
 
@@ -451,6 +563,7 @@ impl Bsdf {
             | Self::Plastic(_)
             | Self::Conductor(_) => true,
             Self::Textured(b) => b.bsdf.is_black_from_behind(),
+            Self::Blend(b) => b.bsdfs.iter().all(Self::is_black_from_behind),
             _ => false,
         }
     }
@@ -464,13 +577,21 @@ impl Bsdf {
             Self::RoughDielectric(b) => b.alpha,
             Self::Plastic(b) => b.coating.facets().map_or(0.0, |(_, alpha)| alpha),
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => 0.0,
+            _ => self.width_of_any(at),
+        };
+        f64::min(width, 1.0)
+    }
+
+    /// Of BSDFs that are no plain models.
+    #[cold]
+    fn width_of_any(&self, at: At<'_>) -> f64 {
+        match self {
             Self::TwoSided(b) => {
                 let back = b.back.as_ref().map_or(1.0, |b| b.lobe_width(at));
                 f64::min(b.front.lobe_width(at), back)
             }
-            Self::Textured(b) => b.at(at).lobe_width(None),
-        };
-        f64::min(width, 1.0)
+            _ => self.composed(|b| b.lobe_width(at)).unwrap_or(1.0),
+        }
     }
 
     /// The name of the plugin this BSDF follows.
@@ -489,6 +610,12 @@ impl Bsdf {
             Self::ThinDielectric(_) => "thindielectric",
             Self::TwoSided(_) => "twosided",
             Self::Textured(b) => b.bsdf.name(),
+            Self::Mask(_) => "mask",
+            Self::Blend(_) => "blendbsdf",
+            Self::Perturbed(b) => b.name(),
+            Self::Anisotropic(b) => b.base.name(),
+            Self::Principled(_) => "principled",
+            Self::PrincipledThin(_) => "principledthin",
         }
     }
 
@@ -499,7 +626,11 @@ impl Bsdf {
     pub fn validate(&self) -> Result<(), SurfaceError> {
         if let Self::TwoSided(b) = self {
             return [Some(&b.front), b.back.as_ref()].into_iter().flatten().try_for_each(|side| {
-                if side.is_transmissive() || matches!(side, Self::Null | Self::TwoSided(_)) {
+                let straight = side.passes_straight();
+                if side.is_transmissive()
+                    || straight
+                    || matches!(side, Self::Null | Self::TwoSided(_))
+                {
                     Err(SurfaceError::NotReflective { bsdf: side.name() })
                 } else {
                     side.validate()
@@ -511,8 +642,29 @@ impl Bsdf {
             Self::Dielectric(b) => b.validate(),
             Self::ThinDielectric(b) => b.validate(),
             Self::Textured(b) => b.validate(),
+            Self::Mask(b) => b.validate(),
+            Self::Blend(b) => b.validate(),
+            Self::Perturbed(b) => b.validate(),
+            Self::Anisotropic(b) => b.validate(),
+            Self::Principled(b) => b.validate(),
+            Self::PrincipledThin(b) => b.validate(),
             _ => match_model!(self, b => b.validate(), _ => Ok(())),
         }
+    }
+
+    /// Checks what textures have from the mesh of a shape.
+    pub(crate) fn validate_on(&self, mesh: &Mesh) -> Result<(), SurfaceError> {
+        match self {
+            Self::Textured(b) if b.textures.iter().any(|t| t.1.attribute().is_some()) => {
+                b.validate_on(mesh)?;
+            }
+            Self::Perturbed(b) if b.map.bounds_on(mesh).is_none() => {
+                let name = b.map.attribute().unwrap_or_default().into();
+                return Err(SurfaceError::NoAttribute { name });
+            }
+            _ => {}
+        }
+        self.inner().try_for_each(|b| b.validate_on(mesh))
     }
 
     /// The one-sided BSDF that a direction meets, and the normal it goes with.

@@ -23,10 +23,42 @@ pub enum Property {
     K,
     /// Sharpness of the Phong lobe, a scalar.
     Exponent,
+    /// Weight of the second BSDF of a blend, a scalar.
+    Weight,
+    /// What a mask leaves of a surface, a scalar.
+    Opacity,
+    /// Roughness along the tangent, a scalar.
+    AlphaU,
+    /// Roughness across it, a scalar.
+    AlphaV,
+    /// Colour of a principled BSDF.
+    BaseColor,
+    /// Its roughness, as artists know it, a scalar; so are all that follow.
+    Roughness,
+    /// How much wider lobes are along the tangent.
+    Anisotropic,
+    /// How much of a metal it is.
+    Metallic,
+    /// How much of the rest goes through.
+    SpecTrans,
+    /// How much of the base colour a dielectric's reflection has.
+    SpecTint,
+    /// The light of cloth at grazing angles.
+    Sheen,
+    /// How much of the base colour that has.
+    SheenTint,
+    /// From diffuse to flat, as by scattering below the surface.
+    Flatness,
+    /// A second, sharper reflection.
+    Clearcoat,
+    /// How sharp that is.
+    ClearcoatGloss,
+    /// Diffuse light that goes through a thin sheet, of two parts.
+    DiffTrans,
 }
 
 impl Property {
-    pub(super) const ALL: [Self; 7] = [
+    pub(super) const ALL: [Self; 23] = [
         Self::Reflectance,
         Self::SpecularReflectance,
         Self::SpecularTransmittance,
@@ -34,6 +66,22 @@ impl Property {
         Self::Eta,
         Self::K,
         Self::Exponent,
+        Self::Weight,
+        Self::Opacity,
+        Self::AlphaU,
+        Self::AlphaV,
+        Self::BaseColor,
+        Self::Roughness,
+        Self::Anisotropic,
+        Self::Metallic,
+        Self::SpecTrans,
+        Self::SpecTint,
+        Self::Sheen,
+        Self::SheenTint,
+        Self::Flatness,
+        Self::Clearcoat,
+        Self::ClearcoatGloss,
+        Self::DiffTrans,
     ];
 
     /// The property's name in job files.
@@ -47,6 +95,22 @@ impl Property {
             Self::Eta => "eta",
             Self::K => "k",
             Self::Exponent => "exponent",
+            Self::Weight => "weight",
+            Self::Opacity => "opacity",
+            Self::AlphaU => "alpha_u",
+            Self::AlphaV => "alpha_v",
+            Self::BaseColor => "base_color",
+            Self::Roughness => "roughness",
+            Self::Anisotropic => "anisotropic",
+            Self::Metallic => "metallic",
+            Self::SpecTrans => "spec_trans",
+            Self::SpecTint => "spec_tint",
+            Self::Sheen => "sheen",
+            Self::SheenTint => "sheen_tint",
+            Self::Flatness => "flatness",
+            Self::Clearcoat => "clearcoat",
+            Self::ClearcoatGloss => "clearcoat_gloss",
+            Self::DiffTrans => "diff_trans",
         }
     }
 
@@ -144,6 +208,23 @@ pub enum SurfaceError {
         /// Kind of that BSDF, by its plugin name.
         bsdf: &'static str,
     },
+    /// A texture wants an attribute that a shape lacks.
+    #[error("a texture of its BSDF is the attribute `{name}`, which its mesh does not have")]
+    NoAttribute {
+        /// The attribute.
+        name: String,
+    },
+    /// The factor of a map of heights.
+    #[error("the scale of a bump map is {0}, but must be finite")]
+    BadScale(f64),
+    /// Something that scatters nothing, or lets light go straight through, where that has no meaning.
+    #[error("a {outer} BSDF cannot hold a {bsdf} BSDF")]
+    CannotHold {
+        /// Kind of the outer BSDF, by its plugin name.
+        outer: &'static str,
+        /// Kind of the nested BSDF, by its plugin name.
+        bsdf: &'static str,
+    },
     /// Only plain reflectors have two equal sides.
     #[error("a twosided BSDF cannot hold a {bsdf} BSDF; use it without twosided")]
     NotReflective {
@@ -196,6 +277,10 @@ pub(super) fn in_range(
     } else {
         Err(SurfaceError::OutOfRange { property, value, expected })
     }
+}
+
+pub(super) fn part(property: Property, value: f64) -> Result<(), SurfaceError> {
+    in_range(property, value, (0.0..=1.0).contains(&value), "from 0 to 1")
 }
 
 pub(super) fn nonnegative(property: Property, value: Rgb) -> Result<(), SurfaceError> {

@@ -148,14 +148,25 @@ impl Dielectric {
 }
 
 impl ThinDielectric {
+    /// The part of the light that comes back, at a cosine above 0.
+    fn reflected(&self, cos: f64) -> f64 {
+        let once = dielectric_reflected(cos, self.eta);
+        // The sum of the light that leaves after 0, 1, 2 … turns in the pane.
+        if once < 1.0 { 2.0 * once / (1.0 + once) } else { 1.0 }
+    }
+
+    /// What goes through.
+    pub(super) fn straight(&self, cos: f64) -> Rgb {
+        let reflected = if cos > 0.0 { self.reflected(cos.min(1.0)) } else { 1.0 };
+        self.specular_transmittance * (1.0 - reflected)
+    }
+
     pub(super) fn sample(&self, from: Vec3, n: Vec3, choice: f64) -> Option<SpecularSample> {
         let cos = n.dot(from).abs();
         if cos == 0.0 {
             return None;
         }
-        let once = dielectric_reflected(cos, self.eta);
-        // The sum of the light that leaves after 0, 1, 2 … turns in the pane.
-        let reflected = if once < 1.0 { 2.0 * once / (1.0 + once) } else { 1.0 };
+        let reflected = self.reflected(cos);
         Some(if choice < reflected {
             let weight = self.specular_reflectance;
             SpecularSample { w: mirrored(from, n), weight, straight: false }

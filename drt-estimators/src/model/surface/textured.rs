@@ -1,6 +1,7 @@
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
+use drt_geom::Mesh;
 use drt_math::{Rgb, RgbVec};
 
 use crate::model::surface::microfacet::LEAST_ALPHA;
@@ -41,7 +42,7 @@ impl Textured {
         if let Some(at) = at {
             for (property, texture) in &self.textures {
                 // Only properties that there are can have got a texture.
-                let _ = bsdf.set(*property, allowed(*property, texture.at(at.uv())));
+                let _ = bsdf.set(*property, allowed(*property, texture.at_point(at)));
             }
         }
         bsdf
@@ -50,13 +51,11 @@ impl Textured {
     /// The gradient of a value by the place of its point, in the plane of the triangle there: through the properties that
     /// textures stand for, by which the value has the derivatives `params`.
     pub(super) fn slide(&self, at: &TexturePoint<'_>, params: &BsdfParams) -> RgbVec {
-        let (uv, [by_u, by_v]) = (at.uv(), at.uv_gradients());
         let mut sum = RgbVec::ZERO;
         for (property, texture) in &self.textures {
-            let value = texture.at(uv);
+            let value = texture.at_point(at);
             if allowed(*property, value) == value {
-                let [u, v] = texture.slopes(uv).map(|slope| slope * params.get(*property));
-                sum += u.outer(by_u) + v.outer(by_v);
+                sum += texture.gradient(at) * params.get(*property);
             }
         }
         sum
@@ -72,8 +71,22 @@ impl Textured {
             return Err(SurfaceError::TexturedTwice { bsdf: self.bsdf.name() });
         }
         self.bsdf.validate()?;
+        self.check_bounds(Texture::bounds)
+    }
+
+    /// Checks what textures have from a mesh.
+    pub(super) fn validate_on(&self, mesh: &Mesh) -> Result<(), SurfaceError> {
+        let missing = |t: &&(Property, Texture)| t.1.bounds_on(mesh).is_none();
+        if let Some((_, texture)) = self.textures.iter().find(missing) {
+            let name = texture.attribute().unwrap_or_default().into();
+            return Err(SurfaceError::NoAttribute { name });
+        }
+        self.check_bounds(|t| t.bounds_on(mesh).unwrap_or_default())
+    }
+
+    fn check_bounds(&self, bounds: impl Fn(&Texture) -> [Rgb; 2]) -> Result<(), SurfaceError> {
         for (property, texture) in &self.textures {
-            for bound in texture.bounds() {
+            for bound in bounds(texture) {
                 let fail = |reason| SurfaceError::Texture {
                     property: *property,
                     reason: Box::new(reason),
@@ -92,7 +105,9 @@ impl Textured {
 fn allowed(property: Property, value: Rgb) -> Rgb {
     match property {
         // Not `max`, which would take what is no number for allowed.
-        Property::Alpha => value.map(|a| if a < LEAST_ALPHA { LEAST_ALPHA } else { a }),
+        Property::Alpha | Property::AlphaU | Property::AlphaV => {
+            value.map(|a| if a < LEAST_ALPHA { LEAST_ALPHA } else { a })
+        }
         _ => value,
     }
 }

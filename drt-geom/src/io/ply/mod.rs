@@ -3,12 +3,14 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
+use self::attributes::Columns;
 use self::body::Body;
 use self::header::{Element, Header};
-use super::polygons::{AssembleError, Corner, Polygons};
+use super::polygons::{AssembleError, Corner, Polygons, Values};
 use crate::triangulate::PolygonError;
 use crate::{Mesh, MeshError, NONE};
 
+mod attributes;
 mod body;
 mod header;
 
@@ -74,7 +76,8 @@ type Failure = (String, PlyErrorKind);
 /// should call it by.
 ///
 /// The mesh needs an element `vertex` with `x y z`, and `face` with a list `vertex_indices` or
-/// `vertex_index`; `nx ny nz` become shading normals, `u v` or `s t` texture coordinates, and all else is passed over. Polygons are
+/// `vertex_index`; `nx ny nz` become shading normals, `u v` or `s t` texture coordinates; groups of
+/// one or three columns, such as `red green blue` or `heat_0`, become [attributes](Mesh::attributes), and all else is passed over. Polygons are
 /// triangulated as [`triangulate`](crate::triangulate()) does, and vertices no face uses left out
 /// ([`Mesh::source_vertices`] keeps the file's order).
 ///
@@ -101,7 +104,9 @@ fn read_mesh(bytes: &[u8]) -> Result<Mesh, Failure> {
         match element.name.as_str() {
             "vertex" => {
                 let vertices = read_vertices(element, &mut body)?;
-                (polygons.positions, polygons.normals, polygons.texcoords) = vertices;
+                (polygons.positions, polygons.normals) = (vertices.positions, vertices.normals);
+                polygons.texcoords = vertices.texcoords;
+                polygons.vertex_attributes = vertices.attributes;
             }
             "face" => read_faces(element, &mut body, &mut polygons)?,
             _ => element.each(&mut body, |_, _| Ok(()))?,
@@ -120,7 +125,7 @@ fn read_vectors(bytes: &[u8]) -> Result<Vec<Vec3>, Failure> {
     let (header, mut body) = Header::read(bytes)?;
     for element in &header.elements {
         if element.name == "vertex" {
-            return Ok(read_vertices(element, &mut body)?.0);
+            return Ok(read_vertices(element, &mut body)?.positions);
         }
         element.each(&mut body, |_, _| Ok(()))?;
     }
@@ -131,10 +136,26 @@ fn place(element: &str, index: usize) -> String {
     alloc::format!("{element} {index} (from 0)")
 }
 
-/// Positions, normals, texture coordinates.
-type Vertices = (Vec<Vec3>, Vec<Vec3>, Vec<[f64; 2]>);
+/// Positions, with what else the file has.
+struct Vertices {
+    positions: Vec<Vec3>,
+    normals: Vec<Vec3>,
+    texcoords: Vec<[f64; 2]>,
+    attributes: Vec<Values>,
+}
 
-/// Positions, with normals and texture coordinates where the file has them.
+/// Places for the values of attributes.
+fn to_be_filled(columns: &[Columns]) -> Vec<Values> {
+    columns.iter().map(|c| (c.name.clone(), Vec::new())).collect()
+}
+
+/// Adds a row's values.
+fn fill(attributes: &mut [Values], columns: &[Columns], row: &[Vec<f64>]) {
+    for (attribute, columns) in attributes.iter_mut().zip(columns) {
+        attribute.1.push(columns.value(row));
+    }
+}
+
 fn read_vertices(element: &Element, body: &mut Body) -> Result<Vertices, Failure> {
     let column = |name: &str| element.properties.iter().position(|p| p.name == name);
     let columns = |names: [&str; 3]| {
@@ -151,6 +172,8 @@ fn read_vertices(element: &Element, body: &mut Body) -> Result<Vertices, Failure
     let pair = |[u, v]: [&str; 2]| Some([column(u)?, column(v)?]);
     let texcoord = pair(["u", "v"]).or_else(|| pair(["s", "t"]));
     let (mut positions, mut normals, mut texcoords) = (Vec::new(), Vec::new(), Vec::new());
+    let others = Columns::of(element, "vertex");
+    let mut attributes = to_be_filled(&others);
     element.each(body, |_, values| {
         let scalar = |c: usize| match values[c][..] {
             [x] => x,
@@ -172,9 +195,10 @@ fn read_vertices(element: &Element, body: &mut Body) -> Result<Vertices, Failure
                 return Err(PlyErrorKind::NotFinite);
             });
         }
+        fill(&mut attributes, &others, values);
         Ok(())
     })?;
-    Ok((positions, normals, texcoords))
+    Ok(Vertices { positions, normals, texcoords, attributes })
 }
 
 fn read_faces(element: &Element, body: &mut Body, polygons: &mut Polygons) -> Result<(), Failure> {
@@ -186,6 +210,8 @@ fn read_faces(element: &Element, body: &mut Body, polygons: &mut Polygons) -> Re
     let count = polygons.positions.len();
     let has_normals = !polygons.normals.is_empty();
     let has_texcoords = !polygons.texcoords.is_empty();
+    let others = Columns::of(element, "face");
+    let mut attributes = to_be_filled(&others);
     element.each(body, |_, values| {
         for &v in &values[list] {
             // Integers up to 2^32 are exact in f64.
@@ -196,9 +222,12 @@ fn read_faces(element: &Element, body: &mut Body, polygons: &mut Polygons) -> Re
             let given = |there| if there { vertex } else { NONE };
             polygons.corner(Corner { vertex, normal: given(has_normals) }, given(has_texcoords));
         }
+        fill(&mut attributes, &others, values);
         match polygons.end_polygon() {
             n @ 0..3 => Err(PolygonError::TooFewCorners(n).into()),
             _ => Ok(()),
         }
-    })
+    })?;
+    polygons.face_attributes = attributes;
+    Ok(())
 }

@@ -88,8 +88,8 @@ fn later_effects_carry_earlier_velocities() {
 
 #[test]
 fn refusals_say_what_would_do() {
-    let unknown = Property::from_name("roughness").unwrap_err().to_string();
-    assert!(unknown.contains("\"roughness\"") && unknown.contains("alpha, eta, k"), "{unknown}");
+    let unknown = Property::from_name("gloss").unwrap_err().to_string();
+    assert!(unknown.contains("\"gloss\"") && unknown.contains("alpha, eta, k"), "{unknown}");
     assert_eq!(Property::from_name("diffuse_reflectance"), Ok(Property::Reflectance));
 
     let refusal = |mut bsdf: Bsdf, property, op, theta| {

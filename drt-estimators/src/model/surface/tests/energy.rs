@@ -9,9 +9,13 @@ use crate::model::surface::tests::*;
 const SAMPLES: u32 = 40_000;
 
 /// Index on a direction's side over that of the exterior.
-fn index(bsdf: &Bsdf, w: Vec3) -> f64 {
+pub(super) fn index(bsdf: &Bsdf, w: Vec3) -> f64 {
     match bsdf {
-        Bsdf::RoughDielectric(b) if normal().dot(w) < 0.0 => b.eta,
+        _ if normal().dot(w) >= 0.0 => 1.0,
+        Bsdf::RoughDielectric(b) => b.eta,
+        Bsdf::Anisotropic(b) => index(&b.base, w),
+        Bsdf::Principled(b) => b.eta,
+        Bsdf::Blend(b) => index(&b.bsdfs[1], w),
         _ => 1.0,
     }
 }

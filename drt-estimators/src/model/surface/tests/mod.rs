@@ -1,11 +1,13 @@
 //! Every model is judged as the same list of cases, from the same directions.
 
 mod changes;
+mod composed;
 mod direction_partners;
 mod energy;
 mod formulas;
 mod gradients;
 mod lobes;
+mod perturbed;
 mod roughness_partners;
 mod sampling;
 mod smooth;
@@ -14,9 +16,10 @@ mod textured;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use drt_math::{Real, Rgb, Rng, Vec3, vec3, warp};
+use drt_math::{Frame, Real, Rgb, Rng, Vec3, vec3, warp};
 
 use crate::model::surface::angles::Angles;
+use crate::model::surface::framed::Framed;
 use crate::model::surface::*;
 
 /// The value of a BSDF over another scalar, by the generic code of `eval`: `lift` turns the value of
@@ -26,7 +29,7 @@ pub(crate) fn value_over<T: Real>(
     wo: Vec3<T>,
     wi: Vec3<T>,
     n: Vec3<T>,
-    lift: &mut impl FnMut(Property, Rgb) -> Rgb<T>,
+    lift: &mut dyn FnMut(Property, Rgb) -> Rgb<T>,
 ) -> Rgb<T> {
     let a = Angles::new(wo, wi, n);
     match bsdf {
@@ -64,6 +67,28 @@ pub(crate) fn value_over<T: Real>(
         }
         .value(&a),
         Bsdf::Textured(b) => value_over(&b.bsdf, wo, wi, n, lift),
+        // Without a place, normals are the surface's.
+        Bsdf::Perturbed(b) => value_over(&b.bsdf, wo, wi, n, lift),
+        Bsdf::Mask(b) => value_over(&b.bsdf, wo, wi, n, lift) * T::from(b.opacity),
+        Bsdf::Blend(b) => {
+            let weight = lift(Property::Weight, Rgb::splat(b.weight)).r;
+            // Their own properties are not properties of the blend.
+            let mut constant = |_, value: Rgb| value.map(T::from);
+            let [a, b] = b.bsdfs.each_ref().map(|b| value_over(b, wo, wi, n, &mut constant));
+            a * (T::one() - weight) + b * weight
+        }
+        Bsdf::Anisotropic(b) => {
+            let frame = Frame::from_normal(n);
+            b.value(frame.to_local(wo), frame.to_local(wi))
+        }
+        Bsdf::Principled(b) => {
+            let frame = Frame::from_normal(n);
+            b.value(frame.to_local(wo), frame.to_local(wi))
+        }
+        Bsdf::PrincipledThin(b) => {
+            let frame = Frame::from_normal(n);
+            b.value(frame.to_local(wo), frame.to_local(wi))
+        }
         Bsdf::TwoSided(b) if a.cos_o.re() >= 0.0 => value_over(&b.front, wo, wi, n, lift),
         Bsdf::TwoSided(b) => value_over(b.back.as_ref().unwrap_or(&b.front), wo, wi, -n, lift),
     }
@@ -145,7 +170,62 @@ fn cases() -> Vec<Bsdf> {
         Bsdf::Plastic(smooth_plastic(1.5)),
         Bsdf::TwoSided(Box::new(TwoSided { front: Bsdf::Phong(phong), back: None })),
         Bsdf::TwoSided(Box::new(copper_front)),
+        Bsdf::Plastic(unmixed_plastic(Beckmann, 0.3, 1.5)),
+        blend(0.3, Bsdf::Phong(phong), Bsdf::RoughDielectric(glass(Ggx, 0.4, 1.5))),
     ]
+}
+
+/// What needs a frame, or is made of others.
+fn composed_cases() -> Vec<Bsdf> {
+    use Distribution::{Beckmann, Ggx};
+    alloc::vec![
+        Bsdf::Mask(Box::new(Mask { bsdf: Bsdf::RoughConductor(copper(Ggx, 0.3)), opacity: 0.6 })),
+        anisotropic(Bsdf::RoughConductor(copper(Beckmann, 0.3)), [0.2, 0.5]),
+        anisotropic(Bsdf::RoughDielectric(glass(Ggx, 0.3, 1.5)), [0.5, 0.2]),
+        Bsdf::Principled(Box::new(Principled {
+            base_color: Rgb::new(0.2, 0.8, 0.1),
+            metallic: 0.3,
+            spec_tint: 0.4,
+            sheen: 0.3,
+            sheen_tint: 0.5,
+            clearcoat: 0.9,
+            flatness: 0.4,
+            anisotropic: 0.8,
+            ..Principled::default()
+        })),
+        Bsdf::Principled(Box::new(Principled { spec_trans: 0.7, roughness: 0.6, ..through() })),
+        Bsdf::PrincipledThin(Box::new(thin())),
+    ]
+}
+
+fn blend(weight: f64, a: Bsdf, b: Bsdf) -> Bsdf {
+    Bsdf::Blend(Box::new(Blend { bsdfs: [a, b], weight }))
+}
+
+fn anisotropic(base: Bsdf, alpha: [f64; 2]) -> Bsdf {
+    Bsdf::Anisotropic(Box::new(Anisotropic { base, alpha }))
+}
+
+/// A coloured interface.
+fn through() -> Principled {
+    Principled { base_color: Rgb::new(0.6, 0.8, 0.4), spec_trans: 1.0, ..Principled::default() }
+}
+
+fn thin() -> PrincipledThin {
+    PrincipledThin {
+        base_color: Rgb::new(0.7, 0.5, 0.1),
+        anisotropic: 0.6,
+        spec_trans: 0.5,
+        spec_tint: 0.3,
+        sheen: 0.2,
+        diff_trans: 0.7,
+        roughness: 0.8,
+        ..PrincipledThin::default()
+    }
+}
+
+fn unmixed_plastic(distribution: Distribution, alpha: f64, eta: f64) -> Plastic {
+    Plastic::new(Coating::unmixed(distribution, alpha, eta).expect("a coating"))
 }
 
 /// Mirror-like surfaces, too sharp for quadrature.

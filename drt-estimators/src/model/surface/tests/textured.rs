@@ -17,8 +17,7 @@ fn squares(a: Rgb, b: Rgb) -> Texture {
 fn every_point_has_a_bsdf_of_its_own() {
     let mesh = procedural::rectangle();
     // Without coordinates of its own a triangle has its weights.
-    let points =
-        [[0.1, 0.2], [0.6, 0.2]].map(|bary| TexturePoint { mesh: &mesh, triangle: 0, bary });
+    let points = [[0.1, 0.2], [0.6, 0.2]].map(|bary| TexturePoint::new(&mesh, 0, bary));
     let (rough, smooth) = (Rgb::splat(0.4), Rgb::splat(0.0));
     let (red, blue) = (Rgb::new(0.9, 0.1, 0.0), Rgb::new(0.0, 0.3, 1.0));
     let base = || copper(Distribution::Ggx, 0.1);

@@ -1,0 +1,138 @@
+use drt_geom::edges::{Lobe, Lobes};
+use drt_math::{Rgb, RgbVec, Vec3};
+
+use crate::model::surface::composed::Composed;
+use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
+use crate::model::surface::{At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample};
+
+/// A linear combination of two BSDFs, `(1 - w) f₀ + w f₁`: Mitsuba's `blendbsdf`.
+///
+/// It is differentiated by its weight; what its parts are made of has no place in its [`BsdfParams`].
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Blend {
+    /// What the weights 0 and 1 stand for.
+    pub bsdfs: [Bsdf; 2],
+    /// The weight w of the second; what is below 0 or above 1 counts as that.
+    pub weight: f64,
+}
+
+/// Least probability of choosing either part: one of weight zero still has a derivative by the weight.
+const LEAST_CHOICE: f64 = 0.05;
+
+impl Blend {
+    /// The weights of both parts.
+    fn weights(&self) -> [f64; 2] {
+        let weight = self.weight.clamp(0.0, 1.0);
+        [1.0 - weight, weight]
+    }
+
+    /// The probabilities of choosing them.
+    fn choices(&self) -> [f64; 2] {
+        self.weights().map(|w| w.clamp(LEAST_CHOICE, 1.0 - LEAST_CHOICE))
+    }
+
+    /// The part that a number of (0, 1) chooses, and the number stretched to (0, 1) again.
+    fn choose(&self, choice: f64) -> (usize, f64) {
+        let [first, second] = self.choices();
+        // Not 1, which no choice is.
+        let most = 1.0 - 0.5 * f64::EPSILON;
+        if choice < second {
+            (1, (choice / second).min(most))
+        } else {
+            (0, ((choice - second) / first).clamp(f64::MIN_POSITIVE, most))
+        }
+    }
+
+    /// The gradient by the place of the point, through the textures of both parts.
+    pub(super) fn slide(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], factor: f64) -> RgbVec {
+        let mut sum = RgbVec::ZERO;
+        for (bsdf, weight) in self.bsdfs.iter().zip(self.weights()) {
+            let mut params = BsdfParams::default();
+            let factor = factor * weight;
+            params.scatter(&bsdf.gradient_at(at, wo, wi, n).params, Rgb::splat(factor));
+            sum += bsdf.slide(at, [wo, wi, n], &params, factor);
+        }
+        sum
+    }
+
+    /// Both sketches, of which the two highest lobes stay.
+    pub(super) fn lobes(&self, at: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let weights = self.weights();
+        let parts = [0, 1].map(|i| self.bsdfs[i].lobes(at, wo, n));
+        let mut all = [Lobe::default(); 4];
+        for (i, lobe) in all.iter_mut().enumerate() {
+            let (part, weight) = (&parts[i / 2].lobes[i % 2], weights[i / 2]);
+            *lobe = Lobe { height: part.height * weight, ..*part };
+        }
+        all.sort_unstable_by(|a, b| b.height.total_cmp(&a.height));
+        let even = parts[0].even * weights[0] + parts[1].even * weights[1];
+        let [a, b, c, d] = all;
+        Lobes { even: even + c.height + d.height, lobes: [a, b] }
+    }
+
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        (property == Property::Weight).then_some(Slot::Scalar(&mut self.weight))
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+        for bsdf in &self.bsdfs {
+            if bsdf.is_null() || bsdf.passes_straight() {
+                return Err(SurfaceError::CannotHold { outer: "blendbsdf", bsdf: bsdf.name() });
+            }
+            bsdf.validate()?;
+        }
+        in_range(Property::Weight, self.weight, true, "a finite number")
+    }
+}
+
+impl Composed for Blend {
+    fn eval(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
+        let [a, b] = self.bsdfs.each_ref().map(|b| b.eval_at(at, wo, wi, n));
+        let [u, v] = self.weights();
+        a * u + b * v
+    }
+
+    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        let [a, b] = self.bsdfs.each_ref().map(|b| b.gradient_at(at, wo, wi, n));
+        let [u, v] = self.weights();
+        // Beyond its range the weight changes nothing.
+        let slope = if (0.0..=1.0).contains(&self.weight) { b.value - a.value } else { Rgb::ZERO };
+        BsdfGradient {
+            value: a.value * u + b.value * v,
+            wo: a.wo * u + b.wo * v,
+            wi: a.wi * u + b.wi * v,
+            n: a.n * u + b.n * v,
+            params: BsdfParams { exponent: slope, ..BsdfParams::default() },
+        }
+    }
+
+    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], given: Given) -> Option<Vec3> {
+        let (part, choice) = self.choose(u[2]);
+        self.bsdfs[part].direction(at, from, n, [u[0], u[1], choice], given)
+    }
+
+    fn sample_specular(
+        &self,
+        at: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        choice: f64,
+        given: Given,
+    ) -> Option<SpecularSample> {
+        let (part, choice) = self.choose(choice);
+        let sample = self.bsdfs[part].sample_specular_at(at, from, n, choice, given)?;
+        let times = self.weights()[part] / self.choices()[part];
+        Some(SpecularSample { weight: sample.weight * times, ..sample })
+    }
+
+    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
+        let parts = self.bsdfs.iter().zip(self.choices());
+        parts.map(|(b, choice)| choice * b.pdf_at(at, from, to, n, given)).sum()
+    }
+
+    fn lobe_width(&self, at: At<'_>) -> f64 {
+        let [a, b] = self.bsdfs.each_ref().map(|b| b.lobe_width(at));
+        f64::min(a, b)
+    }
+}

@@ -1,0 +1,404 @@
+//! Burley's principled model of many materials, as Mitsuba's `principled` has it.
+//!
+//! Burley 2012, "Physically Based Shading at Disney", and 2015, "Extending the Disney BRDF to a BSDF with Integrated Subsurface
+//! Scattering". With the viewer's direction o, the light's i and h between them, all in the frame of the surface, metallic m and
+//! the transmitted part t of the rest, the value is the sum of
+//!
+//! ```text
+//! F D G / (4 o_z)                                       reflection by microfacets (GGX)
+//! (1-m) t sqrt(c) (1-F_d) D G |o·h i·h| / (o_z (o·h + η i·h)²)    refraction by the same
+//! k/4 F_k D_k G_k i_z                                     clearcoat, of the distribution GTR1
+//! (1-m)(1-t) c/π i_z lerp(f_diffuse + f_retro, f_flat, flatness)
+//! (1-m) s F_s(i·h) i_z                                    sheen
+//! ```
+//!
+//! with F = (1-m)(1-tint) F_d + m S(c) + (1-m) tint S(c/lum c · R0), F_d the Fresnel reflectance of η, and S(R) = R + (1-R)(1-cos)⁵
+//! Schlick's. From behind, inside of what lets light through, there are only reflection, by (1-m) t F_d, and refraction.
+
+use core::f64::consts::{FRAC_1_PI, PI, TAU};
+
+use drt_math::{Real, Rgb, Vec3, fm, vec3, warp};
+
+use crate::model::surface::anisotropic::StretchedFacets;
+use crate::model::surface::framed::Framed;
+use crate::model::surface::fresnel::dielectric_reflected;
+use crate::model::surface::microfacet::{Distribution, LEAST_COS2, mirrored, refracted};
+use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, part};
+
+/// Burley's principled BSDF. All but colour and index are numbers from 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Principled {
+    /// Its colour; default 0.5.
+    pub base_color: Rgb,
+    /// The square root of the roughness of microfacets; default 0.5.
+    pub roughness: f64,
+    /// Up to 3.2 times as rough along the tangent as across; default 0.
+    pub anisotropic: f64,
+    /// From a dielectric to a metal; default 0.
+    pub metallic: f64,
+    /// The part of the dielectric that light goes through; default 0.
+    pub spec_trans: f64,
+    /// Index of the interior over that of the exterior; default 1.5.
+    pub eta: f64,
+    /// How much of the base colour a dielectric's reflection has; default 0.
+    pub spec_tint: f64,
+    /// Light at grazing angles, as from cloth; default 0.
+    pub sheen: f64,
+    /// How much of the base colour that has; default 0.
+    pub sheen_tint: f64,
+    /// From diffuse to flat, as by scattering below the surface; default 0.
+    pub flatness: f64,
+    /// A second, sharper reflection; default 0.
+    pub clearcoat: f64,
+    /// How sharp that is; default 0.
+    pub clearcoat_gloss: f64,
+}
+
+impl Default for Principled {
+    fn default() -> Self {
+        Self {
+            base_color: Rgb::splat(0.5),
+            roughness: 0.5,
+            anisotropic: 0.0,
+            metallic: 0.0,
+            spec_trans: 0.0,
+            eta: Self::index_of(0.5),
+            spec_tint: 0.0,
+            sheen: 0.0,
+            sheen_tint: 0.0,
+            flatness: 0.0,
+            clearcoat: 0.0,
+            clearcoat_gloss: 0.0,
+        }
+    }
+}
+
+/// (1 - cos)⁵.
+pub(super) fn grazing<T: Real>(cos: T) -> T {
+    let m = T::one() - cos.abs();
+    if m.re() > 0.0 { m.powi(5) } else { T::zero() }
+}
+
+pub(super) fn lerp<T: Real>(a: T, b: T, by: T) -> T {
+    a + (b - a) * by
+}
+
+/// Schlick's reflectance, 1 at grazing angles; behind an interface to something thinner by the cosine there.
+pub(super) fn schlick<T: Real>(colour: Rgb<T>, cos: T, eta: f64) -> Rgb<T> {
+    let eta = if cos.re() >= 0.0 { eta } else { 1.0 / eta };
+    let cos = if eta > 1.0 {
+        cos
+    } else {
+        let cos2 = T::one() - (T::one() - cos.squared()) / (eta * eta);
+        if cos2.re() > 0.0 { cos2.sqrt() } else { T::zero() }
+    };
+    let weight = grazing(cos);
+    colour.map(|c| lerp(c, T::one(), weight))
+}
+
+/// The reflectance of an interface at normal incidence.
+pub(super) fn normal_reflectance(eta: f64) -> f64 {
+    let r = (eta - 1.0) / (eta + 1.0);
+    r * r
+}
+
+/// A colour of luminance 1.
+pub(super) fn tint(colour: Rgb) -> Rgb {
+    let luminance = Rgb::new(0.212_671, 0.715_160, 0.072_169).dot(colour);
+    if luminance > 0.0 { colour * luminance.recip() } else { Rgb::ONE }
+}
+
+/// Roughness along the tangent and across it.
+pub(super) fn stretched<T: Real>(roughness: f64, anisotropic: f64) -> StretchedFacets<T> {
+    let aspect = fm::sqrt(1.0 - 0.9 * anisotropic);
+    let even = roughness * roughness;
+    let alpha = [even / aspect, even * aspect].map(|a| T::from(a.max(1e-3)));
+    StretchedFacets { distribution: Distribution::Ggx, alpha }
+}
+
+/// The diffuse lobe but for colour and π, with retro-reflection and flattened, by the cosines at viewer and light and of the
+/// light with the half vector.
+pub(super) fn diffuse_lobe<T: Real>(cosines: [T; 3], roughness: f64, flatness: f64) -> T {
+    let [o, i, d] = cosines;
+    let [at_o, at_i] = [grazing(o), grazing(i)];
+    let base = (T::one() - at_o * 0.5) * (T::one() - at_i * 0.5);
+    let back = d.squared() * (2.0 * roughness);
+    let retro = back * (at_i + at_o + at_i * at_o * (back - 1.0));
+    if flatness == 0.0 {
+        return base + retro;
+    }
+    let at_90 = back * 0.5;
+    let both = lerp(T::one(), at_90, at_o) * lerp(T::one(), at_90, at_i);
+    let flat = (both * ((o.abs() + i.abs()).recip() - 0.5) + 0.5) * 1.25;
+    lerp(base + retro, flat, T::from(flatness))
+}
+
+/// The distribution of normals GTR1 of Burley 2012, of a roughness.
+#[derive(Clone, Copy)]
+struct LongTails(f64);
+
+impl LongTails {
+    fn density<T: Real>(self, cos: T) -> T {
+        let less = self.0 * self.0 - 1.0;
+        let scale = less / (PI * 2.0 * fm::ln(self.0));
+        (cos.squared() * less + 1.0).recip() * scale
+    }
+
+    /// A normal of density D cos.
+    fn sample(self, [u, v]: [f64; 2]) -> Vec3 {
+        let alpha2 = self.0 * self.0;
+        let cos2 = (1.0 - fm::powf(alpha2, 1.0 - v)) / (1.0 - alpha2);
+        let (sin_phi, cos_phi) = fm::sin_cos(TAU * u);
+        let sin = fm::sqrt((1.0 - cos2).max(0.0));
+        vec3(cos_phi * sin, sin_phi * sin, fm::sqrt(cos2.max(0.0)))
+    }
+}
+
+/// Roughness of the masking of clearcoats.
+const COAT_MASKING: f64 = 0.25;
+
+/// The probabilities of lobes.
+struct Lobes {
+    diffuse: f64,
+    coat: f64,
+    facets: f64,
+}
+
+impl Principled {
+    /// The index of refraction that artists know as `specular`, which is 0.08 times the reflectance at normal incidence.
+    #[must_use]
+    pub fn index_of(specular: f64) -> f64 {
+        2.0 / (1.0 - fm::sqrt(0.08 * specular)) - 1.0
+    }
+
+    pub(super) fn is_transmissive(&self) -> bool {
+        self.spec_trans > 0.0
+    }
+
+    fn refractive(&self) -> f64 {
+        (1.0 - self.metallic) * self.spec_trans
+    }
+
+    fn diffuse(&self) -> f64 {
+        (1.0 - self.metallic) * (1.0 - self.spec_trans)
+    }
+
+    fn coat(&self) -> LongTails {
+        LongTails(lerp(0.1, 0.001, self.clearcoat_gloss))
+    }
+
+    fn reflectance<T: Real>(&self, fresnel: T, cos: T, front: bool) -> Rgb<T> {
+        if !front {
+            return Rgb::splat(fresnel * self.refractive());
+        }
+        let dielectric = 1.0 - self.metallic;
+        let mut sum = Rgb::splat(fresnel * (dielectric * (1.0 - self.spec_tint)));
+        if self.metallic > 0.0 {
+            sum += schlick(self.base_color.map(T::from), cos, self.eta) * T::from(self.metallic);
+        }
+        if self.spec_tint > 0.0 {
+            let colour = tint(self.base_color) * normal_reflectance(self.eta);
+            let tinted = schlick(colour.map(T::from), cos, self.eta);
+            sum += tinted * T::from(dielectric * self.spec_tint);
+        }
+        sum
+    }
+
+    /// The probabilities of lobes seen from the front.
+    fn lobes(&self) -> Lobes {
+        let (diffuse, coat) = (self.diffuse(), 0.25 * self.clearcoat);
+        let all = 1.0 + diffuse + coat;
+        Lobes { diffuse: diffuse / all, coat: coat / all, facets: 1.0 / all }
+    }
+
+    /// The probability that a facet refracts, where it does not reflect all.
+    fn refracts(&self, fresnel: f64, front: bool) -> f64 {
+        (1.0 - fresnel) * if front { self.refractive() } else { 1.0 }
+    }
+
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        Some(Slot::Scalar(match property {
+            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
+            Property::Roughness => &mut self.roughness,
+            Property::Anisotropic => &mut self.anisotropic,
+            Property::Metallic => &mut self.metallic,
+            Property::SpecTrans => &mut self.spec_trans,
+            Property::Eta => &mut self.eta,
+            Property::SpecTint => &mut self.spec_tint,
+            Property::Sheen => &mut self.sheen,
+            Property::SheenTint => &mut self.sheen_tint,
+            Property::Flatness => &mut self.flatness,
+            Property::Clearcoat => &mut self.clearcoat,
+            Property::ClearcoatGloss => &mut self.clearcoat_gloss,
+            _ => return None,
+        }))
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+        check_colour(self.base_color)?;
+        let contrast = self.spec_trans == 0.0 || (self.eta - 1.0).abs() >= 1e-6;
+        let allowed = self.eta > 0.0 && contrast;
+        in_range(Property::Eta, self.eta, allowed, "positive, and not 1 where light goes through")?;
+        let parts = [
+            (Property::Roughness, self.roughness),
+            (Property::Anisotropic, self.anisotropic),
+            (Property::Metallic, self.metallic),
+            (Property::SpecTrans, self.spec_trans),
+            (Property::SpecTint, self.spec_tint),
+            (Property::Sheen, self.sheen),
+            (Property::SheenTint, self.sheen_tint),
+            (Property::Flatness, self.flatness),
+            (Property::Clearcoat, self.clearcoat),
+            (Property::ClearcoatGloss, self.clearcoat_gloss),
+        ];
+        parts.into_iter().try_for_each(|(property, value)| part(property, value))
+    }
+}
+
+pub(super) fn check_colour(colour: Rgb) -> Result<(), SurfaceError> {
+    colour.to_array().into_iter().try_for_each(|c| part(Property::BaseColor, c))
+}
+
+/// Two directions in the frame of a surface, neither in the surface, and the half vector between them, on the front.
+struct Pair<T> {
+    h: Vec3<T>,
+    oh: T,
+    ih: T,
+    front: bool,
+    reflects: bool,
+    /// The index beyond the interface over that on the viewer's side.
+    eta: f64,
+    /// The index inside over that outside.
+    material: f64,
+}
+
+impl<T: Real> Pair<T> {
+    fn new(o: Vec3<T>, i: Vec3<T>, material: f64) -> Option<Self> {
+        let sides = o.z.re() * i.z.re();
+        let (front, reflects) = (o.z.re() > 0.0, sides > 0.0);
+        let eta = if front { material } else { 1.0 / material };
+        let h = if reflects { o + i } else { o + i * T::from(eta) };
+        // Opposite directions have no half vector between them, and directions in the surface underflow.
+        if sides.abs() < LEAST_COS2 || h.re().max_abs() < 1e-12 {
+            return None;
+        }
+        let h = h.normalize();
+        let h = if h.z.re() < 0.0 { -h } else { h };
+        Some(Self { h, oh: o.dot(h), ih: i.dot(h), front, reflects, eta, material })
+    }
+
+    /// Facets show the viewer, and the light where they reflect, the side that the surface does.
+    fn is_joined(&self) -> bool {
+        let side = if self.front { 1.0 } else { -1.0 };
+        let light = if self.reflects { side } else { -side };
+        self.oh.re() * side > 0.0 && self.ih.re() * light > 0.0
+    }
+
+    fn fresnel(&self) -> T {
+        let eta = if self.oh.re() >= 0.0 { self.material } else { 1.0 / self.material };
+        dielectric_reflected(self.oh.abs(), T::from(eta))
+    }
+}
+
+impl Framed for Principled {
+    fn value<T: Real>(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
+        let mut sum = Rgb::splat(T::zero());
+        let Some(pair) = Pair::new(o, i, self.eta) else { return sum };
+        let Pair { h, oh, ih, front, reflects, eta, .. } = pair;
+        let fresnel = pair.fresnel();
+        if pair.is_joined() {
+            let facets = stretched::<T>(self.roughness, self.anisotropic);
+            let light = facets.density(h) * facets.masking(o) * facets.masking(i) * i.z.abs();
+            if reflects {
+                sum += self.reflectance(fresnel, oh, front) * (light * 0.25);
+            } else if fresnel.re() < 1.0 {
+                let bent = (oh + ih * eta).squared();
+                let through = (T::one() - fresnel) * (oh * ih).abs() / bent * self.refractive();
+                sum += self.base_color.map(fm::sqrt).map(T::from) * (light * through);
+            }
+        }
+        if !(front && reflects) {
+            return sum;
+        }
+        if self.clearcoat > 0.0 && pair.is_joined() {
+            let reflected = schlick(Rgb::splat(T::from(0.04)), oh, self.eta).r;
+            let alpha = T::from(COAT_MASKING);
+            let masking = |w: Vec3<T>| Distribution::Ggx.masking(w.z, alpha) * w.z;
+            let light = reflected * self.coat().density(h.z) * masking(o) * masking(i) * i.z;
+            sum += Rgb::splat(light * (0.25 * self.clearcoat));
+        }
+        let lobe = diffuse_lobe([o.z, i.z, ih], self.roughness, self.flatness);
+        sum += self.base_color.map(T::from) * (lobe * i.z * (self.diffuse() * FRAC_1_PI));
+        if self.sheen > 0.0 {
+            let colour =
+                tint(self.base_color) * self.sheen_tint + Rgb::splat(1.0 - self.sheen_tint);
+            sum += colour.map(T::from) * (grazing(ih) * i.z * (self.sheen * (1.0 - self.metallic)));
+        }
+        sum
+    }
+
+    fn density(&self, o: Vec3, i: Vec3) -> f64 {
+        let Some(pair) = Pair::new(o, i, self.eta) else { return 0.0 };
+        let Pair { h, oh, ih, front, reflects, eta, .. } = pair;
+        if !front && self.refractive() <= 0.0 {
+            return 0.0;
+        }
+        let lobes =
+            if front { self.lobes() } else { Lobes { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
+        let mut sum = 0.0;
+        if pair.is_joined() {
+            let facets = stretched(self.roughness, self.anisotropic);
+            let visible = facets.visible_density(h, o) * oh.abs() * lobes.facets;
+            let refracts = self.refracts(pair.fresnel(), front);
+            sum += if reflects {
+                (1.0 - refracts) * visible / (4.0 * ih.abs())
+            } else {
+                let bent = oh + eta * ih;
+                refracts * visible * eta * eta * ih.abs() / (bent * bent)
+            };
+            if front && reflects {
+                sum += lobes.coat * self.coat().density(h.z) * h.z / (4.0 * ih.abs());
+            }
+        }
+        if front && reflects {
+            sum += lobes.diffuse * i.z * FRAC_1_PI;
+        }
+        sum
+    }
+
+    fn direction(&self, o: Vec3, [u, v, choice]: [f64; 3]) -> Option<Vec3> {
+        let front = o.z > 0.0;
+        if !front && (self.refractive() <= 0.0 || o.z == 0.0) {
+            return None;
+        }
+        let lobes =
+            if front { self.lobes() } else { Lobes { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
+        if choice < lobes.diffuse {
+            return Some(warp::cosine_hemisphere([u, v]));
+        }
+        let choice = choice - lobes.diffuse;
+        if choice < lobes.coat {
+            let i = mirrored(o, self.coat().sample([u, v]));
+            return (i.z > 0.0).then_some(i);
+        }
+        let choice = (choice - lobes.coat) / lobes.facets;
+        let side = o.z.signum();
+        let facets = stretched(self.roughness, self.anisotropic);
+        let m = facets.sample_visible(o * side, [u, v]) * side;
+        let eta = if front { self.eta } else { 1.0 / self.eta };
+        let cos = m.dot(o);
+        if cos <= 0.0 {
+            return None;
+        }
+        let fresnel = dielectric_reflected(cos.min(1.0), eta);
+        let refracts = choice < self.refracts(fresnel, front);
+        let i = if refracts { refracted(o, m, eta)?.0 } else { mirrored(o, m) };
+        (refracts == (i.z * side < 0.0)).then_some(i)
+    }
+
+    fn narrowest(&self) -> f64 {
+        let [u, v] = stretched::<f64>(self.roughness, self.anisotropic).alpha;
+        f64::min(u, v)
+    }
+}

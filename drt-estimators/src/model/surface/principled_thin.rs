@@ -1,0 +1,214 @@
+//! Burley's principled model of thin sheets, as Mitsuba's `principledthin` has it (Burley 2015, section 5.3).
+//!
+//! In the terms of [`Principled`](super::Principled), with the transmitted part t, the diffusely transmitted part d (half of
+//! `diff_trans`), i' the light's direction mirrored to the viewer's side, and h between o and i',
+//!
+//! ```text
+//! t F D G / (4 o_z)                    reflection          t c (1-F_d) D' G' / (4 o_z)      straight on, blurred
+//! (1-t)(1-d) (c/π f + s F_s) i_z       diffuse, sheen      (1-t) d c/π |i_z|               diffuse, to the other side
+//! ```
+//!
+//! where D' is of the roughness times 0.65 η - 0.35. Both sides are alike.
+
+use core::f64::consts::FRAC_1_PI;
+
+use drt_math::{Real, Rgb, Vec3, vec3, warp};
+
+use crate::model::surface::anisotropic::StretchedFacets;
+use crate::model::surface::framed::Framed;
+use crate::model::surface::fresnel::dielectric_reflected;
+use crate::model::surface::microfacet::{LEAST_COS2, mirrored};
+use crate::model::surface::principled::{
+    check_colour, diffuse_lobe, grazing, lerp, normal_reflectance, schlick, stretched, tint,
+};
+use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, part};
+
+/// Burley's principled BSDF of thin sheets. Numbers are from 0 to 1 where nothing else is said.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PrincipledThin {
+    /// Its colour; default 0.5.
+    pub base_color: Rgb,
+    /// The square root of the roughness of microfacets; default 0.5.
+    pub roughness: f64,
+    /// Up to 3.2 times as rough along the tangent as across; default 0.
+    pub anisotropic: f64,
+    /// The part that is specular; default 0.
+    pub spec_trans: f64,
+    /// Index of the sheet over that of what is around it; default 1.5.
+    pub eta: f64,
+    /// How much of the base colour the reflection has; default 0.
+    pub spec_tint: f64,
+    /// Light at grazing angles, as from cloth; default 0.
+    pub sheen: f64,
+    /// How much of the base colour that has; default 0.
+    pub sheen_tint: f64,
+    /// From diffuse to flat; default 0.
+    pub flatness: f64,
+    /// Diffuse light that goes through, from none, 0, to all, 2; default 0.
+    pub diff_trans: f64,
+}
+
+impl Default for PrincipledThin {
+    fn default() -> Self {
+        Self {
+            base_color: Rgb::splat(0.5),
+            roughness: 0.5,
+            anisotropic: 0.0,
+            spec_trans: 0.0,
+            eta: 1.5,
+            spec_tint: 0.0,
+            sheen: 0.0,
+            sheen_tint: 0.0,
+            flatness: 0.0,
+            diff_trans: 0.0,
+        }
+    }
+}
+
+/// Both directions with the viewer in front, and the half vector with the light's one mirrored to the front.
+fn pair<T: Real>(o: Vec3<T>, i: Vec3<T>) -> Option<[Vec3<T>; 3]> {
+    let (o, i) = if o.z.re() < 0.0 { (-o, -i) } else { (o, i) };
+    let h = o + vec3(i.x, i.y, i.z.abs());
+    let known = (o.z.re() * i.z.re()).abs() >= LEAST_COS2 && h.re().max_abs() > 1e-12;
+    known.then(|| [o, i, h.normalize()])
+}
+
+impl PrincipledThin {
+    fn reflecting<T: Real>(&self) -> StretchedFacets<T> {
+        stretched(self.roughness, self.anisotropic)
+    }
+
+    fn blurring<T: Real>(&self) -> StretchedFacets<T> {
+        stretched((0.65 * self.eta - 0.35) * self.roughness, self.anisotropic)
+    }
+
+    /// Probabilities of reflection, of going on, and of diffuse light on this side; the rest is for that on the other one.
+    fn lobes(&self) -> [f64; 3] {
+        let half = 0.5 * self.spec_trans;
+        [half, half, (1.0 - self.spec_trans) * (1.0 - 0.5 * self.diff_trans)]
+    }
+
+    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        Some(Slot::Scalar(match property {
+            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
+            Property::Roughness => &mut self.roughness,
+            Property::Anisotropic => &mut self.anisotropic,
+            Property::SpecTrans => &mut self.spec_trans,
+            Property::Eta => &mut self.eta,
+            Property::SpecTint => &mut self.spec_tint,
+            Property::Sheen => &mut self.sheen,
+            Property::SheenTint => &mut self.sheen_tint,
+            Property::Flatness => &mut self.flatness,
+            Property::DiffTrans => &mut self.diff_trans,
+            _ => return None,
+        }))
+    }
+
+    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+        check_colour(self.base_color)?;
+        in_range(Property::Eta, self.eta, self.eta > 0.0, "above 0")?;
+        let part_of_two = (0.0..=2.0).contains(&self.diff_trans);
+        in_range(Property::DiffTrans, self.diff_trans, part_of_two, "from 0 to 2")?;
+        let parts = [
+            (Property::Roughness, self.roughness),
+            (Property::Anisotropic, self.anisotropic),
+            (Property::SpecTrans, self.spec_trans),
+            (Property::SpecTint, self.spec_tint),
+            (Property::Sheen, self.sheen),
+            (Property::SheenTint, self.sheen_tint),
+            (Property::Flatness, self.flatness),
+        ];
+        parts.into_iter().try_for_each(|(property, value)| part(property, value))
+    }
+}
+
+impl Framed for PrincipledThin {
+    fn value<T: Real>(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
+        let mut sum = Rgb::splat(T::zero());
+        let Some([o, i, h]) = pair(o, i) else { return sum };
+        let colour = self.base_color.map(T::from);
+        let (reflects, across, diffuse) =
+            (i.z.re() > 0.0, 0.5 * self.diff_trans, 1.0 - self.spec_trans);
+        let oh = o.dot(h);
+        // Behind, facets must show the light their other side.
+        let joined = oh.re() > 0.0 && i.dot(h).re() * i.z.re() > 0.0;
+        if self.spec_trans > 0.0 && joined {
+            let fresnel = dielectric_reflected(oh, T::from(self.eta));
+            let facets = if reflects { self.reflecting() } else { self.blurring() };
+            let light = facets.density(h) * facets.masking(o) * facets.masking(i) * i.z.abs();
+            let light = light * (0.25 * self.spec_trans);
+            sum += if reflects {
+                let tinted = tint(self.base_color) * normal_reflectance(self.eta);
+                let tinted = schlick(tinted.map(T::from), oh, self.eta);
+                tinted.map(|t| lerp(fresnel, t, T::from(self.spec_tint))) * light
+            } else {
+                colour * (light * (T::one() - fresnel))
+            };
+        }
+        if reflects {
+            let ih = i.dot(h);
+            let lobe = diffuse_lobe([o.z, i.z, ih], self.roughness, self.flatness);
+            let scale = diffuse * (1.0 - across);
+            sum += colour * (lobe * i.z * (scale * FRAC_1_PI));
+            if self.sheen > 0.0 {
+                let white = Rgb::splat(1.0 - self.sheen_tint);
+                let colour = tint(self.base_color) * self.sheen_tint + white;
+                sum += colour.map(T::from) * (grazing(ih) * i.z * (self.sheen * scale));
+            }
+        } else {
+            sum += colour * (i.z.abs() * (diffuse * across * FRAC_1_PI));
+        }
+        sum
+    }
+
+    fn density(&self, o: Vec3, i: Vec3) -> f64 {
+        let Some([o, i, h]) = pair(o, i) else { return 0.0 };
+        let [reflected, straight, diffuse] = self.lobes();
+        let rest = 1.0 - reflected - straight - diffuse;
+        let reflects = i.z > 0.0;
+        let (facets, specular, even) = if reflects {
+            (self.reflecting(), reflected, diffuse)
+        } else {
+            (self.blurring(), straight, rest)
+        };
+        let even = even * i.z.abs() * FRAC_1_PI;
+        let joined = o.dot(h) > 0.0 && i.dot(h) * i.z > 0.0;
+        if joined && specular > 0.0 {
+            even + 0.25 * specular * facets.visible_density(h, o)
+        } else {
+            even
+        }
+    }
+
+    fn direction(&self, from: Vec3, [u, v, choice]: [f64; 3]) -> Option<Vec3> {
+        let side = from.z.signum();
+        let o = from * side;
+        if o.z <= 0.0 {
+            return None;
+        }
+        let [reflected, straight, diffuse] = self.lobes();
+        let i = if choice < reflected {
+            let i = mirrored(o, self.reflecting().sample_visible(o, [u, v]));
+            (i.z > 0.0).then_some(i)?
+        } else if choice < reflected + straight {
+            let m = self.blurring().sample_visible(o, [u, v]);
+            let i = mirrored(o, m);
+            let through = vec3(i.x, i.y, -i.z);
+            // Facets must show it their other side.
+            (i.z > 0.0 && through.dot(m) < 0.0).then_some(through)?
+        } else {
+            let i = warp::cosine_hemisphere([u, v]);
+            if choice < reflected + straight + diffuse { i } else { -i }
+        };
+        Some(i * side)
+    }
+
+    fn narrowest(&self) -> f64 {
+        if self.spec_trans == 0.0 {
+            return 1.0;
+        }
+        let facets: [StretchedFacets; 2] = [self.reflecting(), self.blurring()];
+        facets.iter().flat_map(|f| f.alpha).fold(1.0, f64::min)
+    }
+}
