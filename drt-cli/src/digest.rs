@@ -85,6 +85,7 @@ struct PlanSummary<'a> {
     flux_shapes: &'a [String],
     antithetic: bool,
     splatting: bool,
+    guiding: &'a [String],
     skipped: &'a [String],
 }
 
@@ -114,6 +115,7 @@ impl<'a> From<&'a Plan> for PlanSummary<'a> {
             flux_shapes: &plan.flux_shapes,
             antithetic: plan.antithetic,
             splatting: plan.splatting,
+            guiding: &plan.guiding,
             skipped: &plan.skipped,
         }
     }
@@ -128,6 +130,7 @@ struct WorkDone {
     differentiated_paths: u64,
     boundary_samples: u64,
     border_samples: u64,
+    guide_samples: u64,
     flux_samples: u64,
     tracking_steps: u64,
 }
@@ -141,6 +144,7 @@ impl From<&Counters> for WorkDone {
             differentiated_paths: c.differentiated_paths,
             boundary_samples: c.boundary_samples,
             border_samples: c.border_samples,
+            guide_samples: c.guide_samples,
             flux_samples: c.flux_samples,
             tracking_steps: c.tracking_steps,
         }

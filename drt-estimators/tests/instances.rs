@@ -11,7 +11,6 @@ use drt_estimators::{
 };
 use drt_geom::procedural;
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
-use drt_motion::Parameter;
 
 /// Adds an instance of the first shapes that are not instances yet.
 fn instance(scene: &mut Scene, id: &str, members: &[&str], to_world: Affine) {

@@ -25,7 +25,13 @@ pub struct Rng {
     points: SobolSampler,
     /// How many of them are left.
     leading: u32,
+    /// What comes before them, and how many of these, at the end of the list, are left.
+    first: [f64; MOST_FIRST],
+    first_left: u32,
 }
+
+/// The most numbers that can be told.
+const MOST_FIRST: usize = 4;
 
 impl Rng {
     /// The generator of one work item: `stream` names the kind of work (and pixel), `index` the
@@ -39,6 +45,8 @@ impl Rng {
             used: 4,
             points: SobolSampler::UNUSED,
             leading: 0,
+            first: [0.0; MOST_FIRST],
+            first_left: 0,
         }
     }
 
@@ -55,6 +63,21 @@ impl Rng {
     #[must_use]
     pub fn led_by(self, points: SobolSampler, dimensions: u32) -> Self {
         Self { points, leading: dimensions, ..self }
+    }
+
+    /// The same, beginning with four numbers in (0, 1) that are told, such as those of a
+    /// distribution other than the uniform one. Bits are not affected.
+    ///
+    /// ```
+    /// use drt_math::Rng;
+    /// let mut rng = Rng::new(1, 2, 3).starting_with([0.1, 0.2, 0.3, 0.4]);
+    /// assert_eq!([rng.next_2d(), rng.next_2d()], [[0.1, 0.2], [0.3, 0.4]]);
+    /// assert_eq!(rng.next_f64(), Rng::new(1, 2, 3).next_f64());
+    /// ```
+    #[must_use]
+    pub fn starting_with(self, first: [f64; 4]) -> Self {
+        let first_left = MOST_FIRST as u32;
+        Self { first, first_left, leading: self.leading + first_left, ..self }
     }
 
     /// 32 random bits.
@@ -88,9 +111,20 @@ impl Rng {
     pub fn next_f64(&mut self) -> f64 {
         if self.leading > 0 {
             self.leading -= 1;
+            if self.first_left > 0 {
+                return self.next_first();
+            }
             return self.points.next_f64();
         }
         interval_centre(self.next_u64() >> 12)
+    }
+
+    /// The next of the numbers that were told.
+    #[cold]
+    fn next_first(&mut self) -> f64 {
+        let number = self.first[MOST_FIRST - self.first_left as usize];
+        self.first_left -= 1;
+        number
     }
 
     /// Two uniform numbers in (0, 1).
@@ -111,7 +145,9 @@ impl Rng {
     pub fn skip(&mut self, numbers: u32) {
         let leading = u32::min(numbers, self.leading);
         self.leading -= leading;
-        self.points.skip(leading);
+        let first = u32::min(leading, self.first_left);
+        self.first_left -= first;
+        self.points.skip(leading - first);
         for _ in leading..numbers {
             self.next_u64();
         }
@@ -211,6 +247,22 @@ mod tests {
             for _ in 0..5 {
                 assert_eq!(skipped.next_f64(), drawn.next_f64(), "{numbers}");
             }
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_told_come_first() {
+        use crate::sobol::SET_DIMENSIONS;
+        let led = || Rng::new(1, 2, 3).led_by(SobolSampler::new(4, 5), SET_DIMENSIONS);
+        let told = [0.1, 0.2, 0.3, 0.4];
+        for numbers in [0, 1, 3, 4, 6, SET_DIMENSIONS + 6] {
+            let mut rng = led().starting_with(told);
+            rng.skip(numbers);
+            let mut expected: Vec<f64> = told.into_iter().skip(numbers as usize).collect();
+            let mut points = led();
+            points.skip(numbers.saturating_sub(4));
+            expected.extend((0..5).map(|_| points.next_f64()));
+            assert!(expected.iter().all(|n| *n == rng.next_f64()), "{numbers}");
         }
     }
 

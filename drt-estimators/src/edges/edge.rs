@@ -1,5 +1,7 @@
 //! Edges that can be silhouettes, and how points on them are drawn (theory sheet §4.3).
 
+mod order;
+
 use alloc::vec::Vec;
 
 use drt_geom::edges::{Coincident, Fan, Gap, Wedge, faces_around};
@@ -128,8 +130,9 @@ impl EdgeTable {
         matters: impl Fn(&Edge) -> bool,
         weight: impl Fn(&Edge) -> f64,
     ) -> Result<Option<Self>, Error> {
-        let kept: Vec<(Edge, f64)> =
+        let mut kept: Vec<(Edge, f64)> =
             edges.iter().map(|e| (*e, weight(e))).filter(|(e, w)| *w > 0.0 && matters(e)).collect();
+        order::sort_by_likeness(&mut kept);
         if kept.is_empty() {
             return Ok(None);
         }

@@ -48,6 +48,8 @@ pub struct Plan {
     pub bidirectional: bool,
     /// Which of the two was chosen and why, where that was left open.
     pub sampling: Option<String>,
+    /// What is known of guides of boundary samples.
+    pub guiding: Vec<String>,
     /// What is skipped, and why.
     pub skipped: Vec<String>,
 }
@@ -132,6 +134,9 @@ impl fmt::Display for Plan {
         }
         if !self.flux_shapes.is_empty() {
             writeln!(f, "flux through: {}", self.flux_shapes.join(", "))?;
+        }
+        for g in &self.guiding {
+            writeln!(f, "guiding: {g}")?;
         }
         for s in &self.skipped {
             writeln!(f, "skipped: {s}")?;

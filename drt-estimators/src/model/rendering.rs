@@ -112,6 +112,8 @@ pub struct Counters {
     pub boundary_samples: u64,
     /// Pixel borders sampled.
     pub border_samples: u64,
+    /// Of these and of boundary segments, the samples by which guides were learnt.
+    pub guide_samples: u64,
     /// Points on moving surfaces sampled for the flux term.
     pub flux_samples: u64,
     /// Tentative collisions in heterogeneous media.
@@ -127,6 +129,7 @@ impl Counters {
         self.differentiated_paths += o.differentiated_paths;
         self.boundary_samples += o.boundary_samples;
         self.border_samples += o.border_samples;
+        self.guide_samples += o.guide_samples;
         self.flux_samples += o.flux_samples;
         self.tracking_steps += o.tracking_steps;
     }

@@ -8,6 +8,8 @@
 //! of the shapes around it; at voxels, through the transposed interpolation. The cost does not grow with the number
 //! of quantities. With the same seed and without [`guiding`](Settings::guiding), ⟨a, J v⟩ = ⟨Jᵀ a, v⟩ to rounding.
 
+mod sizes;
+
 use alloc::vec::Vec;
 use core::ops::Range;
 
@@ -24,17 +26,20 @@ use crate::derivative::sensitivity::{
 use crate::derivative::tangents;
 use crate::model::emitter::EmitterGradient;
 use crate::model::error::{Error, SettingError};
+use crate::model::rendering::Account;
 use crate::model::scene::{Scene, Target, TargetName};
 use crate::model::sensor::SensorGradient;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::model::shard::Shard;
 use crate::model::surface::BsdfParams;
+use crate::run::reverse::sizes::OfGradient;
 use crate::run::session::{Control, estimators, may_move, seed_of_component, slides};
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::BATCHES;
 use crate::sampling::parallel::Pool;
 use crate::sampling::pixels::{Part, Pass, Sampler};
 use crate::terms::boundary::BoundarySink;
+use crate::terms::guiding::Guiding;
 use crate::terms::interior::{PathSink, PixelSampler};
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::Checked;
@@ -157,7 +162,7 @@ pub fn gradient_in_batches(
     let mut world =
         World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, &mut kept)?;
     let estimators = estimators(&scene, wanted.iter().copied(), settings).into_iter();
-    let components = estimators
+    let mut components = estimators
         .map(|(settings, lit)| Component::new(world.lit_by(lit)?, wanted, &settings))
         .collect::<Result<Vec<_>, Error>>()?;
     let needs = components.iter().map(Component::needs);
@@ -165,7 +170,20 @@ pub fn gradient_in_batches(
         world.prepare_for_derivatives(needs);
     }
     let antithetic = components.iter().any(|c| c.prepared.antithetic);
-    let (components, seed) = (&components[..], settings.seed);
+    let pool = Pool::new(settings.threads);
+    let seed = settings.seed;
+    let mut pilots = Account::default();
+    if settings.guiding {
+        for (c, component) in components.iter_mut().enumerate() {
+            let seed = seed_of_component(seed, c);
+            let (account, going) = component.learn(&world, seed, spp, adjoint, &pool, control);
+            pilots.add(account);
+            if !going {
+                return Ok(false);
+            }
+        }
+    }
+    let components = &components[..];
     let units = spp.div_ceil(if antithetic { 2 } else { 1 }).max(1);
     let pass = Pass::new(0, units, film);
     if let Some(shard) = shard.filter(|s| s.count() > pass.parts()) {
@@ -177,8 +195,11 @@ pub fn gradient_in_batches(
     let emission = emission.as_ref();
     let run = Reverse { world: &world, components, emission, antithetic, seed, pass, spp, adjoint };
     let pieces = run.pieces(shard);
-    let pool = Pool::new(settings.threads);
     let mut sums = [run.zeros(), run.zeros()];
+    if let Some(first) = sums[1].first_mut() {
+        first.scene.counters = pilots.counters;
+        first.scene.non_finite += pilots.non_finite_count;
+    }
     let finish = |sums: Vec<Sums>| {
         let mut gradient = SceneGradient::zeros(&world, &active(&scene, wanted));
         for (component, Sums { scene: mut sum, insides }) in components.iter().zip(sums) {
@@ -215,6 +236,8 @@ struct Component {
     prepared: Prepared,
     active: ActiveInputs,
     insides: ReverseMediumMotions,
+    /// What is known of each source of boundary samples.
+    guiding: Vec<Guiding>,
 }
 
 impl Component {
@@ -234,7 +257,39 @@ impl Component {
         active.volumes = insides.volumes();
         world.prepare_for_derivatives(needs(&active));
         let prepared = Prepared::new(world, &active, &insides.flux_shapes, settings, None)?;
-        Ok(Self { prepared, active, insides })
+        let guiding = prepared.sources.iter().map(|_| Guiding::default()).collect();
+        Ok(Self { prepared, active, insides, guiding })
+    }
+
+    /// Learns how to guide boundary samples, by the light of all emitters where that counts; false when cancelled.
+    fn learn(
+        &mut self,
+        all: &World,
+        seed: u64,
+        spp: u32,
+        adjoint: &[Rgb],
+        pool: &Pool,
+        control: &dyn Control,
+    ) -> (Account, bool) {
+        let mut pilots = Account::default();
+        let (prepared, active) = (&self.prepared, &self.active);
+        let splatter = prepared.splatter(all, seed);
+        for (i, guiding) in self.guiding.iter_mut().enumerate() {
+            let samples = f64::from(spp) * prepared.source_ratio(i) * adjoint.len() as f64;
+            let (account, going) = guiding.learn(
+                &splatter,
+                prepared.sources[i],
+                samples,
+                pool,
+                || OfGradient::new(active, adjoint),
+                || control.cancelled(),
+            );
+            pilots.add(account);
+            if !going {
+                return (pilots, false);
+            }
+        }
+        (pilots, true)
     }
 
     fn needs(&self) -> ActiveFactors {
@@ -419,7 +474,8 @@ impl Reverse<'_> {
         });
         let stream = source.stream() + u64::from(batch);
         let splatter = prepared.splatter(self.world, seed_of_component(self.seed, c));
-        let account = splatter.run(source, stream, count, &mut receiver);
+        let guide = component.guiding[i].guide();
+        let account = splatter.run(source, guide, stream, count, &mut receiver);
         let mut to = receiver.inner;
         to.flush();
         let mut sums = to.scatter.sums;

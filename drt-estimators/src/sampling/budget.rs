@@ -27,6 +27,9 @@ const FEWEST_EVEN: f64 = 0.03125;
 /// What a sample costs besides its rays, in rays: to choose an edge and to find what is around it.
 pub(crate) const BESIDES: f64 = 1.0;
 
+/// What a lookup in a grid costs, in rays.
+pub(crate) const LOOKUP: f64 = 0.2;
+
 /// Variance and cost of a term, as a pilot has measured them.
 #[derive(Clone, Debug)]
 pub(crate) struct TermStatistics {

@@ -5,6 +5,7 @@ pub(crate) mod bidirectional;
 pub(crate) mod budget;
 pub(crate) mod film;
 pub(crate) mod flight;
+pub(crate) mod guide;
 pub(crate) mod importance;
 mod mode;
 pub(crate) mod parallel;

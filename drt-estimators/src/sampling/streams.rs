@@ -9,6 +9,7 @@ pub(crate) const FLUX_STREAM: u64 = 1 << 61;
 pub(crate) const SEQUENCE_STREAM: u64 = 1 << 60;
 pub(crate) const PAIR_STREAM: u64 = 1 << 59;
 pub(crate) const VELOCITY_STREAM: u64 = 1 << 58;
+pub(crate) const GUIDE_STREAM: u64 = 1 << 57;
 /// Numbers of a sample that are spread evenly: image point, and the first vertices.
 pub(crate) const DIMENSIONS: u32 = SET_DIMENSIONS;
 

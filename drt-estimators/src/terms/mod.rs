@@ -3,6 +3,7 @@
 pub(crate) mod boundary;
 mod film_plane;
 pub(crate) mod flux;
+pub(crate) mod guiding;
 pub(crate) mod interior;
 pub(crate) mod light_paths;
 pub(crate) mod prepared;

@@ -7,9 +7,10 @@ use drt_math::{Rgb, Rng};
 
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::sensitivity::VelocityFunctional;
-use crate::model::rendering::{Account, NonFinite, Term};
+use crate::model::rendering::{Account, Counters, NonFinite, Term};
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::Splats;
+use crate::sampling::guide::{self, Drawn, Guide};
 use crate::sampling::streams::{DIMENSIONS, LINE_STREAM, SEQUENCE_STREAM};
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary;
@@ -71,6 +72,11 @@ impl BoundarySource {
         matches!(self, Self::PrimaryEdges | Self::Edges(Strategy::Primary))
     }
 
+    /// True for those whose first numbers may have a distribution that is learnt.
+    pub(crate) fn is_guided(self) -> bool {
+        !matches!(self, Self::GrazingFlux | Self::LightPaths)
+    }
+
     /// True when no sample counts much more than others.
     pub(crate) fn is_even(self) -> bool {
         matches!(self, Self::PrimaryEdges | Self::GrazingFlux)
@@ -91,14 +97,28 @@ pub(crate) struct Splatter<'a> {
 }
 
 impl Splatter<'_> {
-    /// Samples `count` times from a source and hands everything to `receiver`. The stream is unique
-    /// to the batch.
+    /// Samples `count` times from a source, as its guide says if there is one, and hands everything to `receiver`. The
+    /// stream is unique to the batch.
     pub(crate) fn run<R: BoundarySink>(
         &self,
         source: BoundarySource,
+        guide: Option<&Guide>,
         stream: u64,
         count: u32,
         receiver: &mut Checked<R>,
+    ) -> Account {
+        self.run_observed(source, guide, stream, count, receiver, |_, _, _, _| {})
+    }
+
+    /// The same, which calls `observe` after each sample of a guide with the receiver, what was drawn, and rays and lookups.
+    pub(crate) fn run_observed<R: BoundarySink>(
+        &self,
+        source: BoundarySource,
+        guide: Option<&Guide>,
+        stream: u64,
+        count: u32,
+        receiver: &mut Checked<R>,
+        mut observe: impl FnMut(&mut R, &Drawn, u64, u64),
     ) -> Account {
         let from_light = source == BoundarySource::LightPaths;
         let mut tracer = Tracer::new(if from_light { self.all } else { self.world });
@@ -114,9 +134,19 @@ impl Splatter<'_> {
         // One Sobol' sequence a batch, so that the scatter of batches stays an honest error.
         let sequence = Rng::new(self.seed, SEQUENCE_STREAM | stream, 0).next_u32();
         for index in 0..count {
-            let points = SobolSampler::new(sequence, index);
-            tracer.rng = Rng::new(self.seed, stream, index).led_by(points, DIMENSIONS);
+            let mut points = SobolSampler::new(sequence, index);
+            let rng = Rng::new(self.seed, stream, index);
+            let drawn = guide.map(|g| g.draw(core::array::from_fn(|_| points.next_f64())));
+            tracer.rng = match &drawn {
+                None => rng.led_by(points, DIMENSIONS),
+                Some(drawn) => {
+                    let others = DIMENSIONS - guide::DIMENSIONS as u32;
+                    rng.led_by(points, others).starting_with(drawn.point)
+                }
+            };
+            receiver.weight = drawn.as_ref().map_or(1.0, |drawn| drawn.inverse_density);
             receiver.index = index;
+            let [rays, lookups] = [tracer.counters.rays, tracer.counters.tracking_steps];
             match source {
                 BoundarySource::Edges(strategy) => {
                     self.boundary.sample(strategy, &mut tracer, &mut edges, receiver);
@@ -141,6 +171,10 @@ impl Splatter<'_> {
                     }
                 }
             }
+            if let Some(drawn) = &drawn {
+                let Counters { rays: after, tracking_steps, .. } = tracer.counters;
+                observe(&mut receiver.inner, drawn, after - rays, tracking_steps - lookups);
+            }
         }
         Account {
             counters: tracer.counters,
@@ -151,9 +185,11 @@ impl Splatter<'_> {
     }
 }
 
-/// Passes finite values on; counts and describes the others.
+/// Passes finite values on, weighted as their sample is guided; counts and describes the others.
 pub(crate) struct Checked<R> {
     pub(crate) inner: R,
+    /// One over the density of a guide. Of what is [spread](BoundarySink::spread) there are none.
+    weight: f64,
     term: Option<Term>,
     seed: u64,
     stream: u64,
@@ -164,7 +200,16 @@ pub(crate) struct Checked<R> {
 
 impl<R> Checked<R> {
     pub(crate) fn new(inner: R) -> Self {
-        Self { inner, term: None, seed: 0, stream: 0, index: 0, found: Vec::new(), count: 0 }
+        Self {
+            inner,
+            weight: 1.0,
+            term: None,
+            seed: 0,
+            stream: 0,
+            index: 0,
+            found: Vec::new(),
+            count: 0,
+        }
     }
 }
 
@@ -174,6 +219,7 @@ impl<R: BoundarySink> BoundarySink for Checked<R> {
     }
 
     fn receive(&mut self, pixel: u32, value: Rgb) {
+        let value = value * self.weight;
         if value.is_finite() {
             self.inner.receive(pixel, value);
             return;

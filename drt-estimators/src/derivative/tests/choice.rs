@@ -117,6 +117,7 @@ fn parts(Sum { weight, samples }: Sum, (prepared, motion): &(Prepared, Motion)) 
         for source in &prepared.sources {
             prepared.splatter(&prepared.world, seed).run(
                 *source,
+                None,
                 source.stream(),
                 samples * PIXELS,
                 &mut primary,

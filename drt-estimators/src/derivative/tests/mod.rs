@@ -5,6 +5,7 @@ mod both_ends;
 mod changes;
 pub(crate) mod choice;
 mod factors;
+mod guided;
 mod moving;
 mod records;
 mod replay;

@@ -13,6 +13,7 @@ use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::{PathSampling, Settings};
 use crate::run::session::{Session, Unattended};
+use crate::sampling::budget::LOOKUP;
 use crate::world::World;
 use crate::world::cache::PreparedCache;
 
@@ -21,9 +22,6 @@ const SIDE: f64 = 32.0;
 
 /// Samples of each of its pixels.
 const SAMPLES: u32 = 32;
-
-/// What a lookup in a grid costs, in rays.
-const LOOKUP: f64 = 0.2;
 
 /// Part of the work of the camera's paths that those from both ends must not exceed, or noise of the pilot would often choose them for
 /// nothing.

@@ -1,5 +1,6 @@
 //! One estimator's part of a run: what it differentiates of which light.
 
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use crate::derivative::contraction::{Contraction, Motion};
@@ -10,10 +11,11 @@ use crate::model::error::Error;
 use crate::model::plan::Plan;
 use crate::model::rendering::{Account, Term};
 use crate::model::settings::{EstimatorKind, Settings};
-use crate::run::session::describe::describe;
+use crate::run::session::describe::{describe, describe_guide};
 use crate::run::session::pass::Pass;
 use crate::run::session::pilot::primary_share;
 use crate::sampling::film::{BATCHES, SplatFilm};
+use crate::terms::guiding::{Guiding, OfImages};
 use crate::terms::interior;
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::{Checked, ToImages};
@@ -27,6 +29,9 @@ pub(super) struct Component {
     pub(super) plan: Plan,
     /// One film per source of boundary samples, with a layer per parameter.
     splats: Vec<SplatFilm>,
+    /// What is known of each of these, where samples are guided.
+    guiding: Vec<Guiding>,
+    guided: bool,
 }
 
 impl Component {
@@ -70,12 +75,46 @@ impl Component {
         let parameters = motion.as_ref().map_or(0, Motion::parameters);
         let size = prepared.world.camera.film();
         let splats = prepared.sources.iter().map(|_| SplatFilm::new(size, parameters)).collect();
-        Ok(Self { prepared, motion, plan, splats })
+        let guiding = prepared.sources.iter().map(|_| Guiding::default()).collect();
+        Ok(Self { prepared, motion, plan, splats, guiding, guided: settings.guiding })
     }
 
     /// Forgets what has been accumulated.
     pub(super) fn clear(&mut self) {
         self.splats.iter_mut().for_each(SplatFilm::clear);
+        self.guiding.fill_with(Guiding::default);
+    }
+
+    /// Learns how to guide a source that takes so many samples in all, by a pilot; false when cancelled.
+    pub(super) fn learn(
+        &mut self,
+        i: usize,
+        seed: u64,
+        samples: f64,
+        all: &World,
+        pass: &Pass<'_>,
+    ) -> (Account, bool) {
+        let Some(motion) = self.motion.as_ref().filter(|_| self.guided) else {
+            return (Account::default(), true);
+        };
+        let (prepared, guiding) = (&self.prepared, &mut self.guiding[i]);
+        guiding.learn(
+            &prepared.splatter(all, seed),
+            prepared.sources[i],
+            samples,
+            pass.pool,
+            || OfImages::new(&prepared.world, motion),
+            || pass.control.cancelled(),
+        )
+    }
+
+    /// What is known of its sources that may be guided.
+    pub(super) fn guiding(&self) -> impl Iterator<Item = String> {
+        let guided = self.guided && self.motion.is_some();
+        let sources = self.prepared.sources.iter().zip(&self.guiding);
+        sources
+            .filter(move |(source, _)| guided && source.is_guided())
+            .map(|(source, guiding)| describe_guide(*source, guiding))
     }
 
     /// Its part in the derivatives of paths, if there are any; with so many edge queries to each path, where
@@ -125,6 +164,7 @@ impl Component {
         let source = self.prepared.sources[i];
         let per_batch = self.prepared.samples_per_batch(per_pixel);
         let splatter = self.prepared.splatter(all, seed);
+        let guide = self.guiding[i].guide();
         let mut sums = film.begin();
         let first = pass.before * BATCHES as u32;
         let own = pass.shard.map_or(0..BATCHES as u32, |shard| shard.of(BATCHES as u32));
@@ -135,7 +175,7 @@ impl Component {
             |b| {
                 let mut receiver = Checked::new(ToImages::new(&self.prepared.world, motion));
                 let stream = source.stream() + u64::from(first + b);
-                let account = splatter.run(source, stream, per_batch, &mut receiver);
+                let account = splatter.run(source, guide, stream, per_batch, &mut receiver);
                 (receiver.inner.splats.settled(), account)
             },
             |b, (splats, of_batch)| {

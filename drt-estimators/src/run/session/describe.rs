@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use crate::derivative::contraction::Motion;
 use crate::model::plan::{MediumPlan, Plan};
 use crate::terms::boundary::Strategy;
+use crate::terms::guiding::Guiding;
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::BoundarySource;
 use crate::world::World;
@@ -74,6 +75,31 @@ pub(super) fn describe(prepared: &Prepared, motion: Option<&Motion>) -> Plan {
         .collect();
     plan.flux_shapes = motion.insides.flux_shapes.iter().map(|s| world.shape_name(*s)).collect();
     plan
+}
+
+/// What is known of how a source is guided.
+pub(super) fn describe_guide(source: BoundarySource, guiding: &Guiding) -> String {
+    let name = match source {
+        BoundarySource::Edges(Strategy::Primary) | BoundarySource::PrimaryEdges => {
+            "camera boundary"
+        }
+        BoundarySource::Edges(Strategy::Direct) => "emitter boundary",
+        BoundarySource::Edges(Strategy::Indirect) => "indirect boundary",
+        BoundarySource::Borders => "pixel borders",
+        BoundarySource::GrazingFlux => "grazing flux",
+        BoundarySource::LightPaths => "light paths",
+    };
+    let Some((learnt, samples)) = guiding.outcome() else {
+        return alloc::format!("{name}: where a pilot finds that it helps");
+    };
+    match &learnt.guide {
+        Some(guide) => alloc::format!(
+            "{name}: {:.2} of the work, by a pilot of {samples} samples and {} cells",
+            1.0 / learnt.gain,
+            guide.cells()
+        ),
+        None => alloc::format!("{name}: no, a pilot of {samples} samples found nothing to gain"),
+    }
 }
 
 fn medium_plan(world: &World, motion: Option<&Motion>, i: usize) -> MediumPlan {

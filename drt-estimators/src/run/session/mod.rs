@@ -179,6 +179,7 @@ impl Session {
             emission,
         };
         session.film = session.new_film(settings.terms);
+        session.describe_guides();
         Ok(session)
     }
 
@@ -216,6 +217,7 @@ impl Session {
         (self.pilot, self.account) = (None, Account::default());
         self.settings.seed = seed;
         (self.samples, self.passes, self.complete) = (0, 0, true);
+        self.describe_guides();
     }
 
     /// Adds `spp` samples per pixel, and boundary samples in [proportion](Settings::boundary_ratio).
@@ -235,6 +237,9 @@ impl Session {
     fn run_pass(&mut self, pass: &Pass<'_>) -> (u32, bool) {
         let units = pass.spp.div_ceil(self.per_unit());
         let sources = self.sources();
+        if !self.learn_guides(&sources, pass) {
+            return (0, false);
+        }
         // The part of the work that is done when the pixels are.
         let part = if sources.is_empty() { 1.0 } else { 0.5 };
         let done = self.run_pixels(pass, units, |done| pass.control.progress(part * done));
@@ -255,6 +260,28 @@ impl Session {
             going = finished;
         }
         (done * self.per_unit(), going)
+    }
+
+    /// Learns how to guide boundary samples from what a run up to the end of this pass can afford. False when it was
+    /// cancelled.
+    fn learn_guides(&mut self, sources: &[(usize, usize)], pass: &Pass<'_>) -> bool {
+        let [w, h] = self.film.size();
+        let of_pixel = f64::from(self.samples) + f64::from(pass.spp);
+        for &(c, i) in sources {
+            let samples = of_pixel * self.source_ratio(c, i) * f64::from(w) * f64::from(h);
+            let seed = seed_of_component(self.settings.seed, c);
+            let (account, going) = self.components[c].learn(i, seed, samples, &self.world, pass);
+            self.account.add(account);
+            if !going {
+                return false;
+            }
+        }
+        self.describe_guides();
+        true
+    }
+
+    fn describe_guides(&mut self) {
+        self.plan.guiding = self.components.iter().flat_map(Component::guiding).collect();
     }
 
     /// Samples every pixel `units` times more, or so on average; returns how often each was.

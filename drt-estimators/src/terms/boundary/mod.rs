@@ -21,6 +21,7 @@
 //! `direct` and `indirect` both find area lights; they share them by the balance heuristic. Shadows of
 //! directly lit media, seen directly, are left to [`shadow`] where that serves.
 
+mod areas;
 pub(crate) mod border;
 mod contact;
 pub(crate) mod shadow;
@@ -32,6 +33,7 @@ use drt_math::{Rgb, Vec3};
 use crate::edges::contact::Contact;
 use crate::edges::edge::{Edge, EdgePoint, EdgeTable, collect, merge_coincident};
 use crate::edges::movers::Movers;
+use crate::terms::boundary::areas::AreaWeights;
 use crate::terms::boundary::shadow::Shadows;
 
 use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, VelocityFunctional, VelocityTerm};
@@ -62,6 +64,8 @@ pub(crate) enum Strategy {
 pub(crate) struct Boundary {
     /// All that can be grazed.
     general: Option<EdgeTable>,
+    /// The same, as they are lit by areas.
+    areas: Option<EdgeTable>,
     /// Silhouettes from the camera.
     camera: Option<EdgeTable>,
     /// Silhouettes from each delta light, by emitter.
@@ -127,6 +131,10 @@ impl Boundary {
             e.may_rest = Contact::anywhere(world, e);
         }
         let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
+        let has_areas = world.max_depth >= 2 && world.lights.has_areas();
+        let weights = has_areas.then(|| AreaWeights::new(world, &edges));
+        let areas = weights.map(|w| EdgeTable::new(&edges, |e| movers.pass(e), |e| w.of(e)));
+        let areas = areas.transpose()?.flatten();
         let camera = &world.camera;
         let in_view = |e: &Edge| match (camera.is_orthographic(), camera.aperture()) {
             (true, _) => e.wedge.projected_length(camera.pinhole().forward),
@@ -153,7 +161,7 @@ impl Boundary {
         let lights = emitters.map(|(i, e)| light(i, &e.item.emitter)).collect::<Result<_, _>>()?;
         let lit = edges.iter().filter(|e| movers.pass_lights(world, e)).copied().collect();
         let shadows = Shadows::new(world, lit);
-        Ok(Self { count: [edges.len() as u64, all], general, camera, lights, shadows })
+        Ok(Self { count: [edges.len() as u64, all], general, areas, camera, lights, shadows })
     }
 
     /// True when a strategy can find anything.
@@ -163,8 +171,7 @@ impl Boundary {
             // One scattering vertex beyond the light, at least.
             Strategy::Direct => {
                 world.max_depth >= 2
-                    && (self.lights.iter().any(Option::is_some)
-                        || (self.general.is_some() && world.lights.has_areas()))
+                    && (self.lights.iter().any(Option::is_some) || self.areas.is_some())
             }
             Strategy::Indirect => world.max_depth >= 2 && self.general.is_some(),
         }
@@ -275,8 +282,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         if let Some(emitter) = choice.delta {
             return self.delta(emitter, choice.pmf);
         }
-        let general = self.boundary.general.as_ref()?;
-        let at = general.sample(&mut self.tracer.rng);
+        let at = self.boundary.areas.as_ref()?.sample(&mut self.tracer.rng);
         if Contact::at(world, &at).is_some() {
             return None;
         }

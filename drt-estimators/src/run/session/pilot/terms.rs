@@ -128,7 +128,8 @@ fn of_source(prepared: &Prepared, motion: &Motion, source: BoundarySource) -> Te
     let scale = 1.0 / (pixels * pixels * f64::from(SAMPLES));
     for i in 0..SAMPLES {
         let mut sink = Checked::new(ToImages::new(world, motion));
-        rays += splatter.run(source, source.stream() + u64::from(i), 1, &mut sink).counters.rays;
+        rays +=
+            splatter.run(source, None, source.stream() + u64::from(i), 1, &mut sink).counters.rays;
         let splats = sink.inner.splats.settled();
         for (p, sum) in variance.iter_mut().enumerate() {
             splats.for_each(p, |_, v| *sum += scale * v.dot(v));

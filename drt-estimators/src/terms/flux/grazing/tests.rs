@@ -46,6 +46,7 @@ fn grazing_flux() -> Moments {
         let count = 1 << 12;
         prepared.splatter(&prepared.world, seed).run(
             BoundarySource::GrazingFlux,
+            None,
             BoundarySource::GrazingFlux.stream(),
             count,
             &mut mean,
