@@ -108,10 +108,12 @@ impl AdjointSink for SquaredNorm<'_> {
 
     fn sensor(&mut self, [gradient, ..]: &[SensorGradient; 3]) {
         if self.active.sensor {
-            let SensorGradient { position, right, up, forward, pixel_size, principal } = gradient;
+            let SensorGradient { position, right, up, forward, pixel_size, principal, .. } =
+                gradient;
             let axes = [position, right, up, forward].map(|v| v.length_squared());
             let [a, b] = principal;
-            self.sum += axes.iter().sum::<f64>() + pixel_size * pixel_size + a * a + b * b;
+            let lens = [*pixel_size, *a, *b, gradient.aperture_radius, gradient.focus_distance];
+            self.sum += axes.iter().sum::<f64>() + lens.iter().map(|v| v * v).sum::<f64>();
         }
     }
 
