@@ -6,7 +6,7 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_geom::Mesh;
-use drt_math::{Rgb, RgbVec, Vec3, fm};
+use drt_math::{Affine, Rgb, RgbVec, Vec3, fm};
 
 /// A colour (or a number, in every channel alike) over texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -107,20 +107,39 @@ pub(crate) struct TexturePoint<'a> {
     pub(crate) bary: [f64; 2],
     /// The direction that frames follow instead of that in which u grows.
     pub(crate) tangent: Option<&'a Vec3>,
+    /// From the mesh's space to the world, where that is another: of an instance.
+    pub(crate) to_world: Option<&'a Affine>,
 }
 
 impl<'a> TexturePoint<'a> {
     #[inline]
     pub(crate) fn new(mesh: &'a Mesh, triangle: u32, bary: [f64; 2]) -> Self {
-        Self { mesh, triangle, bary, tangent: None }
+        Self { mesh, triangle, bary, tangent: None, to_world: None }
     }
 
-    /// The shading normal, on the front of the surface.
+    /// A shading normal on the front of the surface, in the world, of any length.
     pub(crate) fn normal(&self) -> Vec3 {
-        let Some(normals) = &self.mesh.normals else { return self.mesh.normal(self.triangle) };
+        let Some(normals) = &self.mesh.normals else { return self.face_normal() };
         let [i, j, k] = self.mesh.triangles[self.triangle as usize].map(|v| normals[v as usize]);
         let [s, t] = self.bary;
-        (i * (1.0 - s - t) + j * s + k * t).normalize()
+        self.normal_to_world(i * (1.0 - s - t) + j * s + k * t)
+    }
+
+    /// The triangle's normal, in the world, of any length.
+    pub(crate) fn face_normal(&self) -> Vec3 {
+        self.normal_to_world(self.mesh.normal(self.triangle))
+    }
+
+    fn normal_to_world(&self, n: Vec3) -> Vec3 {
+        let Some(map) = self.to_world else { return n };
+        let [a, b, c] = map.linear.cols;
+        let side = if map.linear.determinant() < 0.0 { -1.0 } else { 1.0 };
+        (b.cross(c) * n.x + c.cross(a) * n.y + a.cross(b) * n.z) * side
+    }
+
+    /// A displacement in the mesh's space, in the world.
+    pub(crate) fn vector_to_world(&self, v: Vec3) -> Vec3 {
+        self.to_world.map_or(v, |map| map.linear * v)
     }
 
     pub(crate) fn uv(&self) -> [f64; 2] {

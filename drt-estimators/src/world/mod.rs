@@ -504,12 +504,23 @@ impl World {
         g1 * adjoint.dot(j - i) + g2 * adjoint.dot(k - i)
     }
 
+    /// Where the textures of a point are looked up.
+    #[inline]
+    pub(crate) fn texture_point(&self, s: &SurfacePoint) -> TexturePoint<'_> {
+        let mesh = &self.scene.shapes[s.shape as usize].mesh;
+        let mut at = TexturePoint::new(mesh, s.triangle, s.bary);
+        if s.prim as usize >= self.geometry.prims.len() {
+            at.to_world = self.scene.placement(s.shape as usize);
+        }
+        at
+    }
+
     /// The scattering function at a vertex; `None` at points.
     pub(crate) fn scattering(&self, v: &Vertex) -> Option<Scattering<'_>> {
         match &v.kind {
             Kind::Surface(s) => {
                 let shape = &self.scene.shapes[s.shape as usize];
-                let at = TexturePoint::new(&shape.mesh, s.triangle, s.bary);
+                let at = self.texture_point(s);
                 let bsdf = &self.scene.bsdfs[shape.bsdf].item;
                 Some(Scattering::Surface(bsdf.at(
                     Some(at),

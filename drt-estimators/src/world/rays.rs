@@ -5,7 +5,6 @@ use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::TrackingStats;
 
 use crate::model::rendering::Counters;
-use crate::model::texture::TexturePoint;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{Crossing, RayPath, World, intervals};
 
@@ -173,7 +172,7 @@ impl World {
         let ray = Ray { origin: v.x, dir, t_max: short_of(v.x, distance) };
         path.hits.clear();
         let blocks = |prim: u32| {
-            let shape = self.geometry.prims[prim as usize].shape;
+            let shape = self.geometry.prim(prim).shape;
             !self.is_null(shape) && !self.bsdf_of(shape).passes_straight()
         };
         if self.geometry.bvh.crossings(&ray, Self::skip_of(v), blocks, &mut path.hits) {
@@ -182,8 +181,7 @@ impl World {
         let met = path.crossings.len();
         self.cross(path, dir, medium);
         let through = |s: &SurfacePoint| {
-            let mesh = &self.scene.shapes[s.shape as usize].mesh;
-            let at = TexturePoint::new(mesh, s.triangle, s.bary);
+            let at = self.texture_point(s);
             self.bsdf_of(s.shape).straight(Some(&at), s.ns.dot(dir).abs())
         };
         let crossed = path.crossings[met..].iter().filter(|c| !self.is_null(c.point.shape));

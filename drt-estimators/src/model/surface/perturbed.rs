@@ -127,7 +127,7 @@ impl Perturbed {
                 let [by_u, by_v] = by_coordinates(at);
                 let lifted = |by: Vec3, slope: Rgb| by.reject(front) + front * (scale * slope.r);
                 let normal = lifted(by_u, slopes[0]).cross(lifted(by_v, slopes[1]));
-                let side = at.mesh.normal(at.triangle).dot(normal);
+                let side = at.face_normal().dot(normal);
                 frame.to_local(if side < 0.0 { -normal } else { normal })
             }
         };

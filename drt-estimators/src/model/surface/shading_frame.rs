@@ -25,10 +25,10 @@ pub(super) fn is_front(at: &TexturePoint<'_>, n: Vec3) -> bool {
     n.dot(at.normal()) >= 0.0
 }
 
-/// How the point moves as u and v grow, in its triangle; along any frame's axes where the mesh has no coordinates.
+/// How the point moves in the world as u and v grow, in its triangle; along any frame's axes where the mesh has no coordinates.
 pub(super) fn by_coordinates(at: &TexturePoint<'_>) -> [Vec3; 2] {
     let any = || {
-        let frame = Frame::from_normal(at.mesh.normal(at.triangle));
+        let frame = Frame::from_normal(at.face_normal().normalize());
         [frame.s, frame.t]
     };
     let Some(texcoords) = &at.mesh.texcoords else { return any() };
@@ -38,5 +38,9 @@ pub(super) fn by_coordinates(at: &TexturePoint<'_>) -> [Vec3; 2] {
     let ([u1, v1], [u2, v2]) = ([u1 - u, v1 - v], [u2 - u, v2 - v]);
     let determinant = u1 * v2 - v1 * u2;
     let [by_u, by_v] = [e1 * v2 - e2 * v1, e2 * u1 - e1 * u2].map(|d| d / determinant);
-    if by_u.is_finite() && by_v.is_finite() { [by_u, by_v] } else { any() }
+    if by_u.is_finite() && by_v.is_finite() {
+        [by_u, by_v].map(|by| at.vector_to_world(by))
+    } else {
+        any()
+    }
 }

@@ -45,6 +45,28 @@ fn frames_follow_coordinates_on_both_sides() {
     }
 }
 
+/// Frames of an instance are those of its mesh in the world.
+#[test]
+fn instances_take_their_frames_along() {
+    let mirrored = vec3(-0.7, 1.4, 0.9);
+    for scale in [vec3(0.7, 1.4, 0.9), mirrored] {
+        let rows = [vec3(0.6, -0.8, 0.1), vec3(0.8, 0.6, 0.2), vec3(0.1, -0.3, 1.0)];
+        let [a, b, c] = rows.map(|r| vec3(r.x * scale.x, r.y * scale.y, r.z * scale.z));
+        let linear = drt_math::Mat3::from_rows(a, b, c);
+        let map = drt_math::Affine { linear, translation: vec3(1.0, 2.0, 3.0) };
+        let mesh = square(false);
+        let placed = mesh.transform(&map);
+        for bary in [[0.2, 0.3], [0.6, 0.1]] {
+            let own = TexturePoint::new(&placed, 0, bary);
+            let at = TexturePoint { to_world: Some(&map), ..TexturePoint::new(&mesh, 0, bary) };
+            let n = own.normal().normalize();
+            assert!((at.normal().normalize() - n).max_abs() < 1e-12);
+            let [a, b] = [&own, &at].map(|at| shading_frame(Some(at), n));
+            assert!((a.s - b.s).max_abs() < 1e-12 && (a.t - b.t).max_abs() < 1e-12);
+        }
+    }
+}
+
 #[test]
 fn a_map_of_the_surfaces_own_normals_changes_nothing() {
     let mesh = square(false);
