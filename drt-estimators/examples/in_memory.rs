@@ -109,5 +109,6 @@ fn fog_with_ball() -> Result<Scene, Box<dyn std::error::Error>> {
             },
         )],
         integrator: Integrator { max_depth: Some(6), ..Integrator::default() },
+        ..Scene::default()
     })
 }

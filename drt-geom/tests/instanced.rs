@@ -75,7 +75,7 @@ fn instances_are_what_their_copies_are() {
                 flat.closest_through(&ray, skip, odd, &mut b),
             );
             assert!(same(x, y) && all(&a, &b), "{ray:?}");
-            for blocks in [&|_: u32| false as bool, &odd as &dyn Fn(u32) -> bool] {
+            for blocks in [&|_: u32| false, &odd as &dyn Fn(u32) -> bool] {
                 let x = two.crossings(&ray, skip, blocks, &mut a);
                 assert_eq!(x, flat.crossings(&ray, skip, blocks, &mut b));
                 assert!(all(&a, &b), "{ray:?}");

@@ -177,6 +177,7 @@ fn stage() -> Scene {
         ],
         sensors: vec![Named::new("camera", SceneSensor { sensor, medium, sample_count: None })],
         integrator: Integrator { max_depth: Some(6), rr_depth: 4, ..Integrator::default() },
+        ..Scene::default()
     }
 }
 
