@@ -130,8 +130,9 @@ pub struct Settings {
     /// Samples in antithetic pairs: image points mirrored at the pixel's centre (2021 paper, §5.4), and rays
     /// mirrored in narrow lobes that turn. Derivatives by roughness are always estimated by pairs.
     pub antithetic: bool,
-    /// Choose samples by how things move. Expected values do not change. Reverse mode does not
-    /// know it: forward mode is its exact transpose only without.
+    /// Choose samples by how things move, and boundary samples by what a pilot of them has found: at most an eighth of the samples, which
+    /// are then forgotten. Expected values do not change. Forward and reverse mode choose apart: they are exact transposes of each
+    /// other only without.
     pub guiding: bool,
     /// Of [`EstimatorKind::Radiative`]: query an edge from every vertex of a path (2019 paper), at a cost
     /// quadratic in its length; `boundary_ratio` then counts the camera's edges alone. Else one vertex of each path

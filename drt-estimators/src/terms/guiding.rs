@@ -36,7 +36,7 @@ const BATCH: usize = 512;
 /// A pilot of so many samples stops where the gain is below 1 + [`HOPE`], one of n times as many below 1 + n [`HOPE`]: fewer
 /// tell little of what more will.
 const ENOUGH: usize = 16_384;
-const HOPE: f64 = 0.05;
+const HOPE: f64 = 0.03;
 
 /// A receiver of samples that keeps how large they are.
 pub(crate) trait Sizes: BoundarySink {

@@ -13,8 +13,14 @@ use crate::edges::edge::Edge;
 /// The size of all places to that of all directions.
 const PLACES: f64 = 2.0;
 
+/// As many edges are told apart in any order.
+const FEW: usize = 256;
+
 /// Puts edges, each with something of its own, in the order of a kd-tree's leaves.
 pub(super) fn sort_by_likeness<T>(edges: &mut [(Edge, T)]) {
+    if edges.len() <= FEW {
+        return;
+    }
     let (mut low, mut high) = (Vec3::splat(f64::INFINITY), Vec3::splat(f64::NEG_INFINITY));
     for (e, _) in edges.iter() {
         let middle = e.wedge.at(0.5);

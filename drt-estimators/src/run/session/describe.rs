@@ -98,7 +98,10 @@ pub(super) fn describe_guide(source: BoundarySource, guiding: &Guiding) -> Strin
             1.0 / learnt.gain,
             guide.cells()
         ),
-        None => alloc::format!("{name}: no, a pilot of {samples} samples found nothing to gain"),
+        None => alloc::format!(
+            "{name}: no, a pilot of {samples} samples promises {:.2} of the work",
+            1.0 / learnt.gain
+        ),
     }
 }
 

@@ -19,8 +19,8 @@ use drt_math::Real;
 
 use super::{DEFENSIVE, DIMENSIONS, Guide, Node};
 
-/// The most observations of one guide: 2 MB.
-pub(crate) const MOST_OBSERVATIONS: usize = 1 << 16;
+/// The most observations of one guide: 4 MB.
+pub(crate) const MOST_OBSERVATIONS: usize = 1 << 17;
 
 /// The gain below which there is no guide: more than observations left out have been seen to promise where there is
 /// none.

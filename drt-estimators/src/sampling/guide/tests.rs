@@ -92,17 +92,17 @@ fn points_have_the_density_that_is_told() {
         let inside = |[a, b, c, _]: [f64; DIMENSIONS]| {
             f64::from(a > box_of[0] && a < box_of[1] && b < 0.6 && c > 0.2)
         };
-        let [mut drawn, mut told] = [Moments::default(); 2];
+        let [mut drawn, mut claimed] = [Moments::default(); 2];
         for _ in 0..40_000 {
             drawn.push(inside(guide.draw(core::array::from_fn(|_| rng.next_f64())).point));
             let mut even: [f64; DIMENSIONS] = core::array::from_fn(|_| rng.next_f64());
             even[0] = box_of[0] + (box_of[1] - box_of[0]) * even[0];
-            told.push((box_of[1] - box_of[0]) * inside(even) * guide.density(even));
+            claimed.push((box_of[1] - box_of[0]) * inside(even) * guide.density(even));
         }
-        let z = welch_z(&drawn, &told);
+        let z = welch_z(&drawn, &claimed);
         assert!(z.abs() < 4.0, "{box_of:?}: {z}");
         // Twice the density is seen.
-        assert!((2.0 * told.mean() - drawn.mean()).abs() > 8.0 * drawn.standard_error());
+        assert!((2.0 * claimed.mean() - drawn.mean()).abs() > 8.0 * drawn.standard_error());
     }
 }
 
