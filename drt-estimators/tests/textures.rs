@@ -4,23 +4,17 @@ mod common;
 
 use common::*;
 use drt_estimators::emitter::Emitter;
-use drt_estimators::surface::{Bsdf, Property, Textured};
-use drt_estimators::texture::{Bitmap, Texture, TextureFilter, UvMap};
-use drt_estimators::{EstimatorKind, Scene, Session, Settings, Unattended, finite_differences};
+use drt_estimators::surface::Property;
+use drt_estimators::texture::{TextureFilter, TextureWrap};
+use drt_estimators::{
+    Estimate, EstimatorKind, Layer, PathSampling, Scene, Session, Settings, Unattended,
+    finite_differences,
+};
 use drt_geom::procedural;
-use drt_math::{Rgb, Rng, Vec3, vec3};
+use drt_math::{Rgb, ValueChange, Vec3, vec3};
+use drt_motion::Parameter;
 
 const SPP: u32 = 512;
-
-fn image(seed: u64, [low, high]: [f32; 2], filter: TextureFilter) -> Texture {
-    let mut rng = Rng::new(seed, 0, 0);
-    let mut value = || low + (high - low) * rng.next_f64() as f32;
-    let texels = (0..16).map(|_| [value(), value(), value()]).collect();
-    let to_uv = UvMap([[1.5, 0.3, 0.1], [0.0, 1.2, 0.0]]);
-    let mut image = Bitmap::new([4, 4], texels).expect("an image");
-    (image.filter, image.to_uv) = (filter, to_uv);
-    Texture::Bitmap(image)
-}
 
 /// A floor that fills the view under an even sky: without its texture nothing that slides would change.
 fn floor(filter: TextureFilter) -> Scene {
@@ -28,9 +22,10 @@ fn floor(filter: TextureFilter) -> Scene {
     let textures =
         [(Property::Reflectance, [0.1, 0.9]), (Property::SpecularReflectance, [0.0, 0.4])];
     let textures = textures.into_iter().enumerate();
-    let textures = textures.map(|(i, (p, range))| (p, image(i as u64, range, filter))).collect();
-    let bsdf = Bsdf::Textured(Box::new(Textured::new(phong(), textures).expect("textures")));
-    let bsdf = b.bsdf("floor-bsdf", twosided(bsdf));
+    let textures = textures
+        .map(|(i, (p, range))| (p, image(i as u64, range, filter, TextureWrap::Repeat)))
+        .collect();
+    let bsdf = b.bsdf("floor-bsdf", twosided(textured(phong(), textures)));
     let plain = procedural::rectangle();
     let uv = |p: Vec3| [0.5 * (p.x + 1.0), 0.5 * (p.y + 1.0)];
     let corners = (0..2).map(|i| plain.triangle(i).map(uv)).collect();
@@ -41,36 +36,30 @@ fn floor(filter: TextureFilter) -> Scene {
     b.camera(vec3(0.4, 0.8, 6.0), Vec3::ZERO, 2)
 }
 
-/// Mean derivatives of all pixels and channels by what each parameter moves, with their standard errors; and those by
-/// finite differences.
-fn both(estimator: EstimatorKind, filter: TextureFilter) -> Vec<[[f64; 2]; 2]> {
-    let scene = floor(filter);
-    let shift = || drt_motion::GeometryChange::Translate(vec3(0.6, 0.3, 0.0));
-    let parameters =
-        ["floor", "camera"].map(|target| parameter(target, 0.0, vec![moves(target, shift())]));
+/// The sum over all pixels and channels, with its standard error.
+fn sum(layer: &Layer) -> [f64; 2] {
+    let sum = |f: fn(&Estimate) -> Rgb| layer.pixels.iter().map(|p| f(p).sum()).sum::<f64>();
+    [sum(|p| p.mean), sum(|p| p.stderr * p.stderr).sqrt()]
+}
+
+/// Sums of derivatives by each parameter.
+fn derivatives(
+    scene: &Scene,
+    parameters: &[Parameter],
+    settings: &Settings,
+    spp: u32,
+) -> Vec<[f64; 2]> {
+    let mut session = Session::new(scene, parameters, settings).expect("a valid scene");
+    assert!(session.run(spp, &Unattended));
+    session.rendering().derivatives.iter().map(|d| sum(&d.total)).collect()
+}
+
+/// Those by finite differences. Values jump, or the choice of lobes does: of small steps few samples would tell all.
+fn differences(scene: &Scene, parameters: &[Parameter], spp: u32, step: f64) -> Vec<[f64; 2]> {
+    let estimator = EstimatorKind::FiniteDifference;
     let settings = Settings { estimator, threads: 1, ..Settings::default() };
-    let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
-    assert!(session.run(SPP, &Unattended));
-    let rendering = session.rendering();
-    let settings = Settings { estimator: EstimatorKind::FiniteDifference, ..settings };
-    // Values jump, or the choice of lobes does: of small steps few samples would tell all.
-    let step = 0.02;
-    let differences = finite_differences(&scene, &parameters, &settings, SPP, step, &Unattended);
-    let differences = differences.expect("a valid scene");
-    rendering
-        .derivatives
-        .iter()
-        .zip(&differences)
-        .map(|(d, f)| {
-            [&d.total, f].map(|layer| {
-                let sum = |f: fn(&drt_estimators::Estimate) -> Rgb| {
-                    layer.pixels.iter().map(|p| f(p).sum()).sum::<f64>()
-                };
-                let variance = sum(|p| p.stderr * p.stderr);
-                [sum(|p| p.mean), variance.sqrt()]
-            })
-        })
-        .collect()
+    let differences = finite_differences(scene, parameters, &settings, spp, step, &Unattended);
+    differences.expect("a valid scene").iter().map(sum).collect()
 }
 
 #[test]
@@ -82,7 +71,14 @@ fn values_slide_under_moving_rays() {
         (Radiative, TextureFilter::Bilinear),
         (Warped, TextureFilter::Bilinear),
     ] {
-        for [[own, error], [other, other_error]] in both(estimator, filter) {
+        let scene = floor(filter);
+        let shift = || drt_motion::GeometryChange::Translate(vec3(0.6, 0.3, 0.0));
+        let parameters =
+            ["floor", "camera"].map(|target| parameter(target, 0.0, vec![moves(target, shift())]));
+        let settings = Settings { estimator, threads: 1, ..Settings::default() };
+        let own = derivatives(&scene, &parameters, &settings, SPP);
+        let others = differences(&scene, &parameters, SPP, 0.02);
+        for ([own, error], [other, other_error]) in own.into_iter().zip(others) {
             let error = error.hypot(other_error);
             assert!((own - other).abs() < 4.0 * error, "{estimator:?}: {own} {other} +- {error}");
             // What a texture without slopes would have is far away.
@@ -90,6 +86,60 @@ fn values_slide_under_moving_rays() {
             assert!(resolved, "{estimator:?}: {other} +- {error}");
         }
     }
+}
+
+/// By texels, by numbers of what has textures, and by both at once, away from zero.
+#[test]
+fn texels_change() {
+    let scene = textures();
+    let all = |target, property, op| changes_texel(target, property, None, op);
+    let some = |target, property, at, op| changes_texel(target, property, Some(at), op);
+    let (grow, colours) =
+        (ValueChange::MultiplyLog(1.0), ValueChange::Add(Rgb::new(0.5, 0.2, 1.0)));
+    let parameters = [
+        parameter("wear", 0.1, vec![all("ball-bsdf", "alpha", grow)]),
+        parameter("spot of wear", 0.0, vec![some("ball-bsdf", "alpha", [1, 2], grey(1.0))]),
+        parameter("shine", 0.0, vec![all("ball-bsdf", "specular_reflectance", grow)]),
+        parameter("stain", 0.0, vec![some("floor-bsdf", "reflectance", [0, 1], colours)]),
+        parameter("bleach", 0.2, vec![all("floor", "reflectance", grow)]),
+        parameter("white", 0.0, vec![some("floor", "specular_reflectance", [1, 0], grey(1.0))]),
+    ];
+    use EstimatorKind::{PathSpace, Radiative, Warped};
+    let ends = [PathSampling::Unidirectional, PathSampling::Bidirectional];
+    let others = differences(&scene, &parameters, SPP, 0.1);
+    for (estimator, sampling) in [(PathSpace, ends[0]), (Radiative, ends[0]), (Warped, ends[1])] {
+        let settings = Settings { estimator, sampling, threads: 1, ..Settings::default() };
+        let found = derivatives(&scene, &parameters, &settings, SPP / 2);
+        for (i, parameter) in parameters.iter().enumerate() {
+            let (name, [own, error], [other, other_error]) = (&parameter.name, found[i], others[i]);
+            let error = error.hypot(other_error);
+            assert!((own - other).abs() < 4.0 * error, "{name}: {own} {other} +- {error}");
+            assert!(other.abs() > 12.0 * error, "{name}: {other} +- {error}");
+        }
+    }
+}
+
+#[test]
+fn texels_that_are_not_there_are_refused() {
+    let scene = textures();
+    let fails = |effect: drt_motion::Effect, part: &str| {
+        let parameters = [parameter("stain", 0.0, vec![effect])];
+        let session = Session::new(&scene, &parameters, &Settings::default());
+        let message = session.err().expect("a refusal").to_string();
+        assert!(message.contains(part) && message.contains("stain"), "{message}");
+    };
+    let some = |target, property| changes_texel(target, property, Some([4, 1]), grey(1.0));
+    fails(some("floor-bsdf", "reflectance"), "no texel [4, 1]");
+    fails(some("floor-bsdf", "exponent"), "no texture stands for `exponent`");
+    fails(some("bulb", "intensity"), "have texels");
+    fails(some("camera", "fov"), "have texels");
+    let colour = ValueChange::Add(Rgb::new(1.0, 0.0, 0.0));
+    fails(changes_texel("ball-bsdf", "alpha", None, colour), "a single number");
+    fails(changes_voxel("ball-bsdf", "alpha", [0, 0, 0], grey(1.0)), "have voxels");
+    let dark = parameter("dark", 1.0, vec![changes("floor-bsdf", "reflectance", grey(-1.0))]);
+    let session = Session::new(&scene, &[dark], &Settings::default());
+    let message = session.err().expect("a refusal").to_string();
+    assert!(message.contains("\"reflectance\" is -"), "{message}");
 }
 
 #[test]

@@ -504,15 +504,21 @@ impl World {
         g1 * adjoint.dot(j - i) + g2 * adjoint.dot(k - i)
     }
 
+    /// Where textures are looked up at a point.
+    #[inline]
+    pub(crate) fn texture_point(&self, s: &SurfacePoint) -> TexturePoint<'_> {
+        let mesh = &self.scene.shapes[s.shape as usize].mesh;
+        TexturePoint::new(mesh, s.triangle, s.bary)
+    }
+
     /// The scattering function at a vertex; `None` at points.
     pub(crate) fn scattering(&self, v: &Vertex) -> Option<Scattering<'_>> {
         match &v.kind {
             Kind::Surface(s) => {
                 let shape = &self.scene.shapes[s.shape as usize];
-                let at = TexturePoint::new(&shape.mesh, s.triangle, s.bary);
                 let bsdf = &self.scene.bsdfs[shape.bsdf].item;
                 Some(Scattering::Surface(bsdf.at(
-                    Some(at),
+                    Some(self.texture_point(s)),
                     s.ng,
                     s.ns,
                     shape.mesh.normals.is_some(),

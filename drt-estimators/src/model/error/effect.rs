@@ -26,6 +26,9 @@ pub enum EffectError {
     /// Voxels of anything but a medium.
     #[error("only the grids of a medium have voxels")]
     NoVoxels,
+    /// Texels of what has no textures.
+    #[error("only textures of BSDFs have texels")]
+    NoTexels,
     /// A medium that follows more than one shape that deforms.
     #[error("it follows two shapes that deform; it can follow one")]
     TwoLeaders,
