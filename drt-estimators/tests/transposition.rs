@@ -279,13 +279,18 @@ fn voxels() {
 /// Texels, with what their textures are on at rest and moving.
 #[test]
 fn texels() {
-    let scene = textures();
+    let scene = under_an_image(textures());
     let effects = vec![
         changes_texel("ball-bsdf", "alpha", Some([1, 2]), grey(0.4)),
         changes_texel("ball-bsdf", "specular_reflectance", None, ValueChange::Multiply(0.7)),
         changes_texel("floor-bsdf", "reflectance", None, coloured()),
         changes_texel("floor-bsdf", "specular_reflectance", Some([1, 0]), coloured()),
         changes("floor-bsdf", "exponent", grey(2.0)),
+        changes_texel("glow", "radiance", None, coloured()),
+        changes("glow", "radiance", coloured()),
+        changes_texel("sky", "radiance", Some([5, 3]), coloured()),
+        changes_texel("sky", "radiance", None, ValueChange::MultiplyLog(0.4)),
+        moves("sky", turn()),
     ];
     for estimator in [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped] {
         let alone = Settings { estimator, ..settings() };

@@ -33,6 +33,8 @@ enum GroupKind {
     Voxels(drt_medium::Property),
     /// Each texel's value, channel by channel; of a number, that alone.
     Texels { of: surface::Property, number: bool },
+    /// Each texel's value of the image that tells an emitter's light.
+    LightTexels,
 }
 
 pub(super) fn groups(
@@ -83,15 +85,28 @@ pub(super) fn groups(
 /// The texels that stand for a property of a target, or of the BSDF that it has.
 fn texels(scene: &Scene, target: Target, property: Option<&str>) -> Result<ParameterGroup, String> {
     let name = property.ok_or("`texels` need the `property` that they stand for")?;
+    let no_texture = || format!("no texture stands for `{name}`, so it has no texels");
     let target = match target {
+        Target::Shape(s) if name == "radiance" => {
+            Target::Emitter(scene.shapes[s].emitter.ok_or_else(no_texture)?)
+        }
         Target::Shape(s) => Target::Bsdf(scene.shapes[s].bsdf),
         other => other,
     };
-    let Target::Bsdf(b) = target else { return Err("only textures of BSDFs have texels".into()) };
+    let b = match target {
+        Target::Bsdf(b) => b,
+        Target::Emitter(e) => {
+            let emitter = &scene.emitters[e].item.emitter;
+            emitter.property(name).map_err(|e| e.to_string())?;
+            emitter.texels().ok_or_else(no_texture)?;
+            return Ok(ParameterGroup { target, kind: GroupKind::LightTexels });
+        }
+        _ => return Err("only textures of BSDFs and emitters have texels".into()),
+    };
     let of = surface::Property::from_name(name).map_err(|e| e.to_string())?;
     let bsdf = &scene.bsdfs[b].item;
     if bsdf.texels(of).is_none() {
-        return Err(format!("no texture stands for `{name}`, so it has no texels"));
+        return Err(no_texture());
     }
     let number = bsdf.is_number(of) == Some(true);
     Ok(ParameterGroup { target, kind: GroupKind::Texels { of, number } })
@@ -112,6 +127,7 @@ impl ParameterGroup {
     pub(crate) fn collector(&self, given: &Scene, scene: &Scene) -> Collector {
         match (&self.kind, self.target) {
             (GroupKind::Voxels(property), Target::Medium(m)) => Collector::Voxels(m, *property),
+            (GroupKind::LightTexels, Target::Emitter(e)) => Collector::LightTexels(e),
             (GroupKind::Texels { of, number }, Target::Bsdf(b)) => {
                 Collector::Texels { bsdf: b, of: *of, number: *number }
             }
@@ -141,6 +157,7 @@ pub(crate) enum Collector {
         of: surface::Property,
         number: bool,
     },
+    LightTexels(usize),
     Shape {
         shape: usize,
         /// As the file has it.
@@ -177,6 +194,10 @@ impl Collector {
                         out.extend(values.iter().flat_map(|v| v.to_array()));
                     }
                 }
+            }
+            Self::LightTexels(emitter) => {
+                let Some(texels) = &gradient.emitter_texels[*emitter] else { return };
+                out.extend(texels.values().iter().flat_map(|v| v.to_array()));
             }
             Self::Shape { shape, file, mesh, normals, weights } => {
                 let Some(of) = &gradient.shapes[*shape] else { return };

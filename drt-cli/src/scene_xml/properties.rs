@@ -183,10 +183,17 @@ impl<'a> Properties<'a> {
     /// A colour of light.
     pub(super) fn light(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
         if let Some((e, _)) = self.texture(name)? {
-            let message = format!("a texture cannot stand for `{name}` here; only BSDFs have them");
+            let message = format!(
+                "a texture cannot stand for `{name}` here; only BSDFs and area emitters have them"
+            );
             return Err(e.error(message));
         }
         self.value(name, spectrum::TAGS, spectrum::emitted)
+    }
+
+    /// The texture that varies that stands for a colour of light.
+    pub(super) fn light_texture(&self, name: &'static str) -> Result<Option<Texture>, CliError> {
+        Ok(self.texture(name)?.map(|(_, texture)| texture))
     }
 
     /// A texture that varies, with its element; whatever else has the name is not asked for.

@@ -10,7 +10,7 @@ use crate::derivative::medium_motion::MediumMotions;
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, TextureUse, VelocityFunctional,
 };
-use crate::derivative::tangents::{Tangents, TexelMotion};
+use crate::derivative::tangents::Tangents;
 use crate::model::emitter::EmitterGradient;
 use crate::model::sensor::SensorGradient;
 use crate::model::surface::{BsdfParams, BsdfTangent, Property};
@@ -31,21 +31,21 @@ impl Motion {
         fn some<T>(lists: &[Vec<T>]) -> Vec<bool> {
             lists.iter().map(|l| !l.is_empty()).collect()
         }
-        let textured = |bsdf: usize| {
-            let is_its = |t: &TexelMotion| matches!(t.of, TextureUse::Bsdf(b, _) if b == bsdf);
-            tangents.texels.iter().any(is_its)
-        };
+        let mut bsdfs = some(&tangents.bsdfs);
+        let mut emitters = some(&tangents.emitters);
+        for change in &tangents.texels {
+            match change.of {
+                TextureUse::Bsdf(b, _) => bsdfs[b] = true,
+                TextureUse::Emitter(e) => emitters[e] = true,
+            }
+        }
         let active = ActiveInputs {
             shapes: some(&tangents.shapes),
             volumes: some(&insides.velocities),
             media: some(&tangents.media),
             grids: tangents.media.iter().map(|l| l.iter().any(|(_, t)| t.moves_grids())).collect(),
-            bsdfs: some(&tangents.bsdfs)
-                .into_iter()
-                .enumerate()
-                .map(|(b, changes)| changes || textured(b))
-                .collect(),
-            emitters: some(&tangents.emitters),
+            bsdfs,
+            emitters,
             moving_emitters: tangents
                 .emitters
                 .iter()
@@ -81,7 +81,7 @@ impl Motion {
             match change.of {
                 TextureUse::Bsdf(bsdf, Property::Alpha) => factors.roughness[bsdf] = true,
                 TextureUse::Bsdf(bsdf, Property::Eta) => factors.index[bsdf] = true,
-                TextureUse::Bsdf(..) => {}
+                TextureUse::Bsdf(..) | TextureUse::Emitter(_) => {}
             }
         }
         factors

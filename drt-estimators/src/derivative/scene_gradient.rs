@@ -27,6 +27,8 @@ pub struct SceneGradient {
     pub bsdfs: Vec<Option<BsdfParams>>,
     /// Per scattering model: with respect to the texels of each texture, by what that stands for.
     pub texels: Vec<Vec<(Property, TexelGradient)>>,
+    /// Per emitter: with respect to the texels of the image that tells its light.
+    pub emitter_texels: Vec<Option<TexelGradient>>,
     /// Per emitter.
     pub emitters: Vec<Option<EmitterGradient>>,
     /// With respect to the camera.
@@ -57,6 +59,10 @@ impl SceneGradient {
                     None => Vec::new(),
                 })
                 .collect(),
+            emitter_texels: (active.emitters.iter().zip(&scene.emitters))
+                .map(|(wanted, e)| e.item.emitter.texels().filter(|_| *wanted))
+                .map(|size| size.map(TexelGradient::zeros))
+                .collect(),
             emitters: some(&active.emitters, |_| EmitterGradient::default()),
             sensor: active.sensor.then(SensorGradient::default),
             counters: Counters::default(),
@@ -84,6 +90,7 @@ impl SceneGradient {
                 a.iter_mut().zip(b).for_each(|((_, a), (_, b))| a.add(b));
             }
         }
+        each(&mut self.emitter_texels, &o.emitter_texels, TexelGradient::add);
         each(&mut self.emitters, &o.emitters, |a, b| *a += *b);
         if let (Some(a), Some(b)) = (&mut self.sensor, &o.sensor) {
             *a += *b;

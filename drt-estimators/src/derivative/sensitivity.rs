@@ -129,6 +129,8 @@ impl ActiveInputs {
 pub(crate) enum TextureUse {
     /// A property of a BSDF.
     Bsdf(usize, Property),
+    /// The radiance of an emitter.
+    Emitter(usize),
 }
 
 /// A receiver of sensitivities.

@@ -14,7 +14,7 @@ use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotio
 
 use crate::derivative::grid_deformation::{GridDeformation, GridDeformationError};
 use crate::derivative::sensitivity::TextureUse;
-use crate::model::emitter::{Emitter, EmitterTangent};
+use crate::model::emitter::{Emitter, EmitterError, EmitterTangent};
 use crate::model::error::{EffectError, Error};
 use crate::model::scene::{Scene, Target};
 use crate::model::sensor::{Sensor, SensorTangent};
@@ -405,11 +405,29 @@ impl Apply<'_> {
             reason: e.into(),
         })?;
         let changes = self.geometry(target)?;
-        let placeless = emitter.is_environment() || matches!(emitter, Emitter::Area { .. });
+        let turns = matches!(emitter, Emitter::Envmap { .. });
+        let is_turn = |c: &&Applied<'_, _>| matches!(c.change, GeometryChange::Rotate { .. });
+        if let Some(other) = changes.iter().find(|c| turns && !is_turn(c)) {
+            return Err(self.fail(other.parameter, target, EmitterError::OnlyTurns));
+        }
+        let placeless = !turns && (emitter.is_environment() || emitter.is_area());
         if let Some(first) = changes.first().filter(|_| placeless) {
             return Err(self.fail(first.parameter, target, EffectError::NoPlace));
         }
-        let (emitter, tangents) = self.placed(target, emitter)?;
+        let (mut emitter, tangents) = self.placed(target, emitter)?;
+        let parameters = self.parameters;
+        for (p, parameter, change) in effects_on(parameters, target) {
+            let Change::Property(PropertyChange { property, op, texels: Some(texels), .. }) =
+                change
+            else {
+                continue;
+            };
+            emitter.property(property).map_err(|e| self.fail(p, target, e))?;
+            let found = emitter.change_texels(texels.one(), *op, parameter.value);
+            let (change, rates) = found.map_err(|e| self.fail(p, target, e))?;
+            let of = TextureUse::Emitter(i);
+            add_texels(&mut self.tangents.texels, of, p, &change, rates);
+        }
         self.scene.emitters[i].item.emitter = emitter;
         self.tangents.emitters.push(keep(tangents, |t| !t.is_zero()));
         Ok(())
@@ -467,12 +485,17 @@ impl Apply<'_> {
             if c.voxels.is_some() {
                 return Err(self.fail(p, target, EffectError::NoVoxels));
             }
-            if c.texels.is_some() {
-                return Err(self.fail(p, target, EffectError::NoTexels));
+            match target {
+                // That is another matter.
+                Target::Emitter(_) if c.texels.is_some() => continue,
+                _ if c.texels.is_some() => {
+                    return Err(self.fail(p, target, EffectError::NoTexels));
+                }
+                _ => done.push(&c.property),
             }
-            done.push(&c.property);
-            let changes =
+            let mut changes =
                 drt_motion::parameter::property_changes(self.parameters, &target, &c.property);
+            changes.retain(|c| c.change.texels.is_none());
             let changed = change_value(&changes, None, self.parameters.len())
                 .map_err(|e| self.fail(e.parameter, target, e.cause))?;
             change(&c.property, &changed).map_err(|reason| self.fail(p, target, reason))?;

@@ -213,7 +213,12 @@ impl Scene {
                 let reason = ElementError::NoDerivatives { bsdf, parameter };
                 return Err(unusable(&s.id, "shape", i, reason));
             }
-            if slide && bsdf.is_discontinuous_on(&s.mesh) {
+            let discontinuous = |e: usize| match &self.emitters[e].item.emitter {
+                Emitter::TexturedArea { texture, .. } => !texture.is_continuous_on(&s.mesh),
+                _ => false,
+            };
+            if slide && (bsdf.is_discontinuous_on(&s.mesh) || s.emitter.is_some_and(discontinuous))
+            {
                 let parameter = parameter.into();
                 return Err(unusable(
                     &s.id,

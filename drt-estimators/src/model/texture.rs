@@ -339,12 +339,13 @@ impl Texture {
         }
     }
 
-    /// Columns and rows of texels: of a checkerboard, its two colours.
+    /// Columns and rows of texels: of a checkerboard, its two colours; of an attribute, none.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
         match self {
             Self::Checkerboard { .. } => [2, 1],
             Self::Bitmap(image) => image.size,
+            Self::Attribute(_) => [0; 2],
         }
     }
 
@@ -356,14 +357,16 @@ impl Texture {
         Some(match self {
             Self::Checkerboard { colours, .. } => colours[index],
             Self::Bitmap(image) => image.texel(index as u32),
+            Self::Attribute(_) => return None,
         })
     }
 
-    /// The texels that make up the value at texture coordinates.
-    pub(crate) fn footprint(&self, uv: [f64; 2]) -> Footprint {
+    /// The texels that make up the value at texture coordinates; `None` of an attribute.
+    pub(crate) fn footprint(&self, uv: [f64; 2]) -> Option<Footprint> {
         match self {
-            Self::Checkerboard { to_uv, .. } => Footprint::of(square(to_uv, uv) as u32),
-            Self::Bitmap(image) => image.footprint(uv),
+            Self::Checkerboard { to_uv, .. } => Some(Footprint::of(square(to_uv, uv) as u32)),
+            Self::Bitmap(image) => Some(image.footprint(uv)),
+            Self::Attribute(_) => None,
         }
     }
 
@@ -381,6 +384,7 @@ impl Texture {
                 change.apply(&mut image.texels)?;
                 Ok(rates)
             }
+            Self::Attribute(a) => Err(TexelError::NoTexture(a.name.clone())),
         }
     }
 
@@ -438,6 +442,21 @@ impl Texture {
             }),
             Self::Attribute(_) => [self.mean(); 2],
         }
+    }
+
+    /// About the mean of the values on a triangle of a mesh.
+    pub(crate) fn mean_on(&self, mesh: &Mesh, triangle: u32) -> Rgb {
+        const ROWS: u32 = 8;
+        let mut sum = Rgb::ZERO;
+        // The middles of that many equal triangles squared, which come in pairs but in the last row.
+        for (i, j) in (0..ROWS).flat_map(|i| (0..ROWS - i).map(move |j| (i, j))) {
+            let middle = |by: f64| [i, j].map(|k| (f64::from(k) + by) / f64::from(ROWS));
+            sum += self.at_point(&TexturePoint::new(mesh, triangle, middle(1.0 / 3.0)));
+            if i + j + 1 < ROWS {
+                sum += self.at_point(&TexturePoint::new(mesh, triangle, middle(2.0 / 3.0)));
+            }
+        }
+        sum * (1.0 / f64::from(ROWS * ROWS))
     }
 
     /// The mean of all values over the texture's own period; for an attribute, which depends on the mesh, that of 0 and 1.

@@ -578,14 +578,20 @@ impl AdjointSink for ScatterSink<'_> {
     }
 
     fn texels(&mut self, of: TextureUse, footprint: &Footprint, adjoint: Rgb) {
-        let TextureUse::Bsdf(bsdf, property) = of;
         let adjoint = adjoint * self.weights;
         if !adjoint.is_finite() {
             self.sums.scene.non_finite += 1;
             return;
         }
-        let textures = self.sums.scene.texels[bsdf].iter_mut();
-        for (_, gradient) in textures.filter(|(p, _)| *p == property) {
+        let sums = &mut self.sums.scene;
+        let gradient = match of {
+            TextureUse::Bsdf(bsdf, property) => {
+                let mut textures = sums.texels[bsdf].iter_mut();
+                textures.find(|(p, _)| *p == property).map(|(_, gradient)| gradient)
+            }
+            TextureUse::Emitter(emitter) => sums.emitter_texels[emitter].as_mut(),
+        };
+        if let Some(gradient) = gradient {
             gradient.scatter(footprint, adjoint);
         }
     }

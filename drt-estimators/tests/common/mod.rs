@@ -5,7 +5,7 @@ pub mod pairing;
 
 use std::sync::Arc;
 
-use drt_estimators::emitter::Emitter;
+use drt_estimators::emitter::{Emitter, EnvironmentMap};
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::{
@@ -401,12 +401,28 @@ pub fn textures() -> Scene {
         ],
     );
     let mut scene = surfaces(metal, twosided(floor));
+    let lamp = scene.emitters.iter_mut().find(|e| e.id.as_deref() == Some("glow")).expect("one");
+    lamp.item.emitter = Emitter::TexturedArea {
+        radiance: Rgb::new(3.0, 2.5, 2.0),
+        texture: image(4, [0.1, 1.0], Bilinear, TextureWrap::Repeat),
+    };
     let uv = |p: Vec3| [0.3 * p.x + 0.1, 0.3 * p.z + 0.2];
     for shape in &mut scene.shapes {
         let mesh = (*shape.mesh).clone();
         let corners = (0..mesh.triangles.len() as u32).map(|i| mesh.triangle(i).map(uv)).collect();
         shape.mesh = Arc::new(mesh.with_texcoords(corners).expect("coordinates"));
     }
+    scene
+}
+
+/// The sky being an image.
+pub fn under_an_image(mut scene: Scene) -> Scene {
+    let mut rng = Rng::new(5, 0, 0);
+    let texels = (0..24).map(|_| [0; 3].map(|_| 0.1 + rng.next_f64() as f32)).collect();
+    let frame = Mat3::rotation(vec3(0.48, 0.64, 0.6), 0.5);
+    let map = EnvironmentMap::new([6, 4], texels, frame).expect("a map");
+    let sky = scene.emitters.iter_mut().find(|e| e.id.as_deref() == Some("sky")).expect("one");
+    sky.item.emitter = Emitter::Envmap { radiance: Rgb::new(0.2, 0.3, 0.5), map: Arc::new(map) };
     scene
 }
 

@@ -1,8 +1,8 @@
 //! One parameter that changes many things, as reverse mode sees it: the items it wants, and the
 //! pairing of their gradient with the parameter's velocities.
 
+use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, BsdfChange, Property};
-use drt_estimators::texture::Texture;
 use drt_estimators::{Scene, SceneGradient, Target};
 use drt_math::{Affine, Rgb, Vec3};
 use drt_medium::MediumChange;
@@ -72,12 +72,16 @@ fn plain(bsdf: &Bsdf) -> &Bsdf {
     }
 }
 
-fn texels(texture: &Texture, c: &PropertyChange, gradient: &[Rgb]) -> f64 {
-    let width = texture.size()[0] as usize;
+fn texels(
+    size: [u32; 2],
+    texel: impl Fn([usize; 2]) -> Option<Rgb>,
+    c: &PropertyChange,
+    gradient: &[Rgb],
+) -> f64 {
+    let width = size[0] as usize;
     let changed =
         |i: &usize| c.texels.and_then(Texels::one).is_none_or(|[x, y]| y * width + x == *i);
-    let rate =
-        |i: usize| c.op.map_rate(0.0).value(texture.texel([i % width, i / width]).expect("one"));
+    let rate = |i: usize| c.op.map_rate(0.0).value(texel([i % width, i / width]).expect("one"));
     (0..gradient.len()).filter(changed).map(|i| gradient[i].dot(rate(i))).sum()
 }
 
@@ -100,7 +104,7 @@ fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient
                 let Bsdf::Textured(bsdf) = plain(&scene.bsdfs[i].item) else { unreachable!() };
                 let textures = bsdf.textures.iter();
                 let (_, texture) = textures.clone().find(|(p, _)| *p == property).expect("one");
-                return texels(texture, c, &gradient.values());
+                return texels(texture.size(), |at| texture.texel(at), c, &gradient.values());
             }
             let tangent = scene.bsdfs[i].item.tangent(&BsdfChange { property, op }, 0.0);
             let velocity = tangent.expect("a valid change");
@@ -108,6 +112,17 @@ fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient
         }
         Target::Emitter(i) => {
             let emitter = &scene.emitters[i].item.emitter;
+            if let (Some(_), Some(gradient)) = (c.texels, &g.emitter_texels[i]) {
+                return match emitter {
+                    Emitter::TexturedArea { texture, .. } => {
+                        texels(texture.size(), |at| texture.texel(at), c, &gradient.values())
+                    }
+                    Emitter::Envmap { map, .. } => {
+                        texels(map.size(), |at| map.texel(at), c, &gradient.values())
+                    }
+                    _ => unreachable!("no others have texels"),
+                };
+            }
             let rate = op.rate(emitter.property(&c.property).expect("a property"), 0.0);
             let tangent = emitter.property_tangent(&c.property, rate).expect("a valid change");
             g.emitters[i].as_ref().expect("wanted").dot(&tangent)

@@ -34,7 +34,7 @@ use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Coefficients;
 
 use crate::derivative::adjoint::antithetic::Apart;
-use crate::derivative::adjoint::emitters::{LightEnd, light_moves, strength};
+use crate::derivative::adjoint::emitters::{LightEnd, area, light_moves, surroundings};
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 use crate::derivative::adjoint::turning::RayMotion;
@@ -210,8 +210,7 @@ impl<'w> Differentiator<'w> {
             Endpoint::Environment => {
                 let environment = world.lights.environment().filter(|_| lit.by_surroundings());
                 let Some(environment) = environment else { return };
-                let seen = environment.shape(arrival.dir) * arrival.emission_weight;
-                strength(environment.emitter, theta * seen, sink);
+                surroundings(environment, arrival.dir, theta * arrival.emission_weight, sink);
                 environment.radiance(arrival.dir) * arrival.emission_weight
             }
             Endpoint::Surface(vertex) => {
@@ -224,7 +223,8 @@ impl<'w> Differentiator<'w> {
                     && point.ng.dot(arrival.dir) < 0.0
                 {
                     emitted = world.emitted(point, -arrival.dir) * arrival.emission_weight;
-                    strength(e, theta * arrival.emission_weight, sink);
+                    let adjoint = theta * arrival.emission_weight;
+                    area(world, e, point, adjoint, &mut here, sink);
                 }
                 emitted + collected
             }

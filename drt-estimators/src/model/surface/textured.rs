@@ -71,6 +71,9 @@ impl Textured {
     ) -> Result<Option<(TexelChange, TexelTangent)>, SurfaceError> {
         let found = self.textures.iter_mut().find(|(p, _)| *p == property);
         let Some((_, texture)) = found else { return Ok(None) };
+        if texture.size() == [0; 2] {
+            return Err(SurfaceError::StoodFor { property });
+        }
         let change = change(texture.size())?;
         let rates = texture.change(&change)?;
         let mean = texture.mean();
@@ -84,8 +87,10 @@ impl Textured {
         let uv = at.uv();
         for (property, texture) in &self.textures {
             let value = texture.at(uv);
-            if allowed(*property, value) == value {
-                f(*property, &texture.footprint(uv));
+            if let Some(footprint) = texture.footprint(uv)
+                && allowed(*property, value) == value
+            {
+                f(*property, &footprint);
             }
         }
     }
@@ -165,7 +170,7 @@ impl Bsdf {
     /// Columns and rows of texels of the texture that stands for a property, if one does that can change.
     #[must_use]
     pub fn texels(&self, property: Property) -> Option<[u32; 2]> {
-        Some(self.textured_part()?.texture(property)?.size())
+        Some(self.textured_part()?.texture(property)?.size()).filter(|size| *size != [0; 2])
     }
 
     /// What has textures; of two sides alike, one of them.

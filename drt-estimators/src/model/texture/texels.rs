@@ -99,10 +99,10 @@ impl TexelChange {
         if self.covers(texel) { self.op.at(value, self.theta) } else { value }
     }
 
-    /// Changes texels as images store them.
-    pub(crate) fn apply(&self, texels: &mut Arc<Vec<[f32; 3]>>) -> Result<(), TexelError> {
+    /// Changes texels as images store them; false where they stay what they are.
+    pub(crate) fn apply(&self, texels: &mut Arc<Vec<[f32; 3]>>) -> Result<bool, TexelError> {
         if self.is_identity() {
-            return Ok(());
+            return Ok(false);
         }
         let texels = Arc::make_mut(texels);
         let all = match self.texel {
@@ -116,7 +116,7 @@ impl TexelChange {
                 return Err(TexelError::NotFinite);
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     /// The rates of `count` texels, from their values before the change.
