@@ -248,7 +248,7 @@ impl<'a> Properties<'a> {
     /// Refuses what nobody asked for.
     pub(super) fn finish(&self) -> Result<(), CliError> {
         if let Some((name, _)) = self.textures.borrow().first() {
-            let message = format!("a texture cannot stand for `{name}` here; only BSDFs have them");
+            let message = format!("a texture cannot stand for `{name}` here; only BSDFs and area emitters have them");
             return Err(self.element.error(message));
         }
         let used = self.used.borrow();

@@ -173,6 +173,18 @@ impl Bsdf {
         Some(self.textured_part()?.texture(property)?.size()).filter(|size| *size != [0; 2])
     }
 
+    /// Calls `f` with the textures of all its parts and what they stand for.
+    pub fn for_each_texture(&self, mut f: impl FnMut(Property, &Texture)) {
+        let mut parts = alloc::vec![self];
+        while let Some(part) = parts.pop() {
+            match part {
+                Self::Textured(t) => t.textures.iter().for_each(|(p, texture)| f(*p, texture)),
+                Self::TwoSided(b) => parts.extend(b.back.iter().chain([&b.front])),
+                _ => {}
+            }
+        }
+    }
+
     /// What has textures; of two sides alike, one of them.
     pub(crate) fn textured_part(&self) -> Option<&Textured> {
         match self {
