@@ -85,7 +85,7 @@ pub(super) fn groups(
 /// The texels that stand for a property of a target, or of the BSDF that it has.
 fn texels(scene: &Scene, target: Target, property: Option<&str>) -> Result<ParameterGroup, String> {
     let name = property.ok_or("`texels` need the `property` that they stand for")?;
-    let no_texture = || format!("no texture stands for `{name}`, so it has no texels");
+    let no_texture = || format!("no texture stands for `{name}` whose texels could change");
     let target = match target {
         Target::Shape(s) if name == "radiance" => {
             Target::Emitter(scene.shapes[s].emitter.ok_or_else(no_texture)?)

@@ -35,8 +35,8 @@ impl<'a> Loader<'a> {
         let mut medium = Surrounding::Counted;
         let light = |name| Ok::<Rgb, CliError>(p.light(name)?.unwrap_or(Rgb::ONE));
         let emitter = match kind {
-            "area" => match p.light_texture("radiance")? {
-                Some(texture) => Emitter::TexturedArea { radiance: Rgb::ONE, texture },
+            "area" => match p.texture("radiance")? {
+                Some((_, texture)) => Emitter::TexturedArea { radiance: Rgb::ONE, texture },
                 None => Emitter::Area { radiance: light("radiance")? },
             },
             "constant" => Emitter::Constant { radiance: light("radiance")? },

@@ -191,11 +191,6 @@ impl<'a> Properties<'a> {
         self.value(name, spectrum::TAGS, spectrum::emitted)
     }
 
-    /// The texture that varies that stands for a colour of light.
-    pub(super) fn light_texture(&self, name: &'static str) -> Result<Option<Texture>, CliError> {
-        Ok(self.texture(name)?.map(|(_, texture)| texture))
-    }
-
     /// A texture that varies, with its element; whatever else has the name is not asked for.
     pub(super) fn texture(
         &self,
@@ -248,7 +243,9 @@ impl<'a> Properties<'a> {
     /// Refuses what nobody asked for.
     pub(super) fn finish(&self) -> Result<(), CliError> {
         if let Some((name, _)) = self.textures.borrow().first() {
-            let message = format!("a texture cannot stand for `{name}` here; only BSDFs and area emitters have them");
+            let message = format!(
+                "a texture cannot stand for `{name}` here; only BSDFs and area emitters have them"
+            );
             return Err(self.element.error(message));
         }
         let used = self.used.borrow();

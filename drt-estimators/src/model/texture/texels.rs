@@ -18,7 +18,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum TexelError {
     /// Nothing there has texels.
-    #[error("no texture stands for `{0}`, so it has no texels")]
+    #[error("no texture stands for `{0}` whose texels could change")]
     NoTexture(String),
     /// A texel beyond the image.
     #[error(
