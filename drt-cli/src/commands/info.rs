@@ -138,6 +138,7 @@ fn textures(scene: &Scene) -> Table<4> {
     let size = |[w, h]: [u32; 2]| format!("{w} {wide}, {h} {high}");
     let kind = |t: &Texture| match t {
         Texture::Checkerboard { .. } => "checkerboard".into(),
+        Texture::Attribute(a) => format!("attribute {}", a.name),
         Texture::Bitmap(image) => {
             format!("bitmap, {}, {:?}, {:?}", size(t.size()), image.filter, image.wrap)
                 .to_lowercase()
@@ -148,7 +149,11 @@ fn textures(scene: &Scene) -> Table<4> {
     for (i, b) in scene.bsdfs.iter().enumerate() {
         b.item.for_each_texture(|property, texture| {
             let name = name(b.id.as_ref(), "bsdf", i);
-            rows.push([name, property.to_string(), kind(texture), mean(texture.mean())]);
+            let mean = match texture {
+                Texture::Attribute(_) => String::new(),
+                _ => mean(texture.mean()),
+            };
+            rows.push([name, property.into(), kind(texture), mean]);
         });
     }
     for (i, e) in scene.emitters.iter().enumerate() {

@@ -36,6 +36,9 @@ impl<'a> Loader<'a> {
         let light = |name| Ok::<Rgb, CliError>(p.light(name)?.unwrap_or(Rgb::ONE));
         let emitter = match kind {
             "area" => match p.texture("radiance")? {
+                Some((e, Texture::Attribute(_))) => {
+                    return Err(e.error("attributes of meshes are for BSDFs"));
+                }
                 Some((_, texture)) => Emitter::TexturedArea { radiance: Rgb::ONE, texture },
                 None => Emitter::Area { radiance: light("radiance")? },
             },

@@ -173,15 +173,17 @@ impl Bsdf {
         Some(self.textured_part()?.texture(property)?.size()).filter(|size| *size != [0; 2])
     }
 
-    /// Calls `f` with the textures of all its parts and what they stand for.
-    pub fn for_each_texture(&self, mut f: impl FnMut(Property, &Texture)) {
+    /// Calls `f` with the textures of all its parts, and the properties that they stand for; maps of normals and heights have the
+    /// names of their BSDFs.
+    pub fn for_each_texture(&self, mut f: impl FnMut(&'static str, &Texture)) {
         let mut parts = alloc::vec![self];
         while let Some(part) = parts.pop() {
             match part {
-                Self::Textured(t) => t.textures.iter().for_each(|(p, texture)| f(*p, texture)),
-                Self::TwoSided(b) => parts.extend(b.back.iter().chain([&b.front])),
+                Self::Textured(t) => t.textures.iter().for_each(|(p, t)| f(p.name(), t)),
+                Self::Perturbed(b) => f(part.name(), &b.map),
                 _ => {}
             }
+            parts.extend(part.inner());
         }
     }
 
