@@ -10,7 +10,7 @@ use crate::error::Place;
 
 /// Header and magic number together are padded to a multiple of this.
 const ALIGNMENT: usize = 64;
-const MAGIC: &[u8] = b"\x93NUMPY";
+pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 /// 64-bit floats and bytes, as headers call them.
 const FLOATS: &str = "<f8";
 const BYTES: &str = "|u1";
@@ -52,6 +52,42 @@ pub(crate) fn read_npy_bytes(path: &Path) -> Result<Option<Vec<u8>>, CliError> {
     Ok((bytes == header(BYTES, content.len())).then_some(content))
 }
 
+/// Columns and rows of an image, and its pixels row by row: an array of rows × columns × 3 floats of 32 or 64 bits.
+pub(crate) fn read_npy_image(path: &Path) -> Result<([u32; 2], Vec<[f64; 3]>), CliError> {
+    let fail = |message: &str| CliError::input(&Place::file(path), message);
+    let expected = || fail("expected an array of rows x columns x 3 floats, in C order");
+    let bytes = std::fs::read(path).map_err(|e| fail(&format!("cannot read this file: {e}")))?;
+    let number = |at: usize| bytes.get(at).map(|b| usize::from(*b)).ok_or_else(expected);
+    let (length, start) = match number(6)? {
+        1 => (number(8)? + (number(9)? << 8), 10),
+        _ => (number(8)? + (number(9)? << 8) + (number(10)? << 16) + (number(11)? << 24), 12),
+    };
+    let text = bytes.get(start..start + length).ok_or_else(expected)?;
+    let text = String::from_utf8_lossy(text).replace([' ', '\n'], "");
+    let value = |key: &str| text.split_once(&format!("'{key}':")).map(|(_, rest)| rest);
+    if value("fortran_order").is_none_or(|v| !v.starts_with("False")) {
+        return Err(expected());
+    }
+    let shape = value("shape").and_then(|v| v.strip_prefix('(')?.split_once(')'));
+    let sides: Option<Vec<u32>> =
+        shape.and_then(|(s, _)| s.split_terminator(',').map(|n| n.parse().ok()).collect());
+    let Some([height, width, 3]) = sides.as_deref() else { return Err(expected()) };
+    let data = &bytes[start + length..];
+    let values: Vec<f64> = match value("descr").ok_or_else(expected)? {
+        v if v.starts_with("'<f8'") => {
+            data.as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect()
+        }
+        v if v.starts_with("'<f4'") => {
+            data.as_chunks().0.iter().map(|b| f64::from(f32::from_le_bytes(*b))).collect()
+        }
+        _ => return Err(expected()),
+    };
+    if values.len() as u64 != 3 * u64::from(*width) * u64::from(*height) || values.is_empty() {
+        return Err(fail("it is cut off"));
+    }
+    Ok(([*width, *height], values.as_chunks().0.to_vec()))
+}
+
 fn header(kind: &str, length: usize) -> Vec<u8> {
     let mut text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({length},), }}");
     // Before the text: six bytes of magic, two of version and two of length; after it a line's end.
@@ -68,6 +104,40 @@ fn header(kind: &str, length: usize) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn images_are_read() {
+        let folder = crate::testing::Folder::new();
+        let file = |kind: &str, shape: &str, data: &[u8]| {
+            let mut bytes = header(kind, 0);
+            let (text, with) = ("'shape': (0,)", format!("'shape': {shape}"));
+            let mut line = String::from_utf8_lossy(&bytes.split_off(10)).replace(text, &with);
+            line = format!("{}\n", line.trim_end());
+            bytes[8..10].copy_from_slice(&(line.len() as u16).to_le_bytes());
+            bytes.extend(line.into_bytes());
+            bytes.extend(data);
+            folder.file("image.npy", bytes)
+        };
+        let numbers: Vec<f64> = (0..6).map(f64::from).collect();
+        let wide: Vec<u8> = numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let narrow: Vec<u8> = numbers.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect();
+        for (kind, data) in [("<f8", &wide), ("<f4", &narrow)] {
+            let read = read_npy_image(&file(kind, "(1, 2, 3)", data)).unwrap();
+            assert_eq!(read, ([2, 1], vec![[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]));
+        }
+        for (kind, shape, data, part) in [
+            ("<f8", "(1, 2, 3)", &wide[1..], "cut off"),
+            ("<f8", "(2, 3)", &wide[..], "rows x columns x 3"),
+            ("<i8", "(1, 2, 3)", &wide[..], "rows x columns x 3"),
+        ] {
+            let error = read_npy_image(&file(kind, shape, data)).unwrap_err().to_string();
+            assert!(error.contains(part) && error.contains("image.npy"), "{error}");
+        }
+        for cut in [0, 7, 11, 40] {
+            let bytes = std::fs::read(file("<f8", "(1, 2, 3)", &wide)).unwrap();
+            assert!(read_npy_image(&folder.file("cut.npy", &bytes[..cut])).is_err());
+        }
+    }
 
     #[test]
     fn headers_are_aligned() {

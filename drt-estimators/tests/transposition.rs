@@ -276,6 +276,35 @@ fn voxels() {
     agree("in a moving box", &scene, effects, &with_tetrahedra());
 }
 
+/// Texels, with what their textures are on at rest and moving.
+#[test]
+fn texels() {
+    let scene = under_an_image(textures());
+    let effects = vec![
+        changes_texel("ball-bsdf", "alpha", Some([1, 2]), grey(0.4)),
+        changes_texel("ball-bsdf", "specular_reflectance", None, ValueChange::Multiply(0.7)),
+        changes_texel("floor-bsdf", "reflectance", None, coloured()),
+        changes_texel("floor-bsdf", "specular_reflectance", Some([1, 0]), coloured()),
+        changes("floor-bsdf", "exponent", grey(2.0)),
+        changes_texel("glow", "radiance", None, coloured()),
+        changes("glow", "radiance", coloured()),
+        changes_texel("sky", "radiance", Some([5, 3]), coloured()),
+        changes_texel("sky", "radiance", None, ValueChange::MultiplyLog(0.4)),
+        moves("sky", turn()),
+    ];
+    for estimator in [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped] {
+        let alone = Settings { estimator, ..settings() };
+        by_one_estimator("texels", &scene, effects.clone(), &alone, SPP, EXACT);
+        if estimator != EstimatorKind::Radiative {
+            let both = Settings { sampling: PathSampling::Bidirectional, ..alone };
+            by_one_estimator("from both ends", &scene, effects.clone(), &both, SPP, EXACT);
+        }
+    }
+    let mut effects = effects;
+    effects.extend(wobbles(&scene));
+    by_one_estimator("moving", &scene, effects, &settings(), SPP, EXACT);
+}
+
 #[test]
 fn other_settings() {
     let scene = fog();

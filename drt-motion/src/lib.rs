@@ -16,5 +16,5 @@ pub mod volume;
 pub use drt_math::{ValueChange, ValueMap};
 
 pub use error::{Cause, MotionError};
-pub use parameter::{Change, Effect, GeometryChange, Parameter, PropertyChange};
+pub use parameter::{Change, Effect, GeometryChange, Parameter, PropertyChange, Texels};
 pub use surface::{SurfaceMotion, SurfacePoint};

@@ -56,7 +56,7 @@ fn following_in_a_circle() {
 }
 
 fn property(op: ValueChange) -> PropertyChange {
-    PropertyChange { property: "sigma_t".into(), op, voxels: None }
+    PropertyChange { property: "sigma_t".into(), op, voxels: None, texels: None }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use drt_motion::parameter::{Applied, change_value};
 use drt_motion::{Cause, PropertyChange, ValueChange};
 
 fn property(op: ValueChange) -> PropertyChange {
-    PropertyChange { property: "sigma_t".into(), op, voxels: None }
+    PropertyChange { property: "sigma_t".into(), op, voxels: None, texels: None }
 }
 
 #[test]

@@ -33,7 +33,7 @@ pub fn moves(target: &str, change: GeometryChange) -> Effect {
 /// A change of a number.
 #[must_use]
 pub fn changes(target: &str, property: &str, op: ValueChange) -> Effect {
-    let change = PropertyChange { property: property.into(), op, voxels: None };
+    let change = PropertyChange { property: property.into(), op, voxels: None, texels: None };
     Effect { target: target.into(), change: Change::Property(change) }
 }
 
@@ -213,7 +213,8 @@ fn scalar(built: &Built, name: &str) -> Result<Vec<Effect>> {
                 // The library's sigma_t is that after the scale, the file's value that before.
                 let op = ValueChange::Add(Rgb::splat(grid_scale(built)?));
                 let voxels = Some(serde_json::from_str(indices)?);
-                let change = PropertyChange { property: "sigma_t".into(), op, voxels };
+                let change =
+                    PropertyChange { property: "sigma_t".into(), op, voxels, texels: None };
                 let target = medium_id(built, which)?;
                 vec![Effect { target, change: Change::Property(change) }]
             }

@@ -135,7 +135,7 @@ fn rests() -> Vec<Parameter> {
 
 fn paints() -> Vec<Parameter> {
     let op = ValueChange::Add(Rgb::ONE);
-    let change = PropertyChange { property: "reflectance".into(), op, voxels: None };
+    let change = PropertyChange { property: "reflectance".into(), op, voxels: None, texels: None };
     parameter(vec![Effect { target: "gray".into(), change: Change::Property(change) }])
 }
 

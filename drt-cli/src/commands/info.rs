@@ -3,6 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use drt_estimators::emitter::Emitter;
+use drt_estimators::texture::Texture;
 use drt_estimators::{Integrator, MediumBoundary, Scene, Shape, Surrounding};
 use drt_geom::{EdgeClass, Mesh, Topology};
 use drt_medium::{Medium, MediumKind, Phase};
@@ -44,6 +46,7 @@ fn describe(job: &Job) -> String {
     text += &shapes(scene).to_string();
     text += &media(scene).to_string();
     text += &emitters(scene).to_string();
+    text += &textures(scene).to_string();
     text += &sensors(job).to_string();
     text += &parameters(&job.parameters).to_string();
     text
@@ -127,6 +130,42 @@ fn emitters(scene: &Scene) -> Table<3> {
         [name(e.id.as_ref(), "emitter", i), kind.into(), format!("{:?}", strength.to_array())]
     });
     Table::new(["emitter", "kind", "strength"], rows)
+}
+
+/// Images and patterns, by what they stand for.
+fn textures(scene: &Scene) -> Table<4> {
+    let [wide, high] = ["columns", "rows"];
+    let size = |[w, h]: [u32; 2]| format!("{w} {wide}, {h} {high}");
+    let kind = |t: &Texture| match t {
+        Texture::Checkerboard { .. } => "checkerboard".into(),
+        Texture::Attribute(a) => format!("attribute {}", a.name),
+        Texture::Bitmap(image) => {
+            format!("bitmap, {}, {:?}, {:?}", size(t.size()), image.filter, image.wrap)
+                .to_lowercase()
+        }
+    };
+    let mean = |c: drt_math::Rgb| format!("{:.4?}", c.to_array());
+    let mut rows = Vec::new();
+    for (i, b) in scene.bsdfs.iter().enumerate() {
+        b.item.for_each_texture(|property, texture| {
+            let name = name(b.id.as_ref(), "bsdf", i);
+            let mean = match texture {
+                Texture::Attribute(_) => String::new(),
+                _ => mean(texture.mean()),
+            };
+            rows.push([name, property.into(), kind(texture), mean]);
+        });
+    }
+    for (i, e) in scene.emitters.iter().enumerate() {
+        let name = name(e.id.as_ref(), "emitter", i);
+        let (kind, mean) = match &e.item.emitter {
+            Emitter::TexturedArea { texture, .. } => (kind(texture), mean(texture.mean())),
+            Emitter::Envmap { map, .. } => (format!("around, {}", size(map.size())), String::new()),
+            _ => continue,
+        };
+        rows.push([name, "radiance".into(), kind, mean]);
+    }
+    Table::new(["textures of", "property", "kind", "mean"], rows)
 }
 
 fn sensors(job: &Job) -> Table<6> {

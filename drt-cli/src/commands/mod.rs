@@ -15,9 +15,11 @@ mod noise;
 mod optimize;
 mod options;
 mod outputs;
+mod preview;
 mod render;
 mod run;
 mod shard;
+mod shell;
 mod table;
 
 use std::ffi::OsString;
@@ -100,5 +102,8 @@ fn dispatch(command: &Command) -> Result<Outcome, CliError> {
         Command::Bench(options) => bench::run(options),
         Command::Batch(options) => batch::run(options),
         Command::Merge(options) => merge::run(options),
+        Command::Preview(options) => preview::run(options),
+        Command::Completions { shell } => shell::completions(*shell),
+        Command::Man { output } => shell::manual(output.as_deref()),
     }
 }

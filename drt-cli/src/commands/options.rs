@@ -34,6 +34,31 @@ pub(super) enum Command {
     Merge(MergeOptions),
     /// Show what a scene or job holds, and what will run.
     Info(Options),
+    /// Make a picture to look at of the layers of an OpenEXR file.
+    Preview(PreviewOptions),
+    /// Print what completes commands in a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page, or write those of all commands into a folder.
+    Man {
+        /// The folder.
+        #[arg(short, long, value_name = "FOLDER")]
+        output: Option<PathBuf>,
+    },
+}
+
+#[derive(Args, Debug)]
+pub(super) struct PreviewOptions {
+    /// What `drt` wrote, or any other image.
+    pub(super) input: PathBuf,
+    /// Where to write the picture; default: beside the image, as .png.
+    #[arg(short, long, value_name = "FILE.png")]
+    pub(super) output: Option<PathBuf>,
+    /// Only this layer, such as d_NAME (`image` for the image itself); may be repeated. Default: all but standard errors.
+    #[arg(long, value_name = "NAME")]
+    pub(super) layer: Vec<String>,
 }
 
 /// What the commands on one scene or job take.

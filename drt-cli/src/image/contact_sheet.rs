@@ -45,19 +45,51 @@ pub fn write_preview(
     rendering: &Rendering,
     further: &[(String, &Layer)],
 ) -> Result<(), CliError> {
-    let image = means(&rendering.image);
-    let image = tone::exposed(&image, tone::white_of(&image));
+    let image = exposed(&means(&rendering.image));
     let derivatives = rendering.derivatives.iter();
     let mut panels: Vec<(String, Vec<Pixel>)> =
         derivatives.map(|d| (format!("d_{}", d.name), tone::diverging(&means(&d.total)))).collect();
     panels
         .extend(further.iter().map(|(name, layer)| (name.clone(), tone::diverging(&means(layer)))));
-    let [w, h] = rendering.image.size.map(|n| n as usize);
-    let canvas = if panels.is_empty() {
-        Canvas { width: w, height: h, pixels: image }
-    } else {
-        panels.insert(0, ("image".into(), image));
-        sheet(&panels, [w, h])
+    panels.insert(0, ("image".into(), image));
+    write_panels(path, rendering.image.size, &mut panels)
+}
+
+fn exposed(image: &[Rgb]) -> Vec<Pixel> {
+    tone::exposed(image, tone::white_of(image))
+}
+
+/// Writes a preview of layers of a file, by their names: what may be negative from blue through white (zero) to red, each in its own
+/// range, all else as light. One layer is written pixel for pixel.
+pub(crate) fn write_layers(
+    path: &Path,
+    size: [u32; 2],
+    layers: &[(&str, &[[f32; 3]])],
+) -> Result<(), CliError> {
+    let panel = |(name, pixels): &(&str, &[[f32; 3]])| {
+        let image: Vec<Rgb> = pixels.iter().map(|p| p.map(f64::from).into()).collect();
+        let derivative = name.starts_with("d_") || name.starts_with("fd_");
+        let signed = derivative && !is_error(name) || image.iter().any(|p| p.mean() < 0.0);
+        let shown = if name.is_empty() { "image" } else { name };
+        (shown.into(), if signed { tone::diverging(&image) } else { exposed(&image) })
+    };
+    write_panels(path, size, &mut layers.iter().map(panel).collect::<Vec<_>>())
+}
+
+/// True for the name of a layer of standard errors.
+pub(crate) fn is_error(name: &str) -> bool {
+    name == "stderr" || name.ends_with("_stderr")
+}
+
+fn write_panels(
+    path: &Path,
+    size: [u32; 2],
+    panels: &mut [(String, Vec<Pixel>)],
+) -> Result<(), CliError> {
+    let [w, h] = size.map(|n| n as usize);
+    let canvas = match panels {
+        [(_, pixels)] => Canvas { width: w, height: h, pixels: core::mem::take(pixels) },
+        _ => sheet(panels, [w, h]),
     };
     write_atomically(path, |out| {
         Ok(encode_png(out, [canvas.width as u32, canvas.height as u32], &canvas.pixels)?)

@@ -1,4 +1,4 @@
-//! Plain pictures: linear colours from EXR or PNG, and PNG to look at.
+//! Plain pictures: linear colours from EXR, NPY or PNG, and PNG to look at.
 
 use std::fs::File;
 use std::io::{BufReader, Write};
@@ -10,6 +10,7 @@ use super::read_exr;
 use super::tone::Pixel;
 use crate::CliError;
 use crate::error::Place;
+use crate::npy::{MAGIC, read_npy_image};
 
 /// A picture, row by row from the top left.
 pub(crate) struct Picture {
@@ -49,13 +50,18 @@ impl Picture {
     }
 }
 
-/// Reads EXR (its plain `R`, `G`, `B`) or PNG; its first bytes tell which of the two it is.
+/// Reads EXR (its plain `R`, `G`, `B`), NPY or PNG; its first bytes tell which of them it is.
 pub(crate) fn read_picture(path: &Path) -> Result<Picture, CliError> {
     let place = Place::file(path);
     let fail = |reason: &dyn std::fmt::Display| CliError::input(&place, reason);
     let bytes = std::fs::read(path).map_err(|e| fail(&format!("cannot read this file: {e}")))?;
     if bytes.starts_with(b"\x89PNG") {
         return read_png(path).map_err(|e| fail(&e));
+    }
+    if bytes.starts_with(MAGIC) {
+        let (size, values) = read_npy_image(path)?;
+        let values = values.into_iter().map(Rgb::from).collect();
+        return Ok(Picture { size, values, encoded: false });
     }
     let mut file = read_exr(path)?;
     let pixels = file.layers.remove("").ok_or_else(|| fail(&"it has no channels R, G and B"))?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use drt_math::{Affine, Mat3, Rgb, Vec3};
-use drt_motion::{Change, Effect, GeometryChange, PropertyChange, ValueChange};
+use drt_motion::{Change, Effect, GeometryChange, PropertyChange, Texels, ValueChange};
 
 use super::cages::Cages;
 use super::keys::{self, Voxels};
@@ -78,6 +78,7 @@ fn property(keys: &keys::Effect) -> Result<Option<PropertyChange>, String> {
             ("multiply", keys.multiply.is_some()),
             ("log", keys.log.is_some()),
             ("voxels", keys.voxels.is_some()),
+            ("texels", keys.texels.is_some()),
         ];
         return match stray.iter().find(|(_, given)| *given) {
             Some((key, _)) => Err(format!("`{key}` belongs to a `property`, which is missing")),
@@ -102,5 +103,9 @@ fn property(keys: &keys::Effect) -> Result<Option<PropertyChange>, String> {
         None | Some(Voxels::All(_)) => None,
         Some(Voxels::One(voxel)) => Some(voxel),
     };
-    Ok(Some(PropertyChange { property, op, voxels }))
+    let texels = keys.texels.map(|texels| match texels {
+        keys::Texels::All(_) => Texels::All,
+        keys::Texels::One(texel) => Texels::One(texel),
+    });
+    Ok(Some(PropertyChange { property, op, voxels, texels }))
 }

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use drt_estimators::surface;
 use drt_estimators::{Scene, SceneGradient, Target};
 use drt_geom::Mesh;
 use drt_motion::mean_value::{Cage, CageWeights};
@@ -30,6 +31,10 @@ enum GroupKind {
     Cage(Arc<Mesh>),
     /// Each voxel's value, channel by channel.
     Voxels(drt_medium::Property),
+    /// Each texel's value, channel by channel; of a number, that alone.
+    Texels { of: surface::Property, number: bool },
+    /// Each texel's value of the image that tells an emitter's light.
+    LightTexels,
 }
 
 pub(super) fn groups(
@@ -47,13 +52,22 @@ pub(super) fn groups(
             let keys = spanned.get_ref();
             let target = scene.find(&keys.target).map_err(|e| fail(e.to_string()))?;
             let wrong = |what: &str| fail(format!("`{}` is not {what}", keys.target));
-            let kind = match (&keys.vertices, &keys.cage, &keys.voxels) {
-                (Some(_), None, None) => GroupKind::Vertices,
-                (None, Some(cage), None) => GroupKind::Cage(cages.load(&folder.join(&cage.mesh))?),
-                (None, None, Some(_)) => {
+            let kind = match (&keys.vertices, &keys.cage, &keys.voxels, &keys.texels) {
+                (Some(_), None, None, None) => GroupKind::Vertices,
+                (None, Some(cage), None, None) => {
+                    GroupKind::Cage(cages.load(&folder.join(&cage.mesh))?)
+                }
+                (None, None, Some(_), None) => {
                     GroupKind::Voxels(property(keys.property.as_deref()).map_err(fail)?)
                 }
-                _ => return Err(fail("expected one of `vertices`, `cage` and `voxels`".into())),
+                (None, None, None, Some(_)) => {
+                    return texels(scene, target, keys.property.as_deref()).map_err(fail);
+                }
+                _ => {
+                    return Err(fail(
+                        "expected one of `vertices`, `cage`, `voxels` and `texels`".into(),
+                    ));
+                }
             };
             match (&kind, target) {
                 (GroupKind::Voxels(_), Target::Medium(m)) => match scene.media[m].item.grid() {
@@ -66,6 +80,36 @@ pub(super) fn groups(
             }
         })
         .collect()
+}
+
+/// The texels that stand for a property of a target, or of the BSDF that it has.
+fn texels(scene: &Scene, target: Target, property: Option<&str>) -> Result<ParameterGroup, String> {
+    let name = property.ok_or("`texels` need the `property` that they stand for")?;
+    let no_texture = || format!("no texture stands for `{name}` whose texels could change");
+    let target = match target {
+        Target::Shape(s) if name == "radiance" => {
+            Target::Emitter(scene.shapes[s].emitter.ok_or_else(no_texture)?)
+        }
+        Target::Shape(s) => Target::Bsdf(scene.shapes[s].bsdf),
+        other => other,
+    };
+    let b = match target {
+        Target::Bsdf(b) => b,
+        Target::Emitter(e) => {
+            let emitter = &scene.emitters[e].item.emitter;
+            emitter.property(name).map_err(|e| e.to_string())?;
+            emitter.texels().ok_or_else(no_texture)?;
+            return Ok(ParameterGroup { target, kind: GroupKind::LightTexels });
+        }
+        _ => return Err("only textures of BSDFs and emitters have texels".into()),
+    };
+    let of = surface::Property::from_name(name).map_err(|e| e.to_string())?;
+    let bsdf = &scene.bsdfs[b].item;
+    if bsdf.texels(of).is_none() {
+        return Err(no_texture());
+    }
+    let number = bsdf.is_number(of) == Some(true);
+    Ok(ParameterGroup { target, kind: GroupKind::Texels { of, number } })
 }
 
 fn property(name: Option<&str>) -> Result<drt_medium::Property, String> {
@@ -83,6 +127,10 @@ impl ParameterGroup {
     pub(crate) fn collector(&self, given: &Scene, scene: &Scene) -> Collector {
         match (&self.kind, self.target) {
             (GroupKind::Voxels(property), Target::Medium(m)) => Collector::Voxels(m, *property),
+            (GroupKind::LightTexels, Target::Emitter(e)) => Collector::LightTexels(e),
+            (GroupKind::Texels { of, number }, Target::Bsdf(b)) => {
+                Collector::Texels { bsdf: b, of: *of, number: *number }
+            }
             (kind, Target::Shape(s)) => {
                 let (file, mesh) = (given.shapes[s].mesh.clone(), scene.shapes[s].mesh.clone());
                 let weights = match kind {
@@ -104,6 +152,12 @@ impl ParameterGroup {
 /// Takes a group's part out of gradients.
 pub(crate) enum Collector {
     Voxels(usize, drt_medium::Property),
+    Texels {
+        bsdf: usize,
+        of: surface::Property,
+        number: bool,
+    },
+    LightTexels(usize),
     Shape {
         shape: usize,
         /// As the file has it.
@@ -129,6 +183,21 @@ impl Collector {
                     // Has no voxels.
                     drt_medium::Property::G => {}
                 }
+            }
+            Self::Texels { bsdf, of, number } => {
+                let textures = gradient.texels[*bsdf].iter().filter(|(p, _)| p == of);
+                for (_, texels) in textures {
+                    let values = texels.values();
+                    if *number {
+                        out.extend(values.iter().map(|v| v.sum()));
+                    } else {
+                        out.extend(values.iter().flat_map(|v| v.to_array()));
+                    }
+                }
+            }
+            Self::LightTexels(emitter) => {
+                let Some(texels) = &gradient.emitter_texels[*emitter] else { return };
+                out.extend(texels.values().iter().flat_map(|v| v.to_array()));
             }
             Self::Shape { shape, file, mesh, normals, weights } => {
                 let Some(of) = &gradient.shapes[*shape] else { return };

@@ -134,6 +134,7 @@ pub(super) struct Effect {
     pub(super) multiply: Option<f64>,
     pub(super) log: Option<bool>,
     pub(super) voxels: Option<Voxels>,
+    pub(super) texels: Option<Texels>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -176,6 +177,13 @@ pub(super) enum Voxels {
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(untagged, expecting = "expected \"all\" or [column, row]")]
+pub(super) enum Texels {
+    All(All),
+    One([usize; 2]),
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(super) enum All {
     All,
@@ -192,6 +200,7 @@ pub(super) struct ParameterGroup {
     pub(super) vertices: Option<All>,
     pub(super) cage: Option<Cage>,
     pub(super) voxels: Option<All>,
+    pub(super) texels: Option<All>,
 }
 
 #[derive(Debug, Deserialize)]

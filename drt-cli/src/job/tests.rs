@@ -117,8 +117,9 @@ fn geometry_effects() {
 #[test]
 fn property_effects() {
     let of = |keys: &str| change(&format!("property = \"sigma_t\"\n{keys}"));
-    let expected =
-        |op, voxels| Change::Property(PropertyChange { property: "sigma_t".into(), op, voxels });
+    let expected = |op, voxels| {
+        Change::Property(PropertyChange { property: "sigma_t".into(), op, voxels, texels: None })
+    };
     let add = ValueChange::Add(Rgb::new(1.0, 2.0, 3.0));
     assert_eq!(of("add = [1, 2, 3]"), expected(add, None));
     assert_eq!(of("multiply = 2"), expected(ValueChange::Multiply(2.0), None));

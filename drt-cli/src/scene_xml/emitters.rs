@@ -35,7 +35,13 @@ impl<'a> Loader<'a> {
         let mut medium = Surrounding::Counted;
         let light = |name| Ok::<Rgb, CliError>(p.light(name)?.unwrap_or(Rgb::ONE));
         let emitter = match kind {
-            "area" => Emitter::Area { radiance: light("radiance")? },
+            "area" => match p.texture("radiance")? {
+                Some((e, Texture::Attribute(_))) => {
+                    return Err(e.error("attributes of meshes are for BSDFs"));
+                }
+                Some((_, texture)) => Emitter::TexturedArea { radiance: Rgb::ONE, texture },
+                None => Emitter::Area { radiance: light("radiance")? },
+            },
             "constant" => Emitter::Constant { radiance: light("radiance")? },
             "envmap" => envmap(&p)?,
             "point" => {

@@ -32,7 +32,7 @@ use drt_estimators::{Named, Scene};
 use drt_math::Rgb;
 
 use crate::CliError;
-use crate::error::{Warning, read_text};
+use crate::error::{Place, Warning, read_text};
 use element::Element;
 use index::Index;
 use properties::Properties;
@@ -95,9 +95,30 @@ fn parse_scene(
     defaults: &Defaults,
 ) -> Result<(Scene, Vec<Warning>), CliError> {
     let root = SceneFiles::new(defaults).read(path, text)?;
+    missing_files(path, &root)?;
     let loader = Loader { index: Index::new(&root)?, warnings: RefCell::default() };
     let scene = loader.scene(&root)?;
     Ok((scene, loader.warnings.into_inner()))
+}
+
+/// Refuses a scene several of whose files are missing, naming all of them; of a single one its reader tells.
+fn missing_files(path: &Path, root: &Element) -> Result<(), CliError> {
+    fn visit(e: &Element, found: &mut Vec<String>) {
+        let file = e.attribute("name") == Some("filename") && e.tag == "string";
+        if let Some(name) = e.attribute("value").filter(|_| file)
+            && let Err(error) = e.resolve(name)
+        {
+            found.push(error.to_string());
+        }
+        e.children.iter().for_each(|child| visit(child, found));
+    }
+    let mut found = Vec::new();
+    visit(root, &mut found);
+    if found.len() < 2 {
+        return Ok(());
+    }
+    let message = format!("{} files are missing:\n  {}", found.len(), found.join("\n  "));
+    Err(CliError::input(&Place::file(path), message))
 }
 
 /// Turns elements into things of the scene.

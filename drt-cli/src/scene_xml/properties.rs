@@ -183,7 +183,9 @@ impl<'a> Properties<'a> {
     /// A colour of light.
     pub(super) fn light(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
         if let Some((e, _)) = self.texture(name)? {
-            let message = format!("a texture cannot stand for `{name}` here; only BSDFs have them");
+            let message = format!(
+                "a texture cannot stand for `{name}` here; only BSDFs and area emitters have them"
+            );
             return Err(e.error(message));
         }
         self.value(name, spectrum::TAGS, spectrum::emitted)
@@ -241,7 +243,9 @@ impl<'a> Properties<'a> {
     /// Refuses what nobody asked for.
     pub(super) fn finish(&self) -> Result<(), CliError> {
         if let Some((name, _)) = self.textures.borrow().first() {
-            let message = format!("a texture cannot stand for `{name}` here; only BSDFs have them");
+            let message = format!(
+                "a texture cannot stand for `{name}` here; only BSDFs and area emitters have them"
+            );
             return Err(self.element.error(message));
         }
         let used = self.used.borrow();

@@ -239,7 +239,12 @@ fn moves(targets: &[&str], i: u32) -> Parameter {
 fn paints(target: &str, property: &str, i: u32) -> Parameter {
     let v = unlike(i);
     let op = ValueChange::Add(Rgb::new(v.x, v.y, v.z));
-    let change = Change::Property(PropertyChange { property: property.into(), op, voxels: None });
+    let change = Change::Property(PropertyChange {
+        property: property.into(),
+        op,
+        voxels: None,
+        texels: None,
+    });
     parameter(i, vec![Effect { target: target.into(), change }])
 }
 

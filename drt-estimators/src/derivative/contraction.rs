@@ -8,12 +8,13 @@ use drt_motion::interior::BasisValues;
 
 use crate::derivative::medium_motion::MediumMotions;
 use crate::derivative::sensitivity::{
-    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, VelocityFunctional,
+    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, TextureUse, VelocityFunctional,
 };
 use crate::derivative::tangents::Tangents;
 use crate::model::emitter::EmitterGradient;
 use crate::model::sensor::SensorGradient;
-use crate::model::surface::{BsdfParams, BsdfTangent};
+use crate::model::surface::{BsdfParams, BsdfTangent, Property};
+use crate::model::texture::Footprint;
 use crate::world::vertex::MaterialPoint;
 use crate::world::{ActiveFactors, MediumActivity, World};
 
@@ -30,13 +31,21 @@ impl Motion {
         fn some<T>(lists: &[Vec<T>]) -> Vec<bool> {
             lists.iter().map(|l| !l.is_empty()).collect()
         }
+        let mut bsdfs = some(&tangents.bsdfs);
+        let mut emitters = some(&tangents.emitters);
+        for change in &tangents.texels {
+            match change.of {
+                TextureUse::Bsdf(b, _) => bsdfs[b] = true,
+                TextureUse::Emitter(e) => emitters[e] = true,
+            }
+        }
         let active = ActiveInputs {
             shapes: some(&tangents.shapes),
             volumes: some(&insides.velocities),
             media: some(&tangents.media),
             grids: tangents.media.iter().map(|l| l.iter().any(|(_, t)| t.moves_grids())).collect(),
-            bsdfs: some(&tangents.bsdfs),
-            emitters: some(&tangents.emitters),
+            bsdfs,
+            emitters,
             moving_emitters: tangents
                 .emitters
                 .iter()
@@ -62,12 +71,20 @@ impl Motion {
         type Changes = Vec<(usize, BsdfTangent)>;
         let roughens = |changes: &Changes| changes.iter().any(|(_, t)| !t.alpha.is_zero());
         let bends = |changes: &Changes| changes.iter().any(|(_, t)| !t.eta.is_zero());
-        ActiveFactors {
+        let mut factors = ActiveFactors {
             media: self.tangents.media.iter().map(need).collect(),
             bsdfs: self.active.bsdfs.clone(),
             roughness: self.tangents.bsdfs.iter().map(roughens).collect(),
             index: self.tangents.bsdfs.iter().map(bends).collect(),
+        };
+        for change in &self.tangents.texels {
+            match change.of {
+                TextureUse::Bsdf(bsdf, Property::Alpha) => factors.roughness[bsdf] = true,
+                TextureUse::Bsdf(bsdf, Property::Eta) => factors.index[bsdf] = true,
+                TextureUse::Bsdf(..) | TextureUse::Emitter(_) => {}
+            }
         }
+        factors
     }
 
     pub(crate) fn parameters(&self) -> usize {
@@ -198,6 +215,12 @@ impl AdjointSink for Contraction<'_> {
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
         for (p, tangent) in &self.motion.tangents.bsdfs[bsdf] {
             self.rates[*p] += params.dot(tangent) * weight;
+        }
+    }
+
+    fn texels(&mut self, of: TextureUse, footprint: &Footprint, adjoint: Rgb) {
+        for change in self.motion.tangents.texels.iter().filter(|t| t.of == of) {
+            self.rates[change.parameter] += change.tangent.at(footprint) * adjoint;
         }
     }
 

@@ -11,7 +11,8 @@ use crate::model::emitter::EmitterGradient;
 use crate::model::rendering::Counters;
 use crate::model::scene::Scene;
 use crate::model::sensor::SensorGradient;
-use crate::model::surface::BsdfParams;
+use crate::model::surface::{BsdfParams, Property};
+use crate::model::texture::TexelGradient;
 use crate::world::World;
 
 /// The gradient of a loss with respect to a scene. Entries that were not asked for are `None`.
@@ -24,6 +25,10 @@ pub struct SceneGradient {
     pub media: Vec<Option<MediumGradient>>,
     /// Per scattering model: with respect to its parameters (scalars: the sum over channels).
     pub bsdfs: Vec<Option<BsdfParams>>,
+    /// Per scattering model: with respect to the texels of each texture, by what that stands for.
+    pub texels: Vec<Vec<(Property, TexelGradient)>>,
+    /// Per emitter: with respect to the texels of the image that tells its light.
+    pub emitter_texels: Vec<Option<TexelGradient>>,
     /// Per emitter.
     pub emitters: Vec<Option<EmitterGradient>>,
     /// With respect to the camera.
@@ -44,6 +49,20 @@ impl SceneGradient {
             shapes: some(&active.shapes, |i| VertexGradient::zeros(&scene.shapes[i].mesh)),
             media: some(&active.media, |i| MediumGradient::zeros(&scene.media[i].item)),
             bsdfs: some(&active.bsdfs, |_| BsdfParams::default()),
+            texels: (active.bsdfs.iter().zip(&scene.bsdfs))
+                .map(|(wanted, bsdf)| match bsdf.item.textured_part().filter(|_| *wanted) {
+                    Some(t) => t
+                        .textures
+                        .iter()
+                        .map(|(p, t)| (*p, TexelGradient::zeros(t.size())))
+                        .collect(),
+                    None => Vec::new(),
+                })
+                .collect(),
+            emitter_texels: (active.emitters.iter().zip(&scene.emitters))
+                .map(|(wanted, e)| e.item.emitter.texels().filter(|_| *wanted))
+                .map(|size| size.map(TexelGradient::zeros))
+                .collect(),
             emitters: some(&active.emitters, |_| EmitterGradient::default()),
             sensor: active.sensor.then(SensorGradient::default),
             counters: Counters::default(),
@@ -64,6 +83,14 @@ impl SceneGradient {
         each(&mut self.shapes, &o.shapes, VertexGradient::add);
         each(&mut self.media, &o.media, MediumGradient::add);
         each(&mut self.bsdfs, &o.bsdfs, |a, b| a.scatter(b, Rgb::ONE));
+        for (a, b) in self.texels.iter_mut().zip(&o.texels) {
+            if a.is_empty() {
+                a.clone_from(b);
+            } else {
+                a.iter_mut().zip(b).for_each(|((_, a), (_, b))| a.add(b));
+            }
+        }
+        each(&mut self.emitter_texels, &o.emitter_texels, TexelGradient::add);
         each(&mut self.emitters, &o.emitters, |a, b| *a += *b);
         if let (Some(a), Some(b)) = (&mut self.sensor, &o.sensor) {
             *a += *b;

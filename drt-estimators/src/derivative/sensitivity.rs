@@ -10,7 +10,8 @@ use drt_medium::{CoefficientRates, DepthEstimate};
 
 use crate::model::emitter::EmitterGradient;
 use crate::model::sensor::SensorGradient;
-use crate::model::surface::BsdfParams;
+use crate::model::surface::{BsdfParams, Property};
+use crate::model::texture::Footprint;
 use crate::world::vertex::{MaterialPoint, Matter};
 
 /// Per channel, the change of a value per unit of each entry of a surface point's jet.
@@ -123,6 +124,15 @@ impl ActiveInputs {
     }
 }
 
+/// What texels stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TextureUse {
+    /// A property of a BSDF.
+    Bsdf(usize, Property),
+    /// The radiance of an emitter.
+    Emitter(usize),
+}
+
 /// A receiver of sensitivities.
 pub(crate) trait AdjointSink {
     /// What it depends on.
@@ -139,6 +149,8 @@ pub(crate) trait AdjointSink {
     fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb);
     /// Of a material's parameters; `weight` multiplies channel by channel.
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb);
+    /// Of a value that texels make up.
+    fn texels(&mut self, of: TextureUse, footprint: &Footprint, adjoint: Rgb);
     /// Of an emitter, per channel.
     fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]);
     /// Of the camera, per channel.
@@ -180,6 +192,10 @@ impl AdjointSink for Scaled<'_> {
 
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
         self.sink.bsdf(bsdf, params, weight * self.by);
+    }
+
+    fn texels(&mut self, of: TextureUse, footprint: &Footprint, adjoint: Rgb) {
+        self.sink.texels(of, footprint, adjoint * self.by);
     }
 
     fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]) {

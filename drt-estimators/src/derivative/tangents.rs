@@ -10,14 +10,16 @@ use drt_math::{Affine, Rgb};
 use drt_medium::{MediumChange, MediumTangent};
 use drt_motion::parameter::{Applied, change_value, geometry_changes};
 use drt_motion::surface::{SmoothNormals, move_affine, move_mesh};
-use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotion};
+use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotion, Texels};
 
 use crate::derivative::grid_deformation::{GridDeformation, GridDeformationError};
-use crate::model::emitter::{Emitter, EmitterTangent};
+use crate::derivative::sensitivity::TextureUse;
+use crate::model::emitter::{Emitter, EmitterError, EmitterTangent};
 use crate::model::error::{EffectError, Error};
 use crate::model::scene::{Scene, Target};
 use crate::model::sensor::{Sensor, SensorTangent};
-use crate::model::surface::{BsdfChange, BsdfTangent, Property};
+use crate::model::surface::{BsdfChange, BsdfTangent, Property, SurfaceError};
+use crate::model::texture::{TexelChange, TexelError, TexelTangent};
 
 /// What changes with each parameter: for every item of the scene, the parameters that change it
 /// (by index) and how.
@@ -29,11 +31,36 @@ pub(crate) struct Tangents {
     pub(crate) smooth: Vec<Option<SmoothNormals>>,
     pub(crate) media: Vec<Vec<(usize, MediumTangent)>>,
     pub(crate) bsdfs: Vec<Vec<(usize, BsdfTangent)>>,
+    pub(crate) texels: Vec<TexelMotion>,
     pub(crate) emitters: Vec<Vec<(usize, EmitterTangent)>>,
     /// Of every sensor.
     sensors: Vec<Vec<(usize, SensorTangent)>>,
     /// Of the one that is in use.
     pub(crate) sensor: Vec<(usize, SensorTangent)>,
+}
+
+/// How texels change with a parameter.
+#[derive(Clone, Debug)]
+pub(crate) struct TexelMotion {
+    pub(crate) of: TextureUse,
+    pub(crate) parameter: usize,
+    pub(crate) tangent: TexelTangent,
+}
+
+/// Adds the rates with a parameter to those that earlier changes of the same texels gave.
+fn add_texels(
+    to: &mut Vec<TexelMotion>,
+    of: TextureUse,
+    parameter: usize,
+    change: &TexelChange,
+    tangent: TexelTangent,
+) {
+    let mut own = TexelMotion { of, parameter, tangent };
+    to.iter_mut().filter(|t| t.of == of).for_each(|t| t.tangent.carry(change));
+    match to.iter_mut().find(|t| t.of == of && t.parameter == parameter) {
+        Some(sum) => sum.tangent.add(core::mem::take(&mut own.tangent)),
+        None => to.push(own),
+    }
 }
 
 impl Tangents {
@@ -178,6 +205,7 @@ pub(crate) fn apply(scene: &Scene, parameters: &[Parameter]) -> Result<(Scene, T
         let tangents = applied.sensor(i)?;
         applied.tangents.sensors.push(tangents);
     }
+    applied.tangents.texels.retain(|t| !t.tangent.is_zero());
     Ok((applied.scene, applied.tangents))
 }
 
@@ -228,6 +256,9 @@ impl Apply<'_> {
         for (p, parameter, change) in effects_on(parameters, target) {
             let theta = parameter.value;
             let Change::Property(change) = change else { continue };
+            if change.texels.is_some() {
+                return Err(self.fail(p, target, EffectError::NoTexels));
+            }
             let change = self.medium_change(p, target, change)?;
             for t in &mut tangents {
                 t.push_through(&change, theta);
@@ -334,9 +365,23 @@ impl Apply<'_> {
             let Change::Property(c) = change else {
                 return Err(self.fail(p, target, EffectError::NotMovable));
             };
+            if c.voxels.is_some() {
+                return Err(self.fail(p, target, EffectError::NoVoxels));
+            }
             let theta = parameter.value;
             let property = Property::from_name(&c.property).map_err(|e| self.fail(p, target, e))?;
             let change = BsdfChange { property, op: c.op };
+            let bsdf = &mut self.scene.bsdfs[i].item;
+            let texels = bsdf.change_texels(&change, c.texels.and_then(Texels::one), theta);
+            if let Some((change, rates)) = texels.map_err(|e| self.fail(p, target, e))? {
+                let of = TextureUse::Bsdf(i, property);
+                add_texels(&mut self.tangents.texels, of, p, &change, rates);
+                continue;
+            }
+            if c.texels.is_some() {
+                let reason = TexelError::NoTexture(c.property.clone());
+                return Err(self.fail(p, target, SurfaceError::Texels(reason)));
+            }
             let bsdf = &mut self.scene.bsdfs[i].item;
             let own = bsdf.tangent(&change, theta);
             let own = own.and_then(|t| bsdf.apply(&change, theta).map(|()| t));
@@ -360,11 +405,29 @@ impl Apply<'_> {
             reason: e.into(),
         })?;
         let changes = self.geometry(target)?;
-        let placeless = emitter.is_environment() || matches!(emitter, Emitter::Area { .. });
+        let turns = matches!(emitter, Emitter::Envmap { .. });
+        let is_turn = |c: &&Applied<'_, _>| matches!(c.change, GeometryChange::Rotate { .. });
+        if let Some(other) = changes.iter().find(|c| turns && !is_turn(c)) {
+            return Err(self.fail(other.parameter, target, EmitterError::OnlyTurns));
+        }
+        let placeless = !turns && (emitter.is_environment() || emitter.is_area());
         if let Some(first) = changes.first().filter(|_| placeless) {
             return Err(self.fail(first.parameter, target, EffectError::NoPlace));
         }
-        let (emitter, tangents) = self.placed(target, emitter)?;
+        let (mut emitter, tangents) = self.placed(target, emitter)?;
+        let parameters = self.parameters;
+        for (p, parameter, change) in effects_on(parameters, target) {
+            let Change::Property(PropertyChange { property, op, texels: Some(texels), .. }) =
+                change
+            else {
+                continue;
+            };
+            emitter.property(property).map_err(|e| self.fail(p, target, e))?;
+            let found = emitter.change_texels(texels.one(), *op, parameter.value);
+            let (change, rates) = found.map_err(|e| self.fail(p, target, e))?;
+            let of = TextureUse::Emitter(i);
+            add_texels(&mut self.tangents.texels, of, p, &change, rates);
+        }
         self.scene.emitters[i].item.emitter = emitter;
         self.tangents.emitters.push(keep(tangents, |t| !t.is_zero()));
         Ok(())
@@ -422,9 +485,17 @@ impl Apply<'_> {
             if c.voxels.is_some() {
                 return Err(self.fail(p, target, EffectError::NoVoxels));
             }
-            done.push(&c.property);
-            let changes =
+            match target {
+                // That is another matter.
+                Target::Emitter(_) if c.texels.is_some() => continue,
+                _ if c.texels.is_some() => {
+                    return Err(self.fail(p, target, EffectError::NoTexels));
+                }
+                _ => done.push(&c.property),
+            }
+            let mut changes =
                 drt_motion::parameter::property_changes(self.parameters, &target, &c.property);
+            changes.retain(|c| c.change.texels.is_none());
             let changed = change_value(&changes, None, self.parameters.len())
                 .map_err(|e| self.fail(e.parameter, target, e.cause))?;
             change(&c.property, &changed).map_err(|reason| self.fail(p, target, reason))?;

@@ -15,13 +15,14 @@ mod tests;
 use alloc::sync::Arc;
 use core::f64::consts::PI;
 
-use drt_math::{Frame, Mat3, Rgb, Vec3, fm, vec3, warp};
+use drt_math::{Frame, Mat3, Rgb, ValueChange, Vec3, fm, vec3, warp};
 use thiserror::Error;
 
 pub use crate::model::emitter::emission::{Emission, EmitterGradient, EmitterTangent};
 pub use crate::model::emitter::environment::EnvironmentMap;
 pub use crate::model::emitter::incident::Incident;
 pub use crate::model::emitter::slide::Slide;
+use crate::model::texture::{TexelChange, TexelError, TexelTangent, Texture};
 
 /// An emitter that cannot be used.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -62,6 +63,9 @@ pub enum EmitterError {
     /// A motion that flattens the emitter.
     #[error("the motion takes the {0} emitter's direction to zero; choose a value nearer to zero")]
     Flattened(&'static str),
+    /// A motion of surroundings that is no rotation.
+    #[error("surroundings are infinitely far away: they can be turned (`rotate`), nothing else")]
+    OnlyTurns,
     /// A property that this kind of emitter does not have.
     #[error("a {kind} emitter has no property `{property}`; it has {known}")]
     UnknownProperty {
@@ -88,6 +92,13 @@ pub enum Emitter {
     Area {
         /// Radiance, the same in all directions.
         radiance: Rgb,
+    },
+    /// A shape that glows on its front side, as a texture says.
+    TexturedArea {
+        /// Factor of the texture.
+        radiance: Rgb,
+        /// Radiance by texture coordinates, the same in all directions.
+        texture: Texture,
     },
     /// A point that shines equally in all directions.
     Point {
@@ -165,7 +176,11 @@ impl Emitter {
     pub fn validate(&self) -> Result<(), EmitterError> {
         self.checked()?;
         let (kind, what) = (self.kind(), self.strength_name());
-        match self.strength().to_array().into_iter().find(|v| *v < 0.0) {
+        let mut light = self.strength().to_array().to_vec();
+        if let Self::TexturedArea { texture, .. } = self {
+            light.extend(texture.bounds().iter().flat_map(|c| c.to_array()));
+        }
+        match light.into_iter().find(|v| *v < 0.0) {
             Some(value) => Err(EmitterError::Negative { kind, what, value }),
             None => Ok(()),
         }
@@ -188,7 +203,10 @@ impl Emitter {
         };
         finite(self.strength().is_finite(), self.strength_name())?;
         match *self {
-            Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. } => Ok(self.clone()),
+            Self::Area { .. }
+            | Self::TexturedArea { .. }
+            | Self::Constant { .. }
+            | Self::Envmap { .. } => Ok(self.clone()),
             Self::Point { position, .. } => {
                 finite(position.is_finite(), "position").map(|()| self.clone())
             }
@@ -219,7 +237,7 @@ impl Emitter {
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
-            Self::Area { .. } => "area",
+            Self::Area { .. } | Self::TexturedArea { .. } => "area",
             Self::Point { .. } => "point",
             Self::Spot { .. } => "spot",
             Self::Projector { slide, .. } if slide.is_spot() => "spot",
@@ -233,7 +251,7 @@ impl Emitter {
     /// True for lights of points and directions, which no ray can hit.
     #[must_use]
     pub fn is_delta(&self) -> bool {
-        !matches!(self, Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. })
+        !(self.is_area() || self.is_environment())
     }
 
     /// False for a spot or projector whose light ends with a jump, or jumps inside: its rims need a boundary integral.
@@ -258,12 +276,48 @@ impl Emitter {
         }
     }
 
-    /// The radiance of an area emitter.
+    /// True for a shape that glows.
+    #[must_use]
+    pub fn is_area(&self) -> bool {
+        matches!(self, Self::Area { .. } | Self::TexturedArea { .. })
+    }
+
+    /// Columns and rows of the image that tells its light, if one does.
+    #[must_use]
+    pub fn texels(&self) -> Option<[u32; 2]> {
+        match self {
+            Self::TexturedArea { texture, .. } => Some(texture.size()).filter(|s| *s != [0; 2]),
+            Self::Envmap { map, .. } => Some(map.size()),
+            _ => None,
+        }
+    }
+
+    /// Makes a change of the texels of the image that tells its light.
+    pub(crate) fn change_texels(
+        &mut self,
+        texel: Option<[usize; 2]>,
+        op: ValueChange,
+        theta: f64,
+    ) -> Result<(TexelChange, TexelTangent), TexelError> {
+        let Some(size) = self.texels() else {
+            return Err(TexelError::NoTexture(self.strength_name().into()));
+        };
+        let change = TexelChange::new(size, texel, op, theta)?;
+        let rates = match self {
+            Self::TexturedArea { texture, .. } => texture.change(&change)?,
+            Self::Envmap { map, .. } => Arc::make_mut(map).change(&change)?,
+            _ => TexelTangent::default(),
+        };
+        Ok((change, rates))
+    }
+
+    /// The radiance of an area emitter, the mean of a texture's.
     #[inline]
     #[must_use]
     pub fn area_radiance(&self) -> Option<Rgb> {
         match *self {
             Self::Area { radiance } => Some(radiance),
+            Self::TexturedArea { radiance, ref texture } => Some(radiance * texture.mean()),
             _ => None,
         }
     }
@@ -275,6 +329,7 @@ impl Emitter {
         let disk = PI * scene_radius * scene_radius;
         let factor = match self {
             Self::Area { .. } => PI,
+            Self::TexturedArea { texture, .. } => PI * texture.mean().mean(),
             Self::Point { .. } => 4.0 * PI,
             Self::Spot { cutoff_angle, beam_width, .. } => {
                 2.0 * PI * cone_mean(*beam_width, *cutoff_angle)
@@ -323,6 +378,7 @@ impl Emitter {
     pub fn strength(&self) -> Rgb {
         match *self {
             Self::Area { radiance }
+            | Self::TexturedArea { radiance, .. }
             | Self::Constant { radiance }
             | Self::Envmap { radiance, .. } => radiance,
             Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity,
@@ -344,7 +400,10 @@ impl Emitter {
 
     fn strength_name(&self) -> &'static str {
         match self {
-            Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. } => "radiance",
+            Self::Area { .. }
+            | Self::TexturedArea { .. }
+            | Self::Constant { .. }
+            | Self::Envmap { .. } => "radiance",
             Self::Point { .. } | Self::Spot { .. } => "intensity",
             Self::Projector { slide, .. } if slide.is_spot() => "intensity",
             Self::Directional { .. } | Self::Projector { .. } => "irradiance",

@@ -1,5 +1,7 @@
 //! Values that vary over surfaces, by texture coordinates.
 
+mod texels;
+
 use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -7,6 +9,9 @@ use alloc::vec::Vec;
 
 use drt_geom::Mesh;
 use drt_math::{Affine, Rgb, RgbVec, Vec3, fm};
+
+pub(crate) use crate::model::texture::texels::{Footprint, TexelChange, TexelTangent};
+pub use crate::model::texture::texels::{TexelError, TexelGradient};
 
 /// A colour (or a number, in every channel alike) over texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -211,7 +216,8 @@ impl Bitmap {
         self.to_uv == UvMap::IDENTITY && self.texels.iter().enumerate().all(black)
     }
 
-    fn texel(&self, at: [i64; 2]) -> Rgb {
+    /// The texel in a column and row, which may be beyond the image.
+    fn index(&self, at: [i64; 2]) -> u32 {
         let [x, y] = [0, 1].map(|axis| {
             let n = i64::from(self.size[axis]);
             let place = match self.wrap {
@@ -224,8 +230,11 @@ impl Bitmap {
             };
             place as usize
         });
-        let [r, g, b] = self.texels[y * self.size[0] as usize + x].map(f64::from);
-        Rgb::new(r, g, b)
+        (y * self.size[0] as usize + x) as u32
+    }
+
+    fn texel(&self, index: u32) -> Rgb {
+        Rgb::from(self.texels[index as usize].map(f64::from))
     }
 
     /// Columns and rows, in texels.
@@ -239,21 +248,37 @@ impl Bitmap {
     }
 
     /// The four texels around a place, by rows, and how far it is from the first of them.
-    fn around(&self, place: [f64; 2]) -> ([[Rgb; 2]; 2], [f64; 2]) {
+    fn around(&self, place: [f64; 2]) -> ([[u32; 2]; 2], [f64; 2]) {
         let corner = place.map(|s| fm::floor(s - 0.5));
         let [x, y] = corner.map(|c| c as i64);
-        let row = |y| [self.texel([x, y]), self.texel([x + 1, y])];
+        let row = |y| [self.index([x, y]), self.index([x + 1, y])];
         ([row(y), row(y + 1)], [0, 1].map(|i| place[i] - 0.5 - corner[i]))
+    }
+
+    fn nearest(&self, place: [f64; 2]) -> u32 {
+        self.index(place.map(|s| fm::floor(s) as i64))
     }
 
     fn at(&self, uv: [f64; 2]) -> Rgb {
         let place = self.place(uv);
         match self.filter {
-            TextureFilter::Nearest => self.texel(place.map(|s| fm::floor(s) as i64)),
+            TextureFilter::Nearest => self.texel(self.nearest(place)),
             TextureFilter::Bilinear => {
                 let (rows, [s, t]) = self.around(place);
+                let rows = rows.map(|row| row.map(|texel| self.texel(texel)));
                 let [a, b] = rows.map(|[a, b]| a * (1.0 - s) + b * s);
                 a * (1.0 - t) + b * t
+            }
+        }
+    }
+
+    fn footprint(&self, uv: [f64; 2]) -> Footprint {
+        let place = self.place(uv);
+        match self.filter {
+            TextureFilter::Nearest => Footprint::of(self.nearest(place)),
+            TextureFilter::Bilinear => {
+                let (rows, by) = self.around(place);
+                Footprint::between(rows, by)
             }
         }
     }
@@ -264,13 +289,19 @@ impl Bitmap {
             return [Rgb::ZERO; 2];
         }
         let (rows, [s, t]) = self.around(self.place(uv));
-        let [[a, b], [c, d]] = rows;
+        let [[a, b], [c, d]] = rows.map(|row| row.map(|texel| self.texel(texel)));
         let [width, height] = self.size.map(f64::from);
         let by_x = ((b - a) * (1.0 - t) + (d - c) * t) * width;
         let by_y = ((c - a) * (1.0 - s) + (d - b) * s) * height;
         let [x, y] = self.to_uv.0;
         [0, 1].map(|i| by_x * x[i] + by_y * y[i])
     }
+}
+
+/// Which of its colours a checkerboard has.
+fn square(to_uv: &UvMap, uv: [f64; 2]) -> usize {
+    let [u, v] = to_uv.apply(uv).map(|x| x - fm::floor(x) > 0.5);
+    usize::from(u != v)
 }
 
 impl Texture {
@@ -321,12 +352,58 @@ impl Texture {
     #[must_use]
     pub fn at(&self, uv: [f64; 2]) -> Rgb {
         match self {
-            Self::Checkerboard { colours, to_uv } => {
-                let [u, v] = to_uv.apply(uv).map(|x| x - fm::floor(x) > 0.5);
-                colours[usize::from(u != v)]
-            }
+            Self::Checkerboard { colours, to_uv } => colours[square(to_uv, uv)],
             Self::Bitmap(image) => image.at(uv),
             Self::Attribute(_) => self.mean(),
+        }
+    }
+
+    /// Columns and rows of texels: of a checkerboard, its two colours; of an attribute, none.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        match self {
+            Self::Checkerboard { .. } => [2, 1],
+            Self::Bitmap(image) => image.size,
+            Self::Attribute(_) => [0; 2],
+        }
+    }
+
+    /// The texel in a column and row, as it is stored; none beyond the image.
+    #[must_use]
+    pub fn texel(&self, [x, y]: [usize; 2]) -> Option<Rgb> {
+        let [width, height] = self.size().map(|n| n as usize);
+        let index = (x < width && y < height).then_some(y * width + x)?;
+        Some(match self {
+            Self::Checkerboard { colours, .. } => colours[index],
+            Self::Bitmap(image) => image.texel(index as u32),
+            Self::Attribute(_) => return None,
+        })
+    }
+
+    /// The texels that make up the value at texture coordinates; `None` of an attribute.
+    pub(crate) fn footprint(&self, uv: [f64; 2]) -> Option<Footprint> {
+        match self {
+            Self::Checkerboard { to_uv, .. } => Some(Footprint::of(square(to_uv, uv) as u32)),
+            Self::Bitmap(image) => Some(image.footprint(uv)),
+            Self::Attribute(_) => None,
+        }
+    }
+
+    /// Makes a change of texels, whose rates it returns.
+    pub(crate) fn change(&mut self, change: &TexelChange) -> Result<TexelTangent, TexelError> {
+        let [width, height] = self.size();
+        match self {
+            Self::Checkerboard { colours, .. } => {
+                let rates = change.tangent(width * height, |t| colours[t as usize]);
+                *colours = [0, 1].map(|t| change.value(t, colours[t as usize]));
+                Ok(rates)
+            }
+            Self::Bitmap(image) => {
+                let rates = change.tangent(width * height, |t| image.texel(t));
+                change.apply(&mut image.texels)?;
+                Ok(rates)
+            }
+            Self::Attribute(a) => Err(TexelError::NoTexture(a.name.clone())),
         }
     }
 
@@ -384,6 +461,21 @@ impl Texture {
             }),
             Self::Attribute(_) => [self.mean(); 2],
         }
+    }
+
+    /// About the mean of the values on a triangle of a mesh.
+    pub(crate) fn mean_on(&self, mesh: &Mesh, triangle: u32) -> Rgb {
+        const ROWS: u32 = 8;
+        let mut sum = Rgb::ZERO;
+        // The middles of that many equal triangles squared, which come in pairs but in the last row.
+        for (i, j) in (0..ROWS).flat_map(|i| (0..ROWS - i).map(move |j| (i, j))) {
+            let middle = |by: f64| [i, j].map(|k| (f64::from(k) + by) / f64::from(ROWS));
+            sum += self.at_point(&TexturePoint::new(mesh, triangle, middle(1.0 / 3.0)));
+            if i + j + 1 < ROWS {
+                sum += self.at_point(&TexturePoint::new(mesh, triangle, middle(2.0 / 3.0)));
+            }
+        }
+        sum * (1.0 / f64::from(ROWS * ROWS))
     }
 
     /// The mean of all values over the texture's own period; for an attribute, which depends on the mesh, that of 0 and 1.

@@ -21,7 +21,7 @@ use drt_motion::volume::VolumeAdjoint;
 use crate::derivative::medium_motion::{InteriorGradients, ReverseMediumMotions};
 use crate::derivative::scene_gradient::SceneGradient;
 use crate::derivative::sensitivity::{
-    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, VelocityFunctional,
+    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, TextureUse, VelocityFunctional,
 };
 use crate::derivative::tangents;
 use crate::model::emitter::EmitterGradient;
@@ -32,6 +32,7 @@ use crate::model::sensor::SensorGradient;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::model::shard::Shard;
 use crate::model::surface::BsdfParams;
+use crate::model::texture::Footprint;
 use crate::run::reverse::sizes::OfGradient;
 use crate::run::session::{Control, estimators, may_move, seed_of_component, slides};
 use crate::sampling::bidirectional::EmissionSampler;
@@ -573,6 +574,25 @@ impl AdjointSink for ScatterSink<'_> {
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
         if let Some(gradient) = &mut self.sums.scene.bsdfs[bsdf] {
             gradient.scatter(params, weight * self.weights);
+        }
+    }
+
+    fn texels(&mut self, of: TextureUse, footprint: &Footprint, adjoint: Rgb) {
+        let adjoint = adjoint * self.weights;
+        if !adjoint.is_finite() {
+            self.sums.scene.non_finite += 1;
+            return;
+        }
+        let sums = &mut self.sums.scene;
+        let gradient = match of {
+            TextureUse::Bsdf(bsdf, property) => {
+                let mut textures = sums.texels[bsdf].iter_mut();
+                textures.find(|(p, _)| *p == property).map(|(_, gradient)| gradient)
+            }
+            TextureUse::Emitter(emitter) => sums.emitter_texels[emitter].as_mut(),
+        };
+        if let Some(gradient) = gradient {
+            gradient.scatter(footprint, adjoint);
         }
     }
 

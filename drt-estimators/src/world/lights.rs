@@ -136,14 +136,16 @@ pub(crate) struct Environment {
     pub(crate) emitter: usize,
     strength: Rgb,
     map: Option<Arc<EnvironmentMap>>,
+    /// What directions are drawn by.
+    drawn: Option<Arc<EnvironmentMap>>,
     /// Probability of choosing it; 0 where scattering finds it alone.
     pmf: f64,
 }
 
 impl Environment {
-    /// The radiance from a unit direction per unit of the emitter's own.
-    pub(crate) fn shape(&self, w: Vec3) -> Rgb {
-        self.map.as_ref().map_or(Rgb::ONE, |map| map.at(w))
+    /// What the radiance from all directions is multiplied by, and the image that it comes of.
+    pub(crate) fn parts(&self) -> (Rgb, Option<&EnvironmentMap>) {
+        (self.strength, self.map.as_deref())
     }
 
     /// The radiance from a unit direction.
@@ -158,14 +160,14 @@ impl Environment {
     /// Density per steradian with which light samples have a unit direction.
     #[inline]
     pub(crate) fn pdf(&self, w: Vec3) -> f64 {
-        match &self.map {
+        match &self.drawn {
             None => 0.0,
             Some(map) => self.pmf * map.pdf(w),
         }
     }
 
     fn sample(&self, rng: &mut Rng) -> Option<LightSample> {
-        let (w, pdf) = self.map.as_ref()?.sample(rng.next_f64(), rng.next_2d())?;
+        let (w, pdf) = self.drawn.as_ref()?.sample(rng.next_f64(), rng.next_2d())?;
         let pdf = self.pmf * pdf;
         (pdf > 0.0).then(|| LightSample {
             emitter: self.emitter,
@@ -185,7 +187,7 @@ impl Environment {
 pub(crate) struct LightTable {
     entries: Vec<Entry>,
     table: Option<AliasTable>,
-    /// Radiance of each area emitter, zero for others.
+    /// Radiance of each area emitter, or the mean of its texture's; zero for others.
     area_radiance: Vec<Rgb>,
     /// Selection probability per unit area of each soup triangle's emitter.
     density: Vec<f64>,
@@ -221,11 +223,18 @@ impl LightTable {
             let Some(radiance) = scene.emitters[e].item.emitter.area_radiance() else { continue };
             area_radiance[e] = radiance;
             let surface = shape.mesh.surface_area();
+            let mean = |t: u32| match &scene.emitters[e].item.emitter {
+                Emitter::TexturedArea { radiance, texture } => {
+                    *radiance * texture.mean_on(&shape.mesh, t)
+                }
+                _ => radiance,
+            };
             for t in 0..shape.mesh.triangles.len() as u32 {
                 let area = shape.mesh.area(t);
                 let emitter = e as u32;
                 entries.push(Entry::Triangle { emitter, prim: first_prim[i] + t, area });
-                weights.push((area * core::f64::consts::PI * radiance.mean(), area / surface));
+                let power = area * core::f64::consts::PI * mean(t).mean();
+                weights.push((power, area / surface));
             }
         }
         for (e, named) in scene.emitters.iter().enumerate() {
@@ -234,16 +243,23 @@ impl LightTable {
                 continue;
             }
             match &named.item.emitter {
-                Emitter::Area { .. } => continue,
+                Emitter::Area { .. } | Emitter::TexturedArea { .. } => continue,
                 Emitter::Constant { radiance } => {
-                    environment =
-                        Some(Environment { emitter: e, strength: *radiance, map: None, pmf: 0.0 });
+                    let strength = *radiance;
+                    environment = Some(Environment {
+                        emitter: e,
+                        strength,
+                        map: None,
+                        drawn: None,
+                        pmf: 0.0,
+                    });
                     continue;
                 }
                 Emitter::Envmap { radiance, map } => {
-                    let map = Some(Arc::clone(map));
-                    environment =
-                        Some(Environment { emitter: e, strength: *radiance, map, pmf: 0.0 });
+                    let (strength, map) = (*radiance, Some(Arc::clone(map)));
+                    let other = like.and_then(|l| l.environment.as_ref());
+                    let drawn = other.map_or_else(|| map.clone(), |other| other.drawn.clone());
+                    environment = Some(Environment { emitter: e, strength, map, drawn, pmf: 0.0 });
                     entries.push(Entry::Environment);
                 }
                 _ => entries.push(Entry::Delta { emitter }),
@@ -387,7 +403,7 @@ impl LightTable {
             w,
             y,
             distance,
-            value: self.area_radiance[emitter as usize],
+            value: world.area_radiance(emitter as usize, &point),
             inv_pdf: 1.0 / pdf,
             pdf,
         })

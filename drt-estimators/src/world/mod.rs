@@ -16,6 +16,7 @@ use drt_geom::{Aabb, Hit, Ray, Skip};
 use drt_math::{Rgb, Vec3};
 use drt_medium::{Coefficients, Homogeneous, Medium};
 
+use crate::model::emitter::Emitter;
 use crate::model::error::Error;
 use crate::model::scene::{Scene, Shape, Surrounding};
 use crate::model::surface::Bsdf;
@@ -520,10 +521,9 @@ impl World {
         match &v.kind {
             Kind::Surface(s) => {
                 let shape = &self.scene.shapes[s.shape as usize];
-                let at = self.texture_point(s);
                 let bsdf = &self.scene.bsdfs[shape.bsdf].item;
                 Some(Scattering::Surface(bsdf.at(
-                    Some(at),
+                    Some(self.texture_point(s)),
                     s.ng,
                     s.ns,
                     shape.mesh.normals.is_some(),
@@ -660,8 +660,19 @@ impl World {
     /// Radiance a surface emits from `s` towards the unit direction `w`.
     pub(crate) fn emitted(&self, s: &SurfacePoint, w: Vec3) -> Rgb {
         match self.scene.shapes[s.shape as usize].emitter {
-            Some(e) if s.ng.dot(w) > 0.0 => self.lights.area_radiance(e),
+            Some(e) if s.ng.dot(w) > 0.0 => self.area_radiance(e, s),
             _ => Rgb::ZERO,
+        }
+    }
+
+    /// Radiance of an area emitter at a point of it.
+    #[inline]
+    pub(crate) fn area_radiance(&self, emitter: usize, s: &SurfacePoint) -> Rgb {
+        match &self.scene.emitters[emitter].item.emitter {
+            Emitter::TexturedArea { radiance, texture } if self.lit.by_surroundings() => {
+                *radiance * texture.at_point(&self.texture_point(s))
+            }
+            _ => self.lights.area_radiance(emitter),
         }
     }
 }

@@ -5,12 +5,14 @@ pub mod pairing;
 
 use std::sync::Arc;
 
-use drt_estimators::emitter::Emitter;
+use drt_estimators::emitter::{Emitter, EnvironmentMap};
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::{
-    Bsdf, Diffuse, Distribution, Phong, RoughConductor, RoughDielectric, TwoSided,
+    Bsdf, Diffuse, Distribution, Phong, Property, RoughConductor, RoughDielectric, Textured,
+    TwoSided,
 };
+use drt_estimators::texture::{Bitmap, Texture, TextureFilter, TextureWrap, UvMap};
 use drt_estimators::{
     Integrator, Layer, MediumBoundary, Named, Rendering, Scene, SceneEmitter, SceneSensor, Session,
     Settings, Shape, Surrounding, Unattended,
@@ -18,7 +20,7 @@ use drt_estimators::{
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
 use drt_medium::{Grid, GridMedium, Homogeneous, Layout, Medium, Phase, Volume};
-use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, ValueChange};
+use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, Texels, ValueChange};
 
 /// A scene under construction: elements are named as they are added.
 #[derive(Default)]
@@ -331,13 +333,97 @@ pub fn moves(target: &str, change: GeometryChange) -> Effect {
 }
 
 pub fn changes(target: &str, property: &str, op: ValueChange) -> Effect {
-    let change = PropertyChange { property: property.into(), op, voxels: None };
+    let change = PropertyChange { property: property.into(), op, voxels: None, texels: None };
     Effect { target: target.into(), change: Change::Property(change) }
 }
 
 pub fn changes_voxel(target: &str, property: &str, voxel: [usize; 3], op: ValueChange) -> Effect {
-    let change = PropertyChange { property: property.into(), op, voxels: Some(voxel) };
+    let change =
+        PropertyChange { property: property.into(), op, voxels: Some(voxel), texels: None };
     Effect { target: target.into(), change: Change::Property(change) }
+}
+
+/// Of one texel of the texture that stands for a property, or of all.
+pub fn changes_texel(
+    target: &str,
+    property: &str,
+    texel: Option<[usize; 2]>,
+    op: ValueChange,
+) -> Effect {
+    let change = PropertyChange {
+        property: property.into(),
+        op,
+        voxels: None,
+        texels: Some(texel.map_or(Texels::All, Texels::One)),
+    };
+    Effect { target: target.into(), change: Change::Property(change) }
+}
+
+/// A picture of random values between two, turned a little.
+pub fn image(
+    seed: u64,
+    [low, high]: [f32; 2],
+    filter: TextureFilter,
+    wrap: TextureWrap,
+) -> Texture {
+    let mut rng = Rng::new(seed, 0, 0);
+    let mut value = || low + (high - low) * rng.next_f64() as f32;
+    let texels = (0..16).map(|_| [value(), value(), value()]).collect();
+    let to_uv = UvMap([[1.5, 0.3, 0.1], [0.0, 1.2, 0.0]]);
+    let mut image = Bitmap::new([4, 4], texels).expect("an image");
+    (image.filter, image.wrap, image.to_uv) = (filter, wrap, to_uv);
+    Texture::Bitmap(image)
+}
+
+pub fn textured(bsdf: Bsdf, textures: Vec<(Property, Texture)>) -> Bsdf {
+    Bsdf::Textured(Box::new(Textured::new(bsdf, textures).expect("textures")))
+}
+
+/// Everything textured: a floor under a ball of rough metal, in all kinds of light.
+pub fn textures() -> Scene {
+    use TextureFilter::{Bilinear, Nearest};
+    let metal = textured(
+        metal(),
+        vec![
+            (Property::Alpha, image(1, [0.2, 0.5], Bilinear, TextureWrap::Repeat)),
+            (Property::SpecularReflectance, image(2, [0.3, 0.9], Nearest, TextureWrap::Mirror)),
+        ],
+    );
+    let squares = Texture::Checkerboard {
+        colours: [Rgb::new(0.1, 0.2, 0.3), Rgb::splat(0.25)],
+        to_uv: UvMap([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0]]),
+    };
+    let floor = textured(
+        phong(),
+        vec![
+            (Property::Reflectance, image(3, [0.1, 0.7], Bilinear, TextureWrap::Clamp)),
+            (Property::SpecularReflectance, squares),
+        ],
+    );
+    let mut scene = surfaces(metal, twosided(floor));
+    let lamp = scene.emitters.iter_mut().find(|e| e.id.as_deref() == Some("glow")).expect("one");
+    lamp.item.emitter = Emitter::TexturedArea {
+        radiance: Rgb::new(3.0, 2.5, 2.0),
+        texture: image(4, [0.1, 1.0], Bilinear, TextureWrap::Repeat),
+    };
+    let uv = |p: Vec3| [0.3 * p.x + 0.1, 0.3 * p.z + 0.2];
+    for shape in &mut scene.shapes {
+        let mesh = (*shape.mesh).clone();
+        let corners = (0..mesh.triangles.len() as u32).map(|i| mesh.triangle(i).map(uv)).collect();
+        shape.mesh = Arc::new(mesh.with_texcoords(corners).expect("coordinates"));
+    }
+    scene
+}
+
+/// The sky being an image.
+pub fn under_an_image(mut scene: Scene) -> Scene {
+    let mut rng = Rng::new(5, 0, 0);
+    let texels = (0..24).map(|_| [0; 3].map(|_| 0.1 + rng.next_f64() as f32)).collect();
+    let frame = Mat3::rotation(vec3(0.48, 0.64, 0.6), 0.5);
+    let map = EnvironmentMap::new([6, 4], texels, frame).expect("a map");
+    let sky = scene.emitters.iter_mut().find(|e| e.id.as_deref() == Some("sky")).expect("one");
+    sky.item.emitter = Emitter::Envmap { radiance: Rgb::new(0.2, 0.3, 0.5), map: Arc::new(map) };
+    scene
 }
 
 pub fn grey(v: f64) -> ValueChange {

@@ -1,13 +1,14 @@
 //! One parameter that changes many things, as reverse mode sees it: the items it wants, and the
 //! pairing of their gradient with the parameter's velocities.
 
-use drt_estimators::surface::{BsdfChange, Property};
+use drt_estimators::emitter::Emitter;
+use drt_estimators::surface::{Bsdf, BsdfChange, Property};
 use drt_estimators::{Scene, SceneGradient, Target};
 use drt_math::{Affine, Rgb, Vec3};
 use drt_medium::MediumChange;
 use drt_motion::parameter::Applied;
 use drt_motion::surface::move_mesh;
-use drt_motion::{Change, GeometryChange, Parameter, PropertyChange};
+use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, Texels};
 
 /// What the parameter changes.
 pub fn targets(scene: &Scene, parameter: &Parameter) -> Vec<Target> {
@@ -63,6 +64,27 @@ fn medium(scene: &Scene, i: usize, change: &MediumChange, g: &SceneGradient) -> 
     g.media[i].as_ref().expect("wanted").dot(&tangent)
 }
 
+/// What is on both sides.
+fn plain(bsdf: &Bsdf) -> &Bsdf {
+    match bsdf {
+        Bsdf::TwoSided(b) => &b.front,
+        other => other,
+    }
+}
+
+fn texels(
+    size: [u32; 2],
+    texel: impl Fn([usize; 2]) -> Option<Rgb>,
+    c: &PropertyChange,
+    gradient: &[Rgb],
+) -> f64 {
+    let width = size[0] as usize;
+    let changed =
+        |i: &usize| c.texels.and_then(Texels::one).is_none_or(|[x, y]| y * width + x == *i);
+    let rate = |i: usize| c.op.map_rate(0.0).value(texel([i % width, i / width]).expect("one"));
+    (0..gradient.len()).filter(changed).map(|i| gradient[i].dot(rate(i))).sum()
+}
+
 fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient) -> f64 {
     let (op, voxels) = (c.op, c.voxels);
     match target {
@@ -77,12 +99,30 @@ fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient
         }
         Target::Bsdf(i) => {
             let property = Property::from_name(&c.property).expect("a property");
+            let textures = &g.texels[i];
+            if let Some((_, gradient)) = textures.iter().find(|(p, _)| *p == property) {
+                let Bsdf::Textured(bsdf) = plain(&scene.bsdfs[i].item) else { unreachable!() };
+                let textures = bsdf.textures.iter();
+                let (_, texture) = textures.clone().find(|(p, _)| *p == property).expect("one");
+                return texels(texture.size(), |at| texture.texel(at), c, &gradient.values());
+            }
             let tangent = scene.bsdfs[i].item.tangent(&BsdfChange { property, op }, 0.0);
             let velocity = tangent.expect("a valid change");
             g.bsdfs[i].as_ref().expect("wanted").get(property).dot(velocity.get(property))
         }
         Target::Emitter(i) => {
             let emitter = &scene.emitters[i].item.emitter;
+            if let (Some(_), Some(gradient)) = (c.texels, &g.emitter_texels[i]) {
+                return match emitter {
+                    Emitter::TexturedArea { texture, .. } => {
+                        texels(texture.size(), |at| texture.texel(at), c, &gradient.values())
+                    }
+                    Emitter::Envmap { map, .. } => {
+                        texels(map.size(), |at| map.texel(at), c, &gradient.values())
+                    }
+                    _ => unreachable!("no others have texels"),
+                };
+            }
             let rate = op.rate(emitter.property(&c.property).expect("a property"), 0.0);
             let tangent = emitter.property_tangent(&c.property, rate).expect("a valid change");
             g.emitters[i].as_ref().expect("wanted").dot(&tangent)

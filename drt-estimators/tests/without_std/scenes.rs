@@ -80,7 +80,7 @@ pub(crate) fn deforms(name: &str, target: &str, velocities: &[[f64; 3]]) -> Para
 
 pub(crate) fn grows(name: &str, target: &str, property: &str) -> Parameter {
     let op = ValueChange::Add(Rgb::splat(1.0));
-    let change = PropertyChange { property: property.into(), op, voxels: None };
+    let change = PropertyChange { property: property.into(), op, voxels: None, texels: None };
     parameter(name, target, Change::Property(change))
 }
 

@@ -10,7 +10,7 @@ mod property;
 
 pub use geometry::GeometryChange;
 
-pub use property::{ChangedValue, PropertyChange, change_value};
+pub use property::{ChangedValue, PropertyChange, Texels, change_value};
 
 /// One scalar unknown of a scene, theta: a name, the value it has now, and all it changes.
 ///

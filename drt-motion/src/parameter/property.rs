@@ -17,6 +17,29 @@ pub struct PropertyChange {
     pub op: ValueChange,
     /// The one voxel that changes, x fastest; `None` for the whole property.
     pub voxels: Option<[usize; 3]>,
+    /// What changes of the texture that stands for the property; `None` for the property as a whole.
+    pub texels: Option<Texels>,
+}
+
+/// Texels of a texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Texels {
+    /// All of them, each by the same change.
+    All,
+    /// The one in a column and row.
+    One([usize; 2]),
+}
+
+impl Texels {
+    /// The one, where it is one.
+    #[must_use]
+    pub fn one(self) -> Option<[usize; 2]> {
+        match self {
+            Self::All => None,
+            Self::One(texel) => Some(texel),
+        }
+    }
 }
 
 /// All changes of one value together.

@@ -161,6 +161,7 @@ pub fn smoke() -> Result<Stage> {
         property: "sigma_t".into(),
         op: ValueChange::Add(Rgb::splat(5.0)),
         voxels: Some([2, 1, 2]),
+        texels: None,
     };
     let voxel = Effect { target: "smoke".into(), change: Change::Property(voxel) };
     let ride = Effect { target: "smoke".into(), change: Change::Follow("box".into()) };

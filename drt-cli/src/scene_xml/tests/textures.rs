@@ -1,6 +1,7 @@
 //! Textures, and texture coordinates of shapes.
 
 use drt_estimators::Scene;
+use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, Property};
 use drt_estimators::texture::Texture;
 use drt_geom::Mesh;
@@ -116,8 +117,24 @@ fn unusable_textures_are_told() {
         &["expected repeat, mirror, clamp"],
     );
     let light = bitmap("").replace("reflectance", "radiance");
-    let body = format!("<shape type=\"cube\"><emitter type=\"area\">{light}</emitter></shape>");
-    refused_there(&body, &["cannot stand for `radiance` here"]);
+    let lamp = |light: &str| {
+        format!("<shape type=\"cube\"><emitter type=\"area\">{light}</emitter></shape>")
+    };
+    let scene = load(&folder, &lamp(&light)).unwrap();
+    let Emitter::TexturedArea { radiance, texture } = &scene.emitters[0].item.emitter else {
+        panic!()
+    };
+    assert_eq!((*radiance, texture.size()), (Rgb::ONE, [2, 2]));
+    refused_there(
+        &format!("<emitter type=\"point\">{}</emitter>", light.replace("radiance", "intensity")),
+        &["cannot stand for `intensity` here"],
+    );
+    let dark = "<texture name=\"radiance\" type=\"checkerboard\"><float name=\"color0\" value=\"-1\"/></texture>";
+    refused_there(&lamp(dark), &[":2", "radiance has a channel of -1"]);
+    // All at once.
+    let none = |name: &str| diffuse(&bitmap("").replace("four", name));
+    let both = format!("{}\n{}", none("none"), none("lost"));
+    refused_there(&both, &["2 files are missing", "none.png", ":3", "lost.png"]);
     let board = |name: &str| format!("<texture name=\"{name}\" type=\"checkerboard\"/>");
     refused(
         &format!("<bsdf type=\"roughconductor\">{}{}</bsdf>", board("alpha_u"), board("alpha_v")),

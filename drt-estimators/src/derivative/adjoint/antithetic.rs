@@ -2,7 +2,7 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use crate::derivative::adjoint::{Differentiator, send, turn};
+use crate::derivative::adjoint::{Differentiator, send, send_material, turn};
 use crate::derivative::antithetic::{AntitheticPair, PairKind, PairedRadiance};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::derivative::velocity::RecordedPath;
@@ -74,7 +74,7 @@ impl Differentiator<'_> {
         };
         let bsdf = self.world.scene.shapes[s.shape as usize].bsdf;
         if sink.active().bsdfs[bsdf] {
-            sink.bsdf(bsdf, &params, Rgb::ONE);
+            send_material(self.world, s, &params, Rgb::ONE, sink);
         }
     }
 

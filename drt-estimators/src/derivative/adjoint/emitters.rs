@@ -5,11 +5,12 @@ use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::turning::RayMotion;
 use crate::derivative::adjoint::{Differentiator, Far, Propagated, Stretch, turn};
-use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, SurfaceAdjoint};
+use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, SurfaceAdjoint, TextureUse};
 use crate::derivative::velocity::{RayTurn, TurningRay, VelocityField, VertexVelocity};
-use crate::model::emitter::EmitterGradient;
-use crate::world::lights::{LightKind, LightSample};
-use crate::world::vertex::{Kind, Vertex};
+use crate::model::emitter::{Emitter, EmitterGradient};
+use crate::world::World;
+use crate::world::lights::{Environment, LightKind, LightSample};
+use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 
 /// The emitter's end of a connection.
 pub(super) struct LightEnd<'a> {
@@ -76,10 +77,9 @@ impl Differentiator<'_> {
         let active = sink.active();
         let emitter = active.emitters[light.emitter];
         match &light.kind {
-            LightKind::Area(_) => {
-                if emitter {
-                    strength_of(light.emitter, per_value, sink);
-                }
+            LightKind::Area(point) => {
+                let mut own = SurfaceAdjoint::default();
+                area(self.world, light.emitter, point, per_value, &mut own, sink);
                 let Some(LightMotion { end, velocity, turn: turn_of_ray }) = motion else {
                     self.segment(path, Far::Direction, false, weight, here, sink);
                     return;
@@ -92,6 +92,7 @@ impl Differentiator<'_> {
                 let slides = ray_moves || !velocity.auxiliary.is_empty();
                 let (mut lit, along) = self.material_end(path, end, slides, part, here, sink);
                 turned += along;
+                lit.slide += own.slide;
                 if let Some(to_wi) = to_wi {
                     let g = turn(&(to_wi * phi), light.w, light.distance);
                     lit.u += g;
@@ -99,7 +100,7 @@ impl Differentiator<'_> {
                     turned += to_wi;
                 }
                 if turn_of_ray.is_some() {
-                    turned += self.landing(path, end, &SurfaceAdjoint::default(), weight);
+                    turned += self.landing(path, end, &own, weight);
                 }
                 let matter = core::mem::take(&mut lit.u);
                 let auxiliary = &self.auxiliary[..];
@@ -123,10 +124,8 @@ impl Differentiator<'_> {
                 self.intensity(path, light, per_value, at_light, here, sink);
             }
             LightKind::Environment => {
-                let environment = self.world.lights.environment().filter(|_| emitter);
-                if let Some(environment) = environment {
-                    let adjoint = per_value * environment.shape(light.w);
-                    strength_of(light.emitter, adjoint, sink);
+                if let Some(environment) = self.world.lights.environment() {
+                    surroundings(environment, light.w, per_value, sink);
                 }
                 self.segment(path, Far::Direction, near_moves, weight, here, sink);
             }
@@ -207,15 +206,64 @@ fn direction<S: AdjointSink>(
     sink.emitter(light.emitter, &gradients);
 }
 
-/// Sensitivity to an emitter's radiance, where it changes.
-pub(super) fn strength<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
-    if sink.active().emitters[emitter] && !adjoint.is_zero() {
-        strength_of(emitter, adjoint, sink);
+/// Sensitivity to the radiance of an area emitter at a point: to its own, to its texels, and to the place of the point on it.
+pub(super) fn area<S: AdjointSink>(
+    world: &World,
+    emitter: usize,
+    point: &SurfacePoint,
+    adjoint: Rgb,
+    here: &mut SurfaceAdjoint,
+    sink: &mut S,
+) {
+    let active = sink.active().emitters[emitter];
+    let Emitter::TexturedArea { radiance, texture } = &world.scene.emitters[emitter].item.emitter
+    else {
+        if active && !adjoint.is_zero() {
+            strength(emitter, adjoint, sink);
+        }
+        return;
+    };
+    let at = world.texture_point(point);
+    let by_texture = adjoint * *radiance;
+    here.slide += texture.gradient(&at) * by_texture;
+    if active {
+        strength(emitter, adjoint * texture.at_point(&at), sink);
+        if let Some(footprint) = texture.footprint(at.uv()) {
+            sink.texels(TextureUse::Emitter(emitter), &footprint, by_texture);
+        }
     }
 }
 
+/// Sensitivity to the radiance that comes from a unit direction of the surroundings.
+pub(super) fn surroundings<S: AdjointSink>(
+    environment: &Environment,
+    w: Vec3,
+    adjoint: Rgb,
+    sink: &mut S,
+) {
+    let emitter = environment.emitter;
+    if !sink.active().emitters[emitter] || adjoint.is_zero() {
+        return;
+    }
+    let (radiance, map) = environment.parts();
+    let Some(map) = map else { return strength(emitter, adjoint, sink) };
+    let by_map = adjoint * radiance;
+    sink.texels(TextureUse::Emitter(emitter), &map.footprint(w), by_map);
+    let (strength, turn) = (adjoint * map.at(w), map.by_rotation(w) * by_map);
+    let gradient =
+        |strength, rotation| EmitterGradient { strength, rotation, ..EmitterGradient::default() };
+    sink.emitter(
+        emitter,
+        &[
+            gradient(Rgb::new(strength.r, 0.0, 0.0), turn.r),
+            gradient(Rgb::new(0.0, strength.g, 0.0), turn.g),
+            gradient(Rgb::new(0.0, 0.0, strength.b), turn.b),
+        ],
+    );
+}
+
 /// Sensitivity to an emitter's radiance, channel by channel.
-fn strength_of<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
+fn strength<S: AdjointSink>(emitter: usize, adjoint: Rgb, sink: &mut S) {
     let gradient =
         |r, g, b| EmitterGradient { strength: Rgb::new(r, g, b), ..EmitterGradient::default() };
     sink.emitter(

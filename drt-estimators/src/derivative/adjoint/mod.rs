@@ -34,22 +34,23 @@ use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Coefficients;
 
 use crate::derivative::adjoint::antithetic::Apart;
-use crate::derivative::adjoint::emitters::{LightEnd, light_moves, strength};
+use crate::derivative::adjoint::emitters::{LightEnd, area, light_moves, surroundings};
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 use crate::derivative::adjoint::turning::RayMotion;
 use crate::derivative::sensitivity::{
-    ActiveInputs, AdjointSink, CoefficientAdjoint, Scaled, SurfaceAdjoint,
+    ActiveInputs, AdjointSink, CoefficientAdjoint, Scaled, SurfaceAdjoint, TextureUse,
 };
 use crate::derivative::velocity::{
     Auxiliary, Probe, RayTurn, RecordedPath, TurnPart, TurnParts, VertexVelocity,
 };
 use crate::model::sensor::{Sensor, SensorGradient};
+use crate::model::surface::BsdfParams;
 use crate::sampling::record::{Role, Scattered};
 use crate::sampling::streams::VELOCITY_STREAM;
 use crate::sampling::trace::{Connection, Endpoint};
 use crate::world::lights::EmitterMask;
-use crate::world::vertex::{Kind, Vertex};
+use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{Crossing, World};
 
 /// What has been collected for a vertex while its neighbours are processed.
@@ -209,8 +210,7 @@ impl<'w> Differentiator<'w> {
             Endpoint::Environment => {
                 let environment = world.lights.environment().filter(|_| lit.by_surroundings());
                 let Some(environment) = environment else { return };
-                let seen = environment.shape(arrival.dir) * arrival.emission_weight;
-                strength(environment.emitter, theta * seen, sink);
+                surroundings(environment, arrival.dir, theta * arrival.emission_weight, sink);
                 environment.radiance(arrival.dir) * arrival.emission_weight
             }
             Endpoint::Surface(vertex) => {
@@ -223,7 +223,8 @@ impl<'w> Differentiator<'w> {
                     && point.ng.dot(arrival.dir) < 0.0
                 {
                     emitted = world.emitted(point, -arrival.dir) * arrival.emission_weight;
-                    strength(e, theta * arrival.emission_weight, sink);
+                    let adjoint = theta * arrival.emission_weight;
+                    area(world, e, point, adjoint, &mut here, sink);
                 }
                 emitted + collected
             }
@@ -448,7 +449,7 @@ impl<'w> Differentiator<'w> {
                 here.n += d.ng * adjoint;
                 here.slide += d.slide * adjoint;
                 if material && let Some(params) = d.params {
-                    sink.bsdf(world.scene.shapes[s.shape as usize].bsdf, &params, adjoint);
+                    send_material(world, s, &params, adjoint, sink);
                 }
             }
             _ => {
@@ -669,6 +670,25 @@ fn moves(v: &Vertex, active: &ActiveInputs) -> bool {
         Kind::Volume(_) => v.medium.is_some_and(|m| active.volumes[m]),
         Kind::Point => false,
     }
+}
+
+/// Sends what a material owes at a point: to its numbers, and to the texels that stand for them there.
+fn send_material<S: AdjointSink>(
+    world: &World,
+    point: &SurfacePoint,
+    params: &BsdfParams,
+    adjoint: Rgb,
+    sink: &mut S,
+) {
+    let bsdf = world.scene.shapes[point.shape as usize].bsdf;
+    sink.bsdf(bsdf, params, adjoint);
+    let at = world.texture_point(point);
+    world.scene.bsdfs[bsdf].item.lookups(&at, |property, footprint| {
+        let adjoint = params.get(property) * adjoint;
+        if !adjoint.is_zero() {
+            sink.texels(TextureUse::Bsdf(bsdf, property), footprint, adjoint);
+        }
+    });
 }
 
 /// Sends what a vertex collected.

@@ -172,7 +172,10 @@ impl<'a> Moving<'a> {
             }
         }
         let name = match self.original.emitters[i].item.emitter {
-            Emitter::Area { .. } | Emitter::Constant { .. } | Emitter::Envmap { .. } => "radiance",
+            Emitter::Area { .. }
+            | Emitter::TexturedArea { .. }
+            | Emitter::Constant { .. }
+            | Emitter::Envmap { .. } => "radiance",
             Emitter::Point { .. } | Emitter::Spot { .. } => "intensity",
             Emitter::Directional { .. } | Emitter::Projector { .. } => "irradiance",
         };
@@ -357,6 +360,7 @@ fn light(emitter: &Emitter) -> Light {
     };
     match *emitter {
         Emitter::Area { radiance }
+        | Emitter::TexturedArea { radiance, .. }
         | Emitter::Constant { radiance }
         | Emitter::Envmap { radiance, .. } => Light { strength: rgb(radiance), ..still },
         Emitter::Point { position, intensity } => {

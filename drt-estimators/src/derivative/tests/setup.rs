@@ -11,7 +11,7 @@ use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::medium_motion::MediumMotions;
 use crate::derivative::sensitivity::{
-    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint,
+    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, TextureUse,
 };
 use crate::derivative::tangents;
 use crate::derivative::tests::scenes::*;
@@ -21,6 +21,7 @@ use crate::model::emitter::EmitterGradient;
 use crate::model::scene::Scene;
 use crate::model::sensor::SensorGradient;
 use crate::model::surface::BsdfParams;
+use crate::model::texture::Footprint;
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Tracer;
 use crate::terms::interior::{PathView, Recorder};
@@ -159,6 +160,9 @@ impl AdjointSink for Faulty<'_> {
     }
     fn bsdf(&mut self, bsdf: usize, params: &BsdfParams, weight: Rgb) {
         self.0.bsdf(bsdf, params, weight);
+    }
+    fn texels(&mut self, of: TextureUse, footprint: &Footprint, adjoint: Rgb) {
+        self.0.texels(of, footprint, adjoint);
     }
     fn emitter(&mut self, emitter: usize, gradient: &[EmitterGradient; 3]) {
         self.0.emitter(emitter, gradient);

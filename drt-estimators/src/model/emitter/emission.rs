@@ -48,6 +48,8 @@ pub struct EmitterTangent {
     pub cutoff_angle: f64,
     /// Rate of a spot's beam width, in radians.
     pub beam_width: f64,
+    /// Angular velocity of surroundings that an image tells, in radians.
+    pub rotation: Vec3,
 }
 
 /// Derivatives of a number with respect to what an [`EmitterTangent`] holds the rates of.
@@ -63,6 +65,8 @@ pub struct EmitterGradient {
     pub cutoff_angle: f64,
     /// With respect to the beam width.
     pub beam_width: f64,
+    /// With respect to a rotation of surroundings, by its vector in radians.
+    pub rotation: Vec3,
 }
 
 impl Emitter {
@@ -145,6 +149,7 @@ impl Emission {
             direction: f.direction * weight,
             cutoff_angle: f.cutoff_angle * weight,
             beam_width: f.beam_width * weight,
+            rotation: Vec3::ZERO,
         };
         match &self.picture {
             None => (f.flow * weight, emitter),
@@ -183,6 +188,7 @@ impl EmitterGradient {
             direction: self.direction * w,
             cutoff_angle: self.cutoff_angle * w,
             beam_width: self.beam_width * w,
+            rotation: self.rotation * w,
         }
     }
 
@@ -195,6 +201,7 @@ impl EmitterGradient {
             + self.direction.dot(t.direction)
             + self.cutoff_angle * t.cutoff_angle
             + self.beam_width * t.beam_width
+            + self.rotation.dot(t.rotation)
     }
 }
 
@@ -208,6 +215,7 @@ macro_rules! sum {
                 self.direction += o.direction;
                 self.cutoff_angle += o.cutoff_angle;
                 self.beam_width += o.beam_width;
+                self.rotation += o.rotation;
             }
         }
     )*};

@@ -1,8 +1,11 @@
 use alloc::string::String;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::f64::consts::{PI, TAU};
 
-use drt_math::{AliasTable, Mat3, Rgb, Vec3, fm, vec3};
+use drt_math::{AliasTable, Mat3, Rgb, RgbVec, Vec3, fm, vec3};
+
+use crate::model::texture::{Footprint, TexelChange, TexelError, TexelTangent};
 
 /// Light from all around, as an image says: Mitsuba's `envmap`. Columns go around the axis y of its frame and rows from +y to
 /// -y, the first and the last of them at the poles; values between the middles of texels are interpolated linearly.
@@ -11,7 +14,8 @@ use drt_math::{AliasTable, Mat3, Rgb, Vec3, fm, vec3};
 #[cfg_attr(feature = "serde", serde(try_from = "unchecked::EnvironmentMap"))]
 pub struct EnvironmentMap {
     size: [u32; 2],
-    texels: Vec<[f32; 3]>,
+    /// Row by row; shared by maps that differ in their frames.
+    texels: Arc<Vec<[f32; 3]>>,
     to_world: Mat3,
     /// Of the cells between texels, row by row: by their mean light. `None` where all are black.
     #[cfg_attr(feature = "serde", serde(skip_serializing))]
@@ -19,6 +23,12 @@ pub struct EnvironmentMap {
     /// Integral of the mean of the channels over all directions.
     #[cfg_attr(feature = "serde", serde(skip_serializing))]
     power: f64,
+}
+
+fn is_orthonormal(frame: &Mat3) -> bool {
+    let off = [Vec3::X, Vec3::Y, Vec3::Z].map(|e| frame.transpose_mul(*frame * e) - e);
+    // What is no number is not small.
+    off.into_iter().all(|d| d.is_finite() && d.max_abs() < TOLERANCE)
 }
 
 /// Of the products of a frame's axes.
@@ -46,29 +56,58 @@ impl EnvironmentMap {
                 "the texel in column {x}, row {y} is negative or not finite"
             ));
         }
-        let off = [Vec3::X, Vec3::Y, Vec3::Z].map(|e| to_world.transpose_mul(to_world * e) - e);
-        // What is no number is not small.
-        if !off.into_iter().all(|d| d.is_finite() && d.max_abs() < TOLERANCE) {
+        if !is_orthonormal(&to_world) {
             return Err("its frame may be turned and mirrored, not scaled or sheared".into());
         }
+        let texels = Arc::new(texels);
         let mut map = Self { size, texels, to_world, cells: None, power: 0.0 };
-        let cells = width * (height - 1);
-        let mut weights = Vec::with_capacity(cells);
+        map.prepare()?;
+        Ok(map)
+    }
+
+    /// Finds where light comes from.
+    fn prepare(&mut self) -> Result<(), String> {
+        let map = &*self;
+        let [width, height] = self.size.map(|n| n as usize);
+        let mut weights = Vec::with_capacity(width * (height - 1));
         for y in 0..height - 1 {
             let solid_angle = map.solid_angle(y);
             weights.extend((0..width).map(|x| {
                 let corners = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
-                solid_angle
-                    * 0.25
-                    * corners.map(|(x, y)| map.texel(x, y).mean()).iter().sum::<f64>()
+                // A change of texels may push some below zero.
+                let light = corners.map(|(x, y)| map.wrapped(x, y).mean().max(0.0));
+                solid_angle * 0.25 * light.iter().sum::<f64>()
             }));
         }
-        map.power = weights.iter().sum();
-        if map.power > 0.0 {
+        self.power = weights.iter().sum();
+        self.cells = None;
+        if self.power > 0.0 {
             let table = AliasTable::new(&weights);
-            map.cells = Some(table.map_err(|e| alloc::format!("{e}"))?);
+            self.cells = Some(table.map_err(|e| alloc::format!("{e}"))?);
         }
-        Ok(map)
+        Ok(())
+    }
+
+    /// Columns and rows.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The same turned further; `None` where the map of space is no rotation or reflection.
+    pub(super) fn turned(&self, by: &Mat3) -> Option<Self> {
+        let to_world = *by * self.to_world;
+        is_orthonormal(&to_world).then(|| Self { to_world, ..self.clone() })
+    }
+
+    /// Makes a change of texels, whose rates it returns.
+    pub(super) fn change(&mut self, change: &TexelChange) -> Result<TexelTangent, TexelError> {
+        let value = |t: u32| Rgb::from(self.texels[t as usize].map(f64::from));
+        let rates = change.tangent(self.texels.len() as u32, value);
+        if change.apply(&mut self.texels)? {
+            self.prepare().map_err(|_| TexelError::NotFinite)?;
+        }
+        Ok(rates)
     }
 
     /// Integral of the mean of the channels over all directions.
@@ -76,10 +115,16 @@ impl EnvironmentMap {
         self.power
     }
 
-    fn texel(&self, x: usize, y: usize) -> Rgb {
+    /// The texel in a column and row; none beyond the image.
+    #[must_use]
+    pub fn texel(&self, [x, y]: [usize; 2]) -> Option<Rgb> {
+        let [width, height] = self.size.map(|n| n as usize);
+        (x < width && y < height).then(|| self.wrapped(x, y))
+    }
+
+    fn wrapped(&self, x: usize, y: usize) -> Rgb {
         let width = self.size[0] as usize;
-        let [r, g, b] = self.texels[y * width + x % width].map(f64::from);
-        Rgb::new(r, g, b)
+        Rgb::from(self.texels[y * width + x % width].map(f64::from))
     }
 
     /// Of a cell of a row.
@@ -109,8 +154,37 @@ impl EnvironmentMap {
     #[must_use]
     pub fn at(&self, w: Vec3) -> Rgb {
         let ([x, y], [s, t]) = self.cell(w);
-        let row = |y| self.texel(x, y) * (1.0 - s) + self.texel(x + 1, y) * s;
+        let row = |y| self.wrapped(x, y) * (1.0 - s) + self.wrapped(x + 1, y) * s;
         row(y) * (1.0 - t) + row(y + 1) * t
+    }
+
+    /// The texels that make up the light from a unit direction.
+    pub(crate) fn footprint(&self, w: Vec3) -> Footprint {
+        let ([x, y], by) = self.cell(w);
+        let width = self.size[0] as usize;
+        let row = |y: usize| [x, x + 1].map(|x| (y * width + x % width) as u32);
+        Footprint::between([row(y), row(y + 1)], by)
+    }
+
+    /// The derivative of the light from a unit direction w as the map turns, by the vector of its rotation ω: directions in the
+    /// map's frame turn by -ω × w, so that it is ∇L × w of the gradient ∇L by w. At the poles, where that grows without bounds, it is zero.
+    pub(crate) fn by_rotation(&self, w: Vec3) -> RgbVec {
+        let ([x, y], [s, t]) = self.cell(w);
+        let [[a, b], [c, d]] = [y, y + 1].map(|y| [x, x + 1].map(|x| self.wrapped(x, y)));
+        let [width, height] = self.size.map(f64::from);
+        let around = ((b - a) * (1.0 - t) + (d - c) * t) * (width / TAU);
+        let down = ((c - a) * (1.0 - s) + (d - b) * s) * ((height - 1.0) / PI);
+        let v = self.to_world.transpose_mul(w);
+        let square = v.x * v.x + v.z * v.z;
+        if square <= 0.0 {
+            return RgbVec::ZERO;
+        }
+        // Of the angles atan2(x, -z) and acos y.
+        let by_around = vec3(-v.z, 0.0, v.x) / square;
+        let by_down = (v * v.y - Vec3::Y) / fm::sqrt(square);
+        let gradient =
+            around.outer(self.to_world * by_around) + down.outer(self.to_world * by_down);
+        gradient.map(|g| g.cross(w))
     }
 
     /// Draws a direction that light comes from, by two uniform numbers and one that chooses, with its density per steradian.
@@ -209,6 +283,23 @@ mod tests {
         ([0.1, -0.9, -0.4], 0.793819),
         ([-0.3, 0.1, -0.9], 0.584706),
     ];
+
+    #[test]
+    fn light_turns_with_the_map() {
+        let (map, mut rng) = (map(3), Rng::new(4, 0, 0));
+        let step = 1e-6;
+        for _ in 0..200 {
+            let w = warp::uniform_sphere(rng.next_2d());
+            let axis = warp::uniform_sphere(rng.next_2d());
+            let turned = |by: f64| map.turned(&Mat3::rotation(axis, by)).expect("a rotation").at(w);
+            let difference = (turned(step) - turned(-step)) * (0.5 / step);
+            let rate = map.by_rotation(w).dot(axis);
+            // Not where a border between cells passes by.
+            let error = (rate - difference).max_abs();
+            assert!(error < 1e-6 * (1.0 + rate.max_abs()), "{w:?}: {rate:?} {difference:?}");
+        }
+        assert!(map.turned(&(Mat3::IDENTITY * 1.1)).is_none());
+    }
 
     #[test]
     fn broken_maps_are_refused() {

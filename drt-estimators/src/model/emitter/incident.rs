@@ -32,7 +32,10 @@ impl Emitter {
                 (offset / distance, distance, 1.0 / (distance * distance))
             }
             Self::Directional { direction, .. } => (-direction, f64::INFINITY, 1.0),
-            Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. } => return None,
+            Self::Area { .. }
+            | Self::TexturedArea { .. }
+            | Self::Constant { .. }
+            | Self::Envmap { .. } => return None,
         };
         let emission = self.emission(-w);
         let value = emission.value * inverse_square;

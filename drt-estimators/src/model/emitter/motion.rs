@@ -1,6 +1,8 @@
 //! Emitters that move, and whose numbers change.
 
-use drt_math::{Affine, Rgb};
+use alloc::sync::Arc;
+
+use drt_math::{Affine, Rgb, Vec3, vec3};
 
 use crate::model::emitter::{Emitter, EmitterError, EmitterTangent, slide};
 
@@ -13,14 +15,17 @@ enum Slot {
 
 impl Emitter {
     /// The emitter moved by a map of space: positions go along, directions are mapped as vectors
-    /// and made unit again. An area emitter moves with its shape and an environment not at all.
+    /// and made unit again; an environment of an image turns. An area emitter moves with its shape and a constant environment not at all.
     ///
     /// # Errors
     /// When the map takes a direction to zero or is not finite.
     pub fn moved(&self, map: &Affine) -> Result<Self, EmitterError> {
         let mut moved = self.clone();
         match &mut moved {
-            Self::Area { .. } | Self::Constant { .. } | Self::Envmap { .. } => {}
+            Self::Area { .. } | Self::TexturedArea { .. } | Self::Constant { .. } => {}
+            Self::Envmap { map: sky, .. } => {
+                *sky = Arc::new(sky.turned(&map.linear).ok_or(EmitterError::OnlyTurns)?);
+            }
             Self::Point { position, .. } => *position = map.point(*position),
             Self::Spot { position, direction, .. } => {
                 *position = map.point(*position);
@@ -51,6 +56,10 @@ impl Emitter {
         }
         if let Self::Projector { frame, .. } = self {
             tangent.direction = slide::spin(frame, field);
+        }
+        if matches!(self, Self::Envmap { .. }) {
+            let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|e| field.linear * e);
+            tangent.rotation = vec3(y.z - z.y, z.x - x.z, x.y - y.x) * 0.5;
         }
         tangent
     }
@@ -87,6 +96,7 @@ impl Emitter {
             (
                 _,
                 Self::Area { radiance }
+                | Self::TexturedArea { radiance, .. }
                 | Self::Constant { radiance }
                 | Self::Envmap { radiance, .. },
             ) => *radiance = value,

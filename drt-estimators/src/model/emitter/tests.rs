@@ -55,6 +55,7 @@ fn random_tangent(rng: &mut Rng) -> EmitterTangent {
         direction: random_vec(rng),
         cutoff_angle: rng.next_f64(),
         beam_width: rng.next_f64(),
+        rotation: Vec3::ZERO,
     }
 }
 
@@ -157,6 +158,7 @@ fn gradients_are_those_of_duals() {
             direction: d(9),
             cutoff_angle: e[12],
             beam_width: e[13],
+            rotation: Vec3::ZERO,
         };
         let scale = 1e-10 * e.iter().fold(0.0, |m: f64, e| m.max(e.abs()));
         assert!((point - d(0)).max_abs() < scale, "{point:?} {expected:?}");

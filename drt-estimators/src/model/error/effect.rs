@@ -9,6 +9,7 @@ use thiserror::Error;
 use crate::model::emitter::EmitterError;
 use crate::model::sensor::SensorError;
 use crate::model::surface::SurfaceError;
+use crate::model::texture::TexelError;
 
 /// Why an effect does not apply to its target.
 #[derive(Clone, Debug, Error)]
@@ -26,6 +27,12 @@ pub enum EffectError {
     /// Voxels of anything but a medium.
     #[error("only the grids of a medium have voxels")]
     NoVoxels,
+    /// Texels of what has no textures.
+    #[error("only textures of BSDFs and emitters have texels")]
+    NoTexels,
+    /// Texels that cannot change.
+    #[error(transparent)]
+    Texels(#[from] TexelError),
     /// A medium that follows more than one shape that deforms.
     #[error("it follows two shapes that deform; it can follow one")]
     TwoLeaders,

@@ -114,7 +114,7 @@ pub enum ElementError {
     FilmCut(String),
     /// A discontinuous texture where points slide over its surface.
     #[error(
-        "its BSDF has a discontinuous texture, past which `{parameter}` can only be differentiated by the \
+        "it has a discontinuous texture, past which `{parameter}` can only be differentiated by the \
          estimator path-space, or by finite differences"
     )]
     DiscontinuousTexture {

@@ -189,6 +189,12 @@ impl Bsdf {
         }
     }
 
+    /// True for a property that is a single number; `None` where the BSDF lacks it.
+    #[must_use]
+    pub fn is_number(&self, property: Property) -> Option<bool> {
+        self.clone().property(property).map(|slot| matches!(slot, Slot::Scalar(_)))
+    }
+
     fn lacks(&mut self, property: Property) -> SurfaceError {
         let mut available =
             names(Property::ALL.into_iter().filter(|&p| self.property(p).is_some()));

@@ -4,6 +4,8 @@ use core::fmt;
 
 use drt_math::Rgb;
 
+use crate::model::texture::TexelError;
+
 /// A number or colour of a BSDF that a parameter can move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -202,6 +204,9 @@ pub enum SurfaceError {
         /// What is wrong.
         reason: Box<SurfaceError>,
     },
+    /// Texels that cannot change.
+    #[error(transparent)]
+    Texels(#[from] TexelError),
     /// Textures around something that is no plain BSDF.
     #[error("a {bsdf} BSDF takes no textures; give them to what is in it")]
     TexturedTwice {

@@ -2,12 +2,14 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use drt_geom::Mesh;
-use drt_math::{Rgb, RgbVec};
+use drt_math::{Rgb, RgbVec, ValueChange};
 
 use crate::model::surface::microfacet::LEAST_ALPHA;
 use crate::model::surface::property::{Property, SurfaceError};
-use crate::model::surface::{At, Bsdf, BsdfParams};
-use crate::model::texture::{Texture, TexturePoint};
+use crate::model::surface::{At, Bsdf, BsdfChange, BsdfParams};
+use crate::model::texture::{
+    Footprint, TexelChange, TexelError, TexelTangent, Texture, TexturePoint,
+};
 
 /// A one-sided BSDF some of whose properties vary over the surface.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,6 +63,38 @@ impl Textured {
         sum
     }
 
+    /// Makes a change of the texels that stand for a property; their rates. `None` where no texture does.
+    fn change(
+        &mut self,
+        property: Property,
+        change: impl FnOnce([u32; 2]) -> Result<TexelChange, TexelError>,
+    ) -> Result<Option<(TexelChange, TexelTangent)>, SurfaceError> {
+        let found = self.textures.iter_mut().find(|(p, _)| *p == property);
+        let Some((_, texture)) = found else { return Ok(None) };
+        if texture.size() == [0; 2] {
+            return Err(SurfaceError::StoodFor { property });
+        }
+        let change = change(texture.size())?;
+        let rates = texture.change(&change)?;
+        let mean = texture.mean();
+        self.bsdf.set(property, allowed(property, mean))?;
+        let number = self.bsdf.is_number(property) == Some(true);
+        Ok(Some((change, if number { rates.of_number() } else { rates })))
+    }
+
+    /// Calls `f` with each property whose value is that of texels, and these.
+    pub(super) fn lookups(&self, at: &TexturePoint<'_>, mut f: impl FnMut(Property, &Footprint)) {
+        let uv = at.uv();
+        for (property, texture) in &self.textures {
+            let value = texture.at(uv);
+            if let Some(footprint) = texture.footprint(uv)
+                && allowed(*property, value) == value
+            {
+                f(*property, &footprint);
+            }
+        }
+    }
+
     /// The texture that stands for a property.
     pub(crate) fn texture(&self, property: Property) -> Option<&Texture> {
         self.textures.iter().find(|(p, _)| *p == property).map(|(_, texture)| texture)
@@ -97,6 +131,76 @@ impl Textured {
             }
         }
         Ok(())
+    }
+}
+
+impl Bsdf {
+    /// Makes a change of one texel, or of all, of the texture that stands for a property; the rates of texels with `theta`.
+    /// `None` where there is no texture.
+    pub(crate) fn change_texels(
+        &mut self,
+        change: &BsdfChange,
+        texel: Option<[usize; 2]>,
+        theta: f64,
+    ) -> Result<Option<(TexelChange, TexelTangent)>, SurfaceError> {
+        let BsdfChange { property, op } = *change;
+        if self.texture(property).is_none() {
+            return Ok(None);
+        }
+        if let (Some(true), ValueChange::Add(a), false) =
+            (self.is_number(property), op, op.is_scalar())
+        {
+            return Err(SurfaceError::NotUniform { property, r: a.r, g: a.g, b: a.b });
+        }
+        let textured = match &mut *self {
+            Self::TwoSided(b) if b.back.is_some() => {
+                return Err(SurfaceError::DifferentSides { property });
+            }
+            Self::TwoSided(b) => &mut b.front,
+            other => other,
+        };
+        let Self::Textured(textured) = textured else { return Ok(None) };
+        let found = textured.change(property, |size| TexelChange::new(size, texel, op, theta))?;
+        if theta != 0.0 {
+            self.validate()?;
+        }
+        Ok(found)
+    }
+
+    /// Columns and rows of texels of the texture that stands for a property, if one does that can change.
+    #[must_use]
+    pub fn texels(&self, property: Property) -> Option<[u32; 2]> {
+        Some(self.textured_part()?.texture(property)?.size()).filter(|size| *size != [0; 2])
+    }
+
+    /// Calls `f` with the textures of all its parts, and the properties that they stand for; maps of normals and heights have the
+    /// names of their BSDFs.
+    pub fn for_each_texture(&self, mut f: impl FnMut(&'static str, &Texture)) {
+        let mut parts = alloc::vec![self];
+        while let Some(part) = parts.pop() {
+            match part {
+                Self::Textured(t) => t.textures.iter().for_each(|(p, t)| f(p.name(), t)),
+                Self::Perturbed(b) => f(part.name(), &b.map),
+                _ => {}
+            }
+            parts.extend(part.inner());
+        }
+    }
+
+    /// What has textures; of two sides alike, one of them.
+    pub(crate) fn textured_part(&self) -> Option<&Textured> {
+        match self {
+            Self::Textured(t) => Some(t),
+            Self::TwoSided(b) if b.back.is_none() => b.front.textured_part(),
+            _ => None,
+        }
+    }
+
+    /// Calls `f` with each property whose value is that of texels at a point, and these.
+    pub(crate) fn lookups(&self, at: &TexturePoint<'_>, f: impl FnMut(Property, &Footprint)) {
+        if let Some(textured) = self.textured_part() {
+            textured.lookups(at, f);
+        }
     }
 }
 

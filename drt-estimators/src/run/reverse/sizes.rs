@@ -7,11 +7,12 @@ use drt_math::{Rgb, RgbVec, Vec3};
 use drt_medium::DepthEstimate;
 
 use crate::derivative::sensitivity::{
-    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, VelocityFunctional,
+    ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, TextureUse, VelocityFunctional,
 };
 use crate::model::emitter::EmitterGradient;
 use crate::model::sensor::SensorGradient;
 use crate::model::surface::BsdfParams;
+use crate::model::texture::Footprint;
 use crate::terms::boundary::BoundarySink;
 use crate::terms::guiding::Sizes;
 use crate::world::vertex::MaterialPoint;
@@ -121,4 +122,5 @@ impl AdjointSink for SquaredNorm<'_> {
     fn medium(&mut self, _: usize, _: Vec3, _: &CoefficientAdjoint) {}
     fn depth(&mut self, _: usize, _: &DepthEstimate<'_>, _: Rgb) {}
     fn bsdf(&mut self, _: usize, _: &BsdfParams, _: Rgb) {}
+    fn texels(&mut self, _: TextureUse, _: &Footprint, _: Rgb) {}
 }

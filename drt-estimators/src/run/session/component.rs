@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::medium_motion::MediumMotions;
 use crate::derivative::sensitivity::ActiveInputs;
+use crate::derivative::sensitivity::TextureUse;
 use crate::derivative::tangents::Tangents;
 use crate::model::error::Error;
 use crate::model::plan::Plan;
@@ -45,6 +46,7 @@ impl Component {
         for (e, emitter) in world.scene.emitters.iter().enumerate() {
             if !world.lit.by(&emitter.item.emitter) {
                 tangents.emitters[e].clear();
+                tangents.texels.retain(|t| t.of != TextureUse::Emitter(e));
             }
         }
         let mut motion = None;

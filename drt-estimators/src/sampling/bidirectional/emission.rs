@@ -61,7 +61,7 @@ impl EmittedRay {
             w: d / distance,
             y: self.vertex.x,
             distance,
-            value: world.lights.area_radiance(self.emitter),
+            value: world.area_radiance(self.emitter, &point),
             inv_pdf: 1.0 / pdf,
             pdf,
         };
