@@ -94,7 +94,6 @@ fn fog_with_ball() -> Result<Scene, Box<dyn std::error::Error>> {
             Named::new("grey", Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.5) })),
             Named::new("none", Bsdf::Null),
         ],
-        instances: Vec::new(),
         media: vec![Named::new("fog", Medium::new(fog, Phase::henyey_greenstein(0.3)?))],
         emitters: vec![Named::new(
             "lamp",

@@ -170,7 +170,6 @@ fn stage() -> Scene {
         ],
         bsdfs: vec![Named::new("gray", Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.6) }))],
         media: Vec::new(),
-        instances: Vec::new(),
         emitters: vec![
             emitter("glow", Emitter::Area { radiance }),
             emitter("bulb", Emitter::Point { position, intensity }),
