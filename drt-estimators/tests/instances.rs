@@ -5,6 +5,8 @@ mod common;
 use std::sync::Arc;
 
 use common::*;
+use drt_estimators::surface::{Bsdf, Mask, Perturbation, Perturbed};
+use drt_estimators::texture::{Bitmap, Texture};
 use drt_estimators::{
     EstimatorKind, Instance, MediumBoundary, Scene, Session, Settings, Shape, Target, Unattended,
     agreement, finite_differences, gradient,
@@ -58,21 +60,49 @@ fn scene() -> Scene {
     scene
 }
 
+/// The same with a cube that is half there and has tilted normals.
+fn dressed() -> Scene {
+    let mut scene = scene();
+    let of = scene.shapes.iter().position(|s| s.id.as_deref() == Some("cube")).expect("a cube");
+    let (mesh, bsdf) = (scene.shapes[of].mesh.clone(), scene.shapes[of].bsdf);
+    let corners = [[[0.1, 0.2], [0.9, 0.3], [0.4, 0.8]], [[0.7, 0.2], [0.0, 0.5], [0.4, 0.9]]];
+    let texcoords = (0..mesh.triangles.len()).map(|t| corners[t % 2]).collect();
+    let mesh = Arc::new((*mesh).clone().with_texcoords(texcoords).expect("coordinates"));
+    for shape in scene.shapes.iter_mut().filter(|s| s.bsdf == bsdf) {
+        shape.mesh = mesh.clone();
+    }
+    let map = Bitmap::new([1, 1], vec![[0.85, 0.6, 0.9]]).expect("a texel");
+    let tilted = Perturbed {
+        bsdf: diffuse(0.3, 0.6, 0.7),
+        map: Texture::Bitmap(map),
+        perturbation: Perturbation::Normals,
+        flip_invalid_normals: true,
+        use_shadowing_function: false,
+    };
+    let bsdf = &mut scene.bsdfs[bsdf].item;
+    *bsdf = Bsdf::Mask(Box::new(Mask { bsdf: Bsdf::Perturbed(Box::new(tilted)), opacity: 0.6 }));
+    scene
+}
+
 #[test]
 fn images_are_those_of_copies() {
-    let scene = scene();
+    compared(&scene());
+    compared(&dressed());
+}
+
+fn compared(scene: &Scene) {
     let copies = scene.expanded().expect("copies");
     assert!(copies.instances.is_empty());
     let image = |scene: &Scene, seed| {
         rendered(scene, &[], &Settings { seed, ..Settings::default() }, 256).image
     };
+    let (a, b) = (image(scene, 1), image(&copies, 1));
     // The same paths, but for those that rounding sends another way.
-    let (a, b) = (image(&scene, 1), image(&copies, 1));
     for (a, b) in a.pixels.iter().zip(&b.pixels) {
         let off = (a.mean - b.mean).max_abs();
         assert!(off < 0.5 * a.stderr.max_channel() + 1e-9, "{a:?} {b:?}");
     }
-    assert!(agreement(&image(&scene, 2), &b, None).agrees);
+    assert!(agreement(&image(scene, 2), &b, None).agrees);
     let mut moved = scene.clone();
     moved.instances[0].to_world.translation += Vec3::Y * 0.3;
     assert!(!agreement(&image(&moved, 2), &a, None).agrees);
