@@ -137,10 +137,6 @@ fn unusable_textures_are_told() {
     refused_there(&both, &["2 files are missing", "none.png", ":3", "lost.png"]);
     let board = |name: &str| format!("<texture name=\"{name}\" type=\"checkerboard\"/>");
     refused(
-        &format!("<bsdf type=\"roughconductor\">{}{}</bsdf>", board("alpha_u"), board("alpha_v")),
-        &["a texture of `alpha_u` is not supported"],
-    );
-    refused(
         &format!("<bsdf type=\"roughplastic\">{}</bsdf>", board("alpha")),
         &["has no \"alpha\""],
     );
