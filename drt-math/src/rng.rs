@@ -258,7 +258,8 @@ mod tests {
         for numbers in [0, 1, 3, 4, 6, SET_DIMENSIONS + 6] {
             let mut rng = led().starting_with(told);
             rng.skip(numbers);
-            let mut expected: Vec<f64> = told.into_iter().skip(numbers as usize).collect();
+            let mut expected: alloc::vec::Vec<f64> =
+                told.into_iter().skip(numbers as usize).collect();
             let mut points = led();
             points.skip(numbers.saturating_sub(4));
             expected.extend((0..5).map(|_| points.next_f64()));

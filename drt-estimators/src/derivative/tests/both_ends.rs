@@ -1,4 +1,5 @@
-//! Derivatives by paths from both ends are those from the camera, and need what the camera sees of light paths.
+//! Derivatives by paths from both ends are those from the camera, and need what the camera sees of light paths and the weights of all
+//! strategies.
 
 use crate::derivative::tests::choice::{LIGHT, derivative, prepare_by};
 use crate::derivative::tests::scenes::*;
@@ -8,7 +9,7 @@ use crate::terms::splatting::BoundarySource;
 use crate::world::lights::EmitterMask::{All, Extended};
 
 #[test]
-fn light_paths_that_the_camera_sees_are_needed() {
+fn every_strategy_and_its_weight_are_needed() {
     let scene = fog();
     let brightens = parameter("brightens", 0.0, vec![changes("thin", "albedo", grey(0.3))]);
     for (estimator, mask) in [(PathSpace, All), (Warped, Extended)] {
@@ -31,5 +32,11 @@ fn light_paths_that_the_camera_sees_are_needed() {
             both
         });
         assert!(without.0.abs() > 5.0, "{estimator:?} {without:?}");
+        let never_back = off(&|| {
+            let mut both = by(PathSampling::Bidirectional);
+            both.0.emission.iter_mut().for_each(|e| e.never_back = true);
+            both
+        });
+        assert!(never_back.0.abs() > 5.0, "{estimator:?} {never_back:?}");
     }
 }

@@ -239,6 +239,8 @@ impl TexelGradient {
 
 #[cfg(test)]
 mod tests {
+    use alloc::string::ToString;
+
     use super::*;
 
     #[test]

@@ -180,6 +180,10 @@ impl<'w> Bidirectional<'w> {
         let ratios = Ratios { last: square(self.light_paths / film), earlier: 0.0 };
         // Parallel rays are drawn by area, as if they came from infinity.
         self.camera.begin(ratios, !camera.is_orthographic());
+        #[cfg(all(test, feature = "std"))]
+        {
+            self.camera.never_back = self.emission.never_back;
+        }
         type Mode = Unconnected<RadianceMode>;
         let mut observed = Observed { subpath: &mut self.camera, observer };
         if let Some(first) = tracer.follow::<Mode, _>(&leaving, &mut observed) {
@@ -198,6 +202,10 @@ impl<'w> Bidirectional<'w> {
         let Some(start) = self.emission.sample(self.world, &mut tracer.rng) else { return };
         let ratios = Ratios { last: 1.0 / square(start.pdf), earlier: square(start.inv_start) };
         self.light.begin(ratios, start.finite);
+        #[cfg(all(test, feature = "std"))]
+        {
+            self.light.never_back = self.emission.never_back;
+        }
         let leaving = OutgoingRay::starting(start.vertex, start.dir, start.throughput);
         type Mode = Unconnected<ImportanceMode>;
         let observer = &mut Unobserved::<O>(PhantomData);

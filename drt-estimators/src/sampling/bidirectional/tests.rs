@@ -31,11 +31,10 @@ fn light(scene: &Scene, fault: Option<Fault>, both: bool) -> Moments {
     let world = World::new(scene.clone(), 0, Some(4), None, EmitterMask::All, &mut kept);
     let world = world.expect("a valid scene");
     let camera = &world.camera;
-    let emission = EmissionSampler::new(&world);
+    let never_back = fault == Some(Fault::NeverBack);
+    let emission = EmissionSampler { never_back, ..EmissionSampler::new(&world) };
     let mut from_both = Bidirectional::new(&world, &emission);
     from_both.fault = fault;
-    from_both.camera.never_back = fault == Some(Fault::NeverBack);
-    from_both.light.never_back = fault == Some(Fault::NeverBack);
     let mut moments = Moments::default();
     let mut splats = Vec::new();
     let [width, height] = camera.film();
