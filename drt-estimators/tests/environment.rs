@@ -68,7 +68,7 @@ fn derivatives_under_a_sky() {
         let error = error.hypot(other_error);
         assert!((own - other).abs() < 4.0 * error, "{own} {other} +- {error}");
     }
-    // Rays that turn would see another part of it; nor does it turn itself yet.
+    // Rays that turn would see another part of it.
     for estimator in [EstimatorKind::Radiative, EstimatorKind::Warped] {
         let settings = Settings { estimator, ..Settings::default() };
         let refusal = |parameter: usize| {
@@ -78,7 +78,4 @@ fn derivatives_under_a_sky() {
         assert!(message.contains("sky: an environment of an image"), "{message}");
         assert!(refusal(2).is_none());
     }
-    let turns = [parameter("turn", 0.0, vec![moves("sky", turn())])];
-    let message = Session::new(&scene, &turns, &Settings::default()).err().expect("a refusal");
-    assert!(message.to_string().contains("sky"), "{message}");
 }
