@@ -31,8 +31,8 @@ fn light(scene: &Scene, fault: Option<Fault>, both: bool) -> Moments {
     let world = World::new(scene.clone(), 0, Some(4), None, EmitterMask::All, &mut kept);
     let world = world.expect("a valid scene");
     let camera = &world.camera;
-    let never_back = fault == Some(Fault::NeverBack);
-    let emission = EmissionSampler { never_back, ..EmissionSampler::new(&world) };
+    let mut emission = EmissionSampler::new(&world);
+    emission.never_back = fault == Some(Fault::NeverBack);
     let mut from_both = Bidirectional::new(&world, &emission);
     from_both.fault = fault;
     let mut moments = Moments::default();
