@@ -1,5 +1,6 @@
 //! Reconstruction filters: how much each point of the image plane counts towards a pixel.
 
+mod row;
 mod sampling;
 #[cfg(test)]
 mod tests;
@@ -9,6 +10,7 @@ use core::ops::Range;
 use drt_math::{Real, fm};
 use thiserror::Error;
 
+pub(crate) use crate::model::filter::row::FilterRow;
 pub use crate::model::filter::sampling::FilterSample;
 use crate::model::filter::sampling::HalfProfile;
 
@@ -104,6 +106,8 @@ pub struct Filter {
     scale: f64,
     /// The factor p of one axis at the centre.
     peak: f64,
+    /// What the ratio of a Gaussian's neighbours changes by from pixel to pixel.
+    decay: f64,
     /// A density close to p, with an inverse in closed form.
     half: HalfProfile,
 }
@@ -128,9 +132,9 @@ impl Filter {
                 Err(FilterError::NotPositive { what, value })
             }
         };
-        let (radius, scale, segments) = match kind {
-            FilterKind::Box { radius } => (positive("radius", radius)?, 0.5 / radius, 1),
-            FilterKind::Tent { radius } => (positive("radius", radius)?, 1.0 / radius, 1),
+        let (radius, scale, decay, segments) = match kind {
+            FilterKind::Box { radius } => (positive("radius", radius)?, 0.5 / radius, 1.0, 1),
+            FilterKind::Tent { radius } => (positive("radius", radius)?, 1.0 / radius, 1.0, 1),
             FilterKind::Gaussian { radius, std_dev } => {
                 positive("radius", radius)?;
                 positive("standard deviation", std_dev)?;
@@ -138,7 +142,8 @@ impl Filter {
                     return Err(FilterError::Cut { radius, std_dev });
                 }
                 let integral = 2.0 * radius * gaussian_mean(radius / std_dev);
-                (radius, 1.0 / integral, Self::GAUSSIAN_SEGMENTS)
+                let decay = fm::exp(-1.0 / (std_dev * std_dev));
+                (radius, 1.0 / integral, decay, Self::GAUSSIAN_SEGMENTS)
             }
         };
         if radius > Self::MAX_RADIUS {
@@ -146,7 +151,7 @@ impl Filter {
         }
         let half = HalfProfile::new(segments, |t| shape(kind, radius * t));
         let peak = scale * shape(kind, 0.0);
-        Ok(Self { kind, radius, scale, peak, half })
+        Ok(Self { kind, radius, scale, peak, decay, half })
     }
 
     /// What the filter was made from.
@@ -224,12 +229,17 @@ impl Filter {
     /// The factor p of one axis, and its derivative; at a kink, the mean of both sides.
     #[inline]
     pub(crate) fn axis_with_slope(&self, x: f64) -> (f64, f64) {
+        self.with_slope(x, shape(self.kind, x))
+    }
+
+    /// The same, of an offset where the unnormalised profile is known.
+    #[inline]
+    fn with_slope(&self, x: f64, shape: f64) -> (f64, f64) {
         // Half open, so that box filters of neighbouring pixels tile the plane.
         let inside = -self.radius <= x && x < self.radius;
         if !inside {
             return (0.0, 0.0);
         }
-        let shape = shape(self.kind, x);
         let slope = match self.kind {
             _ if x == 0.0 => 0.0,
             FilterKind::Box { .. } => 0.0,

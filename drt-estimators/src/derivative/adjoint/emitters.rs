@@ -78,8 +78,8 @@ impl Differentiator<'_> {
         let emitter = active.emitters[light.emitter];
         match &light.kind {
             LightKind::Area(point) => {
-                let mut own = SurfaceAdjoint::default();
-                area(self.world, light.emitter, point, per_value, &mut own, sink);
+                let mut slide = RgbVec::ZERO;
+                area(self.world, light.emitter, point, per_value, &mut slide, sink);
                 let Some(LightMotion { end, velocity, turn: turn_of_ray }) = motion else {
                     self.segment(path, Far::Direction, false, weight, here, sink);
                     return;
@@ -90,9 +90,8 @@ impl Differentiator<'_> {
                 let mut turned = self.segment(path, Far::Direction, ray_moves, free, here, sink);
                 let part = weight * phi;
                 let slides = ray_moves || !velocity.auxiliary.is_empty();
-                let (mut lit, along) = self.material_end(path, end, slides, part, here, sink);
-                turned += along;
-                lit.slide += own.slide;
+                let mut lit = SurfaceAdjoint { slide, ..SurfaceAdjoint::default() };
+                turned += self.material_end(path, end, slides, part, &mut lit, here, sink);
                 if let Some(to_wi) = to_wi {
                     let g = turn(&(to_wi * phi), light.w, light.distance);
                     lit.u += g;
@@ -100,6 +99,7 @@ impl Differentiator<'_> {
                     turned += to_wi;
                 }
                 if turn_of_ray.is_some() {
+                    let own = SurfaceAdjoint { slide, ..SurfaceAdjoint::default() };
                     turned += self.landing(path, end, &own, weight);
                 }
                 let matter = core::mem::take(&mut lit.u);
@@ -212,7 +212,7 @@ pub(super) fn area<S: AdjointSink>(
     emitter: usize,
     point: &SurfacePoint,
     adjoint: Rgb,
-    here: &mut SurfaceAdjoint,
+    slide: &mut RgbVec,
     sink: &mut S,
 ) {
     let active = sink.active().emitters[emitter];
@@ -225,7 +225,7 @@ pub(super) fn area<S: AdjointSink>(
     };
     let at = world.texture_point(point);
     let by_texture = adjoint * *radiance;
-    here.slide += texture.gradient(&at) * by_texture;
+    *slide += texture.gradient(&at) * by_texture;
     if active {
         strength(emitter, adjoint * texture.at_point(&at), sink);
         if let Some(footprint) = texture.footprint(at.uv()) {

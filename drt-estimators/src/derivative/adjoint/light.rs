@@ -28,27 +28,28 @@ impl Differentiator<'_> {
         self.filter = [0.0; 2];
         self.filter[axis] = 1.0;
         let value = self.locals[1].incoming * camera.value;
-        let by_view = self.seen(Some(vertex), arrival.dir, value, Rgb::ZERO);
         let phi = velocities.of(1).blend.weight;
-        send(vertex, &SurfaceAdjoint::of_place(by_view.place * phi), sink);
         self.sensor = Default::default();
-        self.by_sensor(&by_view, phi, sink.active());
+        let active = sink.active();
+        let place = self.seen(Some(vertex), arrival.dir, value, Rgb::ZERO, phi, active);
+        send(vertex, &SurfaceAdjoint::of_place(place * phi), sink);
         let mut origin = RgbVec::ZERO;
         if let Some(ray) = path.ray_motion(velocities.of(1).turn) {
-            let by_view = self.seen(None, arrival.dir, value, Rgb::ZERO);
-            self.by_sensor(&by_view, ray.turn.weight, sink.active());
-            origin -= ray.send(arrival.dir, &by_view.place, Rgb::ZERO, sink);
+            let (share, active) = (ray.turn.weight, sink.active());
+            let place = self.seen(None, arrival.dir, value, Rgb::ZERO, share, active);
+            origin -= ray.send(arrival.dir, &place, Rgb::ZERO, sink);
         }
         let sensor = self.sensor;
         self.camera_ray(record, origin, RgbVec::ZERO, &sensor, sink);
     }
 
     /// Node `k` being a vertex of a light path as something sees it: what its scattering collects from behind, and the
-    /// sensitivities there.
+    /// sensitivities there. `ends` is what nodes have collected.
     pub(super) fn behind_joint<S: AdjointSink>(
         &mut self,
         path: &RecordedPath<'_>,
         k: usize,
+        ends: &mut [SurfaceAdjoint],
         sink: &mut S,
     ) -> (Rgb, SurfaceAdjoint) {
         let nothing = (Rgb::ZERO, SurfaceAdjoint::default());
@@ -66,11 +67,12 @@ impl Differentiator<'_> {
         let theta = arrival.throughput * arrival.end.sigma_s();
         let children = self.locals[own].children;
         let passes = theta * (node.value * node.inv_pdf);
-        let mut here = self.locals[own].at.times(passes);
+        let mut here = ends[own].times(passes);
         let adjoint = theta * node.inv_pdf * children;
         let moving = [k, next, arrival.parent as usize].iter().any(|n| velocities.moves(*n));
         let (wo, wi, behind) = (-arrival.dir, node.wi, self.behind(path, k));
-        let to_wi = self.scattering(vertex, wo, wi, None, adjoint, behind, moving, &mut here, sink);
+        let to_wi =
+            self.scattering(vertex, wo, wi, None, adjoint, behind, moving, &mut here, ends, sink);
         let end = record.nodes[next].arrival.as_ref();
         if let (Some(to_wi), Some(end), Some(v)) = (to_wi, end, record.nodes[next].vertex()) {
             let phi = velocities.of(next).blend.weight;

@@ -53,11 +53,10 @@ use crate::world::lights::EmitterMask;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{Crossing, World};
 
-/// What has been collected for a vertex while its neighbours are processed.
+/// What has been collected for a vertex while its neighbours are processed, besides what is by its own velocity and
+/// normals.
 #[derive(Clone, Copy, Debug, Default)]
 struct Local {
-    /// By the vertex's own velocity and normals.
-    at: SurfaceAdjoint,
     /// By the velocity of the matter it is on.
     matter: RgbVec,
     /// C_k, the value of the children per unit of scattering.
@@ -112,6 +111,8 @@ pub(crate) struct Differentiator<'w> {
     /// Rays do not turn, and vertices do not move with what auxiliary rays find: to tell how much that is.
     pub(crate) edges_at_rest: bool,
     locals: Vec<Local>,
+    /// By the velocity and normals of each vertex.
+    ends: Vec<SurfaceAdjoint>,
     points: Vec<(f64, f64)>,
     rng: Rng,
     /// The filter's gradient by the pixel position, over the density.
@@ -137,6 +138,7 @@ impl<'w> Differentiator<'w> {
             camera: Cow::Borrowed(&world.camera),
             edges_at_rest: false,
             locals: Vec::new(),
+            ends: Vec::new(),
             points: Vec::new(),
             rng: Rng::new(0, 0, 0),
             filter: [0.0; 2],
@@ -178,33 +180,55 @@ impl<'w> Differentiator<'w> {
         self.sensor = [SensorGradient::default(); 3];
         self.locals.clear();
         self.locals.resize(nodes, Local::default());
+        let mut ends = core::mem::take(&mut self.ends);
+        ends.clear();
+        ends.resize(nodes, SurfaceAdjoint::default());
         for k in (1..nodes).rev() {
-            self.node(path, k, sink);
+            self.node(path, k, &mut ends, sink);
         }
-        let Local { at, matter, .. } = self.locals[0];
-        self.camera_ray(path.record, at.u + matter + self.origin, self.turn, &self.sensor, sink);
+        let origin = ends[0].u + self.locals[0].matter + self.origin;
+        self.ends = ends;
+        self.camera_ray(path.record, origin, self.turn, &self.sensor, sink);
     }
 
-    fn node<S: AdjointSink>(&mut self, path: &RecordedPath<'_>, k: usize, sink: &mut S) {
+    fn node<S: AdjointSink>(
+        &mut self,
+        path: &RecordedPath<'_>,
+        k: usize,
+        ends: &mut [SurfaceAdjoint],
+        sink: &mut S,
+    ) {
         match path.record.nodes[k].role {
-            Role::Walked | Role::Joined(_) => self.sweep(path, k, sink),
-            Role::OfLight { passed } => self.sweep(path, k, &mut Scaled { sink, by: passed }),
+            Role::Walked | Role::Joined(_) => self.sweep(path, k, ends, sink),
+            Role::OfLight { passed } => self.sweep(path, k, ends, &mut Scaled { sink, by: passed }),
             Role::LastOfLight => {}
         }
     }
 
-    fn sweep<S: AdjointSink>(&mut self, path: &RecordedPath<'_>, k: usize, sink: &mut S) {
+    fn sweep<S: AdjointSink>(
+        &mut self,
+        path: &RecordedPath<'_>,
+        k: usize,
+        ends: &mut [SurfaceAdjoint],
+        sink: &mut S,
+    ) {
         let RecordedPath { record, lit, .. } = *path;
         let node = &record.nodes[k];
         let Some(arrival) = &node.arrival else { return };
         let world = self.world;
         let theta = arrival.throughput;
-        let (mut collected, mut here) = match node.role {
+        let mut of_joint;
+        let (mut collected, here, before) = match node.role {
             Role::Walked => {
-                let Local { children, joined, at, .. } = self.locals[k];
-                (node.value * node.inv_pdf * children + joined, at)
+                let Local { children, joined, .. } = self.locals[k];
+                let Some((here, before)) = ends[..=k].split_last_mut() else { return };
+                (node.value * node.inv_pdf * children + joined, here, before)
             }
-            _ => self.behind_joint(path, k, sink),
+            _ => {
+                let collected;
+                (collected, of_joint) = self.behind_joint(path, k, ends, sink);
+                (collected, &mut of_joint, &mut ends[..k])
+            }
         };
         let received = match &arrival.end {
             Endpoint::Environment => {
@@ -214,7 +238,7 @@ impl<'w> Differentiator<'w> {
                 environment.radiance(arrival.dir) * arrival.emission_weight
             }
             Endpoint::Surface(vertex) => {
-                collected += self.connections(path, k, vertex, theta, &mut here, sink);
+                collected += self.connections(path, k, vertex, theta, here, before, sink);
                 let Kind::Surface(point) = &vertex.kind else { return };
                 let mut emitted = Rgb::ZERO;
                 if let Some(e) = world.scene.shapes[point.shape as usize].emitter
@@ -224,7 +248,7 @@ impl<'w> Differentiator<'w> {
                 {
                     emitted = world.emitted(point, -arrival.dir) * arrival.emission_weight;
                     let adjoint = theta * arrival.emission_weight;
-                    area(world, e, point, adjoint, &mut here, sink);
+                    area(world, e, point, adjoint, &mut here.slide, sink);
                 }
                 emitted + collected
             }
@@ -234,20 +258,19 @@ impl<'w> Differentiator<'w> {
                     ..*c
                 };
                 let theta_s = theta * c.sigma_s();
-                collected += self.connections(path, k, vertex, theta_s, &mut here, sink);
+                collected += self.connections(path, k, vertex, theta_s, here, before, sink);
                 let moving = path.velocities.moves(k);
                 let weight = arrival.emission_weight;
-                self.coefficients(
-                    vertex, c, lit, theta, collected, weight, moving, &mut here, sink,
-                );
+                self.coefficients(vertex, c, lit, theta, collected, weight, moving, here, sink);
                 c.source() * arrival.emission_weight + c.sigma_s() * collected
             }
         };
-        self.arrive(path, k, &path.motion(k), received, &mut here, sink);
+        self.arrive(path, k, &path.motion(k), received, here, before, sink);
     }
 
     /// The segment from the parent to node `k`, and the parent's scattering into it, for what is `received` there by a
-    /// motion of the node; `here` is what it has collected.
+    /// motion of the node; `here` is what it has collected, `before` what nodes before it have.
+    #[allow(clippy::too_many_arguments)]
     fn arrive<S: AdjointSink>(
         &mut self,
         recorded: &RecordedPath<'_>,
@@ -255,6 +278,7 @@ impl<'w> Differentiator<'w> {
         motion: &NodeMotion<'_>,
         received: Rgb,
         here: &mut SurfaceAdjoint,
+        before: &mut [SurfaceAdjoint],
         sink: &mut S,
     ) {
         let world = self.world;
@@ -300,7 +324,7 @@ impl<'w> Differentiator<'w> {
                 Endpoint::Environment => return,
             },
         };
-        let mut there = self.locals[p].at;
+        let Some((there, before)) = before[..=p].split_last_mut() else { return };
         let (near_moves, far_moves) = (velocities.moves(p), velocity.moves);
         let ray_moves = near_moves || turn_of_ray.is_some();
         // As far as this is not the camera's importance.
@@ -318,7 +342,7 @@ impl<'w> Differentiator<'w> {
             let moving = far_moves || near_moves || velocities.moves(behind.parent);
             let behind = Some(behind);
             let to_wi =
-                self.scattering(from, wo, wi, paired, adjoint, behind, moving, &mut there, sink);
+                self.scattering(from, wo, wi, paired, adjoint, behind, moving, there, before, sink);
             if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
                 let g = turn(&(to_wi * phi), wi, arrival.distance);
                 there.u -= g;
@@ -338,15 +362,13 @@ impl<'w> Differentiator<'w> {
         match vertex {
             // No end moves; what is between may.
             _ if !(near_moves || far_moves || ray_moves) => {
-                self.segment(&path, Far::Direction, false, weight, &mut there, sink);
+                self.segment(&path, Far::Direction, false, weight, there, sink);
             }
             None => {
                 if let Some(filter) = seen.filter(|_| sink.active().sensor) {
-                    let by_view = self.seen(None, arrival.dir, value, filter);
-                    self.by_sensor(&by_view, phi, sink.active());
+                    self.seen(None, arrival.dir, value, filter, phi, sink.active());
                 }
-                let along =
-                    self.segment(&path, Far::Direction, ray_moves, weight, &mut there, sink);
+                let along = self.segment(&path, Far::Direction, ray_moves, weight, there, sink);
                 turned_wholly += along;
                 turned = along * (1.0 - phi);
             }
@@ -354,16 +376,14 @@ impl<'w> Differentiator<'w> {
                 let mut matter = self.locals[k].matter;
                 let slides = !velocity.auxiliary.is_empty() || moves(v, sink.active());
                 let view = seen.filter(|_| phi > 0.0 && (sink.active().sensor || slides));
-                let by_view = view.map(|filter| self.seen(vertex, arrival.dir, value, filter));
-                if let Some(by_view) = &by_view {
-                    self.by_sensor(by_view, phi, sink.active());
-                }
-                let by_place = by_view.map_or(RgbVec::ZERO, |v| v.place * phi);
+                let by_place = view.map_or(RgbVec::ZERO, |filter| {
+                    self.seen(vertex, arrival.dir, value, filter, phi, sink.active()) * phi
+                });
                 if turn_of_ray.is_some() {
                     turned_wholly += self.landing(&path, v, here, weight);
                 }
                 let mut film = SurfaceAdjoint::default();
-                let start = if parallel { &mut film } else { &mut there };
+                let start = if parallel { &mut film } else { &mut *there };
                 if phi == 1.0 {
                     here.u += by_place;
                     let moving = ray_moves || moves(v, sink.active());
@@ -372,22 +392,23 @@ impl<'w> Differentiator<'w> {
                     here.u += self.by_film(v, film.u, sink.active());
                 } else {
                     let free = weight * (1.0 - phi);
-                    turned = self.segment(&path, Far::Direction, ray_moves, free, &mut there, sink);
+                    turned = self.segment(&path, Far::Direction, ray_moves, free, there, sink);
                     turned_wholly += turned;
                     if phi > 0.0 {
                         let part = weight * phi;
-                        let start = if parallel { &mut film } else { &mut there };
-                        let (mut fixed, along) =
-                            self.material_end(&path, v, ray_moves, part, start, sink);
+                        let start = if parallel { &mut film } else { &mut *there };
+                        let mut fixed = SurfaceAdjoint::default();
+                        let along =
+                            self.material_end(&path, v, ray_moves, part, &mut fixed, start, sink);
                         turned_wholly += along;
                         fixed.u += by_place + self.by_film(v, film.u, sink.active());
-                        matter += core::mem::take(&mut fixed.u);
+                        matter += fixed.u;
                         here.n += fixed.n;
                         here.j += fixed.j;
                     }
                 }
                 let end = Propagated { vertex: v, velocity, auxiliary, weight, matter };
-                let back = self.propagate(&path, &end, here, &mut there, sink);
+                let back = self.propagate(&path, &end, here, there, sink);
                 turned_wholly += back.by_surfaces;
                 turned += back.by_surfaces + back.by_ray;
             }
@@ -397,9 +418,7 @@ impl<'w> Differentiator<'w> {
             let mut all = turned_wholly;
             if let Some(filter) = seen {
                 // A direction has no parallax.
-                let by_view = self.seen(None, arrival.dir, value, filter);
-                self.by_sensor(&by_view, share, sink.active());
-                all += by_view.place;
+                all += self.seen(None, arrival.dir, value, filter, share, sink.active());
                 // What the camera's image point does is replaced.
                 turned -= turned_wholly * share + weight.outer(gradient);
             }
@@ -411,12 +430,12 @@ impl<'w> Differentiator<'w> {
         if parallel {
             self.origin += core::mem::take(&mut there.u);
         }
-        self.locals[p].at = there;
     }
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
     /// behind `wo`, by normals and by materials, but for what is `paired`. Returns that by the direction `wi`,
-    /// which is the caller's. Unless something of this is `moving`, only the material counts.
+    /// which is the caller's. Unless something of this is `moving`, only the material counts. `before` is what nodes before
+    /// it have collected.
     #[allow(clippy::too_many_arguments)]
     fn scattering<S: AdjointSink>(
         &mut self,
@@ -428,6 +447,7 @@ impl<'w> Differentiator<'w> {
         behind: Option<Behind>,
         moving: bool,
         here: &mut SurfaceAdjoint,
+        before: &mut [SurfaceAdjoint],
         sink: &mut S,
     ) -> Option<RgbVec> {
         let world = self.world;
@@ -465,7 +485,7 @@ impl<'w> Differentiator<'w> {
         if let Some(b) = behind {
             let to_wo = d.wo * adjoint;
             let g = turn(&(to_wo * b.weight), wo, b.distance);
-            self.locals[b.parent].at.u += g;
+            before[b.parent].u += g;
             self.locals[b.node].matter -= g;
             self.locals[b.node].turn -= to_wo;
             // Only the camera's ray turns by itself.
@@ -477,6 +497,7 @@ impl<'w> Differentiator<'w> {
     }
 
     /// Next-event connections of a vertex: returns their sum, without the scattering coefficient.
+    #[allow(clippy::too_many_arguments)]
     fn connections<S: AdjointSink>(
         &mut self,
         recorded: &RecordedPath<'_>,
@@ -484,6 +505,7 @@ impl<'w> Differentiator<'w> {
         vertex: &Vertex,
         theta: Rgb,
         here: &mut SurfaceAdjoint,
+        before: &mut [SurfaceAdjoint],
         sink: &mut S,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
@@ -499,15 +521,16 @@ impl<'w> Differentiator<'w> {
             }
             let crossings = &record.crossings[crossings.clone()];
             let event = NextEvent { c, crossings, theta, behind, moving, arrives };
-            if !self.connect_with_shadows(recorded, k, vertex, &event, sink) {
+            if !self.connect_with_shadows(recorded, k, vertex, &event, before, sink) {
                 sum += c.f * c.rest();
-                self.connect(recorded, -arrival.dir, vertex, &event, here, sink);
+                self.connect(recorded, -arrival.dir, vertex, &event, here, before, sink);
             }
         }
         sum
     }
 
     /// One of them.
+    #[allow(clippy::too_many_arguments)]
     fn connect<S: AdjointSink>(
         &mut self,
         recorded: &RecordedPath<'_>,
@@ -515,6 +538,7 @@ impl<'w> Differentiator<'w> {
         vertex: &Vertex,
         event: &NextEvent<'_>,
         here: &mut SurfaceAdjoint,
+        before: &mut [SurfaceAdjoint],
         sink: &mut S,
     ) {
         let NextEvent { c, crossings, theta, behind, moving, arrives } = *event;
@@ -523,7 +547,8 @@ impl<'w> Differentiator<'w> {
         let motion = self.light_motion(vertex, moving, light, field, sink.active());
         let turns = arrives || motion.is_some() || light_moves(light, sink.active());
         let rest = theta * c.rest();
-        let to_wi = self.scattering(vertex, wo, light.w, None, rest, behind, turns, here, sink);
+        let to_wi =
+            self.scattering(vertex, wo, light.w, None, rest, behind, turns, here, before, sink);
         let per_value = theta * c.f * c.transport;
         let path = Stretch {
             start: vertex.x,
@@ -575,23 +600,35 @@ impl<'w> Differentiator<'w> {
     }
 
     /// The camera's importance and filter towards a vertex, or the environment, that `value` reaches it
-    /// from per unit of the filter's weight.
-    fn seen(&self, vertex: Option<&Vertex>, dir: Vec3, value: Rgb, weight: Rgb) -> ByView {
+    /// from per unit of the filter's weight: what they owe to the place of the vertex. A `share` of what they owe to the
+    /// camera is added to that of others.
+    fn seen(
+        &mut self,
+        vertex: Option<&Vertex>,
+        dir: Vec3,
+        value: Rgb,
+        weight: Rgb,
+        share: f64,
+        active: &ActiveInputs,
+    ) -> RgbVec {
         let camera = &*self.camera;
         let x = vertex.map_or(camera.position() + dir, |v| v.x);
         let projection = camera.view(x);
-        let total = (value * weight).to_array();
-        let mut at = [Vec3::ZERO; 3];
-        let mut sensor = [SensorGradient::default(); 3];
-        for (c, v) in value.to_array().into_iter().enumerate() {
-            let filter = self.filter.map(|f| f * v);
-            (at[c], sensor[c]) = camera.view_gradient(&projection, filter, total[c]);
-            if vertex.is_none() {
-                // A direction has no parallax.
-                sensor[c].position = Vec3::ZERO;
+        let (value, total) = (value.to_array(), (value * weight).to_array());
+        let mut place = [Vec3::ZERO; 3];
+        for (c, sum) in self.sensor.iter_mut().enumerate() {
+            let filter = self.filter.map(|f| f * value[c]);
+            let (at, mut gradient) = camera.view_gradient(&projection, filter, total[c]);
+            place[c] = at;
+            if active.sensor {
+                if vertex.is_none() {
+                    // A direction has no parallax.
+                    gradient.position = Vec3::ZERO;
+                }
+                *sum += gradient.scaled(share);
             }
         }
-        ByView { place: RgbVec { r: at[0], g: at[1], b: at[2] }, sensor }
+        RgbVec { r: place[0], g: place[1], b: place[2] }
     }
 
     /// What the velocity of the film's point from which an orthographic camera sees a vertex owes to the vertex; its debt
@@ -615,16 +652,6 @@ impl<'w> Differentiator<'w> {
     fn behind(&self, path: &RecordedPath<'_>, node: usize) -> Option<Behind> {
         behind(path, node, self.world.camera.is_orthographic())
     }
-
-    /// Adds a share of what the camera's importance and filter owe to the camera.
-    fn by_sensor(&mut self, by_view: &ByView, share: f64, active: &ActiveInputs) {
-        if !active.sensor {
-            return;
-        }
-        for (sum, gradient) in self.sensor.iter_mut().zip(&by_view.sensor) {
-            *sum += gradient.scaled(share);
-        }
-    }
 }
 
 /// A next-event connection.
@@ -639,14 +666,6 @@ struct NextEvent<'a> {
     moving: bool,
     /// Or the one before.
     arrives: bool,
-}
-
-/// Gradient of the camera's importance and filter.
-struct ByView {
-    /// By the point seen.
-    place: RgbVec,
-    /// By the camera, per channel.
-    sensor: [SensorGradient; 3],
 }
 
 /// The segment by which a walk arrived at a node; `None` at the camera. Where its rays are `parallel`, nothing that it sees

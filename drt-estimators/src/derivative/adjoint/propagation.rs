@@ -124,21 +124,21 @@ impl Differentiator<'_> {
         (here.u + slide + matter).dot(a.displacement)
     }
 
-    /// A stretch whose far end moves with its matter, `weight` of light passing: the sensitivities of that end,
-    /// and that of transmittance to the rate of the direction.
+    /// A stretch whose far end moves with its matter, `weight` of light passing: adds the sensitivities of that end to `fixed`,
+    /// and returns that of transmittance to the rate of the direction.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn material_end<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
         end: &Vertex,
         ray_moves: bool,
         weight: Rgb,
+        fixed: &mut SurfaceAdjoint,
         near: &mut SurfaceAdjoint,
         sink: &mut S,
-    ) -> (SurfaceAdjoint, RgbVec) {
-        let mut fixed = SurfaceAdjoint::default();
+    ) -> RgbVec {
         let moving = ray_moves || moves(end, sink.active());
-        let along = self.segment(path, Far::Vertex(end, &mut fixed), moving, weight, near, sink);
-        (fixed, along)
+        self.segment(path, Far::Vertex(end, fixed), moving, weight, near, sink)
     }
 
     /// Sends the sensitivities of a ray along `dir` from a node: to the velocity of its `origin`, and to the rate of its

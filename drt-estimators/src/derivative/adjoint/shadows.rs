@@ -17,6 +17,7 @@ impl Differentiator<'_> {
         k: usize,
         vertex: &Vertex,
         event: &NextEvent<'_>,
+        before: &mut [SurfaceAdjoint],
         sink: &mut S,
     ) -> bool {
         let RecordedPath { record, velocities, .. } = *recorded;
@@ -50,12 +51,12 @@ impl Differentiator<'_> {
             let event = NextEvent { behind, moving: true, arrives: true, ..*event };
             let ordinary = core::mem::take(&mut self.locals[k]);
             let mut here = SurfaceAdjoint::default();
-            self.connect(recorded, -arrival.dir, vertex, &event, &mut here, sink);
+            self.connect(recorded, -arrival.dir, vertex, &event, &mut here, before, sink);
             let light = Some(light);
             let ray = RayMotion { turn, parts: &parts.edges, shadows: &parts.shadows, light };
             let motion = NodeMotion { velocity: &velocity, auxiliary: &auxiliary, ray: Some(ray) };
             let received = event.c.f * event.c.rest();
-            self.arrive(recorded, k, &motion, received, &mut here, sink);
+            self.arrive(recorded, k, &motion, received, &mut here, before, sink);
             let own = core::mem::replace(&mut self.locals[k], ordinary);
             self.locals[k].incoming += own.incoming;
         }

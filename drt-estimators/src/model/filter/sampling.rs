@@ -38,7 +38,7 @@ impl Filter {
         let offset = u.map(|u| self.sample_axis(u, derivative));
         let share = self.slope_share(derivative);
         let [(x, sx), (y, sy)] = offset.map(|o| self.axis_with_slope(o));
-        let pdf = self.pdf_axis(offset[0], sx, share) * self.pdf_axis(offset[1], sy, share);
+        let pdf = self.pdf_axis(offset[0], x, sx, share) * self.pdf_axis(offset[1], y, sy, share);
         let slope = [sx * y, x * sy].map(|g| g / pdf);
         FilterSample { offset, weight: x * y / pdf, slope, pdf }
     }
@@ -48,14 +48,17 @@ impl Filter {
     #[must_use]
     pub fn pdf(&self, offset: [f64; 2], derivative: bool) -> f64 {
         let share = self.slope_share(derivative);
-        offset.map(|x| self.pdf_axis(x, self.axis_with_slope(x).1, share)).iter().product()
+        let pdf = |x| {
+            let (p, slope) = self.axis_with_slope(x);
+            self.pdf_axis(x, p, slope, share)
+        };
+        offset.map(pdf).iter().product()
     }
 
-    /// The factor of one axis, and that of the density of [`sample`](Self::sample).
+    /// The factor of one axis of the density of [`sample`](Self::sample), from p and its derivative there.
     #[inline]
-    pub(crate) fn axis_with_density(&self, x: f64, derivative: bool) -> (f64, f64) {
-        let (p, slope) = self.axis_with_slope(x);
-        (p, self.pdf_axis(x, slope, self.slope_share(derivative)))
+    pub(crate) fn axis_density(&self, x: f64, p: (f64, f64), derivative: bool) -> f64 {
+        self.pdf_axis(x, p.0, p.1, self.slope_share(derivative))
     }
 
     /// Draws a coordinate evenly from the unit interval of pixel `i` out of a row of `n`; with its density. What
@@ -74,7 +77,7 @@ impl Filter {
             // The last representable number would give the offset where the density is zero.
             let below = f64::min(1.0 - 2.0 * tail * v, 1.0 - f64::EPSILON);
             let x = self.radius * self.half.sample(below);
-            (x, self.pdf_axis(-x, 0.0, 0.0) * part / tail)
+            (x, self.pdf_axis(-x, self.axis(-x), 0.0, 0.0) * part / tail)
         };
         let [start, centre] = [f64::from(i), f64::from(i) + 0.5];
         if u < before {
@@ -125,11 +128,15 @@ impl Filter {
         if u < 0.5 { -x } else { x }
     }
 
-    fn pdf_axis(&self, x: f64, slope: f64, share: f64) -> f64 {
-        if x < -self.radius || x >= self.radius {
-            return 0.0;
-        }
-        let profile = 0.5 / self.radius * self.half.pdf(Real::abs(x) / self.radius);
+    fn pdf_axis(&self, x: f64, p: f64, slope: f64, share: f64) -> f64 {
+        let profile = match self.kind {
+            FilterKind::Gaussian { radius, .. } if -radius <= x && x < radius => {
+                0.5 / radius * self.half.pdf(Real::abs(x) / radius)
+            }
+            FilterKind::Gaussian { .. } => return 0.0,
+            // Of which samples are in proportion to p.
+            _ => p,
+        };
         if share == 0.0 {
             return profile;
         }

@@ -76,6 +76,24 @@ fn values_and_gradients_follow_the_definition() {
 }
 
 #[test]
+fn rows_are_the_factors_of_one_pixel_after_another() {
+    let mut rng = Rng::new(7, 0, 0);
+    let wide = FilterKind::Gaussian { radius: 256.0, std_dev: 60.0 };
+    for f in filters().chain([Filter::new(wide).unwrap()]) {
+        for _ in 0..20 {
+            let at = 300.0 + rng.next_f64();
+            let reached = f.reached(at, 600);
+            let peak = f.axis_with_slope(0.0).0;
+            for (i, (p, slope)) in reached.clone().zip(f.row(at, reached.start)) {
+                let (p0, slope0) = f.axis_with_slope(at - (f64::from(i) + 0.5));
+                assert!((p - p0).abs() < 1e-11 * peak, "{:?} {p} {p0}", f.kind());
+                assert!((slope - slope0).abs() < 1e-11 * (peak / f.radius() + slope0.abs()));
+            }
+        }
+    }
+}
+
+#[test]
 fn only_the_box_jumps_at_its_edge() {
     for f in filters() {
         let edge = f.axis(f.radius() * (1.0 - 1e-9)) / f.axis(0.0);
@@ -237,7 +255,7 @@ fn samples_of_a_row_are_shared() {
                                     f64::from(i) + 0.5 + f.sample([u, 0.5], derivative).offset[0];
                                 let density = |j| {
                                     let offset = at - (f64::from(j) + 0.5);
-                                    f.axis_with_density(offset, derivative).1
+                                    f.axis_density(offset, f.axis_with_slope(offset), derivative)
                                 };
                                 (at, (0..n).map(density).sum())
                             }

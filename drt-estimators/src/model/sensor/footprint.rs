@@ -1,4 +1,4 @@
-use crate::model::filter::Filter;
+use crate::model::filter::{Filter, FilterRow};
 
 /// A pixel reached by an image point, and how much the point counts there.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,11 +17,15 @@ pub struct PixelWeight {
 /// is the mean of contributions over samples, never divided by a sum of weights.
 #[derive(Clone, Debug)]
 pub struct Footprint<'a> {
-    filter: &'a Filter,
-    point: [f64; 2],
     columns: [u32; 2],
     rows: [u32; 2],
     next: [u32; 2],
+    /// Of the first column on, of the next one on, and of the rows after the present one.
+    first: FilterRow<'a>,
+    across: FilterRow<'a>,
+    down: FilterRow<'a>,
+    /// The factor of the present row, and its derivative.
+    of_row: (f64, f64),
 }
 
 impl<'a> Footprint<'a> {
@@ -32,7 +36,10 @@ impl<'a> Footprint<'a> {
         });
         // An empty range of columns leaves nothing in any row.
         let rows = if columns[0] < columns[1] { rows } else { [0, 0] };
-        Self { filter, point, columns, rows, next: [columns[0], rows[0]] }
+        let next = [columns[0], rows[0]];
+        let [first, mut down] = [0, 1].map(|k| filter.row(point[k], next[k]));
+        let of_row = down.next().unwrap_or_default();
+        Self { columns, rows, next, first, across: first, down, of_row }
     }
 }
 
@@ -44,14 +51,14 @@ impl Iterator for Footprint<'_> {
         if row >= self.rows[1] {
             return None;
         }
-        self.next = if column + 1 < self.columns[1] {
-            [column + 1, row]
+        let ((x, sx), (y, sy)) = (self.across.next()?, self.of_row);
+        if column + 1 < self.columns[1] {
+            self.next[0] += 1;
         } else {
-            [self.columns[0], row + 1]
-        };
-        let dx = self.point[0] - (f64::from(column) + 0.5);
-        let dy = self.point[1] - (f64::from(row) + 0.5);
-        let [(x, sx), (y, sy)] = [dx, dy].map(|o| self.filter.axis_with_slope(o));
+            self.next = [self.columns[0], row + 1];
+            self.across = self.first;
+            self.of_row = self.down.next()?;
+        }
         Some(PixelWeight { pixel: [column, row], weight: x * y, gradient: [sx * y, x * sy] })
     }
 }

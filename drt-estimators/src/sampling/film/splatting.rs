@@ -138,16 +138,14 @@ impl Taps {
             SplatDensity::OfFilters { derivative } => Some(derivative),
         };
         self.density = if derivative.is_some() { 0.0 } else { 1.0 };
+        let mut row = raster.filter.row(at, self.first);
         for i in reached {
-            let offset = at - (f64::from(i) + 0.5);
-            let weight = match derivative {
-                None => raster.filter.axis(offset),
-                Some(derivative) => {
-                    let (weight, density) = raster.filter.axis_with_density(offset, derivative);
-                    self.density += density;
-                    weight
-                }
-            };
+            let offset = row.offset();
+            let Some(factors) = row.next() else { break };
+            let weight = factors.0;
+            if let Some(derivative) = derivative {
+                self.density += raster.filter.axis_density(offset, factors, derivative);
+            }
             self.pixels.push(weight);
             let block = raster.blocks[axis][i as usize];
             match self.blocks.last_mut() {
