@@ -148,7 +148,12 @@ impl Blends {
 
     /// True when φ > 0 for some vertices on it that the camera sees.
     pub(crate) fn acts_in_view_on(&self, shape: u32) -> bool {
-        self.curvatures.get(shape as usize).is_some_and(|c| *c > 0.0)
+        self.curvature(shape) > 0.0
+    }
+
+    /// Mean curvature of a shape, 1 / scene units; zero where φ is, on lamps, and on what is flat.
+    pub(crate) fn curvature(&self, shape: u32) -> f64 {
+        self.curvatures.get(shape as usize).copied().unwrap_or(0.0)
     }
 
     fn lamp(&self, shape: usize) -> Option<&BlendRegion> {

@@ -84,7 +84,6 @@ mod tests;
 mod turning;
 
 use alloc::sync::Arc;
-use alloc::vec::Vec;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::{Spatial, VelocityField};
@@ -124,17 +123,15 @@ impl Warped {
         let count = [found.list.len() as u64, found.all];
         let mut spatial = Spatial::new(world, active);
         spatial.blends.leave_media();
-        let curved: Vec<bool> = (0..world.scene.shapes.len() as u32)
-            .map(|s| spatial.blends.acts_in_view_on(s))
-            .collect();
         let moves = |shape| active.shapes[shape as usize];
-        let edges = TurningEdges::new(&found, moves, |shape| curved[shape as usize]);
+        let curved = |shape| spatial.blends.curvature(shape) > 0.0;
+        let edges = TurningEdges::new(&found, moves, curved);
         let spatial = Arc::new(spatial);
         let refused = |reason| Err(Error::Setting { setting: "warp", reason });
         let surfaces_only = !(world.has_media() || world.any_null);
         match settings.warp {
             Warp::Edges => {
-                let field = EdgeTurns::new(world, active, Arc::clone(&spatial), edges, curved);
+                let field = EdgeTurns::new(world, active, Arc::clone(&spatial), edges);
                 Ok(Self { field: Arc::new(field), spatial: Some(spatial), count })
             }
             Warp::Points(_) | Warp::Directions(_) if !surfaces_only => {

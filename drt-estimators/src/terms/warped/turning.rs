@@ -21,6 +21,9 @@ use crate::world::vertex::Vertex;
 /// Pixels.
 const PIXELS: f64 = 2.0;
 
+/// Of the radius of curvature: from how far vertices on a curved surface move with their matter.
+const NEAR: f64 = 0.25;
+
 /// The spatial form, with rays that turn.
 #[derive(Debug)]
 pub(super) struct EdgeTurns {
@@ -28,8 +31,8 @@ pub(super) struct EdgeTurns {
     edges: TurningEdges,
     /// Shapes that move and on which vertices may have a blend weight.
     blended: Vec<bool>,
-    /// Shapes with curved surfaces: vertices on them move with their matter.
-    curved: Vec<bool>,
+    /// Mean curvatures of the shapes, 1 / scene units: on curved surfaces vertices move with their matter.
+    curvatures: Vec<f64>,
 }
 
 impl EdgeTurns {
@@ -38,14 +41,37 @@ impl EdgeTurns {
         active: &ActiveInputs,
         spatial: Arc<Spatial>,
         edges: TurningEdges,
-        curved: Vec<bool>,
     ) -> Self {
         let blends = |s: u32| spatial.blends.acts_on(world, s);
-        let blended = (0..)
-            .zip(&active.shapes)
-            .map(|(s, moves)| *moves && (blends(s) || curved[s as usize]))
-            .collect();
-        Self { spatial, edges, blended, curved }
+        let blended = (0..).zip(&active.shapes).map(|(s, moves)| *moves && blends(s)).collect();
+        let shapes = 0..world.scene.shapes.len() as u32;
+        let curvatures = shapes.map(|s| spatial.blends.curvature(s)).collect();
+        Self { spatial, edges, blended, curvatures }
+    }
+
+    /// φ of a vertex on a curved surface; `None` on others.
+    ///
+    /// Against a viewer in a medium or on another surface matter moves however near it is, and a segment turns by that over its
+    /// length r. So φ falls with the square of r; points of one surface move apart in proportion to r.
+    fn of_matter(
+        &self,
+        viewer: Option<&Vertex>,
+        end: &Vertex,
+        dir: Vec3,
+        distance: f64,
+    ) -> Option<Blend> {
+        let shape = end.surface()?.shape;
+        let curvature = self.curvatures[shape as usize];
+        if curvature == 0.0 {
+            return None;
+        }
+        if viewer.is_none_or(|v| v.surface().is_some_and(|s| s.shape == shape)) {
+            return Some(Blend::MATERIAL);
+        }
+        let rise = curvature / NEAR;
+        let q = distance * rise;
+        let rest = 1.0 / (1.0 + q * q);
+        Some(Blend { weight: q * q * rest, gradient: dir * (2.0 * q * rest * rest * rise) })
     }
 }
 
@@ -62,10 +88,11 @@ impl VelocityField for EdgeTurns {
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity {
         let mut velocity = self.spatial.vertex(world, found, probe, auxiliary);
-        if let Endpoint::Surface(v) = &found.arrival.end
-            && v.surface().is_some_and(|s| self.curved[s.shape as usize])
+        let Found { viewer, arrival, .. } = *found;
+        if let Endpoint::Surface(v) = &arrival.end
+            && let Some(blend) = self.of_matter(viewer, v, arrival.dir, arrival.distance)
         {
-            velocity.blend = Blend::MATERIAL;
+            velocity.blend = blend;
         }
         if let Some(turn) = found.turn {
             velocity.moves = true;
@@ -117,10 +144,8 @@ impl VelocityField for EdgeTurns {
         dir: Vec3,
         distance: f64,
     ) -> Blend {
-        match end.surface() {
-            Some(s) if self.curved[s.shape as usize] => Blend::MATERIAL,
-            _ => self.spatial.blend(world, viewer, end, dir, distance),
-        }
+        self.of_matter(Some(viewer), end, dir, distance)
+            .unwrap_or_else(|| self.spatial.blend(world, viewer, end, dir, distance))
     }
 }
 
