@@ -43,8 +43,8 @@
 //! Where edges cross in projection T has a direction-dependent limit: its divergence grows as one over the distance, whose mean
 //! is finite and whose second moment diverges like a logarithm. That is so of every field of this kind.
 //!
-//! Vertices on curved surfaces, by their normals or their facets, have their matter's velocity as far as edges leave room,
-//! v = λ_0 u + ..., with λ_0 = 1 - Σ λ. Creases between their facets then turn only rays that all but meet them, and are found
+//! Vertices on curved surfaces, by their normals or their facets, have their matter's velocity as far as edges leave room and
+//! the vertex before is not near, v = λ_0 φ u + ..., with λ_0 = 1 - Σ λ. Creases between their facets then turn only rays that all but meet them, and are found
 //! in a [tree](drt_geom::edges::ConeTree) that passes over facets which are seen from one side.
 //!
 //! # In volumes

@@ -51,8 +51,8 @@ impl EdgeTurns {
 
     /// φ of a vertex on a curved surface; `None` on others.
     ///
-    /// Against a viewer in a medium or on another surface matter moves however near it is, and a segment turns by that over its
-    /// length r. So φ falls with the square of r; points of one surface move apart in proportion to r.
+    /// A viewer in a medium, on another surface, or whose ray turned does not move with this matter, however near it is, and the
+    /// segment between them turns by the difference over its length r. So φ falls with the square of r.
     fn of_matter(
         &self,
         viewer: Option<&Vertex>,
@@ -60,12 +60,11 @@ impl EdgeTurns {
         dir: Vec3,
         distance: f64,
     ) -> Option<Blend> {
-        let shape = end.surface()?.shape;
-        let curvature = self.curvatures[shape as usize];
+        let curvature = self.curvatures[end.surface()?.shape as usize];
         if curvature == 0.0 {
             return None;
         }
-        if viewer.is_none_or(|v| v.surface().is_some_and(|s| s.shape == shape)) {
+        if viewer.is_none() {
             return Some(Blend::MATERIAL);
         }
         let rise = curvature / NEAR;
