@@ -21,7 +21,7 @@ use crate::model::settings::EstimatorKind;
 use crate::terms::prepared::Prepared;
 use crate::world::World;
 use crate::world::lights::{EmitterMask, LightSample};
-use crate::world::vertex::Vertex;
+use crate::world::vertex::{Kind, Vertex};
 
 /// What is wrong with a field.
 #[derive(Clone, Copy, Debug)]
@@ -195,4 +195,41 @@ fn in_media() {
     let motion = parameter("card", 0.0, alloc::vec![moves("card", shift())]);
     let faults = [Fault::Divergence, Fault::Sign, Fault::Weight];
     compare(&glow(), &motion, LIGHT, &faults);
+}
+
+/// Curved matter near a viewer has a part in a vertex's velocity that falls with the square of the distance, or its difference
+/// from the viewer's velocity would turn short segments without bounds.
+#[test]
+fn matter_near_a_viewer_does_not_turn_segments() {
+    let scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
+    let motion = parameter("ball", 0.0, alloc::vec![moves("ball", shift())]);
+    let lit = EmitterMask::Extended;
+    let (prepared, _) = prepare_lit(EstimatorKind::Warped, lit, &scene, &motion, 4);
+    let (world, warped) = (&prepared.world, prepared.warped.as_ref().expect("the warped form"));
+    let curvature = warped.spatial.as_ref().expect("the spatial form").blends.curvature(0);
+    // On one of the ball's triangles, from its outside.
+    let at = |bary: [f64; 2]| {
+        let (point, x) = world.point(7, bary);
+        Vertex { x, medium: None, kind: Kind::Surface(point) }
+    };
+    let end = at([0.3; 2]);
+    assert!(curvature > 0.0 && end.surface().is_some_and(|s| s.shape == 0), "{curvature}");
+    let of = |viewer: &Vertex, end: &Vertex| {
+        let ray = end.x - viewer.x;
+        warped.field.blend(world, viewer, end, ray.normalize(), ray.length())
+    };
+    for distance in [1e-6, 1e-3, 0.1, 0.5, 3.0] {
+        let x = end.x + vec3(0.3, 0.9, 0.2).normalize() * distance;
+        let viewer = Vertex { x, medium: None, kind: Kind::Volume(None) };
+        let Blend { weight, gradient } = of(&viewer, &end);
+        let far = distance * curvature;
+        assert!((0.0..=1.0).contains(&weight) && weight <= 20.0 * far * far, "{distance} {weight}");
+        assert!(far < 2.0 || weight > 0.95, "{distance} {weight}");
+        let step = 1e-4 * f64::min(distance, 1.0);
+        let [a, b] = [step, -step].map(|s| at([0.3 + s, 0.3]));
+        let (difference, expected) =
+            (of(&viewer, &a).weight - of(&viewer, &b).weight, gradient.dot(a.x - b.x));
+        let size = gradient.length() * (a.x - b.x).length();
+        assert!((difference - expected).abs() < 1e-3 * size, "{distance} {difference} {expected}");
+    }
 }
