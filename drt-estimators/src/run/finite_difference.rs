@@ -66,7 +66,7 @@ pub fn finite_differences(
         };
         let middle = at(0.0, None)?;
         let worlds = [at(-step, Some(&middle))?, at(step, Some(&middle))?];
-        let pair = AntitheticPair { worlds, step, spp, seed: settings.seed };
+        let pair = DisplacedPair { worlds, step, spp, seed: settings.seed };
         let progress = |done: f64| {
             control.progress((p as f64 + done) / parameters.len() as f64);
         };
@@ -79,14 +79,14 @@ pub fn finite_differences(
 }
 
 /// A scene displaced both ways.
-struct AntitheticPair {
+struct DisplacedPair {
     worlds: [World; 2],
     step: f64,
     spp: u32,
     seed: u64,
 }
 
-impl AntitheticPair {
+impl DisplacedPair {
     fn difference(
         &self,
         pool: &Pool,
