@@ -8,14 +8,19 @@
 //! A scene `DIR/…/NAME_INTEGRATOR.xml` has its reference in `refs/NAME_ref_rgb.exr` and the variance of
 //! one sample of a pixel in `refs/NAME_ref_rgb_var.exr`, both as Mitsuba's own tests write them. The
 //! table says of each whether it loads, the rms and the largest z of 8×8 block means, their bias in
-//! percent of the image's mean, and seconds. It exits with 1 where a scene does not load or disagrees.
+//! percent of the image's mean, the rms of what the reference's own numbers cannot show, in percent of a block, and seconds.
+//! It exits with 1 where a scene does not load or disagrees.
 //!
-//! What a reference's own numbers cannot show does not count. They are XYZ in single precision, to which samples were added
+//! References and their variances were taken in XYZ and stored as RGB. Variances mean something in XYZ only: as RGB they
+//! come out below zero. Both images are compared there. The variances of ours are those of runs with other seeds.
+//!
+//! What a reference's own numbers cannot show does not count. They are means in single precision, to which samples were added
 //! one by one: with steps of the size e at the sum of N samples, this adds an error of e²/12 for each sample where these vary by
 //! more than e, but one that is the same each time where all are equal, even within N e/4 (32000 times 0.950456, the X of
-//! white, gives 0.950745, which is in the reference of a white sky). Samples are all equal where several pixels are, to the bit. Some were then kept in half precision: every one of their
-//! pixels is a triple of such numbers once it is taken back to XYZ, off by up to half a step. These errors are the same for equal
-//! pixels, and independent for others.
+//! white, gives 0.950745, which is in the reference of a white sky). Mean squares have the same error; a variance that it may have made does not tell
+//! whether samples vary. Some means were then kept in half precision: every one of their
+//! pixels is a triple of such numbers once it is taken back to XYZ, off by up to half a step. These errors are the same for pixels
+//! that are equal but for them, and independent for others.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,9 +29,12 @@ use std::time::Instant;
 
 use clap::Parser;
 use drt_cli::{ExrFile, read_exr};
+use drt_math::Moments;
 
 /// Width of the blocks whose means are compared.
 const BLOCK: u32 = 8;
+/// Runs of other seeds that make an image.
+const PARTS: u32 = 8;
 
 #[derive(Parser)]
 #[command(about = "Compares images of Mitsuba's test scenes with their references")]
@@ -43,7 +51,7 @@ struct Arguments {
     /// Samples per pixel of the references.
     #[arg(long, default_value_t = 32_000.0)]
     reference_spp: f64,
-    /// Where to keep the images, as NAME.exr; by default nowhere.
+    /// Where to keep the images, as NAME.SEED.exr; by default nowhere.
     #[arg(long)]
     keep: Option<PathBuf>,
     /// The program to render with; by default `drt` of the same build.
@@ -64,6 +72,8 @@ struct Comparison {
     max_z: f64,
     /// Mean difference over the mean of the reference.
     bias: f64,
+    /// Rms over blocks of the standard error by the reference's precision, over the mean of the reference.
+    rounding: f64,
     agrees: bool,
 }
 
@@ -73,17 +83,24 @@ fn main() -> ExitCode {
     find(&arguments.scenes, &mut scenes);
     scenes.sort_by(|a, b| a.path.cmp(&b.path));
     scenes.retain(|s| s.path.to_string_lossy().contains(&arguments.only));
-    println!("{:44} {:>8} {:>8} {:>8} {:>8}", "scene", "rms z", "max z", "bias %", "seconds");
+    println!(
+        "{:44} {:>8} {:>8} {:>8} {:>8} {:>8}",
+        "scene", "rms z", "max z", "bias %", "ref ±%", "seconds"
+    );
     let mut agreeing = 0;
     for scene in &scenes {
         let start = Instant::now();
         match compare(scene, &arguments) {
             Ok(c) => {
                 agreeing += usize::from(c.agrees);
-                let (bias, seconds) = (100.0 * c.bias, start.elapsed().as_secs_f64());
+                let [bias, rounding] = [c.bias, c.rounding].map(|x| 100.0 * x);
+                let seconds = start.elapsed().as_secs_f64();
                 let mark = if c.agrees { "" } else { "  disagrees" };
                 let [rms, max] = [c.rms_z, c.max_z];
-                println!("{:44} {rms:8.2} {max:8.2} {bias:8.2} {seconds:8.1}{mark}", scene.name);
+                println!(
+                    "{:44} {rms:8.2} {max:8.2} {bias:8.2} {rounding:8.3} {seconds:8.1}{mark}",
+                    scene.name
+                );
             }
             Err(message) => println!("{:44} {message}", scene.name),
         }
@@ -115,46 +132,58 @@ fn with_reference(path: PathBuf) -> Option<Scene> {
 }
 
 fn compare(scene: &Scene, arguments: &Arguments) -> Result<Comparison, String> {
-    let read = |path: &Path| read_exr(path).map_err(|e| e.to_string());
-    let (reference, variance) = (read(&scene.reference)?, read(&scene.variance)?);
-    let pixels = reference.size[0] * reference.size[1];
-    let spp = arguments.spp.unwrap_or_else(|| (2_000_000 / pixels.max(1)).max(1));
-    let image = render(scene, spp, arguments)?;
-    if image.size != reference.size {
-        return Err(format!("the image is {:?}, the reference {:?}", image.size, reference.size));
-    }
-    let plain = |file: &ExrFile, layer: &str| {
-        file.layers.get(layer).cloned().ok_or_else(|| format!("no layer `{layer}`"))
-    };
-    let (mean, error) = (plain(&image, "")?, plain(&image, "stderr")?);
-    let (expected, spread) = (plain(&reference, "")?, plain(&variance, "")?);
-    let precision = Precision::of(&expected, arguments.reference_spp);
+    let read = |path: &Path| plain(&read_exr(path).map_err(|e| e.to_string())?);
+    let (expected, spread) = (read(&scene.reference)?, read(&scene.variance)?);
+    let pixels = expected.pixels.len() as u32;
+    let spp = arguments.spp.unwrap_or_else(|| 2_000_000 / pixels.max(1)).max(PARTS) / PARTS;
+    let parts = (0..PARTS)
+        .map(|seed| {
+            let part = plain(&render(scene, spp, seed, arguments)?)?;
+            if part.size == expected.size {
+                Ok(part.pixels)
+            } else {
+                let [ours, theirs] = [part.size, expected.size];
+                Err(format!("the image is {ours:?}, the reference {theirs:?}"))
+            }
+        })
+        .collect::<Result<Vec<_>, String>>()?;
+    let precision = Precision::of(&expected.pixels, arguments.reference_spp);
     let sample = |i: usize, c: usize| {
-        // Means and variances are stored in other colours than they were taken in, so that a
-        // variance can come out below zero.
-        let of_one = f64::from(spread[i][c]).max(0.0);
+        let own = parts.iter().map(|part| part[i][c]).collect::<Moments>();
+        let of_one = spread.pixels[i][c].max(0.0);
         Sample {
-            difference: f64::from(mean[i][c]) - f64::from(expected[i][c]),
-            expected: f64::from(expected[i][c]),
-            variance: f64::from(error[i][c]).powi(2),
+            difference: own.mean() - expected.pixels[i][c],
+            expected: expected.pixels[i][c],
+            variance: own.variance_of_mean(),
             of_reference: of_one / arguments.reference_spp,
-            of_as_many: of_one / f64::from(spp),
+            of_as_many: of_one / f64::from(spp * PARTS),
         }
     };
     let rounding = |pixels: &[usize], c: usize| {
-        // Pixels that are equal: how many, and one of them.
-        let mut equal: BTreeMap<[u32; 3], (f64, usize)> = BTreeMap::new();
+        let (mut alike, mut others) = (BTreeMap::<i64, f64>::new(), 0.0);
         for i in pixels {
-            equal.entry(expected[*i].map(f32::to_bits)).or_insert((0.0, *i)).0 += 1.0;
+            let mean = expected.pixels[*i][c];
+            match precision.of_pixel(mean, spread.pixels[*i][c]) {
+                Rounding::Random(variance) => others += variance,
+                Rounding::Systematic(variance) => {
+                    *alike.entry(precision.class(mean)).or_insert(0.0) += variance.sqrt();
+                }
+            }
         }
-        let variance = |(n, i): &(f64, usize)| {
-            let widest = spread[*i].iter().fold(0.0, |m, v| f64::max(m, f64::from(*v)));
-            let spread = if *n > 1.0 { 0.0 } else { widest.sqrt() };
-            n * n * precision.rounding(expected[*i], spread)[c]
-        };
-        equal.values().map(variance).sum()
+        others + alike.values().map(|error| error * error).sum::<f64>()
     };
-    Ok(judge(reference.size, &sample, &rounding))
+    Ok(judge(expected.size, &sample, &rounding))
+}
+
+/// The plain layer of a file, in XYZ.
+struct Plain {
+    size: [u32; 2],
+    pixels: Vec<[f64; 3]>,
+}
+
+fn plain(file: &ExrFile) -> Result<Plain, String> {
+    let layer = file.layers.get("").ok_or("no plain layer")?;
+    Ok(Plain { size: file.size, pixels: layer.iter().map(|p| xyz(*p)).collect() })
 }
 
 /// How precise the numbers of a reference are.
@@ -165,16 +194,19 @@ struct Precision {
     half: bool,
 }
 
-/// From linear sRGB to XYZ, and back.
+/// The error that the numbers of a pixel have by their precision: a variance.
+enum Rounding {
+    /// Another one in every pixel.
+    Random(f64),
+    /// The same in pixels that are equal.
+    Systematic(f64),
+}
+
+/// From linear sRGB to XYZ.
 const TO_XYZ: [[f64; 3]; 3] = [
     [0.412453, 0.357580, 0.180423],
     [0.212671, 0.715160, 0.072169],
     [0.019334, 0.119193, 0.950227],
-];
-const FROM_XYZ: [[f64; 3]; 3] = [
-    [3.240479, -1.537150, -0.498535],
-    [-0.969256, 1.875991, 0.041556],
-    [0.055648, -0.204043, 1.057311],
 ];
 
 fn xyz(pixel: [f32; 3]) -> [f64; 3] {
@@ -188,31 +220,37 @@ fn half_step(x: f64) -> f64 {
 }
 
 impl Precision {
-    fn of(pixels: &[[f32; 3]], samples: f64) -> Self {
-        // The matrices are known to six digits.
+    fn of(pixels: &[[f64; 3]], samples: f64) -> Self {
+        // The matrix is known to six digits.
         let is_half = |x: f64| {
             let step = half_step(x);
             (x / step - (x / step).round()).abs() * step <= 2e-6 * x.abs() + 1e-9
         };
-        let values = || pixels.iter().flat_map(|p| xyz(*p));
-        let half = values().filter(|x| is_half(*x)).count();
+        let values = || pixels.iter().flatten();
+        let half = values().filter(|x| is_half(**x)).count();
         // By chance about one in a hundred would be.
         Self { samples, half: half * 10 >= values().count() * 9 }
     }
 
-    /// Variance of the rounding of each channel of a pixel whose samples vary by a `spread`.
-    fn rounding(&self, pixel: [f32; 3], spread: f64) -> [f64; 3] {
-        let variance = xyz(pixel).map(|x| {
-            // Of the sum, over the number of samples.
-            let step = x.abs() * f64::from(f32::EPSILON);
-            let added = if spread > self.samples * step {
-                step * step * self.samples / 12.0
-            } else {
-                (self.samples * step / 4.0).powi(2) / 3.0
-            };
-            added + if self.half { half_step(x).powi(2) / 12.0 } else { 0.0 }
-        });
-        FROM_XYZ.map(|row| (0..3).map(|c| row[c] * row[c] * variance[c]).sum())
+    /// The largest error of a sum of equal samples, over the sum.
+    fn of_equal(&self) -> f64 {
+        self.samples * f64::from(f32::EPSILON) / 4.0
+    }
+
+    /// Of a pixel with this mean and variance of one sample.
+    fn of_pixel(&self, mean: f64, variance: f64) -> Rounding {
+        let stored = if self.half { half_step(mean).powi(2) / 12.0 } else { 0.0 };
+        if variance > self.of_equal() * mean * mean {
+            let step = mean.abs() * f64::from(f32::EPSILON);
+            Rounding::Random(step * step * self.samples / 12.0 + stored)
+        } else {
+            Rounding::Systematic((self.of_equal() * mean).powi(2) / 3.0 + stored)
+        }
+    }
+
+    /// Means that may be equal but for their precision.
+    fn class(&self, mean: f64) -> i64 {
+        (mean.abs().max(f64::MIN_POSITIVE).ln() / (2.0 * self.of_equal())).round() as i64
     }
 }
 
@@ -241,6 +279,7 @@ fn judge(
         .flat_map(|y| (0..width.div_ceil(BLOCK)).map(move |x| [x * BLOCK, y * BLOCK]))
         .collect();
     let (mut squares, mut max_z, mut difference, mut expected) = (0.0, 0.0_f64, 0.0, 0.0);
+    let mut rounded = 0.0;
     for [x0, y0] in &blocks {
         for c in 0..3 {
             let mut sum = Sample::default();
@@ -261,6 +300,7 @@ fn judge(
             expected += sum.expected;
             // Both images are stored in single precision.
             let rounding = (1e-6 * sum.expected).powi(2) + rounding(&pixels, c);
+            rounded += rounding;
             let noisy = sum.variance.max(sum.of_as_many).sqrt() > NOISY * sum.expected;
             let own = if noisy { sum.variance.max(sum.of_as_many) } else { sum.variance };
             let z = match own + sum.of_reference + rounding {
@@ -271,22 +311,29 @@ fn judge(
             max_z = max_z.max(z);
         }
     }
-    let rms_z = (squares / (3 * blocks.len()).max(1) as f64).sqrt();
+    let numbers = (3 * blocks.len()).max(1) as f64;
+    let rms_z = (squares / numbers).sqrt();
     // Of 108 numbers, the size of most references, chance passes 4.9 once in ten thousand images.
-    Comparison { rms_z, max_z, bias: difference / expected, agrees: rms_z <= 1.3 && max_z < 5.0 }
+    Comparison {
+        rms_z,
+        max_z,
+        bias: difference / expected,
+        rounding: (rounded * numbers).sqrt() / expected,
+        agrees: rms_z <= 1.3 && max_z < 5.0,
+    }
 }
 
-fn render(scene: &Scene, spp: u32, arguments: &Arguments) -> Result<ExrFile, String> {
+fn render(scene: &Scene, spp: u32, seed: u32, arguments: &Arguments) -> Result<ExrFile, String> {
     let temporary = std::env::temp_dir().join(format!("drt-scene-table-{}", std::process::id()));
     let folder = arguments.keep.as_ref().unwrap_or(&temporary);
     std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
-    let output = folder.join(format!("{}.exr", scene.name.replace('/', "_")));
+    let output = folder.join(format!("{}.{seed}.exr", scene.name.replace('/', "_")));
     let beside = std::env::current_exe().ok().and_then(|e| Some(e.parent()?.parent()?.join("drt")));
     let program = arguments.drt.clone().or(beside).unwrap_or_else(|| "drt".into());
     let run = Command::new(&program)
         .arg("render")
         .arg(&scene.path)
-        .args(["--quiet", "--spp", &spp.to_string(), "-o"])
+        .args(["--quiet", "--spp", &spp.to_string(), "--seed", &seed.to_string(), "-o"])
         .arg(&output)
         .output()
         .map_err(|e| format!("cannot run {}: {e}", program.display()))?;

@@ -18,11 +18,11 @@ use super::{Loader, default_bsdf};
 use crate::CliError;
 
 /// Bands of a sphere between its poles where none are given; twice as many meridians.
-const SPHERE_RESOLUTION: u32 = 64;
+const SPHERE_RESOLUTION: u32 = 128;
 /// Corners of a disk where none are given.
-const DISK_RESOLUTION: u32 = 128;
+const DISK_RESOLUTION: u32 = 256;
 /// Sides of a cylinder where none are given.
-const CYLINDER_RESOLUTION: u32 = 128;
+const CYLINDER_RESOLUTION: u32 = 256;
 
 /// A shape before its placement.
 struct Model {

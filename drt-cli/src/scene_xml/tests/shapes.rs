@@ -28,7 +28,12 @@ fn primitives_stand_where_mitsuba_has_them() {
            </shape>"#,
     );
     let exact = 32.0 / 3.0 * std::f64::consts::PI;
-    assert!((sphere.mesh.volume() / exact - 1.0).abs() < 2e-3);
+    // Images tell half as many bands from a sphere: its silhouette lacks 4e-4 there.
+    let lacks = |mesh: &drt_geom::Mesh| 1.0 - mesh.volume() / exact;
+    assert!((0.0..5e-4).contains(&lacks(&sphere.mesh)));
+    let coarse = r#"<shape type="sphere"><integer name="resolution" value="64"/>
+        <float name="radius" value="2"/></shape>"#;
+    assert!(lacks(&shape(coarse).mesh) > 1e-3);
     let normals = sphere.mesh.normals.as_ref().unwrap();
     let outward = sphere.mesh.positions[7] - vec3(1.0, 2.0, 3.0);
     assert!((normals[7] - outward.normalize()).max_abs() < 1e-12);
@@ -42,7 +47,7 @@ fn cylinders_stand_between_their_ends() {
            <point name="p1" value="1 0 3"/></shape>"#,
     );
     let exact = 12.0 * std::f64::consts::PI;
-    assert!((cylinder.mesh.surface_area() / exact - 1.0).abs() < 2e-3);
+    assert!((cylinder.mesh.surface_area() / exact - 1.0).abs() < 1e-4);
     let normals = cylinder.mesh.normals.as_ref().unwrap();
     for (p, n) in cylinder.mesh.positions.iter().zip(normals) {
         let out = (*p - vec3(1.0, 0.0, 0.0)).reject(Vec3::Z);
