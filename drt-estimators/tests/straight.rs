@@ -5,7 +5,7 @@ mod common;
 use common::{Build, diffuse, placed};
 use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, Mask, ThinDielectric};
-use drt_estimators::{Estimate, Scene, Session, Settings, Unattended};
+use drt_estimators::{Estimate, PathSampling, Scene, Session, Settings, Unattended};
 use drt_geom::procedural::rectangle;
 use drt_math::{Rgb, Vec3, vec3};
 
@@ -62,9 +62,8 @@ fn points_and_directions_shine_through() {
     }
 }
 
-/// Paths see the sky through a mask at any depth that sees it without.
-#[test]
-fn masks_add_no_depth() {
+/// The sky through two masks, by paths up to a depth.
+fn sky_behind(depth: u32, straight_depth: bool) -> Estimate {
     let sky = Emitter::Constant { radiance: Rgb::ONE };
     let mut build = Build::default();
     let between = build.bsdf("between", mask());
@@ -73,8 +72,32 @@ fn masks_add_no_depth() {
         build.shape("roof", mesh, between);
     }
     build.light("sky", sky);
-    let seen = image(&build.camera(vec3(0.0, 0.0, 1.5), vec3(0.1, 0.1, 4.0), 1));
+    let mut scene = build.camera(vec3(0.0, 0.0, 1.5), vec3(0.1, 0.1, 4.0), depth);
+    scene.integrator.straight_depth = straight_depth;
+    image(&scene)
+}
+
+/// Paths see the sky through a mask at any depth that sees it without, or at one more for each, as in Mitsuba's `path`.
+#[test]
+fn masks_add_depth_where_they_should() {
     let expected = (1.0 - OPACITY).powi(2);
-    let off = (seen.mean.g - expected) / seen.stderr.g;
-    assert!(off.abs() < 4.0 && seen.stderr.g < 0.02 * expected, "{seen:?}");
+    for seen in [sky_behind(1, false), sky_behind(3, true)] {
+        let off = (seen.mean.g - expected) / seen.stderr.g;
+        assert!(off.abs() < 4.0 && seen.stderr.g < 0.02 * expected, "{seen:?}");
+    }
+    assert_eq!(sky_behind(2, true).mean, Rgb::ZERO);
+}
+
+/// Where going straight adds depth, points and directions do not shine through.
+#[test]
+fn masks_may_cast_shadows() {
+    let sun = Emitter::Directional { direction: -Vec3::Z, irradiance: Rgb::ONE };
+    let mut scene = shaded(Some(mask()), sun, 3);
+    assert!(image(&scene).mean.g > 0.0);
+    scene.integrator.straight_depth = true;
+    assert_eq!(image(&scene).mean, Rgb::ZERO);
+
+    let both = Settings { sampling: PathSampling::Bidirectional, ..Settings::default() };
+    let refused = Session::new(&scene, &[], &both).err().expect("refused").to_string();
+    assert!(refused.contains("`roof`") && refused.contains("straight"), "{refused}");
 }

@@ -38,7 +38,7 @@ fn describe(job: &Job) -> String {
     if job.text.is_some() {
         text = format!("job {}\n{text}", job.path.display());
     }
-    let Integrator { max_depth, rr_depth, hide_emitters } = scene.integrator;
+    let Integrator { max_depth, rr_depth, hide_emitters, .. } = scene.integrator;
     let depth = job.settings.max_depth.within(max_depth);
     let depth = depth.map_or("unlimited".into(), |d| d.to_string());
     let hidden = if hide_emitters { ", emitters hidden from the camera" } else { "" };

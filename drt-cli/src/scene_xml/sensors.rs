@@ -203,6 +203,8 @@ const PATHS: [&str; 16] = [
 ];
 /// Integrators of paths with one scattering at most.
 const DIRECT: [&str; 3] = ["direct", "direct_projective", "direct_reparam"];
+/// Those that go through null interfaces, masks and panes at no depth.
+const STRAIGHT: [&str; 5] = ["volpath", "volpathmis", "volpath_simple", "prbvolpath", "volpathAD"];
 /// Integrators that say more about the image of another one, inside them.
 const AROUND: [&str; 2] = ["moment", "aov"];
 
@@ -240,6 +242,7 @@ pub(super) fn integrator(e: &Element) -> Result<Integrator, CliError> {
     if let Some(depth) = p.integer_in("rr_depth", 1..=i64::from(u32::MAX))? {
         integrator.rr_depth = depth;
     }
+    integrator.straight_depth = !STRAIGHT.contains(&kind);
     integrator.hide_emitters = p.boolean("hide_emitters")?.unwrap_or(false);
     if p.boolean("strict_normals")? == Some(true) {
         return Err(e.error("`strict_normals` = true is not supported"));

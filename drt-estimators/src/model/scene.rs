@@ -140,11 +140,15 @@ pub struct Integrator {
     /// Rays from the camera pass area emitters, and see no environment.
     #[cfg_attr(feature = "serde", serde(default))]
     pub hide_emitters: bool,
+    /// Going straight through a surface (a mask, a thin pane) adds one to the depth as well, and light of points and
+    /// directions does not get through, as in Mitsuba's `path`; else it adds nothing, as in `volpath`. Null interfaces add nothing in either.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub straight_depth: bool,
 }
 
 impl Default for Integrator {
     fn default() -> Self {
-        Self { max_depth: None, rr_depth: 5, hide_emitters: false }
+        Self { max_depth: None, rr_depth: 5, hide_emitters: false, straight_depth: false }
     }
 }
 
@@ -304,6 +308,11 @@ impl Scene {
         };
         let reason = ElementError::Rim { parameter: parameter.into() };
         Err(unusable(&self.emitters[i].id, "emitter", i, reason))
+    }
+
+    /// The first shape that light goes straight through, but for null interfaces.
+    pub(crate) fn first_straight(&self) -> Option<usize> {
+        self.shapes.iter().position(|s| self.bsdfs[s.bsdf].item.passes_straight())
     }
 
     /// True when the camera sees less than there is, as the integrator hides emitters.

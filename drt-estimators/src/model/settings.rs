@@ -214,6 +214,12 @@ impl Settings {
         {
             return fail("sampling", SettingError::NoLightPaths);
         }
+        if self.sampling == PathSampling::Bidirectional
+            && let Some(i) = scene.first_straight()
+        {
+            let name = scene.shapes[i].id.clone().unwrap_or_else(|| alloc::format!("shape[{i}]"));
+            return fail("sampling", SettingError::Straight(name));
+        }
         Ok(())
     }
 }

@@ -63,7 +63,7 @@ impl Tracer<'_> {
             Drawn::Specular(s) if straight_only && !s.straight => return None,
             Drawn::Specular(s) => {
                 // Like a null interface, a pane that light goes straight through adds no depth.
-                segments -= u32::from(s.straight && segments > 0);
+                segments -= u32::from(s.straight && world.any_straight && segments > 0);
                 (s.w, None, s.weight)
             }
         };

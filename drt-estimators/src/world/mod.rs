@@ -196,7 +196,7 @@ pub(crate) struct World {
     pub(crate) geometry: Arc<Geometry>,
     null: Vec<bool>,
     pub(crate) any_null: bool,
-    /// Some surfaces let light go straight through.
+    /// Some surfaces let light go straight through at no depth.
     pub(crate) any_straight: bool,
     /// The medium beyond every interface.
     ambient: Option<usize>,
@@ -251,7 +251,7 @@ impl World {
             rr_depth: scene.integrator.rr_depth,
             hides_emitters: scene.hides_something(),
             any_null: null.iter().any(|n| *n),
-            any_straight: scene.shapes.iter().any(|s| scene.bsdfs[s.bsdf].item.passes_straight()),
+            any_straight: !scene.integrator.straight_depth && scene.first_straight().is_some(),
             geometry,
             null,
             ambient: None,

@@ -156,14 +156,14 @@ fn integrators() {
     let read = |inside: &str| {
         scene(&format!("<integrator type=\"volpathmis\">{inside}</integrator>")).integrator
     };
-    assert_eq!(
-        scene("").integrator,
-        Integrator { max_depth: None, rr_depth: 5, hide_emitters: false }
-    );
+    assert_eq!(scene("").integrator, Integrator::default());
     assert_eq!(read("").max_depth, None);
+    let straight =
+        |kind| scene(&format!("<integrator type=\"{kind}\"/>")).integrator.straight_depth;
+    assert!(straight("path") && straight("direct") && !straight("volpath"));
     assert_eq!(read(r#"<integer name="max_depth" value="-1"/>"#).max_depth, None);
     let both = r#"<integer name="max_depth" value="7"/><integer name="rr_depth" value="3"/>"#;
-    let read_both = Integrator { max_depth: Some(7), rr_depth: 3, hide_emitters: false };
+    let read_both = Integrator { max_depth: Some(7), rr_depth: 3, ..Integrator::default() };
     assert_eq!(read(both), read_both);
     assert!(read(r#"<boolean name="hide_emitters" value="true"/>"#).hide_emitters);
     let old = old_scene(

@@ -61,6 +61,11 @@ pub enum SettingError {
          integrator hides emitters; use unidirectional"
     )]
     NoLightPaths,
+    /// Paths from both ends, past a surface that light of points and directions goes straight through.
+    #[error(
+        "bidirectional sampling has no masks and thin panes: light goes straight through `{0}`; use unidirectional"
+    )]
+    Straight(String),
     /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
     #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
     JumpingFilter,

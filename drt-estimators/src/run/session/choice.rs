@@ -52,6 +52,9 @@ pub(super) fn chosen(
     if world.camera.aperture().is_some() || world.hides_emitters {
         return without("light paths are connected to no lens, and do not know what is hidden");
     }
+    if scene.first_straight().is_some() {
+        return without("light paths do not know what light goes straight through");
+    }
     if world.max_depth < 2 || !world.lights.start_paths() {
         return without("there are no light paths to join");
     }
