@@ -149,12 +149,15 @@ impl<'a> Loader<'a> {
         }
         let groups = self.groups(shapes, &mut scene.bsdfs)?;
         for e in shapes.iter().filter(|e| !groups.have(e)) {
-            if e.attribute("type") == Some("instance") {
-                self.instance(e, &groups, &mut scene)?;
-                continue;
+            match e.attribute("type") {
+                Some("instance") => self.instance(e, &groups, &mut scene)?,
+                // The shapes in it are among all shapes.
+                Some("merge") => self.merged(e)?,
+                _ => {
+                    let shape = self.shape(e, &mut scene.bsdfs)?;
+                    scene.shapes.push(shape);
+                }
             }
-            let shape = self.shape(e, &mut scene.bsdfs)?;
-            scene.shapes.push(shape);
         }
         for e in self.index.all("sensor") {
             scene.sensors.push(self.sensor(e)?);

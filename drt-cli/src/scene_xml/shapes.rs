@@ -125,7 +125,7 @@ fn model(p: &Properties<'_>) -> Result<Model, CliError> {
             };
             return Err(p.element.error(format!(
                 "the shape type `{other}` is not supported{why}; expected obj, ply, serialized, \
-                 rectangle, cube, sphere, disk, cylinder, shapegroup or instance"
+                 rectangle, cube, sphere, disk, cylinder, shapegroup, instance or merge"
             )));
         }
     };

@@ -64,6 +64,19 @@ impl<'a> Loader<'a> {
         Ok(groups)
     }
 
+    /// Checks a `merge`, whose shapes are what they are without it: joining their meshes saves Mitsuba time.
+    pub(in super::super) fn merged(&self, e: &'a Element) -> Result<(), CliError> {
+        let p = Properties::of(e)?;
+        let inner = self.index.inner(&p, "shape", None);
+        if let Some(referred) = inner.iter().find(|inner| inner.child.tag != "shape") {
+            return Err(referred.child.error("the shapes of a merge stand in it"));
+        }
+        if inner.is_empty() {
+            return Err(e.error("there is no shape in this merge"));
+        }
+        p.finish()
+    }
+
     /// Adds the shapes of an instance to a scene. Where there are several, their ids are that of the instance, a slash, and the id or the
     /// number of each.
     pub(in super::super) fn instance(

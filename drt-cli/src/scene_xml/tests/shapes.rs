@@ -349,3 +349,23 @@ fn groups_hold_shapes_and_instances_refer_to_groups() {
         refused(&format!("{GROUP}{body}"), parts);
     }
 }
+
+#[test]
+fn merged_shapes_are_shapes() {
+    let merged = scene(
+        r#"<bsdf type="diffuse" id="grey"/><shape type="merge" id="all"><shape type="cube" id="box"><ref id="grey"/></shape>
+           <shape type="rectangle"><ref id="grey"/></shape></shape>"#,
+    );
+    let ids: Vec<_> = merged.shapes.iter().map(|s| s.id.as_deref()).collect();
+    assert_eq!(ids, [Some("box"), None]);
+    refused(r#"<shape type="merge"/>"#, &["no shape in this merge"]);
+    let elsewhere = r#"<shape type="cube" id="box"/><shape type="merge"><ref id="box"/></shape>"#;
+    refused(elsewhere, &["stand in it"]);
+    let moved =
+        r#"<shape type="merge"><shape type="cube"/><float name="scale" value="2"/></shape>"#;
+    refused(moved, &["scale", "merge"]);
+    refused(
+        r#"<shape type="shapegroup"><shape type="merge"><shape type="cube"/></shape></shape>"#,
+        &["merge"],
+    );
+}
