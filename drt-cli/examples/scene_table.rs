@@ -11,6 +11,9 @@
 //! percent of the image's mean, the rms of what the reference's own numbers cannot show, in percent of a block, and seconds.
 //! It exits with 1 where a scene does not load or disagrees.
 //!
+//! With `--again FOLDER` two more columns compare with images that Mitsuba makes today (`scene_table_again.py`): the rms z of these
+//! and the reference, and of ours and these. Where the first is large and the second is not, the reference is off, and the table says so.
+//!
 //! References and their variances were taken in XYZ and stored as RGB. Variances mean something in XYZ only: as RGB they
 //! come out below zero. Both images are compared there. The variances of ours are those of runs with other seeds.
 //!
@@ -51,6 +54,9 @@ struct Arguments {
     /// Samples per pixel of the references.
     #[arg(long, default_value_t = 32_000.0)]
     reference_spp: f64,
+    /// A folder of images by Mitsuba as it is now, made by `scene_table_again.py`: NAME.SEED.exr.
+    #[arg(long)]
+    again: Option<PathBuf>,
     /// Where to keep the images, as NAME.SEED.exr; by default nowhere.
     #[arg(long)]
     keep: Option<PathBuf>,
@@ -83,22 +89,32 @@ fn main() -> ExitCode {
     find(&arguments.scenes, &mut scenes);
     scenes.sort_by(|a, b| a.path.cmp(&b.path));
     scenes.retain(|s| s.path.to_string_lossy().contains(&arguments.only));
+    let again = if arguments.again.is_some() { "   mi-ref  ours-mi" } else { "" };
     println!(
-        "{:44} {:>8} {:>8} {:>8} {:>8} {:>8}",
+        "{:44} {:>8} {:>8} {:>8} {:>8} {:>8}{again}",
         "scene", "rms z", "max z", "bias %", "ref ±%", "seconds"
     );
     let mut agreeing = 0;
     for scene in &scenes {
         let start = Instant::now();
         match compare(scene, &arguments) {
-            Ok(c) => {
-                agreeing += usize::from(c.agrees);
+            Ok((c, again)) => {
+                let off =
+                    again.as_ref().is_some_and(|[theirs, ours]| !theirs.agrees && ours.agrees);
+                agreeing += usize::from(c.agrees || off);
                 let [bias, rounding] = [c.bias, c.rounding].map(|x| 100.0 * x);
                 let seconds = start.elapsed().as_secs_f64();
-                let mark = if c.agrees { "" } else { "  disagrees" };
+                let mark = match (c.agrees, off) {
+                    (true, _) => "",
+                    (_, true) => "  the reference is off",
+                    (_, false) => "  disagrees",
+                };
+                let again = again.map_or(String::new(), |[theirs, ours]| {
+                    format!(" {:8.2} {:8.2}", theirs.rms_z, ours.rms_z)
+                });
                 let [rms, max] = [c.rms_z, c.max_z];
                 println!(
-                    "{:44} {rms:8.2} {max:8.2} {bias:8.2} {rounding:8.3} {seconds:8.1}{mark}",
+                    "{:44} {rms:8.2} {max:8.2} {bias:8.2} {rounding:8.3} {seconds:8.1}{again}{mark}",
                     scene.name
                 );
             }
@@ -131,34 +147,22 @@ fn with_reference(path: PathBuf) -> Option<Scene> {
     (reference.exists() && variance.exists()).then_some(Scene { path, name, reference, variance })
 }
 
-fn compare(scene: &Scene, arguments: &Arguments) -> Result<Comparison, String> {
+/// Ours with the reference; and Mitsuba's of today with the reference, ours with that.
+type Comparisons = (Comparison, Option<[Comparison; 2]>);
+
+fn compare(scene: &Scene, arguments: &Arguments) -> Result<Comparisons, String> {
     let read = |path: &Path| plain(&read_exr(path).map_err(|e| e.to_string())?);
     let (expected, spread) = (read(&scene.reference)?, read(&scene.variance)?);
+    let size = expected.size;
     let pixels = expected.pixels.len() as u32;
     let spp = arguments.spp.unwrap_or_else(|| 2_000_000 / pixels.max(1)).max(PARTS) / PARTS;
-    let parts = (0..PARTS)
-        .map(|seed| {
-            let part = plain(&render(scene, spp, seed, arguments)?)?;
-            if part.size == expected.size {
-                Ok(part.pixels)
-            } else {
-                let [ours, theirs] = [part.size, expected.size];
-                Err(format!("the image is {ours:?}, the reference {theirs:?}"))
-            }
-        })
-        .collect::<Result<Vec<_>, String>>()?;
+    let ours = moments(size, |seed| plain(&render(scene, spp, seed, arguments)?))?;
+    let again = arguments
+        .again
+        .as_ref()
+        .map(|folder| moments(size, |seed| read(&folder.join(file_name(scene, seed)))));
+    let again = again.transpose()?;
     let precision = Precision::of(&expected.pixels, arguments.reference_spp);
-    let sample = |i: usize, c: usize| {
-        let own = parts.iter().map(|part| part[i][c]).collect::<Moments>();
-        let of_one = spread.pixels[i][c].max(0.0);
-        Sample {
-            difference: own.mean() - expected.pixels[i][c],
-            expected: expected.pixels[i][c],
-            variance: own.variance_of_mean(),
-            of_reference: of_one / arguments.reference_spp,
-            of_as_many: of_one / f64::from(spp * PARTS),
-        }
-    };
     let rounding = |pixels: &[usize], c: usize| {
         let (mut alike, mut others) = (BTreeMap::<i64, f64>::new(), 0.0);
         for i in pixels {
@@ -172,7 +176,76 @@ fn compare(scene: &Scene, arguments: &Arguments) -> Result<Comparison, String> {
         }
         others + alike.values().map(|error| error * error).sum::<f64>()
     };
-    Ok(judge(expected.size, &sample, &rounding))
+    let of_one = |i: usize, c: usize| spread.pixels[i][c].max(0.0);
+    let with_reference = |image: &Image| {
+        let sample = |i: usize, c: usize| Sample {
+            difference: image.pixels[i][c].mean() - expected.pixels[i][c],
+            expected: expected.pixels[i][c],
+            variance: image.correlation * image.pixels[i][c].variance_of_mean(),
+            of_reference: image.correlation * of_one(i, c) / arguments.reference_spp,
+            of_as_many: image.correlation * of_one(i, c) / f64::from(spp * PARTS),
+        };
+        judge(size, &sample, &rounding)
+    };
+    let with_again = |again: &Image| {
+        let sample = |i: usize, c: usize| Sample {
+            difference: ours.pixels[i][c].mean() - again.pixels[i][c].mean(),
+            expected: again.pixels[i][c].mean(),
+            variance: ours.correlation * ours.pixels[i][c].variance_of_mean(),
+            of_reference: again.correlation * again.pixels[i][c].variance_of_mean(),
+            of_as_many: ours.correlation * of_one(i, c) / f64::from(spp * PARTS),
+        };
+        judge(size, &sample, &|_, _| 0.0)
+    };
+    let again = again.map(|again| [with_reference(&again), with_again(&again)]);
+    Ok((with_reference(&ours), again))
+}
+
+/// An image of several runs.
+struct Image {
+    pixels: Vec<[Moments; 3]>,
+    /// Variance of block means over what it would be if pixels were independent: under filters that reach neighbours, they have
+    /// samples in common. In the mean of the image.
+    correlation: f64,
+}
+
+/// Of each pixel over images of other seeds, which all have the same size.
+fn moments(size: [u32; 2], image: impl Fn(u32) -> Result<Plain, String>) -> Result<Image, String> {
+    let mut sums = vec![[Moments::default(); 3]; size[0] as usize * size[1] as usize];
+    let mut blocks = BTreeMap::<[u32; 2], [Moments; 3]>::new();
+    for seed in 0..PARTS {
+        let part = image(seed)?;
+        if part.size != size {
+            return Err(format!("the image is {:?}, the reference {size:?}", part.size));
+        }
+        for (sum, pixel) in sums.iter_mut().zip(&part.pixels) {
+            for (sum, value) in sum.iter_mut().zip(pixel) {
+                sum.push(*value);
+            }
+        }
+        let mut totals = BTreeMap::<[u32; 2], [f64; 3]>::new();
+        for (i, pixel) in (0..).zip(&part.pixels) {
+            let total = totals.entry([i % size[0] / BLOCK, i / size[0] / BLOCK]).or_default();
+            for (total, value) in total.iter_mut().zip(pixel) {
+                *total += value;
+            }
+        }
+        for (at, total) in totals {
+            let block = blocks.entry(at).or_default();
+            for (block, value) in block.iter_mut().zip(total) {
+                block.push(value);
+            }
+        }
+    }
+    let variance = |m: &Moments| m.variance_of_mean();
+    let apart: f64 = sums.iter().flatten().map(variance).sum();
+    let together: f64 = blocks.values().flatten().map(variance).sum();
+    let correlation = if apart > 0.0 { together / apart } else { 1.0 };
+    Ok(Image { pixels: sums, correlation })
+}
+
+fn file_name(scene: &Scene, seed: u32) -> String {
+    format!("{}.{seed}.exr", scene.name.replace('/', "_"))
 }
 
 /// The plain layer of a file, in XYZ.
@@ -327,7 +400,7 @@ fn render(scene: &Scene, spp: u32, seed: u32, arguments: &Arguments) -> Result<E
     let temporary = std::env::temp_dir().join(format!("drt-scene-table-{}", std::process::id()));
     let folder = arguments.keep.as_ref().unwrap_or(&temporary);
     std::fs::create_dir_all(folder).map_err(|e| e.to_string())?;
-    let output = folder.join(format!("{}.{seed}.exr", scene.name.replace('/', "_")));
+    let output = folder.join(file_name(scene, seed));
     let beside = std::env::current_exe().ok().and_then(|e| Some(e.parent()?.parent()?.join("drt")));
     let program = arguments.drt.clone().or(beside).unwrap_or_else(|| "drt".into());
     let run = Command::new(&program)
