@@ -65,7 +65,7 @@ pub enum SettingError {
     #[error(
         "bidirectional sampling has no masks and thin panes: light goes straight through `{0}`; use unidirectional"
     )]
-    Straight(String),
+    Straight(alloc::string::String),
     /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
     #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
     JumpingFilter,
