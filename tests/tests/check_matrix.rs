@@ -4,7 +4,9 @@
 //! `cargo test --release -p drt-tests --test check_matrix -- --ignored`
 
 use drt_tests::Result;
-use drt_tests::matrix::{Stage, Table, caged, check, deforming, lights, media, riding, surfaces};
+use drt_tests::matrix::{
+    Stage, Table, caged, check, deforming, lights, materials, media, riding, surfaces, textures,
+};
 
 fn run(stage: Result<Stage>) {
     let rows = check(&stage.unwrap()).unwrap();
