@@ -5,6 +5,7 @@ mod composed;
 mod direction_partners;
 mod energy;
 mod formulas;
+mod framed;
 mod gradients;
 mod lobes;
 mod perturbed;
