@@ -61,7 +61,7 @@ pub(super) fn frames_jump_on(mesh: &Mesh) -> bool {
             let (i, j) = (corners[k], corners[(k + 1) % 3]);
             let (along, normal) = *sides.entry([i.min(j), i.max(j)]).or_insert(own);
             let smooth = mesh.normals.is_some() || normal.dot(own.1) > 1.0 - 1e-12;
-            smooth && !((along - own.0).max_abs() <= 1e-9)
+            smooth && (along - own.0).max_abs() > 1e-9
         })
     })
 }
