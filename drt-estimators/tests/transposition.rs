@@ -7,7 +7,7 @@ use common::pairing::{pair, targets};
 use common::*;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
-use drt_estimators::surface::Bsdf;
+use drt_estimators::surface::{Anisotropic, Bsdf, Principled};
 use drt_estimators::{
     EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Unattended, gradient,
 };
@@ -163,6 +163,34 @@ fn narrow_lobes_everything_at_once() {
         ]);
         agree("narrow", &scene, effects, &settings());
     }
+}
+
+/// Frames turn with the corners of their triangles.
+#[test]
+fn uneven_materials_everything_at_once() {
+    let base_color = Rgb::new(0.6, 0.4, 0.2);
+    let ball = Principled { base_color, metallic: 0.4, clearcoat: 0.3, ..Principled::default() };
+    let floor = Anisotropic { base: metal(), alpha: [0.5, 0.2] };
+    let mut scene = surfaces(Bsdf::Principled(Box::new(ball)), Bsdf::Anisotropic(Box::new(floor)));
+    for shape in scene.shapes.iter_mut().filter(|s| s.id.as_deref() == Some("floor")) {
+        let mesh = &shape.mesh;
+        let place = |v: u32| mesh.positions[v as usize];
+        let at = |v| [place(v).x + 0.3 * place(v).y, place(v).y - 0.5 * place(v).z];
+        let texcoords = mesh.triangles.iter().map(|t| t.map(at)).collect();
+        let mesh = mesh.as_ref().clone().with_texcoords(texcoords).expect("coordinates");
+        shape.mesh = mesh.into();
+    }
+    let mut effects = wobbles(&scene);
+    effects.extend([
+        changes("ball-bsdf", "base_color", coloured()),
+        changes("ball-bsdf", "roughness", grey(0.3)),
+        changes("ball-bsdf", "metallic", grey(-0.4)),
+        changes("ball-bsdf", "clearcoat", grey(0.6)),
+        changes("floor-bsdf", "alpha_u", grey(0.5)),
+        changes("floor-bsdf", "alpha_v", grey(-0.3)),
+        changes("floor-bsdf", "k", coloured()),
+    ]);
+    agree("uneven", &scene, effects, &settings());
 }
 
 #[test]

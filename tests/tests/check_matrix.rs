@@ -4,7 +4,10 @@
 //! `cargo test --release -p drt-tests --test check_matrix -- --ignored`
 
 use drt_tests::Result;
-use drt_tests::matrix::{Stage, Table, caged, check, deforming, lights, media, riding, surfaces};
+use drt_tests::matrix::{
+    Stage, Table, caged, check, deforming, lenses, lights, materials, media, riding, surfaces,
+    textures,
+};
 
 fn run(stage: Result<Stage>) {
     let rows = check(&stage.unwrap()).unwrap();
@@ -33,4 +36,26 @@ drt_tests::every_stage!(stages);
 fn scanned_body() {
     let path = std::env::var_os("DRT_BODY").expect("DRT_BODY names an OBJ file");
     run(caged::scanned(path.as_ref()));
+}
+
+/// Lenses that not every estimator has derivatives of; the others refuse them.
+mod through {
+    use super::{Stage, lenses, run};
+
+    #[test]
+    fn thin_lens() {
+        run(lenses::thin_lens().map(Stage::short));
+    }
+
+    #[test]
+    fn parallel_rays() {
+        run(lenses::parallel_rays().map(Stage::short));
+    }
+
+    #[test]
+    #[ignore = "minutes"]
+    fn all() {
+        run(lenses::thin_lens());
+        run(lenses::parallel_rays());
+    }
 }

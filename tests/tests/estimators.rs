@@ -15,7 +15,9 @@ use drt_estimators::EstimatorKind::{Radiative, Warped};
 use drt_estimators::{Depth, PathSampling, Session, Settings, Unattended, agreement};
 use drt_tests::Result;
 use drt_tests::matrix::estimators::{Effort, Method, Pairs, compare};
-use drt_tests::matrix::{Stage, caged, deforming, lights, media, riding, surfaces};
+use drt_tests::matrix::{
+    Stage, caged, deforming, lenses, lights, materials, media, riding, surfaces, textures,
+};
 
 fn run(stage: Result<Stage>, methods: &[Method], effort: Effort) {
     let pairs = compare(&stage.unwrap(), methods, effort).unwrap();

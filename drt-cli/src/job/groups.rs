@@ -108,6 +108,11 @@ fn texels(scene: &Scene, target: Target, property: Option<&str>) -> Result<Param
     if bsdf.texels(of).is_none() {
         return Err(no_texture());
     }
+    if let Some(reason) = bsdf.undifferentiated(of) {
+        let bsdf = bsdf.name();
+        let error = surface::SurfaceError::NotDifferentiated { bsdf, property: of, reason };
+        return Err(error.to_string());
+    }
     let number = bsdf.is_number(of) == Some(true);
     Ok(ParameterGroup { target, kind: GroupKind::Texels { of, number } })
 }

@@ -37,6 +37,8 @@ pub(crate) struct Tangents {
     sensors: Vec<Vec<(usize, SensorTangent)>>,
     /// Of the one that is in use.
     pub(crate) sensor: Vec<(usize, SensorTangent)>,
+    /// Why the first parameter that has finite differences only has no tangents.
+    refused: Option<Error>,
 }
 
 /// How texels change with a parameter.
@@ -64,6 +66,11 @@ fn add_texels(
 }
 
 impl Tangents {
+    /// Refuses parameters that have finite differences only.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        self.refused.clone().map_or(Ok(()), Err)
+    }
+
     /// What changes with any parameter.
     pub(crate) fn targets(&self) -> impl Iterator<Item = Target> {
         fn some<T>(lists: &[Vec<T>]) -> impl Iterator<Item = usize> {
@@ -371,6 +378,12 @@ impl Apply<'_> {
             let theta = parameter.value;
             let property = Property::from_name(&c.property).map_err(|e| self.fail(p, target, e))?;
             let change = BsdfChange { property, op: c.op };
+            let bsdf = &self.scene.bsdfs[i].item;
+            let refused = bsdf.undifferentiated(property).map(|reason| {
+                let bsdf = bsdf.name();
+                self.fail(p, target, SurfaceError::NotDifferentiated { bsdf, property, reason })
+            });
+            self.tangents.refused = self.tangents.refused.take().or(refused);
             let bsdf = &mut self.scene.bsdfs[i].item;
             let texels = bsdf.change_texels(&change, c.texels.and_then(Texels::one), theta);
             if let Some((change, rates)) = texels.map_err(|e| self.fail(p, target, e))? {

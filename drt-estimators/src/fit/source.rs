@@ -22,6 +22,7 @@ pub(super) struct Applied {
 impl Applied {
     pub(super) fn new(scene: &Scene, parameters: &[Parameter]) -> Result<Self, Error> {
         let (scene, tangents) = tangents::apply(scene, parameters)?;
+        tangents.check()?;
         Ok(Self { scene, tangents })
     }
 }

@@ -217,6 +217,15 @@ impl Scene {
                 let reason = ElementError::NoDerivatives { bsdf, parameter };
                 return Err(unusable(&s.id, "shape", i, reason));
             }
+            if bsdf.is_oriented() && s.mesh.texcoords.is_none() {
+                let reason = ElementError::NoCoordinates { parameter: parameter.into() };
+                return Err(unusable(&s.id, "shape", i, reason));
+            }
+            if slide && let Some(property) = bsdf.undifferentiated_texture() {
+                let parameter = parameter.into();
+                let reason = ElementError::UndifferentiatedTexture { property, parameter };
+                return Err(unusable(&s.id, "shape", i, reason));
+            }
             let discontinuous = |e: usize| match &self.emitters[e].item.emitter {
                 Emitter::TexturedArea { texture, .. } => !texture.is_continuous_on(&s.mesh),
                 _ => false,
@@ -500,8 +509,8 @@ mod tests {
     use crate::model::sensor::{Lens, Sensor};
     use crate::model::settings::EstimatorKind;
     use crate::model::surface::{
-        Anisotropic, Blend, Dielectric, Diffuse, Mask, Perturbation, Perturbed, Property,
-        RoughConductor, Textured,
+        Blend, Dielectric, Diffuse, Mask, Perturbation, Perturbed, Property, RoughConductor,
+        Textured,
     };
     use crate::model::texture::Texture;
 
@@ -629,15 +638,10 @@ mod tests {
             }
         };
         let boxed = |p| Bsdf::Perturbed(alloc::boxed::Box::new(p));
-        let uneven =
-            Anisotropic { base: Bsdf::RoughConductor(Default::default()), alpha: [0.1, 0.2] };
         for bsdf in [
             Bsdf::Mask(alloc::boxed::Box::new(Mask { bsdf: inner(), opacity: 0.5 })),
             boxed(perturbed(Perturbation::Normals)),
             boxed(perturbed(Perturbation::Heights(1.0))),
-            Bsdf::Anisotropic(alloc::boxed::Box::new(uneven)),
-            Bsdf::Principled(Default::default()),
-            Bsdf::PrincipledThin(Default::default()),
         ] {
             let kind = bsdf.name();
             // Also inside of others.

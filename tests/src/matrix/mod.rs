@@ -8,12 +8,15 @@ mod cell;
 pub mod deforming;
 pub(crate) mod effects;
 pub mod estimators;
+pub mod lenses;
 pub mod lights;
+pub mod materials;
 pub mod media;
 pub mod riding;
 pub mod scale;
 pub(crate) mod set;
 pub mod surfaces;
+pub mod textures;
 pub(crate) mod verdict;
 
 pub use cell::{Cell, Stage};
@@ -27,6 +30,9 @@ macro_rules! every_stage {
         $with! {
             surfaces: room room_box_filter standing knot gloss blend near_lamp;
             lights: spot point_and_sun;
+            materials: principled thin brushed pressed coated unmixed;
+            lenses: cropped instances;
+            textures: picture mosaic stained picture_lamp sky_and_slide;
             media: fog_box blob still_blob shade smoke glass dented_glass beam layers sheet ember;
             deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed
                 lantern stirred_smoke still_smoke fine_milk fine_glass;

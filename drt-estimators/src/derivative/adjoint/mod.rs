@@ -45,12 +45,12 @@ use crate::derivative::velocity::{
     Auxiliary, Probe, RayTurn, RecordedPath, TurnPart, TurnParts, VertexVelocity,
 };
 use crate::model::sensor::{Sensor, SensorGradient};
-use crate::model::surface::BsdfParams;
+use crate::model::surface::{BsdfParams, by_corners};
 use crate::sampling::record::{Role, Scattered};
 use crate::sampling::streams::VELOCITY_STREAM;
 use crate::sampling::trace::{Connection, Endpoint};
 use crate::world::lights::EmitterMask;
-use crate::world::vertex::{Kind, SurfacePoint, Vertex};
+use crate::world::vertex::{Kind, MaterialPoint, SurfacePoint, Vertex};
 use crate::world::{Crossing, World};
 
 /// What has been collected for a vertex while its neighbours are processed, besides what is by its own velocity and
@@ -459,6 +459,9 @@ impl<'w> Differentiator<'w> {
         if adjoint.is_zero() || !(material || moving) {
             return None;
         }
+        let turns = v.surface().is_some_and(|s| {
+            active.shapes[s.shape as usize] && world.bsdf_of(s.shape).is_oriented()
+        });
         let mut d = world.scattering(v)?.gradient(wo, wi);
         if let Some(apart) = paired {
             apart.take_from(&mut d);
@@ -468,6 +471,10 @@ impl<'w> Differentiator<'w> {
                 here.ns += d.ns * adjoint;
                 here.n += d.ng * adjoint;
                 here.slide += d.slide * adjoint;
+                if turns {
+                    let others = [(wo, d.wo), (wi, d.wi), (s.ng, d.ng)];
+                    send_frame(world, s, &others, adjoint, sink);
+                }
                 if material && let Some(params) = d.params {
                     send_material(world, s, &params, adjoint, sink);
                 }
@@ -708,6 +715,24 @@ fn send_material<S: AdjointSink>(
             sink.texels(TextureUse::Bsdf(bsdf, property), footprint, adjoint);
         }
     });
+}
+
+/// Sends what a value owes to the direction that its frame follows, as that of the corners of the triangle.
+#[cold]
+fn send_frame<S: AdjointSink>(
+    world: &World,
+    point: &SurfacePoint,
+    others: &[(Vec3, RgbVec)],
+    adjoint: Rgb,
+    sink: &mut S,
+) {
+    let at = world.texture_point(point);
+    let corners = by_corners(&at, point.ns, others);
+    for (by_corner, bary) in corners.into_iter().zip([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) {
+        let at = drt_motion::SurfacePoint { triangle: point.triangle, bary };
+        let corner = MaterialPoint { shape: point.shape, at };
+        sink.surface(&corner, &SurfaceAdjoint::of_place(by_corner * adjoint));
+    }
 }
 
 /// Sends what a vertex collected.

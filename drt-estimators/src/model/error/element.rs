@@ -6,7 +6,7 @@ use drt_motion::interior::InteriorError;
 use thiserror::Error;
 
 use crate::model::emitter::EmitterError;
-use crate::model::surface::SurfaceError;
+use crate::model::surface::{Property, SurfaceError};
 
 /// What is wrong with an element of a scene.
 #[derive(Clone, Debug, Error)]
@@ -46,6 +46,15 @@ pub enum ElementError {
     NoDerivatives {
         /// Kind of BSDF, by its plugin name.
         bsdf: &'static str,
+        /// The parameter, or what else was to be differentiated by.
+        parameter: String,
+    },
+    /// A surface whose BSDF tells directions along it apart, without coordinates to tell them by.
+    #[error(
+        "its BSDF follows texture coordinates, which its mesh does not have: `{parameter}` can only be \
+         differentiated by finite differences"
+    )]
+    NoCoordinates {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
@@ -118,6 +127,17 @@ pub enum ElementError {
          estimator path-space, or by finite differences"
     )]
     DiscontinuousTexture {
+        /// The parameter, or what else was to be differentiated by.
+        parameter: String,
+    },
+    /// A texture without derivatives where points slide over its surface.
+    #[error(
+        "a texture stands for its `{property}`, which has no derivative: past it `{parameter}` can only be \
+         differentiated by the estimator path-space, or by finite differences"
+    )]
+    UndifferentiatedTexture {
+        /// What it stands for.
+        property: Property,
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },

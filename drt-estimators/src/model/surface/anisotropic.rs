@@ -96,13 +96,15 @@ impl StretchedFacets {
 }
 
 impl Anisotropic {
-    fn facets<T: Real>(&self) -> StretchedFacets<T> {
+    fn facets<T: Real>(&self, number: impl Fn(Property, f64) -> T) -> StretchedFacets<T> {
+        let [u, v] = self.alpha;
+        let alpha = [number(Property::AlphaU, u), number(Property::AlphaV, v)];
         let distribution = match &self.base {
             Bsdf::RoughConductor(b) => b.distribution,
             Bsdf::RoughDielectric(b) => b.distribution,
             _ => Distribution::default(),
         };
-        StretchedFacets { distribution, alpha: self.alpha.map(T::from) }
+        StretchedFacets { distribution, alpha }
     }
 
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
@@ -127,7 +129,14 @@ impl Anisotropic {
 }
 
 impl Framed for Anisotropic {
-    fn value<T: Real>(&self, wo: Vec3<T>, wi: Vec3<T>) -> Rgb<T> {
+    fn value<T: Real>(
+        &self,
+        number: impl Fn(Property, f64) -> T,
+        wo: Vec3<T>,
+        wi: Vec3<T>,
+    ) -> Rgb<T> {
+        let facets = self.facets(&number);
+        let colour = |property, value: Rgb| value.map(|c| number(property, c));
         let a = Angles::new(wo, wi, Vec3::Z.lift());
         let black = Rgb::splat(T::zero());
         match &self.base {
@@ -135,30 +144,39 @@ impl Framed for Anisotropic {
                 let b = RoughConductor {
                     distribution: b.distribution,
                     alpha: T::from(b.alpha),
-                    eta: b.eta.map(T::from),
-                    k: b.k.map(T::from),
-                    specular_reflectance: b.specular_reflectance.map(T::from),
+                    eta: colour(Property::Eta, b.eta),
+                    k: colour(Property::K, b.k),
+                    specular_reflectance: colour(
+                        Property::SpecularReflectance,
+                        b.specular_reflectance,
+                    ),
                 };
-                b.value_of(&a, self.facets().facets(wo + wi, [wo, wi]))
+                b.value_of(&a, facets.facets(wo + wi, [wo, wi]))
             }
             Bsdf::RoughDielectric(b) => {
                 let b = super::RoughDielectric {
                     distribution: b.distribution,
                     alpha: T::from(b.alpha),
-                    eta: T::from(b.eta),
-                    specular_reflectance: b.specular_reflectance.map(T::from),
-                    specular_transmittance: b.specular_transmittance.map(T::from),
+                    eta: number(Property::Eta, b.eta),
+                    specular_reflectance: colour(
+                        Property::SpecularReflectance,
+                        b.specular_reflectance,
+                    ),
+                    specular_transmittance: colour(
+                        Property::SpecularTransmittance,
+                        b.specular_transmittance,
+                    ),
                 };
                 let Some(passage) = Passage::new(&a, b.eta) else { return black };
                 let h = wo + wi * passage.index();
-                b.value_of(&passage, self.facets().facets(h, [wo, wi]))
+                b.value_of(&passage, facets.facets(h, [wo, wi]))
             }
             _ => black,
         }
     }
 
     fn direction(&self, from: Vec3, u: [f64; 3]) -> Option<Vec3> {
-        let facets: StretchedFacets = self.facets();
+        let facets = self.facets(|_, alpha| alpha);
         match &self.base {
             Bsdf::RoughConductor(_) if from.z > 0.0 => {
                 Some(mirrored(from, facets.sample_visible(from, [u[0], u[1]])))
@@ -173,7 +191,7 @@ impl Framed for Anisotropic {
     }
 
     fn density(&self, from: Vec3, to: Vec3) -> f64 {
-        let facets: StretchedFacets = self.facets();
+        let facets = self.facets(|_, alpha| alpha);
         let a = Angles::new(from, to, Vec3::Z);
         match &self.base {
             Bsdf::RoughConductor(_) if a.in_front() => {

@@ -4,26 +4,28 @@ use crate::model::surface::Bsdf;
 use crate::model::surface::property::{Property, Slot, SurfaceError, names};
 use crate::model::texture::Texture;
 
-/// One number per channel for every property of a BSDF.
+/// One number per channel for every property of a BSDF that it is differentiated by.
+///
+/// No BSDF has two properties that share an entry: what is rare stands where others have something else.
 ///
 /// As part of a [`BsdfGradient`](super::BsdfGradient) it holds the derivative of each channel of the
 /// value with respect to the same channel of the property, or to the property itself when that is a
 /// scalar. Properties a BSDF lacks are zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BsdfParams {
-    /// Albedo of the diffuse lobe.
+    /// Albedo of the diffuse lobe; `base_color`.
     pub reflectance: Rgb,
-    /// Weight of the glossy reflection.
+    /// Weight of the glossy reflection; `clearcoat` and `diff_trans`.
     pub specular_reflectance: Rgb,
-    /// Weight of the glossy refraction.
+    /// Weight of the glossy refraction; `spec_trans`.
     pub specular_transmittance: Rgb,
-    /// Roughness.
+    /// Roughness: `alpha`, `alpha_u`, `roughness`.
     pub alpha: Rgb,
     /// Relative index of refraction.
     pub eta: Rgb,
-    /// Imaginary part of the index.
+    /// Imaginary part of the index; `sheen`.
     pub k: Rgb,
-    /// Sharpness of the Phong lobe; of a blend, which has none, the weight of its second BSDF.
+    /// Sharpness of the Phong lobe; the `weight` of a blend, `alpha_v`, `metallic`.
     pub exponent: Rgb,
 }
 
@@ -58,6 +60,30 @@ impl BsdfParams {
         self.exponent += params.exponent * weight;
     }
 
+    /// How many entries there are.
+    pub(super) const ENTRIES: usize = 7;
+
+    /// The entry of a property, by its number.
+    pub(super) fn entry(property: Property) -> Option<usize> {
+        Some(match property {
+            Property::Reflectance | Property::BaseColor => 0,
+            Property::SpecularReflectance | Property::Clearcoat | Property::DiffTrans => 1,
+            Property::SpecularTransmittance | Property::SpecTrans => 2,
+            Property::Alpha | Property::AlphaU | Property::Roughness => 3,
+            Property::Eta => 4,
+            Property::K | Property::Sheen => 5,
+            Property::Exponent | Property::Weight | Property::AlphaV | Property::Metallic => 6,
+            _ => return None,
+        })
+    }
+
+    /// Entries in the order of their numbers.
+    pub(super) fn from_entries(entries: [Rgb; Self::ENTRIES]) -> Self {
+        let [reflectance, specular_reflectance, specular_transmittance, alpha, eta, k, exponent] =
+            entries;
+        Self { reflectance, specular_reflectance, specular_transmittance, alpha, eta, k, exponent }
+    }
+
     /// The entry of a property; zero of those that nothing is differentiated by.
     #[must_use]
     pub fn get(&self, property: Property) -> Rgb {
@@ -67,16 +93,16 @@ impl BsdfParams {
 
     /// The entry of a property, to change it; `None` of those that nothing is differentiated by.
     pub fn get_mut(&mut self, property: Property) -> Option<&mut Rgb> {
-        Some(match property {
-            Property::Reflectance => &mut self.reflectance,
-            Property::SpecularReflectance => &mut self.specular_reflectance,
-            Property::SpecularTransmittance => &mut self.specular_transmittance,
-            Property::Alpha => &mut self.alpha,
-            Property::Eta => &mut self.eta,
-            Property::K => &mut self.k,
-            Property::Exponent | Property::Weight => &mut self.exponent,
-            _ => return None,
-        })
+        let fields = [
+            &mut self.reflectance,
+            &mut self.specular_reflectance,
+            &mut self.specular_transmittance,
+            &mut self.alpha,
+            &mut self.eta,
+            &mut self.k,
+            &mut self.exponent,
+        ];
+        fields.into_iter().nth(Self::entry(property)?)
     }
 }
 
@@ -142,6 +168,49 @@ impl Bsdf {
             *entry = change.op.map_rate(theta).value(value);
         }
         Ok(velocity)
+    }
+
+    /// Why there are only finite differences with respect to a property of it, if that is so.
+    #[must_use]
+    pub fn undifferentiated(&self, property: Property) -> Option<&'static str> {
+        let (plain, textures) = match self {
+            Self::TwoSided(b) => return b.front.undifferentiated(property),
+            Self::Textured(b) => (&b.bsdf, Some(&**b)),
+            other => (other, None),
+        };
+        let plain = &mut plain.clone();
+        if !matches!(plain, Self::Principled(_) | Self::PrincipledThin(_)) {
+            return None;
+        }
+        // The values of a property are between these.
+        let mut ends = |p: Property| match textures.and_then(|t| t.texture(p)) {
+            Some(texture) => texture.bounds(),
+            None => [plain.property(p).map_or(Rgb::ZERO, |slot| slot.value()); 2],
+        };
+        let mut never = |p: Property| ends(p)[1].max_abs() <= 0.0;
+        let no_light_through = never(Property::SpecTrans);
+        let tinted =
+            !never(Property::SpecTint) || (!never(Property::Sheen) && !never(Property::SheenTint));
+        let [least, most] = ends(property);
+        let least = least.to_array().into_iter().fold(f64::INFINITY, f64::min);
+        let thin = self.name() == "principledthin";
+        match property {
+            _ if BsdfParams::entry(property).is_none() => Some("no path has its derivative"),
+            Property::BaseColor if tinted => Some("a tint mixes its channels"),
+            Property::BaseColor if !thin && !no_light_through && least <= 0.0 => {
+                Some("light goes through by its root, which has no slope at 0")
+            }
+            Property::SpecTrans | Property::DiffTrans if least <= 0.0 => {
+                Some("at 0 no path goes where light would")
+            }
+            Property::DiffTrans if most.max_abs() >= 2.0 => {
+                Some("at 2 no path goes where light would")
+            }
+            Property::Metallic if !no_light_through && most.max_abs() >= 1.0 => {
+                Some("at 1 no path goes where light would")
+            }
+            _ => None,
+        }
     }
 
     /// Sets a property, to a value that may not be allowed; a scalar's to the first channel.

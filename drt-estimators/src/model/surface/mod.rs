@@ -79,6 +79,7 @@ pub use crate::model::surface::dielectric::RoughDielectric;
 pub use crate::model::surface::diffuse::Diffuse;
 pub(crate) use crate::model::surface::direction_partner::{DirectionPartner, Turn};
 use crate::model::surface::facet::Facet;
+pub(crate) use crate::model::surface::framed::by_corners;
 pub(crate) use crate::model::surface::local::LocalBsdf;
 pub use crate::model::surface::mask::Mask;
 pub use crate::model::surface::microfacet::Distribution;
@@ -89,6 +90,7 @@ pub use crate::model::surface::principled::Principled;
 pub use crate::model::surface::principled_thin::PrincipledThin;
 pub use crate::model::surface::property::{Property, SurfaceError};
 pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
+use crate::model::surface::shading_frame::frames_jump_on;
 pub use crate::model::surface::smooth::{Conductor, Dielectric, ThinDielectric};
 pub use crate::model::surface::textured::Textured;
 use crate::model::texture::TexturePoint;
@@ -388,15 +390,34 @@ impl Bsdf {
     }
 
     /// The name of the first BSDF in this one that nothing is differentiated at: it jumps where no term samples it, or its
-    /// frame follows motions in ways that no term knows.
+    /// normals follow motions in ways that no term knows.
     pub(crate) fn undifferentiable(&self) -> Option<&'static str> {
         match self {
-            Self::Mask(_)
-            | Self::Perturbed(_)
-            | Self::Anisotropic(_)
-            | Self::Principled(_)
-            | Self::PrincipledThin(_) => Some(self.name()),
+            Self::Mask(_) | Self::Perturbed(_) => Some(self.name()),
             _ => self.inner().find_map(Self::undifferentiable),
+        }
+    }
+
+    /// True where directions along the surface are told apart, by its texture coordinates.
+    pub(crate) fn is_oriented(&self) -> bool {
+        match self {
+            Self::Diffuse(_) | Self::Phong(_) | Self::RoughConductor(_) | Self::Plastic(_) => false,
+            Self::Anisotropic(_) | Self::Perturbed(_) => true,
+            Self::Principled(b) => b.anisotropic != 0.0,
+            Self::PrincipledThin(b) => b.anisotropic != 0.0,
+            Self::Textured(b) if b.texture(Property::Anisotropic).is_some() => true,
+            _ => self.inner().any(Self::is_oriented),
+        }
+    }
+
+    /// The first property whose texture changes the value in ways that have no derivative.
+    pub(crate) fn undifferentiated_texture(&self) -> Option<Property> {
+        match self {
+            Self::Textured(b) => {
+                let mut properties = b.textures.iter().map(|(p, _)| *p);
+                properties.find(|p| self.undifferentiated(*p).is_some())
+            }
+            _ => self.inner().find_map(Self::undifferentiated_texture),
         }
     }
 
@@ -439,10 +460,13 @@ impl Bsdf {
         }
     }
 
-    /// True where textures jump on a mesh.
+    /// True where textures jump on a mesh, or frames that follow texture coordinates.
     pub(crate) fn is_discontinuous_on(&self, mesh: &Mesh) -> bool {
         match self {
             Self::Textured(b) if b.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh)) => true,
+            Self::Anisotropic(_) | Self::Principled(_) | Self::PrincipledThin(_) => {
+                self.is_oriented() && frames_jump_on(mesh)
+            }
             _ => self.inner().any(|b| b.is_discontinuous_on(mesh)),
         }
     }

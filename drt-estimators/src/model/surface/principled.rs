@@ -28,31 +28,31 @@ use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, pa
 /// Burley's principled BSDF. All but colour and index are numbers from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Principled {
+pub struct Principled<T = f64> {
     /// Its colour; default 0.5.
-    pub base_color: Rgb,
+    pub base_color: Rgb<T>,
     /// The square root of the roughness of microfacets; default 0.5.
-    pub roughness: f64,
+    pub roughness: T,
     /// Up to 3.2 times as rough along the tangent as across; default 0.
-    pub anisotropic: f64,
+    pub anisotropic: T,
     /// From a dielectric to a metal; default 0.
-    pub metallic: f64,
+    pub metallic: T,
     /// The part of the dielectric that light goes through; default 0.
-    pub spec_trans: f64,
+    pub spec_trans: T,
     /// Index of the interior over that of the exterior; default 1.5.
-    pub eta: f64,
+    pub eta: T,
     /// How much of the base colour a dielectric's reflection has; default 0.
-    pub spec_tint: f64,
+    pub spec_tint: T,
     /// Light at grazing angles, as from cloth; default 0.
-    pub sheen: f64,
+    pub sheen: T,
     /// How much of the base colour that has; default 0.
-    pub sheen_tint: f64,
+    pub sheen_tint: T,
     /// From diffuse to flat, as by scattering below the surface; default 0.
-    pub flatness: f64,
+    pub flatness: T,
     /// A second, sharper reflection; default 0.
-    pub clearcoat: f64,
+    pub clearcoat: T,
     /// How sharp that is; default 0.
-    pub clearcoat_gloss: f64,
+    pub clearcoat_gloss: T,
 }
 
 impl Default for Principled {
@@ -85,9 +85,9 @@ pub(super) fn lerp<T: Real>(a: T, b: T, by: T) -> T {
 }
 
 /// Schlick's reflectance, 1 at grazing angles; behind an interface to something thinner by the cosine there.
-pub(super) fn schlick<T: Real>(colour: Rgb<T>, cos: T, eta: f64) -> Rgb<T> {
-    let eta = if cos.re() >= 0.0 { eta } else { 1.0 / eta };
-    let cos = if eta > 1.0 {
+pub(super) fn schlick<T: Real>(colour: Rgb<T>, cos: T, eta: T) -> Rgb<T> {
+    let eta = if cos.re() >= 0.0 { eta } else { eta.recip() };
+    let cos = if eta.re() > 1.0 {
         cos
     } else {
         let cos2 = T::one() - (T::one() - cos.squared()) / (eta * eta);
@@ -98,40 +98,42 @@ pub(super) fn schlick<T: Real>(colour: Rgb<T>, cos: T, eta: f64) -> Rgb<T> {
 }
 
 /// The reflectance of an interface at normal incidence.
-pub(super) fn normal_reflectance(eta: f64) -> f64 {
+pub(super) fn normal_reflectance<T: Real>(eta: T) -> T {
     let r = (eta - 1.0) / (eta + 1.0);
     r * r
 }
 
-/// A colour of luminance 1.
-pub(super) fn tint(colour: Rgb) -> Rgb {
+/// A colour of luminance 1, whose channels depend on all others: constant.
+pub(super) fn tint<T: Real>(colour: Rgb<T>) -> Rgb<T> {
+    let colour = colour.map(Real::re);
     let luminance = Rgb::new(0.212_671, 0.715_160, 0.072_169).dot(colour);
-    if luminance > 0.0 { colour * luminance.recip() } else { Rgb::ONE }
+    let tint = if luminance > 0.0 { colour * luminance.recip() } else { Rgb::ONE };
+    tint.map(T::from)
 }
 
 /// Roughness along the tangent and across it.
-pub(super) fn stretched<T: Real>(roughness: f64, anisotropic: f64) -> StretchedFacets<T> {
-    let aspect = fm::sqrt(1.0 - 0.9 * anisotropic);
+pub(super) fn stretched<T: Real>(roughness: T, anisotropic: T) -> StretchedFacets<T> {
+    let aspect = (T::one() - anisotropic * 0.9).sqrt();
     let even = roughness * roughness;
-    let alpha = [even / aspect, even * aspect].map(|a| T::from(a.max(1e-3)));
+    let alpha = [even / aspect, even * aspect].map(|a| a.max(T::from(1e-3)));
     StretchedFacets { distribution: Distribution::Ggx, alpha }
 }
 
 /// The diffuse lobe but for colour and π, with retro-reflection and flattened, by the cosines at viewer and light and of the
 /// light with the half vector.
-pub(super) fn diffuse_lobe<T: Real>(cosines: [T; 3], roughness: f64, flatness: f64) -> T {
+pub(super) fn diffuse_lobe<T: Real>(cosines: [T; 3], roughness: T, flatness: T) -> T {
     let [o, i, d] = cosines;
     let [at_o, at_i] = [grazing(o), grazing(i)];
     let base = (T::one() - at_o * 0.5) * (T::one() - at_i * 0.5);
-    let back = d.squared() * (2.0 * roughness);
+    let back = d.squared() * (roughness * 2.0);
     let retro = back * (at_i + at_o + at_i * at_o * (back - 1.0));
-    if flatness == 0.0 {
+    if flatness.is_zero() {
         return base + retro;
     }
     let at_90 = back * 0.5;
     let both = lerp(T::one(), at_90, at_o) * lerp(T::one(), at_90, at_i);
     let flat = (both * ((o.abs() + i.abs()).recip() - 0.5) + 0.5) * 1.25;
-    lerp(base + retro, flat, T::from(flatness))
+    lerp(base + retro, flat, flatness)
 }
 
 /// The distribution of normals GTR1 of Burley 2012, of a roughness.
@@ -158,6 +160,75 @@ impl LongTails {
 /// Roughness of the masking of clearcoats.
 const COAT_MASKING: f64 = 0.25;
 
+impl<T: Real> Principled<T> {
+    fn refractive(&self) -> T {
+        (T::one() - self.metallic) * self.spec_trans
+    }
+
+    fn diffuse(&self) -> T {
+        (T::one() - self.metallic) * (T::one() - self.spec_trans)
+    }
+
+    fn coat(&self) -> LongTails {
+        LongTails(lerp(0.1, 0.001, self.clearcoat_gloss.re()))
+    }
+
+    fn reflectance(&self, fresnel: T, cos: T, front: bool) -> Rgb<T> {
+        if !front {
+            return Rgb::splat(fresnel * self.refractive());
+        }
+        let dielectric = T::one() - self.metallic;
+        let mut sum = Rgb::splat(fresnel * (dielectric * (T::one() - self.spec_tint)));
+        if !self.metallic.is_zero() {
+            sum += schlick(self.base_color, cos, self.eta) * self.metallic;
+        }
+        if !self.spec_tint.is_zero() {
+            let colour = tint(self.base_color) * normal_reflectance(self.eta);
+            sum += schlick(colour, cos, self.eta) * (dielectric * self.spec_tint);
+        }
+        sum
+    }
+
+    /// The value in the frame of the surface.
+    fn value_of(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
+        let mut sum = Rgb::splat(T::zero());
+        let Some(pair) = Pair::new(o, i, self.eta) else { return sum };
+        let Pair { h, oh, ih, front, reflects, eta, .. } = pair;
+        let fresnel = pair.fresnel();
+        if pair.is_joined() {
+            let facets = stretched(self.roughness, self.anisotropic);
+            let light = facets.density(h) * facets.masking(o) * facets.masking(i) * i.z.abs();
+            if reflects {
+                sum += self.reflectance(fresnel, oh, front) * (light * 0.25);
+            } else if fresnel.re() < 1.0 {
+                let bent = (oh + ih * eta).squared();
+                let through = (T::one() - fresnel) * (oh * ih).abs() / bent * self.refractive();
+                // Black has no slope, which would be infinite.
+                let root = |c: T| if c.re() > 0.0 { c.sqrt() } else { T::zero() };
+                sum += self.base_color.map(root) * (light * through);
+            }
+        }
+        if !(front && reflects) {
+            return sum;
+        }
+        if !self.clearcoat.is_zero() && pair.is_joined() {
+            let reflected = schlick(Rgb::splat(T::from(0.04)), oh, self.eta).r;
+            let alpha = T::from(COAT_MASKING);
+            let masking = |w: Vec3<T>| Distribution::Ggx.masking(w.z, alpha) * w.z;
+            let light = reflected * self.coat().density(h.z) * masking(o) * masking(i) * i.z;
+            sum += Rgb::splat(light * (self.clearcoat * 0.25));
+        }
+        let lobe = diffuse_lobe([o.z, i.z, ih], self.roughness, self.flatness);
+        sum += self.base_color * (lobe * i.z * (self.diffuse() * FRAC_1_PI));
+        if !self.sheen.is_zero() {
+            let white = T::one() - self.sheen_tint;
+            let colour = tint(self.base_color) * self.sheen_tint + Rgb::splat(white);
+            sum += colour * (grazing(ih) * i.z * (self.sheen * (T::one() - self.metallic)));
+        }
+        sum
+    }
+}
+
 /// The probabilities of lobes.
 struct Lobes {
     diffuse: f64,
@@ -176,33 +247,22 @@ impl Principled {
         self.spec_trans > 0.0
     }
 
-    fn refractive(&self) -> f64 {
-        (1.0 - self.metallic) * self.spec_trans
-    }
-
-    fn diffuse(&self) -> f64 {
-        (1.0 - self.metallic) * (1.0 - self.spec_trans)
-    }
-
-    fn coat(&self) -> LongTails {
-        LongTails(lerp(0.1, 0.001, self.clearcoat_gloss))
-    }
-
-    fn reflectance<T: Real>(&self, fresnel: T, cos: T, front: bool) -> Rgb<T> {
-        if !front {
-            return Rgb::splat(fresnel * self.refractive());
+    /// Its numbers over another scalar.
+    fn over<T: Real>(&self, number: impl Fn(Property, f64) -> T) -> Principled<T> {
+        Principled {
+            base_color: self.base_color.map(|c| number(Property::BaseColor, c)),
+            roughness: number(Property::Roughness, self.roughness),
+            anisotropic: number(Property::Anisotropic, self.anisotropic),
+            metallic: number(Property::Metallic, self.metallic),
+            spec_trans: number(Property::SpecTrans, self.spec_trans),
+            eta: number(Property::Eta, self.eta),
+            spec_tint: number(Property::SpecTint, self.spec_tint),
+            sheen: number(Property::Sheen, self.sheen),
+            sheen_tint: number(Property::SheenTint, self.sheen_tint),
+            flatness: number(Property::Flatness, self.flatness),
+            clearcoat: number(Property::Clearcoat, self.clearcoat),
+            clearcoat_gloss: number(Property::ClearcoatGloss, self.clearcoat_gloss),
         }
-        let dielectric = 1.0 - self.metallic;
-        let mut sum = Rgb::splat(fresnel * (dielectric * (1.0 - self.spec_tint)));
-        if self.metallic > 0.0 {
-            sum += schlick(self.base_color.map(T::from), cos, self.eta) * T::from(self.metallic);
-        }
-        if self.spec_tint > 0.0 {
-            let colour = tint(self.base_color) * normal_reflectance(self.eta);
-            let tinted = schlick(colour.map(T::from), cos, self.eta);
-            sum += tinted * T::from(dielectric * self.spec_tint);
-        }
-        sum
     }
 
     /// The probabilities of lobes seen from the front.
@@ -268,17 +328,17 @@ struct Pair<T> {
     front: bool,
     reflects: bool,
     /// The index beyond the interface over that on the viewer's side.
-    eta: f64,
+    eta: T,
     /// The index inside over that outside.
-    material: f64,
+    material: T,
 }
 
 impl<T: Real> Pair<T> {
-    fn new(o: Vec3<T>, i: Vec3<T>, material: f64) -> Option<Self> {
+    fn new(o: Vec3<T>, i: Vec3<T>, material: T) -> Option<Self> {
         let sides = o.z.re() * i.z.re();
         let (front, reflects) = (o.z.re() > 0.0, sides > 0.0);
-        let eta = if front { material } else { 1.0 / material };
-        let h = if reflects { o + i } else { o + i * T::from(eta) };
+        let eta = if front { material } else { material.recip() };
+        let h = if reflects { o + i } else { o + i * eta };
         // Opposite directions have no half vector between them, and directions in the surface underflow.
         if sides.abs() < LEAST_COS2 || h.re().max_abs() < 1e-12 {
             return None;
@@ -296,46 +356,19 @@ impl<T: Real> Pair<T> {
     }
 
     fn fresnel(&self) -> T {
-        let eta = if self.oh.re() >= 0.0 { self.material } else { 1.0 / self.material };
-        dielectric_reflected(self.oh.abs(), T::from(eta))
+        let eta = if self.oh.re() >= 0.0 { self.material } else { self.material.recip() };
+        dielectric_reflected(self.oh.abs(), eta)
     }
 }
 
 impl Framed for Principled {
-    fn value<T: Real>(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
-        let mut sum = Rgb::splat(T::zero());
-        let Some(pair) = Pair::new(o, i, self.eta) else { return sum };
-        let Pair { h, oh, ih, front, reflects, eta, .. } = pair;
-        let fresnel = pair.fresnel();
-        if pair.is_joined() {
-            let facets = stretched::<T>(self.roughness, self.anisotropic);
-            let light = facets.density(h) * facets.masking(o) * facets.masking(i) * i.z.abs();
-            if reflects {
-                sum += self.reflectance(fresnel, oh, front) * (light * 0.25);
-            } else if fresnel.re() < 1.0 {
-                let bent = (oh + ih * eta).squared();
-                let through = (T::one() - fresnel) * (oh * ih).abs() / bent * self.refractive();
-                sum += self.base_color.map(fm::sqrt).map(T::from) * (light * through);
-            }
-        }
-        if !(front && reflects) {
-            return sum;
-        }
-        if self.clearcoat > 0.0 && pair.is_joined() {
-            let reflected = schlick(Rgb::splat(T::from(0.04)), oh, self.eta).r;
-            let alpha = T::from(COAT_MASKING);
-            let masking = |w: Vec3<T>| Distribution::Ggx.masking(w.z, alpha) * w.z;
-            let light = reflected * self.coat().density(h.z) * masking(o) * masking(i) * i.z;
-            sum += Rgb::splat(light * (0.25 * self.clearcoat));
-        }
-        let lobe = diffuse_lobe([o.z, i.z, ih], self.roughness, self.flatness);
-        sum += self.base_color.map(T::from) * (lobe * i.z * (self.diffuse() * FRAC_1_PI));
-        if self.sheen > 0.0 {
-            let colour =
-                tint(self.base_color) * self.sheen_tint + Rgb::splat(1.0 - self.sheen_tint);
-            sum += colour.map(T::from) * (grazing(ih) * i.z * (self.sheen * (1.0 - self.metallic)));
-        }
-        sum
+    fn value<T: Real>(
+        &self,
+        number: impl Fn(Property, f64) -> T,
+        o: Vec3<T>,
+        i: Vec3<T>,
+    ) -> Rgb<T> {
+        self.over(number).value_of(o, i)
     }
 
     fn density(&self, o: Vec3, i: Vec3) -> f64 {
@@ -398,7 +431,7 @@ impl Framed for Principled {
     }
 
     fn narrowest(&self) -> f64 {
-        let [u, v] = stretched::<f64>(self.roughness, self.anisotropic).alpha;
+        let [u, v] = stretched(self.roughness, self.anisotropic).alpha;
         f64::min(u, v)
     }
 }

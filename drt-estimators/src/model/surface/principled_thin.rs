@@ -26,27 +26,27 @@ use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, pa
 /// Burley's principled BSDF of thin sheets. Numbers are from 0 to 1 where nothing else is said.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct PrincipledThin {
+pub struct PrincipledThin<T = f64> {
     /// Its colour; default 0.5.
-    pub base_color: Rgb,
+    pub base_color: Rgb<T>,
     /// The square root of the roughness of microfacets; default 0.5.
-    pub roughness: f64,
+    pub roughness: T,
     /// Up to 3.2 times as rough along the tangent as across; default 0.
-    pub anisotropic: f64,
+    pub anisotropic: T,
     /// The part that is specular; default 0.
-    pub spec_trans: f64,
+    pub spec_trans: T,
     /// Index of the sheet over that of what is around it; default 1.5.
-    pub eta: f64,
+    pub eta: T,
     /// How much of the base colour the reflection has; default 0.
-    pub spec_tint: f64,
+    pub spec_tint: T,
     /// Light at grazing angles, as from cloth; default 0.
-    pub sheen: f64,
+    pub sheen: T,
     /// How much of the base colour that has; default 0.
-    pub sheen_tint: f64,
+    pub sheen_tint: T,
     /// From diffuse to flat; default 0.
-    pub flatness: f64,
+    pub flatness: T,
     /// Diffuse light that goes through, from none, 0, to all, 2; default 0.
-    pub diff_trans: f64,
+    pub diff_trans: T,
 }
 
 impl Default for PrincipledThin {
@@ -74,13 +74,70 @@ fn pair<T: Real>(o: Vec3<T>, i: Vec3<T>) -> Option<[Vec3<T>; 3]> {
     known.then(|| [o, i, h.normalize()])
 }
 
-impl PrincipledThin {
-    fn reflecting<T: Real>(&self) -> StretchedFacets<T> {
+impl<T: Real> PrincipledThin<T> {
+    fn reflecting(&self) -> StretchedFacets<T> {
         stretched(self.roughness, self.anisotropic)
     }
 
-    fn blurring<T: Real>(&self) -> StretchedFacets<T> {
-        stretched((0.65 * self.eta - 0.35) * self.roughness, self.anisotropic)
+    fn blurring(&self) -> StretchedFacets<T> {
+        stretched((self.eta * 0.65 - 0.35) * self.roughness, self.anisotropic)
+    }
+
+    /// The value in the frame of the surface.
+    fn value_of(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
+        let mut sum = Rgb::splat(T::zero());
+        let Some([o, i, h]) = pair(o, i) else { return sum };
+        let colour = self.base_color;
+        let (reflects, across, diffuse) =
+            (i.z.re() > 0.0, self.diff_trans * 0.5, T::one() - self.spec_trans);
+        let oh = o.dot(h);
+        // Behind, facets must show the light their other side.
+        let joined = oh.re() > 0.0 && i.dot(h).re() * i.z.re() > 0.0;
+        if !self.spec_trans.is_zero() && joined {
+            let fresnel = dielectric_reflected(oh, self.eta);
+            let facets = if reflects { self.reflecting() } else { self.blurring() };
+            let light = facets.density(h) * facets.masking(o) * facets.masking(i) * i.z.abs();
+            let light = light * (self.spec_trans * 0.25);
+            sum += if reflects {
+                let tinted = tint(self.base_color) * normal_reflectance(self.eta);
+                let tinted = schlick(tinted, oh, self.eta);
+                tinted.map(|t| lerp(fresnel, t, self.spec_tint)) * light
+            } else {
+                colour * (light * (T::one() - fresnel))
+            };
+        }
+        if reflects {
+            let ih = i.dot(h);
+            let lobe = diffuse_lobe([o.z, i.z, ih], self.roughness, self.flatness);
+            let scale = diffuse * (T::one() - across);
+            sum += colour * (lobe * i.z * (scale * FRAC_1_PI));
+            if !self.sheen.is_zero() {
+                let white = Rgb::splat(T::one() - self.sheen_tint);
+                let colour = tint(self.base_color) * self.sheen_tint + white;
+                sum += colour * (grazing(ih) * i.z * (self.sheen * scale));
+            }
+        } else {
+            sum += colour * (i.z.abs() * (diffuse * across * FRAC_1_PI));
+        }
+        sum
+    }
+}
+
+impl PrincipledThin {
+    /// Its numbers over another scalar.
+    fn over<T: Real>(&self, number: impl Fn(Property, f64) -> T) -> PrincipledThin<T> {
+        PrincipledThin {
+            base_color: self.base_color.map(|c| number(Property::BaseColor, c)),
+            roughness: number(Property::Roughness, self.roughness),
+            anisotropic: number(Property::Anisotropic, self.anisotropic),
+            spec_trans: number(Property::SpecTrans, self.spec_trans),
+            eta: number(Property::Eta, self.eta),
+            spec_tint: number(Property::SpecTint, self.spec_tint),
+            sheen: number(Property::Sheen, self.sheen),
+            sheen_tint: number(Property::SheenTint, self.sheen_tint),
+            flatness: number(Property::Flatness, self.flatness),
+            diff_trans: number(Property::DiffTrans, self.diff_trans),
+        }
     }
 
     /// Probabilities of reflection, of going on, and of diffuse light on this side; the rest is for that on the other one.
@@ -124,42 +181,13 @@ impl PrincipledThin {
 }
 
 impl Framed for PrincipledThin {
-    fn value<T: Real>(&self, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
-        let mut sum = Rgb::splat(T::zero());
-        let Some([o, i, h]) = pair(o, i) else { return sum };
-        let colour = self.base_color.map(T::from);
-        let (reflects, across, diffuse) =
-            (i.z.re() > 0.0, 0.5 * self.diff_trans, 1.0 - self.spec_trans);
-        let oh = o.dot(h);
-        // Behind, facets must show the light their other side.
-        let joined = oh.re() > 0.0 && i.dot(h).re() * i.z.re() > 0.0;
-        if self.spec_trans > 0.0 && joined {
-            let fresnel = dielectric_reflected(oh, T::from(self.eta));
-            let facets = if reflects { self.reflecting() } else { self.blurring() };
-            let light = facets.density(h) * facets.masking(o) * facets.masking(i) * i.z.abs();
-            let light = light * (0.25 * self.spec_trans);
-            sum += if reflects {
-                let tinted = tint(self.base_color) * normal_reflectance(self.eta);
-                let tinted = schlick(tinted.map(T::from), oh, self.eta);
-                tinted.map(|t| lerp(fresnel, t, T::from(self.spec_tint))) * light
-            } else {
-                colour * (light * (T::one() - fresnel))
-            };
-        }
-        if reflects {
-            let ih = i.dot(h);
-            let lobe = diffuse_lobe([o.z, i.z, ih], self.roughness, self.flatness);
-            let scale = diffuse * (1.0 - across);
-            sum += colour * (lobe * i.z * (scale * FRAC_1_PI));
-            if self.sheen > 0.0 {
-                let white = Rgb::splat(1.0 - self.sheen_tint);
-                let colour = tint(self.base_color) * self.sheen_tint + white;
-                sum += colour.map(T::from) * (grazing(ih) * i.z * (self.sheen * scale));
-            }
-        } else {
-            sum += colour * (i.z.abs() * (diffuse * across * FRAC_1_PI));
-        }
-        sum
+    fn value<T: Real>(
+        &self,
+        number: impl Fn(Property, f64) -> T,
+        o: Vec3<T>,
+        i: Vec3<T>,
+    ) -> Rgb<T> {
+        self.over(number).value_of(o, i)
     }
 
     fn density(&self, o: Vec3, i: Vec3) -> f64 {
@@ -208,7 +236,7 @@ impl Framed for PrincipledThin {
         if self.spec_trans == 0.0 {
             return 1.0;
         }
-        let facets: [StretchedFacets; 2] = [self.reflecting(), self.blurring()];
+        let facets = [self.reflecting(), self.blurring()];
         facets.iter().flat_map(|f| f.alpha).fold(1.0, f64::min)
     }
 }

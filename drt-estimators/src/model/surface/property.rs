@@ -178,6 +178,16 @@ pub enum SurfaceError {
         /// What is allowed.
         expected: &'static str,
     },
+    /// A property of this BSDF that nothing but finite differences differentiates by.
+    #[error("\"{property}\" of a {bsdf} BSDF has finite differences only: {reason}")]
+    NotDifferentiated {
+        /// Kind of BSDF, by its plugin name.
+        bsdf: &'static str,
+        /// The property.
+        property: Property,
+        /// Why.
+        reason: &'static str,
+    },
     /// A scalar property was to be moved by three different numbers.
     #[error("\"{property}\" is a single number: add three equal numbers, not {r}, {g}, {b}")]
     NotUniform {

@@ -1,5 +1,8 @@
 //! Frames whose first axis follows the texture coordinates, as Mitsuba's do.
 
+use alloc::collections::BTreeMap;
+
+use drt_geom::Mesh;
 use drt_math::{Frame, Real, Vec3};
 
 use crate::model::surface::At;
@@ -43,4 +46,22 @@ pub(super) fn by_coordinates(at: &TexturePoint<'_>) -> [Vec3; 2] {
     } else {
         any()
     }
+}
+
+/// True where u grows in different directions on two triangles whose normals are the same where they meet.
+pub(super) fn frames_jump_on(mesh: &Mesh) -> bool {
+    let direction = |triangle: u32| {
+        by_coordinates(&TexturePoint::new(mesh, triangle, [1.0 / 3.0; 2]))[0].normalize()
+    };
+    let mut sides = BTreeMap::new();
+    (0..mesh.triangles.len() as u32).any(|triangle| {
+        let corners = mesh.triangles[triangle as usize];
+        let own = (direction(triangle), mesh.normal(triangle).normalize());
+        (0..3).any(|k| {
+            let (i, j) = (corners[k], corners[(k + 1) % 3]);
+            let (along, normal) = *sides.entry([i.min(j), i.max(j)]).or_insert(own);
+            let smooth = mesh.normals.is_some() || normal.dot(own.1) > 1.0 - 1e-12;
+            smooth && (along - own.0).max_abs() > 1e-9
+        })
+    })
 }

@@ -134,6 +134,7 @@ impl Session {
         kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         settings.check(scene, tangents.targets().next().is_some())?;
+        tangents.check()?;
         let tangents = tangents.seen_by(settings.sensor);
         if let Some(name) = tangents.names.first() {
             scene.refuse_derivatives(name, slides(scene, tangents.targets(), settings))?;

@@ -5,6 +5,7 @@ mod composed;
 mod direction_partners;
 mod energy;
 mod formulas;
+mod framed;
 mod gradients;
 mod lobes;
 mod perturbed;
@@ -79,19 +80,27 @@ pub(crate) fn value_over<T: Real>(
         }
         Bsdf::Anisotropic(b) => {
             let frame = Frame::from_normal(n);
-            b.value(frame.to_local(wo), frame.to_local(wi))
+            b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
         }
         Bsdf::Principled(b) => {
             let frame = Frame::from_normal(n);
-            b.value(frame.to_local(wo), frame.to_local(wi))
+            b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
         }
         Bsdf::PrincipledThin(b) => {
             let frame = Frame::from_normal(n);
-            b.value(frame.to_local(wo), frame.to_local(wi))
+            b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
         }
         Bsdf::TwoSided(b) if a.cos_o.re() >= 0.0 => value_over(&b.front, wo, wi, n, lift),
         Bsdf::TwoSided(b) => value_over(b.back.as_ref().unwrap_or(&b.front), wo, wi, -n, lift),
     }
+}
+
+/// What `Framed::value` takes, of `lift`: of a colour the lanes of its first channel stand for all.
+fn number_over<T: Real>(
+    lift: &mut dyn FnMut(Property, Rgb) -> Rgb<T>,
+) -> impl Fn(Property, f64) -> T {
+    let lift = core::cell::RefCell::new(lift);
+    move |property, value| lift.borrow_mut()(property, Rgb::splat(value)).r
 }
 
 /// A normal along no axis.

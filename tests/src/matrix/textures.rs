@@ -1,0 +1,155 @@
+//! Stages of values that vary: over surfaces, lamps, films in lamps and skies; and of other lenses.
+
+use drt_estimators::emitter::{Emitter, EnvironmentMap, Slide};
+use drt_estimators::surface::{Bsdf, Diffuse, Property, Textured};
+use drt_estimators::texture::{AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap};
+use drt_geom::MeshAttribute;
+use drt_math::{Mat3, Rgb, ValueChange, Vec3, vec3};
+use drt_motion::{Change, Effect, PropertyChange, Texels};
+
+use super::effects::{raise, translate, turn};
+use super::materials::panel;
+use super::set::diffuse;
+use super::{Cell, Stage};
+use crate::Result;
+
+/// Changes texels.
+fn texel(target: &str, property: &str, texels: Texels) -> Effect {
+    let op = ValueChange::Add([1.0, 0.6, -0.4].into());
+    let change =
+        PropertyChange { property: property.into(), op, voxels: None, texels: Some(texels) };
+    Effect { target: target.into(), change: Change::Property(change) }
+}
+
+/// 4 × 3 texels that look like nothing else turned or mirrored.
+fn image() -> Result<Bitmap> {
+    let texel = |i: u16| {
+        let wave = |by: f32| 0.45 + 0.3 * (by * f32::from(i)).sin();
+        [wave(1.7), wave(2.9), wave(0.8)]
+    };
+    Ok(Bitmap::new([4, 3], (0..12).map(texel).collect())?)
+}
+
+fn painted(texture: Texture) -> Result<Bsdf> {
+    let bsdf = Bsdf::Diffuse(Diffuse::default());
+    let textured = Textured::new(bsdf, vec![(Property::Reflectance, texture)])?;
+    Ok(Bsdf::Textured(Box::new(textured)))
+}
+
+/// An image on a panel.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn picture() -> Result<Stage> {
+    let mut image = image()?;
+    image.wrap = TextureWrap::Mirror;
+    let cells = vec![
+        Cell::new("a texel", [texel("panel", "reflectance", Texels::One([1, 1]))])
+            .samples(512)
+            .representative(),
+        Cell::new("all texels", [texel("panel", "reflectance", Texels::All)]).samples(512),
+        Cell::new("panel moves", [translate("panel", vec3(0.3, 0.5, -0.3))])
+            .samples(1024)
+            .representative(),
+        Cell::new("panel turns", [turn("panel", vec3(0.2, 1.0, 0.3), Vec3::ZERO)]),
+    ];
+    Ok(Stage::new("picture", panel(painted(Texture::Bitmap(image))?)?.scene, cells))
+}
+
+/// Nearest texels, which jump: of these, the texels alone are for all estimators.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn mosaic() -> Result<Stage> {
+    let mut image = image()?;
+    (image.filter, image.wrap) = (TextureFilter::Nearest, TextureWrap::Clamp);
+    let cells = vec![
+        Cell::new("a texel", [texel("panel", "reflectance", Texels::One([2, 0]))])
+            .samples(512)
+            .representative(),
+    ];
+    Ok(Stage::new("mosaic", panel(painted(Texture::Bitmap(image))?)?.scene, cells))
+}
+
+/// Values that the corners of a mesh have.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn stained() -> Result<Stage> {
+    let name = String::from("vertex_colour");
+    let texture =
+        Texture::Attribute(AttributeTexture { name: name.clone(), scale: 1.0, grey: false });
+    let mut scene = panel(painted(texture)?)?.scene;
+    let mesh = &scene.shapes[0].mesh;
+    let colour = |v: u32| {
+        [[0.9, 0.1, 0.3], [0.2, 0.7, 0.4], [0.1, 0.3, 0.8], [0.6, 0.6, 0.1]][v as usize % 4]
+    };
+    let values = mesh.triangles.iter().map(|t| t.map(colour)).collect();
+    let mesh = mesh.as_ref().clone().with_attributes(vec![MeshAttribute { name, values }])?;
+    scene.shapes[0].mesh = mesh.into();
+    let cells = vec![
+        Cell::new("panel moves", [translate("panel", vec3(0.3, 0.5, -0.3))])
+            .samples(1024)
+            .representative(),
+        Cell::new("panel turns", [turn("panel", vec3(0.2, 1.0, 0.3), Vec3::ZERO)]),
+    ];
+    Ok(Stage::new("stained", scene, cells))
+}
+
+/// A lamp with a picture before it.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn picture_lamp() -> Result<Stage> {
+    let mut scene = panel(diffuse([0.7, 0.6, 0.5]))?.scene;
+    let lamp = scene.shapes.iter().position(|s| s.emitter.is_some()).ok_or("no lamp")?;
+    let mesh = super::materials::with_coordinates(&drt_geom::procedural::rectangle())?;
+    let mut shape = scene.shapes[lamp].mesh.as_ref().clone();
+    shape.texcoords = mesh.texcoords;
+    scene.shapes[lamp].mesh = shape.into();
+    let (radiance, texture) = (Rgb::new(9.0, 8.0, 7.0), Texture::Bitmap(image()?));
+    scene.emitters[0].item.emitter = Emitter::TexturedArea { radiance, texture };
+    let cells = vec![
+        Cell::new("a texel", [texel("lamp", "radiance", Texels::One([1, 1]))])
+            .samples(512)
+            .representative(),
+        Cell::new("brighter", [raise("lamp", "radiance", 1.0)]).samples(512),
+        Cell::new("lamp moves", [translate("lamp", vec3(0.5, -0.3, 0.3))]),
+    ];
+    Ok(Stage::new("picture lamp", scene, cells))
+}
+
+/// A projector and an environment: their numbers, texels and turns.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn sky_and_slide() -> Result<Stage> {
+    let mut set = panel(diffuse([0.7, 0.6, 0.5]))?;
+    let image = image()?;
+    let texels: Vec<[f32; 3]> = (0..12_u16)
+        .map(|i| [0.4, 0.9, 1.7].map(|by: f32| 0.5 + 0.4 * (by * f32::from(i)).sin()))
+        .collect();
+    let map = EnvironmentMap::new([4, 3], texels, Mat3::IDENTITY)?;
+    let frame = Mat3::rotation(Vec3::X, std::f64::consts::FRAC_PI_2);
+    let slide = Slide::projector(Some(Texture::Bitmap(image)), [0.5, 0.4])?;
+    set = set.light("sky", Emitter::Envmap { radiance: Rgb::ONE, map: map.into() }).light(
+        "projector",
+        Emitter::Projector {
+            position: vec3(0.2, 1.6, -0.4),
+            frame,
+            strength: Rgb::new(6.0, 5.0, 4.0),
+            slide: slide.into(),
+        },
+    );
+    let cells = vec![
+        Cell::new("a texel of the sky", [texel("sky", "radiance", Texels::One([2, 1]))])
+            .samples(512)
+            .representative(),
+        Cell::new("sky", [raise("sky", "radiance", 1.0)]).samples(512),
+        Cell::new("sky turns", [turn("sky", vec3(0.3, 1.0, 0.2), Vec3::ZERO)])
+            .samples(1024)
+            .representative(),
+        Cell::new("projector", [raise("projector", "irradiance", 1.0)]).samples(512),
+    ];
+    Ok(Stage::new("sky and slide", set.scene, cells))
+}

@@ -1,0 +1,139 @@
+//! The rows of the derivative matrix that are refusals: every one names the parameter and the object.
+
+use drt_estimators::EstimatorKind::{PathSpace, Radiative, Warped};
+use drt_estimators::surface::{
+    Bsdf, Coating, Conductor, Dielectric, Diffuse, Mask, Perturbation, Perturbed, Plastic,
+    Principled, PrincipledThin, Property, Textured, ThinDielectric,
+};
+use drt_estimators::texture::{Bitmap, Texture, UvMap};
+use drt_estimators::{EstimatorKind, Scene, Session, Settings};
+use drt_math::Rgb;
+use drt_tests::matrix::{Stage, lenses, materials, textures};
+
+/// What a session says of the stage's parameter of a name, if it refuses it.
+fn refusal(scene: &Scene, stage: &Stage, name: &str, estimator: EstimatorKind) -> Option<String> {
+    let cell = stage.cells.iter().find(|c| c.parameter.name == name).expect("a cell");
+    let settings = Settings { estimator, ..Settings::default() };
+    let session = Session::new(scene, std::slice::from_ref(&cell.parameter), &settings);
+    session.err().map(|e| e.to_string())
+}
+
+fn assert_refused(message: Option<String>, parts: &[&str]) {
+    let message = message.unwrap_or_else(|| panic!("{parts:?}: not refused"));
+    assert!(parts.iter().all(|part| message.contains(part)), "{parts:?}: {message}");
+}
+
+/// The panel of another material.
+fn of(bsdf: Bsdf) -> (Stage, Scene) {
+    let stage = materials::coated().unwrap();
+    let mut scene = stage.scene.clone();
+    let panel = scene.shapes[0].bsdf;
+    scene.bsdfs[panel].item = bsdf;
+    (stage, scene)
+}
+
+#[test]
+fn materials_without_derivatives() {
+    let inner = || Bsdf::Diffuse(Diffuse::default());
+    let perturbed = |perturbation| {
+        let map = Bitmap::new([1, 1], vec![[0.5, 0.5, 1.0]]).unwrap();
+        Bsdf::Perturbed(Box::new(Perturbed {
+            bsdf: inner(),
+            map: Texture::Bitmap(map),
+            perturbation,
+            flip_invalid_normals: true,
+            use_shadowing_function: true,
+        }))
+    };
+    for bsdf in [
+        Bsdf::Conductor(Conductor::default()),
+        Bsdf::Dielectric(Dielectric::default()),
+        Bsdf::ThinDielectric(ThinDielectric::default()),
+        Bsdf::Plastic(Plastic::new(Coating::smooth(1.5).unwrap())),
+        Bsdf::Mask(Box::new(Mask { bsdf: inner(), opacity: 0.5 })),
+        perturbed(Perturbation::Normals),
+        perturbed(Perturbation::Heights(0.1)),
+    ] {
+        let kind = bsdf.name();
+        let (stage, scene) = of(bsdf);
+        for estimator in [PathSpace, Radiative, Warped] {
+            let message = refusal(&scene, &stage, "panel moves", estimator);
+            assert_refused(message, &["panel moves", "panel", kind, "finite differences"]);
+        }
+    }
+}
+
+#[test]
+fn numbers_without_derivatives() {
+    let tinted = Principled { spec_tint: 0.4, ..Principled::default() };
+    let thin = PrincipledThin { sheen: 0.4, sheen_tint: 0.4, ..PrincipledThin::default() };
+    for bsdf in [Bsdf::Principled(Box::new(tinted)), Bsdf::PrincipledThin(Box::new(thin))] {
+        let kind = bsdf.name();
+        let (_, scene) = of(bsdf);
+        for estimator in [PathSpace, Radiative, Warped] {
+            let stage = materials::principled().unwrap();
+            let message = refusal(&scene, &stage, "base_color", estimator);
+            assert_refused(message, &["base_color", "bsdf[0]", kind, "tint", "finite differences"]);
+            assert_eq!(refusal(&scene, &stage, "roughness", estimator), None);
+        }
+    }
+}
+
+#[test]
+fn frames_without_coordinates() {
+    let stage = materials::brushed().unwrap();
+    let mut scene = stage.scene.clone();
+    let mut mesh = scene.shapes[0].mesh.as_ref().clone();
+    mesh.texcoords = None;
+    scene.shapes[0].mesh = mesh.into();
+    for estimator in [PathSpace, Radiative, Warped] {
+        let message = refusal(&scene, &stage, "panel moves", estimator);
+        assert_refused(message, &["panel moves", "panel", "texture coordinates"]);
+    }
+}
+
+#[test]
+fn textures_that_jump_under_sliding_points() {
+    let colours = [Rgb::splat(0.2), Rgb::splat(0.8)];
+    let board = Texture::Checkerboard { colours, to_uv: UvMap::IDENTITY };
+    let bsdf = Bsdf::Diffuse(Diffuse::default());
+    let board = Textured::new(bsdf, vec![(Property::Reflectance, board)]).unwrap();
+    let (stage, board) = of(Bsdf::Textured(Box::new(board)));
+    let mosaic = textures::mosaic().unwrap().scene;
+    for scene in [&board, &mosaic] {
+        for estimator in [Radiative, Warped] {
+            let message = refusal(scene, &stage, "panel moves", estimator);
+            assert_refused(message, &["panel moves", "panel", "discontinuous texture"]);
+        }
+        assert_eq!(refusal(scene, &stage, "panel moves", PathSpace), None);
+    }
+}
+
+#[test]
+fn skies_of_images_over_what_moves() {
+    let (stage, sky) = (materials::coated().unwrap(), textures::sky_and_slide().unwrap());
+    for estimator in [Radiative, Warped] {
+        let mut scene = sky.scene.clone();
+        scene.emitters.retain(|e| e.id.as_deref() != Some("projector"));
+        let message = refusal(&scene, &stage, "panel moves", estimator);
+        assert_refused(message, &["panel moves", "sky", "path-space"]);
+    }
+    // The projector's picture ends where it is bright.
+    let message = refusal(&sky.scene, &stage, "panel moves", PathSpace);
+    assert_refused(message, &["panel moves", "projector", "black border"]);
+    let name = "a texel of the sky";
+    assert_eq!(refusal(&sky.scene, &sky, name, Radiative), None);
+}
+
+#[test]
+fn lenses_of_one_estimator() {
+    let lens = lenses::thin_lens().unwrap();
+    for estimator in [Radiative, Warped] {
+        let message = refusal(&lens.scene, &lens, "panel moves", estimator);
+        assert_refused(message, &["camera", "aperture", "path-space"]);
+    }
+    let parallel = lenses::parallel_rays().unwrap();
+    let message = refusal(&parallel.scene, &parallel, "panel moves", Warped);
+    assert_refused(message, &["camera", "orthographic", "path-space"]);
+    assert_eq!(refusal(&parallel.scene, &parallel, "panel moves", Radiative), None);
+}
