@@ -7,9 +7,9 @@
 Each estimator renders a job's derivatives by paths from the camera and by paths from both ends, until their noise is
 1 % or the time is over; finite differences stand beside them.
 
-`noise` is the rms standard error of the 8 x 8 block means of the digest over their rms. `z` holds block means against the
-first row's: differences over their standard errors, about 1 in rms where both agree. `scale` is the factor, less one, by which all
-blocks together are larger than the first row's, with its standard error: it knows of what blocks share long before one of them does.
+`noise` is the rms standard error of the 8 x 8 block means of the digest over their rms. `z` holds block means against those
+of the row with the least noise: differences over their standard errors, about 1 in rms where both agree. `scale` is the factor, less one, by which all
+blocks together are larger than that row's, with its standard error: it knows of what blocks share long before one of them does.
 Blocks have weights by what the other rows say of them.
 """
 
@@ -68,6 +68,10 @@ def rms(numbers):
     return math.sqrt(sum(x * x for x in numbers) / max(len(numbers), 1))
 
 
+def noise_of(row):
+    return rms(v**0.5 for v in row[1]) / (rms(row[0]) or math.inf)
+
+
 def others(rows, left_out):
     """Block means of all other rows together: what these know by themselves."""
     known = [row for kind, row in rows.items() if kind not in left_out]
@@ -100,13 +104,12 @@ def main():
             for parameter, own in row.items():
                 found.setdefault(parameter, {})[at] = own
         for parameter, rows in found.items():
-            first = min(rows)
+            first = min(rows, key=lambda at: noise_of(rows[at]))
             for at, own in rows.items():
-                noise = rms(v**0.5 for v in own[1]) / (rms(own[0]) or math.inf)
                 told = len(rows) > 2 and at != first
                 beside = compared(own, rows[first], others(rows, [first, at])) if told else " | | "
                 kind, sampling = KINDS[at]
-                print(f"| {scene} | {parameter} | {kind} | {sampling} | {100 * noise:.1f} % | {beside} |", flush=True)
+                print(f"| {scene} | {parameter} | {kind} | {sampling} | {100 * noise_of(own):.1f} % | {beside} |", flush=True)
 
 
 if __name__ == "__main__":
