@@ -96,6 +96,13 @@ impl Blend {
         Self { weight, gradient: Vec3::ZERO }
     }
 
+    /// A weight that rises from 0 at the viewer to 1 at the distance 1 / `rise`, of a vertex at a `distance` along the unit
+    /// direction `dir`.
+    pub(crate) fn of_distance(dir: Vec3, distance: f64, rise: f64) -> Self {
+        let q = f64::min(rise * distance, 1.0);
+        Self { weight: q * q * (3.0 - 2.0 * q), gradient: dir * (6.0 * q * (1.0 - q) * rise) }
+    }
+
     /// The product of two weights.
     pub(crate) fn and(self, other: Self) -> Self {
         let gradient = self.gradient * other.weight + other.gradient * self.weight;
@@ -185,9 +192,7 @@ impl Blends {
             return Blend::default();
         };
         let graze = graze(world, s, dir, distance, self.cosines[shape]);
-        let q = f64::min(curvature * distance, 1.0);
-        let (weight, slope) = (q * q * (3.0 - 2.0 * q), 6.0 * q * (1.0 - q) * curvature);
-        graze.and(Blend { weight, gradient: dir * slope })
+        graze.and(Blend::of_distance(dir, distance, *curvature))
     }
 
     /// φ of all vertices inside of a medium which a `viewer` sees.

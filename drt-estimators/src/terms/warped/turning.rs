@@ -22,7 +22,7 @@ use crate::world::vertex::Vertex;
 const PIXELS: f64 = 2.0;
 
 /// Of the radius of curvature: from how far vertices on a curved surface move with their matter.
-const NEAR: f64 = 0.25;
+const NEAR: f64 = 0.5;
 
 /// The spatial form, with rays that turn.
 #[derive(Debug)]
@@ -52,7 +52,8 @@ impl EdgeTurns {
     /// φ of a vertex on a curved surface; `None` on others.
     ///
     /// A viewer in a medium, on another surface, or whose ray turned does not move with this matter, however near it is, and the
-    /// segment between them turns by the difference over its length r. So φ falls with the square of r.
+    /// segment between them turns by the difference over its length r. So near it φ falls with the square of r; farther away φ is
+    /// 1, as the difference grows where a ray grazes, and must not meet a slope of φ there.
     fn of_matter(
         &self,
         viewer: Option<&Vertex>,
@@ -67,10 +68,7 @@ impl EdgeTurns {
         if viewer.is_none() {
             return Some(Blend::MATERIAL);
         }
-        let rise = curvature / NEAR;
-        let q = distance * rise;
-        let rest = 1.0 / (1.0 + q * q);
-        Some(Blend { weight: q * q * rest, gradient: dir * (2.0 * q * rest * rest * rise) })
+        Some(Blend::of_distance(dir, distance, curvature / NEAR))
     }
 }
 
