@@ -153,3 +153,46 @@ pub fn sky_and_slide() -> Result<Stage> {
     ];
     Ok(Stage::new("sky and slide", set.scene, cells))
 }
+
+/// A spot and a projector with pictures, which move with all that they throw. The projector's has a black border, so that its
+/// light does not jump.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn thrown() -> Result<Stage> {
+    let frame = Mat3::rotation(Vec3::X, std::f64::consts::FRAC_PI_2);
+    let bordered = |i: u16| {
+        let inside = (1..4).contains(&(i % 5)) && (1..3).contains(&(i / 5));
+        if inside { [0.9, 0.4 + 0.02 * f32::from(i), 0.6] } else { [0.0; 3] }
+    };
+    let mut border = Bitmap::new([5, 4], (0..20).map(bordered).collect())?;
+    border.wrap = TextureWrap::Clamp;
+    let slide = Slide::projector(Some(Texture::Bitmap(border)), [0.7, 0.6])?;
+    let beam = Slide::spot(Texture::Bitmap(image()?), 0.7, 0.4)?;
+    let light = |x: f64, strength, slide: Slide| Emitter::Projector {
+        position: vec3(x, 1.6, -0.4),
+        frame,
+        strength,
+        slide: slide.into(),
+    };
+    let scene = panel(diffuse([0.7, 0.6, 0.5]))?
+        .light("spot", light(0.3, Rgb::new(6.0, 5.0, 4.0), beam))
+        .light("projector", light(-0.2, Rgb::new(3.0, 4.0, 5.0), slide))
+        .scene;
+    let cells = vec![
+        Cell::new("spot", [raise("spot", "intensity", 1.0)]).samples(512),
+        Cell::new("spot moves", [translate("spot", vec3(0.3, 0.2, -0.4))])
+            .samples(1024)
+            .representative(),
+        Cell::new("spot turns", [turn("spot", vec3(0.3, 0.4, 1.0), vec3(0.3, 1.6, -0.4))]),
+        Cell::new("projector moves", [translate("projector", vec3(0.2, 0.2, 0.3))])
+            .samples(1024)
+            .representative(),
+        Cell::new(
+            "projector turns",
+            [turn("projector", vec3(1.0, 0.2, 0.3), vec3(-0.2, 1.6, -0.4))],
+        ),
+        Cell::new("panel moves", [translate("panel", vec3(0.3, 0.5, -0.3))]),
+    ];
+    Ok(Stage::new("thrown", scene, cells))
+}
