@@ -47,7 +47,8 @@ pub(super) fn panel(bsdf: Bsdf) -> Result<Set> {
 fn stage(name: &'static str, bsdf: Bsdf, numbers: Vec<Cell>) -> Result<Stage> {
     let mut cells: Vec<Cell> = numbers.into_iter().map(|c| c.samples(512)).collect();
     cells[0] = cells[0].clone().representative();
-    cells.push(Cell::new("panel moves", [translate("panel", vec3(0.3, 0.5, -0.3))]));
+    let moves = Cell::new("panel moves", [translate("panel", vec3(0.3, 0.5, -0.3))]);
+    cells.push(if matches!(bsdf, Bsdf::TwoSided(_)) { moves } else { moves.representative() });
     let turns = Cell::new("panel turns in its plane", [turn("panel", NORMAL, Vec3::ZERO)]);
     let turns = turns.samples(1024);
     // Lobes that are the same all around do not see it.

@@ -33,11 +33,15 @@
 use core::f64::consts::FRAC_1_PI;
 
 use drt_geom::edges::{Lobe, Lobes};
-use drt_math::{Vec3, fm};
+use drt_math::{Rgb, Vec3, fm};
 
 use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA};
-use crate::model::surface::{At, Bsdf, Phong, Plastic, RoughConductor, RoughDielectric};
+use crate::model::surface::principled::stretched;
+use crate::model::surface::{
+    Anisotropic, At, Bsdf, Phong, Plastic, Principled, PrincipledThin, RoughConductor,
+    RoughDielectric,
+};
 
 impl Bsdf {
     /// The sketch of the light that leaves to `wo`, by where it comes from.
@@ -51,6 +55,9 @@ impl Bsdf {
             Self::Plastic(b) => plastic(b, wo, n),
             Self::Textured(b) => b.at(at).lobes(None, wo, n),
             Self::Blend(b) => b.lobes(at, wo, n),
+            Self::Anisotropic(b) => uneven(b, wo, n),
+            Self::Principled(b) => principled(b, wo, n),
+            Self::PrincipledThin(b) => thin(b, wo, n),
             // Nothing is differentiated at all others.
             _ => Lobes::even(0.0),
         }
@@ -93,6 +100,52 @@ fn dielectric(b: &RoughDielectric, wo: Vec3, n: Vec3) -> Lobes {
     let refracted = b.specular_transmittance.mean() * (1.0 - fresnel) / (eta * eta);
     let lobes = [reflection(wo, n, b.alpha, reflected), facet.refraction(wo, eta, refracted)];
     Lobes::glossy(0.0, lobes)
+}
+
+/// As wide all around as where it is widest.
+fn uneven(b: &Anisotropic, wo: Vec3, n: Vec3) -> Lobes {
+    let alpha = widest(b.alpha);
+    match &b.base {
+        Bsdf::RoughConductor(b) => conductor(&RoughConductor { alpha, ..b.clone() }, wo, n),
+        Bsdf::RoughDielectric(b) => dielectric(&RoughDielectric { alpha, ..b.clone() }, wo, n),
+        b => b.lobes(None, wo, n),
+    }
+}
+
+fn widest([u, v]: [f64; 2]) -> f64 {
+    f64::max(u, v)
+}
+
+/// Sheen, over π.
+const SHEEN: f64 = 0.1;
+
+fn principled(b: &Principled, wo: Vec3, n: Vec3) -> Lobes {
+    let (colour, dielectric_part) = (b.base_color.mean(), 1.0 - b.metallic);
+    let glass = RoughDielectric {
+        distribution: Distribution::Ggx,
+        alpha: widest(stretched(b.roughness, b.anisotropic).alpha),
+        eta: b.eta,
+        specular_transmittance: Rgb::splat(colour * dielectric_part * b.spec_trans),
+        ..RoughDielectric::default()
+    };
+    let Lobes { lobes: [mut reflected, refracted], .. } = dielectric(&glass, wo, n);
+    reflected.height += (colour * b.metallic + 0.01 * b.clearcoat) * FRAC_1_PI;
+    let diffuse = colour * (1.0 - b.spec_trans) * FRAC_1_PI + b.sheen * SHEEN;
+    Lobes::glossy(diffuse * dielectric_part, [reflected, refracted])
+}
+
+fn thin(b: &PrincipledThin, wo: Vec3, n: Vec3) -> Lobes {
+    let n = if n.dot(wo) >= 0.0 { n } else { -n };
+    let colour = b.base_color.mean();
+    let once = dielectric_reflected(n.dot(wo).clamp(1e-6, 1.0), b.eta);
+    // From both sides of the sheet.
+    let reflected = 2.0 * once / (1.0 + once);
+    let [mirror, through] =
+        [(b.reflecting(), reflected), (b.blurring(), (1.0 - reflected) * colour)]
+            .map(|(facets, share)| reflection(wo, n, widest(facets.alpha), b.spec_trans * share));
+    let through = Lobe { axis: -wo, ..through };
+    let diffuse = (1.0 - b.spec_trans) * colour * FRAC_1_PI + b.sheen * SHEEN;
+    Lobes::glossy(diffuse, [mirror, through])
 }
 
 fn reflection(wo: Vec3, n: Vec3, alpha: f64, share: f64) -> Lobe {

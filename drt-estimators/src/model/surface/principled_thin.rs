@@ -75,11 +75,11 @@ fn pair<T: Real>(o: Vec3<T>, i: Vec3<T>) -> Option<[Vec3<T>; 3]> {
 }
 
 impl<T: Real> PrincipledThin<T> {
-    fn reflecting(&self) -> StretchedFacets<T> {
+    pub(super) fn reflecting(&self) -> StretchedFacets<T> {
         stretched(self.roughness, self.anisotropic)
     }
 
-    fn blurring(&self) -> StretchedFacets<T> {
+    pub(super) fn blurring(&self) -> StretchedFacets<T> {
         stretched((self.eta * 0.65 - 0.35) * self.roughness, self.anisotropic)
     }
 

@@ -7,7 +7,7 @@ use super::*;
 use crate::model::surface::framed::by_corners;
 
 /// What has a derivative by every number that a [`BsdfParams`] has an entry of.
-fn framed_cases() -> Vec<Bsdf> {
+pub(super) fn framed_cases() -> Vec<Bsdf> {
     let base_color = Rgb::new(0.6, 0.4, 0.2);
     let common = Principled { base_color, anisotropic: 0.7, flatness: 0.3, ..Default::default() };
     alloc::vec![

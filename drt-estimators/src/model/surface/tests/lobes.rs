@@ -5,6 +5,7 @@ use drt_geom::edges::{Lobe, Lobes};
 
 use drt_medium::Phase;
 
+use crate::model::surface::tests::framed::framed_cases;
 use crate::model::surface::tests::*;
 
 const SAMPLES: u32 = 40_000;
@@ -88,6 +89,17 @@ fn refractions_by_facets() {
     for angle in [84.0, 120.0, 130.0] {
         let cost = cost_of(&bsdf, tilted(angle), tilted(angle));
         assert!(cost < 4.5, "{cost} at {angle}");
+    }
+}
+
+/// Wide and narrow lobes, at worst by where they are narrow.
+#[test]
+fn surfaces_that_tell_directions_apart() {
+    for bsdf in framed_cases() {
+        for angle in [5.0, 40.0, 65.0] {
+            let cost = cost_of(&bsdf, tilted(angle), tilted(angle));
+            assert!(cost < 4.5, "{cost} for {bsdf:?} at {angle}");
+        }
     }
 }
 
