@@ -106,8 +106,8 @@ fn dielectric(b: &RoughDielectric, wo: Vec3, n: Vec3) -> Lobes {
 fn uneven(b: &Anisotropic, wo: Vec3, n: Vec3) -> Lobes {
     let alpha = widest(b.alpha);
     match &b.base {
-        Bsdf::RoughConductor(b) => conductor(&RoughConductor { alpha, ..b.clone() }, wo, n),
-        Bsdf::RoughDielectric(b) => dielectric(&RoughDielectric { alpha, ..b.clone() }, wo, n),
+        Bsdf::RoughConductor(b) => conductor(&RoughConductor { alpha, ..*b }, wo, n),
+        Bsdf::RoughDielectric(b) => dielectric(&RoughDielectric { alpha, ..*b }, wo, n),
         b => b.lobes(None, wo, n),
     }
 }
