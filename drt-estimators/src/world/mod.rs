@@ -195,6 +195,8 @@ pub(crate) struct World {
     pub(crate) hides_emitters: bool,
     pub(crate) geometry: Arc<Geometry>,
     null: Vec<bool>,
+    /// Shapes whose BSDFs tell directions along them apart.
+    oriented: Vec<bool>,
     pub(crate) any_null: bool,
     /// Some surfaces let light go straight through at no depth.
     pub(crate) any_straight: bool,
@@ -219,8 +221,10 @@ impl World {
         let (camera_item, surrounding) = (camera.item.sensor.clone(), camera.item.medium);
         let geometry = kept.geometry(&scene)?;
         let radius = geometry.radius;
-        let null: Vec<bool> =
-            scene.shapes.iter().map(|s| scene.bsdfs[s.bsdf].item.is_null()).collect();
+        let of_bsdfs = |is: fn(&Bsdf) -> bool| -> Vec<bool> {
+            scene.shapes.iter().map(|s| is(&scene.bsdfs[s.bsdf].item)).collect()
+        };
+        let [null, oriented] = [Bsdf::is_null, Bsdf::is_oriented].map(of_bsdfs);
         let tracking = scene
             .media
             .iter()
@@ -254,6 +258,7 @@ impl World {
             any_straight: !scene.integrator.straight_depth && scene.first_straight().is_some(),
             geometry,
             null,
+            oriented,
             ambient: None,
             scene,
         };
@@ -413,6 +418,11 @@ impl World {
 
     pub(crate) fn is_null(&self, shape: u32) -> bool {
         self.null[shape as usize]
+    }
+
+    /// True where directions along a shape are told apart.
+    pub(crate) fn is_oriented(&self, shape: u32) -> bool {
+        self.oriented[shape as usize]
     }
 
     /// True where some light goes straight through the surface that a vertex is on.

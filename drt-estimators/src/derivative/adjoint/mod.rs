@@ -459,9 +459,9 @@ impl<'w> Differentiator<'w> {
         if adjoint.is_zero() || !(material || moving) {
             return None;
         }
-        let turns = v.surface().is_some_and(|s| {
-            active.shapes[s.shape as usize] && world.bsdf_of(s.shape).is_oriented()
-        });
+        let turns = v
+            .surface()
+            .is_some_and(|s| active.shapes[s.shape as usize] && world.is_oriented(s.shape));
         let mut d = world.scattering(v)?.gradient(wo, wi);
         if let Some(apart) = paired {
             apart.take_from(&mut d);
