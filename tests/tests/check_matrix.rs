@@ -5,8 +5,8 @@
 
 use drt_tests::Result;
 use drt_tests::matrix::{
-    Stage, Table, caged, check, deforming, lenses, lights, materials, media, riding, surfaces,
-    textures,
+    Stage, Table, caged, check, deforming, lenses, lights, materials, media, riding, still,
+    surfaces, textures,
 };
 
 fn run(stage: Result<Stage>) {
@@ -57,5 +57,27 @@ mod through {
     fn all() {
         run(lenses::thin_lens());
         run(lenses::parallel_rays());
+    }
+}
+
+/// Surfaces past which only what moves nothing is differentiated.
+mod past {
+    use super::{Stage, run, still};
+
+    #[test]
+    fn mirrors() {
+        run(still::mirrors().map(Stage::short));
+    }
+
+    #[test]
+    fn veiled() {
+        run(still::veiled().map(Stage::short));
+    }
+
+    #[test]
+    #[ignore = "minutes"]
+    fn all() {
+        run(still::mirrors());
+        run(still::veiled());
     }
 }

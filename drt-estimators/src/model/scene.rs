@@ -201,24 +201,34 @@ impl TargetName for String {
     }
 }
 
+impl Bsdf {
+    /// Why nothing that moves can be differentiated where light meets this on a mesh.
+    fn refuses_motion(&self, mesh: &Mesh, parameter: &str) -> Option<ElementError> {
+        let parameter = || parameter.into();
+        if self.is_smooth() {
+            return Some(ElementError::Smooth { bsdf: self.name(), parameter: parameter() });
+        }
+        if let Some(bsdf) = self.undifferentiable() {
+            return Some(ElementError::NoDerivatives { bsdf, parameter: parameter() });
+        }
+        let lost = self.is_oriented() && mesh.texcoords.is_none();
+        lost.then(|| ElementError::NoCoordinates { parameter: parameter() })
+    }
+}
+
 impl Scene {
-    /// Refuses derivatives with respect to `parameter` where light meets smooth surfaces: they move
-    /// light along them, which no term here samples. Where vertices `slide` over surfaces, jumps of textures move under them,
-    /// which no term here samples, either.
-    pub(crate) fn refuse_derivatives(&self, parameter: &str, slide: bool) -> Result<(), Error> {
+    /// Refuses derivatives with respect to `parameter` where `moves`, as something moves, and light meets smooth surfaces: they move
+    /// light along them, which no term here samples; nor do the jumps at others. Where vertices `slide` over surfaces, jumps of
+    /// textures move under them, which no term here samples, either.
+    pub(crate) fn refuse_derivatives(
+        &self,
+        parameter: &str,
+        moves: bool,
+        slide: bool,
+    ) -> Result<(), Error> {
         for (i, s) in self.shapes.iter().enumerate() {
             let bsdf = &self.bsdfs[s.bsdf].item;
-            if bsdf.is_smooth() {
-                let (bsdf, parameter) = (bsdf.name(), parameter.into());
-                return Err(unusable(&s.id, "shape", i, ElementError::Smooth { bsdf, parameter }));
-            }
-            if let Some(bsdf) = bsdf.undifferentiable() {
-                let parameter = parameter.into();
-                let reason = ElementError::NoDerivatives { bsdf, parameter };
-                return Err(unusable(&s.id, "shape", i, reason));
-            }
-            if bsdf.is_oriented() && s.mesh.texcoords.is_none() {
-                let reason = ElementError::NoCoordinates { parameter: parameter.into() };
+            if moves && let Some(reason) = bsdf.refuses_motion(&s.mesh, parameter) {
                 return Err(unusable(&s.id, "shape", i, reason));
             }
             if slide && let Some(property) = bsdf.undifferentiated_texture() {
@@ -250,6 +260,11 @@ impl Scene {
             return Err(unusable(id, "emitter", i, ElementError::VaryingSky { parameter }));
         }
         Ok(())
+    }
+
+    /// The first shape of a smooth surface.
+    pub(crate) fn first_smooth(&self) -> Option<usize> {
+        self.shapes.iter().position(|s| self.bsdfs[s.bsdf].item.is_smooth())
     }
 
     /// Checks that indices refer to something, that what emits has an area, and the numbers of meshes, scattering
@@ -578,10 +593,10 @@ mod tests {
     #[test]
     fn smooth_and_textured_surfaces_refuse_derivatives_by_name() {
         let mut scene = scene();
-        assert!(scene.refuse_derivatives("spin", true).is_ok());
+        assert!(scene.refuse_derivatives("spin", true, true).is_ok());
         scene.bsdfs.push(Named::new("glass", Bsdf::Dielectric(Dielectric::default())));
         // One that no shape has does no harm.
-        assert!(scene.refuse_derivatives("spin", true).is_ok());
+        assert!(scene.refuse_derivatives("spin", true, true).is_ok());
         let shape = scene.shapes.len() - 1;
         scene.shapes[shape].bsdf = scene.bsdfs.len() - 1;
         let parameters = [drt_motion::Parameter {
@@ -601,7 +616,7 @@ mod tests {
         assert!(message.contains("`spin` cannot be differentiated"), "{message}");
         // Where vertices slide over surfaces, textures must not jump; their values may change.
         scene.shapes[shape].bsdf = 0;
-        assert!(scene.refuse_derivatives("spin", true).is_ok());
+        assert!(scene.refuse_derivatives("spin", true, true).is_ok());
         let texture = Texture::Checkerboard {
             colours: [Rgb::splat(0.2), Rgb::splat(0.8)],
             to_uv: crate::texture::UvMap::IDENTITY,
@@ -609,8 +624,8 @@ mod tests {
         let bsdf = scene.bsdfs[0].item.clone();
         let textured = Textured::new(bsdf, alloc::vec![(Property::Reflectance, texture)]);
         scene.bsdfs[0].item = Bsdf::Textured(alloc::boxed::Box::new(textured.expect("a texture")));
-        assert!(scene.refuse_derivatives("spin", false).is_ok());
-        let message = scene.refuse_derivatives("spin", true).unwrap_err().to_string();
+        assert!(scene.refuse_derivatives("spin", true, false).is_ok());
+        let message = scene.refuse_derivatives("spin", true, true).unwrap_err().to_string();
         assert!(message.contains(&name) && message.contains("discontinuous texture"), "{message}");
         let op = drt_motion::ValueChange::Add(Rgb::ONE);
         let change = drt_motion::PropertyChange {

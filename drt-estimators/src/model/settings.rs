@@ -220,6 +220,13 @@ impl Settings {
             let name = scene.shapes[i].id.clone().unwrap_or_else(|| alloc::format!("shape[{i}]"));
             return fail("sampling", SettingError::Straight(name));
         }
+        if derivatives
+            && self.sampling == PathSampling::Bidirectional
+            && let Some(i) = scene.first_smooth()
+        {
+            let name = scene.shapes[i].id.clone().unwrap_or_else(|| alloc::format!("shape[{i}]"));
+            return fail("sampling", SettingError::Smooth(name));
+        }
         Ok(())
     }
 }

@@ -146,7 +146,8 @@ pub fn gradient_in_batches(
     let wanted = &targets(scene, wanted)?[..];
     if let Some(target) = wanted.first() {
         let slide = slides(scene, wanted.iter().copied(), settings);
-        scene.refuse_derivatives(&scene.name_of(*target), slide)?;
+        let active = active(scene, wanted);
+        scene.refuse_derivatives(&scene.name_of(*target), active.moves_geometry(), slide)?;
         let moves = |t: &Target| !matches!(t, Target::Sensor(_)) && may_move(scene, *t);
         if let Some(target) = wanted.iter().find(|t| moves(t)) {
             scene.refuse_rims(&scene.name_of(*target))?;

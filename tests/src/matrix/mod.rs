@@ -15,6 +15,7 @@ pub mod media;
 pub mod riding;
 pub mod scale;
 pub(crate) mod set;
+pub mod still;
 pub mod surfaces;
 pub mod textures;
 pub(crate) mod verdict;

@@ -20,6 +20,7 @@
 //! sensitivities are [propagated](propagation) to.
 
 mod antithetic;
+mod connections;
 mod emitters;
 mod light;
 mod propagation;
@@ -34,7 +35,7 @@ use drt_math::{Rgb, RgbVec, Rng, Vec3};
 use drt_medium::Coefficients;
 
 use crate::derivative::adjoint::antithetic::Apart;
-use crate::derivative::adjoint::emitters::{LightEnd, area, light_moves, surroundings};
+use crate::derivative::adjoint::emitters::{area, surroundings};
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 use crate::derivative::adjoint::turning::RayMotion;
@@ -48,10 +49,10 @@ use crate::model::sensor::{Sensor, SensorGradient};
 use crate::model::surface::{BsdfParams, by_corners};
 use crate::sampling::record::{Role, Scattered};
 use crate::sampling::streams::VELOCITY_STREAM;
-use crate::sampling::trace::{Connection, Endpoint};
+use crate::sampling::trace::Endpoint;
+use crate::world::World;
 use crate::world::lights::EmitterMask;
 use crate::world::vertex::{Kind, MaterialPoint, SurfacePoint, Vertex};
-use crate::world::{Crossing, World};
 
 /// What has been collected for a vertex while its neighbours are processed, besides what is by its own velocity and
 /// normals.
@@ -503,72 +504,6 @@ impl<'w> Differentiator<'w> {
         Some(d.wi * adjoint)
     }
 
-    /// Next-event connections of a vertex: returns their sum, without the scattering coefficient.
-    #[allow(clippy::too_many_arguments)]
-    fn connections<S: AdjointSink>(
-        &mut self,
-        recorded: &RecordedPath<'_>,
-        k: usize,
-        vertex: &Vertex,
-        theta: Rgb,
-        here: &mut SurfaceAdjoint,
-        before: &mut [SurfaceAdjoint],
-        sink: &mut S,
-    ) -> Rgb {
-        let mut sum = Rgb::ZERO;
-        let RecordedPath { record, velocities, lit, .. } = *recorded;
-        let node = &record.nodes[k];
-        let Some(arrival) = &node.arrival else { return sum };
-        let behind = self.behind(recorded, k);
-        let moving = velocities.moves(k);
-        let arrives = moving || velocities.moves(arrival.parent as usize);
-        for (c, crossings) in &record.connections[node.connections.clone()] {
-            if !lit.by_sample(&c.light) {
-                continue;
-            }
-            let crossings = &record.crossings[crossings.clone()];
-            let event = NextEvent { c, crossings, theta, behind, moving, arrives };
-            if !self.connect_with_shadows(recorded, k, vertex, &event, before, sink) {
-                sum += c.f * c.rest();
-                self.connect(recorded, -arrival.dir, vertex, &event, here, before, sink);
-            }
-        }
-        sum
-    }
-
-    /// One of them.
-    #[allow(clippy::too_many_arguments)]
-    fn connect<S: AdjointSink>(
-        &mut self,
-        recorded: &RecordedPath<'_>,
-        wo: Vec3,
-        vertex: &Vertex,
-        event: &NextEvent<'_>,
-        here: &mut SurfaceAdjoint,
-        before: &mut [SurfaceAdjoint],
-        sink: &mut S,
-    ) {
-        let NextEvent { c, crossings, theta, behind, moving, arrives } = *event;
-        let light = &c.light;
-        let field = recorded.velocities.field();
-        let motion = self.light_motion(vertex, moving, light, field, sink.active());
-        let turns = arrives || motion.is_some() || light_moves(light, sink.active());
-        let rest = theta * c.rest();
-        let to_wi =
-            self.scattering(vertex, wo, light.w, None, rest, behind, turns, here, before, sink);
-        let per_value = theta * c.f * c.transport;
-        let path = Stretch {
-            start: vertex.x,
-            dir: light.w,
-            length: light.distance,
-            medium: c.start_medium,
-            crossings,
-        };
-        let motion = motion.as_ref();
-        let end = LightEnd { near_moves: moving, light, to_wi, motion };
-        self.light_end(&path, &end, per_value, here, sink);
-    }
-
     /// The coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e.
     #[allow(clippy::too_many_arguments)]
     fn coefficients<S: AdjointSink>(
@@ -659,20 +594,6 @@ impl<'w> Differentiator<'w> {
     fn behind(&self, path: &RecordedPath<'_>, node: usize) -> Option<Behind> {
         behind(path, node, self.world.camera.is_orthographic())
     }
-}
-
-/// A next-event connection.
-#[derive(Clone, Copy)]
-struct NextEvent<'a> {
-    c: &'a Connection,
-    crossings: &'a [Crossing],
-    /// What multiplies it.
-    theta: Rgb,
-    behind: Option<Behind>,
-    /// The vertex moves.
-    moving: bool,
-    /// Or the one before.
-    arrives: bool,
 }
 
 /// The segment by which a walk arrived at a node; `None` at the camera. Where its rays are `parallel`, nothing that it sees

@@ -2,8 +2,9 @@
 
 use alloc::vec::Vec;
 
+use crate::derivative::adjoint::connections::NextEvent;
 use crate::derivative::adjoint::turning::RayMotion;
-use crate::derivative::adjoint::{Behind, Differentiator, NextEvent, NodeMotion};
+use crate::derivative::adjoint::{Behind, Differentiator, NodeMotion};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::derivative::velocity::{Found, RecordedPath, TurningRay};
 use crate::world::vertex::Vertex;

@@ -66,6 +66,11 @@ pub enum SettingError {
         "bidirectional sampling has no masks and thin panes: light goes straight through `{0}`; use unidirectional"
     )]
     Straight(alloc::string::String),
+    /// Derivatives by paths from both ends, past a smooth surface.
+    #[error(
+        "bidirectional sampling has no derivatives past smooth surfaces, as `{0}` is; use unidirectional"
+    )]
+    Smooth(alloc::string::String),
     /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
     #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
     JumpingFilter,

@@ -3,7 +3,9 @@ use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::model::surface::composed::Composed;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
-use crate::model::surface::{At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample};
+use crate::model::surface::{
+    At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
+};
 
 /// A linear combination of two BSDFs, `(1 - w) f₀ + w f₁`: Mitsuba's `blendbsdf`.
 ///
@@ -30,6 +32,12 @@ impl Blend {
     /// The probabilities of choosing them.
     fn choices(&self) -> [f64; 2] {
         self.weights().map(|w| w.clamp(LEAST_CHOICE, 1.0 - LEAST_CHOICE))
+    }
+
+    /// The derivative by the weight, from the values of both parts.
+    fn slope(&self, [a, b]: [Rgb; 2]) -> Rgb {
+        // Beyond its range the weight changes nothing.
+        if (0.0..=1.0).contains(&self.weight) { b - a } else { Rgb::ZERO }
     }
 
     /// The part that a number of (0, 1) chooses, and the number stretched to (0, 1) again.
@@ -96,8 +104,7 @@ impl Composed for Blend {
     fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
         let [a, b] = self.bsdfs.each_ref().map(|b| b.gradient_at(at, wo, wi, n));
         let [u, v] = self.weights();
-        // Beyond its range the weight changes nothing.
-        let slope = if (0.0..=1.0).contains(&self.weight) { b.value - a.value } else { Rgb::ZERO };
+        let slope = self.slope([a.value, b.value]);
         BsdfGradient {
             value: a.value * u + b.value * v,
             wo: a.wo * u + b.wo * v,
@@ -124,6 +131,23 @@ impl Composed for Blend {
         let sample = self.bsdfs[part].sample_specular_at(at, from, n, choice, given)?;
         let times = self.weights()[part] / self.choices()[part];
         Some(SpecularSample { weight: sample.weight * times, ..sample })
+    }
+
+    fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        let parts = self.bsdfs.each_ref().map(|b| b.specular(at, wo, wi, n));
+        if parts.iter().all(Option::is_none) {
+            return None;
+        }
+        let parts = parts.map(Option::unwrap_or_default);
+        let mut both = SpecularValue::default();
+        for (part, (weight, choice)) in
+            parts.iter().zip(self.weights().into_iter().zip(self.choices()))
+        {
+            both.value += part.value * weight;
+            both.probability += part.probability * choice;
+        }
+        both.params.exponent = self.slope(parts.map(|p| p.value));
+        Some(both)
     }
 
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {

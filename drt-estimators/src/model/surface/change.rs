@@ -1,6 +1,7 @@
 use drt_math::{Rgb, ValueChange};
 
 use crate::model::surface::Bsdf;
+use crate::model::surface::mask::has_transmittance;
 use crate::model::surface::property::{Property, Slot, SurfaceError, names};
 use crate::model::texture::Texture;
 
@@ -17,7 +18,7 @@ pub struct BsdfParams {
     pub reflectance: Rgb,
     /// Weight of the glossy reflection; `clearcoat` and `diff_trans`.
     pub specular_reflectance: Rgb,
-    /// Weight of the glossy refraction; `spec_trans`.
+    /// Weight of the glossy refraction; `spec_trans`, and the `opacity` of a mask around what has neither.
     pub specular_transmittance: Rgb,
     /// Roughness: `alpha`, `alpha_u`, `roughness`.
     pub alpha: Rgb,
@@ -68,7 +69,7 @@ impl BsdfParams {
         Some(match property {
             Property::Reflectance | Property::BaseColor => 0,
             Property::SpecularReflectance | Property::Clearcoat | Property::DiffTrans => 1,
-            Property::SpecularTransmittance | Property::SpecTrans => 2,
+            Property::SpecularTransmittance | Property::SpecTrans | Property::Opacity => 2,
             Property::Alpha | Property::AlphaU | Property::Roughness => 3,
             Property::Eta => 4,
             Property::K | Property::Sheen => 5,
@@ -178,10 +179,22 @@ impl Bsdf {
             Self::Textured(b) => (&b.bsdf, Some(&**b)),
             other => (other, None),
         };
-        let plain = &mut plain.clone();
-        if !matches!(plain, Self::Principled(_) | Self::PrincipledThin(_)) {
-            return None;
+        match plain {
+            Self::Principled(_) | Self::PrincipledThin(_) => {}
+            Self::Perturbed(b) => return b.bsdf.undifferentiated(property),
+            Self::Mask(b) if property != Property::Opacity => {
+                return b.bsdf.undifferentiated(property);
+            }
+            Self::Mask(b) if has_transmittance(&b.bsdf) => {
+                return Some("it shares its place with what the surface itself lets through");
+            }
+            Self::Dielectric(_) if property == Property::Eta => {
+                return Some("it turns light that goes through");
+            }
+            Self::Mask(_) => {}
+            _ => return None,
         }
+        let plain = &mut plain.clone();
         // The values of a property are between these.
         let mut ends = |p: Property| match textures.and_then(|t| t.texture(p)) {
             Some(texture) => texture.bounds(),
@@ -199,6 +212,9 @@ impl Bsdf {
             Property::BaseColor if tinted => Some("a tint mixes its channels"),
             Property::BaseColor if !thin && !no_light_through && least <= 0.0 => {
                 Some("light goes through by its root, which has no slope at 0")
+            }
+            Property::Opacity if least <= 0.0 || most.max_abs() >= 1.0 => {
+                Some("at 0 and 1 no path goes where light would")
             }
             Property::SpecTrans | Property::DiffTrans if least <= 0.0 => {
                 Some("at 0 no path goes where light would")

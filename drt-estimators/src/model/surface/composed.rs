@@ -2,7 +2,9 @@
 
 use drt_math::{Rgb, Vec3};
 
-use crate::model::surface::{At, Bsdf, BsdfGradient, Given, SpecularSample, Textured};
+use crate::model::surface::{
+    At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue, Textured,
+};
 
 /// What is asked of such a BSDF. Conventions are those of the methods of [`Bsdf`] of the same names; the normal is that of
 /// the side which the first direction is on, where the BSDF is in a two-sided one.
@@ -21,6 +23,10 @@ pub(super) trait Composed {
         _choice: f64,
         _given: Given,
     ) -> Option<SpecularSample> {
+        None
+    }
+
+    fn specular(&self, _at: At<'_>, _wo: Vec3, _wi: Vec3, _n: Vec3) -> Option<SpecularValue> {
         None
     }
 
@@ -66,6 +72,10 @@ impl Composed for Textured {
         given: Given,
     ) -> Option<SpecularSample> {
         self.at(at).sample_specular_at(at, from, n, choice, given)
+    }
+
+    fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        self.at(at).specular(at, wo, wi, n)
     }
 
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {

@@ -58,6 +58,7 @@ mod property;
 mod roughness_partner;
 mod shading_frame;
 mod smooth;
+mod specular;
 #[cfg(test)]
 pub(crate) mod tests;
 mod textured;
@@ -92,6 +93,7 @@ pub use crate::model::surface::property::{Property, SurfaceError};
 pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
 use crate::model::surface::shading_frame::frames_jump_on;
 pub use crate::model::surface::smooth::{Conductor, Dielectric, ThinDielectric};
+pub(crate) use crate::model::surface::specular::SpecularValue;
 pub use crate::model::surface::textured::Textured;
 use crate::model::texture::TexturePoint;
 

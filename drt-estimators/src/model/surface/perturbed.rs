@@ -3,7 +3,9 @@ use drt_math::{Frame, Rgb, Vec3, fm, vec3};
 use crate::model::surface::composed::Composed;
 use crate::model::surface::property::SurfaceError;
 use crate::model::surface::shading_frame::{by_coordinates, is_front, shading_frame};
-use crate::model::surface::{At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample};
+use crate::model::surface::{
+    At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
+};
 use crate::model::texture::{Texture, TexturePoint};
 
 /// A BSDF about other normals than those of its surface: Mitsuba's `normalmap` and `bumpmap`.
@@ -233,6 +235,15 @@ impl Composed for Perturbed {
             Given::Wi => self.shadowing(&facet, from).0,
         };
         Some(SpecularSample { weight: s.weight * shadowing, ..s })
+    }
+
+    fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        let Some(at) = at else { return self.bsdf.specular(None, wo, wi, n) };
+        let tilt = self.tilt(at, n);
+        let facet = self.seen_from(&tilt, wo);
+        let found = self.bsdf.specular(Some(&facet.at()), wo, wi, facet.normal)?;
+        let shadowing = if facet.sees(wi) { self.shadowing(&facet, wi).0 } else { 0.0 };
+        Some(found.scaled(Rgb::splat(shadowing), 1.0))
     }
 
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {

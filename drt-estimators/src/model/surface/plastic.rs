@@ -2,12 +2,13 @@ use core::f64::consts::FRAC_1_PI;
 
 use drt_math::{Dual, Frame, Real, Rgb, Vec3, warp};
 
-use crate::model::surface::SpecularSample;
 use crate::model::surface::angles::{Angles, Slopes};
 use crate::model::surface::coating::Coating;
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::microfacet::mirrored;
 use crate::model::surface::property::{Property, Slot, SurfaceError, nonnegative};
+use crate::model::surface::specular::same;
+use crate::model::surface::{BsdfParams, SpecularSample, SpecularValue};
 
 /// A diffuse base under a dielectric coating: Mitsuba's `plastic` and `roughplastic`; black from
 /// behind. Light that goes through the coating is scattered by the base and reflected back to it at the
@@ -172,6 +173,18 @@ impl Plastic {
             let weight = self.specular_reflectance * (fresnel / probability);
             SpecularSample { w: mirrored(from, n), weight, straight: false }
         })
+    }
+
+    pub(super) fn specular(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        let cos = n.dot(wo);
+        if !self.is_smooth() || cos <= 0.0 || !same(mirrored(wo, n), wi) {
+            return None;
+        }
+        let fresnel = dielectric_reflected(cos.min(1.0), self.coating.eta());
+        let specular_reflectance = Rgb::splat(fresnel);
+        let params = BsdfParams { specular_reflectance, ..BsdfParams::default() };
+        let value = self.specular_reflectance * fresnel;
+        Some(SpecularValue { value, params, probability: self.specular_choice(cos) })
     }
 
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {

@@ -1,12 +1,13 @@
 //! Smooth surfaces: mirrors, glass and thin glass. They scatter into single directions, which have no
 //! density; a walk draws them by [`Bsdf::sample_specular`](crate::surface::Bsdf::sample_specular).
 
-use drt_math::{Rgb, Vec3};
+use drt_math::{Dual, Real, Rgb, Vec3};
 
-use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
+use crate::model::surface::fresnel::{conductor_reflected, conductor_slopes, dielectric_reflected};
 use crate::model::surface::microfacet::{mirrored, refracted};
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
-use crate::model::surface::{Given, SpecularSample};
+use crate::model::surface::specular::same;
+use crate::model::surface::{BsdfParams, Given, SpecularSample, SpecularValue};
 
 /// A smooth metal: Mitsuba's `conductor`. Black from behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +86,28 @@ impl Conductor {
         })
     }
 
+    pub(super) fn specular(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        let cos = n.dot(wo);
+        if cos <= 0.0 || !same(mirrored(wo, n), wi) {
+            return None;
+        }
+        let SpecularSample { weight: value, .. } = self.sample(wo, n)?;
+        let of_index = |channel: usize| {
+            let [eta, k] = [self.eta, self.k].map(|index| index.to_array()[channel]);
+            let [_, by_eta, by_k] = conductor_slopes(cos, eta, k);
+            [conductor_reflected(cos, eta, k), by_eta, by_k]
+        };
+        let [r, g, b] = [0, 1, 2].map(of_index);
+        let [reflected, by_eta, by_k] = [0, 1, 2].map(|i| Rgb::new(r[i], g[i], b[i]));
+        let params = BsdfParams {
+            specular_reflectance: reflected,
+            eta: self.specular_reflectance * by_eta,
+            k: self.specular_reflectance * by_k,
+            ..BsdfParams::default()
+        };
+        Some(SpecularValue { value, params, probability: 1.0 })
+    }
+
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
             Property::Eta => Some(Slot::Color(&mut self.eta)),
@@ -133,6 +156,23 @@ impl Dielectric {
         Some(SpecularSample { w, weight: self.specular_transmittance * scale, straight: false })
     }
 
+    pub(super) fn specular(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        let cos = n.dot(wo);
+        let (n, eta) = if cos > 0.0 { (n, self.eta) } else { (-n, self.eta.recip()) };
+        let reflected = dielectric_reflected(cos.abs(), eta);
+        let mut params = BsdfParams::default();
+        if same(mirrored(wo, n), wi) {
+            params.specular_reflectance = Rgb::splat(reflected);
+            let value = self.specular_reflectance * reflected;
+            return Some(SpecularValue { value, params, probability: reflected });
+        }
+        refracted(wo, n, eta).filter(|(w, _)| same(*w, wi))?;
+        let through = (1.0 - reflected) / (eta * eta);
+        params.specular_transmittance = Rgb::splat(through);
+        let value = self.specular_transmittance * through;
+        Some(SpecularValue { value, params, probability: 1.0 - reflected })
+    }
+
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
             Property::Eta => Some(Slot::Scalar(&mut self.eta)),
@@ -150,9 +190,7 @@ impl Dielectric {
 impl ThinDielectric {
     /// The part of the light that comes back, at a cosine above 0.
     fn reflected(&self, cos: f64) -> f64 {
-        let once = dielectric_reflected(cos, self.eta);
-        // The sum of the light that leaves after 0, 1, 2 … turns in the pane.
-        if once < 1.0 { 2.0 * once / (1.0 + once) } else { 1.0 }
+        reflected_by_pane(cos, self.eta)
     }
 
     /// What goes through.
@@ -175,6 +213,25 @@ impl ThinDielectric {
         })
     }
 
+    pub(super) fn specular(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        let cos = n.dot(wo).abs().min(1.0);
+        let mut params = BsdfParams::default();
+        let reflected = reflected_by_pane(Dual::<f64, 1>::from(cos), Dual::variable(self.eta, 0));
+        let (part, by_eta) = (reflected.re, reflected.eps[0]);
+        if same(-wo, wi) {
+            params.specular_transmittance = Rgb::splat(1.0 - part);
+            params.eta = self.specular_transmittance * -by_eta;
+            let value = self.specular_transmittance * (1.0 - part);
+            return Some(SpecularValue { value, params, probability: 1.0 - part });
+        }
+        same(mirrored(wo, n), wi).then(|| {
+            params.specular_reflectance = Rgb::splat(part);
+            params.eta = self.specular_reflectance * by_eta;
+            let value = self.specular_reflectance * part;
+            SpecularValue { value, params, probability: part }
+        })
+    }
+
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
             Property::Eta => Some(Slot::Scalar(&mut self.eta)),
@@ -187,6 +244,13 @@ impl ThinDielectric {
     pub(super) fn validate(&self) -> Result<(), SurfaceError> {
         check(self.eta, self.specular_reflectance, self.specular_transmittance)
     }
+}
+
+/// The part of the light that comes back from a pane, at a cosine above 0.
+fn reflected_by_pane<T: Real>(cos: T, eta: T) -> T {
+    let once = dielectric_reflected(cos, eta);
+    // The sum of the light that leaves after 0, 1, 2 … turns in the pane.
+    if once.re() < 1.0 { once * 2.0 / (T::one() + once) } else { T::one() }
 }
 
 fn check(eta: f64, reflectance: Rgb, transmittance: Rgb) -> Result<(), SurfaceError> {

@@ -137,7 +137,9 @@ impl Session {
         tangents.check()?;
         let tangents = tangents.seen_by(settings.sensor);
         if let Some(name) = tangents.names.first() {
-            scene.refuse_derivatives(name, slides(scene, tangents.targets(), settings))?;
+            let moves = tangents.move_light() || !tangents.sensor.is_empty();
+            let slide = slides(scene, tangents.targets(), settings);
+            scene.refuse_derivatives(name, moves, slide)?;
             if tangents.move_light() {
                 scene.refuse_rims(name)?;
             }

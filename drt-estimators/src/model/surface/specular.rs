@@ -1,0 +1,86 @@
+//! Derivatives of what smooth surfaces scatter into single directions.
+//!
+//! A walk that draws one of the single directions of a surface, by probabilities P_i, has the weight V_i / P_i, of which P_i is no
+//! function of what is differentiated by. Parts i of a surface that share a direction are told apart by nothing that the walk
+//! leaves behind. Given the direction, the mean of ∂V_i / P_i over its parts is Σ ∂V_i / Σ P_i, which is what is taken: as
+//! unbiased, and of no more variance. Where the index of refraction turns the direction there is more to a derivative, which
+//! nothing here has.
+
+use drt_math::{Rgb, Vec3};
+
+use crate::model::surface::{At, Bsdf, BsdfParams};
+
+/// What a surface scatters from one direction into another, single one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SpecularValue {
+    /// The value V.
+    pub(crate) value: Rgb,
+    /// Its derivatives by the properties.
+    pub(crate) params: BsdfParams,
+    /// The probability of drawing the direction, given `wo`.
+    pub(crate) probability: f64,
+}
+
+impl SpecularValue {
+    /// So many times the value, drawn so many times as often.
+    pub(super) fn scaled(&self, value: Rgb, probability: f64) -> Self {
+        let mut params = BsdfParams::default();
+        params.scatter(&self.params, value);
+        Self { value: self.value * value, params, probability: self.probability * probability }
+    }
+
+    /// The derivatives of a walk's weight.
+    fn gradient(&self) -> BsdfParams {
+        let mut params = BsdfParams::default();
+        params.scatter(&self.params, Rgb::splat(self.probability.recip()));
+        params
+    }
+}
+
+/// True of a direction that was drawn as this one.
+pub(super) fn same(drawn: Vec3, w: Vec3) -> bool {
+    (drawn - w).max_abs() < 1e-9
+}
+
+impl Bsdf {
+    /// The derivatives of a walk's weight by the properties, where `wi` is a single direction that `wo` is scattered to.
+    #[inline]
+    pub(super) fn specular_gradient(
+        &self,
+        at: At<'_>,
+        wo: Vec3,
+        wi: Vec3,
+        n: Vec3,
+    ) -> Option<BsdfParams> {
+        match self {
+            Self::Null
+            | Self::Diffuse(_)
+            | Self::Phong(_)
+            | Self::RoughConductor(_)
+            | Self::RoughDielectric(_) => None,
+            _ => {
+                let found = self.specular(at, wo, wi, n)?;
+                (found.probability > 0.0).then(|| found.gradient())
+            }
+        }
+    }
+
+    /// What is scattered from `wo` into the single direction `wi`; `None` where it is none.
+    #[cold]
+    pub(crate) fn specular(
+        &self,
+        at: At<'_>,
+        wo: Vec3,
+        wi: Vec3,
+        n: Vec3,
+    ) -> Option<SpecularValue> {
+        let (bsdf, n) = self.facing(wo, n);
+        match bsdf {
+            Self::Plastic(b) => b.specular(wo, wi, n),
+            Self::Conductor(b) => b.specular(wo, wi, n),
+            Self::Dielectric(b) => b.specular(wo, wi, n),
+            Self::ThinDielectric(b) => b.specular(wo, wi, n),
+            _ => bsdf.composed(|b| b.specular(at, wo, wi, n)).flatten(),
+        }
+    }
+}
