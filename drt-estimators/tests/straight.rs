@@ -2,12 +2,12 @@
 
 mod common;
 
-use common::{Build, diffuse, placed};
+use common::{Build, changes, diffuse, parameter, placed};
 use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, Mask, ThinDielectric};
-use drt_estimators::{Estimate, PathSampling, Scene, Session, Settings, Unattended};
+use drt_estimators::{Estimate, EstimatorKind, PathSampling, Scene, Session, Settings, Unattended};
 use drt_geom::procedural::rectangle;
-use drt_math::{Rgb, Vec3, vec3};
+use drt_math::{Rgb, ValueChange, Vec3, vec3};
 
 const OPACITY: f64 = 0.3;
 
@@ -100,4 +100,27 @@ fn masks_may_cast_shadows() {
     let both = Settings { sampling: PathSampling::Bidirectional, ..Settings::default() };
     let refused = Session::new(&scene, &[], &both).err().expect("refused").to_string();
     assert!(refused.contains("`roof`") && refused.contains("straight"), "{refused}");
+}
+
+#[test]
+fn what_goes_through_a_mask_falls_with_its_opacity() {
+    let lamp = Emitter::Point { position: vec3(0.4, 0.2, 4.0), intensity: Rgb::splat(9.0) };
+    let free = image(&shaded(None, lamp.clone(), 2));
+    let scene = shaded(Some(mask()), lamp, 2);
+    let fades =
+        [parameter("fades", 0.0, vec![changes("between", "opacity", ValueChange::Add(Rgb::ONE))])];
+    let derivative = |estimator| {
+        let settings = Settings { threads: 1, estimator, ..Settings::default() };
+        let mut session = Session::new(&scene, &fades, &settings).expect("a scene");
+        assert!(session.run(256, &Unattended));
+        session.rendering().derivatives[0].total.total
+    };
+    let by_path = derivative(EstimatorKind::PathSpace);
+    assert!(z(&by_path, -1.0, &free).abs() < 4.0, "{by_path:?} {free:?}");
+    // Planted: the wrong way.
+    assert!(z(&by_path, 1.0, &free).abs() > 10.0);
+    // Nothing moves, so that all estimators are one.
+    for estimator in [EstimatorKind::Radiative, EstimatorKind::Warped] {
+        assert_eq!(derivative(estimator), by_path);
+    }
 }

@@ -5,9 +5,10 @@ mod common;
 
 use common::pairing::{pair, targets};
 use common::*;
+use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
-use drt_estimators::surface::{Anisotropic, Bsdf, Principled};
+use drt_estimators::surface::{Anisotropic, Bsdf, Conductor, Dielectric, Mask, Principled};
 use drt_estimators::{
     EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Unattended, gradient,
 };
@@ -390,4 +391,44 @@ fn rays_carry_back_exactly() {
     exactly("floor", "floor", wobble(&scene, "floor", 1));
     exactly("lamp", "lamp", wobble(&scene, "lamp", 1));
     exactly("ball", "ball", wobble(&scene, "ball", 1));
+}
+
+#[test]
+fn past_smooth_surfaces_and_masks() {
+    let mut build = Build::default();
+    let grey = build.bsdf("grey", diffuse(0.5, 0.4, 0.3));
+    let silver = build.bsdf(
+        "silver",
+        Bsdf::Conductor(Conductor { eta: Rgb::ONE, k: Rgb::splat(2.0), ..Conductor::default() }),
+    );
+    let glass = build.bsdf("glass", Bsdf::Dielectric(Dielectric::default()));
+    let mask = Mask { bsdf: diffuse(0.6, 0.5, 0.4), opacity: 0.4 };
+    let mask = build.bsdf("mask", Bsdf::Mask(mask.into()));
+    let sheet =
+        |size: f64, angle: f64, at| placed(procedural::rectangle(), Vec3::splat(size), angle, at);
+    build.shape("floor", sheet(3.0, 0.0, Vec3::ZERO), grey);
+    build.shape("mirror", sheet(0.5, 0.4, vec3(0.4, 0.3, 0.3)), silver);
+    build.shape(
+        "ball",
+        placed(procedural::uv_sphere(6), Vec3::splat(0.3), 0.0, vec3(-0.4, 0.2, 0.4)),
+        glass,
+    );
+    build.shape("veil", sheet(0.6, 0.2, vec3(0.0, -0.3, 0.9)), mask);
+    let lamp = Emitter::Point { position: vec3(0.4, 0.2, 4.0), intensity: Rgb::splat(9.0) };
+    build.light("lamp", lamp);
+    build.light("sky", Emitter::Constant { radiance: Rgb::splat(0.3) });
+    let scene = build.camera(vec3(0.3, 0.2, 2.5), Vec3::ZERO, 5);
+    for (target, name) in [
+        ("silver", "k"),
+        ("silver", "specular_reflectance"),
+        ("glass", "specular_transmittance"),
+        ("mask", "opacity"),
+        ("mask", "reflectance"),
+        ("floor", "reflectance"),
+        ("lamp", "intensity"),
+    ] {
+        let amount = if name == "opacity" { Rgb::ONE } else { Rgb::new(1.0, 0.5, -0.5) };
+        let effects = vec![changes(target, name, ValueChange::Add(amount))];
+        by_one_estimator(&format!("{target}, {name}"), &scene, effects, &settings(), 64, EXACT);
+    }
 }

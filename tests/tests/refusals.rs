@@ -6,9 +6,10 @@ use drt_estimators::surface::{
     Principled, PrincipledThin, Property, Textured, ThinDielectric,
 };
 use drt_estimators::texture::{Bitmap, Texture, UvMap};
-use drt_estimators::{EstimatorKind, Scene, Session, Settings};
-use drt_math::Rgb;
-use drt_tests::matrix::{Stage, lenses, materials, textures};
+use drt_estimators::{EstimatorKind, PathSampling, Scene, Session, Settings};
+use drt_math::{Rgb, ValueChange};
+use drt_tests::matrix::{Cell, Stage, lenses, materials, still, textures};
+use drt_tests::motion::changes;
 
 /// What a session says of the stage's parameter of a name, if it refuses it.
 fn refusal(scene: &Scene, stage: &Stage, name: &str, estimator: EstimatorKind) -> Option<String> {
@@ -77,6 +78,37 @@ fn numbers_without_derivatives() {
             assert_eq!(refusal(&scene, &stage, "roughness", estimator), None);
         }
     }
+}
+
+#[test]
+fn light_that_would_turn_or_go_nowhere() {
+    let mirrors = still::mirrors().unwrap();
+    let veiled = still::veiled().unwrap();
+    let with = |scene: &Scene, target, property| {
+        let cell = Cell::new(property, [changes(target, property, ValueChange::Add(Rgb::ONE))]);
+        Stage::new("still", scene.clone(), vec![cell])
+    };
+    let bends = with(&mirrors.scene, "glass", "eta");
+    let mut whole = veiled.scene.clone();
+    let card = whole.shapes.iter().position(|s| s.id.as_deref() == Some("card")).unwrap();
+    let bsdf = whole.shapes[card].bsdf;
+    let Bsdf::Mask(mask) = &mut whole.bsdfs[bsdf].item else { panic!("the card is masked") };
+    mask.opacity = 1.0;
+    let whole = with(&whole, "card", "opacity");
+    for estimator in [PathSpace, Radiative, Warped] {
+        let message = refusal(&bends.scene, &bends, "eta", estimator);
+        assert_refused(message, &["eta", "dielectric", "turns light", "finite differences"]);
+        let message = refusal(&whole.scene, &whole, "opacity", estimator);
+        assert_refused(message, &["opacity", "mask", "at 0 and 1", "finite differences"]);
+    }
+    // Paths from both ends do not know what they owe to smooth surfaces.
+    let settings = Settings { sampling: PathSampling::Bidirectional, ..Settings::default() };
+    let stage = with(&mirrors.scene, "wall", "reflectance");
+    let mut scene = stage.scene.clone();
+    scene.shapes.retain(|s| s.id.as_deref() != Some("pane"));
+    let parameters = [stage.cells[0].parameter.clone()];
+    let message = Session::new(&scene, &parameters, &settings).err().map(|e| e.to_string());
+    assert_refused(message, &["sampling", "mirror", "unidirectional"]);
 }
 
 #[test]

@@ -599,12 +599,11 @@ mod tests {
         assert!(scene.refuse_derivatives("spin", true, true).is_ok());
         let shape = scene.shapes.len() - 1;
         scene.shapes[shape].bsdf = scene.bsdfs.len() - 1;
-        let parameters = [drt_motion::Parameter {
-            name: "spin".into(),
-            value: 0.0,
-            effects: alloc::vec::Vec::new(),
-        }];
         let name = scene.name_of(Target::Shape(shape));
+        let spin = drt_motion::GeometryChange::Rotate { axis: Vec3::Y, pivot: Vec3::ZERO };
+        let change = drt_motion::Change::Geometry(spin);
+        let effects = alloc::vec![drt_motion::Effect { target: name.clone(), change }];
+        let parameters = [drt_motion::Parameter { name: "spin".into(), value: 0.0, effects }];
         let filter = Filter::new(FilterKind::BOX).expect("a filter");
         let at = [Vec3::Z * 5.0, Vec3::ZERO, Vec3::Y];
         let sensor = Sensor::look_at(at, Lens::default(), [2, 2], filter).expect("a camera");

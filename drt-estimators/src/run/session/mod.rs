@@ -133,7 +133,8 @@ impl Session {
         settings: &Settings,
         kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
-        settings.check(scene, tangents.targets().next().is_some())?;
+        let derivatives = !tangents.names.is_empty();
+        settings.check(scene, derivatives)?;
         tangents.check()?;
         let tangents = tangents.seen_by(settings.sensor);
         if let Some(name) = tangents.names.first() {
@@ -147,7 +148,6 @@ impl Session {
         let depth = settings.max_depth.within(scene.integrator.max_depth);
         let mut world =
             World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, kept)?;
-        let derivatives = tangents.targets().next().is_some();
         let (settings, sampling) = choice::chosen(&world, scene, settings, derivatives, kept)?;
         let settings = &settings;
         let mut components = Vec::new();
