@@ -424,8 +424,8 @@ fn past_smooth_surfaces_and_masks() {
         ("glass", "specular_transmittance"),
         ("mask", "opacity"),
         ("mask", "reflectance"),
-        ("floor", "reflectance"),
-        ("lamp", "intensity"),
+        ("grey", "reflectance"),
+        ("sky", "radiance"),
     ] {
         let amount = if name == "opacity" { Rgb::ONE } else { Rgb::new(1.0, 0.5, -0.5) };
         let effects = vec![changes(target, name, ValueChange::Add(amount))];

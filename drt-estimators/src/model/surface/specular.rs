@@ -52,7 +52,7 @@ impl Bsdf {
         wi: Vec3,
         n: Vec3,
     ) -> Option<BsdfParams> {
-        match self {
+        match self.facing(wo, n).0 {
             Self::Null
             | Self::Diffuse(_)
             | Self::Phong(_)
