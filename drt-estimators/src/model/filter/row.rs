@@ -1,4 +1,7 @@
-use drt_math::fm;
+use alloc::vec::Vec;
+use core::ops::Range;
+
+use drt_math::{Real, fm};
 
 use crate::model::filter::{Filter, FilterKind};
 
@@ -35,10 +38,71 @@ impl Filter {
     }
 }
 
+impl Filter {
+    /// Fills in the factors p of one axis for the pixels `reached`, those whose supports hold the coordinate `at`. Returns the density
+    /// there of the [samples](Filter::sample) of these pixels together, as they are drawn where derivatives are wanted or not; without
+    /// either, 1.
+    pub(crate) fn weights(
+        &self,
+        at: f64,
+        reached: Range<u32>,
+        sampled: Option<bool>,
+        weights: &mut Vec<f64>,
+    ) -> f64 {
+        weights.clear();
+        weights.resize(reached.len(), 0.0);
+        let density = sampled.map(|derivative| {
+            let share = self.slope_share(derivative);
+            [1.0 - share, 0.5 * share / self.peak]
+        });
+        let (scale, start) = (self.scale, at - (f64::from(reached.start) + 0.5));
+        match self.kind {
+            FilterKind::Box { .. } => self.fill(start, density, weights, |_| [scale, scale, 0.0]),
+            FilterKind::Tent { radius } => self.fill(start, density, weights, |x| {
+                let p = scale * (1.0 - Real::abs(x) / radius);
+                [p, p, scale / radius]
+            }),
+            FilterKind::Gaussian { radius, std_dev } => {
+                let mut row = self.row(at, reached.start);
+                let (even, knots) = (0.5 / radius, self.half.segments() / radius);
+                let slope = scale / (std_dev * std_dev);
+                self.fill(start, density, weights, |x| {
+                    let (x, bell) = (Real::abs(x), row.bell);
+                    row.step();
+                    [scale * (bell - 1.0), even * self.half.pdf_at(x * knots), x * slope * bell]
+                })
+            }
+        }
+    }
+
+    /// Fills in what `factors` says of offsets: p, the density close to it, and the steepness |p'|.
+    #[inline(always)]
+    fn fill(
+        &self,
+        mut offset: f64,
+        density: Option<[f64; 2]>,
+        weights: &mut [f64],
+        mut factors: impl FnMut(f64) -> [f64; 3],
+    ) -> f64 {
+        let (sampled, [even, steep]) = (density.is_some(), density.unwrap_or_default());
+        let mut sum = 0.0;
+        for weight in weights {
+            let [p, profile, slope] = factors(offset);
+            if -self.radius <= offset && offset < self.radius {
+                *weight = p;
+                sum += even * profile + steep * slope;
+            }
+            offset -= 1.0;
+        }
+        if sampled { sum } else { 1.0 }
+    }
+}
+
 impl FilterRow<'_> {
-    /// The offset of the point from the centre of the next pixel.
-    pub(crate) fn offset(&self) -> f64 {
-        self.offset
+    fn step(&mut self) {
+        self.offset -= 1.0;
+        self.bell *= self.ratio;
+        self.ratio *= self.filter.decay;
     }
 }
 
@@ -52,9 +116,7 @@ impl Iterator for FilterRow<'_> {
             FilterKind::Gaussian { .. } => filter.with_slope(self.offset, self.bell - 1.0),
             _ => filter.axis_with_slope(self.offset),
         };
-        self.offset -= 1.0;
-        self.bell *= self.ratio;
-        self.ratio *= filter.decay;
+        self.step();
         Some(factors)
     }
 }

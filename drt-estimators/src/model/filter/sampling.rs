@@ -55,12 +55,6 @@ impl Filter {
         offset.map(pdf).iter().product()
     }
 
-    /// The factor of one axis of the density of [`sample`](Self::sample), from p and its derivative there.
-    #[inline]
-    pub(crate) fn axis_density(&self, x: f64, p: (f64, f64), derivative: bool) -> f64 {
-        self.pdf_axis(x, p.0, p.1, self.slope_share(derivative))
-    }
-
     /// Draws a coordinate evenly from the unit interval of pixel `i` out of a row of `n`; with its density. What
     /// filters see before the first interval is drawn along with it, in proportion to the first pixel's filter: no
     /// other counts for more there. So it is behind the last one.
@@ -108,7 +102,7 @@ impl Filter {
     }
 
     /// A constant profile has no slope to sample.
-    fn slope_share(&self, derivative: bool) -> f64 {
+    pub(super) fn slope_share(&self, derivative: bool) -> f64 {
         match self.kind {
             FilterKind::Box { .. } => 0.0,
             _ if derivative => SLOPE_SHARE,
@@ -186,6 +180,11 @@ impl HalfProfile {
         (i as f64 + t) / (last + 1) as f64
     }
 
+    /// How many segments there are.
+    pub(super) fn segments(&self) -> f64 {
+        (self.knots.len() - 1) as f64
+    }
+
     /// The probability of everything before `x`.
     fn distribution(&self, x: f64) -> f64 {
         let n = (self.knots.len() - 1) as f64;
@@ -195,8 +194,13 @@ impl HalfProfile {
     }
 
     fn pdf(&self, x: f64) -> f64 {
+        self.pdf_at(x * (self.knots.len() - 1) as f64)
+    }
+
+    /// At a number of knots from the start.
+    #[inline]
+    pub(super) fn pdf_at(&self, at: f64) -> f64 {
         let last = self.knots.len() - 2;
-        let at = x * (last + 1) as f64;
         let i = (at as u32 as usize).min(last);
         let t = at - i as f64;
         self.knots[i] + (self.knots[i + 1] - self.knots[i]) * t

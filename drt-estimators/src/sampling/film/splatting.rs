@@ -131,26 +131,17 @@ impl Taps {
         let at = splat.point[axis];
         let reached = raster.filter.reached(at, raster.size[axis]);
         self.first = reached.start;
-        self.pixels.clear();
-        self.blocks.clear();
-        let derivative = match splat.density {
+        let sampled = match splat.density {
             SplatDensity::Known => None,
             SplatDensity::OfFilters { derivative } => Some(derivative),
         };
-        self.density = if derivative.is_some() { 0.0 } else { 1.0 };
-        let mut row = raster.filter.row(at, self.first);
-        for i in reached {
-            let offset = row.offset();
-            let Some(factors) = row.next() else { break };
-            let weight = factors.0;
-            if let Some(derivative) = derivative {
-                self.density += raster.filter.axis_density(offset, factors, derivative);
-            }
-            self.pixels.push(weight);
-            let block = raster.blocks[axis][i as usize];
+        self.density = raster.filter.weights(at, reached, sampled, &mut self.pixels);
+        self.blocks.clear();
+        let blocks = raster.blocks[axis].get(self.first as usize..).unwrap_or_default();
+        for (weight, block) in self.pixels.iter().zip(blocks) {
             match self.blocks.last_mut() {
-                Some((last, sum)) if *last == block => *sum += weight,
-                _ => self.blocks.push((block, weight)),
+                Some((last, sum)) if last == block => *sum += weight,
+                _ => self.blocks.push((*block, *weight)),
             }
         }
     }
