@@ -253,11 +253,8 @@ fn samples_of_a_row_are_shared() {
                             Some(derivative) => {
                                 let at =
                                     f64::from(i) + 0.5 + f.sample([u, 0.5], derivative).offset[0];
-                                let density = |j| {
-                                    let offset = at - (f64::from(j) + 0.5);
-                                    f.axis_density(offset, f.axis_with_slope(offset), derivative)
-                                };
-                                (at, (0..n).map(density).sum())
+                                let pixels = f.reached(at, n);
+                                (at, f.weights(at, pixels, how, &mut Vec::new()))
                             }
                         };
                         for (j, v) in (0..).zip(&mut values) {
