@@ -22,7 +22,7 @@ pub use crate::model::emitter::emission::{Emission, EmitterGradient, EmitterTang
 pub use crate::model::emitter::environment::EnvironmentMap;
 pub use crate::model::emitter::incident::Incident;
 pub use crate::model::emitter::slide::Slide;
-use crate::model::texture::{TexelChange, TexelError, TexelTangent, Texture};
+use crate::model::texture::{Footprint, TexelChange, TexelError, TexelTangent, Texture};
 
 /// An emitter that cannot be used.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -288,6 +288,7 @@ impl Emitter {
         match self {
             Self::TexturedArea { texture, .. } => Some(texture.size()).filter(|s| *s != [0; 2]),
             Self::Envmap { map, .. } => Some(map.size()),
+            Self::Projector { slide, .. } => slide.texels(),
             _ => None,
         }
     }
@@ -306,9 +307,17 @@ impl Emitter {
         let rates = match self {
             Self::TexturedArea { texture, .. } => texture.change(&change)?,
             Self::Envmap { map, .. } => Arc::make_mut(map).change(&change)?,
+            Self::Projector { slide, .. } => Arc::make_mut(slide).change(&change)?,
             _ => TexelTangent::default(),
         };
         Ok((change, rates))
+    }
+
+    /// The texels of a spot or projector whose light goes along a unit direction, and the intensity of what they hold.
+    pub(crate) fn footprint(&self, flow: Vec3) -> Option<(Footprint, Rgb)> {
+        let Self::Projector { ref slide, ref frame, strength, .. } = *self else { return None };
+        let (footprint, factor) = slide.footprint(frame.transpose_mul(flow))?;
+        Some((footprint, strength * factor))
     }
 
     /// The radiance of an area emitter, the mean of a texture's.

@@ -181,6 +181,14 @@ pub fn thrown() -> Result<Stage> {
         .scene;
     let cells = vec![
         Cell::new("spot", [raise("spot", "intensity", 1.0)]).samples(512),
+        Cell::new("a texel of the spot", [texel("spot", "intensity", Texels::One([1, 1]))])
+            .samples(512),
+        Cell::new(
+            "a texel of the projector",
+            [texel("projector", "irradiance", Texels::One([2, 1]))],
+        )
+        .samples(512)
+        .representative(),
         Cell::new("spot moves", [translate("spot", vec3(0.3, 0.2, -0.4))])
             .samples(1024)
             .representative(),

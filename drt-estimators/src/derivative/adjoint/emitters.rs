@@ -151,7 +151,13 @@ impl Differentiator<'_> {
     ) {
         let item = &self.world.scene.emitters[light.emitter].item.emitter;
         let emission = item.emission(-light.w);
-        let per_value = (per_value / (path.length * path.length)).to_array();
+        let per_value = per_value / (path.length * path.length);
+        if sink.active().emitters[light.emitter]
+            && let Some((footprint, intensity)) = item.footprint(-light.w)
+        {
+            sink.texels(TextureUse::Emitter(light.emitter), &footprint, per_value * intensity);
+        }
+        let per_value = per_value.to_array();
         let mut gradients = [EmitterGradient::default(); 3];
         let mut to_flow = [Vec3::ZERO; 3];
         for c in 0..3 {

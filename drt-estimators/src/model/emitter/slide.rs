@@ -4,7 +4,7 @@ use core::f64::consts::PI;
 use drt_math::{Affine, Mat3, Real, Rgb, RgbVec, Vec3, fm, vec3};
 
 use crate::model::emitter::emission::Falloff;
-use crate::model::texture::Texture;
+use crate::model::texture::{Footprint, TexelChange, TexelError, TexelTangent, Texture};
 
 /// A picture that a point throws: what makes a `projector` or a `spot` of it that has a texture. Both look along +z of a frame.
 ///
@@ -27,6 +27,18 @@ pub struct Slide {
     half: [f64; 2],
     /// Cutoff angle and beam width of a spot, in radians.
     beam: Option<[f64; 2]>,
+}
+
+/// Where light of a slide comes from.
+struct Place {
+    /// Half a picture towards positive coordinates, or negative ones.
+    sign: f64,
+    /// The direction at distance one.
+    slope: [f64; 2],
+    uv: [f64; 2],
+    /// Intensity per strength of white, and its derivative by the direction.
+    factor: f64,
+    by_direction: Vec3,
 }
 
 impl Slide {
@@ -83,36 +95,57 @@ impl Slide {
         }
     }
 
-    /// The intensity per strength along a unit direction of the frame, and its gradient by that.
-    pub(super) fn towards(&self, d: Vec3) -> (Rgb, RgbVec) {
-        let none = (Rgb::ZERO, RgbVec::ZERO);
+    /// Where the light along a unit direction of the frame comes from.
+    fn place(&self, d: Vec3) -> Option<Place> {
         if d.z <= 0.0 {
-            return none;
+            return None;
         }
         let sign = if self.is_spot() { 0.5 } else { -0.5 };
-        let [x, y] = [d.x, d.y].map(|c| c / d.z);
-        let uv = [0.5 + sign * x / self.half[0], 0.5 + sign * y / self.half[1]];
-        let inside = uv.iter().all(|c| (0.0..=1.0).contains(c));
-        let falloff = match self.beam {
-            None if inside => None,
-            None => return none,
-            Some([cutoff, beam]) => Some(Falloff::new(Vec3::Z, d, cutoff, beam)),
-        };
-        let (value, [by_u, by_v]) = match &self.texture {
-            None => (Rgb::ONE, [Rgb::ZERO; 2]),
-            Some(t) => (t.at(uv), t.slopes(uv)),
-        };
-        let u = vec3(1.0, 0.0, -x) * (sign / (self.half[0] * d.z));
-        let v = vec3(0.0, 1.0, -y) * (sign / (self.half[1] * d.z));
-        let (factor, slope) = match falloff {
-            Some(f) => (f.value, f.flow),
-            None => {
+        let slope = [d.x, d.y].map(|c| c / d.z);
+        let uv = [0.5 + sign * slope[0] / self.half[0], 0.5 + sign * slope[1] / self.half[1]];
+        let (factor, by_direction) = match self.beam {
+            Some([cutoff, beam]) => {
+                let falloff = Falloff::new(Vec3::Z, d, cutoff, beam);
+                (falloff.value, falloff.flow)
+            }
+            None if uv.iter().all(|c| (0.0..=1.0).contains(c)) => {
                 let factor = PI / (d.z * d.z * d.z);
                 (factor, Vec3::Z * (-3.0 * factor / d.z))
             }
+            None => return None,
         };
-        let gradient = (by_u * factor).outer(u) + (by_v * factor).outer(v) + value.outer(slope);
+        Some(Place { sign, slope, uv, factor, by_direction })
+    }
+
+    /// The intensity per strength along a unit direction of the frame, and its gradient by that.
+    pub(super) fn towards(&self, d: Vec3) -> (Rgb, RgbVec) {
+        let Some(at) = self.place(d) else { return (Rgb::ZERO, RgbVec::ZERO) };
+        let (value, [by_u, by_v]) = match &self.texture {
+            None => (Rgb::ONE, [Rgb::ZERO; 2]),
+            Some(t) => (t.at(at.uv), t.slopes(at.uv)),
+        };
+        let Place { sign, slope: [x, y], factor, by_direction, .. } = at;
+        let u = vec3(1.0, 0.0, -x) * (sign / (self.half[0] * d.z));
+        let v = vec3(0.0, 1.0, -y) * (sign / (self.half[1] * d.z));
+        let gradient =
+            (by_u * factor).outer(u) + (by_v * factor).outer(v) + value.outer(by_direction);
         (value * factor, gradient)
+    }
+
+    /// Columns and rows of texels, where there are such.
+    pub(super) fn texels(&self) -> Option<[u32; 2]> {
+        self.texture.as_ref().map(Texture::size).filter(|size| *size != [0; 2])
+    }
+
+    /// Makes a change of texels, whose rates it returns.
+    pub(super) fn change(&mut self, change: &TexelChange) -> Result<TexelTangent, TexelError> {
+        self.texture.as_mut().map_or_else(|| Ok(TexelTangent::default()), |t| t.change(change))
+    }
+
+    /// The texels whose light goes along a unit direction of the frame, and the intensity per strength of what they hold.
+    pub(super) fn footprint(&self, d: Vec3) -> Option<(Footprint, f64)> {
+        let at = self.place(d)?;
+        Some((self.texture.as_ref()?.footprint(at.uv)?, at.factor))
     }
 
     /// Integral over all directions of the intensity per strength, about: of a mean texture.
