@@ -8,7 +8,7 @@ use common::*;
 use drt_estimators::emitter::{Emitter, Slide};
 use drt_estimators::texture::{Bitmap, Texture};
 use drt_estimators::{
-    EstimatorKind, Scene, Session, Settings, Unattended, agreement, finite_differences,
+    EstimatorKind, Scene, Session, Settings, Unattended, agreement, finite_differences, gradient,
 };
 use drt_geom::procedural;
 use drt_math::{Mat3, Rgb, Rng, Vec3, vec3};
@@ -96,4 +96,33 @@ fn light_that_jumps_is_refused_by_name() {
     let ball = [parameter("ball", 0.0, vec![moves("ball", shift())])];
     let message = session(&ball, &sharp).expect_err("refused").to_string();
     assert!(message.contains("spot: its light is discontinuous"), "{message}");
+}
+
+/// A texel's part of the image, and the gradient of the image's sum by all texels.
+#[test]
+fn texels_in_reverse() {
+    for (slide, name) in [
+        (Slide::projector(Some(picture(0.0)), [0.7, 0.5]), "irradiance"),
+        (Slide::spot(picture(1.0), 0.6, 0.2), "intensity"),
+    ] {
+        let scene = scene(slide.expect("a picture"));
+        let settings = Settings { guiding: false, ..Settings::default() };
+        let texel = changes_texel("lamp", name, Some([2, 1]), grey(1.0));
+        // Reverse mode takes samples for a lamp that moves as well.
+        let own = [parameter("texel", 0.0, vec![texel]), parameters(name).remove(1)];
+        let forward = &rendered(&scene, &own, &settings, 16).derivatives[0].total.pixels;
+        let forward = forward.iter().fold(Rgb::ZERO, |sum, p| sum + p.mean);
+        let adjoint = vec![Rgb::ONE; pixels(&scene)];
+        let lamp = [scene.find("lamp").expect("a lamp")];
+        let g = gradient(&scene, &lamp, &settings, 16, &adjoint, &Unattended).expect("a gradient");
+        let of_texels = g.emitter_texels.iter().flatten().next().expect("texels").values();
+        let found = of_texels[6 + 2];
+        assert!((found - forward).max_abs() < 1e-9 * forward.max_abs(), "{found:?} {forward:?}");
+        assert!(forward.max_abs() > 1e-3 && of_texels.len() == 30);
+    }
+}
+
+fn pixels(scene: &Scene) -> usize {
+    let [w, h] = scene.sensors[0].item.sensor.film();
+    (w * h) as usize
 }
