@@ -23,8 +23,8 @@ KINDS = ["path-space", "radiative"]
 def cases(names):
     for job in sorted(ROOT.glob("examples/*/job.toml")):
         name = job.parent.name
-        # The mesh of this one has to be fetched.
-        if name == "bunny" or (names and name not in names):
+        # Meshes of these have to be fetched or made.
+        if name in ("bunny", "python") or (names and name not in names):
             continue
         yield f"{name} render", job, ["render"], []
         for kind in KINDS:
