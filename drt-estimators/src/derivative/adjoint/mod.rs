@@ -390,7 +390,9 @@ impl<'w> Differentiator<'w> {
                     let moving = ray_moves || moves(v, sink.active());
                     turned_wholly +=
                         self.segment(&path, Far::Vertex(v, here), moving, weight, start, sink);
-                    here.u += self.by_film(v, film.u, sink.active());
+                    if parallel {
+                        here.u += self.by_film(v, film.u, sink.active());
+                    }
                 } else {
                     let free = weight * (1.0 - phi);
                     turned = self.segment(&path, Far::Direction, ray_moves, free, there, sink);
@@ -629,8 +631,11 @@ fn send_material<S: AdjointSink>(
 ) {
     let bsdf = world.scene.shapes[point.shape as usize].bsdf;
     sink.bsdf(bsdf, params, adjoint);
-    let at = world.texture_point(point);
-    world.scene.bsdfs[bsdf].item.lookups(&at, |property, footprint| {
+    let item = &world.scene.bsdfs[bsdf].item;
+    if item.textured_part().is_none() {
+        return;
+    }
+    item.lookups(&world.texture_point(point), |property, footprint| {
         let adjoint = params.get(property) * adjoint;
         if !adjoint.is_zero() {
             sink.texels(TextureUse::Bsdf(bsdf, property), footprint, adjoint);

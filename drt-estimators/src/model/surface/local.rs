@@ -66,7 +66,7 @@ impl LocalBsdf<'_> {
 
     /// The value with its derivatives, and that by the geometric normal. Of a single direction only the derivatives by the
     /// material, of the weight that [`Self::sample_specular`] gives it.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn gradient(&self, wo: Vec3, wi: Vec3) -> (BsdfGradient, RgbVec) {
         if let Some(params) = self.bsdf.specular_gradient(self.at.as_ref(), wo, wi, self.ns) {
             return (BsdfGradient { params, ..BsdfGradient::default() }, RgbVec::ZERO);

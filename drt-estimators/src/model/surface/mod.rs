@@ -259,7 +259,7 @@ impl Bsdf {
         self.gradient_at(None, wo, wi, n)
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn gradient_at(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
         let (bsdf, facing) = self.facing(wo, n);
         let mut gradient = match_model!(
