@@ -172,9 +172,15 @@ pub(super) fn filter(e: &Element) -> Result<Filter, CliError> {
         "box" => FilterKind::BOX,
         "tent" => FilterKind::Tent { radius: p.float("radius")?.unwrap_or(1.0) },
         "gaussian" => FilterKind::gaussian(p.float("stddev")?.unwrap_or(0.5)),
+        "mitchell" => {
+            let parameter = |name| Ok::<_, CliError>(p.float(name)?.unwrap_or(1.0 / 3.0));
+            FilterKind::Mitchell { b: parameter("B")?, c: parameter("C")? }
+        }
+        "catmullrom" => FilterKind::CATMULL_ROM,
+        "lanczos" => FilterKind::Lanczos { lobes: p.integer_in("lobes", 1..=256)?.unwrap_or(3) },
         other => {
             return Err(e.error(format!(
-                "the filter type `{other}` is not supported; expected box, tent or gaussian"
+                "the filter type `{other}` is not supported; expected box, tent, gaussian, mitchell, catmullrom or lanczos"
             )));
         }
     };

@@ -2,6 +2,7 @@
 
 mod row;
 mod sampling;
+mod signed;
 #[cfg(test)]
 mod tests;
 
@@ -37,6 +38,19 @@ pub enum FilterKind {
         /// Standard deviation before the cut.
         std_dev: f64,
     },
+    /// The cubic splines of Mitchell and Netravali (1988, equation 8) on [-2, 2]. They sharpen: parts are negative.
+    Mitchell {
+        /// Their parameter B, below 3.
+        b: f64,
+        /// Their parameter C.
+        c: f64,
+    },
+    /// A sinc, windowed by the middle of a wider one: `sinc(x) sinc(x / lobes)` with `sinc(x) = sin(pi x) / (pi x)`.
+    /// Every other lobe is negative.
+    Lanczos {
+        /// Half width, and the number of lobes to a side.
+        lobes: u32,
+    },
 }
 
 impl FilterKind {
@@ -46,6 +60,12 @@ impl FilterKind {
     pub const TENT: Self = Self::Tent { radius: 1.0 };
     /// Mitsuba's default `gaussian`.
     pub const GAUSSIAN: Self = Self::gaussian(0.5);
+    /// Mitsuba's default `mitchell`.
+    pub const MITCHELL: Self = Self::Mitchell { b: 1.0 / 3.0, c: 1.0 / 3.0 };
+    /// Mitsuba's `catmullrom`.
+    pub const CATMULL_ROM: Self = Self::Mitchell { b: 0.0, c: 0.5 };
+    /// Mitsuba's default `lanczos`.
+    pub const LANCZOS: Self = Self::Lanczos { lobes: 3 };
 
     /// Mitsuba's `gaussian` of another standard deviation, cut at four of them.
     #[must_use]
@@ -89,9 +109,22 @@ pub enum FilterError {
         /// Standard deviation in pixels.
         std_dev: f64,
     },
+    /// Splines that are not positive at the centre.
+    #[error(
+        "the mitchell filter's parameters are B = {b}, C = {c}; B must be below 3 and both finite"
+    )]
+    Spline {
+        /// The parameter B.
+        b: f64,
+        /// The parameter C.
+        c: f64,
+    },
 }
 
 /// A separable filter P(x, y) = p(x) p(y) with unit integral over the plane, in pixel units.
+///
+/// Where P is negative, image points are drawn in proportion to |P| + |P'| / 8 along each axis: P alone would leave the
+/// slope of the filter unbounded where it crosses zero.
 ///
 /// Offsets are image point minus pixel centre. P is per square pixel; to integrate over the image
 /// plane at unit distance it is divided by the squared pixel size there, as
@@ -116,6 +149,10 @@ impl Filter {
     /// Segments that stand for half a Gaussian when sampling: the density is within 2·10⁻³ of a
     /// filter cut at four standard deviations in its inner half.
     const GAUSSIAN_SEGMENTS: usize = 64;
+    /// The same, of a pixel of a filter with negative parts.
+    const SEGMENTS_OF_A_LOBE: usize = 64;
+    /// What the slope counts for, in pixels, in the density of a filter with negative parts.
+    const SLOPE_IN_DENSITY: f64 = 0.125;
     /// Largest radius in pixels: each sample touches every pixel within it.
     pub const MAX_RADIUS: f64 = 256.0;
 
@@ -132,9 +169,10 @@ impl Filter {
                 Err(FilterError::NotPositive { what, value })
             }
         };
+        let still = |radius, scale, segments| (radius, scale, 1.0, segments);
         let (radius, scale, decay, segments) = match kind {
-            FilterKind::Box { radius } => (positive("radius", radius)?, 0.5 / radius, 1.0, 1),
-            FilterKind::Tent { radius } => (positive("radius", radius)?, 1.0 / radius, 1.0, 1),
+            FilterKind::Box { radius } => still(positive("radius", radius)?, 0.5 / radius, 1),
+            FilterKind::Tent { radius } => still(positive("radius", radius)?, 1.0 / radius, 1),
             FilterKind::Gaussian { radius, std_dev } => {
                 positive("radius", radius)?;
                 positive("standard deviation", std_dev)?;
@@ -145,11 +183,30 @@ impl Filter {
                 let decay = fm::exp(-1.0 / (std_dev * std_dev));
                 (radius, 1.0 / integral, decay, Self::GAUSSIAN_SEGMENTS)
             }
+            // Shifted by whole pixels they add up to one everywhere.
+            FilterKind::Mitchell { b, c } if b < 3.0 && b.is_finite() && c.is_finite() => {
+                still(2.0, 1.0, 2 * Self::SEGMENTS_OF_A_LOBE)
+            }
+            FilterKind::Mitchell { b, c } => return Err(FilterError::Spline { b, c }),
+            FilterKind::Lanczos { lobes } => {
+                let radius = positive("number of lobes", f64::from(lobes))?;
+                if radius > Self::MAX_RADIUS {
+                    return Err(FilterError::TooWide { radius });
+                }
+                still(
+                    radius,
+                    signed::lanczos_scale(lobes),
+                    lobes as usize * Self::SEGMENTS_OF_A_LOBE,
+                )
+            }
         };
         if radius > Self::MAX_RADIUS {
             return Err(FilterError::TooWide { radius });
         }
-        let half = HalfProfile::new(segments, |t| shape(kind, radius * t));
+        let half = HalfProfile::new(segments, |t| match kind.signed(radius * t) {
+            Some((value, slope)) => Real::abs(value) + Self::SLOPE_IN_DENSITY * Real::abs(slope),
+            None => shape(kind, radius * t),
+        });
         let peak = scale * shape(kind, 0.0);
         Ok(Self { kind, radius, scale, peak, decay, half })
     }
@@ -204,11 +261,13 @@ impl Filter {
     pub(crate) fn window(&self, offset: [f64; 2]) -> (f64, [f64; 2]) {
         let [(x, dx), (y, dy)] = offset.map(|o| {
             let (height, slope, steepness) = match self.kind {
-                FilterKind::Box { radius } => {
-                    let s = o / radius;
-                    (f64::max(1.0 - s * s, 0.0), -2.0 * s / radius, 2)
+                FilterKind::Box { .. }
+                | FilterKind::Mitchell { .. }
+                | FilterKind::Lanczos { .. } => {
+                    let s = o / self.radius;
+                    (f64::max(1.0 - s * s, 0.0), -2.0 * s / self.radius, 2)
                 }
-                _ => {
+                FilterKind::Tent { .. } | FilterKind::Gaussian { .. } => {
                     let (height, slope) = self.axis_with_slope(o);
                     (height / self.peak, slope / self.peak, 6)
                 }
@@ -229,7 +288,14 @@ impl Filter {
     /// The factor p of one axis, and its derivative; at a kink, the mean of both sides.
     #[inline]
     pub(crate) fn axis_with_slope(&self, x: f64) -> (f64, f64) {
-        self.with_slope(x, shape(self.kind, x))
+        match self.kind.signed(x) {
+            // Outside, and where x is no number, nothing is left of it.
+            Some((value, slope)) if Real::abs(x) < self.radius => {
+                (self.scale * value, self.scale * slope)
+            }
+            Some(_) => (0.0, 0.0),
+            None => self.with_slope(x, shape(self.kind, x)),
+        }
     }
 
     /// The same, of an offset where the unnormalised profile is known.
@@ -242,7 +308,9 @@ impl Filter {
         }
         let slope = match self.kind {
             _ if x == 0.0 => 0.0,
-            FilterKind::Box { .. } => 0.0,
+            FilterKind::Box { .. } | FilterKind::Mitchell { .. } | FilterKind::Lanczos { .. } => {
+                0.0
+            }
             FilterKind::Tent { radius } => -self.scale / (if x < 0.0 { -radius } else { radius }),
             FilterKind::Gaussian { std_dev, .. } => {
                 -x * (1.0 / (std_dev * std_dev)) * self.scale * (1.0 + shape)
@@ -273,6 +341,9 @@ impl From<Filter> for FilterKind {
 fn shape(kind: FilterKind, x: f64) -> f64 {
     match kind {
         FilterKind::Box { .. } => 1.0,
+        FilterKind::Mitchell { .. } | FilterKind::Lanczos { .. } => {
+            kind.signed(x).map_or(0.0, |(value, _)| value)
+        }
         FilterKind::Tent { radius } => 1.0 - Real::abs(x) / radius,
         FilterKind::Gaussian { radius, std_dev } => {
             fm::exp_m1(0.5 * (radius - x) * (radius + x) / (std_dev * std_dev))
@@ -284,6 +355,8 @@ fn shape(kind: FilterKind, x: f64) -> f64 {
 fn shape_inverse(kind: FilterKind, level: f64) -> f64 {
     match kind {
         FilterKind::Box { radius } => radius,
+        // Not asked for: their slopes are in their densities.
+        FilterKind::Mitchell { .. } | FilterKind::Lanczos { .. } => 0.0,
         FilterKind::Tent { radius } => radius * (1.0 - level),
         FilterKind::Gaussian { radius, std_dev } => {
             let v = 2.0 * std_dev * std_dev;

@@ -48,6 +48,17 @@ fn lens_film_filter_and_sampler() {
         sensor(r#"<film type="hdrfilm"><rfilter type="box"/></film>"#).sensor.filter().kind(),
         FilterKind::BOX
     );
+    let b = r#"<float name="B" value="0.2"/>"#;
+    for (kind, inside, read) in [
+        ("mitchell", "", FilterKind::MITCHELL),
+        ("mitchell", b, FilterKind::Mitchell { b: 0.2, c: 1.0 / 3.0 }),
+        ("catmullrom", "", FilterKind::CATMULL_ROM),
+        ("lanczos", "", FilterKind::LANCZOS),
+    ] {
+        let film =
+            format!(r#"<film type="hdrfilm"><rfilter type="{kind}">{inside}</rfilter></film>"#);
+        assert_eq!(sensor(&film).sensor.filter().kind(), read);
+    }
 }
 
 #[test]
@@ -70,7 +81,9 @@ fn unusable_sensors() {
         let crop = format!(r#"<integer name="{name}" value="{value}"/>"#);
         wrong(&format!(r#"<film type="hdrfilm">{crop}</film>"#), part);
     }
-    wrong(r#"<film type="hdrfilm"><rfilter type="lanczos"/></film>"#, "lanczos");
+    wrong(r#"<film type="hdrfilm"><rfilter type="sinc"/></film>"#, "catmullrom or lanczos");
+    let lobes = r#"<rfilter type="lanczos"><integer name="lobes" value="0"/></rfilter>"#;
+    wrong(&format!(r#"<film type="hdrfilm">{lobes}</film>"#), "`lobes` is 0");
     wrong(r#"<transform name="to_world"><scale value="2"/></transform>"#, "scales or shears");
     wrong(r#"<sampler type="independent"><integer name="sample_count" value="0"/></sampler>"#, "0");
     refused("<sensor type=\"distant\"/>", &["perspective, thinlens or orthographic"]);

@@ -72,6 +72,13 @@ impl Filter {
                     [scale * (bell - 1.0), even * self.half.pdf_at(x * knots), x * slope * bell]
                 })
             }
+            // Their slopes are in their densities.
+            FilterKind::Mitchell { .. } | FilterKind::Lanczos { .. } => {
+                let (even, knots) = (0.5 / self.radius, self.half.segments() / self.radius);
+                self.fill(start, density, weights, |x| {
+                    [self.axis(x), even * self.half.pdf_at(Real::abs(x) * knots), 0.0]
+                })
+            }
         }
     }
 

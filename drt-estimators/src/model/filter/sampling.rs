@@ -104,7 +104,10 @@ impl Filter {
     /// A constant profile has no slope to sample.
     pub(super) fn slope_share(&self, derivative: bool) -> f64 {
         match self.kind {
-            FilterKind::Box { .. } => 0.0,
+            // Of signed ones the slope is in the density at all times.
+            FilterKind::Box { .. } | FilterKind::Mitchell { .. } | FilterKind::Lanczos { .. } => {
+                0.0
+            }
             _ if derivative => SLOPE_SHARE,
             _ => 0.0,
         }
@@ -124,12 +127,12 @@ impl Filter {
 
     fn pdf_axis(&self, x: f64, p: f64, slope: f64, share: f64) -> f64 {
         let profile = match self.kind {
-            FilterKind::Gaussian { radius, .. } if -radius <= x && x < radius => {
-                0.5 / radius * self.half.pdf(Real::abs(x) / radius)
-            }
-            FilterKind::Gaussian { .. } => return 0.0,
             // Of which samples are in proportion to p.
-            _ => p,
+            FilterKind::Box { .. } | FilterKind::Tent { .. } => p,
+            _ if -self.radius <= x && x < self.radius => {
+                0.5 / self.radius * self.half.pdf(Real::abs(x) / self.radius)
+            }
+            _ => return 0.0,
         };
         if share == 0.0 {
             return profile;

@@ -219,7 +219,7 @@ fn direction_rates_are_those_of_duals() {
 fn footprints_hold_every_pixel_that_counts() {
     let view = [Vec3::Z, Vec3::ZERO, Vec3::Y];
     let mut rng = Rng::new(5, 0, 0);
-    for kind in [FilterKind::BOX, FilterKind::TENT, FilterKind::GAUSSIAN] {
+    for kind in [FilterKind::BOX, FilterKind::TENT, FilterKind::MITCHELL, FilterKind::GAUSSIAN] {
         let filter = Filter::new(kind).unwrap();
         let sensor = Sensor::look_at(view, Lens::default(), [9, 6], filter.clone()).unwrap();
         for _ in 0..200 {

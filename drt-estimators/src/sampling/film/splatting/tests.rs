@@ -15,8 +15,12 @@ use crate::sampling::parallel::Pool;
 use crate::sampling::pixels::{Filling, Pass, Sampler};
 
 const SIZE: [u32; 2] = [19, 13];
-const FILTERS: [FilterKind; 3] =
-    [FilterKind::Box { radius: 0.8 }, FilterKind::TENT, FilterKind::GAUSSIAN];
+const FILTERS: [FilterKind; 4] = [
+    FilterKind::Box { radius: 0.8 },
+    FilterKind::TENT,
+    FilterKind::GAUSSIAN,
+    FilterKind::CATMULL_ROM,
+];
 
 fn camera(kind: FilterKind) -> Sensor {
     let filter = Filter::new(kind).unwrap();
