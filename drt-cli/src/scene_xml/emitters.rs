@@ -1,4 +1,4 @@
-//! Emitters: area, point, spot, directional, constant, envmap.
+//! Emitters: area, point, spot, projector, directional, constant, envmap.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use super::sensors::view;
 use super::textures;
 use crate::CliError;
 
-const EMITTERS: &str = "area, point, spot, projector, directional, constant or envmap";
+const EMITTERS: &str = "area, point, spot, projector, directional, constant, envmap or volumelight";
 
 impl<'a> Loader<'a> {
     /// One emitter; an area emitter only where it is `on_shape`.

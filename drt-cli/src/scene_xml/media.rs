@@ -28,7 +28,7 @@ impl<'a> Loader<'a> {
         let quantities = self.quantities(&p)?;
         // How distances and lights are sampled does not change expected values.
         p.accept(&["sample_emitters", "has_spectral_extinction", "strategy", "method"]);
-        p.accept(&["sampling_weight"]);
+        p.accept(&["sampling_weight", "medium_sampling_mode", "sigma_n"]);
         let kind = match p.kind()? {
             "homogeneous" => homogeneous(e, quantities, scale)?,
             "heterogeneous" => heterogeneous(e, quantities, scale)?,

@@ -21,6 +21,7 @@ mod tests;
 mod textures;
 mod transform;
 mod values;
+mod volume_lights;
 mod volumes;
 
 use std::cell::RefCell;
@@ -96,6 +97,7 @@ fn parse_scene(
 ) -> Result<(Scene, Vec<Warning>), CliError> {
     let root = SceneFiles::new(defaults).read(path, text)?;
     missing_files(path, &root)?;
+    at_rest(&root)?;
     let loader = Loader { index: Index::new(&root)?, warnings: RefCell::default() };
     let scene = loader.scene(&root)?;
     Ok((scene, loader.warnings.into_inner()))
@@ -121,6 +123,16 @@ fn missing_files(path: &Path, root: &Element) -> Result<(), CliError> {
     Err(CliError::input(&Place::file(path), message))
 }
 
+/// Refuses what moves while the shutter is open.
+fn at_rest(e: &Element) -> Result<(), CliError> {
+    if e.tag == "animation" {
+        return Err(e.error(
+            "motion blur is not supported, here as in Mitsuba 3.9; give a <transform name=\"to_world\"> of one time",
+        ));
+    }
+    e.children.iter().try_for_each(at_rest)
+}
+
 /// Turns elements into things of the scene.
 struct Loader<'a> {
     index: Index<'a>,
@@ -144,7 +156,8 @@ impl<'a> Loader<'a> {
         }
         let shapes = self.index.all("shape");
         let carried = self.carried_emitters(shapes)?;
-        for e in self.index.all("emitter") {
+        self.light_media(shapes, &carried, &mut scene.media)?;
+        for e in self.emitters() {
             scene.emitters.push(self.emitter(e, carried.contains(&e.ordinal))?);
         }
         let groups = self.groups(shapes, &mut scene.bsdfs)?;

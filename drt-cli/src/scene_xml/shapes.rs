@@ -14,7 +14,7 @@ use drt_math::{Affine, Frame, Mat3, Vec3};
 
 use super::element::Element;
 use super::properties::Properties;
-use super::{Loader, default_bsdf};
+use super::{Loader, default_bsdf, volume_lights};
 use crate::CliError;
 
 /// Bands of a sphere between its poles where none are given; twice as many meridians.
@@ -50,13 +50,16 @@ impl<'a> Loader<'a> {
         let p = Properties::of(e)?;
         let mesh = self.without_degenerate(e, place(&p, model(&p)?)?)?;
         let emitter = self.index.single(&p, "emitter", None)?;
+        // A medium's light is no light of the shape.
+        let emitter = emitter.filter(|inner| !volume_lights::is_one(inner.target));
         let bsdf = match self.index.single(&p, "bsdf", None)? {
             Some(bsdf) => self.counted(bsdf.child, bsdf.target)?,
             None => default_bsdf(bsdfs, self.index.all("bsdf").len(), emitter.is_some()),
         };
         let boundary = self.boundary(&p)?;
         p.finish()?;
-        let emitter = emitter.map(|inner| self.counted(inner.child, inner.target)).transpose()?;
+        let emitter = emitter
+            .and_then(|inner| self.emitters().position(|e| e.ordinal == inner.target.ordinal));
         Ok(Shape { id: e.id().map(Into::into), mesh: Arc::new(mesh), bsdf, boundary, emitter })
     }
 

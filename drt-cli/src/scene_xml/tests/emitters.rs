@@ -187,3 +187,44 @@ fn pictures_are_upright() {
     assert!((e.emission(d).value.r - 120.0 / 255.0).abs() < 1e-6, "{:?}", e.emission(d));
     assert!((e.emission(d).value.g - 200.0 / 255.0).abs() < 1e-6);
 }
+
+/// A ray through a medium sees (1 - exp(-sigma_a t)) j / sigma_a of the light j per length.
+#[test]
+fn volume_lights() {
+    let body = |medium: &str, inside: &str| {
+        format!(
+            r#"<medium type="homogeneous" id="m"><rgb name="sigma_t" value="2"/>{medium}</medium>
+               <emitter type="point"/>
+               <shape type="sphere"><bsdf type="null"/>{inside}</shape>
+               <shape type="rectangle" id="lamp"><emitter type="area"/></shape>"#
+        )
+    };
+    let light = r#"<emitter type="volumelight"><rgb name="radiance" value="2 0 5"/></emitter>"#;
+    let within = format!(r#"<ref name="interior" id="m"/>{light}"#);
+    let albedo = r#"<rgb name="albedo" value="0.75 1 0.5"/>"#;
+    let s = scene(&body(albedo, &within));
+    let drt_medium::MediumKind::Homogeneous(m) = &s.media[0].item.kind else { panic!() };
+    assert_eq!(m.coefficients().source(), Rgb::new(2.0, 0.0, 5.0));
+    let of = |shape: usize| s.shapes[shape].emitter.map(|i| &s.emitters[i].item.emitter);
+    assert_eq!((s.emitters.len(), of(0)), (2, None));
+    assert!(matches!(of(1), Some(Emitter::Area { .. })));
+    let clear = r#"<float name="albedo" value="1"/>"#;
+    refused(&body(clear, &within), &["does not absorb"]);
+    refused(&body("", light), &["no medium called `interior`"]);
+    refused(light, &["belongs inside a <shape>"]);
+    let grid = within.replace("rgb name", "volume type=\"constvolume\" name").replace("2 0 5", "");
+    refused(&body(albedo, &grid), &["<volume", "as a volume"]);
+    let heterogeneous = body(albedo, &within).replace("homogeneous", "heterogeneous");
+    refused(&heterogeneous, &["heterogeneous medium"]);
+}
+
+#[test]
+fn what_moves_is_refused() {
+    let keys = r#"<transform time="0"/><transform time="1"><translate x="1"/></transform>"#;
+    refused(
+        &format!(
+            r#"<emitter type="point"><animation name="to_world">{keys}</animation></emitter>"#
+        ),
+        &[":2", "<animation name=\"to_world\">", "motion blur is not supported"],
+    );
+}
