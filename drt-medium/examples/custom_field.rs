@@ -59,7 +59,7 @@ impl DensityField for SoftBall {
 }
 
 /// Follows one photon downwards into the ball; where it leaves, and with which weight.
-fn photon(ball: &SoftBall, phase: Phase, rng: &mut Rng, stats: &mut TrackingStats) -> (Vec3, f64) {
+fn photon(ball: &SoftBall, phase: &Phase, rng: &mut Rng, stats: &mut TrackingStats) -> (Vec3, f64) {
     let [u, v] = rng.next_2d();
     let mut ray = Ray::new(vec3(2.0 * u - 1.0, 2.0 * v - 1.0, 2.0), -Vec3::Z, f64::INFINITY);
     let mut weight = Rgb::ONE;
@@ -83,7 +83,7 @@ fn main() {
     let mut shares = [Moments::ZERO; 3];
     let photons = 100_000;
     for n in 0..photons {
-        let (dir, weight) = photon(&ball, phase, &mut Rng::new(1, 0, n), &mut stats);
+        let (dir, weight) = photon(&ball, &phase, &mut Rng::new(1, 0, n), &mut stats);
         let leaves = [dir.z > 0.5, dir.z < -0.5, dir.z.abs() <= 0.5];
         for (share, here) in shares.iter_mut().zip(leaves) {
             share.push(if here { weight } else { 0.0 });

@@ -81,6 +81,16 @@ pub enum MediumError {
         /// The range in words.
         expected: &'static str,
     },
+    /// A number that makes no phase function.
+    #[error("the phase function's {what} is {value}; it must be {expected}")]
+    PhaseFunction {
+        /// Which number.
+        what: &'static str,
+        /// The value found.
+        value: f64,
+        /// The range in words.
+        expected: &'static str,
+    },
     /// A voxel was addressed that the property does not have.
     #[error("voxel [{}, {}, {}] of {property} does not exist; the grid has {}x{}x{} voxels",
         voxel[0], voxel[1], voxel[2], size[0], size[1], size[2])]

@@ -40,7 +40,7 @@ pub use grid::{Filter, Grid, Layout, Wrap};
 pub use grid_medium::{GridMedium, Volume};
 pub use homogeneous::Homogeneous;
 pub use medium::{Medium, MediumKind};
-pub use phase::{Phase, henyey_greenstein, rayleigh};
+pub use phase::{Phase, PhaseBlend, PhaseTable, henyey_greenstein, rayleigh};
 pub use tangent::{FieldTangent, MediumTangent};
 pub use tracking::{DistanceSample, TrackingStats};
 pub use transmittance::{Crossing, TransmittanceRate};

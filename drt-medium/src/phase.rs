@@ -1,8 +1,14 @@
+mod blend;
+mod tabulated;
+
+use alloc::boxed::Box;
 use core::f64::consts::PI;
 
 use drt_math::{Frame, Real, Vec3, fm, vec3};
 
 use crate::MediumError;
+pub use blend::PhaseBlend;
+pub use tabulated::PhaseTable;
 
 /// Distribution of scattered directions.
 ///
@@ -10,7 +16,7 @@ use crate::MediumError;
 /// *flow*: `c = 1` goes straight on. Values are per steradian and integrate to one over the
 /// sphere. Swapping or reversing both directions leaves `c` unchanged, so the same numbers serve
 /// light paths and camera paths.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Phase {
     /// Uniform over the sphere.
@@ -23,6 +29,10 @@ pub enum Phase {
     },
     /// Particles much smaller than the wavelength: `3 (1 + c²) / (16 pi)`.
     Rayleigh,
+    /// Two others in proportion.
+    Blend(Box<PhaseBlend>),
+    /// Given by its values.
+    Tabulated(Box<PhaseTable>),
 }
 
 impl Phase {
@@ -41,6 +51,7 @@ impl Phase {
     /// When it does not lie in (-1, 1).
     pub fn validate(&self) -> Result<(), MediumError> {
         match *self {
+            Self::Blend(ref blend) => blend.parts().iter().try_for_each(Self::validate),
             Self::HenyeyGreenstein { g } if !(g > -1.0 && g < 1.0) => {
                 Err(MediumError::OutOfRange {
                     property: crate::Property::G,
@@ -59,6 +70,8 @@ impl Phase {
             Self::Isotropic => T::from(0.25 / PI),
             Self::HenyeyGreenstein { g } => henyey_greenstein(T::from(g), c),
             Self::Rayleigh => rayleigh(c),
+            Self::Blend(ref blend) => blend.eval(c),
+            Self::Tabulated(ref table) => table.eval(c),
         }
     }
 
@@ -70,18 +83,20 @@ impl Phase {
             Self::Isotropic => 0.0,
             Self::HenyeyGreenstein { g } => henyey_greenstein(g, c) * 3.0 * g / squared_chord(g, c),
             Self::Rayleigh => 3.0 / (8.0 * PI) * c,
+            Self::Blend(ref blend) => blend.d_cos(c),
+            Self::Tabulated(ref table) => table.d_cos(c),
         }
     }
 
     /// Derivative of [`Phase::eval`] with respect to the mean cosine of Henyey-Greenstein. The
-    /// isotropic function counts as its member `g = 0`; Rayleigh has no such parameter: zero.
+    /// isotropic function counts as its member `g = 0`; the others have no such parameter: zero.
     #[inline]
     #[must_use]
     pub fn d_g(&self, c: f64) -> f64 {
         let g = match *self {
             Self::Isotropic => 0.0,
             Self::HenyeyGreenstein { g } => g,
-            Self::Rayleigh => return 0.0,
+            Self::Rayleigh | Self::Blend(_) | Self::Tabulated(_) => return 0.0,
         };
         let s = squared_chord(g, c);
         let slope = -2.0 * g * s - 3.0 * (1.0 - g) * (1.0 + g) * (g - c);
@@ -95,7 +110,18 @@ impl Phase {
         match *self {
             Self::Isotropic => Some(0.0),
             Self::HenyeyGreenstein { g } => Some(g),
-            Self::Rayleigh => None,
+            Self::Rayleigh | Self::Blend(_) | Self::Tabulated(_) => None,
+        }
+    }
+
+    /// How far it is from even, from 0 to 1: the largest |mean cosine| of the lobes that it is made of.
+    #[must_use]
+    pub fn sharpness(&self) -> f64 {
+        match self {
+            Self::Isotropic | Self::Rayleigh => 0.0,
+            Self::HenyeyGreenstein { g } => Real::abs(*g),
+            Self::Blend(blend) => blend.parts().iter().map(Self::sharpness).fold(0.0, f64::max),
+            Self::Tabulated(table) => Real::abs(table.mean_cosine()),
         }
     }
 
@@ -105,12 +131,21 @@ impl Phase {
     #[inline]
     #[must_use]
     pub fn sample(&self, flow: Vec3, u: [f64; 2]) -> (Vec3, f64) {
+        if let Self::Blend(blend) = self {
+            return blend.sample(flow, u);
+        }
         // Both 1 - c and 1 + c, so that the sine keeps its digits next to the poles.
         let (below, above) = match *self {
             Self::Isotropic => (2.0 * (1.0 - u[0]), 2.0 * u[0]),
             Self::HenyeyGreenstein { g } => henyey_greenstein_cosine(g, u[0]),
             Self::Rayleigh => {
                 let c = rayleigh_cosine(u[0]);
+                (1.0 - c, 1.0 + c)
+            }
+            // Taken care of above.
+            Self::Blend(_) => (1.0, 1.0),
+            Self::Tabulated(ref table) => {
+                let c = table.sample_cosine(u[0]);
                 (1.0 - c, 1.0 + c)
             }
         };

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use drt_math::testing::{SIGNIFICANCE, sphere_chi_square};
 use drt_math::{Dual, Rng, Vec3, vec3};
-use drt_medium::{Phase, henyey_greenstein};
+use drt_medium::{MediumError, Phase, PhaseBlend, PhaseTable, henyey_greenstein};
 
 const SHARPEST: f64 = 0.9999;
 
@@ -13,12 +13,24 @@ fn phases() -> Vec<Phase> {
     let hg = [-SHARPEST, -0.6, -1e-9, 0.0, 1e-9, 0.3, 0.85, SHARPEST];
     let mut all = vec![Phase::Isotropic, Phase::Rayleigh];
     all.extend(hg.map(|g| Phase::henyey_greenstein(g).expect("a valid g")));
+    all.extend([blend(), table(&[0.5, 1.0, 1.5, 4.0])]);
     all
+}
+
+fn table(values: &[f64]) -> Phase {
+    Phase::Tabulated(Box::new(PhaseTable::new(values.to_vec()).expect("a table")))
+}
+
+fn blend() -> Phase {
+    let parts = [Phase::henyey_greenstein(0.5).expect("a valid g"), Phase::Isotropic];
+    Phase::Blend(Box::new(PhaseBlend::new(0.3, parts).expect("a weight")))
 }
 
 fn mean_cosine(p: &Phase) -> f64 {
     match *p {
         Phase::HenyeyGreenstein { g } => g,
+        Phase::Blend(_) => 0.7 * 0.5,
+        Phase::Tabulated(ref table) => table.mean_cosine(),
         _ => 0.0,
     }
 }
@@ -123,4 +135,23 @@ fn impossible_mean_cosines_are_refused() {
     for g in [1.0, -1.0, 1.5, f64::NAN, f64::INFINITY] {
         assert!(Phase::henyey_greenstein(g).is_err(), "{g}");
     }
+}
+
+/// Values of `eval_pdf` of Mitsuba 3.9.1.
+#[test]
+fn blends_and_tables_are_those_of_mitsuba() {
+    let p = table(&[0.5, 1.0, 1.5, 4.0]);
+    for (c, value) in
+        [(-1.0, 0.0251297), (-0.5, 0.043977), (0.3, 0.0741327), (0.9, 0.182191), (1.0, 0.201038)]
+    {
+        assert!((p.eval(c) - value).abs() < 1e-6, "{c}");
+    }
+    for (c, value) in [(-0.5, 0.0419197), (0.5, 0.0881949), (1.0, 0.358099)] {
+        assert!((blend().eval(c) - value).abs() < 1e-6, "{c}");
+    }
+    let wrong = |values: &[f64]| PhaseTable::new(values.to_vec()).unwrap_err();
+    for values in [&[1.0][..], &[0.0, 0.0], &[1.0, -1.0], &[1.0, f64::NAN]] {
+        assert!(matches!(wrong(values), MediumError::PhaseFunction { .. }));
+    }
+    assert!(PhaseBlend::new(1.5, [Phase::Isotropic, Phase::Rayleigh]).is_err());
 }

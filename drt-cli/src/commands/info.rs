@@ -112,16 +112,24 @@ fn media(scene: &Scene) -> Table<4> {
         }
         _ => ("custom".into(), String::new()),
     };
-    let phase = |m: &Medium| match m.phase {
+    let rows = scene.media.iter().enumerate().map(|(i, m)| {
+        let (kind, coefficients) = kind(&m.item);
+        [name(m.id.as_ref(), "medium", i), kind, coefficients, phase(&m.item.phase)]
+    });
+    Table::new(["medium", "kind", "coefficients", "phase function"], rows)
+}
+
+fn phase(p: &Phase) -> String {
+    match p {
         Phase::Isotropic => "isotropic".into(),
         Phase::Rayleigh => "rayleigh".into(),
         Phase::HenyeyGreenstein { g } => format!("hg, g {g}"),
-    };
-    let rows = scene.media.iter().enumerate().map(|(i, m)| {
-        let (kind, coefficients) = kind(&m.item);
-        [name(m.id.as_ref(), "medium", i), kind, coefficients, phase(&m.item)]
-    });
-    Table::new(["medium", "kind", "coefficients", "phase function"], rows)
+        Phase::Blend(blend) => {
+            let [a, b] = blend.parts().each_ref().map(phase);
+            format!("{a}, and {} of {b}", blend.weight())
+        }
+        Phase::Tabulated(table) => format!("a table, mean cosine {}", table.mean_cosine()),
+    }
 }
 
 fn emitters(scene: &Scene) -> Table<3> {

@@ -2,10 +2,13 @@
 
 use drt_estimators::{Named, Surrounding};
 use drt_math::Rgb;
-use drt_medium::{Grid, GridMedium, Homogeneous, Medium, MediumKind, Phase, Volume};
+use drt_medium::{
+    Grid, GridMedium, Homogeneous, Medium, MediumKind, Phase, PhaseBlend, PhaseTable, Volume,
+};
 
 use super::Loader;
 use super::element::Element;
+use super::numbers::numbers;
 use super::properties::Properties;
 use super::volumes::Field;
 use crate::CliError;
@@ -78,15 +81,39 @@ impl<'a> Loader<'a> {
             "rayleigh" => Phase::Rayleigh,
             "hg" => Phase::henyey_greenstein(p.float("g")?.unwrap_or(0.8))
                 .map_err(|err| e.error(err))?,
+            "blendphase" => self.blended_phase(&p)?,
+            "tabphase" => {
+                let values = p.string("values")?.ok_or_else(|| e.error("`values` is missing"))?;
+                let table = PhaseTable::new(numbers(e, values)?).map_err(|err| e.error(err))?;
+                Phase::Tabulated(Box::new(table))
+            }
             other => {
                 return Err(e.error(format!(
-                    "the phase function type `{other}` is not supported; expected isotropic, hg \
-                     or rayleigh"
+                    "the phase function type `{other}` is not supported; expected isotropic, hg, \
+                     rayleigh, blendphase or tabphase"
                 )));
             }
         };
         p.finish()?;
         Ok(phase)
+    }
+
+    /// Of the two inside, in the order of the file.
+    fn blended_phase(&self, p: &Properties<'a>) -> Result<Phase, CliError> {
+        let e = p.element;
+        let weight = self.field(p, "weight")?.ok_or_else(|| e.error("`weight` is missing"))?;
+        let inner = self.index.inner(p, "phase", None);
+        let [a, b] = inner.as_slice() else {
+            return Err(
+                e.error(format!("expected two phase functions inside, found {}", inner.len()))
+            );
+        };
+        let Some(weight) = weight.as_constant() else {
+            return Err(e.error("a `weight` that varies in space is not supported"));
+        };
+        let parts = [self.phase(a.target)?, self.phase(b.target)?];
+        let blend = PhaseBlend::new(weight.r, parts).map_err(|err| e.error(err))?;
+        Ok(Phase::Blend(Box::new(blend)))
     }
 
     /// The medium stated for a camera or light: a reference, or one nested there.

@@ -61,7 +61,7 @@ impl Scattering<'_> {
                 }
             }
             Self::Volume(phase) => {
-                // Both phase functions here depend on the angle alone, so which of the two
+                // Phase functions here depend on the angle alone, so which of the two
                 // directions is given makes no difference.
                 let (flow, pdf) = phase.sample(-from, rng.next_2d());
                 Some(Drawn::Spread(flow, pdf))
@@ -83,7 +83,7 @@ impl Scattering<'_> {
             Self::Surface(bsdf) => bsdf.lobes(wo),
             Self::Volume(phase) => match phase.mean_cosine_parameter() {
                 Some(g) => Lobes::around(-wo * g.signum(), phase.eval(0.0), phase.eval(g.signum())),
-                None => Lobes::even(phase.eval(0.0)),
+                None => lobes_of(phase, wo),
             },
         }
     }
@@ -92,7 +92,7 @@ impl Scattering<'_> {
     pub(crate) fn lobe_width(&self) -> f64 {
         match self {
             Self::Surface(bsdf) => bsdf.lobe_width(),
-            Self::Volume(phase) => 1.0 - phase.mean_cosine_parameter().map_or(0.0, f64::abs),
+            Self::Volume(phase) => 1.0 - phase.sharpness(),
         }
     }
 
@@ -143,4 +143,16 @@ impl Scattering<'_> {
             Self::Volume(_) => 1.0,
         }
     }
+}
+
+/// A sketch of a phase function without a mean cosine to go by: one lobe to the side where there is more.
+#[cold]
+fn lobes_of(phase: &Phase, wo: Vec3) -> Lobes {
+    if matches!(phase, Phase::Rayleigh) {
+        return Lobes::even(phase.eval(0.0));
+    }
+    let side = if phase.eval(1.0) >= phase.eval(-1.0) { 1.0 } else { -1.0 };
+    // A table may be zero to the sides.
+    let low = f64::max(phase.eval(0.0), 0.01);
+    Lobes::around(-wo * side, low, f64::max(phase.eval(side), low))
 }

@@ -70,7 +70,7 @@ fn thin() -> Result<Condition> {
 /// The same against no medium.
 fn nothing() -> Result<Condition> {
     let phase = Phase::henyey_greenstein(0.3)?;
-    let hard = filled(fog(1e-9, 0.8)?, phase, 3)?;
+    let hard = filled(fog(1e-9, 0.8)?, phase.clone(), 3)?;
     let easy = filled(fog(0.0, 0.8)?, phase, 3)?;
     let [hard, easy] = [hard, easy].map(|scene| Case::new(scene, common()));
     Ok(Condition::new("optical depth 1e-9 and none", hard, easy))

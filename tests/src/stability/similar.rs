@@ -108,7 +108,7 @@ impl Similarity {
                 return Err("no scene here has a medium of its own kind".into());
             }
         };
-        Ok(Medium::new(kind, medium.phase))
+        Ok(Medium::new(kind, medium.phase.clone()))
     }
 
     fn emitter(&self, emitter: &mut Emitter) {

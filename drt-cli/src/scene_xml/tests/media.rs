@@ -49,6 +49,24 @@ fn phase_functions() {
     let phase = |inside: &str| medium("homogeneous", inside).phase;
     assert_eq!(phase(""), Phase::Isotropic);
     assert_eq!(phase("<phase type=\"rayleigh\"/>"), Phase::Rayleigh);
+    let inside =
+        r#"<phase type="hg"><float name="g" value="0.5"/></phase><phase type="isotropic"/>"#;
+    let blend = |inside: &str| format!(r#"<phase type="blendphase">{inside}</phase>"#);
+    let weight = r#"<float name="weight" value="0.3"/>"#;
+    let value = phase(&blend(&format!("{weight}{inside}"))).eval(-0.5);
+    assert!((value - 0.0419197).abs() < 1e-6, "{value}");
+    let table = |values: &str| {
+        format!(r#"<phase type="tabphase"><string name="values" value="{values}"/></phase>"#)
+    };
+    assert!((phase(&table("0.5, 1.0, 1.5, 4")).eval(0.3) - 0.0741327).abs() < 1e-6);
+    let wrong = |inside: &str, part| {
+        refused(&format!("<medium type=\"homogeneous\">{inside}</medium>"), &[part])
+    };
+    wrong(&blend(inside), "`weight` is missing");
+    wrong(&blend(weight), "two phase functions inside, found 0");
+    wrong(&blend(&format!("{}{inside}", weight.replace("0.3", "2"))), "weight is 2");
+    wrong(&table("1"), "number of values is 1");
+    wrong(&table("1, x"), "`x`");
     assert_eq!(phase("<phase type=\"hg\"/>"), Phase::HenyeyGreenstein { g: 0.8 });
     let s = scene(
         r#"<phase type="hg" id="p"><float name="g" value="-0.3"/></phase>
