@@ -28,7 +28,7 @@ use std::cell::RefCell;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use drt_estimators::surface::{Bsdf, Diffuse};
+use drt_estimators::surface::{Bsdf, Diffuse, Mask};
 use drt_estimators::{Named, Scene};
 use drt_math::Rgb;
 
@@ -176,6 +176,9 @@ impl<'a> Loader<'a> {
             scene.sensors.push(self.sensor(e)?);
         }
         self.top_level(root, &mut scene)?;
+        if scene.integrator.straight_depth {
+            count_null_interfaces(&mut scene);
+        }
         Ok(scene)
     }
 
@@ -236,4 +239,20 @@ fn default_bsdf(bsdfs: &mut Vec<Named<Bsdf>>, declared: usize, glows: bool) -> u
         },
         |i| declared + i,
     )
+}
+
+/// Makes null interfaces what they are to integrators that know nothing of media: masks with nothing behind them, which add to the depth and
+/// block the light of points. Those around media stay, as scenes with media mean these.
+fn count_null_interfaces(scene: &mut Scene) {
+    let Scene { bsdfs, shapes, .. } = scene;
+    let count = bsdfs.len();
+    for shape in shapes.iter_mut().filter(|s| s.boundary.is_none()) {
+        if shape.bsdf < count && bsdfs[shape.bsdf].item.is_null() {
+            if bsdfs.len() == count {
+                let bsdf = Bsdf::Diffuse(Diffuse::default());
+                bsdfs.push(Named::anonymous(Bsdf::Mask(Box::new(Mask { bsdf, opacity: 0.0 }))));
+            }
+            shape.bsdf = count;
+        }
+    }
 }

@@ -254,3 +254,20 @@ fn two_sided() {
     refused("<bsdf type=\"twosided\"><bsdf type=\"null\"/></bsdf>", &["null"]);
     refused("<bsdf type=\"hair\"/>", &["`hair` is not supported", "diffuse"]);
 }
+
+/// Mitsuba's `path` takes going through nothing for a scattering.
+#[test]
+fn null_interfaces_count_in_path() {
+    let body = |integrator: &str, inside: &str| {
+        let text = format!(
+            r#"<integrator type="{integrator}"/><medium type="homogeneous" id="m"/>
+               <shape type="cube"><bsdf type="null"/>{inside}</shape>"#
+        );
+        let s = scene(&text);
+        s.bsdfs[s.shapes[0].bsdf].item.clone()
+    };
+    let Bsdf::Mask(mask) = body("path", "") else { panic!() };
+    assert_eq!(mask.opacity, 0.0);
+    assert!(body("volpath", "").is_null());
+    assert!(body("path", r#"<ref name="interior" id="m"/>"#).is_null());
+}
