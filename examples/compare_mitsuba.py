@@ -111,6 +111,10 @@ def compare(mi, name, options):
     theirs, their_error = by_mitsuba(mi, path, defaults, options)
     seconds = middle - start, time.time() - middle
     ours, our_error, theirs, their_error = (a[INNER, INNER] for a in (ours, our_error, theirs, their_error))
+    if not theirs.any():
+        # Such as `ptracer` in a medium whose null interface is between the light's paths and the camera.
+        print(f"| {name} | {ours.mean():.5f} | 0 | Mitsuba's image is black: nothing to compare with |", flush=True)
+        return False
     z = (ours - theirs) / np.sqrt(our_error**2 + their_error**2 + (ROUNDING * theirs) ** 2 + 1e-300)
     agrees = rms(z) <= MAX_RMS_Z and np.abs(z).max() <= largest_by_chance(z.size)
     print(
