@@ -194,6 +194,29 @@ fn stop_rules() {
     assert!(digest["spp"].as_u64().unwrap() > 4);
 }
 
+/// Finite differences go on until they are known, not their image alone.
+#[test]
+fn stop_rules_of_differences() {
+    let folder = folder();
+    let set = "--set estimator.kind=\"finite-difference\" --quiet --digest a.json";
+    let noise = |rules: &str| {
+        expect(&folder.run(&format!("grad job.toml {set} {rules}")), 0, &[]);
+        let digest = folder.json("a.json");
+        let of = |value: &serde_json::Value| {
+            let all = value.as_array().unwrap().iter().flat_map(|b| b.as_array().unwrap().clone());
+            all.map(|v| v.as_f64().unwrap().powi(2)).sum::<f64>()
+        };
+        let layer = &digest["derivatives"]["lamp-x"]["blocks"];
+        (of(&layer["stderr"]) / of(&layer["mean"])).sqrt()
+    };
+    let [coarse, fine] = [0.2, 0.05].map(|target| noise(&format!("--target-error {target}")));
+    assert!(fine < 0.06 && coarse > fine, "{coarse} {fine}");
+    // Time ends it first.
+    let started = std::time::Instant::now();
+    let timed = noise("--target-error 1e-9 --seconds 0.5");
+    assert!(timed < 0.2 && started.elapsed().as_secs_f64() < 5.0, "{timed}");
+}
+
 #[cfg(unix)]
 #[test]
 fn ctrl_c_keeps_what_is_finished() {
