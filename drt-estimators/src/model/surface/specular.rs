@@ -1,10 +1,10 @@
 //! Derivatives of what smooth surfaces scatter into single directions.
 //!
-//! A walk that draws one of the single directions of a surface, by probabilities P_i, has the weight V_i / P_i, of which P_i is no
-//! function of what is differentiated by. Parts i of a surface that share a direction are told apart by nothing that the walk
-//! leaves behind. Given the direction, the mean of ∂V_i / P_i over its parts is Σ ∂V_i / Σ P_i, which is what is taken: as
-//! unbiased, and of no more variance. Where the index of refraction turns the direction there is more to a derivative, which
-//! nothing here has.
+//! A walk that draws one of the single directions of a surface, with the probability P_i, goes on with the weight V_i / P_i. Its
+//! derivative is ∂V_i / P_i: as of any sample, the density counts as a constant. Parts i of a surface that share a direction are
+//! told apart by nothing that the walk leaves behind; given the direction, the mean of ∂V_i / P_i over them is Σ ∂V_i / Σ P_i,
+//! which is taken: as unbiased, and of no more variance. Where an index of refraction turns the direction, there is more to the
+//! derivative, which nothing here has.
 
 use drt_math::{Rgb, Vec3};
 
