@@ -34,7 +34,7 @@ impl RayMotion<'_> {
         for part in self.parts {
             let g = across * part.rate + weight.outer(part.divergence);
             if let Some(point) = part.matter {
-                send_to(point, g, sink);
+                send_to(point, SurfaceAdjoint::of_place(g), sink);
             }
             origin += g;
         }
@@ -60,7 +60,7 @@ impl RayMotion<'_> {
             projected * share.value + weight.outer(along)
         };
         for part in self.shadows {
-            send_to(part.matter, by(&part.share), sink);
+            send_to(part.matter, SurfaceAdjoint::of_place(by(&part.share)), sink);
         }
         if sink.active().emitters[light.emitter] {
             send_to_light(light, &by(&shadow.by_light), sink);
@@ -69,7 +69,9 @@ impl RayMotion<'_> {
         let Weight { value, gradient } = shadow.weight;
         let lifted =
             across.dot(lift) * value + weight * (gradient.dot(lift) + value * lift_divergence);
-        send_to(at.matter, lifted.outer(at.normal), sink);
+        let u = lifted.outer(at.normal);
+        let n = (weight * value).outer(at.lift_by_normal());
+        send_to(at.matter, SurfaceAdjoint { u, n, ..SurfaceAdjoint::default() }, sink);
         let inv = 1.0 / at.distance;
         let rate =
             gradient * inv + at.inv_distance_gradient() * value - at.dir * (2.0 * value * inv);
@@ -77,9 +79,9 @@ impl RayMotion<'_> {
     }
 }
 
-fn send_to<S: AdjointSink>(point: MaterialPoint, g: RgbVec, sink: &mut S) {
+fn send_to<S: AdjointSink>(point: MaterialPoint, adjoint: SurfaceAdjoint, sink: &mut S) {
     if sink.active().moves(&Matter::Surface(point)) {
-        sink.surface(&point, &SurfaceAdjoint::of_place(g));
+        sink.surface(&point, &adjoint);
     }
 }
 

@@ -24,6 +24,12 @@
 //! Σ_i (∂_i G)^T e_i = P^T (τ - 2 ω / t) - 2 N / (r N·d),
 //! div h = τ·d / (N·d) - 2 ω·d / (t N·d) + 2 / (r N·d).
 //! ```
+//!
+//! Where the surface turns, N·u changes along it, too: as N stays across the surface, by -N_dot. So div (h N·u) has a last part,
+//!
+//! ```text
+//! h·∇(N·u) = -t (h - ω N·h / (N·ω))·N_dot.
+//! ```
 
 use drt_math::Vec3;
 
@@ -55,6 +61,8 @@ pub(crate) struct ShadowPlace {
     pub(crate) matter: MaterialPoint,
     /// N, unit, to either side.
     pub(crate) normal: Vec3,
+    /// 1 where that is the geometric normal, -1 where it is the opposite.
+    pub(crate) side: f64,
     /// ω, unit.
     pub(crate) dir: Vec3,
     /// t, in scene units.
@@ -103,6 +111,12 @@ impl ShadowPlace {
         let own = self.inv_distance_gradient().dot(flow) - 2.0 * dir.dot(flow) / distance;
         (flow.reject(dir) / (distance * cosine), (own + 2.0 * inv_range) / cosine)
     }
+
+    /// What h·∇(N·u) is by the rate of the geometric normal.
+    pub(crate) fn lift_by_normal(&self) -> Vec3 {
+        let (h, n) = (self.lift().0, self.normal);
+        (h - self.dir * (n.dot(h) / n.dot(self.dir))) * (-self.side * self.distance)
+    }
 }
 
 #[cfg(test)]
@@ -118,7 +132,7 @@ mod tests {
         let mut next = || vec3(rng.next_f64() - 0.5, rng.next_f64() - 0.5, rng.next_f64() - 0.5);
         for case in 0..200 {
             let (dir, n, light) = (next().normalize(), next().normalize(), next() * 3.0);
-            let (v, u) = (next(), next());
+            let (v, u, spin) = (next(), next(), next());
             let depth = n.dot(dir) * 1.5;
             let at = |dir: Vec3| {
                 let distance = depth / n.dot(dir);
@@ -129,7 +143,8 @@ mod tests {
                 };
                 let at = drt_motion::SurfacePoint { triangle: 0, bary: [0.0; 2] };
                 let matter = MaterialPoint { shape: 0, at };
-                ShadowPlace { matter, normal: n, dir, distance, flow, inv_range }
+                let side = if case % 3 == 0 { -1.0 } else { 1.0 };
+                ShadowPlace { matter, normal: n, side, dir, distance, flow, inv_range }
             };
             let here = at(dir);
             if n.dot(dir).abs() < 0.2 || n.dot(here.flow).abs() < 0.2 {
@@ -138,6 +153,7 @@ mod tests {
             // T of one weight 1, by its definition.
             let turn = |p: &ShadowPlace| {
                 let cosine = n.dot(p.flow);
+                let u = u + spin.cross(p.dir * p.distance);
                 let c = v - p.flow * (n.dot(v) / cosine) + p.flow * (n.dot(u) / cosine);
                 (c - p.dir * c.dot(p.dir)) / p.distance
             };
@@ -157,7 +173,9 @@ mod tests {
                 }
             }
             let (lift, lift_divergence) = here.lift();
-            let closed = here.projection_divergence().dot(v) + lift_divergence * n.dot(u);
+            let u = u + spin.cross(here.dir * here.distance);
+            let spun = here.lift_by_normal().dot(spin.cross(n * here.side));
+            let closed = here.projection_divergence().dot(v) + lift_divergence * n.dot(u) + spun;
             let scale = 1.0 + differences.abs();
             assert!((closed - differences).abs() < 1e-6 * scale, "{closed} {differences}");
             assert!(inverse < 1e-6);

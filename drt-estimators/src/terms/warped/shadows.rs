@@ -39,7 +39,8 @@ impl Flow {
             LightKind::Direction => true,
         };
         let flow = -light.w;
-        let normal = if s.ng.dot(flow) < 0.0 { -s.ng } else { s.ng };
+        let side = if s.ng.dot(flow) < 0.0 { -1.0 } else { 1.0 };
+        let normal = s.ng * side;
         let range = if at_infinity { scale } else { light.distance };
         let inv_range = if at_infinity { 0.0 } else { 1.0 / range };
         let TurningRay { dir, distance, .. } = *ray;
@@ -53,7 +54,8 @@ impl Flow {
         let square =
             Weight::constant(1.0) / (Weight::constant(of_light) + far * far / (seen * seen));
         let near = Near::of_flow(x, flow, range, at_infinity, normal, square);
-        let place = ShadowPlace { matter: s.material(), normal, dir, distance, flow, inv_range };
+        let place =
+            ShadowPlace { matter: s.material(), normal, side, dir, distance, flow, inv_range };
         Some(Self { place, near, range, at_infinity })
     }
 
