@@ -169,12 +169,15 @@ fn shadows() -> Scene {
 fn in_shadows_of_points_and_directions() {
     let turn = GeometryChange::Rotate { axis: vec3(0.3, 0.1, 0.9), pivot: Vec3::ZERO };
     let up = GeometryChange::Translate(Vec3::Y);
+    let tip = GeometryChange::Rotate { axis: vec3(0.9, 0.2, 0.5), pivot: -Vec3::Y };
     let all = [Fault::Divergence, Fault::Sign, Fault::Weight];
     for (name, change, sum, faults) in [
         ("card", shift(), MOMENT, &all[..]),
         ("bulb", shift(), MOMENT, &all[..]),
         ("card", up, LIGHT, &[Fault::Direction]),
         ("sun", turn, LIGHT, &[Fault::Divergence]),
+        // What its own rate changes by along the floor has a part in the divergence.
+        ("floor", tip, MOMENT, &[Fault::Divergence]),
     ] {
         let motion = parameter(name, 0.0, alloc::vec![moves(name, change)]);
         compare_lit(EmitterMask::Delta, &shadows(), &motion, sum, faults);
