@@ -85,10 +85,19 @@ impl Tangents {
 
     /// True when matter or an emitter moves.
     pub(crate) fn move_light(&self) -> bool {
+        let mut light = self.targets().filter(|target| !matches!(target, Target::Sensor(_)));
+        light.any(|target| self.moves(target))
+    }
+
+    /// True of what moves, not of what has other colours or coefficients alone.
+    pub(crate) fn moves(&self, target: Target) -> bool {
         let of_media = |t: &MediumTangent| t.velocity != Affine::ZERO || !t.flows.is_empty();
-        self.shapes.iter().any(|s| !s.is_empty())
-            || self.media.iter().flatten().any(|(_, t)| of_media(t))
-            || self.emitters.iter().flatten().any(|(_, t)| t.moves())
+        match target {
+            Target::Shape(_) | Target::Sensor(_) => true,
+            Target::Bsdf(_) => false,
+            Target::Medium(m) => self.media[m].iter().any(|(_, t)| of_media(t)),
+            Target::Emitter(e) => self.emitters[e].iter().any(|(_, t)| t.moves()),
+        }
     }
 
     /// The same for one of the sensors; where there is no such sensor, none changes.

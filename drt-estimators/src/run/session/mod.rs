@@ -139,7 +139,8 @@ impl Session {
         let tangents = tangents.seen_by(settings.sensor);
         if let Some(name) = tangents.names.first() {
             let moves = tangents.move_light() || !tangents.sensor.is_empty();
-            let slide = slides(scene, tangents.targets(), settings);
+            let moving = tangents.targets().filter(|target| tangents.moves(*target));
+            let slide = slides(scene, moving, settings);
             scene.refuse_derivatives(name, moves, slide)?;
             if tangents.move_light() {
                 scene.refuse_rims(name)?;
