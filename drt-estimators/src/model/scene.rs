@@ -612,7 +612,10 @@ mod tests {
         let message = crate::Session::new(&scene, &parameters, &crate::Settings::default());
         let message = message.err().expect("a refusal").to_string();
         assert!(message.contains(&name) && message.contains("dielectric"), "{message}");
-        assert!(message.contains("`spin` cannot be differentiated"), "{message}");
+        assert!(
+            message.contains("`spin` moves something: it cannot be differentiated"),
+            "{message}"
+        );
         // Where vertices slide over surfaces, textures must not jump; their values may change.
         scene.shapes[shape].bsdf = 0;
         assert!(scene.refuse_derivatives("spin", true, true).is_ok());

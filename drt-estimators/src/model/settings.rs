@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use drt_motion::interior::InteriorMotion;
 
 use crate::model::error::{Error, SettingError};
-use crate::model::scene::Scene;
+use crate::model::scene::{Scene, Target};
 
 /// How derivatives are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -217,14 +217,14 @@ impl Settings {
         if self.sampling == PathSampling::Bidirectional
             && let Some(i) = scene.first_straight()
         {
-            let name = scene.shapes[i].id.clone().unwrap_or_else(|| alloc::format!("shape[{i}]"));
+            let name = scene.name_of(Target::Shape(i));
             return fail("sampling", SettingError::Straight(name));
         }
         if derivatives
             && self.sampling == PathSampling::Bidirectional
             && let Some(i) = scene.first_smooth()
         {
-            let name = scene.shapes[i].id.clone().unwrap_or_else(|| alloc::format!("shape[{i}]"));
+            let name = scene.name_of(Target::Shape(i));
             return fail("sampling", SettingError::Smooth(name));
         }
         Ok(())

@@ -70,7 +70,7 @@ impl RayMotion<'_> {
         let lifted =
             across.dot(lift) * value + weight * (gradient.dot(lift) + value * lift_divergence);
         let u = lifted.outer(at.normal);
-        let n = (weight * value).outer(at.lift_by_normal());
+        let n = (weight * value).outer(at.lift_by_normal(lift));
         send_to(at.matter, SurfaceAdjoint { u, n, ..SurfaceAdjoint::default() }, sink);
         let inv = 1.0 / at.distance;
         let rate =

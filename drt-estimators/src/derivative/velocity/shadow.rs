@@ -112,9 +112,9 @@ impl ShadowPlace {
         (flow.reject(dir) / (distance * cosine), (own + 2.0 * inv_range) / cosine)
     }
 
-    /// What h·∇(N·u) is by the rate of the geometric normal.
-    pub(crate) fn lift_by_normal(&self) -> Vec3 {
-        let (h, n) = (self.lift().0, self.normal);
+    /// What h·∇(N·u) is by the rate of the geometric normal, with the [h](Self::lift) of the place.
+    pub(crate) fn lift_by_normal(&self, h: Vec3) -> Vec3 {
+        let n = self.normal;
         (h - self.dir * (n.dot(h) / n.dot(self.dir))) * (-self.side * self.distance)
     }
 }
@@ -174,7 +174,7 @@ mod tests {
             }
             let (lift, lift_divergence) = here.lift();
             let u = u + spin.cross(here.dir * here.distance);
-            let spun = here.lift_by_normal().dot(spin.cross(n * here.side));
+            let spun = here.lift_by_normal(lift).dot(spin.cross(n * here.side));
             let closed = here.projection_divergence().dot(v) + lift_divergence * n.dot(u) + spun;
             let scale = 1.0 + differences.abs();
             assert!((closed - differences).abs() < 1e-6 * scale, "{closed} {differences}");

@@ -27,9 +27,9 @@ pub enum ElementError {
     /// A shape carries an emitter of another kind than area.
     #[error("it carries an emitter of type `{0}`; only those of type `area` belong on shapes")]
     NotAnArea(&'static str),
-    /// A smooth surface where something is to be differentiated.
+    /// A smooth surface where something that moves is to be differentiated.
     #[error(
-        "its BSDF, {bsdf}, is smooth, and `{parameter}` cannot be differentiated where light may be \
+        "its BSDF, {bsdf}, is smooth, and `{parameter}` moves something: it cannot be differentiated where light may be \
          reflected or refracted by it; make it rough, or use finite differences"
     )]
     Smooth {
@@ -38,9 +38,9 @@ pub enum ElementError {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
-    /// A BSDF that no derivative here knows of.
+    /// A BSDF past which nothing that moves is differentiated.
     #[error(
-        "its BSDF, {bsdf}, has no derivatives, nor has light that meets it: `{parameter}` can only be \
+        "its BSDF, {bsdf}, has no derivatives by what moves, nor has light that meets it: `{parameter}` can only be \
          differentiated by finite differences"
     )]
     NoDerivatives {

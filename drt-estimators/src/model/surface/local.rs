@@ -105,8 +105,8 @@ impl LocalBsdf<'_> {
         self.bsdf.sample_at(self.at.as_ref(), from, self.ns, u, given)
     }
 
-    /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`]. These do not fade: nothing is
-    /// differentiated there, and light that goes about in glass meets so many horizons that it would lose one percent.
+    /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`]. These do not fade: nothing that moves
+    /// is differentiated there, and light that goes about in glass meets so many horizons that it would lose one percent.
     #[inline]
     pub(crate) fn sample_specular(
         &self,

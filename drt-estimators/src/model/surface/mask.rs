@@ -108,7 +108,7 @@ impl Composed for Mask {
     fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let opacity = self.opaque();
         if let Some(inner) = self.bsdf.specular(at, wo, wi, n) {
-            let mut found = inner.scaled(Rgb::splat(opacity), opacity);
+            let mut found = inner.scaled(opacity, opacity);
             self.by_opacity(&mut found.params, inner.value);
             return Some(found);
         }

@@ -363,7 +363,7 @@ impl Bsdf {
         }
     }
 
-    /// True where light is scattered into single directions, which no derivative here knows of.
+    /// True where light is scattered into single directions, past which nothing that moves is differentiated.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
         match self {
@@ -391,7 +391,7 @@ impl Bsdf {
         }
     }
 
-    /// The name of the first BSDF in this one that nothing is differentiated at: it jumps where no term samples it, or its
+    /// The name of the first BSDF in this one that nothing which moves is differentiated at: it jumps where no term samples it, or its
     /// normals follow motions in ways that no term knows.
     pub(crate) fn undifferentiable(&self) -> Option<&'static str> {
         match self {

@@ -23,17 +23,10 @@ pub(crate) struct SpecularValue {
 
 impl SpecularValue {
     /// So many times the value, drawn so many times as often.
-    pub(super) fn scaled(&self, value: Rgb, probability: f64) -> Self {
+    pub(super) fn scaled(&self, value: f64, probability: f64) -> Self {
         let mut params = BsdfParams::default();
-        params.scatter(&self.params, value);
+        params.scatter(&self.params, Rgb::splat(value));
         Self { value: self.value * value, params, probability: self.probability * probability }
-    }
-
-    /// The derivatives of a walk's weight.
-    fn gradient(&self) -> BsdfParams {
-        let mut params = BsdfParams::default();
-        params.scatter(&self.params, Rgb::splat(self.probability.recip()));
-        params
     }
 }
 
@@ -60,7 +53,8 @@ impl Bsdf {
             | Self::RoughDielectric(_) => None,
             _ => {
                 let found = self.specular(at, wo, wi, n)?;
-                (found.probability > 0.0).then(|| found.gradient())
+                let inverse = found.probability.recip();
+                (found.probability > 0.0).then(|| found.scaled(inverse, 1.0).params)
             }
         }
     }
