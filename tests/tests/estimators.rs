@@ -4,7 +4,8 @@
 //! for four seconds each, to know what either estimator costs:
 //! `cargo test --release -p drt-tests --test estimators -- --ignored all:: --nocapture`
 //!
-//! All that the 2019 theory covers, with the scale of each derivative known to 1 % or for ten minutes each:
+//! All that the 2019 theory covers, with the scale of each derivative known to 1 % or for ten minutes each
+//! (`DRT_SCALE=0.02 DRT_SECONDS=3000`: to 2 %, or for fifty):
 //! `cargo test --release -p drt-tests --test estimators -- --ignored covered:: --nocapture`, and `warped::` for the 2023
 //! estimator, `both_ends::` for paths from both ends. Images by these against those from the camera:
 //! `cargo test --release -p drt-tests --test estimators -- --ignored images:: --nocapture`
@@ -27,9 +28,13 @@ fn run(stage: Result<Stage>, methods: &[Method], effort: Effort) {
     assert_eq!(failing, 0, "{failing} of {} derivatives fail", pairs.len());
 }
 
+fn number(variable: &str, default: f64) -> f64 {
+    std::env::var(variable).ok().and_then(|s| s.parse().ok()).unwrap_or(default)
+}
+
 /// Seconds that each estimator has for a stage, unless `DRT_SECONDS` says otherwise.
 fn seconds(default: f64) -> f64 {
-    std::env::var("DRT_SECONDS").ok().and_then(|s| s.parse().ok()).unwrap_or(default)
+    number("DRT_SECONDS", default)
 }
 
 fn short() -> Effort {
@@ -40,8 +45,9 @@ fn costs() -> Effort {
     Effort { noise: 0.01, scale: 0.0, seconds: seconds(4.0) }
 }
 
+/// Until scales are known to 1 %, or to the part that `DRT_SCALE` says.
 fn precise() -> Effort {
-    Effort { noise: 0.01, scale: 0.01, seconds: seconds(600.0) }
+    Effort { noise: 0.01, scale: number("DRT_SCALE", 0.01), seconds: seconds(600.0) }
 }
 
 /// Doubles samples until both images are known to 1/2 %, or time is over.
