@@ -5,9 +5,11 @@ mod common;
 use std::sync::Arc;
 
 use common::*;
+use drt_estimators::EstimatorKind::{self, PathSpace, Radiative, Warped};
 use drt_estimators::emitter::{Emitter, EnvironmentMap};
 use drt_estimators::{
-    EstimatorKind, Layer, PathSampling, Scene, Session, Settings, Unattended, finite_differences,
+    AuxiliarySamples, Layer, PathSampling, Scene, Session, Settings, Unattended, Warp, agreement,
+    finite_differences,
 };
 use drt_geom::procedural;
 use drt_math::{Mat3, Rgb, Rng, Vec3, vec3};
@@ -57,25 +59,29 @@ fn derivatives_under_a_sky() {
         parameter("camera", 0.0, vec![moves("camera", turn())]),
         parameter("sky", 0.0, vec![changes("sky", "radiance", grey(1.0))]),
     ];
-    let settings = Settings { threads: 1, ..Settings::default() };
-    let mut session = Session::new(&scene, &parameters, &settings).expect("a valid scene");
-    assert!(session.run(4096, &Unattended));
-    let rendering = session.rendering();
-    let settings = Settings { estimator: EstimatorKind::FiniteDifference, ..settings };
+    let settings = Settings { estimator: EstimatorKind::FiniteDifference, ..Settings::default() };
     let differences = finite_differences(&scene, &parameters, &settings, 4096, 0.01, &Unattended);
-    for (d, f) in rendering.derivatives.iter().zip(&differences.expect("a valid scene")) {
-        let ([own, error], [other, other_error]) = (sum(&d.total), sum(f));
-        let error = error.hypot(other_error);
-        assert!((own - other).abs() < 4.0 * error, "{own} {other} +- {error}");
-    }
-    // Rays that turn would see another part of it.
-    for estimator in [EstimatorKind::Radiative, EstimatorKind::Warped] {
+    let differences = differences.expect("a valid scene");
+    for estimator in [PathSpace, Radiative, Warped] {
         let settings = Settings { estimator, ..Settings::default() };
+        let rendering = rendered(&scene, &parameters, &settings, 4096);
+        for (d, f) in rendering.derivatives.iter().zip(&differences) {
+            let ([own, error], [other, other_error]) = (sum(&d.total), sum(f));
+            let error = error.hypot(other_error);
+            assert!((own - other).abs() < 4.0 * error, "{own} {other} +- {error}");
+            let found = agreement(&d.total, f, None);
+            assert!(found.agrees, "{estimator:?} {} {found:?}", d.name);
+        }
+    }
+    // Auxiliary samples do not know what else a ray that turns would see of it.
+    for warp in [Warp::Points, Warp::Directions] {
+        let warp = warp(AuxiliarySamples::default());
+        let settings = Settings { estimator: Warped, warp, ..Settings::default() };
         let refusal = |parameter: usize| {
             Session::new(&scene, &parameters[parameter..=parameter], &settings).err()
         };
         let message = refusal(0).expect("a refusal").to_string();
-        assert!(message.contains("sky: an environment of an image"), "{message}");
+        assert!(message.contains("not for environments of an image"), "{message}");
         assert!(refusal(2).is_none());
     }
 }

@@ -5,10 +5,11 @@ mod common;
 use std::sync::Arc;
 
 use common::*;
+use drt_estimators::EstimatorKind::{PathSpace, Radiative, Warped};
 use drt_estimators::sensor::{Aperture, Sensor};
 use drt_estimators::{
-    Estimate, EstimatorKind, PathSampling, Scene, Session, Settings, Unattended, agreement,
-    finite_differences, gradient,
+    AuxiliarySamples, Estimate, PathSampling, Scene, Session, Settings, Unattended, Warp,
+    agreement, finite_differences, gradient,
 };
 use drt_geom::procedural;
 use drt_math::{Rgb, Vec3, vec3};
@@ -40,17 +41,21 @@ fn parameters() -> Vec<Parameter> {
 
 fn derivatives_agree(times: u32) {
     for (scene, faulty) in scenes().iter().zip([true, false]) {
-        let settings = Settings { seed: 1, ..Settings::default() };
-        let path = rendered(scene, &parameters(), &settings, 4000 * times).derivatives;
         let settings = Settings { seed: 3, ..Settings::default() };
         let differences =
             finite_differences(scene, &parameters(), &settings, 4000 * times, 2e-2, &Unattended);
-        for (a, b) in path.iter().zip(&differences.expect("a valid scene")) {
-            let found = agreement(&a.total, b, None);
-            assert!(found.agrees, "{} {found:?}", a.name);
-            // What the lens itself does is small beside the noise of a short run.
-            if faulty && (times > 1 || ["ball", "turn"].contains(&&*a.name)) {
-                assert!(!agreement(&multiple(&a.total, 0.5), b, None).agrees, "{}", a.name);
+        let differences = differences.expect("a valid scene");
+        for estimator in [PathSpace, Radiative, Warped] {
+            let settings = Settings { seed: 1, estimator, ..Settings::default() };
+            let own = rendered(scene, &parameters(), &settings, 4000 * times).derivatives;
+            for (a, b) in own.iter().zip(&differences) {
+                let found = agreement(&a.total, b, None);
+                assert!(found.agrees, "{estimator:?} {} {found:?}", a.name);
+                // What the lens itself does is small beside the noise of a short run.
+                if faulty && (times > 1 || ["ball", "turn"].contains(&&*a.name)) {
+                    let half = agreement(&multiple(&a.total, 0.5), b, None);
+                    assert!(!half.agrees, "{estimator:?} {}", a.name);
+                }
             }
         }
     }
@@ -148,9 +153,10 @@ fn what_is_not_derived_is_refused() {
         assert!(parts.iter().all(|p| message.contains(p)), "{message}");
     };
     let [scene, _] = scenes();
-    for estimator in [EstimatorKind::Radiative, EstimatorKind::Warped] {
-        let settings = Settings { estimator, ..Settings::default() };
-        all(&refusal(&scene, &settings), &["camera: it has an aperture", "`path-space`"]);
+    for warp in [Warp::Points, Warp::Directions] {
+        let warp = warp(AuxiliarySamples::default());
+        let settings = Settings { estimator: Warped, warp, ..Settings::default() };
+        all(&refusal(&scene, &settings), &["warp", "auxiliary points", "aperture"]);
     }
     let both = Settings { sampling: PathSampling::Bidirectional, ..Settings::default() };
     all(&refusal(&scene, &both), &["sampling", "aperture"]);

@@ -38,14 +38,9 @@ fn scanned_body() {
     run(caged::scanned(path.as_ref()));
 }
 
-/// Lenses that not every estimator has derivatives of; the others refuse them.
+/// Parallel rays, which not every estimator has derivatives of; the others refuse them.
 mod through {
     use super::{Stage, lenses, run};
-
-    #[test]
-    fn thin_lens() {
-        run(lenses::thin_lens().map(Stage::short));
-    }
 
     #[test]
     fn parallel_rays() {
@@ -55,7 +50,6 @@ mod through {
     #[test]
     #[ignore = "minutes"]
     fn all() {
-        run(lenses::thin_lens());
         run(lenses::parallel_rays());
     }
 }

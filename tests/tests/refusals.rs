@@ -6,17 +6,34 @@ use drt_estimators::surface::{
     Principled, PrincipledThin, Property, Textured, ThinDielectric,
 };
 use drt_estimators::texture::{Bitmap, Texture, UvMap};
-use drt_estimators::{EstimatorKind, PathSampling, Scene, Session, Settings};
+use drt_estimators::{
+    AuxiliarySamples, EstimatorKind, PathSampling, Scene, Session, Settings, Warp,
+};
 use drt_math::{Rgb, ValueChange};
 use drt_tests::matrix::{Cell, Stage, lenses, materials, still, textures};
 use drt_tests::motion::changes;
 
 /// What a session says of the stage's parameter of a name, if it refuses it.
 fn refusal(scene: &Scene, stage: &Stage, name: &str, estimator: EstimatorKind) -> Option<String> {
+    refusal_with(scene, stage, name, &Settings { estimator, ..Settings::default() })
+}
+
+fn refusal_with(scene: &Scene, stage: &Stage, name: &str, settings: &Settings) -> Option<String> {
     let cell = stage.cells.iter().find(|c| c.parameter.name == name).expect("a cell");
-    let settings = Settings { estimator, ..Settings::default() };
-    let session = Session::new(scene, std::slice::from_ref(&cell.parameter), &settings);
+    let session = Session::new(scene, std::slice::from_ref(&cell.parameter), settings);
     session.err().map(|e| e.to_string())
+}
+
+/// Of the stage's panel that moves, by auxiliary samples of either kind.
+fn by_samples(scene: &Scene, stage: &Stage) -> Option<String> {
+    let by = |warp: fn(AuxiliarySamples) -> Warp| {
+        let warp = warp(AuxiliarySamples::default());
+        let settings = Settings { estimator: Warped, warp, ..Settings::default() };
+        refusal_with(scene, stage, "panel moves", &settings)
+    };
+    let [points, directions] = [by(Warp::Points), by(Warp::Directions)];
+    assert_eq!(points, directions);
+    points
 }
 
 fn assert_refused(message: Option<String>, parts: &[&str]) {
@@ -144,12 +161,9 @@ fn textures_that_jump_under_sliding_points() {
 #[test]
 fn skies_of_images_over_what_moves() {
     let (stage, sky) = (materials::coated().unwrap(), textures::sky_and_slide().unwrap());
-    for estimator in [Radiative, Warped] {
-        let mut scene = sky.scene.clone();
-        scene.emitters.retain(|e| e.id.as_deref() != Some("projector"));
-        let message = refusal(&scene, &stage, "panel moves", estimator);
-        assert_refused(message, &["panel moves", "sky", "path-space"]);
-    }
+    let mut scene = sky.scene.clone();
+    scene.emitters.retain(|e| e.id.as_deref() != Some("projector"));
+    assert_refused(by_samples(&scene, &stage), &["warp", "auxiliary", "environments"]);
     // The projector's picture ends where it is bright.
     let message = refusal(&sky.scene, &stage, "panel moves", PathSpace);
     assert_refused(message, &["panel moves", "projector", "black border"]);
@@ -160,10 +174,7 @@ fn skies_of_images_over_what_moves() {
 #[test]
 fn lenses_of_one_estimator() {
     let lens = lenses::thin_lens().unwrap();
-    for estimator in [Radiative, Warped] {
-        let message = refusal(&lens.scene, &lens, "panel moves", estimator);
-        assert_refused(message, &["camera", "aperture", "path-space"]);
-    }
+    assert_refused(by_samples(&lens.scene, &lens), &["warp", "auxiliary", "aperture"]);
     let parallel = lenses::parallel_rays().unwrap();
     let message = refusal(&parallel.scene, &parallel, "panel moves", Warped);
     assert_refused(message, &["camera", "orthographic", "path-space"]);

@@ -132,8 +132,11 @@ impl DiscontinuityEdges {
         let wedge = &discontinuity.edge.wedge;
         let (eye, forward) = (camera.position(), camera.pinhole().forward);
         let parallel = camera.is_orthographic();
-        let silhouette =
-            if parallel { wedge.projected_length(forward) } else { wedge.subtended_angle(eye) };
+        let silhouette = match camera.aperture() {
+            _ if parallel => wedge.projected_length(forward),
+            None => wedge.subtended_angle(eye),
+            Some(lens) => wedge.most_subtended(eye, lens.radius),
+        };
         let Some(normals) = self.normals(discontinuity).filter(|_| silhouette == 0.0) else {
             return silhouette;
         };

@@ -402,11 +402,6 @@ impl Emitter {
         matches!(self, Self::Constant { .. } | Self::Envmap { .. })
     }
 
-    /// True for surroundings of different light from different directions.
-    pub(crate) fn varies(&self) -> bool {
-        matches!(self, Self::Envmap { .. })
-    }
-
     fn strength_name(&self) -> &'static str {
         match self {
             Self::Area { .. }

@@ -255,10 +255,6 @@ impl Scene {
             let reason = ElementError::HiddenEmitters { parameter: parameter.into() };
             return Err(Error::Element { element: "integrator".into(), reason });
         }
-        if slide && let Some(i) = self.emitters.iter().position(|e| e.item.emitter.varies()) {
-            let (id, parameter) = (&self.emitters[i].id, parameter.into());
-            return Err(unusable(id, "emitter", i, ElementError::VaryingSky { parameter }));
-        }
         Ok(())
     }
 

@@ -57,18 +57,24 @@ impl Node {
     }
 }
 
+/// What a ray of the camera serves.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct CameraRay {
+    /// Column and row of the pixel.
+    pub(crate) pixel: [u32; 2],
+    /// The point of the lens where it starts, as [`ViewSample::lens`].
+    pub(crate) lens: [f64; 2],
+}
+
 /// A recorded path: a tree, since equiangular side vertices branch off its segments.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PathRecord {
     /// Where the camera's ray starts.
     pub(crate) origin: Vec3,
-    /// The point of the lens where it does, as [`ViewSample::lens`].
-    pub(crate) lens: [f64; 2],
+    pub(crate) camera_ray: CameraRay,
     pub(crate) nodes: Vec<Node>,
     pub(crate) crossings: Vec<Crossing>,
     pub(crate) connections: Vec<(Connection, Range<usize>)>,
-    /// Column and row that the path serves.
-    pub(crate) pixel: [u32; 2],
     /// The path's value.
     pub(crate) value: Rgb,
     /// By vertex of a light path: what it scatters of what comes from the camera; its node as the next one sees it, or 0.
@@ -79,7 +85,8 @@ pub(crate) struct PathRecord {
 impl PathRecord {
     /// Empties the record for a camera ray of a `pixel` with filter weight `value`.
     pub(crate) fn begin(&mut self, pixel: [u32; 2], view: &ViewSample, value: Rgb) {
-        (self.pixel, self.origin, self.lens) = (pixel, view.origin, view.lens);
+        self.origin = view.origin;
+        self.camera_ray = CameraRay { pixel, lens: view.lens };
         self.nodes.clear();
         self.crossings.clear();
         self.connections.clear();

@@ -1,4 +1,4 @@
-//! What an [orthographic](crate::model::sensor) camera's derivatives cannot have in or through its film, and a lens not at all.
+//! What an [orthographic](crate::model::sensor) camera's derivatives cannot have in or through its film.
 //!
 //! Paths start on the film's plane. In material form vertices in a medium around the film may cross it, and where a surface
 //! goes through it visibility jumps without an edge; both have terms that are not derived here, so they are refused. A
@@ -21,13 +21,6 @@ pub(super) fn check(
     settings: &Settings,
 ) -> Result<(), Error> {
     let camera = &world.camera;
-    if camera.aperture().is_some()
-        && active.moves_geometry()
-        && settings.estimator != EstimatorKind::PathSpace
-    {
-        let element = world.scene.name_of(Target::Sensor(settings.sensor));
-        return Err(Error::Element { element, reason: ElementError::Lens });
-    }
     if !camera.is_orthographic() || !active.moves_geometry() {
         return Ok(());
     }

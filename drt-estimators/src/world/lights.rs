@@ -7,7 +7,7 @@
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
-use drt_math::{AliasTable, Rgb, Rng, Vec3, warp};
+use drt_math::{AliasTable, Rgb, RgbVec, Rng, Vec3, warp};
 
 use crate::model::emitter::{Emitter, EnvironmentMap};
 use crate::model::error::Error;
@@ -155,6 +155,11 @@ impl Environment {
             None => self.strength,
             Some(map) => self.strength * map.at(w),
         }
+    }
+
+    /// The gradient of the radiance by a unit direction, across it.
+    pub(crate) fn gradient(&self, w: Vec3) -> RgbVec {
+        self.map.as_ref().map_or(RgbVec::ZERO, |map| map.gradient(w) * self.strength)
     }
 
     /// Density per steradian with which light samples have a unit direction.
@@ -318,6 +323,11 @@ impl LightTable {
 
     pub(crate) fn environment(&self) -> Option<&Environment> {
         self.environment.as_ref()
+    }
+
+    /// True where the environment differs by direction.
+    pub(crate) fn has_image(&self) -> bool {
+        self.environment.as_ref().is_some_and(|e| e.map.is_some())
     }
 
     /// Lights with a position inside a scattering medium, for equiangular sampling: emitter index,

@@ -32,8 +32,8 @@ macro_rules! every_stage {
             surfaces: room room_box_filter standing knot gloss blend near_lamp;
             lights: spot point_and_sun;
             materials: principled thin brushed pressed coated unmixed;
-            lenses: cropped instances;
-            textures: picture mosaic stained picture_lamp sky_and_slide thrown;
+            lenses: thin_lens cropped instances;
+            textures: picture mosaic stained picture_lamp under_a_sky sky_and_slide thrown;
             media: fog_box blob still_blob shade smoke glass dented_glass beam layers sheet ember;
             deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed
                 lantern stirred_smoke still_smoke fine_milk fine_glass;

@@ -119,6 +119,35 @@ pub fn picture_lamp() -> Result<Stage> {
     Ok(Stage::new("picture lamp", scene, cells))
 }
 
+/// An environment that looks like nothing else turned or mirrored.
+fn sky() -> Result<Emitter> {
+    let texels: Vec<[f32; 3]> = (0..12_u16)
+        .map(|i| [0.4, 0.9, 1.7].map(|by: f32| 0.5 + 0.4 * (by * f32::from(i)).sin()))
+        .collect();
+    let map = EnvironmentMap::new([4, 3], texels, Mat3::IDENTITY)?;
+    Ok(Emitter::Envmap { radiance: Rgb::ONE, map: map.into() })
+}
+
+/// What moves under an environment, the camera too, which sees some of it.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn under_a_sky() -> Result<Stage> {
+    let set = panel(diffuse([0.7, 0.6, 0.5]))?.light("sky", sky()?);
+    let spin = |target| turn(target, vec3(0.3, 1.0, 0.2), Vec3::ZERO);
+    let cells = vec![
+        Cell::new("panel moves", [translate("panel", vec3(0.3, 0.5, -0.3))])
+            .samples(1024)
+            .representative(),
+        Cell::new("panel and sky turn", ["panel", "sky"].map(spin)),
+        Cell::new("camera turns", [turn("camera", vec3(0.3, 1.0, 0.4), vec3(0.3, 1.2, -2.6))])
+            .samples(1024)
+            .representative(),
+        Cell::new("everything turns", ["panel", "wall", "lamp", "sky", "camera"].map(spin)),
+    ];
+    Ok(Stage::new("under a sky", set.scene, cells))
+}
+
 /// A projector and an environment: their numbers, texels and turns.
 ///
 /// # Errors
@@ -126,13 +155,9 @@ pub fn picture_lamp() -> Result<Stage> {
 pub fn sky_and_slide() -> Result<Stage> {
     let mut set = panel(diffuse([0.7, 0.6, 0.5]))?;
     let image = image()?;
-    let texels: Vec<[f32; 3]> = (0..12_u16)
-        .map(|i| [0.4, 0.9, 1.7].map(|by: f32| 0.5 + 0.4 * (by * f32::from(i)).sin()))
-        .collect();
-    let map = EnvironmentMap::new([4, 3], texels, Mat3::IDENTITY)?;
     let frame = Mat3::rotation(Vec3::X, std::f64::consts::FRAC_PI_2);
     let slide = Slide::projector(Some(Texture::Bitmap(image)), [0.5, 0.4])?;
-    set = set.light("sky", Emitter::Envmap { radiance: Rgb::ONE, map: map.into() }).light(
+    set = set.light("sky", sky()?).light(
         "projector",
         Emitter::Projector {
             position: vec3(0.2, 1.6, -0.4),

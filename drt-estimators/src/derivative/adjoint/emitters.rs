@@ -21,17 +21,17 @@ pub(super) struct LightEnd<'a> {
     pub(super) motion: Option<&'a LightMotion>,
 }
 
-/// How a point on an emitter moves.
+/// How the emitter's end of a connection moves.
 pub(super) struct LightMotion {
-    end: Vertex,
-    velocity: VertexVelocity,
+    /// Of a point on an area.
+    end: Option<(Vertex, VertexVelocity)>,
     /// Of the ray to it.
     turn: Option<RayTurn>,
 }
 
 impl Differentiator<'_> {
-    /// How the emitter's point of a connection moves, and how the ray to it turns; `None` of a point without a surface, and
-    /// where nothing moves.
+    /// How the emitter's point of a connection moves, and how the ray to it turns; `None` where neither does, and of points and
+    /// directions, whose rays turn with shadows.
     pub(super) fn light_motion(
         &mut self,
         viewer: &Vertex,
@@ -40,13 +40,18 @@ impl Differentiator<'_> {
         field: &dyn VelocityField,
         active: &ActiveInputs,
     ) -> Option<LightMotion> {
-        let LightKind::Area(s) = &light.kind else { return None };
-        let (dir, distance, end) = (light.w, light.distance, Some(s));
-        let ray = TurningRay { viewer, moves: near_moves, pixel: None, dir, distance, end };
+        if light.is_delta() {
+            return None;
+        }
+        let (dir, distance, end) = (light.w, light.distance, light.point());
+        let ray = TurningRay { viewer, moves: near_moves, of_camera: None, dir, distance, end };
         let Self { world, parts, auxiliary, probe, .. } = self;
         parts.clear();
         auxiliary.clear();
         let turn = field.turn(world, &ray, probe, parts);
+        let Some(s) = end else {
+            return turn.is_some().then_some(LightMotion { end: None, turn });
+        };
         let moves = near_moves || turn.is_some() || light_moves(light, active);
         if !(moves || field.looks_around()) {
             return None;
@@ -60,7 +65,7 @@ impl Differentiator<'_> {
         if !moves && auxiliary.is_empty() {
             return None;
         }
-        Some(LightMotion { end, velocity, turn })
+        Some(LightMotion { end: Some((end, velocity)), turn })
     }
 
     /// Sensitivities at the emitter's end of a connection.
@@ -80,7 +85,8 @@ impl Differentiator<'_> {
             LightKind::Area(point) => {
                 let mut slide = RgbVec::ZERO;
                 area(self.world, light.emitter, point, per_value, &mut slide, sink);
-                let Some(LightMotion { end, velocity, turn: turn_of_ray }) = motion else {
+                let Some(LightMotion { end: Some((end, velocity)), turn: turn_of_ray }) = motion
+                else {
                     self.segment(path, Far::Direction, false, weight, here, sink);
                     return;
                 };
@@ -106,10 +112,8 @@ impl Differentiator<'_> {
                 let auxiliary = &self.auxiliary[..];
                 let at = Propagated { vertex: end, velocity, auxiliary, weight, matter };
                 self.propagate(path, &at, &mut lit, here, sink);
-                if let Some(turn) = turn_of_ray.as_ref().filter(|_| !self.edges_at_rest) {
-                    let parts = &self.parts[..];
-                    let ray = RayMotion { turn, parts, shadows: &[], light: None };
-                    here.u -= ray.send(light.w, &turned, weight, sink);
+                if let Some(turn) = turn_of_ray {
+                    self.turn_to_light(turn, light, &turned, weight, here, sink);
                 }
             }
             LightKind::Position => {
@@ -124,10 +128,16 @@ impl Differentiator<'_> {
                 self.intensity(path, light, per_value, at_light, here, sink);
             }
             LightKind::Environment => {
-                if let Some(environment) = self.world.lights.environment() {
-                    surroundings(environment, light.w, per_value, sink);
+                let Some(environment) = self.world.lights.environment() else { return };
+                surroundings(environment, light.w, per_value, sink);
+                let turn = motion.and_then(|motion| motion.turn.as_ref());
+                let moving = near_moves || turn.is_some();
+                let mut turned = self.segment(path, Far::Direction, moving, weight, here, sink);
+                if let Some(turn) = turn {
+                    turned += environment.gradient(light.w) * per_value;
+                    turned += to_wi.unwrap_or(RgbVec::ZERO);
+                    self.turn_to_light(turn, light, &turned, weight, here, sink);
                 }
-                self.segment(path, Far::Direction, near_moves, weight, here, sink);
             }
             LightKind::Direction => {
                 let moving = near_moves || emitter;
@@ -136,6 +146,22 @@ impl Differentiator<'_> {
                     direction(light, to_wi, turn, per_value, sink);
                 }
             }
+        }
+    }
+
+    /// Sends the sensitivity `turned` to the rate of the direction of the ray to an emitter, which turns like this.
+    fn turn_to_light<S: AdjointSink>(
+        &self,
+        turn: &RayTurn,
+        light: &LightSample,
+        turned: &RgbVec,
+        weight: Rgb,
+        here: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        if !self.edges_at_rest {
+            let ray = RayMotion { turn, parts: &self.parts, shadows: &[], light: None };
+            here.u -= ray.send(light.w, turned, weight, sink);
         }
     }
 

@@ -176,7 +176,7 @@ impl<'w> Differentiator<'w> {
         }
         self.rng = rng;
         self.filter = filter;
-        self.camera = self.world.camera.at_lens(path.record.lens);
+        self.camera = self.world.camera.at_lens(path.record.camera_ray.lens);
         (self.turn, self.origin) = (RgbVec::ZERO, RgbVec::ZERO);
         self.sensor = [SensorGradient::default(); 3];
         self.locals.clear();
@@ -369,7 +369,11 @@ impl<'w> Differentiator<'w> {
                 if let Some(filter) = seen.filter(|_| sink.active().sensor) {
                     self.seen(None, arrival.dir, value, filter, phi, sink.active());
                 }
-                let along = self.segment(&path, Far::Direction, ray_moves, weight, there, sink);
+                let mut along = self.segment(&path, Far::Direction, ray_moves, weight, there, sink);
+                if let Some(environment) = world.lights.environment() {
+                    let each = arrival.throughput * arrival.emission_weight;
+                    along += environment.gradient(arrival.dir) * each;
+                }
                 turned_wholly += along;
                 turned = along * (1.0 - phi);
             }

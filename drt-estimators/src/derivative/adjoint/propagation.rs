@@ -257,7 +257,7 @@ impl Differentiator<'_> {
         let gradient = |origin: Vec3, turn: Vec3, seen: &SensorGradient| {
             let mut g = self.camera.ray_gradient(record.origin, record.nodes[0].wi, origin, turn);
             g += *seen;
-            self.world.camera.lens_gradient(record.lens, g)
+            self.world.camera.lens_gradient(record.camera_ray.lens, g)
         };
         sink.sensor(&[
             gradient(origin.r, turn.r, &seen[0]),

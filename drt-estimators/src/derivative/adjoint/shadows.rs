@@ -32,7 +32,7 @@ impl Differentiator<'_> {
         let ray = TurningRay {
             viewer: viewer.unwrap_or(&eye),
             moves: velocities.moves(parent),
-            pixel: (parent == 0).then_some(record.pixel),
+            of_camera: (parent == 0).then_some(record.camera_ray),
             dir: arrival.dir,
             distance: arrival.distance,
             end: Some(s),
@@ -42,9 +42,14 @@ impl Differentiator<'_> {
         parts.clear();
         let turn = field.turn_with_shadows(world, &ray, light, moves, &mut parts);
         if let Some(turn) = &turn {
-            let (pixel, turn_of_ray) = (record.pixel, Some(turn));
-            let found =
-                Found { pixel, viewer, ray_moves: true, turn: turn_of_ray, arrival, hits: &[] };
+            let found = Found {
+                camera_ray: record.camera_ray,
+                viewer,
+                ray_moves: true,
+                turn: Some(turn),
+                arrival,
+                hits: &[],
+            };
             let mut auxiliary = Vec::new();
             let velocity = field.vertex(world, &found, &mut self.probe, &mut auxiliary);
             let weight = velocity.blend.weight;

@@ -48,6 +48,7 @@ use crate::derivative::velocity::blend::region::BlendRegion;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::model::scene::Shape;
+use crate::sampling::record::CameraRay;
 use crate::world::World;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 
@@ -204,26 +205,39 @@ impl Blends {
         }
     }
 
-    /// φ of a vertex that the camera sees, but for the part that depends on the pixel.
-    pub(crate) fn in_view(&self, world: &World, vertex: &Vertex) -> Blend {
+    /// φ of a vertex that the camera sees along the unit direction `dir` at a `distance`, but for the part that depends on
+    /// the pixel.
+    pub(crate) fn in_view(
+        &self,
+        world: &World,
+        vertex: &Vertex,
+        dir: Vec3,
+        distance: f64,
+    ) -> Blend {
         let Kind::Surface(s) = &vertex.kind else { return Blend::default() };
         let cosine = self.camera_cosines.get(s.shape as usize).copied().unwrap_or(0.0);
-        let ray = vertex.x - world.camera.eye_of(vertex.x);
-        let distance = ray.length();
         // Parallel rays are those of a viewer infinitely far.
         let apart = if world.camera.is_orthographic() { f64::INFINITY } else { distance };
-        graze(world, s, ray / distance, apart, cosine)
+        graze(world, s, dir, apart, cosine)
     }
 
-    /// φ of a vertex that the camera sees in one pixel.
-    pub(crate) fn in_pixel(&self, world: &World, vertex: &Vertex, pixel: [u32; 2]) -> Blend {
-        let blend = self.in_view(world, vertex);
+    /// φ of a vertex that a ray of the camera finds along the unit direction `dir` at a `distance`.
+    pub(crate) fn in_pixel(
+        &self,
+        world: &World,
+        vertex: &Vertex,
+        dir: Vec3,
+        distance: f64,
+        ray: CameraRay,
+    ) -> Blend {
+        let blend = self.in_view(world, vertex, dir, distance);
         if blend.weight == 0.0 {
             return blend;
         }
-        let view = world.camera.view(vertex.x);
-        let (weight, slope) = world.camera.window(pixel, view.pixel);
-        let (gradient, _) = world.camera.view_gradient(&view, slope, 0.0);
+        let camera = world.camera.at_lens(ray.lens);
+        let view = camera.view(vertex.x);
+        let (weight, slope) = camera.window(ray.pixel, view.pixel);
+        let (gradient, _) = camera.view_gradient(&view, slope, 0.0);
         blend.and(Blend { weight, gradient })
     }
 }

@@ -55,6 +55,7 @@ pub(crate) use crate::derivative::velocity::turn::{
 use crate::derivative::velocity::warp::SurfaceHit;
 
 use crate::derivative::sensitivity::ActiveInputs;
+use crate::sampling::record::CameraRay;
 use crate::sampling::trace::Arrival;
 use crate::world::World;
 use crate::world::lights::LightSample;
@@ -101,8 +102,8 @@ pub(crate) enum Moved {
 
 /// A vertex as it is found.
 pub(crate) struct Found<'a> {
-    /// Column and row of the pixel that the path serves.
-    pub(crate) pixel: [u32; 2],
+    /// The ray that the path starts with.
+    pub(crate) camera_ray: CameraRay,
     /// The vertex that the ray started from; `None` at the camera.
     pub(crate) viewer: Option<&'a Vertex>,
     /// The ray moves: its origin, or its direction.

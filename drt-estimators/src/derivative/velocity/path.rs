@@ -70,7 +70,7 @@ impl PathVelocities {
         let turning = TurningRay {
             viewer,
             moves: self.vertices[node].moves,
-            pixel: (node == 0).then_some(record.pixel),
+            of_camera: (node == 0).then_some(record.camera_ray),
             dir,
             distance: ray.length,
             end: ray.end.as_ref().map(|(point, _)| point),
@@ -107,7 +107,7 @@ impl PathVelocities {
     ) {
         let parent = arrival.parent as usize;
         let found = Found {
-            pixel: record.pixel,
+            camera_ray: record.camera_ray,
             viewer: record.nodes[parent].vertex(),
             ray_moves: self.vertices[parent].moves || self.present.is_some(),
             turn: self.present.map(|i| &self.turns[i as usize]),

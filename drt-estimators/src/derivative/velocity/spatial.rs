@@ -94,7 +94,9 @@ impl VelocityField for Spatial {
         let blend = match (&arrival.end, viewer) {
             // A point at rest that a ray at rest finds.
             (Endpoint::Surface(_), _) if !(propagated || on_mover) => Blend::default(),
-            (Endpoint::Surface(v), None) => self.blends.in_pixel(world, v, found.pixel),
+            (Endpoint::Surface(v), None) => {
+                self.blends.in_pixel(world, v, arrival.dir, arrival.distance, found.camera_ray)
+            }
             (Endpoint::Surface(v) | Endpoint::Volume(v, _), Some(viewer)) => {
                 self.blends.of(world, viewer, v, arrival.dir, arrival.distance)
             }

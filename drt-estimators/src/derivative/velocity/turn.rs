@@ -23,6 +23,7 @@ use core::ops::{Add, AddAssign, Div, Mul, Range, Sub};
 use drt_math::Vec3;
 
 use crate::derivative::velocity::{Blend, ShadowPart, ShadowTurn};
+use crate::sampling::record::CameraRay;
 use crate::world::vertex::{MaterialPoint, SurfacePoint, Vertex};
 
 /// A summand of the rate of a ray's direction, linear in the velocity w of a point beside the ray less that of the ray's
@@ -136,8 +137,8 @@ pub(crate) struct TurningRay<'a> {
     pub(crate) viewer: &'a Vertex,
     /// The viewer moves for some parameter.
     pub(crate) moves: bool,
-    /// The viewer is the camera, and this the pixel's column and row.
-    pub(crate) pixel: Option<[u32; 2]>,
+    /// The viewer is the camera, and this what the ray serves.
+    pub(crate) of_camera: Option<CameraRay>,
     /// Unit.
     pub(crate) dir: Vec3,
     /// To where it ends; infinite where it leaves the scene.

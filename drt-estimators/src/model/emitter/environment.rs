@@ -167,8 +167,13 @@ impl EnvironmentMap {
     }
 
     /// The derivative of the light from a unit direction w as the map turns, by the vector of its rotation ω: directions in the
-    /// map's frame turn by -ω × w, so that it is ∇L × w of the gradient ∇L by w. At the poles, where that grows without bounds, it is zero.
+    /// map's frame turn by -ω × w, so that it is ∇L × w.
     pub(crate) fn by_rotation(&self, w: Vec3) -> RgbVec {
+        self.gradient(w).map(|g| g.cross(w))
+    }
+
+    /// The gradient ∇L of the light by its unit direction, across it. At the poles, where it grows without bounds, it is zero.
+    pub(crate) fn gradient(&self, w: Vec3) -> RgbVec {
         let ([x, y], [s, t]) = self.cell(w);
         let [[a, b], [c, d]] = [y, y + 1].map(|y| [x, x + 1].map(|x| self.wrapped(x, y)));
         let [width, height] = self.size.map(f64::from);
@@ -182,9 +187,7 @@ impl EnvironmentMap {
         // Of the angles atan2(x, -z) and acos y.
         let by_around = vec3(-v.z, 0.0, v.x) / square;
         let by_down = (v * v.y - Vec3::Y) / fm::sqrt(square);
-        let gradient =
-            around.outer(self.to_world * by_around) + down.outer(self.to_world * by_down);
-        gradient.map(|g| g.cross(w))
+        around.outer(self.to_world * by_around) + down.outer(self.to_world * by_down)
     }
 
     /// Draws a direction that light comes from, by two uniform numbers and one that chooses, with its density per steradian.

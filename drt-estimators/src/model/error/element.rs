@@ -95,11 +95,6 @@ pub enum ElementError {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },
-    /// A lens where edges are to be followed in view.
-    #[error(
-        "it has an aperture, and only `path-space` and finite differences have derivatives of what moves in the view of a lens"
-    )]
-    Lens,
     /// Derivatives where the camera does not see emitters.
     #[error(
         "`hide_emitters` is true, and `{parameter}` can only be differentiated by finite differences where the \
@@ -138,15 +133,6 @@ pub enum ElementError {
     UndifferentiatedTexture {
         /// What it stands for.
         property: Property,
-        /// The parameter, or what else was to be differentiated by.
-        parameter: String,
-    },
-    /// An environment that differs by direction where rays turn.
-    #[error(
-        "an environment of an image, under which `{parameter}` can only be differentiated by the estimator \
-         path-space, or by finite differences"
-    )]
-    VaryingSky {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },

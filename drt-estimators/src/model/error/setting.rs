@@ -74,6 +74,12 @@ pub enum SettingError {
     /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
     #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
     JumpingFilter,
+    /// A [`Warp`](crate::Warp) by auxiliary samples in the view of a lens.
+    #[error("auxiliary points and directions are not for cameras with an aperture")]
+    Aperture,
+    /// A [`Warp`](crate::Warp) by auxiliary samples under an environment that differs by direction.
+    #[error("auxiliary points and directions are not for environments of an image")]
+    VaryingSky,
     /// No target to fit to.
     #[error("is missing: there is nothing to fit to")]
     NoTarget,

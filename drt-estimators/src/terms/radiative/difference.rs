@@ -129,7 +129,7 @@ impl<'a> EdgeView<'a> {
         tracer.radiance_from(vertex, self.w, &mut light);
         let world = tracer.world;
         let blend = match self.viewer.kind {
-            Kind::Point => self.blends.in_view(world, &vertex),
+            Kind::Point => self.blends.in_view(world, &vertex, -self.w, distance),
             _ => self.blends.of(world, self.viewer, &vertex, -self.w, distance),
         };
         let blend = blend.weight * self.distance / distance;

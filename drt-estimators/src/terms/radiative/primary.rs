@@ -18,10 +18,11 @@ impl Radiative {
     ) -> Option<()> {
         tracer.counters.boundary_samples += 1;
         let world = tracer.world;
-        let camera = &world.camera;
         let chosen = self.camera.as_ref()?.sample(&self.discontinuities, &mut tracer.rng);
+        let lens = world.camera.draw_lens(&mut tracer.rng);
+        let camera = &*world.camera.at_lens(lens);
         let (x, point) = chosen.discontinuity.point(chosen.along);
-        let eye = world.eye_of(x);
+        let eye = world.eye_at(camera.eye_of(x));
         let view = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, &eye)?;
         let (_, importance) = see(camera, &Vertex { x, medium: None, kind: Kind::Point })?;
         let tau = view.open(tracer)?;
@@ -40,6 +41,7 @@ impl Radiative {
             let n = view.sides.n;
             // A camera that turns takes its image points with it.
             let gradient = camera.ray_gradient(eye.x, -view.w, -n, n * -distance);
+            let gradient = world.camera.lens_gradient(lens, gradient);
             functional.items.clear();
             functional.items.extend(matter.map(|matter| VelocityTerm::of(matter, n)));
             functional.items.push(VelocityTerm::Sensor(gradient));

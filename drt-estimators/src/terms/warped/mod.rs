@@ -137,6 +137,12 @@ impl Warped {
             Warp::Points(_) | Warp::Directions(_) if !surfaces_only => {
                 refused(SettingError::SurfacesOnly)
             }
+            Warp::Points(_) | Warp::Directions(_) if any && world.camera.aperture().is_some() => {
+                refused(SettingError::Aperture)
+            }
+            Warp::Points(_) | Warp::Directions(_) if any && world.lights.has_image() => {
+                refused(SettingError::VaryingSky)
+            }
             Warp::Directions(_) if world.camera.has_borders() => {
                 refused(SettingError::JumpingFilter)
             }

@@ -10,6 +10,7 @@ use crate::derivative::velocity::{
     Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurnParts, TurningRay,
     VelocityField, VertexVelocity, Weight,
 };
+use crate::sampling::record::CameraRay;
 use crate::sampling::trace::Endpoint;
 use crate::terms::warped::edges::TurningEdges;
 use crate::terms::warped::near::ANGLE;
@@ -148,8 +149,8 @@ impl VelocityField for EdgeTurns {
 
 /// Within which angle edges turn a ray, and the weight of what does not turn with it.
 fn around(world: &World, ray: &TurningRay<'_>) -> (f64, Weight) {
-    let Some(pixel) = ray.pixel else { return (ANGLE, Weight::default()) };
-    let camera = &world.camera;
+    let Some(CameraRay { pixel, lens }) = ray.of_camera else { return (ANGLE, Weight::default()) };
+    let camera = &*world.camera.at_lens(lens);
     let angle = f64::min(PIXELS * camera.pinhole().pixel_size, ANGLE);
     if !camera.has_borders() {
         return (angle, Weight::default());

@@ -44,7 +44,10 @@ fn gradients_are_those_of_weights() {
             &|v| own.of(world, &viewer, v, (v.x - from).normalize(), (v.x - from).length()),
             &|v| {
                 let pixel = world.camera.view(world.point(prim, [0.3; 2]).1).pixel;
-                own.in_pixel(world, v, pixel.map(|p| p.clamp(0.0, 4.0) as u32))
+                let pixel = pixel.map(|p| p.clamp(0.0, 4.0) as u32);
+                let ray = CameraRay { pixel, lens: [0.0; 2] };
+                let d = v.x - world.camera.eye_of(v.x);
+                own.in_pixel(world, v, d.normalize(), d.length(), ray)
             },
         ];
         let at = |bary: [f64; 2]| -> (SurfacePoint, Vertex) {

@@ -118,7 +118,8 @@ impl VelocityField for AuxiliaryDirections {
             WarpKernel::Year2020 => WIDE,
             _ => SIGMA,
         };
-        let spread = if ray.pixel.is_some() { f64::min(PIXELS * pixel, spread) } else { spread };
+        let spread =
+            if ray.of_camera.is_some() { f64::min(PIXELS * pixel, spread) } else { spread };
         if !self.edges.any_near(ray.viewer, ray.dir, NEAR * spread, ray.moves) {
             return None;
         }
