@@ -32,7 +32,7 @@ def main():
         for n, line in enumerate(file.read_text().splitlines(), 1):
             if (m := words["code"].search(code_of(line))) and not FOREIGN.search(line):
                 faults.append(f"{file.relative_to(ROOT)}:{n}: {m[0]}")
-    docs = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("docs/estimators/*.md"), *ROOT.glob("drt-*/README.md")]
+    docs = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("docs/*/*.md"), *ROOT.glob("drt-*/README.md")]
     for file in sorted(docs):
         for n, line in enumerate(file.read_text().splitlines(), 1):
             if m := words["docs"].search(line):
