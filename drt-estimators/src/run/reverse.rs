@@ -464,7 +464,8 @@ impl Reverse<'_> {
         let component = &self.components[c];
         let prepared = &component.prepared;
         let source = prepared.sources[i];
-        let per_pixel = f64::from(self.spp) * prepared.source_ratio(i);
+        let share = component.guiding[i].share();
+        let per_pixel = f64::from(self.spp) * prepared.source_ratio(i) * share;
         let count = prepared.samples_per_batch(per_pixel);
         let scale = 1.0 / (f64::from(count) * BATCHES as f64);
         let mut receiver = Checked::new(ToGradient {

@@ -5,6 +5,9 @@
 //! its mean size, so that all count alike; costs are rays and lookups in grids. A pilot goes in rounds, each
 //! of which is guided by those before it, and doubles what is known: most samples of a first, even round find nothing.
 //!
+//! Guided samples find more, and cost more for it. There are fewer of them, so that a source takes the time that it would
+//! take without a guide: with the gain g of work, variance is 1/g as large.
+//!
 //! Pilots take a [part](PART) of the samples of a run at most, and stop where there is nothing to gain. Their samples have no part in
 //! derivatives, so these are unbiased whatever was learnt. A pass after others goes on learning, by all samples of the run
 //! so far. Pilots draw numbers of their own in batches of fixed size, merged in order: guides are the same for any number of threads,
@@ -71,6 +74,12 @@ impl Guiding {
     /// The guide, where there is one that helps.
     pub(crate) fn guide(&self) -> Option<&Guide> {
         self.learnt.as_ref()?.guide.as_ref()
+    }
+
+    /// Samples to one that is even: as many as cost the same, and no more than without a guide.
+    pub(crate) fn share(&self) -> f64 {
+        let learnt = self.learnt.as_ref().filter(|learnt| learnt.guide.is_some());
+        learnt.map_or(1.0, |learnt| 1.0 / f64::max(learnt.cost, 1.0))
     }
 
     /// What was learnt, and the number of samples that it took.

@@ -140,7 +140,7 @@ fn derivatives(
     let (mut forward, mut apart) = (Vec::new(), 0.0);
     for i in 0..paths {
         let slope = trace(&mut tracer, &mut path, None, 31, i);
-        let column = f64::from(path.record.pixel[0]) - 2.5;
+        let column = f64::from(path.record.camera_ray.pixel[0]) - 2.5;
         let rng = Rng::new(6, 0, i);
         rates.clear();
         differentiator.differentiate(&path.path(), slope, rng.clone(), &mut rates);

@@ -132,6 +132,11 @@ impl Component {
         Some(interior::Component { world, along, sink })
     }
 
+    /// Samples of a batch of a source that takes so many per pixel where none is guided.
+    pub(super) fn per_batch(&self, i: usize, per_pixel: f64) -> u32 {
+        self.prepared.samples_per_batch(per_pixel * self.guiding[i].share())
+    }
+
     /// Adds samples of one source of boundary samples, so many per pixel, in a world lit by all emitters; false when cancelled.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn run_source(
@@ -164,7 +169,7 @@ impl Component {
         let (mut account, mut finished) = (Account::default(), 0.0);
         let Some(motion) = &self.motion else { return (account, true) };
         let source = self.prepared.sources[i];
-        let per_batch = self.prepared.samples_per_batch(per_pixel);
+        let per_batch = self.per_batch(i, per_pixel);
         let splatter = self.prepared.splatter(all, seed);
         let guide = self.guiding[i].guide();
         let mut sums = film.begin();

@@ -94,8 +94,9 @@ pub(super) fn describe_guide(source: BoundarySource, guiding: &Guiding) -> Strin
     };
     match &learnt.guide {
         Some(guide) => alloc::format!(
-            "{name}: {:.2} of the work, by a pilot of {samples} samples and {} cells",
+            "{name}: {:.2} of the work by {:.2} of the samples, with a pilot of {samples} and {} cells",
             1.0 / learnt.gain,
+            guiding.share(),
             guide.cells()
         ),
         None => alloc::format!(

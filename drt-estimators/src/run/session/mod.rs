@@ -377,7 +377,7 @@ impl Session {
     /// Samples of a batch of a source, in a pass of so many of each pixel.
     fn per_batch(&self, spp: u32, c: usize, i: usize) -> u32 {
         let per_pixel = f64::from(spp) * self.source_ratio(c, i);
-        self.components[c].prepared.samples_per_batch(per_pixel)
+        self.components[c].per_batch(i, per_pixel)
     }
 
     fn parameters(&self) -> usize {

@@ -60,6 +60,8 @@ pub(crate) struct Learnt {
     pub(crate) guide: Option<Guide>,
     /// Work without the guide over that with it, by observations left out in growing it.
     pub(crate) gain: f64,
+    /// Cost of a sample with the guide over that of one without, by these.
+    pub(crate) cost: f64,
 }
 
 /// An observation with what counts of it.
@@ -130,7 +132,7 @@ impl Means {
 
 /// A guide from observations.
 pub(crate) fn learn(observations: &[Observation]) -> Learnt {
-    let none = Learnt { guide: None, gain: 1.0 };
+    let none = Learnt { guide: None, gain: 1.0, cost: 1.0 };
     let mut counted = tempered(observations);
     if counted.iter().filter(|o| o.square > 0.0).count() < FEWEST {
         return none;
@@ -145,12 +147,12 @@ pub(crate) fn learn(observations: &[Observation]) -> Learnt {
     let cube = Cell { low: [0.0; DIMENSIONS], size: [1.0; DIMENSIONS], volume: 1.0, depth: 0 };
     growth.grow(&mut counted, &cube, of_all(&kept));
     let fit = |which: &dyn Fn(&Counted) -> bool| fitted(&growth.nodes, &counted, which);
-    let gain = match fit(&|o| !o.held) {
-        Some(guide) if guide.cells() > 1 => gain(&guide, &counted),
+    let [gain, cost] = match fit(&|o| !o.held) {
+        Some(guide) if guide.cells() > 1 => judged(&guide, &counted),
         _ => return none,
     };
     let guide = if gain >= LEAST_GAIN { fit(&|_| true) } else { None };
-    Learnt { guide, gain }
+    Learnt { guide, gain, cost }
 }
 
 /// What counts of observations.
@@ -184,8 +186,9 @@ fn tempered(observations: &[Observation]) -> Vec<Counted> {
     observations.iter().enumerate().map(counted).collect()
 }
 
-/// Work without a guide over that with it, by observations that were left out.
-fn gain(guide: &Guide, counted: &[Counted]) -> f64 {
+/// Work without a guide over that with it, and the cost of a sample with it over that of one without, by observations that were
+/// left out.
+fn judged(guide: &Guide, counted: &[Counted]) -> [f64; 2] {
     let (mut squares, mut costs, mut weights) = ([0.0; 2], [0.0; 2], [0.0; 2]);
     for o in counted.iter().filter(|o| o.held) {
         let q = guide.density(o.point.map(f64::from));
@@ -195,8 +198,8 @@ fn gain(guide: &Guide, counted: &[Counted]) -> f64 {
             weights[k] += o.weight * q;
         }
     }
-    let work = |k: usize| squares[k] * costs[k] / weights[k];
-    work(0) / work(1)
+    let [even, guided] = [0, 1].map(|k| costs[k] / weights[k]);
+    [squares[0] * even / (squares[1] * guided), guided / even]
 }
 
 /// A box that is a node's.

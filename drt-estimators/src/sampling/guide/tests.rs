@@ -42,7 +42,7 @@ fn observed(
 /// By rounds of samples, each guided by those before.
 fn learnt(rounds: u64, f: impl Fn([f64; DIMENSIONS], &mut Rng) -> f64) -> Learnt {
     let mut all = Vec::new();
-    let mut learnt = Learnt { guide: None, gain: 1.0 };
+    let mut learnt = Learnt { guide: None, gain: 1.0, cost: 1.0 };
     for round in 0..rounds {
         let even = Guide::even();
         let guide = learnt.guide.as_ref().unwrap_or(&even);
@@ -154,6 +154,9 @@ fn costs_count() {
     let cost = |u: [f64; DIMENSIONS]| if u[1] < 0.5 { 10.0 } else { 1.0 };
     let f = |u: [f64; DIMENSIONS], _: &mut Rng| if u[0] < 0.125 { 1.0 } else { 0.0 };
     let learnt = learn(&observed(&Guide::even(), 1, 8192, f, cost));
+    // A fifth costs 5.5; of the rest 1 / (1 + √10) goes where samples cost ten times as much.
+    let expected = 0.2 + 0.8 * (1.0 + 9.0 / (1.0 + Real::sqrt(10.0))) / 5.5;
+    assert!((learnt.cost / expected - 1.0).abs() < 0.05, "{} {expected}", learnt.cost);
     let guide = learnt.guide.expect("a gain");
     let [dear, cheap] = [0.25, 0.75].map(|b| guide.density([0.06, b, 0.5, 0.5]) - DEFENSIVE);
     assert!((cheap / dear / Real::sqrt(10.0) - 1.0).abs() < 0.1, "{cheap} {dear}");

@@ -13,6 +13,7 @@ use crate::derivative::tests::scenes::{
     diffuse, fog, glow, moves, parameter, phong, shift, stretch, surfaces,
 };
 use crate::derivative::velocity::blend::{Blend, Blends};
+use crate::sampling::record::CameraRay;
 use crate::terms::prepared::Prepared;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 
