@@ -8,7 +8,7 @@ extern crate alloc;
 extern crate self as drt_estimators;
 
 mod derivative;
-mod edges;
+mod discontinuities;
 pub mod fit;
 mod model;
 mod run;

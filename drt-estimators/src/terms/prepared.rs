@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::derivative::contraction::Motion;
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
-use crate::edges::speeds::speeds;
+use crate::discontinuities::speeds::speeds;
 use crate::model::error::Error;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::sampling::bidirectional::EmissionSampler;

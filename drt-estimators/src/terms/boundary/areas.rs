@@ -10,7 +10,7 @@ use core::f64::consts::FRAC_1_PI;
 
 use drt_math::{Real, Rng};
 
-use crate::edges::edge::Edge;
+use crate::discontinuities::edge::Edge;
 use crate::world::World;
 
 /// Points of lights.

@@ -1,12 +1,12 @@
-//! Boundary segments of edges that [rest](crate::edges::contact) on a surface.
+//! Boundary segments of edges that [rest](crate::discontinuities::contact) on a surface.
 
 use core::f64::consts::PI;
 
 use drt_math::{Frame, Rgb, Vec3, warp};
 
 use super::{BoundarySink, End, Sampler, Start, seen};
-use crate::edges::contact::Contact;
-use crate::edges::edge::EdgePoint;
+use crate::discontinuities::contact::Contact;
+use crate::discontinuities::edge::EdgePoint;
 use crate::model::sensor::Sensor;
 
 impl<R: BoundarySink> Sampler<'_, '_, R> {

@@ -30,9 +30,9 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Vec3};
 
-use crate::edges::contact::Contact;
-use crate::edges::edge::{Edge, EdgePoint, EdgeTable, collect, merge_coincident};
-use crate::edges::movers::Movers;
+use crate::discontinuities::contact::Contact;
+use crate::discontinuities::edge::{Edge, EdgePoint, EdgeTable, collect, merge_coincident};
+use crate::discontinuities::movers::Movers;
 use crate::terms::boundary::areas::AreaWeights;
 use crate::terms::boundary::shadow::Shadows;
 

@@ -18,7 +18,7 @@ use alloc::vec::Vec;
 use drt_math::{Real, Rgb, Vec3};
 
 use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
-use crate::edges::edge::Edge;
+use crate::discontinuities::edge::Edge;
 use crate::model::emitter::{Emitter, EmitterGradient};
 use crate::sampling::trace::Tracer;
 use crate::world::vertex::SurfacePoint;

@@ -5,7 +5,7 @@ use drt_geom::edges::EdgeSides;
 use drt_math::{Rgb, Vec3};
 
 use crate::derivative::velocity::blend::Blends;
-use crate::edges::discontinuities::DiscontinuityEdge;
+use crate::discontinuities::discontinuity_edge::DiscontinuityEdge;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
 use crate::terms::radiative::Radiative;

@@ -13,7 +13,7 @@ use drt_geom::edges::Lobes;
 use drt_geom::edges::tree::{Draw, EdgeTree, MOST_WAYS, Segment, TreeScratch, Viewpoint, Way};
 use drt_math::Vec3;
 
-use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::terms::radiative::{Chosen, EdgeQuery};
 use crate::world::World;
 use crate::world::vertex::{Kind, Vertex};

@@ -42,13 +42,13 @@ use alloc::vec::Vec;
 
 use drt_math::{CdfTable, Rng};
 
-use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::terms::radiative::edge_sampler::EdgeSampler;
 pub(crate) use crate::terms::radiative::vertices::EdgeContribution;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
-use crate::edges::edge::Edge;
+use crate::discontinuities::edge::Edge;
 use crate::model::error::Error;
 use crate::world::World;
 

@@ -2,7 +2,7 @@
 
 use drt_math::Vec3;
 
-use crate::edges::discontinuities::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::world::vertex::MaterialPoint;
 
 /// An edge at which radiance jumps.

@@ -8,7 +8,7 @@ use drt_geom::edges::{Cone, ConeSegment, ConeTree};
 use drt_math::Vec3;
 
 use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay, Weight};
-use crate::edges::discontinuities::DiscontinuityEdges;
+use crate::discontinuities::discontinuity_edge::DiscontinuityEdges;
 use crate::terms::warped::beside::Beside;
 use crate::terms::warped::edge::TurningEdge;
 use crate::terms::warped::near::Near;

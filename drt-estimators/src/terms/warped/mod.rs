@@ -87,7 +87,7 @@ use alloc::sync::Arc;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::{Spatial, VelocityField};
-use crate::edges::discontinuities::DiscontinuityEdges;
+use crate::discontinuities::discontinuity_edge::DiscontinuityEdges;
 use crate::model::error::{Error, SettingError};
 use crate::model::settings::{Settings, Warp};
 use crate::terms::warped::auxiliary::directions::AuxiliaryDirections;

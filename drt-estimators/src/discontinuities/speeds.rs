@@ -3,7 +3,7 @@
 use drt_motion::SurfaceMotion;
 
 use crate::derivative::contraction::Motion;
-use crate::edges::edge::Edge;
+use crate::discontinuities::edge::Edge;
 use crate::world::World;
 
 /// How fast an edge moves across itself, at most and relative to the fastest vertex of each

@@ -11,7 +11,7 @@ use drt_geom::Aabb;
 use drt_math::Vec3;
 
 use crate::derivative::sensitivity::ActiveInputs;
-use crate::edges::edge::Edge;
+use crate::discontinuities::edge::Edge;
 use crate::model::sensor::Sensor;
 use crate::world::World;
 

@@ -20,7 +20,7 @@ use core::f64::consts::PI;
 use drt_geom::{Ray, Skip};
 use drt_math::{Real, Vec3, fm};
 
-use crate::edges::edge::{Edge, EdgePoint};
+use crate::discontinuities::edge::{Edge, EdgePoint};
 use crate::world::World;
 use crate::world::vertex::{Kind, Vertex};
 

@@ -7,8 +7,8 @@ use core::ops::Range;
 use drt_geom::edges::{Coincident, EdgeSides, Fan, FanFace, faces_around};
 use drt_math::{Vec3, fm};
 
-use crate::edges::contact::Contact;
-use crate::edges::edge::{Edge, EdgePoint, collect};
+use crate::discontinuities::contact::Contact;
+use crate::discontinuities::edge::{Edge, EdgePoint, collect};
 use crate::model::sensor::Sensor;
 use crate::world::vertex::{MaterialPoint, SurfacePoint};
 use crate::world::{SurroundingMedium, World};

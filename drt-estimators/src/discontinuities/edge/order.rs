@@ -8,7 +8,7 @@
 
 use drt_math::Vec3;
 
-use crate::edges::edge::Edge;
+use crate::discontinuities::edge::Edge;
 
 /// The size of all places to that of all directions.
 const PLACES: f64 = 2.0;
