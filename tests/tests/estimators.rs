@@ -37,17 +37,23 @@ fn seconds(default: f64) -> f64 {
     number("DRT_SECONDS", default)
 }
 
+/// Another number for other random numbers, `DRT_SEED`.
+fn seed() -> u64 {
+    number("DRT_SEED", 0.0) as u64
+}
+
 fn short() -> Effort {
-    Effort { noise: 0.05, scale: 0.0, seconds: seconds(1.0) }
+    Effort { noise: 0.05, scale: 0.0, seconds: seconds(1.0), seed: seed() }
 }
 
 fn costs() -> Effort {
-    Effort { noise: 0.01, scale: 0.0, seconds: seconds(4.0) }
+    Effort { noise: 0.01, scale: 0.0, seconds: seconds(4.0), seed: seed() }
 }
 
 /// Until scales are known to 1 %, or to the part that `DRT_SCALE` says.
 fn precise() -> Effort {
-    Effort { noise: 0.01, scale: number("DRT_SCALE", 0.01), seconds: seconds(600.0) }
+    let scale = number("DRT_SCALE", 0.01);
+    Effort { noise: 0.01, scale, seconds: seconds(600.0), seed: seed() }
 }
 
 /// Doubles samples until both images are known to 1/2 %, or time is over.

@@ -11,7 +11,7 @@
 //!
 //! where f is everything that paths carry through a floor vertex just outside (the boundary of the
 //! domain in Reynolds' theorem; 2021 paper, Eq. 17, with a jump of f from its value to zero). It is the
-//! limit of the kernel of [boundary segments](crate::terms::boundary) for a gap that closes (l = 0, |t×w| N = cos θ times the
+//! limit of the kernel of [boundary segments](crate::terms::boundary_segments) for a gap that closes (l = 0, |t×w| N = cos θ times the
 //! conormal), with segments that end in the shadow of the edge and those that start in it together: so
 //! each path counts once, light and camera both above the floor.
 

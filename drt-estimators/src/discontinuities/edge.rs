@@ -1,13 +1,12 @@
 //! Edges that can be silhouettes, and how points on them are drawn (theory sheet §4.3).
 
-mod order;
-
 use alloc::vec::Vec;
 
 use drt_geom::edges::{Coincident, Fan, Gap, Wedge, faces_around};
 use drt_geom::{EdgeClass, NONE, Topology};
 use drt_math::{CdfTable, Rng, Vec3};
 
+use crate::discontinuities::order::sort_by_likeness;
 use crate::model::error::Error;
 use crate::world::vertex::MaterialPoint;
 use crate::world::{SurroundingMedium, World};
@@ -132,7 +131,7 @@ impl EdgeTable {
     ) -> Result<Option<Self>, Error> {
         let mut kept: Vec<(Edge, f64)> =
             edges.iter().map(|e| (*e, weight(e))).filter(|(e, w)| *w > 0.0 && matters(e)).collect();
-        order::sort_by_likeness(&mut kept);
+        sort_by_likeness(&mut kept, |(e, _)| &e.wedge);
         if kept.is_empty() {
             return Ok(None);
         }

@@ -5,4 +5,5 @@ pub(crate) mod contact;
 pub(crate) mod discontinuity_edge;
 pub(crate) mod edge;
 pub(crate) mod movers;
+mod order;
 pub(crate) mod speeds;

@@ -39,7 +39,7 @@ use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::BATCHES;
 use crate::sampling::parallel::Pool;
 use crate::sampling::pixels::{Part, Pass, Sampler};
-use crate::terms::boundary::BoundarySink;
+use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::guiding::Guiding;
 use crate::terms::interior::{PathSink, PixelSampler};
 use crate::terms::prepared::Prepared;

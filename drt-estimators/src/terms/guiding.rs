@@ -25,7 +25,7 @@ use crate::sampling::guide::Guide;
 use crate::sampling::guide::learning::{Learnt, MOST_OBSERVATIONS, Observation, learn};
 use crate::sampling::parallel::Pool;
 use crate::sampling::streams::GUIDE_STREAM;
-use crate::terms::boundary::BoundarySink;
+use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::splatting::{BoundarySource, Checked, Splatter};
 use crate::world::World;
 

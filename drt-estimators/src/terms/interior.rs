@@ -25,7 +25,7 @@ use crate::sampling::record::PathRecord;
 use crate::sampling::record::Radiance;
 use crate::sampling::streams::{DIMENSIONS, FLUX_STREAM, PAIR_STREAM, VELOCITY_STREAM};
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary::shadow::Shadows;
+use crate::terms::boundary_segments::shadow::Shadows;
 use crate::terms::flux::Flux;
 use crate::terms::radiative::{EdgeQuery, Radiative};
 use crate::terms::warped::Warped;

@@ -22,7 +22,7 @@ use crate::derivative::velocity::PathVelocities;
 use crate::sampling::bidirectional::{Bidirectional, EmissionSampler, SeenFromCamera};
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary::BoundarySink;
+use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::interior::{AlongRays, PathView, Recorder};
 use crate::world::World;
 

@@ -1,6 +1,6 @@
 //! The terms of a derivative: the interior, boundary segments, edges seen from vertices, and flux.
 
-pub(crate) mod boundary;
+pub(crate) mod boundary_segments;
 mod film_plane;
 pub(crate) mod flux;
 pub(crate) mod guiding;

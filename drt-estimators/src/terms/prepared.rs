@@ -11,7 +11,7 @@ use crate::model::error::Error;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::BATCHES;
-use crate::terms::boundary::{Boundary, Strategy};
+use crate::terms::boundary_segments::{Boundary, Strategy};
 use crate::terms::film_plane;
 use crate::terms::flux::{Flux, GrazingFlux};
 use crate::terms::interior::{AlongRays, Component, EdgeQueries};

@@ -13,8 +13,8 @@ use crate::sampling::film::Splats;
 use crate::sampling::guide::{self, Drawn, Guide};
 use crate::sampling::streams::{DIMENSIONS, LINE_STREAM, SEQUENCE_STREAM};
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary;
-use crate::terms::boundary::{Boundary, BoundarySink, Strategy};
+use crate::terms::boundary_segments;
+use crate::terms::boundary_segments::{Boundary, BoundarySink, Strategy};
 use crate::terms::flux;
 use crate::terms::flux::GrazingFlux;
 use crate::terms::interior::AlongRays;
@@ -122,7 +122,7 @@ impl Splatter<'_> {
     ) -> Account {
         let from_light = source == BoundarySource::LightPaths;
         let mut tracer = Tracer::new(if from_light { self.all } else { self.world });
-        let mut edges = boundary::Buffers::default();
+        let mut edges = boundary_segments::Buffers::default();
         let mut functional = VelocityFunctional::default();
         let mut grazing = flux::Buffers::default();
         let mut light_paths = self.emission.filter(|_| from_light).map(|emission| {
@@ -152,7 +152,7 @@ impl Splatter<'_> {
                     self.boundary.sample(strategy, &mut tracer, &mut edges, receiver);
                 }
                 BoundarySource::Borders => {
-                    boundary::border::sample(&mut tracer, &mut edges, receiver);
+                    boundary_segments::border::sample(&mut tracer, &mut edges, receiver);
                 }
                 BoundarySource::PrimaryEdges => {
                     if let Some(radiative) = self.radiative {

@@ -58,6 +58,8 @@ pub struct Effort {
     pub scale: f64,
     /// Seconds for each estimator and stage after which what has been found has to do.
     pub seconds: f64,
+    /// Of the random numbers.
+    pub seed: u64,
 }
 
 /// One derivative by both.
@@ -109,7 +111,8 @@ impl Pair {
 /// # Errors
 /// When the library rejects the scene or a parameter.
 pub fn compare(stage: &Stage, methods: &[Method], effort: Effort) -> Result<Vec<Pair>> {
-    let mut pairs = compare_once(stage, methods, effort, [7, 19])?;
+    let seeds = |first: u64| [7, 19].map(|seed| first + effort.seed + seed);
+    let mut pairs = compare_once(stage, methods, effort, seeds(0))?;
     for method in methods {
         let again = |pair: &Pair| pair.method == *method && !pair.passes();
         if !pairs.iter().any(again) {
@@ -119,7 +122,7 @@ pub fn compare(stage: &Stage, methods: &[Method], effort: Effort) -> Result<Vec<
         failing
             .cells
             .retain(|c| pairs.iter().any(|pair| again(pair) && pair.parameter == c.parameter.name));
-        let second = compare_once(&failing, &[*method], effort, [107, 119])?;
+        let second = compare_once(&failing, &[*method], effort, seeds(100))?;
         for pair in pairs.iter_mut().filter(|pair| again(pair)) {
             if let Some(other) = second.iter().find(|s| s.parameter == pair.parameter) {
                 *pair = other.clone();

@@ -17,7 +17,7 @@ use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::sampling::pixels::Sampler;
 use crate::sampling::streams::sequence_name;
-use crate::terms::boundary::BoundarySink;
+use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::interior::PixelSampler;
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::Checked;

@@ -8,7 +8,7 @@ use crate::derivative::tests::scenes::*;
 use crate::model::settings::Settings;
 use crate::sampling::guide::Guide;
 use crate::sampling::parallel::Pool;
-use crate::terms::boundary::Strategy;
+use crate::terms::boundary_segments::Strategy;
 use crate::terms::guiding::{Guiding, OfImages};
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::{BoundarySource, Checked};

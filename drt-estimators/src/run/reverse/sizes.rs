@@ -13,7 +13,7 @@ use crate::model::emitter::EmitterGradient;
 use crate::model::sensor::SensorGradient;
 use crate::model::surface::BsdfParams;
 use crate::model::texture::Footprint;
-use crate::terms::boundary::BoundarySink;
+use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::guiding::Sizes;
 use crate::world::vertex::MaterialPoint;
 

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use crate::derivative::contraction::Motion;
 use crate::model::plan::{MediumPlan, Plan};
-use crate::terms::boundary::Strategy;
+use crate::terms::boundary_segments::Strategy;
 use crate::terms::guiding::Guiding;
 use crate::terms::prepared::Prepared;
 use crate::terms::splatting::BoundarySource;

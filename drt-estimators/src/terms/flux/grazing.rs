@@ -24,7 +24,7 @@ use crate::model::error::Error;
 use crate::sampling::importance::{Splat, see};
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary::BoundarySink;
+use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::flux::{EDGE_ON, Flux, filled};
 use crate::world::lights::triangle_bary;
 use crate::world::{SurroundingMedium, World};

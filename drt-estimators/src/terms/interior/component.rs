@@ -10,7 +10,7 @@ use crate::derivative::velocity::{PathVelocities, RecordedPath};
 use crate::sampling::record::PathRecord;
 use crate::sampling::streams::LINE_STREAM;
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary::shadow;
+use crate::terms::boundary_segments::shadow;
 use crate::terms::flux::FluxRay;
 use crate::terms::interior::recorder::PathView;
 use crate::terms::interior::{AlongRays, EdgeQueries, PathSink};

@@ -3,7 +3,7 @@
 use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
 use crate::sampling::importance::see;
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary::BoundarySink;
+use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::radiative::Radiative;
 use crate::terms::radiative::difference::EdgeView;
 use crate::world::vertex::{Kind, Matter, Vertex};

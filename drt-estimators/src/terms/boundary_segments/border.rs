@@ -16,7 +16,7 @@ use crate::derivative::sensitivity::VelocityTerm;
 use crate::model::sensor::CameraRay;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary::{BoundarySink, Buffers};
+use crate::terms::boundary_segments::{BoundarySink, Buffers};
 use crate::world::vertex::{Kind, Vertex};
 
 /// Takes one sample of all pixel borders.

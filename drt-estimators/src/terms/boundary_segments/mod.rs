@@ -33,8 +33,8 @@ use drt_math::{Rgb, Vec3};
 use crate::discontinuities::contact::Contact;
 use crate::discontinuities::edge::{Edge, EdgePoint, EdgeTable, collect, merge_coincident};
 use crate::discontinuities::movers::Movers;
-use crate::terms::boundary::areas::AreaWeights;
-use crate::terms::boundary::shadow::Shadows;
+use crate::terms::boundary_segments::areas::AreaWeights;
+use crate::terms::boundary_segments::shadow::Shadows;
 
 use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, VelocityFunctional, VelocityTerm};
 use crate::model::emitter::{Emitter, EmitterGradient};
