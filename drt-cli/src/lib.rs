@@ -8,9 +8,11 @@ pub mod error;
 mod fingerprint;
 mod image;
 mod job;
+mod measured_file;
 mod npy;
 mod scene_xml;
 mod shard_file;
+mod tensor_file;
 #[cfg(test)]
 mod testing;
 
@@ -19,6 +21,7 @@ pub use digest::{RunFacts, Verdict, digest, write_digest};
 pub use error::CliError;
 pub use image::{ExrFile, Provenance, read_exr, write_exr, write_preview};
 pub use job::{Job, Optimize, Overrides, ParameterGroup, load_job};
+pub use measured_file::encode_measured;
 pub use scene_xml::{Defaults, load_scene, parse_scene_str};
 
 /// Name and version, as files carry them.

@@ -8,7 +8,10 @@ use common::*;
 use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
-use drt_estimators::surface::{Anisotropic, Bsdf, Conductor, Dielectric, Mask, Principled};
+use drt_estimators::surface::{
+    Anisotropic, Bsdf, Conductor, Dielectric, Mask, Measured, MeasuredTables, Principled,
+    RoughConductor,
+};
 use drt_estimators::{
     EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Unattended, gradient,
 };
@@ -172,15 +175,8 @@ fn uneven_materials_everything_at_once() {
     let base_color = Rgb::new(0.6, 0.4, 0.2);
     let ball = Principled { base_color, metallic: 0.4, clearcoat: 0.3, ..Principled::default() };
     let floor = Anisotropic { base: metal(), alpha: [0.5, 0.2] };
-    let mut scene = surfaces(Bsdf::Principled(Box::new(ball)), Bsdf::Anisotropic(Box::new(floor)));
-    for shape in scene.shapes.iter_mut().filter(|s| s.id.as_deref() == Some("floor")) {
-        let mesh = &shape.mesh;
-        let place = |v: u32| mesh.positions[v as usize];
-        let at = |v| [place(v).x + 0.3 * place(v).y, place(v).y - 0.5 * place(v).z];
-        let texcoords = mesh.triangles.iter().map(|t| t.map(at)).collect();
-        let mesh = mesh.as_ref().clone().with_texcoords(texcoords).expect("coordinates");
-        shape.mesh = mesh.into();
-    }
+    let ball = Bsdf::Principled(Box::new(ball));
+    let scene = with_coordinates(surfaces(ball, Bsdf::Anisotropic(Box::new(floor))));
     let mut effects = wobbles(&scene);
     effects.extend([
         changes("ball-bsdf", "base_color", coloured()),
@@ -192,6 +188,33 @@ fn uneven_materials_everything_at_once() {
         changes("floor-bsdf", "k", coloured()),
     ]);
     agree("uneven", &scene, effects, &settings());
+}
+
+#[test]
+fn measured_materials() {
+    let measured = |alpha, phi_i: &[f32]| {
+        let metal = RoughConductor::default();
+        let tables = MeasuredTables::of_metal(&metal, alpha, phi_i, [5, 9, 5]).expect("tables");
+        Bsdf::Measured(Measured::new(tables).expect("a material").into())
+    };
+    let whole = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| k * core::f32::consts::FRAC_PI_2);
+    let scene = surfaces(measured([0.4; 2], &[0.0]), measured([0.5, 0.2], &whole));
+    let scene = with_coordinates(scene);
+    let effects = wobbles(&scene);
+    agree("measured", &scene, effects, &settings());
+}
+
+/// Texture coordinates for the floor, along none of its sides.
+fn with_coordinates(mut scene: Scene) -> Scene {
+    for shape in scene.shapes.iter_mut().filter(|s| s.id.as_deref() == Some("floor")) {
+        let mesh = &shape.mesh;
+        let place = |v: u32| mesh.positions[v as usize];
+        let at = |v| [place(v).x + 0.3 * place(v).y, place(v).y - 0.5 * place(v).z];
+        let texcoords = mesh.triangles.iter().map(|t| t.map(at)).collect();
+        let mesh = mesh.as_ref().clone().with_texcoords(texcoords).expect("coordinates");
+        shape.mesh = mesh.into();
+    }
+    scene
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use drt_estimators::surface::{MeasuredTables, RoughConductor};
 use drt_fuzz::{SCENE, write};
 use drt_geom::{Mesh, procedural};
 use drt_math::Vec3;
@@ -55,7 +56,9 @@ const TETGEN: &str = "5 3 1 1\n1 0 0 0 .5 1\n2 1 0 0 .5 1\n3 0 1 0 .5 1\n4 0 0 1
 
 fn main() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in ["obj", "ply", "tet", "vol", "xml", "toml", "serialized", "bitmap", "spectrum"] {
+    for target in [
+        "obj", "ply", "tet", "vol", "xml", "toml", "serialized", "bitmap", "spectrum", "measured",
+    ] {
         std::fs::create_dir_all(corpus.join(target)).expect("the corpus folder can be written");
     }
     meshes(&corpus);
@@ -77,6 +80,7 @@ fn main() {
     for version in [3, 4] {
         write(&corpus.join(format!("serialized/{version}.serialized")), &serialized(version));
     }
+    measured(&corpus.join("measured"));
     examples(&corpus);
 }
 
@@ -100,6 +104,18 @@ fn images(folder: &Path) {
     exr::prelude::write_rgb_file(&path, 3, 2, pixel).expect("a small image");
     let bytes = std::fs::read(&path).expect("what was just written");
     write(&path, &[&[4], &bytes[..]].concat());
+}
+
+/// Metal, even and brushed.
+fn measured(folder: &Path) {
+    let metal = RoughConductor::default();
+    for (name, alpha, phi_i) in
+        [("even", [0.3; 2], &[0.0_f32][..]), ("brushed", [0.5, 0.2], &[-3.14, -1.57, 0.0])]
+    {
+        let tables = MeasuredTables::of_metal(&metal, alpha, phi_i, [3, 5, 3]);
+        let file = drt_cli::encode_measured(&tables.expect("a small material"));
+        write(&folder.join(format!("{name}.bsdf")), &file);
+    }
 }
 
 /// Two meshes of a triangle, with normals and texture coordinates.

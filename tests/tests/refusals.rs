@@ -1,9 +1,12 @@
 //! The rows of the derivative matrix that are refusals: every one names the parameter and the object.
 
+use std::f32::consts::PI;
+
 use drt_estimators::EstimatorKind::{PathSpace, Radiative, Warped};
 use drt_estimators::surface::{
-    Bsdf, Coating, Conductor, Dielectric, Diffuse, Mask, Perturbation, Perturbed, Plastic,
-    Principled, PrincipledThin, Property, Textured, ThinDielectric,
+    Bsdf, Coating, Conductor, Dielectric, Diffuse, Mask, Measured, MeasuredTables, Perturbation,
+    Perturbed, Plastic, Principled, PrincipledThin, Property, RoughConductor, Textured,
+    ThinDielectric,
 };
 use drt_estimators::texture::{Bitmap, Texture, UvMap};
 use drt_estimators::{
@@ -52,6 +55,14 @@ fn of(bsdf: Bsdf) -> (Stage, Scene) {
 
 #[test]
 fn materials_without_derivatives() {
+    // Numbers for a quarter of a turn, too coarse to go on in the next one.
+    let tables = MeasuredTables::of_metal(
+        &RoughConductor::default(),
+        [0.6, 0.2],
+        &[-PI, -0.75 * PI, -0.5 * PI],
+        [5, 9, 5],
+    );
+    let quarter = Measured::new(tables.unwrap()).unwrap();
     let inner = || Bsdf::Diffuse(Diffuse::default());
     let perturbed = |perturbation| {
         let map = Bitmap::new([1, 1], vec![[0.5, 0.5, 1.0]]).unwrap();
@@ -71,6 +82,7 @@ fn materials_without_derivatives() {
         Bsdf::Mask(Box::new(Mask { bsdf: inner(), opacity: 0.5 })),
         perturbed(Perturbation::Normals),
         perturbed(Perturbation::Heights(0.1)),
+        Bsdf::Measured(quarter.into()),
     ] {
         let kind = bsdf.name();
         let (stage, scene) = of(bsdf);

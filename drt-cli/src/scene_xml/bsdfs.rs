@@ -1,6 +1,7 @@
 //! Surface scattering.
 
 mod composed;
+mod measured;
 mod principled;
 
 use std::cell::Cell;
@@ -43,6 +44,7 @@ impl<'a> Loader<'a> {
             "roughdielectric" => rough(&p, Bsdf::RoughDielectric(dielectric(&p)?))?,
             "principled" => Bsdf::Principled(Box::new(principled::thick(&p)?)),
             "principledthin" => Bsdf::PrincipledThin(Box::new(principled::thin(&p)?)),
+            "measured" => Bsdf::Measured(self.measured(&p)?),
             "twosided" => Bsdf::TwoSided(Box::new(self.two_sided(&p, parts)?)),
             "mask" => Bsdf::Mask(Box::new(self.mask(&p, parts)?)),
             "blendbsdf" => Bsdf::Blend(Box::new(self.blend(&p, parts)?)),
@@ -52,7 +54,7 @@ impl<'a> Loader<'a> {
                 return Err(e.error(format!(
                     "the bsdf type `{other}` is not supported; expected diffuse, plastic, \
                      roughplastic, pplastic, conductor, roughconductor, dielectric, \
-                     thindielectric, roughdielectric, phong, principled, principledthin, \
+                     thindielectric, roughdielectric, phong, principled, principledthin, measured, \
                      blendbsdf, mask, normalmap, bumpmap, twosided or null"
                 )));
             }

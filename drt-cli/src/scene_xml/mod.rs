@@ -25,10 +25,11 @@ mod volume_lights;
 mod volumes;
 
 use std::cell::RefCell;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use drt_estimators::surface::{Bsdf, Diffuse, Mask};
+use drt_estimators::surface::{Bsdf, Diffuse, Mask, Measured};
 use drt_estimators::{Named, Scene};
 use drt_math::Rgb;
 
@@ -98,7 +99,8 @@ fn parse_scene(
     let root = SceneFiles::new(defaults).read(path, text)?;
     missing_files(path, &root)?;
     at_rest(&root)?;
-    let loader = Loader { index: Index::new(&root)?, warnings: RefCell::default() };
+    let index = Index::new(&root)?;
+    let loader = Loader { index, warnings: RefCell::default(), measured: RefCell::default() };
     let scene = loader.scene(&root)?;
     Ok((scene, loader.warnings.into_inner()))
 }
@@ -137,6 +139,8 @@ fn at_rest(e: &Element) -> Result<(), CliError> {
 struct Loader<'a> {
     index: Index<'a>,
     warnings: RefCell<Vec<Warning>>,
+    /// Materials of files, which all that name them share.
+    measured: RefCell<BTreeMap<PathBuf, Arc<Measured>>>,
 }
 
 impl<'a> Loader<'a> {

@@ -1,10 +1,11 @@
 //! Stages of one material each: its numbers, and a panel of it that moves and turns in its plane.
 
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 
 use drt_estimators::surface::{
-    Anisotropic, Bsdf, Coating, Distribution, Plastic, Principled, PrincipledThin, RoughConductor,
-    RoughDielectric, TwoSided,
+    Anisotropic, Bsdf, Coating, Distribution, Measured, MeasuredTables, Plastic, Principled,
+    PrincipledThin, RoughConductor, RoughDielectric, TwoSided,
 };
 use drt_geom::Mesh;
 use drt_geom::procedural::rectangle;
@@ -43,16 +44,22 @@ pub(super) fn panel(bsdf: Bsdf) -> Result<Set> {
         .lamp("lamp", lamp, Rgb::new(7.0, 6.0, 5.0)))
 }
 
-/// The panel's numbers, of which the first is in the short check, and its motions.
+/// The panel's numbers, the first of which is in the short check if there are any, and its motions.
 fn stage(name: &'static str, bsdf: Bsdf, numbers: Vec<Cell>) -> Result<Stage> {
     let mut cells: Vec<Cell> = numbers.into_iter().map(|c| c.samples(512)).collect();
-    cells[0] = cells[0].clone().representative();
+    if let Some(first) = cells.first_mut() {
+        *first = first.clone().representative();
+    }
     let moves = Cell::new("panel moves", [translate("panel", vec3(0.3, 0.5, -0.3))]);
     cells.push(if matches!(bsdf, Bsdf::TwoSided(_)) { moves } else { moves.representative() });
     let turns = Cell::new("panel turns in its plane", [turn("panel", NORMAL, Vec3::ZERO)]);
     let turns = turns.samples(1024);
     // Lobes that are the same all around do not see it.
-    cells.push(if matches!(bsdf, Bsdf::Anisotropic(_)) { turns.representative() } else { turns });
+    cells.push(if matches!(bsdf, Bsdf::Anisotropic(_) | Bsdf::Measured(_)) {
+        turns.representative()
+    } else {
+        turns
+    });
     cells.push(Cell::new("panel tips", [turn("panel", vec3(1.0, 0.2, 0.1), Vec3::ZERO)]));
     Ok(Stage::new(name, panel(bsdf)?.scene, cells))
 }
@@ -114,18 +121,43 @@ pub fn thin() -> Result<Stage> {
     stage("thin sheet", Bsdf::PrincipledThin(Box::new(bsdf)), numbers)
 }
 
+fn metal() -> RoughConductor {
+    RoughConductor {
+        distribution: Distribution::Ggx,
+        eta: Rgb::new(0.2, 0.9, 1.4),
+        k: Rgb::new(3.5, 2.4, 1.9),
+        ..RoughConductor::default()
+    }
+}
+
+/// The tables that a measurement of metal would give.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn measured() -> Result<Stage> {
+    tabulated("measured metal", [0.4; 2], &[0.0])
+}
+
+/// The same of metal whose lobes are longer than wide, for viewers all around.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn measured_brushed() -> Result<Stage> {
+    let azimuths: Vec<f32> = (0_u8..9).map(|k| (f32::from(k) / 4.0 - 1.0) * PI as f32).collect();
+    tabulated("measured brushed metal", [0.6, 0.25], &azimuths)
+}
+
+fn tabulated(name: &'static str, alpha: [f64; 2], azimuths: &[f32]) -> Result<Stage> {
+    let tables = MeasuredTables::of_metal(&metal(), alpha, azimuths, [7, 17, 9])?;
+    stage(name, Bsdf::Measured(Arc::new(Measured::new(tables)?)), Vec::new())
+}
+
 /// Metal whose lobes are longer than wide.
 ///
 /// # Errors
 /// When the library rejects the scene.
 pub fn brushed() -> Result<Stage> {
-    let metal = RoughConductor {
-        distribution: Distribution::Ggx,
-        eta: Rgb::new(0.2, 0.9, 1.4),
-        k: Rgb::new(3.5, 2.4, 1.9),
-        ..RoughConductor::default()
-    };
-    let bsdf = Anisotropic { base: Bsdf::RoughConductor(metal), alpha: [0.6, 0.25] };
+    let bsdf = Anisotropic { base: Bsdf::RoughConductor(metal()), alpha: [0.6, 0.25] };
     let numbers = vec![
         number("alpha_u", 1.0),
         number("alpha_v", 0.8),

@@ -31,7 +31,7 @@ macro_rules! every_stage {
         $with! {
             surfaces: room room_box_filter standing knot gloss blend near_lamp;
             lights: spot point_and_sun;
-            materials: principled thin brushed pressed coated unmixed;
+            materials: principled thin brushed pressed coated unmixed measured measured_brushed;
             lenses: thin_lens cropped instances;
             textures: picture mosaic stained picture_lamp under_a_sky sky_and_slide thrown;
             media: fog_box blob still_blob shade smoke glass dented_glass beam layers sheet ember;

@@ -1,4 +1,8 @@
-use drt_estimators::surface::{Bsdf, Distribution, Perturbation, Principled};
+use std::sync::Arc;
+
+use drt_estimators::surface::{
+    Bsdf, Distribution, Measured, MeasuredTables, Perturbation, Principled, RoughConductor,
+};
 use drt_math::Rgb;
 
 use super::{old_scene, refused, scene};
@@ -270,4 +274,49 @@ fn null_interfaces_count_in_path() {
     assert_eq!(mask.opacity, 0.0);
     assert!(body("volpath", "").is_null());
     assert!(body("path", r#"<ref name="interior" id="m"/>"#).is_null());
+}
+
+#[test]
+fn measured_materials() {
+    let folder = crate::testing::Folder::new();
+    let tables =
+        MeasuredTables::of_metal(&RoughConductor::default(), [0.3; 2], &[0.0], [4, 5, 4]).unwrap();
+    let good = crate::encode_measured(&tables);
+    let body = r#"<scene version="3.0.0">
+        <bsdf type="measured" id="a"><string name="filename" value="m.bsdf"/></bsdf>
+        <bsdf type="twosided"><bsdf type="measured"><string name="filename" value="m.bsdf"/></bsdf></bsdf>
+        </scene>"#;
+    let read = |bytes: &[u8]| {
+        folder.file("m.bsdf", bytes);
+        crate::parse_scene_str(body, folder.path())
+    };
+    let scene = read(&good).unwrap();
+    let Bsdf::Measured(a) = &scene.bsdfs[0].item else { panic!() };
+    let Bsdf::TwoSided(sides) = &scene.bsdfs[1].item else { panic!() };
+    let Bsdf::Measured(b) = &sides.front else { panic!() };
+    // One file is read once.
+    assert!(Arc::ptr_eq(a, b));
+    assert!(**a == Measured::new(tables.clone()).unwrap());
+    let refused = |bytes: &[u8], part: &str| {
+        let message = read(bytes).map(|_| ()).unwrap_err().to_string();
+        assert!(message.contains(part) && message.contains("m.bsdf"), "{part}: {message}");
+    };
+    // A number is missing, whatever it belongs to.
+    for end in (0..good.len()).step_by(7) {
+        refused(&good[..end], "");
+    }
+    refused(b"tensor", "not a tensor file");
+    let changed = |change: fn(&mut MeasuredTables)| {
+        let mut tables = tables.clone();
+        change(&mut tables);
+        crate::encode_measured(&tables)
+    };
+    refused(&changed(|t| t.rgb.values[3] = f32::NAN), "`rgb` is NaN at index 3");
+    refused(&changed(|t| t.ndf.values[3] = -1.0), "`ndf` is -1 at index 3");
+    let two = |t: &mut MeasuredTables| t.vndf.shape = vec![4, 1, 5, 5];
+    refused(&changed(two), "`vndf` has the shape [4, 1, 5, 5]");
+    let at = good.windows(3).position(|name| name == b"rgb").unwrap();
+    let mut spectral = good.clone();
+    spectral[at..at + 3].copy_from_slice(b"pgb");
+    refused(&spectral, "there is no `rgb`");
 }

@@ -243,7 +243,7 @@ impl Bsdf {
 
     pub(super) fn property(&mut self, property: Property) -> Option<Slot<'_>> {
         match self {
-            Self::Null => None,
+            Self::Null | Self::Measured(_) => None,
             Self::Diffuse(b) => b.slot(property),
             Self::Phong(b) => b.slot(property),
             Self::RoughConductor(b) => b.slot(property),

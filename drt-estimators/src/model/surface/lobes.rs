@@ -39,7 +39,7 @@ use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA};
 use crate::model::surface::principled::stretched;
 use crate::model::surface::{
-    Anisotropic, At, Bsdf, Phong, Plastic, Principled, PrincipledThin, RoughConductor,
+    Anisotropic, At, Bsdf, Measured, Phong, Plastic, Principled, PrincipledThin, RoughConductor,
     RoughDielectric,
 };
 
@@ -58,6 +58,7 @@ impl Bsdf {
             Self::Anisotropic(b) => uneven(b, wo, n),
             Self::Principled(b) => principled(b, wo, n),
             Self::PrincipledThin(b) => thin(b, wo, n),
+            Self::Measured(b) => measured(b, wo, n),
             // Nothing is differentiated at all others.
             _ => Lobes::even(0.0),
         }
@@ -146,6 +147,15 @@ fn thin(b: &PrincipledThin, wo: Vec3, n: Vec3) -> Lobes {
     let through = Lobe { axis: -wo, ..through };
     let diffuse = (1.0 - b.spec_trans) * colour * FRAC_1_PI + b.sheen * SHEEN;
     Lobes::glossy(diffuse, [mirror, through])
+}
+
+/// The part of measured light that is all around.
+const AROUND: f64 = 0.3;
+
+fn measured(b: &Measured, wo: Vec3, n: Vec3) -> Lobes {
+    let albedo = b.albedo(n.dot(wo));
+    let lobe = reflection(wo, n, b.alpha(), (1.0 - AROUND) * albedo);
+    Lobes::glossy(AROUND * albedo * FRAC_1_PI, [lobe, Lobe::default()])
 }
 
 fn reflection(wo: Vec3, n: Vec3, alpha: f64, share: f64) -> Lobe {

@@ -10,7 +10,7 @@
 //!
 //! The models, their parameters and their defaults are those of the Mitsuba plugins `diffuse`,
 //! `phong`, `plastic`, `roughplastic`, `pplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`,
-//! `roughdielectric`, `principled`, `principledthin`, `blendbsdf`, `mask`, `normalmap`, `bumpmap`, `twosided`
+//! `roughdielectric`, `principled`, `principledthin`, `measured`, `blendbsdf`, `mask`, `normalmap`, `bumpmap`, `twosided`
 //! and `null`.
 //!
 //! ```
@@ -48,6 +48,7 @@ mod fresnel;
 mod lobes;
 mod local;
 mod mask;
+mod measured;
 mod microfacet;
 mod perturbed;
 mod phong;
@@ -65,6 +66,7 @@ mod textured;
 mod visible_slope;
 
 use alloc::boxed::Box;
+use alloc::sync::Arc;
 
 use drt_geom::Mesh;
 use drt_math::{Rgb, RgbVec, Vec3, fm};
@@ -83,6 +85,7 @@ use crate::model::surface::facet::Facet;
 pub(crate) use crate::model::surface::framed::by_corners;
 pub(crate) use crate::model::surface::local::LocalBsdf;
 pub use crate::model::surface::mask::Mask;
+pub use crate::model::surface::measured::{Measured, MeasuredError, MeasuredTables, Tensor};
 pub use crate::model::surface::microfacet::Distribution;
 pub use crate::model::surface::perturbed::{Perturbation, Perturbed};
 pub use crate::model::surface::phong::Phong;
@@ -139,6 +142,8 @@ pub enum Bsdf {
     Principled(Box<Principled>),
     /// The same for thin sheets.
     PrincipledThin(Box<PrincipledThin>),
+    /// One that was measured.
+    Measured(Arc<Measured>),
 }
 
 /// One-sided reflectors used on both sides of a surface: from behind, the normal is turned over.
@@ -396,6 +401,7 @@ impl Bsdf {
     pub(crate) fn undifferentiable(&self) -> Option<&'static str> {
         match self {
             Self::Mask(_) | Self::Perturbed(_) => Some(self.name()),
+            Self::Measured(b) if !b.is_continuous() => Some(self.name()),
             _ => self.inner().find_map(Self::undifferentiable),
         }
     }
@@ -407,6 +413,7 @@ impl Bsdf {
             Self::Anisotropic(_) | Self::Perturbed(_) => true,
             Self::Principled(b) => b.anisotropic != 0.0,
             Self::PrincipledThin(b) => b.anisotropic != 0.0,
+            Self::Measured(b) => b.is_oriented(),
             Self::Textured(b) if b.texture(Property::Anisotropic).is_some() => true,
             _ => self.inner().any(Self::is_oriented),
         }
@@ -466,9 +473,10 @@ impl Bsdf {
     pub(crate) fn is_discontinuous_on(&self, mesh: &Mesh) -> bool {
         match self {
             Self::Textured(b) if b.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh)) => true,
-            Self::Anisotropic(_) | Self::Principled(_) | Self::PrincipledThin(_) => {
-                self.is_oriented() && frames_jump_on(mesh)
-            }
+            Self::Anisotropic(_)
+            | Self::Principled(_)
+            | Self::PrincipledThin(_)
+            | Self::Measured(_) => self.is_oriented() && frames_jump_on(mesh),
             _ => self.inner().any(|b| b.is_discontinuous_on(mesh)),
         }
     }
@@ -501,6 +509,7 @@ impl Bsdf {
             Self::Anisotropic(b) => &**b,
             Self::Principled(b) => &**b,
             Self::PrincipledThin(b) => &**b,
+            Self::Measured(b) => &**b,
             _ => return None,
         }))
     }
@@ -587,7 +596,8 @@ impl Bsdf {
             | Self::Phong(_)
             | Self::RoughConductor(_)
             | Self::Plastic(_)
-            | Self::Conductor(_) => true,
+            | Self::Conductor(_)
+            | Self::Measured(_) => true,
             Self::Textured(b) => b.bsdf.is_black_from_behind(),
             Self::Blend(b) => b.bsdfs.iter().all(Self::is_black_from_behind),
             _ => false,
@@ -642,6 +652,7 @@ impl Bsdf {
             Self::Anisotropic(b) => b.base.name(),
             Self::Principled(_) => "principled",
             Self::PrincipledThin(_) => "principledthin",
+            Self::Measured(_) => "measured",
         }
     }
 

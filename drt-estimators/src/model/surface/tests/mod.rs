@@ -8,6 +8,7 @@ mod formulas;
 mod framed;
 mod gradients;
 mod lobes;
+mod measured;
 mod perturbed;
 mod roughness_partners;
 mod sampling;
@@ -87,6 +88,10 @@ pub(crate) fn value_over<T: Real>(
             b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
         }
         Bsdf::PrincipledThin(b) => {
+            let frame = Frame::from_normal(n);
+            b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
+        }
+        Bsdf::Measured(b) => {
             let frame = Frame::from_normal(n);
             b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
         }
