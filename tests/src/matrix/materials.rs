@@ -55,11 +55,12 @@ fn stage(name: &'static str, bsdf: Bsdf, numbers: Vec<Cell>) -> Result<Stage> {
     let turns = Cell::new("panel turns in its plane", [turn("panel", NORMAL, Vec3::ZERO)]);
     let turns = turns.samples(1024);
     // Lobes that are the same all around do not see it.
-    cells.push(if matches!(bsdf, Bsdf::Anisotropic(_) | Bsdf::Measured(_)) {
-        turns.representative()
-    } else {
-        turns
-    });
+    let oriented = match &bsdf {
+        Bsdf::Anisotropic(_) => true,
+        Bsdf::Measured(b) => b.is_oriented(),
+        _ => false,
+    };
+    cells.push(if oriented { turns.representative() } else { turns });
     cells.push(Cell::new("panel tips", [turn("panel", vec3(1.0, 0.2, 0.1), Vec3::ZERO)]));
     Ok(Stage::new(name, panel(bsdf)?.scene, cells))
 }

@@ -174,8 +174,9 @@ impl Measured {
         self.continuous
     }
 
-    /// True where directions along the surface are told apart.
-    pub(super) fn is_oriented(&self) -> bool {
+    /// True where directions along the surface are told apart, by its texture coordinates.
+    #[must_use]
+    pub fn is_oriented(&self) -> bool {
         let same_rows = |g: &Grid2d| {
             let columns = g.size()[1];
             g.values.chunks_exact(columns).all(|row| row == &g.values[..columns])
