@@ -61,6 +61,40 @@ fn samples_follow_their_density() {
     assert!(p < SIGNIFICANCE, "{p:e}");
 }
 
+/// Values and densities that Mitsuba 3.9.1 (scalar_rgb) gets from files of these tables.
+#[test]
+fn values_are_those_of_mitsuba() {
+    let directions = [
+        [[0.3, 0.2, 0.9], [0.1, -0.4, 0.8]],
+        [[-0.3, 0.2, 0.9], [0.5, 0.4, 0.3]],
+        [[0.8, -0.2, 0.4], [-0.6, 0.3, 0.8]],
+        [[0.1, -0.5, 0.6], [0.2, 0.2, 0.9]],
+    ];
+    let even = [
+        [0.316_687_55, 0.185_644_81, 0.135_972_19, 0.331_697_31],
+        [0.076_882_27, 0.045_090_76, 0.033_123_35, 0.079_042_67],
+        [0.610_350_01, 0.362_134_37, 0.270_829_68, 0.712_911_84],
+        [0.308_294_42, 0.180_888_27, 0.132_877_98, 0.333_397_87],
+    ];
+    let brushed = [
+        [0.336_981_18, 0.197_545_20, 0.144_694_12, 0.377_326_76],
+        [0.021_879_05, 0.012_825_99, 0.009_392_78, 0.021_894_02],
+        [0.635_806_20, 0.376_799_37, 0.281_728_89, 0.791_714_31],
+        [0.247_683_00, 0.145_345_63, 0.106_806_62, 0.253_689_32],
+    ];
+    for (phi_i, expected) in [(alloc::vec![0.0], even), (azimuths(-PI, 0.0, 5), brushed)] {
+        let bsdf = measured(tables(&phi_i, [4, 7, 5]));
+        for (pair, expected) in directions.iter().zip(expected) {
+            let [wo, wi] = pair.map(|w| Vec3::from(w).normalize());
+            let [r, g, b] = bsdf.eval(wo, wi, Vec3::Z).to_array();
+            let found = [r, g, b, bsdf.pdf(wo, wi, Vec3::Z, Given::Wo)];
+            for (found, expected) in found.into_iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-5 * expected, "{found} {expected}");
+            }
+        }
+    }
+}
+
 /// What tables are made of comes out of them, the closer the finer they are.
 #[test]
 fn tables_of_a_metal_are_that_metal() {
