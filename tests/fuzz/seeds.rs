@@ -1,5 +1,6 @@
 //! Writes a corpus for every target to start from: the examples' files, and small files made here.
 
+use std::f32::consts::{FRAC_PI_2, PI};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -56,9 +57,9 @@ const TETGEN: &str = "5 3 1 1\n1 0 0 0 .5 1\n2 1 0 0 .5 1\n3 0 1 0 .5 1\n4 0 0 1
 
 fn main() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in [
-        "obj", "ply", "tet", "vol", "xml", "toml", "serialized", "bitmap", "spectrum", "measured",
-    ] {
+    for target in
+        ["obj", "ply", "tet", "vol", "xml", "toml", "serialized", "bitmap", "spectrum", "measured"]
+    {
         std::fs::create_dir_all(corpus.join(target)).expect("the corpus folder can be written");
     }
     meshes(&corpus);
@@ -109,8 +110,8 @@ fn images(folder: &Path) {
 /// Metal, even and brushed.
 fn measured(folder: &Path) {
     let metal = RoughConductor::default();
-    for (name, alpha, phi_i) in
-        [("even", [0.3; 2], &[0.0_f32][..]), ("brushed", [0.5, 0.2], &[-3.14, -1.57, 0.0])]
+    let half = [-PI, -FRAC_PI_2, 0.0];
+    for (name, alpha, phi_i) in [("even", [0.3; 2], &half[2..]), ("brushed", [0.5, 0.2], &half[..])]
     {
         let tables = MeasuredTables::of_metal(&metal, alpha, phi_i, [3, 5, 3]);
         let file = drt_cli::encode_measured(&tables.expect("a small material"));
