@@ -51,6 +51,31 @@ fn paths_from_both_ends_see_the_same_sky() {
     assert!((a - b).abs() < 4.0 * error && error < 0.005 * a, "{a} {b} +- {error}");
 }
 
+/// Where the camera sees nothing but the sky, an image turns with the sky's gradient alone.
+#[test]
+fn a_camera_that_turns_sees_another_part_of_the_sky() {
+    let mut scene = outside();
+    let far = placed(procedural::rectangle(), Vec3::splat(0.01), 0.0, vec3(0.0, 0.0, -500.0));
+    for shape in &mut scene.shapes {
+        shape.mesh = Arc::new(far.clone());
+    }
+    let parameters = [parameter("camera", 0.0, vec![moves("camera", turn())])];
+    let by = |estimator| {
+        let settings = Settings { estimator, ..Settings::default() };
+        rendered(&scene, &parameters, &settings, 2048).derivatives.remove(0).total
+    };
+    let settings = Settings::default();
+    let differences = finite_differences(&scene, &parameters, &settings, 2048, 0.01, &Unattended);
+    let expected = differences.expect("a valid scene").remove(0);
+    for estimator in [PathSpace, Radiative, Warped] {
+        let own = by(estimator);
+        let found = agreement(&own, &expected, None);
+        assert!(found.agrees, "{estimator:?} {found:?}");
+        // Planted: the other way round.
+        assert!(!agreement(&multiple(&own, -1.0), &expected, None).agrees, "{estimator:?}");
+    }
+}
+
 #[test]
 fn derivatives_under_a_sky() {
     let scene = outside();

@@ -184,7 +184,7 @@ fn skies_of_images_over_what_moves() {
 }
 
 #[test]
-fn lenses_of_one_estimator() {
+fn lenses_of_some_estimators() {
     let lens = lenses::thin_lens().unwrap();
     assert_refused(by_samples(&lens.scene, &lens), &["warp", "auxiliary", "aperture"]);
     let parallel = lenses::parallel_rays().unwrap();

@@ -370,7 +370,10 @@ impl<'w> Differentiator<'w> {
                     self.seen(None, arrival.dir, value, filter, phi, sink.active());
                 }
                 let mut along = self.segment(&path, Far::Direction, ray_moves, weight, there, sink);
-                if let Some(environment) = world.lights.environment() {
+                // Only rays of the camera, and those that turn with edges, come to see another part of it.
+                if (p == 0 || turn_of_ray.is_some())
+                    && let Some(environment) = world.lights.environment()
+                {
                     let each = arrival.throughput * arrival.emission_weight;
                     along += environment.gradient(arrival.dir) * each;
                 }
