@@ -24,7 +24,7 @@ mod triangulate;
 mod weld;
 
 pub use aabb::Aabb;
-pub use crossing::crossing_pairs;
+pub use crossing::{CrossingSegment, crossing_pairs, crossing_segments};
 pub use intersect::ray_plane;
 #[cfg(feature = "obj")]
 pub use io::{ObjError, ObjErrorKind, load_obj};

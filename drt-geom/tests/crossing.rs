@@ -1,6 +1,6 @@
 //! Where surfaces run through each other: what counts as crossing, exactly, and that none is missed.
 
-use drt_geom::{Mesh, crossing_pairs, procedural};
+use drt_geom::{Mesh, crossing_pairs, crossing_segments, procedural};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
 
 fn triangle(corners: [[f64; 3]; 3]) -> Mesh {
@@ -175,4 +175,103 @@ fn nonsense_meets_nothing() {
     bad.triangles[0] = [0, 2, 7];
     assert!(crossing_pairs(&[&bad, &triangle(FLOOR)], 9).is_empty());
     assert!(crossing_pairs(&[], 9).is_empty());
+}
+
+/// How long the segments are along which surfaces pass through each other.
+fn length_of_crossings(surfaces: &[&Mesh]) -> f64 {
+    let found = crossing_segments(surfaces);
+    for s in &found {
+        let tangent = (s.ends[1] - s.ends[0]).normalize();
+        for ((surface, triangles), across) in s.surfaces.iter().zip(s.triangles).zip(s.across) {
+            for (triangle, across) in triangles.into_iter().zip(across) {
+                // The ends are on the triangle, and it goes on from them.
+                let mesh = surfaces[*surface as usize];
+                let [g1, g2] = mesh.barycentric_gradients(triangle);
+                let [a, b, c] = mesh.triangle(triangle);
+                let normal = (b - a).cross(c - a).normalize();
+                assert!(across.dot(tangent).abs() < 1e-9 && across.dot(normal).abs() < 1e-9);
+                assert!((across.length() - 1.0).abs() < 1e-12);
+                let on = |x: Vec3, near: f64| {
+                    let (u, v) = (g1.dot(x - a), g2.dot(x - a));
+                    u > -near && v > -near && u + v < 1.0 + near
+                };
+                assert!(s.ends.iter().all(|x| on(*x, 1e-9) && normal.dot(*x - a).abs() < 1e-9));
+                let middle = (s.ends[0] + s.ends[1]) * 0.5;
+                assert!(on(middle + across * (1e-4 * (s.ends[1] - s.ends[0]).length()), 0.0));
+            }
+        }
+    }
+    found.iter().map(|s| (s.ends[1] - s.ends[0]).length()).sum()
+}
+
+fn placed(mesh: &Mesh, size: Vec3, translation: Vec3) -> Mesh {
+    mesh.transform(&Affine { linear: Mat3::diagonal(size), translation })
+}
+
+fn floor(cells: u32) -> Mesh {
+    placed(&procedural::grid(cells, cells), vec3(2.0, 2.0, 1.0), Vec3::ZERO)
+}
+
+/// A ball in a floor is cut along a circle, however edges of the two lie to each other.
+#[test]
+fn a_ball_in_a_floor_is_cut_along_a_circle() {
+    for cells in [1, 2, 7, 32] {
+        for by in [-0.3, 0.0, 0.01, 0.6] {
+            let circle = core::f64::consts::TAU * f64::sqrt(1.0 - by * by);
+            for ball in [procedural::icosphere(4), procedural::uv_sphere(48)] {
+                let ball = placed(&ball, vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, by));
+                let length = length_of_crossings(&[&floor(cells), &ball]);
+                assert!((length / circle - 1.0).abs() < 0.01, "{cells} {by}: {length} {circle}");
+                let again = length_of_crossings(&[&ball, &floor(cells)]);
+                assert!((length - again).abs() < 1e-9, "{cells} {by}: {length} {again}");
+            }
+        }
+    }
+}
+
+/// What only touches has no such segments: a block on a floor, the walls of a room, a body beside itself.
+#[test]
+fn what_rests_does_not_pass_through() {
+    let block = |bottom: f64| {
+        placed(&procedural::cube(), vec3(0.4, 0.3, 0.5), vec3(0.1, 0.2, 0.5 + bottom))
+    };
+    for cells in [1, 2, 10] {
+        let floor = floor(cells);
+        assert_eq!(length_of_crossings(&[&floor, &block(0.0)]), 0.0);
+        assert_eq!(length_of_crossings(&[&floor, &block(1e-8)]), 0.0);
+        assert_eq!(length_of_crossings(&[&floor, &block(-1e-8)]), 0.0);
+        assert_eq!(length_of_crossings(&[&floor, &block(1e-3)]), 0.0);
+        // Sunk, it meets the floor all around.
+        let perimeter = 2.0 * (0.8 + 0.6);
+        let sunk = length_of_crossings(&[&floor, &block(-1e-3)]);
+        assert!((sunk - perimeter).abs() < 1e-9, "{sunk}");
+    }
+    let [cube, ball] = [procedural::cube(), procedural::icosphere(3)];
+    assert_eq!(length_of_crossings(&[&cube]), 0.0);
+    assert_eq!(length_of_crossings(&[&ball, &ball.clone()]), 0.0);
+    // A wall that stands on an edge of the floor, and one that goes through along it.
+    let wall = |low: f64| triangle([[0.0, -1.0, low], [0.0, 1.0, low], [0.0, 0.0, 1.0]]);
+    assert_eq!(length_of_crossings(&[&floor(2), &wall(0.0)]), 0.0);
+    let through = length_of_crossings(&[&floor(2), &wall(-1.0)]);
+    assert!((through - 1.0).abs() < 1e-9, "{through}");
+}
+
+/// Where two triangles cross, exactly, there is a segment, unless it is very short.
+#[test]
+fn segments_are_where_triangles_cross() {
+    let mut rng = Rng::new(3, 0, 0);
+    let mut point = || vec3(rng.next_f64(), rng.next_f64(), rng.next_f64());
+    let mut crossed = 0;
+    for _ in 0..2000 {
+        let [t, u] = [0; 2].map(|_| {
+            let corners = [point(), point(), point()];
+            Mesh::new(corners.to_vec(), vec![[0, 1, 2]]).unwrap()
+        });
+        let exact = !crossing_pairs(&[&t, &u], 1).is_empty();
+        let length = length_of_crossings(&[&t, &u]);
+        assert!(exact || length == 0.0);
+        crossed += usize::from(exact);
+        assert!(!exact || length > 1e-6, "{t:?} {u:?}");
+    }
+    assert!(crossed > 200, "{crossed}");
 }

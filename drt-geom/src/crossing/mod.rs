@@ -9,9 +9,11 @@ use crate::{Mesh, weld};
 
 mod meet;
 mod near;
+mod segments;
 
 #[cfg(feature = "tetgen")]
 pub(crate) use meet::{has_area, volume_sign};
+pub use segments::{CrossingSegment, crossing_segments};
 
 /// Pairs of triangles, each as (surface, triangle), that have more in common than corners and edges
 /// of both: what cross, overlap, coincide, or touch with a corner where the other has none.
