@@ -48,6 +48,16 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
+    /// A floor on one side of what ends at the first of two angles.
+    pub(super) fn with_floor(
+        up: Vec3,
+        side: Vec3,
+        wedge: [f64; 2],
+        floor: [Option<Vertex>; 2],
+    ) -> Self {
+        Self { up, side, wedge, floor }
+    }
+
     /// What the edge rests on at a point of it; `None` nearly everywhere.
     pub(crate) fn at(world: &World, at: &EdgePoint<'_>) -> Option<Self> {
         let e = at.edge;
@@ -94,10 +104,7 @@ impl Contact {
     pub(crate) fn anywhere(world: &World, e: &Edge) -> bool {
         let mut e = *e;
         e.may_rest = true;
-        PROBES.into_iter().any(|u| {
-            let (x, point) = e.point(u);
-            Self::at(world, &EdgePoint { edge: &e, x, point, inv_pdf: 1.0 }).is_some()
-        })
+        PROBES.into_iter().any(|u| Self::at(world, &EdgePoint::new(&e, u, 1.0)).is_some())
     }
 
     /// The floor next to the edge on the side from which `w` leaves it, and the unit vector along the

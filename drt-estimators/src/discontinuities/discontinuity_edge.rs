@@ -8,9 +8,10 @@ use drt_geom::edges::{Coincident, EdgeSides, Fan, FanFace, faces_around};
 use drt_math::{Vec3, fm};
 
 use crate::discontinuities::contact::Contact;
+use crate::discontinuities::crossing::crossings;
 use crate::discontinuities::edge::{Edge, EdgePoint, collect};
 use crate::model::sensor::Sensor;
-use crate::world::vertex::{MaterialPoint, SurfacePoint};
+use crate::world::vertex::SurfacePoint;
 use crate::world::{SurroundingMedium, World};
 
 /// How much less radiance jumps at a crease of a surface with interpolated normals than its angle tells.
@@ -56,7 +57,8 @@ impl DiscontinuityEdges {
     /// Collects the edges of surfaces that scatter or block. Of edges at one place, that of a shape that
     /// `moves` tells how the place moves.
     pub(crate) fn collect(world: &World, moves: &[bool]) -> Self {
-        let (edges, all) = collect(world);
+        let (mut edges, all) = collect(world);
+        let lines = crossings(world, &mut edges);
         let around: Vec<_> =
             (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
         let mut discontinuities = Self { list: Vec::new(), faces_of_fans: Vec::new(), all };
@@ -74,6 +76,20 @@ impl DiscontinuityEdges {
             let around = around[edge.shape as usize];
             let shape = |i: &usize| &world.scene.shapes[of(i).shape as usize];
             let bounds = same.iter().any(|i| shape(i).boundary.is_some());
+            let found = DiscontinuityEdge { edge, fan, around, bounds, crease, smooth };
+            discontinuities.list.push(found);
+        }
+        for edge in lines {
+            let Some(sheets) = edge.crossing_sheets(world) else { continue };
+            let start = discontinuities.faces_of_fans.len();
+            let mut faces = sheets.map(|(face, across)| FanFace::new(&edge.wedge, face, across));
+            faces.sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
+            discontinuities.faces_of_fans.extend(faces);
+            let fan = start..discontinuities.faces_of_fans.len();
+            let around = around[edge.shape as usize];
+            let mut shapes = edge.shapes().map(|s| &world.scene.shapes[s as usize]);
+            let bounds = shapes.any(|shape| shape.boundary.is_some());
+            let (crease, smooth) = ([1.0; 2], false);
             let found = DiscontinuityEdge { edge, fan, around, bounds, crease, smooth };
             discontinuities.list.push(found);
         }
@@ -137,16 +153,18 @@ impl DiscontinuityEdges {
             None => wedge.subtended_angle(eye),
             Some(lens) => wedge.most_subtended(eye, lens.radius),
         };
-        let Some(normals) = self.normals(discontinuity).filter(|_| silhouette == 0.0) else {
+        if silhouette > 0.0 {
             return silhouette;
-        };
-        let [da, db] = wedge.ends.map(|p| if parallel { forward } else { p - eye });
-        let crease = discontinuity.crease[usize::from(normals[0].dot(da) > 0.0)];
-        let weight = if discontinuity.smooth { crease } else { fm::sqrt(crease) };
+        }
         let size = match parallel {
             true => wedge.length * wedge.sine(forward),
-            false => fm::atan2(da.cross(db).length(), da.dot(db)),
+            false => wedge.angular_size(eye),
         };
+        // Of three faces and more some two are seen beside each other from anywhere.
+        let Some(normals) = self.normals(discontinuity) else { return size };
+        let view = if parallel { forward } else { wedge.ends[0] - eye };
+        let crease = discontinuity.crease[usize::from(normals[0].dot(view) > 0.0)];
+        let weight = if discontinuity.smooth { crease } else { fm::sqrt(crease) };
         weight * size
     }
 
@@ -167,15 +185,14 @@ impl DiscontinuityEdge {
         self.edge.wedge.length
     }
 
-    /// The point `along` the edge.
-    pub(crate) fn point(&self, along: f64) -> (Vec3, MaterialPoint) {
-        self.edge.point(along)
+    /// True when a shape with which it moves is one of some.
+    pub(crate) fn moves(&self, shapes: &[bool]) -> bool {
+        self.edge.shapes().any(|s| shapes[s as usize])
     }
 
     /// What the edge rests on at a point of it.
     pub(crate) fn contact(&self, world: &World, along: f64) -> Option<Contact> {
-        let (x, point) = self.edge.point(along);
-        Contact::at(world, &EdgePoint { edge: &self.edge, x, point, inv_pdf: 1.0 })
+        Contact::at(world, &EdgePoint::new(&self.edge, along, 1.0))
     }
 
     /// A surface point on a face, beside the point `x` of the edge.

@@ -1,11 +1,14 @@
 //! Edges that can be silhouettes, and how points on them are drawn (theory sheet §4.3).
 
 use alloc::vec::Vec;
+use core::f64::consts::PI;
 
 use drt_geom::edges::{Coincident, Fan, Gap, Wedge, faces_around};
 use drt_geom::{EdgeClass, NONE, Topology};
 use drt_math::{CdfTable, Rng, Vec3};
 
+use crate::derivative::velocity::EdgeMatter;
+use crate::discontinuities::crossing::{Sheets, matter, sheets};
 use crate::discontinuities::order::sort_by_likeness;
 use crate::model::error::Error;
 use crate::world::vertex::MaterialPoint;
@@ -20,12 +23,21 @@ pub(crate) struct Edge {
     /// The first face in its shape, and which of its corners are the edge's ends.
     triangle: u32,
     corners: [u8; 2],
+    /// Where another surface passes through, its faces on the two sides.
+    crossed_by: Option<Crossed>,
     /// Where segments that graze the edge run: before the faces, behind them, or on an open edge.
     side: GrazedSide,
     /// The medium in which they run, where that is the same all along the edge.
     medium: SurroundingMedium,
     /// Something is so near that the edge may rest on it.
     pub(crate) may_rest: bool,
+}
+
+/// What passes through the faces at an edge.
+#[derive(Clone, Copy, Debug)]
+struct Crossed {
+    shape: u32,
+    faces: [u32; 2],
 }
 
 /// The side of an edge's faces on which it can be grazed.
@@ -41,8 +53,8 @@ pub(crate) enum GrazedSide {
 pub(crate) struct EdgePoint<'a> {
     pub(crate) edge: &'a Edge,
     pub(crate) x: Vec3,
-    /// The same point on the edge's first face.
-    pub(crate) point: MaterialPoint,
+    /// Of the way along the edge.
+    pub(crate) along: f64,
     /// 1 over the density per length.
     pub(crate) inv_pdf: f64,
 }
@@ -51,7 +63,29 @@ impl Edge {
     /// An edge of a face `triangle` of a shape, whose `corners` are the edge's ends.
     fn new(wedge: Wedge, shape: u32, triangle: u32, corners: [u8; 2], side: GrazedSide) -> Self {
         let medium = SurroundingMedium::Varies;
-        Self { wedge, shape, triangle, corners, side, medium, may_rest: false }
+        let crossed_by = None;
+        Self { wedge, shape, triangle, corners, crossed_by, side, medium, may_rest: false }
+    }
+
+    /// A line along which the faces of one shape and `others` of another pass through each other.
+    pub(super) fn crossing(wedge: Wedge, shapes: [u32; 2], others: [u32; 2]) -> Self {
+        let crossed_by = Some(Crossed { shape: shapes[1], faces: others });
+        Self { crossed_by, ..Self::new(wedge, shapes[0], NONE, [0; 2], GrazedSide::Unknown) }
+    }
+
+    /// The faces around a line along which surfaces pass through each other; `None` of edges of a mesh.
+    pub(crate) fn crossing_sheets(&self, world: &World) -> Option<Sheets> {
+        self.crossed_by.map(|by| sheets(world, &self.wedge, by.faces))
+    }
+
+    /// True of a line along which surfaces pass through each other.
+    pub(crate) fn is_crossing(&self) -> bool {
+        self.crossed_by.is_some()
+    }
+
+    /// The shapes with which it moves.
+    pub(crate) fn shapes(&self) -> impl Iterator<Item = u32> + use<> {
+        core::iter::once(self.shape).chain(self.crossed_by.map(|by| by.shape))
     }
 
     /// The same edge with the faces of others that coincide with it, of which only those beside the widest
@@ -66,13 +100,16 @@ impl Edge {
         Self { wedge, side: GrazedSide::Unknown, ..*self }
     }
 
-    /// The point at `u` of the way along the edge.
-    pub(crate) fn point(&self, u: f64) -> (Vec3, MaterialPoint) {
+    /// How the point at `u` of the way along the edge moves: with matter of one point, or of two.
+    pub(crate) fn matter(&self, world: &World, u: f64) -> [Option<EdgeMatter>; 2] {
+        if let Some(by) = self.crossed_by {
+            return matter(world, &self.wedge, by.faces, self.wedge.at(u)).map(Some);
+        }
         let mut bary = [0.0; 3];
         bary[self.corners[0] as usize] = 1.0 - u;
         bary[self.corners[1] as usize] = u;
         let at = drt_motion::SurfacePoint { triangle: self.triangle, bary: [bary[1], bary[2]] };
-        (self.wedge.at(u), MaterialPoint { shape: self.shape, at })
+        [Some(EdgeMatter::of(MaterialPoint { shape: self.shape, at })), None]
     }
 
     /// Looks up the medium around the edge where one answer holds for all of it; `around` is the one
@@ -90,6 +127,13 @@ impl Edge {
     /// The medium in which segments graze the edge at `x`.
     pub(crate) fn medium(&self, world: &World, x: Vec3) -> Option<usize> {
         self.medium.at(world, x)
+    }
+}
+
+impl<'a> EdgePoint<'a> {
+    /// The point at `along` of the way along an edge.
+    pub(crate) fn new(edge: &'a Edge, along: f64, inv_pdf: f64) -> Self {
+        Self { edge, x: edge.wedge.at(along), along, inv_pdf }
     }
 }
 
@@ -143,15 +187,14 @@ impl EdgeTable {
 
     /// Weight of an edge for directions drawn on it: its length times the angle that is free.
     pub(crate) fn general_weight(e: &Edge) -> f64 {
-        e.wedge.length * e.wedge.free_angle()
+        e.wedge.length * if e.is_crossing() { PI } else { e.wedge.free_angle() }
     }
 
     pub(crate) fn sample(&self, rng: &mut Rng) -> EdgePoint<'_> {
         // Monotone: one number places the point among all edges.
         let s = self.table.sample(rng.next_f64());
         let edge = &self.edges[s.index];
-        let (x, point) = edge.point(s.residual);
-        EdgePoint { edge, x, point, inv_pdf: edge.wedge.length / s.pmf }
+        EdgePoint::new(edge, s.residual, edge.wedge.length / s.pmf)
     }
 }
 

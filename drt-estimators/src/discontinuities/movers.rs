@@ -42,6 +42,10 @@ impl<'a> Movers<'a> {
 
     /// True when visibility past an edge can change at all.
     pub(crate) fn matter_to(&self, e: &Edge) -> bool {
+        if e.is_crossing() {
+            // It only moves with its faces.
+            return self.moves(e);
+        }
         self.active.sensor || self.active.moving_emitters.contains(&true) || self.pass(e)
     }
 
@@ -84,7 +88,7 @@ impl<'a> Movers<'a> {
 
     /// True when the edge itself moves.
     pub(crate) fn moves(&self, e: &Edge) -> bool {
-        self.active.shapes[e.shape as usize]
+        e.shapes().any(|s| self.active.shapes[s as usize])
     }
 
     /// The edge or an inside moves.

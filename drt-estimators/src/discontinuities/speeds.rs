@@ -3,6 +3,7 @@
 use drt_motion::SurfaceMotion;
 
 use crate::derivative::contraction::Motion;
+use crate::derivative::velocity::EdgeMatter;
 use crate::discontinuities::edge::Edge;
 use crate::world::World;
 
@@ -18,15 +19,17 @@ pub(crate) fn speeds<'a>(motion: &'a Motion, world: &'a World) -> impl Fn(&Edge)
         }
     }
     move |edge| {
-        let shape = edge.shape as usize;
-        let mesh = &world.scene.shapes[shape].mesh;
-        let speed = |(p, of_shape): &(usize, SurfaceMotion)| {
-            let across = |end: f64| {
-                let velocity = of_shape.velocity(mesh, &edge.point(end).1.at);
-                velocity.reject(edge.wedge.tangent).length()
+        let of_matter = |matter: EdgeMatter| {
+            let shape = matter.point.shape as usize;
+            let mesh = &world.scene.shapes[shape].mesh;
+            let speed = |(p, of_shape): &(usize, SurfaceMotion)| {
+                let velocity = matter.push(of_shape.velocity(mesh, &matter.point.at));
+                let across = velocity.reject(edge.wedge.tangent).length();
+                across / f64::max(fastest[*p], f64::MIN_POSITIVE)
             };
-            f64::max(across(0.0), across(1.0)) / f64::max(fastest[*p], f64::MIN_POSITIVE)
+            motion.tangents.shapes[shape].iter().map(speed).fold(0.0, f64::max)
         };
-        motion.tangents.shapes[shape].iter().map(speed).fold(0.0, f64::max)
+        let at = |end| edge.matter(world, end).into_iter().flatten().map(&of_matter).sum();
+        f64::max(at(0.0), at(1.0))
     }
 }

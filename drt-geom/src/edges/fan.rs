@@ -72,18 +72,25 @@ pub fn faces_around<'a>(
     edge: &Wedge,
     coincident: impl IntoIterator<Item = &'a Wedge>,
 ) -> Vec<FanFace> {
-    let (x, y) = axes(edge);
     let mut fan: Vec<FanFace> = Vec::new();
     for other in coincident {
         for (face, across) in other.faces.into_iter().zip(other.across) {
             if fan.iter().all(|f| f.face != face) {
-                let angle = fm::atan2(across.dot(y), across.dot(x));
-                fan.push(FanFace { angle, face, across });
+                fan.push(FanFace::new(edge, face, across));
             }
         }
     }
     fan.sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
     fan
+}
+
+impl FanFace {
+    /// A face into which the unit vector `across` an edge points.
+    #[must_use]
+    pub fn new(edge: &Wedge, face: u32, across: Vec3) -> Self {
+        let (x, y) = axes(edge);
+        Self { angle: fm::atan2(across.dot(y), across.dot(x)), face, across }
+    }
 }
 
 /// The directions across an edge from which angles are measured, and a quarter turn on.

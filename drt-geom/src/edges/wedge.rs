@@ -128,6 +128,13 @@ impl Wedge {
         if ![da, db, (da + db) * 0.5].into_iter().any(|d| self.is_silhouette(d.normalize())) {
             return 0.0;
         }
+        self.angular_size(eye)
+    }
+
+    /// The angle in radians between the directions to its ends, silhouette or not.
+    #[must_use]
+    pub fn angular_size(&self, eye: Vec3) -> f64 {
+        let [da, db] = self.ends.map(|p| p - eye);
         fm::atan2(da.cross(db).length(), da.dot(db))
     }
 
@@ -143,9 +150,8 @@ impl Wedge {
         }
         let [da, db] = self.ends.map(|p| p - eye);
         let near = f64::max(da.length(), db.length()) * 1e-3;
-        let angle = fm::atan2(da.cross(db).length(), da.dot(db));
         f64::max(
-            angle,
+            self.angular_size(eye),
             self.length * radius / (da.length_squared() + radius * radius + near * near),
         )
     }

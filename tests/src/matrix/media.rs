@@ -187,6 +187,50 @@ pub fn glass() -> Result<Stage> {
     glass_body("glass ball", at(&icosphere(2), Vec3::splat(0.7), Vec3::ZERO))
 }
 
+/// A ball of syrup in black glass, half sunk in a wall that parts what is inside and outside of it.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn sunk_glass() -> Result<Stage> {
+    let glass = RoughDielectric { alpha: 0.5, eta: 1.1, ..RoughDielectric::default() };
+    let wall = placed(&rectangle(), vec3(2.0, 2.0, 1.0), Vec3::X, PI, vec3(0.0, 0.0, 0.2));
+    let ball = at(&icosphere(2), Vec3::splat(0.7), Vec3::ZERO);
+    let scene = Set::new(vec3(0.6, 0.9, -2.6), Vec3::ZERO, 34.0, 3)?
+        .medium("syrup", fog([0.6, 1.0, 1.5], [0.9, 0.8, 0.7])?, forward(0.4)?)
+        .filled("ball", ball, Bsdf::RoughDielectric(glass), "syrup", None)
+        .shape("wall", wall, diffuse([0.6, 0.5, 0.4]))
+        .light("sky", Emitter::Constant { radiance: Rgb::new(0.8, 0.9, 1.0) })
+        .scene;
+    let cells = vec![
+        Cell::new("ball moves", [translate("ball", vec3(0.3, 0.4, -0.7))]).representative(),
+        Cell::new("wall moves", [translate("wall", vec3(0.0, 0.2, 0.6))]),
+    ];
+    Ok(Stage::new("sunk glass", scene, cells))
+}
+
+/// A ball half sunk in a floor in fog.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn sunk_in_fog() -> Result<Stage> {
+    let place = vec3(0.1, -0.4, 0.3);
+    let floor = placed(&grid(2, 2), vec3(1.4, 1.4, 1.0), Vec3::X, -FRAC_PI_2, vec3(0.0, -0.5, 0.0));
+    let lamp = ceiling_lamp(0.5, vec3(-0.3, 0.8, 0.3));
+    let scene = Set::new(vec3(0.2, 0.4, -0.9), vec3(0.1, -0.4, 0.3), 60.0, 3)?
+        .medium("fog", fog([0.5, 0.7, 0.9], [0.9, 0.8, 0.7])?, forward(0.3)?)
+        .interface("border", at(&cube(), Vec3::splat(1.2), Vec3::ZERO), "fog", None)
+        .shape("floor", floor, diffuse([0.7, 0.6, 0.5]))
+        .shape("ball", at(&icosphere(2), Vec3::splat(0.35), place), diffuse([0.3, 0.5, 0.8]))
+        .lamp("lamp", lamp, Rgb::new(5.0, 6.0, 7.0))
+        .scene;
+    let cells = vec![
+        Cell::new("ball rises", [translate("ball", Vec3::Y)]).representative(),
+        Cell::new("ball slides", [translate("ball", vec3(0.8, 0.0, 0.5))]),
+        Cell::new("floor tilts", [turn("floor", vec3(1.0, 0.0, 0.4), place)]),
+    ];
+    Ok(Stage::new("sunk in fog", scene, cells))
+}
+
 /// A refractive body with dents: edges that graze from inside.
 ///
 /// # Errors

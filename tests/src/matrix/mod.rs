@@ -29,12 +29,13 @@ pub use verdict::{Fault, Row, Table, check};
 macro_rules! every_stage {
     ($with:ident) => {
         $with! {
-            surfaces: room room_box_filter standing knot gloss blend near_lamp;
+            surfaces: room room_box_filter standing sunk sunk_by_point knot gloss blend near_lamp;
             lights: spot point_and_sun;
             materials: principled thin brushed pressed coated unmixed measured measured_brushed;
             lenses: thin_lens cropped instances;
             textures: picture mosaic stained picture_lamp under_a_sky sky_and_slide thrown;
-            media: fog_box blob still_blob shade smoke glass dented_glass beam layers sheet ember;
+            media: fog_box blob still_blob shade smoke glass dented_glass sunk_in_fog sunk_glass beam
+                layers sheet ember;
             deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed
                 lantern stirred_smoke still_smoke fine_milk fine_glass;
             riding: riding riding_tight riding_inside riding_still riding_tetrahedral

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::FilterKind;
 use drt_estimators::surface::{Blend, Bsdf, Distribution, Phong, RoughConductor};
-use drt_geom::procedural::{TorusKnot, cube, grid, rectangle, torus_knot, uv_sphere};
+use drt_geom::procedural::{TorusKnot, cube, grid, icosphere, rectangle, torus_knot, uv_sphere};
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_motion::{Effect, GeometryChange};
 
@@ -110,6 +110,65 @@ pub fn standing() -> Result<Stage> {
         Cell::new("the floor slides", [translate("floor", vec3(0.7, 0.0, 0.7))]),
     ];
     Ok(Stage::new("standing blocks", scene, cells))
+}
+
+/// A ball half sunk in a floor and a block through a wall, by direct light: bodies that no edge bounds where they go in.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn sunk() -> Result<Stage> {
+    let lamp = placed(&rectangle(), vec3(0.4, 0.4, 1.0), Vec3::X, FRAC_PI_2, vec3(0.6, 1.6, 0.5));
+    let scene = sunken(2, [0.8, 0.5, 0.2])?
+        .lamp("lamp", lamp, Rgb::new(14.0, 13.0, 11.0))
+        .light("sky", Emitter::Constant { radiance: Rgb::new(0.2, 0.25, 0.35) })
+        .scene;
+    let both = [translate("ball", vec3(0.4, 0.3, -0.2)), translate("floor", vec3(0.3, 0.6, 0.2))];
+    let cells = vec![
+        Cell::new("ball rises", [translate("ball", Vec3::Y)]).representative(),
+        Cell::new("ball slides", [translate("ball", vec3(0.8, 0.0, 0.5))]),
+        Cell::new("floor tilts", [turn("floor", vec3(1.0, 0.0, 0.4), SUNK_FLOOR)]),
+        Cell::new("block turns", [turn("block", vec3(0.3, 1.0, 0.2), THROUGH_WALL)])
+            .representative(),
+        Cell::new("wall moves", [translate("wall", vec3(0.3, 0.2, 0.8))]),
+        Cell::new("ball and floor move", both),
+        Cell::new("camera moves", [translate("camera", vec3(0.6, 0.2, -0.3))]),
+    ];
+    Ok(Stage::new("sunk", scene, cells))
+}
+
+/// The same in the light of a point, which floor and wall throw on each other. Ball and block are black: with light between surfaces
+/// that touch and move apart, `path-space` has samples in proportion to one over their distance.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn sunk_by_point() -> Result<Stage> {
+    let bulb = Emitter::Point { position: vec3(0.9, 1.2, 0.9), intensity: Rgb::new(3.0, 2.5, 2.0) };
+    let scene = sunken(4, [0.0; 3])?.light("bulb", bulb).scene;
+    let cells = vec![
+        Cell::new("ball rises", [translate("ball", Vec3::Y)]).representative(),
+        Cell::new("ball slides", [translate("ball", vec3(0.8, 0.0, 0.5))]),
+        Cell::new("block turns", [turn("block", vec3(0.3, 1.0, 0.2), THROUGH_WALL)]),
+        Cell::new("bulb moves", [translate("bulb", vec3(0.5, -0.3, 0.4))]),
+    ];
+    Ok(Stage::new("sunk, by a point", scene, cells))
+}
+
+/// Where the ball is in the floor.
+const SUNK_FLOOR: Vec3 = vec3(0.1, -0.6, 0.0);
+/// Where the block is in the wall.
+const THROUGH_WALL: Vec3 = vec3(-0.45, 0.1, -0.6);
+
+/// The bodies, with a reflectance, the floor and the wall.
+fn sunken(depth: u32, bodies: [f64; 3]) -> Result<Set> {
+    let floor = placed(&grid(2, 2), vec3(1.6, 1.6, 1.0), Vec3::X, -FRAC_PI_2, SUNK_FLOOR);
+    let wall = placed(&rectangle(), vec3(1.6, 1.3, 1.0), Vec3::X, 0.1, vec3(0.0, 0.3, -0.6));
+    let ball = at(&icosphere(2), Vec3::splat(0.45), SUNK_FLOOR + vec3(0.2, 0.1, 0.2));
+    let block = placed(&cube(), vec3(0.2, 0.25, 0.4), vec3(1.0, 2.0, 0.5), 0.6, THROUGH_WALL);
+    Ok(Set::new(vec3(0.7, 0.9, 2.8), vec3(0.0, -0.2, 0.0), 38.0, depth)?
+        .shape("floor", floor, diffuse([0.7, 0.6, 0.5]))
+        .shape("wall", wall, diffuse([0.3, 0.5, 0.6]))
+        .shape("ball", ball, diffuse(bodies))
+        .shape("block", block, diffuse(bodies)))
 }
 
 /// A metal knot over a floor under a constant sky.

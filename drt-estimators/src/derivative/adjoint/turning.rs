@@ -33,8 +33,9 @@ impl RayMotion<'_> {
         let mut origin = RgbVec::ZERO;
         for part in self.parts {
             let g = across * part.rate + weight.outer(part.divergence);
-            if let Some(point) = part.matter {
-                send_to(point, SurfaceAdjoint::of_place(g), sink);
+            if let Some(matter) = part.matter {
+                let place = g.map(|g| matter.pull(g));
+                send_to(matter.point, SurfaceAdjoint::of_place(place), sink);
             }
             origin += g;
         }
@@ -60,7 +61,8 @@ impl RayMotion<'_> {
             projected * share.value + weight.outer(along)
         };
         for part in self.shadows {
-            send_to(part.matter, SurfaceAdjoint::of_place(by(&part.share)), sink);
+            let place = by(&part.share).map(|g| part.matter.pull(g));
+            send_to(part.matter.point, SurfaceAdjoint::of_place(place), sink);
         }
         if sink.active().emitters[light.emitter] {
             send_to_light(light, &by(&shadow.by_light), sink);

@@ -33,13 +33,13 @@
 
 use drt_math::Vec3;
 
-use crate::derivative::velocity::Weight;
+use crate::derivative::velocity::{EdgeMatter, Weight};
 use crate::world::vertex::MaterialPoint;
 
 /// A summand of v, by the velocity of an edge's end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ShadowPart {
-    pub(crate) matter: MaterialPoint,
+    pub(crate) matter: EdgeMatter,
     /// Λ k and its part of the edge.
     pub(crate) share: Weight,
 }

@@ -22,16 +22,16 @@ use core::ops::{Add, AddAssign, Div, Mul, Range, Sub};
 
 use drt_math::Vec3;
 
-use crate::derivative::velocity::{Blend, ShadowPart, ShadowTurn};
+use crate::derivative::velocity::{Blend, EdgeMatter, ShadowPart, ShadowTurn};
 use crate::sampling::record::CameraRay;
-use crate::world::vertex::{MaterialPoint, SurfacePoint, Vertex};
+use crate::world::vertex::{SurfacePoint, Vertex};
 
 /// A summand of the rate of a ray's direction, linear in the velocity w of a point beside the ray less that of the ray's
 /// origin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TurnPart {
     /// The point; `None` of what is at rest.
-    pub(crate) matter: Option<MaterialPoint>,
+    pub(crate) matter: Option<EdgeMatter>,
     /// λ / r: the direction's rate per unit of w across the ray. 1 / scene units.
     pub(crate) rate: f64,
     /// What its dot product with w gives to div T. 1 / scene units.

@@ -6,6 +6,7 @@ use drt_math::{Frame, Rgb, Vec3, warp};
 
 use super::{BoundarySink, End, Sampler, Start, seen};
 use crate::discontinuities::contact::Contact;
+use crate::discontinuities::crossing::Sheets;
 use crate::discontinuities::edge::EdgePoint;
 use crate::model::sensor::Sensor;
 
@@ -31,7 +32,55 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
         Some(())
     }
 
+    /// The camera sees a line along which surfaces pass through each other.
+    pub(super) fn crossing_with_camera(
+        &mut self,
+        camera: &Sensor,
+        at: &EdgePoint<'_>,
+        sheets: &Sheets,
+    ) -> Option<()> {
+        let w = camera.eye_of(at.x) - at.x;
+        let contact = |k| Contact::at_crossing(self.tracer.world, at, sheets, k, w);
+        // The camera is between two of the faces.
+        let [first, second] = {
+            let mut seen = (0..sheets.len()).map(contact).filter(|c| c.beside(w).is_some());
+            [seen.next(), seen.next()]
+        };
+        let u = self.tracer.rng.next_f64();
+        let chosen = match (first, second) {
+            (Some(a), Some(b)) => {
+                if u < 0.5 {
+                    a
+                } else {
+                    b
+                }
+            }
+            (one, _) => one?,
+        };
+        let chance = if second.is_some() { 0.5 } else { 1.0 };
+        let at = EdgePoint { inv_pdf: at.inv_pdf / chance, ..*at };
+        self.contact_with_camera(camera, &at, &chosen)
+    }
+
     /// Another vertex sees it.
+    pub(super) fn crossing_with_others(
+        &mut self,
+        at: &EdgePoint<'_>,
+        sheets: &Sheets,
+    ) -> Option<()> {
+        // Either side of any of the faces.
+        let sides = 2 * sheets.len();
+        let u = self.tracer.rng.next_f64() * sides as f64;
+        let side = usize::min(u as usize, sides - 1);
+        let (_, across) = sheets[side / 2];
+        let normal = across.cross(at.edge.wedge.tangent);
+        let towards = if side % 2 == 0 { normal } else { -normal };
+        let contact = Contact::at_crossing(self.tracer.world, at, sheets, side / 2, towards);
+        let at = EdgePoint { inv_pdf: at.inv_pdf * sides as f64, ..*at };
+        self.contact_with_others(&at, &contact)
+    }
+
+    /// Another vertex sees the floor.
     pub(super) fn contact_with_others(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
         let world = self.tracer.world;
         let u = self.tracer.rng.next_2d();

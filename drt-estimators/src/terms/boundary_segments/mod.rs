@@ -31,6 +31,7 @@ use alloc::vec::Vec;
 use drt_math::{Rgb, Vec3};
 
 use crate::discontinuities::contact::Contact;
+use crate::discontinuities::crossing::crossings;
 use crate::discontinuities::edge::{Edge, EdgePoint, EdgeTable, collect, merge_coincident};
 use crate::discontinuities::movers::Movers;
 use crate::terms::boundary_segments::areas::AreaWeights;
@@ -123,20 +124,26 @@ impl Boundary {
         let movers = Movers::new(world, active);
         let (edges, all) = collect(world);
         let mut edges = merge_coincident(edges, |e| movers.moves(e));
+        let lines = crossings(world, &mut edges);
+        edges.extend(lines);
         edges.retain(|e| movers.matter_to(e));
         let around: Vec<_> =
             (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
         for e in &mut edges {
             e.settle_medium(world, around[e.shape as usize]);
-            e.may_rest = Contact::anywhere(world, e);
+            e.may_rest = !e.is_crossing() && Contact::anywhere(world, e);
         }
         let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
         let has_areas = world.max_depth >= 2 && world.lights.has_areas();
         let weights = has_areas.then(|| AreaWeights::new(world, &edges));
-        let areas = weights.map(|w| EdgeTable::new(&edges, |e| movers.pass(e), |e| w.of(e)));
+        let grazed = |e: &Edge| !e.is_crossing();
+        let passed = |e: &Edge| grazed(e) && movers.pass(e);
+        let areas = weights.map(|w| EdgeTable::new(&edges, passed, |e| w.of(e)));
         let areas = areas.transpose()?.flatten();
         let camera = &world.camera;
         let in_view = |e: &Edge| match (camera.is_orthographic(), camera.aperture()) {
+            (true, _) if e.is_crossing() => e.wedge.length * e.wedge.sine(camera.pinhole().forward),
+            _ if e.is_crossing() => e.wedge.angular_size(camera.position()),
             (true, _) => e.wedge.projected_length(camera.pinhole().forward),
             (false, None) => e.wedge.subtended_angle(camera.position()),
             (false, Some(lens)) => e.wedge.most_subtended(camera.position(), lens.radius),
@@ -147,19 +154,20 @@ impl Boundary {
             | Emitter::Spot { position, .. }
             | Emitter::Projector { position, .. } => EdgeTable::new(
                 &edges,
-                |e| movers.pass_emitter(e, i, |x| x - position),
+                |e| grazed(e) && movers.pass_emitter(e, i, |x| x - position),
                 |e| e.wedge.subtended_angle(position),
             ),
             Emitter::Directional { direction, .. } => EdgeTable::new(
                 &edges,
-                |e| movers.pass_emitter(e, i, |_| direction),
+                |e| grazed(e) && movers.pass_emitter(e, i, |_| direction),
                 |e| e.wedge.projected_length(direction),
             ),
             _ => Ok(None),
         };
         let emitters = world.scene.emitters.iter().enumerate();
         let lights = emitters.map(|(i, e)| light(i, &e.item.emitter)).collect::<Result<_, _>>()?;
-        let lit = edges.iter().filter(|e| movers.pass_lights(world, e)).copied().collect();
+        let lit = edges.iter().filter(|e| grazed(e) && movers.pass_lights(world, e));
+        let lit = lit.copied().collect();
         let shadows = Shadows::new(world, lit);
         Ok(Self { count: [edges.len() as u64, all], general, areas, camera, lights, shadows })
     }
@@ -227,6 +235,9 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let at = self.boundary.camera.as_ref()?.sample(&mut self.tracer.rng);
         let lens = world.camera.draw_lens(&mut self.tracer.rng);
         let camera = &*world.camera.at_lens(lens);
+        if let Some(sheets) = at.edge.crossing_sheets(world) {
+            return self.crossing_with_camera(camera, &at, &sheets);
+        }
         if let Some(contact) = Contact::at(world, &at) {
             return self.contact_with_camera(camera, &at, &contact);
         }
@@ -350,6 +361,9 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
     fn indirect(&mut self) -> Option<()> {
         let world = self.tracer.world;
         let at = self.boundary.general.as_ref()?.sample(&mut self.tracer.rng);
+        if let Some(sheets) = at.edge.crossing_sheets(world) {
+            return self.crossing_with_others(&at, &sheets);
+        }
         if let Some(contact) = Contact::at(world, &at) {
             return self.contact_with_others(&at, &contact);
         }
@@ -505,7 +519,8 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
     }
 
     fn edge_rate(&mut self, at: &EdgePoint<'_>, n: Vec3) {
-        self.b.functional.items.push(VelocityTerm::Surface(at.point, n));
+        let matter = at.edge.matter(self.tracer.world, at.along).into_iter().flatten();
+        self.b.functional.items.extend(matter.map(|m| VelocityTerm::Surface(m.point, m.pull(n))));
     }
 
     fn end_rate(&mut self, end: &End, n: Vec3) {

@@ -129,7 +129,7 @@ impl Shadows {
         }
         tracer.counters.boundary_samples += 1;
         let x = eye + dir * m.t;
-        let (x_edge, point) = edge.point(m.s);
+        let x_edge = edge.wedge.at(m.s);
         let around = edge.medium(world, x_edge);
         // Light: from the edge back to the source, and on to the point.
         let tau = self.open(tracer, edge, x_edge, around, -m.w, source, m.r_edge, b)?
@@ -171,7 +171,8 @@ impl Shadows {
         let seen = world.transmittance(eye, dir, &b.segment, &mut tracer.rng, &mut tracer.counters);
         let items = &mut b.functional.items;
         items.clear();
-        items.push(VelocityTerm::Surface(point, n));
+        let matter = edge.matter(world, m.s).into_iter().flatten();
+        items.extend(matter.map(|m| VelocityTerm::Surface(m.point, m.pull(n))));
         let l = match source {
             ShadowLight::Point(..) => m.r_edge / m.r_point,
             ShadowLight::Direction(_) => 1.0,

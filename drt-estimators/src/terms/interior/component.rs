@@ -238,9 +238,9 @@ impl<'a, S: PathSink> Worker<'a, S> {
         let n = sink.layers();
         let layer = if self.separate && e.node > 1 { n } else { 0 };
         sink.begin();
-        for (matter, value) in e.matter.iter().flatten() {
+        for (matter, n, value) in e.matter.iter().flatten() {
             if sink.active().moves(matter) {
-                VelocityTerm::of(*matter, e.n).send(*value * share, sink);
+                VelocityTerm::of(*matter, *n).send(*value * share, sink);
             }
         }
         let viewer = (e.viewer * share).outer(e.n);

@@ -49,7 +49,7 @@ impl<'a> EdgeView<'a> {
         along: f64,
         viewer: &'a Vertex,
     ) -> Option<Self> {
-        let (x, _) = discontinuity.point(along);
+        let x = discontinuity.edge.wedge.at(along);
         let to = viewer.x - x;
         let distance = to.length();
         let w = to / distance;

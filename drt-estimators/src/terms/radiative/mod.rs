@@ -164,7 +164,7 @@ impl Radiative {
             DiscontinuityEdges::default()
         };
         let moves = |j: &DiscontinuityEdge| {
-            if active.shapes[j.edge.shape as usize] { speed(&j.edge) } else { 0.0 }
+            if j.moves(&active.shapes) { speed(&j.edge) } else { 0.0 }
         };
         let moving_shapes = (0..).zip(&active.shapes).filter(|(_, moves)| **moves);
         let holding: Vec<u32> =

@@ -1,12 +1,13 @@
 //! Edges seen from the camera (2019 paper, Eq. 41, at fixed image points).
 
 use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
+use crate::derivative::velocity::EdgeMatter;
 use crate::sampling::importance::see;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::radiative::Radiative;
-use crate::terms::radiative::difference::EdgeView;
-use crate::world::vertex::{Kind, Matter, Vertex};
+use crate::terms::radiative::difference::{EdgeView, SideRadiance};
+use crate::world::vertex::{Kind, Vertex};
 
 impl Radiative {
     /// Takes one sample of the camera's edges.
@@ -21,7 +22,8 @@ impl Radiative {
         let chosen = self.camera.as_ref()?.sample(&self.discontinuities, &mut tracer.rng);
         let lens = world.camera.draw_lens(&mut tracer.rng);
         let camera = &*world.camera.at_lens(lens);
-        let (x, point) = chosen.discontinuity.point(chosen.along);
+        let edge = &chosen.discontinuity.edge;
+        let x = edge.wedge.at(chosen.along);
         let eye = world.eye_at(camera.eye_of(x));
         let view = EdgeView::new(tracer, self, chosen.discontinuity, chosen.along, &eye)?;
         let (_, importance) = see(camera, &Vertex { x, medium: None, kind: Kind::Point })?;
@@ -30,20 +32,23 @@ impl Radiative {
         let weight = tau * (view.sides.sine * chosen.inv_pdf * importance);
         let [minus_light, plus_light] = [weight * minus.light, weight * -plus.light];
         // What has a blend weight moves in view by itself.
+        let n = view.sides.n;
+        let of = |m: EdgeMatter| VelocityTerm::Surface(m.point, m.pull(n));
+        let edge = edge.matter(world, chosen.along).map(|m| m.map(of));
+        let of = |side: &SideRadiance| [side.matter.map(|m| VelocityTerm::of(m, n)), None];
         let parts = [
-            (Some(Matter::Surface(point)), view.distance, minus_light + plus_light, false),
-            (minus.matter, minus.distance, minus_light * -minus.blend, true),
-            (plus.matter, plus.distance, plus_light * -plus.blend, true),
+            (edge, view.distance, minus_light + plus_light, false),
+            (of(&minus), minus.distance, minus_light * -minus.blend, true),
+            (of(&plus), plus.distance, plus_light * -plus.blend, true),
         ];
         let width = camera.film()[0];
         let image_point = camera.view(x).pixel;
         for (matter, distance, value, held) in parts {
-            let n = view.sides.n;
             // A camera that turns takes its image points with it.
             let gradient = camera.ray_gradient(eye.x, -view.w, -n, n * -distance);
             let gradient = world.camera.lens_gradient(lens, gradient);
             functional.items.clear();
-            functional.items.extend(matter.map(|matter| VelocityTerm::of(matter, n)));
+            functional.items.extend(matter.into_iter().flatten());
             functional.items.push(VelocityTerm::Sensor(gradient));
             if value.is_zero() || !receiver.moves(functional) {
                 continue;

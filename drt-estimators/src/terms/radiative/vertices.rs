@@ -5,7 +5,7 @@ use core::ops::Range;
 use drt_geom::edges::tree::TreeScratch;
 use drt_math::{Rgb, Vec3};
 
-use crate::derivative::velocity::RecordedPath;
+use crate::derivative::velocity::{EdgeMatter, RecordedPath};
 use crate::sampling::trace::Endpoint;
 use crate::sampling::trace::Tracer;
 use crate::terms::radiative::choice::Choice;
@@ -13,18 +13,19 @@ use crate::terms::radiative::difference::{EdgeView, SideRadiance};
 use crate::terms::radiative::edge_sampler::{EdgeSampler, viewpoint};
 use crate::terms::radiative::{AT_REST, BY_THROUGHPUT, CARRIED, EdgeQuery, Radiative};
 use crate::world::World;
-use crate::world::vertex::{MaterialPoint, Matter, Vertex};
+use crate::world::vertex::{Matter, Vertex};
 
-/// An edge's contribution to a path: a sum of speeds along `n`.
+/// An edge's contribution to a path: a sum of speeds.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EdgeContribution {
     /// The vertex that sees the edge.
     pub(crate) node: usize,
+    /// Along which the vertex has its speed.
     pub(crate) n: Vec3,
-    /// What multiplies the speed of the vertex.
+    /// What multiplies that.
     pub(crate) viewer: Rgb,
-    /// What multiplies those of the edge, and of what is seen on its two sides.
-    pub(crate) matter: [Option<(Matter, Rgb)>; 3],
+    /// Velocities of the edge and of what is seen on its two sides, dotted with vectors, and what multiplies these.
+    pub(crate) matter: [Option<(Matter, Vec3, Rgb)>; 4],
 }
 
 /// What a query is for.
@@ -40,7 +41,7 @@ enum QueryTarget {
 pub(super) struct EdgeSample<'a> {
     node: usize,
     view: EdgeView<'a>,
-    point: MaterialPoint,
+    along: f64,
     /// Of what the two sides differ by, all but the transmittance.
     pub(super) weight: Rgb,
     /// Segments beyond the edge.
@@ -50,17 +51,20 @@ pub(super) struct EdgeSample<'a> {
 impl EdgeSample<'_> {
     /// What is seen.
     fn follow(self, tracer: &mut Tracer<'_>) -> Option<EdgeContribution> {
-        let Self { node, view, point, weight, longest } = self;
+        let Self { node, view, along, weight, longest } = self;
         let weight = weight * view.open(tracer)?;
         let [minus, plus] = view.sides(tracer, longest);
         let lights = [weight * minus.light, weight * -plus.light];
         let held = [lights[0] * minus.blend, lights[1] * plus.blend];
         let [edge, viewer] = [lights, held].map(|[a, b]| a + b);
-        let of = |side: &SideRadiance, held: Rgb| side.matter.map(|m| (m, -held));
+        let n = view.sides.n;
+        let of = |side: &SideRadiance, held: Rgb| side.matter.map(|m| (m, n, -held));
+        let of_edge = |m: EdgeMatter| (Matter::Surface(m.point), m.pull(n), edge);
+        let [own, other] = view.discontinuity.edge.matter(tracer.world, along);
         let matter =
-            [Some((Matter::Surface(point), edge)), of(&minus, held[0]), of(&plus, held[1])];
+            [own.map(of_edge), other.map(of_edge), of(&minus, held[0]), of(&plus, held[1])];
         let dark = lights.iter().all(|l| l.is_zero());
-        (!dark).then_some(EdgeContribution { node, n: view.sides.n, viewer: viewer - edge, matter })
+        (!dark).then_some(EdgeContribution { node, n, viewer: viewer - edge, matter })
     }
 }
 
@@ -141,8 +145,7 @@ impl Radiative {
         }
         let kernel = view.sides.sine / (view.distance * view.distance);
         let weight = theta * f * (kernel * chosen.inv_pdf / chance);
-        let (_, point) = chosen.discontinuity.point(chosen.along);
-        Some(EdgeSample { node, view, point, weight, longest })
+        Some(EdgeSample { node, view, along: chosen.along, weight, longest })
     }
 
     /// What edges a vertex may sample.

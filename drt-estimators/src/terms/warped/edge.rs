@@ -2,8 +2,9 @@
 
 use drt_math::Vec3;
 
+use crate::derivative::velocity::EdgeMatter;
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
-use crate::world::vertex::MaterialPoint;
+use crate::world::World;
 
 /// An edge at which radiance jumps.
 #[derive(Clone, Debug)]
@@ -11,7 +12,8 @@ pub(super) struct TurningEdge {
     pub(super) ends: [Vec3; 2],
     /// Half its length.
     pub(super) half: f64,
-    pub(super) points: [MaterialPoint; 2],
+    /// How its ends move.
+    pub(super) matter: [[Option<EdgeMatter>; 2]; 2],
     pub(super) moves: bool,
     /// Between faces of a curved surface, on which vertices move with their matter.
     pub(super) facets: bool,
@@ -21,18 +23,19 @@ pub(super) struct TurningEdge {
 
 impl TurningEdge {
     pub(super) fn new(
+        world: &World,
         edges: &DiscontinuityEdges,
         edge: &DiscontinuityEdge,
         moves: bool,
         curved: bool,
     ) -> Self {
-        let [(a, from), (b, to)] = [0.0, 1.0].map(|along| edge.point(along));
+        let matter = [0.0, 1.0].map(|along| edge.edge.matter(world, along));
         let discontinuous = edge.crease.map(|part| part > 0.0);
         let crease = edges.normals(edge).map(|normals| (normals, discontinuous));
-        let (ends, half) = ([a, b], 0.5 * edge.length());
+        let (ends, half) = (edge.edge.wedge.ends, 0.5 * edge.length());
         // Of a fold as sharp as a corner, or between materials, a part is 1.
         let facets = curved && edge.crease.iter().all(|part| *part < 1.0);
-        Self { ends, half, points: [from, to], moves, facets, crease }
+        Self { ends, half, matter, moves, facets, crease }
     }
 
     /// What radiance does there, seen along a vector.

@@ -8,10 +8,11 @@ use drt_geom::edges::{Cone, ConeSegment, ConeTree};
 use drt_math::Vec3;
 
 use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay, Weight};
-use crate::discontinuities::discontinuity_edge::DiscontinuityEdges;
+use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::terms::warped::beside::Beside;
 use crate::terms::warped::edge::TurningEdge;
 use crate::terms::warped::near::Near;
+use crate::world::World;
 use crate::world::vertex::Vertex;
 
 /// The edges of a scene in trees of spheres.
@@ -23,19 +24,17 @@ pub(super) struct TurningEdges {
 }
 
 impl TurningEdges {
-    /// Of those that `moves` says of their shape to move, and `curved` to be on a curved surface.
+    /// Of those that `moves` says to move, and `curved` to be on a curved surface, by its shape.
     pub(super) fn new(
+        world: &World,
         edges: &DiscontinuityEdges,
-        moves: impl Fn(u32) -> bool,
+        moves: impl Fn(&DiscontinuityEdge) -> bool,
         curved: impl Fn(u32) -> bool,
     ) -> Self {
         let list: Vec<_> = edges
             .list
             .iter()
-            .map(|edge| {
-                let shape = edge.edge.shape;
-                TurningEdge::new(edges, edge, moves(shape), curved(shape))
-            })
+            .map(|edge| TurningEdge::new(world, edges, edge, moves(edge), curved(edge.edge.shape)))
             .collect();
         let tree = |of: &dyn Fn(&TurningEdge) -> bool| {
             let segments = list.iter().zip(0..).filter(|(edge, _)| of(edge));
@@ -124,9 +123,9 @@ impl TurningEdges {
             };
             let one = Weight::constant(1.0);
             if edge.moves {
-                let [from, to] = edge.points;
-                add(Some(from), one - beside.along);
-                add(Some(to), beside.along);
+                for (end, part) in edge.matter.iter().zip([one - beside.along, beside.along]) {
+                    end.iter().flatten().for_each(|matter| add(Some(*matter), part));
+                }
             } else if viewer_moves {
                 add(None, one);
             }

@@ -87,7 +87,7 @@ use alloc::sync::Arc;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::{Spatial, VelocityField};
-use crate::discontinuities::discontinuity_edge::DiscontinuityEdges;
+use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::model::error::{Error, SettingError};
 use crate::model::settings::{Settings, Warp};
 use crate::terms::warped::auxiliary::directions::AuxiliaryDirections;
@@ -123,9 +123,9 @@ impl Warped {
         let count = [found.list.len() as u64, found.all];
         let mut spatial = Spatial::new(world, active);
         spatial.blends.leave_media();
-        let moves = |shape| active.shapes[shape as usize];
+        let moves = |edge: &DiscontinuityEdge| edge.moves(&active.shapes);
         let curved = |shape| spatial.blends.curvature(shape) > 0.0;
-        let edges = TurningEdges::new(&found, moves, curved);
+        let edges = TurningEdges::new(world, &found, moves, curved);
         let spatial = Arc::new(spatial);
         let refused = |reason| Err(Error::Setting { setting: "warp", reason });
         let surfaces_only = !(world.has_media() || world.any_null);

@@ -103,10 +103,11 @@ impl TurningEdges {
             if edge.moves {
                 any = true;
                 let along = by_place(beside.along);
-                let [from, to] = edge.points;
-                for (matter, part) in [(from, Weight::constant(1.0) - along), (to, along)] {
+                let parts = [Weight::constant(1.0) - along, along];
+                for (end, part) in edge.matter.iter().zip(parts) {
                     let share = by_direction(own * with_edge * part);
-                    shadows.push(ShadowPart { matter, share });
+                    let moving = end.iter().flatten();
+                    shadows.extend(moving.map(|matter| ShadowPart { matter: *matter, share }));
                 }
             }
         });

@@ -11,8 +11,8 @@ use drt_geom::{Ray, Skip};
 use drt_math::{Frame, Real, Vec3, fm};
 
 use crate::derivative::velocity::{
-    Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurningRay, VelocityField,
-    VertexVelocity,
+    Auxiliary, Blend, EdgeMatter, Found, Probe, RayTurn, Spatial, TurnPart, TurningRay,
+    VelocityField, VertexVelocity,
 };
 use crate::model::settings::{AuxiliarySamples, WarpKernel};
 use crate::terms::warped::auxiliary::kernel::{Distance, SIGMA, WIDE, weight};
@@ -149,7 +149,7 @@ impl VelocityField for AuxiliaryDirections {
             ratio(&samples[at(set.start)..at(set.end)], factor, |(matter, r), value, slope| {
                 let rate = value / r;
                 let divergence = slope / r - ray.dir * (2.0 * rate);
-                parts.push(TurnPart { matter: Some(matter), rate, divergence });
+                parts.push(TurnPart { matter: Some(EdgeMatter::of(matter)), rate, divergence });
                 turn.weight += value;
                 turn.gradient += slope;
             });
