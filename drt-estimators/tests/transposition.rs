@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::sync::Arc;
+
 use common::pairing::{pair, targets};
 use common::*;
 use drt_estimators::emitter::Emitter;
@@ -13,7 +15,8 @@ use drt_estimators::surface::{
     RoughConductor,
 };
 use drt_estimators::{
-    EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Unattended, gradient,
+    EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Shape, Unattended,
+    gradient,
 };
 use drt_geom::procedural;
 use drt_math::{Rgb, Rng, ValueChange, Vec3, vec3};
@@ -144,6 +147,19 @@ fn surfaces_everything_at_once() {
         changes("camera", "fov", grey(3.0)),
     ]);
     agree("everything", &scene, effects, &settings());
+}
+
+/// Lines where surfaces pass through each other move with both of them.
+#[test]
+fn surfaces_that_pass_through_each_other() {
+    for mut scene in [surfaces(diffuse(0.7, 0.6, 0.5), diffuse(0.6, 0.5, 0.4)), fog()] {
+        let body = scene.shapes.iter().find(|s| s.id.as_deref() == Some("ball")).expect("a ball");
+        let at = body.mesh.bounds().center() + vec3(0.1, 0.05, -0.1);
+        let card = placed(procedural::rectangle(), Vec3::splat(0.8), 0.7, at);
+        let card = Shape { id: Some("card".into()), mesh: Arc::new(card), ..body.clone() };
+        scene.shapes.push(card);
+        agree("sunk", &scene, wobbles(&scene), &settings());
+    }
 }
 
 /// In narrow lobes, where pairs of rays tell of what turns.
