@@ -1,7 +1,18 @@
 //! Lines along which surfaces pass through each other.
 //!
-//! No triangle ends there, but what is seen of either does: the line is an edge with four faces around it, all of
-//! which other ones hide something of. It [moves](crate::derivative::velocity::EdgeMatter) against the matter of both surfaces.
+//! No triangle ends there, but what is seen of either does: the line is an edge with four faces around it. Seen from
+//! anywhere a face ends on either side, as at a crease, and it [moves](crate::derivative::velocity::EdgeMatter) against the matter
+//! of both surfaces.
+//!
+//! In material form each of the faces is a domain that ends at the line, for paths on one side of it and for those on the other:
+//! with f what paths carry through a point of a face next to the line on one of its sides, and V the speed of the line
+//! into the face, relative to its matter,
+//!
+//! ```text
+//! d/dθ ∫ f dA = - Σ over faces and sides ∫ V f dl + ...,
+//! ```
+//!
+//! as where an edge [rests](crate::discontinuities::contact) on a surface. Rays that start there see up to the next face around the line.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -11,8 +22,8 @@ use drt_geom::edges::Wedge;
 use drt_geom::{CrossingSegment, Mesh, crossing_segments};
 use drt_math::{Vec3, fm};
 
-use crate::derivative::velocity::EdgeMatter;
 use crate::discontinuities::contact::Contact;
+use crate::discontinuities::crossed::{Crossed, Sheets};
 use crate::discontinuities::edge::{Edge, EdgePoint};
 use crate::world::World;
 use crate::world::vertex::{Kind, Vertex};
@@ -22,12 +33,6 @@ const WHOLE: f64 = 0.999;
 
 /// Of a line's length: how far from it what leaves a face next to it starts.
 const BESIDE: f64 = 1e-6;
-
-/// The middle of a triangle.
-const CENTER: [f64; 2] = [1.0 / 3.0; 2];
-
-/// The four faces around such a line, and the unit vectors across it into them.
-pub(crate) type Sheets = [(u32, Vec3); 4];
 
 /// The lines, of surfaces that scatter or block. Edges of meshes that are such lines go.
 pub(crate) fn crossings(world: &World, edges: &mut Vec<Edge>) -> Vec<Edge> {
@@ -54,35 +59,10 @@ pub(crate) fn crossings(world: &World, edges: &mut Vec<Edge>) -> Vec<Edge> {
     let line = |s: &CrossingSegment| {
         let opposite = s.across[0].map(|across| s.ends[0] + across);
         let wedge = Wedge::new(s.ends, opposite, prims(s, 0));
-        wedge.map(|wedge| Edge::crossing(wedge, [0, 1].map(|k| shape(s, k)), prims(s, 1)))
+        let by = Crossed { shape: shape(s, 1), faces: prims(s, 1) };
+        wedge.map(|wedge| Edge::crossing(wedge, shape(s, 0), by))
     };
     found.iter().filter_map(line).collect()
-}
-
-/// The faces around a line where others, `by`, pass through those of its wedge.
-pub(crate) fn sheets(world: &World, wedge: &Wedge, by: [u32; 2]) -> Sheets {
-    let middle = wedge.at(0.5);
-    let [[a, b], [c, d]] = [wedge.faces, by].map(|faces| {
-        let [first, second] = faces.map(|face| {
-            let (point, x) = world.point(face, CENTER);
-            let across = point.ng.cross(wedge.tangent).normalize();
-            (face, if across.dot(x - middle) < 0.0 { -across } else { across })
-        });
-        if first.0 == second.0 { [first, (first.0, -first.1)] } else { [first, second] }
-    });
-    [a, b, c, d]
-}
-
-/// How a point of the line moves.
-pub(crate) fn matter(world: &World, wedge: &Wedge, by: [u32; 2], x: Vec3) -> [EdgeMatter; 2] {
-    let faces = [wedge.faces, by];
-    // At an edge between two faces, as if it were rounded off.
-    let normals = faces.map(|faces| {
-        let [n, m] = faces.map(|face| world.point(face, CENTER).0.ng);
-        (n + if n.dot(m) < 0.0 { -m } else { m }).normalize()
-    });
-    let points = faces.map(|[face, _]| world.point_near(face, x).0.material());
-    EdgeMatter::of_crossing(points, normals)
 }
 
 impl Contact {

@@ -8,7 +8,7 @@ use drt_geom::{EdgeClass, NONE, Topology};
 use drt_math::{CdfTable, Rng, Vec3};
 
 use crate::derivative::velocity::EdgeMatter;
-use crate::discontinuities::crossing::{Sheets, matter, sheets};
+use crate::discontinuities::crossed::{Crossed, Sheets};
 use crate::discontinuities::order::sort_by_likeness;
 use crate::model::error::Error;
 use crate::world::vertex::MaterialPoint;
@@ -23,7 +23,7 @@ pub(crate) struct Edge {
     /// The first face in its shape, and which of its corners are the edge's ends.
     triangle: u32,
     corners: [u8; 2],
-    /// Where another surface passes through, its faces on the two sides.
+    /// What passes through its faces along it.
     crossed_by: Option<Crossed>,
     /// Where segments that graze the edge run: before the faces, behind them, or on an open edge.
     side: GrazedSide,
@@ -31,13 +31,6 @@ pub(crate) struct Edge {
     medium: SurroundingMedium,
     /// Something is so near that the edge may rest on it.
     pub(crate) may_rest: bool,
-}
-
-/// What passes through the faces at an edge.
-#[derive(Clone, Copy, Debug)]
-struct Crossed {
-    shape: u32,
-    faces: [u32; 2],
 }
 
 /// The side of an edge's faces on which it can be grazed.
@@ -67,15 +60,15 @@ impl Edge {
         Self { wedge, shape, triangle, corners, crossed_by, side, medium, may_rest: false }
     }
 
-    /// A line along which the faces of one shape and `others` of another pass through each other.
-    pub(super) fn crossing(wedge: Wedge, shapes: [u32; 2], others: [u32; 2]) -> Self {
-        let crossed_by = Some(Crossed { shape: shapes[1], faces: others });
-        Self { crossed_by, ..Self::new(wedge, shapes[0], NONE, [0; 2], GrazedSide::Unknown) }
+    /// A line along which others pass `by` through the faces of a shape.
+    pub(super) fn crossing(wedge: Wedge, shape: u32, by: Crossed) -> Self {
+        let edge = Self::new(wedge, shape, NONE, [0; 2], GrazedSide::Unknown);
+        Self { crossed_by: Some(by), ..edge }
     }
 
     /// The faces around a line along which surfaces pass through each other; `None` of edges of a mesh.
     pub(crate) fn crossing_sheets(&self, world: &World) -> Option<Sheets> {
-        self.crossed_by.map(|by| sheets(world, &self.wedge, by.faces))
+        self.crossed_by.map(|by| by.sheets(world, &self.wedge))
     }
 
     /// True of a line along which surfaces pass through each other.
@@ -103,7 +96,7 @@ impl Edge {
     /// How the point at `u` of the way along the edge moves: with matter of one point, or of two.
     pub(crate) fn matter(&self, world: &World, u: f64) -> [Option<EdgeMatter>; 2] {
         if let Some(by) = self.crossed_by {
-            return matter(world, &self.wedge, by.faces, self.wedge.at(u)).map(Some);
+            return by.matter(world, &self.wedge, self.wedge.at(u)).map(Some);
         }
         let mut bary = [0.0; 3];
         bary[self.corners[0] as usize] = 1.0 - u;

@@ -2,6 +2,7 @@
 //! fast they move, and which matter to a viewer.
 
 pub(crate) mod contact;
+pub(crate) mod crossed;
 pub(crate) mod crossing;
 pub(crate) mod discontinuity_edge;
 pub(crate) mod edge;

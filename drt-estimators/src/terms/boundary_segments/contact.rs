@@ -1,4 +1,5 @@
-//! Boundary segments of edges that [rest](crate::discontinuities::contact) on a surface.
+//! Boundary segments of edges that [rest](crate::discontinuities::contact) on a surface, and of lines along which surfaces [pass
+//! through](crate::discontinuities::crossing) each other.
 
 use core::f64::consts::PI;
 
@@ -6,7 +7,7 @@ use drt_math::{Frame, Rgb, Vec3, warp};
 
 use super::{BoundarySink, End, Sampler, Start, seen};
 use crate::discontinuities::contact::Contact;
-use crate::discontinuities::crossing::Sheets;
+use crate::discontinuities::crossed::Sheets;
 use crate::discontinuities::edge::EdgePoint;
 use crate::model::sensor::Sensor;
 
@@ -74,7 +75,7 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
         let side = usize::min(u as usize, sides - 1);
         let (_, across) = sheets[side / 2];
         let normal = across.cross(at.edge.wedge.tangent);
-        let towards = if side % 2 == 0 { normal } else { -normal };
+        let towards = if side.is_multiple_of(2) { normal } else { -normal };
         let contact = Contact::at_crossing(self.tracer.world, at, sheets, side / 2, towards);
         let at = EdgePoint { inv_pdf: at.inv_pdf * sides as f64, ..*at };
         self.contact_with_others(&at, &contact)
