@@ -112,7 +112,7 @@ fn turned(ball: Bsdf, parameter: &Parameter, form: Form) {
             dimmed(incoming, 0.0);
         }
     };
-    let [single, pairs, faulty] = derivatives(&scene, parameter, form, 200_000, fault);
+    let [single, pairs, faulty] = derivatives(&scene, parameter, form, 400_000, fault);
     let (z, unlike) = (z([&single, &pairs]), z([&single, &faulty]));
     let noise = pairs.variance_of_mean() / single.variance_of_mean();
     println!("{form:?}, {}: {z:.2} {noise:.2}; {unlike:.2}", parameter.name);

@@ -38,7 +38,7 @@ fn deviation(gradient: [RgbVec; 4], truth: Rgb<D>) -> f64 {
 
 /// A direction bent to within a few degrees of the plane.
 fn near_horizon(w: Vec3, n: Vec3, rng: &mut Rng) -> Vec3 {
-    (w.reject(n) + n * (0.05 * (rng.next_f64() - 0.3))).normalize()
+    (w.reject(n) + n * (0.0125 * (rng.next_f64() - 0.3))).normalize()
 }
 
 #[test]

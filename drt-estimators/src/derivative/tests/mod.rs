@@ -17,9 +17,9 @@ mod voxels;
 
 use drt_math::Real;
 
-/// How surfaces with interpolated normals fade at their horizons: linearly over the last 0.02 of a
+/// How surfaces with interpolated normals fade at their horizons: linearly over the last 0.005 of a
 /// cosine.
 fn fade<T: Real>(cosine: T) -> T {
-    let c = cosine.abs() / 0.02;
+    let c = cosine.abs() / 0.005;
     if c.re() < 1.0 { c } else { T::one() }
 }

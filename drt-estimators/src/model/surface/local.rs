@@ -16,8 +16,8 @@ use crate::model::surface::{
 };
 use crate::model::texture::TexturePoint;
 
-/// Cosine below which interpolated surfaces fade: 0.04 % of a sphere's image.
-const FADE: f64 = 0.02;
+/// Cosine below which interpolated surfaces fade: 0.0025 % of a sphere's image.
+const FADE: f64 = 0.005;
 
 /// A BSDF with the unit normals of a point. Directions are unit, away from the surface.
 #[derive(Clone, Copy, Debug)]
