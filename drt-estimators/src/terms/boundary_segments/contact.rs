@@ -47,18 +47,8 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
             let mut seen = (0..sheets.len()).map(contact).filter(|c| c.beside(w).is_some());
             [seen.next(), seen.next()]
         };
-        let u = self.tracer.rng.next_f64();
-        let chosen = match (first, second) {
-            (Some(a), Some(b)) => {
-                if u < 0.5 {
-                    a
-                } else {
-                    b
-                }
-            }
-            (one, _) => one?,
-        };
         let chance = if second.is_some() { 0.5 } else { 1.0 };
+        let chosen = if self.tracer.rng.next_f64() < chance { first? } else { second? };
         let at = EdgePoint { inv_pdf: at.inv_pdf / chance, ..*at };
         self.contact_with_camera(camera, &at, &chosen)
     }
@@ -92,9 +82,11 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
         }
         let beyond = self.beyond(&start, w, Rgb::ONE);
         self.light_from(&s, w, world.max_depth.checked_sub(2)?);
+        // Of lines where surfaces pass through each other nothing is left to shadows in media.
+        let emits = !at.edge.is_crossing();
         for (d, only_camera) in beyond.into_iter().flatten() {
             // The density of w is cos θ / π.
-            self.deliver(&d, only_camera, true, w, Rgb::splat(PI * at.inv_pdf));
+            self.deliver(&d, only_camera, emits, w, Rgb::splat(PI * at.inv_pdf));
         }
         Some(())
     }
