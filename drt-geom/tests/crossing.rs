@@ -216,7 +216,7 @@ fn floor(cells: u32) -> Mesh {
 #[test]
 fn a_ball_in_a_floor_is_cut_along_a_circle() {
     for cells in [1, 2, 7, 32] {
-        for by in [-0.3, 0.0, 0.01, 0.6] {
+        for by in [-0.3, -3e-8, 0.0, 1e-7, 4e-7, 0.01, 0.6] {
             let circle = core::f64::consts::TAU * f64::sqrt(1.0 - by * by);
             for ball in [procedural::icosphere(4), procedural::uv_sphere(48)] {
                 let ball = placed(&ball, vec3(1.0, 1.0, 1.0), vec3(0.0, 0.0, by));

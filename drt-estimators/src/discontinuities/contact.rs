@@ -1,4 +1,4 @@
-//! Edges that rest on another surface: the foot of a block on a floor.
+//! Edges that rest on another surface: the foot of a block on a floor, and lines along which surfaces intersect.
 //!
 //! A segment past such an edge has one end on the floor, right at the edge, and neither which end nor
 //! whether it is in shadow there can be found by rays. But what the edge does is simple: it bounds the
@@ -15,12 +15,13 @@
 //! conormal), with segments that end in the shadow of the edge and those that start in it together: so
 //! each path counts once, light and camera both above the floor.
 
-use core::f64::consts::PI;
+use core::f64::consts::{PI, TAU};
 
 use drt_geom::{Ray, Skip};
 use drt_math::{Real, Vec3, fm};
 
 use crate::discontinuities::edge::{Edge, EdgePoint};
+use crate::discontinuities::sheets::Sheets;
 use crate::world::World;
 use crate::world::vertex::{Kind, Vertex};
 
@@ -31,8 +32,45 @@ const GAP: f64 = 1e-6;
 /// Sine of the angle by which faces that lie in the floor may be off.
 const FLAT: f64 = 1e-5;
 
+/// How far from a line along which surfaces intersect rays start, over its length.
+const BESIDE: f64 = 1e-6;
+
 /// Where along an edge it is found out whether it rests on anything.
 const PROBES: [f64; 5] = [0.01, 0.3, 0.5, 0.7, 0.99];
+
+/// What is between two faces around a line along which surfaces intersect.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Quadrant {
+    face: u32,
+    /// Unit, across the line into the face.
+    side: Vec3,
+    /// Unit normal of the face into what is between.
+    up: Vec3,
+    /// To the other face, in radians, and to half a turn at most.
+    angle: f64,
+}
+
+impl Quadrant {
+    /// Next to one of the faces, by its number, on the side to which `towards` points.
+    pub(crate) fn new(tangent: Vec3, sheets: &Sheets, number: usize, towards: Vec3) -> Self {
+        let (face, side) = sheets[number];
+        let normal = side.cross(tangent);
+        let up = if normal.dot(towards) < 0.0 { -normal } else { normal };
+        let to = |across: Vec3| {
+            let angle = fm::atan2(across.dot(up), across.dot(side));
+            if angle < 0.0 { angle + TAU } else { angle }
+        };
+        let others = (0..).zip(sheets).filter(|(k, _)| *k != number);
+        let angle = others.map(|(_, (_, across))| to(*across)).fold(PI, f64::min);
+        Self { face, side, up, angle }
+    }
+
+    /// True of what a vector from the line points into.
+    pub(crate) fn contains(&self, w: Vec3) -> bool {
+        let angle = fm::atan2(w.dot(self.up), w.dot(self.side));
+        angle > 0.0 && angle < self.angle
+    }
+}
 
 /// Where an edge rests on a surface.
 #[derive(Clone, Copy, Debug)]
@@ -48,14 +86,15 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
-    /// A floor on one side of what ends at the first of two angles.
-    pub(super) fn with_floor(
-        up: Vec3,
-        side: Vec3,
-        wedge: [f64; 2],
-        floor: [Option<Vertex>; 2],
-    ) -> Self {
-        Self { up, side, wedge, floor }
+    /// One of the faces around a line along which surfaces intersect, as a floor up to where the next stands on it.
+    pub(crate) fn of_intersection(world: &World, at: &EdgePoint<'_>, floor: &Quadrant) -> Self {
+        let Quadrant { face, side, up, angle } = *floor;
+        let beside = BESIDE * at.edge.wedge.length;
+        let (point, x) = world.point_near(face, at.x + side * beside);
+        let (sine, cosine) = fm::sin_cos(0.5 * angle);
+        let medium = at.edge.medium(world, at.x + (side * cosine + up * sine) * beside);
+        let vertex = Vertex { x, medium, kind: Kind::Surface(point) };
+        Self { up, side, wedge: [angle, PI], floor: [Some(vertex), None] }
     }
 
     /// What the edge rests on at a point of it; `None` nearly everywhere.

@@ -7,9 +7,9 @@ use core::ops::Range;
 use drt_geom::edges::{Coincident, EdgeSides, Fan, FanFace, faces_around};
 use drt_math::{Vec3, fm};
 
+use crate::discontinuities::collect::{Edges, collect};
 use crate::discontinuities::contact::Contact;
-use crate::discontinuities::crossing::crossings;
-use crate::discontinuities::edge::{Edge, EdgePoint, collect};
+use crate::discontinuities::edge::{Edge, EdgePoint};
 use crate::model::sensor::Sensor;
 use crate::world::vertex::SurfacePoint;
 use crate::world::{SurroundingMedium, World};
@@ -57,10 +57,7 @@ impl DiscontinuityEdges {
     /// Collects the edges of surfaces that scatter or block. Of edges at one place, that of a shape that
     /// `moves` tells how the place moves.
     pub(crate) fn collect(world: &World, moves: &[bool]) -> Self {
-        let (mut edges, all) = collect(world);
-        let lines = crossings(world, &mut edges);
-        let around: Vec<_> =
-            (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
+        let Edges { of_meshes: edges, intersections, all } = collect(world, true);
         let mut discontinuities = Self { list: Vec::new(), faces_of_fans: Vec::new(), all };
         for same in Coincident::among(edges.iter().map(|e| &e.wedge)).groups() {
             let of = |i: &usize| &edges[*i];
@@ -70,30 +67,40 @@ impl DiscontinuityEdges {
             let kind = Self::crease(world, edge.wedge.tangent, &faces);
             let Some((crease, smooth)) = kind else { continue };
             edge.may_rest = Contact::anywhere(world, &edge);
-            let start = discontinuities.faces_of_fans.len();
-            discontinuities.faces_of_fans.extend(faces);
-            let fan = start..discontinuities.faces_of_fans.len();
-            let around = around[edge.shape as usize];
-            let shape = |i: &usize| &world.scene.shapes[of(i).shape as usize];
-            let bounds = same.iter().any(|i| shape(i).boundary.is_some());
-            let found = DiscontinuityEdge { edge, fan, around, bounds, crease, smooth };
-            discontinuities.list.push(found);
+            let shapes = same.iter().map(|i| of(i).shape);
+            discontinuities.add(world, edge, &faces, shapes, (crease, smooth));
         }
-        for edge in lines {
-            let Some(sheets) = edge.crossing_sheets(world) else { continue };
-            let start = discontinuities.faces_of_fans.len();
+        for edge in intersections {
+            let Some(sheets) = edge.intersecting_sheets(world) else { continue };
             let mut faces = sheets.map(|(face, across)| FanFace::new(&edge.wedge, face, across));
             faces.sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
-            discontinuities.faces_of_fans.extend(faces);
-            let fan = start..discontinuities.faces_of_fans.len();
-            let around = around[edge.shape as usize];
-            let mut shapes = edge.shapes().map(|s| &world.scene.shapes[s as usize]);
-            let bounds = shapes.any(|shape| shape.boundary.is_some());
-            let (crease, smooth) = ([1.0; 2], false);
-            let found = DiscontinuityEdge { edge, fan, around, bounds, crease, smooth };
-            discontinuities.list.push(found);
+            discontinuities.add(world, edge, &faces, edge.shapes(), ([1.0; 2], false));
+        }
+        let mut around: Vec<Option<SurroundingMedium>> =
+            alloc::vec![None; world.scene.shapes.len()];
+        for found in &mut discontinuities.list {
+            let shape = found.edge.shape as usize;
+            found.around = *around[shape].get_or_insert_with(|| world.medium_around(shape));
         }
         discontinuities
+    }
+
+    /// Adds an edge with the faces around it, which are of some shapes.
+    fn add(
+        &mut self,
+        world: &World,
+        edge: Edge,
+        faces: &[FanFace],
+        shapes: impl Iterator<Item = u32>,
+        (crease, smooth): ([f64; 2], bool),
+    ) {
+        let start = self.faces_of_fans.len();
+        self.faces_of_fans.extend_from_slice(faces);
+        let fan = start..self.faces_of_fans.len();
+        let mut shapes = shapes.map(|s| &world.scene.shapes[s as usize]);
+        let bounds = shapes.any(|shape| shape.boundary.is_some());
+        let around = SurroundingMedium::Varies;
+        self.list.push(DiscontinuityEdge { edge, fan, around, bounds, crease, smooth });
     }
 
     /// How much radiance jumps at a crease between faces, and whether these are smooth; `None` where it never does.
@@ -158,9 +165,9 @@ impl DiscontinuityEdges {
         }
         let size = match parallel {
             true => wedge.length * wedge.sine(forward),
-            false => wedge.angular_size(eye),
+            false => wedge.largest_size(eye, camera.aperture().map_or(0.0, |lens| lens.radius)),
         };
-        // Of three faces and more some two are seen beside each other from anywhere.
+        // Of other than two faces some are seen from anywhere.
         let Some(normals) = self.normals(discontinuity) else { return size };
         let view = if parallel { forward } else { wedge.ends[0] - eye };
         let crease = discontinuity.crease[usize::from(normals[0].dot(view) > 0.0)];

@@ -3,13 +3,14 @@
 use alloc::vec::Vec;
 use core::f64::consts::PI;
 
+use drt_geom::NONE;
 use drt_geom::edges::{Coincident, Fan, Gap, Wedge, faces_around};
-use drt_geom::{EdgeClass, NONE, Topology};
 use drt_math::{CdfTable, Rng, Vec3};
 
+use crate::derivative::sensitivity::VelocityTerm;
 use crate::derivative::velocity::EdgeMatter;
-use crate::discontinuities::crossed::{Crossed, Sheets};
 use crate::discontinuities::order::sort_by_likeness;
+use crate::discontinuities::sheets::{IntersectingFaces, Sheets};
 use crate::model::error::Error;
 use crate::world::vertex::MaterialPoint;
 use crate::world::{SurroundingMedium, World};
@@ -23,8 +24,10 @@ pub(crate) struct Edge {
     /// The first face in its shape, and which of its corners are the edge's ends.
     triangle: u32,
     corners: [u8; 2],
-    /// What passes through its faces along it.
-    crossed_by: Option<Crossed>,
+    /// From where to where along the mesh's edge it goes.
+    part: [f64; 2],
+    /// What intersects its faces along it.
+    intersects: Option<IntersectingFaces>,
     /// Where segments that graze the edge run: before the faces, behind them, or on an open edge.
     side: GrazedSide,
     /// The medium in which they run, where that is the same all along the edge.
@@ -54,31 +57,44 @@ pub(crate) struct EdgePoint<'a> {
 
 impl Edge {
     /// An edge of a face `triangle` of a shape, whose `corners` are the edge's ends.
-    fn new(wedge: Wedge, shape: u32, triangle: u32, corners: [u8; 2], side: GrazedSide) -> Self {
+    pub(super) fn new(
+        wedge: Wedge,
+        shape: u32,
+        triangle: u32,
+        corners: [u8; 2],
+        side: GrazedSide,
+    ) -> Self {
         let medium = SurroundingMedium::Varies;
-        let crossed_by = None;
-        Self { wedge, shape, triangle, corners, crossed_by, side, medium, may_rest: false }
+        let (part, intersects, may_rest) = ([0.0, 1.0], None, false);
+        Self { wedge, shape, triangle, corners, part, intersects, side, medium, may_rest }
     }
 
-    /// A line along which others pass `by` through the faces of a shape.
-    pub(super) fn crossing(wedge: Wedge, shape: u32, by: Crossed) -> Self {
+    /// A line along which others intersect the faces of a shape.
+    pub(super) fn intersection(wedge: Wedge, shape: u32, by: IntersectingFaces) -> Self {
         let edge = Self::new(wedge, shape, NONE, [0; 2], GrazedSide::Unknown);
-        Self { crossed_by: Some(by), ..edge }
+        Self { intersects: Some(by), ..edge }
     }
 
-    /// The faces around a line along which surfaces pass through each other; `None` of edges of a mesh.
-    pub(crate) fn crossing_sheets(&self, world: &World) -> Option<Sheets> {
-        self.crossed_by.map(|by| by.sheets(world, &self.wedge))
+    /// A part of an edge of a mesh.
+    pub(super) fn part(&self, [from, to]: [f64; 2]) -> Self {
+        let ends = [from, to].map(|u| self.wedge.at(u));
+        let wedge = Wedge { ends, length: self.wedge.length * (to - from), ..self.wedge };
+        Self { wedge, part: [from, to], ..*self }
     }
 
-    /// True of a line along which surfaces pass through each other.
-    pub(crate) fn is_crossing(&self) -> bool {
-        self.crossed_by.is_some()
+    /// The faces around a line along which surfaces intersect; `None` of edges of a mesh.
+    pub(crate) fn intersecting_sheets(&self, world: &World) -> Option<Sheets> {
+        self.intersects.map(|by| by.sheets(world, &self.wedge))
+    }
+
+    /// True of a line along which surfaces intersect.
+    pub(crate) fn is_intersection(&self) -> bool {
+        self.intersects.is_some()
     }
 
     /// The shapes with which it moves.
     pub(crate) fn shapes(&self) -> impl Iterator<Item = u32> + use<> {
-        core::iter::once(self.shape).chain(self.crossed_by.map(|by| by.shape))
+        core::iter::once(self.shape).chain(self.intersects.map(|by| by.shape))
     }
 
     /// The same edge with the faces of others that coincide with it, of which only those beside the widest
@@ -94,15 +110,28 @@ impl Edge {
     }
 
     /// How the point at `u` of the way along the edge moves: with matter of one point, or of two.
-    pub(crate) fn matter(&self, world: &World, u: f64) -> [Option<EdgeMatter>; 2] {
-        if let Some(by) = self.crossed_by {
-            return by.matter(world, &self.wedge, self.wedge.at(u)).map(Some);
+    pub(crate) fn matter(&self, world: &World, u: f64) -> (EdgeMatter, Option<EdgeMatter>) {
+        if let Some(by) = self.intersects {
+            let [own, other] = by.matter(world, &self.wedge, self.wedge.at(u));
+            return (own, Some(other));
         }
-        let mut bary = [0.0; 3];
+        let [from, to] = self.part;
+        let (u, mut bary) = (from + (to - from) * u, [0.0; 3]);
         bary[self.corners[0] as usize] = 1.0 - u;
         bary[self.corners[1] as usize] = u;
         let at = drt_motion::SurfacePoint { triangle: self.triangle, bary: [bary[1], bary[2]] };
-        [Some(EdgeMatter::of(MaterialPoint { shape: self.shape, at })), None]
+        (EdgeMatter::of(MaterialPoint { shape: self.shape, at }), None)
+    }
+
+    /// The velocity of the point at `u` of the way along the edge, dotted with n.
+    pub(crate) fn velocity_terms(
+        &self,
+        world: &World,
+        u: f64,
+        n: Vec3,
+    ) -> impl Iterator<Item = VelocityTerm> + use<> {
+        let (own, other) = self.matter(world, u);
+        core::iter::once(own).chain(other).map(move |m| VelocityTerm::Surface(m.point, m.pull(n)))
     }
 
     /// Looks up the medium around the edge where one answer holds for all of it; `around` is the one
@@ -180,7 +209,7 @@ impl EdgeTable {
 
     /// Weight of an edge for directions drawn on it: its length times the angle that is free.
     pub(crate) fn general_weight(e: &Edge) -> f64 {
-        e.wedge.length * if e.is_crossing() { PI } else { e.wedge.free_angle() }
+        e.wedge.length * if e.is_intersection() { PI } else { e.wedge.free_angle() }
     }
 
     pub(crate) fn sample(&self, rng: &mut Rng) -> EdgePoint<'_> {
@@ -189,43 +218,4 @@ impl EdgeTable {
         let edge = &self.edges[s.index];
         EdgePoint::new(edge, s.residual, edge.wedge.length / s.pmf)
     }
-}
-
-/// Every edge of the scene that can be grazed, and the number of all edges.
-pub(crate) fn collect(world: &World) -> (Vec<Edge>, u64) {
-    let mut edges = Vec::new();
-    let mut all = 0;
-    for (i, shape) in world.scene.shapes.iter().enumerate() {
-        if world.is_null(i as u32) {
-            continue;
-        }
-        let mesh = &shape.mesh;
-        let topology = Topology::of(mesh);
-        all += topology.edges.len() as u64;
-        for e in &topology.edges {
-            if e.class == EdgeClass::Flat
-                || (e.class != EdgeClass::Boundary && !e.can_be_silhouette())
-            {
-                continue;
-            }
-            let [a, b] = e.vertices.map(|v| mesh.positions[v as usize]);
-            let face = mesh.triangles[e.faces[0] as usize];
-            let corner = |v: u32| face.iter().position(|c| *c == v);
-            let (Some(ca), Some(cb)) = (corner(e.vertices[0]), corner(e.vertices[1])) else {
-                continue;
-            };
-            let second = usize::from(e.faces[1] != NONE);
-            let opposite = [0, second].map(|k| mesh.positions[e.opposite[k] as usize]);
-            let faces = [0, second].map(|k| world.prim_of(i, e.faces[k]));
-            let side = match e.class {
-                EdgeClass::Convex => GrazedSide::Front,
-                EdgeClass::Concave => GrazedSide::Back,
-                _ => GrazedSide::Unknown,
-            };
-            let corners = [ca as u8, cb as u8];
-            let wedge = Wedge::new([a, b], opposite, faces);
-            edges.extend(wedge.map(|w| Edge::new(w, i as u32, e.faces[0], corners, side)));
-        }
-    }
-    (edges, all)
 }

@@ -42,7 +42,7 @@ impl<'a> Movers<'a> {
 
     /// True when visibility past an edge can change at all.
     pub(crate) fn matter_to(&self, e: &Edge) -> bool {
-        if e.is_crossing() {
+        if e.is_intersection() {
             // It only moves with its faces.
             return self.moves(e);
         }

@@ -29,7 +29,10 @@ pub(crate) fn speeds<'a>(motion: &'a Motion, world: &'a World) -> impl Fn(&Edge)
             };
             motion.tangents.shapes[shape].iter().map(speed).fold(0.0, f64::max)
         };
-        let at = |end| edge.matter(world, end).into_iter().flatten().map(&of_matter).sum();
+        let at = |end| {
+            let (own, other) = edge.matter(world, end);
+            of_matter(own) + other.map_or(0.0, &of_matter)
+        };
         f64::max(at(0.0), at(1.0))
     }
 }

@@ -8,8 +8,8 @@ use drt_math::{Real, Vec3};
 use crate::crossing::near;
 use crate::{Mesh, NONE, Topology, is_usable, weld};
 
-/// Distance from a plane, over the shorter of the triangles' longest edges, within which a corner counts as on it: what
-/// coordinates in files written with single precision are off by.
+/// Distance from a plane, over the smaller of the two surfaces' mean triangle sizes, within which a corner counts as on it: what
+/// coordinates in files written with single precision are off by. One for two surfaces, so that neighbours agree.
 const ON: f64 = 1e-6;
 
 /// Sine of the angle between planes below which nothing is said of where they meet.
@@ -32,8 +32,8 @@ pub struct CrossingSegment {
 /// The segments along which surfaces pass through each other or themselves, in the order of their triangles.
 ///
 /// Not among them are segments at which a surface ends or turns back: what rests on another surface, or touches
-/// it. Nor are those of surfaces that overlap in a plane or nearly so, and of triangles of one surface with a corner in common. Positions
-/// are right up to rounding; corners within a millionth of a triangle's size of a plane count as on it. Triangles
+/// it. Nor are those of surfaces that overlap in a plane or nearly so, and of triangles of one surface with a corner in common. Where three surfaces and
+/// more intersect along one line, any two of them have a segment there. Positions are right up to rounding; corners within a millionth of the mean size of triangles of a plane count as on it. Triangles
 /// without area, and those with coordinates that are not finite, meet nothing. The cost is near linear in the number of triangles.
 ///
 /// # Panics
@@ -56,9 +56,13 @@ pub struct CrossingSegment {
 pub fn crossing_segments(surfaces: &[&Mesh]) -> Vec<CrossingSegment> {
     let mut triangles = Vec::new();
     for (surface, mesh) in (0..).zip(surfaces) {
+        let first = triangles.len();
         for index in 0..mesh.triangles.len() as u32 {
             triangles.extend(Triangle::new(mesh, surface, index));
         }
+        let own = &mut triangles[first..];
+        let mean = own.iter().map(|t: &Triangle| t.size).sum::<f64>() / own.len() as f64;
+        own.iter_mut().for_each(|t| t.size = mean);
     }
     let welded: Vec<_> = surfaces.iter().map(|s| weld(&s.positions)).collect();
     let corners_of = |t: &Triangle| {
@@ -96,7 +100,7 @@ pub fn crossing_segments(surfaces: &[&Mesh]) -> Vec<CrossingSegment> {
 struct Triangle {
     corners: [Vec3; 3],
     normal: Vec3,
-    /// Its longest edge.
+    /// Mean of the longest edges of the surface's triangles.
     size: f64,
     surface: u32,
     index: u32,

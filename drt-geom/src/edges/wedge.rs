@@ -128,14 +128,7 @@ impl Wedge {
         if ![da, db, (da + db) * 0.5].into_iter().any(|d| self.is_silhouette(d.normalize())) {
             return 0.0;
         }
-        self.angular_size(eye)
-    }
-
-    /// The angle in radians between the directions to its ends, silhouette or not.
-    #[must_use]
-    pub fn angular_size(&self, eye: Vec3) -> f64 {
-        let [da, db] = self.ends.map(|p| p - eye);
-        fm::atan2(da.cross(db).length(), da.dot(db))
+        self.largest_size(eye, 0.0)
     }
 
     /// About the largest angle in radians that the edge subtends from points within a `radius` of `eye`, if it is a
@@ -148,12 +141,20 @@ impl Wedge {
         if s0 * s1 < 0.0 && f64::min(Real::abs(s0), Real::abs(s1)) > radius {
             return 0.0;
         }
+        self.largest_size(eye, radius)
+    }
+
+    /// About the largest angle in radians between the directions to its ends from points within a `radius` of `eye`, silhouette or not.
+    #[must_use]
+    pub fn largest_size(&self, eye: Vec3, radius: f64) -> f64 {
         let [da, db] = self.ends.map(|p| p - eye);
+        let angle = fm::atan2(da.cross(db).length(), da.dot(db));
+        if radius == 0.0 {
+            return angle;
+        }
         let near = f64::max(da.length(), db.length()) * 1e-3;
-        f64::max(
-            self.angular_size(eye),
-            self.length * radius / (da.length_squared() + radius * radius + near * near),
-        )
+        let apart = da.length_squared() + radius * radius + near * near;
+        f64::max(angle, self.length * radius / apart)
     }
 
     /// The edge's length seen along the unit direction `w`; 0 where it is no silhouette.

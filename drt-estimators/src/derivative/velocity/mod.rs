@@ -30,7 +30,7 @@
 //! Nothing but a [`VelocityField`] knows which of these it is.
 
 pub(crate) mod blend;
-mod crossing;
+mod intersection;
 mod material;
 mod path;
 mod shadow;
@@ -46,7 +46,7 @@ use drt_geom::Hit;
 use drt_math::{Rng, Vec3};
 
 pub(crate) use crate::derivative::velocity::blend::Blend;
-pub(crate) use crate::derivative::velocity::crossing::EdgeMatter;
+pub(crate) use crate::derivative::velocity::intersection::EdgeMatter;
 pub(crate) use crate::derivative::velocity::material::Material;
 pub(crate) use crate::derivative::velocity::path::{PathVelocities, RecordedPath};
 pub(crate) use crate::derivative::velocity::shadow::{ShadowPart, ShadowPlace, ShadowTurn};

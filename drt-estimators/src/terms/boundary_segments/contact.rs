@@ -1,14 +1,14 @@
-//! Boundary segments of edges that [rest](crate::discontinuities::contact) on a surface, and of lines along which surfaces [pass
-//! through](crate::discontinuities::crossing) each other.
+//! Boundary segments of edges that [rest](crate::discontinuities::contact) on a surface, and of lines along which surfaces
+//! [intersect](crate::discontinuities::intersection).
 
 use core::f64::consts::PI;
 
 use drt_math::{Frame, Rgb, Vec3, warp};
 
 use super::{BoundarySink, End, Sampler, Start, seen};
-use crate::discontinuities::contact::Contact;
-use crate::discontinuities::crossed::Sheets;
+use crate::discontinuities::contact::{Contact, Quadrant};
 use crate::discontinuities::edge::EdgePoint;
+use crate::discontinuities::sheets::Sheets;
 use crate::model::sensor::Sensor;
 
 impl<R: BoundarySink> Sampler<'_, '_, R> {
@@ -33,40 +33,38 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
         Some(())
     }
 
-    /// The camera sees a line along which surfaces pass through each other.
-    pub(super) fn crossing_with_camera(
+    /// The camera sees a line along which surfaces intersect, from between two of the faces.
+    pub(super) fn intersection_with_camera(
         &mut self,
         camera: &Sensor,
         at: &EdgePoint<'_>,
         sheets: &Sheets,
     ) -> Option<()> {
         let w = camera.eye_of(at.x) - at.x;
-        let contact = |k| Contact::at_crossing(self.tracer.world, at, sheets, k, w);
-        // The camera is between two of the faces.
-        let [first, second] = {
-            let mut seen = (0..sheets.len()).map(contact).filter(|c| c.beside(w).is_some());
-            [seen.next(), seen.next()]
-        };
+        let quadrant = |k| Quadrant::new(at.edge.wedge.tangent, sheets, k, w);
+        let mut beside = (0..sheets.len()).map(quadrant).filter(|q| q.contains(w));
+        let [first, second] = [beside.next(), beside.next()];
         let chance = if second.is_some() { 0.5 } else { 1.0 };
         let chosen = if self.tracer.rng.next_f64() < chance { first? } else { second? };
+        let contact = Contact::of_intersection(self.tracer.world, at, &chosen);
         let at = EdgePoint { inv_pdf: at.inv_pdf / chance, ..*at };
-        self.contact_with_camera(camera, &at, &chosen)
+        self.contact_with_camera(camera, &at, &contact)
     }
 
-    /// Another vertex sees it.
-    pub(super) fn crossing_with_others(
+    /// Another vertex sees it, from either side of any of the faces.
+    pub(super) fn intersection_with_others(
         &mut self,
         at: &EdgePoint<'_>,
         sheets: &Sheets,
     ) -> Option<()> {
-        // Either side of any of the faces.
         let sides = 2 * sheets.len();
         let u = self.tracer.rng.next_f64() * sides as f64;
         let side = usize::min(u as usize, sides - 1);
-        let (_, across) = sheets[side / 2];
-        let normal = across.cross(at.edge.wedge.tangent);
+        let tangent = at.edge.wedge.tangent;
+        let normal = sheets[side / 2].1.cross(tangent);
         let towards = if side.is_multiple_of(2) { normal } else { -normal };
-        let contact = Contact::at_crossing(self.tracer.world, at, sheets, side / 2, towards);
+        let chosen = Quadrant::new(tangent, sheets, side / 2, towards);
+        let contact = Contact::of_intersection(self.tracer.world, at, &chosen);
         let at = EdgePoint { inv_pdf: at.inv_pdf * sides as f64, ..*at };
         self.contact_with_others(&at, &contact)
     }
@@ -82,11 +80,10 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
         }
         let beyond = self.beyond(&start, w, Rgb::ONE);
         self.light_from(&s, w, world.max_depth.checked_sub(2)?);
-        // Of lines where surfaces pass through each other nothing is left to shadows in media.
-        let emits = !at.edge.is_crossing();
         for (d, only_camera) in beyond.into_iter().flatten() {
-            // The density of w is cos θ / π.
-            self.deliver(&d, only_camera, emits, w, Rgb::splat(PI * at.inv_pdf));
+            // The density of w is cos θ / π. What the floor emits no shadow in a medium has: of a point of its plane the edge's
+            // is that plane.
+            self.deliver(&d, only_camera, false, w, Rgb::splat(PI * at.inv_pdf));
         }
         Some(())
     }

@@ -18,7 +18,8 @@
 //! | [`direct`](Strategy::Direct) | any, or silhouette from the light | from a sampled light | the light | beyond |
 //! | [`indirect`](Strategy::Indirect) | any | drawn around the edge | traced | traced |
 //!
-//! `direct` and `indirect` both find area lights; they share them by the balance heuristic. Shadows of
+//! Of edges that rest on a surface, and of lines along which surfaces intersect, the [limit](contact) is taken by `primary` and
+//! `indirect`. `direct` and `indirect` both find area lights; they share them by the balance heuristic. Shadows of
 //! directly lit media, seen directly, are left to [`shadow`] where that serves.
 
 mod areas;
@@ -30,9 +31,9 @@ use alloc::vec::Vec;
 
 use drt_math::{Rgb, Vec3};
 
+use crate::discontinuities::collect::{Edges, collect};
 use crate::discontinuities::contact::Contact;
-use crate::discontinuities::crossing::crossings;
-use crate::discontinuities::edge::{Edge, EdgePoint, EdgeTable, collect, merge_coincident};
+use crate::discontinuities::edge::{Edge, EdgePoint, EdgeTable, merge_coincident};
 use crate::discontinuities::movers::Movers;
 use crate::terms::boundary_segments::areas::AreaWeights;
 use crate::terms::boundary_segments::shadow::Shadows;
@@ -63,11 +64,11 @@ pub(crate) enum Strategy {
 /// The edges of a scene, by what sees them.
 #[derive(Debug, Default)]
 pub(crate) struct Boundary {
-    /// All that can be grazed.
+    /// All.
     general: Option<EdgeTable>,
-    /// The same, as they are lit by areas.
+    /// Those of meshes, as they are lit by areas.
     areas: Option<EdgeTable>,
-    /// Silhouettes from the camera.
+    /// Silhouettes from the camera, and lines along which surfaces intersect.
     camera: Option<EdgeTable>,
     /// Silhouettes from each delta light, by emitter.
     lights: Vec<Option<EdgeTable>>,
@@ -122,28 +123,34 @@ impl Boundary {
     /// The edges at which something can change of what is of interest.
     pub(crate) fn new(world: &World, active: &ActiveInputs) -> Result<Self, Error> {
         let movers = Movers::new(world, active);
-        let (edges, all) = collect(world);
-        let mut edges = merge_coincident(edges, |e| movers.moves(e));
-        let lines = crossings(world, &mut edges);
-        edges.extend(lines);
+        // They move with their faces alone.
+        let any = active.shapes.contains(&true);
+        let Edges { of_meshes, intersections, all } = collect(world, any);
+        let mut edges = merge_coincident(of_meshes, |e| movers.moves(e));
+        edges.extend(intersections);
         edges.retain(|e| movers.matter_to(e));
         let around: Vec<_> =
             (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
         for e in &mut edges {
             e.settle_medium(world, around[e.shape as usize]);
-            e.may_rest = !e.is_crossing() && Contact::anywhere(world, e);
+            e.may_rest = !e.is_intersection() && Contact::anywhere(world, e);
         }
         let general = EdgeTable::new(&edges, |e| movers.pass(e), EdgeTable::general_weight)?;
         let has_areas = world.max_depth >= 2 && world.lights.has_areas();
-        let weights = has_areas.then(|| AreaWeights::new(world, &edges));
-        let grazed = |e: &Edge| !e.is_crossing();
-        let passed = |e: &Edge| grazed(e) && movers.pass(e);
-        let areas = weights.map(|w| EdgeTable::new(&edges, passed, |e| w.of(e)));
+        // Lines along which surfaces intersect come last, and are grazed nowhere.
+        let grazed = edges.partition_point(|e| !e.is_intersection());
+        let grazed = &edges[..grazed];
+        let weights = has_areas.then(|| AreaWeights::new(world, grazed));
+        let areas = weights.map(|w| EdgeTable::new(grazed, |e| movers.pass(e), |e| w.of(e)));
         let areas = areas.transpose()?.flatten();
         let camera = &world.camera;
         let in_view = |e: &Edge| match (camera.is_orthographic(), camera.aperture()) {
-            (true, _) if e.is_crossing() => e.wedge.length * e.wedge.sine(camera.pinhole().forward),
-            _ if e.is_crossing() => e.wedge.angular_size(camera.position()),
+            (true, _) if e.is_intersection() => {
+                e.wedge.length * e.wedge.sine(camera.pinhole().forward)
+            }
+            (false, lens) if e.is_intersection() => {
+                e.wedge.largest_size(camera.position(), lens.map_or(0.0, |lens| lens.radius))
+            }
             (true, _) => e.wedge.projected_length(camera.pinhole().forward),
             (false, None) => e.wedge.subtended_angle(camera.position()),
             (false, Some(lens)) => e.wedge.most_subtended(camera.position(), lens.radius),
@@ -153,21 +160,20 @@ impl Boundary {
             Emitter::Point { position, .. }
             | Emitter::Spot { position, .. }
             | Emitter::Projector { position, .. } => EdgeTable::new(
-                &edges,
-                |e| grazed(e) && movers.pass_emitter(e, i, |x| x - position),
+                grazed,
+                |e| movers.pass_emitter(e, i, |x| x - position),
                 |e| e.wedge.subtended_angle(position),
             ),
             Emitter::Directional { direction, .. } => EdgeTable::new(
-                &edges,
-                |e| grazed(e) && movers.pass_emitter(e, i, |_| direction),
+                grazed,
+                |e| movers.pass_emitter(e, i, |_| direction),
                 |e| e.wedge.projected_length(direction),
             ),
             _ => Ok(None),
         };
         let emitters = world.scene.emitters.iter().enumerate();
         let lights = emitters.map(|(i, e)| light(i, &e.item.emitter)).collect::<Result<_, _>>()?;
-        let lit = edges.iter().filter(|e| grazed(e) && movers.pass_lights(world, e));
-        let lit = lit.copied().collect();
+        let lit = grazed.iter().filter(|e| movers.pass_lights(world, e)).copied().collect();
         let shadows = Shadows::new(world, lit);
         Ok(Self { count: [edges.len() as u64, all], general, areas, camera, lights, shadows })
     }
@@ -235,8 +241,8 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let at = self.boundary.camera.as_ref()?.sample(&mut self.tracer.rng);
         let lens = world.camera.draw_lens(&mut self.tracer.rng);
         let camera = &*world.camera.at_lens(lens);
-        if let Some(sheets) = at.edge.crossing_sheets(world) {
-            return self.crossing_with_camera(camera, &at, &sheets);
+        if let Some(sheets) = at.edge.intersecting_sheets(world) {
+            return self.intersection_with_camera(camera, &at, &sheets);
         }
         if let Some(contact) = Contact::at(world, &at) {
             return self.contact_with_camera(camera, &at, &contact);
@@ -361,8 +367,8 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
     fn indirect(&mut self) -> Option<()> {
         let world = self.tracer.world;
         let at = self.boundary.general.as_ref()?.sample(&mut self.tracer.rng);
-        if let Some(sheets) = at.edge.crossing_sheets(world) {
-            return self.crossing_with_others(&at, &sheets);
+        if let Some(sheets) = at.edge.intersecting_sheets(world) {
+            return self.intersection_with_others(&at, &sheets);
         }
         if let Some(contact) = Contact::at(world, &at) {
             return self.contact_with_others(&at, &contact);
@@ -519,8 +525,8 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
     }
 
     fn edge_rate(&mut self, at: &EdgePoint<'_>, n: Vec3) {
-        let matter = at.edge.matter(self.tracer.world, at.along).into_iter().flatten();
-        self.b.functional.items.extend(matter.map(|m| VelocityTerm::Surface(m.point, m.pull(n))));
+        let terms = at.edge.velocity_terms(self.tracer.world, at.along, n);
+        self.b.functional.items.extend(terms);
     }
 
     fn end_rate(&mut self, end: &End, n: Vec3) {

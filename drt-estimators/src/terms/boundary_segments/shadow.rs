@@ -171,8 +171,7 @@ impl Shadows {
         let seen = world.transmittance(eye, dir, &b.segment, &mut tracer.rng, &mut tracer.counters);
         let items = &mut b.functional.items;
         items.clear();
-        let matter = edge.matter(world, m.s).into_iter().flatten();
-        items.extend(matter.map(|m| VelocityTerm::Surface(m.point, m.pull(n))));
+        items.extend(edge.velocity_terms(world, m.s, n));
         let l = match source {
             ShadowLight::Point(..) => m.r_edge / m.r_point,
             ShadowLight::Direction(_) => 1.0,

@@ -1,7 +1,6 @@
 //! Edges seen from the camera (2019 paper, Eq. 41, at fixed image points).
 
 use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
-use crate::derivative::velocity::EdgeMatter;
 use crate::sampling::importance::see;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary_segments::BoundarySink;
@@ -33,8 +32,8 @@ impl Radiative {
         let [minus_light, plus_light] = [weight * minus.light, weight * -plus.light];
         // What has a blend weight moves in view by itself.
         let n = view.sides.n;
-        let of = |m: EdgeMatter| VelocityTerm::Surface(m.point, m.pull(n));
-        let edge = edge.matter(world, chosen.along).map(|m| m.map(of));
+        let mut terms = edge.velocity_terms(world, chosen.along, n);
+        let edge = [terms.next(), terms.next()];
         let of = |side: &SideRadiance| [side.matter.map(|m| VelocityTerm::of(m, n)), None];
         let parts = [
             (edge, view.distance, minus_light + plus_light, false),

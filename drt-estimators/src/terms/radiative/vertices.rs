@@ -60,9 +60,9 @@ impl EdgeSample<'_> {
         let n = view.sides.n;
         let of = |side: &SideRadiance, held: Rgb| side.matter.map(|m| (m, n, -held));
         let of_edge = |m: EdgeMatter| (Matter::Surface(m.point), m.pull(n), edge);
-        let [own, other] = view.discontinuity.edge.matter(tracer.world, along);
+        let (own, other) = view.discontinuity.edge.matter(tracer.world, along);
         let matter =
-            [own.map(of_edge), other.map(of_edge), of(&minus, held[0]), of(&plus, held[1])];
+            [Some(of_edge(own)), other.map(of_edge), of(&minus, held[0]), of(&plus, held[1])];
         let dark = lights.iter().all(|l| l.is_zero());
         (!dark).then_some(EdgeContribution { node, n, viewer: viewer - edge, matter })
     }

@@ -1,10 +1,13 @@
 //! An edge that turns rays.
 
+use alloc::boxed::Box;
+
 use drt_math::Vec3;
 
 use crate::derivative::velocity::EdgeMatter;
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::world::World;
+use crate::world::vertex::MaterialPoint;
 
 /// An edge at which radiance jumps.
 #[derive(Clone, Debug)]
@@ -12,8 +15,10 @@ pub(super) struct TurningEdge {
     pub(super) ends: [Vec3; 2],
     /// Half its length.
     pub(super) half: f64,
-    /// How its ends move.
-    pub(super) matter: [[Option<EdgeMatter>; 2]; 2],
+    /// The matter of its ends.
+    points: [MaterialPoint; 2],
+    /// Where surfaces intersect the ends move with that of both. Few edges have it.
+    of_both: Option<Box<[[EdgeMatter; 2]; 2]>>,
     pub(super) moves: bool,
     /// Between faces of a curved surface, on which vertices move with their matter.
     pub(super) facets: bool,
@@ -29,13 +34,25 @@ impl TurningEdge {
         moves: bool,
         curved: bool,
     ) -> Self {
-        let matter = [0.0, 1.0].map(|along| edge.edge.matter(world, along));
+        let ends = [0.0, 1.0].map(|along| edge.edge.matter(world, along));
+        let points = ends.map(|(own, _)| own.point);
+        let of_both = match ends {
+            [(a, Some(b)), (c, Some(d))] => Some(Box::new([[a, b], [c, d]])),
+            _ => None,
+        };
         let discontinuous = edge.crease.map(|part| part > 0.0);
         let crease = edges.normals(edge).map(|normals| (normals, discontinuous));
         let (ends, half) = (edge.edge.wedge.ends, 0.5 * edge.length());
         // Of a fold as sharp as a corner, or between materials, a part is 1.
         let facets = curved && edge.crease.iter().all(|part| *part < 1.0);
-        Self { ends, half, matter, moves, facets, crease }
+        Self { ends, half, points, of_both, moves, facets, crease }
+    }
+
+    /// How one of its ends moves.
+    pub(super) fn matter(&self, end: usize) -> impl Iterator<Item = EdgeMatter> {
+        let one = self.of_both.is_none().then(|| EdgeMatter::of(self.points[end]));
+        let both = self.of_both.iter().flat_map(move |both| both[end]);
+        one.into_iter().chain(both)
     }
 
     /// What radiance does there, seen along a vector.

@@ -123,8 +123,8 @@ impl TurningEdges {
             };
             let one = Weight::constant(1.0);
             if edge.moves {
-                for (end, part) in edge.matter.iter().zip([one - beside.along, beside.along]) {
-                    end.iter().flatten().for_each(|matter| add(Some(*matter), part));
+                for (end, part) in [one - beside.along, beside.along].into_iter().enumerate() {
+                    edge.matter(end).for_each(|matter| add(Some(matter), part));
                 }
             } else if viewer_moves {
                 add(None, one);

@@ -104,10 +104,9 @@ impl TurningEdges {
                 any = true;
                 let along = by_place(beside.along);
                 let parts = [Weight::constant(1.0) - along, along];
-                for (end, part) in edge.matter.iter().zip(parts) {
+                for (end, part) in parts.into_iter().enumerate() {
                     let share = by_direction(own * with_edge * part);
-                    let moving = end.iter().flatten();
-                    shadows.extend(moving.map(|matter| ShadowPart { matter: *matter, share }));
+                    shadows.extend(edge.matter(end).map(|matter| ShadowPart { matter, share }));
                 }
             }
         });

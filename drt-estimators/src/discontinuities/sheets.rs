@@ -1,4 +1,4 @@
-//! What passes through the faces at an edge, and how the line where they meet moves.
+//! The faces around a line along which two surfaces intersect.
 
 use drt_geom::edges::Wedge;
 use drt_math::Vec3;
@@ -12,14 +12,14 @@ const CENTER: [f64; 2] = [1.0 / 3.0; 2];
 /// Four faces around a line, and the unit vectors across it into them.
 pub(crate) type Sheets = [(u32, Vec3); 4];
 
-/// The faces of a shape, on the two sides of those they pass through; one twice, unless the line where they meet is an edge of theirs.
+/// The faces of a shape on the two sides of another's; one twice, unless an edge between two lies in the other.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Crossed {
+pub(super) struct IntersectingFaces {
     pub(super) shape: u32,
     pub(super) faces: [u32; 2],
 }
 
-impl Crossed {
+impl IntersectingFaces {
     /// The faces around the line, first those of its wedge.
     pub(super) fn sheets(&self, world: &World, wedge: &Wedge) -> Sheets {
         let middle = wedge.at(0.5);
@@ -36,13 +36,11 @@ impl Crossed {
 
     /// How a point x of the line moves.
     pub(super) fn matter(&self, world: &World, wedge: &Wedge, x: Vec3) -> [EdgeMatter; 2] {
-        let faces = [wedge.faces, self.faces];
+        let [a, b, c, d] = self.sheets(world, wedge);
         // At an edge between two faces, as if it were rounded off.
-        let normals = faces.map(|faces| {
-            let [n, m] = faces.map(|face| world.point(face, CENTER).0.ng);
-            (n + if n.dot(m) < 0.0 { -m } else { m }).normalize()
-        });
-        let points = faces.map(|[face, _]| world.point_near(face, x).0.material());
-        EdgeMatter::of_crossing(points, normals)
+        let normals = [[a, b], [c, d]]
+            .map(|[(_, first), (_, second)]| wedge.tangent.cross(first - second).normalize());
+        let points = [a, c].map(|(face, _)| world.point_near(face, x).0.material());
+        EdgeMatter::of_intersection(points, normals)
     }
 }

@@ -1,4 +1,4 @@
-//! The velocity of a line along which two surfaces pass through each other.
+//! The velocity of a line along which two surfaces intersect.
 //!
 //! A point of the line of surfaces a and b stays on both: of its velocity u the normals of the two tell what theirs at the
 //! point, v_a and v_b, have along them, and nothing moves it along the line,
@@ -14,11 +14,11 @@ use drt_math::Vec3;
 
 use crate::world::vertex::MaterialPoint;
 
-/// A material point and how the velocity of a point of an edge depends on its own; with some edges on those of two.
+/// A material point, and how the velocity of a point of an edge depends on that of it; where surfaces intersect it does on two.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct EdgeMatter {
     pub(crate) point: MaterialPoint,
-    /// Of what else crosses the edge's surface here; `None` where the edge moves with its matter.
+    /// `None` where the edge moves with its matter.
     across: Option<Across>,
 }
 
@@ -36,7 +36,7 @@ impl EdgeMatter {
     }
 
     /// Of a line on two surfaces, from a point of each and their unit normals there.
-    pub(crate) fn of_crossing(points: [MaterialPoint; 2], normals: [Vec3; 2]) -> [Self; 2] {
+    pub(crate) fn of_intersection(points: [MaterialPoint; 2], normals: [Vec3; 2]) -> [Self; 2] {
         let [a, b] = normals;
         let c = a.dot(b);
         let part = |point, n: Vec3, other: Vec3| {
@@ -80,7 +80,7 @@ mod tests {
         for _ in 0..100 {
             let [a, b] = [next().normalize(), next().normalize()];
             let velocities = [next(), next()];
-            let matter = EdgeMatter::of_crossing(points, [a, b]);
+            let matter = EdgeMatter::of_intersection(points, [a, b]);
             let moved = matter.iter().zip(velocities).map(|(m, v)| m.push(v));
             let u = moved.fold(Vec3::ZERO, |sum, u| sum + u);
             let scale = 1e-9 * (1.0 + u.length());
