@@ -206,7 +206,7 @@ fn length_of_crossings(surfaces: &[&Mesh]) -> f64 {
             }
         }
     }
-    assert!(inside >= 2 * found.len() as u32);
+    assert!(inside >= 3 * found.len() as u32);
     found.iter().map(|s| (s.ends[1] - s.ends[0]).length()).sum()
 }
 
