@@ -8,7 +8,7 @@ use common::*;
 use drt_estimators::EstimatorKind::{self, PathSpace, Radiative, Warped};
 use drt_estimators::emitter::{Emitter, EnvironmentMap};
 use drt_estimators::{
-    AuxiliarySamples, Layer, PathSampling, Scene, Session, Settings, Unattended, Warp, agreement,
+    AuxiliarySamples, PathSampling, Scene, Session, Settings, Unattended, Warp, agreement,
     finite_differences,
 };
 use drt_geom::procedural;
@@ -30,12 +30,6 @@ fn outside() -> Scene {
     b.shape("ball", ball(0.8, Vec3::ZERO), grey);
     b.light("sky", Emitter::Envmap { radiance: Rgb::new(1.0, 0.9, 0.8), map });
     b.camera(vec3(0.4, 0.8, 6.0), Vec3::ZERO, 3)
-}
-
-fn sum(layer: &Layer) -> [f64; 2] {
-    let mean = layer.pixels.iter().map(|p| p.mean.sum()).sum();
-    let variance: f64 = layer.pixels.iter().map(|p| (p.stderr * p.stderr).sum()).sum();
-    [mean, variance.sqrt()]
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod common;
 use common::*;
 use drt_estimators::EstimatorKind::{PathSpace, Radiative, Warped};
 use drt_estimators::emitter::Emitter;
-use drt_estimators::{Layer, Scene, Settings, Unattended, agreement, finite_differences};
+use drt_estimators::{Scene, Settings, Unattended, agreement, finite_differences};
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_motion::{GeometryChange, Parameter};
@@ -28,12 +28,6 @@ fn turned(axis: Vec3, translation: Vec3) -> Affine {
     Affine { linear: Mat3::rotation(axis, -core::f64::consts::FRAC_PI_2) * 9.0, translation }
 }
 
-fn sum(layer: &Layer) -> [f64; 2] {
-    let mean = layer.pixels.iter().map(|p| p.mean.sum()).sum();
-    let variance: f64 = layer.pixels.iter().map(|p| (p.stderr * p.stderr).sum()).sum();
-    [mean, variance.sqrt()]
-}
-
 fn shifted(x: f64, y: f64, z: f64) -> GeometryChange {
     GeometryChange::Translate(vec3(x, y, z))
 }
@@ -41,11 +35,11 @@ fn shifted(x: f64, y: f64, z: f64) -> GeometryChange {
 /// Derivatives by all estimators beside finite differences.
 fn check(scene: &Scene, parameters: &[Parameter]) {
     let settings = Settings::default();
-    let differences = finite_differences(scene, parameters, &settings, 65_536, 0.01, &Unattended);
+    let differences = finite_differences(scene, parameters, &settings, 24_576, 0.01, &Unattended);
     let differences = differences.expect("a valid scene");
     for estimator in [PathSpace, Radiative, Warped] {
         let settings = Settings { estimator, ..Settings::default() };
-        let rendering = rendered(scene, parameters, &settings, 32_768);
+        let rendering = rendered(scene, parameters, &settings, 12_288);
         for (d, expected) in rendering.derivatives.iter().zip(&differences) {
             let found = agreement(&d.total, expected, None);
             assert!(found.agrees, "{estimator:?} {} {found:?}", d.name);
@@ -53,9 +47,9 @@ fn check(scene: &Scene, parameters: &[Parameter]) {
             let error = error.hypot(other_error);
             println!("{estimator:?} {} {own} {other} +- {error}", d.name);
             assert!((own - other).abs() < 4.0 * error, "{own} {other} +- {error}");
-            assert!(error < 0.02 * other.abs(), "{own} {other} +- {error}");
-            // Planted: a fifth is missing.
-            let faulty = agreement(&multiple(&d.total, 0.8), expected, None);
+            assert!(error < 0.04 * other.abs(), "{own} {other} +- {error}");
+            // Planted: two fifths are missing.
+            let faulty = agreement(&multiple(&d.total, 0.6), expected, None);
             assert!(!faulty.agrees, "{estimator:?} {} {faulty:?}", d.name);
         }
     }

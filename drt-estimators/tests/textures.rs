@@ -9,8 +9,7 @@ use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::Property;
 use drt_estimators::texture::{Bitmap, Texture, TextureFilter, TextureWrap};
 use drt_estimators::{
-    Estimate, EstimatorKind, Layer, PathSampling, Scene, Session, Settings, Unattended,
-    finite_differences,
+    EstimatorKind, PathSampling, Scene, Session, Settings, Unattended, finite_differences,
 };
 use drt_geom::procedural;
 use drt_math::{Affine, Mat3, Rgb, ValueChange, Vec3, vec3};
@@ -36,12 +35,6 @@ fn floor(filter: TextureFilter) -> Scene {
     b.shape("floor", mesh, bsdf);
     b.light("sky", Emitter::Constant { radiance: Rgb::new(0.9, 1.0, 1.1) });
     b.camera(vec3(0.4, 0.8, 6.0), Vec3::ZERO, 2)
-}
-
-/// The sum over all pixels and channels, with its standard error.
-fn sum(layer: &Layer) -> [f64; 2] {
-    let sum = |f: fn(&Estimate) -> Rgb| layer.pixels.iter().map(|p| f(p).sum()).sum::<f64>();
-    [sum(|p| p.mean), sum(|p| p.stderr * p.stderr).sqrt()]
 }
 
 /// Sums of derivatives by each parameter.
@@ -78,8 +71,8 @@ fn values_slide_under_moving_rays() {
         let parameters =
             ["floor", "camera"].map(|target| parameter(target, 0.0, vec![moves(target, shift())]));
         let settings = Settings { estimator, threads: 1, ..Settings::default() };
-        let own = derivatives(&scene, &parameters, &settings, SPP);
-        let others = differences(&scene, &parameters, SPP, 0.02);
+        let own = derivatives(&scene, &parameters, &settings, 4 * SPP);
+        let others = differences(&scene, &parameters, 4 * SPP, 0.02);
         for ([own, error], [other, other_error]) in own.into_iter().zip(others) {
             let error = error.hypot(other_error);
             assert!((own - other).abs() < 4.0 * error, "{estimator:?}: {own} {other} +- {error}");
@@ -115,10 +108,10 @@ fn texels_change() {
     ];
     use EstimatorKind::{PathSpace, Radiative, Warped};
     let ends = [PathSampling::Unidirectional, PathSampling::Bidirectional];
-    let others = differences(&scene, &parameters, SPP, 0.04);
+    let others = differences(&scene, &parameters, 4 * SPP, 0.04);
     for (estimator, sampling) in [(PathSpace, ends[0]), (Radiative, ends[0]), (Warped, ends[1])] {
         let settings = Settings { estimator, sampling, threads: 1, ..Settings::default() };
-        let found = derivatives(&scene, &parameters, &settings, SPP / 2);
+        let found = derivatives(&scene, &parameters, &settings, 4 * SPP / 2);
         for (i, parameter) in parameters.iter().enumerate() {
             let (name, [own, error], [other, other_error]) = (&parameter.name, found[i], others[i]);
             let error = error.hypot(other_error);

@@ -463,6 +463,13 @@ pub fn rendered(
     session.rendering()
 }
 
+/// The sum over all pixels and channels, and its standard error: pixels share samples, and channels are taken to rise and fall
+/// together.
+pub fn sum(layer: &Layer) -> [f64; 2] {
+    let pixels = layer.pixels.len() as f64;
+    [layer.total.mean, layer.total.stderr].map(|mean| mean.sum() * pixels)
+}
+
 /// A multiple of what blocks of a layer hold.
 pub fn multiple(layer: &Layer, by: f64) -> Layer {
     let mut layer = layer.clone();
