@@ -78,6 +78,11 @@ fn edges_of_a_mesh_may_be_the_line() {
     let eighth = Mat3::rotation(Vec3::Z, 0.5 * core::f64::consts::FRAC_PI_2);
     let linear = eighth * Mat3::diagonal(vec3(0.4, 0.4, 9.0));
     let beam = procedural::cube().transform(&Affine { linear, translation: Vec3::ZERO });
-    let slides = parameter("slides", 0.0, vec![moves("body", shifted(1.0, 0.0, 0.0))]);
-    check(&glowing(0.3, beam), &[slides]);
+    // Parts of its edges move otherwise than others.
+    let turns = GeometryChange::Rotate { axis: Vec3::Y, pivot: vec3(0.0, 0.0, -1.5) };
+    let parameters = [
+        parameter("slides", 0.0, vec![moves("body", shifted(1.0, 0.0, 0.0))]),
+        parameter("turns", 0.0, vec![moves("body", turns)]),
+    ];
+    check(&glowing(0.3, beam), &parameters);
 }

@@ -172,8 +172,10 @@ fn nonsense_meets_nothing() {
     let mut bad = triangle(FLOOR);
     bad.positions[1].x = f64::NAN;
     assert!(crossing_pairs(&[&bad, &triangle(FLOOR)], 9).is_empty());
+    assert!(crossing_segments(&[&bad, &triangle(FLOOR)]).is_empty());
     bad.triangles[0] = [0, 2, 7];
     assert!(crossing_pairs(&[&bad, &triangle(FLOOR)], 9).is_empty());
+    assert!(crossing_segments(&[&bad, &triangle(FLOOR)]).is_empty());
     assert!(crossing_pairs(&[], 9).is_empty());
 }
 

@@ -19,8 +19,8 @@ pub(crate) struct Edges {
     pub(crate) all: u64,
 }
 
-/// Looks for every edge; for intersections only if they matter.
-pub(crate) fn collect(world: &World, with_intersections: bool) -> Edges {
+/// Looks for every edge.
+pub(crate) fn collect(world: &World) -> Edges {
     let mut edges = Vec::new();
     let mut all = 0;
     for (i, shape) in world.scene.shapes.iter().enumerate() {
@@ -55,8 +55,7 @@ pub(crate) fn collect(world: &World, with_intersections: bool) -> Edges {
             edges.extend(wedge.map(|w| Edge::new(w, i as u32, e.faces[0], corners, side)));
         }
     }
-    let (of_meshes, intersections) =
-        if with_intersections { intersections(world, edges) } else { (edges, Vec::new()) };
+    let (of_meshes, intersections) = intersections(world, edges);
     all += intersections.len() as u64;
     Edges { of_meshes, intersections, all }
 }

@@ -32,8 +32,9 @@ const GAP: f64 = 1e-6;
 /// Sine of the angle by which faces that lie in the floor may be off.
 const FLAT: f64 = 1e-5;
 
-/// How far from a line along which surfaces intersect rays start, over its length.
-const BESIDE: f64 = 1e-6;
+/// How far from an edge rays start that leave a face beside it, in the edge's lengths: on the edge itself a ray would not tell
+/// which face it leaves.
+pub(super) const BESIDE: f64 = 1e-6;
 
 /// Where along an edge it is found out whether it rests on anything.
 const PROBES: [f64; 5] = [0.01, 0.3, 0.5, 0.7, 0.99];

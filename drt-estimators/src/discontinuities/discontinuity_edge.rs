@@ -8,7 +8,7 @@ use drt_geom::edges::{Coincident, EdgeSides, Fan, FanFace, faces_around};
 use drt_math::{Vec3, fm};
 
 use crate::discontinuities::collect::{Edges, collect};
-use crate::discontinuities::contact::Contact;
+use crate::discontinuities::contact::{BESIDE, Contact};
 use crate::discontinuities::edge::{Edge, EdgePoint};
 use crate::model::sensor::Sensor;
 use crate::world::vertex::SurfacePoint;
@@ -22,10 +22,6 @@ const BEHIND: f64 = 0.05;
 
 /// Angle by which two faces may be out of one plane and still go on in it.
 const FLAT: f64 = 1e-6;
-
-/// Distance from an edge at which radiance beside it is taken, in the edge's lengths: on the edge
-/// itself a ray would not tell which face it leaves.
-const BESIDE: f64 = 1e-6;
 
 /// An edge at which radiance jumps.
 #[derive(Clone, Debug)]
@@ -57,7 +53,9 @@ impl DiscontinuityEdges {
     /// Collects the edges of surfaces that scatter or block. Of edges at one place, that of a shape that
     /// `moves` tells how the place moves.
     pub(crate) fn collect(world: &World, moves: &[bool]) -> Self {
-        let Edges { of_meshes: edges, intersections, all } = collect(world, true);
+        let Edges { of_meshes: edges, intersections, all } = collect(world);
+        let around: Vec<_> =
+            (0..world.scene.shapes.len()).map(|s| world.medium_around(s)).collect();
         let mut discontinuities = Self { list: Vec::new(), faces_of_fans: Vec::new(), all };
         for same in Coincident::among(edges.iter().map(|e| &e.wedge)).groups() {
             let of = |i: &usize| &edges[*i];
@@ -68,19 +66,15 @@ impl DiscontinuityEdges {
             let Some((crease, smooth)) = kind else { continue };
             edge.may_rest = Contact::anywhere(world, &edge);
             let shapes = same.iter().map(|i| of(i).shape);
-            discontinuities.add(world, edge, &faces, shapes, (crease, smooth));
+            let around = around[edge.shape as usize];
+            discontinuities.add(world, edge, &faces, shapes, around, (crease, smooth));
         }
         for edge in intersections {
             let Some(sheets) = edge.intersecting_sheets(world) else { continue };
             let mut faces = sheets.map(|(face, across)| FanFace::new(&edge.wedge, face, across));
             faces.sort_unstable_by(|a, b| a.angle.total_cmp(&b.angle));
-            discontinuities.add(world, edge, &faces, edge.shapes(), ([1.0; 2], false));
-        }
-        let mut around: Vec<Option<SurroundingMedium>> =
-            alloc::vec![None; world.scene.shapes.len()];
-        for found in &mut discontinuities.list {
-            let shape = found.edge.shape as usize;
-            found.around = *around[shape].get_or_insert_with(|| world.medium_around(shape));
+            let around = around[edge.shape as usize];
+            discontinuities.add(world, edge, &faces, edge.shapes(), around, ([1.0; 2], false));
         }
         discontinuities
     }
@@ -92,6 +86,7 @@ impl DiscontinuityEdges {
         edge: Edge,
         faces: &[FanFace],
         shapes: impl Iterator<Item = u32>,
+        around: SurroundingMedium,
         (crease, smooth): ([f64; 2], bool),
     ) {
         let start = self.faces_of_fans.len();
@@ -99,7 +94,6 @@ impl DiscontinuityEdges {
         let fan = start..self.faces_of_fans.len();
         let mut shapes = shapes.map(|s| &world.scene.shapes[s as usize]);
         let bounds = shapes.any(|shape| shape.boundary.is_some());
-        let around = SurroundingMedium::Varies;
         self.list.push(DiscontinuityEdge { edge, fan, around, bounds, crease, smooth });
     }
 
@@ -152,24 +146,18 @@ impl DiscontinuityEdges {
     /// two sides, of the same random numbers, seldom differ, but then by all there is: their root mean square
     /// is that of how often. Where normals are interpolated they differ each time, by little.
     pub(crate) fn seen_from(&self, discontinuity: &DiscontinuityEdge, camera: &Sensor) -> f64 {
-        let wedge = &discontinuity.edge.wedge;
-        let (eye, forward) = (camera.position(), camera.pinhole().forward);
-        let parallel = camera.is_orthographic();
-        let silhouette = match camera.aperture() {
-            _ if parallel => wedge.projected_length(forward),
-            None => wedge.subtended_angle(eye),
-            Some(lens) => wedge.most_subtended(eye, lens.radius),
-        };
+        let edge = &discontinuity.edge;
+        let silhouette = edge.silhouette_in_view(camera);
         if silhouette > 0.0 {
             return silhouette;
         }
-        let size = match parallel {
-            true => wedge.length * wedge.sine(forward),
-            false => wedge.largest_size(eye, camera.aperture().map_or(0.0, |lens| lens.radius)),
-        };
+        let size = edge.size_in_view(camera);
         // Of other than two faces some are seen from anywhere.
         let Some(normals) = self.normals(discontinuity) else { return size };
-        let view = if parallel { forward } else { wedge.ends[0] - eye };
+        let view = match camera.is_orthographic() {
+            true => camera.pinhole().forward,
+            false => edge.wedge.ends[0] - camera.position(),
+        };
         let crease = discontinuity.crease[usize::from(normals[0].dot(view) > 0.0)];
         let weight = if discontinuity.smooth { crease } else { fm::sqrt(crease) };
         weight * size

@@ -12,6 +12,7 @@ use crate::derivative::velocity::EdgeMatter;
 use crate::discontinuities::order::sort_by_likeness;
 use crate::discontinuities::sheets::{IntersectingFaces, Sheets};
 use crate::model::error::Error;
+use crate::model::sensor::Sensor;
 use crate::world::vertex::MaterialPoint;
 use crate::world::{SurroundingMedium, World};
 
@@ -90,6 +91,33 @@ impl Edge {
     /// True of a line along which surfaces intersect.
     pub(crate) fn is_intersection(&self) -> bool {
         self.intersects.is_some()
+    }
+
+    /// How large it is to a camera where it is a silhouette, in radians or in scene units; 0 where it is none.
+    pub(super) fn silhouette_in_view(&self, camera: &Sensor) -> f64 {
+        match (camera.is_orthographic(), camera.aperture()) {
+            (true, _) => self.wedge.projected_length(camera.pinhole().forward),
+            (false, None) => self.wedge.subtended_angle(camera.position()),
+            (false, Some(lens)) => self.wedge.most_subtended(camera.position(), lens.radius),
+        }
+    }
+
+    /// The same, silhouette or not.
+    pub(super) fn size_in_view(&self, camera: &Sensor) -> f64 {
+        let radius = camera.aperture().map_or(0.0, |lens| lens.radius);
+        match camera.is_orthographic() {
+            true => self.wedge.length * self.wedge.sine(camera.pinhole().forward),
+            false => self.wedge.largest_size(camera.position(), radius),
+        }
+    }
+
+    /// How much a boundary segment to a camera matters.
+    pub(crate) fn in_view(&self, camera: &Sensor) -> f64 {
+        if self.is_intersection() {
+            self.size_in_view(camera)
+        } else {
+            self.silhouette_in_view(camera)
+        }
     }
 
     /// The shapes with which it moves.

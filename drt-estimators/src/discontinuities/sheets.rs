@@ -20,7 +20,8 @@ pub(super) struct IntersectingFaces {
 }
 
 impl IntersectingFaces {
-    /// The faces around the line, first those of its wedge.
+    /// The faces around the line, first those of its wedge. Few samples are of such lines: what all edges would have to keep for them
+    /// is computed.
     pub(super) fn sheets(&self, world: &World, wedge: &Wedge) -> Sheets {
         let middle = wedge.at(0.5);
         let [[a, b], [c, d]] = [wedge.faces, self.faces].map(|faces| {

@@ -32,13 +32,12 @@ pub struct CrossingSegment {
 /// The segments along which surfaces pass through each other or themselves, in the order of their triangles.
 ///
 /// Not among them are segments at which a surface ends or turns back: what rests on another surface, or touches
-/// it. Nor are those of surfaces that overlap in a plane or nearly so, and of triangles of one surface with a corner in common. Where three surfaces and
-/// more intersect along one line, any two of them have a segment there. Positions are right up to rounding; corners within a millionth of the mean size of triangles of a plane count as on it. Triangles
-/// without area, and those with coordinates that are not finite, meet nothing. The cost is near linear in the number of triangles.
+/// it. Nor are those of surfaces that overlap in a plane or nearly so, and of triangles of one surface with a corner in
+/// common. Where three surfaces and more intersect along one line, any two of them have a segment there. Positions are
+/// right up to rounding; corners within a millionth of the mean size of triangles of a plane count as on it.
 ///
-/// # Panics
-///
-/// If a triangle has an index out of range; see [`Mesh::validate`].
+/// Triangles without area, those with coordinates that are not finite, and surfaces with an index out of range meet
+/// nothing. The cost is near linear in the number of triangles.
 ///
 /// ```
 /// use drt_geom::{Mesh, crossing_segments};
@@ -57,6 +56,9 @@ pub fn crossing_segments(surfaces: &[&Mesh]) -> Vec<CrossingSegment> {
     let mut triangles = Vec::new();
     for (surface, mesh) in (0..).zip(surfaces) {
         let first = triangles.len();
+        if mesh.triangles.iter().flatten().any(|v| *v as usize >= mesh.positions.len()) {
+            continue;
+        }
         for index in 0..mesh.triangles.len() as u32 {
             triangles.extend(Triangle::new(mesh, surface, index));
         }

@@ -187,7 +187,7 @@ pub fn glass() -> Result<Stage> {
     glass_body("glass ball", at(&icosphere(2), Vec3::splat(0.7), Vec3::ZERO))
 }
 
-/// A ball of syrup in black glass, half sunk in a wall that parts what is inside and outside of it.
+/// A ball of syrup in rough glass, half sunk in a wall that parts what is inside and outside of it.
 ///
 /// # Errors
 /// When the library rejects the scene.

@@ -36,7 +36,7 @@ fn deviation(gradient: [RgbVec; 4], truth: Rgb<D>) -> f64 {
     worst
 }
 
-/// A direction bent to within a few degrees of the plane.
+/// A direction bent to within half a degree of the plane.
 fn near_horizon(w: Vec3, n: Vec3, rng: &mut Rng) -> Vec3 {
     (w.reject(n) + n * (0.0125 * (rng.next_f64() - 0.3))).normalize()
 }

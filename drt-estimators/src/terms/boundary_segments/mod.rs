@@ -123,9 +123,7 @@ impl Boundary {
     /// The edges at which something can change of what is of interest.
     pub(crate) fn new(world: &World, active: &ActiveInputs) -> Result<Self, Error> {
         let movers = Movers::new(world, active);
-        // They move with their faces alone.
-        let any = active.shapes.contains(&true);
-        let Edges { of_meshes, intersections, all } = collect(world, any);
+        let Edges { of_meshes, intersections, all } = collect(world);
         let mut edges = merge_coincident(of_meshes, |e| movers.moves(e));
         edges.extend(intersections);
         edges.retain(|e| movers.matter_to(e));
@@ -144,17 +142,7 @@ impl Boundary {
         let areas = weights.map(|w| EdgeTable::new(grazed, |e| movers.pass(e), |e| w.of(e)));
         let areas = areas.transpose()?.flatten();
         let camera = &world.camera;
-        let in_view = |e: &Edge| match (camera.is_orthographic(), camera.aperture()) {
-            (true, _) if e.is_intersection() => {
-                e.wedge.length * e.wedge.sine(camera.pinhole().forward)
-            }
-            (false, lens) if e.is_intersection() => {
-                e.wedge.largest_size(camera.position(), lens.map_or(0.0, |lens| lens.radius))
-            }
-            (true, _) => e.wedge.projected_length(camera.pinhole().forward),
-            (false, None) => e.wedge.subtended_angle(camera.position()),
-            (false, Some(lens)) => e.wedge.most_subtended(camera.position(), lens.radius),
-        };
+        let in_view = |e: &Edge| e.in_view(camera);
         let camera = EdgeTable::new(&edges, |e| movers.pass_camera(e, camera), in_view)?;
         let light = |i: usize, emitter: &Emitter| match *emitter {
             Emitter::Point { position, .. }
