@@ -208,7 +208,7 @@ pub fn sunk_glass() -> Result<Stage> {
     Ok(Stage::new("sunk glass", scene, cells))
 }
 
-/// A ball and a lamp half sunk in a floor in fog.
+/// A ball half sunk in a floor in fog.
 ///
 /// # Errors
 /// When the library rejects the scene.
@@ -216,23 +216,40 @@ pub fn sunk_in_fog() -> Result<Stage> {
     let place = vec3(0.1, -0.4, 0.3);
     let floor = placed(&grid(2, 2), vec3(1.4, 1.4, 1.0), Vec3::X, -FRAC_PI_2, vec3(0.0, -0.5, 0.0));
     let lamp = ceiling_lamp(0.5, vec3(-0.3, 0.8, 0.3));
-    let upright = vec3(-0.5, -0.5, 0.5);
-    let strip = placed(&rectangle(), vec3(0.2, 0.2, 1.0), Vec3::Y, FRAC_PI_2, upright);
     let scene = Set::new(vec3(0.2, 0.4, -0.9), vec3(0.1, -0.4, 0.3), 60.0, 3)?
         .medium("fog", fog([0.5, 0.7, 0.9], [0.9, 0.8, 0.7])?, forward(0.3)?)
         .interface("border", at(&cube(), Vec3::splat(1.2), Vec3::ZERO), "fog", None)
         .shape("floor", floor, diffuse([0.7, 0.6, 0.5]))
         .shape("ball", at(&icosphere(2), Vec3::splat(0.35), place), diffuse([0.3, 0.5, 0.8]))
         .lamp("lamp", lamp, Rgb::new(5.0, 6.0, 7.0))
-        .lamp("strip", strip, Rgb::new(6.0, 4.0, 2.0))
         .scene;
     let cells = vec![
         Cell::new("ball rises", [translate("ball", Vec3::Y)]).representative(),
         Cell::new("ball slides", [translate("ball", vec3(0.8, 0.0, 0.5))]),
-        Cell::new("strip rises", [translate("strip", vec3(0.1, 0.8, 0.2))]),
         Cell::new("floor tilts", [turn("floor", vec3(1.0, 0.0, 0.4), place)]),
     ];
     Ok(Stage::new("sunk in fog", scene, cells))
+}
+
+/// A lamp half sunk in a black floor, that lights fog.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn sunk_lamp() -> Result<Stage> {
+    let floor = placed(&grid(2, 2), vec3(1.4, 1.4, 1.0), Vec3::X, -FRAC_PI_2, vec3(0.0, -0.5, 0.0));
+    let place = vec3(-0.4, -0.5, 0.4);
+    let lamp = placed(&rectangle(), vec3(0.3, 0.25, 1.0), Vec3::Y, FRAC_PI_2, place);
+    let scene = Set::new(vec3(0.2, 0.4, -0.9), vec3(0.1, -0.3, 0.3), 60.0, 2)?
+        .medium("fog", fog([0.5, 0.7, 0.9], [0.9, 0.8, 0.7])?, forward(0.3)?)
+        .interface("border", at(&cube(), Vec3::splat(1.2), Vec3::ZERO), "fog", None)
+        .shape("floor", floor, diffuse([0.0; 3]))
+        .lamp("lamp", lamp, Rgb::new(6.0, 4.0, 2.0))
+        .scene;
+    let cells = vec![
+        Cell::new("lamp rises", [translate("lamp", vec3(0.1, 0.8, 0.2))]).representative(),
+        Cell::new("floor rises", [translate("floor", Vec3::Y)]),
+    ];
+    Ok(Stage::new("sunk lamp", scene, cells))
 }
 
 /// A refractive body with dents: edges that graze from inside.
