@@ -86,3 +86,16 @@ fn edges_of_a_mesh_may_be_the_line() {
     ];
     check(&glowing(0.3, beam), &parameters);
 }
+
+/// The camera moves as both do, and each sample shows nothing.
+#[test]
+fn what_moves_together_turns_no_ray() {
+    let wall = procedural::grid(3, 4).transform(&turned(Vec3::Y, Vec3::ZERO));
+    let together = ["camera", "floor", "body"].map(|id| moves(id, shifted(0.4, 0.7, -0.2)));
+    let parameters = [parameter("together", 0.0, together.into())];
+    let settings = Settings { estimator: Warped, ..Settings::default() };
+    let rendering = rendered(&glowing(9.0, wall), &parameters, &settings, 256);
+    let total = &rendering.derivatives[0].total;
+    assert!(rendering.image.rms_value() > 0.1);
+    assert!(total.rms_value() < 1e-9, "{}", total.rms_value());
+}

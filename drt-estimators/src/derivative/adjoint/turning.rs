@@ -33,11 +33,12 @@ impl RayMotion<'_> {
         let mut origin = RgbVec::ZERO;
         for part in self.parts {
             let g = across * part.rate + weight.outer(part.divergence);
+            // Where surfaces intersect two parts share the origin: each loses its velocity from that of its own point.
+            let place = part.matter.map_or(g, |matter| g.map(|g| matter.pull(g)));
             if let Some(matter) = part.matter {
-                let place = g.map(|g| matter.pull(g));
                 send_to(matter.point, SurfaceAdjoint::of_place(place), sink);
             }
-            origin += g;
+            origin += place;
         }
         if let (Some(shadow), Some(light)) = (&self.turn.shadow, self.light) {
             origin += self.send_shadow(shadow, light, &across, weight, sink);
