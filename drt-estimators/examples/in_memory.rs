@@ -32,8 +32,8 @@ impl Control for Watch {
         self.stop.load(Ordering::Relaxed)
     }
     fn tile(&self, tile: &FinishedTile<'_>) {
-        // Here a viewer would copy `tile.image` to the screen.
-        assert_eq!(tile.image.len(), (tile.pixels.1 - tile.pixels.0) as usize);
+        // Here a viewer would copy `tile.image()` to the screen.
+        assert_eq!(tile.image().len(), (tile.pixels.1 - tile.pixels.0) as usize);
         self.tiles.fetch_add(1, Ordering::Relaxed);
     }
 }

@@ -11,10 +11,13 @@ mod directions;
 #[cfg(test)]
 mod tests;
 
-use directions::{BY_NIBBLE, DIMENSIONS};
+use directions::{BY_NIBBLE, DIMENSIONS, TOGETHER};
 
 /// Number of dimensions with generator matrices of their own.
 pub const SET_DIMENSIONS: u32 = DIMENSIONS as u32;
+
+/// Coordinates that are computed together.
+const LANES: u32 = TOGETHER as u32;
 
 /// Coordinate `dimension` of point `index` of the sequence named by `seed`, in (0, 1).
 ///
@@ -28,7 +31,8 @@ pub const SET_DIMENSIONS: u32 = DIMENSIONS as u32;
 #[inline]
 #[must_use]
 pub fn sample(index: u32, dimension: u32, seed: u32) -> f64 {
-    coordinate(shuffled(index, dimension / SET_DIMENSIONS, seed), dimension, seed)
+    let shuffled = shuffled(index, dimension / SET_DIMENSIONS, seed);
+    coordinates(shuffled, dimension / LANES, seed)[(dimension % LANES) as usize]
 }
 
 /// The coordinates of one point, one after the other: stands where an [`Rng`](crate::Rng) stands.
@@ -39,40 +43,50 @@ pub struct SobolSampler {
     dimension: u32,
     /// The index as the current set of dimensions sees it.
     shuffled: u32,
+    /// The next coordinate and its neighbours, unless it is the first of these.
+    together: [f64; TOGETHER],
 }
 
 impl SobolSampler {
     /// Point `index` of the sequence named by `seed`: one seed per pixel, one index per sample.
     #[must_use]
     pub fn new(seed: u32, index: u32) -> Self {
-        Self { index, seed, dimension: 0, shuffled: shuffled(index, 0, seed) }
+        Self { index, seed, ..Self::UNUSED }
     }
 
     /// Stands where no points are asked for.
-    pub(crate) const UNUSED: Self = Self { index: 0, seed: 0, dimension: 0, shuffled: 0 };
+    pub(crate) const UNUSED: Self =
+        Self { index: 0, seed: 0, dimension: 0, shuffled: 0, together: [0.0; TOGETHER] };
 
     /// The next coordinate, in (0, 1).
     #[inline]
     pub fn next_f64(&mut self) -> f64 {
-        let x = coordinate(self.shuffled, self.dimension, self.seed);
-        self.dimension = self.dimension.wrapping_add(1);
-        if self.dimension.is_multiple_of(SET_DIMENSIONS) {
-            self.enter_set();
+        let lane = self.dimension % LANES;
+        if lane == 0 {
+            self.enter(self.dimension.is_multiple_of(SET_DIMENSIONS));
         }
-        x
+        self.dimension = self.dimension.wrapping_add(1);
+        self.together[lane as usize]
     }
 
-    #[cold]
-    fn enter_set(&mut self) {
-        self.shuffled = shuffled(self.index, self.dimension / SET_DIMENSIONS, self.seed);
+    /// Computes what stands together with the next coordinate. Not in line, as its many registers would be saved for every
+    /// coordinate.
+    #[inline(never)]
+    fn enter(&mut self, new_set: bool) {
+        if new_set {
+            self.shuffled = shuffled(self.index, self.dimension / SET_DIMENSIONS, self.seed);
+        }
+        self.together = coordinates(self.shuffled, self.dimension / LANES, self.seed);
     }
 
     /// Leaves out so many coordinates.
     pub(crate) fn skip(&mut self, coordinates: u32) {
-        let set = self.dimension / SET_DIMENSIONS;
-        self.dimension = self.dimension.wrapping_add(coordinates);
-        if self.dimension / SET_DIMENSIONS != set {
-            self.enter_set();
+        let before = self.dimension;
+        self.dimension = before.wrapping_add(coordinates);
+        // What begins with the next coordinate is entered with that.
+        let entered = |of: u32| self.dimension.div_ceil(of) != before.div_ceil(of);
+        if entered(LANES) {
+            self.enter(entered(SET_DIMENSIONS));
         }
     }
 
@@ -90,15 +104,23 @@ fn shuffled(index: u32, set: u32, seed: u32) -> u32 {
     nested_uniform_scramble(index.reverse_bits(), mix(seed, !set)).reverse_bits()
 }
 
+/// Those that stand together at one place.
 #[inline]
-fn coordinate(shuffled: u32, dimension: u32, seed: u32) -> f64 {
-    let table = &BY_NIBBLE[(dimension % SET_DIMENSIONS) as usize];
-    let mut digits = 0;
+fn coordinates(shuffled: u32, place: u32, seed: u32) -> [f64; TOGETHER] {
+    let table = &BY_NIBBLE[place as usize % BY_NIBBLE.len()];
+    let mut digits = [0; TOGETHER];
     for (k, row) in table.iter().enumerate() {
-        digits ^= row[(shuffled >> (4 * k) & 15) as usize];
+        let of_nibble = &row[(shuffled >> (4 * k) & 15) as usize];
+        for (digits, d) in digits.iter_mut().zip(of_nibble) {
+            *digits ^= d;
+        }
     }
-    let digits = nested_uniform_scramble(digits, mix(seed, dimension)).reverse_bits();
-    (f64::from(digits) + 0.5) * (1.0 / 4_294_967_296.0)
+    let seeds: [u32; TOGETHER] =
+        core::array::from_fn(|lane| mix(seed, place.wrapping_mul(LANES) | lane as u32));
+    core::array::from_fn(|lane| {
+        let digits = nested_uniform_scramble(digits[lane], seeds[lane]).reverse_bits();
+        (f64::from(digits) + 0.5) * (1.0 / 4_294_967_296.0)
+    })
 }
 
 /// Owen's scramble of binary digits, first digit lowest: each is flipped or not depending on the

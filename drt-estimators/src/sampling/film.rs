@@ -308,7 +308,8 @@ impl PixelFilm {
         self.sums.end_run();
     }
 
-    fn estimate(&self, pixel: usize, layer: usize) -> Estimate {
+    /// One of a pixel's layers.
+    pub(crate) fn estimate(&self, pixel: usize, layer: usize) -> Estimate {
         match &self.image {
             Some(image) if layer == 0 => image.estimate(pixel),
             _ => self.sums.estimate(pixel * self.layers + layer),
@@ -319,11 +320,6 @@ impl PixelFilm {
     pub(crate) fn variance(&self, pixel: u32, layer: usize) -> f64 {
         let stderr = self.estimate(pixel as usize, layer).stderr;
         (stderr * stderr).mean()
-    }
-
-    /// The first layer of some pixels.
-    pub(crate) fn estimates(&self, pixels: core::ops::Range<u32>) -> Vec<Estimate> {
-        pixels.map(|p| self.estimate(p as usize, 0)).collect()
     }
 
     /// One layer as an image.

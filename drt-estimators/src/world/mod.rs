@@ -532,12 +532,8 @@ impl World {
             Kind::Surface(s) => {
                 let shape = &self.scene.shapes[s.shape as usize];
                 let bsdf = &self.scene.bsdfs[shape.bsdf].item;
-                Some(Scattering::Surface(bsdf.at(
-                    Some(self.texture_point(s)),
-                    s.ng,
-                    s.ns,
-                    shape.mesh.normals.is_some(),
-                )))
+                let at = (!bsdf.is_plain()).then(|| self.texture_point(s));
+                Some(Scattering::Surface(bsdf.at(at, s.ng, s.ns, shape.mesh.normals.is_some())))
             }
             Kind::Volume(_) => v.medium.map(|m| Scattering::Volume(&self.medium(m).phase)),
             Kind::Point => None,

@@ -309,8 +309,12 @@ impl Probe {
     /// The crossing with a triangle, if it is a hit of this query.
     #[inline]
     fn meet(&self, prim: u32, triangle: &Corners) -> Option<Crossing> {
+        // The triangle that a ray starts on is among the candidates as a rule.
+        if self.skip.contains(prim) {
+            return None;
+        }
         let crossing = self.sheared.cross(triangle)?;
-        if !(crossing.t > 0.0 && crossing.t < self.ray.t_max) || self.skip.contains(prim) {
+        if !(crossing.t > 0.0 && crossing.t < self.ray.t_max) {
             return None;
         }
         let dir = self.ray.dir;

@@ -45,19 +45,23 @@ pub(super) const INITIAL: [(u32, &[u32]); DIMENSIONS - 1] = [
 #[cfg(test)]
 pub(super) static DIRECTIONS: [[u32; 32]; DIMENSIONS] = directions();
 
-/// The same for every value of every four bits of the index: eight look-ups instead of 32 steps.
-pub(super) static BY_NIBBLE: [[[u32; 16]; 8]; DIMENSIONS] = by_nibble();
+/// Dimensions whose digits stand together in a table.
+pub(super) const TOGETHER: usize = 4;
 
-const fn by_nibble() -> [[[u32; 16]; 8]; DIMENSIONS] {
+/// The same for every value of every four bits of the index, of some neighbouring dimensions: eight look-ups instead of 32
+/// steps for each of them.
+pub(super) static BY_NIBBLE: [[[[u32; TOGETHER]; 16]; 8]; DIMENSIONS / TOGETHER] = by_nibble();
+
+const fn by_nibble() -> [[[[u32; TOGETHER]; 16]; 8]; DIMENSIONS / TOGETHER] {
     let all = directions();
-    let mut table = [[[0; 16]; 8]; DIMENSIONS];
+    let mut table = [[[[0; TOGETHER]; 16]; 8]; DIMENSIONS / TOGETHER];
     let mut d = 0;
     while d < DIMENSIONS {
         let mut i = 0;
         while i < 32 * 16 {
             let (bit, value) = (i / 16, i % 16);
             if value >> (bit % 4) & 1 == 1 {
-                table[d][bit / 4][value] ^= all[d][bit];
+                table[d / TOGETHER][bit / 4][value][d % TOGETHER] ^= all[d][bit];
             }
             i += 1;
         }

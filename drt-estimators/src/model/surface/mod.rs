@@ -239,6 +239,12 @@ impl Bsdf {
         }
     }
 
+    /// True of a model that is the same everywhere and on both sides of its normal.
+    #[inline]
+    pub(crate) fn is_plain(&self) -> bool {
+        match_model!(self, _model => true, _ => matches!(self, Self::Null))
+    }
+
     /// The value `fs(wo, wi) |n·wi|` per channel; zero where the model is black. Like all that does
     /// not say where on a shape it is, this takes textures by their means.
     #[inline]
@@ -249,12 +255,20 @@ impl Bsdf {
 
     #[inline]
     pub(crate) fn eval_at(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
-        let (bsdf, n) = self.facing(wo, n);
         match_model!(
-            bsdf,
+            self,
             b => b.value(&Angles::new(wo, wi, n)),
-            _ => bsdf.composed(|b| b.eval(at, wo, wi, n)).unwrap_or(Rgb::ZERO)
+            _ => self.eval_of_any(at, wo, wi, n)
         )
+    }
+
+    /// Of BSDFs that are no plain models.
+    #[inline(never)]
+    fn eval_of_any(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
+        if let Some((bsdf, n)) = self.side(wo, n) {
+            return bsdf.eval_at(at, wo, wi, n);
+        }
+        self.composed(|b| b.eval(at, wo, wi, n)).unwrap_or(Rgb::ZERO)
     }
 
     /// The value and all its derivatives.
@@ -305,14 +319,32 @@ impl Bsdf {
         u: [f64; 3],
         given: Given,
     ) -> Option<DirectionSample> {
-        let (bsdf, facing) = self.facing(from, n);
-        let w = match_model!(
-            bsdf,
-            b => b.sample(from, facing, u),
-            _ => bsdf.composed(|b| b.sample(at, from, facing, u, given)).flatten()
-        )?;
-        let pdf = self.pdf_at(at, from, w, n, given);
+        let (w, pdf) = match_model!(
+            self,
+            b => {
+                let w = b.sample(from, n, u)?;
+                (w, b.pdf(&Angles::new(from, w, n)))
+            },
+            _ => self.sample_of_any(at, from, n, u, given)?
+        );
         (pdf > 0.0 && pdf.is_finite()).then_some(DirectionSample { w, pdf })
+    }
+
+    /// Of BSDFs that are no plain models, with the density.
+    #[inline(never)]
+    fn sample_of_any(
+        &self,
+        at: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        u: [f64; 3],
+        given: Given,
+    ) -> Option<(Vec3, f64)> {
+        if let Some((bsdf, n)) = self.side(from, n) {
+            return bsdf.sample_at(at, from, n, u, given).map(|s| (s.w, s.pdf));
+        }
+        let w = self.composed(|b| b.sample(at, from, n, u, given)).flatten()?;
+        Some((w, self.pdf_of_any(at, from, w, n, given)))
     }
 
     /// Draws one of the single directions that a smooth surface scatters `from` to. `None` where
@@ -490,12 +522,20 @@ impl Bsdf {
 
     #[inline]
     pub(crate) fn pdf_at(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
-        let (bsdf, n) = self.facing(from, n);
         match_model!(
-            bsdf,
+            self,
             b => b.pdf(&Angles::new(from, to, n)),
-            _ => bsdf.composed(|b| b.pdf(at, from, to, n, given)).unwrap_or(0.0)
+            _ => self.pdf_of_any(at, from, to, n, given)
         )
+    }
+
+    /// Of BSDFs that are no plain models.
+    #[inline(never)]
+    fn pdf_of_any(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
+        if let Some((bsdf, n)) = self.side(from, n) {
+            return bsdf.pdf_at(at, from, to, n, given);
+        }
+        self.composed(|b| b.pdf(at, from, to, n, given)).unwrap_or(0.0)
     }
 
     /// What `f` says of a BSDF that is no plain model; `None` of one that is.
@@ -707,7 +747,14 @@ impl Bsdf {
     /// The one-sided BSDF that a direction meets, and the normal it goes with.
     #[inline]
     fn facing(&self, from: Vec3, n: Vec3) -> (&Self, Vec3) {
-        let Self::TwoSided(b) = self else { return (self, n) };
-        if n.dot(from) >= 0.0 { (&b.front, n) } else { (b.back.as_ref().unwrap_or(&b.front), -n) }
+        self.side(from, n).unwrap_or((self, n))
+    }
+
+    /// The same of a two-sided one; `None` of others.
+    #[inline]
+    fn side(&self, from: Vec3, n: Vec3) -> Option<(&Self, Vec3)> {
+        let Self::TwoSided(b) = self else { return None };
+        let front = n.dot(from) >= 0.0;
+        Some(if front { (&b.front, n) } else { (b.back.as_ref().unwrap_or(&b.front), -n) })
     }
 }

@@ -60,8 +60,16 @@ impl Control for Unattended {}
 pub struct FinishedTile<'a> {
     /// First pixel and one past the last, row by row from the top left.
     pub pixels: (u32, u32),
-    /// The forward image there so far.
-    pub image: &'a [Estimate],
+    film: &'a PixelFilm,
+}
+
+impl FinishedTile<'_> {
+    /// The forward image there so far, pixel by pixel.
+    #[must_use]
+    pub fn image(&self) -> impl ExactSizeIterator<Item = Estimate> {
+        let (first, end) = self.pixels;
+        (first..end).map(|pixel| self.film.estimate(pixel as usize, 0))
+    }
 }
 
 /// A prepared scene and what has been accumulated for it.
@@ -298,9 +306,7 @@ impl Session {
             return 0;
         }
         let tile = |film: &PixelFilm, pixels: core::ops::Range<u32>| {
-            let image = film.estimates(pixels.clone());
-            let pixels = (pixels.start, pixels.end);
-            pass.control.tile(&FinishedTile { pixels, image: &image });
+            pass.control.tile(&FinishedTile { pixels: (pixels.start, pixels.end), film });
         };
         let mut film = core::mem::take(&mut self.film);
         let rest = |part| progress(begun + (1.0 - begun) * part);

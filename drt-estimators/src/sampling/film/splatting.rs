@@ -301,10 +301,9 @@ impl SplattedImage {
 
     /// Adds to the stratum what tiles have added.
     fn settle(&mut self) {
-        self.pixels.add(&self.new.pixels);
-        self.groups.add(&self.new.groups);
-        self.open_events.add(&self.new.events);
-        self.new.clear();
+        self.pixels.take(&mut self.new.pixels);
+        self.groups.take(&mut self.new.groups);
+        self.open_events.add(&core::mem::replace(&mut self.new.events, Events::NONE));
     }
 
     /// Counts samples, with what they have added, and what ends with them.

@@ -51,6 +51,14 @@ impl SampleSums {
         }
     }
 
+    /// The same, and zeros the other sums.
+    pub(super) fn take(&mut self, other: &mut Self) {
+        take_all(&mut self.values, &mut other.values);
+        for (sum, w) in self.weights.iter_mut().zip(&mut other.weights) {
+            *sum += core::mem::take(w);
+        }
+    }
+
     pub(super) fn add_to(&mut self, i: usize, (value, weight): (Rgb, f64)) {
         self.values[i] += value;
         self.weights[i] += weight;
@@ -60,6 +68,13 @@ impl SampleSums {
     fn is_of(&self, n: u64, weighted: bool) -> bool {
         let weights = if weighted { n } else { 0 };
         self.values.len() as u64 == n && self.weights.len() as u64 == weights
+    }
+}
+
+/// Adds sums to others, and zeros them.
+pub(super) fn take_all(sums: &mut [Rgb], others: &mut [Rgb]) {
+    for (sum, v) in sums.iter_mut().zip(others) {
+        *sum += core::mem::replace(v, Rgb::ZERO);
     }
 }
 

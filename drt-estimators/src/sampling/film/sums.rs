@@ -6,7 +6,7 @@ use drt_math::{Real, Rgb};
 
 use crate::model::rendering::Estimate;
 use crate::sampling::film::Ends;
-use crate::sampling::film::strata::SampleSums;
+use crate::sampling::film::strata::{SampleSums, take_all};
 
 /// Means of many numbers at once, with their standard errors: plain arrays with an entry for each.
 ///
@@ -204,6 +204,11 @@ impl RunSums {
         self.open.add(sums);
     }
 
+    /// The same, and zeros those sums.
+    pub(super) fn take(&mut self, sums: &mut SampleSums) {
+        self.open.take(sums);
+    }
+
     /// What the stratum that has not ended holds; it begins anew.
     pub(super) fn take_open(&mut self) -> SampleSums {
         let empty = self.open.empty();
@@ -216,13 +221,10 @@ impl RunSums {
         if ends == Ends::Nothing {
             return;
         }
-        for (sum, v) in self.partial.iter_mut().zip(&self.open.values) {
-            *sum += *v;
+        take_all(&mut self.partial, &mut self.open.values);
+        for (weights, w) in self.weights.iter_mut().zip(&mut self.open.weights) {
+            weights.partial += core::mem::take(w);
         }
-        for (weights, w) in self.weights.iter_mut().zip(&self.open.weights) {
-            weights.partial += *w;
-        }
-        self.open.clear();
         if ends == Ends::Run {
             self.end_run();
         }
