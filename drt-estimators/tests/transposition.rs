@@ -9,7 +9,7 @@ use common::pairing::{pair, targets};
 use common::*;
 use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::{Filter, FilterKind};
-use drt_estimators::sensor::{Lens, Sensor};
+use drt_estimators::sensor::{Aperture, Lens, Sensor};
 use drt_estimators::surface::{
     Anisotropic, Bsdf, Conductor, Dielectric, Mask, Measured, MeasuredTables, Principled,
     RoughConductor,
@@ -400,6 +400,14 @@ fn other_sensors() {
         let filter = Filter::new(FilterKind::BOX).expect("a valid filter");
         *sensor = sensor.clone().with_filter(filter);
         agree("box filter", &scene, effects.clone(), &settings());
+        let mut through = scene.clone();
+        let sensor = &mut through.sensors[0].item.sensor;
+        let aperture = Aperture { radius: 0.4, focus_distance: 2.0 };
+        *sensor = sensor.clone().with_aperture(aperture).expect("a valid sensor");
+        let mut of_lens = effects.clone();
+        of_lens.push(changes("camera", "aperture_radius", grey(0.3)));
+        of_lens.push(changes("camera", "focus_distance", grey(1.5)));
+        agree("lens", &through, of_lens, &settings());
         let meter = Sensor::irradiance_meter(vec3(0.4, 0.8, 4.2), vec3(-0.1, -0.2, -1.0));
         scene.sensors[0].item.sensor = meter.expect("a valid sensor");
         agree_from(200, "meter", &scene, effects, &settings());

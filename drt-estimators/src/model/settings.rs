@@ -208,11 +208,9 @@ impl Settings {
         if derivatives && self.sampling == PathSampling::Bidirectional && !has_both_ends {
             return fail("sampling", SettingError::OtherKinds);
         }
-        let camera = &scene.sensor(self.sensor)?.item.sensor;
-        if self.sampling == PathSampling::Bidirectional
-            && (camera.aperture().is_some() || scene.hides_something())
-        {
-            return fail("sampling", SettingError::NoLightPaths);
+        scene.sensor(self.sensor)?;
+        if self.sampling == PathSampling::Bidirectional && scene.hides_something() {
+            return fail("sampling", SettingError::HiddenEmitters);
         }
         if self.sampling == PathSampling::Bidirectional
             && let Some(i) = scene.first_straight()

@@ -55,12 +55,11 @@ pub enum SettingError {
         "bidirectional sampling is for images, and for derivatives by path-space and warped (with edges) alone"
     )]
     OtherKinds,
-    /// Paths from both ends, by a camera to which light paths are not connected.
+    /// Paths from both ends, where emitters are hidden from the camera.
     #[error(
-        "bidirectional sampling has no lenses and no hidden emitters: the sensor has an aperture, or the \
-         integrator hides emitters; use unidirectional"
+        "bidirectional sampling has no hidden emitters: the integrator hides some; use unidirectional"
     )]
-    NoLightPaths,
+    HiddenEmitters,
     /// Paths from both ends, past a surface that light of points and directions goes straight through.
     #[error(
         "bidirectional sampling has no masks and thin panes: light goes straight through `{0}`; use unidirectional"

@@ -49,8 +49,8 @@ pub(super) fn chosen(
             "`auto` chooses for images; derivatives have paths from both ends where these are asked for",
         );
     }
-    if world.camera.aperture().is_some() || world.hides_emitters {
-        return without("light paths are connected to no lens, and do not know what is hidden");
+    if world.hides_emitters {
+        return without("light paths do not know what is hidden");
     }
     if scene.first_straight().is_some() {
         return without("light paths do not know what light goes straight through");

@@ -42,6 +42,9 @@
 //!
 //! n being the number of light paths to one sample of each pixel, as many as pixels; p_film c/r² is density per area, whatever the camera. Russian roulette is left out of all of it.
 //!
+//! A lens is a pinhole for each of its points (`sensor::aperture`), drawn by one density in all strategies. So it cancels in their weights, and
+//! both paths of a sample see the camera from the same point.
+//!
 //! # Records
 //!
 //! What is to be differentiated is told to a [`JointObserver`]: the camera's walk, next-event connections, and each connection
@@ -59,7 +62,7 @@ use core::marker::PhantomData;
 
 use drt_math::{Real, Rgb, Vec3};
 
-use crate::model::sensor::ViewSample;
+use crate::model::sensor::{Sensor, ViewSample};
 use crate::model::surface::Given;
 pub(crate) use crate::sampling::bidirectional::emission::EmissionSampler;
 use crate::sampling::bidirectional::emission::{EmittedRay, area_flow_pdf};
@@ -137,8 +140,9 @@ impl<'w> Bidirectional<'w> {
             }
         }
         observer.joined(&self.recorded);
+        let camera = &*self.world.camera.at_lens(view.lens);
         for y in 0..self.light.vertices.len() {
-            let seen = self.seen::<Radiance>(tracer, y);
+            let seen = self.seen::<Radiance>(tracer, (camera, view.lens), y);
             splats.extend(seen.map(|seen| seen.splat(self.light_paths)));
         }
         sum
@@ -151,9 +155,11 @@ impl<'w> Bidirectional<'w> {
         seen: &mut Vec<SeenFromCamera>,
     ) {
         tracer.counters.paths += 1;
+        let lens = self.world.camera.draw_lens(&mut tracer.rng);
+        let camera = &*self.world.camera.at_lens(lens);
         self.trace_light::<O>(tracer);
         for y in 0..self.light.vertices.len() {
-            seen.extend(self.seen::<O>(tracer, y));
+            seen.extend(self.seen::<O>(tracer, (camera, lens), y));
         }
     }
 
@@ -174,8 +180,7 @@ impl<'w> Bidirectional<'w> {
         observer: &mut O,
     ) {
         let leaving = tracer.camera_ray(view, weight);
-        let world = self.world;
-        let camera = &world.camera;
+        let camera = &*self.world.camera.at_lens(view.lens);
         let film = camera.view(view.origin + view.direction).importance;
         let ratios = Ratios { last: square(self.light_paths / film), earlier: 0.0 };
         // Parallel rays are drawn by area, as if they came from infinity.
@@ -363,10 +368,11 @@ impl<'w> Bidirectional<'w> {
         (v.sigma_s() * f).is_zero() && !self.world.may_revive(&v.vertex)
     }
 
-    /// A vertex of the light's path as the camera sees it.
+    /// A vertex of the light's path as the camera sees it, the pinhole that it is at a point of its lens.
     fn seen<O: JointObserver>(
         &self,
         tracer: &mut Tracer<'w>,
+        (camera, lens): (&Sensor, [f64; 2]),
         vertex: usize,
     ) -> Option<SeenFromCamera> {
         let y = &self.light.vertices[vertex];
@@ -376,7 +382,7 @@ impl<'w> Bidirectional<'w> {
         }
         let world = self.world;
         let scattering = world.scattering(&y.vertex)?;
-        let (wo, transport) = see(&world.camera, &y.vertex)?;
+        let (wo, transport) = see(camera, &y.vertex)?;
         if y.cosine(wo) < IN_PLANE {
             return None;
         }
@@ -385,7 +391,7 @@ impl<'w> Bidirectional<'w> {
         if light.is_zero() && (!O::RECORDS || self.is_dead(y, scattered.value)) {
             return None;
         }
-        let eye = world.eye_of(y.vertex.x);
+        let eye = world.eye_at(camera.eye_of(y.vertex.x));
         let distance = (eye.x - y.vertex.x).length();
         let target = y.vertex.surface().map(|s| s.prim);
         let (passed, attenuation) = tracer.passed(&eye, -wo, distance, target)?;
@@ -409,10 +415,10 @@ impl<'w> Bidirectional<'w> {
             view: ViewSample {
                 origin: eye.x,
                 direction: -wo,
-                point: world.camera.view(y.vertex.x).pixel,
+                point: camera.view(y.vertex.x).pixel,
                 weight,
                 slope: [0.0; 2],
-                lens: [0.0; 2],
+                lens,
             },
             value: light * arrival.throughput,
             arrival,

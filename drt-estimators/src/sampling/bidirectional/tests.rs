@@ -8,6 +8,7 @@ use drt_math::{Rgb, Rng};
 use super::*;
 use crate::derivative::tests::scenes::*;
 use crate::model::scene::Scene;
+use crate::model::sensor::Aperture;
 use crate::sampling::record::Radiance;
 use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
@@ -21,6 +22,8 @@ pub(super) enum Fault {
     NoSplats,
     /// Directions back have no density.
     NeverBack,
+    /// Light paths are connected to the middle of the lens.
+    OneEye,
 }
 
 const SAMPLES: u32 = 400;
@@ -46,7 +49,9 @@ fn light(scene: &Scene, fault: Option<Fault>, both: bool) -> Moments {
             for unit in 0..SAMPLES {
                 tracer.rng = Rng::new(seed, u64::from(pixel), unit);
                 let u = tracer.rng.next_2d();
-                let s = camera.sample_square(pixel, u);
+                let lens = camera.draw_lens(&mut tracer.rng);
+                let mut s = camera.at_lens(lens).sample_square(pixel, u);
+                s.lens = if fault == Some(Fault::OneEye) { [0.0; 2] } else { lens };
                 let filter = Rgb::splat(s.weight);
                 splats.clear();
                 let value = if both {
@@ -98,4 +103,13 @@ fn surfaces_under_every_light() {
 #[test]
 fn fog_under_every_light() {
     compare(&fog(), &[Fault::NoConnections, Fault::NoSplats, Fault::NeverBack]);
+}
+
+#[test]
+fn lenses() {
+    let mut scene = surfaces(phong(), diffuse(0.6, 0.5, 0.7));
+    let sensor = &mut scene.sensors[0].item.sensor;
+    let aperture = Aperture { radius: 0.5, focus_distance: 1.0 };
+    *sensor = sensor.clone().with_aperture(aperture).expect("a lens");
+    compare(&scene, &[Fault::NoSplats, Fault::OneEye]);
 }
