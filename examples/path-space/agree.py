@@ -2,7 +2,7 @@
 """Holds estimators and samplers against each other on these scenes and on those of examples/warped.
 
     cargo build --release -p drt-cli
-    python3 examples/path-space/agree.py [--seconds S] [--size N] [NAME|JOB.toml...]
+    python3 examples/path-space/agree.py [--seconds S] [--size N] [--kinds KIND...] [NAME|JOB.toml...]
 
 Each estimator renders a job's derivatives by paths from the camera and by paths from both ends, until their noise is
 1 % or the time is over; finite differences stand beside them.
@@ -39,6 +39,7 @@ def arguments():
     parser.add_argument("--drt", default=HERE.parents[1] / "target/release/drt", help="the drt binary")
     parser.add_argument("--seconds", type=float, default=60, help="time of a row at most")
     parser.add_argument("--size", type=int, default=32, help="width and height of the images")
+    parser.add_argument("--kinds", nargs="+", default=[kind for kind, _ in KINDS], help="estimators; all by default")
     parser.add_argument("--noise", type=float, default=0.01, help="noise to stop at")
     return parser.parse_args()
 
@@ -97,6 +98,8 @@ def main():
         job = folder / "job.toml" if folder.is_dir() else pathlib.Path(name)
         scene, found = job.parent.name, {}
         for at, (kind, sampling) in enumerate(KINDS):
+            if kind not in options.kinds:
+                continue
             row = blocks(job, at, options)
             if isinstance(row, str):
                 print(f"| {scene} | | {kind} | {sampling} | {row} | | | |", flush=True)
