@@ -30,6 +30,7 @@ KINDS = [
     ("warped", "bidirectional"),
     ("radiative", "unidirectional"),
     ("finite-difference", "unidirectional"),
+    ("finite-difference", "bidirectional"),
 ]
 
 

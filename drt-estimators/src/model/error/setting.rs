@@ -52,7 +52,8 @@ pub enum SettingError {
     SurfacesOnly,
     /// A [`PathSampling`](crate::PathSampling) that the estimator of derivatives does not have.
     #[error(
-        "bidirectional sampling is for images, and for derivatives by path-space and warped (with edges) alone"
+        "bidirectional sampling is for images, and for derivatives by path-space, warped (with edges) and finite differences \
+         alone"
     )]
     OtherKinds,
     /// Paths from both ends, where emitters are hidden from the camera.

@@ -43,6 +43,7 @@ mod dielectric;
 mod diffuse;
 mod direction_partner;
 mod facet;
+mod flags;
 mod framed;
 mod fresnel;
 mod lobes;
@@ -94,7 +95,6 @@ pub use crate::model::surface::principled::Principled;
 pub use crate::model::surface::principled_thin::PrincipledThin;
 pub use crate::model::surface::property::{Property, SurfaceError};
 pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
-use crate::model::surface::shading_frame::frames_jump_on;
 pub use crate::model::surface::smooth::{Conductor, Dielectric, ThinDielectric};
 pub(crate) use crate::model::surface::specular::SpecularValue;
 pub use crate::model::surface::textured::Textured;
@@ -225,26 +225,6 @@ macro_rules! match_model {
 }
 
 impl Bsdf {
-    /// True when nothing is scattered, as of now: a null interface, or no reflectance on any side.
-    #[must_use]
-    pub(crate) fn is_black(&self) -> bool {
-        match self {
-            Self::Null => true,
-            Self::Diffuse(d) => d.reflectance.is_zero(),
-            Self::Textured(t) => t.bsdf.is_black(),
-            Self::TwoSided(t) => t.front.is_black() && t.back.as_ref().is_none_or(Self::is_black),
-            Self::Blend(b) => b.bsdfs.iter().all(Self::is_black),
-            Self::Perturbed(b) => b.bsdf.is_black(),
-            _ => false,
-        }
-    }
-
-    /// True of a model that is the same everywhere and on both sides of its normal.
-    #[inline]
-    pub(crate) fn is_plain(&self) -> bool {
-        match_model!(self, _model => true, _ => matches!(self, Self::Null))
-    }
-
     /// The value `fs(wo, wi) |n·wi|` per channel; zero where the model is black. Like all that does
     /// not say where on a shape it is, this takes textures by their means.
     #[inline]
@@ -400,24 +380,6 @@ impl Bsdf {
         }
     }
 
-    /// True where light is scattered into single directions, past which nothing that moves is differentiated.
-    #[must_use]
-    pub fn is_smooth(&self) -> bool {
-        match self {
-            Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
-            Self::Plastic(b) => b.is_smooth(),
-            _ => self.inner().any(Self::is_smooth),
-        }
-    }
-
-    /// True where some light goes straight on, as through nothing.
-    pub(crate) fn passes_straight(&self) -> bool {
-        match self {
-            Self::Mask(_) | Self::ThinDielectric(_) => true,
-            _ => self.inner().any(Self::passes_straight),
-        }
-    }
-
     /// The part of the light that goes straight through at a point, as if there was no surface, at a cosine to its normal.
     pub(crate) fn straight(&self, at: At<'_>, cos: f64) -> Rgb {
         match self {
@@ -425,40 +387,6 @@ impl Bsdf {
             Self::ThinDielectric(b) => b.straight(cos),
             Self::Textured(b) if b.bsdf.passes_straight() => b.at(at).straight(None, cos),
             _ => Rgb::ZERO,
-        }
-    }
-
-    /// The name of the first BSDF in this one that nothing which moves is differentiated at: it jumps where no term samples it, or its
-    /// normals follow motions in ways that no term knows.
-    pub(crate) fn undifferentiable(&self) -> Option<&'static str> {
-        match self {
-            Self::Mask(_) | Self::Perturbed(_) => Some(self.name()),
-            Self::Measured(b) if !b.is_continuous() => Some(self.name()),
-            _ => self.inner().find_map(Self::undifferentiable),
-        }
-    }
-
-    /// True where directions along the surface are told apart, by its texture coordinates.
-    pub(crate) fn is_oriented(&self) -> bool {
-        match self {
-            Self::Diffuse(_) | Self::Phong(_) | Self::RoughConductor(_) | Self::Plastic(_) => false,
-            Self::Anisotropic(_) | Self::Perturbed(_) => true,
-            Self::Principled(b) => b.anisotropic != 0.0,
-            Self::PrincipledThin(b) => b.anisotropic != 0.0,
-            Self::Measured(b) => b.is_oriented(),
-            Self::Textured(b) if b.texture(Property::Anisotropic).is_some() => true,
-            _ => self.inner().any(Self::is_oriented),
-        }
-    }
-
-    /// The first property whose texture changes the value in ways that have no derivative.
-    pub(crate) fn undifferentiated_texture(&self) -> Option<Property> {
-        match self {
-            Self::Textured(b) => {
-                let mut properties = b.textures.iter().map(|(p, _)| *p);
-                properties.find(|p| self.undifferentiated(*p).is_some())
-            }
-            _ => self.inner().find_map(Self::undifferentiated_texture),
         }
     }
 
@@ -473,12 +401,6 @@ impl Bsdf {
             _ => [None; 2],
         };
         a.into_iter().chain(b)
-    }
-
-    /// True where the value may depend on the place of its point.
-    #[inline]
-    pub(crate) fn varies(&self) -> bool {
-        matches!(self, Self::Textured(_) | Self::Blend(_) | Self::TwoSided(_))
     }
 
     /// The gradient of a value by the place of its point, as far as textures change there; `params` are the value's
@@ -498,18 +420,6 @@ impl Bsdf {
             }
             (Self::Blend(b), Some(_)) => b.slide(at, [wo, wi, n], factor),
             _ => RgbVec::ZERO,
-        }
-    }
-
-    /// True where textures jump on a mesh, or frames that follow texture coordinates.
-    pub(crate) fn is_discontinuous_on(&self, mesh: &Mesh) -> bool {
-        match self {
-            Self::Textured(b) if b.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh)) => true,
-            Self::Anisotropic(_)
-            | Self::Principled(_)
-            | Self::PrincipledThin(_)
-            | Self::Measured(_) => self.is_oriented() && frames_jump_on(mesh),
-            _ => self.inner().any(|b| b.is_discontinuous_on(mesh)),
         }
     }
 
@@ -587,60 +497,6 @@ impl Bsdf {
             Self::RoughDielectric(b) => b.facet([wo, wi, n]),
             Self::Textured(b) => b.at(at).facet(None, wo, wi, n),
             _ => None,
-        }
-    }
-
-    /// True for the border of a medium that light crosses unchanged.
-    #[inline]
-    #[must_use]
-    pub fn is_null(&self) -> bool {
-        matches!(self, Self::Null)
-    }
-
-    /// True when light is scattered through the surface, to the other side; not for [`Bsdf::Null`],
-    /// which scatters nothing.
-    #[inline]
-    #[must_use]
-    pub fn is_transmissive(&self) -> bool {
-        match self {
-            Self::RoughDielectric(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
-            Self::Null
-            | Self::Diffuse(_)
-            | Self::Phong(_)
-            | Self::RoughConductor(_)
-            | Self::Plastic(_)
-            | Self::Conductor(_) => false,
-            _ => self.is_any_transmissive(),
-        }
-    }
-
-    /// Of BSDFs that are no plain models.
-    #[cold]
-    fn is_any_transmissive(&self) -> bool {
-        match self {
-            Self::PrincipledThin(_) => true,
-            Self::Principled(b) => b.is_transmissive(),
-            Self::Anisotropic(b) => b.base.is_transmissive(),
-            // A texture may stand for how much goes through.
-            Self::Textured(b) => {
-                b.bsdf.is_transmissive() || b.texture(Property::SpecTrans).is_some()
-            }
-            _ => self.inner().any(Self::is_transmissive),
-        }
-    }
-
-    /// True when nothing is scattered where both directions are on the back of the surface.
-    pub(crate) fn is_black_from_behind(&self) -> bool {
-        match self {
-            Self::Diffuse(_)
-            | Self::Phong(_)
-            | Self::RoughConductor(_)
-            | Self::Plastic(_)
-            | Self::Conductor(_)
-            | Self::Measured(_) => true,
-            Self::Textured(b) => b.bsdf.is_black_from_behind(),
-            Self::Blend(b) => b.bsdfs.iter().all(Self::is_black_from_behind),
-            _ => false,
         }
     }
 
