@@ -4,7 +4,7 @@
 mod common;
 
 use common::{direction, inside_triangle};
-use drt_geom::procedural::{TorusKnot, cube, icosphere, torus_knot};
+use drt_geom::procedural::{TorusKnot, cube, icosphere, torus_knot, uv_sphere};
 use drt_geom::{Hit, Mesh, Ray, Skip, Topology, TriangleBvh, ray_plane};
 use drt_math::{Affine, Mat3, Rng, Vec3, vec3};
 
@@ -152,6 +152,34 @@ fn grazing_rays_too() {
                 assert_eq!(bvh.closest(&Ray::new(start.point, d), skip), None, "{lift}");
             }
         }
+    }
+}
+
+/// Points that a ray finds within rounding of an edge, not on it: a camera on the axis of a sphere whose meridians lie on
+/// the borders of its pixels makes such. They are nearer to the edge than rounding may put them behind their own triangle.
+#[test]
+fn points_right_beside_an_edge_are_left_freely() {
+    let mut rng = Rng::new(7, 0, 0);
+    for (scale, offset) in PLACES {
+        let m = placed(&uv_sphere(32), scale, offset);
+        let bvh = TriangleBvh::of(&m).unwrap();
+        let center = vec3(1.0, -0.7, 0.3) * offset;
+        let mut found = 0;
+        for _ in 0..2000 {
+            let across = rng.next_f64() * 1.8 - 0.9;
+            let target = if rng.next_f64() < 0.5 { [across, 0.0] } else { [0.0, across] };
+            let [eye, aim] = [[0.0, 0.0, 4.0], [target[0], target[1], 0.3]]
+                .map(|[x, y, z]| center + vec3(x, y, z) * scale);
+            let Some(hit) = bvh.closest(&Ray::new(eye, aim - eye), Skip::NOTHING) else { continue };
+            let (x, n) = (hit.point(m.triangle(hit.prim)), m.normal(hit.prim));
+            let out = direction(&mut rng);
+            if out.dot(n) > 1e-2 {
+                found += 1;
+                let met = bvh.closest(&Ray::new(x, out), Skip::one(hit.prim));
+                assert_eq!(met, None, "scale {scale} offset {offset}");
+            }
+        }
+        assert!(found > 500, "{found}");
     }
 }
 

@@ -4,9 +4,11 @@
 //! triangle by at most a few units of rounding of their coordinates. A ray from there meets its own
 //! triangle at some t of either sign, and next to an edge or a vertex also the neighbours. Its own
 //! triangles are excluded by number ([`Skip`](super::Skip)). Any other is passed over when the
-//! ray's end itself lies *on* it to within that rounding error: inside the triangle's box widened
-//! by the error, and off its plane by no more than the error bound of that distance. Nothing here
-//! depends on the size of the scene or on the direction of the ray, and triangles that the end does
+//! ray's end itself lies *on* it to within that rounding error: off its plane by no more than the error
+//! bound of that distance, and inside the triangle's box or right beside it. A point that rounding put an ε
+//! behind its own triangle meets a neighbour from behind if the edge between them is nearer than ε over the sine
+//! of the angle at which the ray leaves, so that *beside* is a wider margin than rounding, in all directions alike. Nothing here
+//! depends on the size of the scene or on the direction of the ray, and triangles whose plane the end does
 //! not touch are never dropped, however close the hit.
 
 use super::watertight::Corners;
@@ -23,6 +25,9 @@ pub(super) const fn gamma(n: f64) -> f64 {
 /// Barycentric interpolation with the third weight computed as `1 - b1 - b2` needs gamma(7), a point
 /// on an edge by `lerp` gamma(5).
 const ON_SURFACE: f64 = gamma(16.0);
+
+/// The margin around a triangle's box, relative to its largest coordinate, in which ends in its plane lie beside it.
+const BESIDE: f64 = 64.0 * ON_SURFACE;
 
 /// An end of a ray, with the rounding error of its coordinates beyond that of a point interpolated
 /// on a triangle.
@@ -60,17 +65,17 @@ impl End {
     /// end from which the ray moves off the plane counts too.
     #[inline]
     pub(super) fn lies_on(&self, triangle: &Corners, leaving: [f64; 3]) -> bool {
-        let mut slack = [0.0; 3];
-        for k in 0..3 {
-            let [a, b, c] = [triangle[0][k], triangle[1][k], triangle[2][k]];
-            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-            slack[k] = ON_SURFACE * low.abs().max(high.abs()) + self.error[k];
-            // Written so that a NaN counts as outside.
-            if !(self.point[k] >= low - slack[k] && self.point[k] <= high + slack[k]) {
-                return false;
-            }
+        let side = |k: usize| triangle.map(|v| v[k]);
+        let low = [0, 1, 2].map(|k| side(k).into_iter().fold(f64::INFINITY, f64::min));
+        let high = [0, 1, 2].map(|k| side(k).into_iter().fold(f64::NEG_INFINITY, f64::max));
+        let largest = [0, 1, 2].map(|k| low[k].abs().max(high[k].abs()));
+        let margin = (0..3).fold(0.0, |m: f64, k| m.max(BESIDE * largest[k] + self.error[k]));
+        // Written so that a NaN counts as outside.
+        let near = |k: usize| self.point[k] >= low[k] - margin && self.point[k] <= high[k] + margin;
+        (0..3).all(near) && {
+            let slack = [0, 1, 2].map(|k| ON_SURFACE * largest[k] + self.error[k]);
+            self.touches_plane(triangle, slack, leaving)
         }
-        self.touches_plane(triangle, slack, leaving)
     }
 
     #[cold]

@@ -104,6 +104,16 @@ impl Blend {
         Self { weight: q * q * (3.0 - 2.0 * q), gradient: dir * (6.0 * q * (1.0 - q) * rise) }
     }
 
+    /// The weight of a point x that a ray of the camera finds, by its place in the pixel: it falls to 0 at the borders of the
+    /// filter's support, where what is seen must keep its image point if the filter jumps.
+    pub(crate) fn of_window(world: &World, x: Vec3, ray: CameraRay) -> Self {
+        let camera = world.camera.at_lens(ray.lens);
+        let view = camera.view(x);
+        let (weight, slope) = camera.window(ray.pixel, view.pixel);
+        let (gradient, _) = camera.view_gradient(&view, slope, 0.0);
+        Self { weight, gradient }
+    }
+
     /// The product of two weights.
     pub(crate) fn and(self, other: Self) -> Self {
         let gradient = self.gradient * other.weight + other.gradient * self.weight;
@@ -234,11 +244,7 @@ impl Blends {
         if blend.weight == 0.0 {
             return blend;
         }
-        let camera = world.camera.at_lens(ray.lens);
-        let view = camera.view(vertex.x);
-        let (weight, slope) = camera.window(ray.pixel, view.pixel);
-        let (gradient, _) = camera.view_gradient(&view, slope, 0.0);
-        blend.and(Blend { weight, gradient })
+        blend.and(Blend::of_window(world, vertex.x, ray))
     }
 }
 

@@ -50,14 +50,17 @@ impl EdgeTurns {
         Self { spatial, edges, blended, curvatures }
     }
 
-    /// φ of a vertex on a curved surface; `None` on others.
+    /// φ of a vertex on a curved surface; `None` on others. `of_camera` is the ray that the path starts with, where it is this
+    /// ray that found the vertex.
     ///
+    /// Where a pixel's filter jumps, what the camera sees at the border must keep its image point, so that φ falls to 0 there.
     /// A viewer in a medium, on another surface, or whose ray turned does not move with this matter, however near it is, and the
     /// segment between them turns by the difference over its length r. So near it φ falls with the square of r; farther away φ is
     /// 1, as the difference grows where a ray grazes, and must not meet a slope of φ there.
     fn of_matter(
         &self,
-        viewer: Option<&Vertex>,
+        world: &World,
+        of_camera: Option<CameraRay>,
         end: &Vertex,
         dir: Vec3,
         distance: f64,
@@ -66,10 +69,11 @@ impl EdgeTurns {
         if curvature == 0.0 {
             return None;
         }
-        if viewer.is_none() {
-            return Some(Blend::MATERIAL);
-        }
-        Some(Blend::of_distance(dir, distance, curvature / NEAR))
+        Some(match of_camera {
+            Some(ray) if world.camera.has_borders() => Blend::of_window(world, end.x, ray),
+            Some(_) => Blend::MATERIAL,
+            None => Blend::of_distance(dir, distance, curvature / NEAR),
+        })
     }
 }
 
@@ -87,8 +91,9 @@ impl VelocityField for EdgeTurns {
     ) -> VertexVelocity {
         let mut velocity = self.spatial.vertex(world, found, probe, auxiliary);
         let Found { viewer, arrival, .. } = *found;
+        let of_camera = viewer.is_none().then_some(found.camera_ray);
         if let Endpoint::Surface(v) = &arrival.end
-            && let Some(blend) = self.of_matter(viewer, v, arrival.dir, arrival.distance)
+            && let Some(blend) = self.of_matter(world, of_camera, v, arrival.dir, arrival.distance)
         {
             velocity.blend = blend;
         }
@@ -142,7 +147,7 @@ impl VelocityField for EdgeTurns {
         dir: Vec3,
         distance: f64,
     ) -> Blend {
-        self.of_matter(Some(viewer), end, dir, distance)
+        self.of_matter(world, None, end, dir, distance)
             .unwrap_or_else(|| self.spatial.blend(world, viewer, end, dir, distance))
     }
 }
