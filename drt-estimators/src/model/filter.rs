@@ -53,6 +53,10 @@ pub enum FilterKind {
     },
 }
 
+/// How far beside a jump of a filter an image point still counts as lying on it, in pixels: far more than rounding, far less
+/// than anything that an image shows.
+pub(crate) const ON_BORDER: f64 = 1e-8;
+
 impl FilterKind {
     /// Mitsuba's `box`: every point counts towards the pixel it lies in.
     pub const BOX: Self = Self::Box { radius: 0.5 };
@@ -223,10 +227,11 @@ impl Filter {
         self.radius
     }
 
-    /// The pixels of a row of `n` whose supports hold the coordinate `at`.
+    /// The pixels of a row of `n` whose supports hold the coordinate `at`, or have it on their border.
     pub(crate) fn reached(&self, at: f64, n: u32) -> Range<u32> {
         // Centres i + 1/2 not farther than the radius. Casts saturate, and are no calls as rounding is on many machines.
-        let [first, last] = [at - self.radius - 0.5, at + self.radius - 0.5];
+        let radius = self.radius + if self.is_continuous() { 0.0 } else { ON_BORDER };
+        let [first, last] = [at - radius - 0.5, at + radius - 0.5];
         let start = first as u32;
         let start = start.saturating_add(u32::from(f64::from(start) < first));
         let end = if last >= 0.0 { (last as u32).saturating_add(1) } else { 0 };
@@ -240,7 +245,18 @@ impl Filter {
         !matches!(self.kind, FilterKind::Box { .. })
     }
 
-    /// P at an offset from the pixel's centre, per square pixel.
+    /// True when the borders of all pixels are those of their neighbours.
+    pub(crate) fn tiles(&self) -> bool {
+        self.kind == FilterKind::BOX
+    }
+
+    /// Whether an image coordinate is that of a border between two pixels of a filter that [tiles](Self::tiles).
+    pub(crate) fn is_border(at: f64) -> bool {
+        let beside = at - fm::floor(at);
+        f64::min(beside, 1.0 - beside) < ON_BORDER
+    }
+
+    /// P at an offset from the pixel's centre, per square pixel. Where it jumps, the mean of both sides.
     #[inline]
     #[must_use]
     pub fn eval(&self, dx: f64, dy: f64) -> f64 {
@@ -278,14 +294,17 @@ impl Filter {
         (x * y, [dx * y, x * dy])
     }
 
-    /// The factor p of one axis, per pixel.
+    /// The factor p of one axis, per pixel; at a jump, the mean of both sides.
     #[inline]
     #[must_use]
     pub fn axis(&self, x: f64) -> f64 {
         self.axis_with_slope(x).0
     }
 
-    /// The factor p of one axis, and its derivative; at a kink, the mean of both sides.
+    /// The factor p of one axis, and its derivative; at a kink or a jump, the mean of both sides.
+    ///
+    /// An edge that lies along a border, as in symmetric scenes, then counts half for either pixel, which is what central
+    /// differences tend to.
     #[inline]
     pub(crate) fn axis_with_slope(&self, x: f64) -> (f64, f64) {
         match self.kind.signed(x) {
@@ -301,7 +320,11 @@ impl Filter {
     /// The same, of an offset where the unnormalised profile is known.
     #[inline]
     fn with_slope(&self, x: f64, shape: f64) -> (f64, f64) {
-        // Half open, so that box filters of neighbouring pixels tile the plane.
+        if let FilterKind::Box { radius } = self.kind {
+            let beyond = Real::abs(x) - radius;
+            let share = if Real::abs(beyond) < ON_BORDER { 0.5 } else { 1.0 };
+            return (if beyond < ON_BORDER { share * self.scale } else { 0.0 }, 0.0);
+        }
         let inside = -self.radius <= x && x < self.radius;
         if !inside {
             return (0.0, 0.0);

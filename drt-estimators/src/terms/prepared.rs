@@ -166,6 +166,9 @@ impl Prepared {
         if warped.spatial.is_none() && active.moves_geometry() && world.camera.has_borders() {
             sources.push(BoundarySource::Borders);
         }
+        if warped.on_borders.is_some() {
+            sources.push(BoundarySource::PrimaryEdges);
+        }
         let boundary_ratio = boundary_ratio(settings, sources.len());
         let emission = emission(&world, active, settings, &mut sources);
         Ok(Self {
@@ -213,7 +216,8 @@ impl Prepared {
 
     /// `all` is the world lit by all emitters.
     pub(crate) fn splatter<'a>(&'a self, all: &'a World, seed: u64) -> Splatter<'a> {
-        let radiative = self.radiative.as_ref();
+        let on_borders = self.warped.as_ref().and_then(|warped| warped.on_borders.as_ref());
+        let radiative = self.radiative.as_ref().or(on_borders);
         let (grazing, emission) = (self.grazing.as_ref(), self.emission.as_ref());
         let (world, boundary) = (&self.world, &self.boundary);
         let along = self.along_rays();

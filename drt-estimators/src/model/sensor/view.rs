@@ -5,9 +5,9 @@
 //! for an irradiance meter, whose one pixel has P = 1. An [orthographic](super::orthographic) camera
 //! sees one direction, and h stands for the delta in it.
 
-use drt_math::{Affine, Frame, Vec3, warp};
+use drt_math::{Affine, Frame, Real, Vec3, warp};
 
-use crate::model::filter::{Filter, FilterKind};
+use crate::model::filter::{Filter, FilterKind, ON_BORDER};
 use crate::model::sensor::{
     CameraRay, Lens, Projection, Sensor, SensorError, SensorGradient, orthographic, unit,
 };
@@ -216,6 +216,18 @@ impl Sensor {
     pub(crate) fn window(&self, pixel: [u32; 2], point: [f64; 2]) -> (f64, [f64; 2]) {
         let center = pixel.map(|p| f64::from(p) + 0.5);
         self.filter.window([point[0] - center[0], point[1] - center[1]])
+    }
+
+    /// True when the straight line between two points is seen along a border between pixels, by a filter that jumps there.
+    pub(crate) fn sees_on_border(&self, ends: [Vec3; 2]) -> bool {
+        if !(self.has_borders() && self.filter.tiles() && self.aperture.is_none()) {
+            return false;
+        }
+        let [a, b] = ends.map(|x| self.view(x));
+        let along = |k: usize| {
+            Filter::is_border(a.pixel[k]) && Real::abs(a.pixel[k] - b.pixel[k]) < ON_BORDER
+        };
+        a.depth > 0.0 && b.depth > 0.0 && (along(0) || along(1))
     }
 
     /// True when the filter jumps at the borders of pixels.

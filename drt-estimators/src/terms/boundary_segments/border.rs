@@ -9,10 +9,15 @@
 //!
 //! n outward in the image and q_dot the image velocity of the material point seen. One sample serves
 //! both pixels of a shared border, so that sums over pixels stay exact.
+//!
+//! In symmetric scenes edges lie along borders, and radiance differs on both sides of these. As parameters grow one side moves
+//! through the border, as they fall the other one does. Samples are taken on either side of the border as often, so that the
+//! estimate is the mean of both derivatives, as that of central differences is.
 
 use drt_math::{Rgb, Vec3};
 
 use crate::derivative::sensitivity::VelocityTerm;
+use crate::model::filter::ON_BORDER;
 use crate::model::sensor::CameraRay;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
@@ -34,9 +39,12 @@ pub(crate) fn sample<R: BoundarySink>(
     // A side of a pixel's support, and a point on it.
     let pixel = [0, 1].map(|k| index(tracer.rng.next_f64(), film[k]));
     let axis = usize::from(tracer.rng.next_f64() < 0.5);
-    let outward = if tracer.rng.next_f64() < 0.5 { 1.0 } else { -1.0 };
+    // Each side of the pixel, and on either side of its border.
+    let quarter = 4.0 * tracer.rng.next_f64();
+    let outward = if quarter < 2.0 { 1.0 } else { -1.0 };
+    let beside = if (quarter as u32).is_multiple_of(2) { ON_BORDER } else { -ON_BORDER };
     let mut q = pixel.map(|p| f64::from(p) + 0.5);
-    q[axis] += outward * radius;
+    q[axis] += outward * radius + beside;
     q[1 - axis] += radius * (2.0 * tracer.rng.next_f64() - 1.0);
     let mut neighbour = None;
     if radius == 0.5 {

@@ -195,6 +195,32 @@ impl Radiative {
         Ok(Self { spatial, discontinuities, camera, moving, all, resting, count })
     }
 
+    /// Some edges as the camera alone sees them; `None` where it sees none.
+    pub(crate) fn in_view(
+        world: &World,
+        discontinuities: DiscontinuityEdges,
+        spatial: Arc<Spatial>,
+        counts: impl Fn(&DiscontinuityEdge) -> bool,
+    ) -> Result<Option<Self>, Error> {
+        let size = |j: &DiscontinuityEdge| match counts(j) {
+            true => discontinuities.seen_from(j, &world.camera),
+            false => 0.0,
+        };
+        let camera = PrimaryEdges::new(discontinuities.list.iter().map(size))?;
+        let count =
+            [camera.as_ref().map_or(0, |c| c.discontinuities.len() as u64), discontinuities.all];
+        let [moving, all, resting] = [None, None, None];
+        Ok(camera.is_some().then_some(Self {
+            spatial,
+            discontinuities,
+            camera,
+            moving,
+            all,
+            resting,
+            count,
+        }))
+    }
+
     /// True when the camera can see something change.
     pub(crate) fn has_primary_edges(&self) -> bool {
         self.camera.is_some()

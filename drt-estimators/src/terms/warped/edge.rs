@@ -20,6 +20,8 @@ pub(super) struct TurningEdge {
     /// Where surfaces intersect the ends move with that of both. Few edges have it.
     of_both: Option<Box<[[EdgeMatter; 2]; 2]>>,
     pub(super) moves: bool,
+    /// The camera sees it along borders of pixels, at which its rays must not turn.
+    pub(super) on_border: bool,
     /// Between faces of a curved surface, on which vertices move with their matter.
     pub(super) facets: bool,
     /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
@@ -43,9 +45,10 @@ impl TurningEdge {
         let discontinuous = edge.crease.map(|part| part > 0.0);
         let crease = edges.normals(edge).map(|normals| (normals, discontinuous));
         let (ends, half) = (edge.edge.wedge.ends, 0.5 * edge.length());
+        let on_border = world.camera.sees_on_border(ends);
         // Of a fold as sharp as a corner, or between materials, a part is 1.
         let facets = curved && edge.crease.iter().all(|part| *part < 1.0);
-        Self { ends, half, points, of_both, moves, facets, crease }
+        Self { ends, half, points, of_both, moves, on_border, facets, crease }
     }
 
     /// How one of its ends moves.

@@ -57,7 +57,11 @@
 //! # The camera
 //!
 //! Its rays keep their image points (2019 paper) but where they turn with an edge. Where a filter jumps, the borders
-//! of its support are edges at rest in the image.
+//! of its support are edges at rest in the image, and what is seen there keeps its image point: the material velocity of
+//! curved surfaces falls to zero towards borders.
+//!
+//! An edge that lies along a border, as in symmetric scenes, would ask for two velocities of one ray. No ray of the camera
+//! turns with it, and where it moves it is [sampled](crate::terms::radiative) as an edge that the camera sees.
 //!
 //! # Points and directions
 //!
@@ -70,7 +74,7 @@
 //!
 //! # What is left to boundary samples
 //!
-//! Light of points and directions in scenes with media or null interfaces, where lines of shadow become sheets in the volume. A
+//! Edges along borders of pixels, as the camera sees them. Light of points and directions in scenes with media or null interfaces, where lines of shadow become sheets in the volume. A
 //! [`Session`](crate::Session) leaves it to the path-space estimator, where something moves, and says so in its plan.
 
 mod auxiliary;
@@ -90,6 +94,7 @@ use crate::derivative::velocity::{Spatial, VelocityField};
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::model::error::{Error, SettingError};
 use crate::model::settings::{Settings, Warp};
+use crate::terms::radiative::Radiative;
 use crate::terms::warped::auxiliary::directions::AuxiliaryDirections;
 use crate::terms::warped::auxiliary::points::AuxiliaryPoints;
 use crate::terms::warped::edges::TurningEdges;
@@ -104,6 +109,8 @@ pub(crate) struct Warped {
     pub(crate) spatial: Option<Arc<Spatial>>,
     /// Edges that move vertices, and edges in all.
     pub(crate) count: [u64; 2],
+    /// Edges along borders of pixels, at which no ray of the camera turns.
+    pub(crate) on_borders: Option<Radiative>,
 }
 
 impl Warped {
@@ -132,7 +139,12 @@ impl Warped {
         match settings.warp {
             Warp::Edges => {
                 let field = EdgeTurns::new(world, active, Arc::clone(&spatial), edges);
-                Ok(Self { field: Arc::new(field), spatial: Some(spatial), count })
+                let on_border = |edge: &DiscontinuityEdge| {
+                    (active.sensor || edge.moves(&active.shapes))
+                        && world.camera.sees_on_border(edge.edge.wedge.ends)
+                };
+                let on_borders = Radiative::in_view(world, found, Arc::clone(&spatial), on_border)?;
+                Ok(Self { field: Arc::new(field), spatial: Some(spatial), count, on_borders })
             }
             Warp::Points(_) | Warp::Directions(_) if !surfaces_only => {
                 refused(SettingError::SurfacesOnly)
@@ -148,11 +160,11 @@ impl Warped {
             }
             Warp::Points(samples) => {
                 let field = AuxiliaryPoints::new(world, active, edges, samples);
-                Ok(Self { field: Arc::new(field), spatial: None, count })
+                Ok(Self { field: Arc::new(field), spatial: None, count, on_borders: None })
             }
             Warp::Directions(samples) => {
                 let field = AuxiliaryDirections::new(world, Arc::clone(&spatial), edges, samples);
-                Ok(Self { field: Arc::new(field), spatial: Some(spatial), count })
+                Ok(Self { field: Arc::new(field), spatial: Some(spatial), count, on_borders: None })
             }
         }
     }

@@ -37,12 +37,14 @@ pub(super) struct Near {
     depth: f64,
     /// Creases do not count.
     silhouettes_only: bool,
+    /// The viewer is the camera.
+    of_camera: bool,
 }
 
 impl Near {
     /// Of a ray.
     pub(super) fn of_ray(ray: &TurningRay<'_>, angle: f64) -> Self {
-        let TurningRay { viewer, dir, distance, end, .. } = *ray;
+        let TurningRay { viewer, dir, distance, end, of_camera, .. } = *ray;
         let along = |n: Vec3| if n.dot(dir) < 0.0 { -n } else { n };
         let normal = end.map_or(Vec3::ZERO, |s| along(s.ng));
         let sine = fm::sin(angle);
@@ -58,6 +60,7 @@ impl Near {
             // Nothing is behind the sky.
             depth: if end.is_some() { normal.dot(dir) * distance } else { 0.0 },
             silhouettes_only: false,
+            of_camera: of_camera.is_some(),
         }
     }
 
@@ -89,6 +92,7 @@ impl Near {
             normal,
             depth: normal.dot(x - from),
             silhouettes_only: true,
+            of_camera: false,
         }
     }
 
@@ -99,6 +103,9 @@ impl Near {
 
     /// An edge beside the ray and its weight; `None` where it has none.
     pub(super) fn weight(&self, edge: &TurningEdge) -> Option<(Beside, Weight)> {
+        if self.of_camera && edge.on_border {
+            return None;
+        }
         let (from, w) = (self.from, self.dir);
         let [a, b] = edge.ends;
         let ends = [a - from, b - from];
