@@ -35,7 +35,7 @@ pub use io::{TetFileError, TetFileErrorKind, load_tet_mesh, read_medit, read_tet
 pub use mesh::{Mesh, MeshAttribute, MeshError};
 pub use query::{
     BvhBuilder, BvhError, ClosestPoint, Hit, InstancePlacement, InstancedBvh, Ray, Skip,
-    TriangleBvh, nearest_point,
+    TriangleBvh, coincide, nearest_point,
 };
 pub use tet::{
     ConformityError, SurfacePlace, TetLocator, TetMesh, TetMeshError, TetPoint, TetVertexOrigin,

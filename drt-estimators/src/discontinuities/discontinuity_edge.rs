@@ -200,13 +200,14 @@ impl DiscontinuityEdge {
         world.point_near(prim, x + across * (BESIDE * self.length()))
     }
 
-    /// The medium around the edge at `x` on the viewer's side, `w` pointing to the viewer.
+    /// The medium around the edge at `x` on the viewer's side, `w` pointing to the viewer, where a ray along `dir` starts.
     pub(crate) fn medium(
         &self,
         world: &World,
         sides: &EdgeSides,
         x: Vec3,
         w: Vec3,
+        dir: Vec3,
     ) -> Option<usize> {
         // Most bound none: what it takes to tell by a face is seldom in a cache.
         let faces = sides.faces.iter().flatten().filter(|_| self.bounds);
@@ -217,6 +218,6 @@ impl DiscontinuityEdge {
                 return world.medium_on_side(&point, point.ng.dot(w) > 0.0, None);
             }
         }
-        self.around.at(world, x)
+        self.around.toward(world, x, dir)
     }
 }

@@ -174,7 +174,12 @@ impl Edge {
         };
     }
 
-    /// The medium in which segments graze the edge at `x`.
+    /// The medium in which segments graze the edge.
+    pub(crate) fn surrounding(&self) -> SurroundingMedium {
+        self.medium
+    }
+
+    /// The medium in which segments graze the edge at `x`, which lies on no interface.
     pub(crate) fn medium(&self, world: &World, x: Vec3) -> Option<usize> {
         self.medium.at(world, x)
     }

@@ -55,7 +55,11 @@ impl Geometry {
         let (mut soup, mut prims) = (Vec::new(), Vec::new());
         let mut first_prim = alloc::vec![0; scene.shapes.len()];
         let own = |(i, _): &(usize, &Shape)| scene.placement(*i).is_none();
-        for (i, shape) in scene.shapes.iter().enumerate().filter(own) {
+        // Of surfaces that coincide, the one with lower numbers is met first: a lamp in a ceiling's plane is seen.
+        let mut shapes: Vec<(usize, &Shape)> =
+            scene.shapes.iter().enumerate().filter(own).collect();
+        shapes.sort_by_key(|(_, shape)| shape.emitter.is_none());
+        for (i, shape) in shapes {
             first_prim[i] = prims.len() as u32;
             for t in 0..shape.mesh.triangles.len() as u32 {
                 soup.push(shape.mesh.triangle(t));

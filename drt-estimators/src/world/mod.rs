@@ -165,6 +165,14 @@ impl SurroundingMedium {
             Self::Varies => world.medium_at(x),
         }
     }
+
+    /// At a point that may lie on an interface, where a ray starts along the unit direction `dir`.
+    pub(crate) fn toward(self, world: &World, x: Vec3, dir: Vec3) -> Option<usize> {
+        match self {
+            Self::Uniform(medium) => medium,
+            Self::Varies => world.medium_along(x, dir),
+        }
+    }
 }
 
 /// A scene prepared for light transport.
@@ -361,7 +369,7 @@ impl World {
         let eye = self.camera.position();
         self.camera_medium = match camera {
             Surrounding::Stated(m) => {
-                if self.first_boundary(eye).is_none() {
+                if self.first_boundary(eye, askew()).is_none() {
                     self.ambient = m;
                 }
                 m
@@ -562,10 +570,8 @@ impl World {
         }
     }
 
-    /// The side of the first surface around `x` that bounds media, in a fixed direction.
-    fn first_boundary(&self, x: Vec3) -> Option<(SurfacePoint, bool)> {
-        // Any direction serves; an irrational one avoids edges and axis-aligned faces.
-        let dir = drt_math::vec3(0.577_215_66, 0.414_213_56, 0.703_818_4).normalize();
+    /// The side of the first surface that bounds media from `x` on along `dir`.
+    fn first_boundary(&self, x: Vec3, dir: Vec3) -> Option<(SurfacePoint, bool)> {
         let ray = Ray { origin: x, dir, t_max: f64::INFINITY };
         let bounds = |prim: u32| {
             let shape = self.geometry.prim(prim).shape as usize;
@@ -580,10 +586,16 @@ impl World {
     /// The medium around a point off all surfaces: that on the near side of the first interface
     /// met on the way to infinity.
     pub(crate) fn medium_at(&self, x: Vec3) -> Option<usize> {
+        self.medium_along(x, askew())
+    }
+
+    /// The medium in which a ray from `x` along the unit direction `dir` starts. The point may lie on an interface, but on no
+    /// other surface that bounds media.
+    fn medium_along(&self, x: Vec3, dir: Vec3) -> Option<usize> {
         if !self.has_media() {
             return None;
         }
-        match self.first_boundary(x) {
+        match self.first_boundary(x, dir) {
             Some((point, front)) => self.medium_on_side(&point, front, None),
             None => self.ambient,
         }
@@ -600,7 +612,7 @@ impl World {
     }
 
     /// The medium of all points of a box that are off shapes, if no interface comes near it.
-    fn medium_near(&self, bounds: &Aabb) -> SurroundingMedium {
+    pub(crate) fn medium_near(&self, bounds: &Aabb) -> SurroundingMedium {
         if !self.has_media() {
             return SurroundingMedium::Uniform(None);
         }
@@ -681,6 +693,11 @@ impl World {
             _ => self.lights.area_radiance(emitter),
         }
     }
+}
+
+/// A unit direction that avoids edges and faces along axes, to look for interfaces in where any direction serves.
+fn askew() -> Vec3 {
+    drt_math::vec3(0.577_215_66, 0.414_213_56, 0.703_818_4).normalize()
 }
 
 /// The diagonal of the box around the surfaces that hold a medium; `all` where none do.

@@ -1,12 +1,16 @@
 //! Rays through a prepared scene: followed to the first surface that scatters, or up to a point.
 
-use drt_geom::{Hit, Ray, Skip};
+use drt_geom::{Hit, Ray, Skip, coincide};
 use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::TrackingStats;
 
 use crate::model::rendering::Counters;
+use crate::world::geometry::Prim;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{Crossing, RayPath, World, intervals};
+
+/// How near hits are that may be on surfaces that coincide, relative to their distance.
+const NEARLY: f64 = 1e-6;
 
 impl World {
     fn skip_of(v: &Vertex) -> Skip {
@@ -87,7 +91,10 @@ impl World {
                 !(self.is_null(shape) || passed)
             };
             let end = self.geometry.bvh.closest_through(&ray, skip, blocks, &mut path.hits);
-            self.cross(path, dir, medium);
+            if let Some(end) = &end {
+                self.leave_beyond(&ray, end, &mut path.hits);
+            }
+            self.cross(path, &ray, medium);
             end
         } else {
             self.geometry.bvh.closest(&ray, skip)
@@ -98,11 +105,63 @@ impl World {
         }
     }
 
+    /// Takes away the hits on interfaces that coincide with the surface on which a ray ends: they lie beyond it, from whichever
+    /// side the ray comes, as they do for rays that start on that surface. So fog that stands on a floor begins at the floor.
+    fn leave_beyond(&self, ray: &Ray, end: &Hit, hits: &mut Vec<Hit>) {
+        while let Some(last) = hits.last()
+            && end.t - last.t <= NEARLY * end.t
+            && self.coincide(ray, end, last)
+        {
+            hits.pop();
+        }
+    }
+
+    /// Whether two triangles coincide where a ray meets them.
+    #[cold]
+    fn coincide(&self, ray: &Ray, a: &Hit, b: &Hit) -> bool {
+        coincide(ray, a, self.corners(a.prim), self.corners(b.prim))
+    }
+
+    /// The corners of a triangle in the world.
+    fn corners(&self, prim: u32) -> [Vec3; 3] {
+        let Prim { shape, triangle } = self.geometry.prim(prim);
+        let corners = self.scene.shapes[shape as usize].mesh.triangle(triangle);
+        match self.scene.placement(shape as usize) {
+            Some(to_world) => corners.map(|x| to_world.point(x)),
+            None => corners,
+        }
+    }
+
+    /// Brings hits on interfaces that coincide into the order in which media follow each other: one that ends the medium
+    /// a ray is in comes before one that begins another.
+    #[cold]
+    fn order_coincident(&self, hits: &mut [Hit], ray: &Ray, mut medium: Option<usize>) {
+        for i in 0..hits.len() {
+            let near = |hit: &&Hit| hit.t - hits[i].t <= NEARLY * hit.t;
+            let same = hits[i + 1..].iter().take_while(near);
+            let same = same.take_while(|hit| self.coincide(ray, &hits[i], hit)).count();
+            let sides = |hit: &Hit| {
+                let (point, _) = self.point(hit.prim, hit.bary);
+                let out = point.ng.dot(ray.dir) > 0.0;
+                let on = |front: bool| self.medium_on_side(&point, front, medium);
+                (out, on(!out), on(out))
+            };
+            // The nearest that begins in the medium, else one that is left.
+            let next = (i..=i + same).find(|k| sides(&hits[*k]).1 == medium);
+            let next = next.or_else(|| (i..=i + same).find(|k| sides(&hits[*k]).0)).unwrap_or(i);
+            medium = sides(&hits[next]).2;
+            hits[i..=next].rotate_right(1);
+        }
+    }
+
     /// Crosses the interfaces that a path's hits are on.
-    fn cross(&self, path: &mut RayPath, dir: Vec3, mut medium: Option<usize>) {
+    fn cross(&self, path: &mut RayPath, ray: &Ray, mut medium: Option<usize>) {
+        if path.hits.windows(2).any(|h| h[1].t - h[0].t <= NEARLY * h[1].t) {
+            self.order_coincident(&mut path.hits, ray, medium);
+        }
         for hit in &path.hits {
             let (point, x) = self.point(hit.prim, hit.bary);
-            medium = self.medium_on_side(&point, point.ng.dot(dir) > 0.0, medium);
+            medium = self.medium_on_side(&point, point.ng.dot(ray.dir) > 0.0, medium);
             path.crossings.push(Crossing { point, x, t: hit.t, after: medium });
         }
     }
@@ -179,7 +238,7 @@ impl World {
             return Rgb::ZERO;
         }
         let met = path.crossings.len();
-        self.cross(path, dir, medium);
+        self.cross(path, &ray, medium);
         let through = |s: &SurfacePoint| {
             let at = self.texture_point(s);
             self.bsdf_of(s.shape).straight(Some(&at), s.ns.dot(dir).abs())
@@ -225,7 +284,7 @@ impl World {
         if self.geometry.bvh.crossings(&ray, skip, blocks, &mut path.hits) {
             return false;
         }
-        self.cross(path, dir, medium);
+        self.cross(path, &ray, medium);
         true
     }
 

@@ -78,6 +78,15 @@ impl End {
         }
     }
 
+    /// Whether the end lies in the plane of the triangle, as far as rounding lets one tell.
+    #[cold]
+    pub(super) fn lies_in_plane(&self, triangle: &Corners) -> bool {
+        let largest = |k: usize| triangle.iter().fold(0.0, |m: f64, v| m.max(v[k].abs()));
+        let slack = [0, 1, 2].map(|k| ON_SURFACE * largest(k) + self.error[k]);
+        // A vector of no length leaves no plane.
+        self.touches_plane(triangle, slack, [0.0; 3])
+    }
+
     #[cold]
     fn touches_plane(&self, triangle: &Corners, slack: [f64; 3], leaving: [f64; 3]) -> bool {
         let [v0, v1, v2] = triangle;

@@ -7,6 +7,7 @@ use self::block::{Block, Twin, chain};
 use self::ends::End;
 use self::frame::{BoxFrame, BoxRay};
 use self::lanes::{Lanes, Machine, Task};
+use self::order::First;
 use self::watertight::{Corners, Crossing, ShearedRay};
 use self::wide::{Visitor, WideTree};
 use crate::Aabb;
@@ -21,6 +22,7 @@ mod frame;
 mod instanced;
 mod lanes;
 mod nearest;
+mod order;
 #[cfg(feature = "obvhs")]
 mod ploc;
 mod ray;
@@ -34,6 +36,7 @@ pub(crate) use boxes::BoxTree;
 pub use build::BvhError;
 pub use instanced::{InstancePlacement, InstancedBvh};
 pub use nearest::{ClosestPoint, nearest_point};
+pub use order::coincide;
 pub use ray::{Hit, Ray, Skip};
 pub(crate) use registers::{Registers, Work};
 
@@ -49,7 +52,8 @@ pub(crate) use registers::{Registers, Work};
 /// being near.
 ///
 /// Triangles of zero area have no normal and are never hit. Of hits at equal `t` the one on the
-/// triangle with the lower number comes first, so that results do not depend on the tree.
+/// triangle with the lower number comes first, so that results do not depend on the tree. As the first hit, of
+/// those on triangles that [coincide] there within rounding, too.
 #[derive(Clone, Debug)]
 pub struct TriangleBvh {
     tree: Option<WideTree>,
@@ -92,15 +96,15 @@ impl TriangleBvh {
 
     #[inline(always)]
     fn closest_of(&self, probe: &Probe) -> Option<Hit> {
-        let mut best: Option<(f64, u32, Crossing)> = None;
-        self.visit(probe, |prim, crossing| {
-            if best.is_none_or(|(t, p, _)| (crossing.t, prim) < (t, p)) {
-                best = Some((crossing.t, prim, *crossing));
+        let mut best: Option<First> = None;
+        self.visit(probe, |prim, crossing, corners| {
+            if best.as_ref().is_none_or(|b| b.is_after(&probe.ray, prim, crossing, corners)) {
+                best = Some(First::new(prim, crossing, corners));
                 return ControlFlow::Continue(probe.boxes.limit(crossing.t));
             }
             ControlFlow::Continue(f32::INFINITY)
         });
-        best.map(|(_, prim, crossing)| hit(prim, &crossing))
+        best.map(|b| b.hit)
     }
 
     /// Whether a triangle that `blocks` meets the ray. `blocks` is asked in no particular order and
@@ -125,7 +129,7 @@ impl TriangleBvh {
     #[inline(always)]
     fn any_of(&self, probe: &Probe, mut blocks: impl FnMut(u32) -> bool) -> bool {
         let mut blocked = false;
-        self.visit(probe, |prim, _| {
+        self.visit(probe, |prim, _, _| {
             blocked = blocks(prim);
             if blocked { ControlFlow::Break(()) } else { ControlFlow::Continue(f32::INFINITY) }
         });
@@ -146,7 +150,7 @@ impl TriangleBvh {
 
     #[inline(always)]
     fn all_of(&self, probe: &Probe, mut visit: impl FnMut(Hit)) {
-        self.visit(probe, |prim, crossing| {
+        self.visit(probe, |prim, crossing, _| {
             visit(hit(prim, crossing));
             ControlFlow::Continue(f32::INFINITY)
         });
@@ -164,7 +168,7 @@ impl TriangleBvh {
         out.clear();
         let Some(probe) = self.probe(ray, skip) else { return false };
         let mut blocked = false;
-        self.visit(&probe, |prim, crossing| {
+        self.visit(&probe, |prim, crossing, _| {
             blocked = blocks(prim);
             if blocked {
                 return ControlFlow::Break(());
@@ -190,20 +194,21 @@ impl TriangleBvh {
     ) -> Option<Hit> {
         out.clear();
         let probe = self.probe(ray, skip)?;
-        let mut best: Option<Hit> = None;
-        self.visit(&probe, |prim, crossing| {
-            let hit = hit(prim, crossing);
+        let mut best: Option<First> = None;
+        self.visit(&probe, |prim, crossing, corners| {
             let limit = if !blocks(prim) {
-                out.push(hit);
+                out.push(hit(prim, crossing));
                 f32::INFINITY
-            } else if best.is_none_or(|b| hit.is_before(&b)) {
-                best = Some(hit);
-                probe.boxes.limit(hit.t)
+            } else if best.as_ref().is_none_or(|b| b.is_after(&probe.ray, prim, crossing, corners))
+            {
+                best = Some(First::new(prim, crossing, corners));
+                probe.boxes.limit(crossing.t)
             } else {
                 f32::INFINITY
             };
             ControlFlow::Continue(limit)
         });
+        let best = best.map(|b| b.hit);
         if let Some(best) = &best {
             out.retain(|h| h.is_before(best));
         }
@@ -235,7 +240,11 @@ impl TriangleBvh {
     /// Calls `found` with every hit of the probe. Its answer is where the ray may be cut off, in the
     /// parameter of the probe's box ray.
     #[inline]
-    fn visit(&self, probe: &Probe, found: impl FnMut(u32, &Crossing) -> ControlFlow<(), f32>) {
+    fn visit(
+        &self,
+        probe: &Probe,
+        found: impl FnMut(u32, &Crossing, &Corners) -> ControlFlow<(), f32>,
+    ) {
         let Some(tree) = &self.tree else { return };
         let visitor = Hits { bvh: self, probe, far: probe.boxes.far, found };
         self.machine.run(Walk { tree, query: &probe.boxes, visitor });
@@ -266,7 +275,7 @@ struct Hits<'a, F> {
     found: F,
 }
 
-impl<F: FnMut(u32, &Crossing) -> ControlFlow<(), f32>> Visitor for Hits<'_, F> {
+impl<F: FnMut(u32, &Crossing, &Corners) -> ControlFlow<(), f32>> Visitor for Hits<'_, F> {
     #[inline(always)]
     fn announce<L: Lanes>(&self, lanes: L, index: usize) {
         lanes.prefetch(&self.bvh.blocks[index]);
@@ -287,11 +296,11 @@ impl<F: FnMut(u32, &Crossing) -> ControlFlow<(), f32>> Visitor for Hits<'_, F> {
     }
 }
 
-impl<F: FnMut(u32, &Crossing) -> ControlFlow<(), f32>> Hits<'_, F> {
+impl<F: FnMut(u32, &Crossing, &Corners) -> ControlFlow<(), f32>> Hits<'_, F> {
     #[inline(always)]
     fn test(&mut self, prim: u32, triangle: &Corners) -> ControlFlow<()> {
         if let Some(crossing) = self.probe.meet(prim, triangle) {
-            match (self.found)(prim, &crossing) {
+            match (self.found)(prim, &crossing, triangle) {
                 ControlFlow::Continue(limit) => self.far = self.far.min(limit),
                 ControlFlow::Break(()) => return ControlFlow::Break(()),
             }

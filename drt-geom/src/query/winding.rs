@@ -21,7 +21,7 @@ impl TriangleBvh {
     fn winding(&self, p: Vec3) -> i32 {
         let Some(probe) = self.probe(&Ray::new(p, DIRECTION), Skip::NOTHING) else { return 0 };
         let mut sum = 0;
-        self.visit(&probe, |_, crossing| {
+        self.visit(&probe, |_, crossing, _| {
             sum += if crossing.det < 0.0 { 1 } else { -1 };
             ControlFlow::Continue(f32::INFINITY)
         });

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_1_PI, PI};
 
+use drt_geom::Aabb;
 use drt_math::{Frame, Rgb, Rng, Vec3, warp};
 
 use crate::model::emitter::Emitter;
@@ -35,7 +36,7 @@ pub(crate) struct EmissionSampler {
     /// Media around shapes.
     around: Vec<SurroundingMedium>,
     /// Media around the emitters that are points.
-    at_points: Vec<Option<usize>>,
+    at_points: Vec<SurroundingMedium>,
     /// Of the sphere from which light of directions comes.
     center: Vec3,
     radius: f64,
@@ -75,7 +76,10 @@ impl EmittedRay {
 impl EmissionSampler {
     pub(crate) fn new(world: &World) -> Self {
         let scene = &world.scene;
-        let at_point = |emitter: &Emitter| emitter.position().and_then(|x| world.medium_at(x));
+        let at_point = |emitter: &Emitter| match emitter.position() {
+            Some(x) => world.medium_near(&Aabb::around([x])),
+            None => SurroundingMedium::Uniform(None),
+        };
         Self {
             around: (0..scene.shapes.len()).map(|s| world.medium_around(s)).collect(),
             at_points: scene.emitters.iter().map(|e| at_point(&e.item.emitter)).collect(),
@@ -101,7 +105,7 @@ impl EmissionSampler {
         if cosine <= 0.0 || per_area <= 0.0 {
             return None;
         }
-        let medium = self.around[s.shape as usize].at(world, x);
+        let medium = self.around[s.shape as usize].toward(world, x, dir);
         Some(EmittedRay {
             vertex: Vertex { x, medium, kind: Kind::Surface(s) },
             dir,
@@ -133,7 +137,8 @@ impl EmissionSampler {
             }
             _ => {
                 let flow = light.sample_flow(u)?;
-                (light.position()?, flow.flow, flow.pdf, self.at_points[emitter])
+                let x = light.position()?;
+                (x, flow.flow, flow.pdf, self.at_points[emitter].toward(world, x, flow.flow))
             }
         };
         Some(EmittedRay {

@@ -10,6 +10,7 @@ use crate::discontinuities::contact::{Contact, Quadrant};
 use crate::discontinuities::edge::EdgePoint;
 use crate::discontinuities::sheets::Sheets;
 use crate::model::sensor::Sensor;
+use crate::world::SurroundingMedium;
 
 impl<R: BoundarySink> Sampler<'_, '_, R> {
     /// The camera sees the floor next to the edge.
@@ -92,7 +93,11 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
     fn contact(&mut self, at: &EdgePoint<'_>, c: &Contact, w: Vec3) -> Option<(End, Start)> {
         let (vertex, outward) = c.beside(w)?;
         let prim = vertex.surface()?.prim;
-        let start = Start { x: vertex.x, faces: [prim, prim], medium: vertex.medium };
+        let start = Start {
+            x: vertex.x,
+            faces: [prim, prim],
+            medium: SurroundingMedium::Uniform(vertex.medium),
+        };
         let s = End { vertex: Some(vertex), distance: 0.0, weight: Rgb::ONE, flight: None };
         self.b.functional.items.clear();
         self.edge_rate(at, -outward);

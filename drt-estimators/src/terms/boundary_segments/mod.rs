@@ -48,7 +48,7 @@ use crate::sampling::record::RadianceBySegments;
 use crate::sampling::trace::{Flight, Tracer};
 use crate::world::lights::{LightKind, LightTable};
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
-use crate::world::{RayPath, World};
+use crate::world::{RayPath, SurroundingMedium, World};
 
 /// How a boundary segment is found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,7 +98,7 @@ struct Start {
     x: Vec3,
     /// The faces it lies on.
     faces: [u32; 2],
-    medium: Option<usize>,
+    medium: SurroundingMedium,
 }
 
 /// One end of a boundary segment.
@@ -199,19 +199,20 @@ impl Boundary {
 
 impl Start {
     /// On an edge that nothing touches.
-    fn on(world: &World, at: &EdgePoint<'_>) -> Self {
-        Self { x: at.x, faces: at.edge.wedge.faces, medium: at.edge.medium(world, at.x) }
+    fn on(at: &EdgePoint<'_>) -> Self {
+        Self { x: at.x, faces: at.edge.wedge.faces, medium: at.edge.surrounding() }
     }
 
     /// Follows a ray to the first surface that scatters.
     fn cast(&self, tracer: &mut Tracer<'_>, w: Vec3, ray: &mut RayPath) {
-        tracer.world.cast_past(self.x, self.faces, self.medium, w, ray, &mut tracer.counters);
+        let medium = self.medium.toward(tracer.world, self.x, w);
+        tracer.world.cast_past(self.x, self.faces, medium, w, ray, &mut tracer.counters);
     }
 }
 
 /// A camera's importance at a point per area across the segment, where the point is seen.
 fn seen(camera: &Sensor, start: &Start) -> Option<f64> {
-    let view = Vertex { x: start.x, medium: start.medium, kind: Kind::Point };
+    let view = Vertex { x: start.x, medium: None, kind: Kind::Point };
     Some(see(camera, &view)?.1)
 }
 
@@ -239,7 +240,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let distance = d.length();
         let w = d / distance;
         let n = at.edge.wedge.occluded_side(w)?;
-        let start = Start::on(world, &at);
+        let start = Start::on(&at);
         let transport = seen(camera, &start)?;
         // The camera's side must be open.
         let tau = self.open(&start, w, distance)?;
@@ -295,7 +296,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let LightKind::Area(emitting) = light.kind else { return None };
         let w = -light.w;
         let n = at.edge.wedge.occluded_side(w)?;
-        let start = Start::on(world, &at);
+        let start = Start::on(&at);
         let tau = self.open_to(&start, light.w, &emitting)?;
         let vertex = Vertex { x: light.y, medium: None, kind: Kind::Surface(emitting) };
         let mis = light.pdf / (light.pdf + at.edge.wedge.direction_pdf(w));
@@ -322,7 +323,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let light = LightTable::delta(world, emitter, at.x, pmf)?;
         let w = -light.w;
         let n = at.edge.wedge.occluded_side(w)?;
-        let start = Start::on(world, &at);
+        let start = Start::on(&at);
         let tau = self.open(&start, light.w, light.distance)?;
         let s = End {
             vertex: None,
@@ -364,7 +365,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let u = [self.tracer.rng.next_f64(), self.tracer.rng.next_f64()];
         let (w, inv_pdf) = at.edge.wedge.sample_direction(u);
         let n = at.edge.wedge.occluded_side(w)?;
-        let start = Start::on(world, &at);
+        let start = Start::on(&at);
         let s = self.end(&start, -w, Rgb::ONE).filter(|s| !self.is_dark(s))?;
         let scale = at.edge.wedge.sine(w) * at.inv_pdf * inv_pdf;
         let mut lit = false;
@@ -485,8 +486,8 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
     fn open(&mut self, start: &Start, w: Vec3, distance: f64) -> Option<Rgb> {
         let mut ray = core::mem::take(&mut self.b.ray);
         let Tracer { world, rng, counters, .. } = &mut *self.tracer;
-        let (x, faces) = (start.x, start.faces);
-        let open = world.connect_past(x, faces, start.medium, w, distance, &mut ray, counters);
+        let (x, faces, medium) = (start.x, start.faces, start.medium.toward(world, start.x, w));
+        let open = world.connect_past(x, faces, medium, w, distance, &mut ray, counters);
         let tau = open.then(|| world.transmittance(x, w, &ray, rng, counters));
         self.b.ray = ray;
         tau

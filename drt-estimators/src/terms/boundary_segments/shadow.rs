@@ -130,14 +130,12 @@ impl Shadows {
         tracer.counters.boundary_samples += 1;
         let x = eye + dir * m.t;
         let x_edge = edge.wedge.at(m.s);
-        let around = edge.medium(world, x_edge);
         // Light: from the edge back to the source, and on to the point.
-        let tau = self.open(tracer, edge, x_edge, around, -m.w, source, m.r_edge, b)?
+        let tau = self.open(tracer, edge, x_edge, -m.w, source, m.r_edge, b)?
             * self.open(
                 tracer,
                 edge,
                 x_edge,
-                around,
                 m.w,
                 &ShadowLight::Point(x, None),
                 (x - x_edge).length(),
@@ -208,13 +206,13 @@ impl Shadows {
         tracer: &mut Tracer<'_>,
         edge: &Edge,
         x: Vec3,
-        medium: Option<usize>,
         w: Vec3,
         to: &ShadowLight,
         distance: f64,
         b: &mut Buffers,
     ) -> Option<Rgb> {
         let world = tracer.world;
+        let medium = edge.surrounding().toward(world, x, w);
         world.cast_past(x, edge.wedge.faces, medium, w, &mut b.segment, &mut tracer.counters);
         let reached = match to {
             ShadowLight::Point(_, Some(s)) => {

@@ -56,7 +56,7 @@ impl<'a> EdgeView<'a> {
         let Radiative { discontinuities, spatial, .. } = radiative;
         let sides = discontinuities.sides(discontinuity, w)?;
         let own_faces = sides.own_faces()?;
-        let medium = discontinuity.medium(tracer.world, &sides, x, w);
+        let medium = discontinuity.medium(tracer.world, &sides, x, w, w);
         Some(Self {
             discontinuity,
             along,
@@ -140,7 +140,8 @@ impl<'a> EdgeView<'a> {
     fn beyond(&self, tracer: &mut Tracer<'_>) -> SideRadiance {
         let mut ray = tracer.ray.take().unwrap_or_default();
         let d = -self.w;
-        let (x, faces, medium) = (self.x, self.own_faces, self.medium);
+        let (x, faces) = (self.x, self.own_faces);
+        let medium = self.discontinuity.medium(tracer.world, &self.sides, x, self.w, d);
         tracer.world.cast_past(x, faces, medium, d, &mut ray, &mut tracer.counters);
         let end = tracer.travel(x, d, &ray, Rgb::ONE).end();
         tracer.ray = Some(ray);
