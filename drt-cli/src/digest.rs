@@ -155,6 +155,8 @@ impl From<&Counters> for WorkDone {
 struct Summary {
     mean: [f64; 3],
     stderr: [f64; 3],
+    /// The largest sample's share of the second moment: standard errors of heavy tails are too small.
+    largest_sample_share: f64,
     blocks: Blocks,
 }
 
@@ -172,6 +174,7 @@ impl Summary {
         Self {
             mean: layer.total.mean.to_array(),
             stderr: layer.total.stderr.to_array(),
+            largest_sample_share: layer.tail.share(),
             blocks: Blocks {
                 grid: [drt_estimators::BLOCKS; 2],
                 mean: all(|e| e.mean),
@@ -272,6 +275,7 @@ mod tests {
         let cube = &d["derivatives"]["cube-x"];
         assert_eq!(cube["blocks"]["mean"].as_array().unwrap().len(), 64);
         assert_eq!(cube["blocks"]["stderr"][2], serde_json::json!([201.0, 201.0, 201.0]));
+        assert_eq!(cube["largest_sample_share"], 0.25);
         assert_eq!(d["counters"]["paths"], 12);
         assert!(d["counters"]["rays"].is_u64() && d["counters"]["boundary_samples"].is_u64());
         assert!(d["plan"].is_object() && d.get("checks").is_none() && d.get("job").is_none());

@@ -24,7 +24,7 @@ pub use model::agreement::{Agreement, agreement};
 pub use model::error::{EffectError, ElementError, Error, SettingError};
 pub use model::plan::{MediumPlan, Plan};
 pub use model::rendering::{
-    BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Term,
+    BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Tail, Term,
 };
 pub use model::scene::{
     Instance, Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape,

@@ -44,6 +44,12 @@ impl Rgb {
     pub fn max_channel(self) -> f64 {
         f64::max(f64::max(self.r, self.g), self.b)
     }
+    /// Channel by channel the larger of two.
+    #[inline]
+    #[must_use]
+    pub fn max(self, o: Self) -> Self {
+        Self { r: f64::max(self.r, o.r), g: f64::max(self.g, o.g), b: f64::max(self.b, o.b) }
+    }
     /// Largest absolute channel.
     #[inline]
     #[must_use]

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use drt_estimators::{Estimate, Layer, Session, Settings, Unattended, agreement};
+use drt_estimators::{Estimate, Layer, Session, Settings, Tail, Unattended, agreement};
 use drt_math::Rgb;
 use drt_motion::{Effect, Parameter};
 
@@ -135,6 +135,7 @@ fn zero(like: &Layer) -> Layer {
         pixels: vec![nothing; like.pixels.len()],
         blocks: vec![nothing; like.blocks.len()],
         total: nothing,
+        tail: Tail::default(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use drt_estimators::{Layer, Rendering};
+use drt_estimators::{Layer, Rendering, Tail};
 
 use super::clock::Clock;
 use super::noise::largest_noise;
@@ -138,12 +138,28 @@ fn threads(asked: usize) -> usize {
     }
 }
 
+/// Says of which images standard errors may be too small, since few samples make up most of their second moment.
+fn warn_of_heavy_tails(rendering: &Rendering) {
+    let derivatives = rendering.derivatives.iter().map(|d| (d.name.as_str(), &d.total));
+    for (name, layer) in [("the image", &rendering.image)].into_iter().chain(derivatives) {
+        let share = layer.tail.share();
+        if share > Tail::HEAVY {
+            eprintln!(
+                "note: {name}: one sample makes {:.0} % of the second moment; its standard errors may be too small. \
+                 More samples, another estimator or sampling = \"bidirectional\" tell",
+                100.0 * share
+            );
+        }
+    }
+}
+
 pub(super) fn summarize(rendering: &Rendering, seconds: f64) {
     let [w, h] = rendering.image.size;
     let noise = 100.0 * largest_noise(rendering);
     let complete = if rendering.complete { "" } else { ", incomplete" };
     let spp = rendering.spp;
     eprintln!("{w}x{h}, {spp} spp, {seconds:.2} s, relative noise {noise:.2} %{complete}");
+    warn_of_heavy_tails(rendering);
     if rendering.non_finite > 0 {
         eprintln!("warning: {} contributions were not finite", rendering.non_finite);
         for example in &rendering.non_finite_examples {

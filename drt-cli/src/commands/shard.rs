@@ -1,6 +1,6 @@
 //! `--shard`: one part of the samples of a run, to be merged with the others.
 
-use drt_estimators::{Estimate, EstimatorKind, Layer, Plan, Rendering, Shard, ShardSums};
+use drt_estimators::{Estimate, EstimatorKind, Layer, Plan, Rendering, Shard, ShardSums, Tail};
 use drt_math::Rgb;
 
 use super::Outcome;
@@ -83,6 +83,7 @@ fn alone(job: &Job, sums: &ShardSums) -> Rendering {
         pixels: vec![unknown; size[0] as usize * size[1] as usize],
         blocks: vec![unknown; drt_estimators::BLOCKS * drt_estimators::BLOCKS],
         total: unknown,
+        tail: Tail::default(),
     };
     Rendering {
         image,

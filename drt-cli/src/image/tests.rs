@@ -1,4 +1,4 @@
-use drt_estimators::{Counters, Derivative, Estimate, Layer, Plan, Rendering, Term};
+use drt_estimators::{Counters, Derivative, Estimate, Layer, Plan, Rendering, Tail, Term};
 use drt_math::Rgb;
 
 use super::*;
@@ -15,6 +15,7 @@ fn layer([w, h]: [u32; 2], offset: f64) -> Layer {
         pixels: (0..w * h).map(estimate).collect(),
         blocks: (0..64).map(estimate).collect(),
         total: estimate(3),
+        tail: Tail { second_moment: Rgb::splat(8.0), largest: Rgb::splat(2.0) },
     }
 }
 

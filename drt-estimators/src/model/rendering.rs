@@ -43,6 +43,48 @@ pub struct Layer {
     pub blocks: Vec<Estimate>,
     /// Mean over all pixels.
     pub total: Estimate,
+    /// How much of the second moment of that mean single samples are.
+    pub tail: Tail,
+}
+
+/// How much of the second moment of a mean its largest sample is.
+///
+/// Standard errors are estimated from the samples themselves, and hold only where the second moment is finite and has settled. Where
+/// samples fall off like a power of their size, as 1 / distance does where surfaces slide along each other, the largest one remains a
+/// sizeable part of all, however many there are, and the true error may be larger than the estimated one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Tail {
+    /// The sum over samples of the square of what each adds to the mean over all pixels.
+    pub second_moment: Rgb,
+    /// The largest of these squares.
+    pub largest: Rgb,
+}
+
+impl Tail {
+    /// The share of the largest sample from which on an estimated standard error is not to be trusted.
+    pub const HEAVY: f64 = 0.1;
+
+    /// The largest sample's share of the second moment, from 0 to 1, in the channel where it is largest.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        let pairs = self.largest.to_array().into_iter().zip(self.second_moment.to_array());
+        pairs.fold(
+            0.0,
+            |share, (largest, all)| {
+                if all > 0.0 { f64::max(share, largest / all) } else { share }
+            },
+        )
+    }
+
+    /// That of the sum with an independent estimate.
+    #[must_use]
+    pub fn plus(&self, o: &Self) -> Self {
+        Self {
+            second_moment: self.second_moment + o.second_moment,
+            largest: self.largest.max(o.largest),
+        }
+    }
 }
 
 /// The parts a derivative image is the sum of.

@@ -9,7 +9,8 @@
 //!
 //! Rare events spoil such errors: what saw none of them claims to know its mean exactly. So every
 //! standard error of a block or of the whole contains one event more of the layer's typical size
-//! Σx² / Σ|x| ([`Events`]), which is lost among many and honest among few.
+//! Σx² / Σ|x| ([`Events`]), which is lost among many and honest among few. How much of Σx² the largest event is tells
+//! whether the second moment has settled at all ([`Tail`]).
 
 mod splats;
 mod splatting;
@@ -25,7 +26,7 @@ pub(crate) use crate::sampling::film::splats::Splats;
 pub(crate) use crate::sampling::film::splatting::{Raster, Splat, SplatDensity, SplatTile};
 pub(crate) use crate::sampling::film::strata::Stratum;
 
-use crate::model::rendering::{BLOCKS, Estimate, Layer};
+use crate::model::rendering::{BLOCKS, Estimate, Layer, Tail};
 use crate::sampling::film::splatting::SplattedImage;
 use crate::sampling::film::sums::RunSums;
 
@@ -79,22 +80,28 @@ impl BlockSums {
 struct Events {
     absolute: Rgb,
     squares: Rgb,
+    /// The largest square.
+    largest: Rgb,
 }
 
 impl Events {
-    const NONE: Self = Self { absolute: Rgb::ZERO, squares: Rgb::ZERO };
+    const NONE: Self = Self { absolute: Rgb::ZERO, squares: Rgb::ZERO, largest: Rgb::ZERO };
 
     fn push(&mut self, v: Rgb) {
         self.absolute += v.abs();
-        self.squares += v * v;
+        let square = v * v;
+        self.squares += square;
+        self.largest = self.largest.max(square);
     }
 
     fn add(&mut self, o: &Self) {
         self.absolute += o.absolute;
         self.squares += o.squares;
+        self.largest = self.largest.max(o.largest);
     }
 
-    /// Widens the errors of blocks and total by one event over the samples that each saw.
+    /// Widens the errors of blocks and total by one event over the samples that each saw, and notes how much of the second
+    /// moment of the total the largest event is.
     fn widen(&self, image: &mut Layer, blocks: &Blocks, per_pixel: f64) {
         let inverse = self.absolute.map(|a| if a > 0.0 { 1.0 / a } else { 0.0 });
         let size = self.squares * inverse;
@@ -104,6 +111,10 @@ impl Events {
             let one = size * (1.0 / (f64::from(pixels.max(1)) * per_pixel));
             e.stderr = (e.stderr * e.stderr + one * one).map(Real::sqrt);
         }
+        let of_mean = 1.0 / (f64::from(all.max(1)) * per_pixel);
+        let [second_moment, largest] =
+            [self.squares, self.largest].map(|square| square * (of_mean * of_mean));
+        image.tail = Tail { second_moment, largest };
     }
 }
 
@@ -445,6 +456,7 @@ impl SplatFilm {
             pixels: (0..n).map(estimate).collect(),
             blocks: (n..n + BLOCKS * BLOCKS).map(estimate).collect(),
             total: estimate(n + BLOCKS * BLOCKS),
+            tail: Tail::default(),
         };
         // A sample is one of all that were spread over the film.
         self.layers[l].events.widen(&mut image, blocks, f64::max(self.weight, 1.0));
@@ -497,6 +509,7 @@ impl Layer {
             size,
             blocks: (0..BLOCKS * BLOCKS).map(|k| estimate(k, blocks.count[k])).collect(),
             total: estimate(BLOCKS * BLOCKS, all),
+            tail: Tail::default(),
             pixels,
         }
     }
@@ -508,6 +521,7 @@ impl Layer {
             *a = a.plus(b);
         }
         self.total = self.total.plus(&other.total);
+        self.tail = self.tail.plus(&other.tail);
         self
     }
 }

@@ -116,6 +116,7 @@ fn weights(a: &Half, b: &Half) -> Vec<Rgb> {
 
 #[cfg(test)]
 mod tests {
+    use drt_estimators::Tail;
     use drt_math::Rng;
 
     use super::*;
@@ -146,6 +147,7 @@ mod tests {
             size: [16, 16],
             pixels: Vec::new(),
             total: blocks[0],
+            tail: Tail::default(),
             blocks,
         })
     }

@@ -33,10 +33,21 @@ impl Set {
     /// # Errors
     /// When that is no view.
     pub fn new(origin: Vec3, target: Vec3, fov: f64, depth: u32) -> Result<Self> {
-        let up = drt_math::vec3(0.02, 1.0, 0.05);
+        Self::upright([origin, target, drt_math::vec3(0.02, 1.0, 0.05)], fov, depth)
+    }
+
+    /// The same with the y axis exactly upwards: what is symmetrical is so in the image.
+    ///
+    /// # Errors
+    /// When that is no view.
+    pub fn facing(origin: Vec3, target: Vec3, fov: f64, depth: u32) -> Result<Self> {
+        Self::upright([origin, target, Vec3::Y], fov, depth)
+    }
+
+    fn upright(view: [Vec3; 3], fov: f64, depth: u32) -> Result<Self> {
         let filter = Filter::new(FilterKind::TENT)?;
         let lens = Lens::with_fov(fov);
-        let sensor = Sensor::look_at([origin, target, up], lens, [SIZE; 2], filter)?;
+        let sensor = Sensor::look_at(view, lens, [SIZE; 2], filter)?;
         let sensor = SceneSensor { sensor, medium: Surrounding::Counted, sample_count: None };
         let integrator =
             Integrator { max_depth: Some(depth), rr_depth: depth, ..Integrator::default() };

@@ -3,7 +3,7 @@
 use drt_estimators::emitter::{Emitter, EnvironmentMap, Slide};
 use drt_estimators::surface::{Bsdf, Diffuse, Property, Textured};
 use drt_estimators::texture::{AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap};
-use drt_geom::MeshAttribute;
+use drt_geom::{Mesh, MeshAttribute};
 use drt_math::{Mat3, Rgb, ValueChange, Vec3, vec3};
 use drt_motion::{Change, Effect, PropertyChange, Texels};
 
@@ -12,6 +12,9 @@ use super::materials::panel;
 use super::set::diffuse;
 use super::{Cell, Stage};
 use crate::Result;
+
+/// What the colours of corners are called.
+const COLOURS: &str = "vertex_colour";
 
 /// Changes texels.
 fn texel(target: &str, property: &str, texels: Texels) -> Effect {
@@ -71,15 +74,29 @@ pub fn mosaic() -> Result<Stage> {
     Ok(Stage::new("mosaic", panel(painted(Texture::Bitmap(image))?)?.scene, cells))
 }
 
+/// A mesh whose corners have colours by their places, the same for all that share one.
+pub(super) fn by_place(mesh: Mesh) -> Result<Mesh> {
+    let colour = |x: Vec3| {
+        [x.x + 0.3 * x.y, x.y - 0.5 * x.z, x.z + 0.2].map(|v| 0.5 + 0.35 * (3.0 * v).sin() as f32)
+    };
+    let corner = |v: u32| colour(mesh.positions[v as usize]);
+    let values = mesh.triangles.iter().map(|t| t.map(corner)).collect();
+    Ok(mesh.with_attributes(vec![MeshAttribute { name: String::from(COLOURS), values }])?)
+}
+
+/// A diffuse surface of the colours that its mesh's corners have.
+pub(super) fn coloured() -> Result<Bsdf> {
+    let name = String::from(COLOURS);
+    painted(Texture::Attribute(AttributeTexture { name, scale: 1.0, grey: false }))
+}
+
 /// Values that the corners of a mesh have.
 ///
 /// # Errors
 /// When the library rejects the scene.
 pub fn stained() -> Result<Stage> {
-    let name = String::from("vertex_colour");
-    let texture =
-        Texture::Attribute(AttributeTexture { name: name.clone(), scale: 1.0, grey: false });
-    let mut scene = panel(painted(texture)?)?.scene;
+    let name = String::from(COLOURS);
+    let mut scene = panel(coloured()?)?.scene;
     let mesh = &scene.shapes[0].mesh;
     let colour = |v: u32| {
         [[0.9, 0.1, 0.3], [0.2, 0.7, 0.4], [0.1, 0.3, 0.8], [0.6, 0.6, 0.1]][v as usize % 4]

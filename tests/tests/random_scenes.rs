@@ -1,0 +1,91 @@
+//! Derivatives by all estimators beside each other, on scenes put together at random and on bodies across the borders of pixels.
+//!
+//! All of them, `DRT_COUNT` random scenes from number `DRT_FIRST` on (500 from 0), `DRT_SECONDS` for each estimator and scene:
+//! `cargo test --release -p drt-tests --test random_scenes -- --ignored --nocapture`
+
+use drt_estimators::EstimatorKind::{PathSpace, Radiative, Warped};
+use drt_estimators::PathSampling::Bidirectional;
+use drt_tests::Result;
+use drt_tests::matrix::Stage;
+use drt_tests::matrix::estimators::{Effort, Method, Pair, Pairs, compare};
+use drt_tests::matrix::filters::{BODIES, Body, FILTERS, LIGHTS, Light, bordered};
+use drt_tests::matrix::random;
+
+fn number(variable: &str, default: f64) -> f64 {
+    std::env::var(variable).ok().and_then(|s| s.parse().ok()).unwrap_or(default)
+}
+
+fn effort(seconds: f64) -> Effort {
+    Effort { noise: 0.01, scale: 0.0, seconds: number("DRT_SECONDS", seconds), seed: 0 }
+}
+
+/// The comparisons of a stage, of each estimator that does not refuse it. Prints those that fail.
+fn compared(name: &str, stage: Result<Stage>, methods: &[Method], effort: Effort) -> Vec<Pair> {
+    let stage = stage.unwrap();
+    let mut pairs = Vec::new();
+    for method in methods {
+        match compare(&stage, &[*method], effort) {
+            Ok(found) => pairs.extend(found),
+            Err(refusal) => println!("{name}: {:?} refuses: {refusal}", method.0),
+        }
+    }
+    let failing: Vec<Pair> = pairs.iter().filter(|pair| !pair.passes()).cloned().collect();
+    if !failing.is_empty() {
+        println!("{name}{}", Pairs(&failing));
+    }
+    pairs
+}
+
+fn assert_all_pass(pairs: &[Pair]) {
+    let failing = pairs.iter().filter(|pair| !pair.passes()).count();
+    assert!(!pairs.is_empty());
+    assert_eq!(failing, 0, "{failing} of {} derivatives fail", pairs.len());
+}
+
+fn at_borders(filters: &[usize], bodies: &[Body], lights: &[Light], effort: Effort) {
+    let methods = [Radiative.into(), Warped.into()];
+    let mut pairs = Vec::new();
+    for filter in filters {
+        for body in bodies {
+            for light in lights {
+                let name = format!("{:?}, {body:?}, {light:?}", FILTERS[*filter]);
+                let stage = bordered(FILTERS[*filter], *body, *light);
+                pairs.extend(compared(&name, stage, &methods, effort));
+            }
+        }
+    }
+    assert_all_pass(&pairs);
+}
+
+#[test]
+fn what_is_seen_at_the_borders_of_box_filters() {
+    at_borders(&[0], &[Body::Flat, Body::Smooth], &[Light::Point], effort(0.8));
+}
+
+#[test]
+#[ignore = "minutes"]
+fn every_filter_body_and_light() {
+    at_borders(&[0, 1, 2, 3, 4], &BODIES, &LIGHTS, effort(4.0));
+}
+
+fn at_random(numbers: std::ops::Range<u32>, effort: Effort) {
+    let methods = [Radiative.into(), Warped.into(), Method(PathSpace, Bidirectional)];
+    let mut pairs = Vec::new();
+    for number in numbers {
+        let name = format!("scene {number}");
+        pairs.extend(compared(&name, random::scene(number), &methods, effort));
+    }
+    assert_all_pass(&pairs);
+}
+
+#[test]
+fn four_random_scenes() {
+    at_random(0..4, effort(0.3));
+}
+
+#[test]
+#[ignore = "an hour"]
+fn five_hundred_random_scenes() {
+    let first = number("DRT_FIRST", 0.0) as u32;
+    at_random(first..first + number("DRT_COUNT", 500.0) as u32, effort(1.0));
+}
