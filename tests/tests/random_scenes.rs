@@ -19,6 +19,29 @@ fn effort(seconds: f64) -> Effort {
     Effort { noise: 0.01, scale: 0.0, seconds: number("DRT_SECONDS", seconds), seed: 0 }
 }
 
+/// What is in a scene, in a line.
+fn contents(stage: &Stage) -> String {
+    let scene = &stage.scene;
+    let shapes = scene.shapes.iter().map(|s| {
+        let id = s.id.as_deref().unwrap_or_default();
+        let smooth = if s.mesh.normals.is_some() { " smooth" } else { "" };
+        let bsdf = format!("{:?}", scene.bsdfs[s.bsdf].item);
+        let bsdf = bsdf.split(['(', ' ']).next().unwrap_or_default();
+        let b = s.mesh.bounds();
+        let [low, high] = [b.min, b.max].map(|v| v.to_array().map(|c| (c * 100.0).round() / 100.0));
+        format!("{id} ({}{smooth} {bsdf} {low:?} to {high:?})", s.mesh.triangles.len())
+    });
+    let lights = scene.emitters.iter().map(|e| format!("{:?}", e.item.emitter));
+    let all: Vec<String> = shapes.chain(lights).collect();
+    let sensor = &scene.sensors[0].item.sensor;
+    format!(
+        "{:?}, depth {:?}: {}",
+        sensor.filter().kind(),
+        scene.integrator.max_depth,
+        all.join(", ")
+    )
+}
+
 /// The comparisons of a stage, of each estimator that does not refuse it. Prints those that fail.
 fn compared(name: &str, stage: Result<Stage>, methods: &[Method], effort: Effort) -> Vec<Pair> {
     let stage = stage.unwrap();
@@ -29,17 +52,22 @@ fn compared(name: &str, stage: Result<Stage>, methods: &[Method], effort: Effort
             Err(refusal) => println!("{name}: {:?} refuses: {refusal}", method.0),
         }
     }
-    let failing: Vec<Pair> = pairs.iter().filter(|pair| !pair.passes()).cloned().collect();
+    let failing: Vec<Pair> = pairs.iter().filter(|pair| !agrees(pair)).cloned().collect();
     if !failing.is_empty() {
-        println!("{name}{}", Pairs(&failing));
+        println!("{name}: {}{}", contents(&stage), Pairs(&failing));
     }
     pairs
 }
 
-fn assert_all_pass(pairs: &[Pair]) {
-    let failing = pairs.iter().filter(|pair| !pair.passes()).count();
+/// Planted faults are for scenes that were chosen to show them.
+fn agrees(pair: &Pair) -> bool {
+    pair.agreement.agrees && pair.scale.z() <= 4.0 && pair.non_finite == 0
+}
+
+fn assert_all_agree(pairs: &[Pair]) {
+    let failing = pairs.iter().filter(|pair| !agrees(pair)).count();
     assert!(!pairs.is_empty());
-    assert_eq!(failing, 0, "{failing} of {} derivatives fail", pairs.len());
+    assert_eq!(failing, 0, "{failing} of {} derivatives disagree", pairs.len());
 }
 
 fn at_borders(filters: &[usize], bodies: &[Body], lights: &[Light], effort: Effort) {
@@ -54,7 +82,7 @@ fn at_borders(filters: &[usize], bodies: &[Body], lights: &[Light], effort: Effo
             }
         }
     }
-    assert_all_pass(&pairs);
+    assert_all_agree(&pairs);
 }
 
 #[test]
@@ -75,7 +103,7 @@ fn at_random(numbers: std::ops::Range<u32>, effort: Effort) {
         let name = format!("scene {number}");
         pairs.extend(compared(&name, random::scene(number), &methods, effort));
     }
-    assert_all_pass(&pairs);
+    assert_all_agree(&pairs);
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Edges that rest on another surface: the foot of a block on a floor, and lines along which surfaces intersect.
+//! Edges that rest on another surface: the foot of a block on a floor, the border of a sheet that lies in another's plane, and
+//! lines along which surfaces intersect.
 //!
 //! A segment past such an edge has one end on the floor, right at the edge, and neither which end nor
 //! whether it is in shadow there can be found by rays. But what the edge does is simple: it bounds the
@@ -23,7 +24,7 @@ use drt_math::{Real, Vec3, fm};
 use crate::discontinuities::edge::{Edge, EdgePoint};
 use crate::discontinuities::sheets::Sheets;
 use crate::world::World;
-use crate::world::vertex::{Kind, Vertex};
+use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 
 /// How far an edge may be from the surface it rests on, in its own lengths: what coordinates in
 /// files written with single precision are off by.
@@ -86,6 +87,32 @@ pub(crate) struct Contact {
     floor: [Option<Vertex>; 2],
 }
 
+/// The surface right at a point of an edge that a ray along the unit vector `down` finds.
+fn floor_along(world: &World, at: &EdgePoint<'_>, down: Vec3) -> Option<(SurfacePoint, Vec3)> {
+    let wedge = &at.edge.wedge;
+    let gap = GAP * wedge.length;
+    let ray = Ray { origin: at.x - down * gap, dir: down, t_max: 2.0 * gap };
+    let hit = world.nearest_on(&ray, Skip::two(wedge.faces[0], wedge.faces[1]))?;
+    let (below, x) = world.point(hit.prim, hit.bary);
+    let flat = Real::abs(below.ng.dot(wedge.tangent)) <= FLAT;
+    (flat && !world.is_null(below.shape)).then_some((below, x))
+}
+
+/// The surface in whose plane the only face of an open edge lies, to within rounding, and which it hides: a lamp in a
+/// ceiling's plane.
+fn plane_of_sheet(world: &World, at: &EdgePoint<'_>) -> Option<(SurfacePoint, Vec3)> {
+    let wedge = &at.edge.wedge;
+    let across = wedge.across[0];
+    if wedge.across[1].dot(across) < 1.0 - FLAT {
+        return None;
+    }
+    let (below, x) = floor_along(world, at, across.cross(wedge.tangent).normalize())?;
+    let rounding = 64.0 * f64::EPSILON * (at.x.length() + wedge.length);
+    let coincides = (x - at.x).length() <= rounding && Real::abs(below.ng.dot(across)) <= FLAT;
+    // Of surfaces that coincide the one with the lower number is met.
+    (coincides && wedge.faces[0] < below.prim).then_some((below, x))
+}
+
 impl Contact {
     /// One of the faces around a line along which surfaces intersect, as a floor up to where the next stands on it.
     pub(crate) fn of_intersection(world: &World, at: &EdgePoint<'_>, floor: &Quadrant) -> Self {
@@ -106,14 +133,17 @@ impl Contact {
         }
         let inward = e.wedge.inward()?;
         let gap = GAP * e.wedge.length;
-        let ray = Ray { origin: at.x + inward * gap, dir: -inward, t_max: 2.0 * gap };
         let skip = Skip::two(e.wedge.faces[0], e.wedge.faces[1]);
-        let hit = world.nearest_on(&ray, skip)?;
-        let (below, x) = world.point(hit.prim, hit.bary);
-        if world.is_null(below.shape) || Real::abs(below.ng.dot(e.wedge.tangent)) > FLAT {
-            return None;
-        }
-        let up = if below.ng.dot(inward) > 0.0 { below.ng } else { -below.ng };
+        let (below, x, up) = match floor_along(world, at, -inward) {
+            Some((below, x)) => {
+                let up = if below.ng.dot(inward) > 0.0 { below.ng } else { -below.ng };
+                (below, x, up)
+            }
+            None => {
+                let (below, x) = plane_of_sheet(world, at)?;
+                (below, x, below.ng)
+            }
+        };
         let side = e.wedge.tangent.cross(up).normalize();
         let angles = e.wedge.across.map(|h| {
             let (sine, cosine) = (h.dot(up), h.dot(side));

@@ -115,11 +115,14 @@ impl Draft {
             } else {
                 self.shape(name, mesh, bsdf);
             }
-            let along = self.direction();
+            // What stands on the floor slides on it: as it parts from the floor its image has a kink.
+            let free = if rest == 1 { vec3(1.0, 0.0, 1.0) } else { Vec3::splat(1.0) };
+            let within = |v: Vec3| vec3(v.x * free.x, v.y * free.y, v.z * free.z);
+            let along = within(self.direction());
             self.cell("moves", translate(name, along * 0.7));
-            let about = self.direction();
+            let about = if rest == 1 { Vec3::Y } else { self.direction() };
             self.cell("turns", turn(name, about, place));
-            self.cell("grows", grow(name, vec3(0.5, 0.8, 0.3), place));
+            self.cell("grows", grow(name, within(vec3(0.5, 0.8, 0.3)), place));
         }
         Ok(())
     }
@@ -143,7 +146,8 @@ impl Draft {
         self.set =
             self.set.clone().medium("fog", fog, phase).interface("border", border, "fog", None);
         self.cell("extinction", add("fog", "sigma_t", [0.5, 0.2, 0.4]));
-        self.cell("border moves", translate("border", vec3(0.4, 0.1, -0.3)));
+        let rise = if lift == 0.0 { 0.0 } else { 0.1 };
+        self.cell("border moves", translate("border", vec3(0.4, rise, -0.3)));
         Ok(())
     }
 
