@@ -26,6 +26,14 @@ pub enum Cause {
         /// Velocities given.
         found: usize,
     },
+    /// Normals are to turn of a mesh that has none.
+    #[error("the mesh has no vertex normals to turn")]
+    NoNormals,
+    /// Normals are to turn of a mesh whose vertices other changes move.
+    #[error(
+        "other changes move single vertices of the mesh, so that its normals follow from their positions"
+    )]
+    DeformedNormals,
     /// A [motion](crate::SurfaceMotion) of another mesh.
     #[error("expected {expected} vectors, one per mesh vertex, found {found}")]
     MotionLength {

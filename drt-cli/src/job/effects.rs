@@ -11,8 +11,7 @@ use super::refusal::Refusal;
 use super::velocities;
 
 /// Keys of which an effect has exactly one.
-const KINDS: &str =
-    "translate, rotate, scale, matrix, vertex_velocity, vertex, cage, follow or property";
+const KINDS: &str = "translate, rotate, scale, matrix, vertex_velocity, vertex_normals, vertex, cage, follow or property";
 
 /// What an effect does; files are relative to `folder`.
 pub(super) fn effect(
@@ -40,6 +39,10 @@ pub(super) fn effect(
     if let Some(file) = &keys.vertex_velocity {
         let velocities = velocities::read(&folder.join(file)).map_err(Refusal::File)?;
         changes.push(geometry(GeometryChange::VertexVelocity(velocities.into())));
+    }
+    if let Some(file) = &keys.vertex_normals {
+        let vectors = velocities::read(&folder.join(file)).map_err(Refusal::File)?;
+        changes.push(geometry(GeometryChange::VertexNormals(vectors.into())));
     }
     if let Some(v) = &keys.vertex {
         let direction = vec(v.direction);

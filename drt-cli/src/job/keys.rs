@@ -126,6 +126,7 @@ pub(super) struct Effect {
     pub(super) scale: Option<Scale>,
     pub(super) matrix: Option<[[f64; 4]; 3]>,
     pub(super) vertex_velocity: Option<PathBuf>,
+    pub(super) vertex_normals: Option<PathBuf>,
     pub(super) vertex: Option<Vertex>,
     pub(super) cage: Option<Cage>,
     pub(super) follow: Option<String>,

@@ -39,6 +39,10 @@ pub enum GeometryChange {
         /// Velocity of the vertex.
         direction: Vec3,
     },
+    /// Vertex normals turn and positions stay: to the normal of every vertex, in the order of the mesh's file and where the scene
+    /// file places the mesh, theta times a vector is added before it is made unit. It is done before all other changes of the mesh,
+    /// none of which may move single vertices.
+    VertexNormals(Arc<[Vec3]>),
     /// Every vertex x of the mesh, where the scene file places it, moves by theta times the sum of
     /// λ(x) v over moving vertices of a [cage](crate::mean_value::Cage): λ is the vertex's mean value coordinate
     /// and v its velocity.
@@ -73,7 +77,10 @@ impl GeometryChange {
                 ))
             }
             Self::Matrix(m) => Some(Affine::IDENTITY.plus(&m.times(theta))),
-            Self::VertexVelocity(_) | Self::Vertex { .. } | Self::Cage { .. } => None,
+            Self::VertexVelocity(_)
+            | Self::Vertex { .. }
+            | Self::VertexNormals(_)
+            | Self::Cage { .. } => None,
         }
     }
 
@@ -89,8 +96,17 @@ impl GeometryChange {
             Self::Rotate { axis, pivot } => Some(spin(Mat3::skew(unit_or_zero(axis)), pivot)),
             Self::Scale { factor, pivot } => Some(spin(Mat3::diagonal(factor), pivot)),
             Self::Matrix(m) => Some(m.after(&Affine::IDENTITY.plus(&m.times(theta)).inverse())),
-            Self::VertexVelocity(_) | Self::Vertex { .. } | Self::Cage { .. } => None,
+            Self::VertexVelocity(_)
+            | Self::Vertex { .. }
+            | Self::VertexNormals(_)
+            | Self::Cage { .. } => None,
         }
+    }
+
+    /// True when it moves single vertices.
+    #[must_use]
+    pub fn deforms(&self) -> bool {
+        matches!(self, Self::VertexVelocity(_) | Self::Vertex { .. } | Self::Cage { .. })
     }
 
     /// The kind of change, as job files spell it.
@@ -103,6 +119,7 @@ impl GeometryChange {
             Self::Matrix(_) => "matrix",
             Self::VertexVelocity(_) => "vertex_velocity",
             Self::Vertex { .. } => "vertex",
+            Self::VertexNormals(_) => "vertex_normals",
             Self::Cage { .. } => "cage",
         }
     }
@@ -129,6 +146,9 @@ impl GeometryChange {
             Self::Matrix(m) => finite(m.is_finite(), "the matrix")?,
             Self::VertexVelocity(v) => {
                 finite(v.iter().all(|v| v.is_finite()), "a vertex velocity")?;
+            }
+            Self::VertexNormals(v) => {
+                finite(v.iter().all(|v| v.is_finite()), "a change of a normal")?;
             }
             Self::Vertex { direction, .. } => finite(direction.is_finite(), "the direction")?,
             Self::Cage { vertices, .. } => {

@@ -15,6 +15,7 @@ mod element;
 mod gradient;
 mod moved;
 mod normals;
+mod turned;
 
 pub use element::SurfaceElement;
 pub use gradient::{AffineGradient, JetAdjoint, VertexGradient, in_file_order};

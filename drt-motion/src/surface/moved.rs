@@ -5,6 +5,7 @@ use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
 use super::caged::Caged;
+use super::turned::TurnedNormals;
 use super::{SmoothNormals, SurfaceMotion};
 use crate::error::Cause;
 use crate::error::MotionError;
@@ -55,6 +56,13 @@ pub fn move_mesh(
     let caged = Caged::new(mesh, changes)?;
     for c in changes {
         check(c, parameters)?;
+    }
+    let turned = TurnedNormals::new(mesh, changes, parameters)?;
+    if let Some(turned) = &turned {
+        moved.normals = Some(turned.normals());
+    }
+    let mut linear = Mat3::IDENTITY;
+    for c in changes {
         let fail = |cause| c.error(cause);
         if let Some(velocities) = vertex_velocities(mesh, &caged, c.change).map_err(fail)? {
             deformed = true;
@@ -69,6 +77,7 @@ pub fn move_mesh(
             // Normals are made unit anew, which would not leave them the same bits.
             if step.map != Affine::IDENTITY {
                 moved = moved.transform(&step.map);
+                linear = step.map.linear * linear;
             }
             for field in &mut fields {
                 field.carry(&step);
@@ -81,7 +90,18 @@ pub fn move_mesh(
     if let Some(smooth) = &smooth {
         moved.normals = Some(smooth.normals(&moved));
     }
-    let motions = fields.into_iter().map(|f| f.into_motion(&moved, smooth.as_ref())).collect();
+    let motion = |(parameter, field): (usize, Field)| {
+        let motion = field.into_motion(&moved, smooth.as_ref());
+        match turned.as_ref().and_then(|turned| turned.rates(parameter, &linear)) {
+            None => motion,
+            Some(rates) => {
+                let positions = vec![Vec3::ZERO; moved.positions.len()].into();
+                let turning = SurfaceMotion::Vertices { positions, normals: Some(rates.into()) };
+                motion.plus(&turning, &moved)
+            }
+        }
+    };
+    let motions = fields.into_iter().enumerate().map(motion).collect();
     Ok(MovedMesh { mesh: moved, motions, smooth })
 }
 
@@ -228,6 +248,7 @@ fn vertex_velocities(
         GeometryChange::Translate(_)
         | GeometryChange::Rotate { .. }
         | GeometryChange::Scale { .. }
-        | GeometryChange::Matrix(_) => Ok(None),
+        | GeometryChange::Matrix(_)
+        | GeometryChange::VertexNormals(_) => Ok(None),
     }
 }
