@@ -25,6 +25,8 @@ mod nearest;
 mod ploc;
 mod ray;
 mod registers;
+#[cfg(test)]
+mod tests;
 mod watertight;
 mod wide;
 mod winding;
