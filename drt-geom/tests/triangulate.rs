@@ -120,7 +120,7 @@ fn many_corners_are_cut_in_time() {
     let star = |corners: u32| -> Vec<_> {
         let corner = |i: u32| {
             let (s, c) = (TAU * f64::from(i) / f64::from(corners)).sin_cos();
-            let r = if i % 2 == 0 { 1.0 } else { 0.7 };
+            let r = if i.is_multiple_of(2) { 1.0 } else { 0.7 };
             [r * c, r * s]
         };
         flat(&(0..corners).map(corner).collect::<Vec<_>>())
