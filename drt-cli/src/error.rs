@@ -23,15 +23,6 @@ impl Place {
     pub fn file(path: &Path) -> Self {
         Self { file: path.into(), line: None, column: None }
     }
-
-    /// The place of a byte offset in the text of a file.
-    #[must_use]
-    pub fn of_offset(path: &Path, text: &str, offset: usize) -> Self {
-        let before = text.get(..offset).unwrap_or(text);
-        let line = before.matches('\n').count() + 1;
-        let column = before.rsplit('\n').next().unwrap_or(before).chars().count() + 1;
-        Self { file: path.into(), line: Some(line as u32), column: Some(column as u32) }
-    }
 }
 
 impl fmt::Display for Place {

@@ -8,6 +8,7 @@ pub mod error;
 mod fingerprint;
 mod image;
 mod job;
+mod lines;
 mod measured_file;
 mod npy;
 mod scene_xml;

@@ -104,15 +104,16 @@ impl HasPosition for Corner {
     }
 }
 
+/// A corner for spade: coordinates too small for its predicates are zero at the polygon's scale of one.
+fn place(q: [f64; 2]) -> Point2<f64> {
+    let [x, y] = q.map(|c| if c.abs() < 1e-100 { 0.0 } else { c });
+    Point2::new(x, y)
+}
+
 fn delaunay(p: &[[f64; 2]]) -> Result<Vec<[u32; 3]>, PolygonError> {
     let n = p.len();
-    // Coordinates too small for spade's predicates are zero at the polygon's scale of one.
-    let snap = |c: f64| if c.abs() < 1e-100 { 0.0 } else { c };
-    let corner = |(q, index): (&[f64; 2], u32)| Corner {
-        position: Point2::new(snap(q[0]), snap(q[1])),
-        index,
-    };
-    let corners: Vec<_> = p.iter().zip(0..).map(corner).collect();
+    let corners: Vec<_> =
+        p.iter().zip(0..).map(|(q, index)| Corner { position: place(*q), index }).collect();
     // Zero-length constraints make spade panic.
     let edges = (0..n)
         .map(|i| [i, (i + 1) % n])
@@ -126,15 +127,73 @@ fn delaunay(p: &[[f64; 2]]) -> Result<Vec<[u32; 3]>, PolygonError> {
     if crossing {
         return Err(PolygonError::Crossing);
     }
-    let inside = cdt.inner_faces().filter(|f| {
-        let c = f.center();
-        winds_around(p, [c.x, c.y])
-    });
+    let winds = windings(&cdt, p);
+    let inside = cdt.inner_faces().filter(|f| winds[f.index()] != 0);
     Ok(inside.map(|f| f.vertices().map(|v| v.data().index)).collect())
 }
 
-/// Whether the polygon winds around a point that is on none of its edges.
-fn winds_around(p: &[[f64; 2]], q: [f64; 2]) -> bool {
+type Faces = ConstrainedDelaunayTriangulation<Corner>;
+
+/// How often the polygon winds around each face, by the face's number.
+///
+/// From one face to the next that is the same, but where edges of the polygon lie between them. What cannot be reached
+/// from outside across edges of which it is known by how much it changes is found by itself.
+fn windings(faces: &Faces, p: &[[f64; 2]]) -> Vec<i32> {
+    let changes = changes(faces, p);
+    let mut winds = alloc::vec![None; faces.num_all_faces()];
+    winds[faces.outer_face().index()] = Some(0);
+    let mut open: Vec<_> = faces.convex_hull().map(|e| (e.fix(), 0)).collect();
+    let mut seeds = faces.inner_faces();
+    loop {
+        while let Some((edge, winding)) = open.pop() {
+            let edge = faces.directed_edge(edge);
+            let change = match &changes {
+                Some(changes) => changes[edge.fix().index()],
+                None if edge.is_constraint_edge() => continue,
+                None => 0,
+            };
+            let winding = winding - change;
+            if let Some(face) = edge.rev().face().as_inner()
+                && winds[face.index()].replace(winding).is_none()
+            {
+                open.extend(face.adjacent_edges().map(|e| (e.fix(), winding)));
+            }
+        }
+        let Some(seed) = seeds.find(|f| winds[f.index()].is_none()) else { break };
+        let c = seed.center();
+        let winding = winding_around(p, [c.x, c.y]);
+        winds[seed.index()] = Some(winding);
+        open.extend(seed.adjacent_edges().map(|e| (e.fix(), winding)));
+    }
+    winds.into_iter().map(Option::unwrap_or_default).collect()
+}
+
+/// By how much more the polygon winds around what lies to the left of each directed edge than around what lies to its right.
+/// `None` where an edge of the polygon runs through another corner.
+fn changes(faces: &Faces, p: &[[f64; 2]]) -> Option<Vec<i32>> {
+    // Corners in the same place are one vertex.
+    let key = |q: Point2<f64>| [q.x, q.y];
+    let by_place = |a: &[f64; 2], b: &[f64; 2]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
+    let mut vertices: Vec<_> = faces.vertices().map(|v| (key(v.position()), v.fix())).collect();
+    vertices.sort_unstable_by(|a, b| by_place(&a.0, &b.0));
+    let vertex = |q: Point2<f64>| {
+        let place = vertices.binary_search_by(|v| by_place(&v.0, &key(q))).ok()?;
+        Some(vertices[place].1)
+    };
+    let mut changes = alloc::vec![0; faces.num_directed_edges()];
+    for i in 0..p.len() {
+        let [from, to] = [vertex(place(p[i]))?, vertex(place(p[(i + 1) % p.len()]))?];
+        if from != to {
+            let edge = faces.get_edge_from_neighbors(from, to)?;
+            changes[edge.fix().index()] += 1;
+            changes[edge.rev().fix().index()] -= 1;
+        }
+    }
+    Some(changes)
+}
+
+/// How often the polygon winds around a point that is on none of its edges.
+fn winding_around(p: &[[f64; 2]], q: [f64; 2]) -> i32 {
     let mut winding = 0;
     for i in 0..p.len() {
         let (a, b) = (p[i], p[(i + 1) % p.len()]);
@@ -143,5 +202,5 @@ fn winds_around(p: &[[f64; 2]], q: [f64; 2]) -> bool {
             winding += if b[1] > a[1] { i32::from(side > 0.0) } else { -i32::from(side < 0.0) };
         }
     }
-    winding != 0
+    winding
 }

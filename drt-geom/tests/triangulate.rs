@@ -113,3 +113,35 @@ fn polygons_without_area_do_no_harm() {
         assert_eq!(triangulate(&corners).unwrap().len(), 3);
     }
 }
+
+/// Outlines of very many corners, one with pockets everywhere and one with holes, take about as long as sorting their corners.
+#[test]
+fn many_corners_are_cut_in_time() {
+    let star = |corners: u32| -> Vec<_> {
+        let corner = |i: u32| {
+            let (s, c) = (TAU * f64::from(i) / f64::from(corners)).sin_cos();
+            let r = if i.is_multiple_of(2) { 1.0 } else { 0.7 };
+            [r * c, r * s]
+        };
+        flat(&(0..corners).map(corner).collect::<Vec<_>>())
+    };
+    // A sheet with square holes in a row, each joined to the lower rim by a bridge.
+    let sheet = |holes: u32| -> Vec<_> {
+        let mut corners = Vec::new();
+        for i in 0..holes {
+            let x = f64::from(i);
+            corners.extend([[x, 0.0], [x, 1.0], [x, 2.0], [x + 0.5, 2.0], [x + 0.5, 1.0]]);
+            corners.extend([[x, 1.0], [x, 0.0]]);
+        }
+        let end = f64::from(holes);
+        corners.extend([[end, 0.0], [end, 3.0], [-1.0, 3.0], [-1.0, 0.0]]);
+        flat(&corners)
+    };
+    let start = std::time::Instant::now();
+    assert_eq!(triangulate(&star(100_000)).unwrap().len(), 100_000 - 2);
+    assert_eq!(triangulate(&sheet(10_000)).unwrap().len(), 70_000 + 4 - 2);
+    let seconds = start.elapsed().as_secs_f64();
+    assert!(seconds < 20.0, "{seconds}");
+    assert_covers(&sheet(4), &triangulate(&sheet(4)).unwrap());
+    assert_covers(&star(40), &triangulate(&star(40)).unwrap());
+}

@@ -4,8 +4,9 @@ use core::ops::ControlFlow;
 use alloc::vec::Vec;
 use drt_math::{Rgb, Vec3, vec3};
 
+use crate::lattice::Cell;
 use crate::tracking::zip;
-use crate::{Grid, Piece, Ray};
+use crate::{Filter, Grid, Piece, Ray};
 
 /// Bounds of a grid's field over the cells of a coarser grid on the same unit cube.
 ///
@@ -36,6 +37,8 @@ impl Bounds {
     const CELLS: usize = 16;
     /// Voxels per cell and axis as a rule at most: beyond, more cells are better than wider ones.
     const WIDTH: usize = 4;
+    /// Expected null collisions on a way through a cell beyond which it is cut up: about what that costs.
+    const LOOSE: f64 = 64.0;
     /// Cells per axis at most: the bounds stay small beside the grid.
     const MOST_CELLS: usize = 64;
 
@@ -81,23 +84,16 @@ impl Bounds {
     }
 
     fn range(&self, grid: &Grid, cell: [usize; 3]) -> Range {
-        let (mut min, mut max) = (Rgb::splat(f64::INFINITY), Rgb::ZERO);
-        let (mut sum, mut count) = (Rgb::ZERO, 0.0);
-        for k in self.seen(grid, 2, cell[2]) {
-            for j in self.seen(grid, 1, cell[1]) {
-                for i in self.seen(grid, 0, cell[0]) {
-                    let v = grid.voxel([i, j, k]);
-                    min = zip(min, v, f64::min);
-                    max = zip(max, v.abs(), f64::max);
-                    sum += v;
-                    count += 1.0;
-                }
-            }
-        }
-        Range { min, max, mean: sum / count }
+        let along = |axis: usize| self.seen(grid, axis, cell[axis]);
+        let voxels = along(2)
+            .flat_map(|k| along(1).flat_map(move |j| along(0).map(move |i| grid.voxel([i, j, k]))));
+        Range::of(voxels)
     }
 
     /// The cells a ray crosses, in order, as pieces of the field times `scale`.
+    ///
+    /// Where a cell's bounds are so far apart that most collisions in it would be null ones, it is cut up where the
+    /// interpolation between values changes, so that what is empty beside something very dense costs nothing.
     #[inline(always)]
     pub(crate) fn walk(
         &self,
@@ -106,39 +102,136 @@ impl Bounds {
         ray: &Ray,
         visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
     ) {
-        let Some((mut t, exit)) = clip_to_box(grid, ray) else { return };
+        let Some((enter, exit)) = clip_to_box(grid, ray) else { return };
         let origin = grid.from_world().point(ray.origin);
         let dir = grid.from_world().vector(ray.dir);
-        let mut axes: [Stepper; 3] =
-            core::array::from_fn(|k| Stepper::new(origin[k], dir[k], self.size[k], t));
-        loop {
-            let next = if axes[0].next <= axes[1].next && axes[0].next <= axes[2].next {
-                0
-            } else if axes[1].next <= axes[2].next {
-                1
-            } else {
-                2
-            };
-            let end = f64::min(axes[next].next, exit);
-            if end > t {
-                let [x, y, z] = axes.each_ref().map(|a| a.cell as usize);
-                let r = &self.cells[(z * self.size[1] + y) * self.size[0] + x];
-                // A negative scale cannot occur: media check it.
-                let piece = Piece {
-                    start: t,
-                    end,
-                    majorant: r.max * scale,
-                    minorant: r.min * scale,
-                    mean: r.mean * scale,
-                };
-                if visit(&piece).is_break() {
-                    return;
-                }
-                t = end;
+        let _ = march([origin, dir], self.size, [enter, exit], |[x, y, z], [start, end]| {
+            let r = &self.cells[(z * self.size[1] + y) * self.size[0] + x];
+            if r.is_loose(scale, [start, end]) {
+                return cut(grid, scale, [origin, dir], [start, end], visit);
             }
-            if end >= exit || !axes[next].advance() {
-                return;
-            }
+            visit(&r.piece(scale, [start, end]))
+        });
+    }
+}
+
+impl Range {
+    fn of(values: impl Iterator<Item = Rgb>) -> Self {
+        let (mut min, mut max) = (Rgb::splat(f64::INFINITY), Rgb::ZERO);
+        let (mut sum, mut count) = (Rgb::ZERO, 0.0);
+        for v in values {
+            min = zip(min, v, f64::min);
+            max = zip(max, v.abs(), f64::max);
+            sum += v;
+            count += 1.0;
+        }
+        Self { min, max, mean: sum / count }
+    }
+
+    /// Whether more null collisions than that are expected on a piece of a ray.
+    #[inline(always)]
+    fn is_loose(&self, scale: f64, [start, end]: [f64; 2]) -> bool {
+        (self.max - self.min).max_channel() * scale * (end - start) > Bounds::LOOSE
+    }
+
+    /// What rounding may add to interpolated values is added, but nothing beyond the values between which they are.
+    fn within(self, o: &Self) -> Self {
+        const ROUNDING: f64 = 1e-12;
+        Self {
+            min: zip(self.min * (1.0 - ROUNDING), o.min, f64::max),
+            max: zip(self.max * (1.0 + ROUNDING), o.max, f64::min),
+            mean: self.mean,
+        }
+    }
+
+    /// A negative scale cannot occur: media check it.
+    #[inline(always)]
+    fn piece(&self, scale: f64, [start, end]: [f64; 2]) -> Piece {
+        Piece {
+            start,
+            end,
+            majorant: self.max * scale,
+            minorant: self.min * scale,
+            mean: self.mean * scale,
+        }
+    }
+}
+
+/// Visits part of a ray, given by origin and direction, in pieces on each of which the field is interpolated between the same
+/// values, and in parts of these where it changes much.
+#[cold]
+fn cut(
+    grid: &Grid,
+    scale: f64,
+    ray: [Vec3; 2],
+    part: [f64; 2],
+    visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    // Values are at the ends or in the middle of intervals.
+    let size = grid.axes().each_ref().map(|axis| 2 * axis.intervals());
+    march(ray, size, part, |cell, part| {
+        let middle = [0, 1, 2].map(|k| (cell[k] as f64 + 0.5) / size[k] as f64);
+        let seen = Cell::new(grid.axes(), middle.into()).voxels();
+        let range = Range::of(seen.into_iter().map(|voxel| grid.voxel(voxel)));
+        halve(grid, scale, ray, part, &range, HALVINGS, visit)
+    })
+}
+
+/// So often a piece is halved at most: then it is as short as a rounding of where it is.
+const HALVINGS: u32 = 48;
+
+/// Visits a piece of a ray, in halves where its bounds are too far apart.
+fn halve(
+    grid: &Grid,
+    scale: f64,
+    [origin, dir]: [Vec3; 2],
+    [start, end]: [f64; 2],
+    range: &Range,
+    left: u32,
+    visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    if left == 0 || !range.is_loose(scale, [start, end]) || grid.filter() == Filter::Nearest {
+        return visit(&range.piece(scale, [start, end]));
+    }
+    let middle = 0.5 * (start + end);
+    for part in [[start, middle], [middle, end]] {
+        // What is linear along each axis is largest and smallest at the corners of a box.
+        let ends = part.map(|t| origin + dir * t);
+        let corners = (0..8_usize).map(|n| {
+            let pick = |k: usize| ends[n >> k & 1][k].clamp(0.0, 1.0);
+            grid.value_at_unit(vec3(pick(0), pick(1), pick(2)))
+        });
+        let range = Range::of(corners).within(range);
+        halve(grid, scale, [origin, dir], part, &range, left - 1, visit)?;
+    }
+    ControlFlow::Continue(())
+}
+
+/// Visits the cells of a grid on the unit cube that part of a ray crosses, in order, with the part that is in each.
+#[inline(always)]
+fn march(
+    [origin, dir]: [Vec3; 2],
+    size: [usize; 3],
+    [mut t, exit]: [f64; 2],
+    mut visit: impl FnMut([usize; 3], [f64; 2]) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    let mut axes: [Stepper; 3] =
+        core::array::from_fn(|k| Stepper::new(origin[k], dir[k], size[k], t));
+    loop {
+        let next = if axes[0].next <= axes[1].next && axes[0].next <= axes[2].next {
+            0
+        } else if axes[1].next <= axes[2].next {
+            1
+        } else {
+            2
+        };
+        let end = f64::min(axes[next].next, exit);
+        if end > t {
+            visit(axes.each_ref().map(|a| a.cell as usize), [t, end])?;
+            t = end;
+        }
+        if end >= exit || !axes[next].advance() {
+            return ControlFlow::Continue(());
         }
     }
 }

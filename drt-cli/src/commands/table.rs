@@ -23,16 +23,16 @@ impl<const N: usize> fmt::Display for Table<N> {
         if self.rows.is_empty() {
             return Ok(());
         }
-        let width = |c: usize| {
+        let widths: [usize; N] = std::array::from_fn(|c| {
             let cells = self.rows.iter().map(|row| row[c].chars().count());
             cells.fold(self.heads[c].chars().count(), usize::max)
-        };
+        });
         let heads = self.heads.map(String::from);
         for row in std::iter::once(&heads).chain(&self.rows) {
             let line: String = row
                 .iter()
                 .enumerate()
-                .map(|(c, cell)| format!("{cell:w$}  ", w = width(c)))
+                .map(|(c, cell)| format!("{cell:w$}  ", w = widths[c]))
                 .collect();
             writeln!(f, "{}", line.trim_end())?;
         }

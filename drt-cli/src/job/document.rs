@@ -9,12 +9,14 @@ use toml::de::{DeArray, DeTable, DeValue, Deserializer, Error};
 
 use crate::CliError;
 use crate::error::Place;
+use crate::lines::Lines;
 
 /// A job's text and the assignments laid over it, with spans that tell them apart: those of the
 /// text lie within it, those of each assignment in a range of its own beyond.
 pub(super) struct Document<'a> {
     path: &'a Path,
     text: &'a str,
+    lines: Lines,
     /// Each assignment as TOML, preceded by as many blanks as bytes come before it.
     assignments: Vec<Assignment>,
 }
@@ -36,7 +38,7 @@ impl<'a> Document<'a> {
                 assignment
             })
             .collect();
-        Self { path, text, assignments }
+        Self { path, text, lines: Lines::of(text), assignments }
     }
 
     /// The whole as a value of `T`.
@@ -66,7 +68,7 @@ impl<'a> Document<'a> {
 
     /// The line and column of an offset in the text.
     pub(super) fn place(&self, offset: usize) -> Place {
-        Place::of_offset(self.path, self.text, offset)
+        self.lines.place(self.path, self.text, offset)
     }
 }
 

@@ -4,8 +4,6 @@ mod composed;
 mod measured;
 mod principled;
 
-use std::cell::Cell;
-
 use drt_estimators::surface::{
     Anisotropic, Bsdf, Coating, Conductor, Dielectric, Diffuse, Distribution, Phong, Plastic,
     Property, RoughConductor, RoughDielectric, Textured, ThinDielectric, TwoSided,
@@ -14,22 +12,19 @@ use drt_math::Rgb;
 
 use super::Loader;
 use super::element::Element;
+use super::parts::Parts;
 use super::properties::Properties;
 use super::spectrum::conductors;
 use crate::CliError;
 
-/// So many BSDFs may be inside of one: references could make trees of any size.
-const MOST_PARTS: u32 = 64;
-
 impl<'a> Loader<'a> {
     pub(super) fn bsdf(&self, e: &'a Element) -> Result<Bsdf, CliError> {
-        self.part(e, &Cell::new(MOST_PARTS))
+        self.part(e, &Parts::new("bsdfs"))
     }
 
-    /// A BSDF that is inside of one which may still have so many `parts`.
-    fn part(&self, e: &'a Element, parts: &Cell<u32>) -> Result<Bsdf, CliError> {
-        let left = parts.get().checked_sub(1);
-        parts.set(left.ok_or_else(|| e.error(format!("more than {MOST_PARTS} bsdfs in one")))?);
+    /// A BSDF that is inside of one.
+    fn part(&self, e: &'a Element, parts: &Parts) -> Result<Bsdf, CliError> {
+        parts.count(e)?;
         let p = Properties::of(e)?;
         let bsdf = match p.kind()? {
             "null" => Bsdf::Null,
@@ -74,7 +69,7 @@ impl<'a> Loader<'a> {
         Ok(Bsdf::Textured(Box::new(textured)))
     }
 
-    fn two_sided(&self, p: &Properties<'a>, parts: &Cell<u32>) -> Result<TwoSided, CliError> {
+    fn two_sided(&self, p: &Properties<'a>, parts: &Parts) -> Result<TwoSided, CliError> {
         let sides = self.index.inner(p, "bsdf", None);
         // Also what keeps a reference to itself from being followed for ever.
         if let Some(s) = sides.iter().find(|s| s.target.attribute("type") == Some("twosided")) {

@@ -9,6 +9,7 @@ use drt_medium::{
 use super::Loader;
 use super::element::Element;
 use super::numbers::numbers;
+use super::parts::Parts;
 use super::properties::Properties;
 use super::volumes::Field;
 use crate::CliError;
@@ -75,13 +76,19 @@ impl<'a> Loader<'a> {
     }
 
     pub(super) fn phase(&self, e: &'a Element) -> Result<Phase, CliError> {
+        self.phase_part(e, &Parts::new("phase functions"))
+    }
+
+    /// A phase function that is inside of one.
+    fn phase_part(&self, e: &'a Element, parts: &Parts) -> Result<Phase, CliError> {
+        parts.count(e)?;
         let p = Properties::of(e)?;
         let phase = match p.kind()? {
             "isotropic" => Phase::Isotropic,
             "rayleigh" => Phase::Rayleigh,
             "hg" => Phase::henyey_greenstein(p.float("g")?.unwrap_or(0.8))
                 .map_err(|err| e.error(err))?,
-            "blendphase" => self.blended_phase(&p)?,
+            "blendphase" => self.blended_phase(&p, parts)?,
             "tabphase" => {
                 let values = p.string("values")?.ok_or_else(|| e.error("`values` is missing"))?;
                 let table = PhaseTable::new(numbers(e, values)?).map_err(|err| e.error(err))?;
@@ -99,7 +106,7 @@ impl<'a> Loader<'a> {
     }
 
     /// Of the two inside, in the order of the file.
-    fn blended_phase(&self, p: &Properties<'a>) -> Result<Phase, CliError> {
+    fn blended_phase(&self, p: &Properties<'a>, parts: &Parts) -> Result<Phase, CliError> {
         let e = p.element;
         let weight = self.field(p, "weight")?.ok_or_else(|| e.error("`weight` is missing"))?;
         let inner = self.index.inner(p, "phase", None);
@@ -111,7 +118,7 @@ impl<'a> Loader<'a> {
         let Some(weight) = weight.as_constant() else {
             return Err(e.error("a `weight` that varies in space is not supported"));
         };
-        let parts = [self.phase(a.target)?, self.phase(b.target)?];
+        let parts = [self.phase_part(a.target, parts)?, self.phase_part(b.target, parts)?];
         let blend = PhaseBlend::new(weight.r, parts).map_err(|err| e.error(err))?;
         Ok(Phase::Blend(Box::new(blend)))
     }

@@ -11,6 +11,7 @@ mod emitters;
 mod index;
 mod media;
 mod numbers;
+mod parts;
 mod properties;
 mod sensors;
 mod shapes;

@@ -11,13 +11,14 @@ use super::element::Element;
 use super::values;
 use crate::CliError;
 use crate::error::{Place, read_text};
+use crate::lines::Lines;
 
 /// Values for the `<default>` names of a scene, as `-D NAME=VALUE` gives them.
 pub type Defaults = BTreeMap<String, String>;
 
 /// Elements inside each other beyond this depth are refused: no scene needs them, and reading them
 /// takes stack.
-const MAX_NESTING: usize = 64;
+pub(super) const MAX_NESTING: usize = 64;
 /// More files are refused: a few that include each other again and again can stand for billions.
 const MAX_FILES: usize = 4096;
 /// More elements are refused, all included files together.
@@ -79,8 +80,8 @@ impl SceneFiles {
             CliError::input(&place, format!("not well-formed XML: {e}"))
         })?;
         let root = document.root_element();
-        let file: Arc<Path> = path.into();
-        let place = place_of(&file, root);
+        let file = Text { path: path.into(), lines: Lines::of(text) };
+        let place = file.place(root);
         if root.tag_name().name() != "scene" {
             let found = root.tag_name().name();
             let message = format!("expected a <scene version=\"…\"> element, found <{found}>");
@@ -104,12 +105,12 @@ impl SceneFiles {
 
     fn element(
         &mut self,
-        file: &Arc<Path>,
+        file: &Text,
         node: Node<'_, '_>,
         dialect: Dialect,
         depth: usize,
     ) -> Result<Element, CliError> {
-        let place = place_of(file, node);
+        let place = file.place(node);
         if depth > MAX_NESTING {
             let message = format!("elements nest deeper than {MAX_NESTING}");
             return Err(CliError::input(&place, message));
@@ -217,7 +218,15 @@ impl SceneFiles {
     }
 }
 
-fn place_of(file: &Arc<Path>, node: Node<'_, '_>) -> Place {
-    let at = node.document().text_pos_at(node.range().start);
-    Place { file: file.clone(), line: Some(at.row), column: None }
+/// A file being read.
+struct Text {
+    path: Arc<Path>,
+    lines: Lines,
+}
+
+impl Text {
+    fn place(&self, node: Node<'_, '_>) -> Place {
+        let line = self.lines.line(node.range().start);
+        Place { file: self.path.clone(), line: Some(line), column: None }
+    }
 }

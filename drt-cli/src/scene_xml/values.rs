@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use super::element::Element;
-use super::source::MAX_ELEMENTS;
+use super::source::{MAX_ELEMENTS, MAX_NESTING};
 use crate::CliError;
 
 /// Tags of things that are nothing but values.
@@ -21,7 +21,7 @@ pub(super) fn substitute(root: &mut Element) -> Result<(), CliError> {
     let mut values =
         Values { by_id: HashMap::new(), aliases: HashMap::new(), open: Vec::new(), copies: 0 };
     values.collect(root);
-    if values.by_id.is_empty() { Ok(()) } else { values.replace(root) }
+    if values.by_id.is_empty() { Ok(()) } else { values.replace(root, 0) }
 }
 
 struct Values {
@@ -50,11 +50,17 @@ impl Values {
         }
     }
 
-    fn replace(&mut self, e: &mut Element) -> Result<(), CliError> {
+    /// Replaces the references inside an element that is itself inside so many.
+    fn replace(&mut self, e: &mut Element, depth: usize) -> Result<(), CliError> {
+        if depth > MAX_NESTING {
+            let message =
+                format!("with what references mean, elements nest deeper than {MAX_NESTING}");
+            return Err(e.error(message));
+        }
         for child in &mut e.children {
             match self.meant(child) {
-                Some(id) => *child = self.copy(&id, child)?,
-                None => self.replace(child)?,
+                Some(id) => *child = self.copy(&id, child, depth)?,
+                None => self.replace(child, depth + 1)?,
             }
         }
         Ok(())
@@ -73,7 +79,7 @@ impl Values {
     }
 
     /// A copy of a value under the name of the reference, in its place.
-    fn copy(&mut self, id: &str, at: &Element) -> Result<Element, CliError> {
+    fn copy(&mut self, id: &str, at: &Element, depth: usize) -> Result<Element, CliError> {
         at.only_attributes(&["id", "name"])?;
         if self.open.iter().any(|o| o == id) {
             return Err(at.error(format!("`{id}` refers to itself")));
@@ -85,7 +91,7 @@ impl Values {
             return Err(at.error(format!("references stand for more than {MAX_ELEMENTS} elements")));
         }
         self.open.push(id.into());
-        self.replace(&mut copy)?;
+        self.replace(&mut copy, depth + 1)?;
         self.open.pop();
         Ok(copy)
     }

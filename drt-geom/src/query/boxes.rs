@@ -25,8 +25,8 @@ pub(crate) struct BoxTree {
     machine: Machine,
 }
 
-/// A box in the tree's coordinates. What touches it before rounding does after it: the boxes of the
-/// tree are padded by more than it moves.
+/// A box in the tree's coordinates, rounded outward as those of the tree are, so that what touches it before rounding does
+/// after it.
 #[derive(Clone, Copy)]
 struct Window {
     min: [f32; 3],
@@ -41,7 +41,8 @@ impl BoxTree {
         count: u32,
         corners: impl Fn(u32) -> [Vec3; N],
     ) -> (Self, Vec<u32>) {
-        let frame = BoxFrame::new(bounds);
+        let places = (0..count).map(|i| corners(i).first().copied().unwrap_or(Vec3::ZERO));
+        let frame = BoxFrame::new(bounds, places);
         let enclose = |i: u32| {
             let around = Aabb::around(corners(i));
             frame.enclose(&[around.min, around.max, around.max])
@@ -66,8 +67,8 @@ impl BoxTree {
     #[inline]
     pub(crate) fn near(&self, window: &Aabb, visit: impl FnMut(Range<usize>) -> ControlFlow<()>) {
         let Some(tree) = &self.tree else { return };
-        let local = |v| self.frame.local(v).map(|c| c as f32);
-        let query = Window { min: local(window.min), max: local(window.max) };
+        let Box32 { min, max } = self.frame.enclose(&[window.min, window.max, window.max]);
+        let query = Window { min, max };
         self.machine.run(Walk { tree, query, visitor: Members { blocks: &self.blocks, visit } });
     }
 }

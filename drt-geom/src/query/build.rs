@@ -71,7 +71,7 @@ impl TriangleBvh {
         let (leaves, repeats) = group_twins(triangles);
         let mut bvh = Self {
             tree: None,
-            frame: BoxFrame::new(&bounds),
+            frame: BoxFrame::new(&bounds, triangles.iter().map(|t| t[0])),
             bounds,
             blocks: Vec::new(),
             twins: Vec::with_capacity(repeats.len()),
@@ -143,7 +143,7 @@ impl TriangleBvh {
             return Ok(());
         };
         self.bounds = bounds;
-        self.frame = BoxFrame::new(&bounds);
+        self.frame = BoxFrame::new(&bounds, triangles.iter().map(|t| t[0]));
         for block in &mut self.blocks {
             for lane in 0..block.len() {
                 let prim = block.prims[lane];

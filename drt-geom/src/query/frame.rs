@@ -1,26 +1,32 @@
-//! Single-precision boxes that lose no double-precision hit.
+//! Single-precision boxes that lose no double-precision hit, in scenes of things of any sizes and distances.
 //!
-//! The tree holds its boxes in `f32`, in coordinates centred on the scene and scaled to [-1, 1].
-//! A ray is first clipped to the scene's box in `f64`, so that its origin has such coordinates too,
-//! however far away it started. All roundings of a slab test then shift box planes by at most
-//! about 21 · 2^-24 (conversion of the origin 1, difference 2, inverse direction and products 6,
-//! quantization of compressed boxes 6, their decompression 6), and every box is padded by
-//! 64 · 2^-24. The rounding of the hits themselves moves a triangle by a few 2^-53 of its distance
-//! from the ray's origin, which is less than the padding left as long as the origin is within 2^28
-//! scene sizes.
+//! The tree holds its boxes in `f32`, in coordinates that have most things near zero, where such numbers are
+//! finest, and everything within [-1, 1]. A ray is first clipped to the scene's box in `f64`, so that its origin has
+//! such coordinates too, however far away it started. Each rounding of a slab test then shifts a plane by
+//! 2^-24 of its coordinate and of that of the origin: six of them (conversion of the origin, difference, inverse
+//! direction, product, conversion of where hits end the ray, and one to spare). So a plane is moved outward by
+//! 2^-21 of its own coordinate when the tree is built, and by as much of the origin's coordinate by every ray, which
+//! has two origins: one for the planes that it enters by and one for those that it leaves by. What a box
+//! is enlarged by depends on where it and the ray are, and not on how large the scene is.
+//!
+//! The rounding of the hits themselves moves a triangle by a few 2^-53 of its distance from where the ray
+//! started. Rays add 2^-46 of the largest coordinate of that point, or of the scene, for it.
 
-use drt_math::Vec3;
+use alloc::vec::Vec;
+
+use drt_math::{Real, Vec3};
 
 use super::ray::Ray;
 use crate::Aabb;
 
-/// Padding of every box, in units of the scene's half extent.
-const PADDING: f64 = 1.0 / (1 << 18) as f64;
+/// What planes are moved by, relative to the coordinates of a plane or of a ray's origin.
+const RELATIVE: f64 = 1.0 / (1 << 21) as f64;
 
-/// Length (largest coordinate) of a box ray's direction. So short that the padding alone keeps a ray
-/// in the box it starts in for a t of one or more: traversals that ignore everything below some
-/// small t (some do below 1e-4) then still see every box.
-const SPEED: f64 = 1.0 / (1 << 20) as f64;
+/// What planes are moved by for hits in double precision, relative to the largest coordinate.
+const HITS: f64 = 1.0 / (1_u64 << 46) as f64;
+
+/// What the scene's box is enlarged by on all sides for the clipping of rays.
+const REACH: f64 = 1.0 / (1 << 20) as f64;
 
 /// Direction coordinates nearer to zero than this are zero, and their inverse is that of this: over the
 /// whole scene either moves the ray by less than 1e-20.
@@ -34,6 +40,9 @@ const REMOTE: f64 = (1_u64 << 60) as f64;
 pub(super) struct BoxFrame {
     center: Vec3,
     scale: f64,
+    /// The scene's box, enlarged.
+    low: [f64; 3],
+    high: [f64; 3],
 }
 
 /// A box in the tree's coordinates.
@@ -46,7 +55,10 @@ pub(super) struct Box32 {
 /// A ray in the tree's coordinates, for box tests only.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BoxRay {
-    pub(super) origin: [f32; 3],
+    /// Where it starts for the planes that it enters boxes by.
+    pub(super) enter: [f32; 3],
+    /// Where it starts for those that it leaves them by.
+    pub(super) leave: [f32; 3],
     pub(super) inverse: [f32; 3],
     /// Where the ray ends, in its own parameter.
     pub(super) far: f32,
@@ -56,13 +68,15 @@ pub(super) struct BoxRay {
 
 /// A point in the tree's coordinates, for distances to boxes only.
 ///
-/// No computed distance is more than the true one to anything in the box. For a point within 4 of
-/// the centre, rounding it and the differences (by less than 2^-20) is less than the padding;
-/// farther out it is less than 2^-21 of the distance, and the factor makes up for it and for the
+/// No computed distance is more than the true one to anything in the box: the point is two, each moved towards the
+/// planes it is compared with by what roundings may add, as the planes are; and the factor makes up for the
 /// roundings of squares and sums.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BoxPoint {
-    pub(super) point: [f32; 3],
+    /// The point for the boxes' lower bounds.
+    pub(super) below: [f32; 3],
+    /// The point for their upper bounds.
+    pub(super) above: [f32; 3],
     /// Factor of the squared distances.
     pub(super) trust: f32,
     /// The squared distance up to which boxes count.
@@ -70,10 +84,16 @@ pub(super) struct BoxPoint {
 }
 
 impl BoxFrame {
-    /// The frame of a scene with the given bounds.
-    pub(super) fn new(bounds: &Aabb) -> Self {
-        let half = bounds.extent().max_abs() * 0.5;
-        Self { center: bounds.center(), scale: if half > 0.0 { 1.0 / half } else { 1.0 } }
+    /// The frame of a scene with the given bounds. `places` are those of the things in it: most of them are near zero in the tree's
+    /// coordinates.
+    pub(super) fn new(bounds: &Aabb, places: impl Iterator<Item = Vec3> + Clone) -> Self {
+        let center = Vec3::from([0, 1, 2].map(|k| median(places.clone().map(|p| p[k]))));
+        let half = (bounds.max - center).max_abs().max((bounds.min - center).max_abs());
+        let scale = if half > 0.0 { 1.0 / half } else { 1.0 };
+        let mut frame = Self { center, scale, low: [0.0; 3], high: [0.0; 3] };
+        frame.low = frame.local(bounds.min).map(|c| c - REACH);
+        frame.high = frame.local(bounds.max).map(|c| c + REACH);
+        frame
     }
 
     /// A point in the tree's coordinates.
@@ -91,8 +111,8 @@ impl BoxFrame {
         points.iter().fold(Box32::EMPTY, |b, p| {
             let l = self.local(*p);
             b.union(&Box32 {
-                min: l.map(|c| round_down(c - PADDING)),
-                max: l.map(|c| round_up(c + PADDING)),
+                min: l.map(|c| round_down(c - margin(c))),
+                max: l.map(|c| round_up(c + margin(c))),
             })
         })
     }
@@ -103,33 +123,35 @@ impl BoxFrame {
         let far = self.squared(squared);
         let local = self.local(p);
         if local.iter().all(|c| c.abs() < REMOTE) {
-            BoxPoint { point: local.map(|c| c as f32), trust: 1.0 - 2.0 * PADDING as f32, far }
+            let below = local.map(|c| (c + margin(c)) as f32);
+            let above = local.map(|c| (c - margin(c)) as f32);
+            BoxPoint { below, above, trust: 1.0 - 4.0 * RELATIVE as f32, far }
         } else {
-            BoxPoint { point: [0.0; 3], trust: 0.0, far }
+            BoxPoint { below: [0.0; 3], above: [0.0; 3], trust: 0.0, far }
         }
     }
 
     /// The part of the ray near the scene; `None` when it passes the scene by.
     #[inline(always)]
     pub(super) fn clip(&self, ray: &Ray) -> Option<BoxRay> {
-        let speed = ray.dir.max_abs() * self.scale;
+        let rate = ray.dir.max_abs() * self.scale;
         let origin = self.local(ray.origin);
         // Zero times what is not finite is no number.
         let nothing = (ray.origin + ray.dir) * 0.0;
-        if !(speed > 0.0 && speed < f64::INFINITY && nothing.x + nothing.y + nothing.z == 0.0) {
+        if !(rate > 0.0 && rate < f64::INFINITY && nothing.x + nothing.y + nothing.z == 0.0) {
             return None;
         }
         let dir = (ray.dir * self.scale).to_array();
-        // Padding is far more than a rounding of these.
+        // Margins are far more than a rounding of these.
         let per = dir.map(|d| 1.0 / d);
         let (mut near, mut far) = (0.0, ray.t_max);
         for k in 0..3 {
-            let reach = 1.0 + 2.0 * PADDING;
+            let (low, high) = (self.low[k] - origin[k], self.high[k] - origin[k]);
             if dir[k] != 0.0 {
-                let (a, b) = ((-reach - origin[k]) * per[k], (reach - origin[k]) * per[k]);
+                let (a, b) = (low * per[k], high * per[k]);
                 near = greater(near, lesser(a, b));
                 far = lesser(far, greater(a, b));
-            } else if origin[k].abs() > reach {
+            } else if low > 0.0 || high < 0.0 {
                 return None;
             }
         }
@@ -137,26 +159,26 @@ impl BoxFrame {
         if !(near <= far && ray.t_max > 0.0) {
             return None;
         }
-        let rate = speed / SPEED;
-        let inverse = per.map(|p| {
-            let inverse = (p * rate) as f32;
-            if inverse.abs() > 1.0 / STILL { 1.0 / STILL } else { inverse }
-        });
-        Some(BoxRay {
-            origin: [0, 1, 2].map(|k| (origin[k] + near * dir[k]) as f32),
-            inverse,
-            far: ((far - near) * rate) as f32 + 1.0,
-            start: near,
-            rate,
-        })
+        let hits = HITS
+            * greater(1.0, greater(origin[0].abs(), greater(origin[1].abs(), origin[2].abs())));
+        let (mut enter, mut leave, mut inverse) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+        for k in 0..3 {
+            let per = (per[k] * rate) as f32;
+            inverse[k] = if per.abs() > 1.0 / STILL { 1.0 / STILL } else { per };
+            let start = origin[k] + near * dir[k];
+            let margin = (RELATIVE * start.abs() + hits).copysign(inverse[k].into());
+            enter[k] = (start + margin) as f32;
+            leave[k] = (start - margin) as f32;
+        }
+        let far = ((far - near) * rate) as f32;
+        Some(BoxRay { enter, leave, inverse, far, start: near, rate })
     }
 }
 
 impl BoxRay {
     /// The box parameter behind which nothing nearer than the scene's `t` can be.
     ///
-    /// Padding less roundings puts a box's entry two or more before any hit in it, and parameters
-    /// stay below 2^22, so rounding to nearest (by at most 1/4) is enough.
+    /// Margins less roundings put a box's entry before any hit in it by more than this is rounded by.
     #[inline]
     pub(super) fn limit(&self, t: f64) -> f32 {
         ((t - self.start) * self.rate) as f32
@@ -189,6 +211,22 @@ impl Box32 {
     pub(super) fn doubled_center(&self) -> [f32; 3] {
         [0, 1, 2].map(|k| self.min[k] + self.max[k])
     }
+}
+
+/// What a plane or point is moved by at a coordinate. At zero that is little, but no box is flat.
+#[inline(always)]
+fn margin(c: f64) -> f64 {
+    RELATIVE * Real::abs(c) + HITS
+}
+
+/// The middle one of some numbers; zero of none.
+fn median(numbers: impl Iterator<Item = f64>) -> f64 {
+    let mut numbers: Vec<f64> = numbers.collect();
+    if numbers.is_empty() {
+        return 0.0;
+    }
+    let middle = numbers.len() / 2;
+    *numbers.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// The lesser, in one instruction; the first where one is no number.

@@ -184,7 +184,7 @@ impl Instances {
                 boxes.push((i, around));
             }
         }
-        let frame = BoxFrame::new(&bounds);
+        let frame = BoxFrame::new(&bounds, boxes.iter().map(|(_, b)| b.center()));
         let (mut order, mut blocks, mut tree) = (Vec::new(), Vec::new(), None);
         if !boxes.is_empty() {
             let enclosed: Vec<Box32> =

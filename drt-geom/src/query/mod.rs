@@ -27,6 +27,8 @@ mod order;
 mod ploc;
 mod ray;
 mod registers;
+#[cfg(test)]
+mod tests;
 mod watertight;
 mod wide;
 mod winding;

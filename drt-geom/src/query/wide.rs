@@ -173,11 +173,11 @@ impl Query for &BoxRay {
         let (mut enter, mut leave) = (lanes.single(0.0), lanes.single(far));
         for k in 0..3 {
             let back = usize::from(self.inverse[k] < 0.0);
-            let (origin, inverse) = (lanes.single(self.origin[k]), lanes.single(self.inverse[k]));
+            let inverse = lanes.single(self.inverse[k]);
             let front = lanes.singles(&node.bounds[2 * k + back]);
             let rear = lanes.singles(&node.bounds[2 * k + 1 - back]);
-            enter = ((front - origin) * inverse).max(enter);
-            leave = ((rear - origin) * inverse).min(leave);
+            enter = ((front - lanes.single(self.enter[k])) * inverse).max(enter);
+            leave = ((rear - lanes.single(self.leave[k])) * inverse).min(leave);
         }
         (enter.le(leave), enter.array())
     }
@@ -191,9 +191,8 @@ impl Query for BoxPoint {
     fn enter<L: Lanes>(self, lanes: L, node: &WideNode, far: f32) -> (u32, [f32; WIDTH]) {
         let mut sum = lanes.single(0.0);
         for k in 0..3 {
-            let p = lanes.single(self.point[k]);
-            let below = lanes.singles(&node.bounds[2 * k]) - p;
-            let above = p - lanes.singles(&node.bounds[2 * k + 1]);
+            let below = lanes.singles(&node.bounds[2 * k]) - lanes.single(self.below[k]);
+            let above = lanes.single(self.above[k]) - lanes.singles(&node.bounds[2 * k + 1]);
             let d = below.max(above).max(lanes.single(0.0));
             sum = sum + d * d;
         }

@@ -66,8 +66,10 @@ pub fn move_mesh(
         let fail = |cause| c.error(cause);
         if let Some(velocities) = vertex_velocities(mesh, &caged, c.change).map_err(fail)? {
             deformed = true;
-            for field in &mut fields {
-                field.pin(c.theta, &moved.positions);
+            if c.theta != 0.0 {
+                for field in &mut fields {
+                    field.pin(&moved.positions);
+                }
             }
             for (x, v) in moved.positions.iter_mut().zip(&velocities) {
                 *x += *v * c.theta;
@@ -78,9 +80,9 @@ pub fn move_mesh(
             if step.map != Affine::IDENTITY {
                 moved = moved.transform(&step.map);
                 linear = step.map.linear * linear;
-            }
-            for field in &mut fields {
-                field.carry(&step);
+                for field in &mut fields {
+                    field.carry(&step);
+                }
             }
             fields[c.parameter].add(Field::Affine(step.velocity), &moved.positions);
         }
@@ -120,8 +122,10 @@ pub fn move_affine(
         check(c, parameters)?;
         let step = Step::new(c).ok_or_else(|| c.error(Cause::NotAffine))?;
         map = step.map.after(&map);
-        for v in &mut velocities {
-            *v = step.carry(v);
+        if step.map != Affine::IDENTITY {
+            for v in &mut velocities {
+                *v = step.carry(v);
+            }
         }
         velocities[c.parameter] = velocities[c.parameter].plus(&step.velocity);
         finite(map.is_finite(), "the moved placement").map_err(|cause| c.error(cause))?;
@@ -174,9 +178,8 @@ impl Field {
 
     /// Ties the field to the vertices before these are moved singly by theta times a velocity that
     /// no other parameter influences: an affine function of the position would not survive that.
-    fn pin(&mut self, theta: f64, positions: &[Vec3]) {
+    fn pin(&mut self, positions: &[Vec3]) {
         if let Self::Affine(u) = self
-            && theta != 0.0
             && u.linear != Mat3::ZERO
         {
             *self = Self::Vertices(at_vertices(u, positions));

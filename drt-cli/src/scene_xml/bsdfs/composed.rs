@@ -1,23 +1,22 @@
 //! BSDFs made of others.
 
-use std::cell::Cell;
-
 use drt_estimators::surface::{Blend, Bsdf, Mask, Perturbation, Perturbed};
 use drt_estimators::texture::{Bitmap, Texture};
 use drt_math::Rgb;
 
 use super::super::Loader;
+use super::super::parts::Parts;
 use super::super::properties::Properties;
 use super::super::{spectrum, textures};
 use crate::CliError;
 
 impl<'a> Loader<'a> {
-    pub(super) fn mask(&self, p: &Properties<'a>, parts: &Cell<u32>) -> Result<Mask, CliError> {
+    pub(super) fn mask(&self, p: &Properties<'a>, parts: &Parts) -> Result<Mask, CliError> {
         let opacity = fraction(p, "opacity")?.unwrap_or(0.5);
         Ok(Mask { bsdf: self.only(p, parts)?, opacity })
     }
 
-    pub(super) fn blend(&self, p: &Properties<'a>, parts: &Cell<u32>) -> Result<Blend, CliError> {
+    pub(super) fn blend(&self, p: &Properties<'a>, parts: &Parts) -> Result<Blend, CliError> {
         let weight = fraction(p, "weight")?.unwrap_or(0.5);
         match &self.index.inner(p, "bsdf", None)[..] {
             [a, b] => {
@@ -34,7 +33,7 @@ impl<'a> Loader<'a> {
     pub(super) fn normal_map(
         &self,
         p: &Properties<'a>,
-        parts: &Cell<u32>,
+        parts: &Parts,
     ) -> Result<Perturbed, CliError> {
         let normal = p.color("normalmap")?;
         let normal = normal.ok_or_else(|| p.element.error("`normalmap` is missing"))?;
@@ -52,7 +51,7 @@ impl<'a> Loader<'a> {
     pub(super) fn bump_map(
         &self,
         p: &Properties<'a>,
-        parts: &Cell<u32>,
+        parts: &Parts,
     ) -> Result<Perturbed, CliError> {
         // It may have any name.
         let maps = p.children(|e| e.tag == "texture");
@@ -73,7 +72,7 @@ impl<'a> Loader<'a> {
     fn perturbed(
         &self,
         p: &Properties<'a>,
-        parts: &Cell<u32>,
+        parts: &Parts,
         map: Texture,
         perturbation: Perturbation,
     ) -> Result<Perturbed, CliError> {
@@ -87,7 +86,7 @@ impl<'a> Loader<'a> {
     }
 
     /// The one BSDF inside.
-    fn only(&self, p: &Properties<'a>, parts: &Cell<u32>) -> Result<Bsdf, CliError> {
+    fn only(&self, p: &Properties<'a>, parts: &Parts) -> Result<Bsdf, CliError> {
         let inner = self.index.single(p, "bsdf", None)?;
         let inner = inner.ok_or_else(|| p.element.error("expected a bsdf inside"))?;
         self.part(inner.target, parts)
