@@ -9,6 +9,7 @@ use serde::{Serialize, Serializer};
 
 use crate::CliError;
 use crate::atomic::write_atomically;
+use crate::console;
 
 /// What a digest says beyond the rendering itself.
 #[derive(Clone, Debug)]
@@ -224,10 +225,7 @@ pub fn digest(rendering: &Rendering, facts: &RunFacts, checks: &[Verdict]) -> St
 pub fn write_digest(path: &Path, text: &str) -> Result<(), CliError> {
     use std::io::Write;
     if path.as_os_str() == "-" {
-        let mut out = std::io::stdout().lock();
-        return writeln!(out, "{text}")
-            .and_then(|()| out.flush())
-            .map_err(|e| CliError::write(path, e));
+        return console::print(format!("{text}\n"));
     }
     write_atomically(path, |out| Ok(writeln!(out, "{text}")?))
 }

@@ -6,6 +6,9 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
+use crate::input_file;
+use crate::wording::readable;
+
 /// A place in an input file; lines and columns are counted from 1.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
@@ -81,22 +84,22 @@ pub enum CliError {
 impl CliError {
     /// An unusable input.
     pub fn input(place: &Place, message: impl fmt::Display) -> Self {
-        Self::Input { place: place.clone(), message: message.to_string() }
+        Self::Input { place: place.clone(), message: readable(&message.to_string()) }
     }
 
     /// An unusable argument.
     pub fn argument(message: impl fmt::Display) -> Self {
-        Self::Argument(message.to_string())
+        Self::Argument(readable(&message.to_string()))
     }
 
     /// A failure to write.
     pub fn write(path: &Path, reason: impl fmt::Display) -> Self {
-        Self::Write { path: path.into(), reason: reason.to_string() }
+        Self::Write { path: path.into(), reason: readable(&reason.to_string()) }
     }
 
     /// A fit that cannot go on.
     pub fn unsolved(message: impl fmt::Display) -> Self {
-        Self::Unsolved(message.to_string())
+        Self::Unsolved(readable(&message.to_string()))
     }
 
     /// The exit code of the command: 1 for a fit that failed, 2 for unusable input or arguments, 3 for a failure to write.
@@ -112,8 +115,8 @@ impl CliError {
 
 /// Reads a text file that was named at `from`.
 pub(crate) fn read_text(path: &Path, from: Option<&Place>) -> Result<String, CliError> {
-    std::fs::read_to_string(path).map_err(|e| match from {
-        Some(place) => CliError::input(place, format!("cannot read {}: {e}", path.display())),
-        None => CliError::input(&Place::file(path), format!("cannot read this file: {e}")),
-    })
+    let bytes = input_file::read_at(path, from)?;
+    let not_text = |_| std::io::Error::new(std::io::ErrorKind::InvalidData, "it is not UTF-8 text");
+    let text = String::from_utf8(bytes).map_err(not_text);
+    text.map_err(|e| input_file::unreadable(path, from, &e))
 }

@@ -2,20 +2,25 @@
 #![forbid(unsafe_code)]
 
 mod atomic;
+mod checksum;
 pub mod commands;
+mod console;
 mod digest;
 pub mod error;
 mod fingerprint;
 mod image;
+mod input_file;
 mod job;
 mod lines;
 mod measured_file;
+mod memory;
 mod npy;
 mod scene_xml;
 mod shard_file;
 mod tensor_file;
 #[cfg(test)]
 mod testing;
+mod wording;
 
 pub use atomic::{check_target, write_atomically};
 pub use digest::{RunFacts, Verdict, digest, write_digest};

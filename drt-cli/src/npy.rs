@@ -1,12 +1,11 @@
 //! NumPy's file format, version 1.0: a plain array with a line of text before it.
 
-use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::Path;
 
-use crate::CliError;
 use crate::atomic::write_atomically;
 use crate::error::Place;
+use crate::{CliError, checksum, input_file};
 
 /// Header and magic number together are padded to a multiple of this.
 const ALIGNMENT: usize = 64;
@@ -14,6 +13,8 @@ pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 /// 64-bit floats and bytes, as headers call them.
 const FLOATS: &str = "<f8";
 const BYTES: &str = "|u1";
+/// Bytes that the header of an image may have.
+const MOST_HEADER: u64 = 1 << 16;
 
 /// Writes numbers as an array of one dimension and 64-bit floats.
 pub(crate) fn write_npy(path: &Path, values: &[f64]) -> Result<(), CliError> {
@@ -26,43 +27,50 @@ pub(crate) fn write_npy(path: &Path, values: &[f64]) -> Result<(), CliError> {
     })
 }
 
-/// Writes bytes as an array of one dimension.
+/// Writes bytes as an array of one dimension, with the checksum that they may have a place for.
 pub(crate) fn write_npy_bytes(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
-    write_atomically(path, |out| {
-        out.write_all(&header(BYTES, bytes.len()))?;
-        Ok(out.write_all(bytes)?)
-    })
+    let mut file = header(BYTES, bytes.len());
+    file.extend(bytes);
+    checksum::seal(&mut file);
+    write_atomically(path, |out| Ok(out.write_all(&file)?))
 }
 
 /// True for a file that begins as NPY does.
-pub(crate) fn is_npy(path: &Path) -> Result<bool, CliError> {
-    let fail = |e| CliError::input(&Place::file(path), format!("cannot read this file: {e}"));
-    let mut start = Vec::new();
-    File::open(path).and_then(|f| f.take(6).read_to_end(&mut start)).map_err(fail)?;
-    Ok(start == MAGIC)
+pub(crate) fn is_npy(file: &[u8]) -> bool {
+    file.starts_with(MAGIC)
 }
 
-/// Reads what [`write_npy_bytes`] wrote; `None` for other arrays.
-pub(crate) fn read_npy_bytes(path: &Path) -> Result<Option<Vec<u8>>, CliError> {
-    let mut bytes = std::fs::read(path).map_err(|e| CliError::input(&Place::file(path), e))?;
+/// The array of a file that [`write_npy_bytes`] wrote; `None` for others.
+pub(crate) fn npy_bytes(mut bytes: Vec<u8>) -> Option<Vec<u8>> {
     // The header says how many there are; what it is must be the same to the byte.
     let of = |b: &[u8]| Some(10 + usize::from(*b.get(8)?) + (usize::from(*b.get(9)?) << 8));
-    let Some(start) = of(&bytes).filter(|start| *start <= bytes.len()) else { return Ok(None) };
+    let start = of(&bytes).filter(|start| *start <= bytes.len())?;
     let content = bytes.split_off(start);
-    Ok((bytes == header(BYTES, content.len())).then_some(content))
+    (bytes == header(BYTES, content.len())).then_some(content)
 }
 
-/// Columns and rows of an image, and its pixels row by row: an array of rows × columns × 3 floats of 32 or 64 bits.
-pub(crate) fn read_npy_image(path: &Path) -> Result<([u32; 2], Vec<[f64; 3]>), CliError> {
+/// Columns and rows of an image, and its pixels row by row: an array of rows × columns × 3 floats of 32 or 64 bits. A file
+/// that is too large for one of the size that is expected is not read.
+pub(crate) fn read_npy_image(
+    path: &Path,
+    expected: [u32; 2],
+) -> Result<([u32; 2], Vec<[f64; 3]>), CliError> {
+    let [w, h] = expected.map(u64::from);
+    let most = MOST_HEADER + 24 * w * h;
+    if path.metadata().is_ok_and(|m| m.len() > most) {
+        let message = format!("it is too large for an image of {w}x{h} pixels");
+        return Err(CliError::input(&Place::file(path), message));
+    }
     let fail = |message: &str| CliError::input(&Place::file(path), message);
     let expected = || fail("expected an array of rows x columns x 3 floats, in C order");
-    let bytes = std::fs::read(path).map_err(|e| fail(&format!("cannot read this file: {e}")))?;
+    let bytes = input_file::read_at(path, None)?;
     let number = |at: usize| bytes.get(at).map(|b| usize::from(*b)).ok_or_else(expected);
     let (length, start) = match number(6)? {
-        1 => (number(8)? + (number(9)? << 8), 10),
+        1 => (number(8)? + (number(9)? << 8), 10_usize),
         _ => (number(8)? + (number(9)? << 8) + (number(10)? << 16) + (number(11)? << 24), 12),
     };
-    let text = bytes.get(start..start + length).ok_or_else(expected)?;
+    let text = start.checked_add(length).and_then(|end| bytes.get(start..end));
+    let text = text.ok_or_else(expected)?;
     let text = String::from_utf8_lossy(text).replace([' ', '\n'], "");
     let value = |key: &str| text.split_once(&format!("'{key}':")).map(|(_, rest)| rest);
     if value("fortran_order").is_none_or(|v| !v.starts_with("False")) {
@@ -122,7 +130,7 @@ mod tests {
         let wide: Vec<u8> = numbers.iter().flat_map(|v| v.to_le_bytes()).collect();
         let narrow: Vec<u8> = numbers.iter().flat_map(|v| (*v as f32).to_le_bytes()).collect();
         for (kind, data) in [("<f8", &wide), ("<f4", &narrow)] {
-            let read = read_npy_image(&file(kind, "(1, 2, 3)", data)).unwrap();
+            let read = read_npy_image(&file(kind, "(1, 2, 3)", data), [2, 1]).unwrap();
             assert_eq!(read, ([2, 1], vec![[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]]));
         }
         for (kind, shape, data, part) in [
@@ -130,12 +138,12 @@ mod tests {
             ("<f8", "(2, 3)", &wide[..], "rows x columns x 3"),
             ("<i8", "(1, 2, 3)", &wide[..], "rows x columns x 3"),
         ] {
-            let error = read_npy_image(&file(kind, shape, data)).unwrap_err().to_string();
+            let error = read_npy_image(&file(kind, shape, data), [2, 1]).unwrap_err().to_string();
             assert!(error.contains(part) && error.contains("image.npy"), "{error}");
         }
         for cut in [0, 7, 11, 40] {
             let bytes = std::fs::read(file("<f8", "(1, 2, 3)", &wide)).unwrap();
-            assert!(read_npy_image(&folder.file("cut.npy", &bytes[..cut])).is_err());
+            assert!(read_npy_image(&folder.file("cut.npy", &bytes[..cut]), [2, 1]).is_err());
         }
     }
 

@@ -14,9 +14,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Place;
 use crate::fingerprint::Fingerprint;
-use crate::image::read_attachment;
-use crate::npy::{is_npy, read_npy_bytes};
-use crate::{CliError, PROGRAM};
+use crate::image::attachment;
+use crate::npy::{is_npy, npy_bytes};
+use crate::{CliError, PROGRAM, checksum, input_file};
 
 /// Everything that a shard knows.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -124,20 +124,32 @@ impl ShardFile {
         }
     }
 
+    /// What to put into a file, with a place for its [`checksum`].
     pub(crate) fn bytes(&self) -> Result<Vec<u8>, CliError> {
-        postcard::to_allocvec(self).map_err(|e| CliError::argument(format!("a shard: {e}")))
+        postcard::to_extend(self, checksum::space().to_vec())
+            .map_err(|e| CliError::argument(format!("a shard: {e}")))
     }
 
     /// Reads what a shard has left in an EXR or NPY file.
     pub(crate) fn read(path: &Path) -> Result<Self, CliError> {
+        Self::parse(path, input_file::read_at(path, None)?)
+    }
+
+    fn parse(path: &Path, file: Vec<u8>) -> Result<Self, CliError> {
         let fail = |message: String| CliError::input(&Place::file(path), message);
-        let bytes = match is_npy(path)? {
-            true => read_npy_bytes(path)?,
-            false => read_attachment(path)?,
-        };
         let expected = "expected a file that `drt render` or `drt grad` wrote with --shard";
+        match checksum::is_whole(&file) {
+            None => return Err(fail(format!("it is not a shard; {expected}"))),
+            Some(false) => return Err(fail("it is damaged: its checksum does not fit".into())),
+            Some(true) => {}
+        }
+        let bytes = match is_npy(&file) {
+            true => npy_bytes(file),
+            false => attachment(path, &file)?,
+        };
+        let bytes = bytes.as_deref().and_then(checksum::content);
         let bytes = bytes.ok_or_else(|| fail(format!("it is not a shard; {expected}")))?;
-        let (program, _) = postcard::take_from_bytes::<String>(&bytes)
+        let (program, _) = postcard::take_from_bytes::<String>(bytes)
             .map_err(|e| fail(format!("it is not a shard: {e}; {expected}")))?;
         if program != PROGRAM {
             return Err(fail(format!(
@@ -145,11 +157,59 @@ impl ShardFile {
                  version that made them"
             )));
         }
-        postcard::from_bytes(&bytes).map_err(|e| fail(format!("it is damaged: {e}")))
+        postcard::from_bytes(bytes).map_err(|e| fail(format!("it is damaged: {e}")))
     }
 }
 
 /// The only view of a gradient of a loss.
 pub(crate) fn view(target: Reference) -> View {
     View { sensor: 0, reference: target }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::checksum::tests::damaged;
+    use crate::testing::Folder;
+
+    const SCENE: &str = r#"<scene version="3.0.0"><sensor type="perspective">
+  <film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="4"/></film></sensor>
+  <emitter type="constant" id="sky"/></scene>"#;
+    const JOB: &str = "scene = \"s.xml\"\n[[parameter]]\nname = \"p\"\n[[parameter.effect]]\n\
+                       target = \"sky\"\nproperty = \"radiance\"\nmultiply = 1.0\n";
+
+    #[test]
+    fn every_damaged_shard_is_refused() {
+        let folder = Folder::new();
+        folder.file("s.xml", SCENE);
+        let job = folder.file("j.toml", JOB);
+        let target = folder.path().join("t.exr");
+        let run = |line: &[&str]| crate::commands::main(line.iter().map(Into::into));
+        let text = |path: &Path| path.to_string_lossy().into_owned();
+        let (job, target) = (text(&job), text(&target));
+        assert_eq!(run(&["drt", "render", &job, "--spp", "4", "--quiet", "-o", &target]), 0);
+        for (name, more) in [("1.exr", None), ("1.npy", Some(["--loss", &target]))] {
+            let path = folder.path().join(name);
+            let output = text(&path);
+            let line =
+                ["drt", "grad", &job, "--shard", "1/2", "--quiet", "--spp", "4", "-o", &output];
+            let line: Vec<&str> = line.into_iter().chain(more.into_iter().flatten()).collect();
+            assert_eq!(run(&line), 0);
+            let file = std::fs::read(&path).unwrap();
+            assert!(ShardFile::parse(&path, file.clone()).is_ok());
+            for copy in damaged(&file, 1000) {
+                assert!(ShardFile::parse(&path, copy).is_err());
+            }
+            // Another version of the program, of a name as long.
+            let mut other = file;
+            let seal = &checksum::space()[..16];
+            let at = other.windows(seal.len()).position(|w| w == seal).unwrap();
+            let end = at + checksum::space().len() + 1 + PROGRAM.len();
+            assert!(other[..end].ends_with(PROGRAM.as_bytes()));
+            other[end - 1] ^= 1;
+            checksum::seal(&mut other);
+            let error = ShardFile::parse(&path, other).unwrap_err().to_string();
+            assert!(error.contains("it was written by drt"), "{error}");
+        }
+    }
 }

@@ -233,3 +233,110 @@ fn ctrl_c_keeps_what_is_finished() {
     assert!(digest["spp"].as_u64().unwrap() > 0);
     assert_eq!(folder.exr("a.exr").attributes["drt_complete"], "0");
 }
+
+#[test]
+fn what_is_read_is_not_overwritten() {
+    let folder = folder();
+    let text = |name: &str| std::fs::read_to_string(folder.path().join(name)).unwrap();
+    for (line, parts) in [
+        ("render scene.xml -o scene.xml", &["-o: scene.xml is read"][..]),
+        ("render scene.xml -o ./a.exr --digest a.exr", &["--digest: a.exr", "-o"]),
+        ("grad job.toml --digest job.toml", &["--digest: job.toml is read"]),
+        ("grad job.toml --preview ../NAME/scene.xml", &["--preview: ", "scene.xml is read"]),
+        ("bench job.toml --csv scene.xml", &["--csv: scene.xml is read"]),
+        ("preview scene.xml -o scene.xml", &["-o: scene.xml is read"]),
+        ("merge scene.xml job.toml -o scene.xml", &["-o: scene.xml is read"]),
+        ("batch job.toml -o . --list scene.xml", &["scene.xml"]),
+    ] {
+        let name = folder.path().file_name().unwrap().to_string_lossy().into_owned();
+        let out = folder.run(&line.replace("NAME", &name));
+        expect(&out, 2, parts);
+        assert_eq!((text("scene.xml"), text("job.toml")), (SCENE.into(), JOB.into()), "{line}");
+    }
+    folder.file("list", "scene.xml -o job.toml\njob.toml\n");
+    expect(&folder.run("batch --list list -o out"), 2, &["job.toml is read, and would be"]);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3, "nothing is written");
+}
+
+#[cfg(unix)]
+#[test]
+fn links_and_pipes() {
+    use std::os::unix::fs::symlink;
+
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    symlink(at("scene.xml"), at("link.xml")).unwrap();
+    expect(&folder.run("render link.xml -o scene.xml"), 2, &["-o: scene.xml is read"]);
+    // A link that somebody planted is replaced, not followed.
+    folder.file("theirs", "theirs");
+    symlink(at("theirs"), at("a.exr")).unwrap();
+    expect(&folder.run("render scene.xml -o a.exr"), 0, &[]);
+    assert_eq!(std::fs::read_to_string(at("theirs")).unwrap(), "theirs");
+    assert!(at("a.exr").symlink_metadata().unwrap().is_file());
+    assert!(Command::new("mkfifo").arg(at("fifo")).status().unwrap().success());
+    for line in [
+        "info fifo",
+        "info /dev/zero",
+        "merge fifo",
+        "preview fifo",
+        "grad job.toml --loss fifo -o g.npy",
+    ] {
+        expect(&folder.run(line), 2, &["regular file"]);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn readers_that_go_and_disks_that_are_full() {
+    let folder = folder();
+    folder.file("a.json", "");
+    for line in
+        ["info job.toml", "check job.toml --spp 1 --quiet", "man", "completions bash", "--help"]
+    {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let out = folder.command(line).stdout(full).output().unwrap();
+        expect(&out, 3, &["drt: error: cannot write to the standard output"]);
+        // A pipe whose other end is closed.
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let out = folder.command(line).stdout(writer).output().unwrap();
+        assert!(matches!(out.status.code(), Some(0 | 1)), "{line}: {}", out.status);
+        assert!(!String::from_utf8_lossy(&out.stderr).contains("panicked"));
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let mut command = folder.command("render scene.xml -o a.exr");
+        assert_eq!(command.stderr(full).status().unwrap().code(), Some(0));
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn signals_end_a_run_with_what_is_finished() {
+    use std::time::{Duration, Instant};
+
+    for (signal, line) in [
+        ("TERM", "render scene.xml --quiet --spp 100000000 -o a.exr"),
+        ("INT", "grad job.toml --quiet --spp 100000000 --threads 1 -o a.exr"),
+    ] {
+        let folder = folder();
+        let mut child = folder.command(line).spawn().unwrap();
+        std::thread::sleep(Duration::from_millis(1500));
+        let asked = Instant::now();
+        let id = child.id().to_string();
+        assert!(Command::new("kill").args(["-s", signal, &id]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{line}");
+        assert!(asked.elapsed() < Duration::from_secs(10), "{:?}", asked.elapsed());
+        assert_eq!(folder.exr("a.exr").attributes["drt_complete"], "0");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn films_that_do_not_fit_into_memory() {
+    let folder = folder();
+    let mut shell = Command::new("sh");
+    let drt = env!("CARGO_BIN_EXE_drt");
+    let line =
+        format!("ulimit -v 2000000; {drt} grad job.toml --size 8192x8192 --threads 1 -o a.exr");
+    let out = shell.current_dir(folder.path()).args(["-c", &line]).output().unwrap();
+    expect(&out, 2, &["the film of 8192x8192 pixels", "GB", "--size"]);
+}

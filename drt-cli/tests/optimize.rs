@@ -386,3 +386,77 @@ fn ctrl_c_stores_and_the_rest_follows() {
     expect(&broken.run("optimize job.toml --quiet"), 0, &[]);
     assert_eq!(outcome(&whole), outcome(&broken));
 }
+
+#[test]
+fn a_checkpoint_knows_all_that_it_was_made_from() {
+    let folder = folder(FIT);
+    let plane = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n";
+    folder.file("mesh.obj", plane);
+    folder.file("inc.xml", "<scene version=\"3.0.0\"><default name=\"w\" value=\"0\"/></scene>");
+    let more = "<include filename=\"inc.xml\"/><shape type=\"obj\"><string name=\"filename\" value=\"mesh.obj\"/>\
+                <transform name=\"to_world\"><translate z=\"-1\" x=\"$w\"/></transform></shape></scene>";
+    folder.file("scene.xml", SCENE.replace("</scene>", more));
+    let line = "optimize job.toml --quiet --iterations 2";
+    expect(&folder.run(line), 0, &[]);
+    let target = std::fs::read(folder.path().join("target.exr")).unwrap();
+    let tables = text(&folder, "run/params.csv");
+    let files = [
+        ("mesh.obj", text(&folder, "mesh.obj"), "mesh.obj has changed since"),
+        ("inc.xml", text(&folder, "inc.xml"), "inc.xml has changed since"),
+        ("scene.xml", text(&folder, "scene.xml"), "scene.xml has changed since"),
+    ];
+    for (name, before, part) in &files {
+        folder.file(name, format!("{before}\n"));
+        expect(&folder.run(line), 2, &["checkpoint.json: it belongs to another problem", part]);
+        folder.file(name, before);
+    }
+    render(&folder, "-o target.exr --seed 4");
+    expect(&folder.run(line), 2, &["target.exr has changed since"]);
+    folder.file("target.exr", target);
+    expect(&folder.run(&format!("{line} -D w=0.5")), 2, &["-D w was not given and is `0.5` now"]);
+    folder.file("run/params.csv", tables.replacen("1,", "1,1", 1));
+    expect(&folder.run(line), 2, &["run/params.csv: its numbers are not those"]);
+    folder.file("run/params.csv", tables);
+    expect(&folder.run("optimize job.toml --quiet --iterations 3"), 0, &[]);
+}
+
+#[test]
+fn what_a_fit_reads_is_not_overwritten() {
+    let folder = folder(&FIT.replace("target.exr", "run/target.png"));
+    std::fs::create_dir(folder.path().join("run")).unwrap();
+    render(&folder, "-o a.exr --preview run/target.png");
+    expect(&folder.run("optimize job.toml --quiet"), 2, &["run/target.png would be overwritten"]);
+    for output in ["-o target.exr", "--digest job.toml", "-o run/report.html"] {
+        let job = format!("{JOB}{FIT}");
+        folder.file("job.toml", &job);
+        render(&folder, "-o target.exr");
+        expect(&folder.run(&format!("optimize job.toml --quiet {output}")), 2, &["overwritten"]);
+        assert_eq!(text(&folder, "job.toml"), job);
+    }
+    folder.file("file", "");
+    folder.file("job.toml", format!("{JOB}{}", FIT.replace("\"run\"", "\"file\"")));
+    expect(&folder.run("optimize job.toml --quiet"), 3, &["file is not a folder"]);
+}
+
+#[test]
+fn steps_end_where_properties_have_a_meaning() {
+    // The target is black, as no more than a reflectance of nothing makes it.
+    let folder = Folder::new();
+    folder.file("scene.xml", SCENE);
+    let fit = "[optimize]\ntargets = [\"target.exr\"]\ncheckpoint = \"run\"\n\
+               optimizer = { kind = \"adam\", learning_rate = 0.2, iterations = 6 }\n";
+    let job = JOB.replace("[[parameter]]\nname = \"lamp-x\"", "[[unused]]");
+    let job = job.split("[[unused]]").next().unwrap();
+    folder.file("job.toml", format!("{job}{fit}"));
+    folder.file(
+        "dark.xml",
+        SCENE.replace("1\"/></emitter>", "1\"/><rgb name=\"intensity\" value=\"0\"/></emitter>"),
+    );
+    expect(&folder.run("render dark.xml --quiet --spp 64 -o target.exr"), 0, &[]);
+    let out = folder.run("optimize job.toml");
+    expect(&out, 0, &["parameter `gray` is held at its limit", "\"reflectance\" is", "0 or more"]);
+    assert_eq!(String::from_utf8_lossy(&out.stderr).matches("held at its limit").count(), 1);
+    let [gray] = result(&folder)[..] else { panic!() };
+    assert!((-0.5..=-0.49).contains(&gray), "{gray}");
+    assert!(text(&folder, "run/report.html").contains("held at its limit"));
+}

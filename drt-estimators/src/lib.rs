@@ -38,4 +38,5 @@ pub use model::{emitter, filter, sensor, surface, texture};
 pub use run::finite_difference::finite_differences;
 pub use run::reverse::{GradientBatch, gradient, gradient_in_batches};
 pub use run::session::{Control, FinishedTile, Merged, Session, ShardError, ShardSums, Unattended};
+pub use run::stencil::one_sided_differences;
 pub use world::cache::PreparedCache;

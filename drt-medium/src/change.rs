@@ -70,6 +70,17 @@ pub(crate) struct FieldChange {
 }
 
 impl MediumChange {
+    /// The property that this may take out of the range in which it has a meaning, where it is in it before: one that it
+    /// adds to, an albedo that it multiplies. See [`Medium::check`].
+    #[must_use]
+    pub fn pushes(&self, theta: f64) -> Option<Property> {
+        let change = self.field()?;
+        let ValueMap { factor, offset } = change.op.map(theta);
+        let albedo = matches!(change.field, Field::Albedo);
+        let keeps = offset.is_zero() && (factor == 1.0 || factor >= 0.0 && !albedo);
+        (!keeps).then(|| change.property())
+    }
+
     pub(crate) fn field(&self) -> Option<FieldChange> {
         let change = |field, op, voxel| Some(FieldChange { field, op, voxel });
         match *self {

@@ -61,7 +61,7 @@ impl Volume {
     fn check(&self, property: Property) -> Result<(), MediumError> {
         match self {
             Self::Constant(c) => check(property, *c),
-            Self::Grid(g) => check_grid(property, g),
+            Self::Grid(g) => check_grid(property, g, 1.0),
         }
     }
     pub(crate) fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
@@ -72,8 +72,9 @@ impl Volume {
     }
 }
 
-fn check_grid(property: Property, grid: &Grid) -> Result<(), MediumError> {
-    grid.values().iter().try_for_each(|&v| check(property, Rgb::splat(v)))
+/// Refuses a grid with values that times `scale` are out of the property's range.
+fn check_grid(property: Property, grid: &Grid, scale: f64) -> Result<(), MediumError> {
+    grid.values().iter().try_for_each(|&v| check(property, Rgb::splat(v * scale)))
 }
 
 /// A medium given by voxels: extinction = scale × density grid, with albedo and emission from
@@ -109,12 +110,25 @@ impl GridMedium {
         emission: Volume,
     ) -> Result<Self, MediumError> {
         check(Property::SigmaT, Rgb::splat(scale))?;
-        check_grid(Property::SigmaT, &density)?;
+        check_grid(Property::SigmaT, &density, 1.0)?;
         albedo.check(Property::Albedo)?;
         emission.check(Property::Emission)?;
         let bounds = Bounds::new(&density);
         let floor_depth = Self::DEFAULT_FLOOR_DEPTH;
         Ok(Self { density, scale, albedo, emission, bounds, floor_depth })
+    }
+
+    /// Refuses values outside of a property's physical range.
+    pub(crate) fn check_property(&self, property: Property) -> Result<(), MediumError> {
+        match property {
+            Property::SigmaT => {
+                check(property, Rgb::splat(self.scale))?;
+                check_grid(property, &self.density, self.scale)
+            }
+            Property::Albedo => self.albedo.check(property),
+            Property::Emission => self.emission.check(property),
+            Property::G => Ok(()),
+        }
     }
 
     /// Another least majorant for defensive sampling, given by its optical depth along the diagonal

@@ -4,10 +4,11 @@ use core::ops::ControlFlow;
 
 use drt_math::{Affine, Rgb, Rng, Vec3};
 
+use crate::homogeneous::check;
 use crate::tracking::zip;
 use crate::{
     CoefficientGradients, Coefficients, Crossing, DeformedGrid, DensityField, DistanceSample,
-    GridMedium, Homogeneous, MediumError, Phase, Ray, SpaceMap, TrackingStats, tracking,
+    GridMedium, Homogeneous, MediumError, Phase, Property, Ray, SpaceMap, TrackingStats, tracking,
 };
 
 /// Where a medium gets its coefficients from.
@@ -76,6 +77,26 @@ impl Medium {
             MediumKind::Grid(g) => g.coefficients(x),
             MediumKind::Deformed(d) => d.coefficients(x),
             MediumKind::Custom(f) => f.coefficients(x),
+        }
+    }
+
+    /// Refuses a property that [changes](Self::apply) have taken out of the range in which it has a meaning.
+    ///
+    /// # Errors
+    /// Names the property, a value and the range.
+    pub fn check(&self, property: Property) -> Result<(), MediumError> {
+        let coefficients = match &self.kind {
+            MediumKind::Homogeneous(h) => h.coefficients(),
+            MediumKind::Grid(g) => return g.check_property(property),
+            MediumKind::Deformed(d) => return d.grids().check_property(property),
+            MediumKind::Custom(_) => return Ok(()),
+        };
+        match property {
+            Property::SigmaT => check(property, coefficients.sigma_t),
+            Property::Albedo => check(property, coefficients.albedo),
+            Property::Emission => check(property, coefficients.emission),
+            // There is no phase function with another one.
+            Property::G => Ok(()),
         }
     }
 

@@ -297,3 +297,25 @@ fn changes_that_do_not_fit_say_why() {
     let rayleigh = &mut Medium { phase: Phase::Rayleigh, ..plain() };
     assert_eq!(rayleigh.apply(&MediumChange::G(ADD_GRAY), 0.1), Err(MediumError::NoMeanCosine));
 }
+
+#[test]
+fn changes_that_leave_the_physical_range_are_found() {
+    let down = |voxels| MediumChange::SigmaT { op: ValueChange::Add(Rgb::splat(-1.0)), voxels };
+    let mut fog = Medium::new(
+        Homogeneous::new(Rgb::splat(0.5), Rgb::splat(0.5), Rgb::ZERO).unwrap(),
+        Phase::Isotropic,
+    );
+    assert_eq!(down(None).pushes(0.0), None);
+    assert_eq!(down(None).pushes(1.0), Some(Property::SigmaT));
+    fog.apply(&down(None), 0.5).unwrap();
+    fog.check(Property::SigmaT).unwrap();
+    fog.apply(&down(None), 0.5).unwrap();
+    let error = fog.check(Property::SigmaT).unwrap_err().to_string();
+    assert!(error.contains("sigma_t is -0.5; it must be finite and not negative"), "{error}");
+    let brighter = MediumChange::Albedo { op: ValueChange::Multiply(3.0), voxels: None };
+    assert_eq!(brighter.pushes(1.0), Some(Property::Albedo));
+    fog.apply(&brighter, 1.0).unwrap();
+    assert!(fog.check(Property::Albedo).is_err() && fog.check(Property::Emission).is_ok());
+    let thinner = MediumChange::SigmaT { op: ValueChange::MultiplyLog(-3.0), voxels: None };
+    assert_eq!(thinner.pushes(1.0), None, "it keeps its sign");
+}

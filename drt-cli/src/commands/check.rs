@@ -8,7 +8,7 @@ use super::noise::relative_noise;
 use super::options::Options;
 use super::outputs::Outputs;
 use super::table::Table;
-use super::{Outcome, run};
+use super::{Outcome, run, stop};
 use crate::digest::Verdict;
 use crate::{CliError, Job};
 
@@ -20,11 +20,15 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
             job.path.display()
         )));
     }
-    let outputs = Outputs::new(options, "check")?;
+    let outputs = Outputs::new(options, &job, "check")?;
+    run::tell_one_sided(&job, options.changes.quiet)?;
     let monitor = Monitor::new(options.changes.quiet);
     let mut rendering = derivatives(&job, options, &monitor, 0.4, &mut run::Shared::default())?;
     let differences = match rendering.complete {
-        true => two_steps(&job, rendering.spp, &monitor)?,
+        true => {
+            keep(&job, &outputs, &rendering);
+            two_steps(&job, rendering.spp, &monitor)?
+        }
         false => None,
     };
     monitor.finish();
@@ -38,13 +42,17 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     let further: Vec<(String, &Layer)> = names.zip(&fine).collect();
     outputs.write(&job, &rendering, &further, &verdicts)?;
     let table = table(&verdicts);
-    if outputs.digest_on_stdout() {
-        eprint!("{table}");
-    } else {
-        print!("{table}");
-    }
+    outputs.tell(&table.to_string())?;
     let agrees = verdicts.iter().all(|v| v.agrees);
     Ok(if agrees { Outcome::Done } else { Outcome::Failed })
+}
+
+/// What is written where the program must end while differences are prepared.
+fn keep(job: &Job, outputs: &Outputs, rendering: &Rendering) {
+    let (job, outputs) = (job.clone(), outputs.clone());
+    let rendering = Rendering { complete: false, ..rendering.clone() };
+    // Nobody is left to be told that it cannot be written.
+    stop::rescue(move || drop(outputs.write(&job, &rendering, &[], &[])));
 }
 
 /// Differences at the job's step and at half of it.

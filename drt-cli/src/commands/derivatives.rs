@@ -37,6 +37,7 @@ fn by_differences(
     shared: &mut Shared,
 ) -> Result<Rendering, CliError> {
     let started = Instant::now();
+    run::tell_one_sided(job, options.changes.quiet)?;
     let mut session = run::prepare_forward(job, shared)?;
     monitor.stage("image", 0.0, 0.3 * part);
     let images = 1.0 + 2.0 * job.parameters.len() as f64;

@@ -14,10 +14,13 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     let common = &options.common;
     let mut job = run::open_with_parameters(common)?;
     job.settings.terms = options.terms;
+    if options.terms {
+        job.check_terms()?;
+    }
     if let Some(shard) = options.shard {
         return shard::images(&job, common, "grad", shard);
     }
-    let outputs = Outputs::new(common, "grad")?;
+    let outputs = Outputs::new(common, &job, "grad")?;
     let monitor = Monitor::new(common.changes.quiet);
     let rendering = derivatives(&job, common, &monitor, 1.0, &mut run::Shared::default())?;
     monitor.finish();

@@ -1,6 +1,6 @@
 //! `drt grad --loss` and `--adjoint`: the gradient of a loss by the parameters.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use drt_estimators::fit::{Fit, View};
 use drt_estimators::loss::{Loss, Reference};
@@ -10,6 +10,7 @@ use drt_estimators::{
 use drt_math::Rgb;
 
 use super::derivatives::derivatives;
+use super::destinations::Destinations;
 use super::monitor::Monitor;
 use super::options::GradOptions;
 use super::outputs::Outputs;
@@ -19,7 +20,7 @@ use crate::fingerprint::Fingerprint;
 use crate::image::read_picture;
 use crate::npy::{write_npy, write_npy_bytes};
 use crate::shard_file::{Batch, ShardFile, Sums, Total};
-use crate::{CliError, Job, check_target};
+use crate::{CliError, Job};
 
 /// Between the seeds of an image and of the gradient by what it says.
 const INDEPENDENT: u64 = 0xa076_1d64_78bd_642f;
@@ -43,7 +44,6 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     let Some(output) = &common.output else {
         return Err(CliError::argument("a gradient needs -o FILE.npy to be written to"));
     };
-    check_target(output)?;
     let mut job = run::open(common)?;
     if job.text.is_none() {
         return Err(CliError::argument(format!(
@@ -55,7 +55,10 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     if shard.is_some() {
         shard::check(&job, common, "grad")?;
     }
-    let (monitor, start) = (Monitor::new(common.changes.quiet), Outputs::new(common, "grad")?);
+    let pictures = [&options.loss, &options.adjoint].into_iter().flatten().map(PathBuf::as_path);
+    Destinations::new([("-o", Some(output.as_path()))]).spare(pictures)?;
+    let (monitor, start) =
+        (Monitor::new(common.changes.quiet), Outputs::new(common, &job, "grad")?);
     // Before the seed is changed for the gradient's own samples.
     let asked = job.clone();
     let found = match (&options.loss, &options.adjoint) {
@@ -232,7 +235,5 @@ fn picture(job: &Job, path: &Path) -> Result<Vec<Rgb>, CliError> {
     let Some(sensor) = job.scene.sensors.get(job.settings.sensor) else {
         return Err(CliError::input(&Place::file(&job.scene_path), "the scene has no <sensor>"));
     };
-    let picture = read_picture(path)?;
-    picture.check_size(path, sensor.item.sensor.film())?;
-    Ok(picture.linear())
+    Ok(read_picture(path, sensor.item.sensor.film())?.linear())
 }

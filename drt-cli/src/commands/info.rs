@@ -13,21 +13,19 @@ use drt_motion::{Change, Parameter};
 use super::options::Options;
 use super::table::Table;
 use super::{Outcome, run};
-use crate::{CliError, Job};
+use crate::{CliError, Job, console};
 
 pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     let job = run::open(options)?;
-    print!("{}", describe(&job));
+    console::print(describe(&job))?;
     // The plan comes last: preparing it can fail for reasons that the tables help to find.
     if job.scene.sensors.is_empty() {
-        println!("no plan: the scene has no <sensor>");
+        console::print("no plan: the scene has no <sensor>\n")?;
     } else if let Err(e) = job.require_derivatives() {
-        println!("no plan: {e}");
+        console::print(format!("no plan: {e}\n"))?;
     } else {
-        print!(
-            "plan\n{}",
-            run::prepare(&job, &job.parameters, &mut run::Shared::default())?.plan()
-        );
+        let session = run::prepare(&job, &job.parameters, &mut run::Shared::default())?;
+        console::print(format!("plan\n{}", session.plan()))?;
     }
     Ok(Outcome::Done)
 }

@@ -13,12 +13,12 @@ use crate::digest::RunFacts;
 use crate::error::Place;
 use crate::npy::write_npy;
 use crate::shard_file::{ShardFile, Sums, Total, view};
-use crate::{CliError, Provenance, check_target};
+use crate::{CliError, Provenance, console};
 
 pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
     let files =
         Files { output: &options.output, digest: &options.digest, preview: &options.preview };
-    files.check()?;
+    files.check(options.shards.iter().map(PathBuf::as_path))?;
     let mut shards = Vec::new();
     for path in &options.shards {
         shards.push(Given { path: path.clone(), file: ShardFile::read(path)? });
@@ -34,7 +34,9 @@ pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
             )));
         }
         if !options.quiet {
-            eprintln!("drt: warning: of {count} shards, these are missing: {list}");
+            console::note(format_args!(
+                "drt: warning: of {count} shards, these are missing: {list}"
+            ));
         }
     }
     match &given.0[0].file.sums {
@@ -59,7 +61,6 @@ pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
                     )));
                 }
             }
-            check_target(output)?;
             write_npy(output, &given.gradient()?)?;
         }
     }

@@ -5,6 +5,7 @@ mod bench;
 mod check;
 mod clock;
 mod derivatives;
+mod destinations;
 mod grad;
 mod gradient;
 mod info;
@@ -20,13 +21,17 @@ mod render;
 mod run;
 mod shard;
 mod shell;
+mod stop;
 mod table;
 
 use std::ffi::OsString;
+use std::io::IsTerminal;
 
 use clap::Parser;
 
 use crate::CliError;
+use crate::console;
+use crate::wording::{readable, shown};
 use options::{Command, CommandLine};
 
 /// How a command ended.
@@ -47,7 +52,7 @@ impl Outcome {
         match self {
             Self::Done => 0,
             Self::Failed => 1,
-            Self::Interrupted => 130,
+            Self::Interrupted => stop::STOPPED,
             Self::Silent(code) => code,
         }
     }
@@ -60,7 +65,7 @@ fn noted(rendering: &drt_estimators::Rendering) -> Outcome {
 
 /// Runs the command line `args`, the first of which is the program's name, and returns its exit
 /// code: 0 done, 1 a check failed, 2 unusable input or arguments, 3 failure while writing, 130
-/// stopped by Ctrl-C.
+/// stopped by Ctrl-C or SIGTERM.
 ///
 /// Errors are told in one message on the standard error.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
@@ -68,10 +73,16 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> u8 {
         Ok(line) => line,
         Err(e) => return explain(&e),
     };
-    match dispatch(&line.command) {
-        Ok(outcome) => outcome.exit_code(),
+    stop::listen();
+    told(dispatch(&line.command).map(Outcome::exit_code))
+}
+
+/// The exit code, with the error on the standard error if there is one.
+fn told(result: Result<u8, CliError>) -> u8 {
+    match result {
+        Ok(code) => code,
         Err(e) => {
-            eprintln!("drt: error: {e}");
+            console::note(format_args!("drt: error: {}", shown(&e.to_string())));
             e.exit_code()
         }
     }
@@ -84,10 +95,16 @@ fn explain(e: &clap::Error) -> u8 {
     match text.strip_prefix("error: ") {
         Some(text) if code != 0 => {
             let message = text.split("\n\nUsage:").next().unwrap_or(text);
-            eprintln!("drt: error: {}", message.trim_end());
+            let message = readable(message.trim_end());
+            console::note(format_args!("drt: error: {message}"));
         }
-        // Where not even the help can be shown, nobody is listening.
-        _ => drop(e.print()),
+        _ if code != 0 => console::note(text.trim_end()),
+        // Help, which is a result.
+        _ => {
+            let styled = std::io::stdout().is_terminal();
+            let help = if styled { e.render().ansi().to_string() } else { text };
+            return told(console::print(help).map(|()| code));
+        }
     }
     code
 }

@@ -1,13 +1,11 @@
 //! What watches a run: progress on a terminal, and Ctrl-C.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use drt_estimators::Control;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-/// Set by the first Ctrl-C; signal handlers can reach only statics.
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+use super::stop;
 
 /// Steps of the bar.
 const RESOLUTION: f64 = 1000.0;
@@ -29,15 +27,8 @@ struct Place {
 }
 
 impl Monitor {
-    /// Starts to listen for Ctrl-C: the first one stops the run, the second one the program. The bar
-    /// shows on a terminal only.
+    /// The bar shows on a terminal only.
     pub(super) fn new(quiet: bool) -> Self {
-        // Fails when a handler is already there, as for the second command of one process.
-        let _ = ctrlc::set_handler(|| {
-            if INTERRUPTED.swap(true, Ordering::Relaxed) {
-                std::process::exit(130);
-            }
-        });
         let target = if quiet {
             ProgressDrawTarget::hidden()
         } else {
@@ -75,7 +66,7 @@ impl Monitor {
     }
 
     pub(super) fn interrupted(&self) -> bool {
-        INTERRUPTED.load(Ordering::Relaxed)
+        stop::asked()
     }
 }
 

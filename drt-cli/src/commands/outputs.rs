@@ -5,15 +5,17 @@ use std::path::{Path, PathBuf};
 use drt_estimators::{Layer, Rendering, Tail};
 
 use super::clock::Clock;
+use super::destinations::Destinations;
 use super::noise::largest_noise;
 use super::options::Options;
 use crate::digest::{RunFacts, Verdict, digest, write_digest};
 use crate::shard_file::ShardFile;
-use crate::{CliError, Job, Provenance, check_target, write_exr, write_preview};
+use crate::{CliError, Job, Provenance, console, write_exr, write_preview};
 
 /// Measures a command from its start and writes its results.
-pub(super) struct Outputs<'a> {
-    options: &'a Options,
+#[derive(Clone)]
+pub(super) struct Outputs {
+    options: Options,
     command: &'static str,
     clock: Clock,
     /// The hash of the inputs, where the image shall tell.
@@ -22,11 +24,16 @@ pub(super) struct Outputs<'a> {
     attachment: Option<Vec<u8>>,
 }
 
-impl<'a> Outputs<'a> {
-    /// Starts the clock and refuses places that cannot be written.
-    pub(super) fn new(options: &'a Options, command: &'static str) -> Result<Self, CliError> {
+impl Outputs {
+    /// Starts the clock and refuses places that cannot be written, or that hold what the job was read from.
+    pub(super) fn new(
+        options: &Options,
+        job: &Job,
+        command: &'static str,
+    ) -> Result<Self, CliError> {
         let Options { output, digest, preview, .. } = options;
-        Files { output, digest, preview }.check()?;
+        Files { output, digest, preview }.check(job.inputs())?;
+        let options = options.clone();
         Ok(Self { options, command, clock: Clock::start(), inputs: None, attachment: None })
     }
 
@@ -47,9 +54,28 @@ impl<'a> Outputs<'a> {
         shard.threads = threads(self.options.changes.threads.map_or(0, usize::from));
     }
 
-    /// True when the standard output belongs to the digest.
-    pub(super) fn digest_on_stdout(&self) -> bool {
-        self.options.digest.as_deref() == Some(Path::new("-"))
+    /// Refuses to overwrite more than what the job was read from.
+    pub(super) fn spare<'p>(
+        &self,
+        read: impl IntoIterator<Item = &'p Path>,
+    ) -> Result<(), CliError> {
+        let Options { output, digest, preview, .. } = &self.options;
+        Files { output, digest, preview }.destinations().spare(read)
+    }
+
+    /// The files that are asked for.
+    pub(super) fn files(&self) -> impl Iterator<Item = &Path> {
+        let Options { output, digest, preview, .. } = &self.options;
+        [output, digest, preview].into_iter().flatten().map(PathBuf::as_path)
+    }
+
+    /// Prints lines for people; the standard output may belong to the digest.
+    pub(super) fn tell(&self, lines: &str) -> Result<(), CliError> {
+        if self.options.digest.as_deref() == Some(Path::new("-")) {
+            console::note(lines.trim_end());
+            return Ok(());
+        }
+        console::print(lines)
     }
 
     /// Writes what was asked for. `further` images, such as finite differences, go into the image
@@ -80,7 +106,7 @@ impl<'a> Outputs<'a> {
             inputs: self.inputs.clone(),
             attachment: self.attachment.clone(),
         };
-        let Options { output, digest, preview, .. } = self.options;
+        let Options { output, digest, preview, .. } = &self.options;
         let files = Files { output, digest, preview };
         files.write(rendering, further, checks, &facts, &provenance)?;
         if !self.options.changes.quiet {
@@ -98,14 +124,22 @@ pub(super) struct Files<'a> {
 }
 
 impl Files<'_> {
-    /// Refuses places that cannot be written.
-    pub(super) fn check(&self) -> Result<(), CliError> {
-        let files = [self.output, self.digest, self.preview];
-        files
-            .into_iter()
-            .flatten()
-            .filter(|p| p.as_os_str() != "-")
-            .try_for_each(|p| check_target(p))
+    /// Refuses places that cannot be written, or that hold something that is read.
+    pub(super) fn check<'p>(
+        &self,
+        read: impl IntoIterator<Item = &'p Path>,
+    ) -> Result<(), CliError> {
+        let destinations = self.destinations();
+        destinations.spare(read)?;
+        destinations.check()
+    }
+
+    pub(super) fn destinations(&self) -> Destinations {
+        Destinations::new([
+            ("-o", self.output.as_deref()),
+            ("--digest", self.digest.as_deref()),
+            ("--preview", self.preview.as_deref()),
+        ])
     }
 
     pub(super) fn write(
@@ -144,11 +178,11 @@ fn warn_of_heavy_tails(rendering: &Rendering) {
     for (name, layer) in [("the image", &rendering.image)].into_iter().chain(derivatives) {
         let share = layer.tail.share();
         if share > Tail::HEAVY {
-            eprintln!(
+            console::note(format_args!(
                 "note: {name}: one sample makes {:.0} % of the second moment; its standard errors may be too small. \
                  More samples, another estimator or sampling = \"bidirectional\" tell",
                 100.0 * share
-            );
+            ));
         }
     }
 }
@@ -158,12 +192,15 @@ pub(super) fn summarize(rendering: &Rendering, seconds: f64) {
     let noise = 100.0 * largest_noise(rendering);
     let complete = if rendering.complete { "" } else { ", incomplete" };
     let spp = rendering.spp;
-    eprintln!("{w}x{h}, {spp} spp, {seconds:.2} s, relative noise {noise:.2} %{complete}");
+    console::note(format_args!(
+        "{w}x{h}, {spp} spp, {seconds:.2} s, relative noise {noise:.2} %{complete}"
+    ));
     warn_of_heavy_tails(rendering);
     if rendering.non_finite > 0 {
-        eprintln!("warning: {} contributions were not finite", rendering.non_finite);
+        let count = rendering.non_finite;
+        console::note(format_args!("warning: {count} contributions were not finite"));
         for example in &rendering.non_finite_examples {
-            eprintln!("  {example:?}");
+            console::note(format_args!("  {example:?}"));
         }
     }
 }

@@ -1,18 +1,18 @@
 //! `drt preview`: layers of an EXR file, to look at.
 
 use super::Outcome;
+use super::destinations::Destinations;
 use super::options::PreviewOptions;
 use crate::error::Place;
 use crate::image::{is_error, write_layers};
-use crate::{CliError, check_target, read_exr};
+use crate::{CliError, read_exr};
 
 pub(super) fn run(options: &PreviewOptions) -> Result<Outcome, CliError> {
     let input = &options.input;
     let output = options.output.clone().unwrap_or_else(|| input.with_extension("png"));
-    if output == *input {
-        return Err(CliError::argument("-o names the image itself; give another file"));
-    }
-    check_target(&output)?;
+    let destinations = Destinations::new([("-o", Some(output.as_path()))]);
+    destinations.spare([input.as_path()])?;
+    destinations.check()?;
     let file = read_exr(input)?;
     let all = file.layers.iter().map(|(name, pixels)| (name.as_str(), &pixels[..]));
     let mut layers: Vec<_> = all.clone().filter(|(name, _)| !is_error(name)).collect();

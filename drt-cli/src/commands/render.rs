@@ -7,7 +7,7 @@ use super::options::{Options, RenderOptions};
 use super::outputs::Outputs;
 use super::run::{self, Shared};
 use super::{Outcome, noted, shard};
-use crate::{CliError, Job};
+use crate::{CliError, Job, console};
 
 pub(super) fn run(options: &RenderOptions) -> Result<Outcome, CliError> {
     let (shard, options) = (options.shard, &options.common);
@@ -15,7 +15,7 @@ pub(super) fn run(options: &RenderOptions) -> Result<Outcome, CliError> {
     if let Some(shard) = shard {
         return shard::images(&job, options, "render", shard);
     }
-    let outputs = Outputs::new(options, "render")?;
+    let outputs = Outputs::new(options, &job, "render")?;
     let monitor = Monitor::new(options.changes.quiet);
     let rendering = image(&job, options, &monitor, &mut Shared::default())?;
     monitor.finish();
@@ -32,7 +32,7 @@ pub(super) fn image(
 ) -> Result<Rendering, CliError> {
     let mut session = run::prepare_forward(job, shared)?;
     if let Some(why) = session.plan().sampling.as_ref().filter(|_| !options.changes.quiet) {
-        eprintln!("drt: sampling is {why}");
+        console::note(format_args!("drt: sampling is {why}"));
     }
     monitor.stage("render", 0.0, 1.0);
     let mut rendering = run::sample(&mut session, options, job.spp(), monitor);

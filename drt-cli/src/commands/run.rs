@@ -9,12 +9,18 @@ use drt_motion::Parameter;
 use super::monitor::Monitor;
 use super::noise::largest_noise;
 use super::options::{Changes, Options};
+use crate::error::Place;
 use crate::job::{depth, read_job};
 use crate::scene_xml::SceneReader;
-use crate::{CliError, Job};
+use crate::wording::shown;
+use crate::{CliError, Job, console, memory};
 
 /// Samples per pixel of the first pass where time or noise decides when to stop; later ones double.
 const FIRST_PASS: u32 = 4;
+/// Least memory that each pixel takes.
+const IMAGE_BYTES: u128 = 160;
+/// Least memory that each pixel takes more with each derivative.
+const DERIVATIVE_BYTES: u128 = 300;
 
 /// What jobs of one scene in a row share: its files are read once, and what was prepared is used again.
 #[derive(Default)]
@@ -60,7 +66,7 @@ fn read_changed(
     };
     if !changes.quiet {
         for warning in &job.warnings {
-            eprintln!("drt: warning: {warning}");
+            console::note(format_args!("drt: warning: {}", shown(&warning.to_string())));
         }
     }
     if let Some(name) = &changes.sensor {
@@ -102,11 +108,25 @@ pub(super) fn prepare(
     shared: &mut Shared,
 ) -> Result<Session, CliError> {
     if job.scene.sensors.is_empty() {
-        let place = crate::error::Place::file(&job.scene_path);
+        let place = Place::file(&job.scene_path);
         return Err(CliError::input(&place, "the scene has no <sensor>"));
     }
+    check_memory(job, parameters.len())?;
     Session::with_cache(&job.scene, parameters, &job.settings, &mut shared.prepared)
         .map_err(|e| job.blame(&e))
+}
+
+/// Refuses a film that does not fit into memory, with derivatives by so many parameters.
+fn check_memory(job: &Job, parameters: usize) -> Result<(), CliError> {
+    let Some(sensor) = job.scene.sensors.get(job.settings.sensor) else { return Ok(()) };
+    let [w, h] = sensor.item.sensor.film();
+    let pixel = IMAGE_BYTES + DERIVATIVE_BYTES * parameters as u128;
+    memory::check(u128::from(w) * u128::from(h) * pixel).map_err(|e| {
+        let message = format!(
+            "the film of {w}x{h} pixels, with {parameters} derivatives, would {e}; expected a smaller one (--size)"
+        );
+        CliError::input(&Place::file(&job.scene_path), message)
+    })
 }
 
 /// Prepares the image alone, at the parameters' values.
@@ -115,6 +135,7 @@ pub(super) fn prepare_forward(job: &Job, shared: &mut Shared) -> Result<Session,
     if at_rest {
         return prepare(job, &[], shared);
     }
+    check_memory(job, 0)?;
     let scene = drt_estimators::moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
     Session::with_cache(&scene, &[], &job.settings, &mut shared.prepared).map_err(|e| job.blame(&e))
 }
@@ -129,6 +150,20 @@ pub(super) fn differences(
     let layers = finite_differences(&job.scene, &job.parameters, &job.settings, spp, step, monitor)
         .map_err(|e| job.blame(&e))?;
     Ok((layers.len() == job.parameters.len()).then_some(layers))
+}
+
+/// Tells which differences look to one side.
+pub(super) fn tell_one_sided(job: &Job, quiet: bool) -> Result<(), CliError> {
+    let step = job.settings.step;
+    let names = drt_estimators::one_sided_differences(&job.scene, &job.parameters, step);
+    for name in names.map_err(|e| job.blame(&e))? {
+        if !quiet {
+            console::note(format_args!(
+                "drt: finite differences by `{name}` look to one side: the range of what it changes ends within a step"
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Samples until the options say that it is enough.

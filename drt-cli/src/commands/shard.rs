@@ -40,7 +40,7 @@ pub(super) fn images(
     if options.output.is_none() {
         return Err(CliError::argument("a shard needs -o FILE.exr to be written to"));
     }
-    let outputs = Outputs::new(options, command)?;
+    let outputs = Outputs::new(options, job, command)?;
     let monitor = Monitor::new(options.changes.quiet);
     let name = format!("shard {shard}");
     let shared = &mut Shared::default();

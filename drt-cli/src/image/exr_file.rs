@@ -1,6 +1,7 @@
 //! OpenEXR: the image, derivatives, terms and standard errors as layers of one file.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::{Cursor, Write};
 use std::path::Path;
 
 use drt_estimators::{Estimate, Layer, Rendering};
@@ -13,9 +14,9 @@ use exr::prelude::{
     WritableImage,
 };
 
-use crate::CliError;
 use crate::atomic::write_atomically;
 use crate::error::Place;
+use crate::{CliError, checksum, input_file, memory};
 
 /// Where an image comes from; stored with it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,12 +54,12 @@ const ATTACHMENT: &str = "drt_shard";
 /// Most bytes that the format's headers hold in one.
 const MOST_BYTES: usize = i32::MAX as usize;
 
-/// What a shard has left in a file; `None` where it is of no shard.
+/// What a shard has left in a file with these bytes; `None` where it is of no shard.
 ///
 /// # Errors
-/// When it cannot be read or is malformed.
-pub(crate) fn read_attachment(path: &Path) -> Result<Option<Vec<u8>>, CliError> {
-    let meta = exr::meta::MetaData::read_from_file(path, false)
+/// When it is malformed.
+pub(crate) fn attachment(path: &Path, file: &[u8]) -> Result<Option<Vec<u8>>, CliError> {
+    let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(file), false)
         .map_err(|e| CliError::input(&Place::file(path), e))?;
     let of = |header: exr::meta::header::Header| match header
         .own_attributes
@@ -84,7 +85,7 @@ pub(crate) fn is_result_of(path: &Path, inputs: &str) -> bool {
     })
 }
 
-const CHANNELS: [&str; 3] = ["R", "G", "B"];
+pub(super) const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
 /// Writes a result, with further images (such as finite differences) by layer name.
 ///
@@ -117,7 +118,16 @@ pub fn write_exr(
         AnyChannels::sort(channels),
     );
     let image = exr::prelude::Image::from_layer(layer);
-    write_atomically(path, |out| Ok(image.write().non_parallel().to_buffered(out)?))
+    if provenance.attachment.is_none() {
+        return write_atomically(path, |out| Ok(image.write().non_parallel().to_buffered(out)?));
+    }
+    write_atomically(path, |out| {
+        let mut file = Cursor::new(Vec::new());
+        image.write().non_parallel().to_buffered(&mut file)?;
+        let mut file = file.into_inner();
+        checksum::seal(&mut file);
+        Ok(out.write_all(&file)?)
+    })
 }
 
 /// All images of a result by layer name.
@@ -183,12 +193,62 @@ fn string(t: &Text) -> String {
     String::from_utf8_lossy(t.as_slice()).into_owned()
 }
 
-/// Reads the colours of an EXR file of one or several parts.
+/// The plain colours of a file: all of `R`, `G` and `B`, or `Y` in place of them. `expected` judges the size before pixels
+/// are read.
+pub(super) fn read_plain(
+    path: &Path,
+    expected: impl Fn([u32; 2]) -> Result<(), CliError>,
+) -> Result<Vec<[f32; 3]>, CliError> {
+    let fail = |reason: &dyn std::fmt::Display| CliError::input(&Place::file(path), reason);
+    let headers = headers(path)?;
+    let mut names = Vec::new();
+    for header in &headers {
+        expected([header.layer_size.width() as u32, header.layer_size.height() as u32])?;
+        if header.own_attributes.layer_name.is_none() {
+            names.extend(header.channels.list.iter().map(|c| string(&c.name)));
+        }
+    }
+    let has = |name: &&str| names.iter().any(|n| n == name);
+    if !(CHANNELS.iter().all(has) || is_gray(has)) {
+        let names =
+            if names.is_empty() { "none outside of layers".into() } else { names.join(", ") };
+        let message = format!("its channels are {names}; expected R, G and B, or Y for grey");
+        return Err(fail(&message));
+    }
+    let pixels = read_exr(path)?.layers.remove("");
+    pixels.ok_or_else(|| fail(&"it has no channels R, G and B"))
+}
+
+/// True where luminance stands for all colours.
+fn is_gray(has: impl Fn(&&str) -> bool) -> bool {
+    has(&"Y") && !CHANNELS.iter().chain(&["RY", "BY"]).any(has)
+}
+
+/// The headers of a file, one for each part.
+fn headers(path: &Path) -> Result<SmallVec<[exr::meta::header::Header; 3]>, CliError> {
+    input_file::checked(path)?;
+    let meta = exr::meta::MetaData::read_from_file(path, false);
+    Ok(meta.map_err(|e| CliError::input(&Place::file(path), e))?.headers)
+}
+
+/// Refuses a file whose pixels do not fit into memory.
+fn check_memory(path: &Path) -> Result<(), CliError> {
+    let samples = |h: exr::meta::header::Header| {
+        let pixels = h.layer_size.width() as u128 * h.layer_size.height() as u128;
+        pixels * h.channels.list.len() as u128
+    };
+    // As read, and as colours.
+    let bytes = 8 * headers(path)?.into_iter().map(samples).sum::<u128>();
+    memory::check(bytes).map_err(|e| CliError::input(&Place::file(path), format!("its pixels {e}")))
+}
+
+/// Reads the colours of an EXR file of one or several parts. Where a layer has luminance alone, that is all of its colours.
 ///
 /// # Errors
 /// When it cannot be read, is malformed, has parts of several sizes or no colour channels.
 pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
     let fail = |reason: &dyn std::fmt::Display| CliError::input(&Place::file(path), reason);
+    check_memory(path)?;
     let image = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -207,10 +267,23 @@ pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
             return Err(fail(&"its parts differ in size; expected one size"));
         }
         let prefix = part.attributes.layer_name.as_ref().map(string);
+        let names: BTreeSet<String> =
+            part.channel_data.list.iter().map(|c| string(&c.name)).collect();
         for channel in &part.channel_data.list {
             let name = string(&channel.name);
             let (layer, channel_name) = name.rsplit_once('.').unwrap_or(("", &name));
-            let Some(c) = CHANNELS.iter().position(|n| *n == channel_name) else { continue };
+            let beside = |other: &&str| match layer {
+                "" => names.contains(*other),
+                layer => names.contains(&format!("{layer}.{other}")),
+            };
+            let own = match CHANNELS.iter().position(|n| *n == channel_name) {
+                Some(c) => c..c + 1,
+                None if channel_name == "Y" && is_gray(beside) => 0..3,
+                None => continue,
+            };
+            if channel.sample_data.len() != part.size.width() * part.size.height() {
+                return Err(fail(&format!("its channel {name} has not one sample per pixel")));
+            }
             let layer = match prefix.as_deref() {
                 Some(prefix) if layer.is_empty() => prefix.into(),
                 Some(prefix) => format!("{prefix}.{layer}"),
@@ -219,7 +292,7 @@ pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
             let pixels = file.layers.entry(layer);
             let pixels = pixels.or_insert_with(|| vec![[0.0; 3]; channel.sample_data.len()]);
             for (pixel, value) in pixels.iter_mut().zip(channel.sample_data.values_as_f32()) {
-                pixel[c] = value;
+                pixel[own.clone()].fill(value);
             }
         }
         let standard = part.attributes.software_name.iter().map(|s| ("software".into(), string(s)));
@@ -228,7 +301,7 @@ pub fn read_exr(path: &Path) -> Result<ExrFile, CliError> {
         file.attributes.extend(other.filter_map(|(k, v)| Some((string(k), show(v)?))));
     }
     if file.layers.is_empty() {
-        return Err(fail(&"it has no channels R, G or B"));
+        return Err(fail(&"it has no channels R, G or B, nor Y"));
     }
     Ok(file)
 }

@@ -1,16 +1,16 @@
 //! Plain pictures: linear colours from EXR, NPY or PNG, and PNG to look at.
 
 use std::fs::File;
-use std::io::{BufReader, Write};
+use std::io::{BufReader, Read, Write};
 use std::path::Path;
 
 use drt_math::Rgb;
 
-use super::read_exr;
+use super::exr_file::{CHANNELS, read_plain};
 use super::tone::Pixel;
-use crate::CliError;
 use crate::error::Place;
 use crate::npy::{MAGIC, read_npy_image};
+use crate::{CliError, input_file};
 
 /// A picture, row by row from the top left.
 pub(crate) struct Picture {
@@ -31,48 +31,77 @@ impl Picture {
         }
     }
 
-    /// Refuses a picture of another size than the film's.
-    pub(crate) fn check_size(&self, path: &Path, film: [u32; 2]) -> Result<(), CliError> {
-        let ([w, h], [fw, fh]) = (self.size, film);
-        if self.size == film {
-            return Ok(());
-        }
-        let message = format!(
-            "it has {w}x{h} pixels, but the film of its sensor has {fw}x{fh}; expected the same \
-             size (`--size` changes the film's)"
-        );
-        Err(CliError::input(&Place::file(path), message))
-    }
-
     /// One number per pixel, as stored, whatever the encoding.
     pub(crate) fn gray(&self) -> Vec<f64> {
         self.values.iter().map(|v| v.mean()).collect()
     }
 }
 
-/// Reads EXR (its plain `R`, `G`, `B`), NPY or PNG; its first bytes tell which of them it is.
-pub(crate) fn read_picture(path: &Path) -> Result<Picture, CliError> {
-    let place = Place::file(path);
-    let fail = |reason: &dyn std::fmt::Display| CliError::input(&place, reason);
-    let bytes = std::fs::read(path).map_err(|e| fail(&format!("cannot read this file: {e}")))?;
-    if bytes.starts_with(b"\x89PNG") {
-        return read_png(path).map_err(|e| fail(&e));
-    }
-    if bytes.starts_with(MAGIC) {
-        let (size, values) = read_npy_image(path)?;
+/// Reads a picture that must be of a film's size: EXR (its plain `R`, `G`, `B`, or `Y` in place of all three), NPY or PNG;
+/// its first bytes tell which of them it is. What says in its header that it is of another size is not read any further.
+pub(crate) fn read_picture(path: &Path, film: [u32; 2]) -> Result<Picture, CliError> {
+    let mut start = Vec::new();
+    let first = input_file::open(path).and_then(|f| f.take(8).read_to_end(&mut start));
+    first.map_err(|e| input_file::unreadable(path, None, &e))?;
+    let expected = |size| check_size(path, size, film);
+    let picture = if start.starts_with(b"\x89PNG") {
+        read_png(path, expected)?
+    } else if start.starts_with(MAGIC) {
+        let (size, values) = read_npy_image(path, film)?;
+        expected(size)?;
         let values = values.into_iter().map(Rgb::from).collect();
-        return Ok(Picture { size, values, encoded: false });
-    }
-    let mut file = read_exr(path)?;
-    let pixels = file.layers.remove("").ok_or_else(|| fail(&"it has no channels R, G and B"))?;
-    let values = pixels.into_iter().map(|p| p.map(f64::from).into()).collect();
-    Ok(Picture { size: file.size, values, encoded: false })
+        Picture { size, values, encoded: false }
+    } else {
+        let pixels = read_plain(path, expected)?;
+        let values = pixels.into_iter().map(|p| p.map(f64::from).into()).collect();
+        Picture { size: film, values, encoded: false }
+    };
+    check_finite(path, &picture)?;
+    Ok(picture)
 }
 
-fn read_png(path: &Path) -> Result<Picture, Box<dyn std::error::Error>> {
-    let mut decoder = png::Decoder::new(BufReader::new(File::open(path)?));
+/// Refuses a picture of another size than the film's.
+fn check_size(path: &Path, [w, h]: [u32; 2], film: [u32; 2]) -> Result<(), CliError> {
+    if [w, h] == film {
+        return Ok(());
+    }
+    let [fw, fh] = film;
+    let message = format!(
+        "it has {w}x{h} pixels, but the film of its sensor has {fw}x{fh}; expected the same \
+         size (`--size` changes the film's)"
+    );
+    Err(CliError::input(&Place::file(path), message))
+}
+
+/// Refuses a picture with a value that is no number.
+fn check_finite(path: &Path, picture: &Picture) -> Result<(), CliError> {
+    let Some(i) = picture.values.iter().position(|v| !v.is_finite()) else { return Ok(()) };
+    let values = picture.values[i].to_array();
+    let channel = values.iter().position(|v| !v.is_finite()).unwrap_or(0);
+    let (column, row) = (i % picture.size[0] as usize, i / picture.size[0] as usize);
+    let message = format!(
+        "channel {} of the pixel in column {column}, row {row} is {}; expected a finite number",
+        CHANNELS[channel], values[channel]
+    );
+    Err(CliError::input(&Place::file(path), message))
+}
+
+fn read_png(
+    path: &Path,
+    expected: impl Fn([u32; 2]) -> Result<(), CliError>,
+) -> Result<Picture, CliError> {
+    let fail = |e: &dyn std::fmt::Display| CliError::input(&Place::file(path), e);
+    let file = input_file::open(path).map_err(|e| input_file::unreadable(path, None, &e))?;
+    let mut decoder = png::Decoder::new(BufReader::new(file));
     decoder.set_transformations(png::Transformations::EXPAND);
-    let mut reader = decoder.read_info()?;
+    let reader = decoder.read_info().map_err(|e| fail(&e))?;
+    expected([reader.info().width, reader.info().height])?;
+    decode_png(reader).map_err(|e| fail(&e))
+}
+
+fn decode_png(
+    mut reader: png::Reader<BufReader<File>>,
+) -> Result<Picture, Box<dyn std::error::Error>> {
     let mut bytes = vec![0; reader.output_buffer_size().ok_or("it is too large")?];
     let info = reader.next_frame(&mut bytes)?;
     let bytes = &bytes[..info.buffer_size()];

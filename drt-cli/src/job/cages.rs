@@ -10,8 +10,8 @@ use drt_motion::{Cause, GeometryChange};
 
 use super::keys;
 use super::refusal::Refusal;
-use crate::CliError;
 use crate::error::Place;
+use crate::{CliError, input_file};
 
 /// The cages of a job, each read once: parameters that share a cage share its coordinates, too.
 #[derive(Default)]
@@ -33,22 +33,22 @@ impl Cages {
             .into());
         };
         let path = folder.join(&keys.mesh);
-        let mesh = self.load(&path).map_err(Refusal::File)?;
+        let mesh = self.load(&path)?;
         let count = mesh.source_vertex_count as usize;
         if index as usize >= count {
             let cause = Cause::CageVertexIndex { index, count };
             return Err(format!("`cage`, {}: {cause}", path.display()).into());
         }
-        Ok(GeometryChange::Cage { mesh, vertices: [(index, direction.into())].into() })
+        Ok(GeometryChange::Cage { mesh, vertices: [(index, direction.0.into())].into() })
     }
 
     /// A cage's mesh, checked.
-    pub(super) fn load(&mut self, path: &Path) -> Result<Arc<Mesh>, CliError> {
+    pub(super) fn load(&mut self, path: &Path) -> Result<Arc<Mesh>, Refusal> {
         if let Some(mesh) = self.0.get(path) {
             return Ok(Arc::clone(mesh));
         }
         let fail = |reason: String| CliError::input(&Place::file(path), reason);
-        let bytes = std::fs::read(path).map_err(|e| fail(format!("cannot read this file: {e}")))?;
+        let bytes = input_file::read(path).map_err(|e| Refusal::unreadable(path, &e))?;
         let name = path.to_string_lossy();
         let mesh = if bytes.starts_with(b"ply") {
             drt_geom::load_ply(&bytes, &name).map_err(|e| fail(e.to_string()))?

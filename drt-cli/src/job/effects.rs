@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use drt_estimators::{Scene, Target};
 use drt_math::{Affine, Mat3, Rgb, Vec3};
 use drt_motion::{Change, Effect, GeometryChange, PropertyChange, Texels, ValueChange};
 
 use super::cages::Cages;
 use super::keys::{self, Voxels};
+use super::list::List;
 use super::refusal::Refusal;
 use super::velocities;
 
@@ -20,7 +22,7 @@ pub(super) fn effect(
     cages: &mut Cages,
 ) -> Result<Effect, Refusal> {
     let geometry = |change| Change::Geometry(change);
-    let vec = Vec3::from;
+    let vec = |list: List<f64, 3>| Vec3::from(list.0);
     let mut changes = Vec::new();
     if let Some(t) = keys.translate {
         changes.push(geometry(GeometryChange::Translate(vec(t))));
@@ -34,10 +36,10 @@ pub(super) fn effect(
         changes.push(geometry(GeometryChange::Scale { factor, pivot }));
     }
     if let Some(rows) = keys.matrix {
-        changes.push(geometry(GeometryChange::Matrix(affine(rows))));
+        changes.push(geometry(GeometryChange::Matrix(affine(rows.0.map(|row| row.0)))));
     }
     if let Some(file) = &keys.vertex_velocity {
-        let velocities = velocities::read(&folder.join(file)).map_err(Refusal::File)?;
+        let velocities = velocities::read(&folder.join(file))?;
         changes.push(geometry(GeometryChange::VertexVelocity(velocities.into())));
     }
     if let Some(file) = &keys.vertex_normals {
@@ -66,6 +68,35 @@ pub(super) fn effect(
     }
 }
 
+/// Refuses voxels of a property that has none.
+pub(super) fn check_voxels(
+    scene: &Scene,
+    targets: &[Target],
+    effect: &Effect<String>,
+) -> Result<(), String> {
+    let Change::Property(PropertyChange { property, .. }) = &effect.change else { return Ok(()) };
+    for target in targets {
+        let Target::Medium(m) = target else {
+            let name = &effect.target;
+            return Err(format!(
+                "`voxels`: only the grids of a medium have voxels; `{name}` is none"
+            ));
+        };
+        let grid = scene.media[*m].item.grid();
+        let has_voxels = match property.as_str() {
+            "sigma_t" => grid.is_some(),
+            "albedo" => grid.is_some_and(|g| g.albedo().grid().is_some()),
+            "emission" => grid.is_some_and(|g| g.emission().grid().is_some()),
+            _ => false,
+        };
+        if !has_voxels {
+            let name = &effect.target;
+            return Err(format!("`voxels`: {property} of `{name}` has no grid, and so no voxels"));
+        }
+    }
+    Ok(())
+}
+
 fn affine(rows: [[f64; 4]; 3]) -> Affine {
     let row = |i: usize| Vec3::from([rows[i][0], rows[i][1], rows[i][2]]);
     Affine {
@@ -89,7 +120,7 @@ fn property(keys: &keys::Effect) -> Result<Option<PropertyChange>, String> {
         };
     };
     let op = match (keys.add, keys.multiply, keys.log) {
-        (Some(a), None, None) => ValueChange::Add(Rgb::from(a)),
+        (Some(a), None, None) => ValueChange::Add(Rgb::from(a.0)),
         (None, Some(m), None | Some(false)) => ValueChange::Multiply(m),
         (None, Some(m), Some(true)) => ValueChange::MultiplyLog(m),
         (Some(_), None, Some(_)) => return Err("`log` belongs to `multiply`".into()),
@@ -104,11 +135,11 @@ fn property(keys: &keys::Effect) -> Result<Option<PropertyChange>, String> {
     }
     let voxels = match keys.voxels {
         None | Some(Voxels::All(_)) => None,
-        Some(Voxels::One(voxel)) => Some(voxel),
+        Some(Voxels::One(voxel)) => Some(voxel.0),
     };
     let texels = keys.texels.map(|texels| match texels {
         keys::Texels::All(_) => Texels::All,
-        keys::Texels::One(texel) => Texels::One(texel),
+        keys::Texels::One(texel) => Texels::One(texel.0),
     });
     Ok(Some(PropertyChange { property, op, voxels, texels }))
 }

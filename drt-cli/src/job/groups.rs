@@ -55,7 +55,8 @@ pub(super) fn groups(
             let kind = match (&keys.vertices, &keys.cage, &keys.voxels, &keys.texels) {
                 (Some(_), None, None, None) => GroupKind::Vertices,
                 (None, Some(cage), None, None) => {
-                    GroupKind::Cage(cages.load(&folder.join(&cage.mesh))?)
+                    let mesh = cages.load(&folder.join(&cage.mesh));
+                    GroupKind::Cage(mesh.map_err(|refusal| refusal.told(fail))?)
                 }
                 (None, None, Some(_), None) => {
                     GroupKind::Voxels(property(keys.property.as_deref()).map_err(fail)?)

@@ -8,11 +8,13 @@ use drt_estimators::PathSampling;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::list::List;
+
 /// A whole job.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Job {
-    pub(super) scene: PathBuf,
+    pub(super) scene: Spanned<PathBuf>,
     pub(super) sensor: Option<Spanned<String>>,
     #[serde(default)]
     pub(super) estimator: Estimator,
@@ -121,17 +123,17 @@ pub(super) struct Parameter {
 #[serde(deny_unknown_fields)]
 pub(super) struct Effect {
     pub(super) target: String,
-    pub(super) translate: Option<[f64; 3]>,
+    pub(super) translate: Option<List<f64, 3>>,
     pub(super) rotate: Option<Rotate>,
     pub(super) scale: Option<Scale>,
-    pub(super) matrix: Option<[[f64; 4]; 3]>,
+    pub(super) matrix: Option<List<List<f64, 4>, 3>>,
     pub(super) vertex_velocity: Option<PathBuf>,
     pub(super) vertex_normals: Option<PathBuf>,
     pub(super) vertex: Option<Vertex>,
     pub(super) cage: Option<Cage>,
     pub(super) follow: Option<String>,
     pub(super) property: Option<String>,
-    pub(super) add: Option<[f64; 3]>,
+    pub(super) add: Option<List<f64, 3>>,
     pub(super) multiply: Option<f64>,
     pub(super) log: Option<bool>,
     pub(super) voxels: Option<Voxels>,
@@ -141,24 +143,24 @@ pub(super) struct Effect {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Rotate {
-    pub(super) axis: [f64; 3],
+    pub(super) axis: List<f64, 3>,
     #[serde(default)]
-    pub(super) pivot: [f64; 3],
+    pub(super) pivot: List<f64, 3>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Scale {
-    pub(super) factor: [f64; 3],
+    pub(super) factor: List<f64, 3>,
     #[serde(default)]
-    pub(super) pivot: [f64; 3],
+    pub(super) pivot: List<f64, 3>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Vertex {
     pub(super) index: u32,
-    pub(super) direction: [f64; 3],
+    pub(super) direction: List<f64, 3>,
 }
 
 /// A control cage: one of its vertices, or, in a group, all of them.
@@ -167,21 +169,21 @@ pub(super) struct Vertex {
 pub(super) struct Cage {
     pub(super) mesh: PathBuf,
     pub(super) vertex: Option<u32>,
-    pub(super) direction: Option<[f64; 3]>,
+    pub(super) direction: Option<List<f64, 3>>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(untagged, expecting = "expected \"all\" or [i, j, k]")]
 pub(super) enum Voxels {
     All(All),
-    One([usize; 3]),
+    One(List<usize, 3>),
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(untagged, expecting = "expected \"all\" or [column, row]")]
 pub(super) enum Texels {
     All(All),
-    One([usize; 2]),
+    One(List<usize, 2>),
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -226,20 +228,20 @@ pub(super) enum MotionKind {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Optimize {
-    pub(super) targets: Vec<PathBuf>,
+    pub(super) targets: Vec<Spanned<PathBuf>>,
     pub(super) sensors: Option<Spanned<Vec<String>>>,
-    pub(super) masks: Option<Spanned<Vec<PathBuf>>>,
+    pub(super) masks: Option<Spanned<Vec<Spanned<PathBuf>>>>,
     pub(super) relative: Option<f64>,
     pub(super) loss: Option<Spanned<Loss>>,
     pub(super) optimizer: Option<Spanned<Optimizer>>,
     #[serde(default)]
-    pub(super) bounds: BTreeMap<Spanned<String>, [f64; 2]>,
+    pub(super) bounds: BTreeMap<Spanned<String>, List<f64, 2>>,
     #[serde(default)]
     pub(super) log: Vec<Spanned<String>>,
     #[serde(default)]
-    pub(super) spp: Vec<Spanned<[u32; 2]>>,
+    pub(super) spp: Vec<Spanned<List<u32, 2>>>,
     #[serde(default)]
-    pub(super) reduce: Vec<Spanned<[u32; 2]>>,
+    pub(super) reduce: Vec<Spanned<List<u32, 2>>>,
     pub(super) checkpoint: Option<PathBuf>,
     pub(super) checkpoint_every: Option<Spanned<u32>>,
 }
@@ -288,7 +290,7 @@ pub(super) struct Optimizer {
     pub(super) kind: OptimizerKind,
     pub(super) learning_rate: LearningRate,
     pub(super) iterations: Option<u32>,
-    pub(super) betas: Option<[f64; 2]>,
+    pub(super) betas: Option<List<f64, 2>>,
     pub(super) epsilon: Option<f64>,
     pub(super) momentum: Option<f64>,
     pub(super) memory: Option<f64>,

@@ -3,8 +3,10 @@
 mod cages;
 mod document;
 mod effects;
+mod files;
 mod groups;
 mod keys;
+mod list;
 mod motions;
 mod optimize;
 mod refusal;
@@ -16,20 +18,19 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use drt_estimators::{
-    AuxiliarySamples, Depth, EstimatorKind, Scene, Settings, Target, Warp, WarpKernel,
+    AuxiliarySamples, Depth, EstimatorKind, Scene, Settings, Target, Term, Warp, WarpKernel,
 };
 use drt_motion::Parameter;
 use toml::Spanned;
 
 use crate::error::{Place, Warning, read_text};
 use crate::scene_xml::SceneReader;
-use crate::{CliError, Defaults};
+use crate::{CliError, Defaults, input_file};
 use cages::Cages;
 use document::Document;
 pub use groups::ParameterGroup;
 pub(crate) use keys::Sampling;
 pub use optimize::Optimize;
-use refusal::Refusal;
 
 /// What the command line lays over a job or scene.
 #[derive(Clone, Debug, Default)]
@@ -39,6 +40,12 @@ pub struct Overrides {
     /// Values of the scene's `<default>` names, as `-D NAME=VALUE` gives them.
     pub defaults: Defaults,
 }
+
+/// Most values of parameters that a message shows.
+const MOST_VALUES: usize = 8;
+
+/// Most bytes in the name of a parameter: with what comes to it, the name of a channel has at most 255.
+const LONGEST_NAME: usize = 200;
 
 /// Samples per pixel, where neither job nor scene says how many.
 const DEFAULT_SPP: u32 = 64;
@@ -71,6 +78,10 @@ pub struct Job {
     pub groups: Vec<ParameterGroup>,
     /// What stands in the way of derivative images, but not of a gradient.
     grouped: Option<CliError>,
+    /// What it was read from, but for pictures to fit to.
+    pub(crate) files: Vec<PathBuf>,
+    /// Values given for the scene's `<default>` names.
+    pub(crate) defaults: Defaults,
 }
 
 /// Reads a job file and its scene.
@@ -92,8 +103,8 @@ pub(crate) fn read_job(
     let document = Document::new(path, &text, &overrides.set);
     let keys: keys::Job = document.parse()?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let scene_path = folder.join(&keys.scene);
-    let (mut scene, warnings) = scenes.read(&scene_path, &overrides.defaults)?;
+    let scene_path = scene_file(&document, &keys.scene, folder)?;
+    let (mut scene, warnings, mut read) = scenes.read(&scene_path, &overrides.defaults)?;
     if !(keys.parameter.is_empty() && keys.parameter_group.is_empty()) {
         let expanded = scene.expanded().map(std::borrow::Cow::into_owned);
         scene = expanded.map_err(|e| CliError::input(&Place::file(&scene_path), e))?;
@@ -104,6 +115,8 @@ pub(crate) fn read_job(
     let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters);
     let groups = groups::groups(&document, &keys.parameter_group, folder, &scene)?;
     let grouped = grouped(&document, &keys);
+    read.extend(files::named(&keys, folder));
+    read.push(path.into());
     let path = path.into();
     let text = Some(text);
     let mut job = Job {
@@ -120,9 +133,26 @@ pub(crate) fn read_job(
         places,
         groups,
         grouped,
+        files: read,
+        defaults: overrides.defaults.clone(),
     };
     job.set_spp(spp.unwrap_or(DEFAULT_SPP));
     Ok(job)
+}
+
+/// The file of the scene that a job names.
+fn scene_file(
+    document: &Document<'_>,
+    key: &Spanned<PathBuf>,
+    folder: &Path,
+) -> Result<PathBuf, CliError> {
+    let fail = |message: String| document.error_at(key.span().start, format!("`scene`{message}"));
+    if key.get_ref().as_os_str().is_empty() {
+        return Err(fail(" is empty; expected a file such as \"scene.xml\"".into()));
+    }
+    let path = folder.join(key.get_ref());
+    input_file::check(&path).map_err(|e| fail(format!(": cannot read {}: {e}", path.display())))?;
+    Ok(path)
 }
 
 impl Job {
@@ -140,7 +170,7 @@ impl Job {
         defaults: &Defaults,
         scenes: &mut SceneReader,
     ) -> Result<Self, CliError> {
-        let (scene, warnings) = scenes.read(path, defaults)?;
+        let (scene, warnings, files) = scenes.read(path, defaults)?;
         let mut job = Self {
             path: path.into(),
             text: None,
@@ -155,6 +185,8 @@ impl Job {
             places: Vec::new(),
             groups: Vec::new(),
             grouped: None,
+            files,
+            defaults: defaults.clone(),
         };
         job.take_sample_count();
         Ok(job)
@@ -200,6 +232,41 @@ impl Job {
         Ok(())
     }
 
+    /// All files that were read.
+    pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
+        self.files.iter().map(PathBuf::as_path)
+    }
+
+    /// The pictures that a fit reads; other commands may write them.
+    pub(crate) fn pictures(&self) -> impl Iterator<Item = &Path> {
+        let plan = self.optimize.as_ref().ok().and_then(Option::as_ref);
+        let pictures = plan.into_iter().flat_map(|plan| plan.targets.iter().chain(&plan.masks));
+        pictures.map(PathBuf::as_path)
+    }
+
+    /// Refuses parameters whose layers have the names of the terms of others.
+    ///
+    /// # Errors
+    /// Names both.
+    pub(crate) fn check_terms(&self) -> Result<(), CliError> {
+        for (parameter, place) in self.parameters.iter().zip(&self.places) {
+            let own = parameter.name.strip_suffix("_stderr").unwrap_or(&parameter.name);
+            let taken = Term::ALL.iter().find_map(|term| {
+                let other = own.strip_suffix(term.name())?.strip_suffix('.')?;
+                self.parameters.iter().find(|p| p.name == other).map(|p| (&p.name, term.name()))
+            });
+            if let Some((other, term)) = taken {
+                let name = &parameter.name;
+                let message = format!(
+                    "parameter `{name}`: with --terms its layer d_{name} would be one of the term `{term}` of \
+                     `{other}`; expected another name"
+                );
+                return Err(CliError::input(place, message));
+            }
+        }
+        Ok(())
+    }
+
     /// Refuses what has a gradient, but no derivative images.
     ///
     /// # Errors
@@ -216,6 +283,20 @@ impl Job {
         self.optimize.as_ref().map(Option::as_ref).map_err(CliError::clone)
     }
 
+    /// The parameters that are not at zero, where the scene by itself is good.
+    fn values_to_blame(&self) -> Option<String> {
+        let moved = self.parameters.iter().filter(|p| p.value != 0.0);
+        let mut values: Vec<String> = moved.map(|p| format!("{} = {}", p.name, p.value)).collect();
+        if values.is_empty() || self.scene.check().is_err() {
+            return None;
+        }
+        if values.len() > MOST_VALUES {
+            values.truncate(MOST_VALUES);
+            values.push("…".into());
+        }
+        Some(values.join(", "))
+    }
+
     /// An error of the estimators with the file, and the parameter's line, that it is about.
     #[must_use]
     pub fn blame(&self, error: &drt_estimators::Error) -> CliError {
@@ -224,7 +305,13 @@ impl Job {
                 let at = self.parameters.iter().position(|p| p.name == *parameter);
                 at.and_then(|i| self.places.get(i)).cloned()
             }
-            drt_estimators::Error::Element { .. } => Some(Place::file(&self.scene_path)),
+            drt_estimators::Error::Element { .. } => {
+                if let Some(values) = self.values_to_blame() {
+                    let message = format!("at the parameters' values ({values}): {error}");
+                    return CliError::input(&Place::file(&self.path), message);
+                }
+                Some(Place::file(&self.scene_path))
+            }
             _ => None,
         };
         CliError::input(&place.unwrap_or_else(|| Place::file(&self.path)), error)
@@ -372,6 +459,11 @@ fn parameters(
         if name.is_empty() || name.contains(|c: char| c.is_control() || c == ',') {
             return Err(fail("the name must not be empty nor contain commas".into()));
         }
+        if name.len() > LONGEST_NAME {
+            let message =
+                format!("the name has {} bytes; expected at most {LONGEST_NAME}", name.len());
+            return Err(fail(message));
+        }
         if !names.insert(name) {
             return Err(fail("the name is already taken".into()));
         }
@@ -380,18 +472,30 @@ fn parameters(
         }
         let mut effects = Vec::new();
         for effect in &parameter.effect {
-            let at = effect.span().start;
+            let (at, keys) = (effect.span().start, effect.get_ref());
             let fail = |message| document.error_at(at, format!("parameter `{name}`: {message}"));
-            let effect = effects::effect(effect.get_ref(), folder, &mut cages);
-            let effect = effect.map_err(|refusal| match refusal {
-                Refusal::Keys(message) => fail(message),
-                Refusal::File(error) => error,
-            })?;
-            scene.find_all(&effect.target).map_err(|e| fail(e.to_string()))?;
+            let effect = effects::effect(keys, folder, &mut cages);
+            let effect = effect.map_err(|refusal| refusal.told(fail))?;
+            let targets = scene.find_all(&effect.target).map_err(|e| fail(e.to_string()))?;
+            if keys.voxels.is_some() {
+                effects::check_voxels(scene, &targets, &effect).map_err(fail)?;
+            }
             effects.push(effect);
         }
         parameters.push(Parameter { name: name.clone(), value: parameter.value, effects });
         places.push(document.place(at));
+    }
+    for spanned in &keys.parameter {
+        let name = &spanned.get_ref().name;
+        if let Some(other) =
+            name.strip_suffix("_stderr").filter(|other| names.contains(&(*other).to_owned()))
+        {
+            let message = format!(
+                "parameter `{name}`: its layer d_{name} would be that of the standard error of `{other}`; \
+                 expected another name"
+            );
+            return Err(document.error_at(spanned.span().start, message));
+        }
     }
     Ok((parameters, places))
 }

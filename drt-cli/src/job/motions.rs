@@ -11,9 +11,10 @@ use toml::Spanned;
 
 use super::document::Document;
 use super::keys::{self, MotionKind};
+use super::refusal::Refusal;
 use super::velocities;
-use crate::CliError;
 use crate::error::Place;
+use crate::{CliError, input_file};
 
 /// The kinds asked for, by the medium's index. Several tables may speak of one medium, to give the
 /// velocities of its tetrahedra for several parameters.
@@ -49,7 +50,7 @@ pub(super) fn insides(
                         Arc::unwrap_or_clone(given)
                     }
                     _ => GivenTetrahedra {
-                        mesh: tetrahedra(&folder.join(file))?,
+                        mesh: tetrahedra(&folder.join(file)).map_err(|e| e.told(fail))?,
                         velocities: vec![],
                     },
                 };
@@ -57,7 +58,7 @@ pub(super) fn insides(
                     let parameter = parameters.iter().position(|p| p.name == *name);
                     let parameter =
                         parameter.ok_or_else(|| fail(format!("there is no parameter `{name}`")))?;
-                    let list = velocities::read(&folder.join(file))?;
+                    let list = velocities::read(&folder.join(file)).map_err(|e| e.told(fail))?;
                     let (found, expected) = (list.len(), given.mesh.positions.len());
                     if found != expected {
                         let message = format!("{found} velocities for {expected} vertices");
@@ -97,6 +98,17 @@ fn check(keys: &keys::Motion) -> Result<(), String> {
     }
 }
 
-fn tetrahedra(path: &Path) -> Result<TetMesh, CliError> {
-    drt_geom::load_tet_mesh(path).map_err(|e| CliError::input(&Place::file(path), e))
+fn tetrahedra(path: &Path) -> Result<TetMesh, Refusal> {
+    for file in tetrahedra_files(path) {
+        input_file::check(&file).map_err(|e| Refusal::unreadable(&file, &e))?;
+    }
+    Ok(drt_geom::load_tet_mesh(path).map_err(|e| CliError::input(&Place::file(path), e))?)
+}
+
+/// The files that hold the mesh of this one, which TetGen writes in two.
+pub(super) fn tetrahedra_files(path: &Path) -> Vec<PathBuf> {
+    match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        Some("node" | "ele") => ["node", "ele"].map(|e| path.with_extension(e)).into(),
+        _ => vec![path.into()],
+    }
 }

@@ -1,5 +1,6 @@
 //! From `[optimize]` to what a fit does.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use drt_estimators::Scene;
@@ -9,8 +10,9 @@ use drt_motion::optimize::{Decay, Method, Optimizer, Stages, Variable};
 use toml::Spanned;
 
 use super::document::Document;
+use super::list::List;
 use super::{find_sensor, keys};
-use crate::CliError;
+use crate::{CliError, input_file};
 
 /// Iterations where a job does not say how many.
 const ITERATIONS: u32 = 100;
@@ -49,6 +51,22 @@ pub struct Optimize {
     pub checkpoint: Option<PathBuf>,
     /// Iterations between two checkpoints.
     pub checkpoint_every: u32,
+    /// What to say of a target or mask that cannot be read.
+    unreadable: BTreeMap<PathBuf, CliError>,
+}
+
+impl Optimize {
+    /// Refuses a target or mask that is not there, by the place that names it.
+    ///
+    /// # Errors
+    /// Names the file and the key.
+    pub(crate) fn check_file(&self, path: &Path) -> Result<(), CliError> {
+        match (input_file::check(path), self.unreadable.get(path)) {
+            (Err(_), Some(error)) => Err(error.clone()),
+            (Err(e), None) => Err(input_file::unreadable(path, None, &e)),
+            (Ok(()), _) => Ok(()),
+        }
+    }
 }
 
 pub(super) fn optimize(
@@ -81,8 +99,16 @@ pub(super) fn optimize(
     });
     let masks = keys.masks.as_ref().map_or(Ok(Vec::new()), |masks| {
         reader.one_per_target("masks", masks.span().start, masks.get_ref().len())?;
-        Ok(masks.get_ref().iter().map(|m| folder.join(m)).collect())
+        Ok(masks.get_ref().iter().map(|m| folder.join(m.get_ref())).collect())
     })?;
+    let masked = keys.masks.iter().flat_map(|masks| masks.get_ref().iter());
+    let named = keys.targets.iter().map(|t| ("targets", t)).chain(masked.map(|m| ("masks", m)));
+    let unreadable = |(key, file): (&str, &Spanned<PathBuf>)| {
+        let path = folder.join(file.get_ref());
+        let message = format!("`{key}`: cannot read {}; expected an image file", path.display());
+        (path, document.error_at(file.span().start, message))
+    };
+    let unreadable = named.map(unreadable).collect();
     if keys.targets.is_empty() {
         return Err(reader.error("`targets` is empty; expected an image file per sensor"));
     }
@@ -96,7 +122,7 @@ pub(super) fn optimize(
         None => CHECKPOINT_EVERY,
     };
     Ok(Some(Optimize {
-        targets: keys.targets.iter().map(|t| folder.join(t)).collect(),
+        targets: keys.targets.iter().map(|t| folder.join(t.get_ref())).collect(),
         sensors: sensors.transpose()?,
         masks,
         relative: keys.relative,
@@ -109,6 +135,7 @@ pub(super) fn optimize(
         reduce: Stages::new(1, reader.stages("reduce", &keys.reduce)?),
         checkpoint: keys.checkpoint.as_ref().map(|c| folder.join(c)),
         checkpoint_every,
+        unreadable,
     }))
 }
 
@@ -161,7 +188,7 @@ impl Reader<'_> {
         let Some(keys) = keys else { return Method::ADAM };
         match (keys.kind, Method::ADAM) {
             (keys::OptimizerKind::Adam, Method::Adam { beta1, beta2, epsilon }) => {
-                let [beta1, beta2] = keys.betas.unwrap_or([beta1, beta2]);
+                let [beta1, beta2] = keys.betas.map_or([beta1, beta2], |betas| betas.0);
                 Method::Adam { beta1, beta2, epsilon: keys.epsilon.unwrap_or(epsilon) }
             }
             (keys::OptimizerKind::GaussNewton, _) => match (keys.memory, Method::GAUSS_NEWTON) {
@@ -231,7 +258,7 @@ impl Reader<'_> {
                 self.index("learning_rate", name).map_err(fail)?;
             }
         }
-        for (name, [lower, upper]) in &keys.bounds {
+        for (name, List([lower, upper])) in &keys.bounds {
             let fail = |message| self.document.error_at(name.span().start, message);
             let i = self.index("bounds", name.get_ref()).map_err(fail)?;
             (variables[i].lower, variables[i].upper) = (*lower, *upper);
@@ -243,8 +270,12 @@ impl Reader<'_> {
         Ok(variables)
     }
 
-    fn stages(&self, key: &str, list: &[Spanned<[u32; 2]>]) -> Result<Vec<(u32, u32)>, CliError> {
-        let read = |entry: &Spanned<[u32; 2]>| match *entry.get_ref() {
+    fn stages(
+        &self,
+        key: &str,
+        list: &[Spanned<List<u32, 2>>],
+    ) -> Result<Vec<(u32, u32)>, CliError> {
+        let read = |entry: &Spanned<List<u32, 2>>| match entry.get_ref().0 {
             [_, 0] => {
                 let message = format!("`{key}`: 0; expected [iteration, at least 1]");
                 Err(self.document.error_at(entry.span().start, message))

@@ -14,22 +14,36 @@ const SCENE: &str = r#"<scene version="3.0.0"><medium type="homogeneous" id="fog
     <sampler type="independent"><integer name="sample_count" value="9"/></sampler></sensor>
   <shape type="cube" id="cube"/></scene>"#;
 
+/// A medium of a grid.
+const SMOKE: &str = r#"<medium type="heterogeneous" id="smoke"><volume name="sigma_t" type="gridvolume">
+    <string name="filename" value="g.vol"/></volume></medium></scene>"#;
+
 /// A tetrahedron.
 const CAGE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
 
 fn job(text: &str, set: &[(&str, &str)]) -> Result<Job, CliError> {
     let folder = Folder::new();
-    folder.file("scene.xml", SCENE);
+    folder.file("scene.xml", SCENE.replace("</scene>", SMOKE));
     folder.file("velocity.txt", "# one per vertex\n1 2 3\n\n4, 5, 6  # the last\n");
     folder.file("broken.txt", "1 2 3\n1 2\n");
     let ply = "ply\nformat ascii 1.0\nelement vertex 2\nproperty double x\nproperty double y\n\
                property double z\nend_header\n1 2 3\n4 5 6\n";
     folder.file("velocity.ply", ply);
     folder.file("cage.obj", CAGE);
+    folder.file("g.vol", grid());
     folder.file("open.obj", CAGE.split("f 1 4 3").next().unwrap());
     folder.file("cage.ply", "ply\nformat");
     let set = set.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
     load_job(&folder.file("job.toml", text), &Overrides { set, ..Overrides::default() })
+}
+
+/// A grid of two voxels along each axis.
+fn grid() -> Vec<u8> {
+    let mut bytes = b"VOL\x03".to_vec();
+    bytes.extend([1, 2, 2, 2, 1].iter().flat_map(|n: &i32| n.to_le_bytes()));
+    let numbers = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0].iter().chain(&[0.5; 8]);
+    bytes.extend(numbers.flat_map(|v: &f32| v.to_le_bytes()));
+    bytes
 }
 
 #[track_caller]
@@ -41,9 +55,13 @@ fn refused(text: &str, set: &[(&str, &str)], parts: &[&str]) {
 }
 
 fn change(effect: &str) -> Change {
+    change_of("cube", effect)
+}
+
+fn change_of(target: &str, effect: &str) -> Change {
     let text = format!(
         "scene = \"scene.xml\"\n[[parameter]]\nname = \"p\"\n[[parameter.effect]]\n\
-         target = \"cube\"\n{effect}"
+         target = \"{target}\"\n{effect}"
     );
     job(&text, &[]).unwrap().parameters.remove(0).effects.remove(0).change
 }
@@ -116,7 +134,7 @@ fn geometry_effects() {
 
 #[test]
 fn property_effects() {
-    let of = |keys: &str| change(&format!("property = \"sigma_t\"\n{keys}"));
+    let of = |keys: &str| change_of("smoke", &format!("property = \"sigma_t\"\n{keys}"));
     let expected = |op, voxels| {
         Change::Property(PropertyChange { property: "sigma_t".into(), op, voxels, texels: None })
     };
@@ -147,7 +165,7 @@ fn effects_that_make_no_sense() {
         ("property = \"g\"\nmultiply = 1\nvoxels = \"some\"", "\"all\" or [i, j, k]"),
         (
             "cage = { mesh = \"none.obj\", vertex = 1, direction = [1, 0, 0] }",
-            "none.obj: cannot read",
+            "none.obj: No such file",
         ),
         (
             "cage = { mesh = \"open.obj\", vertex = 1, direction = [1, 0, 0] }",
@@ -162,14 +180,14 @@ fn effects_that_make_no_sense() {
         ("cage = { mesh = \"cage.obj\", vertex = 1 }", "`cage` lacks `direction`"),
         ("cage = { mesh = \"cage.obj\", vertex = -1, direction = [1, 0, 0] }", "job.toml:6"),
         ("vertex_velocity = \"broken.txt\"", "broken.txt:2: `1 2` is not three finite numbers"),
-        ("vertex_velocity = \"none.txt\"", "none.txt: cannot read"),
+        ("vertex_velocity = \"none.txt\"", "none.txt: No such file"),
         ("stretch = [1, 2, 3]", "unknown field `stretch`"),
     ] {
         refused(&text(effect), &[], &[part]);
     }
     refused(&text("").replace("cube", "cone"), &[], &["job.toml:4", "parameter `p`"]);
     let target = text("translate = [1, 2, 3]").replace("cube", "cone");
-    refused(&target, &[], &["`cone`", "known ids: cube, fog, cam"]);
+    refused(&target, &[], &["`cone`", "known ids: cube, fog, smoke, cam"]);
 }
 
 #[test]
@@ -182,7 +200,7 @@ fn unknown_keys_name_their_place_and_the_known_ones() {
     refused("scene = \"scene.xml\"\n[estimator]\nmax_depth = -2", &[], &["-1 (unlimited)"]);
     refused("scene = \"scene.xml\"\n[estimator]\nstep = 0.0", &[], &["a positive number"]);
     refused("scene = \"scene.xml\"\nsensor = \"cube\"", &[], &["job.toml:2", "not a sensor"]);
-    refused("scene = \"nothing.xml\"", &[], &["nothing.xml: cannot read"]);
+    refused("scene = \"nothing.xml\"", &[], &["nothing.xml: No such file"]);
     refused(
         "scene = \"scene.xml\"\n[estimator]\nkind = \"magic\"",
         &[],

@@ -4,17 +4,17 @@ use std::path::Path;
 
 use drt_math::Vec3;
 
-use crate::CliError;
+use super::refusal::Refusal;
 use crate::error::Place;
+use crate::{CliError, input_file};
 
 /// Reads a file; its first bytes tell which of the two it is.
-pub(super) fn read(path: &Path) -> Result<Vec<Vec3>, CliError> {
+pub(super) fn read(path: &Path) -> Result<Vec<Vec3>, Refusal> {
     let place = Place::file(path);
-    let bytes = std::fs::read(path)
-        .map_err(|e| CliError::input(&place, format!("cannot read this file: {e}")))?;
+    let bytes = input_file::read(path).map_err(|e| Refusal::unreadable(path, &e))?;
     if bytes.starts_with(b"ply") {
         return drt_geom::read_vertex_vectors(&bytes, &path.to_string_lossy())
-            .map_err(|e| CliError::input(&place, e));
+            .map_err(|e| CliError::input(&place, e).into());
     }
     let text = std::str::from_utf8(&bytes).map_err(|_| {
         CliError::input(&place, "neither text nor PLY; expected three numbers per line")
@@ -26,7 +26,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Vec3>, CliError> {
         .map(|(i, line)| {
             vector(line).ok_or_else(|| {
                 let place = Place { line: Some(i as u32 + 1), ..place.clone() };
-                CliError::input(&place, format!("`{line}` is not three finite numbers"))
+                CliError::input(&place, format!("`{line}` is not three finite numbers")).into()
             })
         })
         .collect()

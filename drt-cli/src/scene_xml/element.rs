@@ -87,6 +87,12 @@ impl Element {
         let own = self.place.file.parent().unwrap_or(Path::new(""));
         let folders = || std::iter::once(own).chain(self.folders.iter().map(PathBuf::as_path));
         let found = folders().map(|folder| folder.join(path)).find(|file| file.exists());
+        if let Some(file) = &found
+            && !file.is_file()
+            && !file.is_dir()
+        {
+            return Err(self.error(format!("{} is not a regular file", file.display())));
+        }
         found.ok_or_else(|| {
             let mut searched: Vec<String> = Vec::new();
             for folder in folders() {

@@ -8,6 +8,7 @@ mod bsdfs;
 mod dialect;
 mod element;
 mod emitters;
+mod files;
 mod index;
 mod media;
 mod numbers;
@@ -47,7 +48,7 @@ use source::SceneFiles;
 /// # Errors
 /// Names the file, line and element of what is malformed, missing or not supported.
 pub fn load_scene(path: &Path, defaults: &Defaults) -> Result<Scene, CliError> {
-    SceneReader::default().read(path, defaults).map(|(scene, _)| scene)
+    SceneReader::default().read(path, defaults).map(|(scene, ..)| scene)
 }
 
 /// Reads scenes, and remembers the last one: jobs of one scene in a row read its files once.
@@ -56,8 +57,8 @@ pub(crate) struct SceneReader {
     last: Option<(PathBuf, Defaults, Read)>,
 }
 
-/// A scene, and what in it was passed over.
-type Read = (Scene, Vec<Warning>);
+/// A scene, what in it was passed over, and the files that it was read from.
+type Read = (Scene, Vec<Warning>, Vec<PathBuf>);
 
 impl SceneReader {
     /// As [`load_scene`], with what was passed over.
@@ -89,21 +90,17 @@ impl SceneReader {
 /// # Errors
 /// As [`load_scene`].
 pub fn parse_scene_str(xml: &str, base_dir: &Path) -> Result<Scene, CliError> {
-    parse_scene(&base_dir.join("scene.xml"), xml, &Defaults::new()).map(|(scene, _)| scene)
+    parse_scene(&base_dir.join("scene.xml"), xml, &Defaults::new()).map(|(scene, ..)| scene)
 }
 
-fn parse_scene(
-    path: &Path,
-    text: &str,
-    defaults: &Defaults,
-) -> Result<(Scene, Vec<Warning>), CliError> {
-    let root = SceneFiles::new(defaults).read(path, text)?;
+fn parse_scene(path: &Path, text: &str, defaults: &Defaults) -> Result<Read, CliError> {
+    let (root, included) = SceneFiles::new(defaults).read(path, text)?;
     missing_files(path, &root)?;
     at_rest(&root)?;
     let index = Index::new(&root)?;
     let loader = Loader { index, warnings: RefCell::default(), measured: RefCell::default() };
     let scene = loader.scene(&root)?;
-    Ok((scene, loader.warnings.into_inner()))
+    Ok((scene, loader.warnings.into_inner(), files::of_scene(path, included, &root)))
 }
 
 /// Refuses a scene several of whose files are missing, naming all of them; of a single one its reader tells.

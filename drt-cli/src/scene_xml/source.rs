@@ -40,6 +40,8 @@ pub(super) struct SceneFiles {
     paths: Vec<PathBuf>,
     /// Where files are searched at this place, after the folder of the file being read.
     folders: Arc<[PathBuf]>,
+    /// All files included so far.
+    included: Vec<PathBuf>,
     /// Files and elements read so far.
     files: usize,
     elements: usize,
@@ -50,11 +52,16 @@ impl SceneFiles {
         let (given, known) = (given.clone(), given.clone());
         let (used, open, paths, folders) =
             (BTreeSet::new(), Vec::new(), Vec::new(), Arc::default());
-        Self { given, known, used, open, paths, folders, files: 0, elements: 0 }
+        let included = Vec::new();
+        Self { given, known, used, open, paths, folders, included, files: 0, elements: 0 }
     }
 
-    /// The tree of a scene's text; `path` names it in messages and anchors relative paths.
-    pub(super) fn read(mut self, path: &Path, text: &str) -> Result<Element, CliError> {
+    /// The tree of a scene's text, and the files that it includes; `path` names it in messages and anchors relative paths.
+    pub(super) fn read(
+        mut self,
+        path: &Path,
+        text: &str,
+    ) -> Result<(Element, Vec<PathBuf>), CliError> {
         let mut root = self.parse(path, text, 0)?;
         if let Some(name) = self.given.keys().find(|k| !self.used.contains(*k)) {
             return Err(CliError::input(
@@ -64,7 +71,7 @@ impl SceneFiles {
         }
         values::substitute(&mut root)?;
         root.number();
-        Ok(root)
+        Ok((root, self.included))
     }
 
     /// The tree of one file, whose root stands inside `depth` elements.
@@ -185,6 +192,7 @@ impl SceneFiles {
         if self.open.iter().any(|open| same(open, &path)) {
             return Err(at.error(format!("{} includes itself", path.display())));
         }
+        self.included.push(path.clone());
         self.parse(&path, &text, depth)
     }
 

@@ -268,6 +268,8 @@ impl Apply<'_> {
     fn medium(&mut self, i: usize) -> Result<(), Error> {
         let target = Target::Medium(i);
         let mut tangents = alloc::vec![MediumTangent::zero(); self.parameters.len()];
+        // Who may have taken a property out of its range: effects together may leave it in.
+        let mut pushed: Vec<(usize, drt_medium::Property)> = Vec::new();
         let parameters = self.parameters;
         for (p, parameter, change) in effects_on(parameters, target) {
             let theta = parameter.value;
@@ -283,6 +285,14 @@ impl Apply<'_> {
             let own = medium.apply(&change, theta).and_then(|()| medium.tangent(&change, theta));
             let own = own.map_err(|e| self.fail(p, target, e))?;
             tangents[p] = tangents[p].clone().plus(&own);
+            if let Some(property) = change.pushes(theta) {
+                pushed.retain(|(_, other)| *other != property);
+                pushed.push((p, property));
+            }
+        }
+        for (p, property) in pushed {
+            let checked = self.scene.media[i].item.check(property);
+            checked.map_err(|e| self.fail(p, target, e))?;
         }
         // Coefficients do not depend on where they are: what moves the grids can come last.
         self.move_grids(i, &mut tangents)?;
@@ -366,6 +376,10 @@ impl Apply<'_> {
             "sigma_t" => MediumChange::SigmaT { op, voxels },
             "albedo" => MediumChange::Albedo { op, voxels },
             "emission" => MediumChange::Emission { op, voxels },
+            "g" if voxels.is_some() => {
+                let property = drt_medium::Property::G;
+                return Err(self.fail(p, target, drt_medium::MediumError::NotAGrid { property }));
+            }
             "g" => MediumChange::G(op),
             other => {
                 return Err(self.fail(p, target, EffectError::MediumProperty(other.into())));
@@ -449,6 +463,11 @@ impl Apply<'_> {
             let (change, rates) = found.map_err(|e| self.fail(p, target, e))?;
             let of = TextureUse::Emitter(i);
             add_texels(&mut self.tangents.texels, of, p, &change, rates);
+        }
+        let changes =
+            effects_on(parameters, target).filter(|(.., c)| matches!(c, Change::Property(_)));
+        if let Some((p, ..)) = changes.last() {
+            emitter.validate().map_err(|e| self.fail(p, target, e))?;
         }
         self.scene.emitters[i].item.emitter = emitter;
         self.tangents.emitters.push(keep(tangents, |t| !t.is_zero()));

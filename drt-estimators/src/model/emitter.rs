@@ -180,6 +180,9 @@ impl Emitter {
         if let Self::TexturedArea { texture, .. } = self {
             light.extend(texture.bounds().iter().flat_map(|c| c.to_array()));
         }
+        if let Self::Projector { slide, .. } = self {
+            light.extend(slide.darkest().map(Rgb::to_array).into_iter().flatten());
+        }
         match light.into_iter().find(|v| *v < 0.0) {
             Some(value) => Err(EmitterError::Negative { kind, what, value }),
             None => Ok(()),

@@ -60,3 +60,14 @@ pub enum Error {
         reason: SettingError,
     },
 }
+
+impl Error {
+    /// The parameter whose value takes a property out of the range in which it has a meaning, where that is what is wrong.
+    #[must_use]
+    pub fn out_of_range(&self) -> Option<&str> {
+        match self {
+            Self::Effect { parameter, reason, .. } if reason.is_out_of_range() => Some(parameter),
+            _ => None,
+        }
+    }
+}

@@ -13,6 +13,7 @@ use crate::model::rendering::Layer;
 use crate::model::scene::Scene;
 use crate::model::settings::{PathSampling, Settings};
 use crate::run::session::Control;
+use crate::run::stencil::Stencil;
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::{Blocks, PixelFilm, Raster, Splat};
 use crate::sampling::parallel::Pool;
@@ -22,10 +23,11 @@ use crate::world::World;
 use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
 
-/// Central differences of the image by each parameter, in the order of `parameters`: the difference
-/// of the images at value ± `step`, over 2 `step`, from `spp` samples per pixel of each.
+/// Differences of the image by each parameter, in the order of `parameters`: those of the images at value ± `step`, over
+/// 2 `step`, from `spp` samples per pixel of each. Where a property's range ends within a step, the images are those at the
+/// value and at one and two steps to the [one side](one_sided_differences) that is left; they are of second order, too.
 ///
-/// Both images see the same random numbers, and the standard errors are those of the difference. Their paths are
+/// All images see the same random numbers, and the standard errors are those of the difference. Their paths are
 /// from the camera, or from both ends where `settings` ask for these.
 /// Returns fewer layers than parameters when `control` cancelled the run.
 ///
@@ -62,15 +64,17 @@ pub fn finite_differences(
                 &mut PreparedCache::default(),
             )
         };
+        let stencil = Stencil::at(scene, parameters, p, step)?;
         let middle = at(0.0, None)?;
-        let worlds = [at(-step, Some(&middle))?, at(step, Some(&middle))?];
+        let displaced = |offset: &f64| at(offset * step, Some(&middle));
+        let worlds = stencil.offsets.iter().map(displaced).collect::<Result<Vec<_>, _>>()?;
         let both = settings.sampling == PathSampling::Bidirectional;
-        let emission = both.then(|| worlds.each_ref().map(EmissionSampler::new));
-        let pair = DisplacedPair { worlds, emission, step, spp, seed: settings.seed };
+        let emission = both.then(|| worlds.iter().map(EmissionSampler::new).collect());
+        let displaced = Displaced { worlds, emission, stencil, step, spp, seed: settings.seed };
         let progress = |done: f64| {
             control.progress((p as f64 + done) / parameters.len() as f64);
         };
-        match pair.difference(&pool, control, progress) {
+        match displaced.difference(&pool, control, progress) {
             Some(layer) => layers.push(layer),
             None => break,
         }
@@ -78,17 +82,18 @@ pub fn finite_differences(
     Ok(layers)
 }
 
-/// A scene displaced both ways.
-struct DisplacedPair {
-    worlds: [World; 2],
+/// A scene displaced by several amounts.
+struct Displaced {
+    worlds: Vec<World>,
     /// Where paths of light start, if there are any.
-    emission: Option<[EmissionSampler; 2]>,
+    emission: Option<Vec<EmissionSampler>>,
+    stencil: Stencil,
     step: f64,
     spp: u32,
     seed: u64,
 }
 
-impl DisplacedPair {
+impl Displaced {
     fn difference(
         &self,
         pool: &Pool,
@@ -108,47 +113,66 @@ impl DisplacedPair {
             seed,
             allocation: None,
             shard: None,
-            sampler: || StepPair {
-                samplers: [0, 1].map(|k| {
-                    let sampler = PixelSampler::new(&self.worlds[k], None, seed, false, false);
-                    let Some(emission) = &self.emission else { return sampler };
-                    sampler.with_image(ImageSampling::Squares).with_light_paths(Some(&emission[k]))
-                }),
-                scale: 0.5 / self.step,
-                splats: Vec::new(),
+            sampler: || {
+                let weights = self.stencil.weights.iter().enumerate();
+                StepImages {
+                    samplers: weights.map(|(k, weight)| (self.sampler(k), *weight)).collect(),
+                    scale: 0.5 / self.step,
+                    splats: Vec::new(),
+                }
             },
+            cancelled: &|| control.cancelled(),
         };
-        let going = |_: StepPair<'_>, part| {
+        let going = |_: StepImages<'_>, part| {
             progress(part);
             !control.cancelled()
         };
         let done = filling.fill(&mut film, units, going, |_, _| {});
         (done == units).then(|| film.layer(0, &Blocks::new(size)))
     }
+
+    /// What samples one of the displaced scenes.
+    fn sampler(&self, k: usize) -> PixelSampler<'_, Contraction<'_>> {
+        let sampler = PixelSampler::new(&self.worlds[k], None, self.seed, false, false);
+        let Some(emission) = &self.emission else { return sampler };
+        sampler.with_image(ImageSampling::Squares).with_light_paths(emission.get(k))
+    }
 }
 
-/// Samples both displaced scenes alike.
-struct StepPair<'a> {
-    samplers: [PixelSampler<'a, Contraction<'a>>; 2],
+/// Samples all displaced scenes alike.
+struct StepImages<'a> {
+    /// With what each image counts by.
+    samplers: Vec<(PixelSampler<'a, Contraction<'a>>, f64)>,
     scale: f64,
     splats: Vec<Splat>,
 }
 
-impl Sampler for StepPair<'_> {
+impl Sampler for StepImages<'_> {
     fn sample(&mut self, pixel: u32, unit: u32, points: SobolSampler, values: &mut [Rgb]) {
-        let [low, high] = &mut self.samplers;
-        let mut below = [Rgb::ZERO];
-        low.sample(pixel, unit, points.clone(), &mut below);
-        high.sample(pixel, unit, points, values);
-        values[0] = (values[0] - below[0]) * self.scale;
-        let scaled = |s: &Splat, scale| Splat { value: s.value * scale, ..*s };
+        let mut sum = Rgb::ZERO;
+        for (sampler, weight) in &mut self.samplers {
+            let mut value = [Rgb::ZERO];
+            sampler.sample(pixel, unit, points.clone(), &mut value);
+            sum += value[0] * *weight;
+        }
+        values[0] = sum * self.scale;
         self.splats.clear();
-        self.splats.extend(high.splats().iter().map(|s| scaled(s, self.scale)));
-        for below in low.splats().iter().map(|s| scaled(s, -self.scale)) {
-            // What stays where it is differs by little: as one splat it is the small event that it is.
-            match self.splats.iter_mut().find(|s| s.point == below.point) {
-                Some(above) => above.value += below.value,
-                None => self.splats.push(Splat { weight: 0.0, ..below }),
+        let scale = self.scale;
+        let mut last = true;
+        for (sampler, weight) in self.samplers.iter().rev() {
+            let own = sampler.splats().iter();
+            let own = own.map(|s| Splat { value: s.value * (scale * *weight), ..*s });
+            if last {
+                self.splats.extend(own);
+                last = false;
+                continue;
+            }
+            for other in own {
+                // What stays where it is differs by little: as one splat it is the small event that it is.
+                match self.splats.iter_mut().find(|s| s.point == other.point) {
+                    Some(sum) => sum.value += other.value,
+                    None => self.splats.push(Splat { weight: 0.0, ..other }),
+                }
             }
         }
     }

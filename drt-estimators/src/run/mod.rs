@@ -3,3 +3,4 @@
 pub(crate) mod finite_difference;
 pub(crate) mod reverse;
 pub(crate) mod session;
+pub(crate) mod stencil;

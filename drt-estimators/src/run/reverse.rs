@@ -195,7 +195,10 @@ pub fn gradient_in_batches(
     let bidirectional = settings.sampling == PathSampling::Bidirectional;
     let emission = bidirectional.then(|| EmissionSampler::new(&world));
     let emission = emission.as_ref();
-    let run = Reverse { world: &world, components, emission, antithetic, seed, pass, spp, adjoint };
+    let cancelled = &|| control.cancelled();
+    let world = &world;
+    let run =
+        Reverse { world, components, emission, antithetic, seed, pass, spp, adjoint, cancelled };
     let pieces = run.pieces(shard);
     let mut sums = [run.zeros(), run.zeros()];
     if let Some(first) = sums[1].first_mut() {
@@ -203,7 +206,7 @@ pub fn gradient_in_batches(
         first.scene.non_finite += pilots.non_finite_count;
     }
     let finish = |sums: Vec<Sums>| {
-        let mut gradient = SceneGradient::zeros(&world, &active(&scene, wanted));
+        let mut gradient = SceneGradient::zeros(world, &active(&scene, wanted));
         for (component, Sums { scene: mut sum, insides }) in components.iter().zip(sums) {
             component.insides.gather(&component.prepared.world, insides, &mut sum);
             gradient.add(&sum);
@@ -212,6 +215,9 @@ pub fn gradient_in_batches(
     };
     let work = |i: u32| run.piece(&pieces[i as usize]);
     Ok(pool.ordered(0..pieces.len() as u32, 1, work, |i, parts| {
+        if control.cancelled() {
+            return false;
+        }
         let piece = &pieces[i as usize];
         let [of_pixels, of_boundary] = &mut sums;
         let to = if matches!(piece.work, Work::Pixels(_)) { of_pixels } else { of_boundary };
@@ -229,7 +235,7 @@ pub fn gradient_in_batches(
                 of_boundary: [batches.len() as u32, BATCHES as u32],
             });
         }
-        !control.cancelled()
+        true
     }))
 }
 
@@ -275,7 +281,8 @@ impl Component {
     ) -> (Account, bool) {
         let mut pilots = Account::default();
         let (prepared, active) = (&self.prepared, &self.active);
-        let splatter = prepared.splatter(all, seed);
+        let cancelled = || control.cancelled();
+        let splatter = prepared.splatter(all, seed).until(&cancelled);
         for (i, guiding) in self.guiding.iter_mut().enumerate() {
             let samples = f64::from(spp) * prepared.source_ratio(i) * adjoint.len() as f64;
             let (account, going) = guiding.learn(
@@ -284,7 +291,7 @@ impl Component {
                 samples,
                 pool,
                 || OfGradient::new(active, adjoint),
-                || control.cancelled(),
+                cancelled,
             );
             pilots.add(account);
             if !going {
@@ -358,6 +365,8 @@ struct Reverse<'a> {
     pass: Pass,
     spp: u32,
     adjoint: &'a [Rgb],
+    /// True when pieces of work shall end before they are done, to be thrown away.
+    cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// A piece of work.
@@ -447,7 +456,9 @@ impl Reverse<'_> {
                 sink.weights = self.adjoint[pixel as usize] * scale;
             }
             self.pass.sample(seed, pixel, part.run, units.clone(), 1, |unit, points| {
-                sampler.sample(pixel, unit, points, &mut values);
+                if !(self.cancelled)() {
+                    sampler.sample(pixel, unit, points, &mut values);
+                }
             });
         }
         let (account, sinks) = sampler.finish();
@@ -476,7 +487,8 @@ impl Reverse<'_> {
             scale,
         });
         let stream = source.stream() + u64::from(batch);
-        let splatter = prepared.splatter(self.world, seed_of_component(self.seed, c));
+        let seed = seed_of_component(self.seed, c);
+        let splatter = prepared.splatter(self.world, seed).until(self.cancelled);
         let guide = component.guiding[i].guide();
         let account = splatter.run(source, guide, stream, count, &mut receiver);
         let mut to = receiver.inner;

@@ -173,6 +173,8 @@ pub(crate) struct Filling<'a, W> {
     pub(crate) shard: Option<Shard>,
     /// Makes the sampler of a piece of work.
     pub(crate) sampler: W,
+    /// True when a piece of work shall end before it is done; from then on always, and then `finished` says so, too.
+    pub(crate) cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl<W> Filling<'_, W> {
@@ -218,6 +220,7 @@ impl<W> Filling<'_, W> {
             let mut image = raster.as_ref().map(|raster| SplatTile::new(raster, range(t)));
             let mut sampler = (self.sampler)();
             let mut values = alloc::vec![Rgb::ZERO; layers];
+            let mut whole = true;
             for pixel in range(t) {
                 if let Some(image) = &mut image {
                     image.begin(pixel);
@@ -230,6 +233,10 @@ impl<W> Filling<'_, W> {
                 let weight = f64::from(given) / f64::from(taken);
                 let units = at(cut)..at(cut + 1);
                 pass.sample(self.seed, pixel, round.part.run, units, spread, |unit, points| {
+                    whole = whole && !(self.cancelled)();
+                    if !whole {
+                        return;
+                    }
                     sampler.sample(pixel, unit, points, &mut values);
                     if taken != given {
                         values.iter_mut().for_each(|v| *v *= weight);
@@ -242,12 +249,13 @@ impl<W> Filling<'_, W> {
                     }
                 });
             }
-            (tile, image, sampler)
+            whole.then_some((tile, image, sampler))
         };
         let mut waiting = Vec::new();
         let before = film.units();
         film.begin();
-        let going = self.pool.ordered(0..all, 4, work, |i, (tile, image, sampler)| {
+        let going = self.pool.ordered(0..all, 4, work, |i, piece| {
+            let Some((tile, image, sampler)) = piece else { return false };
             waiting.push(tile);
             if let Some(image) = &image {
                 film.splat(image);

@@ -221,7 +221,8 @@ impl Prepared {
         let (grazing, emission) = (self.grazing.as_ref(), self.emission.as_ref());
         let (world, boundary) = (&self.world, &self.boundary);
         let along = self.along_rays();
-        Splatter { world, all, along, boundary, radiative, grazing, emission, seed }
+        let cancelled = &|| false;
+        Splatter { world, all, along, boundary, radiative, grazing, emission, seed, cancelled }
     }
 
     /// Samples of a splatted source to each of a pixel, by the settings alone.

@@ -94,6 +94,15 @@ pub(crate) struct Splatter<'a> {
     pub(crate) grazing: Option<&'a GrazingFlux>,
     pub(crate) emission: Option<&'a EmissionSampler>,
     pub(crate) seed: u64,
+    /// True when a batch shall end before it is done, to be thrown away.
+    pub(crate) cancelled: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl<'a> Splatter<'a> {
+    /// The same, which may be cancelled.
+    pub(crate) fn until(self, cancelled: &'a (dyn Fn() -> bool + Sync)) -> Self {
+        Self { cancelled, ..self }
+    }
 }
 
 impl Splatter<'_> {
@@ -134,6 +143,9 @@ impl Splatter<'_> {
         // One Sobol' sequence a batch, so that the scatter of batches stays an honest error.
         let sequence = Rng::new(self.seed, SEQUENCE_STREAM | stream, 0).next_u32();
         for index in 0..count {
+            if (self.cancelled)() {
+                break;
+            }
             let mut points = SobolSampler::new(sequence, index);
             let rng = Rng::new(self.seed, stream, index);
             let drawn = guide.map(|g| g.draw(core::array::from_fn(|_| points.next_f64())));

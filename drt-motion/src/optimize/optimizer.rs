@@ -96,6 +96,23 @@ impl Optimizer {
         &self.state.values
     }
 
+    /// Takes a variable back to a value between that before the last step and the one it led to, as where the step led
+    /// out of what has a meaning.
+    ///
+    /// # Errors
+    /// When the value is not finite or not within the variable's bounds, or there is no such variable.
+    pub fn take_back(&mut self, variable: usize, value: f64) -> Result<(), OptimizeError> {
+        let expected = self.variables.len();
+        let (Some(of), Some(slot)) =
+            (self.variables.get(variable), self.state.values.get_mut(variable))
+        else {
+            return Err(OptimizeError::Length { what: "variables", expected, found: variable + 1 });
+        };
+        of.check(variable, value)?;
+        *slot = value;
+        Ok(())
+    }
+
     /// What to store.
     #[must_use]
     pub fn state(&self) -> &State {

@@ -134,3 +134,14 @@ fn schedules_reach_what_they_say() {
     assert_eq!([0, 9, 10, 19, 20, 99].map(|i| stages.at(i)), [4, 4, 16, 16, 64, 64]);
     assert_eq!(stages.values().max(), Some(64));
 }
+
+#[test]
+fn a_step_can_be_taken_back() {
+    let mut optimizer = Optimizer::new(Method::ADAM, variables(0.5), &[0.5, 0.5]).unwrap();
+    optimizer.step(&[1.0, -1.0], 1.0).unwrap();
+    let other = optimizer.values()[1];
+    optimizer.take_back(0, 0.25).unwrap();
+    assert_eq!(optimizer.values(), [0.25, other]);
+    assert_eq!(optimizer.state().steps, 1);
+    assert!(optimizer.take_back(0, f64::NAN).is_err() && optimizer.take_back(2, 0.0).is_err());
+}

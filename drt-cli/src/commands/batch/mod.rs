@@ -15,30 +15,34 @@ use self::list::Entry;
 use self::log::{Event, Log};
 use super::clock::Clock;
 use super::derivatives::derivatives;
+use super::destinations::whole_name;
 use super::monitor::Monitor;
 use super::options::BatchOptions;
 use super::outputs::Outputs;
 use super::run::{self, Shared};
 use super::{Outcome, render};
-use crate::atomic::remove_drafts;
 use crate::fingerprint::Fingerprint;
 use crate::image::is_result_of;
-use crate::{CliError, Job};
+use crate::wording::shown;
+use crate::{CliError, Job, console};
 
 /// The name of the log.
 const LOG: &str = "batch.jsonl";
 
 pub(super) fn run(options: &BatchOptions) -> Result<Outcome, CliError> {
     let entries = list::entries(options)?;
-    refuse_collisions(&entries)?;
+    let log = options.output.join(LOG);
+    let written = Written::of(&entries, &log)?;
+    written
+        .spare(entries.iter().map(|e| e.options.input.as_path()).chain(options.list.as_deref()))?;
     for folder in folders(&entries, &options.output) {
         std::fs::create_dir_all(&folder).map_err(|e| CliError::write(&folder, e))?;
-        remove_drafts(&folder);
     }
     let batch = Batch {
-        log: Log::open(&options.output.join(LOG))?,
+        log: Log::open(&log)?,
         monitor: Monitor::new(options.changes.quiet),
         forward: options.forward,
+        written,
     };
     let tally = batch.run(&entries)?;
     batch.monitor.finish();
@@ -61,22 +65,38 @@ fn folders(entries: &[Entry], own: &Path) -> Vec<PathBuf> {
     folders
 }
 
-/// Two jobs must not overwrite each other's results.
-fn refuse_collisions(entries: &[Entry]) -> Result<(), CliError> {
-    let mut taken = BTreeMap::new();
-    for entry in entries {
-        let files = [&entry.options.output, &entry.options.digest, &entry.options.preview];
-        for file in files.into_iter().flatten() {
-            if let Some(other) = taken.insert(file, entry) {
-                return Err(CliError::argument(format!(
-                    "{other} and {entry} would both be written to {}; expected a name of its own, \
-                     by -o in a line of --list",
-                    file.display()
-                )));
+/// All files that a batch writes, and who does.
+struct Written(BTreeMap<PathBuf, String>);
+
+impl Written {
+    /// Two jobs must not overwrite each other's results, nor the log.
+    fn of(entries: &[Entry], log: &Path) -> Result<Self, CliError> {
+        let mut taken = BTreeMap::from([(whole_name(log), "the log".to_owned())]);
+        for entry in entries {
+            let files = [&entry.options.output, &entry.options.digest, &entry.options.preview];
+            for file in files.into_iter().flatten() {
+                if let Some(other) = taken.insert(whole_name(file), entry.to_string()) {
+                    return Err(CliError::argument(format!(
+                        "{other} and {entry} would both be written to {}; expected a name of its \
+                         own, by -o in a line of --list",
+                        file.display()
+                    )));
+                }
             }
         }
+        Ok(Self(taken))
     }
-    Ok(())
+
+    /// Refuses to overwrite what is read.
+    fn spare<'p>(&self, read: impl IntoIterator<Item = &'p Path>) -> Result<(), CliError> {
+        let found = read.into_iter().find_map(|file| Some((file, self.0.get(&whole_name(file))?)));
+        found.map_or(Ok(()), |(file, who)| {
+            Err(CliError::argument(format!(
+                "{} is read, and would be overwritten by {who}; expected another file, by -o",
+                file.display()
+            )))
+        })
+    }
 }
 
 /// What became of the jobs.
@@ -92,16 +112,20 @@ struct Tally {
 impl Tally {
     fn tell(&self, entries: &[Entry], quiet: bool) {
         for (i, error) in &self.failed {
-            eprintln!("drt: error: {}: {error}", entries[*i]);
+            let message = shown(&format!("{}: {error}", entries[*i]));
+            console::note(format_args!("drt: error: {message}"));
         }
         if !quiet {
             let Self { finished, skipped, failed, interrupted } = self;
             let left = entries.len() - finished - skipped - failed.len();
-            eprint!("{finished} finished, {skipped} were finished before, {} failed", failed.len());
-            match interrupted {
-                true => eprintln!(", {left} left; the same command goes on from here"),
-                false => eprintln!(),
-            }
+            let rest = match interrupted {
+                true => format!(", {left} left; the same command goes on from here"),
+                false => String::new(),
+            };
+            console::note(format_args!(
+                "{finished} finished, {skipped} were finished before, {} failed{rest}",
+                failed.len()
+            ));
         }
     }
 }
@@ -118,6 +142,8 @@ struct Batch {
     monitor: Monitor,
     /// No derivatives.
     forward: bool,
+    /// By all jobs.
+    written: Written,
 }
 
 impl Batch {
@@ -160,6 +186,7 @@ impl Batch {
         }
         let (clock, options) = (Clock::start(), &entry.options);
         let job = run::open_shared(options, shared)?;
+        self.written.spare(job.inputs())?;
         let by_derivatives = !self.forward && !job.parameters.is_empty();
         let command = if by_derivatives { "grad" } else { "render" };
         let inputs = hash(&job, command, entry)?.to_string();
@@ -170,7 +197,7 @@ impl Batch {
         }
         let warnings: Vec<String> = job.warnings.iter().map(ToString::to_string).collect();
         self.log.add(entry, Event { warnings: &warnings, ..event("started") })?;
-        let outputs = Outputs::new(options, command)?.of_inputs(inputs.clone());
+        let outputs = Outputs::new(options, &job, command)?.of_inputs(inputs.clone());
         let rendering = if by_derivatives {
             job.require_derivatives()?;
             derivatives(&job, options, &self.monitor, 1.0, shared)?

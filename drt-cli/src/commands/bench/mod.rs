@@ -7,19 +7,22 @@ mod report;
 mod series;
 
 use std::io::Write;
+use std::path::{Path, PathBuf};
 
+use super::destinations::Destinations;
 use super::monitor::Monitor;
 use super::options::BenchOptions;
-use super::{Outcome, run};
-use crate::{CliError, check_target, write_atomically};
+use super::{Outcome, run, stop};
+use crate::{CliError, Job, console, write_atomically};
 use measure::Budget;
 use reference::Reference;
 use series::Series;
 
 pub(super) fn run(options: &BenchOptions) -> Result<Outcome, CliError> {
-    for path in [&options.csv, &options.plot].into_iter().flatten() {
-        check_target(path)?;
-    }
+    let destinations =
+        Destinations::new([("--csv", options.csv.as_deref()), ("--plot", options.plot.as_deref())]);
+    destinations.spare(options.inputs.iter().chain(&options.reference).map(PathBuf::as_path))?;
+    destinations.check()?;
     if options.reference.is_some() && options.inputs.len() > 1 {
         return Err(CliError::argument("--reference belongs to one job; several are given"));
     }
@@ -29,23 +32,40 @@ pub(super) fn run(options: &BenchOptions) -> Result<Outcome, CliError> {
         .iter()
         .map(|input| run::open_changed(input, &options.changes))
         .collect::<Result<Vec<_>, _>>()?;
+    destinations.spare(jobs.iter().flat_map(Job::inputs))?;
     let reference = options.reference.as_deref().map(Reference::read).transpose()?;
     let budget = Budget { seconds: options.seconds, spp: options.spp };
     let monitor = Monitor::new(options.changes.quiet);
     let mut all: Vec<Series> = Vec::new();
     for job in &jobs {
+        keep(options, &all);
         all.extend(measure::job(job, reference.as_ref(), budget, &monitor)?);
         if monitor.interrupted() {
             break;
         }
     }
     monitor.finish();
-    print!("{}", report::table(&all));
-    if let Some(path) = &options.csv {
-        write_atomically(path, |out| Ok(out.write_all(report::csv(&all).as_bytes())?))?;
-    }
-    if let Some(path) = &options.plot {
-        write_atomically(path, |out| Ok(out.write_all(plot::svg(&all).as_bytes())?))?;
-    }
+    tell(&all, options.csv.as_deref(), options.plot.as_deref())?;
     Ok(if monitor.interrupted() { Outcome::Interrupted } else { Outcome::Done })
+}
+
+/// Shows all measurements where they were asked for.
+fn tell(all: &[Series], csv: Option<&Path>, plot: Option<&Path>) -> Result<(), CliError> {
+    console::print(report::table(all).to_string())?;
+    if let Some(path) = csv {
+        write_atomically(path, |out| Ok(out.write_all(report::csv(all).as_bytes())?))?;
+    }
+    if let Some(path) = plot {
+        write_atomically(path, |out| Ok(out.write_all(plot::svg(all).as_bytes())?))?;
+    }
+    Ok(())
+}
+
+/// What is shown where the program must end while the next job is prepared.
+fn keep(options: &BenchOptions, all: &[Series]) {
+    let (all, csv, plot) = (all.to_vec(), options.csv.clone(), options.plot.clone());
+    if !all.is_empty() {
+        // Nobody is left to be told that it cannot be written.
+        stop::rescue(move || drop(tell(&all, csv.as_deref(), plot.as_deref())));
+    }
 }

@@ -1,7 +1,7 @@
 //! The run itself: evaluate, step, store.
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use drt_estimators::fit::{Evaluation, Fit};
@@ -10,14 +10,17 @@ use drt_motion::optimize::{Method, Observation, OptimizeError, Optimizer, Outloo
 use super::checkpoint::Checkpoint;
 use super::gallery::Gallery;
 use super::history::{History, LOSSES, PARAMETERS};
+use super::limits::{self, Limits};
 use super::problem::Problem;
 use super::report::{self, Report};
+use super::sources::Sources;
 use super::team::Team;
 use super::watch::Watch;
-use crate::atomic::{remove_drafts, write_atomically};
+use crate::atomic::write_atomically;
 use crate::commands::Outcome;
 use crate::commands::clock::Clock;
 use crate::commands::monitor::Monitor;
+use crate::commands::stop;
 use crate::error::Place;
 use crate::fingerprint::Fingerprint;
 use crate::{CliError, PROGRAM};
@@ -32,6 +35,7 @@ pub(super) struct Descent<'a> {
     problem: &'a Problem<'a>,
     team: &'a Team,
     fingerprint: Fingerprint,
+    sources: Sources,
     optimizer: Optimizer,
     history: History,
     watch: Watch<'a>,
@@ -39,6 +43,9 @@ pub(super) struct Descent<'a> {
     clock: Clock,
     /// Spent before this run.
     before: [f64; 2],
+    /// What steps were shortened by.
+    limits: Limits,
+    quiet: bool,
     /// Nothing was left to do: what is spent on looking at it again does not count.
     again: bool,
 }
@@ -49,13 +56,17 @@ impl<'a> Descent<'a> {
         problem: &'a Problem<'a>,
         team: &'a Team,
         restart: bool,
+        quiet: bool,
     ) -> Result<Self, CliError> {
         let (clock, plan) = (Clock::start(), problem.plan);
-        let fingerprint = problem.fingerprint()?;
+        let (fingerprint, sources) = match &plan.checkpoint {
+            Some(_) => (problem.fingerprint()?, Sources::of(problem.job)?),
+            None => Default::default(),
+        };
         let refuse = |e| CliError::input(&Place::file(&problem.job.path), e);
         let folder = plan.checkpoint.as_deref();
         let stored = match folder.filter(|_| !restart) {
-            Some(folder) => Checkpoint::read(folder, fingerprint)?.map(|c| (folder, c)),
+            Some(folder) => Checkpoint::read(folder, fingerprint, &sources)?.map(|c| (folder, c)),
             None => None,
         };
         let count = problem.job.parameters.len();
@@ -67,7 +78,9 @@ impl<'a> Descent<'a> {
                 (optimizer, history, vec![0; count], [0.0; 2], false)
             }
             Some((folder, stored)) => {
-                let history = History::read(folder, stored.optimizer.steps as usize, count)?;
+                let steps = stored.optimizer.steps as usize;
+                let history = History::read(folder, steps, count)?;
+                history.check(folder, steps, problem.names(), stored.tables)?;
                 let before = [stored.seconds, stored.cpu_seconds];
                 let enough = stored.optimizer.steps >= u64::from(problem.iterations);
                 let again = stored.complete && enough;
@@ -79,20 +92,20 @@ impl<'a> Descent<'a> {
         let optimizer = optimizer.map_err(refuse)?;
         let watch = Watch::new(problem, blind);
         let folder = folder.filter(|_| team.leads());
-        if let Some(folder) = folder {
-            remove_drafts(folder);
-        }
         let gallery = folder.map(|folder| Gallery::new(problem, folder));
         Ok(Self {
             problem,
             team,
             fingerprint,
+            sources,
             optimizer,
             history,
             watch,
             gallery,
             clock,
             before,
+            limits: Limits::default(),
+            quiet,
             again,
         })
     }
@@ -173,6 +186,10 @@ impl<'a> Descent<'a> {
         };
         let part = |i: u32| f64::from(i) / f64::from(n + 1);
         monitor.stage(&name, part(i), part(i + 1));
+        if let Some(stored) = self.stored() {
+            // That it cannot be written is told by nobody any more.
+            stop::rescue(move || drop(stored.write()));
+        }
         self.team.evaluate(self.problem, i, self.values(), fit, monitor)
     }
 
@@ -201,6 +218,7 @@ impl<'a> Descent<'a> {
         let stepped = self
             .step_by(i, evaluation, factor)
             .map_err(|e| CliError::unsolved(format!("iteration {i}: {e}")));
+        let stepped = stepped.and_then(|()| self.stay_in_range(i, before.values(), fit));
         if let Err(error) = stepped.and_then(|()| self.watch.step(i, self.optimizer.values(), fit))
         {
             self.optimizer = before;
@@ -208,6 +226,32 @@ impl<'a> Descent<'a> {
             return Err(error);
         }
         self.history.values.push(self.optimizer.values().to_vec());
+        Ok(())
+    }
+
+    /// Shortens a step that leads out of where properties have a meaning, parameter by parameter.
+    fn stay_in_range(&mut self, i: u32, before: &[f64], fit: &mut Fit) -> Result<(), CliError> {
+        let names: Vec<String> = self.problem.names().map(Into::into).collect();
+        let mut wanted = self.optimizer.values().to_vec();
+        // Each parameter is to blame at most once, and then all of them together.
+        for round in 0..=names.len() {
+            let Err(error) = fit.scene_at(&wanted) else { break };
+            let named = error.out_of_range().and_then(|name| names.iter().position(|n| n == name));
+            let Some(p) = named else { return Ok(()) };
+            let reason = error.to_string();
+            let everyone = round == names.len() || wanted[p] == before[p];
+            wanted = limits::shortened(before, &wanted, (!everyone).then_some(p), |values| {
+                fit.scene_at(values).is_err_and(|e| e.out_of_range().is_some())
+            });
+            for (p, value) in wanted.iter().enumerate() {
+                let taken = self.optimizer.take_back(p, *value);
+                taken.map_err(|e| CliError::unsolved(format!("iteration {i}: {e}")))?;
+            }
+            self.limits.note(&names[p], i, &reason, self.team.leads() && !self.quiet);
+            if everyone {
+                break;
+            }
+        }
         Ok(())
     }
 
@@ -244,15 +288,14 @@ impl<'a> Descent<'a> {
 
     /// Writes what is needed to go on from here, and the tables.
     fn store(&self) -> Result<(), CliError> {
-        let Some(folder) = self.folder() else { return Ok(()) };
-        create(Some(folder))?;
-        for (name, text) in [
-            (PARAMETERS, self.history.parameters(self.problem.names())),
-            (LOSSES, self.history.losses()),
-        ] {
-            write_atomically(&folder.join(name), |out| Ok(out.write_all(text.as_bytes())?))?;
-        }
+        self.stored().map_or(Ok(()), |stored| stored.write())
+    }
+
+    /// That, ready to be written at any time.
+    fn stored(&self) -> Option<Stored> {
+        let folder = self.folder()?.to_path_buf();
         let [seconds, cpu_seconds] = self.spent();
+        let names = || self.problem.names();
         let checkpoint = Checkpoint {
             program: PROGRAM.into(),
             fingerprint: self.fingerprint,
@@ -261,8 +304,12 @@ impl<'a> Descent<'a> {
             complete: self.history.losses.len() > self.problem.iterations as usize,
             seconds,
             cpu_seconds,
+            sources: self.sources.clone(),
+            tables: self.history.sums(self.steps() as usize, names()),
         };
-        checkpoint.write(folder)
+        let tables =
+            [(PARAMETERS, self.history.parameters(names())), (LOSSES, self.history.losses())];
+        Some(Stored { folder, tables, checkpoint })
     }
 
     /// Shows what was seen last, and the page that tells of it.
@@ -282,6 +329,7 @@ impl<'a> Descent<'a> {
             outlook: self.outlook(seen),
             spent: self.spent(),
             failure,
+            limits: &self.limits,
         };
         let page = page.html();
         write_atomically(&folder.join(report::FILE), |out| Ok(out.write_all(page.as_bytes())?))
@@ -293,6 +341,24 @@ impl<'a> Descent<'a> {
             return self.before;
         }
         [self.before[0] + self.clock.seconds(), self.before[1] + self.clock.cpu_seconds()]
+    }
+}
+
+/// What a run goes on from, with the tables that belong to it.
+struct Stored {
+    folder: PathBuf,
+    tables: [(&'static str, String); 2],
+    checkpoint: Checkpoint,
+}
+
+impl Stored {
+    fn write(&self) -> Result<(), CliError> {
+        create(Some(&self.folder))?;
+        for (name, text) in &self.tables {
+            let path = self.folder.join(name);
+            write_atomically(&path, |out| Ok(out.write_all(text.as_bytes())?))?;
+        }
+        self.checkpoint.write(&self.folder)
     }
 }
 

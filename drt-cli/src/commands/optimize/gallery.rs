@@ -50,6 +50,19 @@ impl<'a> Gallery<'a> {
         self.file(view, &format!("derivative-{parameter:03}"))
     }
 
+    /// True for the files that a run writes, or removes when it begins anew.
+    pub(super) fn writes(&self, path: &Path) -> bool {
+        let views = 0..self.problem.views.len();
+        let own = |v: usize| {
+            let named = ["target", "initial", "current", "difference"];
+            let parameters = 0..self.problem.job.parameters.len();
+            named.into_iter().any(|name| self.file(v, name) == path)
+                || parameters.into_iter().any(|p| self.derivative(v, p) == path)
+        };
+        let name = path.file_name().unwrap_or_default();
+        is_frame(&name.to_string_lossy()) || views.into_iter().any(own)
+    }
+
     /// Removes what a run that began anew left of another: images of iterations that this one may not keep.
     pub(super) fn clear(&self) {
         let Ok(entries) = std::fs::read_dir(self.folder) else { return };

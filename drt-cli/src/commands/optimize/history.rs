@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::CliError;
 use crate::error::{Place, read_text};
+use crate::{CliError, checksum};
 
 /// The name of the table of values.
 pub(super) const PARAMETERS: &str = "params.csv";
@@ -45,6 +45,33 @@ impl History {
             let _ = writeln!(text, "{i},{loss:?}");
         }
         text
+    }
+
+    /// Checksums of the tables as they are after `steps` steps.
+    pub(super) fn sums<'a>(&self, steps: usize, names: impl Iterator<Item = &'a str>) -> [u32; 2] {
+        let mut cut = self.clone();
+        cut.values.truncate(steps + 1);
+        cut.losses.truncate(steps);
+        [checksum::of_text(&cut.parameters(names)), checksum::of_text(&cut.losses())]
+    }
+
+    /// Refuses tables that are not those of a checkpoint.
+    pub(super) fn check<'a>(
+        &self,
+        folder: &Path,
+        steps: usize,
+        names: impl Iterator<Item = &'a str>,
+        expected: [u32; 2],
+    ) -> Result<(), CliError> {
+        let found = self.sums(steps, names);
+        let differs = [PARAMETERS, LOSSES].into_iter().zip(found.iter().zip(&expected));
+        match differs.into_iter().find(|(_, (a, b))| a != b) {
+            None => Ok(()),
+            Some((name, _)) => Err(CliError::input(
+                &Place::file(&folder.join(name)),
+                "its numbers are not those of the checkpoint beside it; --restart begins anew",
+            )),
+        }
     }
 
     /// Reads the tables of a folder as they were after `steps` steps; what was written later is left

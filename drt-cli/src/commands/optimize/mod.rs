@@ -8,20 +8,27 @@ mod checkpoint;
 mod descent;
 mod gallery;
 mod history;
+mod limits;
 mod problem;
 mod report;
+mod sources;
 mod team;
 mod watch;
+
+use std::path::Path;
 
 use drt_estimators::fit::Evaluation;
 
 use super::derivatives::derivatives;
+use super::destinations::whole_name;
 use super::monitor::Monitor;
 use super::options::OptimizeOptions;
 use super::outputs::Outputs;
 use super::{Outcome, run};
+use crate::atomic::check_folder;
 use crate::{CliError, Job};
 use descent::Descent;
+use gallery::Gallery;
 use problem::Problem;
 use team::Team;
 
@@ -43,10 +50,12 @@ pub(super) fn run(options: &OptimizeOptions) -> Result<Outcome, CliError> {
 fn together(options: &OptimizeOptions, team: &Team) -> Result<Outcome, CliError> {
     let common = &options.common;
     let job = team.agree(run::open_with_parameters(common))?;
-    let outputs = team.agree(Outputs::new(common, "optimize"))?;
+    let outputs = team.agree(Outputs::new(common, &job, "optimize"))?;
     let problem = team.agree(Problem::new(&job, options))?;
+    team.agree(spare(&problem, &outputs))?;
     let monitor = Monitor::new(common.changes.quiet || !team.leads());
-    let mut descent = team.agree(Descent::begin(&problem, team, options.restart))?;
+    let mut descent =
+        team.agree(Descent::begin(&problem, team, options.restart, common.changes.quiet))?;
     let ran = descent.run(common.seconds, &monitor);
     let (outcome, last) = ran.inspect_err(|e| {
         monitor.finish();
@@ -63,12 +72,38 @@ fn together(options: &OptimizeOptions, team: &Team) -> Result<Outcome, CliError>
     monitor.finish();
     if !common.changes.quiet {
         let text = summary(&problem, &descent, last.as_ref());
-        match outputs.digest_on_stdout() {
-            true => eprint!("{text}"),
-            false => print!("{text}"),
-        }
+        outputs.tell(&text)?;
     }
     Ok(outcome)
+}
+
+/// Refuses a checkpoint folder that cannot be written, or in which results or inputs would be overwritten.
+fn spare(problem: &Problem<'_>, outputs: &Outputs) -> Result<(), CliError> {
+    outputs.spare(problem.job.pictures())?;
+    let Some(folder) = &problem.plan.checkpoint else { return Ok(()) };
+    check_folder(folder)?;
+    let folder = whole_name(folder);
+    let gallery = Gallery::new(problem, &folder);
+    let tables = [checkpoint::FILE, history::PARAMETERS, history::LOSSES, report::FILE];
+    let is_own = |path: &Path| {
+        let whole = whole_name(path);
+        let name = whole.file_name().unwrap_or_default().to_string_lossy();
+        whole.parent() == Some(&folder)
+            && (tables.contains(&name.as_ref()) || gallery.writes(&whole))
+    };
+    let taken = problem
+        .job
+        .inputs()
+        .chain(problem.job.pictures())
+        .chain(outputs.files())
+        .find(|path| is_own(path));
+    taken.map_or(Ok(()), |path| {
+        Err(CliError::argument(format!(
+            "{} would be overwritten by the fit, whose `checkpoint` folder has a file of this name; expected \
+             another folder",
+            path.display()
+        )))
+    })
 }
 
 /// Image and derivatives at the values reached, where they were asked for.
@@ -76,7 +111,7 @@ fn write(
     job: &Job,
     descent: &Descent<'_>,
     options: &OptimizeOptions,
-    outputs: &Outputs<'_>,
+    outputs: &Outputs,
     monitor: &Monitor,
 ) -> Result<(), CliError> {
     let mut job = job.clone();

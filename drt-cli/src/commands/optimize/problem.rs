@@ -9,7 +9,7 @@ use drt_math::Rng;
 use drt_motion::optimize::Stages;
 
 use crate::commands::options::OptimizeOptions;
-use crate::error::{Place, read_text};
+use crate::error::Place;
 use crate::fingerprint::Fingerprint;
 use crate::image::read_picture;
 use crate::job::Optimize;
@@ -117,7 +117,8 @@ impl<'a> Problem<'a> {
         let plan = self.plan;
         let settings = drt_estimators::Settings { threads: 0, ..self.job.settings.clone() };
         let mut sum = Fingerprint::default();
-        sum.add(read_text(&self.job.scene_path, None)?.as_bytes());
+        serde_json::to_writer(&mut sum, &self.job.scene)
+            .map_err(|e| CliError::input(&Place::file(&self.job.path), e))?;
         sum.add(format!("{:?} {settings:?}", self.job.parameters).as_bytes());
         sum.add(format!("{:?} {:?}", plan.loss, plan.method).as_bytes());
         sum.add(format!("{:?} {:?}", plan.variables, plan.decay).as_bytes());
@@ -159,14 +160,14 @@ fn views(job: &Job, plan: &Optimize) -> Result<Vec<View>, CliError> {
             ));
         };
         let film = of.item.sensor.film();
-        let picture = read_picture(path)?;
-        picture.check_size(path, film)?;
+        plan.check_file(path)?;
+        let picture = read_picture(path, film)?;
         let fail = |path, e| CliError::input(&Place::file(path), e);
         let mut reference =
             Reference::new(picture.size, picture.linear()).map_err(|e| fail(path, e))?;
         if let Some(path) = plan.masks.get(i) {
-            let mask = read_picture(path)?;
-            mask.check_size(path, film)?;
+            plan.check_file(path)?;
+            let mask = read_picture(path, film)?;
             reference = reference.with_mask(mask.gray()).map_err(|e| fail(path, e))?;
         }
         if let Some(part) = plan.relative {

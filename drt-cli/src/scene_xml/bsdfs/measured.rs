@@ -7,7 +7,7 @@ use drt_estimators::surface::Measured;
 
 use super::super::Loader;
 use super::super::properties::Properties;
-use crate::{CliError, measured_file};
+use crate::{CliError, input_file, measured_file};
 
 impl Loader<'_> {
     pub(super) fn measured(&self, p: &Properties<'_>) -> Result<Arc<Measured>, CliError> {
@@ -26,6 +26,6 @@ impl Loader<'_> {
 }
 
 fn read(path: &Path) -> Result<Measured, String> {
-    let bytes = std::fs::read(path).map_err(|err| format!("cannot read this file: {err}"))?;
+    let bytes = input_file::read(path).map_err(|err| format!("cannot read this file: {err}"))?;
     Measured::new(measured_file::decode(&bytes)?).map_err(|err| err.to_string())
 }

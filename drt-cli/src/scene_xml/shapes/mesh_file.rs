@@ -19,7 +19,8 @@ pub(super) fn ply(e: &Element, path: &Path) -> Result<Mesh, CliError> {
 }
 
 pub(super) fn bytes(e: &Element, path: &Path) -> Result<Vec<u8>, CliError> {
-    std::fs::read(path).map_err(|err| e.error(format!("cannot read {}: {err}", path.display())))
+    crate::input_file::read(path)
+        .map_err(|err| e.error(format!("cannot read {}: {err}", path.display())))
 }
 
 /// The mesh with a shading normal per vertex: the mean of the normals of the triangles that *name*

@@ -73,8 +73,7 @@ impl Slide {
         if !self.half.iter().all(|h| *h > 0.0 && h.is_finite()) {
             return Err("its picture has no size".into());
         }
-        let dark = |t: &Texture| t.bounds()[0].to_array().into_iter().any(|c| c < 0.0);
-        if self.texture.as_ref().is_some_and(dark) {
+        if self.darkest().is_some_and(|light| light.to_array().into_iter().any(|c| c < 0.0)) {
             return Err("its texture is negative somewhere".into());
         }
         Ok(self)
@@ -130,6 +129,11 @@ impl Slide {
         let gradient =
             (by_u * factor).outer(u) + (by_v * factor).outer(v) + value.outer(by_direction);
         (value * factor, gradient)
+    }
+
+    /// The least light of its texture, where it has one.
+    pub(super) fn darkest(&self) -> Option<Rgb> {
+        self.texture.as_ref().map(|t| t.bounds()[0])
     }
 
     /// Columns and rows of texels, where there are such.

@@ -75,6 +75,35 @@ pub enum EffectError {
     Medium(#[from] MediumError),
 }
 
+impl EffectError {
+    /// True where a nearer value of the parameter would do.
+    pub(crate) fn is_out_of_range(&self) -> bool {
+        fn of_surface(e: &SurfaceError) -> bool {
+            match e {
+                SurfaceError::OutOfRange { .. } | SurfaceError::Texels(TexelError::NotFinite) => {
+                    true
+                }
+                SurfaceError::Texture { reason, .. } => of_surface(reason),
+                _ => false,
+            }
+        }
+        match self {
+            Self::Surface(e) => of_surface(e),
+            Self::Emitter(e) => {
+                matches!(e, EmitterError::Negative { .. } | EmitterError::Cone { .. })
+            }
+            Self::Sensor(e) => {
+                matches!(e, SensorError::FieldOfView(_) | SensorError::Aperture { .. })
+            }
+            Self::Medium(e) => {
+                matches!(e, MediumError::OutOfRange { .. } | MediumError::PhaseFunction { .. })
+            }
+            Self::Texels(TexelError::NotFinite) => true,
+            _ => false,
+        }
+    }
+}
+
 impl From<DeformationError> for EffectError {
     fn from(e: DeformationError) -> Self {
         match e {

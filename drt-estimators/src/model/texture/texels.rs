@@ -32,7 +32,7 @@ pub enum TexelError {
         size: [u32; 2],
     },
     /// What becomes of a texel.
-    #[error("a texel would not be finite; choose a value nearer to zero")]
+    #[error("a texel would be negative or not finite; choose a value nearer to zero")]
     NotFinite,
 }
 

@@ -100,13 +100,14 @@ impl Component {
             return (Account::default(), true);
         };
         let (prepared, guiding) = (&self.prepared, &mut self.guiding[i]);
+        let cancelled = || pass.control.cancelled();
         guiding.learn(
-            &prepared.splatter(all, seed),
+            &prepared.splatter(all, seed).until(&cancelled),
             prepared.sources[i],
             samples,
             pass.pool,
             || OfImages::new(&prepared.world, motion),
-            || pass.control.cancelled(),
+            cancelled,
         )
     }
 
@@ -170,7 +171,8 @@ impl Component {
         let Some(motion) = &self.motion else { return (account, true) };
         let source = self.prepared.sources[i];
         let per_batch = self.per_batch(i, per_pixel);
-        let splatter = self.prepared.splatter(all, seed);
+        let cancelled = || pass.control.cancelled();
+        let splatter = self.prepared.splatter(all, seed).until(&cancelled);
         let guide = self.guiding[i].guide();
         let mut sums = film.begin();
         let first = pass.before * BATCHES as u32;
@@ -187,13 +189,17 @@ impl Component {
             },
             |b, (splats, of_batch)| {
                 account.add(of_batch);
+                // A batch may have ended early.
+                if pass.control.cancelled() {
+                    return false;
+                }
                 match pass.shard {
                     None => sums.add(&splats, f64::from(per_batch), pass.blocks),
                     Some(_) => film.keep(b, splats),
                 }
                 finished += f64::from(per_batch);
                 progress(f64::from(b - own.start + 1) / count);
-                !pass.control.cancelled()
+                true
             },
         );
         if pass.shard.is_none() {

@@ -347,6 +347,7 @@ impl Session {
                     .with_image(self.image_sampling())
                     .with_light_paths(self.emission.as_ref())
             },
+            cancelled: &|| pass.control.cancelled(),
         };
         let mut account = Account::default();
         let finished = |sampler: PixelSampler<'_, _>, part| {

@@ -27,7 +27,14 @@ impl Sampler for Noisy {
 fn film(allocation: Option<&Allocation>, units: u32) -> PixelFilm {
     let pool = Pool::new(1);
     let mut film = PixelFilm::new(SIZE, 1);
-    let filling = Filling { pool: &pool, seed: 3, allocation, shard: None, sampler: || Noisy };
+    let filling = Filling {
+        pool: &pool,
+        seed: 3,
+        allocation,
+        shard: None,
+        sampler: || Noisy,
+        cancelled: &|| false,
+    };
     filling.fill(&mut film, units, |_, _| true, |_, _| {});
     film
 }

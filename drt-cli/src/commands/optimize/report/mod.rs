@@ -11,6 +11,7 @@ use embed::figure;
 
 use super::gallery::Gallery;
 use super::history::History;
+use super::limits::Limits;
 use super::problem::Problem;
 use crate::PROGRAM;
 use crate::commands::markup::escaped;
@@ -33,6 +34,8 @@ pub(super) struct Report<'a> {
     pub(super) spent: [f64; 2],
     /// Why it ended early, where it did.
     pub(super) failure: Option<&'a str>,
+    /// What steps were shortened by.
+    pub(super) limits: &'a Limits,
 }
 
 impl Report<'_> {
@@ -47,6 +50,9 @@ impl Report<'_> {
         );
         if let Some(failure) = self.failure {
             page += &format!("<p class=\"failed\">{}</p>\n", escaped(failure));
+        }
+        for note in self.limits.notes() {
+            page += &format!("<p>{}</p>\n", escaped(note));
         }
         page += &self.parameters();
         page += &self.curves();

@@ -115,7 +115,7 @@ impl Ranks {
     }
 
     pub(super) fn abort(&self, error: &CliError) -> ! {
-        eprintln!("drt: error: {error}");
+        crate::console::note(format_args!("drt: error: {error}"));
         self.world.abort(i32::from(error.exit_code()))
     }
 

@@ -105,6 +105,7 @@ fn rendered(paths: &Paths<'_>, raster: Raster, threads: usize) -> Layer {
         allocation: None,
         shard: None,
         sampler: || Paths { splats: Vec::new(), ..*paths },
+        cancelled: &|| false,
     };
     for _ in 0..2 {
         filling.fill(&mut film, 20, |_, _| true, |_, _| {});
@@ -218,7 +219,14 @@ fn strata_put_back_make_the_same_image() {
     let filled = |shard| {
         let mut film = PixelFilm::splatted(raster(&camera), 1);
         let sampler = || Paths { splats: Vec::new(), ..paths };
-        let filling = Filling { pool: &pool, seed: 5, allocation: None, shard, sampler };
+        let filling = Filling {
+            pool: &pool,
+            seed: 5,
+            allocation: None,
+            shard,
+            sampler,
+            cancelled: &|| false,
+        };
         assert_eq!(filling.fill(&mut film, units, |_, _| true, |_, _| {}), units);
         film
     };
