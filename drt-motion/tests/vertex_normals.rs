@@ -76,7 +76,7 @@ fn what_has_no_normals_of_its_own_is_refused() {
         move_mesh(mesh, &applied, 1).unwrap_err().cause
     };
     assert_eq!(apply(&mesh, &[&turn]), Cause::NoNormals);
-    let smooth = mesh.with_smooth_normals();
+    let smooth = mesh.clone().with_smooth_normals();
     assert_eq!(apply(&smooth, &[&turn, &pull]), Cause::DeformedNormals);
     let few = GeometryChange::VertexNormals([Vec3::X].into());
     assert_eq!(apply(&smooth, &[&few]), Cause::VertexCount { expected: count, found: 1 });

@@ -43,7 +43,7 @@ pub(super) fn effect(
         changes.push(geometry(GeometryChange::VertexVelocity(velocities.into())));
     }
     if let Some(file) = &keys.vertex_normals {
-        let vectors = velocities::read(&folder.join(file)).map_err(Refusal::File)?;
+        let vectors = velocities::read(&folder.join(file))?;
         changes.push(geometry(GeometryChange::VertexNormals(vectors.into())));
     }
     if let Some(v) = &keys.vertex {

@@ -9,8 +9,8 @@ use super::motions::tetrahedra_files;
 pub(super) fn named(keys: &keys::Job, folder: &Path) -> Vec<PathBuf> {
     let effects = keys.parameter.iter().flat_map(|p| &p.get_ref().effect);
     let of_effect = effects.flat_map(|effect| {
-        let keys::Effect { vertex_velocity, cage, .. } = effect.get_ref();
-        vertex_velocity.iter().chain(cage.as_ref().map(|c| &c.mesh))
+        let keys::Effect { vertex_velocity, vertex_normals, cage, .. } = effect.get_ref();
+        vertex_velocity.iter().chain(vertex_normals).chain(cage.as_ref().map(|c| &c.mesh))
     });
     let cages = keys.parameter_group.iter().filter_map(|g| g.get_ref().cage.as_ref());
     let velocities = keys.motion.iter().filter_map(|m| m.get_ref().velocities.as_ref());
