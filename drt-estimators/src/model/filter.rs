@@ -256,7 +256,7 @@ impl Filter {
         f64::min(beside, 1.0 - beside) < ON_BORDER
     }
 
-    /// P at an offset from the pixel's centre, per square pixel. Where it jumps, the mean of both sides.
+    /// P at an offset from the pixel's centre, per square pixel.
     #[inline]
     #[must_use]
     pub fn eval(&self, dx: f64, dy: f64) -> f64 {
@@ -294,17 +294,14 @@ impl Filter {
         (x * y, [dx * y, x * dy])
     }
 
-    /// The factor p of one axis, per pixel; at a jump, the mean of both sides.
+    /// The factor p of one axis, per pixel.
     #[inline]
     #[must_use]
     pub fn axis(&self, x: f64) -> f64 {
         self.axis_with_slope(x).0
     }
 
-    /// The factor p of one axis, and its derivative; at a kink or a jump, the mean of both sides.
-    ///
-    /// An edge that lies along a border, as in symmetric scenes, then counts half for either pixel, which is what central
-    /// differences tend to.
+    /// The factor p of one axis, and its derivative; at a kink, the mean of both sides.
     #[inline]
     pub(crate) fn axis_with_slope(&self, x: f64) -> (f64, f64) {
         match self.kind.signed(x) {
@@ -320,11 +317,7 @@ impl Filter {
     /// The same, of an offset where the unnormalised profile is known.
     #[inline]
     fn with_slope(&self, x: f64, shape: f64) -> (f64, f64) {
-        if let FilterKind::Box { radius } = self.kind {
-            let beyond = Real::abs(x) - radius;
-            let share = if Real::abs(beyond) < ON_BORDER { 0.5 } else { 1.0 };
-            return (if beyond < ON_BORDER { share * self.scale } else { 0.0 }, 0.0);
-        }
+        // Half open, so that box filters of neighbouring pixels tile the plane.
         let inside = -self.radius <= x && x < self.radius;
         if !inside {
             return (0.0, 0.0);

@@ -3,9 +3,10 @@ use core::ops::Range;
 
 use drt_math::{Real, fm};
 
-use crate::model::filter::{Filter, FilterKind};
+use crate::model::filter::{Filter, FilterKind, ON_BORDER};
 
-/// The factors p of one axis for neighbouring pixels, from left to right, and their derivatives by the offset. Has no end.
+/// The factors p of one axis for neighbouring pixels, from left to right, and their derivatives by the offset. Has no end. At a jump,
+/// the mean of both sides.
 ///
 /// A Gaussian's g(x) takes no exponential for each: g(x - 1) = g(x) r(x) with r(x) = exp((2x - 1) / 2σ²), and
 /// r(x - 1) = r(x) exp(-1/σ²). Rounding adds up to 10⁻¹¹ of a value over the widest filter.
@@ -121,6 +122,12 @@ impl Iterator for FilterRow<'_> {
         let filter = self.filter;
         let factors = match filter.kind {
             FilterKind::Gaussian { .. } => filter.with_slope(self.offset, self.bell - 1.0),
+            FilterKind::Box { radius } => {
+                // An edge along a border, as in symmetric scenes, counts half for either pixel: what central differences tend to.
+                let beyond = Real::abs(self.offset) - radius;
+                let share = if Real::abs(beyond) < ON_BORDER { 0.5 } else { 1.0 };
+                (if beyond < ON_BORDER { share * filter.scale } else { 0.0 }, 0.0)
+            }
             _ => filter.axis_with_slope(self.offset),
         };
         self.step();

@@ -100,6 +100,19 @@ fn values_and_gradients_follow_the_definition() {
 }
 
 #[test]
+fn points_on_a_border_count_half_for_either_pixel() {
+    let f = Filter::new(FilterKind::BOX).unwrap();
+    for at in [5.0, 5.0 + 1e-12, 5.0 - 1e-12] {
+        let reached = f.reached(at, 9);
+        assert_eq!(reached, 4..6);
+        let row: Vec<f64> = f.row(at, 4).take(2).map(|(p, _)| p).collect();
+        assert_eq!(row, [0.5, 0.5]);
+    }
+    assert_eq!(f.reached(5.0 + 1e-6, 9), 5..6);
+    assert_eq!(f.row(5.0 + 1e-6, 5).next().unwrap().0, 1.0);
+}
+
+#[test]
 fn rows_are_the_factors_of_one_pixel_after_another() {
     let mut rng = Rng::new(7, 0, 0);
     let wide = FilterKind::Gaussian { radius: 256.0, std_dev: 60.0 };
