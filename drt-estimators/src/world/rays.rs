@@ -97,7 +97,7 @@ impl World {
             self.cross(path, &ray, medium);
             end
         } else {
-            self.geometry.bvh.closest(&ray, skip)
+            self.geometry.bvh.foremost(&ray, skip)
         };
         if let Some(hit) = end {
             path.end = Some(self.point(hit.prim, hit.bary));

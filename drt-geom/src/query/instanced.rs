@@ -111,6 +111,17 @@ impl InstancedBvh {
         }
     }
 
+    /// As [`TriangleBvh::foremost`]; instances coincide with nothing.
+    #[must_use]
+    #[inline]
+    pub fn foremost(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
+        let hit = self.triangles.foremost(ray, skip);
+        match &self.instances {
+            None => hit,
+            Some(instances) => instances.closest(ray, skip, hit),
+        }
+    }
+
     /// As [`TriangleBvh::any`].
     #[inline]
     pub fn any(&self, ray: &Ray, skip: Skip, mut blocks: impl FnMut(u32) -> bool) -> bool {

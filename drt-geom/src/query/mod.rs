@@ -7,7 +7,7 @@ use self::block::{Block, Twin, chain};
 use self::ends::End;
 use self::frame::{BoxFrame, BoxRay};
 use self::lanes::{Lanes, Machine, Task};
-use self::order::First;
+use self::order::Foremost;
 use self::watertight::{Corners, Crossing, ShearedRay};
 use self::wide::{Visitor, WideTree};
 use crate::Aabb;
@@ -54,8 +54,7 @@ pub(crate) use registers::{Registers, Work};
 /// being near.
 ///
 /// Triangles of zero area have no normal and are never hit. Of hits at equal `t` the one on the
-/// triangle with the lower number comes first, so that results do not depend on the tree. As the first hit, of
-/// those on triangles that [coincide] there within rounding, too.
+/// triangle with the lower number comes first, so that results do not depend on the tree.
 #[derive(Clone, Debug)]
 pub struct TriangleBvh {
     tree: Option<WideTree>,
@@ -98,15 +97,29 @@ impl TriangleBvh {
 
     #[inline(always)]
     fn closest_of(&self, probe: &Probe) -> Option<Hit> {
-        let mut best: Option<First> = None;
-        self.visit(probe, |prim, crossing, corners| {
-            if best.as_ref().is_none_or(|b| b.is_after(&probe.ray, prim, crossing, corners)) {
-                best = Some(First::new(prim, crossing, corners));
+        let mut best: Option<(f64, u32, Crossing)> = None;
+        self.visit(probe, |prim, crossing, _| {
+            if best.is_none_or(|(t, p, _)| (crossing.t, prim) < (t, p)) {
+                best = Some((crossing.t, prim, *crossing));
                 return ControlFlow::Continue(probe.boxes.limit(crossing.t));
             }
             ControlFlow::Continue(f32::INFINITY)
         });
-        best.map(|b| b.hit)
+        best.map(|(_, prim, crossing)| hit(prim, &crossing))
+    }
+
+    /// The first hit along a ray, of which rounding does not decide: of hits that [coincide] with the closest one, that on the triangle
+    /// with the lowest number.
+    #[must_use]
+    pub fn foremost(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
+        let probe = self.probe(ray, skip)?;
+        let mut best = Foremost::default();
+        self.visit(&probe, |prim, crossing, corners| {
+            let nearer = best.take(prim, crossing, corners);
+            let limit = if nearer { probe.boxes.limit(crossing.t) } else { f32::INFINITY };
+            ControlFlow::Continue(limit)
+        });
+        best.hit(ray)
     }
 
     /// Whether a triangle that `blocks` meets the ray. `blocks` is asked in no particular order and
@@ -185,7 +198,7 @@ impl TriangleBvh {
         blocked
     }
 
-    /// The first hit on a triangle that `blocks`, and in `out` the hits on others before it, sorted
+    /// The [foremost](Self::foremost) hit on a triangle that `blocks`, and in `out` the hits on others before it, sorted
     /// as by [`TriangleBvh::crossings`].
     pub fn closest_through(
         &self,
@@ -196,21 +209,19 @@ impl TriangleBvh {
     ) -> Option<Hit> {
         out.clear();
         let probe = self.probe(ray, skip)?;
-        let mut best: Option<First> = None;
+        let mut best = Foremost::default();
         self.visit(&probe, |prim, crossing, corners| {
             let limit = if !blocks(prim) {
                 out.push(hit(prim, crossing));
                 f32::INFINITY
-            } else if best.as_ref().is_none_or(|b| b.is_after(&probe.ray, prim, crossing, corners))
-            {
-                best = Some(First::new(prim, crossing, corners));
+            } else if best.take(prim, crossing, corners) {
                 probe.boxes.limit(crossing.t)
             } else {
                 f32::INFINITY
             };
             ControlFlow::Continue(limit)
         });
-        let best = best.map(|b| b.hit);
+        let best = best.hit(ray);
         if let Some(best) = &best {
             out.retain(|h| h.is_before(best));
         }

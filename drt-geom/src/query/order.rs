@@ -5,6 +5,8 @@
 //! points lie in each other's planes, as far as the rounding of coordinates and of distances along the ray lets one tell,
 //! count as equally far, and the triangle with the lower number comes first.
 
+use alloc::vec::Vec;
+
 use drt_math::Vec3;
 
 use super::ends::{End, gamma};
@@ -17,42 +19,53 @@ const NEAR: f64 = 1e-6;
 /// Bound of the relative error of a distance along a ray.
 const ALONG: f64 = gamma(16.0);
 
-/// The first hit of a ray so far, and its triangle.
-pub(super) struct First {
-    pub(super) hit: Hit,
-    corners: Corners,
+/// The nearest hit of a ray so far, and those that are hardly farther.
+#[derive(Default)]
+pub(super) struct Foremost {
+    nearest: Option<(Hit, Corners)>,
+    near: Vec<(Hit, Corners)>,
 }
 
-impl First {
+impl Foremost {
+    /// Takes in a hit; true where it is the nearest so far.
     #[inline(always)]
-    pub(super) fn new(prim: u32, crossing: &Crossing, corners: &Corners) -> Self {
-        Self { hit: super::hit(prim, crossing), corners: *corners }
-    }
-
-    /// Whether another hit of the ray comes before this one.
-    #[inline(always)]
-    pub(super) fn is_after(
-        &self,
-        ray: &Ray,
-        prim: u32,
-        crossing: &Crossing,
-        corners: &Corners,
-    ) -> bool {
-        if (crossing.t - self.hit.t).abs() > NEAR * self.hit.t {
-            return crossing.t < self.hit.t;
+    pub(super) fn take(&mut self, prim: u32, crossing: &Crossing, corners: &Corners) -> bool {
+        if let Some((nearest, _)) = &self.nearest {
+            if crossing.t > nearest.t + NEAR * nearest.t {
+                return false;
+            }
+            if crossing.t >= nearest.t - NEAR * nearest.t {
+                return self.take_near((super::hit(prim, crossing), *corners));
+            }
         }
-        self.follows_nearly(ray, &super::hit(prim, crossing), corners)
+        self.near.clear();
+        self.nearest = Some((super::hit(prim, crossing), *corners));
+        true
     }
 
     #[cold]
-    fn follows_nearly(&self, ray: &Ray, other: &Hit, corners: &Corners) -> bool {
-        if lies_in_plane(ray, &self.hit, &self.corners, corners)
-            && lies_in_plane(ray, other, corners, &self.corners)
-        {
-            other.prim < self.hit.prim
-        } else {
-            other.is_before(&self.hit)
-        }
+    fn take_near(&mut self, hit: (Hit, Corners)) -> bool {
+        let Some(nearest) = &mut self.nearest else { return false };
+        let nearer = hit.0.is_before(&nearest.0);
+        self.near.push(if nearer { core::mem::replace(nearest, hit) } else { hit });
+        nearer
+    }
+
+    /// The first hit: of those that coincide with the nearest one, that on the triangle with the lowest number. Which it is does
+    /// not depend on the order in which they were found.
+    #[inline(always)]
+    pub(super) fn hit(&self, ray: &Ray) -> Option<Hit> {
+        let nearest = self.nearest.as_ref()?;
+        if self.near.is_empty() { Some(nearest.0) } else { Some(self.lowest(ray, nearest)) }
+    }
+
+    #[cold]
+    fn lowest(&self, ray: &Ray, (nearest, corners): &(Hit, Corners)) -> Hit {
+        let coincide = |(hit, own): &&(Hit, Corners)| {
+            lies_in_plane(ray, hit, own, corners) && lies_in_plane(ray, nearest, corners, own)
+        };
+        let others = self.near.iter().filter(coincide).map(|(hit, _)| *hit);
+        others.fold(*nearest, |first, hit| if hit.prim < first.prim { hit } else { first })
     }
 }
 
