@@ -14,8 +14,8 @@ pub(crate) fn space() -> [u8; LENGTH] {
     space
 }
 
-/// A binary file without its checksum's place and what comes before that; `None` where it has none.
-fn split(file: &[u8]) -> Option<usize> {
+/// Where a binary file has the place of its checksum; `None` where it has none.
+fn find(file: &[u8]) -> Option<usize> {
     file.windows(SEAL.len()).position(|w| w == SEAL).filter(|at| at + LENGTH <= file.len())
 }
 
@@ -29,7 +29,7 @@ fn sum(file: &[u8], at: usize) -> [u8; 4] {
 
 /// Fills in the checksum of a file that has a place for it.
 pub(crate) fn seal(file: &mut [u8]) {
-    if let Some(at) = split(file) {
+    if let Some(at) = find(file) {
         let sum = sum(file, at);
         file[at + SEAL.len()..at + LENGTH].copy_from_slice(&sum);
     }
@@ -37,7 +37,7 @@ pub(crate) fn seal(file: &mut [u8]) {
 
 /// Whether a file is what was sealed; `None` where it has no place for a checksum.
 pub(crate) fn is_whole(file: &[u8]) -> Option<bool> {
-    let at = split(file)?;
+    let at = find(file)?;
     Some(file[at + SEAL.len()..at + LENGTH] == sum(file, at))
 }
 

@@ -37,7 +37,7 @@ pub(crate) fn check(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// The same, as an error about the file.
+/// Refuses what is no regular file, with an error about the file.
 pub(crate) fn checked(path: &Path) -> Result<(), CliError> {
     check(path).map_err(|e| unreadable(path, None, &e))
 }

@@ -9,7 +9,7 @@ use crate::{CliError, check_target};
 pub(super) struct Destinations(Vec<(&'static str, Identity)>);
 
 impl Destinations {
-    /// Those of the options that are given; `-` is the standard output, and no file.
+    /// The files of the options that are given; `-` is the standard output, and no file.
     pub(super) fn new<'p>(
         options: impl IntoIterator<Item = (&'static str, Option<&'p Path>)>,
     ) -> Self {

@@ -6,7 +6,7 @@ use clap::CommandFactory;
 
 use super::Outcome;
 use super::options::CommandLine;
-use crate::{CliError, check_target, console};
+use crate::{CliError, console, write_atomically};
 
 /// Prints what completes commands.
 pub(super) fn completions(shell: clap_complete::Shell) -> Result<Outcome, CliError> {
@@ -24,8 +24,15 @@ pub(super) fn manual(folder: Option<&Path>) -> Result<Outcome, CliError> {
         let _ = clap_mangen::Man::new(command).render(&mut text);
         return console::print(text).map(|()| Outcome::Done);
     };
-    check_target(&folder.join("drt.1"))?;
-    clap_mangen::generate_to(command, folder)
-        .map_err(|e| CliError::Write { path: folder.into(), reason: e.to_string() })?;
+    let mut command = command.disable_help_subcommand(true);
+    command.build();
+    pages(&command, folder)?;
     Ok(Outcome::Done)
+}
+
+/// Writes the pages of a command and of all in it.
+fn pages(command: &clap::Command, folder: &Path) -> Result<(), CliError> {
+    let page = clap_mangen::Man::new(command.clone());
+    write_atomically(&folder.join(page.get_filename()), |out| Ok(page.render(out)?))?;
+    command.get_subcommands().try_for_each(|inner| pages(inner, folder))
 }

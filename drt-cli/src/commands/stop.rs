@@ -14,7 +14,7 @@ use signal_hook::iterator::Signals;
 /// The exit code of what was stopped.
 pub(super) const STOPPED: u8 = 130;
 
-/// How long to wait for work to look.
+/// How long work has to ask.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 static ASKED: AtomicBool = AtomicBool::new(false);
@@ -41,7 +41,7 @@ pub(super) fn listen() {
     });
 }
 
-/// Ends the program where nothing looks whether it shall.
+/// Ends the program where no work has asked in time whether it shall stop.
 fn end_the_deaf() {
     std::thread::sleep(PATIENCE);
     if !HEARD.load(Ordering::SeqCst) {
@@ -53,7 +53,7 @@ fn end_the_deaf() {
     }
 }
 
-/// True when the run shall stop; who asks is taken to do so.
+/// True when the run shall stop, which whoever asks is taken to do.
 pub(super) fn asked() -> bool {
     let asked = ASKED.load(Ordering::Relaxed);
     if asked && !HEARD.load(Ordering::Relaxed) {

@@ -40,7 +40,7 @@ pub struct Provenance {
 pub struct ExrFile {
     /// Columns and rows.
     pub size: [u32; 2],
-    /// Pixels of each layer, row by row from the top left; missing channels are zero.
+    /// Pixels of each layer, row by row from the top left; missing channels are zero, and luminance alone is all three.
     pub layers: BTreeMap<String, Vec<[f32; 3]>>,
     /// Attributes, as text.
     pub attributes: BTreeMap<String, String>,

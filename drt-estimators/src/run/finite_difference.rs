@@ -141,7 +141,7 @@ impl Displaced {
 
 /// Samples all displaced scenes alike.
 struct StepImages<'a> {
-    /// With what each image counts by.
+    /// What samples each image, and the factor that it counts by.
     samplers: Vec<(PixelSampler<'a, Contraction<'a>>, f64)>,
     scale: f64,
     splats: Vec<Splat>,

@@ -16,7 +16,7 @@ pub(crate) struct Stencil {
 }
 
 impl Stencil {
-    /// To both sides where a scene can be at both, and else to one.
+    /// Looks to both sides where the scene has a meaning at both, and else to one.
     pub(crate) fn at(
         scene: &Scene,
         parameters: &[Parameter],

@@ -99,7 +99,7 @@ pub(crate) struct Splatter<'a> {
 }
 
 impl<'a> Splatter<'a> {
-    /// The same, which may be cancelled.
+    /// This splatter with batches that end early when `cancelled` says so.
     pub(crate) fn until(self, cancelled: &'a (dyn Fn() -> bool + Sync)) -> Self {
         Self { cancelled, ..self }
     }

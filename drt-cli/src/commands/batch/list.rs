@@ -104,7 +104,7 @@ fn scene_of(input: &Path) -> Option<PathBuf> {
     if !input.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml")) {
         return Some(input.into());
     }
-    let named: Named = toml::from_str(&std::fs::read_to_string(input).ok()?).ok()?;
+    let named: Named = toml::from_str(&read_text(input, None).ok()?).ok()?;
     Some(input.parent().unwrap_or(Path::new("")).join(named.scene))
 }
 

@@ -8,7 +8,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::Serialize;
 
 use super::list::Entry;
-use crate::{CliError, PROGRAM};
+use crate::{CliError, PROGRAM, input_file};
 
 /// Something that happened to a job.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -53,6 +53,9 @@ impl Log {
     /// Opens a log; the start of a line that was being written when its writer was killed is ended.
     pub(super) fn open(path: &Path) -> Result<Self, CliError> {
         let fail = |e: std::io::Error| CliError::write(path, e);
+        if path.exists() {
+            input_file::check(path).map_err(fail)?;
+        }
         let mut file =
             OpenOptions::new().read(true).append(true).create(true).open(path).map_err(fail)?;
         let mut last = [b'\n'];

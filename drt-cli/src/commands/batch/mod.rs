@@ -142,7 +142,7 @@ struct Batch {
     monitor: Monitor,
     /// No derivatives.
     forward: bool,
-    /// By all jobs.
+    /// The files that all jobs write.
     written: Written,
 }
 

@@ -34,7 +34,7 @@ pub(super) struct Checkpoint {
     pub(super) cpu_seconds: f64,
     /// What decides the steps, file by file.
     pub(super) sources: Sources,
-    /// Of the tables of values and losses, as far as they belong to the steps.
+    /// Checksums of the tables of values and losses, as far as they belong to the steps.
     pub(super) tables: [u32; 2],
 }
 

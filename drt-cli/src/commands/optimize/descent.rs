@@ -291,7 +291,7 @@ impl<'a> Descent<'a> {
         self.stored().map_or(Ok(()), |stored| stored.write())
     }
 
-    /// That, ready to be written at any time.
+    /// What a run goes on from, ready to be written at any time.
     fn stored(&self) -> Option<Stored> {
         let folder = self.folder()?.to_path_buf();
         let [seconds, cpu_seconds] = self.spent();

@@ -12,7 +12,7 @@ use crate::{CliError, Job, input_file};
 /// Hashes of all files that a fit reads, but for the job, and the values given for the scene's `<default>` names.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]
 pub(super) struct Sources {
-    /// By their names from the job's folder on, so that a fit can be moved with all its files.
+    /// The hash of each file by its name from the job's folder on, so that a fit can be moved with all its files.
     files: BTreeMap<String, Fingerprint>,
     defaults: BTreeMap<String, String>,
 }
