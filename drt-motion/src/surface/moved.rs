@@ -5,6 +5,7 @@ use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
 use super::caged::Caged;
+use super::element::Unit;
 use super::{SmoothNormals, SurfaceMotion};
 use crate::error::Cause;
 use crate::error::MotionError;
@@ -83,7 +84,9 @@ pub fn move_mesh(
     if let Some(smooth) = &smooth {
         moved.normals = Some(smooth.normals(&moved));
     }
-    let motions = fields.into_iter().map(|f| f.into_motion(&moved, smooth.as_ref())).collect();
+    let smooth_units = smooth.as_ref().map(|smooth| (smooth, smooth.units(&moved)));
+    let motions =
+        fields.into_iter().map(|f| f.into_motion(&moved, smooth_units.as_ref())).collect();
     Ok(MovedMesh { mesh: moved, motions, smooth })
 }
 
@@ -179,7 +182,11 @@ impl Field {
         };
     }
 
-    fn into_motion(self, moved: &Mesh, smooth: Option<&SmoothNormals>) -> SurfaceMotion {
+    fn into_motion(
+        self,
+        moved: &Mesh,
+        smooth: Option<&(&SmoothNormals, Vec<Unit>)>,
+    ) -> SurfaceMotion {
         let velocities = match self {
             Self::Affine(u) if u.is_zero() => return SurfaceMotion::Rest,
             // Angles weigh recomputed normals; where they change, these do not turn as the field.
@@ -190,7 +197,7 @@ impl Field {
             Self::Vertices(v) if v.iter().all(|v| *v == Vec3::ZERO) => return SurfaceMotion::Rest,
             Self::Vertices(v) => v,
         };
-        let normals = smooth.map(|s| s.rates(moved, &velocities).into());
+        let normals = smooth.map(|(s, units)| s.rates_from(units, moved, &velocities).into());
         SurfaceMotion::Vertices { positions: velocities.into(), normals }
     }
 }
