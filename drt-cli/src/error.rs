@@ -112,7 +112,9 @@ impl CliError {
 
 /// Reads a text file that was named at `from`.
 pub(crate) fn read_text(path: &Path, from: Option<&Place>) -> Result<String, CliError> {
-    std::fs::read_to_string(path).map_err(|e| match from {
+    let text = crate::files::regular(path)
+        .and_then(|()| std::fs::read_to_string(path).map_err(|e| e.to_string()));
+    text.map_err(|e| match from {
         Some(place) => CliError::input(place, format!("cannot read {}: {e}", path.display())),
         None => CliError::input(&Place::file(path), format!("cannot read this file: {e}")),
     })

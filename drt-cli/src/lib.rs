@@ -5,6 +5,7 @@ mod atomic;
 pub mod commands;
 mod digest;
 pub mod error;
+mod files;
 mod fingerprint;
 mod image;
 mod job;
