@@ -156,7 +156,7 @@ impl<'a> Properties<'a> {
     pub(super) fn path(&self, name: &'static str) -> Result<Option<PathBuf>, CliError> {
         let Some(name) = self.string(name)? else { return Ok(None) };
         let path = self.element.resolve(name)?;
-        let fail = |reason| self.element.error(format!("{}: {reason}", path.display()));
+        let fail = |reason| self.element.error(format!("cannot read {}: {reason}", path.display()));
         files::regular(&path).map_err(fail)?;
         Ok(Some(path))
     }

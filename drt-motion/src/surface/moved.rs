@@ -138,6 +138,10 @@ impl Step {
 
     /// The field u of positions before the step, as a field of positions after it: L u(map⁻¹ y).
     fn carry(&self, u: &Affine) -> Affine {
+        // What moves all points alike, or none, as many parameters do.
+        if u.linear == Mat3::ZERO {
+            return Affine { linear: u.linear, translation: self.map.vector(u.translation) };
+        }
         Affine { linear: self.map.linear * u.linear, translation: self.map.vector(u.translation) }
             .after(&self.inverse)
     }
