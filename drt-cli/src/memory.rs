@@ -14,6 +14,20 @@ pub(crate) fn check(bytes: u128) -> Result<(), String> {
     }
 }
 
+/// Refuses a header that claims more bytes than a file of this length can hold, whatever its compression: deflate makes at most
+/// 1032 of one.
+///
+/// # Errors
+/// Names both lengths.
+pub(crate) fn plausible(claimed: u64, length: u64) -> Result<(), String> {
+    const MOST: u64 = 1032;
+    // Headers and tables are not compressed, and what is nearly empty may be a little over.
+    if claimed <= MOST.saturating_mul(length.saturating_add(64)) {
+        return Ok(());
+    }
+    Err(format!("its header claims {claimed} bytes, which a file of {length} bytes cannot hold"))
+}
+
 /// Bytes that the program may still ask for, as far as Linux tells: what is free, within the limit of the process.
 fn available() -> Option<u64> {
     let swap = field("/proc/meminfo", "SwapFree:").unwrap_or(0);

@@ -27,9 +27,9 @@ pub use aabb::Aabb;
 pub use crossing::{CrossingSegment, crossing_pairs, crossing_segments};
 pub use intersect::ray_plane;
 #[cfg(feature = "obj")]
-pub use io::{ObjError, ObjErrorKind, load_obj};
+pub use io::{ObjError, ObjErrorKind, load_obj, load_obj_mended};
 #[cfg(feature = "ply")]
-pub use io::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
+pub use io::{PlyError, PlyErrorKind, load_ply, load_ply_mended, read_vertex_vectors};
 #[cfg(feature = "tet")]
 pub use io::{TetFileError, TetFileErrorKind, load_tet_mesh, read_medit, read_tetgen};
 pub use mesh::{Mesh, MeshAttribute, MeshError};

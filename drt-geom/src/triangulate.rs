@@ -58,7 +58,7 @@ pub fn triangulate(corners: &[Vec3]) -> Result<Vec<[u32; 3]>, PolygonError> {
     if fan_covers(&flat) { Ok(fan(n as u32)) } else { delaunay(&flat) }
 }
 
-fn fan(n: u32) -> Vec<[u32; 3]> {
+pub(crate) fn fan(n: u32) -> Vec<[u32; 3]> {
     (1..n - 1).map(|i| [0, i, i + 1]).collect()
 }
 

@@ -142,7 +142,14 @@ fn index(p: &Properties<'_>, default: (Rgb, Rgb)) -> Result<(Rgb, Rgb), CliError
         (eta, k, None) => (eta.unwrap_or(default.0), k.unwrap_or(default.1)),
         _ => return Err(p.element.error("give `material`, or `eta` and `k`, not both")),
     };
-    Ok((eta * exterior.recip(), k * exterior.recip()))
+    let index = [("eta", eta), ("k", k)].map(|(name, value)| {
+        let clamped = value.map(|v| v.max(0.0));
+        if clamped != value {
+            p.element.note(format!("`{name}` has negative numbers, which count as zero"));
+        }
+        clamped * exterior.recip()
+    });
+    Ok((index[0], index[1]))
 }
 
 fn smooth_conductor(p: &Properties<'_>) -> Result<Conductor, CliError> {

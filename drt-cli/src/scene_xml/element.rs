@@ -2,11 +2,13 @@
 //! spelling. Nothing after this knows of several files or several spellings.
 
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 use crate::CliError;
 use crate::error::Place;
 use crate::scene_xml::dialect::Dialect;
+use crate::scene_xml::notes::Notes;
 
 /// One XML element.
 #[derive(Clone, Debug)]
@@ -22,6 +24,8 @@ pub(super) struct Element {
     pub(super) dialect: Dialect,
     /// Folders in which its files are searched after that of its own file.
     folders: Arc<[PathBuf]>,
+    /// Where its scene keeps notes.
+    notes: Rc<Notes>,
     /// Its number in document order: an identity.
     pub(super) ordinal: usize,
 }
@@ -35,13 +39,14 @@ impl Element {
         place: Place,
         dialect: Dialect,
         folders: Arc<[PathBuf]>,
+        notes: Rc<Notes>,
     ) -> Self {
         for (key, value) in &mut attributes {
             if key == "name" && tag != "default" {
                 *value = dialect.property_name(value);
             }
         }
-        Self { tag, attributes, children: Vec::new(), place, dialect, folders, ordinal: 0 }
+        Self { tag, attributes, children: Vec::new(), place, dialect, folders, notes, ordinal: 0 }
     }
 
     /// An attribute's text.
@@ -78,14 +83,30 @@ impl Element {
         CliError::input(&self.place, format!("{self}: {message}"))
     }
 
+    /// Notes something harmless here that is passed over or mended.
+    pub(super) fn note(&self, message: impl std::fmt::Display) {
+        self.notes.add(&self.place, format!("{self}: {message}"));
+    }
+
+    /// Notes what holds for all things of a `kind`, at the first of them.
+    pub(super) fn note_once(&self, kind: &str, message: impl std::fmt::Display) {
+        self.notes.add_once(kind, &self.place, format!("{self}: {message}"));
+    }
+
+    /// The notes on the scene that it is of.
+    pub(super) fn notes(&self) -> &Notes {
+        &self.notes
+    }
+
     /// The file (or folder) that a path means: in the folder of the scene file in which the element
-    /// stands, in those of the files that include that one, or in one that a `<path>` names.
+    /// stands, in those of the files that include that one, in one that a `<path>` names, or in the working directory.
     ///
     /// # Errors
     /// When none of them has it.
     pub(super) fn resolve(&self, path: &str) -> Result<PathBuf, CliError> {
         let own = self.place.file.parent().unwrap_or(Path::new(""));
-        let folders = || std::iter::once(own).chain(self.folders.iter().map(PathBuf::as_path));
+        let named = || self.folders.iter().map(PathBuf::as_path);
+        let folders = || std::iter::once(own).chain(named()).chain([Path::new("")]);
         let found = folders().map(|folder| folder.join(path)).find(|file| file.exists());
         if let Some(file) = &found
             && !file.is_file()

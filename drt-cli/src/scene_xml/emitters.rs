@@ -25,6 +25,8 @@ impl<'a> Loader<'a> {
     ) -> Result<Named<SceneEmitter>, CliError> {
         let p = Properties::of(e)?;
         let kind = p.kind()?;
+        // How often lights are sampled does not change expected values.
+        p.accept(&["sampling_weight"]);
         if on_shape != (kind == "area") {
             return Err(e.error(if on_shape {
                 "a shape can only carry an emitter of type `area`"
@@ -54,7 +56,7 @@ impl<'a> Loader<'a> {
                 spot(&p, intensity)?
             }
             "projector" => projector(&p)?,
-            "sunsky" | "timed_sunsky" => {
+            "sun" | "sky" | "sunsky" | "timed_sunsky" => {
                 return Err(e.error(format!(
                     "the emitter type `{kind}` is not supported: the model of its sky is a table of spectra that is \
                      not part of this program; render the sky to an image with Mitsuba and use it as an envmap; \

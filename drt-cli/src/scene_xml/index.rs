@@ -18,7 +18,14 @@ pub(super) struct Index<'a> {
     ordered: HashMap<&'static str, Vec<&'a Element>>,
     /// The place of an element among those of its tag.
     positions: HashMap<usize, usize>,
+    /// Ordinals of what the image depends on: what stands in the scene by itself, and what that has in it or refers to.
+    used: HashSet<usize>,
+    /// BSDFs inside others that something refers to.
+    referred: Vec<&'a Element>,
 }
+
+/// Tags of what counts where it stands, whether something refers to it or not.
+const BY_THEMSELVES: [&str; 4] = ["shape", "emitter", "sensor", "integrator"];
 
 /// Something inside an element: nested there, or referred to.
 #[derive(Clone, Copy)]
@@ -36,10 +43,13 @@ impl<'a> Index<'a> {
             aliases: HashMap::new(),
             ordered: COUNTED.into_iter().map(|tag| (tag, Vec::new())).collect(),
             positions: HashMap::new(),
+            used: HashSet::new(),
+            referred: Vec::new(),
         };
         index.register(root, true)?;
         index.check_references(root)?;
         index.check_circles(root)?;
+        index.mark_used(root);
         Ok(index)
     }
 
@@ -131,6 +141,39 @@ impl<'a> Index<'a> {
             }
         }
         Ok(())
+    }
+
+    fn mark_used(&mut self, root: &'a Element) {
+        let by_themselves = |e: &&Element| BY_THEMSELVES.contains(&e.tag.as_str());
+        let mut open: Vec<&Element> = root.children.iter().filter(by_themselves).collect();
+        while let Some(e) = open.pop() {
+            if !self.used.insert(e.ordinal) {
+                continue;
+            }
+            for child in &e.children {
+                let referred = match child.tag.as_str() {
+                    "ref" => child.id().and_then(|id| self.resolve(child, id).ok()),
+                    _ => None,
+                };
+                if let Some(target) = referred.filter(|t| t.tag == "bsdf" && e.tag == "shape")
+                    && self.position(target).is_none()
+                    && !self.referred.iter().any(|known| known.ordinal == target.ordinal)
+                {
+                    self.referred.push(target);
+                }
+                open.push(referred.unwrap_or(child));
+            }
+        }
+    }
+
+    /// Whether the image may depend on an element. One without an id, which nothing could refer to, is taken for one that is meant.
+    pub(super) fn is_used(&self, e: &Element) -> bool {
+        e.id().is_none() || self.used.contains(&e.ordinal)
+    }
+
+    /// The BSDFs inside others that shapes refer to.
+    pub(super) fn referred(&self) -> &[&'a Element] {
+        &self.referred
     }
 
     fn resolve(&self, at: &Element, id: &str) -> Result<&'a Element, CliError> {

@@ -50,6 +50,13 @@ impl<'a> Loader<'a> {
     /// `sigma_t` and `albedo`, or `sigma_a` and `sigma_s`, with `emission`.
     fn quantities(&self, p: &Properties<'a>) -> Result<Quantities, CliError> {
         let e = p.element;
+        if e.is_legacy()
+            && let Some(preset) = p.property("material")
+        {
+            return Err(preset.error(
+                "the coefficients of named materials are not part of this program; give `sigma_t` and `albedo`, or `sigma_a` and `sigma_s`",
+            ));
+        }
         let density = if e.is_legacy() { self.field(p, "density")? } else { None };
         let sigma_t = match (self.field(p, "sigma_t")?, density) {
             (Some(_), Some(_)) => return Err(e.error("give `density` or `sigma_t`, not both")),
@@ -130,6 +137,12 @@ impl<'a> Loader<'a> {
             None => Surrounding::Counted,
         })
     }
+}
+
+/// Stands for a medium that is not used and cannot be read.
+pub(super) fn vacuum(e: &Element) -> Result<Medium, CliError> {
+    let nothing = Homogeneous::new(Rgb::ZERO, Rgb::ZERO, Rgb::ZERO).map_err(|err| e.error(err))?;
+    Ok(Medium::new(nothing, Phase::Isotropic))
 }
 
 /// Extinction and albedo from absorption and scattering. The albedo of two grids would not be one

@@ -11,6 +11,7 @@ mod emitters;
 mod files;
 mod index;
 mod media;
+mod notes;
 mod numbers;
 mod parts;
 mod properties;
@@ -32,7 +33,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use drt_estimators::surface::{Bsdf, Diffuse, Mask, Measured};
-use drt_estimators::{Named, Scene};
+use drt_estimators::{Instance, Named, Scene};
 use drt_math::Rgb;
 
 use crate::CliError;
@@ -40,6 +41,7 @@ use crate::error::{Place, Warning, read_text};
 use element::Element;
 use index::Index;
 use properties::Properties;
+use shapes::SharedMeshes;
 pub use source::Defaults;
 use source::SceneFiles;
 
@@ -95,16 +97,17 @@ pub fn parse_scene_str(xml: &str, base_dir: &Path) -> Result<Scene, CliError> {
 
 fn parse_scene(path: &Path, text: &str, defaults: &Defaults) -> Result<Read, CliError> {
     let (root, included) = SceneFiles::new(defaults).read(path, text)?;
-    missing_files(path, &root)?;
     at_rest(&root)?;
     let index = Index::new(&root)?;
-    let loader = Loader { index, warnings: RefCell::default(), measured: RefCell::default() };
+    missing_files(path, &root, &index)?;
+    let loader = Loader { index, measured: RefCell::default(), referred: RefCell::default() };
     let scene = loader.scene(&root)?;
-    Ok((scene, loader.warnings.into_inner(), files::of_scene(path, included, &root)))
+    Ok((scene, root.notes().take(), files::of_scene(path, included, &root)))
 }
 
-/// Refuses a scene several of whose files are missing, naming all of them; of a single one its reader tells.
-fn missing_files(path: &Path, root: &Element) -> Result<(), CliError> {
+/// Refuses a scene several of whose files are missing, naming all of them; of a single one its reader tells. What is not used is
+/// left out.
+fn missing_files(path: &Path, root: &Element, index: &Index<'_>) -> Result<(), CliError> {
     fn visit(e: &Element, found: &mut Vec<String>) {
         let file = e.attribute("name") == Some("filename") && e.tag == "string";
         if let Some(name) = e.attribute("value").filter(|_| file)
@@ -115,7 +118,7 @@ fn missing_files(path: &Path, root: &Element) -> Result<(), CliError> {
         e.children.iter().for_each(|child| visit(child, found));
     }
     let mut found = Vec::new();
-    visit(root, &mut found);
+    root.children.iter().filter(|e| index.is_used(e)).for_each(|e| visit(e, &mut found));
     if found.len() < 2 {
         return Ok(());
     }
@@ -136,40 +139,62 @@ fn at_rest(e: &Element) -> Result<(), CliError> {
 /// Turns elements into things of the scene.
 struct Loader<'a> {
     index: Index<'a>,
-    warnings: RefCell<Vec<Warning>>,
     /// Materials of files, which all that name them share.
     measured: RefCell<BTreeMap<PathBuf, Arc<Measured>>>,
+    /// BSDFs inside others that something refers to: by the ordinals of their elements, their numbers among the scene's.
+    referred: RefCell<BTreeMap<usize, usize>>,
 }
 
 impl<'a> Loader<'a> {
-    /// Notes something harmless that is passed over.
-    fn warn(&self, e: &Element, message: impl std::fmt::Display) {
-        let warning = Warning { place: e.place.clone(), message: format!("{e}: {message}") };
-        self.warnings.borrow_mut().push(warning);
+    /// What was read, or a stand-in for what is not used and cannot be read, as Mitsuba builds nothing of that.
+    fn unless_unused<T>(
+        &self,
+        e: &Element,
+        read: Result<T, CliError>,
+        stand_in: impl FnOnce() -> Result<T, CliError>,
+    ) -> Result<T, CliError> {
+        read.or_else(|error| {
+            if self.index.is_used(e) {
+                return Err(error);
+            }
+            e.note(format!("is not used, and could not be ({error})"));
+            stand_in()
+        })
     }
 
     fn scene(&self, root: &'a Element) -> Result<Scene, CliError> {
         let mut scene = Scene::default();
         for e in self.index.all("medium") {
-            scene.media.push(self.medium(e)?);
+            let id = || e.id().map(Into::into);
+            let vacuum = || Ok(Named { id: id(), item: media::vacuum(e)? });
+            scene.media.push(self.unless_unused(e, self.medium(e), vacuum)?);
         }
         for e in self.index.all("bsdf") {
-            scene.bsdfs.push(Named { id: e.id().map(Into::into), item: self.bsdf(e)? });
+            let item = self.unless_unused(e, self.bsdf(e), || Ok(Bsdf::Null))?;
+            scene.bsdfs.push(Named { id: e.id().map(Into::into), item });
         }
+        self.referred_bsdfs(&mut scene.bsdfs)?;
+        let declared = scene.bsdfs.len();
         let shapes = self.index.all("shape");
         let carried = self.carried_emitters(shapes)?;
         self.light_media(shapes, &carried, &mut scene.media)?;
         for e in self.emitters() {
             scene.emitters.push(self.emitter(e, carried.contains(&e.ordinal))?);
         }
-        let groups = self.groups(shapes, &mut scene.bsdfs)?;
-        for e in shapes.iter().filter(|e| !groups.have(e)) {
+        let groups = self.groups(shapes, &mut scene.bsdfs, declared)?;
+        let alone: Vec<&Element> = shapes.iter().copied().filter(|e| !groups.have(e)).collect();
+        let shared = SharedMeshes::of(&alone);
+        for e in alone {
             match e.attribute("type") {
                 Some("instance") => self.instance(e, &groups, &mut scene)?,
                 // The shapes in it are among all shapes.
                 Some("merge") => self.merged(e)?,
                 _ => {
-                    let shape = self.shape(e, &mut scene.bsdfs)?;
+                    let shape = self.shape(e, &mut scene.bsdfs, declared, &shared)?;
+                    let Some((shape, to_world)) = shape else { continue };
+                    if let Some(to_world) = to_world {
+                        scene.instances.push(Instance { shape: scene.shapes.len(), to_world });
+                    }
                     scene.shapes.push(shape);
                 }
             }
@@ -205,11 +230,13 @@ impl<'a> Loader<'a> {
             match e.tag.as_str() {
                 "shape" | "bsdf" | "medium" | "emitter" | "sensor" | "alias" => {}
                 // Read for their own sake, so that mistakes in unused ones are found too.
-                "phase" => drop(self.phase(e)?),
-                "volume" => drop(self.volume(e)?),
-                "texture" if e.id().is_some() && textures::varies(e) => drop(textures::read(e)?),
+                "phase" => self.unless_unused(e, self.phase(e).map(drop), || Ok(()))?,
+                "volume" => self.unless_unused(e, self.volume(e).map(drop), || Ok(()))?,
+                "texture" if e.id().is_some() && textures::varies(e) => {
+                    self.unless_unused(e, textures::read(e).map(drop), || Ok(()))?;
+                }
                 "texture" | "spectrum" | "rgb" | "srgb" if e.id().is_some() => {
-                    spectrum::reflected(e)?;
+                    self.unless_unused(e, spectrum::reflected(e).map(drop), || Ok(()))?;
                 }
                 "rfilter" => drop(sensors::filter(e)?),
                 // Read where they are referred to.
@@ -228,11 +255,18 @@ impl<'a> Loader<'a> {
     }
 }
 
-/// The material of a shape without one: gray, or black where the shape is a light, as in Mitsuba.
-/// It is added after all others, so that their order in the file stays.
-fn default_bsdf(bsdfs: &mut Vec<Named<Bsdf>>, declared: usize, glows: bool) -> usize {
-    let reflectance = if glows { Rgb::ZERO } else { Diffuse::default().reflectance };
-    let wanted = Bsdf::Diffuse(Diffuse { reflectance });
+/// The material of a shape without one: gray, or black where the shape is a light, as in Mitsuba; in files of version 0.5 and 0.6
+/// nothing where it bounds a medium.
+fn material_of_none(glows: bool, legacy_boundary: bool) -> Bsdf {
+    match (glows, legacy_boundary) {
+        (true, _) => Bsdf::Diffuse(Diffuse { reflectance: Rgb::ZERO }),
+        (false, true) => Bsdf::Null,
+        (false, false) => Bsdf::Diffuse(Diffuse::default()),
+    }
+}
+
+/// The number of a material that no element is of. It is added after all others, so that their order in the file stays.
+fn added_bsdf(bsdfs: &mut Vec<Named<Bsdf>>, declared: usize, wanted: Bsdf) -> usize {
     let added = bsdfs[declared..].iter().position(|b| b.item == wanted);
     added.map_or_else(
         || {

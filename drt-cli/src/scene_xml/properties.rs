@@ -10,7 +10,28 @@ use drt_math::{Affine, Rgb, Vec3, vec3};
 use super::element::Element;
 use super::numbers::{number, plain_numbers, plain_value, triple};
 use super::{spectrum, textures, transform};
-use crate::CliError;
+use crate::{CliError, input_file};
+
+/// Tags of properties without anything in them.
+const PLAIN: [&str; 9] =
+    ["float", "integer", "boolean", "string", "point", "vector", "rgb", "srgb", "spectrum"];
+
+/// Properties of version 0.5 and 0.6 that change the image, wherever they are and not supported.
+const MATTER: [&str; 13] = [
+    "material",
+    "max_smooth_angle",
+    "kc",
+    "channel",
+    "filename",
+    "to_world",
+    "to_uv",
+    "radius",
+    "shadow_rays",
+    "thickness",
+    "aperture_radius",
+    "orientation",
+    "density",
+];
 
 /// The children of an element, each to be asked for once.
 pub(super) struct Properties<'a> {
@@ -133,7 +154,11 @@ impl<'a> Properties<'a> {
 
     /// A file that exists, wherever it is found.
     pub(super) fn path(&self, name: &'static str) -> Result<Option<PathBuf>, CliError> {
-        self.string(name)?.map(|s| self.element.resolve(s)).transpose()
+        let Some(name) = self.string(name)? else { return Ok(None) };
+        let path = self.element.resolve(name)?;
+        let fail = |reason| self.element.error(format!("cannot read {}: {reason}", path.display()));
+        input_file::check(&path).map_err(|e| fail(e.to_string()))?;
+        Ok(Some(path))
     }
 
     /// One of several words, as what it stands for.
@@ -240,6 +265,22 @@ impl<'a> Properties<'a> {
         self.children(|_| true);
     }
 
+    /// Whether a property that nobody asked for only gets a note: those of files of version 0.5 and 0.6 do, where they change nothing
+    /// here, as that version had many that are about how an image is computed.
+    fn is_passed_over(&self, child: &Element) -> bool {
+        let Some((name, _)) = property_name(child) else { return false };
+        let plain = PLAIN.contains(&child.tag.as_str());
+        if !child.is_legacy() || !plain || MATTER.contains(&name) {
+            return false;
+        }
+        let kind = self.element.attribute("type").unwrap_or("");
+        child.note_once(
+            &format!("{}/{kind}/{name}", self.element.tag),
+            format!("has no effect in {}, here and wherever it is given", self.element),
+        );
+        true
+    }
+
     /// Refuses what nobody asked for.
     pub(super) fn finish(&self) -> Result<(), CliError> {
         if let Some((name, _)) = self.textures.borrow().first() {
@@ -249,8 +290,9 @@ impl<'a> Properties<'a> {
             return Err(self.element.error(message));
         }
         let used = self.used.borrow();
-        let Some(i) = used.iter().position(|u| !u) else { return Ok(()) };
-        let child = &self.element.children[i];
+        let mut left = (self.element.children.iter().zip(used.iter()))
+            .filter(|(child, used)| !**used && !self.is_passed_over(child));
+        let Some((child, _)) = left.next() else { return Ok(()) };
         if property_name(child).is_none() {
             return Err(child.error(format!("not supported inside {}", self.element)));
         }

@@ -58,7 +58,9 @@ impl<'a> Loader<'a> {
         };
         let p = Properties::of(film.target)?;
         let kind = p.kind()?;
-        if kind != "hdrfilm" {
+        // What sets it apart is how pixels are stored.
+        let stored_as_bytes = kind == "ldrfilm" && film.target.is_legacy();
+        if kind != "hdrfilm" && !stored_as_bytes {
             let message = format!("the film type `{kind}` is not supported; expected hdrfilm");
             return Err(film.child.error(message));
         }
@@ -209,6 +211,19 @@ const PATHS: [&str; 16] = [
 ];
 /// Integrators of paths with one scattering at most.
 const DIRECT: [&str; 3] = ["direct", "direct_projective", "direct_reparam"];
+/// Integrators whose image is not that of light on paths.
+const OTHERS: [&str; 10] = [
+    "depth",
+    "stokes",
+    "ao",
+    "field",
+    "velocity",
+    "multichannel",
+    "singlescatter",
+    "vpl",
+    "dipole",
+    "albedo",
+];
 /// Those that go through null interfaces, masks and panes at no depth.
 const STRAIGHT: [&str; 5] = ["volpath", "volpathmis", "volpath_simple", "prbvolpath", "volpathAD"];
 /// Integrators that say more about the image of another one, inside them.
@@ -228,7 +243,7 @@ pub(super) fn integrator(e: &Element) -> Result<Integrator, CliError> {
         };
     }
     let direct = DIRECT.contains(&kind);
-    if !direct && !PATHS.contains(&kind) {
+    if OTHERS.contains(&kind) {
         let message = format!(
             "the integrator type `{kind}` is not supported; expected one that traces paths ({}), one \
              for direct light ({}), or {} around one of them",
@@ -248,10 +263,19 @@ pub(super) fn integrator(e: &Element) -> Result<Integrator, CliError> {
     if let Some(depth) = p.integer_in("rr_depth", 1..=i64::from(u32::MAX))? {
         integrator.rr_depth = depth;
     }
-    integrator.straight_depth = !STRAIGHT.contains(&kind);
+    let known = direct || PATHS.contains(&kind);
+    if !known {
+        e.note(format!("the integrator type `{kind}` is not known; taken for `volpath`, whose image is that of all paths"));
+        p.accept_rest();
+    }
+    integrator.straight_depth = known && !STRAIGHT.contains(&kind);
     integrator.hide_emitters = p.boolean("hide_emitters")?.unwrap_or(false);
     if p.boolean("strict_normals")? == Some(true) {
-        return Err(e.error("`strict_normals` = true is not supported"));
+        let message = "`strict_normals` = true is not supported: light on the wrong side of a triangle is not cut off";
+        if !e.is_legacy() {
+            return Err(e.error(message));
+        }
+        e.note(message);
     }
     // How the work is cut up.
     p.accept(&["samples_per_pass", "block_size", "timeout"]);

@@ -3,6 +3,7 @@
 mod instances;
 mod mesh_file;
 mod serialized;
+mod shared;
 mod texcoords;
 
 use std::sync::Arc;
@@ -14,8 +15,9 @@ use drt_math::{Affine, Frame, Mat3, Vec3};
 
 use super::element::Element;
 use super::properties::Properties;
-use super::{Loader, default_bsdf, volume_lights};
+use super::{Loader, added_bsdf, material_of_none, volume_lights};
 use crate::CliError;
+pub(super) use shared::SharedMeshes;
 
 /// Bands of a sphere between its poles where none are given; twice as many meridians.
 const SPHERE_RESOLUTION: u32 = 128;
@@ -41,40 +43,55 @@ impl Model {
 }
 
 impl<'a> Loader<'a> {
-    /// One shape; a default material is added to `bsdfs` where it has none.
+    /// One shape, unless it has no area, and its map into the world where its mesh is a shared one. A default material is added to the
+    /// `declared` ones where it has none.
     pub(super) fn shape(
         &self,
         e: &'a Element,
         bsdfs: &mut Vec<Named<Bsdf>>,
-    ) -> Result<Shape, CliError> {
+        declared: usize,
+        shared: &SharedMeshes,
+    ) -> Result<Option<(Shape, Option<Affine>)>, CliError> {
         let p = Properties::of(e)?;
-        let mesh = self.without_degenerate(e, place(&p, model(&p)?)?)?;
         let emitter = self.index.single(&p, "emitter", None)?;
         // A medium's light is no light of the shape.
         let emitter = emitter.filter(|inner| !volume_lights::is_one(inner.target));
-        let bsdf = match self.index.single(&p, "bsdf", None)? {
-            Some(bsdf) => self.counted(bsdf.child, bsdf.target)?,
-            None => default_bsdf(bsdfs, self.index.all("bsdf").len(), emitter.is_some()),
+        let (mesh, to_world) = match shared.find(&p)?.filter(|_| emitter.is_none()) {
+            Some((mesh, map)) => (Some(mesh), Some(map)),
+            None => (without_degenerate(&p, place(&p, model(&p)?)?).map(Arc::new), None),
         };
         let boundary = self.boundary(&p)?;
+        let bsdf = match self.index.single(&p, "bsdf", None)? {
+            Some(bsdf) => match self.referred.borrow().get(&bsdf.target.ordinal) {
+                Some(number) => *number,
+                None => self.counted(bsdf.child, bsdf.target)?,
+            },
+            None => {
+                let bounds = e.is_legacy() && boundary.is_some();
+                added_bsdf(bsdfs, declared, material_of_none(emitter.is_some(), bounds))
+            }
+        };
         p.finish()?;
+        let Some(mesh) = mesh else {
+            if emitter.is_some() {
+                return Err(e.error("no triangle of this shape, which is a light, has an area"));
+            }
+            return Ok(None);
+        };
         let emitter = emitter
             .and_then(|inner| self.emitters().position(|e| e.ordinal == inner.target.ordinal));
-        Ok(Shape { id: e.id().map(Into::into), mesh: Arc::new(mesh), bsdf, boundary, emitter })
+        let id = e.id().map(Into::into);
+        Ok(Some((Shape { id, mesh, bsdf, boundary, emitter }, to_world)))
     }
 
-    /// The mesh without triangles that cannot be seen or are there twice.
-    fn without_degenerate(&self, e: &Element, mesh: Mesh) -> Result<Mesh, CliError> {
-        let (clean, dropped) = mesh.drop_degenerate();
-        if clean.triangles.is_empty() {
-            return Err(e.error("no triangle of this shape has an area"));
+    /// Adds the BSDFs inside others that shapes refer to, as things of their own without a name: what a job changes in one of them
+    /// would not change in what it is inside of.
+    pub(super) fn referred_bsdfs(&self, bsdfs: &mut Vec<Named<Bsdf>>) -> Result<(), CliError> {
+        for e in self.index.referred() {
+            self.referred.borrow_mut().insert(e.ordinal, bsdfs.len());
+            bsdfs.push(Named::anonymous(self.bsdf(e)?));
         }
-        if dropped > 0 {
-            let all = mesh.triangles.len();
-            let message = format!("dropped {dropped} of {all} triangles: no area, or there before");
-            self.warn(e, message);
-        }
-        Ok(clean)
+        Ok(())
     }
 
     /// The number of what `child` stands for among things of its kind.
@@ -102,6 +119,27 @@ impl<'a> Loader<'a> {
     }
 }
 
+/// The mesh without triangles that cannot be seen or are there twice; `None` where no triangle is left, and the shape is left out.
+fn without_degenerate(p: &Properties<'_>, mesh: Mesh) -> Option<Mesh> {
+    let (clean, dropped) = mesh.drop_degenerate();
+    let all = mesh.triangles.len();
+    let file = p.element.children.iter().find(|e| e.attribute("name") == Some("filename"));
+    let of = match file.and_then(|e| e.attribute("value")) {
+        Some(file) => format!(" of `{file}`"),
+        None => String::new(),
+    };
+    if clean.triangles.is_empty() {
+        let message = format!("left out: none of the {all} triangles{of} has an area");
+        p.element.note(message);
+        return None;
+    }
+    if dropped > 0 {
+        let message = format!("dropped {dropped} of {all} triangles{of}: no area, or there before");
+        p.element.note(message);
+    }
+    Some(clean)
+}
+
 fn model(p: &Properties<'_>) -> Result<Model, CliError> {
     let face_normals = p.boolean("face_normals")?.unwrap_or(false);
     let mut model = match p.kind()? {
@@ -114,13 +152,14 @@ fn model(p: &Properties<'_>) -> Result<Model, CliError> {
         }
         "cube" => Model::faceted(texcoords::cube(procedural::cube())),
         "rectangle" => Model::faceted(texcoords::rectangle(procedural::rectangle())),
-        "disk" => {
-            let corners = p.integer_in("resolution", 3..=1 << 20)?.unwrap_or(DISK_RESOLUTION);
-            Model::faceted(texcoords::disk(procedural::disk(corners)))
-        }
-        "sphere" => sphere(p)?,
-        "cylinder" => cylinder(p)?,
         other => {
+            if let Some(round) = round(p)? {
+                let mut model = round.model(p.element)?;
+                if face_normals {
+                    model.mesh.normals = None;
+                }
+                return Ok(model);
+            }
             let why = match other {
                 "bsplinecurve" | "linearcurve" => ": curves are no triangles",
                 "sdfgrid" => ": a distance field is no triangles",
@@ -157,26 +196,70 @@ fn from_file(
     Ok(Model { mesh, turns, smooth })
 }
 
-fn sphere(p: &Properties<'_>) -> Result<Model, CliError> {
-    let bands = p.integer_in("resolution", 2..=1024)?.unwrap_or(SPHERE_RESOLUTION);
-    let center = p.vector("center")?.unwrap_or(Vec3::ZERO);
-    let radius = p.float("radius")?.unwrap_or(1.0);
-    if radius <= 0.0 {
-        return Err(p.element.error(format!("`radius` is {radius}; it must be positive")));
-    }
-    let map = Affine { linear: Mat3::IDENTITY * radius, translation: center };
-    let mesh = texcoords::sphere(procedural::uv_sphere(bands)).transform(&map);
-    Ok(Model { mesh, turns: true, smooth: false })
+/// A shape with a curved outline, before it is placed.
+struct Round {
+    kind: &'static str,
+    resolution: u32,
+    /// From the mesh of all shapes of its kind and resolution; `None` for that mesh itself.
+    map: Option<Affine>,
 }
 
-/// From `p0` to `p1` about the line between them, without its ends.
-fn cylinder(p: &Properties<'_>) -> Result<Model, CliError> {
-    let sides = p.integer_in("resolution", 3..=1 << 20)?.unwrap_or(CYLINDER_RESOLUTION);
-    let (from, to) = (p.vector("p0")?.unwrap_or(Vec3::ZERO), p.vector("p1")?.unwrap_or(Vec3::Z));
+impl Round {
+    fn mesh(&self) -> Mesh {
+        match self.kind {
+            "disk" => texcoords::disk(procedural::disk(self.resolution)),
+            "cylinder" => texcoords::cylinder(procedural::cylinder(self.resolution)),
+            _ => texcoords::sphere(procedural::uv_sphere(self.resolution)),
+        }
+    }
+
+    fn model(&self, e: &Element) -> Result<Model, CliError> {
+        let Some(map) = &self.map else { return Ok(Model::faceted(self.mesh())) };
+        let mesh = self.mesh().transform(map);
+        mesh.validate().map_err(|err| e.error(err))?;
+        Ok(Model { mesh, turns: true, smooth: false })
+    }
+}
+
+/// What a sphere, disk or cylinder is made of; `None` for other shapes.
+fn round(p: &Properties<'_>) -> Result<Option<Round>, CliError> {
+    let resolution =
+        |range, default| Ok::<u32, CliError>(p.integer_in("resolution", range)?.unwrap_or(default));
+    Ok(Some(match p.kind()? {
+        "disk" => {
+            let resolution = resolution(3..=1 << 20, DISK_RESOLUTION)?;
+            Round { kind: "disk", resolution, map: None }
+        }
+        "sphere" => {
+            let resolution = resolution(2..=1024, SPHERE_RESOLUTION)?;
+            Round { kind: "sphere", resolution, map: Some(sphere(p)?) }
+        }
+        "cylinder" => {
+            let resolution = resolution(3..=1 << 20, CYLINDER_RESOLUTION)?;
+            Round { kind: "cylinder", resolution, map: Some(cylinder(p)?) }
+        }
+        _ => return Ok(None),
+    }))
+}
+
+/// From the unit sphere.
+fn sphere(p: &Properties<'_>) -> Result<Affine, CliError> {
+    let center = p.vector("center")?.unwrap_or(Vec3::ZERO);
+    Ok(Affine { linear: Mat3::IDENTITY * radius(p)?, translation: center })
+}
+
+fn radius(p: &Properties<'_>) -> Result<f64, CliError> {
     let radius = p.float("radius")?.unwrap_or(1.0);
     if radius <= 0.0 {
         return Err(p.element.error(format!("`radius` is {radius}; it must be positive")));
     }
+    Ok(radius)
+}
+
+/// From the unit cylinder to the one from `p0` to `p1` about the line between them, without its ends.
+fn cylinder(p: &Properties<'_>) -> Result<Affine, CliError> {
+    let (from, to) = (p.vector("p0")?.unwrap_or(Vec3::ZERO), p.vector("p1")?.unwrap_or(Vec3::Z));
+    let radius = radius(p)?;
     let axis = to - from;
     if axis.max_abs() == 0.0 {
         return Err(p.element.error("`p0` and `p1` are the same point"));
@@ -188,10 +271,7 @@ fn cylinder(p: &Properties<'_>) -> Result<Model, CliError> {
         drt_math::vec3(a, b, c)
     };
     let linear = Mat3::from_rows(row(Vec3::X), row(Vec3::Y), row(Vec3::Z));
-    let mesh = texcoords::cylinder(procedural::cylinder(sides));
-    let mesh = mesh.transform(&Affine { linear, translation: from });
-    mesh.validate().map_err(|err| p.element.error(err))?;
-    Ok(Model { mesh, turns: true, smooth: false })
+    Ok(Affine { linear, translation: from })
 }
 
 /// The model in the world.

@@ -2,12 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 use roxmltree::{Document, Node};
 
 use super::dialect::Dialect;
 use super::element::Element;
+use super::notes::Notes;
 use super::values;
 use crate::CliError;
 use crate::error::{Place, read_text};
@@ -42,6 +44,7 @@ pub(super) struct SceneFiles {
     folders: Arc<[PathBuf]>,
     /// All files included so far.
     included: Vec<PathBuf>,
+    notes: Rc<Notes>,
     /// Files and elements read so far.
     files: usize,
     elements: usize,
@@ -52,8 +55,8 @@ impl SceneFiles {
         let (given, known) = (given.clone(), given.clone());
         let (used, open, paths, folders) =
             (BTreeSet::new(), Vec::new(), Vec::new(), Arc::default());
-        let included = Vec::new();
-        Self { given, known, used, open, paths, folders, included, files: 0, elements: 0 }
+        let (included, notes) = (Vec::new(), Rc::default());
+        Self { given, known, used, open, paths, folders, included, notes, files: 0, elements: 0 }
     }
 
     /// The tree of a scene's text, and the files that it includes; `path` names it in messages and anchors relative paths.
@@ -127,12 +130,14 @@ impl SceneFiles {
             let message = format!("the scene has more than {MAX_ELEMENTS} elements");
             return Err(CliError::input(&place, message));
         }
-        let attributes = node
+        let mut attributes = node
             .attributes()
             .map(|a| Ok((a.name().to_owned(), self.substitute(a.value(), &place)?)))
-            .collect::<Result<_, CliError>>()?;
-        let tag = node.tag_name().name().into();
-        let mut element = Element::new(tag, attributes, place, dialect, self.folders.clone());
+            .collect::<Result<Vec<_>, CliError>>()?;
+        let tag: String = node.tag_name().name().into();
+        name_as_id(node, &tag, &mut attributes);
+        let (folders, notes) = (self.folders.clone(), self.notes.clone());
+        let mut element = Element::new(tag, attributes, place, dialect, folders, notes);
         for child in node.children() {
             if child.is_text() && !child.text().unwrap_or("").trim().is_empty() {
                 return Err(element.error("text inside an element; expected elements only"));
@@ -223,6 +228,16 @@ impl SceneFiles {
         }
         out.push_str(rest);
         Ok(out)
+    }
+}
+
+/// Of what stands directly in a scene and has no id, the name is its id.
+fn name_as_id(node: Node<'_, '_>, tag: &str, attributes: &mut Vec<(String, String)>) {
+    let in_scene = node.parent_element().is_some_and(|parent| parent.has_tag_name("scene"));
+    let is_thing = in_scene && !["default", "path", "include", "alias"].contains(&tag);
+    let find = |key: &str| attributes.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone());
+    if let (true, None, Some(name)) = (is_thing, find("id"), find("name")) {
+        attributes.push(("id".into(), name));
     }
 }
 

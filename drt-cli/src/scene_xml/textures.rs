@@ -5,12 +5,12 @@ use std::path::Path;
 use drt_estimators::texture::{
     AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap, UvMap,
 };
-use drt_math::{Affine, Rgb};
+use drt_math::{Affine, Mat3, Rgb, vec3};
 
 use super::element::Element;
 use super::properties::Properties;
 use super::spectrum::srgb_to_linear;
-use crate::{CliError, read_exr};
+use crate::{CliError, memory, read_exr};
 
 /// Textures of these types vary; all others are one colour.
 const VARYING: [&str; 3] = ["bitmap", "checkerboard", "mesh_attribute"];
@@ -19,7 +19,44 @@ const MAX_TEXELS: u64 = 1 << 26;
 
 /// True for a texture that is not the same everywhere.
 pub(super) fn varies(e: &Element) -> bool {
-    e.tag == "texture" && e.attribute("type").is_some_and(|kind| VARYING.contains(&kind))
+    e.tag == "texture"
+        && e.attribute("type").is_some_and(|kind| {
+            VARYING.contains(&kind) || (kind == "scale" && e.children.iter().any(varies))
+        })
+}
+
+/// The texture that a `scale` of version 0.5 and 0.6 is of.
+pub(super) fn scaled<'a>(p: &Properties<'a>) -> Result<&'a Element, CliError> {
+    let scale = |e: &Element| p.is_property(e, "scale");
+    match p.children(|e| matches!(e.tag.as_str(), "texture" | "spectrum") && !scale(e))[..] {
+        [inner] => Ok(inner),
+        ref other => {
+            let message = format!("expected one texture inside, found {}", other.len());
+            Err(p.element.error(message))
+        }
+    }
+}
+
+/// What such a `scale` multiplies by.
+pub(super) fn factor(p: &Properties<'_>) -> Result<Rgb, CliError> {
+    Ok(p.color("scale")?.unwrap_or(Rgb::ONE))
+}
+
+/// A texture with all its colours multiplied.
+fn times(texture: Texture, factor: Rgb) -> Result<Texture, String> {
+    Ok(match texture {
+        Texture::Checkerboard { colours, to_uv } => {
+            Texture::Checkerboard { colours: colours.map(|c| c * factor), to_uv }
+        }
+        Texture::Attribute(a) if factor.r == factor.g && factor.g == factor.b => {
+            Texture::Attribute(AttributeTexture { scale: a.scale * factor.r, ..a })
+        }
+        Texture::Attribute(_) => return Err("an attribute is multiplied by one number".into()),
+        Texture::Bitmap(image) => {
+            let factor = factor.to_array();
+            Texture::Bitmap(image.map(|t| [0, 1, 2].map(|k| (f64::from(t[k]) * factor[k]) as f32))?)
+        }
+    })
 }
 
 /// A texture that [`varies`], of colours.
@@ -30,7 +67,13 @@ pub(super) fn read(e: &Element) -> Result<Texture, CliError> {
         p.finish()?;
         return Ok(texture);
     }
-    let to_uv = uv_map(&p.transform("to_uv")?.unwrap_or(Affine::IDENTITY));
+    if p.kind()? == "scale" {
+        let inner = read(scaled(&p)?)?;
+        let texture = times(inner, factor(&p)?).map_err(|reason| e.error(reason))?;
+        p.finish()?;
+        return Ok(texture);
+    }
+    let to_uv = uv_map(&coordinates(&p)?);
     let texture = if p.kind()? == "checkerboard" {
         let colour =
             |name, default| Ok::<_, CliError>(p.color(name)?.unwrap_or(Rgb::splat(default)));
@@ -76,6 +119,17 @@ pub(super) fn grey([r, g, b]: [f64; 3]) -> f64 {
     0.212_671 * r + 0.715_160 * g + 0.072_169 * b
 }
 
+/// What is done to texture coordinates first: `to_uv`, or the scales and offsets of version 0.5 and 0.6.
+fn coordinates(p: &Properties<'_>) -> Result<Affine, CliError> {
+    if !p.element.is_legacy() {
+        return Ok(p.transform("to_uv")?.unwrap_or(Affine::IDENTITY));
+    }
+    let number = |name, default| Ok::<f64, CliError>(p.float(name)?.unwrap_or(default));
+    let scale = vec3(number("uscale", 1.0)?, number("vscale", 1.0)?, 1.0);
+    let translation = vec3(number("uoffset", 0.0)?, number("voffset", 0.0)?, 0.0);
+    Ok(Affine { linear: Mat3::diagonal(scale), translation })
+}
+
 fn uv_map(map: &Affine) -> UvMap {
     let [x, y, _] = map.linear.cols;
     let t = map.translation;
@@ -86,21 +140,67 @@ fn bitmap(p: &Properties<'_>, to_uv: UvMap) -> Result<Texture, CliError> {
     let e = p.element;
     let path = p.path("filename")?.ok_or_else(|| e.error("`filename` is missing"))?;
     let filters = [("bilinear", TextureFilter::Bilinear), ("nearest", TextureFilter::Nearest)];
+    // Of version 0.5 and 0.6. Many samples see the same without means over what a pixel covers.
+    let means = [("trilinear", TextureFilter::Bilinear), ("ewa", TextureFilter::Bilinear)];
+    let filters = if e.is_legacy() { [&filters[..], &means].concat() } else { filters.to_vec() };
     let wraps = [
         ("repeat", TextureWrap::Repeat),
         ("mirror", TextureWrap::Mirror),
         ("clamp", TextureWrap::Clamp),
     ];
     let filter = p.choice("filter_type", &filters)?.unwrap_or_default();
-    let wrap = p.choice("wrap_mode", &wraps)?.unwrap_or_default();
-    let raw = p.boolean("raw")?.unwrap_or(false);
+    let wrap = p.choice("wrap_mode", &wraps)?;
+    let wrap = if e.is_legacy() { wrap.or(both_ways(p, &wraps)?) } else { wrap };
+    let wrap = wrap.unwrap_or_default();
+    let curve = curve(p)?;
     // How it is stored and looked up.
     p.accept(&["accel", "format"]);
     let fail = |reason: String| e.error(format!("{}: {reason}", path.display()));
-    let (size, texels) = pixels(&path, raw).map_err(fail)?;
+    let (size, mut texels) = pixels(&path, curve != Curve::OfFile).map_err(fail)?;
+    if let Curve::Power(gamma) = curve {
+        texels.iter_mut().flatten().for_each(|v| *v = v.max(0.0).powf(gamma));
+    }
     let mut image = Bitmap::new(size, texels).map_err(fail)?;
     (image.filter, image.wrap, image.to_uv) = (filter, wrap, to_uv);
     Ok(Texture::Bitmap(image))
+}
+
+/// How the numbers of an image file become values.
+#[derive(Clone, Copy, PartialEq)]
+enum Curve {
+    /// By the sRGB curve, unless the format holds linear ones.
+    OfFile,
+    /// They are values.
+    Raw,
+    /// By a power.
+    Power(f32),
+}
+
+/// What `raw` says, or the `gamma` of version 0.5 and 0.6, where 1 is linear and -1 as the file is.
+fn curve(p: &Properties<'_>) -> Result<Curve, CliError> {
+    if !p.element.is_legacy() {
+        return Ok(if p.boolean("raw")?.unwrap_or(false) { Curve::Raw } else { Curve::OfFile });
+    }
+    match p.float("gamma")? {
+        None | Some(-1.0) => Ok(Curve::OfFile),
+        Some(1.0) => Ok(Curve::Raw),
+        Some(gamma) if gamma > 0.0 => Ok(Curve::Power(gamma as f32)),
+        Some(gamma) => {
+            Err(p.element.error(format!("`gamma` is {gamma}; expected a positive number or -1")))
+        }
+    }
+}
+
+/// What `wrap_mode_u` and `wrap_mode_v` of version 0.5 and 0.6 say, which must be the same.
+fn both_ways(
+    p: &Properties<'_>,
+    wraps: &[(&str, TextureWrap)],
+) -> Result<Option<TextureWrap>, CliError> {
+    match (p.choice("wrap_mode_u", wraps)?, p.choice("wrap_mode_v", wraps)?) {
+        (None, None) => Ok(None),
+        (u, v) if u.unwrap_or_default() == v.unwrap_or_default() => Ok(u.or(v)),
+        _ => Err(p.element.error("`wrap_mode_u` and `wrap_mode_v` must be the same")),
+    }
 }
 
 /// Columns and rows, and values row by row from the top.
@@ -119,6 +219,7 @@ pub(super) fn pixels(path: &Path, raw: bool) -> Result<Pixels, String> {
     let decoder = reader.into_decoder().map_err(|err| err.to_string())?;
     let (width, height) = image::ImageDecoder::dimensions(&decoder);
     let size = small([width, height])?;
+    claimed(path, image::ImageDecoder::total_bytes(&decoder))?;
     let image = image::DynamicImage::from_decoder(decoder).map_err(|err| err.to_string())?;
     let image = image.into_rgb32f();
     let value = |v: f32| if linear { v } else { srgb_to_linear(f64::from(v)) as f32 };
@@ -133,6 +234,9 @@ fn exr_pixels(path: &Path) -> Result<Pixels, String> {
     let header = meta.headers.first().ok_or("there is no image in it")?;
     let size = [header.layer_size.width(), header.layer_size.height()];
     small(size.map(|n| u32::try_from(n).unwrap_or(u32::MAX)))?;
+    let samples: usize =
+        header.channels.list.iter().map(|c| c.sample_type.bytes_per_sample()).sum();
+    claimed(path, (size[0] as u64).saturating_mul(size[1] as u64).saturating_mul(samples as u64))?;
     let names: Vec<String> = header.channels.list.iter().map(|c| c.name.to_string()).collect();
     let has = |name: &str| names.iter().any(|n| n == name);
     if ["R", "G", "B"].into_iter().all(has) {
@@ -158,6 +262,12 @@ fn exr_pixels(path: &Path) -> Result<Pixels, String> {
     let grey = grey.ok_or("it has no channel Y")?.sample_data.values_as_f32();
     let size = [layer.size.width() as u32, layer.size.height() as u32];
     Ok((size, grey.map(|v| [v; 3]).collect()))
+}
+
+/// Refuses a header that claims more bytes than the file can hold.
+fn claimed(path: &Path, bytes: u64) -> Result<(), String> {
+    let length = std::fs::metadata(path).map_err(|err| err.to_string())?.len();
+    memory::plausible(bytes, length)
 }
 
 fn small(size: [u32; 2]) -> Result<[u32; 2], String> {

@@ -1,7 +1,7 @@
 //! Quantities in space: numbers, colours, `constvolume` and `gridvolume`.
 
 use drt_math::{Affine, Rgb};
-use drt_medium::{Filter, Layout, Volume, Wrap, vol};
+use drt_medium::{Filter, Grid, Layout, Volume, Wrap, vol};
 
 use super::Loader;
 use super::element::Element;
@@ -65,6 +65,25 @@ fn constant(p: &Properties<'_>) -> Result<Field, CliError> {
     Ok(Field { volume: Volume::Constant(value), placement })
 }
 
+/// The grid with values a little below zero, as simulations and filters leave them, at zero.
+fn not_negative(p: &Properties<'_>, grid: Grid) -> Result<Grid, CliError> {
+    /// How much below zero they may be, of the largest value.
+    const LITTLE: f64 = 0.01;
+    let values = grid.values();
+    let least = values.iter().copied().fold(0.0, f64::min);
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    if !(least < 0.0 && least >= -LITTLE * largest) {
+        return Ok(grid);
+    }
+    let count = values.iter().filter(|v| **v < 0.0).count();
+    p.element.note(format!(
+        "{count} of {} values are below zero, the least {least:.3e}; they count as zero",
+        values.len()
+    ));
+    let values = values.iter().map(|v| v.max(0.0)).collect();
+    Grid::new(grid.size(), grid.channels(), values).map_err(|err| p.element.error(err))
+}
+
 fn grid(p: &Properties<'_>) -> Result<Field, CliError> {
     let e = p.element;
     let path = p.path("filename")?.ok_or_else(|| e.error("`filename` is missing"))?;
@@ -82,7 +101,8 @@ fn grid(p: &Properties<'_>) -> Result<Field, CliError> {
     p.accept(&["raw", "accel", "send_data"]);
     let file = vol::read(&path).map_err(|err| e.error(err))?;
     let stored = if in_stored_box { file.placement() } else { Affine::IDENTITY };
-    let grid = (file.grid.with_layout(layout).with_filter(filter).with_wrap(wrap))
+    let grid = not_negative(p, file.grid)?;
+    let grid = (grid.with_layout(layout).with_filter(filter).with_wrap(wrap))
         .with_placement(to_world.after(&stored))
         .map_err(|err| e.error(err))?;
     Ok(Field { placement: *grid.to_world(), volume: Volume::Grid(grid) })

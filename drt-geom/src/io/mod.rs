@@ -10,8 +10,8 @@ mod polygons;
 mod tet;
 
 #[cfg(feature = "obj")]
-pub use obj::{ObjError, ObjErrorKind, load_obj};
+pub use obj::{ObjError, ObjErrorKind, load_obj, load_obj_mended};
 #[cfg(feature = "ply")]
-pub use ply::{PlyError, PlyErrorKind, load_ply, read_vertex_vectors};
+pub use ply::{PlyError, PlyErrorKind, load_ply, load_ply_mended, read_vertex_vectors};
 #[cfg(feature = "tet")]
 pub use tet::{TetFileError, TetFileErrorKind, load_tet_mesh, read_medit, read_tetgen};

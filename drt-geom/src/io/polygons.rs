@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 use drt_math::Vec3;
 
 use crate::mesh::direction;
-use crate::triangulate::{PolygonError, newell_normal, triangulate};
+use crate::triangulate::{PolygonError, fan, newell_normal, triangulate};
 use crate::{Mesh, MeshAttribute, MeshError, NONE};
 
 /// A file's vertices and polygons before they become a mesh.
@@ -18,6 +18,8 @@ pub(super) struct Polygons {
     /// Values per vertex, and per polygon, by name.
     pub(super) vertex_attributes: Vec<Values>,
     pub(super) face_attributes: Vec<Values>,
+    /// Polygons whose edges cross are cut into fans instead of being refused.
+    mends: bool,
     corners: Vec<Corner>,
     /// Of each corner, its texture coordinates by index; [`NONE`] where the file gives none.
     corner_texcoords: Vec<u32>,
@@ -43,6 +45,11 @@ pub(super) enum AssembleError {
 }
 
 impl Polygons {
+    /// Polygons of which those whose edges cross are cut into fans.
+    pub(super) fn mending() -> Self {
+        Self { mends: true, ..Self::default() }
+    }
+
     /// Adds a corner to the polygon under construction.
     pub(super) fn corner(&mut self, corner: Corner, texcoord: u32) {
         self.corners.push(corner);
@@ -63,7 +70,9 @@ impl Polygons {
     /// The triangulated mesh, of the vertices that polygons use, in the file's order. A vertex with
     /// several normals becomes several. Once any corner has a normal, those without (or with one of
     /// length zero) take their polygon's. Once any has texture coordinates, those without are at (0, 0).
-    pub(super) fn assemble(mut self) -> Result<Mesh, AssembleError> {
+    ///
+    /// The number is that of polygons whose edges cross.
+    pub(super) fn assemble(mut self) -> Result<(Mesh, usize), AssembleError> {
         if self.corners.iter().any(|c| c.normal != NONE) {
             self.complete_normals();
         }
@@ -82,12 +91,17 @@ impl Polygons {
         let mut attributes: Vec<MeshAttribute> =
             named.map(|a| MeshAttribute { name: a.0.clone(), values: Vec::new() }).collect();
         let (of_vertices, of_faces) = attributes.split_at_mut(self.vertex_attributes.len());
-        let (mut texcoords, mut begin) = (Vec::new(), 0);
+        let (mut texcoords, mut begin, mut mended) = (Vec::new(), 0, 0);
         for (index, corners) in self.polygons().enumerate() {
             let points: Vec<_> =
                 corners.iter().map(|c| self.positions[c.vertex as usize]).collect();
-            let pieces =
-                triangulate(&points).map_err(|error| AssembleError::Polygon { index, error })?;
+            let pieces = match triangulate(&points) {
+                Err(PolygonError::Crossing) if self.mends => {
+                    mended += 1;
+                    fan(points.len() as u32)
+                }
+                pieces => pieces.map_err(|error| AssembleError::Polygon { index, error })?,
+            };
             triangles.extend(pieces.iter().map(|t| t.map(|k| place(&corners[k as usize]))));
             if textured {
                 texcoords.extend(pieces.iter().map(|t| t.map(|k| texcoord(begin + k as usize))));
@@ -115,7 +129,7 @@ impl Polygons {
         } else {
             mesh
         };
-        mesh.map_err(AssembleError::Mesh)
+        mesh.map(|mesh| (mesh, mended)).map_err(AssembleError::Mesh)
     }
 
     fn polygons(&self) -> impl Iterator<Item = &[Corner]> {

@@ -5,6 +5,7 @@ use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
 use super::caged::Caged;
+use super::element::Unit;
 use super::turned::TurnedNormals;
 use super::{SmoothNormals, SurfaceMotion};
 use crate::error::Cause;
@@ -92,8 +93,9 @@ pub fn move_mesh(
     if let Some(smooth) = &smooth {
         moved.normals = Some(smooth.normals(&moved));
     }
+    let smooth_units = smooth.as_ref().map(|smooth| (smooth, smooth.units(&moved)));
     let motion = |(parameter, field): (usize, Field)| {
-        let motion = field.into_motion(&moved, smooth.as_ref());
+        let motion = field.into_motion(&moved, smooth_units.as_ref());
         match turned.as_ref().and_then(|turned| turned.rates(parameter, &linear)) {
             None => motion,
             Some(rates) => {
@@ -155,6 +157,10 @@ impl Step {
 
     /// The field u of positions before the step, as a field of positions after it: L u(map⁻¹ y).
     fn carry(&self, u: &Affine) -> Affine {
+        // What moves all points alike, or none, as many parameters do.
+        if u.linear == Mat3::ZERO {
+            return Affine { linear: u.linear, translation: self.map.vector(u.translation) };
+        }
         Affine { linear: self.map.linear * u.linear, translation: self.map.vector(u.translation) }
             .after(&self.inverse)
     }
@@ -199,7 +205,11 @@ impl Field {
         };
     }
 
-    fn into_motion(self, moved: &Mesh, smooth: Option<&SmoothNormals>) -> SurfaceMotion {
+    fn into_motion(
+        self,
+        moved: &Mesh,
+        smooth: Option<&(&SmoothNormals, Vec<Unit>)>,
+    ) -> SurfaceMotion {
         let velocities = match self {
             Self::Affine(u) if u.is_zero() => return SurfaceMotion::Rest,
             // Angles weigh recomputed normals; where they change, these do not turn as the field.
@@ -210,7 +220,7 @@ impl Field {
             Self::Vertices(v) if v.iter().all(|v| *v == Vec3::ZERO) => return SurfaceMotion::Rest,
             Self::Vertices(v) => v,
         };
-        let normals = smooth.map(|s| s.rates(moved, &velocities).into());
+        let normals = smooth.map(|(s, units)| s.rates_from(units, moved, &velocities).into());
         SurfaceMotion::Vertices { positions: velocities.into(), normals }
     }
 }

@@ -59,14 +59,23 @@ impl SmoothNormals {
     /// Rates of the normals for given velocities of the mesh's vertices.
     #[must_use]
     pub fn rates(&self, mesh: &Mesh, velocities: &[Vec3]) -> Vec<Vec3> {
+        self.rates_from(&self.units(mesh), mesh, velocities)
+    }
+
+    /// The same from the [`units`](Self::units), which all velocities of a mesh have in common.
+    pub(super) fn rates_from(&self, units: &[Unit], mesh: &Mesh, velocities: &[Vec3]) -> Vec<Vec3> {
         let mut sums = vec![Vec3::ZERO; self.count];
         for t in &mesh.triangles {
-            let rates = Face::new(mesh, t).rates(t.map(|i| velocities[i as usize]));
+            let v = t.map(|i| velocities[i as usize]);
+            // Most of a mesh rests where single vertices move.
+            if v == [Vec3::ZERO; 3] {
+                continue;
+            }
+            let rates = Face::new(mesh, t).rates(v);
             for (&i, rate) in t.iter().zip(rates) {
                 sums[self.shared[i as usize] as usize] += rate;
             }
         }
-        let units = self.units(mesh);
         let rates: Vec<_> = units.iter().zip(sums).map(|(unit, sum)| unit.rate(sum)).collect();
         self.shared.iter().map(|&s| rates[s as usize]).collect()
     }
@@ -88,7 +97,8 @@ impl SmoothNormals {
         }
     }
 
-    fn units(&self, mesh: &Mesh) -> Vec<Unit> {
+    /// The shared normals, unit and with what they were divided by.
+    pub(super) fn units(&self, mesh: &Mesh) -> Vec<Unit> {
         let mut sums = vec![Vec3::ZERO; self.count];
         for t in &mesh.triangles {
             let face = Face::new(mesh, t);

@@ -9,6 +9,7 @@ use drt_math::Affine;
 use super::super::Loader;
 use super::super::element::Element;
 use super::super::properties::Properties;
+use super::SharedMeshes;
 use crate::CliError;
 
 /// The groups of a scene.
@@ -33,6 +34,7 @@ impl<'a> Loader<'a> {
         &self,
         shapes: &[&'a Element],
         bsdfs: &mut Vec<Named<Bsdf>>,
+        declared: usize,
     ) -> Result<Groups, CliError> {
         let mut groups = Groups::default();
         for e in shapes.iter().filter(|e| e.attribute("type") == Some("shapegroup")) {
@@ -44,14 +46,16 @@ impl<'a> Loader<'a> {
                         "instances of instances are not supported: a shapegroup holds shapes alone";
                     return Err(inner.child.error(message));
                 }
-                let shape = self.shape(inner.target, bsdfs)?;
+                if inner.child.tag == "shape" {
+                    groups.inside.insert(inner.child.ordinal);
+                }
+                let own = SharedMeshes::default();
+                let shape = self.shape(inner.target, bsdfs, declared, &own)?;
+                let Some((shape, _)) = shape else { continue };
                 if shape.emitter.is_some() {
                     return Err(inner
                         .child
                         .error("a shape of a shapegroup cannot carry an emitter"));
-                }
-                if inner.child.tag == "shape" {
-                    groups.inside.insert(inner.child.ordinal);
                 }
                 members.push(shape);
             }

@@ -10,12 +10,25 @@ use crate::scene_xml::element::Element;
 
 /// Reads an OBJ file for the shape `e`.
 pub(super) fn obj(e: &Element, path: &Path) -> Result<Mesh, CliError> {
-    drt_geom::load_obj(&bytes(e, path)?, &path.to_string_lossy()).map_err(|err| e.error(err))
+    let read = drt_geom::load_obj_mended(&bytes(e, path)?, &path.to_string_lossy());
+    read.map(|read| mended(e, path, read)).map_err(|err| e.error(err))
 }
 
 /// Reads a PLY file for the shape `e`.
 pub(super) fn ply(e: &Element, path: &Path) -> Result<Mesh, CliError> {
-    drt_geom::load_ply(&bytes(e, path)?, &path.to_string_lossy()).map_err(|err| e.error(err))
+    let read = drt_geom::load_ply_mended(&bytes(e, path)?, &path.to_string_lossy());
+    read.map(|read| mended(e, path, read)).map_err(|err| e.error(err))
+}
+
+/// A mesh of which some polygons may have been mended.
+fn mended(e: &Element, path: &Path, (mesh, count): (Mesh, usize)) -> Mesh {
+    if count > 0 {
+        let file = path.display();
+        e.note(format!(
+            "the edges of {count} polygons of {file} cross; cut into fans, as Mitsuba does"
+        ));
+    }
+    mesh
 }
 
 pub(super) fn bytes(e: &Element, path: &Path) -> Result<Vec<u8>, CliError> {

@@ -17,6 +17,8 @@ use super::mesh_file;
 use crate::scene_xml::element::Element;
 use crate::{CliError, memory};
 
+/// More vertices or triangles are refused: they would take many gigabytes, which a small file can inflate to.
+const MOST: u64 = 1 << 27;
 const MAGIC: u16 = 0x041C;
 const HAS_NORMALS: u32 = 0x0001;
 const HAS_TEXTURE_COORDINATES: u32 = 0x0002;
@@ -59,7 +61,8 @@ fn part(bytes: &[u8], index: u32) -> Result<(u16, &[u8]), String> {
 }
 
 fn mesh((version, deflated): (u16, &[u8])) -> Result<Mesh, String> {
-    let mut stream = Stream(ZlibDecoder::new(deflated), MOST_INFLATION * deflated.len() as u64);
+    let length = deflated.len() as u64;
+    let mut stream = Stream { inflated: ZlibDecoder::new(deflated), deflated: length };
     let flags = u32::from_le_bytes(stream.chunk()?);
     if version == 4 {
         while stream.chunk::<1>()? != [0] {}
@@ -100,30 +103,29 @@ fn triples(numbers: &[f64]) -> Vec<Vec3> {
     numbers.chunks_exact(3).map(|v| vec3(v[0], v[1], v[2])).collect()
 }
 
-/// What is inflated, and most bytes that it can become.
-struct Stream<'a>(ZlibDecoder<&'a [u8]>, u64);
-
-/// Deflate makes at most 258 bytes of two bits.
-const MOST_INFLATION: u64 = 1032;
+struct Stream<'a> {
+    inflated: ZlibDecoder<&'a [u8]>,
+    /// Bytes of what is deflated.
+    deflated: u64,
+}
 
 impl Stream<'_> {
     fn chunk<const N: usize>(&mut self) -> Result<[u8; N], String> {
         let mut chunk = [0; N];
-        self.0.read_exact(&mut chunk).map_err(|err| err.to_string())?;
+        self.inflated.read_exact(&mut chunk).map_err(|err| err.to_string())?;
         Ok(chunk)
     }
 
     /// `count` items of `size` bytes. Memory grows with what is there, not with what is claimed, and no further than there is.
     fn bytes(&mut self, count: u64, size: u64) -> Result<Vec<u8>, String> {
-        let length = count.checked_mul(size).ok_or("the mesh is too large")?;
-        if length > self.1 {
-            return Err("the mesh is cut short".into());
-        }
+        let length =
+            count.checked_mul(size).filter(|_| count <= MOST).ok_or("the mesh is too large")?;
+        memory::plausible(length, self.deflated)?;
         // As bytes and as numbers.
         let all = 3 * u128::from(length);
         memory::check(all).map_err(|reason| format!("its numbers would {reason}"))?;
         let mut bytes = Vec::new();
-        let read = self.0.by_ref().take(length).read_to_end(&mut bytes);
+        let read = self.inflated.by_ref().take(length).read_to_end(&mut bytes);
         match read.map_err(|err| err.to_string())? {
             n if n as u64 == length => Ok(bytes),
             _ => Err("the mesh is cut short".into()),

@@ -8,12 +8,14 @@ use drt_math::Rgb;
 use super::element::Element;
 use super::numbers::{number, numbers, plain_value};
 use super::properties::Properties;
+use super::textures;
 use crate::CliError;
 use crate::error::read_text;
 use observer::Spectrum;
 
 /// Tags that can give a colour; textures only where they are the same everywhere.
-pub(super) const TAGS: &[&str] = &["rgb", "spectrum", "srgb", "float", "integer", "texture"];
+pub(super) const TAGS: &[&str] =
+    &["rgb", "spectrum", "srgb", "float", "integer", "texture", "blackbody"];
 
 /// The linear sRGB colour of light with the same power at every wavelength, which Mitsuba 3 gives
 /// to emitters with a `<spectrum>` of one number: XYZ = (1, 1, 1) seen by a space whose white is D65.
@@ -38,6 +40,9 @@ pub(super) fn emitted(e: &Element) -> Result<Rgb, CliError> {
 }
 
 fn color(e: &Element, of: Of) -> Result<Rgb, CliError> {
+    if e.tag == "blackbody" {
+        return black_body(e, of);
+    }
     let spectral = e.tag == "spectrum";
     if e.tag == "texture" || (spectral && e.attribute("type").is_some()) {
         return plugin(e, of);
@@ -64,6 +69,26 @@ fn color(e: &Element, of: Of) -> Result<Rgb, CliError> {
     }
 }
 
+/// The element of version 0.5 and 0.6 for the light of a black body: `temperature`, which may end in K, times `scale`.
+fn black_body(e: &Element, of: Of) -> Result<Rgb, CliError> {
+    if !e.is_legacy() {
+        let message = "is of versions 0.5 and 0.6; here it is a <spectrum type=\"blackbody\">";
+        return Err(e.error(message));
+    }
+    e.only_attributes(&["name", "id", "temperature", "scale"])?;
+    let text = e.required("temperature")?.trim().trim_end_matches(['K', 'k']);
+    let kelvin = number(e, "temperature", text)?;
+    let scale = e.attribute("scale").map_or(Ok(1.0), |text| number(e, "scale", text))?;
+    glowing(e, kelvin, of).map(|color| color * scale)
+}
+
+fn glowing(e: &Element, kelvin: f64, of: Of) -> Result<Rgb, CliError> {
+    if kelvin <= 0.0 {
+        return Err(e.error(format!("`temperature` is {kelvin}; it must be positive")));
+    }
+    Ok(seen(&Spectrum::black_body(kelvin), of))
+}
+
 fn seen(spectrum: &Spectrum, of: Of) -> Rgb {
     match of {
         Of::Matter => spectrum.reflected(),
@@ -85,12 +110,13 @@ fn plugin(e: &Element, of: Of) -> Result<Rgb, CliError> {
             Ok(Some(v)) => Rgb::new(v.x, v.y, v.z),
             _ => Rgb::splat(p.float("value")?.ok_or_else(|| needed("value"))?),
         },
+        "scale" if e.is_legacy() => {
+            let inner = textures::scaled(&p)?;
+            color(inner, of)? * textures::factor(&p)?
+        }
         "blackbody" => {
             let kelvin = p.float("temperature")?.ok_or_else(|| needed("temperature"))?;
-            if kelvin <= 0.0 {
-                return Err(e.error(format!("`temperature` is {kelvin}; it must be positive")));
-            }
-            seen(&Spectrum::black_body(kelvin), of)
+            glowing(e, kelvin, of)?
         }
         "regular" => {
             let (from, to) = (p.float("wavelength_min")?, p.float("wavelength_max")?);

@@ -164,7 +164,9 @@ fn integrators_around_others_and_of_direct_light() {
     assert_eq!(depth(path), Some(3));
     assert_eq!(depth(&format!("<integrator type=\"moment\">{path}</integrator>")), Some(3));
     assert_eq!(depth("<integrator type=\"direct\"/>"), Some(2));
-    refused("<integrator type=\"sppm\"/>", &["`sppm` is not supported", "volpath"]);
+    refused("<integrator type=\"depth\"/>", &["`depth` is not supported", "volpath"]);
+    // One that nobody knows is taken for one of paths, with a note.
+    assert_eq!(depth(&path.replace("\"path\"", "\"my_path\"")), Some(3));
     refused("<integrator type=\"moment\"/>", &["one integrator inside, found 0"]);
     refused("<integrator type=\"path\"><float name=\"foo\" value=\"1\"/></integrator>", &["foo"]);
 }

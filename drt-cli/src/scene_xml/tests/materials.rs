@@ -193,6 +193,7 @@ fn bsdfs_made_of_others() {
         let inner = format!("<ref id=\"b{}\"/>", i - 1);
         tree += &format!("<bsdf type=\"blendbsdf\" id=\"b{i}\">{inner}{inner}</bsdf>");
     }
+    tree += "<shape type=\"cube\"><ref id=\"b39\"/></shape>";
     refused(&tree, &["more than 64 bsdfs in one"]);
 }
 

@@ -2,6 +2,7 @@ mod emitters;
 mod language;
 mod materials;
 mod media;
+mod past;
 mod sensors;
 mod shapes;
 mod support;

@@ -79,6 +79,19 @@ pub enum ObjErrorKind {
 /// # Errors
 /// For a line that does not say what it should, and for a file without faces.
 pub fn load_obj(bytes: &[u8], name: &str) -> Result<Mesh, ObjError> {
+    read(bytes, name, Polygons::default()).map(|(mesh, _)| mesh)
+}
+
+/// As [`load_obj`], with polygons whose edges cross (warped quads, say) cut into the fans from their first corners, and the
+/// number of these.
+///
+/// # Errors
+/// As [`load_obj`], but for polygons whose edges cross.
+pub fn load_obj_mended(bytes: &[u8], name: &str) -> Result<(Mesh, usize), ObjError> {
+    read(bytes, name, Polygons::mending())
+}
+
+fn read(bytes: &[u8], name: &str, mut polygons: Polygons) -> Result<(Mesh, usize), ObjError> {
     let fail = |(line, kind)| ObjError { file: name.to_string(), line, kind };
     let mut lines = LogicalLines { rest: bytes, next: 1 };
     let mut file = Statements::new();
@@ -86,7 +99,6 @@ pub fn load_obj(bytes: &[u8], name: &str) -> Result<Mesh, ObjError> {
         file.read(line, &text).map_err(|kind| fail((line, kind)))?;
     }
     let last = lines.next.saturating_sub(1).max(1);
-    let mut polygons = Polygons::default();
     let (vertices, corner_normals);
     (polygons.positions, vertices) = file.positions.load().map_err(fail)?;
     (polygons.normals, corner_normals) = file.normals.load().map_err(fail)?;

@@ -85,7 +85,21 @@ type Failure = (String, PlyErrorKind);
 /// For the first thing that is not as the header says, and for a file without faces. Memory grows
 /// with the file, whatever counts the header claims.
 pub fn load_ply(bytes: &[u8], name: &str) -> Result<Mesh, PlyError> {
-    read_mesh(bytes).map_err(|(place, kind)| PlyError { file: name.to_string(), place, kind })
+    let read = read_mesh(bytes, Polygons::default()).map(|(mesh, _)| mesh);
+    read.map_err(|(place, kind)| PlyError { file: name.to_string(), place, kind })
+}
+
+/// As [`load_ply`], with polygons whose edges cross (warped quads, say) cut into the fans from their first corners, and the
+/// number of these.
+///
+/// # Errors
+/// As [`load_ply`], but for polygons whose edges cross.
+pub fn load_ply_mended(bytes: &[u8], name: &str) -> Result<(Mesh, usize), PlyError> {
+    read_mesh(bytes, Polygons::mending()).map_err(|(place, kind)| PlyError {
+        file: name.to_string(),
+        place,
+        kind,
+    })
 }
 
 /// Reads the `x y z` of the element `vertex` of a PLY file as plain vectors, in the file's order: a
@@ -97,9 +111,8 @@ pub fn read_vertex_vectors(bytes: &[u8], name: &str) -> Result<Vec<Vec3>, PlyErr
     read_vectors(bytes).map_err(|(place, kind)| PlyError { file: name.to_string(), place, kind })
 }
 
-fn read_mesh(bytes: &[u8]) -> Result<Mesh, Failure> {
+fn read_mesh(bytes: &[u8], mut polygons: Polygons) -> Result<(Mesh, usize), Failure> {
     let (header, mut body) = Header::read(bytes)?;
-    let mut polygons = Polygons::default();
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => {
