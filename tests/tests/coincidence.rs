@@ -125,7 +125,8 @@ fn lamps_lie_in_other_surfaces() -> Result<()> {
         let set = floor_and_lamp(3)?.medium("fog", fog()?, Phase::henyey_greenstein(0.3)?);
         Ok(lamp(set.interface("border", border, "fog", None), height))
     };
-    for sampling in [CAMERA, BOTH] {
+    // From the camera alone light so near to fog makes rare, large samples.
+    for sampling in [CAMERA, [PathSampling::Bidirectional; 2]] {
         let found = compared(&foggy(2.2)?, &foggy(2.2 - 1e-6)?, sampling)?;
         assert!(found.agrees, "rms z {} max z {}", found.rms_z, found.max_z);
     }
