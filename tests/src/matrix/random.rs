@@ -158,7 +158,9 @@ impl Draft {
             let (name, set) = (["light", "other"][i], self.set.clone());
             let rng = &mut self.rng;
             let x = between(rng, -0.8, 0.8);
-            let up = vec3(x, 2.2, between(rng, -0.5, 0.8));
+            // Two lamps in one plane may be in one place, where it is not known which shines.
+            let height = 2.2 - 0.3 * i as f64;
+            let up = vec3(x, height, between(rng, -0.5, 0.8));
             self.set = match kind {
                 0 => set.light(name, Emitter::Constant { radiance: Rgb::new(0.8, 0.9, 1.0) }),
                 1 => set.light(
