@@ -1,5 +1,7 @@
 //! Rays through a prepared scene: followed to the first surface that scatters, or up to a point.
 
+use alloc::vec::Vec;
+
 use drt_geom::{Hit, Ray, Skip, coincide};
 use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::TrackingStats;

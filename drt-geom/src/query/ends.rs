@@ -26,7 +26,7 @@ pub(super) const fn gamma(n: f64) -> f64 {
 /// on an edge by `lerp` gamma(5).
 const ON_SURFACE: f64 = gamma(16.0);
 
-/// The margin around a triangle's box, relative to its largest coordinate, in which ends in its plane lie beside it.
+/// The margin around a triangle's box, relative to the end's largest coordinate, in which ends in its plane lie beside it.
 const BESIDE: f64 = 64.0 * ON_SURFACE;
 
 /// An end of a ray, with the rounding error of its coordinates beyond that of a point interpolated
@@ -35,27 +35,29 @@ const BESIDE: f64 = 64.0 * ON_SURFACE;
 pub(super) struct End {
     point: [f64; 3],
     error: [f64; 3],
+    /// How far beside a triangle's box it still lies beside the triangle.
+    beside: f64,
 }
 
 impl End {
     /// The origin, as given.
     #[inline]
     pub(super) fn origin(origin: [f64; 3]) -> Self {
-        Self { point: origin, error: [0.0; 3] }
+        Self::with_error(origin, [0.0; 3])
     }
 
     /// A point with an error of its own.
+    #[inline]
     pub(super) fn with_error(point: [f64; 3], error: [f64; 3]) -> Self {
-        Self { point, error }
+        let largest = |v: [f64; 3]| v[0].abs().max(v[1].abs()).max(v[2].abs());
+        Self { point, error, beside: BESIDE * largest(point) + largest(error) }
     }
 
     /// The point `origin + t dir`, whose terms were rounded, `dir` perhaps by a subtraction.
     pub(super) fn far(origin: [f64; 3], dir: [f64; 3], t: f64) -> Self {
         let error = |k: usize| gamma(4.0) * (origin[k].abs() + (t * dir[k]).abs());
-        Self {
-            point: [0, 1, 2].map(|k| origin[k] + t * dir[k]),
-            error: [error(0), error(1), error(2)],
-        }
+        let point = [0, 1, 2].map(|k| origin[k] + t * dir[k]);
+        Self::with_error(point, [error(0), error(1), error(2)])
     }
 
     /// Whether the end lies on the triangle, as far as rounding lets one tell.
@@ -65,17 +67,18 @@ impl End {
     /// end from which the ray moves off the plane counts too.
     #[inline]
     pub(super) fn lies_on(&self, triangle: &Corners, leaving: [f64; 3]) -> bool {
-        let side = |k: usize| triangle.map(|v| v[k]);
-        let low = [0, 1, 2].map(|k| side(k).into_iter().fold(f64::INFINITY, f64::min));
-        let high = [0, 1, 2].map(|k| side(k).into_iter().fold(f64::NEG_INFINITY, f64::max));
-        let largest = [0, 1, 2].map(|k| low[k].abs().max(high[k].abs()));
-        let margin = (0..3).fold(0.0, |m: f64, k| m.max(BESIDE * largest[k] + self.error[k]));
-        // Written so that a NaN counts as outside.
-        let near = |k: usize| self.point[k] >= low[k] - margin && self.point[k] <= high[k] + margin;
-        (0..3).all(near) && {
-            let slack = [0, 1, 2].map(|k| ON_SURFACE * largest[k] + self.error[k]);
-            self.touches_plane(triangle, slack, leaving)
+        let mut slack = [0.0; 3];
+        for k in 0..3 {
+            let [a, b, c] = [triangle[0][k], triangle[1][k], triangle[2][k]];
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            slack[k] = ON_SURFACE * low.abs().max(high.abs()) + self.error[k];
+            let margin = slack[k] + self.beside;
+            // Written so that a NaN counts as outside.
+            if !(self.point[k] >= low - margin && self.point[k] <= high + margin) {
+                return false;
+            }
         }
+        self.touches_plane(triangle, slack, leaving)
     }
 
     /// Whether the end lies in the plane of the triangle, as far as rounding lets one tell.

@@ -19,35 +19,50 @@ const NEAR: f64 = 1e-6;
 /// Bound of the relative error of a distance along a ray.
 const ALONG: f64 = gamma(16.0);
 
+/// A triangle that a ray crosses.
+struct Met {
+    prim: u32,
+    crossing: Crossing,
+    corners: Corners,
+}
+
 /// The nearest hit of a ray so far, and those that are hardly farther.
 #[derive(Default)]
 pub(super) struct Foremost {
-    nearest: Option<(Hit, Corners)>,
-    near: Vec<(Hit, Corners)>,
+    nearest: Option<Met>,
+    near: Vec<Met>,
+}
+
+impl Met {
+    fn hit(&self) -> Hit {
+        super::hit(self.prim, &self.crossing)
+    }
 }
 
 impl Foremost {
     /// Takes in a hit; true where it is the nearest so far.
     #[inline(always)]
     pub(super) fn take(&mut self, prim: u32, crossing: &Crossing, corners: &Corners) -> bool {
-        if let Some((nearest, _)) = &self.nearest {
-            if crossing.t > nearest.t + NEAR * nearest.t {
+        let met = || Met { prim, crossing: *crossing, corners: *corners };
+        if let Some(nearest) = &self.nearest {
+            let (t, near) = (nearest.crossing.t, NEAR * nearest.crossing.t);
+            if crossing.t > t + near {
                 return false;
             }
-            if crossing.t >= nearest.t - NEAR * nearest.t {
-                return self.take_near((super::hit(prim, crossing), *corners));
+            if crossing.t >= t - near {
+                return self.take_near(met());
             }
         }
         self.near.clear();
-        self.nearest = Some((super::hit(prim, crossing), *corners));
+        self.nearest = Some(met());
         true
     }
 
     #[cold]
-    fn take_near(&mut self, hit: (Hit, Corners)) -> bool {
+    fn take_near(&mut self, met: Met) -> bool {
         let Some(nearest) = &mut self.nearest else { return false };
-        let nearer = hit.0.is_before(&nearest.0);
-        self.near.push(if nearer { core::mem::replace(nearest, hit) } else { hit });
+        let nearer = met.hit().is_before(&nearest.hit());
+        self.near.push(if nearer { core::mem::replace(nearest, met) } else { met });
         nearer
     }
 
@@ -56,16 +71,17 @@ impl Foremost {
     #[inline(always)]
     pub(super) fn hit(&self, ray: &Ray) -> Option<Hit> {
         let nearest = self.nearest.as_ref()?;
-        if self.near.is_empty() { Some(nearest.0) } else { Some(self.lowest(ray, nearest)) }
+        Some(if self.near.is_empty() { nearest.hit() } else { self.lowest(ray, nearest) })
     }
 
     #[cold]
-    fn lowest(&self, ray: &Ray, (nearest, corners): &(Hit, Corners)) -> Hit {
-        let coincide = |(hit, own): &&(Hit, Corners)| {
-            lies_in_plane(ray, hit, own, corners) && lies_in_plane(ray, nearest, corners, own)
+    fn lowest(&self, ray: &Ray, nearest: &Met) -> Hit {
+        let coincides = |met: &&Met| {
+            lies_in_plane(ray, &met.hit(), &met.corners, &nearest.corners)
+                && lies_in_plane(ray, &nearest.hit(), &nearest.corners, &met.corners)
         };
-        let others = self.near.iter().filter(coincide).map(|(hit, _)| *hit);
-        others.fold(*nearest, |first, hit| if hit.prim < first.prim { hit } else { first })
+        let others = self.near.iter().filter(coincides);
+        others.fold(nearest, |first, met| if met.prim < first.prim { met } else { first }).hit()
     }
 }
 
