@@ -244,3 +244,38 @@ fn visibility_is_mutual() {
     }
     assert!(seen > 500, "{seen}");
 }
+
+/// Of triangles that coincide the one with the lowest number is met, whichever way rounding falls.
+#[test]
+fn coincident_surfaces_are_met_in_their_order() {
+    let mut rng = Rng::new(8, 0, 0);
+    let (mut rays, mut by_rounding) = (0, 0);
+    // Farther out, rounding is more than the part of a distance in which hits count as near.
+    for (scale, offset) in PLACES.into_iter().filter(|(scale, offset)| offset / scale < 1e8) {
+        let turn = Mat3::rotation(vec3(0.36, 0.48, 0.8), 0.7);
+        let place =
+            |x: f64, y: f64| (turn * vec3(x, y, 0.0)) * scale + vec3(1.0, -0.7, 0.3) * offset;
+        let large = [place(-2.0, -2.0), place(2.0, -2.0), place(0.0, 3.0)];
+        let small = [place(-0.5, -0.4), place(0.6, -0.5), place(0.1, 0.7)];
+        for first in [[small, large], [large, small]] {
+            let bvh = TriangleBvh::build(&first).unwrap();
+            for _ in 0..500 {
+                let [u, v] = inside_triangle(&mut rng);
+                let aim = small[0] * (1.0 - u - v) + small[1] * u + small[2] * v;
+                let from = aim + direction(&mut rng) * (3.0 * scale);
+                let ray = Ray::new(from, aim - from);
+                let Some(hit) = bvh.foremost(&ray, Skip::NOTHING) else { continue };
+                rays += 1;
+                assert_eq!(hit.prim, 0, "scale {scale} offset {offset}");
+                let closest = bvh.closest(&ray, Skip::NOTHING).unwrap();
+                by_rounding += u32::from(closest.prim != 0);
+            }
+        }
+    }
+    assert!(rays > 7000 && by_rounding > 1000, "{by_rounding} of {rays}");
+    // A gap is a gap.
+    let sheet = |z: f64| [vec3(-1.0, -1.0, z), vec3(1.0, -1.0, z), vec3(0.0, 1.0, z)];
+    let bvh = TriangleBvh::build(&[sheet(0.0), sheet(1e-12)]).unwrap();
+    let ray = Ray::new(vec3(0.1, 0.0, 2.0), vec3(0.01, 0.02, -1.0));
+    assert_eq!(bvh.foremost(&ray, Skip::NOTHING).unwrap().prim, 1);
+}

@@ -26,6 +26,9 @@ pub enum Cause {
         /// Velocities given.
         found: usize,
     },
+    /// A vertex normal and what is added to it cancel.
+    #[error("a vertex normal would have no length")]
+    NoDirection,
     /// Normals are to turn of a mesh that has none.
     #[error("the mesh has no vertex normals to turn")]
     NoNormals,

@@ -2,13 +2,18 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use drt_estimators::{Agreement, Depth, PathSampling, Session, Settings, Unattended, agreement};
+use drt_estimators::surface::{Bsdf, Diffuse, TwoSided};
+use drt_estimators::{
+    Agreement, Depth, EstimatorKind, PathSampling, Session, Settings, Unattended, agreement,
+};
 use drt_geom::Mesh;
 use drt_geom::procedural::{cube, rectangle};
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_medium::{Homogeneous, Phase};
+use drt_motion::{Change, Effect, GeometryChange};
 use drt_tests::Result;
-use drt_tests::matrix::Set;
+use drt_tests::matrix::estimators::{Effort, Pairs, compare};
+use drt_tests::matrix::{Cell, Set, Stage};
 
 /// Everything is turned, so that no coordinate of a plane is exact.
 fn askew(mesh: &Mesh, size: Vec3, about: Option<(Vec3, f64)>, at: Vec3) -> Mesh {
@@ -22,20 +27,28 @@ fn turned(x: Vec3) -> Vec3 {
     Mat3::rotation(vec3(0.36, 0.48, 0.8), 0.7) * x + vec3(0.3, -0.2, 0.1)
 }
 
-fn white() -> drt_estimators::surface::Bsdf {
+fn white() -> Bsdf {
     let reflectance = Rgb::new(0.7, 0.5, 0.4);
-    drt_estimators::surface::Bsdf::Diffuse(drt_estimators::surface::Diffuse { reflectance })
+    Bsdf::Diffuse(Diffuse { reflectance })
+}
+
+fn two_sided(front: Bsdf) -> Bsdf {
+    Bsdf::TwoSided(Box::new(TwoSided { front, back: None }))
 }
 
 fn fog() -> Result<Homogeneous> {
     Ok(Homogeneous::new(Rgb::new(0.8, 1.0, 1.2), Rgb::new(0.9, 0.8, 0.7), Rgb::ZERO)?)
 }
 
-/// A floor, a body on it and a lamp above.
+/// A floor and a body on it, seen from beside.
 fn floor_and_lamp(depth: u32) -> Result<Set> {
+    floor_seen_from(vec3(-0.3, 1.5, -2.4), depth)
+}
+
+fn floor_seen_from(eye: Vec3, depth: u32) -> Result<Set> {
     let floor = askew(&rectangle(), vec3(2.0, 2.0, 1.0), Some((Vec3::X, -FRAC_PI_2)), Vec3::ZERO);
     let body = askew(&cube(), vec3(0.3, 0.25, 0.3), Some((Vec3::Y, 0.5)), vec3(0.1, 0.25, 0.0));
-    Ok(Set::new(turned(vec3(-0.3, 1.5, -2.4)), turned(vec3(0.1, 0.25, 0.0)), 40.0, depth)?
+    Ok(Set::new(turned(eye), turned(vec3(0.1, 0.25, 0.0)), 40.0, depth)?
         .shape("floor", floor, white())
         .shape("body", body, white()))
 }
@@ -100,6 +113,18 @@ fn boxes_of_fog_share_a_face() -> Result<()> {
         let found = compared(&lamp(halves, 2.2), &one, CAMERA)?;
         assert!(found.agrees, "rms z {} max z {}", found.rms_z, found.max_z);
     }
+    // From inside either of them.
+    for eye in [-0.5, 0.5].map(|x| vec3(x, 0.8, -1.0)) {
+        let whole = askew(&cube(), vec3(1.4, 0.7, 1.4), None, vec3(0.0, 0.75, 0.0));
+        let one = floor_seen_from(eye, 3)?.medium("fog", fog()?, Phase::henyey_greenstein(0.3)?);
+        let one = lamp(one.interface("border", whole, "fog", None), 2.2);
+        for order in [[-0.7, 0.7], [0.7, -0.7]] {
+            let halves =
+                side(order[1], "right", side(order[0], "left", floor_seen_from(eye, 3)?)?)?;
+            let found = compared(&lamp(halves, 2.2), &one, CAMERA)?;
+            assert!(found.agrees, "rms z {} max z {}", found.rms_z, found.max_z);
+        }
+    }
     let half = lamp(side(-0.7, "left", floor_and_lamp(4)?)?, 2.2);
     assert!(!compared(&half, &one, CAMERA)?.agrees, "half of the fog is not missed");
     Ok(())
@@ -129,6 +154,34 @@ fn lamps_lie_in_other_surfaces() -> Result<()> {
     for sampling in [CAMERA, [PathSampling::Bidirectional; 2]] {
         let found = compared(&foggy(2.2)?, &foggy(2.2 - 1e-6)?, sampling)?;
         assert!(found.agrees, "rms z {} max z {}", found.rms_z, found.max_z);
+    }
+    Ok(())
+}
+
+/// A lamp that slides in a ceiling's plane covers what is there, whichever way the ceiling faces.
+#[test]
+fn lamps_slide_in_ceilings() -> Result<()> {
+    for angle in [FRAC_PI_2, -FRAC_PI_2] {
+        let at = vec3(0.0, 2.2, 0.0);
+        let ceiling = askew(&rectangle(), vec3(2.0, 2.0, 1.0), Some((Vec3::X, angle)), at);
+        let two_sided = two_sided(white());
+        let set = floor_seen_from(vec3(-0.3, 0.6, -2.4), 2)?;
+        let eye = [vec3(-0.3, 0.3, -2.4), vec3(0.2, 2.0, 0.3)].map(turned);
+        let view = Set::new(eye[0], eye[1], 50.0, 2)?.scene.sensors;
+        let mut scene = lamp(set.shape("ceiling", ceiling, two_sided), 2.2).scene;
+        scene.sensors = view;
+        let slide = turned(vec3(0.7, 0.0, 0.4)) - turned(Vec3::ZERO);
+        let effect = Effect {
+            target: "lamp".into(),
+            change: Change::Geometry(GeometryChange::Translate(slide)),
+        };
+        let stage =
+            Stage::new("lamp in a ceiling", scene, vec![Cell::new("lamp slides", [effect])]);
+        let effort = Effort { noise: 0.03, scale: 0.0, seconds: 1.0, seed: 0 };
+        let methods = [EstimatorKind::Radiative.into(), EstimatorKind::Warped.into()];
+        let pairs = compare(&stage, &methods, effort)?;
+        println!("{}", Pairs(&pairs));
+        assert!(pairs.len() == 2 && pairs.iter().all(|pair| pair.passes()));
     }
     Ok(())
 }

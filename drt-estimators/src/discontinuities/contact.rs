@@ -85,10 +85,12 @@ pub(crate) struct Contact {
     wedge: [f64; 2],
     /// The floor along `side` and against it, where it goes on.
     floor: [Option<Vertex>; 2],
+    /// A sheet lies in the floor's plane, and covers it from either side.
+    pub(crate) two_sided: bool,
 }
 
 /// The surface right at a point of an edge that a ray along the unit vector `down` finds.
-fn floor_along(world: &World, at: &EdgePoint<'_>, down: Vec3) -> Option<(SurfacePoint, Vec3)> {
+fn surface_under(world: &World, at: &EdgePoint<'_>, down: Vec3) -> Option<(SurfacePoint, Vec3)> {
     let wedge = &at.edge.wedge;
     let gap = GAP * wedge.length;
     let ray = Ray { origin: at.x - down * gap, dir: down, t_max: 2.0 * gap };
@@ -106,7 +108,7 @@ fn plane_of_sheet(world: &World, at: &EdgePoint<'_>) -> Option<(SurfacePoint, Ve
     if wedge.across[1].dot(across) < 1.0 - FLAT {
         return None;
     }
-    let (below, x) = floor_along(world, at, across.cross(wedge.tangent).normalize())?;
+    let (below, x) = surface_under(world, at, across.cross(wedge.tangent).normalize())?;
     let rounding = 64.0 * f64::EPSILON * (at.x.length() + wedge.length);
     let coincides = (x - at.x).length() <= rounding && Real::abs(below.ng.dot(across)) <= FLAT;
     // Of surfaces that coincide the one with the lower number is met.
@@ -122,7 +124,8 @@ impl Contact {
         let (sine, cosine) = fm::sin_cos(0.5 * angle);
         let medium = at.edge.medium(world, at.x + (side * cosine + up * sine) * beside);
         let vertex = Vertex { x, medium, kind: Kind::Surface(point) };
-        Self { up, side, wedge: [angle, PI], floor: [Some(vertex), None] }
+        let floor = [Some(vertex), None];
+        Self { up, side, wedge: [angle, PI], floor, two_sided: false }
     }
 
     /// What the edge rests on at a point of it; `None` nearly everywhere.
@@ -134,14 +137,14 @@ impl Contact {
         let inward = e.wedge.inward()?;
         let gap = GAP * e.wedge.length;
         let skip = Skip::two(e.wedge.faces[0], e.wedge.faces[1]);
-        let (below, x, up) = match floor_along(world, at, -inward) {
+        let (below, x, up, two_sided) = match surface_under(world, at, -inward) {
             Some((below, x)) => {
                 let up = if below.ng.dot(inward) > 0.0 { below.ng } else { -below.ng };
-                (below, x, up)
+                (below, x, up, false)
             }
             None => {
                 let (below, x) = plane_of_sheet(world, at)?;
-                (below, x, below.ng)
+                (below, x, below.ng, true)
             }
         };
         let side = e.wedge.tangent.cross(up).normalize();
@@ -167,7 +170,26 @@ impl Contact {
         let floor =
             [open[0].then(|| beside(side)).flatten(), open[1].then(|| beside(-side)).flatten()];
         // Without a floor outside, it is another's edge that this one meets.
-        (floor[0].is_some() || floor[1].is_some()).then_some(Self { up, side, wedge, floor })
+        let any = floor[0].is_some() || floor[1].is_some();
+        any.then_some(Self { up, side, wedge, floor, two_sided })
+    }
+
+    /// The same contact from the other side of the floor.
+    pub(crate) fn turned_over(&self, world: &World) -> Self {
+        let below = |v: &Vertex| {
+            let front = v.surface().is_some_and(|s| s.ng.dot(self.up) < 0.0);
+            let medium = v.surface().and_then(|s| world.medium_on_side(s, front, v.medium));
+            Vertex { medium, ..*v }
+        };
+        let [along, against] = [0, 1].map(|k| self.floor[k].as_ref().map(below));
+        let [low, high] = self.wedge;
+        Self {
+            up: -self.up,
+            side: -self.side,
+            wedge: [PI - high, PI - low],
+            floor: [against, along],
+            two_sided: self.two_sided,
+        }
     }
 
     /// True when an edge rests on something somewhere.

@@ -21,6 +21,8 @@ pub(crate) struct Prim {
 #[derive(Debug)]
 pub(crate) struct Geometry {
     meshes: Vec<Arc<Mesh>>,
+    /// Which shapes emit: their triangles have the lowest numbers.
+    emitting: Vec<bool>,
     instances: Vec<Instance>,
     pub(crate) bvh: InstancedBvh,
     /// The triangles that are no instances. Those of instances come after them, and are not listed.
@@ -98,8 +100,19 @@ impl Geometry {
             false => ((bounds.min + bounds.max) * 0.5, bounds.extent().length() * 0.5),
         };
         let meshes = scene.shapes.iter().map(|s| s.mesh.clone()).collect();
+        let emitting = scene.shapes.iter().map(|s| s.emitter.is_some()).collect();
         let instances = scene.instances.clone();
-        Ok(Arc::new(Self { meshes, instances, bvh, prims, placed, first_prim, center, radius }))
+        Ok(Arc::new(Self {
+            meshes,
+            emitting,
+            instances,
+            bvh,
+            prims,
+            placed,
+            first_prim,
+            center,
+            radius,
+        }))
     }
 
     fn is_of(&self, scene: &Scene) -> bool {
@@ -107,6 +120,7 @@ impl Geometry {
         self.meshes.len() == scene.shapes.len()
             && self.instances == scene.instances
             && self.meshes.iter().zip(&scene.shapes).all(same)
+            && self.emitting.iter().zip(&scene.shapes).all(|(e, s)| *e == s.emitter.is_some())
     }
 
     /// A triangle, whether of an instance or not.

@@ -15,6 +15,9 @@ use crate::model::scene::{Scene, Shape};
 use crate::world::World;
 use crate::world::vertex::SurfacePoint;
 
+/// How far off an emitter's plane a point must be to see it, over the coordinates of both: what rounding adds to that distance.
+const IN_PLANE: f64 = 32.0 * f64::EPSILON;
+
 /// The emitters whose light is looked at. Light adds up, so that an estimator may leave some of it to
 /// another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -401,6 +404,11 @@ impl LightTable {
         let Entry::Triangle { emitter, .. } = choice.entry else { return None };
         let (point, y) = self.point_of(world, choice, rng)?;
         let d = y - x;
+        // A point in the emitter's plane, as those of a ceiling in which a lamp lies, sees nothing of it; rounding would give it a
+        // cosine of that size, and derivatives one over it.
+        if -point.ng.dot(d) <= IN_PLANE * (x.max_abs() + y.max_abs()) {
+            return None;
+        }
         let distance = d.length();
         let w = d / distance;
         let pdf = self.area_pdf(&point, w, distance);

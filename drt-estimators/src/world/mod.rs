@@ -570,17 +570,26 @@ impl World {
         }
     }
 
-    /// The side of the first surface that bounds media from `x` on along `dir`.
+    /// The side of the first surface that bounds media from `x` on along `dir`; of several that coincide, of one that a ray leaves.
     fn first_boundary(&self, x: Vec3, dir: Vec3) -> Option<(SurfacePoint, bool)> {
         let ray = Ray { origin: x, dir, t_max: f64::INFINITY };
         let bounds = |prim: u32| {
             let shape = self.geometry.prim(prim).shape as usize;
             self.scene.shapes[shape].boundary.is_some()
         };
-        let hit =
-            self.geometry.bvh.closest_through(&ray, Skip::NOTHING, bounds, &mut Vec::new())?;
-        let (point, _) = self.point(hit.prim, hit.bary);
-        Some((point, point.ng.dot(dir) < 0.0))
+        let bvh = &self.geometry.bvh;
+        let mut hits = Vec::new();
+        let first = bvh.closest_through(&ray, Skip::NOTHING, bounds, &mut hits)?;
+        let side = |hit: &Hit| {
+            let (point, _) = self.point(hit.prim, hit.bary);
+            (point, point.ng.dot(dir) < 0.0)
+        };
+        // Up to a little beyond it.
+        let ray = Ray { t_max: first.t * (1.0 + 1e-5), ..ray };
+        bvh.crossings(&ray, Skip::NOTHING, |_| false, &mut hits);
+        let coincides = |hit: &&Hit| bounds(hit.prim) && self.coincide(&ray, &first, hit);
+        let left = hits.iter().filter(coincides).map(side).find(|(_, front)| !front);
+        Some(left.unwrap_or_else(|| side(&first)))
     }
 
     /// The medium around a point off all surfaces: that on the near side of the first interface

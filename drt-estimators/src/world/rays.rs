@@ -11,9 +11,6 @@ use crate::world::geometry::Prim;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{Crossing, RayPath, World, intervals};
 
-/// How near hits are that may be on surfaces that coincide, relative to their distance.
-const NEARLY: f64 = 1e-6;
-
 impl World {
     fn skip_of(v: &Vertex) -> Skip {
         match &v.kind {
@@ -110,18 +107,13 @@ impl World {
     /// Takes away the hits on interfaces that coincide with the surface on which a ray ends: they lie beyond it, from whichever
     /// side the ray comes, as they do for rays that start on that surface. So fog that stands on a floor begins at the floor.
     fn leave_beyond(&self, ray: &Ray, end: &Hit, hits: &mut Vec<Hit>) {
-        while let Some(last) = hits.last()
-            && end.t - last.t <= NEARLY * end.t
-            && self.coincide(ray, end, last)
-        {
-            hits.pop();
-        }
+        hits.retain(|hit| !(hit.is_near(end) && self.coincide(ray, end, hit)));
     }
 
     /// Whether two triangles coincide where a ray meets them.
     #[cold]
-    fn coincide(&self, ray: &Ray, a: &Hit, b: &Hit) -> bool {
-        coincide(ray, a, self.corners(a.prim), self.corners(b.prim))
+    pub(super) fn coincide(&self, ray: &Ray, a: &Hit, b: &Hit) -> bool {
+        coincide(ray, (a, self.corners(a.prim)), (b, self.corners(b.prim)))
     }
 
     /// The corners of a triangle in the world.
@@ -139,9 +131,8 @@ impl World {
     #[cold]
     fn order_coincident(&self, hits: &mut [Hit], ray: &Ray, mut medium: Option<usize>) {
         for i in 0..hits.len() {
-            let near = |hit: &&Hit| hit.t - hits[i].t <= NEARLY * hit.t;
-            let same = hits[i + 1..].iter().take_while(near);
-            let same = same.take_while(|hit| self.coincide(ray, &hits[i], hit)).count();
+            let coincides = |hit: &&Hit| self.coincide(ray, &hits[i], hit);
+            let same = hits[i + 1..].iter().take_while(coincides).count();
             let sides = |hit: &Hit| {
                 let (point, _) = self.point(hit.prim, hit.bary);
                 let out = point.ng.dot(ray.dir) > 0.0;
@@ -158,7 +149,7 @@ impl World {
 
     /// Crosses the interfaces that a path's hits are on.
     fn cross(&self, path: &mut RayPath, ray: &Ray, mut medium: Option<usize>) {
-        if path.hits.windows(2).any(|h| h[1].t - h[0].t <= NEARLY * h[1].t) {
+        if path.hits.windows(2).any(|h| h[0].is_near(&h[1])) {
             self.order_coincident(&mut path.hits, ray, medium);
         }
         for hit in &path.hits {

@@ -108,8 +108,8 @@ impl TriangleBvh {
         best.map(|(_, prim, crossing)| hit(prim, &crossing))
     }
 
-    /// The first hit along a ray, of which rounding does not decide: of hits that [coincide] with the closest one, that on the triangle
-    /// with the lowest number.
+    /// The first hit along a ray, chosen so that rounding does not decide: among the hits that [coincide] with the nearest one it is
+    /// that on the triangle with the lowest number.
     #[must_use]
     pub fn foremost(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
         let probe = self.probe(ray, skip)?;

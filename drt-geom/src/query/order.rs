@@ -76,12 +76,34 @@ impl Foremost {
 
     #[cold]
     fn lowest(&self, ray: &Ray, nearest: &Met) -> Hit {
+        let place = |met: &Met| (met.hit(), met.corners.map(Vec3::from));
+        let (first, of_first) = place(nearest);
         let coincides = |met: &&Met| {
-            lies_in_plane(ray, &met.hit(), &met.corners, &nearest.corners)
-                && lies_in_plane(ray, &nearest.hit(), &nearest.corners, &met.corners)
+            let (hit, corners) = place(met);
+            coincide(ray, (&first, of_first), (&hit, corners))
         };
         let others = self.near.iter().filter(coincides);
         others.fold(nearest, |first, met| if met.prim < first.prim { met } else { first }).hit()
+    }
+}
+
+/// Whether a ray meets two triangles at one and the same distance, as far as the rounding of coordinates and of distances along the
+/// ray lets one tell: each hit lies in the plane of the other's triangle.
+#[must_use]
+pub fn coincide(ray: &Ray, a: (&Hit, [Vec3; 3]), b: (&Hit, [Vec3; 3])) -> bool {
+    let corners = |triangle: [Vec3; 3]| triangle.map(|v| v.to_array());
+    let [of_a, of_b] = [corners(a.1), corners(b.1)];
+    a.0.is_near(b.0)
+        && lies_in_plane(ray, a.0, &of_a, &of_b)
+        && lies_in_plane(ray, b.0, &of_b, &of_a)
+}
+
+impl Hit {
+    /// Whether another hit of the same ray is so near that both triangles may [coincide].
+    #[inline]
+    #[must_use]
+    pub fn is_near(&self, other: &Self) -> bool {
+        (self.t - other.t).abs() <= NEAR * self.t.max(other.t)
     }
 }
 
@@ -90,12 +112,4 @@ fn lies_in_plane(ray: &Ray, hit: &Hit, own: &Corners, other: &Corners) -> bool {
     let error = [0, 1, 2].map(|k| ALONG * (origin[k].abs() + (hit.t * dir[k]).abs()));
     let point = hit.point(own.map(Vec3::from));
     End::with_error(point.to_array(), error).lies_in_plane(other)
-}
-
-/// Whether the triangle `other` is met as far along the ray as its `hit` on the triangle `own`, as far as rounding lets one tell.
-///
-/// The ray must pass through the other triangle's outline; only distances are compared.
-#[must_use]
-pub fn coincide(ray: &Ray, hit: &Hit, own: [Vec3; 3], other: [Vec3; 3]) -> bool {
-    lies_in_plane(ray, hit, &own.map(|v| v.to_array()), &other.map(|v| v.to_array()))
 }

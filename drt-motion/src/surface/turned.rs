@@ -51,8 +51,11 @@ impl TurnedNormals {
                 *rate += vector;
                 *sum += vector * c.theta;
             }
-            let usable = turned.sums.iter().all(|n| n.is_finite() && n.length() > 0.0);
-            finite(usable, "a vertex normal").map_err(|cause| c.error(cause))?;
+            let all_finite = turned.sums.iter().all(|n| n.is_finite());
+            finite(all_finite, "a vertex normal").map_err(|cause| c.error(cause))?;
+            if turned.sums.iter().any(|n| n.length() == 0.0) {
+                return Err(c.error(Cause::NoDirection));
+            }
         }
         Ok(turned)
     }
@@ -70,10 +73,15 @@ impl TurnedNormals {
         }
         let [a, b, c] = linear.cols;
         let cofactors = Mat3 { cols: [b.cross(c), c.cross(a), a.cross(b)] };
+        // As a mesh turns its normals: mirrored ones point to the same side of the surface.
+        let side = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
         let rate = |(sum, rate): (&Vec3, &Vec3)| {
             let carried = cofactors * *sum;
             let length = carried.length();
-            (cofactors * *rate).reject(carried / length) / length
+            if length == 0.0 {
+                return Vec3::ZERO;
+            }
+            (cofactors * *rate).reject(carried / length) * (side / length)
         };
         Some(self.sums.iter().zip(own).map(rate).collect())
     }

@@ -5,8 +5,8 @@ use drt_math::{Real, fm};
 
 use crate::model::filter::{Filter, FilterKind, ON_BORDER};
 
-/// The factors p of one axis for neighbouring pixels, from left to right, and their derivatives by the offset. Has no end. At a jump,
-/// the mean of both sides.
+/// The factors p of one axis for neighbouring pixels, from left to right, and their derivatives by the offset. It never ends. Where the
+/// filter jumps, the factor is the mean of both sides.
 ///
 /// A Gaussian's g(x) takes no exponential for each: g(x - 1) = g(x) r(x) with r(x) = exp((2x - 1) / 2σ²), and
 /// r(x - 1) = r(x) exp(-1/σ²). Rounding adds up to 10⁻¹¹ of a value over the widest filter.

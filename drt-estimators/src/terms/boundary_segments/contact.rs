@@ -22,6 +22,8 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
     ) -> Option<()> {
         let world = self.tracer.world;
         let (w, distance) = c.towards(|x| camera.eye_of(x))?;
+        let over = c.two_sided && w.dot(c.up) < 0.0;
+        let c = &if over { c.turned_over(world) } else { *c };
         let (s, start) = self.contact(at, c, w)?;
         let transport = seen(camera, &start)?;
         let tau = self.open(&start, w, distance)?;
@@ -73,6 +75,9 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
     /// Another vertex sees the floor.
     pub(super) fn contact_with_others(&mut self, at: &EdgePoint<'_>, c: &Contact) -> Option<()> {
         let world = self.tracer.world;
+        let over = c.two_sided && self.tracer.rng.next_f64() < 0.5;
+        let c = &if over { c.turned_over(world) } else { *c };
+        let sides = if c.two_sided { 2.0 } else { 1.0 };
         let u = self.tracer.rng.next_2d();
         let w = Frame::from_normal(c.up).to_world(warp::cosine_hemisphere(u));
         let (s, start) = self.contact(at, c, w)?;
@@ -84,7 +89,7 @@ impl<R: BoundarySink> Sampler<'_, '_, R> {
         for (d, only_camera) in beyond.into_iter().flatten() {
             // The density of w is cos θ / π. What the floor emits no shadow in a medium has: of a point of its plane the edge's
             // is that plane.
-            self.deliver(&d, only_camera, false, w, Rgb::splat(PI * at.inv_pdf));
+            self.deliver(&d, only_camera, false, w, Rgb::splat(PI * at.inv_pdf * sides));
         }
         Some(())
     }
