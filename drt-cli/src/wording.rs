@@ -2,7 +2,7 @@
 
 /// Most characters of a word that are shown.
 const LONGEST: usize = 200;
-/// Digits and points of a number that nobody wants to read, and more.
+/// Numbers with more digits than this are shown as powers of ten.
 const LONG_NUMBER: usize = 24;
 
 /// A message with quoted words and others cut to a length that can be read, without characters that steer a terminal, and

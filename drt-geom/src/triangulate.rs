@@ -136,8 +136,9 @@ type Faces = ConstrainedDelaunayTriangulation<Corner>;
 
 /// How often the polygon winds around each face, by the face's number.
 ///
-/// From one face to the next that is the same, but where edges of the polygon lie between them. What cannot be reached
-/// from outside across edges of which it is known by how much it changes is found by itself.
+/// Two faces that share an edge have the same number unless the polygon runs along that edge, so numbers are carried from
+/// the outer face inward. Where a piece of the polygon passes through another of its corners, it is not known how much
+/// the number changes there, and one face beyond is computed from its centre.
 fn windings(faces: &Faces, p: &[[f64; 2]]) -> Vec<i32> {
     let changes = changes(faces, p);
     let mut winds = alloc::vec![None; faces.num_all_faces()];

@@ -93,7 +93,7 @@ impl Bounds {
     /// The cells a ray crosses, in order, as pieces of the field times `scale`.
     ///
     /// Where a cell's bounds are so far apart that most collisions in it would be null ones, it is cut up where the
-    /// interpolation between values changes, so that what is empty beside something very dense costs nothing.
+    /// interpolation between values changes, so that what is empty beside something very dense costs little.
     #[inline(always)]
     pub(crate) fn walk(
         &self,
@@ -105,12 +105,29 @@ impl Bounds {
         let Some((enter, exit)) = clip_to_box(grid, ray) else { return };
         let origin = grid.from_world().point(ray.origin);
         let dir = grid.from_world().vector(ray.dir);
+        let mut cutter = Cutter { grid, scale, ray: [origin, dir], left: Cutter::HALVINGS };
         let _ = march([origin, dir], self.size, [enter, exit], |[x, y, z], [start, end]| {
             let r = &self.cells[(z * self.size[1] + y) * self.size[0] + x];
             if r.is_loose(scale, [start, end]) {
-                return cut(grid, scale, [origin, dir], [start, end], visit);
+                return cutter.cut([start, end], visit);
             }
             visit(&r.piece(scale, [start, end]))
+        });
+    }
+
+    /// The cells of [`walk`](Self::walk), none of which is cut up: for what needs no bounds, only means.
+    pub(crate) fn walk_whole(
+        &self,
+        grid: &Grid,
+        scale: f64,
+        ray: &Ray,
+        visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
+    ) {
+        let Some(part) = clip_to_box(grid, ray) else { return };
+        let origin = grid.from_world().point(ray.origin);
+        let dir = grid.from_world().vector(ray.dir);
+        let _ = march([origin, dir], self.size, part.into(), |[x, y, z], part| {
+            visit(&self.cells[(z * self.size[1] + y) * self.size[0] + x].piece(scale, part))
         });
     }
 }
@@ -134,7 +151,8 @@ impl Range {
         (self.max - self.min).max_channel() * scale * (end - start) > Bounds::LOOSE
     }
 
-    /// What rounding may add to interpolated values is added, but nothing beyond the values between which they are.
+    /// The range widened by what rounding may add to interpolated values, and cut to the range `o` of the voxels that
+    /// they lie between.
     fn within(self, o: &Self) -> Self {
         const ROUNDING: f64 = 1e-12;
         Self {
@@ -157,54 +175,70 @@ impl Range {
     }
 }
 
-/// Visits part of a ray, given by origin and direction, in pieces on each of which the field is interpolated between the same
-/// values, and in parts of these where it changes much.
-#[cold]
-fn cut(
-    grid: &Grid,
+/// Cuts up what of one ray is in cells with loose bounds.
+struct Cutter<'a> {
+    grid: &'a Grid,
     scale: f64,
+    /// Origin and direction in the grid's unit cube.
     ray: [Vec3; 2],
-    part: [f64; 2],
-    visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
-) -> ControlFlow<()> {
-    // Values are at the ends or in the middle of intervals.
-    let size = grid.axes().each_ref().map(|axis| 2 * axis.intervals());
-    march(ray, size, part, |cell, part| {
-        let middle = [0, 1, 2].map(|k| (cell[k] as f64 + 0.5) / size[k] as f64);
-        let seen = Cell::new(grid.axes(), middle.into()).voxels();
-        let range = Range::of(seen.into_iter().map(|voxel| grid.voxel(voxel)));
-        halve(grid, scale, ray, part, &range, HALVINGS, visit)
-    })
+    /// So many more pieces may be halved.
+    left: u32,
 }
 
-/// So often a piece is halved at most: then it is as short as a rounding of where it is.
-const HALVINGS: u32 = 48;
+impl Cutter<'_> {
+    /// Pieces of one ray that are halved at most. Estimates end where nothing gets through any more, after some tens of
+    /// halvings; a ray that is not stopped, since a channel is empty or values are negative, must end as well.
+    const HALVINGS: u32 = 1024;
+    /// So often a piece is halved at most: then it is as short as a rounding of where it is. Few halvings lead there,
+    /// since the first pieces of a steep rise are visited first, and light that enters it does not reach the others.
+    const DEPTH: u32 = 48;
 
-/// Visits a piece of a ray, in halves where its bounds are too far apart.
-fn halve(
-    grid: &Grid,
-    scale: f64,
-    [origin, dir]: [Vec3; 2],
-    [start, end]: [f64; 2],
-    range: &Range,
-    left: u32,
-    visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
-) -> ControlFlow<()> {
-    if left == 0 || !range.is_loose(scale, [start, end]) || grid.filter() == Filter::Nearest {
-        return visit(&range.piece(scale, [start, end]));
+    /// Visits part of the ray in pieces on each of which the field is interpolated between the same values, and in parts
+    /// of these where it changes much.
+    #[cold]
+    fn cut(
+        &mut self,
+        part: [f64; 2],
+        visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let axes = self.grid.axes();
+        // Values are at the ends or in the middle of intervals.
+        let size = axes.each_ref().map(|axis| 2 * axis.intervals());
+        march(self.ray, size, part, |cell, part| {
+            let middle = [0, 1, 2].map(|k| (cell[k] as f64 + 0.5) / size[k] as f64);
+            let seen = Cell::new(axes, middle.into()).voxels();
+            let range = Range::of(seen.into_iter().map(|voxel| self.grid.voxel(voxel)));
+            self.halve(part, &range, Self::DEPTH, visit)
+        })
     }
-    let middle = 0.5 * (start + end);
-    for part in [[start, middle], [middle, end]] {
-        // What is linear along each axis is largest and smallest at the corners of a box.
-        let ends = part.map(|t| origin + dir * t);
-        let corners = (0..8_usize).map(|n| {
-            let pick = |k: usize| ends[n >> k & 1][k].clamp(0.0, 1.0);
-            grid.value_at_unit(vec3(pick(0), pick(1), pick(2)))
-        });
-        let range = Range::of(corners).within(range);
-        halve(grid, scale, [origin, dir], part, &range, left - 1, visit)?;
+
+    /// Visits a piece in halves where its bounds are too far apart.
+    fn halve(
+        &mut self,
+        [start, end]: [f64; 2],
+        range: &Range,
+        depth: u32,
+        visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let may = depth > 0 && self.left > 0 && self.grid.filter() != Filter::Nearest;
+        if !(may && range.is_loose(self.scale, [start, end])) {
+            return visit(&range.piece(self.scale, [start, end]));
+        }
+        self.left -= 1;
+        let [origin, dir] = self.ray;
+        let middle = 0.5 * (start + end);
+        for part in [[start, middle], [middle, end]] {
+            // What is linear along each axis is largest and smallest at the corners of a box.
+            let ends = part.map(|t| origin + dir * t);
+            let corners = (0..8_usize).map(|n| {
+                let pick = |k: usize| ends[n >> k & 1][k].clamp(0.0, 1.0);
+                self.grid.value_at_unit(vec3(pick(0), pick(1), pick(2)))
+            });
+            let range = Range::of(corners).within(range);
+            self.halve(part, &range, depth - 1, visit)?;
+        }
+        ControlFlow::Continue(())
     }
-    ControlFlow::Continue(())
 }
 
 /// Visits the cells of a grid on the unit cube that part of a ray crosses, in order, with the part that is in each.

@@ -133,6 +133,18 @@ impl DensityField for DeformedGrid {
         });
     }
 
+    fn means(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>) {
+        self.map.stretches(ray, &mut |start, end, map| {
+            let mut flow = ControlFlow::Continue(());
+            self.grids.means(&seen_from(ray, start, end, map), &mut |piece| {
+                let (start, end) = (start + piece.start, start + piece.end);
+                flow = visit(&Piece { start, end, ..*piece });
+                flow
+            });
+            flow
+        });
+    }
+
     fn covered(&self, ray: &Ray) -> Option<(f64, f64)> {
         let mut covered: Option<(f64, f64)> = None;
         self.map.stretches(ray, &mut |start, end, map| {

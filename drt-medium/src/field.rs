@@ -68,6 +68,12 @@ pub trait DensityField: Debug + Send + Sync {
     /// a bound must hold on the whole piece.
     fn pieces(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>);
 
+    /// Shows stretches that cover the ray's [`pieces`](Self::pieces) in the same way, of which only the ends and the means
+    /// are used. These may be longer where bounds need short pieces and means do not.
+    fn means(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>) {
+        self.pieces(ray, visit);
+    }
+
     /// From where to where the ray's pieces reach; `None` without any.
     fn covered(&self, ray: &Ray) -> Option<(f64, f64)> {
         let mut covered: Option<(f64, f64)> = None;

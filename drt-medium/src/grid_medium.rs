@@ -243,6 +243,10 @@ impl DensityField for GridMedium {
         self.bounds.walk(&self.density, self.scale, ray, visit);
     }
 
+    fn means(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>) {
+        self.bounds.walk_whole(&self.density, self.scale, ray, visit);
+    }
+
     fn covered(&self, ray: &Ray) -> Option<(f64, f64)> {
         clip_to_box(&self.density, ray)
     }

@@ -95,7 +95,7 @@ impl Medium {
             Property::SigmaT => check(property, coefficients.sigma_t),
             Property::Albedo => check(property, coefficients.albedo),
             Property::Emission => check(property, coefficients.emission),
-            // There is no phase function with another one.
+            // A phase function checks its own g when it is made.
             Property::G => Ok(()),
         }
     }

@@ -130,7 +130,11 @@ pub fn transmittance<F: DensityField + ?Sized>(
         let length = piece.end - piece.start;
         // An empty channel of an infinite piece: 0 × inf.
         control += piece.minorant.map(|m| if m == 0.0 { 0.0 } else { m * length });
-        let residual = (piece.majorant - piece.minorant).max_channel();
+        weight = zip(weight, control, |w, c| if c > DEEPEST { 0.0 } else { w });
+        // Channels of which nothing is left need no collisions.
+        let gap =
+            zip(piece.majorant - piece.minorant, weight, |g, w| if w == 0.0 { 0.0 } else { g });
+        let residual = gap.max_channel();
         let mut t = piece.start;
         while let Some(next) = next_collision(t, piece.end, residual, &mut depth) {
             t = next;
@@ -143,6 +147,9 @@ pub fn transmittance<F: DensityField + ?Sized>(
     });
     weight * (-control).exp()
 }
+
+/// Optical depth through which nothing gets that an `f64` can hold: its exponential is zero.
+const DEEPEST: f64 = 746.0;
 
 /// Points and weights for an unbiased estimate of `∫ h(t) dt` over the parts of the ray that the
 /// field covers: `sum w_i h(t_i)`. One random point in each of equal strata; their number grows
@@ -183,7 +190,7 @@ pub fn approximate_pdf<F: DensityField + ?Sized>(
     let floor = if defensive > 0.0 { defensive * field.majorant_floor() } else { 0.0 };
     let mut depth = Rgb::ZERO;
     let mut rate = Rgb::ZERO;
-    field.pieces(ray, &mut |piece| {
+    field.means(ray, &mut |piece| {
         if piece.start > t {
             return ControlFlow::Break(());
         }

@@ -231,7 +231,7 @@ impl SceneFiles {
     }
 }
 
-/// Of what stands directly in a scene and has no id, the name is its id.
+/// Gives a thing that stands directly in a scene its name as its id where it has no id.
 fn name_as_id(node: Node<'_, '_>, tag: &str, attributes: &mut Vec<(String, String)>) {
     let in_scene = node.parent_element().is_some_and(|parent| parent.has_tag_name("scene"));
     let is_thing = in_scene && !["default", "path", "include", "alias"].contains(&tag);

@@ -77,7 +77,7 @@ impl Tail {
         )
     }
 
-    /// That of the sum with an independent estimate.
+    /// The tail of the sum of two independent estimates.
     #[must_use]
     pub fn plus(&self, o: &Self) -> Self {
         Self {

@@ -24,8 +24,9 @@ use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
 
 /// Differences of the image by each parameter, in the order of `parameters`: those of the images at value ± `step`, over
-/// 2 `step`, from `spp` samples per pixel of each. Where a property's range ends within a step, the images are those at the
-/// value and at one and two steps to the [one side](crate::one_sided_differences) that is left; they are of second order, too.
+/// 2 `step`, from `spp` samples per pixel of each. Where a property's range ends within a step, they look to the
+/// [other side](crate::one_sided_differences): by the images at the value, one step and two steps, which is of second order,
+/// or, where two steps do not fit, by the first two of these, which is of first order.
 ///
 /// All images see the same random numbers, and the standard errors are those of the difference. Their paths are
 /// from the camera, or from both ends where `settings` ask for these.

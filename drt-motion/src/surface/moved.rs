@@ -182,8 +182,8 @@ impl Field {
         }
     }
 
-    /// Ties the field to the vertices before these are moved singly by theta times a velocity that
-    /// no other parameter influences: an affine function of the position would not survive that.
+    /// Ties the field to the vertices, which are at `positions`, before they are moved singly: what is an affine function
+    /// of the position now would not be one afterwards.
     fn pin(&mut self, positions: &[Vec3]) {
         if let Self::Affine(u) = self
             && u.linear != Mat3::ZERO

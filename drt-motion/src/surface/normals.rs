@@ -62,7 +62,7 @@ impl SmoothNormals {
         self.rates_from(&self.units(mesh), mesh, velocities)
     }
 
-    /// The same from the [`units`](Self::units), which all velocities of a mesh have in common.
+    /// Computes [`rates`](Self::rates) from the [`units`](Self::units), which do not depend on the velocities.
     pub(super) fn rates_from(&self, units: &[Unit], mesh: &Mesh, velocities: &[Vec3]) -> Vec<Vec3> {
         let mut sums = vec![Vec3::ZERO; self.count];
         for t in &mesh.triangles {
