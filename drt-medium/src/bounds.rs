@@ -102,17 +102,29 @@ impl Bounds {
         ray: &Ray,
         visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
     ) {
-        let Some((enter, exit)) = clip_to_box(grid, ray) else { return };
+        let Some(part) = clip_to_box(grid, ray) else { return };
         let origin = grid.from_world().point(ray.origin);
         let dir = grid.from_world().vector(ray.dir);
-        let mut cutter = Cutter { grid, scale, ray: [origin, dir], left: Cutter::HALVINGS };
-        let _ = march([origin, dir], self.size, [enter, exit], |[x, y, z], [start, end]| {
-            let r = &self.cells[(z * self.size[1] + y) * self.size[0] + x];
-            if r.is_loose(scale, [start, end]) {
-                return cutter.cut([start, end], visit);
+        let mut cells = March::new([origin, dir], self.size, part.into());
+        let mut cutter = Cutter::new(grid, scale, [origin, dir]);
+        // One call of what visits, which is large, so that it becomes part of this loop.
+        loop {
+            let piece = if cutter.is_cutting() {
+                let Some(piece) = cutter.next() else { continue };
+                piece
+            } else {
+                let Some(([x, y, z], part)) = cells.next() else { return };
+                let range = &self.cells[(z * self.size[1] + y) * self.size[0] + x];
+                if range.is_loose(scale, part) {
+                    cutter.begin(part);
+                    continue;
+                }
+                range.piece(scale, part)
+            };
+            if visit(&piece).is_break() {
+                return;
             }
-            visit(&r.piece(scale, [start, end]))
-        });
+        }
     }
 
     /// The cells of [`walk`](Self::walk), none of which is cut up: for what needs no bounds, only means.
@@ -126,9 +138,13 @@ impl Bounds {
         let Some(part) = clip_to_box(grid, ray) else { return };
         let origin = grid.from_world().point(ray.origin);
         let dir = grid.from_world().vector(ray.dir);
-        let _ = march([origin, dir], self.size, part.into(), |[x, y, z], part| {
-            visit(&self.cells[(z * self.size[1] + y) * self.size[0] + x].piece(scale, part))
-        });
+        let mut cells = March::new([origin, dir], self.size, part.into());
+        while let Some(([x, y, z], part)) = cells.next() {
+            let range = &self.cells[(z * self.size[1] + y) * self.size[0] + x];
+            if visit(&range.piece(scale, part)).is_break() {
+                return;
+            }
+        }
     }
 }
 
@@ -175,7 +191,8 @@ impl Range {
     }
 }
 
-/// Cuts up what of one ray is in cells with loose bounds.
+/// Cuts up what of one ray is in cells with loose bounds: into pieces on each of which the field is interpolated between the same
+/// values, and halves of these where it changes much.
 struct Cutter<'a> {
     grid: &'a Grid,
     scale: f64,
@@ -183,9 +200,22 @@ struct Cutter<'a> {
     ray: [Vec3; 2],
     /// So many more pieces may be halved.
     left: u32,
+    /// Intervals between values that are still to come.
+    intervals: Option<March>,
+    /// What is to be visited before these, the next one last.
+    stack: Vec<Part>,
 }
 
-impl Cutter<'_> {
+/// A part of a ray in an interval between values.
+struct Part {
+    ends: [f64; 2],
+    /// Bounds of what it is a part of.
+    around: Range,
+    /// How often it may be halved.
+    depth: u32,
+}
+
+impl<'a> Cutter<'a> {
     /// Pieces of one ray that are halved at most. Estimates end where nothing gets through any more, after some tens of
     /// halvings; a ray that is not stopped, since a channel is empty or values are negative, must end as well.
     const HALVINGS: u32 = 1024;
@@ -193,80 +223,104 @@ impl Cutter<'_> {
     /// since the first pieces of a steep rise are visited first, and light that enters it does not reach the others.
     const DEPTH: u32 = 48;
 
-    /// Visits part of the ray in pieces on each of which the field is interpolated between the same values, and in parts
-    /// of these where it changes much.
-    #[cold]
-    fn cut(
-        &mut self,
-        part: [f64; 2],
-        visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let axes = self.grid.axes();
-        // Values are at the ends or in the middle of intervals.
-        let size = axes.each_ref().map(|axis| 2 * axis.intervals());
-        march(self.ray, size, part, |cell, part| {
-            let middle = [0, 1, 2].map(|k| (cell[k] as f64 + 0.5) / size[k] as f64);
-            let seen = Cell::new(axes, middle.into()).voxels();
-            let range = Range::of(seen.into_iter().map(|voxel| self.grid.voxel(voxel)));
-            self.halve(part, &range, Self::DEPTH, visit)
-        })
+    #[inline(always)]
+    fn new(grid: &'a Grid, scale: f64, ray: [Vec3; 2]) -> Self {
+        Self { grid, scale, ray, left: Self::HALVINGS, intervals: None, stack: Vec::new() }
     }
 
-    /// Visits a piece in halves where its bounds are too far apart.
-    fn halve(
-        &mut self,
-        [start, end]: [f64; 2],
-        range: &Range,
-        depth: u32,
-        visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let may = depth > 0 && self.left > 0 && self.grid.filter() != Filter::Nearest;
-        if !(may && range.is_loose(self.scale, [start, end])) {
-            return visit(&range.piece(self.scale, [start, end]));
+    #[inline(always)]
+    fn is_cutting(&self) -> bool {
+        self.intervals.is_some()
+    }
+
+    /// Begins with a part of the ray.
+    #[cold]
+    fn begin(&mut self, part: [f64; 2]) {
+        // Values are at the ends or in the middle of intervals.
+        let size = self.grid.axes().each_ref().map(|axis| 2 * axis.intervals());
+        self.intervals = Some(March::new(self.ray, size, part));
+    }
+
+    /// The next piece; `None` where the part of the ray ends.
+    #[cold]
+    fn next(&mut self) -> Option<Piece> {
+        loop {
+            let Some(Part { ends, around, depth }) = self.stack.pop() else {
+                let intervals = self.intervals.as_mut()?;
+                let size = intervals.size;
+                let Some((cell, ends)) = intervals.next() else {
+                    self.intervals = None;
+                    return None;
+                };
+                let middle = [0, 1, 2].map(|k| (cell[k] as f64 + 0.5) / size[k] as f64);
+                let seen = Cell::new(self.grid.axes(), middle.into()).voxels();
+                let around = Range::of(seen.into_iter().map(|voxel| self.grid.voxel(voxel)));
+                self.stack.push(Part { ends, around, depth: Self::DEPTH });
+                continue;
+            };
+            let range = if depth < Self::DEPTH { self.range(ends, &around) } else { around };
+            let may = depth > 0 && self.left > 0 && self.grid.filter() != Filter::Nearest;
+            if !(may && range.is_loose(self.scale, ends)) {
+                return Some(range.piece(self.scale, ends));
+            }
+            self.left -= 1;
+            let [start, end] = ends;
+            let middle = 0.5 * (start + end);
+            for ends in [[middle, end], [start, middle]] {
+                self.stack.push(Part { ends, around: range, depth: depth - 1 });
+            }
         }
-        self.left -= 1;
+    }
+
+    /// Bounds of the field on a part of the ray, within those `around` it.
+    fn range(&self, ends: [f64; 2], around: &Range) -> Range {
         let [origin, dir] = self.ray;
-        let middle = 0.5 * (start + end);
-        for part in [[start, middle], [middle, end]] {
-            // What is linear along each axis is largest and smallest at the corners of a box.
-            let ends = part.map(|t| origin + dir * t);
-            let corners = (0..8_usize).map(|n| {
-                let pick = |k: usize| ends[n >> k & 1][k].clamp(0.0, 1.0);
-                self.grid.value_at_unit(vec3(pick(0), pick(1), pick(2)))
-            });
-            let range = Range::of(corners).within(range);
-            self.halve(part, &range, depth - 1, visit)?;
-        }
-        ControlFlow::Continue(())
+        // What is linear along each axis is largest and smallest at the corners of a box.
+        let ends = ends.map(|t| origin + dir * t);
+        let corners = (0..8_usize).map(|n| {
+            let pick = |k: usize| ends[n >> k & 1][k].clamp(0.0, 1.0);
+            self.grid.value_at_unit(vec3(pick(0), pick(1), pick(2)))
+        });
+        Range::of(corners).within(around)
     }
 }
 
-/// Visits the cells of a grid on the unit cube that part of a ray crosses, in order, with the part that is in each.
-#[inline(always)]
-fn march(
-    [origin, dir]: [Vec3; 2],
+/// The cells of a grid on the unit cube that part of a ray crosses, in order.
+struct March {
+    axes: [Stepper; 3],
     size: [usize; 3],
-    [mut t, exit]: [f64; 2],
-    mut visit: impl FnMut([usize; 3], [f64; 2]) -> ControlFlow<()>,
-) -> ControlFlow<()> {
-    let mut axes: [Stepper; 3] =
-        core::array::from_fn(|k| Stepper::new(origin[k], dir[k], size[k], t));
-    loop {
-        let next = if axes[0].next <= axes[1].next && axes[0].next <= axes[2].next {
-            0
-        } else if axes[1].next <= axes[2].next {
-            1
-        } else {
-            2
-        };
-        let end = f64::min(axes[next].next, exit);
-        if end > t {
-            visit(axes.each_ref().map(|a| a.cell as usize), [t, end])?;
-            t = end;
+    part: [f64; 2],
+    ended: bool,
+}
+
+impl March {
+    #[inline(always)]
+    fn new([origin, dir]: [Vec3; 2], size: [usize; 3], part: [f64; 2]) -> Self {
+        let axes = core::array::from_fn(|k| Stepper::new(origin[k], dir[k], size[k], part[0]));
+        Self { axes, size, part, ended: false }
+    }
+
+    /// The next cell, and the part of the ray that is in it.
+    #[inline(always)]
+    fn next(&mut self) -> Option<([usize; 3], [f64; 2])> {
+        let Self { axes, part: [start, exit], ended, .. } = self;
+        while !*ended {
+            let next = if axes[0].next <= axes[1].next && axes[0].next <= axes[2].next {
+                0
+            } else if axes[1].next <= axes[2].next {
+                1
+            } else {
+                2
+            };
+            let (from, end) = (*start, f64::min(axes[next].next, *exit));
+            let cell = axes.each_ref().map(|a| a.cell as usize);
+            *ended = end >= *exit || !axes[next].advance();
+            if end > from {
+                *start = end;
+                return Some((cell, [from, end]));
+            }
         }
-        if end >= exit || !axes[next].advance() {
-            return ControlFlow::Continue(());
-        }
+        None
     }
 }
 
