@@ -11,7 +11,8 @@ use crate::CliError;
 /// Writes a file aside and puts it in its place when all of it is stored. An existing file is replaced in one step.
 ///
 /// On Linux the file has no name until then, so a program that is killed leaves nothing behind. Where the system
-/// or the file system has no such files, it has a name in the same folder that nobody can guess.
+/// or the file system has no such files, or refuses to name them, it has a name in the same folder that nobody can
+/// guess, `.drt-….tmp`, and a kill may leave it.
 ///
 /// # Errors
 /// When the folder or the file cannot be written, or `write` fails.
@@ -86,12 +87,17 @@ impl Draft {
         if let Some(file) = nameless(folder)? {
             return Ok(Self { file, name: None });
         }
-        let mut builder = names();
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-        let (file, name) = builder.tempfile_in(folder)?.into_parts();
+        let (file, name) = named(folder)?;
         Ok(Self { file, name: Some(name) })
     }
+}
+
+/// A new file under a name that nobody can guess.
+fn named(folder: &Path) -> io::Result<(File, TempPath)> {
+    let mut builder = names();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    Ok(builder.tempfile_in(folder)?.into_parts())
 }
 
 /// The names that drafts have where they need one.
@@ -135,17 +141,32 @@ fn put_in_place(file: &File, path: &Path) -> io::Result<()> {
     use std::os::fd::AsRawFd;
 
     let open = format!("{OPEN_FILES}/{}", file.as_raw_fd());
-    let name = |name: &Path| -> io::Result<()> {
-        Ok(linkat(CWD, open.as_str(), CWD, name, AtFlags::SYMLINK_FOLLOW)?)
-    };
-    match name(path) {
+    put_by(file, path, |name| Ok(linkat(CWD, open.as_str(), CWD, name, AtFlags::SYMLINK_FOLLOW)?))
+}
+
+/// Gives a file a name by a link, or gives the name to a copy of it where links are refused, which shows only now.
+#[cfg(target_os = "linux")]
+fn put_by(file: &File, path: &Path, link: impl Fn(&Path) -> io::Result<()>) -> io::Result<()> {
+    let linked = match link(path) {
         // A link cannot replace a file, but a rename can.
         Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {
-            let named: NamedTempFile<()> = names().make_in(folder_of(path), name)?;
-            named.persist(path).map(drop).map_err(|e| e.error)
+            let named: io::Result<NamedTempFile<()>> = names().make_in(folder_of(path), &link);
+            named.and_then(|named| Ok(named.persist(path).map(drop)?))
         }
         result => result,
-    }
+    };
+    linked.or_else(|_| copy_in_place(file, path))
+}
+
+#[cfg(target_os = "linux")]
+fn copy_in_place(mut file: &File, path: &Path) -> io::Result<()> {
+    use std::io::Seek;
+
+    let (mut copy, name) = named(folder_of(path))?;
+    file.rewind()?;
+    io::copy(&mut file, &mut copy)?;
+    copy.sync_all()?;
+    Ok(name.persist(path)?)
 }
 
 #[cfg(not(target_os = "linux"))]
@@ -198,6 +219,27 @@ mod tests {
         };
         write_atomically(&path, write).unwrap();
         assert_eq!(files(&folder), ["a"]);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn where_links_are_refused_a_copy_gets_the_name() {
+        use io::ErrorKind::{AlreadyExists, PermissionDenied};
+
+        let folder = Folder::new();
+        let path = folder.path().join("a");
+        for text in ["first", "second, which replaces it"] {
+            let draft = Draft::new(folder.path()).unwrap();
+            (&draft.file).write_all(text.as_bytes()).unwrap();
+            let refuse = |name: &Path| {
+                let kind = if name.exists() { AlreadyExists } else { PermissionDenied };
+                Err(kind.into())
+            };
+            put_by(&draft.file, &path, refuse).unwrap();
+            drop(draft);
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+            assert_eq!(files(&folder), ["a"]);
+        }
     }
 
     #[cfg(unix)]

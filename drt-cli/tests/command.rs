@@ -340,3 +340,34 @@ fn films_that_do_not_fit_into_memory() {
     let out = shell.current_dir(folder.path()).args(["-c", &line]).output().unwrap();
     expect(&out, 2, &["the film of 8192x8192 pixels", "GB", "--size"]);
 }
+
+/// The digest goes into a pipe that is full, so that the signal comes while results are written.
+#[cfg(unix)]
+#[test]
+fn what_is_being_written_when_a_signal_comes_is_written() {
+    use std::io::{Read, Write};
+    use std::time::Duration;
+
+    let folder = folder();
+    let (mut from, mut to) = std::io::pipe().unwrap();
+    let stdout = to.try_clone().unwrap();
+    let filler = std::thread::spawn(move || to.write_all(&[0; 1 << 20]));
+    std::thread::sleep(Duration::from_millis(200));
+    // The command holds an end of the pipe too, which it drops with the statement: only then does the pipe end.
+    let line = "render scene.xml --quiet --preview a.png --digest - -o a.exr";
+    let mut child = folder.command(line).stdout(stdout).spawn().unwrap();
+    while !folder.path().join("a.png").exists() {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let pid = child.id().to_string();
+    assert!(Command::new("kill").args(["-TERM", &pid]).status().unwrap().success());
+    // Work that does not look at signals gets less time than this.
+    std::thread::sleep(Duration::from_millis(1200));
+    assert!(child.try_wait().unwrap().is_none());
+    let mut told = Vec::new();
+    from.read_to_end(&mut told).unwrap();
+    filler.join().unwrap().unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    assert!(String::from_utf8_lossy(&told).contains("\"command\""));
+    folder.exr("a.exr");
+}

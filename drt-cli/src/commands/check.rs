@@ -24,14 +24,15 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     run::tell_one_sided(&job, options.changes.quiet)?;
     let monitor = Monitor::new(options.changes.quiet);
     let mut rendering = derivatives(&job, options, &monitor, 0.4, &mut run::Shared::default())?;
+    let kept = rendering.complete.then(|| keep(&job, &outputs, &rendering));
     let differences = match rendering.complete {
-        true => {
-            keep(&job, &outputs, &rendering);
-            two_steps(&job, rendering.spp, &monitor)?
-        }
+        true => two_steps(&job, rendering.spp, &monitor)?,
         false => None,
     };
     monitor.finish();
+    let _writing = stop::writing();
+    // What is written from here on is more.
+    drop(kept);
     let Some([coarse, fine]) = differences else {
         rendering.complete = false;
         outputs.write(&job, &rendering, &[], &[])?;
@@ -48,11 +49,11 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
 }
 
 /// What is written where the program must end while differences are prepared.
-fn keep(job: &Job, outputs: &Outputs, rendering: &Rendering) {
+fn keep(job: &Job, outputs: &Outputs, rendering: &Rendering) -> stop::Kept {
     let (job, outputs) = (job.clone(), outputs.clone());
     let rendering = Rendering { complete: false, ..rendering.clone() };
     // Nobody is left to be told that it cannot be written.
-    stop::rescue(move || drop(outputs.write(&job, &rendering, &[], &[])));
+    stop::rescue(move || drop(outputs.write(&job, &rendering, &[], &[])))
 }
 
 /// Differences at the job's step and at half of it.

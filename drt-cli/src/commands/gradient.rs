@@ -14,7 +14,7 @@ use super::destinations::Destinations;
 use super::monitor::Monitor;
 use super::options::GradOptions;
 use super::outputs::Outputs;
-use super::{Outcome, run, shard};
+use super::{Outcome, run, shard, stop};
 use crate::error::Place;
 use crate::fingerprint::Fingerprint;
 use crate::image::read_picture;
@@ -70,6 +70,7 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
         (None, None) => None,
     };
     monitor.finish();
+    let _writing = stop::writing();
     match (found, shard) {
         (None, _) => return Ok(Outcome::Interrupted),
         (Some(Found::Numbers(gradient)), _) => write_npy(output, &gradient)?,

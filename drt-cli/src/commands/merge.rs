@@ -9,6 +9,7 @@ use super::Outcome;
 use super::gradient::by_parameters;
 use super::options::MergeOptions;
 use super::outputs::{Files, summarize};
+use super::stop;
 use crate::digest::RunFacts;
 use crate::error::Place;
 use crate::npy::write_npy;
@@ -61,7 +62,9 @@ pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
                     )));
                 }
             }
-            write_npy(output, &given.gradient()?)?;
+            let gradient = given.gradient()?;
+            let _writing = stop::writing();
+            write_npy(output, &gradient)?;
         }
     }
     Ok(Outcome::Done)

@@ -8,6 +8,7 @@ use super::clock::Clock;
 use super::destinations::Destinations;
 use super::noise::largest_noise;
 use super::options::Options;
+use super::stop;
 use crate::digest::{RunFacts, Verdict, digest, write_digest};
 use crate::shard_file::ShardFile;
 use crate::{CliError, Job, Provenance, console, write_exr, write_preview};
@@ -150,6 +151,7 @@ impl Files<'_> {
         facts: &RunFacts,
         provenance: &Provenance,
     ) -> Result<(), CliError> {
+        let _writing = stop::writing();
         if let Some(path) = self.preview {
             write_preview(path, rendering, further)?;
         }
@@ -179,8 +181,8 @@ fn warn_of_heavy_tails(rendering: &Rendering) {
         let share = layer.tail.share();
         if share > Tail::HEAVY {
             console::note(format_args!(
-                "note: {name}: one sample makes {:.0} % of the second moment; its standard errors may be too small. \
-                 More samples, another estimator or sampling = \"bidirectional\" tell",
+                "note: {name}: one sample makes up {:.0} % of the second moment, so its standard errors may be too \
+                 small; to check, take more samples, another estimator, or sampling = \"bidirectional\"",
                 100.0 * share
             ));
         }

@@ -8,6 +8,7 @@ use super::monitor::Monitor;
 use super::options::Options;
 use super::outputs::Outputs;
 use super::run::{self, Shared};
+use super::stop;
 use crate::fingerprint::Fingerprint;
 use crate::shard_file::{ShardFile, Sums};
 use crate::{CliError, Job};
@@ -50,6 +51,7 @@ pub(super) fn images(
     };
     monitor.finish();
     let Some(sums) = sums else { return Ok(Outcome::Interrupted) };
+    let _writing = stop::writing();
     let rendering = alone(job, &sums);
     let inputs = Fingerprint::of_job(job, command, &[])?;
     let file = ShardFile::new(job, shard, inputs, command, Sums::Images(sums));

@@ -12,25 +12,35 @@ use super::numbers::{number, plain_numbers, plain_value, triple};
 use super::{spectrum, textures, transform};
 use crate::{CliError, input_file};
 
-/// Tags of properties without anything in them.
-const PLAIN: [&str; 9] =
-    ["float", "integer", "boolean", "string", "point", "vector", "rgb", "srgb", "spectrum"];
-
-/// Properties of version 0.5 and 0.6 that change the image, wherever they are and not supported.
-const MATTER: [&str; 13] = [
-    "material",
-    "max_smooth_angle",
-    "kc",
-    "channel",
-    "filename",
-    "to_world",
-    "to_uv",
-    "radius",
-    "shadow_rays",
-    "thickness",
-    "aperture_radius",
-    "orientation",
-    "density",
+/// Properties of version 0.5 and 0.6 that do not change the expected image, by the element that they are in: they are about how an
+/// image is computed, or how it is stored.
+const HARMLESS: [(&str, &[&str]); 6] = [
+    ("bsdf", &["specular_sampling_weight"]),
+    ("film", &["burn", "exposure", "gamma", "key", "tonemap_method"]),
+    (
+        "integrator",
+        &[
+            "bidirectional",
+            "bidirectional_mutation",
+            "caustic_perturbation",
+            "chain_length",
+            "direct_samples",
+            "lambda",
+            "lens_perturbation",
+            "light_image",
+            "luminance_samples",
+            "manifold_perturbation",
+            "max_chains",
+            "multi_chain_perturbation",
+            "num_chains",
+            "p_large",
+            "sample_direct",
+            "two_stage",
+        ],
+    ),
+    ("medium", &["step_size"]),
+    ("shape", &["collapse"]),
+    ("texture", &["cache", "max_anisotropy"]),
 ];
 
 /// The children of an element, each to be asked for once.
@@ -265,12 +275,14 @@ impl<'a> Properties<'a> {
         self.children(|_| true);
     }
 
-    /// Whether a property that nobody asked for only gets a note: those of files of version 0.5 and 0.6 do, where they change nothing
-    /// here, as that version had many that are about how an image is computed.
+    /// Whether a property that nobody asked for only gets a note, which is so for what is known to be harmless in files of
+    /// version 0.5 and 0.6. Any other may be a misspelt name.
     fn is_passed_over(&self, child: &Element) -> bool {
         let Some((name, _)) = property_name(child) else { return false };
-        let plain = PLAIN.contains(&child.tag.as_str());
-        if !child.is_legacy() || !plain || MATTER.contains(&name) {
+        let plain = ["float", "integer", "boolean", "string"].contains(&child.tag.as_str());
+        let harmless =
+            (HARMLESS.iter()).any(|(tag, names)| *tag == self.element.tag && names.contains(&name));
+        if !child.is_legacy() || !plain || !harmless {
             return false;
         }
         let kind = self.element.attribute("type").unwrap_or("");

@@ -37,14 +37,18 @@ pub(super) fn run(options: &BenchOptions) -> Result<Outcome, CliError> {
     let budget = Budget { seconds: options.seconds, spp: options.spp };
     let monitor = Monitor::new(options.changes.quiet);
     let mut all: Vec<Series> = Vec::new();
+    let mut kept = None;
     for job in &jobs {
-        keep(options, &all);
+        kept = keep(options, &all);
         all.extend(measure::job(job, reference.as_ref(), budget, &monitor)?);
         if monitor.interrupted() {
             break;
         }
     }
     monitor.finish();
+    let _writing = stop::writing();
+    // What is told from here on is more.
+    drop(kept);
     tell(&all, options.csv.as_deref(), options.plot.as_deref())?;
     Ok(if monitor.interrupted() { Outcome::Interrupted } else { Outcome::Done })
 }
@@ -62,10 +66,9 @@ fn tell(all: &[Series], csv: Option<&Path>, plot: Option<&Path>) -> Result<(), C
 }
 
 /// What is shown where the program must end while the next job is prepared.
-fn keep(options: &BenchOptions, all: &[Series]) {
+fn keep(options: &BenchOptions, all: &[Series]) -> Option<stop::Kept> {
     let (all, csv, plot) = (all.to_vec(), options.csv.clone(), options.plot.clone());
-    if !all.is_empty() {
-        // Nobody is left to be told that it cannot be written.
-        stop::rescue(move || drop(tell(&all, csv.as_deref(), plot.as_deref())));
-    }
+    let any = !all.is_empty();
+    // Nobody is left to be told that it cannot be written.
+    any.then(|| stop::rescue(move || drop(tell(&all, csv.as_deref(), plot.as_deref()))))
 }

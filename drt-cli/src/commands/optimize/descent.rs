@@ -2,6 +2,7 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use drt_estimators::fit::{Evaluation, Fit};
@@ -37,7 +38,10 @@ pub(super) struct Descent<'a> {
     fingerprint: Fingerprint,
     sources: Sources,
     optimizer: Optimizer,
-    history: History,
+    /// It only grows, so that what it was is told by two lengths.
+    history: Arc<Mutex<History>>,
+    /// What a signal makes of the steps that are not stored.
+    kept: Option<stop::Kept>,
     watch: Watch<'a>,
     gallery: Option<Gallery<'a>>,
     clock: Clock,
@@ -99,7 +103,8 @@ impl<'a> Descent<'a> {
             fingerprint,
             sources,
             optimizer,
-            history,
+            history: Arc::new(Mutex::new(history)),
+            kept: None,
             watch,
             gallery,
             clock,
@@ -178,27 +183,32 @@ impl<'a> Descent<'a> {
         }
     }
 
-    fn evaluate(&self, fit: &mut Fit, monitor: &Monitor) -> Result<Option<Evaluation>, CliError> {
+    fn evaluate(
+        &mut self,
+        fit: &mut Fit,
+        monitor: &Monitor,
+    ) -> Result<Option<Evaluation>, CliError> {
         let (i, n) = (self.steps(), self.problem.iterations);
-        let name = match self.history.losses.last() {
+        let name = match locked(&self.history).losses.last() {
             Some(loss) => format!("{i} of {n}, loss {loss:.4e}"),
             None => format!("{i} of {n}"),
         };
         let part = |i: u32| f64::from(i) / f64::from(n + 1);
         monitor.stage(&name, part(i), part(i + 1));
-        if let Some(stored) = self.stored() {
-            // That it cannot be written is told by nobody any more.
-            stop::rescue(move || drop(stored.write()));
-        }
+        // That it cannot be written is told by nobody any more.
+        let rescue = |state: Snapshot| stop::rescue(move || drop(state.write()));
+        self.kept = self.snapshot().map(rescue);
         self.team.evaluate(self.problem, i, self.values(), fit, monitor)
     }
 
     /// Takes down what iteration `i` saw.
     fn look_at(&mut self, i: u32, evaluation: &Evaluation) -> Result<(), CliError> {
-        self.history.losses.truncate(i as usize);
-        self.history.losses.push(evaluation.loss());
-        let of_stage = &self.history.losses[self.problem.stage_start(i) as usize..];
+        let mut history = locked(&self.history);
+        history.losses.truncate(i as usize);
+        history.losses.push(evaluation.loss());
+        let of_stage = &history.losses[self.problem.stage_start(i) as usize..];
         let judged = self.watch.evaluation(i, evaluation, of_stage);
+        drop(history);
         if let (Err(error @ CliError::Unsolved(_)), true) = (&judged, i > 0) {
             self.fail(evaluation, error)?;
         }
@@ -225,7 +235,7 @@ impl<'a> Descent<'a> {
             self.fail(evaluation, &error)?;
             return Err(error);
         }
-        self.history.values.push(self.optimizer.values().to_vec());
+        locked(&self.history).values.push(self.optimizer.values().to_vec());
         Ok(())
     }
 
@@ -270,7 +280,7 @@ impl<'a> Descent<'a> {
         if !matches!(self.problem.plan.method, Method::GaussNewton { .. }) {
             return Some(Outlook { step: seen.newton_step()?, errors: seen.uncertainty()? });
         }
-        let (i, looks) = (self.steps(), self.history.losses.len());
+        let (i, looks) = (self.steps(), locked(&self.history).losses.len());
         if looks <= i as usize {
             return self.optimizer.outlook(None).ok().flatten();
         }
@@ -287,29 +297,33 @@ impl<'a> Descent<'a> {
     }
 
     /// Writes what is needed to go on from here, and the tables.
-    fn store(&self) -> Result<(), CliError> {
-        self.stored().map_or(Ok(()), |stored| stored.write())
+    fn store(&mut self) -> Result<(), CliError> {
+        let _writing = stop::writing();
+        // It is of an earlier step, and must not overwrite what is written here.
+        self.kept = None;
+        self.snapshot().map_or(Ok(()), Snapshot::write)
     }
 
-    /// What a run goes on from, ready to be written at any time.
-    fn stored(&self) -> Option<Stored> {
+    /// What a run goes on from, ready to be written at any time. Nothing in it grows with the number of steps.
+    fn snapshot(&self) -> Option<Snapshot> {
         let folder = self.folder()?.to_path_buf();
         let [seconds, cpu_seconds] = self.spent();
-        let names = || self.problem.names();
+        let history = locked(&self.history);
+        let lengths = [history.values.len(), history.losses.len()];
         let checkpoint = Checkpoint {
             program: PROGRAM.into(),
             fingerprint: self.fingerprint,
             optimizer: self.optimizer.state().clone(),
             blind: self.watch.blind.clone(),
-            complete: self.history.losses.len() > self.problem.iterations as usize,
+            complete: lengths[1] > self.problem.iterations as usize,
             seconds,
             cpu_seconds,
             sources: self.sources.clone(),
-            tables: self.history.sums(self.steps() as usize, names()),
+            // They are added when it is written.
+            tables: Default::default(),
         };
-        let tables =
-            [(PARAMETERS, self.history.parameters(names())), (LOSSES, self.history.losses())];
-        Some(Stored { folder, tables, checkpoint })
+        let names = self.problem.names().map(Into::into).collect();
+        Some(Snapshot { folder, names, history: self.history.clone(), lengths, checkpoint })
     }
 
     /// Shows what was seen last, and the page that tells of it.
@@ -319,19 +333,23 @@ impl<'a> Descent<'a> {
         else {
             return Ok(());
         };
-        let iteration = self.history.losses.len().saturating_sub(1) as u32;
+        let _writing = stop::writing();
+        let iteration = locked(&self.history).losses.len().saturating_sub(1) as u32;
         gallery.current(iteration, seen)?;
+        let outlook = self.outlook(seen);
+        let history = locked(&self.history);
         let page = Report {
             problem: self.problem,
-            history: &self.history,
+            history: &history,
             gallery,
             steps: self.steps(),
-            outlook: self.outlook(seen),
+            outlook,
             spent: self.spent(),
             failure,
             limits: &self.limits,
         };
         let page = page.html();
+        drop(history);
         write_atomically(&folder.join(report::FILE), |out| Ok(out.write_all(page.as_bytes())?))
     }
 
@@ -345,21 +363,34 @@ impl<'a> Descent<'a> {
 }
 
 /// What a run goes on from, with the tables that belong to it.
-struct Stored {
+struct Snapshot {
     folder: PathBuf,
-    tables: [(&'static str, String); 2],
+    /// The names of the parameters.
+    names: Vec<String>,
+    history: Arc<Mutex<History>>,
+    /// How many values and losses of the history belong to it.
+    lengths: [usize; 2],
+    /// It lacks the checksums of the tables.
     checkpoint: Checkpoint,
 }
 
-impl Stored {
-    fn write(&self) -> Result<(), CliError> {
-        create(Some(&self.folder))?;
-        for (name, text) in &self.tables {
-            let path = self.folder.join(name);
-            write_atomically(&path, |out| Ok(out.write_all(text.as_bytes())?))?;
+impl Snapshot {
+    fn write(self) -> Result<(), CliError> {
+        let Self { folder, names, history, lengths, mut checkpoint } = self;
+        let history = locked(&history).start(lengths);
+        let names = || names.iter().map(String::as_str);
+        checkpoint.tables = history.sums(checkpoint.optimizer.steps as usize, names());
+        create(Some(&folder))?;
+        for (name, text) in [(PARAMETERS, history.parameters(names())), (LOSSES, history.losses())]
+        {
+            write_atomically(&folder.join(name), |out| Ok(out.write_all(text.as_bytes())?))?;
         }
-        self.checkpoint.write(&self.folder)
+        checkpoint.write(&folder)
     }
+}
+
+fn locked(history: &Mutex<History>) -> MutexGuard<'_, History> {
+    history.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Does something with what Gauss-Newton takes from an evaluation by so many samples.

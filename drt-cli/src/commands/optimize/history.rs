@@ -47,11 +47,18 @@ impl History {
         text
     }
 
+    /// The first so many values and losses.
+    pub(super) fn start(&self, [values, losses]: [usize; 2]) -> Self {
+        let of_losses = &self.losses[..losses.min(self.losses.len())];
+        Self {
+            values: self.values.iter().take(values).cloned().collect(),
+            losses: of_losses.to_vec(),
+        }
+    }
+
     /// Checksums of the tables as they are after `steps` steps.
     pub(super) fn sums<'a>(&self, steps: usize, names: impl Iterator<Item = &'a str>) -> [u32; 2] {
-        let mut cut = self.clone();
-        cut.values.truncate(steps + 1);
-        cut.losses.truncate(steps);
+        let cut = self.start([steps + 1, steps]);
         [checksum::of_text(&cut.parameters(names)), checksum::of_text(&cut.losses())]
     }
 

@@ -18,7 +18,8 @@ impl Limits {
             return;
         }
         let note = format!(
-            "parameter `{parameter}` is held at its limit from iteration {iteration} on, where a step would lead beyond: {reason}"
+            "iteration {iteration}: a step would take parameter `{parameter}` out of range ({reason}); it was shortened to \
+             nine tenths of the way to the limit, as later ones are without a note"
         );
         if aloud {
             console::note(format_args!("drt: {note}"));

@@ -34,7 +34,11 @@ impl Sources {
     pub(super) fn changed(&self, now: &Self) -> Option<String> {
         for (name, hash) in &now.files {
             match self.files.get(name) {
-                None => return Some(format!("{name} is read, which was not before")),
+                None => {
+                    return Some(format!(
+                        "{name} is read now and was not when the checkpoint was written"
+                    ));
+                }
                 Some(before) if before != hash => return Some(format!("{name} has changed since")),
                 Some(_) => {}
             }

@@ -49,6 +49,26 @@ fn properties_of_old_files_that_change_nothing_get_one_note() {
 }
 
 #[test]
+fn misspelt_properties_of_old_files_are_refused() {
+    let bsdf =
+        |inside| format!("<shape type=\"cube\"><bsdf type=\"diffuse\">{inside}</bsdf></shape>");
+    for inside in [
+        r#"<rgb name="reflectence" value="1 0 0"/>"#,
+        r#"<spectrum name="reflectence" value="1"/>"#,
+        r#"<float name="alhpa" value="1"/>"#,
+        // What is harmless in one element or as a number need not be so in others.
+        r#"<float name="stepSize" value="1"/>"#,
+        r#"<rgb name="sampleVisible" value="1"/>"#,
+    ] {
+        let message = read_version("0.6.0", &bsdf(inside)).unwrap_err().to_string();
+        assert!(message.contains("takes") && message.contains("reflectance"), "{message}");
+    }
+    let medium = r#"<medium type="homogeneous" id="m"><spectrum name="sigmaS" value="1"/><spectrum name="sigmaA" value="1"/>
+        <float name="stepSize" value="1"/></medium><shape type="cube"><ref name="interior" id="m"/></shape>"#;
+    assert_eq!(noted("0.6.0", medium).1.len(), 1);
+}
+
+#[test]
 fn lights_films_and_integrators_of_old_files() {
     let body = r#"<integrator type="photonmapper"><integer name="maxDepth" value="3"/><integer name="globalPhotons" value="9"/></integrator>
         <sensor type="perspective"><film type="ldrfilm"><float name="gamma" value="2.2"/></film></sensor>
