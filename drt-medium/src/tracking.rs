@@ -209,7 +209,8 @@ fn next_collision(t: f64, end: f64, majorant: f64, depth: &mut f64) -> Option<f6
     if majorant <= 0.0 {
         return None;
     }
-    let next = t + *depth / majorant;
+    // Where free paths are shorter than a rounding of t, a walk would stand still at a point that rounding put outside.
+    let next = f64::max(t + *depth / majorant, t.next_up());
     if next < end {
         return Some(next);
     }
