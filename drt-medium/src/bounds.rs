@@ -24,6 +24,8 @@ struct Range {
     /// Of the magnitudes.
     max: Rgb,
     mean: Rgb,
+    /// The largest difference of a channel's bounds.
+    spread: f64,
 }
 
 impl fmt::Debug for Bounds {
@@ -158,24 +160,22 @@ impl Range {
             sum += v;
             count += 1.0;
         }
-        Self { min, max, mean: sum / count }
+        Self { min, max, mean: sum / count, spread: (max - min).max_channel() }
     }
 
     /// Whether more null collisions than that are expected on a piece of a ray.
     #[inline(always)]
     fn is_loose(&self, scale: f64, [start, end]: [f64; 2]) -> bool {
-        (self.max - self.min).max_channel() * scale * (end - start) > Bounds::LOOSE
+        self.spread * scale * (end - start) > Bounds::LOOSE
     }
 
     /// The range widened by what rounding may add to interpolated values, and cut to the range `o` of the voxels that
     /// they lie between.
     fn within(self, o: &Self) -> Self {
         const ROUNDING: f64 = 1e-12;
-        Self {
-            min: zip(self.min * (1.0 - ROUNDING), o.min, f64::max),
-            max: zip(self.max * (1.0 + ROUNDING), o.max, f64::min),
-            mean: self.mean,
-        }
+        let min = zip(self.min * (1.0 - ROUNDING), o.min, f64::max);
+        let max = zip(self.max * (1.0 + ROUNDING), o.max, f64::min);
+        Self { min, max, mean: self.mean, spread: (max - min).max_channel() }
     }
 
     /// A negative scale cannot occur: media check it.

@@ -130,10 +130,12 @@ pub fn transmittance<F: DensityField + ?Sized>(
         let length = piece.end - piece.start;
         // An empty channel of an infinite piece: 0 × inf.
         control += piece.minorant.map(|m| if m == 0.0 { 0.0 } else { m * length });
-        weight = zip(weight, control, |w, c| if c > DEEPEST { 0.0 } else { w });
-        // Channels of which nothing is left need no collisions.
-        let gap =
-            zip(piece.majorant - piece.minorant, weight, |g, w| if w == 0.0 { 0.0 } else { g });
+        let mut gap = piece.majorant - piece.minorant;
+        if control.max_channel() > DEEPEST {
+            // Channels of which nothing is left need no collisions.
+            weight = zip(weight, control, |w, c| if c > DEEPEST { 0.0 } else { w });
+            gap = zip(gap, weight, |g, w| if w == 0.0 { 0.0 } else { g });
+        }
         let residual = gap.max_channel();
         let mut t = piece.start;
         while let Some(next) = next_collision(t, piece.end, residual, &mut depth) {
@@ -209,10 +211,10 @@ fn next_collision(t: f64, end: f64, majorant: f64, depth: &mut f64) -> Option<f6
     if majorant <= 0.0 {
         return None;
     }
-    // Where free paths are shorter than a rounding of t, a walk would stand still at a point that rounding put outside.
-    let next = f64::max(t + *depth / majorant, t.next_up());
+    let next = t + *depth / majorant;
     if next < end {
-        return Some(next);
+        // Where free paths are shorter than a rounding of t, a walk would stand still at a point that rounding put outside.
+        return if next > t { Some(next) } else { Some(t.next_up()).filter(|next| *next < end) };
     }
     *depth = f64::max(*depth - majorant * (end - t), 0.0);
     None
