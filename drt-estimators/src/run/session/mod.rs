@@ -40,7 +40,7 @@ use crate::world::lights::EmitterMask;
 
 /// Watches and steers a run. Every method has a default that does nothing.
 pub trait Control: Sync {
-    /// True to stop soon; what is finished is kept.
+    /// True to stop soon; what is finished is kept. Once true, it must stay true: work that ended early is thrown away on its word.
     fn cancelled(&self) -> bool {
         false
     }
