@@ -66,7 +66,9 @@ fn turning_of_nothing(positions: &[Vec3]) -> SurfaceMotion {
 
 #[test]
 fn what_has_no_normals_of_its_own_is_refused() {
-    let mesh = uv_sphere(4);
+    let smooth = uv_sphere(4);
+    let mut mesh = smooth.clone();
+    mesh.normals = None;
     let count = mesh.source_vertex_count as usize;
     let turn = GeometryChange::VertexNormals(vec![Vec3::X; count].into());
     let pull = GeometryChange::Vertex { index: 0, direction: Vec3::X };
@@ -76,8 +78,12 @@ fn what_has_no_normals_of_its_own_is_refused() {
         move_mesh(mesh, &applied, 1).unwrap_err().cause
     };
     assert_eq!(apply(&mesh, &[&turn]), Cause::NoNormals);
-    let smooth = mesh.clone().with_smooth_normals();
     assert_eq!(apply(&smooth, &[&turn, &pull]), Cause::DeformedNormals);
     let few = GeometryChange::VertexNormals([Vec3::X].into());
     assert_eq!(apply(&smooth, &[&few]), Cause::VertexCount { expected: count, found: 1 });
+    let normals = smooth.normals.clone().unwrap_or_default();
+    let back: Vec<Vec3> = normals.iter().map(|n| -*n).collect();
+    let away = GeometryChange::VertexNormals(back.into());
+    let applied = [Applied { parameter: 0, theta: 1.0, change: &away }];
+    assert_eq!(move_mesh(&smooth, &applied, 1).unwrap_err().cause, Cause::NoDirection);
 }
