@@ -169,7 +169,7 @@ fn windings(faces: &Faces, p: &[[f64; 2]]) -> Vec<i32> {
     winds.into_iter().map(Option::unwrap_or_default).collect()
 }
 
-/// By how much more the polygon winds around what lies to the left of each directed edge than around what lies to its right.
+/// For each directed edge, how much more the polygon winds around what lies to its left than around what lies to its right.
 /// `None` where an edge of the polygon runs through another corner.
 fn changes(faces: &Faces, p: &[[f64; 2]]) -> Option<Vec<i32>> {
     // Corners in the same place are one vertex.

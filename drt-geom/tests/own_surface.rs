@@ -245,7 +245,7 @@ fn visibility_is_mutual() {
     assert!(seen > 500, "{seen}");
 }
 
-/// Of triangles that coincide the one with the lowest number is met, whichever way rounding falls.
+/// Rays meet the triangle with the lowest number among those that coincide, whichever way rounding falls.
 #[test]
 fn coincident_surfaces_are_met_in_their_order() {
     let mut rng = Rng::new(8, 0, 0);

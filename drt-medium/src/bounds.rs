@@ -92,6 +92,14 @@ impl Bounds {
         Range::of(voxels)
     }
 
+    /// Origin and direction of a ray in the grid's unit cube, and the cells that it crosses there.
+    #[inline(always)]
+    fn march(&self, grid: &Grid, ray: &Ray) -> Option<([Vec3; 2], March)> {
+        let part = clip_to_box(grid, ray)?;
+        let local = [grid.from_world().point(ray.origin), grid.from_world().vector(ray.dir)];
+        Some((local, March::new(local, self.size, part.into())))
+    }
+
     /// The cells a ray crosses, in order, as pieces of the field times `scale`.
     ///
     /// Where a cell's bounds are so far apart that most collisions in it would be null ones, it is cut up where the
@@ -104,11 +112,8 @@ impl Bounds {
         ray: &Ray,
         visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
     ) {
-        let Some(part) = clip_to_box(grid, ray) else { return };
-        let origin = grid.from_world().point(ray.origin);
-        let dir = grid.from_world().vector(ray.dir);
-        let mut cells = March::new([origin, dir], self.size, part.into());
-        let mut cutter = Cutter::new(grid, scale, [origin, dir]);
+        let Some((local, mut cells)) = self.march(grid, ray) else { return };
+        let mut cutter = Cutter::new(grid, scale, local);
         // One call of what visits, which is large, so that it becomes part of this loop.
         loop {
             let piece = if cutter.is_cutting() {
@@ -137,10 +142,7 @@ impl Bounds {
         ray: &Ray,
         visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>,
     ) {
-        let Some(part) = clip_to_box(grid, ray) else { return };
-        let origin = grid.from_world().point(ray.origin);
-        let dir = grid.from_world().vector(ray.dir);
-        let mut cells = March::new([origin, dir], self.size, part.into());
+        let Some((_, mut cells)) = self.march(grid, ray) else { return };
         while let Some(([x, y, z], part)) = cells.next() {
             let range = &self.cells[(z * self.size[1] + y) * self.size[0] + x];
             if visit(&range.piece(scale, part)).is_break() {

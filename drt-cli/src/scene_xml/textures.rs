@@ -168,11 +168,11 @@ fn bitmap(p: &Properties<'_>, to_uv: UvMap) -> Result<Texture, CliError> {
 /// How the numbers of an image file become values.
 #[derive(Clone, Copy, PartialEq)]
 enum Curve {
-    /// By the sRGB curve, unless the format holds linear ones.
+    /// Values are decoded by the sRGB curve, unless the format holds linear ones.
     OfFile,
     /// They are values.
     Raw,
-    /// By a power.
+    /// Values are decoded by a power.
     Power(f32),
 }
 

@@ -174,7 +174,7 @@ impl Contact {
         any.then_some(Self { up, side, wedge, floor, two_sided })
     }
 
-    /// The same contact from the other side of the floor.
+    /// Looks at this contact from the other side of the floor.
     pub(crate) fn turned_over(&self, world: &World) -> Self {
         let below = |v: &Vertex| {
             let front = v.surface().is_some_and(|s| s.ng.dot(self.up) < 0.0);

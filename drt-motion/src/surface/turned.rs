@@ -18,7 +18,7 @@ use crate::parameter::{Applied, GeometryChange};
 pub(super) struct TurnedNormals {
     /// Sums with the normals of the mesh, before they are made unit.
     sums: Vec<Vec3>,
-    /// By parameter, what it adds per unit; empty where that is nothing.
+    /// What each parameter adds per unit; empty where that is nothing.
     rates: Vec<Vec<Vec3>>,
 }
 

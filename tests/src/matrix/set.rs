@@ -36,7 +36,7 @@ impl Set {
         Self::upright([origin, target, drt_math::vec3(0.02, 1.0, 0.05)], fov, depth)
     }
 
-    /// The same with the y axis exactly upwards: what is symmetrical is so in the image.
+    /// An empty scene with the y axis exactly upwards in the image, so that what is symmetrical is so there.
     ///
     /// # Errors
     /// When that is no view.
