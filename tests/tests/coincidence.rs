@@ -12,7 +12,7 @@ use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_medium::{Homogeneous, Phase};
 use drt_motion::{Change, Effect, GeometryChange};
 use drt_tests::Result;
-use drt_tests::matrix::estimators::{Effort, Pairs, compare};
+use drt_tests::matrix::estimators::{Effort, Limit, Pairs, compare};
 use drt_tests::matrix::{Cell, Set, Stage};
 
 /// Everything is turned, so that no coordinate of a plane is exact.
@@ -177,11 +177,27 @@ fn lamps_slide_in_ceilings() -> Result<()> {
         };
         let stage =
             Stage::new("lamp in a ceiling", scene, vec![Cell::new("lamp slides", [effect])]);
-        let effort = Effort { noise: 0.03, scale: 0.0, seconds: 1.0, seed: 0 };
+        let effort = Effort { noise: 0.03, scale: 0.0, limit: Limit::Samples(1024), seed: 0 };
         let methods = [EstimatorKind::Radiative.into(), EstimatorKind::Warped.into()];
         let pairs = compare(&stage, &methods, effort)?;
         println!("{}", Pairs(&pairs));
         assert!(pairs.len() == 2 && pairs.iter().all(|pair| pair.passes()));
     }
+    Ok(())
+}
+
+#[test]
+fn lamps_that_overlap_in_one_plane_are_refused() -> Result<()> {
+    let other = |x: f64, height: f64| -> Result<Option<String>> {
+        let size = vec3(0.5, 0.5, 1.0);
+        let mesh = askew(&rectangle(), size, Some((Vec3::X, FRAC_PI_2)), vec3(x, height, 0.3));
+        let set = lamp(floor_and_lamp(2)?, 2.2).lamp("other", mesh, Rgb::new(2.0, 1.0, 1.0));
+        Ok(set.scene.check().err().map(|e| e.to_string()))
+    };
+    let refusal = other(1.3, 2.2)?.unwrap();
+    assert!(refusal.contains("other: ") && refusal.contains("emitter `lamp`"), "{refusal}");
+    // Beside it, and below it by the least.
+    assert_eq!(other(1.4 + 1e-9, 2.2)?, None);
+    assert_eq!(other(1.3, 2.2 - 1e-9)?, None);
     Ok(())
 }

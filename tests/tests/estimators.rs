@@ -1,6 +1,6 @@
 //! Derivatives by the 2019 and the 2023 estimators against those by path space: every cell of the check matrix.
 //!
-//! The short check runs the representative cells, to the noise that a few seconds reach. All of them,
+//! The short check runs the representative cells with at most 256 samples per pixel. All of them,
 //! for four seconds each, to know what either estimator costs:
 //! `cargo test --release -p drt-tests --test estimators -- --ignored all:: --nocapture`
 //!
@@ -15,7 +15,7 @@ use std::time::Instant;
 use drt_estimators::EstimatorKind::{Radiative, Warped};
 use drt_estimators::{Depth, PathSampling, Session, Settings, Unattended, agreement};
 use drt_tests::Result;
-use drt_tests::matrix::estimators::{Effort, Method, Pairs, compare};
+use drt_tests::matrix::estimators::{Effort, Limit, Method, Pairs, compare};
 use drt_tests::matrix::{
     Stage, caged, deforming, lenses, lights, materials, media, riding, surfaces, textures,
 };
@@ -33,8 +33,8 @@ fn number(variable: &str, default: f64) -> f64 {
 }
 
 /// Seconds that each estimator has for a stage, unless `DRT_SECONDS` says otherwise.
-fn seconds(default: f64) -> f64 {
-    number("DRT_SECONDS", default)
+fn seconds(default: f64) -> Limit {
+    Limit::Seconds(number("DRT_SECONDS", default))
 }
 
 /// Another number for other random numbers, `DRT_SEED`.
@@ -43,17 +43,17 @@ fn seed() -> u64 {
 }
 
 fn short() -> Effort {
-    Effort { noise: 0.05, scale: 0.0, seconds: seconds(1.0), seed: seed() }
+    Effort { noise: 0.05, scale: 0.0, limit: Limit::Samples(256), seed: seed() }
 }
 
 fn costs() -> Effort {
-    Effort { noise: 0.01, scale: 0.0, seconds: seconds(4.0), seed: seed() }
+    Effort { noise: 0.01, scale: 0.0, limit: seconds(4.0), seed: seed() }
 }
 
 /// Until scales are known to 1 %, or to the part that `DRT_SCALE` says.
 fn precise() -> Effort {
     let scale = number("DRT_SCALE", 0.01);
-    Effort { noise: 0.01, scale, seconds: seconds(600.0), seed: seed() }
+    Effort { noise: 0.01, scale, limit: seconds(600.0), seed: seed() }
 }
 
 /// Doubles samples until both images are known to 1/2 %, or time is over.
@@ -62,7 +62,7 @@ fn images(stage: &Stage) {
         let settings =
             Settings { sampling, seed, max_depth: Depth::OfScene, ..Settings::default() };
         let mut session = Session::new(&stage.scene, &[], &settings).unwrap();
-        let (started, most) = (Instant::now(), seconds(4.0));
+        let (started, most) = (Instant::now(), number("DRT_SECONDS", 4.0));
         let mut spp = 64;
         loop {
             session.run(spp, &Unattended);

@@ -6,6 +6,7 @@ pub(crate) mod agreement;
 pub mod emitter;
 pub(crate) mod error;
 pub mod filter;
+mod overlap;
 pub(crate) mod plan;
 pub(crate) mod rendering;
 pub(crate) mod scene;

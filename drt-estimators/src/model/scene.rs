@@ -12,6 +12,7 @@ use drt_medium::Medium;
 
 use crate::model::emitter::Emitter;
 use crate::model::error::{ElementError, Error, SettingError};
+use crate::model::overlap::overlapping_lamps;
 use crate::model::sensor::Sensor;
 use crate::model::surface::Bsdf;
 
@@ -295,6 +296,10 @@ impl Scene {
             if s.emitter.is_some() && s.mesh.surface_area() <= 0.0 {
                 return Err(fail(ElementError::NoArea));
             }
+        }
+        if let Some([first, second]) = overlapping_lamps(self) {
+            let reason = ElementError::OverlappingLamp(self.name_of(Target::Shape(first)));
+            return Err(unusable(&self.shapes[second].id, "shape", second, reason));
         }
         for (i, b) in self.bsdfs.iter().enumerate() {
             b.item.validate().map_err(|e| unusable(&b.id, "bsdf", i, e.into()))?;

@@ -1,6 +1,7 @@
 //! Derivatives by one estimator against those by others.
 
 use std::fmt;
+use std::ops::Mul;
 use std::time::Instant;
 
 use drt_estimators::{
@@ -49,6 +50,36 @@ impl From<EstimatorKind> for Method {
     }
 }
 
+/// When the sampling of one stage by one estimator stops, precise enough or not.
+#[derive(Clone, Copy, Debug)]
+pub enum Limit {
+    /// After so many samples per pixel, which are the same on every machine.
+    Samples(u32),
+    /// After about so many seconds.
+    Seconds(f64),
+}
+
+impl Limit {
+    /// True where as many samples again would exceed it.
+    fn is_reached(self, samples: u32, seconds: f64) -> bool {
+        match self {
+            Self::Samples(most) => 2 * samples > most,
+            Self::Seconds(most) => 2.0 * seconds > most,
+        }
+    }
+}
+
+impl Mul<f64> for Limit {
+    type Output = Self;
+
+    fn mul(self, factor: f64) -> Self {
+        match self {
+            Self::Samples(most) => Self::Samples((f64::from(most) * factor) as u32),
+            Self::Seconds(most) => Self::Seconds(most * factor),
+        }
+    }
+}
+
 /// How far to go.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
@@ -56,8 +87,8 @@ pub struct Effort {
     pub noise: f64,
     /// Standard error of each [scale](Scale) that is enough instead; 0 where only the former counts.
     pub scale: f64,
-    /// Seconds for each estimator and stage after which what has been found has to do.
-    pub seconds: f64,
+    /// Where to stop if neither is reached.
+    pub limit: Limit,
     /// Of the random numbers.
     pub seed: u64,
 }
@@ -97,16 +128,17 @@ impl Pair {
         self.agreement.agrees && scale && !self.faults.iter().any(unseen) && self.non_finite == 0
     }
 
-    /// A term of the wrong sign is off by twice its size.
-    fn could_see(&self, fault: &Fault) -> bool {
+    /// True where the derivative is known well enough to show a fault: a term of the wrong sign is off by twice its size.
+    #[must_use]
+    pub fn could_see(&self, fault: &Fault) -> bool {
         let part = self.terms.iter().find(|(t, _)| *t == fault.term).map_or(0.0, |(_, p)| *p);
         2.0 * part > 3.0 * self.noise[0].hypot(self.noise[1])
     }
 }
 
 /// Compares every derivative of a stage by each of some `methods` with that by path space. Of hundreds of comparisons
-/// some exceed by chance what one in a thousand does: what fails is measured once more, by other random
-/// numbers alone, and the second verdict counts.
+/// some exceed by chance what one in a thousand does, and a rare sample may be the first of its kind: what fails is
+/// measured once more, by other random numbers and for eight times as long, and the second verdict counts.
 ///
 /// # Errors
 /// When the library rejects the scene or a parameter.
@@ -122,7 +154,8 @@ pub fn compare(stage: &Stage, methods: &[Method], effort: Effort) -> Result<Vec<
         failing
             .cells
             .retain(|c| pairs.iter().any(|pair| again(pair) && pair.parameter == c.parameter.name));
-        let second = compare_once(&failing, &[*method], effort, seeds(100))?;
+        let longer = Effort { limit: effort.limit * 8.0, ..effort };
+        let second = compare_once(&failing, &[*method], longer, seeds(100))?;
         for pair in pairs.iter_mut().filter(|pair| again(pair)) {
             if let Some(other) = second.iter().find(|s| s.parameter == pair.parameter) {
                 *pair = other.clone();
@@ -218,7 +251,7 @@ impl Sampled {
     }
 }
 
-/// Samples until every derivative is precise enough, or the time is up.
+/// Samples until every derivative is precise enough, or the limit is reached.
 fn sample(
     stage: &Stage,
     parameters: &[Parameter],
@@ -243,9 +276,9 @@ fn sample(
         // As many again.
         session.run(first.spp, &Unattended);
         let (all, seconds) = (session.rendering(), start.elapsed().as_secs_f64());
+        let is_last = effort.limit.is_reached(all.spp, seconds);
         let sampled = Sampled { first, all, seconds };
-        // The next round would double the time.
-        if sampled.is_enough(effort) || 2.0 * seconds > effort.seconds {
+        if sampled.is_enough(effort) || is_last {
             return Ok(sampled);
         }
         first = sampled.all;

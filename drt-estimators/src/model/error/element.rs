@@ -24,6 +24,12 @@ pub enum ElementError {
     /// A shape that emits and has no area.
     #[error("it emits but has no area")]
     NoArea,
+    /// Two shapes that emit and overlap in one plane.
+    #[error(
+        "it emits and lies in the plane of the emitter `{0}`, which it overlaps: which of the two is seen is not known; move one of them by a \
+         little, or let it end where the other begins"
+    )]
+    OverlappingLamp(String),
     /// A shape carries an emitter of another kind than area.
     #[error("it carries an emitter of type `{0}`; only those of type `area` belong on shapes")]
     NotAnArea(&'static str),
