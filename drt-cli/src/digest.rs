@@ -75,6 +75,11 @@ struct Digest<'a> {
 /// The plan under the names of the digest.
 #[derive(Serialize)]
 struct PlanSummary<'a> {
+    estimators: &'a [String],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    estimator: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    sampling: Option<&'a str>,
     media: Vec<MediumSummary<'a>>,
     record: bool,
     moving_shapes: &'a [String],
@@ -105,6 +110,9 @@ impl<'a> From<&'a Plan> for PlanSummary<'a> {
             motion: m.motion.iter().map(|(p, how)| (p.as_str(), how.as_str())).collect(),
         };
         Self {
+            estimators: &plan.estimators,
+            estimator: plan.estimator.as_deref(),
+            sampling: plan.sampling.as_deref(),
             media: plan.media.iter().map(medium).collect(),
             record: plan.record,
             moving_shapes: &plan.moving_shapes,
@@ -134,6 +142,7 @@ struct WorkDone {
     guide_samples: u64,
     flux_samples: u64,
     tracking_steps: u64,
+    turning_edges: u64,
 }
 
 impl From<&Counters> for WorkDone {
@@ -148,6 +157,7 @@ impl From<&Counters> for WorkDone {
             guide_samples: c.guide_samples,
             flux_samples: c.flux_samples,
             tracking_steps: c.tracking_steps,
+            turning_edges: c.turning_edges,
         }
     }
 }

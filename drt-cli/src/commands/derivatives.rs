@@ -8,7 +8,7 @@ use super::monitor::Monitor;
 use super::noise::largest_noise;
 use super::options::Options;
 use super::run::{self, Shared};
-use crate::{CliError, Job};
+use crate::{CliError, Job, console};
 
 /// Image and derivatives by the job's estimator, filling the first `part` of the progress bar.
 pub(super) fn derivatives(
@@ -22,6 +22,9 @@ pub(super) fn derivatives(
         EstimatorKind::FiniteDifference => by_differences(job, options, monitor, part, shared),
         _ => {
             let mut session = run::prepare(job, &job.parameters, shared)?;
+            if let Some(why) = session.plan().estimator.as_ref().filter(|_| !options.changes.quiet) {
+                console::note(format_args!("drt: the estimator is {why}"));
+            }
             monitor.stage("grad", 0.0, part);
             Ok(run::sample(&mut session, options, job.spp(), monitor))
         }

@@ -52,6 +52,7 @@ pub(super) struct Estimator {
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Kind {
+    Auto,
     Radiative,
     PathSpace,
     Warped,

@@ -365,7 +365,8 @@ fn settings(
         Some(keys::Kind::FiniteDifference) => EstimatorKind::FiniteDifference,
         Some(keys::Kind::Radiative) => EstimatorKind::Radiative,
         Some(keys::Kind::Warped) => EstimatorKind::Warped,
-        _ => EstimatorKind::PathSpace,
+        Some(keys::Kind::PathSpace) => EstimatorKind::PathSpace,
+        Some(keys::Kind::Auto) | None => EstimatorKind::Auto,
     };
     if let Some(s) = sampling {
         settings.sampling = (*s).into();

@@ -30,7 +30,7 @@ use drt_motion::Parameter;
 use crate::fit::loss::{Loss, Reference};
 use crate::model::error::{Error, SettingError};
 use crate::model::scene::Scene;
-use crate::model::settings::Settings;
+use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
 use crate::run::session::{Control, ShardSums};
 use crate::world::cache::PreparedCache;
@@ -55,6 +55,8 @@ pub struct Fit {
     views: Arc<[View]>,
     loss: Loss,
     settings: Settings,
+    /// How each view's derivatives are estimated.
+    estimators: Vec<EstimatorKind>,
     /// The scene at the values that were asked for last.
     applied: Option<Arc<Applied>>,
     /// From the last evaluation.
@@ -65,8 +67,8 @@ pub struct Fit {
 const HALF: u64 = 0xd1b5_4a32_d192_ed03;
 
 impl Fit {
-    /// `scene` at its parameters' zero; their own values do not matter. `settings` says how images and derivatives are estimated, its
-    /// sensor aside.
+    /// `scene` at its parameters' zero; their own values matter to what is chosen for [`EstimatorKind::Auto`] alone. `settings` says
+    /// how images and derivatives are estimated, its sensor aside.
     ///
     /// # Errors
     /// When there is no view, a view's sensor does not exist or has a film of another size, or a number
@@ -93,8 +95,10 @@ impl Fit {
                 return fail(SettingError::FilmSize { found, film });
             }
         }
-        let (views, applied, kept) = (views.into(), None, PreparedCache::default());
-        Ok(Self { scene, parameters, views, loss, settings, applied, kept })
+        let mut kept = PreparedCache::default();
+        let estimators = estimators(&scene, &parameters, &views, &settings, &mut kept)?;
+        let (views, applied) = (views.into(), None);
+        Ok(Self { scene, parameters, views, loss, settings, estimators, applied, kept })
     }
 
     /// The scene at these values of the parameters.
@@ -232,9 +236,30 @@ impl Fit {
             return Err(Error::Setting { setting: "view", reason });
         };
         let applied = self.apply(values)?;
-        let settings = Settings { sensor, terms: false, ..self.settings.clone() };
+        let estimator = self.estimators[view];
+        let settings = Settings { sensor, estimator, terms: false, ..self.settings.clone() };
         ImageSource::new(&self.scene, &self.parameters, &applied, settings, &mut self.kept)
     }
+}
+
+/// How each view's derivatives are estimated: as the settings say, or as a pilot finds out, which is the same whatever the seed.
+fn estimators(
+    scene: &Scene,
+    parameters: &[Parameter],
+    views: &[View],
+    settings: &Settings,
+    kept: &mut PreparedCache,
+) -> Result<Vec<EstimatorKind>, Error> {
+    if settings.estimator != EstimatorKind::Auto {
+        return Ok(alloc::vec![settings.estimator; views.len()]);
+    }
+    scene.check()?;
+    let applied = Applied::new(scene, parameters)?;
+    let of_view = |view: &View| {
+        let settings = Settings { sensor: view.sensor, seed: 0, ..settings.clone() };
+        applied.estimator(&settings, kept)
+    };
+    views.iter().map(of_view).collect()
 }
 
 /// The seed of one of the two halves of an iteration's samples.

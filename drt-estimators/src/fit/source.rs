@@ -10,7 +10,7 @@ use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
 use crate::run::finite_difference::finite_differences;
-use crate::run::session::{Control, Session, ShardSums};
+use crate::run::session::{Control, Session, ShardSums, choice};
 use crate::world::cache::PreparedCache;
 
 /// A scene at its parameters' values, and its rates of change.
@@ -24,6 +24,17 @@ impl Applied {
         let (scene, tangents) = tangents::apply(scene, parameters)?;
         tangents.check()?;
         Ok(Self { scene, tangents })
+    }
+
+    /// How the derivatives that a sensor sees are estimated with the least work.
+    pub(super) fn estimator(
+        &self,
+        settings: &Settings,
+        kept: &mut PreparedCache,
+    ) -> Result<EstimatorKind, Error> {
+        settings.check(&self.scene, true)?;
+        let tangents = self.tangents.seen_by(settings.sensor);
+        Ok(choice::estimator(&self.scene, &tangents, settings, kept)?.0.estimator)
     }
 }
 

@@ -22,6 +22,8 @@ pub struct MediumPlan {
 pub struct Plan {
     /// The estimators of derivatives, and the light that each differentiates.
     pub estimators: Vec<String>,
+    /// Which estimator was chosen and why, where that was left open.
+    pub estimator: Option<String>,
     /// Media that a path can meet.
     pub media: Vec<MediumPlan>,
     /// True when paths leave records to differentiate.
@@ -108,8 +110,10 @@ impl fmt::Display for Plan {
         };
         let ends = if self.bidirectional { ", from the camera and from emitters" } else { "" };
         writeln!(f, "image: {image}{ends}")?;
-        if let Some(sampling) = &self.sampling {
-            writeln!(f, "sampling: {sampling}")?;
+        for (what, choice) in [("sampling", &self.sampling), ("estimator", &self.estimator)] {
+            if let Some(choice) = choice {
+                writeln!(f, "{what}: {choice}")?;
+            }
         }
         writeln!(f, "path record: {}", yes(self.record))?;
         if self.record {

@@ -160,6 +160,8 @@ pub struct Counters {
     pub flux_samples: u64,
     /// Tentative collisions in heterogeneous media.
     pub tracking_steps: u64,
+    /// Edges and shadows that turned rays, counted once for each ray that they turned.
+    pub turning_edges: u64,
 }
 
 impl Counters {
@@ -174,6 +176,7 @@ impl Counters {
         self.guide_samples += o.guide_samples;
         self.flux_samples += o.flux_samples;
         self.tracking_steps += o.tracking_steps;
+        self.turning_edges += o.turning_edges;
     }
 }
 

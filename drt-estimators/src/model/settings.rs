@@ -21,6 +21,11 @@ pub enum EstimatorKind {
     Warped,
     /// Central differences with common random numbers.
     FiniteDifference,
+    /// Whichever of [`PathSpace`](Self::PathSpace), [`Radiative`](Self::Radiative) and [`Warped`](Self::Warped) finds the derivative
+    /// images of a [`Session`](crate::Session) with the least work, by a pilot of few samples of a small picture; a
+    /// [`Fit`](crate::fit::Fit) chooses once, at the values that its parameters begin with. A [`gradient`](crate::gradient) takes
+    /// `PathSpace`.
+    Auto,
 }
 
 /// How rays turn, or vertices move, with the edges beside them, by [`EstimatorKind::Warped`].
@@ -201,7 +206,7 @@ impl Settings {
             return fail("insides", SettingError::NoMedium { index, count });
         }
         let has_both_ends = match self.estimator {
-            EstimatorKind::PathSpace => true,
+            EstimatorKind::PathSpace | EstimatorKind::Auto => true,
             EstimatorKind::Warped => self.warp == Warp::Edges,
             _ => false,
         };

@@ -108,6 +108,15 @@ fn targets(scene: &Scene, wanted: &[impl TargetName]) -> Result<Vec<Target>, Err
     wanted.iter().map(|w| w.find_in(scene)).collect()
 }
 
+/// The settings with the estimator that gradients take where that was left open.
+fn of_gradients(settings: &Settings) -> Settings {
+    let estimator = match settings.estimator {
+        EstimatorKind::Auto => EstimatorKind::PathSpace,
+        named => named,
+    };
+    Settings { estimator, ..settings.clone() }
+}
+
 /// What one batch of samples adds to a [`gradient`].
 #[derive(Clone, Debug)]
 pub struct GradientBatch {
@@ -140,6 +149,7 @@ pub fn gradient_in_batches(
     control: &dyn Control,
     each: &mut dyn FnMut(GradientBatch),
 ) -> Result<bool, Error> {
+    let settings = &of_gradients(settings);
     scene.check()?;
     settings.check(scene, true)?;
     let scene = &*scene.expanded()?;

@@ -245,13 +245,17 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
     /// The same, and the sinks of the components.
     pub(crate) fn finish(self) -> (Account, Vec<S>) {
         let sum = |of: fn(&Worker<'a, S>) -> u64| self.workers.iter().map(of).sum();
-        let of_paths: u64 = self.views.iter().map(|v| v.velocities.rays()).sum();
-        let probes = of_paths + sum(|w| w.differentiator.rays());
+        let of_paths = self.views.iter().map(|v| v.velocities.probe());
+        let probes = of_paths.chain(self.workers.iter().map(|w| w.differentiator.probe()));
+        let [rays, turning_edges] = probes.fold([0; 2], |[rays, edges], probe| {
+            [rays + probe.rays, edges + probe.turning_edges]
+        });
         let account = Account {
             counters: Counters {
                 differentiated_paths: sum(|w| w.differentiated),
                 recorded_vertices: self.recorded,
-                rays: self.tracer.counters.rays + probes,
+                rays: self.tracer.counters.rays + rays,
+                turning_edges,
                 ..self.tracer.counters
             },
             non_finite: self.non_finite,

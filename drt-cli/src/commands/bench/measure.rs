@@ -34,6 +34,7 @@ pub(super) fn job(
     let by_paths = match job.settings.estimator {
         EstimatorKind::Radiative => "radiative",
         EstimatorKind::Warped => "warped",
+        EstimatorKind::Auto => "auto",
         // Differences are measured in any case.
         _ => "path-space",
     };

@@ -49,6 +49,7 @@ impl Differentiator<'_> {
         parts.clear();
         auxiliary.clear();
         let turn = field.turn(world, &ray, probe, parts);
+        probe.turning_edges += parts.len() as u64;
         let Some(s) = end else {
             return turn.is_some().then_some(LightMotion { end: None, turn });
         };

@@ -153,9 +153,9 @@ impl<'w> Differentiator<'w> {
         }
     }
 
-    /// Rays that velocity fields cast for connections.
-    pub(crate) fn rays(&self) -> u64 {
-        self.probe.rays
+    /// What has been looked at for the velocities of emitters.
+    pub(crate) fn probe(&self) -> &Probe {
+        &self.probe
     }
 
     /// Sends the gradient of the record's value to `sink`. `filter` holds the gradient by the pixel

@@ -41,6 +41,7 @@ impl Differentiator<'_> {
         let mut parts = core::mem::take(&mut self.with_shadows);
         parts.clear();
         let turn = field.turn_with_shadows(world, &ray, light, moves, &mut parts);
+        self.probe.turning_edges += (parts.edges.len() + parts.shadows.len()) as u64;
         if let Some(turn) = &turn {
             let found = Found {
                 camera_ray: record.camera_ray,

@@ -124,13 +124,15 @@ pub(crate) struct Probe {
     pub(crate) rng: Rng,
     /// Rays cast.
     pub(crate) rays: u64,
+    /// Edges and shadows that turned rays, counted for each ray.
+    pub(crate) turning_edges: u64,
     /// Of one of them.
     pub(crate) hits: Vec<Hit>,
 }
 
 impl Probe {
     pub(crate) fn new(rng: Rng) -> Self {
-        Self { rng, rays: 0, hits: Vec::new() }
+        Self { rng, rays: 0, turning_edges: 0, hits: Vec::new() }
     }
 }
 

@@ -75,7 +75,9 @@ impl PathVelocities {
             distance: ray.length,
             end: ray.end.as_ref().map(|(point, _)| point),
         };
+        let before = self.turn_parts.len();
         let turn = self.field.turn(world, &turning, &mut self.probe, &mut self.turn_parts);
+        self.probe.turning_edges += (self.turn_parts.len() - before) as u64;
         self.present = turn.is_some().then_some(self.turns.len() as u32);
         self.turns.extend(turn);
     }
@@ -118,9 +120,9 @@ impl PathVelocities {
         self.vertices.push(VertexVelocity { turn: self.present, ..velocity });
     }
 
-    /// Rays that the field cast.
-    pub(crate) fn rays(&self) -> u64 {
-        self.probe.rays
+    /// What the field has looked at.
+    pub(crate) fn probe(&self) -> &Probe {
+        &self.probe
     }
 
     pub(crate) fn field(&self) -> &dyn VelocityField {

@@ -1,6 +1,6 @@
 //! A run: a scene prepared once, sampled in passes, with its results available at any time.
 
-mod choice;
+pub(crate) mod choice;
 mod component;
 mod describe;
 mod legend;
@@ -145,6 +145,8 @@ impl Session {
         settings.check(scene, derivatives)?;
         tangents.check()?;
         let tangents = tangents.seen_by(settings.sensor);
+        let (settings, estimator) = choice::estimator(scene, &tangents, settings, kept)?;
+        let settings = &settings;
         if let Some(name) = tangents.names.first() {
             let moves = tangents.move_light() || !tangents.sensor.is_empty();
             let moving = tangents.targets().filter(|target| tangents.moves(*target));
@@ -157,7 +159,7 @@ impl Session {
         let depth = settings.max_depth.within(scene.integrator.max_depth);
         let mut world =
             World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, kept)?;
-        let (settings, sampling) = choice::chosen(&world, scene, settings, derivatives, kept)?;
+        let (settings, sampling) = choice::sampling(&world, scene, settings, derivatives, kept)?;
         let settings = &settings;
         let mut components = Vec::new();
         for (settings, lit) in estimators(scene, tangents.targets(), settings) {
@@ -170,7 +172,7 @@ impl Session {
         }
         let mut plan = Plan::together(components.iter().map(|c| &c.plan));
         let bidirectional = settings.sampling == PathSampling::Bidirectional;
-        (plan.bidirectional, plan.sampling) = (bidirectional, sampling);
+        (plan.bidirectional, plan.sampling, plan.estimator) = (bidirectional, sampling, estimator);
         // Light's paths reach any pixel.
         plan.splatting = bidirectional || (settings.splatting && world.camera.shares_points());
         let emission = bidirectional.then(|| EmissionSampler::new(&world));

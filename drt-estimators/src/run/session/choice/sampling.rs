@@ -1,9 +1,7 @@
 //! Which paths find an image with the least work: `PathSampling::Auto`.
 //!
-//! A small picture is rendered with a few samples in either way. The work of one is variance × cost: the variances of 8 × 8
-//! blocks, added up, times rays cast and lookups in grids. Counts stand for time because they are the same on any machine,
-//! any number of threads and every run, and so is the choice. By them the ratio of works is within a quarter of what
-//! clocks tell.
+//! A small picture is rendered with a few samples in either way. The ratio of counted works is within a quarter of what clocks
+//! tell.
 
 use alloc::format;
 use alloc::string::String;
@@ -12,26 +10,13 @@ use crate::derivative::tangents;
 use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::{PathSampling, Settings};
+use crate::run::session::choice::{SAMPLES, WORTH_IT, cost, pilot, small, variance};
 use crate::run::session::{Session, Unattended};
-use crate::sampling::budget::LOOKUP;
 use crate::world::World;
 use crate::world::cache::PreparedCache;
 
-/// Longest side of the small picture, in pixels.
-const SIDE: f64 = 32.0;
-
-/// Samples of each of its pixels.
-const SAMPLES: u32 = 32;
-
-/// Part of the work of the camera's paths that those from both ends must not exceed, or noise of the pilot would often choose them for
-/// nothing.
-const WORTH_IT: f64 = 0.8;
-
-/// Between the seeds of the small pictures and that of the run.
-const SEED_STEP: u64 = 0x6a09_e667_f3bc_c909;
-
 /// The settings with a sampling in place of `Auto`, and why it was chosen.
-pub(super) fn chosen(
+pub(in super::super) fn sampling(
     world: &World,
     scene: &Scene,
     settings: &Settings,
@@ -76,25 +61,8 @@ pub(super) fn chosen(
 
 /// The work of a small picture.
 fn work(scene: &Scene, settings: &Settings, kept: &mut PreparedCache) -> Result<f64, Error> {
-    let mut scene = scene.clone();
-    let sensor = &mut scene.sensors[settings.sensor].item.sensor;
-    let film = sensor.film().map(f64::from);
-    let part = f64::min(1.0, SIDE / f64::max(film[0], film[1]));
-    let small = film.map(|n| f64::max(n * part, 1.0) as u32);
-    if let Ok(small) = sensor.with_film(small) {
-        *sensor = small;
-    }
-    let settings = Settings {
-        seed: settings.seed.wrapping_add(SEED_STEP),
-        adaptive: false,
-        terms: false,
-        ..settings.clone()
-    };
-    let (scene, at_rest) = tangents::apply(&scene, &[])?;
-    let mut session = Session::prepared(&scene, &at_rest, &settings, kept)?;
+    let (scene, at_rest) = tangents::apply(&small(scene, settings), &[])?;
+    let mut session = Session::prepared(&scene, &at_rest, &pilot(settings), kept)?;
     session.run(SAMPLES, &Unattended);
-    let counters = session.account.counters;
-    let layer = session.rendering().image;
-    let variance: f64 = layer.blocks.iter().map(|b| (b.stderr * b.stderr).sum()).sum();
-    Ok(variance * (counters.rays as f64 + LOOKUP * counters.tracking_steps as f64))
+    Ok(variance(&session.rendering().image) * cost(&session.account.counters))
 }
