@@ -94,6 +94,7 @@ impl Bsdf {
         match self {
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
             Self::Plastic(b) => b.is_smooth(),
+            Self::Coated(b) if b.coating.facets().is_none() => true,
             _ => self.inner().any(Self::is_smooth),
         }
     }
@@ -109,7 +110,7 @@ impl Bsdf {
     /// True where the value may depend on the place of its point.
     #[inline]
     pub(crate) fn varies(&self) -> bool {
-        matches!(self, Self::Textured(_) | Self::Blend(_) | Self::TwoSided(_))
+        matches!(self, Self::Textured(_) | Self::Blend(_) | Self::TwoSided(_) | Self::Coated(_))
     }
 
     /// True where directions along the surface are told apart, by its texture coordinates.

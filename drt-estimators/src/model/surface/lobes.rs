@@ -55,6 +55,7 @@ impl Bsdf {
             Self::Plastic(b) => plastic(b, wo, n),
             Self::Textured(b) => b.at(at).lobes(None, wo, n),
             Self::Blend(b) => b.lobes(at, wo, n),
+            Self::Coated(b) => b.lobes(at, wo, n),
             Self::Anisotropic(b) => uneven(b, wo, n),
             Self::Principled(b) => principled(b, wo, n),
             Self::PrincipledThin(b) => thin(b, wo, n),
@@ -63,6 +64,13 @@ impl Bsdf {
             _ => Lobes::even(0.0),
         }
     }
+}
+
+/// A sketch of which the two highest lobes stay; the others count as light from all around.
+pub(super) fn two_highest(even: f64, mut all: [Lobe; 4]) -> Lobes {
+    all.sort_unstable_by(|a, b| b.height.total_cmp(&a.height));
+    let [a, b, c, d] = all;
+    Lobes { even: even + c.height + d.height, lobes: [a, b] }
 }
 
 fn phong(b: &Phong, wo: Vec3, n: Vec3) -> Lobes {
@@ -158,7 +166,7 @@ fn measured(b: &Measured, wo: Vec3, n: Vec3) -> Lobes {
     Lobes::glossy(AROUND * albedo * FRAC_1_PI, [lobe, Lobe::default()])
 }
 
-fn reflection(wo: Vec3, n: Vec3, alpha: f64, share: f64) -> Lobe {
+pub(super) fn reflection(wo: Vec3, n: Vec3, alpha: f64, share: f64) -> Lobe {
     let cos = n.dot(wo).max(alpha);
     Lobe::new(mirrored(wo, n), 4.0 * alpha * alpha * cos, share)
 }

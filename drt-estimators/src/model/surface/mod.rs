@@ -36,6 +36,7 @@ mod angles;
 mod anisotropic;
 mod blend;
 mod change;
+mod coated;
 mod coating;
 mod composed;
 mod conductor;
@@ -76,6 +77,7 @@ use crate::model::surface::angles::Angles;
 pub use crate::model::surface::anisotropic::Anisotropic;
 pub use crate::model::surface::blend::Blend;
 pub use crate::model::surface::change::{BsdfChange, BsdfParams, BsdfTangent};
+pub use crate::model::surface::coated::Coated;
 pub use crate::model::surface::coating::Coating;
 use crate::model::surface::composed::Composed;
 pub use crate::model::surface::conductor::RoughConductor;
@@ -134,6 +136,8 @@ pub enum Bsdf {
     Mask(Box<Mask>),
     /// Something between two others.
     Blend(Box<Blend>),
+    /// One under a clear or tinted layer.
+    Coated(Box<Coated>),
     /// One whose normals are not those of the surface.
     Perturbed(Box<Perturbed>),
     /// A rough metal or interface whose lobes are longer than wide.
@@ -398,6 +402,7 @@ impl Bsdf {
             Self::Mask(b) => [Some(&b.bsdf), None],
             Self::Blend(b) => b.bsdfs.each_ref().map(Some),
             Self::Perturbed(b) => [Some(&b.bsdf), None],
+            Self::Coated(b) => [Some(&b.bsdf), None],
             _ => [None; 2],
         };
         a.into_iter().chain(b)
@@ -419,6 +424,7 @@ impl Bsdf {
                 b.slide(at, params) + b.at(Some(at)).slide(Some(at), [wo, wi, n], params, factor)
             }
             (Self::Blend(b), Some(_)) => b.slide(at, [wo, wi, n], factor),
+            (Self::Coated(b), Some(_)) => b.slide(at, [wo, wi, n], factor),
             _ => RgbVec::ZERO,
         }
     }
@@ -456,6 +462,7 @@ impl Bsdf {
             Self::Mask(b) => &**b,
             Self::Blend(b) => &**b,
             Self::Perturbed(b) => &**b,
+            Self::Coated(b) => &**b,
             Self::Anisotropic(b) => &**b,
             Self::Principled(b) => &**b,
             Self::PrincipledThin(b) => &**b,
@@ -545,6 +552,7 @@ impl Bsdf {
             Self::Mask(_) => "mask",
             Self::Blend(_) => "blendbsdf",
             Self::Perturbed(b) => b.name(),
+            Self::Coated(b) => b.name(),
             Self::Anisotropic(b) => b.base.name(),
             Self::Principled(_) => "principled",
             Self::PrincipledThin(_) => "principledthin",
@@ -578,6 +586,7 @@ impl Bsdf {
             Self::Mask(b) => b.validate(),
             Self::Blend(b) => b.validate(),
             Self::Perturbed(b) => b.validate(),
+            Self::Coated(b) => b.validate(),
             Self::Anisotropic(b) => b.validate(),
             Self::Principled(b) => b.validate(),
             Self::PrincipledThin(b) => b.validate(),
