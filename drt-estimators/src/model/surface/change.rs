@@ -187,6 +187,11 @@ impl Bsdf {
             Self::Principled(_) | Self::PrincipledThin(_) => {}
             Self::Perturbed(b) => return b.bsdf.undifferentiated(property),
             Self::Coated(b) => return b.undifferentiated(property),
+            // Which direction either belongs to is nothing that an even surface needs to know.
+            Self::Ward(b) if matches!(property, Property::AlphaU | Property::AlphaV) => {
+                let even = b.alpha[0] == b.alpha[1] && !self.is_oriented();
+                return even.then_some("both roughnesses are equal; give different ones");
+            }
             Self::Mask(b) if property != Property::Opacity => {
                 return b.bsdf.undifferentiated(property);
             }
@@ -268,6 +273,8 @@ impl Bsdf {
             Self::Anisotropic(b) => b.slot(property),
             Self::Principled(b) => b.slot(property),
             Self::PrincipledThin(b) => b.slot(property),
+            Self::RoughDiffuse(b) => b.slot(property),
+            Self::Ward(b) => b.slot(property),
         }
     }
 

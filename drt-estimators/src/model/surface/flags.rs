@@ -49,6 +49,8 @@ impl Bsdf {
             | Self::RoughConductor(_)
             | Self::Plastic(_)
             | Self::Conductor(_)
+            | Self::RoughDiffuse(_)
+            | Self::Ward(_)
             | Self::Measured(_) => true,
             Self::Textured(b) => b.bsdf.is_black_from_behind(),
             Self::Blend(b) => b.bsdfs.iter().all(Self::is_black_from_behind),
@@ -121,7 +123,14 @@ impl Bsdf {
             Self::Principled(b) => b.anisotropic != 0.0,
             Self::PrincipledThin(b) => b.anisotropic != 0.0,
             Self::Measured(b) => b.is_oriented(),
-            Self::Textured(b) if b.texture(Property::Anisotropic).is_some() => true,
+            Self::Ward(b) => b.alpha[0] != b.alpha[1],
+            Self::Textured(b)
+                if [Property::Anisotropic, Property::AlphaU, Property::AlphaV]
+                    .into_iter()
+                    .any(|p| b.texture(p).is_some()) =>
+            {
+                true
+            }
             _ => self.inner().any(Self::is_oriented),
         }
     }
@@ -154,6 +163,7 @@ impl Bsdf {
             Self::Anisotropic(_)
             | Self::Principled(_)
             | Self::PrincipledThin(_)
+            | Self::Ward(_)
             | Self::Measured(_) => self.is_oriented() && frames_jump_on(mesh),
             _ => self.inner().any(|b| b.is_discontinuous_on(mesh)),
         }

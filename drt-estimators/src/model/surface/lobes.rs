@@ -40,7 +40,7 @@ use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA};
 use crate::model::surface::principled::stretched;
 use crate::model::surface::{
     Anisotropic, At, Bsdf, Measured, Phong, Plastic, Principled, PrincipledThin, RoughConductor,
-    RoughDielectric,
+    RoughDielectric, Ward,
 };
 
 impl Bsdf {
@@ -60,6 +60,8 @@ impl Bsdf {
             Self::Principled(b) => principled(b, wo, n),
             Self::PrincipledThin(b) => thin(b, wo, n),
             Self::Measured(b) => measured(b, wo, n),
+            Self::RoughDiffuse(b) => Lobes::even(b.reflectance.mean() * FRAC_1_PI),
+            Self::Ward(b) => ward(b, wo, n),
             // Nothing is differentiated at all others.
             _ => Lobes::even(0.0),
         }
@@ -78,6 +80,11 @@ fn phong(b: &Phong, wo: Vec3, n: Vec3) -> Lobes {
     // As high in the middle as (exponent + 2) / (2 π).
     let width2 = 2.0 / (b.exponent + 2.0);
     let lobe = Lobe::new(mirrored(wo, n), width2, b.specular_reflectance.mean() * cos);
+    Lobes::glossy(b.reflectance.mean() * FRAC_1_PI, [lobe, Lobe::default()])
+}
+
+fn ward(b: &Ward, wo: Vec3, n: Vec3) -> Lobes {
+    let lobe = reflection(wo, n, widest(b.alpha), b.specular_reflectance.mean());
     Lobes::glossy(b.reflectance.mean() * FRAC_1_PI, [lobe, Lobe::default()])
 }
 

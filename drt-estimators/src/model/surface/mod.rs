@@ -11,7 +11,7 @@
 //! The models, their parameters and their defaults are those of the Mitsuba plugins `diffuse`,
 //! `phong`, `plastic`, `roughplastic`, `pplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`,
 //! `roughdielectric`, `principled`, `principledthin`, `measured`, `blendbsdf`, `mask`, `normalmap`, `bumpmap`, `twosided`
-//! and `null`.
+//! and `null`, and of those of Mitsuba 0.6 `coating`, `roughcoating`, `roughdiffuse` and `ward`.
 //!
 //! ```
 //! use drt_estimators::surface::{Bsdf, Given, RoughConductor};
@@ -58,6 +58,7 @@ mod plastic;
 mod principled;
 mod principled_thin;
 mod property;
+mod rough_diffuse;
 mod roughness_partner;
 mod shading_frame;
 mod smooth;
@@ -66,6 +67,7 @@ mod specular;
 pub(crate) mod tests;
 mod textured;
 mod visible_slope;
+mod ward;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -96,10 +98,12 @@ pub use crate::model::surface::plastic::Plastic;
 pub use crate::model::surface::principled::Principled;
 pub use crate::model::surface::principled_thin::PrincipledThin;
 pub use crate::model::surface::property::{Property, SurfaceError};
+pub use crate::model::surface::rough_diffuse::RoughDiffuse;
 pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
 pub use crate::model::surface::smooth::{Conductor, Dielectric, ThinDielectric};
 pub(crate) use crate::model::surface::specular::SpecularValue;
 pub use crate::model::surface::textured::Textured;
+pub use crate::model::surface::ward::{Ward, WardVariant};
 use crate::model::texture::TexturePoint;
 
 /// A bidirectional scattering distribution function.
@@ -148,6 +152,10 @@ pub enum Bsdf {
     PrincipledThin(Box<PrincipledThin>),
     /// One that was measured.
     Measured(Arc<Measured>),
+    /// A diffuse reflector of rough grooves.
+    RoughDiffuse(RoughDiffuse),
+    /// Ward's reflector.
+    Ward(Ward),
 }
 
 /// One-sided reflectors used on both sides of a surface: from behind, the normal is turned over.
@@ -467,6 +475,8 @@ impl Bsdf {
             Self::Principled(b) => &**b,
             Self::PrincipledThin(b) => &**b,
             Self::Measured(b) => &**b,
+            Self::RoughDiffuse(b) => b,
+            Self::Ward(b) => b,
             _ => return None,
         }))
     }
@@ -557,6 +567,8 @@ impl Bsdf {
             Self::Principled(_) => "principled",
             Self::PrincipledThin(_) => "principledthin",
             Self::Measured(_) => "measured",
+            Self::RoughDiffuse(_) => "roughdiffuse",
+            Self::Ward(_) => "ward",
         }
     }
 
@@ -590,6 +602,8 @@ impl Bsdf {
             Self::Anisotropic(b) => b.validate(),
             Self::Principled(b) => b.validate(),
             Self::PrincipledThin(b) => b.validate(),
+            Self::RoughDiffuse(b) => b.validate(),
+            Self::Ward(b) => b.validate(),
             _ => match_model!(self, b => b.validate(), _ => Ok(())),
         }
     }

@@ -10,6 +10,7 @@ mod framed;
 mod gradients;
 mod lobes;
 mod measured;
+mod past;
 mod perturbed;
 mod roughness_partners;
 mod sampling;
@@ -121,6 +122,14 @@ pub(crate) fn value_over<T: Real>(
             b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
         }
         Bsdf::Measured(b) => {
+            let frame = Frame::from_normal(n);
+            b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
+        }
+        Bsdf::RoughDiffuse(b) => {
+            let frame = Frame::from_normal(n);
+            b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
+        }
+        Bsdf::Ward(b) => {
             let frame = Frame::from_normal(n);
             b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
         }
@@ -244,6 +253,9 @@ fn composed_cases() -> Vec<Bsdf> {
         })),
         Bsdf::Principled(Box::new(Principled { spec_trans: 0.7, roughness: 0.6, ..through() })),
         Bsdf::PrincipledThin(Box::new(thin())),
+        Bsdf::RoughDiffuse(grooves(0.6, false)),
+        Bsdf::RoughDiffuse(grooves(0.3, true)),
+        Bsdf::Ward(Ward { alpha: [0.2, 0.5], ..Ward::default() }),
     ]
 }
 
@@ -259,6 +271,10 @@ fn varnished(bsdf: Bsdf, facets: Option<(Distribution, f64)>) -> Bsdf {
         thickness: 0.7,
         ..Coated::new(bsdf, coating.expect("a coating"))
     }))
+}
+
+fn grooves(alpha: f64, fast: bool) -> RoughDiffuse {
+    RoughDiffuse { reflectance: Rgb::new(0.9, 0.6, 0.3), alpha, fast }
 }
 
 fn blend(weight: f64, a: Bsdf, b: Bsdf) -> Bsdf {
