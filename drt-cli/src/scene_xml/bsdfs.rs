@@ -2,6 +2,7 @@
 
 mod composed;
 mod measured;
+mod past;
 mod principled;
 
 use drt_estimators::surface::{
@@ -44,13 +45,17 @@ impl<'a> Loader<'a> {
             "mask" => Bsdf::Mask(Box::new(self.mask(&p, parts)?)),
             "blendbsdf" => Bsdf::Blend(Box::new(self.blend(&p, parts)?)),
             "normalmap" => Bsdf::Perturbed(Box::new(self.normal_map(&p, parts)?)),
+            "coating" | "roughcoating" => Bsdf::Coated(Box::new(self.coated(&p, parts)?)),
+            "roughdiffuse" => Bsdf::RoughDiffuse(past::rough_diffuse(&p)?),
+            "ward" => past::ward(&p)?,
             "bumpmap" => Bsdf::Perturbed(Box::new(self.bump_map(&p, parts)?)),
             other => {
                 return Err(e.error(format!(
                     "the bsdf type `{other}` is not supported; expected diffuse, plastic, \
                      roughplastic, pplastic, conductor, roughconductor, dielectric, \
                      thindielectric, roughdielectric, phong, principled, principledthin, measured, \
-                     blendbsdf, mask, normalmap, bumpmap, twosided or null"
+                     blendbsdf, mask, normalmap, bumpmap, coating, roughcoating, roughdiffuse, \
+                     ward, twosided or null"
                 )));
             }
         };

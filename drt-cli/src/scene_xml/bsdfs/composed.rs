@@ -86,7 +86,7 @@ impl<'a> Loader<'a> {
     }
 
     /// The one BSDF inside.
-    fn only(&self, p: &Properties<'a>, parts: &Parts) -> Result<Bsdf, CliError> {
+    pub(super) fn only(&self, p: &Properties<'a>, parts: &Parts) -> Result<Bsdf, CliError> {
         let inner = self.index.single(p, "bsdf", None)?;
         let inner = inner.ok_or_else(|| p.element.error("expected a bsdf inside"))?;
         self.part(inner.target, parts)

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use drt_estimators::Scene;
 use drt_estimators::emitter::Emitter;
-use drt_estimators::surface::Bsdf;
+use drt_estimators::surface::{Bsdf, Ward, WardVariant};
 use drt_math::Rgb;
 
 use super::{old_scene, read, read_version, refused, scene};
@@ -94,6 +94,77 @@ fn lights_films_and_integrators_of_old_files() {
     );
     refused("<integrator type=\"ao\"/>", &["ao"]);
     refused("<emitter type=\"sky\"/>", &["sky", "envmap"]);
+}
+
+#[test]
+fn materials_of_old_files() {
+    let old = |text: &str| old_scene(text).bsdfs.remove(0).item;
+    let varnish = r#"<bsdf type="coating"><float name="intIOR" value="1.7"/><float name="thickness" value="2"/>
+        <rgb name="sigmaA" value="0.1,0.2,0.5"/><bsdf type="roughconductor"/></bsdf>"#;
+    let Bsdf::Coated(c) = old(varnish) else { panic!("no coating") };
+    assert_eq!(
+        (c.bsdf.name(), c.thickness, c.sigma_a),
+        ("roughconductor", 2.0, Rgb::new(0.1, 0.2, 0.5))
+    );
+    assert!(c.coating.facets().is_none() && (c.coating.eta() - 1.7 / 1.000_277).abs() < 1e-12);
+    let plain = old(r#"<bsdf type="coating"><bsdf type="diffuse"/></bsdf>"#);
+    assert!(
+        matches!(plain, Bsdf::Coated(c) if (c.coating.eta() - 1.504_183_3).abs() < 1e-6 && c.sigma_a.is_zero())
+    );
+    let rough = old(
+        r#"<bsdf type="roughcoating"><string name="distribution" value="ggx"/><float name="alpha" value="0.3"/>
+        <rgb name="specularReflectance" value="0.5"/><bsdf type="coating"><bsdf type="plastic"/></bsdf></bsdf>"#,
+    );
+    let Bsdf::Coated(c) = rough else { panic!("no coating") };
+    assert!(
+        c.coating.facets().is_some_and(|(_, alpha)| alpha == 0.3) && c.bsdf.name() == "coating"
+    );
+    // A roughness that varies would be that of what is inside.
+    let squares = r#"<texture name="alpha" type="checkerboard"/><bsdf type="roughconductor"/>"#;
+    refused(&format!("<bsdf type=\"roughcoating\">{squares}</bsdf>"), &["`alpha` of a coating"]);
+    refused("<bsdf type=\"coating\"/>", &["expected a bsdf inside"]);
+    refused(
+        "<bsdf type=\"coating\"><bsdf type=\"dielectric\"/></bsdf>",
+        &["cannot hold a dielectric"],
+    );
+    let thin =
+        r#"<bsdf type="coating"><float name="int_ior" value="1"/><bsdf type="diffuse"/></bsdf>"#;
+    refused(thin, &["\"eta\" is 0.99"]);
+
+    let Bsdf::RoughDiffuse(d) = old("<bsdf type=\"roughdiffuse\"/>") else { panic!("no grooves") };
+    assert_eq!((d.reflectance, d.alpha, d.fast), (Rgb::splat(0.5), 0.2, false));
+    let fast = old(
+        r#"<bsdf type="roughdiffuse"><boolean name="useFastApprox" value="true"/><float name="alpha" value="0.4"/>
+        <rgb name="diffuseReflectance" value="0.7"/></bsdf>"#,
+    );
+    assert!(
+        matches!(fast, Bsdf::RoughDiffuse(d) if d.fast && d.alpha == 0.4 && d.reflectance.g == 0.7)
+    );
+
+    let Bsdf::Ward(w) = old("<bsdf type=\"ward\"/>") else { panic!("no Ward") };
+    assert_eq!(w, Ward::default());
+    let w = old(
+        r#"<bsdf type="ward"><string name="variant" value="ward-duer"/><float name="alphaU" value="0.3"/></bsdf>"#,
+    );
+    assert!(matches!(w, Bsdf::Ward(w) if w.variant == WardVariant::Duer && w.alpha == [0.3, 0.1]));
+    refused(
+        "<bsdf type=\"ward\"><string name=\"variant\" value=\"phong\"/></bsdf>",
+        &["ward-duer"],
+    );
+    for none in ["hk", "hair"] {
+        refused(&format!("<bsdf type=\"{none}\"/>"), &[&format!("`{none}` is not supported")]);
+    }
+}
+
+/// A sphere under a layer, as it stands in a file that was refused.
+#[test]
+fn a_coated_sphere_is_a_scene() {
+    let s = old_scene(
+        r#"<integrator type="path"><integer name="maxDepth" value="3"/></integrator><emitter type="constant"/>
+        <shape type="sphere"><bsdf type="coating"><bsdf type="diffuse"/></bsdf></shape>"#,
+    );
+    assert_eq!(s.bsdfs[s.shapes[0].bsdf].item.name(), "coating");
+    assert!(s.bsdfs[s.shapes[0].bsdf].item.is_smooth());
 }
 
 #[test]

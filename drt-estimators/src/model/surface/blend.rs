@@ -1,7 +1,8 @@
 use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use crate::model::surface::composed::Composed;
+use crate::model::surface::composed::{Composed, choose};
+use crate::model::surface::lobes::two_highest;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
 use crate::model::surface::{
     At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
@@ -43,13 +44,8 @@ impl Blend {
     /// The part that a number of (0, 1) chooses, and the number stretched to (0, 1) again.
     fn choose(&self, choice: f64) -> (usize, f64) {
         let [first, second] = self.choices();
-        // Not 1, which no choice is.
-        let most = 1.0 - 0.5 * f64::EPSILON;
-        if choice < second {
-            (1, (choice / second).min(most))
-        } else {
-            (0, ((choice - second) / first).clamp(f64::MIN_POSITIVE, most))
-        }
+        let (is_second, choice) = choose(choice, [second, first]);
+        (usize::from(is_second), choice)
     }
 
     /// The gradient by the place of the point, through the textures of both parts.
@@ -73,10 +69,7 @@ impl Blend {
             let (part, weight) = (&parts[i / 2].lobes[i % 2], weights[i / 2]);
             *lobe = Lobe { height: part.height * weight, ..*part };
         }
-        all.sort_unstable_by(|a, b| b.height.total_cmp(&a.height));
-        let even = parts[0].even * weights[0] + parts[1].even * weights[1];
-        let [a, b, c, d] = all;
-        Lobes { even: even + c.height + d.height, lobes: [a, b] }
+        two_highest(parts[0].even * weights[0] + parts[1].even * weights[1], all)
     }
 
     pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {

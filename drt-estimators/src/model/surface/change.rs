@@ -18,7 +18,8 @@ pub struct BsdfParams {
     pub reflectance: Rgb,
     /// Weight of the glossy reflection; `clearcoat` and `diff_trans`.
     pub specular_reflectance: Rgb,
-    /// Weight of the glossy refraction; `spec_trans`, and the `opacity` of a mask around what has neither.
+    /// Weight of the glossy refraction; `spec_trans`, the `sigma_a` of a coating, and the `opacity` of a mask around what has
+    /// none of these.
     pub specular_transmittance: Rgb,
     /// Roughness: `alpha`, `alpha_u`, `roughness`.
     pub alpha: Rgb,
@@ -69,7 +70,10 @@ impl BsdfParams {
         Some(match property {
             Property::Reflectance | Property::BaseColor => 0,
             Property::SpecularReflectance | Property::Clearcoat | Property::DiffTrans => 1,
-            Property::SpecularTransmittance | Property::SpecTrans | Property::Opacity => 2,
+            Property::SpecularTransmittance
+            | Property::SpecTrans
+            | Property::Opacity
+            | Property::SigmaA => 2,
             Property::Alpha | Property::AlphaU | Property::Roughness => 3,
             Property::Eta => 4,
             Property::K | Property::Sheen => 5,
@@ -182,6 +186,12 @@ impl Bsdf {
         match plain {
             Self::Principled(_) | Self::PrincipledThin(_) => {}
             Self::Perturbed(b) => return b.bsdf.undifferentiated(property),
+            Self::Coated(b) => return b.undifferentiated(property),
+            // Which direction either belongs to is nothing that an even surface needs to know.
+            Self::Ward(b) if matches!(property, Property::AlphaU | Property::AlphaV) => {
+                let even = b.alpha[0] == b.alpha[1] && !self.is_oriented();
+                return even.then_some("both roughnesses are equal; give different ones");
+            }
             Self::Mask(b) if property != Property::Opacity => {
                 return b.bsdf.undifferentiated(property);
             }
@@ -252,7 +262,10 @@ impl Bsdf {
             Self::Conductor(b) => b.slot(property),
             Self::Dielectric(b) => b.slot(property),
             Self::ThinDielectric(b) => b.slot(property),
+            // Inside of another one; by itself it is refused with a message of its own.
+            Self::TwoSided(b) if b.back.is_some() => None,
             Self::TwoSided(b) => b.front.property(property),
+            Self::Coated(b) => b.slot(property),
             Self::Textured(b) => b.bsdf.property(property),
             Self::Mask(b) => b.slot(property),
             Self::Blend(b) => b.slot(property),
@@ -260,6 +273,8 @@ impl Bsdf {
             Self::Anisotropic(b) => b.slot(property),
             Self::Principled(b) => b.slot(property),
             Self::PrincipledThin(b) => b.slot(property),
+            Self::RoughDiffuse(b) => b.slot(property),
+            Self::Ward(b) => b.slot(property),
         }
     }
 
@@ -269,6 +284,7 @@ impl Bsdf {
             Self::Textured(b) => b.texture(property),
             Self::TwoSided(b) => b.front.texture(property),
             Self::Mask(b) => b.bsdf.texture(property),
+            Self::Coated(b) => b.texture(property),
             Self::Perturbed(b) => b.bsdf.texture(property),
             _ => None,
         }

@@ -6,6 +6,7 @@ use core::f64::consts::TAU;
 
 use drt_math::{Real, Vec3, fm, vec3};
 
+use crate::model::surface::angles::Angles;
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, mirrored, refracted};
 use crate::model::surface::property::{Property, SurfaceError, in_range};
@@ -109,6 +110,25 @@ impl Coating {
 
     pub(super) fn internal_reflectance(&self) -> f64 {
         self.internal_reflectance
+    }
+
+    /// The value of a white reflection by the microfacets; `None` of a smooth coating. Both directions are in front.
+    #[inline]
+    pub(super) fn reflection<T: Real>(&self, a: &Angles<T>) -> Option<T> {
+        let (distribution, alpha) = self.facets?;
+        let facets = distribution.facets(a, T::one(), T::from(alpha));
+        if facets.re() == 0.0 {
+            return Some(T::zero());
+        }
+        let fresnel = dielectric_reflected(a.h2.sqrt() * 0.5, T::from(self.eta));
+        Some(facets * fresnel * a.h2.squared() * 0.25)
+    }
+
+    /// The density with which visible microfacets are chosen to reflect so; `None` of a smooth coating.
+    #[inline]
+    pub(super) fn reflection_density(&self, a: &Angles) -> Option<f64> {
+        let (distribution, alpha) = self.facets?;
+        Some(0.25 * a.h2 * a.h2 * distribution.visible_density(a, 1.0, alpha))
     }
 
     /// The part of the light that goes through at a cosine in (0, 1].

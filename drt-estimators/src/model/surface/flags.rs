@@ -49,6 +49,8 @@ impl Bsdf {
             | Self::RoughConductor(_)
             | Self::Plastic(_)
             | Self::Conductor(_)
+            | Self::RoughDiffuse(_)
+            | Self::Ward(_)
             | Self::Measured(_) => true,
             Self::Textured(b) => b.bsdf.is_black_from_behind(),
             Self::Blend(b) => b.bsdfs.iter().all(Self::is_black_from_behind),
@@ -94,6 +96,7 @@ impl Bsdf {
         match self {
             Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
             Self::Plastic(b) => b.is_smooth(),
+            Self::Coated(b) if b.coating.facets().is_none() => true,
             _ => self.inner().any(Self::is_smooth),
         }
     }
@@ -109,7 +112,7 @@ impl Bsdf {
     /// True where the value may depend on the place of its point.
     #[inline]
     pub(crate) fn varies(&self) -> bool {
-        matches!(self, Self::Textured(_) | Self::Blend(_) | Self::TwoSided(_))
+        matches!(self, Self::Textured(_) | Self::Blend(_) | Self::TwoSided(_) | Self::Coated(_))
     }
 
     /// True where directions along the surface are told apart, by its texture coordinates.
@@ -120,7 +123,14 @@ impl Bsdf {
             Self::Principled(b) => b.anisotropic != 0.0,
             Self::PrincipledThin(b) => b.anisotropic != 0.0,
             Self::Measured(b) => b.is_oriented(),
-            Self::Textured(b) if b.texture(Property::Anisotropic).is_some() => true,
+            Self::Ward(b) => b.alpha[0] != b.alpha[1],
+            Self::Textured(b)
+                if [Property::Anisotropic, Property::AlphaU, Property::AlphaV]
+                    .into_iter()
+                    .any(|p| b.texture(p).is_some()) =>
+            {
+                true
+            }
             _ => self.inner().any(Self::is_oriented),
         }
     }
@@ -153,6 +163,7 @@ impl Bsdf {
             Self::Anisotropic(_)
             | Self::Principled(_)
             | Self::PrincipledThin(_)
+            | Self::Ward(_)
             | Self::Measured(_) => self.is_oriented() && frames_jump_on(mesh),
             _ => self.inner().any(|b| b.is_discontinuous_on(mesh)),
         }

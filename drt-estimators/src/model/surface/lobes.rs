@@ -40,7 +40,7 @@ use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA};
 use crate::model::surface::principled::stretched;
 use crate::model::surface::{
     Anisotropic, At, Bsdf, Measured, Phong, Plastic, Principled, PrincipledThin, RoughConductor,
-    RoughDielectric,
+    RoughDielectric, Ward,
 };
 
 impl Bsdf {
@@ -55,14 +55,24 @@ impl Bsdf {
             Self::Plastic(b) => plastic(b, wo, n),
             Self::Textured(b) => b.at(at).lobes(None, wo, n),
             Self::Blend(b) => b.lobes(at, wo, n),
+            Self::Coated(b) => b.lobes(at, wo, n),
             Self::Anisotropic(b) => uneven(b, wo, n),
             Self::Principled(b) => principled(b, wo, n),
             Self::PrincipledThin(b) => thin(b, wo, n),
             Self::Measured(b) => measured(b, wo, n),
+            Self::RoughDiffuse(b) => Lobes::even(b.reflectance.mean() * FRAC_1_PI),
+            Self::Ward(b) => ward(b, wo, n),
             // Nothing is differentiated at all others.
             _ => Lobes::even(0.0),
         }
     }
+}
+
+/// A sketch of which the two highest lobes stay; the others count as light from all around.
+pub(super) fn two_highest(even: f64, mut all: [Lobe; 4]) -> Lobes {
+    all.sort_unstable_by(|a, b| b.height.total_cmp(&a.height));
+    let [a, b, c, d] = all;
+    Lobes { even: even + c.height + d.height, lobes: [a, b] }
 }
 
 fn phong(b: &Phong, wo: Vec3, n: Vec3) -> Lobes {
@@ -70,6 +80,11 @@ fn phong(b: &Phong, wo: Vec3, n: Vec3) -> Lobes {
     // As high in the middle as (exponent + 2) / (2 π).
     let width2 = 2.0 / (b.exponent + 2.0);
     let lobe = Lobe::new(mirrored(wo, n), width2, b.specular_reflectance.mean() * cos);
+    Lobes::glossy(b.reflectance.mean() * FRAC_1_PI, [lobe, Lobe::default()])
+}
+
+fn ward(b: &Ward, wo: Vec3, n: Vec3) -> Lobes {
+    let lobe = reflection(wo, n, widest(b.alpha), b.specular_reflectance.mean());
     Lobes::glossy(b.reflectance.mean() * FRAC_1_PI, [lobe, Lobe::default()])
 }
 
@@ -158,7 +173,7 @@ fn measured(b: &Measured, wo: Vec3, n: Vec3) -> Lobes {
     Lobes::glossy(AROUND * albedo * FRAC_1_PI, [lobe, Lobe::default()])
 }
 
-fn reflection(wo: Vec3, n: Vec3, alpha: f64, share: f64) -> Lobe {
+pub(super) fn reflection(wo: Vec3, n: Vec3, alpha: f64, share: f64) -> Lobe {
     let cos = n.dot(wo).max(alpha);
     Lobe::new(mirrored(wo, n), 4.0 * alpha * alpha * cos, share)
 }

@@ -59,7 +59,9 @@ impl Mask {
 pub(super) fn has_transmittance(bsdf: &Bsdf) -> bool {
     match bsdf {
         Bsdf::RoughDielectric(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => true,
-        Bsdf::Anisotropic(_) | Bsdf::Principled(_) | Bsdf::PrincipledThin(_) => true,
+        Bsdf::Anisotropic(_) | Bsdf::Principled(_) | Bsdf::PrincipledThin(_) | Bsdf::Coated(_) => {
+            true
+        }
         Bsdf::Textured(b) => has_transmittance(&b.bsdf),
         Bsdf::Perturbed(b) => has_transmittance(&b.bsdf),
         // Of what is in a blend nothing has a derivative, and what is two-sided lets no light through.
@@ -108,7 +110,7 @@ impl Composed for Mask {
     fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let opacity = self.opaque();
         if let Some(inner) = self.bsdf.specular(at, wo, wi, n) {
-            let mut found = inner.scaled(opacity, opacity);
+            let mut found = inner.scaled(Rgb::splat(opacity), opacity);
             self.by_opacity(&mut found.params, inner.value);
             return Some(found);
         }

@@ -11,7 +11,7 @@
 //! The models, their parameters and their defaults are those of the Mitsuba plugins `diffuse`,
 //! `phong`, `plastic`, `roughplastic`, `pplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`,
 //! `roughdielectric`, `principled`, `principledthin`, `measured`, `blendbsdf`, `mask`, `normalmap`, `bumpmap`, `twosided`
-//! and `null`.
+//! and `null`, and of those of Mitsuba 0.6 `coating`, `roughcoating`, `roughdiffuse` and `ward`.
 //!
 //! ```
 //! use drt_estimators::surface::{Bsdf, Given, RoughConductor};
@@ -36,6 +36,7 @@ mod angles;
 mod anisotropic;
 mod blend;
 mod change;
+mod coated;
 mod coating;
 mod composed;
 mod conductor;
@@ -57,6 +58,7 @@ mod plastic;
 mod principled;
 mod principled_thin;
 mod property;
+mod rough_diffuse;
 mod roughness_partner;
 mod shading_frame;
 mod smooth;
@@ -65,6 +67,7 @@ mod specular;
 pub(crate) mod tests;
 mod textured;
 mod visible_slope;
+mod ward;
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
@@ -76,6 +79,7 @@ use crate::model::surface::angles::Angles;
 pub use crate::model::surface::anisotropic::Anisotropic;
 pub use crate::model::surface::blend::Blend;
 pub use crate::model::surface::change::{BsdfChange, BsdfParams, BsdfTangent};
+pub use crate::model::surface::coated::Coated;
 pub use crate::model::surface::coating::Coating;
 use crate::model::surface::composed::Composed;
 pub use crate::model::surface::conductor::RoughConductor;
@@ -94,10 +98,12 @@ pub use crate::model::surface::plastic::Plastic;
 pub use crate::model::surface::principled::Principled;
 pub use crate::model::surface::principled_thin::PrincipledThin;
 pub use crate::model::surface::property::{Property, SurfaceError};
+pub use crate::model::surface::rough_diffuse::RoughDiffuse;
 pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
 pub use crate::model::surface::smooth::{Conductor, Dielectric, ThinDielectric};
 pub(crate) use crate::model::surface::specular::SpecularValue;
 pub use crate::model::surface::textured::Textured;
+pub use crate::model::surface::ward::{Ward, WardVariant};
 use crate::model::texture::TexturePoint;
 
 /// A bidirectional scattering distribution function.
@@ -134,6 +140,8 @@ pub enum Bsdf {
     Mask(Box<Mask>),
     /// Something between two others.
     Blend(Box<Blend>),
+    /// One under a clear or tinted layer.
+    Coated(Box<Coated>),
     /// One whose normals are not those of the surface.
     Perturbed(Box<Perturbed>),
     /// A rough metal or interface whose lobes are longer than wide.
@@ -144,6 +152,10 @@ pub enum Bsdf {
     PrincipledThin(Box<PrincipledThin>),
     /// One that was measured.
     Measured(Arc<Measured>),
+    /// A diffuse reflector of rough grooves.
+    RoughDiffuse(RoughDiffuse),
+    /// Ward's reflector.
+    Ward(Ward),
 }
 
 /// One-sided reflectors used on both sides of a surface: from behind, the normal is turned over.
@@ -398,6 +410,7 @@ impl Bsdf {
             Self::Mask(b) => [Some(&b.bsdf), None],
             Self::Blend(b) => b.bsdfs.each_ref().map(Some),
             Self::Perturbed(b) => [Some(&b.bsdf), None],
+            Self::Coated(b) => [Some(&b.bsdf), None],
             _ => [None; 2],
         };
         a.into_iter().chain(b)
@@ -419,6 +432,7 @@ impl Bsdf {
                 b.slide(at, params) + b.at(Some(at)).slide(Some(at), [wo, wi, n], params, factor)
             }
             (Self::Blend(b), Some(_)) => b.slide(at, [wo, wi, n], factor),
+            (Self::Coated(b), Some(_)) => b.slide(at, [wo, wi, n], factor),
             _ => RgbVec::ZERO,
         }
     }
@@ -456,10 +470,13 @@ impl Bsdf {
             Self::Mask(b) => &**b,
             Self::Blend(b) => &**b,
             Self::Perturbed(b) => &**b,
+            Self::Coated(b) => &**b,
             Self::Anisotropic(b) => &**b,
             Self::Principled(b) => &**b,
             Self::PrincipledThin(b) => &**b,
             Self::Measured(b) => &**b,
+            Self::RoughDiffuse(b) => b,
+            Self::Ward(b) => b,
             _ => return None,
         }))
     }
@@ -545,10 +562,13 @@ impl Bsdf {
             Self::Mask(_) => "mask",
             Self::Blend(_) => "blendbsdf",
             Self::Perturbed(b) => b.name(),
+            Self::Coated(b) => b.name(),
             Self::Anisotropic(b) => b.base.name(),
             Self::Principled(_) => "principled",
             Self::PrincipledThin(_) => "principledthin",
             Self::Measured(_) => "measured",
+            Self::RoughDiffuse(_) => "roughdiffuse",
+            Self::Ward(_) => "ward",
         }
     }
 
@@ -578,9 +598,12 @@ impl Bsdf {
             Self::Mask(b) => b.validate(),
             Self::Blend(b) => b.validate(),
             Self::Perturbed(b) => b.validate(),
+            Self::Coated(b) => b.validate(),
             Self::Anisotropic(b) => b.validate(),
             Self::Principled(b) => b.validate(),
             Self::PrincipledThin(b) => b.validate(),
+            Self::RoughDiffuse(b) => b.validate(),
+            Self::Ward(b) => b.validate(),
             _ => match_model!(self, b => b.validate(), _ => Ok(())),
         }
     }

@@ -243,7 +243,7 @@ impl Composed for Perturbed {
         let facet = self.seen_from(&tilt, wo);
         let found = self.bsdf.specular(Some(&facet.at()), wo, wi, facet.normal)?;
         let shadowing = if facet.sees(wi) { self.shadowing(&facet, wi).0 } else { 0.0 };
-        Some(found.scaled(shadowing, 1.0))
+        Some(found.scaled(Rgb::splat(shadowing), 1.0))
     }
 
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {

@@ -56,7 +56,7 @@ impl Plastic {
             return Rgb::splat(T::zero());
         }
         let base = reflectance.map(|c| c / self.inside(c)) * self.base(a);
-        match self.facets(a) {
+        match self.coating.reflection(a) {
             Some(grey) if grey.re() != 0.0 => base + specular_reflectance * grey,
             _ => base,
         }
@@ -82,18 +82,6 @@ impl Plastic {
         through * a.cos_i * (FRAC_1_PI / (eta * eta))
     }
 
-    /// The reflection by microfacets, but for its colour.
-    #[inline]
-    fn facets<T: Real>(&self, a: &Angles<T>) -> Option<T> {
-        let (distribution, alpha) = self.coating.facets()?;
-        let facets = distribution.facets(a, T::one(), T::from(alpha));
-        if facets.re() == 0.0 {
-            return Some(T::zero());
-        }
-        let fresnel = dielectric_reflected(a.h2.sqrt() * 0.5, T::from(self.coating.eta()));
-        Some(facets * fresnel * a.h2.squared() * 0.25)
-    }
-
     #[inline]
     pub(super) fn slopes(&self, a: &Angles) -> Slopes {
         let mut s = Slopes::default();
@@ -106,7 +94,7 @@ impl Plastic {
             h2: Dual::variable(a.h2, 2),
         };
         let base = self.base(&angles);
-        let grey = self.facets(&angles).unwrap_or(Dual::from(0.0));
+        let grey = self.coating.reflection(&angles).unwrap_or(Dual::from(0.0));
         let colour = self.reflectance.map(|c| c / self.inside(c));
         let along = |i: usize| colour * base.eps[i] + self.specular_reflectance * grey.eps[i];
         s.value = colour * base.re + self.specular_reflectance * grey.re;
@@ -136,11 +124,8 @@ impl Plastic {
         }
         let specular = self.specular_choice(a.cos_o);
         let base = (1.0 - specular) * a.cos_i * FRAC_1_PI;
-        match self.coating.facets() {
-            Some((distribution, alpha)) => {
-                let density = distribution.visible_density(a, 1.0, alpha);
-                base + specular * 0.25 * a.h2 * a.h2 * density
-            }
+        match self.coating.reflection_density(a) {
+            Some(density) => base + specular * density,
             None => base,
         }
     }

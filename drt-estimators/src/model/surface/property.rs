@@ -57,10 +57,14 @@ pub enum Property {
     ClearcoatGloss,
     /// Diffuse light that goes through a thin sheet, of two parts.
     DiffTrans,
+    /// Absorption coefficient of a coating, a colour.
+    SigmaA,
+    /// Thickness of a coating.
+    Thickness,
 }
 
 impl Property {
-    pub(super) const ALL: [Self; 23] = [
+    pub(super) const ALL: [Self; 25] = [
         Self::Reflectance,
         Self::SpecularReflectance,
         Self::SpecularTransmittance,
@@ -84,6 +88,8 @@ impl Property {
         Self::Clearcoat,
         Self::ClearcoatGloss,
         Self::DiffTrans,
+        Self::SigmaA,
+        Self::Thickness,
     ];
 
     /// The property's name in job files.
@@ -113,6 +119,8 @@ impl Property {
             Self::Clearcoat => "clearcoat",
             Self::ClearcoatGloss => "clearcoat_gloss",
             Self::DiffTrans => "diff_trans",
+            Self::SigmaA => "sigma_a",
+            Self::Thickness => "thickness",
         }
     }
 

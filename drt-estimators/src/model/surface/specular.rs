@@ -23,9 +23,9 @@ pub(crate) struct SpecularValue {
 
 impl SpecularValue {
     /// So many times the value, drawn so many times as often.
-    pub(super) fn scaled(&self, value: f64, probability: f64) -> Self {
+    pub(super) fn scaled(&self, value: Rgb, probability: f64) -> Self {
         let mut params = BsdfParams::default();
-        params.scatter(&self.params, Rgb::splat(value));
+        params.scatter(&self.params, value);
         Self { value: self.value * value, params, probability: self.probability * probability }
     }
 }
@@ -53,7 +53,7 @@ impl Bsdf {
             | Self::RoughDielectric(_) => None,
             _ => {
                 let found = self.specular(at, wo, wi, n)?;
-                let inverse = found.probability.recip();
+                let inverse = Rgb::splat(found.probability.recip());
                 (found.probability > 0.0).then(|| found.scaled(inverse, 1.0).params)
             }
         }

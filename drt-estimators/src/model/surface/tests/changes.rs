@@ -24,6 +24,9 @@ fn tangents_are_the_rates_of_applied_changes() {
     for bsdf in cases() {
         for change in every_change() {
             let theta = 0.2;
+            if bsdf.undifferentiated(change.property).is_some() {
+                continue;
+            }
             let Ok(velocity) = bsdf.tangent(&change, theta) else { continue };
             let at = |theta: f64| {
                 let mut changed = bsdf.clone();

@@ -3,7 +3,7 @@ use drt_math::Dual;
 use crate::model::surface::tests::*;
 
 /// Lanes 0..9 are the coordinates of `wo`, `wi` and `n`; three for each property follow.
-const LANES: usize = 21;
+const LANES: usize = 24;
 type D = Dual<f64, LANES>;
 
 fn seeded(v: [f64; 3], lane: usize) -> [D; 3] {

@@ -1,6 +1,7 @@
 //! Every model is judged as the same list of cases, from the same directions.
 
 mod changes;
+mod coated;
 mod composed;
 mod direction_partners;
 mod energy;
@@ -9,6 +10,7 @@ mod framed;
 mod gradients;
 mod lobes;
 mod measured;
+mod past;
 mod perturbed;
 mod roughness_partners;
 mod sampling;
@@ -71,6 +73,34 @@ pub(crate) fn value_over<T: Real>(
         Bsdf::Textured(b) => value_over(&b.bsdf, wo, wi, n, lift),
         // Without a place, normals are the surface's.
         Bsdf::Perturbed(b) => value_over(&b.bsdf, wo, wi, n, lift),
+        Bsdf::Coated(b) => {
+            // What lies below, by Snell's law over any scalar; a texture or another layer below has no place here.
+            let eta = T::from(b.coating.eta());
+            let cosine = |c: T| (T::one() - (T::one() - c.squared()) / eta.squared()).sqrt();
+            let below = |w: Vec3<T>, c: T| {
+                let inside = if c.re() < 0.0 { -cosine(c) } else { cosine(c) };
+                w * eta.recip() + n * (inside - c / eta)
+            };
+            let (o, i) = (below(wo, a.cos_o), below(wi, a.cos_i));
+            // A reflectance of the layer hides that of what is below.
+            let mut shown = |property, value: Rgb| match property {
+                Property::SpecularReflectance => value.map(T::from),
+                _ => lift(property, value),
+            };
+            let value = value_over(&b.bsdf, o, i, n, &mut shown);
+            let [co, ci] = [a.cos_o, a.cos_i].map(T::abs);
+            let path = (cosine(co).recip() + cosine(ci).recip()) * b.thickness;
+            let sigma_a = lift(Property::SigmaA, b.sigma_a);
+            let through = b.coating.let_through(co) * b.coating.let_through(ci) * ci
+                / (cosine(ci) * eta.squared());
+            let value = value * sigma_a.map(|s| (-(s * path)).exp() * through);
+            let specular = lift(Property::SpecularReflectance, b.specular_reflectance);
+            let front = if a.cos_o.re() < 0.0 { a.flipped() } else { a };
+            match b.coating.reflection(&front) {
+                Some(top) if front.in_front() => value + specular * top,
+                _ => value,
+            }
+        }
         Bsdf::Mask(b) => value_over(&b.bsdf, wo, wi, n, lift) * T::from(b.opacity),
         Bsdf::Blend(b) => {
             let weight = lift(Property::Weight, Rgb::splat(b.weight)).r;
@@ -92,6 +122,14 @@ pub(crate) fn value_over<T: Real>(
             b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
         }
         Bsdf::Measured(b) => {
+            let frame = Frame::from_normal(n);
+            b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
+        }
+        Bsdf::RoughDiffuse(b) => {
+            let frame = Frame::from_normal(n);
+            b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
+        }
+        Bsdf::Ward(b) => {
             let frame = Frame::from_normal(n);
             b.value(number_over(lift), frame.to_local(wo), frame.to_local(wi))
         }
@@ -186,6 +224,12 @@ fn cases() -> Vec<Bsdf> {
         Bsdf::TwoSided(Box::new(copper_front)),
         Bsdf::Plastic(unmixed_plastic(Beckmann, 0.3, 1.5)),
         blend(0.3, Bsdf::Phong(phong), Bsdf::RoughDielectric(glass(Ggx, 0.4, 1.5))),
+        varnished(Bsdf::Diffuse(Diffuse { reflectance: Rgb::new(0.9, 0.6, 0.3) }), None),
+        varnished(Bsdf::RoughConductor(copper(Ggx, 0.3)), Some((Beckmann, 0.2))),
+        varnished(
+            Bsdf::TwoSided(Box::new(TwoSided { front: Bsdf::Phong(phong), back: None })),
+            Some((Ggx, 0.3)),
+        ),
     ]
 }
 
@@ -209,7 +253,28 @@ fn composed_cases() -> Vec<Bsdf> {
         })),
         Bsdf::Principled(Box::new(Principled { spec_trans: 0.7, roughness: 0.6, ..through() })),
         Bsdf::PrincipledThin(Box::new(thin())),
+        Bsdf::RoughDiffuse(grooves(0.6, false)),
+        Bsdf::RoughDiffuse(grooves(0.3, true)),
+        Bsdf::Ward(Ward { alpha: [0.2, 0.5], ..Ward::default() }),
     ]
+}
+
+/// Under a tinted layer, smooth or rough.
+fn varnished(bsdf: Bsdf, facets: Option<(Distribution, f64)>) -> Bsdf {
+    let coating = match facets {
+        None => Coating::smooth(1.5),
+        Some((distribution, alpha)) => Coating::rough(distribution, alpha, 1.4),
+    };
+    Bsdf::Coated(Box::new(Coated {
+        specular_reflectance: Rgb::new(0.9, 1.0, 0.8),
+        sigma_a: Rgb::new(0.1, 0.2, 0.5),
+        thickness: 0.7,
+        ..Coated::new(bsdf, coating.expect("a coating"))
+    }))
+}
+
+fn grooves(alpha: f64, fast: bool) -> RoughDiffuse {
+    RoughDiffuse { reflectance: Rgb::new(0.9, 0.6, 0.3), alpha, fast }
 }
 
 fn blend(weight: f64, a: Bsdf, b: Bsdf) -> Bsdf {
