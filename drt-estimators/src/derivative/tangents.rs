@@ -306,11 +306,11 @@ impl Apply<'_> {
         let Some(first) = changes.first().map(|c| c.parameter) else { return Ok(()) };
         let n = self.parameters.len();
         let mut medium = self.scene.media[i].item.clone();
-        match (self.deforming_leader(target)?, medium.grid()) {
-            (Some(leader), Some(grid)) => {
+        match (self.deforming_leader(target)?, medium.carried_bounds()) {
+            (Some(leader), Some(bounds)) => {
                 let shape = &self.given.shapes[leader].mesh;
                 let deformation =
-                    GridDeformation::new(grid, shape, &changes, n).map_err(|e| match e {
+                    GridDeformation::new(bounds, shape, &changes, n).map_err(|e| match e {
                         GridDeformationError::Motion(e) => self.fail(e.parameter, target, e.cause),
                         GridDeformationError::Shape(p, reason) => self.fail(p, target, reason),
                     })?;
@@ -328,7 +328,7 @@ impl Apply<'_> {
                 let frame = move_affine(&changes, n)
                     .map_err(|e| self.fail(e.parameter, target, e.cause))?;
                 medium.place(&frame.map).map_err(|e| self.fail(first, target, e))?;
-                if medium.grid().is_some() {
+                if medium.is_carried() {
                     for (t, velocity) in tangents.iter_mut().zip(&frame.velocities) {
                         t.velocity = *velocity;
                     }

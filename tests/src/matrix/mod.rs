@@ -40,7 +40,7 @@ macro_rules! every_stage {
                 layers sheet ember;
             deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed
                 lantern stirred_smoke still_smoke fine_milk fine_glass;
-            riding: riding riding_tight riding_inside riding_still riding_mean_value;
+            riding: riding riding_tight riding_inside riding_still riding_mean_value dyed;
             caged: caged_milk caged_glass caged_solid;
         }
     };
