@@ -1,7 +1,9 @@
 use drt_math::{Affine, Rgb, ValueChange, ValueMap};
 
 use crate::homogeneous::Homogeneous;
-use crate::{Grid, GridMedium, Medium, MediumError, MediumKind, Phase, Property, Volume};
+use crate::{
+    Grid, GridMedium, Medium, MediumError, MediumKind, Phase, Property, UniformMedium, Volume,
+};
 
 /// One way in which a medium depends on a parameter theta.
 ///
@@ -103,6 +105,8 @@ impl Medium {
             MediumChange::G(op) => self.phase.change(op, theta),
             _ => match (change.field(), &mut self.kind) {
                 (Some(c), MediumKind::Homogeneous(h)) => h.change(c, theta),
+                (Some(_), MediumKind::Uniform(u)) if u.is_deformed() => Err(MediumError::Deformed),
+                (Some(c), MediumKind::Uniform(u)) => u.change(c, theta),
                 (Some(c), MediumKind::Grid(g)) => g.change(c, theta),
                 (_, MediumKind::Deformed(_)) => Err(MediumError::Deformed),
                 (_, MediumKind::Custom(_)) => Err(MediumError::CustomField),
@@ -120,17 +124,21 @@ impl Medium {
     /// # Errors
     /// When the property has no grid, or the numbers do not fit it or are not finite.
     pub fn add_to_voxels(&mut self, property: Property, step: &[f64]) -> Result<(), MediumError> {
-        let medium = match &mut self.kind {
-            MediumKind::Grid(medium) => medium,
-            MediumKind::Deformed(_) => return Err(MediumError::Deformed),
-            _ => return Err(MediumError::NotAGrid { property }),
-        };
-        let scale = if property == Property::SigmaT { medium.editable_scale() } else { 1.0 };
-        let grid = match property {
-            Property::SigmaT => Some(&mut medium.density),
-            Property::Albedo => medium.albedo.grid_mut(),
-            Property::Emission => medium.emission.grid_mut(),
-            Property::G => None,
+        let mut scale = 1.0;
+        let grid = match (&mut self.kind, property) {
+            (MediumKind::Deformed(_), _) => return Err(MediumError::Deformed),
+            (MediumKind::Uniform(u), _) if u.is_deformed() => return Err(MediumError::Deformed),
+            (MediumKind::Grid(g), Property::SigmaT) => {
+                scale = g.editable_scale();
+                Some(&mut g.density)
+            }
+            (MediumKind::Grid(GridMedium { albedo: volume, .. }), Property::Albedo)
+            | (MediumKind::Grid(GridMedium { emission: volume, .. }), Property::Emission)
+            | (MediumKind::Uniform(UniformMedium { albedo: volume, .. }), Property::Albedo)
+            | (MediumKind::Uniform(UniformMedium { emission: volume, .. }), Property::Emission) => {
+                volume.grid_mut()
+            }
+            _ => None,
         };
         let grid = grid.ok_or(MediumError::NotAGrid { property })?;
         let values = grid.values();
@@ -149,7 +157,7 @@ impl Medium {
         for (v, s) in grid.values_mut().iter_mut().zip(step) {
             *v += s / scale;
         }
-        if property == Property::SigmaT {
+        if let (MediumKind::Grid(medium), Property::SigmaT) = (&mut self.kind, property) {
             medium.update_bounds(None);
         }
         Ok(())
@@ -180,6 +188,16 @@ impl Homogeneous {
     }
 }
 
+impl UniformMedium {
+    fn change(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
+        match c.field {
+            Field::SigmaT => self.extinction.change(c, theta),
+            Field::Albedo => c.of_volume(&mut self.albedo, theta),
+            Field::Emission => c.of_volume(&mut self.emission, theta),
+        }
+    }
+}
+
 impl GridMedium {
     fn change(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
         let volume = match c.field {
@@ -187,11 +205,7 @@ impl GridMedium {
             Field::Albedo => &mut self.albedo,
             Field::Emission => &mut self.emission,
         };
-        match volume {
-            Volume::Constant(v) => *v = c.of_constant(*v, theta)?,
-            Volume::Grid(g) => c.of_grid(g, theta, 1.0)?,
-        }
-        Ok(())
+        c.of_volume(volume, theta)
     }
 
     fn change_density(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
@@ -238,6 +252,14 @@ impl FieldChange {
         let changed = self.op.at(value, theta);
         changed.to_array().into_iter().try_for_each(|v| self.finite(v).map(drop))?;
         Ok(changed)
+    }
+
+    fn of_volume(&self, volume: &mut Volume, theta: f64) -> Result<(), MediumError> {
+        match volume {
+            Volume::Constant(v) => *v = self.of_constant(*v, theta)?,
+            Volume::Grid(g) => self.of_grid(g, theta, 1.0)?,
+        }
+        Ok(())
     }
 
     /// Changes a grid whose values times `scale` are the property.

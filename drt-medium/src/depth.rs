@@ -41,7 +41,7 @@ pub struct DepthEstimate<'a> {
 
 impl<'a> DepthEstimate<'a> {
     /// The estimate from points of the ray, without the faces of a grid's box. Gradients are looked
-    /// up only for what is `moving`. A homogeneous medium, which has closed forms, gives nothing.
+    /// up only for what is `moving`. A medium of one extinction, which has closed forms, gives nothing.
     #[must_use]
     pub fn inside(medium: &Medium, ray: Ray, points: &'a [(f64, f64)], moving: bool) -> Self {
         let mut estimate = Self {
@@ -54,7 +54,7 @@ impl<'a> DepthEstimate<'a> {
             faces: false,
         };
         match &medium.kind {
-            MediumKind::Homogeneous(_) => {}
+            MediumKind::Homogeneous(_) | MediumKind::Uniform(_) => {}
             MediumKind::Grid(g) if moving => estimate.add_grid::<true>(g),
             MediumKind::Grid(g) => estimate.add_grid::<false>(g),
             MediumKind::Deformed(d) => estimate.add_deformed(d, moving),

@@ -5,8 +5,8 @@ use alloc::vec::Vec;
 use drt_math::{Affine, Rgb, Vec3};
 
 use crate::{
-    CoefficientRates, Crossing, DepthEstimate, FieldTangent, Flow, FlowBasis, Grid, GridMedium,
-    Medium, MediumKind, MediumTangent,
+    CoefficientRates, Crossing, DepthEstimate, FieldTangent, Flow, FlowBasis, Grid, Medium,
+    MediumTangent,
 };
 
 /// Derivative of a loss with respect to one coefficient field: the transpose of [`FieldTangent`].
@@ -134,8 +134,7 @@ impl MediumGradient {
     /// No derivative yet, with room for every voxel of the medium.
     #[must_use]
     pub fn zeros(medium: &Medium) -> Self {
-        let grids = medium.grid().map(GridMedium::volumes);
-        let [sigma_t, albedo, emission] = grids.unwrap_or_default().map(FieldGradient::zeros);
+        let [sigma_t, albedo, emission] = medium.volumes().map(FieldGradient::zeros);
         Self { sigma_t, albedo, emission, g: 0.0, velocity: Affine::ZERO, flow: None }
     }
 
@@ -158,16 +157,12 @@ impl MediumGradient {
     /// the exact transpose of [`MediumTangent::rates`].
     pub fn scatter(&mut self, medium: &Medium, x: Vec3, adjoint: &CoefficientRates) {
         self.g += adjoint.g;
-        let (grids, at) = match (&medium.kind, medium.grid_at(x)) {
-            (MediumKind::Homogeneous(_), _) => ([None; 3], x),
-            (_, Some((g, material))) => (g.volumes(), material),
-            (_, None) => return,
-        };
+        let Some((grids, at)) = medium.volumes_at(x) else { return };
         let c = medium.coefficients(x);
         self.sigma_t.scatter(c.sigma_t, grids[0], at, adjoint.sigma_t);
         self.albedo.scatter(c.albedo, grids[1], at, adjoint.albedo);
         self.emission.scatter(c.emission, grids[2], at, adjoint.emission);
-        if grids[0].is_some() {
+        if grids.iter().any(Option::is_some) {
             let g = medium.gradients(x);
             let pull = g.sigma_t.weighted(adjoint.sigma_t)
                 + g.albedo.weighted(adjoint.albedo)

@@ -23,8 +23,10 @@ mod reach;
 mod tangent;
 pub mod tracking;
 mod transmittance;
+mod uniform;
 #[cfg(feature = "vol")]
 pub mod vol;
+mod volume;
 
 pub use drt_math::ValueChange;
 
@@ -37,10 +39,12 @@ pub use field::{DensityField, Piece, Ray};
 pub use flow::{Flow, FlowBasis, FlowPlace, NodeWeights};
 pub use gradient::{FieldGradient, FlowGradient, MediumGradient};
 pub use grid::{Filter, Grid, Layout, Wrap};
-pub use grid_medium::{GridMedium, Volume};
+pub use grid_medium::GridMedium;
 pub use homogeneous::Homogeneous;
 pub use medium::{Medium, MediumKind};
 pub use phase::{Phase, PhaseBlend, PhaseTable, henyey_greenstein, rayleigh};
 pub use tangent::{FieldTangent, MediumTangent};
 pub use tracking::{DistanceSample, TrackingStats};
 pub use transmittance::{Crossing, TransmittanceRate};
+pub use uniform::UniformMedium;
+pub use volume::Volume;

@@ -7,8 +7,9 @@ use drt_math::{Affine, Rgb, Rng, Vec3};
 use crate::homogeneous::check;
 use crate::tracking::zip;
 use crate::{
-    CoefficientGradients, Coefficients, Crossing, DeformedGrid, DensityField, DistanceSample,
-    GridMedium, Homogeneous, MediumError, Phase, Property, Ray, SpaceMap, TrackingStats, tracking,
+    CoefficientGradients, Coefficients, Crossing, DeformedGrid, DensityField, DistanceSample, Grid,
+    GridMedium, Homogeneous, MediumError, Phase, Property, Ray, SpaceMap, TrackingStats,
+    UniformMedium, tracking,
 };
 
 /// Where a medium gets its coefficients from.
@@ -17,6 +18,8 @@ use crate::{
 pub enum MediumKind {
     /// One set of coefficients everywhere.
     Homogeneous(Homogeneous),
+    /// One extinction everywhere, and volumes for the rest.
+    Uniform(UniformMedium),
     /// Voxels in a box.
     Grid(GridMedium),
     /// Voxels in a box that is bent out of shape. It is made from the other for as long as it has
@@ -49,6 +52,12 @@ impl From<Homogeneous> for MediumKind {
     }
 }
 
+impl From<UniformMedium> for MediumKind {
+    fn from(u: UniformMedium) -> Self {
+        Self::Uniform(u)
+    }
+}
+
 impl From<GridMedium> for MediumKind {
     fn from(g: GridMedium) -> Self {
         Self::Grid(g)
@@ -74,6 +83,7 @@ impl Medium {
     pub fn coefficients(&self, x: Vec3) -> Coefficients {
         match &self.kind {
             MediumKind::Homogeneous(h) => h.coefficients(),
+            MediumKind::Uniform(u) => u.coefficients(x),
             MediumKind::Grid(g) => g.coefficients(x),
             MediumKind::Deformed(d) => d.coefficients(x),
             MediumKind::Custom(f) => f.coefficients(x),
@@ -87,6 +97,7 @@ impl Medium {
     pub fn check(&self, property: Property) -> Result<(), MediumError> {
         let coefficients = match &self.kind {
             MediumKind::Homogeneous(h) => h.coefficients(),
+            MediumKind::Uniform(u) => return u.check_property(property),
             MediumKind::Grid(g) => return g.check_property(property),
             MediumKind::Deformed(d) => return d.grids().check_property(property),
             MediumKind::Custom(_) => return Ok(()),
@@ -106,6 +117,7 @@ impl Medium {
     pub fn sigma_t(&self, x: Vec3) -> Rgb {
         match &self.kind {
             MediumKind::Homogeneous(h) => h.coefficients().sigma_t,
+            MediumKind::Uniform(u) => u.sigma_t(),
             MediumKind::Grid(g) => g.sigma_t(x),
             MediumKind::Deformed(d) => d.sigma_t(x),
             MediumKind::Custom(f) => f.sigma_t(x),
@@ -119,6 +131,7 @@ impl Medium {
     pub fn gradients(&self, x: Vec3) -> CoefficientGradients {
         match &self.kind {
             MediumKind::Homogeneous(_) => CoefficientGradients::ZERO,
+            MediumKind::Uniform(u) => u.gradients(x),
             MediumKind::Grid(g) => g.gradients(x),
             MediumKind::Deformed(d) => d.gradients(x),
             MediumKind::Custom(f) => f.gradients(x),
@@ -135,14 +148,27 @@ impl Medium {
         }
     }
 
-    /// The grids of a medium that has them; of a deformed one as they were placed before.
+    /// A homogeneous medium with this one's extinction, where that is the same everywhere. Distances and
+    /// transmittances of both are alike; its albedo and emission mean nothing.
+    #[inline]
+    #[must_use]
+    pub fn extinction(&self) -> Option<&Homogeneous> {
+        match &self.kind {
+            MediumKind::Homogeneous(h) => Some(h),
+            MediumKind::Uniform(u) => Some(&u.extinction),
+            _ => None,
+        }
+    }
+
+    /// The density grid of a medium that has one, with its other volumes; of a deformed one as they were placed
+    /// before.
     #[inline]
     #[must_use]
     pub fn grid(&self) -> Option<&GridMedium> {
         match &self.kind {
             MediumKind::Grid(g) => Some(g),
             MediumKind::Deformed(d) => Some(d.grids()),
-            MediumKind::Homogeneous(_) | MediumKind::Custom(_) => None,
+            MediumKind::Homogeneous(_) | MediumKind::Uniform(_) | MediumKind::Custom(_) => None,
         }
     }
 
@@ -152,7 +178,59 @@ impl Medium {
         match &self.kind {
             MediumKind::Grid(g) => g.contains(x).then_some((g, x)),
             MediumKind::Deformed(d) => d.material(x).map(|(material, _)| (d.grids(), material)),
-            MediumKind::Homogeneous(_) | MediumKind::Custom(_) => None,
+            MediumKind::Homogeneous(_) | MediumKind::Uniform(_) | MediumKind::Custom(_) => None,
+        }
+    }
+
+    /// The voxels that give a property; `None` where it is the same everywhere, or the user's own.
+    #[must_use]
+    pub fn voxels(&self, property: Property) -> Option<&Grid> {
+        let [sigma_t, albedo, emission] = self.volumes();
+        match property {
+            Property::SigmaT => sigma_t,
+            Property::Albedo => albedo,
+            Property::Emission => emission,
+            Property::G => None,
+        }
+    }
+
+    /// True when a motion of the medium can change its coefficients: when they vary in space.
+    #[must_use]
+    pub fn is_carried(&self) -> bool {
+        self.volumes().iter().any(Option::is_some)
+    }
+
+    /// The part of the world that must move with a medium which is carried along: smallest and largest corner of
+    /// the boxes of its grids, or of the density's alone where that has one.
+    #[must_use]
+    pub fn carried_bounds(&self) -> Option<[Vec3; 2]> {
+        let [sigma_t, albedo, emission] = self.volumes();
+        let bounds = |grid: Option<&Grid>| grid.map(Grid::world_bounds);
+        bounds(sigma_t).or_else(|| match (bounds(albedo), bounds(emission)) {
+            (Some([a, b]), Some([c, d])) => Some([a.min(c), b.max(d)]),
+            (one, other) => one.or(other),
+        })
+    }
+
+    /// The grids of the extinction, the albedo and the emission, as far as they are grids; of what is deformed as
+    /// they were placed before.
+    pub(crate) fn volumes(&self) -> [Option<&Grid>; 3] {
+        match &self.kind {
+            MediumKind::Uniform(u) => u.volumes(),
+            MediumKind::Grid(g) => g.volumes(),
+            MediumKind::Deformed(d) => d.grids().volumes(),
+            MediumKind::Homogeneous(_) | MediumKind::Custom(_) => [None; 3],
+        }
+    }
+
+    /// These grids, and the place in them that a point of the world sees; `None` where there is nothing, and in
+    /// custom fields.
+    #[inline]
+    pub(crate) fn volumes_at(&self, x: Vec3) -> Option<([Option<&Grid>; 3], Vec3)> {
+        match &self.kind {
+            MediumKind::Homogeneous(_) => Some(([None; 3], x)),
+            MediumKind::Uniform(u) => Some((u.volumes(), u.material(x).0)),
+            _ => self.grid_at(x).map(|(grids, material)| (grids.volumes(), material)),
         }
     }
 
@@ -163,7 +241,7 @@ impl Medium {
         match &self.kind {
             MediumKind::Grid(g) => g.crossings(ray).for_each(|c| visit(&c)),
             MediumKind::Deformed(d) => d.crossings(ray).iter().for_each(visit),
-            MediumKind::Homogeneous(_) | MediumKind::Custom(_) => {}
+            MediumKind::Homogeneous(_) | MediumKind::Uniform(_) | MediumKind::Custom(_) => {}
         }
     }
 
@@ -173,6 +251,7 @@ impl Medium {
     pub fn is_emissive(&self) -> bool {
         match &self.kind {
             MediumKind::Homogeneous(h) => !h.coefficients().source().is_zero(),
+            MediumKind::Uniform(u) => u.is_emissive(),
             MediumKind::Grid(g) => g.is_emissive(),
             MediumKind::Deformed(d) => d.grids().is_emissive(),
             MediumKind::Custom(_) => true,
@@ -185,6 +264,7 @@ impl Medium {
     pub fn is_scattering(&self) -> bool {
         match &self.kind {
             MediumKind::Homogeneous(h) => !h.coefficients().sigma_s().is_zero(),
+            MediumKind::Uniform(u) => u.is_scattering(),
             MediumKind::Grid(g) => g.is_scattering(),
             MediumKind::Deformed(d) => d.grids().is_scattering(),
             MediumKind::Custom(_) => true,
@@ -209,7 +289,10 @@ impl Medium {
     ) -> DistanceSample {
         let ray = Ray::new(origin, dir, t_max);
         match &self.kind {
-            MediumKind::Homogeneous(h) => h.sample_distance(t_max, channels, defensive, rng),
+            MediumKind::Homogeneous(h)
+            | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => {
+                h.sample_distance(t_max, channels, defensive, rng)
+            }
             MediumKind::Grid(g) => {
                 tracking::sample_distance(g, &ray, channels, defensive, rng, stats)
             }
@@ -222,21 +305,24 @@ impl Medium {
         }
     }
 
-    /// The density of [`Medium::sample_distance`] at the distance t: exact for a homogeneous
-    /// medium, otherwise the positive stand-in of [`tracking::approximate_pdf`] for weights of
+    /// The density of [`Medium::sample_distance`] at the distance t: exact where the extinction is the
+    /// same everywhere, otherwise the positive stand-in of [`tracking::approximate_pdf`] for weights of
     /// multiple importance sampling.
     #[must_use]
     pub fn free_flight_pdf(&self, ray: &Ray, t: f64, channels: Rgb, defensive: f64) -> f64 {
         match &self.kind {
-            MediumKind::Homogeneous(h) => h.free_flight_pdf(t, ray.t_max, channels, defensive),
+            MediumKind::Homogeneous(h)
+            | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => {
+                h.free_flight_pdf(t, ray.t_max, channels, defensive)
+            }
             MediumKind::Grid(g) => tracking::approximate_pdf(g, ray, t, channels, defensive),
             MediumKind::Deformed(d) => tracking::approximate_pdf(d, ray, t, channels, defensive),
             MediumKind::Custom(f) => tracking::approximate_pdf(&**f, ray, t, channels, defensive),
         }
     }
 
-    /// Transmittance of the segment: exact for a homogeneous medium, otherwise an unbiased
-    /// estimate.
+    /// Transmittance of the segment: exact where the extinction is the same everywhere, otherwise an
+    /// unbiased estimate.
     #[inline]
     pub fn transmittance(
         &self,
@@ -248,7 +334,8 @@ impl Medium {
     ) -> Rgb {
         let ray = Ray::new(origin, dir, t_max);
         match &self.kind {
-            MediumKind::Homogeneous(h) => h.transmittance(t_max),
+            MediumKind::Homogeneous(h)
+            | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => h.transmittance(t_max),
             MediumKind::Grid(g) => tracking::transmittance(g, &ray, rng, stats),
             MediumKind::Deformed(d) => tracking::transmittance(d, &ray, rng, stats),
             MediumKind::Custom(f) => tracking::transmittance(&**f, &ray, rng, stats),
@@ -256,8 +343,8 @@ impl Medium {
     }
 
     /// Points and weights `(t, w)` such that `sum w h(t)` estimates `∫_0^t_max h(t) dt` without
-    /// bias for an h that vanishes where the medium's box is not; appended to `out`. A homogeneous
-    /// medium, whose integrals have closed forms, adds none.
+    /// bias for an h that vanishes where the medium's box is not; appended to `out`. A medium of one
+    /// extinction, whose integrals have closed forms, adds none.
     pub fn line_points(
         &self,
         origin: Vec3,
@@ -268,7 +355,7 @@ impl Medium {
     ) {
         let ray = Ray::new(origin, dir, t_max);
         match &self.kind {
-            MediumKind::Homogeneous(_) => {}
+            MediumKind::Homogeneous(_) | MediumKind::Uniform(_) => {}
             MediumKind::Grid(g) => tracking::line_points(g, &ray, rng, out),
             MediumKind::Deformed(d) => tracking::line_points(d, &ray, rng, out),
             MediumKind::Custom(f) => tracking::line_points(&**f, &ray, rng, out),
@@ -288,6 +375,7 @@ impl Medium {
         };
         match &self.kind {
             MediumKind::Homogeneous(h) => h.coefficients().sigma_t,
+            MediumKind::Uniform(u) => u.sigma_t(),
             MediumKind::Grid(g) => bound(g),
             MediumKind::Deformed(d) => bound(d),
             MediumKind::Custom(f) => bound(&**f),
@@ -300,7 +388,8 @@ impl Medium {
     /// # Errors
     /// For grids that are deformed already, and for custom fields.
     pub fn deform(&mut self, map: Arc<dyn SpaceMap>) -> Result<(), MediumError> {
-        self.kind = match &self.kind {
+        self.kind = match &mut self.kind {
+            MediumKind::Uniform(u) => return u.deform(map),
             MediumKind::Grid(g) => MediumKind::Deformed(DeformedGrid::new(g.clone(), map)),
             MediumKind::Homogeneous(_) => return Ok(()),
             MediumKind::Deformed(_) => return Err(MediumError::Deformed),
@@ -317,6 +406,7 @@ impl Medium {
     /// move.
     pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
         match &mut self.kind {
+            MediumKind::Uniform(u) => u.place(map),
             MediumKind::Grid(g) => g.place(map),
             MediumKind::Homogeneous(_) => Ok(()),
             MediumKind::Deformed(_) => Err(MediumError::Deformed),

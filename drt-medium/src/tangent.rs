@@ -6,7 +6,7 @@ use drt_math::{Affine, Rgb, ValueChange, ValueMap, Vec3};
 use crate::change::{Field, FieldChange};
 use crate::{
     CoefficientGradients, CoefficientRates, Coefficients, Flow, FlowPlace, Grid, Medium,
-    MediumChange, MediumError, MediumKind, Property,
+    MediumChange, MediumError, Property,
 };
 
 /// Derivative of one coefficient field with respect to a parameter, at rest:
@@ -231,10 +231,8 @@ impl MediumTangent {
         velocity: Vec3,
     ) -> CoefficientRates {
         let (c, u) = (coefficients, velocity);
-        let (grids, at) = match (&medium.kind, medium.grid_at(x)) {
-            (MediumKind::Homogeneous(_), _) => ([None; 3], x),
-            (_, Some((g, material))) => (g.volumes(), material),
-            (_, None) => return CoefficientRates { g: self.g, ..CoefficientRates::ZERO },
+        let Some((grids, at)) = medium.volumes_at(x) else {
+            return CoefficientRates { g: self.g, ..CoefficientRates::ZERO };
         };
         CoefficientRates {
             sigma_t: self.sigma_t.rate(c.sigma_t, grids[0], at) - gradients.sigma_t.dot(u),
@@ -255,7 +253,7 @@ impl Medium {
         let mut tangent = MediumTangent::zero();
         match change {
             MediumChange::Place { velocity, .. } => {
-                if self.grid().is_some() {
+                if self.is_carried() {
                     tangent.velocity = *velocity;
                 }
             }
@@ -279,13 +277,11 @@ impl Medium {
         let (property, Some(voxel)) = (change.property(), change.voxel) else {
             return Ok(Rgb::ZERO);
         };
-        let medium = self.grid().ok_or(MediumError::NotAGrid { property })?;
-        let (grid, scale) = match change.field {
-            Field::SigmaT => (Some(medium.density()), medium.scale()),
-            Field::Albedo => (medium.albedo().grid(), 1.0),
-            Field::Emission => (medium.emission().grid(), 1.0),
+        let grid = self.voxels(property).ok_or(MediumError::NotAGrid { property })?;
+        let scale = match (change.field, self.grid()) {
+            (Field::SigmaT, Some(medium)) => medium.scale(),
+            _ => 1.0,
         };
-        let grid = grid.ok_or(MediumError::NotAGrid { property })?;
         let size = grid.size();
         if (0..3).any(|k| voxel[k] >= size[k]) {
             return Err(MediumError::NoSuchVoxel { property, voxel, size });

@@ -89,23 +89,27 @@ pub fn sample_distance<F: DensityField + ?Sized>(
     let mut depth = exponential(rng);
     field.pieces(ray, &mut |piece| {
         stats.pieces += 1;
-        let majorant = f64::max(piece.majorant.max_channel(), floor);
-        let least = defensive * floor / majorant;
+        let mut majorant = f64::max(left(piece.majorant, weight).max_channel(), floor);
         let mut t = piece.start;
         while let Some(next) = next_collision(t, piece.end, majorant, &mut depth) {
             t = next;
             depth = exponential(rng);
             stats.lookups += 1;
-            let sigma = field.sigma_t(ray.at(t));
+            let sigma = left(field.sigma_t(ray.at(t)), weight);
             let accept = acceptance(probabilities * weight.abs(), sigma.abs() / majorant);
-            let accept = accept.clamp(least, 1.0);
+            let accept = accept.clamp(defensive * floor / majorant, 1.0);
             if rng.next_f64() < accept {
                 event = Some((t, weight / (majorant * accept)));
                 return ControlFlow::Break(());
             }
             weight *= sigma.map(|s| (majorant - s) / (majorant * (1.0 - accept)));
+            if weight.to_array().iter().any(|w| w.abs() < f64::MIN_POSITIVE) {
+                // A dense channel must not hold up an empty one once nothing is left of it.
+                weight = weight.map(|w| if w.abs() < f64::MIN_POSITIVE { 0.0 } else { w });
+                majorant = f64::max(left(piece.majorant, weight).max_channel(), floor);
+            }
         }
-        ControlFlow::Continue(())
+        if weight.is_zero() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     match event {
         Some((t, weight)) => DistanceSample::Scatter { t, weight, pdf: None },
@@ -134,7 +138,7 @@ pub fn transmittance<F: DensityField + ?Sized>(
         if control.max_channel() > DEEPEST {
             // Channels of which nothing is left need no collisions.
             weight = zip(weight, control, |w, c| if c > DEEPEST { 0.0 } else { w });
-            gap = zip(gap, weight, |g, w| if w == 0.0 { 0.0 } else { g });
+            gap = left(gap, weight);
         }
         let residual = gap.max_channel();
         let mut t = piece.start;
@@ -218,6 +222,12 @@ fn next_collision(t: f64, end: f64, majorant: f64, depth: &mut f64) -> Option<f6
     }
     *depth = f64::max(*depth - majorant * (end - t), 0.0);
     None
+}
+
+/// An extinction in the channels of which something is left.
+#[inline]
+fn left(sigma: Rgb, weight: Rgb) -> Rgb {
+    zip(sigma, weight, |s, w| if w == 0.0 { 0.0 } else { s })
 }
 
 /// Mean over channels of the collision probability, weighted by their shares of the walk.

@@ -102,7 +102,7 @@ impl Medium {
         rng: &mut Rng,
         points: &mut Vec<(f64, f64)>,
     ) -> Rgb {
-        if self.homogeneous().is_some() {
+        if self.extinction().is_some() {
             let rate = tangent.rates(self, ray.origin).sigma_t;
             return rate.map(|r| if r == 0.0 { 0.0 } else { r * ray.t_max });
         }
@@ -144,7 +144,7 @@ impl Medium {
         points: &mut Vec<(f64, f64)>,
     ) -> [RgbVec; 2] {
         let length = ray.t_max;
-        if let Some(h) = self.homogeneous() {
+        if let Some(h) = self.extinction() {
             let end = h.coefficients().sigma_t.outer(ray.dir);
             return [-end, end];
         }

@@ -7,7 +7,7 @@ use common::*;
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
 use drt_medium::{
     CoefficientRates, Grid, GridMedium, Homogeneous, Layout, Medium, MediumChange, MediumError,
-    MediumGradient, MediumTangent, Phase, Property, ValueChange, Volume, Wrap,
+    MediumGradient, MediumTangent, Phase, Property, UniformMedium, ValueChange, Volume, Wrap,
 };
 
 const MULTIPLY: ValueChange = ValueChange::Multiply(0.7);
@@ -30,6 +30,15 @@ fn full(density_channels: usize) -> Medium {
     let (albedo, emission) = (albedo.expect("a box"), emission.expect("a box"));
     let g = GridMedium::new(density, 2.5, Volume::Grid(albedo), Volume::Grid(emission));
     Medium::new(g.expect("a valid medium"), Phase::HenyeyGreenstein { g: 0.4 })
+}
+
+/// The albedo and the emission of [`full`], under one extinction.
+fn dyed() -> Medium {
+    let full = full(1);
+    let g = full.grid().expect("a grid");
+    let sigma_t = Rgb::new(0.5, 1.0, 2.0);
+    let u = UniformMedium::new(sigma_t, g.albedo().clone(), g.emission().clone());
+    Medium::new(u.expect("a valid medium"), full.phase)
 }
 
 fn plain() -> Medium {
@@ -125,8 +134,10 @@ fn check_rates(start: &Medium, changes: &[ChangeAt], theta: f64) {
 fn each_change_alone() {
     for change in CHANGES {
         for theta in [0.0, 0.35] {
-            for medium in [full(1), full(3)] {
-                check_rates(&medium, &[change], theta);
+            for medium in [full(1), full(3), dyed()] {
+                if medium.clone().apply(&change(theta), theta).is_ok() {
+                    check_rates(&medium, &[change], theta);
+                }
             }
         }
     }
@@ -170,10 +181,22 @@ fn homogeneous_changes() {
 }
 
 #[test]
+fn a_dyed_medium_changes_in_all_its_ways_together() {
+    let fits = |c: &ChangeAt| dyed().apply(&c(0.0), 0.0).is_ok();
+    let changes: Vec<_> = CHANGES.into_iter().filter(fits).collect();
+    assert_eq!(changes.len(), 10, "all but those of voxels that it has not");
+    for theta in [0.0, 0.35, -0.2] {
+        check_rates(&dyed(), &changes, theta);
+    }
+    let away = vec3(50.0, -3.0, 7.0);
+    assert_ne!(dyed().coefficients(away).albedo, Rgb::ZERO, "its volumes end nowhere");
+}
+
+#[test]
 fn gradients_are_the_transposes_of_rates() {
     let mut rng = Rng::new(9, 0, 0);
     let mut color = || Rgb::new(rng.next_f64() - 0.5, rng.next_f64() - 0.5, rng.next_f64() - 0.5);
-    for start in [full(1), full(3), plain()] {
+    for start in [full(1), full(3), dyed(), plain()] {
         let fits = |c: &&ChangeAt| start.clone().apply(&c(0.0), 0.0).is_ok();
         let changes: Vec<_> = CHANGES.iter().filter(fits).copied().collect();
         let (medium, tangent) = changed(&start, &changes, 0.35);
@@ -244,6 +267,13 @@ fn a_step_of_all_voxels_is_the_sum_of_single_ones() {
     let start = full(3);
     let count = start.grid().expect("a grid").density().values().len();
     let step = random_values(count, 8);
+    let mut dye = dyed();
+    let [before, by] =
+        [dye.voxels(Property::Albedo).expect("a grid").values().to_vec(), step[..54].into()];
+    dye.add_to_voxels(Property::Albedo, &by).expect("a fitting step");
+    let sums = before.iter().zip(&by).map(|(v, s)| v + s);
+    assert!(sums.eq(dye.voxels(Property::Albedo).expect("a grid").values().iter().copied()));
+    assert!(dye.add_to_voxels(Property::SigmaT, &by).is_err());
     let (mut whole, mut single) = (start.clone(), start);
     whole.add_to_voxels(Property::SigmaT, &step).expect("a fitting step");
     for (n, s) in step.chunks_exact(3).enumerate() {

@@ -98,6 +98,65 @@ fn cuts_of_a_ray_are_bounded() {
     assert!(cost(&stats) < 30_000, "{stats:?}");
 }
 
+/// A distance in an empty channel is found in few steps beside one so dense that its collisions could not be counted, where the
+/// dense one is the same everywhere and where it rises from nothing, and without bias.
+#[test]
+fn dense_channels_do_not_hold_up_empty_ones() {
+    let uniform = [[1e20, 0.0, 0.5]; 8].concat();
+    let mut rising = vec![0.0; 3 * 8];
+    rising[3] = 1e20;
+    for (values, blue, most) in [(uniform, 0.5, 8.0), (rising, 0.0, 3000.0)] {
+        let grid = Grid::new([2; 3], 3, values).expect("valid");
+        let medium = grid_medium(grid, 1.0, Rgb::ONE);
+        let ray = Ray::new(vec3(0.1, 0.1, -1.0), vec3(0.3, 0.2, 1.0).normalize(), 4.0);
+        let length = clipped(&ray);
+        for defensive in [0.0, 0.25] {
+            let count = 20_000;
+            let mut passed = [Moments::default(); 3];
+            let mut stats = TrackingStats::default();
+            for i in 0..count {
+                let mut rng = Rng::new(3, 1, i);
+                let sample = medium.sample_distance(
+                    ray.origin,
+                    ray.dir,
+                    ray.t_max,
+                    Rgb::ONE,
+                    defensive,
+                    &mut rng,
+                    &mut stats,
+                );
+                let weight = match sample {
+                    DistanceSample::Pass { weight } => weight,
+                    DistanceSample::Scatter { .. } => Rgb::ZERO,
+                };
+                assert!(weight.is_finite());
+                passed.iter_mut().zip(weight.to_array()).for_each(|(m, w)| m.push(w));
+            }
+            let each = stats.lookups as f64 / count as f64;
+            println!("defensive {defensive}: {each} lookups a ray, {} pieces", stats.pieces);
+            assert!(each < most, "{each} lookups a ray");
+            let exact = [0.0, 1.0, (-blue * length).exp()];
+            for (m, exact) in passed.iter().zip(exact) {
+                let off = (m.mean() - exact).abs();
+                assert!(off <= 4.0 * m.standard_error() + 1e-12, "{} beside {exact}", m.mean());
+            }
+            // The fault that would be planted: without the weight of what is left, half of green is lost.
+            assert!((0.5 * passed[1].mean() - 1.0).abs() > 8.0 * passed[1].standard_error());
+        }
+    }
+}
+
+/// How much of a ray is in the unit cube.
+fn clipped(ray: &Ray) -> f64 {
+    let (mut enter, mut leave) = (0.0, ray.t_max);
+    for k in 0..3 {
+        let face = |at: f64| (at - ray.origin[k]) / ray.dir[k];
+        enter = f64::max(enter, f64::min(face(0.0), face(1.0)));
+        leave = f64::min(leave, f64::max(face(0.0), face(1.0)));
+    }
+    leave - enter
+}
+
 /// A grid's field with the fault that is planted: its bounds are the values where pieces start.
 #[derive(Debug)]
 struct OneEnd<'a>(&'a GridMedium);

@@ -6,7 +6,8 @@ mod common;
 use common::*;
 use drt_math::{Affine, Rgb, vec3};
 use drt_medium::{
-    Filter, Grid, Homogeneous, Layout, Medium, MediumChange, MediumKind, Phase, ValueChange, Wrap,
+    Filter, Grid, Homogeneous, Layout, Medium, MediumChange, MediumKind, Phase, UniformMedium,
+    ValueChange, Wrap,
 };
 
 fn round_trip(medium: &Medium) -> Medium {
@@ -23,6 +24,11 @@ fn media_survive() {
     assert_eq!(again.phase, medium.phase);
     let x = medium.grid().expect("a grid").density().to_world().point(vec3(0.7, 0.6, 0.5));
     assert_eq!(again.coefficients(x), medium.coefficients(x));
+
+    let grid = medium.grid().expect("a grid");
+    let dyed = UniformMedium::new(Rgb::splat(0.5), grid.albedo().clone(), grid.emission().clone());
+    let dyed = Medium::new(dyed.expect("valid"), Phase::Isotropic);
+    assert_eq!(round_trip(&dyed).coefficients(x), dyed.coefficients(x));
 
     let h = Homogeneous::new(Rgb::new(0.1, 0.2, 0.3), Rgb::ONE, Rgb::splat(4.0)).expect("valid");
     let again = round_trip(&Medium::new(h, Phase::Rayleigh));

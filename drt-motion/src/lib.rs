@@ -7,6 +7,7 @@ extern crate alloc;
 pub mod deformation;
 mod error;
 pub mod interior;
+mod lists;
 pub mod mean_value;
 pub mod optimize;
 pub mod parameter;

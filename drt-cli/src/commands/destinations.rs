@@ -1,35 +1,65 @@
 //! Where results go, looked at before any work is done.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::{CliError, check_target};
 
-/// Files to be written, each with the option that names it.
+/// Files to be written, each with the option or job that names it.
 #[derive(Default)]
-pub(super) struct Destinations(Vec<(&'static str, Identity)>);
+pub(super) struct Destinations {
+    files: Vec<(String, Identity)>,
+    /// The first file of each name, and of each number.
+    by_name: BTreeMap<PathBuf, usize>,
+    by_number: BTreeMap<(u64, u64), usize>,
+    /// The first file that has been named before, and that.
+    twice: Option<[usize; 2]>,
+}
 
 impl Destinations {
-    /// The files of the options that are given; `-` is the standard output, and no file.
+    /// The files of those options that are given; `-` is the standard output, and no file.
     pub(super) fn new<'p>(
-        options: impl IntoIterator<Item = (&'static str, Option<&'p Path>)>,
+        options: impl IntoIterator<Item = (impl ToString, Option<&'p Path>)>,
     ) -> Self {
-        let given = options.into_iter().filter_map(|(option, path)| Some((option, path?)));
-        let files = given.filter(|(_, path)| path.as_os_str() != "-");
-        Self(files.map(|(option, path)| (option, Identity::of(path))).collect())
+        let mut all = Self::default();
+        for (option, path) in options {
+            if let Some(path) = path.filter(|path| path.as_os_str() != "-") {
+                all.add(option.to_string(), Identity::of(path));
+            }
+        }
+        all
+    }
+
+    fn add(&mut self, option: String, file: Identity) {
+        let number = self.files.len();
+        let before = self.find(&file);
+        self.twice = self.twice.or(before.map(|before| [before, number]));
+        self.by_name.entry(file.whole.clone()).or_insert(number);
+        if let Some(inode) = file.number {
+            self.by_number.entry(inode).or_insert(number);
+        }
+        self.files.push((option, file));
+    }
+
+    fn find(&self, file: &Identity) -> Option<usize> {
+        let by_number = || self.by_number.get(file.number.as_ref()?);
+        self.by_name.get(&file.whole).or_else(by_number).copied()
     }
 
     /// Refuses places that cannot be written, and files with two contents.
     pub(super) fn check(&self) -> Result<(), CliError> {
-        for (i, (option, file)) in self.0.iter().enumerate() {
-            if let Some((other, _)) = self.0[..i].iter().find(|(_, f)| f.is(file)) {
-                let path = file.path.display();
-                return Err(CliError::argument(format!(
-                    "{option}: {path} is what {other} names, too; expected a file for each"
-                )));
-            }
-            check_target(&file.path)?;
-        }
-        Ok(())
+        self.distinct()?;
+        self.files.iter().try_for_each(|(_, file)| check_target(&file.path))
+    }
+
+    /// Refuses files with two contents.
+    pub(super) fn distinct(&self) -> Result<(), CliError> {
+        let Some(twice) = self.twice else { return Ok(()) };
+        let [(other, _), (option, file)] = twice.map(|i| &self.files[i]);
+        let path = file.path.display();
+        Err(CliError::argument(format!(
+            "{option}: {other} would write {path}, too; expected a file for each"
+        )))
     }
 
     /// Refuses to overwrite what is read.
@@ -37,19 +67,16 @@ impl Destinations {
         &self,
         read: impl IntoIterator<Item = &'p Path>,
     ) -> Result<(), CliError> {
-        if self.0.is_empty() {
+        if self.files.is_empty() {
             return Ok(());
         }
-        for input in read {
-            let input = Identity::of(input);
-            if let Some((option, file)) = self.0.iter().find(|(_, f)| f.is(&input)) {
-                return Err(CliError::argument(format!(
-                    "{option}: {} is read by this command, and would be overwritten; expected another file",
-                    file.path.display()
-                )));
-            }
-        }
-        Ok(())
+        let found = read.into_iter().find_map(|input| self.find(&Identity::of(input)));
+        found.map(|i| &self.files[i]).map_or(Ok(()), |(option, file)| {
+            Err(CliError::argument(format!(
+                "{option}: {} is read by this command, and would be overwritten; expected another file",
+                file.path.display()
+            )))
+        })
     }
 }
 
@@ -64,10 +91,6 @@ struct Identity {
 impl Identity {
     fn of(path: &Path) -> Self {
         Self { path: path.into(), whole: whole_name(path), number: number(path) }
-    }
-
-    fn is(&self, other: &Self) -> bool {
-        self.whole == other.whole || self.number.is_some() && self.number == other.number
     }
 }
 
@@ -87,4 +110,35 @@ fn number(path: &Path) -> Option<(u64, u64)> {
 #[cfg(not(unix))]
 fn number(_path: &Path) -> Option<(u64, u64)> {
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::Folder;
+
+    #[test]
+    fn files_are_known_by_any_of_their_names() {
+        let folder = Folder::new();
+        let file = folder.file("a.exr", "");
+        std::fs::create_dir(folder.path().join("b")).unwrap();
+        let again = folder.path().join("b/../a.exr");
+        let other = folder.path().join("c.exr");
+        let of = |paths: &[&Path]| Destinations::new(paths.iter().map(|p| ("job", Some(*p))));
+        let message = of(&[&other, &file, &again]).distinct().unwrap_err().to_string();
+        assert!(
+            message.contains("job: job would write") && message.contains("a.exr, too"),
+            "{message}"
+        );
+        assert!(of(&[&other, &file]).distinct().is_ok());
+        let message = of(&[&other, &file]).spare([&*again]).unwrap_err().to_string();
+        assert!(message.contains("a.exr is read by this command"), "{message}");
+        assert!(of(&[&other, Path::new("-")]).spare([&*file, Path::new("-")]).is_ok());
+        #[cfg(unix)]
+        {
+            let link = folder.path().join("hard.exr");
+            std::fs::hard_link(&file, &link).unwrap();
+            assert!(of(&[&file]).spare([&*link]).is_err());
+        }
+    }
 }

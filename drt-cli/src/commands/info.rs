@@ -7,7 +7,7 @@ use drt_estimators::emitter::Emitter;
 use drt_estimators::texture::Texture;
 use drt_estimators::{Integrator, MediumBoundary, Scene, Shape, Surrounding};
 use drt_geom::{EdgeClass, Mesh, Topology};
-use drt_medium::{Medium, MediumKind, Phase};
+use drt_medium::{Medium, MediumKind, Phase, Volume};
 use drt_motion::{Change, Parameter};
 
 use super::options::Options;
@@ -103,6 +103,13 @@ fn media(scene: &Scene) -> Table<4> {
             let [t, a] = [c.sigma_t, c.albedo].map(|c| format!("{:?}", c.to_array()));
             ("homogeneous".into(), format!("sigma_t {t}, albedo {a}"))
         }
+        MediumKind::Uniform(u) => {
+            let t = u.sigma_t().to_array();
+            let name = |volume: &Volume, name| volume.grid().map(|_| name);
+            let grids = [name(u.albedo(), "albedo"), name(u.emission(), "emission")];
+            let grids = grids.into_iter().flatten().collect::<Vec<_>>().join(" and ");
+            ("homogeneous".into(), format!("sigma_t {t:?}, a grid of {grids}"))
+        }
         MediumKind::Grid(g) => {
             let [x, y, z] = g.density().size();
             let largest = g.largest_sigma_t();
@@ -145,6 +152,10 @@ fn textures(scene: &Scene) -> Table<4> {
     let kind = |t: &Texture| match t {
         Texture::Checkerboard { .. } => "checkerboard".into(),
         Texture::Attribute(a) => format!("attribute {}", a.name),
+        Texture::Volume(v) => match v.volume.grid().map(drt_medium::Grid::size) {
+            Some([x, y, z]) => format!("volume {x}x{y}x{z}"),
+            None => "volume, constant".into(),
+        },
         Texture::Bitmap(image) => {
             format!("bitmap, {}, {:?}, {:?}", size(t.size()), image.filter, image.wrap)
                 .to_lowercase()

@@ -20,6 +20,8 @@ pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
     let files =
         Files { output: &options.output, digest: &options.digest, preview: &options.preview };
     files.check(options.shards.iter().map(PathBuf::as_path))?;
+    // What has taken hours is put together in seconds, for which a first signal waits: reading counts as writing here.
+    let _writing = stop::writing();
     let mut shards = Vec::new();
     for path in &options.shards {
         shards.push(Given { path: path.clone(), file: ShardFile::read(path)? });
@@ -63,7 +65,6 @@ pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
                 }
             }
             let gradient = given.gradient()?;
-            let _writing = stop::writing();
             write_npy(output, &gradient)?;
         }
     }

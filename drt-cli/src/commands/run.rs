@@ -155,11 +155,13 @@ pub(super) fn differences(
 /// Tells which differences look to one side.
 pub(super) fn tell_one_sided(job: &Job, quiet: bool) -> Result<(), CliError> {
     let step = job.settings.step;
-    let names = drt_estimators::one_sided_differences(&job.scene, &job.parameters, step);
-    for name in names.map_err(|e| job.blame(&e))? {
+    let found = drt_estimators::one_sided_differences(&job.scene, &job.parameters, step);
+    for (name, order) in found.map_err(|e| job.blame(&e))? {
         if !quiet {
+            let order = if order == 1 { "first" } else { "second" };
             console::note(format_args!(
-                "drt: finite differences by `{name}` look to one side: the range of what it changes ends within a step"
+                "drt: finite differences by `{name}` look to one side and are of {order} order: the range of what it \
+                 changes ends within a step"
             ));
         }
     }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use drt_estimators::{Scene, Target};
 use drt_math::{Affine, Mat3, Rgb, Vec3};
+use drt_medium::Property;
 use drt_motion::{Change, Effect, GeometryChange, PropertyChange, Texels, ValueChange};
 
 use super::cages::Cages;
@@ -82,14 +83,14 @@ pub(super) fn check_voxels(
                 "`voxels`: only the grids of a medium have voxels; `{name}` is none"
             ));
         };
-        let grid = scene.media[*m].item.grid();
-        let has_voxels = match property.as_str() {
-            "sigma_t" => grid.is_some(),
-            "albedo" => grid.is_some_and(|g| g.albedo().grid().is_some()),
-            "emission" => grid.is_some_and(|g| g.emission().grid().is_some()),
-            _ => false,
+        let medium = &scene.media[*m].item;
+        let voxels = match property.as_str() {
+            "sigma_t" => medium.voxels(Property::SigmaT),
+            "albedo" => medium.voxels(Property::Albedo),
+            "emission" => medium.voxels(Property::Emission),
+            _ => None,
         };
-        if !has_voxels {
+        if voxels.is_none() {
             let name = &effect.target;
             return Err(format!("`voxels`: {property} of `{name}` has no grid, and so no voxels"));
         }

@@ -71,10 +71,12 @@ pub(super) fn groups(
                 }
             };
             match (&kind, target) {
-                (GroupKind::Voxels(_), Target::Medium(m)) => match scene.media[m].item.grid() {
-                    Some(_) => Ok(ParameterGroup { target, kind }),
-                    None => Err(wrong("a medium with a grid")),
-                },
+                (GroupKind::Voxels(property), Target::Medium(m)) => {
+                    match scene.media[m].item.voxels(*property) {
+                        Some(_) => Ok(ParameterGroup { target, kind }),
+                        None => Err(wrong("a medium with a grid of that property")),
+                    }
+                }
                 (GroupKind::Voxels(_), _) => Err(wrong("a medium with a grid")),
                 (_, Target::Shape(_)) => Ok(ParameterGroup { target, kind }),
                 _ => Err(wrong("a shape")),

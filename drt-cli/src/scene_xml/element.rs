@@ -127,6 +127,22 @@ impl Element {
         })
     }
 
+    /// The file that the element names: a property `filename` by its value, an inclusion or a spectrum by the attribute of that
+    /// name.
+    pub(super) fn file(&self) -> Option<Result<PathBuf, CliError>> {
+        let name = match self.attribute("name") {
+            Some("filename") if self.tag == "string" => self.attribute("value"),
+            _ => self.attribute("filename"),
+        };
+        name.map(|name| self.resolve(name))
+    }
+
+    /// The [file](Self::file) of an element that must name one by an attribute.
+    pub(super) fn named_file(&self) -> Result<PathBuf, CliError> {
+        self.required("filename")?;
+        self.file().unwrap_or_else(|| Err(self.error("`filename` is missing")))
+    }
+
     /// Gives it the `name` of the place it is used in, and no id.
     pub(super) fn call(&mut self, name: Option<&str>) {
         self.attributes.retain(|(key, _)| key != "id" && key != "name");

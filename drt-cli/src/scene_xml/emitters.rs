@@ -38,10 +38,10 @@ impl<'a> Loader<'a> {
         let light = |name| Ok::<Rgb, CliError>(p.light(name)?.unwrap_or(Rgb::ONE));
         let emitter = match kind {
             "area" => match p.texture("radiance")? {
-                Some((e, Texture::Attribute(_))) => {
-                    return Err(e.error("attributes of meshes are for BSDFs"));
+                Some((e, texture)) => {
+                    by_coordinates(e, &texture)?;
+                    Emitter::TexturedArea { radiance: Rgb::ONE, texture }
                 }
-                Some((_, texture)) => Emitter::TexturedArea { radiance: Rgb::ONE, texture },
                 None => Emitter::Area { radiance: light("radiance")? },
             },
             "constant" => Emitter::Constant { radiance: light("radiance")? },
@@ -120,6 +120,7 @@ fn spot(p: &Properties<'_>, intensity: Rgb) -> Result<Emitter, CliError> {
         radians("beam_width")?.unwrap_or(Emitter::DEFAULT_BEAM_FRACTION * cutoff_angle);
     if let Some(texture) = p.texture("texture")? {
         let (e, texture) = texture;
+        by_coordinates(e, &texture)?;
         let slide = Slide::spot(texture, cutoff_angle, beam_width).map_err(|err| e.error(err))?;
         return thrown(p, &to_world, intensity, slide);
     }
@@ -151,11 +152,24 @@ fn thrown(
     Ok(Emitter::Projector { position, frame, strength, slide })
 }
 
+/// Refuses a texture that has no texture coordinates.
+fn by_coordinates(e: &Element, texture: &Texture) -> Result<(), CliError> {
+    match texture {
+        Texture::Attribute(_) | Texture::Volume(_) => {
+            Err(e.error("attributes of meshes and volumes are for BSDFs"))
+        }
+        Texture::Bitmap(_) | Texture::Checkerboard { .. } => Ok(()),
+    }
+}
+
 /// A `projector`: the reverse of a camera, whose film is the image of its texture.
 fn projector(p: &Properties<'_>) -> Result<Emitter, CliError> {
     let scale = p.float("scale")?.unwrap_or(1.0);
     let (texture, strength) = match p.texture("irradiance")? {
-        Some((_, texture)) => (Some(texture), Rgb::ONE),
+        Some((e, texture)) => {
+            by_coordinates(e, &texture)?;
+            (Some(texture), Rgb::ONE)
+        }
         None => (None, p.light("irradiance")?.unwrap_or(Rgb::ONE)),
     };
     let size = match &texture {

@@ -7,11 +7,7 @@ use super::element::Element;
 /// The scene's own file, those included, and all that its elements name.
 pub(super) fn of_scene(path: &Path, included: Vec<PathBuf>, root: &Element) -> Vec<PathBuf> {
     fn visit(e: &Element, found: &mut Vec<PathBuf>) {
-        let named = match e.attribute("name") {
-            Some("filename") if e.tag == "string" => e.attribute("value"),
-            _ => e.attribute("filename"),
-        };
-        found.extend(named.and_then(|name| e.resolve(name).ok()));
+        found.extend(e.file().and_then(Result::ok));
         e.children.iter().for_each(|child| visit(child, found));
     }
     let mut found = included;

@@ -3,7 +3,8 @@
 use drt_estimators::{Named, Surrounding};
 use drt_math::Rgb;
 use drt_medium::{
-    Grid, GridMedium, Homogeneous, Medium, MediumKind, Phase, PhaseBlend, PhaseTable, Volume,
+    Grid, GridMedium, Homogeneous, Medium, MediumKind, Phase, PhaseBlend, PhaseTable,
+    UniformMedium, Volume,
 };
 
 use super::Loader;
@@ -162,14 +163,17 @@ fn sum(e: &Element, sigma_a: Field, sigma_s: Field) -> Result<(Field, Field), Cl
 }
 
 fn homogeneous(e: &Element, q: Quantities, scale: f64) -> Result<MediumKind, CliError> {
-    let number = |field: &Field, name| {
-        let message = format!("`{name}` of a homogeneous medium must be one number or colour");
-        field.as_constant().ok_or_else(|| e.error(message))
+    let sigma_t = q.sigma_t.as_constant().ok_or_else(|| {
+        e.error("`sigma_t` of a homogeneous medium must be one number or colour; `albedo` may vary")
+    })?;
+    let kind = match (q.albedo.as_constant(), q.emission.as_constant()) {
+        (Some(albedo), Some(emission)) => {
+            Homogeneous::new(sigma_t * scale, albedo, emission).map(MediumKind::from)
+        }
+        _ => UniformMedium::new(sigma_t * scale, q.albedo.volume, q.emission.volume)
+            .map(MediumKind::from),
     };
-    let sigma_t = number(&q.sigma_t, "sigma_t")? * scale;
-    let (albedo, emission) = (number(&q.albedo, "albedo")?, number(&q.emission, "emission")?);
-    let medium = Homogeneous::new(sigma_t, albedo, emission).map_err(|err| e.error(err))?;
-    Ok(medium.into())
+    kind.map_err(|err| e.error(err))
 }
 
 /// A constant density fills the unit cube of its volume, as in Mitsuba.

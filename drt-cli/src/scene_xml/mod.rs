@@ -109,12 +109,7 @@ fn parse_scene(path: &Path, text: &str, defaults: &Defaults) -> Result<Read, Cli
 /// left out.
 fn missing_files(path: &Path, root: &Element, index: &Index<'_>) -> Result<(), CliError> {
     fn visit(e: &Element, found: &mut Vec<String>) {
-        let file = e.attribute("name") == Some("filename") && e.tag == "string";
-        if let Some(name) = e.attribute("value").filter(|_| file)
-            && let Err(error) = e.resolve(name)
-        {
-            found.push(error.to_string());
-        }
+        found.extend(e.file().and_then(Result::err).map(|error| error.to_string()));
         e.children.iter().for_each(|child| visit(child, found));
     }
     let mut found = Vec::new();
@@ -231,7 +226,7 @@ impl<'a> Loader<'a> {
                 "shape" | "bsdf" | "medium" | "emitter" | "sensor" | "alias" => {}
                 // Read for their own sake, so that mistakes in unused ones are found too.
                 "phase" => self.unless_unused(e, self.phase(e).map(drop), || Ok(()))?,
-                "volume" => self.unless_unused(e, self.volume(e).map(drop), || Ok(()))?,
+                "volume" => self.unless_unused(e, volumes::read(e).map(drop), || Ok(()))?,
                 "texture" if e.id().is_some() && textures::varies(e) => {
                     self.unless_unused(e, textures::read(e).map(drop), || Ok(()))?;
                 }

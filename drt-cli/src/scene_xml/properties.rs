@@ -164,8 +164,9 @@ impl<'a> Properties<'a> {
 
     /// A file that exists, wherever it is found.
     pub(super) fn path(&self, name: &'static str) -> Result<Option<PathBuf>, CliError> {
-        let Some(name) = self.string(name)? else { return Ok(None) };
-        let path = self.element.resolve(name)?;
+        self.string(name)?;
+        let Some(path) = self.property(name).and_then(Element::file) else { return Ok(None) };
+        let path = path?;
         let fail = |reason| self.element.error(format!("cannot read {}: {reason}", path.display()));
         input_file::check(&path).map_err(|e| fail(e.to_string()))?;
         Ok(Some(path))

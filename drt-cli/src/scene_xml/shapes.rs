@@ -9,6 +9,7 @@ mod texcoords;
 use std::sync::Arc;
 
 use drt_estimators::surface::Bsdf;
+use drt_estimators::texture::{Texture, VolumeTexture};
 use drt_estimators::{MediumBoundary, Named, Shape};
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Frame, Mat3, Vec3};
@@ -42,6 +43,13 @@ impl Model {
     }
 }
 
+/// True where a texture of a BSDF is the value of a volume.
+pub(super) fn takes_volumes(bsdf: &Bsdf) -> bool {
+    let mut any = false;
+    bsdf.for_each_texture(|_, texture| any |= matches!(texture, Texture::Volume(_)));
+    any
+}
+
 impl<'a> Loader<'a> {
     /// One shape, unless it has no area, and its map into the world where its mesh is a shared one. A default material is added to the
     /// `declared` ones where it has none.
@@ -56,10 +64,6 @@ impl<'a> Loader<'a> {
         let emitter = self.index.single(&p, "emitter", None)?;
         // A medium's light is no light of the shape.
         let emitter = emitter.filter(|inner| !volume_lights::is_one(inner.target));
-        let (mesh, to_world) = match shared.find(&p)?.filter(|_| emitter.is_none()) {
-            Some((mesh, map)) => (Some(mesh), Some(map)),
-            None => (without_degenerate(&p, place(&p, model(&p)?)?).map(Arc::new), None),
-        };
         let boundary = self.boundary(&p)?;
         let bsdf = match self.index.single(&p, "bsdf", None)? {
             Some(bsdf) => match self.referred.borrow().get(&bsdf.target.ordinal) {
@@ -69,6 +73,18 @@ impl<'a> Loader<'a> {
             None => {
                 let bounds = e.is_legacy() && boundary.is_some();
                 added_bsdf(bsdfs, declared, material_of_none(emitter.is_some(), bounds))
+            }
+        };
+        // What looks up volumes knows where each of its points is.
+        let in_space = takes_volumes(&bsdfs[bsdf].item);
+        let alone = emitter.is_some() || in_space;
+        let (mesh, to_world) = match shared.find(&p)?.filter(|_| !alone) {
+            Some((mesh, map)) => (Some(mesh), Some(map)),
+            None => {
+                let mesh = without_degenerate(&p, place(&p, model(&p)?)?);
+                let remember = |m| VolumeTexture::remember_positions(m).map_err(|err| e.error(err));
+                let mesh = if in_space { mesh.map(remember).transpose()? } else { mesh };
+                (mesh.map(Arc::new), None)
             }
         };
         p.finish()?;

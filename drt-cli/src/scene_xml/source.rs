@@ -189,7 +189,7 @@ impl SceneFiles {
     }
 
     fn include(&mut self, at: &Element, depth: usize) -> Result<Element, CliError> {
-        let path = at.resolve(at.required("filename")?)?;
+        let path = at.named_file()?;
         let text = read_text(&path, Some(&at.place))?;
         let same = |a: &Path, b: &Path| {
             a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))

@@ -1,19 +1,21 @@
-//! Textures that vary over surfaces: `bitmap`, `checkerboard` and `mesh_attribute`.
+//! Textures that vary over surfaces: `bitmap`, `checkerboard`, `mesh_attribute` and `volume`.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use drt_estimators::texture::{
-    AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap, UvMap,
+    AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap, UvMap, VolumeTexture,
 };
 use drt_math::{Affine, Mat3, Rgb, vec3};
 
 use super::element::Element;
 use super::properties::Properties;
 use super::spectrum::srgb_to_linear;
+use super::volumes;
 use crate::{CliError, memory, read_exr};
 
 /// Textures of these types vary; all others are one colour.
-const VARYING: [&str; 3] = ["bitmap", "checkerboard", "mesh_attribute"];
+const VARYING: [&str; 4] = ["bitmap", "checkerboard", "mesh_attribute", "volume"];
 /// Images of more texels are refused: they would take gigabytes.
 const MAX_TEXELS: u64 = 1 << 26;
 
@@ -52,6 +54,7 @@ fn times(texture: Texture, factor: Rgb) -> Result<Texture, String> {
             Texture::Attribute(AttributeTexture { scale: a.scale * factor.r, ..a })
         }
         Texture::Attribute(_) => return Err("an attribute is multiplied by one number".into()),
+        Texture::Volume(_) => return Err("a volume is not multiplied".into()),
         Texture::Bitmap(image) => {
             let factor = factor.to_array();
             Texture::Bitmap(image.map(|t| [0, 1, 2].map(|k| (f64::from(t[k]) * factor[k]) as f32))?)
@@ -62,8 +65,8 @@ fn times(texture: Texture, factor: Rgb) -> Result<Texture, String> {
 /// A texture that [`varies`], of colours.
 pub(super) fn read(e: &Element) -> Result<Texture, CliError> {
     let p = Properties::of(e)?;
-    if p.kind()? == "mesh_attribute" {
-        let texture = attribute(&p)?;
+    if let "mesh_attribute" | "volume" = p.kind()? {
+        let texture = if p.kind()? == "volume" { volume(&p) } else { attribute(&p) }?;
         p.finish()?;
         return Ok(texture);
     }
@@ -95,6 +98,7 @@ pub(super) fn luminance(texture: Texture) -> Result<Texture, String> {
             Texture::Checkerboard { colours, to_uv }
         }
         Texture::Attribute(a) => Texture::Attribute(AttributeTexture { grey: true, ..a }),
+        Texture::Volume(v) => Texture::Volume(VolumeTexture { grey: true, ..v }),
         Texture::Bitmap(image) => Texture::Bitmap(image.map(|t| {
             let [r, g, b] = t.map(f64::from);
             // Exact for what is grey already.
@@ -112,6 +116,16 @@ fn attribute(p: &Properties<'_>) -> Result<Texture, CliError> {
     }
     let scale = p.float("scale")?.unwrap_or(1.0);
     Ok(Texture::Attribute(AttributeTexture { name: name.into(), scale, grey: false }))
+}
+
+/// The values of space where a surface stands in the scene file.
+fn volume(p: &Properties<'_>) -> Result<Texture, CliError> {
+    let e = p.property("volume").ok_or_else(|| p.element.error("`volume` is missing"))?;
+    if e.tag != "volume" {
+        return Err(e.error("`volume` must be a <volume>"));
+    }
+    let volume = Arc::new(volumes::read(e)?.volume);
+    Ok(Texture::Volume(VolumeTexture { volume, grey: false }))
 }
 
 /// The luminance of a colour.

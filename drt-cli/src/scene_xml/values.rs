@@ -8,7 +8,7 @@ use super::source::{MAX_ELEMENTS, MAX_NESTING};
 use crate::CliError;
 
 /// Tags of things that are nothing but values.
-const VALUES: [&str; 4] = ["texture", "spectrum", "rgb", "srgb"];
+const VALUES: [&str; 5] = ["texture", "spectrum", "rgb", "srgb", "volume"];
 
 /// Aliases of aliases beyond this length are taken for a circle.
 pub(super) const MAX_ALIASES: usize = 64;
@@ -58,7 +58,9 @@ impl Values {
             return Err(e.error(message));
         }
         for child in &mut e.children {
-            match self.meant(child) {
+            // The volumes of media are looked up where these are read.
+            let may_be = |id: &String| e.tag == "texture" || self.by_id[id].tag != "volume";
+            match self.meant(child).filter(may_be) {
                 Some(id) => *child = self.copy(&id, child, depth)?,
                 None => self.replace(child, depth + 1)?,
             }

@@ -65,7 +65,9 @@ fn glow(light: &Element, medium: &mut Medium) -> Result<(), CliError> {
     let radiance = p.light("radiance")?.unwrap_or(Rgb::ZERO);
     p.finish()?;
     let MediumKind::Homogeneous(h) = &medium.kind else {
-        return Err(light.error("a volumelight in a heterogeneous medium is not supported; give the medium an `emission`"));
+        return Err(light.error(
+            "a volumelight in a medium with grids is not supported; give the medium an `emission`",
+        ));
     };
     let c = h.coefficients();
     let dark = |(source, absorbed): (f64, f64)| source > 0.0 && absorbed <= 0.0;

@@ -37,26 +37,26 @@ impl<'a> Loader<'a> {
         name: &'static str,
     ) -> Result<Option<Field>, CliError> {
         match self.index.single(p, "volume", Some(name))? {
-            Some(volume) => self.volume(volume.target).map(Some),
+            Some(volume) => read(volume.target).map(Some),
             None => Ok(p.color(name)?.map(Field::constant)),
         }
     }
+}
 
-    /// A `<volume>` element.
-    pub(super) fn volume(&self, e: &'a Element) -> Result<Field, CliError> {
-        let p = Properties::of(e)?;
-        let field = match p.kind()? {
-            "constvolume" => constant(&p)?,
-            "gridvolume" => grid(&p)?,
-            other => {
-                return Err(e.error(format!(
-                    "the volume type `{other}` is not supported; expected gridvolume or constvolume"
-                )));
-            }
-        };
-        p.finish()?;
-        Ok(field)
-    }
+/// A `<volume>` element.
+pub(super) fn read(e: &Element) -> Result<Field, CliError> {
+    let p = Properties::of(e)?;
+    let field = match p.kind()? {
+        "constvolume" => constant(&p)?,
+        "gridvolume" => grid(&p)?,
+        other => {
+            return Err(e.error(format!(
+                "the volume type `{other}` is not supported; expected gridvolume or constvolume"
+            )));
+        }
+    };
+    p.finish()?;
+    Ok(field)
 }
 
 fn constant(p: &Properties<'_>) -> Result<Field, CliError> {

@@ -140,13 +140,13 @@ impl AdjointSink for Contraction<'_> {
     }
 
     fn surface(&mut self, point: &MaterialPoint, adjoint: &SurfaceAdjoint) {
-        let motions = &self.motion.tangents.shapes[point.shape as usize];
-        if motions.is_empty() {
+        let tangents = &self.motion.tangents;
+        if tangents.shapes[point.shape as usize].is_empty() {
             return;
         }
         let mesh = &self.world.scene.shapes[point.shape as usize].mesh;
         let element = drt_motion::surface::SurfaceElement::new(mesh, &point.at);
-        for (p, motion) in motions {
+        for (p, motion) in tangents.felt_on(point.shape as usize, point.at.triangle) {
             let jet = motion.jet_of(&element);
             self.rates[*p] += adjoint.u.dot(jet.u)
                 + adjoint.n.dot(jet.n_dot)

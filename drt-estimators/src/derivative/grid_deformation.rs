@@ -11,7 +11,7 @@ use core::ops::ControlFlow;
 
 use drt_geom::{Mesh, TetrahedralizeInput, tetrahedralize};
 use drt_math::{Affine, Mat3, Vec3};
-use drt_medium::{Flow, FlowBasis, GridMedium, Medium, NodeWeights, Ray, SpaceMap};
+use drt_medium::{Flow, FlowBasis, Medium, NodeWeights, Ray, SpaceMap};
 use drt_motion::deformation::Deformation;
 use drt_motion::interior::{Carrier, MARGIN, TetrahedralField};
 use drt_motion::parameter::Applied;
@@ -45,9 +45,9 @@ pub(crate) struct GridDeformation {
 }
 
 impl GridDeformation {
-    /// The deformation of a grid that follows a shape, given as it was before any change, that `changes` are made to.
+    /// The deformation of grids in the given bounds that follow a shape, given as it was before any change, that `changes` are made to.
     pub(crate) fn new(
-        grid: &GridMedium,
+        bounds: [Vec3; 2],
         shape: &Mesh,
         changes: &[Applied<'_, GeometryChange>],
         parameters: usize,
@@ -59,7 +59,7 @@ impl GridDeformation {
         let frame = move_affine(&affine, parameters)?;
         let moved = move_mesh(shape, changes, parameters)?;
         let field =
-            fill(grid, shape).map_err(|reason| GridDeformationError::Shape(culprit, reason))?;
+            fill(bounds, shape).map_err(|reason| GridDeformationError::Shape(culprit, reason))?;
         // What vertices on the shape do beyond the affine part; others do nothing beyond it.
         let spread = |own: Vec<Vec3>| {
             let motion = SurfaceMotion::Vertices { positions: own.into(), normals: None };
@@ -103,10 +103,9 @@ impl GridDeformation {
     }
 }
 
-/// Tetrahedra in a shape and around it.
-fn fill(grid: &GridMedium, shape: &Mesh) -> Result<TetrahedralField, EffectError> {
+/// Tetrahedra in a shape and around it, up to a box that holds the given corners as well.
+fn fill([min, max]: [Vec3; 2], shape: &Mesh) -> Result<TetrahedralField, EffectError> {
     let bounds = shape.bounds();
-    let [min, max] = grid.density().world_bounds();
     let beyond = (bounds.min - min).max(max - bounds.max).max(Vec3::ZERO).max_abs();
     let diagonal = bounds.extent().length();
     let margin = MARGIN + if diagonal > 0.0 { beyond / diagonal } else { 0.0 };

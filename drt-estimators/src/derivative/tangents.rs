@@ -9,7 +9,7 @@ use core::ops::AddAssign;
 use drt_math::{Affine, Rgb};
 use drt_medium::{MediumChange, MediumTangent};
 use drt_motion::parameter::{Applied, change_value, geometry_changes};
-use drt_motion::surface::{SmoothNormals, move_affine, move_mesh};
+use drt_motion::surface::{ReachedTriangles, SmoothNormals, move_affine, move_mesh};
 use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, SurfaceMotion, Texels};
 
 use crate::derivative::grid_deformation::{GridDeformation, GridDeformationError};
@@ -27,6 +27,8 @@ use crate::model::texture::{TexelChange, TexelError, TexelTangent};
 pub(crate) struct Tangents {
     pub(crate) names: Vec<String>,
     pub(crate) shapes: Vec<Vec<(usize, SurfaceMotion)>>,
+    /// Which of these are felt on which triangles.
+    reached: Vec<ReachedTriangles>,
     /// Where a deformed shape's normals are recomputed: the map to pull gradients back through.
     pub(crate) smooth: Vec<Option<SmoothNormals>>,
     pub(crate) media: Vec<Vec<(usize, MediumTangent)>>,
@@ -98,6 +100,16 @@ impl Tangents {
             Target::Medium(m) => self.media[m].iter().any(|(_, t)| of_media(t)),
             Target::Emitter(e) => self.emitters[e].iter().any(|(_, t)| t.moves()),
         }
+    }
+
+    /// The motions of a shape that can be felt on one of its triangles, by parameters.
+    pub(crate) fn felt_on(
+        &self,
+        shape: usize,
+        triangle: u32,
+    ) -> impl Iterator<Item = &(usize, SurfaceMotion)> {
+        let motions = &self.shapes[shape];
+        self.reached[shape].on(triangle).map(|n| &motions[n])
     }
 
     /// The same for one of the sensors; where there is no such sensor, none changes.
@@ -260,6 +272,8 @@ impl Apply<'_> {
                 self.scene.shapes[i].mesh = Arc::new(moved.mesh);
             }
         }
+        let mesh = &self.scene.shapes[i].mesh;
+        self.tangents.reached.push(ReachedTriangles::new(mesh, motions.iter().map(|(_, m)| m)));
         self.tangents.shapes.push(motions);
         self.tangents.smooth.push(smooth);
         Ok(())
@@ -306,11 +320,11 @@ impl Apply<'_> {
         let Some(first) = changes.first().map(|c| c.parameter) else { return Ok(()) };
         let n = self.parameters.len();
         let mut medium = self.scene.media[i].item.clone();
-        match (self.deforming_leader(target)?, medium.grid()) {
-            (Some(leader), Some(grid)) => {
+        match (self.deforming_leader(target)?, medium.carried_bounds()) {
+            (Some(leader), Some(bounds)) => {
                 let shape = &self.given.shapes[leader].mesh;
                 let deformation =
-                    GridDeformation::new(grid, shape, &changes, n).map_err(|e| match e {
+                    GridDeformation::new(bounds, shape, &changes, n).map_err(|e| match e {
                         GridDeformationError::Motion(e) => self.fail(e.parameter, target, e.cause),
                         GridDeformationError::Shape(p, reason) => self.fail(p, target, reason),
                     })?;
@@ -328,7 +342,7 @@ impl Apply<'_> {
                 let frame = move_affine(&changes, n)
                     .map_err(|e| self.fail(e.parameter, target, e.cause))?;
                 medium.place(&frame.map).map_err(|e| self.fail(first, target, e))?;
-                if medium.grid().is_some() {
+                if medium.is_carried() {
                     for (t, velocity) in tangents.iter_mut().zip(&frame.velocities) {
                         t.velocity = *velocity;
                     }

@@ -13,9 +13,7 @@ pub(crate) fn speeds<'a>(motion: &'a Motion, world: &'a World) -> impl Fn(&Edge)
     let mut fastest = alloc::vec![0.0; motion.parameters()];
     for (shape, motions) in world.scene.shapes.iter().zip(&motion.tangents.shapes) {
         for (p, of_shape) in motions {
-            let speeds = (0..shape.mesh.positions.len())
-                .map(|v| of_shape.vertex_velocity(&shape.mesh, v).length());
-            fastest[*p] = speeds.fold(fastest[*p], f64::max);
+            fastest[*p] = f64::max(fastest[*p], of_shape.fastest(&shape.mesh));
         }
     }
     move |edge| {
@@ -27,7 +25,8 @@ pub(crate) fn speeds<'a>(motion: &'a Motion, world: &'a World) -> impl Fn(&Edge)
                 let across = velocity.reject(edge.wedge.tangent).length();
                 across / f64::max(fastest[*p], f64::MIN_POSITIVE)
             };
-            motion.tangents.shapes[shape].iter().map(speed).fold(0.0, f64::max)
+            let triangle = matter.point.at.triangle;
+            motion.tangents.felt_on(shape, triangle).map(speed).fold(0.0, f64::max)
         };
         let at = |end| {
             let (own, other) = edge.matter(world, end);

@@ -1,6 +1,7 @@
-//! Values that vary over surfaces, by texture coordinates.
+//! Values that vary over surfaces, by texture coordinates or by what their meshes hold.
 
 mod texels;
+mod volume;
 
 use alloc::collections::BTreeMap;
 use alloc::string::String;
@@ -12,6 +13,7 @@ use drt_math::{Affine, Rgb, RgbVec, Vec3, fm};
 
 pub(crate) use crate::model::texture::texels::{Footprint, TexelChange, TexelTangent};
 pub use crate::model::texture::texels::{TexelError, TexelGradient};
+pub use crate::model::texture::volume::VolumeTexture;
 
 /// A colour (or a number, in every channel alike) over texture coordinates.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +30,8 @@ pub enum Texture {
     Bitmap(Bitmap),
     /// Values that the mesh brings along, whatever its texture coordinates.
     Attribute(AttributeTexture),
+    /// Values of the space that the surface was in before it moved.
+    Volume(VolumeTexture),
 }
 
 /// An attribute of the meshes it is on; see [`drt_geom::MeshAttribute`].
@@ -45,17 +49,18 @@ pub struct AttributeTexture {
 impl AttributeTexture {
     fn value(&self, channels: [f64; 3]) -> Rgb {
         let value = Rgb::from(channels) * self.scale;
-        if self.grey {
-            Rgb::splat(Rgb::new(0.212_671, 0.715_160, 0.072_169).dot(value))
-        } else {
-            value
-        }
+        if self.grey { luminance(value) } else { value }
     }
 
     fn corners(&self, mesh: &Mesh, triangle: u32) -> Option<[Rgb; 3]> {
         let corners = mesh.attribute(&self.name)?.values[triangle as usize];
         Some(corners.map(|c| self.value(c.map(f64::from))))
     }
+}
+
+/// The luminance of a colour, in every channel.
+fn luminance(value: Rgb) -> Rgb {
+    Rgb::splat(Rgb::new(0.212_671, 0.715_160, 0.072_169).dot(value))
 }
 
 /// An affine map of texture coordinates, by rows.
@@ -307,9 +312,14 @@ fn square(to_uv: &UvMap, uv: [f64; 2]) -> usize {
 impl Texture {
     /// The value at a point; black on meshes without the attribute that is wanted.
     pub(crate) fn at_point(&self, point: &TexturePoint<'_>) -> Rgb {
-        let Self::Attribute(a) = self else { return self.at(point.uv()) };
-        let attribute = point.mesh.attribute(&a.name);
-        attribute.map_or(Rgb::ZERO, |v| a.value(v.at(point.triangle, point.bary)))
+        let Some(name) = self.attribute() else { return self.at(point.uv()) };
+        let attribute = point.mesh.attribute(name);
+        let channels = attribute.map(|v| v.at(point.triangle, point.bary));
+        channels.map_or(Rgb::ZERO, |channels| match self {
+            Self::Attribute(a) => a.value(channels),
+            Self::Volume(v) => v.value(channels.into()),
+            Self::Checkerboard { .. } | Self::Bitmap(_) => Rgb::ZERO,
+        })
     }
 
     /// The gradient of the value by the place of a point in its triangle, but for jumps.
@@ -321,6 +331,10 @@ impl Texture {
                 };
                 ([q - p, r - p], point.mesh.barycentric_gradients(point.triangle))
             }
+            Self::Volume(v) => (
+                v.slopes(point.mesh, point.triangle, point.bary),
+                point.mesh.barycentric_gradients(point.triangle),
+            ),
             _ => (self.slopes(point.uv()), point.uv_gradients()),
         };
         by_s.outer(s) + by_t.outer(t)
@@ -328,7 +342,13 @@ impl Texture {
 
     /// Values, per channel, between which all others on a mesh are; `None` where it lacks the attribute that is wanted.
     pub(crate) fn bounds_on(&self, mesh: &Mesh) -> Option<[Rgb; 2]> {
-        let Self::Attribute(a) = self else { return Some(self.bounds()) };
+        let a = match self {
+            Self::Attribute(a) => a,
+            Self::Volume(_) => {
+                return mesh.attribute(VolumeTexture::POSITIONS).map(|_| self.bounds());
+            }
+            Self::Checkerboard { .. } | Self::Bitmap(_) => return Some(self.bounds()),
+        };
         let values = mesh.attribute(&a.name)?.values.iter().flatten();
         let mut bounds = [f64::INFINITY, f64::NEG_INFINITY].map(Rgb::splat);
         for value in values.map(|c| a.value(c.map(f64::from))) {
@@ -344,27 +364,28 @@ impl Texture {
     pub(crate) fn attribute(&self) -> Option<&str> {
         match self {
             Self::Attribute(a) => Some(&a.name),
-            _ => None,
+            Self::Volume(_) => Some(VolumeTexture::POSITIONS),
+            Self::Checkerboard { .. } | Self::Bitmap(_) => None,
         }
     }
 
-    /// The value at texture coordinates; of an attribute, which has none, [`Texture::mean`].
+    /// The value at texture coordinates; of an attribute or a volume, which have none, [`Texture::mean`].
     #[must_use]
     pub fn at(&self, uv: [f64; 2]) -> Rgb {
         match self {
             Self::Checkerboard { colours, to_uv } => colours[square(to_uv, uv)],
             Self::Bitmap(image) => image.at(uv),
-            Self::Attribute(_) => self.mean(),
+            Self::Attribute(_) | Self::Volume(_) => self.mean(),
         }
     }
 
-    /// Columns and rows of texels: of a checkerboard, its two colours; of an attribute, none.
+    /// Columns and rows of texels: of a checkerboard, its two colours; of an attribute or a volume, none.
     #[must_use]
     pub fn size(&self) -> [u32; 2] {
         match self {
             Self::Checkerboard { .. } => [2, 1],
             Self::Bitmap(image) => image.size,
-            Self::Attribute(_) => [0; 2],
+            Self::Attribute(_) | Self::Volume(_) => [0; 2],
         }
     }
 
@@ -376,16 +397,16 @@ impl Texture {
         Some(match self {
             Self::Checkerboard { colours, .. } => colours[index],
             Self::Bitmap(image) => image.texel(index as u32),
-            Self::Attribute(_) => return None,
+            Self::Attribute(_) | Self::Volume(_) => return None,
         })
     }
 
-    /// The texels that make up the value at texture coordinates; `None` of an attribute.
+    /// The texels that make up the value at texture coordinates; `None` of an attribute or a volume.
     pub(crate) fn footprint(&self, uv: [f64; 2]) -> Option<Footprint> {
         match self {
             Self::Checkerboard { to_uv, .. } => Some(Footprint::of(square(to_uv, uv) as u32)),
             Self::Bitmap(image) => Some(image.footprint(uv)),
-            Self::Attribute(_) => None,
+            Self::Attribute(_) | Self::Volume(_) => None,
         }
     }
 
@@ -404,6 +425,7 @@ impl Texture {
                 Ok(rates)
             }
             Self::Attribute(a) => Err(TexelError::NoTexture(a.name.clone())),
+            Self::Volume(_) => Err(TexelError::NoTexture(VolumeTexture::POSITIONS.into())),
         }
     }
 
@@ -411,7 +433,7 @@ impl Texture {
     #[must_use]
     pub fn slopes(&self, uv: [f64; 2]) -> [Rgb; 2] {
         match self {
-            Self::Checkerboard { .. } | Self::Attribute(_) => [Rgb::ZERO; 2],
+            Self::Checkerboard { .. } | Self::Attribute(_) | Self::Volume(_) => [Rgb::ZERO; 2],
             Self::Bitmap(image) => image.slopes(uv),
         }
     }
@@ -423,6 +445,7 @@ impl Texture {
             Self::Checkerboard { .. } => false,
             Self::Bitmap(image) => image.filter == TextureFilter::Bilinear,
             Self::Attribute(a) => a.name.starts_with("vertex_"),
+            Self::Volume(v) => v.is_continuous(),
         }
     }
 
@@ -449,7 +472,7 @@ impl Texture {
         })
     }
 
-    /// Values, per channel, between which all others are; of a checkerboard its two colours, of an attribute its mean.
+    /// Values, per channel, between which all others are; of a checkerboard its two colours, of an attribute its mean, of a volume those of its voxels.
     #[must_use]
     pub fn bounds(&self) -> [Rgb; 2] {
         let none = [f64::INFINITY, f64::NEG_INFINITY].map(Rgb::splat);
@@ -460,6 +483,7 @@ impl Texture {
                 widened(b, Rgb::new(r, g, b2))
             }),
             Self::Attribute(_) => [self.mean(); 2],
+            Self::Volume(v) => v.bounds(),
         }
     }
 
@@ -478,12 +502,13 @@ impl Texture {
         sum * (1.0 / f64::from(ROWS * ROWS))
     }
 
-    /// The mean of all values over the texture's own period; for an attribute, which depends on the mesh, that of 0 and 1.
+    /// The mean of all values over the texture's own period; for an attribute, which depends on the mesh, that of 0 and 1; of a volume that of its voxels.
     #[must_use]
     pub fn mean(&self) -> Rgb {
         match self {
             Self::Checkerboard { colours: [a, b], .. } => (*a + *b) * 0.5,
             Self::Attribute(a) => Rgb::splat(0.5 * a.scale),
+            Self::Volume(v) => v.mean(),
             Self::Bitmap(image) => {
                 let sum = image
                     .texels

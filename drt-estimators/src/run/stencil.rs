@@ -48,13 +48,14 @@ impl Stencil {
         Ok(Self { offsets: towards(offsets), weights: towards(weights) })
     }
 
-    fn is_one_sided(&self) -> bool {
-        self.offsets.contains(&0.0)
+    /// The order of a difference to one side; `None` of one to both.
+    fn one_sided_order(&self) -> Option<usize> {
+        self.offsets.contains(&0.0).then_some(self.offsets.len() - 1)
     }
 }
 
 /// The parameters whose [differences](crate::finite_differences) look to one side, since a property's range ends within
-/// a step of their values.
+/// a step of their values, with the order of these: 2, or 1 where the range ends within two steps on the other side as well.
 ///
 /// # Errors
 /// As [`finite_differences`](crate::finite_differences), as far as the parameters' effects go.
@@ -62,14 +63,13 @@ pub fn one_sided_differences(
     scene: &Scene,
     parameters: &[Parameter],
     step: f64,
-) -> Result<Vec<String>, Error> {
-    let mut names = Vec::new();
+) -> Result<Vec<(String, usize)>, Error> {
+    let mut found = Vec::new();
     for (p, parameter) in parameters.iter().enumerate() {
-        if Stencil::at(scene, parameters, p, step)?.is_one_sided() {
-            names.push(parameter.name.clone());
-        }
+        let order = Stencil::at(scene, parameters, p, step)?.one_sided_order();
+        found.extend(order.map(|order| (parameter.name.clone(), order)));
     }
-    Ok(names)
+    Ok(found)
 }
 
 #[cfg(test)]
@@ -100,6 +100,8 @@ mod tests {
         assert_eq!(at(0.0, 1.0).unwrap(), (vec![-1.0, 1.0], vec![-1.0, 1.0]));
         assert_eq!(at(-0.5, 1.0).unwrap(), (vec![0.0, 1.0, 2.0], vec![-3.0, 4.0, -1.0]));
         assert_eq!(at(0.5, -1.0).unwrap(), (vec![0.0, -1.0, -2.0], vec![3.0, -4.0, 1.0]));
+        // Two steps end beyond the other end of the range.
+        assert_eq!(at(-0.125, 3.0).unwrap(), (vec![0.0, 1.0], vec![-2.0, 2.0]));
         // Beyond the range there is no difference at all.
         assert_eq!(at(-1.0, 1.0).unwrap_err().out_of_range(), Some("p"));
     }

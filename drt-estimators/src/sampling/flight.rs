@@ -190,7 +190,7 @@ impl Flown {
 /// the path that sums to one. Grids count where they are evaluated but not along the way.
 fn proxy_extinction(world: &World, medium: usize, at: Option<Vec3>) -> f64 {
     let m = world.medium(medium);
-    match (m.homogeneous(), at) {
+    match (m.extinction(), at) {
         (Some(h), _) => h.coefficients().sigma_t.mean(),
         (None, Some(x)) => m.sigma_t(x).mean(),
         (None, None) => 0.0,

@@ -194,7 +194,7 @@ pub(crate) struct World {
     /// How far light can go in each medium, at most.
     extent: Vec<f64>,
     /// Where set, no discrete choice depends on values that may differ between this scene and
-    /// another: the extinctions by which distances in homogeneous media are drawn instead of their
+    /// another: the extinctions by which distances in media of one extinction are drawn instead of their
     /// own.
     steady: Option<Vec<Option<Homogeneous>>>,
     pub(crate) max_depth: u32,
@@ -258,7 +258,7 @@ impl World {
             needs: ActiveFactors::default(),
             extent: (0..scene.media.len()).map(|m| extent(&scene, m, 2.0 * radius)).collect(),
             steady: like
-                .map(|w| w.scene.media.iter().map(|m| m.item.homogeneous().copied()).collect()),
+                .map(|w| w.scene.media.iter().map(|m| m.item.extinction().copied()).collect()),
             max_depth: depth,
             rr_depth: scene.integrator.rr_depth,
             hides_emitters: scene.hides_something(),
@@ -290,7 +290,7 @@ impl World {
             if *need == MediumActivity::Nothing {
                 continue;
             }
-            self.defensive[m] = match self.medium(m).homogeneous() {
+            self.defensive[m] = match self.medium(m).extinction() {
                 Some(h) => self.defensive_where_thin(m, h),
                 None => DEFENSIVE,
             };
@@ -313,7 +313,7 @@ impl World {
     /// `None` when that is the medium itself.
     pub(crate) fn drawn_by(&self, m: usize) -> Option<(&Homogeneous, Rgb)> {
         let other = self.steady.as_ref()?.get(m)?.as_ref()?;
-        let own = self.medium(m).homogeneous()?;
+        let own = self.medium(m).extinction()?;
         Some((other, other.coefficients().sigma_t - own.coefficients().sigma_t))
     }
 

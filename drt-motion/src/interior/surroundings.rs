@@ -29,7 +29,7 @@ pub struct Surroundings<'a> {
 pub struct SurroundingSurface<'a> {
     /// Its mesh, as moved.
     pub mesh: &'a Arc<Mesh>,
-    /// How it goes on moving, by the indices of the parameters that move it.
+    /// How it goes on moving, by the indices of the parameters that move it, ascending.
     pub motions: &'a [(usize, SurfaceMotion)],
     /// Paths have vertices on it: it scatters or emits.
     pub scatters: bool,
@@ -49,7 +49,8 @@ const REST: &SurfaceMotion = &SurfaceMotion::Rest;
 impl SurroundingSurface<'_> {
     /// How a parameter moves it, if it does.
     pub(super) fn motion(&self, parameter: usize) -> Option<&SurfaceMotion> {
-        self.motions.iter().find(|(p, _)| *p == parameter).map(|(_, motion)| motion)
+        let at = self.motions.binary_search_by_key(&parameter, |(p, _)| *p).ok()?;
+        Some(&self.motions[at].1)
     }
 
     /// How a parameter moves it.

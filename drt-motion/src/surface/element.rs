@@ -1,7 +1,7 @@
 use drt_geom::Mesh;
 use drt_math::{Affine, Vec3};
 
-use super::{JetAdjoint, SurfaceJet, SurfacePoint, VertexGradient, normal_rate};
+use super::{JetAdjoint, SurfaceJet, SurfacePoint, VertexGradient, VertexVectors, normal_rate};
 
 /// The local geometry of a mesh at a point: what every parameter's [`SurfaceJet`] there has in
 /// common, computed once.
@@ -122,8 +122,8 @@ impl SurfaceElement {
 
     pub(crate) fn vertex_jet(
         &self,
-        velocities: &[Vec3],
-        normal_rates: Option<&[Vec3]>,
+        velocities: &VertexVectors,
+        normal_rates: Option<&VertexVectors>,
     ) -> SurfaceJet {
         let v = self.corners.map(|i| velocities[i]);
         let area_dot = area_rate(self.edges, v);

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
-use super::{SmoothNormals, SurfaceElement, SurfaceMotion, SurfacePoint};
+use super::{SmoothNormals, SurfaceElement, SurfaceMotion, SurfacePoint, VertexVectors};
 use crate::volume::VolumeAdjoint;
 
 /// What multiplies each entry of a [`SurfaceJet`](super::SurfaceJet) in a derivative.
@@ -78,8 +78,11 @@ impl VertexGradient {
             SurfaceMotion::Rest => 0.0,
             SurfaceMotion::Affine(field) => self.to_affine(mesh).dot(field),
             SurfaceMotion::Vertices { positions, normals } => {
+                let inner = |own: &[Vec3], v: &VertexVectors| {
+                    v.stored().map(|(i, v)| own[i].dot(v)).sum::<f64>()
+                };
                 inner(&self.positions, positions)
-                    + normals.as_deref().map_or(0.0, |n| inner(&self.normals, n))
+                    + normals.as_ref().map_or(0.0, |n| inner(&self.normals, n))
             }
         }
     }

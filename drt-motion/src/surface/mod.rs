@@ -1,7 +1,6 @@
 //! Velocities of moving and deforming surfaces: at a point of a mesh its velocity, how its normals turn
 //! and how its area grows with a parameter, and the transposes of these maps.
 
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_geom::Mesh;
@@ -15,12 +14,16 @@ mod element;
 mod gradient;
 mod moved;
 mod normals;
+mod reached;
 mod turned;
+mod vectors;
 
 pub use element::SurfaceElement;
 pub use gradient::{AffineGradient, JetAdjoint, VertexGradient, in_file_order};
 pub use moved::{MovedFrame, MovedMesh, move_affine, move_mesh};
 pub use normals::SmoothNormals;
+pub use reached::ReachedTriangles;
+pub use vectors::VertexVectors;
 
 /// A point of a mesh: the same material point however the mesh moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,9 +48,9 @@ pub enum SurfaceMotion {
     /// A velocity for each vertex of the mesh, linear on triangles.
     Vertices {
         /// Velocities, one per mesh vertex.
-        positions: Arc<[Vec3]>,
+        positions: VertexVectors,
         /// Rates of the unit vertex normals, where the mesh has those.
-        normals: Option<Arc<[Vec3]>>,
+        normals: Option<VertexVectors>,
     },
 }
 
@@ -73,8 +76,7 @@ impl SurfaceMotion {
             Self::Rest => true,
             Self::Affine(field) => field.is_zero(),
             Self::Vertices { positions, normals } => {
-                let zero = |v: &[Vec3]| v.iter().all(|v| *v == Vec3::ZERO);
-                zero(positions) && normals.as_deref().is_none_or(zero)
+                positions.is_zero() && normals.as_ref().is_none_or(VertexVectors::is_zero)
             }
         }
     }
@@ -89,7 +91,7 @@ impl SurfaceMotion {
             Self::Affine(field) => finite(field.is_finite(), "the velocity field"),
             Self::Vertices { positions, normals } => {
                 for list in [Some(positions), normals.as_ref()].into_iter().flatten() {
-                    finite(list.iter().all(|v| v.is_finite()), "a vertex velocity")?;
+                    finite(list.stored().all(|(_, v)| v.is_finite()), "a vertex velocity")?;
                     if list.len() != mesh.positions.len() {
                         return Err(Cause::MotionLength {
                             expected: mesh.positions.len(),
@@ -131,6 +133,27 @@ impl SurfaceMotion {
         }
     }
 
+    /// The fastest vertex's speed.
+    ///
+    /// # Panics
+    /// As [`velocity`](Self::velocity).
+    #[must_use]
+    pub fn fastest(&self, mesh: &Mesh) -> f64 {
+        let speeds = |v: &mut dyn Iterator<Item = Vec3>| v.map(Vec3::length).fold(0.0, f64::max);
+        match self {
+            Self::Rest => 0.0,
+            Self::Affine(field) => speeds(&mut mesh.positions.iter().map(|x| field.point(*x))),
+            Self::Vertices { positions, .. } => speeds(&mut positions.stored().map(|(_, v)| v)),
+        }
+    }
+
+    /// The vertices around which alone the motion is felt, where these are known to be few; some may be there twice.
+    pub(crate) fn few_vertices(&self) -> Option<impl Iterator<Item = u32>> {
+        let Self::Vertices { positions, normals } = self else { return None };
+        let normals = normals.as_ref().map_or(Some(&[][..]), VertexVectors::few)?;
+        Some(positions.few()?.iter().chain(normals).map(|(v, _)| *v))
+    }
+
     /// All rates at a point of the moved mesh.
     ///
     /// # Panics
@@ -150,7 +173,7 @@ impl SurfaceMotion {
             Self::Rest => SurfaceJet::default(),
             Self::Affine(field) => element.affine_jet(field),
             Self::Vertices { positions, normals } => {
-                element.vertex_jet(positions, normals.as_deref())
+                element.vertex_jet(positions, normals.as_ref())
             }
         }
     }
@@ -186,8 +209,8 @@ impl SurfaceMotion {
                 mesh_normals.iter().map(|&n| normal_rate(field, n)).collect(),
             ),
             Self::Vertices { positions, normals } => (
-                positions.to_vec(),
-                normals.as_deref().map_or_else(|| still(mesh_normals.len()), <[Vec3]>::to_vec),
+                positions.clone().into(),
+                normals.clone().map_or_else(|| still(mesh_normals.len()), Vec::from),
             ),
         }
     }

@@ -1,16 +1,19 @@
 use alloc::vec;
 use alloc::vec::Vec;
+use core::cell::OnceCell;
 
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
 use super::caged::Caged;
 use super::element::Unit;
+use super::normals::Neighbours;
 use super::turned::TurnedNormals;
-use super::{SmoothNormals, SurfaceMotion};
+use super::{SmoothNormals, SurfaceMotion, VertexVectors};
 use crate::error::Cause;
 use crate::error::MotionError;
 use crate::error::finite;
+use crate::lists::Lists;
 use crate::parameter::{Applied, GeometryChange};
 
 /// A mesh at the parameters' values, and how it goes on moving from there.
@@ -52,8 +55,9 @@ pub fn move_mesh(
     parameters: usize,
 ) -> Result<MovedMesh, MotionError> {
     let mut moved = mesh.clone();
-    let mut fields = vec![Field::Affine(Affine::ZERO); parameters];
+    let mut fields = Fields::new(parameters);
     let mut deformed = false;
+    let sources = Sources::new(mesh, changes);
     let caged = Caged::new(mesh, changes)?;
     for c in changes {
         check(c, parameters)?;
@@ -65,47 +69,51 @@ pub fn move_mesh(
     let mut linear = Mat3::IDENTITY;
     for c in changes {
         let fail = |cause| c.error(cause);
-        if let Some(velocities) = vertex_velocities(mesh, &caged, c.change).map_err(fail)? {
+        let velocities = vertex_velocities(mesh, &caged, &sources, c.change).map_err(fail)?;
+        let mut all_finite = true;
+        if let Some(velocities) = velocities {
             deformed = true;
             if c.theta != 0.0 {
-                for field in &mut fields {
-                    field.pin(&moved.positions);
-                }
+                fields.pin(&moved.positions);
             }
-            for (x, v) in moved.positions.iter_mut().zip(&velocities) {
-                *x += *v * c.theta;
+            for (i, v) in velocities.stored() {
+                moved.positions[i] += v * c.theta;
+                all_finite &= moved.positions[i].is_finite();
             }
-            fields[c.parameter].add(Field::Vertices(velocities), &moved.positions);
+            fields.add(c.parameter, Field::Vertices(velocities), &moved.positions);
         } else if let Some(step) = Step::new(c) {
             // Normals are made unit anew, which would not leave them the same bits.
             if step.map != Affine::IDENTITY {
                 moved = moved.transform(&step.map);
                 linear = step.map.linear * linear;
-                for field in &mut fields {
-                    field.carry(&step);
-                }
+                fields.carry(&step);
             }
-            fields[c.parameter].add(Field::Affine(step.velocity), &moved.positions);
+            fields.add(c.parameter, Field::Affine(step.velocity), &moved.positions);
+            all_finite = moved.positions.iter().all(|x| x.is_finite());
         }
-        finite(moved.positions.iter().all(|x| x.is_finite()), "a moved position").map_err(fail)?;
+        finite(all_finite, "a moved position").map_err(fail)?;
     }
     let smooth = (deformed && mesh.normals.is_some()).then(|| SmoothNormals::new(mesh));
     if let Some(smooth) = &smooth {
         moved.normals = Some(smooth.normals(&moved));
     }
-    let smooth_units = smooth.as_ref().map(|smooth| (smooth, smooth.units(&moved)));
+    let smooth_units = smooth.as_ref().map(|smooth| SmoothUnits {
+        smooth,
+        units: smooth.units(&moved),
+        neighbours: OnceCell::new(),
+    });
     let motion = |(parameter, field): (usize, Field)| {
         let motion = field.into_motion(&moved, smooth_units.as_ref());
         match turned.as_ref().and_then(|turned| turned.rates(parameter, &linear)) {
             None => motion,
             Some(rates) => {
-                let positions = vec![Vec3::ZERO; moved.positions.len()].into();
+                let positions = VertexVectors::zeros(moved.positions.len());
                 let turning = SurfaceMotion::Vertices { positions, normals: Some(rates.into()) };
                 motion.plus(&turning, &moved)
             }
         }
     };
-    let motions = fields.into_iter().enumerate().map(motion).collect();
+    let motions = fields.list.into_iter().enumerate().map(motion).collect();
     Ok(MovedMesh { mesh: moved, motions, smooth })
 }
 
@@ -166,29 +174,68 @@ impl Step {
     }
 }
 
+/// The velocity fields of all parameters.
+///
+/// Most changes leave most fields as they are: one that moves vertices singly all but those that are affine functions of
+/// the position, and so does a translation.
+struct Fields {
+    list: Vec<Field>,
+    /// The fields that are affine and differ from place to place.
+    varying: Vec<usize>,
+}
+
+impl Fields {
+    fn new(parameters: usize) -> Self {
+        Self { list: vec![Field::Affine(Affine::ZERO); parameters], varying: Vec::new() }
+    }
+
+    /// Takes the fields through an affine change of the positions.
+    fn carry(&mut self, step: &Step) {
+        if step.map.linear == Mat3::IDENTITY {
+            self.varying.iter().for_each(|p| self.list[*p].carry(step));
+        } else {
+            self.list.iter_mut().for_each(|field| field.carry(step));
+        }
+    }
+
+    /// Ties the fields to the vertices, which are at `positions`, before they are moved singly: what is an affine function
+    /// of the position now would not be one afterwards.
+    fn pin(&mut self, positions: &[Vec3]) {
+        for p in self.varying.drain(..) {
+            if let Field::Affine(u) = &self.list[p] {
+                self.list[p] = Field::Vertices(at_vertices(u, positions));
+            }
+        }
+    }
+
+    fn add(&mut self, parameter: usize, other: Field, positions: &[Vec3]) {
+        let field = &mut self.list[parameter];
+        let varied = field.varies();
+        field.add(other, positions);
+        match (varied, field.varies()) {
+            (false, true) => self.varying.push(parameter),
+            (true, false) => self.varying.retain(|p| *p != parameter),
+            _ => {}
+        }
+    }
+}
+
 /// A velocity field on the vertices, kept affine for as long as it is.
 #[derive(Clone, Debug)]
 enum Field {
     Affine(Affine),
-    Vertices(Vec<Vec3>),
+    Vertices(VertexVectors),
 }
 
 impl Field {
-    /// Takes the field through an affine change of the positions.
+    fn varies(&self) -> bool {
+        matches!(self, Self::Affine(u) if u.linear != Mat3::ZERO)
+    }
+
     fn carry(&mut self, step: &Step) {
         match self {
             Self::Affine(u) => *u = step.carry(u),
-            Self::Vertices(v) => v.iter_mut().for_each(|v| *v = step.map.vector(*v)),
-        }
-    }
-
-    /// Ties the field to the vertices, which are at `positions`, before they are moved singly: what is an affine function
-    /// of the position now would not be one afterwards.
-    fn pin(&mut self, positions: &[Vec3]) {
-        if let Self::Affine(u) = self
-            && u.linear != Mat3::ZERO
-        {
-            *self = Self::Vertices(at_vertices(u, positions));
+            Self::Vertices(v) => *v = v.map(|v| step.map.vector(v)),
         }
     }
 
@@ -196,32 +243,44 @@ impl Field {
         *self = match (core::mem::replace(self, Self::Affine(Affine::ZERO)), other) {
             (Self::Affine(a), Self::Affine(b)) => Self::Affine(a.plus(&b)),
             (Self::Affine(u), Self::Vertices(v)) | (Self::Vertices(v), Self::Affine(u)) => {
-                let u = at_vertices(&u, positions);
-                Self::Vertices(u.iter().zip(&v).map(|(u, v)| *u + *v).collect())
+                Self::Vertices(if u.is_zero() { v } else { at_vertices(&u, positions).plus(&v) })
             }
-            (Self::Vertices(a), Self::Vertices(b)) => {
-                Self::Vertices(a.iter().zip(&b).map(|(a, b)| *a + *b).collect())
-            }
+            (Self::Vertices(a), Self::Vertices(b)) => Self::Vertices(a.plus(&b)),
         };
     }
 
-    fn into_motion(
-        self,
-        moved: &Mesh,
-        smooth: Option<&(&SmoothNormals, Vec<Unit>)>,
-    ) -> SurfaceMotion {
-        let velocities = match self {
+    fn into_motion(self, moved: &Mesh, smooth: Option<&SmoothUnits<'_>>) -> SurfaceMotion {
+        let positions = match self {
             Self::Affine(u) if u.is_zero() => return SurfaceMotion::Rest,
             // Angles weigh recomputed normals; where they change, these do not turn as the field.
             Self::Affine(u) if smooth.is_some() && !keeps_angles(&u.linear) => {
                 at_vertices(&u, &moved.positions)
             }
             Self::Affine(u) => return SurfaceMotion::Affine(u),
-            Self::Vertices(v) if v.iter().all(|v| *v == Vec3::ZERO) => return SurfaceMotion::Rest,
+            Self::Vertices(v) if v.is_zero() => return SurfaceMotion::Rest,
             Self::Vertices(v) => v,
         };
-        let normals = smooth.map(|(s, units)| s.rates_from(units, moved, &velocities).into());
-        SurfaceMotion::Vertices { positions: velocities.into(), normals }
+        let normals = smooth.map(|smooth| smooth.rates(moved, &positions));
+        SurfaceMotion::Vertices { positions, normals }
+    }
+}
+
+/// The recomputed normals of a mesh, and what their rates depend on.
+struct SmoothUnits<'a> {
+    smooth: &'a SmoothNormals,
+    units: Vec<Unit>,
+    /// Made when a parameter moves few vertices.
+    neighbours: OnceCell<Neighbours>,
+}
+
+impl SmoothUnits<'_> {
+    fn rates(&self, moved: &Mesh, velocities: &VertexVectors) -> VertexVectors {
+        if velocities.few().is_some() {
+            let around = self.neighbours.get_or_init(|| self.smooth.neighbours(moved));
+            return self.smooth.rates_of_few(&self.units, moved, around, velocities);
+        }
+        let all = Vec::from(velocities.clone());
+        self.smooth.rates_from(&self.units, moved, &all).into()
     }
 }
 
@@ -232,8 +291,25 @@ fn keeps_angles(a: &Mat3) -> bool {
     size(&deviatoric) <= 16.0 * f64::EPSILON * size(a)
 }
 
-fn at_vertices(u: &Affine, positions: &[Vec3]) -> Vec<Vec3> {
-    positions.iter().map(|&x| u.point(x)).collect()
+fn at_vertices(u: &Affine, positions: &[Vec3]) -> VertexVectors {
+    positions.iter().map(|&x| u.point(x)).collect::<Vec<_>>().into()
+}
+
+/// The vertices of a mesh that stem from each vertex of its file; empty where no change asks for them.
+struct Sources(Option<Lists>);
+
+impl Sources {
+    fn new(mesh: &Mesh, changes: &[Applied<'_, GeometryChange>]) -> Self {
+        let single =
+            |c: &Applied<'_, GeometryChange>| matches!(c.change, GeometryChange::Vertex { .. });
+        let pairs = || (0..mesh.positions.len() as u32).map(|i| (mesh.source_vertex(i), i));
+        let count = mesh.source_vertex_count as usize;
+        Self(changes.iter().any(single).then(|| Lists::new(count, &pairs().collect::<Vec<_>>())))
+    }
+
+    fn of(&self, source: u32) -> &[u32] {
+        self.0.as_ref().map_or(&[], |lists| lists.of(source as usize))
+    }
 }
 
 /// Velocities of the mesh's vertices, from a change given in the order of the mesh's file; `None`
@@ -241,23 +317,28 @@ fn at_vertices(u: &Affine, positions: &[Vec3]) -> Vec<Vec3> {
 fn vertex_velocities(
     mesh: &Mesh,
     caged: &Caged<'_>,
+    sources: &Sources,
     change: &GeometryChange,
-) -> Result<Option<Vec<Vec3>>, Cause> {
+) -> Result<Option<VertexVectors>, Cause> {
     let count = mesh.source_vertex_count as usize;
-    let gather = |velocity: &dyn Fn(u32) -> Vec3| {
-        let vertices = 0..mesh.positions.len() as u32;
-        Ok(Some(vertices.map(|i| velocity(mesh.source_vertex(i))).collect()))
-    };
+    let vertices = mesh.positions.len();
     match change {
-        GeometryChange::VertexVelocity(v) if v.len() == count => gather(&|i| v[i as usize]),
+        GeometryChange::VertexVelocity(v) if v.len() == count => {
+            let moving = (0..vertices as u32).map(|i| (i, v[mesh.source_vertex(i) as usize]));
+            let moving = moving.filter(|(_, v)| *v != Vec3::ZERO).collect();
+            Ok(Some(VertexVectors::of_few(vertices, moving)))
+        }
         GeometryChange::VertexVelocity(v) => {
             Err(Cause::VertexCount { expected: count, found: v.len() })
         }
         &GeometryChange::Vertex { index, direction } if (index as usize) < count => {
-            gather(&|i| if i == index { direction } else { Vec3::ZERO })
+            let few = sources.of(index).iter().map(|i| (*i, direction)).collect();
+            Ok(Some(VertexVectors::of_few(vertices, few)))
         }
         &GeometryChange::Vertex { index, .. } => Err(Cause::VertexIndex { index, count }),
-        GeometryChange::Cage { mesh: cage, vertices } => Ok(caged.velocities(cage, vertices)),
+        GeometryChange::Cage { mesh: cage, vertices } => {
+            Ok(caged.velocities(cage, vertices).map(Into::into))
+        }
         GeometryChange::Translate(_)
         | GeometryChange::Rotate { .. }
         | GeometryChange::Scale { .. }

@@ -5,7 +5,10 @@ use alloc::vec::Vec;
 use drt_geom::{Mesh, weld};
 use drt_math::{Vec3, fm};
 
+use super::VertexVectors;
 use super::element::{Unit, area_rate, area_rate_transposed, edges_and_area};
+use super::reached::triangles_around;
+use crate::lists::Lists;
 
 /// Vertex normals recomputed from the positions of a deforming mesh, with their rates and the
 /// transpose of those.
@@ -80,6 +83,44 @@ impl SmoothNormals {
         self.shared.iter().map(|&s| rates[s as usize]).collect()
     }
 
+    /// What [`rates_of_few`](Self::rates_of_few) looks up.
+    pub(super) fn neighbours(&self, mesh: &Mesh) -> Neighbours {
+        let pairs: Vec<_> = self.shared.iter().copied().zip(0..).collect();
+        Neighbours { triangles: triangles_around(mesh), takers: Lists::new(self.count, &pairs) }
+    }
+
+    /// The same rates as [`rates_from`](Self::rates_from) for velocities of few vertices, the others resting, in a
+    /// time that depends on these alone.
+    pub(super) fn rates_of_few(
+        &self,
+        units: &[Unit],
+        mesh: &Mesh,
+        around: &Neighbours,
+        velocities: &VertexVectors,
+    ) -> VertexVectors {
+        let mut triangles: Vec<u32> =
+            velocities.stored().flat_map(|(v, _)| around.triangles.of(v)).copied().collect();
+        triangles.sort_unstable();
+        triangles.dedup();
+        let mut sums = BTreeMap::new();
+        for t in triangles.into_iter().map(|t| &mesh.triangles[t as usize]) {
+            let v = t.map(|i| velocities[i as usize]);
+            if v == [Vec3::ZERO; 3] {
+                continue;
+            }
+            for (&i, rate) in t.iter().zip(Face::new(mesh, t).rates(v)) {
+                *sums.entry(self.shared[i as usize]).or_insert(Vec3::ZERO) += rate;
+            }
+        }
+        let mut rates: Vec<(u32, Vec3)> = Vec::new();
+        for (shared, sum) in sums {
+            let rate = units[shared as usize].rate(sum);
+            rates.extend(around.takers.of(shared as usize).iter().map(|i| (*i, rate)));
+        }
+        rates.sort_unstable_by_key(|(i, _)| *i);
+        VertexVectors::of_few(self.shared.len(), rates)
+    }
+
     /// Transpose of [`rates`](Self::rates): adds to `positions` the gradient with respect to the
     /// velocities, given the gradient with respect to the rates of the normals.
     pub fn rates_transposed(&self, mesh: &Mesh, normals: &[Vec3], positions: &mut [Vec3]) {
@@ -108,6 +149,13 @@ impl SmoothNormals {
         }
         sums.into_iter().map(Unit::new).collect()
     }
+}
+
+/// What is around each vertex of a mesh, and which vertices share a normal.
+pub(super) struct Neighbours {
+    triangles: Lists,
+    /// The vertices that take each shared normal.
+    takers: Lists,
 }
 
 /// What a triangle gives to the normals of its corners: its unit normal times its angle there.

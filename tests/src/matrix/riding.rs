@@ -5,10 +5,10 @@ use drt_estimators::emitter::Emitter;
 use drt_geom::Mesh;
 use drt_geom::procedural::cube;
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
-use drt_medium::{Grid, GridMedium, Layout, Phase, Volume};
-use drt_motion::{Change, Effect, GeometryChange};
+use drt_medium::{Grid, GridMedium, Layout, MediumKind, Phase, UniformMedium, Volume};
+use drt_motion::{Change, Effect, GeometryChange, PropertyChange, ValueChange};
 
-use super::effects::{add, turn};
+use super::effects::{add, translate, turn};
 use super::set::placed;
 use super::{Cell, Set, Stage};
 use crate::Result;
@@ -66,9 +66,20 @@ fn rides() -> Effect {
 
 /// A box with a grid of the given half width, every coefficient of which varies in space and colour.
 fn stage(name: &'static str, half: f64) -> Result<Stage> {
-    let albedo = Volume::Grid(lumps(half, [0.7, 0.6, 0.5], 3)?);
-    let glow = Volume::Grid(lumps(half, [0.3, 0.2, 0.5], 3)?);
-    let smoke = GridMedium::new(lumps(half, [1.0; 3], 1)?, 2.0, albedo, glow)?;
+    let smoke = GridMedium::new(lumps(half, [1.0; 3], 1)?, 2.0, albedo(half)?, glow(half)?)?;
+    around(name, smoke)
+}
+
+fn albedo(half: f64) -> Result<Volume> {
+    Ok(Volume::Grid(lumps(half, [0.7, 0.6, 0.5], 3)?))
+}
+
+fn glow(half: f64) -> Result<Volume> {
+    Ok(Volume::Grid(lumps(half, [0.3, 0.2, 0.5], 3)?))
+}
+
+/// A box of a medium that rides with it.
+fn around(name: &'static str, smoke: impl Into<MediumKind>) -> Result<Stage> {
     let sun = Emitter::Directional {
         direction: vec3(-0.7, -1.0, 0.4),
         irradiance: Rgb::new(4.0, 5.0, 6.0),
@@ -139,4 +150,30 @@ pub fn riding_still() -> Result<Stage> {
 pub fn riding_mean_value() -> Result<Stage> {
     let insides = vec![(0, InteriorMotion::MeanValue)];
     Ok(Stage { insides, ..stage("riding, mean value", HALF)? })
+}
+
+/// One extinction everywhere, in a box larger than the grid of the albedo.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn dyed() -> Result<Stage> {
+    let sigma_t = Rgb::new(1.0, 1.4, 2.0);
+    let mut stage = around("dyed", UniformMedium::new(sigma_t, albedo(0.6)?, glow(1.0)?)?)?;
+    let voxel = PropertyChange {
+        property: "albedo".into(),
+        op: ValueChange::Add(Rgb::new(1.0, 0.8, 0.6)),
+        voxels: Some([2, 1, 2]),
+        texels: None,
+    };
+    let voxel = Effect { target: "smoke".into(), change: Change::Property(voxel) };
+    let spin = turn("box", vec3(0.2, 1.0, 0.3), Vec3::ZERO);
+    stage.cells.extend([
+        Cell::new("dye moves", [translate("smoke", vec3(0.7, 0.3, -0.4))]).representative(),
+        Cell::new("box moves", [translate("box", vec3(0.4, 0.3, -0.4))]),
+        Cell::new("box turns, dye rides", [spin, rides()]),
+        Cell::new("a voxel", [voxel]).step(0.25).representative(),
+        Cell::new("extinction", [add("smoke", "sigma_t", [-0.5, 0.3, 0.4])]),
+        Cell::new("albedo", [add("smoke", "albedo", [0.3, 0.5, 0.4])]).step(0.1),
+    ]);
+    Ok(stage)
 }

@@ -1,10 +1,15 @@
 //! Stages of values that vary: over surfaces, lamps, films in lamps and skies; and of other lenses.
 
+use std::sync::Arc;
+
 use drt_estimators::emitter::{Emitter, EnvironmentMap, Slide};
 use drt_estimators::surface::{Bsdf, Diffuse, Property, Textured};
-use drt_estimators::texture::{AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap};
+use drt_estimators::texture::{
+    AttributeTexture, Bitmap, Texture, TextureFilter, TextureWrap, VolumeTexture,
+};
 use drt_geom::{Mesh, MeshAttribute};
-use drt_math::{Mat3, Rgb, ValueChange, Vec3, vec3};
+use drt_math::{Affine, Mat3, Rgb, ValueChange, Vec3, vec3};
+use drt_medium::{Grid, Volume};
 use drt_motion::{Change, Effect, PropertyChange, Texels};
 
 use super::effects::{raise, translate, turn};
@@ -111,6 +116,29 @@ pub fn stained() -> Result<Stage> {
         Cell::new("panel turns", [turn("panel", vec3(0.2, 1.0, 0.3), Vec3::ZERO)]),
     ];
     Ok(Stage::new("stained", scene, cells))
+}
+
+/// Values of the space that a panel has been cut from, in three channels; one cell is of a panel that has moved.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn marbled() -> Result<Stage> {
+    let size = [4_usize, 3, 3];
+    let value = |i: usize| 0.5 + 0.4 * (1.9 * i as f64).sin();
+    let grid = Grid::new(size, 3, (0..3 * size.iter().product::<usize>()).map(value).collect())?;
+    let wide =
+        Affine { linear: Mat3::rotation(Vec3::X, 0.4) * 2.5, translation: vec3(-1.2, -1.0, -1.1) };
+    let volume = Arc::new(Volume::Grid(grid.with_placement(wide)?));
+    let paint = painted(Texture::Volume(VolumeTexture { volume, grey: false }))?;
+    let mut scene = panel(paint)?.scene;
+    let mesh = scene.shapes[0].mesh.as_ref().clone();
+    scene.shapes[0].mesh = VolumeTexture::remember_positions(mesh)?.into();
+    let turns = turn("panel", vec3(0.2, 1.0, 0.3), Vec3::ZERO);
+    let cells = vec![
+        Cell::new("panel moves", [translate("panel", vec3(0.3, 0.5, -0.3))]).samples(1024),
+        Cell::new("panel, turned, turns on", [turns]).at(0.2).samples(1024).representative(),
+    ];
+    Ok(Stage::new("marbled", scene, cells))
 }
 
 /// A lamp with a picture before it.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use drt_estimators::emitter::Emitter;
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_math::{Affine, Mat3, Vec3, vec3};
-use drt_medium::{GridMedium, Homogeneous, Medium, MediumKind, Volume};
+use drt_medium::{GridMedium, Homogeneous, Medium, MediumKind, UniformMedium, Volume};
 use drt_motion::{Change, Effect, GeometryChange, Parameter, ValueChange};
 
 use super::{Case, Condition, Extent};
@@ -85,20 +85,24 @@ impl Similarity {
     }
 
     fn medium(&self, medium: &Medium) -> Result<Medium> {
+        let placed = |volume: &Volume| -> Result<Volume> {
+            let mut volume = volume.clone();
+            if let Volume::Grid(grid) = &mut volume {
+                grid.place(&self.map())?;
+            }
+            Ok(volume)
+        };
         let kind: MediumKind = match &medium.kind {
             MediumKind::Homogeneous(h) => {
                 let mut c = h.coefficients();
                 c.sigma_t *= 1.0 / self.scale;
                 Homogeneous::try_from(c)?.into()
             }
+            MediumKind::Uniform(u) => {
+                let (albedo, emission) = (placed(u.albedo())?, placed(u.emission())?);
+                UniformMedium::new(u.sigma_t() / self.scale, albedo, emission)?.into()
+            }
             MediumKind::Grid(g) => {
-                let placed = |volume: &Volume| -> Result<Volume> {
-                    let mut volume = volume.clone();
-                    if let Volume::Grid(grid) = &mut volume {
-                        grid.place(&self.map())?;
-                    }
-                    Ok(volume)
-                };
                 let mut density = g.density().clone();
                 density.place(&self.map())?;
                 let scale = g.scale() / self.scale;

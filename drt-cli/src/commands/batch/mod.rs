@@ -7,7 +7,6 @@
 mod list;
 mod log;
 
-use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
@@ -15,7 +14,7 @@ use self::list::Entry;
 use self::log::{Event, Log};
 use super::clock::Clock;
 use super::derivatives::derivatives;
-use super::destinations::whole_name;
+use super::destinations::Destinations;
 use super::monitor::Monitor;
 use super::options::BatchOptions;
 use super::outputs::Outputs;
@@ -32,7 +31,9 @@ const LOG: &str = "batch.jsonl";
 pub(super) fn run(options: &BatchOptions) -> Result<Outcome, CliError> {
     let entries = list::entries(options)?;
     let log = options.output.join(LOG);
-    let written = Written::of(&entries, &log)?;
+    // Two jobs must not overwrite each other's results, nor the log.
+    let written = written(&entries, &log);
+    written.distinct()?;
     written
         .spare(entries.iter().map(|e| e.options.input.as_path()).chain(options.list.as_deref()))?;
     for folder in folders(&entries, &options.output) {
@@ -65,38 +66,13 @@ fn folders(entries: &[Entry], own: &Path) -> Vec<PathBuf> {
     folders
 }
 
-/// All files that a batch writes, and who does.
-struct Written(BTreeMap<PathBuf, String>);
-
-impl Written {
-    /// Two jobs must not overwrite each other's results, nor the log.
-    fn of(entries: &[Entry], log: &Path) -> Result<Self, CliError> {
-        let mut taken = BTreeMap::from([(whole_name(log), "the log".to_owned())]);
-        for entry in entries {
-            let files = [&entry.options.output, &entry.options.digest, &entry.options.preview];
-            for file in files.into_iter().flatten() {
-                if let Some(other) = taken.insert(whole_name(file), entry.to_string()) {
-                    return Err(CliError::argument(format!(
-                        "{other} and {entry} would both be written to {}; expected a name of its \
-                         own, by -o in a line of --list",
-                        file.display()
-                    )));
-                }
-            }
-        }
-        Ok(Self(taken))
-    }
-
-    /// Refuses to overwrite what is read.
-    fn spare<'p>(&self, read: impl IntoIterator<Item = &'p Path>) -> Result<(), CliError> {
-        let found = read.into_iter().find_map(|file| Some((file, self.0.get(&whole_name(file))?)));
-        found.map_or(Ok(()), |(file, who)| {
-            Err(CliError::argument(format!(
-                "{} is read, and would be overwritten by {who}; expected another file, by -o",
-                file.display()
-            )))
-        })
-    }
+/// All files that a batch writes: the results of its jobs, and the log.
+fn written(entries: &[Entry], log: &Path) -> Destinations {
+    let results = entries.iter().flat_map(|entry| {
+        let files = [&entry.options.output, &entry.options.digest, &entry.options.preview];
+        files.map(|file| (entry.to_string(), file.as_deref()))
+    });
+    Destinations::new([("the log".to_owned(), Some(log))].into_iter().chain(results))
 }
 
 /// What became of the jobs.
@@ -143,7 +119,7 @@ struct Batch {
     /// No derivatives.
     forward: bool,
     /// The files that all jobs write.
-    written: Written,
+    written: Destinations,
 }
 
 impl Batch {

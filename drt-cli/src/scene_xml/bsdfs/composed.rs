@@ -38,6 +38,9 @@ impl<'a> Loader<'a> {
         let normal = p.color("normalmap")?;
         let normal = normal.ok_or_else(|| p.element.error("`normalmap` is missing"))?;
         let map = match p.take_texture("normalmap") {
+            Some(Texture::Volume(_)) => {
+                return Err(p.element.error("a `normalmap` of a volume is not supported"));
+            }
             Some(map) => map,
             None => {
                 let texel = normal.to_array().map(|c| c as f32);
@@ -59,7 +62,9 @@ impl<'a> Loader<'a> {
             let message = format!("expected one texture inside, found {}", maps.len());
             return Err(p.element.error(message));
         };
-        if !textures::varies(map) || map.attribute("type") == Some("mesh_attribute") {
+        if !textures::varies(map)
+            || matches!(map.attribute("type"), Some("mesh_attribute" | "volume"))
+        {
             return Err(
                 map.error("bumps need an image, or what else varies by texture coordinates")
             );

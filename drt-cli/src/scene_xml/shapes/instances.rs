@@ -9,7 +9,7 @@ use drt_math::Affine;
 use super::super::Loader;
 use super::super::element::Element;
 use super::super::properties::Properties;
-use super::SharedMeshes;
+use super::{SharedMeshes, takes_volumes};
 use crate::CliError;
 
 /// The groups of a scene.
@@ -56,6 +56,11 @@ impl<'a> Loader<'a> {
                     return Err(inner
                         .child
                         .error("a shape of a shapegroup cannot carry an emitter"));
+                }
+                if takes_volumes(&bsdfs[shape.bsdf].item) {
+                    return Err(inner.child.error(
+                        "a `volume` texture in a shapegroup is not supported: its value is one for each place in the world",
+                    ));
                 }
                 members.push(shape);
             }

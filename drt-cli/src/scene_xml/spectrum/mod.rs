@@ -141,7 +141,7 @@ fn plugin(e: &Element, of: Of) -> Result<Rgb, CliError> {
         other => {
             let message = format!(
                 "the {} type `{other}` is not supported; expected uniform, d65, srgb, rawconstant, \
-                 blackbody, regular, irregular, bitmap, checkerboard or mesh_attribute",
+                 blackbody, regular, irregular, bitmap, checkerboard, mesh_attribute or volume",
                 e.tag
             );
             return Err(e.error(message));
@@ -168,7 +168,7 @@ fn pairs(e: &Element, text: &str) -> Result<Spectrum, CliError> {
 
 /// A text file with a wavelength and a value per line; `#` starts a comment.
 fn file(e: &Element) -> Result<Spectrum, CliError> {
-    let path = e.resolve(e.required("filename")?)?;
+    let path = e.named_file()?;
     let text = read_text(&path, Some(&e.place))?;
     let mut samples = Vec::new();
     for (i, line) in text.lines().enumerate() {

@@ -215,7 +215,7 @@ fn volume_lights() {
     let grid = within.replace("rgb name", "volume type=\"constvolume\" name").replace("2 0 5", "");
     refused(&body(albedo, &grid), &["<volume", "as a volume"]);
     let heterogeneous = body(albedo, &within).replace("homogeneous", "heterogeneous");
-    refused(&heterogeneous, &["heterogeneous medium"]);
+    refused(&heterogeneous, &["medium with grids"]);
 }
 
 #[test]

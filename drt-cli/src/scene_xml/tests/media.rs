@@ -157,6 +157,37 @@ fn heterogeneous_of_constants_is_a_box() {
 }
 
 #[test]
+fn homogeneous_media_take_their_albedo_from_a_grid() {
+    let folder = Folder::new();
+    ramp(&folder);
+    let grid = |name: &str| {
+        format!(
+            "<volume name=\"{name}\" type=\"gridvolume\"><string name=\"filename\" \
+             value=\"ramp.vol\"/></volume>"
+        )
+    };
+    let inside = format!("<float name=\"sigma_t\" value=\"2\"/>{}", grid("emission"));
+    let text = |inside: &str| {
+        format!("<scene version=\"3.0.0\"><medium type=\"homogeneous\">{inside}</medium></scene>")
+    };
+    let load = |inside: &str| {
+        let file = folder.file("s.xml", text(inside));
+        load_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
+    };
+    let m = load(&inside).unwrap();
+    let (near, far) = (vec3(0.375, 0.5, 0.5), vec3(9.0, 0.5, 0.5));
+    assert_eq!(m.coefficients(near).emission, Rgb::ONE);
+    // The outermost value goes on, and the extinction does.
+    assert_eq!((m.sigma_t(far), m.coefficients(far).emission), (Rgb::splat(2.0), Rgb::splat(3.0)));
+    assert_eq!(m.coefficients(far).albedo, Rgb::splat(0.75));
+    assert!(m.extinction().is_some() && m.homogeneous().is_none());
+    let message = load(&grid("albedo")).unwrap_err().to_string();
+    assert!(message.contains("albedo is 2"), "{message}");
+    let message = load(&grid("sigma_t")).unwrap_err().to_string();
+    assert!(message.contains("`sigma_t` of a homogeneous medium must be one number"), "{message}");
+}
+
+#[test]
 fn absorbing_and_scattering_grids() {
     let folder = Folder::new();
     ramp(&folder);

@@ -3,9 +3,11 @@
 use drt_estimators::Scene;
 use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, Property};
-use drt_estimators::texture::Texture;
+use drt_estimators::texture::{Texture, VolumeTexture};
 use drt_geom::Mesh;
 use drt_math::{Rgb, Vec3, vec3};
+use drt_medium::Grid;
+use drt_medium::vol::{VolFile, encode};
 
 use super::{refused, scene};
 use crate::testing::Folder;
@@ -298,6 +300,64 @@ fn files_bring_their_coordinates() {
     let [a, b, c] = corners("ply", mirrored);
     assert_eq!(a, upright[0]);
     assert!([b, c] == [upright[1], upright[2]] || [c, b] == [upright[1], upright[2]]);
+}
+
+#[test]
+fn volumes_on_surfaces() {
+    let folder = Folder::new();
+    let grid = Grid::new([2, 1, 1], 1, vec![0.2, 0.6]).unwrap();
+    let bounds = [Vec3::ZERO, Vec3::splat(1.0)];
+    folder.file("v.vol", encode(&VolFile { grid, bounds }).unwrap());
+    let volume = |rest: &str| {
+        format!(
+            "<volume {rest} type=\"gridvolume\"><string name=\"filename\" value=\"v.vol\"/>\
+             <transform name=\"to_world\"><scale value=\"2\"/></transform></volume>"
+        )
+    };
+    let paint = |inside: &str| {
+        format!(
+            "<bsdf type=\"diffuse\"><texture name=\"reflectance\" type=\"volume\">{inside}</texture></bsdf>"
+        )
+    };
+    let shape = |kind: &str, paint: &str| {
+        format!(
+            "<shape type=\"{kind}\">{paint}<transform name=\"to_world\"><translate x=\"1\" y=\"0.5\"/>\
+             </transform></shape>"
+        )
+    };
+    let inside = shape("rectangle", &paint(&volume("name=\"volume\"")));
+    let referred = shape("rectangle", &paint("<ref id=\"v\" name=\"volume\"/>"));
+    for body in [inside.clone(), format!("{}{referred}", volume("id=\"v\""))] {
+        let s = load(&folder, &body).unwrap();
+        assert!(s.check().is_ok());
+        let positions = s.shapes[0].mesh.attribute(VolumeTexture::POSITIONS).unwrap();
+        let [x, y, _] = positions.at(0, [0.0, 0.5]);
+        let mesh = &s.shapes[0].mesh;
+        let [i, _, k] = mesh.triangles[0].map(|v| mesh.positions[v as usize]);
+        assert_eq!([x, y], [0.5 * (i.x + k.x), 0.5 * (i.y + k.y)]);
+        s.bsdfs[0].item.for_each_texture(|_, texture| {
+            let Texture::Volume(v) = texture else { panic!() };
+            assert!((v.volume.value(vec3(1.25, 0.3, 9.0)).g - 0.5).abs() < 1e-6);
+            let off = [0.2, 0.6].iter().zip(texture.bounds()).map(|(v, b)| (b.g - v).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-6);
+        });
+    }
+    // Eight round shapes would be images of one mesh, which cannot know where all of them are.
+    let spheres = shape("sphere", &paint(&volume("name=\"volume\""))).repeat(8);
+    assert!(load(&folder, &spheres).unwrap().instances.is_empty());
+    let fails = |body: &str, part: &str| {
+        let message = load(&folder, body).map_err(|e| e.to_string()).unwrap_err();
+        assert!(message.contains(part), "{message}");
+    };
+    fails(&shape("cube", &paint("")), "`volume` is missing");
+    fails(&shape("cube", &paint("<float name=\"volume\" value=\"1\"/>")), "must be a <volume>");
+    fails(
+        &format!("<shape type=\"shapegroup\">{inside}</shape>"),
+        "in a shapegroup is not supported",
+    );
+    let lamp =
+        paint(&volume("name=\"volume\"")).replace("bsdf", "emitter").replace("diffuse", "area");
+    fails(&shape("cube", &lamp.replace("reflectance", "radiance")), "volumes are for BSDFs");
 }
 
 #[test]

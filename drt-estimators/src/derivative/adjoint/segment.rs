@@ -128,12 +128,12 @@ impl Differentiator<'_> {
         for i in intervals(path.medium, path.crossings, path.length) {
             let Some(m) = i.medium else { continue };
             let length = i.end - i.start;
-            if !length.is_finite() && world.medium(m).homogeneous().is_some() {
+            if !length.is_finite() && world.medium(m).extinction().is_some() {
                 continue;
             }
             let changes = sink.active().media[m];
             let start = path.start + path.dir * i.start;
-            if let Some(h) = world.medium(m).homogeneous() {
+            if let Some(h) = world.medium(m).extinction() {
                 if changes {
                     sink.medium(m, start, &CoefficientAdjoint::of_sigma_t(weight * -length));
                 }

@@ -108,7 +108,7 @@ pub(super) fn describe_guide(source: BoundarySource, guiding: &Guiding) -> Strin
 
 fn medium_plan(world: &World, motion: Option<&Motion>, i: usize) -> MediumPlan {
     let item = &world.scene.media[i];
-    let tracking = match item.item.homogeneous() {
+    let tracking = match item.item.extinction() {
         Some(_) => "closed form",
         None => "delta tracking",
     };

@@ -176,7 +176,9 @@ fn ends_inside(world: &World, medium: usize) -> bool {
     let grid = match &world.medium(medium).kind {
         MediumKind::Grid(grid) => grid.density(),
         MediumKind::Deformed(_) => return true,
-        MediumKind::Homogeneous(_) | MediumKind::Custom(_) => return false,
+        MediumKind::Homogeneous(_) | MediumKind::Uniform(_) | MediumKind::Custom(_) => {
+            return false;
+        }
     };
     let shapes = &world.scene.shapes;
     let mut around =
