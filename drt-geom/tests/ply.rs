@@ -156,6 +156,7 @@ fn wrong_files_are_named() {
         ("ascii", "binary_middle_endian", |k| matches!(k, PlyErrorKind::Header { .. })),
         ("element vertex 5", "element vertex -5", |k| matches!(k, PlyErrorKind::Header { .. })),
         ("property float x", "property quad x", |k| matches!(k, PlyErrorKind::Header { .. })),
+        ("element face", "element vertex", |k| matches!(k, PlyErrorKind::Header { .. })),
         ("property float x", "property float a", |k| matches!(k, PlyErrorKind::Missing(_))),
         ("list uchar int", "list float int", |k| matches!(k, PlyErrorKind::Header { .. })),
         ("comment", "commend", |k| matches!(k, PlyErrorKind::Header { .. })),

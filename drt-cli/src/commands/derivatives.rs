@@ -22,7 +22,8 @@ pub(super) fn derivatives(
         EstimatorKind::FiniteDifference => by_differences(job, options, monitor, part, shared),
         _ => {
             let mut session = run::prepare(job, &job.parameters, shared)?;
-            if let Some(why) = session.plan().estimator.as_ref().filter(|_| !options.changes.quiet) {
+            if let Some(why) = session.plan().estimator.as_ref().filter(|_| !options.changes.quiet)
+            {
                 console::note(format_args!("drt: the estimator is {why}"));
             }
             monitor.stage("grad", 0.0, part);

@@ -94,10 +94,10 @@ fn surface_under(world: &World, at: &EdgePoint<'_>, down: Vec3) -> Option<(Surfa
     let wedge = &at.edge.wedge;
     let gap = GAP * wedge.length;
     let ray = Ray { origin: at.x - down * gap, dir: down, t_max: 2.0 * gap };
-    let hit = world.nearest_on(&ray, Skip::two(wedge.faces[0], wedge.faces[1]))?;
+    let hit = world.nearest_scattering(&ray, Skip::two(wedge.faces[0], wedge.faces[1]))?;
     let (below, x) = world.point(hit.prim, hit.bary);
     let flat = Real::abs(below.ng.dot(wedge.tangent)) <= FLAT;
-    (flat && !world.is_null(below.shape)).then_some((below, x))
+    flat.then_some((below, x))
 }
 
 /// The surface in whose plane the only face of an open edge lies, to within rounding, and which it hides: a lamp in a
@@ -155,11 +155,12 @@ impl Contact {
         let [Some(a), Some(b)] = angles else { return None };
         let wedge = [f64::min(a, b), f64::max(a, b)];
         // Next to the edge, so that its faces neither touch the floor there nor shade it from outside.
-        let medium = e.medium(world, at.x);
+        // The floor may be where a medium begins.
+        let medium = e.surrounding().toward(world, at.x, up);
         let beside = |outward: Vec3| {
             let x = x + outward * (4.0 * gap);
             let ray = Ray { origin: x + up * gap, dir: -up, t_max: 2.0 * gap };
-            let hit = world.nearest_on(&ray, skip)?;
+            let hit = world.nearest_scattering(&ray, skip)?;
             let (floor, x) = world.point(hit.prim, hit.bary);
             let medium = world.medium_on_side(&floor, floor.ng.dot(up) > 0.0, medium);
             let found = Vertex { x, medium, kind: Kind::Surface(floor) };

@@ -247,9 +247,8 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         let sum = |of: fn(&Worker<'a, S>) -> u64| self.workers.iter().map(of).sum();
         let of_paths = self.views.iter().map(|v| v.velocities.probe());
         let probes = of_paths.chain(self.workers.iter().map(|w| w.differentiator.probe()));
-        let [rays, turning_edges] = probes.fold([0; 2], |[rays, edges], probe| {
-            [rays + probe.rays, edges + probe.turning_edges]
-        });
+        let [rays, turning_edges] = probes
+            .fold([0; 2], |[rays, edges], probe| [rays + probe.rays, edges + probe.turning_edges]);
         let account = Account {
             counters: Counters {
                 differentiated_paths: sum(|w| w.differentiated),

@@ -159,9 +159,13 @@ impl World {
         }
     }
 
-    /// The first hit of a ray, whatever it is on.
-    pub(crate) fn nearest_on(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
-        self.geometry.bvh.closest(ray, skip)
+    /// The first hit of a ray on what is no null interface, even where one coincides with it.
+    pub(crate) fn nearest_scattering(&self, ray: &Ray, skip: Skip) -> Option<Hit> {
+        if !self.any_null {
+            return self.geometry.bvh.closest(ray, skip);
+        }
+        let blocks = |prim: u32| !self.is_null(self.geometry.prim(prim).shape);
+        self.geometry.bvh.closest_through(ray, skip, blocks, &mut Vec::new())
     }
 
     /// The null interfaces between `v` and a point at `distance` along the unit direction `dir`;

@@ -96,6 +96,10 @@ impl Header {
                     let count =
                         count.parse().map_err(|_| expected("a count: `element NAME COUNT`"))?;
                     let name = (*name).to_string();
+                    // Faces would count the vertices of one, and find those of the other.
+                    if elements.iter().any(|e| e.name == name) {
+                        return Err(expected("an element of another name: each is declared once"));
+                    }
                     elements.push(Element { name, count, properties: Vec::new() });
                 }
                 (_, ["property", definition @ ..]) => {
