@@ -90,7 +90,7 @@ fn lists_sweep() {
     assert_eq!((&digest["seed"], &digest["spp"]), (&3.into(), &2.into()));
     assert_ne!(folder.exr("out/x1.exr").layers[""], folder.exr("out/x2.exr").layers[""]);
     for (line, part) in [
-        ("batch 0.toml 0.toml", "0.toml: 0.toml would write ./0.exr, too"),
+        ("batch 0.toml 0.toml", "0.toml: ./0.exr is what 0.toml names, too"),
         ("batch --list none", "none: cannot read"),
         ("batch", "<INPUTS>"),
     ] {

@@ -254,7 +254,11 @@ fn what_is_read_is_not_overwritten() {
         assert_eq!((text("scene.xml"), text("job.toml")), (SCENE.into(), JOB.into()), "{line}");
     }
     folder.file("list", "scene.xml -o job.toml\njob.toml\n");
-    expect(&folder.run("batch --list list -o out"), 2, &["job.toml is read, and would be"]);
+    expect(
+        &folder.run("batch --list list -o out"),
+        2,
+        &["job.toml is read by this command, and would be"],
+    );
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3, "nothing is written");
 }
 

@@ -127,20 +127,18 @@ impl Element {
         })
     }
 
-    /// The file that the element names: a property `filename` by its value, an inclusion or a spectrum by the attribute of that
-    /// name.
-    pub(super) fn file(&self) -> Option<Result<PathBuf, CliError>> {
-        let name = match self.attribute("name") {
+    /// The file that the element names, as it is written: by its value where it is a property `filename`, or by
+    /// the attribute `filename` of an inclusion or a spectrum.
+    pub(super) fn file_name(&self) -> Option<&str> {
+        match self.attribute("name") {
             Some("filename") if self.tag == "string" => self.attribute("value"),
             _ => self.attribute("filename"),
-        };
-        name.map(|name| self.resolve(name))
+        }
     }
 
-    /// The [file](Self::file) of an element that must name one by an attribute.
-    pub(super) fn named_file(&self) -> Result<PathBuf, CliError> {
-        self.required("filename")?;
-        self.file().unwrap_or_else(|| Err(self.error("`filename` is missing")))
+    /// The [named](Self::file_name) file, wherever it is found.
+    pub(super) fn file(&self) -> Option<Result<PathBuf, CliError>> {
+        self.file_name().map(|name| self.resolve(name))
     }
 
     /// Gives it the `name` of the place it is used in, and no id.

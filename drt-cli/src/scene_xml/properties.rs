@@ -165,8 +165,8 @@ impl<'a> Properties<'a> {
     /// A file that exists, wherever it is found.
     pub(super) fn path(&self, name: &'static str) -> Result<Option<PathBuf>, CliError> {
         self.string(name)?;
-        let Some(path) = self.property(name).and_then(Element::file) else { return Ok(None) };
-        let path = path?;
+        let Some(file) = self.property(name).and_then(Element::file_name) else { return Ok(None) };
+        let path = self.element.resolve(file)?;
         let fail = |reason| self.element.error(format!("cannot read {}: {reason}", path.display()));
         input_file::check(&path).map_err(|e| fail(e.to_string()))?;
         Ok(Some(path))

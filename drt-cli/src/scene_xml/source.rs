@@ -189,7 +189,8 @@ impl SceneFiles {
     }
 
     fn include(&mut self, at: &Element, depth: usize) -> Result<Element, CliError> {
-        let path = at.named_file()?;
+        let missing = || at.error("the attribute `filename` is missing");
+        let path = at.resolve(at.file_name().ok_or_else(missing)?)?;
         let text = read_text(&path, Some(&at.place))?;
         let same = |a: &Path, b: &Path| {
             a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))

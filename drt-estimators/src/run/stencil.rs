@@ -77,6 +77,7 @@ mod tests {
     use alloc::vec;
 
     use drt_math::{Rgb, ValueChange};
+    use drt_medium::{Homogeneous, Medium, Phase};
     use drt_motion::{Change, Effect, PropertyChange};
 
     use super::*;
@@ -86,22 +87,32 @@ mod tests {
     #[test]
     fn differences_look_to_where_there_is_something() {
         let gray = Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.5) });
-        let scene = Scene { bsdfs: vec![Named::new("gray", gray)], ..Scene::default() };
-        let change = |op| {
-            let (property, voxels, texels) = ("reflectance".into(), None, None);
+        let fog = Homogeneous::new(Rgb::ONE, Rgb::splat(0.5), Rgb::ZERO).expect("a medium");
+        let scene = Scene {
+            bsdfs: vec![Named::new("gray", gray)],
+            media: vec![Named::new("fog", Medium::new(fog, Phase::Isotropic))],
+            ..Scene::default()
+        };
+        let change = |property: &str, op| {
+            let (property, voxels, texels) = (property.into(), None, None);
             Change::Property(PropertyChange { property, op, voxels, texels })
         };
-        let at = |value: f64, direction: f64| {
+        let of = |[target, property]: [&str; 2], value: f64, direction: f64| {
             let op = ValueChange::Add(Rgb::splat(direction));
-            let effects = vec![Effect { target: "gray".into(), change: change(op) }];
+            let effects = vec![Effect { target: target.into(), change: change(property, op) }];
             let parameters = [Parameter { name: "p".into(), value, effects }];
             Stencil::at(&scene, &parameters, 0, 0.25).map(|s| (s.offsets, s.weights))
         };
+        let at = |value, direction| of(["gray", "reflectance"], value, direction);
         assert_eq!(at(0.0, 1.0).unwrap(), (vec![-1.0, 1.0], vec![-1.0, 1.0]));
         assert_eq!(at(-0.5, 1.0).unwrap(), (vec![0.0, 1.0, 2.0], vec![-3.0, 4.0, -1.0]));
         assert_eq!(at(0.5, -1.0).unwrap(), (vec![0.0, -1.0, -2.0], vec![3.0, -4.0, 1.0]));
-        // Two steps end beyond the other end of the range.
-        assert_eq!(at(-0.125, 3.0).unwrap(), (vec![0.0, 1.0], vec![-2.0, 2.0]));
+        // Albedos end at one, beyond which two steps of these lead, but not two of those.
+        let albedo = |direction| of(["fog", "albedo"], 0.0, direction);
+        assert_eq!(albedo(1.9).unwrap(), (vec![-1.0, 1.0], vec![-1.0, 1.0]));
+        let at_zero = |direction: f64| of(["fog", "albedo"], -0.5 / direction, direction);
+        assert_eq!(at_zero(1.0).unwrap().0, [0.0, 1.0, 2.0]);
+        assert_eq!(at_zero(4.0).unwrap(), (vec![0.0, 1.0], vec![-2.0, 2.0]));
         // Beyond the range there is no difference at all.
         assert_eq!(at(-1.0, 1.0).unwrap_err().out_of_range(), Some("p"));
     }

@@ -67,11 +67,14 @@ pub fn move_mesh(
         moved.normals = Some(turned.normals());
     }
     let mut linear = Mat3::IDENTITY;
+    // Affine changes become one map until positions are asked for: a mesh is moved once, whatever their number.
+    let mut pending: Option<(Affine, &Applied<'_, GeometryChange>)> = None;
     for c in changes {
         let fail = |cause| c.error(cause);
         let velocities = vertex_velocities(mesh, &caged, &sources, c.change).map_err(fail)?;
         let mut all_finite = true;
         if let Some(velocities) = velocities {
+            settle(&mut moved, pending.take())?;
             deformed = true;
             if c.theta != 0.0 {
                 fields.pin(&moved.positions);
@@ -84,15 +87,20 @@ pub fn move_mesh(
         } else if let Some(step) = Step::new(c) {
             // Normals are made unit anew, which would not leave them the same bits.
             if step.map != Affine::IDENTITY {
-                moved = moved.transform(&step.map);
+                let map = pending.map_or(step.map, |(before, _)| step.map.after(&before));
+                all_finite = map.is_finite();
+                pending = Some((map, c));
                 linear = step.map.linear * linear;
                 fields.carry(&step);
             }
+            if matches!(fields.list[c.parameter], Field::Vertices(_)) {
+                settle(&mut moved, pending.take())?;
+            }
             fields.add(c.parameter, Field::Affine(step.velocity), &moved.positions);
-            all_finite = moved.positions.iter().all(|x| x.is_finite());
         }
         finite(all_finite, "a moved position").map_err(fail)?;
     }
+    settle(&mut moved, pending)?;
     let smooth = (deformed && mesh.normals.is_some()).then(|| SmoothNormals::new(mesh));
     if let Some(smooth) = &smooth {
         moved.normals = Some(smooth.normals(&moved));
@@ -115,6 +123,17 @@ pub fn move_mesh(
     };
     let motions = fields.list.into_iter().enumerate().map(motion).collect();
     Ok(MovedMesh { mesh: moved, motions, smooth })
+}
+
+/// Moves a mesh by the map of affine changes, which ends with the one given.
+fn settle(
+    mesh: &mut Mesh,
+    pending: Option<(Affine, &Applied<'_, GeometryChange>)>,
+) -> Result<(), MotionError> {
+    let Some((map, last)) = pending else { return Ok(()) };
+    *mesh = mesh.transform(&map);
+    let all_finite = mesh.positions.iter().all(|x| x.is_finite());
+    finite(all_finite, "a moved position").map_err(|cause| last.error(cause))
 }
 
 /// Applies changes to something placed as a whole, in the order given, for `parameters` parameters

@@ -168,7 +168,8 @@ fn pairs(e: &Element, text: &str) -> Result<Spectrum, CliError> {
 
 /// A text file with a wavelength and a value per line; `#` starts a comment.
 fn file(e: &Element) -> Result<Spectrum, CliError> {
-    let path = e.named_file()?;
+    let missing = || e.error("the attribute `filename` is missing");
+    let path = e.resolve(e.file_name().ok_or_else(missing)?)?;
     let text = read_text(&path, Some(&e.place))?;
     let mut samples = Vec::new();
     for (i, line) in text.lines().enumerate() {

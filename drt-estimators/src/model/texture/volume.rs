@@ -40,10 +40,10 @@ impl VolumeTexture {
     }
 
     pub(super) fn value(&self, x: Vec3) -> Rgb {
-        self.told(self.volume.value(x))
+        self.toned(self.volume.value(x))
     }
 
-    fn told(&self, value: Rgb) -> Rgb {
+    fn toned(&self, value: Rgb) -> Rgb {
         if self.grey { luminance(value) } else { value }
     }
 
@@ -53,7 +53,7 @@ impl VolumeTexture {
         let corners = &attribute.values[triangle as usize];
         let [p, q, r] = corners.map(|c| Vec3::from(c.map(f64::from)));
         let gradient = self.volume.gradient(attribute.at(triangle, bary).into());
-        [q - p, r - p].map(|edge| self.told(gradient.dot(edge)))
+        [q - p, r - p].map(|edge| self.toned(gradient.dot(edge)))
     }
 
     pub(super) fn is_continuous(&self) -> bool {
@@ -72,7 +72,7 @@ impl VolumeTexture {
                 _ => Rgb::splat(voxel[0]),
             })
         });
-        constant.into_iter().chain(voxels).map(|value| self.told(value))
+        constant.into_iter().chain(voxels).map(|value| self.toned(value))
     }
 
     /// Values, per channel, between which all others are.
