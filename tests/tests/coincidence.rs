@@ -201,23 +201,3 @@ fn lamps_that_overlap_in_one_plane_are_refused() -> Result<()> {
     assert_eq!(other(1.3, 2.2 - 1e-9)?, None);
     Ok(())
 }
-
-/// A sheet stands on the floor, and so does the fog around it: it is the floor that the sheet's edge rests on.
-#[test]
-fn sheets_slide_on_floors_where_fog_begins() -> Result<()> {
-    let fog = fog_on_floor(0.0)?;
-    let sheet = askew(&rectangle(), vec3(0.3, 0.35, 1.0), None, vec3(-0.3, 0.35, -0.6));
-    let set = fog.shape("sheet", sheet, two_sided(white()));
-    let slide = turned(vec3(0.5, 0.0, 0.4)) - turned(Vec3::ZERO);
-    let effect = Effect {
-        target: "sheet".into(),
-        change: Change::Geometry(GeometryChange::Translate(slide)),
-    };
-    let cell = Cell::new("sheet slides", [effect]);
-    let stage = Stage::new("sheet on a floor in fog", set.scene, vec![cell]);
-    let effort = Effort { noise: 0.03, scale: 0.0, limit: Limit::Samples(1024), seed: 0 };
-    let pairs = compare(&stage, &[EstimatorKind::Warped.into()], effort)?;
-    println!("{}", Pairs(&pairs));
-    assert!(pairs.len() == 1 && pairs[0].passes());
-    Ok(())
-}

@@ -127,6 +127,16 @@ fn four_random_scenes() {
     at_random(0..4, effort(128));
 }
 
+/// A sheet on a floor on which fog stands, too: its edge rests on the floor, and not on the fog's border.
+#[test]
+fn a_sheet_on_a_floor_where_fog_begins() {
+    let stage = random::scene(148).map(|mut stage| {
+        stage.cells.retain(|cell| cell.parameter.name == "first: moves");
+        stage
+    });
+    assert_all_agree(&compared("scene 148", stage, &[Warped.into()], effort(2048)));
+}
+
 #[test]
 #[ignore = "an hour"]
 fn five_hundred_random_scenes() {

@@ -71,7 +71,7 @@ fn defaults_are_the_contracts() {
     let j = job("scene = \"scene.xml\"", &[]).unwrap();
     let s = &j.settings;
     assert_eq!((s.sensor, j.spp(), s.boundary_ratio, s.max_depth), (0, 64, None, Depth::OfScene));
-    assert_eq!((s.estimator, s.antithetic, s.step), (EstimatorKind::PathSpace, true, 1e-3));
+    assert_eq!((s.estimator, s.antithetic, s.step), (EstimatorKind::Auto, true, 1e-3));
     assert!(j.parameters.is_empty());
     j.require_derivatives().unwrap();
 }

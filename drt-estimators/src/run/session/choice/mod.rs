@@ -15,12 +15,6 @@ use crate::model::scene::Scene;
 use crate::model::settings::Settings;
 use crate::sampling::budget::{BESIDES, LOOKUP};
 
-/// Longest side of the small pictures, in pixels.
-const SIDE: f64 = 32.0;
-
-/// Samples of each of their pixels.
-const SAMPLES: u32 = 32;
-
 /// Part of the work of what is usual that something else must not exceed, or noise of the pilot would often choose it for nothing.
 const WORTH_IT: f64 = 0.8;
 
@@ -30,12 +24,12 @@ const SEED_STEP: u64 = 0x6a09_e667_f3bc_c909;
 /// What an edge that turns a ray costs, in rays.
 const TURNING_EDGE: f64 = 1.0;
 
-/// The scene with a small film.
-fn small(scene: &Scene, settings: &Settings) -> Scene {
+/// The scene with a film whose longer side has `side` pixels at most.
+fn small(scene: &Scene, settings: &Settings, side: f64) -> Scene {
     let mut scene = scene.clone();
     let sensor = &mut scene.sensors[settings.sensor].item.sensor;
     let film = sensor.film().map(f64::from);
-    let part = f64::min(1.0, SIDE / f64::max(film[0], film[1]));
+    let part = f64::min(1.0, side / f64::max(film[0], film[1]));
     let small = film.map(|n| f64::max(n * part, 1.0) as u32);
     if let Ok(small) = sensor.with_film(small) {
         *sensor = small;

@@ -10,10 +10,16 @@ use crate::derivative::tangents;
 use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::{PathSampling, Settings};
-use crate::run::session::choice::{SAMPLES, WORTH_IT, cost, pilot, small, variance};
+use crate::run::session::choice::{WORTH_IT, cost, pilot, small, variance};
 use crate::run::session::{Session, Unattended};
 use crate::world::World;
 use crate::world::cache::PreparedCache;
+
+/// Longest side of the small picture, in pixels.
+const SIDE: f64 = 32.0;
+
+/// Samples of each of its pixels.
+const SAMPLES: u32 = 32;
 
 /// The settings with a sampling in place of `Auto`, and why it was chosen.
 pub(in super::super) fn sampling(
@@ -61,7 +67,7 @@ pub(in super::super) fn sampling(
 
 /// The work of a small picture.
 fn work(scene: &Scene, settings: &Settings, kept: &mut PreparedCache) -> Result<f64, Error> {
-    let (scene, at_rest) = tangents::apply(&small(scene, settings), &[])?;
+    let (scene, at_rest) = tangents::apply(&small(scene, settings, SIDE), &[])?;
     let mut session = Session::prepared(&scene, &at_rest, &pilot(settings), kept)?;
     session.run(SAMPLES, &Unattended);
     Ok(variance(&session.rendering().image) * cost(&session.account.counters))
