@@ -7,7 +7,7 @@
 //! work of k = cost of k × Σ_p variance of p by k / least variance of p by any.
 //! ```
 //!
-//! An estimator that costs or works many times more than another is left out as soon as a few samples show it.
+//! An estimator that costs many times more than another is left out as soon as a few samples show it.
 //!
 //! Where lights are points or directions, the estimators share the light as they do when they are asked for by name, and it is these
 //! combinations that are compared.
@@ -28,13 +28,16 @@ use crate::world::cache::PreparedCache;
 const MOST_PARAMETERS: usize = 256;
 
 /// Longest side of the small picture, in pixels.
-const SIDE: f64 = 24.0;
+const SIDE: f64 = 32.0;
 
-/// Samples of each pixel by which the cost of an estimator is seen, those by which its work is, and those of all that are left.
-const ROUNDS: [u32; 3] = [2, 2, 12];
+/// Samples of each pixel by which the cost of an estimator is seen.
+const FIRST: u32 = 2;
 
-/// How many times the least cost, or the least work, an estimator may have to be looked at further.
-const FAR_OFF: f64 = 8.0;
+/// Samples of each pixel by which its work is: with fewer, rare samples of edges are often not seen at all.
+const SAMPLES: u32 = 32;
+
+/// How many times the least cost an estimator may have to be looked at further.
+const MOST_COSTLY: f64 = 8.0;
 
 /// An estimator whose variances are below this part of another's counts as if it had so much.
 const LEAST: f64 = 1e-6;
@@ -106,18 +109,15 @@ pub(crate) fn estimator(
     if let [only] = &candidates[..] {
         return chosen(only.kind, "the other estimators refuse this scene");
     }
-    let measures = [costs, works, works];
-    let mut works = Vec::new();
-    for (samples, measure) in ROUNDS.into_iter().zip(measures) {
-        for candidate in &mut candidates {
-            candidate.session.run(samples, &Unattended);
-        }
-        works = measure(&candidates);
-        let least = works.iter().copied().fold(f64::INFINITY, f64::min);
-        let mut near = works.iter().map(|work| *work <= FAR_OFF * least);
-        candidates.retain(|_| near.next().unwrap_or(true));
-        works.retain(|work| *work <= FAR_OFF * least);
+    for candidate in &mut candidates {
+        candidate.session.run(FIRST, &Unattended);
     }
+    let cheapest = candidates.iter().map(Candidate::cost).fold(f64::INFINITY, f64::min);
+    candidates.retain(|c| c.cost() <= MOST_COSTLY * cheapest);
+    for candidate in &mut candidates {
+        candidate.session.run(SAMPLES - FIRST, &Unattended);
+    }
+    let works = works(&candidates);
     let least = works.iter().copied().fold(f64::INFINITY, f64::min);
     let of_usual = candidates.iter().position(|c| c.kind == usual).map(|i| works[i]);
     let best = match of_usual {
@@ -134,11 +134,6 @@ pub(crate) fn estimator(
     let compared: Vec<String> = compared.collect();
     let why = format!("in a pilot the work was, over the least of all, {}", compared.join(", "));
     chosen(best, &why)
-}
-
-/// The cost of each candidate.
-fn costs(candidates: &[Candidate]) -> Vec<f64> {
-    candidates.iter().map(Candidate::cost).collect()
 }
 
 /// The work of each candidate.
