@@ -150,7 +150,7 @@ type Expected = fn(&PlyErrorKind) -> bool;
 
 #[test]
 fn wrong_files_are_named() {
-    let cases: [(&str, &str, Expected); 16] = [
+    let cases: [(&str, &str, Expected); 17] = [
         ("ply\n", "plx\n", |k| matches!(k, PlyErrorKind::Header { .. })),
         ("ascii 1.0", "ascii 2.0", |k| matches!(k, PlyErrorKind::Header { .. })),
         ("ascii", "binary_middle_endian", |k| matches!(k, PlyErrorKind::Header { .. })),

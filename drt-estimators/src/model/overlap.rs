@@ -8,8 +8,6 @@ use alloc::vec::Vec;
 use drt_geom::Aabb;
 use drt_math::Vec3;
 
-use crate::model::scene::{Scene, Shape};
-
 /// What counts as one plane, and as no overlap, relative to coordinates: some rounding errors of these.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
@@ -22,10 +20,17 @@ struct Emitting {
     bounds: Aabb,
 }
 
-/// Two shapes that emit and overlap in one plane, where a scene has such, the lower number first.
-pub(super) fn overlapping_lamps(scene: &Scene) -> Option<[usize; 2]> {
+/// Two shapes that emit and overlap in one plane, where there are such, the lower number first. `shapes` are those that emit, by
+/// their numbers, and their triangles.
+pub(super) fn overlapping_lamps<T: Iterator<Item = Corners>>(
+    shapes: impl Iterator<Item = (usize, T)>,
+) -> Option<[usize; 2]> {
+    let of_shape = |(shape, triangles): (usize, T)| {
+        triangles.map(move |corners| Emitting { shape, corners, bounds: Aabb::around(corners) })
+    };
+    let mut triangles: Vec<Emitting> = shapes.flat_map(of_shape).collect();
     // From left to right, so that each is compared only with those that begin before it ends.
-    let triangles = from_left(scene);
+    triangles.sort_by(|a, b| a.bounds.min.x.total_cmp(&b.bounds.min.x));
     let of_pair = |(i, a): (usize, &Emitting)| {
         let beside = triangles[i + 1..].iter().take_while(|b| b.bounds.min.x <= a.bounds.max.x);
         let mut others = beside.filter(|b| b.shape != a.shape && b.bounds.meets(&a.bounds));
@@ -33,25 +38,6 @@ pub(super) fn overlapping_lamps(scene: &Scene) -> Option<[usize; 2]> {
         Some([a.shape.min(met.shape), a.shape.max(met.shape)])
     };
     triangles.iter().enumerate().find_map(of_pair)
-}
-
-/// The triangles that emit, sorted; none where a single shape emits.
-fn from_left(scene: &Scene) -> Vec<Emitting> {
-    let emits = |(_, shape): &(usize, &Shape)| shape.emitter.is_some();
-    let shapes = || scene.shapes.iter().enumerate().filter(emits).map(|(i, _)| i);
-    if shapes().nth(1).is_none() {
-        return Vec::new();
-    }
-    let of_shape = |shape| {
-        scene.world_triangles(shape).map(move |corners| Emitting {
-            shape,
-            corners,
-            bounds: Aabb::around(corners),
-        })
-    };
-    let mut all: Vec<Emitting> = shapes().flat_map(of_shape).collect();
-    all.sort_by(|a, b| a.bounds.min.x.total_cmp(&b.bounds.min.x));
-    all
 }
 
 /// True when both triangles lie in one plane and have an area in common.

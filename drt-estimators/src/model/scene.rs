@@ -297,7 +297,11 @@ impl Scene {
                 return Err(fail(ElementError::NoArea));
             }
         }
-        if let Some([first, second]) = overlapping_lamps(self) {
+        let emit = || (0..self.shapes.len()).filter(|s| self.shapes[*s].emitter.is_some());
+        // One alone overlaps with none.
+        let others = emit().nth(1).is_some();
+        let lamps = emit().filter(|_| others).map(|s| (s, self.world_triangles(s)));
+        if let Some([first, second]) = overlapping_lamps(lamps) {
             let reason = ElementError::OverlappingLamp(self.name_of(Target::Shape(first)));
             return Err(unusable(&self.shapes[second].id, "shape", second, reason));
         }
