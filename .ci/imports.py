@@ -8,7 +8,7 @@ import re
 import sys
 
 SRC = pathlib.Path(__file__).resolve().parent.parent / "drt-estimators" / "src"
-FOLDERS = ["model", "world", "sampling", "derivative", "discontinuities", "terms", "run", "fit"]
+FOLDERS = ["model", "world", "sampling", "derivative", "discontinuities", "terms", "estimators", "run", "fit"]
 
 
 def code(file):
