@@ -6,3 +6,5 @@ pub(crate) mod finite_difference;
 pub(crate) mod gradient;
 pub(crate) mod session;
 pub(crate) mod stencil;
+#[cfg(all(test, feature = "std"))]
+mod tests;

@@ -11,7 +11,7 @@ use crate::model::error::Error;
 use crate::model::rendering::{Account, Term};
 use crate::run::component::{Component, Unknowns};
 use crate::run::session::pass::Pass;
-use crate::run::session::pilot::primary_share;
+use crate::run::session::primary_share::primary_share;
 use crate::sampling::film::{BATCHES, SplatFilm};
 use crate::terms::guiding::OfImages;
 use crate::terms::interior;

@@ -7,6 +7,7 @@ mod images;
 mod legend;
 mod pass;
 mod pilot;
+mod primary_share;
 mod shard;
 
 use alloc::string::String;

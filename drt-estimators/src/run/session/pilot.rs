@@ -1,7 +1,5 @@
 //! The few samples by which a session decides where the others go, and which are then forgotten.
 
-mod terms;
-
 use alloc::vec::Vec;
 
 use crate::run::component::seed_of_component;
@@ -11,8 +9,6 @@ use crate::run::session::pass::Pass;
 use crate::sampling::allocation::Allocation;
 use crate::sampling::budget::{SampleBudget, TermStatistics};
 use crate::sampling::film::{PixelFilm, SplatFilm};
-
-pub(super) use crate::run::session::pilot::terms::primary_share;
 
 /// What a pilot found out.
 pub(super) struct Pilot {
