@@ -65,6 +65,8 @@ pub struct Evaluation {
     views: Arc<[View]>,
     seen: Vec<Seen>,
     parameters: usize,
+    /// The gradient by each group of unknowns.
+    groups: Vec<Vec<f64>>,
 }
 
 impl Evaluation {
@@ -90,7 +92,18 @@ impl Evaluation {
             return Err(Error::Setting { setting: "halves", reason: SettingError::ForeignHalves });
         }
         let seen = halves.into_iter().map(|halves| Seen { halves }).collect();
-        Ok(Self { loss, views, seen, parameters })
+        Ok(Self { loss, views, seen, parameters, groups: Vec::new() })
+    }
+
+    /// With the gradient by each group of unknowns.
+    pub(super) fn with_groups(self, groups: Vec<Vec<f64>>) -> Self {
+        Self { groups, ..self }
+    }
+
+    /// The gradient of the loss by the values of a [`Group`](super::Group), in their order; none where there is no such group.
+    #[must_use]
+    pub fn group_gradient(&self, group: usize) -> &[f64] {
+        self.groups.get(group).map_or(&[], Vec::as_slice)
     }
 
     fn pairs(&self) -> impl Iterator<Item = (&View, &Seen)> {

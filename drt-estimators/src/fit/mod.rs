@@ -16,6 +16,7 @@
 //! shared product, without its bias.
 
 mod evaluation;
+mod group;
 mod linear;
 pub mod loss;
 mod source;
@@ -29,7 +30,7 @@ use drt_motion::Parameter;
 
 use crate::fit::loss::{Loss, Reference};
 use crate::model::error::{Error, SettingError};
-use crate::model::scene::Scene;
+use crate::model::scene::{Scene, Target};
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
 use crate::run::control::Control;
@@ -37,6 +38,7 @@ use crate::run::session::ShardSums;
 use crate::world::cache::PreparedCache;
 
 pub use crate::fit::evaluation::{Evaluation, Half};
+pub use crate::fit::group::{Collector, Group, GroupKind};
 use crate::fit::source::{Applied, ImageSource};
 pub use crate::fit::step::{Misstep, check_step};
 
@@ -51,7 +53,13 @@ pub struct View {
 
 /// A scene, what may change in it, and what it shall look like.
 pub struct Fit {
+    /// As it was given.
+    given: Scene,
+    /// With the values of the groups.
     scene: Scene,
+    groups: Vec<Group>,
+    /// Their values.
+    group_values: Vec<Vec<f64>>,
     parameters: Vec<Parameter>,
     views: Arc<[View]>,
     loss: Loss,
@@ -98,8 +106,59 @@ impl Fit {
         }
         let mut kept = PreparedCache::default();
         let estimators = estimators(&scene, &parameters, &views, &settings, &mut kept)?;
-        let (views, applied) = (views.into(), None);
-        Ok(Self { scene, parameters, views, loss, settings, estimators, applied, kept })
+        let (views, applied, given) = (views.into(), None, scene.clone());
+        let (groups, group_values) = (Vec::new(), Vec::new());
+        Ok(Self {
+            given,
+            scene,
+            groups,
+            group_values,
+            parameters,
+            views,
+            loss,
+            settings,
+            estimators,
+            applied,
+            kept,
+        })
+    }
+
+    /// This fit with groups of unknowns beside its parameters. They have the values of the scene until
+    /// [`set_group`](Self::set_group) gives them others, and gradients come from reverse mode, whatever the number of unknowns.
+    ///
+    /// # Errors
+    /// When images are differentiated by [`EstimatorKind::FiniteDifference`], which has no reverse mode, and when two groups decide the same
+    /// values.
+    pub fn with_groups(mut self, groups: Vec<Group>) -> Result<Self, Error> {
+        if !groups.is_empty() && self.settings.estimator == EstimatorKind::FiniteDifference {
+            return Err(Error::Setting { setting: "estimator", reason: SettingError::NoSession });
+        }
+        Group::check_together(&groups)?;
+        self.group_values = groups.iter().map(|group| group.values(&self.given)).collect();
+        self.groups = groups;
+        Ok(self)
+    }
+
+    /// Gives a group other values, in the order of [`Group::values`].
+    ///
+    /// # Errors
+    /// When there is no such group, their number is another, or one is out of its range; the values then stay.
+    pub fn set_group(&mut self, group: usize, values: &[f64]) -> Result<(), Error> {
+        let Some(known) = self.group_values.get_mut(group) else {
+            let reason = SettingError::NoGroup { index: group, count: self.groups.len() };
+            return Err(Error::Setting { setting: "group", reason });
+        };
+        let before = core::mem::replace(known, values.to_vec());
+        // From what was given, so that nothing depends on values on the way.
+        let mut scene = self.given.clone();
+        let mut all = self.groups.iter().zip(&self.group_values);
+        if let Err(error) = all.try_for_each(|(of, v)| of.apply(&self.given, v, &mut scene)) {
+            self.group_values[group] = before;
+            return Err(error);
+        }
+        self.scene = scene;
+        self.applied = None;
+        Ok(())
     }
 
     /// The scene at these values of the parameters.
@@ -146,17 +205,71 @@ impl Fit {
         control: &dyn Control,
     ) -> Result<Option<Evaluation>, Error> {
         let mut halves = Vec::new();
+        let mut groups = alloc::vec![Vec::new(); self.groups.len()];
         let count = self.views.len();
         for view in 0..count {
             let progress = |done| control.progress((view as f64 + done) / count as f64);
             let control = Watched { control, progress };
-            let seen = self.halves(values, spp, seed, view, 0..2, &control)?;
+            let seen = match self.groups.is_empty() {
+                true => self.halves(values, spp, seed, view, 0..2, &control)?,
+                false => {
+                    let of_groups = &mut groups;
+                    self.halves_and_groups(values, spp, seed, view, of_groups, &control)?
+                }
+            };
             match seen.and_then(|seen| <[Half; 2]>::try_from(seen).ok()) {
                 Some(seen) => halves.push(seen),
                 None => return Ok(None),
             }
         }
-        self.together(halves).map(Some)
+        Ok(Some(self.together(halves)?.with_groups(groups)))
+    }
+
+    /// What one view's images tell, and their part in the gradients of groups: the adjoint of each half's image, times the derivatives
+    /// of samples that are those of the other half.
+    fn halves_and_groups(
+        &mut self,
+        values: &[f64],
+        spp: u32,
+        seed: u64,
+        view: usize,
+        gradients: &mut [Vec<f64>],
+        control: &dyn Control,
+    ) -> Result<Option<Vec<Half>>, Error> {
+        let part = |from: f64, done: f64| control.progress(0.5 * (from + done));
+        let images = Watched { control, progress: |done| part(0.0, done) };
+        let Some(halves) = self.halves(values, spp, seed, view, 0..2, &images)? else {
+            return Ok(None);
+        };
+        let reference = &self.views[view].reference;
+        let adjoints = [0, 1].map(|k| self.loss.adjoint(&halves[k].image, reference));
+        let applied = self.apply(values)?;
+        let collectors = self
+            .groups
+            .iter()
+            .map(|group| group.collector(&self.given, &applied.scene, &self.parameters));
+        let collectors = collectors.collect::<Result<Vec<_>, _>>()?;
+        let mut wanted: Vec<Target> = Vec::new();
+        for group in self.groups.iter().filter(|group| !group.values(&self.given).is_empty()) {
+            if !wanted.contains(&group.target) {
+                wanted.push(group.target);
+            }
+        }
+        let mut source = self.source(values, view, 2)?;
+        for (k, adjoint) in (0..2).zip(adjoints.iter().rev()) {
+            let progress = |done| part(1.0, 0.5 * (k as f64 + done));
+            let control = Watched { control, progress };
+            let seed = half_seed(seed, k);
+            let found = source.gradient(&wanted, spp.div_ceil(2), seed, adjoint, &control)?;
+            let Some(gradient) = found else { return Ok(None) };
+            for (collector, sum) in collectors.iter().zip(&mut *gradients) {
+                let mut own = Vec::new();
+                collector.collect(&gradient, &mut own);
+                sum.resize(own.len(), 0.0);
+                sum.iter_mut().zip(&own).for_each(|(sum, own)| *sum += 0.5 * own);
+            }
+        }
+        Ok(Some(halves))
     }
 
     /// What one view's images tell: some of its two halves, as [`evaluate`](Self::evaluate) takes them. `None` when `control`

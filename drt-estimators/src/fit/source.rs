@@ -1,12 +1,14 @@
 //! Where images and derivatives come from.
 
+use drt_math::Rgb;
 use drt_motion::Parameter;
 
+use crate::derivative::scene_gradient::SceneGradient;
 use crate::derivative::tangents;
 use crate::derivative::tangents::Tangents;
 use crate::fit::evaluation::{Half, means};
 use crate::model::error::{Error, SettingError};
-use crate::model::scene::Scene;
+use crate::model::scene::{Scene, Target};
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
 use crate::run::control::Control;
@@ -87,6 +89,20 @@ impl<'a> ImageSource<'a> {
             half.derivatives = layers.iter().map(means).collect();
         }
         Ok(Some(half))
+    }
+
+    /// The gradient of a loss by the items `wanted`; `None` when it was cancelled.
+    pub(super) fn gradient(
+        &mut self,
+        wanted: &[Target],
+        spp: u32,
+        seed: u64,
+        adjoint: &[Rgb],
+        control: &dyn Control,
+    ) -> Result<Option<SceneGradient>, Error> {
+        self.session.restart(seed);
+        let gradient = self.session.gradient(wanted, spp, adjoint, control)?;
+        Ok((!control.cancelled()).then_some(gradient))
     }
 
     /// Shards that there can be of that.

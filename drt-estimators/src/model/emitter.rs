@@ -296,6 +296,34 @@ impl Emitter {
         }
     }
 
+    /// The texels of the image that tells its light, row by row and as they are stored; `None` where none does.
+    #[must_use]
+    pub fn texel_values(&self) -> Option<Vec<Rgb>> {
+        self.texels()?;
+        match self {
+            Self::TexturedArea { texture, .. } => Some(texture.texels()),
+            Self::Envmap { map, .. } => Some(map.texels()),
+            Self::Projector { slide, .. } => slide.texture().map(Texture::texels),
+            _ => None,
+        }
+    }
+
+    /// The same emitter with other texels of the image that tells its light, row by row.
+    ///
+    /// # Errors
+    /// When no image does, there are more or fewer texels, or one is negative or not finite.
+    pub fn with_texel_values(&self, values: &[Rgb]) -> Result<Self, TexelError> {
+        let mut with = self.clone();
+        match &mut with {
+            Self::TexturedArea { texture, .. } => texture.set_texels(values)?,
+            Self::Envmap { map, .. } => Arc::make_mut(map).set_texels(values)?,
+            Self::Projector { slide, .. } => Arc::make_mut(slide).set_texels(values)?,
+            _ => return Err(TexelError::NoTexture(self.strength_name().into())),
+        }
+        with.validate().map_err(|_| TexelError::NotFinite)?;
+        Ok(with)
+    }
+
     /// Makes a change of the texels of the image that tells its light.
     pub(crate) fn change_texels(
         &mut self,

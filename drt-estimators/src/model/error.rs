@@ -43,6 +43,14 @@ pub enum Error {
         /// Why it does not apply.
         reason: EffectError,
     },
+    /// A [group](crate::fit::Group) of unknowns is unusable, or its values are.
+    #[error("group `{group}`: {reason}")]
+    Group {
+        /// The group.
+        group: String,
+        /// What is wrong.
+        reason: String,
+    },
     /// An element of the scene is unusable.
     #[error("{element}: {reason}")]
     Element {

@@ -11,7 +11,9 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::{Affine, Rgb, RgbVec, Vec3, fm};
 
-pub(crate) use crate::model::texture::texels::{Footprint, TexelChange, TexelTangent};
+pub(crate) use crate::model::texture::texels::{
+    Footprint, TexelChange, TexelTangent, replace_texels,
+};
 pub use crate::model::texture::texels::{TexelError, TexelGradient};
 pub use crate::model::texture::volume::VolumeTexture;
 
@@ -399,6 +401,29 @@ impl Texture {
             Self::Bitmap(image) => image.texel(index as u32),
             Self::Attribute(_) | Self::Volume(_) => return None,
         })
+    }
+
+    /// All texels, row by row and as they are stored; none of an attribute or a volume.
+    #[must_use]
+    pub fn texels(&self) -> Vec<Rgb> {
+        match self {
+            Self::Checkerboard { colours, .. } => colours.to_vec(),
+            Self::Bitmap(image) => (0..image.texels.len() as u32).map(|t| image.texel(t)).collect(),
+            Self::Attribute(_) | Self::Volume(_) => Vec::new(),
+        }
+    }
+
+    /// Gives all texels other values.
+    pub(crate) fn set_texels(&mut self, values: &[Rgb]) -> Result<(), TexelError> {
+        match (&mut *self, values) {
+            (Self::Checkerboard { colours, .. }, [a, b]) => *colours = [*a, *b],
+            (Self::Bitmap(image), _) => return replace_texels(&mut image.texels, values),
+            _ => {
+                let (found, expected) = (values.len(), self.texels().len());
+                return Err(TexelError::Count { found, expected });
+            }
+        }
+        Ok(())
     }
 
     /// The texels that make up the value at texture coordinates; `None` of an attribute or a volume.

@@ -5,7 +5,7 @@ use core::f64::consts::{PI, TAU};
 
 use drt_math::{AliasTable, Mat3, Rgb, RgbVec, Vec3, fm, vec3};
 
-use crate::model::texture::{Footprint, TexelChange, TexelError, TexelTangent};
+use crate::model::texture::{Footprint, TexelChange, TexelError, TexelTangent, replace_texels};
 
 /// Light from all around, as an image says: Mitsuba's `envmap`. Columns go around the axis y of its frame and rows from +y to
 /// -y, the first and the last of them at the poles; values between the middles of texels are interpolated linearly.
@@ -108,6 +108,17 @@ impl EnvironmentMap {
             self.prepare().map_err(|_| TexelError::NotFinite)?;
         }
         Ok(rates)
+    }
+
+    /// All texels, row by row.
+    pub(super) fn texels(&self) -> Vec<Rgb> {
+        self.texels.iter().map(|t| Rgb::from(t.map(f64::from))).collect()
+    }
+
+    /// Gives all texels other values.
+    pub(super) fn set_texels(&mut self, values: &[Rgb]) -> Result<(), TexelError> {
+        replace_texels(&mut self.texels, values)?;
+        self.prepare().map_err(|_| TexelError::NotFinite)
     }
 
     /// Integral of the mean of the channels over all directions.

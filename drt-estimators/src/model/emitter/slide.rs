@@ -141,6 +141,16 @@ impl Slide {
         self.texture.as_ref().map(Texture::size).filter(|size| *size != [0; 2])
     }
 
+    /// The texture that tells its light, where one does.
+    pub(super) fn texture(&self) -> Option<&Texture> {
+        self.texture.as_ref()
+    }
+
+    /// Gives all texels other values.
+    pub(super) fn set_texels(&mut self, values: &[Rgb]) -> Result<(), TexelError> {
+        self.texture.as_mut().map_or(Ok(()), |texture| texture.set_texels(values))
+    }
+
     /// Makes a change of texels, whose rates it returns.
     pub(super) fn change(&mut self, change: &TexelChange) -> Result<TexelTangent, TexelError> {
         self.texture.as_mut().map_or_else(|| Ok(TexelTangent::default()), |t| t.change(change))

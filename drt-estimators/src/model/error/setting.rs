@@ -15,6 +15,14 @@ pub enum SettingError {
         /// How many there are.
         count: usize,
     },
+    /// A group of unknowns that does not exist.
+    #[error("there is no group {index}; the fit has {count}")]
+    NoGroup {
+        /// The one asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
     /// A medium that does not exist.
     #[error("there is no medium {index}; the scene has {count}")]
     NoMedium {

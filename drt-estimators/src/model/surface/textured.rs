@@ -82,6 +82,16 @@ impl Textured {
         Ok(Some((change, if number { rates.of_number() } else { rates })))
     }
 
+    /// Gives the texels that stand for a property other values; false where no texture does.
+    fn set_texels(&mut self, property: Property, values: &[Rgb]) -> Result<bool, SurfaceError> {
+        let found = self.textures.iter_mut().find(|(p, _)| *p == property);
+        let Some((_, texture)) = found else { return Ok(false) };
+        texture.set_texels(values)?;
+        let mean = texture.mean();
+        self.bsdf.set(property, allowed(property, mean))?;
+        Ok(true)
+    }
+
     /// Calls `f` with each property whose value is that of texels, and these.
     pub(super) fn lookups(&self, at: &TexturePoint<'_>, mut f: impl FnMut(Property, &Footprint)) {
         let uv = at.uv();
@@ -165,6 +175,38 @@ impl Bsdf {
             self.validate()?;
         }
         Ok(found)
+    }
+
+    /// The texels of the texture that stands for a property, row by row and as they are stored; `None` where none does.
+    #[must_use]
+    pub fn texel_values(&self, property: Property) -> Option<Vec<Rgb>> {
+        self.texels(property)?;
+        Some(self.textured_part()?.texture(property)?.texels())
+    }
+
+    /// The same BSDF with other texels of the texture that stands for a property, row by row.
+    ///
+    /// # Errors
+    /// When no texture stands for it, there are more or fewer texels, or a value is out of the property's range.
+    pub fn with_texel_values(
+        &self,
+        property: Property,
+        values: &[Rgb],
+    ) -> Result<Self, SurfaceError> {
+        let mut with = self.clone();
+        let textured = match &mut with {
+            Self::TwoSided(b) if b.back.is_none() => &mut b.front,
+            other => other,
+        };
+        let found = match textured {
+            Self::Textured(textured) => textured.set_texels(property, values)?,
+            _ => false,
+        };
+        if !found {
+            return Err(TexelError::NoTexture(property.name().into()).into());
+        }
+        with.validate()?;
+        Ok(with)
     }
 
     /// Columns and rows of texels of the texture that stands for a property, if one does that can change.

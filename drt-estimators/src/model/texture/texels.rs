@@ -34,6 +34,32 @@ pub enum TexelError {
     /// What becomes of a texel.
     #[error("a texel would be negative or not finite; choose a value nearer to zero")]
     NotFinite,
+    /// More or fewer values than texels.
+    #[error("{found} values for {expected} texels")]
+    Count {
+        /// The number of values.
+        found: usize,
+        /// The number of texels.
+        expected: usize,
+    },
+}
+
+/// Texels of these values, as images store them, in place of others.
+pub(crate) fn replace_texels(
+    texels: &mut Arc<Vec<[f32; 3]>>,
+    values: &[Rgb],
+) -> Result<(), TexelError> {
+    let (found, expected) = (values.len(), texels.len());
+    if found != expected {
+        return Err(TexelError::Count { found, expected });
+    }
+    let stored: Vec<[f32; 3]> =
+        values.iter().map(|value| value.to_array().map(|v| v as f32)).collect();
+    if !stored.iter().flatten().all(|v| v.is_finite()) {
+        return Err(TexelError::NotFinite);
+    }
+    *texels = Arc::new(stored);
+    Ok(())
 }
 
 /// The texels that a value is made of, by index, with their weights.

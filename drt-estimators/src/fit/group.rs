@@ -1,0 +1,354 @@
+//! Unknowns that are too many to name: vertices of a shape or of a cage around it, voxels, texels.
+//!
+//! A group has absolute values, in the order and the units of the scene that a fit is given: positions in the scene's coordinates in the order of
+//! the shape's file, voxels as the grid stores them (before its scale), texels as the texture stores them, channel by channel. They are set before any parameter acts,
+//! and their gradient is that by these values: what parameters that move the shape do to it is pulled back.
+
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+
+use drt_geom::Mesh;
+use drt_math::{Mat3, Rgb, Vec3, vec3};
+use drt_motion::mean_value::{Cage, CageWeights};
+use drt_motion::parameter::Applied;
+use drt_motion::surface::{SmoothNormals, in_file_order, move_mesh};
+use drt_motion::{Change, GeometryChange, Parameter};
+
+use crate::derivative::scene_gradient::SceneGradient;
+use crate::model::error::Error;
+use crate::model::scene::{Scene, Target, TargetName};
+use crate::model::surface;
+
+/// Many unknowns of one kind.
+#[derive(Clone, Debug)]
+pub struct Group {
+    /// Its name, for messages and files.
+    pub name: String,
+    /// What they change.
+    pub target: Target,
+    /// What they are.
+    pub kind: GroupKind,
+}
+
+/// What the unknowns of a [`Group`] are.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub enum GroupKind {
+    /// The x, y and z of each vertex of the shape's file.
+    Vertices,
+    /// The x, y and z of each vertex of a cage around the shape, which follows by mean value coordinates.
+    Cage(Arc<Mesh>),
+    /// Each voxel's value, channel by channel.
+    Voxels(drt_medium::Property),
+    /// Each texel's value of the texture that stands for a property, channel by channel; of a number, that alone.
+    Texels {
+        /// What the texture stands for.
+        property: surface::Property,
+        /// The property is a number.
+        number: bool,
+    },
+    /// Each texel's value of the image that tells an emitter's light, channel by channel.
+    LightTexels,
+}
+
+impl Group {
+    /// A group of a scene's unknowns.
+    ///
+    /// # Errors
+    /// When the target has no such unknowns, a cage is not closed, or its vertices are not those of a polyhedron.
+    pub fn new(
+        name: impl Into<String>,
+        scene: &Scene,
+        target: &impl TargetName,
+        kind: GroupKind,
+    ) -> Result<Self, Error> {
+        let group = Self { name: name.into(), target: target.find_in(scene)?, kind };
+        if let GroupKind::Cage(cage) = &group.kind {
+            Cage::new(cage).map_err(|e| group.refusal(&e))?;
+        }
+        if group.values(scene).is_empty() {
+            return Err(group.refusal(&"its target has no such values"));
+        }
+        Ok(group)
+    }
+
+    /// Refuses groups that would both decide the same values.
+    pub(super) fn check_together(groups: &[Self]) -> Result<(), Error> {
+        for (i, group) in groups.iter().enumerate() {
+            let same = |other: &&Self| {
+                other.target == group.target
+                    && match (&other.kind, &group.kind) {
+                        (GroupKind::Voxels(a), GroupKind::Voxels(b)) => a == b,
+                        (
+                            GroupKind::Texels { property: a, .. },
+                            GroupKind::Texels { property: b, .. },
+                        ) => a == b,
+                        _ => true,
+                    }
+            };
+            if let Some(other) = groups[..i].iter().find(same) {
+                let message = format!("group {} changes the same values", other.name);
+                return Err(group.refusal(&message));
+            }
+        }
+        Ok(())
+    }
+
+    fn refusal(&self, reason: &dyn ToString) -> Error {
+        Error::Group { group: self.name.clone(), reason: reason.to_string() }
+    }
+
+    /// The values that it has in a scene; of a cage, where its vertices are.
+    #[must_use]
+    pub fn values(&self, scene: &Scene) -> Vec<f64> {
+        let coordinates = |positions: &[Vec3]| -> Vec<f64> {
+            positions.iter().flat_map(|p| p.to_array()).collect()
+        };
+        match (&self.kind, self.target) {
+            (GroupKind::Vertices, Target::Shape(s)) => {
+                let mesh = &scene.shapes[s].mesh;
+                let mut positions = alloc::vec![Vec3::ZERO; mesh.source_vertex_count as usize];
+                for (i, p) in (0..).zip(&mesh.positions) {
+                    positions[mesh.source_vertex(i) as usize] = *p;
+                }
+                coordinates(&positions)
+            }
+            (GroupKind::Cage(cage), Target::Shape(_)) => coordinates(&cage.positions),
+            (GroupKind::Voxels(property), Target::Medium(m)) => {
+                let grid = scene.media[m].item.voxels(*property);
+                grid.map_or_else(Vec::new, |grid| grid.values().to_vec())
+            }
+            (GroupKind::Texels { property, number }, Target::Bsdf(b)) => {
+                let texels = scene.bsdfs[b].item.texel_values(*property).unwrap_or_default();
+                match number {
+                    true => texels.iter().map(|v| v.r).collect(),
+                    false => texels.iter().flat_map(|v| v.to_array()).collect(),
+                }
+            }
+            (GroupKind::LightTexels, Target::Emitter(e)) => {
+                let texels = scene.emitters[e].item.emitter.texel_values().unwrap_or_default();
+                texels.iter().flat_map(|v| v.to_array()).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Gives a `scene` these values, where `given` is the one that the group was made for. In `scene` other groups, and nothing else, may have
+    /// been given their values before.
+    ///
+    /// # Errors
+    /// When their number is another, one is not finite, or out of its range.
+    pub fn apply(&self, given: &Scene, values: &[f64], scene: &mut Scene) -> Result<(), Error> {
+        let start = self.values(given);
+        if start.len() != values.len() {
+            let (found, expected) = (values.len(), start.len());
+            return Err(self.refusal(&format!("{found} values for {expected} unknowns")));
+        }
+        if let Some(value) = values.iter().find(|v| !v.is_finite()) {
+            return Err(self.refusal(&format!("a value is {value}")));
+        }
+        let change: Vec<f64> = values.iter().zip(&start).map(|(v, s)| v - s).collect();
+        let vectors = |numbers: &[f64]| -> Vec<Vec3> {
+            numbers.chunks_exact(3).map(|c| vec3(c[0], c[1], c[2])).collect()
+        };
+        match (&self.kind, self.target) {
+            (GroupKind::Vertices, Target::Shape(s)) => {
+                let change = GeometryChange::VertexVelocity(vectors(&change).into());
+                self.deform(given, scene, s, &change)
+            }
+            (GroupKind::Cage(cage), Target::Shape(s)) => {
+                let vertices = (0..).zip(vectors(&change)).collect();
+                let change = GeometryChange::Cage { mesh: cage.clone(), vertices };
+                self.deform(given, scene, s, &change)
+            }
+            (GroupKind::Voxels(property), Target::Medium(m)) => {
+                let mut medium = scene.media[m].item.clone();
+                let scale = voxel_scale(&medium, *property);
+                let step: Vec<f64> = change.iter().map(|c| c * scale).collect();
+                medium.add_to_voxels(*property, &step).map_err(|e| self.refusal(&e))?;
+                medium.check(*property).map_err(|e| self.refusal(&e))?;
+                scene.media[m].item = medium;
+                Ok(())
+            }
+            (GroupKind::Texels { property, number }, Target::Bsdf(b)) => {
+                let texels: Vec<Rgb> = match number {
+                    true => values.iter().map(|v| Rgb::splat(*v)).collect(),
+                    false => vectors(values).iter().map(|v| Rgb::from(v.to_array())).collect(),
+                };
+                let with = scene.bsdfs[b].item.with_texel_values(*property, &texels);
+                scene.bsdfs[b].item = with.map_err(|e| self.refusal(&e))?;
+                Ok(())
+            }
+            (GroupKind::LightTexels, Target::Emitter(e)) => {
+                let texels: Vec<Rgb> =
+                    vectors(values).iter().map(|v| Rgb::from(v.to_array())).collect();
+                let with = scene.emitters[e].item.emitter.with_texel_values(&texels);
+                scene.emitters[e].item.emitter = with.map_err(|e| self.refusal(&e))?;
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn deform(
+        &self,
+        given: &Scene,
+        scene: &mut Scene,
+        shape: usize,
+        change: &GeometryChange,
+    ) -> Result<(), Error> {
+        let changes = [Applied { parameter: 0, theta: 1.0, change }];
+        let moved = move_mesh(&given.shapes[shape].mesh, &changes, 1);
+        scene.shapes[shape].mesh = Arc::new(moved.map_err(|e| self.refusal(&e))?.mesh);
+        Ok(())
+    }
+
+    /// What takes the group's part out of gradients by its target. `given` is the scene that the group was made for, `scene` the one that
+    /// is differentiated: the parameters have acted on it.
+    ///
+    /// # Errors
+    /// When a parameter moves single vertices of the group's shape, which cannot be pulled back.
+    pub fn collector(
+        &self,
+        given: &Scene,
+        scene: &Scene,
+        parameters: &[Parameter],
+    ) -> Result<Collector, Error> {
+        let take = match (&self.kind, self.target) {
+            (GroupKind::Voxels(property), Target::Medium(m)) => {
+                Take::Voxels(m, *property, voxel_scale(&given.media[m].item, *property))
+            }
+            (GroupKind::LightTexels, Target::Emitter(e)) => Take::LightTexels(e),
+            (GroupKind::Texels { property, number }, Target::Bsdf(b)) => {
+                Take::Texels { bsdf: b, property: *property, number: *number }
+            }
+            (kind, Target::Shape(s)) => {
+                let (file, mesh) = (given.shapes[s].mesh.clone(), scene.shapes[s].mesh.clone());
+                let weights = match kind {
+                    GroupKind::Cage(cage) => {
+                        let cage = Cage::new(cage).map_err(|e| self.refusal(&e))?;
+                        Some(CageWeights::new(&cage, &file.positions))
+                    }
+                    _ => None,
+                };
+                let pull_back = self.linear_part(given, s, parameters)?.transpose();
+                let normals = SmoothNormals::new(&mesh);
+                let of = OfShape { shape: s, file, mesh, normals, weights, pull_back };
+                Take::Shape(of.into())
+            }
+            _ => Take::Nothing,
+        };
+        Ok(Collector(take))
+    }
+
+    /// The linear part of what parameters do to a shape.
+    fn linear_part(
+        &self,
+        scene: &Scene,
+        shape: usize,
+        parameters: &[Parameter],
+    ) -> Result<Mat3, Error> {
+        let mut linear = Mat3::IDENTITY;
+        for (parameter, effect) in
+            parameters.iter().flat_map(|p| p.effects.iter().map(move |e| (p, e)))
+        {
+            let Change::Geometry(change) = &effect.change else { continue };
+            if effect.target.as_str().find_in(scene)? != Target::Shape(shape) {
+                continue;
+            }
+            match change.affine(parameter.value) {
+                Some(map) => linear = map.linear * linear,
+                None if parameter.value == 0.0 => {}
+                None => {
+                    let name = &parameter.name;
+                    return Err(self.refusal(&format!(
+                        "parameter `{name}` moves single vertices of its shape; expected affine changes beside a group"
+                    )));
+                }
+            }
+        }
+        Ok(linear)
+    }
+}
+
+/// What a voxel's stored value is multiplied with to make the property.
+fn voxel_scale(medium: &drt_medium::Medium, property: drt_medium::Property) -> f64 {
+    match (medium.grid(), property) {
+        (Some(grid), drt_medium::Property::SigmaT) => grid.scale(),
+        _ => 1.0,
+    }
+}
+
+/// Takes a [`Group`]'s part out of gradients.
+#[derive(Debug)]
+pub struct Collector(Take);
+
+#[derive(Debug)]
+enum Take {
+    Voxels(usize, drt_medium::Property, f64),
+    Texels { bsdf: usize, property: surface::Property, number: bool },
+    LightTexels(usize),
+    Shape(alloc::boxed::Box<OfShape>),
+    Nothing,
+}
+
+#[derive(Debug)]
+struct OfShape {
+    shape: usize,
+    /// As it was before the group changed it.
+    file: Arc<Mesh>,
+    /// As it is.
+    mesh: Arc<Mesh>,
+    normals: SmoothNormals,
+    /// Of a cage's vertices.
+    weights: Option<CageWeights>,
+    /// The transpose of the linear map that parameters make.
+    pull_back: Mat3,
+}
+
+impl Collector {
+    /// Adds the group's part of the gradient of a loss, one number per value and in their order, to the end of a list.
+    pub fn collect(&self, gradient: &SceneGradient, out: &mut Vec<f64>) {
+        match &self.0 {
+            Take::Voxels(m, property, scale) => {
+                let Some(of) = &gradient.media[*m] else { return };
+                let voxels = match property {
+                    drt_medium::Property::SigmaT => &of.sigma_t.voxels,
+                    drt_medium::Property::Albedo => &of.albedo.voxels,
+                    drt_medium::Property::Emission => &of.emission.voxels,
+                    // It is no grid.
+                    drt_medium::Property::G => return,
+                };
+                out.extend(voxels.iter().map(|v| v * scale));
+            }
+            Take::Texels { bsdf, property, number } => {
+                let textures = gradient.texels[*bsdf].iter().filter(|(p, _)| p == property);
+                for (_, texels) in textures {
+                    let values = texels.values();
+                    if *number {
+                        out.extend(values.iter().map(|v| v.sum()));
+                    } else {
+                        out.extend(values.iter().flat_map(|v| v.to_array()));
+                    }
+                }
+            }
+            Take::LightTexels(emitter) => {
+                let Some(texels) = &gradient.emitter_texels[*emitter] else { return };
+                out.extend(texels.values().iter().flat_map(|v| v.to_array()));
+            }
+            Take::Shape(of) => {
+                let Some(by_mesh) = &gradient.shapes[of.shape] else { return };
+                let mut vertices = by_mesh.finish(&of.mesh, &of.normals);
+                vertices.iter_mut().for_each(|v| *v = of.pull_back * *v);
+                let vectors = match &of.weights {
+                    Some(weights) => weights.gather(&vertices),
+                    None => in_file_order(&of.file, &vertices),
+                };
+                out.extend(vectors.iter().flat_map(|v| v.to_array()));
+            }
+            Take::Nothing => {}
+        }
+    }
+}
