@@ -23,7 +23,8 @@ use drt_estimators::{
 use drt_motion::Parameter;
 use toml::Spanned;
 
-use crate::error::{Place, Warning, read_text};
+use crate::error::{Place, Warning};
+use crate::input_file::read_text;
 use crate::scene_xml::SceneReader;
 use crate::{CliError, Defaults, input_file};
 use cages::Cages;

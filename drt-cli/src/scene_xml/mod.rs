@@ -21,6 +21,7 @@ mod source;
 mod spectrum;
 #[cfg(test)]
 mod tests;
+mod textured;
 mod textures;
 mod transform;
 mod values;
@@ -37,7 +38,8 @@ use drt_estimators::{Instance, Named, Scene};
 use drt_math::Rgb;
 
 use crate::CliError;
-use crate::error::{Place, Warning, read_text};
+use crate::error::{Place, Warning};
+use crate::input_file::read_text;
 use element::Element;
 use index::Index;
 use properties::Properties;
@@ -227,7 +229,7 @@ impl<'a> Loader<'a> {
                 // Read for their own sake, so that mistakes in unused ones are found too.
                 "phase" => self.unless_unused(e, self.phase(e).map(drop), || Ok(()))?,
                 "volume" => self.unless_unused(e, volumes::read(e).map(drop), || Ok(()))?,
-                "texture" if e.id().is_some() && textures::varies(e) => {
+                "texture" if e.id().is_some() && properties::varies(e) => {
                     self.unless_unused(e, textures::read(e).map(drop), || Ok(()))?;
                 }
                 "texture" | "spectrum" | "rgb" | "srgb" if e.id().is_some() => {

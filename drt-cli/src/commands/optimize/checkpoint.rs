@@ -7,8 +7,9 @@ use drt_motion::optimize::State;
 use serde::{Deserialize, Serialize};
 
 use crate::atomic::write_atomically;
-use crate::error::{Place, read_text};
+use crate::error::Place;
 use crate::fingerprint::Fingerprint;
+use crate::input_file::read_text;
 
 use super::sources::Sources;
 use crate::{CliError, PROGRAM, checksum};

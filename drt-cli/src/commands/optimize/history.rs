@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::error::{Place, read_text};
+use crate::error::Place;
+use crate::input_file::read_text;
 use crate::{CliError, checksum};
 
 /// The name of the table of values.
