@@ -12,7 +12,8 @@ use toml::Spanned;
 use super::document::Document;
 use super::list::List;
 use super::{find_sensor, keys};
-use crate::{CliError, input_file};
+use crate::CliError;
+use crate::files::input_file;
 
 /// Iterations where a job does not say how many.
 const ITERATIONS: u32 = 100;
@@ -60,7 +61,7 @@ impl Optimize {
     ///
     /// # Errors
     /// Names the file and the key.
-    pub(crate) fn check_file(&self, path: &Path) -> Result<(), CliError> {
+    pub fn check_file(&self, path: &Path) -> Result<(), CliError> {
         match (input_file::check(path), self.unreadable.get(path)) {
             (Err(_), Some(error)) => Err(error.clone()),
             (Err(e), None) => Err(input_file::unreadable(path, None, &e)),

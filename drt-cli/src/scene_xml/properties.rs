@@ -10,7 +10,8 @@ use drt_math::{Affine, Rgb, Vec3, vec3};
 use super::element::Element;
 use super::numbers::{number, plain_numbers, plain_value, triple};
 use super::transform;
-use crate::{CliError, input_file};
+use crate::CliError;
+use crate::files::input_file;
 
 /// Properties of version 0.5 and 0.6 that do not change the expected image, by the element that they are in: they are about how an
 /// image is computed, or how it is stored.

@@ -13,8 +13,8 @@ use super::notes::Notes;
 use super::values;
 use crate::CliError;
 use crate::error::Place;
-use crate::input_file::read_text;
-use crate::lines::Lines;
+use crate::files::input_file::read_text;
+use crate::files::lines::Lines;
 
 /// Values for the `<default>` names of a scene, as `-D NAME=VALUE` gives them.
 pub type Defaults = BTreeMap<String, String>;

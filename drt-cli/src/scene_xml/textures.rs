@@ -12,7 +12,8 @@ use super::element::Element;
 use super::properties::Properties;
 use super::spectrum::{factor, scaled, srgb_to_linear};
 use super::volumes;
-use crate::{CliError, memory, read_exr};
+use crate::files::memory;
+use crate::{CliError, read_exr};
 
 /// Images of more texels are refused: they would take gigabytes.
 const MAX_TEXELS: u64 = 1 << 26;

@@ -9,7 +9,7 @@ use super::element::Element;
 use super::numbers::{number, numbers, plain_value};
 use super::properties::{Properties, no_texture};
 use crate::CliError;
-use crate::input_file::read_text;
+use crate::files::input_file::read_text;
 use observer::Spectrum;
 
 /// Tags that can give a colour; textures only where they are the same everywhere.
