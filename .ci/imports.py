@@ -14,9 +14,16 @@ CRATES = ["drt-math", "drt-geom", "drt-medium", "drt-motion", "drt-estimators", 
 # A file may import from its own folder and from those before it.
 ORDER = {
     "drt-estimators": ["model", "world", "sampling", "derivative", "discontinuities", "terms", "run", "fit"],
+    "drt-cli": ["testing", "wording", "error", "files", "scene_xml", "job", "commands"],
 }
-# Folders with circles between their parts, which are listed but are no faults.
-UNCHECKED = set()
+# In these folders some parts import each other in circles, which are listed but are no faults.
+UNCHECKED = {
+    "drt-estimators/derivative",
+    "drt-estimators/derivative/velocity",
+    "drt-estimators/model/sensor",
+    "drt-estimators/model/surface",
+    "drt-estimators/run/session",
+}
 
 TEST_MODULE = r"#\[cfg\((?:all\()?test\b[^\]]*\]\s*(?:pub(?:\(\w+\))? )?mod \w+ \{"
 TEST_IMPORT = r"#\[cfg\((?:all\()?test\b[^\]]*\]\s*(?:pub(?:\(\w+\))? )?use [^;]*;"
@@ -174,15 +181,22 @@ def main():
             graph.setdefault(module[same], {}).setdefault(target[same], (module, target))
             if same == 0 and {module[0], target[0]} <= set(order) and order.index(target[0]) > order.index(module[0]):
                 faults.append(f"{show(name, module)} imports {show(name, target)}, which comes after it")
-        levels += len(graphs)
+        levels += len({module[:-1] for module in crate.text if module})
         for level, graph in graphs.items():
             for circle in circles(graph):
                 line = f"a circle in {show(name, level)}: {' -> '.join(circle)}"
                 for one, other in zip(circle, circle[1:]):
                     module, target = graph[one][other]
                     line += f"\n    {show(name, module)} imports {show(name, target)}"
-                (left if show(name, level) in UNCHECKED else faults).append(line)
-    print("\n".join(faults) or f"{files} files at {levels} levels, all imports one way")
+                if show(name, level) in UNCHECKED:
+                    left.append((show(name, level), line))
+                else:
+                    faults.append(line)
+    done = UNCHECKED - {level for level, _ in left}
+    faults += [f"{level} has no circles: UNCHECKED need not name it" for level in sorted(done)]
+    for level, line in left:
+        print(f"not checked: {line}")
+    print("\n".join(faults) or f"{files} files in {levels} folders, all imports one way but where not checked")
     return 1 if faults else 0
 
 

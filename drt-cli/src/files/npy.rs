@@ -40,7 +40,7 @@ pub fn write_npy(path: &Path, values: &[f64]) -> Result<(), CliError> {
     })
 }
 
-/// Writes bytes as an array of one dimension, with the [checksum](super::checksum) that they may have a place for.
+/// Writes bytes as an array of one dimension, with the [`checksum`] that they may have a place for.
 ///
 /// # Errors
 /// When the file cannot be written.
