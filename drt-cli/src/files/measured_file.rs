@@ -4,7 +4,10 @@ use drt_estimators::surface::{MeasuredTables, Tensor};
 
 use crate::files::tensor_file::{self, TensorFile, Values};
 
-/// The tables of a file, not yet checked for making a material.
+/// Reads the tables of a file, not yet checked for making a material, from its bytes.
+///
+/// # Errors
+/// Names the field that is missing, or has another type or shape than it should.
 pub fn decode(bytes: &[u8]) -> Result<MeasuredTables, String> {
     let file = TensorFile::new(bytes)?;
     if !file.has("rgb") && file.has("spectra") {

@@ -179,7 +179,7 @@ enum Part {
         file: Arc<Mesh>,
         mesh: Arc<Mesh>,
         normals: SmoothNormals,
-        /// Of a cage's vertices.
+        /// What a cage's vertices weigh at those of the shape.
         weights: Option<CageWeights>,
     },
     Nothing,

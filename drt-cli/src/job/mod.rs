@@ -257,12 +257,12 @@ impl Job {
         Ok(())
     }
 
-    /// All files that were read.
+    /// Lists all files that were read.
     pub fn inputs(&self) -> impl Iterator<Item = &Path> {
         self.files.iter().map(PathBuf::as_path)
     }
 
-    /// The pictures that a fit reads; other commands may write them.
+    /// Lists the pictures that a fit reads; other commands may write them.
     pub fn pictures(&self) -> impl Iterator<Item = &Path> {
         let plan = self.optimize.as_ref().ok().and_then(Option::as_ref);
         let pictures = plan.into_iter().flat_map(|plan| plan.targets.iter().chain(&plan.masks));

@@ -46,7 +46,7 @@ pub struct Optimize {
     pub iterations: u32,
     /// Samples per pixel from some iterations on, instead of the estimator's.
     pub spp: Vec<(u32, u32)>,
-    /// By how much the images' sides are divided.
+    /// The images' sides are divided by this much.
     pub reduce: Stages<u32>,
     /// The folder that a stopped run goes on from.
     pub checkpoint: Option<PathBuf>,

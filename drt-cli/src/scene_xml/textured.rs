@@ -11,7 +11,7 @@ use crate::CliError;
 impl<'a> Properties<'a> {
     /// A finite number.
     ///
-    /// Of a texture that varies it is the mean, and the texture is kept.
+    /// A texture that varies gives its mean and is kept.
     pub(super) fn float(&self, name: &'static str) -> Result<Option<f64>, CliError> {
         if let Some((e, texture)) = self.texture(name)? {
             let texture = textures::luminance(texture).map_err(|reason| e.error(reason))?;
@@ -22,7 +22,7 @@ impl<'a> Properties<'a> {
 
     /// A colour of something that reflects, refracts or absorbs.
     ///
-    /// Of a texture that varies it is the mean, and the texture is kept.
+    /// A texture that varies gives its mean and is kept.
     pub(super) fn color(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
         if let Some((_, texture)) = self.texture(name)? {
             return Ok(Some(self.keep(name, texture)));
