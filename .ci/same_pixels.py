@@ -17,7 +17,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-KINDS = ["path-space", "radiative"]
+KINDS = ["path-space", "radiative", "warped"]
 
 
 def cases(names):

@@ -9,6 +9,7 @@ extern crate self as drt_estimators;
 
 mod derivative;
 mod discontinuities;
+mod estimators;
 pub mod fit;
 mod model;
 mod run;
@@ -35,8 +36,9 @@ pub use model::settings::{
 };
 pub use model::shard::Shard;
 pub use model::{emitter, filter, sensor, surface, texture};
+pub use run::control::{Control, FinishedTile, Unattended};
 pub use run::finite_difference::finite_differences;
-pub use run::reverse::{GradientBatch, gradient, gradient_in_batches};
-pub use run::session::{Control, FinishedTile, Merged, Session, ShardError, ShardSums, Unattended};
+pub use run::gradient::GradientBatch;
+pub use run::session::{Merged, Session, ShardError, ShardSums, gradient, gradient_in_batches};
 pub use run::stencil::one_sided_differences;
 pub use world::cache::PreparedCache;

@@ -16,7 +16,6 @@ use drt_estimators::surface::{
 };
 use drt_estimators::{
     EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Shape, Unattended,
-    gradient,
 };
 use drt_geom::procedural;
 use drt_math::{Rgb, Rng, ValueChange, Vec3, vec3};
@@ -70,7 +69,8 @@ fn sides(scene: &Scene, parameter: &Parameter, settings: &Settings, spp: u32) ->
     let forward = products.iter().map(|p| p.sum()).sum();
     let size = products.iter().map(|p| p.abs().sum()).sum();
     let wanted = targets(scene, parameter);
-    let g = gradient(scene, &wanted, settings, spp, &a, &Unattended).expect("a valid scene");
+    // From the same preparation.
+    let g = session.gradient(&wanted, spp, &a, &Unattended).expect("a valid scene");
     assert_eq!(g.non_finite, 0);
     (forward, pair(scene, parameter, &g), size)
 }

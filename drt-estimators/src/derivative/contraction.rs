@@ -57,7 +57,7 @@ impl Motion {
     }
 
     /// What must be sampled even where it contributes nothing to the image.
-    pub(crate) fn needs(&self) -> ActiveFactors {
+    pub(crate) fn factors(&self) -> ActiveFactors {
         let need = |tangents: &Vec<(usize, MediumTangent)>| {
             let any = |f: fn(&MediumTangent) -> bool| tangents.iter().any(|(_, t)| f(t));
             if any(|t| !t.albedo.is_zero() || !t.emission.is_zero()) {

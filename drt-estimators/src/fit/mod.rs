@@ -32,7 +32,8 @@ use crate::model::error::{Error, SettingError};
 use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
-use crate::run::session::{Control, ShardSums};
+use crate::run::control::Control;
+use crate::run::session::ShardSums;
 use crate::world::cache::PreparedCache;
 
 pub use crate::fit::evaluation::{Evaluation, Half};

@@ -9,8 +9,9 @@ use crate::model::error::{Error, SettingError};
 use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
+use crate::run::control::Control;
 use crate::run::finite_difference::finite_differences;
-use crate::run::session::{Control, Session, ShardSums, choice};
+use crate::run::session::{Session, ShardSums, choice};
 use crate::world::cache::PreparedCache;
 
 /// A scene at its parameters' values, and its rates of change.

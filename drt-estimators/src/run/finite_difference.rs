@@ -12,7 +12,7 @@ use crate::model::error::{Error, SettingError};
 use crate::model::rendering::Layer;
 use crate::model::scene::Scene;
 use crate::model::settings::{PathSampling, Settings};
-use crate::run::session::Control;
+use crate::run::control::Control;
 use crate::run::stencil::Stencil;
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::{Blocks, PixelFilm, Raster, Splat};

@@ -13,6 +13,7 @@
 //! so far. Pilots draw numbers of their own in batches of fixed size, merged in order: guides are the same for any number of threads,
 //! and in every shard of a run.
 
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use drt_math::{Real, Rgb};
@@ -25,8 +26,9 @@ use crate::sampling::guide::Guide;
 use crate::sampling::guide::learning::{Learnt, MOST_OBSERVATIONS, Observation, learn};
 use crate::sampling::parallel::Pool;
 use crate::sampling::streams::GUIDE_STREAM;
-use crate::terms::boundary_segments::BoundarySink;
-use crate::terms::splatting::{BoundarySource, Checked, Splatter};
+use crate::terms::boundary_segments::{BoundarySink, Strategy};
+use crate::terms::source::BoundarySource;
+use crate::terms::splatting::{Checked, Splatter};
 use crate::world::World;
 
 /// The part of a source's samples that its pilot takes at most.
@@ -83,8 +85,37 @@ impl Guiding {
     }
 
     /// What was learnt, and the number of samples that it took.
-    pub(crate) fn outcome(&self) -> Option<(&Learnt, u32)> {
+    fn outcome(&self) -> Option<(&Learnt, u32)> {
         Some((self.learnt.as_ref()?, self.batches * BATCH as u32))
+    }
+
+    /// What is known, in words.
+    pub(crate) fn describe(&self, source: BoundarySource) -> String {
+        let name = match source {
+            BoundarySource::Edges(Strategy::Primary) | BoundarySource::PrimaryEdges => {
+                "camera boundary"
+            }
+            BoundarySource::Edges(Strategy::Direct) => "emitter boundary",
+            BoundarySource::Edges(Strategy::Indirect) => "indirect boundary",
+            BoundarySource::Borders => "pixel borders",
+            BoundarySource::GrazingFlux => "grazing flux",
+            BoundarySource::LightPaths => "light paths",
+        };
+        let Some((learnt, samples)) = self.outcome() else {
+            return alloc::format!("{name}: where a pilot finds that it helps");
+        };
+        match &learnt.guide {
+            Some(guide) => alloc::format!(
+                "{name}: {:.2} of the work by {:.2} of the samples, with a pilot of {samples} and {} cells",
+                1.0 / learnt.gain,
+                self.share(),
+                guide.cells()
+            ),
+            None => alloc::format!(
+                "{name}: no, a pilot of {samples} samples promises {:.2} of the work",
+                1.0 / learnt.gain
+            ),
+        }
     }
 
     /// Learns what a run of so many `samples` in all can afford. The account is that of the pilot; false when it was
@@ -240,10 +271,6 @@ impl<'a> BoundarySink for OfImages<'a> {
         for (square, rate) in self.squares.iter_mut().zip(&self.contraction.rates) {
             *square += size * (rate.r * rate.r);
         }
-    }
-
-    fn sink(&self) -> &Contraction<'a> {
-        &self.contraction
     }
 
     fn spread(&mut self, _: &[(u32, f64)], _: impl FnOnce(&mut Contraction<'a>)) -> bool {

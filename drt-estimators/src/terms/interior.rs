@@ -3,7 +3,6 @@
 mod component;
 mod recorder;
 
-use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::sobol::SobolSampler;
@@ -14,8 +13,7 @@ use crate::terms::interior::component::{Traced, Worker};
 pub(crate) use crate::terms::interior::recorder::{PathView, Recorder};
 
 use crate::derivative::contraction::Contraction;
-use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, VelocityFunctional};
-use crate::derivative::velocity::{Material, Movers, VelocityField};
+use crate::derivative::sensitivity::{AdjointSink, VelocityFunctional};
 use crate::model::rendering::{Account, Counters, NonFinite, Term};
 use crate::model::sensor::ViewSample;
 use crate::sampling::bidirectional::{Bidirectional, EmissionSampler};
@@ -25,74 +23,8 @@ use crate::sampling::record::PathRecord;
 use crate::sampling::record::Radiance;
 use crate::sampling::streams::{DIMENSIONS, FLUX_STREAM, PAIR_STREAM, VELOCITY_STREAM};
 use crate::sampling::trace::Tracer;
-use crate::terms::boundary_segments::shadow::Shadows;
-use crate::terms::flux::Flux;
-use crate::terms::radiative::{EdgeQuery, Radiative};
-use crate::terms::warped::Warped;
+use crate::terms::edge_queries::EdgeQuery;
 use crate::world::{RayPath, World};
-
-/// Boundary and flux terms that are found along camera rays.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct AlongRays<'a> {
-    pub(crate) flux: Option<&'a Flux>,
-    pub(crate) shadows: Option<&'a Shadows>,
-    /// Set in the spatial form.
-    pub(crate) radiative: Option<&'a Radiative>,
-    /// Set where rays turn with edges.
-    pub(crate) warped: Option<&'a Warped>,
-    pub(crate) queries: EdgeQueries,
-    /// Pairs of rays tell how narrow lobes turn.
-    pub(crate) lobe_pairs: bool,
-}
-
-/// How often a path queries edges.
-#[derive(Clone, Copy)]
-pub(crate) enum EdgeQueries {
-    /// So many times on average, each time from one of its vertices.
-    Average(f64),
-    /// Once from each of its vertices.
-    EveryVertex,
-}
-
-impl Default for EdgeQueries {
-    fn default() -> Self {
-        Self::Average(0.0)
-    }
-}
-
-impl EdgeQueries {
-    fn any(self) -> bool {
-        !matches!(self, Self::Average(0.0))
-    }
-
-    /// Another average, where there is one.
-    pub(crate) fn or_average(self, queries: Option<f64>) -> Self {
-        match (self, queries) {
-            (Self::Average(own), Some(queries)) if own > 0.0 => Self::Average(queries),
-            _ => self,
-        }
-    }
-}
-
-impl AlongRays<'_> {
-    /// The velocity field of the estimator.
-    pub(crate) fn field(&self, active: &ActiveInputs) -> Arc<dyn VelocityField> {
-        match (self.radiative, self.warped) {
-            (Some(radiative), _) => Arc::clone(&radiative.spatial) as _,
-            (_, Some(warped)) => Arc::clone(&warped.field),
-            _ => Arc::new(Material::new(Movers::new(active))),
-        }
-    }
-
-    /// The terms kept in layers of their own, where terms are kept apart.
-    pub(crate) fn terms(&self) -> impl Iterator<Item = Term> {
-        let warp = self.warped.map(|_| Term::Warp);
-        let flux = self.flux.map(|_| Term::Flux);
-        let edges = if self.queries.any() { &[Term::Direct, Term::Indirect][..] } else { &[] };
-        let along = warp.into_iter().chain(flux);
-        along.chain(self.shadows.map(|_| Term::Direct)).chain(edges.iter().copied())
-    }
-}
 
 /// Where the derivatives of a pixel's paths go.
 pub(crate) trait PathSink: AdjointSink {
@@ -276,7 +208,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
         };
         let s = ViewSample { lens, ..s };
         let weight = Rgb::splat(s.weight);
-        let queries = self.workers.iter().any(|w| w.along.queries.any());
+        let queries = self.workers.iter().any(|w| w.queries.any());
         let query = queries.then(|| EdgeQuery::reserve(&mut rng));
         self.tracer.rng = rng;
         if self.workers.is_empty() {
@@ -298,7 +230,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             let pairs = self.bidirectional.is_none().then(|| stream(PAIR_STREAM));
             view.begin(pairs, velocities, || stream(FLUX_STREAM));
         }
-        let shadows = self.workers.iter().any(|w| w.along.shadows.is_some());
+        let shadows = self.workers.iter().any(|w| w.terms.boundary.shadows.is_some());
         let mut recorder = Recorder {
             record: &mut self.record,
             views: &mut self.views,
@@ -334,7 +266,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             }
             worker.add(&mut self.tracer, &path, view, at, values);
             if self.separate {
-                at += n * worker.along.terms().count();
+                at += n * worker.terms.along_paths(worker.queries).count();
             }
         }
     }

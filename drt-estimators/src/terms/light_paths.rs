@@ -11,19 +11,20 @@
 //! so that a path has three values for all pixels that it reaches: ∂f, and f times the rates of the image point's column and
 //! row. There is no record but that of the light path: each vertex is the end of a connection from the camera.
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, Rng};
 
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::antithetic::AntitheticPairs;
-use crate::derivative::sensitivity::AdjointSink;
 use crate::derivative::velocity::PathVelocities;
 use crate::sampling::bidirectional::{Bidirectional, EmissionSampler, SeenFromCamera};
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary_segments::BoundarySink;
-use crate::terms::interior::{AlongRays, PathView, Recorder};
+use crate::terms::interior::{PathView, Recorder};
+use crate::terms::selected::Terms;
 use crate::world::World;
 
 /// Light paths at work.
@@ -39,16 +40,16 @@ pub(crate) struct LightPaths<'a> {
 }
 
 impl<'a> LightPaths<'a> {
-    /// In the light of `all` emitters, for derivatives by those that light a `world`, which go to `sink`.
+    /// In the light of `all` emitters, for the `terms` of derivatives by those that light a `world`.
     pub(crate) fn new(
         all: &'a World,
         emission: &'a EmissionSampler,
         world: &'a World,
-        along: &AlongRays<'_>,
-        sink: &impl AdjointSink,
+        terms: &Terms,
     ) -> Self {
-        let velocities = PathVelocities::new(along.field(sink.active()));
-        let view = PathView::new(world, velocities, AntitheticPairs::new(false), along.flux);
+        let velocities = PathVelocities::new(Arc::clone(&terms.velocity));
+        let pairs = AntitheticPairs::new(false);
+        let view = PathView::new(world, velocities, pairs, terms.flux.as_ref());
         Self {
             world,
             paths: Bidirectional::new(all, emission),

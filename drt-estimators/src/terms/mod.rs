@@ -1,12 +1,12 @@
 //! The terms of a derivative: the interior, boundary segments, edges seen from vertices, and flux.
 
 pub(crate) mod boundary_segments;
-mod film_plane;
+pub(crate) mod edge_queries;
 pub(crate) mod flux;
 pub(crate) mod guiding;
 pub(crate) mod interior;
 pub(crate) mod light_paths;
 pub(crate) mod prepared;
-pub(crate) mod radiative;
+pub(crate) mod selected;
+pub(crate) mod source;
 pub(crate) mod splatting;
-pub(crate) mod warped;

@@ -8,91 +8,24 @@ use drt_math::{Rgb, Rng};
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::sensitivity::VelocityFunctional;
 use crate::model::rendering::{Account, Counters, NonFinite, Term};
-use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::Splats;
 use crate::sampling::guide::{self, Drawn, Guide};
 use crate::sampling::streams::{DIMENSIONS, LINE_STREAM, SEQUENCE_STREAM};
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary_segments;
-use crate::terms::boundary_segments::{Boundary, BoundarySink, Strategy};
+use crate::terms::boundary_segments::BoundarySink;
 use crate::terms::flux;
-use crate::terms::flux::GrazingFlux;
-use crate::terms::interior::AlongRays;
 use crate::terms::light_paths::LightPaths;
-use crate::terms::radiative::Radiative;
+use crate::terms::selected::Terms;
+use crate::terms::source::BoundarySource;
 use crate::world::World;
-
-/// A splatted source of derivatives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum BoundarySource {
-    /// Boundary segments found by a strategy.
-    Edges(Strategy),
-    /// Jumps of a box filter.
-    Borders,
-    /// Edges seen from the camera, in the spatial form.
-    PrimaryEdges,
-    /// The flux through what the camera sees edge on.
-    GrazingFlux,
-    /// Light paths that are connected to the camera.
-    LightPaths,
-}
-
-impl BoundarySource {
-    pub(crate) fn term(self) -> Term {
-        match self {
-            Self::Edges(Strategy::Primary) | Self::Borders | Self::PrimaryEdges => Term::Primary,
-            Self::Edges(Strategy::Direct) => Term::Direct,
-            Self::Edges(Strategy::Indirect) => Term::Indirect,
-            Self::GrazingFlux => Term::Flux,
-            Self::LightPaths => Term::Interior,
-        }
-    }
-
-    /// Tells the source's random numbers apart from all others.
-    pub(crate) fn stream(self) -> u64 {
-        let id = match self {
-            Self::Edges(Strategy::Primary) => 1,
-            Self::Edges(Strategy::Direct) => 2,
-            Self::Edges(Strategy::Indirect) => 3,
-            Self::Borders => 4,
-            Self::PrimaryEdges => 5,
-            Self::GrazingFlux => 6,
-            Self::LightPaths => 7,
-        };
-        id << 40
-    }
-
-    /// Samples of it to one of other sources.
-    pub(crate) fn part(self) -> f64 {
-        if self == Self::GrazingFlux { 0.0625 } else { 1.0 }
-    }
-
-    /// True for the edges that the camera sees.
-    pub(crate) fn is_of_camera(self) -> bool {
-        matches!(self, Self::PrimaryEdges | Self::Edges(Strategy::Primary))
-    }
-
-    /// True for those whose first numbers may have a distribution that is learnt.
-    pub(crate) fn is_guided(self) -> bool {
-        !matches!(self, Self::GrazingFlux | Self::LightPaths)
-    }
-
-    /// True when no sample counts much more than others.
-    pub(crate) fn is_even(self) -> bool {
-        matches!(self, Self::PrimaryEdges | Self::GrazingFlux)
-    }
-}
 
 /// What splatted terms are sampled from.
 pub(crate) struct Splatter<'a> {
     pub(crate) world: &'a World,
     /// Lit by all emitters.
     pub(crate) all: &'a World,
-    pub(crate) along: AlongRays<'a>,
-    pub(crate) boundary: &'a Boundary,
-    pub(crate) radiative: Option<&'a Radiative>,
-    pub(crate) grazing: Option<&'a GrazingFlux>,
-    pub(crate) emission: Option<&'a EmissionSampler>,
+    pub(crate) terms: &'a Terms,
     pub(crate) seed: u64,
     /// True when a batch shall end before it is done, to be thrown away.
     pub(crate) cancelled: &'a (dyn Fn() -> bool + Sync),
@@ -134,9 +67,9 @@ impl Splatter<'_> {
         let mut edges = boundary_segments::Buffers::default();
         let mut functional = VelocityFunctional::default();
         let mut grazing = flux::Buffers::default();
-        let mut light_paths = self.emission.filter(|_| from_light).map(|emission| {
-            LightPaths::new(self.all, emission, self.world, &self.along, receiver.sink())
-        });
+        let emission = self.terms.emission.as_ref().filter(|_| from_light);
+        let mut light_paths =
+            emission.map(|emission| LightPaths::new(self.all, emission, self.world, self.terms));
         receiver.term = Some(source.term());
         receiver.seed = self.seed;
         receiver.stream = stream;
@@ -161,18 +94,18 @@ impl Splatter<'_> {
             let [rays, lookups] = [tracer.counters.rays, tracer.counters.tracking_steps];
             match source {
                 BoundarySource::Edges(strategy) => {
-                    self.boundary.sample(strategy, &mut tracer, &mut edges, receiver);
+                    self.terms.boundary.sample(strategy, &mut tracer, &mut edges, receiver);
                 }
                 BoundarySource::Borders => {
                     boundary_segments::border::sample(&mut tracer, &mut edges, receiver);
                 }
                 BoundarySource::PrimaryEdges => {
-                    if let Some(radiative) = self.radiative {
-                        radiative.primary_edge(&mut tracer, &mut functional, receiver);
+                    if let Some(edges) = &self.terms.edges {
+                        edges.primary_edge(&mut tracer, &mut functional, receiver);
                     }
                 }
                 BoundarySource::GrazingFlux => {
-                    if let Some(seen) = self.grazing {
+                    if let Some(seen) = &self.terms.grazing {
                         seen.sample(&mut tracer, &mut grazing, receiver);
                     }
                 }
@@ -241,10 +174,6 @@ impl<R: BoundarySink> BoundarySink for Checked<R> {
 
     type Sink = R::Sink;
 
-    fn sink(&self) -> &R::Sink {
-        self.inner.sink()
-    }
-
     fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut R::Sink)) -> bool {
         let finite = self.inner.spread(pixels, send);
         if !finite {
@@ -300,10 +229,6 @@ impl<'a> BoundarySink for ToImages<'a> {
     }
 
     type Sink = Contraction<'a>;
-
-    fn sink(&self) -> &Contraction<'a> {
-        &self.contraction
-    }
 
     fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut Contraction<'a>)) -> bool {
         self.contraction.clear();

@@ -276,6 +276,9 @@ impl World {
 
     /// The same scene by the light of some emitters.
     pub(crate) fn lit_by(&self, lit: EmitterMask) -> Result<Self, Error> {
+        if lit == self.lit {
+            return Ok(self.clone());
+        }
         let first_prim = &self.geometry.first_prim;
         let lights = LightTable::new(&self.scene, first_prim, self.geometry.radius, None, lit)?;
         let mut world = Self { lights, lit, ..self.clone() };

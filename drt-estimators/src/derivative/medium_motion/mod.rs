@@ -22,6 +22,17 @@ pub(crate) use crate::derivative::medium_motion::reverse::{
 };
 use crate::derivative::medium_motion::surroundings::surroundings;
 
+/// How an estimator lets the insides of media move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Insides {
+    /// They follow what is around them.
+    Follow,
+    /// They follow what moves all that is around them by one affine field.
+    Affine,
+    /// They stay where they are.
+    AtRest,
+}
+
 /// The motions of the insides of all media, and the shapes whose flux must be added.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct MediumMotions {
@@ -38,6 +49,21 @@ pub(crate) struct MediumMotions {
 }
 
 impl MediumMotions {
+    /// As an estimator lets them move.
+    pub(crate) fn new(
+        insides: Insides,
+        world: &World,
+        tangents: &Tangents,
+        asked: &[(usize, InteriorMotion)],
+        kept: &mut PreparedCache,
+    ) -> Result<Self, Error> {
+        match insides {
+            Insides::Follow => Self::plan(world, tangents, asked, kept),
+            Insides::Affine => Ok(Self::affine(world, tangents, asked)),
+            Insides::AtRest => Ok(Self::at_rest(world.scene.media.len())),
+        }
+    }
+
     /// Nothing moves, and nothing else makes up for it.
     pub(crate) fn at_rest(media: usize) -> Self {
         Self {

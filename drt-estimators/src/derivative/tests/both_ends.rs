@@ -5,7 +5,7 @@ use crate::derivative::tests::choice::{LIGHT, derivative, prepare_by};
 use crate::derivative::tests::scenes::*;
 use crate::model::settings::EstimatorKind::{PathSpace, Warped};
 use crate::model::settings::{PathSampling, Settings};
-use crate::terms::splatting::BoundarySource;
+use crate::terms::source::BoundarySource;
 use crate::world::lights::EmitterMask::{All, Extended};
 
 #[test]
@@ -28,13 +28,13 @@ fn every_strategy_and_its_weight_are_needed() {
         assert!(fair.0.abs() < 4.0 && fair.1 < 0.02, "{estimator:?} {fair:?}");
         let without = off(&|| {
             let mut both = by(PathSampling::Bidirectional);
-            both.0.sources.retain(|s| *s != BoundarySource::LightPaths);
+            both.0.terms.sources.retain(|s| *s != BoundarySource::LightPaths);
             both
         });
         assert!(without.0.abs() > 5.0, "{estimator:?} {without:?}");
         let never_back = off(&|| {
             let mut both = by(PathSampling::Bidirectional);
-            both.0.emission.iter_mut().for_each(|e| e.never_back = true);
+            both.0.terms.emission.iter_mut().for_each(|e| e.never_back = true);
             both
         });
         assert!(never_back.0.abs() > 5.0, "{estimator:?} {never_back:?}");

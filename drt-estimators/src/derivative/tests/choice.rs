@@ -13,6 +13,8 @@ use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::sensitivity::VelocityFunctional;
 use crate::derivative::tangents;
 use crate::derivative::tests::scenes::FILM;
+use crate::estimators;
+use crate::estimators::Changes;
 use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::sampling::pixels::Sampler;
@@ -67,8 +69,10 @@ pub(crate) fn prepare_by(
     let tangents = tangents.seen_by(0);
     let insides = crate::derivative::medium_motion::MediumMotions::affine(&world, &tangents, &[]);
     let motion = Motion::new(tangents, insides);
-    world.prepare_for_derivatives(motion.needs());
-    let prepared = Prepared::new(world, &motion.active, &[], settings, Some(&motion));
+    world.prepare_for_derivatives(motion.factors());
+    let changes =
+        Changes { active: &motion.active, flux_shapes: &[], settings, motion: Some(&motion) };
+    let prepared = estimators::prepare(estimators::named(settings.estimator), world, &changes);
     (prepared.expect("a valid scene"), motion)
 }
 
@@ -99,10 +103,10 @@ fn parts(Sum { weight, samples }: Sum, (prepared, motion): &(Prepared, Motion)) 
     for seed in 0..BATCHES {
         let [mut rays, mut edges] = [0.0; 2];
         let component = prepared.component(Contraction::new(&prepared.world, motion));
-        let along = prepared.along_rays();
+        let terms = &prepared.terms;
         let mut sampler = PixelSampler::new(&prepared.world, [component], seed, false, true)
-            .with_light_paths(prepared.emission.as_ref());
-        let mut values = vec![Rgb::ZERO; 2 + along.terms().count()];
+            .with_light_paths(prepared.terms.emission.as_ref());
+        let mut values = vec![Rgb::ZERO; 2 + terms.along_paths(terms.queries).count()];
         for pixel in 0..PIXELS {
             let sequence = sequence_name(seed, pixel, 0);
             for unit in 0..samples {
@@ -114,7 +118,7 @@ fn parts(Sum { weight, samples }: Sum, (prepared, motion): &(Prepared, Motion)) 
         }
         let contraction = Contraction::new(&prepared.world, motion);
         let mut primary = Checked::new(Total { contraction, weight, sum: 0.0 });
-        for source in &prepared.sources {
+        for source in &prepared.terms.sources {
             prepared.splatter(&prepared.world, seed).run(
                 *source,
                 None,
@@ -167,10 +171,6 @@ impl<'a> BoundarySink for Total<'a> {
     }
 
     type Sink = Contraction<'a>;
-
-    fn sink(&self) -> &Contraction<'a> {
-        &self.contraction
-    }
 
     fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut Contraction<'a>)) -> bool {
         self.contraction.clear();

@@ -11,7 +11,8 @@ use crate::sampling::parallel::Pool;
 use crate::terms::boundary_segments::Strategy;
 use crate::terms::guiding::{Guiding, OfImages};
 use crate::terms::prepared::Prepared;
-use crate::terms::splatting::{BoundarySource, Checked};
+use crate::terms::source::BoundarySource;
+use crate::terms::splatting::Checked;
 use crate::world::lights::EmitterMask;
 
 const SEED: u64 = 17;

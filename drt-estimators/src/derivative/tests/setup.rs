@@ -52,7 +52,7 @@ pub(super) fn prepare(scene: &Scene, parameter: &Parameter) -> (World, Motion) {
         World::new(at_value, 0, depth, None, EmitterMask::All, &mut kept).expect("a valid scene");
     let insides = MediumMotions::plan(&world, &tangents, &[], &mut kept).expect("a valid scene");
     let motion = Motion::new(tangents, insides);
-    world.prepare_for_derivatives(motion.needs());
+    world.prepare_for_derivatives(motion.factors());
     (world, motion)
 }
 

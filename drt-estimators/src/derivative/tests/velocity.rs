@@ -22,7 +22,7 @@ use crate::derivative::velocity::{
 };
 use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
-use crate::run::reverse::ScatterSink;
+use crate::run::gradient::ScatterSink;
 use crate::sampling::trace::Endpoint;
 use crate::sampling::trace::Tracer;
 use crate::world::World;

@@ -160,6 +160,16 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         true
     }
 
+    /// Whether the image points of paths move, so that a pixel's filter has a rate.
+    fn moves_image_points(&self) -> bool {
+        true
+    }
+
+    /// Whether vertices move with the edges beside them, what they owe to which is kept as a term of its own.
+    fn follows_edges(&self) -> bool {
+        false
+    }
+
     /// Whether it draws random numbers.
     fn is_random(&self) -> bool {
         false

@@ -18,7 +18,7 @@
 //! [blended](super::blend) with that of matter; in homogeneous media distances are [warped](super::warp).
 //!
 //! What these derivatives leave out, jumps of the integrand that move, is in
-//! [`radiative`](crate::terms::radiative).
+//! [`radiative`](crate::terms::edge_queries).
 
 use alloc::vec::Vec;
 
@@ -108,6 +108,10 @@ impl VelocityField for Spatial {
 
     fn may_move(&self) -> bool {
         self.movers.any()
+    }
+
+    fn moves_image_points(&self) -> bool {
+        false
     }
 
     fn blend(

@@ -1,11 +1,13 @@
 //! A run: a scene prepared once, sampled in passes, with its results available at any time.
 
 pub(crate) mod choice;
-mod component;
 mod describe;
+mod gradient;
+mod images;
 mod legend;
 mod pass;
 mod pilot;
+mod primary_share;
 mod shard;
 
 use alloc::string::String;
@@ -14,20 +16,23 @@ use alloc::vec::Vec;
 
 use drt_motion::Parameter;
 
-use crate::run::session::component::Component;
+use crate::derivative::tangents;
+use crate::derivative::tangents::Tangents;
+use crate::estimators;
+use crate::estimators::Estimator;
+use crate::estimators::shares::{shares, slides};
+use crate::model::error::{Error, SettingError};
+use crate::model::plan::Plan;
+use crate::model::rendering::{Account, Rendering, Term};
+use crate::model::scene::{Scene, Target};
+use crate::model::settings::{EstimatorKind, PathSampling, Settings};
+use crate::run::component::{Unknowns, seed_of_component};
+use crate::run::control::{Control, FinishedTile};
+use crate::run::gradient::PreparedGradient;
+use crate::run::session::images::Images;
 use crate::run::session::legend::Legend;
 use crate::run::session::pass::Pass;
 use crate::run::session::pilot::Pilot;
-pub use crate::run::session::shard::{Merged, ShardError, ShardSums};
-
-use crate::derivative::tangents;
-use crate::derivative::tangents::Tangents;
-use crate::model::error::{Error, SettingError};
-use crate::model::plan::Plan;
-use crate::model::rendering::Estimate;
-use crate::model::rendering::{Account, Rendering, Term};
-use crate::model::scene::{Scene, Target};
-use crate::model::settings::{EstimatorKind, PathSampling, Settings, Warp};
 use crate::sampling::allocation;
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::{Blocks, PixelFilm, Raster};
@@ -38,47 +43,26 @@ use crate::world::World;
 use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
 
-/// Watches and steers a run. Every method has a default that does nothing.
-pub trait Control: Sync {
-    /// True to stop soon; what is finished is kept. Once true, it must stay true: work that ended early is thrown away on its word.
-    fn cancelled(&self) -> bool {
-        false
-    }
-    /// Called with the part of the current call to [`Session::run`] that is done, from 0 to 1.
-    fn progress(&self, _done: f64) {}
-    /// Called with each finished piece of the image, in order.
-    fn tile(&self, _tile: &FinishedTile<'_>) {}
-}
+pub use crate::run::session::gradient::{gradient, gradient_in_batches};
+pub use crate::run::session::shard::{Merged, ShardError, ShardSums};
 
-/// No control: run to the end in silence.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Unattended;
-impl Control for Unattended {}
-
-/// Some neighbouring pixels after another round of samples.
-#[derive(Clone, Copy, Debug)]
-pub struct FinishedTile<'a> {
-    /// First pixel and one past the last, row by row from the top left.
-    pub pixels: (u32, u32),
-    film: &'a PixelFilm,
-}
-
-impl FinishedTile<'_> {
-    /// The forward image there so far, pixel by pixel.
-    #[must_use]
-    pub fn image(&self) -> impl ExactSizeIterator<Item = Estimate> {
-        let (first, end) = self.pixels;
-        (first..end).map(|pixel| self.film.estimate(pixel as usize, 0))
-    }
-}
-
-/// A prepared scene and what has been accumulated for it.
+/// A prepared scene and what has been accumulated for it: its image and images of derivatives, by [`run`](Session::run), and from the
+/// same preparation gradients of losses by everything, by [`gradient`](Session::gradient).
 pub struct Session {
-    /// By all light, for paths.
+    /// Lit by all emitters.
     world: World,
+    /// The same, with what derivative images need of paths.
+    paths: World,
     /// Each differentiates the light of some emitters.
-    components: Vec<Component>,
+    images: Vec<Images>,
+    /// As they were asked for, and with what has been chosen.
+    asked: Settings,
     settings: Settings,
+    /// What the last gradient was prepared for, and the estimator that gradients take.
+    gradient: Option<(Vec<Target>, PreparedGradient)>,
+    of_gradients: &'static dyn Estimator,
+    /// What the next preparation can use again.
+    kept: PreparedCache,
     plan: Plan,
     /// Where paths of light start, if there are any.
     emission: Option<EmissionSampler>,
@@ -93,14 +77,6 @@ pub struct Session {
     pool: Arc<Pool>,
 }
 
-/// Between the seeds of the boundary samples of components, whose errors must not depend on each other.
-const SEED_STEP: u64 = 0x9e37_79b9_7f4a_7c15;
-
-/// The seed of a component's boundary samples.
-pub(crate) fn seed_of_component(seed: u64, i: usize) -> u64 {
-    seed.wrapping_add(SEED_STEP.wrapping_mul(i as u64))
-}
-
 impl Session {
     /// Prepares `scene` at the parameters' values; without parameters, only the image is computed.
     ///
@@ -112,7 +88,31 @@ impl Session {
         parameters: &[Parameter],
         settings: &Settings,
     ) -> Result<Self, Error> {
-        Self::with_cache(scene, parameters, settings, &mut PreparedCache::default())
+        let mut kept = PreparedCache::default();
+        let mut session = Self::with_cache(scene, parameters, settings, &mut kept)?;
+        session.kept = kept;
+        Ok(session)
+    }
+
+    /// Goes on with the same scene at other values: vertices that have moved, other voxels, texels or numbers, other values of
+    /// the parameters. What has been accumulated is forgotten. What has not changed is used again; the results are those of a
+    /// new session, to the bit.
+    ///
+    /// # Errors
+    /// As [`Session::new`]; the session then stays as it was.
+    pub fn update(&mut self, scene: &Scene, parameters: &[Parameter]) -> Result<(), Error> {
+        let mut kept = core::mem::take(&mut self.kept);
+        let updated = Self::with_cache(scene, parameters, &self.asked, &mut kept);
+        self.kept = kept;
+        let (kept, pool) = (core::mem::take(&mut self.kept), Arc::clone(&self.pool));
+        match updated {
+            Ok(updated) => *self = Self { kept, pool, ..updated },
+            Err(error) => {
+                self.kept = kept;
+                return Err(error);
+            }
+        }
+        Ok(())
     }
 
     /// As [`Session::new`], with what earlier sessions of nearly the same scene left to be used again. The
@@ -145,61 +145,84 @@ impl Session {
         settings.check(scene, derivatives)?;
         tangents.check()?;
         let tangents = tangents.seen_by(settings.sensor);
-        let (settings, estimator) = choice::estimator(scene, &tangents, settings, kept)?;
-        let settings = &settings;
+        let (chosen, why) = choice::estimator(scene, &tangents, settings, kept)?;
+        let estimator = estimators::named(chosen.estimator);
+        let mut session = Self::by(estimator, scene, &tangents, &chosen, kept)?;
+        session.asked = settings.clone();
+        session.plan.estimator = why;
+        // Which estimator is best for few parameters tells nothing of gradients by everything.
+        session.of_gradients = estimators::named(settings.estimator);
+        Ok(session)
+    }
+
+    /// Prepares a scene at the parameters' values for an estimator of derivatives.
+    pub(crate) fn by(
+        estimator: &'static dyn Estimator,
+        scene: &Scene,
+        tangents: &Tangents,
+        settings: &Settings,
+        kept: &mut PreparedCache,
+    ) -> Result<Self, Error> {
+        let asked = settings.clone();
         if let Some(name) = tangents.names.first() {
             let moves = tangents.move_light() || !tangents.sensor.is_empty();
             let moving = tangents.targets().filter(|target| tangents.moves(*target));
-            let slide = slides(scene, moving, settings);
-            scene.refuse_derivatives(name, moves, slide)?;
+            scene.refuse_derivatives(name, moves, slides(estimator, scene, moving))?;
             if tangents.move_light() {
                 scene.refuse_rims(name)?;
             }
         }
         let depth = settings.max_depth.within(scene.integrator.max_depth);
-        let mut world =
+        let world =
             World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, kept)?;
+        let derivatives = !tangents.names.is_empty();
         let (settings, sampling) = choice::sampling(&world, scene, settings, derivatives, kept)?;
-        let settings = &settings;
-        let mut components = Vec::new();
-        for (settings, lit) in estimators(scene, tangents.targets(), settings) {
-            let world = world.lit_by(lit)?;
-            components.push(Component::new(world, tangents.clone(), &settings, kept)?);
+        let mut images = Vec::new();
+        for share in shares(estimator, scene, tangents.targets(), &settings) {
+            let world = world.lit_by(share.lit)?;
+            images.push(Images::new(world, tangents.clone(), &share, kept)?);
         }
-        let needs = components.iter().filter_map(|c| Some(c.motion.as_ref()?.needs()));
+        let mut paths = world.clone();
+        let needs = images.iter().map(|images| images.component.unknowns.needs());
         if let Some(needs) = needs.reduce(|all, needs| all.union(&needs)) {
-            world.prepare_for_derivatives(needs);
+            paths.prepare_for_derivatives(needs);
         }
-        let mut plan = Plan::together(components.iter().map(|c| &c.plan));
+        let plans: Vec<Plan> = images.iter().map(|i| describe::describe(&i.component)).collect();
+        let mut plan = Plan::together(plans.iter());
         let bidirectional = settings.sampling == PathSampling::Bidirectional;
-        (plan.bidirectional, plan.sampling, plan.estimator) = (bidirectional, sampling, estimator);
+        (plan.bidirectional, plan.sampling) = (bidirectional, sampling);
         // Light's paths reach any pixel.
         plan.splatting = bidirectional || (settings.splatting && world.camera.shares_points());
-        let emission = bidirectional.then(|| EmissionSampler::new(&world));
+        let emission = bidirectional.then(|| EmissionSampler::new(&paths));
         let size = world.camera.film();
         let mut session = Self {
             film: PixelFilm::new(size, 1),
             blocks: Arc::new(Blocks::new(size)),
             pool: Arc::new(Pool::new(settings.threads)),
-            settings: settings.clone(),
             pilot: None,
             account: Account::default(),
             samples: 0,
             passes: 0,
             complete: true,
+            gradient: None,
+            of_gradients: estimator,
+            kept: PreparedCache::default(),
+            asked,
+            settings,
             world,
-            components,
+            paths,
+            images,
             plan,
             emission,
         };
-        session.film = session.new_film(settings.terms);
+        session.film = session.new_film(session.settings.terms);
         session.describe_guides();
         Ok(session)
     }
 
     /// An empty film, with terms apart or not.
     fn new_film(&self, terms: bool) -> PixelFilm {
-        let camera = &self.world.camera;
+        let camera = &self.paths.camera;
         let layers = self.layers(terms);
         if self.plan.splatting {
             PixelFilm::splatted(Raster::new(camera.filter().clone(), camera.film()), layers)
@@ -227,9 +250,9 @@ impl Session {
     /// was.
     pub fn restart(&mut self, seed: u64) {
         self.film.clear();
-        self.components.iter_mut().for_each(Component::clear);
+        self.images.iter_mut().for_each(Images::clear);
         (self.pilot, self.account) = (None, Account::default());
-        self.settings.seed = seed;
+        (self.settings.seed, self.asked.seed) = (seed, seed);
         (self.samples, self.passes, self.complete) = (0, 0, true);
         self.describe_guides();
     }
@@ -269,7 +292,7 @@ impl Session {
                 pass.control.progress(part + (1.0 - part) * before);
             };
             let (account, finished) =
-                self.components[c].run_source(i, seed, per_pixel, &self.world, pass, progress);
+                self.images[c].run_source(i, seed, per_pixel, &self.paths, pass, progress);
             self.account.add(account);
             going = finished;
         }
@@ -284,7 +307,7 @@ impl Session {
         for &(c, i) in sources {
             let samples = of_pixel * self.source_ratio(c, i) * f64::from(w) * f64::from(h);
             let seed = seed_of_component(self.settings.seed, c);
-            let (account, going) = self.components[c].learn(i, seed, samples, &self.world, pass);
+            let (account, going) = self.images[c].learn(i, seed, samples, &self.paths, pass);
             self.account.add(account);
             if !going {
                 return false;
@@ -295,7 +318,8 @@ impl Session {
     }
 
     fn describe_guides(&mut self) {
-        self.plan.guiding = self.components.iter().flat_map(Component::guiding).collect();
+        let guides = self.images.iter().flat_map(|images| images.component.describe_guides());
+        self.plan.guiding = guides.collect();
     }
 
     /// Samples every pixel `units` times more, or so on average; returns how often each was.
@@ -344,8 +368,8 @@ impl Session {
             allocation: self.pilot.as_ref().map(|p| &p.pixels),
             shard: pass.shard,
             sampler: || {
-                let components = self.components.iter().filter_map(|c| c.of_paths(queries));
-                PixelSampler::new(&self.world, components, seed, self.plan.antithetic, terms)
+                let components = self.images.iter().filter_map(|images| images.of_paths(queries));
+                PixelSampler::new(&self.paths, components, seed, self.plan.antithetic, terms)
                     .with_image(self.image_sampling())
                     .with_light_paths(self.emission.as_ref())
             },
@@ -368,17 +392,17 @@ impl Session {
 
     /// All sources of boundary samples: component, and index among its own.
     fn sources(&self) -> Vec<(usize, usize)> {
-        let of = |(c, component): (usize, &Component)| {
-            (0..component.prepared.sources.len()).map(move |i| (c, i))
+        let of = |(c, images): (usize, &Images)| {
+            (0..images.component.sources().len()).map(move |i| (c, i))
         };
-        self.components.iter().enumerate().flat_map(of).collect()
+        self.images.iter().enumerate().flat_map(of).collect()
     }
 
     /// Samples of a source to each of a pixel.
     fn source_ratio(&self, c: usize, i: usize) -> f64 {
         let budget = self.pilot.as_ref().and_then(|pilot| pilot.budget.as_ref());
         budget.map_or_else(
-            || self.components[c].prepared.source_ratio(i),
+            || self.images[c].component.prepared.source_ratio(i),
             |budget| budget.sources[self.sources().iter().position(|s| *s == (c, i)).unwrap_or(0)],
         )
     }
@@ -386,16 +410,17 @@ impl Session {
     /// Samples of a batch of a source, in a pass of so many of each pixel.
     fn per_batch(&self, spp: u32, c: usize, i: usize) -> u32 {
         let per_pixel = f64::from(spp) * self.source_ratio(c, i);
-        self.components[c].per_batch(i, per_pixel)
+        self.images[c].component.per_batch(i, per_pixel)
     }
 
     fn parameters(&self) -> usize {
-        self.components[0].motion.as_ref().map_or(0, |m| m.parameters())
+        self.images[0].component.unknowns.parameters()
     }
 
     /// Terms found along paths, in the order of their layers.
     fn terms(&self) -> impl Iterator<Item = Term> {
-        self.components.iter().flat_map(|c| c.prepared.along_rays().terms().collect::<Vec<_>>())
+        let terms = self.images.iter().map(|images| &images.component.prepared.terms);
+        terms.flat_map(|terms| terms.along_paths(terms.queries))
     }
 
     /// Layers of a pixel's samples: the image, a derivative per parameter, and if terms are kept apart one per
@@ -412,7 +437,7 @@ impl Session {
             image: self.film.layer(0, &self.blocks),
             derivatives: self.legend().derivatives(
                 &self.film,
-                self.components.iter().flat_map(Component::splats),
+                self.images.iter().flat_map(Images::splats),
                 &self.blocks,
             ),
             plan: self.plan.clone(),
@@ -425,75 +450,18 @@ impl Session {
     }
 
     fn legend(&self) -> Legend {
-        let components = self.components.iter();
+        let images = self.images.iter();
         Legend {
             size: self.film.size(),
             splatted: self.plan.splatting,
             parameters: self.names(),
             along: self.terms().filter(|_| self.settings.terms).collect(),
-            sources: components.flat_map(Component::terms).collect(),
+            sources: images.flat_map(Images::terms).collect(),
             apart: self.settings.terms,
         }
     }
 
     fn names(&self) -> Vec<String> {
-        self.components[0].motion.as_ref().map_or_else(Vec::new, |m| m.tangents.names.clone())
+        self.images[0].component.unknowns.tangents.names.clone()
     }
-}
-
-/// Whether what a target changes may move.
-pub(crate) fn may_move(scene: &Scene, target: Target) -> bool {
-    match target {
-        Target::Shape(_) | Target::Sensor(_) => true,
-        Target::Bsdf(_) => false,
-        Target::Medium(m) => scene.media.get(m).is_some_and(|m| m.item.homogeneous().is_none()),
-        Target::Emitter(e) => scene.emitters.get(e).is_some_and(|e| e.item.emitter.is_delta()),
-    }
-}
-
-/// Whether vertices of paths slide over surfaces as the targets change.
-pub(crate) fn slides(
-    scene: &Scene,
-    targets: impl IntoIterator<Item = Target>,
-    settings: &Settings,
-) -> bool {
-    let material = settings.estimator == EstimatorKind::PathSpace;
-    !material && targets.into_iter().any(|target| may_move(scene, target))
-}
-
-/// Which estimator differentiates which light: points and directions do not fit the 2019 form (theory sheet
-/// §3), which leaves them to path space where one of the targets may move. Rays that turn with edges turn with their shadows as
-/// well, but on surfaces alone.
-pub(crate) fn estimators(
-    scene: &Scene,
-    targets: impl IntoIterator<Item = Target>,
-    settings: &Settings,
-) -> Vec<(Settings, EmitterMask)> {
-    let may_move = |target| may_move(scene, target);
-    let emitters = || scene.emitters.iter().map(|e| &e.item.emitter);
-    let mut shares = Vec::new();
-    let volumes = !scene.media.is_empty() || scene.bsdfs.iter().any(|b| b.item.is_null());
-    let fits = match settings.estimator {
-        EstimatorKind::Radiative => false,
-        // What lies behind a connection turns alike for all light that it brings.
-        EstimatorKind::Warped => {
-            let from_camera = settings.sampling == PathSampling::Unidirectional;
-            !volumes && matches!(settings.warp, Warp::Edges) && from_camera
-        }
-        _ => true,
-    };
-    if !fits && emitters().any(|e| e.is_delta()) && targets.into_iter().any(may_move) {
-        shares.push((EstimatorKind::PathSpace, EmitterMask::Delta));
-        let media = scene.media.iter().any(|m| m.item.is_emissive());
-        if media || emitters().any(|e| !e.is_delta()) {
-            shares.push((settings.estimator, EmitterMask::Extended));
-        }
-    } else {
-        shares.push((settings.estimator, EmitterMask::All));
-    }
-    // They share what is said of boundary samples; what is not, each finds out.
-    let said = settings.boundary_ratio.or((!settings.adaptive).then_some(1.0));
-    let boundary_ratio = said.map(|all| all / shares.len() as f64);
-    let own = |(estimator, lit)| (Settings { estimator, boundary_ratio, ..settings.clone() }, lit);
-    shares.into_iter().map(own).collect()
 }

@@ -1,7 +1,7 @@
 //! One call to a session.
 
 use crate::model::shard::Shard;
-use crate::run::session::Control;
+use crate::run::control::Control;
 use crate::sampling::film::Blocks;
 use crate::sampling::parallel::Pool;
 

@@ -12,10 +12,11 @@ use crate::model::error::{Error as RunError, SettingError};
 use crate::model::plan::Plan;
 use crate::model::rendering::{Account, Rendering};
 use crate::model::shard::Shard;
-use crate::run::session::component::Component;
+use crate::run::control::Control;
+use crate::run::session::Session;
+use crate::run::session::images::Images;
 use crate::run::session::legend::Legend;
 use crate::run::session::pass::Pass;
-use crate::run::session::{Control, Session};
 use crate::sampling::film::{BATCHES, Blocks, PixelFilm, SplatFilm, Splats, Stratum};
 use crate::sampling::{allocation, pixels};
 
@@ -132,7 +133,7 @@ impl Session {
             adaptive: self.pilot.is_some(),
             per_batch,
         };
-        let films = self.components.iter_mut().flat_map(Component::splats_mut);
+        let films = self.images.iter_mut().flat_map(Images::splats_mut);
         Ok(Some(ShardSums {
             shard,
             run,

@@ -86,8 +86,6 @@ pub(crate) trait BoundarySink {
     fn moves(&mut self, functional: &VelocityFunctional) -> bool;
     /// The last functional times `value` goes to `pixel`.
     fn receive(&mut self, pixel: u32, value: Rgb);
-    /// What sensitivities are wanted for.
-    fn sink(&self) -> &Self::Sink;
     /// What is sent goes to each of some pixels, times its weight. False when it is not finite.
     fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut Self::Sink)) -> bool;
 }

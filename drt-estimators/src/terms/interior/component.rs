@@ -1,5 +1,7 @@
 //! One estimator's part in the derivative of a path: the light of some emitters, by a velocity field.
 
+use alloc::sync::Arc;
+
 use drt_geom::edges::tree::TreeScratch;
 use drt_math::{Rgb, RgbVec, Rng};
 
@@ -11,23 +13,27 @@ use crate::sampling::record::PathRecord;
 use crate::sampling::streams::LINE_STREAM;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary_segments::shadow;
+use crate::terms::edge_queries::{EdgeContribution, EdgeQuery, QueryRate, SeenEdges};
 use crate::terms::flux::FluxRay;
+use crate::terms::interior::PathSink;
 use crate::terms::interior::recorder::PathView;
-use crate::terms::interior::{AlongRays, EdgeQueries, PathSink};
-use crate::terms::radiative::{EdgeContribution, EdgeQuery, Radiative};
+use crate::terms::selected::Terms;
 use crate::world::{RayPath, World};
 
 /// What one estimator differentiates of the paths through pixels.
 pub(crate) struct Component<'a, S> {
     /// The scene, lit by what this estimator differentiates.
     pub(crate) world: &'a World,
-    pub(crate) along: AlongRays<'a>,
+    pub(crate) terms: &'a Terms,
+    /// How often paths query edges, which may be other than the terms have it.
+    pub(crate) queries: QueryRate,
     pub(crate) sink: S,
 }
 
 /// A component at work.
 pub(super) struct Worker<'a, S> {
-    pub(super) along: AlongRays<'a>,
+    pub(super) terms: &'a Terms,
+    pub(super) queries: QueryRate,
     pub(super) sink: S,
     pub(super) differentiator: Differentiator<'a>,
     shadow_buffers: shadow::Buffers,
@@ -56,12 +62,13 @@ pub(super) struct Traced<'t> {
 impl<'a, S: PathSink> Worker<'a, S> {
     /// With what it keeps of each path.
     pub(super) fn new(component: Component<'a, S>, separate: bool) -> (Self, PathView<'a>) {
-        let Component { world, along, sink } = component;
-        let velocities = PathVelocities::new(along.field(sink.active()));
-        let pairs = AntitheticPairs::new(along.lobe_pairs);
-        let view = PathView::new(world, velocities, pairs, along.flux);
+        let Component { world, terms, queries, sink } = component;
+        let velocities = PathVelocities::new(Arc::clone(&terms.velocity));
+        let pairs = AntitheticPairs::new(terms.lobe_pairs);
+        let view = PathView::new(world, velocities, pairs, terms.flux.as_ref());
         let worker = Self {
-            along,
+            terms,
+            queries,
             sink,
             differentiator: Differentiator::new(world),
             shadow_buffers: shadow::Buffers::default(),
@@ -76,12 +83,11 @@ impl<'a, S: PathSink> Worker<'a, S> {
 
     /// Whether derivatives of the filter are needed.
     pub(super) fn differentiates_filter(&self) -> bool {
-        // At fixed image points without turns they are not.
-        self.along.radiative.is_none() && self.sink.active().moves_geometry()
+        self.terms.velocity.moves_image_points() && self.sink.active().moves_geometry()
     }
 
     /// Adds what a path tells: of the interior to the first layers of a derivative, and of each term found along
-    /// its rays to layers of its own from `at` on, in the order of [`AlongRays::terms`], or to the same.
+    /// its rays to layers of its own from `at` on, in the order of [`Terms::along_paths`], or to the same.
     pub(super) fn add(
         &mut self,
         tracer: &mut Tracer<'a>,
@@ -98,7 +104,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
             at += n;
             layer..layer + n
         };
-        if self.along.warped.is_some() && self.separate {
+        if self.terms.velocity.follows_edges() && self.separate {
             let mut parts = [alloc::vec![Rgb::ZERO; n], alloc::vec![Rgb::ZERO; n]];
             for (at_rest, part) in [true, false].into_iter().zip(&mut parts) {
                 self.differentiator.edges_at_rest = at_rest;
@@ -115,13 +121,14 @@ impl<'a, S: PathSink> Worker<'a, S> {
         if view.flux.is_some() {
             self.flux(tracer, path, view, &mut values[next(self.separate)]);
         }
-        if let (Some(radiative), Some(query)) = (self.along.radiative, path.query.clone()) {
+        let edges = self.terms.edges.as_ref().filter(|_| self.queries.any());
+        if let (Some(edges), Some(query)) = (edges, path.query.clone()) {
             let from = next(self.separate).start;
             let before = tracer.counters.rays;
-            self.edges(tracer, radiative, path, view, query, &mut values[from..]);
+            self.edges(tracer, edges, path, view, query, &mut values[from..]);
             self.query_rays += tracer.counters.rays - before;
         }
-        if let Some(shadows) = self.along.shadows {
+        if let Some(shadows) = &self.terms.boundary.shadows {
             let values = &mut values[next(self.separate)];
             let (dir, weight) = (path.record.nodes[0].wi, path.record.nodes[0].value);
             let Self { sink, shadow_buffers, .. } = self;
@@ -189,15 +196,15 @@ impl<'a, S: PathSink> Worker<'a, S> {
     fn edges(
         &mut self,
         tracer: &mut Tracer<'a>,
-        radiative: &Radiative,
+        edges: &SeenEdges,
         path: &Traced<'_>,
         view: &PathView<'_>,
         mut first: Rng,
         values: &mut [Rgb],
     ) {
         let recorded = &view.of(path.record);
-        match self.along.queries {
-            EdgeQueries::Average(queries) => {
+        match self.queries {
+            QueryRate::Average(queries) => {
                 let mut left = queries;
                 while left > 0.0 {
                     // A part of a query is one now and then.
@@ -206,18 +213,16 @@ impl<'a, S: PathSink> Worker<'a, S> {
                     let numbers = if left == queries { &mut first } else { rng };
                     left -= 1.0;
                     let query = taken.then(|| EdgeQuery::new(numbers));
-                    let edge = query.and_then(|query| {
-                        radiative.edge(tracer, recorded, &query, &mut self.options)
-                    });
+                    let edge = query
+                        .and_then(|query| edges.edge(tracer, recorded, &query, &mut self.options));
                     self.send(path.record, view, edge, 1.0 / queries, values);
                 }
             }
-            EdgeQueries::EveryVertex => {
+            QueryRate::EveryVertex => {
                 for node in 1..path.record.nodes.len() {
                     let rng = &mut tracer.rng;
                     let query = EdgeQuery::new(if node == 1 { &mut first } else { rng });
-                    let edge =
-                        radiative.edge_from(tracer, recorded, node, &query, &mut self.options);
+                    let edge = edges.edge_from(tracer, recorded, node, &query, &mut self.options);
                     self.send(path.record, view, edge, 1.0, values);
                 }
             }

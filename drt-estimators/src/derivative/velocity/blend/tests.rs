@@ -33,7 +33,7 @@ fn prepare(facets: bool) -> (Prepared, Motion) {
 fn gradients_are_those_of_weights() {
     let (prepared, _) = prepare(false);
     let world = &prepared.world;
-    let own = &prepared.radiative.as_ref().expect("the spatial form").spatial.blends;
+    let own = &prepared.terms.edges.as_ref().expect("the spatial form").spatial.blends;
     let mut rng = Rng::new(1, 2, 3);
     let mut counts = [0; 2];
     for _ in 0..20_000 {

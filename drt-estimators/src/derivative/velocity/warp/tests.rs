@@ -154,7 +154,7 @@ fn what_is_followed_stands_for_all() {
     let [all, few] = [1.0, 20.0].map(|followed| {
         let prepare = |_: f64| {
             let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
-            if let Some(flux) = &mut prepared.flux {
+            if let Some(flux) = &mut prepared.terms.flux {
                 flux.followed = followed;
             }
             // Then all of it is flux.

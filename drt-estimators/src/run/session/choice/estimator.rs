@@ -17,11 +17,13 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use crate::derivative::tangents::Tangents;
+use crate::estimators::named;
 use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings, Warp};
+use crate::run::control::Unattended;
+use crate::run::session::Session;
 use crate::run::session::choice::{WORTH_IT, cost, pilot, small, variance};
-use crate::run::session::{Session, Unattended};
 use crate::world::cache::PreparedCache;
 
 /// More derivatives than these are not sampled by a pilot: each would keep films for all of them.
@@ -58,17 +60,6 @@ impl Candidate {
     }
 }
 
-/// The name of an estimator in plans.
-fn name(kind: EstimatorKind) -> &'static str {
-    match kind {
-        EstimatorKind::Auto => "auto",
-        EstimatorKind::PathSpace => "path-space",
-        EstimatorKind::Radiative => "radiative",
-        EstimatorKind::Warped => "warped",
-        EstimatorKind::FiniteDifference => "finite-difference",
-    }
-}
-
 /// The settings with an estimator in place of `Auto`, and why it was chosen.
 pub(crate) fn estimator(
     scene: &Scene,
@@ -80,7 +71,7 @@ pub(crate) fn estimator(
         return Ok((settings.clone(), None));
     }
     let with = |estimator| Settings { estimator, ..settings.clone() };
-    let chosen = |kind, why: &str| Ok((with(kind), Some(format!("{}: {why}", name(kind)))));
+    let chosen = |kind, why: &str| Ok((with(kind), Some(format!("{}: {why}", named(kind).name()))));
     let usual = EstimatorKind::PathSpace;
     if tangents.names.is_empty() {
         return Ok((with(usual), None));
@@ -129,7 +120,7 @@ pub(crate) fn estimator(
     };
     let compared = candidates.iter().zip(&works).map(|(c, work)| {
         let ratio = if least > 0.0 { work / least } else { 1.0 };
-        format!("{} {ratio:.2}", name(c.kind))
+        format!("{} {ratio:.2}", named(c.kind).name())
     });
     let compared: Vec<String> = compared.collect();
     let why = format!("in a pilot the work was, over the least of all, {}", compared.join(", "));

@@ -10,8 +10,9 @@ use crate::derivative::tangents;
 use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::{PathSampling, Settings};
+use crate::run::control::Unattended;
+use crate::run::session::Session;
 use crate::run::session::choice::{WORTH_IT, cost, pilot, small, variance};
-use crate::run::session::{Session, Unattended};
 use crate::world::World;
 use crate::world::cache::PreparedCache;
 

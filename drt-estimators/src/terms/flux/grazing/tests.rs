@@ -14,9 +14,10 @@ use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
 use crate::model::settings::EstimatorKind;
 use crate::model::settings::Settings;
+use crate::run::control::Unattended;
 use crate::run::session::Session;
-use crate::run::session::Unattended;
-use crate::terms::splatting::{BoundarySource, Checked};
+use crate::terms::source::BoundarySource;
+use crate::terms::splatting::Checked;
 
 /// A cube of milk, lit by a lamp and the sky, whose top is a little lower than the camera.
 fn milk() -> (Scene, Parameter) {

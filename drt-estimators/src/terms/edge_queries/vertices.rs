@@ -8,10 +8,10 @@ use drt_math::{Rgb, Vec3};
 use crate::derivative::velocity::{EdgeMatter, RecordedPath};
 use crate::sampling::trace::Endpoint;
 use crate::sampling::trace::Tracer;
-use crate::terms::radiative::choice::Choice;
-use crate::terms::radiative::difference::{EdgeView, SideRadiance};
-use crate::terms::radiative::edge_sampler::{EdgeSampler, viewpoint};
-use crate::terms::radiative::{AT_REST, BY_THROUGHPUT, CARRIED, EdgeQuery, Radiative};
+use crate::terms::edge_queries::choice::Choice;
+use crate::terms::edge_queries::difference::{EdgeView, SideRadiance};
+use crate::terms::edge_queries::edge_sampler::{EdgeSampler, viewpoint};
+use crate::terms::edge_queries::{AT_REST, BY_THROUGHPUT, CARRIED, EdgeQuery, SeenEdges};
 use crate::world::World;
 use crate::world::vertex::{Matter, Vertex};
 
@@ -68,7 +68,7 @@ impl EdgeSample<'_> {
     }
 }
 
-impl Radiative {
+impl SeenEdges {
     /// Takes one sample: one of the path's vertices, an edge that it sees.
     pub(crate) fn edge(
         &self,

@@ -7,9 +7,9 @@ use drt_math::{Vec3, fm};
 use crate::derivative::velocity::{
     RayTurn, ShadowPart, ShadowPlace, ShadowTurn, TurnParts, TurningRay, Weight,
 };
-use crate::terms::warped::beside::Beside;
-use crate::terms::warped::edges::{TurningEdges, divide};
-use crate::terms::warped::near::{ANGLE, Near};
+use crate::estimators::warped::beside::Beside;
+use crate::estimators::warped::edges::{TurningEdges, divide};
+use crate::estimators::warped::near::{ANGLE, Near};
 use crate::world::lights::{LightKind, LightSample};
 use crate::world::vertex::SurfacePoint;
 

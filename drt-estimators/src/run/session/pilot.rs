@@ -1,16 +1,14 @@
 //! The few samples by which a session decides where the others go, and which are then forgotten.
 
-mod terms;
-
 use alloc::vec::Vec;
 
-use crate::run::session::{Component, Pass, Session, seed_of_component};
+use crate::run::component::seed_of_component;
+use crate::run::session::Session;
+use crate::run::session::images::Images;
+use crate::run::session::pass::Pass;
 use crate::sampling::allocation::Allocation;
 use crate::sampling::budget::{SampleBudget, TermStatistics};
 use crate::sampling::film::{PixelFilm, SplatFilm};
-use crate::terms::interior::EdgeQueries;
-
-pub(super) use crate::run::session::pilot::terms::primary_share;
 
 /// What a pilot found out.
 pub(super) struct Pilot {
@@ -67,11 +65,8 @@ impl Session {
     /// Of so many `layers`, with terms apart, the first one of edge queries; and how many each path takes. Queries
     /// from every vertex belong to their path, and have none.
     fn queries(&self, layers: usize) -> (usize, f64) {
-        let average = |c: &Component| match c.prepared.along_rays().queries {
-            EdgeQueries::Average(queries) if queries > 0.0 => Some(queries),
-            _ => None,
-        };
-        match self.components.iter().find_map(average) {
+        let average = |images: &Images| images.component.prepared.terms.queries.average();
+        match self.images.iter().find_map(average) {
             // They are the last ones: those of two terms.
             Some(queries) => (layers - 2 * self.parameters(), queries),
             None => (layers, 1.0),
@@ -89,13 +84,12 @@ impl Session {
         let (size, n) = (self.film.size(), self.parameters());
         let mut film = SplatFilm::new(size, n);
         // Where no sample counts much more than others, few tell enough.
-        let even = self.components[c].prepared.sources[i].is_even();
+        let even = self.images[c].component.sources()[i].is_even();
         let part = if even { 0.25 } else { 1.0 };
         let per_pixel = part * f64::from(units * self.per_unit()) * self.source_ratio(c, i);
         let seed = !seed_of_component(self.settings.seed, c);
-        let component = &self.components[c];
         let (account, going) =
-            component.sample_source(&mut film, i, seed, per_pixel, &self.world, pass, |_| {});
+            self.images[c].sample_source(&mut film, i, seed, per_pixel, &self.world, pass, |_| {});
         let samples = film.samples();
         let per_pixel = samples / (f64::from(size[0]) * f64::from(size[1]));
         let variance = (0..n).map(|p| per_pixel * film.variance(p)).collect();

@@ -8,7 +8,7 @@ use crate::derivative::velocity::blend::Blends;
 use crate::discontinuities::discontinuity_edge::DiscontinuityEdge;
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
-use crate::terms::radiative::Radiative;
+use crate::terms::edge_queries::SeenEdges;
 use crate::world::vertex::{Kind, Matter, Vertex};
 
 /// An edge point and a viewer of it.
@@ -44,7 +44,7 @@ impl<'a> EdgeView<'a> {
     /// Of the point `along` an edge, from a viewer; `None` where the edge is seen end on.
     pub(super) fn new(
         tracer: &Tracer<'_>,
-        radiative: &'a Radiative,
+        radiative: &'a SeenEdges,
         discontinuity: &'a DiscontinuityEdge,
         along: f64,
         viewer: &'a Vertex,
@@ -53,7 +53,7 @@ impl<'a> EdgeView<'a> {
         let to = viewer.x - x;
         let distance = to.length();
         let w = to / distance;
-        let Radiative { discontinuities, spatial, .. } = radiative;
+        let SeenEdges { discontinuities, spatial, .. } = radiative;
         let sides = discontinuities.sides(discontinuity, w)?;
         let own_faces = sides.own_faces()?;
         let medium = discontinuity.medium(tracer.world, &sides, x, w, w);

@@ -1,46 +1,56 @@
-//! One estimator's part of a run: what it differentiates of which light.
+//! Images of derivatives: an estimator's part in them, and its boundary terms so far.
 
-use alloc::string::String;
 use alloc::vec::Vec;
 
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::medium_motion::MediumMotions;
-use crate::derivative::sensitivity::ActiveInputs;
-use crate::derivative::sensitivity::TextureUse;
+use crate::derivative::sensitivity::{ActiveInputs, TextureUse};
 use crate::derivative::tangents::Tangents;
+use crate::estimators::shares::Share;
 use crate::model::error::Error;
-use crate::model::plan::Plan;
 use crate::model::rendering::{Account, Term};
-use crate::model::settings::{EstimatorKind, Settings};
-use crate::run::session::describe::{describe, describe_guide};
+use crate::run::component::{Component, Unknowns};
 use crate::run::session::pass::Pass;
-use crate::run::session::pilot::primary_share;
+use crate::run::session::primary_share::primary_share;
 use crate::sampling::film::{BATCHES, SplatFilm};
-use crate::terms::guiding::{Guiding, OfImages};
+use crate::terms::guiding::OfImages;
 use crate::terms::interior;
-use crate::terms::prepared::Prepared;
 use crate::terms::splatting::{Checked, ToImages};
-use crate::world::World;
 use crate::world::cache::PreparedCache;
+use crate::world::{ActiveFactors, World};
 
-/// A scene prepared for one estimator, and its boundary terms so far.
-pub(super) struct Component {
-    pub(super) prepared: Prepared,
-    pub(super) motion: Option<Motion>,
-    pub(super) plan: Plan,
-    /// One film per source of boundary samples, with a layer per parameter.
-    splats: Vec<SplatFilm>,
-    /// What is known of each of these, where samples are guided.
-    guiding: Vec<Guiding>,
-    guided: bool,
+/// Parameters have an image each.
+impl Unknowns for Motion {
+    fn active(&self) -> &ActiveInputs {
+        &self.active
+    }
+
+    fn needs(&self) -> ActiveFactors {
+        self.factors()
+    }
+
+    fn flux_shapes(&self) -> &[usize] {
+        &self.insides.flux_shapes
+    }
+
+    fn motion(&self) -> Option<&Motion> {
+        Some(self)
+    }
 }
 
-impl Component {
+/// An estimator's part in images of derivatives.
+pub(super) struct Images {
+    pub(super) component: Component<Motion>,
+    /// One film per source of boundary samples, with a layer per parameter.
+    splats: Vec<SplatFilm>,
+}
+
+impl Images {
     /// Prepares a world at the parameters' values for the light that it is lit by.
     pub(super) fn new(
-        mut world: World,
+        world: World,
         mut tangents: Tangents,
-        settings: &Settings,
+        share: &Share,
         kept: &mut PreparedCache,
     ) -> Result<Self, Error> {
         for (e, emitter) in world.scene.emitters.iter().enumerate() {
@@ -49,42 +59,30 @@ impl Component {
                 tangents.texels.retain(|t| t.of != TextureUse::Emitter(e));
             }
         }
-        let mut motion = None;
-        if !tangents.names.is_empty() {
-            let insides = match settings.estimator {
-                EstimatorKind::Warped => MediumMotions::at_rest(world.scene.media.len()),
-                EstimatorKind::Radiative => {
-                    MediumMotions::affine(&world, &tangents, &settings.insides)
-                }
-                _ => MediumMotions::plan(&world, &tangents, &settings.insides, kept)?,
-            };
-            motion = Some(Motion::new(tangents, insides));
-        }
-        if let Some(motion) = &motion {
-            world.prepare_for_derivatives(motion.needs());
-        }
-        let nothing = ActiveInputs::default();
-        let active = motion.as_ref().map_or(&nothing, |m| &m.active);
-        let flux_shapes = motion.as_ref().map_or(&[][..], |m| &m.insides.flux_shapes);
-        let guide = motion.as_ref().filter(|_| settings.guiding);
-        let mut prepared = Prepared::new(world, active, flux_shapes, settings, guide)?;
+        let Share { estimator, settings, .. } = share;
+        let insides = match tangents.names.is_empty() {
+            true => MediumMotions::at_rest(world.scene.media.len()),
+            false => {
+                let insides = estimator.insides();
+                MediumMotions::new(insides, &world, &tangents, &settings.insides, kept)?
+            }
+        };
+        let mut component = Component::new(world, Motion::new(tangents, insides), share)?;
+        let Component { prepared, unknowns: motion, .. } = &mut component;
         // Else the pilot of a run measures more.
         let measures = !settings.adaptive || settings.boundary_ratio.is_some();
-        if let Some(motion) = guide.filter(|_| measures) {
-            prepared.primary_share = primary_share(&prepared, motion, prepared.boundary_ratio);
+        if settings.guiding && measures {
+            prepared.primary_share = primary_share(prepared, motion, prepared.terms.boundary_ratio);
         }
-        let plan = describe(&prepared, motion.as_ref());
-        let parameters = motion.as_ref().map_or(0, Motion::parameters);
-        let size = prepared.world.camera.film();
-        let splats = prepared.sources.iter().map(|_| SplatFilm::new(size, parameters)).collect();
-        let guiding = prepared.sources.iter().map(|_| Guiding::default()).collect();
-        Ok(Self { prepared, motion, plan, splats, guiding, guided: settings.guiding })
+        let (size, parameters) = (prepared.world.camera.film(), motion.parameters());
+        let splats = component.sources().iter().map(|_| SplatFilm::new(size, parameters)).collect();
+        Ok(Self { component, splats })
     }
 
     /// Forgets what has been accumulated.
     pub(super) fn clear(&mut self) {
         self.splats.iter_mut().for_each(SplatFilm::clear);
-        self.guiding.fill_with(Guiding::default);
+        self.component.forget_guides();
     }
 
     /// Learns how to guide a source that takes so many samples in all, by a pilot; false when cancelled.
@@ -96,28 +94,8 @@ impl Component {
         all: &World,
         pass: &Pass<'_>,
     ) -> (Account, bool) {
-        let Some(motion) = self.motion.as_ref().filter(|_| self.guided) else {
-            return (Account::default(), true);
-        };
-        let (prepared, guiding) = (&self.prepared, &mut self.guiding[i]);
         let cancelled = || pass.control.cancelled();
-        guiding.learn(
-            &prepared.splatter(all, seed).until(&cancelled),
-            prepared.sources[i],
-            samples,
-            pass.pool,
-            || OfImages::new(&prepared.world, motion),
-            cancelled,
-        )
-    }
-
-    /// What is known of its sources that may be guided.
-    pub(super) fn guiding(&self) -> impl Iterator<Item = String> {
-        let guided = self.guided && self.motion.is_some();
-        let sources = self.prepared.sources.iter().zip(&self.guiding);
-        sources
-            .filter(move |(source, _)| guided && source.is_guided())
-            .map(|(source, guiding)| describe_guide(*source, guiding))
+        self.component.learn(i, seed, samples, all, pass.pool, OfImages::new, &cancelled)
     }
 
     /// Its part in the derivatives of paths, if there are any; with so many edge queries to each path, where
@@ -126,16 +104,13 @@ impl Component {
         &self,
         queries: Option<f64>,
     ) -> Option<interior::Component<'_, Contraction<'_>>> {
-        let world = &self.prepared.world;
-        let mut along = self.prepared.along_rays();
-        along.queries = along.queries.or_average(queries);
-        let sink = Contraction::new(world, self.motion.as_ref()?);
-        Some(interior::Component { world, along, sink })
-    }
-
-    /// Samples of a batch of a source that takes so many per pixel where none is guided.
-    pub(super) fn per_batch(&self, i: usize, per_pixel: f64) -> u32 {
-        self.prepared.samples_per_batch(per_pixel * self.guiding[i].share())
+        let Component { prepared, unknowns: motion, .. } = &self.component;
+        if motion.parameters() == 0 {
+            return None;
+        }
+        let mut component = prepared.component(Contraction::new(&prepared.world, motion));
+        component.queries = component.queries.or_average(queries);
+        Some(component)
     }
 
     /// Adds samples of one source of boundary samples, so many per pixel, in a world lit by all emitters; false when cancelled.
@@ -168,12 +143,12 @@ impl Component {
         progress: impl Fn(f64),
     ) -> (Account, bool) {
         let (mut account, mut finished) = (Account::default(), 0.0);
-        let Some(motion) = &self.motion else { return (account, true) };
-        let source = self.prepared.sources[i];
-        let per_batch = self.per_batch(i, per_pixel);
+        let Component { prepared, unknowns: motion, .. } = &self.component;
+        let source = self.component.sources()[i];
+        let per_batch = self.component.per_batch(i, per_pixel);
         let cancelled = || pass.control.cancelled();
-        let splatter = self.prepared.splatter(all, seed).until(&cancelled);
-        let guide = self.guiding[i].guide();
+        let splatter = prepared.splatter(all, seed).until(&cancelled);
+        let guide = self.component.guiding(i).guide();
         let mut sums = film.begin();
         let first = pass.before * BATCHES as u32;
         let own = pass.shard.map_or(0..BATCHES as u32, |shard| shard.of(BATCHES as u32));
@@ -182,7 +157,7 @@ impl Component {
             own.clone(),
             1,
             |b| {
-                let mut receiver = Checked::new(ToImages::new(&self.prepared.world, motion));
+                let mut receiver = Checked::new(ToImages::new(&prepared.world, motion));
                 let stream = source.stream() + u64::from(first + b);
                 let account = splatter.run(source, guide, stream, per_batch, &mut receiver);
                 (receiver.inner.splats.settled(), account)
@@ -210,7 +185,7 @@ impl Component {
 
     /// The terms that its sources of boundary samples belong to.
     pub(super) fn terms(&self) -> impl Iterator<Item = Term> {
-        self.prepared.sources.iter().map(|source| source.term())
+        self.component.sources().iter().map(|source| source.term())
     }
 
     /// The films of its sources.

@@ -10,11 +10,11 @@ use crate::derivative::velocity::{
     Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurnParts, TurningRay,
     VelocityField, VertexVelocity, Weight,
 };
+use crate::estimators::warped::edges::TurningEdges;
+use crate::estimators::warped::near::ANGLE;
+use crate::estimators::warped::shadows::Flow;
 use crate::sampling::record::CameraRay;
 use crate::sampling::trace::Endpoint;
-use crate::terms::warped::edges::TurningEdges;
-use crate::terms::warped::near::ANGLE;
-use crate::terms::warped::shadows::Flow;
 use crate::world::World;
 use crate::world::lights::LightSample;
 use crate::world::vertex::Vertex;
@@ -106,6 +106,10 @@ impl VelocityField for EdgeTurns {
 
     fn may_move(&self) -> bool {
         self.spatial.may_move()
+    }
+
+    fn follows_edges(&self) -> bool {
+        true
     }
 
     fn turn(

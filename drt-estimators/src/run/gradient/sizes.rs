@@ -58,10 +58,6 @@ impl<'a> BoundarySink for OfGradient<'a> {
         self.weight += self.adjoint[pixel as usize].dot(value);
     }
 
-    fn sink(&self) -> &SquaredNorm<'a> {
-        &self.norm
-    }
-
     fn spread(&mut self, _: &[(u32, f64)], _: impl FnOnce(&mut SquaredNorm<'a>)) -> bool {
         true
     }

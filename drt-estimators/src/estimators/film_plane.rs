@@ -8,39 +8,51 @@
 use drt_math::Vec3;
 
 use crate::derivative::sensitivity::ActiveInputs;
+use crate::estimators::Changes;
 use crate::model::error::{ElementError, Error};
 use crate::model::scene::Target;
 use crate::model::sensor::Sensor;
-use crate::model::settings::{EstimatorKind, Settings};
 use crate::world::{SurroundingMedium, Tracking, World};
 
-/// Refuses what has no derivative as something moves.
-pub(super) fn check(
-    world: &World,
-    active: &ActiveInputs,
-    settings: &Settings,
-) -> Result<(), Error> {
-    let camera = &world.camera;
-    if !camera.is_orthographic() || !active.moves_geometry() {
+/// What an estimator cannot do with a film that rays leave in parallel.
+pub(super) enum Film {
+    /// Let its rays turn.
+    Turning,
+    /// Let a medium around it move.
+    Swept,
+}
+
+/// Refuses what an estimator cannot do as something moves.
+pub(super) fn refuse(world: &World, changes: &Changes<'_>, film: Film) -> Result<(), Error> {
+    if !world.camera.is_orthographic() || !changes.active.moves_geometry() {
         return Ok(());
     }
-    let fail = |reason| {
-        let element = world.scene.name_of(Target::Sensor(settings.sensor));
-        Err(Error::Element { element, reason })
-    };
-    match settings.estimator {
-        EstimatorKind::Warped => return fail(ElementError::ParallelRays),
-        EstimatorKind::PathSpace if sweeps_medium(world, active) => {
-            return fail(ElementError::FilmInMedium);
+    match film {
+        Film::Turning => fail(world, changes, ElementError::ParallelRays),
+        Film::Swept if sweeps_medium(world, changes.active) => {
+            fail(world, changes, ElementError::FilmInMedium)
         }
-        _ => {}
+        Film::Swept => Ok(()),
+    }
+}
+
+/// Refuses surfaces that go through the film as something moves.
+pub(super) fn refuse_cuts(world: &World, changes: &Changes<'_>) -> Result<(), Error> {
+    let camera = &world.camera;
+    if !camera.is_orthographic() || !changes.active.moves_geometry() {
+        return Ok(());
     }
     let cut = (0..world.scene.shapes.len()).find(|s| {
         let mesh = &world.scene.shapes[*s].mesh;
         let mut triangles = (0..mesh.triangles.len() as u32).map(|t| mesh.triangle(t));
         !world.is_null(*s as u32) && triangles.any(|t| cuts(camera, t))
     });
-    cut.map_or(Ok(()), |s| fail(ElementError::FilmCut(world.shape_name(s))))
+    cut.map_or(Ok(()), |s| fail(world, changes, ElementError::FilmCut(world.shape_name(s))))
+}
+
+fn fail(world: &World, changes: &Changes<'_>, reason: ElementError) -> Result<(), Error> {
+    let element = world.scene.name_of(Target::Sensor(changes.settings.sensor));
+    Err(Error::Element { element, reason })
 }
 
 /// True when vertices of the material form move through the film.

@@ -23,9 +23,10 @@ use drt_math::{Real, Rgb};
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::sampling::budget::{BESIDES, TermStatistics};
 use crate::sampling::pixels::Sampler;
-use crate::terms::interior::{EdgeQueries, PixelSampler};
+use crate::terms::interior::PixelSampler;
 use crate::terms::prepared::Prepared;
-use crate::terms::splatting::{BoundarySource, Checked, ToImages};
+use crate::terms::source::BoundarySource;
+use crate::terms::splatting::{Checked, ToImages};
 
 /// Samples of pixels, and of each kind that lands anywhere.
 const SAMPLES: u32 = 256;
@@ -45,10 +46,12 @@ pub(in crate::run::session) fn primary_share(
     motion: &Motion,
     equal: f64,
 ) -> f64 {
-    let Some(camera) = prepared.sources.iter().position(|s| s.is_of_camera()) else { return 1.0 };
+    let Some(camera) = prepared.terms.sources.iter().position(|s| s.is_of_camera()) else {
+        return 1.0;
+    };
     let [paths, queries] = along_paths(prepared, motion);
     let measured = |source: &BoundarySource| of_source(prepared, motion, *source);
-    let mut others: Vec<TermStatistics> = prepared.sources.iter().map(measured).collect();
+    let mut others: Vec<TermStatistics> = prepared.terms.sources.iter().map(measured).collect();
     let camera = others.swap_remove(camera);
     others.push(queries);
     part(&camera, &paths, &others, equal)
@@ -78,13 +81,13 @@ fn part(
 
 /// Of paths, and of edge queries from them.
 fn along_paths(prepared: &Prepared, motion: &Motion) -> [TermStatistics; 2] {
-    let (world, along) = (&prepared.world, prepared.along_rays());
+    let Prepared { world, terms, .. } = prepared;
     let n = motion.parameters();
-    let layers = 1 + n * (1 + along.terms().count());
+    let layers = 1 + n * (1 + terms.along_paths(terms.queries).count());
     let [mut one, mut other] = [0, 1].map(|_| alloc::vec![Rgb::ZERO; layers]);
     let mut squares = alloc::vec![0.0; layers];
     let component = prepared.component(Contraction::new(world, motion));
-    let mut sampler = PixelSampler::new(world, [component], SEED, prepared.antithetic, true);
+    let mut sampler = PixelSampler::new(world, [component], SEED, terms.antithetic, true);
     let [w, h] = world.camera.film();
     for i in 0..SAMPLES / 2 {
         // Two in a pixel differ by their noise alone.
@@ -108,9 +111,9 @@ fn along_paths(prepared: &Prepared, motion: &Motion) -> [TermStatistics; 2] {
         TermStatistics { variance, rays: rays as f64 / (each * paths), even: false }
     };
     // Those of queries are the last ones, of two terms.
-    let (first, each) = match along.queries {
-        EdgeQueries::Average(queries) if queries > 0.0 => (layers - 2 * n, queries),
-        _ => (layers, 1.0),
+    let (first, each) = match terms.queries.average() {
+        Some(queries) => (layers - 2 * n, queries),
+        None => (layers, 1.0),
     };
     let rays = if first < layers { account.query_rays } else { 0 };
     [of(1..first, account.counters.rays - rays, 1.0), of(first..layers, rays, each)]

@@ -12,8 +12,8 @@ use crate::derivative::contraction::Motion;
 use crate::derivative::tests::choice::{LIGHT, MOMENT, Sum, derivative, prepare_lit};
 use crate::derivative::tests::scenes::*;
 use crate::derivative::velocity::{
-    Auxiliary, Blend, Found, Probe, RayTurn, TurnPart, TurnParts, TurningRay, VelocityField,
-    VertexVelocity, Weight,
+    Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurnParts, TurningRay,
+    VelocityField, VertexVelocity, Weight,
 };
 use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
@@ -132,9 +132,8 @@ fn compare_lit(lit: EmitterMask, scene: &Scene, motion: &Parameter, sum: Sum, fa
         let faulty = off(&|_| {
             let (mut prepared, motion) =
                 prepare_lit(EstimatorKind::Warped, lit, scene, motion, depth);
-            let warped = prepared.warped.as_mut().expect("the warped form");
-            let field = Arc::clone(&warped.field);
-            warped.field = Arc::new(Faulty { field, fault: *fault });
+            let field = Arc::clone(&prepared.terms.velocity);
+            prepared.terms.velocity = Arc::new(Faulty { field, fault: *fault });
             (prepared, motion)
         });
         assert!(faulty.0.abs() > 5.0, "{fault:?} {faulty:?}");
@@ -207,9 +206,9 @@ fn matter_near_a_viewer_does_not_turn_segments() {
     let scene = surfaces(phong(), diffuse(0.6, 0.5, 0.4));
     let motion = parameter("ball", 0.0, alloc::vec![moves("ball", shift())]);
     let lit = EmitterMask::Extended;
-    let (prepared, _) = prepare_lit(EstimatorKind::Warped, lit, &scene, &motion, 4);
-    let (world, warped) = (&prepared.world, prepared.warped.as_ref().expect("the warped form"));
-    let curvature = warped.spatial.as_ref().expect("the spatial form").blends.curvature(0);
+    let (prepared, of) = prepare_lit(EstimatorKind::Warped, lit, &scene, &motion, 4);
+    let (world, field) = (&prepared.world, &prepared.terms.velocity);
+    let curvature = Spatial::new(world, &of.active).blends.curvature(0);
     // On one of the ball's triangles, from its outside.
     let at = |bary: [f64; 2]| {
         let (point, x) = world.point(7, bary);
@@ -219,7 +218,7 @@ fn matter_near_a_viewer_does_not_turn_segments() {
     assert!(curvature > 0.0 && end.surface().is_some_and(|s| s.shape == 0), "{curvature}");
     let of = |viewer: &Vertex, end: &Vertex| {
         let ray = end.x - viewer.x;
-        warped.field.blend(world, viewer, end, ray.normalize(), ray.length())
+        field.blend(world, viewer, end, ray.normalize(), ray.length())
     };
     for distance in [1e-6, 1e-3, 0.1, 0.5, 3.0] {
         let x = end.x + vec3(0.3, 0.9, 0.2).normalize() * distance;

@@ -61,7 +61,7 @@
 //! curved surfaces falls to zero towards borders.
 //!
 //! An edge that lies along a border, as in symmetric scenes, would ask for two velocities of one ray. No ray of the camera
-//! turns with it, and where it moves it is [sampled](crate::terms::radiative) as an edge that the camera sees.
+//! turns with it, and where it moves it is [sampled](crate::terms::edge_queries) as an edge that the camera sees.
 //!
 //! # Points and directions
 //!
@@ -89,39 +89,54 @@ mod turning;
 
 use alloc::sync::Arc;
 
+use crate::derivative::medium_motion::Insides;
 use crate::derivative::sensitivity::ActiveInputs;
-use crate::derivative::velocity::{Spatial, VelocityField};
+use crate::derivative::velocity::Spatial;
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
+use crate::estimators::film_plane::{self, Film};
+use crate::estimators::warped::auxiliary::directions::AuxiliaryDirections;
+use crate::estimators::warped::auxiliary::points::AuxiliaryPoints;
+use crate::estimators::warped::edges::TurningEdges;
+use crate::estimators::warped::turning::EdgeTurns;
+use crate::estimators::{Changes, Estimator, mirrors};
 use crate::model::error::{Error, SettingError};
-use crate::model::settings::{Settings, Warp};
-use crate::terms::radiative::Radiative;
-use crate::terms::warped::auxiliary::directions::AuxiliaryDirections;
-use crate::terms::warped::auxiliary::points::AuxiliaryPoints;
-use crate::terms::warped::edges::TurningEdges;
-use crate::terms::warped::turning::EdgeTurns;
+use crate::model::scene::Scene;
+use crate::model::settings::{PathSampling, Settings, Warp};
+use crate::terms::edge_queries::SeenEdges;
+use crate::terms::flux::Flux;
+use crate::terms::selected::Terms;
+use crate::terms::source::BoundarySource;
 use crate::world::World;
 
-/// The velocity field of a scene whose edges are not sampled.
-#[derive(Debug)]
-pub(crate) struct Warped {
-    pub(crate) field: Arc<dyn VelocityField>,
-    /// Set in the spatial form.
-    pub(crate) spatial: Option<Arc<Spatial>>,
-    /// Edges that move vertices, and edges in all.
-    pub(crate) count: [u64; 2],
-    /// Edges along borders of pixels, at which no ray of the camera turns.
-    pub(crate) on_borders: Option<Radiative>,
-}
+/// Vertices move with the edges beside them, so that hardly any edge is sampled.
+pub(crate) struct Warped;
 
-impl Warped {
-    /// As asked for by the settings.
-    pub(crate) fn new(
-        world: &World,
-        active: &ActiveInputs,
-        settings: &Settings,
-    ) -> Result<Self, Error> {
+impl Estimator for Warped {
+    fn name(&self) -> &'static str {
+        "warped"
+    }
+
+    fn insides(&self) -> Insides {
+        Insides::AtRest
+    }
+
+    fn slides(&self) -> bool {
+        true
+    }
+
+    // What lies behind a connection turns alike for all light that it brings.
+    fn takes_delta_lights(&self, scene: &Scene, settings: &Settings) -> bool {
+        let volumes = !scene.media.is_empty() || scene.bsdfs.iter().any(|b| b.item.is_null());
+        let from_camera = settings.sampling == PathSampling::Unidirectional;
+        !volumes && matches!(settings.warp, Warp::Edges) && from_camera
+    }
+
+    fn terms(&self, world: &World, changes: &Changes<'_>) -> Result<Terms, Error> {
+        film_plane::refuse(world, changes, Film::Turning)?;
+        let Changes { active, settings, .. } = *changes;
         let lights = &active.moving_emitters;
         let any = active.sensor || active.shapes.contains(&true) || lights.contains(&true);
+        refuse(world, settings.warp, any)?;
         let found = if any {
             DiscontinuityEdges::collect(world, &active.shapes)
         } else {
@@ -130,42 +145,63 @@ impl Warped {
         let count = [found.list.len() as u64, found.all];
         let mut spatial = Spatial::new(world, active);
         spatial.blends.leave_media();
+        let spatial = Arc::new(spatial);
         let moves = |edge: &DiscontinuityEdge| edge.moves(&active.shapes);
         let curved = |shape| spatial.blends.curvature(shape) > 0.0;
         let edges = TurningEdges::new(world, &found, moves, curved);
-        let spatial = Arc::new(spatial);
-        let refused = |reason| Err(Error::Setting { setting: "warp", reason });
-        let surfaces_only = !(world.has_media() || world.any_null);
-        match settings.warp {
+        let mut terms = match settings.warp {
             Warp::Edges => {
                 let field = EdgeTurns::new(world, active, Arc::clone(&spatial), edges);
+                let mut terms = Terms::interior(Arc::new(field));
                 let on_border = |edge: &DiscontinuityEdge| {
-                    (active.sensor || edge.moves(&active.shapes))
+                    (active.sensor || moves(edge))
                         && world.camera.sees_on_border(edge.edge.wedge.ends)
                 };
-                let on_borders = Radiative::in_view(world, found, Arc::clone(&spatial), on_border)?;
-                Ok(Self { field: Arc::new(field), spatial: Some(spatial), count, on_borders })
-            }
-            Warp::Points(_) | Warp::Directions(_) if !surfaces_only => {
-                refused(SettingError::SurfacesOnly)
-            }
-            Warp::Points(_) | Warp::Directions(_) if any && world.camera.aperture().is_some() => {
-                refused(SettingError::Aperture)
-            }
-            Warp::Points(_) | Warp::Directions(_) if any && world.lights.has_image() => {
-                refused(SettingError::VaryingSky)
-            }
-            Warp::Directions(_) if world.camera.has_borders() => {
-                refused(SettingError::JumpingFilter)
+                terms.edges = SeenEdges::in_view(world, found, Arc::clone(&spatial), on_border)?;
+                terms.sources.extend(terms.edges.as_ref().map(|_| BoundarySource::PrimaryEdges));
+                terms.flux = flux(world, active, &spatial);
+                terms
             }
             Warp::Points(samples) => {
                 let field = AuxiliaryPoints::new(world, active, edges, samples);
-                Ok(Self { field: Arc::new(field), spatial: None, count, on_borders: None })
+                let mut terms = Terms::interior(Arc::new(field));
+                if active.moves_geometry() && world.camera.has_borders() {
+                    terms.sources.push(BoundarySource::Borders);
+                }
+                terms
             }
             Warp::Directions(samples) => {
                 let field = AuxiliaryDirections::new(world, Arc::clone(&spatial), edges, samples);
-                Ok(Self { field: Arc::new(field), spatial: Some(spatial), count, on_borders: None })
+                let mut terms = Terms::interior(Arc::new(field));
+                terms.flux = flux(world, active, &spatial);
+                terms
             }
-        }
+        };
+        terms.edge_count = count;
+        terms.share_samples(settings, terms.sources.len());
+        terms.antithetic = mirrors(world, changes);
+        terms.add_light_paths(world, changes);
+        Ok(terms)
     }
+}
+
+/// Refuses what the kinds of warp cannot do that do not know edges, where `any` edge may move.
+fn refuse(world: &World, warp: Warp, any: bool) -> Result<(), Error> {
+    let surfaces_only = !(world.has_media() || world.any_null);
+    let reason = match warp {
+        Warp::Edges => return Ok(()),
+        _ if !surfaces_only => SettingError::SurfacesOnly,
+        _ if any && world.camera.aperture().is_some() => SettingError::Aperture,
+        _ if any && world.lights.has_image() => SettingError::VaryingSky,
+        Warp::Directions(_) if world.camera.has_borders() => SettingError::JumpingFilter,
+        _ => return Ok(()),
+    };
+    Err(Error::Setting { setting: "warp", reason })
+}
+
+/// What sweeps over rays that turn.
+fn flux(world: &World, active: &ActiveInputs, spatial: &Arc<Spatial>) -> Option<Flux> {
+    let sweeps = active.moves_geometry() || active.grids.contains(&true);
+    let flux = sweeps.then(|| Flux::spatial(world, active, spatial)).flatten();
+    flux.map(Flux::along_rays)
 }

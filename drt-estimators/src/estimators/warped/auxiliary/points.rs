@@ -21,12 +21,12 @@ use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::{
     Auxiliary, Blend, Found, Moved, Movers, Probe, VelocityField, VertexVelocity,
 };
+use crate::estimators::warped::auxiliary::kernel::{Distance, SIGMA, WIDE, weight};
+use crate::estimators::warped::auxiliary::rims::Rims;
+use crate::estimators::warped::auxiliary::{Sample, plan, ratio};
+use crate::estimators::warped::edges::TurningEdges;
 use crate::model::settings::{AuxiliarySamples, WarpKernel};
 use crate::sampling::trace::Endpoint;
-use crate::terms::warped::auxiliary::kernel::{Distance, SIGMA, WIDE, weight};
-use crate::terms::warped::auxiliary::rims::Rims;
-use crate::terms::warped::auxiliary::{Sample, plan, ratio};
-use crate::terms::warped::edges::TurningEdges;
 use crate::world::World;
 use crate::world::rays::short_of;
 use crate::world::vertex::{Matter, SurfacePoint, Vertex};
@@ -55,7 +55,7 @@ struct Hidden {
 }
 
 impl AuxiliaryPoints {
-    pub(in crate::terms::warped) fn new(
+    pub(in crate::estimators::warped) fn new(
         world: &World,
         active: &ActiveInputs,
         edges: TurningEdges,
@@ -262,6 +262,10 @@ impl VelocityField for AuxiliaryPoints {
     }
 
     fn is_random(&self) -> bool {
+        true
+    }
+
+    fn follows_edges(&self) -> bool {
         true
     }
 

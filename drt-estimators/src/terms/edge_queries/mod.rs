@@ -1,40 +1,26 @@
-//! The 2019 estimator: the derivative of radiance itself, along the rays that carry it.
+//! Edges at which radiance jumps, as a vertex or the camera sees them.
 //!
-//! Radiance L(x, w) is differentiated for a ray whose origin and direction move (2019 paper, Eqs.
-//! 16–32, in the corrected form of theory sheet §3). Every integral over directions and distances is
-//! differentiated at fixed directions and distances, so the record of an ordinary path is enough for
-//! the part without jumps: [`Spatial`] sweeps it backwards. Wherever the
-//! integrand jumps, and the jump moves relative to the ray, Reynolds' theorem adds a term:
+//! Where radiance is differentiated along rays of fixed directions, directions in which it jumps move where something moves. For
+//! an edge point y seen from a vertex x along d = (y - x)/r,
+//! with the edge's tangent t and N = t × (-d) / |t × d|, Reynolds' theorem adds (2019 paper, Eq. 23)
 //!
-//! * in distance, at surfaces beside media: D_dot σ_s L^ins of D19.16 and D19.20, on both sides of
-//!   interfaces that do not scatter. That is the [flux](crate::terms::flux), against rays that move. In
-//!   homogeneous media most of it is taken in by vertices that surfaces [warped](crate::derivative::velocity::warp);
-//! * in direction, at edges (D19.23): for an edge point y seen from a vertex x along d = (y - x)/r,
-//!   with the edge's tangent t and N = t × (-d) / |t × d|,
+//! ```text
+//! ∫ f(x, d) τ(x, y) [L(-N) - L(+N)] N·(y_dot - x_dot) |t × d| / r²  dl(y),
+//! ```
 //!
-//!   ```text
-//!   ∫ f(x, d) τ(x, y) [L(-N) - L(+N)] N·(y_dot - x_dot) |t × d| / r²  dl(y),
-//!   ```
+//! L(±N) being the radiance that leaves y towards x just beside the edge on either side, or comes
+//! from behind the edge where that side is open (D19.52–53). Silhouettes, borders and creases are
+//! one case: going around the edge from x's direction, a side is a face if one is met within half a
+//! turn. At the camera f is the filter and importance, and d turns with the image point.
 //!
-//!   L(±N) being the radiance that leaves y towards x just beside the edge on either side, or comes
-//!   from behind the edge where that side is open (D19.52–53). Silhouettes, borders and creases are
-//!   one case: going around the edge from x's direction, a side is a face if one is met within half a
-//!   turn. At the camera f is the filter and importance, and d turns with the image point.
-//!
-//! Cost is linear in path length: of all vertices of a path one, mostly in proportion to its throughput
-//! times an estimate of what edges amount to from there, queries an edge, and of all surfaces met one
-//! is asked for its flux; each traces side paths that
-//! branch no more. (The paper does both at every vertex, at a cost that is quadratic;
-//! [`every_vertex`](crate::Settings::every_vertex) does so with edges.)
-//!
-//! Light from points and directions does not fit this form: its shadows make radiance jump along lines
-//! on surfaces, which would be edges of the vertex before. A [`Session`](crate::Session) leaves such lights to
-//! the path-space estimator and adds the two.
+//! One vertex of each path, chosen mostly in proportion to its throughput times an estimate of what edges amount to from there,
+//! queries an edge, so that cost is linear in path length.
 
 mod choice;
 mod difference;
 mod edge_sampler;
 mod primary;
+mod rate;
 mod vertices;
 
 use alloc::sync::Arc;
@@ -43,8 +29,9 @@ use alloc::vec::Vec;
 use drt_math::{CdfTable, Rng};
 
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
-use crate::terms::radiative::edge_sampler::EdgeSampler;
-pub(crate) use crate::terms::radiative::vertices::EdgeContribution;
+use crate::terms::edge_queries::edge_sampler::EdgeSampler;
+pub(crate) use crate::terms::edge_queries::rate::QueryRate;
+pub(crate) use crate::terms::edge_queries::vertices::EdgeContribution;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
@@ -54,7 +41,7 @@ use crate::world::World;
 
 /// The edges at which radiance jumps, by what sees them.
 #[derive(Debug)]
-pub(crate) struct Radiative {
+pub(crate) struct SeenEdges {
     /// How the vertices of paths move.
     pub(crate) spatial: Arc<Spatial>,
     discontinuities: DiscontinuityEdges,
@@ -147,7 +134,7 @@ impl PrimaryEdges {
     }
 }
 
-impl Radiative {
+impl SeenEdges {
     /// The edges at which something can change of what is of interest, which move with some relative
     /// `speed`.
     pub(crate) fn new(

@@ -9,9 +9,9 @@ use drt_math::Vec3;
 
 use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay, Weight};
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
-use crate::terms::warped::beside::Beside;
-use crate::terms::warped::edge::TurningEdge;
-use crate::terms::warped::near::Near;
+use crate::estimators::warped::beside::Beside;
+use crate::estimators::warped::edge::TurningEdge;
+use crate::estimators::warped::near::Near;
 use crate::world::World;
 use crate::world::vertex::Vertex;
 

@@ -4,8 +4,8 @@ use drt_geom::edges::Cone;
 use drt_math::{Real, Vec3, fm};
 
 use crate::derivative::velocity::{TurningRay, Weight};
-use crate::terms::warped::beside::Beside;
-use crate::terms::warped::edge::{Discontinuity, TurningEdge};
+use crate::estimators::warped::beside::Beside;
+use crate::estimators::warped::edge::{Discontinuity, TurningEdge};
 
 /// Within which angle edges turn a ray, in radians.
 pub(super) const ANGLE: f64 = 0.1;

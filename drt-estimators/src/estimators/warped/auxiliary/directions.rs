@@ -14,11 +14,11 @@ use crate::derivative::velocity::{
     Auxiliary, Blend, EdgeMatter, Found, Probe, RayTurn, Spatial, TurnPart, TurningRay,
     VelocityField, VertexVelocity,
 };
+use crate::estimators::warped::auxiliary::kernel::{Distance, SIGMA, WIDE, weight};
+use crate::estimators::warped::auxiliary::rims::Rims;
+use crate::estimators::warped::auxiliary::{Sample, plan, ratio};
+use crate::estimators::warped::edges::TurningEdges;
 use crate::model::settings::{AuxiliarySamples, WarpKernel};
-use crate::terms::warped::auxiliary::kernel::{Distance, SIGMA, WIDE, weight};
-use crate::terms::warped::auxiliary::rims::Rims;
-use crate::terms::warped::auxiliary::{Sample, plan, ratio};
-use crate::terms::warped::edges::TurningEdges;
 use crate::world::World;
 use crate::world::vertex::{MaterialPoint, Vertex};
 
@@ -38,7 +38,7 @@ pub(crate) struct AuxiliaryDirections {
 }
 
 impl AuxiliaryDirections {
-    pub(in crate::terms::warped) fn new(
+    pub(in crate::estimators::warped) fn new(
         world: &World,
         spatial: Arc<Spatial>,
         edges: TurningEdges,
@@ -104,6 +104,10 @@ impl VelocityField for AuxiliaryDirections {
         let moves = velocity.moves || found.turn.is_some();
         // What blends would have to be told to boundary tests.
         VertexVelocity { moves, blend: Blend::default(), ..velocity }
+    }
+
+    fn follows_edges(&self) -> bool {
+        true
     }
 
     fn turn(

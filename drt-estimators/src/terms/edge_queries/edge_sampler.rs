@@ -14,7 +14,7 @@ use drt_geom::edges::tree::{Draw, EdgeTree, MOST_WAYS, Segment, TreeScratch, Vie
 use drt_math::Vec3;
 
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
-use crate::terms::radiative::{Chosen, EdgeQuery};
+use crate::terms::edge_queries::{Chosen, EdgeQuery};
 use crate::world::World;
 use crate::world::vertex::{Kind, Vertex};
 

@@ -4,11 +4,11 @@ use crate::derivative::sensitivity::{VelocityFunctional, VelocityTerm};
 use crate::sampling::importance::see;
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary_segments::BoundarySink;
-use crate::terms::radiative::Radiative;
-use crate::terms::radiative::difference::{EdgeView, SideRadiance};
+use crate::terms::edge_queries::SeenEdges;
+use crate::terms::edge_queries::difference::{EdgeView, SideRadiance};
 use crate::world::vertex::{Kind, Vertex};
 
-impl Radiative {
+impl SeenEdges {
     /// Takes one sample of the camera's edges.
     pub(crate) fn primary_edge<R: BoundarySink>(
         &self,

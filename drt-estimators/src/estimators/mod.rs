@@ -1,0 +1,123 @@
+//! Estimators of derivatives.
+//!
+//! A derivative of a path integral is that of its integrand along some velocity of the vertices of paths, and what jumps of the
+//! integrand add that do not move by that velocity. An [`Estimator`] chooses the velocity, and [`Terms`] that together are the
+//! derivative for it; what samples these terms does not know which estimator it is.
+
+mod film_plane;
+pub(crate) mod path_space;
+pub(crate) mod radiative;
+pub(crate) mod shares;
+pub(crate) mod warped;
+
+use crate::derivative::contraction::Motion;
+use crate::derivative::medium_motion::Insides;
+use crate::derivative::sensitivity::ActiveInputs;
+use crate::estimators::path_space::PathSpace;
+use crate::estimators::radiative::Radiative;
+use crate::estimators::warped::Warped;
+use crate::model::error::Error;
+use crate::model::scene::Scene;
+use crate::model::settings::{EstimatorKind, PathSampling, Settings};
+use crate::sampling::bidirectional::EmissionSampler;
+use crate::terms::flux::{Flux, GrazingFlux};
+use crate::terms::prepared::Prepared;
+use crate::terms::selected::Terms;
+use crate::terms::source::BoundarySource;
+use crate::world::World;
+
+/// A way to estimate derivatives.
+pub(crate) trait Estimator: Sync {
+    /// The name that plans and messages give it.
+    fn name(&self) -> &'static str;
+
+    /// How the insides of media move, where nobody asks for something else.
+    fn insides(&self) -> Insides;
+
+    /// Whether vertices slide over surfaces as something moves, so that what depends on their place there has to be smooth.
+    fn slides(&self) -> bool;
+
+    /// Whether its terms hold for the light of points and directions, too, as something moves.
+    fn takes_delta_lights(&self, scene: &Scene, settings: &Settings) -> bool;
+
+    /// The velocity of vertices, and the terms, for what changes of a world.
+    ///
+    /// # Errors
+    /// When it has no derivative of that.
+    fn terms(&self, world: &World, changes: &Changes<'_>) -> Result<Terms, Error>;
+}
+
+/// What changes of a world, and how its derivative is asked for.
+pub(crate) struct Changes<'a> {
+    pub(crate) active: &'a ActiveInputs,
+    /// Shapes beside media whose insides do not follow them.
+    pub(crate) flux_shapes: &'a [usize],
+    pub(crate) settings: &'a Settings,
+    /// Which edges move how fast, where that is known.
+    pub(crate) motion: Option<&'a Motion>,
+}
+
+/// The estimator that a kind names. What is no estimator of a session is the default one, which differentiates nothing where there are no
+/// parameters.
+pub(crate) fn named(kind: EstimatorKind) -> &'static dyn Estimator {
+    match kind {
+        EstimatorKind::Radiative => &Radiative,
+        EstimatorKind::Warped => &Warped,
+        EstimatorKind::PathSpace | EstimatorKind::FiniteDifference | EstimatorKind::Auto => {
+            &PathSpace
+        }
+    }
+}
+
+/// Prepares a world for an estimator.
+///
+/// # Errors
+/// As [`Estimator::terms`].
+pub(crate) fn prepare(
+    estimator: &dyn Estimator,
+    world: World,
+    changes: &Changes<'_>,
+) -> Result<Prepared, Error> {
+    // Without anything to differentiate, all are the same.
+    let estimator = if changes.active.any() { estimator } else { &PathSpace };
+    let terms = estimator.terms(&world, changes)?;
+    film_plane::refuse_cuts(&world, changes)?;
+    Ok(Prepared::new(estimator.name(), world, terms))
+}
+
+impl Terms {
+    /// Adds the light paths of paths from both ends, where these are asked for.
+    fn add_light_paths(&mut self, world: &World, changes: &Changes<'_>) {
+        let Changes { active, settings, .. } = changes;
+        let bidirectional = settings.sampling == PathSampling::Bidirectional && active.any();
+        self.sources.extend(bidirectional.then_some(BoundarySource::LightPaths));
+        self.emission = bidirectional.then(|| EmissionSampler::new(world));
+        self.lobe_pairs = settings.antithetic && self.emission.is_none();
+    }
+
+    /// Adds a flux, and what the camera sees of it edge on as one more source.
+    fn add_flux(
+        &mut self,
+        world: &World,
+        flux: Option<Flux>,
+        active: &ActiveInputs,
+    ) -> Result<(), Error> {
+        if let Some(flux) = &flux {
+            self.grazing = GrazingFlux::new(world, flux, active)?;
+            self.sources.extend(self.grazing.as_ref().map(|_| BoundarySource::GrazingFlux));
+        }
+        self.flux = flux;
+        Ok(())
+    }
+
+    /// Divides the boundary samples that are asked for among some kinds of them.
+    fn share_samples(&mut self, settings: &Settings, kinds: usize) {
+        self.boundary_ratio = settings.boundary_ratio.unwrap_or(1.0) / kinds.max(1) as f64;
+    }
+}
+
+/// Whether image points come in mirrored pairs. The filter's rate is what they cancel; without it they only cost.
+fn mirrors(world: &World, changes: &Changes<'_>) -> bool {
+    let Changes { active, settings, .. } = changes;
+    settings.antithetic && active.moves_geometry() && world.camera.filter().is_continuous()
+}
