@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use thiserror::Error;
 
-use crate::input_file;
 use crate::wording::readable;
 
 /// A place in an input file; lines and columns are counted from 1.
@@ -111,12 +110,4 @@ impl CliError {
             Self::Write { .. } => 3,
         }
     }
-}
-
-/// Reads a text file that was named at `from`.
-pub(crate) fn read_text(path: &Path, from: Option<&Place>) -> Result<String, CliError> {
-    let bytes = input_file::read_at(path, from)?;
-    let not_text = |_| std::io::Error::new(std::io::ErrorKind::InvalidData, "it is not UTF-8 text");
-    let text = String::from_utf8(bytes).map_err(not_text);
-    text.map_err(|e| input_file::unreadable(path, from, &e))
 }

@@ -1,33 +1,25 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
-mod atomic;
-mod checksum;
+#[cfg(feature = "command")]
 pub mod commands;
-mod console;
-mod digest;
 pub mod error;
-mod fingerprint;
-mod image;
-mod input_file;
+pub mod files;
 mod job;
-mod lines;
-mod measured_file;
-mod memory;
-mod npy;
 mod scene_xml;
-mod shard_file;
-mod tensor_file;
 #[cfg(test)]
 mod testing;
 mod wording;
 
-pub use atomic::{check_target, write_atomically};
-pub use digest::{RunFacts, Verdict, digest, write_digest};
 pub use error::CliError;
-pub use image::{ExrFile, Provenance, read_exr, write_exr, write_preview};
-pub use job::{Job, Optimize, Overrides, ParameterGroup, load_job};
-pub use measured_file::encode_measured;
+pub use files::atomic::{check_target, write_atomically};
+pub use files::digest::{RunFacts, Verdict, digest, write_digest};
+pub use files::image::{
+    ExrFile, Picture, Provenance, read_exr, read_picture, write_exr, write_preview,
+};
+pub use files::measured_file::encode_measured;
+pub use files::npy::write_npy;
+pub use job::{Collector, Job, Optimize, Overrides, ParameterGroup, load_job};
 pub use scene_xml::{Defaults, load_scene, parse_scene_str};
 
 /// Name and version, as files carry them.

@@ -36,3 +36,15 @@ impl Drop for Folder {
 /// A tetrahedron with outward faces.
 pub(crate) const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n\
                                       f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+/// Copies of a file with one bit flipped in each.
+#[cfg(feature = "command")]
+pub(crate) fn damaged(file: &[u8], count: u32) -> impl Iterator<Item = Vec<u8>> {
+    let mut rng = drt_math::Rng::new(11, 0, 0);
+    (0..count).map(move |_| {
+        let bit = (rng.next_f64() * 8.0 * file.len() as f64) as usize;
+        let mut copy = file.to_vec();
+        copy[bit / 8] ^= 1 << (bit % 8);
+        copy
+    })
+}

@@ -1,4 +1,5 @@
 //! `drt batch`: many jobs, some of them broken, and kills at any time.
+#![cfg(feature = "command")]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! The `drt` program from outside: exit codes, files and messages.
+#![cfg(feature = "command")]
 
 mod common;
 

@@ -1,5 +1,6 @@
 //! Input that is broken, hostile or absurd: one error that names file and place, exit code 2,
 //! nothing written, in bounded time. Input that is only odd is rendered.
+#![cfg(feature = "command")]
 
 mod common;
 

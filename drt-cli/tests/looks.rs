@@ -1,4 +1,5 @@
 //! Previews, completions, manual pages and lists, by the `drt` program.
+#![cfg(feature = "command")]
 
 mod common;
 

@@ -1,5 +1,6 @@
 //! `drt optimize` from outside: it arrives, goes on after a crash to the same bits, and says plainly
 //! why it cannot.
+#![cfg(feature = "command")]
 
 mod common;
 

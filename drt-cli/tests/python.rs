@@ -1,4 +1,5 @@
 //! The example in Python, where there is one with NumPy; by PyTorch, where there is that.
+#![cfg(feature = "command")]
 
 mod common;
 

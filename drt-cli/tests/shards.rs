@@ -1,4 +1,5 @@
 //! `--shard` and `drt merge`: the bits of the run in one piece.
+#![cfg(feature = "command")]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! Texels as parameters, by the `drt` program.
+#![cfg(feature = "command")]
 
 mod common;
 

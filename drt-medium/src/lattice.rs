@@ -1,6 +1,42 @@
+//! A regular lattice in a unit cube along each of its axes, and the values that a point sees.
+
 use drt_math::{Vec3, vec3};
 
-use crate::{Filter, Layout, Wrap};
+/// Where the values sit in the unit cube.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Layout {
+    /// Value i of n at (i + 1/2) / n: the middle of its voxel, as in Mitsuba.
+    #[default]
+    VoxelCentred,
+    /// Value i of n at i / (n - 1): the outermost values lie on the faces of the cube.
+    NodeCentred,
+}
+
+/// How values are joined between the places where they sit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Filter {
+    /// Trilinear interpolation: continuous, with jumps of slope between voxels.
+    #[default]
+    Trilinear,
+    /// The value of the nearest voxel: constant inside, with jumps between voxels. Its gradient is
+    /// zero almost everywhere, so derivatives for *motions* of such a grid lack the jumps' part.
+    Nearest,
+}
+
+/// What lies beyond the outermost values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum Wrap {
+    /// The outermost value goes on.
+    #[default]
+    Clamp,
+    /// The grid starts again.
+    Repeat,
+    /// The grid runs back and forth; the outermost value appears twice.
+    Mirror,
+}
 
 /// Where the values of a grid sit along one axis of its unit cube, and which of them a point sees.
 #[derive(Clone, Copy, Debug, PartialEq)]

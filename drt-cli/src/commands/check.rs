@@ -9,7 +9,7 @@ use super::options::Options;
 use super::outputs::Outputs;
 use super::table::Table;
 use super::{Outcome, run, stop};
-use crate::digest::Verdict;
+use crate::files::digest::Verdict;
 use crate::{CliError, Job};
 
 pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
@@ -111,7 +111,7 @@ mod tests {
     use drt_math::{Rgb, Rng};
 
     use super::*;
-    use crate::image::tests::rendering;
+    use crate::files::image::tests::rendering;
 
     /// A derivative with noise of the size it claims, around `scale` times the truth.
     fn noisy(truth: &Layer, scale: f64, rng: &mut Rng) -> Layer {

@@ -4,11 +4,12 @@ use std::time::Instant;
 
 use drt_estimators::{Derivative, EstimatorKind, Rendering};
 
+use super::console;
 use super::monitor::Monitor;
 use super::noise::largest_noise;
 use super::options::Options;
 use super::run::{self, Shared};
-use crate::{CliError, Job, console};
+use crate::{CliError, Job};
 
 /// Image and derivatives by the job's estimator, filling the first `part` of the progress bar.
 pub(super) fn derivatives(

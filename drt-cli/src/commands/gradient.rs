@@ -11,15 +11,15 @@ use drt_math::Rgb;
 
 use super::derivatives::derivatives;
 use super::destinations::Destinations;
+use super::fingerprint::Fingerprint;
 use super::monitor::Monitor;
 use super::options::GradOptions;
 use super::outputs::Outputs;
+use super::shard_file::{Batch, ShardFile, Sums, Total};
 use super::{Outcome, run, shard, stop};
 use crate::error::Place;
-use crate::fingerprint::Fingerprint;
-use crate::image::read_picture;
-use crate::npy::{write_npy, write_npy_bytes};
-use crate::shard_file::{Batch, ShardFile, Sums, Total};
+use crate::files::image::read_picture;
+use crate::files::npy::{write_npy, write_npy_bytes};
 use crate::{CliError, Job};
 
 /// Between the seeds of an image and of the gradient by what it says.

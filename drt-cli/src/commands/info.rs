@@ -10,10 +10,11 @@ use drt_geom::{EdgeClass, Mesh, Topology};
 use drt_medium::{Medium, MediumKind, Phase, Volume};
 use drt_motion::{Change, Parameter};
 
+use super::console;
 use super::options::Options;
 use super::table::Table;
 use super::{Outcome, run};
-use crate::{CliError, Job, console};
+use crate::{CliError, Job};
 
 pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
     let job = run::open(options)?;

@@ -6,15 +6,16 @@ use drt_estimators::fit::{Evaluation, Half};
 use drt_estimators::{Rendering, ShardError, ShardSums};
 
 use super::Outcome;
+use super::console;
 use super::gradient::by_parameters;
 use super::options::MergeOptions;
 use super::outputs::{Files, summarize};
+use super::shard_file::{ShardFile, Sums, Total, view};
 use super::stop;
-use crate::digest::RunFacts;
 use crate::error::Place;
-use crate::npy::write_npy;
-use crate::shard_file::{ShardFile, Sums, Total, view};
-use crate::{CliError, Provenance, console};
+use crate::files::digest::RunFacts;
+use crate::files::npy::write_npy;
+use crate::{CliError, Provenance};
 
 pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
     let files =

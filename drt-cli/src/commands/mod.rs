@@ -4,8 +4,10 @@ mod batch;
 mod bench;
 mod check;
 mod clock;
+mod console;
 mod derivatives;
 mod destinations;
+mod fingerprint;
 mod grad;
 mod gradient;
 mod info;
@@ -20,6 +22,7 @@ mod preview;
 mod render;
 mod run;
 mod shard;
+mod shard_file;
 mod shell;
 mod stop;
 mod table;
@@ -30,7 +33,6 @@ use std::io::IsTerminal;
 use clap::Parser;
 
 use crate::CliError;
-use crate::console;
 use crate::wording::{readable, shown};
 use options::{Command, CommandLine};
 

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, Parser, Subcommand};
+use clap::builder::PossibleValue;
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use drt_estimators::Shard;
 
-use crate::job::Sampling;
+use crate::job::keys::Sampling;
 use crate::{CliError, Overrides};
 
 /// Differentiable rendering of surfaces and participating media.
@@ -89,6 +90,21 @@ pub(super) struct Options {
     pub(super) sampling: Option<Sampling>,
     #[command(flatten)]
     pub(super) changes: Changes,
+}
+
+impl ValueEnum for Sampling {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Unidirectional, Self::Bidirectional, Self::Auto]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = match self {
+            Self::Unidirectional => ("unidirectional", "From the camera"),
+            Self::Bidirectional => ("bidirectional", "From the camera and from emitters"),
+            Self::Auto => ("auto", "What a pilot finds to take less work"),
+        };
+        Some(PossibleValue::new(name).help(help))
+    }
 }
 
 /// What every command may change about a scene or job.

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use drt_estimators::{Layer, Rendering, Tail};
 
 use super::clock::Clock;
+use super::console;
 use super::destinations::Destinations;
 use super::noise::largest_noise;
 use super::options::Options;
+use super::shard_file::ShardFile;
 use super::stop;
-use crate::digest::{RunFacts, Verdict, digest, write_digest};
-use crate::shard_file::ShardFile;
-use crate::{CliError, Job, Provenance, console, write_exr, write_preview};
+use crate::files::digest::{RunFacts, Verdict, digest, write_digest};
+use crate::{CliError, Job, Provenance, write_exr, write_preview};
 
 /// Measures a command from its start and writes its results.
 #[derive(Clone)]
@@ -156,7 +157,12 @@ impl Files<'_> {
             write_preview(path, rendering, further)?;
         }
         if let Some(path) = self.digest {
-            write_digest(path, &digest(rendering, facts, checks))?;
+            let text = digest(rendering, facts, checks);
+            if path.as_os_str() == "-" {
+                console::print(format!("{text}\n"))?;
+            } else {
+                write_digest(path, &text)?;
+            }
         }
         // The image comes last: what has it has everything.
         if let Some(path) = self.output {

@@ -4,7 +4,7 @@ use super::Outcome;
 use super::destinations::Destinations;
 use super::options::PreviewOptions;
 use crate::error::Place;
-use crate::image::{is_error, write_layers};
+use crate::files::image::{is_error, write_layers};
 use crate::{CliError, read_exr};
 
 pub(super) fn run(options: &PreviewOptions) -> Result<Outcome, CliError> {

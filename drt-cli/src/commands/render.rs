@@ -2,12 +2,13 @@
 
 use drt_estimators::Rendering;
 
+use super::console;
 use super::monitor::Monitor;
 use super::options::{Options, RenderOptions};
 use super::outputs::Outputs;
 use super::run::{self, Shared};
 use super::{Outcome, noted, shard};
-use crate::{CliError, Job, console};
+use crate::{CliError, Job};
 
 pub(super) fn run(options: &RenderOptions) -> Result<Outcome, CliError> {
     let (shard, options) = (options.shard, &options.common);

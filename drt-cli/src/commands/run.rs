@@ -6,14 +6,16 @@ use std::time::Instant;
 use drt_estimators::{Layer, PreparedCache, Rendering, Session, finite_differences};
 use drt_motion::Parameter;
 
+use super::console;
 use super::monitor::Monitor;
 use super::noise::largest_noise;
 use super::options::{Changes, Options};
 use crate::error::Place;
+use crate::files::memory;
 use crate::job::{depth, read_job};
 use crate::scene_xml::SceneReader;
 use crate::wording::shown;
-use crate::{CliError, Job, console, memory};
+use crate::{CliError, Job};
 
 /// Samples per pixel of the first pass where time or noise decides when to stop; later ones double.
 const FIRST_PASS: u32 = 4;

@@ -4,13 +4,13 @@ use drt_estimators::{Estimate, EstimatorKind, Layer, Plan, Rendering, Shard, Sha
 use drt_math::Rgb;
 
 use super::Outcome;
+use super::fingerprint::Fingerprint;
 use super::monitor::Monitor;
 use super::options::Options;
 use super::outputs::Outputs;
 use super::run::{self, Shared};
+use super::shard_file::{ShardFile, Sums};
 use super::stop;
-use crate::fingerprint::Fingerprint;
-use crate::shard_file::{ShardFile, Sums};
 use crate::{CliError, Job};
 
 /// Refuses what a part of a run cannot have.

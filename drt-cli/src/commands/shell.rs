@@ -5,8 +5,9 @@ use std::path::Path;
 use clap::CommandFactory;
 
 use super::Outcome;
+use super::console;
 use super::options::CommandLine;
-use crate::{CliError, console, write_atomically};
+use crate::{CliError, write_atomically};
 
 /// Prints what completes commands.
 pub(super) fn completions(shell: clap_complete::Shell) -> Result<Outcome, CliError> {

@@ -10,8 +10,9 @@ use drt_motion::{Cause, GeometryChange};
 
 use super::keys;
 use super::refusal::Refusal;
+use crate::CliError;
 use crate::error::Place;
-use crate::{CliError, input_file};
+use crate::files::input_file;
 
 /// The cages of a job, each read once: parameters that share a cage share its coordinates, too.
 #[derive(Default)]

@@ -9,7 +9,7 @@ use toml::de::{DeArray, DeTable, DeValue, Deserializer, Error};
 
 use crate::CliError;
 use crate::error::Place;
-use crate::lines::Lines;
+use crate::files::lines::Lines;
 
 /// A job's text and the assignments laid over it, with spans that tell them apart: those of the
 /// text lie within it, those of each assignment in a range of its own beyond.

@@ -132,12 +132,16 @@ fn property(name: Option<&str>) -> Result<drt_medium::Property, String> {
 impl ParameterGroup {
     /// What adds the group's part to gradients of a loss. `given` is the scene as the file has it, `scene` the one that
     /// is differentiated.
-    pub(crate) fn collector(&self, given: &Scene, scene: &Scene) -> Collector {
+    pub fn collector(&self, given: &Scene, scene: &Scene) -> Collector {
+        Collector(self.part(given, scene))
+    }
+
+    fn part(&self, given: &Scene, scene: &Scene) -> Part {
         match (&self.kind, self.target) {
-            (GroupKind::Voxels(property), Target::Medium(m)) => Collector::Voxels(m, *property),
-            (GroupKind::LightTexels, Target::Emitter(e)) => Collector::LightTexels(e),
+            (GroupKind::Voxels(property), Target::Medium(m)) => Part::Voxels(m, *property),
+            (GroupKind::LightTexels, Target::Emitter(e)) => Part::LightTexels(e),
             (GroupKind::Texels { of, number }, Target::Bsdf(b)) => {
-                Collector::Texels { bsdf: b, of: *of, number: *number }
+                Part::Texels { bsdf: b, of: *of, number: *number }
             }
             (kind, Target::Shape(s)) => {
                 let (file, mesh) = (given.shapes[s].mesh.clone(), scene.shapes[s].mesh.clone());
@@ -145,20 +149,23 @@ impl ParameterGroup {
                     // It was loaded as a cage.
                     GroupKind::Cage(cage) => match Cage::new(cage) {
                         Ok(cage) => Some(CageWeights::new(&cage, &file.positions)),
-                        Err(_) => return Collector::Nothing,
+                        Err(_) => return Part::Nothing,
                     },
                     _ => None,
                 };
                 let normals = SmoothNormals::new(&mesh);
-                Collector::Shape { shape: s, file, mesh, normals, weights }
+                Part::Shape { shape: s, file, mesh, normals, weights }
             }
-            _ => Collector::Nothing,
+            _ => Part::Nothing,
         }
     }
 }
 
-/// Takes a group's part out of gradients.
-pub(crate) enum Collector {
+/// Takes a group's part out of gradients of a loss.
+pub struct Collector(Part);
+
+/// What the part of a group is in a gradient.
+enum Part {
     Voxels(usize, drt_medium::Property),
     Texels {
         bsdf: usize,
@@ -172,7 +179,7 @@ pub(crate) enum Collector {
         file: Arc<Mesh>,
         mesh: Arc<Mesh>,
         normals: SmoothNormals,
-        /// Of a cage's vertices.
+        /// What a cage's vertices weigh at those of the shape.
         weights: Option<CageWeights>,
     },
     Nothing,
@@ -180,9 +187,9 @@ pub(crate) enum Collector {
 
 impl Collector {
     /// Adds the group's part to the gradient of a loss.
-    pub(crate) fn collect(&self, gradient: &SceneGradient, out: &mut Vec<f64>) {
-        match self {
-            Self::Voxels(m, property) => {
+    pub fn collect(&self, gradient: &SceneGradient, out: &mut Vec<f64>) {
+        match &self.0 {
+            Part::Voxels(m, property) => {
                 let Some(of) = &gradient.media[*m] else { return };
                 match property {
                     drt_medium::Property::SigmaT => out.extend(&of.sigma_t.voxels),
@@ -192,7 +199,7 @@ impl Collector {
                     drt_medium::Property::G => {}
                 }
             }
-            Self::Texels { bsdf, of, number } => {
+            Part::Texels { bsdf, of, number } => {
                 let textures = gradient.texels[*bsdf].iter().filter(|(p, _)| p == of);
                 for (_, texels) in textures {
                     let values = texels.values();
@@ -203,11 +210,11 @@ impl Collector {
                     }
                 }
             }
-            Self::LightTexels(emitter) => {
+            Part::LightTexels(emitter) => {
                 let Some(texels) = &gradient.emitter_texels[*emitter] else { return };
                 out.extend(texels.values().iter().flat_map(|v| v.to_array()));
             }
-            Self::Shape { shape, file, mesh, normals, weights } => {
+            Part::Shape { shape, file, mesh, normals, weights } => {
                 let Some(of) = &gradient.shapes[*shape] else { return };
                 let vertices = of.finish(mesh, normals);
                 let vectors = match weights {
@@ -216,7 +223,7 @@ impl Collector {
                 };
                 out.extend(vectors.iter().flat_map(|v| [v.x, v.y, v.z]));
             }
-            Self::Nothing => {}
+            Part::Nothing => {}
         }
     }
 }

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use clap::ValueEnum;
 use drt_estimators::PathSampling;
 use serde::Deserialize;
 use toml::Spanned;
@@ -88,7 +87,7 @@ pub(super) enum WarpKernel {
 }
 
 /// How paths are found, as jobs and commands name it.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum Sampling {
     /// From the camera.

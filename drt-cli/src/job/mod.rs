@@ -5,7 +5,7 @@ mod document;
 mod effects;
 mod files;
 mod groups;
-mod keys;
+pub(crate) mod keys;
 mod list;
 mod motions;
 mod optimize;
@@ -23,13 +23,14 @@ use drt_estimators::{
 use drt_motion::Parameter;
 use toml::Spanned;
 
-use crate::error::{Place, Warning, read_text};
+use crate::error::{Place, Warning};
+use crate::files::input_file;
+use crate::files::input_file::read_text;
 use crate::scene_xml::SceneReader;
-use crate::{CliError, Defaults, input_file};
+use crate::{CliError, Defaults};
 use cages::Cages;
 use document::Document;
-pub use groups::ParameterGroup;
-pub(crate) use keys::Sampling;
+pub use groups::{Collector, ParameterGroup};
 pub use optimize::Optimize;
 
 /// What the command line lays over a job or scene.
@@ -81,10 +82,34 @@ pub struct Job {
     /// What it was read from, but for pictures to fit to.
     pub(crate) files: Vec<PathBuf>,
     /// Values given for the scene's `<default>` names.
-    pub(crate) defaults: Defaults,
+    pub defaults: Defaults,
 }
 
 /// Reads a job file and its scene.
+///
+/// ```
+/// use drt_cli::{Overrides, load_job};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("job.toml");
+/// # let scene = r#"<scene version="3.0.0"><emitter type="constant" id="sky"/></scene>"#;
+/// # std::fs::write(folder.path().join("scene.xml"), scene)?;
+/// std::fs::write(
+///     &path,
+///     r#"scene = "scene.xml"
+///
+///        [[parameter]]
+///        name = "light"
+///        [[parameter.effect]]
+///        target = "sky"
+///        property = "radiance"
+///        multiply = 1.0"#,
+/// )?;
+/// let set = vec![("estimator.spp".into(), "16".into())];
+/// let job = load_job(&path, &Overrides { set, ..Overrides::default() })?;
+/// assert_eq!((job.spp(), job.parameters[0].name.as_str()), (16, "light"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// Names the file, line and key, or the `--set`, of what is malformed, unknown, missing or not
@@ -232,13 +257,13 @@ impl Job {
         Ok(())
     }
 
-    /// All files that were read.
-    pub(crate) fn inputs(&self) -> impl Iterator<Item = &Path> {
+    /// Lists all files that were read.
+    pub fn inputs(&self) -> impl Iterator<Item = &Path> {
         self.files.iter().map(PathBuf::as_path)
     }
 
-    /// The pictures that a fit reads; other commands may write them.
-    pub(crate) fn pictures(&self) -> impl Iterator<Item = &Path> {
+    /// Lists the pictures that a fit reads; other commands may write them.
+    pub fn pictures(&self) -> impl Iterator<Item = &Path> {
         let plan = self.optimize.as_ref().ok().and_then(Option::as_ref);
         let pictures = plan.into_iter().flat_map(|plan| plan.targets.iter().chain(&plan.masks));
         pictures.map(PathBuf::as_path)
@@ -248,7 +273,7 @@ impl Job {
     ///
     /// # Errors
     /// Names both.
-    pub(crate) fn check_terms(&self) -> Result<(), CliError> {
+    pub fn check_terms(&self) -> Result<(), CliError> {
         for (parameter, place) in self.parameters.iter().zip(&self.places) {
             let own = parameter.name.strip_suffix("_stderr").unwrap_or(&parameter.name);
             let taken = Term::ALL.iter().find_map(|term| {

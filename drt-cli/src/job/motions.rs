@@ -13,8 +13,9 @@ use super::document::Document;
 use super::keys::{self, MotionKind};
 use super::refusal::Refusal;
 use super::velocities;
+use crate::CliError;
 use crate::error::Place;
-use crate::{CliError, input_file};
+use crate::files::input_file;
 
 /// The kinds asked for, by the medium's index. Several tables may speak of one medium, to give the
 /// velocities of its tetrahedra for several parameters.

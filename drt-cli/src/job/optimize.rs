@@ -12,7 +12,8 @@ use toml::Spanned;
 use super::document::Document;
 use super::list::List;
 use super::{find_sensor, keys};
-use crate::{CliError, input_file};
+use crate::CliError;
+use crate::files::input_file;
 
 /// Iterations where a job does not say how many.
 const ITERATIONS: u32 = 100;
@@ -45,7 +46,7 @@ pub struct Optimize {
     pub iterations: u32,
     /// Samples per pixel from some iterations on, instead of the estimator's.
     pub spp: Vec<(u32, u32)>,
-    /// By how much the images' sides are divided.
+    /// The images' sides are divided by this much.
     pub reduce: Stages<u32>,
     /// The folder that a stopped run goes on from.
     pub checkpoint: Option<PathBuf>,
@@ -60,7 +61,7 @@ impl Optimize {
     ///
     /// # Errors
     /// Names the file and the key.
-    pub(crate) fn check_file(&self, path: &Path) -> Result<(), CliError> {
+    pub fn check_file(&self, path: &Path) -> Result<(), CliError> {
         match (input_file::check(path), self.unreadable.get(path)) {
             (Err(_), Some(error)) => Err(error.clone()),
             (Err(e), None) => Err(input_file::unreadable(path, None, &e)),

@@ -5,8 +5,9 @@ use std::path::Path;
 use drt_math::Vec3;
 
 use super::refusal::Refusal;
+use crate::CliError;
 use crate::error::Place;
-use crate::{CliError, input_file};
+use crate::files::input_file;
 
 /// Reads a file; its first bytes tell which of the two it is.
 pub(super) fn read(path: &Path) -> Result<Vec<Vec3>, Refusal> {

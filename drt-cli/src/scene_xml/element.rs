@@ -10,6 +10,12 @@ use crate::error::Place;
 use crate::scene_xml::dialect::Dialect;
 use crate::scene_xml::notes::Notes;
 
+/// Elements inside each other beyond this depth are refused: no scene needs them, and reading them
+/// takes stack.
+pub(super) const MAX_NESTING: usize = 64;
+/// More elements are refused, all included files together.
+pub(super) const MAX_ELEMENTS: usize = 1 << 20;
+
 /// One XML element.
 #[derive(Clone, Debug)]
 pub(super) struct Element {

@@ -21,6 +21,7 @@ mod source;
 mod spectrum;
 #[cfg(test)]
 mod tests;
+mod textured;
 mod textures;
 mod transform;
 mod values;
@@ -37,7 +38,8 @@ use drt_estimators::{Instance, Named, Scene};
 use drt_math::Rgb;
 
 use crate::CliError;
-use crate::error::{Place, Warning, read_text};
+use crate::error::{Place, Warning};
+use crate::files::input_file::read_text;
 use element::Element;
 use index::Index;
 use properties::Properties;
@@ -46,6 +48,28 @@ pub use source::Defaults;
 use source::SceneFiles;
 
 /// Reads a scene file; `defaults` override its `<default>` values.
+///
+/// ```
+/// use drt_cli::{Defaults, load_scene};
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("scene.xml");
+/// std::fs::write(
+///     &path,
+///     r#"<scene version="3.0.0">
+///          <default name="size" value="64"/>
+///          <sensor type="perspective">
+///            <film type="hdrfilm">
+///              <integer name="width" value="$size"/>
+///              <integer name="height" value="48"/>
+///            </film>
+///          </sensor>
+///        </scene>"#,
+/// )?;
+/// let scene = load_scene(&path, &Defaults::from([("size".into(), "32".into())]))?;
+/// assert_eq!(scene.sensors[0].item.sensor.film(), [32, 48]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// Names the file, line and element of what is malformed, missing or not supported.
@@ -227,7 +251,7 @@ impl<'a> Loader<'a> {
                 // Read for their own sake, so that mistakes in unused ones are found too.
                 "phase" => self.unless_unused(e, self.phase(e).map(drop), || Ok(()))?,
                 "volume" => self.unless_unused(e, volumes::read(e).map(drop), || Ok(()))?,
-                "texture" if e.id().is_some() && textures::varies(e) => {
+                "texture" if e.id().is_some() && properties::varies(e) => {
                     self.unless_unused(e, textures::read(e).map(drop), || Ok(()))?;
                 }
                 "texture" | "spectrum" | "rgb" | "srgb" if e.id().is_some() => {

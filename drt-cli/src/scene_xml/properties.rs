@@ -9,8 +9,9 @@ use drt_math::{Affine, Rgb, Vec3, vec3};
 
 use super::element::Element;
 use super::numbers::{number, plain_numbers, plain_value, triple};
-use super::{spectrum, textures, transform};
-use crate::{CliError, input_file};
+use super::transform;
+use crate::CliError;
+use crate::files::input_file;
 
 /// Properties of version 0.5 and 0.6 that do not change the expected image, by the element that they are in: they are about how an
 /// image is computed, or how it is stored.
@@ -42,6 +43,9 @@ const HARMLESS: [(&str, &[&str]); 6] = [
     ("shape", &["collapse"]),
     ("texture", &["cache", "max_anisotropy"]),
 ];
+
+/// Textures of these types vary; all others are one colour.
+const VARYING: [&str; 4] = ["bitmap", "checkerboard", "mesh_attribute", "volume"];
 
 /// The children of an element, each to be asked for once.
 pub(super) struct Properties<'a> {
@@ -95,7 +99,8 @@ impl<'a> Properties<'a> {
         self.children(|e| property_name(e).is_some_and(|(n, _)| n == name)).first().copied()
     }
 
-    fn value<T>(
+    /// A property with one of several tags, as what `parse` makes of it.
+    pub(super) fn value<T>(
         &self,
         name: &'static str,
         tags: &[&str],
@@ -108,13 +113,10 @@ impl<'a> Properties<'a> {
         Err(e.error(format!("`{name}` must be a <{}>", tags.join("> or <"))))
     }
 
-    /// A finite number.
-    ///
-    /// Of a texture that varies it is the mean, and the texture is kept.
-    pub(super) fn float(&self, name: &'static str) -> Result<Option<f64>, CliError> {
-        if let Some((e, texture)) = self.texture(name)? {
-            let texture = textures::luminance(texture).map_err(|reason| e.error(reason))?;
-            return Ok(Some(self.keep(name, texture).r));
+    /// A finite number, for which no texture stands.
+    pub(super) fn number(&self, name: &'static str) -> Result<Option<f64>, CliError> {
+        if self.varying(name).is_some() {
+            return Err(no_texture(self.element, name));
         }
         self.value(name, &["float", "integer"], |e| match *plain_numbers(e)? {
             [v] => Ok(v),
@@ -206,42 +208,14 @@ impl<'a> Properties<'a> {
         self.value(name, &["transform"], transform::parse)
     }
 
-    /// A colour of something that reflects, refracts or absorbs.
-    ///
-    /// Of a texture that varies it is the mean, and the texture is kept.
-    pub(super) fn color(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
-        if let Some((_, texture)) = self.texture(name)? {
-            return Ok(Some(self.keep(name, texture)));
-        }
-        self.value(name, spectrum::TAGS, spectrum::reflected)
-    }
-
-    /// A colour of light.
-    pub(super) fn light(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
-        if let Some((e, _)) = self.texture(name)? {
-            let message = format!(
-                "a texture cannot stand for `{name}` here; only BSDFs and area emitters have them"
-            );
-            return Err(e.error(message));
-        }
-        self.value(name, spectrum::TAGS, spectrum::emitted)
-    }
-
-    /// A texture that varies, with its element; whatever else has the name is not asked for.
-    pub(super) fn texture(
-        &self,
-        name: &'static str,
-    ) -> Result<Option<(&'a Element, Texture)>, CliError> {
+    /// The texture that varies and stands for a property, if one does; whatever else has the name is not asked for.
+    pub(super) fn varying(&self, name: &str) -> Option<&'a Element> {
         let is_named = |e: &&Element| property_name(e).is_some_and(|(n, _)| n == name);
-        let Some(e) = self.element.children.iter().find(is_named) else { return Ok(None) };
-        if !textures::varies(e) {
-            return Ok(None);
-        }
-        self.property(name);
-        Ok(Some((e, textures::read(e)?)))
+        self.element.children.iter().find(is_named).filter(|e| varies(e))
     }
 
-    fn keep(&self, name: &'static str, texture: Texture) -> Rgb {
+    /// Keeps a texture that varies for whoever can use it, and returns its mean.
+    pub(super) fn keep(&self, name: &'static str, texture: Texture) -> Rgb {
         let mean = texture.mean();
         self.textures.borrow_mut().push((name, texture));
         mean
@@ -297,10 +271,7 @@ impl<'a> Properties<'a> {
     /// Refuses what nobody asked for.
     pub(super) fn finish(&self) -> Result<(), CliError> {
         if let Some((name, _)) = self.textures.borrow().first() {
-            let message = format!(
-                "a texture cannot stand for `{name}` here; only BSDFs and area emitters have them"
-            );
-            return Err(self.element.error(message));
+            return Err(no_texture(self.element, name));
         }
         let used = self.used.borrow();
         let mut left = (self.element.children.iter().zip(used.iter()))
@@ -321,4 +292,19 @@ impl<'a> Properties<'a> {
 fn property_name(e: &Element) -> Option<(&str, &Element)> {
     // References to media share names by design: an interior and an exterior are told apart there.
     if e.tag == "ref" { None } else { e.attribute("name").map(|n| (n, e)) }
+}
+
+/// True for a texture that is not the same everywhere.
+pub(super) fn varies(e: &Element) -> bool {
+    e.tag == "texture"
+        && e.attribute("type").is_some_and(|kind| {
+            VARYING.contains(&kind) || (kind == "scale" && e.children.iter().any(varies))
+        })
+}
+
+/// The error where a texture that varies stands for a property that only has one value.
+pub(super) fn no_texture(at: &Element, name: &str) -> CliError {
+    at.error(format!(
+        "a texture cannot stand for `{name}` here; only BSDFs and area emitters have them"
+    ))
 }

@@ -8,23 +8,19 @@ use std::sync::Arc;
 use roxmltree::{Document, Node};
 
 use super::dialect::Dialect;
-use super::element::Element;
+use super::element::{Element, MAX_ELEMENTS, MAX_NESTING};
 use super::notes::Notes;
 use super::values;
 use crate::CliError;
-use crate::error::{Place, read_text};
-use crate::lines::Lines;
+use crate::error::Place;
+use crate::files::input_file::read_text;
+use crate::files::lines::Lines;
 
 /// Values for the `<default>` names of a scene, as `-D NAME=VALUE` gives them.
 pub type Defaults = BTreeMap<String, String>;
 
-/// Elements inside each other beyond this depth are refused: no scene needs them, and reading them
-/// takes stack.
-pub(super) const MAX_NESTING: usize = 64;
 /// More files are refused: a few that include each other again and again can stand for billions.
 const MAX_FILES: usize = 4096;
-/// More elements are refused, all included files together.
-pub(super) const MAX_ELEMENTS: usize = 1 << 20;
 /// Longest text, in bytes, that values of `$name` may make; each can double the one before.
 const MAX_TEXT: usize = 1 << 16;
 

@@ -10,39 +10,13 @@ use drt_math::{Affine, Mat3, Rgb, vec3};
 
 use super::element::Element;
 use super::properties::Properties;
-use super::spectrum::srgb_to_linear;
+use super::spectrum::{factor, scaled, srgb_to_linear};
 use super::volumes;
-use crate::{CliError, memory, read_exr};
+use crate::files::memory;
+use crate::{CliError, read_exr};
 
-/// Textures of these types vary; all others are one colour.
-const VARYING: [&str; 4] = ["bitmap", "checkerboard", "mesh_attribute", "volume"];
 /// Images of more texels are refused: they would take gigabytes.
 const MAX_TEXELS: u64 = 1 << 26;
-
-/// True for a texture that is not the same everywhere.
-pub(super) fn varies(e: &Element) -> bool {
-    e.tag == "texture"
-        && e.attribute("type").is_some_and(|kind| {
-            VARYING.contains(&kind) || (kind == "scale" && e.children.iter().any(varies))
-        })
-}
-
-/// The texture that a `scale` of version 0.5 and 0.6 is of.
-pub(super) fn scaled<'a>(p: &Properties<'a>) -> Result<&'a Element, CliError> {
-    let scale = |e: &Element| p.is_property(e, "scale");
-    match p.children(|e| matches!(e.tag.as_str(), "texture" | "spectrum") && !scale(e))[..] {
-        [inner] => Ok(inner),
-        ref other => {
-            let message = format!("expected one texture inside, found {}", other.len());
-            Err(p.element.error(message))
-        }
-    }
-}
-
-/// What such a `scale` multiplies by.
-pub(super) fn factor(p: &Properties<'_>) -> Result<Rgb, CliError> {
-    Ok(p.color("scale")?.unwrap_or(Rgb::ONE))
-}
 
 /// A texture with all its colours multiplied.
 fn times(texture: Texture, factor: Rgb) -> Result<Texture, String> {
@@ -62,7 +36,7 @@ fn times(texture: Texture, factor: Rgb) -> Result<Texture, String> {
     })
 }
 
-/// A texture that [`varies`], of colours.
+/// A texture that varies, of colours.
 pub(super) fn read(e: &Element) -> Result<Texture, CliError> {
     let p = Properties::of(e)?;
     if let "mesh_attribute" | "volume" = p.kind()? {
@@ -78,8 +52,9 @@ pub(super) fn read(e: &Element) -> Result<Texture, CliError> {
     }
     let to_uv = uv_map(&coordinates(&p)?);
     let texture = if p.kind()? == "checkerboard" {
-        let colour =
-            |name, default| Ok::<_, CliError>(p.color(name)?.unwrap_or(Rgb::splat(default)));
+        let colour = |name, default| {
+            Ok::<_, CliError>(p.uniform_color(name)?.unwrap_or(Rgb::splat(default)))
+        };
         Texture::Checkerboard { colours: [colour("color0", 0.4)?, colour("color1", 0.2)?], to_uv }
     } else {
         bitmap(&p, to_uv)?
@@ -114,7 +89,7 @@ fn attribute(p: &Properties<'_>) -> Result<Texture, CliError> {
         let message = format!("`name` is `{name}`; expected it to begin with vertex_ or face_");
         return Err(e.error(message));
     }
-    let scale = p.float("scale")?.unwrap_or(1.0);
+    let scale = p.number("scale")?.unwrap_or(1.0);
     Ok(Texture::Attribute(AttributeTexture { name: name.into(), scale, grey: false }))
 }
 
@@ -138,7 +113,7 @@ fn coordinates(p: &Properties<'_>) -> Result<Affine, CliError> {
     if !p.element.is_legacy() {
         return Ok(p.transform("to_uv")?.unwrap_or(Affine::IDENTITY));
     }
-    let number = |name, default| Ok::<f64, CliError>(p.float(name)?.unwrap_or(default));
+    let number = |name, default| Ok::<f64, CliError>(p.number(name)?.unwrap_or(default));
     let scale = vec3(number("uscale", 1.0)?, number("vscale", 1.0)?, 1.0);
     let translation = vec3(number("uoffset", 0.0)?, number("voffset", 0.0)?, 0.0);
     Ok(Affine { linear: Mat3::diagonal(scale), translation })
@@ -195,7 +170,7 @@ fn curve(p: &Properties<'_>) -> Result<Curve, CliError> {
     if !p.element.is_legacy() {
         return Ok(if p.boolean("raw")?.unwrap_or(false) { Curve::Raw } else { Curve::OfFile });
     }
-    match p.float("gamma")? {
+    match p.number("gamma")? {
         None | Some(-1.0) => Ok(Curve::OfFile),
         Some(1.0) => Ok(Curve::Raw),
         Some(gamma) if gamma > 0.0 => Ok(Curve::Power(gamma as f32)),

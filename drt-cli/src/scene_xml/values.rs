@@ -3,8 +3,7 @@
 
 use std::collections::HashMap;
 
-use super::element::Element;
-use super::source::{MAX_ELEMENTS, MAX_NESTING};
+use super::element::{Element, MAX_ELEMENTS, MAX_NESTING};
 use crate::CliError;
 
 /// Tags of things that are nothing but values.

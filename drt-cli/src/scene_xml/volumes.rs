@@ -38,7 +38,7 @@ impl<'a> Loader<'a> {
     ) -> Result<Option<Field>, CliError> {
         match self.index.single(p, "volume", Some(name))? {
             Some(volume) => read(volume.target).map(Some),
-            None => Ok(p.color(name)?.map(Field::constant)),
+            None => Ok(p.uniform_color(name)?.map(Field::constant)),
         }
     }
 }
@@ -60,7 +60,7 @@ pub(super) fn read(e: &Element) -> Result<Field, CliError> {
 }
 
 fn constant(p: &Properties<'_>) -> Result<Field, CliError> {
-    let value = p.color("value")?.ok_or_else(|| p.element.error("`value` is missing"))?;
+    let value = p.uniform_color("value")?.ok_or_else(|| p.element.error("`value` is missing"))?;
     let placement = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
     Ok(Field { volume: Volume::Constant(value), placement })
 }

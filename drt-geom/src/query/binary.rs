@@ -6,6 +6,7 @@
 use alloc::vec::Vec;
 
 use super::frame::Box32;
+use super::node::Node;
 #[cfg(feature = "obvhs")]
 use super::ploc::Ploc;
 
@@ -27,15 +28,6 @@ pub enum BvhBuilder {
     #[cfg(feature = "obvhs")]
     #[default]
     Obvhs,
-}
-
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Node {
-    pub(super) bounds: Box32,
-    /// Inner node: index of the first of its two children. Leaf: its primitive.
-    pub(super) first: u32,
-    /// Number of primitives, one; zero marks an inner node.
-    pub(super) count: u32,
 }
 
 /// The tree. It numbers the primitives in its own order, that of the leaves from left to right.

@@ -7,10 +7,11 @@ use drt_math::Vec3;
 
 use super::Walk;
 use super::binary::BvhBuilder;
+use super::children::WIDTH;
 use super::collapse::collapse;
 use super::frame::{Box32, BoxFrame};
 use super::lanes::{Lanes, Machine, Vector};
-use super::wide::{Query, Visitor, WIDTH, WideNode, WideTree};
+use super::wide::{Query, Visitor, WideNode, WideTree};
 use crate::Aabb;
 
 /// Boxes in a leaf of the tree.

@@ -5,8 +5,8 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::binary::{BinaryTree, BvhBuilder};
+use super::children::{LEAF, NO_CHILD, WIDTH};
 use super::frame::Box32;
-use super::wide::{LEAF, NO_CHILD, WIDTH};
 
 /// Cost of testing a block of triangles, in that of testing a node's boxes.
 const BLOCK_COST: f32 = 1.0;

@@ -16,12 +16,14 @@ mod binary;
 mod block;
 mod boxes;
 mod build;
+mod children;
 mod collapse;
 mod ends;
 mod frame;
 mod instanced;
 mod lanes;
 mod nearest;
+mod node;
 mod order;
 #[cfg(feature = "obvhs")]
 mod ploc;

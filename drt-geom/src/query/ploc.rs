@@ -18,8 +18,8 @@ use ::obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use ::obvhs::bvh2::{Bvh2, DEFAULT_MAX_STACK_DEPTH};
 use ::obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
-use super::binary::Node;
 use super::frame::Box32;
+use super::node::Node;
 
 /// Most boxes of a set. Trees over fewer are no worse: what is cut first is cut well.
 const MOST: usize = 1024;

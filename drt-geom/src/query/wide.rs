@@ -3,18 +3,10 @@
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
+use super::children::{LEAF, NO_CHILD, WIDTH};
 use super::collapse::Collapsed;
 use super::frame::{Box32, BoxPoint, BoxRay};
 use super::lanes::{Lanes, Vector};
-
-/// Most children of a node.
-pub(super) const WIDTH: usize = 8;
-
-/// Marks a child that is a block of primitives.
-pub(super) const LEAF: u32 = 1 << 31;
-
-/// Stands where a node has no child.
-pub(super) const NO_CHILD: u32 = u32::MAX;
 
 /// Entries of the stack before it goes on in the heap: enough unless a tree is huge or very uneven, and few
 /// enough to be cleared without a call.

@@ -3,9 +3,9 @@ use core::ops::ControlFlow;
 
 use drt_math::{Vec3, vec3};
 
+use super::arrays::MOST;
 use super::double::EdgeFrame;
 use super::starts::Starts;
-use super::validate::MOST;
 use super::{TetMesh, TetMeshError, flat_height};
 use crate::query::BoxTree;
 use crate::{Aabb, NONE};

@@ -6,6 +6,7 @@ use drt_math::{Real, Vec3};
 
 use crate::Aabb;
 
+mod arrays;
 mod conformity;
 mod double;
 mod error;

@@ -3,10 +3,7 @@ use alloc::vec::Vec;
 use super::double::EdgeFrame;
 use super::faces::is_even;
 use super::{TetLocator, TetMesh, TetMeshError};
-use crate::{is_usable, weld};
-
-/// Most tetrahedra, and vertices: 30 bits name them.
-pub(super) const MOST: usize = (1 << 30) - 1;
+use crate::weld;
 
 impl TetMesh {
     /// Checks that the tetrahedra are a mesh of a domain: every point of it lies in one of them, or
@@ -72,24 +69,5 @@ impl TetMesh {
                 })
             }
         }
-    }
-
-    /// Checks that positions can be computed with and that all indices name one.
-    pub(super) fn check_arrays(&self) -> Result<(), TetMeshError> {
-        let count = self.positions.len();
-        for (what, count) in [("vertices", count), ("tetrahedra", self.tets.len())] {
-            if count > MOST {
-                return Err(TetMeshError::TooLarge { what, count });
-            }
-        }
-        if let Some(vertex) = self.positions.iter().position(|p| !is_usable(*p)) {
-            return Err(TetMeshError::BadPosition { vertex: vertex as u32 });
-        }
-        for (tet, corners) in (0..).zip(&self.tets) {
-            if let Some(&index) = corners.iter().find(|v| **v as usize >= count) {
-                return Err(TetMeshError::IndexOutOfRange { tet, index, count });
-            }
-        }
-        Ok(())
     }
 }

@@ -12,6 +12,10 @@ use crate::NONE;
 /// For each corner the three others, so that the corner and they are a positive tetrahedron.
 pub(super) const OPPOSITE: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
+/// How far a vertex may be moved onto an input edge or triangle, of the largest coordinate: some
+/// roundings.
+pub(super) const ROUNDING: f64 = 1e-14;
+
 /// A positive tetrahedron, or a vacant place when its first vertex is [`NONE`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tet {

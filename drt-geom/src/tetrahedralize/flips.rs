@@ -2,9 +2,8 @@
 
 use alloc::vec::Vec;
 
-use super::complex::Complex;
+use super::complex::{Complex, ROUNDING};
 use super::plate::Plate;
-use super::recovery::ROUNDING;
 use crate::NONE;
 
 /// Rings longer than this are left alone: removing their edge is the cube of it in work.

@@ -4,8 +4,7 @@ use alloc::vec::Vec;
 
 use drt_math::Vec3;
 
-use super::complex::Complex;
-use super::recovery::ROUNDING;
+use super::complex::{Complex, ROUNDING};
 
 /// A triangle and the vertices that count as exactly on it: rounded ones are not.
 #[derive(Debug)]

@@ -10,16 +10,12 @@ use alloc::vec::Vec;
 
 use drt_math::{Rng, Vec3, vec3};
 
-use super::complex::Complex;
+use super::complex::{Complex, ROUNDING};
 use super::faces::sorted;
 use super::flips::Wanted;
 use super::input::{Carrier, FIRST, Merged, Named, edge_key};
 use super::{SurfaceTriangle, TetrahedralizeError};
 use crate::NONE;
-
-/// How far a vertex may be moved onto an input edge or triangle, of the largest coordinate: some
-/// roundings.
-pub(super) const ROUNDING: f64 = 1e-14;
 
 /// Changes tried at random, in all and with some more for each vertex: where many edges are
 /// missing, trials cost more than the vertices that they save.

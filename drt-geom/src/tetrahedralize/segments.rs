@@ -3,9 +3,10 @@
 use drt_math::Vec3;
 
 use super::TetrahedralizeError;
+use super::complex::ROUNDING;
 use super::flips::Wanted;
 use super::input::{Merged, edge_key};
-use super::recovery::{Kept, ROUNDING, Recovery};
+use super::recovery::{Kept, Recovery};
 use super::walk::Meets;
 use crate::NONE;
 

@@ -4,7 +4,8 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::Vec3;
 
-use super::triangle::{Triangle, View};
+use super::triangle::Triangle;
+use super::view::View;
 use super::{BEYOND, Kernel, MeanValueWeight, orientation, unit_of};
 use crate::error::Cause;
 

@@ -6,7 +6,8 @@ use drt_math::{Vec3, vec3};
 
 use super::hierarchy::{self, Cluster};
 use super::moments::{Derivatives, Moments};
-use super::triangle::{Triangle, View};
+use super::triangle::Triangle;
+use super::view::View;
 use super::{BEYOND, Kernel, MeanValueWeight, orientation, unit_of};
 use crate::error::Cause;
 use crate::volume::VolumeJet;

@@ -38,6 +38,7 @@ mod plane;
 mod quadrature;
 mod transpose;
 mod triangle;
+mod view;
 
 use drt_math::Vec3;
 

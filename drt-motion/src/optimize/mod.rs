@@ -45,6 +45,7 @@
 //! # Ok::<(), drt_motion::optimize::OptimizeError>(())
 //! ```
 
+mod checks;
 mod error;
 mod gauss_newton;
 mod method;

@@ -1,6 +1,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::checks::{all_finite, same_length};
 use super::{Averages, Method, Observation, OptimizeError, Variable};
 
 /// Everything that an [`Optimizer`] remembers, one number per variable in each list.
@@ -216,23 +217,5 @@ impl Optimizer {
         all_finite("the squares after the step", &next.second)?;
         self.state = next;
         Ok(())
-    }
-}
-
-pub(super) fn same_length(
-    what: &'static str,
-    expected: usize,
-    list: &[f64],
-) -> Result<(), OptimizeError> {
-    if list.len() == expected {
-        return Ok(());
-    }
-    Err(OptimizeError::Length { what, expected, found: list.len() })
-}
-
-pub(super) fn all_finite(what: &'static str, list: &[f64]) -> Result<(), OptimizeError> {
-    match list.iter().position(|v| !v.is_finite()) {
-        None => Ok(()),
-        Some(variable) => Err(OptimizeError::NotFinite { variable, what }),
     }
 }

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
-use super::{SmoothNormals, SurfaceElement, SurfaceMotion, SurfacePoint, VertexVectors};
+use super::{SmoothNormals, SurfaceMotion, SurfacePoint, VertexVectors};
 use crate::volume::VolumeAdjoint;
 
 /// What multiplies each entry of a [`SurfaceJet`](super::SurfaceJet) in a derivative.
@@ -41,18 +41,10 @@ impl VertexGradient {
         }
     }
 
-    /// Adds the transpose of the jet at a point, applied to `adjoint`.
-    ///
-    /// # Panics
-    /// When the point or this gradient belongs to another mesh.
-    pub fn scatter(&mut self, mesh: &Mesh, point: &SurfacePoint, adjoint: &JetAdjoint) {
-        SurfaceElement::new(mesh, point).scatter(adjoint, self);
-    }
-
     /// Adds the transpose of the [velocity](SurfaceMotion::velocity) at a point alone.
     ///
     /// # Panics
-    /// As [`scatter`](Self::scatter).
+    /// When the point or this gradient belongs to another mesh.
     pub fn scatter_velocity(&mut self, mesh: &Mesh, point: &SurfacePoint, u: Vec3) {
         let corners = mesh.triangles[point.triangle as usize];
         for (i, w) in corners.into_iter().zip(point.weights()) {

@@ -9,6 +9,7 @@ use drt_math::{Affine, Vec3};
 use crate::error::Cause;
 use crate::error::finite;
 
+mod area;
 mod caged;
 mod element;
 mod gradient;

@@ -5,8 +5,8 @@ use core::cell::OnceCell;
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Vec3};
 
+use super::area::Unit;
 use super::caged::Caged;
-use super::element::Unit;
 use super::normals::Neighbours;
 use super::turned::TurnedNormals;
 use super::{SmoothNormals, SurfaceMotion, VertexVectors};

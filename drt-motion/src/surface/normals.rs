@@ -6,7 +6,7 @@ use drt_geom::{Mesh, weld};
 use drt_math::{Vec3, fm};
 
 use super::VertexVectors;
-use super::element::{Unit, area_rate, area_rate_transposed, edges_and_area};
+use super::area::{Unit, area_rate, area_rate_transposed, edges_and_area};
 use super::reached::triangles_around;
 use crate::lists::Lists;
 

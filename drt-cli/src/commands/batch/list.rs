@@ -8,7 +8,8 @@ use serde::Deserialize;
 
 use crate::CliError;
 use crate::commands::options::{BatchOptions, ListLine, Options};
-use crate::error::{Place, read_text};
+use crate::error::Place;
+use crate::files::input_file::read_text;
 use crate::job::name_of;
 
 /// A job of a batch, with all its options.

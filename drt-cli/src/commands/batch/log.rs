@@ -8,7 +8,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use serde::Serialize;
 
 use super::list::Entry;
-use crate::{CliError, PROGRAM, input_file};
+use crate::files::input_file;
+use crate::{CliError, PROGRAM};
 
 /// Something that happened to a job.
 #[derive(Clone, Copy, Debug, Serialize)]

@@ -20,10 +20,11 @@ use super::options::BatchOptions;
 use super::outputs::Outputs;
 use super::run::{self, Shared};
 use super::{Outcome, render};
-use crate::fingerprint::Fingerprint;
-use crate::image::is_result_of;
+use crate::commands::console;
+use crate::commands::fingerprint::Fingerprint;
+use crate::files::image::is_result_of;
 use crate::wording::shown;
-use crate::{CliError, Job, console};
+use crate::{CliError, Job};
 
 /// The name of the log.
 const LOG: &str = "batch.jsonl";

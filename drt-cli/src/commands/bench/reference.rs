@@ -72,7 +72,7 @@ mod tests {
         let size = [13, 10];
         let value = |i: u32| (i * i % 97) as f32;
         let pixels: Vec<[f32; 3]> = (0..size[0] * size[1]).map(|i| [value(i); 3]).collect();
-        let rendering = crate::image::tests::rendering(size);
+        let rendering = crate::files::image::tests::rendering(size);
         let means = block_means(&pixels, size);
         assert_eq!(means.len(), rendering.image.blocks.len());
         // Cell (7, 7): columns 11 and 12, rows 8 and 9.

@@ -6,12 +6,14 @@ use std::path::Path;
 use drt_motion::optimize::State;
 use serde::{Deserialize, Serialize};
 
-use crate::atomic::write_atomically;
-use crate::error::{Place, read_text};
-use crate::fingerprint::Fingerprint;
+use crate::commands::fingerprint::Fingerprint;
+use crate::error::Place;
+use crate::files::atomic::write_atomically;
+use crate::files::input_file::read_text;
 
 use super::sources::Sources;
-use crate::{CliError, PROGRAM, checksum};
+use crate::files::checksum;
+use crate::{CliError, PROGRAM};
 
 /// The name of the file. It is replaced last: what else is in the folder is at least as new, and what
 /// is newer is made anew.
@@ -89,8 +91,7 @@ mod tests {
     use drt_motion::optimize::{Method, Optimizer, Variable};
 
     use super::*;
-    use crate::checksum::tests::damaged;
-    use crate::testing::Folder;
+    use crate::testing::{Folder, damaged};
 
     #[test]
     fn every_damaged_checkpoint_is_refused() {

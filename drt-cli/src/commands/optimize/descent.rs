@@ -17,13 +17,13 @@ use super::report::{self, Report};
 use super::sources::Sources;
 use super::team::Team;
 use super::watch::Watch;
-use crate::atomic::write_atomically;
 use crate::commands::Outcome;
 use crate::commands::clock::Clock;
+use crate::commands::fingerprint::Fingerprint;
 use crate::commands::monitor::Monitor;
 use crate::commands::stop;
 use crate::error::Place;
-use crate::fingerprint::Fingerprint;
+use crate::files::atomic::write_atomically;
 use crate::{CliError, PROGRAM};
 
 /// Seconds after which a checkpoint is written, however few iterations have passed.

@@ -7,9 +7,9 @@ use drt_math::Rgb;
 
 use super::problem::Problem;
 use crate::CliError;
-use crate::atomic::write_atomically;
-use crate::image::encode_png;
-use crate::image::tone::{Pixel, diverging, exposed, white_of};
+use crate::files::atomic::write_atomically;
+use crate::files::image::picture::encode_png;
+use crate::files::image::tone::{Pixel, diverging, exposed, white_of};
 
 /// Images on the way, the first and last included.
 const FRAMES: u32 = 9;

@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::error::{Place, read_text};
-use crate::{CliError, checksum};
+use crate::CliError;
+use crate::error::Place;
+use crate::files::checksum;
+use crate::files::input_file::read_text;
 
 /// The name of the table of values.
 pub(super) const PARAMETERS: &str = "params.csv";

@@ -1,6 +1,6 @@
 //! Steps that would lead out of where properties have a meaning.
 
-use crate::console;
+use crate::commands::console;
 
 /// How near to the limit a step comes, of the way there: a limit itself may have no meaning, as a roughness of zero.
 const PART: f64 = 0.9;

@@ -25,7 +25,7 @@ use super::monitor::Monitor;
 use super::options::OptimizeOptions;
 use super::outputs::Outputs;
 use super::{Outcome, run};
-use crate::atomic::check_folder;
+use crate::files::atomic::check_folder;
 use crate::{CliError, Job};
 use descent::Descent;
 use gallery::Gallery;

@@ -8,10 +8,10 @@ use drt_estimators::loss::Reference;
 use drt_math::Rng;
 use drt_motion::optimize::Stages;
 
+use crate::commands::fingerprint::Fingerprint;
 use crate::commands::options::OptimizeOptions;
 use crate::error::Place;
-use crate::fingerprint::Fingerprint;
-use crate::image::read_picture;
+use crate::files::image::read_picture;
 use crate::job::Optimize;
 use crate::{CliError, Job};
 

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use crate::commands::fingerprint::Fingerprint;
 use crate::error::Place;
-use crate::fingerprint::Fingerprint;
-use crate::{CliError, Job, input_file};
+use crate::files::input_file;
+use crate::{CliError, Job};
 
 /// Hashes of all files that a fit reads, but for the job, and the values given for the scene's `<default>` names.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize)]

@@ -6,7 +6,7 @@ use drt_math::Rgb;
 
 use super::super::Loader;
 use super::super::parts::Parts;
-use super::super::properties::Properties;
+use super::super::properties::{Properties, varies};
 use super::super::{spectrum, textures};
 use crate::CliError;
 
@@ -62,9 +62,7 @@ impl<'a> Loader<'a> {
             let message = format!("expected one texture inside, found {}", maps.len());
             return Err(p.element.error(message));
         };
-        if !textures::varies(map)
-            || matches!(map.attribute("type"), Some("mesh_attribute" | "volume"))
-        {
+        if !varies(map) || matches!(map.attribute("type"), Some("mesh_attribute" | "volume")) {
             return Err(
                 map.error("bumps need an image, or what else varies by texture coordinates")
             );
@@ -102,7 +100,7 @@ impl<'a> Loader<'a> {
 fn fraction(p: &Properties<'_>, name: &'static str) -> Result<Option<f64>, CliError> {
     let named = |e: &&_| p.is_property(e, name);
     match p.element.children.iter().find(named) {
-        Some(e) if !textures::varies(e) && !["float", "integer"].contains(&e.tag.as_str()) => {
+        Some(e) if !varies(e) && !["float", "integer"].contains(&e.tag.as_str()) => {
             p.property(name);
             let colour: Rgb = spectrum::reflected(e)?;
             Ok(Some(textures::grey(colour.to_array())))

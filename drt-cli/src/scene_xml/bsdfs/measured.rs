@@ -7,7 +7,8 @@ use drt_estimators::surface::Measured;
 
 use super::super::Loader;
 use super::super::properties::Properties;
-use crate::{CliError, input_file, measured_file};
+use crate::CliError;
+use crate::files::{input_file, measured_file};
 
 impl Loader<'_> {
     pub(super) fn measured(&self, p: &Properties<'_>) -> Result<Arc<Measured>, CliError> {

@@ -32,7 +32,7 @@ fn mended(e: &Element, path: &Path, (mesh, count): (Mesh, usize)) -> Mesh {
 }
 
 pub(super) fn bytes(e: &Element, path: &Path) -> Result<Vec<u8>, CliError> {
-    crate::input_file::read(path)
+    crate::files::input_file::read(path)
         .map_err(|err| e.error(format!("cannot read {}: {err}", path.display())))
 }
 

@@ -14,8 +14,9 @@ use drt_math::{Vec3, vec3};
 use flate2::read::ZlibDecoder;
 
 use super::mesh_file;
+use crate::CliError;
+use crate::files::memory;
 use crate::scene_xml::element::Element;
-use crate::{CliError, memory};
 
 /// More vertices or triangles are refused: they would take many gigabytes, which a small file can inflate to.
 const MOST: u64 = 1 << 27;

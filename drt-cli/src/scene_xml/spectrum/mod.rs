@@ -7,15 +7,13 @@ use drt_math::Rgb;
 
 use super::element::Element;
 use super::numbers::{number, numbers, plain_value};
-use super::properties::Properties;
-use super::textures;
+use super::properties::{Properties, no_texture};
 use crate::CliError;
-use crate::error::read_text;
+use crate::files::input_file::read_text;
 use observer::Spectrum;
 
 /// Tags that can give a colour; textures only where they are the same everywhere.
-pub(super) const TAGS: &[&str] =
-    &["rgb", "spectrum", "srgb", "float", "integer", "texture", "blackbody"];
+const TAGS: &[&str] = &["rgb", "spectrum", "srgb", "float", "integer", "texture", "blackbody"];
 
 /// The linear sRGB colour of light with the same power at every wavelength, which Mitsuba 3 gives
 /// to emitters with a `<spectrum>` of one number: XYZ = (1, 1, 1) seen by a space whose white is D65.
@@ -29,13 +27,31 @@ enum Of {
     Light,
 }
 
+impl Properties<'_> {
+    /// A colour of something that reflects, refracts or absorbs, for which no texture stands.
+    pub(super) fn uniform_color(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
+        if self.varying(name).is_some() {
+            return Err(no_texture(self.element, name));
+        }
+        self.value(name, TAGS, reflected)
+    }
+
+    /// A colour of light.
+    pub(super) fn light(&self, name: &'static str) -> Result<Option<Rgb>, CliError> {
+        if let Some(e) = self.varying(name) {
+            return Err(no_texture(e, name));
+        }
+        self.value(name, TAGS, emitted)
+    }
+}
+
 /// The colour of something that reflects, refracts or absorbs.
 pub(super) fn reflected(e: &Element) -> Result<Rgb, CliError> {
     color(e, Of::Matter)
 }
 
 /// The colour of light.
-pub(super) fn emitted(e: &Element) -> Result<Rgb, CliError> {
+fn emitted(e: &Element) -> Result<Rgb, CliError> {
     color(e, Of::Light)
 }
 
@@ -99,27 +115,27 @@ fn seen(spectrum: &Spectrum, of: Of) -> Rgb {
 /// A spectrum, or a texture that is the same everywhere, as a plugin.
 fn plugin(e: &Element, of: Of) -> Result<Rgb, CliError> {
     let p = Properties::of(e)?;
-    let one = |name| Ok::<f64, CliError>(p.float(name)?.unwrap_or(1.0));
+    let one = |name| Ok::<f64, CliError>(p.number(name)?.unwrap_or(1.0));
     let needed = |name: &str| e.error(format!("`{name}` is missing"));
     let color = match p.kind()? {
         "uniform" => Rgb::splat(one("value")?),
         // The white of linear sRGB.
-        "d65" => p.color("color")?.unwrap_or(Rgb::ONE) * one("scale")?,
-        "srgb" => p.color("color")?.ok_or_else(|| needed("color"))?,
+        "d65" => p.uniform_color("color")?.unwrap_or(Rgb::ONE) * one("scale")?,
+        "srgb" => p.uniform_color("color")?.ok_or_else(|| needed("color"))?,
         "rawconstant" => match p.vector("value") {
             Ok(Some(v)) => Rgb::new(v.x, v.y, v.z),
-            _ => Rgb::splat(p.float("value")?.ok_or_else(|| needed("value"))?),
+            _ => Rgb::splat(p.number("value")?.ok_or_else(|| needed("value"))?),
         },
         "scale" if e.is_legacy() => {
-            let inner = textures::scaled(&p)?;
-            color(inner, of)? * textures::factor(&p)?
+            let inner = scaled(&p)?;
+            color(inner, of)? * factor(&p)?
         }
         "blackbody" => {
-            let kelvin = p.float("temperature")?.ok_or_else(|| needed("temperature"))?;
+            let kelvin = p.number("temperature")?.ok_or_else(|| needed("temperature"))?;
             glowing(e, kelvin, of)?
         }
         "regular" => {
-            let (from, to) = (p.float("wavelength_min")?, p.float("wavelength_max")?);
+            let (from, to) = (p.number("wavelength_min")?, p.number("wavelength_max")?);
             let values = list(&p, "values")?.ok_or_else(|| needed("values"))?;
             let (Some(from), Some(to)) = (from, to) else {
                 return Err(needed("wavelength_min` or `wavelength_max"));
@@ -149,6 +165,23 @@ fn plugin(e: &Element, of: Of) -> Result<Rgb, CliError> {
     };
     p.finish()?;
     Ok(color)
+}
+
+/// The texture that a `scale` of version 0.5 and 0.6 is of.
+pub(super) fn scaled<'a>(p: &Properties<'a>) -> Result<&'a Element, CliError> {
+    let scale = |e: &Element| p.is_property(e, "scale");
+    match p.children(|e| matches!(e.tag.as_str(), "texture" | "spectrum") && !scale(e))[..] {
+        [inner] => Ok(inner),
+        ref other => {
+            let message = format!("expected one texture inside, found {}", other.len());
+            Err(p.element.error(message))
+        }
+    }
+}
+
+/// What such a `scale` multiplies by.
+pub(super) fn factor(p: &Properties<'_>) -> Result<Rgb, CliError> {
+    Ok(p.uniform_color("scale")?.unwrap_or(Rgb::ONE))
 }
 
 /// The numbers of a `<string>`.

@@ -2,7 +2,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use super::PlyErrorKind;
-use super::header::{Property, Scalar};
+use super::property::{Property, Scalar};
 
 /// How numbers are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,6 +13,7 @@ use crate::{Mesh, MeshError, NONE};
 mod attributes;
 mod body;
 mod header;
+mod property;
 
 /// What is wrong with a PLY file, and where.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

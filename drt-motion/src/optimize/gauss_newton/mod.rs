@@ -85,7 +85,7 @@ use drt_math::dense::{Cholesky, dot, times, zeros};
 use drt_math::fm;
 
 use super::OptimizeError;
-use super::optimizer::{all_finite, same_length};
+use super::checks::{all_finite, same_length};
 use least::least;
 use metric::{Metric, Signal, table};
 

@@ -115,7 +115,7 @@ impl Ranks {
     }
 
     pub(super) fn abort(&self, error: &CliError) -> ! {
-        crate::console::note(format_args!("drt: error: {error}"));
+        crate::commands::console::note(format_args!("drt: error: {error}"));
         self.world.abort(i32::from(error.exit_code()))
     }
 

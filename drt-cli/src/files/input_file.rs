@@ -54,3 +54,11 @@ pub(crate) fn unreadable(path: &Path, from: Option<&Place>, e: &io::Error) -> Cl
         None => CliError::input(&Place::file(path), format!("cannot read this file: {e}")),
     }
 }
+
+/// Reads a text file that was named at `from`.
+pub(crate) fn read_text(path: &Path, from: Option<&Place>) -> Result<String, CliError> {
+    let bytes = read_at(path, from)?;
+    let not_text = |_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text");
+    let text = String::from_utf8(bytes).map_err(not_text);
+    text.map_err(|e| unreadable(path, from, &e))
+}

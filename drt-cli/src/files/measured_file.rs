@@ -2,10 +2,13 @@
 
 use drt_estimators::surface::{MeasuredTables, Tensor};
 
-use crate::tensor_file::{self, TensorFile, Values};
+use crate::files::tensor_file::{self, TensorFile, Values};
 
-/// The tables of a file, not yet checked for making a material.
-pub(crate) fn decode(bytes: &[u8]) -> Result<MeasuredTables, String> {
+/// Reads the tables of a file, not yet checked for making a material, from its bytes.
+///
+/// # Errors
+/// Names the field that is missing, or has another type or shape than it should.
+pub fn decode(bytes: &[u8]) -> Result<MeasuredTables, String> {
     let file = TensorFile::new(bytes)?;
     if !file.has("rgb") && file.has("spectra") {
         return Err("it has `spectra`, but no `rgb`; take the RGB file of the material".into());

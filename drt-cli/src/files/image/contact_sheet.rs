@@ -9,7 +9,7 @@ use super::font;
 use super::picture::encode_png;
 use super::tone::{self, Pixel};
 use crate::CliError;
-use crate::atomic::write_atomically;
+use crate::files::atomic::write_atomically;
 
 const BACKGROUND: Pixel = [38, 38, 40];
 const INK: Pixel = [225, 225, 225];
@@ -61,7 +61,10 @@ fn exposed(image: &[Rgb]) -> Vec<Pixel> {
 
 /// Writes a preview of layers of a file, by their names: what may be negative from blue through white (zero) to red, each in its own
 /// range, all else as light. One layer is written pixel for pixel.
-pub(crate) fn write_layers(
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_layers(
     path: &Path,
     size: [u32; 2],
     layers: &[(&str, &[[f32; 3]])],
@@ -77,7 +80,7 @@ pub(crate) fn write_layers(
 }
 
 /// True for the name of a layer of standard errors.
-pub(crate) fn is_error(name: &str) -> bool {
+pub fn is_error(name: &str) -> bool {
     name == "stderr" || name.ends_with("_stderr")
 }
 

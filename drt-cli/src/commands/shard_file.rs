@@ -12,11 +12,12 @@ use drt_estimators::{Shard, ShardSums};
 use drt_math::Rgb;
 use serde::{Deserialize, Serialize};
 
+use super::fingerprint::Fingerprint;
 use crate::error::Place;
-use crate::fingerprint::Fingerprint;
-use crate::image::attachment;
-use crate::npy::{is_npy, npy_bytes};
-use crate::{CliError, PROGRAM, checksum, input_file};
+use crate::files::image::attachment;
+use crate::files::npy::{is_npy, npy_bytes};
+use crate::files::{checksum, input_file};
+use crate::{CliError, PROGRAM};
 
 /// Everything that a shard knows.
 #[derive(Clone, Debug, Deserialize, Serialize)]
@@ -169,8 +170,7 @@ pub(crate) fn view(target: Reference) -> View {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::checksum::tests::damaged;
-    use crate::testing::Folder;
+    use crate::testing::{Folder, damaged};
 
     const SCENE: &str = r#"<scene version="3.0.0"><sensor type="perspective">
   <film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="4"/></film></sensor>

@@ -3,9 +3,10 @@
 use std::io::Write;
 use std::path::Path;
 
-use crate::atomic::write_atomically;
+use crate::CliError;
 use crate::error::Place;
-use crate::{CliError, checksum, input_file};
+use crate::files::atomic::write_atomically;
+use crate::files::{checksum, input_file};
 
 /// Header and magic number together are padded to a multiple of this.
 const ALIGNMENT: usize = 64;
@@ -17,7 +18,19 @@ const BYTES: &str = "|u1";
 const MOST_HEADER: u64 = 1 << 16;
 
 /// Writes numbers as an array of one dimension and 64-bit floats.
-pub(crate) fn write_npy(path: &Path, values: &[f64]) -> Result<(), CliError> {
+///
+/// ```
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("gradient.npy");
+/// drt_cli::write_npy(&path, &[0.5, -1.0])?;
+/// let file = std::fs::read(&path)?;
+/// assert!(file.starts_with(b"\x93NUMPY") && file.ends_with(&(-1.0_f64).to_le_bytes()));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_npy(path: &Path, values: &[f64]) -> Result<(), CliError> {
     write_atomically(path, |out| {
         out.write_all(&header(FLOATS, values.len()))?;
         for value in values {
@@ -27,21 +40,24 @@ pub(crate) fn write_npy(path: &Path, values: &[f64]) -> Result<(), CliError> {
     })
 }
 
-/// Writes bytes as an array of one dimension, with the checksum that they may have a place for.
-pub(crate) fn write_npy_bytes(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+/// Writes bytes as an array of one dimension, with the [`checksum`] that they may have a place for.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_npy_bytes(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     let mut file = header(BYTES, bytes.len());
     file.extend(bytes);
     checksum::seal(&mut file);
     write_atomically(path, |out| Ok(out.write_all(&file)?))
 }
 
-/// True for a file that begins as NPY does.
-pub(crate) fn is_npy(file: &[u8]) -> bool {
+/// True for the bytes of a file that begins as NPY does.
+pub fn is_npy(file: &[u8]) -> bool {
     file.starts_with(MAGIC)
 }
 
-/// The array of a file that [`write_npy_bytes`] wrote; `None` for others.
-pub(crate) fn npy_bytes(mut bytes: Vec<u8>) -> Option<Vec<u8>> {
+/// Takes the array out of the bytes of a file that [`write_npy_bytes`] wrote; `None` for others.
+pub fn npy_bytes(mut bytes: Vec<u8>) -> Option<Vec<u8>> {
     // The header says how many there are; what it is must be the same to the byte.
     let of = |b: &[u8]| Some(10 + usize::from(*b.get(8)?) + (usize::from(*b.get(9)?) << 8));
     let start = of(&bytes).filter(|start| *start <= bytes.len())?;
@@ -49,9 +65,12 @@ pub(crate) fn npy_bytes(mut bytes: Vec<u8>) -> Option<Vec<u8>> {
     (bytes == header(BYTES, content.len())).then_some(content)
 }
 
-/// Columns and rows of an image, and its pixels row by row: an array of rows × columns × 3 floats of 32 or 64 bits. A file
-/// that is too large for one of the size that is expected is not read.
-pub(crate) fn read_npy_image(
+/// Reads an image, an array of rows × columns × 3 floats of 32 or 64 bits: its columns and rows, and its pixels row by row. A
+/// file that is too large for one of the size that is expected is not read.
+///
+/// # Errors
+/// When the file cannot be read, is cut off or holds something else.
+pub fn read_npy_image(
     path: &Path,
     expected: [u32; 2],
 ) -> Result<([u32; 2], Vec<[f64; 3]>), CliError> {

@@ -45,7 +45,10 @@ pub fn check_target(path: &Path) -> Result<(), CliError> {
 }
 
 /// Refuses a folder that can be neither written to nor made, before hours of work are spent for it. It makes none.
-pub(crate) fn check_folder(folder: &Path) -> Result<(), CliError> {
+///
+/// # Errors
+/// Names the folder and what stands in the way.
+pub fn check_folder(folder: &Path) -> Result<(), CliError> {
     let there = folder.ancestors().map(here).find(|f| f.symlink_metadata().is_ok());
     let there = there.unwrap_or(Path::new("."));
     if !there.is_dir() {

@@ -8,14 +8,15 @@ use drt_math::Rgb;
 
 use super::exr_file::{CHANNELS, read_plain};
 use super::tone::Pixel;
+use crate::CliError;
 use crate::error::Place;
-use crate::npy::{MAGIC, read_npy_image};
-use crate::{CliError, input_file};
+use crate::files::input_file;
+use crate::files::npy::{MAGIC, read_npy_image};
 
 /// A picture, row by row from the top left.
-pub(crate) struct Picture {
+pub struct Picture {
     /// Columns and rows.
-    pub(crate) size: [u32; 2],
+    pub size: [u32; 2],
     /// What is stored: linear colours in EXR, in PNG values from 0 to 1.
     values: Vec<Rgb>,
     /// Values are encoded for screens.
@@ -24,7 +25,7 @@ pub(crate) struct Picture {
 
 impl Picture {
     /// Linear colours; those of PNG are taken as sRGB.
-    pub(crate) fn linear(self) -> Vec<Rgb> {
+    pub fn linear(self) -> Vec<Rgb> {
         match self.encoded {
             true => self.values.into_iter().map(|v| v.map(decode)).collect(),
             false => self.values,
@@ -32,14 +33,17 @@ impl Picture {
     }
 
     /// One number per pixel, as stored, whatever the encoding.
-    pub(crate) fn gray(&self) -> Vec<f64> {
+    pub fn gray(&self) -> Vec<f64> {
         self.values.iter().map(|v| v.mean()).collect()
     }
 }
 
 /// Reads a picture that must be of a film's size: EXR (its plain `R`, `G`, `B`, or `Y` in place of all three), NPY or PNG;
 /// its first bytes tell which of them it is. What says in its header that it is of another size is not read any further.
-pub(crate) fn read_picture(path: &Path, film: [u32; 2]) -> Result<Picture, CliError> {
+///
+/// # Errors
+/// Names the file and what is wrong with it or its size.
+pub fn read_picture(path: &Path, film: [u32; 2]) -> Result<Picture, CliError> {
     let mut start = Vec::new();
     let first = input_file::open(path).and_then(|f| f.take(8).read_to_end(&mut start));
     first.map_err(|e| input_file::unreadable(path, None, &e))?;

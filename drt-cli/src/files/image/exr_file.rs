@@ -14,9 +14,10 @@ use exr::prelude::{
     WritableImage,
 };
 
-use crate::atomic::write_atomically;
+use crate::CliError;
 use crate::error::Place;
-use crate::{CliError, checksum, input_file, memory};
+use crate::files::atomic::write_atomically;
+use crate::files::{checksum, input_file, memory};
 
 /// Where an image comes from; stored with it.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,11 +55,12 @@ const ATTACHMENT: &str = "drt_shard";
 /// Most bytes that the format's headers hold in one.
 const MOST_BYTES: usize = i32::MAX as usize;
 
-/// What a shard has left in a file with these bytes; `None` where it is of no shard.
+/// Takes what a shard has left, [`Provenance::attachment`], out of the bytes of a file, whose path is for messages; `None`
+/// where it is of no shard.
 ///
 /// # Errors
 /// When it is malformed.
-pub(crate) fn attachment(path: &Path, file: &[u8]) -> Result<Option<Vec<u8>>, CliError> {
+pub fn attachment(path: &Path, file: &[u8]) -> Result<Option<Vec<u8>>, CliError> {
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(file), false)
         .map_err(|e| CliError::input(&Place::file(path), e))?;
     let of = |header: exr::meta::header::Header| match header
@@ -72,8 +74,8 @@ pub(crate) fn attachment(path: &Path, file: &[u8]) -> Result<Option<Vec<u8>>, Cl
     Ok(meta.headers.into_iter().find_map(of))
 }
 
-/// True where a file is a complete result of inputs with this hash, by this version of the program.
-pub(crate) fn is_result_of(path: &Path, inputs: &str) -> bool {
+/// True where a file is a complete result of inputs with this hash, [`Provenance::inputs`], by this version of the program.
+pub fn is_result_of(path: &Path, inputs: &str) -> bool {
     let Ok(meta) = exr::meta::MetaData::read_from_file(path, false) else { return false };
     meta.headers.iter().any(|header| {
         let attributes = &header.own_attributes;
@@ -88,6 +90,34 @@ pub(crate) fn is_result_of(path: &Path, inputs: &str) -> bool {
 pub(super) const CHANNELS: [&str; 3] = ["R", "G", "B"];
 
 /// Writes a result, with further images (such as finite differences) by layer name.
+///
+/// ```
+/// use drt_cli::{Provenance, parse_scene_str, read_exr, write_exr};
+/// use drt_estimators::{Session, Settings, Unattended};
+///
+/// let scene = parse_scene_str(
+///     r#"<scene version="3.0.0">
+///          <sensor type="perspective">
+///            <film type="hdrfilm">
+///              <integer name="width" value="4"/>
+///              <integer name="height" value="3"/>
+///            </film>
+///          </sensor>
+///          <emitter type="constant" id="sky"/>
+///        </scene>"#,
+///     std::path::Path::new("."),
+/// )?;
+/// let mut session = Session::new(&scene, &[], &Settings::default())?;
+/// session.run(1, &Unattended);
+///
+/// # let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("sky.exr");
+/// let provenance = Provenance { scene: "sky.xml".into(), ..Provenance::default() };
+/// write_exr(&path, &session.rendering(), &[], &provenance)?;
+/// let file = read_exr(&path)?;
+/// assert_eq!((file.size, file.attributes["drt_scene"].as_str()), ([4, 3], "sky.xml"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// When the file cannot be written.

@@ -1,4 +1,7 @@
 //! Checksums over whole files that other runs go on from. Any bit that has flipped is found.
+//!
+//! A binary file has a place for its checksum somewhere in it: [`space`] makes the place, [`seal`] fills it in, and
+//! [`is_whole`] looks at it. JSON has its checksum at the end: [`seal_json`] and [`is_whole_json`].
 
 use crc32fast::Hasher;
 
@@ -7,8 +10,8 @@ const SEAL: [u8; 16] = *b"\xd7drt\xffcrc32\x80hole\xa9";
 /// The length of what [`space`] gives.
 const LENGTH: usize = SEAL.len() + 4;
 
-/// What a binary file has where its checksum shall be.
-pub(crate) fn space() -> [u8; LENGTH] {
+/// Gives the bytes that a binary file has where its checksum shall be.
+pub fn space() -> [u8; LENGTH] {
     let mut space = [0; LENGTH];
     space[..SEAL.len()].copy_from_slice(&SEAL);
     space
@@ -28,57 +31,44 @@ fn sum(file: &[u8], at: usize) -> [u8; 4] {
 }
 
 /// Fills in the checksum of a file that has a place for it.
-pub(crate) fn seal(file: &mut [u8]) {
+pub fn seal(file: &mut [u8]) {
     if let Some(at) = find(file) {
         let sum = sum(file, at);
         file[at + SEAL.len()..at + LENGTH].copy_from_slice(&sum);
     }
 }
 
-/// Whether a file is what was sealed; `None` where it has no place for a checksum.
-pub(crate) fn is_whole(file: &[u8]) -> Option<bool> {
+/// Tells whether a file is what was sealed; `None` where it has no place for a checksum.
+pub fn is_whole(file: &[u8]) -> Option<bool> {
     let at = find(file)?;
     Some(file[at + SEAL.len()..at + LENGTH] == sum(file, at))
 }
 
-/// What follows the checksum's place in a part of a file that begins with it.
-pub(crate) fn content(part: &[u8]) -> Option<&[u8]> {
+/// Gives what follows the checksum's place in a part of a file that begins with it; `None` for other parts.
+pub fn content(part: &[u8]) -> Option<&[u8]> {
     part.starts_with(&SEAL).then(|| part.get(LENGTH..)).flatten()
 }
 
-/// The checksum of a text.
-pub(crate) fn of_text(text: &str) -> u32 {
+/// Computes the checksum of a text.
+pub fn of_text(text: &str) -> u32 {
     crc32fast::hash(text.as_bytes())
 }
 
-/// A JSON object, which must not be empty, with the checksum of all before as its last entry, as the text of a file.
-pub(crate) fn seal_json(object: &str) -> String {
+/// Adds to a JSON object, which must not be empty, the checksum of all before as its last entry, and gives the text of a file.
+pub fn seal_json(object: &str) -> String {
     let body = object.trim_end().strip_suffix('}').unwrap_or(object);
     format!("{body},\"crc32\":\"{:08x}\"}}\n", of_text(body))
 }
 
-/// Whether the text of a file is what [`seal_json`] gave.
-pub(crate) fn is_whole_json(text: &str) -> bool {
+/// Tells whether the text of a file is what [`seal_json`] gave.
+pub fn is_whole_json(text: &str) -> bool {
     let body = text.rsplit_once(",\"crc32\":");
     body.is_some_and(|(body, _)| seal_json(&format!("{body}}}")) == text)
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use drt_math::Rng;
-
+mod tests {
     use super::*;
-
-    /// Copies of a file with one bit flipped in each.
-    pub(crate) fn damaged(file: &[u8], count: u32) -> impl Iterator<Item = Vec<u8>> {
-        let mut rng = Rng::new(11, 0, 0);
-        (0..count).map(move |_| {
-            let bit = (rng.next_f64() * 8.0 * file.len() as f64) as usize;
-            let mut copy = file.to_vec();
-            copy[bit / 8] ^= 1 << (bit % 8);
-            copy
-        })
-    }
 
     #[test]
     fn every_flipped_bit_is_found() {

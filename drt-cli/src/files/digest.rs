@@ -8,8 +8,7 @@ use drt_math::Rgb;
 use serde::{Serialize, Serializer};
 
 use crate::CliError;
-use crate::atomic::write_atomically;
-use crate::console;
+use crate::files::atomic::write_atomically;
 
 /// What a digest says beyond the rendering itself.
 #[derive(Clone, Debug)]
@@ -228,22 +227,19 @@ pub fn digest(rendering: &Rendering, facts: &RunFacts, checks: &[Verdict]) -> St
     serde_json::to_string(&digest).unwrap_or_default()
 }
 
-/// Writes a digest; `-` is the standard output.
+/// Writes a digest, a line of JSON.
 ///
 /// # Errors
 /// When it cannot be written.
 pub fn write_digest(path: &Path, text: &str) -> Result<(), CliError> {
     use std::io::Write;
-    if path.as_os_str() == "-" {
-        return console::print(format!("{text}\n"));
-    }
     write_atomically(path, |out| Ok(writeln!(out, "{text}")?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::tests::rendering;
+    use crate::files::image::tests::rendering;
     use crate::testing::Folder;
 
     fn facts() -> RunFacts {

@@ -1,0 +1,13 @@
+//! Image files: EXR with everything, PNG to look at.
+
+mod contact_sheet;
+mod exr_file;
+mod font;
+pub(crate) mod picture;
+#[cfg(test)]
+pub(crate) mod tests;
+pub(crate) mod tone;
+
+pub use contact_sheet::{is_error, write_layers, write_preview};
+pub use exr_file::{ExrFile, Provenance, attachment, is_result_of, read_exr, write_exr};
+pub use picture::{Picture, read_picture};

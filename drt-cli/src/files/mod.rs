@@ -1,0 +1,13 @@
+//! Files other than scenes and jobs: images, arrays, digests and tables of materials, and how files are read and written
+//! whole.
+
+pub mod atomic;
+pub mod checksum;
+pub mod digest;
+pub mod image;
+pub(crate) mod input_file;
+pub(crate) mod lines;
+pub mod measured_file;
+pub(crate) mod memory;
+pub mod npy;
+pub(crate) mod tensor_file;
