@@ -19,7 +19,7 @@ pub use files::image::{
 };
 pub use files::measured_file::encode_measured;
 pub use files::npy::write_npy;
-pub use job::{Collector, Job, Optimize, Overrides, ParameterGroup, load_job};
+pub use job::{GroupSteps, Job, Optimize, Overrides, ParameterGroup, load_job};
 pub use scene_xml::{Defaults, load_scene, parse_scene_str};
 
 /// Name and version, as files carry them.

@@ -20,7 +20,7 @@ use super::{Outcome, run, shard, stop};
 use crate::error::Place;
 use crate::files::image::read_picture;
 use crate::files::npy::{write_npy, write_npy_bytes};
-use crate::{CliError, Job};
+use crate::{CliError, Job, ParameterGroup};
 
 /// Between the seeds of an image and of the gradient by what it says.
 const INDEPENDENT: u64 = 0xa076_1d64_78bd_642f;
@@ -210,8 +210,10 @@ fn in_reverse(
     mut each: impl FnMut(Batch),
 ) -> Result<bool, CliError> {
     let scene = moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
-    let wanted: Vec<Target> = job.groups.iter().map(|g| g.target).collect();
-    let groups: Vec<_> = job.groups.iter().map(|g| g.collector(&job.scene, &scene)).collect();
+    let wanted: Vec<Target> = job.groups.iter().map(|g| g.group.target).collect();
+    let collector = |g: &ParameterGroup| g.group.collector(&job.scene, &scene, &job.parameters);
+    let groups = job.groups.iter().map(collector).collect::<Result<Vec<_>, _>>();
+    let groups = groups.map_err(|e| job.blame(&e))?;
     let numbers = |gradient: &SceneGradient| {
         let mut numbers = Vec::new();
         groups.iter().for_each(|group| group.collect(gradient, &mut numbers));

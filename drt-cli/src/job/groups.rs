@@ -1,40 +1,40 @@
 //! From `[[parameter_group]]` to many parameters at once.
 
 use std::path::Path;
-use std::sync::Arc;
 
-use drt_estimators::surface;
-use drt_estimators::{Scene, SceneGradient, Target};
-use drt_geom::Mesh;
-use drt_motion::mean_value::{Cage, CageWeights};
-use drt_motion::surface::{SmoothNormals, in_file_order};
+use drt_estimators::fit::{Group, GroupKind};
+use drt_estimators::{Scene, Target, surface};
+use drt_motion::optimize::Stages;
 use toml::Spanned;
 
 use super::cages::Cages;
 use super::document::Document;
 use super::keys;
+use super::list::List;
 use crate::CliError;
 
-/// Parameters that are all zero in the scene's file and too many to name.
+/// Parameters that are too many to name, and how a fit steps them.
 #[derive(Clone, Debug)]
 pub struct ParameterGroup {
-    /// What they change.
-    pub target: Target,
-    kind: GroupKind,
+    /// What they are.
+    pub group: Group,
+    /// How they are stepped.
+    pub steps: GroupSteps,
 }
 
+/// How a fit steps a group.
 #[derive(Clone, Debug)]
-enum GroupKind {
-    /// The x, y and z of each vertex of the shape's file.
-    Vertices,
-    /// The x, y and z of each vertex of a cage around the shape.
-    Cage(Arc<Mesh>),
-    /// Each voxel's value, channel by channel.
-    Voxels(drt_medium::Property),
-    /// Each texel's value, channel by channel; of a number, that alone.
-    Texels { of: surface::Property, number: bool },
-    /// Each texel's value of the image that tells an emitter's light.
-    LightTexels,
+pub struct GroupSteps {
+    /// By iteration; the optimizer's where it is `None`.
+    pub learning_rate: Option<Stages<f64>>,
+    /// λ of the preconditioner (I + λ L)⁻², L being the combinatorial Laplacian of the mesh; 0 is none.
+    pub laplacian: f64,
+    /// Weight of total variation (voxels, texels), or of the Laplacian's energy (vertices).
+    pub smooth: f64,
+    /// Least and largest value.
+    pub bounds: [f64; 2],
+    /// The logarithm is stepped.
+    pub log: bool,
 }
 
 pub(super) fn groups(
@@ -44,49 +44,80 @@ pub(super) fn groups(
     scene: &Scene,
 ) -> Result<Vec<ParameterGroup>, CliError> {
     let mut cages = Cages::default();
-    keys.iter()
-        .map(|spanned| {
-            let fail = |message: String| {
-                document.error_at(spanned.span().start, format!("[[parameter_group]]: {message}"))
-            };
-            let keys = spanned.get_ref();
-            let target = scene.find(&keys.target).map_err(|e| fail(e.to_string()))?;
-            let wrong = |what: &str| fail(format!("`{}` is not {what}", keys.target));
-            let kind = match (&keys.vertices, &keys.cage, &keys.voxels, &keys.texels) {
-                (Some(_), None, None, None) => GroupKind::Vertices,
-                (None, Some(cage), None, None) => {
-                    let mesh = cages.load(&folder.join(&cage.mesh));
-                    GroupKind::Cage(mesh.map_err(|refusal| refusal.told(fail))?)
-                }
-                (None, None, Some(_), None) => {
-                    GroupKind::Voxels(property(keys.property.as_deref()).map_err(fail)?)
-                }
-                (None, None, None, Some(_)) => {
-                    return texels(scene, target, keys.property.as_deref()).map_err(fail);
-                }
-                _ => {
-                    return Err(fail(
-                        "expected one of `vertices`, `cage`, `voxels` and `texels`".into(),
-                    ));
-                }
-            };
-            match (&kind, target) {
-                (GroupKind::Voxels(property), Target::Medium(m)) => {
-                    match scene.media[m].item.voxels(*property) {
-                        Some(_) => Ok(ParameterGroup { target, kind }),
-                        None => Err(wrong("a medium with a grid of that property")),
-                    }
-                }
-                (GroupKind::Voxels(_), _) => Err(wrong("a medium with a grid")),
-                (_, Target::Shape(_)) => Ok(ParameterGroup { target, kind }),
-                _ => Err(wrong("a shape")),
+    let mut groups: Vec<ParameterGroup> = Vec::new();
+    for spanned in keys {
+        let fail = |message: String| {
+            document.error_at(spanned.span().start, format!("[[parameter_group]]: {message}"))
+        };
+        let keys = spanned.get_ref();
+        let (target, kind) = match &keys.cage {
+            Some(cage) => {
+                let mesh = cages.load(&folder.join(&cage.mesh));
+                let mesh = mesh.map_err(|refusal| refusal.told(fail))?;
+                alone(keys).map_err(fail)?;
+                let target = scene.find(&keys.target).map_err(|e| fail(e.to_string()))?;
+                (target, GroupKind::Cage(mesh))
             }
-        })
-        .collect()
+            None => unknowns(scene, keys).map_err(fail)?,
+        };
+        let shape = matches!(kind, GroupKind::Vertices | GroupKind::Cage(_));
+        if shape && !matches!(target, Target::Shape(_)) {
+            return Err(fail(format!("`{}` is not a shape", keys.target)));
+        }
+        let name = keys.name.clone().unwrap_or_else(|| keys.target.clone());
+        if name.is_empty() || name.contains(['/', '\\', ',', '"']) || name.starts_with('.') {
+            return Err(fail(format!("`name`: \"{name}\" cannot be the name of a file")));
+        }
+        if groups.iter().any(|g| g.group.name == name) {
+            return Err(fail(format!("there are two groups `{name}`; expected a `name` of each")));
+        }
+        let steps = steps(keys, &kind).map_err(fail)?;
+        let group = Group::new(name, scene, &target, kind).map_err(|e| fail(e.to_string()))?;
+        groups.push(ParameterGroup { group, steps });
+    }
+    Ok(groups)
+}
+
+/// Refuses more than one kind of unknowns.
+fn alone(keys: &keys::ParameterGroup) -> Result<(), String> {
+    let kinds = [
+        keys.vertices.is_some(),
+        keys.cage.is_some(),
+        keys.voxels.is_some(),
+        keys.texels.is_some(),
+    ];
+    match kinds.into_iter().filter(|given| *given).count() {
+        1 => Ok(()),
+        _ => Err("expected one of `vertices`, `cage`, `voxels` and `texels`".into()),
+    }
+}
+
+fn unknowns(scene: &Scene, keys: &keys::ParameterGroup) -> Result<(Target, GroupKind), String> {
+    alone(keys)?;
+    let target = scene.find(&keys.target).map_err(|e| e.to_string())?;
+    if keys.vertices.is_some() {
+        return Ok((target, GroupKind::Vertices));
+    }
+    if keys.texels.is_some() {
+        return texels(scene, target, keys.property.as_deref());
+    }
+    let property = property(keys.property.as_deref())?;
+    let wrong = |what: &str| Err(format!("`{}` is not {what}", keys.target));
+    match target {
+        Target::Medium(m) if scene.media[m].item.voxels(property).is_some() => {
+            Ok((target, GroupKind::Voxels(property)))
+        }
+        Target::Medium(_) => wrong("a medium with a grid of that property"),
+        _ => wrong("a medium with a grid"),
+    }
 }
 
 /// The texels that stand for a property of a target, or of the BSDF that it has.
-fn texels(scene: &Scene, target: Target, property: Option<&str>) -> Result<ParameterGroup, String> {
+fn texels(
+    scene: &Scene,
+    target: Target,
+    property: Option<&str>,
+) -> Result<(Target, GroupKind), String> {
     let name = property.ok_or("`texels` need the `property` that they stand for")?;
     let no_texture = || format!("no texture stands for `{name}` whose texels could change");
     let target = match target {
@@ -102,22 +133,22 @@ fn texels(scene: &Scene, target: Target, property: Option<&str>) -> Result<Param
             let emitter = &scene.emitters[e].item.emitter;
             emitter.property(name).map_err(|e| e.to_string())?;
             emitter.texels().ok_or_else(no_texture)?;
-            return Ok(ParameterGroup { target, kind: GroupKind::LightTexels });
+            return Ok((target, GroupKind::LightTexels));
         }
         _ => return Err("only textures of BSDFs and emitters have texels".into()),
     };
-    let of = surface::Property::from_name(name).map_err(|e| e.to_string())?;
+    let property = surface::Property::from_name(name).map_err(|e| e.to_string())?;
     let bsdf = &scene.bsdfs[b].item;
-    if bsdf.texels(of).is_none() {
+    if bsdf.texels(property).is_none() {
         return Err(no_texture());
     }
-    if let Some(reason) = bsdf.undifferentiated(of) {
+    if let Some(reason) = bsdf.undifferentiated(property) {
         let bsdf = bsdf.name();
-        let error = surface::SurfaceError::NotDifferentiated { bsdf, property: of, reason };
+        let error = surface::SurfaceError::NotDifferentiated { bsdf, property, reason };
         return Err(error.to_string());
     }
-    let number = bsdf.is_number(of) == Some(true);
-    Ok(ParameterGroup { target, kind: GroupKind::Texels { of, number } })
+    let number = bsdf.is_number(property) == Some(true);
+    Ok((target, GroupKind::Texels { property, number }))
 }
 
 fn property(name: Option<&str>) -> Result<drt_medium::Property, String> {
@@ -129,101 +160,48 @@ fn property(name: Option<&str>) -> Result<drt_medium::Property, String> {
     }
 }
 
-impl ParameterGroup {
-    /// What adds the group's part to gradients of a loss. `given` is the scene as the file has it, `scene` the one that
-    /// is differentiated.
-    pub fn collector(&self, given: &Scene, scene: &Scene) -> Collector {
-        Collector(self.part(given, scene))
+/// How a group is stepped. Values stay in the range in which they have a meaning, where nothing else is said.
+fn steps(keys: &keys::ParameterGroup, kind: &GroupKind) -> Result<GroupSteps, String> {
+    let all = [f64::NEG_INFINITY, f64::INFINITY];
+    let meaningful = match kind {
+        GroupKind::Voxels(drt_medium::Property::Albedo) => [0.0, 1.0],
+        GroupKind::Voxels(_) | GroupKind::LightTexels => [0.0, f64::INFINITY],
+        GroupKind::Texels { property, .. } => property.range(),
+        _ => all,
+    };
+    let of_shape = matches!(kind, GroupKind::Vertices | GroupKind::Cage(_));
+    let bounds = keys.bounds.map_or(meaningful, |List(bounds)| bounds);
+    if !(bounds[0] < bounds[1]) {
+        return Err(format!("`bounds`: [{}, {}]; expected a range", bounds[0], bounds[1]));
     }
-
-    fn part(&self, given: &Scene, scene: &Scene) -> Part {
-        match (&self.kind, self.target) {
-            (GroupKind::Voxels(property), Target::Medium(m)) => Part::Voxels(m, *property),
-            (GroupKind::LightTexels, Target::Emitter(e)) => Part::LightTexels(e),
-            (GroupKind::Texels { of, number }, Target::Bsdf(b)) => {
-                Part::Texels { bsdf: b, of: *of, number: *number }
-            }
-            (kind, Target::Shape(s)) => {
-                let (file, mesh) = (given.shapes[s].mesh.clone(), scene.shapes[s].mesh.clone());
-                let weights = match kind {
-                    // It was loaded as a cage.
-                    GroupKind::Cage(cage) => match Cage::new(cage) {
-                        Ok(cage) => Some(CageWeights::new(&cage, &file.positions)),
-                        Err(_) => return Part::Nothing,
-                    },
-                    _ => None,
-                };
-                let normals = SmoothNormals::new(&mesh);
-                Part::Shape { shape: s, file, mesh, normals, weights }
-            }
-            _ => Part::Nothing,
+    let not_negative = |name: &str, value: Option<f64>| match value.unwrap_or(0.0) {
+        value if value >= 0.0 && value.is_finite() => Ok(value),
+        value => Err(format!("`{name}` is {value}; expected a number that is not negative")),
+    };
+    let laplacian = not_negative("laplacian", keys.laplacian)?;
+    if laplacian > 0.0 && !of_shape {
+        return Err("`laplacian` goes with `vertices` and `cage`".into());
+    }
+    let log = keys.log.unwrap_or(false);
+    if laplacian > 0.0 && (log || bounds != all) {
+        return Err("`laplacian` does not go with `bounds` or `log`".into());
+    }
+    let learning_rate = match &keys.learning_rate {
+        None => None,
+        Some(keys::GroupRate::All(rate)) => Some(Stages::new(*rate, Vec::new())),
+        Some(keys::GroupRate::Stages(stages)) => {
+            let stage = |List([from, rate]): &List<f64, 2>| {
+                let whole = *from >= 0.0 && from.fract() == 0.0 && *from <= f64::from(u32::MAX);
+                whole.then_some((*from as u32, *rate)).ok_or_else(|| {
+                    format!("`learning_rate`: a stage begins at iteration {from}; expected a whole number")
+                })
+            };
+            let stages = stages.iter().map(stage).collect::<Result<Vec<_>, _>>()?;
+            let Some((_, first)) = stages.first().copied() else {
+                return Err("`learning_rate`: there are no stages".into());
+            };
+            Some(Stages::new(first, stages))
         }
-    }
-}
-
-/// Takes a group's part out of gradients of a loss.
-pub struct Collector(Part);
-
-/// What the part of a group is in a gradient.
-enum Part {
-    Voxels(usize, drt_medium::Property),
-    Texels {
-        bsdf: usize,
-        of: surface::Property,
-        number: bool,
-    },
-    LightTexels(usize),
-    Shape {
-        shape: usize,
-        /// As the file has it.
-        file: Arc<Mesh>,
-        mesh: Arc<Mesh>,
-        normals: SmoothNormals,
-        /// What a cage's vertices weigh at those of the shape.
-        weights: Option<CageWeights>,
-    },
-    Nothing,
-}
-
-impl Collector {
-    /// Adds the group's part to the gradient of a loss.
-    pub fn collect(&self, gradient: &SceneGradient, out: &mut Vec<f64>) {
-        match &self.0 {
-            Part::Voxels(m, property) => {
-                let Some(of) = &gradient.media[*m] else { return };
-                match property {
-                    drt_medium::Property::SigmaT => out.extend(&of.sigma_t.voxels),
-                    drt_medium::Property::Albedo => out.extend(&of.albedo.voxels),
-                    drt_medium::Property::Emission => out.extend(&of.emission.voxels),
-                    // Has no voxels.
-                    drt_medium::Property::G => {}
-                }
-            }
-            Part::Texels { bsdf, of, number } => {
-                let textures = gradient.texels[*bsdf].iter().filter(|(p, _)| p == of);
-                for (_, texels) in textures {
-                    let values = texels.values();
-                    if *number {
-                        out.extend(values.iter().map(|v| v.sum()));
-                    } else {
-                        out.extend(values.iter().flat_map(|v| v.to_array()));
-                    }
-                }
-            }
-            Part::LightTexels(emitter) => {
-                let Some(texels) = &gradient.emitter_texels[*emitter] else { return };
-                out.extend(texels.values().iter().flat_map(|v| v.to_array()));
-            }
-            Part::Shape { shape, file, mesh, normals, weights } => {
-                let Some(of) = &gradient.shapes[*shape] else { return };
-                let vertices = of.finish(mesh, normals);
-                let vectors = match weights {
-                    Some(weights) => weights.gather(&vertices),
-                    None => in_file_order(file, &vertices),
-                };
-                out.extend(vectors.iter().flat_map(|v| [v.x, v.y, v.z]));
-            }
-            Part::Nothing => {}
-        }
-    }
+    };
+    Ok(GroupSteps { learning_rate, laplacian, smooth: not_negative("smooth", keys.smooth)?, bounds, log })
 }

@@ -196,14 +196,24 @@ pub(super) enum All {
 #[serde(deny_unknown_fields)]
 pub(super) struct ParameterGroup {
     pub(super) target: String,
-    /// For the reader of the job alone.
-    #[serde(rename = "name")]
-    pub(super) _name: Option<String>,
+    pub(super) name: Option<String>,
     pub(super) property: Option<String>,
     pub(super) vertices: Option<All>,
     pub(super) cage: Option<Cage>,
     pub(super) voxels: Option<All>,
     pub(super) texels: Option<All>,
+    pub(super) learning_rate: Option<GroupRate>,
+    pub(super) laplacian: Option<f64>,
+    pub(super) smooth: Option<f64>,
+    pub(super) bounds: Option<List<f64, 2>>,
+    pub(super) log: Option<bool>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "expected a number or stages [[0, 0.02], [100, 0.005]]")]
+pub(super) enum GroupRate {
+    All(f64),
+    Stages(Vec<List<f64, 2>>),
 }
 
 #[derive(Debug, Deserialize)]

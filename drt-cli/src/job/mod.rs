@@ -30,7 +30,7 @@ use crate::scene_xml::SceneReader;
 use crate::{CliError, Defaults};
 use cages::Cages;
 use document::Document;
-pub use groups::{Collector, ParameterGroup};
+pub use groups::{GroupSteps, ParameterGroup};
 pub use optimize::Optimize;
 
 /// What the command line lays over a job or scene.
@@ -137,8 +137,8 @@ pub(crate) fn read_job(
     let (parameters, places) = parameters(&document, &keys, folder, &scene)?;
     let settings = settings(&document, &keys, folder, &scene, &parameters)?;
     let [spp, boundary_spp] = sample_counts(&document, &keys.estimator)?;
-    let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters);
     let groups = groups::groups(&document, &keys.parameter_group, folder, &scene)?;
+    let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters, &groups);
     let grouped = grouped(&document, &keys);
     read.extend(files::named(&keys, folder));
     read.push(path.into());

@@ -11,7 +11,7 @@ use toml::Spanned;
 
 use super::document::Document;
 use super::list::List;
-use super::{find_sensor, keys};
+use super::{ParameterGroup, find_sensor, keys};
 use crate::CliError;
 use crate::files::input_file;
 
@@ -40,6 +40,8 @@ pub struct Optimize {
     pub method: Method,
     /// Learning rate and bounds of each parameter.
     pub variables: Vec<Variable>,
+    /// Learning rate of each group of unknowns that has none of its own.
+    pub group_rates: Vec<f64>,
     /// How learning rates change.
     pub decay: Decay,
     /// Steps to take.
@@ -76,9 +78,10 @@ pub(super) fn optimize(
     folder: &Path,
     scene: &Scene,
     parameters: &[Parameter<String>],
+    groups: &[ParameterGroup],
 ) -> Result<Option<Optimize>, CliError> {
     let Some(table) = &keys.optimize else { return Ok(None) };
-    let reader = Reader { document, table, parameters };
+    let reader = Reader { document, table, parameters, groups };
     let keys = table.get_ref();
     let (loss, method, decay) = (reader.loss()?, reader.method(), reader.decay()?);
     if matches!(method, Method::GaussNewton { .. }) && !loss.is_curved() {
@@ -88,6 +91,7 @@ pub(super) fn optimize(
         ));
     }
     let variables = reader.variables()?;
+    let group_rates = reader.group_rates()?;
     let start: Vec<f64> = parameters.iter().map(|p| p.value).collect();
     // Refuses what no run could begin with, parameters by their names.
     Optimizer::new(method, variables.clone(), &start).map_err(|e| reader.refuse(&e.to_string()))?;
@@ -130,6 +134,7 @@ pub(super) fn optimize(
         loss,
         method,
         variables,
+        group_rates,
         decay,
         iterations: optimizer.and_then(|o| o.iterations).unwrap_or(ITERATIONS),
         spp: reader.stages("spp", &keys.spp)?,
@@ -144,6 +149,7 @@ struct Reader<'a> {
     document: &'a Document<'a>,
     table: &'a Spanned<keys::Optimize>,
     parameters: &'a [Parameter<String>],
+    groups: &'a [ParameterGroup],
 }
 
 impl Reader<'_> {
@@ -255,7 +261,8 @@ impl Reader<'_> {
             variables.push(Variable { learning_rate, ..Variable::default() });
         }
         if let keys::LearningRate::Each(rates) = rates {
-            for name in rates.keys() {
+            let of_group = |name: &String| self.groups.iter().any(|g| g.group.name == *name);
+            for name in rates.keys().filter(|name| !of_group(name)) {
                 self.index("learning_rate", name).map_err(fail)?;
             }
         }
@@ -269,6 +276,27 @@ impl Reader<'_> {
             variables[self.index("log", name.get_ref()).map_err(fail)?].logarithmic = true;
         }
         Ok(variables)
+    }
+
+    /// The learning rate that a group takes where it has none of its own.
+    fn group_rates(&self) -> Result<Vec<f64>, CliError> {
+        let optimizer = self.table.get_ref().optimizer.as_ref();
+        let default = keys::LearningRate::default();
+        let rates = optimizer.map_or(&default, |o| &o.get_ref().learning_rate);
+        let rate = |g: &ParameterGroup| match (rates, &g.steps.learning_rate) {
+            (keys::LearningRate::All(rate), _) => Ok(*rate),
+            (keys::LearningRate::Each(rates), own) => match (rates.get(&g.group.name), own) {
+                (Some(rate), _) => Ok(*rate),
+                (None, Some(_)) => Ok(0.0),
+                (None, None) => {
+                    let at = optimizer.map_or(self.table.span().start, |o| o.span().start);
+                    let message =
+                        format!("`learning_rate` has no entry for group `{}`", g.group.name);
+                    Err(self.document.error_at(at, message))
+                }
+            },
+        };
+        self.groups.iter().map(rate).collect()
     }
 
     fn stages(

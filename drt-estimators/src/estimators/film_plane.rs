@@ -19,7 +19,7 @@ pub(super) enum Film {
     /// Let its rays turn.
     Turning,
     /// Let a medium around it move.
-    Swept,
+    InMedium,
 }
 
 /// Refuses what an estimator cannot do as something moves.
@@ -29,10 +29,10 @@ pub(super) fn refuse(world: &World, changes: &Changes<'_>, film: Film) -> Result
     }
     match film {
         Film::Turning => fail(world, changes, ElementError::ParallelRays),
-        Film::Swept if sweeps_medium(world, changes.active) => {
+        Film::InMedium if sweeps_medium(world, changes.active) => {
             fail(world, changes, ElementError::FilmInMedium)
         }
-        Film::Swept => Ok(()),
+        Film::InMedium => Ok(()),
     }
 }
 

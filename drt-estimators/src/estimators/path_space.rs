@@ -52,7 +52,7 @@ impl Estimator for PathSpace {
 
     fn terms(&self, world: &World, changes: &Changes<'_>) -> Result<Terms, Error> {
         let Changes { active, flux_shapes, settings, .. } = *changes;
-        film_plane::refuse(world, changes, Film::Swept)?;
+        film_plane::refuse(world, changes, Film::InMedium)?;
         let mut terms = Terms::interior(Arc::new(Material::new(Movers::new(active))));
         if active.moves_geometry() {
             terms.boundary = Boundary::new(world, active)?;

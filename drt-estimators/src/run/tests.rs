@@ -23,14 +23,14 @@ use crate::world::World;
 use crate::world::cache::PreparedCache;
 
 /// Path space with insides of media at rest, as in the spatial form: all surfaces that move sweep over them, which has a flux.
-struct Swept;
+struct AtRest;
 
 /// The same without the flux.
 struct Faulty;
 
-impl Estimator for Swept {
+impl Estimator for AtRest {
     fn name(&self) -> &'static str {
-        "swept"
+        "at-rest"
     }
 
     fn insides(&self) -> Insides {
@@ -64,11 +64,11 @@ impl Estimator for Faulty {
     }
 
     fn slides(&self) -> bool {
-        Swept.slides()
+        AtRest.slides()
     }
 
     fn takes_delta_lights(&self, scene: &Scene, settings: &Settings) -> bool {
-        Swept.takes_delta_lights(scene, settings)
+        AtRest.takes_delta_lights(scene, settings)
     }
 
     fn terms(&self, world: &World, changes: &Changes<'_>) -> Result<Terms, Error> {
@@ -97,7 +97,7 @@ fn estimators_are_told_from_outside() {
         let [error, size] = [own.stderr + judge.stderr, judge.mean].map(|v| v.abs().sum());
         ((own.mean - judge.mean).abs().sum() / error, error / size)
     };
-    let (z, error) = off(by(&Swept));
+    let (z, error) = off(by(&AtRest));
     assert!(z < 3.0 && error < 0.05, "{z} {error}");
     let (z, _) = off(by(&Faulty));
     assert!(z > 5.0, "{z}");

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use drt_motion::optimize::State;
+use drt_motion::optimize::{FieldState, State};
 use serde::{Deserialize, Serialize};
 
 use crate::commands::fingerprint::Fingerprint;
@@ -26,6 +26,8 @@ pub(super) struct Checkpoint {
     /// Of all that decides the run's steps.
     pub(super) fingerprint: Fingerprint,
     pub(super) optimizer: State,
+    /// Of the groups of unknowns.
+    pub(super) fields: Vec<FieldState>,
     /// Iterations in a row in which each parameter changed nothing.
     pub(super) blind: Vec<u32>,
     /// True when all iterations were made and the last values were looked at.
@@ -102,6 +104,7 @@ mod tests {
             program: PROGRAM.into(),
             fingerprint,
             optimizer: optimizer.state().clone(),
+            fields: Vec::new(),
             blind: vec![0],
             complete: false,
             seconds: 1.5,

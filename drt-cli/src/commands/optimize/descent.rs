@@ -9,6 +9,7 @@ use drt_estimators::fit::{Evaluation, Fit};
 use drt_motion::optimize::{Method, Observation, OptimizeError, Optimizer, Outlook};
 
 use super::checkpoint::Checkpoint;
+use super::fields::{FieldResult, Fields};
 use super::gallery::Gallery;
 use super::history::{History, LOSSES, PARAMETERS};
 use super::limits::{self, Limits};
@@ -28,6 +29,8 @@ use crate::{CliError, PROGRAM};
 
 /// Seconds after which a checkpoint is written, however few iterations have passed.
 const CHECKPOINT_SECONDS: f64 = 30.0;
+/// Times that a step of groups is halved before it is given up.
+const SHORTENED: u32 = 6;
 /// Least seconds between pictures of the present state.
 const PICTURE_SECONDS: f64 = 10.0;
 
@@ -38,6 +41,8 @@ pub(super) struct Descent<'a> {
     fingerprint: Fingerprint,
     sources: Sources,
     optimizer: Optimizer,
+    /// The groups of unknowns.
+    pub(super) fields: Fields<'a>,
     /// It only grows, so that what it was is told by two lengths.
     history: Arc<Mutex<History>>,
     /// What a signal makes of the steps that are not stored.
@@ -73,24 +78,28 @@ impl<'a> Descent<'a> {
             Some(folder) => Checkpoint::read(folder, fingerprint, &sources)?.map(|c| (folder, c)),
             None => None,
         };
-        let count = problem.job.parameters.len();
-        let (optimizer, history, blind, before, again) = match stored {
+        let count = problem.columns().count();
+        let parameters = problem.job.parameters.len();
+        let (optimizer, fields, history, blind, before, again) = match stored {
             None => {
                 let start = problem.start();
                 let optimizer = Optimizer::new(plan.method, plan.variables.clone(), &start);
-                let history = History { values: vec![start], losses: Vec::new() };
-                (optimizer, history, vec![0; count], [0.0; 2], false)
+                let fields = Fields::begin(problem)?;
+                let values = vec![fields.row(&start)];
+                let history = History { values, losses: Vec::new() };
+                (optimizer, fields, history, vec![0; parameters], [0.0; 2], false)
             }
             Some((folder, stored)) => {
                 let steps = stored.optimizer.steps as usize;
                 let history = History::read(folder, steps, count)?;
-                history.check(folder, steps, problem.names(), stored.tables)?;
+                history.check(folder, steps, problem.columns(), stored.tables)?;
                 let before = [stored.seconds, stored.cpu_seconds];
                 let enough = stored.optimizer.steps >= u64::from(problem.iterations);
                 let again = stored.complete && enough;
                 let optimizer =
                     Optimizer::resume(plan.method, plan.variables.clone(), stored.optimizer);
-                (optimizer, history, stored.blind, before, again)
+                let fields = Fields::resume(problem, stored.fields)?;
+                (optimizer, fields, history, stored.blind, before, again)
             }
         };
         let optimizer = optimizer.map_err(refuse)?;
@@ -103,6 +112,7 @@ impl<'a> Descent<'a> {
             fingerprint,
             sources,
             optimizer,
+            fields,
             history: Arc::new(Mutex::new(history)),
             kept: None,
             watch,
@@ -140,12 +150,14 @@ impl<'a> Descent<'a> {
         let problem = self.problem;
         let (mut stored, mut stored_at, mut pictured) = (Instant::now(), self.steps(), None);
         let mut fit = problem.fit_at(self.steps())?;
+        self.fields.give(&mut fit)?;
         self.watch.begin(self.optimizer.values(), &mut fit)?;
         let mut last = None;
         loop {
             let i = self.steps();
             if problem.stage_start(i) == i && i > 0 {
                 fit = problem.fit_at(i)?;
+                self.fields.give(&mut fit)?;
             }
             let Some(evaluation) = self.evaluate(&mut fit, monitor)? else {
                 self.store()?;
@@ -213,6 +225,9 @@ impl<'a> Descent<'a> {
             self.fail(evaluation, error)?;
         }
         judged?;
+        if i == 0 {
+            self.fields.check_first(evaluation)?;
+        }
         let Some(gallery) = &self.gallery else { return Ok(()) };
         if i == 0 {
             create(self.folder())?;
@@ -229,14 +244,44 @@ impl<'a> Descent<'a> {
             .step_by(i, evaluation, factor)
             .map_err(|e| CliError::unsolved(format!("iteration {i}: {e}")));
         let stepped = stepped.and_then(|()| self.stay_in_range(i, before.values(), fit));
-        if let Err(error) = stepped.and_then(|()| self.watch.step(i, self.optimizer.values(), fit))
-        {
+        let stepped = stepped.and_then(|()| self.step_groups(i, evaluation, factor, fit));
+        if let Err(error) = stepped {
             self.optimizer = before;
             self.fail(evaluation, &error)?;
             return Err(error);
         }
-        locked(&self.history).values.push(self.optimizer.values().to_vec());
+        locked(&self.history).values.push(self.fields.row(self.optimizer.values()));
         Ok(())
+    }
+
+    /// Steps the groups, by less where a whole step is not possible.
+    fn step_groups(
+        &mut self,
+        i: u32,
+        evaluation: &Evaluation,
+        factor: f64,
+        fit: &mut Fit,
+    ) -> Result<(), CliError> {
+        let before = self.fields.clone();
+        self.fields.step(i, evaluation, factor)?;
+        let mut left = SHORTENED;
+        loop {
+            let given = self.fields.give(fit);
+            let judged = given.and_then(|()| self.watch.step(i, self.optimizer.values(), fit));
+            match judged {
+                Ok(()) => return Ok(()),
+                Err(error) if left == 0 || self.fields.is_empty() => {
+                    self.fields = before;
+                    return Err(error);
+                }
+                Err(error) => {
+                    let loud = self.team.leads() && !self.quiet && left == SHORTENED;
+                    self.limits.note_groups(i, &error.to_string(), loud);
+                    self.fields.shorten(0.5);
+                    left -= 1;
+                }
+            }
+        }
     }
 
     /// Shortens a step that leads out of where properties have a meaning, parameter by parameter.
@@ -314,6 +359,7 @@ impl<'a> Descent<'a> {
             program: PROGRAM.into(),
             fingerprint: self.fingerprint,
             optimizer: self.optimizer.state().clone(),
+            fields: self.fields.states(),
             blind: self.watch.blind.clone(),
             complete: lengths[1] > self.problem.iterations as usize,
             seconds,
@@ -322,8 +368,9 @@ impl<'a> Descent<'a> {
             // They are added when it is written.
             tables: Default::default(),
         };
-        let names = self.problem.names().map(Into::into).collect();
-        Some(Snapshot { folder, names, history: self.history.clone(), lengths, checkpoint })
+        let names = self.problem.columns().map(Into::into).collect();
+        let results = self.fields.results();
+        Some(Snapshot { results, folder, names, history: self.history.clone(), lengths, checkpoint })
     }
 
     /// Shows what was seen last, and the page that tells of it.
@@ -365,8 +412,10 @@ impl<'a> Descent<'a> {
 /// What a run goes on from, with the tables that belong to it.
 struct Snapshot {
     folder: PathBuf,
-    /// The names of the parameters.
+    /// The names of the columns of the table of values.
     names: Vec<String>,
+    /// What the groups of unknowns have become.
+    results: Vec<FieldResult>,
     history: Arc<Mutex<History>>,
     /// How many values and losses of the history belong to it.
     lengths: [usize; 2],
@@ -376,11 +425,12 @@ struct Snapshot {
 
 impl Snapshot {
     fn write(self) -> Result<(), CliError> {
-        let Self { folder, names, history, lengths, mut checkpoint } = self;
+        let Self { folder, names, results, history, lengths, mut checkpoint } = self;
         let history = locked(&history).start(lengths);
         let names = || names.iter().map(String::as_str);
         checkpoint.tables = history.sums(checkpoint.optimizer.steps as usize, names());
         create(Some(&folder))?;
+        results.iter().try_for_each(|result| result.write(&folder))?;
         for (name, text) in [(PARAMETERS, history.parameters(names())), (LOSSES, history.losses())]
         {
             write_atomically(&folder.join(name), |out| Ok(out.write_all(text.as_bytes())?))?;

@@ -21,10 +21,28 @@ impl Limits {
             "iteration {iteration}: a step would take parameter `{parameter}` out of range ({reason}); it was shortened to \
              nine tenths of the way to the limit, as later ones are without a note"
         );
+        self.tell(parameter, note, aloud);
+    }
+
+    /// Notes that a step of the groups of unknowns was shortened.
+    pub(super) fn note_groups(&mut self, iteration: u32, reason: &str, aloud: bool) {
+        // No parameter has this name.
+        let name = "";
+        if self.0.iter().any(|(known, _)| known == name) {
+            return;
+        }
+        let note = format!(
+            "iteration {iteration}: a step of the groups is not possible ({reason}); it was halved, as later ones are \
+             without a note"
+        );
+        self.tell(name, note, aloud);
+    }
+
+    fn tell(&mut self, name: &str, note: String, aloud: bool) {
         if aloud {
             console::note(format_args!("drt: {note}"));
         }
-        self.0.push((parameter.into(), note));
+        self.0.push((name.into(), note));
     }
 
     pub(super) fn notes(&self) -> impl Iterator<Item = &str> {

@@ -6,6 +6,7 @@
 
 mod checkpoint;
 mod descent;
+mod fields;
 mod gallery;
 mod history;
 mod limits;
@@ -28,6 +29,7 @@ use super::{Outcome, run};
 use crate::files::atomic::check_folder;
 use crate::{CliError, Job};
 use descent::Descent;
+use fields::Fields;
 use gallery::Gallery;
 use problem::Problem;
 use team::Team;
@@ -89,7 +91,9 @@ fn spare(problem: &Problem<'_>, outputs: &Outputs) -> Result<(), CliError> {
         let whole = whole_name(path);
         let name = whole.file_name().unwrap_or_default().to_string_lossy();
         whole.parent() == Some(&folder)
-            && (tables.contains(&name.as_ref()) || gallery.writes(&whole))
+            && (tables.contains(&name.as_ref())
+                || gallery.writes(&whole)
+                || Fields::names(problem).any(|own| own == name))
     };
     let taken = problem
         .job
@@ -118,6 +122,7 @@ fn write(
     for (parameter, value) in job.parameters.iter_mut().zip(descent.values()) {
         parameter.value = *value;
     }
+    descent.fields.apply(&mut job)?;
     let by_count = super::options::Options { seconds: None, ..options.common.clone() };
     let rendering = derivatives(&job, &by_count, monitor, 1.0, &mut run::Shared::default())?;
     outputs.write(&job, &rendering, &[], &[])

@@ -6,7 +6,7 @@ use drt_estimators::Scene;
 use drt_estimators::fit::{Fit, View};
 use drt_estimators::loss::Reference;
 use drt_math::Rng;
-use drt_motion::optimize::Stages;
+use drt_motion::optimize::{Method, Stages};
 
 use crate::commands::fingerprint::Fingerprint;
 use crate::commands::options::OptimizeOptions;
@@ -34,8 +34,13 @@ impl<'a> Problem<'a> {
         let plan = job.optimize()?.ok_or_else(|| {
             CliError::input(&place, "it has no [optimize], which names the targets to fit to")
         })?;
-        if job.parameters.is_empty() {
-            return Err(CliError::input(&place, "it has no [[parameter]] to fit"));
+        if job.parameters.is_empty() && job.groups.is_empty() {
+            let message = "it has no [[parameter]] and no [[parameter_group]] to fit";
+            return Err(CliError::input(&place, message));
+        }
+        if !job.groups.is_empty() && matches!(plan.method, Method::GaussNewton { .. }) {
+            let message = "`optimizer` \"gauss-newton\" does not go with [[parameter_group]]; expected \"adam\" or \"sgd\"";
+            return Err(CliError::input(&place, message));
         }
         let spp = match options.common.spp {
             Some(spp) => Stages::new(spp, Vec::new()),
@@ -73,7 +78,9 @@ impl<'a> Problem<'a> {
             views.push(View { sensor: view.sensor, reference });
         }
         let parameters = self.job.parameters.clone();
+        let groups = self.job.groups.iter().map(|g| g.group.clone()).collect();
         Fit::new(scene, parameters, views, self.plan.loss, self.job.settings.clone())
+            .and_then(|fit| fit.with_groups(groups))
             .map_err(|e| self.job.blame(&e))
     }
 
@@ -107,6 +114,11 @@ impl<'a> Problem<'a> {
         self.job.parameters.iter().map(|p| p.name.as_str())
     }
 
+    /// What the columns of the table of values hold: the parameters' values, and how far each group has gone.
+    pub(super) fn columns(&self) -> impl Iterator<Item = &str> {
+        self.names().chain(self.job.groups.iter().map(|g| g.group.name.as_str()))
+    }
+
     pub(super) fn start(&self) -> Vec<f64> {
         self.job.parameters.iter().map(|p| p.value).collect()
     }
@@ -123,6 +135,7 @@ impl<'a> Problem<'a> {
         sum.add(format!("{:?} {:?}", plan.loss, plan.method).as_bytes());
         sum.add(format!("{:?} {:?}", plan.variables, plan.decay).as_bytes());
         sum.add(format!("{:?} {:?}", self.spp, plan.reduce).as_bytes());
+        sum.add(format!("{:?}", self.job.groups).as_bytes());
         for view in &self.views {
             sum.add(format!("{} {:?}", view.sensor, view.reference).as_bytes());
         }

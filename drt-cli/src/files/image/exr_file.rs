@@ -160,6 +160,24 @@ pub fn write_exr(
     })
 }
 
+/// An EXR file of texels, row by row; `None` where their number is not that of the size.
+pub(crate) fn encode_texels([width, height]: [u32; 2], texels: &[Rgb]) -> Option<Vec<u8>> {
+    let [width, height] = [width as usize, height as usize];
+    let fits = texels.len() == width * height;
+    let image = fits.then(|| {
+        exr::prelude::Image::from_channels(
+            (width, height),
+            exr::prelude::SpecificChannels::rgb(|at: exr::prelude::Vec2<usize>| {
+                let [r, g, b] = texels[at.y() * width + at.x()].to_array().map(|v| v as f32);
+                (r, g, b)
+            }),
+        )
+    })?;
+    let mut file = Cursor::new(Vec::new());
+    image.write().non_parallel().to_buffered(&mut file).ok()?;
+    Some(file.into_inner())
+}
+
 /// All images of a result by layer name.
 fn layers<'a>(
     rendering: &'a Rendering,

@@ -92,6 +92,18 @@ impl Property {
         Self::Thickness,
     ];
 
+    /// The least and the largest value that has a meaning, whatever the BSDF.
+    #[must_use]
+    pub fn range(self) -> [f64; 2] {
+        match self {
+            Self::Eta | Self::K | Self::Exponent | Self::SigmaA | Self::Thickness => {
+                [0.0, f64::INFINITY]
+            }
+            Self::DiffTrans => [0.0, 2.0],
+            _ => [0.0, 1.0],
+        }
+    }
+
     /// The property's name in job files.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -1,0 +1,292 @@
+//! The groups of unknowns of a fit: where they are, how they step, and the files that they become.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use drt_estimators::fit::{Evaluation, Fit, Group, GroupKind};
+use drt_estimators::{Scene, Target};
+use drt_medium::vol::{self, VolFile};
+use drt_motion::optimize::{
+    FieldOptimizer, FieldRule, FieldState, LaplacianSmoothing, Stages, laplacian_energy,
+    total_variation,
+};
+
+use super::problem::Problem;
+use crate::error::Place;
+use crate::files::atomic::write_atomically;
+use crate::files::image::encode_texels;
+use crate::files::mesh_file;
+use crate::job::{GroupSteps, ParameterGroup};
+use crate::{CliError, Job};
+
+/// All groups of a fit.
+#[derive(Clone)]
+pub(super) struct Fields<'a> {
+    problem: &'a Problem<'a>,
+    optimizers: Vec<FieldOptimizer>,
+    /// By group.
+    starts: Vec<Vec<f64>>,
+}
+
+impl<'a> Fields<'a> {
+    /// Begins with the values of the scene.
+    pub(super) fn begin(problem: &'a Problem<'a>) -> Result<Self, CliError> {
+        Self::new(problem, |rule, _, start| FieldOptimizer::new(rule, start))
+    }
+
+    /// Goes on from the states of a checkpoint.
+    pub(super) fn resume(
+        problem: &'a Problem<'a>,
+        states: Vec<FieldState>,
+    ) -> Result<Self, CliError> {
+        if states.len() != problem.job.groups.len() {
+            let message = "its checkpoint has another number of groups; --restart begins anew";
+            return Err(CliError::input(&Place::file(&problem.job.path), message));
+        }
+        Self::new(problem, |rule, i, _| FieldOptimizer::resume(rule, states[i].clone()))
+    }
+
+    fn new<E: std::fmt::Display>(
+        problem: &'a Problem<'a>,
+        make: impl Fn(FieldRule, usize, &[f64]) -> Result<FieldOptimizer, E>,
+    ) -> Result<Self, CliError> {
+        let (mut optimizers, mut starts) = (Vec::new(), Vec::new());
+        let scene = &problem.job.scene;
+        for (i, group) in problem.job.groups.iter().enumerate() {
+            let fail = |e: &dyn std::fmt::Display| {
+                let message = format!("group `{}`: {e}", group.group.name);
+                CliError::input(&Place::file(&problem.job.path), message)
+            };
+            let start = group.group.values(scene);
+            let rule = rule(problem, group, problem.plan.group_rates[i]).map_err(|e| fail(&e))?;
+            optimizers.push(make(rule, i, &start).map_err(|e| fail(&e))?);
+            starts.push(start);
+        }
+        Ok(Self { problem, optimizers, starts })
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.optimizers.is_empty()
+    }
+
+    fn groups(&self) -> impl Iterator<Item = (&'a ParameterGroup, &FieldOptimizer)> {
+        self.problem.job.groups.iter().zip(&self.optimizers)
+    }
+
+    /// Gives a fit the present values.
+    pub(super) fn give(&self, fit: &mut Fit) -> Result<(), CliError> {
+        for (i, optimizer) in self.optimizers.iter().enumerate() {
+            fit.set_group(i, optimizer.values()).map_err(|e| self.problem.job.blame(&e))?;
+        }
+        Ok(())
+    }
+
+    /// Gives a job's scene the present values.
+    pub(super) fn apply(&self, job: &mut Job) -> Result<(), CliError> {
+        let mut scene = job.scene.clone();
+        for (group, optimizer) in self.groups() {
+            let applied = group.group.apply(&job.scene, optimizer.values(), &mut scene);
+            applied.map_err(|e| job.blame(&e))?;
+        }
+        job.scene = scene;
+        Ok(())
+    }
+
+    /// A row of the table of values: the parameters', and the root mean square change of each group from where it began.
+    pub(super) fn row(&self, parameters: &[f64]) -> Vec<f64> {
+        let change = |(optimizer, start): (&FieldOptimizer, &Vec<f64>)| {
+            let squares = optimizer.values().iter().zip(start).map(|(v, s)| (v - s) * (v - s));
+            (squares.sum::<f64>() / start.len().max(1) as f64).sqrt()
+        };
+        let changes = self.optimizers.iter().zip(&self.starts).map(change);
+        parameters.iter().copied().chain(changes).collect()
+    }
+
+    /// Refuses a group that nothing depends on.
+    pub(super) fn check_first(&self, seen: &Evaluation) -> Result<(), CliError> {
+        for (i, (group, _)) in self.groups().enumerate() {
+            if seen.group_gradient(i).iter().all(|g| *g == 0.0) {
+                let message = format!(
+                    "group `{}` changes nothing that its targets show: its gradient is zero everywhere; expected \
+                     something in view",
+                    group.group.name
+                );
+                return Err(CliError::input(&Place::file(&self.problem.job.path), message));
+            }
+        }
+        Ok(())
+    }
+
+    /// Steps all groups.
+    pub(super) fn step(
+        &mut self,
+        i: u32,
+        seen: &Evaluation,
+        factor: f64,
+    ) -> Result<(), CliError> {
+        let job = self.problem.job;
+        for (g, (group, optimizer)) in job.groups.iter().zip(&mut self.optimizers).enumerate() {
+            let mut gradient = seen.group_gradient(g).to_vec();
+            if group.steps.smooth > 0.0 {
+                smooth(&job.scene, group, optimizer.values(), &mut gradient);
+            }
+            let stepped = optimizer.step(&gradient, i, factor);
+            stepped.map_err(|e| {
+                CliError::unsolved(format!("iteration {i}: group `{}`: {e}", group.group.name))
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Takes back all but a part of the last step.
+    pub(super) fn shorten(&mut self, part: f64) {
+        self.optimizers.iter_mut().for_each(|optimizer| optimizer.shorten(part));
+    }
+
+    /// What a checkpoint stores.
+    pub(super) fn states(&self) -> Vec<FieldState> {
+        self.optimizers.iter().map(|optimizer| optimizer.state().clone()).collect()
+    }
+
+    /// What the groups have become, to be written at any time.
+    pub(super) fn results(&self) -> Vec<FieldResult> {
+        let mut scene = self.problem.job.scene.clone();
+        let result = |(group, optimizer): (&ParameterGroup, &FieldOptimizer)| {
+            let (group, values) = (&group.group, optimizer.values());
+            // They have been given to the fit already.
+            group.apply(&self.problem.job.scene, values, &mut scene).ok()?;
+            Some(FieldResult { files: files(group, values, &scene)? })
+        };
+        self.groups().filter_map(result).collect()
+    }
+
+    /// The names of the files that results are written to.
+    pub(super) fn names(problem: &Problem<'_>) -> impl Iterator<Item = String> {
+        problem.job.groups.iter().flat_map(|g| {
+            let name = &g.group.name;
+            endings(&g.group.kind).iter().map(move |ending| format!("{name}.{ending}"))
+        })
+    }
+}
+
+/// The files that a group becomes.
+pub(super) struct FieldResult {
+    files: Vec<(String, Vec<u8>)>,
+}
+
+impl FieldResult {
+    pub(super) fn write(&self, folder: &Path) -> Result<(), CliError> {
+        for (name, bytes) in &self.files {
+            write_atomically(&folder.join(name), |out| Ok(out.write_all(bytes)?))?;
+        }
+        Ok(())
+    }
+}
+
+fn endings(kind: &GroupKind) -> &'static [&'static str] {
+    match kind {
+        GroupKind::Vertices | GroupKind::Cage(_) => &["ply", "obj"],
+        GroupKind::Voxels(_) => &["vol"],
+        _ => &["exr"],
+    }
+}
+
+/// The files of a group's values, in a scene that has them.
+fn files(group: &Group, values: &[f64], scene: &Scene) -> Option<Vec<(String, Vec<u8>)>> {
+    let name = |ending: &str| format!("{}.{ending}", group.name);
+    Some(match (&group.kind, group.target) {
+        (GroupKind::Vertices, Target::Shape(s)) => {
+            let mesh = &scene.shapes[s].mesh;
+            vec![
+                (name("ply"), mesh_file::ply(mesh)),
+                (name("obj"), mesh_file::obj(mesh).into_bytes()),
+            ]
+        }
+        (GroupKind::Cage(cage), _) => {
+            let mut cage = (**cage).clone();
+            for (p, v) in cage.positions.iter_mut().zip(values.chunks_exact(3)) {
+                *p = drt_math::vec3(v[0], v[1], v[2]);
+            }
+            vec![
+                (name("ply"), mesh_file::ply(&cage)),
+                (name("obj"), mesh_file::obj(&cage).into_bytes()),
+            ]
+        }
+        (GroupKind::Voxels(property), Target::Medium(m)) => {
+            let grid = scene.media[m].item.voxels(*property)?.clone();
+            let bounds = grid.world_bounds();
+            vec![(name("vol"), vol::encode(&VolFile { grid, bounds }).ok()?)]
+        }
+        (GroupKind::Texels { property, .. }, Target::Bsdf(b)) => {
+            let bsdf = &scene.bsdfs[b].item;
+            let texels = bsdf.texel_values(*property)?;
+            vec![(name("exr"), encode_texels(bsdf.texels(*property)?, &texels)?)]
+        }
+        (GroupKind::LightTexels, Target::Emitter(e)) => {
+            let emitter = &scene.emitters[e].item.emitter;
+            vec![(name("exr"), encode_texels(emitter.texels()?, &emitter.texel_values()?)?)]
+        }
+        _ => return None,
+    })
+}
+
+/// How a group steps.
+fn rule(
+    problem: &Problem<'_>,
+    group: &ParameterGroup,
+    default_rate: f64,
+) -> Result<FieldRule, drt_motion::optimize::OptimizeError> {
+    let GroupSteps { learning_rate, laplacian, bounds: [lower, upper], log, .. } = &group.steps;
+    let smoothing = match mesh(&problem.job.scene, &group.group) {
+        Some((vertices, triangles)) if *laplacian > 0.0 => {
+            Some(LaplacianSmoothing::new(vertices, &triangles, *laplacian)?)
+        }
+        _ => None,
+    };
+    let rate = learning_rate.clone();
+    Ok(FieldRule {
+        method: problem.plan.method,
+        learning_rate: rate.unwrap_or_else(|| Stages::new(default_rate, Vec::new())),
+        lower: *lower,
+        upper: *upper,
+        logarithmic: *log,
+        smoothing,
+    })
+}
+
+/// The vertices and triangles whose coordinates a group has, in its order.
+fn mesh(scene: &Scene, group: &Group) -> Option<(usize, Vec<[u32; 3]>)> {
+    let mesh = match (&group.kind, group.target) {
+        (GroupKind::Vertices, Target::Shape(s)) => &scene.shapes[s].mesh,
+        (GroupKind::Cage(cage), _) => cage,
+        _ => return None,
+    };
+    let triangles = mesh.triangles.iter().map(|t| t.map(|v| mesh.source_vertex(v))).collect();
+    Some((mesh.source_vertex_count as usize, triangles))
+}
+
+/// Adds the gradient of a group's regulariser.
+fn smooth(scene: &Scene, group: &ParameterGroup, values: &[f64], gradient: &mut [f64]) {
+    let weight = group.steps.smooth;
+    let of = &group.group;
+    if let Some((vertices, triangles)) = mesh(scene, of) {
+        laplacian_energy(vertices, &triangles, values, gradient, weight);
+        return;
+    }
+    let shape = match (&of.kind, of.target) {
+        (GroupKind::Voxels(property), Target::Medium(m)) => {
+            scene.media[m].item.voxels(*property).map(drt_medium::Grid::size)
+        }
+        (GroupKind::Texels { property, .. }, Target::Bsdf(b)) => {
+            scene.bsdfs[b].item.texels(*property).map(|[w, h]| [w as usize, h as usize, 1])
+        }
+        (GroupKind::LightTexels, Target::Emitter(e)) => {
+            let size = scene.emitters[e].item.emitter.texels();
+            size.map(|[w, h]| [w as usize, h as usize, 1])
+        }
+        _ => None,
+    };
+    let Some(shape) = shape else { return };
+    let channels = values.len() / shape.iter().product::<usize>().max(1);
+    total_variation(shape, channels, values, gradient, weight);
+}
