@@ -1,6 +1,6 @@
 use thiserror::Error;
 
-/// A request that cannot be optimised. Variables are counted from 0.
+/// A request that cannot be optimised. Variables are counted from 0, and so are the values of a field.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum OptimizeError {
@@ -80,4 +80,34 @@ pub enum OptimizeError {
     /// Second derivatives that no noise explains.
     #[error("the curvature with its noise is not positive: it is not that of a sum of squares")]
     NotSquares,
+    /// A method that fields cannot step by.
+    #[error("fields step by Adam or momentum; Gauss-Newton steps need a matrix of all unknowns")]
+    FieldMethod,
+    /// A smoothing together with what would make its steps rough again.
+    #[error("a smoothed field takes neither bounds nor logarithms: they act on single values")]
+    SmoothedBounds,
+    /// A field whose values do not spread evenly over the vertices of its smoothing.
+    #[error("{values} values; expected a multiple of {vertices}, the vertices of the mesh")]
+    Columns {
+        /// The number of values.
+        values: usize,
+        /// The number of vertices, copies included.
+        vertices: usize,
+    },
+    /// A corner of a triangle that is no vertex.
+    #[error("triangle {triangle} names vertex {vertex}; expected less than {vertices}")]
+    Triangle {
+        /// The triangle, counted from 0.
+        triangle: usize,
+        /// The vertex that it names.
+        vertex: u32,
+        /// The number of vertices.
+        vertices: usize,
+    },
+    /// A smoothing that double precision has no room for.
+    #[error("smoothing with lambda {lambda} cannot be factorised; expected a smaller lambda")]
+    Factorisation {
+        /// The factor of the Laplacian.
+        lambda: f64,
+    },
 }

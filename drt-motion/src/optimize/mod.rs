@@ -20,6 +20,8 @@
 //! # Ok::<(), drt_motion::optimize::OptimizeError>(())
 //! ```
 //!
+//! Very many unknowns of one kind, such as the vertices of a mesh, step by [`field`].
+//!
 //! Where the function is a sum of squares whose parts have known derivatives, [`Method::GaussNewton`] goes
 //! straight there, through valleys and noise:
 //!
@@ -47,6 +49,7 @@
 
 mod checks;
 mod error;
+pub mod field;
 mod gauss_newton;
 mod method;
 mod optimizer;
