@@ -203,5 +203,11 @@ fn steps(keys: &keys::ParameterGroup, kind: &GroupKind) -> Result<GroupSteps, St
             Some(Stages::new(first, stages))
         }
     };
-    Ok(GroupSteps { learning_rate, laplacian, smooth: not_negative("smooth", keys.smooth)?, bounds, log })
+    Ok(GroupSteps {
+        learning_rate,
+        laplacian,
+        smooth: not_negative("smooth", keys.smooth)?,
+        bounds,
+        log,
+    })
 }

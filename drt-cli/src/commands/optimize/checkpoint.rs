@@ -3,7 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
-use drt_motion::optimize::{FieldState, State};
+use drt_motion::optimize::State;
+use drt_motion::optimize::field::FieldState;
 use serde::{Deserialize, Serialize};
 
 use crate::commands::fingerprint::Fingerprint;

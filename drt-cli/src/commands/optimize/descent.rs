@@ -370,7 +370,14 @@ impl<'a> Descent<'a> {
         };
         let names = self.problem.columns().map(Into::into).collect();
         let results = self.fields.results();
-        Some(Snapshot { results, folder, names, history: self.history.clone(), lengths, checkpoint })
+        Some(Snapshot {
+            results,
+            folder,
+            names,
+            history: self.history.clone(),
+            lengths,
+            checkpoint,
+        })
     }
 
     /// Shows what was seen last, and the page that tells of it.

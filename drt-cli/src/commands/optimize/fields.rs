@@ -5,11 +5,13 @@ use std::path::Path;
 
 use drt_estimators::fit::{Evaluation, Fit, Group, GroupKind};
 use drt_estimators::{Scene, Target};
+use drt_math::{Vec3, vec3};
 use drt_medium::vol::{self, VolFile};
-use drt_motion::optimize::{
-    FieldOptimizer, FieldRule, FieldState, LaplacianSmoothing, Stages, laplacian_energy,
+use drt_motion::optimize::field::{
+    FieldOptimizer, FieldRule, FieldState, LaplacianSmoothing, MeshLaplacian, laplacian_energy,
     total_variation,
 };
+use drt_motion::optimize::{OptimizeError, Stages};
 
 use super::problem::Problem;
 use crate::error::Place;
@@ -24,8 +26,15 @@ use crate::{CliError, Job};
 pub(super) struct Fields<'a> {
     problem: &'a Problem<'a>,
     optimizers: Vec<FieldOptimizer>,
-    /// By group.
-    starts: Vec<Vec<f64>>,
+    /// By group: where it began, and what bends its mesh, if it has one.
+    starts: Vec<Start>,
+}
+
+/// What a group began with.
+#[derive(Clone)]
+struct Start {
+    values: Vec<f64>,
+    laplacian: Option<MeshLaplacian>,
 }
 
 impl<'a> Fields<'a> {
@@ -57,10 +66,12 @@ impl<'a> Fields<'a> {
                 let message = format!("group `{}`: {e}", group.group.name);
                 CliError::input(&Place::file(&problem.job.path), message)
             };
-            let start = group.group.values(scene);
-            let rule = rule(problem, group, problem.plan.group_rates[i]).map_err(|e| fail(&e))?;
-            optimizers.push(make(rule, i, &start).map_err(|e| fail(&e))?);
-            starts.push(start);
+            let values = group.group.values(scene);
+            let laplacian = laplacian(scene, &group.group, &values).map_err(|e| fail(&e))?;
+            let rate = problem.plan.group_rates[i];
+            let rule = rule(problem, group, rate, laplacian.as_ref()).map_err(|e| fail(&e))?;
+            optimizers.push(make(rule, i, &values).map_err(|e| fail(&e))?);
+            starts.push(Start { values, laplacian });
         }
         Ok(Self { problem, optimizers, starts })
     }
@@ -94,9 +105,9 @@ impl<'a> Fields<'a> {
 
     /// A row of the table of values: the parameters', and the root mean square change of each group from where it began.
     pub(super) fn row(&self, parameters: &[f64]) -> Vec<f64> {
-        let change = |(optimizer, start): (&FieldOptimizer, &Vec<f64>)| {
-            let squares = optimizer.values().iter().zip(start).map(|(v, s)| (v - s) * (v - s));
-            (squares.sum::<f64>() / start.len().max(1) as f64).sqrt()
+        let change = |(optimizer, Start { values, .. }): (&FieldOptimizer, &Start)| {
+            let squares = optimizer.values().iter().zip(values).map(|(v, s)| (v - s) * (v - s));
+            (squares.sum::<f64>() / values.len().max(1) as f64).sqrt()
         };
         let changes = self.optimizers.iter().zip(&self.starts).map(change);
         parameters.iter().copied().chain(changes).collect()
@@ -118,20 +129,16 @@ impl<'a> Fields<'a> {
     }
 
     /// Steps all groups.
-    pub(super) fn step(
-        &mut self,
-        i: u32,
-        seen: &Evaluation,
-        factor: f64,
-    ) -> Result<(), CliError> {
+    pub(super) fn step(&mut self, i: u32, seen: &Evaluation, factor: f64) -> Result<(), CliError> {
         let job = self.problem.job;
         for (g, (group, optimizer)) in job.groups.iter().zip(&mut self.optimizers).enumerate() {
             let mut gradient = seen.group_gradient(g).to_vec();
-            if group.steps.smooth > 0.0 {
-                smooth(&job.scene, group, optimizer.values(), &mut gradient);
-            }
-            let stepped = optimizer.step(&gradient, i, factor);
-            stepped.map_err(|e| {
+            let laplacian = self.starts[g].laplacian.as_ref();
+            let smoothed = match group.steps.smooth > 0.0 {
+                true => smooth(&job.scene, group, laplacian, optimizer.values(), &mut gradient),
+                false => Ok(()),
+            };
+            smoothed.and_then(|()| optimizer.step(&gradient, i, factor)).map_err(|e| {
                 CliError::unsolved(format!("iteration {i}: group `{}`: {e}", group.group.name))
             })?;
         }
@@ -205,7 +212,7 @@ fn files(group: &Group, values: &[f64], scene: &Scene) -> Option<Vec<(String, Ve
         (GroupKind::Cage(cage), _) => {
             let mut cage = (**cage).clone();
             for (p, v) in cage.positions.iter_mut().zip(values.chunks_exact(3)) {
-                *p = drt_math::vec3(v[0], v[1], v[2]);
+                *p = vec3(v[0], v[1], v[2]);
             }
             vec![
                 (name("ply"), mesh_file::ply(&cage)),
@@ -235,58 +242,67 @@ fn rule(
     problem: &Problem<'_>,
     group: &ParameterGroup,
     default_rate: f64,
-) -> Result<FieldRule, drt_motion::optimize::OptimizeError> {
-    let GroupSteps { learning_rate, laplacian, bounds: [lower, upper], log, .. } = &group.steps;
-    let smoothing = match mesh(&problem.job.scene, &group.group) {
-        Some((vertices, triangles)) if *laplacian > 0.0 => {
-            Some(LaplacianSmoothing::new(vertices, &triangles, *laplacian)?)
-        }
-        _ => None,
+    laplacian: Option<&MeshLaplacian>,
+) -> Result<FieldRule, OptimizeError> {
+    let GroupSteps { learning_rate, laplacian: lambda, bounds, log, .. } = &group.steps;
+    let smoothing = match laplacian.filter(|_| *lambda > 0.0) {
+        Some(laplacian) => Some(LaplacianSmoothing::of(laplacian.clone(), *lambda)?),
+        None => None,
     };
     let rate = learning_rate.clone();
     Ok(FieldRule {
         method: problem.plan.method,
         learning_rate: rate.unwrap_or_else(|| Stages::new(default_rate, Vec::new())),
-        lower: *lower,
-        upper: *upper,
+        lower: bounds[0],
+        upper: bounds[1],
         logarithmic: *log,
         smoothing,
     })
 }
 
-/// The vertices and triangles whose coordinates a group has, in its order.
-fn mesh(scene: &Scene, group: &Group) -> Option<(usize, Vec<[u32; 3]>)> {
+/// The Laplacian of the mesh whose vertices a group has, in its order.
+fn laplacian(
+    scene: &Scene,
+    group: &Group,
+    values: &[f64],
+) -> Result<Option<MeshLaplacian>, OptimizeError> {
     let mesh = match (&group.kind, group.target) {
         (GroupKind::Vertices, Target::Shape(s)) => &scene.shapes[s].mesh,
         (GroupKind::Cage(cage), _) => cage,
-        _ => return None,
+        _ => return Ok(None),
     };
-    let triangles = mesh.triangles.iter().map(|t| t.map(|v| mesh.source_vertex(v))).collect();
-    Some((mesh.source_vertex_count as usize, triangles))
+    let positions: Vec<Vec3> = values.chunks_exact(3).map(|c| vec3(c[0], c[1], c[2])).collect();
+    let triangles: Vec<[u32; 3]> =
+        mesh.triangles.iter().map(|t| t.map(|v| mesh.source_vertex(v))).collect();
+    MeshLaplacian::with_seams(&positions, &triangles).map(Some)
 }
 
 /// Adds the gradient of a group's regulariser.
-fn smooth(scene: &Scene, group: &ParameterGroup, values: &[f64], gradient: &mut [f64]) {
+fn smooth(
+    scene: &Scene,
+    group: &ParameterGroup,
+    laplacian: Option<&MeshLaplacian>,
+    values: &[f64],
+    gradient: &mut [f64],
+) -> Result<(), OptimizeError> {
     let weight = group.steps.smooth;
-    let of = &group.group;
-    if let Some((vertices, triangles)) = mesh(scene, of) {
-        laplacian_energy(vertices, &triangles, values, gradient, weight);
-        return;
+    if let Some(laplacian) = laplacian {
+        return laplacian_energy(laplacian, 3, values, gradient, weight).map(drop);
     }
-    let shape = match (&of.kind, of.target) {
+    let of_image = |size: Option<[u32; 2]>| size.map(|[w, h]| [w as usize, h as usize, 1]);
+    let shape = match (&group.group.kind, group.group.target) {
         (GroupKind::Voxels(property), Target::Medium(m)) => {
             scene.media[m].item.voxels(*property).map(drt_medium::Grid::size)
         }
         (GroupKind::Texels { property, .. }, Target::Bsdf(b)) => {
-            scene.bsdfs[b].item.texels(*property).map(|[w, h]| [w as usize, h as usize, 1])
+            of_image(scene.bsdfs[b].item.texels(*property))
         }
         (GroupKind::LightTexels, Target::Emitter(e)) => {
-            let size = scene.emitters[e].item.emitter.texels();
-            size.map(|[w, h]| [w as usize, h as usize, 1])
+            of_image(scene.emitters[e].item.emitter.texels())
         }
         _ => None,
     };
-    let Some(shape) = shape else { return };
+    let Some(shape) = shape else { return Ok(()) };
     let channels = values.len() / shape.iter().product::<usize>().max(1);
-    total_variation(shape, channels, values, gradient, weight);
+    total_variation(shape, channels, values, gradient, weight).map(drop)
 }

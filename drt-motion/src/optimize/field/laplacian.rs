@@ -6,7 +6,7 @@ use drt_math::Vec3;
 
 use crate::lists::Lists;
 use crate::optimize::OptimizeError;
-use crate::optimize::optimizer::same_length;
+use crate::optimize::checks::same_length;
 
 /// The combinatorial Laplacian L of a mesh's edges: (L x)ᵢ is the sum of xᵢ - xⱼ over the vertices j that share an
 /// edge with i.

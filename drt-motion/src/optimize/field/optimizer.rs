@@ -6,7 +6,7 @@ use core::mem;
 use drt_math::fm;
 
 use super::FieldRule;
-use crate::optimize::optimizer::{all_finite, same_length};
+use crate::optimize::checks::{all_finite, same_length};
 use crate::optimize::{Method, OptimizeError};
 
 /// Everything that a [`FieldOptimizer`] remembers from one iteration to the next.

@@ -1,7 +1,7 @@
 use drt_math::fm;
 
 use crate::optimize::OptimizeError;
-use crate::optimize::optimizer::same_length;
+use crate::optimize::checks::same_length;
 
 /// The ε of [`total_variation`], in the units of the values.
 pub const TOTAL_VARIATION_EPSILON: f64 = 1e-6;
