@@ -92,6 +92,13 @@ fn read_changed(
 
 /// Opens an input that must be a job with derivatives that can be computed.
 pub(super) fn open_with_parameters(options: &Options) -> Result<Job, CliError> {
+    let job = open_job(options)?;
+    job.require_derivatives()?;
+    Ok(job)
+}
+
+/// Opens an input that must be a job.
+pub(super) fn open_job(options: &Options) -> Result<Job, CliError> {
     let job = open(options)?;
     if job.text.is_none() {
         return Err(CliError::argument(format!(
@@ -99,7 +106,6 @@ pub(super) fn open_with_parameters(options: &Options) -> Result<Job, CliError> {
             options.input.display()
         )));
     }
-    job.require_derivatives()?;
     Ok(job)
 }
 

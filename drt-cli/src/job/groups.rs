@@ -171,7 +171,8 @@ fn steps(keys: &keys::ParameterGroup, kind: &GroupKind) -> Result<GroupSteps, St
     };
     let of_shape = matches!(kind, GroupKind::Vertices | GroupKind::Cage(_));
     let bounds = keys.bounds.map_or(meaningful, |List(bounds)| bounds);
-    if !(bounds[0] < bounds[1]) {
+    let [lower, upper] = bounds;
+    if lower.partial_cmp(&upper) != Some(core::cmp::Ordering::Less) {
         return Err(format!("`bounds`: [{}, {}]; expected a range", bounds[0], bounds[1]));
     }
     let not_negative = |name: &str, value: Option<f64>| match value.unwrap_or(0.0) {

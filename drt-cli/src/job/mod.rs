@@ -530,6 +530,6 @@ fn parameters(
 fn grouped(document: &Document<'_>, keys: &keys::Job) -> Option<CliError> {
     let group = keys.parameter_group.first()?;
     let message = "[[parameter_group]] has a gradient (`drt grad --loss` or `--adjoint`), but \
-                   no derivative images, and is not fitted yet";
+                   no derivative images; `drt optimize` fits it";
     Some(document.error_at(group.span().start, message))
 }

@@ -51,7 +51,8 @@ pub(super) fn run(options: &OptimizeOptions) -> Result<Outcome, CliError> {
 
 fn together(options: &OptimizeOptions, team: &Team) -> Result<Outcome, CliError> {
     let common = &options.common;
-    let job = team.agree(run::open_with_parameters(common))?;
+    let job = team.agree(run::open_job(common))?;
+    team.agree(team.check(&job))?;
     let outputs = team.agree(Outputs::new(common, &job, "optimize"))?;
     let problem = team.agree(Problem::new(&job, options))?;
     team.agree(spare(&problem, &outputs))?;

@@ -7,8 +7,9 @@
 use drt_estimators::fit::{Evaluation, Fit};
 
 use super::problem::Problem;
-use crate::CliError;
 use crate::commands::monitor::Monitor;
+use crate::error::Place;
+use crate::{CliError, Job};
 
 #[cfg(feature = "mpi")]
 mod ranks;
@@ -39,6 +40,15 @@ impl Team {
                  `mpi` (cargo build --release -p drt-cli --features mpi)",
             )),
         }
+    }
+
+    /// Refuses what several processes cannot share.
+    pub(super) fn check(&self, job: &Job) -> Result<(), CliError> {
+        if matches!(self, Self::Alone) || job.groups.is_empty() {
+            return Ok(());
+        }
+        let message = "[[parameter_group]] is fitted by one process; expected no launcher of MPI";
+        Err(CliError::input(&Place::file(&job.path), message))
     }
 
     /// True for the one that writes and speaks.
