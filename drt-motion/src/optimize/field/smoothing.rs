@@ -21,10 +21,10 @@ use crate::optimize::OptimizeError;
 ///
 /// With the Laplacian L of the mesh (see [`MeshLaplacian`]) and λ ≥ 0, descent goes over u = (I + λL) x in place of
 /// the coordinates x. The derivatives of a loss by u are (I + λL)⁻¹ times its gradient g by x, and a step of u leads
-/// to x = (I + λL)⁻¹ u, so that plain gradient descent with the learning rate η is x ← x - η (I + λL)⁻² g (their
-/// section 3.1). Noise of single vertices is damped, while motions of whole parts keep their speed. With
-/// [`Method::Adam`](crate::optimize::Method::Adam) the second moment is one number for the whole field, the largest
-/// (their section 3.2, "UniformAdam"), so that steps do not undo the smoothing.
+/// to x = (I + λL)⁻¹ u, so that plain gradient descent with the learning rate η is x ← x - η (I + λL)⁻² g. Noise of
+/// single vertices is damped, while motions of whole parts keep their speed. With
+/// [`Method::Adam`](crate::optimize::Method::Adam) the second moment is one number for the whole field, the largest,
+/// as in their variant of Adam: a factor for each value would undo the smoothing.
 ///
 /// The matrix is factorised once; clones share the factor.
 ///
