@@ -445,8 +445,10 @@ mod smoothing {
             let error = LaplacianSmoothing::new(3, &triangles, lambda).unwrap_err().to_string();
             assert_eq!(error, format!("lambda is {lambda}; expected 0 or a positive number"));
         }
-        let lost = LaplacianSmoothing::new(3, &triangles, 1e300).unwrap_err();
-        assert_eq!(lost, OptimizeError::Factorisation { lambda: 1e300 });
+        for lambda in [1e13, 1e17, 1e300] {
+            let lost = LaplacianSmoothing::new(3, &triangles, lambda).unwrap_err();
+            assert_eq!(lost, OptimizeError::Factorisation { lambda });
+        }
         assert!(matches!(
             LaplacianSmoothing::new(2, &triangles, 1.0),
             Err(OptimizeError::Triangle { triangle: 0, vertex: 2, vertices: 2 })

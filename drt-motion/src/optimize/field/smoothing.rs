@@ -16,6 +16,9 @@ use faer::{Conj, MatMut, Par, Side, Spec};
 use super::MeshLaplacian;
 use crate::optimize::OptimizeError;
 
+/// The relative error of a solution from which on a factorisation is refused.
+const LOST: f64 = 1e-6;
+
 /// Smooth steps for the vertices of a mesh, after Nicolet, Jacobson and Jakob 2021, "Large Steps in Inverse
 /// Rendering of Geometry".
 ///
@@ -106,7 +109,16 @@ impl LaplacianSmoothing {
         }
         let (pattern, numbers) =
             factorise(&laplacian, lambda).ok_or(OptimizeError::Factorisation { lambda })?;
-        Ok(Self { factorised: Arc::new(Factorised { laplacian, lambda, pattern, numbers }) })
+        let smoothing =
+            Self { factorised: Arc::new(Factorised { laplacian, lambda, pattern, numbers }) };
+        // What is the same everywhere is not changed by I + λL, unless rounding has lost the I.
+        let mut ones = vec![1.0; smoothing.laplacian().vertices()];
+        smoothing.solve(&mut ones, 1)?;
+        if ones.iter().all(|one| (one - 1.0).abs() < LOST) {
+            Ok(smoothing)
+        } else {
+            Err(OptimizeError::Factorisation { lambda })
+        }
     }
 
     /// The Laplacian L.
