@@ -165,8 +165,8 @@ fn has_squares(method: &Method) -> bool {
     matches!(method, Method::Adam { .. })
 }
 
-/// Adam's steps with one second moment for the whole field, the largest (Nicolet, Jacobson and Jakob 2021, section
-/// 3.2): a factor for each value would make smooth directions rough.
+/// Adam's steps with one second moment for the whole field, the largest of all values (Nicolet, Jacobson and Jakob
+/// 2021): a factor for each value would make smooth directions rough.
 #[cfg(feature = "sparse")]
 fn uniform_steps(state: &FieldState, epsilon: f64) -> Vec<f64> {
     let largest = state.second.iter().copied().fold(0.0, f64::max);

@@ -16,15 +16,18 @@ use faer::{Conj, MatMut, Par, Side, Spec};
 use super::MeshLaplacian;
 use crate::optimize::OptimizeError;
 
+/// The relative error of a solution from which on a factorisation is refused.
+const LOST: f64 = 1e-6;
+
 /// Smooth steps for the vertices of a mesh, after Nicolet, Jacobson and Jakob 2021, "Large Steps in Inverse
 /// Rendering of Geometry".
 ///
 /// With the Laplacian L of the mesh (see [`MeshLaplacian`]) and λ ≥ 0, descent goes over u = (I + λL) x in place of
 /// the coordinates x. The derivatives of a loss by u are (I + λL)⁻¹ times its gradient g by x, and a step of u leads
-/// to x = (I + λL)⁻¹ u, so that plain gradient descent with the learning rate η is x ← x - η (I + λL)⁻² g (their
-/// section 3.1). Noise of single vertices is damped, while motions of whole parts keep their speed. With
-/// [`Method::Adam`](crate::optimize::Method::Adam) the second moment is one number for the whole field, the largest
-/// (their section 3.2, "UniformAdam"), so that steps do not undo the smoothing.
+/// to x = (I + λL)⁻¹ u, so that plain gradient descent with the learning rate η is x ← x - η (I + λL)⁻² g. Noise of
+/// single vertices is damped, while motions of whole parts keep their speed. With
+/// [`Method::Adam`](crate::optimize::Method::Adam) the second moment is one number for the whole field, the largest,
+/// as in their variant of Adam: a factor for each value would undo the smoothing.
 ///
 /// The matrix is factorised once; clones share the factor.
 ///
@@ -106,7 +109,16 @@ impl LaplacianSmoothing {
         }
         let (pattern, numbers) =
             factorise(&laplacian, lambda).ok_or(OptimizeError::Factorisation { lambda })?;
-        Ok(Self { factorised: Arc::new(Factorised { laplacian, lambda, pattern, numbers }) })
+        let smoothing =
+            Self { factorised: Arc::new(Factorised { laplacian, lambda, pattern, numbers }) };
+        // What is the same everywhere is not changed by I + λL, unless rounding has lost the I.
+        let mut ones = vec![1.0; smoothing.laplacian().vertices()];
+        smoothing.solve(&mut ones, 1)?;
+        if ones.iter().all(|one| (one - 1.0).abs() < LOST) {
+            Ok(smoothing)
+        } else {
+            Err(OptimizeError::Factorisation { lambda })
+        }
     }
 
     /// The Laplacian L.

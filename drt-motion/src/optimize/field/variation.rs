@@ -29,11 +29,14 @@ pub fn total_variation(
     let expected = shape.iter().fold(channels, |product, n| product.saturating_mul(*n));
     same_length("the values of the grid", expected, values)?;
     same_length("the gradient of the grid", expected, gradient)?;
+    if expected == 0 {
+        return Ok(0.0);
+    }
     let mut sum = 0.0;
     let mut stride = channels;
     for count in shape {
         // Whatever varies faster than this axis is one piece of memory, and so is the axis with it.
-        for line in (0..expected).step_by((stride * count).max(1)) {
+        for line in (0..expected).step_by(stride * count) {
             for i in line..line + stride * (count - 1) {
                 let difference = values[i + stride] - values[i];
                 let length = fm::sqrt(
