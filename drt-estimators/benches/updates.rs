@@ -39,7 +39,7 @@ fn measure(name: &str, scene: &Scene, shape: usize, estimator: EstimatorKind) {
     let settings = Settings { estimator, threads: 1, ..Settings::default() };
     let adjoint = vec![Rgb::splat(1.0 / PIXELS as f64); PIXELS];
     let mut session = Session::new(scene, &[], &settings).expect("a valid scene");
-    let mut gradient = |session: &mut Session| {
+    let gradient = |session: &mut Session| {
         let begun = Instant::now();
         let wanted = [Target::Shape(shape)];
         session.gradient(&wanted, SPP, &adjoint, &Unattended).expect("a gradient");

@@ -64,11 +64,16 @@ pub(super) fn groups(
         if shape && !matches!(target, Target::Shape(_)) {
             return Err(fail(format!("`{}` is not a shape", keys.target)));
         }
-        let name = keys.name.clone().unwrap_or_else(|| keys.target.clone());
+        let taken = |name: &str| groups.iter().any(|g| g.group.name == name);
+        let name = match &keys.name {
+            Some(name) => name.clone(),
+            None if taken(&keys.target) => format!("{}-{}", keys.target, what(keys, &kind)),
+            None => keys.target.clone(),
+        };
         if name.is_empty() || name.contains(['/', '\\', ',', '"']) || name.starts_with('.') {
             return Err(fail(format!("`name`: \"{name}\" cannot be the name of a file")));
         }
-        if groups.iter().any(|g| g.group.name == name) {
+        if taken(&name) {
             return Err(fail(format!("there are two groups `{name}`; expected a `name` of each")));
         }
         let steps = steps(keys, &kind).map_err(fail)?;
@@ -76,6 +81,15 @@ pub(super) fn groups(
         groups.push(ParameterGroup { group, steps });
     }
     Ok(groups)
+}
+
+/// A word for what the unknowns are.
+fn what(keys: &keys::ParameterGroup, kind: &GroupKind) -> String {
+    match kind {
+        GroupKind::Vertices => "vertices".into(),
+        GroupKind::Cage(_) => "cage".into(),
+        _ => keys.property.clone().unwrap_or_default(),
+    }
 }
 
 /// Refuses more than one kind of unknowns.
