@@ -158,7 +158,7 @@ name = "body"
 target = "body"
 vertices = "all"
 laplacian = 25.0
-learning_rate = [[0, 0.03], [60, 0.01]]
+learning_rate = [[0, 0.3], [40, 0.1], [80, 0.03]]
 """
 
 
