@@ -41,7 +41,7 @@ fn image(scene: &Scene, parameters: &[Parameter], spp: u32) -> Vec<Rgb> {
 
 fn fit(scene: &Scene, target: [f64; 3], loss: Loss) -> Fit {
     let pixels = image(&moved(scene, &parameters(target)).unwrap(), &[], 256);
-    let view = View { sensor: 0, reference: Reference::new(FILM, pixels).unwrap() };
+    let view = View::new(0, Reference::new(FILM, pixels).unwrap());
     Fit::new(scene.clone(), parameters([0.0; 3]), vec![view], loss, settings()).unwrap()
 }
 
@@ -177,7 +177,7 @@ fn views_share_what_they_can() {
     let black = || Reference::new(FILM, vec![Rgb::ZERO; (FILM[0] * FILM[1]) as usize]).unwrap();
     let wobbling = || {
         let effects = vec![moves("ball", wobble(&scene, "ball", 1))];
-        let views = [0, 1].map(|sensor| View { sensor, reference: black() });
+        let views = [0, 1].map(|sensor| View::new(sensor, black()));
         let parameters = vec![parameter("wobble", 0.0, effects)];
         Fit::new(scene.clone(), parameters, views.into(), Loss::L2, settings()).unwrap()
     };
@@ -238,7 +238,7 @@ fn parameters_that_change_nothing_are_seen() {
     let reference = Reference::new(FILM, image(&scene, &[], 4)).unwrap();
     let mut all = parameters([0.0; 3]);
     all.push(parameter("nothing", 0.0, vec![]));
-    let views = vec![View { sensor: 0, reference }];
+    let views = vec![View::new(0, reference)];
     let mut fit = Fit::new(scene, all, views, Loss::L2, settings()).unwrap();
     let seen = fit.evaluate(&[0.0; 4], 4, 0, &Unattended).unwrap().unwrap();
     assert_eq!([0, 1, 2, 3].map(|p| seen.is_blind_to(p)), [false, false, false, true]);
@@ -265,7 +265,7 @@ fn targets_must_fit_the_film() {
     let scene = room();
     let view = |sensor, size: [u32; 2]| {
         let pixels = vec![Rgb::ZERO; (size[0] * size[1]) as usize];
-        View { sensor, reference: Reference::new(size, pixels).unwrap() }
+        View::new(sensor, Reference::new(size, pixels).unwrap())
     };
     let fail = |views| {
         Fit::new(scene.clone(), vec![], views, Loss::L2, settings()).err().unwrap().to_string()

@@ -28,7 +28,7 @@ fn view(scene: &Scene) -> View {
     let mut session = Session::new(scene, &[], &settings()).expect("a valid scene");
     session.run(64, &Unattended);
     let pixels = session.rendering().image.pixels.iter().map(|p| p.mean * 1.5).collect();
-    View { sensor: 0, reference: Reference::new(FILM, pixels).expect("a picture") }
+    View::new(0, Reference::new(FILM, pixels).expect("a picture"))
 }
 
 fn fit(scene: &Scene, parameters: &[Parameter], groups: Vec<Group>) -> Fit {

@@ -125,7 +125,7 @@ fn of_loss(
         job.settings.seed = job.settings.seed.wrapping_add(INDEPENDENT);
         return of_adjoint(job, options, loss.adjoint(&image, &reference), monitor);
     }
-    let (scene, views) = (job.scene.clone(), vec![View { sensor, reference: reference.clone() }]);
+    let (scene, views) = (job.scene.clone(), vec![View::new(sensor, reference.clone())]);
     let mut fit = Fit::new(scene, job.parameters.clone(), views, loss, job.settings.clone())
         .map_err(|e| job.blame(&e))?;
     let values: Vec<f64> = job.parameters.iter().map(|p| p.value).collect();

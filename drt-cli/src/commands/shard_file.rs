@@ -164,7 +164,7 @@ impl ShardFile {
 
 /// The only view of a gradient of a loss.
 pub(crate) fn view(target: Reference) -> View {
-    View { sensor: 0, reference: target }
+    View::new(0, target)
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@ use super::motions::tetrahedra_files;
 
 /// What decides the parameters and how things move; pictures to fit to are not among them.
 pub(super) fn named(keys: &keys::Job, folder: &Path) -> Vec<PathBuf> {
-    let effects = keys.parameter.iter().flat_map(|p| &p.get_ref().effect);
+    let of_views = keys.view.iter().flat_map(|v| &v.get_ref().effect);
+    let effects = keys.parameter.iter().flat_map(|p| &p.get_ref().effect).chain(of_views);
     let of_effect = effects.flat_map(|effect| {
         let keys::Effect { vertex_velocity, vertex_normals, cage, .. } = effect.get_ref();
         vertex_velocity.iter().chain(vertex_normals).chain(cage.as_ref().map(|c| &c.mesh))

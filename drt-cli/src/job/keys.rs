@@ -23,6 +23,8 @@ pub(super) struct Job {
     pub(super) parameter_group: Vec<Spanned<ParameterGroup>>,
     #[serde(default)]
     pub(super) motion: Vec<Spanned<Motion>>,
+    #[serde(default)]
+    pub(super) view: Vec<Spanned<View>>,
     pub(super) optimize: Option<Spanned<Optimize>>,
 }
 
@@ -138,6 +140,18 @@ pub(super) struct Effect {
     pub(super) log: Option<bool>,
     pub(super) voxels: Option<Voxels>,
     pub(super) texels: Option<Texels>,
+    /// In views: by how much.
+    pub(super) amount: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct View {
+    pub(super) target: PathBuf,
+    pub(super) sensor: Option<String>,
+    pub(super) mask: Option<PathBuf>,
+    #[serde(default)]
+    pub(super) effect: Vec<Spanned<Effect>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -238,7 +252,9 @@ pub(super) enum MotionKind {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Optimize {
+    #[serde(default)]
     pub(super) targets: Vec<Spanned<PathBuf>>,
+    pub(super) views_per_iteration: Option<Spanned<u32>>,
     pub(super) sensors: Option<Spanned<Vec<String>>>,
     pub(super) masks: Option<Spanned<Vec<Spanned<PathBuf>>>>,
     pub(super) relative: Option<f64>,

@@ -13,6 +13,7 @@ mod refusal;
 #[cfg(test)]
 mod tests;
 mod velocities;
+mod views;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -138,7 +139,9 @@ pub(crate) fn read_job(
     let settings = settings(&document, &keys, folder, &scene, &parameters)?;
     let [spp, boundary_spp] = sample_counts(&document, &keys.estimator)?;
     let groups = groups::groups(&document, &keys.parameter_group, folder, &scene)?;
-    let optimize = optimize::optimize(&document, &keys, folder, &scene, &parameters, &groups);
+    let views = views::views(&document, &keys.view, folder, &scene)?;
+    let known = optimize::Known { scene: &scene, parameters: &parameters, groups: &groups };
+    let optimize = optimize::optimize(&document, &keys, folder, &known, views);
     let grouped = grouped(&document, &keys);
     read.extend(files::named(&keys, folder));
     read.push(path.into());
@@ -265,7 +268,9 @@ impl Job {
     /// Lists the pictures that a fit reads; other commands may write them.
     pub fn pictures(&self) -> impl Iterator<Item = &Path> {
         let plan = self.optimize.as_ref().ok().and_then(Option::as_ref);
-        let pictures = plan.into_iter().flat_map(|plan| plan.targets.iter().chain(&plan.masks));
+        let pictures = plan
+            .into_iter()
+            .flat_map(|plan| plan.targets.iter().chain(plan.masks.iter().flatten()));
         pictures.map(PathBuf::as_path)
     }
 
@@ -500,6 +505,9 @@ fn parameters(
         for effect in &parameter.effect {
             let (at, keys) = (effect.span().start, effect.get_ref());
             let fail = |message| document.error_at(at, format!("parameter `{name}`: {message}"));
+            if keys.amount.is_some() {
+                return Err(fail("`amount` belongs to the effects of a [[view]]".into()));
+            }
             let effect = effects::effect(keys, folder, &mut cages);
             let effect = effect.map_err(|refusal| refusal.told(fail))?;
             let targets = scene.find_all(&effect.target).map_err(|e| fail(e.to_string()))?;

@@ -11,6 +11,7 @@ use toml::Spanned;
 
 use super::document::Document;
 use super::list::List;
+use super::views::JobView;
 use super::{ParameterGroup, find_sensor, keys};
 use crate::CliError;
 use crate::files::input_file;
@@ -30,8 +31,12 @@ pub struct Optimize {
     /// The sensor of each target; `None` is the job's own for a single target, else all sensors in the
     /// scene's order.
     pub sensors: Option<Vec<usize>>,
-    /// Image files of the targets' masks; empty, or one per target.
-    pub masks: Vec<PathBuf>,
+    /// Image files of the targets' masks, one per target where there are any.
+    pub masks: Vec<Option<PathBuf>>,
+    /// What is known to be otherwise in each target, where there are poses.
+    pub poses: Vec<Vec<Parameter>>,
+    /// How many of the targets an iteration looks at.
+    pub views_per_iteration: Option<u32>,
     /// Divides differences by what a target shows, and this part of its mean more.
     pub relative: Option<f64>,
     /// What is minimised.
@@ -76,13 +81,17 @@ pub(super) fn optimize(
     document: &Document<'_>,
     keys: &keys::Job,
     folder: &Path,
-    scene: &Scene,
-    parameters: &[Parameter<String>],
-    groups: &[ParameterGroup],
+    known: &Known<'_>,
+    views: Vec<JobView>,
 ) -> Result<Option<Optimize>, CliError> {
-    let Some(table) = &keys.optimize else { return Ok(None) };
+    let Some(table) = &keys.optimize else {
+        let Some(view) = keys.view.first() else { return Ok(None) };
+        let message = "[[view]] goes with an [optimize]";
+        return Err(document.error_at(view.span().start, message));
+    };
+    let Known { scene, parameters, groups } = *known;
     let reader = Reader { document, table, parameters, groups };
-    let keys = table.get_ref();
+    let (job, keys) = (keys, table.get_ref());
     let (loss, method, decay) = (reader.loss()?, reader.method(), reader.decay()?);
     if matches!(method, Method::GaussNewton { .. }) && !loss.is_curved() {
         return Err(reader.error(
@@ -90,6 +99,10 @@ pub(super) fn optimize(
              expected \"l2\", \"pyramid-l2\" or \"rmse\"",
         ));
     }
+    let own_sensor = match &job.sensor {
+        Some(name) => find_sensor(scene, name.get_ref()).unwrap_or(0),
+        None => 0,
+    };
     let variables = reader.variables()?;
     let group_rates = reader.group_rates()?;
     let start: Vec<f64> = parameters.iter().map(|p| p.value).collect();
@@ -104,7 +117,7 @@ pub(super) fn optimize(
     });
     let masks = keys.masks.as_ref().map_or(Ok(Vec::new()), |masks| {
         reader.one_per_target("masks", masks.span().start, masks.get_ref().len())?;
-        Ok(masks.get_ref().iter().map(|m| folder.join(m.get_ref())).collect())
+        Ok(masks.get_ref().iter().map(|m| Some(folder.join(m.get_ref()))).collect())
     })?;
     let masked = keys.masks.iter().flat_map(|masks| masks.get_ref().iter());
     let named = keys.targets.iter().map(|t| ("targets", t)).chain(masked.map(|m| ("masks", m)));
@@ -113,10 +126,33 @@ pub(super) fn optimize(
         let message = format!("`{key}`: cannot read {}; expected an image file", path.display());
         (path, document.error_at(file.span().start, message))
     };
-    let unreadable = named.map(unreadable).collect();
-    if keys.targets.is_empty() {
-        return Err(reader.error("`targets` is empty; expected an image file per sensor"));
+    let mut unreadable: BTreeMap<PathBuf, CliError> = named.map(unreadable).collect();
+    let plain = keys.sensors.is_some() || keys.masks.is_some() || !keys.targets.is_empty();
+    if plain && !views.is_empty() {
+        let message = "[[view]] takes the place of `targets`, `sensors` and `masks`; expected one or the other";
+        return Err(reader.error(message));
     }
+    if keys.targets.is_empty() && views.is_empty() {
+        return Err(
+            reader.error("`targets` is empty; expected an image file per sensor, or [[view]]")
+        );
+    }
+    unreadable.extend(views.iter().flat_map(|view| view.unreadable.iter().cloned()));
+    let targets: Vec<PathBuf> = match &views[..] {
+        [] => keys.targets.iter().map(|t| folder.join(t.get_ref())).collect(),
+        views => views.iter().map(|view| view.target.clone()).collect(),
+    };
+    let views_per_iteration = match &keys.views_per_iteration {
+        Some(n) if *n.get_ref() == 0 || *n.get_ref() as usize > targets.len() => {
+            let message = format!(
+                "`views_per_iteration` is {}; expected 1 to {}, the number of views",
+                n.get_ref(),
+                targets.len()
+            );
+            return Err(document.error_at(n.span().start, message));
+        }
+        n => n.as_ref().map(|n| *n.get_ref()),
+    };
     let optimizer = keys.optimizer.as_ref().map(Spanned::get_ref);
     let checkpoint_every = match &keys.checkpoint_every {
         Some(n) if *n.get_ref() == 0 => {
@@ -127,9 +163,17 @@ pub(super) fn optimize(
         None => CHECKPOINT_EVERY,
     };
     Ok(Some(Optimize {
-        targets: keys.targets.iter().map(|t| folder.join(t.get_ref())).collect(),
-        sensors: sensors.transpose()?,
-        masks,
+        sensors: match &views[..] {
+            [] => sensors.transpose()?,
+            views => Some(views.iter().map(|view| view.sensor.unwrap_or(own_sensor)).collect()),
+        },
+        masks: match &views[..] {
+            [] => masks,
+            views => views.iter().map(|view| view.mask.clone()).collect(),
+        },
+        poses: views.iter().map(|view| view.pose.clone()).collect(),
+        views_per_iteration,
+        targets,
         relative: keys.relative,
         loss,
         method,
@@ -143,6 +187,13 @@ pub(super) fn optimize(
         checkpoint_every,
         unreadable,
     }))
+}
+
+/// What a job has read before its fit.
+pub(super) struct Known<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) parameters: &'a [Parameter<String>],
+    pub(super) groups: &'a [ParameterGroup],
 }
 
 struct Reader<'a> {

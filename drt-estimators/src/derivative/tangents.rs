@@ -68,6 +68,26 @@ fn add_texels(
 }
 
 impl Tangents {
+    /// Those of the first so many parameters, in the scene at the values of all.
+    pub(crate) fn of_first(mut self, count: usize, scene: &Scene) -> Self {
+        fn first<T>(lists: &mut [Vec<(usize, T)>], count: usize) {
+            lists.iter_mut().for_each(|list| list.retain(|(p, _)| *p < count));
+        }
+        self.names.truncate(count);
+        first(&mut self.shapes, count);
+        let of_shapes = self.shapes.iter().zip(&scene.shapes);
+        let reached = of_shapes.map(|(motions, shape)| {
+            ReachedTriangles::new(&shape.mesh, motions.iter().map(|(_, m)| m))
+        });
+        self.reached = reached.collect();
+        first(&mut self.media, count);
+        first(&mut self.bsdfs, count);
+        first(&mut self.emitters, count);
+        first(&mut self.sensors, count);
+        self.texels.retain(|t| t.parameter < count);
+        self
+    }
+
     /// Refuses parameters that have finite differences only.
     pub(crate) fn check(&self) -> Result<(), Error> {
         self.refused.clone().map_or(Ok(()), Err)

@@ -63,6 +63,8 @@ impl Seen {
 pub struct Evaluation {
     loss: Loss,
     views: Arc<[View]>,
+    /// Which of the views have been seen, in the order of `seen`.
+    which: Vec<usize>,
     seen: Vec<Seen>,
     parameters: usize,
     /// The gradient by each group of unknowns.
@@ -81,23 +83,57 @@ impl Evaluation {
         parameters: usize,
     ) -> Result<Self, Error> {
         let views = views.into();
+        let all = (0..views.len()).collect();
+        Self::of_some(loss, views, all, halves, parameters)
+    }
+
+    /// What halves of the samples of some views tell, which are given by their numbers.
+    pub(super) fn of_some(
+        loss: Loss,
+        views: Arc<[View]>,
+        which: Vec<usize>,
+        halves: Vec<[Half; 2]>,
+        parameters: usize,
+    ) -> Result<Self, Error> {
         let fits = |view: &View, half: &Half| {
             let [w, h] = view.reference.size();
             let n = w as usize * h as usize;
             half.derivatives.len() == parameters
                 && [&half.image].into_iter().chain(&half.derivatives).all(|i| i.len() == n)
         };
-        let all = views.iter().zip(&halves).all(|(v, seen)| seen.iter().all(|h| fits(v, h)));
-        if halves.len() != views.len() || !all {
+        let all = which.iter().zip(&halves).all(|(v, seen)| {
+            views.get(*v).is_some_and(|view| seen.iter().all(|half| fits(view, half)))
+        });
+        if halves.len() != which.len() || which.is_empty() || !all {
             return Err(Error::Setting { setting: "halves", reason: SettingError::ForeignHalves });
         }
         let seen = halves.into_iter().map(|halves| Seen { halves }).collect();
-        Ok(Self { loss, views, seen, parameters, groups: Vec::new() })
+        Ok(Self { loss, views, which, seen, parameters, groups: Vec::new() })
+    }
+
+    /// Whether a view has been seen, where only some were asked for.
+    #[must_use]
+    pub fn sees(&self, view: usize) -> bool {
+        self.which.contains(&view)
+    }
+
+    /// Whether all views have been seen.
+    #[must_use]
+    pub fn sees_all(&self) -> bool {
+        self.which.len() == self.views.len()
+    }
+
+    /// What the sums over the views that were seen count for all.
+    fn scale(&self) -> f64 {
+        self.views.len() as f64 / self.which.len() as f64
     }
 
     /// With the gradient by each group of unknowns.
-    pub(super) fn with_groups(self, groups: Vec<Vec<f64>>) -> Self {
-        Self { groups, ..self }
+    pub(super) fn with_groups(mut self, mut groups: Vec<Vec<f64>>) -> Self {
+        let scale = self.scale();
+        groups.iter_mut().flatten().for_each(|g| *g *= scale);
+        self.groups = groups;
+        self
     }
 
     /// The gradient of the loss by the values of a [`Group`](super::Group), in their order; none where there is no such group.
@@ -107,13 +143,14 @@ impl Evaluation {
     }
 
     fn pairs(&self) -> impl Iterator<Item = (&View, &Seen)> {
-        self.views.iter().zip(&self.seen)
+        self.which.iter().map(|v| &self.views[*v]).zip(&self.seen)
     }
 
     /// The loss of the images by all samples, summed over views. Their noise adds to it.
     #[must_use]
     pub fn loss(&self) -> f64 {
-        self.pairs().map(|(v, s)| self.loss.value(&s.image(), &v.reference)).sum()
+        let losses = self.pairs().map(|(v, s)| self.loss.value(&s.image(), &v.reference));
+        self.scale() * losses.sum::<f64>()
     }
 
     /// The gradient of the loss by the parameters, from images and derivatives with independent errors.
@@ -124,7 +161,7 @@ impl Evaluation {
             for (image, other) in [(0, 1), (1, 0)] {
                 let adjoint = self.loss.adjoint(&seen.halves[image].image, &view.reference);
                 for (sum, d) in gradient.iter_mut().zip(&seen.halves[other].derivatives) {
-                    *sum += 0.5 * inner(&adjoint, d);
+                    *sum += 0.5 * self.scale() * inner(&adjoint, d);
                 }
             }
         }
@@ -155,7 +192,8 @@ impl Evaluation {
             let differences: Vec<Vec<f64>> = (0..n).map(of).collect();
             for (row, x) in covariance.iter_mut().zip(&differences) {
                 for (sum, y) in row.iter_mut().zip(&differences) {
-                    *sum += 0.25 * x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+                    let square = self.scale() * self.scale();
+                    *sum += 0.25 * square * x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
                 }
             }
         }
@@ -181,7 +219,7 @@ impl Evaluation {
                 for (j, d) in seen.halves[first].derivatives.iter().enumerate() {
                     let curved = self.loss.curvature(d, value, &view.reference);
                     for (k, other) in seen.halves[second].derivatives.iter().enumerate() {
-                        let product = 0.25 * inner(&curved, other);
+                        let product = 0.25 * self.scale() * inner(&curved, other);
                         curvature[j][k] += product;
                         curvature[k][j] += product;
                     }
@@ -210,7 +248,7 @@ impl Evaluation {
             for (row, d) in noise.iter_mut().zip(&differences) {
                 let curved = self.loss.curvature(d, value, &view.reference);
                 for (sum, other) in row.iter_mut().zip(&differences) {
-                    *sum += 0.5 * inner(&curved, other);
+                    *sum += 0.5 * self.scale() * inner(&curved, other);
                 }
             }
         }
@@ -236,19 +274,24 @@ impl Evaluation {
     /// The image of a view by all samples, row by row from the top left.
     ///
     /// # Panics
-    /// When there is no such view.
+    /// When there is no such view, or it has not been [seen](Self::sees).
     #[must_use]
     pub fn image(&self, view: usize) -> Vec<Rgb> {
-        self.seen[view].image()
+        self.of_view(view).image()
+    }
+
+    fn of_view(&self, view: usize) -> &Seen {
+        let place = self.which.iter().position(|v| *v == view);
+        &self.seen[place.unwrap_or(usize::MAX)]
     }
 
     /// The derivative of a view's image by a parameter, by all samples.
     ///
     /// # Panics
-    /// When there is no such view or parameter.
+    /// When there is no such view or parameter, or the view has not been [seen](Self::sees).
     #[must_use]
     pub fn derivative(&self, view: usize, parameter: usize) -> Vec<Rgb> {
-        self.seen[view].derivative(parameter)
+        self.of_view(view).derivative(parameter)
     }
 
     /// True when the derivative by a parameter is zero in every pixel of every view.

@@ -49,6 +49,17 @@ pub struct View {
     pub sensor: usize,
     /// What it shall see.
     pub reference: Reference,
+    /// What is known to be otherwise in this view, as a body on a turntable is: changes by their parameters' values, after all that is
+    /// fitted. Gradients go back through them.
+    pub pose: Vec<Parameter>,
+}
+
+impl View {
+    /// What a sensor shall see of the scene as it is.
+    #[must_use]
+    pub fn new(sensor: usize, reference: Reference) -> Self {
+        Self { sensor, reference, pose: Vec::new() }
+    }
 }
 
 /// A scene, what may change in it, and what it shall look like.
@@ -204,11 +215,28 @@ impl Fit {
         seed: u64,
         control: &dyn Control,
     ) -> Result<Option<Evaluation>, Error> {
+        let all: Vec<usize> = (0..self.views.len()).collect();
+        self.evaluate_views(values, spp, seed, &all, control)
+    }
+
+    /// As [`evaluate`](Self::evaluate), of some of the views alone: loss and derivatives are those of the views that are seen, times the number of
+    /// all over that of these, as an estimate of what all would tell.
+    ///
+    /// # Errors
+    /// As [`evaluate`](Self::evaluate), and when there is no such view.
+    pub fn evaluate_views(
+        &mut self,
+        values: &[f64],
+        spp: u32,
+        seed: u64,
+        views: &[usize],
+        control: &dyn Control,
+    ) -> Result<Option<Evaluation>, Error> {
         let mut halves = Vec::new();
         let mut groups = alloc::vec![Vec::new(); self.groups.len()];
-        let count = self.views.len();
-        for view in 0..count {
-            let progress = |done| control.progress((view as f64 + done) / count as f64);
+        let count = views.len();
+        for (k, view) in views.iter().copied().enumerate() {
+            let progress = |done| control.progress((k as f64 + done) / count as f64);
             let control = Watched { control, progress };
             let seen = match self.groups.is_empty() {
                 true => self.halves(values, spp, seed, view, 0..2, &control)?,
@@ -222,7 +250,14 @@ impl Fit {
                 None => return Ok(None),
             }
         }
-        Ok(Some(self.together(halves)?.with_groups(groups)))
+        let seen = Evaluation::of_some(
+            self.loss,
+            self.views.clone(),
+            views.to_vec(),
+            halves,
+            self.parameters.len(),
+        )?;
+        Ok(Some(seen.with_groups(groups)))
     }
 
     /// What one view's images tell, and their part in the gradients of groups: the adjoint of each half's image, times the derivatives
@@ -241,13 +276,12 @@ impl Fit {
         let Some(halves) = self.halves(values, spp, seed, view, 0..2, &images)? else {
             return Ok(None);
         };
-        let reference = &self.views[view].reference;
+        let applied = self.posed(values, view)?;
+        let View { reference, pose, .. } = &self.views[view];
         let adjoints = [0, 1].map(|k| self.loss.adjoint(&halves[k].image, reference));
-        let applied = self.apply(values)?;
-        let collectors = self
-            .groups
-            .iter()
-            .map(|group| group.collector(&self.given, &applied.scene, &self.parameters));
+        let changes = [&self.parameters[..], pose].concat();
+        let collectors =
+            self.groups.iter().map(|group| group.collector(&self.given, &applied.scene, &changes));
         let collectors = collectors.collect::<Result<Vec<_>, _>>()?;
         let mut wanted: Vec<Target> = Vec::new();
         for group in self.groups.iter().filter(|group| !group.values(&self.given).is_empty()) {
@@ -349,10 +383,20 @@ impl Fit {
             let reason = SettingError::NoSensor { index: view, count };
             return Err(Error::Setting { setting: "view", reason });
         };
-        let applied = self.apply(values)?;
+        let applied = self.posed(values, view)?;
         let estimator = self.estimators[view];
         let settings = Settings { sensor, estimator, terms: false, ..self.settings.clone() };
-        ImageSource::new(&self.scene, &self.parameters, &applied, settings, &mut self.kept)
+        let pose = &self.views[view].pose;
+        ImageSource::new(&self.scene, &self.parameters, pose, &applied, settings, &mut self.kept)
+    }
+
+    /// The scene at these values as a view sees it.
+    fn posed(&mut self, values: &[f64], view: usize) -> Result<Arc<Applied>, Error> {
+        let applied = self.apply(values)?;
+        match &self.views[view].pose[..] {
+            [] => Ok(applied),
+            pose => Applied::posed(&self.scene, &self.parameters, pose).map(Arc::new),
+        }
     }
 }
 
@@ -368,8 +412,8 @@ fn estimators(
         return Ok(alloc::vec![settings.estimator; views.len()]);
     }
     scene.check()?;
-    let applied = Applied::new(scene, parameters)?;
     let of_view = |view: &View| {
+        let applied = Applied::posed(scene, parameters, &view.pose)?;
         let settings = Settings { sensor: view.sensor, seed: 0, ..settings.clone() };
         applied.estimator(&settings, kept)
     };

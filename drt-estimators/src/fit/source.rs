@@ -29,6 +29,19 @@ impl Applied {
         Ok(Self { scene, tangents })
     }
 
+    /// With changes that are known beside those by parameters, and after them.
+    pub(super) fn posed(
+        scene: &Scene,
+        parameters: &[Parameter],
+        pose: &[Parameter],
+    ) -> Result<Self, Error> {
+        let all = [parameters, pose].concat();
+        let (scene, tangents) = tangents::apply(scene, &all)?;
+        let tangents = tangents.of_first(parameters.len(), &scene);
+        tangents.check()?;
+        Ok(Self { scene, tangents })
+    }
+
     /// How the derivatives that a sensor sees are estimated with the least work.
     pub(super) fn estimator(
         &self,
@@ -44,15 +57,16 @@ impl Applied {
 /// A scene prepared at its parameters' values.
 pub(super) struct ImageSource<'a> {
     session: Session,
-    /// Set where derivatives are differences of images.
-    differences: Option<(&'a Scene, &'a [Parameter])>,
+    /// Set where derivatives are differences of images: the scene, and all changes, of which the first so many have derivatives.
+    differences: Option<(&'a Scene, Vec<Parameter>, usize)>,
     settings: Settings,
 }
 
 impl<'a> ImageSource<'a> {
     pub(super) fn new(
         scene: &'a Scene,
-        parameters: &'a [Parameter],
+        parameters: &[Parameter],
+        pose: &[Parameter],
         applied: &Applied,
         settings: Settings,
         kept: &mut PreparedCache,
@@ -61,7 +75,8 @@ impl<'a> ImageSource<'a> {
         if settings.estimator == EstimatorKind::FiniteDifference {
             let (moved, no_tangents) = tangents::apply(moved, &[])?;
             let session = Session::prepared(&moved, &no_tangents, &settings, kept)?;
-            return Ok(Self { session, differences: Some((scene, parameters)), settings });
+            let differences = Some((scene, [parameters, pose].concat(), parameters.len()));
+            return Ok(Self { session, differences, settings });
         }
         let session = Session::prepared(moved, tangents, &settings, kept)?;
         Ok(Self { session, differences: None, settings })
@@ -79,14 +94,14 @@ impl<'a> ImageSource<'a> {
             return Ok(None);
         }
         let mut half = Half::from(&self.session.rendering());
-        if let Some((scene, parameters)) = self.differences {
+        if let Some((scene, changes, wanted)) = &self.differences {
             let settings = Settings { seed, ..self.settings.clone() };
             let step = settings.step;
-            let layers = finite_differences(scene, parameters, &settings, spp, step, control)?;
-            if layers.len() < parameters.len() {
+            let layers = finite_differences(scene, changes, &settings, spp, step, control)?;
+            if layers.len() < changes.len() {
                 return Ok(None);
             }
-            half.derivatives = layers.iter().map(means).collect();
+            half.derivatives = layers.iter().take(*wanted).map(means).collect();
         }
         Ok(Some(half))
     }

@@ -98,7 +98,7 @@ impl<'a> Gallery<'a> {
     /// Stores what an iteration saw as the present state.
     pub(super) fn current(&self, iteration: u32, evaluation: &Evaluation) -> Result<(), CliError> {
         self.image(iteration, evaluation, |v| self.file(v, "current"))?;
-        for v in 0..self.problem.views.len() {
+        for v in (0..self.problem.views.len()).filter(|v| evaluation.sees(*v)) {
             let (size, image) = (self.problem.size(v, iteration), evaluation.image(v));
             for p in 0..self.problem.job.parameters.len() {
                 let derivative = diverging(&evaluation.derivative(v, p));
@@ -120,7 +120,7 @@ impl<'a> Gallery<'a> {
         evaluation: &Evaluation,
         file: impl Fn(usize) -> PathBuf,
     ) -> Result<(), CliError> {
-        for v in 0..self.problem.views.len() {
+        for v in (0..self.problem.views.len()).filter(|v| evaluation.sees(*v)) {
             let pixels = exposed(&evaluation.image(v), self.white[v]);
             write(&file(v), self.problem.size(v, iteration), &pixels)?;
         }

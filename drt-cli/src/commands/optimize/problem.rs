@@ -18,6 +18,9 @@ use crate::{CliError, Job};
 /// Random numbers that name the seeds of iterations.
 const SEED_STREAM: u64 = 0x0f17;
 
+/// Random numbers that order the views.
+const VIEW_STREAM: u64 = 0x71e7;
+
 /// A job that can be fitted.
 pub(super) struct Problem<'a> {
     pub(super) job: &'a Job,
@@ -75,7 +78,7 @@ impl<'a> Problem<'a> {
                 let resized = sensor.sensor.with_film(reference.size());
                 sensor.sensor = resized.map_err(|e| fail(&e))?;
             }
-            views.push(View { sensor: view.sensor, reference });
+            views.push(View { reference, ..view.clone() });
         }
         let parameters = self.job.parameters.clone();
         let groups = self.job.groups.iter().map(|g| g.group.clone()).collect();
@@ -92,6 +95,27 @@ impl<'a> Problem<'a> {
     /// iteration shares its random numbers with one.
     pub(super) fn seed(&self, iteration: u32) -> u64 {
         Rng::new(self.job.settings.seed, SEED_STREAM, iteration).next_u64()
+    }
+
+    /// The views that an iteration looks at: all of them first and last, and else a few in an order that the seed fixes, each once before any comes again.
+    pub(super) fn views_at(&self, iteration: u32) -> Vec<usize> {
+        let count = self.views.len();
+        let all = || (0..count).collect();
+        let Some(few) = self.plan.views_per_iteration.map(|n| n as usize) else { return all() };
+        if iteration == 0 || iteration >= self.iterations {
+            return all();
+        }
+        let first = (iteration as usize - 1) * few;
+        (first..first + few).map(|k| self.order(k / count)[k % count]).collect()
+    }
+
+    /// The order of the views in one round.
+    fn order(&self, round: usize) -> Vec<usize> {
+        let mut rng = Rng::new(self.job.settings.seed, VIEW_STREAM, round as u32);
+        let mut keyed: Vec<(u64, usize)> =
+            (0..self.views.len()).map(|v| (rng.next_u64(), v)).collect();
+        keyed.sort_unstable();
+        keyed.into_iter().map(|(_, v)| v).collect()
     }
 
     /// Columns and rows of a view's images in an iteration.
@@ -135,9 +159,10 @@ impl<'a> Problem<'a> {
         sum.add(format!("{:?} {:?}", plan.loss, plan.method).as_bytes());
         sum.add(format!("{:?} {:?}", plan.variables, plan.decay).as_bytes());
         sum.add(format!("{:?} {:?}", self.spp, plan.reduce).as_bytes());
-        sum.add(format!("{:?}", self.job.groups).as_bytes());
+        sum.add(format!("{:?} {:?}", self.job.groups, plan.views_per_iteration).as_bytes());
         for view in &self.views {
             sum.add(format!("{} {:?}", view.sensor, view.reference).as_bytes());
+            sum.add(format!("{:?}", view.pose).as_bytes());
         }
         Ok(sum)
     }
@@ -162,7 +187,8 @@ fn views(job: &Job, plan: &Optimize) -> Result<Vec<View>, CliError> {
     let mut used = BTreeMap::new();
     let mut views = Vec::new();
     for (i, (path, sensor)) in plan.targets.iter().zip(sensors).enumerate() {
-        if let Some(other) = used.insert(sensor, path) {
+        let other = used.insert(sensor, path).filter(|_| plan.poses.is_empty());
+        if let Some(other) = other {
             let message = format!("sensor {sensor} sees two targets, {} and this", other.display());
             return Err(CliError::input(&Place::file(path), message));
         }
@@ -178,7 +204,7 @@ fn views(job: &Job, plan: &Optimize) -> Result<Vec<View>, CliError> {
         let fail = |path, e| CliError::input(&Place::file(path), e);
         let mut reference =
             Reference::new(picture.size, picture.linear()).map_err(|e| fail(path, e))?;
-        if let Some(path) = plan.masks.get(i) {
+        if let Some(Some(path)) = plan.masks.get(i) {
             plan.check_file(path)?;
             let mask = read_picture(path, film)?;
             reference = reference.with_mask(mask.gray()).map_err(|e| fail(path, e))?;
@@ -186,7 +212,8 @@ fn views(job: &Job, plan: &Optimize) -> Result<Vec<View>, CliError> {
         if let Some(part) = plan.relative {
             reference = reference.relative(part).map_err(|e| fail(path, e))?;
         }
-        views.push(View { sensor, reference });
+        let pose = plan.poses.get(i).cloned().unwrap_or_default();
+        views.push(View { sensor, reference, pose });
     }
     Ok(views)
 }

@@ -44,10 +44,11 @@ impl Team {
 
     /// Refuses what several processes cannot share.
     pub(super) fn check(&self, job: &Job) -> Result<(), CliError> {
-        if matches!(self, Self::Alone) || job.groups.is_empty() {
+        let few = job.optimize()?.is_some_and(|plan| plan.views_per_iteration.is_some());
+        if matches!(self, Self::Alone) || (job.groups.is_empty() && !few) {
             return Ok(());
         }
-        let message = "[[parameter_group]] is fitted by one process; expected no launcher of MPI";
+        let message = "[[parameter_group]] and `views_per_iteration` go with one process; expected no launcher of MPI";
         Err(CliError::input(&Place::file(&job.path), message))
     }
 
@@ -89,7 +90,13 @@ impl Team {
     ) -> Result<Option<Evaluation>, CliError> {
         match self {
             Self::Alone => fit
-                .evaluate(values, problem.spp(i), problem.seed(i), monitor)
+                .evaluate_views(
+                    values,
+                    problem.spp(i),
+                    problem.seed(i),
+                    &problem.views_at(i),
+                    monitor,
+                )
                 .map_err(|e| problem.job.blame(&e)),
             #[cfg(feature = "mpi")]
             Self::Ranks(ranks) => ranks.evaluate(problem, i, values, fit, monitor),

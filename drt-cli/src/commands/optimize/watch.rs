@@ -43,6 +43,10 @@ impl<'a> Watch<'a> {
         losses: &[f64],
     ) -> Result<(), CliError> {
         for (p, name) in self.problem.names().enumerate() {
+            // What some views do not show others may.
+            if !evaluation.sees_all() {
+                continue;
+            }
             let counts = evaluation.is_blind_to(p) && self.problem.varies(p);
             self.blind[p] = if counts { self.blind[p] + 1 } else { 0 };
             if counts && i == 0 {
