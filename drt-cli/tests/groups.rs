@@ -12,13 +12,15 @@ const SCENE: &str = r#"<scene version="3.0.0">
     <transform name="to_world"><lookat origin="0 -4 3" target="0 0 0" up="0 0 1"/></transform>
     <film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="24"/>
       <rfilter type="tent"/></film></sensor>
-  <shape type="sphere" id="ball"><float name="radius" value="$radius"/>
+  <shape type="obj" id="ball"><string name="filename" value="ball.obj"/>
+    <transform name="to_world"><scale value="$radius"/></transform>
     <bsdf type="diffuse"><rgb name="reflectance" value="0.7 0.4 0.3"/></bsdf></shape>
   <shape type="rectangle" id="floor">
     <transform name="to_world"><scale value="2"/><translate z="-0.6"/></transform>
     <bsdf type="diffuse" id="paint"><texture type="bitmap" name="reflectance">
       <string name="filename" value="texels.exr"/><boolean name="raw" value="true"/></texture></bsdf></shape>
-  <shape type="sphere" id="hidden"><point name="center" x="0" y="0" z="-9"/></shape>
+  <shape type="obj" id="hidden"><string name="filename" value="ball.obj"/>
+    <transform name="to_world"><translate z="-9"/></transform></shape>
   <emitter type="point" id="lamp"><point name="position" value="0.5 -1.5 3"/><rgb name="intensity" value="20"/></emitter>
 </scene>"#;
 
@@ -49,9 +51,24 @@ texels = "all"
 smooth = 1e-3
 "#;
 
+/// A folder with a ball of some hundred vertices.
+fn with_ball() -> Folder {
+    let folder = Folder::new();
+    let mesh = drt_geom::procedural::icosphere(3);
+    let mut text = String::new();
+    for p in &mesh.positions {
+        text += &format!("v {} {} {}\n", p.x, p.y, p.z);
+    }
+    for [a, b, c] in &mesh.triangles {
+        text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
+    }
+    folder.file("ball.obj", text);
+    folder
+}
+
 /// A folder with a scene, a job, and a target that has a larger ball.
 fn folder() -> Folder {
-    let folder = Folder::new();
+    let folder = with_ball();
     // An image of some size, in the place of a texture.
     let gray = SCENE.replace("texels.exr", "gray.exr").replace("bitmap", "checkerboard");
     let gray = gray.replace(
@@ -89,9 +106,9 @@ fn shapes_and_textures_are_fitted_beside_parameters() {
     assert!(radius > 0.54, "{radius}");
     // What came out can be rendered again.
     std::fs::copy(folder.path().join("run/paint.exr"), folder.path().join("texels.exr")).unwrap();
-    let ball = r#"<shape type="sphere" id="ball"><float name="radius" value="$radius"/>"#;
-    let own = r#"<shape type="ply" id="ball"><string name="filename" value="run/body.ply"/>"#;
-    folder.file("fitted.xml", SCENE.replace(ball, own));
+    let ball = r#"type="obj" id="ball"><string name="filename" value="ball.obj"/>"#;
+    let own = r#"type="ply" id="ball"><string name="filename" value="run/body.ply"/>"#;
+    folder.file("fitted.xml", SCENE.replacen(ball, own, 1));
     expect(&folder.run("render fitted.xml --quiet --spp 16 -D radius=1 -o fitted.exr"), 0, &[]);
 }
 
@@ -109,6 +126,70 @@ fn a_fit_of_groups_ends_in_the_same_bits() {
     let whole = after(&["--iterations 6 --threads 1"]);
     assert!(whole == after(&["--iterations 6 --threads 3"]));
     assert!(whole == after(&["--iterations 2", "--iterations 3 --threads 2", "--iterations 6"]));
+}
+
+/// A body on a turntable: one camera, pictures in known poses, two of three in an iteration.
+#[test]
+fn views_in_known_poses() {
+    let folder = with_ball();
+    // A ball beside the axis of the table tells how far that has turned.
+    let radius = r#"<scale value="$radius"/>"#;
+    let off = format!(r#"{radius}<translate x="0.4"/>"#);
+    let plain = SCENE.replace(radius, &off).replace("bitmap", "checkerboard").replace(
+        r#"<string name="filename" value="texels.exr"/><boolean name="raw" value="true"/>"#,
+        "",
+    );
+    folder.file("scene.xml", plain);
+    let turn = "target = \"ball\"\nrotate = { axis = [0, 0, 1], pivot = [0, 0, 0] }\n";
+    let table = format!(
+        "scene = \"scene.xml\"\n[[parameter]]\nname = \"turn\"\n[[parameter.effect]]\n{turn}"
+    );
+    folder.file("table.toml", table);
+    let poses = [0.0, 2.1, 4.2];
+    for (k, pose) in poses.iter().enumerate() {
+        let at = format!("-D radius=0.4 --set parameter.turn.value={pose} -o t{k}.exr");
+        expect(&folder.run(&format!("render table.toml --quiet --spp 128 {at}")), 0, &[]);
+    }
+    let job = |sign: f64| {
+        let view = |(k, pose): (usize, &f64)| {
+            let amount = sign * pose;
+            format!("[[view]]\ntarget = \"t{k}.exr\"\n[[view.effect]]\n{turn}amount = {amount:?}\n")
+        };
+        let views: String = poses.iter().enumerate().map(view).collect();
+        format!(
+            "scene = \"scene.xml\"\n[estimator]\nspp = 16\n[optimize]\nviews_per_iteration = 2\n\
+             checkpoint = \"run\"\noptimizer = {{ kind = \"adam\", iterations = 12 }}\n{views}\
+             [[parameter_group]]\nname = \"body\"\ntarget = \"ball\"\nvertices = \"all\"\n\
+             laplacian = 10.0\nlearning_rate = [[0, 1.0], [6, 0.4]]\n"
+        )
+    };
+    let losses = |job: String, runs: &[&str]| -> Vec<f64> {
+        folder.file("job.toml", job);
+        for options in runs {
+            expect(&folder.run(&format!("optimize job.toml --quiet {options}")), 0, &[]);
+        }
+        let table = String::from_utf8(bytes(&folder, "loss.csv")).unwrap();
+        table.lines().skip(1).map(|l| l.split(',').nth(1).unwrap().parse().unwrap()).collect()
+    };
+    let whole = losses(job(1.0), &["--restart"]);
+    assert!(whole.len() == 13 && whole[12] < 0.6 * whole[0], "{whole:?}");
+    let body = bytes(&folder, "body.ply");
+    // A run that was stopped goes on with the views that were next.
+    let parts = losses(job(1.0), &["--restart --seconds 0.01", "--threads 1"]);
+    assert!(parts == whole, "{parts:?} {whole:?}");
+    assert!(bytes(&folder, "body.ply") == body);
+    // Poses of the wrong sense do not fit.
+    let wrong = losses(job(-1.0), &["--restart --iterations 1"]);
+    assert!(wrong[0] > 1.5 * whole[0], "{wrong:?} {whole:?}");
+    for (from, to, message) in [
+        ("views_per", "targets = [\"t0.exr\"]\nviews_per", "[[view]] takes the place of `targets`"),
+        ("iteration = 2", "iteration = 4", "`views_per_iteration` is 4; expected 1 to 3"),
+        ("t1.exr", "missing.exr", "missing.exr"),
+        ("amount = 2.1", "amount = inf", "`amount` is inf"),
+    ] {
+        folder.file("bad.toml", job(1.0).replace(from, to));
+        expect(&folder.run("optimize bad.toml --quiet"), 2, &[message, "bad.toml:"]);
+    }
 }
 
 #[test]

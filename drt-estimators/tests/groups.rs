@@ -32,7 +32,13 @@ fn view(scene: &Scene) -> View {
 }
 
 fn fit(scene: &Scene, parameters: &[Parameter], groups: Vec<Group>) -> Fit {
-    let fit = Fit::new(scene.clone(), parameters.to_vec(), vec![view(scene)], Loss::L2, settings());
+    posed(scene, parameters, groups, Vec::new())
+}
+
+/// As [`fit`], with the scene in a known pose.
+fn posed(scene: &Scene, parameters: &[Parameter], groups: Vec<Group>, pose: Vec<Parameter>) -> Fit {
+    let views = vec![View { pose, ..view(scene) }];
+    let fit = Fit::new(scene.clone(), parameters.to_vec(), views, Loss::L2, settings());
     fit.and_then(|fit| fit.with_groups(groups)).expect("a valid fit")
 }
 
@@ -51,12 +57,13 @@ fn compare(
     wrong: &[f64],
     by_parameter: Parameter,
     after: &[Parameter],
+    pose: &[Parameter],
 ) -> [[f64; 2]; 2] {
     let values: Vec<f64> = after.iter().map(|p| p.value).collect();
-    let mut groups = fit(scene, after, vec![group]);
+    let mut groups = posed(scene, after, vec![group], pose.to_vec());
     let mut all = vec![by_parameter];
     all.extend_from_slice(after);
-    let mut parameters = fit(scene, &all, Vec::new());
+    let mut parameters = posed(scene, &all, Vec::new(), pose.to_vec());
     let along = |seen: &Evaluation, direction: &[f64]| -> f64 {
         let gradient = seen.group_gradient(0);
         assert_eq!(gradient.len(), direction.len());
@@ -101,7 +108,10 @@ fn vertices_before_a_turn() {
     let group = Group::new("ball", &scene, &"ball", GroupKind::Vertices).expect("a shape");
     let along = parameter("along", 0.0, vec![effect]);
     let (own, wrong) = (coordinates(&field), coordinates(&turn_back(&field)));
-    check(compare(&scene, group, &own, &wrong, along, &[turned(1.2)]));
+    check(compare(&scene, group, &own, &wrong, along.clone(), &[turned(1.2)], &[]));
+    // Known, in place of a parameter.
+    let group = Group::new("ball", &scene, &"ball", GroupKind::Vertices).expect("a shape");
+    check(compare(&scene, group, &own, &wrong, along, &[], &[turned(1.2)]));
 }
 
 #[test]
@@ -115,7 +125,7 @@ fn cages_before_a_turn() {
     let group = Group::new("cage", &scene, &"ball", GroupKind::Cage(cage)).expect("a cage");
     let along = parameter("along", 0.0, vec![effect]);
     let (own, wrong) = (coordinates(&field), coordinates(&turn_back(&field)));
-    check(compare(&scene, group, &own, &wrong, along, &[turned(1.2)]));
+    check(compare(&scene, group, &own, &wrong, along, &[turned(1.2)], &[]));
 }
 
 /// Voxels are those of the file: the density's scale is not in them.
@@ -131,7 +141,7 @@ fn voxels_of_a_scaled_density() {
         0.0,
         vec![changes("smoke", "sigma_t", drt_math::ValueChange::Multiply(1.0))],
     );
-    check(compare(&scene, group, &own, &wrong, scales, &[]));
+    check(compare(&scene, group, &own, &wrong, scales, &[], &[]));
 }
 
 #[test]

@@ -110,7 +110,12 @@ fn of_loss(
     let pixels = picture(job, target)?;
     let sensor = job.settings.sensor;
     let size = job.scene.sensors[sensor].item.sensor.film();
-    let loss = job.optimize()?.map_or(Loss::L2, |o| o.loss);
+    let plan = job.optimize()?;
+    if plan.is_some_and(|plan| !plan.poses.is_empty()) {
+        let message = "a gradient is of one picture of the scene as it is; its [[view]] are for `drt optimize`";
+        return Err(CliError::input(&Place::file(&job.path), message));
+    }
+    let loss = plan.map_or(Loss::L2, |plan| plan.loss);
     let hash = hash(&format!("{loss:?}"), &pixels);
     let reference = Reference::new(size, pixels).map_err(fail)?;
     if !job.groups.is_empty() {

@@ -273,7 +273,8 @@ impl Fit {
     ) -> Result<Option<Vec<Half>>, Error> {
         let part = |from: f64, done: f64| control.progress(0.5 * (from + done));
         let images = Watched { control, progress: |done| part(0.0, done) };
-        let Some(halves) = self.halves(values, spp, seed, view, 0..2, &images)? else {
+        let mut source = self.source(values, view, 2)?;
+        let Some(halves) = halves_of(&mut source, spp, seed, 0..2, &images)? else {
             return Ok(None);
         };
         let applied = self.posed(values, view)?;
@@ -289,7 +290,6 @@ impl Fit {
                 wanted.push(group.target);
             }
         }
-        let mut source = self.source(values, view, 2)?;
         for (k, adjoint) in (0..2).zip(adjoints.iter().rev()) {
             let progress = |done| part(1.0, 0.5 * (k as f64 + done));
             let control = Watched { control, progress };
@@ -320,19 +320,8 @@ impl Fit {
         wanted: Range<usize>,
         control: &dyn Control,
     ) -> Result<Option<Vec<Half>>, Error> {
-        let count = wanted.len().max(1) as f64;
-        let mut halves = Vec::new();
-        let first = wanted.start;
         let mut source = self.source(values, view, wanted.end)?;
-        for k in wanted {
-            let progress = |done| control.progress(((k - first) as f64 + done) / count);
-            let control = Watched { control, progress };
-            match source.half(spp.div_ceil(2), half_seed(seed, k), &control)? {
-                Some(half) => halves.push(half),
-                None => return Ok(None),
-            }
-        }
-        Ok(Some(halves))
+        halves_of(&mut source, spp, seed, wanted, control)
     }
 
     /// One shard of the samples of a half of a view. `None` when `control` cancelled it.
@@ -371,12 +360,7 @@ impl Fit {
         Evaluation::of(self.loss, self.views.clone(), halves, self.parameters.len())
     }
 
-    fn source(
-        &mut self,
-        values: &[f64],
-        view: usize,
-        halves: usize,
-    ) -> Result<ImageSource<'_>, Error> {
+    fn source(&mut self, values: &[f64], view: usize, halves: usize) -> Result<ImageSource, Error> {
         self.scene.check()?;
         let count = self.views.len();
         let Some(sensor) = self.views.get(view).filter(|_| halves <= 2).map(|v| v.sensor) else {
@@ -418,6 +402,27 @@ fn estimators(
         applied.estimator(&settings, kept)
     };
     views.iter().map(of_view).collect()
+}
+
+/// Some halves of the samples of a view. `None` when `control` cancelled it.
+fn halves_of(
+    source: &mut ImageSource,
+    spp: u32,
+    seed: u64,
+    wanted: Range<usize>,
+    control: &dyn Control,
+) -> Result<Option<Vec<Half>>, Error> {
+    let (first, count) = (wanted.start, wanted.len().max(1) as f64);
+    let mut halves = Vec::new();
+    for k in wanted {
+        let progress = |done| control.progress(((k - first) as f64 + done) / count);
+        let control = Watched { control, progress };
+        match source.half(spp.div_ceil(2), half_seed(seed, k), &control)? {
+            Some(half) => halves.push(half),
+            None => return Ok(None),
+        }
+    }
+    Ok(Some(halves))
 }
 
 /// The seed of one of the two halves of an iteration's samples.

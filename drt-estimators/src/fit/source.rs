@@ -55,16 +55,16 @@ impl Applied {
 }
 
 /// A scene prepared at its parameters' values.
-pub(super) struct ImageSource<'a> {
+pub(super) struct ImageSource {
     session: Session,
     /// Set where derivatives are differences of images: the scene, and all changes, of which the first so many have derivatives.
-    differences: Option<(&'a Scene, Vec<Parameter>, usize)>,
+    differences: Option<(Scene, Vec<Parameter>, usize)>,
     settings: Settings,
 }
 
-impl<'a> ImageSource<'a> {
+impl ImageSource {
     pub(super) fn new(
-        scene: &'a Scene,
+        scene: &Scene,
         parameters: &[Parameter],
         pose: &[Parameter],
         applied: &Applied,
@@ -75,7 +75,7 @@ impl<'a> ImageSource<'a> {
         if settings.estimator == EstimatorKind::FiniteDifference {
             let (moved, no_tangents) = tangents::apply(moved, &[])?;
             let session = Session::prepared(&moved, &no_tangents, &settings, kept)?;
-            let differences = Some((scene, [parameters, pose].concat(), parameters.len()));
+            let differences = Some((scene.clone(), [parameters, pose].concat(), parameters.len()));
             return Ok(Self { session, differences, settings });
         }
         let session = Session::prepared(moved, tangents, &settings, kept)?;
