@@ -25,7 +25,7 @@ pub struct ParameterGroup {
 /// How a fit steps a group.
 #[derive(Clone, Debug)]
 pub struct GroupSteps {
-    /// By iteration; the optimizer's where it is `None`.
+    /// The learning rate by iteration; the optimizer's where it is `None`.
     pub learning_rate: Option<Stages<f64>>,
     /// λ of the preconditioner (I + λ L)⁻², L being the combinatorial Laplacian of the mesh; 0 is none.
     pub laplacian: f64,

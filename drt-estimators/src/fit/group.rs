@@ -302,7 +302,7 @@ struct OfShape {
     /// As it is.
     mesh: Arc<Mesh>,
     normals: SmoothNormals,
-    /// Of a cage's vertices.
+    /// The weights of a cage's vertices, where the group has those.
     weights: Option<CageWeights>,
     /// The transpose of the linear map that parameters make.
     pull_back: Mat3,

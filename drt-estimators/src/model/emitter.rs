@@ -308,7 +308,7 @@ impl Emitter {
         }
     }
 
-    /// The same emitter with other texels of the image that tells its light, row by row.
+    /// This emitter with other texels of the image that tells its light, row by row.
     ///
     /// # Errors
     /// When no image does, there are more or fewer texels, or one is negative or not finite.

@@ -25,7 +25,7 @@ use crate::world::cache::PreparedCache;
 /// Path space with insides of media at rest, as in the spatial form: all surfaces that move sweep over them, which has a flux.
 struct AtRest;
 
-/// The same without the flux.
+/// At rest without the flux, which is wrong.
 struct Faulty;
 
 impl Estimator for AtRest {

@@ -27,7 +27,7 @@ pub(super) struct Checkpoint {
     /// Of all that decides the run's steps.
     pub(super) fingerprint: Fingerprint,
     pub(super) optimizer: State,
-    /// Of the groups of unknowns.
+    /// The states of the groups of unknowns, in the job's order.
     pub(super) fields: Vec<FieldState>,
     /// Iterations in a row in which each parameter changed nothing.
     pub(super) blind: Vec<u32>,

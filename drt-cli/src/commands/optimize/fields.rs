@@ -26,7 +26,7 @@ use crate::{CliError, Job};
 pub(super) struct Fields<'a> {
     problem: &'a Problem<'a>,
     optimizers: Vec<FieldOptimizer>,
-    /// By group: where it began, and what bends its mesh, if it has one.
+    /// Where each group began, and what bends its mesh, if it has one.
     starts: Vec<Start>,
 }
 

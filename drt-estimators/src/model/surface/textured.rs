@@ -184,7 +184,7 @@ impl Bsdf {
         Some(self.textured_part()?.texture(property)?.texels())
     }
 
-    /// The same BSDF with other texels of the texture that stands for a property, row by row.
+    /// This BSDF with other texels of the texture that stands for a property, row by row.
     ///
     /// # Errors
     /// When no texture stands for it, there are more or fewer texels, or a value is out of the property's range.

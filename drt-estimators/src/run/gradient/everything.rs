@@ -19,7 +19,7 @@ pub(super) struct Everything {
 }
 
 impl Everything {
-    /// Of the items `wanted`, in a world that is lit by an estimator's light.
+    /// All numbers of the items `wanted`, in a world that is lit by an estimator's light.
     pub(super) fn new(
         world: &World,
         wanted: &[Target],

@@ -46,11 +46,11 @@ pub struct GradientBatch {
     /// Its number, from 0. The gradient is the sum over all batches in this order: of their pixels and of their boundary
     /// samples, and then of both.
     pub number: u32,
-    /// By the paths of pixels.
+    /// The gradient from the paths of pixels.
     pub pixels: SceneGradient,
     /// Samples of each pixel, and those that each has in all batches together.
     pub of_pixels: [u32; 2],
-    /// By boundary samples.
+    /// The gradient from boundary samples.
     pub boundary: SceneGradient,
     /// Batches of boundary samples, and those of all batches.
     pub of_boundary: [u32; 2],

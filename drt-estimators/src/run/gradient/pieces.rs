@@ -35,7 +35,7 @@ pub(super) struct Piece {
 }
 
 pub(super) enum Work {
-    /// Of the pixels from the first one on, up to the second one.
+    /// Samples of the pixels from the first one on, up to the second one.
     Pixels([u32; 2]),
     /// Component, source and batch.
     Splats(usize, usize, u32),

@@ -51,7 +51,7 @@ pub use crate::run::session::shard::{Merged, ShardError, ShardSums};
 pub struct Session {
     /// Lit by all emitters.
     world: World,
-    /// The same, with what derivative images need of paths.
+    /// That world, with what derivative images need of paths.
     paths: World,
     /// Each differentiates the light of some emitters.
     images: Vec<Images>,
