@@ -151,6 +151,7 @@ max_depth = 3
 targets = [{targets}]
 sensors = [{sensors}]
 optimizer = {{ kind = "adam", learning_rate = 0.02, iterations = 100 }}
+views_per_iteration = 6
 checkpoint = "out"
 
 [[parameter_group]]
