@@ -1,5 +1,7 @@
 //! Where images and derivatives come from.
 
+use alloc::vec::Vec;
+
 use drt_math::Rgb;
 use drt_motion::Parameter;
 

@@ -13,6 +13,7 @@ mod slide;
 mod tests;
 
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 use core::f64::consts::PI;
 
 use drt_math::{Frame, Mat3, Rgb, ValueChange, Vec3, fm, vec3, warp};
