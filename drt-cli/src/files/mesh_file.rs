@@ -16,7 +16,8 @@ fn in_file_order(mesh: &Mesh) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 }
 
 /// A binary PLY file: x, y, z in double precision in the order of the file that the mesh came from, and its triangles.
-pub(crate) fn ply(mesh: &Mesh) -> Vec<u8> {
+#[must_use]
+pub fn ply(mesh: &Mesh) -> Vec<u8> {
     let (positions, faces) = in_file_order(mesh);
     let mut out = format!(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\n\
@@ -36,7 +37,8 @@ pub(crate) fn ply(mesh: &Mesh) -> Vec<u8> {
 }
 
 /// An OBJ file: positions in the order of the file that the mesh came from, with the texture coordinates and normals that it has.
-pub(crate) fn obj(mesh: &Mesh) -> String {
+#[must_use]
+pub fn obj(mesh: &Mesh) -> String {
     let (positions, faces) = in_file_order(mesh);
     let mut text = String::new();
     // Writing to a string cannot fail.

@@ -9,6 +9,6 @@ pub(crate) mod input_file;
 pub(crate) mod lines;
 pub mod measured_file;
 pub(crate) mod memory;
-pub(crate) mod mesh_file;
+pub mod mesh_file;
 pub mod npy;
 pub(crate) mod tensor_file;

@@ -161,7 +161,8 @@ pub fn write_exr(
 }
 
 /// An EXR file of texels, row by row; `None` where their number is not that of the size.
-pub(crate) fn encode_texels([width, height]: [u32; 2], texels: &[Rgb]) -> Option<Vec<u8>> {
+#[must_use]
+pub fn encode_texels([width, height]: [u32; 2], texels: &[Rgb]) -> Option<Vec<u8>> {
     let [width, height] = [width as usize, height as usize];
     let fits = texels.len() == width * height;
     let image = fits.then(|| {

@@ -9,6 +9,7 @@ pub(crate) mod tests;
 pub(crate) mod tone;
 
 pub use contact_sheet::{is_error, write_layers, write_preview};
-pub(crate) use exr_file::encode_texels;
-pub use exr_file::{ExrFile, Provenance, attachment, is_result_of, read_exr, write_exr};
+pub use exr_file::{
+    ExrFile, Provenance, attachment, encode_texels, is_result_of, read_exr, write_exr,
+};
 pub use picture::{Picture, read_picture};
