@@ -285,7 +285,7 @@ impl Fit {
             self.groups.iter().map(|group| group.collector(&self.given, &applied.scene, &changes));
         let collectors = collectors.collect::<Result<Vec<_>, _>>()?;
         let mut wanted: Vec<Target> = Vec::new();
-        for group in self.groups.iter().filter(|group| !group.values(&self.given).is_empty()) {
+        for group in &self.groups {
             if !wanted.contains(&group.target) {
                 wanted.push(group.target);
             }
