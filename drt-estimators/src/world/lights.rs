@@ -99,6 +99,14 @@ pub(crate) enum LightKind {
     Environment,
 }
 
+/// A sampled point of an emitter with an area.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AreaPoint {
+    emitter: u32,
+    point: SurfacePoint,
+    y: Vec3,
+}
+
 /// A sampled point or direction of an emitter, seen from somewhere.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightSample {
@@ -401,8 +409,30 @@ impl LightTable {
         x: Vec3,
         rng: &mut Rng,
     ) -> Option<LightSample> {
+        let point = self.area_point(world, choice, rng)?;
+        self.area_seen_from(world, &point, x)
+    }
+
+    /// Samples a point of an emitter with an area, uniformly; `None` of others.
+    pub(crate) fn area_point(
+        &self,
+        world: &World,
+        choice: &Choice,
+        rng: &mut Rng,
+    ) -> Option<AreaPoint> {
         let Entry::Triangle { emitter, .. } = choice.entry else { return None };
         let (point, y) = self.point_of(world, choice, rng)?;
+        Some(AreaPoint { emitter, point, y })
+    }
+
+    /// The light that a point of an emitter sends to `x`; `None` where it sends none.
+    pub(crate) fn area_seen_from(
+        &self,
+        world: &World,
+        of: &AreaPoint,
+        x: Vec3,
+    ) -> Option<LightSample> {
+        let AreaPoint { emitter, point, y } = *of;
         let d = y - x;
         // A point in the emitter's plane, as those of a ceiling in which a lamp lies, sees nothing of it; rounding would give it a
         // cosine of that size, and derivatives one over it.

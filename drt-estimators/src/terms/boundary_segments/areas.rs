@@ -6,12 +6,14 @@
 //! mean is that of a few points, the same for all edges; an edge that is no silhouette from these may be one from others, with about
 //! the probability that it is one from anywhere, its free angle over π. It counts as if it were seen so by one point more.
 
+use alloc::vec::Vec;
 use core::f64::consts::FRAC_1_PI;
 
 use drt_math::{Real, Rng};
 
 use crate::discontinuities::edge::Edge;
 use crate::world::World;
+use crate::world::lights::AreaPoint;
 
 /// Points of lights.
 const POINTS: u32 = 8;
@@ -28,13 +30,22 @@ const SEED: u64 = 0x6172_6561_7321;
 /// Weights of edges for segments that start on areas.
 pub(super) struct AreaWeights<'a> {
     world: &'a World,
+    /// Points of lights, the same for all edges.
+    points: Vec<AreaPoint>,
     /// The mean of g² over some edges and all points.
     mean: f64,
 }
 
 impl<'a> AreaWeights<'a> {
     pub(super) fn new(world: &'a World, edges: &[Edge]) -> Self {
-        let mut weights = Self { world, mean: 0.0 };
+        let lights = &world.lights;
+        let point = |point| {
+            let mut rng = Rng::new(SEED, 0, point);
+            let light = lights.choose(&mut rng)?;
+            lights.area_point(world, &light, &mut rng)
+        };
+        let mut weights =
+            Self { world, points: (0..POINTS).filter_map(point).collect(), mean: 0.0 };
         let step = edges.len().div_ceil(SOME).max(1);
         let some = edges.iter().step_by(step).map(|e| weights.squares(e)[1]);
         let (sum, count) = some.fold((0.0, 0.0), |(sum, n), square| (sum + square, n + 1.0));
@@ -52,13 +63,10 @@ impl<'a> AreaWeights<'a> {
 
     /// The means of g², for points from which the edge is a silhouette and for all.
     fn squares(&self, e: &Edge) -> [f64; 2] {
-        let lights = &self.world.lights;
         let x = e.wedge.at(0.5);
         let mut sums = [0.0; 2];
-        for point in 0..POINTS {
-            let mut rng = Rng::new(SEED, 0, point);
-            let light = lights.choose(&mut rng);
-            let light = light.and_then(|l| lights.sample_area(self.world, &l, x, &mut rng));
+        for point in &self.points {
+            let light = self.world.lights.area_seen_from(self.world, point, x);
             let Some(light) = light else { continue };
             let g = light.value.mean() * light.inv_pdf * e.wedge.sine(light.w);
             let square = g * g / f64::from(POINTS);
