@@ -117,8 +117,12 @@ impl DiscontinuityEdges {
             _ => [1.0; 2],
         };
         let dull = |s: usize| shapes[s].emitter.is_none();
-        if shapes[sa].bsdf != shapes[sb].bsdf || !dull(sa) || !dull(sb) {
+        let alike = sa == sb && fronts[0] == fronts[1] && world.emits_evenly(sa as u32);
+        if shapes[sa].bsdf != shapes[sb].bsdf || !(alike || dull(sa) && dull(sb)) {
             return Some((sides, false));
+        }
+        if alike && world.bsdf_of(sa as u32).is_black() {
+            return Some(([0.0; 2], smooth));
         }
         let bend = PI - fm::atan2(a.across.cross(b.across).length(), a.across.dot(b.across));
         if bend < FLAT {
@@ -134,6 +138,25 @@ impl DiscontinuityEdges {
         discontinuity: &DiscontinuityEdge,
     ) -> impl Iterator<Item = (u32, Vec3)> {
         self.faces_of_fans[discontinuity.fan.clone()].iter().map(|f| (f.face, f.across))
+    }
+
+    /// The shape of the two faces of a crease, if it is the same one.
+    pub(crate) fn shape_of_faces(
+        &self,
+        world: &World,
+        discontinuity: &DiscontinuityEdge,
+    ) -> Option<u32> {
+        let [a, b] = &self.faces_of_fans[discontinuity.fan.clone()] else { return None };
+        let [sa, sb] = [a, b].map(|f| world.geometry.prim(f.face).shape);
+        (sa == sb).then_some(sa)
+    }
+
+    /// True of a crease whose two faces show their fronts on the same side.
+    pub(crate) fn faces_one_way(&self, world: &World, discontinuity: &DiscontinuityEdge) -> bool {
+        let [a, b] = &self.faces_of_fans[discontinuity.fan.clone()] else { return false };
+        let [n, m] = normals(discontinuity.edge.wedge.tangent, [a.across, b.across]);
+        let [f, g] = [a, b].map(|f| world.point(f.face, [0.0; 2]).0.ng);
+        (n.dot(f) > 0.0) == (m.dot(g) > 0.0)
     }
 
     /// Unit normals of the two faces of a crease, on one side of the surface.

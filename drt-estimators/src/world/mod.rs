@@ -695,6 +695,12 @@ impl World {
         }
     }
 
+    /// True of a shape that emits the same radiance from everywhere on its front.
+    pub(crate) fn emits_evenly(&self, shape: u32) -> bool {
+        let emitter = self.scene.shapes[shape as usize].emitter;
+        emitter.is_some_and(|e| matches!(self.scene.emitters[e].item.emitter, Emitter::Area { .. }))
+    }
+
     /// Radiance of an area emitter at a point of it.
     #[inline]
     pub(crate) fn area_radiance(&self, emitter: usize, s: &SurfacePoint) -> Rgb {

@@ -44,7 +44,15 @@ impl Differentiator<'_> {
             return None;
         }
         let (dir, distance, end) = (light.w, light.distance, light.point());
-        let ray = TurningRay { viewer, moves: near_moves, of_camera: None, dir, distance, end };
+        let ray = TurningRay {
+            viewer,
+            moves: near_moves,
+            of_camera: None,
+            dir,
+            distance,
+            end,
+            emission_alone: true,
+        };
         let Self { world, parts, auxiliary, probe, .. } = self;
         parts.clear();
         auxiliary.clear();

@@ -21,6 +21,7 @@
 
 mod antithetic;
 mod connections;
+mod emission;
 mod emitters;
 mod light;
 mod propagation;
@@ -250,6 +251,9 @@ impl<'w> Differentiator<'w> {
                     emitted = world.emitted(point, -arrival.dir) * arrival.emission_weight;
                     let adjoint = theta * arrival.emission_weight;
                     area(world, e, point, adjoint, &mut here.slide, sink);
+                    if self.emit_apart(path, k, point, emitted, before, sink) {
+                        emitted = Rgb::ZERO;
+                    }
                 }
                 emitted + collected
             }

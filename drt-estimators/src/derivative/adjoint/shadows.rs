@@ -3,10 +3,10 @@
 use alloc::vec::Vec;
 
 use crate::derivative::adjoint::connections::NextEvent;
-use crate::derivative::adjoint::turning::RayMotion;
+use crate::derivative::adjoint::turning::{RayMotion, found_ray};
 use crate::derivative::adjoint::{Behind, Differentiator, NodeMotion};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::{Found, RecordedPath, TurningRay};
+use crate::derivative::velocity::{Found, RecordedPath};
 use crate::world::vertex::Vertex;
 
 impl Differentiator<'_> {
@@ -26,17 +26,9 @@ impl Differentiator<'_> {
         let Some(arrival) = record.nodes[k].arrival.as_ref() else { return false };
         let fits = light.point().is_none() && !self.edges_at_rest;
         let Some(s) = vertex.surface().filter(|_| fits) else { return false };
-        let parent = arrival.parent as usize;
         let eye = world.eye_at(record.origin);
-        let viewer = record.nodes[parent].vertex();
-        let ray = TurningRay {
-            viewer: viewer.unwrap_or(&eye),
-            moves: velocities.moves(parent),
-            of_camera: (parent == 0).then_some(record.camera_ray),
-            dir: arrival.dir,
-            distance: arrival.distance,
-            end: Some(s),
-        };
+        let viewer = record.nodes[arrival.parent as usize].vertex();
+        let ray = found_ray(recorded, arrival, &eye, s);
         let moves = event.moving || sink.active().moving_emitters[light.emitter];
         let mut parts = core::mem::take(&mut self.with_shadows);
         parts.clear();
@@ -56,16 +48,15 @@ impl Differentiator<'_> {
             let weight = velocity.blend.weight;
             let behind = event.behind.map(|b| Behind { weight, ..b });
             let event = NextEvent { behind, moving: true, arrives: true, ..*event };
-            let ordinary = core::mem::take(&mut self.locals[k]);
-            let mut here = SurfaceAdjoint::default();
-            self.connect(recorded, -arrival.dir, vertex, &event, &mut here, before, sink);
             let light = Some(light);
             let ray = RayMotion { turn, parts: &parts.edges, shadows: &parts.shadows, light };
             let motion = NodeMotion { velocity: &velocity, auxiliary: &auxiliary, ray: Some(ray) };
             let received = event.c.f * event.c.rest();
-            self.arrive(recorded, k, &motion, received, &mut here, before, sink);
-            let own = core::mem::replace(&mut self.locals[k], ordinary);
-            self.locals[k].incoming += own.incoming;
+            self.alone(k, |sweep| {
+                let here = &mut SurfaceAdjoint::default();
+                sweep.connect(recorded, -arrival.dir, vertex, &event, here, before, sink);
+                sweep.arrive(recorded, k, &motion, received, here, before, sink);
+            });
         }
         self.with_shadows = parts;
         turn.is_some()

@@ -3,10 +3,13 @@
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::{RayTurn, ShadowPart, ShadowTurn, TurnPart, Weight};
+use crate::derivative::velocity::{
+    RayTurn, RecordedPath, ShadowPart, ShadowTurn, TurnPart, TurningRay, Weight,
+};
 use crate::model::emitter::EmitterGradient;
+use crate::sampling::trace::Arrival;
 use crate::world::lights::{LightKind, LightSample};
-use crate::world::vertex::{MaterialPoint, Matter};
+use crate::world::vertex::{MaterialPoint, Matter, SurfacePoint, Vertex};
 
 /// How a ray turns.
 #[derive(Clone, Copy)]
@@ -17,6 +20,25 @@ pub(super) struct RayMotion<'a> {
     pub(super) shadows: &'a [ShadowPart],
     /// That which casts them.
     pub(super) light: Option<&'a LightSample>,
+}
+
+/// The ray that found the surface point `end` of an arrival; the `eye` is the viewer where it is the camera's.
+pub(super) fn found_ray<'a>(
+    recorded: &RecordedPath<'a>,
+    arrival: &Arrival,
+    eye: &'a Vertex,
+    end: &'a SurfacePoint,
+) -> TurningRay<'a> {
+    let parent = arrival.parent as usize;
+    TurningRay {
+        viewer: recorded.record.nodes[parent].vertex().unwrap_or(eye),
+        moves: recorded.velocities.moves(parent),
+        of_camera: (parent == 0).then_some(recorded.record.camera_ray),
+        dir: arrival.dir,
+        distance: arrival.distance,
+        end: Some(end),
+        emission_alone: false,
+    }
 }
 
 impl RayMotion<'_> {

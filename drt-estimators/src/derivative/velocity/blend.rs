@@ -257,18 +257,21 @@ fn bounds_of(world: &World, medium: usize) -> Option<Aabb> {
 /// The mean curvatures of the shapes by their shading normals, or by their edges where they have
 /// none; 1 / scene units.
 fn curvatures(world: &World) -> Vec<f64> {
-    let curvature = |(s, shape): (u32, &Shape)| {
+    let curvature_of = |(s, shape): (u32, &Shape)| {
         // Lamps have a φ of their own, which is 0 for what the camera sees of them.
-        if shape.emitter.is_some() {
-            return 0.0;
-        }
-        match &shape.mesh.normals {
-            Some(_) => by_normals(&shape.mesh),
-            None if world.is_null(s) => 0.0,
-            None => by_edges(&shape.mesh),
-        }
+        if shape.emitter.is_some() { 0.0 } else { curvature(world, s) }
     };
-    (0..).zip(&world.scene.shapes).map(curvature).collect()
+    (0..).zip(&world.scene.shapes).map(curvature_of).collect()
+}
+
+/// The mean curvature of a shape, 1 / scene units; zero of null interfaces without normals.
+pub(crate) fn curvature(world: &World, shape: u32) -> f64 {
+    let mesh = &world.scene.shapes[shape as usize].mesh;
+    match &mesh.normals {
+        Some(_) => by_normals(mesh),
+        None if world.is_null(shape) => 0.0,
+        None => by_edges(mesh),
+    }
 }
 
 /// The part of φ by the angle of incidence: from 0 at a `cosine` to 1.

@@ -210,6 +210,11 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         None
     }
 
+    /// Whether rays that end at a surface point turn otherwise for what the surface emits than for what it scatters.
+    fn emission_turns_apart(&self, _s: &SurfacePoint) -> bool {
+        false
+    }
+
     /// How a ray turns for what it sees by a point or directional emitter, where that differs: also with the
     /// shadows beside the point where it ends. `light_moves` tells that the emitter or that point may. Appends the summands.
     fn turn_with_shadows(

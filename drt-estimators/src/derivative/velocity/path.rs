@@ -74,6 +74,7 @@ impl PathVelocities {
             dir,
             distance: ray.length,
             end: ray.end.as_ref().map(|(point, _)| point),
+            emission_alone: false,
         };
         let before = self.turn_parts.len();
         let turn = self.field.turn(world, &turning, &mut self.probe, &mut self.turn_parts);

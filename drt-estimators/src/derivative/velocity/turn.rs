@@ -145,4 +145,6 @@ pub(crate) struct TurningRay<'a> {
     pub(crate) distance: f64,
     /// The surface point there.
     pub(crate) end: Option<&'a SurfacePoint>,
+    /// Only the light counts that the surface there emits, and not what it scatters.
+    pub(crate) emission_alone: bool,
 }

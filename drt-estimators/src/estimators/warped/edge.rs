@@ -24,6 +24,8 @@ pub(super) struct TurningEdge {
     pub(super) on_border: bool,
     /// Between faces of a curved surface, on which vertices move with their matter.
     pub(super) facets: bool,
+    /// Of a crease that is seen in the middle of one shape only: that shape.
+    pub(super) within: Option<u32>,
     /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
     pub(super) crease: Option<([Vec3; 2], [bool; 2])>,
 }
@@ -48,7 +50,9 @@ impl TurningEdge {
         let on_border = world.camera.sees_on_border(ends);
         // Of a fold as sharp as a corner, or between materials, a part is 1.
         let facets = curved && edge.crease.iter().all(|part| *part < 1.0);
-        Self { ends, half, points, of_both, moves, on_border, facets, crease }
+        // What rests on another surface may end there.
+        let within = edges.shape_of_faces(world, edge).filter(|_| !edge.edge.may_rest);
+        Self { ends, half, points, of_both, moves, on_border, facets, within, crease }
     }
 
     /// How one of its ends moves.

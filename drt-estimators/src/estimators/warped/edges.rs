@@ -13,7 +13,7 @@ use crate::estimators::warped::beside::Beside;
 use crate::estimators::warped::edge::TurningEdge;
 use crate::estimators::warped::near::Near;
 use crate::world::World;
-use crate::world::vertex::Vertex;
+use crate::world::vertex::{SurfacePoint, Vertex};
 
 /// The edges of a scene in trees of spheres.
 #[derive(Debug, Default)]
@@ -21,6 +21,10 @@ pub(super) struct TurningEdges {
     list: Vec<TurningEdge>,
     all: ConeTree,
     moving: ConeTree,
+    /// Shapes with creases between facets.
+    faceted: Vec<bool>,
+    /// Shapes with creases at which what they emit is the same on both sides.
+    emits_alike: Vec<bool>,
 }
 
 impl TurningEdges {
@@ -45,7 +49,33 @@ impl TurningEdges {
             ConeTree::new(&segments.map(segment).collect::<Vec<_>>())
         };
         let (all, moving) = (tree(&|_| true), tree(&|edge| edge.moves));
-        Self { list, all, moving }
+        let shapes = &world.scene.shapes;
+        let mut faceted = alloc::vec![false; shapes.len()];
+        let mut emits_alike = alloc::vec![false; shapes.len()];
+        for shape in list.iter().filter_map(|edge| edge.within.filter(|_| edge.facets)) {
+            faceted[shape as usize] = true;
+        }
+        for edge in &edges.list {
+            let Some(shape) = edges.shape_of_faces(world, edge) else { continue };
+            emits_alike[shape as usize] = world.emits_evenly(shape);
+        }
+        for edge in &edges.list {
+            let Some(shape) = edges.shape_of_faces(world, edge) else { continue };
+            emits_alike[shape as usize] &= edges.faces_one_way(world, edge);
+        }
+        Self { list, all, moving, faceted, emits_alike }
+    }
+
+    /// True of a ray that ends on a shape at whose creases what it emits does not jump, though what it scatters may.
+    pub(super) fn emission_turns_apart(&self, s: &SurfacePoint) -> bool {
+        self.emits_alike[s.shape as usize]
+    }
+
+    fn near(&self, ray: &TurningRay<'_>, angle: f64) -> Near {
+        let alike = |s: &SurfacePoint| ray.emission_alone && self.emission_turns_apart(s);
+        let creases_of = ray.end.filter(|s| !alike(s)).map(|s| s.shape);
+        let facets = creases_of.is_some_and(|shape| self.faceted[shape as usize]);
+        Near::of_ray(ray, angle, creases_of, facets)
     }
 
     /// True when something moves.
@@ -76,7 +106,7 @@ impl TurningEdges {
         always: bool,
         parts: &mut Vec<TurnPart>,
     ) -> Option<RayTurn> {
-        let near = Near::of_ray(ray, angle);
+        let near = self.near(ray, angle);
         if !(ray.moves || always) {
             let any = self.moving.visit(&near.cone, &near.narrow, |i| {
                 match near.weight(&self.list[i as usize]) {
@@ -99,13 +129,17 @@ impl TurningEdges {
         Some(RayTurn { weight, gradient, parts: first..parts.len(), shadow: None })
     }
 
-    /// Adds up the weights of edges, and what they turn a ray by if these were divided by 1.
-    pub(super) fn gather(
+    /// Adds up the weights of edges beside a ray, and what they turn it by if these were divided by 1.
+    pub(super) fn gather_beside(
         &self,
-        near: &Near,
-        viewer_moves: bool,
+        ray: &TurningRay<'_>,
+        angle: f64,
         parts: &mut Vec<TurnPart>,
     ) -> Weight {
+        self.gather(&self.near(ray, angle), ray.moves, parts)
+    }
+
+    fn gather(&self, near: &Near, viewer_moves: bool, parts: &mut Vec<TurnPart>) -> Weight {
         let mut sum = Weight::default();
         let mut resting = TurnPart { matter: None, rate: 0.0, divergence: Vec3::ZERO };
         self.visit(near, |edge, beside, weight| {

@@ -88,10 +88,12 @@ mod tests;
 mod turning;
 
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 use crate::derivative::medium_motion::Insides;
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
+use crate::derivative::velocity::blend::curvature;
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::estimators::film_plane::{self, Film};
 use crate::estimators::warped::auxiliary::directions::AuxiliaryDirections;
@@ -147,7 +149,11 @@ impl Estimator for Warped {
         spatial.blends.leave_media();
         let spatial = Arc::new(spatial);
         let moves = |edge: &DiscontinuityEdge| edge.moves(&active.shapes);
-        let curved = |shape| spatial.blends.curvature(shape) > 0.0;
+        let lamp = |shape: u32| world.scene.shapes[shape as usize].emitter.is_some();
+        let curvatures: Vec<f64> = (0..world.scene.shapes.len() as u32)
+            .map(|s| if lamp(s) { curvature(world, s) } else { spatial.blends.curvature(s) })
+            .collect();
+        let curved = |shape: u32| curvatures[shape as usize] > 0.0;
         let edges = TurningEdges::new(world, &found, moves, curved);
         let mut terms = match settings.warp {
             Warp::Edges => {

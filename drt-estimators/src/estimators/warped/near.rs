@@ -26,6 +26,8 @@ pub(super) struct Near {
     at_infinity: Option<f64>,
     /// Squared sine of the cone's angle.
     square: Weight,
+    /// How large an edge is seen, as a sine, whose weight is as large as that of any longer one.
+    long: f64,
     pub(super) cone: Cone,
     /// For creases of curved surfaces.
     pub(super) narrow: Cone,
@@ -35,15 +37,25 @@ pub(super) struct Near {
     /// from its plane.
     normal: Vec3,
     depth: f64,
-    /// Creases do not count.
+    /// How far the ray goes, where it ends on facets whose planes do not count.
+    length: Option<Weight>,
+    /// The shape where the ray ends, if creases of it count.
+    creases_of: Option<u32>,
+    /// No crease counts.
     silhouettes_only: bool,
     /// The viewer is the camera.
     of_camera: bool,
 }
 
 impl Near {
-    /// Of a ray.
-    pub(super) fn of_ray(ray: &TurningRay<'_>, angle: f64) -> Self {
+    /// Of a ray. `creases_of` is the shape where it ends, if radiance may jump at creases of that; `facets` tells that this is a
+    /// curved one.
+    pub(super) fn of_ray(
+        ray: &TurningRay<'_>,
+        angle: f64,
+        creases_of: Option<u32>,
+        facets: bool,
+    ) -> Self {
         let TurningRay { viewer, dir, distance, end, of_camera, .. } = *ray;
         let along = |n: Vec3| if n.dot(dir) < 0.0 { -n } else { n };
         let normal = end.map_or(Vec3::ZERO, |s| along(s.ng));
@@ -53,12 +65,24 @@ impl Near {
             dir,
             at_infinity: None,
             square: Weight::constant(sine * sine),
+            long: sine,
             cone: Cone::new(viewer.x, dir, angle, f64::INFINITY),
-            narrow: Cone::new(viewer.x, dir, NARROW * angle, f64::INFINITY),
+            narrow: Cone::new(
+                viewer.x,
+                dir,
+                if facets { NARROW * angle } else { 0.0 },
+                f64::INFINITY,
+            ),
             horizon: viewer.surface().map(|s| along(s.ng)),
             normal,
+            // At creases that do not count, what is behind must not jump with the plane.
+            length: end.filter(|_| creases_of.is_none()).map(|_| {
+                let gradient = normal.reject(dir) * (-distance / normal.dot(dir));
+                Weight { value: distance, gradient }
+            }),
             // Nothing is behind the sky.
             depth: if end.is_some() { normal.dot(dir) * distance } else { 0.0 },
+            creases_of,
             silhouettes_only: false,
             of_camera: of_camera.is_some(),
         }
@@ -86,19 +110,29 @@ impl Near {
             dir,
             at_infinity: at_infinity.then_some(range),
             square,
+            long: fm::sin(ANGLE),
             cone: cone(sine),
             narrow: cone(0.0),
             horizon: None,
             normal,
             depth: normal.dot(x - from),
+            length: None,
+            creases_of: None,
             silhouettes_only: true,
             of_camera: false,
         }
     }
 
-    /// How far a point, less the viewer's place, is behind the plane of the surface where the ray ends.
-    fn behind(&self, place: Vec3) -> f64 {
-        self.normal.dot(place) - self.depth
+    /// How far the nearest point of an edge, which goes from one end along a `side`, is behind the plane of the surface where the
+    /// ray ends, or farther away than that.
+    fn behind(&self, beside: &Beside, side: Vec3) -> Weight {
+        match self.length {
+            Some(length) => beside.distance - length,
+            None => {
+                let value = self.normal.dot(beside.place) - self.depth;
+                Weight { value, gradient: beside.along.gradient * self.normal.dot(side) }
+            }
+        }
     }
 
     /// An edge beside the ray and its weight; `None` where it has none.
@@ -111,12 +145,16 @@ impl Near {
         let ends = [a - from, b - from];
         let below = |n: Vec3| ends.iter().all(|p| n.dot(*p) <= 1e-9 * p.length());
         let view = if self.at_infinity.is_some() { w } else { ends[0] };
-        let widest = match edge.discontinuity(view) {
-            Discontinuity::Silhouette => self.square,
+        let full = (self.square, self.long);
+        let (widest, long) = match edge.discontinuity(view) {
+            Discontinuity::Silhouette => full,
             _ if self.silhouettes_only => return None,
             Discontinuity::None => return None,
-            Discontinuity::Facets => self.square * Weight::constant(NARROW * NARROW),
-            Discontinuity::Crease => self.square,
+            _ if edge.within.is_some_and(|shape| self.creases_of != Some(shape)) => return None,
+            Discontinuity::Facets => {
+                (self.square * Weight::constant(NARROW * NARROW), self.long * NARROW)
+            }
+            Discontinuity::Crease => full,
         };
         // Most edges are farther away, by a sphere around them.
         let middle = (ends[0] + ends[1]) * 0.5;
@@ -143,15 +181,15 @@ impl Near {
             return None;
         }
         let least = f64::MIN_POSITIVE.sqrt();
-        let behind = self.behind(beside.place);
+        // The weights of many short edges add up to what that of one line has where they are.
+        let part = Weight::constant(f64::min(self.seen_length(ends) / long, 1.0));
+        let behind = self.behind(&beside, b - a);
         // Of an edge that is not hidden the weight diverges where the ray meets it.
-        if behind <= 0.0 {
+        if behind.value <= 0.0 {
             let square = Weight { value: f64::max(square.value, least), ..square };
-            return Some((beside, widest / square - Weight::constant(1.0)));
+            return Some((beside, part * (widest / square - Weight::constant(1.0))));
         }
-        let slope = beside.along.gradient * self.normal.dot(b - a);
-        let reach = beside.distance * Weight::constant(BEHIND);
-        let q = Weight { value: behind, gradient: slope } / reach;
+        let q = behind / (beside.distance * Weight::constant(BEHIND));
         if q.value >= 1.0 {
             return None;
         }
@@ -160,6 +198,18 @@ impl Near {
         let rise = shown * (widest - square);
         let mut fall = square + (Weight::constant(1.0) - shown) * widest;
         fall.value = f64::max(fall.value, least);
-        Some((beside, rise / fall))
+        Some((beside, part * (rise / fall)))
+    }
+
+    /// How long an edge between two points, less the viewer's place, is as it is seen: the sine of its angle.
+    fn seen_length(&self, [a, b]: [Vec3; 2]) -> f64 {
+        match self.at_infinity {
+            Some(scale) => (b - a).cross(self.dir).length() / scale,
+            None if a.dot(b) <= 0.0 => 1.0,
+            None => {
+                let square = a.length_squared() * b.length_squared();
+                Real::sqrt(a.cross(b).length_squared() / square)
+            }
+        }
     }
 }

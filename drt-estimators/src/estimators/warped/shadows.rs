@@ -113,7 +113,7 @@ impl TurningEdges {
         if !(any && weight.value > 0.0) {
             return None;
         }
-        let turned = self.gather(&Near::of_ray(ray, angle), ray.moves, edges);
+        let turned = self.gather_beside(ray, angle, edges);
         let total = Weight::constant(1.0) + turned + rest + weight;
         divide(&mut edges[first..], ray.dir, total);
         for part in &mut shadows[first_shadow..] {

@@ -17,7 +17,7 @@ use crate::sampling::record::CameraRay;
 use crate::sampling::trace::Endpoint;
 use crate::world::World;
 use crate::world::lights::LightSample;
-use crate::world::vertex::Vertex;
+use crate::world::vertex::{SurfacePoint, Vertex};
 
 /// Pixels.
 const PIXELS: f64 = 2.0;
@@ -125,6 +125,10 @@ impl VelocityField for EdgeTurns {
         }
         let (angle, rest) = around(world, ray);
         self.edges.turn(ray, angle, rest, always, parts)
+    }
+
+    fn emission_turns_apart(&self, s: &SurfacePoint) -> bool {
+        self.edges.emission_turns_apart(s)
     }
 
     fn turn_with_shadows(
