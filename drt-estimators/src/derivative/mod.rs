@@ -6,6 +6,7 @@ pub(crate) mod antithetic;
 pub(crate) mod contraction;
 pub(crate) mod grid_deformation;
 pub(crate) mod medium_motion;
+pub(crate) mod recorded_path;
 pub(crate) mod scene_gradient;
 pub(crate) mod sensitivity;
 pub(crate) mod tangents;

@@ -139,13 +139,13 @@ pub fn ball(radius: f64, centre: Vec3) -> Mesh {
     placed(procedural::icosphere(1), Vec3::splat(radius), 0.3, centre).with_smooth_normals()
 }
 
-fn floor() -> Mesh {
+pub fn floor() -> Mesh {
     // Facing up.
     let linear = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 4.0;
     procedural::grid(2, 2).transform(&Affine { linear, translation: vec3(0.0, -1.0, 0.0) })
 }
 
-fn lamp() -> Mesh {
+pub fn lamp() -> Mesh {
     // Facing down, a little askew.
     placed(
         procedural::rectangle().transform(&Affine {

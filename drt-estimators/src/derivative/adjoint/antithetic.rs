@@ -4,8 +4,8 @@ use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::{Differentiator, send, send_material, turn};
 use crate::derivative::antithetic::{AntitheticPair, PairKind, PairedRadiance};
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::RecordedPath;
 use crate::model::surface::{BsdfParams, Turn};
 use crate::sampling::record::Node;
 use crate::sampling::trace::{Arrival, Endpoint};

@@ -11,8 +11,9 @@ use drt_math::Rgb;
 
 use crate::derivative::adjoint::turning::{RayMotion, found_ray};
 use crate::derivative::adjoint::{Differentiator, NodeMotion};
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::{Found, RecordedPath, TurningRay};
+use crate::derivative::velocity::{Found, TurningRay};
 use crate::world::vertex::SurfacePoint;
 
 impl Differentiator<'_> {

@@ -9,8 +9,8 @@
 use drt_math::{Rgb, RgbVec};
 
 use crate::derivative::adjoint::{Differentiator, send, turn};
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::RecordedPath;
 use crate::sampling::trace::Endpoint;
 
 impl Differentiator<'_> {

@@ -40,12 +40,11 @@ use crate::derivative::adjoint::emitters::{area, surroundings};
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 use crate::derivative::adjoint::turning::RayMotion;
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, Scaled, SurfaceAdjoint, TextureUse,
 };
-use crate::derivative::velocity::{
-    Auxiliary, Probe, RayTurn, RecordedPath, TurnPart, TurnParts, VertexVelocity,
-};
+use crate::derivative::velocity::{Auxiliary, Probe, RayTurn, TurnPart, TurnParts, VertexVelocity};
 use crate::model::sensor::{Sensor, SensorGradient};
 use crate::model::surface::{BsdfParams, by_corners};
 use crate::sampling::record::{Role, Scattered};

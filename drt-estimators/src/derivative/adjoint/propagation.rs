@@ -10,8 +10,9 @@
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::{Differentiator, Far, Stretch, moves, send};
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint, VelocityTerm};
-use crate::derivative::velocity::{Auxiliary, Moved, RecordedPath, VertexVelocity};
+use crate::derivative::velocity::{Auxiliary, Moved, VertexVelocity};
 use crate::model::sensor::SensorGradient;
 use crate::sampling::record::PathRecord;
 use crate::world::World;

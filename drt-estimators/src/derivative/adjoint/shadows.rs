@@ -5,8 +5,9 @@ use alloc::vec::Vec;
 use crate::derivative::adjoint::connections::NextEvent;
 use crate::derivative::adjoint::turning::{RayMotion, found_ray};
 use crate::derivative::adjoint::{Behind, Differentiator, NodeMotion};
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::{Found, RecordedPath};
+use crate::derivative::velocity::Found;
 use crate::world::vertex::Vertex;
 
 impl Differentiator<'_> {

@@ -2,10 +2,9 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::{
-    RayTurn, RecordedPath, ShadowPart, ShadowTurn, TurnPart, TurningRay, Weight,
-};
+use crate::derivative::velocity::{RayTurn, ShadowPart, ShadowTurn, TurnPart, TurningRay, Weight};
 use crate::model::emitter::EmitterGradient;
 use crate::sampling::trace::Arrival;
 use crate::world::lights::{LightKind, LightSample};

@@ -10,12 +10,12 @@ use drt_motion::{GeometryChange, Parameter};
 use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::medium_motion::MediumMotions;
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, TextureUse,
 };
 use crate::derivative::tangents;
 use crate::derivative::tests::scenes::*;
-use crate::derivative::velocity::RecordedPath;
 use crate::derivative::velocity::{Material, Movers, PathVelocities, VelocityField};
 use crate::model::emitter::EmitterGradient;
 use crate::model::scene::Scene;

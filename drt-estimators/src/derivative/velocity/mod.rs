@@ -37,6 +37,7 @@ mod shadow;
 pub(crate) mod spatial;
 mod turn;
 pub(crate) mod warp;
+mod weight;
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -48,13 +49,12 @@ use drt_math::{Rng, Vec3};
 pub(crate) use crate::derivative::velocity::blend::Blend;
 pub(crate) use crate::derivative::velocity::intersection::EdgeMatter;
 pub(crate) use crate::derivative::velocity::material::Material;
-pub(crate) use crate::derivative::velocity::path::{PathVelocities, RecordedPath};
+pub(crate) use crate::derivative::velocity::path::PathVelocities;
 pub(crate) use crate::derivative::velocity::shadow::{ShadowPart, ShadowPlace, ShadowTurn};
 pub(crate) use crate::derivative::velocity::spatial::Spatial;
-pub(crate) use crate::derivative::velocity::turn::{
-    RayTurn, TurnPart, TurnParts, TurningRay, Weight,
-};
+pub(crate) use crate::derivative::velocity::turn::{RayTurn, TurnPart, TurnParts, TurningRay};
 use crate::derivative::velocity::warp::SurfaceHit;
+pub(crate) use crate::derivative::velocity::weight::Weight;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::sampling::record::CameraRay;

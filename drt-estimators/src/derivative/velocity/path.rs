@@ -5,14 +5,12 @@ use alloc::vec::Vec;
 
 use drt_math::{Rng, Vec3};
 
-use crate::derivative::antithetic::AntitheticPairs;
 use crate::derivative::velocity::{
     Auxiliary, Found, Probe, RayTurn, SurfaceHit, TurnPart, TurningRay, VelocityField,
     VertexVelocity,
 };
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Arrival;
-use crate::world::lights::EmitterMask;
 use crate::world::vertex::Vertex;
 use crate::world::{RayPath, World};
 
@@ -154,14 +152,4 @@ impl PathVelocities {
     pub(crate) fn auxiliary(&self, velocity: &VertexVelocity) -> &[Auxiliary] {
         &self.auxiliary[velocity.auxiliary.clone()]
     }
-}
-
-/// What is to be differentiated of a path: the light of some emitters, by a velocity field.
-#[derive(Clone, Copy)]
-pub(crate) struct RecordedPath<'p> {
-    pub(crate) record: &'p PathRecord,
-    pub(crate) velocities: &'p PathVelocities,
-    /// Rays beside it, where they are asked for.
-    pub(crate) pairs: &'p AntitheticPairs,
-    pub(crate) lit: EmitterMask,
 }

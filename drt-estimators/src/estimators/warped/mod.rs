@@ -25,17 +25,28 @@
 //! from x. With q the squared sine of the angle between ω and e,
 //!
 //! ```text
-//! w_e = s (sin² Δ - q) / (q + (1 - s) sin² Δ).
+//! w_e = c s (sin² Δ - q) / (q + (1 - s) sin² Δ).
 //! ```
 //!
-//! s is 1 for edges before the plane of the surface where the ray ends, and falls to 0 behind it. So a single edge has λ = 1 - q / sin² Δ:
+//! s is 1 for edges before the plane of the surface where the ray ends, and falls to 0 behind it. c is the sine of the angle that
+//! the edge subtends at x over sin Δ, and at most 1: the many short edges of a fine mesh have together the weight of the line that
+//! they approximate, however fine it is. So a single long edge has λ = 1 - q / sin² Δ:
 //! on an edge that is seen the ray turns just as fast as the edge does, T is continuous wherever radiance is, and its
 //! divergence is a closed form. There are no auxiliary rays, and there is no bias.
+//!
+//! A crease between two faces of one shape bounds nothing that a ray sees which ends on another shape. It counts only for rays that
+//! end on its own, unless it rests on another surface.
+//!
+//! Even what is seen of its own shape need not jump there. An emitter whose radiance is the same everywhere emits the same on both
+//! sides of its creases, though what it scatters jumps. These two are summands of a path's value, and each has a field of
+//! its own: for [emission](crate::derivative::adjoint), as next-event estimation and rays that hit an emitter find it, creases
+//! of the emitter do not count, and s depends on how far beyond the end of the ray the nearest point of an edge is, as the planes of
+//! facets jump at creases.
 //!
 //! | requirement (theory sheet §9) | why it holds |
 //! |---|---|
 //! | T is the velocity of each visible edge | w diverges there, and no other weight does but at points where edges cross |
-//! | T is continuous elsewhere | which edges count, as silhouettes or at all, depends on x alone; w is continuous in ω, and s on a face |
+//! | T is continuous elsewhere | which edges count depends on x and the shape where the ray ends, which changes at edges that count; w is continuous in ω, and s on a face |
 //! | s may differ on the two sides of a crease or silhouette | there T is that edge's velocity on both sides |
 //! | nothing at horizons | scattered light vanishes there; edges below them are left out |
 //! | x moves by its whole velocity | x_dot is that of the vertex before, its own turn included: each vertex is conditioned on the one before (theory sheet §9.3) |

@@ -18,6 +18,7 @@ use crate::derivative::velocity::{
 use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
 use crate::model::settings::EstimatorKind;
+use crate::model::surface::Bsdf;
 use crate::terms::prepared::Prepared;
 use crate::world::World;
 use crate::world::lights::{EmitterMask, LightSample};
@@ -197,6 +198,35 @@ fn in_media() {
     let motion = parameter("card", 0.0, alloc::vec![moves("card", shift())]);
     let faults = [Fault::Divergence, Fault::Sign, Fault::Weight];
     compare(&glow(), &motion, LIGHT, &faults);
+}
+
+/// A ball of many facets that glows, over a floor, and half hidden from that by a card. Another lamp lights all of them.
+fn glowing_ball(ball_bsdf: Bsdf) -> Scene {
+    let mut b = Build::default();
+    let bsdf = b.bsdf("ball-bsdf", ball_bsdf);
+    let radiance = Rgb::new(4.0, 3.0, 5.0);
+    let glow = b.light("ball-glow", Emitter::Area { radiance });
+    b.shape("ball", ball(0.35, vec3(0.1, 0.7, 0.0)), bsdf).emitter = Some(glow);
+    let bsdf = b.bsdf("gray", diffuse(0.6, 0.5, 0.4));
+    let card = placed(procedural::cube(), vec3(0.3, 0.02, 0.3), 0.5, vec3(0.4, 0.0, 0.1));
+    b.shape("card", card, bsdf);
+    b.shape("floor", floor(), bsdf);
+    b.lamp(lamp(), Rgb::new(9.0, 9.0, 9.0));
+    b.camera(vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0), 4)
+}
+
+/// What a lamp emits jumps at none of its creases, and what it scatters jumps at all of them.
+#[test]
+fn lamps_of_facets() {
+    for (name, bsdf, sum) in [
+        ("ball", diffuse(0.0, 0.0, 0.0), MOMENT),
+        ("ball", diffuse(0.8, 0.9, 0.7), MOMENT),
+        ("card", diffuse(0.0, 0.0, 0.0), LIGHT),
+    ] {
+        let motion = parameter(name, 0.0, alloc::vec![moves(name, shift())]);
+        let faults = [Fault::Divergence, Fault::Sign, Fault::Weight];
+        compare(&glowing_ball(bsdf), &motion, sum, &faults);
+    }
 }
 
 /// Curved matter near a viewer has a part in a vertex's velocity that falls with the square of the distance, or its difference

@@ -5,7 +5,8 @@ use core::ops::Range;
 use drt_geom::edges::tree::TreeScratch;
 use drt_math::{Rgb, Vec3};
 
-use crate::derivative::velocity::{EdgeMatter, RecordedPath};
+use crate::derivative::recorded_path::RecordedPath;
+use crate::derivative::velocity::EdgeMatter;
 use crate::sampling::trace::Endpoint;
 use crate::sampling::trace::Tracer;
 use crate::terms::edge_queries::choice::Choice;

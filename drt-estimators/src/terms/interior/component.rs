@@ -7,8 +7,9 @@ use drt_math::{Rgb, RgbVec, Rng};
 
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::antithetic::{AntitheticPairs, PairedRadiance};
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{SurfaceAdjoint, VelocityTerm};
-use crate::derivative::velocity::{PathVelocities, RecordedPath};
+use crate::derivative::velocity::PathVelocities;
 use crate::sampling::record::PathRecord;
 use crate::sampling::streams::LINE_STREAM;
 use crate::sampling::trace::Tracer;

@@ -3,8 +3,8 @@
 use drt_math::{Rgb, Rng};
 
 use crate::derivative::antithetic::AntitheticPairs;
+use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::velocity::PathVelocities;
-use crate::derivative::velocity::RecordedPath;
 use crate::model::rendering::Counters;
 use crate::model::sensor::ViewSample;
 use crate::sampling::record::{Joint, JointObserver, LightPath, Node, PathRecord, Role};
