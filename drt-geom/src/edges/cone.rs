@@ -89,7 +89,26 @@ pub struct ConeSegment {
 pub struct ConeTree {
     /// In the order of a walk that goes down first.
     nodes: Vec<Node>,
-    order: Vec<u32>,
+    leaves: Vec<Leaf>,
+}
+
+/// A segment as leaves list it.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    name: u32,
+    /// One of its ends.
+    end: Vec3,
+    facets: Option<[Vec3; 2]>,
+}
+
+impl Leaf {
+    /// False of an edge whose facets are seen from one side.
+    fn may_be_silhouette(&self, cone: &Cone) -> bool {
+        let Some(facets) = self.facets else { return true };
+        let view = if cone.radius.is_some() { cone.axis } else { self.end - cone.apex };
+        let [front, other] = facets.map(|n| n.dot(view) > 0.0);
+        front != other
+    }
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -98,7 +117,7 @@ struct Node {
     radius: f64,
     /// The node after all below this one.
     next: u32,
-    /// In `order`; none for an inner node.
+    /// Which of the leaves' segments; none for an inner node.
     leaf: [u32; 2],
     normals: Normals,
 }
@@ -135,17 +154,18 @@ impl Normals {
 
     /// False when the viewer sees all facets in a sphere from one side.
     fn may_be_silhouettes(&self, cone: &Cone, center: Vec3, radius: f64) -> bool {
-        let at_infinity = cone.radius.is_some();
-        let view = if at_infinity { cone.axis } else { center - cone.apex };
-        let distance = view.length();
-        let sine = if at_infinity { 0.0 } else { radius / distance };
-        let [spread, narrow] = self.turn;
-        // The sum of both angles must be less than a right one, and the view nearer to the axis than what is left.
-        if sine.is_nan() || sine >= narrow {
+        let (view, radius) = match cone.radius {
+            Some(_) => (cone.axis, 0.0),
+            None => (center - cone.apex, radius),
+        };
+        let (square, [spread, narrow]) = (view.length_squared(), self.turn);
+        let outside = square - radius * radius;
+        // With the sphere's angle, whose sine is its radius over the distance, the sum of both angles must be less than a right one,
+        // and the view nearer to the axis than what is left.
+        if outside.is_nan() || radius * radius >= narrow * narrow * square {
             return true;
         }
-        let both = spread * Real::sqrt(1.0 - sine * sine) + narrow * sine;
-        Real::abs(self.axis.dot(view)) <= both * distance
+        Real::abs(self.axis.dot(view)) <= spread * Real::sqrt(outside) + narrow * radius
     }
 }
 
@@ -158,7 +178,11 @@ impl ConeTree {
         if !order.is_empty() {
             tree.split(segments, &mut order, 0);
         }
-        tree.order = order.into_iter().map(|i| segments[i as usize].name).collect();
+        let leaf = |i: u32| {
+            let ConeSegment { ends: [end, _], name, facets } = segments[i as usize];
+            Leaf { name, end, facets }
+        };
+        tree.leaves = order.into_iter().map(leaf).collect();
         tree
     }
 
@@ -208,15 +232,19 @@ impl ConeTree {
         while let Some(node) = self.nodes.get(at) {
             let Node { center, radius, .. } = *node;
             let place = Place::new(cone, center);
+            let in_narrow = narrow.may_meet_at(&place, radius);
             let met = cone.may_meet_at(&place, radius)
-                && (narrow.may_meet_at(&place, radius)
-                    || node.normals.may_be_silhouettes(cone, center, radius));
+                && (in_narrow || node.normals.may_be_silhouettes(cone, center, radius));
             if !met {
                 at = node.next as usize;
                 continue;
             }
             let [first, end] = node.leaf;
-            self.order[first as usize..end as usize].iter().try_for_each(|i| found(*i))?;
+            for leaf in &self.leaves[first as usize..end as usize] {
+                if in_narrow || leaf.may_be_silhouette(cone) {
+                    found(leaf.name)?;
+                }
+            }
             at += 1;
         }
         ControlFlow::Continue(())
