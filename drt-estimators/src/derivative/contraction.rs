@@ -69,8 +69,10 @@ impl Motion {
             }
         };
         type Changes = Vec<(usize, BsdfTangent)>;
-        let roughens = |changes: &Changes| changes.iter().any(|(_, t)| !t.alpha.is_zero());
-        let bends = |changes: &Changes| changes.iter().any(|(_, t)| !t.eta.is_zero());
+        let roughens =
+            |changes: &Changes| changes.iter().any(|(_, t)| !t.get(Property::Alpha).is_zero());
+        let bends =
+            |changes: &Changes| changes.iter().any(|(_, t)| !t.get(Property::Eta).is_zero());
         let mut factors = ActiveFactors {
             media: self.tangents.media.iter().map(need).collect(),
             bsdfs: self.active.bsdfs.clone(),

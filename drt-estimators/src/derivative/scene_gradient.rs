@@ -48,7 +48,7 @@ impl SceneGradient {
         Self {
             shapes: some(&active.shapes, |i| VertexGradient::zeros(&scene.shapes[i].mesh)),
             media: some(&active.media, |i| MediumGradient::zeros(&scene.media[i].item)),
-            bsdfs: some(&active.bsdfs, |_| BsdfParams::default()),
+            bsdfs: some(&active.bsdfs, |i| BsdfParams::zeros(scene.bsdfs[i].item.differentiated())),
             texels: (active.bsdfs.iter().zip(&scene.bsdfs))
                 .map(|(wanted, bsdf)| match bsdf.item.textured_part().filter(|_| *wanted) {
                     Some(t) => t

@@ -423,7 +423,7 @@ impl Apply<'_> {
 
     fn bsdf(&mut self, i: usize) -> Result<(), Error> {
         let target = Target::Bsdf(i);
-        let mut tangents = alloc::vec![BsdfTangent::default(); self.parameters.len()];
+        let mut tangents = alloc::vec![BsdfTangent::zeros(self.scene.bsdfs[i].item.differentiated()); self.parameters.len()];
         let parameters = self.parameters;
         for (p, parameter, change) in effects_on(parameters, target) {
             let Change::Property(c) = change else {
@@ -459,11 +459,9 @@ impl Apply<'_> {
             for t in &mut tangents {
                 change.carry(t, theta);
             }
-            if let Some(sum) = tangents[p].get_mut(property) {
-                *sum += own.get(property);
-            }
+            tangents[p].scatter(&own, Rgb::ONE);
         }
-        self.tangents.bsdfs.push(keep(tangents, |t| *t != BsdfTangent::default()));
+        self.tangents.bsdfs.push(keep(tangents, |t| !t.is_zero()));
         Ok(())
     }
 

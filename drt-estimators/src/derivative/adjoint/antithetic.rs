@@ -6,7 +6,7 @@ use crate::derivative::adjoint::{Differentiator, send, send_material, turn};
 use crate::derivative::antithetic::{AntitheticPair, PairKind, PairedRadiance};
 use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::model::surface::{BsdfParams, Turn};
+use crate::model::surface::{BsdfParams, Property, Turn};
 use crate::sampling::record::Node;
 use crate::sampling::trace::{Arrival, Endpoint};
 use crate::world::scatter::ScatteringGradient;
@@ -32,8 +32,9 @@ impl<'a> Apart<'a> {
     pub(super) fn take_from(&self, d: &mut ScatteringGradient) {
         let value = self.value;
         if let Some(params) = &mut d.params {
-            params.alpha -= value * self.alpha;
-            params.eta -= value * self.turn.map_or(0.0, |turn| turn.eta);
+            params.add(Property::Alpha, -value * self.alpha);
+            let by_index = self.turn.map_or(0.0, |turn| turn.eta);
+            params.add(Property::Eta, -value * by_index);
         }
         if let Some(turn) = self.turn {
             d.wo -= value.outer(turn.wo);
@@ -61,15 +62,14 @@ impl Differentiator<'_> {
         let light = [own * self.locals[pair.node].children, others * other.light];
         let params = match &pair.kind {
             PairKind::Roughness(slope) => {
-                let alpha = (light[0] - light[1]) * *slope;
-                BsdfParams { alpha, ..BsdfParams::default() }
+                BsdfParams::of(Property::Alpha, (light[0] - light[1]) * *slope)
             }
             PairKind::Turns(turns) => {
                 if sink.active().moves_geometry() {
                     self.turned(path, pair, turns, light, [own, others], other, sink);
                 }
                 let eta = light[0] * turns[0].eta + light[1] * turns[1].eta;
-                BsdfParams { eta, ..BsdfParams::default() }
+                BsdfParams::of(Property::Eta, eta)
             }
         };
         let bsdf = self.world.scene.shapes[s.shape as usize].bsdf;

@@ -5,8 +5,7 @@ use drt_medium::{Phase, henyey_greenstein};
 
 use crate::derivative::tests::fade;
 use crate::derivative::tests::scenes::{diffuse, glass, metal, phong, twosided};
-use crate::model::surface::tests::value_over;
-use crate::model::surface::{Bsdf, Given};
+use crate::model::surface::{Bsdf, Constants, Given};
 use crate::world::scatter::{Drawn, Scattering};
 
 /// The coordinates of `wo`, `wi`, the shading and the geometric normal.
@@ -62,7 +61,7 @@ fn surfaces_also_where_they_fade() {
                 let scattering = Scattering::Surface(bsdf.at(None, ng, ns, smooth));
                 let [o, i, n, facet] =
                     [(wo, 0), (wi, 3), (ns, 6), (ng, 9)].map(|(v, lane)| seeded(v, lane));
-                let mut truth = value_over(bsdf, o, i, n, &mut |_, v: Rgb| v.map(D::from));
+                let mut truth = bsdf.value(Constants, None, [o, i, n]);
                 if smooth {
                     let factor = fade(n.dot(o)) * fade(facet.dot(i));
                     truth *= factor;

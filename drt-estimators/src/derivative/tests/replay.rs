@@ -11,7 +11,7 @@ use crate::derivative::tests::changes::{D, rgb, with_rate};
 use crate::derivative::tests::fade;
 use crate::derivative::tests::moving::Moving;
 use crate::model::emitter::Emitter;
-use crate::model::surface::tests::value_over;
+use crate::model::surface::{Numbers, Property, PropertySet};
 use crate::sampling::record::Node;
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::{Connection, Endpoint};
@@ -22,6 +22,31 @@ use crate::world::vertex::{Kind, Vertex};
 /// Gauss's rule of two points on [0, 1], exact for cubics: extinction is one along a line within
 /// a voxel, as is its gradient times a velocity linear along the line.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+
+/// The numbers of a material that change with the parameter.
+#[derive(Clone, Copy)]
+struct Rates<'a, 'b> {
+    scene: &'a Moving<'b>,
+    bsdf: usize,
+    hidden: PropertySet,
+}
+
+impl Numbers<D> for Rates<'_, '_> {
+    fn number(self, property: Property, value: f64) -> D {
+        self.colour(property, Rgb::splat(value)).r
+    }
+
+    fn colour(self, property: Property, value: Rgb) -> Rgb<D> {
+        if self.hidden.contains(property) {
+            return value.map(D::from);
+        }
+        self.scene.material(self.bsdf, property, value)
+    }
+
+    fn without(self, hidden: PropertySet) -> Self {
+        Self { hidden: self.hidden.union(hidden), ..self }
+    }
+}
 
 /// A vertex as it moves.
 #[derive(Clone, Copy)]
@@ -250,9 +275,9 @@ impl Replay<'_> {
                 let p = self.scene.surface(s);
                 let shape = &self.scene.world.scene.shapes[s.shape as usize];
                 let bsdf = &self.scene.world.scene.bsdfs[shape.bsdf].item;
-                let value = value_over(bsdf, wo, wi, p.ns, &mut |property, value| {
-                    self.scene.material(shape.bsdf, property, value)
-                });
+                let numbers =
+                    Rates { scene: self.scene, bsdf: shape.bsdf, hidden: PropertySet::NONE };
+                let value = bsdf.value(numbers, None, [wo, wi, p.ns]);
                 if shape.mesh.normals.is_none() {
                     return value;
                 }

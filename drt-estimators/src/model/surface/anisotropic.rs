@@ -10,16 +10,22 @@
 //!
 //! All vectors are in the frame of [`Framed`].
 
+use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3, fm, vec3};
 
 use crate::model::surface::angles::Angles;
 use crate::model::surface::dielectric::Passage;
-use crate::model::surface::framed::Framed;
+use crate::model::surface::framed::{self, Framed};
+use crate::model::surface::lobes::widest;
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, LEAST_COS2, mirrored};
+use crate::model::surface::model::{
+    COORDINATES, Constants, Dependence, Flags, Model, Numbers, by_duals,
+};
+use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
-use crate::model::surface::{Bsdf, RoughConductor};
+use crate::model::surface::{At, Bsdf, BsdfGradient, Given, RoughConductor, RoughDielectric};
 
-/// A [`RoughConductor`] or [`RoughDielectric`](super::RoughDielectric) of uneven roughness: `alpha_u` and `alpha_v` of
+/// A [`RoughConductor`] or [`RoughDielectric`] of uneven roughness: `alpha_u` and `alpha_v` of
 /// Mitsuba's plugins.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -96,9 +102,9 @@ impl StretchedFacets {
 }
 
 impl Anisotropic {
-    fn facets<T: Real>(&self, number: impl Fn(Property, f64) -> T) -> StretchedFacets<T> {
+    fn facets<T: Real>(&self, numbers: impl Numbers<T>) -> StretchedFacets<T> {
         let [u, v] = self.alpha;
-        let alpha = [number(Property::AlphaU, u), number(Property::AlphaV, v)];
+        let alpha = [numbers.number(Property::AlphaU, u), numbers.number(Property::AlphaV, v)];
         let distribution = match &self.base {
             Bsdf::RoughConductor(b) => b.distribution,
             Bsdf::RoughDielectric(b) => b.distribution,
@@ -106,77 +112,29 @@ impl Anisotropic {
         };
         StretchedFacets { distribution, alpha }
     }
-
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        match property {
-            Property::AlphaU => Some(Slot::Scalar(&mut self.alpha[0])),
-            Property::AlphaV => Some(Slot::Scalar(&mut self.alpha[1])),
-            Property::Alpha => None,
-            _ => self.base.property(property),
-        }
-    }
-
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        if !matches!(self.base, Bsdf::RoughConductor(_) | Bsdf::RoughDielectric(_)) {
-            let bsdf = self.base.name();
-            return Err(SurfaceError::CannotHold { outer: "anisotropic", bsdf });
-        }
-        for (property, alpha) in [Property::AlphaU, Property::AlphaV].into_iter().zip(self.alpha) {
-            in_range(property, alpha, alpha >= LEAST_ALPHA, "at least 1e-4")?;
-        }
-        self.base.validate()
-    }
 }
 
 impl Framed for Anisotropic {
-    fn value<T: Real>(
-        &self,
-        number: impl Fn(Property, f64) -> T,
-        wo: Vec3<T>,
-        wi: Vec3<T>,
-    ) -> Rgb<T> {
-        let facets = self.facets(&number);
-        let colour = |property, value: Rgb| value.map(|c| number(property, c));
+    fn in_frame<T: Real>(&self, numbers: impl Numbers<T>, wo: Vec3<T>, wi: Vec3<T>) -> Rgb<T> {
+        let facets = self.facets(numbers);
         let a = Angles::new(wo, wi, Vec3::Z.lift());
         let black = Rgb::splat(T::zero());
         match &self.base {
             Bsdf::RoughConductor(b) if a.in_front() => {
-                let b = RoughConductor {
-                    distribution: b.distribution,
-                    alpha: T::from(b.alpha),
-                    eta: colour(Property::Eta, b.eta),
-                    k: colour(Property::K, b.k),
-                    specular_reflectance: colour(
-                        Property::SpecularReflectance,
-                        b.specular_reflectance,
-                    ),
-                };
-                b.value_of(&a, facets.facets(wo + wi, [wo, wi]))
+                b.value_of(numbers, &a, facets.facets(wo + wi, [wo, wi]))
             }
             Bsdf::RoughDielectric(b) => {
-                let b = super::RoughDielectric {
-                    distribution: b.distribution,
-                    alpha: T::from(b.alpha),
-                    eta: number(Property::Eta, b.eta),
-                    specular_reflectance: colour(
-                        Property::SpecularReflectance,
-                        b.specular_reflectance,
-                    ),
-                    specular_transmittance: colour(
-                        Property::SpecularTransmittance,
-                        b.specular_transmittance,
-                    ),
-                };
-                let Some(passage) = Passage::new(&a, b.eta) else { return black };
+                let eta = numbers.number(Property::Eta, b.eta);
+                let Some(passage) = Passage::new(&a, eta) else { return black };
                 let h = wo + wi * passage.index();
-                b.value_of(&passage, facets.facets(h, [wo, wi]))
+                b.value_of(numbers, &passage, facets.facets(h, [wo, wi]))
             }
             _ => black,
         }
     }
 
     fn direction(&self, from: Vec3, u: [f64; 3]) -> Option<Vec3> {
-        let facets = self.facets(|_, alpha| alpha);
+        let facets = self.facets(Constants);
         match &self.base {
             Bsdf::RoughConductor(_) if from.z > 0.0 => {
                 Some(mirrored(from, facets.sample_visible(from, [u[0], u[1]])))
@@ -191,7 +149,7 @@ impl Framed for Anisotropic {
     }
 
     fn density(&self, from: Vec3, to: Vec3) -> f64 {
-        let facets = self.facets(|_, alpha| alpha);
+        let facets = self.facets(Constants);
         let a = Angles::new(from, to, Vec3::Z);
         match &self.base {
             Bsdf::RoughConductor(_) if a.in_front() => {
@@ -204,8 +162,88 @@ impl Framed for Anisotropic {
             _ => 0.0,
         }
     }
+}
 
-    fn narrowest(&self) -> f64 {
+impl Model for Anisotropic {
+    fn name(&self) -> &'static str {
+        self.base.name()
+    }
+
+    #[inline(never)]
+    fn flags(&self) -> Flags {
+        Flags { oriented: true, ..self.base.flags() }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Frame
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        let own = const { PropertySet::new(&[Property::AlphaU, Property::AlphaV]) };
+        let even = const { PropertySet::new(&[Property::Alpha]) };
+        self.base.differentiated().without(even).union(own)
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::AlphaU => Some(Slot::Scalar(&mut self.alpha[0])),
+            Property::AlphaV => Some(Slot::Scalar(&mut self.alpha[1])),
+            Property::Alpha => None,
+            _ => self.base.property(property),
+        }
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        if !matches!(self.base, Bsdf::RoughConductor(_) | Bsdf::RoughDielectric(_)) {
+            let bsdf = self.base.name();
+            return Err(SurfaceError::CannotHold { outer: "anisotropic", bsdf });
+        }
+        for (property, alpha) in [Property::AlphaU, Property::AlphaV].into_iter().zip(self.alpha) {
+            in_range(property, alpha, alpha >= LEAST_ALPHA, "at least 1e-4")?;
+        }
+        self.base.validate()
+    }
+
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        directions: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        framed::value(self, numbers, at, directions)
+    }
+
+    #[inline(never)]
+    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_duals::<{ COORDINATES + 5 }>(
+            self.differentiated(),
+            [wo, wi, n],
+            |numbers, directions| framed::value(self, numbers, at, directions),
+        )
+    }
+
+    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+        framed::sample(self, at, from, n, u)
+    }
+
+    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        framed::pdf(self, at, from, to, n)
+    }
+
+    /// As wide all around as where it is widest.
+    fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let alpha = widest(self.alpha);
+        match &self.base {
+            Bsdf::RoughConductor(b) => RoughConductor { alpha, ..*b }.lobes(None, wo, n),
+            Bsdf::RoughDielectric(b) => RoughDielectric { alpha, ..*b }.lobes(None, wo, n),
+            b => b.lobes(None, wo, n),
+        }
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
         f64::min(self.alpha[0], self.alpha[1])
     }
 }

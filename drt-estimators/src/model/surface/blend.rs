@@ -1,8 +1,10 @@
 use drt_geom::edges::{Lobe, Lobes};
-use drt_math::{Rgb, RgbVec, Vec3};
+use drt_math::{Real, Rgb, RgbVec, Vec3};
 
-use crate::model::surface::composed::{Composed, choose};
+use crate::model::surface::choice::choose;
 use crate::model::surface::lobes::two_highest;
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
 use crate::model::surface::{
     At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
@@ -10,7 +12,7 @@ use crate::model::surface::{
 
 /// A linear combination of two BSDFs, `(1 - w) f₀ + w f₁`: Mitsuba's `blendbsdf`.
 ///
-/// It is differentiated by its weight; what its parts are made of has no place in its [`BsdfParams`].
+/// It is differentiated by its weight, and not by the properties of its parts.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Blend {
@@ -47,36 +49,34 @@ impl Blend {
         let (is_second, choice) = choose(choice, [second, first]);
         (usize::from(is_second), choice)
     }
+}
 
-    /// The gradient by the place of the point, through the textures of both parts.
-    pub(super) fn slide(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], factor: f64) -> RgbVec {
-        let mut sum = RgbVec::ZERO;
-        for (bsdf, weight) in self.bsdfs.iter().zip(self.weights()) {
-            let mut params = BsdfParams::default();
-            let factor = factor * weight;
-            params.scatter(&bsdf.gradient_at(at, wo, wi, n).params, Rgb::splat(factor));
-            sum += bsdf.slide(at, [wo, wi, n], &params, factor);
-        }
-        sum
+impl Model for Blend {
+    fn name(&self) -> &'static str {
+        "blendbsdf"
     }
 
-    /// Both sketches, of which the two highest lobes stay.
-    pub(super) fn lobes(&self, at: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
-        let weights = self.weights();
-        let parts = [0, 1].map(|i| self.bsdfs[i].lobes(at, wo, n));
-        let mut all = [Lobe::default(); 4];
-        for (i, lobe) in all.iter_mut().enumerate() {
-            let (part, weight) = (&parts[i / 2].lobes[i % 2], weights[i / 2]);
-            *lobe = Lobe { height: part.height * weight, ..*part };
-        }
-        two_highest(parts[0].even * weights[0] + parts[1].even * weights[1], all)
+    #[inline(never)]
+    fn flags(&self) -> Flags {
+        let [a, b] = self.bsdfs.each_ref().map(Bsdf::flags);
+        a.of_both(b)
     }
 
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Point
+    }
+
+    /// Properties of its parts do not count: both parts may have the same one.
+    fn differentiated(&self) -> PropertySet {
+        const { PropertySet::new(&[Property::Weight]) }
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         (property == Property::Weight).then_some(Slot::Scalar(&mut self.weight))
     }
 
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+    fn validate(&self) -> Result<(), SurfaceError> {
         for bsdf in &self.bsdfs {
             if bsdf.is_null() || bsdf.passes_straight() {
                 return Err(SurfaceError::CannotHold { outer: "blendbsdf", bsdf: bsdf.name() });
@@ -85,15 +85,26 @@ impl Blend {
         }
         in_range(Property::Weight, self.weight, true, "a finite number")
     }
-}
 
-impl Composed for Blend {
-    fn eval(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
-        let [a, b] = self.bsdfs.each_ref().map(|b| b.eval_at(at, wo, wi, n));
-        let [u, v] = self.weights();
-        a * u + b * v
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        directions: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        let weight = numbers.number(Property::Weight, self.weight);
+        let weight = match weight.re() {
+            w if w < 0.0 => T::zero(),
+            w if w > 1.0 => T::one(),
+            _ => weight,
+        };
+        let numbers = numbers.without(PropertySet::ALL);
+        let [a, b] = self.bsdfs.each_ref().map(|b| b.value(numbers, at, directions));
+        a * (T::one() - weight) + b * weight
     }
 
+    #[inline(never)]
     fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
         let [a, b] = self.bsdfs.each_ref().map(|b| b.gradient_at(at, wo, wi, n));
         let [u, v] = self.weights();
@@ -103,7 +114,7 @@ impl Composed for Blend {
             wo: a.wo * u + b.wo * v,
             wi: a.wi * u + b.wi * v,
             n: a.n * u + b.n * v,
-            params: BsdfParams { exponent: slope, ..BsdfParams::default() },
+            params: BsdfParams::of(Property::Weight, slope),
         }
     }
 
@@ -139,7 +150,7 @@ impl Composed for Blend {
             both.value += part.value * weight;
             both.probability += part.probability * choice;
         }
-        both.params.exponent = self.slope(parts.map(|p| p.value));
+        both.params = BsdfParams::of(Property::Weight, self.slope(parts.map(|p| p.value)));
         Some(both)
     }
 
@@ -151,5 +162,31 @@ impl Composed for Blend {
     fn lobe_width(&self, at: At<'_>) -> f64 {
         let [a, b] = self.bsdfs.each_ref().map(|b| b.lobe_width(at));
         f64::min(a, b)
+    }
+
+    /// Both sketches, of which the two highest lobes stay.
+    fn lobes(&self, at: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let weights = self.weights();
+        let parts = [0, 1].map(|i| self.bsdfs[i].lobes(at, wo, n));
+        let mut all = [Lobe::default(); 4];
+        for (i, lobe) in all.iter_mut().enumerate() {
+            let (part, weight) = (&parts[i / 2].lobes[i % 2], weights[i / 2]);
+            *lobe = Lobe { height: part.height * weight, ..*part };
+        }
+        two_highest(parts[0].even * weights[0] + parts[1].even * weights[1], all)
+    }
+
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        self.bsdfs.each_ref().map(Some)
+    }
+
+    fn slide(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], _: &BsdfParams, factor: f64) -> RgbVec {
+        let mut sum = RgbVec::ZERO;
+        for (bsdf, weight) in self.bsdfs.iter().zip(self.weights()) {
+            let factor = factor * weight;
+            let params = bsdf.gradient_at(at, wo, wi, n).params.scaled(Rgb::splat(factor));
+            sum += bsdf.slide(at, [wo, wi, n], &params, factor);
+        }
+        sum
     }
 }

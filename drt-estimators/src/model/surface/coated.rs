@@ -40,14 +40,18 @@ use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Dual, Real, Rgb, RgbVec, Vec3, fm};
 
 use crate::model::surface::angles::{Angles, Slopes};
+use crate::model::surface::choice::choose;
 use crate::model::surface::coating::Coating;
-use crate::model::surface::composed::{Composed, choose};
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::lobes::{reflection, two_highest};
 use crate::model::surface::microfacet::mirrored;
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 use crate::model::surface::specular::same;
-use crate::model::surface::{At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue};
+use crate::model::surface::{
+    At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue, Textured,
+};
 use crate::model::texture::Texture;
 
 /// A reflector under a dielectric layer, which may absorb: Mitsuba 0.6's `coating` and `roughcoating`.
@@ -96,10 +100,6 @@ impl Coated {
         Self { bsdf, coating, specular_reflectance: Rgb::ONE, sigma_a: Rgb::ZERO, thickness: 1.0 }
     }
 
-    pub(super) fn name(&self) -> &'static str {
-        if self.is_smooth() { "coating" } else { "roughcoating" }
-    }
-
     /// True when the interface is a mirror.
     fn is_smooth(&self) -> bool {
         self.coating.facets().is_none()
@@ -134,10 +134,10 @@ impl Coated {
     }
 
     /// The part of the light that gets through the interface and the layer, and back.
-    fn through<T: Real>(&self, cosines: [T; 2]) -> Rgb<T> {
+    fn through<T: Real>(&self, sigma_a: Rgb<T>, cosines: [T; 2]) -> Rgb<T> {
         let [a, b] = cosines.map(|c| self.coating.let_through(c.abs()));
         let (both, path) = (a * b, self.path(cosines));
-        self.sigma_a.map(|s| (path * -s).exp() * both)
+        sigma_a.map(|s| (path * -s).exp() * both)
     }
 
     /// The solid angle in the layer by that outside.
@@ -147,8 +147,8 @@ impl Coated {
     }
 
     /// What the value below is multiplied by.
-    fn factor<T: Real>(&self, [cos_o, cos_i]: [T; 2]) -> Rgb<T> {
-        self.through([cos_o, cos_i]) * self.compression(cos_i)
+    fn factor<T: Real>(&self, sigma_a: Rgb<T>, [cos_o, cos_i]: [T; 2]) -> Rgb<T> {
+        self.through(sigma_a, [cos_o, cos_i]) * self.compression(cos_i)
     }
 
     /// The white reflection by microfacets, on the side of both directions; `None` of a smooth layer.
@@ -161,40 +161,37 @@ impl Coated {
     fn choices(&self, cos: f64) -> [f64; 2] {
         let cos = Real::abs(cos);
         let reflected = (1.0 - self.coating.let_through(cos)) * self.specular_reflectance.mean();
-        let rest = self.through([cos; 2]).mean();
+        let rest = self.through(self.sigma_a, [cos; 2]).mean();
         let sum = reflected + rest;
         let share = if sum > 0.0 { reflected / sum } else { 0.5 };
         let share = share.clamp(LEAST_CHOICE, 1.0 - LEAST_CHOICE);
         [share, 1.0 - share]
     }
+}
 
-    /// The gradient by the place of the point, through textures of what is below.
-    pub(super) fn slide(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], factor: f64) -> RgbVec {
-        let inside = [self.below(wo, n).w, self.below(wi, n).w, n];
-        let params = self.bsdf.gradient_at(at, inside[0], inside[1], n).params;
-        self.bsdf.slide(at, inside, &params, 1.0) * (self.factor([n.dot(wo), n.dot(wi)]) * factor)
+impl Model for Coated {
+    fn name(&self) -> &'static str {
+        if self.is_smooth() { "coating" } else { "roughcoating" }
     }
 
-    /// The sketch of what is below, bent and dimmed, with the reflection by microfacets.
-    pub(super) fn lobes(&self, at: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
-        let (side, eta2) = (if n.dot(wo) < 0.0 { -n } else { n }, self.coating.eta().powi(2));
-        let cos = side.dot(wo).clamp(1e-6, 1.0);
-        let dimmed = self.through([cos; 2]).mean() / eta2;
-        let below = self.bsdf.lobes(at, self.below(wo, n).w, n);
-        let [a, b] = below.lobes.map(|lobe| {
-            let along = lobe.axis.reject(n);
-            let flat = if along.max_abs() > 0.0 { along.normalize() } else { lobe.axis };
-            let axis = self.above(lobe.axis, n).unwrap_or(flat);
-            Lobe { axis, width2: lobe.width2 * eta2, height: lobe.height * dimmed * eta2 }
-        });
-        let top = self.coating.facets().map(|(_, alpha)| {
-            let reflected = 1.0 - self.coating.let_through(cos);
-            reflection(wo, side, alpha, self.specular_reflectance.mean() * reflected)
-        });
-        two_highest(below.even * dimmed, [a, b, top.unwrap_or_default(), Lobe::default()])
+    #[inline(never)]
+    fn flags(&self) -> Flags {
+        let inner = self.bsdf.flags();
+        let smooth = self.is_smooth() || inner.smooth;
+        Flags { black: false, black_from_behind: false, smooth, ..inner }
     }
 
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Point
+    }
+
+    fn differentiated(&self) -> PropertySet {
+        let own = const { PropertySet::new(&[Property::SpecularReflectance, Property::SigmaA]) };
+        self.bsdf.differentiated().union(own)
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
             Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
             Property::SigmaA => Some(Slot::Color(&mut self.sigma_a)),
@@ -203,29 +200,7 @@ impl Coated {
         }
     }
 
-    /// The texture below the layer that stands for a property.
-    pub(super) fn texture(&self, property: Property) -> Option<&Texture> {
-        match property {
-            Property::SpecularReflectance | Property::SigmaA | Property::Thickness => None,
-            _ => self.bsdf.texture(property),
-        }
-    }
-
-    pub(super) fn undifferentiated(&self, property: Property) -> Option<&'static str> {
-        match property {
-            Property::SpecularReflectance | Property::SigmaA => None,
-            Property::Thickness => Some("change `sigma_a`, which it is a factor of"),
-            // Their places are those of the two above.
-            Property::Clearcoat
-            | Property::DiffTrans
-            | Property::SpecularTransmittance
-            | Property::SpecTrans
-            | Property::Opacity => Some("it shares its place with a property of the coating"),
-            _ => self.bsdf.undifferentiated(property),
-        }
-    }
-
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+    fn validate(&self) -> Result<(), SurfaceError> {
         let inner = &self.bsdf;
         if inner.is_null() || inner.passes_straight() || inner.is_transmissive() {
             return Err(SurfaceError::CannotHold { outer: self.name(), bsdf: inner.name() });
@@ -236,24 +211,41 @@ impl Coated {
         in_range(Property::Thickness, self.thickness, self.thickness >= 0.0, "0 or more")?;
         inner.validate()
     }
-}
 
-impl Composed for Coated {
-    fn eval(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
-        let value = self.bsdf.eval_at(at, self.below(wo, n).w, self.below(wi, n).w, n);
-        let value = value * self.factor([n.dot(wo), n.dot(wi)]);
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        [wo, wi, n]: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        let eta = self.coating.eta();
+        let below = |w: Vec3<T>| {
+            let cos = n.dot(w);
+            let inside = self.refracted(cos.abs());
+            let inside = if cos.re() < 0.0 { -inside } else { inside };
+            w * T::from(eta.recip()) + n * (inside - cos / eta)
+        };
+        let hidden = const { PropertySet::new(&[Property::SpecularReflectance]) };
+        let value = self.bsdf.value(numbers.without(hidden), at, [below(wo), below(wi), n]);
+        let sigma_a = numbers.colour(Property::SigmaA, self.sigma_a);
+        let value = value * self.factor(sigma_a, [n.dot(wo), n.dot(wi)]);
         match self.facets(Angles::new(wo, wi, n)) {
-            Some(grey) => value + self.specular_reflectance * grey,
+            Some(grey) => {
+                let property = Property::SpecularReflectance;
+                value + numbers.colour(property, self.specular_reflectance) * grey
+            }
             None => value,
         }
     }
 
+    #[inline(never)]
     fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
         let angles = Angles::new(wo, wi, n);
         let below = [self.below(wo, n), self.below(wi, n)];
         let d = self.bsdf.gradient_at(at, below[0].w, below[1].w, n);
         let cosines = [Dual::<f64, 2>::variable(angles.cos_o, 0), Dual::variable(angles.cos_i, 1)];
-        let factor = self.factor(cosines);
+        let factor = self.factor(self.sigma_a.map(Dual::from), cosines);
         let by = |i: usize| factor.map(|f| f.eps[i]);
         let (by_cos_o, by_cos_i) = (d.value * by(0), d.value * by(1));
         let factor = factor.map(|f| f.re);
@@ -273,10 +265,11 @@ impl Composed for Coated {
             h2: along(2),
             ..Slopes::default()
         };
-        slopes.params.scatter(&d.params, factor);
-        slopes.params.specular_reflectance = Rgb::splat(grey.map_or(0.0, |g| g.re));
+        slopes.params = d.params.scaled(factor);
+        let top = Rgb::splat(grey.map_or(0.0, |g| g.re));
+        slopes.params.set(Property::SpecularReflectance, top);
         let path = self.path([angles.cos_o, angles.cos_i]);
-        slopes.params.specular_transmittance = base * -path;
+        slopes.params.set(Property::SigmaA, base * -path);
 
         let mut gradient = slopes.pull_back(wo, wi, n);
         let eta = self.coating.eta();
@@ -314,7 +307,8 @@ impl Composed for Coated {
             let below = self.below(from, n).w;
             let s = self.bsdf.sample_specular_at(at, below, n, choice, given)?;
             let w = self.above(s.w, n)?;
-            let weight = s.weight * self.through([cos, n.dot(w)]) * choices[1].recip();
+            let weight =
+                s.weight * self.through(self.sigma_a, [cos, n.dot(w)]) * choices[1].recip();
             return Some(SpecularSample { w, weight, straight: false });
         }
         (self.is_smooth() && cos != 0.0).then(|| {
@@ -330,17 +324,18 @@ impl Composed for Coated {
         let choices = self.choices(cos);
         let cosines = [cos, n.dot(wi)];
         let nested = self.bsdf.specular(at, self.below(wo, n).w, self.below(wi, n).w, n);
-        let nested = nested.map(|found| found.scaled(self.through(cosines), choices[1]));
+        let nested =
+            nested.map(|found| found.scaled(self.through(self.sigma_a, cosines), choices[1]));
         let top = self.is_smooth() && cos != 0.0 && same(mirrored(wo, n), wi);
         if nested.is_none() && !top {
             return None;
         }
         let mut found = nested.unwrap_or_default();
-        found.params.specular_transmittance = found.value * -self.path(cosines);
-        found.params.specular_reflectance = Rgb::ZERO;
+        found.params.set(Property::SigmaA, found.value * -self.path(cosines));
+        found.params.set(Property::SpecularReflectance, Rgb::ZERO);
         if top {
             let fresnel = dielectric_reflected(Real::abs(cos).min(1.0), self.coating.eta());
-            found.params.specular_reflectance = Rgb::splat(fresnel);
+            found.params.set(Property::SpecularReflectance, Rgb::splat(fresnel));
             found.value += self.specular_reflectance * fresnel;
             found.probability += choices[0];
         }
@@ -360,5 +355,51 @@ impl Composed for Coated {
     fn lobe_width(&self, at: At<'_>) -> f64 {
         let top = self.coating.facets().map_or(0.0, |(_, alpha)| alpha);
         f64::min(top, self.bsdf.lobe_width(at))
+    }
+
+    /// The sketch of what is below, bent and dimmed, with the reflection by microfacets.
+    fn lobes(&self, at: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let (side, eta2) = (if n.dot(wo) < 0.0 { -n } else { n }, self.coating.eta().powi(2));
+        let cos = side.dot(wo).clamp(1e-6, 1.0);
+        let dimmed = self.through(self.sigma_a, [cos; 2]).mean() / eta2;
+        let below = self.bsdf.lobes(at, self.below(wo, n).w, n);
+        let [a, b] = below.lobes.map(|lobe| {
+            let along = lobe.axis.reject(n);
+            let flat = if along.max_abs() > 0.0 { along.normalize() } else { lobe.axis };
+            let axis = self.above(lobe.axis, n).unwrap_or(flat);
+            Lobe { axis, width2: lobe.width2 * eta2, height: lobe.height * dimmed * eta2 }
+        });
+        let top = self.coating.facets().map(|(_, alpha)| {
+            let reflected = 1.0 - self.coating.let_through(cos);
+            reflection(wo, side, alpha, self.specular_reflectance.mean() * reflected)
+        });
+        two_highest(below.even * dimmed, [a, b, top.unwrap_or_default(), Lobe::default()])
+    }
+
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        [Some(&self.bsdf), None]
+    }
+
+    /// The texture below the layer that stands for a property.
+    fn texture(&self, property: Property) -> Option<&Texture> {
+        match property {
+            Property::SpecularReflectance | Property::SigmaA | Property::Thickness => None,
+            _ => self.bsdf.texture(property),
+        }
+    }
+
+    fn undifferentiated(&self, property: Property, _: Option<&Textured>) -> Option<&'static str> {
+        match property {
+            Property::SpecularReflectance | Property::SigmaA => None,
+            Property::Thickness => Some("change `sigma_a`, which it is a factor of"),
+            _ => self.bsdf.undifferentiated(property),
+        }
+    }
+
+    fn slide(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], _: &BsdfParams, factor: f64) -> RgbVec {
+        let inside = [self.below(wo, n).w, self.below(wi, n).w, n];
+        let params = self.bsdf.gradient_at(at, inside[0], inside[1], n).params;
+        self.bsdf.slide(at, inside, &params, 1.0)
+            * (self.factor(self.sigma_a, [n.dot(wo), n.dot(wi)]) * factor)
     }
 }

@@ -21,7 +21,7 @@ pub struct Coating {
     eta: f64,
     /// Microfacets and their roughness; a smooth coating has none.
     facets: Option<(Distribution, f64)>,
-    /// Of a rough one: the part let through at [`COSINES`] cosines from 0 to 1. Without, it is that of a smooth one.
+    /// The part of the light that a rough coating lets through at [`COSINES`] cosines from 0 to 1; empty for a smooth one.
     transmittance: Arc<[f64]>,
     /// The part of diffuse light from below that is reflected back down.
     internal_reflectance: f64,

@@ -1,10 +1,15 @@
-use drt_math::{Dual, Real, Rgb, Vec3, fm};
+use drt_geom::edges::Lobes;
+use drt_math::{Real, Rgb, Vec3, fm};
 
-use crate::model::surface::angles::{Angles, Slopes};
+use crate::model::surface::angles::{ANGLES, Angles, Isotropic, by_angles};
 use crate::model::surface::facet::Facet;
 use crate::model::surface::fresnel::{dielectric_reflected, dielectric_transmitted};
+use crate::model::surface::lobes::{SeenFacet, reflection};
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, mirrored, refracted};
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
+use crate::model::surface::{At, BsdfGradient, Given};
 
 /// A rough interface between two transparent media: Walter et al. 2007, eq. 20 (reflection) and
 /// eq. 21 (refraction). The normal points to the exterior.
@@ -13,17 +18,17 @@ use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, no
 /// over squared index is what the surface conserves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct RoughDielectric<T = f64> {
+pub struct RoughDielectric {
     /// Distribution of the microfacets; default Beckmann.
     pub distribution: Distribution,
     /// Roughness, at least 1e-4; default 0.1.
-    pub alpha: T,
+    pub alpha: f64,
     /// Index of the interior over that of the exterior, not one; default glass (BK7) in air.
-    pub eta: T,
+    pub eta: f64,
     /// Factor of the reflection; default 1.
-    pub specular_reflectance: Rgb<T>,
+    pub specular_reflectance: Rgb,
     /// Factor of the refraction; default 1.
-    pub specular_transmittance: Rgb<T>,
+    pub specular_transmittance: Rgb,
 }
 
 impl Default for RoughDielectric {
@@ -106,67 +111,25 @@ impl<T: Real> Passage<T> {
     }
 }
 
-impl<T: Real> RoughDielectric<T> {
-    #[inline]
-    pub(super) fn value(&self, a: &Angles<T>) -> Rgb<T> {
-        let Some(passage) = Passage::new(a, self.eta) else { return Rgb::splat(T::zero()) };
-        let facets = self.distribution.facets(&passage.a, passage.index(), self.alpha);
-        self.value_of(&passage, facets)
-    }
-
+impl RoughDielectric {
     /// The value by [`Distribution::facets`] of any kind.
     #[inline(always)]
-    pub(super) fn value_of(&self, passage: &Passage<T>, facets: T) -> Rgb<T> {
+    pub(super) fn value_of<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        passage: &Passage<T>,
+        facets: T,
+    ) -> Rgb<T> {
         // Also where |h| = 0, which the rest could not be differentiated at.
         if facets.re() == 0.0 {
             return Rgb::splat(T::zero());
         }
-        self.colour(passage.reflects()) * (facets * passage.facet_share())
-    }
-
-    #[inline]
-    fn colour(&self, reflects: bool) -> Rgb<T> {
-        if reflects { self.specular_reflectance } else { self.specular_transmittance }
-    }
-}
-
-impl RoughDielectric {
-    #[inline]
-    pub(super) fn slopes(&self, a: &Angles) -> Slopes {
-        let mut s = Slopes::default();
-        let Some(Passage { a: seen, eta }) = Passage::new(a, self.eta) else { return s };
-        let reflects = seen.cos_i > 0.0;
-        let index = if reflects { 1.0 } else { eta };
-        let Some(facets) = self.distribution.facet_slopes(&seen, index, self.alpha) else {
-            return s;
-        };
-        let share = Passage::<Dual<f64, 2>> {
-            a: Angles {
-                cos_o: Dual::from(seen.cos_o),
-                cos_i: Dual::from(seen.cos_i),
-                h2: Dual::variable(seen.h2, 0),
-            },
-            eta: Dual::variable(eta, 1),
-        }
-        .facet_share();
-
-        let colour = self.colour(reflects);
-        // Seen from behind, the cosines are turned over and the index is inverted.
-        let (side, inversion) = if a.cos_o > 0.0 { (1.0, 1.0) } else { (-1.0, -eta * eta) };
-        let by_index = if reflects { 0.0 } else { facets.index * share.re };
-        let value = facets.value * share.re;
-        s.value = colour * value;
-        s.cos_o = colour * (side * facets.cos_o * share.re);
-        s.cos_i = colour * (side * facets.cos_i * share.re);
-        s.h2 = colour * (facets.h2 * share.re + facets.value * share.eps[0]);
-        s.params.alpha = colour * (facets.alpha * share.re);
-        s.params.eta = colour * (inversion * (by_index + facets.value * share.eps[1]));
-        if reflects {
-            s.params.specular_reflectance = Rgb::splat(value);
+        let colour = if passage.reflects() {
+            numbers.colour(Property::SpecularReflectance, self.specular_reflectance)
         } else {
-            s.params.specular_transmittance = Rgb::splat(value);
-        }
-        s
+            numbers.colour(Property::SpecularTransmittance, self.specular_transmittance)
+        };
+        colour * (facets * passage.facet_share())
     }
 
     /// Probability of reflecting at a microfacet that reflects the part `fresnel`: by the lobes'
@@ -177,14 +140,6 @@ impl RoughDielectric {
         let sum = reflected + (1.0 - fresnel) * self.specular_transmittance.mean();
         let share = if sum > 0.0 { reflected / sum } else { fresnel };
         0.8 * share + 0.2 * fresnel
-    }
-
-    #[inline]
-    pub(super) fn pdf(&self, a: &Angles) -> f64 {
-        let Some(passage) = Passage::new(a, self.eta) else { return 0.0 };
-        let Passage { a, .. } = &passage;
-        let index = passage.index();
-        self.pdf_of(&passage, || self.distribution.visible_density(a, index, self.alpha))
     }
 
     /// The density by [`Distribution::visible_density`] of any kind.
@@ -201,13 +156,6 @@ impl RoughDielectric {
             return 0.0;
         };
         probability * jacobian * visible()
-    }
-
-    #[inline]
-    pub(super) fn sample(&self, from: Vec3, n: Vec3, u: [f64; 3]) -> Option<Vec3> {
-        let (n, eta) = self.seen_from(from, n)?;
-        let m = self.distribution.sample_visible(from, n, self.alpha, [u[0], u[1]]);
-        self.sample_by(m, from, n, eta, u[2])
     }
 
     /// The direction into which a facet with the normal `m` sends light, by a number that chooses between reflection and
@@ -231,19 +179,6 @@ impl RoughDielectric {
         (reflects == (n.dot(w) > 0.0)).then_some(w)
     }
 
-    /// With the rate of its index by that of the material.
-    #[inline]
-    pub(super) fn facet(&self, [wo, wi, n]: [Vec3; 3]) -> Option<(Facet, f64)> {
-        let (side, eta) = self.seen_from(wo, n)?;
-        let index = (side.dot(wi) < 0.0).then_some(eta);
-        let by_eta = match index {
-            None => 0.0,
-            Some(_) if side == n => 1.0,
-            Some(eta) => -eta * eta,
-        };
-        Some((Facet::new((self.distribution, self.alpha), [wo, wi, side], index), by_eta))
-    }
-
     /// The normal on the side of a direction, and the index beyond over the one on that side.
     #[inline]
     pub(super) fn seen_from(&self, from: Vec3, n: Vec3) -> Option<(Vec3, f64)> {
@@ -256,8 +191,55 @@ impl RoughDielectric {
             None
         }
     }
+}
 
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+impl Isotropic for RoughDielectric {
+    #[inline]
+    fn by_angles<T: Real>(&self, numbers: impl Numbers<T>, a: &Angles<T>) -> Rgb<T> {
+        let eta = numbers.number(Property::Eta, self.eta);
+        let Some(passage) = Passage::new(a, eta) else { return Rgb::splat(T::zero()) };
+        let alpha = numbers.number(Property::Alpha, self.alpha);
+        let facets = self.distribution.facets(&passage.a, passage.index(), alpha);
+        self.value_of(numbers, &passage, facets)
+    }
+}
+
+impl Model for RoughDielectric {
+    fn name(&self) -> &'static str {
+        "roughdielectric"
+    }
+
+    #[inline]
+    fn flags(&self) -> Flags {
+        Flags {
+            black: false,
+            black_from_behind: false,
+            transmissive: true,
+            smooth: false,
+            straight: false,
+            oriented: false,
+            differentiable: true,
+        }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Normal
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        const {
+            PropertySet::new(&[
+                Property::SpecularReflectance,
+                Property::SpecularTransmittance,
+                Property::Alpha,
+                Property::Eta,
+            ])
+        }
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
             Property::Alpha => Some(Slot::Scalar(&mut self.alpha)),
             Property::Eta => Some(Slot::Scalar(&mut self.eta)),
@@ -267,12 +249,70 @@ impl RoughDielectric {
         }
     }
 
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+    fn validate(&self) -> Result<(), SurfaceError> {
         in_range(Property::Alpha, self.alpha, self.alpha >= LEAST_ALPHA, "at least 1e-4")?;
         let contrast = (self.eta - 1.0).abs();
         let allowed = self.eta > 0.0 && contrast >= LEAST_CONTRAST;
         in_range(Property::Eta, self.eta, allowed, "positive and not 1 (use a null BSDF there)")?;
         nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
         nonnegative(Property::SpecularTransmittance, self.specular_transmittance)
+    }
+
+    #[inline]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        _: At<'_>,
+        [wo, wi, n]: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        self.by_angles(numbers, &Angles::new(wo, wi, n))
+    }
+
+    #[inline]
+    fn gradient(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_angles::<{ ANGLES + 4 }>(self, [wo, wi, n])
+    }
+
+    #[inline]
+    fn sample(&self, _: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+        let (n, eta) = self.seen_from(from, n)?;
+        let m = self.distribution.sample_visible(from, n, self.alpha, [u[0], u[1]]);
+        self.sample_by(m, from, n, eta, u[2])
+    }
+
+    #[inline]
+    fn pdf(&self, _: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        let Some(passage) = Passage::new(&Angles::new(from, to, n), self.eta) else { return 0.0 };
+        let Passage { a, .. } = &passage;
+        let index = passage.index();
+        self.pdf_of(&passage, || self.distribution.visible_density(a, index, self.alpha))
+    }
+
+    #[inline]
+    fn facet(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<(Facet, f64)> {
+        let (side, eta) = self.seen_from(wo, n)?;
+        let index = (side.dot(wi) < 0.0).then_some(eta);
+        let by_eta = match index {
+            None => 0.0,
+            Some(_) if side == n => 1.0,
+            Some(eta) => -eta * eta,
+        };
+        Some((Facet::new((self.distribution, self.alpha), [wo, wi, side], index), by_eta))
+    }
+
+    fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let (n, eta) = if n.dot(wo) >= 0.0 { (n, self.eta) } else { (-n, self.eta.recip()) };
+        let facet = SeenFacet::new(wo, n, self.distribution, self.alpha);
+        let cosines = [facet.cos, n.dot(wo).clamp(1e-6, 1.0)];
+        let fresnel = 0.5 * cosines.map(|cos| dielectric_reflected(cos, eta)).iter().sum::<f64>();
+        let reflected = self.specular_reflectance.mean() * fresnel;
+        let refracted = self.specular_transmittance.mean() * (1.0 - fresnel) / (eta * eta);
+        let lobes =
+            [reflection(wo, n, self.alpha, reflected), facet.refraction(wo, eta, refracted)];
+        Lobes::glossy(0.0, lobes)
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
+        self.alpha
     }
 }

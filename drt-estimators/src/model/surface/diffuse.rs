@@ -1,16 +1,20 @@
 use core::f64::consts::FRAC_1_PI;
 
+use drt_geom::edges::Lobes;
 use drt_math::{Frame, Real, Rgb, Vec3, warp};
 
-use crate::model::surface::angles::{Angles, Slopes};
+use crate::model::surface::angles::{ANGLES, Angles, Isotropic, by_angles};
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, nonnegative};
+use crate::model::surface::{At, BsdfGradient, Given};
 
 /// A Lambertian reflector: `fs = reflectance / pi` in front, black from behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Diffuse<T = f64> {
+pub struct Diffuse {
     /// Part of the incident power that is reflected; default 0.5.
-    pub reflectance: Rgb<T>,
+    pub reflectance: Rgb,
 }
 
 impl Default for Diffuse {
@@ -19,47 +23,87 @@ impl Default for Diffuse {
     }
 }
 
-impl<T: Real> Diffuse<T> {
+impl Isotropic for Diffuse {
     #[inline]
-    pub(super) fn value(&self, a: &Angles<T>) -> Rgb<T> {
+    fn by_angles<T: Real>(&self, numbers: impl Numbers<T>, a: &Angles<T>) -> Rgb<T> {
         if !a.in_front() {
             return Rgb::splat(T::zero());
         }
-        self.reflectance * (a.cos_i * FRAC_1_PI)
+        numbers.colour(Property::Reflectance, self.reflectance) * (a.cos_i * FRAC_1_PI)
     }
 }
 
-impl Diffuse {
+impl Model for Diffuse {
+    fn name(&self) -> &'static str {
+        "diffuse"
+    }
+
     #[inline]
-    pub(super) fn slopes(&self, a: &Angles) -> Slopes {
-        let mut s = Slopes::default();
-        if a.in_front() {
-            s.value = self.value(a);
-            s.cos_i = self.reflectance * FRAC_1_PI;
-            s.params.reflectance = Rgb::splat(a.cos_i * FRAC_1_PI);
+    fn flags(&self) -> Flags {
+        Flags {
+            black: self.reflectance.is_zero(),
+            black_from_behind: true,
+            transmissive: false,
+            smooth: false,
+            straight: false,
+            oriented: false,
+            differentiable: true,
         }
-        s
     }
 
     #[inline]
-    pub(super) fn pdf(&self, a: &Angles) -> f64 {
-        if a.in_front() { a.cos_i * FRAC_1_PI } else { 0.0 }
+    fn dependence(&self) -> Dependence {
+        Dependence::Normal
     }
 
     #[inline]
-    pub(super) fn sample(&self, from: Vec3, n: Vec3, u: [f64; 3]) -> Option<Vec3> {
-        (n.dot(from) > 0.0)
-            .then(|| Frame::from_normal(n).to_world(warp::cosine_hemisphere([u[0], u[1]])))
+    fn differentiated(&self) -> PropertySet {
+        const { PropertySet::new(&[Property::Reflectance]) }
     }
 
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
             Property::Reflectance => Some(Slot::Color(&mut self.reflectance)),
             _ => None,
         }
     }
 
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+    fn validate(&self) -> Result<(), SurfaceError> {
         nonnegative(Property::Reflectance, self.reflectance)
+    }
+
+    #[inline]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        _: At<'_>,
+        [wo, wi, n]: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        self.by_angles(numbers, &Angles::new(wo, wi, n))
+    }
+
+    #[inline]
+    fn gradient(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_angles::<{ ANGLES + 1 }>(self, [wo, wi, n])
+    }
+
+    #[inline]
+    fn sample(&self, _: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+        (n.dot(from) > 0.0)
+            .then(|| Frame::from_normal(n).to_world(warp::cosine_hemisphere([u[0], u[1]])))
+    }
+
+    #[inline]
+    fn pdf(&self, _: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        let a = Angles::new(from, to, n);
+        if a.in_front() { a.cos_i * FRAC_1_PI } else { 0.0 }
+    }
+
+    fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
+        Lobes::even(self.reflectance.mean() * FRAC_1_PI)
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
+        1.0
     }
 }

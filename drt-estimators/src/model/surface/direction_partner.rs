@@ -41,18 +41,18 @@ pub(crate) struct DirectionPartner {
 /// The part of the logarithmic derivative of a scattering function that is due to the density of microfacets.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turn {
-    /// By the direction `wo`.
+    /// Its gradient by the direction `wo`.
     pub(crate) wo: Vec3,
-    /// By the direction `wi`.
+    /// Its gradient by the direction `wi`.
     pub(crate) wi: Vec3,
-    /// By the shading normal.
+    /// Its gradient by the shading normal.
     pub(crate) n: Vec3,
-    /// By the index of refraction.
+    /// Its derivative by the index of refraction.
     pub(crate) eta: f64,
 }
 
 impl DirectionPartner {
-    /// Of a scattering at a surface with the normal `n`; `by_eta` is the rate of its index by that of the material.
+    /// The partner in a scattering at a surface with the normal `n`; `by_eta` is the rate of its index by that of the material.
     pub(super) fn new(facet: &Facet, n: Vec3, by_eta: f64) -> Option<Self> {
         let slope = facet.slope()?;
         let other_m = facet.tilted(-slope);

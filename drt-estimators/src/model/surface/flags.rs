@@ -2,10 +2,28 @@
 
 use drt_geom::Mesh;
 
+use crate::model::surface::kinds::each;
+use crate::model::surface::model::{Dependence, Flags, Model};
 use crate::model::surface::shading_frame::frames_jump_on;
 use crate::model::surface::{Bsdf, Property};
 
 impl Bsdf {
+    /// What a model states of itself.
+    #[inline(always)]
+    pub(super) fn flags(&self) -> Flags {
+        each!(self, b => b.flags())
+    }
+
+    #[inline(always)]
+    fn dependence(&self) -> Dependence {
+        each!(self, b => b.dependence())
+    }
+
+    /// The BSDFs that this one is made of.
+    pub(super) fn parts(&self) -> impl Iterator<Item = &Self> {
+        each!(self, b => b.parts()).into_iter().flatten()
+    }
+
     /// True for the border of a medium that light crosses unchanged.
     #[inline]
     #[must_use]
@@ -13,49 +31,22 @@ impl Bsdf {
         matches!(self, Self::Null)
     }
 
-    /// True of a model that is the same everywhere and on both sides of its normal.
+    /// True of a model that is the same everywhere and in all directions about its normal.
     #[inline]
     pub(crate) fn is_plain(&self) -> bool {
-        matches!(
-            self,
-            Self::Null
-                | Self::Diffuse(_)
-                | Self::Phong(_)
-                | Self::RoughConductor(_)
-                | Self::RoughDielectric(_)
-                | Self::Plastic(_)
-        )
+        self.dependence() == Dependence::Normal
     }
 
     /// True when nothing is scattered, as of now: a null interface, or no reflectance on any side.
+    #[inline]
     #[must_use]
     pub(crate) fn is_black(&self) -> bool {
-        match self {
-            Self::Null => true,
-            Self::Diffuse(d) => d.reflectance.is_zero(),
-            Self::Textured(t) => t.bsdf.is_black(),
-            Self::TwoSided(t) => t.front.is_black() && t.back.as_ref().is_none_or(Self::is_black),
-            Self::Blend(b) => b.bsdfs.iter().all(Self::is_black),
-            Self::Perturbed(b) => b.bsdf.is_black(),
-            _ => false,
-        }
+        self.flags().black
     }
 
     /// True when nothing is scattered where both directions are on the back of the surface.
     pub(crate) fn is_black_from_behind(&self) -> bool {
-        match self {
-            Self::Diffuse(_)
-            | Self::Phong(_)
-            | Self::RoughConductor(_)
-            | Self::Plastic(_)
-            | Self::Conductor(_)
-            | Self::RoughDiffuse(_)
-            | Self::Ward(_)
-            | Self::Measured(_) => true,
-            Self::Textured(b) => b.bsdf.is_black_from_behind(),
-            Self::Blend(b) => b.bsdfs.iter().all(Self::is_black_from_behind),
-            _ => false,
-        }
+        self.flags().black_from_behind
     }
 
     /// True when light is scattered through the surface, to the other side; not for [`Bsdf::Null`],
@@ -63,86 +54,37 @@ impl Bsdf {
     #[inline]
     #[must_use]
     pub fn is_transmissive(&self) -> bool {
-        match self {
-            Self::RoughDielectric(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
-            Self::Null
-            | Self::Diffuse(_)
-            | Self::Phong(_)
-            | Self::RoughConductor(_)
-            | Self::Plastic(_)
-            | Self::Conductor(_) => false,
-            _ => self.is_any_transmissive(),
-        }
-    }
-
-    /// Of BSDFs that are no plain models.
-    #[cold]
-    fn is_any_transmissive(&self) -> bool {
-        match self {
-            Self::PrincipledThin(_) => true,
-            Self::Principled(b) => b.is_transmissive(),
-            Self::Anisotropic(b) => b.base.is_transmissive(),
-            // A texture may stand for how much goes through.
-            Self::Textured(b) => {
-                b.bsdf.is_transmissive() || b.texture(Property::SpecTrans).is_some()
-            }
-            _ => self.inner().any(Self::is_transmissive),
-        }
+        self.flags().transmissive
     }
 
     /// True where light is scattered into single directions, past which nothing that moves is differentiated.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
-        match self {
-            Self::Conductor(_) | Self::Dielectric(_) | Self::ThinDielectric(_) => true,
-            Self::Plastic(b) => b.is_smooth(),
-            Self::Coated(b) if b.coating.facets().is_none() => true,
-            _ => self.inner().any(Self::is_smooth),
-        }
+        self.flags().smooth
     }
 
     /// True where some light goes straight on, as through nothing.
+    #[inline]
     pub(crate) fn passes_straight(&self) -> bool {
-        match self {
-            Self::Mask(_) | Self::ThinDielectric(_) => true,
-            _ => self.inner().any(Self::passes_straight),
-        }
+        self.flags().straight
     }
 
     /// True where the value may depend on the place of its point.
     #[inline]
     pub(crate) fn varies(&self) -> bool {
-        matches!(self, Self::Textured(_) | Self::Blend(_) | Self::TwoSided(_) | Self::Coated(_))
+        self.dependence() == Dependence::Point
     }
 
     /// True where directions along the surface are told apart, by its texture coordinates.
     pub(crate) fn is_oriented(&self) -> bool {
-        match self {
-            Self::Diffuse(_) | Self::Phong(_) | Self::RoughConductor(_) | Self::Plastic(_) => false,
-            Self::Anisotropic(_) | Self::Perturbed(_) => true,
-            Self::Principled(b) => b.anisotropic != 0.0,
-            Self::PrincipledThin(b) => b.anisotropic != 0.0,
-            Self::Measured(b) => b.is_oriented(),
-            Self::Ward(b) => b.alpha[0] != b.alpha[1],
-            Self::Textured(b)
-                if [Property::Anisotropic, Property::AlphaU, Property::AlphaV]
-                    .into_iter()
-                    .any(|p| b.texture(p).is_some()) =>
-            {
-                true
-            }
-            _ => self.inner().any(Self::is_oriented),
-        }
+        self.flags().oriented
     }
 
     /// The name of the first BSDF in this one that nothing which moves is differentiated at: it jumps where no term samples it, or its
     /// normals follow motions in ways that no term knows.
     pub(crate) fn undifferentiable(&self) -> Option<&'static str> {
-        match self {
-            Self::Mask(_) | Self::Perturbed(_) => Some(self.name()),
-            Self::Measured(b) if !b.is_continuous() => Some(self.name()),
-            _ => self.inner().find_map(Self::undifferentiable),
-        }
+        let lost = !self.flags().differentiable;
+        lost.then(|| self.parts().find_map(Self::undifferentiable).unwrap_or(self.name()))
     }
 
     /// The first property whose texture changes the value in ways that have no derivative.
@@ -152,20 +94,19 @@ impl Bsdf {
                 let mut properties = b.textures.iter().map(|(p, _)| *p);
                 properties.find(|p| self.undifferentiated(*p).is_some())
             }
-            _ => self.inner().find_map(Self::undifferentiated_texture),
+            _ => self.parts().find_map(Self::undifferentiated_texture),
         }
     }
 
     /// True where textures jump on a mesh, or frames that follow texture coordinates.
     pub(crate) fn is_discontinuous_on(&self, mesh: &Mesh) -> bool {
-        match self {
-            Self::Textured(b) if b.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh)) => true,
-            Self::Anisotropic(_)
-            | Self::Principled(_)
-            | Self::PrincipledThin(_)
-            | Self::Ward(_)
-            | Self::Measured(_) => self.is_oriented() && frames_jump_on(mesh),
-            _ => self.inner().any(|b| b.is_discontinuous_on(mesh)),
+        match self.dependence() {
+            Dependence::Normal => false,
+            Dependence::Frame => self.is_oriented() && frames_jump_on(mesh),
+            Dependence::Point => {
+                each!(self, b => b.jumps_on(mesh))
+                    || self.parts().any(|b| b.is_discontinuous_on(mesh))
+            }
         }
     }
 }

@@ -1,8 +1,5 @@
 //! BSDFs that tell directions along the surface apart.
 //!
-//! Their derivatives are those of dual numbers: by both directions, the normal, and every number that has an entry in
-//! [`BsdfParams`]. The channels of a colour share a lane, as no channel of a value depends on another one of it.
-//!
 //! The tangent t that a frame follows counts by its angle about the normal n alone. Turning both directions, n and t about n
 //! together by an angle φ changes nothing, so that what turns t alone is the opposite of what turns the rest:
 //!
@@ -12,63 +9,55 @@
 //!
 //! with s the unit vector along t in the surface ([`by_corners`]).
 
-use drt_math::{Dual, Real, Rgb, RgbVec, Vec3, vec3};
+use drt_math::{Real, Rgb, RgbVec, Vec3};
 
-use crate::model::surface::composed::Composed;
-use crate::model::surface::property::Property;
+use crate::model::surface::At;
+use crate::model::surface::model::{Model, Numbers};
 use crate::model::surface::shading_frame::{by_coordinates, shading_frame};
-use crate::model::surface::{At, BsdfGradient, BsdfParams, Given};
 use crate::model::texture::TexturePoint;
 
-/// A BSDF in the frame of its surface, that of [`shading_frame`]: the normal is along z.
-pub(super) trait Framed {
-    /// The value times the cosine at the light's direction, with what `number` makes of each number of a property.
-    fn value<T: Real>(
-        &self,
-        number: impl Fn(Property, f64) -> T,
-        wo: Vec3<T>,
-        wi: Vec3<T>,
-    ) -> Rgb<T>;
+/// A model in the frame of its surface, that of [`shading_frame`]: the normal is along z.
+pub(super) trait Framed: Model {
+    /// The value times the cosine at the light's direction, over any scalar.
+    fn in_frame<T: Real>(&self, numbers: impl Numbers<T>, wo: Vec3<T>, wi: Vec3<T>) -> Rgb<T>;
 
     /// Draws the direction that `from` is scattered to.
     fn direction(&self, from: Vec3, u: [f64; 3]) -> Option<Vec3>;
 
-    /// The density of that.
+    /// The density with which `direction` draws the direction `to`.
     fn density(&self, from: Vec3, to: Vec3) -> f64;
-
-    /// About how wide the narrowest lobe is, in slopes.
-    fn narrowest(&self) -> f64;
 }
 
-/// First of the lanes of properties, after those of two directions and the normal.
-const FIRST: usize = 9;
-type Lanes = Dual<f64, { FIRST + BsdfParams::ENTRIES }>;
+/// The value of a model in the frame that a point has.
+#[inline(always)]
+pub(super) fn value<T: Real>(
+    model: &impl Framed,
+    numbers: impl Numbers<T>,
+    at: At<'_>,
+    [wo, wi, n]: [Vec3<T>; 3],
+) -> Rgb<T> {
+    let frame = shading_frame(at, n);
+    model.in_frame(numbers, frame.to_local(wo), frame.to_local(wi))
+}
 
-/// The gradient of a value in the frame of its surface, with respect to the directions, the normal that the frame is about, and
-/// properties.
-fn gradient_in_frame(at: At<'_>, [wo, wi, n]: [Vec3; 3], bsdf: &impl Framed) -> BsdfGradient {
-    let variable = |v: Vec3, first: usize| {
-        let [x, y, z] = v.to_array();
-        vec3(
-            Lanes::variable(x, first),
-            Lanes::variable(y, first + 1),
-            Lanes::variable(z, first + 2),
-        )
-    };
-    let number = |property, value| match BsdfParams::entry(property) {
-        Some(entry) => Lanes::variable(value, FIRST + entry),
-        None => Lanes::from(value),
-    };
-    let frame = shading_frame(at, variable(n, 6));
-    let value =
-        bsdf.value(number, frame.to_local(variable(wo, 0)), frame.to_local(variable(wi, 3)));
-    let lane = |k: usize| value.map(|c| c.eps[k]);
-    let by = |first: usize| {
-        let axis = |k: usize| lane(first + k);
-        axis(0).outer(Vec3::X) + axis(1).outer(Vec3::Y) + axis(2).outer(Vec3::Z)
-    };
-    let params = BsdfParams::from_entries(core::array::from_fn(|k| lane(FIRST + k)));
-    BsdfGradient { value: value.map(|c| c.re), wo: by(0), wi: by(3), n: by(6), params }
+/// Draws a direction in that frame.
+#[inline(never)]
+pub(super) fn sample(
+    model: &impl Framed,
+    at: At<'_>,
+    from: Vec3,
+    n: Vec3,
+    u: [f64; 3],
+) -> Option<Vec3> {
+    let frame = shading_frame(at, n);
+    Some(frame.to_world(model.direction(frame.to_local(from), u)?))
+}
+
+/// The density with which `sample` draws the direction `to`.
+#[inline(never)]
+pub(super) fn pdf(model: &impl Framed, at: At<'_>, from: Vec3, to: Vec3, n: Vec3) -> f64 {
+    let frame = shading_frame(at, n);
+    model.density(frame.to_local(from), frame.to_local(to))
 }
 
 /// The gradient of a value by the corners of its triangle, as far as these turn the frame about the normal `n`. `others` are the
@@ -90,29 +79,4 @@ pub(crate) fn by_corners(at: &TexturePoint<'_>, n: Vec3, others: &[(Vec3, RgbVec
     let by_angle = others.iter().fold(Rgb::ZERO, |sum, (w, by)| sum - by.dot(n.cross(*w)));
     let by_tangent = by_angle.outer(n.cross(along) * (1.0 / (length2 * determinant)));
     [v1 - v2, v2, -v1].map(|share| by_tangent * share)
-}
-
-impl<B: Framed> Composed for B {
-    fn eval(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
-        let frame = shading_frame(at, n);
-        self.value(|_, v| v, frame.to_local(wo), frame.to_local(wi))
-    }
-
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        gradient_in_frame(at, [wo, wi, n], self)
-    }
-
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        let frame = shading_frame(at, n);
-        Some(frame.to_world(self.direction(frame.to_local(from), u)?))
-    }
-
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        let frame = shading_frame(at, n);
-        self.density(frame.to_local(from), frame.to_local(to))
-    }
-
-    fn lobe_width(&self, _: At<'_>) -> f64 {
-        self.narrowest()
-    }
 }

@@ -68,7 +68,8 @@ impl LocalBsdf<'_> {
     /// material, of the weight that [`Self::sample_specular`] gives it.
     #[inline(always)]
     pub(crate) fn gradient(&self, wo: Vec3, wi: Vec3) -> (BsdfGradient, RgbVec) {
-        if let Some(params) = self.bsdf.specular_gradient(self.at.as_ref(), wo, wi, self.ns) {
+        let single = self.bsdf.specular(self.at.as_ref(), wo, wi, self.ns);
+        if let Some(params) = single.and_then(|found| found.of_weight()) {
             return (BsdfGradient { params, ..BsdfGradient::default() }, RgbVec::ZERO);
         }
         let mut d = self.bsdf.gradient_at(self.at.as_ref(), wo, wi, self.ns);
@@ -80,9 +81,7 @@ impl LocalBsdf<'_> {
             d.n = d.n * factor + by_wo.outer(wo);
             d.wi = d.wi * factor + by_wi.outer(self.ng);
             by_ng = by_wi.outer(wi);
-            let mut params = BsdfParams::default();
-            params.scatter(&d.params, Rgb::splat(factor));
-            d.params = params;
+            d.params = d.params.scaled(Rgb::splat(factor));
             d.value *= factor;
         }
         (d, by_ng)

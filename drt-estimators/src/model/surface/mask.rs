@@ -1,11 +1,15 @@
-use drt_math::{Rgb, Vec3};
+use drt_geom::edges::Lobes;
+use drt_math::{Real, Rgb, Vec3};
 
-use crate::model::surface::composed::Composed;
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::params::PropertySet;
+use crate::model::surface::principled::ends_of;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
 use crate::model::surface::specular::same;
 use crate::model::surface::{
-    At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
+    At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue, Textured,
 };
+use crate::model::texture::Texture;
 
 /// A surface that is there with a probability, its opacity: Mitsuba's `mask`. Else light goes straight through, as through
 /// nothing.
@@ -24,13 +28,9 @@ impl Mask {
         self.opacity.clamp(0.0, 1.0)
     }
 
-    /// Sets the derivative by the opacity.
-    fn by_opacity(&self, params: &mut BsdfParams, slope: Rgb) {
-        if !has_transmittance(&self.bsdf)
-            && let Some(entry) = params.get_mut(Property::Opacity)
-        {
-            *entry = slope;
-        }
+    /// The derivative by the opacity of what it is a factor of: beyond its range it changes nothing.
+    fn slope(&self, value: Rgb) -> Rgb {
+        if (0.0..=1.0).contains(&self.opacity) { value } else { Rgb::ZERO }
     }
 
     /// A number of (0, 1) that chooses the surface, stretched to (0, 1) again.
@@ -38,54 +38,62 @@ impl Mask {
         let opacity = self.opaque();
         (choice < opacity).then(|| choice / opacity)
     }
+}
 
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+impl Model for Mask {
+    fn name(&self) -> &'static str {
+        "mask"
+    }
+
+    #[inline(never)]
+    fn flags(&self) -> Flags {
+        Flags { black: false, straight: true, differentiable: false, ..self.bsdf.flags() }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Point
+    }
+
+    fn differentiated(&self) -> PropertySet {
+        self.bsdf.differentiated().union(const { PropertySet::new(&[Property::Opacity]) })
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
             Property::Opacity => Some(Slot::Scalar(&mut self.opacity)),
             _ => self.bsdf.property(property),
         }
     }
 
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+    fn validate(&self) -> Result<(), SurfaceError> {
         if self.bsdf.is_null() || self.bsdf.passes_straight() {
             return Err(SurfaceError::CannotHold { outer: "mask", bsdf: self.bsdf.name() });
         }
         in_range(Property::Opacity, self.opacity, true, "a finite number")?;
         self.bsdf.validate()
     }
-}
 
-/// True of what has a property whose entry is that of the opacity: around it only that has a derivative.
-pub(super) fn has_transmittance(bsdf: &Bsdf) -> bool {
-    match bsdf {
-        Bsdf::RoughDielectric(_) | Bsdf::Dielectric(_) | Bsdf::ThinDielectric(_) => true,
-        Bsdf::Anisotropic(_) | Bsdf::Principled(_) | Bsdf::PrincipledThin(_) | Bsdf::Coated(_) => {
-            true
-        }
-        Bsdf::Textured(b) => has_transmittance(&b.bsdf),
-        Bsdf::Perturbed(b) => has_transmittance(&b.bsdf),
-        // Of what is in a blend nothing has a derivative, and what is two-sided lets no light through.
-        _ => false,
-    }
-}
-
-impl Composed for Mask {
-    fn eval(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
-        self.bsdf.eval_at(at, wo, wi, n) * self.opaque()
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        directions: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        let opacity = match self.opaque() {
+            opacity if opacity == self.opacity => numbers.number(Property::Opacity, opacity),
+            beyond => T::from(beyond),
+        };
+        self.bsdf.value(numbers, at, directions) * opacity
     }
 
+    #[inline(never)]
     fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
         let (d, opacity) = (self.bsdf.gradient_at(at, wo, wi, n), self.opaque());
-        let mut params = BsdfParams::default();
-        params.scatter(&d.params, Rgb::splat(opacity));
-        self.by_opacity(&mut params, d.value);
-        BsdfGradient {
-            value: d.value * opacity,
-            wo: d.wo * opacity,
-            wi: d.wi * opacity,
-            n: d.n * opacity,
-            params,
-        }
+        let mut scaled = d.scaled(opacity);
+        scaled.params.set(Property::Opacity, self.slope(d.value));
+        scaled
     }
 
     fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], given: Given) -> Option<Vec3> {
@@ -107,26 +115,54 @@ impl Composed for Mask {
         }
     }
 
-    fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
-        let opacity = self.opaque();
-        if let Some(inner) = self.bsdf.specular(at, wo, wi, n) {
-            let mut found = inner.scaled(Rgb::splat(opacity), opacity);
-            self.by_opacity(&mut found.params, inner.value);
-            return Some(found);
-        }
-        same(-wo, wi).then(|| {
-            let mut params = BsdfParams::default();
-            self.by_opacity(&mut params, Rgb::splat(-1.0));
-            let value = Rgb::splat(1.0 - opacity);
-            SpecularValue { value, params, probability: 1.0 - opacity }
-        })
-    }
-
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
         self.bsdf.pdf_at(at, from, to, n, given) * self.opaque()
     }
 
     fn lobe_width(&self, at: At<'_>) -> f64 {
         self.bsdf.lobe_width(at)
+    }
+
+    fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        let opacity = self.opaque();
+        if let Some(inner) = self.bsdf.specular(at, wo, wi, n) {
+            let mut found = inner.scaled(Rgb::splat(opacity), opacity);
+            found.params.set(Property::Opacity, self.slope(inner.value));
+            return Some(found);
+        }
+        same(-wo, wi).then(|| SpecularValue {
+            value: Rgb::splat(1.0 - opacity),
+            params: BsdfParams::of(Property::Opacity, self.slope(Rgb::splat(-1.0))),
+            probability: 1.0 - opacity,
+        })
+    }
+
+    fn straight(&self, _: At<'_>, _: f64) -> Rgb {
+        Rgb::splat(1.0 - self.opaque())
+    }
+
+    /// No sampler asks for it, as nothing that moves is differentiated at such surfaces.
+    fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
+        Lobes::even(0.0)
+    }
+
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        [Some(&self.bsdf), None]
+    }
+
+    fn texture(&self, property: Property) -> Option<&Texture> {
+        self.bsdf.texture(property)
+    }
+
+    fn undifferentiated(
+        &self,
+        property: Property,
+        textures: Option<&Textured>,
+    ) -> Option<&'static str> {
+        if property != Property::Opacity {
+            return self.bsdf.undifferentiated(property);
+        }
+        let [least, most] = ends_of(self.opacity, property, textures);
+        (least <= 0.0 || most >= 1.0).then_some("at 0 and 1 no path goes where light would")
     }
 }

@@ -35,22 +35,31 @@ mod marginal2d;
 mod tables;
 mod tabulated;
 
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
+use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Real, Rgb, Rng, Vec3, fm, vec3};
 
-use crate::model::surface::framed::Framed;
+use crate::model::surface::framed::{self, Framed};
+use crate::model::surface::lobes::reflection;
 use crate::model::surface::measured::marginal2d::{Grid2d, Marginal2d, Mix};
 pub use crate::model::surface::measured::tables::{MeasuredError, MeasuredTables, Tensor};
 use crate::model::surface::microfacet::mirrored;
-use crate::model::surface::property::Property;
+use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::params::PropertySet;
+use crate::model::surface::property::{Property, Slot, SurfaceError};
+use crate::model::surface::{At, BsdfGradient, Given};
 
 /// Cosine below which light fades.
 const HORIZON: f64 = 0.001;
 
 /// A sine below which a direction is taken to have no azimuth.
 const NO_AZIMUTH: f64 = 1e-9;
+
+/// The part of measured light that is all around.
+const AROUND: f64 = 0.3;
 
 /// How far around the normal values are compared to go on across it, in radians.
 const ACROSS: f64 = 1e-4;
@@ -74,6 +83,7 @@ pub struct Measured {
     /// Parts of a turn that the azimuths stand for.
     reduction: Reduction,
     continuous: bool,
+    oriented: bool,
     /// About as wide as microfacets of this roughness.
     alpha: f64,
     /// Light that returns, by the viewer's angle with the normal.
@@ -94,7 +104,7 @@ enum Reduction {
 
 /// Where a pair of directions is in the tables.
 struct Place<T> {
-    /// Of the viewer.
+    /// The tables that are mixed for the viewer's direction.
     mix: Mix<T>,
     u_o: [T; 2],
     u_m: [T; 2],
@@ -157,10 +167,12 @@ impl Measured {
             jacobian,
             reduction,
             continuous: true,
+            oriented: false,
             alpha: 1.0,
             albedo: [0.0; ALBEDOS],
         };
         new.continuous = new.goes_on_across_ends();
+        new.oriented = new.tells_azimuths_apart();
         new.alpha = new.roughness();
         let angle = |k: usize| (k as f64 + 0.5) * FRAC_PI_2 / ALBEDOS as f64;
         new.albedo = core::array::from_fn(|k| new.light_returned(angle(k)));
@@ -177,16 +189,15 @@ impl Measured {
     /// True where directions along the surface are told apart, by its texture coordinates.
     #[must_use]
     pub fn is_oriented(&self) -> bool {
+        self.oriented
+    }
+
+    fn tells_azimuths_apart(&self) -> bool {
         let same_rows = |g: &Grid2d| {
             let columns = g.size()[1];
             g.values.chunks_exact(columns).all(|row| row == &g.values[..columns])
         };
         self.reduction != Reduction::Isotropic || self.phi_i.len() > 1 || !same_rows(&self.sigma)
-    }
-
-    /// About how rough microfacets are that scatter so.
-    pub(super) fn alpha(&self) -> f64 {
-        self.alpha
     }
 
     /// About how much light returns to a direction at a cosine to the normal.
@@ -195,7 +206,7 @@ impl Measured {
         self.albedo[usize::min(place as usize, ALBEDOS - 1)]
     }
 
-    /// The same pair in the part of a turn that there are numbers for; those of the viewer first.
+    /// The pair turned into the part of a turn that there are numbers for; the viewer's direction is first.
     fn reduced<T: Real>(&self, pair: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let [x, y] = self.signs(pair[0].re());
         pair.map(|w| vec3(w.x * x, w.y * y, w.z))
@@ -275,8 +286,7 @@ impl Measured {
             for _ in 0..256 {
                 let theta = FRAC_PI_2 * rng.next_f64();
                 let viewer = |h: f64| direction(theta, end + h);
-                let Some(i) = self.direction(viewer(1e-9), [rng.next_f64(), rng.next_f64(), 0.0])
-                else {
+                let Some(i) = self.draw(viewer(1e-9), [rng.next_f64(), rng.next_f64(), 0.0]) else {
                     continue;
                 };
                 let [a, b] = [1e-9, -1e-9].map(|h| self.value_at([viewer(h), i]));
@@ -287,7 +297,7 @@ impl Measured {
         off <= 1e-3 * sum
     }
 
-    /// Of visible normals at the steepest view there is, whose density is at most 1/(π α²) for microfacets.
+    /// The roughness of microfacets whose visible normals have the greatest density that there is at the steepest view: 1/(π α²).
     fn roughness(&self) -> f64 {
         let grid = self.vndf.grid();
         let mix = self.mix(f64::from(self.theta_i[0]), f64::from(self.phi_i[0]));
@@ -310,8 +320,8 @@ impl Measured {
         let (mut sum, count) = (0.0, 256);
         for k in 0..count {
             let o = direction(theta, TAU * f64::from(k) / f64::from(count));
-            if let Some(i) = self.direction(o, [rng.next_f64(), rng.next_f64(), 0.0]) {
-                let density = self.density(o, i);
+            if let Some(i) = self.draw(o, [rng.next_f64(), rng.next_f64(), 0.0]) {
+                let density = self.drawn(o, i);
                 if density > 0.0 {
                     sum += self.value_at([o, i]).mean() / density;
                 }
@@ -352,13 +362,38 @@ impl Reduction {
     }
 }
 
-impl Framed for Measured {
-    fn value<T: Real>(
-        &self,
-        _number: impl Fn(Property, f64) -> T,
-        wo: Vec3<T>,
-        wi: Vec3<T>,
-    ) -> Rgb<T> {
+impl Measured {
+    /// Draws a direction in the frame of the surface.
+    fn draw(&self, from: Vec3, u: [f64; 3]) -> Option<Vec3> {
+        if from.z <= 0.0 {
+            return None;
+        }
+        let [o, _] = self.reduced([from; 2]);
+        let [theta_o, phi_o, _] = angles(o);
+        let mix = self.mix(theta_o, phi_o);
+        let [x, y] = self.vndf.sample(&mix, self.luminance.sample(&mix, [u[0], u[1]]));
+        let from_azimuth = if self.reduction == Reduction::Isotropic { phi_o } else { 0.0 };
+        let m = direction(x * x * FRAC_PI_2, (2.0 * y - 1.0) * PI + from_azimuth);
+        let to = mirrored(o, m);
+        let [x, y] = self.signs(from);
+        (to.z > 0.0).then(|| vec3(to.x * x, to.y * y, to.z))
+    }
+
+    /// The density with which `draw` draws the direction `to`.
+    fn drawn(&self, from: Vec3, to: Vec3) -> f64 {
+        let Some(Place { mix, u_m, sin_m, cos_om, .. }) = self.place([from, to]) else {
+            return 0.0;
+        };
+        let s = self.vndf.invert(&mix, u_m);
+        let jacobian = 2.0 * PI * PI * u_m[0] * sin_m * 4.0 * cos_om;
+        let density = self.luminance.density(&mix, s) * self.vndf.density(&mix, u_m);
+        // Finite at the normal, too, a point that nothing is drawn at.
+        density / jacobian.max(1e-30)
+    }
+}
+
+impl Framed for Arc<Measured> {
+    fn in_frame<T: Real>(&self, _: impl Numbers<T>, wo: Vec3<T>, wi: Vec3<T>) -> Rgb<T> {
         if wo.z.re() <= 0.0 || wi.z.re() <= 0.0 {
             return Rgb::splat(T::zero());
         }
@@ -376,32 +411,84 @@ impl Framed for Measured {
     }
 
     fn direction(&self, from: Vec3, u: [f64; 3]) -> Option<Vec3> {
-        if from.z <= 0.0 {
-            return None;
-        }
-        let [o, _] = self.reduced([from; 2]);
-        let [theta_o, phi_o, _] = angles(o);
-        let mix = self.mix(theta_o, phi_o);
-        let [x, y] = self.vndf.sample(&mix, self.luminance.sample(&mix, [u[0], u[1]]));
-        let from_azimuth = if self.reduction == Reduction::Isotropic { phi_o } else { 0.0 };
-        let m = direction(x * x * FRAC_PI_2, (2.0 * y - 1.0) * PI + from_azimuth);
-        let to = mirrored(o, m);
-        let [x, y] = self.signs(from);
-        (to.z > 0.0).then(|| vec3(to.x * x, to.y * y, to.z))
+        self.as_ref().draw(from, u)
     }
 
     fn density(&self, from: Vec3, to: Vec3) -> f64 {
-        let Some(Place { mix, u_m, sin_m, cos_om, .. }) = self.place([from, to]) else {
-            return 0.0;
-        };
-        let s = self.vndf.invert(&mix, u_m);
-        let jacobian = 2.0 * PI * PI * u_m[0] * sin_m * 4.0 * cos_om;
-        let density = self.luminance.density(&mix, s) * self.vndf.density(&mix, u_m);
-        // Finite at the normal, too, a point that nothing is drawn at.
-        density / jacobian.max(1e-30)
+        self.as_ref().drawn(from, to)
+    }
+}
+
+impl Model for Arc<Measured> {
+    fn name(&self) -> &'static str {
+        "measured"
     }
 
-    fn narrowest(&self) -> f64 {
+    #[inline]
+    fn flags(&self) -> Flags {
+        Flags {
+            black: false,
+            black_from_behind: true,
+            transmissive: false,
+            smooth: false,
+            straight: false,
+            oriented: self.oriented,
+            differentiable: self.continuous,
+        }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Frame
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        PropertySet::NONE
+    }
+
+    fn slot(&mut self, _: Property) -> Option<Slot<'_>> {
+        None
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        Ok(())
+    }
+
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        directions: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        framed::value(self, numbers, at, directions)
+    }
+
+    #[inline(never)]
+    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_duals::<{ COORDINATES + 0 }>(
+            self.differentiated(),
+            [wo, wi, n],
+            |numbers, directions| framed::value(self, numbers, at, directions),
+        )
+    }
+
+    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+        framed::sample(self, at, from, n, u)
+    }
+
+    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        framed::pdf(self, at, from, to, n)
+    }
+
+    fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let albedo = self.albedo(n.dot(wo));
+        let lobe = reflection(wo, n, self.alpha, (1.0 - AROUND) * albedo);
+        Lobes::glossy(AROUND * albedo * FRAC_1_PI, [lobe, Lobe::default()])
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
         self.alpha
     }
 }

@@ -30,15 +30,12 @@ pub(super) const LEAST_COS2: f64 = 1e-40;
 /// the smaller root of `0.396 a² - 1.259 a + 1`.
 const UNMASKED: f64 = 1.548_140_7;
 
-/// A scattering by microfacets, without its factors of |h|², and its derivatives.
-///
-/// The half vector is `h = wo + index wi`, where `index` is 1 in reflections.
+/// A reflection by microfacets, without its factor of |h|⁴, and its derivatives.
 pub(super) struct FacetSlopes {
     pub(super) value: f64,
     pub(super) cos_o: f64,
     pub(super) cos_i: f64,
     pub(super) h2: f64,
-    pub(super) index: f64,
     pub(super) alpha: f64,
 }
 
@@ -59,15 +56,14 @@ impl Distribution {
         density * self.masking(a.cos_o, alpha) * (self.masking(cos_i, alpha) * cos_i)
     }
 
-    /// As [`Distribution::facets`], with duals only as wide as each factor needs.
+    /// [`Distribution::facets`] of a reflection, with duals only as wide as each factor needs.
     #[inline]
-    pub(super) fn facet_slopes(self, a: &Angles, index: f64, alpha: f64) -> Option<FacetSlopes> {
+    pub(super) fn facet_slopes(self, a: &Angles, alpha: f64) -> Option<FacetSlopes> {
         type Narrow = Dual<f64, 2>;
         type Wide = Dual<f64, 3>;
-        let contrast = 1.0 - index;
         let density = self.density(
-            Wide::variable(a.cos_o + index * a.cos_i, 0),
-            Wide::variable(contrast * contrast + index * a.h2, 1),
+            Wide::variable(a.cos_o + a.cos_i, 0),
+            Wide::variable(a.h2, 1),
             Wide::variable(alpha, 2),
         );
         if density.re == 0.0 {
@@ -83,9 +79,8 @@ impl Distribution {
         Some(FacetSlopes {
             value: d * o * i,
             cos_o: by_n_dot_h + d * i * masking_o.eps[0],
-            cos_i: by_n_dot_h * index + d * o * masked_i.eps[0],
-            h2: by_h2 * index,
-            index: by_n_dot_h * a.cos_i + by_h2 * (a.h2 - 2.0 * contrast),
+            cos_i: by_n_dot_h + d * o * masked_i.eps[0],
+            h2: by_h2,
             alpha: by_alpha + d * (i * masking_o.eps[1] + o * masked_i.eps[1]),
         })
     }

@@ -1,10 +1,13 @@
-use drt_math::{Frame, Rgb, Vec3, fm, vec3};
+use drt_geom::Mesh;
+use drt_geom::edges::Lobes;
+use drt_math::{Dual, Frame, Real, Rgb, RgbVec, Vec3, vec3};
 
-use crate::model::surface::composed::Composed;
-use crate::model::surface::property::SurfaceError;
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::params::PropertySet;
+use crate::model::surface::property::{Property, Slot, SurfaceError};
 use crate::model::surface::shading_frame::{by_coordinates, is_front, shading_frame};
 use crate::model::surface::{
-    At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
+    At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue, Textured,
 };
 use crate::model::texture::{Texture, TexturePoint};
 
@@ -96,25 +99,16 @@ impl Facet<'_> {
         self.normal.dot(w) * self.surface.dot(w) > 0.0
     }
 
-    /// The factor of light from `wi`, and its derivative by the cosine there.
-    fn shadowing(&self, wi: Vec3) -> (f64, f64) {
-        let cos = self.surface.dot(wi);
+    /// The factor of light from a direction at a cosine to the surface's normal.
+    fn shadowed<T: Real>(&self, cos: T) -> T {
         let alpha2 = f64::min(0.125 * self.tan2, 1.0);
-        let tan2 = (1.0 / (cos * cos) - 1.0).max(0.0);
-        let root = fm::sqrt(1.0 + alpha2 * tan2);
-        let by_root = -2.0 / ((1.0 + root) * (1.0 + root));
-        (2.0 / (1.0 + root), by_root * -alpha2 / (cos * cos * cos * root))
+        let tan2 = (cos.squared().recip() - 1.0).max(T::zero());
+        let root = (tan2 * alpha2 + 1.0).sqrt();
+        T::from(2.0) / (root + 1.0)
     }
 }
 
 impl Perturbed {
-    pub(super) fn name(&self) -> &'static str {
-        match self.perturbation {
-            Perturbation::Normals => "normalmap",
-            Perturbation::Heights(_) => "bumpmap",
-        }
-    }
-
     fn tilt<'a>(&self, at: &TexturePoint<'a>, n: Vec3) -> Tilt<'a> {
         // Maps tell normals of the front; behind, they are turned over with the surface's.
         let front = if is_front(at, n) { n } else { -n };
@@ -146,11 +140,43 @@ impl Perturbed {
         ([tilt.facet(false), tilt.facet(true)], self.flip_invalid_normals)
     }
 
+    /// The factor of light from `wi`, and its derivative by the cosine.
     fn shadowing(&self, facet: &Facet<'_>, wi: Vec3) -> (f64, f64) {
-        if self.use_shadowing_function { facet.shadowing(wi) } else { (1.0, 0.0) }
+        if !self.use_shadowing_function {
+            return (1.0, 0.0);
+        }
+        let factor = facet.shadowed(Dual::<f64, 1>::variable(facet.surface.dot(wi), 0));
+        (factor.re, factor.eps[0])
+    }
+}
+
+impl Model for Perturbed {
+    fn name(&self) -> &'static str {
+        match self.perturbation {
+            Perturbation::Normals => "normalmap",
+            Perturbation::Heights(_) => "bumpmap",
+        }
     }
 
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
+    #[inline(never)]
+    fn flags(&self) -> Flags {
+        Flags { oriented: true, differentiable: false, ..self.bsdf.flags() }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Point
+    }
+
+    fn differentiated(&self) -> PropertySet {
+        self.bsdf.differentiated()
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        self.bsdf.property(property)
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
         if self.bsdf.is_null() || self.bsdf.passes_straight() {
             return Err(SurfaceError::CannotHold { outer: self.name(), bsdf: self.bsdf.name() });
         }
@@ -161,20 +187,29 @@ impl Perturbed {
         }
         self.bsdf.validate()
     }
-}
 
-impl Composed for Perturbed {
-    fn eval(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Rgb {
-        let Some(at) = at else { return self.bsdf.eval_at(None, wo, wi, n) };
-        let tilt = self.tilt(at, n);
-        let facet = self.seen_from(&tilt, wo);
-        if !facet.sees(wi) {
-            return Rgb::ZERO;
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        [wo, wi, n]: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        let Some(at) = at else { return self.bsdf.value(numbers, None, [wo, wi, n]) };
+        let tilt = self.tilt(at, n.re());
+        let facet = self.seen_from(&tilt, wo.re());
+        if !facet.sees(wi.re()) {
+            return Rgb::splat(T::zero());
         }
-        self.bsdf.eval_at(Some(&facet.at()), wo, wi, facet.normal) * self.shadowing(&facet, wi).0
+        let value = self.bsdf.value(numbers, Some(&facet.at()), [wo, wi, facet.normal.lift()]);
+        if !self.use_shadowing_function {
+            return value;
+        }
+        value * facet.shadowed(facet.surface.lift().dot(wi))
     }
 
     /// With respect to the surface's normal there is none: nothing that moves is differentiated here.
+    #[inline(never)]
     fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
         let Some(at) = at else { return self.bsdf.gradient_at(None, wo, wi, n) };
         let tilt = self.tilt(at, n);
@@ -184,15 +219,10 @@ impl Composed for Perturbed {
         }
         let d = self.bsdf.gradient_at(Some(&facet.at()), wo, wi, facet.normal);
         let (shadowing, by_cos) = self.shadowing(&facet, wi);
-        let mut params = BsdfParams::default();
-        params.scatter(&d.params, Rgb::splat(shadowing));
-        BsdfGradient {
-            value: d.value * shadowing,
-            wo: d.wo * shadowing,
-            wi: d.wi * shadowing + (d.value * by_cos).outer(n),
-            params,
-            ..BsdfGradient::default()
-        }
+        let mut scaled = d.scaled(shadowing);
+        scaled.wi += (d.value * by_cos).outer(n);
+        scaled.n = RgbVec::ZERO;
+        scaled
     }
 
     fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], given: Given) -> Option<Vec3> {
@@ -267,5 +297,32 @@ impl Composed for Perturbed {
 
     fn lobe_width(&self, at: At<'_>) -> f64 {
         self.bsdf.lobe_width(at)
+    }
+
+    /// No sampler asks for it, as nothing that moves is differentiated at such surfaces.
+    fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
+        Lobes::even(0.0)
+    }
+
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        [Some(&self.bsdf), None]
+    }
+
+    fn texture(&self, property: Property) -> Option<&Texture> {
+        self.bsdf.texture(property)
+    }
+
+    fn undifferentiated(&self, property: Property, _: Option<&Textured>) -> Option<&'static str> {
+        self.bsdf.undifferentiated(property)
+    }
+
+    fn validate_on(&self, mesh: &Mesh) -> Result<(), SurfaceError> {
+        match self.map.bounds_on(mesh) {
+            Some(_) => Ok(()),
+            None => {
+                let name = self.map.attribute().unwrap_or_default().into();
+                Err(SurfaceError::NoAttribute { name })
+            }
+        }
     }
 }

@@ -1,9 +1,14 @@
 use core::f64::consts::{FRAC_1_PI, PI};
 
+use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Frame, Real, Rgb, Vec3, fm, vec3, warp};
 
-use crate::model::surface::angles::{Angles, Slopes};
+use crate::model::surface::angles::{ANGLES, Angles, Isotropic, by_angles};
+use crate::model::surface::microfacet::mirrored;
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
+use crate::model::surface::{At, BsdfGradient, Given};
 
 /// The modified Phong reflector of Lafortune & Willems 1994, "Using the modified Phong reflectance
 /// model for physically based rendering": in front
@@ -14,13 +19,13 @@ use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, no
 /// It conserves energy when `reflectance + specular_reflectance <= 1`; this is not enforced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Phong<T = f64> {
+pub struct Phong {
     /// Weight of the diffuse lobe; default 0.5.
-    pub reflectance: Rgb<T>,
+    pub reflectance: Rgb,
     /// Weight of the glossy lobe; default 0.2.
-    pub specular_reflectance: Rgb<T>,
+    pub specular_reflectance: Rgb,
     /// Sharpness of the glossy lobe, above 0; default 30.
-    pub exponent: T,
+    pub exponent: f64,
 }
 
 impl Default for Phong {
@@ -32,17 +37,6 @@ impl Default for Phong {
 /// Least probability of choosing either lobe: a lobe of weight zero still has a derivative with
 /// respect to that weight.
 const LEAST_CHOICE: f64 = 0.1;
-
-impl<T: Real> Phong<T> {
-    #[inline]
-    pub(super) fn value(&self, a: &Angles<T>) -> Rgb<T> {
-        if !a.in_front() {
-            return Rgb::splat(T::zero());
-        }
-        let lobe = glossy_lobe(mirror_cosine(a), self.exponent);
-        (self.reflectance * T::from(FRAC_1_PI) + self.specular_reflectance * lobe) * a.cos_i
-    }
-}
 
 /// Cosine between one direction and the mirror image of the other: `2 (n·wo)(n·wi) - wo·wi`.
 #[inline]
@@ -60,50 +54,101 @@ fn glossy_lobe<T: Real>(cos: T, exponent: T) -> T {
 
 impl Phong {
     #[inline]
-    pub(super) fn slopes(&self, a: &Angles) -> Slopes {
-        let mut s = Slopes::default();
-        if !a.in_front() {
-            return s;
-        }
-        let cos = mirror_cosine(a);
-        let lobe = glossy_lobe(cos, self.exponent);
-        let f = self.reflectance * FRAC_1_PI + self.specular_reflectance * lobe;
-        s.value = f * a.cos_i;
-        s.cos_i = f;
-        s.params.reflectance = Rgb::splat(a.cos_i * FRAC_1_PI);
-        if lobe > 0.0 {
-            let glossy = self.specular_reflectance * (lobe * a.cos_i);
-            let along_cos = glossy * (self.exponent / cos);
-            s.cos_o = along_cos * (2.0 * a.cos_i);
-            s.cos_i += along_cos * (2.0 * a.cos_o);
-            s.h2 = along_cos * -0.5;
-            s.params.specular_reflectance = Rgb::splat(lobe * a.cos_i);
-            s.params.exponent = glossy * ((self.exponent + 2.0).recip() + fm::ln(cos));
-        }
-        s
-    }
-
-    #[inline]
     fn glossy_choice(&self) -> f64 {
         let (diffuse, glossy) = (self.reflectance.mean(), self.specular_reflectance.mean());
         let sum = diffuse + glossy;
         let share = if sum > 0.0 { glossy / sum } else { 0.5 };
         share.clamp(LEAST_CHOICE, 1.0 - LEAST_CHOICE)
     }
+}
 
+impl Isotropic for Phong {
     #[inline]
-    pub(super) fn pdf(&self, a: &Angles) -> f64 {
+    fn by_angles<T: Real>(&self, numbers: impl Numbers<T>, a: &Angles<T>) -> Rgb<T> {
         if !a.in_front() {
-            return 0.0;
+            return Rgb::splat(T::zero());
         }
-        let glossy = self.glossy_choice();
-        let lobe = glossy_lobe(mirror_cosine(a), self.exponent) * (self.exponent + 1.0)
-            / (self.exponent + 2.0);
-        glossy * lobe + (1.0 - glossy) * a.cos_i * FRAC_1_PI
+        let exponent = numbers.number(Property::Exponent, self.exponent);
+        let lobe = glossy_lobe(mirror_cosine(a), exponent);
+        let reflectance = numbers.colour(Property::Reflectance, self.reflectance);
+        let specular = numbers.colour(Property::SpecularReflectance, self.specular_reflectance);
+        (reflectance * T::from(FRAC_1_PI) + specular * lobe) * a.cos_i
+    }
+}
+
+impl Model for Phong {
+    fn name(&self) -> &'static str {
+        "phong"
     }
 
     #[inline]
-    pub(super) fn sample(&self, from: Vec3, n: Vec3, [u, v, choice]: [f64; 3]) -> Option<Vec3> {
+    fn flags(&self) -> Flags {
+        Flags {
+            black: false,
+            black_from_behind: true,
+            transmissive: false,
+            smooth: false,
+            straight: false,
+            oriented: false,
+            differentiable: true,
+        }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Normal
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        const {
+            PropertySet::new(&[
+                Property::Reflectance,
+                Property::SpecularReflectance,
+                Property::Exponent,
+            ])
+        }
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Reflectance => Some(Slot::Color(&mut self.reflectance)),
+            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
+            Property::Exponent => Some(Slot::Scalar(&mut self.exponent)),
+            _ => None,
+        }
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        nonnegative(Property::Reflectance, self.reflectance)?;
+        nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
+        in_range(Property::Exponent, self.exponent, self.exponent > 0.0, "above 0")
+    }
+
+    #[inline]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        _: At<'_>,
+        [wo, wi, n]: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        self.by_angles(numbers, &Angles::new(wo, wi, n))
+    }
+
+    #[inline]
+    fn gradient(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_angles::<{ ANGLES + 3 }>(self, [wo, wi, n])
+    }
+
+    #[inline]
+    fn sample(
+        &self,
+        _: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        [u, v, choice]: [f64; 3],
+        _: Given,
+    ) -> Option<Vec3> {
         let cos_from = n.dot(from);
         if cos_from <= 0.0 {
             return None;
@@ -118,18 +163,27 @@ impl Phong {
         Some(Frame::from_normal(mirror).to_world(vec3(sin * cos_phi, sin * sin_phi, cos)))
     }
 
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        match property {
-            Property::Reflectance => Some(Slot::Color(&mut self.reflectance)),
-            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
-            Property::Exponent => Some(Slot::Scalar(&mut self.exponent)),
-            _ => None,
+    #[inline]
+    fn pdf(&self, _: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        let a = Angles::new(from, to, n);
+        if !a.in_front() {
+            return 0.0;
         }
+        let glossy = self.glossy_choice();
+        let lobe = glossy_lobe(mirror_cosine(&a), self.exponent) * (self.exponent + 1.0)
+            / (self.exponent + 2.0);
+        glossy * lobe + (1.0 - glossy) * a.cos_i * FRAC_1_PI
     }
 
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        nonnegative(Property::Reflectance, self.reflectance)?;
-        nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
-        in_range(Property::Exponent, self.exponent, self.exponent > 0.0, "above 0")
+    fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let cos = n.dot(wo).max(0.0);
+        // As high in the middle as (exponent + 2) / (2 π).
+        let width2 = 2.0 / (self.exponent + 2.0);
+        let lobe = Lobe::new(mirrored(wo, n), width2, self.specular_reflectance.mean() * cos);
+        Lobes::glossy(self.reflectance.mean() * FRAC_1_PI, [lobe, Lobe::default()])
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
+        1.0 / fm::sqrt(1.0 + 0.5 * self.exponent)
     }
 }

@@ -1,14 +1,18 @@
 use core::f64::consts::FRAC_1_PI;
 
-use drt_math::{Dual, Frame, Real, Rgb, Vec3, warp};
+use drt_geom::edges::{Lobe, Lobes};
+use drt_math::{Frame, Real, Rgb, Vec3, warp};
 
-use crate::model::surface::angles::{Angles, Slopes};
+use crate::model::surface::angles::{ANGLES, Angles, Isotropic, by_angles};
 use crate::model::surface::coating::Coating;
 use crate::model::surface::fresnel::dielectric_reflected;
+use crate::model::surface::lobes::reflection;
 use crate::model::surface::microfacet::mirrored;
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError, nonnegative};
 use crate::model::surface::specular::same;
-use crate::model::surface::{BsdfParams, SpecularSample, SpecularValue};
+use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
 
 /// A diffuse base under a dielectric coating: Mitsuba's `plastic` and `roughplastic`; black from
 /// behind. Light that goes through the coating is scattered by the base and reflected back to it at the
@@ -44,29 +48,6 @@ impl Plastic {
         self.coating.facets().is_none()
     }
 
-    /// The value with other colours, over any scalar.
-    #[inline]
-    pub(super) fn value_with<T: Real>(
-        &self,
-        a: &Angles<T>,
-        reflectance: Rgb<T>,
-        specular_reflectance: Rgb<T>,
-    ) -> Rgb<T> {
-        if !a.in_front() {
-            return Rgb::splat(T::zero());
-        }
-        let base = reflectance.map(|c| c / self.inside(c)) * self.base(a);
-        match self.coating.reflection(a) {
-            Some(grey) if grey.re() != 0.0 => base + specular_reflectance * grey,
-            _ => base,
-        }
-    }
-
-    #[inline]
-    pub(super) fn value(&self, a: &Angles) -> Rgb {
-        self.value_with(a, self.reflectance, self.specular_reflectance)
-    }
-
     /// One less what comes back to a base of a colour inside.
     #[inline]
     fn inside<T: Real>(&self, colour: T) -> T {
@@ -82,31 +63,6 @@ impl Plastic {
         through * a.cos_i * (FRAC_1_PI / (eta * eta))
     }
 
-    #[inline]
-    pub(super) fn slopes(&self, a: &Angles) -> Slopes {
-        let mut s = Slopes::default();
-        if !a.in_front() {
-            return s;
-        }
-        let angles = Angles::<Dual<f64, 3>> {
-            cos_o: Dual::variable(a.cos_o, 0),
-            cos_i: Dual::variable(a.cos_i, 1),
-            h2: Dual::variable(a.h2, 2),
-        };
-        let base = self.base(&angles);
-        let grey = self.coating.reflection(&angles).unwrap_or(Dual::from(0.0));
-        let colour = self.reflectance.map(|c| c / self.inside(c));
-        let along = |i: usize| colour * base.eps[i] + self.specular_reflectance * grey.eps[i];
-        s.value = colour * base.re + self.specular_reflectance * grey.re;
-        (s.cos_o, s.cos_i, s.h2) = (along(0), along(1), along(2));
-        s.params.specular_reflectance = Rgb::splat(grey.re);
-        s.params.reflectance = self.reflectance.map(|c| {
-            let inside = self.inside(c);
-            if self.nonlinear { base.re / (inside * inside) } else { base.re / inside }
-        });
-        s
-    }
-
     /// Probability of the reflection at the coating, seen at a cosine.
     #[inline]
     fn specular_choice(&self, cos: f64) -> f64 {
@@ -116,22 +72,92 @@ impl Plastic {
         let share = if sum > 0.0 { specular / sum } else { 0.5 };
         share.clamp(LEAST_CHOICE, 1.0 - LEAST_CHOICE)
     }
+}
+
+impl Isotropic for Plastic {
+    #[inline]
+    fn by_angles<T: Real>(&self, numbers: impl Numbers<T>, a: &Angles<T>) -> Rgb<T> {
+        if !a.in_front() {
+            return Rgb::splat(T::zero());
+        }
+        let reflectance = numbers.colour(Property::Reflectance, self.reflectance);
+        let base = reflectance.map(|c| c / self.inside(c)) * self.base(a);
+        match self.coating.reflection(a) {
+            Some(grey) if grey.re() != 0.0 => {
+                let property = Property::SpecularReflectance;
+                base + numbers.colour(property, self.specular_reflectance) * grey
+            }
+            _ => base,
+        }
+    }
+}
+
+impl Model for Plastic {
+    fn name(&self) -> &'static str {
+        if self.is_smooth() { "plastic" } else { "roughplastic" }
+    }
 
     #[inline]
-    pub(super) fn pdf(&self, a: &Angles) -> f64 {
-        if !a.in_front() {
-            return 0.0;
-        }
-        let specular = self.specular_choice(a.cos_o);
-        let base = (1.0 - specular) * a.cos_i * FRAC_1_PI;
-        match self.coating.reflection_density(a) {
-            Some(density) => base + specular * density,
-            None => base,
+    fn flags(&self) -> Flags {
+        Flags {
+            black: false,
+            black_from_behind: true,
+            transmissive: false,
+            smooth: self.is_smooth(),
+            straight: false,
+            oriented: false,
+            differentiable: true,
         }
     }
 
     #[inline]
-    pub(super) fn sample(&self, from: Vec3, n: Vec3, [u, v, choice]: [f64; 3]) -> Option<Vec3> {
+    fn dependence(&self) -> Dependence {
+        Dependence::Normal
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        const { PropertySet::new(&[Property::Reflectance, Property::SpecularReflectance]) }
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Reflectance => Some(Slot::Color(&mut self.reflectance)),
+            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
+            _ => None,
+        }
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        self.coating.validate()?;
+        nonnegative(Property::Reflectance, self.reflectance)?;
+        nonnegative(Property::SpecularReflectance, self.specular_reflectance)
+    }
+
+    #[inline]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        _: At<'_>,
+        [wo, wi, n]: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        self.by_angles(numbers, &Angles::new(wo, wi, n))
+    }
+
+    #[inline]
+    fn gradient(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_angles::<{ ANGLES + 2 }>(self, [wo, wi, n])
+    }
+
+    #[inline]
+    fn sample(
+        &self,
+        _: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        [u, v, choice]: [f64; 3],
+        _: Given,
+    ) -> Option<Vec3> {
         let cos = n.dot(from);
         if cos <= 0.0 {
             return None;
@@ -143,12 +169,27 @@ impl Plastic {
         Some(mirrored(from, distribution.sample_visible(from, n, alpha, [u, v])))
     }
 
-    /// The reflection at a smooth coating, where `choice` chooses it.
-    pub(super) fn sample_specular(
+    #[inline]
+    fn pdf(&self, _: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        let a = Angles::new(from, to, n);
+        if !a.in_front() {
+            return 0.0;
+        }
+        let specular = self.specular_choice(a.cos_o);
+        let base = (1.0 - specular) * a.cos_i * FRAC_1_PI;
+        match self.coating.reflection_density(&a) {
+            Some(density) => base + specular * density,
+            None => base,
+        }
+    }
+
+    fn sample_specular(
         &self,
+        _: At<'_>,
         from: Vec3,
         n: Vec3,
         choice: f64,
+        _: Given,
     ) -> Option<SpecularSample> {
         let cos = n.dot(from);
         let probability =
@@ -160,29 +201,30 @@ impl Plastic {
         })
     }
 
-    pub(super) fn specular(&self, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+    fn specular(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let cos = n.dot(wo);
         if !self.is_smooth() || cos <= 0.0 || !same(mirrored(wo, n), wi) {
             return None;
         }
         let fresnel = dielectric_reflected(cos.min(1.0), self.coating.eta());
-        let specular_reflectance = Rgb::splat(fresnel);
-        let params = BsdfParams { specular_reflectance, ..BsdfParams::default() };
+        let params = BsdfParams::of(Property::SpecularReflectance, Rgb::splat(fresnel));
         let value = self.specular_reflectance * fresnel;
         Some(SpecularValue { value, params, probability: self.specular_choice(cos) })
     }
 
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        match property {
-            Property::Reflectance => Some(Slot::Color(&mut self.reflectance)),
-            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
-            _ => None,
+    fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let through = self.coating.let_through(n.dot(wo).clamp(1e-6, 1.0));
+        let even = self.reflectance.mean() * through * FRAC_1_PI;
+        match self.coating.facets() {
+            Some((_, alpha)) => {
+                let share = self.specular_reflectance.mean() * (1.0 - through);
+                Lobes::glossy(even, [reflection(wo, n, alpha, share), Lobe::default()])
+            }
+            None => Lobes::even(even),
         }
     }
 
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        self.coating.validate()?;
-        nonnegative(Property::Reflectance, self.reflectance)?;
-        nonnegative(Property::SpecularReflectance, self.specular_reflectance)
+    fn lobe_width(&self, _: At<'_>) -> f64 {
+        self.coating.facets().map_or(0.0, |(_, alpha)| alpha)
     }
 }

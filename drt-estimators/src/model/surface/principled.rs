@@ -17,13 +17,19 @@
 
 use core::f64::consts::{FRAC_1_PI, PI, TAU};
 
+use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3, fm, vec3, warp};
 
 use crate::model::surface::anisotropic::StretchedFacets;
-use crate::model::surface::framed::Framed;
+use crate::model::surface::framed::{self, Framed};
 use crate::model::surface::fresnel::dielectric_reflected;
+use crate::model::surface::lobes::{SHEEN, widest};
 use crate::model::surface::microfacet::{Distribution, LEAST_COS2, mirrored, refracted};
+use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, part};
+use crate::model::surface::{At, BsdfGradient, Given, RoughDielectric, Textured};
+use crate::model::texture::Texture;
 
 /// Burley's principled BSDF. All but colour and index are numbers from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -230,7 +236,7 @@ impl<T: Real> Principled<T> {
 }
 
 /// The probabilities of lobes.
-struct Lobes {
+struct Shares {
     diffuse: f64,
     coat: f64,
     facets: f64,
@@ -243,81 +249,69 @@ impl Principled {
         2.0 / (1.0 - fm::sqrt(0.08 * specular)) - 1.0
     }
 
-    pub(super) fn is_transmissive(&self) -> bool {
-        self.spec_trans > 0.0
-    }
-
     /// Its numbers over another scalar.
-    fn over<T: Real>(&self, number: impl Fn(Property, f64) -> T) -> Principled<T> {
+    fn over<T: Real>(&self, numbers: impl Numbers<T>) -> Principled<T> {
         Principled {
-            base_color: self.base_color.map(|c| number(Property::BaseColor, c)),
-            roughness: number(Property::Roughness, self.roughness),
-            anisotropic: number(Property::Anisotropic, self.anisotropic),
-            metallic: number(Property::Metallic, self.metallic),
-            spec_trans: number(Property::SpecTrans, self.spec_trans),
-            eta: number(Property::Eta, self.eta),
-            spec_tint: number(Property::SpecTint, self.spec_tint),
-            sheen: number(Property::Sheen, self.sheen),
-            sheen_tint: number(Property::SheenTint, self.sheen_tint),
-            flatness: number(Property::Flatness, self.flatness),
-            clearcoat: number(Property::Clearcoat, self.clearcoat),
-            clearcoat_gloss: number(Property::ClearcoatGloss, self.clearcoat_gloss),
+            base_color: numbers.colour(Property::BaseColor, self.base_color),
+            roughness: numbers.number(Property::Roughness, self.roughness),
+            anisotropic: numbers.number(Property::Anisotropic, self.anisotropic),
+            metallic: numbers.number(Property::Metallic, self.metallic),
+            spec_trans: numbers.number(Property::SpecTrans, self.spec_trans),
+            eta: numbers.number(Property::Eta, self.eta),
+            spec_tint: numbers.number(Property::SpecTint, self.spec_tint),
+            sheen: numbers.number(Property::Sheen, self.sheen),
+            sheen_tint: numbers.number(Property::SheenTint, self.sheen_tint),
+            flatness: numbers.number(Property::Flatness, self.flatness),
+            clearcoat: numbers.number(Property::Clearcoat, self.clearcoat),
+            clearcoat_gloss: numbers.number(Property::ClearcoatGloss, self.clearcoat_gloss),
         }
     }
 
     /// The probabilities of lobes seen from the front.
-    fn lobes(&self) -> Lobes {
+    fn shares(&self) -> Shares {
         let (diffuse, coat) = (self.diffuse(), 0.25 * self.clearcoat);
         let all = 1.0 + diffuse + coat;
-        Lobes { diffuse: diffuse / all, coat: coat / all, facets: 1.0 / all }
+        Shares { diffuse: diffuse / all, coat: coat / all, facets: 1.0 / all }
     }
 
     /// The probability that a facet refracts, where it does not reflect all.
     fn refracts(&self, fresnel: f64, front: bool) -> f64 {
         (1.0 - fresnel) * if front { self.refractive() } else { 1.0 }
     }
-
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        Some(Slot::Scalar(match property {
-            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
-            Property::Roughness => &mut self.roughness,
-            Property::Anisotropic => &mut self.anisotropic,
-            Property::Metallic => &mut self.metallic,
-            Property::SpecTrans => &mut self.spec_trans,
-            Property::Eta => &mut self.eta,
-            Property::SpecTint => &mut self.spec_tint,
-            Property::Sheen => &mut self.sheen,
-            Property::SheenTint => &mut self.sheen_tint,
-            Property::Flatness => &mut self.flatness,
-            Property::Clearcoat => &mut self.clearcoat,
-            Property::ClearcoatGloss => &mut self.clearcoat_gloss,
-            _ => return None,
-        }))
-    }
-
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        check_colour(self.base_color)?;
-        let contrast = self.spec_trans == 0.0 || (self.eta - 1.0).abs() >= 1e-6;
-        let allowed = self.eta > 0.0 && contrast;
-        in_range(Property::Eta, self.eta, allowed, "positive, and not 1 where light goes through")?;
-        let parts = [
-            (Property::Roughness, self.roughness),
-            (Property::Anisotropic, self.anisotropic),
-            (Property::Metallic, self.metallic),
-            (Property::SpecTrans, self.spec_trans),
-            (Property::SpecTint, self.spec_tint),
-            (Property::Sheen, self.sheen),
-            (Property::SheenTint, self.sheen_tint),
-            (Property::Flatness, self.flatness),
-            (Property::Clearcoat, self.clearcoat),
-            (Property::ClearcoatGloss, self.clearcoat_gloss),
-        ];
-        parts.into_iter().try_for_each(|(property, value)| part(property, value))
-    }
 }
 
 pub(super) fn check_colour(colour: Rgb) -> Result<(), SurfaceError> {
     colour.to_array().into_iter().try_for_each(|c| part(Property::BaseColor, c))
+}
+
+/// Why nothing is differentiated by a part of which there is none by now.
+pub(super) const NOTHING_DRAWN: &str = "at 0 no path goes where light would";
+/// Why nothing is differentiated by the colour of what has a tint.
+pub(super) const TINTED: &str = "a tint mixes its channels";
+
+/// The least and the largest value of a number, for which a texture may stand.
+pub(super) fn ends_of(value: f64, property: Property, textures: Option<&Textured>) -> [f64; 2] {
+    let bounds = textures.and_then(|t| t.texture_of(property)).map(Texture::bounds);
+    bounds.map_or([value; 2], |[least, most]| [least.r, most.r])
+}
+
+/// The least channel of a base colour, for which a texture may stand.
+pub(super) fn least_colour(colour: Rgb, textures: Option<&Textured>) -> f64 {
+    let texture = textures.and_then(|t| t.texture_of(Property::BaseColor));
+    let least = texture.map_or(colour, |t| t.bounds()[0]);
+    least.to_array().into_iter().fold(f64::INFINITY, f64::min)
+}
+
+/// True where the base colour tints something.
+pub(super) fn tints(
+    spec_tint: f64,
+    sheen: f64,
+    sheen_tint: f64,
+    textures: Option<&Textured>,
+) -> bool {
+    let some = |value, property| ends_of(value, property, textures)[1] > 0.0;
+    some(spec_tint, Property::SpecTint)
+        || (some(sheen, Property::Sheen) && some(sheen_tint, Property::SheenTint))
 }
 
 /// Two directions in the frame of a surface, neither in the surface, and the half vector between them, on the front.
@@ -362,13 +356,8 @@ impl<T: Real> Pair<T> {
 }
 
 impl Framed for Principled {
-    fn value<T: Real>(
-        &self,
-        number: impl Fn(Property, f64) -> T,
-        o: Vec3<T>,
-        i: Vec3<T>,
-    ) -> Rgb<T> {
-        self.over(number).value_of(o, i)
+    fn in_frame<T: Real>(&self, numbers: impl Numbers<T>, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
+        self.over(numbers).value_of(o, i)
     }
 
     fn density(&self, o: Vec3, i: Vec3) -> f64 {
@@ -378,7 +367,7 @@ impl Framed for Principled {
             return 0.0;
         }
         let lobes =
-            if front { self.lobes() } else { Lobes { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
+            if front { self.shares() } else { Shares { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
         let mut sum = 0.0;
         if pair.is_joined() {
             let facets = stretched(self.roughness, self.anisotropic);
@@ -406,7 +395,7 @@ impl Framed for Principled {
             return None;
         }
         let lobes =
-            if front { self.lobes() } else { Lobes { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
+            if front { self.shares() } else { Shares { diffuse: 0.0, coat: 0.0, facets: 1.0 } };
         if choice < lobes.diffuse {
             return Some(warp::cosine_hemisphere([u, v]));
         }
@@ -429,8 +418,153 @@ impl Framed for Principled {
         let i = if refracts { refracted(o, m, eta)?.0 } else { mirrored(o, m) };
         (refracts == (i.z * side < 0.0)).then_some(i)
     }
+}
 
-    fn narrowest(&self) -> f64 {
+impl Model for Principled {
+    fn name(&self) -> &'static str {
+        "principled"
+    }
+
+    #[inline]
+    fn flags(&self) -> Flags {
+        Flags {
+            black: false,
+            black_from_behind: false,
+            transmissive: self.spec_trans > 0.0,
+            smooth: false,
+            straight: false,
+            oriented: self.anisotropic != 0.0,
+            differentiable: true,
+        }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Frame
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        const {
+            PropertySet::new(&[
+                Property::BaseColor,
+                Property::Roughness,
+                Property::Metallic,
+                Property::SpecTrans,
+                Property::Eta,
+                Property::Sheen,
+                Property::Clearcoat,
+            ])
+        }
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        Some(Slot::Scalar(match property {
+            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
+            Property::Roughness => &mut self.roughness,
+            Property::Anisotropic => &mut self.anisotropic,
+            Property::Metallic => &mut self.metallic,
+            Property::SpecTrans => &mut self.spec_trans,
+            Property::Eta => &mut self.eta,
+            Property::SpecTint => &mut self.spec_tint,
+            Property::Sheen => &mut self.sheen,
+            Property::SheenTint => &mut self.sheen_tint,
+            Property::Flatness => &mut self.flatness,
+            Property::Clearcoat => &mut self.clearcoat,
+            Property::ClearcoatGloss => &mut self.clearcoat_gloss,
+            _ => return None,
+        }))
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        check_colour(self.base_color)?;
+        let contrast = self.spec_trans == 0.0 || (self.eta - 1.0).abs() >= 1e-6;
+        let allowed = self.eta > 0.0 && contrast;
+        in_range(Property::Eta, self.eta, allowed, "positive, and not 1 where light goes through")?;
+        let parts = [
+            (Property::Roughness, self.roughness),
+            (Property::Anisotropic, self.anisotropic),
+            (Property::Metallic, self.metallic),
+            (Property::SpecTrans, self.spec_trans),
+            (Property::SpecTint, self.spec_tint),
+            (Property::Sheen, self.sheen),
+            (Property::SheenTint, self.sheen_tint),
+            (Property::Flatness, self.flatness),
+            (Property::Clearcoat, self.clearcoat),
+            (Property::ClearcoatGloss, self.clearcoat_gloss),
+        ];
+        parts.into_iter().try_for_each(|(property, value)| part(property, value))
+    }
+
+    fn undifferentiated(
+        &self,
+        property: Property,
+        textures: Option<&Textured>,
+    ) -> Option<&'static str> {
+        // The values of a property are between these.
+        let ends = |value: f64, p| ends_of(value, p, textures);
+        let never = |value, p| ends(value, p)[1] <= 0.0;
+        let no_light_through = never(self.spec_trans, Property::SpecTrans);
+        match property {
+            Property::BaseColor if tints(self.spec_tint, self.sheen, self.sheen_tint, textures) => {
+                Some(TINTED)
+            }
+            Property::BaseColor
+                if !no_light_through && least_colour(self.base_color, textures) <= 0.0 =>
+            {
+                Some("light goes through by its root, which has no slope at 0")
+            }
+            Property::SpecTrans if ends(self.spec_trans, property)[0] <= 0.0 => Some(NOTHING_DRAWN),
+            Property::Metallic if !no_light_through && ends(self.metallic, property)[1] >= 1.0 => {
+                Some("at 1 no path goes where light would")
+            }
+            _ => None,
+        }
+    }
+
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        directions: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        framed::value(self, numbers, at, directions)
+    }
+
+    #[inline(never)]
+    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_duals::<{ COORDINATES + 7 }>(
+            self.differentiated(),
+            [wo, wi, n],
+            |numbers, directions| framed::value(self, numbers, at, directions),
+        )
+    }
+
+    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+        framed::sample(self, at, from, n, u)
+    }
+
+    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        framed::pdf(self, at, from, to, n)
+    }
+
+    fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let (colour, dielectric_part) = (self.base_color.mean(), 1.0 - self.metallic);
+        let glass = RoughDielectric {
+            distribution: Distribution::Ggx,
+            alpha: widest(stretched(self.roughness, self.anisotropic).alpha),
+            eta: self.eta,
+            specular_transmittance: Rgb::splat(colour * dielectric_part * self.spec_trans),
+            ..RoughDielectric::default()
+        };
+        let Lobes { lobes: [mut reflected, refracted], .. } = glass.lobes(None, wo, n);
+        reflected.height += (colour * self.metallic + 0.01 * self.clearcoat) * FRAC_1_PI;
+        let diffuse = colour * (1.0 - self.spec_trans) * FRAC_1_PI + self.sheen * SHEEN;
+        Lobes::glossy(diffuse * dielectric_part, [reflected, refracted])
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
         let [u, v] = stretched(self.roughness, self.anisotropic).alpha;
         f64::min(u, v)
     }

@@ -12,16 +12,22 @@
 
 use core::f64::consts::FRAC_1_PI;
 
+use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Real, Rgb, Vec3, vec3, warp};
 
 use crate::model::surface::anisotropic::StretchedFacets;
-use crate::model::surface::framed::Framed;
+use crate::model::surface::framed::{self, Framed};
 use crate::model::surface::fresnel::dielectric_reflected;
+use crate::model::surface::lobes::{SHEEN, reflection, widest};
 use crate::model::surface::microfacet::{LEAST_COS2, mirrored};
+use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::params::PropertySet;
 use crate::model::surface::principled::{
-    check_colour, diffuse_lobe, grazing, lerp, normal_reflectance, schlick, stretched, tint,
+    NOTHING_DRAWN, TINTED, check_colour, diffuse_lobe, ends_of, grazing, lerp, normal_reflectance,
+    schlick, stretched, tint, tints,
 };
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, part};
+use crate::model::surface::{At, BsdfGradient, Given, Textured};
 
 /// Burley's principled BSDF of thin sheets. Numbers are from 0 to 1 where nothing else is said.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,74 +131,36 @@ impl<T: Real> PrincipledThin<T> {
 
 impl PrincipledThin {
     /// Its numbers over another scalar.
-    fn over<T: Real>(&self, number: impl Fn(Property, f64) -> T) -> PrincipledThin<T> {
+    fn over<T: Real>(&self, numbers: impl Numbers<T>) -> PrincipledThin<T> {
         PrincipledThin {
-            base_color: self.base_color.map(|c| number(Property::BaseColor, c)),
-            roughness: number(Property::Roughness, self.roughness),
-            anisotropic: number(Property::Anisotropic, self.anisotropic),
-            spec_trans: number(Property::SpecTrans, self.spec_trans),
-            eta: number(Property::Eta, self.eta),
-            spec_tint: number(Property::SpecTint, self.spec_tint),
-            sheen: number(Property::Sheen, self.sheen),
-            sheen_tint: number(Property::SheenTint, self.sheen_tint),
-            flatness: number(Property::Flatness, self.flatness),
-            diff_trans: number(Property::DiffTrans, self.diff_trans),
+            base_color: numbers.colour(Property::BaseColor, self.base_color),
+            roughness: numbers.number(Property::Roughness, self.roughness),
+            anisotropic: numbers.number(Property::Anisotropic, self.anisotropic),
+            spec_trans: numbers.number(Property::SpecTrans, self.spec_trans),
+            eta: numbers.number(Property::Eta, self.eta),
+            spec_tint: numbers.number(Property::SpecTint, self.spec_tint),
+            sheen: numbers.number(Property::Sheen, self.sheen),
+            sheen_tint: numbers.number(Property::SheenTint, self.sheen_tint),
+            flatness: numbers.number(Property::Flatness, self.flatness),
+            diff_trans: numbers.number(Property::DiffTrans, self.diff_trans),
         }
     }
 
     /// Probabilities of reflection, of going on, and of diffuse light on this side; the rest is for that on the other one.
-    fn lobes(&self) -> [f64; 3] {
+    fn shares(&self) -> [f64; 3] {
         let half = 0.5 * self.spec_trans;
         [half, half, (1.0 - self.spec_trans) * (1.0 - 0.5 * self.diff_trans)]
-    }
-
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        Some(Slot::Scalar(match property {
-            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
-            Property::Roughness => &mut self.roughness,
-            Property::Anisotropic => &mut self.anisotropic,
-            Property::SpecTrans => &mut self.spec_trans,
-            Property::Eta => &mut self.eta,
-            Property::SpecTint => &mut self.spec_tint,
-            Property::Sheen => &mut self.sheen,
-            Property::SheenTint => &mut self.sheen_tint,
-            Property::Flatness => &mut self.flatness,
-            Property::DiffTrans => &mut self.diff_trans,
-            _ => return None,
-        }))
-    }
-
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        check_colour(self.base_color)?;
-        in_range(Property::Eta, self.eta, self.eta > 0.0, "above 0")?;
-        let part_of_two = (0.0..=2.0).contains(&self.diff_trans);
-        in_range(Property::DiffTrans, self.diff_trans, part_of_two, "from 0 to 2")?;
-        let parts = [
-            (Property::Roughness, self.roughness),
-            (Property::Anisotropic, self.anisotropic),
-            (Property::SpecTrans, self.spec_trans),
-            (Property::SpecTint, self.spec_tint),
-            (Property::Sheen, self.sheen),
-            (Property::SheenTint, self.sheen_tint),
-            (Property::Flatness, self.flatness),
-        ];
-        parts.into_iter().try_for_each(|(property, value)| part(property, value))
     }
 }
 
 impl Framed for PrincipledThin {
-    fn value<T: Real>(
-        &self,
-        number: impl Fn(Property, f64) -> T,
-        o: Vec3<T>,
-        i: Vec3<T>,
-    ) -> Rgb<T> {
-        self.over(number).value_of(o, i)
+    fn in_frame<T: Real>(&self, numbers: impl Numbers<T>, o: Vec3<T>, i: Vec3<T>) -> Rgb<T> {
+        self.over(numbers).value_of(o, i)
     }
 
     fn density(&self, o: Vec3, i: Vec3) -> f64 {
         let Some([o, i, h]) = pair(o, i) else { return 0.0 };
-        let [reflected, straight, diffuse] = self.lobes();
+        let [reflected, straight, diffuse] = self.shares();
         let rest = 1.0 - reflected - straight - diffuse;
         let reflects = i.z > 0.0;
         let (facets, specular, even) = if reflects {
@@ -215,7 +183,7 @@ impl Framed for PrincipledThin {
         if o.z <= 0.0 {
             return None;
         }
-        let [reflected, straight, diffuse] = self.lobes();
+        let [reflected, straight, diffuse] = self.shares();
         let i = if choice < reflected {
             let i = mirrored(o, self.reflecting().sample_visible(o, [u, v]));
             (i.z > 0.0).then_some(i)?
@@ -231,8 +199,142 @@ impl Framed for PrincipledThin {
         };
         Some(i * side)
     }
+}
 
-    fn narrowest(&self) -> f64 {
+impl Model for PrincipledThin {
+    fn name(&self) -> &'static str {
+        "principledthin"
+    }
+
+    #[inline]
+    fn flags(&self) -> Flags {
+        Flags {
+            black: false,
+            black_from_behind: false,
+            transmissive: true,
+            smooth: false,
+            straight: false,
+            oriented: self.anisotropic != 0.0,
+            differentiable: true,
+        }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Frame
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        const {
+            PropertySet::new(&[
+                Property::BaseColor,
+                Property::Roughness,
+                Property::SpecTrans,
+                Property::Eta,
+                Property::Sheen,
+                Property::DiffTrans,
+            ])
+        }
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        Some(Slot::Scalar(match property {
+            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
+            Property::Roughness => &mut self.roughness,
+            Property::Anisotropic => &mut self.anisotropic,
+            Property::SpecTrans => &mut self.spec_trans,
+            Property::Eta => &mut self.eta,
+            Property::SpecTint => &mut self.spec_tint,
+            Property::Sheen => &mut self.sheen,
+            Property::SheenTint => &mut self.sheen_tint,
+            Property::Flatness => &mut self.flatness,
+            Property::DiffTrans => &mut self.diff_trans,
+            _ => return None,
+        }))
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        check_colour(self.base_color)?;
+        in_range(Property::Eta, self.eta, self.eta > 0.0, "above 0")?;
+        let part_of_two = (0.0..=2.0).contains(&self.diff_trans);
+        in_range(Property::DiffTrans, self.diff_trans, part_of_two, "from 0 to 2")?;
+        let parts = [
+            (Property::Roughness, self.roughness),
+            (Property::Anisotropic, self.anisotropic),
+            (Property::SpecTrans, self.spec_trans),
+            (Property::SpecTint, self.spec_tint),
+            (Property::Sheen, self.sheen),
+            (Property::SheenTint, self.sheen_tint),
+            (Property::Flatness, self.flatness),
+        ];
+        parts.into_iter().try_for_each(|(property, value)| part(property, value))
+    }
+
+    fn undifferentiated(
+        &self,
+        property: Property,
+        textures: Option<&Textured>,
+    ) -> Option<&'static str> {
+        match property {
+            Property::BaseColor if tints(self.spec_tint, self.sheen, self.sheen_tint, textures) => {
+                Some(TINTED)
+            }
+            Property::SpecTrans if ends_of(self.spec_trans, property, textures)[0] <= 0.0 => {
+                Some(NOTHING_DRAWN)
+            }
+            Property::DiffTrans => match ends_of(self.diff_trans, property, textures) {
+                [least, _] if least <= 0.0 => Some(NOTHING_DRAWN),
+                [_, most] if most >= 2.0 => Some("at 2 no path goes where light would"),
+                _ => None,
+            },
+            _ => None,
+        }
+    }
+
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        directions: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        framed::value(self, numbers, at, directions)
+    }
+
+    #[inline(never)]
+    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_duals::<{ COORDINATES + 6 }>(
+            self.differentiated(),
+            [wo, wi, n],
+            |numbers, directions| framed::value(self, numbers, at, directions),
+        )
+    }
+
+    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+        framed::sample(self, at, from, n, u)
+    }
+
+    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        framed::pdf(self, at, from, to, n)
+    }
+
+    fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let n = if n.dot(wo) >= 0.0 { n } else { -n };
+        let colour = self.base_color.mean();
+        let once = dielectric_reflected(n.dot(wo).clamp(1e-6, 1.0), self.eta);
+        // From both sides of the sheet.
+        let reflected = 2.0 * once / (1.0 + once);
+        let [mirror, through] =
+            [(self.reflecting(), reflected), (self.blurring(), (1.0 - reflected) * colour)].map(
+                |(facets, share)| reflection(wo, n, widest(facets.alpha), self.spec_trans * share),
+            );
+        let through = Lobe { axis: -wo, ..through };
+        let diffuse = (1.0 - self.spec_trans) * colour * FRAC_1_PI + self.sheen * SHEEN;
+        Lobes::glossy(diffuse, [mirror, through])
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
         if self.spec_trans == 0.0 {
             return 1.0;
         }

@@ -18,11 +18,15 @@
 
 use core::f64::consts::{FRAC_1_PI, FRAC_2_PI};
 
+use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3, warp};
 
-use crate::model::surface::framed::Framed;
+use crate::model::surface::framed::{self, Framed};
 use crate::model::surface::microfacet::LEAST_COS2;
+use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
+use crate::model::surface::{At, BsdfGradient, Given};
 
 /// A rough diffuse reflector: Mitsuba 0.6's `roughdiffuse`. Black from behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,33 +58,13 @@ fn polar<T: Real>(w: Vec3<T>) -> [T; 2] {
     [sin2.sqrt(), w.z.acos()]
 }
 
-impl RoughDiffuse {
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        match property {
-            Property::Reflectance => Some(Slot::Color(&mut self.reflectance)),
-            Property::Alpha => Some(Slot::Scalar(&mut self.alpha)),
-            _ => None,
-        }
-    }
-
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        nonnegative(Property::Reflectance, self.reflectance)?;
-        in_range(Property::Alpha, self.alpha, self.alpha >= 0.0, "0 or more")
-    }
-}
-
 impl Framed for RoughDiffuse {
-    fn value<T: Real>(
-        &self,
-        number: impl Fn(Property, f64) -> T,
-        wo: Vec3<T>,
-        wi: Vec3<T>,
-    ) -> Rgb<T> {
+    fn in_frame<T: Real>(&self, numbers: impl Numbers<T>, wo: Vec3<T>, wi: Vec3<T>) -> Rgb<T> {
         let above = wo.z.re() > 0.0 && wi.z.re() > 0.0;
         if !above || (wo.z * wi.z).re() < LEAST_COS2 {
             return Rgb::splat(T::zero());
         }
-        let variance = number(Property::Alpha, self.alpha).squared() * 0.5;
+        let variance = numbers.number(Property::Alpha, self.alpha).squared() * 0.5;
         let share = |offset: f64| variance / (variance + offset);
         let ([sin_o, angle_o], [sin_i, angle_i]) = (polar(wo), polar(wi));
         let both = sin_o * sin_i;
@@ -94,7 +78,7 @@ impl Framed for RoughDiffuse {
         let tan_beta = sin_beta / cos_beta;
         let towards = cos_phi.re() > 0.0;
         let once = T::one() - share(0.33) * 0.5;
-        let colour = self.reflectance.map(|c| number(Property::Reflectance, c));
+        let colour = numbers.colour(Property::Reflectance, self.reflectance);
         let scale = wi.z * FRAC_1_PI;
         if self.fast {
             let lit = if towards { cos_phi } else { T::zero() };
@@ -119,8 +103,81 @@ impl Framed for RoughDiffuse {
     fn density(&self, from: Vec3, to: Vec3) -> f64 {
         if from.z > 0.0 && to.z > 0.0 { to.z * FRAC_1_PI } else { 0.0 }
     }
+}
 
-    fn narrowest(&self) -> f64 {
+impl Model for RoughDiffuse {
+    fn name(&self) -> &'static str {
+        "roughdiffuse"
+    }
+
+    #[inline]
+    fn flags(&self) -> Flags {
+        Flags {
+            black: false,
+            black_from_behind: true,
+            transmissive: false,
+            smooth: false,
+            straight: false,
+            oriented: false,
+            differentiable: true,
+        }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Frame
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        const { PropertySet::new(&[Property::Reflectance, Property::Alpha]) }
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Reflectance => Some(Slot::Color(&mut self.reflectance)),
+            Property::Alpha => Some(Slot::Scalar(&mut self.alpha)),
+            _ => None,
+        }
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        nonnegative(Property::Reflectance, self.reflectance)?;
+        in_range(Property::Alpha, self.alpha, self.alpha >= 0.0, "0 or more")
+    }
+
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        directions: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        framed::value(self, numbers, at, directions)
+    }
+
+    #[inline(never)]
+    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_duals::<{ COORDINATES + 2 }>(
+            self.differentiated(),
+            [wo, wi, n],
+            |numbers, directions| framed::value(self, numbers, at, directions),
+        )
+    }
+
+    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+        framed::sample(self, at, from, n, u)
+    }
+
+    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        framed::pdf(self, at, from, to, n)
+    }
+
+    fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
+        Lobes::even(self.reflectance.mean() * FRAC_1_PI)
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
         1.0
     }
 }

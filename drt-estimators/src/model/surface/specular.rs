@@ -6,9 +6,9 @@
 //! which is taken: as unbiased, and of no more variance. Where an index of refraction turns the direction, there is more to the
 //! derivative, which nothing here has.
 
-use drt_math::{Rgb, Vec3};
+use drt_math::{Dual, Rgb, Vec3};
 
-use crate::model::surface::{At, Bsdf, BsdfParams};
+use crate::model::surface::params::{BsdfParams, PropertySet};
 
 /// What a surface scatters from one direction into another, single one.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,59 +22,30 @@ pub(crate) struct SpecularValue {
 }
 
 impl SpecularValue {
-    /// So many times the value, drawn so many times as often.
+    /// The parts of a value over dual numbers, which have a lane for each of the properties.
+    pub(super) fn by_duals<const N: usize>(
+        properties: PropertySet,
+        value: Rgb<Dual<f64, N>>,
+        probability: f64,
+    ) -> Self {
+        let params = BsdfParams::from_ranks(properties, |k| value.map(|c| c.eps[k]));
+        Self { value: value.map(|c| c.re), params, probability }
+    }
+
+    /// The value times a factor, where the direction is drawn with another factor of the probability.
     pub(super) fn scaled(&self, value: Rgb, probability: f64) -> Self {
-        let mut params = BsdfParams::default();
-        params.scatter(&self.params, value);
+        let params = self.params.scaled(value);
         Self { value: self.value * value, params, probability: self.probability * probability }
+    }
+
+    /// The derivatives of a walk's weight by the properties; `None` where nothing draws the direction.
+    pub(super) fn of_weight(&self) -> Option<BsdfParams> {
+        let inverse = Rgb::splat(self.probability.recip());
+        (self.probability > 0.0).then(|| self.params.scaled(inverse))
     }
 }
 
 /// True of a direction that was drawn as this one.
 pub(super) fn same(drawn: Vec3, w: Vec3) -> bool {
     (drawn - w).max_abs() < 1e-9
-}
-
-impl Bsdf {
-    /// The derivatives of a walk's weight by the properties, where `wi` is a single direction that `wo` is scattered to.
-    #[inline]
-    pub(super) fn specular_gradient(
-        &self,
-        at: At<'_>,
-        wo: Vec3,
-        wi: Vec3,
-        n: Vec3,
-    ) -> Option<BsdfParams> {
-        match self.facing(wo, n).0 {
-            Self::Null
-            | Self::Diffuse(_)
-            | Self::Phong(_)
-            | Self::RoughConductor(_)
-            | Self::RoughDielectric(_) => None,
-            _ => {
-                let found = self.specular(at, wo, wi, n)?;
-                let inverse = Rgb::splat(found.probability.recip());
-                (found.probability > 0.0).then(|| found.scaled(inverse, 1.0).params)
-            }
-        }
-    }
-
-    /// What is scattered from `wo` into the single direction `wi`; `None` where it is none.
-    #[cold]
-    pub(crate) fn specular(
-        &self,
-        at: At<'_>,
-        wo: Vec3,
-        wi: Vec3,
-        n: Vec3,
-    ) -> Option<SpecularValue> {
-        let (bsdf, n) = self.facing(wo, n);
-        match bsdf {
-            Self::Plastic(b) => b.specular(wo, wi, n),
-            Self::Conductor(b) => b.specular(wo, wi, n),
-            Self::Dielectric(b) => b.specular(wo, wi, n),
-            Self::ThinDielectric(b) => b.specular(wo, wi, n),
-            _ => bsdf.composed(|b| b.specular(at, wo, wi, n)).flatten(),
-        }
-    }
 }

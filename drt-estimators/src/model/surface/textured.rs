@@ -2,11 +2,18 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use drt_geom::Mesh;
-use drt_math::{Rgb, RgbVec, ValueChange};
+use drt_geom::edges::Lobes;
+use drt_math::{Real, Rgb, RgbVec, ValueChange, Vec3};
+
+use crate::model::surface::facet::Facet;
 
 use crate::model::surface::microfacet::LEAST_ALPHA;
-use crate::model::surface::property::{Property, SurfaceError};
-use crate::model::surface::{At, Bsdf, BsdfChange, BsdfParams};
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::params::PropertySet;
+use crate::model::surface::property::{Property, Slot, SurfaceError};
+use crate::model::surface::{
+    At, Bsdf, BsdfChange, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
+};
 use crate::model::texture::{
     Footprint, TexelChange, TexelError, TexelTangent, Texture, TexturePoint,
 };
@@ -48,19 +55,6 @@ impl Textured {
             }
         }
         bsdf
-    }
-
-    /// The gradient of a value by the place of its point, in the plane of the triangle there: through the properties that
-    /// textures stand for, by which the value has the derivatives `params`.
-    pub(super) fn slide(&self, at: &TexturePoint<'_>, params: &BsdfParams) -> RgbVec {
-        let mut sum = RgbVec::ZERO;
-        for (property, texture) in &self.textures {
-            let value = texture.at_point(at);
-            if allowed(*property, value) == value {
-                sum += texture.gradient(at) * params.get(*property);
-            }
-        }
-        sum
     }
 
     /// Makes a change of the texels that stand for a property; their rates. `None` where no texture does.
@@ -106,26 +100,8 @@ impl Textured {
     }
 
     /// The texture that stands for a property.
-    pub(crate) fn texture(&self, property: Property) -> Option<&Texture> {
+    pub(super) fn texture_of(&self, property: Property) -> Option<&Texture> {
         self.textures.iter().find(|(p, _)| *p == property).map(|(_, texture)| texture)
-    }
-
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        if matches!(self.bsdf, Bsdf::Textured(_) | Bsdf::TwoSided(_)) {
-            return Err(SurfaceError::TexturedTwice { bsdf: self.bsdf.name() });
-        }
-        self.bsdf.validate()?;
-        self.check_bounds(Texture::bounds)
-    }
-
-    /// Checks what textures have from a mesh.
-    pub(super) fn validate_on(&self, mesh: &Mesh) -> Result<(), SurfaceError> {
-        let missing = |t: &&(Property, Texture)| t.1.bounds_on(mesh).is_none();
-        if let Some((_, texture)) = self.textures.iter().find(missing) {
-            let name = texture.attribute().unwrap_or_default().into();
-            return Err(SurfaceError::NoAttribute { name });
-        }
-        self.check_bounds(|t| t.bounds_on(mesh).unwrap_or_default())
     }
 
     fn check_bounds(&self, bounds: impl Fn(&Texture) -> [Rgb; 2]) -> Result<(), SurfaceError> {
@@ -141,6 +117,166 @@ impl Textured {
             }
         }
         Ok(())
+    }
+}
+
+impl Textured {
+    /// True where textures tell directions along the surface apart.
+    pub(super) fn orients(&self) -> bool {
+        let uneven = [Property::Anisotropic, Property::AlphaU, Property::AlphaV];
+        uneven.into_iter().any(|p| self.texture_of(p).is_some())
+    }
+
+    /// The gradient of a value by the place of its point, in the plane of the triangle there: through the properties that
+    /// textures stand for, by which the value has the derivatives `params`.
+    fn slide_of_textures(&self, at: &TexturePoint<'_>, params: &BsdfParams) -> RgbVec {
+        let mut sum = RgbVec::ZERO;
+        for (property, texture) in &self.textures {
+            let value = texture.at_point(at);
+            if allowed(*property, value) == value {
+                sum += texture.gradient(at) * params.get(*property);
+            }
+        }
+        sum
+    }
+}
+
+/// At each point this is the BSDF of the textures' values there.
+impl Model for Textured {
+    fn name(&self) -> &'static str {
+        self.bsdf.name()
+    }
+
+    #[inline(never)]
+    fn flags(&self) -> Flags {
+        let inner = self.bsdf.flags();
+        // A texture may stand for how much goes through.
+        let through = self.texture_of(Property::SpecTrans).is_some();
+        let transmissive = inner.transmissive || through;
+        Flags { transmissive, oriented: inner.oriented || self.orients(), ..inner }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Point
+    }
+
+    fn differentiated(&self) -> PropertySet {
+        self.bsdf.differentiated()
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        self.bsdf.property(property)
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        if matches!(self.bsdf, Bsdf::Textured(_) | Bsdf::TwoSided(_)) {
+            return Err(SurfaceError::TexturedTwice { bsdf: self.bsdf.name() });
+        }
+        self.bsdf.validate()?;
+        self.check_bounds(Texture::bounds)
+    }
+
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        directions: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        self.at(at).value(numbers, at, directions)
+    }
+
+    #[inline(never)]
+    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        self.at(at).gradient_at(at, wo, wi, n)
+    }
+
+    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], given: Given) -> Option<Vec3> {
+        self.at(at).direction(at, from, n, u, given)
+    }
+
+    #[inline(never)]
+    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
+        self.at(at).pdf_at(at, from, to, n, given)
+    }
+
+    #[inline(never)]
+    fn draw(
+        &self,
+        at: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        u: [f64; 3],
+        given: Given,
+    ) -> Option<(Vec3, f64)> {
+        self.at(at).sample_at(at, from, n, u, given).map(|s| (s.w, s.pdf))
+    }
+
+    #[inline(never)]
+    fn sample_specular(
+        &self,
+        at: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        choice: f64,
+        given: Given,
+    ) -> Option<SpecularSample> {
+        self.at(at).sample_specular_at(at, from, n, choice, given)
+    }
+
+    #[inline(never)]
+    fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        self.at(at).specular(at, wo, wi, n)
+    }
+
+    fn straight(&self, at: At<'_>, cos: f64) -> Rgb {
+        if self.bsdf.passes_straight() { self.at(at).straight(None, cos) } else { Rgb::ZERO }
+    }
+
+    #[inline(never)]
+    fn facet(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<(Facet, f64)> {
+        self.at(at).facet(None, wo, wi, n)
+    }
+
+    fn lobes(&self, at: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        self.at(at).lobes(None, wo, n)
+    }
+
+    fn lobe_width(&self, at: At<'_>) -> f64 {
+        self.at(at).lobe_width(at)
+    }
+
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        [Some(&self.bsdf), None]
+    }
+
+    fn texture(&self, property: Property) -> Option<&Texture> {
+        self.texture_of(property)
+    }
+
+    fn undifferentiated(&self, property: Property, _: Option<&Textured>) -> Option<&'static str> {
+        self.bsdf.undifferentiated_with(property, Some(self))
+    }
+
+    fn slide(&self, at: At<'_>, directions: [Vec3; 3], params: &BsdfParams, factor: f64) -> RgbVec {
+        let Some(point) = at else { return RgbVec::ZERO };
+        let inner = self.at(at).slide(at, directions, params, factor);
+        self.slide_of_textures(point, params) + inner
+    }
+
+    /// Checks what textures have from a mesh.
+    fn validate_on(&self, mesh: &Mesh) -> Result<(), SurfaceError> {
+        let missing = |t: &&(Property, Texture)| t.1.bounds_on(mesh).is_none();
+        if let Some((_, texture)) = self.textures.iter().find(missing) {
+            let name = texture.attribute().unwrap_or_default().into();
+            return Err(SurfaceError::NoAttribute { name });
+        }
+        self.check_bounds(|t| t.bounds_on(mesh).unwrap_or_default())
+    }
+
+    fn jumps_on(&self, mesh: &Mesh) -> bool {
+        self.textures.iter().any(|(_, t)| !t.is_continuous_on(mesh))
     }
 }
 
@@ -181,7 +317,7 @@ impl Bsdf {
     #[must_use]
     pub fn texel_values(&self, property: Property) -> Option<Vec<Rgb>> {
         self.texels(property)?;
-        Some(self.textured_part()?.texture(property)?.texels())
+        Some(self.textured_part()?.texture_of(property)?.texels())
     }
 
     /// This BSDF with other texels of the texture that stands for a property, row by row.
@@ -212,7 +348,7 @@ impl Bsdf {
     /// Columns and rows of texels of the texture that stands for a property, if one does that can change.
     #[must_use]
     pub fn texels(&self, property: Property) -> Option<[u32; 2]> {
-        Some(self.textured_part()?.texture(property)?.size()).filter(|size| *size != [0; 2])
+        Some(self.textured_part()?.texture_of(property)?.size()).filter(|size| *size != [0; 2])
     }
 
     /// Calls `f` with the textures of all its parts, and the properties that they stand for; maps of normals and heights have the
@@ -225,7 +361,7 @@ impl Bsdf {
                 Self::Perturbed(b) => f(part.name(), &b.map),
                 _ => {}
             }
-            parts.extend(part.inner());
+            parts.extend(part.parts());
         }
     }
 

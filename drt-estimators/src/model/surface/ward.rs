@@ -18,12 +18,17 @@
 
 use core::f64::consts::{FRAC_1_PI, TAU};
 
+use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Real, Rgb, Vec3, fm, vec3, warp};
 
-use crate::model::surface::composed::choose;
-use crate::model::surface::framed::Framed;
+use crate::model::surface::choice::choose;
+use crate::model::surface::framed::{self, Framed};
+use crate::model::surface::lobes::{reflection, widest};
 use crate::model::surface::microfacet::{LEAST_ALPHA, LEAST_COS2, mirrored};
+use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
+use crate::model::surface::{At, BsdfGradient, Given, Textured};
 
 /// Ward's model: Mitsuba 0.6's `ward`. Black from behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,40 +87,18 @@ impl Ward {
         let share = share.clamp(LEAST_CHOICE, 1.0 - LEAST_CHOICE);
         [share, 1.0 - share]
     }
-
-    pub(super) fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        match property {
-            Property::Reflectance => Some(Slot::Color(&mut self.reflectance)),
-            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
-            Property::AlphaU => Some(Slot::Scalar(&mut self.alpha[0])),
-            Property::AlphaV => Some(Slot::Scalar(&mut self.alpha[1])),
-            _ => None,
-        }
-    }
-
-    pub(super) fn validate(&self) -> Result<(), SurfaceError> {
-        nonnegative(Property::Reflectance, self.reflectance)?;
-        nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
-        let alphas = [Property::AlphaU, Property::AlphaV].into_iter().zip(self.alpha);
-        alphas.into_iter().try_for_each(|(property, alpha)| {
-            in_range(property, alpha, alpha >= LEAST_ALPHA, "at least 1e-4")
-        })
-    }
 }
 
 impl Framed for Ward {
-    fn value<T: Real>(
-        &self,
-        number: impl Fn(Property, f64) -> T,
-        wo: Vec3<T>,
-        wi: Vec3<T>,
-    ) -> Rgb<T> {
+    fn in_frame<T: Real>(&self, numbers: impl Numbers<T>, wo: Vec3<T>, wi: Vec3<T>) -> Rgb<T> {
         let above = wo.z.re() > 0.0 && wi.z.re() > 0.0;
         if !above || (wo.z * wi.z).re() < LEAST_COS2 {
             return Rgb::splat(T::zero());
         }
-        let alpha =
-            [number(Property::AlphaU, self.alpha[0]), number(Property::AlphaV, self.alpha[1])];
+        let alpha = [
+            numbers.number(Property::AlphaU, self.alpha[0]),
+            numbers.number(Property::AlphaV, self.alpha[1]),
+        ];
         let h = wo + wi;
         let lobe = gaussian(h, alpha);
         let lobe = if lobe.is_zero() {
@@ -127,9 +110,8 @@ impl Framed for Ward {
                 WardVariant::Balanced => h.length_squared() * wi.z / h.z.squared().squared(),
             }
         };
-        let colour = |property, value: Rgb| value.map(|c| number(property, c));
-        colour(Property::Reflectance, self.reflectance) * (wi.z * FRAC_1_PI)
-            + colour(Property::SpecularReflectance, self.specular_reflectance) * lobe
+        numbers.colour(Property::Reflectance, self.reflectance) * (wi.z * FRAC_1_PI)
+            + numbers.colour(Property::SpecularReflectance, self.specular_reflectance) * lobe
     }
 
     fn direction(&self, from: Vec3, u: [f64; 3]) -> Option<Vec3> {
@@ -157,8 +139,106 @@ impl Framed for Ward {
             if lobe == 0.0 { 0.0 } else { 0.5 * lobe * h.length_squared() / (h.z * h.z * h.z) };
         glossy * lobe + diffuse * to.z * FRAC_1_PI
     }
+}
 
-    fn narrowest(&self) -> f64 {
+impl Model for Ward {
+    fn name(&self) -> &'static str {
+        "ward"
+    }
+
+    #[inline]
+    fn flags(&self) -> Flags {
+        Flags {
+            black: false,
+            black_from_behind: true,
+            transmissive: false,
+            smooth: false,
+            straight: false,
+            oriented: self.alpha[0] != self.alpha[1],
+            differentiable: true,
+        }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Frame
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        const {
+            PropertySet::new(&[
+                Property::Reflectance,
+                Property::SpecularReflectance,
+                Property::AlphaU,
+                Property::AlphaV,
+            ])
+        }
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Reflectance => Some(Slot::Color(&mut self.reflectance)),
+            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
+            Property::AlphaU => Some(Slot::Scalar(&mut self.alpha[0])),
+            Property::AlphaV => Some(Slot::Scalar(&mut self.alpha[1])),
+            _ => None,
+        }
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        nonnegative(Property::Reflectance, self.reflectance)?;
+        nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
+        let alphas = [Property::AlphaU, Property::AlphaV].into_iter().zip(self.alpha);
+        alphas.into_iter().try_for_each(|(property, alpha)| {
+            in_range(property, alpha, alpha >= LEAST_ALPHA, "at least 1e-4")
+        })
+    }
+
+    fn undifferentiated(
+        &self,
+        property: Property,
+        textures: Option<&Textured>,
+    ) -> Option<&'static str> {
+        let roughness = matches!(property, Property::AlphaU | Property::AlphaV);
+        // Which direction either belongs to is nothing that an even surface needs to know.
+        let oriented = self.flags().oriented || textures.is_some_and(Textured::orients);
+        (roughness && !oriented).then_some("both roughnesses are equal; give different ones")
+    }
+
+    #[inline(never)]
+    fn value<T: Real>(
+        &self,
+        numbers: impl Numbers<T>,
+        at: At<'_>,
+        directions: [Vec3<T>; 3],
+    ) -> Rgb<T> {
+        framed::value(self, numbers, at, directions)
+    }
+
+    #[inline(never)]
+    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+        by_duals::<{ COORDINATES + 4 }>(
+            self.differentiated(),
+            [wo, wi, n],
+            |numbers, directions| framed::value(self, numbers, at, directions),
+        )
+    }
+
+    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+        framed::sample(self, at, from, n, u)
+    }
+
+    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+        framed::pdf(self, at, from, to, n)
+    }
+
+    fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {
+        let lobe = reflection(wo, n, widest(self.alpha), self.specular_reflectance.mean());
+        Lobes::glossy(self.reflectance.mean() * FRAC_1_PI, [lobe, Lobe::default()])
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
         f64::min(self.alpha[0], self.alpha[1])
     }
 }

@@ -193,7 +193,7 @@ fn properties_are_the_layers_and_those_of_what_is_below() {
     let sides = varnished(Bsdf::TwoSided(Box::new(sides)), None);
     assert_eq!(sides.is_number(Property::Reflectance), None);
     let mask = Mask { bsdf: metal, opacity: 0.5 };
-    assert!(Bsdf::Mask(Box::new(mask)).undifferentiated(Property::Opacity).is_some());
+    assert!(Bsdf::Mask(Box::new(mask)).undifferentiated(Property::Opacity).is_none());
 }
 
 #[test]

@@ -13,7 +13,7 @@ const INDEX: f64 = 0.3;
 fn region(bsdf: &Bsdf, wo: Vec3, wi: Vec3) -> f64 {
     let g = bsdf.gradient(wo, wi, normal());
     let ([dn, dwo], index) = motion(bsdf, wo);
-    (g.n.g.dot(dn) + g.wo.g.dot(dwo) + g.params.eta.g * index) / g.value.g
+    (g.n.g.dot(dn) + g.wo.g.dot(dwo) + g.params.get(Property::Eta).g * index) / g.value.g
 }
 
 /// The part of it that pairs tell.

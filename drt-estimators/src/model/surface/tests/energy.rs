@@ -16,6 +16,7 @@ pub(super) fn index(bsdf: &Bsdf, w: Vec3) -> f64 {
         Bsdf::Anisotropic(b) => index(&b.base, w),
         Bsdf::Principled(b) => b.eta,
         Bsdf::Blend(b) => index(&b.bsdfs[1], w),
+        Bsdf::Mask(b) => index(&b.bsdf, w),
         _ => 1.0,
     }
 }
@@ -32,7 +33,7 @@ fn sampled(bsdf: &Bsdf, wo: Vec3, factor: impl Fn(Vec3) -> f64) -> Moments {
     sum
 }
 
-/// The same by directions spread evenly.
+/// The integral over `wi` of the green value by directions spread evenly.
 fn spread(bsdf: &Bsdf, wo: Vec3) -> Moments {
     let mut rng = Rng::new(22, 0, 0);
     let mut sum = Moments::default();
@@ -118,6 +119,10 @@ fn exchanged_directions_scatter_alike() {
     let mut rng = Rng::new(23, 0, 0);
     let n = normal();
     for bsdf in cases() {
+        // Thin sheets are not where facets hide the light that goes through, nor is what was measured.
+        if matches!(bsdf, Bsdf::PrincipledThin(_) | Bsdf::Measured(_)) {
+            continue;
+        }
         let mut compared = 0;
         for _ in 0..2000 {
             let [wo, wi] = [random_direction(&mut rng), random_direction(&mut rng)];

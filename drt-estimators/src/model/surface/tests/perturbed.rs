@@ -22,6 +22,11 @@ fn everywhere(texel: [f32; 3]) -> Texture {
     Texture::Bitmap(Bitmap::new([1, 1], vec![texel]).expect("one texel"))
 }
 
+/// A map whose normals are the surface's.
+pub(super) fn even_map(bsdf: Bsdf) -> Perturbed {
+    mapped(bsdf, [0.5, 0.5, 1.0])
+}
+
 fn mapped(bsdf: Bsdf, texel: [f32; 3]) -> Perturbed {
     Perturbed {
         bsdf,

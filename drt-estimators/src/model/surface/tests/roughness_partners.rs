@@ -61,7 +61,7 @@ fn derivatives(bsdf: &Bsdf, wo: Vec3) -> [Moments; 3] {
             continue;
         };
         let g = bsdf.gradient(wo, s.w, normal());
-        let region = g.params.alpha.g * light(s.w);
+        let region = g.params.get(Property::Alpha).g * light(s.w);
         let partner = bsdf.roughness_partner(None, wo, s.w, normal());
         let [apart, uncompared] = partner.map_or([region; 2], |c| {
             let beside = bsdf.eval(wo, c.w, normal()).g * light(c.w);

@@ -1,0 +1,157 @@
+//! Thin panes.
+
+use drt_geom::edges::Lobes;
+use drt_math::{Dual, Real, Rgb, Vec3};
+
+use crate::model::surface::fresnel::dielectric_reflected;
+use crate::model::surface::microfacet::mirrored;
+use crate::model::surface::model::{Dependence, Flags, Lanes, Model, Numbers};
+use crate::model::surface::params::PropertySet;
+use crate::model::surface::property::{Property, Slot, SurfaceError};
+use crate::model::surface::smooth_dielectric::{GLASS, check};
+use crate::model::surface::specular::same;
+use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
+
+/// A pane so thin that light goes straight through it, with all reflections inside of it: Mitsuba's
+/// `thindielectric`. Both sides are alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ThinDielectric {
+    /// Index of the pane over that of what is around it; default glass (BK7) in air.
+    pub eta: f64,
+    /// Factor of the reflection; default 1.
+    pub specular_reflectance: Rgb,
+    /// Factor of what goes through; default 1.
+    pub specular_transmittance: Rgb,
+}
+
+impl Default for ThinDielectric {
+    fn default() -> Self {
+        let (specular_reflectance, specular_transmittance) = (Rgb::ONE, Rgb::ONE);
+        Self { eta: GLASS, specular_reflectance, specular_transmittance }
+    }
+}
+
+/// The part of the light that comes back from a pane, at a cosine above 0.
+fn reflected_by_pane<T: Real>(cos: T, eta: T) -> T {
+    let once = dielectric_reflected(cos, eta);
+    // The sum of the light that leaves after 0, 1, 2 … turns in the pane.
+    if once.re() < 1.0 { once * 2.0 / (T::one() + once) } else { T::one() }
+}
+
+impl Model for ThinDielectric {
+    fn name(&self) -> &'static str {
+        "thindielectric"
+    }
+
+    #[inline]
+    fn flags(&self) -> Flags {
+        Flags {
+            black: false,
+            black_from_behind: false,
+            transmissive: true,
+            smooth: true,
+            straight: true,
+            oriented: false,
+            differentiable: true,
+        }
+    }
+
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Normal
+    }
+
+    #[inline]
+    fn differentiated(&self) -> PropertySet {
+        const {
+            PropertySet::new(&[
+                Property::SpecularReflectance,
+                Property::SpecularTransmittance,
+                Property::Eta,
+            ])
+        }
+    }
+
+    fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
+        match property {
+            Property::Eta => Some(Slot::Scalar(&mut self.eta)),
+            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
+            Property::SpecularTransmittance => Some(Slot::Color(&mut self.specular_transmittance)),
+            _ => None,
+        }
+    }
+
+    fn validate(&self) -> Result<(), SurfaceError> {
+        check(self.eta, self.specular_reflectance, self.specular_transmittance)
+    }
+
+    fn value<T: Real>(&self, _: impl Numbers<T>, _: At<'_>, _: [Vec3<T>; 3]) -> Rgb<T> {
+        Rgb::splat(T::zero())
+    }
+
+    fn gradient(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3) -> BsdfGradient {
+        BsdfGradient::default()
+    }
+
+    fn sample(&self, _: At<'_>, _: Vec3, _: Vec3, _: [f64; 3], _: Given) -> Option<Vec3> {
+        None
+    }
+
+    fn pdf(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3, _: Given) -> f64 {
+        0.0
+    }
+
+    fn sample_specular(
+        &self,
+        _: At<'_>,
+        from: Vec3,
+        n: Vec3,
+        choice: f64,
+        _: Given,
+    ) -> Option<SpecularSample> {
+        let cos = n.dot(from).abs();
+        if cos == 0.0 {
+            return None;
+        }
+        let reflected = reflected_by_pane(cos, self.eta);
+        Some(if choice < reflected {
+            let weight = self.specular_reflectance;
+            SpecularSample { w: mirrored(from, n), weight, straight: false }
+        } else {
+            SpecularSample { w: -from, weight: self.specular_transmittance, straight: true }
+        })
+    }
+
+    fn specular(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        let cos = n.dot(wo).abs().min(1.0);
+        let properties = self.differentiated();
+        let numbers = Lanes::<0>::new(properties);
+        let eta: Dual<f64, 3> = numbers.number(Property::Eta, self.eta);
+        let reflected = reflected_by_pane(Dual::from(cos), eta);
+        if same(-wo, wi) {
+            let through = Dual::one() - reflected;
+            let colour =
+                numbers.colour(Property::SpecularTransmittance, self.specular_transmittance);
+            return Some(SpecularValue::by_duals(properties, colour * through, through.re));
+        }
+        same(mirrored(wo, n), wi).then(|| {
+            let colour = numbers.colour(Property::SpecularReflectance, self.specular_reflectance);
+            SpecularValue::by_duals(properties, colour * reflected, reflected.re)
+        })
+    }
+
+    fn straight(&self, _: At<'_>, cos: f64) -> Rgb {
+        let reflected = if cos > 0.0 { reflected_by_pane(cos.min(1.0), self.eta) } else { 1.0 };
+        self.specular_transmittance * (1.0 - reflected)
+    }
+
+    /// No sampler asks for it, as nothing that moves is differentiated at such surfaces.
+    fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
+        Lobes::even(0.0)
+    }
+
+    fn lobe_width(&self, _: At<'_>) -> f64 {
+        0.0
+    }
+}
