@@ -118,11 +118,13 @@ impl Model for Blend {
         }
     }
 
+    #[inline(never)]
     fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], given: Given) -> Option<Vec3> {
         let (part, choice) = self.choose(u[2]);
         self.bsdfs[part].direction(at, from, n, [u[0], u[1], choice], given)
     }
 
+    #[inline(never)]
     fn sample_specular(
         &self,
         at: At<'_>,
@@ -137,6 +139,7 @@ impl Model for Blend {
         Some(SpecularSample { weight: sample.weight * times, ..sample })
     }
 
+    #[inline(never)]
     fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let parts = self.bsdfs.each_ref().map(|b| b.specular(at, wo, wi, n));
         if parts.iter().all(Option::is_none) {
@@ -154,6 +157,7 @@ impl Model for Blend {
         Some(both)
     }
 
+    #[inline(never)]
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
         let parts = self.bsdfs.iter().zip(self.choices());
         parts.map(|(b, choice)| choice * b.pdf_at(at, from, to, n, given)).sum()

@@ -279,6 +279,7 @@ impl Model for Coated {
         gradient
     }
 
+    #[inline(never)]
     fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], given: Given) -> Option<Vec3> {
         let cos = n.dot(from);
         let (reflects, choice) = choose(u[2], self.choices(cos));
@@ -292,6 +293,7 @@ impl Model for Coated {
         Some(mirrored(from, distribution.sample_visible(from, side, alpha, [u[0], u[1]])))
     }
 
+    #[inline(never)]
     fn sample_specular(
         &self,
         at: At<'_>,
@@ -319,6 +321,7 @@ impl Model for Coated {
     }
 
     /// A mirror below reflects to where the interface does.
+    #[inline(never)]
     fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let cos = n.dot(wo);
         let choices = self.choices(cos);
@@ -342,6 +345,7 @@ impl Model for Coated {
         Some(found)
     }
 
+    #[inline(never)]
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
         let a = Angles::new(from, to, n);
         let [reflects, rest] = self.choices(a.cos_o);

@@ -96,11 +96,13 @@ impl Model for Mask {
         scaled
     }
 
+    #[inline(never)]
     fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], given: Given) -> Option<Vec3> {
         let choice = self.there(u[2])?;
         self.bsdf.direction(at, from, n, [u[0], u[1], choice], given)
     }
 
+    #[inline(never)]
     fn sample_specular(
         &self,
         at: At<'_>,
@@ -115,6 +117,7 @@ impl Model for Mask {
         }
     }
 
+    #[inline(never)]
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
         self.bsdf.pdf_at(at, from, to, n, given) * self.opaque()
     }
@@ -123,6 +126,7 @@ impl Model for Mask {
         self.bsdf.lobe_width(at)
     }
 
+    #[inline(never)]
     fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let opacity = self.opaque();
         if let Some(inner) = self.bsdf.specular(at, wo, wi, n) {

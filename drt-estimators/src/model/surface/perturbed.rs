@@ -225,6 +225,7 @@ impl Model for Perturbed {
         scaled
     }
 
+    #[inline(never)]
     fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], given: Given) -> Option<Vec3> {
         let Some(at) = at else { return self.bsdf.direction(None, from, n, u, given) };
         let tilt = self.tilt(at, n);
@@ -244,6 +245,7 @@ impl Model for Perturbed {
         facet.sees(w).then_some(w)
     }
 
+    #[inline(never)]
     fn sample_specular(
         &self,
         at: At<'_>,
@@ -267,6 +269,7 @@ impl Model for Perturbed {
         Some(SpecularSample { weight: s.weight * shadowing, ..s })
     }
 
+    #[inline(never)]
     fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let Some(at) = at else { return self.bsdf.specular(None, wo, wi, n) };
         let tilt = self.tilt(at, n);
@@ -276,6 +279,7 @@ impl Model for Perturbed {
         Some(found.scaled(Rgb::splat(shadowing), 1.0))
     }
 
+    #[inline(never)]
     fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, given: Given) -> f64 {
         let Some(at) = at else { return self.bsdf.pdf_at(None, from, to, n, given) };
         let tilt = self.tilt(at, n);

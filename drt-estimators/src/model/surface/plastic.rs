@@ -183,6 +183,7 @@ impl Model for Plastic {
         }
     }
 
+    #[inline(never)]
     fn sample_specular(
         &self,
         _: At<'_>,
@@ -201,6 +202,7 @@ impl Model for Plastic {
         })
     }
 
+    #[inline(never)]
     fn specular(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let cos = n.dot(wo);
         if !self.is_smooth() || cos <= 0.0 || !same(mirrored(wo, n), wi) {

@@ -103,6 +103,7 @@ impl Model for Conductor {
         0.0
     }
 
+    #[inline(never)]
     fn sample_specular(
         &self,
         _: At<'_>,
@@ -119,6 +120,7 @@ impl Model for Conductor {
         })
     }
 
+    #[inline(never)]
     fn specular(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let cos = n.dot(wo);
         if cos <= 0.0 || !same(mirrored(wo, n), wi) {

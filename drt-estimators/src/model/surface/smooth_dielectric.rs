@@ -102,6 +102,7 @@ impl Model for Dielectric {
         0.0
     }
 
+    #[inline(never)]
     fn sample_specular(
         &self,
         _: At<'_>,
@@ -130,6 +131,7 @@ impl Model for Dielectric {
         Some(SpecularSample { w, weight: self.specular_transmittance * scale, straight: false })
     }
 
+    #[inline(never)]
     fn specular(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let cos = n.dot(wo);
         let (n, eta) = if cos > 0.0 { (n, self.eta) } else { (-n, self.eta.recip()) };

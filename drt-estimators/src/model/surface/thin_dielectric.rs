@@ -102,6 +102,7 @@ impl Model for ThinDielectric {
         0.0
     }
 
+    #[inline(never)]
     fn sample_specular(
         &self,
         _: At<'_>,
@@ -123,6 +124,7 @@ impl Model for ThinDielectric {
         })
     }
 
+    #[inline(never)]
     fn specular(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let cos = n.dot(wo).abs().min(1.0);
         let properties = self.differentiated();
