@@ -467,11 +467,9 @@ impl Model for Arc<Measured> {
 
     #[inline(never)]
     fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_duals::<{ COORDINATES + 0 }>(
-            self.differentiated(),
-            [wo, wi, n],
-            |numbers, directions| framed::value(self, numbers, at, directions),
-        )
+        by_duals::<COORDINATES>(self.differentiated(), [wo, wi, n], |numbers, directions| {
+            framed::value(self, numbers, at, directions)
+        })
     }
 
     fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
