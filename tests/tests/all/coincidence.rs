@@ -12,7 +12,7 @@ use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_medium::{Homogeneous, Phase};
 use drt_motion::{Change, Effect, GeometryChange};
 use drt_tests::Result;
-use drt_tests::matrix::estimators::{Effort, Limit, Pairs, compare};
+use drt_tests::matrix::estimators::{Effort, Pairs, compare};
 use drt_tests::matrix::{Cell, Set, Stage};
 
 /// Everything is turned, so that no coordinate of a plane is exact.
@@ -177,7 +177,7 @@ fn lamps_slide_in_ceilings() -> Result<()> {
         };
         let stage =
             Stage::new("lamp in a ceiling", scene, vec![Cell::new("lamp slides", [effect])]);
-        let effort = Effort { noise: 0.03, scale: 0.0, limit: Limit::Samples(1024), seed: 0 };
+        let effort = Effort { noise: 0.03, scale: 0.0, samples: 1024, seed: 0 };
         let methods = [EstimatorKind::Radiative.into(), EstimatorKind::Warped.into()];
         let pairs = compare(&stage, &methods, effort)?;
         println!("{}", Pairs(&pairs));

@@ -1,11 +1,11 @@
-//! Derivatives by the 2019 and the 2023 estimators against those by path space: every cell of the check matrix.
+//! Derivatives by the 2019 and the 2023 estimators against those by path space: every cell of the check matrix, whose short check
+//! is beside that of finite differences.
 //!
-//! The short check runs the representative cells with at most 256 samples per pixel. All of them,
-//! for four seconds each, to know what either estimator costs:
+//! All cells with as many samples per pixel as `DRT_SAMPLES` says, to know what either estimator costs:
 //! `cargo test --release -p drt-tests --test all -- --ignored estimators::all:: --nocapture`
 //!
-//! All that the 2019 theory covers, with the scale of each derivative known to 1 % or for ten minutes each
-//! (`DRT_SCALE=0.02 DRT_SECONDS=3000`: to 2 %, or for fifty):
+//! All that the 2019 theory covers, with the scale of each derivative known to 1 % or to what `DRT_SAMPLES` gives
+//! (`DRT_SCALE=0.02`: to 2 %):
 //! `cargo test --release -p drt-tests --test all -- --ignored estimators::covered:: --nocapture`, and `warped::` for the 2023
 //! estimator, `both_ends::` for paths from both ends. Images by these against those from the camera:
 //! `cargo test --release -p drt-tests --test all -- --ignored estimators::images:: --nocapture`
@@ -15,7 +15,7 @@ use std::time::Instant;
 use drt_estimators::EstimatorKind::{Radiative, Warped};
 use drt_estimators::{Depth, PathSampling, Session, Settings, Unattended, agreement};
 use drt_tests::Result;
-use drt_tests::matrix::estimators::{Effort, Limit, Method, Pairs, compare};
+use drt_tests::matrix::estimators::{Effort, Method, Pairs, compare};
 use drt_tests::matrix::{
     Stage, caged, deforming, lenses, lights, materials, media, riding, surfaces, textures,
 };
@@ -32,9 +32,9 @@ fn number(variable: &str, default: f64) -> f64 {
     std::env::var(variable).ok().and_then(|s| s.parse().ok()).unwrap_or(default)
 }
 
-/// Seconds that each estimator has for a stage, unless `DRT_SECONDS` says otherwise.
-fn seconds(default: f64) -> Limit {
-    Limit::Seconds(number("DRT_SECONDS", default))
+/// Most samples per pixel, unless `DRT_SAMPLES` says otherwise.
+fn samples(default: u32) -> u32 {
+    number("DRT_SAMPLES", f64::from(default)) as u32
 }
 
 /// Another number for other random numbers, `DRT_SEED`.
@@ -42,33 +42,29 @@ fn seed() -> u64 {
     number("DRT_SEED", 0.0) as u64
 }
 
-fn short() -> Effort {
-    Effort { noise: 0.05, scale: 0.0, limit: Limit::Samples(256), seed: seed() }
-}
-
 fn costs() -> Effort {
-    Effort { noise: 0.01, scale: 0.0, limit: seconds(4.0), seed: seed() }
+    Effort { noise: 0.01, scale: 0.0, samples: samples(1 << 11), seed: seed() }
 }
 
 /// Until scales are known to 1 %, or to the part that `DRT_SCALE` says.
 fn precise() -> Effort {
     let scale = number("DRT_SCALE", 0.01);
-    Effort { noise: 0.01, scale, limit: seconds(600.0), seed: seed() }
+    Effort { noise: 0.01, scale, samples: samples(1 << 18), seed: seed() }
 }
 
-/// Doubles samples until both images are known to 1/2 %, or time is over.
+/// Doubles samples until both images are known to 1/2 %, or samples are spent.
 fn images(stage: &Stage) {
     let run = |sampling, seed| {
         let settings =
             Settings { sampling, seed, max_depth: Depth::OfScene, ..Settings::default() };
         let mut session = Session::new(&stage.scene, &[], &settings).unwrap();
-        let (started, most) = (Instant::now(), number("DRT_SECONDS", 4.0));
+        let started = Instant::now();
         let mut spp = 64;
         loop {
             session.run(spp, &Unattended);
             let rendering = session.rendering();
             let noise = rendering.image.relative_noise(None);
-            if noise < 0.005 || started.elapsed().as_secs_f64() > most {
+            if noise < 0.005 || 2 * rendering.spp > samples(1 << 14) {
                 return (rendering, noise, started.elapsed().as_secs_f64());
             }
             spp = rendering.spp;
@@ -91,12 +87,6 @@ fn images(stage: &Stage) {
 
 macro_rules! stages {
     ($($room:ident: $($stage:ident)*;)*) => {
-        mod short {
-            $($(#[test] fn $stage() {
-                let stage = super::$room::$stage().map(super::Stage::short);
-                super::run(stage, &[super::Radiative.into(), super::Warped.into()], super::short());
-            })*)*
-        }
         mod all {
             $($(#[test] #[ignore = "minutes"] fn $stage() {
                 super::run(super::$room::$stage(), &[super::Radiative.into()], super::costs());

@@ -8,6 +8,7 @@ mod invariances;
 mod oracle_faults;
 mod oracles;
 mod random_scenes;
+mod references;
 mod refusals;
 mod skipping;
 mod stability;
