@@ -1,6 +1,5 @@
 //! Parameters as data: which changes reach a target, and files.
 
-#[cfg(feature = "serde")]
 use drt_math::Vec3;
 use drt_motion::parameter::{Applied, geometry_changes, property_changes};
 use drt_motion::{Cause, Change, Effect, GeometryChange, Parameter, PropertyChange, ValueChange};
