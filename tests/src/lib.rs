@@ -11,6 +11,7 @@ pub mod matrix;
 pub mod measure;
 pub mod motion;
 pub mod oracle;
+pub mod reference;
 pub mod region;
 pub mod rooms;
 pub mod scene;

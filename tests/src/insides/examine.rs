@@ -3,17 +3,15 @@
 use std::fmt;
 use std::time::Instant;
 
-use drt_estimators::{
-    Agreement, Estimate, Layer, Session, Settings, Unattended, agreement, finite_differences,
-};
+use drt_estimators::{Agreement, Estimate, Layer, Session, Settings, Unattended, agreement};
 use drt_math::Rgb;
 
 use super::{Case, Way};
 use crate::Result;
-use crate::matrix::verdict::plus;
+use crate::reference::{self, Reference, Wanted};
 
 /// Samples per pixel of the first round.
-const ROUND: u32 = 1 << 9;
+const ROUND: u32 = 1 << 10;
 
 /// Rms z at which what is wrong has shown.
 const CLEAR: f64 = 2.0;
@@ -27,6 +25,10 @@ const MOST_DIFFERENCES: u32 = 1 << 20;
 
 /// How much noisier than the other ways finite differences may be.
 const COARSER: f64 = 3.0;
+
+/// The names of stored references.
+const FIRST: &str = "first way";
+const DIFFERENCES_NAME: &str = "finite differences";
 
 /// A derivative image by one way, and whether it is that of the first.
 #[derive(Clone, Debug)]
@@ -74,16 +76,71 @@ impl Finding {
     }
 }
 
-/// Computes every right way to a relative noise, or to a number of samples per pixel, and every wrong
-/// one until it shows, at most with a few times the samples of the first.
+/// How much less noise stored references have than what is judged by them.
+const FINER: f64 = 4.0;
+
+/// Samples per pixel of the stored finite differences.
+const LONG_DIFFERENCES: u32 = 1 << 14;
+
+/// The first way with little noise, and finite differences if the case asks for them, as they are stored.
 ///
 /// # Errors
 /// When the library rejects the scene or a way.
-pub fn examine(case: &Case, noise: f64, samples: u32) -> Result<Finding> {
+pub fn references(case: &Case, noise: f64, seed: u64) -> Result<Vec<Reference>> {
+    let way = &case.right[0];
+    let mut run = Run::new(case, way, seed)?;
+    while run.noise() > noise / FINER {
+        run.go_on(noise / FINER, u32::MAX);
+    }
+    let mut all = vec![Reference {
+        name: FIRST.into(),
+        fingerprint: 0,
+        samples: run.samples,
+        seed,
+        step: 0.0,
+        change: vec![Rgb::ZERO; run.layer.blocks.len()],
+        blocks: run.layer.blocks,
+    }];
+    if let Some(step) = case.step {
+        let (scene, parameter) = (&case.scene, &way.parameter);
+        let found = Reference::by_differences(scene, parameter, step, LONG_DIFFERENCES, seed)?;
+        all.push(Reference { name: DIFFERENCES_NAME.into(), ..found });
+    }
+    let of = fingerprint_of(case);
+    Ok(all.into_iter().map(|reference| reference.standing_for(of)).collect())
+}
+
+/// The [references] that are stored.
+///
+/// # Errors
+/// When one is missing, cannot be read, or stands for another scene than the case has.
+pub fn stored(case: &Case) -> Result<Vec<Reference>> {
+    let names = [Some(FIRST), case.step.map(|_| DIFFERENCES_NAME)];
+    let wanted = names.into_iter().flatten().map(|name| Wanted {
+        name,
+        fingerprint: fingerprint_of(case),
+        samples: None,
+    });
+    reference::stored(case.name, &wanted.collect::<Vec<_>>())
+}
+
+fn fingerprint_of(case: &Case) -> u64 {
+    let step = case.step.unwrap_or_default();
+    reference::fingerprint(case.name, &case.scene, &case.right[0].parameter, step)
+}
+
+/// Computes every right way to a relative noise, or to a number of samples per pixel, and every wrong
+/// one until it shows, at most with a few times the samples of the first. All are judged by the `known` references, or
+/// without any by the first way and by finite differences of now.
+///
+/// # Errors
+/// When the library rejects the scene or a way.
+pub fn examine(case: &Case, noise: f64, samples: u32, known: &[Reference]) -> Result<Finding> {
     let fail = |way: &Way, e: drt_estimators::Error| format!("{}, {}: {e}", case.name, way.name);
     let mut right: Vec<Verdict> = Vec::new();
     let mut wrong = Vec::new();
-    let mut first: Option<Layer> = None;
+    let mut reference = known.first().map(Reference::layer);
+    let mut own: Option<Layer> = None;
     let mut non_finite = 0;
     // Other random numbers for each, so that their errors are independent.
     for (seed, way) in (1..).zip(&case.right) {
@@ -91,11 +148,15 @@ pub fn examine(case: &Case, noise: f64, samples: u32) -> Result<Finding> {
         while run.noise() > noise && run.samples < samples {
             run.go_on(noise, samples);
         }
-        let other = first.get_or_insert_with(|| run.layer.clone());
+        let other = reference.get_or_insert_with(|| run.layer.clone());
         right.push(run.verdict(way, other));
+        own.get_or_insert_with(|| run.layer.clone());
         non_finite += run.non_finite;
     }
-    let (first, samples) = (first.ok_or("a case needs a way")?, PATIENCE * right[0].samples);
+    let (Some(first), Some(own)) = (reference, own) else {
+        return Err("a case needs a way".into());
+    };
+    let samples = PATIENCE * right[0].samples;
     for (seed, way) in (101..).zip(&case.wrong) {
         let mut run = Run::new(case, way, seed).map_err(|e| fail(way, e))?;
         while compare(&run.layer, &first).rms_z < CLEAR && run.samples < samples {
@@ -103,37 +164,38 @@ pub fn examine(case: &Case, noise: f64, samples: u32) -> Result<Finding> {
         }
         wrong.push(run.verdict(way, &first));
     }
-    let differences = case.step.map(|step| differences(case, step, noise, &first)).transpose()?;
+    let differences = match (known, case.step) {
+        ([_, known, ..], _) => Some(differences_verdict(known, &own)),
+        (_, Some(step)) => Some(differences(case, step, noise, &own)?),
+        _ => None,
+    };
     Ok(Finding { name: case.name, limit: noise, right, wrong, differences, non_finite })
 }
 
 /// Finite differences by as many samples as the noise takes.
 fn differences(case: &Case, step: f64, noise: f64, first: &Layer) -> Result<Verdict> {
     let start = Instant::now();
-    let way = &case.right[0];
-    let settings = Settings { threads: 1, seed: 201, ..Settings::default() };
     let mut samples = DIFFERENCES;
     loop {
-        let difference = |step: f64| -> Result<Layer> {
-            let parameters = std::slice::from_ref(&way.parameter);
-            let layers =
-                finite_differences(&case.scene, parameters, &settings, samples, step, &Unattended)?;
-            Ok(layers.into_iter().next().ok_or("no finite difference")?)
-        };
-        let half = difference(0.5 * step)?;
-        let relative = relative_noise(&half);
-        if relative > COARSER * noise && samples < MOST_DIFFERENCES {
+        let (scene, parameter) = (&case.scene, &case.right[0].parameter);
+        let found = Reference::by_differences(scene, parameter, step, samples, 201)?;
+        if relative_noise(&found.layer()) > COARSER * noise && samples < MOST_DIFFERENCES {
             samples *= 4;
             continue;
         }
-        let bias = plus(&difference(step)?, -1.0, &half);
-        return Ok(Verdict {
-            way: "finite differences",
-            agreement: compare_biased(first, &half, &bias),
-            noise: relative,
-            samples,
-            seconds: start.elapsed().as_secs_f64(),
-        });
+        let seconds = start.elapsed().as_secs_f64();
+        return Ok(Verdict { seconds, ..differences_verdict(&found, first) });
+    }
+}
+
+fn differences_verdict(found: &Reference, first: &Layer) -> Verdict {
+    let half = found.layer();
+    Verdict {
+        way: DIFFERENCES_NAME,
+        agreement: compare_biased(first, &half, &found.change()),
+        noise: relative_noise(&half),
+        samples: found.samples,
+        seconds: 0.0,
     }
 }
 

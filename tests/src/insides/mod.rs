@@ -10,7 +10,7 @@ pub mod sheets;
 mod stirred;
 
 pub use cases::Case;
-pub use examine::{Finding, Table, Verdict, examine};
+pub use examine::{Finding, Table, Verdict, examine, references, stored};
 pub use stirred::Stirred;
 
 use drt_estimators::InteriorMotion;

@@ -95,6 +95,12 @@ impl Stage {
         self
     }
 
+    /// The cells that one run can differentiate together: a parameter that is not at rest changes the scene for all of its run.
+    pub fn runs(&self) -> impl Iterator<Item = &[Cell]> {
+        let at_rest = |c: &Cell| c.parameter.value == 0.0;
+        self.cells.chunk_by(move |a, b| at_rest(a) && at_rest(b))
+    }
+
     /// The same with nothing but what the 2019 theory covers: without lights that shine from points and
     /// directions, and without what changes these; under a sky where nothing else shines.
     #[must_use]

@@ -1,7 +1,6 @@
 //! Derivatives by one estimator against those by others.
 
 use std::fmt;
-use std::ops::Mul;
 use std::time::Instant;
 
 use drt_estimators::{
@@ -11,9 +10,10 @@ use drt_estimators::{
 use drt_motion::Parameter;
 
 use super::scale::{Halves, Scale};
-use super::verdict::{SIGNIFICANT, plus};
-use super::{Cell, Fault, Stage};
+use super::verdict::{MOST_ERRORS, SIGNIFICANT, judge, plus};
+use super::{Fault, Row, Stage};
 use crate::Result;
+use crate::reference::Reference;
 
 /// Samples per pixel of the first round. There are two at least: they are [compared](Scale) by halves.
 const ROUND: u32 = 1 << 6;
@@ -24,9 +24,6 @@ const EACH: f64 = 0.95 * std::f64::consts::FRAC_1_SQRT_2;
 
 /// A derivative below this part of the largest one of its image is measured against that one.
 const NEAR_ZERO: f64 = 0.05;
-
-/// A single number agrees within this many standard errors.
-const MOST_ERRORS: f64 = 4.0;
 
 /// An estimator of derivatives, and how it finds paths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,36 +47,6 @@ impl From<EstimatorKind> for Method {
     }
 }
 
-/// When the sampling of one stage by one estimator stops, precise enough or not.
-#[derive(Clone, Copy, Debug)]
-pub enum Limit {
-    /// After so many samples per pixel, which are the same on every machine.
-    Samples(u32),
-    /// After about so many seconds.
-    Seconds(f64),
-}
-
-impl Limit {
-    /// True where as many samples again would exceed it.
-    fn is_reached(self, samples: u32, seconds: f64) -> bool {
-        match self {
-            Self::Samples(most) => 2 * samples > most,
-            Self::Seconds(most) => 2.0 * seconds > most,
-        }
-    }
-}
-
-impl Mul<f64> for Limit {
-    type Output = Self;
-
-    fn mul(self, factor: f64) -> Self {
-        match self {
-            Self::Samples(most) => Self::Samples((f64::from(most) * factor) as u32),
-            Self::Seconds(most) => Self::Seconds(most * factor),
-        }
-    }
-}
-
 /// How far to go.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
@@ -87,8 +54,8 @@ pub struct Effort {
     pub noise: f64,
     /// Standard error of each [scale](Scale) that is enough instead; 0 where only the former counts.
     pub scale: f64,
-    /// Where to stop if neither is reached.
-    pub limit: Limit,
+    /// Samples per pixel at which to stop if neither is reached.
+    pub samples: u32,
     /// Of the random numbers.
     pub seed: u64,
 }
@@ -123,16 +90,9 @@ impl Pair {
     /// True when both agree, and what is clearly wrong does not.
     #[must_use]
     pub fn passes(&self) -> bool {
-        let unseen = |f: &Fault| f.agreement.agrees && self.could_see(f);
+        let unseen = |f: &Fault| f.must_be_seen && !f.is_seen;
         let scale = self.scale.z() <= MOST_ERRORS;
         self.agreement.agrees && scale && !self.faults.iter().any(unseen) && self.non_finite == 0
-    }
-
-    /// True where the derivative is known well enough to show a fault: a term of the wrong sign is off by twice its size.
-    #[must_use]
-    pub fn could_see(&self, fault: &Fault) -> bool {
-        let part = self.terms.iter().find(|(t, _)| *t == fault.term).map_or(0.0, |(_, p)| *p);
-        2.0 * part > 3.0 * self.noise[0].hypot(self.noise[1])
     }
 }
 
@@ -154,7 +114,7 @@ pub fn compare(stage: &Stage, methods: &[Method], effort: Effort) -> Result<Vec<
         failing
             .cells
             .retain(|c| pairs.iter().any(|pair| again(pair) && pair.parameter == c.parameter.name));
-        let longer = Effort { limit: effort.limit * 8.0, ..effort };
+        let longer = Effort { samples: 8 * effort.samples, ..effort };
         let second = compare_once(&failing, &[*method], longer, seeds(100))?;
         for pair in pairs.iter_mut().filter(|pair| again(pair)) {
             if let Some(other) = second.iter().find(|s| s.parameter == pair.parameter) {
@@ -172,8 +132,7 @@ fn compare_once(
     seeds: [u64; 2],
 ) -> Result<Vec<Pair>> {
     let mut pairs = Vec::new();
-    let at_rest = |c: &Cell| c.parameter.value == 0.0;
-    for cells in stage.cells.chunk_by(|a, b| at_rest(a) && at_rest(b)) {
+    for cells in stage.runs() {
         let parameters: Vec<Parameter> = cells.iter().map(|c| c.parameter.clone()).collect();
         let run = |method, seed| sample(stage, &parameters, method, seed, effort);
         // Other random numbers, so that the errors are independent.
@@ -186,6 +145,59 @@ fn compare_once(
     Ok(pairs)
 }
 
+/// A stage by several estimators, each of which was sampled once.
+#[derive(Clone, Debug, Default)]
+pub struct Examined {
+    /// Each against finite differences.
+    pub rows: Vec<Row>,
+    /// Others against path space.
+    pub pairs: Vec<Pair>,
+}
+
+/// Samples a stage by path space, as long as the stage says, and by each of some `methods`, and judges all by finite differences
+/// and the `methods` also by path space. What fails is [measured once more](compare).
+///
+/// # Errors
+/// When the library rejects the scene or a parameter.
+pub fn examine(
+    stage: &Stage,
+    references: &[Reference],
+    methods: &[Method],
+    effort: Effort,
+) -> Result<Examined> {
+    let mut found = Examined::default();
+    let mut number = 0;
+    for cells in stage.runs() {
+        let references = &references[number..number + cells.len()];
+        number += cells.len();
+        let parameters: Vec<Parameter> = cells.iter().map(|c| c.parameter.clone()).collect();
+        let rows = |method: Method, sampled: &Sampled| -> Vec<Row> {
+            let cells = cells.iter().enumerate().zip(references);
+            let of =
+                |((k, cell), reference)| judge(stage.name, method, (cell, k), sampled, reference);
+            cells.map(of).collect()
+        };
+        let longest = Effort { noise: 0.0, scale: 0.0, samples: stage.samples, ..effort };
+        let run = |seed| sample(stage, &parameters, Method::REFERENCE, seed, longest);
+        let path_space = run(effort.seed + 7)?;
+        found.rows.extend(rows(Method::REFERENCE, &path_space));
+        for method in methods {
+            let run = |effort: Effort| -> Result<(Vec<Row>, Vec<Pair>)> {
+                let own = sample(stage, &parameters, *method, effort.seed + 19, effort)?;
+                Ok((rows(*method, &own), pairs_of(stage.name, *method, &own, &path_space)))
+            };
+            let (mut rows, mut pairs) = run(effort)?;
+            if !(rows.iter().all(Row::passes) && pairs.iter().all(Pair::passes)) {
+                let (seed, samples) = (effort.seed + 100, 8 * effort.samples);
+                (rows, pairs) = run(Effort { seed, samples, ..effort })?;
+            }
+            found.rows.extend(rows);
+            found.pairs.extend(pairs);
+        }
+    }
+    Ok(found)
+}
+
 /// The comparisons of all derivatives that two estimators have sampled.
 fn pairs_of(stage: &'static str, method: Method, own: &Sampled, reference: &Sampled) -> Vec<Pair> {
     let mut pairs = Vec::new();
@@ -196,10 +208,17 @@ fn pairs_of(stage: &'static str, method: Method, own: &Sampled, reference: &Samp
         let terms: Vec<(Term, f64)> =
             a.terms.iter().map(|(t, l)| (*t, l.rms_value() / size * part)).collect();
         let plant = |((term, part), (_, layer)): (&(Term, f64), &(Term, Layer))| {
-            (*part >= SIGNIFICANT).then(|| Fault {
-                term: *term,
-                factor: -1.0,
-                agreement: agreement(&plus(&a.total, -2.0, layer), &b.total, None),
+            (*part >= SIGNIFICANT).then(|| {
+                let found = agreement(&plus(&a.total, -2.0, layer), &b.total, None);
+                Fault {
+                    term: *term,
+                    factor: -1.0,
+                    rms_z: found.rms_z,
+                    scale_z: 0.0,
+                    is_seen: !found.agrees,
+                    // A term of the wrong sign is off by twice its size.
+                    must_be_seen: 2.0 * part > 3.0 * noise[0].hypot(noise[1]),
+                }
             })
         };
         pairs.push(Pair {
@@ -219,12 +238,12 @@ fn pairs_of(stage: &'static str, method: Method, own: &Sampled, reference: &Samp
 }
 
 /// What has been sampled.
-struct Sampled {
-    /// Of the first half of the samples.
-    first: Rendering,
-    /// Of all of them.
-    all: Rendering,
-    seconds: f64,
+pub(super) struct Sampled {
+    /// From the first half of the samples.
+    pub(super) first: Rendering,
+    /// From all of them.
+    pub(super) all: Rendering,
+    pub(super) seconds: f64,
 }
 
 impl Sampled {
@@ -264,6 +283,8 @@ fn sample(
         seed,
         estimator,
         sampling,
+        boundary_ratio: (Method(estimator, sampling) == Method::REFERENCE)
+            .then(|| f64::from(stage.boundary_samples) / f64::from(stage.samples)),
         terms: true,
         insides: stage.insides.clone(),
         ..Settings::default()
@@ -276,7 +297,7 @@ fn sample(
         // As many again.
         session.run(first.spp, &Unattended);
         let (all, seconds) = (session.rendering(), start.elapsed().as_secs_f64());
-        let is_last = effort.limit.is_reached(all.spp, seconds);
+        let is_last = 2 * all.spp > effort.samples;
         let sampled = Sampled { first, all, seconds };
         if sampled.is_enough(effort) || is_last {
             return Ok(sampled);
@@ -312,8 +333,8 @@ impl fmt::Display for Pairs<'_> {
                 write!(f, " {} {part:.2}", term.name())?;
             }
             for fault in &pair.faults {
-                let unclear = if pair.could_see(fault) { "" } else { " (in noise)" };
-                write!(f, "; {} × -1: {:.1}{unclear}", fault.term.name(), fault.agreement.rms_z)?;
+                let unclear = if fault.must_be_seen { "" } else { " (in noise)" };
+                write!(f, "; {} × -1: {:.1}{unclear}", fault.term.name(), fault.rms_z)?;
             }
             writeln!(f, "{}", if pair.passes() { "" } else { "  <<< FAILS" })?;
         }

@@ -14,6 +14,7 @@ pub mod lights;
 pub mod materials;
 pub mod media;
 pub mod random;
+pub mod reference;
 pub mod riding;
 pub mod scale;
 pub(crate) mod set;
@@ -24,7 +25,7 @@ pub(crate) mod verdict;
 
 pub use cell::{Cell, Stage};
 pub use set::Set;
-pub use verdict::{Fault, Row, Table, check};
+pub use verdict::{Fault, Row, Table};
 
 /// Hands the names of all stages, by module, to another macro.
 #[macro_export]

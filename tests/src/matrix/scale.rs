@@ -56,6 +56,29 @@ impl Scale {
         Self { off: difference / size, stderr: variance.sqrt() / size.abs() }
     }
 
+    /// Compares an estimate with a finite difference, and with what doubling the step `changes` it by. A third of that
+    /// is the error of the second order, which is taken away; how much this moves the scale counts as an error.
+    #[must_use]
+    pub fn against(a: Halves<'_>, b: &Layer, changes: &Layer) -> Self {
+        let [first, second] = &a.split();
+        let of_first = weights_of(first);
+        let of_second = weights_of(second);
+        let (mut difference, mut size, mut variance, mut bias) = (0.0, 0.0, 0.0, 0.0);
+        for (k, (b, change)) in b.blocks.iter().zip(&changes.blocks).enumerate() {
+            let correction = change.mean * (1.0 / 3.0);
+            let mean = b.mean - correction;
+            // Weights come from the half that is not judged by them.
+            for (w, a) in [(of_first[k], &second[k]), (of_second[k], &first[k])] {
+                difference += w.dot(a.mean - mean);
+                size += w.dot(mean);
+                variance += weighted_error(w, a).powi(2);
+                bias += w.dot(correction);
+            }
+            variance += weighted_error(of_first[k] + of_second[k], b).powi(2);
+        }
+        Self { off: difference / size, stderr: variance.sqrt().hypot(bias) / size.abs() }
+    }
+
     /// How well one estimate alone is known, as a part of it.
     #[must_use]
     pub fn noise(a: Halves<'_>) -> f64 {
@@ -104,6 +127,11 @@ fn weighted_error(w: Rgb, e: &Estimate) -> f64 {
     w.map(f64::abs).dot(e.stderr)
 }
 
+/// By what has been seen of one.
+fn weights_of(a: &Half) -> Vec<Rgb> {
+    weights(a, a)
+}
+
 /// By what has been seen of both.
 fn weights(a: &Half, b: &Half) -> Vec<Rgb> {
     let blocks = || a.iter().zip(b);
@@ -150,6 +178,40 @@ mod tests {
             tail: Tail::default(),
             blocks,
         })
+    }
+
+    /// Mean of what an image that is a factor times another is said to be larger by than that other, which is known but
+    /// for the error of a step, and the standard error in the mean; both in standard errors.
+    fn against_known(factor: f64) -> [f64; 2] {
+        let mut rng = Rng::new(6, 0, 0);
+        let mut sums = [0.0; 2];
+        for _ in 0..TRIALS {
+            let [first, all] = measured(factor, &mut rng);
+            let with = |of: &dyn Fn(usize) -> f64, stderr: f64| {
+                let mut layer = all.clone();
+                for (i, block) in layer.blocks.iter_mut().enumerate() {
+                    *block = Estimate { mean: Rgb::splat(of(i)), stderr: Rgb::splat(stderr) };
+                }
+                layer
+            };
+            let exact = |i: usize| (f64::from(i as u32) * 0.3).sin();
+            let change = |i: usize| 3e-3 * exact(i);
+            let known = with(&|i| exact(i) + change(i) / 3.0, 1e-4);
+            let halves = Halves { first: &first, all: &all };
+            let scale = Scale::against(halves, &known, &with(&change, 0.0));
+            let z = scale.off / scale.stderr;
+            [z, scale.stderr].iter().zip(&mut sums).for_each(|(x, sum)| *sum += x);
+        }
+        sums.map(|s| s / TRIALS as f64)
+    }
+
+    #[test]
+    fn finite_differences_are_corrected_for_their_steps() {
+        let [mean, stderr] = against_known(1.0);
+        assert!(mean.abs() < 4.0 / (TRIALS as f64).sqrt(), "{mean}");
+        // Planted: a factor is off by five standard errors.
+        let [mean, _] = against_known(1.0 + 5.0 * stderr);
+        assert!((4.0..6.0).contains(&mean), "{mean}");
     }
 
     /// Mean and rms, in standard errors, of what an image that is a factor times another is said to be

@@ -1,22 +1,22 @@
 //! Derivatives against finite differences, and against the same with a planted fault.
 
 use std::fmt;
-use std::time::Instant;
 
-use drt_estimators::{
-    Agreement, Derivative, Layer, Session, Settings, Term, Unattended, agreement,
-    finite_differences,
-};
-use drt_motion::Parameter;
+use drt_estimators::{Agreement, Derivative, Layer, Term, agreement};
 
-use super::{Cell, Stage};
-use crate::Result;
-
-/// Errors of finite differences below this part of the image's rms are not told apart.
-const RESOLUTION: f64 = 5e-3;
+use super::Cell;
+use super::estimators::{Method, Sampled};
+use super::scale::{Halves, Scale};
+use crate::reference::{RESOLUTION, Reference, at_least};
 
 /// Terms from this part of the derivative on must not pass with the wrong sign.
 pub(super) const SIGNIFICANT: f64 = 0.3;
+
+/// The factor that must not pass where a cell is known precisely.
+const OFF: f64 = 1.03;
+
+/// A single number agrees within this many standard errors.
+pub(super) const MOST_ERRORS: f64 = 4.0;
 
 /// A cell's verdict.
 #[derive(Clone, Debug)]
@@ -25,15 +25,19 @@ pub struct Row {
     pub stage: &'static str,
     /// Name of the parameter.
     pub parameter: String,
+    /// The estimator in question.
+    pub method: Method,
     /// The comparison.
     pub agreement: Agreement,
+    /// How much larger the derivative is than the finite difference.
+    pub scale: Scale,
     /// Relative noise of the derivative's block means, and of the finite difference's.
     pub noise: [f64; 2],
     /// Difference of the finite differences of both steps over their size.
     pub step_error: f64,
     /// Block means of each term over those of the finite difference, rms.
     pub terms: Vec<(Term, f64)>,
-    /// What was planted, and the comparisons then.
+    /// What was planted, and whether it was seen.
     pub faults: Vec<Fault>,
     /// Contributions that were no numbers.
     pub non_finite: u64,
@@ -45,8 +49,9 @@ impl Row {
     /// True when the derivative agrees, and a wrong one would not.
     #[must_use]
     pub fn passes(&self) -> bool {
-        let unseen = |fault: &Fault| fault.agreement.agrees;
-        self.agreement.agrees && !self.faults.iter().any(unseen) && self.non_finite == 0
+        let unseen = |fault: &Fault| fault.must_be_seen && !fault.is_seen;
+        let right = self.agreement.agrees && self.scale.z() <= MOST_ERRORS;
+        right && !self.faults.iter().any(unseen) && self.non_finite == 0
     }
 }
 
@@ -57,98 +62,83 @@ pub struct Fault {
     pub term: Term,
     /// The factor.
     pub factor: f64,
-    /// The comparison with finite differences.
-    pub agreement: Agreement,
+    /// The rms z of the comparison by blocks.
+    pub rms_z: f64,
+    /// How many standard errors the scale is off by.
+    pub scale_z: f64,
+    /// Whether the derivative was rejected.
+    pub is_seen: bool,
+    /// Whether the noise is small enough for that.
+    pub must_be_seen: bool,
 }
 
-/// Checks every cell of a stage.
-///
-/// # Errors
-/// When the library rejects the scene or a parameter.
-pub fn check(stage: &Stage) -> Result<Vec<Row>> {
-    let mut rows = Vec::new();
-    // A parameter that is not at rest changes the scene for all of its run.
-    let at_rest = |c: &Cell| c.parameter.value == 0.0;
-    for cells in stage.cells.chunk_by(|a, b| at_rest(a) && at_rest(b)) {
-        let parameters: Vec<Parameter> = cells.iter().map(|c| c.parameter.clone()).collect();
-        let start = Instant::now();
-        // Tests run side by side; each keeps to one thread.
-        let settings = Settings {
-            threads: 1,
-            seed: 7,
-            boundary_ratio: Some(f64::from(stage.boundary_samples) / f64::from(stage.samples)),
-            terms: true,
-            insides: stage.insides.clone(),
-            ..Settings::default()
-        };
-        let mut session = Session::new(&stage.scene, &parameters, &settings)?;
-        session.run(stage.samples, &Unattended);
-        let rendering = session.rendering();
-        let share = start.elapsed().as_secs_f64() / cells.len() as f64;
-        let radiance = rendering.image.rms_value();
-        for (cell, derivative) in cells.iter().zip(&rendering.derivatives) {
-            let mut row = compare(stage, cell, derivative, radiance)?;
-            row.non_finite = rendering.non_finite;
-            row.seconds += share;
-            rows.push(row);
-        }
-    }
-    Ok(rows)
-}
-
-/// Judges a derivative of an image of about the given radiance.
-fn compare(stage: &Stage, cell: &Cell, derivative: &Derivative, radiance: f64) -> Result<Row> {
-    let start = Instant::now();
-    let settings = Settings { threads: 1, seed: 11, ..Settings::default() };
-    let parameters = [cell.parameter.clone()];
-    let difference = |step: f64| -> Result<Layer> {
-        let Stage { scene, .. } = stage;
-        let layers =
-            finite_differences(scene, &parameters, &settings, cell.samples, step, &Unattended)?;
-        Ok(layers.into_iter().next().ok_or("no finite difference")?)
+/// Judges the derivative that was sampled of a cell, the one with a number in its run.
+pub(super) fn judge(
+    stage: &'static str,
+    method: Method,
+    (cell, number): (&Cell, usize),
+    sampled: &Sampled,
+    reference: &Reference,
+) -> Row {
+    let [first, all] = [&sampled.first, &sampled.all].map(|r| &r.derivatives[number]);
+    let half = resolved(reference, cell, sampled, all);
+    let change = reference.change();
+    let compare = |[first, all]: [&Layer; 2]| {
+        let agreement = agreement(all, &half, Some(&change));
+        (agreement, Scale::against(Halves { first, all }, &half, &change))
     };
-    let (whole, mut half) = (difference(cell.step)?, difference(0.5 * cell.step)?);
-    let change = plus(&whole, -1.0, &half);
-    // Blocks where next to nothing happens would be judged by the few samples that say so.
-    let mut least = RESOLUTION * half.rms_value();
-    if derivative.terms.iter().any(|(t, l)| *t != Term::Interior && l.rms_value() > 0.0) {
-        // One sample more or less for which an edge passes between both images.
-        let samples = half.pixels.len() / half.blocks.len() * cell.samples as usize;
-        least = least.max(radiance / (cell.step * samples as f64));
-    }
-    for block in &mut half.blocks {
-        block.stderr = block.stderr.map(|e| e.max(least));
-    }
-    let total = &derivative.total;
-    let judge = |derivative: &Layer| agreement(derivative, &half, Some(&change));
+    let (agreement, scale) = compare([&first.total, &all.total]);
     let size = half.rms_value();
+    let noise = [&all.total, &half].map(|l| l.relative_noise(Some(size)));
     let terms: Vec<(Term, f64)> =
-        derivative.terms.iter().map(|(t, l)| (*t, l.rms_value() / size)).collect();
+        all.terms.iter().map(|(t, l)| (*t, l.rms_value() / size)).collect();
     let largest = terms.iter().map(|(_, part)| *part).fold(0.0, f64::max);
+    let plant = |k: usize, factor: f64, must_be_seen: bool| {
+        let wrong = [first, all].map(|d| plus(&d.total, factor - 1.0, &d.terms[k].1));
+        let (agreement, scale) = compare([&wrong[0], &wrong[1]]);
+        let is_seen = !agreement.agrees || scale.z() > MOST_ERRORS;
+        let (term, rms_z, scale_z) = (terms[k].0, agreement.rms_z, scale.z());
+        Fault { term, factor, rms_z, scale_z, is_seen, must_be_seen }
+    };
+    let is_path_space = method == Method::REFERENCE;
     let mut faults = Vec::new();
-    for ((term, part), (_, layer)) in terms.iter().zip(&derivative.terms) {
-        let mut plant = |factor: f64| {
-            let agreement = judge(&plus(total, factor - 1.0, layer));
-            faults.push(Fault { term: *term, factor, agreement });
-        };
+    for (k, (_, part)) in terms.iter().enumerate() {
         if *part >= SIGNIFICANT {
-            plant(-1.0);
+            // A term of the wrong sign is off by twice its size.
+            let clear = 2.0 * part > 3.0 * noise[0].hypot(noise[1]);
+            faults.push(plant(k, -1.0, is_path_space || clear));
         }
-        if cell.precise && *part == largest {
-            plant(1.03);
+        if *part == largest {
+            let clear = (OFF - 1.0) * part > 2.0 * MOST_ERRORS * scale.stderr;
+            faults.push(plant(k, OFF, clear || is_path_space && cell.precise));
         }
     }
-    Ok(Row {
-        stage: stage.name,
+    Row {
+        stage,
         parameter: cell.parameter.name.clone(),
-        agreement: judge(total),
-        noise: [total, &half].map(|l| l.relative_noise(Some(size))),
+        method,
+        agreement,
+        scale,
+        noise,
         step_error: change.rms_value() / size,
         terms,
         faults,
-        non_finite: 0,
-        seconds: start.elapsed().as_secs_f64(),
-    })
+        non_finite: sampled.all.non_finite,
+        seconds: sampled.seconds / sampled.all.derivatives.len() as f64,
+    }
+}
+
+/// The finite difference with errors that are not too small. Blocks where next to nothing happens would be judged by the few samples that say so.
+fn resolved(reference: &Reference, cell: &Cell, sampled: &Sampled, all: &Derivative) -> Layer {
+    let half = reference.layer();
+    let mut least = RESOLUTION * half.rms_value();
+    if all.terms.iter().any(|(t, l)| *t != Term::Interior && l.rms_value() > 0.0) {
+        // One sample more or less for which an edge passes between both images.
+        let pixels = all.total.pixels.len() / half.blocks.len();
+        let samples = pixels as f64 * f64::from(reference.samples);
+        least = least.max(sampled.all.image.rms_value() / (cell.step * samples));
+    }
+    at_least(half, least)
 }
 
 /// Block means of `a + factor b`, with the errors of `a`.
@@ -167,25 +157,32 @@ pub struct Table<'a>(pub &'a [Row]);
 impl fmt::Display for Table<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let heads = ["rms z", "max z", "limit", "noise", "fd", "step", "s"];
-        write!(f, "\n{:<44}", "")?;
+        write!(f, "\n{:<54}", "")?;
         for head in heads {
             write!(f, " {head:>6}")?;
         }
-        writeln!(f, "  terms; faults planted and their rms z")?;
+        writeln!(f, "  scale            terms; faults planted, their rms z, and z of their scale")?;
         for row in self.0 {
-            let name = format!("{}: {}", row.stage, row.parameter);
+            let name = format!("{}: {}, {:?}", row.stage, row.parameter, row.method.0);
             let a = &row.agreement;
-            write!(f, "{name:<44} {:>6.2} {:>6.2} {:>6.2}", a.rms_z, a.max_z, a.limit)?;
+            write!(f, "{name:<54} {:>6.2} {:>6.2} {:>6.2}", a.rms_z, a.max_z, a.limit)?;
             for part in [row.noise[0], row.noise[1], row.step_error] {
                 write!(f, " {:>5.1}%", 100.0 * part)?;
             }
             write!(f, " {:>6.1} ", row.seconds)?;
+            let Scale { off, stderr } = row.scale;
+            write!(f, " {:>+6.2} ± {:>5.2}% ", 100.0 * off, 100.0 * stderr)?;
             for (term, part) in row.terms.iter().filter(|(_, part)| *part >= 5e-3) {
                 write!(f, " {} {part:.2}", term.name())?;
             }
             for fault in &row.faults {
-                let Fault { term, factor, agreement } = fault;
-                write!(f, "; {} × {factor}: {:.1}", term.name(), agreement.rms_z)?;
+                let Fault { term, factor, rms_z, scale_z, is_seen, must_be_seen } = fault;
+                write!(f, "; {} × {factor}: {rms_z:.1} {scale_z:.1}", term.name())?;
+                match (is_seen, must_be_seen) {
+                    (false, true) => write!(f, " (unseen)")?,
+                    (false, false) => write!(f, " (in noise)")?,
+                    _ => {}
+                }
             }
             if row.non_finite > 0 {
                 write!(f, "  {} contributions not finite", row.non_finite)?;

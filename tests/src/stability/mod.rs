@@ -10,7 +10,7 @@ mod condition;
 mod lights;
 mod matter;
 #[allow(unreachable_pub, reason = "shared with the tests of drt-estimators")]
-#[path = "../../../drt-estimators/tests/common/pairing.rs"]
+#[path = "../../../drt-estimators/tests/all/common/pairing.rs"]
 mod pairing;
 mod similar;
 

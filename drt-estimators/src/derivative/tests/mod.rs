@@ -9,7 +9,7 @@ mod guided;
 mod moving;
 mod records;
 mod replay;
-#[path = "../../../tests/common/mod.rs"]
+#[path = "../../../tests/all/common/mod.rs"]
 pub(crate) mod scenes;
 mod setup;
 mod velocity;

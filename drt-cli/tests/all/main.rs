@@ -1,0 +1,15 @@
+//! All tests of the crate from outside, in one program.
+#![cfg(feature = "command")]
+
+mod batch;
+mod command;
+mod common;
+mod groups;
+mod hard_inputs;
+mod looks;
+#[cfg(all(unix, feature = "mpi"))]
+mod mpi;
+mod optimize;
+mod python;
+mod shards;
+mod textures;

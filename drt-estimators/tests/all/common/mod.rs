@@ -1,0 +1,478 @@
+//! Small scenes with a bit of everything, and the parameters that change them.
+#![allow(dead_code, unreachable_pub, reason = "the crate's own tests use a part")]
+
+pub mod pairing;
+
+use std::sync::Arc;
+
+use drt_estimators::emitter::{Emitter, EnvironmentMap};
+use drt_estimators::filter::{Filter, FilterKind};
+use drt_estimators::sensor::{Lens, Sensor};
+use drt_estimators::surface::{
+    Bsdf, Diffuse, Distribution, Phong, Property, RoughConductor, RoughDielectric, Textured,
+    TwoSided,
+};
+use drt_estimators::texture::{Bitmap, Texture, TextureFilter, TextureWrap, UvMap};
+use drt_estimators::{
+    Integrator, Layer, MediumBoundary, Named, Rendering, Scene, SceneEmitter, SceneSensor, Session,
+    Settings, Shape, Surrounding, Unattended,
+};
+use drt_geom::{Mesh, procedural};
+use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
+use drt_medium::{Grid, GridMedium, Homogeneous, Layout, Medium, Phase, Volume};
+use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, Texels, ValueChange};
+
+/// A scene under construction: elements are named as they are added.
+#[derive(Default)]
+pub struct Build(pub Scene);
+
+impl Build {
+    pub fn bsdf(&mut self, id: &str, bsdf: Bsdf) -> usize {
+        self.0.bsdfs.push(Named::new(id, bsdf));
+        self.0.bsdfs.len() - 1
+    }
+
+    pub fn medium(&mut self, id: &str, medium: Medium) -> usize {
+        self.0.media.push(Named::new(id, medium));
+        self.0.media.len() - 1
+    }
+
+    pub fn shape(&mut self, id: &str, mesh: Mesh, bsdf: usize) -> &mut Shape {
+        let shape = Shape {
+            id: Some(id.into()),
+            mesh: Arc::new(mesh),
+            bsdf,
+            boundary: None,
+            emitter: None,
+        };
+        self.0.shapes.push(shape);
+        self.0.shapes.last_mut().expect("just added")
+    }
+
+    /// A null interface around a medium.
+    pub fn interface(&mut self, id: &str, mesh: Mesh, inside: usize, outside: Option<usize>) {
+        let bsdf = self.bsdf(&format!("{id}-null"), Bsdf::Null);
+        self.shape(id, mesh, bsdf).boundary =
+            Some(MediumBoundary { interior: Some(inside), exterior: outside });
+    }
+
+    pub fn light(&mut self, id: &str, emitter: Emitter) -> usize {
+        let emitter = emitter.checked().expect("a valid emitter");
+        let item = SceneEmitter { emitter, medium: Surrounding::Counted };
+        self.0.emitters.push(Named::new(id, item));
+        self.0.emitters.len() - 1
+    }
+
+    /// A black rectangle that glows.
+    pub fn lamp(&mut self, mesh: Mesh, radiance: Rgb) {
+        let bsdf = self.bsdf("lamp-bsdf", diffuse(0.2, 0.2, 0.2));
+        let emitter = self.light("glow", Emitter::Area { radiance });
+        self.shape("lamp", mesh, bsdf).emitter = Some(emitter);
+    }
+
+    pub fn camera(mut self, origin: Vec3, target: Vec3, max_depth: u32) -> Scene {
+        let filter = Filter::new(FilterKind::Tent { radius: 1.0 }).expect("a valid filter");
+        let sensor = Sensor::look_at([origin, target, Vec3::Y], Lens::with_fov(40.0), FILM, filter);
+        let item = SceneSensor {
+            sensor: sensor.expect("a valid camera"),
+            medium: Surrounding::Counted,
+            sample_count: None,
+        };
+        self.0.sensors.push(Named::new("camera", item));
+        self.0.integrator =
+            Integrator { max_depth: Some(max_depth), rr_depth: 3, ..Integrator::default() };
+        self.0
+    }
+}
+
+pub const FILM: [u32; 2] = [6, 5];
+
+pub fn diffuse(r: f64, g: f64, b: f64) -> Bsdf {
+    Bsdf::Diffuse(Diffuse { reflectance: Rgb::new(r, g, b) })
+}
+
+pub fn phong() -> Bsdf {
+    Bsdf::Phong(Phong {
+        reflectance: Rgb::new(0.5, 0.3, 0.2),
+        specular_reflectance: Rgb::splat(0.3),
+        exponent: 12.0,
+    })
+}
+
+pub fn metal() -> Bsdf {
+    Bsdf::RoughConductor(RoughConductor {
+        distribution: Distribution::Ggx,
+        alpha: 0.35,
+        eta: Rgb::new(0.2, 0.9, 1.1),
+        k: Rgb::new(3.9, 2.4, 2.1),
+        specular_reflectance: Rgb::new(0.9, 0.8, 0.7),
+    })
+}
+
+pub fn glass() -> Bsdf {
+    Bsdf::RoughDielectric(RoughDielectric {
+        distribution: Distribution::Beckmann,
+        alpha: 0.3,
+        eta: 1.4,
+        specular_reflectance: Rgb::new(0.9, 1.0, 0.8),
+        specular_transmittance: Rgb::new(0.8, 0.9, 1.0),
+    })
+}
+
+pub fn twosided(front: Bsdf) -> Bsdf {
+    Bsdf::TwoSided(Box::new(TwoSided { front, back: None }))
+}
+
+pub fn homogeneous(sigma_t: Rgb, albedo: Rgb, emission: Rgb, g: f64) -> Medium {
+    let coefficients = Homogeneous::new(sigma_t, albedo, emission).expect("valid coefficients");
+    Medium::new(coefficients, Phase::henyey_greenstein(g).expect("a valid mean cosine"))
+}
+
+/// Placed by a scale, a turn about a slanted axis and a shift.
+pub fn placed(mesh: Mesh, scale: Vec3, turn: f64, shift: Vec3) -> Mesh {
+    let linear = Mat3::rotation(vec3(0.48, 0.64, 0.6), turn) * Mat3::diagonal(scale);
+    mesh.transform(&Affine { linear, translation: shift })
+}
+
+/// A ball with smooth shading normals.
+pub fn ball(radius: f64, centre: Vec3) -> Mesh {
+    placed(procedural::icosphere(1), Vec3::splat(radius), 0.3, centre).with_smooth_normals()
+}
+
+pub fn floor() -> Mesh {
+    // Facing up.
+    let linear = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 4.0;
+    procedural::grid(2, 2).transform(&Affine { linear, translation: vec3(0.0, -1.0, 0.0) })
+}
+
+pub fn lamp() -> Mesh {
+    // Facing down, a little askew.
+    placed(
+        procedural::rectangle().transform(&Affine {
+            linear: Mat3::rotation(Vec3::X, core::f64::consts::FRAC_PI_2),
+            translation: Vec3::ZERO,
+        }),
+        Vec3::splat(0.7),
+        0.2,
+        vec3(0.6, 2.2, -0.4),
+    )
+}
+
+/// A smooth ball of one material over a floor of another, under every kind of light; no media.
+pub fn surfaces(ball_bsdf: Bsdf, floor_bsdf: Bsdf) -> Scene {
+    let mut b = Build::default();
+    let bsdf = b.bsdf("ball-bsdf", ball_bsdf);
+    b.shape("ball", ball(0.9, vec3(0.1, 0.1, 0.0)), bsdf);
+    let bsdf = b.bsdf("floor-bsdf", floor_bsdf);
+    b.shape("floor", floor(), bsdf);
+    b.lamp(lamp(), Rgb::new(3.0, 2.5, 2.0));
+    b.light(
+        "bulb",
+        Emitter::Point { position: vec3(-1.5, 1.3, 0.8), intensity: Rgb::new(1.0, 1.5, 2.0) },
+    );
+    b.light(
+        "spot",
+        Emitter::Spot {
+            position: vec3(1.4, 1.6, 1.5),
+            direction: vec3(-0.8, -1.2, -0.9),
+            intensity: Rgb::new(4.0, 3.0, 3.5),
+            cutoff_angle: 0.9,
+            beam_width: 0.1,
+        },
+    );
+    b.light(
+        "sun",
+        Emitter::Directional {
+            direction: vec3(0.4, -1.0, -0.3),
+            irradiance: Rgb::new(0.7, 0.6, 0.5),
+        },
+    );
+    b.light("sky", Emitter::Constant { radiance: Rgb::new(0.2, 0.3, 0.5) });
+    b.camera(vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0), 5)
+}
+
+/// A floor that a block of fog, out of view, shines on, with a card between the two that hides half of the block.
+pub fn glow() -> Scene {
+    let mut b = Build::default();
+    let bsdf = b.bsdf("floor-bsdf", diffuse(0.6, 0.5, 0.4));
+    b.shape("floor", floor(), bsdf);
+    let bsdf = b.bsdf("card-bsdf", diffuse(0.1, 0.1, 0.1));
+    let card = placed(procedural::cube(), vec3(0.4, 0.02, 0.6), 0.0, vec3(-0.5, 0.0, 0.0));
+    b.shape("card", card, bsdf);
+    let fog = homogeneous(Rgb::new(2.0, 1.5, 2.5), Rgb::splat(0.95), Rgb::ZERO, 0.0);
+    let fog = b.medium("fog", fog);
+    let block = placed(procedural::cube(), Vec3::splat(0.7), 0.3, vec3(-0.9, 1.1, 0.0));
+    b.interface("block", block, fog, None);
+    b.lamp(lamp(), Rgb::new(3.0, 2.5, 2.0));
+    b.camera(vec3(0.3, 0.3, 3.5), vec3(0.0, -1.0, 0.0), 4)
+}
+
+/// A solid ball and a bulb in a box of fog with a denser blob in it, lit from outside as well.
+pub fn fog() -> Scene {
+    let mut b = Build::default();
+    let thin = b.medium(
+        "thin",
+        homogeneous(
+            Rgb::new(0.4, 0.5, 0.3),
+            Rgb::new(0.9, 0.6, 0.8),
+            Rgb::new(0.0, 0.1, 0.05),
+            0.4,
+        ),
+    );
+    let dense = b.medium(
+        "dense",
+        homogeneous(Rgb::new(1.5, 1.1, 2.0), Rgb::new(0.7, 0.9, 0.5), Rgb::ZERO, -0.3),
+    );
+    let box_mesh = placed(procedural::cube(), vec3(1.7, 1.5, 1.6), 0.15, vec3(0.0, 0.1, 0.0));
+    b.interface("box", box_mesh, thin, None);
+    let blob = placed(procedural::icosphere(0), Vec3::splat(0.5), 0.7, vec3(-0.7, 0.4, 0.3));
+    b.interface("blob", blob, dense, Some(thin));
+    let bsdf = b.bsdf("ball-bsdf", phong());
+    b.shape("ball", ball(0.45, vec3(0.5, -0.3, 0.1)), bsdf);
+    b.light(
+        "bulb",
+        Emitter::Point { position: vec3(0.3, 0.7, 0.5), intensity: Rgb::new(1.0, 1.5, 2.0) },
+    );
+    b.lamp(placed(lamp(), Vec3::splat(1.0), 0.0, vec3(0.2, 0.6, 0.3)), Rgb::new(3.0, 2.5, 2.0));
+    b.light(
+        "sun",
+        Emitter::Directional {
+            direction: vec3(0.4, -1.0, -0.3),
+            irradiance: Rgb::new(0.7, 0.6, 0.5),
+        },
+    );
+    b.light("sky", Emitter::Constant { radiance: Rgb::new(0.2, 0.3, 0.5) });
+    b.camera(vec3(0.4, 0.8, 4.2), vec3(0.0, 0.1, 0.0), 4)
+}
+
+/// A block in a tub of fog with a floor at -1, both of one reflectance; its own bottom is at `bottom`.
+pub fn fog_with_a_block(bottom: f64, reflectance: f64) -> Scene {
+    let mut b = Build::default();
+    let fog = homogeneous(Rgb::new(0.6, 0.5, 0.4), Rgb::new(0.9, 0.8, 0.7), Rgb::ZERO, 0.2);
+    let fog = b.medium("fog", fog);
+    b.interface("tub", procedural::cube().transform(&scaled(1.5, vec3(0.0, 0.25, 0.0))), fog, None);
+    let bsdf = b.bsdf("floor-bsdf", diffuse(reflectance, reflectance, reflectance));
+    b.shape(
+        "floor",
+        {
+            let mut floor = floor();
+            floor.positions.iter_mut().for_each(|p| *p = vec3(0.3 * p.x, p.y, 0.3 * p.z));
+            floor
+        },
+        bsdf,
+    );
+    let place = scaled(0.4, vec3(0.1, bottom + 0.4, 0.0));
+    b.shape("block", procedural::cube().transform(&place), bsdf);
+    b.light(
+        "sun",
+        Emitter::Directional {
+            direction: vec3(0.4, -1.0, -0.3),
+            irradiance: Rgb::new(2.0, 2.5, 3.0),
+        },
+    );
+    b.camera(vec3(0.4, 0.8, 4.2), vec3(0.0, -0.2, 0.0), 4)
+}
+
+pub fn scaled(size: f64, at: Vec3) -> Affine {
+    Affine { linear: Mat3::IDENTITY * size, translation: at }
+}
+
+/// Voxels of smoke, with at least `border` at the faces of their box, in a larger box.
+pub fn smoke(border: f64) -> Scene {
+    let mut b = Build::default();
+    let n = 5;
+    let mut rng = Rng::new(7, 0, 0);
+    let inner = |i: usize| i > 0 && i < n - 1;
+    let values = (0..n * n * n)
+        .map(|v| {
+            let (i, j, k) = (v % n, v / n % n, v / n / n);
+            let value = 2.0 * rng.next_f64();
+            if inner(i) && inner(j) && inner(k) { value } else { border * value }
+        })
+        .collect();
+    let linear = Mat3::rotation(vec3(0.48, 0.64, 0.6), 0.4) * 2.0;
+    let placement = Affine { linear, translation: -(linear * Vec3::splat(0.5)) };
+    let density = Grid::new([n, n, n], 1, values)
+        .expect("a valid grid")
+        .with_layout(Layout::NodeCentred)
+        .with_placement(placement)
+        .expect("a box");
+    let albedo = Volume::Constant(Rgb::new(0.9, 0.7, 0.8));
+    let emission = Volume::Constant(Rgb::new(0.1, 0.05, 0.0));
+    let medium = GridMedium::new(density, 1.3, albedo, emission).expect("valid coefficients");
+    let medium = Medium::new(medium, Phase::henyey_greenstein(0.3).expect("valid"));
+    let smoke = b.medium("smoke", medium);
+    b.interface("box", placed(procedural::cube(), Vec3::splat(1.9), 0.1, Vec3::ZERO), smoke, None);
+    let bsdf = b.bsdf("floor-bsdf", diffuse(0.6, 0.5, 0.4));
+    let mut floor = floor();
+    for p in &mut floor.positions {
+        p.y -= 2.0;
+    }
+    b.shape("floor", floor, bsdf);
+    b.lamp(placed(lamp(), Vec3::splat(1.0), 0.0, vec3(0.2, 1.0, 0.3)), Rgb::new(3.0, 2.5, 2.0));
+    b.light(
+        "bulb",
+        Emitter::Point { position: vec3(0.3, 0.2, 0.5), intensity: Rgb::new(1.0, 1.5, 2.0) },
+    );
+    b.light(
+        "sun",
+        Emitter::Directional {
+            direction: vec3(0.4, -1.0, -0.3),
+            irradiance: Rgb::new(0.7, 0.6, 0.5),
+        },
+    );
+    b.camera(vec3(0.4, 0.8, 6.0), Vec3::ZERO, 4)
+}
+
+pub fn parameter(name: &str, value: f64, effects: Vec<Effect>) -> Parameter {
+    Parameter { name: name.into(), value, effects }
+}
+
+pub fn moves(target: &str, change: GeometryChange) -> Effect {
+    Effect { target: target.into(), change: Change::Geometry(change) }
+}
+
+pub fn changes(target: &str, property: &str, op: ValueChange) -> Effect {
+    let change = PropertyChange { property: property.into(), op, voxels: None, texels: None };
+    Effect { target: target.into(), change: Change::Property(change) }
+}
+
+pub fn changes_voxel(target: &str, property: &str, voxel: [usize; 3], op: ValueChange) -> Effect {
+    let change =
+        PropertyChange { property: property.into(), op, voxels: Some(voxel), texels: None };
+    Effect { target: target.into(), change: Change::Property(change) }
+}
+
+/// Of one texel of the texture that stands for a property, or of all.
+pub fn changes_texel(
+    target: &str,
+    property: &str,
+    texel: Option<[usize; 2]>,
+    op: ValueChange,
+) -> Effect {
+    let change = PropertyChange {
+        property: property.into(),
+        op,
+        voxels: None,
+        texels: Some(texel.map_or(Texels::All, Texels::One)),
+    };
+    Effect { target: target.into(), change: Change::Property(change) }
+}
+
+/// A picture of random values between two, turned a little.
+pub fn image(
+    seed: u64,
+    [low, high]: [f32; 2],
+    filter: TextureFilter,
+    wrap: TextureWrap,
+) -> Texture {
+    let mut rng = Rng::new(seed, 0, 0);
+    let mut value = || low + (high - low) * rng.next_f64() as f32;
+    let texels = (0..16).map(|_| [value(), value(), value()]).collect();
+    let to_uv = UvMap([[1.5, 0.3, 0.1], [0.0, 1.2, 0.0]]);
+    let mut image = Bitmap::new([4, 4], texels).expect("an image");
+    (image.filter, image.wrap, image.to_uv) = (filter, wrap, to_uv);
+    Texture::Bitmap(image)
+}
+
+pub fn textured(bsdf: Bsdf, textures: Vec<(Property, Texture)>) -> Bsdf {
+    Bsdf::Textured(Box::new(Textured::new(bsdf, textures).expect("textures")))
+}
+
+/// Everything textured: a floor under a ball of rough metal, in all kinds of light.
+pub fn textures() -> Scene {
+    use TextureFilter::{Bilinear, Nearest};
+    let metal = textured(
+        metal(),
+        vec![
+            (Property::Alpha, image(1, [0.2, 0.5], Bilinear, TextureWrap::Repeat)),
+            (Property::SpecularReflectance, image(2, [0.3, 0.9], Nearest, TextureWrap::Mirror)),
+        ],
+    );
+    let squares = Texture::Checkerboard {
+        colours: [Rgb::new(0.1, 0.2, 0.3), Rgb::splat(0.25)],
+        to_uv: UvMap([[2.0, 0.0, 0.0], [0.0, 2.0, 0.0]]),
+    };
+    let floor = textured(
+        phong(),
+        vec![
+            (Property::Reflectance, image(3, [0.1, 0.7], Bilinear, TextureWrap::Clamp)),
+            (Property::SpecularReflectance, squares),
+        ],
+    );
+    let mut scene = surfaces(metal, twosided(floor));
+    let lamp = scene.emitters.iter_mut().find(|e| e.id.as_deref() == Some("glow")).expect("one");
+    lamp.item.emitter = Emitter::TexturedArea {
+        radiance: Rgb::new(3.0, 2.5, 2.0),
+        texture: image(4, [0.1, 1.0], Bilinear, TextureWrap::Repeat),
+    };
+    let uv = |p: Vec3| [0.3 * p.x + 0.1, 0.3 * p.z + 0.2];
+    for shape in &mut scene.shapes {
+        let mesh = (*shape.mesh).clone();
+        let corners = (0..mesh.triangles.len() as u32).map(|i| mesh.triangle(i).map(uv)).collect();
+        shape.mesh = Arc::new(mesh.with_texcoords(corners).expect("coordinates"));
+    }
+    scene
+}
+
+/// The sky being an image.
+pub fn under_an_image(mut scene: Scene) -> Scene {
+    let mut rng = Rng::new(5, 0, 0);
+    let texels = (0..24).map(|_| [0; 3].map(|_| 0.1 + rng.next_f64() as f32)).collect();
+    let frame = Mat3::rotation(vec3(0.48, 0.64, 0.6), 0.5);
+    let map = EnvironmentMap::new([6, 4], texels, frame).expect("a map");
+    let sky = scene.emitters.iter_mut().find(|e| e.id.as_deref() == Some("sky")).expect("one");
+    sky.item.emitter = Emitter::Envmap { radiance: Rgb::new(0.2, 0.3, 0.5), map: Arc::new(map) };
+    scene
+}
+
+pub fn grey(v: f64) -> ValueChange {
+    ValueChange::Add(Rgb::splat(v))
+}
+
+pub fn shift() -> GeometryChange {
+    GeometryChange::Translate(vec3(0.7, -0.4, 0.5))
+}
+
+pub fn turn() -> GeometryChange {
+    GeometryChange::Rotate { axis: vec3(0.3, 1.0, -0.2), pivot: vec3(0.1, 0.2, -0.3) }
+}
+
+pub fn stretch() -> GeometryChange {
+    GeometryChange::Scale { factor: vec3(0.5, -0.3, 0.2), pivot: vec3(0.1, 0.2, 0.3) }
+}
+
+/// A velocity for each vertex of a shape's file.
+pub fn wobble(scene: &Scene, shape: &str, seed: u64) -> GeometryChange {
+    let mesh = &scene.shapes.iter().find(|s| s.id.as_deref() == Some(shape)).expect("a shape").mesh;
+    let mut rng = Rng::new(seed, 0, 0);
+    let mut signed = || 2.0 * rng.next_f64() - 1.0;
+    let velocities = (0..mesh.source_vertex_count).map(|_| vec3(signed(), signed(), signed()));
+    GeometryChange::VertexVelocity(velocities.collect())
+}
+
+/// The image and derivatives of so many samples per pixel.
+pub fn rendered(
+    scene: &Scene,
+    parameters: &[Parameter],
+    settings: &Settings,
+    spp: u32,
+) -> Rendering {
+    let mut session = Session::new(scene, parameters, settings).expect("a valid scene");
+    assert!(session.run(spp, &Unattended));
+    session.rendering()
+}
+
+/// The sum over all pixels and channels, and its standard error: pixels share samples, and channels are taken to rise and fall
+/// together.
+pub fn sum(layer: &Layer) -> [f64; 2] {
+    let pixels = layer.pixels.len() as f64;
+    [layer.total.mean, layer.total.stderr].map(|mean| mean.sum() * pixels)
+}
+
+/// A multiple of what blocks of a layer hold.
+pub fn multiple(layer: &Layer, by: f64) -> Layer {
+    let mut layer = layer.clone();
+    layer.blocks.iter_mut().for_each(|b| b.mean *= by);
+    layer
+}

@@ -1,0 +1,15 @@
+//! All tests of the crate from outside, in one program.
+
+mod changes;
+mod common;
+mod deformed;
+mod dense_voxels;
+mod grids;
+mod phase;
+#[cfg(feature = "serde")]
+mod serde;
+mod single_scattering;
+mod tracking;
+mod transmittance;
+#[cfg(feature = "vol")]
+mod vol;

@@ -1,0 +1,14 @@
+//! All tests of the crate from outside, in one program.
+
+mod check_matrix;
+mod coincidence;
+mod estimators;
+mod insides;
+mod invariances;
+mod oracle_faults;
+mod oracles;
+mod random_scenes;
+mod references;
+mod refusals;
+mod skipping;
+mod stability;
