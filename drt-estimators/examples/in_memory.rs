@@ -5,17 +5,13 @@
 //! cargo run --release -p drt-estimators --example in_memory
 //! ```
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::{Bsdf, Diffuse};
-use drt_estimators::{
-    Control, FinishedTile, Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor,
-    Session, Settings, Shape, Surrounding,
-};
+use drt_estimators::{Control, FinishedTile, Scene, SceneBuilder, Session, Settings, ShapeBuilder};
 use drt_math::{Affine, Mat3, Rgb, vec3};
 use drt_medium::{Homogeneous, Medium, Phase};
 use drt_motion::{Change, Effect, GeometryChange, Parameter};
@@ -72,42 +68,17 @@ fn fog_with_ball() -> Result<Scene, Box<dyn std::error::Error>> {
     let lamp = Emitter::Point { position: vec3(1.0, -1.0, 4.0), intensity: Rgb::splat(60.0) };
     let view = [vec3(0.0, -6.0, 1.0), vec3(0.0, 0.0, 0.0), vec3(0.0, 0.0, 1.0)];
     let filter = Filter::new(FilterKind::TENT)?;
+    let sensor = Sensor::look_at(view, Lens::with_fov(45.0), [32, 32], filter)?;
     let size = |s: f64| Affine { linear: Mat3::IDENTITY * s, ..Affine::IDENTITY };
-    Ok(Scene {
-        shapes: vec![
-            Shape {
-                id: Some("walls".into()),
-                mesh: Arc::new(drt_geom::procedural::cube().transform(&size(2.0))),
-                bsdf: 1,
-                boundary: Some(MediumBoundary { interior: Some(0), exterior: None }),
-                emitter: None,
-            },
-            Shape {
-                id: Some("ball".into()),
-                mesh: Arc::new(drt_geom::procedural::icosphere(3).transform(&size(0.7))),
-                bsdf: 0,
-                boundary: None,
-                emitter: None,
-            },
-        ],
-        bsdfs: vec![
-            Named::new("grey", Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.5) })),
-            Named::new("none", Bsdf::Null),
-        ],
-        media: vec![Named::new("fog", Medium::new(fog, Phase::henyey_greenstein(0.3)?))],
-        emitters: vec![Named::new(
-            "lamp",
-            SceneEmitter { emitter: lamp, medium: Surrounding::Counted },
-        )],
-        sensors: vec![Named::new(
-            "camera",
-            SceneSensor {
-                sensor: Sensor::look_at(view, Lens::with_fov(45.0), [32, 32], filter)?,
-                medium: Surrounding::Counted,
-                sample_count: None,
-            },
-        )],
-        integrator: Integrator { max_depth: Some(6), ..Integrator::default() },
-        ..Scene::default()
-    })
+    let walls = drt_geom::procedural::cube().transform(&size(2.0));
+    let ball = drt_geom::procedural::icosphere(3).transform(&size(0.7));
+    let grey = Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.5) });
+    let scene = SceneBuilder::new()
+        .medium("fog", Medium::new(fog, Phase::henyey_greenstein(0.3)?))
+        .shape("walls", ShapeBuilder::interface(walls).interior("fog"))
+        .shape("ball", ShapeBuilder::new(ball, grey))
+        .emitter("lamp", lamp)
+        .sensor("camera", sensor)
+        .max_depth(6);
+    Ok(scene.build()?)
 }

@@ -3,6 +3,7 @@
 //! Plain data: nothing here follows a ray.
 
 pub(crate) mod agreement;
+pub(crate) mod builder;
 pub mod emitter;
 pub(crate) mod error;
 pub mod filter;

@@ -421,7 +421,7 @@ impl Scene {
         id.clone().unwrap_or_else(|| alloc::format!("{kind}[{i}]"))
     }
 
-    fn named(&self) -> impl Iterator<Item = (Option<&str>, Target)> {
+    pub(crate) fn named(&self) -> impl Iterator<Item = (Option<&str>, Target)> {
         fn ids<T>(
             items: &[Named<T>],
             make: fn(usize) -> Target,

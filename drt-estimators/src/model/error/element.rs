@@ -1,4 +1,5 @@
 use alloc::string::String;
+use alloc::vec::Vec;
 
 use drt_geom::{BvhError, MeshError};
 use drt_medium::MediumError;
@@ -12,6 +13,19 @@ use crate::model::surface::{Property, SurfaceError};
 #[derive(Clone, Debug, Error)]
 #[non_exhaustive]
 pub enum ElementError {
+    /// A shape names something that no element is called.
+    #[error("no {kind} is called `{name}`; known are: {}", listed(known))]
+    UnknownPart {
+        /// What kind of element it has to be.
+        kind: &'static str,
+        /// The id.
+        name: String,
+        /// The ids of elements of this kind.
+        known: Vec<String>,
+    },
+    /// Two elements of a scene that was built by ids have the same one.
+    #[error("another element has the same id")]
+    SameId,
     /// A shape's scattering model does not exist.
     #[error("there is no bsdf {0}")]
     NoBsdf(usize),
@@ -168,4 +182,8 @@ pub enum ElementError {
         /// The same with names.
         message: String,
     },
+}
+
+fn listed(ids: &[String]) -> String {
+    if ids.is_empty() { "none".into() } else { ids.join(", ") }
 }
