@@ -21,9 +21,9 @@ pub use derivative::scene_gradient::SceneGradient;
 pub use derivative::tangents::moved;
 pub use drt_motion::interior::{GivenTetrahedra, InteriorMotion};
 pub use fit::loss;
-pub use model::agreement::{Agreement, agreement};
 pub use model::builder::{SceneBuilder, ShapeBuilder};
 pub use model::error::{EffectError, ElementError, Error, SettingError};
+pub use model::image_comparison::{Agreement, agreement};
 pub use model::plan::{MediumPlan, Plan};
 pub use model::rendering::{
     BLOCKS, Counters, Derivative, Estimate, Layer, NonFinite, Rendering, Tail, Term,

@@ -4,12 +4,12 @@ use super::derivatives::derivatives;
 use super::monitor::Monitor;
 use super::options::GradOptions;
 use super::outputs::Outputs;
-use super::{Outcome, gradient, noted, run, shard};
+use super::{Outcome, loss_gradient, noted, run, shard};
 use crate::CliError;
 
 pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     if options.loss.is_some() || options.adjoint.is_some() {
-        return gradient::run(options);
+        return loss_gradient::run(options);
     }
     let common = &options.common;
     let mut job = run::open_with_parameters(common)?;

@@ -7,7 +7,7 @@ use drt_estimators::{Rendering, ShardError, ShardSums};
 
 use super::Outcome;
 use super::console;
-use super::gradient::by_parameters;
+use super::loss_gradient::by_parameters;
 use super::options::MergeOptions;
 use super::outputs::{Files, summarize};
 use super::shard_file::{ShardFile, Sums, Total, view};

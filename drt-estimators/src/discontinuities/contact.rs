@@ -22,7 +22,7 @@ use drt_geom::{Ray, Skip};
 use drt_math::{Real, Vec3, fm};
 
 use crate::discontinuities::edge::{Edge, EdgePoint};
-use crate::discontinuities::sheets::Sheets;
+use crate::discontinuities::intersection_faces::Sheets;
 use crate::world::World;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 

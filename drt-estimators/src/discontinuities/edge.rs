@@ -9,8 +9,8 @@ use drt_math::{CdfTable, Rng, Vec3};
 
 use crate::derivative::sensitivity::VelocityTerm;
 use crate::derivative::velocity::EdgeMatter;
+use crate::discontinuities::intersection_faces::{IntersectingFaces, Sheets};
 use crate::discontinuities::order::sort_by_likeness;
-use crate::discontinuities::sheets::{IntersectingFaces, Sheets};
 use crate::model::error::Error;
 use crate::model::sensor::Sensor;
 use crate::world::vertex::MaterialPoint;

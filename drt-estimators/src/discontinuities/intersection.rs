@@ -21,7 +21,7 @@ use drt_geom::edges::Wedge;
 use drt_geom::{CrossingSegment, Mesh, crossing_segments};
 
 use crate::discontinuities::edge::Edge;
-use crate::discontinuities::sheets::IntersectingFaces;
+use crate::discontinuities::intersection_faces::IntersectingFaces;
 use crate::world::World;
 
 /// AlongEdges of an edge that are shorter, over the edge's length, are left out.

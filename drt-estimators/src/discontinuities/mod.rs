@@ -6,7 +6,7 @@ pub(crate) mod contact;
 pub(crate) mod discontinuity_edge;
 pub(crate) mod edge;
 mod intersection;
+pub(crate) mod intersection_faces;
 pub(crate) mod movers;
 mod order;
-pub(crate) mod sheets;
 pub(crate) mod speeds;

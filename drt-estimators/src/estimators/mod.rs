@@ -4,10 +4,10 @@
 //! integrand add that do not move by that velocity. An [`Estimator`] chooses the velocity, and [`Terms`] that together are the
 //! derivative for it; what samples these terms does not know which estimator it is.
 
-mod film_plane;
+pub(crate) mod emitter_shares;
+mod orthographic;
 pub(crate) mod path_space;
 pub(crate) mod radiative;
-pub(crate) mod shares;
 pub(crate) mod warped;
 
 use crate::derivative::contraction::Motion;
@@ -20,10 +20,10 @@ use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::sampling::bidirectional::EmissionSampler;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::flux::{Flux, GrazingFlux};
 use crate::terms::prepared::Prepared;
 use crate::terms::selected::Terms;
-use crate::terms::source::BoundarySource;
 use crate::world::World;
 
 /// A way to estimate derivatives.
@@ -81,7 +81,7 @@ pub(crate) fn prepare(
     // Without anything to differentiate, all are the same.
     let estimator = if changes.active.any() { estimator } else { &PathSpace };
     let terms = estimator.terms(&world, changes)?;
-    film_plane::refuse_cuts(&world, changes)?;
+    orthographic::refuse_cuts(&world, changes)?;
     Ok(Prepared::new(estimator.name(), world, terms))
 }
 

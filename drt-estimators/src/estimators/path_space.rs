@@ -19,15 +19,15 @@ use alloc::sync::Arc;
 
 use crate::derivative::medium_motion::Insides;
 use crate::derivative::velocity::{Material, Movers};
-use crate::estimators::film_plane::{self, Film};
+use crate::estimators::orthographic::{self, Film};
 use crate::estimators::{Changes, Estimator, mirrors};
 use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
 use crate::terms::boundary_segments::{Boundary, Strategy};
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::flux::Flux;
 use crate::terms::selected::Terms;
-use crate::terms::source::BoundarySource;
 use crate::world::World;
 
 /// Vertices move with their matter, and edges are sampled by segments that touch them.
@@ -52,7 +52,7 @@ impl Estimator for PathSpace {
 
     fn terms(&self, world: &World, changes: &Changes<'_>) -> Result<Terms, Error> {
         let Changes { active, flux_shapes, settings, .. } = *changes;
-        film_plane::refuse(world, changes, Film::InMedium)?;
+        orthographic::refuse(world, changes, Film::InMedium)?;
         let mut terms = Terms::interior(Arc::new(Material::new(Movers::new(active))));
         if active.moves_geometry() {
             terms.boundary = Boundary::new(world, active)?;

@@ -29,10 +29,10 @@ use crate::estimators::{Changes, Estimator};
 use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::edge_queries::{QueryRate, SeenEdges};
 use crate::terms::flux::Flux;
 use crate::terms::selected::Terms;
-use crate::terms::source::BoundarySource;
 use crate::world::World;
 
 /// Vertices move with the rays that find them, and ask for the edges that they see.

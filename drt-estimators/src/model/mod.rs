@@ -2,12 +2,12 @@
 //!
 //! Plain data: nothing here follows a ray.
 
-pub(crate) mod agreement;
 pub(crate) mod builder;
 pub mod emitter;
+mod emitter_overlap;
 pub(crate) mod error;
 pub mod filter;
-mod overlap;
+pub(crate) mod image_comparison;
 pub(crate) mod plan;
 pub(crate) mod rendering;
 pub(crate) mod scene;

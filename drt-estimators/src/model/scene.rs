@@ -11,8 +11,8 @@ use drt_math::{Affine, Vec3};
 use drt_medium::Medium;
 
 use crate::model::emitter::Emitter;
+use crate::model::emitter_overlap::overlapping_lamps;
 use crate::model::error::{ElementError, Error, SettingError};
-use crate::model::overlap::overlapping_lamps;
 use crate::model::sensor::Sensor;
 use crate::model::surface::Bsdf;
 

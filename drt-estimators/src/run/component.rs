@@ -7,13 +7,13 @@ use crate::derivative::contraction::Motion;
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::estimators;
 use crate::estimators::Changes;
-use crate::estimators::shares::Share;
+use crate::estimators::emitter_shares::Share;
 use crate::model::error::Error;
 use crate::model::rendering::Account;
 use crate::sampling::parallel::Pool;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::guiding::{Guiding, Sizes};
 use crate::terms::prepared::Prepared;
-use crate::terms::source::BoundarySource;
 use crate::world::{ActiveFactors, World};
 
 /// What derivatives are taken by: a few parameters, each with an image, or all that a gradient has numbers for.

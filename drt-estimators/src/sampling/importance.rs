@@ -11,8 +11,8 @@ use drt_math::{Rgb, Vec3};
 
 use crate::model::sensor::Sensor;
 use crate::sampling::flight::{Flown, medium_span};
-use crate::sampling::mode::{ImportanceMode, TransportMode};
 use crate::sampling::trace::{Alive, Flight, Observer, PathState, Pixel, Tracer};
+use crate::sampling::transport_mode::{ImportanceMode, TransportMode};
 use crate::world::RayPath;
 use crate::world::vertex::{Kind, Vertex};
 

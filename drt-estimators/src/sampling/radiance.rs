@@ -3,8 +3,8 @@
 use drt_math::{Rgb, Vec3};
 
 use crate::model::sensor::ViewSample;
-use crate::sampling::mode::RadianceMode;
 use crate::sampling::trace::{Alive, Observer, OutgoingRay, PathState, Pixel, Tracer};
+use crate::sampling::transport_mode::RadianceMode;
 use crate::world::vertex::{Kind, Vertex};
 
 impl Tracer<'_> {

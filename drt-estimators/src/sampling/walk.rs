@@ -4,10 +4,10 @@ use drt_math::{Rgb, Vec3};
 use drt_medium::Coefficients;
 
 use crate::sampling::flight::{Flown, Travel, medium_span};
-use crate::sampling::mode::TransportMode;
 use crate::sampling::trace::{
     Alive, Arrival, Connection, Endpoint, Flight, Observer, OutgoingRay, PathState, Pixel, Tracer,
 };
+use crate::sampling::transport_mode::TransportMode;
 use crate::world::RayPath;
 use crate::world::lights::LightSample;
 use crate::world::scatter::Drawn;

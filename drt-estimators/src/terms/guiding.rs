@@ -27,7 +27,7 @@ use crate::sampling::guide::learning::{Learnt, MOST_OBSERVATIONS, Observation, l
 use crate::sampling::parallel::Pool;
 use crate::sampling::streams::GUIDE_STREAM;
 use crate::terms::boundary_segments::{BoundarySink, Strategy};
-use crate::terms::source::BoundarySource;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::splatting::{Checked, Splatter};
 use crate::world::World;
 

@@ -6,9 +6,9 @@ use alloc::sync::Arc;
 #[cfg(all(test, feature = "std"))]
 use crate::derivative::velocity::Spatial;
 use crate::sampling::film::BATCHES;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::interior::Component;
 use crate::terms::selected::Terms;
-use crate::terms::source::BoundarySource;
 use crate::terms::splatting::Splatter;
 use crate::world::World;
 

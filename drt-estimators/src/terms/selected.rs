@@ -7,9 +7,9 @@ use crate::derivative::velocity::VelocityField;
 use crate::model::rendering::Term;
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::terms::boundary_segments::Boundary;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::edge_queries::{QueryRate, SeenEdges};
 use crate::terms::flux::{Flux, GrazingFlux};
-use crate::terms::source::BoundarySource;
 
 /// A velocity of the vertices of paths, and the terms that go with it. The interior term is always there; each of the others
 /// is prepared where it can contribute.

@@ -14,10 +14,10 @@ use crate::sampling::streams::{DIMENSIONS, LINE_STREAM, SEQUENCE_STREAM};
 use crate::sampling::trace::Tracer;
 use crate::terms::boundary_segments;
 use crate::terms::boundary_segments::BoundarySink;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::flux;
 use crate::terms::light_paths::LightPaths;
 use crate::terms::selected::Terms;
-use crate::terms::source::BoundarySource;
 use crate::world::World;
 
 /// What splatted terms are sampled from.

@@ -5,7 +5,7 @@ use crate::derivative::tests::choice::{LIGHT, derivative, prepare_by};
 use crate::derivative::tests::scenes::*;
 use crate::model::settings::EstimatorKind::{PathSpace, Warped};
 use crate::model::settings::{PathSampling, Settings};
-use crate::terms::source::BoundarySource;
+use crate::terms::boundary_source::BoundarySource;
 use crate::world::lights::EmitterMask::{All, Extended};
 
 #[test]

@@ -9,9 +9,9 @@ use crate::model::settings::Settings;
 use crate::sampling::guide::Guide;
 use crate::sampling::parallel::Pool;
 use crate::terms::boundary_segments::Strategy;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::guiding::{Guiding, OfImages};
 use crate::terms::prepared::Prepared;
-use crate::terms::source::BoundarySource;
 use crate::terms::splatting::Checked;
 use crate::world::lights::EmitterMask;
 

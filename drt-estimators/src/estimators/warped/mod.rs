@@ -106,7 +106,7 @@ use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::Spatial;
 use crate::derivative::velocity::blend::curvature;
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
-use crate::estimators::film_plane::{self, Film};
+use crate::estimators::orthographic::{self, Film};
 use crate::estimators::warped::auxiliary::directions::AuxiliaryDirections;
 use crate::estimators::warped::auxiliary::points::AuxiliaryPoints;
 use crate::estimators::warped::edges::TurningEdges;
@@ -115,10 +115,10 @@ use crate::estimators::{Changes, Estimator, mirrors};
 use crate::model::error::{Error, SettingError};
 use crate::model::scene::Scene;
 use crate::model::settings::{PathSampling, Settings, Warp};
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::edge_queries::SeenEdges;
 use crate::terms::flux::Flux;
 use crate::terms::selected::Terms;
-use crate::terms::source::BoundarySource;
 use crate::world::World;
 
 /// Vertices move with the edges beside them, so that hardly any edge is sampled.
@@ -145,7 +145,7 @@ impl Estimator for Warped {
     }
 
     fn terms(&self, world: &World, changes: &Changes<'_>) -> Result<Terms, Error> {
-        film_plane::refuse(world, changes, Film::Turning)?;
+        orthographic::refuse(world, changes, Film::Turning)?;
         let Changes { active, settings, .. } = *changes;
         let lights = &active.moving_emitters;
         let any = active.sensor || active.shapes.contains(&true) || lights.contains(&true);

@@ -19,7 +19,7 @@ use drt_math::Rgb;
 
 use crate::derivative::scene_gradient::SceneGradient;
 use crate::estimators::Estimator;
-use crate::estimators::shares::shares;
+use crate::estimators::emitter_shares::shares;
 use crate::model::error::{Error, SettingError};
 use crate::model::rendering::Account;
 use crate::model::scene::Target;

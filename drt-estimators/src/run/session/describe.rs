@@ -6,8 +6,8 @@ use crate::derivative::contraction::Motion;
 use crate::model::plan::{MediumPlan, Plan};
 use crate::run::component::Component;
 use crate::terms::boundary_segments::Strategy;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::prepared::Prepared;
-use crate::terms::source::BoundarySource;
 use crate::world::World;
 use crate::world::lights::EmitterMask;
 

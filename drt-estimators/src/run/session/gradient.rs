@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use drt_math::Rgb;
 
 use crate::derivative::scene_gradient::SceneGradient;
-use crate::estimators::shares::{may_move, slides};
+use crate::estimators::emitter_shares::{may_move, slides};
 use crate::model::error::Error;
 use crate::model::scene::{Scene, Target, TargetName};
 use crate::model::settings::{PathSampling, Settings};

@@ -6,7 +6,7 @@ use crate::derivative::contraction::{Contraction, Motion};
 use crate::derivative::medium_motion::MediumMotions;
 use crate::derivative::sensitivity::{ActiveInputs, TextureUse};
 use crate::derivative::tangents::Tangents;
-use crate::estimators::shares::Share;
+use crate::estimators::emitter_shares::Share;
 use crate::model::error::Error;
 use crate::model::rendering::{Account, Term};
 use crate::run::component::{Component, Unknowns};

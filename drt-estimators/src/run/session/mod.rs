@@ -20,7 +20,7 @@ use crate::derivative::tangents;
 use crate::derivative::tangents::Tangents;
 use crate::estimators;
 use crate::estimators::Estimator;
-use crate::estimators::shares::{shares, slides};
+use crate::estimators::emitter_shares::{shares, slides};
 use crate::model::error::{Error, SettingError};
 use crate::model::plan::Plan;
 use crate::model::rendering::{Account, Rendering, Term};

@@ -23,9 +23,9 @@ use drt_math::{Real, Rgb};
 use crate::derivative::contraction::{Contraction, Motion};
 use crate::sampling::budget::{BESIDES, TermStatistics};
 use crate::sampling::pixels::Sampler;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::interior::PixelSampler;
 use crate::terms::prepared::Prepared;
-use crate::terms::source::BoundarySource;
 use crate::terms::splatting::{Checked, ToImages};
 
 /// Samples of pixels, and of each kind that lands anywhere.

@@ -72,11 +72,11 @@ use crate::sampling::bidirectional::subpath::{
 use crate::sampling::film::{Splat, SplatDensity};
 use crate::sampling::flight::proxy_attenuation;
 use crate::sampling::importance::see;
-use crate::sampling::mode::{ImportanceMode, RadianceMode, TransportMode};
 use crate::sampling::record::{
     Joint, JointObserver, LightPath, LightVertex, Radiance, Scattered, SeenVertex,
 };
 use crate::sampling::trace::{Arrival, Connection, OutgoingRay, Tracer};
+use crate::sampling::transport_mode::{ImportanceMode, RadianceMode, TransportMode};
 use crate::world::lights::LightKind;
 use crate::world::vertex::Vertex;
 use crate::world::{Crossing, World};

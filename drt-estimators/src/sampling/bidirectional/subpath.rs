@@ -9,9 +9,9 @@ use drt_medium::Coefficients;
 
 use crate::model::surface::Given;
 use crate::sampling::flight::proxy_attenuation;
-use crate::sampling::mode::{ConnectionPoint, TransportMode};
 use crate::sampling::record::{JointObserver, Scattered};
 use crate::sampling::trace::{Arrival, Endpoint, Observer, OutgoingRay, PathState, Pixel, Tracer};
+use crate::sampling::transport_mode::{ConnectionPoint, TransportMode};
 use crate::world::scatter::Scattering;
 use crate::world::vertex::{Kind, Vertex};
 use crate::world::{Crossing, RayPath, World};

@@ -8,7 +8,7 @@ use drt_math::{Frame, Rgb, Vec3, warp};
 use super::{BoundarySink, End, Sampler, Start, seen};
 use crate::discontinuities::contact::{Contact, Quadrant};
 use crate::discontinuities::edge::EdgePoint;
-use crate::discontinuities::sheets::Sheets;
+use crate::discontinuities::intersection_faces::Sheets;
 use crate::model::sensor::Sensor;
 use crate::world::SurroundingMedium;
 

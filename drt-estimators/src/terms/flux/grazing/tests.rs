@@ -16,7 +16,7 @@ use crate::model::settings::EstimatorKind;
 use crate::model::settings::Settings;
 use crate::run::control::Unattended;
 use crate::run::session::Session;
-use crate::terms::source::BoundarySource;
+use crate::terms::boundary_source::BoundarySource;
 use crate::terms::splatting::Checked;
 
 /// A cube of milk, lit by a lamp and the sky, whose top is a little lower than the camera.
