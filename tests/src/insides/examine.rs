@@ -17,7 +17,7 @@ const ROUND: u32 = 1 << 10;
 const CLEAR: f64 = 2.0;
 
 /// Samples of what is wrong before it counts as unnoticed, over those of the first way.
-const PATIENCE: u32 = 4;
+const PATIENCE: u32 = 16;
 
 /// Samples per pixel of the first finite differences, and of the last.
 const DIFFERENCES: u32 = 1 << 12;

@@ -218,13 +218,9 @@ fn glowing_ball(ball_bsdf: Bsdf) -> Scene {
 /// What a lamp emits jumps at none of its creases, and what it scatters jumps at all of them.
 #[test]
 fn lamps_of_facets() {
-    for (name, bsdf, sum) in [
-        ("ball", diffuse(0.0, 0.0, 0.0), MOMENT),
-        ("ball", diffuse(0.8, 0.9, 0.7), MOMENT),
-        ("card", diffuse(0.0, 0.0, 0.0), LIGHT),
-    ] {
-        let motion = parameter(name, 0.0, alloc::vec![moves(name, shift())]);
-        let sum = Sum { samples: 512, ..sum };
+    let motion = parameter("ball", 0.0, alloc::vec![moves("ball", shift())]);
+    let sum = Sum { samples: 512, ..MOMENT };
+    for bsdf in [diffuse(0.0, 0.0, 0.0), diffuse(0.8, 0.9, 0.7)] {
         compare(&glowing_ball(bsdf), &motion, sum, &[Fault::Sign, Fault::Weight]);
     }
 }

@@ -11,7 +11,7 @@ use crate::model::texture::Texture;
 ///
 /// ```
 /// use drt_estimators::surface::{Bsdf, BsdfChange, Diffuse, Property};
-/// use drt_math::ValueChange;
+/// use drt_math::{Rgb, ValueChange};
 ///
 /// let mut wall = Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.4) });
 /// let redder = BsdfChange {
