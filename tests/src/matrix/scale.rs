@@ -127,7 +127,7 @@ fn weighted_error(w: Rgb, e: &Estimate) -> f64 {
     w.map(f64::abs).dot(e.stderr)
 }
 
-/// By what has been seen of one.
+/// Weights for the blocks of one half, from that half alone.
 fn weights_of(a: &Half) -> Vec<Rgb> {
     weights(a, a)
 }

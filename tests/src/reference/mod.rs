@@ -72,7 +72,7 @@ impl Reference {
         Ok(Self { name, fingerprint: 0, samples, seed, step, blocks, change })
     }
 
-    /// The same, which stands for what has this fingerprint.
+    /// Lets these derivatives stand for the scene that has this fingerprint.
     #[must_use]
     pub fn standing_for(self, fingerprint: u64) -> Self {
         Self { fingerprint, ..self }

@@ -56,7 +56,7 @@ macro_rules! stages {
 
 drt_tests::every_stage!(stages);
 
-/// Of any mesh: `DRT_BODY=bunny.obj cargo test --release -p drt-tests --test all -- --ignored check_matrix::scanned`
+/// Checks the derivatives of any mesh: `DRT_BODY=bunny.obj cargo test --release -p drt-tests --test all -- --ignored check_matrix::scanned`
 #[test]
 #[ignore = "needs a mesh, named by DRT_BODY"]
 fn scanned_body() {

@@ -16,7 +16,7 @@ impl Weight {
         Self { value, gradient: Vec3::ZERO }
     }
 
-    /// By something else that the direction depends on.
+    /// Replaces the gradient with one, by something else that the direction depends on.
     pub(crate) fn map_gradient(self, f: impl FnOnce(Vec3) -> Vec3) -> Self {
         Self { gradient: f(self.gradient), ..self }
     }

@@ -24,7 +24,7 @@ pub(super) struct TurningEdge {
     pub(super) on_border: bool,
     /// Between faces of a curved surface, on which vertices move with their matter.
     pub(super) facets: bool,
-    /// Of a crease that is seen in the middle of one shape only: that shape.
+    /// The shape of both faces of a crease that rests on no other surface.
     pub(super) within: Option<u32>,
     /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
     pub(super) crease: Option<([Vec3; 2], [bool; 2])>,

@@ -48,7 +48,7 @@ pub(super) struct Near {
 }
 
 impl Near {
-    /// Of a ray. `creases_of` is the shape where it ends, if radiance may jump at creases of that; `facets` tells that this is a
+    /// Prepares the weights of edges beside a ray. `creases_of` is the shape where it ends, if radiance may jump at creases of that; `facets` tells that this is a
     /// curved one.
     pub(super) fn of_ray(
         ray: &TurningRay<'_>,
