@@ -2,15 +2,11 @@
 //! in a room, a body in fog, a coloured blob, a cloud of voxels. The same floor, lights and camera in
 //! all of them.
 
-use std::sync::Arc;
-
 use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::{Bsdf, Diffuse};
-use drt_estimators::{
-    Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding,
-};
+use drt_estimators::{Integrator, Scene, SceneBuilder, ShapeBuilder};
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, Rng, ValueChange, Vec3, vec3};
 use drt_medium::{Grid, GridMedium, Homogeneous, Medium, Phase, Volume};
@@ -47,42 +43,45 @@ pub(crate) fn all(detail: Detail) -> [Subject; 5] {
 }
 
 /// A knot and a ball over a floor.
-fn open(detail: Detail) -> Subject {
-    let mut scene = stage();
-    scene.shapes.push(shape("knot", knot(detail), 0));
-    scene.shapes.push(shape("ball", sized(&procedural::icosphere(3), 0.5, vec3(0.9, 0.8, 0.5)), 0));
+fn knot_and_ball(name: &'static str, detail: Detail, more: Option<Mesh>) -> Subject {
+    let ball = sized(&procedural::icosphere(3), 0.5, vec3(0.9, 0.8, 0.5));
+    let mut scene = stage().shape("knot", gray(knot(detail))).shape("ball", gray(ball));
+    if let Some(walls) = more {
+        scene = scene.shape("walls", gray(walls));
+    }
     let parameters = vec![
         ("moves", ten(|i| moves(&["knot"], i))),
         ("colour", ten(|i| paints("gray", "reflectance", i))),
     ];
-    Subject { name: "open", scene, parameters, vertices_of: "knot" }
+    Subject { name, scene: built(scene), parameters, vertices_of: "knot" }
 }
 
-/// The same between walls: no path escapes.
+/// Both in the open.
+fn open(detail: Detail) -> Subject {
+    knot_and_ball("open", detail, None)
+}
+
+/// Both between walls: no path escapes.
 fn room(detail: Detail) -> Subject {
-    let open = open(detail);
-    let mut scene = open.scene;
-    scene.shapes.push(shape("walls", walls(), 0));
-    Subject { name: "room", scene, ..open }
+    knot_and_ball("room", detail, Some(walls()))
 }
 
 /// The knot in a room full of fog.
 fn fog(detail: Detail) -> Subject {
-    let mut scene = stage();
-    scene.shapes.push(shape("knot", knot(detail), 0));
-    let fog = homogeneous(Rgb::splat(0.15), Rgb::splat(0.9), 0.3);
     let border = sized(&procedural::cube(), 6.0, vec3(0.0, 0.0, 5.0));
-    enclose(&mut scene, "border", border, "fog", fog);
+    let scene = stage()
+        .medium("fog", homogeneous(Rgb::splat(0.15), Rgb::splat(0.9), 0.3))
+        .shape("knot", gray(knot(detail)))
+        .shape("border", ShapeBuilder::interface(border).interior("fog"));
     let parameters = vec![
         ("moves", ten(|i| moves(&["knot"], i))),
         ("extinction", ten(|i| paints("fog", "sigma_t", i))),
     ];
-    Subject { name: "fog", scene, parameters, vertices_of: "knot" }
+    Subject { name: "fog", scene: built(scene), parameters, vertices_of: "knot" }
 }
 
 /// A bumpy blob that scatters each colour differently.
 fn blob(detail: Detail) -> Subject {
-    let mut scene = stage();
     let mut mesh = procedural::uv_sphere(match detail {
         Detail::Fine => 50,
         Detail::Coarse => 12,
@@ -92,7 +91,8 @@ fn blob(detail: Detail) -> Subject {
     }
     mesh.normals = None;
     let milk = homogeneous(Rgb::new(1.0, 2.0, 4.0), Rgb::new(0.95, 0.9, 0.7), 0.2);
-    enclose(&mut scene, "blob", sized(&mesh, 1.0, vec3(0.0, 0.0, 1.4)), "milk", milk);
+    let blob = ShapeBuilder::interface(sized(&mesh, 1.0, vec3(0.0, 0.0, 1.4))).interior("milk");
+    let scene = built(stage().medium("milk", milk).shape("blob", blob));
     let parameters = vec![
         ("moves", ten(|i| moves(&["blob"], i))),
         ("extinction", ten(|i| paints("milk", "sigma_t", i))),
@@ -102,8 +102,6 @@ fn blob(detail: Detail) -> Subject {
 
 /// Voxels of smoke that fade out inside their box, over the knot.
 fn cloud(detail: Detail) -> Subject {
-    let mut scene = stage();
-    scene.shapes.push(shape("knot", knot(detail), 0));
     const N: usize = 32;
     let values = (0..N * N * N).map(|v| {
         let centred = |i: usize| 2.0 * (i as f64 + 0.5) / N as f64 - 1.0;
@@ -117,67 +115,79 @@ fn cloud(detail: Detail) -> Subject {
     let smoke = GridMedium::new(density.expect("a grid"), 2.5, albedo, emission);
     let smoke = Medium::new(smoke.expect("coefficients"), Phase::Isotropic);
     let border = sized(&procedural::cube(), 1.6, vec3(0.0, 0.0, 2.1));
-    enclose(&mut scene, "border", border, "smoke", smoke);
+    let scene = stage()
+        .medium("smoke", smoke)
+        .shape("knot", gray(knot(detail)))
+        .shape("border", ShapeBuilder::interface(border).interior("smoke"));
     let parameters = vec![
         ("moves", ten(|i| moves(&["border", "smoke"], i))),
         ("density", ten(|i| paints("smoke", "sigma_t", i))),
     ];
-    Subject { name: "cloud", scene, parameters, vertices_of: "knot" }
+    Subject { name: "cloud", scene: built(scene), parameters, vertices_of: "knot" }
 }
 
 /// A closed room in which nothing is ever absorbed and no path ends before `max_depth`: a ball under
 /// a bulb, in mist where `misty`.
 pub(crate) fn furnace(misty: bool, max_depth: u32) -> Subject {
-    let mut scene = stage();
-    scene.shapes.clear();
-    scene.emitters.retain(|e| e.id.as_deref() == Some("bulb"));
-    scene.bsdfs[0] = Named::new("white", Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE }));
-    scene.shapes.push(shape("walls", walls(), 0));
-    scene.shapes.push(shape("ball", sized(&procedural::icosphere(2), 1.0, vec3(0.0, 0.0, 1.2)), 0));
-    scene.integrator =
+    let white = |mesh| {
+        let shape = ShapeBuilder::sharing(mesh, "white");
+        if misty { shape.exterior("mist") } else { shape }
+    };
+    let integrator =
         Integrator { max_depth: Some(max_depth), rr_depth: u32::MAX, ..Integrator::default() };
+    let ball = sized(&procedural::icosphere(2), 1.0, vec3(0.0, 0.0, 1.2));
+    let mut scene = SceneBuilder::new();
+    if misty {
+        scene = scene.medium("mist", homogeneous(Rgb::splat(0.15), Rgb::ONE, 0.0));
+    }
+    let scene = scene
+        .bsdf("white", Bsdf::Diffuse(Diffuse { reflectance: Rgb::ONE }))
+        .shape("walls", white(walls()))
+        .shape("ball", white(ball))
+        .emitter("bulb", bulb())
+        .sensor("camera", camera())
+        .integrator(integrator);
     let mut parameters = vec![
         ("moves", ten(|i| moves(&["ball"], i))),
         ("colour", ten(|i| paints("white", "reflectance", i))),
     ];
     if misty {
-        scene.media.push(Named::new("mist", homogeneous(Rgb::splat(0.15), Rgb::ONE, 0.0)));
-        for s in &mut scene.shapes {
-            s.boundary = Some(MediumBoundary { interior: None, exterior: Some(0) });
-        }
         parameters.push(("extinction", ten(|i| paints("mist", "sigma_t", i))));
     }
     let name = if misty { "misty" } else { "clear" };
-    Subject { name, scene, parameters, vertices_of: "ball" }
+    Subject { name, scene: built(scene), parameters, vertices_of: "ball" }
 }
 
 /// A floor under a lamp and a bulb, and a camera.
-fn stage() -> Scene {
-    let emitter =
-        |id: &str, emitter| Named::new(id, SceneEmitter { emitter, medium: Surrounding::Counted });
-    let radiance = Rgb::splat(12.0);
-    let (position, intensity) = (vec3(-2.5, -2.0, 4.0), Rgb::splat(20.0));
+fn stage() -> SceneBuilder {
     let mut lamp = sized(&procedural::rectangle(), 0.7, vec3(2.0, 1.5, 4.5));
     lamp.flip();
+    let glow = Emitter::Area { radiance: Rgb::splat(12.0) };
+    SceneBuilder::new()
+        .bsdf("gray", Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.6) }))
+        .shape("floor", gray(sized(&procedural::grid(8, 8), 5.0, Vec3::ZERO)))
+        .shape("lamp", gray(lamp).emitter(glow))
+        .emitter("bulb", bulb())
+        .sensor("camera", camera())
+        .integrator(Integrator { max_depth: Some(6), rr_depth: 4, ..Integrator::default() })
+}
+
+fn bulb() -> Emitter {
+    Emitter::Point { position: vec3(-2.5, -2.0, 4.0), intensity: Rgb::splat(20.0) }
+}
+
+fn camera() -> Sensor {
     let view = [vec3(0.5, -7.0, 4.0), vec3(0.0, 0.0, 1.0), Vec3::Z];
     let filter = Filter::new(FilterKind::TENT).expect("a tent");
-    let sensor = Sensor::look_at(view, Lens::with_fov(40.0), [48, 48], filter).expect("a camera");
-    let medium = Surrounding::Counted;
-    Scene {
-        shapes: vec![
-            shape("floor", sized(&procedural::grid(8, 8), 5.0, Vec3::ZERO), 0),
-            Shape { emitter: Some(0), ..shape("lamp", lamp, 0) },
-        ],
-        bsdfs: vec![Named::new("gray", Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.6) }))],
-        media: Vec::new(),
-        emitters: vec![
-            emitter("glow", Emitter::Area { radiance }),
-            emitter("bulb", Emitter::Point { position, intensity }),
-        ],
-        sensors: vec![Named::new("camera", SceneSensor { sensor, medium, sample_count: None })],
-        integrator: Integrator { max_depth: Some(6), rr_depth: 4, ..Integrator::default() },
-        ..Scene::default()
-    }
+    Sensor::look_at(view, Lens::with_fov(40.0), [48, 48], filter).expect("a camera")
+}
+
+fn gray(mesh: Mesh) -> ShapeBuilder {
+    ShapeBuilder::sharing(mesh, "gray")
+}
+
+fn built(scene: SceneBuilder) -> Scene {
+    scene.build().expect("a scene")
 }
 
 /// Many silhouettes.
@@ -201,22 +211,9 @@ fn sized(mesh: &Mesh, size: f64, at: Vec3) -> Mesh {
     mesh.transform(&Affine { linear: Mat3::IDENTITY * size, translation: at })
 }
 
-fn shape(id: &str, mesh: Mesh, bsdf: usize) -> Shape {
-    Shape { id: Some(id.into()), mesh: Arc::new(mesh), bsdf, boundary: None, emitter: None }
-}
-
 fn homogeneous(sigma_t: Rgb, albedo: Rgb, g: f64) -> Medium {
     let coefficients = Homogeneous::new(sigma_t, albedo, Rgb::ZERO).expect("coefficients");
     Medium::new(coefficients, Phase::henyey_greenstein(g).expect("a mean cosine"))
-}
-
-/// Puts a medium inside an invisible surface.
-fn enclose(scene: &mut Scene, id: &str, mesh: Mesh, medium_id: &str, medium: Medium) {
-    scene.media.push(Named::new(medium_id, medium));
-    scene.bsdfs.push(Named::new("none", Bsdf::Null));
-    let boundary = MediumBoundary { interior: Some(scene.media.len() - 1), exterior: None };
-    let bsdf = scene.bsdfs.len() - 1;
-    scene.shapes.push(Shape { boundary: Some(boundary), ..shape(id, mesh, bsdf) });
 }
 
 fn ten(make: impl Fn(u32) -> Parameter) -> Vec<Parameter> {

@@ -169,10 +169,12 @@ impl SceneBuilder {
     /// When two elements have the same id, a shape names what does not exist, or an element is unusable.
     pub fn build(self) -> Result<Scene, Error> {
         let Self { shapes, bsdfs, media, emitters, sensors, integrator } = self;
-        let mut scene = Scene { bsdfs, media, emitters, sensors, integrator, ..Scene::default() };
+        let mut scene = Scene { bsdfs, media, sensors, integrator, ..Scene::default() };
+        // The emitters of shapes come first: what others there are does not change their indices.
         for (id, shape) in shapes {
             add(&mut scene, id, shape)?;
         }
+        scene.emitters.extend(emitters);
         refuse_same_ids(&scene)?;
         scene.check()?;
         Ok(scene)
@@ -268,7 +270,7 @@ mod tests {
         let found: Vec<_> = scene.shapes.iter().map(|s| (s.bsdf, s.boundary, s.emitter)).collect();
         assert_eq!(found[0], (1, boundary(Some(1), None), None));
         assert_eq!(found[1], (0, boundary(None, Some(1)), None));
-        assert_eq!(found[2], (2, None, Some(1)));
+        assert_eq!(found[2], (2, None, Some(0)));
         assert_eq!(scene.instances, [Instance { shape: 3, to_world: Affine::IDENTITY }]);
         assert_eq!(scene.integrator.max_depth, Some(4));
     }

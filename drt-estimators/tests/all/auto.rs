@@ -29,8 +29,7 @@ fn same(a: &Rendering, b: &Rendering) -> bool {
 
 /// A ball over a floor under a lamp and a sky, by a box filter: pixels' borders are edges to `path-space`.
 fn room() -> Scene {
-    let mut scene = surfaces(diffuse(0.7, 0.5, 0.3), diffuse(0.4, 0.5, 0.6));
-    scene.emitters.retain(|e| matches!(e.id.as_deref(), Some("glow" | "sky")));
+    let mut scene = surfaces_in_extended_light(diffuse(0.7, 0.5, 0.3), diffuse(0.4, 0.5, 0.6));
     let sensor = &mut scene.sensors[0].item.sensor;
     *sensor = sensor.clone().with_filter(Filter::new(FilterKind::BOX).unwrap());
     scene

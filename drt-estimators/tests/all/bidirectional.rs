@@ -74,16 +74,15 @@ fn a_pilot_chooses_what_takes_less_work() {
 
 /// A ball in thick fog, with a small lamp beside it.
 fn lamp_in_fog() -> Scene {
-    let mut b = Build::default();
-    let fog = homogeneous(Rgb::splat(1.2), Rgb::splat(0.97), Rgb::ZERO, 0.0);
-    let fog = b.medium("fog", fog);
     let tub = placed(procedural::cube(), Vec3::splat(2.0), 0.0, Vec3::ZERO);
-    b.interface("tub", tub, fog, None);
-    let bsdf = b.bsdf("ball-bsdf", diffuse(0.6, 0.5, 0.4));
-    b.shape("ball", ball(0.5, vec3(0.6, -0.5, 0.0)), bsdf);
     let lamp = placed(procedural::rectangle(), Vec3::splat(0.05), 0.4, vec3(-0.7, 0.6, -0.3));
-    b.lamp(lamp, Rgb::splat(900.0));
-    b.camera(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 8)
+    let ball = ball(0.5, vec3(0.6, -0.5, 0.0));
+    let scene = SceneBuilder::new()
+        .medium("fog", homogeneous(Rgb::splat(1.2), Rgb::splat(0.97), Rgb::ZERO, 0.0))
+        .shape("tub", ShapeBuilder::interface(tub).interior("fog"))
+        .shape("ball", ShapeBuilder::new(ball, diffuse(0.6, 0.5, 0.4)))
+        .shape("lamp", glowing(lamp, Rgb::splat(900.0)));
+    seen(scene, [vec3(0.3, 0.4, 5.0), Vec3::ZERO], 8)
 }
 
 /// Derivatives by paths from both ends, over the bars of those from the camera.
@@ -122,7 +121,7 @@ fn check(name: &str, scene: &Scene, effects: Vec<Effect>, spp: u32) {
 #[test]
 fn derivatives_are_those_from_the_camera() {
     let scene = surfaces(metal(), phong());
-    check("albedo", &scene, vec![changes("floor-bsdf", "reflectance", grey(0.3))], 256);
+    check("albedo", &scene, vec![changes("floor", "reflectance", grey(0.3))], 256);
     check("ball", &scene, vec![moves("ball", shift())], 256);
     check("extinction", &fog(), vec![changes("thin", "sigma_t", grey(0.3))], 512);
 }

@@ -26,11 +26,11 @@ fn blames(name: Option<String>, words: &str, change: impl FnOnce(&mut Scene)) {
 }
 
 fn bsdf(words: &str, bad: Bsdf) {
-    blames(fog().bsdfs[0].id.clone(), words, |scene| scene.bsdfs[0].item = bad);
+    blames(Some("bsdf[0]".into()), words, |scene| scene.bsdfs[0].item = bad);
 }
 
 fn emitter(words: &str, bad: Emitter) {
-    blames(fog().emitters[0].id.clone(), words, |scene| {
+    blames(Some("emitter[0]".into()), words, |scene| {
         scene.shapes.iter_mut().for_each(|s| s.emitter = None);
         scene.emitters[0].item.emitter = bad;
     });

@@ -22,7 +22,7 @@ fn cases() -> Vec<(Scene, Vec<Parameter>)> {
         parameter(
             "lamp",
             0.1,
-            vec![moves("lamp", shift()), changes("glow", "radiance", grey(1.0))],
+            vec![moves("lamp", shift()), changes("lamp", "radiance", grey(1.0))],
         ),
     ];
     let in_fog = vec![

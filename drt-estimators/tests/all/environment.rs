@@ -20,14 +20,12 @@ fn outside() -> Scene {
     texels[10] = [9.0, 7.0, 5.0];
     let frame = Mat3::rotation(vec3(0.2, 1.0, 0.1).normalize(), 0.8);
     let map = Arc::new(EnvironmentMap::new([8, 4], texels, frame).expect("a map"));
-    let mut b = Build::default();
-    let floor = b.bsdf("floor-bsdf", metal());
-    let mesh = placed(procedural::rectangle(), vec3(4.0, 4.0, 4.0), 0.0, vec3(0.0, 0.0, -1.0));
-    b.shape("floor", mesh, floor);
-    let grey = b.bsdf("ball-bsdf", diffuse(0.7, 0.6, 0.5));
-    b.shape("ball", ball(0.8, Vec3::ZERO), grey);
-    b.light("sky", Emitter::Envmap { radiance: Rgb::new(1.0, 0.9, 0.8), map });
-    b.camera(vec3(0.4, 0.8, 6.0), Vec3::ZERO, 3)
+    let floor = placed(procedural::rectangle(), vec3(4.0, 4.0, 4.0), 0.0, vec3(0.0, 0.0, -1.0));
+    let scene = SceneBuilder::new()
+        .shape("floor", ShapeBuilder::new(floor, metal()))
+        .shape("ball", ShapeBuilder::new(ball(0.8, Vec3::ZERO), diffuse(0.7, 0.6, 0.5)))
+        .emitter("sky", Emitter::Envmap { radiance: Rgb::new(1.0, 0.9, 0.8), map });
+    seen(scene, [vec3(0.4, 0.8, 6.0), Vec3::ZERO], 3)
 }
 
 #[test]

@@ -14,9 +14,6 @@ fn edges(every_vertex: bool, seed: u64) -> [Layer; 2] {
     let mut scene = fog();
     // What lights the fog from outside is path space's, or has no edges.
     scene.emitters.retain(|e| e.id.as_deref() != Some("sun") && e.id.as_deref() != Some("bulb"));
-    for shape in &mut scene.shapes {
-        shape.emitter = shape.emitter.map(|_| 0);
-    }
     let settings = Settings {
         estimator: EstimatorKind::Radiative,
         every_vertex,

@@ -13,17 +13,15 @@ const PYRAMID: Loss = Loss::PyramidL2 { levels: 10, weight: 4.0 };
 
 /// A ball over a floor, lit by a lamp and the sky.
 fn room() -> Scene {
-    let mut scene = surfaces(diffuse(0.7, 0.5, 0.3), diffuse(0.4, 0.5, 0.6));
-    scene.emitters.retain(|e| matches!(e.id.as_deref(), Some("glow" | "sky")));
-    scene
+    surfaces_in_extended_light(diffuse(0.7, 0.5, 0.3), diffuse(0.4, 0.5, 0.6))
 }
 
 /// The ball moves, the floor and the lamp brighten.
 fn parameters(values: [f64; 3]) -> Vec<Parameter> {
     vec![
         parameter("ball-x", values[0], vec![moves("ball", GeometryChange::Translate(Vec3::X))]),
-        parameter("floor", values[1], vec![changes("floor-bsdf", "reflectance", grey(0.3))]),
-        parameter("lamp", values[2], vec![changes("glow", "radiance", grey(1.0))]),
+        parameter("floor", values[1], vec![changes("floor", "reflectance", grey(0.3))]),
+        parameter("lamp", values[2], vec![changes("lamp", "radiance", grey(1.0))]),
     ]
 }
 

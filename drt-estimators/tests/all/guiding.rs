@@ -123,7 +123,7 @@ fn short_runs_have_no_pilots() {
     assert_eq!(r.counters.guide_samples, 0);
     let off = Settings { boundary_ratio: None, ..settings(5, false) };
     assert!(rendered(&scene, &slides, &off).plan.guiding.is_empty());
-    let still = parameter("brighter", 0.0, vec![changes("glow", "radiance", grey(1.0))]);
+    let still = parameter("brighter", 0.0, vec![changes("lamp", "radiance", grey(1.0))]);
     let r = rendered(&scene, &still, &settings(5, true));
     assert!(r.counters.guide_samples == 0 && r.plan.guiding.is_empty());
 }

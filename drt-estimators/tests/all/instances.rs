@@ -24,32 +24,28 @@ fn instance(scene: &mut Scene, id: &str, members: &[&str], to_world: Affine) {
 
 /// A smooth ball and a cube, stretched, turned and mirrored several times over a floor and in fog.
 fn scene() -> Scene {
-    let mut b = Build::default();
-    let bsdf = b.bsdf("ball-bsdf", phong());
-    b.shape("ball", ball(0.4, vec3(0.0, 0.5, 0.1)), bsdf);
-    let bsdf = b.bsdf("cube-bsdf", diffuse(0.3, 0.6, 0.7));
-    b.shape("cube", placed(procedural::cube(), Vec3::splat(0.3), 0.4, vec3(0.1, -0.4, 0.0)), bsdf);
+    let cube = placed(procedural::cube(), Vec3::splat(0.3), 0.4, vec3(0.1, -0.4, 0.0));
+    let veil = placed(procedural::cube(), Vec3::splat(0.35), 0.2, Vec3::Z * 0.8);
     let fog = homogeneous(Rgb::new(0.8, 0.5, 0.6), Rgb::splat(0.8), Rgb::ZERO, 0.2);
-    let fog = b.medium("fog", fog);
-    b.interface(
-        "veil",
-        placed(procedural::cube(), Vec3::splat(0.35), 0.2, Vec3::Z * 0.8),
-        fog,
-        None,
-    );
-    let bsdf = b.bsdf("floor-bsdf", diffuse(0.6, 0.5, 0.4));
     let linear = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 4.0;
     let floor = Affine { linear, translation: vec3(0.0, -1.0, 0.0) };
-    b.shape("floor", procedural::rectangle().transform(&floor), bsdf);
+    let floor = procedural::rectangle().transform(&floor);
     let bulb = drt_estimators::emitter::Emitter::Point {
         position: vec3(-1.0, 2.3, 2.0),
         intensity: Rgb::new(4.0, 5.0, 6.0),
     };
-    b.light("bulb", bulb);
     let down = Mat3::rotation(Vec3::X, core::f64::consts::FRAC_PI_2) * 0.5;
     let lamp = Affine { linear: down, translation: vec3(0.5, 2.2, 0.0) };
-    b.lamp(procedural::rectangle().transform(&lamp), Rgb::new(3.0, 2.5, 2.0));
-    let mut scene = b.camera(vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0), 3);
+    let lamp = procedural::rectangle().transform(&lamp);
+    let scene = SceneBuilder::new()
+        .medium("fog", fog)
+        .shape("ball", ShapeBuilder::new(ball(0.4, vec3(0.0, 0.5, 0.1)), phong()))
+        .shape("cube", ShapeBuilder::new(cube, diffuse(0.3, 0.6, 0.7)))
+        .shape("veil", ShapeBuilder::interface(veil).interior("fog"))
+        .shape("floor", ShapeBuilder::new(floor, diffuse(0.6, 0.5, 0.4)))
+        .shape("lamp", glowing(lamp, Rgb::new(3.0, 2.5, 2.0)))
+        .emitter("bulb", bulb);
+    let mut scene = seen(scene, [vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0)], 3);
     let turned = Mat3::rotation(vec3(0.48, 0.64, 0.6), 0.9) * Mat3::diagonal(vec3(0.8, 1.1, 0.7));
     let mirrored = Mat3::diagonal(vec3(-0.9, 0.8, 0.9));
     let at = |linear, x: f64, y: f64| Affine { linear, translation: vec3(x, y, 0.0) };
@@ -112,7 +108,7 @@ fn derivatives_agree() {
     let scene = scene();
     let parameters = [
         parameter("one", 0.0, vec![moves("one", shift())]),
-        parameter("colour", 0.0, vec![changes("cube-bsdf", "reflectance", grey(0.5))]),
+        parameter("colour", 0.0, vec![changes("cube", "reflectance", grey(0.5))]),
     ];
     let settings = Settings { seed: 3, ..Settings::default() };
     let differences = finite_differences(&scene, &parameters, &settings, 3000, 1e-2, &Unattended);

@@ -10,15 +10,14 @@ use drt_motion::{GeometryChange, Parameter};
 
 /// A floor whose rims but one are out of view, which is at `end`, and what goes through it; both glow.
 fn glowing(end: f64, body: Mesh) -> Scene {
-    let mut b = Build::default();
-    let black = b.bsdf("black", diffuse(0.0, 0.0, 0.0));
-    let [dim, bright] = [("dim", 0.5), ("bright", 2.0)].map(|(id, radiance)| {
-        b.light(id, Emitter::Area { radiance: Rgb::new(radiance, 1.0, 0.7 * radiance) })
-    });
+    let glows = |mesh, radiance| {
+        let radiance = Rgb::new(radiance, 1.0, 0.7 * radiance);
+        ShapeBuilder::new(mesh, diffuse(0.0, 0.0, 0.0)).emitter(Emitter::Area { radiance })
+    };
     let floor = procedural::grid(2, 2).transform(&turned(Vec3::X, vec3(0.0, 0.0, end - 9.0)));
-    b.shape("floor", floor, black).emitter = Some(dim);
-    b.shape("body", body, black).emitter = Some(bright);
-    b.camera(vec3(1.5, 1.4, 3.0), vec3(0.0, 0.0, 0.0), 1)
+    let scene =
+        SceneBuilder::new().shape("floor", glows(floor, 0.5)).shape("body", glows(body, 2.0));
+    seen(scene, [vec3(1.5, 1.4, 3.0), Vec3::ZERO], 1)
 }
 
 /// Nine times as large, by a quarter of a turn.

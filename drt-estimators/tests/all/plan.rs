@@ -83,9 +83,9 @@ fn parameters_that_change_nothing() {
 fn materials_media_and_strengths_have_no_boundary() {
     let colour = ValueChange::Add(Rgb::new(0.5, -0.2, 0.3));
     for (scene, effect) in [
-        (surfaces(metal(), phong()), changes("ball-bsdf", "alpha", grey(0.1))),
+        (surfaces(metal(), phong()), changes("ball", "alpha", grey(0.1))),
         (surfaces(metal(), phong()), changes("bulb", "intensity", colour)),
-        (surfaces(metal(), phong()), changes("glow", "radiance", colour)),
+        (surfaces(metal(), phong()), changes("lamp", "radiance", colour)),
         (surfaces(metal(), phong()), changes("spot", "cutoff_angle", grey(1.0))),
         (fog(), changes("thin", "sigma_t", colour)),
         (fog(), changes("dense", "g", grey(0.2))),

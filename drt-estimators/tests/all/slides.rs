@@ -24,19 +24,20 @@ fn picture(border: f32) -> Texture {
 
 /// A cube over a floor in the light of a picture.
 fn scene(slide: Slide) -> Scene {
-    let mut b = Build::default();
-    let bsdf = b.bsdf("cube-bsdf", diffuse(0.5, 0.7, 0.6));
-    b.shape("cube", placed(procedural::cube(), Vec3::splat(0.5), 0.5, vec3(0.1, 0.1, 0.0)), bsdf);
-    let bsdf = b.bsdf("floor-bsdf", diffuse(0.6, 0.5, 0.7));
+    let cube = placed(procedural::cube(), Vec3::splat(0.5), 0.5, vec3(0.1, 0.1, 0.0));
     let linear = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 4.0;
     let floor = drt_math::Affine { linear, translation: vec3(0.0, -1.0, 0.0) };
-    b.shape("floor", procedural::rectangle().transform(&floor), bsdf);
+    let floor = procedural::rectangle().transform(&floor);
     let position = vec3(0.8, 2.5, 1.5);
     let view = drt_estimators::sensor::look_at(position, vec3(0.1, -0.2, 0.0), Vec3::Y);
     let frame = view.expect("a view").linear;
     let strength = Rgb::new(4.0, 5.0, 6.0);
-    b.light("lamp", Emitter::Projector { position, frame, strength, slide: Arc::new(slide) });
-    b.camera(vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0), 3)
+    let lamp = Emitter::Projector { position, frame, strength, slide: Arc::new(slide) };
+    let scene = SceneBuilder::new()
+        .shape("cube", ShapeBuilder::new(cube, diffuse(0.5, 0.7, 0.6)))
+        .shape("floor", ShapeBuilder::new(floor, diffuse(0.6, 0.5, 0.7)))
+        .emitter("lamp", lamp);
+    seen(scene, [vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0)], 3)
 }
 
 fn parameters(name: &str) -> Vec<Parameter> {

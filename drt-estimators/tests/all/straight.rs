@@ -1,6 +1,6 @@
 //! Light that goes straight through: at no depth, and to where points and directions light.
 
-use crate::common::{Build, changes, diffuse, parameter, placed};
+use crate::common::{SceneBuilder, ShapeBuilder, changes, diffuse, parameter, placed, seen};
 use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{Bsdf, Mask, ThinDielectric};
 use drt_estimators::{Estimate, EstimatorKind, PathSampling, Scene, Session, Settings, Unattended};
@@ -15,16 +15,15 @@ fn mask() -> Bsdf {
 
 /// Something between a floor and its light, out of the camera's sight.
 fn shaded(by: Option<Bsdf>, light: Emitter, depth: u32) -> Scene {
-    let mut build = Build::default();
-    let grey = build.bsdf("grey", diffuse(0.5, 0.5, 0.5));
-    build.shape("floor", placed(rectangle(), Vec3::splat(3.0), 0.0, Vec3::ZERO), grey);
+    let floor = placed(rectangle(), Vec3::splat(3.0), 0.0, Vec3::ZERO);
+    let mut scene = SceneBuilder::new()
+        .shape("floor", ShapeBuilder::new(floor, diffuse(0.5, 0.5, 0.5)))
+        .emitter("light", light);
     if let Some(bsdf) = by {
-        let between = build.bsdf("between", bsdf);
-        let mesh = placed(rectangle(), Vec3::splat(9.0), 0.0, vec3(0.0, 0.0, 2.0));
-        build.shape("roof", mesh, between);
+        let roof = placed(rectangle(), Vec3::splat(9.0), 0.0, vec3(0.0, 0.0, 2.0));
+        scene = scene.shape("roof", ShapeBuilder::new(roof, bsdf));
     }
-    build.light("light", light);
-    build.camera(vec3(0.3, 0.2, 1.5), Vec3::ZERO, depth)
+    seen(scene, [vec3(0.3, 0.2, 1.5), Vec3::ZERO], depth)
 }
 
 fn image(scene: &Scene) -> Estimate {
@@ -63,14 +62,12 @@ fn points_and_directions_shine_through() {
 /// The sky through two masks, by paths up to a depth.
 fn sky_behind(depth: u32, straight_depth: bool) -> Estimate {
     let sky = Emitter::Constant { radiance: Rgb::ONE };
-    let mut build = Build::default();
-    let between = build.bsdf("between", mask());
-    for z in [2.0, 2.5] {
+    let mut scene = SceneBuilder::new().emitter("sky", sky);
+    for (id, z) in [("roof", 2.0), ("cover", 2.5)] {
         let mesh = placed(rectangle(), Vec3::splat(9.0), 0.0, vec3(0.0, 0.0, z));
-        build.shape("roof", mesh, between);
+        scene = scene.shape(id, ShapeBuilder::new(mesh, mask()));
     }
-    build.light("sky", sky);
-    let mut scene = build.camera(vec3(0.0, 0.0, 1.5), vec3(0.1, 0.1, 4.0), depth);
+    let mut scene = seen(scene, [vec3(0.0, 0.0, 1.5), vec3(0.1, 0.1, 4.0)], depth);
     scene.integrator.straight_depth = straight_depth;
     image(&scene)
 }
@@ -106,7 +103,7 @@ fn what_goes_through_a_mask_falls_with_its_opacity() {
     let free = image(&shaded(None, lamp.clone(), 2));
     let scene = shaded(Some(mask()), lamp, 2);
     let fades =
-        [parameter("fades", 0.0, vec![changes("between", "opacity", ValueChange::Add(Rgb::ONE))])];
+        [parameter("fades", 0.0, vec![changes("roof", "opacity", ValueChange::Add(Rgb::ONE))])];
     let derivative = |estimator| {
         let settings = Settings { threads: 1, estimator, ..Settings::default() };
         let mut session = Session::new(&scene, &fades, &settings).expect("a scene");

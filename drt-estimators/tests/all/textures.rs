@@ -17,22 +17,21 @@ const SPP: u32 = 512;
 
 /// A floor that fills the view under an even sky: without its texture nothing that slides would change.
 fn floor(filter: TextureFilter) -> Scene {
-    let mut b = Build::default();
     let textures =
         [(Property::Reflectance, [0.1, 0.9]), (Property::SpecularReflectance, [0.0, 0.4])];
     let textures = textures.into_iter().enumerate();
     let textures = textures
         .map(|(i, (p, range))| (p, image(i as u64, range, filter, TextureWrap::Repeat)))
         .collect();
-    let bsdf = b.bsdf("floor-bsdf", twosided(textured(phong(), textures)));
     let plain = procedural::rectangle();
     let uv = |p: Vec3| [0.5 * (p.x + 1.0), 0.5 * (p.y + 1.0)];
     let corners = (0..2).map(|i| plain.triangle(i).map(uv)).collect();
     let mesh = plain.with_texcoords(corners).expect("coordinates");
     let mesh = placed(mesh, vec3(9.0, 9.0, 9.0), 0.0, vec3(0.0, 0.0, 0.0));
-    b.shape("floor", mesh, bsdf);
-    b.light("sky", Emitter::Constant { radiance: Rgb::new(0.9, 1.0, 1.1) });
-    b.camera(vec3(0.4, 0.8, 6.0), Vec3::ZERO, 2)
+    let scene = SceneBuilder::new()
+        .shape("floor", ShapeBuilder::new(mesh, twosided(textured(phong(), textures))))
+        .emitter("sky", Emitter::Constant { radiance: Rgb::new(0.9, 1.0, 1.1) });
+    seen(scene, [vec3(0.4, 0.8, 6.0), Vec3::ZERO], 2)
 }
 
 /// Sums of derivatives by each parameter.
@@ -90,10 +89,10 @@ fn texels_change() {
     let (grow, colours) =
         (ValueChange::MultiplyLog(1.0), ValueChange::Add(Rgb::new(0.5, 0.2, 1.0)));
     let parameters = [
-        parameter("wear", 0.1, vec![all("ball-bsdf", "alpha", grow)]),
-        parameter("spot of wear", 0.0, vec![some("ball-bsdf", "alpha", [1, 2], grey(1.0))]),
-        parameter("shine", 0.0, vec![all("ball-bsdf", "specular_reflectance", grow)]),
-        parameter("stain", 0.0, vec![some("floor-bsdf", "reflectance", [0, 1], colours)]),
+        parameter("wear", 0.1, vec![all("ball", "alpha", grow)]),
+        parameter("spot of wear", 0.0, vec![some("ball", "alpha", [1, 2], grey(1.0))]),
+        parameter("shine", 0.0, vec![all("ball", "specular_reflectance", grow)]),
+        parameter("stain", 0.0, vec![some("floor", "reflectance", [0, 1], colours)]),
         parameter("bleach", 0.2, vec![all("floor", "reflectance", grow)]),
         parameter("white", 0.0, vec![some("floor", "specular_reflectance", [1, 0], grey(1.0))]),
         parameter("pattern", 0.1, vec![all("lamp", "radiance", colours)]),
@@ -129,16 +128,16 @@ fn texels_that_are_not_there_are_refused() {
         assert!(message.contains(part) && message.contains("stain"), "{message}");
     };
     let some = |target, property| changes_texel(target, property, Some([4, 1]), grey(1.0));
-    fails(some("floor-bsdf", "reflectance"), "no texel [4, 1]");
-    fails(some("floor-bsdf", "exponent"), "no texture stands for `exponent`");
+    fails(some("floor", "reflectance"), "no texel [4, 1]");
+    fails(some("floor", "exponent"), "no texture stands for `exponent`");
     fails(some("bulb", "intensity"), "no texture stands for `intensity`");
     fails(some("sky", "radiance"), "no texture stands for `radiance`");
     fails(some("lamp", "radiance"), "no texel [4, 1]");
-    fails(some("glow", "intensity"), "no property `intensity`");
+    fails(some("emitter[0]", "intensity"), "no property `intensity`");
     fails(some("camera", "fov"), "have texels");
     let colour = ValueChange::Add(Rgb::new(1.0, 0.0, 0.0));
-    fails(changes_texel("ball-bsdf", "alpha", None, colour), "a single number");
-    fails(changes_voxel("ball-bsdf", "alpha", [0, 0, 0], grey(1.0)), "have voxels");
+    fails(changes_texel("ball", "alpha", None, colour), "a single number");
+    fails(changes_voxel("ball", "alpha", [0, 0, 0], grey(1.0)), "have voxels");
     let image = under_an_image(textures());
     for change in [shift(), stretch()] {
         let parameters = [parameter("storm", 0.0, vec![moves("sky", change)])];
@@ -146,7 +145,7 @@ fn texels_that_are_not_there_are_refused() {
         let message = session.err().expect("a refusal").to_string();
         assert!(message.contains("storm") && message.contains("can be turned"), "{message}");
     }
-    let dark = parameter("dark", 1.0, vec![changes("floor-bsdf", "reflectance", grey(-1.0))]);
+    let dark = parameter("dark", 1.0, vec![changes("floor", "reflectance", grey(-1.0))]);
     let session = Session::new(&scene, &[dark], &Settings::default());
     let message = session.err().expect("a refusal").to_string();
     assert!(message.contains("\"reflectance\" is -"), "{message}");
@@ -154,27 +153,24 @@ fn texels_that_are_not_there_are_refused() {
 
 /// A lamp brighter to the right over a floor: the camera sees one of them alone.
 fn glowing(filter: TextureFilter, lamp_in_view: bool) -> Scene {
-    let mut b = Build::default();
-    let bsdf = b.bsdf("floor-bsdf", diffuse(0.7, 0.7, 0.7));
     let flat = |turn: f64, size: f64, y: f64| {
         let linear = Mat3::rotation(Vec3::X, turn) * size;
         procedural::rectangle().transform(&Affine { linear, translation: vec3(0.0, y, 0.0) })
     };
-    b.shape("floor", flat(-FRAC_PI_2, 9.0, -0.5), bsdf);
     let mesh = flat(FRAC_PI_2, 2.0, 0.6);
     let uv = |p: Vec3| [0.5 + 0.25 * p.x, 0.5 + 0.25 * p.z];
     let corners = (0..2).map(|i| mesh.triangle(i).map(uv)).collect();
     let texels = (0..16).map(|i| [0.1, 0.3, 0.6, 1.0].map(|v| v + 0.02 * i as f32)[i % 4]);
     let mut ramp = Bitmap::new([4, 4], texels.map(|v| [v, 0.5 * v, 0.2]).collect()).expect("one");
     (ramp.filter, ramp.wrap) = (filter, TextureWrap::Clamp);
-    let bsdf = b.bsdf("lamp-bsdf", diffuse(0.0, 0.0, 0.0));
     let radiance = Rgb::new(3.0, 2.5, 2.0);
     let emitter = Emitter::TexturedArea { radiance, texture: Texture::Bitmap(ramp) };
-    let emitter = b.light("glow", emitter);
     let mesh = mesh.with_texcoords(corners).expect("coordinates");
-    b.shape("lamp", mesh, bsdf).emitter = Some(emitter);
+    let floor = ShapeBuilder::new(flat(-FRAC_PI_2, 9.0, -0.5), diffuse(0.7, 0.7, 0.7));
+    let lamp = ShapeBuilder::new(mesh, diffuse(0.0, 0.0, 0.0)).emitter(emitter);
+    let scene = SceneBuilder::new().shape("floor", floor).shape("lamp", lamp);
     let y = if lamp_in_view { 9.0 } else { -9.0 };
-    b.camera(vec3(0.2, 0.1, 0.3), vec3(0.4, y, 0.2), 2)
+    seen(scene, [vec3(0.2, 0.1, 0.3), vec3(0.4, y, 0.2)], 2)
 }
 
 #[test]

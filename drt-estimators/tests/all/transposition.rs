@@ -130,11 +130,11 @@ fn surfaces_everything_at_once() {
     let scene = surfaces(metal(), phong());
     let mut effects = wobbles(&scene);
     effects.extend([
-        changes("ball-bsdf", "alpha", grey(0.3)),
-        changes("ball-bsdf", "eta", coloured()),
-        changes("floor-bsdf", "reflectance", coloured()),
-        changes("floor-bsdf", "exponent", grey(2.0)),
-        changes("glow", "radiance", coloured()),
+        changes("ball", "alpha", grey(0.3)),
+        changes("ball", "eta", coloured()),
+        changes("floor", "reflectance", coloured()),
+        changes("floor", "exponent", grey(2.0)),
+        changes("lamp", "radiance", coloured()),
         changes("bulb", "intensity", ValueChange::MultiplyLog(0.7)),
         moves("bulb", shift()),
         changes("spot", "cutoff_angle", grey(4.0)),
@@ -175,8 +175,8 @@ fn narrow_lobes_everything_at_once() {
         let scene = surfaces(ball, diffuse(0.6, 0.5, 0.4));
         let mut effects = wobbles(&scene);
         effects.extend([
-            changes("ball-bsdf", "alpha", grey(0.3)),
-            changes("ball-bsdf", "eta", grey(0.2)),
+            changes("ball", "alpha", grey(0.3)),
+            changes("ball", "eta", grey(0.2)),
             moves("camera", turn()),
         ]);
         agree("narrow", &scene, effects, &settings());
@@ -193,13 +193,13 @@ fn uneven_materials_everything_at_once() {
     let scene = with_coordinates(surfaces(ball, Bsdf::Anisotropic(Box::new(floor))));
     let mut effects = wobbles(&scene);
     effects.extend([
-        changes("ball-bsdf", "base_color", coloured()),
-        changes("ball-bsdf", "roughness", grey(0.3)),
-        changes("ball-bsdf", "metallic", grey(-0.4)),
-        changes("ball-bsdf", "clearcoat", grey(0.6)),
-        changes("floor-bsdf", "alpha_u", grey(0.5)),
-        changes("floor-bsdf", "alpha_v", grey(-0.3)),
-        changes("floor-bsdf", "k", coloured()),
+        changes("ball", "base_color", coloured()),
+        changes("ball", "roughness", grey(0.3)),
+        changes("ball", "metallic", grey(-0.4)),
+        changes("ball", "clearcoat", grey(0.6)),
+        changes("floor", "alpha_u", grey(0.5)),
+        changes("floor", "alpha_v", grey(-0.3)),
+        changes("floor", "k", coloured()),
     ]);
     agree("uneven", &scene, effects, &settings());
 }
@@ -240,9 +240,9 @@ fn surfaces_one_at_a_time() {
         ("floor", vec![moves("floor", stretch())]),
         ("camera", vec![moves("camera", shift())]),
         ("lamp", vec![moves("lamp", wobble(&scene, "lamp", 2))]),
-        ("reflectance", vec![changes("floor-bsdf", "reflectance", coloured())]),
-        ("index", vec![changes("ball-bsdf", "eta", grey(0.2))]),
-        ("radiance", vec![changes("glow", "radiance", coloured())]),
+        ("reflectance", vec![changes("floor", "reflectance", coloured())]),
+        ("index", vec![changes("ball", "eta", grey(0.2))]),
+        ("radiance", vec![changes("lamp", "radiance", coloured())]),
         ("bulb", vec![moves("bulb", shift())]),
         ("spot", vec![moves("spot", turn())]),
         ("sun", vec![moves("sun", turn())]),
@@ -260,7 +260,7 @@ fn fog_with_a_solid_in(settings: &Settings) {
         }
         effects.push(changes(medium, "g", grey(0.4)));
     }
-    effects.push(changes("ball-bsdf", "reflectance", coloured()));
+    effects.push(changes("ball", "reflectance", coloured()));
     effects.push(changes("bulb", "intensity", coloured()));
     effects.push(moves("sun", turn()));
     effects.push(moves("camera", turn()));
@@ -347,13 +347,13 @@ fn voxels() {
 fn texels() {
     let scene = under_an_image(textures());
     let effects = vec![
-        changes_texel("ball-bsdf", "alpha", Some([1, 2]), grey(0.4)),
-        changes_texel("ball-bsdf", "specular_reflectance", None, ValueChange::Multiply(0.7)),
-        changes_texel("floor-bsdf", "reflectance", None, coloured()),
-        changes_texel("floor-bsdf", "specular_reflectance", Some([1, 0]), coloured()),
-        changes("floor-bsdf", "exponent", grey(2.0)),
-        changes_texel("glow", "radiance", None, coloured()),
-        changes("glow", "radiance", coloured()),
+        changes_texel("ball", "alpha", Some([1, 2]), grey(0.4)),
+        changes_texel("ball", "specular_reflectance", None, ValueChange::Multiply(0.7)),
+        changes_texel("floor", "reflectance", None, coloured()),
+        changes_texel("floor", "specular_reflectance", Some([1, 0]), coloured()),
+        changes("floor", "exponent", grey(2.0)),
+        changes_texel("lamp", "radiance", None, coloured()),
+        changes("lamp", "radiance", coloured()),
         changes_texel("sky", "radiance", Some([5, 3]), coloured()),
         changes_texel("sky", "radiance", None, ValueChange::MultiplyLog(0.4)),
         moves("sky", turn()),
@@ -440,36 +440,29 @@ fn rays_carry_back_exactly() {
 
 #[test]
 fn past_smooth_surfaces_and_masks() {
-    let mut build = Build::default();
-    let grey = build.bsdf("grey", diffuse(0.5, 0.4, 0.3));
-    let silver = build.bsdf(
-        "silver",
-        Bsdf::Conductor(Conductor { eta: Rgb::ONE, k: Rgb::splat(2.0), ..Conductor::default() }),
-    );
-    let glass = build.bsdf("glass", Bsdf::Dielectric(Dielectric::default()));
-    let mask = Mask { bsdf: diffuse(0.6, 0.5, 0.4), opacity: 0.4 };
-    let mask = build.bsdf("mask", Bsdf::Mask(mask.into()));
+    let silver =
+        Bsdf::Conductor(Conductor { eta: Rgb::ONE, k: Rgb::splat(2.0), ..Conductor::default() });
+    let mask = Bsdf::Mask(Mask { bsdf: diffuse(0.6, 0.5, 0.4), opacity: 0.4 }.into());
     let sheet =
         |size: f64, angle: f64, at| placed(procedural::rectangle(), Vec3::splat(size), angle, at);
-    build.shape("floor", sheet(3.0, 0.0, Vec3::ZERO), grey);
-    build.shape("mirror", sheet(0.5, 0.4, vec3(0.4, 0.3, 0.3)), silver);
-    build.shape(
-        "ball",
-        placed(procedural::uv_sphere(6), Vec3::splat(0.3), 0.0, vec3(-0.4, 0.2, 0.4)),
-        glass,
-    );
-    build.shape("veil", sheet(0.6, 0.2, vec3(0.0, -0.3, 0.9)), mask);
+    let ball = placed(procedural::uv_sphere(6), Vec3::splat(0.3), 0.0, vec3(-0.4, 0.2, 0.4));
+    let glass = Bsdf::Dielectric(Dielectric::default());
     let lamp = Emitter::Point { position: vec3(0.4, 0.2, 4.0), intensity: Rgb::splat(9.0) };
-    build.light("lamp", lamp);
-    build.light("sky", Emitter::Constant { radiance: Rgb::splat(0.3) });
-    let scene = build.camera(vec3(0.3, 0.2, 2.5), Vec3::ZERO, 5);
+    let scene = SceneBuilder::new()
+        .shape("floor", ShapeBuilder::new(sheet(3.0, 0.0, Vec3::ZERO), diffuse(0.5, 0.4, 0.3)))
+        .shape("mirror", ShapeBuilder::new(sheet(0.5, 0.4, vec3(0.4, 0.3, 0.3)), silver))
+        .shape("ball", ShapeBuilder::new(ball, glass))
+        .shape("veil", ShapeBuilder::new(sheet(0.6, 0.2, vec3(0.0, -0.3, 0.9)), mask))
+        .emitter("lamp", lamp)
+        .emitter("sky", Emitter::Constant { radiance: Rgb::splat(0.3) });
+    let scene = seen(scene, [vec3(0.3, 0.2, 2.5), Vec3::ZERO], 5);
     for (target, name) in [
-        ("silver", "k"),
-        ("silver", "specular_reflectance"),
-        ("glass", "specular_transmittance"),
-        ("mask", "opacity"),
-        ("mask", "reflectance"),
-        ("grey", "reflectance"),
+        ("mirror", "k"),
+        ("mirror", "specular_reflectance"),
+        ("ball", "specular_transmittance"),
+        ("veil", "opacity"),
+        ("veil", "reflectance"),
+        ("floor", "reflectance"),
         ("sky", "radiance"),
     ] {
         let amount = if name == "opacity" { Rgb::ONE } else { Rgb::new(1.0, 0.5, -0.5) };

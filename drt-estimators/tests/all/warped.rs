@@ -14,17 +14,22 @@ fn at(scale: f64, shift: Vec3) -> Affine {
     }
 }
 
-/// A floor under a lamp, a bulb and the sun, and what `more` adds.
-fn stage(more: impl FnOnce(&mut Build, usize)) -> Scene {
-    let mut b = Build::default();
-    let bsdf = b.bsdf("bsdf", diffuse(0.6, 0.5, 0.4));
-    b.shape("floor", procedural::grid(2, 2).transform(&at(4.0, vec3(0.0, -1.0, 0.0))), bsdf);
-    b.lamp(procedural::rectangle().transform(&at(-0.5, vec3(0.9, 2.0, 0.3))), Rgb::splat(6.0));
+fn plain(mesh: Mesh) -> ShapeBuilder {
+    ShapeBuilder::new(mesh, diffuse(0.6, 0.5, 0.4))
+}
+
+/// A floor under a lamp, a bulb and the sun, and `more` shapes.
+fn stage<const N: usize>(more: [(&str, ShapeBuilder); N]) -> Scene {
+    let floor = procedural::grid(2, 2).transform(&at(4.0, vec3(0.0, -1.0, 0.0)));
+    let lamp = procedural::rectangle().transform(&at(-0.5, vec3(0.9, 2.0, 0.3)));
     let (position, direction) = (vec3(-1.3, 2.3, 0.4), vec3(0.3, -1.0, -0.3));
-    b.light("bulb", Emitter::Point { position, intensity: Rgb::splat(2.0) });
-    b.light("sun", Emitter::Directional { direction, irradiance: Rgb::splat(0.5) });
-    more(&mut b, bsdf);
-    b.camera(vec3(0.3, 1.0, 4.0), vec3(0.0, -0.6, 0.0), 4)
+    let scene = SceneBuilder::new()
+        .shape("floor", plain(floor))
+        .shape("lamp", glowing(lamp, Rgb::splat(6.0)))
+        .emitter("bulb", Emitter::Point { position, intensity: Rgb::splat(2.0) })
+        .emitter("sun", Emitter::Directional { direction, irradiance: Rgb::splat(0.5) });
+    let scene = more.into_iter().fold(scene, |scene, (id, shape)| scene.shape(id, shape));
+    seen(scene, [vec3(0.3, 1.0, 4.0), vec3(0.0, -0.6, 0.0)], 4)
 }
 
 fn by(estimator: EstimatorKind, scene: &Scene, seed: u64, spp: u32) -> Rendering {
@@ -62,10 +67,7 @@ fn block(x: f64) -> Mesh {
 #[test]
 fn sheets_in_one_place() {
     let sheet = || procedural::rectangle().transform(&at(0.5, vec3(0.1, -0.2, 0.0)));
-    check(&stage(|b, bsdf| {
-        b.shape("it", sheet(), bsdf);
-        b.shape("other", sheet(), bsdf);
-    }));
+    check(&stage([("it", plain(sheet())), ("other", plain(sheet()))]));
 }
 
 #[test]
@@ -78,9 +80,7 @@ fn triangles_without_area() {
     let mut triangles = good.triangles.clone();
     triangles.extend([[n, n + 1, n + 2], [n + 3, n + 4, n + 5]]);
     let mesh = Mesh::new(positions, triangles).expect("a mesh");
-    check(&stage(|b, bsdf| {
-        b.shape("it", mesh, bsdf);
-    }));
+    check(&stage([("it", plain(mesh))]));
 }
 
 /// On what it moves through, of which the derivative is one to either side only.
@@ -88,21 +88,15 @@ fn triangles_without_area() {
 fn a_lamp_that_touches_what_moves() {
     let lamp = procedural::rectangle().transform(&at(0.35, vec3(0.1, 0.25, 0.2)));
     let upright = procedural::cube().transform(&scaled(0.35, vec3(0.1, -0.1, 0.2)));
-    let scene = stage(|b, bsdf| {
-        b.shape("it", upright, bsdf);
-        let glow = b.light("touching", Emitter::Area { radiance: Rgb::splat(2.0) });
-        b.shape("patch", lamp, bsdf).emitter = Some(glow);
-    });
-    warped(&scene, 256);
+    let patch = plain(lamp).emitter(Emitter::Area { radiance: Rgb::splat(2.0) });
+    warped(&stage([("it", plain(upright)), ("patch", patch)]), 256);
 }
 
 /// A bulb on the line of an edge, and the sun along faces: what moves away from there has derivatives to either side only.
 #[test]
 fn lights_in_line_with_edges() {
     let upright = procedural::cube().transform(&scaled(0.35, vec3(0.1, -0.1, 0.2)));
-    let mut scene = stage(|b, bsdf| {
-        b.shape("it", upright, bsdf);
-    });
+    let mut scene = stage([("it", plain(upright))]);
     for light in &mut scene.emitters {
         match &mut light.item.emitter {
             Emitter::Point { position, .. } => *position = vec3(0.45, 1.6, 0.55),

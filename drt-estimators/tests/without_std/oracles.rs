@@ -1,8 +1,8 @@
 //! The cases, named as in `tests/data/oracles.json`.
 
-use drt_estimators::Named;
 use drt_estimators::emitter::Emitter;
 use drt_estimators::sensor::Sensor;
+use drt_estimators::{SceneBuilder, ShapeBuilder};
 use drt_geom::procedural;
 use drt_math::{Rgb, vec3};
 use drt_medium::{Homogeneous, Medium, Phase};
@@ -13,10 +13,9 @@ use crate::scenes::*;
 #[test]
 fn p01_lambert_triangle() {
     let meter = Sensor::irradiance_meter(vec3(0.1, -0.2, 0.0), vec3(0.0, 0.0, 1.0));
-    let light = Emitter::Area { radiance: Rgb::splat(2.0) };
-    let mut scene = empty(light, meter.expect("a valid meter"));
     let corners = [[0.1, 0.8, 1.4], [0.9, -0.3, 1.9], [-0.7, -0.5, 1.6]];
-    scene.shapes = vec![shining(shape("lamp", triangle(corners), BLACK))];
+    let scene = SceneBuilder::new().shape("lamp", glowing(triangle(corners), 2.0));
+    let scene = seen(scene, meter.expect("a valid meter"));
     let turn = [[0.0, 0.0, 0.0], [0.52, 0.41, 0.07], [0.81, -0.62, -0.79]];
     let parameters = [
         (deforms("vertex", "lamp", &[[0.0; 3], [0.0; 3], [0.3, -0.2, 0.5]]), -0.15773024283405),
@@ -34,15 +33,17 @@ fn p06_absorbing_emitting_box() {
     let right = [0.09950371902099894, -0.9950371902099893, 0.0];
     // Narrow enough to stand for a single ray.
     let camera = pixel([-3.0, 0.1, -0.2], [right, up, forward], [0.0, 0.0], 1e-4);
-    let mut scene = empty(Emitter::Constant { radiance: Rgb::splat(2.5) }, camera);
     let gas = Homogeneous::new(Rgb::splat(1.3), Rgb::ZERO, Rgb::splat(0.8)).expect("valid numbers");
-    scene.media = vec![Named::new("gas", Medium::new(gas, Phase::Isotropic))];
     let cube = procedural::cube();
     let face = |x: f64| -> Vec<[f64; 3]> {
         cube.positions.iter().map(|p| [f64::from(p.x == x), 0.0, 0.0]).collect()
     };
     let (low, high) = (face(-1.0), face(1.0));
-    scene.shapes = vec![filled(shape("box", cube, NULL))];
+    let scene = SceneBuilder::new()
+        .medium("gas", Medium::new(gas, Phase::Isotropic))
+        .shape("box", ShapeBuilder::interface(cube).interior("gas"))
+        .emitter("light", Emitter::Constant { radiance: Rgb::splat(2.5) });
+    let scene = seen(scene, camera);
     let parameters = [
         (grows("sigma", "gas", "sigma_t"), -0.24606852332684),
         (deforms("high face", "box", &high), -0.15994454016244),
@@ -56,10 +57,12 @@ fn p06_absorbing_emitting_box() {
 fn p12_pixel_emissive_triangle() {
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let camera = pixel([0.0; 3], axes, [0.02, 0.03], 0.1);
-    let mut scene = empty(Emitter::Area { radiance: Rgb::splat(1.7) }, camera);
     let lamp = triangle([[0.1, 0.4, 1.8], [0.5, -0.1, 2.5], [-0.3, -0.2, 2.0]]);
     let occluder = triangle([[-0.05, -0.3, 1.2], [0.2, -0.1, 1.3], [0.0, 0.1, 1.1]]);
-    scene.shapes = vec![shining(shape("lamp", lamp, BLACK)), shape("occluder", occluder, BLACK)];
+    let scene = SceneBuilder::new()
+        .shape("lamp", glowing(lamp, 1.7))
+        .shape("occluder", diffuse(occluder, 0.0));
+    let scene = seen(scene, camera);
     let parameters = [
         (moves("lamp", "lamp", [0.3, -0.2, 0.6]), -0.78924125466711),
         (moves("camera", "sensor", [0.5, 0.0, 0.2]), -0.47449655400322),
@@ -77,11 +80,14 @@ fn p13_pixel_floor_shadow() {
     ];
     let camera = pixel([4.0, -1.0, 3.0], axes, [0.0, 0.0], 0.05);
     let light = Emitter::Point { position: vec3(0.5, 0.4, 3.0), intensity: Rgb::splat(9.0) };
-    let mut scene = empty(light, camera);
     let floor =
         quad([[-20.0, -20.0, 0.0], [20.0, -20.0, 0.0], [20.0, 20.0, 0.0], [-20.0, 20.0, 0.0]]);
     let occluder = quad([[-2.0, -2.0, 1.2], [0.35, -2.2, 1.0], [0.45, 2.0, 1.1], [-2.0, 2.1, 1.3]]);
-    scene.shapes = vec![shape("floor", floor, GREY), shape("occluder", occluder, BLACK)];
+    let scene = SceneBuilder::new()
+        .shape("floor", diffuse(floor, 0.7))
+        .shape("occluder", diffuse(occluder, 0.0))
+        .emitter("light", light);
+    let scene = seen(scene, camera);
     let parameters = [
         (moves("occluder", "occluder", [0.6, 0.1, 0.3]), -0.44411710275367),
         (moves("light", "light", [1.0, 0.0, 0.0]), 0.26737152477938),

@@ -1,48 +1,25 @@
 //! Scenes in code.
 
-use std::sync::Arc;
-
 use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::{Bsdf, Diffuse};
-use drt_estimators::{
-    Integrator, MediumBoundary, Named, Scene, SceneEmitter, SceneSensor, Shape, Surrounding,
-};
+use drt_estimators::{Scene, SceneBuilder, ShapeBuilder};
 use drt_geom::Mesh;
 use drt_math::{Affine, Mat3, Rgb, Vec3};
 use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, ValueChange};
 
-pub(crate) const BLACK: usize = 0;
-pub(crate) const NULL: usize = 1;
-pub(crate) const GREY: usize = 2;
-
-/// Nothing but the scattering models above, the given light and the given sensor.
-pub(crate) fn empty(light: Emitter, sensor: Sensor) -> Scene {
-    let light = SceneEmitter { emitter: light, medium: Surrounding::Counted };
-    let sensor = SceneSensor { sensor, medium: Surrounding::Counted, sample_count: None };
-    let diffuse = |reflectance| Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(reflectance) });
-    Scene {
-        bsdfs: [diffuse(0.0), Bsdf::Null, diffuse(0.7)].map(Named::anonymous).into(),
-        emitters: vec![Named::new("light", light)],
-        sensors: vec![Named::new("sensor", sensor)],
-        integrator: Integrator::default(),
-        ..Scene::default()
-    }
+/// The scene of a builder, as a sensor sees it.
+pub(crate) fn seen(scene: SceneBuilder, sensor: Sensor) -> Scene {
+    scene.sensor("sensor", sensor).build().expect("a valid scene")
 }
 
-pub(crate) fn shape(id: &str, mesh: Mesh, bsdf: usize) -> Shape {
-    Shape { id: Some(id.into()), mesh: Arc::new(mesh), bsdf, boundary: None, emitter: None }
+pub(crate) fn diffuse(mesh: Mesh, reflectance: f64) -> ShapeBuilder {
+    ShapeBuilder::new(mesh, Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(reflectance) }))
 }
 
-/// The same shape around medium 0.
-pub(crate) fn filled(shape: Shape) -> Shape {
-    Shape { boundary: Some(MediumBoundary { interior: Some(0), exterior: None }), ..shape }
-}
-
-/// The same shape with the scene's light on it.
-pub(crate) fn shining(shape: Shape) -> Shape {
-    Shape { emitter: Some(0), ..shape }
+pub(crate) fn glowing(mesh: Mesh, radiance: f64) -> ShapeBuilder {
+    diffuse(mesh, 0.0).emitter(Emitter::Area { radiance: Rgb::splat(radiance) })
 }
 
 pub(crate) fn triangle(corners: [[f64; 3]; 3]) -> Mesh {

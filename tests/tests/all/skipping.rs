@@ -13,8 +13,8 @@ use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::sensor::{Lens, Sensor};
 use drt_estimators::surface::{Bsdf, Diffuse};
 use drt_estimators::{
-    Counters, EstimatorKind, Layer, MediumBoundary, Named, Rendering, Scene, SceneEmitter,
-    SceneSensor, Session, Settings, Shape, Surrounding, Term, Unattended, agreement,
+    Counters, EstimatorKind, Layer, Rendering, Scene, SceneBuilder, Session, Settings,
+    ShapeBuilder, Term, Unattended, agreement,
 };
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, ValueChange, Vec3, vec3};
@@ -32,65 +32,46 @@ fn scaled(mesh: &Mesh, size: f64, at: Vec3) -> Mesh {
 }
 
 /// A floor with 49 things on it, under a lamp and a bulb.
-fn crowd() -> Scene {
+fn crowd() -> SceneBuilder {
     let gray = Bsdf::Diffuse(Diffuse { reflectance: Rgb::splat(0.6) });
-    let shape = |id: String, mesh: Mesh| Shape {
-        id: Some(id),
-        mesh: Arc::new(mesh),
-        bsdf: 0,
-        boundary: None,
-        emitter: None,
-    };
-    let emitter = |emitter| SceneEmitter { emitter, medium: Surrounding::Counted };
-    let mut scene = Scene {
-        bsdfs: vec![Named::new("gray", gray)],
-        emitters: vec![
-            Named::new("glow", emitter(Emitter::Area { radiance: Rgb::splat(20.0) })),
-            Named::new(
-                "bulb",
-                emitter(Emitter::Point {
-                    position: vec3(-2.5, -2.0, 3.0),
-                    intensity: Rgb::splat(15.0),
-                }),
-            ),
-        ],
-        ..Scene::default()
-    };
-    scene.shapes.push(shape("floor".into(), scaled(&procedural::rectangle(), 5.0, Vec3::ZERO)));
+    let bulb = Emitter::Point { position: vec3(-2.5, -2.0, 3.0), intensity: Rgb::splat(15.0) };
+    let floor = scaled(&procedural::rectangle(), 5.0, Vec3::ZERO);
+    let mut scene = SceneBuilder::new()
+        .bsdf("gray", gray)
+        .emitter("bulb", bulb)
+        .shape("floor", ShapeBuilder::sharing(floor, "gray"));
     for i in 1..OBJECTS as u32 {
         let [x, y] = [(i - 1) % 7, (i - 1) / 7].map(|k| f64::from(k) - 3.0);
         let (mesh, size) = match i % 3 {
             0 => (procedural::cube(), 0.2),
             _ => (procedural::icosphere(1), 0.3),
         };
-        scene.shapes.push(shape(format!("thing {i}"), scaled(&mesh, size, vec3(x, y, 0.4))));
+        let thing = ShapeBuilder::sharing(scaled(&mesh, size, vec3(x, y, 0.4)), "gray");
+        scene = scene.shape(format!("thing {i}"), thing);
     }
     let mut lamp = scaled(&procedural::rectangle(), 0.5, vec3(2.0, 2.0, 3.5));
     lamp.flip();
-    scene.shapes.push(Shape { emitter: Some(0), ..shape("lamp".into(), lamp) });
+    let glow = Emitter::Area { radiance: Rgb::splat(20.0) };
     let view = [vec3(0.5, -7.0, 4.0), vec3(0.0, -0.3, 0.2), Vec3::Z];
     let filter = Filter::new(FilterKind::TENT).expect("a tent");
     let sensor = Sensor::look_at(view, Lens::with_fov(45.0), [SIDE, SIDE], filter);
-    let sensor = sensor.expect("a camera");
-    let medium = Surrounding::Counted;
-    scene.sensors.push(Named::new("camera", SceneSensor { sensor, medium, sample_count: None }));
-    scene.integrator.max_depth = Some(3);
     scene
+        .shape("lamp", ShapeBuilder::sharing(lamp, "gray").emitter(glow))
+        .sensor("camera", sensor.expect("a camera"))
+        .max_depth(3)
+}
+
+/// The crowd in vacuum.
+fn clear() -> Scene {
+    crowd().build().expect("a scene")
 }
 
 /// The crowd in a box of a medium.
 fn hazy(medium: Medium) -> Scene {
-    let mut scene = crowd();
-    scene.media.push(Named::new("haze", medium));
-    scene.bsdfs.push(Named::new("none", Bsdf::Null));
-    scene.shapes.push(Shape {
-        id: Some("walls".into()),
-        mesh: Arc::new(scaled(&procedural::cube(), 4.5, vec3(0.0, 0.0, 2.0))),
-        bsdf: 1,
-        boundary: Some(MediumBoundary { interior: Some(0), exterior: None }),
-        emitter: None,
-    });
-    scene
+    let walls = scaled(&procedural::cube(), 4.5, vec3(0.0, 0.0, 2.0));
+    let scene = crowd().medium("haze", medium);
+    let scene = scene.shape("walls", ShapeBuilder::interface(walls).interior("haze"));
+    scene.build().expect("a scene")
 }
 
 fn homogeneous() -> Medium {
@@ -164,7 +145,7 @@ fn term(r: &Rendering, term: Term) -> &Layer {
 
 #[test]
 fn no_medium() {
-    let r = rendered(&crowd(), &moves(&["thing 25"]), 4);
+    let r = rendered(&clear(), &moves(&["thing 25"]), 4);
     assert!(r.plan.media.is_empty());
     assert_eq!((r.counters.tracking_steps, r.counters.flux_samples), (0, 0));
 }
@@ -195,8 +176,8 @@ fn faded_out() {
 
 #[test]
 fn nothing_moves() {
-    let still = rendered(&crowd(), &rests(), 4);
-    let forward = rendered(&crowd(), &[], 4);
+    let still = rendered(&clear(), &rests(), 4);
+    let forward = rendered(&clear(), &[], 4);
     assert!(!still.plan.record && still.plan.edges == [0, 0]);
     assert_eq!(
         Counters { recorded_vertices: 0, ..still.counters },
@@ -211,20 +192,20 @@ fn nothing_moves() {
 
 #[test]
 fn only_materials_change() {
-    let r = rendered(&crowd(), &paints(), 4);
+    let r = rendered(&clear(), &paints(), 4);
     let c = &r.counters;
     assert_eq!((c.boundary_samples, c.border_samples, c.flux_samples), (0, 0, 0));
     assert_eq!(r.plan.edges, [0, 0], "no edge was even looked at");
     assert!(!r.plan.antithetic && r.plan.record);
     assert_eq!(c.differentiated_paths, 4 * PIXELS);
     // Where nothing is reflected now, something may be: a few rays more.
-    let forward = rendered(&crowd(), &[], 4).counters.rays;
+    let forward = rendered(&clear(), &[], 4).counters.rays;
     assert!(c.rays * 10 < forward * 11, "{} rays, {forward} forward", c.rays);
 }
 
 #[test]
 fn no_parameters() {
-    for scene in [crowd(), hazy(homogeneous()), hazy(voxels())] {
+    for scene in [clear(), hazy(homogeneous()), hazy(voxels())] {
         let r = rendered(&scene, &[], 4);
         let Counters { paths, rays, tracking_steps, .. } = r.counters;
         assert_eq!(r.counters, Counters { paths, rays, tracking_steps, ..Counters::default() });
@@ -237,8 +218,8 @@ fn no_parameters() {
 fn one_object_of_fifty_moves() {
     let all: Vec<String> = (1..OBJECTS).map(|i| format!("thing {i}")).collect();
     let all: Vec<&str> = all.iter().map(String::as_str).collect();
-    let every = rendered(&crowd(), &moves(&all), 4).plan.edges;
-    let one = rendered(&crowd(), &moves(&["thing 25"]), 4).plan;
+    let every = rendered(&clear(), &moves(&all), 4).plan.edges;
+    let one = rendered(&clear(), &moves(&["thing 25"]), 4).plan;
     assert_eq!((one.moving_shapes.len(), one.edges[1]), (1, every[1]));
     assert!(one.primary && one.direct && one.indirect);
     assert!(one.edges[0] * 5 < every[0] * 2, "{:?} of {every:?}", one.edges);
@@ -248,15 +229,15 @@ fn one_object_of_fifty_moves() {
 /// only its own shadows.
 #[test]
 fn a_camera_or_a_bulb_alone() {
-    let camera = rendered(&crowd(), &moves(&["camera"]), 4).plan;
+    let camera = rendered(&clear(), &moves(&["camera"]), 4).plan;
     assert_eq!((camera.primary, camera.direct, camera.indirect), (true, false, false));
-    let bulb = rendered(&crowd(), &moves(&["bulb"]), 4).plan;
+    let bulb = rendered(&clear(), &moves(&["bulb"]), 4).plan;
     assert_eq!((bulb.primary, bulb.direct, bulb.indirect), (false, true, false));
     // Where these terms are sampled for the sake of others, not one sample counts for these two.
     for (target, skipped) in
         [("camera", [Term::Direct, Term::Indirect]), ("bulb", [Term::Primary, Term::Indirect])]
     {
-        let company = rendered(&crowd(), &in_company(moves(&[target])), 16);
+        let company = rendered(&clear(), &in_company(moves(&[target])), 16);
         for t in skipped {
             assert!(term(&company, t).pixels.iter().all(|p| p.mean.is_zero()), "{target} {t:?}");
         }
@@ -268,7 +249,7 @@ fn a_camera_or_a_bulb_alone() {
 
 /// Everything moves with the second parameter, so that no edge is skipped for the first.
 fn in_company(mut parameters: Vec<Parameter>) -> Vec<Parameter> {
-    let scene = crowd();
+    let scene = clear();
     let shapes = scene.shapes.iter().filter_map(|s| s.id.as_deref());
     let all: Vec<&str> = shapes.chain(["camera", "bulb"]).collect();
     parameters.extend(moves(&all).into_iter().map(|p| Parameter { name: "all".into(), ..p }));
@@ -278,7 +259,7 @@ fn in_company(mut parameters: Vec<Parameter>) -> Vec<Parameter> {
 /// Nothing that counts is left out: a derivative is the same whether edges are skipped or not.
 #[test]
 fn skipped_edges_contribute_nothing() {
-    let scene = crowd();
+    let scene = clear();
     for target in ["thing 25", "thing 3", "floor", "lamp"] {
         let alone = rendered(&scene, &moves(&[target]), 512);
         let company = rendered(&scene, &in_company(moves(&[target])), 512);
@@ -309,7 +290,7 @@ fn seconds<const N: usize>(tasks: [&dyn Fn(); N]) -> [f64; N] {
 #[test]
 #[ignore = "measures time"]
 fn the_time_is_not_spent() {
-    let (vacuum, fog, smoke) = (crowd(), hazy(homogeneous()), hazy(voxels()));
+    let (vacuum, fog, smoke) = (clear(), hazy(homogeneous()), hazy(voxels()));
     let all: Vec<String> = (1..OBJECTS).map(|i| format!("thing {i}")).collect();
     let all: Vec<&str> = all.iter().map(String::as_str).collect();
     let (one, every) = (moves(&["thing 25"]), moves(&all));

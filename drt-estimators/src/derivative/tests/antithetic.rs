@@ -78,7 +78,7 @@ fn dimmed(incoming: &mut PairedRadiance, by: f64) {
 
 fn check(ball: Bsdf) {
     let scene = surfaces(ball, twosided(phong()));
-    let rougher = set("alpha", "ball-bsdf", "alpha", grey(1.0));
+    let rougher = set("alpha", "ball", "alpha", grey(1.0));
     // Planted: one of the sides is too dark.
     let fault: Change<'_> = &|pair, incoming| {
         if matches!(pair.kind, PairKind::Roughness(slope) if slope < 0.0) {
@@ -139,7 +139,7 @@ fn pairs_of_rays_tell_how_cameras_turn_lobes() {
 
 #[test]
 fn pairs_of_rays_tell_how_glass_bends_light() {
-    turned(glass(), &set("eta", "ball-bsdf", "eta", grey(0.1)), Form::Material);
+    turned(glass(), &set("eta", "ball", "eta", grey(0.1)), Form::Material);
 }
 
 /// When all turns together no path changes, and neither do pairs, whose rays turn to different ends.

@@ -127,7 +127,7 @@ fn materials() {
         let number = |name| matches!(name, "alpha" | "exponent") || (name == "eta" && transmissive);
         let op = |name| if number(name) { grey(0.2) } else { coloured() };
         let mut parameters: Vec<Parameter> =
-            properties.into_iter().map(|p| set(p, "ball-bsdf", p, op(p))).collect();
+            properties.into_iter().map(|p| set(p, "ball", p, op(p))).collect();
         parameters.push(motion("ball", "shift", shift()));
         parameters.push(motion("ball", "turn", turn()));
         parameters.push(motion("ball", "wobble", wobble(&scene, "ball", 9)));
@@ -179,7 +179,7 @@ fn several_effects_away_from_zero() {
 #[test]
 fn factors_that_are_zero() {
     let scene = surfaces(diffuse(0.0, 0.5, 0.0), phong());
-    compare_all(&scene, &[set("reflectance", "ball-bsdf", "reflectance", coloured())]);
+    compare_all(&scene, &[set("reflectance", "ball", "reflectance", coloured())]);
     let mut scene = fog();
     let clear = |sigma_t, albedo| homogeneous(sigma_t, albedo, Rgb::ZERO, 0.2);
     scene.media[0].item = clear(Rgb::new(0.0, 0.5, 0.0), Rgb::new(0.9, 0.0, 0.8));

@@ -100,27 +100,22 @@ fn window(x: Vec3, r: f64, axes: &[usize]) -> (f64, Vec3) {
 
 /// A floor under the sky and the sun.
 fn floor() -> Scene {
-    let mut scene = surfaces(diffuse(0.5, 0.5, 0.5), phong());
-    let lone = |id: &Option<alloc::string::String>| id.as_deref() == Some("floor");
-    scene.shapes.retain(|s| lone(&s.id));
-    let far = |e: &Emitter| matches!(e, Emitter::Constant { .. } | Emitter::Directional { .. });
-    scene.emitters.retain(|e| far(&e.item.emitter));
-    scene
+    let scene = SceneBuilder::new()
+        .shape("floor", ShapeBuilder::new(super::scenes::floor(), phong()))
+        .emitter("sun", sun(Rgb::new(0.7, 0.6, 0.5)))
+        .emitter("sky", sky());
+    seen(scene, [vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0)], 5)
 }
 
 /// A box of mist under the sky.
 fn mist() -> Scene {
-    let mut b = Build::default();
-    let mist = homogeneous(Rgb::new(1.0, 0.8, 1.2), Rgb::splat(0.9), Rgb::ZERO, 0.2);
-    let mist = b.medium("mist", mist);
     let room = placed(procedural::cube(), Vec3::splat(1.4), 0.0, Vec3::ZERO);
-    b.interface("room", room, mist, None);
-    b.light("sky", Emitter::Constant { radiance: Rgb::new(1.0, 0.5, 0.2) });
-    b.light(
-        "sun",
-        Emitter::Directional { direction: vec3(0.4, -1.0, -0.3), irradiance: Rgb::splat(0.7) },
-    );
-    b.camera(vec3(0.3, 0.9, 4.0), Vec3::ZERO, 4)
+    let scene = SceneBuilder::new()
+        .medium("mist", homogeneous(Rgb::new(1.0, 0.8, 1.2), Rgb::splat(0.9), Rgb::ZERO, 0.2))
+        .shape("room", ShapeBuilder::interface(room).interior("mist"))
+        .emitter("sky", Emitter::Constant { radiance: Rgb::new(1.0, 0.5, 0.2) })
+        .emitter("sun", sun(Rgb::splat(0.7)));
+    seen(scene, [vec3(0.3, 0.9, 4.0), Vec3::ZERO], 4)
 }
 
 /// Derivatives of the moment of light across the image, path by path; and the largest difference between forward

@@ -151,18 +151,21 @@ fn on_surfaces() {
 
 /// The shadows that a card, out of view, casts on a floor, by a bulb and the sun.
 fn shadows() -> Scene {
-    let mut b = Build::default();
-    let bsdf = b.bsdf("bsdf", diffuse(0.6, 0.5, 0.4));
+    let grey = || diffuse(0.6, 0.5, 0.4);
     let up = Mat3::rotation(Vec3::X, -core::f64::consts::FRAC_PI_2) * 4.0;
     let at = |shift: f64| Affine { linear: up, translation: vec3(0.0, shift, 0.0) };
-    b.shape("floor", procedural::grid(2, 2).transform(&at(-1.0)), bsdf);
+    let floor = procedural::grid(2, 2).transform(&at(-1.0));
     let card = placed(procedural::cube(), vec3(0.3, 0.2, 0.3), 0.5, vec3(0.1, 0.9, 0.2));
-    b.shape("card", card, bsdf);
     let position = vec3(-0.3, 2.3, 0.4);
-    b.light("bulb", Emitter::Point { position, intensity: Rgb::new(3.0, 4.0, 2.0) });
+    let bulb = Emitter::Point { position, intensity: Rgb::new(3.0, 4.0, 2.0) };
     let direction = vec3(0.3, -1.0, -0.3);
-    b.light("sun", Emitter::Directional { direction, irradiance: Rgb::new(0.7, 0.6, 0.5) });
-    b.camera(vec3(0.3, 0.3, 3.5), vec3(0.0, -1.0, 0.0), 4)
+    let sun = Emitter::Directional { direction, irradiance: Rgb::new(0.7, 0.6, 0.5) };
+    let scene = SceneBuilder::new()
+        .shape("floor", ShapeBuilder::new(floor, grey()))
+        .shape("card", ShapeBuilder::new(card, grey()))
+        .emitter("bulb", bulb)
+        .emitter("sun", sun);
+    seen(scene, [vec3(0.3, 0.3, 3.5), vec3(0.0, -1.0, 0.0)], 4)
 }
 
 #[test]
@@ -202,17 +205,16 @@ fn in_media() {
 
 /// A ball of many facets that glows, over a floor, and half hidden from that by a card. Another lamp lights all of them.
 fn glowing_ball(ball_bsdf: Bsdf) -> Scene {
-    let mut b = Build::default();
-    let bsdf = b.bsdf("ball-bsdf", ball_bsdf);
-    let radiance = Rgb::new(4.0, 3.0, 5.0);
-    let glow = b.light("ball-glow", Emitter::Area { radiance });
-    b.shape("ball", ball(0.35, vec3(0.1, 0.7, 0.0)), bsdf).emitter = Some(glow);
-    let bsdf = b.bsdf("gray", diffuse(0.6, 0.5, 0.4));
+    let glow = Emitter::Area { radiance: Rgb::new(4.0, 3.0, 5.0) };
+    let ball = ShapeBuilder::new(ball(0.35, vec3(0.1, 0.7, 0.0)), ball_bsdf).emitter(glow);
+    let grey = || diffuse(0.6, 0.5, 0.4);
     let card = placed(procedural::cube(), vec3(0.3, 0.02, 0.3), 0.5, vec3(0.4, 0.0, 0.1));
-    b.shape("card", card, bsdf);
-    b.shape("floor", floor(), bsdf);
-    b.lamp(lamp(), Rgb::new(9.0, 9.0, 9.0));
-    b.camera(vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0), 4)
+    let scene = SceneBuilder::new()
+        .shape("ball", ball)
+        .shape("card", ShapeBuilder::new(card, grey()))
+        .shape("floor", ShapeBuilder::new(floor(), grey()))
+        .shape("lamp", glowing(lamp(), Rgb::new(9.0, 9.0, 9.0)));
+    seen(scene, [vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0)], 4)
 }
 
 /// What a lamp emits jumps at none of its creases, and what it scatters jumps at all of them.

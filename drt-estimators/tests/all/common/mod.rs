@@ -13,76 +13,30 @@ use drt_estimators::surface::{
     TwoSided,
 };
 use drt_estimators::texture::{Bitmap, Texture, TextureFilter, TextureWrap, UvMap};
-use drt_estimators::{
-    Integrator, Layer, MediumBoundary, Named, Rendering, Scene, SceneEmitter, SceneSensor, Session,
-    Settings, Shape, Surrounding, Unattended,
-};
+use drt_estimators::{Integrator, Layer, Rendering, Scene, Session, Settings, Unattended};
+pub use drt_estimators::{SceneBuilder, ShapeBuilder};
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
 use drt_medium::{Grid, GridMedium, Homogeneous, Layout, Medium, Phase, Volume};
 use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, Texels, ValueChange};
 
-/// A scene under construction: elements are named as they are added.
-#[derive(Default)]
-pub struct Build(pub Scene);
-
-impl Build {
-    pub fn bsdf(&mut self, id: &str, bsdf: Bsdf) -> usize {
-        self.0.bsdfs.push(Named::new(id, bsdf));
-        self.0.bsdfs.len() - 1
+/// The scene of a builder, as a camera at a point sees it that looks at another one.
+pub fn seen(scene: SceneBuilder, [origin, target]: [Vec3; 2], max_depth: u32) -> Scene {
+    let filter = Filter::new(FilterKind::Tent { radius: 1.0 }).expect("a valid filter");
+    let sensor = Sensor::look_at([origin, target, Vec3::Y], Lens::with_fov(40.0), FILM, filter);
+    let integrator =
+        Integrator { max_depth: Some(max_depth), rr_depth: 3, ..Integrator::default() };
+    let scene = scene.sensor("camera", sensor.expect("a valid camera")).integrator(integrator);
+    let mut scene = scene.build().expect("a valid scene");
+    for emitter in scene.emitters.iter_mut().map(|e| &mut e.item.emitter) {
+        *emitter = emitter.checked().expect("a valid emitter");
     }
+    scene
+}
 
-    pub fn medium(&mut self, id: &str, medium: Medium) -> usize {
-        self.0.media.push(Named::new(id, medium));
-        self.0.media.len() - 1
-    }
-
-    pub fn shape(&mut self, id: &str, mesh: Mesh, bsdf: usize) -> &mut Shape {
-        let shape = Shape {
-            id: Some(id.into()),
-            mesh: Arc::new(mesh),
-            bsdf,
-            boundary: None,
-            emitter: None,
-        };
-        self.0.shapes.push(shape);
-        self.0.shapes.last_mut().expect("just added")
-    }
-
-    /// A null interface around a medium.
-    pub fn interface(&mut self, id: &str, mesh: Mesh, inside: usize, outside: Option<usize>) {
-        let bsdf = self.bsdf(&format!("{id}-null"), Bsdf::Null);
-        self.shape(id, mesh, bsdf).boundary =
-            Some(MediumBoundary { interior: Some(inside), exterior: outside });
-    }
-
-    pub fn light(&mut self, id: &str, emitter: Emitter) -> usize {
-        let emitter = emitter.checked().expect("a valid emitter");
-        let item = SceneEmitter { emitter, medium: Surrounding::Counted };
-        self.0.emitters.push(Named::new(id, item));
-        self.0.emitters.len() - 1
-    }
-
-    /// A black rectangle that glows.
-    pub fn lamp(&mut self, mesh: Mesh, radiance: Rgb) {
-        let bsdf = self.bsdf("lamp-bsdf", diffuse(0.2, 0.2, 0.2));
-        let emitter = self.light("glow", Emitter::Area { radiance });
-        self.shape("lamp", mesh, bsdf).emitter = Some(emitter);
-    }
-
-    pub fn camera(mut self, origin: Vec3, target: Vec3, max_depth: u32) -> Scene {
-        let filter = Filter::new(FilterKind::Tent { radius: 1.0 }).expect("a valid filter");
-        let sensor = Sensor::look_at([origin, target, Vec3::Y], Lens::with_fov(40.0), FILM, filter);
-        let item = SceneSensor {
-            sensor: sensor.expect("a valid camera"),
-            medium: Surrounding::Counted,
-            sample_count: None,
-        };
-        self.0.sensors.push(Named::new("camera", item));
-        self.0.integrator =
-            Integrator { max_depth: Some(max_depth), rr_depth: 3, ..Integrator::default() };
-        self.0
-    }
+/// A dark surface that glows.
+pub fn glowing(mesh: Mesh, radiance: Rgb) -> ShapeBuilder {
+    ShapeBuilder::new(mesh, diffuse(0.2, 0.2, 0.2)).emitter(Emitter::Area { radiance })
 }
 
 pub const FILM: [u32; 2] = [6, 5];
@@ -158,119 +112,105 @@ pub fn lamp() -> Mesh {
     )
 }
 
+/// A smooth ball of one material over a floor of another, under a lamp.
+fn ball_on_floor(ball_bsdf: Bsdf, floor_bsdf: Bsdf) -> SceneBuilder {
+    SceneBuilder::new()
+        .shape("ball", ShapeBuilder::new(ball(0.9, vec3(0.1, 0.1, 0.0)), ball_bsdf))
+        .shape("floor", ShapeBuilder::new(floor(), floor_bsdf))
+        .shape("lamp", glowing(lamp(), Rgb::new(3.0, 2.5, 2.0)))
+}
+
+/// Where the camera is that sees ball and floor, and what it looks at.
+const BEFORE_BALL: [Vec3; 2] = [vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0)];
+
+/// A smooth ball of one material over a floor of another, in the light of a lamp and the sky.
+pub fn surfaces_in_extended_light(ball_bsdf: Bsdf, floor_bsdf: Bsdf) -> Scene {
+    seen(ball_on_floor(ball_bsdf, floor_bsdf).emitter("sky", sky()), BEFORE_BALL, 5)
+}
+
 /// A smooth ball of one material over a floor of another, under every kind of light; no media.
 pub fn surfaces(ball_bsdf: Bsdf, floor_bsdf: Bsdf) -> Scene {
-    let mut b = Build::default();
-    let bsdf = b.bsdf("ball-bsdf", ball_bsdf);
-    b.shape("ball", ball(0.9, vec3(0.1, 0.1, 0.0)), bsdf);
-    let bsdf = b.bsdf("floor-bsdf", floor_bsdf);
-    b.shape("floor", floor(), bsdf);
-    b.lamp(lamp(), Rgb::new(3.0, 2.5, 2.0));
-    b.light(
-        "bulb",
-        Emitter::Point { position: vec3(-1.5, 1.3, 0.8), intensity: Rgb::new(1.0, 1.5, 2.0) },
-    );
-    b.light(
-        "spot",
-        Emitter::Spot {
-            position: vec3(1.4, 1.6, 1.5),
-            direction: vec3(-0.8, -1.2, -0.9),
-            intensity: Rgb::new(4.0, 3.0, 3.5),
-            cutoff_angle: 0.9,
-            beam_width: 0.1,
-        },
-    );
-    b.light(
-        "sun",
-        Emitter::Directional {
-            direction: vec3(0.4, -1.0, -0.3),
-            irradiance: Rgb::new(0.7, 0.6, 0.5),
-        },
-    );
-    b.light("sky", Emitter::Constant { radiance: Rgb::new(0.2, 0.3, 0.5) });
-    b.camera(vec3(0.3, 0.9, 4.0), vec3(0.0, -0.1, 0.0), 5)
+    let spot = Emitter::Spot {
+        position: vec3(1.4, 1.6, 1.5),
+        direction: vec3(-0.8, -1.2, -0.9),
+        intensity: Rgb::new(4.0, 3.0, 3.5),
+        cutoff_angle: 0.9,
+        beam_width: 0.1,
+    };
+    let scene = ball_on_floor(ball_bsdf, floor_bsdf)
+        .emitter("bulb", bulb(vec3(-1.5, 1.3, 0.8)))
+        .emitter("spot", spot)
+        .emitter("sun", sun(Rgb::new(0.7, 0.6, 0.5)))
+        .emitter("sky", sky());
+    seen(scene, BEFORE_BALL, 5)
+}
+
+pub fn sky() -> Emitter {
+    Emitter::Constant { radiance: Rgb::new(0.2, 0.3, 0.5) }
+}
+
+pub fn bulb(position: Vec3) -> Emitter {
+    Emitter::Point { position, intensity: Rgb::new(1.0, 1.5, 2.0) }
+}
+
+pub fn sun(irradiance: Rgb) -> Emitter {
+    Emitter::Directional { direction: vec3(0.4, -1.0, -0.3), irradiance }
 }
 
 /// A floor that a block of fog, out of view, shines on, with a card between the two that hides half of the block.
 pub fn glow() -> Scene {
-    let mut b = Build::default();
-    let bsdf = b.bsdf("floor-bsdf", diffuse(0.6, 0.5, 0.4));
-    b.shape("floor", floor(), bsdf);
-    let bsdf = b.bsdf("card-bsdf", diffuse(0.1, 0.1, 0.1));
     let card = placed(procedural::cube(), vec3(0.4, 0.02, 0.6), 0.0, vec3(-0.5, 0.0, 0.0));
-    b.shape("card", card, bsdf);
-    let fog = homogeneous(Rgb::new(2.0, 1.5, 2.5), Rgb::splat(0.95), Rgb::ZERO, 0.0);
-    let fog = b.medium("fog", fog);
     let block = placed(procedural::cube(), Vec3::splat(0.7), 0.3, vec3(-0.9, 1.1, 0.0));
-    b.interface("block", block, fog, None);
-    b.lamp(lamp(), Rgb::new(3.0, 2.5, 2.0));
-    b.camera(vec3(0.3, 0.3, 3.5), vec3(0.0, -1.0, 0.0), 4)
+    let fog = homogeneous(Rgb::new(2.0, 1.5, 2.5), Rgb::splat(0.95), Rgb::ZERO, 0.0);
+    let scene = SceneBuilder::new()
+        .medium("fog", fog)
+        .shape("floor", ShapeBuilder::new(floor(), diffuse(0.6, 0.5, 0.4)))
+        .shape("card", ShapeBuilder::new(card, diffuse(0.1, 0.1, 0.1)))
+        .shape("block", ShapeBuilder::interface(block).interior("fog"))
+        .shape("lamp", glowing(lamp(), Rgb::new(3.0, 2.5, 2.0)));
+    seen(scene, [vec3(0.3, 0.3, 3.5), vec3(0.0, -1.0, 0.0)], 4)
+}
+
+/// The lamp at another place.
+fn lamp_at(place: Vec3) -> ShapeBuilder {
+    glowing(placed(lamp(), Vec3::splat(1.0), 0.0, place), Rgb::new(3.0, 2.5, 2.0))
 }
 
 /// A solid ball and a bulb in a box of fog with a denser blob in it, lit from outside as well.
 pub fn fog() -> Scene {
-    let mut b = Build::default();
-    let thin = b.medium(
-        "thin",
-        homogeneous(
-            Rgb::new(0.4, 0.5, 0.3),
-            Rgb::new(0.9, 0.6, 0.8),
-            Rgb::new(0.0, 0.1, 0.05),
-            0.4,
-        ),
-    );
-    let dense = b.medium(
-        "dense",
-        homogeneous(Rgb::new(1.5, 1.1, 2.0), Rgb::new(0.7, 0.9, 0.5), Rgb::ZERO, -0.3),
-    );
-    let box_mesh = placed(procedural::cube(), vec3(1.7, 1.5, 1.6), 0.15, vec3(0.0, 0.1, 0.0));
-    b.interface("box", box_mesh, thin, None);
+    let emission = Rgb::new(0.0, 0.1, 0.05);
+    let thin = homogeneous(Rgb::new(0.4, 0.5, 0.3), Rgb::new(0.9, 0.6, 0.8), emission, 0.4);
+    let dense = homogeneous(Rgb::new(1.5, 1.1, 2.0), Rgb::new(0.7, 0.9, 0.5), Rgb::ZERO, -0.3);
+    let walls = placed(procedural::cube(), vec3(1.7, 1.5, 1.6), 0.15, vec3(0.0, 0.1, 0.0));
     let blob = placed(procedural::icosphere(0), Vec3::splat(0.5), 0.7, vec3(-0.7, 0.4, 0.3));
-    b.interface("blob", blob, dense, Some(thin));
-    let bsdf = b.bsdf("ball-bsdf", phong());
-    b.shape("ball", ball(0.45, vec3(0.5, -0.3, 0.1)), bsdf);
-    b.light(
-        "bulb",
-        Emitter::Point { position: vec3(0.3, 0.7, 0.5), intensity: Rgb::new(1.0, 1.5, 2.0) },
-    );
-    b.lamp(placed(lamp(), Vec3::splat(1.0), 0.0, vec3(0.2, 0.6, 0.3)), Rgb::new(3.0, 2.5, 2.0));
-    b.light(
-        "sun",
-        Emitter::Directional {
-            direction: vec3(0.4, -1.0, -0.3),
-            irradiance: Rgb::new(0.7, 0.6, 0.5),
-        },
-    );
-    b.light("sky", Emitter::Constant { radiance: Rgb::new(0.2, 0.3, 0.5) });
-    b.camera(vec3(0.4, 0.8, 4.2), vec3(0.0, 0.1, 0.0), 4)
+    let scene = SceneBuilder::new()
+        .medium("thin", thin)
+        .medium("dense", dense)
+        .shape("box", ShapeBuilder::interface(walls).interior("thin"))
+        .shape("blob", ShapeBuilder::interface(blob).interior("dense").exterior("thin"))
+        .shape("ball", ShapeBuilder::new(ball(0.45, vec3(0.5, -0.3, 0.1)), phong()))
+        .shape("lamp", lamp_at(vec3(0.2, 0.6, 0.3)))
+        .emitter("bulb", bulb(vec3(0.3, 0.7, 0.5)))
+        .emitter("sun", sun(Rgb::new(0.7, 0.6, 0.5)))
+        .emitter("sky", sky());
+    seen(scene, [vec3(0.4, 0.8, 4.2), vec3(0.0, 0.1, 0.0)], 4)
 }
 
 /// A block in a tub of fog with a floor at -1, both of one reflectance; its own bottom is at `bottom`.
 pub fn fog_with_a_block(bottom: f64, reflectance: f64) -> Scene {
-    let mut b = Build::default();
     let fog = homogeneous(Rgb::new(0.6, 0.5, 0.4), Rgb::new(0.9, 0.8, 0.7), Rgb::ZERO, 0.2);
-    let fog = b.medium("fog", fog);
-    b.interface("tub", procedural::cube().transform(&scaled(1.5, vec3(0.0, 0.25, 0.0))), fog, None);
-    let bsdf = b.bsdf("floor-bsdf", diffuse(reflectance, reflectance, reflectance));
-    b.shape(
-        "floor",
-        {
-            let mut floor = floor();
-            floor.positions.iter_mut().for_each(|p| *p = vec3(0.3 * p.x, p.y, 0.3 * p.z));
-            floor
-        },
-        bsdf,
-    );
-    let place = scaled(0.4, vec3(0.1, bottom + 0.4, 0.0));
-    b.shape("block", procedural::cube().transform(&place), bsdf);
-    b.light(
-        "sun",
-        Emitter::Directional {
-            direction: vec3(0.4, -1.0, -0.3),
-            irradiance: Rgb::new(2.0, 2.5, 3.0),
-        },
-    );
-    b.camera(vec3(0.4, 0.8, 4.2), vec3(0.0, -0.2, 0.0), 4)
+    let tub = procedural::cube().transform(&scaled(1.5, vec3(0.0, 0.25, 0.0)));
+    let mut floor = floor();
+    floor.positions.iter_mut().for_each(|p| *p = vec3(0.3 * p.x, p.y, 0.3 * p.z));
+    let block = procedural::cube().transform(&scaled(0.4, vec3(0.1, bottom + 0.4, 0.0)));
+    let scene = SceneBuilder::new()
+        .medium("fog", fog)
+        .bsdf("grey", diffuse(reflectance, reflectance, reflectance))
+        .shape("tub", ShapeBuilder::interface(tub).interior("fog"))
+        .shape("floor", ShapeBuilder::sharing(floor, "grey"))
+        .shape("block", ShapeBuilder::sharing(block, "grey"))
+        .emitter("sun", sun(Rgb::new(2.0, 2.5, 3.0)));
+    seen(scene, [vec3(0.4, 0.8, 4.2), vec3(0.0, -0.2, 0.0)], 4)
 }
 
 pub fn scaled(size: f64, at: Vec3) -> Affine {
@@ -279,7 +219,6 @@ pub fn scaled(size: f64, at: Vec3) -> Affine {
 
 /// Voxels of smoke, with at least `border` at the faces of their box, in a larger box.
 pub fn smoke(border: f64) -> Scene {
-    let mut b = Build::default();
     let n = 5;
     let mut rng = Rng::new(7, 0, 0);
     let inner = |i: usize| i > 0 && i < n - 1;
@@ -301,27 +240,19 @@ pub fn smoke(border: f64) -> Scene {
     let emission = Volume::Constant(Rgb::new(0.1, 0.05, 0.0));
     let medium = GridMedium::new(density, 1.3, albedo, emission).expect("valid coefficients");
     let medium = Medium::new(medium, Phase::henyey_greenstein(0.3).expect("valid"));
-    let smoke = b.medium("smoke", medium);
-    b.interface("box", placed(procedural::cube(), Vec3::splat(1.9), 0.1, Vec3::ZERO), smoke, None);
-    let bsdf = b.bsdf("floor-bsdf", diffuse(0.6, 0.5, 0.4));
+    let walls = placed(procedural::cube(), Vec3::splat(1.9), 0.1, Vec3::ZERO);
     let mut floor = floor();
     for p in &mut floor.positions {
         p.y -= 2.0;
     }
-    b.shape("floor", floor, bsdf);
-    b.lamp(placed(lamp(), Vec3::splat(1.0), 0.0, vec3(0.2, 1.0, 0.3)), Rgb::new(3.0, 2.5, 2.0));
-    b.light(
-        "bulb",
-        Emitter::Point { position: vec3(0.3, 0.2, 0.5), intensity: Rgb::new(1.0, 1.5, 2.0) },
-    );
-    b.light(
-        "sun",
-        Emitter::Directional {
-            direction: vec3(0.4, -1.0, -0.3),
-            irradiance: Rgb::new(0.7, 0.6, 0.5),
-        },
-    );
-    b.camera(vec3(0.4, 0.8, 6.0), Vec3::ZERO, 4)
+    let scene = SceneBuilder::new()
+        .medium("smoke", medium)
+        .shape("box", ShapeBuilder::interface(walls).interior("smoke"))
+        .shape("floor", ShapeBuilder::new(floor, diffuse(0.6, 0.5, 0.4)))
+        .shape("lamp", lamp_at(vec3(0.2, 1.0, 0.3)))
+        .emitter("bulb", bulb(vec3(0.3, 0.2, 0.5)))
+        .emitter("sun", sun(Rgb::new(0.7, 0.6, 0.5)));
+    seen(scene, [vec3(0.4, 0.8, 6.0), Vec3::ZERO], 4)
 }
 
 pub fn parameter(name: &str, value: f64, effects: Vec<Effect>) -> Parameter {
@@ -401,7 +332,8 @@ pub fn textures() -> Scene {
         ],
     );
     let mut scene = surfaces(metal, twosided(floor));
-    let lamp = scene.emitters.iter_mut().find(|e| e.id.as_deref() == Some("glow")).expect("one");
+    let area = |e: &Emitter| matches!(e, Emitter::Area { .. });
+    let lamp = scene.emitters.iter_mut().find(|e| area(&e.item.emitter)).expect("a lamp");
     lamp.item.emitter = Emitter::TexturedArea {
         radiance: Rgb::new(3.0, 2.5, 2.0),
         texture: image(4, [0.1, 1.0], Bilinear, TextureWrap::Repeat),

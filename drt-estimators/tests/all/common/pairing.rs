@@ -8,11 +8,18 @@ use drt_math::{Affine, Rgb, Vec3};
 use drt_medium::MediumChange;
 use drt_motion::parameter::Applied;
 use drt_motion::surface::move_mesh;
-use drt_motion::{Change, GeometryChange, Parameter, PropertyChange, Texels};
+use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, Texels};
 
-/// What the parameter changes.
+/// What the parameter changes: a property of a shape is that of its emitter or its BSDF.
 pub fn targets(scene: &Scene, parameter: &Parameter) -> Vec<Target> {
-    parameter.effects.iter().map(|e| scene.find(&e.target).expect("a known target")).collect()
+    let target = |e: &Effect| match (scene.find(&e.target).expect("a known target"), &e.change) {
+        (Target::Shape(i), Change::Property(c)) => match scene.shapes[i].emitter {
+            Some(e) if c.property == "radiance" => Target::Emitter(e),
+            _ => Target::Bsdf(scene.shapes[i].bsdf),
+        },
+        (target, _) => target,
+    };
+    parameter.effects.iter().map(target).collect()
 }
 
 /// The derivative along the parameter, at theta = 0, of what `gradient` is the gradient of.

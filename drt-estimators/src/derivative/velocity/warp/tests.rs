@@ -10,7 +10,7 @@ use drt_motion::{Effect, GeometryChange};
 use crate::derivative::tests::choice;
 use crate::derivative::tests::choice::MOMENT;
 use crate::derivative::tests::scenes::{
-    Build, ball, diffuse, homogeneous, moves, parameter, placed, shift,
+    SceneBuilder, ShapeBuilder, ball, diffuse, homogeneous, moves, parameter, placed, seen, shift,
 };
 use crate::derivative::velocity::Moved;
 use crate::derivative::velocity::warp::{Stretch, SurfaceHit, warps};
@@ -109,26 +109,25 @@ enum Ball {
 }
 
 fn ball_in_mist(kind: Ball) -> Scene {
-    let mut b = Build::default();
-    let medium = |b: &mut Build, id, s| {
-        b.medium(id, homogeneous(Rgb::new(1.0, 0.8, 1.2) * s, Rgb::splat(0.9), Rgb::ZERO, 0.2))
-    };
-    let mist = medium(&mut b, "mist", if kind == Ball::Matter { 1.5 } else { 0.2 });
+    let medium = |s| homogeneous(Rgb::new(1.0, 0.8, 1.2) * s, Rgb::splat(0.9), Rgb::ZERO, 0.2);
     let room = placed(procedural::cube(), Vec3::splat(1.4), 0.0, Vec3::ZERO);
-    b.interface("room", room, mist, None);
-    if kind == Ball::Milk {
-        let milk = medium(&mut b, "milk", 5.0);
-        b.interface("ball", ball(0.8, Vec3::ZERO), milk, Some(mist));
+    let inner = ball(0.8, Vec3::ZERO);
+    let mut scene = SceneBuilder::new()
+        .medium("mist", medium(if kind == Ball::Matter { 1.5 } else { 0.2 }))
+        .shape("room", ShapeBuilder::interface(room).interior("mist"))
+        .emitter("sky", Emitter::Constant { radiance: Rgb::splat(1.0) });
+    scene = if kind == Ball::Milk {
+        let milk = ShapeBuilder::interface(inner).interior("milk").exterior("mist");
+        scene.medium("milk", medium(5.0)).shape("ball", milk)
     } else {
-        let bsdf = b.bsdf("ball-bsdf", diffuse(0.1, 0.1, 0.1));
-        b.shape("ball", ball(0.8, Vec3::ZERO), bsdf);
-    }
+        scene.shape("ball", ShapeBuilder::new(inner, diffuse(0.1, 0.1, 0.1)))
+    };
     if kind == Ball::Coated {
-        let varnish = medium(&mut b, "varnish", 2.0);
-        b.interface("coat", ball(0.9, Vec3::ZERO), varnish, Some(mist));
+        let coat = ShapeBuilder::interface(ball(0.9, Vec3::ZERO));
+        let coat = coat.interior("varnish").exterior("mist");
+        scene = scene.medium("varnish", medium(2.0)).shape("coat", coat);
     }
-    b.light("sky", Emitter::Constant { radiance: Rgb::splat(1.0) });
-    b.camera(vec3(0.3, 0.9, 4.0), Vec3::ZERO, 4)
+    seen(scene, [vec3(0.3, 0.9, 4.0), Vec3::ZERO], 4)
 }
 
 /// Warps of three lengths, of none at first.

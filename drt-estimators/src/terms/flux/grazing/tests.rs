@@ -9,7 +9,9 @@ use drt_motion::{GeometryChange, Parameter};
 
 use crate::derivative::contraction::Contraction;
 use crate::derivative::tests::choice;
-use crate::derivative::tests::scenes::{Build, FILM, homogeneous, moves, parameter, placed};
+use crate::derivative::tests::scenes::{
+    FILM, SceneBuilder, ShapeBuilder, glowing, homogeneous, moves, parameter, placed, seen,
+};
 use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
 use crate::model::settings::EstimatorKind;
@@ -21,17 +23,17 @@ use crate::terms::splatting::Checked;
 
 /// A cube of milk, lit by a lamp and the sky, whose top is a little lower than the camera.
 fn milk() -> (Scene, Parameter) {
-    let mut b = Build::default();
     let milk = homogeneous(Rgb::new(2.0, 1.5, 3.0), Rgb::splat(0.9), Rgb::ZERO, 0.2);
-    let milk = b.medium("milk", milk);
     let cube = placed(procedural::cube(), Vec3::splat(0.5), 0.0, vec3(0.0, -0.52, 0.0));
-    b.interface("cube", cube, milk, None);
     let lamp = placed(procedural::rectangle(), Vec3::splat(2.0), 180.0, vec3(0.0, 3.0, 0.0));
-    b.lamp(lamp, Rgb::splat(2.0));
-    b.light("sky", Emitter::Constant { radiance: Rgb::splat(0.3) });
+    let scene = SceneBuilder::new()
+        .medium("milk", milk)
+        .shape("cube", ShapeBuilder::interface(cube).interior("milk"))
+        .shape("lamp", glowing(lamp, Rgb::splat(2.0)))
+        .emitter("sky", Emitter::Constant { radiance: Rgb::splat(0.3) });
     let up = GeometryChange::Translate(vec3(0.0, 1.0, 0.0));
     let motion = parameter("cube", 0.0, vec![moves("cube", up)]);
-    (b.camera(vec3(0.0, 0.0, 4.0), Vec3::ZERO, 5), motion)
+    (seen(scene, [vec3(0.0, 0.0, 4.0), Vec3::ZERO], 5), motion)
 }
 
 const PIXELS: u32 = FILM[0] * FILM[1];
