@@ -10,13 +10,13 @@ sys.path.insert(0, str(HERE.parent))
 import assets  # noqa: E402
 
 HEIGHT = 2.4
-VIEWS, SPP, LEVELS = 40, 512, 5
+VIEWS, SPP, LEVELS = 40, 256, 5
 
 
 def piece(x, y, z):
     """Negative inside of a pawn with a waist, a collar and a head, which stands along y."""
     r = math.hypot(x, z)
-    base = max(r - (0.2 + 0.36 * math.exp(-((y + 0.85) ** 2) / 0.12)), abs(y) - 0.85)
+    base = max(r - (0.2 + 0.36 * math.exp(-((y + 0.75) ** 2) / 0.12)), abs(y) - 0.85 + 0.4 * r * r)
     collar = math.hypot(max(r - 0.12, 0.0), 1.4 * (y - 0.28)) - 0.2
     head = math.sqrt(r * r + (y - 0.62) ** 2) - 0.32
     return assets.smooth_union([base, collar, head], 0.05)
@@ -34,7 +34,7 @@ def main():
     assets.write_ply(run / "truth.ply", lifted(assets.star_shaped(points, piece, 1.5)), faces)
     views = []
     for k in range(VIEWS):
-        turn, tilt = (k * 137.508) % 360.0, -75.0 + 150.0 * (k + 0.5) / VIEWS
+        turn, tilt = (k * 137.508) % 360.0, -95.0 + 190.0 * (k + 0.5) / VIEWS
         picture = run / f"view-{k:02}.exr"
         assets.render(HERE / "scene.xml", picture, SPP, {"mesh": run / "truth.ply", "turn": turn, "tilt": tilt})
         turns = [assets.rotation("piece", axis, angle, (0, HEIGHT, 0)) for axis, angle in (((0, 1, 0), turn), ((0, 0, 1), tilt))]
