@@ -47,6 +47,22 @@ def icosphere(levels):
     return points, faces
 
 
+def dodecahedron():
+    """Unit vertices, and faces that cut each pentagon into the five triangles about its middle."""
+    corners, triangles = icosphere(0)
+    points = [unit([sum(corners[i][k] for i in t) for k in range(3)]) for t in triangles]
+    faces = []
+    for middle, corner in enumerate(corners):
+        side = [n for n, t in enumerate(triangles) if middle in t]
+        first = points[side[0]]
+        u = unit([first[k] - corner[k] * sum(a * b for a, b in zip(first, corner)) for k in range(3)])
+        v = (corner[1] * u[2] - corner[2] * u[1], corner[2] * u[0] - corner[0] * u[2], corner[0] * u[1] - corner[1] * u[0])
+        side.sort(key=lambda n: math.atan2(sum(a * b for a, b in zip(points[n], v)), sum(a * b for a, b in zip(points[n], u))))
+        points.append(tuple(sum(points[n][k] for n in side) / 5 for k in range(3)))
+        faces += [(len(points) - 1, side[n], side[(n + 1) % 5]) for n in range(5)]
+    return points, faces
+
+
 def revolve(profile, around):
     """The closed surface that a profile of (radius, height) makes about the y axis, from its lower end to its upper end.
 
@@ -68,6 +84,19 @@ def revolve(profile, around):
         last = 1 + (len(inner) - 1) * around
         faces.append((last + k, last + k1, top))
     return points, faces
+
+
+def apple(around=96, along=64):
+    """An apple of radius 1 about the origin, with a dimple at its top and a smaller one below; its top leans to one side."""
+    profile = []
+    for k in range(along + 1):
+        turn = math.pi * k / along
+        radius = math.sin(turn) * (1 + 0.08 * math.cos(turn)) ** -1
+        height = -0.9 * math.cos(turn) - 0.38 * math.exp(-((math.pi - turn) / 0.42) ** 2) + 0.2 * math.exp(-((turn / 0.4) ** 2))
+        profile.append((radius if 0 < k < along else 0.0, height))
+    points, faces = revolve(profile, around)
+    lobes = [1 + 0.035 * math.cos(5 * math.atan2(z, x)) * (1 - y) / 2 for x, y, z in points]
+    return [(x * m + 0.08 * y * y, y, z * m) for (x, y, z), m in zip(points, lobes)], faces
 
 
 def write_ply(path, points, faces):
