@@ -8,6 +8,7 @@ import sys
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 import assets  # noqa: E402
+import views  # noqa: E402
 
 HEIGHT = 2.4
 VIEWS, SPP, LEVELS = 40, 256, 5
@@ -32,14 +33,14 @@ def main():
     points, faces = assets.icosphere(LEVELS)
     assets.write_ply(run / "start.ply", lifted((0.4 * x, 0.8 * y, 0.4 * z) for x, y, z in points), faces)
     assets.write_ply(run / "truth.ply", lifted(assets.star_shaped(points, piece, 1.5)), faces)
-    views = []
+    poses = []
     for k in range(VIEWS):
         turn, tilt = (k * 137.508) % 360.0, -95.0 + 190.0 * (k + 0.5) / VIEWS
         picture = run / f"view-{k:02}.exr"
-        assets.render(HERE / "scene.xml", picture, SPP, {"mesh": run / "truth.ply", "turn": turn, "tilt": tilt})
-        turns = [assets.rotation("piece", axis, angle, (0, HEIGHT, 0)) for axis, angle in (((0, 1, 0), turn), ((0, 0, 1), tilt))]
-        views.append(assets.view(picture.name, turns))
-    assets.write_job(HERE / "job.toml", run / "job.toml", views)
+        views.render(HERE / "scene.xml", picture, SPP, {"mesh": run / "truth.ply", "turn": turn, "tilt": tilt})
+        turns = [views.rotation("piece", axis, angle, (0, HEIGHT, 0)) for axis, angle in (((0, 1, 0), turn), ((0, 0, 1), tilt))]
+        poses.append(views.view(picture.name, turns))
+    views.write_job(HERE / "job.toml", run / "job.toml", poses)
 
 
 main()

@@ -8,6 +8,7 @@ import sys
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 import assets  # noqa: E402
+import views  # noqa: E402
 
 VIEWS, SPP, LEVELS = 40, 128, 5
 
@@ -28,14 +29,14 @@ def main():
     points, faces = assets.icosphere(LEVELS)
     assets.write_ply(run / "start.ply", [tuple(0.55 * c for c in p) for p in points], faces)
     assets.write_ply(run / "truth.ply", assets.star_shaped(points, body, 1.5), faces)
-    views = []
+    poses = []
     for k in range(VIEWS):
         turn, tilt = (k * 137.508) % 360.0, -80.0 + 160.0 * (k + 0.5) / VIEWS
         picture = run / f"view-{k:02}.exr"
-        assets.render(HERE / "scene.xml", picture, SPP, {"mesh": run / "truth.ply", "turn": turn, "tilt": tilt})
-        turns = [assets.rotation("body", axis, angle, (0, 0, 0)) for axis, angle in (((0, 1, 0), turn), ((1, 0, 0), tilt))]
-        views.append(assets.view(picture.name, turns))
-    assets.write_job(HERE / "job.toml", run / "job.toml", views)
+        views.render(HERE / "scene.xml", picture, SPP, {"mesh": run / "truth.ply", "turn": turn, "tilt": tilt})
+        turns = [views.rotation("body", axis, angle, (0, 0, 0)) for axis, angle in (((0, 1, 0), turn), ((1, 0, 0), tilt))]
+        poses.append(views.view(picture.name, turns))
+    views.write_job(HERE / "job.toml", run / "job.toml", poses)
 
 
 main()

@@ -8,6 +8,7 @@ import sys
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 import assets  # noqa: E402
+import views  # noqa: E402
 
 VIEWS, SPP, LEVELS = 50, 256, 5
 
@@ -28,15 +29,15 @@ def main():
     points, faces = assets.icosphere(LEVELS)
     assets.write_ply(run / "start.ply", [tuple(0.45 * c for c in p) for p in points], faces)
     assets.write_ply(run / "truth.ply", [body(p) for p in points], faces)
-    views = []
+    poses = []
     for k in range(VIEWS):
         up = math.degrees(math.asin(0.9 - 1.8 * (k + 0.5) / VIEWS))
         around = (k * 137.508) % 360.0
         picture = run / f"view-{k:02}.exr"
-        assets.render(HERE / "scene.xml", picture, SPP, {"mesh": run / "truth.ply", "up": up, "around": around})
-        turns = [assets.rotation("camera", axis, angle, (0, 0, 0)) for axis, angle in (((-1, 0, 0), up), ((0, 1, 0), around))]
-        views.append(assets.view(picture.name, turns))
-    assets.write_job(HERE / "job.toml", run / "job.toml", views)
+        views.render(HERE / "scene.xml", picture, SPP, {"mesh": run / "truth.ply", "up": up, "around": around})
+        turns = [views.rotation("camera", axis, angle, (0, 0, 0)) for axis, angle in (((-1, 0, 0), up), ((0, 1, 0), around))]
+        poses.append(views.view(picture.name, turns))
+    views.write_job(HERE / "job.toml", run / "job.toml", poses)
 
 
 main()
