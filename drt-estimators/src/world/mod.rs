@@ -1,4 +1,4 @@
-//! A scene prepared for ray queries: one soup of triangles under one tree, media by side.
+//! A scene prepared for ray queries: the triangles of all shapes in one BVH, and the media on both sides of each.
 
 pub(crate) mod cache;
 mod geometry;
@@ -573,7 +573,8 @@ impl World {
         }
     }
 
-    /// The side of the first surface that bounds media from `x` on along `dir`; of several that coincide, of one that a ray leaves.
+    /// The side of the first surface that bounds media from `x` on along `dir`; of several that coincide, of one that a
+    /// ray leaves.
     fn first_boundary(&self, x: Vec3, dir: Vec3) -> Option<(SurfacePoint, bool)> {
         let ray = Ray { origin: x, dir, t_max: f64::INFINITY };
         let bounds = |prim: u32| {
@@ -601,8 +602,8 @@ impl World {
         self.medium_along(x, askew())
     }
 
-    /// The medium in which a ray from `x` along the unit direction `dir` starts. The point may lie on an interface, but on no
-    /// other surface that bounds media.
+    /// The medium in which a ray from `x` along the unit direction `dir` starts. The point may lie on an interface, but
+    /// on no other surface that bounds media.
     fn medium_along(&self, x: Vec3, dir: Vec3) -> Option<usize> {
         if !self.has_media() {
             return None;
