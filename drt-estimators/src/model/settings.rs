@@ -77,8 +77,7 @@ pub enum WarpKernel {
     Year2020,
 }
 
-/// The maximum depth of paths. A depth of 1 shows emitters only, and each scattering adds 1; light that goes straight
-/// through adds none.
+/// The maximum depth of paths. A depth of 1 shows emitters only, and each scattering adds 1; null interfaces add none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Depth {
