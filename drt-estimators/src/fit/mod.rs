@@ -203,9 +203,9 @@ impl Fit {
     }
 
     /// Loss and derivatives at these values of the parameters, from `spp` samples per pixel of each view, and at
-    /// least two; boundary samples are as many in proportion as the settings say. The same seed gives
-    /// the same result, whatever the settings' own, and whatever was evaluated before: what has not
-    /// changed since is used again. `None` when `control` cancelled it.
+    /// least two; the settings say how many boundary samples there are for each of them. A seed always gives
+    /// one result, whatever the seed of the settings and whatever was evaluated before; parts of the scene that have
+    /// not changed since are used again. `None` when `control` cancelled it.
     ///
     /// # Errors
     /// As [`Session::new`](crate::Session::new).

@@ -190,7 +190,7 @@ impl Emitter {
         }
     }
 
-    /// The same emitter with unit directions.
+    /// This emitter with unit directions.
     ///
     /// # Errors
     /// Names the field that is not finite, a zero direction, or a cone that is none.

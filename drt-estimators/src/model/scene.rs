@@ -470,7 +470,7 @@ impl Scene {
         Aabb::around((0..8).map(corner))
     }
 
-    /// The same scene with a mesh in world space for every instance: what derivatives are made of, as each of its edges
+    /// This scene with a mesh in world space for every instance: derivatives need it, as each of its edges
     /// and vertices moves by itself.
     ///
     /// # Errors

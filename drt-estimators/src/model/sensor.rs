@@ -228,7 +228,7 @@ impl Sensor {
         Self::from_to_world(&look_at(origin, target, up)?, lens, film, filter)
     }
 
-    /// The same view with another number of pixels.
+    /// This sensor with another number of pixels.
     ///
     /// # Errors
     /// When a side is zero, or there are more than [`MAX_PIXELS`](Self::MAX_PIXELS).
@@ -237,14 +237,14 @@ impl Sensor {
         self.with(self.lens, film, self.window.resized(self.film, film))
     }
 
-    /// The same sensor with another lens and film.
+    /// This sensor with another lens and film.
     fn with(&self, lens: Lens, film: [u32; 2], window: Window) -> Result<Self, SensorError> {
         let (to_world, filter, response) = (self.to_world(), self.filter.clone(), self.response);
         let (window, aperture) = (Some(window), self.aperture);
         Parts { to_world, lens, film, window, filter, response, aperture }.sensor()
     }
 
-    /// The same camera with another filter.
+    /// This sensor with another filter.
     #[must_use]
     pub fn with_filter(self, filter: Filter) -> Self {
         Self { filter, ..self }

@@ -197,7 +197,7 @@ impl Bitmap {
         Ok(Self { size, texels: Arc::new(texels), filter, wrap, to_uv: UvMap::IDENTITY })
     }
 
-    /// The same image of other texels.
+    /// This image with each texel replaced by the value of a function.
     ///
     /// # Errors
     /// When one is not finite.

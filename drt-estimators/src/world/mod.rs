@@ -151,9 +151,9 @@ pub(crate) enum Tracking {
 /// The medium around something; `None` is vacuum.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum SurroundingMedium {
-    /// The same everywhere around it.
+    /// One medium everywhere around it.
     Uniform(Option<usize>),
-    /// Different at different points.
+    /// Different media at different points.
     Varies,
 }
 
@@ -274,7 +274,7 @@ impl World {
         Ok(world)
     }
 
-    /// The same scene by the light of some emitters.
+    /// This world with the light of some emitters only.
     pub(crate) fn lit_by(&self, lit: EmitterMask) -> Result<Self, Error> {
         if lit == self.lit {
             return Ok(self.clone());

@@ -55,11 +55,11 @@ use crate::world::World;
 use crate::world::lights::EmitterMask;
 use crate::world::vertex::{Kind, MaterialPoint, SurfacePoint, Vertex};
 
-/// What has been collected for a vertex while its neighbours are processed, besides what is by its own velocity and
-/// normals.
+/// Derivatives that have been collected for a vertex while its neighbours are processed, except those with respect to
+/// its own velocity and normals.
 #[derive(Clone, Copy, Debug, Default)]
 struct Local {
-    /// By the velocity of the matter it is on.
+    /// With respect to the velocity of the matter that it is on.
     matter: RgbVec,
     /// C_k, the value of the children per unit of scattering.
     children: Rgb,
@@ -67,7 +67,8 @@ struct Local {
     joined: Rgb,
     /// a_k R_k, its part of the parent's C.
     incoming: Rgb,
-    /// By the rate of the direction of the ray that found the vertex, as far as its scattering sees that.
+    /// With respect to the rate of the direction of the ray that found the vertex, through the scattering at the
+    /// vertex.
     turn: RgbVec,
 }
 
@@ -110,25 +111,27 @@ pub(crate) struct Differentiator<'w> {
     world: &'w World,
     /// The camera, at the path's point of its lens.
     camera: Cow<'w, Sensor>,
-    /// Rays do not turn, and vertices do not move with what auxiliary rays find: to tell how much that is.
+    /// When true, rays do not turn and vertices do not move with what auxiliary rays find, to find the contribution of
+    /// these motions.
     pub(crate) edges_at_rest: bool,
     locals: Vec<Local>,
-    /// By the velocity and normals of each vertex.
+    /// Derivatives with respect to the velocity and normals of each vertex.
     ends: Vec<SurfaceAdjoint>,
     points: Vec<(f64, f64)>,
     rng: Rng,
-    /// The filter's gradient by the pixel position, over the density.
+    /// The filter's gradient with respect to the pixel position, over the density.
     filter: [f64; 2],
-    /// By the rate of the camera ray's direction.
+    /// Derivative with respect to the rate of the camera ray's direction.
     turn: RgbVec,
-    /// By the velocity of the point where an orthographic camera's ray starts, at its image point.
+    /// Derivative with respect to the velocity of the point where an orthographic camera's ray starts, at its image
+    /// point.
     origin: RgbVec,
-    /// Of the camera's importance and filter, per channel.
+    /// Gradients of the camera's importance and filter, per channel.
     sensor: [SensorGradient; 3],
     /// Summands of the turns of rays to lights, and of the velocities of points on these.
     parts: Vec<TurnPart>,
     auxiliary: Vec<Auxiliary>,
-    /// Of rays that turn with shadows.
+    /// Summands of the turns of rays that turn with shadows.
     with_shadows: TurnParts,
     probe: Probe,
 }

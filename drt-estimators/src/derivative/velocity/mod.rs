@@ -120,13 +120,13 @@ pub(crate) struct Found<'a> {
 /// What a field needs to trace rays of its own.
 #[derive(Clone, Debug)]
 pub(crate) struct Probe {
-    /// Independent of the walk's.
+    /// Random numbers that are independent of the walk's.
     pub(crate) rng: Rng,
     /// Rays cast.
     pub(crate) rays: u64,
     /// Edges and shadows that turned rays, counted for each ray.
     pub(crate) turning_edges: u64,
-    /// Of one of them.
+    /// Buffer for the hits of one ray.
     pub(crate) hits: Vec<Hit>,
 }
 
@@ -138,10 +138,11 @@ impl Probe {
 
 /// A velocity field of the vertices of paths.
 pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
-    /// Of the camera.
+    /// The velocity of the camera.
     fn camera(&self) -> VertexVelocity;
 
-    /// Of a vertex of a path, or of the environment that it escaped to; appends its summands.
+    /// The velocity of a vertex of a path, or of the environment to which the path escaped; appends its summands to
+    /// `auxiliary`.
     fn vertex(
         &self,
         world: &World,
@@ -150,7 +151,7 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity;
 
-    /// Whether it looks at the rays that find vertices, to where they end.
+    /// Whether the field depends on the rays that find vertices, up to their ends.
     fn follows_rays(&self) -> bool {
         true
     }
@@ -165,23 +166,23 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         true
     }
 
-    /// Whether vertices move with the edges beside them, what they owe to which is kept as a term of its own.
+    /// Whether vertices move with the edges beside them; what this adds is a term of its own.
     fn follows_edges(&self) -> bool {
         false
     }
 
-    /// Whether it draws random numbers.
+    /// Whether the field draws random numbers.
     fn is_random(&self) -> bool {
         false
     }
 
-    /// Whether points on emitters may move though neither they nor the ray does.
+    /// Whether points on emitters may get a velocity though neither the emitter nor the ray moves.
     fn looks_around(&self) -> bool {
         false
     }
 
-    /// Of a point on an emitter to which a `viewer` is connected along the unit direction `dir` over a `distance`;
-    /// appends its summands.
+    /// The velocity of a point on an emitter to which a `viewer` is connected along the unit direction `dir` over a
+    /// `distance`; appends its summands to `auxiliary`.
     #[allow(clippy::too_many_arguments)]
     fn light(
         &self,

@@ -65,7 +65,7 @@ impl Reference {
         }
     }
 
-    /// The same with a factor for each pixel's difference: 0 leaves it out.
+    /// This reference with a factor for each pixel's difference; a factor of 0 leaves the pixel out.
     ///
     /// # Errors
     /// When there are not as many factors, or one is negative or not finite, or all are zero.
@@ -82,9 +82,10 @@ impl Reference {
         Ok(Self { mask: Some(mask), ..self })
     }
 
-    /// The same with each pixel's difference divided by what it shows, the mean of its channels, and
-    /// `part` of the image's mean more; in units of that mean, and times the mask so far. Where noise and what there
-    /// is to see grow with brightness, dark pixels tell as much as bright ones.
+    /// This reference with each pixel's difference divided by the sum of the pixel's brightness (the mean of its
+    /// channels) and `part` times the image's mean brightness. The divisors are in units of that mean, and the mask so
+    /// far still applies. Where both noise and signal grow with brightness, dark pixels then contribute as much
+    /// information as bright ones.
     ///
     /// # Errors
     /// When the part is not positive, or the image is black or has negative pixels.
@@ -118,7 +119,7 @@ impl Reference {
         &self.pixels
     }
 
-    /// The same by means over `factor`×`factor` pixels.
+    /// This reference reduced to the means over `factor`×`factor` pixels.
     ///
     /// # Errors
     /// When the sides are not multiples of the factor, or the mask then leaves nothing.

@@ -306,7 +306,7 @@ impl<'w> Bidirectional<'w> {
         z.weight() * f * connection.rest()
     }
 
-    /// Of a vertex of the camera's path with one of the light's.
+    /// The connection of a vertex of the camera path with one of the light path.
     fn connection<O: JointObserver>(
         &self,
         tracer: &mut Tracer<'w>,
@@ -457,7 +457,7 @@ impl SeenFromCamera {
     }
 }
 
-/// Of a vertex of the camera's path in what observes the walk.
+/// The number that the observer of the walk uses for a vertex of the camera path.
 fn name(vertex: usize) -> u32 {
     vertex as u32 + 1
 }

@@ -115,7 +115,7 @@ struct Chosen<'a> {
 }
 
 impl PrimaryEdges {
-    /// Of all edges with their weights.
+    /// A table of all edges with their weights.
     fn new(weights: impl Iterator<Item = f64>) -> Result<Option<Self>, Error> {
         let weighed = (0..).zip(weights);
         let (indices, weights): (Vec<u32>, Vec<f64>) = weighed.filter(|(_, w)| *w > 0.0).unzip();

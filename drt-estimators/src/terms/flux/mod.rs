@@ -53,7 +53,7 @@ const EDGE_ON: f64 = GRAZED;
 /// The surfaces with a flux.
 #[derive(Clone, Debug)]
 pub(crate) struct Flux {
-    /// Of the material form.
+    /// In the material form: the shapes with a flux.
     shapes: Arc<[bool]>,
     /// Media in which the faces of a grid's box have a flux.
     grids: Arc<[bool]>,
@@ -61,9 +61,9 @@ pub(crate) struct Flux {
     largest: Arc<[Option<f64>]>,
     /// Segments at which a volume vertex can no longer send anything.
     longest: u32,
-    /// In the spatial form: where there is a flux even if the ray stands still.
+    /// In the spatial form: the shapes and grids that have a flux even if the ray is at rest.
     movers: Option<Movers>,
-    /// And how vertices move there.
+    /// In the spatial form: the velocity field of vertices.
     pub(crate) spatial: Option<Arc<Spatial>>,
     /// Cosine of the angle of incidence below which the camera's rays leave the flux to [`GrazingFlux`].
     least_cosine: f64,
@@ -79,7 +79,7 @@ struct Movers {
 }
 
 impl Flux {
-    /// Of the material form; `None` when nothing has a flux.
+    /// The flux of the material form; `None` when nothing has a flux.
     pub(crate) fn new(world: &World, shapes: &[usize], active: &ActiveInputs) -> Option<Self> {
         let flags = (0..world.scene.shapes.len()).map(|s| shapes.contains(&s)).collect();
         let moves = |m: usize| {
@@ -102,7 +102,7 @@ impl Flux {
         })
     }
 
-    /// Of the spatial form; `None` when no medium has vertices.
+    /// The flux of the spatial form; `None` when no medium has vertices.
     pub(crate) fn spatial(
         world: &World,
         active: &ActiveInputs,
@@ -127,7 +127,7 @@ impl Flux {
         })
     }
 
-    /// The same with all of the flux left to rays.
+    /// This flux with everything sampled along rays, at grazing angles too.
     pub(crate) fn along_rays(self) -> Self {
         Self { least_cosine: 0.0, ..self }
     }
@@ -137,12 +137,12 @@ impl Flux {
         (moves && self.movers.is_some()) || self.moves(shape)
     }
 
-    /// The same of a ray at rest.
+    /// True when a shape sweeps over the points of a ray at rest.
     fn moves(&self, shape: u32) -> bool {
         self.movers.as_ref().map_or(&self.shapes, |m| &m.shapes)[shape as usize]
     }
 
-    /// The same of the faces of a grid.
+    /// True when the faces of a medium's grid sweep over the points of a ray, which may itself be `moves`.
     fn sweeps_grid(&self, medium: usize, moves: bool) -> bool {
         let moves = |m: &Movers| moves || m.grids[medium];
         self.grids[medium] && self.movers.as_ref().is_none_or(moves)
