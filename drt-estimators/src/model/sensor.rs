@@ -99,7 +99,7 @@ pub enum SensorError {
     /// A viewing direction that is zero.
     #[error("look_at: origin and target are the same point")]
     NoDirection,
-    /// An upward direction that does not exist.
+    /// An upward direction that is zero or parallel to the viewing direction.
     #[error("look_at: `up` is zero or parallel to the viewing direction")]
     NoUp,
     /// A NaN or infinity.
@@ -130,7 +130,7 @@ pub struct Sensor {
     window: Window,
     filter: Filter,
     response: Response,
-    /// `None` of a pinhole.
+    /// `None` for a pinhole.
     aperture: Option<Aperture>,
 }
 
@@ -337,7 +337,7 @@ struct Parts {
     window: Option<Window>,
     filter: Filter,
     response: Response,
-    /// `None` of a pinhole.
+    /// `None` for a pinhole.
     #[cfg_attr(feature = "serde", serde(default))]
     aperture: Option<Aperture>,
 }
