@@ -95,9 +95,9 @@ impl Session {
         Ok(session)
     }
 
-    /// Goes on with the same scene at other values: vertices that have moved, other voxels, texels or numbers, other
-    /// values of the parameters. What has been accumulated is forgotten. What has not changed is used again; the
-    /// results are those of a new session, to the bit.
+    /// Goes on with this scene at other values: vertices that have moved, other voxels, texels or numbers, other
+    /// values of the parameters. All accumulated samples are discarded. Preparations of parts that have not changed are
+    /// used again; the results are those of a new session, to the bit.
     ///
     /// # Errors
     /// As [`Session::new`]; the session then stays as it was.
@@ -116,8 +116,8 @@ impl Session {
         Ok(())
     }
 
-    /// As [`Session::new`], with what earlier sessions of nearly the same scene left to be used again. The
-    /// results are the same to the bit.
+    /// As [`Session::new`], but with preparations that earlier sessions of a similar scene have left in the cache. The
+    /// results are those of [`Session::new`] to the bit.
     ///
     /// # Errors
     /// As [`Session::new`].
@@ -247,8 +247,8 @@ impl Session {
         &self.plan
     }
 
-    /// Forgets all images, and goes on as if prepared with this seed: what comes is independent of what
-    /// was.
+    /// Discards all samples, and goes on as if prepared with this seed: later samples are independent of the earlier
+    /// ones.
     pub fn restart(&mut self, seed: u64) {
         self.film.clear();
         self.images.iter_mut().for_each(Images::clear);
@@ -259,7 +259,7 @@ impl Session {
     }
 
     /// Adds `spp` samples per pixel, and boundary samples in [proportion](Settings::boundary_ratio).
-    /// Returns false when `control` cancelled it; the result then holds what was finished.
+    /// Returns false when `control` cancelled it; the result then has the samples that were finished.
     pub fn run(&mut self, spp: u32, control: &dyn Control) -> bool {
         let (pool, blocks) = (Arc::clone(&self.pool), Arc::clone(&self.blocks));
         let before = self.passes;
