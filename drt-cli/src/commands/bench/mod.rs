@@ -1,5 +1,5 @@
-//! `drt bench`: error against run time at doubling sample counts, for the image, the derivatives by the job's estimator, and
-//! finite differences.
+//! `drt bench`: error against run time at doubling sample counts, for the image, the derivatives by the job's
+//! estimator, and finite differences.
 
 mod measure;
 mod plot;
