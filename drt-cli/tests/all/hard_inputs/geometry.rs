@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::common::{Folder, expect};
-use crate::hard_inputs::{from_file, job, run};
+use crate::hard_inputs::{from_file, job, run, scene};
 
 /// What must be rendered: the image is finite, and the time is that of a scene of this size.
 #[track_caller]

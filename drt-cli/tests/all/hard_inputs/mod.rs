@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use std::process::{Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{Folder, expect};
+use crate::common::Folder;
 
 /// Longest that any refusal may take, on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(90);
