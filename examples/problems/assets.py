@@ -111,7 +111,7 @@ property list uchar uint vertex_indices
 end_header
 """
     data = b"".join(struct.pack("<3d", *p) for p in points) + b"".join(struct.pack("<B3I", 3, *f) for f in faces)
-    path.write_bytes(header.encode() + data)
+    pathlib.Path(path).write_bytes(header.encode() + data)
 
 
 def write_vol(path, size, channels, value):
@@ -119,7 +119,7 @@ def write_vol(path, size, channels, value):
     middles = [(i + 0.5) / size for i in range(size)]
     data = [c for z in middles for y in middles for x in middles for c in value(x, y, z)]
     header = struct.pack("<3sBiiiii6f", b"VOL", 3, 1, size, size, size, channels, 0, 0, 0, 1, 1, 1)
-    path.write_bytes(header + struct.pack(f"<{len(data)}f", *data))
+    pathlib.Path(path).write_bytes(header + struct.pack(f"<{len(data)}f", *data))
 
 
 def write_png(path, width, height, colour):
@@ -133,7 +133,7 @@ def write_png(path, width, height, colour):
 
     head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     data = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows, 9)) + chunk(b"IEND", b"")
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + data)
+    pathlib.Path(path).write_bytes(b"\x89PNG\r\n\x1a\n" + data)
 
 
 def smoothstep(a, b, x):
@@ -180,3 +180,49 @@ def smoke(x, y, z):
     inside = smoothstep(0, 0.6, 1 - away - top + puff)
     border = min(x, 1 - x, y, 1 - y, z, 1 - z)
     return inside * smoothstep(0.0, 0.08, border)
+
+
+def star(arms, notch):
+    """A flat star in the plane of x and y, one arm of each of the lengths, with notches in between; it looks along z."""
+    points = [(0.0, 0.0, 0.0)]
+    for k, length in enumerate(arms):
+        for turn, reach in ((k, length), (k + 0.5, notch)):
+            angle = 2 * math.pi * turn / len(arms)
+            points.append((-reach * math.sin(angle), reach * math.cos(angle), 0.0))
+    rim = len(points) - 1
+    return points, [(0, 1 + k, 1 + (k + 1) % rim) for k in range(rim)]
+
+
+def box_cage(low, high):
+    """A box of twelve triangles; bit 0 of a vertex's number says which end of x it is at, bit 1 of y, bit 2 of z."""
+    ends = (low, high)
+    points = [(ends[k & 1][0], ends[k >> 1 & 1][1], ends[k >> 2][2]) for k in range(8)]
+    sides = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
+    return points, [t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))]
+
+
+def smooth_union(distances, width):
+    """The distance from a union of bodies, with fillets of about this width where they meet."""
+    nearest = min(distances)
+    return nearest - width * math.log(sum(math.exp((nearest - d) / width) for d in distances))
+
+
+def star_shaped(directions, body, longest):
+    """Where rays from the origin leave a body, of which all points can be seen from there; `body` is negative inside."""
+    points = []
+    for d in directions:
+        inside, outside = 0.0, longest
+        for _ in range(40):
+            middle = (inside + outside) / 2
+            if body(*(middle * c for c in d)) < 0:
+                inside = middle
+            else:
+                outside = middle
+        points.append(tuple(inside * c for c in d))
+    return points
+
+
+def write_obj(path, points, faces):
+    """Triangles as an OBJ file."""
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
+    pathlib.Path(path).write_text("\n".join(lines) + "\n")
