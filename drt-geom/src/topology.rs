@@ -44,8 +44,8 @@ pub struct Edge {
     pub class: EdgeClass,
     /// The widest angle between neighbouring faces around the edge, in radians: 2 pi at a boundary,
     /// pi for a flat edge, more for any edge that can be a silhouette. A direction grazes the edge
-    /// with every face on one side for a fraction `(free_angle - pi) / pi` of the planes through it.
-    pub free_angle: f64,
+    /// with every face on one side for a fraction `(widest_angle - pi) / pi` of the planes through it.
+    pub widest_angle: f64,
 }
 
 impl Edge {
@@ -56,7 +56,7 @@ impl Edge {
     /// lie between those two.
     #[must_use]
     pub fn can_be_silhouette(&self) -> bool {
-        self.free_angle > PI + FLAT
+        self.widest_angle > PI + FLAT
     }
 }
 
@@ -174,18 +174,18 @@ fn edge(mesh: &Mesh, around: &[HalfEdge]) -> Edge {
             faces: [around[0].face, NONE],
             opposite: [o, NONE],
             class: EdgeClass::Boundary,
-            free_angle: TAU,
+            widest_angle: TAU,
         };
     }
     let mut angles = angles_around(mesh, around);
-    let pair = |i: usize, j: usize, class, free_angle| {
+    let pair = |i: usize, j: usize, class, widest_angle| {
         let [a, b, o] = corners(mesh, &around[i]);
         Edge {
             vertices: [a, b],
             faces: [around[i].face, around[j].face],
             opposite: [o, corners(mesh, &around[j])[2]],
             class,
-            free_angle,
+            widest_angle,
         }
     };
     if let [_, (outside, _)] = angles[..] {

@@ -2,7 +2,7 @@
 
 use std::process::{Command, Stdio};
 
-use crate::common::{Folder, expect};
+use crate::common::{Folder, expect, gray_and_lamp};
 
 const SCENE: &str = r#"<scene version="3.0.0">
   <default name="rho" value="0.5"/>
@@ -17,22 +17,7 @@ const SCENE: &str = r#"<scene version="3.0.0">
   <emitter type="point" id="lamp"><point name="position" value="1 -1 2"/></emitter>
 </scene>"#;
 
-const JOB: &str = r#"scene = "scene.xml"
-[estimator]
-spp = 64
-[[parameter]]
-name = "gray"
-[[parameter.effect]]
-target = "gray"
-property = "reflectance"
-add = [1.0, 1.0, 1.0]
-[[parameter]]
-name = "lamp-x"
-value = 0.1
-[[parameter.effect]]
-target = "lamp"
-translate = [1.0, 0.0, 0.0]
-"#;
+const JOB: &str = gray_and_lamp!("64", "value = 0.1\n");
 
 /// A folder with a scene and a job.
 fn folder() -> Folder {

@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use crate::common::{Folder, expect};
+use crate::common::{Folder, expect, gray_and_lamp};
 
 const SCENE: &str = r#"<scene version="3.0.0">
   <integrator type="path"><integer name="max_depth" value="2"/></integrator>
@@ -21,21 +21,7 @@ const SCENE: &str = r#"<scene version="3.0.0">
   <emitter type="point" id="lamp"><point name="position" value="0.5 -0.5 1"/></emitter>
 </scene>"#;
 
-const JOB: &str = r#"scene = "scene.xml"
-[estimator]
-spp = 16
-[[parameter]]
-name = "gray"
-[[parameter.effect]]
-target = "gray"
-property = "reflectance"
-add = [1.0, 1.0, 1.0]
-[[parameter]]
-name = "lamp-x"
-[[parameter.effect]]
-target = "lamp"
-translate = [1.0, 0.0, 0.0]
-"#;
+const JOB: &str = gray_and_lamp!("16", "");
 
 const FIT: &str = r#"
 [optimize]

@@ -240,9 +240,9 @@ impl EdgeTable {
         Ok(Some(Self { edges: kept.into_iter().map(|(e, _)| e).collect(), table }))
     }
 
-    /// Weight of an edge for directions drawn on it: its length times the angle that is free.
+    /// Weight of an edge for directions drawn on it: its length times its silhouette angle.
     pub(crate) fn general_weight(e: &Edge) -> f64 {
-        e.wedge.length * if e.is_intersection() { PI } else { e.wedge.free_angle() }
+        e.wedge.length * if e.is_intersection() { PI } else { e.wedge.silhouette_angle() }
     }
 
     pub(crate) fn sample(&self, rng: &mut Rng) -> EdgePoint<'_> {

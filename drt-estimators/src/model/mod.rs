@@ -7,6 +7,7 @@ pub mod emitter;
 mod emitter_overlap;
 pub(crate) mod error;
 pub mod filter;
+mod gradient;
 pub(crate) mod image_comparison;
 pub(crate) mod plan;
 pub(crate) mod rendering;

@@ -49,7 +49,7 @@ impl Wedge {
     /// Angle in radians through which planes that graze the edge turn: half a turn without what is
     /// [between](Self::between) the faces.
     #[must_use]
-    pub fn free_angle(&self) -> f64 {
+    pub fn silhouette_angle(&self) -> f64 {
         PI - self.between
     }
 
@@ -92,7 +92,7 @@ impl Wedge {
     #[must_use]
     pub fn sample_direction(&self, u: [f64; 2]) -> (Vec3, f64) {
         let theta = warp::sin_squared_polar(u[0]);
-        let free = self.free_angle();
+        let free = self.silhouette_angle();
         let u = 2.0 * u[1];
         let azimuth =
             if u < 1.0 { self.between + u * free } else { PI + self.between + (u - 1.0) * free };
@@ -103,7 +103,7 @@ impl Wedge {
     }
 
     fn inverse_density(&self, theta: f64, sin: f64) -> f64 {
-        2.0 * self.free_angle() * sin / warp::sin_squared_polar_pdf(theta)
+        2.0 * self.silhouette_angle() * sin / warp::sin_squared_polar_pdf(theta)
     }
 
     /// Density per steradian of [`Self::sample_direction`] at a direction that grazes the edge.
@@ -218,7 +218,7 @@ mod tests {
     }
 
     /// Sampled directions graze the edge and have the density they claim: ∫ sin θ cos² θ dω over those that graze
-    /// it is π/4 times the free angle.
+    /// it is π/4 times the silhouette angle.
     #[test]
     fn directions_are_those_that_graze() {
         let mut rng = Rng::new(7, 0, 0);
@@ -235,7 +235,7 @@ mod tests {
                 squares += term * term;
             }
             let n = f64::from(n);
-            let (mean, expected) = (sum / n, 0.25 * PI * e.free_angle());
+            let (mean, expected) = (sum / n, 0.25 * PI * e.silhouette_angle());
             let error = Real::sqrt((squares / n - mean * mean) / n);
             assert!((mean - expected).abs() < 4.0 * error, "{mean} ± {error}, not {expected}");
             assert!(error < 0.01 * expected);

@@ -30,7 +30,7 @@ fn a_cube_has_twelve_ridges_at_any_scale_and_place() {
             assert_eq!(count(&t, EdgeClass::Flat), 6, "scale {scale}");
             for e in &t.edges {
                 let expected = if e.class == EdgeClass::Flat { PI } else { 1.5 * PI };
-                assert!((e.free_angle - expected).abs() < 1e-9);
+                assert!((e.widest_angle - expected).abs() < 1e-9);
                 assert_eq!(e.can_be_silhouette(), e.class == EdgeClass::Convex);
             }
         }
@@ -108,7 +108,7 @@ fn books_of_many_pages() {
     let (_, e) = spine(&[0.0, 0.8, 1.2, 0.3]);
     assert_eq!(e.class, EdgeClass::NonManifold);
     assert_eq!(e.faces, [0, 2]);
-    assert!((e.free_angle - (2.0 * PI - 1.2)).abs() < 1e-12 && e.can_be_silhouette());
+    assert!((e.widest_angle - (2.0 * PI - 1.2)).abs() < 1e-12 && e.can_be_silhouette());
     // Pages all round hide each other from everywhere.
     let (_, e) = spine(&[0.0, 2.0, 4.0]);
     assert!(e.class == EdgeClass::NonManifold && !e.can_be_silhouette());
@@ -116,7 +116,7 @@ fn books_of_many_pages() {
     let (_, e) = spine(&[0.0, FRAC_PI_2, PI]);
     assert!(!e.can_be_silhouette());
     let (_, e) = spine(&[0.5, 0.5]);
-    assert!((e.free_angle - 2.0 * PI).abs() < 1e-12 && e.can_be_silhouette());
+    assert!((e.widest_angle - 2.0 * PI).abs() < 1e-12 && e.can_be_silhouette());
 }
 
 /// The two-face test on the pair is the all-faces test, for every direction.
@@ -139,7 +139,7 @@ fn the_pair_stands_for_all_pages() {
             assert_eq!(one_sided, pair && e.can_be_silhouette());
             grazing += i32::from(one_sided);
         }
-        let expected = 360.0 * f64::max(0.0, (e.free_angle - PI) / PI);
+        let expected = 360.0 * f64::max(0.0, (e.widest_angle - PI) / PI);
         assert!((f64::from(grazing) - expected).abs() < 6.0, "{grazing} {expected}");
     }
 }

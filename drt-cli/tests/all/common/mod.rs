@@ -5,6 +5,24 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU32, Ordering};
 
+/// The text of a job with samples per pixel, whose parameters are the reflectance of the scene's `gray` and the place of its `lamp`; of
+/// the latter with a line more.
+macro_rules! gray_and_lamp {
+    ($spp:literal, $lamp:literal) => {
+        concat!(
+            "scene = \"scene.xml\"\n[estimator]\nspp = ",
+            $spp,
+            "\n[[parameter]]\nname = \"gray\"\n[[parameter.effect]]\ntarget = \"gray\"\n",
+            "property = \"reflectance\"\nadd = [1.0, 1.0, 1.0]\n",
+            "[[parameter]]\nname = \"lamp-x\"\n",
+            $lamp,
+            "[[parameter.effect]]\ntarget = \"lamp\"\ntranslate = [1.0, 0.0, 0.0]\n",
+        )
+    };
+}
+
+pub(crate) use gray_and_lamp;
+
 /// A folder of its own for a test, removed at its end.
 pub struct Folder(PathBuf);
 

@@ -3,8 +3,10 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
+use crate::derivative::adjoint::propagation::Propagated;
+use crate::derivative::adjoint::segment::{Far, Stretch};
 use crate::derivative::adjoint::turning::RayMotion;
-use crate::derivative::adjoint::{Differentiator, Far, Propagated, Stretch, turn};
+use crate::derivative::adjoint::{Differentiator, turn};
 use crate::derivative::sensitivity::{ActiveInputs, AdjointSink, SurfaceAdjoint, TextureUse};
 use crate::derivative::velocity::{RayTurn, TurningRay, VelocityField, VertexVelocity};
 use crate::model::emitter::{Emitter, EmitterGradient};

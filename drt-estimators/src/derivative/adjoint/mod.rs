@@ -16,10 +16,12 @@
 //!
 //! Where paths from the camera are [connected](light) with light's, several nodes have the same children.
 //!
-//! Vertices move by a [`velocity`](super::velocity) field; what that blends for a vertex says what its
+//! A node of the walk is swept in two steps: what it [receives](Differentiator::sweep), and the segment by which the walk
+//! [arrived](arrival) there. Vertices move by a [`velocity`](super::velocity) field; what that blends for a vertex says what its
 //! sensitivities are [propagated](propagation) to.
 
 mod antithetic;
+mod arrival;
 mod connections;
 mod emission;
 mod emitters;
@@ -37,17 +39,15 @@ use drt_medium::Coefficients;
 
 use crate::derivative::adjoint::antithetic::Apart;
 use crate::derivative::adjoint::emitters::{area, surroundings};
-use crate::derivative::adjoint::propagation::Propagated;
-use crate::derivative::adjoint::segment::{Far, Stretch};
 use crate::derivative::adjoint::turning::RayMotion;
 use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, Scaled, SurfaceAdjoint, TextureUse,
 };
-use crate::derivative::velocity::{Auxiliary, Probe, RayTurn, TurnPart, TurnParts, VertexVelocity};
+use crate::derivative::velocity::{Auxiliary, Probe, TurnPart, TurnParts, VertexVelocity};
 use crate::model::sensor::{Sensor, SensorGradient};
 use crate::model::surface::{BsdfParams, by_corners};
-use crate::sampling::record::{Role, Scattered};
+use crate::sampling::record::Role;
 use crate::sampling::streams::VELOCITY_STREAM;
 use crate::sampling::trace::Endpoint;
 use crate::world::World;
@@ -270,179 +270,6 @@ impl<'w> Differentiator<'w> {
             }
         };
         self.arrive(path, k, &path.motion(k), received, here, before, sink);
-    }
-
-    /// The segment from the parent to node `k`, and the parent's scattering into it, for what is `received` there by a
-    /// motion of the node; `here` is what it has collected, `before` what nodes before it have.
-    #[allow(clippy::too_many_arguments)]
-    fn arrive<S: AdjointSink>(
-        &mut self,
-        recorded: &RecordedPath<'_>,
-        k: usize,
-        motion: &NodeMotion<'_>,
-        received: Rgb,
-        here: &mut SurfaceAdjoint,
-        before: &mut [SurfaceAdjoint],
-        sink: &mut S,
-    ) {
-        let world = self.world;
-        let RecordedPath { record, velocities, .. } = *recorded;
-        let Some(arrival) = &record.nodes[k].arrival else { return };
-        let p = arrival.parent as usize;
-        let value = arrival.arrival * received;
-        let joined = match record.nodes[k].role {
-            Role::Joined(leaving) => Some(leaving),
-            _ => None,
-        };
-        match joined {
-            Some(Scattered { value: f, inv_pdf }) => self.locals[p].joined += f * inv_pdf * value,
-            None => self.locals[p].children += value,
-        }
-        self.locals[k].incoming += value;
-        let NodeMotion { velocity, auxiliary, ray: turn_of_ray } = *motion;
-        let vertex = record.nodes[k].vertex();
-        // Parallel rays start on the film, at a point that moves with what it sees, as far as that is matter's.
-        let parallel = p == 0 && world.camera.is_orthographic();
-        let fixed = parallel && vertex.is_none();
-        let phi = if fixed { 0.0 } else { velocity.blend.weight };
-        if value.is_zero() {
-            let Local { matter, turn, .. } = self.locals[k];
-            let nothing = here.is_zero() && [matter, turn] == [RgbVec::ZERO; 2];
-            // What nothing comes back from may still move what comes before.
-            if nothing || (phi == 1.0 && turn_of_ray.is_none()) {
-                if let Some(v) = vertex {
-                    here.u += matter;
-                    send(v, here, sink);
-                }
-                return;
-            }
-        }
-        let weight = arrival.throughput * received;
-        let parent = &record.nodes[p];
-        let eye = world.eye_at(record.origin);
-        let (from, theta) = match &parent.arrival {
-            None => (&eye, Rgb::ONE),
-            Some(a) => match &a.end {
-                Endpoint::Surface(v) => (v, a.throughput),
-                Endpoint::Volume(v, c) => (v, a.throughput * c.sigma_s()),
-                Endpoint::Environment => return,
-            },
-        };
-        let Some((there, before)) = before[..=p].split_last_mut() else { return };
-        let (near_moves, far_moves) = (velocities.moves(p), velocity.moves);
-        let ray_moves = near_moves || turn_of_ray.is_some();
-        // As far as this is not the camera's importance.
-        let mut turned_wholly = self.locals[k].turn;
-        // The scattering function of the parent sees the two ends of the segment as a direction; on a light path
-        // it depends on who looks.
-        let of_light = matches!(record.nodes[k].role, Role::OfLight { .. });
-        if let Some(behind) = self.behind(recorded, p).filter(|_| !of_light) {
-            let (wi, inv_pdf, paired) = match joined {
-                Some(leaving) => (arrival.dir, leaving.inv_pdf, None),
-                None => (parent.wi, parent.inv_pdf, Some(Apart::of(recorded, p))),
-            };
-            let adjoint = theta * value * inv_pdf;
-            let wo = parent.arrival.as_ref().map_or(Vec3::ZERO, |a| -a.dir);
-            let moving = far_moves || near_moves || velocities.moves(behind.parent);
-            let behind = Some(behind);
-            let to_wi =
-                self.scattering(from, wo, wi, paired, adjoint, behind, moving, there, before, sink);
-            if let (Some(to_wi), Some(_)) = (to_wi, vertex) {
-                let g = turn(&(to_wi * phi), wi, arrival.distance);
-                there.u -= g;
-                self.locals[k].matter += g;
-            }
-            turned_wholly += to_wi.unwrap_or(RgbVec::ZERO);
-        }
-        let path = Stretch {
-            start: from.x,
-            dir: arrival.dir,
-            length: arrival.distance,
-            medium: arrival.start_medium,
-            crossings: &record.crossings[record.nodes[k].crossings.clone()],
-        };
-        let seen = (p == 0).then_some(parent.value);
-        let mut turned = RgbVec::ZERO;
-        match vertex {
-            // No end moves; what is between may.
-            _ if !(near_moves || far_moves || ray_moves) => {
-                self.segment(&path, Far::Direction, false, weight, there, sink);
-            }
-            None => {
-                if let Some(filter) = seen.filter(|_| sink.active().sensor) {
-                    self.seen(None, arrival.dir, value, filter, phi, sink.active());
-                }
-                let mut along = self.segment(&path, Far::Direction, ray_moves, weight, there, sink);
-                // Only rays of the camera, and those that turn with edges, come to see another part of it.
-                if (p == 0 || turn_of_ray.is_some())
-                    && let Some(environment) = world.lights.environment()
-                {
-                    let each = arrival.throughput * arrival.emission_weight;
-                    along += environment.gradient(arrival.dir) * each;
-                }
-                turned_wholly += along;
-                turned = along * (1.0 - phi);
-            }
-            Some(v) => {
-                let mut matter = self.locals[k].matter;
-                let slides = !velocity.auxiliary.is_empty() || moves(v, sink.active());
-                let view = seen.filter(|_| phi > 0.0 && (sink.active().sensor || slides));
-                let by_place = view.map_or(RgbVec::ZERO, |filter| {
-                    self.seen(vertex, arrival.dir, value, filter, phi, sink.active()) * phi
-                });
-                if turn_of_ray.is_some() {
-                    turned_wholly += self.landing(&path, v, here, weight);
-                }
-                let mut film = SurfaceAdjoint::default();
-                let start = if parallel { &mut film } else { &mut *there };
-                if phi == 1.0 {
-                    here.u += by_place;
-                    let moving = ray_moves || moves(v, sink.active());
-                    turned_wholly +=
-                        self.segment(&path, Far::Vertex(v, here), moving, weight, start, sink);
-                    if parallel {
-                        here.u += self.by_film(v, film.u, sink.active());
-                    }
-                } else {
-                    let free = weight * (1.0 - phi);
-                    turned = self.segment(&path, Far::Direction, ray_moves, free, there, sink);
-                    turned_wholly += turned;
-                    if phi > 0.0 {
-                        let part = weight * phi;
-                        let start = if parallel { &mut film } else { &mut *there };
-                        let mut fixed = SurfaceAdjoint::default();
-                        let along =
-                            self.material_end(&path, v, ray_moves, part, &mut fixed, start, sink);
-                        turned_wholly += along;
-                        fixed.u += by_place + self.by_film(v, film.u, sink.active());
-                        matter += fixed.u;
-                        here.n += fixed.n;
-                        here.j += fixed.j;
-                    }
-                }
-                let end = Propagated { vertex: v, velocity, auxiliary, weight, matter };
-                let back = self.propagate(&path, &end, here, there, sink);
-                turned_wholly += back.by_surfaces;
-                turned += back.by_surfaces + back.by_ray;
-            }
-        }
-        if let Some(ray) = turn_of_ray.filter(|_| !self.edges_at_rest) {
-            let RayTurn { weight: share, gradient, .. } = *ray.turn;
-            let mut all = turned_wholly;
-            if let Some(filter) = seen {
-                // A direction has no parallax.
-                all += self.seen(None, arrival.dir, value, filter, share, sink.active());
-                // What the camera's image point does is replaced.
-                turned -= turned_wholly * share + weight.outer(gradient);
-            }
-            there.u -= ray.send(arrival.dir, &all, weight, sink);
-        }
-        if p == 0 {
-            self.turn += turned;
-        }
-        if parallel {
-            self.origin += core::mem::take(&mut there.u);
-        }
     }
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions

@@ -9,7 +9,8 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
-use crate::derivative::adjoint::{Differentiator, Far, Stretch, moves, send};
+use crate::derivative::adjoint::segment::{Far, Stretch};
+use crate::derivative::adjoint::{Differentiator, moves, send};
 use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint, VelocityTerm};
 use crate::derivative::velocity::{Auxiliary, Moved, VertexVelocity};

@@ -51,18 +51,17 @@ impl TurningEdges {
         let (all, moving) = (tree(&|_| true), tree(&|edge| edge.moves));
         let shapes = &world.scene.shapes;
         let mut faceted = alloc::vec![false; shapes.len()];
-        let mut emits_alike = alloc::vec![false; shapes.len()];
         for shape in list.iter().filter_map(|edge| edge.within.filter(|_| edge.facets)) {
             faceted[shape as usize] = true;
         }
+        let mut emits_alike = alloc::vec![None; shapes.len()];
         for edge in &edges.list {
             let Some(shape) = edges.shape_of_faces(world, edge) else { continue };
-            emits_alike[shape as usize] = world.emits_evenly(shape);
+            let alike = &mut emits_alike[shape as usize];
+            *alike.get_or_insert_with(|| world.emits_evenly(shape)) &=
+                edges.faces_one_way(world, edge);
         }
-        for edge in &edges.list {
-            let Some(shape) = edges.shape_of_faces(world, edge) else { continue };
-            emits_alike[shape as usize] &= edges.faces_one_way(world, edge);
-        }
+        let emits_alike = emits_alike.into_iter().map(|alike| alike.unwrap_or(false)).collect();
         Self { list, all, moving, faceted, emits_alike }
     }
 

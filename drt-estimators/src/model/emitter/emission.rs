@@ -1,8 +1,7 @@
-use core::ops::AddAssign;
-
 use drt_math::{Rgb, RgbVec, Vec3, fm};
 
 use crate::model::emitter::Emitter;
+use crate::model::gradient::dual_vectors;
 
 /// What an emitter sends in a direction, and how it changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,58 +168,12 @@ impl EmitterTangent {
     pub fn moves(&self) -> bool {
         self.position != Vec3::ZERO || self.direction != Vec3::ZERO
     }
-
-    /// True when nothing changes.
-    #[must_use]
-    pub fn is_zero(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
-impl EmitterGradient {
-    /// A multiple.
-    #[inline]
-    #[must_use]
-    pub fn scaled(&self, w: f64) -> Self {
-        Self {
-            strength: self.strength * w,
-            position: self.position * w,
-            direction: self.direction * w,
-            cutoff_angle: self.cutoff_angle * w,
-            beam_width: self.beam_width * w,
-            rotation: self.rotation * w,
-        }
-    }
-
-    /// The derivative along a tangent.
-    #[inline]
-    #[must_use]
-    pub fn dot(&self, t: &EmitterTangent) -> f64 {
-        self.strength.dot(t.strength)
-            + self.position.dot(t.position)
-            + self.direction.dot(t.direction)
-            + self.cutoff_angle * t.cutoff_angle
-            + self.beam_width * t.beam_width
-            + self.rotation.dot(t.rotation)
-    }
-}
-
-macro_rules! sum {
-    ($($type:ident)*) => {$(
-        impl AddAssign for $type {
-            #[inline]
-            fn add_assign(&mut self, o: Self) {
-                self.strength += o.strength;
-                self.position += o.position;
-                self.direction += o.direction;
-                self.cutoff_angle += o.cutoff_angle;
-                self.beam_width += o.beam_width;
-                self.rotation += o.rotation;
-            }
-        }
-    )*};
-}
-sum! { EmitterTangent EmitterGradient }
+dual_vectors!(
+    EmitterGradient,
+    EmitterTangent { strength, position, direction, cutoff_angle, beam_width, rotation }
+);
 
 /// Angle between unit vectors, exact for small angles too.
 fn angle(a: Vec3, b: Vec3) -> f64 {

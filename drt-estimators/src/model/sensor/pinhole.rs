@@ -1,6 +1,6 @@
-use core::ops::AddAssign;
-
 use drt_math::{Real, Vec3};
+
+use crate::model::gradient::dual_vectors;
 
 /// Where a camera is and how it maps directions to pixels; generic, so that it can carry duals.
 ///
@@ -190,63 +190,16 @@ impl Pinhole {
     }
 }
 
-impl SensorTangent {
-    /// True when nothing changes.
-    #[must_use]
-    pub fn is_zero(&self) -> bool {
-        *self == Self::default()
+dual_vectors!(
+    SensorGradient,
+    SensorTangent {
+        position,
+        right,
+        up,
+        forward,
+        pixel_size,
+        principal,
+        aperture_radius,
+        focus_distance,
     }
-}
-
-impl SensorGradient {
-    /// A multiple.
-    #[inline]
-    #[must_use]
-    pub fn scaled(&self, w: f64) -> Self {
-        Self {
-            position: self.position * w,
-            right: self.right * w,
-            up: self.up * w,
-            forward: self.forward * w,
-            pixel_size: self.pixel_size * w,
-            principal: self.principal.map(|p| p * w),
-            aperture_radius: self.aperture_radius * w,
-            focus_distance: self.focus_distance * w,
-        }
-    }
-
-    /// The derivative along a tangent.
-    #[inline]
-    #[must_use]
-    pub fn dot(&self, t: &SensorTangent) -> f64 {
-        self.position.dot(t.position)
-            + self.right.dot(t.right)
-            + self.up.dot(t.up)
-            + self.forward.dot(t.forward)
-            + self.pixel_size * t.pixel_size
-            + self.principal[0] * t.principal[0]
-            + self.principal[1] * t.principal[1]
-            + self.aperture_radius * t.aperture_radius
-            + self.focus_distance * t.focus_distance
-    }
-}
-
-macro_rules! sum {
-    ($($type:ident)*) => {$(
-        impl AddAssign for $type {
-            #[inline]
-            fn add_assign(&mut self, o: Self) {
-                self.position += o.position;
-                self.right += o.right;
-                self.up += o.up;
-                self.forward += o.forward;
-                self.pixel_size += o.pixel_size;
-                self.principal[0] += o.principal[0];
-                self.principal[1] += o.principal[1];
-                self.aperture_radius += o.aperture_radius;
-                self.focus_distance += o.focus_distance;
-            }
-        }
-    )*};
-}
-sum! { SensorTangent SensorGradient }
+);

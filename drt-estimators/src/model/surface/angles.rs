@@ -43,6 +43,41 @@ pub(super) trait Isotropic: Model {
     fn by_angles<T: Real>(&self, numbers: impl Numbers<T>, a: &Angles<T>) -> Rgb<T>;
 }
 
+/// The methods by which a [`Model`] that is [`Isotropic`] answers: it depends on nothing but the normal, and its derivatives are those
+/// of dual numbers. The arguments are the properties that the value is differentiated by. A file that uses this imports the types that
+/// these methods have in [`Model`].
+macro_rules! scatters_by_angles {
+    ($($property:ident),+) => {
+        #[inline]
+        fn dependence(&self) -> Dependence {
+            Dependence::Normal
+        }
+
+        #[inline]
+        fn differentiated(&self) -> PropertySet {
+            const { PropertySet::new(&[$(Property::$property),+]) }
+        }
+
+        #[inline]
+        fn value<T: Real>(
+            &self,
+            numbers: impl Numbers<T>,
+            _: At<'_>,
+            [wo, wi, n]: [Vec3<T>; 3],
+        ) -> Rgb<T> {
+            self.by_angles(numbers, &Angles::new(wo, wi, n))
+        }
+
+        #[inline]
+        fn gradient(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+            use $crate::model::surface::angles::{ANGLES, by_angles};
+            by_angles::<{ ANGLES + [$(Property::$property),+].len() }>(self, [wo, wi, n])
+        }
+    };
+}
+
+pub(super) use scatters_by_angles;
+
 /// The lanes of the angles.
 pub(super) const ANGLES: usize = 3;
 

@@ -15,12 +15,10 @@ use drt_math::{Real, Rgb, Vec3, fm, vec3};
 
 use crate::model::surface::angles::Angles;
 use crate::model::surface::dielectric::Passage;
-use crate::model::surface::framed::{self, Framed};
+use crate::model::surface::framed::{Framed, scatters_in_frame};
 use crate::model::surface::lobes::widest;
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, LEAST_COS2, mirrored};
-use crate::model::surface::model::{
-    COORDINATES, Constants, Dependence, Flags, Model, Numbers, by_duals,
-};
+use crate::model::surface::model::{Constants, Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
 use crate::model::surface::{At, Bsdf, BsdfGradient, Given, RoughConductor, RoughDielectric};
@@ -175,11 +173,6 @@ impl Model for Anisotropic {
     }
 
     #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Frame
-    }
-
-    #[inline]
     fn differentiated(&self) -> PropertySet {
         let own = const { PropertySet::new(&[Property::AlphaU, Property::AlphaV]) };
         let even = const { PropertySet::new(&[Property::Alpha]) };
@@ -206,32 +199,7 @@ impl Model for Anisotropic {
         self.base.validate()
     }
 
-    #[inline(never)]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        at: At<'_>,
-        directions: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        framed::value(self, numbers, at, directions)
-    }
-
-    #[inline(never)]
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_duals::<{ COORDINATES + 5 }>(
-            self.differentiated(),
-            [wo, wi, n],
-            |numbers, directions| framed::value(self, numbers, at, directions),
-        )
-    }
-
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        framed::sample(self, at, from, n, u)
-    }
-
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        framed::pdf(self, at, from, to, n)
-    }
+    scatters_in_frame!(at most 5);
 
     /// As wide all around as where it is widest.
     fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {

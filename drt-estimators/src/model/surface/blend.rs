@@ -3,7 +3,7 @@ use drt_math::{Real, Rgb, RgbVec, Vec3};
 
 use crate::model::surface::choice::choose;
 use crate::model::surface::lobes::two_highest;
-use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
 use crate::model::surface::{
@@ -60,11 +60,6 @@ impl Model for Blend {
     fn flags(&self) -> Flags {
         let [a, b] = self.bsdfs.each_ref().map(Bsdf::flags);
         a.of_both(b)
-    }
-
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Point
     }
 
     /// Properties of its parts do not count: both parts may have the same one.

@@ -45,7 +45,7 @@ use crate::model::surface::coating::Coating;
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::lobes::{reflection, two_highest};
 use crate::model::surface::microfacet::mirrored;
-use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 use crate::model::surface::specular::same;
@@ -179,11 +179,6 @@ impl Model for Coated {
         let inner = self.bsdf.flags();
         let smooth = self.is_smooth() || inner.smooth;
         Flags { black: false, black_from_behind: false, smooth, ..inner }
-    }
-
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Point
     }
 
     fn differentiated(&self) -> PropertySet {

@@ -46,6 +46,16 @@ fn reflection_jacobian<T: Real>(h2: T) -> T {
     h2.squared() * 0.25
 }
 
+/// Checks the numbers of a metal but for its roughness.
+pub(super) fn check_metal(eta: Rgb, k: Rgb, reflectance: Rgb) -> Result<(), SurfaceError> {
+    nonnegative(Property::SpecularReflectance, reflectance)?;
+    nonnegative(Property::Eta, eta)?;
+    nonnegative(Property::K, k)?;
+    (eta + k).to_array().into_iter().try_for_each(|sum| {
+        in_range(Property::K, sum, sum > 0.0, "above 0 in channels where eta is 0")
+    })
+}
+
 impl RoughConductor {
     /// The value by [`Distribution::facets`] of any kind.
     #[inline(always)]
@@ -97,15 +107,7 @@ impl Model for RoughConductor {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: true,
-            transmissive: false,
-            smooth: false,
-            straight: false,
-            oriented: false,
-            differentiable: true,
-        }
+        Flags::REFLECTOR
     }
 
     #[inline]
@@ -137,13 +139,7 @@ impl Model for RoughConductor {
 
     fn validate(&self) -> Result<(), SurfaceError> {
         in_range(Property::Alpha, self.alpha, self.alpha >= LEAST_ALPHA, "at least 1e-4")?;
-        nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
-        nonnegative(Property::Eta, self.eta)?;
-        nonnegative(Property::K, self.k)?;
-        let indices = self.eta + self.k;
-        indices.to_array().into_iter().try_for_each(|sum| {
-            in_range(Property::K, sum, sum > 0.0, "above 0 in channels where eta is 0")
-        })
+        check_metal(self.eta, self.k, self.specular_reflectance)
     }
 
     #[inline]

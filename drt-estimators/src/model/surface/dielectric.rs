@@ -1,7 +1,7 @@
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3, fm};
 
-use crate::model::surface::angles::{ANGLES, Angles, Isotropic, by_angles};
+use crate::model::surface::angles::{Angles, Isotropic, scatters_by_angles};
 use crate::model::surface::facet::Facet;
 use crate::model::surface::fresnel::{dielectric_reflected, dielectric_transmitted};
 use crate::model::surface::lobes::{SeenFacet, reflection};
@@ -9,6 +9,7 @@ use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, mirrored, ref
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
+use crate::model::surface::smooth_dielectric::slot;
 use crate::model::surface::{At, BsdfGradient, Given};
 
 /// A rough interface between two transparent media: Walter et al. 2007, eq. 20 (reflection) and
@@ -211,41 +212,18 @@ impl Model for RoughDielectric {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: false,
-            transmissive: true,
-            smooth: false,
-            straight: false,
-            oriented: false,
-            differentiable: true,
-        }
+        Flags::INTERFACE
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Normal
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const {
-            PropertySet::new(&[
-                Property::SpecularReflectance,
-                Property::SpecularTransmittance,
-                Property::Alpha,
-                Property::Eta,
-            ])
-        }
-    }
+    scatters_by_angles!(SpecularReflectance, SpecularTransmittance, Alpha, Eta);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
             Property::Alpha => Some(Slot::Scalar(&mut self.alpha)),
-            Property::Eta => Some(Slot::Scalar(&mut self.eta)),
-            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
-            Property::SpecularTransmittance => Some(Slot::Color(&mut self.specular_transmittance)),
-            _ => None,
+            _ => {
+                let Self { eta, specular_reflectance, specular_transmittance, .. } = self;
+                slot(property, eta, specular_reflectance, specular_transmittance)
+            }
         }
     }
 
@@ -256,21 +234,6 @@ impl Model for RoughDielectric {
         in_range(Property::Eta, self.eta, allowed, "positive and not 1 (use a null BSDF there)")?;
         nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
         nonnegative(Property::SpecularTransmittance, self.specular_transmittance)
-    }
-
-    #[inline]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        _: At<'_>,
-        [wo, wi, n]: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        self.by_angles(numbers, &Angles::new(wo, wi, n))
-    }
-
-    #[inline]
-    fn gradient(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_angles::<{ ANGLES + 4 }>(self, [wo, wi, n])
     }
 
     #[inline]

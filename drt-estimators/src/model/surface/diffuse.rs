@@ -3,7 +3,7 @@ use core::f64::consts::FRAC_1_PI;
 use drt_geom::edges::Lobes;
 use drt_math::{Frame, Real, Rgb, Vec3, warp};
 
-use crate::model::surface::angles::{ANGLES, Angles, Isotropic, by_angles};
+use crate::model::surface::angles::{Angles, Isotropic, scatters_by_angles};
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, nonnegative};
@@ -40,26 +40,10 @@ impl Model for Diffuse {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: self.reflectance.is_zero(),
-            black_from_behind: true,
-            transmissive: false,
-            smooth: false,
-            straight: false,
-            oriented: false,
-            differentiable: true,
-        }
+        Flags { black: self.reflectance.is_zero(), ..Flags::REFLECTOR }
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Normal
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const { PropertySet::new(&[Property::Reflectance]) }
-    }
+    scatters_by_angles!(Reflectance);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
@@ -70,21 +54,6 @@ impl Model for Diffuse {
 
     fn validate(&self) -> Result<(), SurfaceError> {
         nonnegative(Property::Reflectance, self.reflectance)
-    }
-
-    #[inline]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        _: At<'_>,
-        [wo, wi, n]: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        self.by_angles(numbers, &Angles::new(wo, wi, n))
-    }
-
-    #[inline]
-    fn gradient(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_angles::<{ ANGLES + 1 }>(self, [wo, wi, n])
     }
 
     #[inline]

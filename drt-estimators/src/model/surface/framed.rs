@@ -28,6 +28,60 @@ pub(super) trait Framed: Model {
     fn density(&self, from: Vec3, to: Vec3) -> f64;
 }
 
+/// The methods by which a [`Model`] that is [`Framed`] answers: its derivatives are those of dual numbers. The arguments are the
+/// properties that the value is differentiated by; a model that finds them otherwise gives the largest number of them. A file that uses
+/// this imports the types that these methods have in [`Model`].
+macro_rules! scatters_in_frame {
+    ($($property:ident),*) => {
+        #[inline]
+        fn differentiated(&self) -> PropertySet {
+            const { PropertySet::new(&[$(Property::$property),*]) }
+        }
+
+        $crate::model::surface::framed::scatters_in_frame!(
+            at most <[Property]>::len(&[$(Property::$property),*])
+        );
+    };
+    (at most $properties:expr) => {
+        #[inline]
+        fn dependence(&self) -> Dependence {
+            Dependence::Frame
+        }
+
+        #[inline(never)]
+        fn value<T: Real>(
+            &self,
+            numbers: impl Numbers<T>,
+            at: At<'_>,
+            directions: [Vec3<T>; 3],
+        ) -> Rgb<T> {
+            $crate::model::surface::framed::value(self, numbers, at, directions)
+        }
+
+        #[inline(never)]
+        fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
+            use $crate::model::surface::model::{COORDINATES, by_duals};
+            by_duals::<{ COORDINATES + $properties }>(
+                self.differentiated(),
+                [wo, wi, n],
+                |numbers, directions| {
+                    $crate::model::surface::framed::value(self, numbers, at, directions)
+                },
+            )
+        }
+
+        fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+            $crate::model::surface::framed::sample(self, at, from, n, u)
+        }
+
+        fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
+            $crate::model::surface::framed::pdf(self, at, from, to, n)
+        }
+    };
+}
+
+pub(super) use scatters_in_frame;
+
 /// The value of a model in the frame that a point has.
 #[inline(always)]
 pub(super) fn value<T: Real>(

@@ -1,7 +1,7 @@
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3};
 
-use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::principled::ends_of;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
@@ -48,11 +48,6 @@ impl Model for Mask {
     #[inline(never)]
     fn flags(&self) -> Flags {
         Flags { black: false, straight: true, differentiable: false, ..self.bsdf.flags() }
-    }
-
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Point
     }
 
     fn differentiated(&self) -> PropertySet {

@@ -42,12 +42,12 @@ use core::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Real, Rgb, Rng, Vec3, fm, vec3};
 
-use crate::model::surface::framed::{self, Framed};
+use crate::model::surface::framed::{Framed, scatters_in_frame};
 use crate::model::surface::lobes::reflection;
 use crate::model::surface::measured::marginal2d::{Grid2d, Marginal2d, Mix};
 pub use crate::model::surface::measured::tables::{MeasuredError, MeasuredTables, Tensor};
 use crate::model::surface::microfacet::mirrored;
-use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
 use crate::model::surface::{At, BsdfGradient, Given};
@@ -426,26 +426,11 @@ impl Model for Arc<Measured> {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: true,
-            transmissive: false,
-            smooth: false,
-            straight: false,
-            oriented: self.oriented,
-            differentiable: self.continuous,
-        }
+        let (oriented, differentiable) = (self.oriented, self.continuous);
+        Flags { oriented, differentiable, ..Flags::REFLECTOR }
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Frame
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        PropertySet::NONE
-    }
+    scatters_in_frame!();
 
     fn slot(&mut self, _: Property) -> Option<Slot<'_>> {
         None
@@ -453,31 +438,6 @@ impl Model for Arc<Measured> {
 
     fn validate(&self) -> Result<(), SurfaceError> {
         Ok(())
-    }
-
-    #[inline(never)]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        at: At<'_>,
-        directions: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        framed::value(self, numbers, at, directions)
-    }
-
-    #[inline(never)]
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_duals::<COORDINATES>(self.differentiated(), [wo, wi, n], |numbers, directions| {
-            framed::value(self, numbers, at, directions)
-        })
-    }
-
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        framed::sample(self, at, from, n, u)
-    }
-
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        framed::pdf(self, at, from, to, n)
     }
 
     fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {

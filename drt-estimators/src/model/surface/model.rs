@@ -93,7 +93,8 @@ pub(super) enum Dependence {
     Point,
 }
 
-/// What transport asks of a BSDF before it samples one. A model states every field.
+/// What transport asks of a BSDF before it samples one. A model that is not made of others starts from [`Flags::REFLECTOR`] or
+/// [`Flags::INTERFACE`] and states where it differs; `tests/flags.rs` compares what it answers with its values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Flags {
     /// Nothing is scattered, as of now.
@@ -114,6 +115,21 @@ pub(super) struct Flags {
 }
 
 impl Flags {
+    /// The answers of a rough reflector, alike in all directions about its normal and black from behind.
+    pub(super) const REFLECTOR: Self = Self {
+        black: false,
+        black_from_behind: true,
+        transmissive: false,
+        smooth: false,
+        straight: false,
+        oriented: false,
+        differentiable: true,
+    };
+
+    /// The answers of a rough surface that scatters light on both of its sides and through it.
+    pub(super) const INTERFACE: Self =
+        Self { black_from_behind: false, transmissive: true, ..Self::REFLECTOR };
+
     /// What is made of two BSDFs is black where both are, and the rest where either is.
     pub(super) fn of_both(self, other: Self) -> Self {
         Self {
@@ -135,7 +151,12 @@ pub(super) trait Model {
 
     fn flags(&self) -> Flags;
 
-    fn dependence(&self) -> Dependence;
+    /// What the value depends on besides directions. A model that knows nothing better answers that its point decides, which is never
+    /// wrong.
+    #[inline]
+    fn dependence(&self) -> Dependence {
+        Dependence::Point
+    }
 
     /// The properties that its value is differentiated by.
     fn differentiated(&self) -> PropertySet;

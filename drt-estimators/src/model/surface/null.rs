@@ -16,16 +16,8 @@ impl Model for NoSurface {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: true,
-            // Light crosses it from there.
-            black_from_behind: false,
-            transmissive: false,
-            smooth: false,
-            straight: false,
-            oriented: false,
-            differentiable: true,
-        }
+        // Light crosses it from behind.
+        Flags { black: true, black_from_behind: false, ..Flags::REFLECTOR }
     }
 
     #[inline]

@@ -2,7 +2,7 @@ use drt_geom::Mesh;
 use drt_geom::edges::Lobes;
 use drt_math::{Dual, Frame, Real, Rgb, RgbVec, Vec3, vec3};
 
-use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
 use crate::model::surface::shading_frame::{by_coordinates, is_front, shading_frame};
@@ -161,11 +161,6 @@ impl Model for Perturbed {
     #[inline(never)]
     fn flags(&self) -> Flags {
         Flags { oriented: true, differentiable: false, ..self.bsdf.flags() }
-    }
-
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Point
     }
 
     fn differentiated(&self) -> PropertySet {

@@ -3,7 +3,7 @@ use core::f64::consts::{FRAC_1_PI, PI};
 use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Frame, Real, Rgb, Vec3, fm, vec3, warp};
 
-use crate::model::surface::angles::{ANGLES, Angles, Isotropic, by_angles};
+use crate::model::surface::angles::{Angles, Isotropic, scatters_by_angles};
 use crate::model::surface::microfacet::mirrored;
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
@@ -83,32 +83,10 @@ impl Model for Phong {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: true,
-            transmissive: false,
-            smooth: false,
-            straight: false,
-            oriented: false,
-            differentiable: true,
-        }
+        Flags::REFLECTOR
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Normal
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const {
-            PropertySet::new(&[
-                Property::Reflectance,
-                Property::SpecularReflectance,
-                Property::Exponent,
-            ])
-        }
-    }
+    scatters_by_angles!(Reflectance, SpecularReflectance, Exponent);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
@@ -126,29 +104,8 @@ impl Model for Phong {
     }
 
     #[inline]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        _: At<'_>,
-        [wo, wi, n]: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        self.by_angles(numbers, &Angles::new(wo, wi, n))
-    }
-
-    #[inline]
-    fn gradient(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_angles::<{ ANGLES + 3 }>(self, [wo, wi, n])
-    }
-
-    #[inline]
-    fn sample(
-        &self,
-        _: At<'_>,
-        from: Vec3,
-        n: Vec3,
-        [u, v, choice]: [f64; 3],
-        _: Given,
-    ) -> Option<Vec3> {
+    fn sample(&self, _: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
+        let [u, v, choice] = u;
         let cos_from = n.dot(from);
         if cos_from <= 0.0 {
             return None;

@@ -3,7 +3,7 @@ use core::f64::consts::FRAC_1_PI;
 use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Frame, Real, Rgb, Vec3, warp};
 
-use crate::model::surface::angles::{ANGLES, Angles, Isotropic, by_angles};
+use crate::model::surface::angles::{Angles, Isotropic, scatters_by_angles};
 use crate::model::surface::coating::Coating;
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::lobes::reflection;
@@ -99,26 +99,10 @@ impl Model for Plastic {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: true,
-            transmissive: false,
-            smooth: self.is_smooth(),
-            straight: false,
-            oriented: false,
-            differentiable: true,
-        }
+        Flags { smooth: self.is_smooth(), ..Flags::REFLECTOR }
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Normal
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const { PropertySet::new(&[Property::Reflectance, Property::SpecularReflectance]) }
-    }
+    scatters_by_angles!(Reflectance, SpecularReflectance);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
@@ -132,21 +116,6 @@ impl Model for Plastic {
         self.coating.validate()?;
         nonnegative(Property::Reflectance, self.reflectance)?;
         nonnegative(Property::SpecularReflectance, self.specular_reflectance)
-    }
-
-    #[inline]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        _: At<'_>,
-        [wo, wi, n]: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        self.by_angles(numbers, &Angles::new(wo, wi, n))
-    }
-
-    #[inline]
-    fn gradient(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_angles::<{ ANGLES + 2 }>(self, [wo, wi, n])
     }
 
     #[inline]

@@ -21,11 +21,11 @@ use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3, fm, vec3, warp};
 
 use crate::model::surface::anisotropic::StretchedFacets;
-use crate::model::surface::framed::{self, Framed};
+use crate::model::surface::framed::{Framed, scatters_in_frame};
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::lobes::{SHEEN, widest};
 use crate::model::surface::microfacet::{Distribution, LEAST_COS2, mirrored, refracted};
-use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, part};
 use crate::model::surface::{At, BsdfGradient, Given, RoughDielectric, Textured};
@@ -243,6 +243,22 @@ struct Shares {
 }
 
 impl Principled {
+    /// Its numbers from 0 to 1.
+    fn unit_numbers(&mut self) -> [(Property, &mut f64); 10] {
+        [
+            (Property::Roughness, &mut self.roughness),
+            (Property::Anisotropic, &mut self.anisotropic),
+            (Property::Metallic, &mut self.metallic),
+            (Property::SpecTrans, &mut self.spec_trans),
+            (Property::SpecTint, &mut self.spec_tint),
+            (Property::Sheen, &mut self.sheen),
+            (Property::SheenTint, &mut self.sheen_tint),
+            (Property::Flatness, &mut self.flatness),
+            (Property::Clearcoat, &mut self.clearcoat),
+            (Property::ClearcoatGloss, &mut self.clearcoat_gloss),
+        ]
+    }
+
     /// The index of refraction that artists know as `specular`, which is 0.08 times the reflectance at normal incidence.
     #[must_use]
     pub fn index_of(specular: f64) -> f64 {
@@ -427,53 +443,21 @@ impl Model for Principled {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: false,
-            transmissive: self.spec_trans > 0.0,
-            smooth: false,
-            straight: false,
-            oriented: self.anisotropic != 0.0,
-            differentiable: true,
-        }
+        let (transmissive, oriented) = (self.spec_trans > 0.0, self.anisotropic != 0.0);
+        Flags { transmissive, oriented, ..Flags::INTERFACE }
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Frame
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const {
-            PropertySet::new(&[
-                Property::BaseColor,
-                Property::Roughness,
-                Property::Metallic,
-                Property::SpecTrans,
-                Property::Eta,
-                Property::Sheen,
-                Property::Clearcoat,
-            ])
-        }
-    }
+    scatters_in_frame!(BaseColor, Roughness, Metallic, SpecTrans, Eta, Sheen, Clearcoat);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        Some(Slot::Scalar(match property {
-            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
-            Property::Roughness => &mut self.roughness,
-            Property::Anisotropic => &mut self.anisotropic,
-            Property::Metallic => &mut self.metallic,
-            Property::SpecTrans => &mut self.spec_trans,
-            Property::Eta => &mut self.eta,
-            Property::SpecTint => &mut self.spec_tint,
-            Property::Sheen => &mut self.sheen,
-            Property::SheenTint => &mut self.sheen_tint,
-            Property::Flatness => &mut self.flatness,
-            Property::Clearcoat => &mut self.clearcoat,
-            Property::ClearcoatGloss => &mut self.clearcoat_gloss,
-            _ => return None,
-        }))
+        match property {
+            Property::BaseColor => Some(Slot::Color(&mut self.base_color)),
+            Property::Eta => Some(Slot::Scalar(&mut self.eta)),
+            _ => {
+                let mut numbers = self.unit_numbers().into_iter();
+                numbers.find(|(p, _)| *p == property).map(|(_, value)| Slot::Scalar(value))
+            }
+        }
     }
 
     fn validate(&self) -> Result<(), SurfaceError> {
@@ -481,19 +465,8 @@ impl Model for Principled {
         let contrast = self.spec_trans == 0.0 || (self.eta - 1.0).abs() >= 1e-6;
         let allowed = self.eta > 0.0 && contrast;
         in_range(Property::Eta, self.eta, allowed, "positive, and not 1 where light goes through")?;
-        let parts = [
-            (Property::Roughness, self.roughness),
-            (Property::Anisotropic, self.anisotropic),
-            (Property::Metallic, self.metallic),
-            (Property::SpecTrans, self.spec_trans),
-            (Property::SpecTint, self.spec_tint),
-            (Property::Sheen, self.sheen),
-            (Property::SheenTint, self.sheen_tint),
-            (Property::Flatness, self.flatness),
-            (Property::Clearcoat, self.clearcoat),
-            (Property::ClearcoatGloss, self.clearcoat_gloss),
-        ];
-        parts.into_iter().try_for_each(|(property, value)| part(property, value))
+        let mut own = *self;
+        own.unit_numbers().into_iter().try_for_each(|(property, value)| part(property, *value))
     }
 
     fn undifferentiated(
@@ -520,33 +493,6 @@ impl Model for Principled {
             }
             _ => None,
         }
-    }
-
-    #[inline(never)]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        at: At<'_>,
-        directions: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        framed::value(self, numbers, at, directions)
-    }
-
-    #[inline(never)]
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_duals::<{ COORDINATES + 7 }>(
-            self.differentiated(),
-            [wo, wi, n],
-            |numbers, directions| framed::value(self, numbers, at, directions),
-        )
-    }
-
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        framed::sample(self, at, from, n, u)
-    }
-
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        framed::pdf(self, at, from, to, n)
     }
 
     fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {

@@ -16,11 +16,11 @@ use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Real, Rgb, Vec3, vec3, warp};
 
 use crate::model::surface::anisotropic::StretchedFacets;
-use crate::model::surface::framed::{self, Framed};
+use crate::model::surface::framed::{Framed, scatters_in_frame};
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::lobes::{SHEEN, reflection, widest};
 use crate::model::surface::microfacet::{LEAST_COS2, mirrored};
-use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::principled::{
     NOTHING_DRAWN, TINTED, check_colour, diffuse_lobe, ends_of, grazing, lerp, normal_reflectance,
@@ -130,6 +130,19 @@ impl<T: Real> PrincipledThin<T> {
 }
 
 impl PrincipledThin {
+    /// Its numbers from 0 to 1.
+    fn unit_numbers(&mut self) -> [(Property, &mut f64); 7] {
+        [
+            (Property::Roughness, &mut self.roughness),
+            (Property::Anisotropic, &mut self.anisotropic),
+            (Property::SpecTrans, &mut self.spec_trans),
+            (Property::SpecTint, &mut self.spec_tint),
+            (Property::Sheen, &mut self.sheen),
+            (Property::SheenTint, &mut self.sheen_tint),
+            (Property::Flatness, &mut self.flatness),
+        ]
+    }
+
     /// Its numbers over another scalar.
     fn over<T: Real>(&self, numbers: impl Numbers<T>) -> PrincipledThin<T> {
         PrincipledThin {
@@ -208,50 +221,21 @@ impl Model for PrincipledThin {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: false,
-            transmissive: true,
-            smooth: false,
-            straight: false,
-            oriented: self.anisotropic != 0.0,
-            differentiable: true,
-        }
+        Flags { oriented: self.anisotropic != 0.0, ..Flags::INTERFACE }
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Frame
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const {
-            PropertySet::new(&[
-                Property::BaseColor,
-                Property::Roughness,
-                Property::SpecTrans,
-                Property::Eta,
-                Property::Sheen,
-                Property::DiffTrans,
-            ])
-        }
-    }
+    scatters_in_frame!(BaseColor, Roughness, SpecTrans, Eta, Sheen, DiffTrans);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        Some(Slot::Scalar(match property {
-            Property::BaseColor => return Some(Slot::Color(&mut self.base_color)),
-            Property::Roughness => &mut self.roughness,
-            Property::Anisotropic => &mut self.anisotropic,
-            Property::SpecTrans => &mut self.spec_trans,
-            Property::Eta => &mut self.eta,
-            Property::SpecTint => &mut self.spec_tint,
-            Property::Sheen => &mut self.sheen,
-            Property::SheenTint => &mut self.sheen_tint,
-            Property::Flatness => &mut self.flatness,
-            Property::DiffTrans => &mut self.diff_trans,
-            _ => return None,
-        }))
+        match property {
+            Property::BaseColor => Some(Slot::Color(&mut self.base_color)),
+            Property::Eta => Some(Slot::Scalar(&mut self.eta)),
+            Property::DiffTrans => Some(Slot::Scalar(&mut self.diff_trans)),
+            _ => {
+                let mut numbers = self.unit_numbers().into_iter();
+                numbers.find(|(p, _)| *p == property).map(|(_, value)| Slot::Scalar(value))
+            }
+        }
     }
 
     fn validate(&self) -> Result<(), SurfaceError> {
@@ -259,16 +243,8 @@ impl Model for PrincipledThin {
         in_range(Property::Eta, self.eta, self.eta > 0.0, "above 0")?;
         let part_of_two = (0.0..=2.0).contains(&self.diff_trans);
         in_range(Property::DiffTrans, self.diff_trans, part_of_two, "from 0 to 2")?;
-        let parts = [
-            (Property::Roughness, self.roughness),
-            (Property::Anisotropic, self.anisotropic),
-            (Property::SpecTrans, self.spec_trans),
-            (Property::SpecTint, self.spec_tint),
-            (Property::Sheen, self.sheen),
-            (Property::SheenTint, self.sheen_tint),
-            (Property::Flatness, self.flatness),
-        ];
-        parts.into_iter().try_for_each(|(property, value)| part(property, value))
+        let mut own = *self;
+        own.unit_numbers().into_iter().try_for_each(|(property, value)| part(property, *value))
     }
 
     fn undifferentiated(
@@ -290,33 +266,6 @@ impl Model for PrincipledThin {
             },
             _ => None,
         }
-    }
-
-    #[inline(never)]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        at: At<'_>,
-        directions: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        framed::value(self, numbers, at, directions)
-    }
-
-    #[inline(never)]
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_duals::<{ COORDINATES + 6 }>(
-            self.differentiated(),
-            [wo, wi, n],
-            |numbers, directions| framed::value(self, numbers, at, directions),
-        )
-    }
-
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        framed::sample(self, at, from, n, u)
-    }
-
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        framed::pdf(self, at, from, to, n)
     }
 
     fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {

@@ -21,9 +21,9 @@ use core::f64::consts::{FRAC_1_PI, FRAC_2_PI};
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3, warp};
 
-use crate::model::surface::framed::{self, Framed};
+use crate::model::surface::framed::{Framed, scatters_in_frame};
 use crate::model::surface::microfacet::LEAST_COS2;
-use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 use crate::model::surface::{At, BsdfGradient, Given};
@@ -112,26 +112,10 @@ impl Model for RoughDiffuse {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: true,
-            transmissive: false,
-            smooth: false,
-            straight: false,
-            oriented: false,
-            differentiable: true,
-        }
+        Flags::REFLECTOR
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Frame
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const { PropertySet::new(&[Property::Reflectance, Property::Alpha]) }
-    }
+    scatters_in_frame!(Reflectance, Alpha);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
@@ -144,33 +128,6 @@ impl Model for RoughDiffuse {
     fn validate(&self) -> Result<(), SurfaceError> {
         nonnegative(Property::Reflectance, self.reflectance)?;
         in_range(Property::Alpha, self.alpha, self.alpha >= 0.0, "0 or more")
-    }
-
-    #[inline(never)]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        at: At<'_>,
-        directions: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        framed::value(self, numbers, at, directions)
-    }
-
-    #[inline(never)]
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_duals::<{ COORDINATES + 2 }>(
-            self.differentiated(),
-            [wo, wi, n],
-            |numbers, directions| framed::value(self, numbers, at, directions),
-        )
-    }
-
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        framed::sample(self, at, from, n, u)
-    }
-
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        framed::pdf(self, at, from, to, n)
     }
 
     fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {

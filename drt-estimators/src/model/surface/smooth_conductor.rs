@@ -3,12 +3,13 @@
 use drt_geom::edges::Lobes;
 use drt_math::{Dual, Real, Rgb, Vec3};
 
+use crate::model::surface::conductor::check_metal;
 use crate::model::surface::fresnel::conductor_reflected;
 use crate::model::surface::microfacet::mirrored;
 use crate::model::surface::model::{Constants, Dependence, Flags, Lanes, Model, Numbers};
 use crate::model::surface::params::PropertySet;
-use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
-use crate::model::surface::specular::same;
+use crate::model::surface::property::{Property, Slot, SurfaceError};
+use crate::model::surface::specular::{same, scatters_into_single_directions};
 use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
 
 /// A smooth metal: Mitsuba's `conductor`. Black from behind.
@@ -47,26 +48,10 @@ impl Model for Conductor {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: true,
-            transmissive: false,
-            smooth: true,
-            straight: false,
-            oriented: false,
-            differentiable: true,
-        }
+        Flags { smooth: true, ..Flags::REFLECTOR }
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Normal
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const { PropertySet::new(&[Property::SpecularReflectance, Property::Eta, Property::K]) }
-    }
+    scatters_into_single_directions!(SpecularReflectance, Eta, K);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
@@ -78,29 +63,7 @@ impl Model for Conductor {
     }
 
     fn validate(&self) -> Result<(), SurfaceError> {
-        nonnegative(Property::SpecularReflectance, self.specular_reflectance)?;
-        nonnegative(Property::Eta, self.eta)?;
-        nonnegative(Property::K, self.k)?;
-        let indices = self.eta + self.k;
-        indices.to_array().into_iter().try_for_each(|sum| {
-            in_range(Property::K, sum, sum > 0.0, "above 0 in channels where eta is 0")
-        })
-    }
-
-    fn value<T: Real>(&self, _: impl Numbers<T>, _: At<'_>, _: [Vec3<T>; 3]) -> Rgb<T> {
-        Rgb::splat(T::zero())
-    }
-
-    fn gradient(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3) -> BsdfGradient {
-        BsdfGradient::default()
-    }
-
-    fn sample(&self, _: At<'_>, _: Vec3, _: Vec3, _: [f64; 3], _: Given) -> Option<Vec3> {
-        None
-    }
-
-    fn pdf(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3, _: Given) -> f64 {
-        0.0
+        check_metal(self.eta, self.k, self.specular_reflectance)
     }
 
     #[inline(never)]
@@ -112,10 +75,9 @@ impl Model for Conductor {
         _: f64,
         _: Given,
     ) -> Option<SpecularSample> {
-        let cos = n.dot(from);
-        (cos > 0.0).then(|| SpecularSample {
+        (n.dot(from) > 0.0).then(|| SpecularSample {
             w: mirrored(from, n),
-            weight: self.reflected(Constants, cos),
+            weight: self.reflected(Constants, n.dot(from)),
             straight: false,
         })
     }
@@ -129,14 +91,5 @@ impl Model for Conductor {
         let properties = self.differentiated();
         let value: Rgb<Dual<f64, 3>> = self.reflected(Lanes::<0>::new(properties), cos);
         Some(SpecularValue::by_duals(properties, value, 1.0))
-    }
-
-    /// No sampler asks for it, as nothing that moves is differentiated at such surfaces.
-    fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
-        Lobes::even(0.0)
-    }
-
-    fn lobe_width(&self, _: At<'_>) -> f64 {
-        0.0
     }
 }

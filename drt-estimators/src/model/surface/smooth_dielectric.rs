@@ -8,7 +8,7 @@ use crate::model::surface::microfacet::{mirrored, refracted};
 use crate::model::surface::model::{Dependence, Flags, Lanes, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
-use crate::model::surface::specular::same;
+use crate::model::surface::specular::{same, scatters_into_single_directions};
 use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue, Textured};
 
 /// A smooth interface of two transparent media: Mitsuba's `dielectric`. The normal points to the
@@ -41,6 +41,21 @@ pub(super) fn check(eta: f64, reflectance: Rgb, transmittance: Rgb) -> Result<()
     nonnegative(Property::SpecularTransmittance, transmittance)
 }
 
+/// Where an interface or a pane keeps a property.
+pub(super) fn slot<'a>(
+    property: Property,
+    eta: &'a mut f64,
+    reflectance: &'a mut Rgb,
+    transmittance: &'a mut Rgb,
+) -> Option<Slot<'a>> {
+    match property {
+        Property::Eta => Some(Slot::Scalar(eta)),
+        Property::SpecularReflectance => Some(Slot::Color(reflectance)),
+        Property::SpecularTransmittance => Some(Slot::Color(transmittance)),
+        _ => None,
+    }
+}
+
 impl Model for Dielectric {
     fn name(&self) -> &'static str {
         "dielectric"
@@ -48,34 +63,14 @@ impl Model for Dielectric {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: false,
-            transmissive: true,
-            smooth: true,
-            straight: false,
-            oriented: false,
-            differentiable: true,
-        }
+        Flags { smooth: true, ..Flags::INTERFACE }
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Normal
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const { PropertySet::new(&[Property::SpecularReflectance, Property::SpecularTransmittance]) }
-    }
+    scatters_into_single_directions!(SpecularReflectance, SpecularTransmittance);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        match property {
-            Property::Eta => Some(Slot::Scalar(&mut self.eta)),
-            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
-            Property::SpecularTransmittance => Some(Slot::Color(&mut self.specular_transmittance)),
-            _ => None,
-        }
+        let Self { eta, specular_reflectance, specular_transmittance } = self;
+        slot(property, eta, specular_reflectance, specular_transmittance)
     }
 
     fn validate(&self) -> Result<(), SurfaceError> {
@@ -84,22 +79,6 @@ impl Model for Dielectric {
 
     fn undifferentiated(&self, property: Property, _: Option<&Textured>) -> Option<&'static str> {
         (property == Property::Eta).then_some("it turns light that goes through")
-    }
-
-    fn value<T: Real>(&self, _: impl Numbers<T>, _: At<'_>, _: [Vec3<T>; 3]) -> Rgb<T> {
-        Rgb::splat(T::zero())
-    }
-
-    fn gradient(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3) -> BsdfGradient {
-        BsdfGradient::default()
-    }
-
-    fn sample(&self, _: At<'_>, _: Vec3, _: Vec3, _: [f64; 3], _: Given) -> Option<Vec3> {
-        None
-    }
-
-    fn pdf(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3, _: Given) -> f64 {
-        0.0
     }
 
     #[inline(never)]
@@ -150,14 +129,5 @@ impl Model for Dielectric {
         let value = colour(Property::SpecularTransmittance, self.specular_transmittance)
             * Dual::from(through);
         Some(SpecularValue::by_duals(properties, value, 1.0 - reflected))
-    }
-
-    /// No sampler asks for it, as nothing that moves is differentiated at such surfaces.
-    fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
-        Lobes::even(0.0)
-    }
-
-    fn lobe_width(&self, _: At<'_>) -> f64 {
-        0.0
     }
 }

@@ -10,6 +10,49 @@ use drt_math::{Dual, Rgb, Vec3};
 
 use crate::model::surface::params::{BsdfParams, PropertySet};
 
+/// The methods by which a [`Model`](super::model::Model) answers that scatters light into single directions only: nothing is in its value,
+/// and no sampler asks for a sketch of it, as nothing that moves is differentiated at such surfaces. The arguments are the properties that
+/// the model is differentiated by. A file that uses this imports the types that these methods have in `Model`.
+macro_rules! scatters_into_single_directions {
+    ($($property:ident),+) => {
+        #[inline]
+        fn dependence(&self) -> Dependence {
+            Dependence::Normal
+        }
+
+        #[inline]
+        fn differentiated(&self) -> PropertySet {
+            const { PropertySet::new(&[$(Property::$property),+]) }
+        }
+
+        fn value<T: Real>(&self, _: impl Numbers<T>, _: At<'_>, _: [Vec3<T>; 3]) -> Rgb<T> {
+            Rgb::splat(T::zero())
+        }
+
+        fn gradient(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3) -> BsdfGradient {
+            BsdfGradient::default()
+        }
+
+        fn sample(&self, _: At<'_>, _: Vec3, _: Vec3, _: [f64; 3], _: Given) -> Option<Vec3> {
+            None
+        }
+
+        fn pdf(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3, _: Given) -> f64 {
+            0.0
+        }
+
+        fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
+            Lobes::even(0.0)
+        }
+
+        fn lobe_width(&self, _: At<'_>) -> f64 {
+            0.0
+        }
+    };
+}
+
+pub(super) use scatters_into_single_directions;
+
 /// What a surface scatters from one direction into another, single one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct SpecularValue {

@@ -8,7 +8,7 @@ use drt_math::{Real, Rgb, RgbVec, ValueChange, Vec3};
 use crate::model::surface::facet::Facet;
 
 use crate::model::surface::microfacet::LEAST_ALPHA;
-use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
 use crate::model::surface::{
@@ -154,11 +154,6 @@ impl Model for Textured {
         let through = self.texture_of(Property::SpecTrans).is_some();
         let transmissive = inner.transmissive || through;
         Flags { transmissive, oriented: inner.oriented || self.orients(), ..inner }
-    }
-
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Point
     }
 
     fn differentiated(&self) -> PropertySet {

@@ -8,8 +8,8 @@ use crate::model::surface::microfacet::mirrored;
 use crate::model::surface::model::{Dependence, Flags, Lanes, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
-use crate::model::surface::smooth_dielectric::{GLASS, check};
-use crate::model::surface::specular::same;
+use crate::model::surface::smooth_dielectric::{GLASS, check, slot};
+use crate::model::surface::specular::{same, scatters_into_single_directions};
 use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
 
 /// A pane so thin that light goes straight through it, with all reflections inside of it: Mitsuba's
@@ -46,60 +46,18 @@ impl Model for ThinDielectric {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: false,
-            transmissive: true,
-            smooth: true,
-            straight: true,
-            oriented: false,
-            differentiable: true,
-        }
+        Flags { smooth: true, straight: true, ..Flags::INTERFACE }
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Normal
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const {
-            PropertySet::new(&[
-                Property::SpecularReflectance,
-                Property::SpecularTransmittance,
-                Property::Eta,
-            ])
-        }
-    }
+    scatters_into_single_directions!(SpecularReflectance, SpecularTransmittance, Eta);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
-        match property {
-            Property::Eta => Some(Slot::Scalar(&mut self.eta)),
-            Property::SpecularReflectance => Some(Slot::Color(&mut self.specular_reflectance)),
-            Property::SpecularTransmittance => Some(Slot::Color(&mut self.specular_transmittance)),
-            _ => None,
-        }
+        let Self { eta, specular_reflectance, specular_transmittance } = self;
+        slot(property, eta, specular_reflectance, specular_transmittance)
     }
 
     fn validate(&self) -> Result<(), SurfaceError> {
         check(self.eta, self.specular_reflectance, self.specular_transmittance)
-    }
-
-    fn value<T: Real>(&self, _: impl Numbers<T>, _: At<'_>, _: [Vec3<T>; 3]) -> Rgb<T> {
-        Rgb::splat(T::zero())
-    }
-
-    fn gradient(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3) -> BsdfGradient {
-        BsdfGradient::default()
-    }
-
-    fn sample(&self, _: At<'_>, _: Vec3, _: Vec3, _: [f64; 3], _: Given) -> Option<Vec3> {
-        None
-    }
-
-    fn pdf(&self, _: At<'_>, _: Vec3, _: Vec3, _: Vec3, _: Given) -> f64 {
-        0.0
     }
 
     #[inline(never)]
@@ -146,14 +104,5 @@ impl Model for ThinDielectric {
     fn straight(&self, _: At<'_>, cos: f64) -> Rgb {
         let reflected = if cos > 0.0 { reflected_by_pane(cos.min(1.0), self.eta) } else { 1.0 };
         self.specular_transmittance * (1.0 - reflected)
-    }
-
-    /// No sampler asks for it, as nothing that moves is differentiated at such surfaces.
-    fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
-        Lobes::even(0.0)
-    }
-
-    fn lobe_width(&self, _: At<'_>) -> f64 {
-        0.0
     }
 }

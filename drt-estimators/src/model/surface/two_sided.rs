@@ -2,7 +2,7 @@ use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, RgbVec, Vec3};
 
 use crate::model::surface::facet::Facet;
-use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
+use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError};
 use crate::model::surface::{
@@ -41,11 +41,6 @@ impl Model for TwoSided {
     fn flags(&self) -> Flags {
         let both = self.front.flags().of_both(self.behind().flags());
         Flags { black_from_behind: false, ..both }
-    }
-
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Point
     }
 
     fn differentiated(&self) -> PropertySet {

@@ -22,10 +22,10 @@ use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Real, Rgb, Vec3, fm, vec3, warp};
 
 use crate::model::surface::choice::choose;
-use crate::model::surface::framed::{self, Framed};
+use crate::model::surface::framed::{Framed, scatters_in_frame};
 use crate::model::surface::lobes::{reflection, widest};
 use crate::model::surface::microfacet::{LEAST_ALPHA, LEAST_COS2, mirrored};
-use crate::model::surface::model::{COORDINATES, Dependence, Flags, Model, Numbers, by_duals};
+use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 use crate::model::surface::{At, BsdfGradient, Given, Textured};
@@ -148,33 +148,10 @@ impl Model for Ward {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags {
-            black: false,
-            black_from_behind: true,
-            transmissive: false,
-            smooth: false,
-            straight: false,
-            oriented: self.alpha[0] != self.alpha[1],
-            differentiable: true,
-        }
+        Flags { oriented: self.alpha[0] != self.alpha[1], ..Flags::REFLECTOR }
     }
 
-    #[inline]
-    fn dependence(&self) -> Dependence {
-        Dependence::Frame
-    }
-
-    #[inline]
-    fn differentiated(&self) -> PropertySet {
-        const {
-            PropertySet::new(&[
-                Property::Reflectance,
-                Property::SpecularReflectance,
-                Property::AlphaU,
-                Property::AlphaV,
-            ])
-        }
-    }
+    scatters_in_frame!(Reflectance, SpecularReflectance, AlphaU, AlphaV);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         match property {
@@ -204,33 +181,6 @@ impl Model for Ward {
         // Which direction either belongs to is nothing that an even surface needs to know.
         let oriented = self.flags().oriented || textures.is_some_and(Textured::orients);
         (roughness && !oriented).then_some("both roughnesses are equal; give different ones")
-    }
-
-    #[inline(never)]
-    fn value<T: Real>(
-        &self,
-        numbers: impl Numbers<T>,
-        at: At<'_>,
-        directions: [Vec3<T>; 3],
-    ) -> Rgb<T> {
-        framed::value(self, numbers, at, directions)
-    }
-
-    #[inline(never)]
-    fn gradient(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> BsdfGradient {
-        by_duals::<{ COORDINATES + 4 }>(
-            self.differentiated(),
-            [wo, wi, n],
-            |numbers, directions| framed::value(self, numbers, at, directions),
-        )
-    }
-
-    fn sample(&self, at: At<'_>, from: Vec3, n: Vec3, u: [f64; 3], _: Given) -> Option<Vec3> {
-        framed::sample(self, at, from, n, u)
-    }
-
-    fn pdf(&self, at: At<'_>, from: Vec3, to: Vec3, n: Vec3, _: Given) -> f64 {
-        framed::pdf(self, at, from, to, n)
     }
 
     fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {

@@ -42,9 +42,6 @@ pub(crate) struct EmissionSampler {
     radius: f64,
     /// Medium outside.
     outside: Option<usize>,
-    /// A fault of paths that start here: directions back have no density.
-    #[cfg(all(test, feature = "std"))]
-    pub(crate) never_back: bool,
 }
 
 impl EmittedRay {
@@ -86,8 +83,6 @@ impl EmissionSampler {
             center: world.geometry.center,
             radius: f64::max(world.geometry.radius, f64::MIN_POSITIVE) * 1.001,
             outside: world.ambient(),
-            #[cfg(all(test, feature = "std"))]
-            never_back: false,
         }
     }
 

@@ -94,8 +94,6 @@ pub(crate) struct Bidirectional<'w> {
     light: Subpath,
     /// The light path as it is recorded.
     recorded: LightPath,
-    #[cfg(all(test, feature = "std"))]
-    fault: Option<tests::Fault>,
 }
 
 impl<'w> Bidirectional<'w> {
@@ -108,8 +106,6 @@ impl<'w> Bidirectional<'w> {
             camera: Subpath::new(RadianceMode::GIVEN),
             light: Subpath::new(ImportanceMode::GIVEN),
             recorded: LightPath::default(),
-            #[cfg(all(test, feature = "std"))]
-            fault: None,
         }
     }
 
@@ -124,8 +120,19 @@ impl<'w> Bidirectional<'w> {
         observer: &mut O,
     ) -> Rgb {
         self.trace_camera(tracer, view, weight, observer);
-        let mut sum = self.camera.met;
         self.trace_light::<O>(tracer);
+        self.join(tracer, view, splats, observer)
+    }
+
+    /// Joins the two paths that have been traced, by all strategies.
+    fn join<O: JointObserver>(
+        &mut self,
+        tracer: &mut Tracer<'w>,
+        view: &ViewSample,
+        splats: &mut Vec<Splat>,
+        observer: &mut O,
+    ) -> Rgb {
+        let mut sum = self.camera.met;
         for k in 0..self.camera.vertices.len() {
             let z = self.camera.vertices[k];
             sum += self.met(&z, k, observer);
@@ -185,10 +192,6 @@ impl<'w> Bidirectional<'w> {
         let ratios = Ratios { last: square(self.light_paths / film), earlier: 0.0 };
         // Parallel rays are drawn by area, as if they came from infinity.
         self.camera.begin(ratios, !camera.is_orthographic());
-        #[cfg(all(test, feature = "std"))]
-        {
-            self.camera.never_back = self.emission.never_back;
-        }
         type Mode = Unconnected<RadianceMode>;
         let mut observed = Observed { subpath: &mut self.camera, observer };
         if let Some(first) = tracer.follow::<Mode, _>(&leaving, &mut observed) {
@@ -207,10 +210,6 @@ impl<'w> Bidirectional<'w> {
         let Some(start) = self.emission.sample(self.world, &mut tracer.rng) else { return };
         let ratios = Ratios { last: 1.0 / square(start.pdf), earlier: square(start.inv_start) };
         self.light.begin(ratios, start.finite);
-        #[cfg(all(test, feature = "std"))]
-        {
-            self.light.never_back = self.emission.never_back;
-        }
         let leaving = OutgoingRay::starting(start.vertex, start.dir, start.throughput);
         type Mode = Unconnected<ImportanceMode>;
         let observer = &mut Unobserved::<O>(PhantomData);
@@ -312,10 +311,6 @@ impl<'w> Bidirectional<'w> {
         observer: &mut O,
     ) -> Rgb {
         let y = &self.light.vertices[of_light];
-        #[cfg(all(test, feature = "std"))]
-        if self.fault == Some(tests::Fault::NoConnections) {
-            return Rgb::ZERO;
-        }
         let world = self.world;
         let at = [&z.vertex, &y.vertex].map(|v| world.scattering(v));
         let [Some(of_z), Some(of_y)] = at else { return Rgb::ZERO };
@@ -376,10 +371,6 @@ impl<'w> Bidirectional<'w> {
         vertex: usize,
     ) -> Option<SeenFromCamera> {
         let y = &self.light.vertices[vertex];
-        #[cfg(all(test, feature = "std"))]
-        if self.fault == Some(tests::Fault::NoSplats) {
-            return None;
-        }
         let world = self.world;
         let scattering = world.scattering(&y.vertex)?;
         let (wo, transport) = see(camera, &y.vertex)?;

@@ -171,8 +171,6 @@ pub(super) struct Subpath {
     finite: bool,
     /// Light that came in from outside, or from inside of a medium.
     pub(super) met: Rgb,
-    #[cfg(all(test, feature = "std"))]
-    pub(super) never_back: bool,
 }
 
 impl Subpath {
@@ -186,8 +184,6 @@ impl Subpath {
             segments: 1,
             finite: true,
             met: Rgb::ZERO,
-            #[cfg(all(test, feature = "std"))]
-            never_back: false,
         }
     }
 
@@ -202,10 +198,6 @@ impl Subpath {
 
     /// The density of the direction back, from one that the other end's walk would come from.
     pub(super) fn back(&self, scattering: &Scattering<'_>, to: Vec3, from: Vec3) -> f64 {
-        #[cfg(all(test, feature = "std"))]
-        if self.never_back {
-            return 0.0;
-        }
         let given = match self.given {
             Given::Wo => Given::Wi,
             Given::Wi => Given::Wo,

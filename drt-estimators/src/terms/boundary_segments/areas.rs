@@ -4,7 +4,7 @@
 //! the probability p of an edge per length, a sample has the value g / p there, g being light times the sine of edge and segment, and none
 //! elsewhere. So its second moment is least for p ∝ √(mean of g² over points of lights from which the edge is a silhouette). The
 //! mean is that of a few points, the same for all edges; an edge that is no silhouette from these may be one from others, with about
-//! the probability that it is one from anywhere, its free angle over π. It counts as if it were seen so by one point more.
+//! the probability that it is one from anywhere, its silhouette angle over π. It counts as if it were seen so by one point more.
 
 use alloc::vec::Vec;
 use core::f64::consts::FRAC_1_PI;
@@ -56,7 +56,7 @@ impl<'a> AreaWeights<'a> {
     /// Of one edge.
     pub(super) fn of(&self, e: &Edge) -> f64 {
         let [seen, all] = self.squares(e);
-        let anywhere = e.wedge.free_angle() * FRAC_1_PI;
+        let anywhere = e.wedge.silhouette_angle() * FRAC_1_PI;
         let unseen = anywhere * (all + EVEN * self.mean) / f64::from(POINTS);
         if self.mean > 0.0 { e.wedge.length * Real::sqrt(seen + unseen) } else { anywhere }
     }

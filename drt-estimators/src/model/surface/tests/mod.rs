@@ -5,6 +5,7 @@ mod coated;
 mod composed;
 mod direction_partners;
 mod energy;
+mod flags;
 mod formulas;
 mod framed;
 mod gradients;

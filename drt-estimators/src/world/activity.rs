@@ -1,0 +1,127 @@
+//! What a parameter may change, and how paths are sampled there so that derivatives find what images do not need.
+
+use alloc::vec::Vec;
+
+use drt_math::Rgb;
+use drt_medium::Homogeneous;
+
+use crate::world::vertex::{Kind, SurfacePoint, Vertex};
+use crate::world::{Tracking, World};
+
+/// Largest probability of going on under Russian roulette. Below one it also ends paths that lose
+/// nothing, at the price of weights that grow with every vertex.
+const MOST_SURVIVAL: f64 = 0.99;
+/// What comes off something dark may still move fast: a survivor counts ten times at most.
+const LEAST_SURVIVAL: f64 = 0.1;
+/// The probability where it must not depend on what a path carries.
+const STEADY_SURVIVAL: f64 = 0.9;
+/// Least probability of a scattering vertex per tentative collision where coefficients change.
+const DEFENSIVE: f64 = 0.1;
+
+/// What derivatives need of a medium.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum MediumActivity {
+    /// Its coefficients do not change.
+    Nothing,
+    /// They change.
+    Density,
+    /// So does what happens at vertices, even if nothing does now.
+    Vertices,
+}
+
+/// What derivatives need beyond the image.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ActiveFactors {
+    pub(crate) media: Vec<MediumActivity>,
+    pub(crate) bsdfs: Vec<bool>,
+    /// Those whose roughness changes.
+    pub(crate) roughness: Vec<bool>,
+    /// Those whose index of refraction changes.
+    pub(crate) index: Vec<bool>,
+}
+
+impl ActiveFactors {
+    /// What either needs.
+    pub(crate) fn union(&self, other: &Self) -> Self {
+        let any = |a: &[bool], b: &[bool]| a.iter().zip(b).map(|(a, b)| *a || *b).collect();
+        Self {
+            media: self.media.iter().zip(&other.media).map(|(a, b)| *a.max(b)).collect(),
+            bsdfs: any(&self.bsdfs, &other.bsdfs),
+            roughness: any(&self.roughness, &other.roughness),
+            index: any(&self.index, &other.index),
+        }
+    }
+}
+
+impl World {
+    /// Makes sure that what derivatives need is sampled where its value is zero (theory sheet §14.5):
+    /// vertices in media whose coefficients change, and paths over materials that change.
+    pub(crate) fn prepare_for_derivatives(&mut self, needs: ActiveFactors) {
+        for (m, need) in needs.media.iter().enumerate() {
+            if *need == MediumActivity::Nothing {
+                continue;
+            }
+            self.defensive[m] = match self.medium(m).extinction() {
+                Some(h) => self.defensive_where_thin(m, h),
+                None => DEFENSIVE,
+            };
+            if *need == MediumActivity::Vertices {
+                self.tracking[m] = Tracking::Vertices;
+            }
+        }
+        self.needs = needs;
+    }
+
+    /// The least probability of a vertex per flight through a homogeneous filling of medium `m`: zero
+    /// where free flights stop inside more often than that by themselves.
+    pub(crate) fn defensive_where_thin(&self, m: usize, filling: &Homogeneous) -> f64 {
+        let sigma_t = filling.coefficients().sigma_t.to_array();
+        let thin = |s: f64| s * self.extent[m] < DEFENSIVE;
+        if sigma_t.into_iter().any(thin) { DEFENSIVE } else { 0.0 }
+    }
+
+    /// The medium by whose extinction distances are drawn, and its extinction less the medium's own;
+    /// `None` when that is the medium itself.
+    pub(crate) fn drawn_by(&self, m: usize) -> Option<(&Homogeneous, Rgb)> {
+        let other = self.steady.as_ref()?.get(m)?.as_ref()?;
+        let own = self.medium(m).extinction()?;
+        Some((other, other.coefficients().sigma_t - own.coefficients().sigma_t))
+    }
+
+    /// Probability that Russian roulette lets a path go on which carries `throughput`.
+    pub(crate) fn survival(&self, throughput: Rgb) -> f64 {
+        if self.steady.is_some() {
+            STEADY_SURVIVAL
+        } else {
+            let moves = throughput.max_channel();
+            if moves > 0.0 { moves.clamp(LEAST_SURVIVAL, MOST_SURVIVAL) } else { 0.0 }
+        }
+    }
+
+    /// True when a parameter changes how `v` scatters, so that a zero there may not stay zero.
+    pub(crate) fn may_revive(&self, v: &Vertex) -> bool {
+        match (&v.kind, v.medium) {
+            (Kind::Surface(s), _) => self.needed(&self.needs.bsdfs, s),
+            (_, Some(m)) => self.needs.media.get(m).is_some_and(|n| *n != MediumActivity::Nothing),
+            _ => false,
+        }
+    }
+
+    /// True when a parameter changes how rough the surface at `v` is.
+    pub(crate) fn roughens(&self, v: &Vertex) -> bool {
+        v.surface().is_some_and(|s| self.needed(&self.needs.roughness, s))
+    }
+
+    /// True when a parameter changes how the surface at `v` refracts.
+    pub(crate) fn bends_light(&self, v: &Vertex) -> bool {
+        let bends = |s: &SurfacePoint| {
+            self.needed(&self.needs.index, s) && self.bsdf_of(s.shape).is_transmissive()
+        };
+        v.surface().is_some_and(bends)
+    }
+
+    /// Whether the material of a surface is one of those that something is needed `of`.
+    fn needed(&self, of: &[bool], s: &SurfacePoint) -> bool {
+        of.get(self.scene.shapes[s.shape as usize].bsdf) == Some(&true)
+    }
+}
