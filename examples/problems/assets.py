@@ -226,19 +226,3 @@ def write_obj(path, points, faces):
     """Triangles as an OBJ file."""
     lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
     pathlib.Path(path).write_text("\n".join(lines) + "\n")
-
-
-def sheet(count, size):
-    """A square of count × count vertices in the plane of x and z around the origin, x fastest; it faces up."""
-    at = [size * (k / (count - 1) - 0.5) for k in range(count)]
-    corners = [j * count + i for j in range(count - 1) for i in range(count - 1)]
-    faces = [t for a in corners for t in ((a, a + count, a + count + 1), (a, a + count + 1, a + 1))]
-    return [(x, 0.0, z) for z in at for x in at], faces
-
-
-def write_vol(path, size, value):
-    """A grid of size³ voxels as Mitsuba's .vol file, by their values at places from 0 to 1 in x, y and z."""
-    at = [(k + 0.5) / size for k in range(size)]
-    values = [value(x, y, z) for z in at for y in at for x in at]
-    header = b"VOL\x03" + struct.pack("<5i6f", 1, size, size, size, 1, 0, 0, 0, 1, 1, 1)
-    pathlib.Path(path).write_bytes(header + struct.pack(f"<{len(values)}f", *values))

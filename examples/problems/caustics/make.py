@@ -4,9 +4,8 @@
 import pathlib
 import sys
 
-HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import assets
 
-(HERE / "run").mkdir(exist_ok=True)
-assets.write_obj(HERE / "run/cage.obj", *assets.box_cage((-0.5, 0.65, -0.65), (0.5, 1.75, 0.6)))
+run = assets.run_folder(__file__)
+assets.write_obj(run / "cage.obj", *assets.box_cage((-0.5, 0.65, -0.65), (0.5, 1.75, 0.6)))
