@@ -4,9 +4,8 @@
 import pathlib
 import sys
 
-HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import assets
 
-(HERE / "run").mkdir(exist_ok=True)
-assets.write_ply(HERE / "run/star.ply", *assets.star([1.5, 0.6, 0.9, 0.55, 0.75], 0.25))
+run = assets.run_folder(__file__)
+assets.write_ply(run / "star.ply", *assets.star([1.5, 0.6, 0.9, 0.55, 0.75], 0.25))
