@@ -1,5 +1,5 @@
-//! Differentiating a recorded path once: velocities of its vertices, the backward sweep, and where
-//! sensitivities go.
+//! Differentiating a recorded path once: velocities of its vertices, the backward sweep, and the sinks of
+//! sensitivities.
 
 pub(crate) mod adjoint;
 pub(crate) mod antithetic;

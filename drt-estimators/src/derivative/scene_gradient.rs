@@ -25,11 +25,11 @@ pub struct SceneGradient {
     pub media: Vec<Option<MediumGradient>>,
     /// Per scattering model: with respect to its parameters (scalars: the sum over channels).
     pub bsdfs: Vec<Option<BsdfParams>>,
-    /// Per scattering model: with respect to the texels of each texture, by what that stands for.
+    /// Per scattering model: with respect to the texels of each texture, with the property that has the texture.
     pub texels: Vec<Vec<(Property, TexelGradient)>>,
-    /// Per emitter: with respect to the texels of the image that tells its light.
+    /// Per emitter: with respect to the texels of the image of its emission.
     pub emitter_texels: Vec<Option<TexelGradient>>,
-    /// Per emitter.
+    /// Per emitter: with respect to its emission, position, direction and angles.
     pub emitters: Vec<Option<EmitterGradient>>,
     /// With respect to the camera.
     pub sensor: Option<SensorGradient>,

@@ -1,5 +1,5 @@
-//! Edges of the scene at which visibility or radiance can jump: which there are, what is around them, how
-//! fast they move, and which matter to a viewer.
+//! Edges of the scene at which visibility or radiance can jump: finding them, the faces and media around them,
+//! their velocities, and their importance to a viewer.
 
 pub(crate) mod collect;
 pub(crate) mod contact;

@@ -1,8 +1,9 @@
 //! Estimators of derivatives.
 //!
-//! A derivative of a path integral is that of its integrand along some velocity of the vertices of paths, and what jumps of the
-//! integrand add that do not move by that velocity. An [`Estimator`] chooses the velocity, and [`Terms`] that together are the
-//! derivative for it; what samples these terms does not know which estimator it is.
+//! The derivative of a path integral has an interior term, which is the derivative of the integrand as the vertices of
+//! paths move with some velocity field, and terms for the jumps of the integrand that do not move with that field. An
+//! [`Estimator`] chooses the velocity field, and the [`Terms`] that together are the derivative for it; the code that
+//! samples these terms does not know which estimator it is.
 
 pub(crate) mod emitter_shares;
 mod orthographic;
@@ -31,23 +32,24 @@ pub(crate) trait Estimator: Sync {
     /// The name that plans and messages give it.
     fn name(&self) -> &'static str;
 
-    /// How the insides of media move, where nobody asks for something else.
+    /// How the insides of media move by default.
     fn insides(&self) -> Insides;
 
-    /// Whether vertices slide over surfaces as something moves, so that what depends on their place there has to be smooth.
+    /// Whether vertices slide over surfaces as something moves, so that functions of their position there, such as
+    /// textures, have to be continuous.
     fn slides(&self) -> bool;
 
-    /// Whether its terms hold for the light of points and directions, too, as something moves.
+    /// Whether its terms include the light of point, spot and directional emitters where something moves.
     fn takes_delta_lights(&self, scene: &Scene, settings: &Settings) -> bool;
 
-    /// The velocity of vertices, and the terms, for what changes of a world.
+    /// The velocity field of vertices, and the terms, for what changes in a world.
     ///
     /// # Errors
     /// When it has no derivative of that.
     fn terms(&self, world: &World, changes: &Changes<'_>) -> Result<Terms, Error>;
 }
 
-/// What changes of a world, and how its derivative is asked for.
+/// What changes in a world, and the settings of its derivative.
 pub(crate) struct Changes<'a> {
     pub(crate) active: &'a ActiveInputs,
     /// Shapes beside media whose insides do not follow them.
@@ -57,8 +59,8 @@ pub(crate) struct Changes<'a> {
     pub(crate) motion: Option<&'a Motion>,
 }
 
-/// The estimator that a kind names. What is no estimator of a session is the default one, which differentiates nothing where there are no
-/// parameters.
+/// The estimator that a kind names. A kind that is no estimator of a session gives the default one, which
+/// differentiates nothing where there are no parameters.
 pub(crate) fn named(kind: EstimatorKind) -> &'static dyn Estimator {
     match kind {
         EstimatorKind::Radiative => &Radiative,

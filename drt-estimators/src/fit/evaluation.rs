@@ -1,4 +1,4 @@
-//! What an iteration learns from its images.
+//! The loss, gradient and curvature that an iteration computes from its images.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -58,24 +58,25 @@ impl Seen {
     }
 }
 
-/// A scene at some values of its parameters, seen by every view of a [`Fit`](super::Fit).
+/// The images and derivatives of all views of a [`Fit`](super::Fit), at some values of the parameters.
 #[derive(Clone, Debug)]
 pub struct Evaluation {
     loss: Loss,
     views: Arc<[View]>,
-    /// Which of the views have been seen, in the order of `seen`.
+    /// Indices of the views that have been rendered, in the order of `seen`.
     which: Vec<usize>,
     seen: Vec<Seen>,
     parameters: usize,
-    /// The gradient by each group of unknowns.
+    /// The gradient with respect to each group of unknowns.
     groups: Vec<Vec<f64>>,
 }
 
 impl Evaluation {
-    /// What halves of all views' samples tell by a loss; by one of `parameters` there is a derivative each.
+    /// The evaluation of a loss from both halves of the samples of all views; each half has a derivative image for each
+    /// of `parameters`.
     ///
     /// # Errors
-    /// When their number, sizes or derivatives are others than the views' and parameters'.
+    /// When the number of halves, their sizes or their derivatives do not match the views and parameters.
     pub fn of(
         loss: Loss,
         views: impl Into<Arc<[View]>>,
@@ -87,7 +88,7 @@ impl Evaluation {
         Self::of_some(loss, views, all, halves, parameters)
     }
 
-    /// What halves of the samples of some views tell, which are given by their numbers.
+    /// The evaluation from both halves of the samples of some views, which are given by their indices.
     pub(super) fn of_some(
         loss: Loss,
         views: Arc<[View]>,
@@ -111,24 +112,24 @@ impl Evaluation {
         Ok(Self { loss, views, which, seen, parameters, groups: Vec::new() })
     }
 
-    /// Whether a view has been seen, where only some were asked for.
+    /// Whether a view has been rendered; an evaluation may be of some views only.
     #[must_use]
     pub fn sees(&self, view: usize) -> bool {
         self.which.contains(&view)
     }
 
-    /// Whether all views have been seen.
+    /// Whether all views have been rendered.
     #[must_use]
     pub fn sees_all(&self) -> bool {
         self.which.len() == self.views.len()
     }
 
-    /// What the sums over the views that were seen count for all.
+    /// The factor that takes sums over the rendered views to sums over all views.
     fn scale(&self) -> f64 {
         self.views.len() as f64 / self.which.len() as f64
     }
 
-    /// With the gradient by each group of unknowns.
+    /// Adds the gradient with respect to each group of unknowns.
     pub(super) fn with_groups(mut self, mut groups: Vec<Vec<f64>>) -> Self {
         let scale = self.scale();
         groups.iter_mut().flatten().for_each(|g| *g *= scale);
@@ -136,7 +137,8 @@ impl Evaluation {
         self
     }
 
-    /// The gradient of the loss by the values of a [`Group`](super::Group), in their order; none where there is no such group.
+    /// The gradient of the loss with respect to the values of a [`Group`](super::Group), in their order; empty where
+    /// there is no such group.
     #[must_use]
     pub fn group_gradient(&self, group: usize) -> &[f64] {
         self.groups.get(group).map_or(&[], Vec::as_slice)
@@ -146,14 +148,14 @@ impl Evaluation {
         self.which.iter().map(|v| &self.views[*v]).zip(&self.seen)
     }
 
-    /// The loss of the images by all samples, summed over views. Their noise adds to it.
+    /// The loss of the images from all samples, summed over views. The noise of the images adds to it.
     #[must_use]
     pub fn loss(&self) -> f64 {
         let losses = self.pairs().map(|(v, s)| self.loss.value(&s.image(), &v.reference));
         self.scale() * losses.sum::<f64>()
     }
 
-    /// The gradient of the loss by the parameters, from images and derivatives with independent errors.
+    /// The gradient of the loss with respect to the parameters, from images and derivatives with independent errors.
     #[must_use]
     pub fn gradient(&self) -> Vec<f64> {
         let mut gradient = alloc::vec![0.0; self.parameters];
@@ -170,8 +172,8 @@ impl Evaluation {
 
     /// The covariance of the [gradient](Self::gradient)'s errors, one row per parameter.
     ///
-    /// From what the halves differ by, to first order in the noise; errors of pixels that are far apart
-    /// are taken as independent.
+    /// It is estimated from the difference of the halves, to first order in the noise; errors of pixels that are far
+    /// apart are taken to be independent.
     #[must_use]
     pub fn covariance(&self) -> Vec<Vec<f64>> {
         let n = self.parameters;
@@ -207,8 +209,8 @@ impl Evaluation {
         covariance.iter().enumerate().map(|(i, row)| fm::sqrt(row[i])).collect()
     }
 
-    /// The second derivatives of the loss as far as they come from the first derivatives of the images
-    /// (Gauss and Newton's), one row per parameter; unbiased as the gradient.
+    /// The Gauss-Newton approximation of the loss's second derivatives, from the first derivatives of the images, one
+    /// row per parameter; as unbiased as the gradient.
     #[must_use]
     pub fn curvature(&self) -> Vec<Vec<f64>> {
         let n = self.parameters;
@@ -229,9 +231,9 @@ impl Evaluation {
         curvature
     }
 
-    /// What the noise of the derivatives adds to their squares, in the units of
-    /// [`curvature`](Self::curvature): that plus this is the mean of the halves' own, which are positive but
-    /// biased.
+    /// The part that the noise of the derivatives adds to their squares, in the units of
+    /// [`curvature`](Self::curvature). The sum of both is the mean of the curvatures of the single halves, which are
+    /// positive but biased.
     #[must_use]
     pub fn curvature_noise(&self) -> Vec<Vec<f64>> {
         let n = self.parameters;
@@ -255,15 +257,15 @@ impl Evaluation {
         noise
     }
 
-    /// How far the noise of this evaluation alone would lead a Newton step astray, per parameter: a
-    /// measure of how well the samples determine the values. `None` where the images do not tell the
-    /// parameters apart.
+    /// The standard error of a Newton step that is due to the noise of this evaluation, per parameter: a
+    /// measure of how well the samples determine the values. `None` where the images do not distinguish the
+    /// parameters.
     #[must_use]
     pub fn uncertainty(&self) -> Option<Vec<f64>> {
         newton_noise(&self.curvature(), &self.covariance())
     }
 
-    /// What a Newton step would add to the parameters: how far they seem to be from their goal. `None`
+    /// The change of the parameters by a Newton step, an estimate of their distance from the optimum. `None`
     /// as for [`uncertainty`](Self::uncertainty).
     #[must_use]
     pub fn newton_step(&self) -> Option<Vec<f64>> {
@@ -271,7 +273,7 @@ impl Evaluation {
         Some(step.into_iter().map(|s| -s).collect())
     }
 
-    /// The image of a view by all samples, row by row from the top left.
+    /// The image of a view from all samples, row by row from the top left.
     ///
     /// # Panics
     /// When there is no such view, or it has not been [seen](Self::sees).
@@ -285,7 +287,7 @@ impl Evaluation {
         &self.seen[place.unwrap_or(usize::MAX)]
     }
 
-    /// The derivative of a view's image by a parameter, by all samples.
+    /// The derivative of a view's image with respect to a parameter, from all samples.
     ///
     /// # Panics
     /// When there is no such view or parameter, or the view has not been [seen](Self::sees).
@@ -294,7 +296,7 @@ impl Evaluation {
         self.of_view(view).derivative(parameter)
     }
 
-    /// True when the derivative by a parameter is zero in every pixel of every view.
+    /// True when the derivative with respect to a parameter is zero in every pixel of every view.
     ///
     /// # Panics
     /// When there is no such parameter.

@@ -1,8 +1,9 @@
-//! Unknowns that are too many to name: vertices of a shape or of a cage around it, voxels, texels.
+//! Groups of very many unknowns of one kind: vertices of a shape or of a cage around it, voxels, texels.
 //!
-//! A group has absolute values, in the order and the units of the scene that a fit is given: positions in the scene's coordinates in the order of
-//! the shape's file, voxels as the grid stores them (before its scale), texels as the texture stores them, channel by channel. They are set before any parameter acts,
-//! and their gradient is that by these values: what parameters that move the shape do to it is pulled back.
+//! The values of a group are absolute, in the order and the units of the scene that a fit is given: positions in the
+//! scene's coordinates in the order of the shape's file, voxels as the grid stores them (before its scale), texels as
+//! the texture stores them, channel by channel. They are set before any parameter acts. The gradient is with respect to
+//! these values: it is propagated back through parameters that move the shape.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -21,18 +22,18 @@ use crate::model::error::Error;
 use crate::model::scene::{Scene, Target, TargetName};
 use crate::model::surface;
 
-/// Many unknowns of one kind.
+/// Very many unknowns of one kind.
 #[derive(Clone, Debug)]
 pub struct Group {
-    /// Its name, for messages and files.
+    /// Name of the group, for messages and files.
     pub name: String,
-    /// What they change.
+    /// The item of the scene that the unknowns change.
     pub target: Target,
-    /// What they are.
+    /// The kind of unknowns.
     pub kind: GroupKind,
 }
 
-/// What the unknowns of a [`Group`] are.
+/// The kind of unknowns of a [`Group`].
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum GroupKind {
@@ -42,14 +43,15 @@ pub enum GroupKind {
     Cage(Arc<Mesh>),
     /// Each voxel's value, channel by channel.
     Voxels(drt_medium::Property),
-    /// Each texel's value of the texture that stands for a property, channel by channel; of a number, that alone.
+    /// Each texel's value of a property's texture, channel by channel; one value per texel where the property is a
+    /// number.
     Texels {
-        /// What the texture stands for.
+        /// The property that has the texture.
         property: surface::Property,
         /// The property is a number.
         number: bool,
     },
-    /// Each texel's value of the image that tells an emitter's light, channel by channel.
+    /// Each texel's value of the image of an emitter's light, channel by channel.
     LightTexels,
 }
 
@@ -74,7 +76,7 @@ impl Group {
         Ok(group)
     }
 
-    /// Refuses groups that would both decide the same values.
+    /// Refuses groups that would set the same values.
     pub(super) fn check_together(groups: &[Self]) -> Result<(), Error> {
         for (i, group) in groups.iter().enumerate() {
             let same = |other: &&Self| {
@@ -100,7 +102,7 @@ impl Group {
         Error::Group { group: self.name.clone(), reason: reason.to_string() }
     }
 
-    /// The values that it has in a scene; of a cage, where its vertices are.
+    /// The values of the group in a scene; for a cage, the positions of its vertices.
     #[must_use]
     pub fn values(&self, scene: &Scene) -> Vec<f64> {
         let coordinates = |positions: &[Vec3]| -> Vec<f64> {
@@ -135,11 +137,11 @@ impl Group {
         }
     }
 
-    /// Gives a `scene` these values, where `given` is the one that the group was made for. In `scene` other groups, and nothing else, may have
-    /// been given their values before.
+    /// Sets the group's values in a `scene`, where `given` is the scene that the group was made for. In `scene`, only
+    /// other groups may have been set before.
     ///
     /// # Errors
-    /// When their number is another, one is not finite, or out of its range.
+    /// When the number of values is wrong, or a value is not finite or out of its range.
     pub fn apply(&self, given: &Scene, values: &[f64], scene: &mut Scene) -> Result<(), Error> {
         let start = self.values(given);
         if start.len() != values.len() {
@@ -205,11 +207,11 @@ impl Group {
         Ok(())
     }
 
-    /// What takes the group's part out of gradients by its target. `given` is the scene that the group was made for, `scene` the one that
-    /// is differentiated: the parameters have acted on it.
+    /// The collector that extracts the group's part from gradients with respect to its target. `given` is the scene
+    /// that the group was made for, `scene` the one that is differentiated, on which the parameters have acted.
     ///
     /// # Errors
-    /// When a parameter moves single vertices of the group's shape, which cannot be pulled back.
+    /// When a parameter moves single vertices of the group's shape, through which gradients cannot be propagated back.
     pub fn collector(
         &self,
         given: &Scene,
@@ -281,7 +283,7 @@ fn voxel_scale(medium: &drt_medium::Medium, property: drt_medium::Property) -> f
     }
 }
 
-/// Takes a [`Group`]'s part out of gradients.
+/// Extracts a [`Group`]'s part from gradients.
 #[derive(Debug)]
 pub struct Collector(Take);
 
@@ -309,7 +311,7 @@ struct OfShape {
 }
 
 impl Collector {
-    /// Adds the group's part of the gradient of a loss, one number per value and in their order, to the end of a list.
+    /// Appends the group's part of the gradient of a loss to a list, one number per value and in their order.
     pub fn collect(&self, gradient: &SceneGradient, out: &mut Vec<f64>) {
         match &self.0 {
             Take::Voxels(m, property, scale) => {

@@ -1,19 +1,19 @@
-//! Fitting parameters to pictures: what one iteration needs to know.
+//! Fitting parameters to pictures: the loss and gradient that one iteration needs.
 //!
-//! An image is an estimate, and so is its derivative; where both come from the same samples, their
-//! errors multiply to something that does not average out. Every iteration therefore takes its samples
-//! in two independent halves A and B, and pairs the adjoint a = dLoss/dI of one with the derivative of
+//! An image I is an estimate, and so is its derivative dI. Where both come from the same samples, the product of their
+//! errors does not average out. Every iteration therefore takes its samples
+//! in two independent halves A and B, and pairs the adjoint a = dLoss/dI of one half with the derivative of
 //! the other:
 //!
 //! ```text
 //! gradient = (⟨a(I_A), dI_B⟩ + ⟨a(I_B), dI_A⟩) / 2.
 //! ```
 //!
-//! That is unbiased where the adjoint is linear in the image, as it is for squared losses
-//! ([`Loss::L2`], [`Loss::PyramidL2`]), with any number of samples; for the others it is as far as the
-//! image's own noise matters less than its distance from the target. All samples still serve image and
-//! derivative alike, and a first-order expansion shows that nothing is lost: the error is that of the
-//! shared product, without its bias.
+//! For any number of samples this is unbiased where the adjoint is linear in the image, as it is for squared losses
+//! ([`Loss::L2`], [`Loss::PyramidL2`]). For other losses it is nearly unbiased where the
+//! image's noise is small compared with its distance from the target. All samples are still used for both image and
+//! derivative, and a first-order expansion shows that nothing is lost: the error is that of the
+//! product with shared samples, without its bias.
 
 mod evaluation;
 mod group;
@@ -42,27 +42,27 @@ pub use crate::fit::group::{Collector, Group, GroupKind};
 use crate::fit::source::{Applied, ImageSource};
 pub use crate::fit::step::{Misstep, check_step};
 
-/// A picture that a scene shall look like.
+/// A sensor, and the image that it should see.
 #[derive(Clone, Debug)]
 pub struct View {
     /// Index of the sensor that sees it.
     pub sensor: usize,
-    /// What it shall see.
+    /// The image that it should see.
     pub reference: Reference,
-    /// What is known to be otherwise in this view, as a body on a turntable is: changes by their parameters' values, after all that is
-    /// fitted. Gradients go back through them.
+    /// Known changes of the scene in this view, as of a body on a turntable: they are applied at their parameters'
+    /// values, after all that is fitted. Gradients are propagated back through them.
     pub pose: Vec<Parameter>,
 }
 
 impl View {
-    /// What a sensor shall see of the scene as it is.
+    /// A view of the scene without a pose.
     #[must_use]
     pub fn new(sensor: usize, reference: Reference) -> Self {
         Self { sensor, reference, pose: Vec::new() }
     }
 }
 
-/// A scene, what may change in it, and what it shall look like.
+/// A scene, the parameters and groups that are fitted, and the views that it should match.
 pub struct Fit {
     /// As it was given.
     given: Scene,
@@ -87,8 +87,8 @@ pub struct Fit {
 const HALF: u64 = 0xd1b5_4a32_d192_ed03;
 
 impl Fit {
-    /// `scene` at its parameters' zero; their own values matter to what is chosen for [`EstimatorKind::Auto`] alone. `settings` says
-    /// how images and derivatives are estimated, its sensor aside.
+    /// `scene` at its parameters' zero; their own values matter to what is chosen for [`EstimatorKind::Auto`] alone.
+    /// `settings` says how images and derivatives are estimated, its sensor aside.
     ///
     /// # Errors
     /// When there is no view, a view's sensor does not exist or has a film of another size, or a number
@@ -135,11 +135,12 @@ impl Fit {
     }
 
     /// This fit with groups of unknowns beside its parameters. They have the values of the scene until
-    /// [`set_group`](Self::set_group) gives them others, and gradients come from reverse mode, whatever the number of unknowns.
+    /// [`set_group`](Self::set_group) gives them others, and gradients come from reverse mode, whatever the number of
+    /// unknowns.
     ///
     /// # Errors
-    /// When images are differentiated by [`EstimatorKind::FiniteDifference`], which has no reverse mode, and when two groups decide the same
-    /// values.
+    /// When images are differentiated by [`EstimatorKind::FiniteDifference`], which has no reverse mode, and when two
+    /// groups decide the same values.
     pub fn with_groups(mut self, groups: Vec<Group>) -> Result<Self, Error> {
         if !groups.is_empty() && self.settings.estimator == EstimatorKind::FiniteDifference {
             return Err(Error::Setting { setting: "estimator", reason: SettingError::NoSession });
@@ -202,9 +203,9 @@ impl Fit {
     }
 
     /// Loss and derivatives at these values of the parameters, from `spp` samples per pixel of each view, and at
-    /// least two; boundary samples are as many in proportion as the settings say. The same seed gives
-    /// the same result, whatever the settings' own, and whatever was evaluated before: what has not
-    /// changed since is used again. `None` when `control` cancelled it.
+    /// least two; the settings say how many boundary samples there are for each of them. A seed always gives
+    /// one result, whatever the seed of the settings and whatever was evaluated before; parts of the scene that have
+    /// not changed since are used again. `None` when `control` cancelled it.
     ///
     /// # Errors
     /// As [`Session::new`](crate::Session::new).
@@ -219,8 +220,8 @@ impl Fit {
         self.evaluate_views(values, spp, seed, &all, control)
     }
 
-    /// As [`evaluate`](Self::evaluate), of some of the views alone: loss and derivatives are those of the views that are seen, times the number of
-    /// all over that of these, as an estimate of what all would tell.
+    /// As [`evaluate`](Self::evaluate), of some of the views alone: loss and derivatives are those of the views that
+    /// are seen, times the number of all over that of these, as an estimate of what all would tell.
     ///
     /// # Errors
     /// As [`evaluate`](Self::evaluate), and when there is no such view.
@@ -260,8 +261,8 @@ impl Fit {
         Ok(Some(seen.with_groups(groups)))
     }
 
-    /// What one view's images tell, and their part in the gradients of groups: the adjoint of each half's image, times the derivatives
-    /// of samples that are those of the other half.
+    /// What one view's images tell, and their part in the gradients of groups: the adjoint of each half's image, times
+    /// the derivatives of samples that are those of the other half.
     fn halves_and_groups(
         &mut self,
         values: &[f64],
@@ -306,8 +307,8 @@ impl Fit {
         Ok(Some(halves))
     }
 
-    /// What one view's images tell: some of its two halves, as [`evaluate`](Self::evaluate) takes them. `None` when `control`
-    /// cancelled it.
+    /// What one view's images tell: some of its two halves, as [`evaluate`](Self::evaluate) takes them. `None` when
+    /// `control` cancelled it.
     ///
     /// # Errors
     /// As [`evaluate`](Self::evaluate), and when there is no such view or half.
@@ -384,7 +385,8 @@ impl Fit {
     }
 }
 
-/// How each view's derivatives are estimated: as the settings say, or as a pilot finds out, which is the same whatever the seed.
+/// How each view's derivatives are estimated: as the settings say, or as a pilot finds out, which is the same whatever
+/// the seed.
 fn estimators(
     scene: &Scene,
     parameters: &[Parameter],

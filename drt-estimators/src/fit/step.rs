@@ -1,4 +1,5 @@
-//! Steps that no small step would have led to.
+//! Steps of a fit that are too large: no sequence of small, physically possible steps leads from one scene to the
+//! other.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -11,7 +12,7 @@ use thiserror::Error;
 use crate::model::scene::{Scene, Shape};
 use crate::model::surface::Bsdf;
 
-/// Why one scene cannot have become another by a step of a fit.
+/// The reason why a step of a fit from one scene to another is refused.
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum Misstep {
@@ -26,10 +27,10 @@ pub enum Misstep {
     Folded {
         /// The shape.
         shape: String,
-        /// Part of its area.
+        /// The part of its area that has turned over, in percent.
         percent: f64,
     },
-    /// A light or camera is on the other side of a surface that lets no light through.
+    /// A light or camera has passed through an opaque surface.
     #[error("`{item}` passed through `{wall}`")]
     Through {
         /// The light or camera.
@@ -49,11 +50,11 @@ const RIGID: f64 = 1e-9;
 const ON: f64 = 1e-9;
 
 /// Checks a step between two scenes that differ by their parameters' values only: a shape that has
-/// turned inside out or folded over, a light or one of these sensors that passed through a wall. What
-/// moves is taken to move straight.
+/// turned inside out or folded over, or a light or one of these sensors that has passed through a wall, is an error.
+/// Everything that moves is assumed to move along straight lines.
 ///
 /// # Errors
-/// The first such thing.
+/// The first of these faults that is found.
 pub fn check_step(before: &Scene, after: &Scene, sensors: &[usize]) -> Result<(), Misstep> {
     let shapes = || before.shapes.iter().zip(&after.shapes).enumerate();
     for (i, (a, b)) in shapes().filter(|(_, (a, b))| !Arc::ptr_eq(&a.mesh, &b.mesh)) {

@@ -1,4 +1,4 @@
-//! Scenes put together by names.
+//! A builder of scenes whose elements refer to each other by names.
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -94,12 +94,12 @@ impl ShapeBuilder {
         Self { mesh, bsdf, interior: None, exterior: None, emitter: None, to_world: None }
     }
 
-    /// Puts the medium of an id behind the surface. Without it, and with an exterior, vacuum is there.
+    /// Puts the medium of an id behind the surface. If only an exterior is given, vacuum is behind it.
     pub fn interior(self, medium: impl Into<String>) -> Self {
         Self { interior: Some(medium.into()), ..self }
     }
 
-    /// Puts the medium of an id before the surface. Without it, and with an interior, vacuum is there.
+    /// Puts the medium of an id in front of the surface. If only an interior is given, vacuum is in front of it.
     pub fn exterior(self, medium: impl Into<String>) -> Self {
         Self { exterior: Some(medium.into()), ..self }
     }
@@ -109,7 +109,7 @@ impl ShapeBuilder {
         Self { emitter: Some(emitter), ..self }
     }
 
-    /// Makes the shape an instance, whose mesh is in a space of its own, and which this map takes to the world.
+    /// Makes the shape an instance, whose mesh is in a space of its own; this map takes that space to the world.
     pub fn to_world(self, map: Affine) -> Self {
         Self { to_world: Some(map), ..self }
     }
@@ -139,13 +139,13 @@ impl SceneBuilder {
         self
     }
 
-    /// Adds an emitter without a shape, in the medium that the interfaces around it say.
+    /// Adds an emitter without a shape. Its medium is found from the interfaces around it.
     pub fn emitter(mut self, id: impl Into<String>, emitter: Emitter) -> Self {
         self.emitters.push(Named::new(id, counted(emitter)));
         self
     }
 
-    /// Adds a sensor with its film, in the medium that the interfaces around it say.
+    /// Adds a sensor with its film. Its medium is found from the interfaces around it.
     pub fn sensor(mut self, id: impl Into<String>, sensor: Sensor) -> Self {
         let sensor = SceneSensor { sensor, medium: Surrounding::Counted, sample_count: None };
         self.sensors.push(Named::new(id, sensor));

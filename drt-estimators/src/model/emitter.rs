@@ -29,7 +29,7 @@ use crate::model::texture::{Footprint, TexelChange, TexelError, TexelTangent, Te
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum EmitterError {
-    /// A direction that does not exist.
+    /// A direction that is zero.
     #[error("the {0} emitter's direction is the zero vector; give a direction, of any length")]
     ZeroDirection(&'static str),
     /// A NaN or infinity.
@@ -40,7 +40,7 @@ pub enum EmitterError {
         /// The offending field.
         what: &'static str,
     },
-    /// Light below zero.
+    /// Emission below zero.
     #[error("the {kind} emitter's {what} has a channel of {value}; it must not be negative")]
     Negative {
         /// Kind of the emitter.
@@ -50,7 +50,7 @@ pub enum EmitterError {
         /// The channel's value.
         value: f64,
     },
-    /// A cone that does not exist.
+    /// Angles that are not those of a cone.
     #[error(
         "the spot emitter's cutoff_angle is {cutoff_angle} and its beam_width {beam_width} \
          degrees; expected 0 <= beam_width <= cutoff_angle <= 180 and cutoff_angle > 0"
@@ -64,7 +64,7 @@ pub enum EmitterError {
     /// A motion that flattens the emitter.
     #[error("the motion takes the {0} emitter's direction to zero; choose a value nearer to zero")]
     Flattened(&'static str),
-    /// A motion of surroundings that is no rotation.
+    /// A motion of an environment that is not a rotation.
     #[error("surroundings are infinitely far away: they can be turned (`rotate`), nothing else")]
     OnlyTurns,
     /// A property that this kind of emitter does not have.
@@ -77,54 +77,54 @@ pub enum EmitterError {
         /// Names that exist.
         known: &'static str,
     },
-    /// Different numbers for the channels of something that has none.
+    /// Different numbers for the channels of a property that is a single number.
     #[error("`{0}` is a single number; give three equal ones")]
     NotScalar(&'static str),
 }
 
-/// A source of light. [`checked`](Self::checked) makes directions unit vectors; everything else
-/// here relies on it.
+/// An emitter. [`checked`](Self::checked) makes directions unit vectors; all other methods
+/// rely on that.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Emitter {
-    /// A shape that glows on its front side.
+    /// A shape that emits on its front side.
     Area {
-        /// Radiance, the same in all directions.
+        /// Radiance, equal in all directions.
         radiance: Rgb,
     },
-    /// A shape that glows on its front side, as a texture says.
+    /// A shape that emits on its front side, with a texture of radiance.
     TexturedArea {
         /// Factor of the texture.
         radiance: Rgb,
-        /// Radiance by texture coordinates, the same in all directions.
+        /// Radiance by texture coordinates, equal in all directions.
         texture: Texture,
     },
-    /// A point that shines equally in all directions.
+    /// A point that emits equally in all directions.
     Point {
-        /// Where it is.
+        /// Its position.
         position: Vec3,
         /// Power per steradian.
         intensity: Rgb,
     },
-    /// A point that shines in a cone.
+    /// A point that emits into a cone.
     Spot {
-        /// Where it is.
+        /// Its position.
         position: Vec3,
         /// The cone's axis.
         direction: Vec3,
-        /// Power per steradian inside the beam.
+        /// Power per steradian inside the inner cone.
         intensity: Rgb,
-        /// Angle from the axis at which the light ends, in radians.
+        /// Angle from the axis at which the intensity becomes zero, in radians.
         cutoff_angle: f64,
-        /// Angle from the axis up to which it is full, in radians; between the two it falls
-        /// linearly with the angle.
+        /// Angle from the axis up to which the intensity is full (the inner cone), in radians; between the two angles
+        /// it falls linearly with the angle.
         beam_width: f64,
     },
-    /// A point that throws a picture: Mitsuba's `projector`, and its `spot` with a texture.
+    /// A point that projects a picture: Mitsuba's `projector`, and its `spot` with a texture.
     Projector {
-        /// Where it is.
+        /// Its position.
         position: Vec3,
         /// Its axes, which light leaves along the last of; they may be mirrored.
         frame: Mat3,
@@ -135,17 +135,17 @@ pub enum Emitter {
     },
     /// Parallel light from infinitely far away.
     Directional {
-        /// Where the light flows to.
+        /// Direction of flow.
         direction: Vec3,
         /// Power per area perpendicular to the flow.
         irradiance: Rgb,
     },
-    /// A sky of the same radiance in all directions.
+    /// An environment of constant radiance.
     Constant {
         /// The radiance.
         radiance: Rgb,
     },
-    /// A sky that an image tells the radiance of.
+    /// An environment whose radiance is an image (environment map).
     Envmap {
         /// Factor of the image.
         radiance: Rgb,
@@ -154,7 +154,7 @@ pub enum Emitter {
     },
 }
 
-/// A direction of flow drawn from a point or spot light.
+/// A direction of flow sampled from a point or spot light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FlowSample {
     /// Unit vector.
@@ -190,7 +190,7 @@ impl Emitter {
         }
     }
 
-    /// The same emitter with unit directions.
+    /// This emitter with unit directions.
     ///
     /// # Errors
     /// Names the field that is not finite, a zero direction, or a cone that is none.
@@ -252,7 +252,7 @@ impl Emitter {
         }
     }
 
-    /// True for lights of points and directions, which no ray can hit.
+    /// True for point, spot and directional emitters (delta lights), which no ray can hit.
     #[must_use]
     pub fn is_delta(&self) -> bool {
         !(self.is_area() || self.is_environment())
@@ -268,7 +268,7 @@ impl Emitter {
         }
     }
 
-    /// Where a light that is a point is.
+    /// The position of an emitter that is a point.
     #[inline]
     #[must_use]
     pub fn position(&self) -> Option<Vec3> {
@@ -280,13 +280,13 @@ impl Emitter {
         }
     }
 
-    /// True for a shape that glows.
+    /// True for a shape that emits.
     #[must_use]
     pub fn is_area(&self) -> bool {
         matches!(self, Self::Area { .. } | Self::TexturedArea { .. })
     }
 
-    /// Columns and rows of the image that tells its light, if one does.
+    /// Columns and rows of the image of its emission, if there is one.
     #[must_use]
     pub fn texels(&self) -> Option<[u32; 2]> {
         match self {
@@ -363,8 +363,8 @@ impl Emitter {
         }
     }
 
-    /// Power sent into a scene inside a sphere of `scene_radius`, mean of the channels (of an image's factor and its mean apart): what
-    /// emitters are chosen by. That of an area emitter is per unit of area.
+    /// Power sent into a scene inside a sphere of `scene_radius`, mean of the channels (of an image's factor and its
+    /// mean apart): what emitters are chosen by. That of an area emitter is per unit of area.
     #[must_use]
     pub fn power(&self, scene_radius: f64) -> f64 {
         let disk = PI * scene_radius * scene_radius;

@@ -1,7 +1,8 @@
 //! Two emitters in one place: surfaces of lamps that overlap in a common plane.
 //!
-//! Of surfaces that coincide, a ray meets the one with the lower number. Where both shine, next-event estimation samples each of
-//! them, and the radiance of the second would depend on how it was found. Which of the two should be seen is for the scene to say.
+//! Where surfaces coincide, a ray hits the one with the lower number. Where both emit, next-event estimation samples
+//! each of them, and the radiance of the second would depend on how it was found. Which of the two should be seen is
+//! for the scene to say.
 
 use alloc::vec::Vec;
 
@@ -20,8 +21,8 @@ struct Emitting {
     bounds: Aabb,
 }
 
-/// Two shapes that emit and overlap in one plane, where there are such, the lower number first. `shapes` are those that emit, by
-/// their numbers, and their triangles.
+/// Two shapes that emit and overlap in one plane, where there are such, the lower number first. `shapes` are those that
+/// emit, by their numbers, and their triangles.
 pub(super) fn overlapping_lamps<T: Iterator<Item = Corners>>(
     shapes: impl Iterator<Item = (usize, T)>,
 ) -> Option<[usize; 2]> {

@@ -1,4 +1,4 @@
-//! What can be wrong with a scene or a request.
+//! Errors of a scene or a request.
 
 mod effect;
 mod element;
@@ -70,7 +70,8 @@ pub enum Error {
 }
 
 impl Error {
-    /// The parameter whose value takes a property out of the range in which it has a meaning, where that is what is wrong.
+    /// The parameter whose value takes a property out of the range in which it has a meaning, where that is what is
+    /// wrong.
     #[must_use]
     pub fn out_of_range(&self) -> Option<&str> {
         match self {

@@ -1,4 +1,4 @@
-//! Reconstruction filters: how much each point of the image plane counts towards a pixel.
+//! Reconstruction filters: the weight that each point of the image plane has in a pixel.
 
 mod row;
 mod sampling;
@@ -53,8 +53,8 @@ pub enum FilterKind {
     },
 }
 
-/// How far beside a jump of a filter an image point still counts as lying on it, in pixels: far more than rounding, far less
-/// than anything that an image shows.
+/// How far beside a jump of a filter an image point still counts as lying on it, in pixels: far more than rounding, far
+/// less than anything that an image shows.
 pub(crate) const ON_BORDER: f64 = 1e-8;
 
 impl FilterKind {
@@ -96,13 +96,13 @@ pub enum FilterError {
         /// Its value in pixels.
         value: f64,
     },
-    /// A support over which samples would have to be spread for too long.
+    /// A support that is too wide: every sample would have to be added to too many pixels.
     #[error("the reconstruction filter reaches {radius} pixels far; at most 256")]
     TooWide {
         /// Radius in pixels.
         radius: f64,
     },
-    /// A Gaussian cut where nothing of its shape, or no number, is left.
+    /// A Gaussian that is cut so near or so far that its shape, or a finite number, is lost.
     #[error(
         "the gaussian filter's radius {radius} must be between 0.001 and 30 standard deviations \
          ({std_dev}); 4 are usual"
@@ -215,7 +215,7 @@ impl Filter {
         Ok(Self { kind, radius, scale, peak, decay, half })
     }
 
-    /// What the filter was made from.
+    /// The shape from which the filter was made.
     #[must_use]
     pub fn kind(&self) -> FilterKind {
         self.kind

@@ -1,6 +1,6 @@
-//! What a scene is made of, what is asked of an estimator, and what comes out.
+//! The contents of a scene, the settings of estimators, and their results.
 //!
-//! Plain data: nothing here follows a ray.
+//! These are plain data: nothing here traces a ray.
 
 pub(crate) mod builder;
 pub mod emitter;

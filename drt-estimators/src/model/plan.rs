@@ -4,7 +4,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
-/// How a medium is tracked, and how surface velocities reach its inside.
+/// How a medium is tracked, and which velocity field its inside has.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MediumPlan {
@@ -12,23 +12,24 @@ pub struct MediumPlan {
     pub medium: String,
     /// `closed form` or `delta tracking`.
     pub tracking: String,
-    /// Per parameter that moves it: its name and `affine`, `blend` or `static with flux`.
+    /// For each parameter that moves it, the parameter's name and the field: `affine`, `blend`, `tetrahedral`,
+    /// `mean value` or `static`, followed by `with flux` where flux through surfaces is added.
     pub motion: Vec<(String, String)>,
 }
 
-/// What a run will do and what it skips.
+/// What a session will run and what it skips.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plan {
     /// The estimators of derivatives, and the light that each differentiates.
     pub estimators: Vec<String>,
-    /// Which estimator was chosen and why, where that was left open.
+    /// The estimator that was chosen and the reason, where the settings leave the choice open.
     pub estimator: Option<String>,
-    /// Media that a path can meet.
+    /// Media that a path can enter.
     pub media: Vec<MediumPlan>,
-    /// True when paths leave records to differentiate.
+    /// True when paths are recorded, to be differentiated.
     pub record: bool,
-    /// Shapes that move under some parameter.
+    /// Shapes that move with some parameter.
     pub moving_shapes: Vec<String>,
     /// Edges at which visibility can change, out of all edges.
     pub edges: [u64; 2],
@@ -40,17 +41,17 @@ pub struct Plan {
     pub direct: bool,
     /// Boundary segments between scattering vertices are sampled.
     pub indirect: bool,
-    /// Surfaces whose flux into static media is sampled.
+    /// Surfaces beside media whose inside does not follow them: the flux through these surfaces is sampled.
     pub flux_shapes: Vec<String>,
-    /// Image points come in mirrored pairs.
+    /// Image points come in antithetic pairs, mirrored at the pixel's centre.
     pub antithetic: bool,
-    /// Paths of the image count for every pixel that they reach.
+    /// Paths of the image count for every pixel whose filter they reach.
     pub splatting: bool,
     /// Paths of the image, and of the interior term, come from emitters, too.
     pub bidirectional: bool,
-    /// Which of the two was chosen and why, where that was left open.
+    /// The kind of paths that was chosen and the reason, where the settings leave the choice open.
     pub sampling: Option<String>,
-    /// What is known of guides of boundary samples.
+    /// What guides of boundary samples have learnt, in words, one entry for each kind of boundary samples.
     pub guiding: Vec<String>,
     /// What is skipped, and why.
     pub skipped: Vec<String>,

@@ -47,11 +47,12 @@ pub struct Layer {
     pub tail: Tail,
 }
 
-/// How much of the second moment of a mean its largest sample is.
+/// The second moment of a mean, and the share that its largest sample has in it.
 ///
-/// Standard errors are estimated from the samples themselves, and hold only where the second moment is finite and has settled. Where
-/// samples fall off like a power of their size, as 1 / distance does where surfaces slide along each other, the largest one remains a
-/// sizeable part of all, however many there are, and the true error may be larger than the estimated one.
+/// Standard errors are estimated from the samples themselves, and are valid only where the second moment is finite and
+/// has converged. Where the distribution of samples has a power-law tail, as 1 / distance has where surfaces slide
+/// along each other, the largest sample keeps a sizeable share however many samples there are, and the true error may
+/// be larger than the estimated one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Tail {
@@ -87,23 +88,24 @@ impl Tail {
     }
 }
 
-/// The parts a derivative image is the sum of.
+/// The summands of a derivative image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Term {
-    /// Differentiated contributions of material paths.
+    /// The interior term: differentiated contributions along paths.
     Interior,
     /// Visibility from the camera, and jumps of the pixel filter.
     Primary,
-    /// Visibility between an emitter and the first vertex it lights; of
-    /// [`EstimatorKind::Radiative`](crate::EstimatorKind::Radiative) the edges that the first scattering vertex sees.
+    /// Visibility between an emitter and the first vertex it lights; in
+    /// [`EstimatorKind::Radiative`](crate::EstimatorKind::Radiative), edges that the first scattering vertex sees.
     Direct,
-    /// Visibility between scattering vertices; or the edges that later ones see.
+    /// Visibility between scattering vertices; in [`EstimatorKind::Radiative`](crate::EstimatorKind::Radiative), edges
+    /// that later vertices see.
     Indirect,
-    /// Flux of scattering through moving surfaces around a static inside.
+    /// Flux of scattering through moving surfaces that the inside of a medium does not follow.
     Flux,
-    /// What vertices owe to the edges that they move with, by [`EstimatorKind::Warped`](crate::EstimatorKind::Warped).
+    /// What the motion of edges adds along paths, in [`EstimatorKind::Warped`](crate::EstimatorKind::Warped).
     Warp,
 }
 
@@ -154,7 +156,7 @@ pub struct Counters {
     pub boundary_samples: u64,
     /// Pixel borders sampled.
     pub border_samples: u64,
-    /// Of these and of boundary segments, the samples by which guides were learnt.
+    /// Samples of pixel borders and boundary segments that pilots took to learn guides.
     pub guide_samples: u64,
     /// Points on moving surfaces sampled for the flux term.
     pub flux_samples: u64,
@@ -180,11 +182,11 @@ impl Counters {
     }
 }
 
-/// A contribution that was not a finite number, with what replays it.
+/// A contribution that was not a finite number, with the random numbers that reproduce it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NonFinite {
-    /// The term it belongs to; `None` is the image itself.
+    /// The term that it belongs to; `None` is the image itself.
     pub term: Option<Term>,
     /// Seed, stream and index of the random numbers.
     pub seed: u64,
@@ -223,7 +225,7 @@ impl Account {
     }
 }
 
-/// A finished (or cancelled) run.
+/// The results of a finished (or cancelled) session.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Rendering {
@@ -241,6 +243,6 @@ pub struct Rendering {
     pub non_finite_examples: Vec<NonFinite>,
     /// Samples per pixel finished.
     pub spp: u32,
-    /// False when the run was cancelled; the images then hold what was finished.
+    /// False when the session was cancelled; the images then have the samples that were finished.
     pub complete: bool,
 }

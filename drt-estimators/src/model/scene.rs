@@ -1,4 +1,4 @@
-//! What a scene is made of: plain data, the reference configuration every estimator starts from.
+//! The contents of a scene: plain data, the reference configuration from which every estimator starts.
 
 use alloc::borrow::Cow;
 use alloc::collections::BTreeSet;
@@ -16,22 +16,22 @@ use crate::model::error::{ElementError, Error, SettingError};
 use crate::model::sensor::Sensor;
 use crate::model::surface::Bsdf;
 
-/// A scene: shapes, what they are made of, what lights them, and who looks.
+/// A scene: shapes, their scattering models and media, emitters, and sensors.
 ///
-/// Indices refer to the vectors of the same struct. Everything is in world space but the meshes of instances.
+/// Indices refer to the vectors of this struct. Everything is in world space except the meshes of instances.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Scene {
     /// Surfaces, in file order.
     pub shapes: Vec<Shape>,
-    /// Those of them that are instances, by shape in increasing order.
+    /// The shapes that are instances, in increasing order of their indices.
     #[cfg_attr(feature = "serde", serde(default))]
     pub instances: Vec<Instance>,
     /// Surface scattering models.
     pub bsdfs: Vec<Named<Bsdf>>,
     /// Participating media.
     pub media: Vec<Named<Medium>>,
-    /// Emitters; an area emitter is named by the shape that carries it.
+    /// Emitters; the shape of an area emitter has the emitter's index.
     pub emitters: Vec<Named<SceneEmitter>>,
     /// Cameras.
     pub sensors: Vec<Named<SceneSensor>>,
@@ -39,22 +39,22 @@ pub struct Scene {
     pub integrator: Integrator,
 }
 
-/// Something a job file can address by id.
+/// An item that a job file can address by its id.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Named<T> {
     /// The id in the scene file, where there is one.
     pub id: Option<String>,
-    /// The thing itself.
+    /// The item itself.
     pub item: T,
 }
 
 impl<T> Named<T> {
-    /// A thing with an id.
+    /// An item with an id.
     pub fn new(id: impl Into<String>, item: T) -> Self {
         Self { id: Some(id.into()), item }
     }
-    /// A thing addressed by order alone.
+    /// An item that is addressed by its order only.
     pub fn anonymous(item: T) -> Self {
         Self { id: None, item }
     }
@@ -66,14 +66,14 @@ impl<T> Named<T> {
 pub struct Shape {
     /// The id in the scene file, where there is one.
     pub id: Option<String>,
-    /// Geometry, in world space unless the shape is an [`Instance`]. The front of a triangle is where its vertices turn
-    /// counter-clockwise; `interior` is behind it.
+    /// Geometry, in world space unless the shape is an [`Instance`]. The front of a triangle is the side from which its
+    /// vertices run counter-clockwise; `interior` is behind it.
     pub mesh: Arc<Mesh>,
     /// Index of the scattering model.
     pub bsdf: usize,
-    /// The media it separates; `None` leaves the medium as it is.
+    /// The media that the surface separates; with `None` the medium is the one around the surface, on both sides.
     pub boundary: Option<MediumBoundary>,
-    /// Index of the area emitter it carries.
+    /// Index of the shape's area emitter, if it emits.
     pub emitter: Option<usize>,
 }
 
@@ -83,17 +83,17 @@ pub struct Shape {
 pub struct Instance {
     /// Index of the shape.
     pub shape: usize,
-    /// From the space of its mesh to the world. The front of a surface stays its front where this mirrors.
+    /// The map from the space of the mesh to the world. The front of a surface stays its front where this map mirrors.
     pub to_world: Affine,
 }
 
-/// The media behind and before a surface; `None` is vacuum.
+/// The media behind and in front of a surface; `None` is vacuum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MediumBoundary {
     /// Behind the faces.
     pub interior: Option<usize>,
-    /// Before the faces.
+    /// In front of the faces.
     pub exterior: Option<usize>,
 }
 
@@ -115,7 +115,7 @@ pub struct SceneSensor {
     pub sensor: Sensor,
     /// The medium around it.
     pub medium: Surrounding,
-    /// Samples per pixel the scene file asks for.
+    /// Samples per pixel that the scene file asks for.
     pub sample_count: Option<u32>,
 }
 
@@ -134,15 +134,16 @@ pub enum Surrounding {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Integrator {
-    /// 1 shows emitters only, each real scattering adds one; `None` is unlimited.
+    /// The maximum depth: 1 shows emitters only, and each scattering adds 1; `None` is unlimited.
     pub max_depth: Option<u32>,
     /// The depth from which Russian roulette may end a path.
     pub rr_depth: u32,
-    /// Rays from the camera pass area emitters, and see no environment.
+    /// Camera rays go through area emitters, and see no environment.
     #[cfg_attr(feature = "serde", serde(default))]
     pub hide_emitters: bool,
-    /// Going straight through a surface (a mask, a thin pane) adds one to the depth as well, and light of points and
-    /// directions does not get through, as in Mitsuba's `path`; else it adds nothing, as in `volpath`. Null interfaces add nothing in either.
+    /// Going straight through a surface (a mask, a thin pane) also adds 1 to the depth, and the light of point, spot
+    /// and directional emitters does not get through, as in Mitsuba's `path`. Otherwise it adds nothing, as in
+    /// `volpath`. Null interfaces add nothing in either case.
     #[cfg_attr(feature = "serde", serde(default))]
     pub straight_depth: bool,
 }
@@ -153,7 +154,7 @@ impl Default for Integrator {
     }
 }
 
-/// What an effect acts on, once its name has been looked up.
+/// The item of a scene on which an effect acts, once its name has been looked up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Target {
     /// A shape.
@@ -168,7 +169,7 @@ pub enum Target {
     Sensor(usize),
 }
 
-/// What names an item of a scene: its id, its kind and order such as `shape[0]`, or the [`Target`] itself.
+/// A name of an item of a scene: its id, its kind and order such as `shape[0]`, or the [`Target`] itself.
 pub trait TargetName {
     /// The item.
     ///
@@ -218,9 +219,9 @@ impl Bsdf {
 }
 
 impl Scene {
-    /// Refuses derivatives with respect to `parameter` where `moves`, as something moves, and light meets smooth surfaces: they move
-    /// light along them, which no term here samples; nor do the jumps at others. Where vertices `slide` over surfaces, jumps of
-    /// textures move under them, which no term here samples, either.
+    /// Refuses derivatives with respect to `parameter` where `moves`, as something moves, and light meets smooth
+    /// surfaces: they move light along them, which no term here samples; nor do the jumps at others. Where vertices
+    /// `slide` over surfaces, jumps of textures move under them, which no term here samples, either.
     pub(crate) fn refuse_derivatives(
         &self,
         parameter: &str,
@@ -375,8 +376,8 @@ impl Scene {
         }
     }
 
-    /// Finds all that a job calls `name`: as [`find`](Self::find), or all shapes of an instance of several, whose ids are that
-    /// of the instance, a slash and what each is called in its group.
+    /// Finds all that a job calls `name`: as [`find`](Self::find), or all shapes of an instance of several, whose ids
+    /// are that of the instance, a slash and what each is called in its group.
     ///
     /// # Errors
     /// As [`find`](Self::find).
@@ -469,8 +470,8 @@ impl Scene {
         Aabb::around((0..8).map(corner))
     }
 
-    /// The same scene with a mesh in world space for every instance: what derivatives are made of, as each of its edges and vertices
-    /// moves by itself.
+    /// This scene with a mesh in world space for every instance: derivatives need it, as each of its edges
+    /// and vertices moves by itself.
     ///
     /// # Errors
     /// When these would have more than 33 million triangles.

@@ -35,7 +35,7 @@ use crate::model::sensor::window::Window;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum SensorError {
-    /// A field of view that no plane image can have.
+    /// A field of view that is not that of a plane image.
     #[error("the field of view is {0} degrees; it must lie strictly between 0 and 180")]
     FieldOfView(f64),
     /// A film without pixels.
@@ -57,7 +57,7 @@ pub enum SensorError {
         /// Width and height of the film.
         film: [u32; 2],
     },
-    /// A lens that is none.
+    /// A number of a lens that is not valid.
     #[error("`{what}` is {value}; expected a positive number")]
     Aperture {
         /// Which number.
@@ -65,7 +65,7 @@ pub enum SensorError {
         /// Its value.
         value: f64,
     },
-    /// A lens on what is no perspective camera.
+    /// A lens on a sensor that is not a perspective camera.
     #[error("only a perspective camera has a lens")]
     NoLens,
     /// Clip planes that leave nothing to see.
@@ -82,13 +82,13 @@ pub enum SensorError {
          keep a camera a camera"
     )]
     NotRigid,
-    /// A film of an orthographic camera that is no square pixels.
+    /// A film of an orthographic camera whose pixels are not square.
     #[error(
         "the orthographic camera's film is stretched along one axis or sheared; its pixels stay square \
          under rotations, reflections, translations and scales that are the same along all axes"
     )]
     Oblong,
-    /// A property asked of a camera that has none.
+    /// A property of a camera that has no properties.
     #[error(
         "an orthographic camera has no property to differentiate, and none named `{0}`; move or scale it"
     )]
@@ -96,10 +96,10 @@ pub enum SensorError {
     /// A motion that flattens the camera.
     #[error("the motion flattens the camera's axes; choose a value nearer to zero")]
     Flattened,
-    /// A viewing direction that does not exist.
+    /// A viewing direction that is zero.
     #[error("look_at: origin and target are the same point")]
     NoDirection,
-    /// An upward direction that does not exist.
+    /// An upward direction that is zero or parallel to the viewing direction.
     #[error("look_at: `up` is zero or parallel to the viewing direction")]
     NoUp,
     /// A NaN or infinity.
@@ -111,7 +111,7 @@ pub enum SensorError {
          principal_point_offset_y, and where it has a lens aperture_radius and focus_distance"
     )]
     UnknownProperty(alloc::string::String),
-    /// Different numbers for the channels of something that has none.
+    /// Different numbers for the channels of a property that is a single number.
     #[error("`{0}` is a single number; give three equal ones")]
     NotScalar(&'static str),
     /// The reconstruction filter is unusable.
@@ -119,7 +119,7 @@ pub enum SensorError {
     Filter(#[from] FilterError),
 }
 
-/// A camera with its film, perspective or orthographic, or a meter of irradiance.
+/// A perspective or orthographic camera with its film, or an irradiance meter.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "Parts", into = "Parts"))]
@@ -130,7 +130,7 @@ pub struct Sensor {
     window: Window,
     filter: Filter,
     response: Response,
-    /// `None` of a pinhole.
+    /// `None` for a pinhole.
     aperture: Option<Aperture>,
 }
 
@@ -145,11 +145,11 @@ pub struct CameraRay {
     pub range: [f64; 2],
 }
 
-/// The placement that looks from `origin` at `target`: columns left, up, forward, as Mitsuba's
-/// `lookat`.
+/// The camera-to-world map of a camera at `origin` that looks at `target`; its columns are left, up, forward, as in
+/// Mitsuba's `lookat`.
 ///
 /// # Errors
-/// When the three do not determine a direction and an upright.
+/// When the three vectors do not determine a viewing direction and an upward direction.
 pub fn look_at(origin: Vec3, target: Vec3, up: Vec3) -> Result<Affine, SensorError> {
     for (v, what) in [(origin, "origin"), (target, "target"), (up, "up direction")] {
         finite(v.is_finite(), what)?;
@@ -228,7 +228,7 @@ impl Sensor {
         Self::from_to_world(&look_at(origin, target, up)?, lens, film, filter)
     }
 
-    /// The same view with another number of pixels.
+    /// This sensor with another number of pixels.
     ///
     /// # Errors
     /// When a side is zero, or there are more than [`MAX_PIXELS`](Self::MAX_PIXELS).
@@ -237,14 +237,14 @@ impl Sensor {
         self.with(self.lens, film, self.window.resized(self.film, film))
     }
 
-    /// The same sensor with another lens and film.
+    /// This sensor with another lens and film.
     fn with(&self, lens: Lens, film: [u32; 2], window: Window) -> Result<Self, SensorError> {
         let (to_world, filter, response) = (self.to_world(), self.filter.clone(), self.response);
         let (window, aperture) = (Some(window), self.aperture);
         Parts { to_world, lens, film, window, filter, response, aperture }.sensor()
     }
 
-    /// The same camera with another filter.
+    /// This sensor with another filter.
     #[must_use]
     pub fn with_filter(self, filter: Filter) -> Self {
         Self { filter, ..self }
@@ -260,7 +260,7 @@ impl Sensor {
         Affine { linear: Mat3 { cols: [-right, up, forward] }, translation: position }
     }
 
-    /// The centre of projection; of an orthographic camera, a point on its film.
+    /// The centre of projection; for an orthographic camera, a point on its film.
     #[inline]
     #[must_use]
     pub fn position(&self) -> Vec3 {
@@ -337,7 +337,7 @@ struct Parts {
     window: Option<Window>,
     filter: Filter,
     response: Response,
-    /// `None` of a pinhole.
+    /// `None` for a pinhole.
     #[cfg_attr(feature = "serde", serde(default))]
     aperture: Option<Aperture>,
 }

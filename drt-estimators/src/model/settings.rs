@@ -12,33 +12,35 @@ use crate::model::scene::{Scene, Target};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum EstimatorKind {
-    /// Material-form path integrals, interior and boundary (2021 paper).
+    /// Path integrals in material form, with interior and boundary terms (2021 paper).
     #[default]
     PathSpace,
-    /// The derivative of radiance along rays, with edges seen from every vertex (2019 paper).
+    /// The derivative of radiance along rays, with edges seen from vertices (2019 paper): from one vertex of each path,
+    /// or from all with [`every_vertex`](Settings::every_vertex).
     Radiative,
     /// Rays that turn with the edges beside them, so that no edge has to be sampled (2023 paper).
     Warped,
     /// Central differences with common random numbers.
     FiniteDifference,
-    /// Whichever of [`PathSpace`](Self::PathSpace), [`Radiative`](Self::Radiative) and [`Warped`](Self::Warped) finds the derivative
-    /// images of a [`Session`](crate::Session) with the least work, by a pilot of few samples of a small picture; a
-    /// [`Fit`](crate::fit::Fit) chooses once, at the values that its parameters begin with. A [`gradient`](crate::gradient) takes
-    /// `PathSpace`.
+    /// A choice among [`PathSpace`](Self::PathSpace), [`Radiative`](Self::Radiative) and [`Warped`](Self::Warped): a
+    /// pilot of few samples of a small picture compares the work that they need for the derivative images of a
+    /// [`Session`](crate::Session). `PathSpace` is taken unless another one needs less than 0.8 of its work. A
+    /// [`Fit`](crate::fit::Fit) chooses once for each view, at the initial values of its parameters. A
+    /// [`gradient`](crate::gradient) takes `PathSpace`.
     Auto,
 }
 
-/// How rays turn, or vertices move, with the edges beside them, by [`EstimatorKind::Warped`].
+/// How rays turn, or vertices move, with the edges beside them, in [`EstimatorKind::Warped`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Warp {
-    /// By the edges themselves: without auxiliary rays, and without bias.
+    /// Rays turn with the edges themselves, without auxiliary rays and without bias.
     #[default]
     Edges,
-    /// By auxiliary points around each vertex, as published in 2023. Surfaces only.
+    /// Vertices move with what hides auxiliary points around them, as published in 2023. Surfaces only.
     Points(AuxiliarySamples),
-    /// By auxiliary directions around each ray, as published in 2020. Surfaces only.
+    /// Rays turn with what auxiliary rays around them hit, as published in 2020. Surfaces only.
     Directions(AuxiliarySamples),
 }
 
@@ -46,11 +48,11 @@ pub enum Warp {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AuxiliarySamples {
-    /// Of each vertex or ray; the more, the less bias.
+    /// Number of auxiliary samples of each vertex or ray; the bias falls as it grows.
     pub count: u32,
     /// Their weights.
     pub kernel: WarpKernel,
-    /// Without bias, by random truncation of a sum over doubled counts, at some four times the cost.
+    /// Remove the bias by random truncation of a sum over doubled counts, at about four times the cost.
     pub debiased: bool,
 }
 
@@ -65,26 +67,26 @@ impl Default for AuxiliarySamples {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum WarpKernel {
-    /// Boundary tests by distance from silhouettes, open and sharp edges of triangle meshes, and the cube of distance and
-    /// test together (theory sheet §9.1).
+    /// The boundary test is the distance from silhouettes, open edges and sharp edges of triangle meshes, and the sum
+    /// of distance function and boundary test is cubed (theory sheet §9.1).
     #[default]
     Corrected,
-    /// The distance of Eq. 16 of the 2023 paper, cubed, and tests as printed there.
+    /// The distance function of Eq. 16 of the 2023 paper, cubed, and boundary tests as printed there.
     Year2023,
-    /// The distance of Eq. 57 of the 2023 paper, which is that of 2020.
+    /// The distance function of Eq. 57 of the 2023 paper, which is that of the 2020 paper.
     Year2020,
 }
 
-/// The longest paths: 1 shows emitters only, each real scattering adds one.
+/// The maximum depth of paths. A depth of 1 shows emitters only, and each scattering adds 1; null interfaces add none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Depth {
-    /// As the scene's integrator has it.
+    /// The depth of the scene's integrator.
     #[default]
     OfScene,
-    /// Ended by Russian roulette alone.
+    /// Unlimited: only Russian roulette ends paths.
     Unlimited,
-    /// So many at most.
+    /// At most this depth.
     AtMost(u32),
 }
 
@@ -108,14 +110,15 @@ pub enum PathSampling {
     /// From the camera, with next-event estimation.
     #[default]
     Unidirectional,
-    /// From the camera and from emitters, joined in every way. Of images, and of derivatives by [`EstimatorKind::PathSpace`]
-    /// and by [`EstimatorKind::Warped`] with edges.
+    /// From the camera and from emitters, connected in every way: for images, and for derivatives by
+    /// [`EstimatorKind::PathSpace`] and by [`EstimatorKind::Warped`] with edges.
     Bidirectional,
-    /// Whichever of the two finds the image with less work, by a pilot of few samples. Derivatives take the first.
+    /// For images, bidirectional paths if they need less than 0.8 of the work of unidirectional ones in a pilot of few
+    /// samples, and otherwise unidirectional ones. Derivatives take unidirectional ones.
     Auto,
 }
 
-/// How images and derivatives are estimated, whatever the number of samples: that is told by each call.
+/// How images and derivatives are estimated. The number of samples is not a setting, but an argument of each call.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Settings {
@@ -125,42 +128,43 @@ pub struct Settings {
     pub sampling: PathSampling,
     /// Index of the sensor.
     pub sensor: usize,
-    /// Boundary samples of all kinds together to each sample of a pixel, on average; positive. They share them in equal
-    /// parts, of which edges seen from the camera leave up to three quarters where a pilot finds them known well enough.
-    /// `None` is 1; with [`adaptive`](Self::adaptive), for each kind what makes the noise least for the time, between
-    /// 1/4 and 4.
+    /// The number of boundary samples of all kinds together for each sample of a pixel, on average; positive. All kinds
+    /// get equal parts, except that edges seen from the camera give up to three quarters of theirs to the others where
+    /// a pilot finds their noise small enough. `None` is 1; with [`adaptive`](Self::adaptive), `None` chooses for each
+    /// kind the number between 1/4 and 4 that makes the noise least for the time.
     pub boundary_ratio: Option<f64>,
     /// Path depth.
     pub max_depth: Depth,
     /// Samples in antithetic pairs: image points mirrored at the pixel's centre (2021 paper, §5.4), and rays
-    /// mirrored in narrow lobes that turn. Derivatives by roughness are always estimated by pairs.
+    /// mirrored in narrow lobes that turn. Derivatives with respect to roughness are always estimated by pairs.
     pub antithetic: bool,
-    /// Choose samples by how things move, and boundary samples by what a pilot of them has found: at most an eighth of the samples, which
-    /// are then forgotten. Expected values do not change. Forward and reverse mode choose apart: they are exact transposes of each
-    /// other only without.
+    /// Choose samples by the velocities of the scene, and boundary samples by a density that is learnt from a pilot.
+    /// The pilot is at most an eighth of the samples, and is not part of the result. Expected values do not change.
+    /// Forward and reverse mode learn separately, so they are exact transposes of each other only without guiding.
     pub guiding: bool,
-    /// Of [`EstimatorKind::Radiative`]: query an edge from every vertex of a path (2019 paper), at a cost
-    /// quadratic in its length; `boundary_ratio` then counts the camera's edges alone. Else one vertex of each path
-    /// queries, chosen by its throughput.
+    /// For [`EstimatorKind::Radiative`]: query an edge from every vertex of a path (2019 paper), at a cost
+    /// quadratic in the path's length; `boundary_ratio` then counts the camera's edges only. Otherwise one vertex of
+    /// each path queries an edge, chosen mostly by its throughput times an estimate of the edges' contribution.
     pub every_vertex: bool,
     /// Give more of the samples to pixels whose derivatives (without parameters, whose image) are noisier; the
-    /// mean stays. A pilot takes an eighth of the samples and is then forgotten.
+    /// mean does not change. A pilot takes an eighth of the samples, and is not part of the result.
     pub adaptive: bool,
-    /// Let every path of the image count for all pixels whose filters reach it, where these reach neighbours: less
-    /// noise of pixels, which have it in common with those around. Else each pixel draws its paths from its own filter, for
-    /// itself, as derivatives always do; filters of more than 8 pixels' radius are left to that.
+    /// Let every path of the image count for all pixels whose filters reach it, where filters reach neighbouring
+    /// pixels. Pixels then have less noise, but it is correlated with that of the pixels around. Otherwise each pixel
+    /// draws paths from its own filter, for itself alone, as derivatives always do; this is also so for filters with a
+    /// radius of more than 8 pixels.
     pub splatting: bool,
-    /// Of [`EstimatorKind::Warped`].
+    /// For [`EstimatorKind::Warped`]: the way in which rays turn or vertices move.
     pub warp: Warp,
     /// Half step of finite differences, in units of each parameter.
     pub step: f64,
-    /// Names the random numbers: same seed, same pixel data.
+    /// Seed of the random numbers: equal seeds give equal pixel data.
     pub seed: u64,
-    /// Threads; 0 is all cores. Without the feature `parallel`, one.
+    /// Number of threads; 0 is one per core. Without the feature `parallel` there is one thread.
     pub threads: usize,
-    /// Keep each derivative's terms apart as well.
+    /// Also return the terms of each derivative separately.
     pub terms: bool,
-    /// How the insides of media move, by the medium's index, where not as the plan chooses.
+    /// Velocity fields inside media that are to replace the plan's choice, each with the medium's index.
     pub insides: Vec<(usize, InteriorMotion)>,
 }
 

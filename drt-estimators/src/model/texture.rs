@@ -1,4 +1,4 @@
-//! Values that vary over surfaces, by texture coordinates or by what their meshes hold.
+//! Values that vary over surfaces, by texture coordinates or by attributes of their meshes.
 
 mod texels;
 mod volume;
@@ -23,28 +23,28 @@ pub use crate::model::texture::volume::VolumeTexture;
 pub enum Texture {
     /// Squares of two colours, half a unit wide.
     Checkerboard {
-        /// That of the square at the origin, and that of its neighbours.
+        /// The colour of the square at the origin, and the colour of its neighbours.
         colours: [Rgb; 2],
         /// What is done to coordinates first.
         to_uv: UvMap,
     },
     /// An image.
     Bitmap(Bitmap),
-    /// Values that the mesh brings along, whatever its texture coordinates.
+    /// Values of an attribute of the mesh, independent of texture coordinates.
     Attribute(AttributeTexture),
-    /// Values of the space that the surface was in before it moved.
+    /// Values of a volume at the position that the surface point had before it moved.
     Volume(VolumeTexture),
 }
 
-/// An attribute of the meshes it is on; see [`drt_geom::MeshAttribute`].
+/// An attribute of the meshes that have this texture; see [`drt_geom::MeshAttribute`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AttributeTexture {
     /// The attribute's name.
     pub name: String,
-    /// Its values are multiplied by this.
+    /// Factor of the attribute's values.
     pub scale: f64,
-    /// Their luminance counts, in every channel.
+    /// Whether the luminance of the values replaces every channel.
     pub grey: bool,
 }
 
@@ -86,27 +86,27 @@ pub struct Bitmap {
     pub to_uv: UvMap,
 }
 
-/// Values between the middles of texels.
+/// Interpolation between the middles of texels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum TextureFilter {
-    /// Those of the nearest texel.
+    /// The value of the nearest texel.
     Nearest,
-    /// Interpolated linearly along both axes.
+    /// Linear interpolation along both axes.
     #[default]
     Bilinear,
 }
 
-/// Values beyond the unit square.
+/// Values outside the unit square.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum TextureWrap {
-    /// The image again.
+    /// The image is repeated.
     #[default]
     Repeat,
-    /// The image again, every second one mirrored.
+    /// The image is repeated, and every second copy is mirrored.
     Mirror,
-    /// Those of its border.
+    /// The values at the image's border.
     Clamp,
 }
 
@@ -197,7 +197,7 @@ impl Bitmap {
         Ok(Self { size, texels: Arc::new(texels), filter, wrap, to_uv: UvMap::IDENTITY })
     }
 
-    /// The same image of other texels.
+    /// This image with each texel replaced by the value of a function.
     ///
     /// # Errors
     /// When one is not finite.
@@ -497,7 +497,8 @@ impl Texture {
         })
     }
 
-    /// Values, per channel, between which all others are; of a checkerboard its two colours, of an attribute its mean, of a volume those of its voxels.
+    /// Values, per channel, between which all others are; of a checkerboard its two colours, of an attribute its mean,
+    /// of a volume those of its voxels.
     #[must_use]
     pub fn bounds(&self) -> [Rgb; 2] {
         let none = [f64::INFINITY, f64::NEG_INFINITY].map(Rgb::splat);
@@ -527,7 +528,8 @@ impl Texture {
         sum * (1.0 / f64::from(ROWS * ROWS))
     }
 
-    /// The mean of all values over the texture's own period; for an attribute, which depends on the mesh, that of 0 and 1; of a volume that of its voxels.
+    /// The mean of all values over the texture's own period; for an attribute, which depends on the mesh, that of 0 and
+    /// 1; of a volume that of its voxels.
     #[must_use]
     pub fn mean(&self) -> Rgb {
         match self {

@@ -1,11 +1,12 @@
-//! How a caller watches and steers a run.
+//! How a caller observes and cancels a run.
 
 use crate::model::rendering::Estimate;
 use crate::sampling::film::PixelFilm;
 
-/// Watches and steers a run. Every method has a default that does nothing.
+/// Observes and cancels a run. Every method has a default that does nothing.
 pub trait Control: Sync {
-    /// True to stop soon; what is finished is kept. Once true, it must stay true: work that ended early is thrown away on its word.
+    /// Returns true to stop soon; finished samples are kept. Once true, it must stay true, because unfinished work is
+    /// then discarded.
     fn cancelled(&self) -> bool {
         false
     }
@@ -15,7 +16,7 @@ pub trait Control: Sync {
     fn tile(&self, _tile: &FinishedTile<'_>) {}
 }
 
-/// No control: run to the end in silence.
+/// No control: the run goes on to its end and reports nothing.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Unattended;
 impl Control for Unattended {}

@@ -1,4 +1,4 @@
-//! Finite differences with common random numbers: the judge of every other estimator.
+//! Finite differences with common random numbers: the reference for every other estimator.
 
 use alloc::vec::Vec;
 
@@ -23,12 +23,13 @@ use crate::world::World;
 use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
 
-/// Differences of the image by each parameter, in the order of `parameters`: those of the images at value ± `step`, over
-/// 2 `step`, from `spp` samples per pixel of each. Where a property's range ends within a step, they look to the
-/// [other side](crate::one_sided_differences): by the images at the value, one step and two steps, which is of second order,
-/// or, where two steps do not fit, by the first two of these, which is of first order.
+/// Finite differences of the image with respect to each parameter, in the order of `parameters`: the difference of the
+/// images at value ± `step`, over 2 `step`, from `spp` samples per pixel of each image. Where a property's range ends
+/// within a step, the difference is taken on the [other side](crate::one_sided_differences): from the images at the
+/// value, one step and two steps away, which is of second order, or, where two steps do not fit, from the first two of
+/// these, which is of first order.
 ///
-/// All images see the same random numbers, and the standard errors are those of the difference. Their paths are
+/// All images have common random numbers, and the standard errors are those of the difference. Paths are
 /// from the camera, or from both ends where `settings` ask for these.
 /// Returns fewer layers than parameters when `control` cancelled the run.
 ///

@@ -1,4 +1,4 @@
-//! Runs: forward and reverse mode from one preparation, and finite differences.
+//! Sessions with forward and reverse mode from one preparation, and finite differences.
 
 pub(crate) mod component;
 pub(crate) mod control;

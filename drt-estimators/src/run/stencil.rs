@@ -1,4 +1,4 @@
-//! The values of a parameter whose images make a difference.
+//! The values of a parameter at which images are rendered for a finite difference.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -16,7 +16,7 @@ pub(crate) struct Stencil {
 }
 
 impl Stencil {
-    /// Looks to both sides where the scene has a meaning at both, and else to one.
+    /// A difference over both sides where the scene is valid at both, and otherwise over one.
     pub(crate) fn at(
         scene: &Scene,
         parameters: &[Parameter],
@@ -54,8 +54,9 @@ impl Stencil {
     }
 }
 
-/// The parameters whose [differences](crate::finite_differences) look to one side, since a property's range ends within
-/// a step of their values, with the order of these: 2, or 1 where the range ends within two steps on the other side as well.
+/// The parameters whose [differences](crate::finite_differences) are one-sided, because a property's range ends within
+/// a step of their values, with the order of the difference: 2, or 1 where the range ends within two steps on the other
+/// side as well.
 ///
 /// # Errors
 /// As [`finite_differences`](crate::finite_differences), as far as the parameters' effects go.

@@ -1,4 +1,5 @@
-//! Sampling in plain numbers: the walk and its record, the samples of pixels, and where they are added up.
+//! Sampling in plain numbers, without derivatives: the walk and its record, the samples of pixels, and the films that
+//! add them up.
 
 pub(crate) mod allocation;
 pub(crate) mod bidirectional;

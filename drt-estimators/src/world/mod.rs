@@ -1,4 +1,4 @@
-//! A scene prepared for ray queries: one soup of triangles under one tree, media by side.
+//! A scene prepared for ray queries: the triangles of all shapes in one BVH, and the media on both sides of each.
 
 mod activity;
 pub(crate) mod cache;
@@ -141,7 +141,7 @@ impl World {
         Ok(world)
     }
 
-    /// The same scene by the light of some emitters.
+    /// This world with the light of some emitters only.
     pub(crate) fn lit_by(&self, lit: EmitterMask) -> Result<Self, Error> {
         if lit == self.lit {
             return Ok(self.clone());

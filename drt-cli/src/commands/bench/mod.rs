@@ -1,4 +1,5 @@
-//! `drt bench`: error against run time at doubling sample counts, for every estimator that applies.
+//! `drt bench`: error against run time at doubling sample counts, for the image, the derivatives by the job's
+//! estimator, and finite differences.
 
 mod measure;
 mod plot;

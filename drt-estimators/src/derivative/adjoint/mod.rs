@@ -1,24 +1,25 @@
 //! Differentiating a recorded path once: the gradient of its value with respect to every local
 //! quantity, in one backward sweep.
 //!
-//! With the symbols of [`trace`](crate::sampling::trace), let R_k be what reaches vertex k per unit of
-//! throughput and Q_k what its scattering collects:
+//! With the symbols of [`trace`](crate::sampling::trace), let R_k be the radiance that reaches vertex k per unit of
+//! throughput, and Q_k the radiance that its scattering collects:
 //!
 //! ```text
 //! Q_k = NEE_k + s_k C_k,   C_k = sum over children c of a_c R_c,   R_k = e_k + σ_k Q_k
 //! ```
 //!
-//! The path's value is R_0. Its factors, in the material form (2021 paper, Eqs. 23–30; theory sheet
-//! §4), are the geometric term, Jacobian and transmittance of each segment, the scattering functions
-//! and the coefficients. The derivative by a segment's factors is Θ_c R_c times their logarithmic
-//! gradient; by a scattering function Θ_k σ_k C_k / p times its gradient; by σ_k it is Θ_k Q_k. No
-//! quotient by a factor that can vanish is formed. Cost is linear in the number of vertices.
+//! The path's value is R_0. In the material form (2021 paper, Eqs. 23–30; theory sheet
+//! §4) its factors are the geometric term, Jacobian and transmittance of each segment, the scattering functions
+//! and the coefficients. The derivative with respect to a segment's factors is Θ_c R_c times their logarithmic
+//! gradient; with respect to a scattering function it is Θ_k σ_k C_k / p times the function's gradient; with respect to
+//! σ_k it is Θ_k Q_k. The sweep never divides by a factor that can vanish. Its cost is linear in the number of
+//! vertices.
 //!
-//! Where paths from the camera are [connected](light) with light's, several nodes have the same children.
+//! Where paths from the camera are [connected](light) with light paths, several nodes have the same children.
 //!
 //! A node of the walk is swept in two steps: what it [receives](Differentiator::sweep), and the segment by which the walk
-//! [arrived](arrival) there. Vertices move by a [`velocity`](super::velocity) field; what that blends for a vertex says what its
-//! sensitivities are [propagated](propagation) to.
+//! [arrived](arrival) there. Vertices move with a [`velocity`](super::velocity) field. A vertex's velocity is a weighted sum
+//! of other velocities, and its sensitivities are [propagated](propagation) to these with the same weights.
 
 mod antithetic;
 mod arrival;
@@ -54,11 +55,11 @@ use crate::world::World;
 use crate::world::lights::EmitterMask;
 use crate::world::vertex::{Kind, MaterialPoint, SurfacePoint, Vertex};
 
-/// What has been collected for a vertex while its neighbours are processed, besides what is by its own velocity and
-/// normals.
+/// Derivatives that have been collected for a vertex while its neighbours are processed, except those with respect to
+/// its own velocity and normals.
 #[derive(Clone, Copy, Debug, Default)]
 struct Local {
-    /// By the velocity of the matter it is on.
+    /// With respect to the velocity of the matter that it is on.
     matter: RgbVec,
     /// C_k, the value of the children per unit of scattering.
     children: Rgb,
@@ -66,7 +67,8 @@ struct Local {
     joined: Rgb,
     /// a_k R_k, its part of the parent's C.
     incoming: Rgb,
-    /// By the rate of the direction of the ray that found the vertex, as far as its scattering sees that.
+    /// With respect to the rate of the direction of the ray that found the vertex, through the scattering at the
+    /// vertex.
     turn: RgbVec,
 }
 
@@ -109,25 +111,27 @@ pub(crate) struct Differentiator<'w> {
     world: &'w World,
     /// The camera, at the path's point of its lens.
     camera: Cow<'w, Sensor>,
-    /// Rays do not turn, and vertices do not move with what auxiliary rays find: to tell how much that is.
+    /// When true, rays do not turn and vertices do not move with what auxiliary rays find, to find the contribution of
+    /// these motions.
     pub(crate) edges_at_rest: bool,
     locals: Vec<Local>,
-    /// By the velocity and normals of each vertex.
+    /// Derivatives with respect to the velocity and normals of each vertex.
     ends: Vec<SurfaceAdjoint>,
     points: Vec<(f64, f64)>,
     rng: Rng,
-    /// The filter's gradient by the pixel position, over the density.
+    /// The filter's gradient with respect to the pixel position, over the density.
     filter: [f64; 2],
-    /// By the rate of the camera ray's direction.
+    /// Derivative with respect to the rate of the camera ray's direction.
     turn: RgbVec,
-    /// By the velocity of the point where an orthographic camera's ray starts, at its image point.
+    /// Derivative with respect to the velocity of the point where an orthographic camera's ray starts, at its image
+    /// point.
     origin: RgbVec,
-    /// Of the camera's importance and filter, per channel.
+    /// Gradients of the camera's importance and filter, per channel.
     sensor: [SensorGradient; 3],
     /// Summands of the turns of rays to lights, and of the velocities of points on these.
     parts: Vec<TurnPart>,
     auxiliary: Vec<Auxiliary>,
-    /// Of rays that turn with shadows.
+    /// Summands of the turns of rays that turn with shadows.
     with_shadows: TurnParts,
     probe: Probe,
 }
@@ -274,8 +278,8 @@ impl<'w> Differentiator<'w> {
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
     /// behind `wo`, by normals and by materials, but for what is `paired`. Returns that by the direction `wi`,
-    /// which is the caller's. Unless something of this is `moving`, only the material counts. `before` is what nodes before
-    /// it have collected.
+    /// which is the caller's. Unless something of this is `moving`, only the material counts. `before` is what nodes
+    /// before it have collected.
     #[allow(clippy::too_many_arguments)]
     fn scattering<S: AdjointSink>(
         &mut self,
@@ -381,8 +385,8 @@ impl<'w> Differentiator<'w> {
     }
 
     /// The camera's importance and filter towards a vertex, or the environment, that `value` reaches it
-    /// from per unit of the filter's weight: what they owe to the place of the vertex. A `share` of what they owe to the
-    /// camera is added to that of others.
+    /// from per unit of the filter's weight: what they owe to the place of the vertex. A `share` of what they owe to
+    /// the camera is added to that of others.
     fn seen(
         &mut self,
         vertex: Option<&Vertex>,
@@ -412,8 +416,8 @@ impl<'w> Differentiator<'w> {
         RgbVec { r: place[0], g: place[1], b: place[2] }
     }
 
-    /// What the velocity of the film's point from which an orthographic camera sees a vertex owes to the vertex; its debt
-    /// to the camera is added to that.
+    /// What the velocity of the film's point from which an orthographic camera sees a vertex owes to the vertex; its
+    /// debt to the camera is added to that.
     fn by_film(&mut self, vertex: &Vertex, film: RgbVec, active: &ActiveInputs) -> RgbVec {
         if film == RgbVec::ZERO {
             return film;
@@ -435,8 +439,8 @@ impl<'w> Differentiator<'w> {
     }
 }
 
-/// The segment by which a walk arrived at a node; `None` at the camera. Where its rays are `parallel`, nothing that it sees
-/// turns them.
+/// The segment by which a walk arrived at a node; `None` at the camera. Where its rays are `parallel`, nothing that it
+/// sees turns them.
 fn behind(path: &RecordedPath<'_>, node: usize, parallel: bool) -> Option<Behind> {
     let arrival = path.record.nodes[node].arrival.as_ref()?;
     let (parent, distance) = (arrival.parent as usize, arrival.distance);

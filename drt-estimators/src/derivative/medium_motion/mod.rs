@@ -1,7 +1,7 @@
 //! How the inside of each medium moves with each parameter (theory sheet §4.1, §14.1).
 //!
-//! What is around a medium is gathered from the scene here; which field follows it is
-//! [chosen](drt_motion::interior) there.
+//! This module collects the surfaces, cameras and lights around each medium from the scene; drt-motion
+//! [chooses](drt_motion::interior) the velocity field that follows them.
 
 use alloc::string::String;
 use alloc::vec::Vec;

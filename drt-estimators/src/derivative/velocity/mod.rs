@@ -1,8 +1,8 @@
-//! What velocity the vertices of a path have as parameters change.
+//! The velocities of the vertices of a path as parameters change.
 //!
-//! A path integral is differentiated along a velocity field of its vertices, which is free but for its
-//! value at jumps of the integrand (theory sheet §4.1, §9). Every field here gives a vertex at x, found
-//! by a ray that starts at x_p and runs along d over the distance t, the velocity
+//! A path integral is differentiated along a velocity field of its vertices, which is free except for its
+//! value at jumps of the integrand (theory sheet §4.1, §9). Let a vertex at x be found
+//! by a ray that starts at x_p and runs along d over the distance t. Every field here gives it the velocity
 //!
 //! ```text
 //! v = φ u + (1 - φ) c + Σ_j a_j (b_j·w_j),
@@ -11,11 +11,11 @@
 //! | symbol | code | meaning |
 //! |---|---|---|
 //! | u | | velocity of the material point at x |
-//! | c | | velocity propagated by the ray: x_p_dot + t d_dot, and D_dot d more on a surface (2019 paper, Eq. 19) |
-//! | φ, ∇φ | [`Blend`] | weight of the material velocity, and its gradient by x |
-//! | w_j | [`Auxiliary::matter`] | velocity of another material point, less that of the [ray](Moved) |
-//! | b_j | [`Auxiliary::functional`] | what of it counts |
-//! | a_j | [`Auxiliary::displacement`] | what it gives to x |
+//! | c | | velocity propagated by the ray: x_p_dot + t d_dot, and on a surface D_dot d in addition (2019 paper, Eq. 19) |
+//! | φ, ∇φ | [`Blend`] | weight of the material velocity, and its gradient with respect to x |
+//! | w_j | [`Auxiliary::matter`] | velocity of another material point, relative to that of the [ray](Moved) |
+//! | b_j | [`Auxiliary::functional`] | vector whose dot product with w_j counts |
+//! | a_j | [`Auxiliary::displacement`] | velocity of x per unit of this product |
 //!
 //! The field enters a derivative by its values and by its divergence (2023 paper, Eq. 38),
 //!
@@ -25,9 +25,9 @@
 //!
 //! so that v and div v are linear functionals of the velocities of matter, with coefficients that depend
 //! on the path alone. [`material`] has φ = 1 (2021 paper), [`spatial`] mostly φ = 0 (2019 paper). A field
-//! that is smoothed from auxiliary points (2023 paper, Eqs. 44–47) has φ = 1 and summands for each. Rays may also
-//! [turn], with edges beside them.
-//! Nothing but a [`VelocityField`] knows which of these it is.
+//! that is smoothed from auxiliary points (2023 paper, Eqs. 44–47) has φ = 1 and summands for each of these points.
+//! Rays may also [turn] with edges beside them.
+//! Only the [`VelocityField`] itself knows which of these fields it is.
 
 pub(crate) mod blend;
 mod intersection;
@@ -70,9 +70,9 @@ pub(crate) struct VertexVelocity {
     pub(crate) moves: bool,
     /// φ and ∇φ.
     pub(crate) blend: Blend,
-    /// Its summands in [`PathVelocities::auxiliary`].
+    /// The vertex's summands in [`PathVelocities::auxiliary`].
     pub(crate) auxiliary: Range<usize>,
-    /// Which of the path's rays that turn found it, if it was one.
+    /// Index of the ray that found the vertex among the path's rays that turn, if the ray turns.
     pub(crate) turn: Option<u32>,
 }
 
@@ -97,12 +97,12 @@ pub(crate) enum Moved {
     Vertex,
     /// The vertex, by how much faster the material point is than the vertex before.
     FromViewer,
-    /// The point of the ray that found the vertex, at fixed direction, by how much faster the material point is than the
-    /// ray's at its distance.
+    /// The point of the ray that found the vertex, at fixed direction, by how much faster the material point is than
+    /// the ray's at its distance.
     RayPoint(f64),
 }
 
-/// A vertex as it is found.
+/// A vertex, and the ray that has just found it.
 pub(crate) struct Found<'a> {
     /// The ray that the path starts with.
     pub(crate) camera_ray: CameraRay,
@@ -117,16 +117,16 @@ pub(crate) struct Found<'a> {
     pub(crate) hits: &'a [SurfaceHit],
 }
 
-/// What a field needs to look around.
+/// What a field needs to trace rays of its own.
 #[derive(Clone, Debug)]
 pub(crate) struct Probe {
-    /// Independent of the walk's.
+    /// Random numbers that are independent of the walk's.
     pub(crate) rng: Rng,
     /// Rays cast.
     pub(crate) rays: u64,
     /// Edges and shadows that turned rays, counted for each ray.
     pub(crate) turning_edges: u64,
-    /// Of one of them.
+    /// Buffer for the hits of one ray.
     pub(crate) hits: Vec<Hit>,
 }
 
@@ -138,10 +138,11 @@ impl Probe {
 
 /// A velocity field of the vertices of paths.
 pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
-    /// Of the camera.
+    /// The velocity of the camera.
     fn camera(&self) -> VertexVelocity;
 
-    /// Of a vertex of a path, or of the environment that it escaped to; appends its summands.
+    /// The velocity of a vertex of a path, or of the environment to which the path escaped; appends its summands to
+    /// `auxiliary`.
     fn vertex(
         &self,
         world: &World,
@@ -150,7 +151,7 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         auxiliary: &mut Vec<Auxiliary>,
     ) -> VertexVelocity;
 
-    /// Whether it looks at the rays that find vertices, to where they end.
+    /// Whether the field depends on the rays that find vertices, up to their ends.
     fn follows_rays(&self) -> bool {
         true
     }
@@ -165,23 +166,23 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         true
     }
 
-    /// Whether vertices move with the edges beside them, what they owe to which is kept as a term of its own.
+    /// Whether vertices move with the edges beside them; what this adds is a term of its own.
     fn follows_edges(&self) -> bool {
         false
     }
 
-    /// Whether it draws random numbers.
+    /// Whether the field draws random numbers.
     fn is_random(&self) -> bool {
         false
     }
 
-    /// Whether points on emitters may move though neither they nor the ray does.
+    /// Whether points on emitters may get a velocity though neither the emitter nor the ray moves.
     fn looks_around(&self) -> bool {
         false
     }
 
-    /// Of a point on an emitter to which a `viewer` is connected along the unit direction `dir` over a `distance`; appends
-    /// its summands.
+    /// The velocity of a point on an emitter to which a `viewer` is connected along the unit direction `dir` over a
+    /// `distance`; appends its summands to `auxiliary`.
     #[allow(clippy::too_many_arguments)]
     fn light(
         &self,
@@ -216,7 +217,8 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
     }
 
     /// How a ray turns for what it sees by a point or directional emitter, where that differs: also with the
-    /// shadows beside the point where it ends. `light_moves` tells that the emitter or that point may. Appends the summands.
+    /// shadows beside the point where it ends. `light_moves` tells that the emitter or that point may. Appends the
+    /// summands.
     fn turn_with_shadows(
         &self,
         _world: &World,
@@ -249,12 +251,12 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
     }
 }
 
-/// What moves for some parameter.
+/// What moves with some parameter.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Movers {
     /// Shapes.
     pub(crate) shapes: Arc<[bool]>,
-    /// Media whose inside does.
+    /// Media whose inside moves.
     pub(crate) volumes: Arc<[bool]>,
     pub(crate) camera: bool,
 }

@@ -1,92 +1,101 @@
-//! The 2023 estimator: no edge is sampled, vertices move with the edges beside them.
+//! The 2023 estimator: no edge is sampled; vertices move with the edges beside them instead.
 //!
-//! Of an integral whose integrand jumps, the boundary term of the derivative becomes an interior one when points move
-//! by a velocity field v that has the boundary's velocity where the integrand jumps (2023 paper, Eqs. 10 and 38; theory sheet
-//! §9):
+//! The boundary term of the derivative of an integral whose integrand f jumps becomes an interior term when points move
+//! by a velocity field v that has the boundary's velocity where the integrand jumps (2023 paper, Eqs. 10 and 38; theory
+//! sheet §9):
 //!
 //! ```text
 //! d/dθ ∫ f dp = ∫ [∂f + div(f v)] dp.
 //! ```
 //!
-//! v is free elsewhere. The paper smooths a discontinuous velocity, which auxiliary points tell, in the plane of each vertex.
-//! That is [here](auxiliary) to compare with; its mean of ratios is biased, it needs rays, and knows surfaces only.
+//! Elsewhere v is free. The paper smooths a discontinuous velocity, which is known at auxiliary points, in the plane of
+//! each vertex. That version is [here](auxiliary) for comparison; its ratio of estimates is biased, it traces more
+//! rays, and it works for surfaces only.
 //!
 //! # By edges
 //!
-//! The default takes the edges themselves. In the spatial form (theory sheet §3, §10 route B) a path is a function
-//! of directions, and radiance jumps at directions in which an edge is seen from the ray's origin x: silhouettes, borders, and
-//! creases between faces of different radiance. A ray along ω [turns](crate::derivative::velocity::RayTurn) at the rate
+//! The default uses the edges themselves. In the spatial form (theory sheet §3, §10 route B) a path is a function
+//! of directions, and radiance jumps at directions in which an edge is seen from the ray's origin x: silhouettes,
+//! borders, and creases between faces of different radiance. A ray along the unit vector ω
+//! [turns](crate::derivative::velocity::RayTurn) at the rate
 //!
 //! ```text
 //! T(ω) = Σ_e λ_e (1 - ω ω^T) (u_e - x_dot) / r_e,    λ_e = w_e / (1 + Σ w),
 //! ```
 //!
-//! summed over all edges within an angle Δ of ω, e being the nearest point of an edge, u_e its velocity and r_e its distance
-//! from x. With q the squared sine of the angle between ω and e,
+//! summed over all edges within an angle Δ of ω (0.1 radians; less for camera rays and creases of curved surfaces).
+//! Here e is the point of an edge that is nearest to the ray, u_e its velocity, r_e its distance from x, and x_dot the
+//! velocity of x. With q the squared sine of the angle between ω and e,
 //!
 //! ```text
 //! w_e = c s (sin² Δ - q) / (q + (1 - s) sin² Δ).
 //! ```
 //!
-//! s is 1 for edges before the plane of the surface where the ray ends, and falls to 0 behind it. c is the sine of the angle that
-//! the edge subtends at x over sin Δ, and at most 1: the many short edges of a fine mesh have together the weight of the line that
-//! they approximate, however fine it is. So a single long edge has λ = 1 - q / sin² Δ:
-//! on an edge that is seen the ray turns just as fast as the edge does, T is continuous wherever radiance is, and its
-//! divergence is a closed form. There are no auxiliary rays, and there is no bias.
+//! s is 1 for edges in front of the plane of the surface where the ray ends, and falls to 0 behind it. c is the sine of
+//! the angle that the edge subtends at x, over sin Δ, and at most 1: the many short edges of a fine mesh together have
+//! the weight of the line that they approximate, however fine the mesh is. So a single long edge has λ = 1 - q / sin²
+//! Δ. On an edge that is visible, the ray turns exactly as fast as the edge does, T is continuous wherever radiance is,
+//! and its divergence is a closed form. There are no auxiliary rays and there is no bias.
 //!
-//! A crease between two faces of one shape bounds nothing that a ray sees which ends on another shape. It counts only for rays that
-//! end on its own, unless it rests on another surface.
+//! A crease between two faces of one shape is no discontinuity for a ray that ends on another shape. It counts only for
+//! rays that end on its own shape, unless it rests on another surface.
 //!
-//! Even what is seen of its own shape need not jump there. An emitter whose radiance is the same everywhere emits the same on both
-//! sides of its creases, though what it scatters jumps. These two are summands of a path's value, and each has a field of
-//! its own: for [emission](crate::derivative::adjoint), as next-event estimation and rays that hit an emitter find it, creases
-//! of the emitter do not count, and s depends on how far beyond the end of the ray the nearest point of an edge is, as the planes of
-//! facets jump at creases.
+//! Radiance from the crease's own shape need not jump there either. An emitter whose radiance is constant emits equally
+//! on both sides of its creases, though the light that it scatters jumps. Emission and scattering are summands of a
+//! path's value, and each has a field of its own. For [emission](crate::derivative::adjoint), as next-event estimation
+//! and rays that hit an emitter find it, creases of the emitter do not count, and s depends on how far beyond the end
+//! of the ray the nearest point of an edge is, because the planes of facets jump at creases.
 //!
 //! | requirement (theory sheet §9) | why it holds |
 //! |---|---|
-//! | T is the velocity of each visible edge | w diverges there, and no other weight does but at points where edges cross |
+//! | T is the velocity of each visible edge | its w diverges there, and no other weight does, except at points where edges cross |
 //! | T is continuous elsewhere | which edges count depends on x and the shape where the ray ends, which changes at edges that count; w is continuous in ω, and s on a face |
 //! | s may differ on the two sides of a crease or silhouette | there T is that edge's velocity on both sides |
-//! | nothing at horizons | scattered light vanishes there; edges below them are left out |
+//! | no condition at horizons | scattered light vanishes there; edges below them are left out |
 //! | x moves by its whole velocity | x_dot is that of the vertex before, its own turn included: each vertex is conditioned on the one before (theory sheet §9.3) |
 //!
-//! Where edges cross in projection T has a direction-dependent limit: its divergence grows as one over the distance, whose mean
-//! is finite and whose second moment diverges like a logarithm. That is so of every field of this kind.
+//! Where edges cross in projection, T has a limit that depends on direction: its divergence grows as one over the
+//! distance, with a finite mean and a second moment that diverges like a logarithm. This holds for every field of this
+//! kind.
 //!
-//! Vertices on curved surfaces, by their normals or their facets, have their matter's velocity as far as edges leave room and
-//! the vertex before is not near, v = λ_0 φ u + ..., with λ_0 = 1 - Σ λ. Creases between their facets then turn only rays that all but meet them, and are found
-//! in a [tree](drt_geom::edges::ConeTree) that passes over facets which are seen from one side.
+//! Vertices on surfaces that are curved, by their normals or their facets, have the velocity u of their matter as far
+//! as edges leave weight for it and the vertex before is not near: v = λ_0 φ u + ..., with λ_0 = 1 - Σ λ. Creases
+//! between their facets then turn only rays that nearly hit them, and are found in a [tree](drt_geom::edges::ConeTree)
+//! that skips facets which are seen from one side.
 //!
 //! # In volumes
 //!
-//! A vertex in a medium stands at a fixed distance of its ray, and turns with it; so does what dims the ray. All points of a ray
-//! turn alike, so that the condition on edges before a vertex holds for those behind it as well. Surfaces beside media keep the
-//! [flux](crate::terms::flux) of the spatial form, against rays that turn. Nothing else is needed: interfaces, grids, emission
-//! and several media are as in the 2019 estimator, whose edge queries this field replaces.
+//! A vertex in a medium is at a fixed distance along its ray, and turns with the ray; so do the points at which the
+//! medium attenuates the ray. All points of a ray turn by the same angle, so the condition on edges in front of a
+//! vertex also holds for those behind it. Surfaces beside media keep the [flux](crate::terms::flux) of the spatial
+//! form, relative to rays that turn. Nothing else is needed: interfaces, grids, emission and several media are as in
+//! the 2019 estimator, whose edge queries this field replaces.
 //!
 //! # The camera
 //!
-//! Its rays keep their image points (2019 paper) but where they turn with an edge. Where a filter jumps, the borders
-//! of its support are edges at rest in the image, and what is seen there keeps its image point: the material velocity of
-//! curved surfaces falls to zero towards borders.
+//! Camera rays keep their image points (2019 paper) except where they turn with an edge. Where a filter jumps, the
+//! borders of its support are edges at rest in the image, and points seen there keep their image point: the material
+//! velocity of curved surfaces falls to zero towards borders.
 //!
-//! An edge that lies along a border, as in symmetric scenes, would ask for two velocities of one ray. No ray of the camera
-//! turns with it, and where it moves it is [sampled](crate::terms::edge_queries) as an edge that the camera sees.
+//! An edge that lies along a border, as in symmetric scenes, would require two velocities of one ray. No camera ray
+//! turns with such an edge; where it moves, it is [sampled](crate::terms::edge_queries) as an edge that the camera
+//! sees.
 //!
 //! # Points and directions
 //!
-//! Their light jumps along lines on surfaces that no edge is seen along, the shadows of edges. A next-event connection to
-//! such an emitter gives the ray that found its vertex a rate of its own, in which
-//! [shadows](crate::derivative::velocity::ShadowTurn) of edges near the connection have weights beside those of edges near
-//! the ray. They are as above, of the squared distance of a shadow over that of what the ray sees within Δ (and the light,
-//! added as resistances are). Only silhouettes count, as the light sees them. Each such connection is differentiated by
-//! itself, in one more step of the backward sweep.
+//! The light of point, spot and directional emitters jumps on surfaces along the shadows of edges, where no edge is
+//! seen from the vertex before. A next-event connection to such an emitter gives the ray that found its vertex a rate
+//! of its own, in which [shadows](crate::derivative::velocity::ShadowTurn) of edges near the connection have weights
+//! beside those of edges near the ray. Their weights have the form above, with the squared distance of a shadow over
+//! the squared radius of what the ray and the light see within Δ (the two squares are combined as parallel resistances
+//! are). Only silhouettes as seen from the light count. Each such connection is differentiated separately, in one more
+//! step of the backward sweep.
 //!
 //! # What is left to boundary samples
 //!
-//! Edges along borders of pixels, as the camera sees them. Light of points and directions in scenes with media or null interfaces, where lines of shadow become sheets in the volume. A
-//! [`Session`](crate::Session) leaves it to the path-space estimator, where something moves, and says so in its plan.
+//! Boundary samples remain for edges along borders of pixels, as the camera sees them. The light of point, spot and
+//! directional emitters in scenes with media or null interfaces, where lines of shadow become sheets in the volume, is
+//! left to the path-space estimator where something moves; the plan of a [`Session`](crate::Session) says so.
 
 mod auxiliary;
 mod beside;

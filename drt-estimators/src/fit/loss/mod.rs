@@ -1,4 +1,4 @@
-//! How far an image is from the one that is wanted, and the derivative of that by every pixel.
+//! Losses, which measure how far an image is from its target, and their derivatives with respect to every pixel.
 //!
 //! Images are lists of linear RGB, row by row from the top left.
 
@@ -13,7 +13,7 @@ use drt_math::{Rgb, fm};
 use crate::fit::loss::pyramid::Pyramid;
 use crate::model::error::{Error, SettingError};
 
-/// A distance between images. With d the difference of two images, times the mask where there is one:
+/// A distance between images. In the variants, d is the difference of two images, times the mask where there is one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Loss {
@@ -22,12 +22,12 @@ pub enum Loss {
     L2,
     /// Σ |d|, over pixels and channels.
     L1,
-    /// The square root of the mean of d² over pixels and channels. Those that a mask takes out count
-    /// in the mean.
+    /// The square root of the mean of d² over pixels and channels. Pixels that a mask takes out count
+    /// in the mean as zeros.
     Rmse,
     /// Σᵢ weightⁱ Σ (Dⁱ d)², where D halves an image by means over 2×2 pixels: Zhang et al. 2019,
-    /// "A differential theory of radiative transfer", footnote 7. Coarse levels see what is far from
-    /// where it should be, when fine ones do not yet.
+    /// "A differential theory of radiative transfer", footnote 7. Coarse levels have a gradient for features that are
+    /// far from where they should be, where fine levels do not have one yet.
     ///
     /// Where a side is odd, its last pixels make narrower cells with means of their own. The smallest
     /// level has one pixel.
@@ -40,7 +40,7 @@ pub enum Loss {
     },
 }
 
-/// An image that is wanted, and where.
+/// A target image, and the pixels at which it counts.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Reference {
@@ -65,7 +65,7 @@ impl Reference {
         }
     }
 
-    /// The same with a factor for each pixel's difference: 0 leaves it out.
+    /// This reference with a factor for each pixel's difference; a factor of 0 leaves the pixel out.
     ///
     /// # Errors
     /// When there are not as many factors, or one is negative or not finite, or all are zero.
@@ -82,9 +82,10 @@ impl Reference {
         Ok(Self { mask: Some(mask), ..self })
     }
 
-    /// The same with each pixel's difference divided by what it shows, the mean of its channels, and
-    /// `part` of the image's mean more; in units of that mean, and times the mask so far. Where noise and what there
-    /// is to see grow with brightness, dark pixels tell as much as bright ones.
+    /// This reference with each pixel's difference divided by the sum of the pixel's brightness (the mean of its
+    /// channels) and `part` times the image's mean brightness. The divisors are in units of that mean, and the mask so
+    /// far still applies. Where both noise and signal grow with brightness, dark pixels then contribute as much
+    /// information as bright ones.
     ///
     /// # Errors
     /// When the part is not positive, or the image is black or has negative pixels.
@@ -118,7 +119,7 @@ impl Reference {
         &self.pixels
     }
 
-    /// The same by means over `factor`×`factor` pixels.
+    /// This reference reduced to the means over `factor`×`factor` pixels.
     ///
     /// # Errors
     /// When the sides are not multiples of the factor, or the mask then leaves nothing.

@@ -1,8 +1,10 @@
-//! Microfacets whose roughness depends on the direction along the surface, and the rough metals and interfaces made of them.
+//! Microfacets whose roughness depends on the direction along the surface, and the rough metals and interfaces made of
+//! them.
 //!
 //! Slopes are stretched by α_u along the tangent and by α_v across it (Heitz 2014, "Understanding the Masking-Shadowing
-//! Function in Microfacet-Based BRDFs", section 5). With α² = α_u α_v and h stretched to h' = (h_x α/α_u, h_y α/α_v, h_z), the
-//! density of normals is that of even roughness α at h'; masking of a direction w is that of the roughness along it,
+//! Function in Microfacet-Based BRDFs", section 5). With α² = α_u α_v and h stretched to h' = (h_x α/α_u, h_y α/α_v,
+//! h_z), the density of normals is that of even roughness α at h'; masking of a direction w is that of the roughness
+//! along it,
 //!
 //! ```text
 //! α(w)² sin² = α_u² w_x² + α_v² w_y².
@@ -28,7 +30,7 @@ use crate::model::surface::{At, Bsdf, BsdfGradient, Given, RoughConductor, Rough
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Anisotropic {
-    /// One of the two; its own roughness does not count.
+    /// The [`RoughConductor`] or [`RoughDielectric`]; its own roughness is ignored.
     pub base: Bsdf,
     /// Roughness in the direction in which the texture coordinate u grows and across it, each at least 1e-4.
     pub alpha: [f64; 2],

@@ -12,13 +12,13 @@ use crate::model::surface::{
 
 /// A linear combination of two BSDFs, `(1 - w) f₀ + w f₁`: Mitsuba's `blendbsdf`.
 ///
-/// It is differentiated by its weight, and not by the properties of its parts.
+/// It is differentiated with respect to its weight, but not with respect to the properties of its parts.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Blend {
-    /// What the weights 0 and 1 stand for.
+    /// The BSDFs at the weights 0 and 1.
     pub bsdfs: [Bsdf; 2],
-    /// The weight w of the second; what is below 0 or above 1 counts as that.
+    /// The weight w of the second BSDF, clamped to the range from 0 to 1.
     pub weight: f64,
 }
 

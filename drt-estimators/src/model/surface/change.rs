@@ -26,9 +26,9 @@ use crate::model::texture::Texture;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfChange {
-    /// What changes.
+    /// The property that changes.
     pub property: Property,
-    /// How it depends on theta.
+    /// How the property depends on the parameter theta.
     pub op: ValueChange,
 }
 

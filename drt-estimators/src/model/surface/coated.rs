@@ -1,18 +1,18 @@
 //! A dielectric layer over any reflector.
 //!
-//! After Weidlich & Wilkie 2007, "Arbitrarily Layered Micro-Facet Surfaces", as Mitsuba 0.6's `coating` and `roughcoating` have
-//! it: light is refracted into the layer, scattered once by what is below, and refracted out again; light that the layer reflects
-//! back down is lost. With η the index of the layer over that of the outside, a direction w at the cosine c = n·w to the normal
-//! belongs to the direction w' in the layer,
+//! After Weidlich & Wilkie 2007, "Arbitrarily Layered Micro-Facet Surfaces", as Mitsuba 0.6's `coating` and
+//! `roughcoating` have it: light is refracted into the layer, scattered once by what is below, and refracted out again;
+//! light that the layer reflects back down is lost. With η the index of the layer over that of the outside, a direction
+//! w at the cosine c = n·w to the normal belongs to the direction w' in the layer,
 //!
 //! ```text
 //! w' = w / η + n g(c),     g(c) = c' - c / η,     c' = sign(c) √(1 - (1 - c²) / η²),
 //! ```
 //!
-//! which has the cosine c' and the tangent part of Snell's law. Both directions point away from the surface. What leaves along wo
-//! by light from wi is the integral of L'(wi') f'(wo', wi') |c'| over solid angles in the layer. The radiance that arrives there
-//! is L' = T(wi) η² L, for it is compressed, and what leaves is T(wo) / η² of what goes up in the layer. The sine shrinks by η,
-//! so that solid angles are
+//! which has the cosine c' and the tangent part of Snell's law. Both directions point away from the surface. What
+//! leaves along wo by light from wi is the integral of L'(wi') f'(wo', wi') |c'| over solid angles in the layer. The
+//! radiance that arrives there is L' = T(wi) η² L, for it is compressed, and what leaves is T(wo) / η² of what goes up
+//! in the layer. The sine shrinks by η, so that solid angles are
 //!
 //! ```text
 //! c' dw' = c dw / η².
@@ -24,9 +24,9 @@
 //! f |n·wi| = T(wo) T(wi) exp(-σ d (1 / |n·wo'| + 1 / |n·wi'|)) f'(wo', wi') |n·wi'| · |n·wi| / (η² |n·wi'|),
 //! ```
 //!
-//! whose last factor is dwi'/dwi: a density of directions below the layer, times it, is one above. f is as symmetric as f'.
-//! On top is the reflection of the interface, on both sides of the surface: a mirror's, or one by microfacets. For single
-//! directions that something smooth below scatters to, there is no last factor.
+//! whose last factor is dwi'/dwi: a density of directions below the layer, times it, is one above. f is as symmetric as
+//! f'. On top is the reflection of the interface, on both sides of the surface: a mirror's, or one by microfacets. For
+//! single directions that something smooth below scatters to, there is no last factor.
 //!
 //! Rough layers let through what [`Coating`] has tabulated, but bend light as a smooth one does.
 //!
@@ -56,11 +56,11 @@ use crate::model::texture::Texture;
 
 /// A reflector under a dielectric layer, which may absorb: Mitsuba 0.6's `coating` and `roughcoating`.
 ///
-/// What is below keeps its properties, but for a `specular_reflectance` of its own: that is the layer's.
+/// The BSDF below keeps its properties, except `specular_reflectance`, which is that of the layer.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Coated {
-    /// What scatters below the layer; no light may go through it.
+    /// The BSDF below the layer; it must not transmit light.
     pub bsdf: Bsdf,
     /// The upper interface of the layer.
     pub coating: Coating,

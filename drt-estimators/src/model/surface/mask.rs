@@ -11,14 +11,14 @@ use crate::model::surface::{
 };
 use crate::model::texture::Texture;
 
-/// A surface that is there with a probability, its opacity: Mitsuba's `mask`. Else light goes straight through, as through
-/// nothing.
+/// A surface that scatters with a probability, its opacity, and otherwise lets light go straight
+/// through: Mitsuba's `mask`.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Mask {
-    /// What scatters where the surface is there.
+    /// The BSDF of the part that scatters.
     pub bsdf: Bsdf,
-    /// The opacity; what is below 0 or above 1 counts as that. Default 0.5.
+    /// The opacity, clamped to the range from 0 to 1; default 0.5.
     pub opacity: f64,
 }
 

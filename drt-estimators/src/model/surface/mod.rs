@@ -2,16 +2,16 @@
 //!
 //! Conventions: `wo` points towards the camera side, `wi` towards the light side, both away from the
 //! surface; `n` is the shading normal; all three have length one. The geometric normal plays no
-//! part: telling which side of the true surface a direction is on is the caller's. Values *include*
-//! the cosine at the light, `fs(wo, wi) |n·wi|`, and transport radiance: a refraction carries the
-//! squared ratio of the indices on the sides of `wo` and `wi`. What smooth surfaces scatter into
-//! single directions is not in the value and has no density; [`Bsdf::sample_specular`] draws it.
+//! part: the caller has to find out on which side of the true surface a direction is. Values *include*
+//! the cosine at the light, `fs(wo, wi) |n·wi|`, and transport radiance: a refraction has as a factor the
+//! squared ratio of the refractive indices on the sides of `wo` and `wi`. Delta lobes of smooth surfaces
+//! are not in the value and have no density; [`Bsdf::sample_specular`] samples them.
 //! [`Bsdf::Null`] scatters nothing, and light crosses it unchanged.
 //!
 //! The models, their parameters and their defaults are those of the Mitsuba plugins `diffuse`,
 //! `phong`, `plastic`, `roughplastic`, `pplastic`, `conductor`, `roughconductor`, `dielectric`, `thindielectric`,
-//! `roughdielectric`, `principled`, `principledthin`, `measured`, `blendbsdf`, `mask`, `normalmap`, `bumpmap`, `twosided`
-//! and `null`, and of those of Mitsuba 0.6 `coating`, `roughcoating`, `roughdiffuse` and `ward`.
+//! `roughdielectric`, `principled`, `principledthin`, `measured`, `blendbsdf`, `mask`, `normalmap`, `bumpmap`,
+//! `twosided` and `null`, and of those of Mitsuba 0.6 `coating`, `roughcoating`, `roughdiffuse` and `ward`.
 //!
 //! ```
 //! use drt_estimators::surface::{Bsdf, Given, Property, RoughConductor};
@@ -117,10 +117,10 @@ pub use crate::model::surface::two_sided::TwoSided;
 pub use crate::model::surface::ward::{Ward, WardVariant};
 use crate::model::texture::TexturePoint;
 
-/// Which of the two directions a sample starts from.
+/// Which of the two directions is known when the other is sampled.
 ///
-/// For every model here the same density serves both walks, as all of them treat the two
-/// directions alike up to the factors a weight contains.
+/// For every model here one density serves paths from the camera and from lights, as all models are symmetric in the
+/// two directions up to factors that are part of a sample's weight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Given {
     /// `wo` is known and `wi` drawn: a walk from the camera.
@@ -129,7 +129,7 @@ pub enum Given {
     Wi,
 }
 
-/// A direction drawn at random.
+/// A sampled direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionSample {
     /// The direction, away from the surface, of length one.
@@ -138,22 +138,22 @@ pub struct DirectionSample {
     pub pdf: f64,
 }
 
-/// A direction that a smooth surface scatters to.
+/// A direction into which a smooth surface scatters (a delta lobe).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpecularSample {
     /// The direction, away from the surface, of length one.
     pub w: Vec3,
-    /// What is scattered there, over the probability of choosing it.
+    /// Scattered radiance per incident radiance in this direction, over the probability of choosing it.
     pub weight: Rgb,
-    /// It goes on straight, as if there were no surface.
+    /// Light goes straight on, as if there were no surface.
     pub straight: bool,
 }
 
 /// A value `fs(wo, wi) |n·wi|` with its derivatives.
 ///
 /// Derivatives with respect to the three vectors are those of one smooth extension of the value to
-/// vectors of any length. Only their contraction with velocities that keep the length, orthogonal
-/// to the respective vector, has a meaning of its own.
+/// vectors of any length. Only their dot products with velocities that keep the length, which are orthogonal
+/// to the respective vector, have a meaning of their own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BsdfGradient {
     /// The value, as [`Bsdf::eval`] gives it.
@@ -335,7 +335,8 @@ impl Bsdf {
         each!(self, b => b.specular(at, wo, wi, n))
     }
 
-    /// The part of the light that goes straight through at a point, as if there was no surface, at a cosine to its normal.
+    /// The part of the light that goes straight through at a point, as if there was no surface, at a cosine to its
+    /// normal.
     pub(crate) fn straight(&self, at: At<'_>, cos: f64) -> Rgb {
         each!(self, b => b.straight(at, cos))
     }

@@ -11,33 +11,33 @@ use crate::model::surface::{
 };
 use crate::model::texture::{Texture, TexturePoint};
 
-/// A BSDF about other normals than those of its surface: Mitsuba's `normalmap` and `bumpmap`.
+/// A BSDF with other normals than those of its surface: Mitsuba's `normalmap` and `bumpmap`.
 ///
-/// Light counts only where the surface's normal and the other one see it from the same side. Where the mean of textures is
-/// taken, the normals are the surface's.
+/// Light counts only if it is on one and the same side of the surface's normal and of the perturbed one. Where textures
+/// are replaced by their means, the normals are the surface's.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Perturbed {
-    /// What scatters.
+    /// The BSDF that is evaluated with these normals.
     pub bsdf: Bsdf,
     /// Normals or heights.
     pub map: Texture,
-    /// What the map holds.
+    /// Whether the map has normals or heights.
     pub perturbation: Perturbation,
-    /// A normal that faces away from the viewer is mirrored at the surface's (Schüssler et al. 2017, "Microfacet-based Normal
-    /// Mapping for Robust Monte Carlo Path Tracing").
+    /// A normal that faces away from the viewer is mirrored at the surface's (Schüssler et al. 2017, "Microfacet-based
+    /// Normal Mapping for Robust Monte Carlo Path Tracing").
     pub flip_invalid_normals: bool,
-    /// Light fades towards the horizon, as by microfacets (Conty Estevez et al. 2019, "A Microfacet-Based Shadowing Function to
-    /// Solve the Bump Terminator Problem").
+    /// Light fades towards the horizon, as by microfacets (Conty Estevez et al. 2019, "A Microfacet-Based Shadowing
+    /// Function to Solve the Bump Terminator Problem").
     pub use_shadowing_function: bool,
 }
 
-/// What a map tells of normals.
+/// The kind of map that gives the normals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Perturbation {
-    /// Its channels are the normal's coordinates along the directions of u, of v, and of the surface's normal, with [-1, 1]
-    /// stored as [0, 1].
+    /// Its channels are the normal's coordinates along the directions of u, of v, and of the surface's normal, with
+    /// [-1, 1] stored as [0, 1].
     Normals,
     /// Its first channel is the height of the surface, to be multiplied by this.
     Heights(f64),

@@ -24,8 +24,8 @@ use crate::model::texture::{
 pub struct Textured {
     /// The BSDF with the means of its textures.
     pub bsdf: Bsdf,
-    /// Textures, each with what it stands for; of a scalar property their first channel counts, and
-    /// roughness is no less than microfacets can have.
+    /// Textures, each with the property that it replaces. For a scalar property the first channel of the texture
+    /// counts, and roughness is clamped to at least the smallest value of microfacets.
     pub textures: Vec<(Property, Texture)>,
 }
 
@@ -127,8 +127,8 @@ impl Textured {
         uneven.into_iter().any(|p| self.texture_of(p).is_some())
     }
 
-    /// The gradient of a value by the place of its point, in the plane of the triangle there: through the properties that
-    /// textures stand for, by which the value has the derivatives `params`.
+    /// The gradient of a value by the place of its point, in the plane of the triangle there: through the properties
+    /// that textures stand for, by which the value has the derivatives `params`.
     fn slide_of_textures(&self, at: &TexturePoint<'_>, params: &BsdfParams) -> RgbVec {
         let mut sum = RgbVec::ZERO;
         for (property, texture) in &self.textures {
@@ -276,8 +276,8 @@ impl Model for Textured {
 }
 
 impl Bsdf {
-    /// Makes a change of one texel, or of all, of the texture that stands for a property; the rates of texels with `theta`.
-    /// `None` where there is no texture.
+    /// Makes a change of one texel, or of all, of the texture that stands for a property; the rates of texels with
+    /// `theta`. `None` where there is no texture.
     pub(crate) fn change_texels(
         &mut self,
         change: &BsdfChange,
@@ -346,8 +346,8 @@ impl Bsdf {
         Some(self.textured_part()?.texture_of(property)?.size()).filter(|size| *size != [0; 2])
     }
 
-    /// Calls `f` with the textures of all its parts, and the properties that they stand for; maps of normals and heights have the
-    /// names of their BSDFs.
+    /// Calls `f` with the textures of all its parts, and the properties that they stand for; maps of normals and
+    /// heights have the names of their BSDFs.
     pub fn for_each_texture(&self, mut f: impl FnMut(&'static str, &Texture)) {
         let mut parts = alloc::vec![self];
         while let Some(part) = parts.pop() {

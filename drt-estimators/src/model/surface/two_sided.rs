@@ -16,7 +16,7 @@ use crate::model::texture::Texture;
 pub struct TwoSided {
     /// The side the normal points to.
     pub front: Bsdf,
-    /// The other side; `None` for the same again.
+    /// The other side; `None` for the BSDF of the front.
     pub back: Option<Bsdf>,
 }
 

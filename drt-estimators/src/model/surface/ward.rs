@@ -14,7 +14,8 @@
 //! p = E |h|² / (2π α_u α_v h_z³),
 //! ```
 //!
-//! by 1 / cos³ for slopes to normals and 1 / (4 ĥ·wi) for normals to directions (Walter 2005, "Notes on the Ward BRDF").
+//! by 1 / cos³ for slopes to normals and 1 / (4 ĥ·wi) for normals to directions (Walter 2005, "Notes on the Ward
+//! BRDF").
 
 use core::f64::consts::{FRAC_1_PI, TAU};
 
@@ -40,11 +41,12 @@ pub struct Ward {
     pub reflectance: Rgb,
     /// Weight of the glossy lobe; default 0.2.
     pub specular_reflectance: Rgb,
-    /// Roughness in the direction in which the texture coordinate u grows and across it, each at least 1e-4; default 0.1.
+    /// Roughness in the direction in which the texture coordinate u grows and across it, each at least 1e-4; default
+    /// 0.1.
     pub alpha: [f64; 2],
 }
 
-/// What the glossy lobe of a [`Ward`] is divided by.
+/// The normalisation of the glossy lobe of a [`Ward`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum WardVariant {

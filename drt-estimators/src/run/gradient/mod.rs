@@ -1,12 +1,13 @@
-//! Reverse mode: the gradient of a loss by everything, from the same paths, records and boundary samples as
-//! derivative images.
+//! Reverse mode: the gradient of a loss with respect to all quantities of a scene, from paths, records and boundary
+//! samples like those of derivative images.
 //!
-//! With a_i = ∂Loss/∂I_i at pixel i, the gradient by a quantity q is Σ_i a_i ∂I_i/∂q. Forward mode contracts
-//! sensitivities (to positions, normals, coefficients) with the tangents of its parameters. Here each is
-//! multiplied by its pixel's adjoint and added up where it belongs: at mesh vertices, through the transposed jets
-//! of surface points; for points inside a medium, at the vertices of its tetrahedra and from there at those
-//! of the shapes around it; at voxels, through the transposed interpolation. The cost does not grow with the number
-//! of quantities. With the same seed and without [`guiding`](crate::Settings::guiding), ⟨a, J v⟩ = ⟨Jᵀ a, v⟩ to rounding.
+//! With the adjoint a_i = ∂Loss/∂I_i at pixel i, the gradient with respect to a quantity q is Σ_i a_i ∂I_i/∂q. Forward
+//! mode takes the dot product of sensitivities (to positions, normals, coefficients) and the tangents of its
+//! parameters. Reverse mode multiplies each sensitivity by its pixel's adjoint, and adds it up at the quantities that
+//! it depends on: at mesh vertices, through the transposed jets of surface points; for points inside a medium, at the
+//! vertices of its tetrahedra, and from there at the vertices of the shapes around it; at voxels, through the
+//! transposed interpolation. The cost does not grow with the number of quantities. With equal seeds and without
+//! [`guiding`](crate::Settings::guiding), ⟨a, J v⟩ = ⟨Jᵀ a, v⟩ to rounding.
 
 mod everything;
 mod pieces;
@@ -43,16 +44,16 @@ use crate::world::World;
 /// What one batch of samples adds to a [gradient](crate::Session::gradient).
 #[derive(Clone, Debug)]
 pub struct GradientBatch {
-    /// Its number, from 0. The gradient is the sum over all batches in this order: of their pixels and of their boundary
-    /// samples, and then of both.
+    /// Number of the batch, from 0. To get the gradient, add up the `pixels` of all batches in this order, and their
+    /// `boundary` likewise, and then add the two sums.
     pub number: u32,
     /// The gradient from the paths of pixels.
     pub pixels: SceneGradient,
-    /// Samples of each pixel, and those that each has in all batches together.
+    /// Samples of each pixel in this batch, and in all batches together.
     pub of_pixels: [u32; 2],
     /// The gradient from boundary samples.
     pub boundary: SceneGradient,
-    /// Batches of boundary samples, and those of all batches.
+    /// Parts of the boundary samples in this batch, and in all batches together.
     pub of_boundary: [u32; 2],
 }
 

@@ -19,31 +19,35 @@ use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
 
 impl Session {
-    /// The gradient of a loss by the items `wanted` of the scene at the parameters' values, from `spp` samples per pixel, and boundary samples in
-    /// [proportion](Settings::boundary_ratio). `adjoint` holds ∂Loss/∂I per pixel and channel, row by row
-    /// from the top left. What is prepared for these items serves again when they are asked for again. Images of the session have no part
-    /// in it; with the seed that they have, its errors and theirs depend on each other.
+    /// The gradient of a loss with respect to the items `wanted` of the scene at the parameters' values, from `spp`
+    /// samples per pixel, and boundary samples in [proportion](Settings::boundary_ratio). `adjoint` holds ∂Loss/∂I per
+    /// pixel and channel, row by row from the top left. Preparations for these items are used again when they are
+    /// wanted again. The samples of the session's images are not used for gradients; but with the seed of the images,
+    /// the errors of gradient and images are correlated.
     ///
-    /// How the inside of a medium moves with what is around it:
+    /// The inside of a medium moves with the shapes around it as follows:
     ///
-    /// * By default it is filled with tetrahedra between the shapes that touch it and the cameras and point lights in it. Their
-    ///   gradients are added to those of the shapes. To make them takes 0.05 to 0.25 s per 1000 vertices.
-    /// * It stays at rest, and the flux through the shapes that are wanted is added, where no paths have vertices on what
-    ///   is wanted (null and black surfaces), where shapes pass through each other, where [`Settings::insides`]
-    ///   asks for [`InteriorMotion::Static`](crate::InteriorMotion::Static), and by
+    /// * By default it is filled with tetrahedra between the shapes that touch it and the cameras and point lights in
+    ///   it. The gradients at their vertices are added to those of the shapes. Making the tetrahedra takes 0.05 to 0.25
+    ///   s per 1000 vertices.
+    /// * It stays at rest, and the flux through the shapes that are wanted is added, where no paths have vertices on
+    ///   the items that are wanted (null and black surfaces), where shapes pass through each other, where
+    ///   [`Settings::insides`] asks for [`InteriorMotion::Static`](crate::InteriorMotion::Static), and by
     ///   [`EstimatorKind::Radiative`](crate::EstimatorKind::Radiative).
-    /// * Tetrahedra that [`Settings::insides`] gives are taken, without the velocities given along with them. Other kinds
-    ///   of motion count as not asked for.
+    /// * Tetrahedra that [`Settings::insides`] gives are used, without the velocities that are given with them. Other
+    ///   kinds of motion in [`Settings::insides`] are ignored.
     ///
-    /// All of these have the same expected value. Forward mode is the exact transpose with the same seed, settings and
-    /// `spp`, without [`guiding`](Settings::guiding), and with one of the kinds above asked for in both. An exception are shapes that touch and
-    /// move differently: no field follows both, and the flux through what is left behind is added here.
+    /// The expected value does not depend on this choice. Forward mode is the exact transpose if it has this seed,
+    /// these settings and this `spp`, without [`guiding`](Settings::guiding), and if both modes ask for one of the
+    /// kinds above. Shapes that touch and move differently are an exception: no field follows both, and the flux
+    /// through the shape that is not followed is added here.
     ///
-    /// Where the settings leave the estimator open, it is [`EstimatorKind::PathSpace`](crate::EstimatorKind::PathSpace).
+    /// Where the settings leave the estimator open, it is
+    /// [`EstimatorKind::PathSpace`](crate::EstimatorKind::PathSpace).
     ///
     /// # Errors
-    /// When a name is not that of one item, the adjoint's size is not the film's, the scene or a setting is unusable, or
-    /// tetrahedra that [`Settings::insides`] asks for cannot be made.
+    /// When a name is not that of one item, the adjoint's size is not the film's, the scene or a setting is unusable,
+    /// or tetrahedra that [`Settings::insides`] asks for cannot be made.
     pub fn gradient(
         &mut self,
         wanted: &[impl TargetName],
@@ -67,8 +71,9 @@ impl Session {
         Ok(self.prepared_gradient(wanted)?.zeros())
     }
 
-    /// A [`gradient`](Self::gradient) in parts: calls `each` with every batch of samples, or with those of a shard, as they are finished, in
-    /// order. The batches do not depend on who takes them. False when `control` cancelled it.
+    /// A [`gradient`](Self::gradient) in parts: calls `each` with every batch of samples, or with those of a shard, as
+    /// they are finished, in order. The batches do not depend on how they are shared among machines. False when
+    /// `control` cancelled it.
     ///
     /// # Errors
     /// As [`gradient`](Self::gradient), and when there are more shards than batches.
@@ -140,7 +145,8 @@ impl Session {
     }
 }
 
-/// The gradient of a loss by the items `wanted` of a scene: [`Session::gradient`] of a session that serves once.
+/// The gradient of a loss with respect to the items `wanted` of a scene: [`Session::gradient`] of a session that is
+/// used once.
 ///
 /// # Errors
 /// As [`Session::gradient`].

@@ -1,4 +1,4 @@
-//! A run: a scene prepared once, sampled in passes, with its results available at any time.
+//! Sessions: a scene is prepared once and sampled in passes, and its results are available at any time.
 
 pub(crate) mod choice;
 mod describe;
@@ -46,16 +46,17 @@ use crate::world::lights::EmitterMask;
 pub use crate::run::session::gradient::{gradient, gradient_in_batches};
 pub use crate::run::session::shard::{Merged, ShardError, ShardSums};
 
-/// A prepared scene and what has been accumulated for it: its image and images of derivatives, by [`run`](Session::run), and from the
-/// same preparation gradients of losses by everything, by [`gradient`](Session::gradient).
+/// A prepared scene and the samples taken of it so far. [`run`](Session::run) accumulates its image and derivative
+/// images; [`gradient`](Session::gradient) estimates, from this preparation, the gradient of a loss with respect to all
+/// quantities of the scene.
 pub struct Session {
     /// Lit by all emitters.
     world: World,
-    /// That world, with what derivative images need of paths.
+    /// That world, with the settings of paths that derivative images need.
     paths: World,
     /// Each differentiates the light of some emitters.
     images: Vec<Images>,
-    /// As they were asked for, and with what has been chosen.
+    /// The settings as they were given, and with all choices made.
     asked: Settings,
     settings: Settings,
     /// What the last gradient was prepared for, and the estimator that gradients take.
@@ -94,9 +95,9 @@ impl Session {
         Ok(session)
     }
 
-    /// Goes on with the same scene at other values: vertices that have moved, other voxels, texels or numbers, other values of
-    /// the parameters. What has been accumulated is forgotten. What has not changed is used again; the results are those of a
-    /// new session, to the bit.
+    /// Goes on with this scene at other values: vertices that have moved, other voxels, texels or numbers, other
+    /// values of the parameters. All accumulated samples are discarded. Preparations of parts that have not changed are
+    /// used again; the results are those of a new session, to the bit.
     ///
     /// # Errors
     /// As [`Session::new`]; the session then stays as it was.
@@ -115,8 +116,8 @@ impl Session {
         Ok(())
     }
 
-    /// As [`Session::new`], with what earlier sessions of nearly the same scene left to be used again. The
-    /// results are the same to the bit.
+    /// As [`Session::new`], but with preparations that earlier sessions of a similar scene have left in the cache. The
+    /// results are those of [`Session::new`] to the bit.
     ///
     /// # Errors
     /// As [`Session::new`].
@@ -246,8 +247,8 @@ impl Session {
         &self.plan
     }
 
-    /// Forgets all images, and goes on as if prepared with this seed: what comes is independent of what
-    /// was.
+    /// Discards all samples, and goes on as if prepared with this seed: later samples are independent of the earlier
+    /// ones.
     pub fn restart(&mut self, seed: u64) {
         self.film.clear();
         self.images.iter_mut().for_each(Images::clear);
@@ -258,7 +259,7 @@ impl Session {
     }
 
     /// Adds `spp` samples per pixel, and boundary samples in [proportion](Settings::boundary_ratio).
-    /// Returns false when `control` cancelled it; the result then holds what was finished.
+    /// Returns false when `control` cancelled it; the result then has the samples that were finished.
     pub fn run(&mut self, spp: u32, control: &dyn Control) -> bool {
         let (pool, blocks) = (Arc::clone(&self.pool), Arc::clone(&self.blocks));
         let before = self.passes;

@@ -78,8 +78,8 @@ pub enum ShardError {
 /// A run from its shards.
 #[derive(Clone, Debug)]
 pub struct Merged {
-    /// Its images; not complete where shards are missing, but unbiased, with the errors of the samples that
-    /// there are.
+    /// The images. Where shards are missing they are marked as not complete, but they are unbiased, with the errors of
+    /// the samples that were taken.
     pub rendering: Rendering,
     /// The shards that are missing.
     pub missing: Vec<u32>,
@@ -95,9 +95,9 @@ impl Session {
         u32::min(pass.parts(), BATCHES as u32)
     }
 
-    /// Takes one shard of the samples that [`run`](Self::run) takes after [`restart`](Self::restart) with `seed`, forgetting
-    /// all before. `None` when `control` cancelled it. Where the settings are
-    /// [adaptive](crate::Settings::adaptive), every shard makes the same pilot samples to decide alike.
+    /// Takes one shard of the samples that [`run`](Self::run) takes after [`restart`](Self::restart) with `seed`, after
+    /// discarding all earlier samples. `None` when `control` cancelled it. Where the settings are
+    /// [adaptive](crate::Settings::adaptive), every shard takes equal pilot samples, so that all make equal decisions.
     ///
     /// # Errors
     /// When there are more shards than strata of samples.
@@ -187,10 +187,11 @@ impl ShardSums {
         Ok(())
     }
 
-    /// The run that shards are of, whatever their order: with all of them the bits of the run in one piece.
+    /// The result of the run to which the shards belong, in whatever order they are given. With all shards it has the
+    /// bits of the run in one piece.
     ///
     /// # Errors
-    /// When they are not of one run, one is there twice or damaged, or too many are missing.
+    /// When the shards do not belong to one run, a shard is given twice or damaged, or too many are missing.
     pub fn merge(shards: &[Self]) -> Result<Merged, ShardError> {
         let mut shards: Vec<&Self> = shards.iter().collect();
         shards.sort_by_key(|s| s.shard.index());

@@ -1,27 +1,29 @@
 //! Paths from both ends (Veach 1997, chapter 10; Lafortune and Willems 1993).
 //!
-//! A path z_0 … z_{t-1} from the camera and one y_0 … y_{s-1} from an emitter are joined in every way: by each prefix of one with
-//! each of the other. A light path of n segments is found by n + 1 of these strategies (s, t), whose contributions
-//! are weighted by the power heuristic with exponent 2,
+//! A path z_0 … z_{t-1} from the camera and a path y_0 … y_{s-1} from an emitter are connected in every way: each
+//! prefix of one with each prefix of the other. A complete path of n segments is found by n + 1 of these strategies (s,
+//! t), whose contributions are weighted by the power heuristic with exponent 2:
 //!
-//! | s, t | what joins them |
+//! | s, t | connection |
 //! |---|---|
-//! | 0, t | the camera's path meets an emitter, emission in a medium, or leaves the scene |
-//! | 1, t | next-event estimation: a point chosen for the vertex |
-//! | s, 1 | the light's vertex is connected to the camera, and splatted; along the one direction of an orthographic one |
-//! | s, t | the vertices are connected |
+//! | 0, t | none: the camera path hits an emitter or a medium that emits, or leaves the scene |
+//! | 1, t | next-event estimation: a point on an emitter is chosen for the vertex |
+//! | s, 1 | the vertex of the light path is connected to the camera, and splatted; for an orthographic camera along its one direction |
+//! | s, t | the two vertices are connected |
 //!
 //! # Weights
 //!
 //! In measures of area and volume the density of a strategy is a product over its vertices of the density of the
-//! direction that led there, the cosine there (1 in a volume) over the squared distance, the transmittance τ of the segment,
-//! and in a volume σ_t. Every inner vertex is drawn by one side or the other, so σ_t is in all strategies' densities and
-//! cancels; transmittance is in all but that whose connection the segment is. Ratios of densities need τ of single
-//! segments alone. In grids it has no closed form: there, and for colours, a [proxy](proxy_attenuation) takes its place, in
-//! all strategies alike, so that weights add up to 1 for any medium, and are best where it is exact.
+//! direction that led there, the cosine there (1 in a volume) over the squared distance, the transmittance τ of the
+//! segment, and in a volume σ_t. Every inner vertex is sampled from one side or the other, so σ_t is in all strategies'
+//! densities and cancels; the transmittance of a segment is in the densities of all strategies except the one that
+//! connects along this segment. Ratios of densities need τ of single segments only. In grids τ has no closed form:
+//! there, and for colours, a [proxy](proxy_attenuation) is used in place of it, in all strategies alike. So weights add
+//! up to 1 for any medium, and are best where the proxy is exact.
 //!
-//! Sums over strategies are light from vertex to vertex (Georgiev 2012; van Antwerpen 2011): with p the density of the direction that
-//! left a vertex, p' that of the one back, and c the cosine at the vertex that is arrived at,
+//! Sums over strategies are passed on from vertex to vertex (Georgiev 2012; van Antwerpen 2011). Let p be the density
+//! of the direction in which the path left a vertex, p' that of the reverse direction, r the length of the segment, and
+//! c the cosine at the vertex where it arrives. Then
 //!
 //! ```text
 //! at the start      d = p_connect / p_start,                  e = c_0 / p_start (0 of what has no area)
@@ -30,8 +32,8 @@
 //! arriving          d ← d r² / (c τ),                         e ← e / c
 //! ```
 //!
-//! with all numbers but the densities of one strategy squared. d p stands for connecting the last segment instead of drawing it, e for connecting an earlier one.
-//! Then the weight of a strategy is 1 / (1 + a_y + a_z) with
+//! with all numbers squared except the densities of one strategy. d p stands for connecting along the last segment
+//! instead of sampling it, e for connecting along an earlier one. The weight of a strategy is 1 / (1 + a_y + a_z) with
 //!
 //! ```text
 //! connection        a_y = τ² p_z(→y)² (c_y/r²)² (d_y + e_y p'_y²), and a_z likewise
@@ -40,17 +42,18 @@
 //! emission met      a_z = p_light² d_z + p_start² e_z
 //! ```
 //!
-//! n being the number of light paths to one sample of each pixel, as many as pixels; p_film c/r² is density per area, whatever the camera. Russian roulette is left out of all of it.
+//! where n is the number of light paths for one sample of every pixel, which is the number of pixels, and p_film c/r²
+//! is a density per area for every kind of camera. The probabilities of Russian roulette are left out of all densities.
 //!
-//! A lens is a pinhole for each of its points (`sensor::aperture`), drawn by one density in all strategies. So it cancels in their weights, and
-//! both paths of a sample see the camera from the same point.
+//! A lens is a pinhole for each of its points (`sensor::aperture`), which all strategies sample with one density. So
+//! this density cancels in their weights, and both paths of a sample use one point of the lens.
 //!
 //! # Records
 //!
-//! What is to be differentiated is told to a [`JointObserver`]: the camera's walk, next-event connections, and each connection
-//! with a vertex of the light path, which is turned round as a [`LightPath`]. Weights are functions of the path alone; so they
-//! are in the transport of connections, as densities are, and have no derivative. Vertices of light paths that the camera sees are
-//! recorded one by one, for the pixels that they land on.
+//! A [`JointObserver`] receives what is to be differentiated: the camera path, next-event connections, and each
+//! connection with a vertex of the light path, which is reversed as a [`LightPath`]. Weights are functions of the path
+//! alone, so they are factors of connections, as densities are, and are not differentiated. Connections of light path
+//! vertices to the camera are recorded one by one, for the pixels on which they land.
 
 mod emission;
 mod subpath;
@@ -109,8 +112,8 @@ impl<'w> Bidirectional<'w> {
         }
     }
 
-    /// Traces a path from either end. Returns what comes along the camera's ray, times its `weight`; what reaches the film elsewhere is
-    /// added to `splats`. The observer is told of all but these.
+    /// Traces a path from either end. Returns what comes along the camera's ray, times its `weight`; what reaches the
+    /// film elsewhere is added to `splats`. The observer is told of all but these.
     pub(crate) fn trace<O: JointObserver>(
         &mut self,
         tracer: &mut Tracer<'w>,
@@ -302,7 +305,7 @@ impl<'w> Bidirectional<'w> {
         z.weight() * f * connection.rest()
     }
 
-    /// Of a vertex of the camera's path with one of the light's.
+    /// The connection of a vertex of the camera path with one of the light path.
     fn connection<O: JointObserver>(
         &self,
         tracer: &mut Tracer<'w>,
@@ -422,7 +425,8 @@ impl<'w> Bidirectional<'w> {
 /// A vertex of a light path as the camera sees it.
 pub(crate) struct SeenFromCamera {
     vertex: usize,
-    /// Its ray; the weight is the camera's importance without a filter, over the squared distance and times the MIS weight.
+    /// Its ray; the weight is the camera's importance without a filter, over the squared distance and times the MIS
+    /// weight.
     pub(crate) view: ViewSample,
     /// What arrives.
     value: Rgb,
@@ -444,14 +448,14 @@ impl SeenFromCamera {
     }
 }
 
-/// Of a vertex of the camera's path in what observes the walk.
+/// The number that the observer of the walk uses for a vertex of the camera path.
 fn name(vertex: usize) -> u32 {
     vertex as u32 + 1
 }
 
 impl Tracer<'_> {
-    /// What passes from a vertex to a point, and its [proxy](proxy_attenuation); `None` where a surface other than the `target` is
-    /// in the way, or nothing passes.
+    /// What passes from a vertex to a point, and its [proxy](proxy_attenuation); `None` where a surface other than the
+    /// `target` is in the way, or nothing passes.
     fn passed(
         &mut self,
         from: &Vertex,

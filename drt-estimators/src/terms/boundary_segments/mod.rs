@@ -1,16 +1,18 @@
 //! The boundary term: visibility jumps where a segment of a path grazes an edge.
 //!
-//! With both ends free, one collapsed kernel serves every kind of end (theory sheet §4.2, from 2021
-//! paper, Eqs. 35–44): for an edge point x_B, a unit direction w from the source end S to the
-//! detector end D, the edge tangent t, N the unit normal of plane(t, w) on the side of the faces,
-//! and l = |x_B - x_S| / |x_D - x_S|,
+//! With both ends free, one kernel serves all kinds of ends (theory sheet §4.2, from 2021
+//! paper, Eqs. 35–44). Let x_B be a point on an edge, t the edge's tangent, w the unit direction from the source end S
+//! to the detector end D, N the unit normal of plane(t, w) on the side of the faces,
+//! and l = |x_B - x_S| / |x_D - x_S|. With velocities u, transmittance τ, and Lout and Wout the radiance and the
+//! importance that leave the ends, the term is
 //!
 //! ```text
 //! ∫ dl(x_B) ∫ dσ(w) [dr_S] [dr_D] τ(x_S, x_D) |t×w| N·(u_B - (1-l) u_S - l u_D) Lout(S→D) Wout(D→S)
 //! ```
 //!
-//! It is linear in the velocities, which is why a sample is a [`VelocityFunctional`] times light. Delta ends
-//! (camera, point and directional lights) replace dσ by 1/r² and drop their dr. The strategies:
+//! The kernel is linear in the velocities, so a sample is a [`VelocityFunctional`] times light. The integrals over r
+//! are for ends in a volume. A delta end (camera, point or directional light) replaces dσ by 1/r² and has no dr. The
+//! strategies are:
 //!
 //! | strategy | edge | direction | S | D |
 //! |---|---|---|---|---|
@@ -18,9 +20,9 @@
 //! | [`direct`](Strategy::Direct) | any, or silhouette from the light | from a sampled light | the light | beyond |
 //! | [`indirect`](Strategy::Indirect) | any | drawn around the edge | traced | traced |
 //!
-//! Of edges that rest on a surface, and of lines along which surfaces intersect, the [limit](contact) is taken by `primary` and
-//! `indirect`. `direct` and `indirect` both find area lights; they share them by the balance heuristic. Shadows of
-//! directly lit media, seen directly, are left to [`shadow`] where that serves.
+//! For edges that rest on a surface, and lines along which surfaces intersect, `primary` and `indirect` take the
+//! [limit](contact). Both `direct` and `indirect` find area lights, and are combined by the balance heuristic. Shadows
+//! in media that are directly lit and directly seen are left to [`shadow`] in scenes with few edges.
 
 mod areas;
 pub(crate) mod border;
@@ -61,12 +63,12 @@ pub(crate) enum Strategy {
     Indirect,
 }
 
-/// The edges of a scene, by what sees them.
+/// The edges of a scene, grouped by the vertices that see them.
 #[derive(Debug, Default)]
 pub(crate) struct Boundary {
-    /// All.
+    /// All edges.
     general: Option<EdgeTable>,
-    /// Those of meshes, as they are lit by areas.
+    /// Edges of meshes, weighted by how area lights light them.
     areas: Option<EdgeTable>,
     /// Silhouettes from the camera, and lines along which surfaces intersect.
     camera: Option<EdgeTable>,
@@ -78,15 +80,15 @@ pub(crate) struct Boundary {
     pub(crate) count: [u64; 2],
 }
 
-/// What a sample's value is handed to.
+/// The receiver of a sample's value.
 pub(crate) trait BoundarySink {
     /// Where sensitivities go.
     type Sink: AdjointSink;
-    /// Evaluates how the sample's geometry moves; false when it does not, which ends the sample.
+    /// Evaluates the velocity functional of the sample; false when nothing of the sample moves, which ends the sample.
     fn moves(&mut self, functional: &VelocityFunctional) -> bool;
-    /// The last functional times `value` goes to `pixel`.
+    /// Adds the last functional times `value` to `pixel`.
     fn receive(&mut self, pixel: u32, value: Rgb);
-    /// What is sent goes to each of some pixels, times its weight. False when it is not finite.
+    /// Adds what `send` sends to each of these pixels, times its weight; false when it is not finite.
     fn spread(&mut self, pixels: &[(u32, f64)], send: impl FnOnce(&mut Self::Sink)) -> bool;
 }
 
@@ -118,7 +120,7 @@ pub(crate) struct Buffers {
 }
 
 impl Boundary {
-    /// The edges at which something can change of what is of interest.
+    /// The edges at which visibility can change with some parameter.
     pub(crate) fn new(world: &World, active: &ActiveInputs) -> Result<Self, Error> {
         let movers = Movers::new(world, active);
         let Edges { of_meshes, intersections, all } = collect(world);

@@ -1,20 +1,21 @@
 //! Edges at which radiance jumps, as a vertex or the camera sees them.
 //!
-//! Where radiance is differentiated along rays of fixed directions, directions in which it jumps move where something moves. For
-//! an edge point y seen from a vertex x along d = (y - x)/r,
-//! with the edge's tangent t and N = t × (-d) / |t × d|, Reynolds' theorem adds (2019 paper, Eq. 23)
+//! Where radiance is differentiated along rays of fixed directions, the directions at which it jumps move when
+//! something moves. For an edge point y seen from a vertex x along d = (y - x)/r,
+//! with the edge's tangent t and N = t × (-d) / |t × d|, Reynolds' theorem adds the boundary term (2019 paper, Eq. 23)
 //!
 //! ```text
 //! ∫ f(x, d) τ(x, y) [L(-N) - L(+N)] N·(y_dot - x_dot) |t × d| / r²  dl(y),
 //! ```
 //!
-//! L(±N) being the radiance that leaves y towards x just beside the edge on either side, or comes
-//! from behind the edge where that side is open (D19.52–53). Silhouettes, borders and creases are
-//! one case: going around the edge from x's direction, a side is a face if one is met within half a
-//! turn. At the camera f is the filter and importance, and d turns with the image point.
+//! where f is the scattering function and τ the transmittance. L(±N) is the radiance that leaves y towards x just
+//! beside the edge on either side, or that comes from behind the edge where that side is open (D19.52–53). Silhouettes,
+//! borders and creases are handled alike: on either side, the face is the first one within half a turn around the edge
+//! from the direction of x, and the side is open if there is none. At the camera f is the filter times the importance,
+//! and d turns with the image point.
 //!
-//! One vertex of each path, chosen mostly in proportion to its throughput times an estimate of what edges amount to from there,
-//! queries an edge, so that cost is linear in path length.
+//! One vertex of each path queries an edge, so that the cost is linear in path length. The vertex is chosen mostly in
+//! proportion to its throughput times an estimate of the contribution of edges seen from it.
 
 mod choice;
 mod difference;
@@ -39,7 +40,7 @@ use crate::discontinuities::edge::Edge;
 use crate::model::error::Error;
 use crate::world::World;
 
-/// The edges at which radiance jumps, by what sees them.
+/// The edges at which radiance jumps, grouped by the vertices that see them.
 #[derive(Debug)]
 pub(crate) struct SeenEdges {
     /// How the vertices of paths move.
@@ -114,7 +115,7 @@ struct Chosen<'a> {
 }
 
 impl PrimaryEdges {
-    /// Of all edges with their weights.
+    /// A table of all edges with their weights.
     fn new(weights: impl Iterator<Item = f64>) -> Result<Option<Self>, Error> {
         let weighed = (0..).zip(weights);
         let (indices, weights): (Vec<u32>, Vec<f64>) = weighed.filter(|(_, w)| *w > 0.0).unzip();

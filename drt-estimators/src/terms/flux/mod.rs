@@ -1,32 +1,33 @@
-//! The flux term: scattering swept through by deforming surfaces around an inside that does not
+//! The flux term: scattering that moving surfaces sweep over where the inside of a medium does not
 //! follow them (theory sheet §4.1).
 //!
 //! For every surface Σ with unit normal n from its back (-) to its front (+) and a medium whose
-//! field u does not match the surface's velocity u_Σ,
+//! velocity field u does not match the surface's velocity u_Σ, the term is
 //!
 //! ```text
 //! ∫_Σ [f(-) - f(+)] n·(u_Σ - u) dA,
 //! ```
 //!
 //! f being the contribution of paths with a volume vertex on that side of Σ (0 inside an opaque
-//! body). Seen from the vertex before it, dA = r² dω / |n·w|: every ray that a camera path follows
-//! and that meets Σ gives one term, throughput × τ × Lout / |n·w|. So the term is gathered on the
-//! camera's own paths, however small the pixel. To keep the cost linear in path length, one of a
-//! path's meetings is chosen in proportion to its throughput over the cosine (weighted reservoir
-//! sampling), and Lout traced for it alone. In a grid it counts by the extinction there: where a cloud fades
-//! out inside of its box, nothing is traced.
+//! body). Seen from the vertex before, at the distance r in the direction w, dA = r² dω / |n·w|: every ray of a camera
+//! path that crosses Σ gives one term, throughput × τ × Lout / |n·w|, with the transmittance τ and the radiance Lout
+//! that a volume vertex there sends back. So the term is sampled along the camera paths themselves, however small the
+//! pixel. To keep the cost linear in path length, one of the crossings of a path is chosen with probability
+//! proportional to its throughput over the cosine (weighted reservoir sampling), and Lout is traced for it alone. In a
+//! grid the probability is also proportional to the extinction there: where a cloud fades out inside its box, nothing
+//! is traced.
 //!
-//! In the spatial form (2019 paper, Eq. 16 and 20; theory sheet §3, §6) volume vertices stand at fixed
-//! distances of their rays, u is the velocity of the ray's point at Σ, and every surface beside a
-//! medium has this flux: f̂ with D_dot = n·(u_Σ - u) / (n·w) is the same term, less what this surface and the
-//! one beyond the medium [warped](crate::derivative::velocity::warp) along, times the share by which vertices there do not
-//! [blend](crate::derivative::velocity::blend) to their medium. What of the two cancels for every velocity of the ray, as in a thin
-//! layer, is not even traced.
+//! In the spatial form (2019 paper, Eqs. 16 and 20; theory sheet §3, §6) volume vertices are at fixed
+//! distances along their rays, u is the velocity of the ray's point at Σ, and every surface beside a
+//! medium has this flux. The term f̂ D_dot with D_dot = n·(u_Σ - u) / (n·w) is this flux, less what this surface and
+//! the one beyond the medium have [warped](crate::derivative::velocity::warp) along, times the share by which vertices
+//! there do not [blend](crate::derivative::velocity::blend) to their medium. Where the fluxes of the two surfaces
+//! cancel for every velocity of the ray, as in a thin layer, nothing is traced.
 //!
-//! What the camera sees [edge on](grazing) of surfaces, its rays hardly meet: there points are drawn by area.
+//! Camera rays rarely hit surfaces that the camera sees [edge on](grazing): points on these are sampled by area.
 //!
 //! A grid ends at its box, where coefficients jump to zero. Faces of the box that lie inside the medium
-//! are such surfaces too, with f(+) = 0 and the velocity of the grid for u_Σ.
+//! are surfaces of this kind, too, with f(+) = 0 and the velocity of the grid for u_Σ.
 
 mod grazing;
 mod reservoir;
@@ -52,7 +53,7 @@ const EDGE_ON: f64 = GRAZED;
 /// The surfaces with a flux.
 #[derive(Clone, Debug)]
 pub(crate) struct Flux {
-    /// Of the material form.
+    /// In the material form: the shapes with a flux.
     shapes: Arc<[bool]>,
     /// Media in which the faces of a grid's box have a flux.
     grids: Arc<[bool]>,
@@ -60,9 +61,9 @@ pub(crate) struct Flux {
     largest: Arc<[Option<f64>]>,
     /// Segments at which a volume vertex can no longer send anything.
     longest: u32,
-    /// In the spatial form: where there is a flux even if the ray stands still.
+    /// In the spatial form: the shapes and grids that have a flux even if the ray is at rest.
     movers: Option<Movers>,
-    /// And how vertices move there.
+    /// In the spatial form: the velocity field of vertices.
     pub(crate) spatial: Option<Arc<Spatial>>,
     /// Cosine of the angle of incidence below which the camera's rays leave the flux to [`GrazingFlux`].
     least_cosine: f64,
@@ -78,7 +79,7 @@ struct Movers {
 }
 
 impl Flux {
-    /// Of the material form; `None` when nothing has a flux.
+    /// The flux of the material form; `None` when nothing has a flux.
     pub(crate) fn new(world: &World, shapes: &[usize], active: &ActiveInputs) -> Option<Self> {
         let flags = (0..world.scene.shapes.len()).map(|s| shapes.contains(&s)).collect();
         let moves = |m: usize| {
@@ -101,7 +102,7 @@ impl Flux {
         })
     }
 
-    /// Of the spatial form; `None` when no medium has vertices.
+    /// The flux of the spatial form; `None` when no medium has vertices.
     pub(crate) fn spatial(
         world: &World,
         active: &ActiveInputs,
@@ -126,7 +127,7 @@ impl Flux {
         })
     }
 
-    /// The same with all of the flux left to rays.
+    /// This flux with everything sampled along rays, at grazing angles too.
     pub(crate) fn along_rays(self) -> Self {
         Self { least_cosine: 0.0, ..self }
     }
@@ -136,12 +137,12 @@ impl Flux {
         (moves && self.movers.is_some()) || self.moves(shape)
     }
 
-    /// The same of a ray at rest.
+    /// True when a shape sweeps over the points of a ray at rest.
     fn moves(&self, shape: u32) -> bool {
         self.movers.as_ref().map_or(&self.shapes, |m| &m.shapes)[shape as usize]
     }
 
-    /// The same of the faces of a grid.
+    /// True when the faces of a medium's grid sweep over the points of a ray, which may itself be `moves`.
     fn sweeps_grid(&self, medium: usize, moves: bool) -> bool {
         let moves = |m: &Movers| moves || m.grids[medium];
         self.grids[medium] && self.movers.as_ref().is_none_or(moves)

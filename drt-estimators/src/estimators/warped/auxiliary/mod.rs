@@ -1,16 +1,17 @@
-//! Velocities smoothed from what auxiliary rays find, as published.
+//! Velocities that are smoothed from what auxiliary rays hit, as published.
 //!
-//! Around a vertex, or a ray, some samples are drawn; each has a discontinuous velocity, that of whatever is seen or blocks
-//! there. The velocity of the vertex is their mean by weights that diverge where the sample lies on a boundary and the vertex
-//! beside it (2023 paper, Eqs. 14 and 41; theory sheet §9.1),
+//! Samples are drawn around a vertex or a ray. Each has a velocity v_dis, discontinuous from sample to sample, of what
+//! is seen or occludes there. The velocity v of the vertex is their mean with weights w that diverge where the sample
+//! lies on a boundary and the vertex beside it (2023 paper, Eqs. 14 and 41; theory sheet §9.1),
 //!
 //! ```text
 //! v = V / W,    div v = dV / W - (∇W·V) / W²,    W = Σ w/pdf,  V = Σ w v_dis / pdf,  dV = Σ ∇w·v_dis / pdf,
 //! ```
 //!
-//! (Eqs. 44–47 and 58–62), with gradients by the vertex at fixed samples: the summand w div v_dis of Eq. 61 must be left out
-//! (theory sheet §12.32). A ratio of two estimates is biased, by O(1/N) for many samples N, however many paths there are. It is
-//! debiased by a sum over doubled numbers of samples, of which one term is drawn: with r(S) the ratio by a set S of samples,
+//! (Eqs. 44–47 and 58–62), with gradients with respect to the vertex at fixed samples: the summand w div v_dis of Eq.
+//! 61 must be left out (theory sheet §12.32). A ratio of two estimates is biased, by O(1/N) for many samples N, however
+//! many paths there are. The bias is removed by a sum over doubled numbers of samples, of which one term is drawn: with
+//! r(S) the ratio V / W from a set S of samples,
 //!
 //! ```text
 //! v = r(first N) + [r(all 2^k N) - (r(first half) + r(second half)) / 2] / P(k),    P(k) ∝ 2^(-3k/2).

@@ -1,8 +1,9 @@
-//! What a run leaves open, decided by small pictures: how paths are found (`PathSampling::Auto`), and which estimator
-//! differentiates them (`EstimatorKind::Auto`).
+//! Choices that the settings leave open, made by rendering small pictures: how paths are found (`PathSampling::Auto`),
+//! and which estimator differentiates them (`EstimatorKind::Auto`).
 //!
-//! Every choice is that of the least work, which is variance × cost. Costs are counted, not timed, because counts are the same on any
-//! machine, any number of threads and every run, and so is the choice.
+//! Work is variance × cost. The default is left only for a method with less than 0.8 of its work. Costs are counted,
+//! not timed, because counts are the same on any machine, with any number of threads and in every run, and so is the
+//! choice.
 
 mod estimator;
 mod sampling;
@@ -15,7 +16,8 @@ use crate::model::scene::Scene;
 use crate::model::settings::Settings;
 use crate::sampling::budget::{BESIDES, LOOKUP};
 
-/// Part of the work of what is usual that something else must not exceed, or noise of the pilot would often choose it for nothing.
+/// Part of the work of what is usual that something else must not exceed, or noise of the pilot would often choose it
+/// for nothing.
 const WORTH_IT: f64 = 0.8;
 
 /// Between the seeds of the small pictures and that of the run.

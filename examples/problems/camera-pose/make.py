@@ -1,0 +1,19 @@
+#!/usr/bin/env python3
+"""Makes the smoke before the camera: its density and its colour."""
+
+import pathlib
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+import assets
+
+
+def colour(x, y, z):
+    """The smoke is blue below and orange above, and the border between the two is ragged."""
+    t = assets.smoothstep(0.3, 0.7, y + 0.5 * (assets.billows(3 * x, 3 * y, 3 * z, 2) - 0.5))
+    return tuple(a + t * (b - a) for a, b in zip((0.75, 0.88, 0.98), (0.99, 0.9, 0.7)))
+
+
+run = assets.run_folder(__file__)
+assets.write_vol(run / "density.vol", 48, 1, lambda x, y, z: (assets.smoke(x, y, z),))
+assets.write_vol(run / "albedo.vol", 16, 3, colour)
