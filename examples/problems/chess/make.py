@@ -35,7 +35,8 @@ def main():
     assets.write_ply(run / "truth.ply", lifted(assets.star_shaped(points, piece, 1.5)), faces)
     poses = []
     for k in range(VIEWS):
-        turn, tilt = (k * 137.508) % 360.0, -95.0 + 190.0 * (k + 0.5) / VIEWS
+        # Seen from the piece, the lamp goes over a sphere at golden angles, so that each part of the piece is somewhere at the border of a shadow.
+        turn, tilt = (k * 137.508) % 360.0, math.degrees(math.acos(1.0 - (2 * k + 1) / VIEWS))
         picture = run / f"view-{k:02}.exr"
         views.render(HERE / "scene.xml", picture, SPP, {"mesh": run / "truth.ply", "turn": turn, "tilt": tilt})
         turns = [views.rotation("piece", axis, angle, (0, HEIGHT, 0)) for axis, angle in (((0, 1, 0), turn), ((0, 0, 1), tilt))]
