@@ -14,6 +14,7 @@ mod lens;
 mod motion;
 mod orthographic;
 mod pinhole;
+mod response;
 #[cfg(test)]
 mod tests;
 mod view;
@@ -28,7 +29,8 @@ pub use crate::model::sensor::aperture::Aperture;
 pub use crate::model::sensor::footprint::{Footprint, PixelWeight};
 pub use crate::model::sensor::lens::{FovAxis, Lens};
 pub use crate::model::sensor::pinhole::{Pinhole, Projection, SensorGradient, SensorTangent};
-pub use crate::model::sensor::view::{Response, ViewSample};
+pub use crate::model::sensor::response::Response;
+pub use crate::model::sensor::view::ViewSample;
 use crate::model::sensor::window::Window;
 
 /// A camera that cannot be used.

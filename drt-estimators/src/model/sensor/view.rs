@@ -9,24 +9,11 @@ use drt_math::{Affine, Frame, Real, Vec3, warp};
 
 use crate::model::filter::{Filter, FilterKind, ON_BORDER};
 use crate::model::sensor::{
-    CameraRay, Lens, Projection, Sensor, SensorError, SensorGradient, orthographic, unit,
+    CameraRay, Lens, Projection, Response, Sensor, SensorError, SensorGradient, orthographic, unit,
 };
 
 /// The largest radius of a filter, in pixels, whose samples are shared: each touches (2 × 8)² pixels.
 const MOST_SHARED: f64 = 8.0;
-
-/// How a sensor weighs directions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Response {
-    /// A pinhole camera.
-    #[default]
-    Perspective,
-    /// A camera of parallel rays.
-    Orthographic,
-    /// The cosine over the hemisphere around the forward axis; one pixel.
-    Irradiance,
-}
 
 /// A direction drawn for a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]

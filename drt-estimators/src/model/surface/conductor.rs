@@ -1,9 +1,10 @@
 use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Real, Rgb, Vec3, fm};
 
-use crate::model::surface::angles::{Angles, Isotropic, Slopes};
+use crate::model::surface::angles::{Angles, Slopes};
 use crate::model::surface::facet::Facet;
 use crate::model::surface::fresnel::{conductor_reflected, conductor_slopes};
+use crate::model::surface::isotropic::Isotropic;
 use crate::model::surface::lobes::reflection;
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, mirrored};
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};

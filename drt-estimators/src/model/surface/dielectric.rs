@@ -1,9 +1,10 @@
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3, fm};
 
-use crate::model::surface::angles::{Angles, Isotropic, scatters_by_angles};
+use crate::model::surface::angles::Angles;
 use crate::model::surface::facet::Facet;
 use crate::model::surface::fresnel::{dielectric_reflected, dielectric_transmitted};
+use crate::model::surface::isotropic::{Isotropic, scatters_by_angles};
 use crate::model::surface::lobes::{SeenFacet, reflection};
 use crate::model::surface::microfacet::{Distribution, LEAST_ALPHA, mirrored, refracted};
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};

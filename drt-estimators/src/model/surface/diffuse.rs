@@ -3,7 +3,8 @@ use core::f64::consts::FRAC_1_PI;
 use drt_geom::edges::Lobes;
 use drt_math::{Frame, Real, Rgb, Vec3, warp};
 
-use crate::model::surface::angles::{Angles, Isotropic, scatters_by_angles};
+use crate::model::surface::angles::Angles;
+use crate::model::surface::isotropic::{Isotropic, scatters_by_angles};
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, nonnegative};

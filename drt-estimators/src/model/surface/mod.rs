@@ -33,30 +33,24 @@
 //! ```
 
 mod angles;
-mod anisotropic;
-mod blend;
-mod change;
+mod bsdf;
 mod choice;
-mod coated;
 mod coating;
 mod conductor;
 mod dielectric;
 mod diffuse;
 mod direction_partner;
 mod facet;
-mod flags;
 mod framed;
 mod fresnel;
-mod kinds;
+mod isotropic;
 mod lobes;
 mod local;
-mod mask;
 mod measured;
 mod microfacet;
 mod model;
 mod null;
 mod params;
-mod perturbed;
 mod phong;
 mod plastic;
 mod principled;
@@ -68,11 +62,11 @@ mod shading_frame;
 mod smooth_conductor;
 mod smooth_dielectric;
 mod specular;
+mod stretched_facets;
 #[cfg(test)]
 pub(crate) mod tests;
-mod textured;
+mod textures;
 mod thin_dielectric;
-mod two_sided;
 mod visible_slope;
 mod ward;
 
@@ -80,10 +74,10 @@ use drt_geom::Mesh;
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, RgbVec, Vec3};
 
-pub use crate::model::surface::anisotropic::Anisotropic;
-pub use crate::model::surface::blend::Blend;
-pub use crate::model::surface::change::BsdfChange;
-pub use crate::model::surface::coated::Coated;
+use crate::model::surface::bsdf::each;
+pub use crate::model::surface::bsdf::{
+    Anisotropic, Blend, Bsdf, BsdfChange, Coated, Mask, Perturbation, Perturbed, Textured, TwoSided,
+};
 pub use crate::model::surface::coating::Coating;
 pub use crate::model::surface::conductor::RoughConductor;
 pub use crate::model::surface::dielectric::RoughDielectric;
@@ -91,16 +85,12 @@ pub use crate::model::surface::diffuse::Diffuse;
 pub(crate) use crate::model::surface::direction_partner::{DirectionPartner, Turn};
 use crate::model::surface::facet::Facet;
 pub(crate) use crate::model::surface::framed::by_corners;
-pub use crate::model::surface::kinds::Bsdf;
-use crate::model::surface::kinds::each;
 pub(crate) use crate::model::surface::local::LocalBsdf;
-pub use crate::model::surface::mask::Mask;
 pub use crate::model::surface::measured::{Measured, MeasuredError, MeasuredTables, Tensor};
 pub use crate::model::surface::microfacet::Distribution;
 use crate::model::surface::model::Model;
 pub(crate) use crate::model::surface::model::{Constants, Numbers};
 pub use crate::model::surface::params::{BsdfParams, BsdfTangent, PropertySet};
-pub use crate::model::surface::perturbed::{Perturbation, Perturbed};
 pub use crate::model::surface::phong::Phong;
 pub use crate::model::surface::plastic::Plastic;
 pub use crate::model::surface::principled::Principled;
@@ -111,9 +101,7 @@ pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
 pub use crate::model::surface::smooth_conductor::Conductor;
 pub use crate::model::surface::smooth_dielectric::Dielectric;
 pub(crate) use crate::model::surface::specular::SpecularValue;
-pub use crate::model::surface::textured::Textured;
 pub use crate::model::surface::thin_dielectric::ThinDielectric;
-pub use crate::model::surface::two_sided::TwoSided;
 pub use crate::model::surface::ward::{Ward, WardVariant};
 use crate::model::texture::TexturePoint;
 

@@ -15,9 +15,8 @@ use drt_math::{Dual, Real, Rgb, RgbVec, Vec3};
 use crate::model::surface::facet::Facet;
 use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError};
-use crate::model::surface::{
-    At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue, Textured,
-};
+use crate::model::surface::textures::Textures;
+use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
 use crate::model::texture::Texture;
 
 /// Turns the numbers of a model's properties into those that its value is computed over.
@@ -234,11 +233,6 @@ pub(super) trait Model {
     /// About how far the half vector of its sharpest lobe is from the normal, in slopes.
     fn lobe_width(&self, at: At<'_>) -> f64;
 
-    /// The BSDFs that it is made of.
-    fn parts(&self) -> [Option<&Bsdf>; 2] {
-        [None; 2]
-    }
-
     /// The texture that stands for a property.
     fn texture(&self, _property: Property) -> Option<&Texture> {
         None
@@ -249,7 +243,7 @@ pub(super) trait Model {
     fn undifferentiated(
         &self,
         _property: Property,
-        _textures: Option<&Textured>,
+        _textures: Textures<'_>,
     ) -> Option<&'static str> {
         None
     }

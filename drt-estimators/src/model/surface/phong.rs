@@ -3,7 +3,8 @@ use core::f64::consts::{FRAC_1_PI, PI};
 use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Frame, Real, Rgb, Vec3, fm, vec3, warp};
 
-use crate::model::surface::angles::{Angles, Isotropic, scatters_by_angles};
+use crate::model::surface::angles::Angles;
+use crate::model::surface::isotropic::{Isotropic, scatters_by_angles};
 use crate::model::surface::microfacet::mirrored;
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;

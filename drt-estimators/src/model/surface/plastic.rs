@@ -3,9 +3,10 @@ use core::f64::consts::FRAC_1_PI;
 use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Frame, Real, Rgb, Vec3, warp};
 
-use crate::model::surface::angles::{Angles, Isotropic, scatters_by_angles};
+use crate::model::surface::angles::Angles;
 use crate::model::surface::coating::Coating;
 use crate::model::surface::fresnel::dielectric_reflected;
+use crate::model::surface::isotropic::{Isotropic, scatters_by_angles};
 use crate::model::surface::lobes::reflection;
 use crate::model::surface::microfacet::mirrored;
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};

@@ -20,7 +20,6 @@ use core::f64::consts::{FRAC_1_PI, PI, TAU};
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3, fm, vec3, warp};
 
-use crate::model::surface::anisotropic::StretchedFacets;
 use crate::model::surface::framed::{Framed, scatters_in_frame};
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::lobes::{SHEEN, widest};
@@ -28,7 +27,9 @@ use crate::model::surface::microfacet::{Distribution, LEAST_COS2, mirrored, refr
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, part};
-use crate::model::surface::{At, BsdfGradient, Given, RoughDielectric, Textured};
+use crate::model::surface::stretched_facets::StretchedFacets;
+use crate::model::surface::textures::Textures;
+use crate::model::surface::{At, BsdfGradient, Given, RoughDielectric};
 use crate::model::texture::Texture;
 
 /// Burley's principled BSDF. All but colour and index are numbers from 0 to 1.
@@ -306,25 +307,20 @@ pub(super) const NOTHING_DRAWN: &str = "at 0 no path goes where light would";
 pub(super) const TINTED: &str = "a tint mixes its channels";
 
 /// The least and the largest value of a number, for which a texture may stand.
-pub(super) fn ends_of(value: f64, property: Property, textures: Option<&Textured>) -> [f64; 2] {
-    let bounds = textures.and_then(|t| t.texture_of(property)).map(Texture::bounds);
+pub(super) fn ends_of(value: f64, property: Property, textures: Textures<'_>) -> [f64; 2] {
+    let bounds = textures.of(property).map(Texture::bounds);
     bounds.map_or([value; 2], |[least, most]| [least.r, most.r])
 }
 
 /// The least channel of a base colour, for which a texture may stand.
-pub(super) fn least_colour(colour: Rgb, textures: Option<&Textured>) -> f64 {
-    let texture = textures.and_then(|t| t.texture_of(Property::BaseColor));
+pub(super) fn least_colour(colour: Rgb, textures: Textures<'_>) -> f64 {
+    let texture = textures.of(Property::BaseColor);
     let least = texture.map_or(colour, |t| t.bounds()[0]);
     least.to_array().into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// True where the base colour tints something.
-pub(super) fn tints(
-    spec_tint: f64,
-    sheen: f64,
-    sheen_tint: f64,
-    textures: Option<&Textured>,
-) -> bool {
+pub(super) fn tints(spec_tint: f64, sheen: f64, sheen_tint: f64, textures: Textures<'_>) -> bool {
     let some = |value, property| ends_of(value, property, textures)[1] > 0.0;
     some(spec_tint, Property::SpecTint)
         || (some(sheen, Property::Sheen) && some(sheen_tint, Property::SheenTint))
@@ -469,11 +465,7 @@ impl Model for Principled {
         own.unit_numbers().into_iter().try_for_each(|(property, value)| part(property, *value))
     }
 
-    fn undifferentiated(
-        &self,
-        property: Property,
-        textures: Option<&Textured>,
-    ) -> Option<&'static str> {
+    fn undifferentiated(&self, property: Property, textures: Textures<'_>) -> Option<&'static str> {
         // The values of a property are between these.
         let ends = |value: f64, p| ends_of(value, p, textures);
         let never = |value, p| ends(value, p)[1] <= 0.0;

@@ -15,7 +15,6 @@ use core::f64::consts::FRAC_1_PI;
 use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Real, Rgb, Vec3, vec3, warp};
 
-use crate::model::surface::anisotropic::StretchedFacets;
 use crate::model::surface::framed::{Framed, scatters_in_frame};
 use crate::model::surface::fresnel::dielectric_reflected;
 use crate::model::surface::lobes::{SHEEN, reflection, widest};
@@ -27,7 +26,9 @@ use crate::model::surface::principled::{
     schlick, stretched, tint, tints,
 };
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, part};
-use crate::model::surface::{At, BsdfGradient, Given, Textured};
+use crate::model::surface::stretched_facets::StretchedFacets;
+use crate::model::surface::textures::Textures;
+use crate::model::surface::{At, BsdfGradient, Given};
 
 /// Burley's principled BSDF of thin sheets. Numbers are from 0 to 1 where nothing else is said.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -247,11 +248,7 @@ impl Model for PrincipledThin {
         own.unit_numbers().into_iter().try_for_each(|(property, value)| part(property, *value))
     }
 
-    fn undifferentiated(
-        &self,
-        property: Property,
-        textures: Option<&Textured>,
-    ) -> Option<&'static str> {
+    fn undifferentiated(&self, property: Property, textures: Textures<'_>) -> Option<&'static str> {
         match property {
             Property::BaseColor if tints(self.spec_tint, self.sheen, self.sheen_tint, textures) => {
                 Some(TINTED)

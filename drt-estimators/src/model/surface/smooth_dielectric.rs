@@ -9,7 +9,8 @@ use crate::model::surface::model::{Dependence, Flags, Lanes, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 use crate::model::surface::specular::{same, scatters_into_single_directions};
-use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue, Textured};
+use crate::model::surface::textures::Textures;
+use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
 
 /// A smooth interface of two transparent media: Mitsuba's `dielectric`. The normal points to the
 /// exterior. Radiance is transported, as by [`RoughDielectric`](super::RoughDielectric).
@@ -77,7 +78,7 @@ impl Model for Dielectric {
         check(self.eta, self.specular_reflectance, self.specular_transmittance)
     }
 
-    fn undifferentiated(&self, property: Property, _: Option<&Textured>) -> Option<&'static str> {
+    fn undifferentiated(&self, property: Property, _: Textures<'_>) -> Option<&'static str> {
         (property == Property::Eta).then_some("it turns light that goes through")
     }
 

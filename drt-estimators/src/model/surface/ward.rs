@@ -29,7 +29,8 @@ use crate::model::surface::microfacet::{LEAST_ALPHA, LEAST_COS2, mirrored};
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
-use crate::model::surface::{At, BsdfGradient, Given, Textured};
+use crate::model::surface::textures::Textures;
+use crate::model::surface::{At, BsdfGradient, Given};
 
 /// Ward's model: Mitsuba 0.6's `ward`. Black from behind.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -174,14 +175,10 @@ impl Model for Ward {
         })
     }
 
-    fn undifferentiated(
-        &self,
-        property: Property,
-        textures: Option<&Textured>,
-    ) -> Option<&'static str> {
+    fn undifferentiated(&self, property: Property, textures: Textures<'_>) -> Option<&'static str> {
         let roughness = matches!(property, Property::AlphaU | Property::AlphaV);
         // Which direction either belongs to is nothing that an even surface needs to know.
-        let oriented = self.flags().oriented || textures.is_some_and(Textured::orients);
+        let oriented = self.flags().oriented || textures.orients();
         (roughness && !oriented).then_some("both roughnesses are equal; give different ones")
     }
 

@@ -9,11 +9,11 @@ use core::f64::consts::{FRAC_PI_2, PI};
 use drt_math::{Rgb, Vec3, fm};
 
 use crate::model::surface::RoughConductor;
-use crate::model::surface::anisotropic::StretchedFacets;
 use crate::model::surface::fresnel::conductor_reflected;
 use crate::model::surface::measured::marginal2d::{Grid2d, Marginal2d, Mix};
 use crate::model::surface::measured::{MeasuredError, MeasuredTables, Tensor, direction};
 use crate::model::surface::microfacet::mirrored;
+use crate::model::surface::stretched_facets::StretchedFacets;
 
 impl MeasuredTables {
     /// The tables of a metal of the roughness `alpha` along u and across it; its own does not count. There are azimuths `phi_i`, a

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use drt_math::Rgb;
 
-use crate::model::surface::kinds::KINDS;
+use crate::model::surface::bsdf::KINDS;
 use crate::model::surface::tests::measured::measured_cases;
 use crate::model::surface::tests::perturbed::even_map;
 use crate::model::surface::tests::*;

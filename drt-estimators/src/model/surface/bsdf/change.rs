@@ -1,10 +1,11 @@
 use drt_math::{Rgb, ValueChange};
 
-use crate::model::surface::kinds::each;
+use crate::model::surface::Bsdf;
+use crate::model::surface::bsdf::each;
 use crate::model::surface::model::Model;
 use crate::model::surface::params::{BsdfTangent, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError, names};
-use crate::model::surface::{Bsdf, Textured};
+use crate::model::surface::textures::Textures;
 use crate::model::texture::Texture;
 
 /// A parameter's effect on one property of a BSDF.
@@ -81,14 +82,14 @@ impl Bsdf {
     /// Why there are only finite differences with respect to a property of it, if that is so.
     #[must_use]
     pub fn undifferentiated(&self, property: Property) -> Option<&'static str> {
-        self.undifferentiated_with(property, None)
+        self.undifferentiated_with(property, Textures::NONE)
     }
 
     /// Why there are only finite differences, where `textures` stand for some of the values.
-    pub(super) fn undifferentiated_with(
+    pub(in crate::model::surface) fn undifferentiated_with(
         &self,
         property: Property,
-        textures: Option<&Textured>,
+        textures: Textures<'_>,
     ) -> Option<&'static str> {
         each!(self, b => b.undifferentiated(property, textures)).or_else(|| {
             let lost = !self.differentiated().contains(property);
@@ -100,7 +101,11 @@ impl Bsdf {
     ///
     /// # Errors
     /// When the BSDF has no such property.
-    pub(super) fn set(&mut self, property: Property, value: Rgb) -> Result<(), SurfaceError> {
+    pub(in crate::model::surface) fn set(
+        &mut self,
+        property: Property,
+        value: Rgb,
+    ) -> Result<(), SurfaceError> {
         match self.property(property) {
             Some(slot) => slot.set(value),
             None => return Err(self.lacks(property)),
@@ -109,7 +114,7 @@ impl Bsdf {
     }
 
     /// Where it keeps a property.
-    pub(super) fn property(&mut self, property: Property) -> Option<Slot<'_>> {
+    pub(in crate::model::surface) fn property(&mut self, property: Property) -> Option<Slot<'_>> {
         each!(self, b => b.slot(property))
     }
 

@@ -5,12 +5,14 @@ use drt_geom::Mesh;
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, RgbVec, ValueChange, Vec3};
 
+use crate::model::surface::bsdf::Composed;
 use crate::model::surface::facet::Facet;
 
 use crate::model::surface::microfacet::LEAST_ALPHA;
 use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
+use crate::model::surface::textures::Textures;
 use crate::model::surface::{
     At, Bsdf, BsdfChange, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
 };
@@ -46,7 +48,7 @@ impl Textured {
 
     /// The BSDF at a point.
     #[inline]
-    pub(super) fn at(&self, at: At<'_>) -> Bsdf {
+    pub(in crate::model::surface) fn at(&self, at: At<'_>) -> Bsdf {
         let mut bsdf = self.bsdf.clone();
         if let Some(at) = at {
             for (property, texture) in &self.textures {
@@ -87,7 +89,11 @@ impl Textured {
     }
 
     /// Calls `f` with each property whose value is that of texels, and these.
-    pub(super) fn lookups(&self, at: &TexturePoint<'_>, mut f: impl FnMut(Property, &Footprint)) {
+    pub(in crate::model::surface) fn lookups(
+        &self,
+        at: &TexturePoint<'_>,
+        mut f: impl FnMut(Property, &Footprint),
+    ) {
         let uv = at.uv();
         for (property, texture) in &self.textures {
             let value = texture.at(uv);
@@ -99,9 +105,8 @@ impl Textured {
         }
     }
 
-    /// The texture that stands for a property.
-    pub(super) fn texture_of(&self, property: Property) -> Option<&Texture> {
-        self.textures.iter().find(|(p, _)| *p == property).map(|(_, texture)| texture)
+    fn textures(&self) -> Textures<'_> {
+        Textures(&self.textures)
     }
 
     fn check_bounds(&self, bounds: impl Fn(&Texture) -> [Rgb; 2]) -> Result<(), SurfaceError> {
@@ -121,12 +126,6 @@ impl Textured {
 }
 
 impl Textured {
-    /// True where textures tell directions along the surface apart.
-    pub(super) fn orients(&self) -> bool {
-        let uneven = [Property::Anisotropic, Property::AlphaU, Property::AlphaV];
-        uneven.into_iter().any(|p| self.texture_of(p).is_some())
-    }
-
     /// The gradient of a value by the place of its point, in the plane of the triangle there: through the properties
     /// that textures stand for, by which the value has the derivatives `params`.
     fn slide_of_textures(&self, at: &TexturePoint<'_>, params: &BsdfParams) -> RgbVec {
@@ -142,6 +141,12 @@ impl Textured {
 }
 
 /// At each point this is the BSDF of the textures' values there.
+impl Composed for Textured {
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        [Some(&self.bsdf), None]
+    }
+}
+
 impl Model for Textured {
     fn name(&self) -> &'static str {
         self.bsdf.name()
@@ -151,9 +156,9 @@ impl Model for Textured {
     fn flags(&self) -> Flags {
         let inner = self.bsdf.flags();
         // A texture may stand for how much goes through.
-        let through = self.texture_of(Property::SpecTrans).is_some();
+        let through = self.textures().of(Property::SpecTrans).is_some();
         let transmissive = inner.transmissive || through;
-        Flags { transmissive, oriented: inner.oriented || self.orients(), ..inner }
+        Flags { transmissive, oriented: inner.oriented || self.textures().orients(), ..inner }
     }
 
     fn differentiated(&self) -> PropertySet {
@@ -242,16 +247,12 @@ impl Model for Textured {
         self.at(at).lobe_width(at)
     }
 
-    fn parts(&self) -> [Option<&Bsdf>; 2] {
-        [Some(&self.bsdf), None]
-    }
-
     fn texture(&self, property: Property) -> Option<&Texture> {
-        self.texture_of(property)
+        self.textures().of(property)
     }
 
-    fn undifferentiated(&self, property: Property, _: Option<&Textured>) -> Option<&'static str> {
-        self.bsdf.undifferentiated_with(property, Some(self))
+    fn undifferentiated(&self, property: Property, _: Textures<'_>) -> Option<&'static str> {
+        self.bsdf.undifferentiated_with(property, self.textures())
     }
 
     fn slide(&self, at: At<'_>, directions: [Vec3; 3], params: &BsdfParams, factor: f64) -> RgbVec {
@@ -312,7 +313,7 @@ impl Bsdf {
     #[must_use]
     pub fn texel_values(&self, property: Property) -> Option<Vec<Rgb>> {
         self.texels(property)?;
-        Some(self.textured_part()?.texture_of(property)?.texels())
+        Some(self.textured_part()?.textures().of(property)?.texels())
     }
 
     /// This BSDF with other texels of the texture that stands for a property, row by row.
@@ -343,7 +344,7 @@ impl Bsdf {
     /// Columns and rows of texels of the texture that stands for a property, if one does that can change.
     #[must_use]
     pub fn texels(&self, property: Property) -> Option<[u32; 2]> {
-        Some(self.textured_part()?.texture_of(property)?.size()).filter(|size| *size != [0; 2])
+        Some(self.textured_part()?.textures().of(property)?.size()).filter(|size| *size != [0; 2])
     }
 
     /// Calls `f` with the textures of all its parts, and the properties that they stand for; maps of normals and

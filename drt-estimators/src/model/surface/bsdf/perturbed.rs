@@ -2,13 +2,13 @@ use drt_geom::Mesh;
 use drt_geom::edges::Lobes;
 use drt_math::{Dual, Frame, Real, Rgb, RgbVec, Vec3, vec3};
 
+use crate::model::surface::bsdf::Composed;
 use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
 use crate::model::surface::shading_frame::{by_coordinates, is_front, shading_frame};
-use crate::model::surface::{
-    At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue, Textured,
-};
+use crate::model::surface::textures::Textures;
+use crate::model::surface::{At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue};
 use crate::model::texture::{Texture, TexturePoint};
 
 /// A BSDF with other normals than those of its surface: Mitsuba's `normalmap` and `bumpmap`.
@@ -147,6 +147,12 @@ impl Perturbed {
         }
         let factor = facet.shadowed(Dual::<f64, 1>::variable(facet.surface.dot(wi), 0));
         (factor.re, factor.eps[0])
+    }
+}
+
+impl Composed for Perturbed {
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        [Some(&self.bsdf), None]
     }
 }
 
@@ -303,15 +309,11 @@ impl Model for Perturbed {
         Lobes::even(0.0)
     }
 
-    fn parts(&self) -> [Option<&Bsdf>; 2] {
-        [Some(&self.bsdf), None]
-    }
-
     fn texture(&self, property: Property) -> Option<&Texture> {
         self.bsdf.texture(property)
     }
 
-    fn undifferentiated(&self, property: Property, _: Option<&Textured>) -> Option<&'static str> {
+    fn undifferentiated(&self, property: Property, _: Textures<'_>) -> Option<&'static str> {
         self.bsdf.undifferentiated(property)
     }
 

@@ -40,6 +40,7 @@ use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Dual, Real, Rgb, RgbVec, Vec3, fm};
 
 use crate::model::surface::angles::{Angles, Slopes};
+use crate::model::surface::bsdf::Composed;
 use crate::model::surface::choice::choose;
 use crate::model::surface::coating::Coating;
 use crate::model::surface::fresnel::dielectric_reflected;
@@ -49,9 +50,8 @@ use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
 use crate::model::surface::specular::same;
-use crate::model::surface::{
-    At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue, Textured,
-};
+use crate::model::surface::textures::Textures;
+use crate::model::surface::{At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue};
 use crate::model::texture::Texture;
 
 /// A reflector under a dielectric layer, which may absorb: Mitsuba 0.6's `coating` and `roughcoating`.
@@ -166,6 +166,12 @@ impl Coated {
         let share = if sum > 0.0 { reflected / sum } else { 0.5 };
         let share = share.clamp(LEAST_CHOICE, 1.0 - LEAST_CHOICE);
         [share, 1.0 - share]
+    }
+}
+
+impl Composed for Coated {
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        [Some(&self.bsdf), None]
     }
 }
 
@@ -375,10 +381,6 @@ impl Model for Coated {
         two_highest(below.even * dimmed, [a, b, top.unwrap_or_default(), Lobe::default()])
     }
 
-    fn parts(&self) -> [Option<&Bsdf>; 2] {
-        [Some(&self.bsdf), None]
-    }
-
     /// The texture below the layer that stands for a property.
     fn texture(&self, property: Property) -> Option<&Texture> {
         match property {
@@ -387,7 +389,7 @@ impl Model for Coated {
         }
     }
 
-    fn undifferentiated(&self, property: Property, _: Option<&Textured>) -> Option<&'static str> {
+    fn undifferentiated(&self, property: Property, _: Textures<'_>) -> Option<&'static str> {
         match property {
             Property::SpecularReflectance | Property::SigmaA => None,
             Property::Thickness => Some("change `sigma_a`, which it is a factor of"),

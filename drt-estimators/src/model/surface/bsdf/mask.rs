@@ -1,13 +1,15 @@
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, Vec3};
 
+use crate::model::surface::bsdf::Composed;
 use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::principled::ends_of;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
 use crate::model::surface::specular::same;
+use crate::model::surface::textures::Textures;
 use crate::model::surface::{
-    At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue, Textured,
+    At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
 };
 use crate::model::texture::Texture;
 
@@ -24,7 +26,7 @@ pub struct Mask {
 
 impl Mask {
     /// The opacity as a probability.
-    pub(super) fn opaque(&self) -> f64 {
+    pub(in crate::model::surface) fn opaque(&self) -> f64 {
         self.opacity.clamp(0.0, 1.0)
     }
 
@@ -37,6 +39,12 @@ impl Mask {
     fn there(&self, choice: f64) -> Option<f64> {
         let opacity = self.opaque();
         (choice < opacity).then(|| choice / opacity)
+    }
+}
+
+impl Composed for Mask {
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        [Some(&self.bsdf), None]
     }
 }
 
@@ -145,19 +153,11 @@ impl Model for Mask {
         Lobes::even(0.0)
     }
 
-    fn parts(&self) -> [Option<&Bsdf>; 2] {
-        [Some(&self.bsdf), None]
-    }
-
     fn texture(&self, property: Property) -> Option<&Texture> {
         self.bsdf.texture(property)
     }
 
-    fn undifferentiated(
-        &self,
-        property: Property,
-        textures: Option<&Textured>,
-    ) -> Option<&'static str> {
+    fn undifferentiated(&self, property: Property, textures: Textures<'_>) -> Option<&'static str> {
         if property != Property::Opacity {
             return self.bsdf.undifferentiated(property);
         }

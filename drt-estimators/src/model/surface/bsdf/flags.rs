@@ -2,7 +2,7 @@
 
 use drt_geom::Mesh;
 
-use crate::model::surface::kinds::each;
+use crate::model::surface::bsdf::each;
 use crate::model::surface::model::{Dependence, Flags, Model};
 use crate::model::surface::shading_frame::frames_jump_on;
 use crate::model::surface::{Bsdf, Property};
@@ -10,18 +10,13 @@ use crate::model::surface::{Bsdf, Property};
 impl Bsdf {
     /// What a model states of itself.
     #[inline(always)]
-    pub(super) fn flags(&self) -> Flags {
+    pub(in crate::model::surface) fn flags(&self) -> Flags {
         each!(self, b => b.flags())
     }
 
     #[inline(always)]
     fn dependence(&self) -> Dependence {
         each!(self, b => b.dependence())
-    }
-
-    /// The BSDFs that this one is made of.
-    pub(super) fn parts(&self) -> impl Iterator<Item = &Self> {
-        each!(self, b => b.parts()).into_iter().flatten()
     }
 
     /// True for the border of a medium that light crosses unchanged.

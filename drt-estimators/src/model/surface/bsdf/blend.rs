@@ -1,6 +1,7 @@
 use drt_geom::edges::{Lobe, Lobes};
 use drt_math::{Real, Rgb, RgbVec, Vec3};
 
+use crate::model::surface::bsdf::Composed;
 use crate::model::surface::choice::choose;
 use crate::model::surface::lobes::two_highest;
 use crate::model::surface::model::{Flags, Model, Numbers};
@@ -48,6 +49,12 @@ impl Blend {
         let [first, second] = self.choices();
         let (is_second, choice) = choose(choice, [second, first]);
         (usize::from(is_second), choice)
+    }
+}
+
+impl Composed for Blend {
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        self.bsdfs.each_ref().map(Some)
     }
 }
 
@@ -173,10 +180,6 @@ impl Model for Blend {
             *lobe = Lobe { height: part.height * weight, ..*part };
         }
         two_highest(parts[0].even * weights[0] + parts[1].even * weights[1], all)
-    }
-
-    fn parts(&self) -> [Option<&Bsdf>; 2] {
-        self.bsdfs.each_ref().map(Some)
     }
 
     fn slide(&self, at: At<'_>, [wo, wi, n]: [Vec3; 3], _: &BsdfParams, factor: f64) -> RgbVec {

@@ -1,13 +1,13 @@
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, RgbVec, Vec3};
 
+use crate::model::surface::bsdf::Composed;
 use crate::model::surface::facet::Facet;
 use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError};
-use crate::model::surface::{
-    At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue, Textured,
-};
+use crate::model::surface::textures::Textures;
+use crate::model::surface::{At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue};
 use crate::model::texture::Texture;
 
 /// One-sided reflectors used on both sides of a surface: from behind, the normal is turned over.
@@ -29,6 +29,12 @@ impl TwoSided {
 
     fn behind(&self) -> &Bsdf {
         self.back.as_ref().unwrap_or(&self.front)
+    }
+}
+
+impl Composed for TwoSided {
+    fn parts(&self) -> [Option<&Bsdf>; 2] {
+        [Some(&self.front), self.back.as_ref()]
     }
 }
 
@@ -148,15 +154,11 @@ impl Model for TwoSided {
         f64::min(self.front.lobe_width(at), self.behind().lobe_width(at))
     }
 
-    fn parts(&self) -> [Option<&Bsdf>; 2] {
-        [Some(&self.front), self.back.as_ref()]
-    }
-
     fn texture(&self, property: Property) -> Option<&Texture> {
         self.front.texture(property)
     }
 
-    fn undifferentiated(&self, property: Property, _: Option<&Textured>) -> Option<&'static str> {
+    fn undifferentiated(&self, property: Property, _: Textures<'_>) -> Option<&'static str> {
         self.front.undifferentiated(property)
     }
 
