@@ -336,11 +336,18 @@ fn failures_on_the_way_are_told_and_stored() {
     // Into the floor.
     let job = text(&folder, "job.toml")
         .replace("translate = [1.0, 0.0, 0.0]", "translate = [0.0, 0.0, -1.0]");
-    folder.file("down.toml", job.replace("lamp-x = 40.0", "lamp-x = 3.0"));
+    folder.file("down.toml", job.replace("lamp-x = 40.0", "lamp-x = 300.0"));
     let out = folder.run("optimize down.toml --quiet --set parameter.gray.value=-0.4");
     expect(&out, 1, &["iteration 0: the step to", "`lamp` passed through `floor`"]);
     assert!(text(&folder, "run/report.html").contains("passed through"));
     assert_eq!(text(&folder, "run/params.csv").lines().count(), 2);
+    // A fourth of a step does not reach the floor, and what is halved is the step of all parameters.
+    std::fs::remove_dir_all(folder.path().join("run")).unwrap();
+    folder.file("down.toml", job.replace("lamp-x = 40.0", "lamp-x = 3.0"));
+    let out = folder.run("optimize down.toml --iterations 1 --set parameter.gray.value=-0.4");
+    expect(&out, 0, &["a step is not possible", "`lamp` passed through `floor`", "halved"]);
+    let [gray, lamp] = result(&folder)[..] else { panic!() };
+    assert!((gray + 0.395).abs() < 1e-6 && (lamp - 0.75).abs() < 1e-6, "{gray} {lamp}");
     // Steps too far, back and forth.
     std::fs::remove_dir_all(folder.path().join("run")).unwrap();
     let moves = "target = \"lamp\"\ntranslate = [1.0, 0.0, 0.0]";

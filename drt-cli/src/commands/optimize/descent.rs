@@ -29,8 +29,8 @@ use crate::{CliError, PROGRAM};
 
 /// Seconds after which a checkpoint is written, however few iterations have passed.
 const CHECKPOINT_SECONDS: f64 = 30.0;
-/// Times that a step of groups is halved before it is given up.
-const SHORTENED: u32 = 6;
+/// Times that a step is halved before it is given up.
+const HALVINGS: u32 = 6;
 /// Least seconds between pictures of the present state.
 const PICTURE_SECONDS: f64 = 10.0;
 
@@ -244,7 +244,9 @@ impl<'a> Descent<'a> {
             .step_by(i, evaluation, factor)
             .map_err(|e| CliError::unsolved(format!("iteration {i}: {e}")));
         let stepped = stepped.and_then(|()| self.stay_in_range(i, before.values(), fit));
-        let stepped = stepped.and_then(|()| self.step_groups(i, evaluation, factor, fit));
+        let stepped = stepped.and_then(|()| {
+            self.step_as_far_as_possible(i, before.values(), evaluation, factor, fit)
+        });
         if let Err(error) = stepped {
             self.optimizer = before;
             self.fail(evaluation, &error)?;
@@ -254,34 +256,48 @@ impl<'a> Descent<'a> {
         Ok(())
     }
 
-    /// Steps the groups, by less where a whole step is not possible.
-    fn step_groups(
+    /// Steps the groups as the parameters have been stepped from the values `before`, and halves both steps while the scene
+    /// that they lead to is not possible.
+    fn step_as_far_as_possible(
         &mut self,
         i: u32,
+        before: &[f64],
         evaluation: &Evaluation,
         factor: f64,
         fit: &mut Fit,
     ) -> Result<(), CliError> {
-        let before = self.fields.clone();
+        let fields = self.fields.clone();
         self.fields.step(i, evaluation, factor)?;
-        let mut left = SHORTENED;
+        let mut left = HALVINGS;
         loop {
-            let given = self.fields.give(fit);
-            let judged = given.and_then(|()| self.watch.step(i, self.optimizer.values(), fit));
-            match judged {
-                Ok(()) => return Ok(()),
-                Err(error) if left == 0 || self.fields.is_empty() => {
-                    self.fields = before;
-                    return Err(error);
-                }
-                Err(error) => {
-                    let loud = self.team.leads() && !self.quiet && left == SHORTENED;
-                    self.limits.note_groups(i, &error.to_string(), loud);
-                    self.fields.shorten(0.5);
-                    left -= 1;
-                }
+            let given = self.fields.give(fit).map_err(|e| e.to_string());
+            let judged = given.and_then(|()| self.watch.step(self.optimizer.values(), fit));
+            let Err(reason) = judged else { return Ok(()) };
+            if left == 0 {
+                self.fields = fields;
+                return Err(self.watch.impossible(i, self.optimizer.values(), &reason));
             }
+            let aloud = self.team.leads() && !self.quiet && left == HALVINGS;
+            self.limits.note_halved(i, &reason, aloud);
+            self.fields.shorten(0.5);
+            let halves: Vec<f64> = self
+                .optimizer
+                .values()
+                .iter()
+                .zip(before)
+                .map(|(to, from)| 0.5 * (from + to))
+                .collect();
+            self.take_back(i, &halves)?;
+            left -= 1;
         }
+    }
+
+    fn take_back(&mut self, i: u32, values: &[f64]) -> Result<(), CliError> {
+        for (p, value) in values.iter().enumerate() {
+            let taken = self.optimizer.take_back(p, *value);
+            taken.map_err(|e| CliError::unsolved(format!("iteration {i}: {e}")))?;
+        }
+        Ok(())
     }
 
     /// Shortens a step that leads out of where properties have a meaning, parameter by parameter.
@@ -298,10 +314,7 @@ impl<'a> Descent<'a> {
             wanted = limits::shortened(before, &wanted, (!everyone).then_some(p), |values| {
                 fit.scene_at(values).is_err_and(|e| e.out_of_range().is_some())
             });
-            for (p, value) in wanted.iter().enumerate() {
-                let taken = self.optimizer.take_back(p, *value);
-                taken.map_err(|e| CliError::unsolved(format!("iteration {i}: {e}")))?;
-            }
+            self.take_back(i, &wanted)?;
             self.limits.note(&names[p], i, &reason, self.team.leads() && !self.quiet);
             if everyone {
                 break;

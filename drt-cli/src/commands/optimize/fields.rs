@@ -76,10 +76,6 @@ impl<'a> Fields<'a> {
         Ok(Self { problem, optimizers, starts })
     }
 
-    pub(super) fn is_empty(&self) -> bool {
-        self.optimizers.is_empty()
-    }
-
     fn groups(&self) -> impl Iterator<Item = (&'a ParameterGroup, &FieldOptimizer)> {
         self.problem.job.groups.iter().zip(&self.optimizers)
     }

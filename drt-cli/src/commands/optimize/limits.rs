@@ -24,16 +24,15 @@ impl Limits {
         self.tell(parameter, note, aloud);
     }
 
-    /// Notes that a step of the groups of unknowns was shortened.
-    pub(super) fn note_groups(&mut self, iteration: u32, reason: &str, aloud: bool) {
+    /// Notes that a step of all unknowns was halved.
+    pub(super) fn note_halved(&mut self, iteration: u32, reason: &str, aloud: bool) {
         // No parameter has this name.
         let name = "";
         if self.0.iter().any(|(known, _)| known == name) {
             return;
         }
         let note = format!(
-            "iteration {iteration}: a step of the groups is not possible ({reason}); it was halved, as later ones are \
-             without a note"
+            "iteration {iteration}: a step is not possible ({reason}); it was halved, as later ones are without a note"
         );
         self.tell(name, note, aloud);
     }

@@ -80,20 +80,22 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Judges the step from iteration `i` to these values.
-    pub(super) fn step(&mut self, i: u32, values: &[f64], fit: &mut Fit) -> Result<(), CliError> {
-        let fail = |what: String| {
-            let values = self.problem.names().zip(values).map(|(n, v)| format!("{n} = {v:.6}"));
-            CliError::unsolved(format!(
-                "iteration {i}: the step to {} is not possible: {what}; lower the learning rate, \
-                 or give parameters `bounds`",
-                values.collect::<Vec<_>>().join(", ")
-            ))
-        };
-        let next = fit.scene_at(values).map_err(|e| fail(e.to_string()))?;
+    /// Judges the step to these values: what is wrong with it, if anything is.
+    pub(super) fn step(&mut self, values: &[f64], fit: &mut Fit) -> Result<(), String> {
+        let next = fit.scene_at(values).map_err(|e| e.to_string())?;
         let sensors: Vec<usize> = self.problem.views.iter().map(|v| v.sensor).collect();
-        check_step(&self.scene, next, &sensors).map_err(|e| fail(e.to_string()))?;
+        check_step(&self.scene, next, &sensors).map_err(|e| e.to_string())?;
         self.scene = next.clone();
         Ok(())
+    }
+
+    /// The end of a fit whose step from iteration `i` to these values is not possible.
+    pub(super) fn impossible(&self, i: u32, values: &[f64], what: &str) -> CliError {
+        let values = self.problem.names().zip(values).map(|(n, v)| format!("{n} = {v:.6}"));
+        CliError::unsolved(format!(
+            "iteration {i}: the step to {} is not possible: {what}; lower the learning rate, \
+             or give parameters `bounds`",
+            values.collect::<Vec<_>>().join(", ")
+        ))
     }
 }
