@@ -6,8 +6,8 @@
 
 Each problem is a folder beside this file. Its make.py, if it has one, makes what the scene needs; the job's pictures are rendered
 (with another seed than any of the fits'), `drt optimize` runs on the job, and a row of a table in Markdown is printed. What is there
-already is read, not run: a stopped fit goes on, a finished one only evaluates its last image; --again begins
-all anew.
+already is read, not run: a stopped fit goes on, a finished one only evaluates its last image; --again removes
+all of it and begins anew.
 
 A problem's problem.toml says of which paper it is, and what to reach:
 
@@ -31,12 +31,14 @@ import json
 import math
 import os
 import pathlib
+import shutil
 import struct
 import subprocess
 import sys
 import tomllib
 
 import surfaces
+import views
 
 HERE = pathlib.Path(__file__).resolve().parent
 HEAD = ["problem", "paper", "looked for", "unknowns", "views", "size", "start", "reached", "error", "iterations (within the bound from)",
@@ -84,7 +86,9 @@ class Problem:
         return [word for name in self.target for word in ("--set", f"parameter.{name}.value={float(values[name])}")]
 
     def make(self):
-        """Assets and pictures that are not there yet."""
+        """Assets, and pictures that are not there yet or older than what they show."""
+        if self.options.again:
+            shutil.rmtree(self.run, ignore_errors=True)
         self.run.mkdir(exist_ok=True)
         if (self.folder / "make.py").exists():
             environment = os.environ | {"DRT": str(self.options.drt)}
@@ -98,7 +102,7 @@ class Problem:
         if self.target:
             for picture, sensor in zip(self.pictures, self.sensors):
                 path = self.path.parent / picture
-                if not path.exists():
+                if not views.is_newer(path, self.folder / "scene.xml", self.folder / "problem.toml"):
                     sees = ["--sensor", sensor] if sensor else []
                     self.drt("render", self.path, *self.at(self.target), *sees, "--seed", 1, "--spp", self.about["spp"], "--output", path)
 

@@ -12,9 +12,15 @@ DRT = os.environ.get("DRT", str(pathlib.Path(__file__).resolve().parents[2] / "t
 """The program that renders."""
 
 
+def is_newer(file, *others):
+    """True of a file that is there and was written after the others."""
+    time = pathlib.Path(file).stat().st_mtime if pathlib.Path(file).exists() else 0.0
+    return all(time > pathlib.Path(other).stat().st_mtime for other in others)
+
+
 def render(scene, output, spp, defines=(), sensor=None, more=()):
-    """Renders a picture to a file, unless the file is there."""
-    if pathlib.Path(output).exists():
+    """Renders a picture to a file, unless a file is there that is newer than the scene."""
+    if is_newer(output, scene):
         return
     words = [DRT, "render", scene, "--quiet", "--seed", "1", "--spp", spp, "--output", output, *more]
     words += ["--sensor", sensor] if sensor else []

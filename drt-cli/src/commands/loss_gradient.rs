@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use drt_estimators::fit::{Fit, View};
-use drt_estimators::loss::{Loss, Reference};
+use drt_estimators::loss::Loss;
 use drt_estimators::{
     Derivative, GradientBatch, Rendering, SceneGradient, Shard, Target, gradient_in_batches, moved,
 };
@@ -16,7 +16,7 @@ use super::monitor::Monitor;
 use super::options::GradOptions;
 use super::outputs::Outputs;
 use super::shard_file::{Batch, ShardFile, Sums, Total};
-use super::{Outcome, run, shard, stop};
+use super::{Outcome, run, shard, stop, targets};
 use crate::error::Place;
 use crate::files::image::read_picture;
 use crate::files::npy::{write_npy, write_npy_bytes};
@@ -55,14 +55,16 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     if shard.is_some() {
         shard::check(&job, common, "grad")?;
     }
-    let pictures = [&options.loss, &options.adjoint].into_iter().flatten().map(PathBuf::as_path);
-    Destinations::new([("-o", Some(output.as_path()))]).spare(pictures)?;
+    let given = [options.loss.as_ref().and_then(Option::as_ref), options.adjoint.as_ref()];
+    let named = job.optimize()?.map(|plan| plan.targets.iter().chain(plan.masks.iter().flatten()));
+    let pictures = given.into_iter().flatten().chain(named.into_iter().flatten());
+    Destinations::new([("-o", Some(output.as_path()))]).spare(pictures.map(PathBuf::as_path))?;
     let (monitor, start) =
         (Monitor::new(common.changes.quiet), Outputs::new(common, &job, "grad")?);
     // Before the seed is changed for the gradient's own samples.
     let asked = job.clone();
     let found = match (&options.loss, &options.adjoint) {
-        (Some(target), _) => of_loss(&mut job, options, target, &monitor)?,
+        (Some(target), _) => of_loss(&mut job, options, target.as_deref(), &monitor)?,
         (None, Some(adjoint)) => {
             let adjoint = picture(&job, adjoint)?;
             of_adjoint(&mut job, options, adjoint, &monitor)?
@@ -92,61 +94,107 @@ enum Found {
     Sums(Box<Sums>, String),
 }
 
-fn hash(loss: &str, pixels: &[Rgb]) -> String {
+/// Tells pictures apart, and losses of them.
+fn hash(loss: &str, picture: &impl std::fmt::Debug) -> String {
     let mut sum = Fingerprint::default();
     sum.add(loss.as_bytes());
-    pixels.iter().flat_map(|p| p.to_array()).for_each(|v| sum.add(&v.to_le_bytes()));
+    sum.add(format!("{picture:?}").as_bytes());
     sum.to_string()
 }
 
-/// By the job's own loss, where it names one.
+/// By the job's own loss, where it names one, of a picture or of all that the job names.
 fn of_loss(
     job: &mut Job,
     options: &GradOptions,
-    target: &Path,
+    target: Option<&Path>,
     monitor: &Monitor,
 ) -> Result<Option<Found>, CliError> {
-    let fail = |e| CliError::input(&Place::file(target), e);
-    let pixels = picture(job, target)?;
-    let sensor = job.settings.sensor;
-    let size = job.scene.sensors[sensor].item.sensor.film();
     let plan = job.optimize()?;
-    if plan.is_some_and(|plan| !plan.poses.is_empty()) {
-        let message = "a gradient is of one picture of the scene as it is; its [[view]] are for `drt optimize`";
-        return Err(CliError::input(&Place::file(&job.path), message));
-    }
     let loss = plan.map_or(Loss::L2, |plan| plan.loss);
-    let hash = hash(&format!("{loss:?}"), &pixels);
-    let reference = Reference::new(size, pixels).map_err(fail)?;
-    if !job.groups.is_empty() {
-        // Image and gradient need independent samples.
-        let mut session = run::prepare_forward(job, &mut run::Shared::default())?;
-        monitor.stage("image", 0.0, 0.3);
-        let rendering = run::sample(&mut session, &options.common, job.spp(), monitor);
-        if !rendering.complete {
-            return Ok(None);
+    let views = match (target, plan) {
+        (Some(target), plan) => vec![targets::instead(job, plan, target)?],
+        (None, Some(plan)) => targets::views(job, plan)?,
+        (None, None) => {
+            let message =
+                "it has no [optimize] with `targets`, and no [[view]]; expected `--loss FILE`";
+            return Err(CliError::input(&Place::file(&job.path), message));
         }
-        let image: Vec<Rgb> = rendering.image.pixels.iter().map(|p| p.mean).collect();
-        job.settings.seed = job.settings.seed.wrapping_add(INDEPENDENT);
-        return of_adjoint(job, options, loss.adjoint(&image, &reference), monitor);
-    }
-    let (scene, views) = (job.scene.clone(), vec![View::new(sensor, reference.clone())]);
-    let mut fit = Fit::new(scene, job.parameters.clone(), views, loss, job.settings.clone())
-        .map_err(|e| job.blame(&e))?;
-    let values: Vec<f64> = job.parameters.iter().map(|p| p.value).collect();
-    let (spp, seed) = (job.spp(), job.settings.seed);
-    if let Some(shard) = options.shard {
-        let mut half = |k: usize| {
-            monitor.stage("gradient", 0.5 * k as f64, 0.5 * (k + 1) as f64);
-            fit.half_shard(&values, spp, seed, 0, k, shard, monitor).map_err(|e| job.blame(&e))
-        };
-        let Some((a, b)) = half(0)?.zip(half(1)?) else { return Ok(None) };
-        let sums = Sums::Halves { halves: Box::new([a, b]), loss, target: reference };
-        return Ok(Some(Found::Sums(Box::new(sums), hash)));
+    };
+    // What shards add up has to be what one run samples.
+    match (&views[..], options.shard) {
+        ([view], _) if !job.groups.is_empty() && view.pose.is_empty() => {
+            return by_its_image(job, options, &view.clone(), loss, monitor);
+        }
+        ([view], Some(shard)) if job.groups.is_empty() => {
+            return halves_of_loss(job, shard, view.clone(), loss, monitor);
+        }
+        (_, Some(_)) => {
+            let message = "--shard goes with one target or view, and with [[parameter_group]] where that has no pose";
+            return Err(CliError::argument(message));
+        }
+        (_, None) => {}
     }
     monitor.stage("gradient", 0.0, 1.0);
-    let seen = fit.evaluate(&values, spp, seed, monitor).map_err(|e| job.blame(&e))?;
-    Ok(seen.map(|seen| Found::Numbers(seen.gradient())))
+    let mut fit = fit(job, views, loss)?;
+    let seen = fit
+        .evaluate(&values(job), job.spp(), job.settings.seed, monitor)
+        .map_err(|e| job.blame(&e))?;
+    Ok(seen.map(|seen| {
+        let groups = (0..job.groups.len()).flat_map(|g| seen.group_gradient(g));
+        Found::Numbers(seen.gradient().into_iter().chain(groups.copied()).collect())
+    }))
+}
+
+fn fit(job: &Job, views: Vec<View>, loss: Loss) -> Result<Fit, CliError> {
+    let groups = job.groups.iter().map(|g| g.group.clone()).collect();
+    Fit::new(job.scene.clone(), job.parameters.clone(), views, loss, job.settings.clone())
+        .and_then(|fit| fit.with_groups(groups))
+        .map_err(|e| job.blame(&e))
+}
+
+fn values(job: &Job) -> Vec<f64> {
+    job.parameters.iter().map(|p| p.value).collect()
+}
+
+/// By the derivative of the loss by an image, whose samples are not those of the gradient.
+fn by_its_image(
+    job: &mut Job,
+    options: &GradOptions,
+    view: &View,
+    loss: Loss,
+    monitor: &Monitor,
+) -> Result<Option<Found>, CliError> {
+    job.settings.sensor = view.sensor;
+    let mut session = run::prepare_forward(job, &mut run::Shared::default())?;
+    monitor.stage("image", 0.0, 0.3);
+    let rendering = run::sample(&mut session, &options.common, job.spp(), monitor);
+    if !rendering.complete {
+        return Ok(None);
+    }
+    let image: Vec<Rgb> = rendering.image.pixels.iter().map(|p| p.mean).collect();
+    job.settings.seed = job.settings.seed.wrapping_add(INDEPENDENT);
+    of_adjoint(job, options, loss.adjoint(&image, &view.reference), monitor)
+}
+
+/// A shard of the two halves that the gradient by parameters is made of.
+fn halves_of_loss(
+    job: &Job,
+    shard: Shard,
+    view: View,
+    loss: Loss,
+    monitor: &Monitor,
+) -> Result<Option<Found>, CliError> {
+    let target = view.reference.clone();
+    let mut fit = fit(job, vec![view], loss)?;
+    let mut half = |k: usize| {
+        monitor.stage("gradient", 0.5 * k as f64, 0.5 * (k + 1) as f64);
+        fit.half_shard(&values(job), job.spp(), job.settings.seed, 0, k, shard, monitor)
+            .map_err(|e| job.blame(&e))
+    };
+    let Some((a, b)) = half(0)?.zip(half(1)?) else { return Ok(None) };
+    let hash = hash(&format!("{loss:?}"), &target);
+    let sums = Sums::Halves { halves: Box::new([a, b]), loss, target };
+    Ok(Some(Found::Sums(Box::new(sums), hash)))
 }
 
 /// Forward for the parameters, in reverse for the groups.

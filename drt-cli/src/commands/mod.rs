@@ -26,6 +26,7 @@ mod shard_file;
 mod shell;
 mod stop;
 mod table;
+mod targets;
 
 use std::ffi::OsString;
 use std::io::IsTerminal;

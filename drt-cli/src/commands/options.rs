@@ -177,9 +177,10 @@ pub(super) struct GradOptions {
     /// Store each term of a derivative in a layer of its own.
     #[arg(long)]
     pub(super) terms: bool,
-    /// Write the gradient of the distance to this target image, as NPY, instead of images.
-    #[arg(long, value_name = "FILE")]
-    pub(super) loss: Option<PathBuf>,
+    /// Write the gradient of a loss, as NPY, instead of images: of that of this target image, or of all targets or views that the
+    /// job names.
+    #[arg(long, value_name = "FILE", num_args = 0..=1)]
+    pub(super) loss: Option<Option<PathBuf>>,
     /// The same for a loss of which this is the derivative by every pixel.
     #[arg(long, value_name = "FILE.exr")]
     pub(super) adjoint: Option<PathBuf>,

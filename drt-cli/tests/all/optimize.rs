@@ -253,6 +253,48 @@ fn gradients_by_target_and_by_adjoint_agree() {
     expect(&folder.run(small), 2, &["target.exr: it has 16x16 pixels"]);
 }
 
+/// A pose is a known part of the scene, a mask and `relative` are part of the loss, and views add up.
+#[test]
+fn gradients_are_those_of_all_views() {
+    let folder = folder("");
+    expect(&folder.run("render job.toml --quiet --spp 64 --sensor above -o above.exr"), 0, &[]);
+    let gray = |values: &[u8]| image::GrayImage::from_raw(8, 8, values.to_vec()).unwrap();
+    let half: Vec<u8> = (0..64).map(|i| if i % 8 < 4 { 255 } else { 0 }).collect();
+    gray(&half).save(folder.path().join("half.png")).unwrap();
+    let view = |target: &str, more: &str| format!("[[view]]\ntarget = \"{target}\"\n{more}\n");
+    let moved = "[[view.effect]]\ntarget = \"lamp\"\ntranslate = [1.0, 0.0, 0.0]\namount = 0.3";
+    let masked = "sensor = \"above\"\nmask = \"half.png\"";
+    let group = "[[parameter_group]]\ntarget = \"floor\"\nvertices = \"all\"\n";
+    let gradient = |groups: &str, plan: &str, options: &str| {
+        folder.file("views.toml", format!("{JOB}{groups}[optimize]\nrelative = 0.5\n{plan}"));
+        let line = format!("grad views.toml --quiet --spp 64 {options} -o g.npy");
+        expect(&folder.run(&line), 0, &[]);
+        array(&folder, "g.npy")
+    };
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-9 * (a.abs() + b.abs());
+    let posed = view("target.exr", moved) + &view("above.exr", &format!("{masked}\n{moved}"));
+    let posed = gradient(group, &posed, "--loss");
+    let both = view("target.exr", "") + &view("above.exr", masked);
+    let there = gradient(group, &both, "--set parameter.lamp-x.value=0.3 --loss");
+    assert!(posed.len() == 2 + 12 && posed.iter().zip(&there).all(|(a, b)| near(*a, *b)));
+    let both = gradient("", &both, "--loss");
+    let apart = ["target.exr", "above.exr"].map(|target| {
+        let more = if target == "above.exr" { masked } else { "" };
+        gradient("", &view(target, more), "--loss")
+    });
+    assert!((0..2).all(|p| near(both[p], apart[0][p] + apart[1][p])), "{both:?} {apart:?}");
+    let above = &apart[1];
+    // The mask and `relative` count, also of a picture that is named beside the job.
+    let plain = gradient("", &view("above.exr", "sensor = \"above\""), "--loss");
+    assert!((plain[0] - above[0]).abs() > 0.1 * plain[0].abs(), "{plain:?} {above:?}");
+    let target = "targets = [\"above.exr\"]\nsensors = [\"above\"]\nmasks = [\"half.png\"]\n";
+    assert_eq!(&gradient("", target, "--loss above.exr"), above);
+    folder.file("views.toml", format!("{JOB}[optimize]\n{}", view("target.exr", moved)));
+    expect(&folder.run("grad views.toml --loss target.exr -o g.npy"), 2, &["without a file"]);
+    folder.file("views.toml", JOB);
+    expect(&folder.run("grad views.toml --loss -o g.npy"), 2, &["no [optimize]", "--loss FILE"]);
+}
+
 /// The whole cage, and the whole of the shape's vertices, shifted alike, shift the shape.
 #[test]
 fn groups_have_gradients_in_reverse() {

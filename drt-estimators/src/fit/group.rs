@@ -76,8 +76,11 @@ impl Group {
         Ok(group)
     }
 
-    /// Refuses groups that would set the same values.
-    pub(super) fn check_together(groups: &[Self]) -> Result<(), Error> {
+    /// Refuses groups that would set the same values. Each of them has its gradient, but only one of them can step.
+    ///
+    /// # Errors
+    /// For the first group that decides values of one before it.
+    pub fn check_together(groups: &[Self]) -> Result<(), Error> {
         for (i, group) in groups.iter().enumerate() {
             let same = |other: &&Self| {
                 other.target == group.target

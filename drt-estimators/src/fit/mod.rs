@@ -139,13 +139,11 @@ impl Fit {
     /// unknowns.
     ///
     /// # Errors
-    /// When images are differentiated by [`EstimatorKind::FiniteDifference`], which has no reverse mode, and when two
-    /// groups decide the same values.
+    /// When images are differentiated by [`EstimatorKind::FiniteDifference`], which has no reverse mode.
     pub fn with_groups(mut self, groups: Vec<Group>) -> Result<Self, Error> {
         if !groups.is_empty() && self.settings.estimator == EstimatorKind::FiniteDifference {
             return Err(Error::Setting { setting: "estimator", reason: SettingError::NoSession });
         }
-        Group::check_together(&groups)?;
         self.group_values = groups.iter().map(|group| group.values(&self.given)).collect();
         self.groups = groups;
         Ok(self)
@@ -154,12 +152,14 @@ impl Fit {
     /// Gives a group other values, in the order of [`Group::values`].
     ///
     /// # Errors
-    /// When there is no such group, their number is another, or one is out of its range; the values then stay.
+    /// When there is no such group, their number is another, or one is out of its range, and when two groups decide the same
+    /// values; the values then stay.
     pub fn set_group(&mut self, group: usize, values: &[f64]) -> Result<(), Error> {
         let Some(known) = self.group_values.get_mut(group) else {
             let reason = SettingError::NoGroup { index: group, count: self.groups.len() };
             return Err(Error::Setting { setting: "group", reason });
         };
+        Group::check_together(&self.groups)?;
         let before = core::mem::replace(known, values.to_vec());
         // From what was given, so that nothing depends on values on the way.
         let mut scene = self.given.clone();

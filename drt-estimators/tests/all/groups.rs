@@ -171,7 +171,8 @@ fn what_cannot_be_meant_is_refused() {
     assert_eq!(message.as_deref(), Some("group `ball`: its target has no such values"));
     let twice = vec![vertices(), Group { name: "again".into(), ..vertices() }];
     let fit = || Fit::new(scene.clone(), vec![], vec![view(&scene)], Loss::L2, settings()).unwrap();
-    let message = fit().with_groups(twice).err().map(|e| e.to_string());
+    let mut both = fit().with_groups(twice).expect("each has its gradient");
+    let message = both.set_group(1, &vertices().values(&scene)).err().map(|e| e.to_string());
     assert_eq!(message.as_deref(), Some("group `again`: group ball changes the same values"));
     let mut one = fit().with_groups(vec![vertices()]).expect("a valid fit");
     assert!(one.set_group(1, &[]).is_err() && one.set_group(0, &[1.0]).is_err());

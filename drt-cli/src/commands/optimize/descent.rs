@@ -403,6 +403,9 @@ impl<'a> Descent<'a> {
         let _writing = stop::writing();
         let iteration = locked(&self.history).losses.len().saturating_sub(1) as u32;
         gallery.current(iteration, seen)?;
+        for (group, [before, now]) in self.fields.shapes() {
+            gallery.turning(group, [&before, &now])?;
+        }
         let outlook = self.outlook(seen);
         let history = locked(&self.history);
         let page = Report {

@@ -2,9 +2,11 @@
 
 use std::io::Write as _;
 use std::path::Path;
+use std::sync::Arc;
 
 use drt_estimators::fit::{Evaluation, Fit, Group, GroupKind};
 use drt_estimators::{Scene, Target};
+use drt_geom::Mesh;
 use drt_math::{Vec3, vec3};
 use drt_medium::vol::{self, VolFile};
 use drt_motion::optimize::field::{
@@ -161,6 +163,24 @@ impl<'a> Fields<'a> {
             Some(FieldResult { files: files(group, values, &scene)? })
         };
         self.groups().filter_map(result).collect()
+    }
+
+    /// The shapes that groups of vertices or of a cage move, as they were and as they are now, by the groups' names.
+    pub(super) fn shapes(&self) -> Vec<(&'a str, [Arc<Mesh>; 2])> {
+        let given = &self.problem.job.scene;
+        let mut scene = given.clone();
+        let shape = |(group, optimizer): (&'a ParameterGroup, &FieldOptimizer)| {
+            let Group { name, kind, target: Target::Shape(s), .. } = &group.group else {
+                return None;
+            };
+            if !matches!(kind, GroupKind::Vertices | GroupKind::Cage(_)) {
+                return None;
+            }
+            // They have been given to the fit already.
+            group.group.apply(given, optimizer.values(), &mut scene).ok()?;
+            Some((name.as_str(), [given, &scene].map(|scene| scene.shapes[*s].mesh.clone())))
+        };
+        self.groups().filter_map(shape).collect()
     }
 
     /// The names of the files that results are written to.

@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use drt_estimators::fit::Evaluation;
-use drt_math::Rgb;
+use drt_geom::Mesh;
+use drt_math::{Rgb, Vec3};
 
 use super::problem::Problem;
+use super::turntable::turning;
 use crate::CliError;
 use crate::files::atomic::write_atomically;
 use crate::files::image::picture::encode_png;
@@ -50,6 +52,11 @@ impl<'a> Gallery<'a> {
         self.file(view, &format!("derivative-{parameter:03}"))
     }
 
+    /// The shape that a group moves.
+    pub(super) fn shape(&self, group: &str) -> PathBuf {
+        self.folder.join(format!("{group}-turning.png"))
+    }
+
     /// True for the files that a run writes, or removes when it begins anew.
     pub(super) fn writes(&self, path: &Path) -> bool {
         let views = 0..self.problem.views.len();
@@ -60,7 +67,10 @@ impl<'a> Gallery<'a> {
                 || parameters.into_iter().any(|p| self.derivative(v, p) == path)
         };
         let name = path.file_name().unwrap_or_default();
-        is_frame(&name.to_string_lossy()) || views.into_iter().any(own)
+        let mut groups = self.problem.job.groups.iter();
+        is_frame(&name.to_string_lossy())
+            || views.into_iter().any(own)
+            || groups.any(|group| self.shape(&group.group.name) == path)
     }
 
     /// Removes what a run that began anew left of another: images of iterations that this one may not keep.
@@ -112,6 +122,15 @@ impl<'a> Gallery<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Stores the shape that a group moves, as it was and as it is now, seen from all around.
+    pub(super) fn turning(&self, group: &str, [before, now]: [&Mesh; 2]) -> Result<(), CliError> {
+        let sensor = self.problem.views.first().map(|view| view.sensor);
+        let sensors = &self.problem.job.scene.sensors;
+        let up = sensor.map_or(Vec3::Y, |s| sensors[s].item.sensor.pinhole().up);
+        let Some((size, pixels)) = turning(&[before, now], up) else { return Ok(()) };
+        write(&self.shape(group), size, &exposed(&pixels, 1.0))
     }
 
     fn image(

@@ -14,6 +14,7 @@ mod problem;
 mod report;
 mod sources;
 mod team;
+mod turntable;
 mod watch;
 
 use std::path::Path;

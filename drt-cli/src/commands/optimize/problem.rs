@@ -1,17 +1,14 @@
 //! What is to be fitted: the job with its targets read.
 
-use std::collections::BTreeMap;
-
 use drt_estimators::Scene;
-use drt_estimators::fit::{Fit, View};
-use drt_estimators::loss::Reference;
+use drt_estimators::fit::{Fit, Group, View};
 use drt_math::Rng;
 use drt_motion::optimize::{Method, Stages};
 
 use crate::commands::fingerprint::Fingerprint;
 use crate::commands::options::OptimizeOptions;
+use crate::commands::targets;
 use crate::error::Place;
-use crate::files::image::read_picture;
 use crate::job::Optimize;
 use crate::{CliError, Job};
 
@@ -50,7 +47,7 @@ impl<'a> Problem<'a> {
             None => Stages::new(job.spp(), plan.spp.clone()),
         };
         let iterations = options.iterations.unwrap_or(plan.iterations);
-        let views = views(job, plan)?;
+        let views = targets::views(job, plan)?;
         let problem = Self { job, plan, views, iterations, spp };
         for factor in plan.reduce.values() {
             problem.fit(factor)?;
@@ -81,7 +78,8 @@ impl<'a> Problem<'a> {
             views.push(View { reference, ..view.clone() });
         }
         let parameters = self.job.parameters.clone();
-        let groups = self.job.groups.iter().map(|g| g.group.clone()).collect();
+        let groups: Vec<Group> = self.job.groups.iter().map(|g| g.group.clone()).collect();
+        Group::check_together(&groups).map_err(|e| self.job.blame(&e))?;
         Fit::new(scene, parameters, views, self.plan.loss, self.job.settings.clone())
             .and_then(|fit| fit.with_groups(groups))
             .map_err(|e| self.job.blame(&e))
@@ -166,54 +164,4 @@ impl<'a> Problem<'a> {
         }
         Ok(sum)
     }
-}
-
-/// The targets with their sensors.
-fn views(job: &Job, plan: &Optimize) -> Result<Vec<View>, CliError> {
-    let count = plan.targets.len();
-    let sensors = match &plan.sensors {
-        Some(sensors) => sensors.clone(),
-        None if count == 1 => vec![job.settings.sensor],
-        None if count == job.scene.sensors.len() => (0..count).collect(),
-        None => {
-            let message = format!(
-                "`targets` has {count} files, but the scene has {} sensors; expected one target, \
-                 one per sensor, or `sensors` with the sensor of each",
-                job.scene.sensors.len()
-            );
-            return Err(CliError::input(&Place::file(&job.path), message));
-        }
-    };
-    let mut used = BTreeMap::new();
-    let mut views = Vec::new();
-    for (i, (path, sensor)) in plan.targets.iter().zip(sensors).enumerate() {
-        let other = used.insert(sensor, path).filter(|_| plan.poses.is_empty());
-        if let Some(other) = other {
-            let message = format!("sensor {sensor} sees two targets, {} and this", other.display());
-            return Err(CliError::input(&Place::file(path), message));
-        }
-        let Some(of) = job.scene.sensors.get(sensor) else {
-            return Err(CliError::input(
-                &Place::file(&job.scene_path),
-                "the scene has no <sensor>",
-            ));
-        };
-        let film = of.item.sensor.film();
-        plan.check_file(path)?;
-        let picture = read_picture(path, film)?;
-        let fail = |path, e| CliError::input(&Place::file(path), e);
-        let mut reference =
-            Reference::new(picture.size, picture.linear()).map_err(|e| fail(path, e))?;
-        if let Some(Some(path)) = plan.masks.get(i) {
-            plan.check_file(path)?;
-            let mask = read_picture(path, film)?;
-            reference = reference.with_mask(mask.gray()).map_err(|e| fail(path, e))?;
-        }
-        if let Some(part) = plan.relative {
-            reference = reference.relative(part).map_err(|e| fail(path, e))?;
-        }
-        let pose = plan.poses.get(i).cloned().unwrap_or_default();
-        views.push(View { sensor, reference, pose });
-    }
-    Ok(views)
 }

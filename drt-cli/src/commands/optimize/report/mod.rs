@@ -152,6 +152,11 @@ impl Report<'_> {
             text += &figure(&self.gallery.file(v, "difference"), "now − target");
             text += "</div>\n";
         }
+        for group in &self.problem.job.groups {
+            let name = &group.group.name;
+            text +=
+                &figure(&self.gallery.shape(name), &format!("{name}: the start above, now below"));
+        }
         text += "<h2>Derivatives</h2>\n";
         for v in 0..self.problem.views.len() {
             text += "<div class=\"row\">\n";
