@@ -28,16 +28,35 @@ def render(scene, output, spp, defines=(), sensor=None, more=()):
     subprocess.run([str(w) for w in words], check=True)
 
 
+def write(path, text):
+    """Writes a file where that changes it, so that it is no newer than what was made of it."""
+    if not path.exists() or path.read_text() != text:
+        path.write_text(text)
+
+
+def effect(target, change, amount=1.0):
+    """A known effect of a view: on which element, what it does as a job says it, and how much of it."""
+    return target, change, amount
+
+
 def rotation(target, axis, degrees, pivot):
-    """The effect of a job that turns a shape."""
-    rotate = f"{{ axis = {list(axis)}, pivot = {list(pivot)} }}"
-    return f'[[view.effect]]\ntarget = "{target}"\nrotate = {rotate}\namount = {math.radians(degrees)!r}\n'
+    """The effect that turns a shape."""
+    return effect(target, f"rotate = {{ axis = {list(axis)}, pivot = {list(pivot)} }}", math.radians(degrees))
+
+
+def pose(scene, effects):
+    """A job whose scene has these effects, to be rendered."""
+    parts = [f'scene = "{scene}"\n']
+    for k, (target, change, amount) in enumerate(effects):
+        parts.append(f'[[parameter]]\nname = "pose-{k}"\nvalue = {amount!r}\n[[parameter.effect]]\ntarget = "{target}"\n{change}\n')
+    return "".join(parts)
 
 
 def view(picture, effects=(), sensor=None):
     """A view of a job: its picture, and the known pose that its scene has there."""
     sees = f'sensor = "{sensor}"\n' if sensor else ""
-    return f'[[view]]\ntarget = "{picture}"\n{sees}' + "".join(effects)
+    known = "".join(f'[[view.effect]]\ntarget = "{target}"\n{change}\namount = {amount!r}\n' for target, change, amount in effects)
+    return f'[[view]]\ntarget = "{picture}"\n{sees}{known}'
 
 
 def write_job(source, output, views):
