@@ -226,3 +226,11 @@ def write_obj(path, points, faces):
     """Triangles as an OBJ file."""
     lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces]
     pathlib.Path(path).write_text("\n".join(lines) + "\n")
+
+
+def sheet(count, size):
+    """A square of count × count vertices in the plane of x and z around the origin, x fastest; it faces up."""
+    at = [size * (k / (count - 1) - 0.5) for k in range(count)]
+    corners = [j * count + i for j in range(count - 1) for i in range(count - 1)]
+    faces = [t for a in corners for t in ((a, a + count, a + count + 1), (a, a + count + 1, a + 1))]
+    return [(x, 0.0, z) for z in at for x in at], faces
