@@ -238,6 +238,7 @@ impl Job {
     /// they change in proportion.
     pub fn set_spp(&mut self, spp: u32) {
         self.spp = spp;
+        self.settings.expected_spp = spp;
         let ratio = |boundary: u32| f64::from(boundary) / f64::from(spp.max(1));
         self.settings.boundary_ratio = self.boundary_spp.map(ratio);
     }

@@ -15,6 +15,7 @@ use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
 use crate::run::control::Control;
 use crate::run::finite_difference::finite_differences;
+use crate::run::session::preparation::Ground;
 use crate::run::session::{Session, ShardSums, choice};
 use crate::world::cache::PreparedCache;
 
@@ -52,7 +53,8 @@ impl Applied {
     ) -> Result<EstimatorKind, Error> {
         settings.check(&self.scene, true)?;
         let tangents = self.tangents.seen_by(settings.sensor);
-        Ok(choice::estimator(&self.scene, &tangents, settings, kept)?.0.estimator)
+        let ground = Ground::new(&self.scene, &tangents, settings, kept)?;
+        Ok(choice::estimator(&ground, kept)?.kind)
     }
 }
 

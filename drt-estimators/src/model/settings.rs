@@ -22,9 +22,9 @@ pub enum EstimatorKind {
     Warped,
     /// Central differences with common random numbers.
     FiniteDifference,
-    /// A choice among [`PathSpace`](Self::PathSpace), [`Radiative`](Self::Radiative) and [`Warped`](Self::Warped): a
-    /// pilot of few samples of a small picture compares the work that they need for the derivative images of a
-    /// [`Session`](crate::Session). `PathSpace` is taken unless another one needs less than 0.8 of its work. A
+    /// A choice among [`PathSpace`](Self::PathSpace), [`Radiative`](Self::Radiative) and [`Warped`](Self::Warped): where something moves, a
+    /// pilot of few samples compares the work that they need for the derivative images of a
+    /// [`Session`](crate::Session), at a small part of the cost of the [run](Settings::expected_spp). `PathSpace` is taken unless another one needs less than 0.8 of its work. A
     /// [`Fit`](crate::fit::Fit) chooses once for each view, at the initial values of its parameters. A
     /// [`gradient`](crate::gradient) takes `PathSpace`.
     Auto,
@@ -162,6 +162,9 @@ pub struct Settings {
     pub seed: u64,
     /// Number of threads; 0 is one per core. Without the feature `parallel` there is one thread.
     pub threads: usize,
+    /// Samples per pixel that a run is expected to take. The pilot of [`EstimatorKind::Auto`] costs at most a sixteenth of such a run;
+    /// where the run is so short that this tells nothing, there is no pilot.
+    pub expected_spp: u32,
     /// Also return the terms of each derivative separately.
     pub terms: bool,
     /// Velocity fields inside media that are to replace the plan's choice, each with the medium's index.
@@ -185,6 +188,7 @@ impl Default for Settings {
             step: 1e-3,
             seed: 0,
             threads: 0,
+            expected_spp: 64,
             terms: false,
             insides: Vec::new(),
         }

@@ -17,6 +17,7 @@ use crate::model::settings::Settings;
 use crate::run::control::Unattended;
 use crate::run::finite_difference::finite_differences;
 use crate::run::session::Session;
+use crate::run::session::preparation::Ground;
 use crate::terms::flux::Flux;
 use crate::terms::selected::Terms;
 use crate::world::World;
@@ -85,8 +86,10 @@ fn estimators_are_told_from_outside() {
     let by = |estimator: &'static dyn Estimator| -> Estimate {
         let (scene, tangents) = tangents::apply(&scene, &falling).expect("a valid parameter");
         let mut kept = PreparedCache::default();
-        let session = Session::by(estimator, &scene, &tangents.seen_by(0), &settings, &mut kept);
-        let mut session = session.expect("a valid scene");
+        let tangents = tangents.seen_by(0);
+        let ground = Ground::new(&scene, &tangents, &settings, &mut kept).expect("a valid scene");
+        let preparation = ground.prepare(estimator, &mut kept).expect("a valid scene");
+        let mut session = Session::of(ground, preparation);
         assert!(session.run(1 << 16, &Unattended));
         assert!(session.plan().estimators[0].starts_with(estimator.name()));
         session.rendering().derivatives[0].total.total

@@ -41,6 +41,21 @@ pub(crate) struct TermStatistics {
     pub(crate) even: bool,
 }
 
+impl TermStatistics {
+    /// What several measurements by equally many samples say together; of none, nothing.
+    pub(crate) fn mean<'a>(measured: impl ExactSizeIterator<Item = &'a Self>) -> Self {
+        let part = 1.0 / measured.len() as f64;
+        let mut mean = Self { variance: Vec::new(), rays: 0.0, even: false };
+        for one in measured {
+            mean.variance.resize(one.variance.len(), 0.0);
+            mean.variance.iter_mut().zip(&one.variance).for_each(|(sum, v)| *sum += part * v);
+            mean.rays += part * one.rays;
+            mean.even = one.even;
+        }
+        mean
+    }
+}
+
 /// Boundary samples to each path.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct SampleBudget {

@@ -39,6 +39,11 @@ fn cell(i: u32, n: u32) -> usize {
     (0..BLOCKS).rev().find(|k| (*k as u32 * n) / BLOCKS as u32 <= i).unwrap_or(0)
 }
 
+/// The block that a pixel belongs to.
+pub(crate) fn block_of(pixel: u32, [w, h]: [u32; 2]) -> usize {
+    cell(pixel / w, h) * BLOCKS + cell(pixel % w, w)
+}
+
 /// Block of each pixel, and pixels per block.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks {

@@ -3,20 +3,14 @@
 use alloc::vec::Vec;
 
 use crate::derivative::contraction::{Contraction, Motion};
-use crate::derivative::medium_motion::MediumMotions;
-use crate::derivative::sensitivity::{ActiveInputs, TextureUse};
-use crate::derivative::tangents::Tangents;
-use crate::estimators::emitter_shares::Share;
-use crate::model::error::Error;
+use crate::derivative::sensitivity::ActiveInputs;
 use crate::model::rendering::{Account, Term};
 use crate::run::component::{Component, Unknowns};
 use crate::run::session::pass::Pass;
-use crate::run::session::primary_share::primary_share;
 use crate::sampling::film::{BATCHES, SplatFilm};
 use crate::terms::guiding::OfImages;
 use crate::terms::interior;
 use crate::terms::splatting::{Checked, ToImages};
-use crate::world::cache::PreparedCache;
 use crate::world::{ActiveFactors, World};
 
 /// Parameters have an image each.
@@ -46,37 +40,12 @@ pub(super) struct Images {
 }
 
 impl Images {
-    /// Prepares a world at the parameters' values for the light that it is lit by.
-    pub(super) fn new(
-        world: World,
-        mut tangents: Tangents,
-        share: &Share,
-        kept: &mut PreparedCache,
-    ) -> Result<Self, Error> {
-        for (e, emitter) in world.scene.emitters.iter().enumerate() {
-            if !world.lit.by(&emitter.item.emitter) {
-                tangents.emitters[e].clear();
-                tangents.texels.retain(|t| t.of != TextureUse::Emitter(e));
-            }
-        }
-        let Share { estimator, settings, .. } = share;
-        let insides = match tangents.names.is_empty() {
-            true => MediumMotions::at_rest(world.scene.media.len()),
-            false => {
-                let insides = estimator.insides();
-                MediumMotions::new(insides, &world, &tangents, &settings.insides, kept)?
-            }
-        };
-        let mut component = Component::new(world, Motion::new(tangents, insides), share)?;
-        let Component { prepared, unknowns: motion, .. } = &mut component;
-        // Else the pilot of a run measures more.
-        let measures = !settings.adaptive || settings.boundary_ratio.is_some();
-        if settings.guiding && measures {
-            prepared.primary_share = primary_share(prepared, motion, prepared.terms.boundary_ratio);
-        }
+    /// Films for what is prepared.
+    pub(super) fn new(component: Component<Motion>) -> Self {
+        let Component { prepared, unknowns: motion, .. } = &component;
         let (size, parameters) = (prepared.world.camera.film(), motion.parameters());
         let splats = component.sources().iter().map(|_| SplatFilm::new(size, parameters)).collect();
-        Ok(Self { component, splats })
+        Self { component, splats }
     }
 
     /// Forgets what has been accumulated.

@@ -6,9 +6,12 @@ mod gradient;
 mod images;
 mod legend;
 mod pass;
+mod path_sampling;
 mod pilot;
+pub(crate) mod preparation;
 mod primary_share;
 mod shard;
+mod term_samples;
 
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -20,7 +23,6 @@ use crate::derivative::tangents;
 use crate::derivative::tangents::Tangents;
 use crate::estimators;
 use crate::estimators::Estimator;
-use crate::estimators::emitter_shares::{shares, slides};
 use crate::model::error::{Error, SettingError};
 use crate::model::plan::Plan;
 use crate::model::rendering::{Account, Rendering, Term};
@@ -29,10 +31,12 @@ use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::run::component::{Unknowns, seed_of_component};
 use crate::run::control::{Control, FinishedTile};
 use crate::run::gradient::PreparedGradient;
+use crate::run::session::choice::Chosen;
 use crate::run::session::images::Images;
 use crate::run::session::legend::Legend;
 use crate::run::session::pass::Pass;
 use crate::run::session::pilot::Pilot;
+use crate::run::session::preparation::{Ground, Preparation};
 use crate::sampling::allocation;
 use crate::sampling::bidirectional::EmissionSampler;
 use crate::sampling::film::{Blocks, PixelFilm, Raster};
@@ -41,7 +45,6 @@ use crate::sampling::pixels::Filling;
 use crate::terms::interior::{ImageSampling, PixelSampler};
 use crate::world::World;
 use crate::world::cache::PreparedCache;
-use crate::world::lights::EmitterMask;
 
 pub use crate::run::session::gradient::{gradient, gradient_in_batches};
 pub use crate::run::session::shard::{Merged, ShardError, ShardSums};
@@ -146,43 +149,20 @@ impl Session {
         settings.check(scene, derivatives)?;
         tangents.check()?;
         let tangents = tangents.seen_by(settings.sensor);
-        let (chosen, why) = choice::estimator(scene, &tangents, settings, kept)?;
-        let estimator = estimators::named(chosen.estimator);
-        let mut session = Self::by(estimator, scene, &tangents, &chosen, kept)?;
-        session.asked = settings.clone();
+        let ground = Ground::new(scene, &tangents, settings, kept)?;
+        let Chosen { preparation, why, .. } = choice::estimator(&ground, kept)?;
+        let mut session = Self::of(ground, preparation);
         session.plan.estimator = why;
         // Which estimator is best for few parameters tells nothing of gradients by everything.
         session.of_gradients = estimators::named(settings.estimator);
         Ok(session)
     }
 
-    /// Prepares a scene at the parameters' values for an estimator of derivatives.
-    pub(crate) fn by(
-        estimator: &'static dyn Estimator,
-        scene: &Scene,
-        tangents: &Tangents,
-        settings: &Settings,
-        kept: &mut PreparedCache,
-    ) -> Result<Self, Error> {
-        let asked = settings.clone();
-        if let Some(name) = tangents.names.first() {
-            let moves = tangents.move_light() || !tangents.sensor.is_empty();
-            let moving = tangents.targets().filter(|target| tangents.moves(*target));
-            scene.refuse_derivatives(name, moves, slides(estimator, scene, moving))?;
-            if tangents.move_light() {
-                scene.refuse_rims(name)?;
-            }
-        }
-        let depth = settings.max_depth.within(scene.integrator.max_depth);
-        let world =
-            World::new(scene.clone(), settings.sensor, depth, None, EmitterMask::All, kept)?;
-        let derivatives = !tangents.names.is_empty();
-        let (settings, sampling) = choice::sampling(&world, scene, settings, derivatives, kept)?;
-        let mut images = Vec::new();
-        for share in shares(estimator, scene, tangents.targets(), &settings) {
-            let world = world.lit_by(share.lit)?;
-            images.push(Images::new(world, tangents.clone(), &share, kept)?);
-        }
+    /// A session without samples.
+    pub(crate) fn of(ground: Ground<'_>, preparation: Preparation) -> Self {
+        let Preparation { estimator, parts } = preparation;
+        let Ground { world, asked, settings, sampling, pool, .. } = ground;
+        let images: Vec<Images> = parts.into_iter().map(|p| Images::new(p.component)).collect();
         let mut paths = world.clone();
         let needs = images.iter().map(|images| images.component.unknowns.needs());
         if let Some(needs) = needs.reduce(|all, needs| all.union(&needs)) {
@@ -199,7 +179,7 @@ impl Session {
         let mut session = Self {
             film: PixelFilm::new(size, 1),
             blocks: Arc::new(Blocks::new(size)),
-            pool: Arc::new(Pool::new(settings.threads)),
+            pool,
             pilot: None,
             account: Account::default(),
             samples: 0,
@@ -218,7 +198,7 @@ impl Session {
         };
         session.film = session.new_film(session.settings.terms);
         session.describe_guides();
-        Ok(session)
+        session
     }
 
     /// An empty film, with terms apart or not.

@@ -17,22 +17,11 @@
 
 use alloc::vec::Vec;
 
-use drt_math::sobol::SobolSampler;
-use drt_math::{Real, Rgb};
+use drt_math::Real;
 
-use crate::derivative::contraction::{Contraction, Motion};
+use crate::run::session::term_samples::Batch;
 use crate::sampling::budget::{BESIDES, TermStatistics};
-use crate::sampling::pixels::Sampler;
-use crate::terms::boundary_source::BoundarySource;
-use crate::terms::interior::PixelSampler;
 use crate::terms::prepared::Prepared;
-use crate::terms::splatting::{Checked, ToImages};
-
-/// Samples of pixels, and of each kind that lands anywhere.
-const SAMPLES: u32 = 256;
-
-/// Their seed: the same whatever samples a run takes.
-const SEED: u64 = 0x7363_6f75_7473;
 
 /// The smallest part that is taken of an equal one.
 const LEAST: f64 = 0.25;
@@ -40,21 +29,21 @@ const LEAST: f64 = 0.25;
 /// The part of p that is taken, for what so few samples miss.
 const TAKEN: f64 = 0.25;
 
-/// The part that edges seen from the camera take of an `equal` one, which is in samples to a path.
-pub(in crate::run::session) fn primary_share(
-    prepared: &Prepared,
-    motion: &Motion,
-    equal: f64,
-) -> f64 {
-    let Some(camera) = prepared.terms.sources.iter().position(|s| s.is_of_camera()) else {
-        return 1.0;
-    };
-    let [paths, queries] = along_paths(prepared, motion);
-    let measured = |source: &BoundarySource| of_source(prepared, motion, *source);
-    let mut others: Vec<TermStatistics> = prepared.terms.sources.iter().map(measured).collect();
-    let camera = others.swap_remove(camera);
-    others.push(queries);
-    part(&camera, &paths, &others, equal)
+/// The index among its sources of the edges that the camera sees, where there are any.
+pub(super) fn of_camera(prepared: &Prepared) -> Option<usize> {
+    prepared.terms.sources.iter().position(|s| s.is_of_camera())
+}
+
+/// The part that edges seen from the camera take of an equal one, by what some batches have seen.
+pub(super) fn primary_share(prepared: &Prepared, batches: &[Batch]) -> f64 {
+    let (Some(camera), Some(first)) = (of_camera(prepared), batches.first()) else { return 1.0 };
+    let mut terms: Vec<TermStatistics> = (0..first.len())
+        .map(|t| TermStatistics::mean(batches.iter().map(|batch| &batch[t].pixels)))
+        .collect();
+    // Paths come first, then edge queries, then the sources.
+    let camera = terms.remove(2 + camera);
+    let paths = terms.remove(0);
+    part(&camera, &paths, &terms, prepared.terms.boundary_ratio)
 }
 
 /// p, as a power of two.
@@ -77,68 +66,6 @@ fn part(
         part *= 0.5;
     }
     part
-}
-
-/// Of paths, and of edge queries from them.
-fn along_paths(prepared: &Prepared, motion: &Motion) -> [TermStatistics; 2] {
-    let Prepared { world, terms, .. } = prepared;
-    let n = motion.parameters();
-    let layers = 1 + n * (1 + terms.along_paths(terms.queries).count());
-    let [mut one, mut other] = [0, 1].map(|_| alloc::vec![Rgb::ZERO; layers]);
-    let mut squares = alloc::vec![0.0; layers];
-    let component = prepared.component(Contraction::new(world, motion));
-    let mut sampler = PixelSampler::new(world, [component], SEED, terms.antithetic, true);
-    let [w, h] = world.camera.film();
-    for i in 0..SAMPLES / 2 {
-        // Two in a pixel differ by their noise alone.
-        let pixel = u64::from(i) * u64::from(w) * u64::from(h) / u64::from(SAMPLES / 2);
-        for (k, values) in (0..).zip([&mut one, &mut other]) {
-            sampler.sample(pixel as u32, k, SobolSampler::new(SEED as u32 + i, k), values);
-        }
-        for (sum, (a, b)) in squares.iter_mut().zip(one.iter().zip(&other)) {
-            let d = *a - *b;
-            *sum += d.dot(d);
-        }
-    }
-    let account = sampler.account();
-    let paths = account.counters.paths as f64;
-    let per_path = paths / f64::from(SAMPLES);
-    let of = |layers: core::ops::Range<usize>, rays: u64, each: f64| {
-        let mut variance = alloc::vec![0.0; n];
-        for l in layers {
-            variance[(l - 1) % n] += each * per_path * squares[l] / f64::from(SAMPLES);
-        }
-        TermStatistics { variance, rays: rays as f64 / (each * paths), even: false }
-    };
-    // Those of queries are the last ones, of two terms.
-    let (first, each) = match terms.queries.average() {
-        Some(queries) => (layers - 2 * n, queries),
-        None => (layers, 1.0),
-    };
-    let rays = if first < layers { account.query_rays } else { 0 };
-    [of(1..first, account.counters.rays - rays, 1.0), of(first..layers, rays, each)]
-}
-
-/// Of a source of boundary samples.
-fn of_source(prepared: &Prepared, motion: &Motion, source: BoundarySource) -> TermStatistics {
-    let world = &prepared.world;
-    let splatter = prepared.splatter(world, SEED);
-    let mut variance = alloc::vec![0.0; motion.parameters()];
-    let mut rays = 0;
-    // Each pixel is the mean over the samples of all pixels.
-    let [w, h] = world.camera.film();
-    let pixels = f64::from(w) * f64::from(h);
-    let scale = 1.0 / (pixels * pixels * f64::from(SAMPLES));
-    for i in 0..SAMPLES {
-        let mut sink = Checked::new(ToImages::new(world, motion));
-        rays +=
-            splatter.run(source, None, source.stream() + u64::from(i), 1, &mut sink).counters.rays;
-        let splats = sink.inner.splats.settled();
-        for (p, sum) in variance.iter_mut().enumerate() {
-            splats.for_each(p, |_, v| *sum += scale * v.dot(v));
-        }
-    }
-    TermStatistics { variance, rays: rays as f64 / f64::from(SAMPLES), even: source.is_even() }
 }
 
 #[cfg(test)]

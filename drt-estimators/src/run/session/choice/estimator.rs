@@ -1,13 +1,7 @@
 //! Which estimator finds derivatives with the least work: `EstimatorKind::Auto`.
 //!
-//! Each estimator that does not refuse the scene differentiates a small picture. The work of a derivative by one is the variance of its
-//! block means times the cost, and several derivatives count alike:
-//!
-//! ```text
-//! work of k = cost of k × Σ_p variance of p by k / least variance of p by any.
-//! ```
-//!
-//! An estimator that costs many times more than another is left out as soon as a few samples show it.
+//! Where nothing moves, all estimators are alike. Elsewhere each one that does not refuse the scene is prepared, a pilot
+//! [compares](crate::run::session::choice::comparison) their work, and the run goes on with what was prepared for the one that is chosen.
 //!
 //! Where lights are points or directions, the estimators share the light as they do when they are asked for by name, and it is these
 //! combinations that are compared.
@@ -16,131 +10,91 @@ use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use crate::derivative::tangents::Tangents;
 use crate::estimators::named;
 use crate::model::error::Error;
-use crate::model::scene::Scene;
-use crate::model::settings::{EstimatorKind, PathSampling, Settings, Warp};
-use crate::run::control::Unattended;
-use crate::run::session::Session;
-use crate::run::session::choice::{WORTH_IT, cost, pilot, small, variance};
+use crate::model::settings::{EstimatorKind, PathSampling, Warp};
+use crate::run::session::choice::comparison::{
+    Candidate, PART, USUAL, Work, best, cheapest, compare,
+};
+use crate::run::session::preparation::{Ground, Preparation};
+use crate::run::session::term_samples::BATCH;
 use crate::world::cache::PreparedCache;
 
-/// More derivatives than these are not sampled by a pilot: each would keep films for all of them.
+/// More derivatives than these are not sampled by a pilot, whose variances would be too many.
 const MOST_PARAMETERS: usize = 256;
 
-/// Longest side of the small picture, in pixels.
-const SIDE: f64 = 32.0;
+/// The fewest paths of a pilot, in batches.
+const FEWEST: u32 = 64;
 
-/// Samples of each pixel by which the cost of an estimator is seen.
-const FIRST: u32 = 2;
+/// The cost of preparing an edge for an estimator, in rays.
+const PREPARING: f64 = 8.0;
 
-/// Samples of each pixel by which its work is: with fewer, rare samples of edges are often not seen at all.
-const SAMPLES: u32 = 32;
-
-/// How many times the least cost an estimator may have to be looked at further.
-const MOST_COSTLY: f64 = 8.0;
-
-/// An estimator whose variances are below this part of another's counts as if it had so much.
-const LEAST: f64 = 1e-6;
-
-/// An estimator that can be chosen, and the small picture by it.
-struct Candidate {
-    kind: EstimatorKind,
-    session: Session,
+/// The estimator that is asked for or chosen.
+pub(crate) struct Chosen {
+    pub(crate) kind: EstimatorKind,
+    /// The scene prepared for it.
+    pub(crate) preparation: Preparation,
+    /// Its name and why it was chosen, where it was.
+    pub(crate) why: Option<String>,
 }
 
-impl Candidate {
-    fn cost(&self) -> f64 {
-        cost(&self.session.account.counters)
+/// Prepares a scene for the estimator that is asked for, or chooses one.
+pub(crate) fn estimator(ground: &Ground<'_>, kept: &mut PreparedCache) -> Result<Chosen, Error> {
+    let asked = &ground.settings;
+    let named_one = |kind, why: Option<&str>, kept: &mut PreparedCache| {
+        let preparation = ground.prepare(named(kind), kept)?;
+        let why = why.map(|why| format!("{}: {why}", named(kind).name()));
+        Ok(Chosen { kind, preparation, why })
+    };
+    if asked.estimator != EstimatorKind::Auto || ground.tangents.names.is_empty() {
+        return named_one(asked.estimator, None, kept);
     }
-
-    fn variances(&self) -> Vec<f64> {
-        self.session.rendering().derivatives.iter().map(|d| variance(&d.total)).collect()
+    if let Some(why) = needs_no_pilot(ground) {
+        return named_one(USUAL, Some(why), kept);
     }
-}
-
-/// The settings with an estimator in place of `Auto`, and why it was chosen.
-pub(crate) fn estimator(
-    scene: &Scene,
-    tangents: &Tangents,
-    settings: &Settings,
-    kept: &mut PreparedCache,
-) -> Result<(Settings, Option<String>), Error> {
-    if settings.estimator != EstimatorKind::Auto {
-        return Ok((settings.clone(), None));
+    let both_ends = asked.sampling == PathSampling::Bidirectional;
+    let (mut candidates, mut refusal) = (Vec::new(), None);
+    let mut consider =
+        |kind, candidates: &mut Vec<Candidate>| match ground.prepare(named(kind), kept) {
+            Ok(prepared) => candidates.push(Candidate::new(kind, prepared, ground)),
+            Err(error) => refusal = refusal.take().or(Some(error)),
+        };
+    consider(USUAL, &mut candidates);
+    if !both_ends {
+        consider(EstimatorKind::Radiative, &mut candidates);
     }
-    let with = |estimator| Settings { estimator, ..settings.clone() };
-    let chosen = |kind, why: &str| Ok((with(kind), Some(format!("{}: {why}", named(kind).name()))));
-    let usual = EstimatorKind::PathSpace;
-    if tangents.names.is_empty() {
-        return Ok((with(usual), None));
+    // Other kinds of warps are biased. This estimator is the best one least often, and is not prepared where that costs much.
+    let affordable = PART * ground.paths_of_run() * cheapest(&candidates);
+    if asked.warp == Warp::Edges && PREPARING * ground.edges() <= affordable {
+        consider(EstimatorKind::Warped, &mut candidates);
     }
-    if tangents.names.len() > MOST_PARAMETERS {
-        return chosen(usual, "there are too many parameters for a pilot");
-    }
-    let both_ends = settings.sampling == PathSampling::Bidirectional;
-    let kinds = [
-        Some(EstimatorKind::PathSpace),
-        (!both_ends).then_some(EstimatorKind::Radiative),
-        // The others of its kind are biased.
-        (settings.warp == Warp::Edges).then_some(EstimatorKind::Warped),
-    ];
-    let (scene, mut refusal) = (small(scene, settings, SIDE), None);
-    let mut candidates = Vec::new();
-    for kind in kinds.into_iter().flatten() {
-        match Session::prepared(&scene, tangents, &pilot(&with(kind)), kept) {
-            Ok(session) => candidates.push(Candidate { kind, session }),
-            Err(error) => refusal = refusal.or(Some(error)),
-        }
-    }
-    if let ([], Some(refusal)) = (&candidates[..], refusal) {
-        return Err(refusal);
-    }
-    if let [only] = &candidates[..] {
-        return chosen(only.kind, "the other estimators refuse this scene");
-    }
-    for candidate in &mut candidates {
-        candidate.session.run(FIRST, &Unattended);
-    }
-    let cheapest = candidates.iter().map(Candidate::cost).fold(f64::INFINITY, f64::min);
-    candidates.retain(|c| c.cost() <= MOST_COSTLY * cheapest);
-    for candidate in &mut candidates {
-        candidate.session.run(SAMPLES - FIRST, &Unattended);
-    }
-    let works = works(&candidates);
-    let least = works.iter().copied().fold(f64::INFINITY, f64::min);
-    let of_usual = candidates.iter().position(|c| c.kind == usual).map(|i| works[i]);
-    let best = match of_usual {
-        Some(work) if least >= WORTH_IT * work => usual,
-        _ => {
-            let best = works.iter().position(|work| *work == least);
-            best.map_or(usual, |i| candidates[i].kind)
+    let (best, why) = match (&mut candidates[..], refusal) {
+        ([], Some(refusal)) => return Err(refusal),
+        ([_], _) => (0, String::from("the other estimators refuse this scene")),
+        (several, _) => {
+            let works = compare(several, ground);
+            let ratio =
+                |(c, w): (&Candidate, &Work)| format!("{} {:.2}", named(c.kind).name(), w.ratio);
+            let compared: Vec<String> = several.iter().zip(&works).map(ratio).collect();
+            let compared = compared.join(", ");
+            let why = format!("in a pilot the work was, over the least of all, {compared}");
+            (best(several, &works), why)
         }
     };
-    let compared = candidates.iter().zip(&works).map(|(c, work)| {
-        let ratio = if least > 0.0 { work / least } else { 1.0 };
-        format!("{} {ratio:.2}", named(c.kind).name())
-    });
-    let compared: Vec<String> = compared.collect();
-    let why = format!("in a pilot the work was, over the least of all, {}", compared.join(", "));
-    chosen(best, &why)
+    let Candidate { kind, prepared: preparation, .. } = candidates.swap_remove(best);
+    let why = Some(format!("{}: {why}", named(kind).name()));
+    Ok(Chosen { kind, preparation, why })
 }
 
-/// The work of each candidate.
-fn works(candidates: &[Candidate]) -> Vec<f64> {
-    let variances: Vec<Vec<f64>> = candidates.iter().map(Candidate::variances).collect();
-    let parameters = variances.iter().map(Vec::len).min().unwrap_or(0);
-    let mut works = alloc::vec![0.0; candidates.len()];
-    for p in 0..parameters {
-        let of_parameter = || variances.iter().map(|v| v[p]);
-        let largest = of_parameter().fold(0.0, f64::max);
-        let least = f64::max(of_parameter().fold(f64::INFINITY, f64::min), LEAST * largest);
-        for (work, variance) in works.iter_mut().zip(of_parameter()) {
-            // Without any noise, each is as good.
-            *work += if largest > 0.0 { f64::max(variance / least, LEAST) } else { 1.0 };
-        }
+/// Why the usual estimator is taken without a pilot, where it is.
+fn needs_no_pilot(ground: &Ground<'_>) -> Option<&'static str> {
+    let tangents = ground.tangents;
+    if tangents.names.len() > MOST_PARAMETERS {
+        return Some("there are too many parameters for a pilot");
     }
-    works.iter_mut().zip(candidates).for_each(|(work, c)| *work *= c.cost());
-    works
+    if !tangents.move_light() && tangents.sensor.is_empty() {
+        return Some("nothing moves, and all estimators are alike");
+    }
+    let short = PART * ground.paths_of_run() < f64::from(FEWEST * BATCH);
+    short.then_some("the run is too short for a pilot")
 }
