@@ -27,7 +27,7 @@ pub(super) fn turning(meshes: &[&Mesh], up: Vec3) -> Option<([u32; 2], Vec<Rgb>)
     let (middle, radius) = (bounds.center(), 0.5 * bounds.extent().length());
     let up = nearest_axis(up);
     let aside = if up.x == 0.0 { Vec3::X } else { Vec3::Z };
-    let distance = 1.15 * radius / (0.5 * FOV.to_radians()).sin();
+    let distance = radius / (0.5 * FOV.to_radians()).sin();
     let size = [TURNS * SIZE, meshes.len() as u32 * SIZE];
     let mut pixels = vec![Rgb::ZERO; (size[0] * size[1]) as usize];
     for (row, mesh) in meshes.iter().enumerate() {
@@ -67,8 +67,8 @@ fn tile(mesh: &Mesh, middle: Vec3, eye: Vec3, up: Vec3) -> Option<Vec<Rgb>> {
                 Bsdf::TwoSided(Box::new(TwoSided { front: clay, back: None })),
             ),
         )
-        .emitter("lamp", Emitter::Directional { direction: lamp, irradiance: Rgb::splat(2.5) })
-        .emitter("sky", Emitter::Constant { radiance: Rgb::splat(0.3) })
+        .emitter("lamp", Emitter::Directional { direction: lamp, irradiance: Rgb::splat(3.0) })
+        .emitter("sky", Emitter::Constant { radiance: Rgb::splat(0.15) })
         .sensor("camera", sensor)
         .max_depth(2)
         .build()
@@ -95,7 +95,7 @@ mod tests {
                 let (x, y) = (k % SIZE + turn * SIZE, k / SIZE + row * SIZE);
                 pixels[(y * size[0] + x) as usize].r
             };
-            (0..SIZE * SIZE).filter(|k| (of(*k) - 0.3).abs() > 0.02).count()
+            (0..SIZE * SIZE).filter(|k| (of(*k) - 0.15).abs() > 0.02).count()
         };
         assert!(lit(0, 1) > 4 * lit(0, 0), "{} {}", lit(0, 1), lit(0, 0));
         assert_eq!(lit(0, 2), lit(1, 2));
