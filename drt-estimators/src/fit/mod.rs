@@ -35,6 +35,7 @@ use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
 use crate::run::control::Control;
 use crate::run::session::ShardSums;
+use crate::run::session::choice::gradients;
 use crate::world::cache::PreparedCache;
 
 pub use crate::fit::evaluation::{Evaluation, Half};
@@ -116,7 +117,7 @@ impl Fit {
             }
         }
         let mut kept = PreparedCache::default();
-        let estimators = estimators(&scene, &parameters, &views, &settings, &mut kept)?;
+        let estimators = estimators(&scene, &parameters, &[], &views, &settings, &mut kept)?;
         let (views, applied, given) = (views.into(), None, scene.clone());
         let (groups, group_values) = (Vec::new(), Vec::new());
         Ok(Self {
@@ -136,7 +137,8 @@ impl Fit {
 
     /// This fit with groups of unknowns beside its parameters. They have the values of the scene until
     /// [`set_group`](Self::set_group) gives them others, and gradients come from reverse mode, whatever the number of
-    /// unknowns.
+    /// unknowns. What is left open by [`EstimatorKind::Auto`] is chosen for the parameters and for motions of the
+    /// shapes that groups change, once for each sensor, in the pose of its first view.
     ///
     /// # Errors
     /// When images are differentiated by [`EstimatorKind::FiniteDifference`], which has no reverse mode.
@@ -146,7 +148,17 @@ impl Fit {
         }
         self.group_values = groups.iter().map(|group| group.values(&self.given)).collect();
         self.groups = groups;
+        if !self.groups.is_empty() {
+            let Self { given, parameters, groups, views, settings, kept, .. } = &mut self;
+            self.estimators = estimators(given, parameters, groups, views, settings, kept)?;
+        }
         Ok(self)
+    }
+
+    /// How each view's derivatives are estimated, without what was left open.
+    #[must_use]
+    pub fn estimators(&self) -> &[EstimatorKind] {
+        &self.estimators
     }
 
     /// Gives a group other values, in the order of [`Group::values`].
@@ -285,12 +297,7 @@ impl Fit {
         let collectors =
             self.groups.iter().map(|group| group.collector(&self.given, &applied.scene, &changes));
         let collectors = collectors.collect::<Result<Vec<_>, _>>()?;
-        let mut wanted: Vec<Target> = Vec::new();
-        for group in &self.groups {
-            if !wanted.contains(&group.target) {
-                wanted.push(group.target);
-            }
-        }
+        let wanted = targets(&self.groups);
         for (k, adjoint) in (0..2).zip(adjoints.iter().rev()) {
             let progress = |done| part(1.0, 0.5 * (k as f64 + done));
             let control = Watched { control, progress };
@@ -390,6 +397,7 @@ impl Fit {
 fn estimators(
     scene: &Scene,
     parameters: &[Parameter],
+    groups: &[Group],
     views: &[View],
     settings: &Settings,
     kept: &mut PreparedCache,
@@ -398,12 +406,38 @@ fn estimators(
         return Ok(alloc::vec![settings.estimator; views.len()]);
     }
     scene.check()?;
-    let of_view = |view: &View| {
-        let applied = Applied::posed(scene, parameters, &view.pose)?;
+    let all = [gradients::probes(scene, &targets(groups)), parameters.to_vec()].concat();
+    let mut of_view = |view: &View| {
         let settings = Settings { sensor: view.sensor, seed: 0, ..settings.clone() };
-        applied.estimator(&settings, kept)
+        let chosen = Applied::posed(scene, &all, &view.pose)
+            .and_then(|applied| applied.estimator(&settings, kept));
+        match chosen {
+            // What a group's motions do not go with may be said by its gradient, if at all.
+            Err(_) if !groups.is_empty() => Ok(EstimatorKind::PathSpace),
+            chosen => chosen,
+        }
     };
-    views.iter().map(of_view).collect()
+    if groups.is_empty() {
+        return views.iter().map(of_view).collect();
+    }
+    // Poses of one scene seen by one sensor differ too little for a pilot of each of many.
+    let mut of_sensors: Vec<Option<EstimatorKind>> = alloc::vec![None; scene.sensors.len()];
+    let mut of_sensor = |view: &View| match of_sensors[view.sensor] {
+        Some(known) => Ok(known),
+        None => of_view(view).inspect(|kind| of_sensors[view.sensor] = Some(*kind)),
+    };
+    views.iter().map(&mut of_sensor).collect()
+}
+
+/// The items that groups change, each once.
+fn targets(groups: &[Group]) -> Vec<Target> {
+    let mut targets: Vec<Target> = Vec::new();
+    for group in groups {
+        if !targets.contains(&group.target) {
+            targets.push(group.target);
+        }
+    }
+    targets
 }
 
 /// Some halves of the samples of a view. `None` when `control` cancelled it.

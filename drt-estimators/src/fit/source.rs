@@ -15,8 +15,8 @@ use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
 use crate::run::control::Control;
 use crate::run::finite_difference::finite_differences;
-use crate::run::session::preparation::Ground;
-use crate::run::session::{Session, ShardSums, choice};
+use crate::run::session::choice::gradients;
+use crate::run::session::{Session, ShardSums};
 use crate::world::cache::PreparedCache;
 
 /// A scene at its parameters' values, and its rates of change.
@@ -52,9 +52,7 @@ impl Applied {
         kept: &mut PreparedCache,
     ) -> Result<EstimatorKind, Error> {
         settings.check(&self.scene, true)?;
-        let tangents = self.tangents.seen_by(settings.sensor);
-        let ground = Ground::new(&self.scene, &tangents, settings, kept)?;
-        Ok(choice::estimator(&ground, kept)?.kind)
+        gradients::for_motions(&self.scene, &self.tangents, settings, kept)
     }
 }
 

@@ -25,9 +25,23 @@ pub enum EstimatorKind {
     /// A choice among [`PathSpace`](Self::PathSpace), [`Radiative`](Self::Radiative) and [`Warped`](Self::Warped): where something moves, a
     /// pilot of few samples compares the work that they need for the derivative images of a
     /// [`Session`](crate::Session), at a small part of the cost of the [run](Settings::expected_spp). `PathSpace` is taken unless another one needs less than 0.8 of its work. A
-    /// [`Fit`](crate::fit::Fit) chooses once for each view, at the initial values of its parameters. A
-    /// [`gradient`](crate::gradient) takes `PathSpace`.
+    /// [`Fit`](crate::fit::Fit) chooses once for each view, at the initial values of its parameters. For a
+    /// [`gradient`](crate::Session::gradient) the pilot moves the items that it is with respect to by smooth random fields.
     Auto,
+}
+
+impl EstimatorKind {
+    /// The name that messages and job files have for it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::PathSpace => "path-space",
+            Self::Radiative => "radiative",
+            Self::Warped => "warped",
+            Self::FiniteDifference => "finite-difference",
+            Self::Auto => "auto",
+        }
+    }
 }
 
 /// How rays turn, or vertices move, with the edges beside them, in [`EstimatorKind::Warped`].
@@ -162,7 +176,7 @@ pub struct Settings {
     pub seed: u64,
     /// Number of threads; 0 is one per core. Without the feature `parallel` there is one thread.
     pub threads: usize,
-    /// Samples per pixel that a run is expected to take. The pilot of [`EstimatorKind::Auto`] costs at most a sixteenth of such a run;
+    /// Samples per pixel that a run is expected to take. The pilot of [`EstimatorKind::Auto`] costs at most a tenth of such a run;
     /// where the run is so short that this tells nothing, there is no pilot.
     pub expected_spp: u32,
     /// Also return the terms of each derivative separately.

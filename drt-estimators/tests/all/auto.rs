@@ -2,10 +2,13 @@
 
 use crate::common::*;
 use drt_estimators::filter::{Filter, FilterKind};
+use drt_estimators::fit::{Fit, Group, GroupKind, View};
+use drt_estimators::loss::{Loss, Reference};
 use drt_estimators::{
-    EstimatorKind, PathSampling, Rendering, Scene, Session, Settings, Unattended, gradient,
+    EstimatorKind, PathSampling, Rendering, Scene, Session, Settings, Unattended,
 };
-use drt_math::{Rgb, Vec3};
+use drt_geom::procedural;
+use drt_math::{Rgb, Vec3, vec3};
 use drt_motion::{GeometryChange, Parameter};
 
 fn settings(estimator: EstimatorKind) -> Settings {
@@ -27,9 +30,13 @@ fn same(a: &Rendering, b: &Rendering) -> bool {
     pixels(a) == pixels(b)
 }
 
-/// A ball over a floor under a lamp and a sky, by a box filter: pixels' borders are edges to `path-space`.
+/// A ball over a floor under a lamp and a sky.
 fn room() -> Scene {
-    let mut scene = surfaces_in_extended_light(diffuse(0.7, 0.5, 0.3), diffuse(0.4, 0.5, 0.6));
+    by_box_filter(surfaces_in_extended_light(diffuse(0.7, 0.5, 0.3), diffuse(0.4, 0.5, 0.6)))
+}
+
+/// With a filter that jumps at the borders of pixels, which are edges to `path-space`.
+fn by_box_filter(mut scene: Scene) -> Scene {
     let sensor = &mut scene.sensors[0].item.sensor;
     *sensor = sensor.clone().with_filter(Filter::new(FilterKind::BOX).unwrap());
     scene
@@ -84,14 +91,60 @@ fn what_refuses_is_not_chosen() {
     assert!(by_name.is_some() && refusal(EstimatorKind::Auto) == by_name);
 }
 
-#[test]
-fn gradients_take_path_space() {
-    let scene = room();
-    let [w, h] = scene.sensors[0].item.sensor.film();
+/// A box over a floor under a constant sky: what moves is flat and evenly lit, which suits `radiative`.
+fn box_over_floor() -> Scene {
+    let block = placed(procedural::cube(), Vec3::splat(0.5), 0.3, vec3(0.0, -0.3, 0.0));
+    let scene = SceneBuilder::new()
+        .shape("box", ShapeBuilder::new(block, diffuse(0.7, 0.5, 0.3)))
+        .shape("floor", ShapeBuilder::new(floor(), diffuse(0.4, 0.5, 0.6)))
+        .emitter("sky", sky());
+    let mut scene = by_box_filter(seen(scene, [vec3(0.8, 1.2, 4.0), vec3(0.0, -0.5, 0.0)], 3));
+    let sensor = &mut scene.sensors[0].item.sensor;
+    *sensor = sensor.with_film([30, 24]).unwrap();
+    scene
+}
+
+/// The gradient by the box's vertices of the sum of the image.
+fn gradient_of_sum(session: &mut Session, spp: u32) -> Vec<Vec3> {
+    let [w, h] = box_over_floor().sensors[0].item.sensor.film();
     let adjoint = vec![Rgb::ONE; (w * h) as usize];
-    let by = |kind| {
-        let found = gradient(&scene, &["ball"], &settings(kind), 4, &adjoint, &Unattended).unwrap();
-        format!("{:?}", found.shapes)
+    let found = session.gradient(&["box"], spp, &adjoint, &Unattended).unwrap();
+    found.vertices(&box_over_floor(), 0).unwrap()
+}
+
+#[test]
+fn gradients_take_what_motions_of_their_items_choose() {
+    const SPP: u32 = 128;
+    let scene = box_over_floor();
+    let session = |kind| Session::new(&scene, &[], &settings(kind)).unwrap();
+    let by = |kind| gradient_of_sum(&mut session(kind), SPP);
+    let chosen = by(EstimatorKind::Auto);
+    assert!(chosen == by(EstimatorKind::Radiative));
+    assert!(chosen != by(EstimatorKind::PathSpace));
+    // The choice stays as the scene changes, even for samples that are too few for a pilot, and is that of a loss in a fit.
+    let mut known = session(EstimatorKind::Auto);
+    gradient_of_sum(&mut known, SPP);
+    known.update(&scene, &[]).unwrap();
+    let few = |kind| gradient_of_sum(&mut session(kind), 4);
+    assert!(gradient_of_sum(&mut known, 4) == few(EstimatorKind::Radiative));
+    assert!(few(EstimatorKind::Auto) == few(EstimatorKind::PathSpace));
+    assert!(few(EstimatorKind::PathSpace) != few(EstimatorKind::Radiative));
+}
+
+#[test]
+fn fits_of_groups_choose_for_these() {
+    let scene = box_over_floor();
+    let size = scene.sensors[0].item.sensor.film();
+    let dark = Reference::new(size, vec![Rgb::ZERO; (size[0] * size[1]) as usize]).unwrap();
+    let gradient = |kind| {
+        let group = Group::new("box", &scene, &"box", GroupKind::Vertices).unwrap();
+        let views = vec![View::new(0, dark.clone())];
+        let fit = Fit::new(scene.clone(), vec![], views, Loss::L2, settings(kind)).unwrap();
+        let mut fit = fit.with_groups(vec![group]).unwrap();
+        let seen = fit.evaluate(&[], 8, 1, &Unattended).unwrap().unwrap();
+        seen.group_gradient(0).to_vec()
     };
-    assert!(by(EstimatorKind::Auto) == by(EstimatorKind::PathSpace));
+    let chosen = gradient(EstimatorKind::Auto);
+    assert!(chosen == gradient(EstimatorKind::Radiative));
+    assert!(chosen != gradient(EstimatorKind::PathSpace));
 }

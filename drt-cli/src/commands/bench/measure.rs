@@ -32,11 +32,9 @@ pub(super) fn job(
         return Ok(all);
     }
     let by_paths = match job.settings.estimator {
-        EstimatorKind::Radiative => "radiative",
-        EstimatorKind::Warped => "warped",
-        EstimatorKind::Auto => "auto",
         // Differences are measured in any case.
-        _ => "path-space",
+        EstimatorKind::FiniteDifference => EstimatorKind::PathSpace.name(),
+        kind => kind.name(),
     };
     let derivatives = bench
         .session(by_paths, |job| run::prepare(job, &job.parameters, &mut run::Shared::default()))?;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use drt_estimators::EstimatorKind;
 use drt_estimators::fit::{Evaluation, Fit};
 use drt_motion::optimize::{Method, Observation, OptimizeError, Optimizer, Outlook};
 
@@ -54,6 +55,8 @@ pub(super) struct Descent<'a> {
     before: [f64; 2],
     /// What steps were shortened by.
     limits: Limits,
+    /// The estimators of derivatives at present, one for each view.
+    estimators: Vec<EstimatorKind>,
     quiet: bool,
     /// Nothing was left to do: what is spent on looking at it again does not count.
     again: bool,
@@ -120,6 +123,7 @@ impl<'a> Descent<'a> {
             clock,
             before,
             limits: Limits::default(),
+            estimators: Vec::new(),
             quiet,
             again,
         })
@@ -138,6 +142,14 @@ impl<'a> Descent<'a> {
     /// The values reached.
     pub(super) fn values(&self) -> &[f64] {
         self.optimizer.values()
+    }
+
+    /// The estimators that derivatives are by, each once.
+    pub(super) fn estimators(&self) -> Vec<&'static str> {
+        let mut names: Vec<_> = self.estimators.iter().map(|kind| kind.name()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
     }
 
     /// Goes on to the end, or until it is told to stop, or for so many seconds. Returns what was seen
@@ -159,6 +171,7 @@ impl<'a> Descent<'a> {
                 fit = problem.fit_at(i)?;
                 self.fields.give(&mut fit)?;
             }
+            self.estimators = fit.estimators().to_vec();
             let Some(evaluation) = self.evaluate(&mut fit, monitor)? else {
                 self.store()?;
                 if let Some(seen) = &last {

@@ -19,6 +19,7 @@ mod watch;
 
 use std::path::Path;
 
+use drt_estimators::EstimatorKind;
 use drt_estimators::fit::Evaluation;
 
 use super::derivatives::derivatives;
@@ -140,6 +141,10 @@ fn summary(problem: &Problem<'_>, descent: &Descent<'_>, last: Option<&Evaluatio
     let mut text: String = problem.names().zip(descent.values()).enumerate().map(line).collect();
     if last.is_some() && outlook.is_none() {
         text += "± not known: the derivatives do not tell these parameters apart\n";
+    }
+    let names = descent.estimators();
+    if problem.job.settings.estimator == EstimatorKind::Auto && !names.is_empty() {
+        text += &format!("derivatives by {}, as a pilot chose\n", names.join(" and "));
     }
     if descent.steps() < problem.iterations {
         let (steps, n) = (descent.steps(), problem.iterations);

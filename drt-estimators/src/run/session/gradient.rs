@@ -1,22 +1,42 @@
 //! Gradients of losses from a session's preparation.
 
 use alloc::borrow::Cow;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use drt_math::Rgb;
 
 use crate::derivative::scene_gradient::SceneGradient;
 use crate::estimators::emitter_shares::{may_move, slides};
+use crate::estimators::{Estimator, named};
 use crate::model::error::Error;
 use crate::model::scene::{Scene, Target, TargetName};
-use crate::model::settings::{PathSampling, Settings};
+use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::model::shard::Shard;
 use crate::run::control::Control;
 use crate::run::gradient::{GradientBatch, PreparedGradient, Sampling, active};
 use crate::run::session::Session;
+use crate::run::session::choice::gradients;
 use crate::world::World;
 use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
+
+/// What a session keeps of its last gradient.
+#[derive(Default)]
+pub(super) struct Gradient {
+    /// The items that it was with respect to.
+    wanted: Vec<Target>,
+    /// The estimator that was chosen for these items.
+    estimator: Option<EstimatorKind>,
+    prepared: Option<PreparedGradient>,
+}
+
+impl Gradient {
+    /// The same choice for a scene that has changed.
+    pub(super) fn unprepared(&mut self) -> Self {
+        Self { prepared: None, ..core::mem::take(self) }
+    }
+}
 
 impl Session {
     /// The gradient of a loss with respect to the items `wanted` of the scene at the parameters' values, from `spp`
@@ -42,8 +62,8 @@ impl Session {
     /// kinds above. Shapes that touch and move differently are an exception: no field follows both, and the flux
     /// through the shape that is not followed is added here.
     ///
-    /// Where the settings leave the estimator open, it is
-    /// [`EstimatorKind::PathSpace`](crate::EstimatorKind::PathSpace).
+    /// Where the settings leave the [estimator open](crate::EstimatorKind::Auto), the first gradient with respect to
+    /// these items chooses it for a run of `spp` samples per pixel, and the choice stays.
     ///
     /// # Errors
     /// When a name is not that of one item, the adjoint's size is not the film's, the scene or a setting is unusable,
@@ -68,7 +88,7 @@ impl Session {
             return Ok(pixels);
         }
         // It was cancelled before anything was done.
-        Ok(self.prepared_gradient(wanted)?.zeros())
+        Ok(self.prepared_gradient(wanted, spp)?.zeros())
     }
 
     /// A [`gradient`](Self::gradient) in parts: calls `each` with every batch of samples, or with those of a shard, as
@@ -86,28 +106,37 @@ impl Session {
         control: &dyn Control,
         each: &mut dyn FnMut(GradientBatch),
     ) -> Result<bool, Error> {
-        self.prepared_gradient(wanted)?;
-        let Some((_, prepared)) = &mut self.gradient else { return Ok(false) };
-        let (pool, seed) = (&*self.pool, self.asked.seed);
-        prepared.run(&Sampling { pool, seed, spp, adjoint, shard, control }, each)
+        let (pool, seed) = (Arc::clone(&self.pool), self.asked.seed);
+        let prepared = self.prepared_gradient(wanted, spp)?;
+        prepared.run(&Sampling { pool: &pool, seed, spp, adjoint, shard, control }, each)
     }
 
-    /// What is prepared for a gradient by some items.
+    /// What is prepared for a gradient by some items, of which a run takes `spp` samples per pixel.
     fn prepared_gradient(
         &mut self,
         wanted: &[impl TargetName],
-    ) -> Result<&PreparedGradient, Error> {
+        spp: u32,
+    ) -> Result<&mut PreparedGradient, Error> {
         let world = &self.world;
         let expanded = world.scene.expanded()?;
         let scene = &*expanded;
         let wanted: Vec<Target> =
             wanted.iter().map(|w| w.find_in(scene)).collect::<Result<_, _>>()?;
-        let known = self.gradient.take().filter(|(of, _)| *of == wanted);
-        let (of, prepared) = match known {
-            Some(known) => known,
+        let known = core::mem::take(&mut self.gradient);
+        let known = if known.wanted == wanted { known } else { Gradient::default() };
+        let prepared = match known.prepared {
+            Some(prepared) => {
+                self.gradient = Gradient { wanted, estimator: known.estimator, prepared: None };
+                prepared
+            }
             None => {
+                let settings = Settings { expected_spp: spp, ..self.asked.clone() };
+                self.asked.check(scene, true)?;
+                let choose = || gradients::for_items(scene, &wanted, &settings, &mut self.kept);
+                let kind = known.estimator.unwrap_or_else(choose);
+                let estimator = named(kind);
                 let prepared = match &expanded {
-                    Cow::Borrowed(_) => self.prepare_gradient(world, &wanted)?,
+                    Cow::Borrowed(_) => self.prepare_gradient(estimator, world, &wanted)?,
                     // Instances have no derivatives but as shapes of their own.
                     Cow::Owned(scene) => {
                         let Settings { sensor, max_depth, .. } = self.asked;
@@ -116,22 +145,23 @@ impl Session {
                         let scene = scene.clone();
                         let world =
                             World::new(scene, sensor, depth, None, EmitterMask::All, &mut kept)?;
-                        self.prepare_gradient(&world, &wanted)?
+                        self.prepare_gradient(estimator, &world, &wanted)?
                     }
                 };
-                (wanted, prepared)
+                self.gradient = Gradient { wanted, estimator: Some(kind), prepared: None };
+                prepared
             }
         };
-        Ok(&self.gradient.insert((of, prepared)).1)
+        Ok(self.gradient.prepared.insert(prepared))
     }
 
     fn prepare_gradient(
         &self,
+        estimator: &'static dyn Estimator,
         world: &World,
         wanted: &[Target],
     ) -> Result<PreparedGradient, Error> {
-        let (scene, estimator) = (&*world.scene, self.of_gradients);
-        self.asked.check(scene, true)?;
+        let scene = &*world.scene;
         if let Some(target) = wanted.first() {
             let slide = slides(estimator, scene, wanted.iter().copied());
             let moves = active(scene, wanted).moves_geometry();

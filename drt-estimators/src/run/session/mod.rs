@@ -21,17 +21,15 @@ use drt_motion::Parameter;
 
 use crate::derivative::tangents;
 use crate::derivative::tangents::Tangents;
-use crate::estimators;
-use crate::estimators::Estimator;
 use crate::model::error::{Error, SettingError};
 use crate::model::plan::Plan;
 use crate::model::rendering::{Account, Rendering, Term};
-use crate::model::scene::{Scene, Target};
+use crate::model::scene::Scene;
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
 use crate::run::component::{Unknowns, seed_of_component};
 use crate::run::control::{Control, FinishedTile};
-use crate::run::gradient::PreparedGradient;
 use crate::run::session::choice::Chosen;
+use crate::run::session::gradient::Gradient;
 use crate::run::session::images::Images;
 use crate::run::session::legend::Legend;
 use crate::run::session::pass::Pass;
@@ -62,9 +60,7 @@ pub struct Session {
     /// The settings as they were given, and with all choices made.
     asked: Settings,
     settings: Settings,
-    /// What the last gradient was prepared for, and the estimator that gradients take.
-    gradient: Option<(Vec<Target>, PreparedGradient)>,
-    of_gradients: &'static dyn Estimator,
+    gradient: Gradient,
     /// What the next preparation can use again.
     kept: PreparedCache,
     plan: Plan,
@@ -100,7 +96,8 @@ impl Session {
 
     /// Goes on with this scene at other values: vertices that have moved, other voxels, texels or numbers, other
     /// values of the parameters. All accumulated samples are discarded. Preparations of parts that have not changed are
-    /// used again; the results are those of a new session, to the bit.
+    /// used again; the results are those of a new session, to the bit, except that an estimator which was
+    /// [chosen](EstimatorKind::Auto) for a gradient is kept as long as gradients with respect to the same items are asked for.
     ///
     /// # Errors
     /// As [`Session::new`]; the session then stays as it was.
@@ -110,7 +107,10 @@ impl Session {
         self.kept = kept;
         let (kept, pool) = (core::mem::take(&mut self.kept), Arc::clone(&self.pool));
         match updated {
-            Ok(updated) => *self = Self { kept, pool, ..updated },
+            Ok(updated) => {
+                let gradient = self.gradient.unprepared();
+                *self = Self { kept, pool, gradient, ..updated };
+            }
             Err(error) => {
                 self.kept = kept;
                 return Err(error);
@@ -153,14 +153,12 @@ impl Session {
         let Chosen { preparation, why, .. } = choice::estimator(&ground, kept)?;
         let mut session = Self::of(ground, preparation);
         session.plan.estimator = why;
-        // Which estimator is best for few parameters tells nothing of gradients by everything.
-        session.of_gradients = estimators::named(settings.estimator);
         Ok(session)
     }
 
     /// A session without samples.
     pub(crate) fn of(ground: Ground<'_>, preparation: Preparation) -> Self {
-        let Preparation { estimator, parts } = preparation;
+        let parts = preparation.parts;
         let Ground { world, asked, settings, sampling, pool, .. } = ground;
         let images: Vec<Images> = parts.into_iter().map(|p| Images::new(p.component)).collect();
         let mut paths = world.clone();
@@ -185,8 +183,7 @@ impl Session {
             samples: 0,
             passes: 0,
             complete: true,
-            gradient: None,
-            of_gradients: estimator,
+            gradient: Gradient::default(),
             kept: PreparedCache::default(),
             asked,
             settings,

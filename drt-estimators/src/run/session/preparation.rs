@@ -44,7 +44,6 @@ pub(super) struct Part {
 
 /// A scene prepared for an estimator.
 pub(crate) struct Preparation {
-    pub(super) estimator: &'static dyn Estimator,
     /// What is differentiated of the light of which emitters.
     pub(super) parts: Vec<Part>,
 }
@@ -84,7 +83,7 @@ impl<'a> Ground<'a> {
         }
         let shares = shares(estimator, scene, tangents.targets(), settings);
         let parts = shares.iter().map(|share| self.part(share, kept)).collect::<Result<_, _>>()?;
-        Ok(Preparation { estimator, parts })
+        Ok(Preparation { parts })
     }
 
     /// The paths of the pixels that a run is expected to take.
