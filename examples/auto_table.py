@@ -5,14 +5,15 @@
 
 Derivative images of each job, or of all jobs of the examples, are estimated by each of path-space, radiative, warped and auto, with as many samples.
 The work of an estimator is the variance of a parameter's derivative (the sum over blocks of pixels and channels) times processor time. It is
-taken relative to the best of the three for each parameter, and averaged over the parameters. The processor time of auto includes its pilot. Estimators with
-rare, large samples need several seeds: variances are averaged over these.
+taken relative to the best of the three for each parameter, and averaged over the parameters. The processor time of auto includes its pilot. Where samples are
+rare and large, one run tells little of a variance: the work is the median over several seeds.
 """
 
 import argparse
 import json
 import math
 import pathlib
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -26,27 +27,26 @@ def arguments():
     parser.add_argument("jobs", nargs="*", type=pathlib.Path)
     parser.add_argument("--drt", default=HERE.parent / "target/release/drt", help="the drt binary")
     parser.add_argument("--spp", type=int, default=64, help="samples per pixel")
-    parser.add_argument("--seeds", type=int, default=1, help="number of seeds")
+    parser.add_argument("--seeds", type=int, default=1, help="number of seeds, an odd one")
     parser.add_argument("--size", default="64x64", help="of the images")
     return parser.parse_args()
 
 
 def measure(job, kind, options, folder):
-    """Mean work by parameter and what the plan says of the estimator, or nothing where the estimator refuses the job."""
+    """Median work by parameter and what the plan says of the estimator, or nothing where the estimator refuses the job."""
     digest = pathlib.Path(folder) / "digest.json"
     line = [options.drt, "grad", job, "--quiet", "--threads", 1, "--spp", options.spp, "--size", options.size]
     line += ["--set", f"estimator.kind={kind}", "--output", pathlib.Path(folder) / "image.exr", "--digest", digest]
-    variances, seconds, taken = {}, 0, ""
+    works, taken = {}, ""
     for seed in range(options.seeds):
         if subprocess.run([str(word) for word in [*line, "--seed", seed]], capture_output=True).returncode != 0:
             return None
         report = json.loads(digest.read_text())
-        seconds += report["cpu_seconds"]
         taken = report["plan"].get("estimator", "")
         for name, derivative in report["derivatives"].items():
             variance = sum(error * error for block in derivative["blocks"]["stderr"] for error in block)
-            variances[name] = variances.get(name, 0) + variance
-    return {name: variance * seconds / options.seeds**2 for name, variance in variances.items()}, taken
+            works.setdefault(name, []).append(variance * report["cpu_seconds"])
+    return {name: statistics.median(each) for name, each in works.items()}, taken
 
 
 def row(job, options, folder):

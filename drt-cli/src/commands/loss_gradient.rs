@@ -9,6 +9,7 @@ use drt_estimators::{
 };
 use drt_math::Rgb;
 
+use super::console;
 use super::derivatives::derivatives;
 use super::destinations::Destinations;
 use super::fingerprint::Fingerprint;
@@ -75,7 +76,10 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     let _writing = stop::writing();
     match (found, shard) {
         (None, _) => return Ok(Outcome::Interrupted),
-        (Some(Found::Numbers(gradient)), _) => write_npy(output, &gradient)?,
+        (Some(Found::Numbers(gradient)), _) => {
+            write_npy(output, &gradient)?;
+            unseen(&asked, &gradient).iter().for_each(|note| console::note(note));
+        }
         (Some(Found::Sums(sums, picture)), Some(shard)) => {
             let inputs = Fingerprint::of_job(&asked, "grad", &[&picture])?;
             let mut file = ShardFile::new(&asked, shard, inputs, "grad", *sums);
@@ -92,6 +96,20 @@ enum Found {
     Numbers(Vec<f64>),
     /// With a hash of the picture that it is about.
     Sums(Box<Sums>, String),
+}
+
+/// Notes of groups that a loss does not depend on, as when nothing of them is in view.
+fn unseen(job: &Job, gradient: &[f64]) -> Vec<String> {
+    let mut rest = &gradient[job.parameters.len().min(gradient.len())..];
+    let mut notes = Vec::new();
+    for ParameterGroup { group, .. } in &job.groups {
+        let (own, others) = rest.split_at(group.values(&job.scene).len().min(rest.len()));
+        rest = others;
+        if own.iter().all(|g| *g == 0.0) {
+            notes.push(format!("note: group `{}`: its gradient is zero everywhere", group.name));
+        }
+    }
+    notes
 }
 
 /// Tells pictures apart, and losses of them.

@@ -318,6 +318,9 @@ fn groups_have_gradients_in_reverse() {
         assert!((vertices - cage).abs() < 1e-9 * cage.abs(), "{vertices} {cage}");
         assert!((up - vertices).abs() < 0.05 * up.abs(), "{options}: {up} {vertices}");
     }
+    // Only lamps are seen directly, and this one is a point.
+    let dark = "grad groups.toml --quiet --spp 4 --max-depth 1 --loss target.exr -o a.npy";
+    expect(&folder.run(dark), 0, &["note: group `floor`: its gradient is zero everywhere"]);
     let wrong = format!("{job}[[parameter_group]]\ntarget = \"lamp\"\nvertices = \"all\"\n");
     folder.file("wrong.toml", wrong);
     let line = "grad wrong.toml --loss target.exr -o a.npy";

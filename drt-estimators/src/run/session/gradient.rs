@@ -58,7 +58,7 @@ impl Session {
     ///   kinds of motion in [`Settings::insides`] are ignored.
     ///
     /// The expected value does not depend on this choice. Forward mode is the exact transpose if it has this seed,
-    /// these settings and this `spp`, without [`guiding`](Settings::guiding), and if both modes ask for one of the
+    /// these settings, which name an estimator, and this `spp`, without [`guiding`](Settings::guiding), and if both modes ask for one of the
     /// kinds above. Shapes that touch and move differently are an exception: no field follows both, and the flux
     /// through the shape that is not followed is added here.
     ///
