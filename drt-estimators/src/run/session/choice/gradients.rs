@@ -22,7 +22,7 @@ use crate::run::session::choice::estimator::estimator;
 use crate::run::session::preparation::Ground;
 use crate::world::cache::PreparedCache;
 
-/// Motions of one shape, and of all shapes together.
+/// How many motions there are of one shape, and of all items together.
 const PER_SHAPE: u32 = 2;
 const MOST: usize = 16;
 
@@ -54,7 +54,7 @@ pub(crate) fn for_items(
     chosen.unwrap_or(EstimatorKind::PathSpace)
 }
 
-/// The estimator of derivatives that are in part those by [`probes`].
+/// The estimator of derivatives with respect to parameters, of which [`probes`] may be a part.
 pub(crate) fn for_motions(
     scene: &Scene,
     tangents: &Tangents,
@@ -67,9 +67,7 @@ pub(crate) fn for_motions(
     }
     tangents.check()?;
     let ground = Ground::new(scene, &tangents, settings, kept)?;
-    let c = estimator(&ground, kept)?;
-    std::eprintln!("{:?}", c.why);
-    Ok(c.kind)
+    Ok(estimator(&ground, kept)?.kind)
 }
 
 /// Parameters, zero at present, that move some items of a scene: none where nothing can move. Emitters that are points or directions
