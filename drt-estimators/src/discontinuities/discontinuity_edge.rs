@@ -177,10 +177,7 @@ impl DiscontinuityEdges {
         let size = edge.size_in_view(camera);
         // Of other than two faces some are seen from anywhere.
         let Some(normals) = self.normals(discontinuity) else { return size };
-        let view = match camera.is_orthographic() {
-            true => camera.pinhole().forward,
-            false => edge.wedge.ends[0] - camera.position(),
-        };
+        let view = camera.viewpoint().onward(edge.wedge.ends[0]);
         let crease = discontinuity.crease[usize::from(normals[0].dot(view) > 0.0)];
         let weight = if discontinuity.smooth { crease } else { fm::sqrt(crease) };
         weight * size

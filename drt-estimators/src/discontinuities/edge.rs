@@ -12,7 +12,7 @@ use crate::derivative::velocity::EdgeMatter;
 use crate::discontinuities::intersection_faces::{IntersectingFaces, Sheets};
 use crate::discontinuities::order::sort_by_likeness;
 use crate::model::error::Error;
-use crate::model::sensor::Sensor;
+use crate::model::sensor::{Sensor, Viewpoint};
 use crate::world::vertex::MaterialPoint;
 use crate::world::{SurroundingMedium, World};
 
@@ -95,19 +95,19 @@ impl Edge {
 
     /// How large it is to a camera where it is a silhouette, in radians or in scene units; 0 where it is none.
     pub(super) fn silhouette_in_view(&self, camera: &Sensor) -> f64 {
-        match (camera.is_orthographic(), camera.aperture()) {
-            (true, _) => self.wedge.projected_length(camera.pinhole().forward),
-            (false, None) => self.wedge.subtended_angle(camera.position()),
-            (false, Some(lens)) => self.wedge.most_subtended(camera.position(), lens.radius),
+        match camera.viewpoint() {
+            Viewpoint::Infinity(forward) => self.wedge.projected_length(forward),
+            Viewpoint::Point(eye) => self.wedge.subtended_angle(eye),
+            Viewpoint::Lens { centre, radius } => self.wedge.most_subtended(centre, radius),
         }
     }
 
-    /// The same, silhouette or not.
+    /// How large it is to a camera, silhouette or not, in the same units.
     pub(super) fn size_in_view(&self, camera: &Sensor) -> f64 {
-        let radius = camera.aperture().map_or(0.0, |lens| lens.radius);
-        match camera.is_orthographic() {
-            true => self.wedge.length * self.wedge.sine(camera.pinhole().forward),
-            false => self.wedge.largest_size(camera.position(), radius),
+        match camera.viewpoint() {
+            Viewpoint::Infinity(forward) => self.wedge.length * self.wedge.sine(forward),
+            Viewpoint::Point(eye) => self.wedge.largest_size(eye, 0.0),
+            Viewpoint::Lens { centre, radius } => self.wedge.largest_size(centre, radius),
         }
     }
 

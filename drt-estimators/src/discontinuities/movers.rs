@@ -12,7 +12,7 @@ use drt_math::Vec3;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::discontinuities::edge::Edge;
-use crate::model::sensor::Sensor;
+use crate::model::sensor::{Sensor, Viewpoint};
 use crate::world::World;
 
 /// Boxes that are kept apart; more become one around all.
@@ -57,14 +57,11 @@ impl<'a> Movers<'a> {
 
     /// True when an edge can matter to segments that start at the camera.
     pub(crate) fn pass_camera(&self, e: &Edge, camera: &Sensor) -> bool {
-        let onward = |x| {
-            if camera.is_orthographic() { camera.pinhole().forward } else { x - camera.position() }
+        let seen = match camera.viewpoint() {
+            Viewpoint::Lens { .. } => self.pass(e),
+            from => self.pass_beyond(e, |x| from.onward(x)),
         };
-        match camera.aperture() {
-            // They start anywhere on the lens.
-            Some(_) => self.active.sensor || self.pass(e),
-            None => self.active.sensor || self.pass_beyond(e, onward),
-        }
+        self.active.sensor || seen
     }
 
     /// True when an edge can matter to segments that start on an emitter, which leave it at `x`

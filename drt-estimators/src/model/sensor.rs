@@ -18,6 +18,7 @@ mod response;
 #[cfg(test)]
 mod tests;
 mod view;
+mod viewpoint;
 mod window;
 
 use drt_math::{Affine, Mat3, Vec3, fm};
@@ -31,6 +32,7 @@ pub use crate::model::sensor::lens::{FovAxis, Lens};
 pub use crate::model::sensor::pinhole::{Pinhole, Projection, SensorGradient, SensorTangent};
 pub use crate::model::sensor::response::Response;
 pub use crate::model::sensor::view::ViewSample;
+pub(crate) use crate::model::sensor::viewpoint::Viewpoint;
 use crate::model::sensor::window::Window;
 
 /// A camera that cannot be used.

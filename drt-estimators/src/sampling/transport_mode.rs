@@ -15,6 +15,7 @@
 use drt_math::{Rgb, Vec3};
 use drt_medium::Coefficients;
 
+use crate::model::sensor::Viewpoint;
 use crate::model::surface::Given;
 use crate::sampling::trace::{Observer, PathState, Tracer};
 use crate::world::lights::{LightKind, LightSample, LightTable};
@@ -155,8 +156,7 @@ impl TransportMode for ImportanceMode {
 
     // Parallel rays do not crowd anywhere, and those of a lens not in one point.
     fn has_points(world: &World) -> bool {
-        !world.camera.is_orthographic()
-            && world.camera.aperture().is_none()
+        matches!(world.camera.viewpoint(), Viewpoint::Point(_))
             && world.camera_medium.is_some_and(|m| world.tracking[m] == Tracking::Vertices)
     }
 

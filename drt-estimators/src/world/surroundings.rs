@@ -49,16 +49,10 @@ impl World {
             }
             Surrounding::Counted => self.medium_at(eye),
         };
-        self.film_medium = match camera {
-            Surrounding::Counted if self.camera.is_orthographic() => {
-                self.medium_near(&Aabb::around(self.camera.film_corners()))
-            }
-            Surrounding::Counted if self.camera.aperture().is_some() => {
-                let square = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
-                let corner = |at| self.camera.at_lens(at).position();
-                self.medium_near(&Aabb::around(square.map(corner)))
-            }
-            _ => SurroundingMedium::Uniform(self.camera_medium),
+        let is_counted = matches!(camera, Surrounding::Counted);
+        self.film_medium = match self.camera.around_origins().filter(|_| is_counted) {
+            Some(around) => self.medium_near(&Aabb::around(around)),
+            None => SurroundingMedium::Uniform(self.camera_medium),
         };
         self.settle_lights();
     }

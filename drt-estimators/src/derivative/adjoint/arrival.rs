@@ -147,7 +147,7 @@ impl Differentiator<'_> {
         before: &mut [SurfaceAdjoint],
         sink: &mut S,
     ) {
-        let parallel_rays = self.world.camera.is_orthographic();
+        let parallel_rays = self.world.camera.viewpoint().is_at_infinity();
         let Some(segment) = &Segment::new(recorded, k, motion, received, parallel_rays) else {
             return;
         };

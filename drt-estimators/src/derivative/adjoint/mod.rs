@@ -435,7 +435,7 @@ impl<'w> Differentiator<'w> {
 
     /// The segment by which a walk arrived at a node; `None` at the camera.
     fn behind(&self, path: &RecordedPath<'_>, node: usize) -> Option<Behind> {
-        behind(path, node, self.world.camera.is_orthographic())
+        behind(path, node, self.world.camera.viewpoint().is_at_infinity())
     }
 }
 

@@ -62,9 +62,11 @@ fn points(
         |position: Vec3, velocities: Vec<(usize, Vec3)>| InteriorPoint { position, velocities };
     let mut found = Vec::new();
     // Only where rays meet in a point does what is around it have to move along.
-    if world.camera_medium == Some(medium) && !world.camera.is_orthographic() {
+    if world.camera_medium == Some(medium)
+        && let Some(eye) = world.camera.viewpoint().centre()
+    {
         let moves = tangents.iter().flat_map(|t| &t.sensor).map(|(p, t)| (*p, t.position));
-        found.push((Anchor::Camera, point(world.camera.position(), moves.collect())));
+        found.push((Anchor::Camera, point(eye, moves.collect())));
     }
     for (e, named) in world.scene.emitters.iter().enumerate() {
         if let Some(x) = named.item.emitter.position()

@@ -132,10 +132,7 @@ impl Blends {
             .collect();
         let seen = |(s, curvature): (usize, &f64)| {
             let center = world.scene.shapes[s].mesh.bounds().center();
-            let far = (center - camera.position()).length();
-            let pixel =
-                camera.pinhole().pixel_size * if camera.is_orthographic() { 1.0 } else { far };
-            f64::min(GRAZING_PIXELS * curvature * pixel, GRAZING)
+            f64::min(GRAZING_PIXELS * curvature * camera.pixel_width_at(center), GRAZING)
         };
         let camera_cosines = curvatures.iter().enumerate().map(seen).collect();
         let shapes = world.scene.shapes.iter();
@@ -226,8 +223,8 @@ impl Blends {
     ) -> Blend {
         let Kind::Surface(s) = &vertex.kind else { return Blend::default() };
         let cosine = self.camera_cosines.get(s.shape as usize).copied().unwrap_or(0.0);
-        // Parallel rays are those of a viewer infinitely far.
-        let apart = if world.camera.is_orthographic() { f64::INFINITY } else { distance };
+        let is_far = world.camera.viewpoint().is_at_infinity();
+        let apart = if is_far { f64::INFINITY } else { distance };
         graze(world, s, dir, apart, cosine)
     }
 

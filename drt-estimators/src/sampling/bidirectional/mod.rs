@@ -194,7 +194,7 @@ impl<'w> Bidirectional<'w> {
         let film = camera.view(view.origin + view.direction).importance;
         let ratios = Ratios { last: square(self.light_paths / film), earlier: 0.0 };
         // Parallel rays are drawn by area, as if they came from infinity.
-        self.camera.begin(ratios, !camera.is_orthographic());
+        self.camera.begin(ratios, !camera.viewpoint().is_at_infinity());
         type Mode = Unconnected<RadianceMode>;
         let mut observed = Observed { subpath: &mut self.camera, observer };
         if let Some(first) = tracer.follow::<Mode, _>(&leaving, &mut observed) {

@@ -77,7 +77,7 @@ pub(crate) fn sample<R: BoundarySink>(
         }
         Some(Vertex { medium: Some(m), x, .. }) => items.push(VelocityTerm::Volume(m, x, point)),
         // What has no place keeps its image point, or its direction.
-        _ if camera.is_orthographic() => return None,
+        _ if camera.viewpoint().is_at_infinity() => return None,
         _ => sensor.position = Vec3::ZERO,
     }
     items.push(VelocityTerm::Sensor(world.camera.lens_gradient(lens, sensor)));

@@ -247,7 +247,7 @@ impl<'w, R: BoundarySink> Sampler<'_, 'w, R> {
         let s = self.end(&start, -w, Rgb::ONE).filter(|s| !self.is_dark(s))?;
         self.b.functional.items.clear();
         self.edge_rate(&at, n);
-        let gradient = if camera.is_orthographic() {
+        let gradient = if camera.viewpoint().is_at_infinity() {
             self.end_rate(&s, -n);
             match s.vertex {
                 Some(_) => SensorGradient { forward: n * s.distance, ..SensorGradient::default() },

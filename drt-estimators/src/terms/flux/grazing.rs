@@ -17,10 +17,11 @@ mod tests;
 
 use alloc::vec::Vec;
 
-use drt_math::{CdfTable, Real};
+use drt_math::{CdfTable, Real, Vec3};
 
 use crate::derivative::sensitivity::{ActiveInputs, VelocityFunctional, VelocityTerm};
 use crate::model::error::Error;
+use crate::model::sensor::Viewpoint;
 use crate::sampling::importance::{Splat, see};
 use crate::sampling::record::Radiance;
 use crate::sampling::trace::Tracer;
@@ -63,10 +64,7 @@ impl GrazingFlux {
         flux: &Flux,
         active: &ActiveInputs,
     ) -> Result<Option<Self>, Error> {
-        let camera = &world.camera;
-        let eye = camera.position();
-        // How far rays start from there.
-        let apart = camera.aperture().map_or(0.0, |lens| lens.radius);
+        let viewpoint = world.camera.viewpoint();
         let (mut triangles, mut weights) = (Vec::new(), Vec::new());
         for (s, shape) in (0..).zip(&world.scene.shapes) {
             if !flux.sweeps(s, active.sensor) {
@@ -79,14 +77,12 @@ impl GrazingFlux {
                 let across = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
                 let area = 0.5 * across.length();
                 let n = across.normalize();
-                let (seen, r2) = if camera.is_orthographic() {
-                    (Real::abs(n.dot(camera.pinhole().forward)) < EDGE_ON, 1.0)
-                } else {
-                    let height = Real::abs(n.dot(corners[0] - eye));
-                    let farthest = corners.iter().map(|c| (*c - eye).length()).fold(0.0, f64::max);
-                    let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - eye;
-                    let r2 = f64::max(middle.length_squared(), area);
-                    (height - apart < EDGE_ON * (farthest + apart), r2)
+                let (seen, r2) = match viewpoint {
+                    Viewpoint::Infinity(forward) => (Real::abs(n.dot(forward)) < EDGE_ON, 1.0),
+                    Viewpoint::Point(eye) => grazed_from(corners, n, area, eye, 0.0),
+                    Viewpoint::Lens { centre, radius } => {
+                        grazed_from(corners, n, area, centre, radius)
+                    }
                 };
                 if area > 0.0 && seen {
                     let around = *around.get_or_insert_with(|| world.medium_around(s as usize));
@@ -161,4 +157,14 @@ impl GrazingFlux {
         }
         Some(())
     }
+}
+
+/// Whether a triangle with the unit normal `n` may be seen edge on from within a `radius` around the eye, and the square of its
+/// distance, which is at least its area.
+fn grazed_from(corners: [Vec3; 3], n: Vec3, area: f64, eye: Vec3, radius: f64) -> (bool, f64) {
+    let height = Real::abs(n.dot(corners[0] - eye));
+    let farthest = corners.iter().map(|c| (*c - eye).length()).fold(0.0, f64::max);
+    let middle = (corners[0] + corners[1] + corners[2]) / 3.0 - eye;
+    let r2 = f64::max(middle.length_squared(), area);
+    (height - radius < EDGE_ON * (farthest + radius), r2)
 }
