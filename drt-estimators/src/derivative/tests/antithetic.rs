@@ -46,24 +46,32 @@ fn derivatives(
     };
     let mut path = Recording::new(world, field, AntitheticPairs::new(true));
     let mut differentiator = Differentiator::new(world);
-    let mut sink = Contraction::new(world, &motion);
+    let mut sinks = [(); 2].map(|()| Contraction::new(world, &motion));
     let mut buffer = PairedRadiance::default();
-    let mut of = |seed: u64, paired: bool, change: Change<'_>| -> Moments {
-        let one = |i| {
+    // Without the fault and with it, by the same paths.
+    let mut of = |seed: u64, paired: bool| -> [Moments; 2] {
+        let mut found = [Moments::default(); 2];
+        for i in 0..paths {
             let choices = paired.then(|| Rng::new(9, 1, i));
             let slope = trace(&mut tracer, &mut path, choices, seed, i);
-            sink.clear();
-            differentiator.differentiate(&path.path(), slope, Rng::new(6, 0, i), &mut sink);
+            sinks.iter_mut().for_each(Contraction::clear);
+            let [right, wrong] = &mut sinks;
+            differentiator.differentiate(&path.path(), slope, Rng::new(6, 0, i), right);
+            let alone = right.rates[0].mean();
             path.views[0].pairs.follow(&mut tracer, &mut buffer, |pair, chance, incoming| {
+                differentiator.pair(&path.path(), pair, chance, incoming, right);
                 let mut incoming = incoming.clone();
-                change(pair, &mut incoming);
-                differentiator.pair(&path.path(), pair, chance, &incoming, &mut sink);
+                fault(pair, &mut incoming);
+                differentiator.pair(&path.path(), pair, chance, &incoming, wrong);
             });
-            sink.rates[0].mean()
-        };
-        (0..paths).map(one).collect()
+            let both = [right.rates[0].mean(), alone + wrong.rates[0].mean()];
+            found.iter_mut().zip(both).for_each(|(moments, value)| moments.push(value));
+        }
+        found
     };
-    [of(20, false, &|_, _| {}), of(21, true, &|_, _| {}), of(21, true, fault)]
+    let [single, _] = of(20, false);
+    let [pairs, faulty] = of(21, true);
+    [single, pairs, faulty]
 }
 
 fn z([single, pairs]: [&Moments; 2]) -> f64 {

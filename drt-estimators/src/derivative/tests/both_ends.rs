@@ -3,7 +3,7 @@
 
 use drt_math::stats::Moments;
 
-use crate::derivative::tests::choice::{LIGHT, derivative, prepare_by};
+use crate::derivative::tests::choice::{LIGHT, parts, prepare_by, total};
 use crate::derivative::tests::scenes::*;
 use crate::model::settings::EstimatorKind::{PathSpace, Warped};
 use crate::model::settings::{PathSampling, Settings};
@@ -19,26 +19,22 @@ fn every_strategy_and_its_weight_are_needed() {
             let settings = Settings { estimator, sampling, ..Settings::default() };
             prepare_by(&settings, mask, &scene, &brightens, 5)
         };
-        let sum = |prepare: &dyn Fn() -> _| derivative(LIGHT, &|_| prepare(), [1.0; 2]);
-        let reference = sum(&|| by(PathSampling::Unidirectional));
+        let one = parts(LIGHT, &by(PathSampling::Unidirectional));
+        let both = parts(LIGHT, &by(PathSampling::Bidirectional));
+        let reference = total(&one, &one);
         let judged = |own: Moments| {
             let error = f64::sqrt(own.variance_of_mean() + reference.variance_of_mean());
             ((own.mean() - reference.mean()) / error, error / reference.mean().abs())
         };
-        let off = |prepare: &dyn Fn() -> _| judged(sum(prepare));
-        let mixed = |both: f64| {
-            by(if both == 1.0 { PathSampling::Bidirectional } else { PathSampling::Unidirectional })
-        };
-        let fair = off(&|| by(PathSampling::Bidirectional));
+        let fair = judged(total(&both, &both));
         assert!(fair.0.abs() < 4.0 && fair.1 < 0.02, "{estimator:?} {fair:?}");
-        let without = off(&|| {
-            let mut both = by(PathSampling::Bidirectional);
-            both.0.terms.sources.retain(|s| *s != BoundarySource::LightPaths);
-            both
-        });
+        let mut camera_alone = by(PathSampling::Bidirectional);
+        camera_alone.0.terms.sources.retain(|s| *s != BoundarySource::LightPaths);
+        let camera_alone = parts(LIGHT, &camera_alone);
+        let without = judged(total(&camera_alone, &camera_alone));
         assert!(without.0.abs() > 5.0, "{estimator:?} {without:?}");
         // Paths from the camera that know nothing of light paths, with all that the camera sees of these.
-        let unweighted = judged(derivative(LIGHT, &mixed, [0.0, 1.0]));
+        let unweighted = judged(total(&one, &both));
         assert!(unweighted.0.abs() > 5.0, "{estimator:?} {unweighted:?}");
     }
 }

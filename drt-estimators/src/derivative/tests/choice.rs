@@ -93,12 +93,15 @@ pub(crate) const MOMENT: Sum =
 pub(crate) const LIGHT: Sum = Sum { weight: |_| 1.0, samples: 128 };
 
 /// The derivative of a sum by batches of samples: the interior term, and all others.
-struct Parts {
+pub(crate) struct Parts {
     rays: Vec<f64>,
     edges: Vec<f64>,
 }
 
-fn parts(Sum { weight, samples }: Sum, (prepared, motion): &(Prepared, Motion)) -> Parts {
+pub(crate) fn parts(
+    Sum { weight, samples }: Sum,
+    (prepared, motion): &(Prepared, Motion),
+) -> Parts {
     let mut parts = Parts { rays: Vec::new(), edges: Vec::new() };
     for seed in 0..BATCHES {
         let [mut rays, mut edges] = [0.0; 2];
@@ -134,21 +137,15 @@ fn parts(Sum { weight, samples }: Sum, (prepared, motion): &(Prepared, Motion)) 
     parts
 }
 
-fn total(rays: &Parts, edges: &Parts) -> Moments {
+/// The interior term of one, and all others of another.
+pub(crate) fn total(rays: &Parts, edges: &Parts) -> Moments {
     rays.rays.iter().zip(&edges.edges).map(|(rays, edges)| rays + edges).collect()
 }
 
-/// The derivative of a sum: the interior term with a world made by `prepare(strengths[0])`, and all others with
-/// one by `prepare(strengths[1])`.
-pub(crate) fn derivative(
-    sum: Sum,
-    prepare: &dyn Fn(f64) -> (Prepared, Motion),
-    [rays, edges]: [f64; 2],
-) -> Moments {
-    let of = |strength| parts(sum, &prepare(strength));
-    let first = of(rays);
-    // The same strength gives the same numbers.
-    if rays == edges { total(&first, &first) } else { total(&first, &of(edges)) }
+/// The derivative of a sum, by all terms of a scene that has been prepared.
+pub(crate) fn derivative(sum: Sum, prepared: &(Prepared, Motion)) -> Moments {
+    let parts = parts(sum, prepared);
+    total(&parts, &parts)
 }
 
 const BATCHES: u64 = 48;

@@ -120,23 +120,20 @@ fn compare_lit(lit: EmitterMask, scene: &Scene, motion: &Parameter, sum: Sum, fa
         EmitterMask::Delta => (EstimatorKind::PathSpace, 2),
         _ => (EstimatorKind::Radiative, 4),
     };
-    let by = |kind| move |_| prepare_lit(kind, lit, scene, motion, depth);
-    let reference = derivative(sum, &by(other), [1.0; 2]);
-    let off = |prepare: &dyn Fn(f64) -> (Prepared, Motion)| {
-        let own: Moments = derivative(sum, prepare, [1.0; 2]);
+    let by = |kind| prepare_lit(kind, lit, scene, motion, depth);
+    let reference = derivative(sum, &by(other));
+    let off = |prepared: &(Prepared, Motion)| {
+        let own: Moments = derivative(sum, prepared);
         let error = f64::sqrt(own.variance_of_mean() + reference.variance_of_mean());
         ((own.mean() - reference.mean()) / error, error / reference.mean())
     };
     let fair = off(&by(EstimatorKind::Warped));
     assert!(fair.0.abs() < 4.0 && fair.1.abs() < 0.1, "{fair:?}");
     for fault in faults {
-        let faulty = off(&|_| {
-            let (mut prepared, motion) =
-                prepare_lit(EstimatorKind::Warped, lit, scene, motion, depth);
-            let field = Arc::clone(&prepared.terms.velocity);
-            prepared.terms.velocity = Arc::new(Faulty { field, fault: *fault });
-            (prepared, motion)
-        });
+        let (mut prepared, motion) = by(EstimatorKind::Warped);
+        let field = Arc::clone(&prepared.terms.velocity);
+        prepared.terms.velocity = Arc::new(Faulty { field, fault: *fault });
+        let faulty = off(&(prepared, motion));
         assert!(faulty.0.abs() > 5.0, "{fault:?} {faulty:?}");
     }
 }

@@ -151,16 +151,13 @@ fn what_is_followed_stands_for_all() {
     let scene = ball_in_mist(Ball::Milk);
     let motion = parameter("ball", 0.0, vec![moves("ball", shift())]);
     let [all, few] = [1.0, 20.0].map(|followed| {
-        let prepare = |_: f64| {
-            let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
-            if let Some(flux) = &mut prepared.terms.flux {
-                flux.followed = followed;
-            }
-            // Then all of it is flux.
-            prepared.change_spatial(|s| s.free_paths.clear());
-            (prepared, motion)
-        };
-        choice::derivative(MOMENT, &prepare, [1.0; 2])
+        let (mut prepared, motion) = choice::prepare(&scene, &motion, 4);
+        if let Some(flux) = &mut prepared.terms.flux {
+            flux.followed = followed;
+        }
+        // Then all of it is flux.
+        prepared.change_spatial(|s| s.free_paths.clear());
+        choice::derivative(MOMENT, &(prepared, motion))
     });
     let error = f64::sqrt(all.variance_of_mean() + few.variance_of_mean());
     assert!((all.mean() - few.mean()).abs() < 4.0 * error, "{all:?} {few:?}");
