@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod comparison;
+pub mod cores;
 pub mod detector;
 pub mod insides;
 pub mod judge;

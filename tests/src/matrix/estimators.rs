@@ -11,7 +11,7 @@ use drt_motion::Parameter;
 
 use super::scale::{Halves, Scale};
 use super::verdict::{MOST_ERRORS, SIGNIFICANT, judge, plus};
-use super::{Fault, Row, Stage};
+use super::{Cell, Fault, Row, Stage};
 use crate::Result;
 use crate::reference::Reference;
 
@@ -38,6 +38,30 @@ impl Method {
 
     const fn both_ends(kind: EstimatorKind) -> Self {
         Self(kind, PathSampling::Bidirectional)
+    }
+
+    /// Prepares each run of a stage, and samples nothing.
+    ///
+    /// # Errors
+    /// When the library rejects the scene or a parameter, or the estimator refuses it.
+    pub fn accepts(self, stage: &Stage) -> Result<()> {
+        stage.runs().try_for_each(|cells| self.session(stage, &parameters(cells), 0).map(|_| ()))
+    }
+
+    fn session(self, stage: &Stage, parameters: &[Parameter], seed: u64) -> Result<Session> {
+        let Self(estimator, sampling) = self;
+        let settings = Settings {
+            threads: 1,
+            seed,
+            estimator,
+            sampling,
+            boundary_ratio: (self == Self::REFERENCE)
+                .then(|| f64::from(stage.boundary_samples) / f64::from(stage.samples)),
+            terms: true,
+            insides: stage.insides.clone(),
+            ..Settings::default()
+        };
+        Ok(Session::new(&stage.scene, parameters, &settings)?)
     }
 }
 
@@ -133,7 +157,7 @@ fn compare_once(
 ) -> Result<Vec<Pair>> {
     let mut pairs = Vec::new();
     for cells in stage.runs() {
-        let parameters: Vec<Parameter> = cells.iter().map(|c| c.parameter.clone()).collect();
+        let parameters = parameters(cells);
         let run = |method, seed| sample(stage, &parameters, method, seed, effort);
         // Other random numbers, so that the errors are independent.
         let reference = run(Method::REFERENCE, seeds[0])?;
@@ -170,7 +194,7 @@ pub fn examine(
     for cells in stage.runs() {
         let references = &references[number..number + cells.len()];
         number += cells.len();
-        let parameters: Vec<Parameter> = cells.iter().map(|c| c.parameter.clone()).collect();
+        let parameters = parameters(cells);
         let rows = |method: Method, sampled: &Sampled| -> Vec<Row> {
             let cells = cells.iter().enumerate().zip(references);
             let of =
@@ -274,22 +298,11 @@ impl Sampled {
 fn sample(
     stage: &Stage,
     parameters: &[Parameter],
-    Method(estimator, sampling): Method,
+    method: Method,
     seed: u64,
     effort: Effort,
 ) -> Result<Sampled> {
-    let settings = Settings {
-        threads: 1,
-        seed,
-        estimator,
-        sampling,
-        boundary_ratio: (Method(estimator, sampling) == Method::REFERENCE)
-            .then(|| f64::from(stage.boundary_samples) / f64::from(stage.samples)),
-        terms: true,
-        insides: stage.insides.clone(),
-        ..Settings::default()
-    };
-    let mut session = Session::new(&stage.scene, parameters, &settings)?;
+    let mut session = method.session(stage, parameters, seed)?;
     let start = Instant::now();
     session.run(ROUND, &Unattended);
     let mut first = session.rendering();
@@ -304,6 +317,10 @@ fn sample(
         }
         first = sampled.all;
     }
+}
+
+fn parameters(cells: &[Cell]) -> Vec<Parameter> {
+    cells.iter().map(|c| c.parameter.clone()).collect()
 }
 
 /// Pairs as a table for a reader of test output.

@@ -3,9 +3,8 @@
 //! The tests that run by default are quick; `--ignored` runs the strict ones. `DRT_ORACLES=FILE`
 //! reads another file of the same form.
 
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-
 use drt_estimators::{EstimatorKind, InteriorMotion};
+use drt_tests::cores::on_all_cores;
 use drt_tests::judge::{Row, Table, rows};
 use drt_tests::measure::{Effort, measure};
 use drt_tests::oracle::OracleFile;
@@ -31,7 +30,8 @@ fn judge(trials: &[Trial], effort: &Effort) {
         let rows = rows(trial, &measured, effort);
         eprintln!("{}", Table(&rows));
         rows
-    });
+    })
+    .concat();
     println!("{}", Table(&all));
     let failing = all.iter().filter(|row| !row.passes()).count();
     assert_eq!(failing, 0, "{failing} of {} numbers fail", all.len());
@@ -55,25 +55,6 @@ fn check_insides(kinds: &[&str], effort: &Effort) {
         all.extend(these);
     }
     judge(&all, effort);
-}
-
-/// Does something for each trial, and keeps their order.
-fn on_all_cores<T: Send>(trials: &[Trial], of: impl Fn(&Trial) -> Vec<T> + Sync) -> Vec<T> {
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut done = Vec::new();
-        while let Some((i, trial)) = trials.iter().enumerate().nth(next.fetch_add(1, Relaxed)) {
-            done.push((i, of(trial)));
-        }
-        done
-    };
-    let mut all = std::thread::scope(|scope| {
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let threads: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
-        threads.into_iter().flat_map(|t| t.join().unwrap()).collect::<Vec<_>>()
-    });
-    all.sort_by_key(|(i, _)| *i);
-    all.into_iter().flat_map(|(_, rows)| rows).collect()
 }
 
 /// Every number to 0.3 %, those near zero (less than a twentieth of the largest) to 0.3 % of the

@@ -47,13 +47,13 @@ fn contents(stage: &Stage) -> String {
 /// The comparisons of a stage, of each estimator that does not refuse it. Prints those that fail.
 fn compared(name: &str, stage: Result<Stage>, methods: &[Method], effort: Effort) -> Vec<Pair> {
     let stage = stage.unwrap();
-    let mut pairs = Vec::new();
-    for method in methods {
-        match compare(&stage, &[*method], effort) {
-            Ok(found) => pairs.extend(found),
-            Err(refusal) => println!("{name}: {:?} refuses: {refusal}", method.0),
-        }
-    }
+    let mut methods = methods.to_vec();
+    methods.retain(|method| {
+        let refusal = method.accepts(&stage).err();
+        refusal.iter().for_each(|r| println!("{name}: {:?} refuses: {r}", method.0));
+        refusal.is_none()
+    });
+    let pairs = compare(&stage, &methods, effort).unwrap();
     let failing: Vec<Pair> = pairs.iter().filter(|pair| !agrees(pair)).cloned().collect();
     if !failing.is_empty() {
         println!("{name}: {}{}", contents(&stage), Pairs(&failing));

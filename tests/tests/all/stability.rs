@@ -3,15 +3,15 @@
 //! With more samples:
 //! `cargo test --release -p drt-tests --test all -- --ignored stability:: --nocapture`
 
+use drt_tests::cores::on_all_cores;
 use drt_tests::stability::{Condition, Extent, Row, Table, conditions, examine};
 
-fn run(conditions: Vec<Condition>) -> Vec<Row> {
-    let mut rows = Vec::new();
-    for condition in conditions {
-        let own = examine(&condition).unwrap_or_else(|e| panic!("{}: {e}", condition.name));
-        print!("{}", Table(&own));
-        rows.extend(own);
-    }
+fn run(conditions: &[Condition]) -> Vec<Row> {
+    let rows = on_all_cores(conditions, |condition| {
+        examine(condition).unwrap_or_else(|e| panic!("{}: {e}", condition.name))
+    })
+    .concat();
+    print!("{}", Table(&rows));
     rows
 }
 
@@ -26,11 +26,11 @@ fn judge(rows: &[Row], sharp: f64) {
 
 #[test]
 fn extreme_scenes_equal_ordinary_ones() {
-    judge(&run(conditions(Extent::Short).unwrap()), 0.6);
+    judge(&run(&conditions(Extent::Short).unwrap()), 0.6);
 }
 
 #[test]
 #[ignore = "minutes"]
 fn extreme_scenes_equal_ordinary_ones_precisely() {
-    judge(&run(conditions(Extent::Full).unwrap()), 0.8);
+    judge(&run(&conditions(Extent::Full).unwrap()), 0.8);
 }
