@@ -20,10 +20,10 @@ const SPP: u32 = 4;
 const FOV: f64 = 30.0;
 
 /// Rows of pictures of meshes, one mesh a row and the first on top: by a lamp beside a camera that turns about the axis of the
-/// coordinates that `up` is nearest to. They are seen as far away as shows the first as a whole. Width and height are in
+/// coordinates that `up` is nearest to. They are seen from where all of them are in view as a whole. Width and height are in
 /// pixels, and pixels go row by row; nothing for what cannot be shown, such as a mesh without extent.
 pub(super) fn turning(meshes: &[&Mesh], up: Vec3) -> Option<([u32; 2], Vec<Rgb>)> {
-    let bounds = meshes.first()?.bounds();
+    let bounds = meshes.iter().map(|mesh| mesh.bounds()).reduce(|all, one| all.union(&one))?;
     let (middle, radius) = (bounds.center(), 0.5 * bounds.extent().length());
     let up = nearest_axis(up);
     let aside = if up.x == 0.0 { Vec3::X } else { Vec3::Z };
@@ -80,7 +80,7 @@ fn tile(mesh: &Mesh, middle: Vec3, eye: Vec3, up: Vec3) -> Option<Vec<Rgb>> {
 
 #[cfg(test)]
 mod tests {
-    use drt_math::vec3;
+    use drt_math::{Affine, Mat3, vec3};
 
     use super::*;
 
@@ -90,15 +90,21 @@ mod tests {
         let (size, pixels) = turning(&[&sheet, &sheet], vec3(0.1, 0.9, -0.3)).unwrap();
         assert_eq!(size, [TURNS * SIZE, 2 * SIZE]);
         // The sheet is upright, in the plane of x and y, and the camera begins on the axis of x.
-        let lit = |row: u32, turn: u32| {
-            let of = |k: u32| {
-                let (x, y) = (k % SIZE + turn * SIZE, k / SIZE + row * SIZE);
-                pixels[(y * size[0] + x) as usize].r
-            };
-            (0..SIZE * SIZE).filter(|k| (of(*k) - 0.15).abs() > 0.02).count()
+        let seen = |pixels: &[Rgb], row: u32, turn: u32, k: u32| {
+            let (x, y) = (k % SIZE + turn * SIZE, k / SIZE + row * SIZE);
+            (pixels[(y * size[0] + x) as usize].r - 0.15).abs() > 0.02
         };
+        let lit =
+            |row: u32, turn: u32| (0..SIZE * SIZE).filter(|k| seen(&pixels, row, turn, *k)).count();
         assert!(lit(0, 1) > 4 * lit(0, 0), "{} {}", lit(0, 1), lit(0, 0));
         assert_eq!(lit(0, 2), lit(1, 2));
+        // One that has grown is in view as a whole, too.
+        let fifth = Affine { linear: Mat3::IDENTITY * 0.2, translation: Vec3::ZERO };
+        let small = sheet.transform(&fifth);
+        let (_, grown) = turning(&[&small, &sheet], Vec3::Y).unwrap();
+        let border = |k: u32| [k % SIZE, k / SIZE].iter().any(|c| *c == 0 || *c == SIZE - 1);
+        let at_border: Vec<u32> = (0..SIZE * SIZE).filter(|k| border(*k)).collect();
+        assert!(!(0..TURNS).any(|turn| at_border.iter().any(|k| seen(&grown, 1, turn, *k))));
         assert_eq!(nearest_axis(vec3(0.1, 0.2, -0.3)), -Vec3::Z);
     }
 }
