@@ -37,6 +37,8 @@ pub struct DepthEstimate<'a> {
     pub moment: RgbVec,
     /// The faces of a grid's box are in it.
     pub faces: bool,
+    /// Motions of the grids are left out of its rate.
+    pub at_rest: bool,
 }
 
 impl<'a> DepthEstimate<'a> {
@@ -52,6 +54,7 @@ impl<'a> DepthEstimate<'a> {
             gradient: RgbVec::ZERO,
             moment: RgbVec::ZERO,
             faces: false,
+            at_rest: false,
         };
         match &medium.kind {
             MediumKind::Homogeneous(_) | MediumKind::Uniform(_) => {}
@@ -70,6 +73,13 @@ impl<'a> DepthEstimate<'a> {
         medium.crossings(&ray, |c| self.add_face(c));
         self.faces = true;
         self
+    }
+
+    /// This estimate without what motions of the grids change, for derivatives by coefficients alone.
+    #[must_use]
+    pub fn at_rest(self) -> Self {
+        let [gradient, moment] = [RgbVec::ZERO; 2];
+        Self { gradient, moment, faces: false, at_rest: true, ..self }
     }
 
     fn add_face(&mut self, c: &Crossing) {
@@ -159,6 +169,9 @@ impl<'a> DepthEstimate<'a> {
     /// and the derivative by the velocity there. Of many parameters whose tangents flow, each adds the
     /// products with its own velocities to [`rate_without_flows`](Self::rate_without_flows).
     pub fn pulls(&self, medium: &Medium, mut visit: impl FnMut(Vec3, RgbVec)) {
+        if self.at_rest {
+            return;
+        }
         for &(t, w) in self.points {
             let x = self.ray.at(t);
             let g = medium.gradients(x).sigma_t;

@@ -98,6 +98,15 @@ impl GridMedium {
         self.scale * self.bounds.largest()
     }
 
+    /// The share of voxels in which some channel's extinction is below `sigma_t`, in 1 / scene unit.
+    #[must_use]
+    pub fn share_below(&self, sigma_t: f64) -> f64 {
+        let channels = self.density.channels();
+        let voxels = self.density.values().chunks(channels);
+        let thin = |voxel: &&[f64]| voxel.iter().any(|v| v.abs() * self.scale < sigma_t);
+        voxels.filter(thin).count() as f64 * channels as f64 / self.density.values().len() as f64
+    }
+
     pub(crate) fn is_scattering(&self) -> bool {
         self.largest_sigma_t() > 0.0 && !self.albedo.is_zero()
     }

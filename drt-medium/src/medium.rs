@@ -8,7 +8,7 @@ use crate::homogeneous::check;
 use crate::tracking::zip;
 use crate::{
     CoefficientGradients, Coefficients, Crossing, DeformedGrid, DensityField, DistanceSample, Grid,
-    GridMedium, Homogeneous, MediumError, Phase, Property, Ray, SpaceMap, TrackingStats,
+    GridMedium, Homogeneous, MediumError, Phase, Piece, Property, Ray, SpaceMap, TrackingStats,
     UniformMedium, tracking,
 };
 
@@ -182,6 +182,12 @@ impl Medium {
         }
     }
 
+    /// True of a point of the world in the box of the medium's density grid.
+    #[must_use]
+    pub fn contains(&self, x: Vec3) -> bool {
+        self.grid_at(x).is_some()
+    }
+
     /// The voxels that give a property; `None` where it is the same everywhere, or the user's own.
     #[must_use]
     pub fn voxels(&self, property: Property) -> Option<&Grid> {
@@ -256,6 +262,23 @@ impl Medium {
             MediumKind::Deformed(d) => d.grids().is_emissive(),
             MediumKind::Custom(_) => true,
         }
+    }
+
+    /// False when no point of the medium would scatter or emit light, whatever its extinction. Custom fields are taken to. Looks
+    /// at every voxel: a question for the preparation of a scene.
+    #[must_use]
+    pub fn would_send_light(&self) -> bool {
+        let [albedo, emission] = match &self.kind {
+            MediumKind::Homogeneous(h) => {
+                let c = h.coefficients();
+                return !(c.albedo.is_zero() && c.emission.is_zero());
+            }
+            MediumKind::Uniform(u) => return u.is_scattering() || u.is_emissive(),
+            MediumKind::Grid(g) => [g.albedo(), g.emission()],
+            MediumKind::Deformed(d) => [d.grids().albedo(), d.grids().emission()],
+            MediumKind::Custom(_) => return true,
+        };
+        !(albedo.is_zero() && emission.is_zero())
     }
 
     /// False when no point of the medium scatters. Custom fields are taken to scatter. Looks at
@@ -359,6 +382,23 @@ impl Medium {
             MediumKind::Grid(g) => tracking::line_points(g, &ray, rng, out),
             MediumKind::Deformed(d) => tracking::line_points(d, &ray, rng, out),
             MediumKind::Custom(f) => tracking::line_points(&**f, &ray, rng, out),
+        }
+    }
+
+    /// Shows stretches of a ray with the mean extinction on each, by which densities of sampling are steered, until
+    /// `visit` breaks; see [`DensityField::means`].
+    pub fn means(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>) {
+        match &self.kind {
+            MediumKind::Homogeneous(h)
+            | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => {
+                let mean = h.coefficients().sigma_t;
+                let (start, end) = (0.0, ray.t_max);
+                // The visitor has nothing left to see in any case.
+                let _ = visit(&Piece { start, end, majorant: mean, minorant: mean, mean });
+            }
+            MediumKind::Grid(g) => g.means(ray, visit),
+            MediumKind::Deformed(d) => d.means(ray, visit),
+            MediumKind::Custom(f) => f.means(ray, visit),
         }
     }
 

@@ -141,6 +141,7 @@ struct WorkDone {
     guide_samples: u64,
     flux_samples: u64,
     tracking_steps: u64,
+    probes: u64,
     turning_edges: u64,
 }
 
@@ -156,6 +157,7 @@ impl From<&Counters> for WorkDone {
             guide_samples: c.guide_samples,
             flux_samples: c.flux_samples,
             tracking_steps: c.tracking_steps,
+            probes: c.probes,
             turning_edges: c.turning_edges,
         }
     }

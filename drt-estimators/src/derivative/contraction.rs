@@ -76,6 +76,12 @@ impl Motion {
         let mut factors = ActiveFactors {
             media: self.tangents.media.iter().map(need).collect(),
             bsdfs: self.active.bsdfs.clone(),
+            extinctions: self
+                .tangents
+                .media
+                .iter()
+                .map(|l| l.iter().any(|(_, t)| !t.sigma_t.is_zero()))
+                .collect(),
             roughness: self.tangents.bsdfs.iter().map(roughens).collect(),
             index: self.tangents.bsdfs.iter().map(bends).collect(),
         };

@@ -10,7 +10,8 @@ use core::fmt;
 pub struct MediumPlan {
     /// The medium's name.
     pub medium: String,
-    /// `closed form` or `delta tracking`.
+    /// `closed form` or `delta tracking`; and the extinction below which derivatives by it are estimated by probes, points on
+    /// rays of paths at which no path stops, where that is so.
     pub tracking: String,
     /// For each parameter that moves it, the parameter's name and the field: `affine`, `blend`, `tetrahedral`,
     /// `mean value` or `static`, followed by `with flux` where flux through surfaces is added.

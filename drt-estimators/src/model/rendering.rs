@@ -162,6 +162,8 @@ pub struct Counters {
     pub flux_samples: u64,
     /// Tentative collisions in heterogeneous media.
     pub tracking_steps: u64,
+    /// Points on rays at which the extinctions of media were probed.
+    pub probes: u64,
     /// Edges and shadows that turned rays, counted once for each ray that they turned.
     pub turning_edges: u64,
 }
@@ -178,6 +180,7 @@ impl Counters {
         self.guide_samples += o.guide_samples;
         self.flux_samples += o.flux_samples;
         self.tracking_steps += o.tracking_steps;
+        self.probes += o.probes;
         self.turning_edges += o.turning_edges;
     }
 }

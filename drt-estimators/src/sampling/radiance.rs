@@ -3,6 +3,7 @@
 use drt_math::{Rgb, Vec3};
 
 use crate::model::sensor::ViewSample;
+use crate::sampling::record::Radiance;
 use crate::sampling::trace::{Alive, Observer, OutgoingRay, PathState, Pixel, Tracer};
 use crate::sampling::transport_mode::RadianceMode;
 use crate::world::vertex::{Kind, Vertex};
@@ -56,18 +57,24 @@ impl Tracer<'_> {
             }
             Kind::Point => return,
         };
-        let stop = PathState {
-            node: 0,
-            vertex,
-            coefficients,
-            from: wo,
-            throughput: Rgb::ONE,
-            arrival: Rgb::ONE,
-            alive: Alive::new(Rgb::ONE),
-            segments: 0,
-            flight: None,
-        };
+        let stop = PathState { coefficients, ..starting(vertex, wo) };
         self.walk::<RadianceMode, O>(stop, observer);
+    }
+
+    /// Estimates the radiance that a volume vertex scatters into the unit direction `wo` per unit of its scattering coefficient,
+    /// which may be zero, as that of a path of so many `segments` so far; `alive` is what Russian roulette takes it to carry.
+    pub(crate) fn radiance_scattered(
+        &mut self,
+        vertex: Vertex,
+        wo: Vec3,
+        alive: Rgb,
+        segments: u32,
+    ) -> Rgb {
+        let alive = Alive::new(alive);
+        let mut radiance = Radiance::default();
+        let stop = PathState { alive, segments, ..starting(vertex, wo) };
+        self.walk::<RadianceMode, Radiance>(stop, &mut radiance);
+        radiance.0
     }
 
     /// The same over at most `longest` segments.
@@ -81,5 +88,20 @@ impl Tracer<'_> {
         let own = core::mem::replace(&mut self.max_segments, longest);
         self.radiance_from(vertex, wo, observer);
         self.max_segments = own;
+    }
+}
+
+/// A path that starts at a vertex, seen along `wo`.
+fn starting(vertex: Vertex, wo: Vec3) -> PathState {
+    PathState {
+        node: 0,
+        vertex,
+        coefficients: None,
+        from: wo,
+        throughput: Rgb::ONE,
+        arrival: Rgb::ONE,
+        alive: Alive::new(Rgb::ONE),
+        segments: 0,
+        flight: None,
     }
 }

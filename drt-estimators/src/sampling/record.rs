@@ -31,6 +31,8 @@ pub(crate) struct Node {
     pub(crate) role: Role,
     /// Index of the vertex of a light path that the node is, where it is one.
     pub(crate) light: u32,
+    /// The control radiance of the ray by which the walk arrived, see [`probe`](crate::terms::interior).
+    pub(crate) control: Rgb,
 }
 
 /// What made a node.
@@ -45,6 +47,8 @@ pub(crate) enum Role {
     OfLight { passed: Rgb },
     /// The last vertex of a light path that anything is connected with.
     LastOfLight,
+    /// A point of a segment that no walk stopped at, where coefficients of a medium are differentiated.
+    Probe,
 }
 
 impl Node {
@@ -102,6 +106,7 @@ impl PathRecord {
             inv_pdf: 1.0,
             role: Role::Walked,
             light: 0,
+            control: Rgb::ZERO,
         });
     }
 
@@ -134,6 +139,7 @@ impl PathRecord {
             inv_pdf: 0.0,
             role: Role::Walked,
             light: 0,
+            control: Rgb::ZERO,
         });
         self.nodes.len() as u32 - 1
     }

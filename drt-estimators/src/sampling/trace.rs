@@ -171,6 +171,11 @@ impl OutgoingRay {
         Self { node: 0, vertex, dir, pdf: None, throughput, alive, segments: 0 }
     }
 
+    /// What Russian roulette takes it to carry.
+    pub(crate) fn carries(&self) -> Rgb {
+        self.alive.value
+    }
+
     /// The density of its direction.
     pub(crate) fn pdf(&self) -> Option<f64> {
         self.pdf

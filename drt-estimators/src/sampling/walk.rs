@@ -8,10 +8,10 @@ use crate::sampling::trace::{
     Alive, Arrival, Connection, Endpoint, Flight, Observer, OutgoingRay, PathState, Pixel, Tracer,
 };
 use crate::sampling::transport_mode::TransportMode;
-use crate::world::RayPath;
 use crate::world::lights::LightSample;
 use crate::world::scatter::Drawn;
 use crate::world::vertex::Vertex;
+use crate::world::{RayPath, World};
 
 impl Tracer<'_> {
     pub(super) fn walk<M: TransportMode, O: Observer>(
@@ -183,10 +183,8 @@ impl Tracer<'_> {
         let mut emission_weight = 0.0;
         // A black emitter with a moving radiance must be recorded too, so the weight does not
         // depend on the value being nonzero.
-        if let Some(point) = vertex.surface().filter(|s| M::EMISSION && self.world.emits(s)) {
-            let light = self.world.lights.area_pdf(point, leaving.dir, ray.length);
-            emission_weight = leaving.pdf.map_or(1.0, |p| p / (p + light));
-            let emitted = self.world.emitted(point, -leaving.dir);
+        if let Some((emitted, weight)) = leaving.met(self.world, ray).filter(|_| M::EMISSION) {
+            emission_weight = weight;
             observer.contribution(Pixel::Own, segments, throughput * emitted * emission_weight);
         }
         let record = Arrival {
@@ -221,17 +219,10 @@ impl Tracer<'_> {
         arrival: Rgb,
         observer: &mut O,
     ) {
-        let environment = self.world.lights.environment().filter(|_| M::EMISSION);
-        let Some(environment) = environment else { return };
-        if self.world.hides_emitters && leaving.segments == 0 {
-            return;
-        }
+        let met = leaving.met(self.world, ray).filter(|_| M::EMISSION);
+        let Some((radiance, emission_weight)) = met else { return };
         let throughput = leaving.throughput * arrival;
-        let emission_weight = match leaving.pdf {
-            Some(p) => p / (p + environment.pdf(leaving.dir)),
-            None => 1.0,
-        };
-        let radiance = environment.radiance(leaving.dir) * emission_weight;
+        let radiance = radiance * emission_weight;
         observer.contribution(Pixel::Own, leaving.segments + 1, throughput * radiance);
         let record = Arrival {
             parent: leaving.node,
@@ -323,6 +314,25 @@ impl Tracer<'_> {
         }
         let tau = world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters);
         Some(tau * part)
+    }
+}
+
+impl OutgoingRay {
+    /// What emits at the end of a ray, if anything does: its radiance towards the ray's start, and the weight of that against
+    /// next-event estimation.
+    pub(crate) fn met(&self, world: &World, ray: &RayPath) -> Option<(Rgb, f64)> {
+        let weight = |light: f64| self.pdf.map_or(1.0, |p| p / (p + light));
+        if let Some((point, _)) = &ray.end {
+            world.emits(point).then(|| {
+                let light = world.lights.area_pdf(point, self.dir, ray.length);
+                (world.emitted(point, -self.dir), weight(light))
+            })
+        } else {
+            let hidden = world.hides_emitters && self.segments == 0;
+            let environment = world.lights.environment().filter(|_| !hidden)?;
+            let radiance = environment.radiance(self.dir);
+            Some((radiance, weight(environment.pdf(self.dir))))
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! The interior term, and the plain forward image: one pixel sample at a time.
 
 mod component;
+mod probe;
 mod recorder;
 
 use alloc::vec::Vec;
@@ -10,6 +11,7 @@ use drt_math::{Rgb, Rng};
 
 pub(crate) use crate::terms::interior::component::Component;
 use crate::terms::interior::component::{Traced, Worker};
+pub(crate) use crate::terms::interior::probe::Probes;
 pub(crate) use crate::terms::interior::recorder::{PathView, Recorder};
 
 use crate::derivative::contraction::Contraction;
@@ -21,7 +23,9 @@ use crate::sampling::film::{Splat, SplatDensity};
 use crate::sampling::pixels::Sampler;
 use crate::sampling::record::PathRecord;
 use crate::sampling::record::Radiance;
-use crate::sampling::streams::{DIMENSIONS, FLUX_STREAM, PAIR_STREAM, VELOCITY_STREAM};
+use crate::sampling::streams::{
+    DIMENSIONS, FLUX_STREAM, PAIR_STREAM, PROBE_STREAM, VELOCITY_STREAM,
+};
 use crate::sampling::trace::Tracer;
 use crate::terms::edge_queries::EdgeQuery;
 use crate::world::{RayPath, World};
@@ -114,6 +118,8 @@ pub(crate) struct PixelSampler<'a, S> {
     separate: bool,
     image: ImageSampling,
     bidirectional: Option<Bidirectional<'a>>,
+    /// Chooses where media are probed, if any are.
+    probes: Option<Probes>,
     splats: Vec<Splat>,
     non_finite: Vec<NonFinite>,
     non_finite_count: u64,
@@ -146,6 +152,7 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             separate,
             image: ImageSampling::OwnPixel,
             bidirectional: None,
+            probes: world.has_probes().then(Probes::new),
             splats: Vec::new(),
             non_finite: Vec::new(),
             non_finite_count: 0,
@@ -230,19 +237,24 @@ impl<'a, S: PathSink> PixelSampler<'a, S> {
             let pairs = self.bidirectional.is_none().then(|| stream(PAIR_STREAM));
             view.begin(pairs, velocities, || stream(FLUX_STREAM));
         }
+        if let Some(probes) = &mut self.probes {
+            probes.begin(Rng::new(self.seed, PROBE_STREAM | u64::from(pixel), unit));
+        }
         let shadows = self.workers.iter().any(|w| w.terms.boundary.shadows.is_some());
         let mut recorder = Recorder {
             record: &mut self.record,
             views: &mut self.views,
             camera_ray: shadows.then_some(&mut self.camera_ray),
+            probes: self.probes.as_mut(),
         };
         recorder.begin([pixel % width, pixel / width], &s, weight);
         let light = if let Some(both) = &mut self.bidirectional {
             both.trace(&mut self.tracer, &s, weight, &mut self.splats, &mut recorder)
         } else {
             self.tracer.trace_camera(&s, weight, &mut recorder);
-            self.record.value
+            recorder.record.value
         };
+        recorder.probe(&mut self.tracer);
         self.add_to_image(&s, derivative, light, values);
         self.recorded += self.record.nodes.len() as u64;
         let path = Traced {

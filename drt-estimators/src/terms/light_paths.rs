@@ -49,7 +49,7 @@ impl<'a> LightPaths<'a> {
     ) -> Self {
         let velocities = PathVelocities::new(Arc::clone(&terms.velocity));
         let pairs = AntitheticPairs::new(false);
-        let view = PathView::new(world, velocities, pairs, terms.flux.as_ref());
+        let view = PathView::new(world, velocities, pairs, terms.flux.as_ref()).with_probes();
         Self {
             world,
             paths: Bidirectional::new(all, emission),
@@ -100,7 +100,7 @@ impl<'a> LightPaths<'a> {
             u32::min(inside, [width, height][k].saturating_sub(1))
         });
         views[0].begin(None, || line.clone(), || line.clone());
-        let mut recorder = Recorder { record, views, camera_ray: None };
+        let mut recorder = Recorder { record, views, camera_ray: None, probes: None };
         recorder.begin(column_and_row, &seen.view, Rgb::splat(seen.view.weight));
         self.paths.record_seen(seen, &mut recorder);
         let recorded = views[0].of(record);

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use drt_math::Rgb;
-use drt_medium::Homogeneous;
+use drt_medium::{Coefficients, DensityField, Homogeneous};
 
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{Tracking, World};
@@ -17,6 +17,14 @@ const LEAST_SURVIVAL: f64 = 0.1;
 const STEADY_SURVIVAL: f64 = 0.9;
 /// Least probability of a scattering vertex per tentative collision where coefficients change.
 const DEFENSIVE: f64 = 0.1;
+
+/// Optical depth of a medium's grid, along its diagonal, below which probes are better than vertices.
+const PROBED_DEPTH: f64 = 1.0;
+/// Share of voxels that are empty, or nearly so, from which on probes pay.
+const LEAST_EMPTY: f64 = 0.05;
+/// Part of a medium's largest extinction below which a voxel is thin, and the share of these from which on probes pay.
+const CONTRAST: f64 = 0.25;
+const LEAST_THIN: f64 = 0.5;
 
 /// What derivatives need of a medium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -34,6 +42,8 @@ pub(crate) enum MediumActivity {
 pub(crate) struct ActiveFactors {
     pub(crate) media: Vec<MediumActivity>,
     pub(crate) bsdfs: Vec<bool>,
+    /// Media whose extinction changes.
+    pub(crate) extinctions: Vec<bool>,
     /// Those whose roughness changes.
     pub(crate) roughness: Vec<bool>,
     /// Those whose index of refraction changes.
@@ -47,6 +57,7 @@ impl ActiveFactors {
         Self {
             media: self.media.iter().zip(&other.media).map(|(a, b)| *a.max(b)).collect(),
             bsdfs: any(&self.bsdfs, &other.bsdfs),
+            extinctions: any(&self.extinctions, &other.extinctions),
             roughness: any(&self.roughness, &other.roughness),
             index: any(&self.index, &other.index),
         }
@@ -61,15 +72,51 @@ impl World {
             if *need == MediumActivity::Nothing {
                 continue;
             }
-            self.defensive[m] = match self.medium(m).extinction() {
-                Some(h) => self.defensive_where_thin(m, h),
-                None => DEFENSIVE,
-            };
-            if *need == MediumActivity::Vertices {
+            if *need == MediumActivity::Vertices
+                || (needs.extinctions[m] && self.medium(m).would_send_light())
+            {
                 self.tracking[m] = Tracking::Vertices;
             }
+            self.probed[m] = self.probed_below(m).filter(|_| needs.extinctions[m]);
+            self.defensive[m] = match self.medium(m).extinction() {
+                Some(h) => self.defensive_where_thin(m, h),
+                None if self.probed[m].is_some() => 0.0,
+                None => DEFENSIVE,
+            };
         }
         self.needs = needs;
+    }
+
+    /// The extinction of medium `m` below which probes differentiate it better than vertices; `None` where there is too
+    /// little of that.
+    fn probed_below(&self, m: usize) -> Option<f64> {
+        let medium = self.medium(m);
+        let grid = medium.grid()?;
+        let mut emitters = self.scene.emitters.iter().filter_map(|e| e.item.emitter.position());
+        if self.tracking[m] == Tracking::Attenuation || emitters.any(|x| medium.contains(x)) {
+            return None;
+        }
+        let floor = PROBED_DEPTH * grid.majorant_floor();
+        let varies = grid.share_below(floor) >= LEAST_EMPTY
+            || grid.share_below(CONTRAST * grid.largest_sigma_t()) >= LEAST_THIN;
+        varies.then_some(floor)
+    }
+
+    /// The part of the derivative by the extinction at a vertex that is estimated by vertices there, in media with probes:
+    /// the balance heuristic for densities σ T and c T of a vertex and of a probe.
+    pub(crate) fn share_of_vertices(&self, vertex: &Vertex, c: &Coefficients) -> f64 {
+        match vertex.medium.and_then(|m| self.probed[m]) {
+            Some(floor) => {
+                let sigma_t = c.sigma_t.abs().mean();
+                sigma_t / (sigma_t + floor)
+            }
+            None => 1.0,
+        }
+    }
+
+    /// True where some medium is differentiated by probes.
+    pub(crate) fn has_probes(&self) -> bool {
+        self.probed.iter().any(Option::is_some)
     }
 
     /// The least probability of a vertex per flight through a homogeneous filling of medium `m`: zero

@@ -57,6 +57,8 @@ pub(crate) struct World {
     /// Least probability of a scattering vertex per tentative collision, per medium: nonzero
     /// where derivatives need vertices in empty or thin space.
     pub(crate) defensive: Vec<f64>,
+    /// The extinction below which probes differentiate a medium better than vertices do, where that is so.
+    pub(crate) probed: Vec<Option<f64>>,
     needs: ActiveFactors,
     /// How far light can go in each medium, at most.
     extent: Vec<f64>,
@@ -122,6 +124,7 @@ impl World {
             film_medium: SurroundingMedium::Uniform(None),
             tracking,
             defensive: alloc::vec![0.0; scene.media.len()],
+            probed: alloc::vec![None; scene.media.len()],
             needs: ActiveFactors::default(),
             extent: (0..scene.media.len()).map(|m| extent(&scene, m, 2.0 * radius)).collect(),
             steady: like

@@ -18,6 +18,7 @@ mod instances;
 mod intersections;
 mod orthographic;
 mod plan;
+mod probes;
 mod sessions;
 mod shards;
 mod slides;

@@ -27,6 +27,7 @@ mod connections;
 mod emission;
 mod emitters;
 mod light;
+mod probe;
 mod propagation;
 mod segment;
 mod shadows;
@@ -123,6 +124,8 @@ pub(crate) struct Differentiator<'w> {
     filter: [f64; 2],
     /// Derivative with respect to the rate of the camera ray's direction.
     turn: RgbVec,
+    /// What the next segment's line integrals take for light that does not come back along it.
+    control: Rgb,
     /// Derivative with respect to the velocity of the point where an orthographic camera's ray starts, at its image
     /// point.
     origin: RgbVec,
@@ -148,6 +151,7 @@ impl<'w> Differentiator<'w> {
             rng: Rng::new(0, 0, 0),
             filter: [0.0; 2],
             turn: RgbVec::ZERO,
+            control: Rgb::ZERO,
             origin: RgbVec::ZERO,
             sensor: [SensorGradient::default(); 3],
             parts: Vec::new(),
@@ -207,6 +211,7 @@ impl<'w> Differentiator<'w> {
             Role::Walked | Role::Joined(_) => self.sweep(path, k, ends, sink),
             Role::OfLight { passed } => self.sweep(path, k, ends, &mut Scaled { sink, by: passed }),
             Role::LastOfLight => {}
+            Role::Probe => self.probed(path, k, ends, sink),
         }
     }
 
@@ -222,6 +227,7 @@ impl<'w> Differentiator<'w> {
         let Some(arrival) = &node.arrival else { return };
         let world = self.world;
         let theta = arrival.throughput;
+        let control = path.control(k);
         let mut of_joint;
         let (mut collected, here, before) = match node.role {
             Role::Walked => {
@@ -261,19 +267,29 @@ impl<'w> Differentiator<'w> {
                 emitted + collected
             }
             Endpoint::Volume(vertex, c) => {
-                let c = &Coefficients {
-                    emission: if lit.by_surroundings() { c.emission } else { Rgb::ZERO },
-                    ..*c
-                };
+                let c = &lit_by(lit, c);
                 let theta_s = theta * c.sigma_s();
                 collected += self.connections(path, k, vertex, theta_s, here, before, sink);
                 let moving = path.velocities.moves(k);
                 let weight = arrival.emission_weight;
-                self.coefficients(vertex, c, lit, theta, collected, weight, moving, here, sink);
+                let share = match path.probed {
+                    Some(_) => world.share_of_vertices(vertex, c),
+                    None => 1.0,
+                };
+                let mut adjoint = by_coefficients(c, lit, theta, collected, weight);
+                adjoint.sigma_t *= share;
+                self.coefficients(vertex, &adjoint, moving, here, sink);
+                self.control_at(vertex, theta * control * share, sink);
                 c.source() * arrival.emission_weight + c.sigma_s() * collected
             }
         };
+        let passes = match &arrival.end {
+            Endpoint::Volume(_, c) => c.sigma_t,
+            _ => Rgb::ONE,
+        };
+        self.control = theta * passes * control;
         self.arrive(path, k, &path.motion(k), received, here, before, sink);
+        self.control_alone(path, k, sink);
     }
 
     /// Sensitivities of a scattering function, `adjoint` multiplying its value: by the positions
@@ -347,34 +363,18 @@ impl<'w> Differentiator<'w> {
         Some(d.wi * adjoint)
     }
 
-    /// The coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e.
-    #[allow(clippy::too_many_arguments)]
+    /// Sensitivities of the coefficients at a volume vertex, which may move against the medium's grids.
     fn coefficients<S: AdjointSink>(
         &mut self,
         vertex: &Vertex,
-        c: &Coefficients,
-        lit: EmitterMask,
-        theta: Rgb,
-        collected: Rgb,
-        emission_weight: f64,
+        adjoint: &CoefficientAdjoint,
         moving: bool,
         here: &mut SurfaceAdjoint,
         sink: &mut S,
     ) {
         let Some(m) = vertex.medium else { return };
-        let emission = c.emission * emission_weight;
-        let adjoint = CoefficientAdjoint {
-            sigma_t: theta * (c.albedo * collected + (Rgb::ONE - c.albedo) * emission),
-            albedo: theta * c.sigma_t * (collected - emission),
-            emission: if lit.by_surroundings() {
-                theta * c.sigma_a() * emission_weight
-            } else {
-                Rgb::ZERO
-            },
-            g: Rgb::ZERO,
-        };
         if sink.active().media[m] {
-            sink.medium(m, vertex.x, &adjoint);
+            sink.medium(m, vertex.x, adjoint);
         }
         if moving {
             let g = self.world.medium(m).gradients(vertex.x);
@@ -436,6 +436,32 @@ impl<'w> Differentiator<'w> {
     /// The segment by which a walk arrived at a node; `None` at the camera.
     fn behind(&self, path: &RecordedPath<'_>, node: usize) -> Option<Behind> {
         behind(path, node, self.world.camera.viewpoint().is_at_infinity())
+    }
+}
+
+/// Coefficients with the emission that counts.
+fn lit_by(lit: EmitterMask, c: &Coefficients) -> Coefficients {
+    Coefficients { emission: if lit.by_surroundings() { c.emission } else { Rgb::ZERO }, ..*c }
+}
+
+/// Sensitivities of the coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e, Q being what it has `collected`.
+fn by_coefficients(
+    c: &Coefficients,
+    lit: EmitterMask,
+    theta: Rgb,
+    collected: Rgb,
+    emission_weight: f64,
+) -> CoefficientAdjoint {
+    let emission = c.emission * emission_weight;
+    CoefficientAdjoint {
+        sigma_t: theta * (c.albedo * collected + (Rgb::ONE - c.albedo) * emission),
+        albedo: theta * c.sigma_t * (collected - emission),
+        emission: if lit.by_surroundings() {
+            theta * c.sigma_a() * emission_weight
+        } else {
+            Rgb::ZERO
+        },
+        g: Rgb::ZERO,
     }
 }
 

@@ -26,7 +26,7 @@ pub(super) enum Far<'a> {
 
 /// Sensitivities by the places of the points along a stretch, collected at its ends.
 #[derive(Default)]
-struct Along {
+pub(super) struct Along {
     /// The far end is a fixed direction: points follow the near end alone.
     fixed: bool,
     near: RgbVec,
@@ -112,7 +112,7 @@ impl Differentiator<'_> {
 
     /// Sensitivities of the transmittance over a stretch; those by the places of points along it are
     /// added to `along`.
-    fn transmittance<S: AdjointSink>(
+    pub(super) fn transmittance<S: AdjointSink>(
         &mut self,
         path: &Stretch<'_>,
         moving: bool,
@@ -124,6 +124,7 @@ impl Differentiator<'_> {
         if !world.has_media() {
             return;
         }
+        let control = core::mem::take(&mut self.control);
         let mut depth_per_length = Rgb::ZERO;
         for i in intervals(path.medium, path.crossings, path.length) {
             let Some(m) = i.medium else { continue };
@@ -139,7 +140,7 @@ impl Differentiator<'_> {
                 }
                 depth_per_length += h.coefficients().sigma_t * (length / path.length);
             } else if moving || changes {
-                depth_per_length += self.grid(path, &i, m, moving, weight, along, sink);
+                depth_per_length += self.grid(path, &i, m, moving, [weight, control], along, sink);
             }
         }
         if moving && !along.fixed {
@@ -174,7 +175,7 @@ impl Differentiator<'_> {
         i: &Interval,
         m: usize,
         moving: bool,
-        weight: Rgb,
+        [weight, control]: [Rgb; 2],
         along: &mut Along,
         sink: &mut S,
     ) -> Rgb {
@@ -191,7 +192,13 @@ impl Differentiator<'_> {
             depth = depth.with_faces(medium);
         }
         if changes {
-            sink.depth(m, &depth, -weight);
+            let control = if self.world.probed[m].is_some() { control } else { Rgb::ZERO };
+            if relative && !control.is_zero() {
+                sink.depth(m, &depth, -weight);
+                sink.depth(m, &depth.at_rest(), control);
+            } else {
+                sink.depth(m, &depth, control - weight);
+            }
         }
         if moving {
             let (g, moment) = (depth.gradient * -weight, depth.moment * -weight);

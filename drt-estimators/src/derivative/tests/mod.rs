@@ -7,6 +7,7 @@ pub(crate) mod choice;
 mod factors;
 mod guided;
 mod moving;
+mod probes;
 mod records;
 mod replay;
 #[path = "../../../tests/all/common/mod.rs"]

@@ -24,7 +24,7 @@ use crate::model::surface::BsdfParams;
 use crate::model::texture::Footprint;
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Tracer;
-use crate::terms::interior::{PathView, Recorder};
+use crate::terms::interior::{PathView, Probes, Recorder};
 use crate::world::World;
 use crate::world::cache::PreparedCache;
 use crate::world::lights::EmitterMask;
@@ -79,15 +79,33 @@ impl<'w> Recording<'w> {
         Self::new(world, Arc::new(field), AntitheticPairs::default())
     }
 
+    /// Leaves to probes what these are better at.
+    pub(super) fn with_probes(self) -> Self {
+        let Self { record, views } = self;
+        Self { record, views: views.map(PathView::with_probes) }
+    }
+
     pub(super) fn path(&self) -> RecordedPath<'_> {
         self.views[0].of(&self.record)
     }
 }
 
 /// Traces a path from some pixel; returns the filter's gradient over the density.
-pub(super) fn trace(
-    tracer: &mut Tracer<'_>,
-    recording: &mut Recording<'_>,
+pub(super) fn trace<'w>(
+    tracer: &mut Tracer<'w>,
+    recording: &mut Recording<'w>,
+    pairs: Option<Rng>,
+    seed: u64,
+    i: u32,
+) -> [f64; 2] {
+    trace_with(tracer, recording, None, pairs, seed, i)
+}
+
+/// Traces a path as [`trace`] does, with probes.
+pub(super) fn trace_with<'w>(
+    tracer: &mut Tracer<'w>,
+    recording: &mut Recording<'w>,
+    probes: Option<&mut Probes>,
     pairs: Option<Rng>,
     seed: u64,
     i: u32,
@@ -99,10 +117,11 @@ pub(super) fn trace(
     let pixel = [i % pixels % FILM[0], i % pixels / FILM[0]];
     let Recording { record, views } = recording;
     views[0].begin(pairs, || Rng::new(0, 0, 0), || Rng::new(0, 0, 0));
-    let mut recorder = Recorder { record, views, camera_ray: None };
+    let mut recorder = Recorder { record, views, camera_ray: None, probes };
     recorder.begin(pixel, &view, weight);
     tracer.rng = rng;
     tracer.trace_camera(&view, weight, &mut recorder);
+    recorder.probe(tracer);
     view.slope
 }
 

@@ -53,6 +53,7 @@ impl Unknowns for Everything {
         ActiveFactors {
             media: active.media.iter().map(need).collect(),
             bsdfs: active.bsdfs.clone(),
+            extinctions: active.media.clone(),
             roughness: active.bsdfs.clone(),
             index: active.bsdfs.clone(),
         }

@@ -68,9 +68,12 @@ pub(super) fn describe(component: &Component<Motion>) -> Plan {
 
 fn medium_plan(world: &World, motion: &Motion, i: usize) -> MediumPlan {
     let item = &world.scene.media[i];
-    let tracking = match item.item.extinction() {
-        Some(_) => "closed form",
-        None => "delta tracking",
+    let tracking = match (item.item.extinction(), world.probed[i]) {
+        (Some(_), _) => String::from("closed form"),
+        (None, None) => String::from("delta tracking"),
+        (None, Some(least)) => {
+            alloc::format!("delta tracking, with probes where the extinction is below {least:.3}")
+        }
     };
     let insides = &motion.insides;
     let moved = |p: usize| {
@@ -84,7 +87,7 @@ fn medium_plan(world: &World, motion: &Motion, i: usize) -> MediumPlan {
         Some((motion.tangents.names[p].clone(), how))
     };
     let motions = (0..motion.parameters()).filter_map(moved).collect();
-    MediumPlan { medium: medium_name(world, i), tracking: tracking.into(), motion: motions }
+    MediumPlan { medium: medium_name(world, i), tracking, motion: motions }
 }
 
 fn medium_name(world: &World, i: usize) -> String {

@@ -7,6 +7,7 @@ use drt_math::{Rgb, Vec3};
 
 use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::velocity::EdgeMatter;
+use crate::sampling::record::Role;
 use crate::sampling::trace::Endpoint;
 use crate::sampling::trace::Tracer;
 use crate::terms::edge_queries::choice::Choice;
@@ -129,7 +130,8 @@ impl SeenEdges {
     ) -> Option<EdgeSample<'a>> {
         let (record, moves) = (&path.record, path.velocities.moves(node));
         let recorded = &record.nodes[node];
-        let arrival = recorded.arrival.as_ref()?;
+        let arrival =
+            recorded.arrival.as_ref().filter(|_| !matches!(recorded.role, Role::Probe))?;
         let (vertex, theta) =
             scattering_vertex(recorded.vertex()?, &arrival.end, arrival.throughput)?;
         let longest = tracer.max_segments.checked_sub(record.segments(node) + 1)?;
@@ -186,7 +188,8 @@ impl SeenEdges {
     ) -> Option<(usize, f64)> {
         let mut choice = Choice::new(u, BY_THROUGHPUT);
         for (k, node) in path.record.nodes.iter().enumerate().skip(1) {
-            let Some(arrival) = node.arrival.as_ref() else { continue };
+            let arrival = node.arrival.as_ref().filter(|_| !matches!(node.role, Role::Probe));
+            let Some(arrival) = arrival else { continue };
             if k as u32 >= tracer.max_segments {
                 break;
             }

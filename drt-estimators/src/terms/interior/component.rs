@@ -7,7 +7,6 @@ use drt_math::{Rgb, RgbVec, Rng};
 
 use crate::derivative::adjoint::Differentiator;
 use crate::derivative::antithetic::{AntitheticPairs, PairedRadiance};
-use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{SurfaceAdjoint, VelocityTerm};
 use crate::derivative::velocity::PathVelocities;
 use crate::sampling::record::PathRecord;
@@ -66,7 +65,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
         let Component { world, terms, queries, sink } = component;
         let velocities = PathVelocities::new(Arc::clone(&terms.velocity));
         let pairs = AntitheticPairs::new(terms.lobe_pairs);
-        let view = PathView::new(world, velocities, pairs, terms.flux.as_ref());
+        let view = PathView::new(world, velocities, pairs, terms.flux.as_ref()).with_probes();
         let worker = Self {
             terms,
             queries,
@@ -178,10 +177,8 @@ impl<'a, S: PathSink> Worker<'a, S> {
         values: &mut [Rgb],
     ) {
         let Self { sink, differentiator, .. } = self;
-        let PathView { world, velocities, pairs, flux, .. } = view;
-        let Some(flux) = flux else { return };
-        let record = path.record;
-        let recorded = RecordedPath { record, velocities, pairs, lit: world.lit };
+        let Some(mut flux) = view.flux.take() else { return };
+        let recorded = view.of(path.record);
         flux.evaluate(tracer, |f, ray_of_flux, value| {
             let Some(ray_of_flux) = ray_of_flux else { return sink.functional(f, value, values) };
             sink.begin();
@@ -191,6 +188,7 @@ impl<'a, S: PathSink> Worker<'a, S> {
             differentiator.send_back_ray(&recorded, node, dir, turns, origin, turn, sink);
             sink.finish(values);
         });
+        view.flux = Some(flux);
     }
 
     /// Queries edges; the first query has the best numbers.

@@ -8,8 +8,9 @@ use crate::derivative::velocity::PathVelocities;
 use crate::model::rendering::Counters;
 use crate::model::sensor::ViewSample;
 use crate::sampling::record::{Joint, JointObserver, LightPath, Node, PathRecord, Role};
-use crate::sampling::trace::{Arrival, Connection, Observer, OutgoingRay, Pixel};
+use crate::sampling::trace::{Arrival, Connection, Endpoint, Observer, OutgoingRay, Pixel, Tracer};
 use crate::terms::flux::{Flux, Reservoir};
+use crate::terms::interior::probe::{Probe, Probes};
 use crate::world::Crossing;
 use crate::world::{RayPath, World};
 
@@ -21,6 +22,8 @@ pub(crate) struct PathView<'a> {
     pub(crate) pairs: AntitheticPairs,
     /// One of the surfaces with a flux that the path met, if there are such.
     pub(crate) flux: Option<Reservoir>,
+    /// What scattering collects at the path's probe, where extinctions are differentiated by probes as well.
+    probed: Option<Rgb>,
     /// A ray that was looked at for nothing else.
     looked: RayPath,
 }
@@ -33,7 +36,12 @@ impl<'a> PathView<'a> {
         flux: Option<&Flux>,
     ) -> Self {
         let flux = flux.map(Reservoir::new);
-        Self { world, velocities, pairs, flux, looked: RayPath::default() }
+        Self { world, velocities, pairs, flux, probed: None, looked: RayPath::default() }
+    }
+
+    /// Leaves to probes what these are better at.
+    pub(crate) fn with_probes(self) -> Self {
+        Self { probed: self.world.has_probes().then_some(Rgb::ZERO), ..self }
     }
 
     /// Forgets the last path; random numbers are for choosing among pairs, for velocities, and for surfaces with a flux.
@@ -52,8 +60,8 @@ impl<'a> PathView<'a> {
 
     /// With the record that it belongs to.
     pub(crate) fn of<'p>(&'p self, record: &'p PathRecord) -> RecordedPath<'p> {
-        let Self { velocities, pairs, .. } = self;
-        RecordedPath { record, velocities, pairs, lit: self.world.lit }
+        let Self { velocities, pairs, probed, .. } = self;
+        RecordedPath { record, velocities, pairs, lit: self.world.lit, probed: *probed }
     }
 }
 
@@ -63,9 +71,11 @@ pub(crate) struct Recorder<'r, 'a> {
     pub(crate) views: &'r mut [PathView<'a>],
     /// Keeps the camera's ray, where that is asked for.
     pub(crate) camera_ray: Option<&'r mut RayPath>,
+    /// Chooses where media are probed, if any are.
+    pub(crate) probes: Option<&'r mut Probes>,
 }
 
-impl Recorder<'_, '_> {
+impl<'a> Recorder<'_, 'a> {
     /// A node has been added that no walk arrived at.
     fn found(&mut self, node: usize) {
         let Node { arrival: Some(arrival), role, .. } = &self.record.nodes[node] else { return };
@@ -95,6 +105,28 @@ impl Recorder<'_, '_> {
         }
     }
 
+    /// Adds the probe of a path that has been walked, and traces what it sees.
+    pub(crate) fn probe(&mut self, tracer: &mut Tracer<'a>) {
+        let Some(probes) = self.probes.take() else { return };
+        self.views.iter_mut().for_each(|view| view.probed = view.probed.map(|_| Rgb::ZERO));
+        let Some(probe) = probes.choose(tracer) else { return };
+        let Probe { arrival, carries, segments, control } = probe;
+        let node = self.record.arrive(&arrival, &probes.way().crossings);
+        self.record.nodes[node as usize].role = Role::Probe;
+        self.record.nodes[node as usize].control = control;
+        self.found(node as usize);
+        let Endpoint::Volume(vertex, _) = arrival.end else { return };
+        let walked = core::mem::replace(&mut tracer.rng, probes.numbers());
+        let all = tracer.world;
+        for view in self.views.iter_mut().filter(|view| view.probed.is_some()) {
+            tracer.rng = probes.numbers();
+            tracer.world = view.world;
+            let seen = tracer.radiance_scattered(vertex, -arrival.dir, carries, segments);
+            view.probed = Some(seen);
+        }
+        (tracer.rng, tracer.world) = (walked, all);
+    }
+
     /// Empties the record for a camera ray of a `pixel` with filter weight `value`.
     pub(crate) fn begin(&mut self, pixel: [u32; 2], view: &ViewSample, value: Rgb) {
         self.record.begin(pixel, view, value);
@@ -108,7 +140,10 @@ impl Observer for Recorder<'_, '_> {
         self.record.value += value;
     }
 
-    fn ray(&mut self, _: &World, leaving: &OutgoingRay, ray: &RayPath) {
+    fn ray(&mut self, world: &World, leaving: &OutgoingRay, ray: &RayPath) {
+        if let Some(probes) = &mut self.probes {
+            probes.offer(world, leaving, ray);
+        }
         if let (0, Some(kept)) = (leaving.node, &mut self.camera_ray) {
             kept.clone_from(ray);
         }
@@ -124,6 +159,12 @@ impl Observer for Recorder<'_, '_> {
 
     fn arrive(&mut self, _: &World, arrival: &Arrival, crossings: &[Crossing]) -> u32 {
         let node = self.record.arrive(arrival, crossings);
+        if let Some(probes) = &self.probes {
+            let beside =
+                matches!(arrival.end, Endpoint::Volume(..)) && arrival.emission_weight == 0.0;
+            self.record.nodes[node as usize].control =
+                if beside { Rgb::ZERO } else { probes.control };
+        }
         for view in self.views.iter_mut() {
             let hits = view.flux.as_ref().map_or(&[][..], Reservoir::hits);
             view.velocities.arrive(view.world, self.record, arrival, hits);

@@ -255,6 +255,58 @@ pub fn smoke(border: f64) -> Scene {
     seen(scene, [vec3(0.4, 0.8, 6.0), Vec3::ZERO], 4)
 }
 
+const VOXELS: usize = 5;
+
+/// A cube of voxels with the extinctions of three channels, in the light of the sky.
+fn cloud(extinctions: Vec<f64>, albedo: Rgb) -> SceneBuilder {
+    let side = 2.0;
+    let placement =
+        Affine { linear: Mat3::diagonal(Vec3::splat(side)), translation: Vec3::splat(-0.5 * side) };
+    let density = Grid::new([VOXELS; 3], 3, extinctions).expect("a grid");
+    let density = density.with_placement(placement).expect("a box");
+    let [albedo, emission] = [Volume::Constant(albedo), Volume::Constant(Rgb::ZERO)];
+    let medium = GridMedium::new(density, 1.0, albedo, emission).expect("valid coefficients");
+    let medium = Medium::new(medium, Phase::henyey_greenstein(0.0).expect("a mean cosine"));
+    let walls = procedural::cube().transform(&scaled(0.5 * side, Vec3::ZERO));
+    SceneBuilder::new()
+        .medium("cloud", medium)
+        .shape("box", ShapeBuilder::interface(walls).interior("cloud"))
+        .emitter("sky", Emitter::Constant { radiance: Rgb::new(0.8, 1.0, 1.3) })
+}
+
+const BEFORE_CLOUD: [Vec3; 2] = [vec3(0.4, 0.8, 5.0), Vec3::ZERO];
+
+/// A cloud without any extinction.
+pub fn empty_cloud(albedo: Rgb) -> Scene {
+    seen(cloud(vec![0.0; 3 * VOXELS.pow(3)], albedo), BEFORE_CLOUD, 6)
+}
+
+/// A cloud of which one voxel in seven is filled, each channel by its own amount, over a floor and under a lamp.
+pub fn sparse_cloud() -> Scene {
+    let mut rng = Rng::new(5, 0, 0);
+    let mut extinctions = Vec::new();
+    for _ in 0..VOXELS.pow(3) {
+        let filled = rng.next_f64() < 1.0 / 7.0;
+        extinctions.extend([4.0, 2.5, 1.0].map(|s| if filled { s } else { 0.0 }));
+    }
+    let mut floor = floor();
+    floor.positions.iter_mut().for_each(|p| p.y -= 0.5);
+    let scene = cloud(extinctions, Rgb::new(0.6, 0.3, 0.4))
+        .shape("floor", ShapeBuilder::new(floor, diffuse(0.6, 0.5, 0.4)))
+        .shape("lamp", glowing(lamp(), Rgb::new(9.0, 8.0, 7.0)));
+    seen(scene, BEFORE_CLOUD, 5)
+}
+
+/// A cloud that is the same everywhere.
+pub fn full_cloud() -> Scene {
+    seen(cloud(vec![2.0; 3 * VOXELS.pow(3)], Rgb::splat(0.9)), BEFORE_CLOUD, 5)
+}
+
+/// All of a cloud's extinction grows, by channel.
+pub fn thickens() -> Effect {
+    changes("cloud", "sigma_t", ValueChange::Add(Rgb::new(1.0, 0.8, 0.6)))
+}
+
 pub fn parameter(name: &str, value: f64, effects: Vec<Effect>) -> Parameter {
     Parameter { name: name.into(), value, effects }
 }

@@ -1,0 +1,295 @@
+//! Probes: points on the rays of a path at which extinctions are differentiated where free flight seldom stops.
+//!
+//! Let a ray leave x along w, and let T(y) be the transmittance from x to its point y. The light that arrives at x is
+//!
+//! ```text
+//! L(x) = ∫ T [σ_t a S + σ_t (1 - a) e] dy + T_end L_end,
+//! ```
+//!
+//! with the albedo a, the emission e, and the radiance S that the phase function gathers at y. For a change σ_t' of the extinction
+//!
+//! ```text
+//! L'(x) = ∫ T σ_t' [a S + (1 - a) e - L(y)] dy,
+//! ```
+//!
+//! L(y) being what arrives at y along the ray. The part with L(y) is T' / T = -∫ σ_t' of the segments of the path, which line
+//! integrals estimate wherever σ_t is (`derivative::adjoint::segment`). The other part is that of volume vertices. Free flight has
+//! the density σ_t T, so that a vertex would have to be weighted by σ_t' / σ_t, with a variance of the order of ∫ T σ_t'² / σ_t: it
+//! is infinite where σ_t vanishes and σ_t' does not, and in empty voxels there is no vertex at all.
+//!
+//! A *probe* y has a density that does not depend on σ_t at y (differential ratio tracking, Nimier-David et al. 2022). With the
+//! throughput Θ to x, all rays of a path together have the density
+//!
+//! ```text
+//! q(y) = Θ T̃(y) / W,   W = Σ over rays of Θ ∫ T̃ dy,
+//! ```
+//!
+//! where T̃ is the average of two approximations of T: by the mean extinctions of the cells on the way, and by their minima, so that
+//! T / T̃ is about 2 at most. Where free flight does better, a stretch counts for less. One probe is chosen by reservoir sampling
+//! while the path is walked, and S is traced for it alone. So the cost stays linear in the path's length.
+//!
+//! # Control radiance
+//!
+//! The two parts have opposite signs and cancel where light is the same in all directions, but free flight and probe do not meet the same
+//! points. For any radiance β that depends on the ray alone, and not on where the walk stops on it,
+//!
+//! ```text
+//! E[m ∫_0^t σ_t' dy] = ∫ T σ_t' dy,   m = σ_t a at a volume vertex at the distance t, a at the ray's end,
+//! ```
+//!
+//! a being transmittance over density there (integrate by parts). So L and a S may both be taken relative to β: the line integrals of a
+//! segment take Θ (a R - m β) for Θ a R, and a vertex or probe takes a S - β. What a ray would see without any medium, times the root of what the medium
+//! lets through, roughly, is used for β, and of a sky that is the same everywhere, a part of the rest. Emission is weighted as where the walk meets it. All this costs nothing. Where a medium on the way has no
+//! vertices, the identity does not hold, and β is zero.
+//!
+//! # Beside vertices
+//!
+//! Vertices are better where σ_t is large. A vertex takes the part σ_t / (σ_t + c) of the derivative at its place, and a probe
+//! the rest: the balance heuristic for densities σ_t T and c T, where c is a medium's
+//! [least extinction](World::share_of_vertices) that vertices see well. The parts depend on the place alone, so that
+//! they add up to one for vertices of any path, be they found by free flight, by the angle that a light is seen under, or from the
+//! emitter's end. Derivatives by the albedo and by the emission are in proportion to σ_t and stay with vertices.
+//!
+//! # Motion
+//!
+//! A vertex that moves with the velocity v through a grid that moves with u sees σ_t change by σ_t' = ∂σ_t + (v - u)·∇σ_t. A probe is
+//! added to the path's record as a vertex that no light passes, found by the ray that it is on. It is given the [velocity](crate::derivative::velocity) of
+//! a vertex there, and sends its sensitivities the same way, whatever the estimator is, in forward and reverse mode.
+//!
+//! # What is left out
+//!
+//! Custom fields, of which it is not known where they are empty. Media in which only grids move, whose σ_t' vanishes with σ_t. Media with a point or spot
+//! emitter in them: S has a pole there. Connections with emitters, whose line integrals meet no vertices.
+
+use core::ops::ControlFlow;
+
+use drt_math::{Rgb, Rng, Vec3, fm};
+use drt_medium::{Piece, Ray};
+
+use crate::sampling::trace::{Arrival, Endpoint, OutgoingRay, Tracer};
+use crate::world::lights::Environment;
+use crate::world::vertex::{Kind, Vertex};
+use crate::world::{RayPath, Tracking, World, intervals};
+
+/// The part of a sky's even radiance that is taken to come back out of what it does not get through.
+const SCATTERED: f64 = 0.7;
+
+/// A stretch of a ray that a probe may be on.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    node: u32,
+    origin: Vec3,
+    dir: Vec3,
+    throughput: Rgb,
+    carries: Rgb,
+    /// Segments up to a vertex on it.
+    segments: u32,
+    start: f64,
+    length: f64,
+    /// How much points on it count.
+    scale: f64,
+    control: Rgb,
+    passing: Passing,
+    rates: [f64; 2],
+}
+
+/// The two approximations of the transmittance of a ray so far.
+#[derive(Clone, Copy, Debug)]
+struct Passing([f64; 2]);
+
+/// A point of a path that has been chosen.
+pub(crate) struct Probe {
+    pub(crate) arrival: Arrival,
+    /// What Russian roulette takes the path to carry there.
+    pub(crate) carries: Rgb,
+    pub(crate) segments: u32,
+    pub(crate) control: Rgb,
+}
+
+/// Chooses one probe per path.
+#[derive(Clone, Debug)]
+pub(crate) struct Probes {
+    rng: Rng,
+    total: f64,
+    chosen: Option<Stretch>,
+    /// The ray up to the end of the chosen stretch.
+    part: RayPath,
+    /// The control radiance of the present ray.
+    pub(crate) control: Rgb,
+}
+
+impl Probes {
+    pub(crate) fn new() -> Self {
+        Self {
+            rng: Rng::new(0, 0, 0),
+            total: 0.0,
+            chosen: None,
+            part: RayPath::default(),
+            control: Rgb::ZERO,
+        }
+    }
+
+    /// Forgets the last path.
+    pub(crate) fn begin(&mut self, rng: Rng) {
+        self.rng = rng;
+        self.total = 0.0;
+        self.chosen = None;
+    }
+
+    /// Offers what is on a ray of the path.
+    pub(crate) fn offer(&mut self, world: &World, leaving: &OutgoingRay, ray: &RayPath) {
+        let OutgoingRay { node, throughput, dir, .. } = *leaving;
+        self.control = Rgb::ZERO;
+        let strength = throughput.max_abs();
+        let segments = leaving.segments + 1;
+        if strength == 0.0 || segments > world.max_depth {
+            return;
+        }
+        let origin = leaving.vertex.x;
+        let mut passing = Passing([0.5; 2]);
+        let [mut probed, mut chosen] = [false; 2];
+        for i in intervals(ray.medium, &ray.crossings, ray.length) {
+            let Some(m) = i.medium.filter(|_| i.end > i.start) else { continue };
+            let floor = world.probed[m];
+            probed |= floor.is_some();
+            let part = Ray::new(origin + dir * i.start, dir, i.end - i.start);
+            world.medium(m).means(&part, &mut |piece: &Piece| {
+                let length = piece.end - piece.start;
+                let rates = [piece.mean, piece.minorant].map(least);
+                if let Some(floor) = floor.filter(|_| length > 0.0) {
+                    let scale = strength * 0.5 * (1.0 + floor / (floor + piece.mean.mean().abs()));
+                    let [a, b] = passing.along(rates, length);
+                    let weight = scale * (a + b);
+                    self.total += weight;
+                    if self.rng.next_f64() * self.total < weight {
+                        let start = i.start + piece.start;
+                        let carries = leaving.carries();
+                        self.chosen = Some(Stretch {
+                            node,
+                            origin,
+                            dir,
+                            throughput,
+                            carries,
+                            segments,
+                            start,
+                            length,
+                            scale,
+                            control: Rgb::ZERO,
+                            passing,
+                            rates,
+                        });
+                        self.part.truncate_from(ray, start + length);
+                        chosen = true;
+                    }
+                }
+                passing = passing.after(rates, length);
+                if passing.0 == [0.0; 2] {
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
+                }
+            });
+        }
+        if !probed {
+            return;
+        }
+        self.control = control(world, leaving, ray, 2.0 * passing.0[0]);
+        if let Some(stretch) = self.chosen.as_mut().filter(|_| chosen) {
+            stretch.control = self.control;
+        }
+    }
+
+    /// The probe of the path; `None` where no ray of it met a medium that has some, or nothing gets there.
+    pub(crate) fn choose(&mut self, tracer: &mut Tracer<'_>) -> Option<Probe> {
+        let s = self.chosen.take()?;
+        let (world, rng) = (tracer.world, &mut self.rng);
+        let [a, b] = s.passing.along(s.rates, s.length);
+        let rate = s.rates[usize::from(rng.next_f64() * (a + b) >= a)];
+        let within = exponential(rng.next_f64(), rate, s.length);
+        let [a, b] = s.passing.after(s.rates, within).0;
+        let density = s.scale * (a + b) / self.total;
+        let distance = s.start + within;
+        self.part.cut(distance);
+        let m = self.part.last_medium()?;
+        let tau = world.transmittance(s.origin, s.dir, &self.part, rng, &mut tracer.counters);
+        if tau.is_zero() {
+            return None;
+        }
+        let x = s.origin + s.dir * distance;
+        let vertex = Vertex { x, medium: Some(m), kind: Kind::Volume(None) };
+        tracer.counters.probes += 1;
+        let arrival = tau * (1.0 / density);
+        let arrival = Arrival {
+            parent: s.node,
+            end: Endpoint::Volume(vertex, world.coefficients(m, x)),
+            dir: s.dir,
+            distance,
+            start_medium: self.part.medium,
+            arrival,
+            throughput: s.throughput * arrival,
+            emission_weight: 1.0,
+        };
+        Some(Probe { arrival, carries: s.carries, segments: s.segments, control: s.control })
+    }
+
+    /// Interfaces on the way to the probe that has been chosen last.
+    pub(crate) fn way(&self) -> &RayPath {
+        &self.part
+    }
+
+    /// The random numbers of what a probe sees.
+    pub(crate) fn numbers(&self) -> Rng {
+        self.rng.clone()
+    }
+}
+
+impl Passing {
+    /// The integrals of both approximations over the next `length`.
+    fn along(self, rates: [f64; 2], length: f64) -> [f64; 2] {
+        [0, 1].map(|k| {
+            let depth = rates[k] * length;
+            let mean = if depth < 1e-6 { 1.0 - 0.5 * depth } else { -fm::exp_m1(-depth) / depth };
+            self.0[k] * length * mean
+        })
+    }
+
+    /// Both approximations after that.
+    fn after(self, rates: [f64; 2], length: f64) -> Self {
+        Self([0, 1].map(|k| {
+            if rates[k] > 0.0 { self.0[k] * fm::exp(-rates[k] * length) } else { self.0[k] }
+        }))
+    }
+}
+
+/// The control radiance of a ray that the media on its way let so much through, roughly.
+fn control(world: &World, leaving: &OutgoingRay, ray: &RayPath, passing: f64) -> Rgb {
+    let Some((radiance, weight)) = leaving.met(world, ray) else { return Rgb::ZERO };
+    let attenuates = |m: usize| world.tracking[m] == Tracking::Attenuation;
+    let mut media = intervals(ray.medium, &ray.crossings, ray.length).filter_map(|i| i.medium);
+    // Where nothing stops, the walk does not tell how much is left at the points that it passes.
+    if media.any(attenuates) {
+        return Rgb::ZERO;
+    }
+    let through = fm::sqrt(passing);
+    let environment = world.lights.environment().filter(|_| ray.end.is_none());
+    let around = match environment.map(Environment::parts) {
+        Some((radiance, None)) => radiance * SCATTERED,
+        _ => Rgb::ZERO,
+    };
+    radiance * (weight * through) + around * (1.0 - through)
+}
+
+/// The extinction of the channel that lets most through.
+fn least(sigma_t: Rgb) -> f64 {
+    let [r, g, b] = sigma_t.to_array();
+    f64::max(f64::min(f64::min(r, g), b), 0.0)
+}
+
+/// A distance in a stretch with a density in proportion to what passes.
+fn exponential(u: f64, rate: f64, length: f64) -> f64 {
+    let depth = rate * length;
+    if depth < 1e-6 {
+        return u * length;
+    }
+    f64::min(-fm::ln_1p(u * fm::exp_m1(-depth)) / rate, length)
+}

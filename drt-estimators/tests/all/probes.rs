@@ -1,0 +1,122 @@
+//! Derivatives by the extinction of media with empty voxels, where free flight puts no vertices.
+
+use crate::common::pairing::{pair, targets};
+use crate::common::*;
+use drt_estimators::{
+    EstimatorKind, InteriorMotion, PathSampling, Session, Settings, Unattended, agreement,
+    finite_differences,
+};
+use drt_math::{Rgb, Rng, ValueChange};
+use drt_motion::Parameter;
+
+fn parameters(value: f64) -> Vec<Parameter> {
+    let voxel = changes_voxel("cloud", "sigma_t", [2, 2, 3], ValueChange::Add(Rgb::splat(3.0)));
+    let drifts = vec![moves("cloud", shift()), moves("box", shift()), thickens()];
+    vec![
+        parameter("all", value, vec![thickens()]),
+        parameter("voxel", value, vec![voxel]),
+        parameter("drifts", value, drifts),
+    ]
+}
+
+/// Nothing is scattered yet: the derivative is ∫ (albedo S - L) dy with both radiances that of the sky.
+#[test]
+fn the_first_of_a_medium() {
+    let by = |albedo: Rgb| {
+        let settings = Settings { seed: 4, ..Settings::default() };
+        let found = rendered(&empty_cloud(albedo), &parameters(0.0)[..1], &settings, 16);
+        found.derivatives[0].total.pixels.clone()
+    };
+    let albedo = Rgb::new(0.9, 0.7, 0.0);
+    let off = |wrong: f64| {
+        let both = by(albedo).into_iter().zip(by(Rgb::ZERO));
+        let off = both.map(|(found, absorbed)| {
+            let expected = absorbed.mean * (Rgb::ONE - albedo * wrong);
+            (found.mean - expected).max_abs() / absorbed.mean.max_abs()
+        });
+        off.fold(0.0, f64::max)
+    };
+    assert!(off(1.0) < 1e-12, "{:e}", off(1.0));
+    assert!(off(1.001) > 1e-4);
+}
+
+/// All estimators and samplings agree with finite differences.
+#[test]
+fn estimators_agree_in_sparse_media() {
+    // As near to the exact zeros as a central difference goes.
+    let step = 0.05;
+    let parameters = parameters(step);
+    let scene = sparse_cloud();
+    let spp = 4000;
+    let settings = Settings { seed: 3, ..Settings::default() };
+    let differences =
+        finite_differences(&scene, &parameters, &settings, 4 * spp, step, &Unattended);
+    let differences = differences.expect("a valid scene");
+    let kinds = [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped];
+    let from_camera = kinds.map(|kind| (kind, PathSampling::Unidirectional));
+    let both = (EstimatorKind::PathSpace, PathSampling::Bidirectional);
+    for (seed, (estimator, sampling)) in (7..).zip(from_camera.into_iter().chain([both])) {
+        let settings = Settings { estimator, sampling, seed, ..Settings::default() };
+        let found = rendered(&scene, &parameters, &settings, spp);
+        assert!(found.counters.probes > 0);
+        for (d, difference) in found.derivatives.iter().zip(&differences) {
+            let name = format!("{} by {estimator:?}, {sampling:?}", d.name);
+            let same = agreement(&d.total, difference, None);
+            assert!(same.agrees, "{name}: {same:?}");
+            let [known, error] = sum(difference);
+            let [value, own] = sum(&d.total);
+            let off = |part: f64| (part * value - known).abs() / f64::hypot(own, error);
+            assert!(off(1.0) < 4.0, "{name}: {}", off(1.0));
+            // As if half of it were missing.
+            assert!(off(0.5) > 4.0, "{name}: {}", off(0.5));
+        }
+    }
+}
+
+/// The reverse mode is the transpose of the forward mode.
+#[test]
+fn transposes_of_probes() {
+    let scene = sparse_cloud();
+    let [width, height] = scene.sensors[0].item.sensor.film();
+    let mut rng = Rng::new(99, 0, 0);
+    let mut signed = || 2.0 * rng.next_f64() - 1.0;
+    let adjoint: Vec<Rgb> =
+        (0..width * height).map(|_| Rgb::new(signed(), signed(), signed())).collect();
+    for estimator in [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped] {
+        for p in parameters(0.0) {
+            let insides = vec![(0, InteriorMotion::Static)];
+            let settings =
+                Settings { estimator, insides, seed: 3, guiding: false, ..Settings::default() };
+            let mut session =
+                Session::new(&scene, core::slice::from_ref(&p), &settings).expect("a valid scene");
+            assert!(session.run(16, &Unattended));
+            let forward = session.rendering();
+            assert!(forward.counters.probes > 0);
+            let pixels = forward.derivatives[0].total.pixels.iter().zip(&adjoint);
+            let products: Vec<Rgb> = pixels.map(|(pixel, a)| pixel.mean * *a).collect();
+            let size: f64 = products.iter().map(|p| p.abs().sum()).sum();
+            let along: f64 = products.iter().map(|p| p.sum()).sum();
+            let gradient = session.gradient(&targets(&scene, &p), 16, &adjoint, &Unattended);
+            let back = pair(&scene, &p, &gradient.expect("a valid scene"));
+            assert!((along - back).abs() < 1e-9 * size, "{}: {along} {back}", p.name);
+        }
+    }
+}
+
+/// Where nothing is empty, or only colours change, no probes are taken.
+#[test]
+fn probes_only_where_they_help() {
+    let settings = Settings::default();
+    let full = full_cloud();
+    let colours = parameter("albedo", 0.0, vec![changes("cloud", "albedo", grey(-0.5))]);
+    for (scene, p, probed) in [
+        (&sparse_cloud(), parameters(0.0).swap_remove(0), true),
+        (&sparse_cloud(), colours, false),
+        (&full, parameters(0.0).swap_remove(0), false),
+    ] {
+        let found = rendered(scene, core::slice::from_ref(&p), &settings, 4);
+        assert_eq!(found.counters.probes > 0, probed);
+        let said = found.plan.media[0].tracking.contains("probes");
+        assert_eq!(said, probed, "{}", found.plan.media[0].tracking);
+    }
+}
