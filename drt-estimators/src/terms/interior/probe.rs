@@ -38,9 +38,9 @@
 //! ```
 //!
 //! a being transmittance over density there (integrate by parts). So L and a S may both be taken relative to β: the line integrals of a
-//! segment take Θ (a R - m β) for Θ a R, and a vertex or probe takes a S - β. What a ray would see without any medium, times the root of what the medium
-//! lets through, roughly, is used for β, and of a sky that is the same everywhere, a part of the rest. Emission is weighted as where the walk meets it. All this costs nothing. Where a medium on the way has no
-//! vertices, the identity does not hold, and β is zero.
+//! segment take Θ (a R - m β) for Θ a R, and a vertex or probe takes a S - β. Here β is what the ray would see without any medium, weighted
+//! as where the walk meets it, times the root of what the medium lets through, roughly; of a sky that is the same everywhere, a part of the rest
+//! is added. All this costs nothing. Where a medium on the way has no vertices, the identity does not hold, and β is zero.
 //!
 //! # Beside vertices
 //!
