@@ -78,7 +78,7 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
         (None, _) => return Ok(Outcome::Interrupted),
         (Some(Found::Numbers(gradient)), _) => {
             write_npy(output, &gradient)?;
-            unseen(&asked, &gradient).iter().for_each(|note| console::note(note));
+            unseen(&asked, &gradient).iter().for_each(console::note);
         }
         (Some(Found::Sums(sums, picture)), Some(shard)) => {
             let inputs = Fingerprint::of_job(&asked, "grad", &[&picture])?;
