@@ -19,6 +19,8 @@ mod grid_medium;
 mod homogeneous;
 mod lattice;
 mod medium;
+#[cfg(feature = "vol")]
+pub mod nanovdb;
 mod phase;
 mod reach;
 mod tangent;

@@ -34,7 +34,7 @@ impl VolFile {
     }
 }
 
-/// Why a `.vol` file cannot be read or written.
+/// Why a file of a volume cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolError {
@@ -79,7 +79,7 @@ pub enum VolError {
         source: MediumError,
     },
     /// A grid cannot be stored in this format.
-    #[error("the grid cannot be written as .vol: {0}")]
+    #[error("the grid cannot be written: {0}")]
     NotStorable(&'static str),
 }
 

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use drt_estimators::surface::{MeasuredTables, RoughConductor};
 use drt_fuzz::{SCENE, write};
 use drt_geom::{Mesh, procedural};
-use drt_math::Vec3;
+use drt_math::{Affine, Mat3, Vec3};
+use drt_medium::nanovdb::{self, NanoVdb};
 use drt_medium::{Grid, vol};
 
 const OLD_SCENE: &str = r#"<scene version="0.5.0">
@@ -57,15 +58,26 @@ const TETGEN: &str = "5 3 1 1\n1 0 0 0 .5 1\n2 1 0 0 .5 1\n3 0 1 0 .5 1\n4 0 0 1
 
 fn main() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("corpus");
-    for target in
-        ["obj", "ply", "tet", "vol", "xml", "toml", "serialized", "bitmap", "spectrum", "measured"]
-    {
+    for target in [
+        "obj",
+        "ply",
+        "tet",
+        "vol",
+        "nvdb",
+        "xml",
+        "toml",
+        "serialized",
+        "bitmap",
+        "spectrum",
+        "measured",
+    ] {
         std::fs::create_dir_all(corpus.join(target)).expect("the corpus folder can be written");
     }
     meshes(&corpus);
     write(&corpus.join("tet/two.mesh"), MEDIT.as_bytes());
     write(&corpus.join("tet/two.node"), TETGEN.as_bytes());
     volumes(&corpus.join("vol"));
+    trees(&corpus.join("nvdb"));
     write(&corpus.join("xml/new.xml"), SCENE.as_bytes());
     write(&corpus.join("xml/old.xml"), OLD_SCENE.as_bytes());
     for (i, effect) in EFFECTS.iter().enumerate() {
@@ -231,6 +243,17 @@ fn ply(mesh: &Mesh, format: &str) -> Vec<u8> {
         put("\n".into(), &[]);
     }
     file
+}
+
+fn trees(folder: &Path) {
+    for channels in [1, 3] {
+        let values = (0..9 * 3 * 2 * channels).map(|i| f64::from(i as u32 / 6 % 3)).collect();
+        let grid = Grid::new([9, 3, 2], channels, values).expect("a valid grid");
+        let placement = Affine { linear: Mat3::IDENTITY, translation: Vec3::ZERO };
+        let tree = NanoVdb { name: "density".into(), grid, placement };
+        let bytes = nanovdb::encode(&tree).expect("a small grid");
+        write(&folder.join(format!("{channels}.nvdb")), &bytes);
+    }
 }
 
 fn volumes(folder: &Path) {

@@ -1,7 +1,7 @@
 //! Quantities in space: numbers, colours, `constvolume` and `gridvolume`.
 
 use drt_math::{Affine, Rgb};
-use drt_medium::{Filter, Grid, Layout, Volume, Wrap, vol};
+use drt_medium::{Filter, Grid, Layout, Volume, Wrap, nanovdb, vol};
 
 use super::Loader;
 use super::element::Element;
@@ -99,9 +99,18 @@ fn grid(p: &Properties<'_>) -> Result<Field, CliError> {
     let layout = if legacy { Layout::NodeCentred } else { Layout::VoxelCentred };
     // Spectral upsampling and texture hardware.
     p.accept(&["raw", "accel", "send_data"]);
-    let file = vol::read(&path).map_err(|err| e.error(err))?;
-    let stored = if in_stored_box { file.placement() } else { Affine::IDENTITY };
-    let grid = not_negative(p, file.grid)?;
+    let is_tree = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("nvdb"));
+    let (grid, placement) = if is_tree {
+        let name = p.string("grid_name")?;
+        let file = nanovdb::read(&path, name).map_err(|err| e.error(err))?;
+        (file.grid, file.placement)
+    } else {
+        let file = vol::read(&path).map_err(|err| e.error(err))?;
+        let placement = file.placement();
+        (file.grid, placement)
+    };
+    let stored = if in_stored_box { placement } else { Affine::IDENTITY };
+    let grid = not_negative(p, grid)?;
     let grid = (grid.with_layout(layout).with_filter(filter).with_wrap(wrap))
         .with_placement(to_world.after(&stored))
         .map_err(|err| e.error(err))?;

@@ -80,7 +80,7 @@ impl Motion {
                 .tangents
                 .media
                 .iter()
-                .map(|l| l.iter().any(|(_, t)| !t.sigma_t.is_zero()))
+                .map(|l| l.iter().any(|(_, t)| !t.sigma_t.is_zero() || t.moves_grids()))
                 .collect(),
             roughness: self.tangents.bsdfs.iter().map(roughens).collect(),
             index: self.tangents.bsdfs.iter().map(bends).collect(),

@@ -42,7 +42,7 @@ pub(crate) enum MediumActivity {
 pub(crate) struct ActiveFactors {
     pub(crate) media: Vec<MediumActivity>,
     pub(crate) bsdfs: Vec<bool>,
-    /// Media whose extinction changes.
+    /// Media whose extinction changes somewhere, with its values or as its grid moves.
     pub(crate) extinctions: Vec<bool>,
     /// Those whose roughness changes.
     pub(crate) roughness: Vec<bool>,
@@ -69,20 +69,25 @@ impl World {
     /// vertices in media whose coefficients change, and paths over materials that change.
     pub(crate) fn prepare_for_derivatives(&mut self, needs: ActiveFactors) {
         for (m, need) in needs.media.iter().enumerate() {
-            if *need == MediumActivity::Nothing {
-                continue;
-            }
+            let changes = *need != MediumActivity::Nothing;
             if *need == MediumActivity::Vertices
-                || (needs.extinctions[m] && self.medium(m).would_send_light())
+                || (changes && needs.extinctions[m] && self.medium(m).would_send_light())
             {
                 self.tracking[m] = Tracking::Vertices;
             }
-            self.probed[m] = self.probed_below(m).filter(|_| needs.extinctions[m]);
-            self.defensive[m] = match self.medium(m).extinction() {
-                Some(h) => self.defensive_where_thin(m, h),
-                None if self.probed[m].is_some() => 0.0,
-                None => DEFENSIVE,
-            };
+            if !(changes || needs.extinctions[m]) {
+                continue;
+            }
+            let probed = self.probed_below(m);
+            if changes || probed.is_some() {
+                self.probed[m] = probed.filter(|_| needs.extinctions[m]);
+                // The same where probes would be taken but nothing asks for them, so that all derivatives are by the same paths.
+                self.defensive[m] = match self.medium(m).extinction() {
+                    Some(h) => self.defensive_where_thin(m, h),
+                    None if probed.is_some() => 0.0,
+                    None => DEFENSIVE,
+                };
+            }
         }
         self.needs = needs;
     }

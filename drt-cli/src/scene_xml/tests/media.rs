@@ -1,4 +1,5 @@
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
+use drt_medium::nanovdb::NanoVdb;
 use drt_medium::vol::{VolFile, encode};
 use drt_medium::{Coefficients, Grid, Medium, MediumKind, Phase, Volume};
 
@@ -84,6 +85,40 @@ fn old_media_have_no_defaults() {
     let c = s.media[0].item.homogeneous().unwrap().coefficients();
     assert_eq!((c.sigma_t, c.albedo), (Rgb::splat(0.1), Rgb::new(0.9, 0.5, 0.5)));
     assert!(super::read_version("0.5.0", "<medium type=\"homogeneous\"/>").is_err());
+}
+
+/// NanoVDB files are read as `.vol` files are, one grid of them.
+#[test]
+fn grids_of_nanovdb() {
+    let folder = Folder::new();
+    let grid = Grid::new([4, 1, 1], 1, vec![0.0, 1.0, 2.0, 3.0]).unwrap();
+    let linear = Mat3::diagonal(vec3(2.0, 1.0, 1.0));
+    let placement = Affine { linear, translation: Vec3::ZERO };
+    let file = NanoVdb { name: "smoke".into(), grid, placement };
+    folder.file("ramp.nvdb", drt_medium::nanovdb::encode(&file).unwrap());
+    let density = |more: &str| {
+        format!(
+            "<volume name=\"sigma_t\" type=\"gridvolume\"><string name=\"filename\" value=\"ramp.nvdb\"/>{more}</volume>\
+             <float name=\"albedo\" value=\"0.5\"/>"
+        )
+    };
+    let at = |more: &str, x: f64| {
+        grid_medium(&folder, "3.0.0", &density(more)).sigma_t(vec3(x, 0.5, 0.5)).r
+    };
+    let name = r#"<string name="grid_name" value="smoke"/>"#;
+    assert!((at("", 0.375) - 1.0).abs() < 1e-12);
+    let stored = r#"<boolean name="use_grid_bbox" value="true"/>"#;
+    assert!((at(&format!("{name}{stored}"), 0.75) - 1.0).abs() < 1e-12);
+    let other = format!(
+        "<scene version=\"3.0.0\"><medium type=\"heterogeneous\">{}</medium></scene>",
+        density(&name.replace("smoke", "heat"))
+    );
+    let path = folder.file("s.xml", other);
+    let error = load_scene(&path, &Defaults::new()).unwrap_err().to_string();
+    assert!(
+        error.contains("ramp.nvdb") && error.contains("the list of grids is `smoke`"),
+        "{error}"
+    );
 }
 
 /// A ramp from 0 to 3 along x, stored in the box (0, 0, 0)-(2, 1, 1).

@@ -52,13 +52,14 @@
 //!
 //! # Motion
 //!
-//! A vertex that moves with the velocity v through a grid that moves with u sees σ_t change by σ_t' = ∂σ_t + (v - u)·∇σ_t. A probe is
+//! A vertex that moves with the velocity v through a grid that moves with u sees σ_t change by σ_t' = ∂σ_t + (v - u)·∇σ_t. Beside an empty voxel, where σ_t
+//! rises from zero along a line, ∫ σ_t'² / σ_t diverges like a logarithm, so that grids that move are probed as well. A probe is
 //! added to the path's record as a vertex that no light passes, found by the ray that it is on. It is given the [velocity](crate::derivative::velocity) of
 //! a vertex there, and sends its sensitivities the same way, whatever the estimator is, in forward and reverse mode.
 //!
 //! # What is left out
 //!
-//! Custom fields, of which it is not known where they are empty. Media in which only grids move, whose σ_t' vanishes with σ_t. Media with a point or spot
+//! Custom fields, of which it is not known where they are empty. Media with a point or spot
 //! emitter in them: S has a pole there. Connections with emitters, whose line integrals meet no vertices.
 
 use core::ops::ControlFlow;
