@@ -127,6 +127,9 @@ def run(options, folder, seed):
 def main():
     options = arguments()
     theirs = json.loads((options.folder / "figures.json").read_text())
+    unknown = [cell for cell in options.cells if cell not in theirs]
+    if unknown:
+        sys.exit(f"no such cell: {', '.join(unknown)}; expected one of {', '.join(theirs)}")
     print("| cell | drt | se | Sample Matching | se | prbvolpath | se | their difference | apart, in se | se over theirs | s |")
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     for cell in options.cells or theirs:
