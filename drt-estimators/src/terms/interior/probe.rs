@@ -54,7 +54,8 @@
 //! the rest: the balance heuristic for densities σ_t T and c T, where c is a medium's
 //! [least extinction](World::share_of_vertices) that vertices see well. The parts depend on the place alone, so that
 //! they add up to one for vertices of any path, be they found by free flight, by the angle that a light is seen under, or from the
-//! emitter's end. Derivatives by the albedo and by the emission are in proportion to σ_t and stay with vertices.
+//! emitter's end. Derivatives by the albedo and by the emission are shared in the same way, but do not call for probes where the
+//! extinction stays as it is: they are in proportion to σ_t, and vertices see them well for half the time.
 //!
 //! # Motion
 //!
