@@ -20,7 +20,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
             job.path.display()
         )));
     }
-    let outputs = Outputs::new(options, &job, "check")?;
+    let outputs = Outputs::of_images(options, &job, "check")?;
     run::tell_one_sided(&job, options.changes.quiet)?;
     let monitor = Monitor::new(options.changes.quiet);
     let mut rendering = derivatives(&job, options, &monitor, 0.4, &mut run::Shared::default())?;

@@ -55,7 +55,7 @@ fn together(options: &OptimizeOptions, team: &Team) -> Result<Outcome, CliError>
     let common = &options.common;
     let job = team.agree(run::open_job(common))?;
     team.agree(team.check(&job))?;
-    let outputs = team.agree(Outputs::new(common, &job, "optimize"))?;
+    let outputs = team.agree(Outputs::of_images(common, &job, "optimize"))?;
     let problem = team.agree(Problem::new(&job, options))?;
     team.agree(spare(&problem, &outputs))?;
     let monitor = Monitor::new(common.changes.quiet || !team.leads());
