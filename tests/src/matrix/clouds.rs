@@ -12,7 +12,7 @@ use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_medium::{Grid, GridMedium, Layout, Phase, Volume};
 use drt_motion::{Change, Effect, GeometryChange, ValueChange};
 
-use super::effects::{translate, turn};
+use super::effects::{grow, translate, turn};
 use super::set::{at, placed};
 use super::textures::sky;
 use super::{Cell, Set, Stage};
@@ -116,7 +116,11 @@ pub fn cloud(border: Border, light: Light) -> Result<Stage> {
     let scene = light.shine(set)?.scene;
     let bends = |p: &Vec3| vec3(0.3 - p.x * p.z, 0.4 * p.x * p.y, 0.5 * p.x * p.x - 0.2 * p.y);
     let bends = border.mesh().positions.iter().map(bends).collect();
-    let bends = moves("border", GeometryChange::VertexVelocity(bends));
+    let deforms = match border {
+        // Flat tetrahedra across the creases of a ring turn over when these bend.
+        Border::Ring => grow("border", vec3(0.5, -0.3, 0.6), Vec3::ZERO),
+        _ => moves("border", GeometryChange::VertexVelocity(bends)),
+    };
     let rides = || Effect { target: "smoke".into(), change: Change::Follow("border".into()) };
     let spin = turn("border", vec3(0.2, 1.0, 0.3), Vec3::ZERO);
     let grows = |property| changes("smoke", property, ValueChange::Multiply(1.0));
@@ -126,7 +130,7 @@ pub fn cloud(border: Border, light: Light) -> Result<Stage> {
         Cell::new("grid moves", [translate("smoke", vec3(0.5, 0.3, -0.4))]).representative(),
         Cell::new("grid turns", [turn("smoke", vec3(0.2, 1.0, 0.3), Vec3::ZERO)]),
         Cell::new("border turns, grid rides", [spin, rides()]),
-        Cell::new("border bends, grid rides", [bends, rides()]),
+        Cell::new("border deforms, grid rides", [deforms, rides()]),
     ];
     Ok(Stage { samples: 1024, boundary_samples: 1024, ..Stage::new("cloud", scene, cells) })
 }
