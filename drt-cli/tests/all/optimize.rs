@@ -66,6 +66,7 @@ fn a_fit_arrives_and_tells_of_it() {
     expect(&out, 0, &[]);
     let said = String::from_utf8_lossy(&out.stdout);
     assert!(said.contains("gray = 0.") && said.contains(" ± "), "{said}");
+    assert!(said.contains("a further step would change it by"), "{said}");
     let [gray, lamp] = result(&folder)[..] else { panic!() };
     assert!((gray - 0.2).abs() < 0.02 && (lamp + 0.5).abs() < 0.05, "{gray} {lamp}");
     let (values, losses) = (text(&folder, "run/params.csv"), text(&folder, "run/loss.csv"));
