@@ -17,7 +17,7 @@ use drt_estimators::{Integrator, Layer, Rendering, Scene, Session, Settings, Una
 pub use drt_estimators::{SceneBuilder, ShapeBuilder};
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
-use drt_medium::{Grid, GridMedium, Homogeneous, Layout, Medium, Phase, Volume};
+use drt_medium::{Grid, GridMedium, Homogeneous, Layout, Medium, Phase, PhaseBlend, Volume};
 use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, Texels, ValueChange};
 
 /// The scene of a builder, as a camera at a point sees it that looks at another one.
@@ -253,6 +253,42 @@ pub fn smoke(border: f64) -> Scene {
         .emitter("bulb", bulb(vec3(0.3, 0.2, 0.5)))
         .emitter("sun", sun(Rgb::new(0.7, 0.6, 0.5)));
     seen(scene, [vec3(0.4, 0.8, 6.0), Vec3::ZERO], 4)
+}
+
+/// Smoke with a phase function that varies as well: by its mean cosine, or by how much each of two functions counts.
+pub fn varied_smoke(border: f64) -> [Scene; 2] {
+    let scene = smoke(border);
+    let placement = *scene.media[0].item.grid().expect("voxels").density().to_world();
+    let mut rng = Rng::new(17, 0, 0);
+    let mut varied = |lo: f64, hi: f64| {
+        let values = (0..64).map(|_| lo + (hi - lo) * rng.next_f64()).collect();
+        let grid = Grid::new([4; 3], 1, values).expect("a valid grid");
+        grid.with_placement(placement).expect("a box")
+    };
+    let g = Phase::henyey_greenstein_grid(varied(-0.6, 0.7)).expect("mean cosines");
+    let parts = [Phase::henyey_greenstein_grid(varied(0.2, 0.8)).expect("valid"), Phase::Rayleigh];
+    let blend = PhaseBlend::varying(varied(0.1, 0.9), parts).expect("weights");
+    [g, Phase::Blend(Box::new(blend))].map(|phase| {
+        let mut scene = scene.clone();
+        scene.media[0].item.phase = phase;
+        scene
+    })
+}
+
+/// Light from all sides would hide what phase functions do: a sun behind the camera is all there is.
+pub fn in_the_sun(mut scene: Scene) -> Scene {
+    for emitter in scene.emitters.iter_mut().map(|e| &mut e.item.emitter) {
+        match emitter {
+            Emitter::Point { intensity, .. } => *intensity = Rgb::ZERO,
+            Emitter::Area { radiance } => *radiance = Rgb::ZERO,
+            Emitter::Directional { direction, irradiance } => {
+                *direction = vec3(-0.2, -0.3, -1.0).normalize();
+                *irradiance = Rgb::splat(5.0);
+            }
+            _ => {}
+        }
+    }
+    scene
 }
 
 const VOXELS: usize = 5;
