@@ -319,6 +319,31 @@ pub fn empty_cloud(albedo: Rgb) -> Scene {
 
 /// A cloud of which one voxel in seven is filled, each channel by its own amount, over a floor and under a lamp.
 pub fn sparse_cloud() -> Scene {
+    seen(sparse(), BEFORE_CLOUD, 5)
+}
+
+/// Such a cloud with a lamp in the middle of it.
+pub fn inhabited_cloud() -> Scene {
+    let inner = placed(procedural::rectangle(), Vec3::splat(0.3), 0.5, vec3(0.1, 0.0, -0.1));
+    let inner = glowing(inner, Rgb::new(6.0, 7.0, 8.0));
+    seen(sparse().shape("inner", inner), BEFORE_CLOUD, 5)
+}
+
+/// Such a cloud that glows, by voxels of its own.
+pub fn glowing_cloud() -> Scene {
+    let mut scene = sparse_cloud();
+    let grids = scene.media[0].item.grid().expect("voxels");
+    let mut rng = Rng::new(12, 0, 0);
+    let values = (0..3 * 4_usize.pow(3)).map(|_| 3.0 * rng.next_f64()).collect();
+    let emission = Grid::new([4; 3], 3, values).expect("a grid");
+    let emission = emission.with_placement(*grids.density().to_world()).expect("a box");
+    let (density, albedo) = (grids.density().clone(), grids.albedo().clone());
+    let grids = GridMedium::new(density, grids.scale(), albedo, Volume::Grid(emission));
+    scene.media[0].item.kind = grids.expect("valid coefficients").into();
+    scene
+}
+
+fn sparse() -> SceneBuilder {
     let mut rng = Rng::new(5, 0, 0);
     let mut extinctions = Vec::new();
     for _ in 0..VOXELS.pow(3) {
@@ -327,10 +352,9 @@ pub fn sparse_cloud() -> Scene {
     }
     let mut floor = floor();
     floor.positions.iter_mut().for_each(|p| p.y -= 0.5);
-    let scene = cloud(extinctions, Rgb::new(0.6, 0.3, 0.4))
+    cloud(extinctions, Rgb::new(0.6, 0.3, 0.4))
         .shape("floor", ShapeBuilder::new(floor, diffuse(0.6, 0.5, 0.4)))
-        .shape("lamp", glowing(lamp(), Rgb::new(9.0, 8.0, 7.0)));
-    seen(scene, BEFORE_CLOUD, 5)
+        .shape("lamp", glowing(lamp(), Rgb::new(9.0, 8.0, 7.0)))
 }
 
 /// A cloud that is the same everywhere.
