@@ -62,10 +62,7 @@ fn numbers() -> Vec<[f64; 3]> {
 }
 
 fn phases() {
-    println!(
-        "{:18} {:>8} {:>8} {:>8} {:>8}",
-        "phase function, ns", "eval", "sample", "d_cos", "d_g"
-    );
+    println!("{:18} {:>8} {:>8} {:>8}", "phase function, ns", "eval", "sample", "gradient");
     let (flow, out, u) = (directions(1), directions(2), numbers());
     let cosine = |i: usize| flow[i].dot(out[i]);
     for (name, phase) in [
@@ -73,11 +70,11 @@ fn phases() {
         ("henyey-greenstein", Phase::HenyeyGreenstein { g: 0.7 }),
         ("rayleigh", Phase::Rayleigh),
     ] {
+        let phase = phase.at(Vec3::ZERO);
         let row = per_call([
             kernel(|i| phase.eval(cosine(i))),
             kernel(|i| phase.sample(flow[i], [u[i][0], u[i][1]])),
-            kernel(|i| phase.d_cos(cosine(i))),
-            kernel(|i| phase.d_g(cosine(i))),
+            kernel(|i| phase.gradient(cosine(i))),
         ]);
         println!("{name:18}{}", columns(&row));
     }

@@ -35,7 +35,19 @@ pub enum MediumChange {
         voxels: Option<[usize; 3]>,
     },
     /// Changes the mean cosine of the phase function.
-    G(ValueChange),
+    G {
+        /// How.
+        op: ValueChange,
+        /// One voxel only.
+        voxels: Option<[usize; 3]>,
+    },
+    /// Changes the part that the second function of a blend has.
+    Weight {
+        /// How.
+        op: ValueChange,
+        /// One voxel only.
+        voxels: Option<[usize; 3]>,
+    },
     /// Moves the grids of the medium.
     Place {
         /// The map of the world at the parameter's value.
@@ -45,12 +57,14 @@ pub enum MediumChange {
     },
 }
 
-/// The coefficients that vary in space.
+/// What may vary in space.
 #[derive(Clone, Copy)]
 pub(crate) enum Field {
     SigmaT,
     Albedo,
     Emission,
+    G,
+    Weight,
 }
 
 impl From<Field> for Property {
@@ -59,6 +73,8 @@ impl From<Field> for Property {
             Field::SigmaT => Self::SigmaT,
             Field::Albedo => Self::Albedo,
             Field::Emission => Self::Emission,
+            Field::G => Self::G,
+            Field::Weight => Self::Weight,
         }
     }
 }
@@ -73,13 +89,13 @@ pub(crate) struct FieldChange {
 
 impl MediumChange {
     /// The property that this may take out of the range in which it has a meaning, where it is in it before: one that it
-    /// adds to, an albedo that it multiplies. See [`Medium::check`].
+    /// adds to, or multiplies where the range has an upper end. See [`Medium::check`].
     #[must_use]
     pub fn pushes(&self, theta: f64) -> Option<Property> {
         let change = self.field()?;
         let ValueMap { factor, offset } = change.op.map(theta);
-        let albedo = matches!(change.field, Field::Albedo);
-        let keeps = offset.is_zero() && (factor == 1.0 || factor >= 0.0 && !albedo);
+        let bounded = matches!(change.field, Field::Albedo | Field::G | Field::Weight);
+        let keeps = offset.is_zero() && (factor == 1.0 || factor >= 0.0 && !bounded);
         (!keeps).then(|| change.property())
     }
 
@@ -89,7 +105,9 @@ impl MediumChange {
             Self::SigmaT { op, voxels } => change(Field::SigmaT, op, voxels),
             Self::Albedo { op, voxels } => change(Field::Albedo, op, voxels),
             Self::Emission { op, voxels } => change(Field::Emission, op, voxels),
-            Self::G(_) | Self::Place { .. } => None,
+            Self::G { op, voxels } => change(Field::G, op, voxels),
+            Self::Weight { op, voxels } => change(Field::Weight, op, voxels),
+            Self::Place { .. } => None,
         }
     }
 }
@@ -102,8 +120,10 @@ impl Medium {
     pub fn apply(&mut self, change: &MediumChange, theta: f64) -> Result<(), MediumError> {
         match change {
             MediumChange::Place { map, .. } => self.place(map),
-            MediumChange::G(op) => self.phase.change(op, theta),
             _ => match (change.field(), &mut self.kind) {
+                (Some(c @ FieldChange { field: Field::G | Field::Weight, .. }), _) => {
+                    self.phase.change(&c, theta)
+                }
                 (Some(c), MediumKind::Homogeneous(h)) => h.change(c, theta),
                 (Some(_), MediumKind::Uniform(u)) if u.is_deformed() => Err(MediumError::Deformed),
                 (Some(c), MediumKind::Uniform(u)) => u.change(c, theta),
@@ -126,6 +146,7 @@ impl Medium {
     pub fn add_to_voxels(&mut self, property: Property, step: &[f64]) -> Result<(), MediumError> {
         let mut scale = 1.0;
         let grid = match (&mut self.kind, property) {
+            (_, Property::G | Property::Weight) => self.phase.voxels_mut(property),
             (MediumKind::Deformed(_), _) => return Err(MediumError::Deformed),
             (MediumKind::Uniform(u), _) if u.is_deformed() => return Err(MediumError::Deformed),
             (MediumKind::Grid(g), Property::SigmaT) => {
@@ -165,12 +186,33 @@ impl Medium {
 }
 
 impl Phase {
-    fn change(&mut self, op: &ValueChange, theta: f64) -> Result<(), MediumError> {
-        let g = self.mean_cosine_parameter().ok_or(MediumError::NoMeanCosine)?;
-        if !op.is_scalar() {
-            return Err(MediumError::NotScalar { property: Property::G });
+    /// Refuses a change of what it does not have.
+    pub(crate) fn check_change(&self, c: &FieldChange) -> Result<(), MediumError> {
+        match (self, c.field) {
+            (
+                Self::Isotropic | Self::HenyeyGreenstein { .. } | Self::HenyeyGreensteinGrid(_),
+                Field::G,
+            )
+            | (Self::Blend(_), Field::Weight) => {}
+            (_, Field::Weight) => return Err(MediumError::NoWeight),
+            _ => return Err(MediumError::NoMeanCosine),
         }
-        *self = Self::henyey_greenstein(op.at(Rgb::splat(g), theta).r)?;
+        if c.op.is_scalar() {
+            Ok(())
+        } else {
+            Err(MediumError::NotScalar { property: c.property() })
+        }
+    }
+
+    fn change(&mut self, c: &FieldChange, theta: f64) -> Result<(), MediumError> {
+        self.check_change(c)?;
+        let g = match self {
+            Self::Blend(blend) => return c.of_volume(&mut blend.weight, theta),
+            Self::HenyeyGreensteinGrid(g) => return c.of_grid(g, theta, 1.0),
+            Self::HenyeyGreenstein { g } => *g,
+            _ => 0.0,
+        };
+        *self = Self::HenyeyGreenstein { g: c.of_constant(Rgb::splat(g), theta)?.r };
         Ok(())
     }
 }
@@ -182,6 +224,8 @@ impl Homogeneous {
             Field::SigmaT => &mut c0.sigma_t,
             Field::Albedo => &mut c0.albedo,
             Field::Emission => &mut c0.emission,
+            // Those of the phase function.
+            Field::G | Field::Weight => return Ok(()),
         };
         *value = c.of_constant(*value, theta)?;
         Ok(())
@@ -194,6 +238,7 @@ impl UniformMedium {
             Field::SigmaT => self.extinction.change(c, theta),
             Field::Albedo => c.of_volume(&mut self.albedo, theta),
             Field::Emission => c.of_volume(&mut self.emission, theta),
+            Field::G | Field::Weight => Ok(()),
         }
     }
 }
@@ -204,6 +249,7 @@ impl GridMedium {
             Field::SigmaT => return self.change_density(c, theta),
             Field::Albedo => &mut self.albedo,
             Field::Emission => &mut self.emission,
+            Field::G | Field::Weight => return Ok(()),
         };
         c.of_volume(volume, theta)
     }

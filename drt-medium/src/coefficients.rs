@@ -65,14 +65,11 @@ pub struct CoefficientRates {
     pub albedo: Rgb,
     /// Of the emitted radiance.
     pub emission: Rgb,
-    /// Of the phase function's mean cosine.
-    pub g: f64,
 }
 
 impl CoefficientRates {
     /// At rest.
-    pub const ZERO: Self =
-        Self { sigma_t: Rgb::ZERO, albedo: Rgb::ZERO, emission: Rgb::ZERO, g: 0.0 };
+    pub const ZERO: Self = Self { sigma_t: Rgb::ZERO, albedo: Rgb::ZERO, emission: Rgb::ZERO };
 
     /// The pairing of rates with the adjoint of the same point: the rate of the loss.
     #[inline]
@@ -81,6 +78,5 @@ impl CoefficientRates {
         self.sigma_t.dot(adjoint.sigma_t)
             + self.albedo.dot(adjoint.albedo)
             + self.emission.dot(adjoint.emission)
-            + self.g * adjoint.g
     }
 }

@@ -12,16 +12,36 @@ pub enum Property {
     Emission,
     /// Mean cosine of the phase function.
     G,
+    /// Part of a blend of phase functions that the second one has.
+    Weight,
 }
 
-impl fmt::Display for Property {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl Property {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::SigmaT, Self::Albedo, Self::Emission, Self::G, Self::Weight];
+
+    /// The property of a name, as jobs and messages call it.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|p| p.name() == name)
+    }
+
+    /// What it is called.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
             Self::SigmaT => "sigma_t",
             Self::Albedo => "albedo",
             Self::Emission => "emission",
             Self::G => "g",
-        })
+            Self::Weight => "weight",
+        }
+    }
+}
+
+impl fmt::Display for Property {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
     }
 }
 
@@ -108,8 +128,8 @@ pub enum MediumError {
         /// The property.
         property: Property,
     },
-    /// Three different numbers were given for a scalar.
-    #[error("{property} is one number; give three equal ones")]
+    /// Three numbers were given for a scalar.
+    #[error("{property} is one number, not a colour")]
     NotScalar {
         /// The property.
         property: Property,
@@ -117,6 +137,9 @@ pub enum MediumError {
     /// The phase function has no such parameter.
     #[error("this phase function has no g; use Henyey-Greenstein")]
     NoMeanCosine,
+    /// The phase function is no blend.
+    #[error("this phase function has no weight; use a blend")]
+    NoWeight,
     /// A deformed grid cannot be changed.
     #[error("the grid is deformed; place it, and change its values, before that")]
     Deformed,

@@ -6,7 +6,7 @@ use drt_math::{Affine, Rgb, Vec3};
 
 use crate::{
     CoefficientRates, Crossing, DepthEstimate, FieldTangent, Flow, FlowBasis, Grid, Medium,
-    MediumTangent,
+    MediumTangent, PhaseGradient, Property,
 };
 
 /// Derivative of a loss with respect to one coefficient field: the transpose of [`FieldTangent`].
@@ -58,7 +58,9 @@ pub struct MediumGradient {
     /// Of the emitted radiance.
     pub emission: FieldGradient,
     /// Of the phase function's mean cosine.
-    pub g: f64,
+    pub g: FieldGradient,
+    /// Of the weight of a blend of phase functions.
+    pub weight: FieldGradient,
     /// Of the coefficients of the grids' velocity field.
     pub velocity: Affine,
     /// Of the velocities of nodes, where there is room for them.
@@ -135,15 +137,17 @@ impl MediumGradient {
     #[must_use]
     pub fn zeros(medium: &Medium) -> Self {
         let [sigma_t, albedo, emission] = medium.volumes().map(FieldGradient::zeros);
-        Self { sigma_t, albedo, emission, g: 0.0, velocity: Affine::ZERO, flow: None }
+        let phase = [Property::G, Property::Weight].map(|p| medium.phase.voxels(p));
+        let [g, weight] = phase.map(FieldGradient::zeros);
+        Self { sigma_t, albedo, emission, g, weight, velocity: Affine::ZERO, flow: None }
     }
 
     /// No derivative yet, without room for voxels: for media none of whose parameters names a
     /// voxel.
     #[must_use]
     pub fn zeros_without_voxels() -> Self {
-        let [sigma_t, albedo, emission] = [None; 3].map(FieldGradient::zeros);
-        Self { sigma_t, albedo, emission, g: 0.0, velocity: Affine::ZERO, flow: None }
+        let [sigma_t, albedo, emission, g, weight] = [None; 5].map(FieldGradient::zeros);
+        Self { sigma_t, albedo, emission, g, weight, velocity: Affine::ZERO, flow: None }
     }
 
     /// The same with room for the velocities of `nodes` nodes.
@@ -156,7 +160,6 @@ impl MediumGradient {
     /// Adds the derivatives of a loss with respect to the coefficients at the point x of the world:
     /// the exact transpose of [`MediumTangent::rates`].
     pub fn scatter(&mut self, medium: &Medium, x: Vec3, adjoint: &CoefficientRates) {
-        self.g += adjoint.g;
         let Some((grids, at)) = medium.volumes_at(x) else { return };
         let c = medium.coefficients(x);
         self.sigma_t.scatter(c.sigma_t, grids[0], at, adjoint.sigma_t);
@@ -168,6 +171,31 @@ impl MediumGradient {
                 + g.albedo.weighted(adjoint.albedo)
                 + g.emission.weighted(adjoint.emission);
             self.scatter_velocity(x, -pull);
+        }
+    }
+
+    /// Adds the derivative of a loss with respect to the phase function's value, for one pair of directions, at the point x of
+    /// the world: the transpose of [`MediumTangent::phase_rate`].
+    pub fn scatter_phase(
+        &mut self,
+        medium: &Medium,
+        x: Vec3,
+        gradient: &PhaseGradient,
+        adjoint: f64,
+    ) {
+        for (own, property, by) in [
+            (&mut self.g, Property::G, gradient.g),
+            (&mut self.weight, Property::Weight, gradient.weight),
+        ] {
+            if by != 0.0 {
+                let here = medium.phase_at(x);
+                let grid = medium.phase.voxels(property);
+                let adjoint = Rgb::new(by * adjoint, 0.0, 0.0);
+                own.scatter(Rgb::splat(here.number()), grid, here.looked_up(), adjoint);
+            }
+        }
+        if gradient.place != Vec3::ZERO {
+            self.scatter_velocity(x, gradient.place * -adjoint);
         }
     }
 
@@ -228,7 +256,8 @@ impl MediumGradient {
         self.sigma_t.dot(&tangent.sigma_t)
             + self.albedo.dot(&tangent.albedo)
             + self.emission.dot(&tangent.emission)
-            + self.g * tangent.g
+            + self.g.dot(&tangent.g)
+            + self.weight.dot(&tangent.weight)
             + linear
             + flows.sum::<f64>()
             + a.translation.dot(b.translation)
@@ -239,7 +268,8 @@ impl MediumGradient {
         self.sigma_t.add(&o.sigma_t);
         self.albedo.add(&o.albedo);
         self.emission.add(&o.emission);
-        self.g += o.g;
+        self.g.add(&o.g);
+        self.weight.add(&o.weight);
         self.velocity = self.velocity.plus(&o.velocity);
         if let (Some(a), Some(b)) = (&mut self.flow, &o.flow) {
             a.nodes.iter_mut().zip(&b.nodes).for_each(|(a, b)| *a += *b);

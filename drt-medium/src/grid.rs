@@ -195,6 +195,29 @@ impl Grid {
         }
     }
 
+    /// The largest value of each channel; a single channel stands for all three.
+    #[must_use]
+    pub fn largest(&self) -> Rgb {
+        let largest = |c: usize| {
+            let values = self.values.iter().skip(c).step_by(self.channels);
+            values.copied().fold(f64::NEG_INFINITY, f64::max)
+        };
+        self.per_channel(largest)
+    }
+
+    /// The same field with every channel multiplied by a factor of its own.
+    #[must_use]
+    pub fn scaled(&self, by: Rgb) -> Self {
+        let mut grid = self.clone();
+        grid.spread_channels();
+        for voxel in grid.values.chunks_exact_mut(3) {
+            for (value, by) in voxel.iter_mut().zip(by.to_array()) {
+                *value *= by;
+            }
+        }
+        grid
+    }
+
     /// The field at a point of the world.
     #[inline]
     #[must_use]

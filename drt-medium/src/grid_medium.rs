@@ -60,7 +60,7 @@ impl GridMedium {
             }
             Property::Albedo => self.albedo.check(property),
             Property::Emission => self.emission.check(property),
-            Property::G => Ok(()),
+            Property::G | Property::Weight => Ok(()),
         }
     }
 

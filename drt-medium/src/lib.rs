@@ -47,7 +47,9 @@ pub use grid_medium::GridMedium;
 pub use homogeneous::Homogeneous;
 pub use lattice::{Filter, Layout, Wrap};
 pub use medium::{Medium, MediumKind};
-pub use phase::{Phase, PhaseBlend, PhaseTable, henyey_greenstein, rayleigh};
+pub use phase::{
+    LocalPhase, Phase, PhaseBlend, PhaseGradient, PhaseTable, henyey_greenstein, rayleigh,
+};
 pub use tangent::{FieldTangent, MediumTangent};
 pub use tracking::{DistanceSample, TrackingStats};
 pub use transmittance::TransmittanceRate;

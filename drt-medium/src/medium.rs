@@ -2,14 +2,14 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-use drt_math::{Affine, Rgb, Rng, Vec3};
+use drt_math::{Affine, Mat3, Rgb, Rng, Vec3};
 
 use crate::homogeneous::check;
 use crate::tracking::zip;
 use crate::{
     CoefficientGradients, Coefficients, Crossing, DeformedGrid, DensityField, DistanceSample, Grid,
-    GridMedium, Homogeneous, MediumError, Phase, Piece, Property, Ray, SpaceMap, TrackingStats,
-    UniformMedium, tracking,
+    GridMedium, Homogeneous, LocalPhase, MediumError, Phase, Piece, Property, Ray, SpaceMap,
+    TrackingStats, UniformMedium, Volume, tracking,
 };
 
 /// Where a medium gets its coefficients from.
@@ -95,6 +95,9 @@ impl Medium {
     /// # Errors
     /// Names the property, a value and the range.
     pub fn check(&self, property: Property) -> Result<(), MediumError> {
+        if matches!(property, Property::G | Property::Weight) {
+            return self.phase.validate();
+        }
         let coefficients = match &self.kind {
             MediumKind::Homogeneous(h) => h.coefficients(),
             MediumKind::Uniform(u) => return u.check_property(property),
@@ -106,8 +109,8 @@ impl Medium {
             Property::SigmaT => check(property, coefficients.sigma_t),
             Property::Albedo => check(property, coefficients.albedo),
             Property::Emission => check(property, coefficients.emission),
-            // A phase function checks its own g when it is made.
-            Property::G => Ok(()),
+            // Checked above.
+            Property::G | Property::Weight => Ok(()),
         }
     }
 
@@ -138,14 +141,30 @@ impl Medium {
         }
     }
 
-    /// The coefficients of a medium that has the same everywhere.
+    /// The coefficients of a medium that is the same everywhere, with its phase function.
     #[inline]
     #[must_use]
     pub fn homogeneous(&self) -> Option<&Homogeneous> {
         match &self.kind {
-            MediumKind::Homogeneous(h) => Some(h),
+            MediumKind::Homogeneous(h) => Some(h).filter(|_| !self.phase.varies()),
             _ => None,
         }
+    }
+
+    /// The phase function at a point of the world.
+    #[inline]
+    #[must_use]
+    pub fn phase_at(&self, x: Vec3) -> LocalPhase<'_> {
+        if !self.phase.varies() {
+            return self.phase.at(x);
+        }
+        let place = match &self.kind {
+            MediumKind::Uniform(u) => Some(u.material(x)),
+            MediumKind::Deformed(d) => d.material(x),
+            MediumKind::Homogeneous(_) | MediumKind::Grid(_) | MediumKind::Custom(_) => None,
+        };
+        let (at, slope) = place.unwrap_or((x, Mat3::IDENTITY));
+        LocalPhase::new(&self.phase, at, slope)
     }
 
     /// A homogeneous medium with this one's extinction, where that is the same everywhere. Distances and
@@ -196,14 +215,14 @@ impl Medium {
             Property::SigmaT => sigma_t,
             Property::Albedo => albedo,
             Property::Emission => emission,
-            Property::G => None,
+            Property::G | Property::Weight => self.phase.voxels(property),
         }
     }
 
-    /// True when a motion of the medium can change its coefficients: when they vary in space.
+    /// True when a motion of the medium can change its coefficients or its phase function: when they vary in space.
     #[must_use]
     pub fn is_carried(&self) -> bool {
-        self.volumes().iter().any(Option::is_some)
+        self.volumes().iter().any(Option::is_some) || self.phase.varies()
     }
 
     /// The part of the world that must move with a medium which is carried along: smallest and largest corner of
@@ -211,11 +230,13 @@ impl Medium {
     #[must_use]
     pub fn carried_bounds(&self) -> Option<[Vec3; 2]> {
         let [sigma_t, albedo, emission] = self.volumes();
-        let bounds = |grid: Option<&Grid>| grid.map(Grid::world_bounds);
-        bounds(sigma_t).or_else(|| match (bounds(albedo), bounds(emission)) {
-            (Some([a, b]), Some([c, d])) => Some([a.min(c), b.max(d)]),
-            (one, other) => one.or(other),
-        })
+        if let Some(density) = sigma_t {
+            return Some(density.world_bounds());
+        }
+        let mut grids: Vec<&Grid> = [albedo, emission].into_iter().flatten().collect();
+        self.phase.grids(&mut |grid| grids.push(grid));
+        let bounds = grids.into_iter().map(Grid::world_bounds);
+        bounds.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])
     }
 
     /// The grids of the extinction, the albedo and the emission, as far as they are grids; of what is deformed as
@@ -431,26 +452,34 @@ impl Medium {
         self.kind = match &mut self.kind {
             MediumKind::Uniform(u) => return u.deform(map),
             MediumKind::Grid(g) => MediumKind::Deformed(DeformedGrid::new(g.clone(), map)),
-            MediumKind::Homogeneous(_) => return Ok(()),
+            MediumKind::Homogeneous(_) if !self.phase.varies() => return Ok(()),
+            MediumKind::Homogeneous(h) => {
+                let Coefficients { sigma_t, albedo, emission } = h.coefficients();
+                let [albedo, emission] = [albedo, emission].map(Volume::Constant);
+                let mut uniform = UniformMedium::new(sigma_t, albedo, emission)?;
+                uniform.deform(map)?;
+                uniform.into()
+            }
             MediumKind::Deformed(_) => return Err(MediumError::Deformed),
             MediumKind::Custom(_) => return Err(MediumError::CustomField),
         };
         Ok(())
     }
 
-    /// Moves the grids by a map of the world. A homogeneous medium has nothing that could move;
-    /// surfaces bound it.
+    /// Moves the grids by a map of the world, with those of the phase function. A homogeneous medium has no others; surfaces
+    /// bound it.
     ///
     /// # Errors
     /// When the map is singular, for deformed grids, and for custom fields, which nobody outside can
     /// move.
     pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
         match &mut self.kind {
-            MediumKind::Uniform(u) => u.place(map),
-            MediumKind::Grid(g) => g.place(map),
-            MediumKind::Homogeneous(_) => Ok(()),
-            MediumKind::Deformed(_) => Err(MediumError::Deformed),
-            MediumKind::Custom(_) => Err(MediumError::CustomField),
+            MediumKind::Uniform(u) => u.place(map)?,
+            MediumKind::Grid(g) => g.place(map)?,
+            MediumKind::Homogeneous(_) => {}
+            MediumKind::Deformed(_) => return Err(MediumError::Deformed),
+            MediumKind::Custom(_) => return Err(MediumError::CustomField),
         }
+        self.phase.place(map)
     }
 }

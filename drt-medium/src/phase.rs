@@ -1,21 +1,22 @@
 mod blend;
+mod local;
 mod tabulated;
 
 use alloc::boxed::Box;
 use core::f64::consts::PI;
 
-use drt_math::{Frame, Real, Vec3, fm, vec3};
+use drt_math::{Affine, Mat3, Real, Vec3, fm};
 
-use crate::MediumError;
+use crate::volume::check_scalars;
+use crate::{Grid, MediumError, Property};
 pub use blend::PhaseBlend;
+pub use local::{LocalPhase, PhaseGradient};
 pub use tabulated::PhaseTable;
 
 /// Distribution of scattered directions.
 ///
-/// Every cosine here is `c = w' . w` between the incoming and the outgoing direction of light
-/// *flow*: `c = 1` goes straight on. Values are per steradian and integrate to one over the
-/// sphere. Swapping or reversing both directions leaves `c` unchanged, so the same numbers serve
-/// light paths and camera paths.
+/// Its numbers may vary in space. [`Phase::at`] and [`Medium::phase_at`](crate::Medium::phase_at) give it at a point, where it can
+/// be evaluated and sampled.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Phase {
@@ -27,6 +28,8 @@ pub enum Phase {
         /// Mean cosine, in (-1, 1); positive scatters forward.
         g: f64,
     },
+    /// Henyey and Greenstein's function with a mean cosine that a grid of one channel gives.
+    HenyeyGreensteinGrid(Box<Grid>),
     /// Particles much smaller than the wavelength: `3 (1 + c²) / (16 pi)`.
     Rayleigh,
     /// Two others in proportion.
@@ -45,116 +48,104 @@ impl Phase {
         phase.validate().map(|()| phase)
     }
 
-    /// Checks the mean cosine.
+    /// Henyey-Greenstein with a mean cosine from a grid.
     ///
     /// # Errors
-    /// When it does not lie in (-1, 1).
+    /// When the grid has three channels, or a value does not lie in (-1, 1).
+    pub fn henyey_greenstein_grid(g: Grid) -> Result<Self, MediumError> {
+        let phase = Self::HenyeyGreensteinGrid(Box::new(g));
+        phase.validate().map(|()| phase)
+    }
+
+    /// Checks mean cosines and weights.
+    ///
+    /// # Errors
+    /// When a mean cosine does not lie in (-1, 1), or a weight not in [0, 1], or a grid of these has three channels.
     pub fn validate(&self) -> Result<(), MediumError> {
-        match *self {
-            Self::Blend(ref blend) => blend.parts().iter().try_for_each(Self::validate),
-            Self::HenyeyGreenstein { g } if !(g > -1.0 && g < 1.0) => {
-                Err(MediumError::OutOfRange {
-                    property: crate::Property::G,
-                    value: g,
-                    expected: "between -1 and 1, both excluded",
-                })
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Density per steradian at a flow cosine.
-    #[inline]
-    pub fn eval<T: Real>(&self, c: T) -> T {
-        match *self {
-            Self::Isotropic => T::from(0.25 / PI),
-            Self::HenyeyGreenstein { g } => henyey_greenstein(T::from(g), c),
-            Self::Rayleigh => rayleigh(c),
-            Self::Blend(ref blend) => blend.eval(c),
-            Self::Tabulated(ref table) => table.eval(c),
-        }
-    }
-
-    /// Derivative of [`Phase::eval`] with respect to the cosine.
-    #[inline]
-    #[must_use]
-    pub fn d_cos(&self, c: f64) -> f64 {
-        match *self {
-            Self::Isotropic => 0.0,
-            Self::HenyeyGreenstein { g } => henyey_greenstein(g, c) * 3.0 * g / squared_chord(g, c),
-            Self::Rayleigh => 3.0 / (8.0 * PI) * c,
-            Self::Blend(ref blend) => blend.d_cos(c),
-            Self::Tabulated(ref table) => table.d_cos(c),
-        }
-    }
-
-    /// Derivative of [`Phase::eval`] with respect to the mean cosine of Henyey-Greenstein. The
-    /// isotropic function counts as its member `g = 0`; the others have no such parameter: zero.
-    #[inline]
-    #[must_use]
-    pub fn d_g(&self, c: f64) -> f64 {
-        let g = match *self {
-            Self::Isotropic => 0.0,
-            Self::HenyeyGreenstein { g } => g,
-            Self::Rayleigh | Self::Blend(_) | Self::Tabulated(_) => return 0.0,
-        };
-        let s = squared_chord(g, c);
-        let slope = -2.0 * g * s - 3.0 * (1.0 - g) * (1.0 + g) * (g - c);
-        slope / (4.0 * PI * s * s * fm::sqrt(s))
-    }
-
-    /// The mean cosine `g` where the phase function has that parameter.
-    #[inline]
-    #[must_use]
-    pub fn mean_cosine_parameter(&self) -> Option<f64> {
-        match *self {
-            Self::Isotropic => Some(0.0),
-            Self::HenyeyGreenstein { g } => Some(g),
-            Self::Rayleigh | Self::Blend(_) | Self::Tabulated(_) => None,
-        }
-    }
-
-    /// How far it is from even, from 0 to 1: the largest |mean cosine| of the lobes that it is made of.
-    #[must_use]
-    pub fn sharpness(&self) -> f64 {
         match self {
-            Self::Isotropic | Self::Rayleigh => 0.0,
-            Self::HenyeyGreenstein { g } => Real::abs(*g),
-            Self::Blend(blend) => blend.parts().iter().map(Self::sharpness).fold(0.0, f64::max),
-            Self::Tabulated(table) => Real::abs(table.mean_cosine()),
+            Self::Blend(blend) => blend.validate(),
+            Self::HenyeyGreenstein { g } => check_mean_cosine(*g),
+            Self::HenyeyGreensteinGrid(g) => check_scalars(Property::G, g, check_mean_cosine),
+            Self::Isotropic | Self::Rayleigh | Self::Tabulated(_) => Ok(()),
         }
     }
 
-    /// A flow direction after scattering, with density proportional to the phase function, and
-    /// that density per steradian. `flow` is the unit direction before; `u` are two uniform
-    /// numbers in [0, 1).
+    /// The phase function at a point of the space in which its grids are placed.
     #[inline]
     #[must_use]
-    pub fn sample(&self, flow: Vec3, u: [f64; 2]) -> (Vec3, f64) {
-        if let Self::Blend(blend) = self {
-            return blend.sample(flow, u);
-        }
-        // Both 1 - c and 1 + c, so that the sine keeps its digits next to the poles.
-        let (below, above) = match *self {
-            Self::Isotropic => (2.0 * (1.0 - u[0]), 2.0 * u[0]),
-            Self::HenyeyGreenstein { g } => henyey_greenstein_cosine(g, u[0]),
-            Self::Rayleigh => {
-                let c = rayleigh_cosine(u[0]);
-                (1.0 - c, 1.0 + c)
-            }
-            // Taken care of above.
-            Self::Blend(_) => (1.0, 1.0),
-            Self::Tabulated(ref table) => {
-                let c = table.sample_cosine(u[0]);
-                (1.0 - c, 1.0 + c)
-            }
-        };
-        let c = if below < above { 1.0 - below } else { above - 1.0 };
-        let s = fm::sqrt(f64::max(0.0, below * above));
-        let (sin_phi, cos_phi) = fm::sin_cos(2.0 * PI * u[1]);
-        let w = Frame::from_normal(flow).to_world(vec3(s * cos_phi, s * sin_phi, c));
-        (w, self.eval(c))
+    pub fn at(&self, x: Vec3) -> LocalPhase<'_> {
+        LocalPhase::new(self, x, Mat3::IDENTITY)
     }
+
+    /// True where it is not the same everywhere.
+    #[inline]
+    #[must_use]
+    pub fn varies(&self) -> bool {
+        match self {
+            Self::HenyeyGreensteinGrid(_) => true,
+            Self::Blend(blend) => blend.varies(),
+            Self::Isotropic
+            | Self::HenyeyGreenstein { .. }
+            | Self::Rayleigh
+            | Self::Tabulated(_) => false,
+        }
+    }
+
+    /// The voxels that give its mean cosine or its weight; `None` where that is the same everywhere.
+    #[must_use]
+    pub fn voxels(&self, property: Property) -> Option<&Grid> {
+        match (self, property) {
+            (Self::HenyeyGreensteinGrid(g), Property::G) => Some(g),
+            (Self::Blend(blend), Property::Weight) => blend.weight().grid(),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn voxels_mut(&mut self, property: Property) -> Option<&mut Grid> {
+        match (self, property) {
+            (Self::HenyeyGreensteinGrid(g), Property::G) => Some(g),
+            (Self::Blend(blend), Property::Weight) => blend.weight.grid_mut(),
+            _ => None,
+        }
+    }
+
+    /// Shows all grids in it, those of the parts of a blend too.
+    pub(crate) fn grids<'a>(&'a self, visit: &mut dyn FnMut(&'a Grid)) {
+        match self {
+            Self::HenyeyGreensteinGrid(g) => visit(g),
+            Self::Blend(blend) => {
+                blend.weight().grid().into_iter().for_each(&mut *visit);
+                blend.parts().iter().for_each(|part| part.grids(visit));
+            }
+            Self::Isotropic
+            | Self::HenyeyGreenstein { .. }
+            | Self::Rayleigh
+            | Self::Tabulated(_) => {}
+        }
+    }
+
+    /// Moves its grids by a map of the world.
+    ///
+    /// # Errors
+    /// When the map is singular.
+    pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
+        match self {
+            Self::HenyeyGreensteinGrid(g) => g.place(map),
+            Self::Blend(blend) => blend.place(map),
+            Self::Isotropic
+            | Self::HenyeyGreenstein { .. }
+            | Self::Rayleigh
+            | Self::Tabulated(_) => Ok(()),
+        }
+    }
+}
+
+fn check_mean_cosine(g: f64) -> Result<(), MediumError> {
+    if g > -1.0 && g < 1.0 {
+        return Ok(());
+    }
+    let expected = "between -1 and 1, both excluded";
+    Err(MediumError::OutOfRange { property: Property::G, value: g, expected })
 }
 
 /// `1 + g² - 2 g c` as a sum of nonnegative terms: near the peak of a sharp lobe the textbook

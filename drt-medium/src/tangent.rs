@@ -6,7 +6,7 @@ use drt_math::{Affine, Rgb, ValueChange, ValueMap, Vec3};
 use crate::change::{Field, FieldChange};
 use crate::{
     CoefficientGradients, CoefficientRates, Coefficients, Flow, FlowPlace, Grid, Medium,
-    MediumChange, MediumError, Property,
+    MediumChange, MediumError, PhaseGradient, Property,
 };
 
 /// Derivative of one coefficient field with respect to a parameter, at rest:
@@ -35,7 +35,9 @@ pub struct MediumTangent {
     /// Of the emitted radiance.
     pub emission: FieldTangent,
     /// Of the phase function's mean cosine.
-    pub g: f64,
+    pub g: FieldTangent,
+    /// Of the weight of a blend of phase functions.
+    pub weight: FieldTangent,
     /// Velocity field of the grids, in world coordinates.
     pub velocity: Affine,
     /// Further velocities of the grids, which add up.
@@ -126,7 +128,8 @@ impl MediumTangent {
             sigma_t: FieldTangent::default(),
             albedo: FieldTangent::default(),
             emission: FieldTangent::default(),
-            g: 0.0,
+            g: FieldTangent::default(),
+            weight: FieldTangent::default(),
             velocity: Affine::ZERO,
             flows: Vec::new(),
         }
@@ -138,7 +141,8 @@ impl MediumTangent {
         self.sigma_t.is_zero()
             && self.albedo.is_zero()
             && self.emission.is_zero()
-            && self.g == 0.0
+            && self.g.is_zero()
+            && self.weight.is_zero()
             && !self.moves_grids()
     }
 
@@ -148,7 +152,8 @@ impl MediumTangent {
         self.sigma_t.add(&o.sigma_t);
         self.albedo.add(&o.albedo);
         self.emission.add(&o.emission);
-        self.g += o.g;
+        self.g.add(&o.g);
+        self.weight.add(&o.weight);
         self.velocity = self.velocity.plus(&o.velocity);
         for flow in &o.flows {
             if !self.flows.iter_mut().any(|own| own.add(flow)) {
@@ -161,7 +166,6 @@ impl MediumTangent {
     /// Chain rule: this tangent after a later change, made at theta, has acted on the medium too.
     pub fn push_through(&mut self, later: &MediumChange, theta: f64) {
         match later {
-            MediumChange::G(op) => self.g *= op.map(theta).factor,
             MediumChange::Place { map, .. } => {
                 let turn = Affine { linear: map.linear, translation: Vec3::ZERO };
                 self.velocity = turn.after(&self.velocity).after(&map.inverse());
@@ -180,6 +184,8 @@ impl MediumTangent {
             Field::SigmaT => &mut self.sigma_t,
             Field::Albedo => &mut self.albedo,
             Field::Emission => &mut self.emission,
+            Field::G => &mut self.g,
+            Field::Weight => &mut self.weight,
         }
     }
 
@@ -232,14 +238,39 @@ impl MediumTangent {
     ) -> CoefficientRates {
         let (c, u) = (coefficients, velocity);
         let Some((grids, at)) = medium.volumes_at(x) else {
-            return CoefficientRates { g: self.g, ..CoefficientRates::ZERO };
+            return CoefficientRates::ZERO;
         };
         CoefficientRates {
             sigma_t: self.sigma_t.rate(c.sigma_t, grids[0], at) - gradients.sigma_t.dot(u),
             albedo: self.albedo.rate(c.albedo, grids[1], at) - gradients.albedo.dot(u),
             emission: self.emission.rate(c.emission, grids[2], at) - gradients.emission.dot(u),
-            g: self.g,
         }
+    }
+
+    /// Eulerian rate of the phase function's value, for one pair of directions, at the fixed point x of the world. `gradient` is that
+    /// of the value, and `place` remembers what other tangents at the same point can use.
+    #[must_use]
+    pub fn phase_rate(
+        &self,
+        medium: &Medium,
+        x: Vec3,
+        gradient: &PhaseGradient,
+        place: &mut FlowPlace,
+    ) -> f64 {
+        let mut rate = 0.0;
+        for (tangent, property, by) in
+            [(&self.g, Property::G, gradient.g), (&self.weight, Property::Weight, gradient.weight)]
+        {
+            if by != 0.0 && !tangent.is_zero() {
+                let here = medium.phase_at(x);
+                let grid = medium.phase.voxels(property);
+                rate += by * tangent.rate(Rgb::splat(here.number()), grid, here.looked_up()).r;
+            }
+        }
+        if gradient.place != Vec3::ZERO && self.moves_grids() {
+            rate -= gradient.place.dot(self.grid_velocity(x, place));
+        }
+        rate
     }
 }
 
@@ -257,13 +288,11 @@ impl Medium {
                     tangent.velocity = *velocity;
                 }
             }
-            MediumChange::G(op) => {
-                let g = self.phase.mean_cosine_parameter().ok_or(MediumError::NoMeanCosine)?;
-                relative_rate(Property::G, op, theta)?;
-                tangent.g = op.rate(Rgb::splat(g), theta).r;
-            }
             _ => {
                 if let Some(c) = change.field() {
+                    if matches!(c.field, Field::G | Field::Weight) {
+                        self.phase.check_change(&c)?;
+                    }
                     let present = self.voxel_value(&c)?;
                     *tangent.field_mut(c.field) = FieldTangent::of(&c, theta, present)?;
                 }

@@ -79,3 +79,15 @@ impl Volume {
 pub(crate) fn check_grid(property: Property, grid: &Grid, scale: f64) -> Result<(), MediumError> {
     grid.values().iter().try_for_each(|&v| check(property, Rgb::splat(v * scale)))
 }
+
+/// Refuses a grid of more than one channel, or with a value that `check` refuses.
+pub(crate) fn check_scalars(
+    property: Property,
+    grid: &Grid,
+    check: impl Fn(f64) -> Result<(), MediumError>,
+) -> Result<(), MediumError> {
+    if grid.channels() != 1 {
+        return Err(MediumError::NotScalar { property });
+    }
+    grid.values().iter().try_for_each(|v| check(*v))
+}

@@ -219,9 +219,13 @@ fn phase(p: &Phase) -> String {
         Phase::Isotropic => "isotropic".into(),
         Phase::Rayleigh => "rayleigh".into(),
         Phase::HenyeyGreenstein { g } => format!("hg, g {g}"),
+        Phase::HenyeyGreensteinGrid(_) => "hg, a grid of g".into(),
         Phase::Blend(blend) => {
             let [a, b] = blend.parts().each_ref().map(phase);
-            format!("{a}, and {} of {b}", blend.weight())
+            match blend.weight() {
+                Volume::Constant(weight) => format!("{a}, and {} of {b}", weight.r),
+                Volume::Grid(_) => format!("{a}, and {b} by a grid of weights"),
+            }
         }
         Phase::Tabulated(table) => format!("a table, mean cosine {}", table.mean_cosine()),
     }

@@ -84,12 +84,7 @@ pub(super) fn check_voxels(
             ));
         };
         let medium = &scene.media[*m].item;
-        let voxels = match property.as_str() {
-            "sigma_t" => medium.voxels(Property::SigmaT),
-            "albedo" => medium.voxels(Property::Albedo),
-            "emission" => medium.voxels(Property::Emission),
-            _ => None,
-        };
+        let voxels = Property::from_name(property).and_then(|p| medium.voxels(p));
         if voxels.is_none() {
             let name = &effect.target;
             return Err(format!("`voxels`: {property} of `{name}` has no grid, and so no voxels"));

@@ -166,19 +166,21 @@ fn texels(
 }
 
 fn property(name: Option<&str>) -> Result<drt_medium::Property, String> {
-    match name {
-        Some("sigma_t") => Ok(drt_medium::Property::SigmaT),
-        Some("albedo") => Ok(drt_medium::Property::Albedo),
-        Some("emission") => Ok(drt_medium::Property::Emission),
-        _ => Err("`voxels` need `property`: sigma_t, albedo or emission".into()),
-    }
+    name.and_then(drt_medium::Property::from_name)
+        .ok_or_else(|| "`voxels` need `property`: sigma_t, albedo, emission, g or weight".into())
 }
+
+/// How far from zero a fit takes mean cosines where nothing else is said: at 1 nothing is scattered aside.
+const SHARPEST_G: f64 = 0.99;
 
 /// How a group is stepped. Values stay in the range in which they have a meaning, where nothing else is said.
 fn steps(keys: &keys::ParameterGroup, kind: &GroupKind) -> Result<GroupSteps, String> {
     let all = [f64::NEG_INFINITY, f64::INFINITY];
     let meaningful = match kind {
-        GroupKind::Voxels(drt_medium::Property::Albedo) => [0.0, 1.0],
+        GroupKind::Voxels(drt_medium::Property::Albedo | drt_medium::Property::Weight) => {
+            [0.0, 1.0]
+        }
+        GroupKind::Voxels(drt_medium::Property::G) => [-SHARPEST_G, SHARPEST_G],
         GroupKind::Voxels(_) | GroupKind::LightTexels => [0.0, f64::INFINITY],
         GroupKind::Texels { property, .. } => property.range(),
         _ => all,

@@ -12,7 +12,7 @@ use super::element::Element;
 use super::numbers::numbers;
 use super::parts::Parts;
 use super::properties::Properties;
-use super::volumes::Field;
+use super::volumes::{self, Field, Values};
 use crate::CliError;
 
 /// Extinction (before the medium's scale), albedo and emitted radiance.
@@ -94,8 +94,7 @@ impl<'a> Loader<'a> {
         let phase = match p.kind()? {
             "isotropic" => Phase::Isotropic,
             "rayleigh" => Phase::Rayleigh,
-            "hg" => Phase::henyey_greenstein(p.float("g")?.unwrap_or(0.8))
-                .map_err(|err| e.error(err))?,
+            "hg" => self.henyey_greenstein(&p)?,
             "blendphase" => self.blended_phase(&p, parts)?,
             "tabphase" => {
                 let values = p.string("values")?.ok_or_else(|| e.error("`values` is missing"))?;
@@ -113,6 +112,24 @@ impl<'a> Loader<'a> {
         Ok(phase)
     }
 
+    /// With one mean cosine, or with a volume of them.
+    fn henyey_greenstein(&self, p: &Properties<'a>) -> Result<Phase, CliError> {
+        let grid = match self.index.single(p, "volume", Some("g"))? {
+            Some(volume) => match volumes::read(volume.target, Values::Any)?.volume {
+                Volume::Grid(grid) => Some(grid),
+                Volume::Constant(g) => {
+                    return Phase::henyey_greenstein(g.r).map_err(|err| p.element.error(err));
+                }
+            },
+            None => None,
+        };
+        let phase = match grid {
+            Some(grid) => Phase::henyey_greenstein_grid(grid),
+            None => Phase::henyey_greenstein(p.float("g")?.unwrap_or(0.8)),
+        };
+        phase.map_err(|err| p.element.error(err))
+    }
+
     /// Of the two inside, in the order of the file.
     fn blended_phase(&self, p: &Properties<'a>, parts: &Parts) -> Result<Phase, CliError> {
         let e = p.element;
@@ -123,12 +140,12 @@ impl<'a> Loader<'a> {
                 e.error(format!("expected two phase functions inside, found {}", inner.len()))
             );
         };
-        let Some(weight) = weight.as_constant() else {
-            return Err(e.error("a `weight` that varies in space is not supported"));
-        };
         let parts = [self.phase_part(a.target, parts)?, self.phase_part(b.target, parts)?];
-        let blend = PhaseBlend::new(weight.r, parts).map_err(|err| e.error(err))?;
-        Ok(Phase::Blend(Box::new(blend)))
+        let blend = match weight.volume {
+            Volume::Constant(weight) => PhaseBlend::new(weight.r, parts),
+            Volume::Grid(weights) => PhaseBlend::varying(weights, parts),
+        };
+        Ok(Phase::Blend(Box::new(blend.map_err(|err| e.error(err))?)))
     }
 
     /// The medium stated for a camera or light: a reference, or one nested there.

@@ -250,7 +250,11 @@ impl<'a> Loader<'a> {
                 "shape" | "bsdf" | "medium" | "emitter" | "sensor" | "alias" => {}
                 // Read for their own sake, so that mistakes in unused ones are found too.
                 "phase" => self.unless_unused(e, self.phase(e).map(drop), || Ok(()))?,
-                "volume" => self.unless_unused(e, volumes::read(e).map(drop), || Ok(()))?,
+                "volume" => {
+                    self.unless_unused(e, volumes::read(e, volumes::Values::Any).map(drop), || {
+                        Ok(())
+                    })?
+                }
                 "texture" if e.id().is_some() && properties::varies(e) => {
                     self.unless_unused(e, textures::read(e).map(drop), || Ok(()))?;
                 }

@@ -99,7 +99,7 @@ fn volume(p: &Properties<'_>) -> Result<Texture, CliError> {
     if e.tag != "volume" {
         return Err(e.error("`volume` must be a <volume>"));
     }
-    let volume = Arc::new(volumes::read(e)?.volume);
+    let volume = Arc::new(volumes::read(e, volumes::Values::NotNegative)?.volume);
     Ok(Texture::Volume(VolumeTexture { volume, grey: false }))
 }
 

@@ -7,11 +7,12 @@ use std::collections::HashSet;
 
 use drt_estimators::Named;
 use drt_math::Rgb;
-use drt_medium::{Homogeneous, Medium, MediumKind};
+use drt_medium::{Homogeneous, Medium, MediumKind, UniformMedium, Volume};
 
 use super::Loader;
 use super::element::Element;
 use super::properties::Properties;
+use super::volumes::{self, Values};
 use crate::CliError;
 
 /// True for what is a medium's light, and no emitter of the scene.
@@ -48,36 +49,50 @@ impl<'a> Loader<'a> {
                     .target
                     .error("the shape around it has no medium called `interior`"));
             };
-            glow(light.target, &mut media[number].item)?;
+            self.glow(light.target, &mut media[number].item)?;
         }
         Ok(())
     }
+
+    fn glow(&self, light: &'a Element, medium: &mut Medium) -> Result<(), CliError> {
+        let p = Properties::of(light)?;
+        p.kind()?;
+        let radiance = match self.index.single(&p, "volume", Some("radiance"))? {
+            Some(volume) => volumes::read(volume.target, Values::NotNegative)?.volume,
+            None => Volume::Constant(p.light("radiance")?.unwrap_or(Rgb::ZERO)),
+        };
+        p.finish()?;
+        emit(light, &radiance, medium)
+    }
 }
 
-fn glow(light: &Element, medium: &mut Medium) -> Result<(), CliError> {
-    let p = Properties::of(light)?;
-    p.kind()?;
-    let grid = light.children.iter().find(|e| e.tag == "volume");
-    if let Some(grid) = grid {
-        return Err(grid
-            .error("the `radiance` of a volumelight as a volume is not supported; give a colour"));
-    }
-    let radiance = p.light("radiance")?.unwrap_or(Rgb::ZERO);
-    p.finish()?;
+fn emit(light: &Element, radiance: &Volume, medium: &mut Medium) -> Result<(), CliError> {
     let MediumKind::Homogeneous(h) = &medium.kind else {
         return Err(light.error(
             "a volumelight in a medium with grids is not supported; give the medium an `emission`",
         ));
     };
     let c = h.coefficients();
+    let brightest = match radiance {
+        Volume::Constant(radiance) => *radiance,
+        Volume::Grid(grid) => grid.largest(),
+    };
     let dark = |(source, absorbed): (f64, f64)| source > 0.0 && absorbed <= 0.0;
-    if radiance.to_array().into_iter().zip(c.sigma_a().to_array()).any(dark) {
+    if brightest.to_array().into_iter().zip(c.sigma_a().to_array()).any(dark) {
         return Err(light.error(
             "a volumelight in a medium that does not absorb, in any of its three colours, is not supported",
         ));
     }
-    let emission = radiance.div_or_zero(c.sigma_a());
-    medium.kind =
-        Homogeneous::new(c.sigma_t, c.albedo, emission).map_err(|err| light.error(err))?.into();
+    let per_source = Rgb::ONE.div_or_zero(c.sigma_a());
+    let kind = match radiance {
+        Volume::Constant(radiance) => {
+            Homogeneous::new(c.sigma_t, c.albedo, *radiance * per_source).map(MediumKind::from)
+        }
+        Volume::Grid(grid) => {
+            let (albedo, emission) = (Volume::Constant(c.albedo), grid.scaled(per_source));
+            UniformMedium::new(c.sigma_t, albedo, Volume::Grid(emission)).map(MediumKind::from)
+        }
+    };
+    medium.kind = kind.map_err(|err| light.error(err))?;
     Ok(())
 }

@@ -37,18 +37,25 @@ impl<'a> Loader<'a> {
         name: &'static str,
     ) -> Result<Option<Field>, CliError> {
         match self.index.single(p, "volume", Some(name))? {
-            Some(volume) => read(volume.target).map(Some),
+            Some(volume) => read(volume.target, Values::NotNegative).map(Some),
             None => Ok(p.uniform_color(name)?.map(Field::constant)),
         }
     }
 }
 
+/// What the values of a grid may be.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Values {
+    NotNegative,
+    Any,
+}
+
 /// A `<volume>` element.
-pub(super) fn read(e: &Element) -> Result<Field, CliError> {
+pub(super) fn read(e: &Element, values: Values) -> Result<Field, CliError> {
     let p = Properties::of(e)?;
     let field = match p.kind()? {
         "constvolume" => constant(&p)?,
-        "gridvolume" => grid(&p)?,
+        "gridvolume" => grid(&p, values)?,
         other => {
             return Err(e.error(format!(
                 "the volume type `{other}` is not supported; expected gridvolume or constvolume"
@@ -84,7 +91,7 @@ fn not_negative(p: &Properties<'_>, grid: Grid) -> Result<Grid, CliError> {
     Grid::new(grid.size(), grid.channels(), values).map_err(|err| p.element.error(err))
 }
 
-fn grid(p: &Properties<'_>) -> Result<Field, CliError> {
+fn grid(p: &Properties<'_>, values: Values) -> Result<Field, CliError> {
     let e = p.element;
     let path = p.path("filename")?.ok_or_else(|| e.error("`filename` is missing"))?;
     let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
@@ -110,7 +117,7 @@ fn grid(p: &Properties<'_>) -> Result<Field, CliError> {
         (file.grid, placement)
     };
     let stored = if in_stored_box { placement } else { Affine::IDENTITY };
-    let grid = not_negative(p, grid)?;
+    let grid = if values == Values::Any { grid } else { not_negative(p, grid)? };
     let grid = (grid.with_layout(layout).with_filter(filter).with_wrap(wrap))
         .with_placement(to_world.after(&stored))
         .map_err(|err| e.error(err))?;

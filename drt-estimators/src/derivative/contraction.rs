@@ -3,7 +3,9 @@
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
-use drt_medium::{CoefficientGradients, CoefficientRates, DepthEstimate, FlowPlace, MediumTangent};
+use drt_medium::{
+    CoefficientGradients, CoefficientRates, DepthEstimate, FlowPlace, MediumTangent, PhaseGradient,
+};
 use drt_motion::interior::BasisValues;
 
 use crate::derivative::medium_motion::MediumMotions;
@@ -200,6 +202,14 @@ impl AdjointSink for Contraction<'_> {
             let velocity = tangent.grid_velocity(x, &mut self.flow);
             let rates = tangent.rates_given(medium, x, &coefficients, &gradients, velocity);
             self.rates[*p] += adjoint.dot(&rates);
+        }
+    }
+
+    fn phase(&mut self, medium: usize, x: Vec3, gradient: &PhaseGradient, adjoint: Rgb) {
+        let tangents = &self.motion.tangents.media[medium];
+        let medium = self.world.medium(medium);
+        for (p, tangent) in tangents {
+            self.rates[*p] += adjoint * tangent.phase_rate(medium, x, gradient, &mut self.flow);
         }
     }
 

@@ -6,7 +6,7 @@
 use alloc::vec::Vec;
 
 use drt_math::{Rgb, RgbVec, Vec3};
-use drt_medium::{CoefficientRates, DepthEstimate};
+use drt_medium::{CoefficientRates, DepthEstimate, PhaseGradient};
 
 use crate::model::emitter::EmitterGradient;
 use crate::model::sensor::SensorGradient;
@@ -53,8 +53,6 @@ pub(crate) struct CoefficientAdjoint {
     pub(crate) sigma_t: Rgb,
     pub(crate) albedo: Rgb,
     pub(crate) emission: Rgb,
-    /// Of every channel, by the one asymmetry parameter.
-    pub(crate) g: Rgb,
 }
 
 impl CoefficientAdjoint {
@@ -65,10 +63,7 @@ impl CoefficientAdjoint {
 
     /// The change along rates of the coefficients.
     pub(crate) fn dot(&self, r: &CoefficientRates) -> Rgb {
-        self.sigma_t * r.sigma_t
-            + self.albedo * r.albedo
-            + self.emission * r.emission
-            + self.g * r.g
+        self.sigma_t * r.sigma_t + self.albedo * r.albedo + self.emission * r.emission
     }
 
     /// The channels summed with weights.
@@ -77,7 +72,6 @@ impl CoefficientAdjoint {
             sigma_t: self.sigma_t * w,
             albedo: self.albedo * w,
             emission: self.emission * w,
-            g: self.g.dot(w),
         }
     }
 }
@@ -145,6 +139,8 @@ pub(crate) trait AdjointSink {
     fn grid(&mut self, medium: usize, x: Vec3, u: &RgbVec);
     /// Of a medium's coefficients at a point of space.
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint);
+    /// Of the value of a medium's phase function at a point of space, whose gradient is given.
+    fn phase(&mut self, medium: usize, x: Vec3, gradient: &PhaseGradient, adjoint: Rgb);
     /// Of the optical depth of a ray through a medium that varies in space.
     fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb);
     /// Of a material's parameters; `weight` multiplies channel by channel.
@@ -181,9 +177,13 @@ impl AdjointSink for Scaled<'_> {
     }
 
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
-        let CoefficientAdjoint { sigma_t, albedo, emission, g } = *adjoint;
-        let [sigma_t, albedo, emission, g] = [sigma_t, albedo, emission, g].map(|v| v * self.by);
-        self.sink.medium(medium, x, &CoefficientAdjoint { sigma_t, albedo, emission, g });
+        let CoefficientAdjoint { sigma_t, albedo, emission } = *adjoint;
+        let [sigma_t, albedo, emission] = [sigma_t, albedo, emission].map(|v| v * self.by);
+        self.sink.medium(medium, x, &CoefficientAdjoint { sigma_t, albedo, emission });
+    }
+
+    fn phase(&mut self, medium: usize, x: Vec3, gradient: &PhaseGradient, adjoint: Rgb) {
+        self.sink.phase(medium, x, gradient, adjoint * self.by);
     }
 
     fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {

@@ -410,11 +410,8 @@ impl Apply<'_> {
             "sigma_t" => MediumChange::SigmaT { op, voxels },
             "albedo" => MediumChange::Albedo { op, voxels },
             "emission" => MediumChange::Emission { op, voxels },
-            "g" if voxels.is_some() => {
-                let property = drt_medium::Property::G;
-                return Err(self.fail(p, target, drt_medium::MediumError::NotAGrid { property }));
-            }
-            "g" => MediumChange::G(op),
+            "g" => MediumChange::G { op, voxels },
+            "weight" => MediumChange::Weight { op, voxels },
             other => {
                 return Err(self.fail(p, target, EffectError::MediumProperty(other.into())));
             }

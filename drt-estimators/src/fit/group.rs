@@ -323,8 +323,8 @@ impl Collector {
                     drt_medium::Property::SigmaT => &of.sigma_t.voxels,
                     drt_medium::Property::Albedo => &of.albedo.voxels,
                     drt_medium::Property::Emission => &of.emission.voxels,
-                    // It is no grid.
-                    drt_medium::Property::G => return,
+                    drt_medium::Property::G => &of.g.voxels,
+                    drt_medium::Property::Weight => &of.weight.voxels,
                 };
                 out.extend(voxels.iter().map(|v| v * scale));
             }

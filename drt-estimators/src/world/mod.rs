@@ -226,7 +226,7 @@ impl World {
                 let at = (!bsdf.is_plain()).then(|| self.texture_point(s));
                 Some(Scattering::Surface(bsdf.at(at, s.ng, s.ns, shape.mesh.normals.is_some())))
             }
-            Kind::Volume(_) => v.medium.map(|m| Scattering::Volume(&self.medium(m).phase)),
+            Kind::Volume(_) => v.medium.map(|m| Scattering::Volume(self.medium(m).phase_at(v.x))),
             Kind::Point => None,
         }
     }

@@ -2,7 +2,7 @@
 
 use drt_geom::edges::Lobes;
 use drt_math::{Rgb, RgbVec, Rng, Vec3};
-use drt_medium::Phase;
+use drt_medium::{LocalPhase, Phase, PhaseGradient};
 
 use crate::model::surface::{
     BsdfParams, DirectionPartner, Given, LocalBsdf, RoughnessPartner, SpecularSample,
@@ -14,7 +14,7 @@ pub(crate) enum Scattering<'a> {
     /// BSDF times the cosine on the light's side.
     Surface(LocalBsdf<'a>),
     /// Phase function; the scattering coefficient is not in it.
-    Volume(&'a Phase),
+    Volume(LocalPhase<'a>),
 }
 
 /// A direction drawn at random.
@@ -35,8 +35,8 @@ pub(crate) struct ScatteringGradient {
     pub(crate) ng: RgbVec,
     /// With respect to the place of the point on its surface, where textures change.
     pub(crate) slide: RgbVec,
-    /// With respect to the phase function's asymmetry.
-    pub(crate) g: f64,
+    /// Of the phase function, in media.
+    pub(crate) phase: Option<PhaseGradient>,
     /// With respect to the material, on surfaces.
     pub(crate) params: Option<BsdfParams>,
 }
@@ -73,7 +73,7 @@ impl Scattering<'_> {
     pub(crate) fn pdf(&self, from: Vec3, to: Vec3, given: Given) -> f64 {
         match self {
             Self::Surface(bsdf) => bsdf.pdf(from, to, given),
-            Self::Volume(phase) => phase.eval(-from.dot(to)),
+            Self::Volume(phase) => phase.pdf(-from.dot(to)),
         }
     }
 
@@ -102,18 +102,18 @@ impl Scattering<'_> {
             Self::Surface(bsdf) => {
                 let (d, ng) = bsdf.gradient(wo, wi);
                 let (slide, params) = (bsdf.slide(wo, wi, &d.params), Some(d.params));
-                ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, ng, slide, g: 0.0, params }
+                ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, ng, slide, phase: None, params }
             }
             Self::Volume(phase) => {
-                let c = -wo.dot(wi);
-                let slope = Rgb::splat(-phase.d_cos(c));
+                let gradient = phase.gradient(-wo.dot(wi));
+                let slope = Rgb::splat(-gradient.cosine);
                 ScatteringGradient {
                     wo: slope.outer(wi),
                     wi: slope.outer(wo),
                     ns: RgbVec::ZERO,
                     ng: RgbVec::ZERO,
                     slide: RgbVec::ZERO,
-                    g: phase.d_g(c),
+                    phase: Some(gradient),
                     params: None,
                 }
             }
@@ -147,8 +147,8 @@ impl Scattering<'_> {
 
 /// A sketch of a phase function without a mean cosine to go by: one lobe to the side where there is more.
 #[cold]
-fn lobes_of(phase: &Phase, wo: Vec3) -> Lobes {
-    if matches!(phase, Phase::Rayleigh) {
+fn lobes_of(phase: &LocalPhase<'_>, wo: Vec3) -> Lobes {
+    if matches!(phase.phase(), Phase::Rayleigh) {
         return Lobes::even(phase.eval(0.0));
     }
     let side = if phase.eval(1.0) >= phase.eval(-1.0) { 1.0 } else { -1.0 };

@@ -142,6 +142,19 @@ fn voxels_of_a_scaled_density() {
     check(compare(&scene, group, &own, &wrong, scales, &[], &[]));
 }
 
+/// The mean cosines of a phase function, which are voxels as well.
+#[test]
+fn voxels_of_mean_cosines() {
+    let [scene, _] = varied_smoke(1.0).map(in_the_sun);
+    let group = Group::new("smoke", &scene, &"smoke", GroupKind::Voxels(Property::G));
+    let group = group.expect("a grid");
+    let own: Vec<f64> = group.values(&scene).iter().map(|v| 0.6 * v).collect();
+    let wrong: Vec<f64> = own.iter().map(|v| 1.3 * v).collect();
+    let op = drt_math::ValueChange::Multiply(0.6);
+    let scales = parameter("scales", 0.0, vec![changes("smoke", "g", op)]);
+    check(compare(&scene, group, &own, &wrong, scales, &[], &[]));
+}
+
 #[test]
 fn values_do_not_remember_the_way() {
     let scene = surfaces(diffuse(0.7, 0.5, 0.3), diffuse(0.4, 0.5, 0.6));

@@ -17,6 +17,7 @@ mod guiding;
 mod instances;
 mod intersections;
 mod orthographic;
+mod phases;
 mod plan;
 mod probes;
 mod sessions;

@@ -3,7 +3,7 @@
 use crate::common::pairing::{pair, targets};
 use crate::common::*;
 use drt_estimators::{
-    EstimatorKind, InteriorMotion, PathSampling, Session, Settings, Unattended, agreement,
+    EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Unattended, agreement,
     finite_differences,
 };
 use drt_math::{Rgb, Rng, ValueChange};
@@ -43,21 +43,38 @@ fn the_first_of_a_medium() {
 /// All estimators and samplings agree with finite differences.
 #[test]
 fn estimators_agree_in_sparse_media() {
-    // As near to the exact zeros as a central difference goes.
-    let step = 0.05;
-    let parameters = parameters(step);
-    let scene = sparse_cloud();
-    let spp = 4000;
+    judge(&sparse_cloud(), &parameters(STEP));
+}
+
+/// Light that a medium emits, and that of a lamp in it, is gathered at probes as any other is.
+#[test]
+fn estimators_agree_in_sparse_media_that_shine() {
+    let emits = |voxel| {
+        let op = ValueChange::Add(Rgb::new(0.9, 0.7, 0.5));
+        changes_voxel("cloud", "emission", voxel, op)
+    };
+    let slab = (0..16).map(|i| emits([i % 4, i / 4, 2])).collect();
+    let mut of_glow = parameters(STEP);
+    of_glow.retain(|p| p.name != "voxel");
+    of_glow.push(parameter("emission", STEP, slab));
+    judge(&glowing_cloud(), &of_glow);
+    judge(&inhabited_cloud(), &parameters(STEP)[..1]);
+}
+
+/// As near to the exact zeros as a central difference goes.
+const STEP: f64 = 0.05;
+
+fn judge(scene: &Scene, parameters: &[Parameter]) {
+    let (step, spp) = (STEP, 4000);
     let settings = Settings { seed: 3, ..Settings::default() };
-    let differences =
-        finite_differences(&scene, &parameters, &settings, 4 * spp, step, &Unattended);
+    let differences = finite_differences(scene, parameters, &settings, 4 * spp, step, &Unattended);
     let differences = differences.expect("a valid scene");
     let kinds = [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped];
     let from_camera = kinds.map(|kind| (kind, PathSampling::Unidirectional));
     let both = (EstimatorKind::PathSpace, PathSampling::Bidirectional);
     for (seed, (estimator, sampling)) in (7..).zip(from_camera.into_iter().chain([both])) {
         let settings = Settings { estimator, sampling, seed, ..Settings::default() };
-        let found = rendered(&scene, &parameters, &settings, spp);
+        let found = rendered(scene, parameters, &settings, spp);
         assert!(found.counters.probes > 0);
         for (d, difference) in found.derivatives.iter().zip(&differences) {
             let name = format!("{} by {estimator:?}, {sampling:?}", d.name);
@@ -66,6 +83,7 @@ fn estimators_agree_in_sparse_media() {
             let [known, error] = sum(difference);
             let [value, own] = sum(&d.total);
             let off = |part: f64| (part * value - known).abs() / f64::hypot(own, error);
+            println!("{name}: {value} ± {own}, {known} ± {error}");
             assert!(off(1.0) < 4.0, "{name}: {}", off(1.0));
             // As if half of it were missing.
             assert!(off(0.5) > 4.0, "{name}: {}", off(0.5));
@@ -76,19 +94,30 @@ fn estimators_agree_in_sparse_media() {
 /// The reverse mode is the transpose of the forward mode.
 #[test]
 fn transposes_of_probes() {
-    let scene = sparse_cloud();
+    let glows = ValueChange::Add(Rgb::new(0.9, 0.7, 0.5));
+    let glow = vec![changes_voxel("cloud", "emission", [1, 2, 2], glows), thickens()];
+    let glow = parameter("glow", 0.0, glow);
+    for (scene, parameters) in [
+        (sparse_cloud(), parameters(0.0)),
+        (glowing_cloud(), vec![parameters(0.0).swap_remove(2), glow]),
+    ] {
+        transposed(&scene, &parameters);
+    }
+}
+
+fn transposed(scene: &Scene, parameters: &[Parameter]) {
     let [width, height] = scene.sensors[0].item.sensor.film();
     let mut rng = Rng::new(99, 0, 0);
     let mut signed = || 2.0 * rng.next_f64() - 1.0;
     let adjoint: Vec<Rgb> =
         (0..width * height).map(|_| Rgb::new(signed(), signed(), signed())).collect();
     for estimator in [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped] {
-        for p in parameters(0.0) {
+        for p in parameters {
             let insides = vec![(0, InteriorMotion::Static)];
             let settings =
                 Settings { estimator, insides, seed: 3, guiding: false, ..Settings::default() };
             let mut session =
-                Session::new(&scene, core::slice::from_ref(&p), &settings).expect("a valid scene");
+                Session::new(scene, core::slice::from_ref(p), &settings).expect("a valid scene");
             assert!(session.run(16, &Unattended));
             let forward = session.rendering();
             assert!(forward.counters.probes > 0);
@@ -96,8 +125,8 @@ fn transposes_of_probes() {
             let products: Vec<Rgb> = pixels.map(|(pixel, a)| pixel.mean * *a).collect();
             let size: f64 = products.iter().map(|p| p.abs().sum()).sum();
             let along: f64 = products.iter().map(|p| p.sum()).sum();
-            let gradient = session.gradient(&targets(&scene, &p), 16, &adjoint, &Unattended);
-            let back = pair(&scene, &p, &gradient.expect("a valid scene"));
+            let gradient = session.gradient(&targets(scene, p), 16, &adjoint, &Unattended);
+            let back = pair(scene, p, &gradient.expect("a valid scene"));
             assert!((along - back).abs() < 1e-9 * size, "{}: {along} {back}", p.name);
         }
     }

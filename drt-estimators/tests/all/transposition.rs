@@ -342,6 +342,22 @@ fn voxels() {
     agree("in a moving box", &scene, effects, &with_tetrahedra());
 }
 
+/// Voxels of phase functions, at rest and moving.
+#[test]
+fn voxels_of_phase_functions() {
+    for (scene, property) in varied_smoke(1.0).iter().zip(["g", "weight"]) {
+        let mut rng = Rng::new(8, 0, 0);
+        let mut index = || (4.0 * rng.next_f64()) as usize;
+        let voxels = (0..20).map(|_| [index(), index(), index()]);
+        let mut effects: Vec<Effect> =
+            voxels.map(|v| changes_voxel("smoke", property, v, grey(0.3))).collect();
+        agree(property, scene, effects.clone(), &settings());
+        agree("grid turns", scene, vec![moves("smoke", turn())], &settings());
+        effects.extend([moves("box", wobble(scene, "box", 2)), moves("smoke", turn())]);
+        agree("in a moving box", scene, effects, &with_tetrahedra());
+    }
+}
+
 /// Texels, with what their textures are on at rest and moving.
 #[test]
 fn texels() {

@@ -1,13 +1,18 @@
-use drt_math::{Real, Vec3};
+use drt_math::{Affine, Rgb};
 
-use crate::{MediumError, Phase};
+use crate::volume::{Volume, check_scalars};
+use crate::{Grid, MediumError, Phase, Property};
 
-/// Two phase functions in proportion: `(1 - w) p_0 + w p_1`.
+/// Least probability of sampling either part of a blend: one of weight zero still has a derivative by the weight.
+const LEAST_CHOICE: f64 = 0.05;
+
+/// Two phase functions in proportion: `(1 - w) p_0 + w p_1`, with a weight that may vary in space.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(into = "(f64, [Phase; 2])", try_from = "(f64, [Phase; 2])"))]
+#[cfg_attr(feature = "serde", serde(into = "(Volume, [Phase; 2])"))]
+#[cfg_attr(feature = "serde", serde(try_from = "(Volume, [Phase; 2])"))]
 pub struct PhaseBlend {
-    weight: f64,
+    pub(crate) weight: Volume,
     parts: [Phase; 2],
 }
 
@@ -17,18 +22,34 @@ impl PhaseBlend {
     /// # Errors
     /// When the weight does not lie in [0, 1].
     pub fn new(weight: f64, parts: [Phase; 2]) -> Result<Self, MediumError> {
-        if (0.0..=1.0).contains(&weight) {
-            Ok(Self { weight, parts })
-        } else {
-            let expected = "between 0 and 1";
-            Err(MediumError::PhaseFunction { what: "weight", value: weight, expected })
-        }
+        Self::with(Volume::Constant(Rgb::splat(weight)), parts)
     }
 
-    /// The part of the second one.
+    /// A blend with a grid of weights of the second part.
+    ///
+    /// # Errors
+    /// When the grid has three channels, or a weight does not lie in [0, 1].
+    pub fn varying(weight: Grid, parts: [Phase; 2]) -> Result<Self, MediumError> {
+        Self::with(Volume::Grid(weight), parts)
+    }
+
+    fn with(weight: Volume, parts: [Phase; 2]) -> Result<Self, MediumError> {
+        let blend = Self { weight, parts };
+        blend.validate().map(|()| blend)
+    }
+
+    pub(super) fn validate(&self) -> Result<(), MediumError> {
+        match &self.weight {
+            Volume::Constant(w) => check_weight(w.r)?,
+            Volume::Grid(grid) => check_scalars(Property::Weight, grid, check_weight)?,
+        }
+        self.parts.iter().try_for_each(Phase::validate)
+    }
+
+    /// The part of the second one; all three channels are the same.
     #[must_use]
-    pub fn weight(&self) -> f64 {
-        self.weight
+    pub fn weight(&self) -> &Volume {
+        &self.weight
     }
 
     /// What it is made of.
@@ -37,39 +58,50 @@ impl PhaseBlend {
         &self.parts
     }
 
-    pub(super) fn eval<T: Real>(&self, c: T) -> T {
-        let [a, b] = &self.parts;
-        a.eval(c) * (1.0 - self.weight) + b.eval(c) * self.weight
+    pub(super) fn varies(&self) -> bool {
+        self.weight.grid().is_some() || self.parts.iter().any(Phase::varies)
     }
 
-    pub(super) fn d_cos(&self, c: f64) -> f64 {
-        let [a, b] = self.parts.each_ref().map(|p| p.d_cos(c));
-        a * (1.0 - self.weight) + b * self.weight
+    pub(super) fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
+        self.weight.place(map)?;
+        self.parts.iter_mut().try_for_each(|part| part.place(map))
     }
 
-    /// From one of the parts, with the density of both. The first number also says which.
-    pub(super) fn sample(&self, flow: Vec3, u: [f64; 2]) -> (Vec3, f64) {
-        let [a, b] = &self.parts;
+    /// Probability of sampling the second part.
+    #[inline]
+    pub(super) fn choice(weight: f64) -> f64 {
+        weight.clamp(LEAST_CHOICE, 1.0 - LEAST_CHOICE)
+    }
+
+    /// The part that a number in [0, 1) chooses, and the number stretched to [0, 1) again.
+    #[inline]
+    pub(super) fn choose(&self, weight: f64, u: f64) -> (usize, f64) {
+        let choice = Self::choice(weight);
         // Numbers stay below one.
         let rest = |v: f64| f64::min(v, 1.0 - f64::EPSILON);
-        let (w, _) = if u[0] < self.weight {
-            b.sample(flow, [rest(u[0] / self.weight), u[1]])
-        } else {
-            a.sample(flow, [rest((u[0] - self.weight) / (1.0 - self.weight)), u[1]])
-        };
-        (w, self.eval(flow.dot(w)))
+        if u < choice { (1, rest(u / choice)) } else { (0, rest((u - choice) / (1.0 - choice))) }
     }
 }
 
-impl From<PhaseBlend> for (f64, [Phase; 2]) {
+fn check_weight(value: f64) -> Result<(), MediumError> {
+    if (0.0..=1.0).contains(&value) {
+        return Ok(());
+    }
+    let expected = "between 0 and 1";
+    Err(MediumError::OutOfRange { property: Property::Weight, value, expected })
+}
+
+#[cfg(feature = "serde")]
+impl From<PhaseBlend> for (Volume, [Phase; 2]) {
     fn from(blend: PhaseBlend) -> Self {
         (blend.weight, blend.parts)
     }
 }
 
-impl TryFrom<(f64, [Phase; 2])> for PhaseBlend {
+#[cfg(feature = "serde")]
+impl TryFrom<(Volume, [Phase; 2])> for PhaseBlend {
     type Error = MediumError;
-    fn try_from((weight, parts): (f64, [Phase; 2])) -> Result<Self, MediumError> {
-        Self::new(weight, parts)
+    fn try_from((weight, parts): (Volume, [Phase; 2])) -> Result<Self, MediumError> {
+        Self::with(weight, parts)
     }
 }

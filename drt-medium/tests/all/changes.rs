@@ -4,8 +4,9 @@
 use crate::common::*;
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
 use drt_medium::{
-    CoefficientRates, Grid, GridMedium, Homogeneous, Layout, Medium, MediumChange, MediumError,
-    MediumGradient, MediumTangent, Phase, Property, UniformMedium, ValueChange, Volume, Wrap,
+    CoefficientRates, FlowPlace, Grid, GridMedium, Homogeneous, Layout, Medium, MediumChange,
+    MediumError, MediumGradient, MediumTangent, Phase, PhaseBlend, Property, UniformMedium,
+    ValueChange, Volume, Wrap,
 };
 
 const MULTIPLY: ValueChange = ValueChange::Multiply(0.7);
@@ -26,8 +27,22 @@ fn full(density_channels: usize) -> Medium {
     let albedo = grid([3, 3, 2], 3, 2).with_wrap(Wrap::Mirror).with_placement(wider);
     let emission = grid([2, 6, 2], 1, 3).with_layout(Layout::NodeCentred).with_placement(place);
     let (albedo, emission) = (albedo.expect("a box"), emission.expect("a box"));
+    let cosines = random_values(36, 4).into_iter().map(|v| 0.6 * v - 0.3).collect();
+    let cosines = Grid::new([4, 3, 3], 1, cosines).expect("a valid grid").with_placement(wider);
     let g = GridMedium::new(density, 2.5, Volume::Grid(albedo), Volume::Grid(emission));
-    Medium::new(g.expect("a valid medium"), Phase::HenyeyGreenstein { g: 0.4 })
+    let phase = Phase::henyey_greenstein_grid(cosines.expect("a box"));
+    Medium::new(g.expect("a valid medium"), phase.expect("mean cosines"))
+}
+
+/// A grid with a blend of functions, one of which varies too, by a grid of weights.
+fn blended() -> Medium {
+    let full = full(1);
+    let values = random_values(36, 5).into_iter().map(|v| 0.3 + 0.4 * v).collect();
+    let grid = full.voxels(Property::G).expect("a grid");
+    let weights = Grid::new(grid.size(), 1, values).expect("a valid grid");
+    let weights = weights.with_placement(*grid.to_world()).expect("a box");
+    let blend = PhaseBlend::varying(weights, [Phase::Rayleigh, full.phase.clone()]);
+    Medium { phase: Phase::Blend(Box::new(blend.expect("weights"))), ..full }
 }
 
 /// The albedo and the emission of [`full`], under one extinction.
@@ -58,7 +73,7 @@ fn turning(theta: f64) -> MediumChange {
 type ChangeAt = fn(f64) -> MediumChange;
 
 /// All at once, in an order in which each meets what came before.
-const CHANGES: [ChangeAt; 12] = [
+const CHANGES: [ChangeAt; 16] = [
     |_| MediumChange::SigmaT { op: ADD_GRAY, voxels: None },
     |_| MediumChange::SigmaT { op: MULTIPLY, voxels: Some([2, 1, 1]) },
     |_| MediumChange::Emission { op: MULTIPLY, voxels: None },
@@ -69,9 +84,19 @@ const CHANGES: [ChangeAt; 12] = [
     |_| MediumChange::SigmaT { op: ADD, voxels: None },
     |_| MediumChange::Albedo { op: ADD, voxels: None },
     turning,
-    |_| MediumChange::G(ValueChange::Add(Rgb { r: 0.2, g: 0.2, b: 0.2 })),
-    |_| MediumChange::G(ValueChange::MultiplyLog(0.3)),
+    |_| MediumChange::G { op: ValueChange::Add(Rgb { r: 0.2, g: 0.2, b: 0.2 }), voxels: None },
+    |_| MediumChange::G { op: ValueChange::MultiplyLog(0.3), voxels: None },
+    |_| MediumChange::G { op: ADD_GRAY, voxels: Some([2, 1, 1]) },
+    |_| MediumChange::Weight { op: MULTIPLY, voxels: None },
+    turning,
+    |_| MediumChange::Weight { op: ADD_GRAY, voxels: Some([1, 1, 2]) },
 ];
+
+/// Those that a medium has the properties for.
+fn fitting(medium: &Medium) -> Vec<ChangeAt> {
+    let fits = |c: &ChangeAt| medium.clone().apply(&c(0.0), 0.0).is_ok();
+    CHANGES.into_iter().filter(fits).collect()
+}
 
 /// The medium after the changes, and its tangent with respect to their common parameter.
 fn changed(start: &Medium, changes: &[ChangeAt], theta: f64) -> (Medium, MediumTangent) {
@@ -86,10 +111,27 @@ fn changed(start: &Medium, changes: &[ChangeAt], theta: f64) -> (Medium, MediumT
     (medium, tangent)
 }
 
-fn local(medium: &Medium, x: Vec3) -> CoefficientRates {
+/// The cosine at which phase functions are looked at.
+const COSINE: f64 = 0.4;
+
+/// What a medium has at a point, or the rates of that.
+#[derive(Clone, Copy, Debug)]
+struct Local {
+    coefficients: CoefficientRates,
+    phase: f64,
+}
+
+fn local(medium: &Medium, x: Vec3) -> Local {
     let c = medium.coefficients(x);
-    let g = medium.phase.mean_cosine_parameter().unwrap_or(0.0);
-    CoefficientRates { sigma_t: c.sigma_t, albedo: c.albedo, emission: c.emission, g }
+    let (sigma_t, albedo, emission) = (c.sigma_t, c.albedo, c.emission);
+    let coefficients = CoefficientRates { sigma_t, albedo, emission };
+    Local { coefficients, phase: medium.phase_at(x).eval(COSINE) }
+}
+
+fn rates(tangent: &MediumTangent, medium: &Medium, x: Vec3) -> Local {
+    let gradient = medium.phase_at(x).gradient(COSINE);
+    let phase = tangent.phase_rate(medium, x, &gradient, &mut FlowPlace::default());
+    Local { coefficients: tangent.rates(medium, x), phase }
 }
 
 /// Points inside the density box of the medium, away from its faces and from voxel planes.
@@ -103,9 +145,10 @@ fn points(medium: &Medium) -> Vec<Vec3> {
     }
 }
 
-fn difference(a: &CoefficientRates, b: &CoefficientRates) -> f64 {
+fn difference(of: &Local, from: &Local) -> f64 {
+    let (a, b) = (&of.coefficients, &from.coefficients);
     let fields = [a.sigma_t - b.sigma_t, a.albedo - b.albedo, a.emission - b.emission];
-    fields.into_iter().map(Rgb::max_abs).fold((a.g - b.g).abs(), f64::max)
+    fields.into_iter().map(Rgb::max_abs).fold((of.phase - from.phase).abs(), f64::max)
 }
 
 fn check_rates(start: &Medium, changes: &[ChangeAt], theta: f64) {
@@ -114,15 +157,16 @@ fn check_rates(start: &Medium, changes: &[ChangeAt], theta: f64) {
     let (above, below) =
         (changed(start, changes, theta + h).0, changed(start, changes, theta - h).0);
     for x in points(&medium) {
-        let rates = tangent.rates(&medium, x);
-        let (a, b) = (local(&above, x), local(&below, x));
+        let rates = rates(&tangent, &medium, x);
+        let (up, down) = (local(&above, x), local(&below, x));
+        let (a, b) = (up.coefficients, down.coefficients);
         let slope = |a: Rgb, b: Rgb| (a - b) / (2.0 * h);
-        let numeric = CoefficientRates {
+        let coefficients = CoefficientRates {
             sigma_t: slope(a.sigma_t, b.sigma_t),
             albedo: slope(a.albedo, b.albedo),
             emission: slope(a.emission, b.emission),
-            g: (a.g - b.g) / (2.0 * h),
         };
+        let numeric = Local { coefficients, phase: (up.phase - down.phase) / (2.0 * h) };
         let error = difference(&rates, &numeric);
         assert!(error < 1e-6, "theta {theta}, {x:?}: {rates:?}, numeric {numeric:?}");
     }
@@ -132,7 +176,7 @@ fn check_rates(start: &Medium, changes: &[ChangeAt], theta: f64) {
 fn each_change_alone() {
     for change in CHANGES {
         for theta in [0.0, 0.35] {
-            for medium in [full(1), full(3), dyed()] {
+            for medium in [full(1), full(3), dyed(), blended()] {
                 if medium.clone().apply(&change(theta), theta).is_ok() {
                     check_rates(&medium, &[change], theta);
                 }
@@ -144,8 +188,8 @@ fn each_change_alone() {
 #[test]
 fn all_changes_together_by_the_chain_rule() {
     for theta in [0.0, 0.35, -0.2] {
-        for medium in [full(1), full(3)] {
-            check_rates(&medium, &CHANGES, theta);
+        for medium in [full(1), full(3), blended()] {
+            check_rates(&medium, &fitting(&medium), theta);
         }
     }
 }
@@ -154,15 +198,17 @@ fn all_changes_together_by_the_chain_rule() {
 fn the_chain_rule_is_needed() {
     let theta = 0.35;
     let start = full(3);
-    let (medium, whole) = changed(&start, &CHANGES, theta);
+    let changes = fitting(&start);
+    let (medium, whole) = changed(&start, &changes, theta);
     let mut sum = MediumTangent::zero();
     let mut stepped = start;
-    for change in CHANGES {
+    for change in changes {
         let change = change(theta);
         stepped.apply(&change, theta).expect("a change that fits");
         sum = sum.plus(&stepped.tangent(&change, theta).expect("a change that fits"));
     }
-    let differs = |x: &Vec3| difference(&sum.rates(&medium, *x), &whole.rates(&medium, *x)) > 1e-3;
+    let differs =
+        |x: &Vec3| difference(&rates(&sum, &medium, *x), &rates(&whole, &medium, *x)) > 1e-3;
     assert!(points(&medium).iter().all(differs), "a plain sum of tangents passes");
 }
 
@@ -172,7 +218,7 @@ fn homogeneous_changes() {
         |_| MediumChange::SigmaT { op: MULTIPLY, voxels: None },
         |_| MediumChange::Emission { op: ADD, voxels: None },
         |_| MediumChange::SigmaT { op: ADD, voxels: None },
-        |_| MediumChange::G(ADD_GRAY),
+        |_| MediumChange::G { op: ADD_GRAY, voxels: None },
         turning,
     ];
     check_rates(&plain(), &whole, 0.3);
@@ -180,9 +226,8 @@ fn homogeneous_changes() {
 
 #[test]
 fn a_dyed_medium_changes_in_all_its_ways_together() {
-    let fits = |c: &ChangeAt| dyed().apply(&c(0.0), 0.0).is_ok();
-    let changes: Vec<_> = CHANGES.into_iter().filter(fits).collect();
-    assert_eq!(changes.len(), 10, "all but those of voxels that it has not");
+    let changes = fitting(&dyed());
+    assert_eq!(changes.len(), 12, "all but those of voxels that it has not");
     for theta in [0.0, 0.35, -0.2] {
         check_rates(&dyed(), &changes, theta);
     }
@@ -194,24 +239,21 @@ fn a_dyed_medium_changes_in_all_its_ways_together() {
 fn gradients_are_the_transposes_of_rates() {
     let mut rng = Rng::new(9, 0, 0);
     let mut color = || Rgb::new(rng.next_f64() - 0.5, rng.next_f64() - 0.5, rng.next_f64() - 0.5);
-    for start in [full(1), full(3), dyed(), plain()] {
-        let fits = |c: &&ChangeAt| start.clone().apply(&c(0.0), 0.0).is_ok();
-        let changes: Vec<_> = CHANGES.iter().filter(fits).copied().collect();
-        let (medium, tangent) = changed(&start, &changes, 0.35);
+    for start in [full(1), full(3), dyed(), plain(), blended()] {
+        let (medium, tangent) = changed(&start, &fitting(&start), 0.35);
         let mut parts = [MediumGradient::zeros(&medium), MediumGradient::zeros(&medium)];
         let mut forward = 0.0;
         let mut size = 0.0;
         for (n, x) in points(&medium).into_iter().enumerate() {
-            let adjoint = CoefficientRates {
-                sigma_t: color(),
-                albedo: color(),
-                emission: color(),
-                g: color().r,
-            };
-            let rate = tangent.rates(&medium, x).dot(&adjoint);
+            let adjoint = CoefficientRates { sigma_t: color(), albedo: color(), emission: color() };
+            let of_phase = color().r;
+            let here = rates(&tangent, &medium, x);
+            let rate = here.coefficients.dot(&adjoint) + here.phase * of_phase;
             forward += rate;
             size += rate.abs();
             parts[n % 2].scatter(&medium, x, &adjoint);
+            let gradient = medium.phase_at(x).gradient(COSINE);
+            parts[n % 2].scatter_phase(&medium, x, &gradient, of_phase);
         }
         let [mut gradient, other] = parts;
         gradient.add(&other);
@@ -287,6 +329,10 @@ fn a_step_of_all_voxels_is_the_sum_of_single_ones() {
     }
     assert!(whole.add_to_voxels(Property::SigmaT, &step[1..]).is_err());
     assert!(whole.add_to_voxels(Property::G, &step).is_err());
+    let before = whole.voxels(Property::G).expect("a grid").values().to_vec();
+    whole.add_to_voxels(Property::G, &step[..36]).expect("a fitting step");
+    let sums = before.iter().zip(&step).map(|(v, s)| v + s);
+    assert!(sums.eq(whole.voxels(Property::G).expect("a grid").values().iter().copied()));
     assert!(whole.add_to_voxels(Property::SigmaT, &vec![f64::NAN; count]).is_err());
 }
 
@@ -304,10 +350,20 @@ fn changes_that_do_not_fit_say_why() {
     assert!(g.apply(&sigma(MULTIPLY, None), f64::INFINITY).is_err());
     assert!(g.apply(&sigma(ValueChange::MultiplyLog(1e3), Some([0, 0, 0])), 10.0).is_err());
     assert_eq!(
-        g.apply(&MediumChange::G(ADD), 1.0),
+        g.apply(&MediumChange::G { op: ADD, voxels: None }, 1.0),
         Err(MediumError::NotScalar { property: Property::G })
     );
-    assert!(g.apply(&MediumChange::G(ADD_GRAY), 5.0).is_err());
+    let mut wide = g.clone();
+    wide.apply(&MediumChange::G { op: ADD_GRAY, voxels: None }, 5.0).expect("finite values");
+    assert!(wide.check(Property::G).is_err() && g.check(Property::G).is_ok());
+    let of_weight = MediumChange::Weight { op: ADD_GRAY, voxels: None };
+    assert_eq!(g.apply(&of_weight, 0.1), Err(MediumError::NoWeight));
+    let property = Property::G;
+    assert_eq!(
+        h.apply(&MediumChange::G { op: ADD_GRAY, voxels: voxel }, 0.1),
+        Err(MediumError::NotAGrid { property })
+    );
+    let property = Property::SigmaT;
     let nan = ValueChange::Add(Rgb::new(f64::NAN, 1.0, 1.0));
     assert!(g.apply(&sigma(nan, None), 1.0).is_err());
     assert!(h.apply(&sigma(nan, None), 1.0).is_err());
@@ -323,7 +379,8 @@ fn changes_that_do_not_fit_say_why() {
     let collapse = MediumChange::Place { map: flat, velocity: flat };
     assert_eq!(g.apply(&collapse, 0.0), Err(MediumError::SingularPlacement));
     let rayleigh = &mut Medium { phase: Phase::Rayleigh, ..plain() };
-    assert_eq!(rayleigh.apply(&MediumChange::G(ADD_GRAY), 0.1), Err(MediumError::NoMeanCosine));
+    let of_g = MediumChange::G { op: ADD_GRAY, voxels: None };
+    assert_eq!(rayleigh.apply(&of_g, 0.1), Err(MediumError::NoMeanCosine));
 }
 
 #[test]

@@ -8,8 +8,9 @@ use crate::common::{
 };
 use drt_math::{Affine, Mat3, Rgb, RgbVec, Rng, Vec3, vec3};
 use drt_medium::{
-    CoefficientRates, DepthEstimate, DistanceSample, Flow, FlowBasis, Grid, Layout, Medium,
-    MediumError, MediumGradient, MediumTangent, NodeWeights, Ray, SpaceMap, TrackingStats,
+    CoefficientRates, DepthEstimate, DistanceSample, Flow, FlowBasis, FlowPlace, Grid, Homogeneous,
+    Layout, Medium, MediumError, MediumGradient, MediumTangent, NodeWeights, Phase, Ray, SpaceMap,
+    TrackingStats,
 };
 
 /// Where the cloud is folded.
@@ -231,6 +232,47 @@ fn gradients_by_nodes_are_the_transposes() {
     }
     let reverse = gradient.dot(&tangent);
     assert!((forward - reverse).abs() < 1e-12 * forward.abs(), "{forward} {reverse}");
+}
+
+/// The grid of a phase function is bent like the others, and moves like them; also where there are no others.
+#[test]
+fn phase_functions_are_bent() {
+    let values = random_values(60, 4).into_iter().map(|v| 1.4 * v - 0.7).collect();
+    let place = placement(vec3(-1.2, -0.9, -0.6), vec3(2.0, 0.9, 0.6));
+    let cosines = Grid::new([5, 4, 3], 1, values).expect("a grid").with_placement(place);
+    let phase = Phase::henyey_greenstein_grid(cosines.expect("a proper box"));
+    let phase = phase.expect("mean cosines");
+    let plain = Homogeneous::new(Rgb::ONE, Rgb::splat(0.5), Rgb::ZERO).expect("coefficients");
+    let kinds = [cloud().kind, plain.into()];
+    let (k, h, cosine) = (0.3, 1e-6, 0.6);
+    let (tangent, place) = (bending(), &mut FlowPlace::default());
+    for kind in kinds {
+        let bent = |k: f64| {
+            let mut medium = Medium::new(kind.clone(), phase.clone());
+            medium.deform(Arc::new(Bend(k))).expect("it can be deformed");
+            medium
+        };
+        let [low, medium, high] = [k - h, k, k + h].map(bent);
+        let basis = tangent.flows[0].basis.clone();
+        let mut gradient = MediumGradient::zeros(&medium).with_flow(basis, 1);
+        let [mut forward, mut jumps] = [0.0; 2];
+        for i in 0..50 {
+            let x = vec3(-0.8 + 0.05 * f64::from(i), 0.1, 0.07);
+            if medium.grid().is_some() && !medium.contains(x) {
+                continue;
+            }
+            let here = medium.phase_at(x).gradient(cosine);
+            let rate = tangent.phase_rate(&medium, x, &here, place);
+            let [a, b] = [&low, &high].map(|m| m.phase_at(x).eval(cosine));
+            let off = (rate - (b - a) / (2.0 * h)).abs();
+            jumps += f64::from(u8::from(off > 1e-6));
+            forward += rate;
+            gradient.scatter_phase(&medium, x, &here, 1.0);
+        }
+        // Where a plane between voxels is passed, the slopes of both sides differ.
+        assert!(jumps < 3.0 && forward.abs() > 0.1, "{jumps} jumps, {forward}");
+        assert!((gradient.dot(&tangent) - forward).abs() < 1e-12 * forward.abs());
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use drt_math::testing::{SIGNIFICANCE, sphere_chi_square};
 use drt_math::{Dual, Rng, Vec3, vec3};
-use drt_medium::{MediumError, Phase, PhaseBlend, PhaseTable, henyey_greenstein};
+use drt_medium::{Grid, MediumError, Phase, PhaseBlend, PhaseTable, henyey_greenstein};
 
 const SHARPEST: f64 = 0.9999;
 
@@ -24,6 +24,71 @@ fn table(values: &[f64]) -> Phase {
 fn blend() -> Phase {
     let parts = [Phase::henyey_greenstein(0.5).expect("a valid g"), Phase::Isotropic];
     Phase::Blend(Box::new(PhaseBlend::new(0.3, parts).expect("a weight")))
+}
+
+/// Values on a line of voxels along x.
+fn ramp(values: &[f64], channels: usize) -> Grid {
+    let count = values.len() / channels;
+    Grid::new([count, 1, 1], channels, values.to_vec()).expect("a valid grid")
+}
+
+/// Functions that vary in space: a mean cosine, a weight, and both at once.
+fn varying() -> [Phase; 3] {
+    let g = Phase::henyey_greenstein_grid(ramp(&[-0.7, 0.1, 0.8], 1)).expect("mean cosines");
+    let blend = |weights: &[f64], parts| {
+        let blend = PhaseBlend::varying(ramp(weights, 1), parts).expect("weights");
+        Phase::Blend(Box::new(blend))
+    };
+    let of_constants = blend(&[0.0, 1.0], [Phase::Rayleigh, table(&[0.0, 1.0, 3.0])]);
+    [g.clone(), of_constants, blend(&[0.2, 0.9, 0.4], [g, Phase::Isotropic])]
+}
+
+/// Everywhere it is a phase function, and it is sampled as its density says.
+#[test]
+fn normalised_and_sampled_wherever_it_varies() {
+    let flow = vec3(0.48, -0.6, 0.64);
+    for phase in varying() {
+        for x in [0.0, 0.31, 0.5, 0.77] {
+            let p = phase.at(vec3(x, 0.5, 0.5));
+            let total = sphere_integral(1.0, |c, _| p.eval(c));
+            assert!((total - 1.0).abs() < 1e-6, "{p:?} integrates to {total}");
+            let directions = (0..100_000).map(|i| {
+                let (w, pdf) = p.sample(flow, Rng::new(1, 2, i).next_2d());
+                assert!((pdf / p.pdf(flow.dot(w)) - 1.0).abs() < 1e-9);
+                w
+            });
+            let value = sphere_chi_square(directions, |w| p.pdf(flow.dot(w)));
+            assert!(value > SIGNIFICANCE, "{p:?}: p-value {value}");
+        }
+    }
+    let [g, ..] = varying();
+    let [here, there] = [0.2, 0.8].map(|x| g.at(vec3(x, 0.5, 0.5)));
+    let directions = (0..100_000).map(|i| here.sample(flow, Rng::new(1, 2, i).next_2d()).0);
+    let value = sphere_chi_square(directions, |w| there.eval(flow.dot(w)));
+    assert!(value < SIGNIFICANCE, "samples of one place pass for those of another: {value}");
+}
+
+/// Where the weight is zero, the other part is sampled as well: it has a derivative.
+#[test]
+fn both_parts_of_a_blend_are_sampled() {
+    let [_, blend, _] = varying();
+    let p = blend.at(vec3(0.0, 0.5, 0.5));
+    assert_eq!(
+        p.gradient(1.0).weight,
+        table(&[0.0, 1.0, 3.0]).at(Vec3::ZERO).eval(1.0) - p.eval(1.0)
+    );
+    assert!(p.pdf(1.0) != p.eval(1.0) && p.pdf(1.0) > 0.95 * p.eval(1.0));
+}
+
+#[test]
+fn grids_that_make_no_phase_function_are_refused() {
+    let parts = || [Phase::Isotropic, Phase::Rayleigh];
+    for (values, channels) in [(&[0.1, 0.2, 0.3][..], 3), (&[0.1, 1.0], 1), (&[-1.5, 0.0], 1)] {
+        assert!(Phase::henyey_greenstein_grid(ramp(values, channels)).is_err());
+    }
+    for (values, channels) in [(&[0.1, 0.2, 0.3][..], 3), (&[0.1, 1.1], 1), (&[-0.1, 0.0], 1)] {
+        assert!(PhaseBlend::varying(ramp(values, channels), parts()).is_err());
+    }
 }
 
 fn mean_cosine(p: &Phase) -> f64 {
@@ -56,9 +121,10 @@ fn sphere_integral(peak: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
 fn normalised_with_the_mean_cosine_promised() {
     for p in phases() {
         let g = mean_cosine(&p);
-        let total = sphere_integral(g, |c, _| p.eval(c));
+        let here = p.at(Vec3::ZERO);
+        let total = sphere_integral(g, |c, _| here.eval(c));
         assert!((total - 1.0).abs() < 1e-7, "{p:?} integrates to {total}");
-        let mean = sphere_integral(g, |c, _| c * p.eval(c));
+        let mean = sphere_integral(g, |c, _| c * here.eval(c));
         assert!((mean - g).abs() < 1e-7, "{p:?} has mean cosine {mean}");
     }
 }
@@ -67,10 +133,11 @@ fn normalised_with_the_mean_cosine_promised() {
 fn sampled_as_evaluated() {
     let flow = vec3(0.48, -0.6, 0.64);
     for p in phases().into_iter().filter(|p| mean_cosine(p).abs() < 0.9) {
+        let p = p.at(Vec3::ZERO);
         let directions = (0..200_000).map(|i| {
             let (w, pdf) = p.sample(flow, Rng::new(1, 2, i).next_2d());
             assert!((w.length() - 1.0).abs() < 1e-12);
-            assert!((pdf / p.eval(flow.dot(w)) - 1.0).abs() < 1e-9);
+            assert!((pdf / p.pdf(flow.dot(w)) - 1.0).abs() < 1e-9);
             w
         });
         let value = sphere_chi_square(directions, |w| p.eval(flow.dot(w)));
@@ -81,6 +148,7 @@ fn sampled_as_evaluated() {
 #[test]
 fn the_wrong_orientation_is_noticed() {
     let p = Phase::henyey_greenstein(0.05).expect("a valid g");
+    let p = p.at(Vec3::ZERO);
     let directions = (0..200_000).map(|i| p.sample(Vec3::Z, Rng::new(1, 2, i).next_2d()).0);
     let value = sphere_chi_square(directions, |w| p.eval(-w.z));
     assert!(value < SIGNIFICANCE, "backward passes for forward: p-value {value}");
@@ -91,6 +159,7 @@ fn inversion_holds_for_the_sharpest_lobes() {
     // The distribution function of Henyey-Greenstein in closed form, as a function of 1 - c.
     for g in [0.5, 0.99, SHARPEST] {
         let p = Phase::henyey_greenstein(g).expect("a valid g");
+        let p = p.at(Vec3::ZERO);
         for u in [1e-9, 0.01, 0.3, 0.7, 0.99, 1.0 - 1e-9] {
             let (w, _) = p.sample(Vec3::Z, [u, 0.0]);
             // The sine has its digits where the cosine has lost them.
@@ -105,11 +174,12 @@ fn inversion_holds_for_the_sharpest_lobes() {
 #[test]
 fn forward_is_forward() {
     let forward = Phase::henyey_greenstein(0.7).expect("a valid g");
+    let forward = forward.at(Vec3::ZERO);
     assert!(forward.eval(1.0) > 100.0 * forward.eval(-1.0));
     let (w, _) = forward.sample(Vec3::X, [0.5, 0.5]);
     assert!(w.x > 0.8);
     for p in phases() {
-        assert!(p.sample(Vec3::Y, [0.25, 0.5]).1.is_finite(), "{p:?}");
+        assert!(p.at(Vec3::ZERO).sample(Vec3::Y, [0.25, 0.5]).1.is_finite(), "{p:?}");
     }
 }
 
@@ -117,14 +187,16 @@ fn forward_is_forward() {
 fn derivatives_are_those_of_duals() {
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-10 * b.abs().max(1e-300);
     let mut rng = Rng::new(5, 0, 0);
-    for p in phases() {
+    for p in &phases() {
+        let p = p.at(Vec3::ZERO);
         for _ in 0..200 {
             let c = 2.0 * rng.next_f64() - 1.0;
             let d = p.eval(Dual::<f64, 1>::variable(c, 0));
-            assert!(close(p.d_cos(c), d.eps[0]), "{p:?} at {c}: {} {}", p.d_cos(c), d.eps[0]);
+            let by = p.gradient(c);
+            assert!(close(by.cosine, d.eps[0]), "{p:?} at {c}: {} {}", by.cosine, d.eps[0]);
             if let Some(g) = p.mean_cosine_parameter() {
                 let d = henyey_greenstein(Dual::<f64, 1>::variable(g, 0), Dual::from(c));
-                assert!(close(p.d_g(c), d.eps[0]), "{p:?} at {c}: {} {}", p.d_g(c), d.eps[0]);
+                assert!(close(by.g, d.eps[0]), "{p:?} at {c}: {} {}", by.g, d.eps[0]);
             }
         }
     }
@@ -144,10 +216,10 @@ fn blends_and_tables_are_those_of_mitsuba() {
     for (c, value) in
         [(-1.0, 0.0251297), (-0.5, 0.043977), (0.3, 0.0741327), (0.9, 0.182191), (1.0, 0.201038)]
     {
-        assert!((p.eval(c) - value).abs() < 1e-6, "{c}");
+        assert!((p.at(Vec3::ZERO).eval(c) - value).abs() < 1e-6, "{c}");
     }
     for (c, value) in [(-0.5, 0.0419197), (0.5, 0.0881949), (1.0, 0.358099)] {
-        assert!((blend().eval(c) - value).abs() < 1e-6, "{c}");
+        assert!((blend().at(Vec3::ZERO).eval(c) - value).abs() < 1e-6, "{c}");
     }
     let wrong = |values: &[f64]| PhaseTable::new(values.to_vec()).unwrap_err();
     for values in [&[1.0][..], &[0.0, 0.0], &[1.0, -1.0], &[1.0, f64::NAN]] {

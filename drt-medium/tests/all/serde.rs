@@ -3,8 +3,8 @@
 use crate::common::*;
 use drt_math::{Affine, Rgb, vec3};
 use drt_medium::{
-    Filter, Grid, Homogeneous, Layout, Medium, MediumChange, MediumKind, Phase, UniformMedium,
-    ValueChange, Wrap,
+    Filter, Grid, Homogeneous, Layout, Medium, MediumChange, MediumKind, Phase, PhaseBlend,
+    UniformMedium, ValueChange, Wrap,
 };
 
 fn round_trip(medium: &Medium) -> Medium {
@@ -19,6 +19,11 @@ fn media_survive() {
     let again = round_trip(&medium);
     assert_eq!(again.grid(), medium.grid());
     assert_eq!(again.phase, medium.phase);
+    let weights = Grid::new([2, 1, 1], 1, vec![0.1, 0.6]).expect("a valid grid");
+    let parts = [Phase::henyey_greenstein_grid(weights.clone()).expect("valid"), Phase::Rayleigh];
+    let blend = PhaseBlend::varying(weights, parts).expect("valid");
+    medium.phase = Phase::Blend(Box::new(blend));
+    assert_eq!(round_trip(&medium).phase, medium.phase);
     let x = medium.grid().expect("a grid").density().to_world().point(vec3(0.7, 0.6, 0.5));
     assert_eq!(again.coefficients(x), medium.coefficients(x));
 

@@ -4,7 +4,7 @@
 use crate::common::*;
 use drt_math::{Rgb, Vec3, vec3};
 use drt_medium::{
-    DistanceSample, Homogeneous, Medium, MediumChange, Phase, TrackingStats, ValueChange,
+    DistanceSample, FlowPlace, Homogeneous, Medium, MediumChange, Phase, TrackingStats, ValueChange,
 };
 
 const LIGHT: Vec3 = vec3(1.5, 0.8, 0.4);
@@ -30,14 +30,16 @@ fn radiance(change: Option<MediumChange>) -> drt_math::Moments {
         // Flow: from the light to x, then towards the origin.
         let c = ((x - LIGHT) / r).dot(-dir);
         let coefficients = medium.coefficients(x);
-        let phase = medium.phase.eval(c);
+        let here = medium.phase_at(x);
+        let phase = here.eval(c);
         let arriving = weight.r * INTENSITY * (-coefficients.sigma_t.r * r).exp() / (r * r);
         let Some(tangent) = &tangent else { return arriving * coefficients.sigma_s().r * phase };
         let rate = tangent.rates(&medium, x);
         let scattering = rate.sigma_t.r * coefficients.albedo.r
             + coefficients.sigma_t.r * rate.albedo.r
             - coefficients.sigma_s().r * rate.sigma_t.r * (t + r);
-        let turning = coefficients.sigma_s().r * medium.phase.d_g(c) * rate.g;
+        let turning = coefficients.sigma_s().r
+            * tangent.phase_rate(&medium, x, &here.gradient(c), &mut FlowPlace::default());
         arriving * (scattering * phase + turning)
     })
 }
@@ -49,7 +51,7 @@ fn value_and_derivatives_with_respect_to_the_medium() {
         ("value", None, 0.163_273_339_759_29),
         ("sigma_t", Some(MediumChange::SigmaT { op: add, voxels: None }), -0.083_026_614_548_341),
         ("albedo", Some(MediumChange::Albedo { op: add, voxels: None }), 0.204_091_674_699_11),
-        ("g", Some(MediumChange::G(add)), 0.055_504_958_190_37),
+        ("g", Some(MediumChange::G { op: add, voxels: None }), 0.055_504_958_190_37),
     ];
     for (what, change, truth) in cases {
         let e = radiance(change);

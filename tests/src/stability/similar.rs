@@ -112,7 +112,9 @@ impl Similarity {
                 return Err("no scene here has a medium of its own kind".into());
             }
         };
-        Ok(Medium::new(kind, medium.phase.clone()))
+        let mut phase = medium.phase.clone();
+        phase.place(&self.map())?;
+        Ok(Medium::new(kind, phase))
     }
 
     fn emitter(&self, emitter: &mut Emitter) {

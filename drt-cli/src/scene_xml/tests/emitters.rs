@@ -3,6 +3,8 @@ use drt_estimators::{SceneEmitter, Surrounding};
 use drt_math::{Rgb, Vec3, vec3};
 
 use super::{old_scene, refused, scene};
+use crate::testing::Folder;
+use crate::{Defaults, load_scene};
 
 fn emitter(kind: &str, inside: &str) -> Emitter {
     scene(&format!("<emitter type=\"{kind}\">{inside}</emitter>")).emitters.remove(0).item.emitter
@@ -212,8 +214,22 @@ fn volume_lights() {
     refused(&body(clear, &within), &["does not absorb"]);
     refused(&body("", light), &["no medium called `interior`"]);
     refused(light, &["belongs inside a <shape>"]);
-    let grid = within.replace("rgb name", "volume type=\"constvolume\" name").replace("2 0 5", "");
-    refused(&body(albedo, &grid), &["<volume", "as a volume"]);
+    let folder = Folder::new();
+    let values = drt_medium::Grid::new([2, 1, 1], 1, vec![1.0, 3.0]).unwrap();
+    let file = drt_medium::vol::VolFile { grid: values, bounds: [Vec3::ZERO, Vec3::splat(1.0)] };
+    folder.file("glow.vol", drt_medium::vol::encode(&file).unwrap());
+    let grid = r#"<emitter type="volumelight"><volume name="radiance" type="gridvolume">
+        <string name="filename" value="glow.vol"/></volume></emitter>"#;
+    let glow = |albedo: &str| {
+        let inside = body(albedo, &within.replace(light, grid));
+        let file = folder.file("s.xml", format!("<scene version=\"3.0.0\">{inside}</scene>"));
+        load_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
+    };
+    let m = glow(r#"<rgb name="albedo" value="0.75 0.9 0.5"/>"#).unwrap();
+    let source = m.coefficients(vec3(0.5, 0.5, 0.5)).source();
+    assert!((source - Rgb::splat(2.0)).max_abs() < 1e-12, "{source:?}");
+    let message = glow(albedo).unwrap_err().to_string();
+    assert!(message.contains("does not absorb"), "{message}");
     let heterogeneous = body(albedo, &within).replace("homogeneous", "heterogeneous");
     refused(&heterogeneous, &["medium with grids"]);
 }

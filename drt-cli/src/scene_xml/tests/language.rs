@@ -125,7 +125,7 @@ fn everything_can_be_referred_to() {
     assert_eq!(reflectance(&s.bsdfs[1].item), Rgb::new(0.5, 0.0, 0.0));
     assert_eq!(s.shapes[0].emitter, Some(0));
     assert_eq!(s.shapes[0].boundary.unwrap().interior, Some(0));
-    assert!(s.media[0].item.phase.mean_cosine_parameter().is_some());
+    assert!(matches!(s.media[0].item.phase, drt_medium::Phase::HenyeyGreenstein { .. }));
     refused(
         "<emitter type=\"area\" id=\"lamp\"/><shape type=\"cube\"><ref id=\"lamp\"/></shape>\n\
          <shape type=\"cube\"><ref id=\"lamp\"/></shape>",

@@ -1,7 +1,7 @@
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_medium::nanovdb::NanoVdb;
 use drt_medium::vol::{VolFile, encode};
-use drt_medium::{Coefficients, Grid, Medium, MediumKind, Phase, Volume};
+use drt_medium::{Coefficients, Grid, Medium, MediumKind, Phase, Property, Volume};
 
 use super::{old_scene, refused, scene};
 use crate::testing::Folder;
@@ -54,12 +54,12 @@ fn phase_functions() {
         r#"<phase type="hg"><float name="g" value="0.5"/></phase><phase type="isotropic"/>"#;
     let blend = |inside: &str| format!(r#"<phase type="blendphase">{inside}</phase>"#);
     let weight = r#"<float name="weight" value="0.3"/>"#;
-    let value = phase(&blend(&format!("{weight}{inside}"))).eval(-0.5);
+    let value = phase(&blend(&format!("{weight}{inside}"))).at(Vec3::ZERO).eval(-0.5);
     assert!((value - 0.0419197).abs() < 1e-6, "{value}");
     let table = |values: &str| {
         format!(r#"<phase type="tabphase"><string name="values" value="{values}"/></phase>"#)
     };
-    assert!((phase(&table("0.5, 1.0, 1.5, 4")).eval(0.3) - 0.0741327).abs() < 1e-6);
+    assert!((phase(&table("0.5, 1.0, 1.5, 4")).at(Vec3::ZERO).eval(0.3) - 0.0741327).abs() < 1e-6);
     let wrong = |inside: &str, part| {
         refused(&format!("<medium type=\"homogeneous\">{inside}</medium>"), &[part])
     };
@@ -220,6 +220,50 @@ fn homogeneous_media_take_their_albedo_from_a_grid() {
     assert!(message.contains("albedo is 2"), "{message}");
     let message = load(&grid("sigma_t")).unwrap_err().to_string();
     assert!(message.contains("`sigma_t` of a homogeneous medium must be one number"), "{message}");
+}
+
+/// Mean cosines and weights of phase functions are read from volumes; negative cosines stay what they are.
+#[test]
+fn phase_functions_take_their_numbers_from_grids() {
+    let folder = Folder::new();
+    ramp(&folder);
+    let signed = Grid::new([4, 1, 1], 1, vec![-0.001, 0.2, 0.4, 0.6]).unwrap();
+    let bounds = [Vec3::ZERO, Vec3::splat(1.0)];
+    folder.file("signed.vol", encode(&VolFile { grid: signed, bounds }).unwrap());
+    let grid = |name: &str, file: &str| {
+        format!(
+            "<volume name=\"{name}\" type=\"gridvolume\"><string name=\"filename\" \
+             value=\"{file}.vol\"/></volume>"
+        )
+    };
+    let load = |phase: &str| {
+        let text = format!(
+            "<scene version=\"3.0.0\"><medium type=\"homogeneous\">{phase}</medium></scene>"
+        );
+        let file = folder.file("s.xml", text);
+        load_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
+    };
+    let at = |x: f64| vec3(x, 0.5, 0.5);
+    let hg = |file: &str| format!("<phase type=\"hg\">{}</phase>", grid("g", file));
+    let m = load(&hg("signed")).unwrap();
+    for (x, g) in [(0.125, -0.001), (0.5, 0.3), (9.0, 0.6)] {
+        let found = m.phase_at(at(x)).mean_cosine_parameter().unwrap();
+        assert!((found - g).abs() < 1e-7, "{found} at {x}");
+    }
+    assert!(m.homogeneous().is_none() && m.extinction().is_some() && m.is_carried());
+    assert_eq!(m.voxels(Property::G).unwrap().size(), [4, 1, 1]);
+    let message = load(&hg("ramp")).unwrap_err().to_string();
+    assert!(message.contains("g is 1; it must be between -1 and 1"), "{message}");
+    let parts = r#"<phase type="isotropic"/><phase type="rayleigh"/>"#;
+    let blend =
+        |file: &str| format!("<phase type=\"blendphase\">{}{parts}</phase>", grid("weight", file));
+    let message = load(&blend("ramp")).unwrap_err().to_string();
+    assert!(message.contains("weight is 2; it must be between 0 and 1"), "{message}");
+    let m = load(&blend("signed")).unwrap();
+    assert!(m.voxels(Property::Weight).is_some() && m.voxels(Property::G).is_none());
+    let even = 0.25 / core::f64::consts::PI;
+    let value = m.phase_at(at(0.5)).eval(0.0);
+    assert!((value - even * (0.7 + 0.3 * 0.75)).abs() < 1e-7, "{value}");
 }
 
 #[test]

@@ -339,12 +339,11 @@ impl<'w> Differentiator<'w> {
                 }
             }
             _ => {
-                if material
-                    && d.g != 0.0
-                    && let Some(m) = v.medium
-                {
-                    let g = adjoint * d.g;
-                    sink.medium(m, v.x, &CoefficientAdjoint { g, ..CoefficientAdjoint::default() });
+                if let (Some(m), Some(gradient)) = (v.medium, d.phase) {
+                    if material {
+                        sink.phase(m, v.x, &gradient, adjoint);
+                    }
+                    here.u += adjoint.outer(gradient.place);
                 }
             }
         }
@@ -460,7 +459,6 @@ fn by_coefficients(
         } else {
             Rgb::ZERO
         },
-        g: Rgb::ZERO,
     }
 }
 

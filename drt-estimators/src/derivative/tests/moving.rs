@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use drt_geom::Mesh;
 use drt_math::{Real, Rgb, ValueChange, Vec3, vec3};
+use drt_medium::{Grid, Phase, Volume, henyey_greenstein, rayleigh};
 use drt_motion::{Change, GeometryChange, Parameter};
 
 use crate::derivative::contraction::{Contraction, Motion};
@@ -330,10 +331,48 @@ impl<'a> Moving<'a> {
         a * x.x + b * x.y + c * x.z + m.translation.lift()
     }
 
-    /// The phase function's mean cosine.
-    pub(super) fn mean_cosine(&self, medium: usize) -> D {
-        let g = self.original.media[medium].item.phase.mean_cosine_parameter();
-        self.changed(Target::Medium(medium), "g", Rgb::splat(g.expect("it has one"))).r
+    /// The value of a phase function at a point and a flow cosine.
+    pub(super) fn phase(&self, medium: usize, x: Vec3<D>, cosine: D) -> D {
+        let target = Target::Medium(medium);
+        let at = self.before_motion(target, x);
+        self.phase_of(&self.original.media[medium].item.phase, target, at, cosine)
+    }
+
+    fn phase_of(&self, phase: &Phase, target: Target, at: Vec3<D>, cosine: D) -> D {
+        let constant = |name: &str, value: f64| self.changed(target, name, Rgb::splat(value)).r;
+        match phase {
+            Phase::Isotropic => henyey_greenstein(constant("g", 0.0), cosine),
+            Phase::HenyeyGreenstein { g } => henyey_greenstein(constant("g", *g), cosine),
+            Phase::HenyeyGreensteinGrid(grid) => {
+                henyey_greenstein(self.in_voxels(target, "g", grid, at), cosine)
+            }
+            Phase::Rayleigh => rayleigh(cosine),
+            Phase::Blend(blend) => {
+                let weight = match blend.weight() {
+                    Volume::Constant(w) => constant("weight", w.r),
+                    Volume::Grid(grid) => self.in_voxels(target, "weight", grid, at),
+                };
+                let [a, b] = blend.parts().each_ref().map(|p| self.phase_of(p, target, at, cosine));
+                a * (D::one() - weight) + b * weight
+            }
+            Phase::Tabulated(_) => unreachable!("not used here"),
+        }
+    }
+
+    /// A number that a grid has at a point of it.
+    fn in_voxels(&self, target: Target, name: &str, grid: &Grid, x: Vec3<D>) -> D {
+        let at = x.re();
+        let rate = grid.gradient(at).r.dot(vec3(x.x.eps[0], x.y.eps[0], x.z.eps[0]));
+        let mut value = with_rate(grid.value(at).r, rate);
+        for c in self.on(target) {
+            let Change::Property(p) = c else { continue };
+            if p.property == name {
+                let after = change(&p.op, Rgb::splat(value), self.theta).r;
+                let share = p.voxels.map_or(1.0, |v| hat(grid, v).value(at).r);
+                value += (after - value) * share;
+            }
+        }
+        value
     }
 
     /// A property of a material.

@@ -5,7 +5,6 @@ use alloc::vec::Vec;
 
 use drt_geom::ray_plane;
 use drt_math::{Real, Rgb, Vec3};
-use drt_medium::{Phase, henyey_greenstein, rayleigh};
 
 use crate::derivative::tests::changes::{D, rgb, with_rate};
 use crate::derivative::tests::fade;
@@ -285,11 +284,7 @@ impl Replay<'_> {
             }
             _ => {
                 let m = v.medium.expect("a medium");
-                let cosine = -wo.dot(wi);
-                Rgb::splat(match self.scene.world.medium(m).phase {
-                    Phase::Rayleigh => rayleigh(cosine),
-                    _ => henyey_greenstein(self.scene.mean_cosine(m), cosine),
-                })
+                Rgb::splat(self.scene.phase(m, self.vertex(v).x, -wo.dot(wi)))
             }
         }
     }

@@ -4,7 +4,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 
 use drt_math::{Rgb, RgbVec, Rng, ValueChange, Vec3};
-use drt_medium::DepthEstimate;
+use drt_medium::{DepthEstimate, PhaseGradient};
 use drt_motion::{GeometryChange, Parameter};
 
 use crate::derivative::antithetic::AntitheticPairs;
@@ -139,6 +139,8 @@ pub(super) enum Fault {
     Volume,
     /// The box of a moving grid stays.
     GridFace,
+    /// The grid of a phase function stays.
+    PhaseGrid,
 }
 
 /// A contraction that makes a mistake.
@@ -154,7 +156,7 @@ impl AdjointSink for Faulty<'_> {
             Fault::NoJacobian => a.j = Rgb::ZERO,
             Fault::Normal => a.n = -a.n,
             Fault::ShadingNormal => a.ns = RgbVec::ZERO,
-            Fault::None | Fault::Volume | Fault::GridFace => {}
+            Fault::None | Fault::Volume | Fault::GridFace | Fault::PhaseGrid => {}
         }
         self.0.surface(point, &a);
     }
@@ -168,6 +170,13 @@ impl AdjointSink for Faulty<'_> {
     }
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint) {
         self.0.medium(medium, x, adjoint);
+    }
+    fn phase(&mut self, medium: usize, x: Vec3, gradient: &PhaseGradient, adjoint: Rgb) {
+        let mut gradient = *gradient;
+        if self.1 == Fault::PhaseGrid {
+            gradient.place = Vec3::ZERO;
+        }
+        self.0.phase(medium, x, &gradient, adjoint);
     }
     fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {
         let mut depth = *depth;

@@ -50,6 +50,28 @@ fn derivatives_on_average() {
     assert!(mean_deviations(&scene, &turned, Fault::GridFace, 1.0).iter().any(off));
 }
 
+/// Phase functions whose numbers are voxels, which change one by one and move.
+#[test]
+fn phase_functions_that_vary() {
+    let one = ValueChange::Add(Rgb::splat(0.3));
+    let [cosines, blend] = varied_smoke(1.0);
+    for (scene, property) in [(&cosines, "g"), (&blend, "weight")] {
+        let voxel = vec![changes_voxel("smoke", property, [2, 1, 2], one)];
+        for p in [
+            parameter(property, 0.0, voxel),
+            set("all", "smoke", property, ValueChange::MultiplyLog(0.7)),
+            motion("smoke", "turn", turn()),
+            motion("box", "shift", shift()),
+            motion("camera", "turn", turn()),
+        ] {
+            judge(scene, &p);
+        }
+        let shifted = motion("smoke", "shift", shift());
+        let off = |z: &f64| z.abs() > 6.0;
+        assert!(mean_deviations(scene, &shifted, Fault::PhaseGrid, 1.0).iter().any(off));
+    }
+}
+
 fn judge(scene: &Scene, parameter: &Parameter) {
     let deviations = mean_deviations(scene, parameter, Fault::None, 1.0);
     let n = deviations.len() as f64;

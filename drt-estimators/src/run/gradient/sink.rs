@@ -1,7 +1,7 @@
 //! Where a gradient's sensitivities are added up.
 
 use drt_math::{Rgb, RgbVec, Vec3};
-use drt_medium::{CoefficientRates, DepthEstimate};
+use drt_medium::{CoefficientRates, DepthEstimate, PhaseGradient};
 use drt_motion::surface::JetAdjoint;
 use drt_motion::volume::VolumeAdjoint;
 
@@ -112,6 +112,16 @@ impl AdjointSink for ScatterSink<'_> {
         }
     }
 
+    fn phase(&mut self, medium: usize, x: Vec3, gradient: &PhaseGradient, adjoint: Rgb) {
+        let Some(sum) = &mut self.sums.scene.media[medium] else { return };
+        let adjoint = adjoint.dot(self.weights);
+        if adjoint.is_finite() {
+            sum.scatter_phase(self.world.medium(medium), x, gradient, adjoint);
+        } else {
+            self.sums.scene.non_finite += 1;
+        }
+    }
+
     fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {
         let Some(gradient) = &mut self.sums.scene.media[medium] else { return };
         let adjoint = adjoint * self.weights;
@@ -217,5 +227,5 @@ impl<'a> BoundarySink for ToGradient<'a> {
 }
 
 fn is_finite(r: &CoefficientRates) -> bool {
-    r.sigma_t.is_finite() && r.albedo.is_finite() && r.emission.is_finite() && r.g.is_finite()
+    r.sigma_t.is_finite() && r.albedo.is_finite() && r.emission.is_finite()
 }

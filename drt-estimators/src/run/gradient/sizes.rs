@@ -4,7 +4,7 @@
 //! of the camera), each of which is moved by a few vertices, or by one item.
 
 use drt_math::{Rgb, RgbVec, Vec3};
-use drt_medium::DepthEstimate;
+use drt_medium::{DepthEstimate, PhaseGradient};
 
 use crate::derivative::sensitivity::{
     ActiveInputs, AdjointSink, CoefficientAdjoint, SurfaceAdjoint, TextureUse, VelocityFunctional,
@@ -116,6 +116,7 @@ impl AdjointSink for SquaredNorm<'_> {
 
     // Boundary samples have none of these.
     fn medium(&mut self, _: usize, _: Vec3, _: &CoefficientAdjoint) {}
+    fn phase(&mut self, _: usize, _: Vec3, _: &PhaseGradient, _: Rgb) {}
     fn depth(&mut self, _: usize, _: &DepthEstimate<'_>, _: Rgb) {}
     fn bsdf(&mut self, _: usize, _: &BsdfParams, _: Rgb) {}
     fn texels(&mut self, _: TextureUse, _: &Footprint, _: Rgb) {}

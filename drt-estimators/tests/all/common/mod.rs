@@ -17,7 +17,7 @@ use drt_estimators::{Integrator, Layer, Rendering, Scene, Session, Settings, Una
 pub use drt_estimators::{SceneBuilder, ShapeBuilder};
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
-use drt_medium::{Grid, GridMedium, Homogeneous, Layout, Medium, Phase, Volume};
+use drt_medium::{Grid, GridMedium, Homogeneous, Layout, Medium, Phase, PhaseBlend, Volume};
 use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, Texels, ValueChange};
 
 /// The scene of a builder, as a camera at a point sees it that looks at another one.
@@ -255,6 +255,42 @@ pub fn smoke(border: f64) -> Scene {
     seen(scene, [vec3(0.4, 0.8, 6.0), Vec3::ZERO], 4)
 }
 
+/// Smoke with a phase function that varies as well: by its mean cosine, or by how much each of two functions counts.
+pub fn varied_smoke(border: f64) -> [Scene; 2] {
+    let scene = smoke(border);
+    let placement = *scene.media[0].item.grid().expect("voxels").density().to_world();
+    let mut rng = Rng::new(17, 0, 0);
+    let mut varied = |lo: f64, hi: f64| {
+        let values = (0..64).map(|_| lo + (hi - lo) * rng.next_f64()).collect();
+        let grid = Grid::new([4; 3], 1, values).expect("a valid grid");
+        grid.with_placement(placement).expect("a box")
+    };
+    let g = Phase::henyey_greenstein_grid(varied(-0.6, 0.7)).expect("mean cosines");
+    let parts = [Phase::henyey_greenstein_grid(varied(0.2, 0.8)).expect("valid"), Phase::Rayleigh];
+    let blend = PhaseBlend::varying(varied(0.1, 0.9), parts).expect("weights");
+    [g, Phase::Blend(Box::new(blend))].map(|phase| {
+        let mut scene = scene.clone();
+        scene.media[0].item.phase = phase;
+        scene
+    })
+}
+
+/// Light from all sides would hide what phase functions do: a sun behind the camera is all there is.
+pub fn in_the_sun(mut scene: Scene) -> Scene {
+    for emitter in scene.emitters.iter_mut().map(|e| &mut e.item.emitter) {
+        match emitter {
+            Emitter::Point { intensity, .. } => *intensity = Rgb::ZERO,
+            Emitter::Area { radiance } => *radiance = Rgb::ZERO,
+            Emitter::Directional { direction, irradiance } => {
+                *direction = vec3(-0.2, -0.3, -1.0).normalize();
+                *irradiance = Rgb::splat(5.0);
+            }
+            _ => {}
+        }
+    }
+    scene
+}
+
 const VOXELS: usize = 5;
 
 /// A cube of voxels with the extinctions of three channels, in the light of the sky.
@@ -283,6 +319,31 @@ pub fn empty_cloud(albedo: Rgb) -> Scene {
 
 /// A cloud of which one voxel in seven is filled, each channel by its own amount, over a floor and under a lamp.
 pub fn sparse_cloud() -> Scene {
+    seen(sparse(), BEFORE_CLOUD, 5)
+}
+
+/// Such a cloud with a lamp in the middle of it.
+pub fn inhabited_cloud() -> Scene {
+    let inner = placed(procedural::rectangle(), Vec3::splat(0.3), 0.5, vec3(0.1, 0.0, -0.1));
+    let inner = glowing(inner, Rgb::new(6.0, 7.0, 8.0));
+    seen(sparse().shape("inner", inner), BEFORE_CLOUD, 5)
+}
+
+/// Such a cloud that glows, by voxels of its own.
+pub fn glowing_cloud() -> Scene {
+    let mut scene = sparse_cloud();
+    let grids = scene.media[0].item.grid().expect("voxels");
+    let mut rng = Rng::new(12, 0, 0);
+    let values = (0..3 * 4_usize.pow(3)).map(|_| 3.0 * rng.next_f64()).collect();
+    let emission = Grid::new([4; 3], 3, values).expect("a grid");
+    let emission = emission.with_placement(*grids.density().to_world()).expect("a box");
+    let (density, albedo) = (grids.density().clone(), grids.albedo().clone());
+    let grids = GridMedium::new(density, grids.scale(), albedo, Volume::Grid(emission));
+    scene.media[0].item.kind = grids.expect("valid coefficients").into();
+    scene
+}
+
+fn sparse() -> SceneBuilder {
     let mut rng = Rng::new(5, 0, 0);
     let mut extinctions = Vec::new();
     for _ in 0..VOXELS.pow(3) {
@@ -291,10 +352,9 @@ pub fn sparse_cloud() -> Scene {
     }
     let mut floor = floor();
     floor.positions.iter_mut().for_each(|p| p.y -= 0.5);
-    let scene = cloud(extinctions, Rgb::new(0.6, 0.3, 0.4))
+    cloud(extinctions, Rgb::new(0.6, 0.3, 0.4))
         .shape("floor", ShapeBuilder::new(floor, diffuse(0.6, 0.5, 0.4)))
-        .shape("lamp", glowing(lamp(), Rgb::new(9.0, 8.0, 7.0)));
-    seen(scene, BEFORE_CLOUD, 5)
+        .shape("lamp", glowing(lamp(), Rgb::new(9.0, 8.0, 7.0)))
 }
 
 /// A cloud that is the same everywhere.

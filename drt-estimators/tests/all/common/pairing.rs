@@ -100,7 +100,8 @@ fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient
                 "sigma_t" => MediumChange::SigmaT { op, voxels },
                 "albedo" => MediumChange::Albedo { op, voxels },
                 "emission" => MediumChange::Emission { op, voxels },
-                _ => MediumChange::G(op),
+                "weight" => MediumChange::Weight { op, voxels },
+                _ => MediumChange::G { op, voxels },
             };
             medium(scene, i, &change, g)
         }

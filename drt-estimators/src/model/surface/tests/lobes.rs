@@ -109,6 +109,7 @@ fn phase_functions() {
     let wo = tilted(20.0);
     for g in [0.0, 0.3, -0.6, 0.9, 0.99] {
         let phase = Phase::henyey_greenstein(g).expect("a valid asymmetry");
+        let phase = phase.at(Vec3::ZERO);
         let lobes = |peak: f64| Lobes::around(-wo * g.signum(), phase.eval(0.0), peak);
         let cost_with = |peak: f64| {
             let lobes = lobes(peak);
