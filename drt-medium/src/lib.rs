@@ -30,6 +30,7 @@ mod uniform;
 #[cfg(feature = "vol")]
 pub mod vol;
 mod volume;
+mod voxel_gradient;
 
 pub use drt_math::ValueChange;
 
@@ -53,3 +54,4 @@ pub use tracking::{DistanceSample, TrackingStats};
 pub use transmittance::TransmittanceRate;
 pub use uniform::UniformMedium;
 pub use volume::Volume;
+pub use voxel_gradient::VoxelGradient;

@@ -214,7 +214,7 @@ fn gradients_are_the_transposes_of_rates() {
             parts[n % 2].scatter(&medium, x, &adjoint);
         }
         let [mut gradient, other] = parts;
-        gradient.add(&other);
+        gradient.add(other);
         let reverse = gradient.dot(&tangent);
         assert!((forward - reverse).abs() < 1e-13 * size, "{forward} forward, {reverse} reverse");
     }
