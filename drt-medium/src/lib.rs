@@ -21,6 +21,8 @@ mod lattice;
 mod medium;
 #[cfg(feature = "vol")]
 pub mod nanovdb;
+#[cfg(feature = "vol")]
+mod pages;
 mod phase;
 mod reach;
 mod tangent;
@@ -29,6 +31,8 @@ mod transmittance;
 mod uniform;
 #[cfg(feature = "vol")]
 pub mod vol;
+#[cfg(feature = "vol")]
+mod vol_error;
 mod volume;
 mod voxel_gradient;
 
