@@ -43,6 +43,20 @@ fn written_files_come_back() {
 }
 
 #[test]
+fn a_cut_file_is_refused_before_room_for_its_values_is_asked_for() {
+    let path = std::env::temp_dir().join(format!("drt-medium-cut-{}.vol", std::process::id()));
+    // A terabyte of values, of which one is there.
+    for (sizes, found) in [([1 << 14, 1 << 12, 1 << 12], 52), ([i32::MAX; 3], 52)] {
+        let mut bytes = header(1, sizes, 1);
+        bytes.extend(1.0_f32.to_le_bytes());
+        std::fs::write(&path, bytes).expect("a writable folder");
+        let refusal = read(&path).expect_err("a cut file");
+        std::fs::remove_file(&path).expect("the file just written");
+        assert!(matches!(refusal, VolError::Cut { found: f, .. } if f == found), "{refusal}");
+    }
+}
+
+#[test]
 fn the_three_encodings() {
     let values = |v: VolFile| v.grid.values().to_vec();
     let mut bytes = header(1, [2, 1, 1], 1);
