@@ -18,9 +18,11 @@ A problem's problem.toml says of which paper it is, and what to reach:
     iterations, core_seconds   what the paper needs: iterations, and seconds of all its cores for one of them
     [target]                   the values that are looked for, by parameter
     [shape]                    for a mesh: the group that is fitted, and the files of its start and of its truth
+    [volume]                   for a grid: the group that is fitted, the name that the scene has for the grid's file, the files of
+                               its start and of its truth, and the sensors that no fit sees, with samples per pixel for these
 
-Errors of parameters are distances between vectors, those of a shape mean distances between surfaces, both over that of
-the start. Where the target is a drawing, there is no truth: the error is the loss over that of the start. Core seconds are of the
+Errors of parameters are distances between vectors, those of a shape mean distances between surfaces, those of a volume mean
+squares of the differences of pictures by sensors that no fit sees, all over that of the start. Where the target is a drawing, there is no truth: the error is the loss over that of the start. Core seconds are of the
 whole process, user and system, reading the scene and writing pictures included.
 """
 
@@ -37,6 +39,7 @@ import subprocess
 import sys
 import tomllib
 
+import pictures
 import surfaces
 import views
 
@@ -74,6 +77,7 @@ class Problem:
         self.run = self.folder / "run"
         self.about = tomllib.loads((self.folder / "problem.toml").read_text())
         self.shape = self.about.get("shape")
+        self.volume = self.about.get("volume")
         self.target = self.about.get("target", {})
 
     def drt(self, *words):
@@ -121,6 +125,12 @@ class Problem:
             errors = [1.0] * (len(rows) - 1) + [after / before]
             unknowns = 3 * len(surfaces.read_ply(self.folder / self.shape["start"])[0])
             return Fit(errors, *percent, unknowns, seconds)
+        if self.volume:
+            squares = {what: self.held_out_square(what, path) for what, path in self.grids(out).items() if what != "target"}
+            errors = [1.0] * (len(rows) - 1) + [squares["reached"] / squares["start"]]
+            size = struct.unpack_from("<4i", (self.folder / self.volume["start"]).read_bytes(), 8)
+            levels = [f"{pictures.decibels(squares[what]):.1f} dB" for what in ("start", "reached")]
+            return Fit(errors, *levels, math.prod(size), seconds)
         if self.target:
             errors = [self.distance(row) / self.distance(rows[0]) for row in rows]
             return Fit(errors, self.short(rows[0]), self.short(rows[-1]), len(self.target), seconds)
@@ -128,6 +138,26 @@ class Problem:
             losses = [float(row["loss"]) for row in csv.DictReader(file)]
         unknowns = len(self.job["parameter"])
         return Fit([l / losses[0] for l in losses], f"loss {losses[0]:.3g}", f"loss {losses[-1]:.3g}", unknowns, seconds)
+
+    def grids(self, out):
+        """The files of the volume at the start, as it is, and as the fit left it."""
+        start, truth = (self.folder / self.volume[what] for what in ("start", "truth"))
+        return {"start": start, "target": truth, "reached": out / f"{self.volume['group']}.vol"}
+
+    def held_out(self, what, grid):
+        """Pictures of a grid by sensors that no fit sees."""
+        for sensor in self.volume["held_out"]:
+            picture = self.run / f"{sensor}-{what}.png"
+            if not views.is_newer(picture, grid, self.folder / "scene.xml"):
+                words = ["-D", f"{self.volume['grid']}={grid}", "--sensor", sensor, "--spp", self.volume["spp"]]
+                self.drt("render", self.folder / "scene.xml", *words, "--output", picture.with_suffix(".exr"), "--preview", picture)
+            yield picture
+
+    def held_out_square(self, what, grid):
+        """The mean square difference of these to those of the grid as it is."""
+        truth = self.held_out("target", self.folder / self.volume["truth"])
+        squares = [pictures.mean_square(a, b) for a, b in zip(self.held_out(what, grid), truth)]
+        return sum(squares) / len(squares)
 
     def distance(self, values):
         return math.dist([values[name] for name in self.target], list(self.target.values()))
@@ -144,7 +174,7 @@ class Problem:
         # From here on the error stays within the bound.
         late = [i for i, error in enumerate(fit.errors) if error > self.about["bound"]]
         there = late[-1] + 1 if late else 0
-        reached = "not reached" if there > steps else "" if self.shape else f"{there}"
+        reached = "not reached" if there > steps else "" if self.shape or self.volume else f"{there}"
         each, theirs = fit.core_seconds / steps, self.about.get("core_seconds")
         size = self.size()
         cells = [
@@ -176,8 +206,14 @@ class Problem:
         return struct.unpack(">2I", self.of_first_view("current").read_bytes()[16:24])
 
     def copy_pictures(self):
-        """Start, target and result, as the fit saw its first view."""
+        """Start, target and result, as the fit saw its first view; of a volume, as a sensor sees it that no fit saw."""
         self.options.pictures.mkdir(parents=True, exist_ok=True)
+        if self.volume:
+            out = self.path.parent / self.job["optimize"]["checkpoint"]
+            for what, grid in self.grids(out).items():
+                picture, *_ = self.held_out(what, grid)
+                shutil.copy(picture, self.options.pictures / f"{self.name}-{what}.png")
+            return
         for what, name in (("frame-00000", "start"), ("target", "target"), ("current", "reached")):
             (self.options.pictures / f"{self.name}-{name}.png").write_bytes(self.of_first_view(what).read_bytes())
 
