@@ -4,7 +4,7 @@ use drt_estimators::{Layer, Rendering, agreement};
 
 use super::derivatives::derivatives;
 use super::monitor::Monitor;
-use super::noise::relative_noise;
+use super::noise::{noise_of_difference, relative_noise};
 use super::options::Options;
 use super::outputs::Outputs;
 use super::table::Table;
@@ -20,7 +20,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
             job.path.display()
         )));
     }
-    let outputs = Outputs::new(options, &job, "check")?;
+    let outputs = Outputs::of_images(options, &job, "check")?;
     run::tell_one_sided(&job, options.changes.quiet)?;
     let monitor = Monitor::new(options.changes.quiet);
     let mut rendering = derivatives(&job, options, &monitor, 0.4, &mut run::Shared::default())?;
@@ -39,13 +39,42 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
         return Ok(Outcome::Interrupted);
     };
     let verdicts = judge(&rendering, &coarse, &fine);
+    let noise = loudest(&rendering, &fine);
     let names = job.parameters.iter().map(|p| format!("fd_{}", p.name));
     let further: Vec<(String, &Layer)> = names.zip(&fine).collect();
     outputs.write(&job, &rendering, &further, &verdicts)?;
-    let table = table(&verdicts);
+    let table = table(&verdicts, &noise);
     outputs.tell(&table.to_string())?;
+    let loudest = noise.iter().copied().fold(0.0, f64::max);
+    if loudest > TELLING && verdicts.iter().all(|v| v.agrees) {
+        outputs.tell(&too_noisy(loudest, rendering.spp))?;
+        return Ok(Outcome::Failed);
+    }
     let agrees = verdicts.iter().all(|v| v.agrees);
     Ok(if agrees { Outcome::Done } else { Outcome::Failed })
+}
+
+/// Relative noise of the difference of a derivative and its finite difference above which nothing is told: half of it could be
+/// missing.
+const TELLING: f64 = 0.5;
+
+/// The noise of what each derivative is compared by.
+fn loudest(rendering: &Rendering, differences: &[Layer]) -> Vec<f64> {
+    let pairs = rendering.derivatives.iter().zip(differences);
+    pairs.map(|(d, fine)| noise_of_difference(&d.total, fine, rendering)).collect()
+}
+
+/// What more samples would help.
+fn too_noisy(noise: f64, spp: u32) -> String {
+    // Noise falls with the square root of their number.
+    let needed = f64::from(spp) * (noise / (0.5 * TELLING)).powi(2);
+    let percent = 100.0 * noise;
+    if needed.is_finite() && needed < f64::from(u32::MAX) {
+        let needed = (needed.ceil() as u32).next_power_of_two();
+        format!("too noisy to tell: differences have {percent:.0} % of noise; try --spp {needed}\n")
+    } else {
+        "too noisy to tell: the noise is larger than any derivative; expected more samples (--spp)\n".into()
+    }
 }
 
 /// What is written where the program must end while differences are prepared.
@@ -92,15 +121,20 @@ fn difference(coarse: &Layer, fine: &Layer) -> Layer {
     difference
 }
 
-fn table(verdicts: &[Verdict]) -> Table<6> {
-    let rows = verdicts.iter().map(|v| {
+fn table(verdicts: &[Verdict], noise: &[f64]) -> Table<6> {
+    let rows = verdicts.iter().zip(noise).map(|(v, noise)| {
         [
             v.parameter.clone(),
             format!("{:.3}", v.rms_z),
             format!("{:.3}", v.max_z),
             format!("{:.3}", v.limit),
             format!("{:.2} %", 100.0 * v.relative_noise),
-            if v.agrees { "agrees" } else { "DISAGREES" }.into(),
+            match v.agrees {
+                false => "DISAGREES",
+                true if *noise > TELLING => "too noisy to tell",
+                true => "agrees",
+            }
+            .into(),
         ]
     });
     Table::new(["parameter", "rms z", "max z", "limit", "relative noise", "verdict"], rows)

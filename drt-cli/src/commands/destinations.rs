@@ -80,6 +80,25 @@ impl Destinations {
     }
 }
 
+/// Refuses a file whose name does not end as what would be in it.
+pub(super) fn check_ending(option: &str, path: &Path, known: &[&str]) -> Result<(), CliError> {
+    if known.iter().any(|ending| ends_with(path, ending)) {
+        return Ok(());
+    }
+    let known: Vec<String> = known.iter().map(|ending| format!(".{ending}")).collect();
+    let message = format!(
+        "{option}: {}: expected a file that ends in {}",
+        path.display(),
+        known.join(" or ")
+    );
+    Err(CliError::argument(message))
+}
+
+/// True for a name with this ending, in capitals or not.
+pub(super) fn ends_with(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
+}
+
 /// A file, however it is called.
 struct Identity {
     path: PathBuf,

@@ -1,54 +1,143 @@
 //! `drt info`: what is in a scene or job, and what a run would do.
 
 use std::collections::HashMap;
+use std::fmt;
+use std::path::Path;
 use std::sync::Arc;
 
 use drt_estimators::emitter::Emitter;
 use drt_estimators::texture::Texture;
-use drt_estimators::{Integrator, MediumBoundary, Scene, Shape, Surrounding};
+use drt_estimators::{Integrator, MediumBoundary, Plan, Scene, Shape, Surrounding};
 use drt_geom::{EdgeClass, Mesh, Topology};
 use drt_medium::{Medium, MediumKind, Phase, Volume};
 use drt_motion::{Change, Parameter};
+use serde_json::json;
 
 use super::console;
-use super::options::Options;
+use super::destinations::Destinations;
+use super::options::{InfoOptions, Options};
 use super::table::Table;
 use super::{Outcome, run};
-use crate::{CliError, Job};
+use crate::error::Place;
+use crate::files::digest::{plan_json, write_digest};
+use crate::{CliError, Job, PROGRAM};
 
-pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
-    let job = run::open(options)?;
-    console::print(describe(&job))?;
+pub(super) fn run(options: &InfoOptions) -> Result<Outcome, CliError> {
+    let InfoOptions { input, digest, spp, sampling, changes } = options;
+    let own = Options::of(input.clone());
+    let own = Options { spp: *spp, sampling: *sampling, changes: changes.clone(), ..own };
+    let job = run::open(&own)?;
+    let contents = Contents::new(&job);
+    let destinations = Destinations::new([("--digest", digest.as_deref())]);
+    destinations.spare(job.inputs())?;
+    destinations.check()?;
+    let text_is_asked_for = digest.as_deref() != Some(Path::new("-"));
+    if text_is_asked_for {
+        console::print(contents.to_string())?;
+    }
     // The plan comes last: preparing it can fail for reasons that the tables help to find.
-    if job.scene.sensors.is_empty() {
-        console::print("no plan: the scene has no <sensor>\n")?;
-    } else if let Err(e) = job.require_derivatives() {
-        console::print(format!("no plan: {e}\n"))?;
-    } else {
-        let session = run::prepare(&job, &job.parameters, &mut run::Shared::default())?;
-        console::print(format!("plan\n{}", session.plan()))?;
+    let plan = plan(&job)?;
+    if text_is_asked_for {
+        console::print(match &plan {
+            Ok(plan) => format!("plan\n{plan}"),
+            Err(why) => format!("no plan: {why}\n"),
+        })?;
+    }
+    if let Some(path) = digest {
+        let text = contents.json(&job, plan.as_ref())?;
+        if text_is_asked_for {
+            write_digest(path, &text)?;
+        } else {
+            console::print(format!("{text}\n"))?;
+        }
     }
     Ok(Outcome::Done)
 }
 
-fn describe(job: &Job) -> String {
-    let scene = &job.scene;
-    let mut text = format!("scene {}\n", job.scene_path.display());
-    if job.text.is_some() {
-        text = format!("job {}\n{text}", job.path.display());
+/// What a run would do, or why there is none.
+fn plan(job: &Job) -> Result<Result<Plan, String>, CliError> {
+    if job.scene.sensors.is_empty() {
+        return Ok(Err("the scene has no <sensor>".into()));
     }
-    let Integrator { max_depth, rr_depth, hide_emitters, .. } = scene.integrator;
-    let depth = job.settings.max_depth.within(max_depth);
-    let depth = depth.map_or("unlimited".into(), |d| d.to_string());
-    let hidden = if hide_emitters { ", emitters hidden from the camera" } else { "" };
-    text += &format!("depth {depth}, Russian roulette from {rr_depth}{hidden}\n\n");
-    text += &shapes(scene).to_string();
-    text += &media(scene).to_string();
-    text += &emitters(scene).to_string();
-    text += &textures(scene).to_string();
-    text += &sensors(job).to_string();
-    text += &parameters(&job.parameters).to_string();
-    text
+    if let Err(e) = job.require_derivatives() {
+        return Ok(Err(e.to_string()));
+    }
+    let session = run::prepare(job, &job.parameters, &mut run::Shared::default())?;
+    Ok(Ok(session.plan().clone()))
+}
+
+/// What a scene or job holds.
+struct Contents {
+    scene: String,
+    job: Option<String>,
+    depth: Option<u32>,
+    rr_depth: u32,
+    hides_emitters: bool,
+    shapes: Table<8>,
+    media: Table<4>,
+    emitters: Table<3>,
+    textures: Table<4>,
+    sensors: Table<6>,
+    parameters: Table<4>,
+}
+
+impl Contents {
+    fn new(job: &Job) -> Self {
+        let scene = &job.scene;
+        let Integrator { max_depth, rr_depth, hide_emitters, .. } = scene.integrator;
+        Self {
+            scene: job.scene_path.display().to_string(),
+            job: job.text.is_some().then(|| job.path.display().to_string()),
+            depth: job.settings.max_depth.within(max_depth),
+            rr_depth,
+            hides_emitters: hide_emitters,
+            shapes: shapes(scene),
+            media: media(scene),
+            emitters: emitters(scene),
+            textures: textures(scene),
+            sensors: sensors(job),
+            parameters: parameters(&job.parameters),
+        }
+    }
+
+    /// The same for programs: tables as lists of objects.
+    fn json(&self, job: &Job, plan: Result<&Plan, &String>) -> Result<String, CliError> {
+        let place = Place::file(&job.path);
+        let plan = plan.map_err(Clone::clone).map(plan_json);
+        let (plan, no_plan) = (plan.as_ref().ok(), plan.as_ref().err());
+        let all = json!({
+            "program": PROGRAM,
+            "command": "info",
+            "scene": self.scene,
+            "job": self.job,
+            "depth": self.depth,
+            "rr_depth": self.rr_depth,
+            "hide_emitters": self.hides_emitters,
+            "shapes": self.shapes.json(),
+            "media": self.media.json(),
+            "emitters": self.emitters.json(),
+            "textures": self.textures.json(),
+            "sensors": self.sensors.json(),
+            "parameters": self.parameters.json(),
+            "plan": plan,
+            "no_plan": no_plan,
+        });
+        serde_json::to_string_pretty(&all).map_err(|e| CliError::input(&place, e))
+    }
+}
+
+impl fmt::Display for Contents {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { scene, job, depth, rr_depth, hides_emitters, .. } = self;
+        if let Some(job) = job {
+            writeln!(f, "job {job}")?;
+        }
+        let depth = depth.map_or("unlimited".into(), |d| d.to_string());
+        let hidden = if *hides_emitters { ", emitters hidden from the camera" } else { "" };
+        writeln!(f, "scene {scene}\ndepth {depth}, Russian roulette from {rr_depth}{hidden}\n")?;
+        let Self { shapes, media, emitters, textures, sensors, parameters, .. } = self;
+        write!(f, "{shapes}{media}{emitters}{textures}{sensors}{parameters}")
+    }
 }
 
 /// The id, or kind and order.
@@ -93,7 +182,7 @@ fn shapes(scene: &Scene) -> Table<8> {
         ]
     };
     let heads =
-        ["shape", "triangles", "surface", "edges", "normals", "bsdf", "inside | outside", ""];
+        ["shape", "triangles", "surface", "edges", "normals", "bsdf", "inside | outside", "role"];
     Table::new(heads, scene.shapes.iter().enumerate().map(row))
 }
 
@@ -216,7 +305,7 @@ fn sensors(job: &Job) -> Table<6> {
             if i == job.settings.sensor { "used" } else { "" }.into(),
         ]
     });
-    Table::new(["sensor", "film", "filter", "field of view", "medium", ""], rows)
+    Table::new(["sensor", "film", "filter", "field of view", "medium", "role"], rows)
 }
 
 fn parameters(parameters: &[Parameter<String>]) -> Table<4> {

@@ -11,11 +11,11 @@ use drt_math::Rgb;
 
 use super::console;
 use super::derivatives::derivatives;
-use super::destinations::Destinations;
+use super::destinations::{Destinations, check_ending};
 use super::fingerprint::Fingerprint;
 use super::monitor::Monitor;
-use super::options::GradOptions;
-use super::outputs::Outputs;
+use super::options::{GradOptions, Options};
+use super::outputs::{Outputs, name_written, output_or_beside};
 use super::shard_file::{Batch, ShardFile, Sums, Total};
 use super::{Outcome, run, shard, stop, targets};
 use crate::error::Place;
@@ -30,21 +30,23 @@ const INDEPENDENT: u64 = 0xa076_1d64_78bd_642f;
 /// of each group.
 pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     let common = &options.common;
-    for (name, given) in [
-        ("terms", options.terms),
-        ("digest", common.digest.is_some()),
-        ("preview", common.preview.is_some()),
-        ("loss", options.loss.is_some() && options.adjoint.is_some()),
-        ("seconds", common.seconds.is_some()),
-        ("target-error", common.target_error.is_some()),
-    ] {
-        if given {
-            return Err(CliError::argument(format!("--{name} does not go with a gradient")));
-        }
+    let look = common.look.given();
+    refuse_with_gradient([
+        ("--terms", options.terms),
+        ("--digest", common.digest.is_some()),
+        ("--preview", common.preview.is_some()),
+        ("--loss", options.loss.is_some() && options.adjoint.is_some()),
+        ("--seconds", common.seconds.is_some()),
+        ("--target-error", common.target_error.is_some()),
+        (look.unwrap_or_default(), look.is_some()),
+    ])?;
+    let given = common;
+    if options.shard.is_some() && given.output.is_none() {
+        return Err(CliError::argument("a shard needs -o FILE.npy to be written to"));
     }
-    let Some(output) = &common.output else {
-        return Err(CliError::argument("a gradient needs -o FILE.npy to be written to"));
-    };
+    let output = &output_or_beside(given, "npy");
+    check_ending("-o", output, &["npy"])?;
+    let common = &Options { output: Some(output.clone()), ..given.clone() };
     let mut job = run::open(common)?;
     if job.text.is_none() {
         return Err(CliError::argument(format!(
@@ -56,9 +58,9 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
     if shard.is_some() {
         shard::check(&job, common, "grad")?;
     }
-    let given = [options.loss.as_ref().and_then(Option::as_ref), options.adjoint.as_ref()];
+    let asked_for = [options.loss.as_ref().and_then(Option::as_ref), options.adjoint.as_ref()];
     let named = job.optimize()?.map(|plan| plan.targets.iter().chain(plan.masks.iter().flatten()));
-    let pictures = given.into_iter().flatten().chain(named.into_iter().flatten());
+    let pictures = asked_for.into_iter().flatten().chain(named.into_iter().flatten());
     Destinations::new([("-o", Some(output.as_path()))]).spare(pictures.map(PathBuf::as_path))?;
     let (monitor, start) =
         (Monitor::new(common.changes.quiet), Outputs::new(common, &job, "grad")?);
@@ -79,6 +81,7 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
         (Some(Found::Numbers(gradient)), _) => {
             write_npy(output, &gradient)?;
             unseen(&asked, &gradient).iter().for_each(console::note);
+            name_written(given, output);
         }
         (Some(Found::Sums(sums, picture)), Some(shard)) => {
             let inputs = Fingerprint::of_job(&asked, "grad", &[&picture])?;
@@ -89,6 +92,16 @@ pub(super) fn run(options: &GradOptions) -> Result<Outcome, CliError> {
         (Some(Found::Sums(..)), None) => {}
     }
     Ok(Outcome::Done)
+}
+
+/// Refuses options that say nothing about a gradient.
+pub(super) fn refuse_with_gradient<'o>(
+    options: impl IntoIterator<Item = (&'o str, bool)>,
+) -> Result<(), CliError> {
+    let given = options.into_iter().find_map(|(option, given)| given.then_some(option));
+    given.map_or(Ok(()), |option| {
+        Err(CliError::argument(format!("{option} does not go with a gradient")))
+    })
 }
 
 /// What a gradient, or a shard of one, is.

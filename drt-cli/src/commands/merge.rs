@@ -7,7 +7,8 @@ use drt_estimators::{Rendering, ShardError, ShardSums};
 
 use super::Outcome;
 use super::console;
-use super::loss_gradient::by_parameters;
+use super::destinations::check_ending;
+use super::loss_gradient::{by_parameters, refuse_with_gradient};
 use super::options::MergeOptions;
 use super::outputs::{Files, summarize};
 use super::shard_file::{ShardFile, Sums, Total, view};
@@ -18,8 +19,8 @@ use crate::files::npy::write_npy;
 use crate::{CliError, Provenance};
 
 pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
-    let files =
-        Files { output: &options.output, digest: &options.digest, preview: &options.preview };
+    let MergeOptions { output, digest, preview, look, .. } = options;
+    let files = Files { output, digest, preview, look: *look };
     files.check(options.shards.iter().map(PathBuf::as_path))?;
     // What has taken hours is put together in seconds, for which a first signal waits: reading counts as writing here.
     let _writing = stop::writing();
@@ -45,6 +46,7 @@ pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
     }
     match &given.0[0].file.sums {
         Sums::Images(_) => {
+            files.check_images()?;
             let rendering = given.images()?;
             let (facts, provenance) = given.facts();
             files.write(&rendering, &[], &[], &facts, &provenance)?;
@@ -56,15 +58,12 @@ pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {
             let Some(output) = &options.output else {
                 return Err(CliError::argument("a gradient needs -o FILE.npy to be written to"));
             };
-            for (name, given) in
-                [("digest", options.digest.is_some()), ("preview", options.preview.is_some())]
-            {
-                if given {
-                    return Err(CliError::argument(format!(
-                        "--{name} does not go with a gradient"
-                    )));
-                }
-            }
+            check_ending("-o", output, &["npy"])?;
+            refuse_with_gradient([
+                ("--digest", options.digest.is_some()),
+                ("--preview", options.preview.is_some()),
+                (look.given().unwrap_or_default(), look.given().is_some()),
+            ])?;
             let gradient = given.gradient()?;
             write_npy(output, &gradient)?;
         }

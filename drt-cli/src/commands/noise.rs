@@ -5,7 +5,20 @@ use drt_estimators::{Layer, Rendering};
 /// Rms standard error over rms value; for a derivative whose value drowns in its own error, over the
 /// largest derivative of the same run.
 pub(super) fn relative_noise(layer: &Layer, rendering: &Rendering) -> f64 {
-    let (value, error) = (layer.rms_value(), layer.relative_noise(Some(1.0)));
+    noise_of(layer.rms_value(), rms_error(layer), rendering)
+}
+
+/// The same for the difference of a derivative and another estimate of it.
+pub(super) fn noise_of_difference(layer: &Layer, other: &Layer, rendering: &Rendering) -> f64 {
+    let error = rms_error(layer).hypot(rms_error(other));
+    noise_of(layer.rms_value(), error, rendering)
+}
+
+fn rms_error(layer: &Layer) -> f64 {
+    layer.relative_noise(Some(1.0))
+}
+
+fn noise_of(value: f64, error: f64, rendering: &Rendering) -> f64 {
     if error == 0.0 {
         return 0.0;
     }

@@ -7,7 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use drt_estimators::Shard;
 
 use crate::job::keys::Sampling;
-use crate::{CliError, Overrides};
+use crate::{CliError, Overrides, Tone, ToneCurve};
 
 /// Differentiable rendering of surfaces and participating media.
 #[derive(Debug, Parser)]
@@ -34,7 +34,7 @@ pub(super) enum Command {
     /// Merge the shards of a render or gradient into the result of the run in one piece.
     Merge(MergeOptions),
     /// Show what a scene or job holds, and what will run.
-    Info(Options),
+    Info(InfoOptions),
     /// Make a picture to look at of the layers of an OpenEXR file.
     Preview(PreviewOptions),
     /// Print what completes commands in a shell.
@@ -60,6 +60,64 @@ pub(super) struct PreviewOptions {
     /// Only this layer, such as d_NAME (`image` for the image itself); may be repeated. Default: all but standard errors.
     #[arg(long, value_name = "NAME")]
     pub(super) layer: Vec<String>,
+    #[command(flatten)]
+    pub(super) look: Look,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct InfoOptions {
+    /// A scene (.xml) or a job (.toml).
+    pub(super) input: PathBuf,
+    /// Where to write what is shown, as JSON; `-` is the standard output, where it takes the place of the tables.
+    #[arg(long, value_name = "FILE.json")]
+    pub(super) digest: Option<PathBuf>,
+    /// Samples per pixel, as the plan would have them.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(super) spp: Option<u32>,
+    /// How paths are found, instead of as the job says.
+    #[arg(long, value_name = "KIND")]
+    pub(super) sampling: Option<Sampling>,
+    #[command(flatten)]
+    pub(super) changes: Changes,
+}
+
+/// How light is shown in PNG pictures.
+#[derive(Args, Clone, Copy, Debug, Default)]
+pub(super) struct Look {
+    /// Exposure of PNG pictures in stops, at 0 of which radiance 1 is white. Default: 0 for -o FILE.png, and for other pictures what
+    /// their light needs.
+    #[arg(long, value_name = "EV", value_parser = finite, allow_negative_numbers = true)]
+    pub(super) exposure: Option<f64>,
+    /// Tone curve of PNG pictures.
+    #[arg(long, value_name = "CURVE")]
+    pub(super) tonemap: Option<ToneCurve>,
+}
+
+impl Look {
+    /// As asked for, with another exposure where none is.
+    pub(super) fn tone(self, exposure: Option<f64>) -> Tone {
+        Tone { exposure: self.exposure.or(exposure), curve: self.tonemap.unwrap_or_default() }
+    }
+
+    /// The option that is given, if any.
+    pub(super) fn given(self) -> Option<&'static str> {
+        let exposure = self.exposure.map(|_| "--exposure");
+        exposure.or(self.tonemap.map(|_| "--tonemap"))
+    }
+}
+
+impl ValueEnum for ToneCurve {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Srgb, Self::Aces]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = match self {
+            Self::Srgb => ("srgb", "Straight, cut off at white"),
+            Self::Aces => ("aces", "The shape of film"),
+        };
+        Some(PossibleValue::new(name).help(help))
+    }
 }
 
 /// What the commands on one scene or job take.
@@ -67,8 +125,9 @@ pub(super) struct PreviewOptions {
 pub(super) struct Options {
     /// A scene (.xml) or a job (.toml).
     pub(super) input: PathBuf,
-    /// Where to write images and standard errors, as OpenEXR.
-    #[arg(short, long, value_name = "FILE.exr")]
+    /// Where to write images and standard errors, as OpenEXR (.exr), or a picture of them (.png). Default of `render` and `grad`: beside
+    /// the input, under its name.
+    #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
     /// Where to write a summary, as JSON; `-` is the standard output.
     #[arg(long, value_name = "FILE.json")]
@@ -76,6 +135,8 @@ pub(super) struct Options {
     /// Where to write a picture to look at.
     #[arg(long, value_name = "FILE.png")]
     pub(super) preview: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) look: Look,
     /// Samples per pixel.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub(super) spp: Option<u32>,
@@ -150,7 +211,7 @@ pub(super) struct MergeOptions {
     /// What `drt render` or `drt grad` wrote with `--shard`, in any order.
     #[arg(required = true)]
     pub(super) shards: Vec<PathBuf>,
-    /// Where to write the result: an OpenEXR file of images, an NPY file of a gradient.
+    /// Where to write the result: an OpenEXR file (.exr) or a picture (.png) of images, an NPY file (.npy) of a gradient.
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
     /// Where to write a summary, as JSON; `-` is the standard output.
@@ -159,6 +220,8 @@ pub(super) struct MergeOptions {
     /// Where to write a picture to look at.
     #[arg(long, value_name = "FILE.png")]
     pub(super) preview: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) look: Look,
     /// Merge what there is, though shards are missing: unbiased, with wider errors.
     #[arg(long)]
     pub(super) partial: bool,
@@ -262,6 +325,7 @@ impl Options {
             output: None,
             digest: None,
             preview: None,
+            look: Look::default(),
             spp: None,
             seconds: None,
             target_error: None,
@@ -316,6 +380,11 @@ fn shard(text: &str) -> Result<Shard, String> {
     let number = |s: &str| s.parse::<u32>().ok();
     let shard = text.split_once('/').and_then(|(k, n)| Shard::new(number(k)?, number(n)?));
     shard.ok_or_else(|| "expected one of several parts, from 1, such as 3/8".into())
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
+    value.ok_or_else(|| "expected a number".into())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -6,13 +6,13 @@ use drt_estimators::{Layer, Rendering, Tail};
 
 use super::clock::Clock;
 use super::console;
-use super::destinations::Destinations;
+use super::destinations::{Destinations, check_ending, ends_with};
 use super::noise::largest_noise;
-use super::options::Options;
+use super::options::{Look, Options};
 use super::shard_file::ShardFile;
 use super::stop;
 use crate::files::digest::{RunFacts, Verdict, digest, write_digest};
-use crate::{CliError, Job, Provenance, write_exr, write_preview};
+use crate::{CliError, Job, Provenance, Tone, write_exr, write_preview};
 
 /// Measures a command from its start and writes its results.
 #[derive(Clone)]
@@ -33,10 +33,20 @@ impl Outputs {
         job: &Job,
         command: &'static str,
     ) -> Result<Self, CliError> {
-        let Options { output, digest, preview, .. } = options;
-        Files { output, digest, preview }.check(job.inputs())?;
+        Files::of(options).check(job.inputs())?;
         let options = options.clone();
         Ok(Self { options, command, clock: Clock::start(), inputs: None, attachment: None })
+    }
+
+    /// The same for images, of which names tell the kind.
+    pub(super) fn of_images(
+        options: &Options,
+        job: &Job,
+        command: &'static str,
+    ) -> Result<Self, CliError> {
+        let outputs = Self::new(options, job, command)?;
+        Files::of(options).check_images()?;
+        Ok(outputs)
     }
 
     /// Marks the image as the result of inputs with this hash.
@@ -61,8 +71,7 @@ impl Outputs {
         &self,
         read: impl IntoIterator<Item = &'p Path>,
     ) -> Result<(), CliError> {
-        let Options { output, digest, preview, .. } = &self.options;
-        Files { output, digest, preview }.destinations().spare(read)
+        Files::of(&self.options).destinations().spare(read)
     }
 
     /// The files that are asked for.
@@ -108,13 +117,23 @@ impl Outputs {
             inputs: self.inputs.clone(),
             attachment: self.attachment.clone(),
         };
-        let Options { output, digest, preview, .. } = &self.options;
-        let files = Files { output, digest, preview };
-        files.write(rendering, further, checks, &facts, &provenance)?;
+        Files::of(&self.options).write(rendering, further, checks, &facts, &provenance)?;
         if !self.options.changes.quiet {
             summarize(rendering, seconds);
         }
         Ok(())
+    }
+}
+
+/// The file that is named, or else one beside the input, under its name.
+pub(super) fn output_or_beside(options: &Options, ending: &str) -> PathBuf {
+    options.output.clone().unwrap_or_else(|| options.input.with_extension(ending))
+}
+
+/// Names the file that has been written, where the command line does not.
+pub(super) fn name_written(options: &Options, path: &Path) {
+    if options.output.is_none() && !options.changes.quiet {
+        console::note(format_args!("written to {}", path.display()));
     }
 }
 
@@ -123,9 +142,33 @@ pub(super) struct Files<'a> {
     pub(super) output: &'a Option<PathBuf>,
     pub(super) digest: &'a Option<PathBuf>,
     pub(super) preview: &'a Option<PathBuf>,
+    pub(super) look: Look,
+}
+
+impl<'a> Files<'a> {
+    fn of(options: &'a Options) -> Self {
+        let Options { output, digest, preview, look, .. } = options;
+        Self { output, digest, preview, look: *look }
+    }
 }
 
 impl Files<'_> {
+    /// Refuses images under names of something else, and a look for which there is no picture.
+    pub(super) fn check_images(&self) -> Result<(), CliError> {
+        let endings: [(&str, &Option<PathBuf>, &[&str]); 2] =
+            [("-o", self.output, &["exr", "png"]), ("--preview", self.preview, &["png"])];
+        for (option, path, known) in endings {
+            path.as_ref().map_or(Ok(()), |path| check_ending(option, path, known))?;
+        }
+        let picture = self.output.as_ref().filter(|path| ends_with(path, "png"));
+        match self.look.given().filter(|_| picture.or(self.preview.as_ref()).is_none()) {
+            Some(option) => Err(CliError::argument(format!(
+                "{option}: no picture is written; expected -o FILE.png or --preview FILE.png beside it"
+            ))),
+            None => Ok(()),
+        }
+    }
+
     /// Refuses places that cannot be written, or that hold something that is read.
     pub(super) fn check<'p>(
         &self,
@@ -154,7 +197,7 @@ impl Files<'_> {
     ) -> Result<(), CliError> {
         let _writing = stop::writing();
         if let Some(path) = self.preview {
-            write_preview(path, rendering, further)?;
+            write_preview(path, rendering, further, self.look.tone(None))?;
         }
         if let Some(path) = self.digest {
             let text = digest(rendering, facts, checks);
@@ -165,9 +208,13 @@ impl Files<'_> {
             }
         }
         // The image comes last: what has it has everything.
-        if let Some(path) = self.output {
-            write_exr(path, rendering, further, provenance)?;
-        }
+        match self.output {
+            Some(path) if ends_with(path, "png") => {
+                write_preview(path, rendering, further, self.look.tone(Tone::PLAIN.exposure))
+            }
+            Some(path) => write_exr(path, rendering, further, provenance),
+            None => Ok(()),
+        }?;
         Ok(())
     }
 }

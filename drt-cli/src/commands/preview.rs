@@ -1,7 +1,7 @@
 //! `drt preview`: layers of an EXR file, to look at.
 
 use super::Outcome;
-use super::destinations::Destinations;
+use super::destinations::{Destinations, check_ending};
 use super::options::PreviewOptions;
 use crate::error::Place;
 use crate::files::image::{is_error, write_layers};
@@ -13,6 +13,7 @@ pub(super) fn run(options: &PreviewOptions) -> Result<Outcome, CliError> {
     let destinations = Destinations::new([("-o", Some(output.as_path()))]);
     destinations.spare([input.as_path()])?;
     destinations.check()?;
+    check_ending("-o", &output, &["png"])?;
     let file = read_exr(input)?;
     let all = file.layers.iter().map(|(name, pixels)| (name.as_str(), &pixels[..]));
     let mut layers: Vec<_> = all.clone().filter(|(name, _)| !is_error(name)).collect();
@@ -34,6 +35,6 @@ pub(super) fn run(options: &PreviewOptions) -> Result<Outcome, CliError> {
     if layers.is_empty() {
         return Err(CliError::input(&Place::file(input), "it has no layers but standard errors"));
     }
-    write_layers(&output, file.size, &layers)?;
+    write_layers(&output, file.size, &layers, options.look.tone(None))?;
     Ok(Outcome::Done)
 }

@@ -5,22 +5,25 @@ use drt_estimators::Rendering;
 use super::console;
 use super::monitor::Monitor;
 use super::options::{Options, RenderOptions};
-use super::outputs::Outputs;
+use super::outputs::{Outputs, name_written, output_or_beside};
 use super::run::{self, Shared};
 use super::{Outcome, noted, shard};
 use crate::{CliError, Job};
 
 pub(super) fn run(options: &RenderOptions) -> Result<Outcome, CliError> {
-    let (shard, options) = (options.shard, &options.common);
-    let job = run::open(options)?;
+    let (shard, given) = (options.shard, &options.common);
+    let job = run::open(given)?;
     if let Some(shard) = shard {
-        return shard::images(&job, options, "render", shard);
+        return shard::images(&job, given, "render", shard);
     }
-    let outputs = Outputs::new(options, &job, "render")?;
+    let output = output_or_beside(given, "exr");
+    let options = &Options { output: Some(output.clone()), ..given.clone() };
+    let outputs = Outputs::of_images(options, &job, "render")?;
     let monitor = Monitor::new(options.changes.quiet);
     let rendering = image(&job, options, &monitor, &mut Shared::default())?;
     monitor.finish();
     outputs.write(&job, &rendering, &[], &[])?;
+    name_written(given, &output);
     Ok(noted(&rendering))
 }
 

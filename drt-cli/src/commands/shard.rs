@@ -4,6 +4,7 @@ use drt_estimators::{Estimate, EstimatorKind, Layer, Plan, Rendering, Shard, Sha
 use drt_math::Rgb;
 
 use super::Outcome;
+use super::destinations::check_ending;
 use super::fingerprint::Fingerprint;
 use super::monitor::Monitor;
 use super::options::Options;
@@ -38,10 +39,11 @@ pub(super) fn images(
     shard: Shard,
 ) -> Result<Outcome, CliError> {
     check(job, options, command)?;
-    if options.output.is_none() {
+    let Some(output) = &options.output else {
         return Err(CliError::argument("a shard needs -o FILE.exr to be written to"));
-    }
-    let outputs = Outputs::new(options, job, command)?;
+    };
+    let outputs = Outputs::of_images(options, job, command)?;
+    check_ending("-o", output, &["exr"])?;
     let monitor = Monitor::new(options.changes.quiet);
     let name = format!("shard {shard}");
     let shared = &mut Shared::default();

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use serde_json::{Map, Value};
+
 /// Rows under heads, each column as wide as its widest entry.
 pub(super) struct Table<const N: usize> {
     heads: [&'static str; N],
@@ -14,6 +16,21 @@ impl<const N: usize> Table<N> {
         rows: impl IntoIterator<Item = [String; N]>,
     ) -> Self {
         Self { heads, rows: rows.into_iter().collect() }
+    }
+
+    /// The rows under their heads, with numbers for what reads as one, and without empty entries.
+    pub(super) fn json(&self) -> Value {
+        let value = |cell: &String| match cell.parse::<u64>() {
+            Ok(number) => number.into(),
+            Err(_) => cell.parse::<f64>().map_or_else(|_| cell.as_str().into(), Value::from),
+        };
+        let row = |row: &[String; N]| {
+            let entries = self.heads.iter().zip(row).filter(|(_, cell)| !cell.is_empty());
+            let entries = entries
+                .map(|(head, cell)| (head.replace(" | ", "_").replace(' ', "_"), value(cell)));
+            Value::Object(entries.collect::<Map<_, _>>())
+        };
+        self.rows.iter().map(row).collect()
     }
 }
 

@@ -101,6 +101,11 @@ struct MediumSummary<'a> {
     motion: BTreeMap<&'a str, &'a str>,
 }
 
+/// The plan as the digest has it.
+pub(crate) fn plan_json(plan: &Plan) -> Option<serde_json::Value> {
+    serde_json::to_value(PlanSummary::from(plan)).ok()
+}
+
 impl<'a> From<&'a Plan> for PlanSummary<'a> {
     fn from(plan: &'a Plan) -> Self {
         let medium = |m: &'a MediumPlan| MediumSummary {

@@ -91,6 +91,17 @@ fn gradients_pass_their_check() {
     assert!(folder.exr("c.exr").layers.contains_key("fd_lamp-x"));
 }
 
+/// Where half of a derivative could be missing, nothing is said to agree.
+#[test]
+fn noisy_checks_tell_nothing() {
+    let folder = folder();
+    let noisy = "check job.toml --quiet --spp 1 --size 64x32 --set estimator.step=1e-6";
+    let out = folder.run(&format!("{noisy} --set estimator.kind=path-space --max-depth 2"));
+    let said = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert_eq!(out.status.code(), Some(1), "{said}");
+    assert!(said.contains("too noisy to tell") && said.contains("--spp"), "{said}");
+}
+
 #[test]
 fn info_lists_and_plans() {
     let folder = folder();

@@ -78,3 +78,75 @@ fn textures_and_missing_files_are_listed() {
     let parts = ["2 files are missing", "wrong.xml:2", "`a.obj`", "wrong.xml:3", "`b.obj`"];
     expect(&folder.run("info wrong.xml"), 2, &parts);
 }
+
+/// Names tell the kind of file, and pictures are as bright as is asked for.
+#[test]
+fn names_tell_what_is_written() {
+    let folder = Folder::new();
+    folder.file("scene.xml", SCENE);
+    folder.file("job.toml", JOB);
+    let exists = |name: &str| folder.path().join(name).exists();
+    // Without a name, beside the input.
+    expect(&folder.run("render scene.xml"), 0, &["written to scene.exr"]);
+    expect(&folder.run("grad job.toml"), 0, &["written to job.exr"]);
+    assert!(exists("scene.exr") && folder.exr("job.exr").layers.contains_key("d_light"));
+    // The sky's radiance is 1, which is white as it is, and half of it a stop below.
+    let brightest = |options: &str| {
+        expect(&folder.run(&format!("render scene.xml --quiet -o a.png {options}")), 0, &[]);
+        assert_eq!(size(&folder, "a.png"), (8, 6));
+        let picture = image::open(folder.path().join("a.png")).unwrap().into_rgb8();
+        picture.pixels().map(|p| p[0]).max().unwrap()
+    };
+    assert_eq!(brightest(""), 255);
+    assert!((187..=188).contains(&brightest("--exposure -1")), "half of white");
+    assert!(brightest("--tonemap aces") < 255);
+    for (line, part) in [
+        ("render scene.xml -o a.jpg", "a.jpg: expected a file that ends in .exr or .png"),
+        ("render scene.xml -o a", "a: expected a file"),
+        ("render scene.xml --preview a.exr", "--preview: a.exr: expected"),
+        ("render scene.xml -o b.exr --exposure 1", "--exposure: no picture is written"),
+        ("render scene.xml --tonemap film", "aces"),
+        ("render scene.xml --shard 1/2 -o b.png", "b.png: expected a file that ends in .exr"),
+        ("batch scene.xml --list list", "b.png: expected a file that ends in .exr"),
+        ("grad job.toml --loss scene.exr -o b.exr", "b.exr: expected a file that ends in .npy"),
+        ("preview job.exr -o b.gif", "b.gif: expected"),
+        ("info scene.xml -o b.exr", "-o"),
+    ] {
+        folder.file("list", "scene.xml -o b.png\n");
+        expect(&folder.run(line), 2, &[part]);
+        assert!(!exists("b.exr") && !exists("b.png"), "{line}");
+    }
+}
+
+/// What has been exposed for a screen is no target; a picture of the light itself is.
+#[test]
+fn pictures_for_the_eye_are_no_targets() {
+    let folder = Folder::new();
+    folder.file("scene.xml", SCENE);
+    folder.file("job.toml", JOB);
+    let gradient = |target: &str| folder.run(&format!("grad job.toml --quiet --loss {target}"));
+    expect(&folder.run("render scene.xml -o a.png --preview b.png"), 0, &[]);
+    expect(&gradient("a.png"), 0, &[]);
+    expect(&gradient("b.png"), 2, &["b.png: it was made to be looked at"]);
+    expect(&folder.run("render scene.xml -o a.png --exposure 1"), 0, &[]);
+    expect(&gradient("a.png"), 2, &["a.png: it was made to be looked at"]);
+}
+
+#[test]
+fn contents_as_json() {
+    let folder = Folder::new();
+    folder.file("scene.xml", SCENE);
+    folder.file("job.toml", JOB);
+    let output = folder.run("info job.toml --digest -");
+    expect(&output, 0, &[]);
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&found["command"], &found["job"]), (&"info".into(), &"job.toml".into()));
+    let wall = &found["shapes"][0];
+    assert_eq!((&wall["shape"], &wall["triangles"]), (&"wall".into(), &2.into()));
+    assert_eq!(found["parameters"][0]["target"], "sky");
+    assert!(found["plan"]["estimators"].is_array() && found["no_plan"].is_null());
+    // In a file, beside the tables.
+    expect(&folder.run("info scene.xml --digest b.json"), 0, &[]);
+    assert_eq!(folder.json("b.json")["sensors"][0]["film"], "8x6");
+    expect(&folder.run("info scene.xml --digest scene.xml"), 2, &["scene.xml is read"]);
+}

@@ -5,6 +5,7 @@
 
 pub mod caged;
 mod cell;
+pub mod clouds;
 pub mod deforming;
 pub(crate) mod effects;
 pub mod estimators;
@@ -42,6 +43,7 @@ macro_rules! every_stage {
             deforming: wax mean_value_wax still_wax jelly sheared_glass nested touching pulse immersed
                 lantern stirred_smoke still_smoke fine_milk fine_glass;
             riding: riding riding_tight riding_inside riding_still riding_mean_value dyed;
+            clouds: cloud_under_a_sky;
             caged: caged_milk caged_glass caged_solid;
         }
     };

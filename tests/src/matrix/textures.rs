@@ -165,7 +165,7 @@ pub fn picture_lamp() -> Result<Stage> {
 }
 
 /// An environment that looks like nothing else turned or mirrored.
-fn sky() -> Result<Emitter> {
+pub(super) fn sky() -> Result<Emitter> {
     let texels: Vec<[f32; 3]> = (0..12_u16)
         .map(|i| [0.4, 0.9, 1.7].map(|by: f32| 0.5 + 0.4 * (by * f32::from(i)).sin()))
         .collect();

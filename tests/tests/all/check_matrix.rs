@@ -9,16 +9,16 @@ use drt_tests::Result;
 use drt_tests::matrix::estimators::{Effort, Method, Pairs, examine};
 use drt_tests::matrix::reference::{self, stored};
 use drt_tests::matrix::{
-    Stage, Table, caged, deforming, lenses, lights, materials, media, riding, still, surfaces,
-    textures,
+    Stage, Table, caged, clouds, deforming, lenses, lights, materials, media, riding, still,
+    surfaces, textures,
 };
 use drt_tests::reference::Reference;
 
 /// How far estimators other than path space go, whose samples are the stage's.
 const EFFORT: Effort = Effort { noise: 0.05, scale: 0.0, samples: 256, seed: 0 };
 
-fn judge(stage: &Stage, references: &[Reference], methods: &[Method]) {
-    let found = examine(stage, references, methods, EFFORT).unwrap();
+pub(crate) fn judge(stage: &Stage, references: &[Reference], methods: &[Method], effort: Effort) {
+    let found = examine(stage, references, methods, effort).unwrap();
     println!("{}{}", Table(&found.rows), Pairs(&found.pairs));
     assert!(!found.rows.is_empty(), "the stage has no such cells");
     let failing = found.rows.iter().filter(|row| !row.passes()).count();
@@ -30,7 +30,7 @@ fn judge(stage: &Stage, references: &[Reference], methods: &[Method]) {
 /// The representative cells against stored references.
 fn short(stage: Result<Stage>, methods: &[Method]) {
     let stage = stage.unwrap().short();
-    judge(&stage, &stored(&stage).unwrap_or_else(|e| panic!("{e}")), methods);
+    judge(&stage, &stored(&stage).unwrap_or_else(|e| panic!("{e}")), methods, EFFORT);
 }
 
 /// All cells by path space, against finite differences of now.
@@ -38,7 +38,7 @@ fn long(stage: Result<Stage>) {
     let stage = stage.unwrap();
     let of = |cell| reference::short(&stage, cell);
     let references: Result<Vec<Reference>> = stage.cells.iter().map(of).collect();
-    judge(&stage, &references.unwrap(), &[]);
+    judge(&stage, &references.unwrap(), &[], EFFORT);
 }
 
 macro_rules! stages {

@@ -17,7 +17,7 @@ use drt_estimators::{Depth, PathSampling, Session, Settings, Unattended, agreeme
 use drt_tests::Result;
 use drt_tests::matrix::estimators::{Effort, Method, Pairs, compare};
 use drt_tests::matrix::{
-    Stage, caged, deforming, lenses, lights, materials, media, riding, surfaces, textures,
+    Stage, caged, clouds, deforming, lenses, lights, materials, media, riding, surfaces, textures,
 };
 
 fn run(stage: Result<Stage>, methods: &[Method], effort: Effort) {

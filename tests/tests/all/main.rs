@@ -1,6 +1,7 @@
 //! All tests of the crate from outside, in one program.
 
 mod check_matrix;
+mod clouds;
 mod coincidence;
 mod estimators;
 mod insides;

@@ -7,7 +7,8 @@
 use drt_tests::Result;
 use drt_tests::matrix::reference::{long, stored};
 use drt_tests::matrix::{
-    Stage, caged, deforming, lenses, lights, materials, media, riding, still, surfaces, textures,
+    Stage, caged, clouds, deforming, lenses, lights, materials, media, riding, still, surfaces,
+    textures,
 };
 use drt_tests::reference::{Reference, SEED, write};
 

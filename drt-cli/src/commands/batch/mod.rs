@@ -14,7 +14,7 @@ use self::list::Entry;
 use self::log::{Event, Log};
 use super::clock::Clock;
 use super::derivatives::derivatives;
-use super::destinations::Destinations;
+use super::destinations::{Destinations, check_ending};
 use super::monitor::Monitor;
 use super::options::BatchOptions;
 use super::outputs::Outputs;
@@ -37,6 +37,8 @@ pub(super) fn run(options: &BatchOptions) -> Result<Outcome, CliError> {
     written.distinct()?;
     written
         .spare(entries.iter().map(|e| e.options.input.as_path()).chain(options.list.as_deref()))?;
+    // What is done is known by the marks of its images.
+    entries.iter().try_for_each(|e| check_ending("-o", e.output(), &["exr"]))?;
     for folder in folders(&entries, &options.output) {
         std::fs::create_dir_all(&folder).map_err(|e| CliError::write(&folder, e))?;
     }
@@ -174,7 +176,7 @@ impl Batch {
         }
         let warnings: Vec<String> = job.warnings.iter().map(ToString::to_string).collect();
         self.log.add(entry, Event { warnings: &warnings, ..event("started") })?;
-        let outputs = Outputs::new(options, &job, command)?.of_inputs(inputs.clone());
+        let outputs = Outputs::of_images(options, &job, command)?.of_inputs(inputs.clone());
         let rendering = if by_derivatives {
             job.require_derivatives()?;
             derivatives(&job, options, &self.monitor, 1.0, shared)?

@@ -10,7 +10,7 @@ use super::problem::Problem;
 use super::turntable::turning;
 use crate::CliError;
 use crate::files::atomic::write_atomically;
-use crate::files::image::picture::encode_png;
+use crate::files::image::picture::{SCREEN, encode_png};
 use crate::files::image::tone::{Pixel, diverging, exposed, white_of};
 
 /// Images on the way, the first and last included.
@@ -156,5 +156,5 @@ fn is_frame(name: &str) -> bool {
 }
 
 fn write(path: &Path, size: [u32; 2], pixels: &[Pixel]) -> Result<(), CliError> {
-    write_atomically(path, |out| Ok(encode_png(out, size, pixels)?))
+    write_atomically(path, |out| Ok(encode_png(out, size, pixels, Some(SCREEN))?))
 }

@@ -21,6 +21,7 @@ use std::path::Path;
 
 use drt_estimators::EstimatorKind;
 use drt_estimators::fit::Evaluation;
+use drt_motion::optimize::Outlook;
 
 use super::derivatives::derivatives;
 use super::destinations::whole_name;
@@ -55,7 +56,7 @@ fn together(options: &OptimizeOptions, team: &Team) -> Result<Outcome, CliError>
     let common = &options.common;
     let job = team.agree(run::open_job(common))?;
     team.agree(team.check(&job))?;
-    let outputs = team.agree(Outputs::new(common, &job, "optimize"))?;
+    let outputs = team.agree(Outputs::of_images(common, &job, "optimize"))?;
     let problem = team.agree(Problem::new(&job, options))?;
     team.agree(spare(&problem, &outputs))?;
     let monitor = Monitor::new(common.changes.quiet || !team.leads());
@@ -135,7 +136,13 @@ fn write(
 fn summary(problem: &Problem<'_>, descent: &Descent<'_>, last: Option<&Evaluation>) -> String {
     let outlook = last.and_then(|seen| descent.outlook(seen));
     let line = |(p, (name, value)): (usize, (&str, &f64))| match &outlook {
-        Some(known) => format!("{name} = {value:.6} ± {:.1e}\n", known.errors[p]),
+        Some(Outlook { errors, step }) => {
+            let (error, further) = (errors[p], step[p]);
+            let arrived = if further.abs() > error { ": not arrived" } else { "" };
+            format!(
+                "{name} = {value:.6} ± {error:.1e}, and a further step would change it by {further:+.1e}{arrived}\n"
+            )
+        }
         None => format!("{name} = {value:.6}\n"),
     };
     let mut text: String = problem.names().zip(descent.values()).enumerate().map(line).collect();

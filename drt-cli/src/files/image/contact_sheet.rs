@@ -6,8 +6,8 @@ use drt_estimators::{Layer, Rendering};
 use drt_math::Rgb;
 
 use super::font;
-use super::picture::encode_png;
-use super::tone::{self, Pixel};
+use super::picture::{SCREEN, encode_png};
+use super::tone::{self, Pixel, Tone};
 use crate::CliError;
 use crate::files::atomic::write_atomically;
 
@@ -34,9 +34,45 @@ impl Canvas {
             self.pixels[y * self.width + x] = color;
         }
     }
+
+    /// The colours of values from minus to plus a range, between these numbers.
+    fn bar(&mut self, range: f64, [left, top]: [usize; 2], width: usize) {
+        let text = |sign: &str| format!("{sign}{range:.1e}");
+        let number = text("-").len() * font::ADVANCE;
+        let [start, end] = [number, width.saturating_sub(number)];
+        for x in start..end {
+            let part = (x - start) as f64 / (end - start).max(2).wrapping_sub(1) as f64;
+            for y in 0..font::HEIGHT {
+                self.set(left + x, top + y, tone::signed(2.0 * part - 1.0));
+            }
+        }
+        for (sign, at) in [("-", 0), ("+", end)] {
+            font::draw(&text(sign), |x, y| self.set(left + at + x, top + y, INK));
+        }
+    }
 }
 
-/// Writes a preview. Without derivatives it is the image alone, pixel for pixel.
+/// What is seen of one layer.
+struct Panel {
+    name: String,
+    pixels: Vec<Pixel>,
+    /// What full colour stands for, where colours have signs.
+    range: Option<f64>,
+}
+
+impl Panel {
+    fn light(name: impl Into<String>, image: &[Rgb], tone: Tone) -> Self {
+        Self { name: name.into(), pixels: tone.shown(image), range: None }
+    }
+
+    fn signed(name: impl Into<String>, image: &[Rgb]) -> Self {
+        let range = Some(tone::range_of(image));
+        Self { name: name.into(), pixels: tone::diverging(image), range }
+    }
+}
+
+/// Writes a picture to look at. Without derivatives it is the image alone, pixel for pixel; with some, each is beside it, with the values
+/// that its colours stand for, and whatever else is in `further`.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -44,19 +80,13 @@ pub fn write_preview(
     path: &Path,
     rendering: &Rendering,
     further: &[(String, &Layer)],
+    tone: Tone,
 ) -> Result<(), CliError> {
-    let image = exposed(&means(&rendering.image));
+    let mut panels = vec![Panel::light("image", &means(&rendering.image), tone)];
     let derivatives = rendering.derivatives.iter();
-    let mut panels: Vec<(String, Vec<Pixel>)> =
-        derivatives.map(|d| (format!("d_{}", d.name), tone::diverging(&means(&d.total)))).collect();
-    panels
-        .extend(further.iter().map(|(name, layer)| (name.clone(), tone::diverging(&means(layer)))));
-    panels.insert(0, ("image".into(), image));
-    write_panels(path, rendering.image.size, &mut panels)
-}
-
-fn exposed(image: &[Rgb]) -> Vec<Pixel> {
-    tone::exposed(image, tone::white_of(image))
+    panels.extend(derivatives.map(|d| Panel::signed(format!("d_{}", d.name), &means(&d.total))));
+    panels.extend(further.iter().map(|(name, layer)| Panel::signed(name.clone(), &means(layer))));
+    write_panels(path, rendering.image.size, &mut panels, tone)
 }
 
 /// Writes a preview of layers of a file, by their names: what may be negative from blue through white (zero) to red, each in its own
@@ -68,15 +98,16 @@ pub fn write_layers(
     path: &Path,
     size: [u32; 2],
     layers: &[(&str, &[[f32; 3]])],
+    tone: Tone,
 ) -> Result<(), CliError> {
     let panel = |(name, pixels): &(&str, &[[f32; 3]])| {
         let image: Vec<Rgb> = pixels.iter().map(|p| p.map(f64::from).into()).collect();
         let derivative = name.starts_with("d_") || name.starts_with("fd_");
         let signed = derivative && !is_error(name) || image.iter().any(|p| p.mean() < 0.0);
         let shown = if name.is_empty() { "image" } else { name };
-        (shown.into(), if signed { tone::diverging(&image) } else { exposed(&image) })
+        if signed { Panel::signed(shown, &image) } else { Panel::light(shown, &image, tone) }
     };
-    write_panels(path, size, &mut layers.iter().map(panel).collect::<Vec<_>>())
+    write_panels(path, size, &mut layers.iter().map(panel).collect::<Vec<_>>(), tone)
 }
 
 /// True for the name of a layer of standard errors.
@@ -87,15 +118,20 @@ pub fn is_error(name: &str) -> bool {
 fn write_panels(
     path: &Path,
     size: [u32; 2],
-    panels: &mut [(String, Vec<Pixel>)],
+    panels: &mut [Panel],
+    tone: Tone,
 ) -> Result<(), CliError> {
     let [w, h] = size.map(|n| n as usize);
+    let mut note = Some(SCREEN);
     let canvas = match panels {
-        [(_, pixels)] => Canvas { width: w, height: h, pixels: core::mem::take(pixels) },
+        [Panel { pixels, range, .. }] => {
+            note = note.filter(|_| range.is_some() || tone != Tone::PLAIN);
+            Canvas { width: w, height: h, pixels: core::mem::take(pixels) }
+        }
         _ => sheet(panels, [w, h]),
     };
     write_atomically(path, |out| {
-        Ok(encode_png(out, [canvas.width as u32, canvas.height as u32], &canvas.pixels)?)
+        Ok(encode_png(out, [canvas.width as u32, canvas.height as u32], &canvas.pixels, note)?)
     })
 }
 
@@ -103,14 +139,16 @@ fn means(layer: &Layer) -> Vec<Rgb> {
     layer.pixels.iter().map(|p| p.mean).collect()
 }
 
-/// Panels of one size in a grid, each above its name.
-fn sheet(panels: &[(String, Vec<Pixel>)], [w, h]: [usize; 2]) -> Canvas {
+/// Panels of one size in a grid, each above its name, and above a bar of its colours between the values that they stand for.
+fn sheet(panels: &[Panel], [w, h]: [usize; 2]) -> Canvas {
     let zoom = LEAST_PANEL.div_ceil(w).clamp(1, 16);
     let columns = (panels.len() as f64).sqrt().ceil() as usize;
-    let cell = [w * zoom + MARGIN, h * zoom + font::HEIGHT + 2 * MARGIN];
+    let bars = panels.iter().any(|panel| panel.range.is_some());
+    let line = font::HEIGHT + MARGIN;
+    let cell = [w * zoom + MARGIN, h * zoom + line * if bars { 2 } else { 1 } + MARGIN];
     let rows = panels.len().div_ceil(columns);
     let mut canvas = Canvas::new(columns * cell[0] + MARGIN, rows * cell[1] + MARGIN);
-    for (i, (name, pixels)) in panels.iter().enumerate() {
+    for (i, Panel { name, pixels, range }) in panels.iter().enumerate() {
         let [left, top] = [i % columns * cell[0] + MARGIN, i / columns * cell[1] + MARGIN];
         for y in 0..h * zoom {
             for x in 0..w * zoom {
@@ -121,6 +159,9 @@ fn sheet(panels: &[(String, Vec<Pixel>)], [w, h]: [usize; 2]) -> Canvas {
         font::draw(&name.chars().take(fitting).collect::<String>(), |x, y| {
             canvas.set(left + x, top + h * zoom + MARGIN / 2 + y, INK);
         });
+        if let Some(range) = range {
+            canvas.bar(*range, [left, top + h * zoom + MARGIN / 2 + line], w * zoom);
+        }
     }
     canvas
 }

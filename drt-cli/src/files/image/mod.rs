@@ -13,3 +13,4 @@ pub use exr_file::{
     ExrFile, Provenance, attachment, encode_texels, is_result_of, read_exr, write_exr,
 };
 pub use picture::{Picture, read_picture};
+pub use tone::{Tone, ToneCurve};

@@ -38,6 +38,11 @@ impl Picture {
     }
 }
 
+/// What a PNG carries that is no longer the image it was made of: light has been exposed, or derivatives have become colours.
+pub(crate) const SCREEN: &str = "for the eye alone: exposed for a screen";
+/// The keyword of that note.
+const NOTE: &str = "Comment";
+
 /// Reads a picture that must be of a film's size: EXR (its plain `R`, `G`, `B`, or `Y` in place of all three), NPY or PNG;
 /// its first bytes tell which of them it is. What says in its header that it is of another size is not read any further.
 ///
@@ -100,6 +105,11 @@ fn read_png(
     decoder.set_transformations(png::Transformations::EXPAND);
     let reader = decoder.read_info().map_err(|e| fail(&e))?;
     expected([reader.info().width, reader.info().height])?;
+    let notes = &reader.info().uncompressed_latin1_text;
+    if notes.iter().any(|note| note.keyword == NOTE && note.text == SCREEN) {
+        let message = "it was made to be looked at, its light is exposed for a screen; expected the OpenEXR file of the same image";
+        return Err(fail(&message));
+    }
     decode_png(reader).map_err(|e| fail(&e))
 }
 
@@ -134,16 +144,20 @@ fn decode(s: f64) -> f64 {
     if s <= 0.040_45 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }
 }
 
-/// Writes a picture as PNG.
+/// Writes a picture as PNG, with a note where it is for the eye [alone](SCREEN).
 pub(crate) fn encode_png(
     out: impl Write,
     [w, h]: [u32; 2],
     pixels: &[Pixel],
+    note: Option<&str>,
 ) -> Result<(), png::EncodingError> {
     let mut encoder = png::Encoder::new(out, w, h);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    if let Some(note) = note {
+        encoder.add_text_chunk(NOTE.into(), note.into())?;
+    }
     let mut writer = encoder.write_header()?;
     writer.write_image_data(pixels.as_flattened())?;
     writer.finish()

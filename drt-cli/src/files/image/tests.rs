@@ -122,11 +122,11 @@ fn previews_hold_the_image_or_a_sheet() {
         (reader.info().width, reader.info().height)
     };
     let mut rendering = rendering([40, 30]);
-    write_preview(&path, &rendering, &[]).unwrap();
+    write_preview(&path, &rendering, &[], Tone::default()).unwrap();
     let (width, height) = size();
     assert!(width > 2 * 160 && height > 2 * 120, "three enlarged panels in two columns");
     rendering.derivatives.clear();
-    write_preview(&path, &rendering, &[]).unwrap();
+    write_preview(&path, &rendering, &[], Tone::default()).unwrap();
     assert_eq!(size(), (40, 30));
 }
 

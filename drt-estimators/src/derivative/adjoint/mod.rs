@@ -276,8 +276,7 @@ impl<'w> Differentiator<'w> {
                     Some(_) => world.share_of_vertices(vertex, c),
                     None => 1.0,
                 };
-                let mut adjoint = by_coefficients(c, lit, theta, collected, weight);
-                adjoint.sigma_t *= share;
+                let adjoint = by_coefficients(c, lit, theta * share, collected, weight);
                 self.coefficients(vertex, &adjoint, moving, here, sink);
                 self.control_at(vertex, theta * control * share, sink);
                 c.source() * arrival.emission_weight + c.sigma_s() * collected

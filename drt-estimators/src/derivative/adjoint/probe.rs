@@ -6,7 +6,7 @@ use drt_medium::{DepthEstimate, Ray};
 use crate::derivative::adjoint::segment::{Along, Stretch};
 use crate::derivative::adjoint::{Differentiator, by_coefficients, lit_by};
 use crate::derivative::recorded_path::RecordedPath;
-use crate::derivative::sensitivity::{AdjointSink, CoefficientAdjoint, SurfaceAdjoint};
+use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::sampling::trace::Endpoint;
 use crate::world::vertex::Vertex;
 
@@ -26,8 +26,7 @@ impl Differentiator<'_> {
         let Some((here, before)) = ends[..=k].split_last_mut() else { return };
         let c = &lit_by(lit, c);
         let share = 1.0 - self.world.share_of_vertices(vertex, c);
-        let sigma_t = by_coefficients(c, lit, arrival.throughput * share, collected, 1.0).sigma_t;
-        let adjoint = CoefficientAdjoint::of_sigma_t(sigma_t);
+        let adjoint = by_coefficients(c, lit, arrival.throughput * share, collected, 1.0);
         self.coefficients(vertex, &adjoint, path.velocities.moves(k), here, sink);
         self.control_at(vertex, arrival.throughput * path.control(k) * share, sink);
         self.arrive(path, k, &path.motion(k), Rgb::ZERO, here, before, sink);

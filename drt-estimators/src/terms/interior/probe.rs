@@ -40,7 +40,13 @@
 //! a being transmittance over density there (integrate by parts). So L and a S may both be taken relative to β: the line integrals of a
 //! segment take Θ (a R - m β) for Θ a R, and a vertex or probe takes a S - β. Here β is what the ray would see without any medium, weighted
 //! as where the walk meets it, times the root of what the medium lets through, roughly; of a sky that is the same everywhere, a part of the rest
-//! is added. All this costs nothing. Where a medium on the way has no vertices, the identity does not hold, and β is zero.
+//! is added. Half of what scatters once leaves a body of some depth, so that with the sky's radiance L the gathered radiance is about
+//! S = (L + a S) / 2, and the part is a S / L = a / (2 - a), with the albedo at the mean place where a probe would be. It is one where
+//! nothing is absorbed: there a sky makes S = L exactly. Where a medium on the way has no vertices, the identity does not hold, and β is zero.
+//!
+//! # Splitting
+//!
+//! In thin places most of the noise is that of S. A probe that takes more than half of the derivative is seen by two paths from there on.
 //!
 //! # Beside vertices
 //!
@@ -48,7 +54,8 @@
 //! the rest: the balance heuristic for densities σ_t T and c T, where c is a medium's
 //! [least extinction](World::share_of_vertices) that vertices see well. The parts depend on the place alone, so that
 //! they add up to one for vertices of any path, be they found by free flight, by the angle that a light is seen under, or from the
-//! emitter's end. Derivatives by the albedo and by the emission are in proportion to σ_t and stay with vertices.
+//! emitter's end. Derivatives by the albedo and by the emission are shared in the same way, but do not call for probes where the
+//! extinction stays as it is: they are in proportion to σ_t, and vertices see them well for half the time.
 //!
 //! # Motion
 //!
@@ -72,8 +79,8 @@ use crate::world::lights::Environment;
 use crate::world::vertex::{Kind, Vertex};
 use crate::world::{RayPath, Tracking, World, intervals};
 
-/// The part of a sky's even radiance that is taken to come back out of what it does not get through.
-const SCATTERED: f64 = 0.7;
+/// Paths that go on from a probe that takes more than half of the derivative.
+const SPLIT: u32 = 2;
 
 /// A stretch of a ray that a probe may be on.
 #[derive(Clone, Copy, Debug)]
@@ -105,6 +112,8 @@ pub(crate) struct Probe {
     pub(crate) carries: Rgb,
     pub(crate) segments: u32,
     pub(crate) control: Rgb,
+    /// How many paths see what it scatters.
+    pub(crate) paths: u32,
 }
 
 /// Chooses one probe per path.
@@ -148,11 +157,11 @@ impl Probes {
         }
         let origin = leaving.vertex.x;
         let mut passing = Passing([0.5; 2]);
-        let [mut probed, mut chosen] = [false; 2];
+        let mut chosen = false;
+        let mut mean = MeanPlace::default();
         for i in intervals(ray.medium, &ray.crossings, ray.length) {
             let Some(m) = i.medium.filter(|_| i.end > i.start) else { continue };
             let floor = world.probed[m];
-            probed |= floor.is_some();
             let part = Ray::new(origin + dir * i.start, dir, i.end - i.start);
             world.medium(m).means(&part, &mut |piece: &Piece| {
                 let length = piece.end - piece.start;
@@ -162,6 +171,7 @@ impl Probes {
                     let [a, b] = passing.along(rates, length);
                     let weight = scale * (a + b);
                     self.total += weight;
+                    mean.add(m, i.start + 0.5 * (piece.start + piece.end), weight);
                     if self.rng.next_f64() * self.total < weight {
                         let start = i.start + piece.start;
                         let carries = leaving.carries();
@@ -191,10 +201,9 @@ impl Probes {
                 }
             });
         }
-        if !probed {
-            return;
-        }
-        self.control = control(world, leaving, ray, 2.0 * passing.0[0]);
+        let Some((m, distance)) = mean.place() else { return };
+        let albedo = world.coefficients(m, origin + dir * distance).albedo;
+        self.control = control(world, leaving, ray, 2.0 * passing.0[0], albedo);
         if let Some(stretch) = self.chosen.as_mut().filter(|_| chosen) {
             stretch.control = self.control;
         }
@@ -218,11 +227,14 @@ impl Probes {
         }
         let x = s.origin + s.dir * distance;
         let vertex = Vertex { x, medium: Some(m), kind: Kind::Volume(None) };
+        let coefficients = world.coefficients(m, x);
+        let by_vertices = world.share_of_vertices(&vertex, &coefficients);
+        let paths = if by_vertices < 0.5 { SPLIT } else { 1 };
         tracer.counters.probes += 1;
         let arrival = tau * (1.0 / density);
         let arrival = Arrival {
             parent: s.node,
-            end: Endpoint::Volume(vertex, world.coefficients(m, x)),
+            end: Endpoint::Volume(vertex, coefficients),
             dir: s.dir,
             distance,
             start_medium: self.part.medium,
@@ -230,7 +242,8 @@ impl Probes {
             throughput: s.throughput * arrival,
             emission_weight: 1.0,
         };
-        Some(Probe { arrival, carries: s.carries, segments: s.segments, control: s.control })
+        let Stretch { carries, segments, control, .. } = s;
+        Some(Probe { arrival, carries, segments, control, paths })
     }
 
     /// Interfaces on the way to the probe that has been chosen last.
@@ -241,6 +254,27 @@ impl Probes {
     /// The random numbers of what a probe sees.
     pub(crate) fn numbers(&self) -> Rng {
         self.rng.clone()
+    }
+}
+
+/// The mean place of probes on a ray.
+#[derive(Clone, Copy, Debug, Default)]
+struct MeanPlace {
+    medium: usize,
+    weight: f64,
+    moment: f64,
+}
+
+impl MeanPlace {
+    fn add(&mut self, medium: usize, distance: f64, weight: f64) {
+        self.medium = medium;
+        self.weight += weight;
+        self.moment += distance * weight;
+    }
+
+    /// The medium that was met last, and the distance; `None` where the ray meets nothing that is probed.
+    fn place(&self) -> Option<(usize, f64)> {
+        (self.weight > 0.0).then(|| (self.medium, self.moment / self.weight))
     }
 }
 
@@ -262,8 +296,8 @@ impl Passing {
     }
 }
 
-/// The control radiance of a ray that the media on its way let so much through, roughly.
-fn control(world: &World, leaving: &OutgoingRay, ray: &RayPath, passing: f64) -> Rgb {
+/// The control radiance of a ray that the media on its way let so much through, roughly, and of which the rest meets an `albedo`.
+fn control(world: &World, leaving: &OutgoingRay, ray: &RayPath, passing: f64, albedo: Rgb) -> Rgb {
     let Some((radiance, weight)) = leaving.met(world, ray) else { return Rgb::ZERO };
     let attenuates = |m: usize| world.tracking[m] == Tracking::Attenuation;
     let mut media = intervals(ray.medium, &ray.crossings, ray.length).filter_map(|i| i.medium);
@@ -274,7 +308,7 @@ fn control(world: &World, leaving: &OutgoingRay, ray: &RayPath, passing: f64) ->
     let through = fm::sqrt(passing);
     let environment = world.lights.environment().filter(|_| ray.end.is_none());
     let around = match environment.map(Environment::parts) {
-        Some((radiance, None)) => radiance * SCATTERED,
+        Some((radiance, None)) => radiance * albedo.map(|a| a / (2.0 - a)),
         _ => Rgb::ZERO,
     };
     radiance * (weight * through) + around * (1.0 - through)

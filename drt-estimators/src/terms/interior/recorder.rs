@@ -110,7 +110,7 @@ impl<'a> Recorder<'_, 'a> {
         let Some(probes) = self.probes.take() else { return };
         self.views.iter_mut().for_each(|view| view.probed = view.probed.map(|_| Rgb::ZERO));
         let Some(probe) = probes.choose(tracer) else { return };
-        let Probe { arrival, carries, segments, control } = probe;
+        let Probe { arrival, carries, segments, control, paths } = probe;
         let node = self.record.arrive(&arrival, &probes.way().crossings);
         self.record.nodes[node as usize].role = Role::Probe;
         self.record.nodes[node as usize].control = control;
@@ -121,8 +121,11 @@ impl<'a> Recorder<'_, 'a> {
         for view in self.views.iter_mut().filter(|view| view.probed.is_some()) {
             tracer.rng = probes.numbers();
             tracer.world = view.world;
-            let seen = tracer.radiance_scattered(vertex, -arrival.dir, carries, segments);
-            view.probed = Some(seen);
+            let mut seen = Rgb::ZERO;
+            for _ in 0..paths {
+                seen += tracer.radiance_scattered(vertex, -arrival.dir, carries, segments);
+            }
+            view.probed = Some(seen * (1.0 / f64::from(paths)));
         }
         (tracer.rng, tracer.world) = (walked, all);
     }
