@@ -5,7 +5,7 @@
 //! Rays cross a cube, straight or at a slant: of one medium, and of a cloud of voxels whose extinction
 //! is mostly far below its largest. The cloud is walked with the bounds of its cells, with their
 //! majorants alone (plain ratio tracking), and with one majorant for all; these take turns on the
-//! same rays. A transmittance's noise is the standard deviation of one estimate over the mean, and
+//! same rays. Then smoke of the same shape in ever more voxels, most of which are empty. A transmittance's noise is the standard deviation of one estimate over the mean, and
 //! "work" is variance times time, in units of the cloud's.
 
 use std::cell::RefCell;
@@ -35,7 +35,39 @@ fn main() {
         distances(&media);
         transmittances(&media);
     }
+    let smoke = SIDES.map(|(name, side)| (name, smoke(side)));
+    println!("smoke: {:.0} % of the voxels are empty", 100.0 * EMPTY);
+    println!();
+    distances(&smoke);
+    transmittances(&smoke);
     gradients(&media(1.0)[1].1);
+}
+
+/// Grids of smoke by the number of voxels along each side.
+const SIDES: [(&str, usize); 3] = [("smoke, 32", 32), ("smoke, 128", 128), ("smoke, 256", 256)];
+/// The share of voxels without any smoke.
+const EMPTY: f64 = 0.87;
+
+/// A cloud whose thin parts are gone, and whose inside is in folds.
+fn smoke(side: usize) -> Medium {
+    let values = (0..side.pow(3)).map(|v| {
+        let unit = |i: usize| (i as f64 + 0.5) / side as f64;
+        let p = Vec3::from([v % side, v / side % side, v / side / side].map(unit));
+        let folds = f64::sin(23.0 * p.x + 9.0 * f64::sin(11.0 * p.y)) * f64::sin(31.0 * p.z);
+        let puff =
+            |&(centre, r): &([f64; 3], f64)| f64::exp(-((p - centre.into()) / r).length_squared());
+        PUFFS.iter().map(puff).sum::<f64>() * (1.0 + 0.5 * folds)
+    });
+    let values: Vec<f64> = values.collect();
+    let mut sorted = values.clone();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let least = sorted[(EMPTY * sorted.len() as f64) as usize];
+    let values: Vec<f64> = values.iter().map(|v| f64::max(v - least, 0.0)).collect();
+    let scale = 5.0 * values.len() as f64 / values.iter().sum::<f64>();
+    let grid = Grid::new([side; 3], 1, values).expect("a grid");
+    let [albedo, emission] = [Rgb::splat(0.9), Rgb::ZERO].map(Volume::Constant);
+    let smoke = GridMedium::new(grid, scale, albedo, emission).expect("coefficients");
+    Medium::new(smoke, Phase::Isotropic)
 }
 
 /// Which bounds of the cloud are shown to a walk.

@@ -6,7 +6,7 @@ use drt_math::{Affine, Rgb, Vec3};
 
 use crate::{
     CoefficientRates, Crossing, DepthEstimate, FieldTangent, Flow, FlowBasis, Grid, Medium,
-    MediumTangent, PhaseGradient, Property,
+    MediumTangent, PhaseGradient, Property, VoxelGradient,
 };
 
 /// Derivative of a loss with respect to one coefficient field: the transpose of [`FieldTangent`].
@@ -16,10 +16,8 @@ pub struct FieldGradient {
     pub uniform: Rgb,
     /// With respect to the logarithm of a common factor.
     pub relative: f64,
-    /// With respect to the voxels' values (after a density's scale), in the order and with the
-    /// channels of the grid; a single channel stands for all three. Empty for a constant.
-    pub voxels: Vec<f64>,
-    size: [usize; 3],
+    /// With respect to the voxels' values (after a density's scale); `None` for a constant.
+    pub voxels: Option<VoxelGradient>,
 }
 
 /// Derivative of a loss with respect to the velocities of nodes: the transpose of [`Flow`].
@@ -69,15 +67,7 @@ pub struct MediumGradient {
 
 impl FieldGradient {
     fn zeros(grid: Option<&Grid>) -> Self {
-        Self {
-            voxels: vec![0.0; grid.map_or(0, |g| g.values().len())],
-            size: grid.map_or([0; 3], Grid::size),
-            ..Self::default()
-        }
-    }
-
-    fn channels(&self) -> usize {
-        self.voxels.len() / self.size.iter().product::<usize>().max(1)
+        Self { voxels: grid.map(VoxelGradient::zeros), ..Self::default() }
     }
 
     fn scatter(&mut self, field: Rgb, grid: Option<&Grid>, x: Vec3, adjoint: Rgb) {
@@ -92,42 +82,27 @@ impl FieldGradient {
     }
 
     fn scatter_voxels(&mut self, grid: &Grid, x: Vec3, adjoint: Rgb) {
-        if self.voxels.is_empty() {
-            return;
-        }
-        let cell = grid.cell(grid.from_world().point(x));
-        let channels = self.channels();
-        for (voxel, w) in grid.corners(&cell).into_iter().zip(cell.weights()) {
-            let at = &mut self.voxels[voxel * channels..][..channels];
-            match at {
-                [one] => *one += adjoint.sum() * w,
-                _ => {
-                    for (a, c) in at.iter_mut().zip(adjoint.to_array()) {
-                        *a += c * w;
-                    }
-                }
-            }
+        if let Some(voxels) = &mut self.voxels {
+            voxels.add_at(grid.from_world().point(x), adjoint);
         }
     }
 
     fn dot(&self, tangent: &FieldTangent) -> f64 {
-        let channels = self.channels();
-        let voxels = tangent.voxels.iter().map(|([i, j, k], v)| {
-            let at = ((k * self.size[1] + j) * self.size[0] + i) * channels;
-            match self.voxels[at..at + channels] {
-                [one] => one * v.r,
-                [r, g, b] => Rgb::new(r, g, b).dot(*v),
-                _ => 0.0,
-            }
-        });
-        self.uniform.dot(tangent.uniform) + self.relative * tangent.relative + voxels.sum::<f64>()
+        let voxels = if tangent.voxels.is_empty() {
+            0.0
+        } else {
+            self.voxels.as_ref().expect("room for voxels").dot(&tangent.voxels)
+        };
+        self.uniform.dot(tangent.uniform) + self.relative * tangent.relative + voxels
     }
 
-    fn add(&mut self, o: &Self) {
+    fn add(&mut self, o: Self) {
         self.uniform += o.uniform;
         self.relative += o.relative;
-        for (a, b) in self.voxels.iter_mut().zip(&o.voxels) {
-            *a += b;
+        match (&mut self.voxels, o.voxels) {
+            (Some(sum), Some(voxels)) => sum.add(voxels),
+            (sum @ None, voxels) => *sum = voxels,
+            (Some(_), None) => {}
         }
     }
 }
@@ -211,7 +186,7 @@ impl MediumGradient {
         let sigma_t = &mut self.sigma_t;
         sigma_t.uniform += adjoint * depth.length;
         sigma_t.relative += depth.depth.dot(adjoint);
-        if !sigma_t.voxels.is_empty() {
+        if sigma_t.voxels.is_some() {
             for (grid, material, w) in depth.points_inside(medium) {
                 sigma_t.scatter_voxels(grid.density(), material, adjoint * w);
             }
@@ -264,14 +239,14 @@ impl MediumGradient {
     }
 
     /// Adds another gradient of the same medium: for sums over threads.
-    pub fn add(&mut self, o: &Self) {
-        self.sigma_t.add(&o.sigma_t);
-        self.albedo.add(&o.albedo);
-        self.emission.add(&o.emission);
-        self.g.add(&o.g);
-        self.weight.add(&o.weight);
+    pub fn add(&mut self, o: Self) {
+        self.sigma_t.add(o.sigma_t);
+        self.albedo.add(o.albedo);
+        self.emission.add(o.emission);
+        self.g.add(o.g);
+        self.weight.add(o.weight);
         self.velocity = self.velocity.plus(&o.velocity);
-        if let (Some(a), Some(b)) = (&mut self.flow, &o.flow) {
+        if let (Some(a), Some(b)) = (&mut self.flow, o.flow) {
             a.nodes.iter_mut().zip(&b.nodes).for_each(|(a, b)| *a += *b);
         }
     }

@@ -1,3 +1,4 @@
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -25,7 +26,8 @@ use crate::lattice::{Axis, Cell, Filter, Layout, Wrap};
 pub struct Grid {
     size: [usize; 3],
     channels: usize,
-    values: Vec<f64>,
+    /// Scenes are copied, and few copies have other values.
+    values: Arc<Vec<f64>>,
     layout: Layout,
     filter: Filter,
     wrap: Wrap,
@@ -57,7 +59,7 @@ impl Grid {
         Ok(Self {
             size,
             channels,
-            values,
+            values: Arc::new(values),
             layout,
             filter,
             wrap,
@@ -139,6 +141,7 @@ impl Grid {
     pub fn values(&self) -> &[f64] {
         &self.values
     }
+
     /// Where the values sit.
     #[must_use]
     pub fn layout(&self) -> Layout {
@@ -210,7 +213,7 @@ impl Grid {
     pub fn scaled(&self, by: Rgb) -> Self {
         let mut grid = self.clone();
         grid.spread_channels();
-        for voxel in grid.values.chunks_exact_mut(3) {
+        for voxel in grid.values_mut().chunks_exact_mut(3) {
             for (value, by) in voxel.iter_mut().zip(by.to_array()) {
                 *value *= by;
             }
@@ -295,13 +298,13 @@ impl Grid {
     }
 
     pub(crate) fn values_mut(&mut self) -> &mut [f64] {
-        &mut self.values
+        Arc::<Vec<f64>>::make_mut(&mut self.values)
     }
 
     /// Gives every colour channel its own values.
     pub(crate) fn spread_channels(&mut self) {
         if self.channels == 1 {
-            self.values = self.values.iter().flat_map(|&v| [v; 3]).collect();
+            self.values = Arc::new(self.values.iter().flat_map(|&v| [v; 3]).collect());
             self.channels = 3;
         }
     }
@@ -328,7 +331,7 @@ pub(crate) fn unflatten([nx, ny, _]: [usize; 3], n: usize) -> [usize; 3] {
 
 #[cfg(feature = "serde")]
 mod stored {
-    use super::{Affine, Filter, Layout, MediumError, Vec, Wrap};
+    use super::{Affine, Arc, Filter, Layout, MediumError, Vec, Wrap};
 
     /// What a file holds of a grid; everything else follows from it.
     #[derive(serde::Serialize, serde::Deserialize)]
@@ -345,6 +348,7 @@ mod stored {
     impl From<super::Grid> for Grid {
         fn from(g: super::Grid) -> Self {
             let super::Grid { size, channels, values, layout, filter, wrap, to_world, .. } = g;
+            let values = Arc::unwrap_or_clone(values);
             Self { size, channels, layout, filter, wrap, to_world, values }
         }
     }

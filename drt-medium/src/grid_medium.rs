@@ -1,3 +1,4 @@
+use alloc::sync::Arc;
 use core::ops::ControlFlow;
 
 use drt_math::{Affine, Rgb, Vec3};
@@ -24,7 +25,7 @@ pub struct GridMedium {
     pub(crate) scale: f64,
     pub(crate) albedo: Volume,
     pub(crate) emission: Volume,
-    bounds: Bounds,
+    bounds: Arc<Bounds>,
     floor_depth: f64,
 }
 
@@ -46,7 +47,7 @@ impl GridMedium {
         check_grid(Property::SigmaT, &density, 1.0)?;
         albedo.check(Property::Albedo)?;
         emission.check(Property::Emission)?;
-        let bounds = Bounds::new(&density);
+        let bounds = Arc::new(Bounds::new(&density));
         let floor_depth = Self::DEFAULT_FLOOR_DEPTH;
         Ok(Self { density, scale, albedo, emission, bounds, floor_depth })
     }
@@ -129,8 +130,8 @@ impl GridMedium {
     /// Brings the bounds up to date after a change of one voxel of the density, or of all.
     pub(crate) fn update_bounds(&mut self, voxel: Option<[usize; 3]>) {
         match voxel {
-            Some(v) => self.bounds.refresh(&self.density, v),
-            None => self.bounds = Bounds::new(&self.density),
+            Some(v) => Arc::make_mut(&mut self.bounds).refresh(&self.density, v),
+            None => self.bounds = Arc::new(Bounds::new(&self.density)),
         }
     }
 

@@ -91,6 +91,13 @@ impl Axis {
         }
     }
 
+    /// The values on both sides of a unit coordinate, and their weights in the interpolation.
+    #[inline]
+    pub(crate) fn neighbours(&self, u: f64) -> [(usize, f64); 2] {
+        let Between { lo, hi, frac } = self.between(u);
+        [(lo, 1.0 - frac), (hi, frac)]
+    }
+
     /// Every value that some point of the closed interval of unit coordinates can see.
     pub(crate) fn covering(&self, from: f64, to: f64) -> impl Iterator<Item = usize> + use<> {
         let axis = *self;

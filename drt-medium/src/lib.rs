@@ -21,6 +21,8 @@ mod lattice;
 mod medium;
 #[cfg(feature = "vol")]
 pub mod nanovdb;
+#[cfg(feature = "vol")]
+mod pages;
 mod phase;
 mod reach;
 mod tangent;
@@ -29,7 +31,10 @@ mod transmittance;
 mod uniform;
 #[cfg(feature = "vol")]
 pub mod vol;
+#[cfg(feature = "vol")]
+mod vol_error;
 mod volume;
+mod voxel_gradient;
 
 pub use drt_math::ValueChange;
 
@@ -55,3 +60,4 @@ pub use tracking::{DistanceSample, TrackingStats};
 pub use transmittance::TransmittanceRate;
 pub use uniform::UniformMedium;
 pub use volume::Volume;
+pub use voxel_gradient::VoxelGradient;

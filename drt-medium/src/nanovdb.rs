@@ -10,7 +10,6 @@
 mod decode;
 mod encode;
 mod layout;
-mod pages;
 
 use std::path::Path;
 use std::string::{String, ToString};
@@ -19,7 +18,7 @@ use std::vec::Vec;
 use drt_math::Affine;
 
 use crate::Grid;
-use crate::vol::VolError;
+use crate::vol_error::VolError;
 
 pub use crate::nanovdb::decode::decode;
 pub use crate::nanovdb::encode::encode;

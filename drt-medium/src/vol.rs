@@ -4,16 +4,24 @@
 //! 3: u8 with 255 for one); i32 size along x, y, z; i32 channels; six float32 of bounding box (least
 //! corner, then largest); then the values, x fastest, then y, then z, channels side by side.
 
+use std::format;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
 use std::path::Path;
-use std::string::{String, ToString};
+use std::string::ToString;
+use std::vec;
 use std::vec::Vec;
 
-use drt_math::{Affine, Mat3, Vec3};
+use drt_math::{Affine, Mat3, Vec3, vec3};
 
-use crate::{Grid, MediumError};
+use crate::Grid;
+use crate::pages::Pages;
+pub use crate::vol_error::VolError;
 
 const MAGIC: [u8; 4] = *b"VOL\x03";
 const HEADER: usize = 48;
+/// Bytes that are read at a time: whole values of every encoding.
+const BUFFER: usize = 1 << 16;
 
 /// A grid and the bounding box stored with it.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,56 +42,7 @@ impl VolFile {
     }
 }
 
-/// Why a file of a volume cannot be read or written.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum VolError {
-    /// The system refused.
-    #[error("{file}: {source}")]
-    Io {
-        /// The file.
-        file: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A header field or value is not what the format allows.
-    #[error("{file}, byte {offset}: {field} is {found}, expected {expected}")]
-    Field {
-        /// The file.
-        file: String,
-        /// Where in the file.
-        offset: usize,
-        /// What stands there.
-        field: &'static str,
-        /// What was found.
-        found: String,
-        /// What the format allows.
-        expected: &'static str,
-    },
-    /// The file ends too early.
-    #[error("{file} is cut off at byte {found}: its header announces {expected} bytes")]
-    Cut {
-        /// The file.
-        file: String,
-        /// Bytes there.
-        found: usize,
-        /// Bytes needed; `usize::MAX` when no file could be that large.
-        expected: usize,
-    },
-    /// The values do not form a grid.
-    #[error("{file}: {source}")]
-    Grid {
-        /// The file.
-        file: String,
-        /// What is wrong with it.
-        source: MediumError,
-    },
-    /// A grid cannot be stored in this format.
-    #[error("the grid cannot be written: {0}")]
-    NotStorable(&'static str),
-}
-
-/// Reads a file.
+/// Reads a file. Its bytes are not kept beside the values.
 ///
 /// # Errors
 /// When it cannot be opened, is not a `.vol` file of version 3, is cut off, has other than 1 or 3
@@ -91,8 +50,9 @@ pub enum VolError {
 /// does not have the bytes for.
 pub fn read(path: impl AsRef<Path>) -> Result<VolFile, VolError> {
     let file = path.as_ref().display().to_string();
-    match std::fs::read(path) {
-        Ok(bytes) => decode(&bytes, &file),
+    let opened = File::open(path).and_then(|open| Ok((open.metadata()?.len(), open)));
+    match opened {
+        Ok((length, open)) => decode_from(open, length, &file),
         Err(source) => Err(VolError::Io { file, source }),
     }
 }
@@ -102,50 +62,84 @@ pub fn read(path: impl AsRef<Path>) -> Result<VolFile, VolError> {
 /// # Errors
 /// As [`read`].
 pub fn decode(bytes: &[u8], file: &str) -> Result<VolFile, VolError> {
-    let input = Input { bytes, file };
-    if bytes.len() < HEADER {
-        return Err(input.cut(HEADER));
+    decode_from(bytes, bytes.len() as u64, file)
+}
+
+/// What the header of a file tells.
+struct Header {
+    encoding: Encoding,
+    size: [usize; 3],
+    channels: usize,
+    bounds: [Vec3; 2],
+}
+
+/// Reads a file of a length.
+fn decode_from(mut from: impl Read, length: u64, file: &str) -> Result<VolFile, VolError> {
+    let length = usize::try_from(length).unwrap_or(usize::MAX);
+    let failed = |source| VolError::Io { file: file.to_string(), source };
+    let mut start = Vec::new();
+    from.by_ref().take(HEADER as u64).read_to_end(&mut start).map_err(failed)?;
+    let Header { encoding, size, channels, bounds } = header(&Pages { bytes: &start, file })?;
+    let width = encoding.width();
+    let count = size.iter().try_fold(channels, |n, &s| n.checked_mul(s));
+    let bytes = count.and_then(|n| n.checked_mul(width));
+    let end = bytes.and_then(|n| n.checked_add(HEADER)).unwrap_or(usize::MAX);
+    let cut = |found| VolError::Cut { file: file.to_string(), found, expected: end };
+    let count = count.filter(|_| end <= length).ok_or_else(|| cut(length))?;
+    let mut values = Vec::with_capacity(count);
+    let mut buffer = vec![0; usize::min(BUFFER, count * width)];
+    while values.len() < count {
+        let at = HEADER + values.len() * width;
+        let part = &mut buffer[..usize::min(BUFFER, end - at)];
+        from.read_exact(part).map_err(|source| match source.kind() {
+            ErrorKind::UnexpectedEof => cut(at),
+            _ => failed(source),
+        })?;
+        let part = Pages { bytes: part, file };
+        for (n, raw) in part.bytes.chunks_exact(width).enumerate() {
+            values.push(part.finite(at + n * width, "a grid value", encoding.value(raw))?);
+        }
     }
-    if bytes[..4] != MAGIC {
-        let found = format!("{:?}", &bytes[..4]);
-        return Err(input.field(0, "the signature", found, "the bytes \"VOL\" and version 3"));
+    let grid = Grid::new(size, channels, values)
+        .map_err(|source| VolError::Grid { file: file.to_string(), source })?;
+    Ok(VolFile { grid, bounds })
+}
+
+fn header(pages: &Pages<'_>) -> Result<Header, VolError> {
+    pages.slice(0, HEADER)?;
+    let signature = pages.slice(0, MAGIC.len())?;
+    if *signature != MAGIC {
+        let (found, expected) = (format!("{signature:?}"), "the bytes \"VOL\" and version 3");
+        return Err(pages.field(0, "the signature", found, expected));
     }
-    let encoding = match input.i32(4) {
+    let encoding = match pages.i32(4)? {
         1 => Encoding::Float32,
         2 => Encoding::Float16,
         3 => Encoding::Byte,
         e => {
             let expected = "1 (float32), 2 (float16) or 3 (bytes)";
-            return Err(input.field(4, "the encoding", e.to_string(), expected));
+            return Err(pages.field(4, "the encoding", e.to_string(), expected));
         }
     };
-    let size = [
-        input.size(8, "the size along x")?,
-        input.size(12, "the size along y")?,
-        input.size(16, "the size along z")?,
-    ];
-    let channels = match input.i32(20) {
-        n @ (1 | 3) => n as usize,
-        n => return Err(input.field(20, "the number of channels", n.to_string(), "1 or 3")),
+    let extent = |offset, field| {
+        let n = pages.i32(offset)?;
+        let size = usize::try_from(n).ok().filter(|n| *n > 0);
+        size.ok_or_else(|| pages.field(offset, field, n.to_string(), "at least 1"))
     };
-    let mut corners = [0.0; 6];
-    for (k, c) in corners.iter_mut().enumerate() {
-        *c = input.finite(24 + 4 * k, "the bounding box", f64::from(input.f32(24 + 4 * k)))?;
-    }
-    let [x0, y0, z0, x1, y1, z1] = corners;
-
-    let width = encoding.width();
-    let length = size.iter().try_fold(channels * width, |n, &s| n.checked_mul(s));
-    let end = length.and_then(|n| n.checked_add(HEADER)).unwrap_or(usize::MAX);
-    let data = bytes.get(HEADER..end).ok_or_else(|| input.cut(end))?;
-    let values = data
-        .chunks_exact(width)
-        .enumerate()
-        .map(|(n, raw)| input.finite(HEADER + n * width, "a grid value", encoding.value(raw)))
-        .collect::<Result<Vec<_>, _>>()?;
-    let grid = Grid::new(size, channels, values)
-        .map_err(|source| VolError::Grid { file: file.to_string(), source })?;
-    Ok(VolFile { grid, bounds: [[x0, y0, z0].into(), [x1, y1, z1].into()] })
+    let size = [
+        extent(8, "the size along x")?,
+        extent(12, "the size along y")?,
+        extent(16, "the size along z")?,
+    ];
+    let channels = match pages.i32(20)? {
+        n @ (1 | 3) => n as usize,
+        n => return Err(pages.field(20, "the number of channels", n.to_string(), "1 or 3")),
+    };
+    let corner = |offset: usize| -> Result<Vec3, VolError> {
+        let c = |k: usize| pages.f32(offset + 4 * k, "the bounding box");
+        Ok(vec3(c(0)?, c(1)?, c(2)?))
+    };
+    Ok(Header { encoding, size, channels, bounds: [corner(24)?, corner(36)?] })
 }
 
 /// Writes a file in float32. Layout, filter, wrap mode and placement are not part of the format.
@@ -218,47 +212,4 @@ fn half(bits: u16) -> f64 {
         e => (1024.0 + fraction) * (f64::from(e) - 25.0).exp2(),
     };
     if bits >> 15 == 1 { -magnitude } else { magnitude }
-}
-
-/// The bytes of a file at least as long as the header, and its name for errors.
-struct Input<'a> {
-    bytes: &'a [u8],
-    file: &'a str,
-}
-
-impl Input<'_> {
-    fn word(&self, offset: usize) -> [u8; 4] {
-        core::array::from_fn(|i| self.bytes[offset + i])
-    }
-    fn i32(&self, offset: usize) -> i32 {
-        i32::from_le_bytes(self.word(offset))
-    }
-    fn f32(&self, offset: usize) -> f32 {
-        f32::from_le_bytes(self.word(offset))
-    }
-    fn size(&self, offset: usize, field: &'static str) -> Result<usize, VolError> {
-        let n = self.i32(offset);
-        match usize::try_from(n) {
-            Ok(n) if n > 0 => Ok(n),
-            _ => Err(self.field(offset, field, n.to_string(), "at least 1")),
-        }
-    }
-    fn finite(&self, offset: usize, field: &'static str, value: f64) -> Result<f64, VolError> {
-        if value.is_finite() {
-            return Ok(value);
-        }
-        Err(self.field(offset, field, value.to_string(), "a finite number"))
-    }
-    fn field(
-        &self,
-        offset: usize,
-        field: &'static str,
-        found: String,
-        expected: &'static str,
-    ) -> VolError {
-        VolError::Field { file: self.file.to_string(), offset, field, found, expected }
-    }
-    fn cut(&self, expected: usize) -> VolError {
-        VolError::Cut { file: self.file.to_string(), found: self.bytes.len(), expected }
-    }
 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use drt_estimators::fit::{Fit, View};
+use drt_estimators::fit::{Collector, Fit, View};
 use drt_estimators::loss::Loss;
 use drt_estimators::{
     Derivative, GradientBatch, Rendering, SceneGradient, Shard, Target, gradient_in_batches, moved,
@@ -116,7 +116,7 @@ fn unseen(job: &Job, gradient: &[f64]) -> Vec<String> {
     let mut rest = &gradient[job.parameters.len().min(gradient.len())..];
     let mut notes = Vec::new();
     for ParameterGroup { group, .. } in &job.groups {
-        let (own, others) = rest.split_at(group.values(&job.scene).len().min(rest.len()));
+        let (own, others) = rest.split_at(group.count(&job.scene).min(rest.len()));
         rest = others;
         if own.iter().all(|g| *g == 0.0) {
             notes.push(format!("note: group `{}`: its gradient is zero everywhere", group.name));
@@ -256,14 +256,26 @@ fn of_adjoint(
     if !job.groups.is_empty() {
         monitor.stage("gradient in reverse", 0.6, 1.0);
         let mut total = Total::default();
-        let each = |batch| match options.shard {
-            Some(_) => batches.push(batch),
-            None => drop(total.add(batch)),
+        let each = |collectors: &[Collector], batch: GradientBatch| {
+            let GradientBatch { number, pixels, of_pixels, boundary, of_boundary } = batch;
+            let of = [pixels, boundary];
+            if options.shard.is_some() {
+                let [pixels, boundary] = of.map(|gradient| {
+                    let mut sums = vec![0.0; count(job)];
+                    collect(job, collectors, &gradient, &mut sums);
+                    sums
+                });
+                batches.push(Batch { number, pixels, of_pixels, boundary, of_boundary });
+            } else if let Some(sums) = total.next(count(job), of_pixels, of_boundary) {
+                let parts = of.iter().zip(sums);
+                parts.for_each(|(gradient, sums)| collect(job, collectors, gradient, sums));
+            }
         };
         if !in_reverse(job, options.shard, &adjoint, monitor, each)? {
             return Ok(None);
         }
-        numbers.extend(total.numbers());
+        let found = total.numbers();
+        numbers = if numbers.is_empty() { found } else { [numbers, found].concat() };
     }
     if monitor.interrupted() {
         return Ok(None);
@@ -285,35 +297,36 @@ pub(super) fn by_parameters(rendering: &Rendering, adjoint: &[Rgb]) -> Vec<f64> 
     rendering.derivatives.iter().map(product).collect()
 }
 
+/// The number of unknowns of all groups.
+fn count(job: &Job) -> usize {
+    job.groups.iter().map(|g| g.group.count(&job.scene)).sum()
+}
+
+/// Adds the groups' parts of a gradient to numbers for all unknowns.
+fn collect(job: &Job, collectors: &[Collector], gradient: &SceneGradient, mut numbers: &mut [f64]) {
+    for (group, collector) in job.groups.iter().zip(collectors) {
+        let (own, rest) = numbers.split_at_mut(group.group.count(&job.scene));
+        collector.add_to(gradient, 1.0, own);
+        numbers = rest;
+    }
+}
+
 /// The gradient by the groups, batch by batch; false when it was interrupted.
 fn in_reverse(
     job: &Job,
     shard: Option<Shard>,
     adjoint: &[Rgb],
     monitor: &Monitor,
-    mut each: impl FnMut(Batch),
+    mut each: impl FnMut(&[Collector], GradientBatch),
 ) -> Result<bool, CliError> {
     let scene = moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
     let wanted: Vec<Target> = job.groups.iter().map(|g| g.group.target).collect();
     let collector = |g: &ParameterGroup| g.group.collector(&job.scene, &scene, &job.parameters);
-    let groups = job.groups.iter().map(collector).collect::<Result<Vec<_>, _>>();
-    let groups = groups.map_err(|e| job.blame(&e))?;
-    let numbers = |gradient: &SceneGradient| {
-        let mut numbers = Vec::new();
-        groups.iter().for_each(|group| group.collect(gradient, &mut numbers));
-        numbers
-    };
-    let mut collect = |batch: GradientBatch| {
-        each(Batch {
-            number: batch.number,
-            pixels: numbers(&batch.pixels),
-            of_pixels: batch.of_pixels,
-            boundary: numbers(&batch.boundary),
-            of_boundary: batch.of_boundary,
-        });
-    };
+    let collectors = job.groups.iter().map(collector).collect::<Result<Vec<_>, _>>();
+    let collectors = collectors.map_err(|e| job.blame(&e))?;
     let (settings, spp) = (&job.settings, job.spp());
-    gradient_in_batches(&scene, &wanted, settings, spp, adjoint, shard, monitor, &mut collect)
+    let mut each = |batch| each(&collectors, batch);
+    gradient_in_batches(&scene, &wanted, settings, spp, adjoint, shard, monitor, &mut each)
         .map_err(|e| job.blame(&e))
 }
 

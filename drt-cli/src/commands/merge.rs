@@ -178,7 +178,7 @@ impl Shards {
                 batches.sort_by_key(|(_, batch)| batch.number);
                 let mut total = Total::default();
                 for (path, batch) in batches {
-                    if !total.add(batch) {
+                    if !total.add(&batch) {
                         return Err(damaged(&path, "its batches are of another gradient"));
                     }
                 }

@@ -72,31 +72,48 @@ pub(crate) struct Batch {
 pub(crate) struct Total(Option<Batch>);
 
 impl Total {
+    /// The sums over paths and over boundary samples, to which the next batch of a gradient by so many unknowns is to be
+    /// added; `None` for a batch that is not of this gradient.
+    pub(crate) fn next(
+        &mut self,
+        unknowns: usize,
+        of_pixels: [u32; 2],
+        of_boundary: [u32; 2],
+    ) -> Option<[&mut [f64]; 2]> {
+        let sum = self.0.get_or_insert_with(|| Batch {
+            number: 0,
+            pixels: vec![0.0; unknowns],
+            of_pixels: [0, of_pixels[1]],
+            boundary: vec![0.0; unknowns],
+            of_boundary: [0, of_boundary[1]],
+        });
+        let fits = sum.pixels.len() == unknowns
+            && sum.of_pixels[1] == of_pixels[1]
+            && sum.of_boundary[1] == of_boundary[1];
+        sum.of_pixels[0] += of_pixels[0];
+        sum.of_boundary[0] += of_boundary[0];
+        fits.then_some([&mut sum.pixels, &mut sum.boundary])
+    }
+
     /// Adds the next batch; false for one that is not of this gradient.
-    pub(crate) fn add(&mut self, batch: Batch) -> bool {
-        let Some(sum) = &mut self.0 else {
-            self.0 = Some(batch);
-            return true;
-        };
-        let fits = sum.pixels.len() == batch.pixels.len()
-            && sum.boundary.len() == batch.boundary.len()
-            && sum.of_pixels[1] == batch.of_pixels[1]
-            && sum.of_boundary[1] == batch.of_boundary[1];
-        for (sum, b) in [(&mut sum.pixels, &batch.pixels), (&mut sum.boundary, &batch.boundary)] {
-            sum.iter_mut().zip(b).for_each(|(sum, b)| *sum += b);
+    pub(crate) fn add(&mut self, batch: &Batch) -> bool {
+        let Batch { pixels, of_pixels, boundary, of_boundary, .. } = batch;
+        let sums = self.next(pixels.len(), *of_pixels, *of_boundary);
+        let Some(sums) = sums.filter(|_| boundary.len() == pixels.len()) else { return false };
+        for (sum, part) in sums.into_iter().zip([pixels, boundary]) {
+            sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
         }
-        sum.of_pixels[0] += batch.of_pixels[0];
-        sum.of_boundary[0] += batch.of_boundary[0];
-        fits
+        true
     }
 
     /// The gradient; what is missing counts as what is there.
     pub(crate) fn numbers(self) -> Vec<f64> {
-        let sum = self.0.unwrap_or_default();
+        let Batch { mut pixels, of_pixels, boundary, of_boundary, .. } = self.0.unwrap_or_default();
         // Exactly 1 where nothing is missing.
         let scale = |[there, all]: [u32; 2]| f64::from(all) / f64::from(there);
-        let (a, b) = (scale(sum.of_pixels), scale(sum.of_boundary));
-        sum.pixels.iter().zip(&sum.boundary).map(|(p, s)| p * a + s * b).collect()
+        let (a, b) = (scale(of_pixels), scale(of_boundary));
+        pixels.iter_mut().zip(&boundary).for_each(|(p, s)| *p = *p * a + s * b);
+        pixels
     }
 }
 

@@ -70,30 +70,31 @@ impl SceneGradient {
         }
     }
 
-    pub(crate) fn add(&mut self, o: &Self) {
-        fn each<T: Clone>(a: &mut [Option<T>], b: &[Option<T>], add: impl Fn(&mut T, &T)) {
+    /// Adds what other samples give for the same scene.
+    pub(crate) fn add(&mut self, o: Self) {
+        fn each<T>(a: &mut [Option<T>], b: Vec<Option<T>>, add: impl Fn(&mut T, T)) {
             for (a, b) in a.iter_mut().zip(b) {
                 match (a, b) {
                     (Some(a), Some(b)) => add(a, b),
-                    (a @ None, Some(b)) => *a = Some(b.clone()),
+                    (a @ None, b) => *a = b,
                     (_, None) => {}
                 }
             }
         }
-        each(&mut self.shapes, &o.shapes, VertexGradient::add);
-        each(&mut self.media, &o.media, MediumGradient::add);
-        each(&mut self.bsdfs, &o.bsdfs, |a, b| a.scatter(b, Rgb::ONE));
-        for (a, b) in self.texels.iter_mut().zip(&o.texels) {
+        each(&mut self.shapes, o.shapes, |a, b| a.add(&b));
+        each(&mut self.media, o.media, MediumGradient::add);
+        each(&mut self.bsdfs, o.bsdfs, |a, b| a.scatter(&b, Rgb::ONE));
+        for (a, b) in self.texels.iter_mut().zip(o.texels) {
             if a.is_empty() {
-                a.clone_from(b);
+                *a = b;
             } else {
-                a.iter_mut().zip(b).for_each(|((_, a), (_, b))| a.add(b));
+                a.iter_mut().zip(&b).for_each(|((_, a), (_, b))| a.add(b));
             }
         }
-        each(&mut self.emitter_texels, &o.emitter_texels, TexelGradient::add);
-        each(&mut self.emitters, &o.emitters, |a, b| *a += *b);
-        if let (Some(a), Some(b)) = (&mut self.sensor, &o.sensor) {
-            *a += *b;
+        each(&mut self.emitter_texels, o.emitter_texels, |a, b| a.add(&b));
+        each(&mut self.emitters, o.emitters, |a, b| *a += b);
+        if let (Some(a), Some(b)) = (&mut self.sensor, o.sensor) {
+            *a += b;
         }
         self.counters.add(&o.counters);
         self.non_finite += o.non_finite;

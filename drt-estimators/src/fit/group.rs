@@ -70,7 +70,7 @@ impl Group {
         if let GroupKind::Cage(cage) = &group.kind {
             Cage::new(cage).map_err(|e| group.refusal(&e))?;
         }
-        if group.values(scene).is_empty() {
+        if group.count(scene) == 0 {
             return Err(group.refusal(&"its target has no such values"));
         }
         Ok(group)
@@ -103,6 +103,17 @@ impl Group {
 
     fn refusal(&self, reason: &dyn ToString) -> Error {
         Error::Group { group: self.name.clone(), reason: reason.to_string() }
+    }
+
+    /// The number of values of the group in a scene.
+    #[must_use]
+    pub fn count(&self, scene: &Scene) -> usize {
+        match (&self.kind, self.target) {
+            (GroupKind::Voxels(property), Target::Medium(m)) => {
+                scene.media[m].item.voxels(*property).map_or(0, |grid| grid.values().len())
+            }
+            _ => self.values(scene).len(),
+        }
     }
 
     /// The values of the group in a scene; for a cage, the positions of its vertices.
@@ -314,8 +325,11 @@ struct OfShape {
 }
 
 impl Collector {
-    /// Appends the group's part of the gradient of a loss to a list, one number per value and in their order.
-    pub fn collect(&self, gradient: &SceneGradient, out: &mut Vec<f64>) {
+    /// Adds the group's part of the gradient of a loss, times a weight, to numbers for its values, in their order.
+    pub fn add_to(&self, gradient: &SceneGradient, weight: f64, numbers: &mut [f64]) {
+        let add = |numbers: &mut [f64], part: &mut dyn Iterator<Item = f64>| {
+            numbers.iter_mut().zip(part).for_each(|(number, g)| *number += weight * g);
+        };
         match &self.0 {
             Take::Voxels(m, property, scale) => {
                 let Some(of) = &gradient.media[*m] else { return };
@@ -326,22 +340,24 @@ impl Collector {
                     drt_medium::Property::G => &of.g.voxels,
                     drt_medium::Property::Weight => &of.weight.voxels,
                 };
-                out.extend(voxels.iter().map(|v| v * scale));
+                if let Some(voxels) = voxels {
+                    voxels.add_to(numbers, weight * scale);
+                }
             }
             Take::Texels { bsdf, property, number } => {
                 let textures = gradient.texels[*bsdf].iter().filter(|(p, _)| p == property);
                 for (_, texels) in textures {
                     let values = texels.values();
                     if *number {
-                        out.extend(values.iter().map(|v| v.sum()));
+                        add(numbers, &mut values.iter().map(|v| v.sum()));
                     } else {
-                        out.extend(values.iter().flat_map(|v| v.to_array()));
+                        add(numbers, &mut values.iter().flat_map(|v| v.to_array()));
                     }
                 }
             }
             Take::LightTexels(emitter) => {
                 let Some(texels) = &gradient.emitter_texels[*emitter] else { return };
-                out.extend(texels.values().iter().flat_map(|v| v.to_array()));
+                add(numbers, &mut texels.values().iter().flat_map(|v| v.to_array()));
             }
             Take::Shape(of) => {
                 let Some(by_mesh) = &gradient.shapes[of.shape] else { return };
@@ -351,7 +367,7 @@ impl Collector {
                     Some(weights) => weights.gather(&vertices),
                     None => in_file_order(&of.file, &vertices),
                 };
-                out.extend(vectors.iter().flat_map(|v| v.to_array()));
+                add(numbers, &mut vectors.iter().flat_map(|v| v.to_array()));
             }
             Take::Nothing => {}
         }

@@ -246,7 +246,8 @@ impl Fit {
         control: &dyn Control,
     ) -> Result<Option<Evaluation>, Error> {
         let mut halves = Vec::new();
-        let mut groups = alloc::vec![Vec::new(); self.groups.len()];
+        let zeros = |group: &Group| alloc::vec![0.0; group.count(&self.given)];
+        let mut groups: Vec<Vec<f64>> = self.groups.iter().map(zeros).collect();
         let count = views.len();
         for (k, view) in views.iter().copied().enumerate() {
             let progress = |done| control.progress((k as f64 + done) / count as f64);
@@ -305,10 +306,7 @@ impl Fit {
             let found = source.gradient(&wanted, spp.div_ceil(2), seed, adjoint, &control)?;
             let Some(gradient) = found else { return Ok(None) };
             for (collector, sum) in collectors.iter().zip(&mut *gradients) {
-                let mut own = Vec::new();
-                collector.collect(&gradient, &mut own);
-                sum.resize(own.len(), 0.0);
-                sum.iter_mut().zip(&own).for_each(|(sum, own)| *sum += 0.5 * own);
+                collector.add_to(&gradient, 0.5, sum);
             }
         }
         Ok(Some(halves))

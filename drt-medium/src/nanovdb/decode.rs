@@ -17,8 +17,8 @@ use crate::nanovdb::layout::{
     LOWER_LOG, LOWER_SIDE, Layout, MAJOR, MAJOR_SHIFT, SEGMENT, TABLE_SIZE, TILE, TILE_VALUE,
     TRANSLATION, UPPER_LOG, UPPER_SIDE, VERSION,
 };
-use crate::nanovdb::pages::Pages;
-use crate::vol::VolError;
+use crate::pages::Pages;
+use crate::vol_error::VolError;
 
 /// Voxels of a box that are always accepted, and how many there may be for each one that is stored.
 const SMALL: u64 = 1 << 24;

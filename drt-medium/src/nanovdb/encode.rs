@@ -12,7 +12,7 @@ use crate::nanovdb::layout::{
     LEAF_SIDE, LINEAR, LONGEST_NAME, LOWER_LOG, LOWER_SIDE, Layout, MAJOR, MAJOR_SHIFT, MAP,
     SEGMENT, TABLE_SIZE, TILE, TRANSLATION, TREE, UPPER_LOG, UPPER_SIDE, VERSION,
 };
-use crate::vol::VolError;
+use crate::vol_error::VolError;
 
 /// Flags of a grid: that boxes are stored, and that nodes come in the order of their level.
 const FLAGS: u32 = 1 << 1 | 1 << 5;

@@ -256,7 +256,7 @@ fn gradients_are_the_transposes_of_rates() {
             parts[n % 2].scatter_phase(&medium, x, &gradient, of_phase);
         }
         let [mut gradient, other] = parts;
-        gradient.add(&other);
+        gradient.add(other);
         let reverse = gradient.dot(&tangent);
         assert!((forward - reverse).abs() < 1e-13 * size, "{forward} forward, {reverse} reverse");
     }

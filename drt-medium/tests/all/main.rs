@@ -1,5 +1,6 @@
 //! All tests of the crate from outside, in one program.
 
+mod big_grids;
 mod changes;
 mod common;
 mod deformed;

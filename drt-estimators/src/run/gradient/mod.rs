@@ -154,7 +154,7 @@ impl PreparedGradient {
             let piece = &list[i as usize];
             let [of_pixels, of_boundary] = &mut sums;
             let to = if matches!(piece.work, Work::Pixels(_)) { of_pixels } else { of_boundary };
-            parts.iter().for_each(|(c, part)| to[*c].add(part));
+            parts.into_iter().for_each(|(c, part)| to[c].add(part));
             if piece.last {
                 let [pixels, boundary] =
                     core::mem::replace(&mut sums, [pieces.zeros(), pieces.zeros()])
@@ -207,7 +207,7 @@ impl PreparedGradient {
         for (component, Sums { scene: mut sum, insides }) in self.components.iter().zip(sums) {
             let Component { prepared, unknowns, .. } = component;
             unknowns.insides.gather(&prepared.world, insides, &mut sum);
-            gradient.add(&sum);
+            gradient.add(sum);
         }
         gradient
     }

@@ -31,8 +31,8 @@ impl Sums {
         Self { scene: SceneGradient::zeros(world, &of.active), insides: of.insides.zeros() }
     }
 
-    pub(super) fn add(&mut self, other: &Self) {
-        self.scene.add(&other.scene);
+    pub(super) fn add(&mut self, other: Self) {
+        self.scene.add(other.scene);
         self.insides.add(&other.insides);
     }
 }

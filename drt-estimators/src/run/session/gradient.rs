@@ -80,11 +80,11 @@ impl Session {
             let parts = [batch.pixels, batch.boundary];
             match &mut sums {
                 None => sums = Some(parts),
-                Some(sums) => sums.iter_mut().zip(&parts).for_each(|(sum, part)| sum.add(part)),
+                Some(sums) => sums.iter_mut().zip(parts).for_each(|(sum, part)| sum.add(part)),
             }
         })?;
         if let Some([mut pixels, boundary]) = sums {
-            pixels.add(&boundary);
+            pixels.add(boundary);
             return Ok(pixels);
         }
         // It was cancelled before anything was done.

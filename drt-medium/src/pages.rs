@@ -2,17 +2,17 @@
 
 use std::string::{String, ToString};
 
-use crate::vol::VolError;
+use crate::vol_error::VolError;
 
 /// Bytes with a name for errors.
 #[derive(Clone, Copy)]
-pub(super) struct Pages<'a> {
-    pub(super) bytes: &'a [u8],
-    pub(super) file: &'a str,
+pub(crate) struct Pages<'a> {
+    pub(crate) bytes: &'a [u8],
+    pub(crate) file: &'a str,
 }
 
 impl<'a> Pages<'a> {
-    pub(super) fn slice(&self, offset: usize, length: usize) -> Result<&'a [u8], VolError> {
+    pub(crate) fn slice(&self, offset: usize, length: usize) -> Result<&'a [u8], VolError> {
         let end = offset.checked_add(length);
         end.and_then(|end| self.bytes.get(offset..end)).ok_or_else(|| VolError::Cut {
             file: self.file.to_string(),
@@ -26,46 +26,51 @@ impl<'a> Pages<'a> {
         Ok(core::array::from_fn(|i| slice[i]))
     }
 
-    pub(super) fn u16(&self, offset: usize) -> Result<u16, VolError> {
+    pub(crate) fn u16(&self, offset: usize) -> Result<u16, VolError> {
         self.array(offset).map(u16::from_le_bytes)
     }
 
-    pub(super) fn u32(&self, offset: usize) -> Result<u32, VolError> {
+    pub(crate) fn u32(&self, offset: usize) -> Result<u32, VolError> {
         self.array(offset).map(u32::from_le_bytes)
     }
 
-    pub(super) fn i32(&self, offset: usize) -> Result<i32, VolError> {
+    pub(crate) fn i32(&self, offset: usize) -> Result<i32, VolError> {
         self.array(offset).map(i32::from_le_bytes)
     }
 
-    pub(super) fn u64(&self, offset: usize) -> Result<u64, VolError> {
+    pub(crate) fn u64(&self, offset: usize) -> Result<u64, VolError> {
         self.array(offset).map(u64::from_le_bytes)
     }
 
     /// A number of bytes, from one place or to one.
-    pub(super) fn length(&self, offset: usize, field: &'static str) -> Result<usize, VolError> {
+    pub(crate) fn length(&self, offset: usize, field: &'static str) -> Result<usize, VolError> {
         let n = self.u64(offset)?;
         usize::try_from(n).ok().filter(|n| *n < usize::MAX / 4).ok_or_else(|| {
             self.field(offset, field, n.to_string(), "a number of bytes that a file can have")
         })
     }
 
-    pub(super) fn f64(&self, offset: usize, field: &'static str) -> Result<f64, VolError> {
+    pub(crate) fn f64(&self, offset: usize, field: &'static str) -> Result<f64, VolError> {
         self.finite(offset, field, f64::from_le_bytes(self.array(offset)?))
     }
 
-    pub(super) fn f32(&self, offset: usize, field: &'static str) -> Result<f64, VolError> {
+    pub(crate) fn f32(&self, offset: usize, field: &'static str) -> Result<f64, VolError> {
         self.finite(offset, field, f64::from(f32::from_le_bytes(self.array(offset)?)))
     }
 
-    fn finite(&self, offset: usize, field: &'static str, value: f64) -> Result<f64, VolError> {
+    pub(crate) fn finite(
+        &self,
+        offset: usize,
+        field: &'static str,
+        value: f64,
+    ) -> Result<f64, VolError> {
         match value.is_finite() {
             true => Ok(value),
             false => Err(self.field(offset, field, value.to_string(), "a finite number")),
         }
     }
 
-    pub(super) fn signature(
+    pub(crate) fn signature(
         &self,
         offset: usize,
         among: [[u8; 8]; 2],
@@ -81,7 +86,7 @@ impl<'a> Pages<'a> {
         }
     }
 
-    pub(super) fn field(
+    pub(crate) fn field(
         &self,
         offset: usize,
         field: &'static str,
