@@ -102,6 +102,7 @@ struct MediumSummary<'a> {
 }
 
 /// The plan as the digest has it.
+#[cfg(feature = "command")]
 pub(crate) fn plan_json(plan: &Plan) -> Option<serde_json::Value> {
     serde_json::to_value(PlanSummary::from(plan)).ok()
 }
