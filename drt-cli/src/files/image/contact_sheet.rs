@@ -37,9 +37,13 @@ impl Canvas {
 
     /// The colours of values from minus to plus a range, between these numbers.
     fn bar(&mut self, range: f64, [left, top]: [usize; 2], width: usize) {
-        let text = |sign: &str| format!("{sign}{range:.1e}");
-        let number = text("-").len() * font::ADVANCE;
-        let [start, end] = [number, width.saturating_sub(number)];
+        let number = match range {
+            0.01..1000.0 => format!("{range:.2}"),
+            _ => format!("{range:.1e}"),
+        };
+        let text = |sign: &str| format!("{sign}{number}");
+        let wide = text("-").len() * font::ADVANCE;
+        let [start, end] = [wide, width.saturating_sub(wide)];
         for x in start..end {
             let part = (x - start) as f64 / (end - start).max(2).wrapping_sub(1) as f64;
             for y in 0..font::HEIGHT {
