@@ -38,7 +38,7 @@ def cases(names):
 def command(program, job, call, options, work, samples, size="24x24"):
     options = [str(work / "adjoint.exr") if o == "ADJOINT" else o for o in options]
     reverse = "--adjoint" in options
-    out = ["-o", str(work / "gradient.npy")] if reverse else ["--digest", str(work / "digest.json")]
+    out = ["-o", str(work / "gradient.npy")] if reverse else ["-o", str(work / "image.exr"), "--digest", str(work / "digest.json")]
     return [str(program), *call, str(job), "--size", size, "--spp", str(samples), "--seed", "3",
             "--threads", "1", "--quiet", *out, *options]
 

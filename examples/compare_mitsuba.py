@@ -18,6 +18,7 @@ import json
 import pathlib
 import subprocess
 import sys
+import tempfile
 import time
 import xml.etree.ElementTree as ET
 
@@ -76,10 +77,12 @@ def by_mitsuba(mi, path, defaults, options):
 
 def digest(drt, path, defaults, options):
     """What drt says of an image it renders."""
-    command = [drt, "render", path, "--digest", "-", "--quiet", *options]
-    for name, value in defaults.items():
-        command += ["-D", f"{name}={value}"]
-    run = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
+    with tempfile.TemporaryDirectory() as folder:
+        image = pathlib.Path(folder, "image.exr")
+        command = [drt, "render", path, "--output", image, "--digest", "-", "--quiet", *options]
+        for name, value in defaults.items():
+            command += ["-D", f"{name}={value}"]
+        run = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False)
     if run.returncode != 0:
         sys.exit(f"{path}: drt failed: {run.stderr.strip()}")
     return json.loads(run.stdout)

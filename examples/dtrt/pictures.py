@@ -40,7 +40,8 @@ def main():
             sys.exit(f"{name}: expected one of {', '.join(SPP)}")
         line = [options.drt, "grad", HERE / f"{name}.toml", "--set", f"estimator.kind={options.kind}", "--quiet"]
         line += ["--size", f"{options.size}x{options.size}", "--spp", max(1, round(SPP[name] * options.scale))]
-        line += ["--threads", options.threads, "--preview", options.folder / f"{name}.png"]
+        picture = options.folder / f"{name}.png"
+        line += ["--threads", options.threads, "--output", picture.with_suffix(".exr"), "--preview", picture]
         if subprocess.run([str(word) for word in line]).returncode != 0:
             sys.exit(f"{name}: drt grad failed")
 

@@ -51,7 +51,7 @@ def blocks(job, at, options):
     with tempfile.TemporaryDirectory() as folder:
         digest = pathlib.Path(folder, "digest.json")
         line = [options.drt, "grad", job, "--quiet", "--size", f"{options.size}x{options.size}", "--seed", 100 + at]
-        line += ["--set", f"estimator.kind={kind}", "--sampling", sampling, "--digest", digest]
+        line += ["--set", f"estimator.kind={kind}", "--sampling", sampling, "--output", digest.with_suffix(".exr"), "--digest", digest]
         if kind == "finite-difference":
             # An image first, whose samples a pixel differences then take as well; twice as many images.
             line += ["--seconds", options.seconds / 4]

@@ -53,7 +53,7 @@ def run(job, settings, spp, seed, options):
     with tempfile.TemporaryDirectory() as folder:
         digest, said = pathlib.Path(folder, "digest.json"), pathlib.Path(folder, "said")
         line = [options.drt, "grad", job, "--quiet", "--threads", 1, "--size", f"{options.size}x{options.size}"]
-        line += ["--max-depth", options.max_depth, "--spp", spp, "--seed", seed, "--digest", digest]
+        line += ["--max-depth", options.max_depth, "--spp", spp, "--seed", seed, "--output", digest.with_suffix(".exr"), "--digest", digest]
         for setting in settings:
             line += ["--set", setting]
         with said.open("w") as errors:
