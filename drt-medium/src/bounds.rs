@@ -31,7 +31,7 @@ pub(crate) struct Bounds {
 
 impl fmt::Debug for Bounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Bounds").field("cells", &self.fine.cells()).finish_non_exhaustive()
+        f.debug_struct("Bounds").field("size", &self.fine.cells().size()).finish_non_exhaustive()
     }
 }
 

@@ -149,7 +149,7 @@ class Problem:
         for sensor in self.volume["held_out"]:
             picture = self.run / f"{sensor}-{what}.png"
             if not views.is_newer(picture, grid, self.folder / "scene.xml"):
-                words = ["-D", f"{self.volume['grid']}={grid}", "--sensor", sensor, "--spp", self.volume["spp"]]
+                words = ["-D", f"{self.volume['grid']}={grid}", "--sensor", sensor, "--spp", self.volume["spp"], "--exposure", self.volume["exposure"]]
                 self.drt("render", self.folder / "scene.xml", *words, "--output", picture.with_suffix(".exr"), "--preview", picture)
             yield picture
 
