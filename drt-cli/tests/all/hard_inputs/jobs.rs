@@ -174,7 +174,7 @@ fn differences_at_the_end_of_a_range() {
     // On the other side the range ends within two steps, too.
     let effect = "target = \"fog\"\nproperty = \"albedo\"\nadd = [1, 1, 1]";
     folder.file("j.toml", job(effect).replace("\"p\"", "\"p\"\nvalue = -0.5"));
-    let out = run(&folder, "check j.toml --spp 64 --size 8x8 --set estimator.step=0.6");
+    let out = run(&folder, "check j.toml --spp 1024 --size 8x8 --set estimator.step=0.6");
     expect(&out, 0, &["finite differences by `p` look to one side and are of first order"]);
 }
 
