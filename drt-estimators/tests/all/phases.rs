@@ -1,9 +1,8 @@
 //! Derivatives by phase functions that vary in space, against finite differences, by all estimators.
 
+use crate::common::differences::agree_with_differences;
 use crate::common::*;
-use drt_estimators::{
-    EstimatorKind, PathSampling, Scene, Settings, Unattended, agreement, finite_differences,
-};
+use drt_estimators::{EstimatorKind, Scene};
 use drt_math::{Rgb, ValueChange, vec3};
 use drt_medium::Homogeneous;
 use drt_motion::{GeometryChange, Parameter};
@@ -31,38 +30,16 @@ fn by_motion() -> Vec<Parameter> {
     vec![parameter("shifts", 0.0, vec![moves("smoke", shift)])]
 }
 
-fn judge(what: &str, scene: &Scene, parameters: &[Parameter]) {
-    let (step, spp) = (0.1, 2000);
-    let settings = Settings { seed: 3, ..Settings::default() };
-    let differences = finite_differences(scene, parameters, &settings, 4 * spp, step, &Unattended);
-    let differences = differences.expect("a valid scene");
-    let kinds = [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped];
-    let from_camera = kinds.map(|kind| (kind, PathSampling::Unidirectional));
-    let both = [EstimatorKind::PathSpace, EstimatorKind::Warped]
-        .map(|kind| (kind, PathSampling::Bidirectional));
-    for (seed, (estimator, sampling)) in (7..).zip(from_camera.into_iter().chain(both)) {
-        let settings = Settings { estimator, sampling, seed, ..Settings::default() };
-        let found = rendered(scene, parameters, &settings, spp);
-        for (d, difference) in found.derivatives.iter().zip(&differences) {
-            let name = format!("{what}, {} by {estimator:?}, {sampling:?}", d.name);
-            let same = agreement(&d.total, difference, None);
-            assert!(same.agrees, "{name}: {same:?}");
-            let [known, error] = sum(difference);
-            let [value, own] = sum(&d.total);
-            let off = |part: f64| (part * value - known).abs() / f64::hypot(own, error);
-            println!("{name}: {value} ± {own}, {known} ± {error}");
-            assert!(off(1.0) < 4.0, "{name}: {}", off(1.0));
-            // As if half of it were missing.
-            assert!(off(0.5) > 4.0, "{name}: {}", off(0.5));
-        }
-    }
+fn judge(scene: &Scene, parameters: &[Parameter]) {
+    let both = [EstimatorKind::PathSpace, EstimatorKind::Warped];
+    agree_with_differences(scene, parameters, 0.1, 2000, &both, |_| {});
 }
 
 #[test]
 fn estimators_agree_where_phase_functions_vary() {
     for (scene, property) in varied_smoke(1.0).into_iter().zip(["g", "weight"]) {
         let scene = in_the_sun(scene);
-        judge(property, &scene, &by_value(property));
-        judge(property, &in_fog(scene), &by_motion());
+        judge(&scene, &by_value(property));
+        judge(&in_fog(scene), &by_motion());
     }
 }

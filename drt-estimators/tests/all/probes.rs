@@ -1,11 +1,9 @@
 //! Derivatives by the extinction of media with empty voxels, where free flight puts no vertices.
 
+use crate::common::differences::agree_with_differences;
 use crate::common::pairing::{pair, targets};
 use crate::common::*;
-use drt_estimators::{
-    EstimatorKind, InteriorMotion, PathSampling, Scene, Session, Settings, Unattended, agreement,
-    finite_differences,
-};
+use drt_estimators::{EstimatorKind, InteriorMotion, Scene, Session, Settings, Unattended};
 use drt_math::{Rgb, Rng, ValueChange};
 use drt_motion::Parameter;
 
@@ -65,30 +63,9 @@ fn estimators_agree_in_sparse_media_that_shine() {
 const STEP: f64 = 0.05;
 
 fn judge(scene: &Scene, parameters: &[Parameter]) {
-    let (step, spp) = (STEP, 4000);
-    let settings = Settings { seed: 3, ..Settings::default() };
-    let differences = finite_differences(scene, parameters, &settings, 4 * spp, step, &Unattended);
-    let differences = differences.expect("a valid scene");
-    let kinds = [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped];
-    let from_camera = kinds.map(|kind| (kind, PathSampling::Unidirectional));
-    let both = (EstimatorKind::PathSpace, PathSampling::Bidirectional);
-    for (seed, (estimator, sampling)) in (7..).zip(from_camera.into_iter().chain([both])) {
-        let settings = Settings { estimator, sampling, seed, ..Settings::default() };
-        let found = rendered(scene, parameters, &settings, spp);
+    agree_with_differences(scene, parameters, STEP, 4000, &[EstimatorKind::PathSpace], |found| {
         assert!(found.counters.probes > 0);
-        for (d, difference) in found.derivatives.iter().zip(&differences) {
-            let name = format!("{} by {estimator:?}, {sampling:?}", d.name);
-            let same = agreement(&d.total, difference, None);
-            assert!(same.agrees, "{name}: {same:?}");
-            let [known, error] = sum(difference);
-            let [value, own] = sum(&d.total);
-            let off = |part: f64| (part * value - known).abs() / f64::hypot(own, error);
-            println!("{name}: {value} ± {own}, {known} ± {error}");
-            assert!(off(1.0) < 4.0, "{name}: {}", off(1.0));
-            // As if half of it were missing.
-            assert!(off(0.5) > 4.0, "{name}: {}", off(0.5));
-        }
-    }
+    });
 }
 
 /// The reverse mode is the transpose of the forward mode.

@@ -1,6 +1,7 @@
 //! Small scenes with a bit of everything, and the parameters that change them.
 #![allow(dead_code, unreachable_pub, reason = "the crate's own tests use a part")]
 
+pub mod differences;
 pub mod pairing;
 
 use std::sync::Arc;
