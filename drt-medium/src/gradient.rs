@@ -49,19 +49,19 @@ impl FlowGradient {
 /// Derivative of a loss with respect to everything a [`MediumTangent`] can change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MediumGradient {
-    /// Of the extinction, albedo held.
+    /// Derivative with respect to the extinction, with the albedo held.
     pub sigma_t: FieldGradient,
-    /// Of the albedo, extinction held.
+    /// Derivative with respect to the albedo, with the extinction held.
     pub albedo: FieldGradient,
-    /// Of the emitted radiance.
+    /// Derivative with respect to the emitted radiance.
     pub emission: FieldGradient,
-    /// Of the phase function's mean cosine.
+    /// Derivative with respect to the phase function's mean cosine.
     pub g: FieldGradient,
-    /// Of the weight of a blend of phase functions.
+    /// Derivative with respect to the weight of a blend of phase functions.
     pub weight: FieldGradient,
-    /// Of the coefficients of the grids' velocity field.
+    /// Derivative with respect to the coefficients of the grids' velocity field.
     pub velocity: Affine,
-    /// Of the velocities of nodes, where there is room for them.
+    /// Derivative with respect to the velocities of nodes, where there is room for them.
     pub flow: Option<FlowGradient>,
 }
 

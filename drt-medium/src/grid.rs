@@ -208,7 +208,7 @@ impl Grid {
         self.per_channel(largest)
     }
 
-    /// The same field with every channel multiplied by a factor of its own.
+    /// A copy of the field with every channel multiplied by a factor of its own.
     #[must_use]
     pub fn scaled(&self, by: Rgb) -> Self {
         let mut grid = self.clone();

@@ -1,7 +1,7 @@
 //! NanoVDB files (`.nvdb`, version 32): sparse grids in a tree of three levels below its root (Museth 2021, "NanoVDB: A GPU-Friendly and Portable
 //! VDB Data Structure for Real-Time Rendering and Simulation").
 //!
-//! Of a file, one grid of `f32` or of three `f32` a voxel is read, of the class *fog volume* or of none. It becomes a dense grid over the tree's
+//! A file gives one grid of `f32` or of three `f32` a voxel, of the class *fog volume* or of none. It becomes a dense grid over the tree's
 //! bounding box of active values. In NanoVDB a value belongs to the point at its integer coordinates; here the voxel around it is that point's cube, so that the
 //! grid's box reaches half a voxel farther than the outermost points.
 //!

@@ -28,15 +28,15 @@ pub struct FieldTangent {
 /// [`MediumTangent::push_through`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct MediumTangent {
-    /// Of the extinction, albedo held.
+    /// Rate of the extinction, with the albedo held.
     pub sigma_t: FieldTangent,
-    /// Of the albedo, extinction held.
+    /// Rate of the albedo, with the extinction held.
     pub albedo: FieldTangent,
-    /// Of the emitted radiance.
+    /// Rate of the emitted radiance.
     pub emission: FieldTangent,
-    /// Of the phase function's mean cosine.
+    /// Rate of the phase function's mean cosine.
     pub g: FieldTangent,
-    /// Of the weight of a blend of phase functions.
+    /// Rate of the weight of a blend of phase functions.
     pub weight: FieldTangent,
     /// Velocity field of the grids, in world coordinates.
     pub velocity: Affine,

@@ -39,19 +39,21 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
         return Ok(Outcome::Interrupted);
     };
     let verdicts = judge(&rendering, &coarse, &fine);
-    let noise = loudest(&rendering, &fine);
+    let noise = noise_of_each(&rendering, &fine);
     let names = job.parameters.iter().map(|p| format!("fd_{}", p.name));
     let further: Vec<(String, &Layer)> = names.zip(&fine).collect();
     outputs.write(&job, &rendering, &further, &verdicts)?;
     let table = table(&verdicts, &noise);
     outputs.tell(&table.to_string())?;
-    let loudest = noise.iter().copied().fold(0.0, f64::max);
-    if loudest > TELLING && verdicts.iter().all(|v| v.agrees) {
+    if verdicts.iter().any(|v| !v.agrees) {
+        return Ok(Outcome::Failed);
+    }
+    let loudest = noise.into_iter().fold(0.0, f64::max);
+    if loudest > TELLING {
         outputs.tell(&too_noisy(loudest, rendering.spp))?;
         return Ok(Outcome::Failed);
     }
-    let agrees = verdicts.iter().all(|v| v.agrees);
-    Ok(if agrees { Outcome::Done } else { Outcome::Failed })
+    Ok(Outcome::Done)
 }
 
 /// Relative noise of the difference of a derivative and its finite difference above which nothing is told: half of it could be
@@ -59,7 +61,7 @@ pub(super) fn run(options: &Options) -> Result<Outcome, CliError> {
 const TELLING: f64 = 0.5;
 
 /// The noise of what each derivative is compared by.
-fn loudest(rendering: &Rendering, differences: &[Layer]) -> Vec<f64> {
+fn noise_of_each(rendering: &Rendering, differences: &[Layer]) -> Vec<f64> {
     let pairs = rendering.derivatives.iter().zip(differences);
     pairs.map(|(d, fine)| noise_of_difference(&d.total, fine, rendering)).collect()
 }

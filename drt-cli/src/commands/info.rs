@@ -100,7 +100,7 @@ impl Contents {
         }
     }
 
-    /// The same for programs: tables as lists of objects.
+    /// Gives programs the contents as JSON, with tables as lists of objects.
     fn json(&self, job: &Job, plan: Result<&Plan, &String>) -> Result<String, CliError> {
         let place = Place::file(&job.path);
         let plan = plan.map_err(Clone::clone).map(plan_json);

@@ -8,7 +8,7 @@ pub(super) fn relative_noise(layer: &Layer, rendering: &Rendering) -> f64 {
     noise_of(layer.rms_value(), rms_error(layer), rendering)
 }
 
-/// The same for the difference of a derivative and another estimate of it.
+/// Relative noise of the difference between a derivative and another estimate of it, over what [`relative_noise`] divides by.
 pub(super) fn noise_of_difference(layer: &Layer, other: &Layer, rendering: &Rendering) -> f64 {
     let error = rms_error(layer).hypot(rms_error(other));
     noise_of(layer.rms_value(), error, rendering)

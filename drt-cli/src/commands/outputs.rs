@@ -38,7 +38,7 @@ impl Outputs {
         Ok(Self { options, command, clock: Clock::start(), inputs: None, attachment: None })
     }
 
-    /// The same for images, of which names tell the kind.
+    /// Does what [`new`](Self::new) does for a command that writes images, and refuses names that end as no image does.
     pub(super) fn of_images(
         options: &Options,
         job: &Job,

@@ -139,7 +139,7 @@ pub(crate) trait AdjointSink {
     fn grid(&mut self, medium: usize, x: Vec3, u: &RgbVec);
     /// Of a medium's coefficients at a point of space.
     fn medium(&mut self, medium: usize, x: Vec3, adjoint: &CoefficientAdjoint);
-    /// Of the value of a medium's phase function at a point of space, whose gradient is given.
+    /// Takes the derivative by the value of a medium's phase function at a point of space, whose gradient is given.
     fn phase(&mut self, medium: usize, x: Vec3, gradient: &PhaseGradient, adjoint: Rgb);
     /// Of the optical depth of a ray through a medium that varies in space.
     fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb);

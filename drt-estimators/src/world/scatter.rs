@@ -35,7 +35,7 @@ pub(crate) struct ScatteringGradient {
     pub(crate) ng: RgbVec,
     /// With respect to the place of the point on its surface, where textures change.
     pub(crate) slide: RgbVec,
-    /// Of the phase function, in media.
+    /// Derivatives of the phase function, in media.
     pub(crate) phase: Option<PhaseGradient>,
     /// With respect to the material, on surfaces.
     pub(crate) params: Option<BsdfParams>,

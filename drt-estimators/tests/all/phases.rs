@@ -7,7 +7,7 @@ use drt_math::{Rgb, ValueChange, vec3};
 use drt_medium::Homogeneous;
 use drt_motion::{GeometryChange, Parameter};
 
-/// The same phase function where everything else is the same everywhere, so that nothing but it moves with the grid.
+/// Fog whose coefficients are the same everywhere takes the place of the smoke, so that nothing but the phase function moves with the grid.
 fn in_fog(mut scene: Scene) -> Scene {
     let fog = Homogeneous::new(Rgb::new(0.3, 0.4, 0.6), Rgb::splat(0.8), Rgb::ZERO);
     scene.media[0].item.kind = fog.expect("coefficients").into();
