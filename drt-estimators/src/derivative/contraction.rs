@@ -86,6 +86,7 @@ impl Motion {
                 .collect(),
             roughness: self.tangents.bsdfs.iter().map(roughens).collect(),
             index: self.tangents.bsdfs.iter().map(bends).collect(),
+            moves: self.active.moves_geometry(),
         };
         for change in &self.tangents.texels {
             match change.of {

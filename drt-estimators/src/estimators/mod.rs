@@ -71,6 +71,17 @@ pub(crate) fn named(kind: EstimatorKind) -> &'static dyn Estimator {
     }
 }
 
+/// The estimator that serves in place of the one that is asked for, where something `moves` in a scene: past smooth surfaces light
+/// follows from what comes before, so that only vertices which move with their rays, and rays which turn with what they meet
+/// there, have a derivative.
+pub(crate) fn in_scene(
+    asked: &'static dyn Estimator,
+    scene: &Scene,
+    moves: bool,
+) -> &'static dyn Estimator {
+    if moves && scene.first_smooth().is_some() { &Warped } else { asked }
+}
+
 /// Prepares a world for an estimator.
 ///
 /// # Errors

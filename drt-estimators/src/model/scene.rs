@@ -207,9 +207,6 @@ impl Bsdf {
     /// Why nothing that moves can be differentiated where light meets this on a mesh.
     fn refuses_motion(&self, mesh: &Mesh, parameter: &str) -> Option<ElementError> {
         let parameter = || parameter.into();
-        if self.is_smooth() {
-            return Some(ElementError::Smooth { bsdf: self.name(), parameter: parameter() });
-        }
         if let Some(bsdf) = self.undifferentiable() {
             return Some(ElementError::NoDerivatives { bsdf, parameter: parameter() });
         }
@@ -219,9 +216,9 @@ impl Bsdf {
 }
 
 impl Scene {
-    /// Refuses derivatives with respect to `parameter` where `moves`, as something moves, and light meets smooth
-    /// surfaces: they move light along them, which no term here samples; nor do the jumps at others. Where vertices
-    /// `slide` over surfaces, jumps of textures move under them, which no term here samples, either.
+    /// Refuses derivatives with respect to `parameter` where `moves`, as something moves, and light meets surfaces at which it
+    /// jumps as no term here samples. Where vertices `slide` over surfaces, jumps of textures move under them, which no term here
+    /// samples, either.
     pub(crate) fn refuse_derivatives(
         &self,
         parameter: &str,
@@ -253,9 +250,29 @@ impl Scene {
                 ));
             }
         }
+        if moves {
+            self.refuse_beside_smooth_surfaces(parameter)?;
+        }
         if self.hides_something() {
             let reason = ElementError::HiddenEmitters { parameter: parameter.into() };
             return Err(Error::Element { element: "integrator".into(), reason });
+        }
+        Ok(())
+    }
+
+    /// Refuses derivatives by what moves of light that smooth surfaces have no terms for: that of points and directions, whose shadows
+    /// would move rays behind such surfaces, and that which they emit themselves.
+    fn refuse_beside_smooth_surfaces(&self, parameter: &str) -> Result<(), Error> {
+        let Some(smooth) = self.first_smooth() else { return Ok(()) };
+        let (parameter, surface) = (parameter.into(), self.name_of(Target::Shape(smooth)));
+        if let Some(e) = self.emitters.iter().position(|e| e.item.emitter.is_delta()) {
+            let reason = ElementError::DeltaLightPastSmooth { parameter, surface };
+            return Err(unusable(&self.emitters[e].id, "emitter", e, reason));
+        }
+        let emits = |s: &Shape| s.emitter.is_some() && self.bsdfs[s.bsdf].item.is_smooth();
+        if let Some(i) = self.shapes.iter().position(emits) {
+            let reason = ElementError::SmoothEmitter { parameter };
+            return Err(unusable(&self.shapes[i].id, "shape", i, reason));
         }
         Ok(())
     }

@@ -29,6 +29,8 @@ pub(crate) struct Node {
     /// Its inverse density, Russian roulette included.
     pub(crate) inv_pdf: f64,
     pub(crate) role: Role,
+    /// The walk left in one of the single directions of a smooth surface.
+    pub(crate) single: bool,
     /// Index of the vertex of a light path that the node is, where it is one.
     pub(crate) light: u32,
     /// The control radiance of the ray by which the walk arrived, see [`probe`](crate::terms::interior).
@@ -105,6 +107,7 @@ impl PathRecord {
             value,
             inv_pdf: 1.0,
             role: Role::Walked,
+            single: false,
             light: 0,
             control: Rgb::ZERO,
         });
@@ -138,6 +141,7 @@ impl PathRecord {
             value: Rgb::ZERO,
             inv_pdf: 0.0,
             role: Role::Walked,
+            single: false,
             light: 0,
             control: Rgb::ZERO,
         });
@@ -148,6 +152,7 @@ impl PathRecord {
     pub(crate) fn scatter(&mut self, leaving: &OutgoingRay, value: Rgb, inv_pdf: f64) {
         let node = &mut self.nodes[leaving.node as usize];
         (node.wi, node.value, node.inv_pdf) = (leaving.dir, value, inv_pdf);
+        node.single = leaving.pdf().is_none();
     }
 
     /// A node was connected to a light.

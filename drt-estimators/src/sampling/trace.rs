@@ -199,6 +199,8 @@ pub(crate) struct Tracer<'w> {
     /// Boxed, as it is lent out for every segment.
     pub(crate) ray: Option<Box<RayPath>>,
     pub(crate) shadow: RayPath,
+    /// How many paths the present one stands for in its connections, of those that might go on from where it is.
+    pub(super) connected: f64,
 }
 
 impl<'w> Tracer<'w> {
@@ -210,6 +212,7 @@ impl<'w> Tracer<'w> {
             max_segments: world.max_depth.min(LONGEST),
             ray: None,
             shadow: RayPath::default(),
+            connected: 1.0,
         }
     }
 }

@@ -45,8 +45,17 @@ impl Tracer<'_> {
         if stop.alive.times(stop.arrival * sigma_s, spare).value.is_zero() {
             return None;
         }
-        if !straight_only {
+        let parted = O::RECORDS && world.parts_directions(&scattering);
+        let mut drawn = None;
+        if parted {
+            drawn = scattering.sample(stop.from, M::GIVEN, &mut self.rng);
+        }
+        // A path that goes on in a single direction is no path of what is connected, which the others count more often for.
+        if !(straight_only || matches!(drawn, Some(Drawn::Specular(_)))) {
+            let others = if parted { 1.0 - scattering.single_chance(stop.from) } else { 1.0 };
+            self.connected = others.recip();
             M::connect(self, stop, &scattering, sigma_s, observer);
+            self.connected = 1.0;
         }
         if stop.segments + 1 >= self.max_segments && !M::EMISSION {
             if !(world.any_straight && world.passes_straight(&stop.vertex)) {
@@ -55,7 +64,10 @@ impl Tracer<'_> {
             straight_only = true;
         }
         let mut segments = stop.segments;
-        let (to, pdf, value) = match scattering.sample(stop.from, M::GIVEN, &mut self.rng)? {
+        if !parted {
+            drawn = scattering.sample(stop.from, M::GIVEN, &mut self.rng);
+        }
+        let (to, pdf, value) = match drawn? {
             Drawn::Spread(to, pdf) if pdf > 0.0 && !straight_only => {
                 (to, Some(pdf), M::value(&scattering, stop.from, to))
             }
@@ -292,7 +304,7 @@ impl Tracer<'_> {
             }
             world.transmittance(v.x, w, &self.shadow, &mut self.rng, &mut self.counters)
         };
-        let transport = tau * (weight * light.inv_pdf);
+        let transport = tau * (weight * light.inv_pdf * self.connected);
         if transport.is_zero() {
             return;
         }

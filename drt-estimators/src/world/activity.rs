@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use drt_math::Rgb;
 use drt_medium::{Coefficients, DensityField, Homogeneous};
 
+use crate::world::scatter::Scattering;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{Tracking, World};
 
@@ -48,6 +49,8 @@ pub(crate) struct ActiveFactors {
     pub(crate) roughness: Vec<bool>,
     /// Those whose index of refraction changes.
     pub(crate) index: Vec<bool>,
+    /// Light moves against what it meets or the camera.
+    pub(crate) moves: bool,
 }
 
 impl ActiveFactors {
@@ -60,6 +63,7 @@ impl ActiveFactors {
             extinctions: any(&self.extinctions, &other.extinctions),
             roughness: any(&self.roughness, &other.roughness),
             index: any(&self.index, &other.index),
+            moves: self.moves || other.moves,
         }
     }
 }
@@ -157,6 +161,14 @@ impl World {
             (_, Some(m)) => self.needs.media.get(m).is_some_and(|n| *n != MediumActivity::Nothing),
             _ => false,
         }
+    }
+
+    /// True where derivatives keep apart what a surface scatters into single directions from the rest: what is seen in such a
+    /// direction turns the ray that found the surface, which must not happen to light whose value does not hold the probability of
+    /// that direction.
+    pub(crate) fn parts_directions(&self, scattering: &Scattering<'_>) -> bool {
+        self.needs.moves
+            && matches!(scattering, Scattering::Surface(bsdf) if bsdf.is_partly_smooth())
     }
 
     /// True when a parameter changes how rough the surface at `v` is.

@@ -69,6 +69,14 @@ impl Scattering<'_> {
         }
     }
 
+    /// The probability with which [`Scattering::sample`] draws a single direction.
+    pub(crate) fn single_chance(&self, from: Vec3) -> f64 {
+        match self {
+            Self::Surface(bsdf) => bsdf.single_chance(from),
+            Self::Volume(_) => 0.0,
+        }
+    }
+
     /// The solid-angle density of [`Scattering::sample`].
     pub(crate) fn pdf(&self, from: Vec3, to: Vec3, given: Given) -> f64 {
         match self {

@@ -19,6 +19,7 @@ pub mod reference;
 pub mod riding;
 pub mod scale;
 pub(crate) mod set;
+pub mod smooth;
 pub mod still;
 pub mod surfaces;
 pub mod textures;

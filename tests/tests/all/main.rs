@@ -12,4 +12,5 @@ mod random_scenes;
 mod references;
 mod refusals;
 mod skipping;
+mod smooth;
 mod stability;

@@ -17,6 +17,7 @@
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::antithetic::Apart;
+use crate::derivative::adjoint::chain::Single;
 use crate::derivative::adjoint::propagation::Propagated;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 use crate::derivative::adjoint::{Differentiator, Local, NodeMotion, moves, send, turn};
@@ -165,7 +166,10 @@ impl Differentiator<'_> {
         // As far as this is not the camera's importance.
         let wholly = self.locals[k].turn;
         let mut turned = Turned { wholly, at_image_point: RgbVec::ZERO };
-        if let Some(to_wi) = self.scatter_into(segment, start, there, before, sink) {
+        let single = Single::at(self.world, segment.from());
+        if single.is_none()
+            && let Some(to_wi) = self.scatter_into(segment, start, there, before, sink)
+        {
             turned.wholly += to_wi;
         }
         let stretch = &segment.stretch(start.0.x);
@@ -180,6 +184,9 @@ impl Differentiator<'_> {
         self.turn_ray(segment, &mut turned, there, sink);
         if segment.parent == 0 {
             self.turn += turned.at_image_point;
+        }
+        if let Some(single) = single {
+            self.bend_into(segment, &single, start.1, wholly + turned.at_image_point, there, sink);
         }
         if segment.parallel {
             self.origin += core::mem::take(&mut there.u);
@@ -245,6 +252,25 @@ impl Differentiator<'_> {
         to_wi
     }
 
+    /// The parent's scattering into a segment that leaves in a single direction, which is owed `onward`.
+    #[cold]
+    fn bend_into<S: AdjointSink>(
+        &mut self,
+        segment: &Segment<'_>,
+        single: &Single<'_>,
+        theta: Rgb,
+        onward: RgbVec,
+        there: &mut SurfaceAdjoint,
+        sink: &mut S,
+    ) {
+        let node = segment.from();
+        let Some(arrival) = &node.arrival else { return };
+        let before = arrival.parent as usize;
+        let adjoint = theta * segment.value * node.inv_pdf;
+        let moving = segment.moves() || segment.path.velocities.moves(before);
+        self.bend(single, segment.parent, before, onward, adjoint, moving, there, sink);
+    }
+
     /// A segment that ends in the environment, at a fixed direction: its transmittance, and what a ray that turns comes to see of the
     /// environment.
     #[inline]
@@ -261,8 +287,9 @@ impl Differentiator<'_> {
             self.seen(None, arrival.dir, value, filter, phi, sink.active());
         }
         let mut along = self.segment(stretch, Far::Direction, ray_moves, weight, there, sink);
-        // Only rays of the camera, and those that turn with edges, come to see another part of it.
-        if (segment.parent == 0 || segment.motion.ray.is_some())
+        // Only rays of the camera, and those that turn with edges or behind smooth surfaces, come to see another part of it.
+        let turns = segment.motion.ray.is_some() || segment.from().single;
+        if (segment.parent == 0 || turns)
             && let Some(environment) = self.world.lights.environment()
         {
             let each = arrival.throughput * arrival.emission_weight;

@@ -52,8 +52,13 @@ impl Differentiator<'_> {
         };
         let mut auxiliary = Vec::new();
         let velocity = &field.vertex(world, &found, &mut self.probe, &mut auxiliary);
-        let ray =
-            turn.as_ref().map(|turn| RayMotion { turn, parts: &parts, shadows: &[], light: None });
+        let ray = turn.as_ref().map(|turn| RayMotion {
+            turn,
+            chain: &[],
+            parts: &parts,
+            shadows: &[],
+            light: None,
+        });
         let motion = NodeMotion { velocity, auxiliary: &auxiliary, ray };
         self.alone(k, |sweep| {
             let here = &mut SurfaceAdjoint::default();

@@ -54,6 +54,7 @@ impl Differentiator<'_> {
             distance,
             end,
             emission_alone: true,
+            tangent_plane: None,
         };
         let Self { world, parts, auxiliary, probe, .. } = self;
         parts.clear();
@@ -171,7 +172,7 @@ impl Differentiator<'_> {
         sink: &mut S,
     ) {
         if !self.edges_at_rest {
-            let ray = RayMotion { turn, parts: &self.parts, shadows: &[], light: None };
+            let ray = RayMotion { turn, chain: &[], parts: &self.parts, shadows: &[], light: None };
             here.u -= ray.send(light.w, turned, weight, sink);
         }
     }

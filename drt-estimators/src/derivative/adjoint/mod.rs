@@ -23,6 +23,7 @@
 
 mod antithetic;
 mod arrival;
+mod chain;
 mod connections;
 mod emission;
 mod emitters;
@@ -96,7 +97,8 @@ impl<'p> RecordedPath<'p> {
     fn ray_motion(&self, turn: Option<u32>) -> Option<RayMotion<'p>> {
         let turn = self.velocities.turn(turn)?;
         let parts = self.velocities.turn_parts(turn);
-        Some(RayMotion { turn, parts, shadows: &[], light: None })
+        let chain = self.velocities.chain_parts(turn);
+        Some(RayMotion { turn, parts, chain, shadows: &[], light: None })
     }
 
     #[inline]

@@ -9,6 +9,7 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
+use crate::derivative::adjoint::chain::Single;
 use crate::derivative::adjoint::segment::{Far, Stretch};
 use crate::derivative::adjoint::{Differentiator, moves, send};
 use crate::derivative::recorded_path::RecordedPath;
@@ -190,6 +191,12 @@ impl Differentiator<'_> {
             let mut back = RgbVec::ZERO;
             let mut turned = RgbVec::ZERO;
             let mut turned_wholly = RgbVec::ZERO;
+            if let Some(single) = Single::at(self.world, node) {
+                let (to_wo, by_n) = single.pull(turn);
+                here.ns += by_n;
+                turned -= to_wo;
+                turned_wholly -= to_wo;
+            }
             for a in velocities.auxiliary(velocity) {
                 let g = match a.moved {
                     Moved::RayPoint(_) => here.u.dot(a.displacement) * free,

@@ -50,7 +50,8 @@ impl Differentiator<'_> {
             let behind = event.behind.map(|b| Behind { weight, ..b });
             let event = NextEvent { behind, moving: true, arrives: true, ..*event };
             let light = Some(light);
-            let ray = RayMotion { turn, parts: &parts.edges, shadows: &parts.shadows, light };
+            let ray =
+                RayMotion { turn, chain: &[], parts: &parts.edges, shadows: &parts.shadows, light };
             let motion = NodeMotion { velocity: &velocity, auxiliary: &auxiliary, ray: Some(ray) };
             let received = event.c.f * event.c.rest();
             self.alone(k, |sweep| {

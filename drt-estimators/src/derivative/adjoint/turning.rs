@@ -4,7 +4,9 @@ use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::derivative::velocity::{RayTurn, ShadowPart, ShadowTurn, TurnPart, TurningRay, Weight};
+use crate::derivative::velocity::{
+    ChainPart, Mover, RayTurn, ShadowPart, ShadowTurn, TurnPart, TurningRay, Weight,
+};
 use crate::model::emitter::EmitterGradient;
 use crate::sampling::trace::Arrival;
 use crate::world::lights::{LightKind, LightSample};
@@ -15,6 +17,8 @@ use crate::world::vertex::{MaterialPoint, Matter, SurfacePoint, Vertex};
 pub(super) struct RayMotion<'a> {
     pub(super) turn: &'a RayTurn,
     pub(super) parts: &'a [TurnPart],
+    /// From past smooth surfaces.
+    pub(super) chain: &'a [ChainPart],
     /// Of shadows.
     pub(super) shadows: &'a [ShadowPart],
     /// That which casts them.
@@ -37,6 +41,7 @@ pub(super) fn found_ray<'a>(
         distance: arrival.distance,
         end: Some(end),
         emission_alone: false,
+        tangent_plane: None,
     }
 }
 
@@ -60,6 +65,19 @@ impl RayMotion<'_> {
                 send_to(matter.point, SurfaceAdjoint::of_place(place), sink);
             }
             origin += place;
+        }
+        for part in self.chain {
+            let g = across.map(|g| part.rate.transpose_mul(g)) + weight.outer(part.divergence);
+            match part.mover {
+                Mover::Viewer => origin -= g,
+                Mover::Place(matter) => {
+                    let g = g.map(|g| matter.pull(g));
+                    send_to(matter.point, SurfaceAdjoint::of_place(g), sink);
+                }
+                Mover::Normal(point) => {
+                    send_to(point, SurfaceAdjoint { ns: g, ..SurfaceAdjoint::default() }, sink);
+                }
+            }
         }
         if let (Some(shadow), Some(light)) = (&self.turn.shadow, self.light) {
             origin += self.send_shadow(shadow, light, &across, weight, sink);

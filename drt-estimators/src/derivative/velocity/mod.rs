@@ -30,6 +30,7 @@
 //! Only the [`VelocityField`] itself knows which of these fields it is.
 
 pub(crate) mod blend;
+mod chain;
 mod intersection;
 mod material;
 mod path;
@@ -47,12 +48,18 @@ use drt_geom::Hit;
 use drt_math::{Rng, Vec3};
 
 pub(crate) use crate::derivative::velocity::blend::Blend;
+pub(crate) use crate::derivative::velocity::chain::{
+    ByU, Link, Mover, Rate, RayBehind, RayByMover, RayByU, evened, first_ray, ray_by_movers,
+    rays_by_u,
+};
 pub(crate) use crate::derivative::velocity::intersection::EdgeMatter;
 pub(crate) use crate::derivative::velocity::material::Material;
 pub(crate) use crate::derivative::velocity::path::PathVelocities;
 pub(crate) use crate::derivative::velocity::shadow::{ShadowPart, ShadowPlace, ShadowTurn};
 pub(crate) use crate::derivative::velocity::spatial::Spatial;
-pub(crate) use crate::derivative::velocity::turn::{RayTurn, TurnPart, TurnParts, TurningRay};
+pub(crate) use crate::derivative::velocity::turn::{
+    ChainPart, ChainedRay, RayTurn, TangentPlane, TurnPart, TurnParts, TurningRay,
+};
 use crate::derivative::velocity::warp::SurfaceHit;
 pub(crate) use crate::derivative::velocity::weight::Weight;
 
@@ -207,6 +214,17 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
         _ray: &TurningRay<'_>,
         _probe: &mut Probe,
         _parts: &mut Vec<TurnPart>,
+    ) -> Option<RayTurn> {
+        None
+    }
+
+    /// How a ray turns that starts a chain of smooth surfaces, with the edges beside all rays of the chain; appends the summands.
+    fn turn_with_chain(
+        &self,
+        _world: &World,
+        _chain: &ChainedRay<'_>,
+        _parts: &mut Vec<TurnPart>,
+        _chained: &mut Vec<ChainPart>,
     ) -> Option<RayTurn> {
         None
     }

@@ -6,8 +6,8 @@ use alloc::vec::Vec;
 use drt_math::{Rng, Vec3};
 
 use crate::derivative::velocity::{
-    Auxiliary, Found, Probe, RayTurn, SurfaceHit, TurnPart, TurningRay, VelocityField,
-    VertexVelocity,
+    Auxiliary, Blend, ChainPart, ChainedRay, Found, Link, Probe, RayBehind, RayTurn, SurfaceHit,
+    TurnPart, TurningRay, VelocityField, VertexVelocity,
 };
 use crate::sampling::record::PathRecord;
 use crate::sampling::trace::Arrival;
@@ -23,6 +23,7 @@ pub(crate) struct PathVelocities {
     /// Rays that turn, the present one last if it is one.
     turns: Vec<RayTurn>,
     turn_parts: Vec<TurnPart>,
+    chain_parts: Vec<ChainPart>,
     /// Of the present ray.
     present: Option<u32>,
     probe: Probe,
@@ -36,6 +37,7 @@ impl PathVelocities {
             auxiliary: Vec::new(),
             turns: Vec::new(),
             turn_parts: Vec::new(),
+            chain_parts: Vec::new(),
             present: None,
             probe: Probe::new(Rng::new(0, 0, 0)),
         }
@@ -50,6 +52,7 @@ impl PathVelocities {
         self.auxiliary.clear();
         self.turns.clear();
         self.turn_parts.clear();
+        self.chain_parts.clear();
         self.present = None;
         self.vertices.push(self.field.camera());
     }
@@ -65,20 +68,77 @@ impl PathVelocities {
         dir: Vec3,
         ray: &RayPath,
     ) {
+        let end = ray.end.as_ref().map(|(point, _)| point);
+        if record.nodes[node].single {
+            let last = RayBehind { dir, distance: ray.length, end: end.copied() };
+            self.present = None;
+            self.chain(world, record, node, last);
+            return;
+        }
         let turning = TurningRay {
             viewer,
             moves: self.vertices[node].moves,
             of_camera: (node == 0).then_some(record.camera_ray),
             dir,
             distance: ray.length,
-            end: ray.end.as_ref().map(|(point, _)| point),
+            end,
             emission_alone: false,
+            tangent_plane: None,
         };
         let before = self.turn_parts.len();
         let turn = self.field.turn(world, &turning, &mut self.probe, &mut self.turn_parts);
         self.probe.turning_edges += (self.turn_parts.len() - before) as u64;
         self.present = turn.is_some().then_some(self.turns.len() as u32);
         self.turns.extend(turn);
+    }
+
+    /// Turns the ray that started a chain of smooth surfaces with what is beside the `last` ray of the chain, too, which leaves a node.
+    #[cold]
+    fn chain(&mut self, world: &World, record: &PathRecord, node: usize, last: RayBehind) {
+        let (mut first, mut links, mut rays) = (node, Vec::new(), alloc::vec![last]);
+        let arrival = loop {
+            let Some(arrival) = &record.nodes[first].arrival else { return };
+            let Some(link) = Link::at(world, &record.nodes[first]) else { return };
+            let end = Some(link.point);
+            links.push(link);
+            let parent = arrival.parent as usize;
+            if !record.nodes[parent].single {
+                break arrival;
+            }
+            rays.push(RayBehind { dir: arrival.dir, distance: arrival.distance, end });
+            first = parent;
+        };
+        links.reverse();
+        rays.reverse();
+        let parent = arrival.parent as usize;
+        let eye = world.eye_at(record.origin);
+        let start = TurningRay {
+            viewer: record.nodes[parent].vertex().unwrap_or(&eye),
+            moves: self.vertices[parent].moves,
+            of_camera: (parent == 0).then_some(record.camera_ray),
+            dir: arrival.dir,
+            distance: arrival.distance,
+            end: Some(&links[0].point),
+            emission_alone: false,
+            tangent_plane: None,
+        };
+        let chain = ChainedRay { start, links: links.clone(), rays };
+        let (parts, chained) = (&mut self.turn_parts, &mut self.chain_parts);
+        let turn = self.field.turn_with_chain(world, &chain, parts, chained);
+        let Some(turn) = turn else { return };
+        self.probe.turning_edges += (turn.parts.len() + turn.chain.len()) as u64;
+        let at = self.turns.len() as u32;
+        self.turns.push(turn);
+        self.vertices[first].turn = Some(at);
+        // They are a chain of nodes, each of which the ray before has found.
+        let mut k = node;
+        while let Some(arrival) = &record.nodes[k].arrival {
+            self.vertices[k].moves = true;
+            if k == first {
+                break;
+            }
+            k = arrival.parent as usize;
+        }
     }
 
     /// Adds that of a vertex that no ray of the record has found.
@@ -90,6 +150,13 @@ impl PathVelocities {
     /// Counts rays that were cast for the field.
     pub(crate) fn count(&mut self, rays: u64) {
         self.probe.rays += rays;
+    }
+
+    /// The walk leaves a node in a single direction, which follows from the ray that found it: nothing else moves the node.
+    pub(crate) fn leave_single(&mut self, node: usize) {
+        if self.field.follows_rays() {
+            self.vertices[node].blend = Blend::default();
+        }
     }
 
     /// How the present ray turns, if it does, by its index.
@@ -115,7 +182,11 @@ impl PathVelocities {
             arrival,
             hits,
         };
-        let velocity = self.field.vertex(world, &found, &mut self.probe, &mut self.auxiliary);
+        let mut velocity = self.field.vertex(world, &found, &mut self.probe, &mut self.auxiliary);
+        // Where a direction follows from what is before, a vertex cannot move otherwise than with the ray.
+        if record.nodes[parent].single {
+            velocity.blend = Blend::default();
+        }
         self.vertices.push(VertexVelocity { turn: self.present, ..velocity });
     }
 
@@ -146,6 +217,11 @@ impl PathVelocities {
     /// Its summands.
     pub(crate) fn turn_parts(&self, turn: &RayTurn) -> &[TurnPart] {
         &self.turn_parts[turn.parts.clone()]
+    }
+
+    /// Those from past smooth surfaces.
+    pub(crate) fn chain_parts(&self, turn: &RayTurn) -> &[ChainPart] {
+        &self.chain_parts[turn.chain.clone()]
     }
 
     /// A vertex's summands from other material points.

@@ -61,7 +61,8 @@ impl Spatial {
         self.free_paths.get(medium).copied().flatten()
     }
 
-    fn moves(&self, s: &SurfacePoint) -> bool {
+    /// Whether a surface point moves.
+    pub(crate) fn moves(&self, s: &SurfacePoint) -> bool {
         self.movers.moves(&Matter::Surface(s.material()))
     }
 }

@@ -20,9 +20,11 @@ use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use drt_math::Vec3;
+use drt_math::{Mat3, Vec3};
 
-use crate::derivative::velocity::{Blend, EdgeMatter, ShadowPart, ShadowTurn};
+use crate::derivative::velocity::{
+    Blend, EdgeMatter, Link, Mover, RayBehind, ShadowPart, ShadowTurn,
+};
 use crate::sampling::record::CameraRay;
 use crate::world::vertex::{SurfacePoint, Vertex};
 
@@ -38,6 +40,16 @@ pub(crate) struct TurnPart {
     pub(crate) divergence: Vec3,
 }
 
+/// A summand of the rate of a ray's direction that comes from something past a smooth surface, or from such a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ChainPart {
+    pub(crate) mover: Mover,
+    /// The direction's rate by the velocity of the mover; 1 / scene units.
+    pub(crate) rate: Mat3,
+    /// What its dot product with that velocity gives to div T; 1 / scene units.
+    pub(crate) divergence: Vec3,
+}
+
 /// The rate T of a ray's direction.
 #[derive(Clone, Debug)]
 pub(crate) struct RayTurn {
@@ -47,6 +59,8 @@ pub(crate) struct RayTurn {
     pub(crate) gradient: Vec3,
     /// Its summands.
     pub(crate) parts: Range<usize>,
+    /// Those of edges that the ray meets past smooth surfaces.
+    pub(crate) chain: Range<usize>,
     /// What shadows add, for the light of one emitter. Few rays have one, and turns are moved about.
     pub(crate) shadow: Option<Box<ShadowTurn>>,
 }
@@ -72,6 +86,25 @@ impl TurnParts {
     }
 }
 
+/// A ray that starts a chain of smooth surfaces, and the rays behind each of these.
+#[derive(Clone, Debug)]
+pub(crate) struct ChainedRay<'a> {
+    pub(crate) start: TurningRay<'a>,
+    pub(crate) links: Vec<Link>,
+    pub(crate) rays: Vec<RayBehind>,
+}
+
+/// A plane by the direction of the ray that ends on it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TangentPlane {
+    /// Unit, away from the ray's origin.
+    pub(crate) normal: Vec3,
+    /// Where the ray ends.
+    pub(crate) place: Vec3,
+    /// Two unit vectors across the ray, and what the normal and the place change by as the direction turns by them, per radian.
+    pub(crate) by_direction: [(Vec3, [Vec3; 2]); 2],
+}
+
 /// A ray as its turn is asked for.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TurningRay<'a> {
@@ -89,4 +122,7 @@ pub(crate) struct TurningRay<'a> {
     pub(crate) end: Option<&'a SurfacePoint>,
     /// Only the light counts that the surface there emits, and not what it scatters.
     pub(crate) emission_alone: bool,
+    /// The tangent plane there, of a smooth surface with interpolated normals, where only the light counts that goes on from it in a
+    /// single direction.
+    pub(crate) tangent_plane: Option<TangentPlane>,
 }

@@ -24,6 +24,8 @@ pub(super) struct TurningEdge {
     pub(super) on_border: bool,
     /// Between faces of a curved surface, on which vertices move with their matter.
     pub(super) facets: bool,
+    /// Between faces of a smooth body with interpolated normals, where light jumps at silhouettes alone.
+    pub(super) untracked: bool,
     /// The shape of both faces of a crease that rests on no other surface.
     pub(super) within: Option<u32>,
     /// Of a crease: the normals of its faces on one side, and whether radiance jumps seen from that side, and the other.
@@ -52,7 +54,8 @@ impl TurningEdge {
         let facets = curved && edge.crease.iter().all(|part| *part < 1.0);
         // What rests on another surface may end there.
         let within = edges.shape_of_faces(world, edge).filter(|_| !edge.edge.may_rest);
-        Self { ends, half, points, of_both, moves, on_border, facets, within, crease }
+        let untracked = facets && within.is_some_and(|shape| is_untracked(world, shape));
+        Self { ends, half, points, of_both, moves, on_border, facets, untracked, within, crease }
     }
 
     /// How one of its ends moves.
@@ -69,10 +72,18 @@ impl TurningEdge {
         match discontinuous[usize::from(front)] {
             _ if front != other => Discontinuity::Silhouette,
             false => Discontinuity::None,
+            _ if self.untracked => Discontinuity::None,
             true if self.facets => Discontinuity::Facets,
             true => Discontinuity::Crease,
         }
     }
+}
+
+/// Whether all light that a shape scatters is a continuous function of the ray that meets it, up to its silhouette.
+pub(super) fn is_untracked(world: &World, shape: u32) -> bool {
+    let bsdf = world.bsdf_of(shape);
+    let normals = world.scene.shapes[shape as usize].mesh.normals.is_some();
+    normals && bsdf.is_smooth() && !bsdf.is_partly_smooth()
 }
 
 /// What radiance does at an edge.

@@ -1,17 +1,21 @@
 //! The edges that turn rays.
 
+use alloc::collections::BTreeMap;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::convert::Infallible;
 use core::ops::ControlFlow;
 
+use drt_geom::Mesh;
 use drt_geom::edges::{Cone, ConeSegment, ConeTree};
-use drt_math::Vec3;
+use drt_math::{Mat3, Vec3};
 
 use crate::derivative::velocity::{RayTurn, TurnPart, TurningRay, Weight};
 use crate::discontinuities::discontinuity_edge::{DiscontinuityEdge, DiscontinuityEdges};
 use crate::estimators::warped::beside::Beside;
-use crate::estimators::warped::edge::TurningEdge;
+use crate::estimators::warped::edge::{TurningEdge, is_untracked};
 use crate::estimators::warped::near::Near;
+use crate::model::scene::{Scene, Shape};
 use crate::world::World;
 use crate::world::vertex::{SurfacePoint, Vertex};
 
@@ -25,6 +29,12 @@ pub(super) struct TurningEdges {
     faceted: Vec<bool>,
     /// Shapes with creases at which what they emit is the same on both sides.
     emits_alike: Vec<bool>,
+    /// Shapes at whose creases light does not jump.
+    untracked: Vec<bool>,
+    /// The gradients of the normals of smooth shapes at their vertices, where they are interpolated.
+    normal_slopes: Vec<Vec<Mat3>>,
+    /// To look these up.
+    scene: Option<Arc<Scene>>,
 }
 
 impl TurningEdges {
@@ -62,7 +72,17 @@ impl TurningEdges {
                 edges.faces_one_way(world, edge);
         }
         let emits_alike = emits_alike.into_iter().map(|alike| alike.unwrap_or(false)).collect();
-        Self { list, all, moving, faceted, emits_alike }
+        let untracked = (0..shapes.len() as u32).map(|s| is_untracked(world, s)).collect();
+        let slopes = |shape: &Shape| {
+            if world.scene.bsdfs[shape.bsdf].item.is_smooth() {
+                normal_slopes(&shape.mesh)
+            } else {
+                Vec::new()
+            }
+        };
+        let normal_slopes = shapes.iter().map(slopes).collect();
+        let scene = Some(Arc::clone(&world.scene));
+        Self { list, all, moving, faceted, emits_alike, untracked, normal_slopes, scene }
     }
 
     /// True of a ray that ends on a shape at whose creases what it emits does not jump, though what it scatters may.
@@ -70,8 +90,23 @@ impl TurningEdges {
         self.emits_alike[s.shape as usize]
     }
 
+    /// Whether light does not jump at the creases of a shape.
+    pub(super) fn is_untracked(&self, shape: u32) -> bool {
+        self.untracked[shape as usize]
+    }
+
+    /// The gradients of the normals at the corners of a smooth surface, where they are interpolated.
+    pub(super) fn normal_slopes(&self, s: &SurfacePoint) -> Option<[Mat3; 3]> {
+        let slopes = &self.normal_slopes[s.shape as usize];
+        let mesh = &self.scene.as_ref()?.shapes[s.shape as usize].mesh;
+        let corners = mesh.triangles[s.triangle as usize];
+        (!slopes.is_empty()).then(|| corners.map(|v| slopes[v as usize]))
+    }
+
     fn near(&self, ray: &TurningRay<'_>, angle: f64) -> Near {
-        let alike = |s: &SurfacePoint| ray.emission_alone && self.emission_turns_apart(s);
+        let alike = |s: &SurfacePoint| {
+            ray.tangent_plane.is_some() || (ray.emission_alone && self.emission_turns_apart(s))
+        };
         let creases_of = ray.end.filter(|s| !alike(s)).map(|s| s.shape);
         let facets = creases_of.is_some_and(|shape| self.faceted[shape as usize]);
         Near::of_ray(ray, angle, creases_of, facets)
@@ -95,6 +130,30 @@ impl TurningEdges {
         tree.visit(&cone, &cone, |_| ControlFlow::Break(())).is_break()
     }
 
+    /// Tells all edges in a cone, and some beside it.
+    pub(super) fn visit_all<B>(
+        &self,
+        cone: &Cone,
+        mut found: impl FnMut(&TurningEdge) -> ControlFlow<B>,
+    ) -> ControlFlow<B> {
+        self.all.visit(cone, cone, |i| found(&self.list[i as usize]))
+    }
+
+    /// Whether an edge that moves has a weight beside a ray.
+    pub(super) fn moves_beside(&self, ray: &TurningRay<'_>, angle: f64) -> bool {
+        self.any_moves_near(&self.near(ray, angle))
+    }
+
+    fn any_moves_near(&self, near: &Near) -> bool {
+        let any = self.moving.visit(&near.cone, &near.narrow, |i| {
+            match near.weight(&self.list[i as usize]) {
+                Some(_) => ControlFlow::Break(()),
+                None => ControlFlow::Continue(()),
+            }
+        });
+        any.is_break()
+    }
+
     /// How edges within an `angle` of a ray turn it, besides what does not turn with a weight of `rest` beside 1. Without any
     /// that moves, unless `always` or the viewer moves, they do not.
     pub(super) fn turn(
@@ -106,16 +165,8 @@ impl TurningEdges {
         parts: &mut Vec<TurnPart>,
     ) -> Option<RayTurn> {
         let near = self.near(ray, angle);
-        if !(ray.moves || always) {
-            let any = self.moving.visit(&near.cone, &near.narrow, |i| {
-                match near.weight(&self.list[i as usize]) {
-                    Some(_) => ControlFlow::Break(()),
-                    None => ControlFlow::Continue(()),
-                }
-            });
-            if any.is_continue() {
-                return None;
-            }
+        if !(ray.moves || always || self.any_moves_near(&near)) {
+            return None;
         }
         let first = parts.len();
         let sum = self.gather(&near, ray.moves, parts);
@@ -125,7 +176,7 @@ impl TurningEdges {
         let total = Weight::constant(1.0) + sum + rest;
         divide(&mut parts[first..], ray.dir, total);
         let Weight { value: weight, gradient } = sum / total;
-        Some(RayTurn { weight, gradient, parts: first..parts.len(), shadow: None })
+        Some(RayTurn { weight, gradient, parts: first..parts.len(), chain: 0..0, shadow: None })
     }
 
     /// Adds up the weights of edges beside a ray, and what they turn it by if these were divided by 1.
@@ -180,6 +231,42 @@ impl TurningEdges {
         });
         debug_assert!(all.is_continue());
     }
+}
+
+/// The gradient of a mesh's unit normals by the place at each vertex, 1 / scene units: the mean of those in the middle of the triangles
+/// around it, by their areas. Vertices at one place that have one normal, as along seams of texture coordinates, count as one. Empty of
+/// a mesh without normals.
+fn normal_slopes(mesh: &Mesh) -> Vec<Mat3> {
+    let Some(normals) = &mesh.normals else { return Vec::new() };
+    let key = |v: usize| {
+        let [x, n] = [mesh.positions[v], normals[v]];
+        [x, n].map(|v| v.to_array().map(f64::to_bits))
+    };
+    let mut sums = BTreeMap::new();
+    for (t, corners) in (0..).zip(&mesh.triangles) {
+        let [a, b, c] = mesh.triangle(t);
+        let area = (b - a).cross(c - a).length();
+        let [i, j, k] = corners.map(|v| normals[v as usize]);
+        let sum = (i + j + k) * (1.0 / 3.0);
+        let [g, h] = mesh.barycentric_gradients(t);
+        let n = sum.normalize();
+        let [along_g, along_h] = [j - i, k - i].map(|d| d.reject(n) * (area / sum.length()));
+        let cols = [Vec3::X, Vec3::Y, Vec3::Z].map(|e| along_g * g.dot(e) + along_h * h.dot(e));
+        let slope = Mat3 { cols };
+        if !slope.is_finite() {
+            continue;
+        }
+        for v in corners {
+            let (total, weight) = sums.entry(key(*v as usize)).or_insert((Mat3::ZERO, 0.0));
+            *total = *total + slope;
+            *weight += area;
+        }
+    }
+    let mean = |v: usize| match sums.get(&key(v)) {
+        Some((total, weight)) if *weight > 0.0 => *total * weight.recip(),
+        _ => Mat3::ZERO,
+    };
+    (0..mesh.positions.len()).map(mean).collect()
 }
 
 /// Divides what turns a ray by the sum of all weights.

@@ -98,6 +98,7 @@
 //! left to the path-space estimator where something moves; the plan of a [`Session`](crate::Session) says so.
 
 mod auxiliary;
+mod behind;
 mod beside;
 mod edge;
 mod edges;
@@ -217,6 +218,7 @@ fn refuse(world: &World, warp: Warp, any: bool) -> Result<(), Error> {
     let reason = match warp {
         Warp::Edges => return Ok(()),
         _ if !surfaces_only => SettingError::SurfacesOnly,
+        _ if any && world.scene.first_smooth().is_some() => SettingError::SmoothSurfaces,
         _ if any && world.camera.aperture().is_some() => SettingError::Aperture,
         _ if any && world.lights.has_image() => SettingError::VaryingSky,
         Warp::Directions(_) if world.camera.has_borders() => SettingError::JumpingFilter,

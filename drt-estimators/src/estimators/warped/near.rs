@@ -3,7 +3,7 @@
 use drt_geom::edges::Cone;
 use drt_math::{Real, Vec3, fm};
 
-use crate::derivative::velocity::{TurningRay, Weight};
+use crate::derivative::velocity::{TangentPlane, TurningRay, Weight};
 use crate::estimators::warped::beside::Beside;
 use crate::estimators::warped::edge::{Discontinuity, TurningEdge};
 
@@ -11,10 +11,10 @@ use crate::estimators::warped::edge::{Discontinuity, TurningEdge};
 pub(super) const ANGLE: f64 = 0.1;
 
 /// How far behind the plane of the surface where a ray ends edges turn it, over their distances.
-const BEHIND: f64 = 0.02;
+pub(super) const BEHIND: f64 = 0.02;
 
 /// How far creases between the faces of curved surfaces turn rays, over what other edges do.
-const NARROW: f64 = 0.1;
+pub(super) const NARROW: f64 = 0.1;
 
 /// What the weight of an edge depends on besides the edge.
 pub(super) struct Near {
@@ -39,6 +39,8 @@ pub(super) struct Near {
     depth: f64,
     /// How far the ray goes, where it ends on facets whose planes do not count.
     length: Option<Weight>,
+    /// The tangent plane there, in place of both.
+    tangent_plane: Option<TangentPlane>,
     /// The shape where the ray ends, if creases of it count.
     creases_of: Option<u32>,
     /// No crease counts.
@@ -76,6 +78,7 @@ impl Near {
             horizon: viewer.surface().map(|s| along(s.ng)),
             normal,
             // At creases that do not count, what is behind must not jump with the plane.
+            tangent_plane: ray.tangent_plane,
             length: end.filter(|_| creases_of.is_none()).map(|_| {
                 let gradient = normal.reject(dir) * (-distance / normal.dot(dir));
                 Weight { value: distance, gradient }
@@ -117,6 +120,7 @@ impl Near {
             normal,
             depth: normal.dot(x - from),
             length: None,
+            tangent_plane: None,
             creases_of: None,
             silhouettes_only: true,
             of_camera: false,
@@ -126,6 +130,14 @@ impl Near {
     /// How far the nearest point of an edge, which goes from one end along a `side`, is behind the plane of the surface where the
     /// ray ends, or farther away than that.
     fn behind(&self, beside: &Beside, side: Vec3) -> Weight {
+        if let Some(TangentPlane { normal, place, by_direction }) = self.tangent_plane {
+            let beyond = beside.place + self.from - place;
+            let mut gradient = beside.along.gradient * normal.dot(side);
+            for (across, [by_normal, by_place]) in by_direction {
+                gradient += across * (by_normal.dot(beyond) - normal.dot(by_place));
+            }
+            return Weight { value: normal.dot(beyond), gradient };
+        }
         match self.length {
             Some(length) => beside.distance - length,
             None => {

@@ -125,6 +125,7 @@ impl TurningEdges {
             weight,
             gradient,
             parts: first..edges.len(),
+            chain: 0..0,
             shadow: Some(Box::new(shadow)),
         })
     }

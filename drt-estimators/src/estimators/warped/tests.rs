@@ -1,5 +1,7 @@
 //! Derivatives without samples of edges are those with them, and what is wrong with a field is found.
 
+mod chains;
+
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
@@ -12,8 +14,8 @@ use crate::derivative::contraction::Motion;
 use crate::derivative::tests::choice::{LIGHT, MOMENT, Sum, derivative, prepare_lit};
 use crate::derivative::tests::scenes::*;
 use crate::derivative::velocity::{
-    Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurnParts, TurningRay,
-    VelocityField, VertexVelocity, Weight,
+    Auxiliary, Blend, ChainPart, ChainedRay, Found, Probe, RayTurn, Spatial, TurnPart, TurnParts,
+    TurningRay, VelocityField, VertexVelocity, Weight,
 };
 use crate::model::emitter::Emitter;
 use crate::model::scene::Scene;
@@ -83,6 +85,32 @@ impl VelocityField for Faulty {
         Some(turn)
     }
 
+    fn turn_with_chain(
+        &self,
+        world: &World,
+        chain: &ChainedRay<'_>,
+        parts: &mut Vec<TurnPart>,
+        chained: &mut Vec<ChainPart>,
+    ) -> Option<RayTurn> {
+        let turn = self.field.turn_with_chain(world, chain, parts, chained)?;
+        for part in &mut chained[turn.chain.clone()] {
+            match self.fault {
+                Fault::Divergence => part.divergence = Vec3::ZERO,
+                Fault::Sign => {
+                    part.rate = part.rate * -1.0;
+                    part.divergence = -part.divergence;
+                }
+                Fault::Weight => {
+                    part.rate = part.rate * 0.8;
+                    part.divergence *= 0.8;
+                }
+                // A frozen one.
+                Fault::Direction => (part.rate, part.divergence) = (Mat3::ZERO, Vec3::ZERO),
+            }
+        }
+        Some(turn)
+    }
+
     fn turn_with_shadows(
         &self,
         world: &World,
@@ -121,16 +149,25 @@ fn compare_lit(lit: EmitterMask, scene: &Scene, motion: &Parameter, sum: Sum, fa
         _ => (EstimatorKind::Radiative, 4),
     };
     let by = |kind| prepare_lit(kind, lit, scene, motion, depth);
-    let reference = derivative(sum, &by(other));
+    assert_found(&derivative(sum, &by(other)), sum, || by(EstimatorKind::Warped), faults);
+}
+
+/// Asserts that a derivative is what another one is, and that it is not with faults.
+fn assert_found(
+    reference: &Moments,
+    sum: Sum,
+    warped: impl Fn() -> (Prepared, Motion),
+    faults: &[Fault],
+) {
     let off = |prepared: &(Prepared, Motion)| {
         let own: Moments = derivative(sum, prepared);
         let error = f64::sqrt(own.variance_of_mean() + reference.variance_of_mean());
         ((own.mean() - reference.mean()) / error, error / reference.mean())
     };
-    let fair = off(&by(EstimatorKind::Warped));
+    let fair = off(&warped());
     assert!(fair.0.abs() < 4.0 && fair.1.abs() < 0.1, "{fair:?}");
     for fault in faults {
-        let (mut prepared, motion) = by(EstimatorKind::Warped);
+        let (mut prepared, motion) = warped();
         let field = Arc::clone(&prepared.terms.velocity);
         prepared.terms.velocity = Arc::new(Faulty { field, fault: *fault });
         let faulty = off(&(prepared, motion));

@@ -7,10 +7,11 @@ use drt_math::Vec3;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::{
-    Auxiliary, Blend, Found, Probe, RayTurn, Spatial, TurnPart, TurnParts, TurningRay,
-    VelocityField, VertexVelocity, Weight,
+    Auxiliary, Blend, ChainPart, ChainedRay, Found, Probe, RayTurn, Spatial, TurnPart, TurnParts,
+    TurningRay, VelocityField, VertexVelocity, Weight,
 };
-use crate::estimators::warped::edges::TurningEdges;
+use crate::estimators::warped::behind::TurnedBehind;
+use crate::estimators::warped::edges::{TurningEdges, divide};
 use crate::estimators::warped::near::ANGLE;
 use crate::estimators::warped::shadows::Flow;
 use crate::sampling::record::CameraRay;
@@ -125,6 +126,35 @@ impl VelocityField for EdgeTurns {
         }
         let (angle, rest) = around(world, ray);
         self.edges.turn(ray, angle, rest, always, parts)
+    }
+
+    fn turn_with_chain(
+        &self,
+        world: &World,
+        chain: &ChainedRay<'_>,
+        parts: &mut Vec<TurnPart>,
+        chained: &mut Vec<ChainPart>,
+    ) -> Option<RayTurn> {
+        let tangent_plane = TurnedBehind::tangent_plane(chain);
+        let start = &TurningRay { tangent_plane, ..chain.start };
+        let (angle, rest) = around(world, start);
+        let behind =
+            TurnedBehind::new(world, &self.edges, chain, angle, |point| self.spatial.moves(point));
+        if !(behind.moves || start.moves || self.edges.moves_beside(start, angle)) {
+            return None;
+        }
+        let first = [parts.len(), chained.len()];
+        let beside = self.edges.gather_beside(start, angle, parts);
+        let all = behind.by_u(&beside) + behind.sum;
+        if all.re == 0.0 {
+            return None;
+        }
+        let total = all + behind.by_u(&(Weight::constant(1.0) + rest));
+        divide(&mut parts[first[0]..], start.dir, behind.by_direction(total));
+        chained.extend(behind.finish(total));
+        let Weight { value: weight, gradient } = behind.by_direction(all / total);
+        let [parts, chain] = [first[0]..parts.len(), first[1]..chained.len()];
+        Some(RayTurn { weight, gradient, parts, chain, shadow: None })
     }
 
     fn emission_turns_apart(&self, s: &SurfacePoint) -> bool {

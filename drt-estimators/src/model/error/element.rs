@@ -47,14 +47,23 @@ pub enum ElementError {
     /// A shape carries an emitter of another kind than area.
     #[error("it carries an emitter of type `{0}`; only those of type `area` belong on shapes")]
     NotAnArea(&'static str),
-    /// A smooth surface where something that moves is to be differentiated.
+    /// A point or directional emitter where something that moves is to be differentiated past a smooth surface.
     #[error(
-        "its BSDF, {bsdf}, is smooth, and `{parameter}` moves something: it cannot be differentiated where light may be \
-         reflected or refracted by it; make it rough, or use finite differences"
+        "its light comes from a point or a direction, and `{parameter}` moves something: the shadows that are seen past the smooth \
+         surface `{surface}` cannot be differentiated; give the light a size, make the surface rough, or use finite differences"
     )]
-    Smooth {
-        /// Kind of BSDF, by its plugin name.
-        bsdf: &'static str,
+    DeltaLightPastSmooth {
+        /// The parameter, or what else was to be differentiated by.
+        parameter: String,
+        /// The first smooth surface.
+        surface: String,
+    },
+    /// A smooth surface that emits, where something that moves is to be differentiated.
+    #[error(
+        "it emits and is smooth, and `{parameter}` moves something: what it emits and what it reflects move apart; let another \
+         shape emit, make it rough, or use finite differences"
+    )]
+    SmoothEmitter {
         /// The parameter, or what else was to be differentiated by.
         parameter: String,
     },

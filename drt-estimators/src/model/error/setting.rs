@@ -79,6 +79,9 @@ pub enum SettingError {
         "bidirectional sampling has no derivatives past smooth surfaces, as `{0}` is; use unidirectional"
     )]
     Smooth(alloc::string::String),
+    /// A [`Warp`](crate::Warp) by auxiliary samples, past a smooth surface.
+    #[error("auxiliary points and directions are not for scenes with smooth surfaces")]
+    SmoothSurfaces,
     /// A [`Warp`](crate::Warp) that the pixel filter does not allow.
     #[error("auxiliary directions need a pixel filter that does not jump: tent or gaussian")]
     JumpingFilter,

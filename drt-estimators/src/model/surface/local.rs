@@ -12,7 +12,7 @@ use drt_math::{Real, Rgb, RgbVec, Vec3};
 
 use crate::model::surface::{
     Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given, RoughnessPartner,
-    SpecularSample,
+    SpecularSample, SpecularValue,
 };
 use crate::model::texture::TexturePoint;
 
@@ -68,8 +68,7 @@ impl LocalBsdf<'_> {
     /// material, of the weight that [`Self::sample_specular`] gives it.
     #[inline(always)]
     pub(crate) fn gradient(&self, wo: Vec3, wi: Vec3) -> (BsdfGradient, RgbVec) {
-        let single = self.bsdf.specular(self.at.as_ref(), wo, wi, self.ns);
-        if let Some(params) = single.and_then(|found| found.of_weight()) {
+        if let Some(SpecularValue { params, .. }) = self.specular(wo, wi) {
             return (BsdfGradient { params, ..BsdfGradient::default() }, RgbVec::ZERO);
         }
         let mut d = self.bsdf.gradient_at(self.at.as_ref(), wo, wi, self.ns);
@@ -85,6 +84,26 @@ impl LocalBsdf<'_> {
             d.value *= factor;
         }
         (d, by_ng)
+    }
+
+    /// The weight that [`Self::sample_specular`] gives a single direction; `None` of others.
+    pub(crate) fn specular(&self, wo: Vec3, wi: Vec3) -> Option<SpecularValue> {
+        self.bsdf.specular(self.at.as_ref(), wo, wi, self.ns)?.of_weight()
+    }
+
+    /// The probability with which [`Self::sample_specular`] draws any direction.
+    pub(crate) fn single_chance(&self, from: Vec3) -> f64 {
+        self.bsdf.single_chance(self.at.as_ref(), from, self.ns)
+    }
+
+    /// Light is scattered into single directions, and other light into all directions of a solid angle.
+    pub(crate) fn is_partly_smooth(&self) -> bool {
+        self.bsdf.is_partly_smooth()
+    }
+
+    /// The shading normal.
+    pub(crate) fn normal(&self) -> Vec3 {
+        self.ns
     }
 
     /// The gradient of the value by the place of the point, as far as textures change there; `params` holds its
@@ -104,8 +123,8 @@ impl LocalBsdf<'_> {
         self.bsdf.sample_at(self.at.as_ref(), from, self.ns, u, given)
     }
 
-    /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`]. These do not fade: nothing that moves
-    /// is differentiated there, and light that goes about in glass meets so many horizons that it would lose one percent.
+    /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`]. These do not fade: light that goes
+    /// about in glass meets so many horizons that it would lose one percent.
     #[inline]
     pub(crate) fn sample_specular(
         &self,

@@ -100,7 +100,7 @@ pub use crate::model::surface::rough_diffuse::RoughDiffuse;
 pub(crate) use crate::model::surface::roughness_partner::RoughnessPartner;
 pub use crate::model::surface::smooth_conductor::Conductor;
 pub use crate::model::surface::smooth_dielectric::Dielectric;
-pub(crate) use crate::model::surface::specular::SpecularValue;
+pub(crate) use crate::model::surface::specular::{Bend, SpecularValue};
 pub use crate::model::surface::thin_dielectric::ThinDielectric;
 pub use crate::model::surface::ward::{Ward, WardVariant};
 use crate::model::texture::TexturePoint;
@@ -309,6 +309,11 @@ impl Bsdf {
         given: Given,
     ) -> Option<SpecularSample> {
         each!(self, b => b.sample_specular(at, from, n, choice, given))
+    }
+
+    /// The probability with which [`Bsdf::sample_specular`] draws any direction.
+    pub(crate) fn single_chance(&self, at: At<'_>, from: Vec3, n: Vec3) -> f64 {
+        each!(self, b => b.single_chance(at, from, n))
     }
 
     /// What is scattered from `wo` into the single direction `wi`; `None` where it is none.

@@ -106,6 +106,8 @@ pub(super) struct Flags {
     pub(super) smooth: bool,
     /// Some light goes straight on, as through nothing.
     pub(super) straight: bool,
+    /// Some light is scattered into all directions of a solid angle.
+    pub(super) spread: bool,
     /// Directions along the surface are told apart, by its texture coordinates.
     pub(super) oriented: bool,
     /// The value may be differentiated where something moves: it has no jumps besides those that boundary terms sample, and its
@@ -121,6 +123,7 @@ impl Flags {
         transmissive: false,
         smooth: false,
         straight: false,
+        spread: true,
         oriented: false,
         differentiable: true,
     };
@@ -137,6 +140,7 @@ impl Flags {
             transmissive: self.transmissive || other.transmissive,
             smooth: self.smooth || other.smooth,
             straight: self.straight || other.straight,
+            spread: self.spread || other.spread,
             oriented: self.oriented || other.oriented,
             differentiable: self.differentiable && other.differentiable,
         }
@@ -208,6 +212,12 @@ pub(super) trait Model {
         _given: Given,
     ) -> Option<SpecularSample> {
         None
+    }
+
+    /// The probability with which `sample_specular` draws any direction.
+    #[inline]
+    fn single_chance(&self, _at: At<'_>, _from: Vec3, _n: Vec3) -> f64 {
+        0.0
     }
 
     /// What is scattered from `wo` into the single direction `wi`.

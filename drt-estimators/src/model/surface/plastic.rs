@@ -1,7 +1,7 @@
 use core::f64::consts::FRAC_1_PI;
 
 use drt_geom::edges::{Lobe, Lobes};
-use drt_math::{Frame, Real, Rgb, Vec3, warp};
+use drt_math::{Dual, Frame, Real, Rgb, Vec3, warp};
 
 use crate::model::surface::angles::Angles;
 use crate::model::surface::coating::Coating;
@@ -12,7 +12,7 @@ use crate::model::surface::microfacet::mirrored;
 use crate::model::surface::model::{Dependence, Flags, Model, Numbers};
 use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError, nonnegative};
-use crate::model::surface::specular::same;
+use crate::model::surface::specular::{Bend, same};
 use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
 
 /// A diffuse base under a dielectric coating: Mitsuba's `plastic` and `roughplastic`; black from
@@ -153,18 +153,22 @@ impl Model for Plastic {
         }
     }
 
+    fn single_chance(&self, _: At<'_>, from: Vec3, n: Vec3) -> f64 {
+        let cos = n.dot(from);
+        if self.is_smooth() && cos > 0.0 { self.specular_choice(cos) } else { 0.0 }
+    }
+
     #[inline(never)]
     fn sample_specular(
         &self,
-        _: At<'_>,
+        at: At<'_>,
         from: Vec3,
         n: Vec3,
         choice: f64,
         _: Given,
     ) -> Option<SpecularSample> {
         let cos = n.dot(from);
-        let probability =
-            if self.is_smooth() && cos > 0.0 { self.specular_choice(cos) } else { 0.0 };
+        let probability = self.single_chance(at, from, n);
         (choice < probability).then(|| {
             let fresnel = dielectric_reflected(cos.min(1.0), self.coating.eta());
             let weight = self.specular_reflectance * (fresnel / probability);
@@ -178,10 +182,16 @@ impl Model for Plastic {
         if !self.is_smooth() || cos <= 0.0 || !same(mirrored(wo, n), wi) {
             return None;
         }
-        let fresnel = dielectric_reflected(cos.min(1.0), self.coating.eta());
-        let params = BsdfParams::of(Property::SpecularReflectance, Rgb::splat(fresnel));
-        let value = self.specular_reflectance * fresnel;
-        Some(SpecularValue { value, params, probability: self.specular_choice(cos) })
+        let eta = Dual::from(self.coating.eta());
+        let fresnel = dielectric_reflected(Dual::variable(cos.min(1.0), 0), eta);
+        let Dual { re: fresnel, eps: [by_cosine] } = fresnel;
+        Some(SpecularValue {
+            value: self.specular_reflectance * fresnel,
+            params: BsdfParams::of(Property::SpecularReflectance, Rgb::splat(fresnel)),
+            probability: self.specular_choice(cos),
+            by_cosine: self.specular_reflectance * by_cosine,
+            bend: Bend::Mirror,
+        })
     }
 
     fn lobes(&self, _: At<'_>, wo: Vec3, n: Vec3) -> Lobes {

@@ -9,7 +9,7 @@ use crate::model::surface::microfacet::mirrored;
 use crate::model::surface::model::{Constants, Dependence, Flags, Lanes, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
-use crate::model::surface::specular::{same, scatters_into_single_directions};
+use crate::model::surface::specular::{Bend, same, scatters_into_single_directions};
 use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
 
 /// A smooth metal: Mitsuba's `conductor`. Black from behind.
@@ -32,10 +32,10 @@ impl Default for Conductor {
 
 impl Conductor {
     /// What is reflected at a cosine, over any scalar.
-    fn reflected<T: Real>(&self, numbers: impl Numbers<T>, cos: f64) -> Rgb<T> {
+    fn reflected<T: Real>(&self, numbers: impl Numbers<T>, cos: T) -> Rgb<T> {
         let eta = numbers.colour(Property::Eta, self.eta);
         let k = numbers.colour(Property::K, self.k);
-        let reflected = |eta, k| conductor_reflected(T::from(cos), eta, k);
+        let reflected = |eta, k| conductor_reflected(cos, eta, k);
         numbers.colour(Property::SpecularReflectance, self.specular_reflectance)
             * Rgb::new(reflected(eta.r, k.r), reflected(eta.g, k.g), reflected(eta.b, k.b))
     }
@@ -48,7 +48,7 @@ impl Model for Conductor {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags { smooth: true, ..Flags::REFLECTOR }
+        Flags { smooth: true, spread: false, ..Flags::REFLECTOR }
     }
 
     scatters_into_single_directions!(SpecularReflectance, Eta, K);
@@ -89,7 +89,10 @@ impl Model for Conductor {
             return None;
         }
         let properties = self.differentiated();
-        let value: Rgb<Dual<f64, 3>> = self.reflected(Lanes::<0>::new(properties), cos);
-        Some(SpecularValue::by_duals(properties, value, 1.0))
+        let lanes = Lanes::<0>::new(properties);
+        let value: Rgb<Dual<f64, 3>> = self.reflected(lanes, Dual::from(cos));
+        let turned: Rgb<Dual<f64, 1>> = self.reflected(Constants, Dual::variable(cos, 0));
+        let by_cosine = turned.map(|c| c.eps[0]);
+        Some(SpecularValue::by_duals(properties, value, by_cosine, 1.0, Bend::Mirror))
     }
 }

@@ -8,7 +8,7 @@ use crate::model::surface::microfacet::{mirrored, refracted};
 use crate::model::surface::model::{Dependence, Flags, Lanes, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
-use crate::model::surface::specular::{same, scatters_into_single_directions};
+use crate::model::surface::specular::{Bend, same, scatters_into_single_directions};
 use crate::model::surface::textures::Textures;
 use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
 
@@ -64,7 +64,7 @@ impl Model for Dielectric {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags { smooth: true, ..Flags::INTERFACE }
+        Flags { smooth: true, spread: false, ..Flags::INTERFACE }
     }
 
     scatters_into_single_directions!(SpecularReflectance, SpecularTransmittance);
@@ -115,7 +115,9 @@ impl Model for Dielectric {
     fn specular(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
         let cos = n.dot(wo);
         let (n, eta) = if cos > 0.0 { (n, self.eta) } else { (-n, self.eta.recip()) };
-        let reflected = dielectric_reflected(cos.abs(), eta);
+        let side = cos.signum();
+        let reflected = dielectric_reflected(Dual::variable(cos.abs(), 0), Dual::from(eta));
+        let Dual { re: reflected, eps: [by_cosine] } = reflected;
         let properties = self.differentiated();
         let colour = |property, colour| -> Rgb<Dual<f64, 2>> {
             Lanes::<0>::new(properties).colour(property, colour)
@@ -123,12 +125,21 @@ impl Model for Dielectric {
         if same(mirrored(wo, n), wi) {
             let value = colour(Property::SpecularReflectance, self.specular_reflectance)
                 * Dual::from(reflected);
-            return Some(SpecularValue::by_duals(properties, value, reflected));
+            let by_cosine = self.specular_reflectance * (by_cosine * side);
+            return Some(SpecularValue::by_duals(
+                properties,
+                value,
+                by_cosine,
+                reflected,
+                Bend::Mirror,
+            ));
         }
         refracted(wo, n, eta).filter(|(w, _)| same(*w, wi))?;
         let through = (1.0 - reflected) / (eta * eta);
         let value = colour(Property::SpecularTransmittance, self.specular_transmittance)
             * Dual::from(through);
-        Some(SpecularValue::by_duals(properties, value, 1.0 - reflected))
+        let by_cosine = self.specular_transmittance * (-by_cosine * side / (eta * eta));
+        let bend = Bend::Refraction(eta);
+        Some(SpecularValue::by_duals(properties, value, by_cosine, 1.0 - reflected, bend))
     }
 }

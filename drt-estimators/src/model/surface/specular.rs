@@ -3,15 +3,17 @@
 //! A walk that draws one of the single directions of a surface, with the probability P_i, goes on with the weight V_i / P_i. Its
 //! derivative is ∂V_i / P_i: as of any sample, the density counts as a constant. Parts i of a surface that share a direction are
 //! told apart by nothing that the walk leaves behind; given the direction, the mean of ∂V_i / P_i over them is Σ ∂V_i / Σ P_i,
-//! which is taken: as unbiased, and of no more variance. Where an index of refraction turns the direction, there is more to the
-//! derivative, which nothing here has.
+//! which is taken: as unbiased, and of no more variance.
+//!
+//! As a point of the surface, its normal or the direction that light arrives from moves, the single direction moves with them. It is a
+//! function w(wo, n) that a [`Bend`] tells; the value is a function of the cosine n·wo, besides what textures do.
 
-use drt_math::{Dual, Rgb, Vec3};
+use drt_math::{Dual, Real, Rgb, RgbVec, Vec3, vec3};
 
 use crate::model::surface::params::{BsdfParams, PropertySet};
 
 /// The methods by which a [`Model`](super::model::Model) answers that scatters light into single directions only: nothing is in its value,
-/// and no sampler asks for a sketch of it, as nothing that moves is differentiated at such surfaces. The arguments are the properties that
+/// and no sampler asks for a sketch of it, as nothing that moves is sampled at edges beside such surfaces. The arguments are the properties that
 /// the model is differentiated by. A file that uses this imports the types that these methods have in `Model`.
 macro_rules! scatters_into_single_directions {
     ($($property:ident),+) => {
@@ -41,6 +43,10 @@ macro_rules! scatters_into_single_directions {
             0.0
         }
 
+        fn single_chance(&self, _: At<'_>, _: Vec3, _: Vec3) -> f64 {
+            1.0
+        }
+
         fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
             Lobes::even(0.0)
         }
@@ -62,6 +68,59 @@ pub(crate) struct SpecularValue {
     pub(crate) params: BsdfParams,
     /// The probability of drawing the direction, given `wo`.
     pub(crate) probability: f64,
+    /// The value's derivative by the cosine of `wo` with the normal, whose sign tells the sides apart.
+    pub(crate) by_cosine: Rgb,
+    /// How the direction follows from `wo` and the normal.
+    pub(crate) bend: Bend,
+}
+
+/// How a single direction follows from the one where light leaves to, and from the normal.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum Bend {
+    /// Straight on, as if there was no surface.
+    #[default]
+    Straight,
+    /// Reflected.
+    Mirror,
+    /// Refracted, by an index on the side of the light's direction over that on the other.
+    Refraction(f64),
+}
+
+impl Bend {
+    /// The direction of a ray that goes on from a surface, where it arrives along the unit direction `w`; n is the unit normal, on
+    /// either side. All angles of refraction exist: asked for others, it tells that along the surface.
+    pub(crate) fn onward<T: Real>(self, w: Vec3<T>, n: Vec3<T>) -> Vec3<T> {
+        let cos = n.dot(w);
+        match self {
+            Self::Straight => w,
+            Self::Mirror => w - n * (cos * 2.0),
+            Self::Refraction(eta) => {
+                let beyond = T::one() - (T::one() - cos.squared()) / (eta * eta);
+                let beyond = if beyond.re() > 0.0 { beyond.sqrt() } else { T::zero() };
+                let beyond = if cos.re() < 0.0 { -beyond } else { beyond };
+                w / T::from(eta) + n * (beyond - cos / T::from(eta))
+            }
+        }
+    }
+
+    /// Sensitivities by w and by n, from those by the direction [`onward`](Self::onward).
+    pub(crate) fn pull(self, w: Vec3, n: Vec3, g: RgbVec) -> (RgbVec, RgbVec) {
+        let inputs = |v: Vec3, first: usize| -> Vec3<Dual<f64, 6>> {
+            let [x, y, z] = v.to_array();
+            [(x, 0), (y, 1), (z, 2)].map(|(v, k)| Dual::variable(v, first + k)).into()
+        };
+        let onward = self.onward(inputs(w, 0), inputs(n, 3));
+        let by = |first: usize| {
+            g.map(|g| {
+                let lane = |k: usize| {
+                    let [x, y, z] = onward.to_array().map(|c| c.eps[first + k]);
+                    vec3(x, y, z).dot(g)
+                };
+                vec3(lane(0), lane(1), lane(2))
+            })
+        };
+        (by(0), by(3))
+    }
 }
 
 impl SpecularValue {
@@ -69,22 +128,30 @@ impl SpecularValue {
     pub(super) fn by_duals<const N: usize>(
         properties: PropertySet,
         value: Rgb<Dual<f64, N>>,
+        by_cosine: Rgb,
         probability: f64,
+        bend: Bend,
     ) -> Self {
         let params = BsdfParams::from_ranks(properties, |k| value.map(|c| c.eps[k]));
-        Self { value: value.map(|c| c.re), params, probability }
+        let value = value.map(|c| c.re);
+        Self { value, params, probability, bend, by_cosine }
     }
 
     /// The value times a factor, where the direction is drawn with another factor of the probability.
     pub(super) fn scaled(&self, value: Rgb, probability: f64) -> Self {
         let params = self.params.scaled(value);
-        Self { value: self.value * value, params, probability: self.probability * probability }
+        Self {
+            value: self.value * value,
+            params,
+            probability: self.probability * probability,
+            by_cosine: self.by_cosine * value,
+            bend: self.bend,
+        }
     }
 
-    /// The derivatives of a walk's weight by the properties; `None` where nothing draws the direction.
-    pub(super) fn of_weight(&self) -> Option<BsdfParams> {
-        let inverse = Rgb::splat(self.probability.recip());
-        (self.probability > 0.0).then(|| self.params.scaled(inverse))
+    /// The walk's weight in place of the value, with its derivatives; `None` where nothing draws the direction.
+    pub(super) fn of_weight(&self) -> Option<Self> {
+        (self.probability > 0.0).then(|| self.scaled(Rgb::splat(self.probability.recip()), 1.0))
     }
 }
 

@@ -9,7 +9,7 @@ use crate::model::surface::model::{Dependence, Flags, Lanes, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::property::{Property, Slot, SurfaceError};
 use crate::model::surface::smooth_dielectric::{GLASS, check, slot};
-use crate::model::surface::specular::{same, scatters_into_single_directions};
+use crate::model::surface::specular::{Bend, same, scatters_into_single_directions};
 use crate::model::surface::{At, BsdfGradient, Given, SpecularSample, SpecularValue};
 
 /// A pane so thin that light goes straight through it, with all reflections inside of it: Mitsuba's
@@ -46,7 +46,7 @@ impl Model for ThinDielectric {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags { smooth: true, straight: true, ..Flags::INTERFACE }
+        Flags { smooth: true, straight: true, spread: false, ..Flags::INTERFACE }
     }
 
     scatters_into_single_directions!(SpecularReflectance, SpecularTransmittance, Eta);
@@ -84,20 +84,33 @@ impl Model for ThinDielectric {
 
     #[inline(never)]
     fn specular(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
+        let side = n.dot(wo).signum();
         let cos = n.dot(wo).abs().min(1.0);
         let properties = self.differentiated();
         let numbers = Lanes::<0>::new(properties);
         let eta: Dual<f64, 3> = numbers.number(Property::Eta, self.eta);
         let reflected = reflected_by_pane(Dual::from(cos), eta);
+        let turned = reflected_by_pane(Dual::variable(cos, 0), Dual::from(self.eta));
+        let [by_cosine] = turned.eps.map(|slope: f64| slope * side);
         if same(-wo, wi) {
             let through = Dual::one() - reflected;
             let colour =
                 numbers.colour(Property::SpecularTransmittance, self.specular_transmittance);
-            return Some(SpecularValue::by_duals(properties, colour * through, through.re));
+            let by_cosine = self.specular_transmittance * -by_cosine;
+            let (value, chance) = (colour * through, through.re);
+            return Some(SpecularValue::by_duals(
+                properties,
+                value,
+                by_cosine,
+                chance,
+                Bend::Straight,
+            ));
         }
         same(mirrored(wo, n), wi).then(|| {
             let colour = numbers.colour(Property::SpecularReflectance, self.specular_reflectance);
-            SpecularValue::by_duals(properties, colour * reflected, reflected.re)
+            let by_cosine = self.specular_reflectance * by_cosine;
+            let (value, chance) = (colour * reflected, reflected.re);
+            SpecularValue::by_duals(properties, value, by_cosine, chance, Bend::Mirror)
         })
     }
 

@@ -56,6 +56,7 @@ impl Unknowns for Everything {
             extinctions: active.media.clone(),
             roughness: active.bsdfs.clone(),
             index: active.bsdfs.clone(),
+            moves: active.moves_geometry(),
         }
     }
 

@@ -8,7 +8,7 @@ use drt_math::Rgb;
 
 use crate::derivative::scene_gradient::SceneGradient;
 use crate::estimators::emitter_shares::{may_move, slides};
-use crate::estimators::{Estimator, named};
+use crate::estimators::{Estimator, in_scene, named};
 use crate::model::error::Error;
 use crate::model::scene::{Scene, Target, TargetName};
 use crate::model::settings::{EstimatorKind, PathSampling, Settings};
@@ -162,9 +162,10 @@ impl Session {
         wanted: &[Target],
     ) -> Result<PreparedGradient, Error> {
         let scene = &*world.scene;
+        let moves = active(scene, wanted).moves_geometry();
+        let estimator = in_scene(estimator, scene, moves);
         if let Some(target) = wanted.first() {
             let slide = slides(estimator, scene, wanted.iter().copied());
-            let moves = active(scene, wanted).moves_geometry();
             scene.refuse_derivatives(&scene.name_of(*target), moves, slide)?;
             let light = |t: &Target| !matches!(t, Target::Sensor(_)) && may_move(scene, *t);
             if let Some(target) = wanted.iter().find(|target| light(target)) {

@@ -8,8 +8,8 @@ use crate::derivative::contraction::Motion;
 use crate::derivative::medium_motion::MediumMotions;
 use crate::derivative::sensitivity::TextureUse;
 use crate::derivative::tangents::Tangents;
-use crate::estimators::Estimator;
 use crate::estimators::emitter_shares::{Share, shares, slides};
+use crate::estimators::{Estimator, in_scene};
 use crate::model::error::Error;
 use crate::model::scene::Scene;
 use crate::model::settings::Settings;
@@ -24,7 +24,7 @@ use crate::world::lights::EmitterMask;
 
 /// A scene at its parameters' values, prepared as far as no estimator matters.
 pub(crate) struct Ground<'a> {
-    scene: &'a Scene,
+    pub(super) scene: &'a Scene,
     pub(super) tangents: &'a Tangents,
     /// Lit by all emitters.
     pub(super) world: World,
@@ -73,8 +73,9 @@ impl<'a> Ground<'a> {
         kept: &mut PreparedCache,
     ) -> Result<Preparation, Error> {
         let Self { scene, tangents, settings, .. } = self;
+        let estimator = in_scene(estimator, scene, self.moves());
         if let Some(name) = tangents.names.first() {
-            let moves = tangents.move_light() || !tangents.sensor.is_empty();
+            let moves = self.moves();
             let moving = tangents.targets().filter(|target| tangents.moves(*target));
             scene.refuse_derivatives(name, moves, slides(estimator, scene, moving))?;
             if tangents.move_light() {
@@ -84,6 +85,11 @@ impl<'a> Ground<'a> {
         let shares = shares(estimator, scene, tangents.targets(), settings);
         let parts = shares.iter().map(|share| self.part(share, kept)).collect::<Result<_, _>>()?;
         Ok(Preparation { parts })
+    }
+
+    /// Whether light moves against what it meets or the camera.
+    pub(super) fn moves(&self) -> bool {
+        self.tangents.move_light() || !self.tangents.sensor.is_empty()
     }
 
     /// The paths of the pixels that a run is expected to take.

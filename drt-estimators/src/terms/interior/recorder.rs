@@ -178,6 +178,9 @@ impl Observer for Recorder<'_, '_> {
     fn scatter(&mut self, _: &World, leaving: &OutgoingRay, value: Rgb, inv_pdf: f64, rng: &Rng) {
         self.record.scatter(leaving, value, inv_pdf);
         for view in self.views.iter_mut() {
+            if leaving.pdf().is_none() {
+                view.velocities.leave_single(leaving.node as usize);
+            }
             view.pairs.offer(view.world, self.record, &view.velocities, leaving, rng);
         }
     }

@@ -143,8 +143,13 @@ impl VelocityField for AuxiliaryDirections {
             samples.push(self.sample(world, ray, spread, w, pdf, probe));
         }
         let first = parts.len();
-        let mut turn =
-            RayTurn { weight: 0.0, gradient: Vec3::ZERO, parts: first..first, shadow: None };
+        let mut turn = RayTurn {
+            weight: 0.0,
+            gradient: Vec3::ZERO,
+            parts: first..first,
+            chain: 0..0,
+            shadow: None,
+        };
         for (set, factor) in sets {
             let at = |part: f64| (part * f64::from(count)) as usize;
             if factor == 0.0 {

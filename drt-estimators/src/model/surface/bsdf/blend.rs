@@ -126,6 +126,11 @@ impl Model for Blend {
         self.bsdfs[part].direction(at, from, n, [u[0], u[1], choice], given)
     }
 
+    fn single_chance(&self, at: At<'_>, from: Vec3, n: Vec3) -> f64 {
+        let parts = self.bsdfs.iter().zip(self.choices());
+        parts.map(|(bsdf, choice)| choice * bsdf.single_chance(at, from, n)).sum()
+    }
+
     #[inline(never)]
     fn sample_specular(
         &self,
@@ -147,12 +152,15 @@ impl Model for Blend {
         if parts.iter().all(Option::is_none) {
             return None;
         }
+        // Parts that share a direction bend alike.
+        let bend = parts.iter().flatten().map(|part| part.bend).next().unwrap_or_default();
         let parts = parts.map(Option::unwrap_or_default);
-        let mut both = SpecularValue::default();
+        let mut both = SpecularValue { bend, ..SpecularValue::default() };
         for (part, (weight, choice)) in
             parts.iter().zip(self.weights().into_iter().zip(self.choices()))
         {
             both.value += part.value * weight;
+            both.by_cosine += part.by_cosine * weight;
             both.probability += part.probability * choice;
         }
         both.params = BsdfParams::of(Property::Weight, self.slope(parts.map(|p| p.value)));

@@ -49,7 +49,7 @@ use crate::model::surface::microfacet::mirrored;
 use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::{BsdfParams, PropertySet};
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range, nonnegative};
-use crate::model::surface::specular::same;
+use crate::model::surface::specular::{Bend, same};
 use crate::model::surface::textures::Textures;
 use crate::model::surface::{At, Bsdf, BsdfGradient, Given, SpecularSample, SpecularValue};
 use crate::model::texture::Texture;
@@ -184,7 +184,8 @@ impl Model for Coated {
     fn flags(&self) -> Flags {
         let inner = self.bsdf.flags();
         let smooth = self.is_smooth() || inner.smooth;
-        Flags { black: false, black_from_behind: false, smooth, ..inner }
+        let spread = !self.is_smooth() || inner.spread;
+        Flags { black: false, black_from_behind: false, smooth, spread, ..inner }
     }
 
     fn differentiated(&self) -> PropertySet {
@@ -294,6 +295,13 @@ impl Model for Coated {
         Some(mirrored(from, distribution.sample_visible(from, side, alpha, [u[0], u[1]])))
     }
 
+    fn single_chance(&self, at: At<'_>, from: Vec3, n: Vec3) -> f64 {
+        let cos = n.dot(from);
+        let [reflects, rest] = self.choices(cos);
+        let top = if self.is_smooth() && cos != 0.0 { reflects } else { 0.0 };
+        top + rest * self.bsdf.single_chance(at, self.below(from, n).w, n)
+    }
+
     #[inline(never)]
     fn sample_specular(
         &self,
@@ -328,8 +336,17 @@ impl Model for Coated {
         let choices = self.choices(cos);
         let cosines = [cos, n.dot(wi)];
         let nested = self.bsdf.specular(at, self.below(wo, n).w, self.below(wi, n).w, n);
-        let nested =
-            nested.map(|found| found.scaled(self.through(self.sigma_a, cosines), choices[1]));
+        let nested = nested.map(|found| {
+            let outside = Dual::<f64, 1>::variable(cos, 0);
+            let sigma_a = self.sigma_a.map(Dual::from);
+            let through = self.through(sigma_a, [outside; 2]);
+            let by_through = through.map(|c| c.eps[0]);
+            let [inside] = self.refracted(outside.abs()).eps;
+            let by_cosine = found.by_cosine * (inside * cos.signum());
+            let mut scaled = found.scaled(through.map(|c| c.re), choices[1]);
+            scaled.by_cosine = by_cosine * through.map(|c| c.re) + found.value * by_through;
+            scaled
+        });
         let top = self.is_smooth() && cos != 0.0 && same(mirrored(wo, n), wi);
         if nested.is_none() && !top {
             return None;
@@ -338,10 +355,14 @@ impl Model for Coated {
         found.params.set(Property::SigmaA, found.value * -self.path(cosines));
         found.params.set(Property::SpecularReflectance, Rgb::ZERO);
         if top {
-            let fresnel = dielectric_reflected(Real::abs(cos).min(1.0), self.coating.eta());
+            let turned = Dual::variable(Real::abs(cos).min(1.0), 0);
+            let fresnel = dielectric_reflected(turned, Dual::from(self.coating.eta()));
+            let Dual { re: fresnel, eps: [by_cosine] } = fresnel;
             found.params.set(Property::SpecularReflectance, Rgb::splat(fresnel));
             found.value += self.specular_reflectance * fresnel;
+            found.by_cosine += self.specular_reflectance * (by_cosine * cos.signum());
             found.probability += choices[0];
+            found.bend = Bend::Mirror;
         }
         Some(found)
     }

@@ -52,10 +52,16 @@ impl Bsdf {
         self.flags().transmissive
     }
 
-    /// True where light is scattered into single directions, past which nothing that moves is differentiated.
+    /// True where light is scattered into single directions.
     #[must_use]
     pub fn is_smooth(&self) -> bool {
         self.flags().smooth
+    }
+
+    /// True where light is scattered into single directions, and other light into all directions of a solid angle.
+    pub(crate) fn is_partly_smooth(&self) -> bool {
+        let flags = self.flags();
+        flags.smooth && flags.spread
     }
 
     /// True where some light goes straight on, as through nothing.

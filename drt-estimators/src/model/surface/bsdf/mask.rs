@@ -6,7 +6,7 @@ use crate::model::surface::model::{Flags, Model, Numbers};
 use crate::model::surface::params::PropertySet;
 use crate::model::surface::principled::ends_of;
 use crate::model::surface::property::{Property, Slot, SurfaceError, in_range};
-use crate::model::surface::specular::same;
+use crate::model::surface::specular::{Bend, same};
 use crate::model::surface::textures::Textures;
 use crate::model::surface::{
     At, Bsdf, BsdfGradient, BsdfParams, Given, SpecularSample, SpecularValue,
@@ -55,7 +55,7 @@ impl Model for Mask {
 
     #[inline(never)]
     fn flags(&self) -> Flags {
-        Flags { black: false, straight: true, differentiable: false, ..self.bsdf.flags() }
+        Flags { black: false, straight: true, smooth: true, ..self.bsdf.flags() }
     }
 
     fn differentiated(&self) -> PropertySet {
@@ -105,6 +105,10 @@ impl Model for Mask {
         self.bsdf.direction(at, from, n, [u[0], u[1], choice], given)
     }
 
+    fn single_chance(&self, at: At<'_>, from: Vec3, n: Vec3) -> f64 {
+        1.0 - self.opaque() * (1.0 - self.bsdf.single_chance(at, from, n))
+    }
+
     #[inline(never)]
     fn sample_specular(
         &self,
@@ -141,6 +145,8 @@ impl Model for Mask {
             value: Rgb::splat(1.0 - opacity),
             params: BsdfParams::of(Property::Opacity, self.slope(Rgb::splat(-1.0))),
             probability: 1.0 - opacity,
+            by_cosine: Rgb::ZERO,
+            bend: Bend::Straight,
         })
     }
 
@@ -148,7 +154,7 @@ impl Model for Mask {
         Rgb::splat(1.0 - self.opaque())
     }
 
-    /// No sampler asks for it, as nothing that moves is differentiated at such surfaces.
+    /// No sampler asks for it, as no edge is sampled beside surfaces that let light straight through.
     fn lobes(&self, _: At<'_>, _: Vec3, _: Vec3) -> Lobes {
         Lobes::even(0.0)
     }

@@ -213,6 +213,10 @@ impl Model for Textured {
         self.at(at).sample_at(at, from, n, u, given).map(|s| (s.w, s.pdf))
     }
 
+    fn single_chance(&self, at: At<'_>, from: Vec3, n: Vec3) -> f64 {
+        self.at(at).single_chance(at, from, n)
+    }
+
     #[inline(never)]
     fn sample_specular(
         &self,

@@ -120,6 +120,11 @@ impl Model for TwoSided {
         bsdf.sample_at(at, from, n, u, given).map(|s| (s.w, s.pdf))
     }
 
+    fn single_chance(&self, at: At<'_>, from: Vec3, n: Vec3) -> f64 {
+        let (bsdf, n) = self.side(from, n);
+        bsdf.single_chance(at, from, n)
+    }
+
     #[inline(never)]
     fn sample_specular(
         &self,
@@ -135,8 +140,10 @@ impl Model for TwoSided {
 
     #[inline(never)]
     fn specular(&self, at: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
-        let (bsdf, n) = self.side(wo, n);
-        bsdf.specular(at, wo, wi, n)
+        let (bsdf, side) = self.side(wo, n);
+        let found = bsdf.specular(at, wo, wi, side)?;
+        // The cosine is that with the normal of the front.
+        Some(SpecularValue { by_cosine: found.by_cosine * side.dot(n).signum(), ..found })
     }
 
     #[inline(never)]

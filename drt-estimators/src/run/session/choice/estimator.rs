@@ -49,6 +49,10 @@ pub(crate) fn estimator(ground: &Ground<'_>, kept: &mut PreparedCache) -> Result
     if asked.estimator != EstimatorKind::Auto || ground.tangents.names.is_empty() {
         return named_one(asked.estimator, None, kept);
     }
+    if ground.moves() && ground.scene.first_smooth().is_some() {
+        let why = "of all estimators it alone has derivatives past smooth surfaces";
+        return named_one(EstimatorKind::Warped, Some(why), kept);
+    }
     if let Some(why) = needs_no_pilot(ground) {
         return named_one(USUAL, Some(why), kept);
     }
@@ -92,7 +96,7 @@ fn needs_no_pilot(ground: &Ground<'_>) -> Option<&'static str> {
     if tangents.names.len() > MOST_PARAMETERS {
         return Some("there are too many parameters for a pilot");
     }
-    if !tangents.move_light() && tangents.sensor.is_empty() {
+    if !ground.moves() {
         return Some("nothing moves, and all estimators are alike");
     }
     let short = PART * ground.paths_of_run() < f64::from(FEWEST * BATCH);

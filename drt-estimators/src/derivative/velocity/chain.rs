@@ -1,0 +1,545 @@
+//! Rays that smooth surfaces pass on, as functions of the ray that started them.
+//!
+//! A chain starts at a point x with a direction d(u), u being two coordinates across it, and goes on from smooth surface to smooth
+//! surface (theory sheet §15): it meets the plane of a triangle, and leaves in the direction that the surface singles out,
+//!
+//! ```text
+//! y = x + d N·(a - x) / (N·d),    N = (b - a) × (c - a),    w = s(d, n(y)),
+//! ```
+//!
+//! n being N or the normals of the corners, interpolated. All of this is a smooth function of u, of x and of the corners, so that dual
+//! numbers tell how the ray behind the last surface depends on them: by u once and twice, by everything that may move once, and that
+//! by u again.
+//!
+//! It is smooth up to the borders of triangles, that is. Where normals are interpolated, rays are continuous there, but their derivatives
+//! jump. [`Evened`] derivatives do not: they are those of a surface whose tangent plane has the shading normal, and whose curvature is
+//! interpolated, too. They differ from the others by as much as triangles are large.
+
+use alloc::vec::Vec;
+use core::array::from_fn;
+
+use drt_math::{Dual, Frame, Mat3, Real, Vec3};
+
+use crate::derivative::velocity::EdgeMatter;
+use crate::model::surface::Bend;
+use crate::sampling::record::Node;
+use crate::world::World;
+use crate::world::scatter::Scattering;
+use crate::world::vertex::{MaterialPoint, SurfacePoint};
+
+/// A number with its derivatives by u.
+pub(crate) type ByU = Dual<f64, 2>;
+
+/// With those by what moves as well.
+type ByMatter = Dual<ByU, LANES>;
+
+/// The coordinates of three points.
+const LANES: usize = 9;
+
+/// A smooth surface of a chain.
+#[derive(Clone, Debug)]
+pub(crate) struct Link {
+    pub(crate) point: SurfacePoint,
+    corners: [Vec3; 3],
+    /// Of the corners, where they are interpolated.
+    normals: Option<[Vec3; 3]>,
+    bend: Bend,
+}
+
+/// Where a chain meets a surface, by u.
+struct Meeting {
+    /// The unit direction in which it arrives, and over which distance.
+    w: Vec3<ByU>,
+    distance: ByU,
+    /// Unit.
+    n: Vec3<ByU>,
+    /// The weights of the corners.
+    weights: [ByU; 3],
+    /// The length of the sum of the corners' normals.
+    length: ByU,
+    /// The normal's gradient by the place.
+    slope: Mat3<ByU>,
+}
+
+/// A ray that left a smooth surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RayBehind {
+    pub(crate) dir: Vec3,
+    /// To where it ends; infinite where it leaves the scene.
+    pub(crate) distance: f64,
+    /// The surface point there.
+    pub(crate) end: Option<SurfacePoint>,
+}
+
+/// What moves a ray behind a chain.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Mover {
+    /// The point where the chain starts.
+    Viewer,
+    /// The velocity of a point of a surface, or of an edge.
+    Place(EdgeMatter),
+    /// The rate of the shading normal at a point.
+    Normal(MaterialPoint),
+}
+
+/// A ray of a chain by u: its origin x and its unit direction w, each with the derivatives by both coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RayByU {
+    pub(crate) x: Vec3<ByU>,
+    pub(crate) w: Vec3<ByU>,
+    pub(crate) dx: [Vec3<ByU>; 2],
+    pub(crate) dw: [Vec3<ByU>; 2],
+}
+
+/// Derivatives of a ray that are continuous on bodies with interpolated normals.
+#[derive(Clone, Debug)]
+pub(crate) struct Evened {
+    /// By both coordinates of u.
+    pub(crate) by_u: [Rate; 2],
+    pub(crate) by_movers: Vec<RayByMover>,
+}
+
+/// How fast a ray's origin and direction move at fixed u, by one coordinate of the velocity of something.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rate {
+    pub(crate) x: Vec3<ByU>,
+    pub(crate) w: Vec3<ByU>,
+}
+
+/// A ray by the velocity of something, along each axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RayByMover {
+    pub(crate) mover: Mover,
+    pub(crate) axes: [Rate; 3],
+}
+
+/// The shape of a triangle, over any scalar.
+struct Triangle<T> {
+    corners: [Vec3<T>; 3],
+    normals: Option<[Vec3<T>; 3]>,
+}
+
+/// A ray over any scalar.
+#[derive(Clone, Copy)]
+struct Ray<T> {
+    x: Vec3<T>,
+    w: Vec3<T>,
+}
+
+impl Link {
+    /// The surface by which a walk left a node in a single direction; `None` of other nodes.
+    pub(crate) fn at(world: &World, node: &Node) -> Option<Self> {
+        let (vertex, arrival) = (node.vertex()?, node.arrival.as_ref()?);
+        let point = *vertex.surface().filter(|_| node.single)?;
+        let Some(Scattering::Surface(bsdf)) = world.scattering(vertex) else { return None };
+        let bend = bsdf.specular(-arrival.dir, node.wi)?.bend;
+        Some(Self::new(world, point, bend))
+    }
+
+    /// A point of a surface, which light goes on from in some way.
+    pub(crate) fn new(world: &World, point: SurfacePoint, bend: Bend) -> Self {
+        let corners = CORNERS.map(|bary| world.point(point.prim, bary));
+        let normals = world.is_smooth(&point).then(|| corners.map(|(corner, _)| corner.ns));
+        Self { point, corners: corners.map(|(_, x)| x), normals, bend }
+    }
+
+    /// Where a ray along a unit direction w meets the triangle's plane, and the unit shading normal there, on the side that w points to.
+    pub(crate) fn tangent_plane(&self, x: Vec3<ByU>, w: Vec3<ByU>) -> [Vec3<ByU>; 2] {
+        let [a, b, c] = self.corners;
+        let across = (b - a).cross(c - a).lift();
+        let place = x + w * (across.dot(a.lift() - x) / across.dot(w));
+        let weights = self.weights(place);
+        let normal = match self.normals {
+            None => self.point.ng.lift(),
+            Some(normals) => normals
+                .into_iter()
+                .zip(weights)
+                .fold(Vec3::zero(), |sum, (n, weight)| sum + n.lift() * weight)
+                .normalize(),
+        };
+        [if normal.dot(w).re < 0.0 { -normal } else { normal }, place]
+    }
+
+    fn triangle<T: Real>(&self) -> Triangle<T> {
+        let lift = |of: [Vec3; 3]| of.map(Vec3::lift);
+        Triangle { corners: lift(self.corners), normals: self.normals.map(lift) }
+    }
+
+    fn pass<T: Real>(&self, ray: Ray<T>, triangle: &Triangle<T>) -> Ray<T> {
+        let [a, b, c] = triangle.corners;
+        let (e1, e2) = (b - a, c - a);
+        let across = e1.cross(e2);
+        let x = ray.x + ray.w * (across.dot(a - ray.x) / across.dot(ray.w));
+        let n = match triangle.normals {
+            None => across,
+            Some([na, nb, nc]) => {
+                let square = across.length_squared();
+                let at = x - a;
+                let (s, t) = (across.dot(at.cross(e2)) / square, across.dot(e1.cross(at)) / square);
+                na * (T::one() - s - t) + nb * s + nc * t
+            }
+        };
+        Ray { x, w: self.bend.onward(ray.w, n.normalize()) }
+    }
+}
+
+impl Link {
+    /// True where normals are interpolated.
+    pub(crate) fn is_interpolated(&self) -> bool {
+        self.normals.is_some()
+    }
+
+    fn corner(&self, k: usize) -> MaterialPoint {
+        let at = drt_motion::SurfacePoint { triangle: self.point.triangle, bary: CORNERS[k] };
+        MaterialPoint { shape: self.point.shape, at }
+    }
+
+    /// How the normal of the triangle moves as one of its corners does.
+    fn normal_rate(&self, k: usize, velocity: Vec3) -> Vec3<ByU> {
+        let corners = from_fn::<_, 3, _>(|i| {
+            let (at, rate) = (self.corners[i].to_array(), velocity.to_array());
+            let rate = if i == k { rate } else { [0.0; 3] };
+            Vec3::from(from_fn::<_, 3, _>(|axis| Dual::<f64, 1>::new(at[axis], [rate[axis]])))
+        });
+        let [a, b, c] = corners;
+        let n = (b - a).cross(c - a).normalize();
+        let rate: Vec3 = n.to_array().map(|c| c.eps[0]).into();
+        rate.lift()
+    }
+
+    /// The weights of the corners at a point of the triangle's plane.
+    fn weights(&self, y: Vec3<ByU>) -> [ByU; 3] {
+        let [a, b, c] = self.corners;
+        let (e1, e2) = (b - a, c - a);
+        let across = e1.cross(e2);
+        let along = across * across.length_squared().recip();
+        let at = y - a.lift();
+        let by = |v: Vec3| at.dot(v.lift());
+        let (s, t) = (by(e2.cross(along)), by(along.cross(e1)));
+        [ByU::from(1.0) - s - t, s, t]
+    }
+
+    /// 1 in the middle of the triangle, and 0 on its border.
+    pub(crate) fn inside(&self, y: Vec3<ByU>) -> ByU {
+        let [a, b, c] = self.weights(y);
+        a * b * c * 27.0
+    }
+
+    /// `slopes` are the gradients of the normals at the corners, where these are interpolated.
+    fn meeting(&self, before: [Vec3<ByU>; 2], y: Vec3<ByU>, slopes: &Option<[Mat3; 3]>) -> Meeting {
+        let [x, w] = before;
+        let weights = self.weights(y);
+        let mut slope = Mat3 { cols: [Vec3::zero(); 3] };
+        let (Some(normals), Some(slopes)) = (self.normals, slopes) else {
+            let n = self.point.ng.lift();
+            let length = ByU::from(1.0);
+            return Meeting { w, distance: (y - x).dot(w), n, weights, length, slope };
+        };
+        let mut sum = Vec3::zero();
+        for ((normal, corner), weight) in normals.iter().zip(slopes).zip(weights) {
+            sum = sum + normal.lift() * weight;
+            for (col, add) in slope.cols.iter_mut().zip(&corner.cols) {
+                *col = *col + add.lift() * weight;
+            }
+        }
+        let length = sum.length();
+        let n = sum * length.recip();
+        Meeting { w, distance: (y - x).dot(w), n, weights, length, slope }
+    }
+}
+
+impl Meeting {
+    /// How the ray that goes on moves, as the one that arrives does.
+    fn pass(&self, bend: Bend, rate: &Rate) -> Rate {
+        let ray = rate.x + rate.w * self.distance;
+        let x = ray - self.w * (self.n.dot(ray) / self.n.dot(self.w));
+        Rate { x, w: self.turn(bend, rate.w, self.slope * x) }
+    }
+
+    /// How it moves as the surface does, by the velocity of the surface's point and the rate of its normal.
+    fn moved(&self, bend: Bend, u: Vec3<ByU>, n: Vec3<ByU>) -> Rate {
+        let x = self.w * (self.n.dot(u) / self.n.dot(self.w));
+        Rate { x, w: self.turn(bend, Vec3::zero(), n + self.slope * (x - u)) }
+    }
+
+    fn turn(&self, bend: Bend, w: Vec3<ByU>, n: Vec3<ByU>) -> Vec3<ByU> {
+        let n = n.reject(self.n);
+        let variable = |v: Vec3<ByU>, rate: Vec3<ByU>| -> Vec3<Dual<ByU, 1>> {
+            let (v, rate) = (v.to_array(), rate.to_array());
+            from_fn::<_, 3, _>(|k| Dual::new(v[k], [rate[k]])).into()
+        };
+        let onward = bend.onward(variable(self.w, w), variable(self.n, n));
+        onward.to_array().map(|c| c.eps[0]).into()
+    }
+}
+
+/// The derivatives of the rays behind the surfaces of a chain, without jumps. `rays` are these rays, `slopes` the gradients of normals
+/// at the corners of the surfaces where they are interpolated.
+pub(crate) fn evened(
+    start: Vec3,
+    viewer_moves: bool,
+    frame: &Frame,
+    links: &[Link],
+    rays: &[RayByU],
+    slopes: &[Option<[Mat3; 3]>],
+    moves: impl Fn(&SurfacePoint) -> bool,
+) -> Vec<Evened> {
+    let u = from_fn(|k| Dual::<ByU, 2>::variable(Dual::variable(0.0, k), k));
+    let d = direction(frame, u).to_array();
+    let mut before = [start.lift(), d.map(|c| c.re).into()];
+    let mut now = Evened {
+        by_u: from_fn(|k| Rate { x: Vec3::zero(), w: d.map(|c| c.eps[k]).into() }),
+        by_movers: Vec::new(),
+    };
+    if viewer_moves {
+        let axes = AXES.map(|axis| Rate { x: axis.lift(), w: Vec3::zero() });
+        now.by_movers.push(RayByMover { mover: Mover::Viewer, axes });
+    }
+    let mut pass = |((link, ray), slopes): ((&Link, &RayByU), &Option<[Mat3; 3]>)| {
+        let meeting = link.meeting(before, ray.x, slopes);
+        before = [ray.x, ray.w];
+        let rates = now.by_movers.iter_mut().flat_map(|m| &mut m.axes);
+        for rate in now.by_u.iter_mut().chain(rates) {
+            *rate = meeting.pass(link.bend, rate);
+        }
+        if moves(&link.point) {
+            now.by_movers.extend(link.movers(&meeting));
+        }
+        now.clone()
+    };
+    links.iter().zip(rays).zip(slopes).map(&mut pass).collect()
+}
+
+impl Link {
+    fn movers(&self, meeting: &Meeting) -> impl Iterator<Item = RayByMover> {
+        let still = Vec3::zero();
+        let places = (0..3).map(move |k| {
+            let axes = AXES.map(|axis| {
+                let turned = if self.is_interpolated() { still } else { self.normal_rate(k, axis) };
+                meeting.moved(self.bend, axis.lift() * meeting.weights[k], turned)
+            });
+            RayByMover { mover: Mover::Place(EdgeMatter::of(self.corner(k))), axes }
+        });
+        let normals = (0..3).filter(|_| self.is_interpolated()).map(move |k| {
+            let share = meeting.weights[k] / meeting.length;
+            let axes = AXES.map(|axis| meeting.moved(self.bend, still, axis.lift() * share));
+            RayByMover { mover: Mover::Normal(self.corner(k)), axes }
+        });
+        places.chain(normals)
+    }
+}
+
+const AXES: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
+
+const CORNERS: [[f64; 2]; 3] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+
+/// The direction at u in a frame about the present one.
+fn direction<T: Real>(frame: &Frame, u: [T; 2]) -> Vec3<T> {
+    (frame.n.lift() + frame.s.lift() * u[0] + frame.t.lift() * u[1]).normalize()
+}
+
+/// The first ray of a chain, by u.
+pub(crate) fn first_ray(start: Vec3, frame: &Frame) -> [Vec3<ByU>; 2] {
+    [start.lift(), direction(frame, from_fn(|k| ByU::variable(0.0, k)))]
+}
+
+/// The ray behind each of a chain's surfaces. `frame` is about the first ray's direction.
+pub(crate) fn rays_by_u(start: Vec3, frame: &Frame, links: &[Link]) -> Vec<RayByU> {
+    let u = from_fn(|k| Dual::<ByU, 2>::variable(Dual::variable(0.0, k), k));
+    let mut ray = Ray { x: start.lift(), w: direction(frame, u) };
+    let mut pass = |link: &Link| {
+        ray = link.pass(ray, &link.triangle());
+        let by = |v: Vec3<Dual<ByU, 2>>, k: usize| v.to_array().map(|c| c.eps[k]).into();
+        let value = |v: Vec3<Dual<ByU, 2>>| v.to_array().map(|c| c.re).into();
+        RayByU {
+            x: value(ray.x),
+            w: value(ray.w),
+            dx: from_fn(|k| by(ray.x, k)),
+            dw: from_fn(|k| by(ray.w, k)),
+        }
+    };
+    links.iter().map(&mut pass).collect()
+}
+
+/// The ray behind the last of a chain's surfaces, by everything of it that moves: the viewer, and the links of which `moves` says so.
+pub(crate) fn ray_by_movers(
+    start: Vec3,
+    viewer_moves: bool,
+    frame: &Frame,
+    links: &[Link],
+    moves: impl Fn(&SurfacePoint) -> bool,
+) -> Vec<RayByMover> {
+    let u = from_fn(|k| ByU::variable(0.0, k));
+    let d = direction(frame, u).to_array().map(constant).into();
+    let first = Ray { x: start.lift(), w: d };
+    let mut found = Vec::new();
+    let through = |ray: Ray<ByMatter>, from: usize| {
+        links[from..].iter().fold(ray, |ray, link| link.pass(ray, &link.triangle()))
+    };
+    if viewer_moves {
+        let ray = through(Ray { x: variable(start, 0), ..first }, 0);
+        found.push(RayByMover { mover: Mover::Viewer, axes: axes(&ray, 0) });
+    }
+    let mut before = first;
+    for (i, link) in links.iter().enumerate() {
+        let still = link.triangle();
+        if moves(&link.point) {
+            let corner = |k: usize| link.corner(k);
+            let mut add = |triangle: &Triangle<ByMatter>, mover: &dyn Fn(usize) -> Mover| {
+                let ray = through(link.pass(before, triangle), i + 1);
+                found.extend((0..3).map(|k| RayByMover { mover: mover(k), axes: axes(&ray, k) }));
+            };
+            let corners = from_fn(|k| variable(link.corners[k], k));
+            add(&Triangle { corners, normals: still.normals }, &|k| {
+                Mover::Place(EdgeMatter::of(corner(k)))
+            });
+            if let Some(normals) = link.normals {
+                let normals = Some(from_fn(|k| variable(normals[k], k)));
+                add(&Triangle { corners: still.corners, normals }, &|k| Mover::Normal(corner(k)));
+            }
+        }
+        before = link.pass(before, &still);
+    }
+    found
+}
+
+fn constant(value: ByU) -> ByMatter {
+    Dual::new(value, [ByU::from(0.0); LANES])
+}
+
+/// A point whose coordinates are the lanes of the `k`-th of three.
+fn variable(v: Vec3, k: usize) -> Vec3<ByMatter> {
+    let v = v.to_array();
+    from_fn::<_, 3, _>(|axis| Dual::variable(ByU::from(v[axis]), 3 * k + axis)).into()
+}
+
+fn axes(ray: &Ray<ByMatter>, k: usize) -> [Rate; 3] {
+    from_fn(|axis| {
+        let by = |v: Vec3<ByMatter>| v.to_array().map(|c| c.eps[3 * k + axis]).into();
+        Rate { x: by(ray.x), w: by(ray.w) }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use drt_math::{Rng, vec3};
+
+    use super::*;
+
+    fn next(rng: &mut Rng) -> Vec3 {
+        vec3(rng.next_f64() - 0.5, rng.next_f64() - 0.5, rng.next_f64() - 0.5)
+    }
+
+    /// A mirror, an interface and a surface that light goes straight through, each about across the z axis, at places that a ray along
+    /// it meets one after the other.
+    fn chain(rng: &mut Rng, interpolated: bool) -> Vec<Link> {
+        let bends = [Bend::Refraction(1.5), Bend::Straight, Bend::Mirror];
+        let link = |(i, bend): (u32, Bend)| {
+            let place = Vec3::Z * f64::from(i + 1);
+            let corners = [vec3(-2.0, -2.0, 0.0), vec3(3.0, -1.0, 0.2), vec3(-1.0, 3.0, -0.2)];
+            let corners = corners.map(|c| c + place + next(rng) * 0.3);
+            let [a, b, c] = corners;
+            let ng = (b - a).cross(c - a).normalize();
+            let normals = corners.map(|_| (ng + next(rng) * 0.3).normalize());
+            let point = SurfacePoint { prim: 0, shape: i, triangle: 0, bary: [0.3; 2], ng, ns: ng };
+            Link { point, corners, normals: interpolated.then_some(normals), bend }
+        };
+        (0..).zip(bends).map(link).collect()
+    }
+
+    fn traced(start: Vec3, frame: &Frame, u: [f64; 2], links: &[Link]) -> [Vec3; 2] {
+        let ray = Ray { x: start, w: direction(frame, u) };
+        let ray = links.iter().fold(ray, |ray, link| link.pass(ray, &link.triangle()));
+        [ray.x, ray.w]
+    }
+
+    fn apart(a: [Vec3; 2], b: [Vec3; 2], h: f64) -> [Vec3; 2] {
+        [(a[0] - b[0]) / h, (a[1] - b[1]) / h]
+    }
+
+    fn assert_same(found: [Vec3; 2], expected: [Vec3; 2], what: &str) {
+        for (f, e) in found.into_iter().zip(expected) {
+            assert!((f - e).max_abs() < 1e-5 * (1.0 + e.max_abs()), "{what}: {f:?} {e:?}");
+        }
+    }
+
+    const H: f64 = 1e-4;
+
+    /// Derivatives by u are differences, and so are those of derivatives.
+    #[test]
+    fn derivatives_are_differences() {
+        let mut rng = Rng::new(5, 0, 0);
+        for round in 0..20 {
+            let links = chain(&mut rng, round % 2 == 0);
+            let start = next(&mut rng) * 0.5 - Vec3::Z;
+            let frame = Frame::from_normal((Vec3::Z + next(&mut rng) * 0.2).normalize());
+            let rays = rays_by_u(start, &frame, &links);
+            let ray = rays.last().unwrap();
+            for k in 0..2 {
+                let at = |h: f64| {
+                    let mut u = [0.0; 2];
+                    u[k] = h;
+                    traced(start, &frame, u, &links)
+                };
+                let expected = apart(at(H), at(-H), 2.0 * H);
+                assert_same([ray.dx[k].re(), ray.dw[k].re()], expected, "by u");
+                let along = |v: Vec3<ByU>| -> Vec3 { v.to_array().map(|c| c.eps[k]).into() };
+                assert_same([along(ray.x), along(ray.w)], expected, "by u");
+                let [plus, zero, minus] = [at(H), at(0.0), at(-H)];
+                let second = [0, 1].map(|i| (plus[i] + minus[i] - zero[i] * 2.0) / (H * H));
+                assert_same([along(ray.dx[k]), along(ray.dw[k])], second, "by u twice");
+            }
+            // Evened derivatives are the same where nothing is interpolated.
+            if round % 2 == 1 {
+                let slopes = alloc::vec![None; links.len()];
+                let all = evened(start, true, &frame, &links, &rays, &slopes, |_| true);
+                let even = all.last().unwrap();
+                let exact = ray_by_movers(start, true, &frame, &links, |_| true);
+                assert_eq!(even.by_movers.len(), exact.len());
+                for (a, b) in even.by_movers.iter().zip(&exact) {
+                    for (a, b) in a.axes.iter().zip(&b.axes) {
+                        assert_same([a.x.re(), a.w.re()], [b.x.re(), b.w.re()], "evened");
+                        let turn = |v: Vec3<ByU>| v.to_array().map(|c| c.eps[0]).into();
+                        assert_same([turn(a.x), turn(a.w)], [turn(b.x), turn(b.w)], "evened");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Rates by what moves are differences.
+    #[test]
+    fn rates_are_differences() {
+        let mut rng = Rng::new(6, 0, 0);
+        for round in 0..10 {
+            let links = chain(&mut rng, round % 2 == 0);
+            let start = next(&mut rng) * 0.5 - Vec3::Z;
+            let frame = Frame::from_normal((Vec3::Z + next(&mut rng) * 0.2).normalize());
+            let found = ray_by_movers(start, true, &frame, &links, |s| s.shape != 1);
+            for RayByMover { mover, axes } in found {
+                for (rate, axis) in axes.iter().zip(AXES) {
+                    let at = |h: f64| {
+                        let (mut links, mut start) = (links.clone(), start);
+                        let corner = |bary: [f64; 2]| {
+                            CORNERS.iter().position(|corner| *corner == bary).unwrap()
+                        };
+                        match mover {
+                            Mover::Viewer => start += axis * h,
+                            Mover::Place(EdgeMatter { point, .. }) => {
+                                links[point.shape as usize].corners[corner(point.at.bary)] +=
+                                    axis * h;
+                            }
+                            Mover::Normal(point) => {
+                                let link = &mut links[point.shape as usize];
+                                link.normals.as_mut().unwrap()[corner(point.at.bary)] += axis * h;
+                            }
+                        }
+                        traced(start, &frame, [0.0; 2], &links)
+                    };
+                    let expected = apart(at(H), at(-H), 2.0 * H);
+                    assert_same([rate.x.re(), rate.w.re()], expected, "by what moves");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Stages in which things move that are seen in mirrors, through glass, panes and masks, and these move, too.
+
+use std::f64::consts::FRAC_PI_2;
+
+use drt_estimators::surface::{
+    Bsdf, Coating, Conductor, Dielectric, Mask, Plastic, ThinDielectric,
+};
+use drt_geom::Mesh;
+use drt_geom::procedural::{cube, grid, icosphere, rectangle};
+use drt_math::{Rgb, Vec3, vec3};
+use drt_medium::{Homogeneous, Phase};
+use drt_motion::GeometryChange;
+
+use super::deforming::sky;
+use super::effects::{grow, translate, turn};
+use super::set::{at, diffuse, placed};
+use super::{Cell, Set, Stage};
+use crate::Result;
+use crate::motion::moves;
+
+/// The half step of finite differences: what is seen past curved glass moves fast.
+const STEP: f64 = 0.02;
+
+fn silver() -> Bsdf {
+    Bsdf::Conductor(Conductor {
+        eta: Rgb::new(0.4, 0.6, 0.9),
+        k: Rgb::new(2.8, 2.3, 1.7),
+        specular_reflectance: Rgb::splat(0.9),
+    })
+}
+
+fn glass() -> Bsdf {
+    Bsdf::Dielectric(Dielectric { eta: 1.5, ..Dielectric::default() })
+}
+
+fn block(size: f64, place: Vec3) -> Mesh {
+    placed(&cube(), Vec3::splat(size), vec3(0.4, 1.0, 0.2), 0.6, place)
+}
+
+fn panel(size: [f64; 2], angle: f64, place: Vec3) -> Mesh {
+    placed(&rectangle(), vec3(size[0], size[1], 1.0), Vec3::Y, angle, place)
+}
+
+fn floor(bsdf: Bsdf, set: Set) -> Set {
+    let mesh = placed(&rectangle(), vec3(4.0, 4.0, 1.0), Vec3::X, -FRAC_PI_2, vec3(0.0, -0.9, 0.0));
+    set.shape("floor", mesh, bsdf)
+}
+
+/// An even sky, and what stands under it as the camera sees it.
+fn under_a_sky(eye: Vec3, target: Vec3, depth: u32) -> Result<Set> {
+    Ok(Set::new(eye, target, 42.0, depth)?.light("sky", sky()))
+}
+
+/// The block, what it is seen past, and the camera.
+fn moving(past: &str, pivot: Vec3) -> Vec<Cell> {
+    let cell = |name: &str, effect| Cell::new(name, [effect]).step(STEP);
+    vec![
+        cell("block moves", translate("block", vec3(0.5, 0.3, 0.2))).representative(),
+        cell("what it is seen past turns", turn(past, vec3(0.3, 0.8, 0.1), pivot)).representative(),
+        cell("what it is seen past moves", translate(past, vec3(0.2, -0.3, 0.5))),
+        cell("camera turns", turn("camera", vec3(0.1, 0.9, 0.3), Vec3::ZERO)),
+    ]
+}
+
+fn stage(name: &'static str, set: Set, cells: Vec<Cell>) -> Stage {
+    Stage { samples: 1024, ..Stage::new(name, set.scene, cells) }
+}
+
+/// A block that is seen beside a mirror and in it.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn mirror() -> Result<Stage> {
+    let pivot = vec3(0.0, 0.3, -2.0);
+    let set = under_a_sky(vec3(0.6, 0.8, 3.5), vec3(0.0, 0.0, -1.0), 3)?
+        .shape("block", block(0.5, vec3(1.2, 0.0, 0.4)), diffuse([0.8, 0.3, 0.2]))
+        .shape("mirror", panel([1.6, 1.6], 0.26, pivot), silver());
+    Ok(stage("mirror", set, moving("mirror", pivot)))
+}
+
+/// A block that is seen over a varnished floor and in it.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn varnish() -> Result<Stage> {
+    let varnish =
+        Plastic { reflectance: Rgb::new(0.3, 0.4, 0.2), ..Plastic::new(Coating::smooth(1.9)?) };
+    let set = under_a_sky(vec3(0.6, 0.8, 3.5), vec3(0.0, 0.0, -1.0), 3)?.shape(
+        "block",
+        block(0.5, vec3(0.2, 0.0, 0.4)),
+        diffuse([0.8, 0.3, 0.2]),
+    );
+    let set = floor(Bsdf::Plastic(varnish), set);
+    Ok(stage("varnish", set, moving("floor", vec3(0.0, -0.9, 0.0))))
+}
+
+/// A block behind a pane, and one behind a veil that is half opaque.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn panes() -> Result<Stage> {
+    let pane = Bsdf::ThinDielectric(ThinDielectric { eta: 1.6, ..ThinDielectric::default() });
+    let veil = Bsdf::Mask(Mask { bsdf: diffuse([0.3, 0.7, 0.2]), opacity: 0.4 }.into());
+    let place = vec3(-0.9, 0.1, 1.0);
+    let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 4)?
+        .shape("block", block(0.9, vec3(0.1, 0.0, -0.8)), diffuse([0.8, 0.3, 0.2]))
+        .shape("pane", panel([0.7, 0.9], 0.5, place), pane)
+        .shape("veil", panel([0.7, 0.9], 0.4, vec3(0.8, -0.1, 1.2)), veil);
+    let mut cells = moving("pane", place);
+    let fades = turn("veil", vec3(0.1, 0.9, 0.1), vec3(0.8, -0.1, 1.2));
+    cells.push(Cell::new("veil turns", [fades]).step(STEP).representative());
+    Ok(stage("panes", set, cells))
+}
+
+/// A block behind a slab of glass.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn slab() -> Result<Stage> {
+    let pivot = vec3(0.0, 0.0, 1.0);
+    let slab = placed(&cube(), vec3(1.2, 1.2, 0.3), Vec3::Y, 0.6, pivot);
+    let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 6)?
+        .shape("block", block(0.5, vec3(0.1, 0.0, -0.8)), diffuse([0.8, 0.3, 0.2]))
+        .shape("slab", slab, glass());
+    Ok(stage("slab", set, moving("slab", pivot)))
+}
+
+/// A ball whose normals are those of a sphere.
+fn ball(radius: f64, place: Vec3) -> Mesh {
+    at(&icosphere(3).with_smooth_normals(), Vec3::splat(radius), place)
+}
+
+/// A block behind a ball of glass.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn glass_ball() -> Result<Stage> {
+    let pivot = vec3(0.0, 0.0, 1.0);
+    let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 6)?
+        .shape("block", block(0.5, vec3(0.1, 0.0, -0.8)), diffuse([0.8, 0.3, 0.2]))
+        .shape("ball", ball(0.9, pivot), glass());
+    let mut cells = moving("ball", pivot);
+    cells.push(Cell::new("ball flattens", [grow("ball", vec3(0.4, -0.3, 0.5), pivot)]).step(STEP));
+    Ok(stage("glass ball", set, cells))
+}
+
+/// A block that is seen beside a ball of silver and in it.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn silver_ball() -> Result<Stage> {
+    let pivot = vec3(0.0, 0.0, 1.0);
+    let set = under_a_sky(vec3(0.3, 0.4, 5.0), Vec3::ZERO, 3)?
+        .shape("block", block(0.5, vec3(1.3, 0.0, 1.8)), diffuse([0.8, 0.3, 0.2]))
+        .shape("ball", ball(0.9, pivot), silver());
+    let mut cells = moving("ball", pivot);
+    cells.push(Cell::new("ball flattens", [grow("ball", vec3(0.4, -0.3, 0.5), pivot)]).step(STEP));
+    Ok(stage("silver ball", set, cells))
+}
+
+/// A block of milky glass, which bends.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn milky_glass() -> Result<Stage> {
+    let milk = Homogeneous::new(Rgb::new(0.8, 1.0, 1.4), Rgb::splat(0.9), Rgb::ZERO)?;
+    let body = at(&icosphere(2).with_smooth_normals(), Vec3::splat(0.9), Vec3::ZERO);
+    let bends = |p: &Vec3| vec3(0.3 - p.x * p.z, 0.4 * p.x * p.y, 0.5 * p.x * p.x - 0.2 * p.y);
+    let bends = GeometryChange::VertexVelocity(body.positions.iter().map(bends).collect());
+    let set = under_a_sky(vec3(0.3, 0.8, 4.0), Vec3::ZERO, 6)?
+        .medium("milk", milk, Phase::Isotropic)
+        .filled("body", body, glass(), "milk", None)
+        .shape("block", block(0.35, vec3(0.2, 0.3, -1.6)), diffuse([0.8, 0.3, 0.2]));
+    let set = floor(diffuse([0.5, 0.5, 0.4]), set);
+    let cell = |name: &str, effect| Cell::new(name, [effect]).step(STEP);
+    let cells = vec![
+        cell("body bends", moves("body", bends)),
+        cell("body moves", translate("body", vec3(0.3, 0.2, 0.4))),
+        cell("block moves", translate("block", vec3(0.5, 0.3, 0.2))),
+    ];
+    Ok(stage("milky glass", set, cells))
+}
+
+/// Water with waves over a floor.
+///
+/// # Errors
+/// When the library rejects the scene.
+pub fn water() -> Result<Stage> {
+    let mut mesh = at(&grid(12, 12), vec3(2.0, 2.0, 1.0), Vec3::ZERO);
+    let height = |p: Vec3| 0.06 * (3.0 * p.x).sin() * (2.0 * p.y + 0.5).cos();
+    let lift = |scale: f64| move |p: &Vec3| *p + Vec3::Z * (scale * height(*p));
+    let rise: Vec<Vec3> = mesh.positions.iter().map(|p| Vec3::Z * height(*p)).collect();
+    mesh.positions = mesh.positions.iter().map(lift(1.0)).collect();
+    let mesh = mesh.with_smooth_normals();
+    let mesh = placed(&mesh, Vec3::splat(1.0), Vec3::X, -FRAC_PI_2, Vec3::ZERO);
+    let up = |v: Vec3| vec3(v.x, v.z, -v.y);
+    let waves = GeometryChange::VertexVelocity(rise.into_iter().map(up).collect());
+    let set = under_a_sky(vec3(0.2, 3.0, 2.6), Vec3::ZERO, 5)?.shape("water", mesh, glass()).shape(
+        "block",
+        block(0.35, vec3(0.2, -0.5, 0.1)),
+        diffuse([0.8, 0.3, 0.2]),
+    );
+    let set = floor(diffuse([0.5, 0.5, 0.4]), set);
+    let cell = |name: &str, effect| Cell::new(name, [effect]).step(STEP);
+    let cells = vec![
+        cell("waves rise", moves("water", waves)),
+        cell("block moves", translate("block", vec3(0.5, 0.1, 0.2))),
+    ];
+    Ok(stage("water", set, cells))
+}
