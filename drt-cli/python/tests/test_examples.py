@@ -1,0 +1,41 @@
+"""The examples and the page about Python, as they stand there."""
+
+import os
+import re
+import subprocess
+import sys
+
+from conftest import ROOT
+
+EXAMPLES = ROOT / "examples/python"
+
+
+def losses_of(program, folder):
+    """The losses that a short run of an example prints."""
+    picture = folder / "fit.png"
+    options = ["--iterations", "6", "--size", "16", "--spp", "8", "--picture", picture]
+    done = subprocess.run(
+        [sys.executable, EXAMPLES / program, *map(str, options)],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
+    )
+    assert done.returncode == 0, done.stderr
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    return [float(loss) for loss in re.findall(r"loss (\S+)", done.stdout)]
+
+
+def test_a_painting_and_a_vase_are_fitted(tmp_path):
+    losses = losses_of("fit.py", tmp_path)
+    assert losses[-1] < 0.5 * losses[0]
+
+
+def test_the_code_of_the_page_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    page = (ROOT / "docs/python.md").read_text()
+    code = re.findall(r"```python\n(.*?)```", page, re.S)
+    assert len(code) > 1
+    names = {}
+    for block in code:
+        if "torch" not in block:
+            exec(compile(block, "docs/python.md", "exec"), names)
