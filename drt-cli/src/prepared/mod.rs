@@ -48,6 +48,33 @@ pub enum Unknown {
 ///
 /// What is left to a pilot (`kind` or `sampling` = `"auto"`) is decided at the first call, by its seed, and decided anew when
 /// the number of samples changes. For derivative images it is also decided anew when values change.
+///
+/// ```
+/// use drt_cli::{Overrides, PreparedJob, Samples, Unknown, load_job};
+/// use drt_estimators::Unattended;
+/// use drt_math::Rgb;
+///
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("job.toml");
+/// # let scene = r#"<scene version="3.0.0"><sensor type="perspective"><film type="hdrfilm">
+/// #   <integer name="width" value="6"/><integer name="height" value="4"/></film></sensor>
+/// #   <emitter type="constant" id="sky"/></scene>"#;
+/// # std::fs::write(folder.path().join("scene.xml"), scene)?;
+/// # let parameter = "name = \"light\"\neffect = [{ target = \"sky\", property = \"radiance\", multiply = 1.0 }]";
+/// # std::fs::write(&path, format!("scene = \"scene.xml\"\n[[parameter]]\n{parameter}\n"))?;
+/// let mut job = PreparedJob::new(load_job(&path, &Overrides::default())?)?;
+/// let light = Unknown::Parameter(0);
+/// let samples = Samples { spp: 4, ..job.samples() };
+///
+/// // The sum of all pixels and channels, and its derivative.
+/// job.set(&[(light, &[0.5])])?;
+/// let seen = job.render(samples, &Unattended)?.expect("nobody cancels it");
+/// let adjoint = vec![Rgb::ONE; seen.image.pixels.len()];
+/// let gradient = job.gradient(&[light], &adjoint, samples, &Unattended)?.expect("nobody cancels it");
+/// let sum: f64 = seen.image.pixels.iter().map(|pixel| pixel.mean.sum()).sum();
+/// assert!((gradient[0][0] - sum / 1.5).abs() < 1e-9 * sum);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct PreparedJob {
     /// With the present values of the parameters.
     job: Job,

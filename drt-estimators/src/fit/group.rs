@@ -77,7 +77,8 @@ impl Group {
     }
 
     /// Groups of all vertices, voxels and texels of a scene that have gradients, named by their targets and by what
-    /// they are: `cube.vertices`, `smoke.sigma_t`, `wall.reflectance`, `sky.radiance`.
+    /// they are: `cube.vertices`, `smoke.sigma_t`, `wall.reflectance`, `sky.radiance`. Vertices of instances are left
+    /// out: they have gradients in an [expanded](Scene::expanded) scene.
     #[must_use]
     pub fn all(scene: &Scene) -> Vec<Self> {
         let mut groups = Vec::new();
@@ -85,7 +86,8 @@ impl Group {
             let name = format!("{}.{what}", scene.name_of(target));
             groups.push(Self { name, target, kind });
         };
-        for s in 0..scene.shapes.len() {
+        let instanced = |s: &usize| scene.instances.iter().any(|instance| instance.shape == *s);
+        for s in (0..scene.shapes.len()).filter(|s| !instanced(s)) {
             add(Target::Shape(s), "vertices", GroupKind::Vertices);
         }
         for (m, medium) in scene.media.iter().enumerate() {

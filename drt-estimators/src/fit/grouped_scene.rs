@@ -1,6 +1,7 @@
 //! A scene with groups of unknowns, at any of their values.
 
 use alloc::borrow::Cow;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 
 use crate::fit::group::Group;
@@ -17,7 +18,7 @@ pub struct GroupedScene {
     scene: Scene,
     groups: Vec<Group>,
     /// The values of each group; `None` where they are those of the given scene.
-    values: Vec<Option<Vec<f64>>>,
+    values: Vec<Option<Arc<[f64]>>>,
 }
 
 impl GroupedScene {
@@ -50,7 +51,7 @@ impl GroupedScene {
     #[must_use]
     pub fn values(&self, group: usize) -> Option<Cow<'_, [f64]>> {
         Some(match self.values.get(group)? {
-            Some(values) => Cow::Borrowed(values.as_slice()),
+            Some(values) => Cow::Borrowed(&**values),
             None => Cow::Owned(self.groups[group].values(&self.given)),
         })
     }
@@ -77,6 +78,12 @@ impl GroupedScene {
             return Err(Error::Setting { setting: "group", reason });
         }
         Group::check_together(&self.groups)?;
+        let mut after = self.values.clone();
+        for (group, values) in changes {
+            // What is given need not be computed anew, which would change its last bits.
+            let given = self.groups[*group].values(&self.given) == *values;
+            after[*group] = (!given).then(|| (*values).into());
+        }
         let changed =
             |group: &Group| changes.iter().any(|(g, _)| self.groups[*g].target == group.target);
         let mut scene = self.scene.clone();
@@ -84,15 +91,12 @@ impl GroupedScene {
         for group in self.groups.iter().filter(|group| changed(group)) {
             reset(&mut scene, &self.given, group.target);
         }
-        for (i, group) in self.groups.iter().enumerate().filter(|(_, group)| changed(group)) {
-            let new = changes.iter().rev().find(|(g, _)| *g == i).map(|(_, values)| *values);
-            if let Some(values) = new.or(self.values[i].as_deref()) {
+        for (group, values) in self.groups.iter().zip(&after).filter(|(group, _)| changed(group)) {
+            if let Some(values) = values {
                 group.apply(&self.given, values, &mut scene)?;
             }
         }
-        for (group, values) in changes {
-            self.values[*group] = Some(values.to_vec());
-        }
+        self.values = after;
         self.scene = scene;
         Ok(())
     }
