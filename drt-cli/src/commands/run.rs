@@ -17,6 +17,7 @@ use crate::{CliError, Job};
 
 /// Samples per pixel of the first pass where time or noise decides when to stop; later ones double.
 const FIRST_PASS: u32 = 4;
+
 /// What jobs of one scene in a row share: its files are read once, and what was prepared is used again.
 #[derive(Default)]
 pub(super) struct Shared {
