@@ -14,7 +14,7 @@ CRATES = ["drt-math", "drt-geom", "drt-medium", "drt-motion", "drt-estimators", 
 # A file may import from its own folder and from those before it.
 ORDER = {
     "drt-estimators": ["model", "world", "sampling", "derivative", "discontinuities", "terms", "estimators", "run", "fit"],
-    "drt-cli": ["testing", "wording", "error", "files", "scene_xml", "job", "commands"],
+    "drt-cli": ["testing", "wording", "error", "files", "scene_xml", "job", "prepared", "commands"],
 }
 
 TEST_MODULE = r"#\[cfg\((?:all\()?test\b[^\]]*\]\s*(?:pub(?:\(\w+\))? )?mod \w+ \{"

@@ -6,6 +6,7 @@ pub mod commands;
 pub mod error;
 pub mod files;
 mod job;
+mod prepared;
 mod scene_xml;
 #[cfg(test)]
 mod testing;
@@ -20,6 +21,7 @@ pub use files::image::{
 pub use files::measured_file::encode_measured;
 pub use files::npy::write_npy;
 pub use job::{GroupSteps, Job, Optimize, Overrides, ParameterGroup, load_job};
+pub use prepared::{FieldSteps, PreparedJob, Samples, Unknown, independent_seed};
 pub use scene_xml::{Defaults, load_scene, parse_scene_str};
 
 /// Name and version, as files carry them.

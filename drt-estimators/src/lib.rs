@@ -37,7 +37,7 @@ pub use model::settings::{
 };
 pub use model::shard::Shard;
 pub use model::{emitter, filter, sensor, surface, texture};
-pub use run::control::{Control, FinishedTile, Unattended};
+pub use run::control::{Control, FinishedTile, Part, Unattended};
 pub use run::finite_difference::finite_differences;
 pub use run::gradient::GradientBatch;
 pub use run::session::{Merged, Session, ShardError, ShardSums, gradient, gradient_in_batches};

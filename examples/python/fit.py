@@ -1,10 +1,10 @@
-"""Fits the texture of a painting and the shape of a vase to an image of them, with NumPy around `drt`.
+"""Fits the texture of a painting and the shape of a vase to an image of them, with the package `drt` and NumPy.
 
-    cargo build --release -p drt-cli
-    DRT=target/release/drt python3 examples/python/fit.py --picture fit.png
+    pip install ./drt-cli/python
+    python examples/python/fit.py --picture fit.png
 
-Every iteration writes the scene's files, renders it, and asks for the gradient of the loss by all vertices and texels at once, which
-costs what it costs by a few. What comes after is ordinary Python: the vase's vertices depend on the radii of its rings, its texels on nothing.
+Every iteration renders the scene and asks for the gradient of the loss by all vertices and texels at once, which costs what it
+costs by a few. What comes after is ordinary Python: the vase's vertices depend on the radii of its rings, its texels on nothing.
 The known answer, which the target is rendered from, is `Unknowns.answer()`. fit_torch.py does the same by PyTorch.
 """
 
@@ -22,6 +22,8 @@ SECTORS = 24
 # Of the vase's rings.
 HEIGHTS = np.linspace(0.02, 1.5, 9)
 ROWS, COLUMNS = 10, 16
+# Seeds that no iteration has.
+TARGET, LAST = 1 << 32, 2 << 32
 
 
 @dataclass
@@ -65,8 +67,8 @@ def radii_gradient(by_vertices):
     return np.einsum("rsc,sc->r", rings, CIRCLE)
 
 
-def write(folder, unknowns):
-    """The files of the scene that depend on the unknowns."""
+def load(folder, size, unknowns):
+    """The scene at these values, from files that are written into the folder."""
     lines = ["v {:.9g} {:.9g} {:.9g}".format(*v) for v in vertices(unknowns.radii)]
     for s in range(SECTORS):
         t, middle = (s + 1) % SECTORS, len(HEIGHTS) * SECTORS + 1
@@ -76,27 +78,13 @@ def write(folder, unknowns):
             lines.append(f"f {a + s} {b + s} {b + t} {a + t}")
     (folder / "vase.obj").write_text("\n".join(lines) + "\n")
     drt.write_exr(folder / "painting.exr", unknowns.painting)
+    return drt.Job.load(HERE / "job.toml", defaults={"folder": folder, "resolution": size})
 
 
-class Scene:
-    """The scene at any values of the unknowns."""
-
-    def __init__(self, folder, size, spp):
-        self.folder, self.spp, self.seed = folder, spp, 0
-        self.options = ["-D", f"folder={folder}", "-D", f"resolution={size}"]
-
-    def image(self, unknowns, spp=None):
-        write(self.folder, unknowns)
-        self.seed += 1
-        return drt.image(HERE / "scene.xml", spp or self.spp, self.seed, self.options)
-
-    def gradient(self, unknowns, adjoint):
-        """By vertices and by texels, from dLoss/dimage."""
-        write(self.folder, unknowns)
-        self.seed += 1
-        found = drt.gradient(HERE / "job.toml", adjoint, self.spp, self.seed, self.options)
-        split = 3 * (len(HEIGHTS) * SECTORS + 1)
-        return found[:split].reshape(-1, 3), found[split:].reshape(ROWS, COLUMNS, 3)
+def image(scene, unknowns, spp, seed):
+    """What the scene looks like at these values."""
+    scene.params.update({"vase": vertices(unknowns.radii), "wall": unknowns.painting})
+    return scene.render(spp, seed)[0]
 
 
 class Adam:
@@ -123,7 +111,8 @@ def picture(path, scene, target, start, found):
         painting = unknowns.painting[::-1].repeat(zoom, axis=0).repeat(zoom, axis=1)
         return np.concatenate([image, np.ones((4, image.shape[1], 3)), painting])
 
-    all = [(Unknowns.answer(), target), (start, scene.image(start, 256)), (found, scene.image(found, 256))]
+    shown = [image(scene, unknowns, 256, LAST) for unknowns in (start, found)]
+    all = [(Unknowns.answer(), target), (start, shown[0]), (found, shown[1])]
     panels = [panel(*one).repeat(3, axis=0).repeat(3, axis=1) for one in all]
     gap = np.ones((len(panels[0]), 8, 3))
     drt.write_png(path, np.concatenate([panels[0], gap, panels[1], gap, panels[2]], axis=1))
@@ -132,7 +121,9 @@ def picture(path, scene, target, start, found):
 def arguments():
     parser = argparse.ArgumentParser()
     parser.add_argument("--iterations", type=int, default=120)
-    parser.add_argument("--size", type=int, default=64, help="of the image, in pixels; a multiple of 16")
+    parser.add_argument(
+        "--size", type=int, default=64, help="of the image, in pixels; a multiple of 16"
+    )
     parser.add_argument("--spp", type=int, default=16, help="samples per pixel")
     parser.add_argument("--picture", type=Path, help="a PNG of target, start and result")
     return parser.parse_args()
@@ -146,17 +137,22 @@ def report(iteration, loss, unknowns, answer):
     )
 
 
-def fit(scene, target, unknowns, iterations, answer):
+def fit(scene, target, unknowns, iterations, spp, answer):
     """Minimises the mean squared difference from the target."""
+
+    def loss(seen):
+        difference = seen - target
+        return np.mean(difference**2), 2 * difference / difference.size
+
     radii, painting = Adam(0.02), Adam(0.04)
     for iteration in range(iterations):
-        difference = scene.image(unknowns) - target
+        scene.params.update({"vase": vertices(unknowns.radii), "wall": unknowns.painting})
+        gradient = scene.gradient(loss, spp=spp, seed=iteration)
         if iteration % 10 == 0 or iteration == iterations - 1:
-            report(iteration, np.mean(difference**2), unknowns, answer)
-        by_vertices, by_texels = scene.gradient(unknowns, 2 * difference / difference.size)
+            report(iteration, gradient.loss, unknowns, answer)
         unknowns = Unknowns(
-            np.clip(radii.step(unknowns.radii, radii_gradient(by_vertices)), 0.05, 0.9),
-            np.clip(painting.step(unknowns.painting, by_texels), 0, 1),
+            np.clip(radii.step(unknowns.radii, radii_gradient(gradient["vase"])), 0.05, 0.9),
+            np.clip(painting.step(unknowns.painting, gradient["wall"]), 0, 1),
         )
     return unknowns
 
@@ -165,10 +161,11 @@ def main(fit=fit):
     options = arguments()
     answer, start = Unknowns.answer(), Unknowns.start()
     with tempfile.TemporaryDirectory() as folder:
-        scene = Scene(Path(folder), options.size, options.spp)
-        target = scene.image(answer, 1024)
-        found = fit(scene, target, start, options.iterations, answer)
-        report(options.iterations, np.mean((scene.image(found, 256) - target) ** 2), found, answer)
+        scene = load(Path(folder), options.size, start)
+        target = image(scene, answer, 1024, TARGET)
+        found = fit(scene, target, start, options.iterations, options.spp, answer)
+        reached = np.mean((image(scene, found, 256, LAST) - target) ** 2)
+        report(options.iterations, reached, found, answer)
         if options.picture:
             picture(options.picture, scene, target, start, found)
 

@@ -1,28 +1,12 @@
-"""The same as fit.py by PyTorch: `drt` as a function that autograd differentiates through.
+"""The same as fit.py by PyTorch, which differentiates through the images of `drt`.
 
-    DRT=target/release/drt python3 examples/python/fit_torch.py --picture fit.png
+python examples/python/fit_torch.py --picture fit.png
 """
 
-import numpy as np
+import fit
 import torch
 
-import fit
-
-
-class Render(torch.autograd.Function):
-    """From vertices and texels to an image. In the backward pass one run gives the gradient by all of them."""
-
-    @staticmethod
-    def forward(ctx, scene, radii, vertices, texels):
-        ctx.scene, ctx.unknowns = scene, fit.Unknowns(radii, texels.detach().numpy())
-        # Only what a caller may change passes gradients on; the vertices are those of the radii.
-        return torch.as_tensor(scene.image(ctx.unknowns), dtype=vertices.dtype)
-
-    @staticmethod
-    def backward(ctx, adjoint):
-        by_vertices, by_texels = ctx.scene.gradient(ctx.unknowns, adjoint.numpy())
-        return None, None, torch.from_numpy(by_vertices), torch.from_numpy(by_texels)
-
+import drt.torch
 
 CIRCLE = torch.from_numpy(fit.CIRCLE)
 UP = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
@@ -35,17 +19,18 @@ def vertices(radii):
     return torch.cat([rings.reshape(-1, 3), HEIGHTS[0] * UP[None]])
 
 
-def by_torch(scene, target, unknowns, iterations, answer):
+def by_torch(scene, target, unknowns, iterations, spp, answer):
     """Minimises the mean squared difference from the target."""
     radii = torch.tensor(unknowns.radii, requires_grad=True)
     painting = torch.tensor(unknowns.painting, requires_grad=True)
-    target = torch.as_tensor(target, dtype=torch.float64)
+    target = torch.as_tensor(target)
     groups = [{"params": [radii], "lr": 0.02}, {"params": [painting], "lr": 0.04}]
     optimizer = torch.optim.Adam(groups, betas=(0.9, 0.99), eps=1e-5)
     decay = torch.optim.lr_scheduler.LambdaLR(optimizer, lambda k: 1 / (1 + 0.02 * (k + 1)))
     for iteration in range(iterations):
         optimizer.zero_grad()
-        image = Render.apply(scene, radii.detach().numpy().copy(), vertices(radii), painting)
+        params = {"vase": vertices(radii), "wall": painting}
+        image = drt.torch.render(scene, params, spp, iteration)
         loss = torch.mean((image - target) ** 2)
         loss.backward()
         if iteration % 10 == 0 or iteration == iterations - 1:

@@ -2,13 +2,14 @@
 
 use std::time::Instant;
 
-use drt_estimators::{Derivative, EstimatorKind, Rendering};
+use drt_estimators::{EstimatorKind, Rendering};
 
 use super::console;
 use super::monitor::Monitor;
 use super::noise::largest_noise;
 use super::options::Options;
 use super::run::{self, Shared};
+use crate::prepared::gradient::named;
 use crate::{CliError, Job};
 
 /// Image and derivatives by the job's estimator, filling the first `part` of the progress bar.
@@ -61,10 +62,7 @@ fn by_differences(
             rendering.complete = false;
             return Ok(rendering);
         };
-        let named = job.parameters.iter().zip(layers);
-        rendering.derivatives = named
-            .map(|(p, total)| Derivative { name: p.name.clone(), total, terms: Vec::new() })
-            .collect();
+        rendering.derivatives = named(&job.parameters, layers);
         let more = more_samples(&rendering, options, spp, started, began);
         let Some(more) = more else { return Ok(rendering) };
         spp = more;

@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 
 use drt_estimators::fit::{Collector, Fit, View};
 use drt_estimators::loss::Loss;
-use drt_estimators::{
-    Derivative, GradientBatch, Rendering, SceneGradient, Shard, Target, gradient_in_batches, moved,
-};
+use drt_estimators::{GradientBatch, SceneGradient, Shard, Target, gradient_in_batches};
 use drt_math::Rgb;
 
 use super::console;
@@ -21,10 +19,9 @@ use super::{Outcome, run, shard, stop, targets};
 use crate::error::Place;
 use crate::files::image::read_picture;
 use crate::files::npy::{write_npy, write_npy_bytes};
+use crate::prepared::gradient::{by_parameters, collect, collectors};
+use crate::prepared::independent_seed;
 use crate::{CliError, Job, ParameterGroup};
-
-/// Between the seeds of an image and of the gradient by what it says.
-const INDEPENDENT: u64 = 0xa076_1d64_78bd_642f;
 
 /// Writes the gradient where `--output` says: one number per parameter in the job's order, then those
 /// of each group.
@@ -203,7 +200,7 @@ fn by_its_image(
         return Ok(None);
     }
     let image: Vec<Rgb> = rendering.image.pixels.iter().map(|p| p.mean).collect();
-    job.settings.seed = job.settings.seed.wrapping_add(INDEPENDENT);
+    job.settings.seed = independent_seed(job.settings.seed);
     of_adjoint(job, options, loss.adjoint(&image, &view.reference), monitor)
 }
 
@@ -262,13 +259,13 @@ fn of_adjoint(
             if options.shard.is_some() {
                 let [pixels, boundary] = of.map(|gradient| {
                     let mut sums = vec![0.0; count(job)];
-                    collect(job, collectors, &gradient, &mut sums);
+                    collect_all(job, collectors, &gradient, &mut sums);
                     sums
                 });
                 batches.push(Batch { number, pixels, of_pixels, boundary, of_boundary });
             } else if let Some(sums) = total.next(count(job), of_pixels, of_boundary) {
                 let parts = of.iter().zip(sums);
-                parts.for_each(|(gradient, sums)| collect(job, collectors, gradient, sums));
+                parts.for_each(|(gradient, sums)| collect_all(job, collectors, gradient, sums));
             }
         };
         if !in_reverse(job, options.shard, &adjoint, monitor, each)? {
@@ -289,26 +286,24 @@ fn of_adjoint(
     }))
 }
 
-/// The gradient by the parameters of a loss with this derivative by every pixel.
-pub(super) fn by_parameters(rendering: &Rendering, adjoint: &[Rgb]) -> Vec<f64> {
-    let product = |d: &Derivative| -> f64 {
-        d.total.pixels.iter().zip(adjoint).map(|(p, a)| p.mean.dot(*a)).sum()
-    };
-    rendering.derivatives.iter().map(product).collect()
-}
-
 /// The number of unknowns of all groups.
 fn count(job: &Job) -> usize {
     job.groups.iter().map(|g| g.group.count(&job.scene)).sum()
 }
 
 /// Adds the groups' parts of a gradient to numbers for all unknowns.
-fn collect(job: &Job, collectors: &[Collector], gradient: &SceneGradient, mut numbers: &mut [f64]) {
-    for (group, collector) in job.groups.iter().zip(collectors) {
-        let (own, rest) = numbers.split_at_mut(group.group.count(&job.scene));
-        collector.add_to(gradient, 1.0, own);
+fn collect_all(
+    job: &Job,
+    collectors: &[Collector],
+    gradient: &SceneGradient,
+    mut numbers: &mut [f64],
+) {
+    let own = job.groups.iter().map(|group| {
+        let (own, rest) = core::mem::take(&mut numbers).split_at_mut(group.group.count(&job.scene));
         numbers = rest;
-    }
+        own
+    });
+    collect(collectors, gradient, own);
 }
 
 /// The gradient by the groups, batch by batch; false when it was interrupted.
@@ -319,11 +314,9 @@ fn in_reverse(
     monitor: &Monitor,
     mut each: impl FnMut(&[Collector], GradientBatch),
 ) -> Result<bool, CliError> {
-    let scene = moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
+    let scene = job.at_values(&job.scene)?;
     let wanted: Vec<Target> = job.groups.iter().map(|g| g.group.target).collect();
-    let collector = |g: &ParameterGroup| g.group.collector(&job.scene, &scene, &job.parameters);
-    let collectors = job.groups.iter().map(collector).collect::<Result<Vec<_>, _>>();
-    let collectors = collectors.map_err(|e| job.blame(&e))?;
+    let collectors = collectors(job, job.groups.iter().map(|g| &g.group), &scene)?;
     let (settings, spp) = (&job.settings, job.spp());
     let mut each = |batch| each(&collectors, batch);
     gradient_in_batches(&scene, &wanted, settings, spp, adjoint, shard, monitor, &mut each)

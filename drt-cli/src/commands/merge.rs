@@ -8,7 +8,7 @@ use drt_estimators::{Rendering, ShardError, ShardSums};
 use super::Outcome;
 use super::console;
 use super::destinations::check_ending;
-use super::loss_gradient::{by_parameters, refuse_with_gradient};
+use super::loss_gradient::refuse_with_gradient;
 use super::options::MergeOptions;
 use super::outputs::{Files, summarize};
 use super::shard_file::{ShardFile, Sums, Total, view};
@@ -16,6 +16,7 @@ use super::stop;
 use crate::error::Place;
 use crate::files::digest::RunFacts;
 use crate::files::npy::write_npy;
+use crate::prepared::gradient::by_parameters;
 use crate::{CliError, Provenance};
 
 pub(super) fn run(options: &MergeOptions) -> Result<Outcome, CliError> {

@@ -10,8 +10,6 @@ use super::console;
 use super::monitor::Monitor;
 use super::noise::largest_noise;
 use super::options::{Changes, Options};
-use crate::error::Place;
-use crate::files::memory;
 use crate::job::{depth, read_job};
 use crate::scene_xml::SceneReader;
 use crate::wording::shown;
@@ -19,10 +17,6 @@ use crate::{CliError, Job};
 
 /// Samples per pixel of the first pass where time or noise decides when to stop; later ones double.
 const FIRST_PASS: u32 = 4;
-/// Least memory that each pixel takes.
-const IMAGE_BYTES: u128 = 160;
-/// Least memory that each pixel takes more with each derivative.
-const DERIVATIVE_BYTES: u128 = 300;
 
 /// What jobs of one scene in a row share: its files are read once, and what was prepared is used again.
 #[derive(Default)]
@@ -74,11 +68,8 @@ fn read_changed(
     if let Some(name) = &changes.sensor {
         job.select_sensor(name)?;
     }
-    if let (Some(film), Some(sensor)) =
-        (changes.size, job.scene.sensors.get_mut(job.settings.sensor))
-    {
-        let resized = sensor.item.sensor.with_film(film);
-        sensor.item.sensor = resized.map_err(|e| CliError::argument(format!("--size: {e}")))?;
+    if let Some(film) = changes.size {
+        job.resize(job.settings.sensor, film)?;
     }
     let settings = &mut job.settings;
     settings.seed = changes.seed.unwrap_or(settings.seed);
@@ -115,37 +106,13 @@ pub(super) fn prepare(
     parameters: &[Parameter<String>],
     shared: &mut Shared,
 ) -> Result<Session, CliError> {
-    if job.scene.sensors.is_empty() {
-        let place = Place::file(&job.scene_path);
-        return Err(CliError::input(&place, "the scene has no <sensor>"));
-    }
-    check_memory(job, parameters.len())?;
-    Session::with_cache(&job.scene, parameters, &job.settings, &mut shared.prepared)
-        .map_err(|e| job.blame(&e))
-}
-
-/// Refuses a film that does not fit into memory, with derivatives by so many parameters.
-fn check_memory(job: &Job, parameters: usize) -> Result<(), CliError> {
-    let Some(sensor) = job.scene.sensors.get(job.settings.sensor) else { return Ok(()) };
-    let [w, h] = sensor.item.sensor.film();
-    let pixel = IMAGE_BYTES + DERIVATIVE_BYTES * parameters as u128;
-    memory::check(u128::from(w) * u128::from(h) * pixel).map_err(|e| {
-        let message = format!(
-            "the film of {w}x{h} pixels, with {parameters} derivatives, would {e}; expected a smaller one (--size)"
-        );
-        CliError::input(&Place::file(&job.scene_path), message)
-    })
+    job.session(&job.scene, parameters, &job.settings, &mut shared.prepared)
 }
 
 /// Prepares the image alone, at the parameters' values.
 pub(super) fn prepare_forward(job: &Job, shared: &mut Shared) -> Result<Session, CliError> {
-    let at_rest = job.parameters.iter().all(|p| p.value == 0.0);
-    if at_rest {
-        return prepare(job, &[], shared);
-    }
-    check_memory(job, 0)?;
-    let scene = drt_estimators::moved(&job.scene, &job.parameters).map_err(|e| job.blame(&e))?;
-    Session::with_cache(&scene, &[], &job.settings, &mut shared.prepared).map_err(|e| job.blame(&e))
+    let scene = job.at_values(&job.scene)?;
+    job.session(&scene, &[], &job.settings, &mut shared.prepared)
 }
 
 /// Finite differences of every parameter; `None` when they were interrupted.

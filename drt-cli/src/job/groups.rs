@@ -37,6 +37,29 @@ pub struct GroupSteps {
     pub log: bool,
 }
 
+impl GroupSteps {
+    /// The steps of unknowns of some kind, or of one number if there is none, as the text of a TOML table says by the keys of a
+    /// `[[parameter_group]]`: `learning_rate`, `laplacian`, `smooth`, `bounds` and `log`.
+    ///
+    /// # Errors
+    /// Names the key.
+    pub fn from_text(text: &str, kind: Option<&GroupKind>) -> Result<Self, CliError> {
+        let keys: keys::Steps =
+            toml::from_str(text).map_err(|e| CliError::argument(e.message().to_string()))?;
+        steps(&keys, kind).map_err(CliError::argument)
+    }
+}
+
+impl From<Group> for ParameterGroup {
+    /// A group whose values stay in the range in which they have a meaning.
+    fn from(group: Group) -> Self {
+        let bounds = range(&group.kind);
+        let steps =
+            GroupSteps { learning_rate: None, laplacian: 0.0, smooth: 0.0, bounds, log: false };
+        Self { group, steps }
+    }
+}
+
 pub(super) fn groups(
     document: &Document<'_>,
     keys: &[Spanned<keys::ParameterGroup>],
@@ -76,7 +99,7 @@ pub(super) fn groups(
         if taken(&name) {
             return Err(fail(format!("there are two groups `{name}`; expected a `name` of each")));
         }
-        let steps = steps(keys, &kind).map_err(fail)?;
+        let steps = steps(&keys.steps(), Some(&kind)).map_err(fail)?;
         let group = Group::new(name, scene, &target, kind).map_err(|e| fail(e.to_string()))?;
         groups.push(ParameterGroup { group, steps });
     }
@@ -173,20 +196,25 @@ fn property(name: Option<&str>) -> Result<drt_medium::Property, String> {
 /// How far from zero a fit takes mean cosines where nothing else is said: at 1 nothing is scattered aside.
 const SHARPEST_G: f64 = 0.99;
 
-/// How a group is stepped. Values stay in the range in which they have a meaning, where nothing else is said.
-fn steps(keys: &keys::ParameterGroup, kind: &GroupKind) -> Result<GroupSteps, String> {
-    let all = [f64::NEG_INFINITY, f64::INFINITY];
-    let meaningful = match kind {
+const UNBOUNDED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+/// The range in which values of a kind have a meaning.
+fn range(kind: &GroupKind) -> [f64; 2] {
+    match kind {
         GroupKind::Voxels(drt_medium::Property::Albedo | drt_medium::Property::Weight) => {
             [0.0, 1.0]
         }
         GroupKind::Voxels(drt_medium::Property::G) => [-SHARPEST_G, SHARPEST_G],
         GroupKind::Voxels(_) | GroupKind::LightTexels => [0.0, f64::INFINITY],
         GroupKind::Texels { property, .. } => property.range(),
-        _ => all,
-    };
-    let of_shape = matches!(kind, GroupKind::Vertices | GroupKind::Cage(_));
-    let bounds = keys.bounds.map_or(meaningful, |List(bounds)| bounds);
+        _ => UNBOUNDED,
+    }
+}
+
+/// How a group is stepped. Values stay in the range in which they have a meaning, where nothing else is said.
+fn steps(keys: &keys::Steps, kind: Option<&GroupKind>) -> Result<GroupSteps, String> {
+    let of_shape = matches!(kind, Some(GroupKind::Vertices | GroupKind::Cage(_)));
+    let bounds = keys.bounds.map_or(kind.map_or(UNBOUNDED, range), |List(bounds)| bounds);
     let [lower, upper] = bounds;
     if lower.partial_cmp(&upper) != Some(core::cmp::Ordering::Less) {
         return Err(format!("`bounds`: [{}, {}]; expected a range", bounds[0], bounds[1]));
@@ -200,7 +228,7 @@ fn steps(keys: &keys::ParameterGroup, kind: &GroupKind) -> Result<GroupSteps, St
         return Err("`laplacian` goes with `vertices` and `cage`".into());
     }
     let log = keys.log.unwrap_or(false);
-    if laplacian > 0.0 && (log || bounds != all) {
+    if laplacian > 0.0 && (log || bounds != UNBOUNDED) {
         return Err("`laplacian` does not go with `bounds` or `log`".into());
     }
     let learning_rate = match &keys.learning_rate {
@@ -220,11 +248,9 @@ fn steps(keys: &keys::ParameterGroup, kind: &GroupKind) -> Result<GroupSteps, St
             Some(Stages::new(first, stages))
         }
     };
-    Ok(GroupSteps {
-        learning_rate,
-        laplacian,
-        smooth: not_negative("smooth", keys.smooth)?,
-        bounds,
-        log,
-    })
+    let smooth = not_negative("smooth", keys.smooth)?;
+    if smooth > 0.0 && kind.is_none() {
+        return Err("`smooth` goes with groups".into());
+    }
+    Ok(GroupSteps { learning_rate, laplacian, smooth, bounds, log })
 }

@@ -223,7 +223,27 @@ pub(super) struct ParameterGroup {
     pub(super) log: Option<bool>,
 }
 
+impl ParameterGroup {
+    /// The keys that say how the group is stepped.
+    pub(super) fn steps(&self) -> Steps {
+        let Self { learning_rate, laplacian, smooth, bounds, log, .. } = self;
+        let learning_rate = learning_rate.clone();
+        Steps { learning_rate, laplacian: *laplacian, smooth: *smooth, bounds: *bounds, log: *log }
+    }
+}
+
+/// How a fit steps unknowns.
 #[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Steps {
+    pub(super) learning_rate: Option<GroupRate>,
+    pub(super) laplacian: Option<f64>,
+    pub(super) smooth: Option<f64>,
+    pub(super) bounds: Option<List<f64, 2>>,
+    pub(super) log: Option<bool>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
 #[serde(untagged, expecting = "expected a number or stages [[0, 0.02], [100, 0.005]]")]
 pub(super) enum GroupRate {
     All(f64),

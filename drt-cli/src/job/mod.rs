@@ -9,6 +9,7 @@ pub(crate) mod keys;
 mod list;
 mod motions;
 mod optimize;
+mod preparation;
 mod refusal;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ mod views;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use drt_estimators::fit::Group;
 use drt_estimators::{
     AuxiliarySamples, Depth, EstimatorKind, Scene, Settings, Target, Term, Warp, WarpKernel,
 };
@@ -125,8 +127,17 @@ pub(crate) fn read_job(
     overrides: &Overrides,
     scenes: &mut SceneReader,
 ) -> Result<Job, CliError> {
-    let text = read_text(path, None)?;
-    let document = Document::new(path, &text, &overrides.set);
+    parse(path, &read_text(path, None)?, overrides, scenes)
+}
+
+/// Reads a job from its text; relative file names start from the folder of `path`, by which messages call it.
+fn parse(
+    path: &Path,
+    text: &str,
+    overrides: &Overrides,
+    scenes: &mut SceneReader,
+) -> Result<Job, CliError> {
+    let document = Document::new(path, text, &overrides.set);
     let keys: keys::Job = document.parse()?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let scene_path = scene_file(&document, &keys.scene, folder)?;
@@ -146,7 +157,7 @@ pub(crate) fn read_job(
     read.extend(files::named(&keys, folder));
     read.push(path.into());
     let path = path.into();
-    let text = Some(text);
+    let text = Some(text.into());
     let mut job = Job {
         path,
         text,
@@ -190,6 +201,15 @@ impl Job {
     /// As [`load_scene`](crate::load_scene).
     pub fn from_scene(path: &Path, defaults: &Defaults) -> Result<Self, CliError> {
         Self::read_scene(path, defaults, &mut SceneReader::default())
+    }
+
+    /// Reads a job from its text, as [`load_job`] does from a file. Relative file names start from the folder of `path`, by
+    /// which messages call the text; there need not be such a file.
+    ///
+    /// # Errors
+    /// As [`load_job`].
+    pub fn from_text(text: &str, path: &Path, overrides: &Overrides) -> Result<Self, CliError> {
+        parse(path, text, overrides, &mut SceneReader::default())
     }
 
     /// As [`Job::from_scene`], with a reader that may know the scene.
@@ -237,10 +257,38 @@ impl Job {
     /// Changes the number of samples per pixel. Boundary samples stay as many as the job says; where it does not,
     /// they change in proportion.
     pub fn set_spp(&mut self, spp: u32) {
+        self.settings = self.settings_for(spp);
         self.spp = spp;
-        self.settings.expected_spp = spp;
+    }
+
+    /// The settings with another number of samples per pixel.
+    pub(crate) fn settings_for(&self, spp: u32) -> Settings {
         let ratio = |boundary: u32| f64::from(boundary) / f64::from(spp.max(1));
-        self.settings.boundary_ratio = self.boundary_spp.map(ratio);
+        let boundary_ratio = self.boundary_spp.map(ratio);
+        Settings { expected_spp: spp, boundary_ratio, ..self.settings.clone() }
+    }
+
+    /// Gives a sensor's film another size, in pixels.
+    ///
+    /// # Errors
+    /// When there is no such sensor, or no film of that size.
+    pub fn resize(&mut self, sensor: usize, size: [u32; 2]) -> Result<(), CliError> {
+        let Some(sensor) = self.scene.sensors.get_mut(sensor) else {
+            let message = "the scene has no <sensor>";
+            return Err(CliError::input(&Place::file(&self.scene_path), message));
+        };
+        let resized = sensor.item.sensor.with_film(size);
+        sensor.item.sensor = resized.map_err(|e| CliError::argument(format!("--size: {e}")))?;
+        Ok(())
+    }
+
+    /// Adds a group of each shape's vertices, each medium's voxels and each texture's texels, as far as they have
+    /// gradients; they are named as [`Group::all`] does.
+    #[must_use]
+    pub fn with_all_groups(mut self) -> Self {
+        let all = Group::all(&self.scene).into_iter().map(ParameterGroup::from);
+        self.groups.extend(all);
+        self
     }
 
     /// What to call it among others: the file's name, or that of its folder where the file's says
@@ -259,6 +307,14 @@ impl Job {
             .map_err(|e| CliError::argument(format!("--sensor: {e}")))?;
         self.take_sample_count();
         Ok(())
+    }
+
+    /// The index of the sensor of an id, or of kind and order such as `sensor[1]`.
+    ///
+    /// # Errors
+    /// When nothing has this name, or it is not a sensor.
+    pub fn find_sensor(&self, name: &str) -> Result<usize, CliError> {
+        find_sensor(&self.scene, name).map_err(CliError::argument)
     }
 
     /// Lists all files that were read.

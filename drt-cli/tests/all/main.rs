@@ -10,6 +10,5 @@ mod looks;
 #[cfg(all(unix, feature = "mpi"))]
 mod mpi;
 mod optimize;
-mod python;
 mod shards;
 mod textures;

@@ -19,7 +19,7 @@ use drt_motion::{Change, GeometryChange, Parameter};
 
 use crate::derivative::scene_gradient::SceneGradient;
 use crate::model::error::Error;
-use crate::model::scene::{Scene, Target, TargetName};
+use crate::model::scene::{Named, Scene, Target, TargetName};
 use crate::model::surface;
 
 /// Very many unknowns of one kind.
@@ -76,6 +76,44 @@ impl Group {
         Ok(group)
     }
 
+    /// Groups of all vertices, voxels and texels of a scene that have gradients, named by their targets and by what
+    /// they are: `cube.vertices`, `smoke.sigma_t`, `wall.reflectance`, `sky.radiance`. Vertices of instances are left
+    /// out: they have gradients in an [expanded](Scene::expanded) scene.
+    #[must_use]
+    pub fn all(scene: &Scene) -> Vec<Self> {
+        let mut groups = Vec::new();
+        let mut add = |target, what: &str, kind| {
+            let name = format!("{}.{what}", scene.name_of(target));
+            groups.push(Self { name, target, kind });
+        };
+        let instanced = |s: &usize| scene.instances.iter().any(|instance| instance.shape == *s);
+        for s in (0..scene.shapes.len()).filter(|s| !instanced(s)) {
+            add(Target::Shape(s), "vertices", GroupKind::Vertices);
+        }
+        for (m, medium) in scene.media.iter().enumerate() {
+            for property in drt_medium::Property::ALL {
+                if medium.item.voxels(property).is_some() {
+                    add(Target::Medium(m), property.name(), GroupKind::Voxels(property));
+                }
+            }
+        }
+        for (b, Named { item: bsdf, .. }) in scene.bsdfs.iter().enumerate() {
+            for property in bsdf.differentiated().iter() {
+                let number = bsdf.is_number(property) == Some(true);
+                if bsdf.texels(property).is_some() && bsdf.undifferentiated(property).is_none() {
+                    let kind = GroupKind::Texels { property, number };
+                    add(Target::Bsdf(b), property.name(), kind);
+                }
+            }
+        }
+        for (e, emitter) in scene.emitters.iter().enumerate() {
+            if emitter.item.emitter.texels().is_some() {
+                add(Target::Emitter(e), "radiance", GroupKind::LightTexels);
+            }
+        }
+        groups
+    }
+
     /// Refuses groups that would set the same values. Each of them has its gradient, but only one of them can step.
     ///
     /// # Errors
@@ -114,6 +152,37 @@ impl Group {
             }
             _ => self.values(scene).len(),
         }
+    }
+
+    /// The lengths of the axes of the group's values, the last of which varies fastest: vertices × 3, voxels of z × y × x,
+    /// or rows × columns of texels, with another axis where these have several channels.
+    #[must_use]
+    pub fn shape(&self, scene: &Scene) -> Vec<usize> {
+        let of_image = |size: Option<[u32; 2]>| {
+            size.map_or_else(Vec::new, |[w, h]| alloc::vec![h as usize, w as usize])
+        };
+        let mut shape = match (&self.kind, self.target) {
+            (GroupKind::Vertices, Target::Shape(s)) => {
+                alloc::vec![scene.shapes[s].mesh.source_vertex_count as usize]
+            }
+            (GroupKind::Cage(cage), _) => alloc::vec![cage.positions.len()],
+            (GroupKind::Voxels(property), Target::Medium(m)) => {
+                let grid = scene.media[m].item.voxels(*property);
+                grid.map_or_else(Vec::new, |grid| grid.size().into_iter().rev().collect())
+            }
+            (GroupKind::Texels { property, .. }, Target::Bsdf(b)) => {
+                of_image(scene.bsdfs[b].item.texels(*property))
+            }
+            (GroupKind::LightTexels, Target::Emitter(e)) => {
+                of_image(scene.emitters[e].item.emitter.texels())
+            }
+            _ => Vec::new(),
+        };
+        let channels = self.count(scene) / shape.iter().product::<usize>().max(1);
+        if channels != 1 {
+            shape.push(channels);
+        }
+        shape
     }
 
     /// The values of the group in a scene; for a cage, the positions of its vertices.

@@ -17,6 +17,7 @@
 
 mod evaluation;
 mod group;
+mod grouped_scene;
 mod linear;
 pub mod loss;
 mod source;
@@ -33,13 +34,14 @@ use crate::model::error::{Error, SettingError};
 use crate::model::scene::{Scene, Target};
 use crate::model::settings::{EstimatorKind, Settings};
 use crate::model::shard::Shard;
-use crate::run::control::Control;
+use crate::run::control::{Control, Part};
 use crate::run::session::ShardSums;
 use crate::run::session::choice::gradients;
 use crate::world::cache::PreparedCache;
 
 pub use crate::fit::evaluation::{Evaluation, Half};
 pub use crate::fit::group::{Collector, Group, GroupKind};
+pub use crate::fit::grouped_scene::GroupedScene;
 use crate::fit::source::{Applied, ImageSource};
 pub use crate::fit::step::{Misstep, check_step};
 
@@ -65,13 +67,8 @@ impl View {
 
 /// A scene, the parameters and groups that are fitted, and the views that it should match.
 pub struct Fit {
-    /// As it was given.
-    given: Scene,
     /// With the values of the groups.
-    scene: Scene,
-    groups: Vec<Group>,
-    /// Their values.
-    group_values: Vec<Vec<f64>>,
+    grouped: GroupedScene,
     parameters: Vec<Parameter>,
     views: Arc<[View]>,
     loss: Loss,
@@ -118,21 +115,9 @@ impl Fit {
         }
         let mut kept = PreparedCache::default();
         let estimators = estimators(&scene, &parameters, &[], &views, &settings, &mut kept)?;
-        let (views, applied, given) = (views.into(), None, scene.clone());
-        let (groups, group_values) = (Vec::new(), Vec::new());
-        Ok(Self {
-            given,
-            scene,
-            groups,
-            group_values,
-            parameters,
-            views,
-            loss,
-            settings,
-            estimators,
-            applied,
-            kept,
-        })
+        let (views, applied) = (views.into(), None);
+        let grouped = GroupedScene::new(scene, Vec::new());
+        Ok(Self { grouped, parameters, views, loss, settings, estimators, applied, kept })
     }
 
     /// This fit with groups of unknowns beside its parameters. They have the values of the scene until
@@ -146,10 +131,10 @@ impl Fit {
         if !groups.is_empty() && self.settings.estimator == EstimatorKind::FiniteDifference {
             return Err(Error::Setting { setting: "estimator", reason: SettingError::NoSession });
         }
-        self.group_values = groups.iter().map(|group| group.values(&self.given)).collect();
-        self.groups = groups;
-        if !self.groups.is_empty() {
-            let Self { given, parameters, groups, views, settings, kept, .. } = &mut self;
+        self.grouped = GroupedScene::new(self.grouped.given().clone(), groups);
+        if !self.grouped.groups().is_empty() {
+            let Self { grouped, parameters, views, settings, kept, .. } = &mut self;
+            let (given, groups) = (grouped.given(), grouped.groups());
             self.estimators = estimators(given, parameters, groups, views, settings, kept)?;
         }
         Ok(self)
@@ -167,20 +152,7 @@ impl Fit {
     /// When there is no such group, their number is another, or one is out of its range, and when two groups decide the same
     /// values; the values then stay.
     pub fn set_group(&mut self, group: usize, values: &[f64]) -> Result<(), Error> {
-        let Some(known) = self.group_values.get_mut(group) else {
-            let reason = SettingError::NoGroup { index: group, count: self.groups.len() };
-            return Err(Error::Setting { setting: "group", reason });
-        };
-        Group::check_together(&self.groups)?;
-        let before = core::mem::replace(known, values.to_vec());
-        // From what was given, so that nothing depends on values on the way.
-        let mut scene = self.given.clone();
-        let mut all = self.groups.iter().zip(&self.group_values);
-        if let Err(error) = all.try_for_each(|(of, v)| of.apply(&self.given, v, &mut scene)) {
-            self.group_values[group] = before;
-            return Err(error);
-        }
-        self.scene = scene;
+        self.grouped.set(&[(group, values)])?;
         self.applied = None;
         Ok(())
     }
@@ -191,7 +163,7 @@ impl Fit {
     /// When an effect does not fit its target there.
     pub fn scene_at(&mut self, values: &[f64]) -> Result<&Scene, Error> {
         self.apply(values)?;
-        Ok(self.applied.as_ref().map_or(&self.scene, |applied| &applied.scene))
+        Ok(self.applied.as_ref().map_or(self.grouped.scene(), |applied| &applied.scene))
     }
 
     fn apply(&mut self, values: &[f64]) -> Result<Arc<Applied>, Error> {
@@ -209,7 +181,7 @@ impl Fit {
         if let Some(applied) = &self.applied {
             return Ok(applied.clone());
         }
-        let applied = Arc::new(Applied::new(&self.scene, &self.parameters)?);
+        let applied = Arc::new(Applied::new(self.grouped.scene(), &self.parameters)?);
         self.applied = Some(applied.clone());
         Ok(applied)
     }
@@ -246,13 +218,13 @@ impl Fit {
         control: &dyn Control,
     ) -> Result<Option<Evaluation>, Error> {
         let mut halves = Vec::new();
-        let zeros = |group: &Group| alloc::vec![0.0; group.count(&self.given)];
-        let mut groups: Vec<Vec<f64>> = self.groups.iter().map(zeros).collect();
+        let zeros = |group: &Group| alloc::vec![0.0; group.count(self.grouped.given())];
+        let mut groups: Vec<Vec<f64>> = self.grouped.groups().iter().map(zeros).collect();
         let count = views.len();
         for (k, view) in views.iter().copied().enumerate() {
-            let progress = |done| control.progress((k as f64 + done) / count as f64);
-            let control = Watched { control, progress };
-            let seen = match self.groups.is_empty() {
+            let control =
+                Part::new(control, k as f64 / count as f64, (k + 1) as f64 / count as f64);
+            let seen = match groups.is_empty() {
                 true => self.halves(values, spp, seed, view, 0..2, &control)?,
                 false => {
                     let of_groups = &mut groups;
@@ -285,8 +257,7 @@ impl Fit {
         gradients: &mut [Vec<f64>],
         control: &dyn Control,
     ) -> Result<Option<Vec<Half>>, Error> {
-        let part = |from: f64, done: f64| control.progress(0.5 * (from + done));
-        let images = Watched { control, progress: |done| part(0.0, done) };
+        let images = Part::new(control, 0.0, 0.5);
         let mut source = self.source(values, view, 2)?;
         let Some(halves) = halves_of(&mut source, spp, seed, 0..2, &images)? else {
             return Ok(None);
@@ -295,13 +266,14 @@ impl Fit {
         let View { reference, pose, .. } = &self.views[view];
         let adjoints = [0, 1].map(|k| self.loss.adjoint(&halves[k].image, reference));
         let changes = [&self.parameters[..], pose].concat();
+        let (given, groups) = (self.grouped.given(), self.grouped.groups());
         let collectors =
-            self.groups.iter().map(|group| group.collector(&self.given, &applied.scene, &changes));
+            groups.iter().map(|group| group.collector(given, &applied.scene, &changes));
         let collectors = collectors.collect::<Result<Vec<_>, _>>()?;
-        let wanted = targets(&self.groups);
+        let wanted = targets(groups);
         for (k, adjoint) in (0..2).zip(adjoints.iter().rev()) {
-            let progress = |done| part(1.0, 0.5 * (k as f64 + done));
-            let control = Watched { control, progress };
+            let from = 0.5 + 0.25 * k as f64;
+            let control = Part::new(control, from, from + 0.25);
             let seed = half_seed(seed, k);
             let found = source.gradient(&wanted, spp.div_ceil(2), seed, adjoint, &control)?;
             let Some(gradient) = found else { return Ok(None) };
@@ -367,7 +339,7 @@ impl Fit {
     }
 
     fn source(&mut self, values: &[f64], view: usize, halves: usize) -> Result<ImageSource, Error> {
-        self.scene.check()?;
+        self.grouped.scene().check()?;
         let count = self.views.len();
         let Some(sensor) = self.views.get(view).filter(|_| halves <= 2).map(|v| v.sensor) else {
             let reason = SettingError::NoSensor { index: view, count };
@@ -377,7 +349,8 @@ impl Fit {
         let estimator = self.estimators[view];
         let settings = Settings { sensor, estimator, terms: false, ..self.settings.clone() };
         let pose = &self.views[view].pose;
-        ImageSource::new(&self.scene, &self.parameters, pose, &applied, settings, &mut self.kept)
+        let scene = self.grouped.scene();
+        ImageSource::new(scene, &self.parameters, pose, &applied, settings, &mut self.kept)
     }
 
     /// The scene at these values as a view sees it.
@@ -385,7 +358,7 @@ impl Fit {
         let applied = self.apply(values)?;
         match &self.views[view].pose[..] {
             [] => Ok(applied),
-            pose => Applied::posed(&self.scene, &self.parameters, pose).map(Arc::new),
+            pose => Applied::posed(self.grouped.scene(), &self.parameters, pose).map(Arc::new),
         }
     }
 }
@@ -449,8 +422,8 @@ fn halves_of(
     let (first, count) = (wanted.start, wanted.len().max(1) as f64);
     let mut halves = Vec::new();
     for k in wanted {
-        let progress = |done| control.progress(((k - first) as f64 + done) / count);
-        let control = Watched { control, progress };
+        let from = (k - first) as f64;
+        let control = Part::new(control, from / count, (from + 1.0) / count);
         match source.half(spp.div_ceil(2), half_seed(seed, k), &control)? {
             Some(half) => halves.push(half),
             None => return Ok(None),
@@ -462,20 +435,4 @@ fn halves_of(
 /// The seed of one of the two halves of an iteration's samples.
 fn half_seed(seed: u64, half: usize) -> u64 {
     if half == 0 { seed } else { seed.wrapping_add(HALF) }
-}
-
-/// Watches a part of a longer run.
-struct Watched<'a, P> {
-    control: &'a dyn Control,
-    progress: P,
-}
-
-impl<P: Fn(f64) + Sync> Control for Watched<'_, P> {
-    fn cancelled(&self) -> bool {
-        self.control.cancelled()
-    }
-
-    fn progress(&self, done: f64) {
-        (self.progress)(done);
-    }
 }

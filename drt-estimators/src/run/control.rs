@@ -21,6 +21,32 @@ pub trait Control: Sync {
 pub struct Unattended;
 impl Control for Unattended {}
 
+/// The control of a part of a longer run.
+#[derive(Clone, Copy)]
+pub struct Part<'a> {
+    whole: &'a dyn Control,
+    from: f64,
+    to: f64,
+}
+
+impl<'a> Part<'a> {
+    /// The part from `from` to `to` of what `whole` controls, where 0 is its start and 1 its end.
+    #[must_use]
+    pub fn new(whole: &'a dyn Control, from: f64, to: f64) -> Self {
+        Self { whole, from, to }
+    }
+}
+
+impl Control for Part<'_> {
+    fn cancelled(&self) -> bool {
+        self.whole.cancelled()
+    }
+
+    fn progress(&self, done: f64) {
+        self.whole.progress(self.from + (self.to - self.from) * done);
+    }
+}
+
 /// Some neighbouring pixels after another round of samples.
 #[derive(Clone, Copy, Debug)]
 pub struct FinishedTile<'a> {

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::common::*;
-use drt_estimators::fit::{Evaluation, Fit, Group, GroupKind, View};
+use drt_estimators::fit::{Evaluation, Fit, Group, GroupKind, GroupedScene, View};
 use drt_estimators::loss::{Loss, Reference};
 use drt_estimators::{Scene, Session, Settings, Unattended};
 use drt_geom::procedural;
@@ -193,4 +193,37 @@ fn what_cannot_be_meant_is_refused() {
     values[5] = f64::NAN;
     let message = one.set_group(0, &values).err().map(|e| e.to_string());
     assert_eq!(message.as_deref(), Some("group `ball`: a value is NaN"));
+}
+
+/// Values depend on what was set last alone: set back, everything has the bits that it had; of what cannot be set nothing
+/// changes.
+#[test]
+fn values_are_those_that_were_set_last() {
+    let scene = surfaces(diffuse(0.7, 0.5, 0.3), diffuse(0.4, 0.5, 0.6));
+    let groups = Group::all(&scene);
+    let names: Vec<String> = groups.iter().map(|group| group.name.clone()).collect();
+    assert!(names.iter().any(|name| name == "ball.vertices"), "{names:?}");
+    for group in &groups {
+        assert_eq!(group.shape(&scene).iter().product::<usize>(), group.count(&scene));
+    }
+    let ball = names.iter().position(|name| name == "ball.vertices").expect("a ball");
+    let mut grouped = GroupedScene::new(scene.clone(), groups);
+    let start = grouped.values(ball).expect("a group").into_owned();
+    let bits = |grouped: &GroupedScene| -> Vec<u64> {
+        let values = grouped.groups()[ball].values(grouped.scene());
+        values.iter().map(|v| v.to_bits()).collect()
+    };
+    let before = bits(&grouped);
+    let moved: Vec<f64> = start.iter().map(|v| v + 0.1).collect();
+    grouped.set(&[(ball, &moved)]).expect("finite values");
+    assert_ne!(bits(&grouped), before);
+    let once = bits(&grouped);
+    for wrong in [&moved[1..], &vec![f64::NAN; moved.len()]] {
+        assert!(grouped.set(&[(ball, &start), (ball, wrong)]).is_err());
+        assert_eq!(bits(&grouped), once);
+    }
+    assert!(grouped.set(&[(ball, &start), (names.len(), &[])]).is_err());
+    assert_eq!(bits(&grouped), once);
+    grouped.set(&[(ball, &start)]).expect("finite values");
+    assert_eq!(bits(&grouped), before);
 }

@@ -7,42 +7,37 @@ use std::sync::Arc;
 use drt_estimators::fit::{Evaluation, Fit, Group, GroupKind};
 use drt_estimators::{Scene, Target};
 use drt_geom::Mesh;
-use drt_math::{Vec3, vec3};
+use drt_math::vec3;
 use drt_medium::vol::{self, VolFile};
-use drt_motion::optimize::field::{
-    FieldOptimizer, FieldRule, FieldState, LaplacianSmoothing, MeshLaplacian, laplacian_energy,
-    total_variation,
-};
-use drt_motion::optimize::{OptimizeError, Stages};
+use drt_motion::optimize::OptimizeError;
+use drt_motion::optimize::field::FieldState;
 
 use super::problem::Problem;
 use crate::error::Place;
 use crate::files::atomic::write_atomically;
 use crate::files::image::encode_texels;
 use crate::files::mesh_file;
-use crate::job::{GroupSteps, ParameterGroup};
+use crate::job::ParameterGroup;
+use crate::prepared::FieldSteps;
 use crate::{CliError, Job};
 
 /// All groups of a fit.
 #[derive(Clone)]
 pub(super) struct Fields<'a> {
     problem: &'a Problem<'a>,
-    optimizers: Vec<FieldOptimizer>,
-    /// Where each group began, and what bends its mesh, if it has one.
-    starts: Vec<Start>,
-}
-
-/// What a group began with.
-#[derive(Clone)]
-struct Start {
-    values: Vec<f64>,
-    laplacian: Option<MeshLaplacian>,
+    optimizers: Vec<FieldSteps>,
+    /// Where each group began.
+    starts: Vec<Vec<f64>>,
 }
 
 impl<'a> Fields<'a> {
     /// Begins with the values of the scene.
     pub(super) fn begin(problem: &'a Problem<'a>) -> Result<Self, CliError> {
-        Self::new(problem, |rule, _, start| FieldOptimizer::new(rule, start))
+        Self::new(problem, |i, start| {
+            let job = problem.job;
+            let (method, rate) = (problem.plan.method, problem.plan.group_rates[i]);
+            FieldSteps::new(&job.scene, &job.groups[i], start, method, rate)
+        })
     }
 
     /// Goes on from the states of a checkpoint.
@@ -54,31 +49,30 @@ impl<'a> Fields<'a> {
             let message = "its checkpoint has another number of groups; --restart begins anew";
             return Err(CliError::input(&Place::file(&problem.job.path), message));
         }
-        Self::new(problem, |rule, i, _| FieldOptimizer::resume(rule, states[i].clone()))
+        Self::new(problem, |i, start| {
+            let (job, state) = (problem.job, states[i].clone());
+            let (method, rate) = (problem.plan.method, problem.plan.group_rates[i]);
+            FieldSteps::resume(&job.scene, &job.groups[i], start, method, rate, state)
+        })
     }
 
-    fn new<E: std::fmt::Display>(
+    fn new(
         problem: &'a Problem<'a>,
-        make: impl Fn(FieldRule, usize, &[f64]) -> Result<FieldOptimizer, E>,
+        make: impl Fn(usize, &[f64]) -> Result<FieldSteps, OptimizeError>,
     ) -> Result<Self, CliError> {
         let (mut optimizers, mut starts) = (Vec::new(), Vec::new());
-        let scene = &problem.job.scene;
         for (i, group) in problem.job.groups.iter().enumerate() {
-            let fail = |e: &dyn std::fmt::Display| {
+            let values = group.group.values(&problem.job.scene);
+            optimizers.push(make(i, &values).map_err(|e| {
                 let message = format!("group `{}`: {e}", group.group.name);
                 CliError::input(&Place::file(&problem.job.path), message)
-            };
-            let values = group.group.values(scene);
-            let laplacian = laplacian(scene, &group.group, &values).map_err(|e| fail(&e))?;
-            let rate = problem.plan.group_rates[i];
-            let rule = rule(problem, group, rate, laplacian.as_ref()).map_err(|e| fail(&e))?;
-            optimizers.push(make(rule, i, &values).map_err(|e| fail(&e))?);
-            starts.push(Start { values, laplacian });
+            })?);
+            starts.push(values);
         }
         Ok(Self { problem, optimizers, starts })
     }
 
-    fn groups(&self) -> impl Iterator<Item = (&'a ParameterGroup, &FieldOptimizer)> {
+    fn groups(&self) -> impl Iterator<Item = (&'a ParameterGroup, &FieldSteps)> {
         self.problem.job.groups.iter().zip(&self.optimizers)
     }
 
@@ -103,7 +97,7 @@ impl<'a> Fields<'a> {
 
     /// A row of the table of values: the parameters', and the root mean square change of each group from where it began.
     pub(super) fn row(&self, parameters: &[f64]) -> Vec<f64> {
-        let change = |(optimizer, Start { values, .. }): (&FieldOptimizer, &Start)| {
+        let change = |(optimizer, values): (&FieldSteps, &Vec<f64>)| {
             let squares = optimizer.values().iter().zip(values).map(|(v, s)| (v - s) * (v - s));
             (squares.sum::<f64>() / values.len().max(1) as f64).sqrt()
         };
@@ -128,15 +122,9 @@ impl<'a> Fields<'a> {
 
     /// Steps all groups.
     pub(super) fn step(&mut self, i: u32, seen: &Evaluation, factor: f64) -> Result<(), CliError> {
-        let job = self.problem.job;
-        for (g, (group, optimizer)) in job.groups.iter().zip(&mut self.optimizers).enumerate() {
-            let mut gradient = seen.group_gradient(g).to_vec();
-            let laplacian = self.starts[g].laplacian.as_ref();
-            let smoothed = match group.steps.smooth > 0.0 {
-                true => smooth(&job.scene, group, laplacian, optimizer.values(), &mut gradient),
-                false => Ok(()),
-            };
-            smoothed.and_then(|()| optimizer.step(&gradient, i, factor)).map_err(|e| {
+        let groups = self.problem.job.groups.iter();
+        for (g, (group, optimizer)) in groups.zip(&mut self.optimizers).enumerate() {
+            optimizer.step(seen.group_gradient(g), i, factor).map_err(|e| {
                 CliError::unsolved(format!("iteration {i}: group `{}`: {e}", group.group.name))
             })?;
         }
@@ -156,7 +144,7 @@ impl<'a> Fields<'a> {
     /// What the groups have become, to be written at any time.
     pub(super) fn results(&self) -> Vec<FieldResult> {
         let mut scene = self.problem.job.scene.clone();
-        let result = |(group, optimizer): (&ParameterGroup, &FieldOptimizer)| {
+        let result = |(group, optimizer): (&ParameterGroup, &FieldSteps)| {
             let (group, values) = (&group.group, optimizer.values());
             // They have been given to the fit already.
             group.apply(&self.problem.job.scene, values, &mut scene).ok()?;
@@ -169,7 +157,7 @@ impl<'a> Fields<'a> {
     pub(super) fn shapes(&self) -> Vec<(&'a str, [Arc<Mesh>; 2])> {
         let given = &self.problem.job.scene;
         let mut scene = given.clone();
-        let shape = |(group, optimizer): (&'a ParameterGroup, &FieldOptimizer)| {
+        let shape = |(group, optimizer): (&'a ParameterGroup, &FieldSteps)| {
             let Group { name, kind, target: Target::Shape(s), .. } = &group.group else {
                 return None;
             };
@@ -251,74 +239,4 @@ fn files(group: &Group, values: &[f64], scene: &Scene) -> Option<Vec<(String, Ve
         }
         _ => return None,
     })
-}
-
-/// How a group steps.
-fn rule(
-    problem: &Problem<'_>,
-    group: &ParameterGroup,
-    default_rate: f64,
-    laplacian: Option<&MeshLaplacian>,
-) -> Result<FieldRule, OptimizeError> {
-    let GroupSteps { learning_rate, laplacian: lambda, bounds, log, .. } = &group.steps;
-    let smoothing = match laplacian.filter(|_| *lambda > 0.0) {
-        Some(laplacian) => Some(LaplacianSmoothing::of(laplacian.clone(), *lambda)?),
-        None => None,
-    };
-    let rate = learning_rate.clone();
-    Ok(FieldRule {
-        method: problem.plan.method,
-        learning_rate: rate.unwrap_or_else(|| Stages::new(default_rate, Vec::new())),
-        lower: bounds[0],
-        upper: bounds[1],
-        logarithmic: *log,
-        smoothing,
-    })
-}
-
-/// The Laplacian of the mesh whose vertices a group has, in its order.
-fn laplacian(
-    scene: &Scene,
-    group: &Group,
-    values: &[f64],
-) -> Result<Option<MeshLaplacian>, OptimizeError> {
-    let mesh = match (&group.kind, group.target) {
-        (GroupKind::Vertices, Target::Shape(s)) => &scene.shapes[s].mesh,
-        (GroupKind::Cage(cage), _) => cage,
-        _ => return Ok(None),
-    };
-    let positions: Vec<Vec3> = values.chunks_exact(3).map(|c| vec3(c[0], c[1], c[2])).collect();
-    let triangles: Vec<[u32; 3]> =
-        mesh.triangles.iter().map(|t| t.map(|v| mesh.source_vertex(v))).collect();
-    MeshLaplacian::with_seams(&positions, &triangles).map(Some)
-}
-
-/// Adds the gradient of a group's regulariser.
-fn smooth(
-    scene: &Scene,
-    group: &ParameterGroup,
-    laplacian: Option<&MeshLaplacian>,
-    values: &[f64],
-    gradient: &mut [f64],
-) -> Result<(), OptimizeError> {
-    let weight = group.steps.smooth;
-    if let Some(laplacian) = laplacian {
-        return laplacian_energy(laplacian, 3, values, gradient, weight).map(drop);
-    }
-    let of_image = |size: Option<[u32; 2]>| size.map(|[w, h]| [w as usize, h as usize, 1]);
-    let shape = match (&group.group.kind, group.group.target) {
-        (GroupKind::Voxels(property), Target::Medium(m)) => {
-            scene.media[m].item.voxels(*property).map(drt_medium::Grid::size)
-        }
-        (GroupKind::Texels { property, .. }, Target::Bsdf(b)) => {
-            of_image(scene.bsdfs[b].item.texels(*property))
-        }
-        (GroupKind::LightTexels, Target::Emitter(e)) => {
-            of_image(scene.emitters[e].item.emitter.texels())
-        }
-        _ => None,
-    };
-    let Some(shape) = shape else { return Ok(()) };
-    let channels = values.len() / shape.iter().product::<usize>().max(1);
-    total_variation(shape, channels, values, gradient, weight).map(drop)
 }
