@@ -63,8 +63,7 @@ fn numbers() -> Vec<[f64; 3]> {
 
 fn phases() {
     println!("{:18} {:>8} {:>8} {:>8}", "phase function, ns", "eval", "sample", "gradient");
-    let (flow, out, u) = (directions(1), directions(2), numbers());
-    let cosine = |i: usize| flow[i].dot(out[i]);
+    let (from, to, u) = (directions(1), directions(2), numbers());
     for (name, phase) in [
         ("isotropic", Phase::Isotropic),
         ("henyey-greenstein", Phase::HenyeyGreenstein { g: 0.7 }),
@@ -72,9 +71,9 @@ fn phases() {
     ] {
         let phase = phase.at(Vec3::ZERO);
         let row = per_call([
-            kernel(|i| phase.eval(cosine(i))),
-            kernel(|i| phase.sample(flow[i], [u[i][0], u[i][1]])),
-            kernel(|i| phase.gradient(cosine(i))),
+            kernel(|i| phase.eval(from[i], to[i])),
+            kernel(|i| phase.sample(from[i], [u[i][0], u[i][1]])),
+            kernel(|i| phase.gradient(from[i], to[i])),
         ]);
         println!("{name:18}{}", columns(&row));
     }

@@ -48,7 +48,21 @@ pub enum MediumChange {
         /// One voxel only.
         voxels: Option<[usize; 3]>,
     },
-    /// Moves the grids of the medium.
+    /// Changes the entries Sxx, Syy and Szz of the matrix of SGGX, three channels in this order.
+    SggxDiagonal {
+        /// How.
+        op: ValueChange,
+        /// One voxel only.
+        voxels: Option<[usize; 3]>,
+    },
+    /// Changes the entries Sxy, Sxz and Syz of the matrix of SGGX, three channels in this order.
+    SggxOffDiagonal {
+        /// How.
+        op: ValueChange,
+        /// One voxel only.
+        voxels: Option<[usize; 3]>,
+    },
+    /// Moves the grids of the medium, and turns its microflakes with them.
     Place {
         /// The map of the world at the parameter's value.
         map: Affine,
@@ -58,13 +72,15 @@ pub enum MediumChange {
 }
 
 /// What may vary in space.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Field {
     SigmaT,
     Albedo,
     Emission,
     G,
     Weight,
+    SggxDiagonal,
+    SggxOffDiagonal,
 }
 
 impl From<Field> for Property {
@@ -75,6 +91,8 @@ impl From<Field> for Property {
             Field::Emission => Self::Emission,
             Field::G => Self::G,
             Field::Weight => Self::Weight,
+            Field::SggxDiagonal => Self::SggxDiagonal,
+            Field::SggxOffDiagonal => Self::SggxOffDiagonal,
         }
     }
 }
@@ -94,7 +112,7 @@ impl MediumChange {
     pub fn pushes(&self, theta: f64) -> Option<Property> {
         let change = self.field()?;
         let ValueMap { factor, offset } = change.op.map(theta);
-        let bounded = matches!(change.field, Field::Albedo | Field::G | Field::Weight);
+        let bounded = !matches!(change.field, Field::SigmaT | Field::Emission);
         let keeps = offset.is_zero() && (factor == 1.0 || factor >= 0.0 && !bounded);
         (!keeps).then(|| change.property())
     }
@@ -107,6 +125,8 @@ impl MediumChange {
             Self::Emission { op, voxels } => change(Field::Emission, op, voxels),
             Self::G { op, voxels } => change(Field::G, op, voxels),
             Self::Weight { op, voxels } => change(Field::Weight, op, voxels),
+            Self::SggxDiagonal { op, voxels } => change(Field::SggxDiagonal, op, voxels),
+            Self::SggxOffDiagonal { op, voxels } => change(Field::SggxOffDiagonal, op, voxels),
             Self::Place { .. } => None,
         }
     }
@@ -121,9 +141,7 @@ impl Medium {
         match change {
             MediumChange::Place { map, .. } => self.place(map),
             _ => match (change.field(), &mut self.kind) {
-                (Some(c @ FieldChange { field: Field::G | Field::Weight, .. }), _) => {
-                    self.phase.change(&c, theta)
-                }
+                (Some(c), _) if c.property().is_of_phase() => self.phase.change(&c, theta),
                 (Some(c), MediumKind::Homogeneous(h)) => h.change(c, theta),
                 (Some(_), MediumKind::Uniform(u)) if u.is_deformed() => Err(MediumError::Deformed),
                 (Some(c), MediumKind::Uniform(u)) => u.change(c, theta),
@@ -146,7 +164,7 @@ impl Medium {
     pub fn add_to_voxels(&mut self, property: Property, step: &[f64]) -> Result<(), MediumError> {
         let mut scale = 1.0;
         let grid = match (&mut self.kind, property) {
-            (_, Property::G | Property::Weight) => self.phase.voxels_mut(property),
+            (_, property) if property.is_of_phase() => self.phase.voxels_mut(property),
             (MediumKind::Deformed(_), _) => return Err(MediumError::Deformed),
             (MediumKind::Uniform(u), _) if u.is_deformed() => return Err(MediumError::Deformed),
             (MediumKind::Grid(g), Property::SigmaT) => {
@@ -181,6 +199,9 @@ impl Medium {
         if let (MediumKind::Grid(medium), Property::SigmaT) = (&mut self.kind, property) {
             medium.update_bounds(None);
         }
+        if let Phase::Sggx(flakes) = &mut self.phase {
+            flakes.update();
+        }
         Ok(())
     }
 }
@@ -188,16 +209,18 @@ impl Medium {
 impl Phase {
     /// Refuses a change of what it does not have.
     pub(crate) fn check_change(&self, c: &FieldChange) -> Result<(), MediumError> {
-        match (self, c.field) {
+        let scalar = match (self, c.field) {
             (
                 Self::Isotropic | Self::HenyeyGreenstein { .. } | Self::HenyeyGreensteinGrid(_),
                 Field::G,
             )
-            | (Self::Blend(_), Field::Weight) => {}
+            | (Self::Blend(_), Field::Weight) => true,
+            (Self::Sggx(_), Field::SggxDiagonal | Field::SggxOffDiagonal) => false,
             (_, Field::Weight) => return Err(MediumError::NoWeight),
+            (_, Field::SggxDiagonal | Field::SggxOffDiagonal) => return Err(MediumError::NoSggx),
             _ => return Err(MediumError::NoMeanCosine),
-        }
-        if c.op.is_scalar() {
+        };
+        if c.op.is_scalar() || !scalar {
             Ok(())
         } else {
             Err(MediumError::NotScalar { property: c.property() })
@@ -208,6 +231,13 @@ impl Phase {
         self.check_change(c)?;
         let g = match self {
             Self::Blend(blend) => return c.of_volume(&mut blend.weight, theta),
+            Self::Sggx(flakes) => {
+                let [diagonal, off_diagonal] = &mut flakes.entries;
+                let entries = if c.field == Field::SggxDiagonal { diagonal } else { off_diagonal };
+                c.of_volume(entries, theta)?;
+                flakes.update();
+                return Ok(());
+            }
             Self::HenyeyGreensteinGrid(g) => return c.of_grid(g, theta, 1.0),
             Self::HenyeyGreenstein { g } => *g,
             _ => 0.0,
@@ -225,7 +255,7 @@ impl Homogeneous {
             Field::Albedo => &mut c0.albedo,
             Field::Emission => &mut c0.emission,
             // Those of the phase function.
-            Field::G | Field::Weight => return Ok(()),
+            _ => return Ok(()),
         };
         *value = c.of_constant(*value, theta)?;
         Ok(())
@@ -238,7 +268,7 @@ impl UniformMedium {
             Field::SigmaT => self.extinction.change(c, theta),
             Field::Albedo => c.of_volume(&mut self.albedo, theta),
             Field::Emission => c.of_volume(&mut self.emission, theta),
-            Field::G | Field::Weight => Ok(()),
+            _ => Ok(()),
         }
     }
 }
@@ -249,7 +279,7 @@ impl GridMedium {
             Field::SigmaT => return self.change_density(c, theta),
             Field::Albedo => &mut self.albedo,
             Field::Emission => &mut self.emission,
-            Field::G | Field::Weight => return Ok(()),
+            _ => return Ok(()),
         };
         c.of_volume(volume, theta)
     }

@@ -10,13 +10,18 @@
 //!
 //! and so do the rates by the motion of the ray's own ends. At the faces of a grid's box, where σ
 //! jumps by -σ along the outward normal N, ∇σ dt stands for -σ N / |N·w|.
+//!
+//! In a medium of microflakes the extinction depends on the direction as well ([`directed`](crate::directed)), and all of this holds for
+//! σ(x) A(x, w). With P = ∫ ∂(σA)/∂w dt across w, the direction's own rate w' adds w'·P. Flakes that turn with the rate ω
+//! look as if w turned with -ω, so that a grid with the spin ω = curl u / 2 adds -(ω × w)·P = -ω·(w × P).
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::bounds::in_unit_cube;
+use crate::tangent::spin;
 use crate::{
-    Crossing, DeformedGrid, DensityField, FlowPlace, GridMedium, Medium, MediumKind, MediumTangent,
-    Ray,
+    Crossing, DeformedGrid, DensityField, FlakesGradient, FlowPlace, GridMedium, Medium,
+    MediumKind, MediumTangent, Ray,
 };
 
 /// An estimate of a ray's optical depth and of what its derivatives depend on; unbiased where
@@ -27,7 +32,7 @@ pub struct DepthEstimate<'a> {
     pub ray: Ray,
     /// The points `(t, w)` and weights of the estimate.
     pub points: &'a [(f64, f64)],
-    /// Length of the ray inside the medium.
+    /// Length of the ray inside the medium, of which microflakes make as much more as their projected area.
     pub length: f64,
     /// The optical depth, `∫ sigma_t dt`.
     pub depth: Rgb,
@@ -35,6 +40,8 @@ pub struct DepthEstimate<'a> {
     pub gradient: RgbVec,
     /// `∫ t grad sigma_t dt`; zero unless asked for.
     pub moment: RgbVec,
+    /// The derivative by the ray's direction across it; zero but for microflakes.
+    pub turn: RgbVec,
     /// The faces of a grid's box are in it.
     pub faces: bool,
     /// Motions of the grids are left out of its rate.
@@ -53,10 +60,12 @@ impl<'a> DepthEstimate<'a> {
             depth: Rgb::ZERO,
             gradient: RgbVec::ZERO,
             moment: RgbVec::ZERO,
+            turn: RgbVec::ZERO,
             faces: false,
             at_rest: false,
         };
         match &medium.kind {
+            _ if medium.phase.sggx().is_some() => estimate.add_directed(medium, moving),
             MediumKind::Homogeneous(_) | MediumKind::Uniform(_) => {}
             MediumKind::Grid(g) if moving => estimate.add_grid::<true>(g),
             MediumKind::Grid(g) => estimate.add_grid::<false>(g),
@@ -86,6 +95,53 @@ impl<'a> DepthEstimate<'a> {
         let g = -c.depth_per_velocity();
         self.gradient += g;
         self.moment += g * c.t;
+    }
+
+    #[cold]
+    fn add_directed(&mut self, medium: &Medium, moving: bool) {
+        let w = self.ray.dir;
+        for (x, t, weight) in self.points_in(medium) {
+            let (sigma_t, here) = (medium.sigma_t(x), medium.phase_at(x));
+            let (area, by) = (here.projected_area(w), medium.area_gradient(x, w));
+            self.length += weight * area;
+            self.depth += sigma_t * (weight * area);
+            self.turn += sigma_t.outer(by.wo.reject(w)) * weight;
+            if moving {
+                let g = medium.gradients(x).sigma_t * area + sigma_t.outer(by.place);
+                self.gradient += g * weight;
+                self.moment += g * (weight * t);
+            }
+        }
+    }
+
+    /// The points of the estimate that lie in the medium, with their distances and weights.
+    fn points_in<'m>(
+        &self,
+        medium: &'m Medium,
+    ) -> impl Iterator<Item = (Vec3, f64, f64)> + use<'a, 'm> {
+        let (ray, points) = (self.ray, self.points);
+        let places = points.iter().map(move |(t, w)| (ray.at(*t), *t, *w));
+        places.filter(|(x, ..)| medium.volumes_at(*x).is_some())
+    }
+
+    /// How the depth depends on the matrix of microflakes: calls `visit` with points of the ray, and the derivative there,
+    /// which a colour multiplies. Other media have none.
+    pub(crate) fn by_flakes(
+        &self,
+        medium: &Medium,
+        mut visit: impl FnMut(Vec3, &FlakesGradient, Rgb),
+    ) {
+        if medium.phase.sggx().is_some() {
+            for (x, _, weight) in self.points_in(medium) {
+                let by = medium.phase_at(x).area_gradient(self.ray.dir).flakes;
+                visit(x, &by, medium.sigma_t(x) * weight);
+            }
+        }
+    }
+
+    /// How the depth depends on the spin of the grids, which turns microflakes: -(w × P).
+    pub(crate) fn by_spin(&self) -> RgbVec {
+        if self.at_rest { RgbVec::ZERO } else { self.turn.map(|turn| turn.cross(self.ray.dir)) }
     }
 
     fn add_deformed(&mut self, medium: &DeformedGrid, moving: bool) {
@@ -174,7 +230,10 @@ impl<'a> DepthEstimate<'a> {
         }
         for &(t, w) in self.points {
             let x = self.ray.at(t);
-            let g = medium.gradients(x).sigma_t;
+            let mut g = medium.gradients(x).sigma_t;
+            if let Some(directed) = medium.directed(self.ray.dir) {
+                g = directed.gradients(x).sigma_t;
+            }
             if g != RgbVec::ZERO {
                 visit(x, g * -w);
             }
@@ -196,19 +255,37 @@ impl<'a> DepthEstimate<'a> {
                 rate += sigma_t.voxel_rate(grid.density(), material) * w;
             }
         }
+        if medium.phase.sggx().is_some() {
+            rate + self.rate_of_flakes(medium, tangent)
+        } else {
+            rate
+        }
+    }
+
+    /// What microflakes add to the rate as they change and turn.
+    #[cold]
+    fn rate_of_flakes(&self, medium: &Medium, tangent: &MediumTangent) -> Rgb {
+        let mut rate = self.by_spin().dot(spin(&tangent.velocity));
+        if tangent.flakes.iter().any(|t| !t.is_zero()) {
+            self.by_flakes(medium, |x, by, sigma_t| {
+                rate += sigma_t * tangent.flakes_rate(medium, x, by);
+            });
+        }
         rate
     }
 
     /// The points of the estimate that lie inside the medium's grids, as the grids see them, with their
-    /// weights.
+    /// weights, which microflakes multiply with their projected areas.
     pub(crate) fn points_inside<'m>(
         &self,
         medium: &'m Medium,
     ) -> impl Iterator<Item = (&'m GridMedium, Vec3, f64)> + use<'a, 'm> {
-        let (ray, points) = (self.ray, self.points);
+        let (ray, points, directed) = (self.ray, self.points, medium.phase.sggx().is_some());
         points.iter().filter_map(move |(t, w)| {
-            let (grid, material) = medium.grid_at(ray.at(*t))?;
-            Some((grid, material, *w))
+            let x = ray.at(*t);
+            let (grid, material) = medium.grid_at(x)?;
+            let w = if directed { *w * medium.projected_area(x, ray.dir) } else { *w };
+            Some((grid, material, w))
         })
     }
 }

@@ -1,3 +1,5 @@
+use alloc::format;
+use alloc::string::String;
 use core::fmt;
 
 /// The property of a medium that an error or a change is about.
@@ -14,11 +16,29 @@ pub enum Property {
     G,
     /// Part of a blend of phase functions that the second one has.
     Weight,
+    /// Entries Sxx, Syy and Szz of the matrix of the SGGX phase function.
+    SggxDiagonal,
+    /// Its entries Sxy, Sxz and Syz.
+    SggxOffDiagonal,
 }
 
 impl Property {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::SigmaT, Self::Albedo, Self::Emission, Self::G, Self::Weight];
+    pub const ALL: [Self; 7] = [
+        Self::SigmaT,
+        Self::Albedo,
+        Self::Emission,
+        Self::G,
+        Self::Weight,
+        Self::SggxDiagonal,
+        Self::SggxOffDiagonal,
+    ];
+
+    /// True of a property of the phase function.
+    #[must_use]
+    pub fn is_of_phase(self) -> bool {
+        !matches!(self, Self::SigmaT | Self::Albedo | Self::Emission)
+    }
 
     /// The property of a name, as jobs and messages call it.
     #[must_use]
@@ -35,6 +55,8 @@ impl Property {
             Self::Emission => "emission",
             Self::G => "g",
             Self::Weight => "weight",
+            Self::SggxDiagonal => "sggx_diagonal",
+            Self::SggxOffDiagonal => "sggx_off_diagonal",
         }
     }
 }
@@ -140,6 +162,33 @@ pub enum MediumError {
     /// The phase function is no blend.
     #[error("this phase function has no weight; use a blend")]
     NoWeight,
+    /// The phase function has no such parameter.
+    #[error("this phase function has no matrix S; use SGGX")]
+    NoSggx,
+    /// A matrix makes no distribution of microflakes.
+    #[error("the matrix S of SGGX{} with [Sxx, Syy, Szz] = {:?} and [Sxy, Sxz, Syz] = {:?} is not positive definite; it must be that, or zero",
+        at_voxel(voxel), entries[0], entries[1])]
+    SggxMatrix {
+        /// Where it is; `None` where it is the same everywhere.
+        voxel: Option<[usize; 3]>,
+        /// Its entries on the diagonal, and off it.
+        entries: [[f64; 3]; 2],
+    },
+    /// The grids of the entries of S do not belong together.
+    #[error(
+        "the diagonal and the off-diagonal entries of SGGX must be grids of three channels that differ in values alone"
+    )]
+    SggxGrids,
+    /// A blend of phase functions has SGGX in it.
+    #[error(
+        "SGGX cannot be a part of a blend: the extinction depends on the direction for it, and not for the other part"
+    )]
+    SggxInBlend,
+    /// A motion that would change more of microflakes than their directions.
+    #[error(
+        "a medium with the phase function SGGX can be moved, turned, and scaled alike along all axes; a stretch or a deformation would change its flakes in a way that SGGX does not tell"
+    )]
+    SggxMotion,
     /// A deformed grid cannot be changed.
     #[error("the grid is deformed; place it, and change its values, before that")]
     Deformed,
@@ -154,4 +203,8 @@ pub enum MediumError {
         /// The property.
         property: Property,
     },
+}
+
+fn at_voxel(voxel: &Option<[usize; 3]>) -> String {
+    voxel.map_or_else(String::new, |[i, j, k]| format!(" at voxel [{i}, {j}, {k}]"))
 }

@@ -5,8 +5,8 @@ use alloc::vec::Vec;
 use drt_math::{Affine, Rgb, Vec3};
 
 use crate::{
-    CoefficientRates, Crossing, DepthEstimate, FieldTangent, Flow, FlowBasis, Grid, Medium,
-    MediumTangent, PhaseGradient, Property, VoxelGradient,
+    CoefficientRates, Crossing, DepthEstimate, FieldTangent, FlakesGradient, Flow, FlowBasis, Grid,
+    Medium, MediumTangent, PhaseGradient, Property, VoxelGradient,
 };
 
 /// Derivative of a loss with respect to one coefficient field: the transpose of [`FieldTangent`].
@@ -59,6 +59,9 @@ pub struct MediumGradient {
     pub g: FieldGradient,
     /// Derivative with respect to the weight of a blend of phase functions.
     pub weight: FieldGradient,
+    /// Derivative with respect to the entries of the matrix of SGGX, on the diagonal and off it, as they were before any
+    /// motion.
+    pub flakes: [FieldGradient; 2],
     /// Derivative with respect to the coefficients of the grids' velocity field.
     pub velocity: Affine,
     /// Derivative with respect to the velocities of nodes, where there is room for them.
@@ -112,9 +115,17 @@ impl MediumGradient {
     #[must_use]
     pub fn zeros(medium: &Medium) -> Self {
         let [sigma_t, albedo, emission] = medium.volumes().map(FieldGradient::zeros);
-        let phase = [Property::G, Property::Weight].map(|p| medium.phase.voxels(p));
-        let [g, weight] = phase.map(FieldGradient::zeros);
-        Self { sigma_t, albedo, emission, g, weight, velocity: Affine::ZERO, flow: None }
+        let of_phase = |p| FieldGradient::zeros(medium.phase.voxels(p));
+        Self {
+            sigma_t,
+            albedo,
+            emission,
+            g: of_phase(Property::G),
+            weight: of_phase(Property::Weight),
+            flakes: [Property::SggxDiagonal, Property::SggxOffDiagonal].map(of_phase),
+            velocity: Affine::ZERO,
+            flow: None,
+        }
     }
 
     /// No derivative yet, without room for voxels: for media none of whose parameters names a
@@ -122,7 +133,8 @@ impl MediumGradient {
     #[must_use]
     pub fn zeros_without_voxels() -> Self {
         let [sigma_t, albedo, emission, g, weight] = [None; 5].map(FieldGradient::zeros);
-        Self { sigma_t, albedo, emission, g, weight, velocity: Affine::ZERO, flow: None }
+        let flakes = Default::default();
+        Self { sigma_t, albedo, emission, g, weight, flakes, velocity: Affine::ZERO, flow: None }
     }
 
     /// The same with room for the velocities of `nodes` nodes.
@@ -172,6 +184,28 @@ impl MediumGradient {
         if gradient.place != Vec3::ZERO {
             self.scatter_velocity(x, gradient.place * -adjoint);
         }
+        if medium.phase.sggx().is_some() {
+            self.scatter_flakes(medium, x, &gradient.flakes, adjoint);
+            self.scatter_spin(gradient.turn * adjoint);
+        }
+    }
+
+    /// The transpose of [`MediumTangent::flakes_rate`].
+    fn scatter_flakes(&mut self, medium: &Medium, x: Vec3, by: &FlakesGradient, adjoint: f64) {
+        let Some(field) = medium.phase.sggx() else { return };
+        let at = medium.phase_place(x);
+        let parts = field.entries().iter().zip(field.by_values(by));
+        for (own, (entries, by)) in self.flakes.iter_mut().zip(parts) {
+            own.scatter(entries.value(at), entries.grid(), at, by * adjoint);
+        }
+    }
+
+    /// Adds the derivative of a loss with respect to the [spin](crate::tangent::spin) of the grids.
+    fn scatter_spin(&mut self, adjoint: Vec3) {
+        let half = adjoint * 0.5;
+        for (col, axis) in self.velocity.linear.cols.iter_mut().zip([Vec3::X, Vec3::Y, Vec3::Z]) {
+            *col += half.cross(axis);
+        }
     }
 
     /// Adds the derivative of a loss with respect to the optical depth that a crossing's motion
@@ -190,6 +224,12 @@ impl MediumGradient {
             for (grid, material, w) in depth.points_inside(medium) {
                 sigma_t.scatter_voxels(grid.density(), material, adjoint * w);
             }
+        }
+        if medium.phase.sggx().is_some() {
+            depth.by_flakes(medium, |x, by, weight| {
+                self.scatter_flakes(medium, x, by, weight.dot(adjoint));
+            });
+            self.scatter_spin(depth.by_spin().weighted(adjoint));
         }
         if let Some(flow) = &mut self.flow {
             depth.pulls(medium, |x, pull| flow.scatter(x, pull.weighted(adjoint)));
@@ -233,6 +273,7 @@ impl MediumGradient {
             + self.emission.dot(&tangent.emission)
             + self.g.dot(&tangent.g)
             + self.weight.dot(&tangent.weight)
+            + self.flakes.iter().zip(&tangent.flakes).map(|(g, t)| g.dot(t)).sum::<f64>()
             + linear
             + flows.sum::<f64>()
             + a.translation.dot(b.translation)
@@ -245,6 +286,7 @@ impl MediumGradient {
         self.emission.add(o.emission);
         self.g.add(o.g);
         self.weight.add(o.weight);
+        self.flakes.iter_mut().zip(o.flakes).for_each(|(own, other)| own.add(other));
         self.velocity = self.velocity.plus(&o.velocity);
         if let (Some(a), Some(b)) = (&mut self.flow, o.flow) {
             a.nodes.iter_mut().zip(&b.nodes).for_each(|(a, b)| *a += *b);

@@ -184,6 +184,21 @@ impl Grid {
         x + y + z
     }
 
+    /// The least edge of a voxel in the world.
+    pub(crate) fn voxel_size(&self) -> f64 {
+        let edges = self.to_world.linear.cols;
+        let widths = [0, 1, 2].map(|k| edges[k].length() / self.size[k] as f64);
+        widths.into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// True of a grid that differs from this one in values alone.
+    pub(crate) fn is_like(&self, o: &Self) -> bool {
+        self.size == o.size
+            && self.channels == o.channels
+            && (self.layout, self.filter, self.wrap) == (o.layout, o.filter, o.wrap)
+            && self.to_world == o.to_world
+    }
+
     /// The values of one voxel; a single channel stands for all three.
     ///
     /// # Panics

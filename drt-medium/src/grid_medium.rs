@@ -61,7 +61,7 @@ impl GridMedium {
             }
             Property::Albedo => self.albedo.check(property),
             Property::Emission => self.emission.check(property),
-            Property::G | Property::Weight => Ok(()),
+            _ => Ok(()),
         }
     }
 
@@ -195,10 +195,7 @@ impl DensityField for GridMedium {
     }
 
     fn feature_size(&self) -> f64 {
-        let edges = self.density.to_world().linear.cols;
-        let size = self.density.size();
-        let widths = [0, 1, 2].map(|k| edges[k].length() / size[k] as f64);
-        widths.into_iter().fold(f64::INFINITY, f64::min)
+        self.density.voxel_size()
     }
 }
 

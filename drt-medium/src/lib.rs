@@ -10,6 +10,7 @@ mod coefficients;
 mod crossing;
 mod deformed;
 mod depth;
+mod directed;
 mod error;
 mod field;
 mod flow;
@@ -53,7 +54,8 @@ pub use homogeneous::Homogeneous;
 pub use lattice::{Filter, Layout, Wrap};
 pub use medium::{Medium, MediumKind};
 pub use phase::{
-    LocalPhase, Phase, PhaseBlend, PhaseGradient, PhaseTable, henyey_greenstein, rayleigh,
+    Flakes, FlakesGradient, LocalPhase, Phase, PhaseBlend, PhaseGradient, PhaseTable, Sggx,
+    henyey_greenstein, rayleigh,
 };
 pub use tangent::{FieldTangent, MediumTangent};
 pub use tracking::{DistanceSample, TrackingStats};

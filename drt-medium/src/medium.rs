@@ -2,14 +2,14 @@ use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
 
-use drt_math::{Affine, Mat3, Rgb, Rng, Vec3};
+use drt_math::{Affine, Rgb, Rng, Vec3};
 
 use crate::homogeneous::check;
 use crate::tracking::zip;
 use crate::{
     CoefficientGradients, Coefficients, Crossing, DeformedGrid, DensityField, DistanceSample, Grid,
-    GridMedium, Homogeneous, LocalPhase, MediumError, Phase, Piece, Property, Ray, SpaceMap,
-    TrackingStats, UniformMedium, Volume, tracking,
+    GridMedium, Homogeneous, LocalPhase, MediumError, Phase, PhaseGradient, Piece, Property, Ray,
+    SpaceMap, TrackingStats, UniformMedium, Volume, tracking,
 };
 
 /// Where a medium gets its coefficients from.
@@ -70,6 +70,19 @@ impl From<DeformedGrid> for MediumKind {
     }
 }
 
+impl MediumKind {
+    /// The extinction as a field that [`tracking`] can walk through.
+    pub(crate) fn field(&self) -> &dyn DensityField {
+        match self {
+            Self::Homogeneous(h) => h,
+            Self::Uniform(u) => &u.extinction,
+            Self::Grid(g) => g,
+            Self::Deformed(d) => d,
+            Self::Custom(f) => &**f,
+        }
+    }
+}
+
 impl Medium {
     /// A medium from its parts.
     #[must_use]
@@ -77,7 +90,8 @@ impl Medium {
         Self { kind: kind.into(), phase }
     }
 
-    /// Everything at a point.
+    /// Everything at a point. The extinction of microflakes, which depends on the direction, is that for a
+    /// [projected area](Medium::projected_area) of one.
     #[inline]
     #[must_use]
     pub fn coefficients(&self, x: Vec3) -> Coefficients {
@@ -95,7 +109,7 @@ impl Medium {
     /// # Errors
     /// Names the property, a value and the range.
     pub fn check(&self, property: Property) -> Result<(), MediumError> {
-        if matches!(property, Property::G | Property::Weight) {
+        if property.is_of_phase() {
             return self.phase.validate();
         }
         let coefficients = match &self.kind {
@@ -110,11 +124,12 @@ impl Medium {
             Property::Albedo => check(property, coefficients.albedo),
             Property::Emission => check(property, coefficients.emission),
             // Checked above.
-            Property::G | Property::Weight => Ok(()),
+            _ => Ok(()),
         }
     }
 
-    /// The extinction at a point, in 1 / scene unit.
+    /// The extinction at a point, in 1 / scene unit; that of the [coefficients](Medium::coefficients). See
+    /// [`Medium::sigma_t_along`].
     #[inline]
     #[must_use]
     pub fn sigma_t(&self, x: Vec3) -> Rgb {
@@ -155,23 +170,70 @@ impl Medium {
     #[inline]
     #[must_use]
     pub fn phase_at(&self, x: Vec3) -> LocalPhase<'_> {
-        if !self.phase.varies() {
-            return self.phase.at(x);
-        }
-        let place = match &self.kind {
-            MediumKind::Uniform(u) => Some(u.material(x)),
-            MediumKind::Deformed(d) => d.material(x),
-            MediumKind::Homogeneous(_) | MediumKind::Grid(_) | MediumKind::Custom(_) => None,
-        };
-        let (at, slope) = place.unwrap_or((x, Mat3::IDENTITY));
-        LocalPhase::new(&self.phase, at, slope)
+        LocalPhase::new(&self.phase, self.phase_place(x))
     }
 
-    /// A homogeneous medium with this one's extinction, where that is the same everywhere. Distances and
+    /// The place where the phase function's grids are looked up for a point of the world.
+    #[inline]
+    pub(crate) fn phase_place(&self, x: Vec3) -> Vec3 {
+        if !self.phase.varies() {
+            return x;
+        }
+        match &self.kind {
+            MediumKind::Uniform(u) => u.material(x).0,
+            MediumKind::Deformed(d) => d.material(x).map_or(x, |(material, _)| material),
+            MediumKind::Homogeneous(_) | MediumKind::Grid(_) | MediumKind::Custom(_) => x,
+        }
+    }
+
+    /// Derivatives of the phase function's value at a point of the world, all with respect to the world; see
+    /// [`LocalPhase::gradient`]. `here` is what [`Medium::phase_at`] gives there.
+    #[must_use]
+    pub fn phase_gradient(
+        &self,
+        x: Vec3,
+        here: &LocalPhase<'_>,
+        wo: Vec3,
+        wi: Vec3,
+    ) -> PhaseGradient {
+        self.in_world(x, here.gradient(wo, wi))
+    }
+
+    /// Derivatives of the [projected area](LocalPhase::projected_area) of microflakes at a point of the world, all with
+    /// respect to the world.
+    #[must_use]
+    pub fn area_gradient(&self, x: Vec3, w: Vec3) -> PhaseGradient {
+        self.in_world(x, self.phase_at(x).area_gradient(w))
+    }
+
+    /// A gradient whose place is where grids are looked up, by the place in the world.
+    pub(crate) fn in_world(&self, x: Vec3, mut gradient: PhaseGradient) -> PhaseGradient {
+        if gradient.place != Vec3::ZERO {
+            let slope = match &self.kind {
+                MediumKind::Uniform(u) => Some(u.material(x).1),
+                MediumKind::Deformed(d) => d.material(x).map(|(_, slope)| slope),
+                MediumKind::Homogeneous(_) | MediumKind::Grid(_) | MediumKind::Custom(_) => None,
+            };
+            if let Some(slope) = slope {
+                gradient.place = slope.transpose_mul(gradient.place);
+            }
+        }
+        gradient
+    }
+
+    /// A homogeneous medium with this one's extinction, where that is the same everywhere and in all directions. Distances and
     /// transmittances of both are alike; its albedo and emission mean nothing.
     #[inline]
     #[must_use]
     pub fn extinction(&self) -> Option<&Homogeneous> {
+        if self.phase.sggx().is_some() { None } else { self.even_extinction() }
+    }
+
+    /// A homogeneous medium with the extinction of this one's [coefficients](Self::coefficients), where that is the same
+    /// everywhere: [`Medium::extinction`] but for microflakes.
+    #[inline]
+    #[must_use]
+    pub fn even_extinction(&self) -> Option<&Homogeneous> {
         match &self.kind {
             MediumKind::Homogeneous(h) => Some(h),
             MediumKind::Uniform(u) => Some(&u.extinction),
@@ -215,14 +277,24 @@ impl Medium {
             Property::SigmaT => sigma_t,
             Property::Albedo => albedo,
             Property::Emission => emission,
-            Property::G | Property::Weight => self.phase.voxels(property),
+            _ => self.phase.voxels(property),
         }
     }
 
-    /// True when a motion of the medium can change its coefficients or its phase function: when they vary in space.
+    /// True when a motion of the medium can change its coefficients or its phase function: when they vary in space or depend on
+    /// more than angles.
     #[must_use]
     pub fn is_carried(&self) -> bool {
-        self.volumes().iter().any(Option::is_some) || self.phase.varies()
+        let flakes = self.phase.sggx().is_some();
+        self.volumes().iter().any(Option::is_some) || self.phase.varies() || flakes
+    }
+
+    /// Refuses velocities with which the medium cannot be carried, per unit of a parameter at each point of the world.
+    ///
+    /// # Errors
+    /// When microflakes would not only turn.
+    pub fn admits(&self, velocity: &Affine) -> Result<(), MediumError> {
+        self.phase.sggx().map_or(Ok(()), |flakes| flakes.admits(velocity))
     }
 
     /// The part of the world that must move with a medium which is carried along: smallest and largest corner of
@@ -265,9 +337,11 @@ impl Medium {
     /// [`GridMedium::crossings`].
     #[inline]
     pub fn crossings(&self, ray: &Ray, mut visit: impl FnMut(&Crossing)) {
+        let seen =
+            |c: Crossing| Crossing { sigma_t: self.along(c.sigma_t, ray.at(c.t), ray.dir), ..c };
         match &self.kind {
-            MediumKind::Grid(g) => g.crossings(ray).for_each(|c| visit(&c)),
-            MediumKind::Deformed(d) => d.crossings(ray).iter().for_each(visit),
+            MediumKind::Grid(g) => g.crossings(ray).for_each(|c| visit(&seen(c))),
+            MediumKind::Deformed(d) => d.crossings(ray).into_iter().for_each(|c| visit(&seen(c))),
             MediumKind::Homogeneous(_) | MediumKind::Uniform(_) | MediumKind::Custom(_) => {}
         }
     }
@@ -332,6 +406,12 @@ impl Medium {
         stats: &mut TrackingStats,
     ) -> DistanceSample {
         let ray = Ray::new(origin, dir, t_max);
+        if let Some(directed) = self.directed(dir) {
+            return match directed.even() {
+                Some(h) => h.sample_distance(t_max, channels, defensive, rng),
+                None => tracking::sample_distance(&directed, &ray, channels, defensive, rng, stats),
+            };
+        }
         match &self.kind {
             MediumKind::Homogeneous(h)
             | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => {
@@ -354,6 +434,12 @@ impl Medium {
     /// multiple importance sampling.
     #[must_use]
     pub fn free_flight_pdf(&self, ray: &Ray, t: f64, channels: Rgb, defensive: f64) -> f64 {
+        if let Some(directed) = self.directed(ray.dir) {
+            return match directed.even() {
+                Some(h) => h.free_flight_pdf(t, ray.t_max, channels, defensive),
+                None => tracking::approximate_pdf(&directed, ray, t, channels, defensive),
+            };
+        }
         match &self.kind {
             MediumKind::Homogeneous(h)
             | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => {
@@ -377,6 +463,12 @@ impl Medium {
         stats: &mut TrackingStats,
     ) -> Rgb {
         let ray = Ray::new(origin, dir, t_max);
+        if let Some(directed) = self.directed(dir) {
+            return match directed.even() {
+                Some(h) => h.transmittance(t_max),
+                None => tracking::transmittance(&directed, &ray, rng, stats),
+            };
+        }
         match &self.kind {
             MediumKind::Homogeneous(h)
             | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => h.transmittance(t_max),
@@ -388,7 +480,7 @@ impl Medium {
 
     /// Points and weights `(t, w)` such that `sum w h(t)` estimates `∫_0^t_max h(t) dt` without
     /// bias for an h that vanishes where the medium's box is not; appended to `out`. A medium of one
-    /// extinction, whose integrals have closed forms, adds none.
+    /// extinction, whose integrals have closed forms, adds none, and one without a box none to an infinite ray.
     pub fn line_points(
         &self,
         origin: Vec3,
@@ -399,7 +491,11 @@ impl Medium {
     ) {
         let ray = Ray::new(origin, dir, t_max);
         match &self.kind {
-            MediumKind::Homogeneous(_) | MediumKind::Uniform(_) => {}
+            MediumKind::Homogeneous(_) | MediumKind::Uniform(_) => {
+                if let Some(directed) = self.directed(dir).filter(|_| t_max.is_finite()) {
+                    tracking::line_points(&directed, &ray, rng, out);
+                }
+            }
             MediumKind::Grid(g) => tracking::line_points(g, &ray, rng, out),
             MediumKind::Deformed(d) => tracking::line_points(d, &ray, rng, out),
             MediumKind::Custom(f) => tracking::line_points(&**f, &ray, rng, out),
@@ -409,46 +505,39 @@ impl Medium {
     /// Shows stretches of a ray with the mean extinction on each, by which densities of sampling are steered, until
     /// `visit` breaks; see [`DensityField::means`].
     pub fn means(&self, ray: &Ray, visit: &mut dyn FnMut(&Piece) -> ControlFlow<()>) {
-        match &self.kind {
-            MediumKind::Homogeneous(h)
-            | MediumKind::Uniform(UniformMedium { extinction: h, .. }) => {
-                let mean = h.coefficients().sigma_t;
-                let (start, end) = (0.0, ray.t_max);
-                // The visitor has nothing left to see in any case.
-                let _ = visit(&Piece { start, end, majorant: mean, minorant: mean, mean });
-            }
-            MediumKind::Grid(g) => g.means(ray, visit),
-            MediumKind::Deformed(d) => d.means(ray, visit),
-            MediumKind::Custom(f) => f.means(ray, visit),
+        match self.directed(ray.dir) {
+            Some(directed) => directed.means(ray, visit),
+            None => self.kind.field().means(ray, visit),
         }
     }
 
     /// An upper bound of the extinction along a ray.
     #[must_use]
     pub fn majorant(&self, ray: &Ray) -> Rgb {
-        let bound = |field: &dyn DensityField| {
-            let mut bound = Rgb::ZERO;
-            field.pieces(ray, &mut |p| {
-                bound = zip(bound, p.majorant, f64::max);
-                ControlFlow::Continue(())
-            });
-            bound
-        };
-        match &self.kind {
-            MediumKind::Homogeneous(h) => h.coefficients().sigma_t,
-            MediumKind::Uniform(u) => u.sigma_t(),
-            MediumKind::Grid(g) => bound(g),
-            MediumKind::Deformed(d) => bound(d),
-            MediumKind::Custom(f) => bound(&**f),
+        if let Some(h) = self.extinction() {
+            return h.coefficients().sigma_t;
         }
+        let mut bound = Rgb::ZERO;
+        let visit = &mut |p: &Piece| {
+            bound = zip(bound, p.majorant, f64::max);
+            ControlFlow::Continue(())
+        };
+        match self.directed(ray.dir) {
+            Some(directed) => directed.pieces(ray, visit),
+            None => self.kind.field().pieces(ray, visit),
+        }
+        bound
     }
 
     /// Lets a map of space carry the grids from where they are placed. The rest has nothing that could
     /// be carried.
     ///
     /// # Errors
-    /// For grids that are deformed already, and for custom fields.
+    /// For grids that are deformed already, for custom fields, and for microflakes.
     pub fn deform(&mut self, map: Arc<dyn SpaceMap>) -> Result<(), MediumError> {
+        if self.phase.sggx().is_some() {
+            return Err(MediumError::SggxMotion);
+        }
         self.kind = match &mut self.kind {
             MediumKind::Uniform(u) => return u.deform(map),
             MediumKind::Grid(g) => MediumKind::Deformed(DeformedGrid::new(g.clone(), map)),
@@ -470,8 +559,8 @@ impl Medium {
     /// bound it.
     ///
     /// # Errors
-    /// When the map is singular, for deformed grids, and for custom fields, which nobody outside can
-    /// move.
+    /// When the map is singular, or [unfit](crate::Sggx::place) for microflakes, for deformed grids, and for custom fields, which
+    /// nobody outside can move.
     pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
         match &mut self.kind {
             MediumKind::Uniform(u) => u.place(map)?,

@@ -1,16 +1,21 @@
 mod blend;
+mod flakes;
 mod local;
+mod sggx;
 mod tabulated;
 
 use alloc::boxed::Box;
 use core::f64::consts::PI;
 
-use drt_math::{Affine, Mat3, Real, Vec3, fm};
+use drt_math::{Affine, Real, Vec3, fm};
 
-use crate::volume::check_scalars;
+use crate::volume::{Volume, check_scalars};
 use crate::{Grid, MediumError, Property};
 pub use blend::PhaseBlend;
+pub use flakes::{Flakes, FlakesGradient};
 pub use local::{LocalPhase, PhaseGradient};
+pub(crate) use sggx::AreaRange;
+pub use sggx::Sggx;
 pub use tabulated::PhaseTable;
 
 /// Distribution of scattered directions.
@@ -36,6 +41,9 @@ pub enum Phase {
     Blend(Box<PhaseBlend>),
     /// Given by its values.
     Tabulated(Box<PhaseTable>),
+    /// That of microflakes (Heitz et al. 2015), which depends on more than the angle. The extinction then depends on the
+    /// direction as well: it is the medium's times the [projected area](Flakes::projected_area).
+    Sggx(Box<Sggx>),
 }
 
 impl Phase {
@@ -60,12 +68,14 @@ impl Phase {
     /// Checks mean cosines and weights.
     ///
     /// # Errors
-    /// When a mean cosine does not lie in (-1, 1), or a weight not in [0, 1], or a grid of these has three channels.
+    /// When a mean cosine does not lie in (-1, 1), or a weight not in [0, 1], or a grid of these has three channels, or a
+    /// matrix of SGGX is not positive definite.
     pub fn validate(&self) -> Result<(), MediumError> {
         match self {
             Self::Blend(blend) => blend.validate(),
             Self::HenyeyGreenstein { g } => check_mean_cosine(*g),
             Self::HenyeyGreensteinGrid(g) => check_scalars(Property::G, g, check_mean_cosine),
+            Self::Sggx(field) => field.validate(),
             Self::Isotropic | Self::Rayleigh | Self::Tabulated(_) => Ok(()),
         }
     }
@@ -74,7 +84,7 @@ impl Phase {
     #[inline]
     #[must_use]
     pub fn at(&self, x: Vec3) -> LocalPhase<'_> {
-        LocalPhase::new(self, x, Mat3::IDENTITY)
+        LocalPhase::new(self, x)
     }
 
     /// True where it is not the same everywhere.
@@ -84,6 +94,7 @@ impl Phase {
         match self {
             Self::HenyeyGreensteinGrid(_) => true,
             Self::Blend(blend) => blend.varies(),
+            Self::Sggx(field) => field.varies(),
             Self::Isotropic
             | Self::HenyeyGreenstein { .. }
             | Self::Rayleigh
@@ -91,12 +102,24 @@ impl Phase {
         }
     }
 
-    /// The voxels that give its mean cosine or its weight; `None` where that is the same everywhere.
+    /// The microflakes of SGGX, by which the extinction depends on the direction.
+    #[inline]
+    #[must_use]
+    pub fn sggx(&self) -> Option<&Sggx> {
+        match self {
+            Self::Sggx(field) => Some(field),
+            _ => None,
+        }
+    }
+
+    /// The voxels that give one of its properties; `None` where that is the same everywhere.
     #[must_use]
     pub fn voxels(&self, property: Property) -> Option<&Grid> {
         match (self, property) {
             (Self::HenyeyGreensteinGrid(g), Property::G) => Some(g),
             (Self::Blend(blend), Property::Weight) => blend.weight().grid(),
+            (Self::Sggx(field), Property::SggxDiagonal) => field.entries()[0].grid(),
+            (Self::Sggx(field), Property::SggxOffDiagonal) => field.entries()[1].grid(),
             _ => None,
         }
     }
@@ -105,6 +128,8 @@ impl Phase {
         match (self, property) {
             (Self::HenyeyGreensteinGrid(g), Property::G) => Some(g),
             (Self::Blend(blend), Property::Weight) => blend.weight.grid_mut(),
+            (Self::Sggx(field), Property::SggxDiagonal) => field.entries[0].grid_mut(),
+            (Self::Sggx(field), Property::SggxOffDiagonal) => field.entries[1].grid_mut(),
             _ => None,
         }
     }
@@ -117,6 +142,7 @@ impl Phase {
                 blend.weight().grid().into_iter().for_each(&mut *visit);
                 blend.parts().iter().for_each(|part| part.grids(visit));
             }
+            Self::Sggx(field) => field.entries().iter().filter_map(Volume::grid).for_each(visit),
             Self::Isotropic
             | Self::HenyeyGreenstein { .. }
             | Self::Rayleigh
@@ -127,11 +153,12 @@ impl Phase {
     /// Moves its grids by a map of the world.
     ///
     /// # Errors
-    /// When the map is singular.
+    /// When the map is singular, or [unfit](Sggx::place) for microflakes.
     pub fn place(&mut self, map: &Affine) -> Result<(), MediumError> {
         match self {
             Self::HenyeyGreensteinGrid(g) => g.place(map),
             Self::Blend(blend) => blend.place(map),
+            Self::Sggx(field) => field.place(map),
             Self::Isotropic
             | Self::HenyeyGreenstein { .. }
             | Self::Rayleigh

@@ -1,12 +1,12 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use drt_math::{Affine, Rgb, ValueChange, ValueMap, Vec3};
+use drt_math::{Affine, Rgb, ValueChange, ValueMap, Vec3, vec3};
 
 use crate::change::{Field, FieldChange};
 use crate::{
-    CoefficientGradients, CoefficientRates, Coefficients, Flow, FlowPlace, Grid, Medium,
-    MediumChange, MediumError, PhaseGradient, Property,
+    CoefficientGradients, CoefficientRates, Coefficients, FlakesGradient, Flow, FlowPlace, Grid,
+    Medium, MediumChange, MediumError, PhaseGradient, Property,
 };
 
 /// Derivative of one coefficient field with respect to a parameter, at rest:
@@ -38,6 +38,8 @@ pub struct MediumTangent {
     pub g: FieldTangent,
     /// Rate of the weight of a blend of phase functions.
     pub weight: FieldTangent,
+    /// Rates of the entries of the matrix of SGGX, on the diagonal and off it, as they were before any motion.
+    pub flakes: [FieldTangent; 2],
     /// Velocity field of the grids, in world coordinates.
     pub velocity: Affine,
     /// Further velocities of the grids, which add up.
@@ -130,6 +132,7 @@ impl MediumTangent {
             emission: FieldTangent::default(),
             g: FieldTangent::default(),
             weight: FieldTangent::default(),
+            flakes: Default::default(),
             velocity: Affine::ZERO,
             flows: Vec::new(),
         }
@@ -143,6 +146,7 @@ impl MediumTangent {
             && self.emission.is_zero()
             && self.g.is_zero()
             && self.weight.is_zero()
+            && self.flakes.iter().all(FieldTangent::is_zero)
             && !self.moves_grids()
     }
 
@@ -154,6 +158,7 @@ impl MediumTangent {
         self.emission.add(&o.emission);
         self.g.add(&o.g);
         self.weight.add(&o.weight);
+        self.flakes.iter_mut().zip(&o.flakes).for_each(|(own, other)| own.add(other));
         self.velocity = self.velocity.plus(&o.velocity);
         for flow in &o.flows {
             if !self.flows.iter_mut().any(|own| own.add(flow)) {
@@ -186,6 +191,8 @@ impl MediumTangent {
             Field::Emission => &mut self.emission,
             Field::G => &mut self.g,
             Field::Weight => &mut self.weight,
+            Field::SggxDiagonal => &mut self.flakes[0],
+            Field::SggxOffDiagonal => &mut self.flakes[1],
         }
     }
 
@@ -270,8 +277,33 @@ impl MediumTangent {
         if gradient.place != Vec3::ZERO && self.moves_grids() {
             rate -= gradient.place.dot(self.grid_velocity(x, place));
         }
+        if medium.phase.sggx().is_some() {
+            rate += self.flakes_rate(medium, x, &gradient.flakes);
+            rate += gradient.turn.dot(spin(&self.velocity));
+        }
         rate
     }
+
+    /// The rate, as the matrix of microflakes changes, of a number whose gradient by it is given, at the point x of the world.
+    pub(crate) fn flakes_rate(&self, medium: &Medium, x: Vec3, by: &FlakesGradient) -> f64 {
+        let Some(field) = medium.phase.sggx() else { return 0.0 };
+        let at = medium.phase_place(x);
+        let rate = |k: usize, by: Rgb| match &self.flakes[k] {
+            tangent if tangent.is_zero() => 0.0,
+            tangent => {
+                let entries = &field.entries()[k];
+                by.dot(tangent.rate(entries.value(at), entries.grid(), at))
+            }
+        };
+        let [diagonal, off_diagonal] = field.by_values(by);
+        rate(0, diagonal) + rate(1, off_diagonal)
+    }
+}
+
+/// The rate of rotation in a velocity field: half of its curl, in radians.
+pub(crate) fn spin(velocity: &Affine) -> Vec3 {
+    let [x, y, z] = velocity.linear.cols;
+    vec3(y.z - z.y, z.x - x.z, x.y - y.x) * 0.5
 }
 
 impl Medium {
@@ -279,18 +311,19 @@ impl Medium {
     /// theta, as the last one so far.
     ///
     /// # Errors
-    /// As [`Medium::apply`]; and when a factor `1 + theta m` is zero.
+    /// As [`Medium::apply`]; and when a factor `1 + theta m` is zero, or microflakes would not only [turn](Medium::admits).
     pub fn tangent(&self, change: &MediumChange, theta: f64) -> Result<MediumTangent, MediumError> {
         let mut tangent = MediumTangent::zero();
         match change {
             MediumChange::Place { velocity, .. } => {
+                self.admits(velocity)?;
                 if self.is_carried() {
                     tangent.velocity = *velocity;
                 }
             }
             _ => {
                 if let Some(c) = change.field() {
-                    if matches!(c.field, Field::G | Field::Weight) {
+                    if c.property().is_of_phase() {
                         self.phase.check_change(&c)?;
                     }
                     let present = self.voxel_value(&c)?;

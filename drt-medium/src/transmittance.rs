@@ -60,7 +60,8 @@ impl Medium {
     ///
     /// With `R` the length, `z(s)` the points of the segment and N, c the normals and cosines of
     /// the box's faces it crosses:
-    /// `d tau = (dR / R) tau + R ∫ grad sigma . dz ds - sum sigma N . dz / |c|`.
+    /// `d tau = (dR / R) tau + R ∫ grad sigma . dz ds - sum sigma N . dz / |c|`. Microflakes add the derivative by the
+    /// direction.
     pub fn optical_depth_gradient(
         &self,
         ray: &Ray,
@@ -75,7 +76,7 @@ impl Medium {
         points.clear();
         self.line_points(ray.origin, ray.dir, length, rng, points);
         let e = DepthEstimate::inside(self, *ray, points, true).with_faces(self);
-        let end = (e.moment + e.depth.outer(ray.dir)) * (1.0 / length);
+        let end = (e.moment + e.depth.outer(ray.dir) + e.turn) * (1.0 / length);
         [e.gradient - end, end]
     }
 }

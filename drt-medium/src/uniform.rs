@@ -67,7 +67,7 @@ impl UniformMedium {
             Property::SigmaT => crate::homogeneous::check(property, self.sigma_t()),
             Property::Albedo => self.albedo.check(property),
             Property::Emission => self.emission.check(property),
-            Property::G | Property::Weight => Ok(()),
+            _ => Ok(()),
         }
     }
 

@@ -8,7 +8,7 @@ use std::format;
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
-use std::string::ToString;
+use std::string::{String, ToString};
 use std::vec;
 use std::vec::Vec;
 
@@ -49,12 +49,8 @@ impl VolFile {
 /// channels, or holds a value that is not finite. Nothing is allocated for sizes that the file
 /// does not have the bytes for.
 pub fn read(path: impl AsRef<Path>) -> Result<VolFile, VolError> {
-    let file = path.as_ref().display().to_string();
-    let opened = File::open(path).and_then(|open| Ok((open.metadata()?.len(), open)));
-    match opened {
-        Ok((length, open)) => decode_from(open, length, &file),
-        Err(source) => Err(VolError::Io { file, source }),
-    }
+    let (file, length, open) = open(path)?;
+    decode_from(open, length, &file)
 }
 
 /// Reads the content of a file; `file` names it in errors.
@@ -65,7 +61,32 @@ pub fn decode(bytes: &[u8], file: &str) -> Result<VolFile, VolError> {
     decode_from(bytes, bytes.len() as u64, file)
 }
 
+/// Reads a file of symmetric matrices, whose six channels are the entries xx, yy, zz, xy, xz and yz, as one of those on the
+/// diagonal and one of the others.
+///
+/// # Errors
+/// As [`read`], but for the number of channels, which is six.
+pub fn read_matrices(path: impl AsRef<Path>) -> Result<[VolFile; 2], VolError> {
+    let (file, length, open) = open(path)?;
+    let (header, values) = values_from(open, length, &file, &[6])?;
+    let part = |first: usize| -> Result<VolFile, VolError> {
+        let own = values.chunks_exact(6).flat_map(|six| six[first..first + 3].iter().copied());
+        header.grid(3, own.collect(), &file)
+    };
+    Ok([part(0)?, part(3)?])
+}
+
+/// The name of a file, its length and what is in it.
+fn open(path: impl AsRef<Path>) -> Result<(String, u64, File), VolError> {
+    let file = path.as_ref().display().to_string();
+    match File::open(path).and_then(|open| Ok((open.metadata()?.len(), open))) {
+        Ok((length, open)) => Ok((file, length, open)),
+        Err(source) => Err(VolError::Io { file, source }),
+    }
+}
+
 /// What the header of a file tells.
+#[derive(Clone, Copy)]
 struct Header {
     encoding: Encoding,
     size: [usize; 3],
@@ -73,13 +94,34 @@ struct Header {
     bounds: [Vec3; 2],
 }
 
+impl Header {
+    /// The file with these values.
+    fn grid(&self, channels: usize, values: Vec<f64>, file: &str) -> Result<VolFile, VolError> {
+        let grid = Grid::new(self.size, channels, values)
+            .map_err(|source| VolError::Grid { file: file.to_string(), source })?;
+        Ok(VolFile { grid, bounds: self.bounds })
+    }
+}
+
 /// Reads a file of a length.
-fn decode_from(mut from: impl Read, length: u64, file: &str) -> Result<VolFile, VolError> {
+fn decode_from(from: impl Read, length: u64, file: &str) -> Result<VolFile, VolError> {
+    let (header, values) = values_from(from, length, file, &[1, 3])?;
+    header.grid(header.channels, values, file)
+}
+
+/// The header and the values of a file of a length and one of the given numbers of channels.
+fn values_from(
+    mut from: impl Read,
+    length: u64,
+    file: &str,
+    allowed: &[usize],
+) -> Result<(Header, Vec<f64>), VolError> {
     let length = usize::try_from(length).unwrap_or(usize::MAX);
     let failed = |source| VolError::Io { file: file.to_string(), source };
     let mut start = Vec::new();
     from.by_ref().take(HEADER as u64).read_to_end(&mut start).map_err(failed)?;
-    let Header { encoding, size, channels, bounds } = header(&Pages { bytes: &start, file })?;
+    let header = header(&Pages { bytes: &start, file }, allowed)?;
+    let Header { encoding, size, channels, .. } = header;
     let width = encoding.width();
     let count = size.iter().try_fold(channels, |n, &s| n.checked_mul(s));
     let bytes = count.and_then(|n| n.checked_mul(width));
@@ -100,12 +142,10 @@ fn decode_from(mut from: impl Read, length: u64, file: &str) -> Result<VolFile, 
             values.push(part.finite(at + n * width, "a grid value", encoding.value(raw))?);
         }
     }
-    let grid = Grid::new(size, channels, values)
-        .map_err(|source| VolError::Grid { file: file.to_string(), source })?;
-    Ok(VolFile { grid, bounds })
+    Ok((header, values))
 }
 
-fn header(pages: &Pages<'_>) -> Result<Header, VolError> {
+fn header(pages: &Pages<'_>, allowed: &[usize]) -> Result<Header, VolError> {
     pages.slice(0, HEADER)?;
     let signature = pages.slice(0, MAGIC.len())?;
     if *signature != MAGIC {
@@ -131,10 +171,11 @@ fn header(pages: &Pages<'_>) -> Result<Header, VolError> {
         extent(12, "the size along y")?,
         extent(16, "the size along z")?,
     ];
-    let channels = match pages.i32(20)? {
-        n @ (1 | 3) => n as usize,
-        n => return Err(pages.field(20, "the number of channels", n.to_string(), "1 or 3")),
-    };
+    let found = pages.i32(20)?;
+    let channels = allowed.iter().copied().find(|n| usize::try_from(found) == Ok(*n));
+    let expected = if allowed.contains(&6) { "6" } else { "1 or 3" };
+    let channels = channels
+        .ok_or_else(|| pages.field(20, "the number of channels", found.to_string(), expected))?;
     let corner = |offset: usize| -> Result<Vec3, VolError> {
         let c = |k: usize| pages.f32(offset + 4 * k, "the bounding box");
         Ok(vec3(c(0)?, c(1)?, c(2)?))

@@ -9,6 +9,7 @@ use drt_estimators::emitter::Emitter;
 use drt_estimators::texture::Texture;
 use drt_estimators::{Integrator, MediumBoundary, Plan, Scene, Shape, Surrounding};
 use drt_geom::{EdgeClass, Mesh, Topology};
+use drt_math::Vec3;
 use drt_medium::{Medium, MediumKind, Phase, Volume};
 use drt_motion::{Change, Parameter};
 use serde_json::json;
@@ -226,6 +227,11 @@ fn phase(p: &Phase) -> String {
                 Volume::Constant(weight) => format!("{a}, and {} of {b}", weight.r),
                 Volume::Grid(_) => format!("{a}, and {b} by a grid of weights"),
             }
+        }
+        Phase::Sggx(field) if field.varies() => "sggx, a grid of S".into(),
+        Phase::Sggx(field) => {
+            let [d, o] = field.entries().each_ref().map(|v| v.value(Vec3::ZERO).to_array());
+            format!("sggx, S {d:?} and {o:?} off the diagonal")
         }
         Phase::Tabulated(table) => format!("a table, mean cosine {}", table.mean_cosine()),
     }

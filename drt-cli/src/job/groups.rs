@@ -189,8 +189,10 @@ fn texels(
 }
 
 fn property(name: Option<&str>) -> Result<drt_medium::Property, String> {
-    name.and_then(drt_medium::Property::from_name)
-        .ok_or_else(|| "`voxels` need `property`: sigma_t, albedo, emission, g or weight".into())
+    name.and_then(drt_medium::Property::from_name).ok_or_else(|| {
+        let names = drt_medium::Property::ALL.map(drt_medium::Property::name).join(", ");
+        format!("`voxels` need a `property`, one of {names}")
+    })
 }
 
 /// How far from zero a fit takes mean cosines where nothing else is said: at 1 nothing is scattered aside.
@@ -205,6 +207,7 @@ fn range(kind: &GroupKind) -> [f64; 2] {
             [0.0, 1.0]
         }
         GroupKind::Voxels(drt_medium::Property::G) => [-SHARPEST_G, SHARPEST_G],
+        GroupKind::Voxels(drt_medium::Property::SggxOffDiagonal) => all,
         GroupKind::Voxels(_) | GroupKind::LightTexels => [0.0, f64::INFINITY],
         GroupKind::Texels { property, .. } => property.range(),
         _ => UNBOUNDED,

@@ -3,7 +3,7 @@
 use drt_estimators::{Named, Surrounding};
 use drt_math::Rgb;
 use drt_medium::{
-    Grid, GridMedium, Homogeneous, Medium, MediumKind, Phase, PhaseBlend, PhaseTable,
+    Flakes, Grid, GridMedium, Homogeneous, Medium, MediumKind, Phase, PhaseBlend, PhaseTable, Sggx,
     UniformMedium, Volume,
 };
 
@@ -96,6 +96,7 @@ impl<'a> Loader<'a> {
             "rayleigh" => Phase::Rayleigh,
             "hg" => self.henyey_greenstein(&p)?,
             "blendphase" => self.blended_phase(&p, parts)?,
+            "sggx" => self.microflakes(&p)?,
             "tabphase" => {
                 let values = p.string("values")?.ok_or_else(|| e.error("`values` is missing"))?;
                 let table = PhaseTable::new(numbers(e, values)?).map_err(|err| e.error(err))?;
@@ -104,7 +105,7 @@ impl<'a> Loader<'a> {
             other => {
                 return Err(e.error(format!(
                     "the phase function type `{other}` is not supported; expected isotropic, hg, \
-                     rayleigh, blendphase or tabphase"
+                     rayleigh, blendphase, tabphase or sggx"
                 )));
             }
         };
@@ -128,6 +129,21 @@ impl<'a> Loader<'a> {
             None => Phase::henyey_greenstein(p.float("g")?.unwrap_or(0.8)),
         };
         phase.map_err(|err| p.element.error(err))
+    }
+
+    /// With a volume of matrices, which are the same everywhere where that has one voxel.
+    fn microflakes(&self, p: &Properties<'a>) -> Result<Phase, CliError> {
+        let e = p.element;
+        let volume = self.index.single(p, "volume", Some("S"))?;
+        let volume = volume.ok_or_else(|| e.error("the volume `S` is missing"))?.target;
+        let [diagonal, off_diagonal] = volumes::read_matrices(volume)?;
+        let field = if diagonal.size() == [1; 3] {
+            let of = |grid: &Grid| grid.voxel([0; 3]).to_array().into();
+            Sggx::new(Flakes { diagonal: of(&diagonal), off_diagonal: of(&off_diagonal) })
+        } else {
+            Sggx::varying(diagonal, off_diagonal)
+        };
+        Ok(Phase::Sggx(Box::new(field.map_err(|err| volume.error(err))?)))
     }
 
     /// Of the two inside, in the order of the file.

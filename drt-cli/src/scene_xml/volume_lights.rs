@@ -72,6 +72,11 @@ fn emit(light: &Element, radiance: &Volume, medium: &mut Medium) -> Result<(), C
             "a volumelight in a medium with grids is not supported; give the medium an `emission`",
         ));
     };
+    if medium.phase.sggx().is_some() {
+        return Err(light.error(
+            "a volumelight in a medium of microflakes is not supported; they emit by how much of them a direction sees",
+        ));
+    }
     let c = h.coefficients();
     let brightest = match radiance {
         Volume::Constant(radiance) => *radiance,

@@ -1,7 +1,10 @@
 //! Quantities in space: numbers, colours, `constvolume` and `gridvolume`.
 
+use std::path::PathBuf;
+
 use drt_math::{Affine, Rgb};
-use drt_medium::{Filter, Grid, Layout, Volume, Wrap, nanovdb, vol};
+use drt_medium::vol::{self, VolFile};
+use drt_medium::{Filter, Grid, Layout, Volume, Wrap, nanovdb};
 
 use super::Loader;
 use super::element::Element;
@@ -91,21 +94,49 @@ fn not_negative(p: &Properties<'_>, grid: Grid) -> Result<Grid, CliError> {
     Grid::new(grid.size(), grid.channels(), values).map_err(|err| p.element.error(err))
 }
 
+/// How a `gridvolume` joins its values, and where it is.
+struct Joined {
+    layout: Layout,
+    filter: Filter,
+    wrap: Wrap,
+    to_world: Affine,
+    in_stored_box: bool,
+}
+
+impl Joined {
+    fn of(p: &Properties<'_>) -> Result<Self, CliError> {
+        let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
+        let filters = [("trilinear", Filter::Trilinear), ("nearest", Filter::Nearest)];
+        let wraps = [("clamp", Wrap::Clamp), ("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror)];
+        let filter = p.choice("filter_type", &filters)?.unwrap_or_default();
+        let wrap = p.choice("wrap_mode", &wraps)?.unwrap_or_default();
+        // Files of Mitsuba 0.5 and 0.6 place a grid in the box stored with it, its outermost values on
+        // the faces.
+        let legacy = p.element.is_legacy();
+        let in_stored_box = p.boolean("use_grid_bbox")?.unwrap_or(legacy);
+        let layout = if legacy { Layout::NodeCentred } else { Layout::VoxelCentred };
+        // Spectral upsampling and texture hardware.
+        p.accept(&["raw", "accel", "send_data"]);
+        Ok(Self { layout, filter, wrap, to_world, in_stored_box })
+    }
+
+    /// A grid of a file, stored with a placement.
+    fn place(&self, e: &Element, grid: Grid, placement: Affine) -> Result<Grid, CliError> {
+        let stored = if self.in_stored_box { placement } else { Affine::IDENTITY };
+        (grid.with_layout(self.layout).with_filter(self.filter).with_wrap(self.wrap))
+            .with_placement(self.to_world.after(&stored))
+            .map_err(|err| e.error(err))
+    }
+}
+
+fn filename(p: &Properties<'_>) -> Result<PathBuf, CliError> {
+    p.path("filename")?.ok_or_else(|| p.element.error("`filename` is missing"))
+}
+
 fn grid(p: &Properties<'_>, values: Values) -> Result<Field, CliError> {
     let e = p.element;
-    let path = p.path("filename")?.ok_or_else(|| e.error("`filename` is missing"))?;
-    let to_world = p.transform("to_world")?.unwrap_or(Affine::IDENTITY);
-    let filters = [("trilinear", Filter::Trilinear), ("nearest", Filter::Nearest)];
-    let wraps = [("clamp", Wrap::Clamp), ("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror)];
-    let filter = p.choice("filter_type", &filters)?.unwrap_or_default();
-    let wrap = p.choice("wrap_mode", &wraps)?.unwrap_or_default();
-    // Files of Mitsuba 0.5 and 0.6 place a grid in the box stored with it, its outermost values on
-    // the faces.
-    let legacy = e.is_legacy();
-    let in_stored_box = p.boolean("use_grid_bbox")?.unwrap_or(legacy);
-    let layout = if legacy { Layout::NodeCentred } else { Layout::VoxelCentred };
-    // Spectral upsampling and texture hardware.
-    p.accept(&["raw", "accel", "send_data"]);
+    let path = filename(p)?;
+    let joined = Joined::of(p)?;
     let is_tree = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("nvdb"));
     let (grid, placement) = if is_tree {
         let name = p.string("grid_name")?;
@@ -116,10 +147,22 @@ fn grid(p: &Properties<'_>, values: Values) -> Result<Field, CliError> {
         let placement = file.placement();
         (file.grid, placement)
     };
-    let stored = if in_stored_box { placement } else { Affine::IDENTITY };
     let grid = if values == Values::Any { grid } else { not_negative(p, grid)? };
-    let grid = (grid.with_layout(layout).with_filter(filter).with_wrap(wrap))
-        .with_placement(to_world.after(&stored))
-        .map_err(|err| e.error(err))?;
+    let grid = joined.place(e, grid, placement)?;
     Ok(Field { placement: *grid.to_world(), volume: Volume::Grid(grid) })
+}
+
+/// A `<volume>` element of symmetric matrices, as one grid of their diagonals and one of what is off these.
+pub(super) fn read_matrices(e: &Element) -> Result<[Grid; 2], CliError> {
+    let p = Properties::of(e)?;
+    if p.kind()? != "gridvolume" {
+        return Err(e.error("matrices are given by a gridvolume of six channels"));
+    }
+    let joined = Joined::of(&p)?;
+    let [diagonal, off_diagonal] = vol::read_matrices(filename(&p)?).map_err(|err| e.error(err))?;
+    let placement = diagonal.placement();
+    let place = |file: VolFile| joined.place(e, file.grid, placement);
+    let grids = [place(diagonal)?, place(off_diagonal)?];
+    p.finish()?;
+    Ok(grids)
 }

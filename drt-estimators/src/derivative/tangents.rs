@@ -341,6 +341,9 @@ impl Apply<'_> {
         let n = self.parameters.len();
         let mut medium = self.scene.media[i].item.clone();
         match (self.deforming_leader(target)?, medium.carried_bounds()) {
+            (Some(_), _) if medium.phase.sggx().is_some() => {
+                return Err(self.fail(first, target, drt_medium::MediumError::SggxMotion));
+            }
             (Some(leader), Some(bounds)) => {
                 let shape = &self.given.shapes[leader].mesh;
                 let deformation =
@@ -365,6 +368,9 @@ impl Apply<'_> {
                 if medium.is_carried() {
                     for (t, velocity) in tangents.iter_mut().zip(&frame.velocities) {
                         t.velocity = *velocity;
+                    }
+                    for (p, t) in tangents.iter().enumerate() {
+                        medium.admits(&t.velocity).map_err(|e| self.fail(p, target, e))?;
                     }
                 }
             }
@@ -412,6 +418,8 @@ impl Apply<'_> {
             "emission" => MediumChange::Emission { op, voxels },
             "g" => MediumChange::G { op, voxels },
             "weight" => MediumChange::Weight { op, voxels },
+            "sggx_diagonal" => MediumChange::SggxDiagonal { op, voxels },
+            "sggx_off_diagonal" => MediumChange::SggxOffDiagonal { op, voxels },
             other => {
                 return Err(self.fail(p, target, EffectError::MediumProperty(other.into())));
             }

@@ -408,6 +408,8 @@ impl Collector {
                     drt_medium::Property::Emission => &of.emission.voxels,
                     drt_medium::Property::G => &of.g.voxels,
                     drt_medium::Property::Weight => &of.weight.voxels,
+                    drt_medium::Property::SggxDiagonal => &of.flakes[0].voxels,
+                    drt_medium::Property::SggxOffDiagonal => &of.flakes[1].voxels,
                 };
                 if let Some(voxels) = voxels {
                     voxels.add_to(numbers, weight * scale);

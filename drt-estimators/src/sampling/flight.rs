@@ -56,7 +56,7 @@ impl Tracer<'_> {
                         let vertex = Vertex { x, medium: Some(m), kind: Kind::Volume(None) };
                         return Travel::Volume(Flown {
                             vertex,
-                            coefficients: world.coefficients(m, x),
+                            coefficients: world.coefficients(m, x, dir),
                             t: interval.start + t,
                             arrival: passed * weight,
                             crossed: i,
@@ -121,7 +121,7 @@ impl Tracer<'_> {
         let tau = world.transmittance(origin, dir, part, &mut self.rng, &mut self.counters);
         Some(Flown {
             vertex: Vertex { x, medium: Some(medium), kind: Kind::Volume(None) },
-            coefficients: world.coefficients(medium, x),
+            coefficients: world.coefficients(medium, x, dir),
             t,
             arrival: tau / (density + free),
             crossed: part.crossings.len(),

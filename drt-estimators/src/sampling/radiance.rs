@@ -51,7 +51,7 @@ impl Tracer<'_> {
             }
             Kind::Volume(_) => {
                 let Some(m) = vertex.medium else { return };
-                let c = self.world.coefficients(m, vertex.x);
+                let c = self.world.coefficients(m, vertex.x, wo);
                 observer.contribution(Pixel::Own, 0, c.source());
                 Some(c)
             }

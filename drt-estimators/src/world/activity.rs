@@ -86,7 +86,7 @@ impl World {
             if changes || probed.is_some() {
                 self.probed[m] = probed.filter(|_| needs.extinctions[m]);
                 // The same where probes would be taken but nothing asks for them, so that all derivatives are by the same paths.
-                self.defensive[m] = match self.medium(m).extinction() {
+                self.defensive[m] = match self.medium(m).even_extinction() {
                     Some(h) => self.defensive_where_thin(m, h),
                     None if probed.is_some() => 0.0,
                     None => DEFENSIVE,

@@ -170,11 +170,14 @@ impl World {
         &self.scene.media[m].item
     }
 
-    /// The coefficients of medium `m` at `x`, its emission as far as it counts.
-    pub(crate) fn coefficients(&self, m: usize, x: Vec3) -> Coefficients {
+    /// The coefficients of medium `m` at `x`. The emission is that along the unit vector `w`, of which microflakes show their
+    /// [area](Medium::projected_area), as far as it counts.
+    pub(crate) fn coefficients(&self, m: usize, x: Vec3, w: Vec3) -> Coefficients {
         let mut c = self.medium(m).coefficients(x);
         if !self.lit.by_surroundings() {
             c.emission = Rgb::ZERO;
+        } else if !c.emission.is_zero() {
+            c.emission *= self.medium(m).projected_area(x, w);
         }
         c
     }
@@ -226,7 +229,10 @@ impl World {
                 let at = (!bsdf.is_plain()).then(|| self.texture_point(s));
                 Some(Scattering::Surface(bsdf.at(at, s.ng, s.ns, shape.mesh.normals.is_some())))
             }
-            Kind::Volume(_) => v.medium.map(|m| Scattering::Volume(self.medium(m).phase_at(v.x))),
+            Kind::Volume(_) => v.medium.map(|m| {
+                let (medium, x) = (self.medium(m), v.x);
+                Scattering::Volume { medium, x, phase: medium.phase_at(x) }
+            }),
             Kind::Point => None,
         }
     }

@@ -1,8 +1,10 @@
 //! Scattering at a vertex, surface or volume, under one roof.
 
+use core::f64::consts::FRAC_1_PI;
+
 use drt_geom::edges::Lobes;
-use drt_math::{Rgb, RgbVec, Rng, Vec3};
-use drt_medium::{LocalPhase, Phase, PhaseGradient};
+use drt_math::{Rgb, RgbVec, Rng, Vec3, fm, vec3};
+use drt_medium::{LocalPhase, Medium, Phase, PhaseGradient};
 
 use crate::model::surface::{
     BsdfParams, DirectionPartner, Given, LocalBsdf, RoughnessPartner, SpecularSample,
@@ -13,8 +15,8 @@ use crate::model::surface::{
 pub(crate) enum Scattering<'a> {
     /// BSDF times the cosine on the light's side.
     Surface(LocalBsdf<'a>),
-    /// Phase function; the scattering coefficient is not in it.
-    Volume(LocalPhase<'a>),
+    /// Phase function of a medium at a point; the scattering coefficient is not in it.
+    Volume { medium: &'a Medium, x: Vec3, phase: LocalPhase<'a> },
 }
 
 /// A direction drawn at random.
@@ -41,12 +43,27 @@ pub(crate) struct ScatteringGradient {
     pub(crate) params: Option<BsdfParams>,
 }
 
+impl ScatteringGradient {
+    /// The gradient of what a medium does at a point.
+    pub(crate) fn of_phase(gradient: PhaseGradient) -> Self {
+        Self {
+            wo: Rgb::ONE.outer(gradient.wo),
+            wi: Rgb::ONE.outer(gradient.wi),
+            ns: RgbVec::ZERO,
+            ng: RgbVec::ZERO,
+            slide: RgbVec::ZERO,
+            phase: Some(gradient),
+            params: None,
+        }
+    }
+}
+
 impl Scattering<'_> {
     /// The value for light from `wi` leaving to `wo`, both unit and away from the vertex.
     pub(crate) fn eval(&self, wo: Vec3, wi: Vec3) -> Rgb {
         match self {
             Self::Surface(bsdf) => bsdf.eval(wo, wi),
-            Self::Volume(phase) => Rgb::splat(phase.eval(-wo.dot(wi))),
+            Self::Volume { phase, .. } => Rgb::splat(phase.eval(wo, wi)),
         }
     }
 
@@ -60,11 +77,11 @@ impl Scattering<'_> {
                     None => bsdf.sample(from, u, given).map(|s| Drawn::Spread(s.w, s.pdf)),
                 }
             }
-            Self::Volume(phase) => {
-                // Phase functions here depend on the angle alone, so which of the two
-                // directions is given makes no difference.
-                let (flow, pdf) = phase.sample(-from, rng.next_2d());
-                Some(Drawn::Spread(flow, pdf))
+            Self::Volume { phase, .. } => {
+                // Phase functions are reciprocal, so which of the two directions is given makes no
+                // difference.
+                let (to, pdf) = phase.sample(from, rng.next_2d());
+                Some(Drawn::Spread(to, pdf))
             }
         }
     }
@@ -81,7 +98,7 @@ impl Scattering<'_> {
     pub(crate) fn pdf(&self, from: Vec3, to: Vec3, given: Given) -> f64 {
         match self {
             Self::Surface(bsdf) => bsdf.pdf(from, to, given),
-            Self::Volume(phase) => phase.pdf(-from.dot(to)),
+            Self::Volume { phase, .. } => phase.pdf(from, to),
         }
     }
 
@@ -89,8 +106,11 @@ impl Scattering<'_> {
     pub(crate) fn lobes(&self, wo: Vec3) -> Lobes {
         match self {
             Self::Surface(bsdf) => bsdf.lobes(wo),
-            Self::Volume(phase) => match phase.mean_cosine_parameter() {
-                Some(g) => Lobes::around(-wo * g.signum(), phase.eval(0.0), phase.eval(g.signum())),
+            Self::Volume { phase, .. } => match phase.mean_cosine_parameter() {
+                Some(g) => {
+                    let [aside, peak] = [0.0, g.signum()].map(|c| at_cosine(phase, c));
+                    Lobes::around(-wo * g.signum(), aside, peak)
+                }
                 None => lobes_of(phase, wo),
             },
         }
@@ -100,7 +120,7 @@ impl Scattering<'_> {
     pub(crate) fn lobe_width(&self) -> f64 {
         match self {
             Self::Surface(bsdf) => bsdf.lobe_width(),
-            Self::Volume(phase) => 1.0 - phase.sharpness(),
+            Self::Volume { phase, .. } => 1.0 - phase.sharpness(),
         }
     }
 
@@ -112,18 +132,8 @@ impl Scattering<'_> {
                 let (slide, params) = (bsdf.slide(wo, wi, &d.params), Some(d.params));
                 ScatteringGradient { wo: d.wo, wi: d.wi, ns: d.n, ng, slide, phase: None, params }
             }
-            Self::Volume(phase) => {
-                let gradient = phase.gradient(-wo.dot(wi));
-                let slope = Rgb::splat(-gradient.cosine);
-                ScatteringGradient {
-                    wo: slope.outer(wi),
-                    wi: slope.outer(wo),
-                    ns: RgbVec::ZERO,
-                    ng: RgbVec::ZERO,
-                    slide: RgbVec::ZERO,
-                    phase: Some(gradient),
-                    params: None,
-                }
+            Self::Volume { medium, x, phase } => {
+                ScatteringGradient::of_phase(medium.phase_gradient(*x, phase, wo, wi))
             }
         }
     }
@@ -132,7 +142,7 @@ impl Scattering<'_> {
     pub(crate) fn roughness_partner(&self, wo: Vec3, wi: Vec3) -> Option<RoughnessPartner> {
         match self {
             Self::Surface(bsdf) => bsdf.roughness_partner(wo, wi),
-            Self::Volume(_) => None,
+            Self::Volume { .. } => None,
         }
     }
 
@@ -140,7 +150,7 @@ impl Scattering<'_> {
     pub(crate) fn direction_partner(&self, wo: Vec3, wi: Vec3) -> Option<DirectionPartner> {
         match self {
             Self::Surface(bsdf) => bsdf.direction_partner(wo, wi),
-            Self::Volume(_) => None,
+            Self::Volume { .. } => None,
         }
     }
 
@@ -148,19 +158,28 @@ impl Scattering<'_> {
     pub(crate) fn adjoint_correction(&self, wo: Vec3, wi: Vec3) -> f64 {
         match self {
             Self::Surface(bsdf) => bsdf.adjoint_correction(wo, wi),
-            Self::Volume(_) => 1.0,
+            Self::Volume { .. } => 1.0,
         }
     }
+}
+
+/// A phase function's value where light turns by the angle of a cosine, in one of the planes that it may turn in.
+fn at_cosine(phase: &LocalPhase<'_>, c: f64) -> f64 {
+    phase.eval(-Vec3::Z, vec3(fm::sqrt(1.0 - c * c), 0.0, c))
 }
 
 /// A sketch of a phase function without a mean cosine to go by: one lobe to the side where there is more.
 #[cold]
 fn lobes_of(phase: &LocalPhase<'_>, wo: Vec3) -> Lobes {
-    if matches!(phase.phase(), Phase::Rayleigh) {
-        return Lobes::even(phase.eval(0.0));
+    match phase.phase() {
+        Phase::Rayleigh => return Lobes::even(at_cosine(phase, 0.0)),
+        // As if what the flakes show was scattered evenly.
+        Phase::Sggx(_) => return Lobes::even(0.25 * FRAC_1_PI * phase.projected_area(wo)),
+        _ => {}
     }
-    let side = if phase.eval(1.0) >= phase.eval(-1.0) { 1.0 } else { -1.0 };
+    let [back, aside, forward] = [-1.0, 0.0, 1.0].map(|c| at_cosine(phase, c));
+    let (side, most) = if forward >= back { (1.0, forward) } else { (-1.0, back) };
     // A table may be zero to the sides.
-    let low = f64::max(phase.eval(0.0), 0.01);
-    Lobes::around(-wo * side, low, f64::max(phase.eval(side), low))
+    let low = f64::max(aside, 0.01);
+    Lobes::around(-wo * side, low, f64::max(most, low))
 }

@@ -170,10 +170,10 @@ impl World {
         self.medium(medium).grid().map_or(0.0, |g| 2e-9 * g.density().world_extent().max_abs())
     }
 
-    /// The extinction at a point of an interface, on the side that the unit vector `towards` points to.
+    /// The extinction at a point of an interface, along the unit vector `towards` on the side that it points to.
     pub(crate) fn sigma_t_at_border(&self, medium: Option<usize>, x: Vec3, towards: Vec3) -> Rgb {
         let Some(m) = medium else { return Rgb::ZERO };
-        self.medium(m).sigma_t(x + towards * self.border(m))
+        self.medium(m).sigma_t_along(x + towards * self.border(m), towards)
     }
 
     /// A volume vertex touching a surface on one side.

@@ -10,6 +10,7 @@ mod environment;
 mod every_vertex;
 mod film;
 mod fit;
+mod flakes;
 mod gradient_insides;
 mod grid_deformation;
 mod groups;

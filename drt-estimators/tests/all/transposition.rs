@@ -358,6 +358,29 @@ fn voxels_of_phase_functions() {
     }
 }
 
+/// Microflakes in voxels and the same everywhere, at rest, and turned by motions that change them.
+#[test]
+fn microflakes() {
+    let both = |voxel: Option<[usize; 3]>| {
+        ["sggx_diagonal", "sggx_off_diagonal"].map(|property| match voxel {
+            Some(voxel) => changes_voxel("smoke", property, voxel, coloured()),
+            None => changes("smoke", property, coloured()),
+        })
+    };
+    let mut rng = Rng::new(8, 0, 0);
+    let mut index = || (4.0 * rng.next_f64()) as usize;
+    let voxels: Vec<_> = (0..10).map(|_| Some([index(), index(), index()])).collect();
+    for (scene, places) in [(flaky_smoke(1.0), voxels), (flaky_fog(), vec![None])] {
+        let mut effects: Vec<Effect> = places.into_iter().flat_map(both).collect();
+        effects.push(changes("smoke", "sigma_t", coloured()));
+        effects.push(changes("smoke", "emission", coloured()));
+        agree("values", &scene, effects.clone(), &settings());
+        agree("flakes turn", &scene, vec![moves("smoke", turn())], &settings());
+        effects.extend([moves("box", wobble(&scene, "box", 2)), moves("smoke", turn())]);
+        agree("in a moving box", &scene, effects, &with_tetrahedra());
+    }
+}
+
 /// Texels, with what their textures are on at rest and moving.
 #[test]
 fn texels() {

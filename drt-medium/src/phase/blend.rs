@@ -20,7 +20,7 @@ impl PhaseBlend {
     /// A blend with `weight` of the second part.
     ///
     /// # Errors
-    /// When the weight does not lie in [0, 1].
+    /// When the weight does not lie in [0, 1], or a part is SGGX.
     pub fn new(weight: f64, parts: [Phase; 2]) -> Result<Self, MediumError> {
         Self::with(Volume::Constant(Rgb::splat(weight)), parts)
     }
@@ -28,7 +28,7 @@ impl PhaseBlend {
     /// A blend with a grid of weights of the second part.
     ///
     /// # Errors
-    /// When the grid has three channels, or a weight does not lie in [0, 1].
+    /// When the grid has three channels, or a weight does not lie in [0, 1], or a part is SGGX.
     pub fn varying(weight: Grid, parts: [Phase; 2]) -> Result<Self, MediumError> {
         Self::with(Volume::Grid(weight), parts)
     }
@@ -42,6 +42,9 @@ impl PhaseBlend {
         match &self.weight {
             Volume::Constant(w) => check_weight(w.r)?,
             Volume::Grid(grid) => check_scalars(Property::Weight, grid, check_weight)?,
+        }
+        if self.parts.iter().any(|part| part.sggx().is_some()) {
+            return Err(MediumError::SggxInBlend);
         }
         self.parts.iter().try_for_each(Phase::validate)
     }

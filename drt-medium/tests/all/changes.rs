@@ -5,8 +5,8 @@ use crate::common::*;
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
 use drt_medium::{
     CoefficientRates, FlowPlace, Grid, GridMedium, Homogeneous, Layout, Medium, MediumChange,
-    MediumError, MediumGradient, MediumTangent, Phase, PhaseBlend, Property, UniformMedium,
-    ValueChange, Volume, Wrap,
+    MediumError, MediumGradient, MediumTangent, Phase, PhaseBlend, PhaseGradient, Property,
+    UniformMedium, ValueChange, Volume, Wrap,
 };
 
 const MULTIPLY: ValueChange = ValueChange::Multiply(0.7);
@@ -114,6 +114,12 @@ fn changed(start: &Medium, changes: &[ChangeAt], theta: f64) -> (Medium, MediumT
 /// The cosine at which phase functions are looked at.
 const COSINE: f64 = 0.4;
 
+/// Derivatives of the phase function there.
+fn gradient(medium: &Medium, x: Vec3) -> PhaseGradient {
+    let [wo, wi] = directions(COSINE);
+    medium.phase_gradient(x, &medium.phase_at(x), wo, wi)
+}
+
 /// What a medium has at a point, or the rates of that.
 #[derive(Clone, Copy, Debug)]
 struct Local {
@@ -125,11 +131,11 @@ fn local(medium: &Medium, x: Vec3) -> Local {
     let c = medium.coefficients(x);
     let (sigma_t, albedo, emission) = (c.sigma_t, c.albedo, c.emission);
     let coefficients = CoefficientRates { sigma_t, albedo, emission };
-    Local { coefficients, phase: medium.phase_at(x).eval(COSINE) }
+    Local { coefficients, phase: at_cosine(&medium.phase_at(x), COSINE) }
 }
 
 fn rates(tangent: &MediumTangent, medium: &Medium, x: Vec3) -> Local {
-    let gradient = medium.phase_at(x).gradient(COSINE);
+    let gradient = gradient(medium, x);
     let phase = tangent.phase_rate(medium, x, &gradient, &mut FlowPlace::default());
     Local { coefficients: tangent.rates(medium, x), phase }
 }
@@ -252,7 +258,7 @@ fn gradients_are_the_transposes_of_rates() {
             forward += rate;
             size += rate.abs();
             parts[n % 2].scatter(&medium, x, &adjoint);
-            let gradient = medium.phase_at(x).gradient(COSINE);
+            let gradient = gradient(&medium, x);
             parts[n % 2].scatter_phase(&medium, x, &gradient, of_phase);
         }
         let [mut gradient, other] = parts;

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::common::{
-    assert_agrees, assert_rejects, estimate, grid_medium, placement, random_values,
+    assert_agrees, assert_rejects, directions, estimate, grid_medium, placement, random_values,
 };
 use drt_math::{Affine, Mat3, Rgb, RgbVec, Rng, Vec3, vec3};
 use drt_medium::{
@@ -261,9 +261,10 @@ fn phase_functions_are_bent() {
             if medium.grid().is_some() && !medium.contains(x) {
                 continue;
             }
-            let here = medium.phase_at(x).gradient(cosine);
+            let [wo, wi] = directions(cosine);
+            let here = medium.phase_gradient(x, &medium.phase_at(x), wo, wi);
             let rate = tangent.phase_rate(&medium, x, &here, place);
-            let [a, b] = [&low, &high].map(|m| m.phase_at(x).eval(cosine));
+            let [a, b] = [&low, &high].map(|m| m.phase_at(x).eval(wo, wi));
             let off = (rate - (b - a) / (2.0 * h)).abs();
             jumps += f64::from(u8::from(off > 1e-6));
             forward += rate;

@@ -9,6 +9,7 @@ mod grids;
 mod phase;
 #[cfg(feature = "serde")]
 mod serde;
+mod sggx;
 mod single_scattering;
 mod tracking;
 mod transmittance;

@@ -7,6 +7,8 @@ use drt_math::testing::{SIGNIFICANCE, sphere_chi_square};
 use drt_math::{Dual, Rng, Vec3, vec3};
 use drt_medium::{Grid, MediumError, Phase, PhaseBlend, PhaseTable, henyey_greenstein};
 
+use crate::common::{at_cosine, directions};
+
 const SHARPEST: f64 = 0.9999;
 
 fn phases() -> Vec<Phase> {
@@ -50,21 +52,21 @@ fn normalised_and_sampled_wherever_it_varies() {
     for phase in varying() {
         for x in [0.0, 0.31, 0.5, 0.77] {
             let p = phase.at(vec3(x, 0.5, 0.5));
-            let total = sphere_integral(1.0, |c, _| p.eval(c));
+            let total = sphere_integral(1.0, |c, _| at_cosine(&p, c));
             assert!((total - 1.0).abs() < 1e-6, "{p:?} integrates to {total}");
             let directions = (0..100_000).map(|i| {
-                let (w, pdf) = p.sample(flow, Rng::new(1, 2, i).next_2d());
-                assert!((pdf / p.pdf(flow.dot(w)) - 1.0).abs() < 1e-9);
+                let (w, pdf) = p.sample(-flow, Rng::new(1, 2, i).next_2d());
+                assert!((pdf / p.pdf(-flow, w) - 1.0).abs() < 1e-9);
                 w
             });
-            let value = sphere_chi_square(directions, |w| p.pdf(flow.dot(w)));
+            let value = sphere_chi_square(directions, |w| p.pdf(-flow, w));
             assert!(value > SIGNIFICANCE, "{p:?}: p-value {value}");
         }
     }
     let [g, ..] = varying();
     let [here, there] = [0.2, 0.8].map(|x| g.at(vec3(x, 0.5, 0.5)));
-    let directions = (0..100_000).map(|i| here.sample(flow, Rng::new(1, 2, i).next_2d()).0);
-    let value = sphere_chi_square(directions, |w| there.eval(flow.dot(w)));
+    let directions = (0..100_000).map(|i| here.sample(-flow, Rng::new(1, 2, i).next_2d()).0);
+    let value = sphere_chi_square(directions, |w| there.eval(w, -flow));
     assert!(value < SIGNIFICANCE, "samples of one place pass for those of another: {value}");
 }
 
@@ -73,11 +75,11 @@ fn normalised_and_sampled_wherever_it_varies() {
 fn both_parts_of_a_blend_are_sampled() {
     let [_, blend, _] = varying();
     let p = blend.at(vec3(0.0, 0.5, 0.5));
-    assert_eq!(
-        p.gradient(1.0).weight,
-        table(&[0.0, 1.0, 3.0]).at(Vec3::ZERO).eval(1.0) - p.eval(1.0)
-    );
-    assert!(p.pdf(1.0) != p.eval(1.0) && p.pdf(1.0) > 0.95 * p.eval(1.0));
+    let [wo, wi] = directions(1.0);
+    let other = at_cosine(&table(&[0.0, 1.0, 3.0]).at(Vec3::ZERO), 1.0);
+    let (value, density) = (p.eval(wo, wi), p.pdf(wo, wi));
+    assert_eq!(p.gradient(wo, wi).weight, other - value);
+    assert!(density != value && density > 0.95 * value);
 }
 
 #[test]
@@ -122,9 +124,9 @@ fn normalised_with_the_mean_cosine_promised() {
     for p in phases() {
         let g = mean_cosine(&p);
         let here = p.at(Vec3::ZERO);
-        let total = sphere_integral(g, |c, _| here.eval(c));
+        let total = sphere_integral(g, |c, _| at_cosine(&here, c));
         assert!((total - 1.0).abs() < 1e-7, "{p:?} integrates to {total}");
-        let mean = sphere_integral(g, |c, _| c * here.eval(c));
+        let mean = sphere_integral(g, |c, _| c * at_cosine(&here, c));
         assert!((mean - g).abs() < 1e-7, "{p:?} has mean cosine {mean}");
     }
 }
@@ -135,12 +137,12 @@ fn sampled_as_evaluated() {
     for p in phases().into_iter().filter(|p| mean_cosine(p).abs() < 0.9) {
         let p = p.at(Vec3::ZERO);
         let directions = (0..200_000).map(|i| {
-            let (w, pdf) = p.sample(flow, Rng::new(1, 2, i).next_2d());
+            let (w, pdf) = p.sample(-flow, Rng::new(1, 2, i).next_2d());
             assert!((w.length() - 1.0).abs() < 1e-12);
-            assert!((pdf / p.pdf(flow.dot(w)) - 1.0).abs() < 1e-9);
+            assert!((pdf / p.pdf(-flow, w) - 1.0).abs() < 1e-9);
             w
         });
-        let value = sphere_chi_square(directions, |w| p.eval(flow.dot(w)));
+        let value = sphere_chi_square(directions, |w| p.eval(w, -flow));
         assert!(value > SIGNIFICANCE, "{p:?}: p-value {value}");
     }
 }
@@ -149,8 +151,8 @@ fn sampled_as_evaluated() {
 fn the_wrong_orientation_is_noticed() {
     let p = Phase::henyey_greenstein(0.05).expect("a valid g");
     let p = p.at(Vec3::ZERO);
-    let directions = (0..200_000).map(|i| p.sample(Vec3::Z, Rng::new(1, 2, i).next_2d()).0);
-    let value = sphere_chi_square(directions, |w| p.eval(-w.z));
+    let directions = (0..200_000).map(|i| p.sample(-Vec3::Z, Rng::new(1, 2, i).next_2d()).0);
+    let value = sphere_chi_square(directions, |w| p.eval(w, Vec3::Z));
     assert!(value < SIGNIFICANCE, "backward passes for forward: p-value {value}");
 }
 
@@ -161,7 +163,7 @@ fn inversion_holds_for_the_sharpest_lobes() {
         let p = Phase::henyey_greenstein(g).expect("a valid g");
         let p = p.at(Vec3::ZERO);
         for u in [1e-9, 0.01, 0.3, 0.7, 0.99, 1.0 - 1e-9] {
-            let (w, _) = p.sample(Vec3::Z, [u, 0.0]);
+            let (w, _) = p.sample(-Vec3::Z, [u, 0.0]);
             // The sine has its digits where the cosine has lost them.
             let below = w.x.hypot(w.y).powi(2) / (1.0 + w.z);
             let root = ((1.0 - g).powi(2) + 2.0 * g * below).sqrt();
@@ -175,11 +177,11 @@ fn inversion_holds_for_the_sharpest_lobes() {
 fn forward_is_forward() {
     let forward = Phase::henyey_greenstein(0.7).expect("a valid g");
     let forward = forward.at(Vec3::ZERO);
-    assert!(forward.eval(1.0) > 100.0 * forward.eval(-1.0));
-    let (w, _) = forward.sample(Vec3::X, [0.5, 0.5]);
+    assert!(at_cosine(&forward, 1.0) > 100.0 * at_cosine(&forward, -1.0));
+    let (w, _) = forward.sample(-Vec3::X, [0.5, 0.5]);
     assert!(w.x > 0.8);
     for p in phases() {
-        assert!(p.at(Vec3::ZERO).sample(Vec3::Y, [0.25, 0.5]).1.is_finite(), "{p:?}");
+        assert!(p.at(Vec3::ZERO).sample(-Vec3::Y, [0.25, 0.5]).1.is_finite(), "{p:?}");
     }
 }
 
@@ -191,9 +193,13 @@ fn derivatives_are_those_of_duals() {
         let p = p.at(Vec3::ZERO);
         for _ in 0..200 {
             let c = 2.0 * rng.next_f64() - 1.0;
-            let d = p.eval(Dual::<f64, 1>::variable(c, 0));
-            let by = p.gradient(c);
-            assert!(close(by.cosine, d.eps[0]), "{p:?} at {c}: {} {}", by.cosine, d.eps[0]);
+            let d = at_cosine(&p, Dual::<f64, 1>::variable(c, 0));
+            let [wo, wi] = directions(c);
+            let by = p.gradient(wo, wi);
+            // The directions are turned as the cosine grows.
+            let cosine = by.wi.dot(vec3(-c / wi.x, 0.0, -1.0));
+            assert!(close(cosine, d.eps[0]), "{p:?} at {c}: {cosine} {}", d.eps[0]);
+            assert_eq!(by.wo.dot(wo), by.wi.dot(wi));
             if let Some(g) = p.mean_cosine_parameter() {
                 let d = henyey_greenstein(Dual::<f64, 1>::variable(g, 0), Dual::from(c));
                 assert!(close(by.g, d.eps[0]), "{p:?} at {c}: {} {}", by.g, d.eps[0]);
@@ -216,10 +222,10 @@ fn blends_and_tables_are_those_of_mitsuba() {
     for (c, value) in
         [(-1.0, 0.0251297), (-0.5, 0.043977), (0.3, 0.0741327), (0.9, 0.182191), (1.0, 0.201038)]
     {
-        assert!((p.at(Vec3::ZERO).eval(c) - value).abs() < 1e-6, "{c}");
+        assert!((at_cosine(&p.at(Vec3::ZERO), c) - value).abs() < 1e-6, "{c}");
     }
     for (c, value) in [(-0.5, 0.0419197), (0.5, 0.0881949), (1.0, 0.358099)] {
-        assert!((blend().at(Vec3::ZERO).eval(c) - value).abs() < 1e-6, "{c}");
+        assert!((at_cosine(&blend().at(Vec3::ZERO), c) - value).abs() < 1e-6, "{c}");
     }
     let wrong = |values: &[f64]| PhaseTable::new(values.to_vec()).unwrap_err();
     for values in [&[1.0][..], &[0.0, 0.0], &[1.0, -1.0], &[1.0, f64::NAN]] {

@@ -27,11 +27,11 @@ fn radiance(change: Option<MediumChange>) -> drt_math::Moments {
         let DistanceSample::Scatter { t, weight, .. } = s else { return 0.0 };
         let x = dir * t;
         let r = (LIGHT - x).length();
-        // Flow: from the light to x, then towards the origin.
-        let c = ((x - LIGHT) / r).dot(-dir);
+        // From the light to x, then towards the origin.
+        let (wo, wi) = (-dir, (LIGHT - x) / r);
         let coefficients = medium.coefficients(x);
         let here = medium.phase_at(x);
-        let phase = here.eval(c);
+        let phase = here.eval(wo, wi);
         let arriving = weight.r * INTENSITY * (-coefficients.sigma_t.r * r).exp() / (r * r);
         let Some(tangent) = &tangent else { return arriving * coefficients.sigma_s().r * phase };
         let rate = tangent.rates(&medium, x);
@@ -39,7 +39,7 @@ fn radiance(change: Option<MediumChange>) -> drt_math::Moments {
             + coefficients.sigma_t.r * rate.albedo.r
             - coefficients.sigma_s().r * rate.sigma_t.r * (t + r);
         let turning = coefficients.sigma_s().r
-            * tangent.phase_rate(&medium, x, &here.gradient(c), &mut FlowPlace::default());
+            * tangent.phase_rate(&medium, x, &here.gradient(wo, wi), &mut FlowPlace::default());
         arriving * (scattering * phase + turning)
     })
 }

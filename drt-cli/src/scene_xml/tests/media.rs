@@ -1,7 +1,7 @@
 use drt_math::{Affine, Mat3, Rgb, Vec3, vec3};
 use drt_medium::nanovdb::NanoVdb;
 use drt_medium::vol::{VolFile, encode};
-use drt_medium::{Coefficients, Grid, Medium, MediumKind, Phase, Property, Volume};
+use drt_medium::{Coefficients, Grid, LocalPhase, Medium, MediumKind, Phase, Property, Volume};
 
 use super::{old_scene, refused, scene};
 use crate::testing::Folder;
@@ -13,6 +13,11 @@ fn medium(kind: &str, inside: &str) -> Medium {
 
 fn homogeneous(inside: &str) -> Coefficients {
     medium("homogeneous", inside).homogeneous().unwrap().coefficients()
+}
+
+/// The value of a phase function where light turns by the angle of a cosine.
+fn at_cosine(phase: &LocalPhase<'_>, cosine: f64) -> f64 {
+    phase.eval(-Vec3::Z, vec3((1.0 - cosine * cosine).sqrt(), 0.0, cosine))
 }
 
 #[test]
@@ -54,12 +59,15 @@ fn phase_functions() {
         r#"<phase type="hg"><float name="g" value="0.5"/></phase><phase type="isotropic"/>"#;
     let blend = |inside: &str| format!(r#"<phase type="blendphase">{inside}</phase>"#);
     let weight = r#"<float name="weight" value="0.3"/>"#;
-    let value = phase(&blend(&format!("{weight}{inside}"))).at(Vec3::ZERO).eval(-0.5);
+    let value = at_cosine(&phase(&blend(&format!("{weight}{inside}"))).at(Vec3::ZERO), -0.5);
     assert!((value - 0.0419197).abs() < 1e-6, "{value}");
     let table = |values: &str| {
         format!(r#"<phase type="tabphase"><string name="values" value="{values}"/></phase>"#)
     };
-    assert!((phase(&table("0.5, 1.0, 1.5, 4")).at(Vec3::ZERO).eval(0.3) - 0.0741327).abs() < 1e-6);
+    assert!(
+        (at_cosine(&phase(&table("0.5, 1.0, 1.5, 4")).at(Vec3::ZERO), 0.3) - 0.0741327).abs()
+            < 1e-6
+    );
     let wrong = |inside: &str, part| {
         refused(&format!("<medium type=\"homogeneous\">{inside}</medium>"), &[part])
     };
@@ -262,7 +270,7 @@ fn phase_functions_take_their_numbers_from_grids() {
     let m = load(&blend("signed")).unwrap();
     assert!(m.voxels(Property::Weight).is_some() && m.voxels(Property::G).is_none());
     let even = 0.25 / core::f64::consts::PI;
-    let value = m.phase_at(at(0.5)).eval(0.0);
+    let value = at_cosine(&m.phase_at(at(0.5)), 0.0);
     assert!((value - even * (0.7 + 0.3 * 0.75)).abs() < 1e-7, "{value}");
 }
 
@@ -300,4 +308,64 @@ fn unusable_grids() {
     refused(&volume(r#"<string name="filename" value="no.vol"/>"#), &[":3", "no.vol"]);
     let vdb = "<medium type=\"heterogeneous\"><volume name=\"sigma_t\" type=\"vdb\"/></medium>";
     refused(vdb, &["`vdb` is not supported"]);
+}
+
+/// Bytes of a volume of six channels.
+fn six_channels(size: [i32; 3], values: &[f32]) -> Vec<u8> {
+    let head = [1, size[0], size[1], size[2], 6].map(i32::to_le_bytes);
+    let corners = [0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0].map(f32::to_le_bytes);
+    let values = values.iter().map(|v| v.to_le_bytes());
+    let numbers = head.into_iter().chain(corners).chain(values).flatten();
+    b"VOL\x03".iter().copied().chain(numbers).collect()
+}
+
+#[test]
+fn microflakes_are_read_from_six_channels() {
+    let folder = Folder::new();
+    let [a, b] = [[1.0, 0.5, 0.25, 0.1, -0.1, 0.05], [0.5, 0.5, 0.5, 0.0, 0.0, 0.1_f32]];
+    let bad = [0.5, 0.5, 0.5, 0.6, 0.0, 0.0];
+    for (name, size, values) in [
+        ("one", [1, 1, 1], a.to_vec()),
+        ("two", [2, 1, 1], [a, b].concat()),
+        ("bad", [2, 1, 1], [a, bad].concat()),
+    ] {
+        folder.file(&format!("{name}.vol"), six_channels(size, &values));
+    }
+    folder.file("seven.vol", {
+        let mut bytes = six_channels([1, 1, 1], &a);
+        bytes[20] = 3;
+        bytes
+    });
+    let load = |inside: &str| {
+        let text = format!(
+            "<scene version=\"3.0.0\"><medium type=\"homogeneous\"><phase type=\"sggx\">{inside}\
+             </phase></medium></scene>"
+        );
+        let file = folder.file("s.xml", text);
+        load_scene(&file, &Defaults::new()).map(|mut s| s.media.remove(0).item)
+    };
+    let of = |file: &str| {
+        format!(
+            "<volume name=\"S\" type=\"gridvolume\"><string name=\"filename\" \
+             value=\"{file}.vol\"/><transform name=\"to_world\"><rotate z=\"1\" angle=\"30\"/>\
+             </transform></volume>"
+        )
+    };
+    let m = load(&of("one")).unwrap();
+    assert!(m.homogeneous().is_some() && m.extinction().is_none() && m.is_carried());
+    let area = m.projected_area(Vec3::ZERO, vec3(0.6, 0.8, 0.0));
+    assert!((area * area - (0.36 + 0.32 + 0.96 * 0.1)).abs() < 1e-7, "{area}");
+    let m = load(&of("two")).unwrap();
+    assert_eq!(m.voxels(Property::SggxOffDiagonal).unwrap().size(), [2, 1, 1]);
+    // The volume is turned, and S is not.
+    let inside = m.voxels(Property::SggxDiagonal).unwrap().to_world().point(vec3(0.1, 0.5, 0.5));
+    assert!((m.projected_area(inside, Vec3::Y) - 0.5_f64.sqrt()).abs() < 1e-7);
+    for (inside, part) in [
+        (of("bad"), "at voxel [1, 0, 0]"),
+        (of("seven"), "the number of channels is 3, expected 6"),
+        (String::new(), "the volume `S` is missing"),
+    ] {
+        let message = load(&inside).unwrap_err().to_string();
+        assert!(message.contains(part), "{message}");
+    }
 }

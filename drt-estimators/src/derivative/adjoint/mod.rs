@@ -278,14 +278,17 @@ impl<'w> Differentiator<'w> {
                     Some(_) => world.share_of_vertices(vertex, c),
                     None => 1.0,
                 };
-                let adjoint = by_coefficients(c, lit, theta * share, collected, weight);
+                let area = self.area_along(vertex, arrival.dir);
+                let adjoint = by_coefficients(c, lit, theta * share, collected, weight, area);
                 self.coefficients(vertex, &adjoint, moving, here, sink);
-                self.control_at(vertex, theta * control * share, sink);
+                let source = theta * c.source() * weight;
+                self.emission_along(path, k, vertex, source, here, before, sink);
+                self.control_at(vertex, arrival.dir, theta * control * share, sink);
                 c.source() * arrival.emission_weight + c.sigma_s() * collected
             }
         };
         let passes = match &arrival.end {
-            Endpoint::Volume(_, c) => c.sigma_t,
+            Endpoint::Volume(v, c) => c.sigma_t * self.area_along(v, arrival.dir),
             _ => Rgb::ONE,
         };
         self.control = theta * passes * control;
@@ -350,17 +353,56 @@ impl<'w> Differentiator<'w> {
             }
         }
         if let Some(b) = behind {
-            let to_wo = d.wo * adjoint;
-            let g = turn(&(to_wo * b.weight), wo, b.distance);
-            before[b.parent].u += g;
-            self.locals[b.node].matter -= g;
-            self.locals[b.node].turn -= to_wo;
-            // Only the camera's ray turns by itself.
-            if b.parent == 0 {
-                self.turn -= to_wo * (1.0 - b.weight);
-            }
+            self.turned_back(&b, wo, d.wo * adjoint, before);
         }
         Some(d.wi * adjoint)
+    }
+
+    /// Sensitivities to the unit direction `wo` from a vertex to what it was seen from, which moves with both.
+    fn turned_back(&mut self, b: &Behind, wo: Vec3, to_wo: RgbVec, before: &mut [SurfaceAdjoint]) {
+        let g = turn(&(to_wo * b.weight), wo, b.distance);
+        before[b.parent].u += g;
+        self.locals[b.node].matter -= g;
+        self.locals[b.node].turn -= to_wo;
+        // Only the camera's ray turns by itself.
+        if b.parent == 0 {
+            self.turn -= to_wo * (1.0 - b.weight);
+        }
+    }
+
+    /// What the extinction along the unit direction `w` at a volume vertex is over that of its coefficients.
+    #[inline]
+    fn area_along(&self, v: &Vertex, w: Vec3) -> f64 {
+        v.medium.map_or(1.0, |m| self.world.medium(m).projected_area(v.x, w))
+    }
+
+    /// Sensitivities of what a volume vertex emits, by the area that its microflakes show to where it is seen from.
+    #[allow(clippy::too_many_arguments)]
+    fn emission_along<S: AdjointSink>(
+        &mut self,
+        path: &RecordedPath<'_>,
+        k: usize,
+        v: &Vertex,
+        source: Rgb,
+        here: &mut SurfaceAdjoint,
+        before: &mut [SurfaceAdjoint],
+        sink: &mut S,
+    ) {
+        let Some(m) = v.medium.filter(|_| !source.is_zero()) else { return };
+        let (Some(b), medium) = (self.behind(path, k), self.world.medium(m)) else { return };
+        let Some(arrival) = path.record.nodes[k].arrival.as_ref() else { return };
+        if medium.phase.sggx().is_none() {
+            return;
+        }
+        let wo = -arrival.dir;
+        let gradient = medium.area_gradient(v.x, wo);
+        // Nothing is emitted where the area is zero.
+        let adjoint = source * (1.0 / medium.projected_area(v.x, wo));
+        if sink.active().media[m] {
+            sink.phase(m, v.x, &gradient, adjoint);
+        }
+        here.u += adjoint.outer(gradient.place);
+        self.turned_back(&b, wo, adjoint.outer(gradient.wo), before);
     }
 
     /// Sensitivities of the coefficients at a volume vertex, which may move against the medium's grids.
@@ -444,20 +486,22 @@ fn lit_by(lit: EmitterMask, c: &Coefficients) -> Coefficients {
     Coefficients { emission: if lit.by_surroundings() { c.emission } else { Rgb::ZERO }, ..*c }
 }
 
-/// Sensitivities of the coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e, Q being what it has `collected`.
+/// Sensitivities of the coefficients at a volume vertex: R = σ_t albedo Q + σ_t (1 - albedo) e, Q being what it has `collected`, and
+/// e the emission times the projected `area` of the medium there.
 fn by_coefficients(
     c: &Coefficients,
     lit: EmitterMask,
     theta: Rgb,
     collected: Rgb,
     emission_weight: f64,
+    area: f64,
 ) -> CoefficientAdjoint {
     let emission = c.emission * emission_weight;
     CoefficientAdjoint {
         sigma_t: theta * (c.albedo * collected + (Rgb::ONE - c.albedo) * emission),
         albedo: theta * c.sigma_t * (collected - emission),
         emission: if lit.by_surroundings() {
-            theta * c.sigma_a() * emission_weight
+            theta * c.sigma_a() * (emission_weight * area)
         } else {
             Rgb::ZERO
         },

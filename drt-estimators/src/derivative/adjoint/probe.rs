@@ -26,22 +26,30 @@ impl Differentiator<'_> {
         let Some((here, before)) = ends[..=k].split_last_mut() else { return };
         let c = &lit_by(lit, c);
         let share = 1.0 - self.world.share_of_vertices(vertex, c);
-        let adjoint = by_coefficients(c, lit, arrival.throughput * share, collected, 1.0);
+        let (theta, area) = (arrival.throughput * share, self.area_along(vertex, arrival.dir));
+        let adjoint = by_coefficients(c, lit, theta, collected, 1.0, area);
         self.coefficients(vertex, &adjoint, path.velocities.moves(k), here, sink);
-        self.control_at(vertex, arrival.throughput * path.control(k) * share, sink);
+        let control = arrival.throughput * path.control(k) * share;
+        self.control_at(vertex, arrival.dir, control, sink);
         self.arrive(path, k, &path.motion(k), Rgb::ZERO, here, before, sink);
     }
 }
 
 impl Differentiator<'_> {
-    /// Takes the control radiance, times its throughput, off what the extinction at a place owes.
-    pub(super) fn control_at<S: AdjointSink>(&self, vertex: &Vertex, control: Rgb, sink: &mut S) {
+    /// Takes the control radiance, times its throughput, off what the extinction along `dir` at a place owes.
+    pub(super) fn control_at<S: AdjointSink>(
+        &self,
+        vertex: &Vertex,
+        dir: Vec3,
+        control: Rgb,
+        sink: &mut S,
+    ) {
         let Some(m) = vertex.medium.filter(|m| self.world.probed[*m].is_some()) else { return };
         if control.is_zero() || !sink.active().media[m] {
             return;
         }
         let medium = self.world.medium(m);
-        let ray = Ray::new(vertex.x, Vec3::ZERO, 0.0);
+        let ray = Ray::new(vertex.x, dir, 0.0);
         let point = DepthEstimate::inside(medium, ray, &[(0.0, 1.0)], false).at_rest();
         sink.depth(m, &point, -control);
     }

@@ -5,6 +5,8 @@
 //! ```text
 //! t_dot = (R_dot/R) t + R ∫ [σ_dot + z_dot·∇σ] ds + sum over crossings (σ₋-σ₊) N·(u_c - z_dot) / (N·w)
 //! ```
+//!
+//! Where σ depends on the direction w, w_dot·∫ ∂σ/∂w ds comes on top, with w_dot = (ẏ - ẋ) / R across w between two points.
 
 use drt_math::{Rgb, RgbVec, Vec3};
 use drt_medium::DepthEstimate;
@@ -36,6 +38,17 @@ pub(super) struct Along {
 }
 
 impl Along {
+    /// Adds the gradient by the direction of a stretch of a given length, across it.
+    fn add_turn(&mut self, g: &RgbVec, length: f64) {
+        if self.fixed {
+            self.turn += *g;
+        } else {
+            let far = *g * (1.0 / length);
+            self.near -= far;
+            self.far += far;
+        }
+    }
+
     /// Adds the gradient by points of a stretch of a given length, and the sum of it times their
     /// distances from the start.
     fn add(&mut self, g: &RgbVec, moment: &RgbVec, length: f64) {
@@ -203,6 +216,9 @@ impl Differentiator<'_> {
         if moving {
             let (g, moment) = (depth.gradient * -weight, depth.moment * -weight);
             along.add(&g, &(moment + g * i.start), path.length);
+            if depth.turn != RgbVec::ZERO {
+                along.add_turn(&(depth.turn * -weight), path.length);
+            }
         }
         let depth = depth.depth;
         self.points = points;

@@ -1,7 +1,7 @@
 //! Scattering under one roof: gradients against dual numbers, densities against samples' weights.
 
 use drt_math::{Dual, Real, Rgb, RgbVec, Rng, Vec3, warp};
-use drt_medium::{Phase, henyey_greenstein};
+use drt_medium::{Homogeneous, Medium, Phase, henyey_greenstein};
 
 use crate::derivative::tests::fade;
 use crate::derivative::tests::scenes::{diffuse, glass, metal, phong, twosided};
@@ -84,10 +84,12 @@ fn phase_functions() {
     for phase in [Phase::Isotropic, Phase::HenyeyGreenstein { g: -0.7 }, Phase::Rayleigh] {
         for _ in 0..1000 {
             let (wo, wi) = (random(&mut rng), random(&mut rng));
-            let phase = phase.at(Vec3::ZERO);
-            let g = Scattering::Volume(phase).gradient(wo, wi);
-            let cosine = -seeded(wo, 0).dot(seeded(wi, 3));
-            let truth = Rgb::splat(phase.eval(cosine));
+            let medium = Medium::new(Homogeneous::default(), phase.clone());
+            let (x, phase) = (Vec3::ZERO, medium.phase_at(Vec3::ZERO));
+            let g = Scattering::Volume { medium: &medium, x, phase }.gradient(wo, wi);
+            let (moving_wo, moving_wi) = (seeded(wo, 0), seeded(wi, 3));
+            let cosine = -moving_wo.dot(moving_wi);
+            let truth = Rgb::splat(phase.eval(moving_wo, moving_wi));
             assert!(deviation([g.wo, g.wi, g.ns, g.ng], truth) < 1e-10);
             if let Some(mean) = phase.mean_cosine_parameter() {
                 let by_g = henyey_greenstein(Dual::<f64, 1>::variable(mean, 0), cosine.re.into());

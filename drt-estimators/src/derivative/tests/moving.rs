@@ -355,7 +355,7 @@ impl<'a> Moving<'a> {
                 let [a, b] = blend.parts().each_ref().map(|p| self.phase_of(p, target, at, cosine));
                 a * (D::one() - weight) + b * weight
             }
-            Phase::Tabulated(_) => unreachable!("not used here"),
+            Phase::Tabulated(_) | Phase::Sggx(_) => unreachable!("not used here"),
         }
     }
 

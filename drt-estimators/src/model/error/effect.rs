@@ -37,7 +37,9 @@ pub enum EffectError {
     #[error("it follows two shapes that deform; it can follow one")]
     TwoLeaders,
     /// A property that media do not have.
-    #[error("a medium has no property `{0}`; it has sigma_t, albedo, emission, g and weight")]
+    #[error(
+        "a medium has no property `{0}`; it has sigma_t, albedo, emission, g, weight, sggx_diagonal and sggx_off_diagonal"
+    )]
     MediumProperty(String),
     /// A grid cannot follow a shape that no tetrahedra surround.
     #[error("no tetrahedra fill the space around the shape that it follows: {0}")]

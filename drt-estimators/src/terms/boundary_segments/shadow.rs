@@ -160,7 +160,7 @@ impl Shadows {
             }
         };
         let c = world.medium(medium).coefficients(x);
-        let scattered = c.sigma_s() * world.medium(medium).phase_at(x).eval(m.w.dot(-dir));
+        let scattered = c.sigma_s() * world.medium(medium).phase_at(x).eval(-dir, -m.w);
         let value = strength * scattered * tau * (1.0 / (fall * Real::abs(n.dot(dir))));
         if value.is_zero() || !value.is_finite() {
             return None;

@@ -202,7 +202,7 @@ impl Probes {
             });
         }
         let Some((m, distance)) = mean.place() else { return };
-        let albedo = world.coefficients(m, origin + dir * distance).albedo;
+        let albedo = world.coefficients(m, origin + dir * distance, dir).albedo;
         self.control = control(world, leaving, ray, 2.0 * passing.0[0], albedo);
         if let Some(stretch) = self.chosen.as_mut().filter(|_| chosen) {
             stretch.control = self.control;
@@ -227,7 +227,7 @@ impl Probes {
         }
         let x = s.origin + s.dir * distance;
         let vertex = Vertex { x, medium: Some(m), kind: Kind::Volume(None) };
-        let coefficients = world.coefficients(m, x);
+        let coefficients = world.coefficients(m, x, s.dir);
         let by_vertices = world.share_of_vertices(&vertex, &coefficients);
         let paths = if by_vertices < 0.5 { SPLIT } else { 1 };
         tracer.counters.probes += 1;

@@ -18,7 +18,9 @@ use drt_estimators::{Integrator, Layer, Rendering, Scene, Session, Settings, Una
 pub use drt_estimators::{SceneBuilder, ShapeBuilder};
 use drt_geom::{Mesh, procedural};
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
-use drt_medium::{Grid, GridMedium, Homogeneous, Layout, Medium, Phase, PhaseBlend, Volume};
+use drt_medium::{
+    Flakes, Grid, GridMedium, Homogeneous, Layout, Medium, Phase, PhaseBlend, Sggx, Volume,
+};
 use drt_motion::{Change, Effect, GeometryChange, Parameter, PropertyChange, Texels, ValueChange};
 
 /// The scene of a builder, as a camera at a point sees it that looks at another one.
@@ -274,6 +276,52 @@ pub fn varied_smoke(border: f64) -> [Scene; 2] {
         scene.media[0].item.phase = phase;
         scene
     })
+}
+
+/// Sheets that lean to the camera more or less, and to a side.
+fn some_flakes(rng: &mut Rng) -> Flakes {
+    let axes = vec3(0.1 + 0.1 * rng.next_f64(), 0.2 + 0.1 * rng.next_f64(), 1.0);
+    let lean = Mat3::rotation(vec3(0.6, 0.8, 0.0), 0.3 + 0.4 * rng.next_f64());
+    Flakes { diagonal: axes, off_diagonal: Vec3::ZERO }.turned(&lean)
+}
+
+/// Smoke of microflakes that vary, and that emits.
+pub fn flaky_smoke(border: f64) -> Scene {
+    let mut scene = smoke(border);
+    let placement = *scene.media[0].item.grid().expect("voxels").density().to_world();
+    let mut rng = Rng::new(21, 0, 0);
+    let voxels: Vec<Flakes> = (0..64).map(|_| some_flakes(&mut rng)).collect();
+    let grid = |entries: fn(&Flakes) -> Vec3| {
+        let values = voxels.iter().flat_map(|s| entries(s).to_array()).collect();
+        let grid = Grid::new([4; 3], 3, values).expect("a valid grid");
+        grid.with_placement(placement).expect("a box")
+    };
+    let field = Sggx::varying(grid(|s| s.diagonal), grid(|s| s.off_diagonal));
+    scene.media[0].item.phase = Phase::Sggx(Box::new(field.expect("flakes")));
+    scene
+}
+
+/// Fog of microflakes that are the same everywhere takes the place of the smoke.
+pub fn flaky_fog() -> Scene {
+    let mut scene = smoke(1.0);
+    let fog = Homogeneous::new(
+        Rgb::new(0.3, 0.4, 0.6),
+        Rgb::new(0.8, 0.7, 0.9),
+        Rgb::new(0.1, 0.05, 0.0),
+    );
+    let field = Sggx::new(some_flakes(&mut Rng::new(22, 0, 0))).expect("flakes");
+    scene.media[0].item = Medium::new(fog.expect("coefficients"), Phase::Sggx(Box::new(field)));
+    scene
+}
+
+/// A medium in a box, and a lamp beside it: nothing else has a shadow or an outline.
+pub fn alone(medium: Medium) -> Scene {
+    let walls = placed(procedural::cube(), Vec3::splat(1.4), 0.1, Vec3::ZERO);
+    let scene = SceneBuilder::new()
+        .medium("smoke", medium)
+        .shape("box", ShapeBuilder::interface(walls).interior("smoke"))
+        .emitter("bulb", bulb(vec3(0.5, 2.6, 3.0)));
+    seen(scene, [vec3(0.4, 0.8, 6.0), Vec3::ZERO], 4)
 }
 
 /// Light from all sides would hide what phase functions do: a sun behind the camera is all there is.

@@ -101,6 +101,8 @@ fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient
                 "albedo" => MediumChange::Albedo { op, voxels },
                 "emission" => MediumChange::Emission { op, voxels },
                 "weight" => MediumChange::Weight { op, voxels },
+                "sggx_diagonal" => MediumChange::SggxDiagonal { op, voxels },
+                "sggx_off_diagonal" => MediumChange::SggxOffDiagonal { op, voxels },
                 _ => MediumChange::G { op, voxels },
             };
             medium(scene, i, &change, g)

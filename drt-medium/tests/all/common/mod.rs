@@ -1,7 +1,9 @@
 //! Media with known answers, and exact quadrature through grids.
 
-use drt_math::{Affine, Mat3, Moments, Rgb, Rng, Vec3, testing, vec3};
-use drt_medium::{Grid, GridMedium, Layout, Medium, MediumKind, Phase, Ray, TrackingStats, Volume};
+use drt_math::{Affine, Mat3, Moments, Real, Rgb, Rng, Vec3, testing, vec3};
+use drt_medium::{
+    Grid, GridMedium, Layout, LocalPhase, Medium, MediumKind, Phase, Ray, TrackingStats, Volume,
+};
 
 /// Judged in standard errors: four.
 pub(crate) const Z: f64 = 4.0;
@@ -29,6 +31,18 @@ pub(crate) fn assert_agrees(what: &str, estimate: &Moments, truth: f64, precisio
 pub(crate) fn assert_rejects(what: &str, estimate: &Moments, wrong: f64) {
     let z = testing::z_score(estimate, wrong);
     assert!(z.abs() > Z, "{what}: the planted fault {wrong} passes with z = {z}");
+}
+
+/// Unit directions, in which light leaves and from which it comes, that it goes straight on between if the cosine is one.
+pub(crate) fn directions<T: Real>(cosine: T) -> [Vec3<T>; 2] {
+    let (zero, sine) = (T::zero(), (T::one() - cosine.squared()).max(T::zero()).sqrt());
+    [vec3(zero, zero, T::one()), vec3(sine, zero, -cosine)]
+}
+
+/// The value of a phase function at a cosine.
+pub(crate) fn at_cosine<T: Real>(phase: &LocalPhase<'_>, cosine: T) -> T {
+    let [wo, wi] = directions(cosine);
+    phase.eval(wo, wi)
 }
 
 /// A box from its corners, as a placement of the unit cube.

@@ -110,14 +110,15 @@ fn phase_functions() {
     for g in [0.0, 0.3, -0.6, 0.9, 0.99] {
         let phase = Phase::henyey_greenstein(g).expect("a valid asymmetry");
         let phase = phase.at(Vec3::ZERO);
-        let lobes = |peak: f64| Lobes::around(-wo * g.signum(), phase.eval(0.0), peak);
+        let aside = phase.eval(wo, tilted(110.0));
+        let lobes = |peak: f64| Lobes::around(-wo * g.signum(), aside, peak);
         let cost_with = |peak: f64| {
             let lobes = lobes(peak);
-            let draw = |rng: &mut Rng| Some(phase.sample(-wo, rng.next_2d()).0);
-            let f = |w: Vec3| phase.eval(-wo.dot(w));
+            let draw = |rng: &mut Rng| Some(phase.sample(wo, rng.next_2d()).0);
+            let f = |w: Vec3| phase.eval(wo, w);
             cost(f, |w| toward(&lobes, w, 1.0), draw, f)
         };
-        let right = cost_with(phase.eval(g.signum()));
+        let right = cost_with(phase.eval(wo, -wo * g.signum()));
         assert!(right < 1.4, "{right} for {g}");
         // Planted: no peak.
         let flat = cost_with(0.0);
