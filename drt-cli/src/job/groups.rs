@@ -207,7 +207,7 @@ fn range(kind: &GroupKind) -> [f64; 2] {
             [0.0, 1.0]
         }
         GroupKind::Voxels(drt_medium::Property::G) => [-SHARPEST_G, SHARPEST_G],
-        GroupKind::Voxels(drt_medium::Property::SggxOffDiagonal) => all,
+        GroupKind::Voxels(drt_medium::Property::SggxOffDiagonal) => UNBOUNDED,
         GroupKind::Voxels(_) | GroupKind::LightTexels => [0.0, f64::INFINITY],
         GroupKind::Texels { property, .. } => property.range(),
         _ => UNBOUNDED,

@@ -90,7 +90,7 @@ impl Scattering<'_> {
     pub(crate) fn single_chance(&self, from: Vec3) -> f64 {
         match self {
             Self::Surface(bsdf) => bsdf.single_chance(from),
-            Self::Volume(_) => 0.0,
+            Self::Volume { .. } => 0.0,
         }
     }
 

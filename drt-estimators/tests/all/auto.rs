@@ -4,8 +4,10 @@ use crate::common::*;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::fit::{Fit, Group, GroupKind, View};
 use drt_estimators::loss::{Loss, Reference};
+use drt_estimators::emitter::Emitter;
 use drt_estimators::{
-    EstimatorKind, PathSampling, Rendering, Scene, Session, Settings, Unattended,
+    EstimatorKind, Named, PathSampling, Rendering, Scene, SceneEmitter, Session, Settings,
+    Surrounding, Unattended,
 };
 use drt_geom::procedural;
 use drt_math::{Rgb, Vec3, vec3};
@@ -82,9 +84,16 @@ fn what_refuses_is_not_chosen() {
     let why = run(&room(), &camera_moves(), &both).plan.estimator.unwrap();
     assert!(!why.contains("radiative"), "{why}");
     assert_eq!(run(&room(), &[], &settings(EstimatorKind::Auto)).plan.estimator, None);
-    // What all refuse is refused as `path-space` does.
+    // Past smooth surfaces there is no choice.
     let mut mirror = room();
     mirror.bsdfs[0].item = drt_estimators::surface::Bsdf::Conductor(Default::default());
+    mirror.emitters.retain(|e| !e.item.emitter.is_delta());
+    let why = run(&mirror, &camera_moves(), &settings(EstimatorKind::Auto)).plan.estimator.unwrap();
+    assert!(why.contains("warped") && why.contains("smooth"), "{why}");
+    // What all refuse is refused as `path-space` does.
+    let light = Emitter::Point { position: vec3(0.0, 0.5, 0.0), intensity: Rgb::ONE };
+    let (emitter, medium) = (light, Surrounding::Counted);
+    mirror.emitters.push(Named::new("bulb", SceneEmitter { emitter, medium }));
     let refusal =
         |kind| Session::new(&mirror, &camera_moves(), &settings(kind)).err().map(|e| e.to_string());
     let by_name = refusal(EstimatorKind::PathSpace);

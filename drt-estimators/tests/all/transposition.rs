@@ -508,4 +508,16 @@ fn past_smooth_surfaces_and_masks() {
         let effects = vec![changes(target, name, ValueChange::Add(amount))];
         by_one_estimator(&format!("{target}, {name}"), &scene, effects, &settings(), 64, EXACT);
     }
+    // What moves, where no shadow is seen past them.
+    let mut scene = scene;
+    scene.emitters.retain(|e| !e.item.emitter.is_delta());
+    for target in ["mirror", "ball", "veil", "floor", "camera"] {
+        let name = format!("{target} moves");
+        for change in [shift(), turn()] {
+            let effects = vec![moves(target, change)];
+            by_one_estimator(&name, &scene, effects, &settings(), 64, EXACT);
+        }
+    }
+    let effects = vec![moves("ball", wobble(&scene, "ball", 1))];
+    by_one_estimator("ball deforms", &scene, effects, &settings(), 64, EXACT);
 }

@@ -9,10 +9,12 @@ use drt_estimators::surface::{
     ThinDielectric,
 };
 use drt_estimators::texture::{Bitmap, Texture, UvMap};
+use drt_estimators::emitter::Emitter;
 use drt_estimators::{
-    AuxiliarySamples, EstimatorKind, PathSampling, Scene, Session, Settings, Warp,
+    AuxiliarySamples, EstimatorKind, Named, PathSampling, Scene, SceneEmitter, Session, Settings,
+    Surrounding, Warp,
 };
-use drt_math::{Rgb, ValueChange};
+use drt_math::{Rgb, ValueChange, vec3};
 use drt_tests::matrix::{Cell, Stage, lenses, materials, still, textures};
 use drt_tests::motion::changes;
 
@@ -75,11 +77,6 @@ fn materials_without_derivatives() {
         }))
     };
     for bsdf in [
-        Bsdf::Conductor(Conductor::default()),
-        Bsdf::Dielectric(Dielectric::default()),
-        Bsdf::ThinDielectric(ThinDielectric::default()),
-        Bsdf::Plastic(Plastic::new(Coating::smooth(1.5).unwrap())),
-        Bsdf::Mask(Box::new(Mask { bsdf: inner(), opacity: 0.5 })),
         perturbed(Perturbation::Normals),
         perturbed(Perturbation::Heights(0.1)),
         Bsdf::Measured(quarter.into()),
@@ -90,6 +87,39 @@ fn materials_without_derivatives() {
             let message = refusal(&scene, &stage, "panel moves", estimator);
             assert_refused(message, &["panel moves", "panel", kind, "finite differences"]);
         }
+    }
+}
+
+/// Smooth surfaces may move, but not under light that jumps in shadows, and not if they emit.
+#[test]
+fn what_smooth_surfaces_have_no_terms_for() {
+    let inner = || Bsdf::Diffuse(Diffuse::default());
+    for bsdf in [
+        Bsdf::Conductor(Conductor::default()),
+        Bsdf::Dielectric(Dielectric::default()),
+        Bsdf::ThinDielectric(ThinDielectric::default()),
+        Bsdf::Plastic(Plastic::new(Coating::smooth(1.5).unwrap())),
+        Bsdf::Mask(Box::new(Mask { bsdf: inner(), opacity: 0.5 })),
+    ] {
+        let (stage, scene) = of(bsdf);
+        let mut lit = scene.clone();
+        let (position, intensity) = (vec3(0.0, 2.0, 0.0), Rgb::ONE);
+        let bulb = SceneEmitter {
+            emitter: Emitter::Point { position, intensity },
+            medium: Surrounding::Counted,
+        };
+        lit.emitters.push(Named::new("bulb", bulb));
+        let mut glowing = scene.clone();
+        glowing.shapes[0].emitter = Some(0);
+        for estimator in [PathSpace, Radiative, Warped] {
+            assert_eq!(refusal(&scene, &stage, "panel moves", estimator), None);
+            let message = refusal(&lit, &stage, "panel moves", estimator);
+            assert_refused(message, &["panel moves", "panel", "bulb", "finite differences"]);
+            let message = refusal(&glowing, &stage, "panel moves", estimator);
+            assert_refused(message, &["panel moves", "panel", "emits", "finite differences"]);
+        }
+        let message = by_samples(&scene, &stage);
+        assert_refused(message, &["warp", "smooth"]);
     }
 }
 
