@@ -235,7 +235,7 @@ fn warn_of_heavy_tails(rendering: &Rendering) {
         if share > Tail::HEAVY {
             console::note(format_args!(
                 "note: {name}: one sample makes up {:.0} % of the second moment, so its standard errors may be too \
-                 small; to check, take more samples, another estimator, or sampling = \"bidirectional\"",
+                 small; to check, take more samples, or another estimator or way to sample paths where there is one",
                 100.0 * share
             ));
         }
