@@ -1,3 +1,4 @@
+use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::String;
 use core::fmt;
@@ -172,7 +173,7 @@ pub enum MediumError {
         /// Where it is; `None` where it is the same everywhere.
         voxel: Option<[usize; 3]>,
         /// Its entries on the diagonal, and off it.
-        entries: [[f64; 3]; 2],
+        entries: Box<[[f64; 3]; 2]>,
     },
     /// The grids of the entries of S do not belong together.
     #[error(

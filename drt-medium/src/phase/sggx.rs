@@ -1,3 +1,5 @@
+use alloc::boxed::Box;
+
 use drt_math::{Affine, Mat3, Rgb, Vec3, fm};
 
 use super::flakes::{Flakes, FlakesGradient};
@@ -217,7 +219,10 @@ fn valid(flakes: Flakes, voxel: Option<[usize; 3]>) -> Result<(), MediumError> {
         return Ok(());
     }
     let Flakes { diagonal, off_diagonal } = flakes;
-    Err(MediumError::SggxMatrix { voxel, entries: [diagonal.to_array(), off_diagonal.to_array()] })
+    Err(MediumError::SggxMatrix {
+        voxel,
+        entries: Box::new([diagonal.to_array(), off_diagonal.to_array()]),
+    })
 }
 
 impl Range {
