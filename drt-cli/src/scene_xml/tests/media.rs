@@ -43,7 +43,7 @@ fn homogeneous_by_either_pair_of_coefficients() {
         (r#"<float name="sigma_t" value="-1"/>"#, "sigma_t"),
         (r#"<float name="density" value="1"/>"#, "density"),
         (r#"<phase type="hg"><float name="g" value="1"/></phase>"#, "g"),
-        (r#"<phase type="sggx"/>"#, "`sggx` is not supported"),
+        (r#"<phase type="sggx"/>"#, "the volume `S` is missing"),
     ] {
         refused(&format!("<medium type=\"homogeneous\">\n{inside}</medium>"), &[part]);
     }
