@@ -1,10 +1,10 @@
 //! The estimator that a pilot chooses: it is one of those that have names, bit for bit, with little work in the pilot.
 
 use crate::common::*;
+use drt_estimators::emitter::Emitter;
 use drt_estimators::filter::{Filter, FilterKind};
 use drt_estimators::fit::{Fit, Group, GroupKind, View};
 use drt_estimators::loss::{Loss, Reference};
-use drt_estimators::emitter::Emitter;
 use drt_estimators::{
     EstimatorKind, Named, PathSampling, Rendering, Scene, SceneEmitter, Session, Settings,
     Surrounding, Unattended,

@@ -3,13 +3,13 @@
 use std::f32::consts::PI;
 
 use drt_estimators::EstimatorKind::{PathSpace, Radiative, Warped};
+use drt_estimators::emitter::Emitter;
 use drt_estimators::surface::{
     Bsdf, Coating, Conductor, Dielectric, Diffuse, Mask, Measured, MeasuredTables, Perturbation,
     Perturbed, Plastic, Principled, PrincipledThin, Property, RoughConductor, Textured,
     ThinDielectric,
 };
 use drt_estimators::texture::{Bitmap, Texture, UvMap};
-use drt_estimators::emitter::Emitter;
 use drt_estimators::{
     AuxiliarySamples, EstimatorKind, Named, PathSampling, Scene, SceneEmitter, Session, Settings,
     Surrounding, Warp,
