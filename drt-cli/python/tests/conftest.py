@@ -1,6 +1,6 @@
 """Small scenes for tests."""
 
-import faulthandler
+import signal
 import struct
 from pathlib import Path
 
@@ -72,12 +72,12 @@ def volume(values):
     return head + np.ascontiguousarray(values, "<f4").tobytes()
 
 
-@pytest.fixture(autouse=True)
-def impatient():
-    """A test that hangs ends with a trace."""
-    faulthandler.dump_traceback_later(120, exit=True)
+@pytest.fixture
+def interrupts():
+    """Ctrl-C is heard, also where a shell has started this in the background and so made it deaf."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
-    faulthandler.cancel_dump_traceback_later()
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture

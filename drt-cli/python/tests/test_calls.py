@@ -104,7 +104,7 @@ def test_progress_is_told_and_may_stop(box):
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals")
 @pytest.mark.parametrize("what", ["render", "gradient"])
-def test_ctrl_c_is_heard_within_a_second(what):
+def test_ctrl_c_is_heard_within_a_second(what, interrupts):
     """On a scene of a size that is not small; it can be used afterwards."""
     scene = drt.load(ROOT / "examples/surface-box/scene.xml")
     scene.resize(256, 256)
