@@ -56,6 +56,7 @@ impl<'a> Single<'a> {
 impl Differentiator<'_> {
     /// Sends what is owed at a node that the walk left in a single direction: `onward` to the rate of that, and an `adjoint` that
     /// multiplies the value of the scattering. Unless something of this is `moving`, only the material counts.
+    #[allow(clippy::too_many_arguments)]
     pub(super) fn bend<S: AdjointSink>(
         &mut self,
         single: &Single<'_>,

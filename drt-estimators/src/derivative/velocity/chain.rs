@@ -47,7 +47,7 @@ pub(crate) struct Link {
 }
 
 /// Where a chain meets a surface, by u.
-struct Meeting {
+struct LinkHit {
     /// The unit direction in which it arrives, and over which distance.
     w: Vec3<ByU>,
     distance: ByU,
@@ -95,13 +95,13 @@ pub(crate) struct RayByU {
 #[derive(Clone, Debug)]
 pub(crate) struct Evened {
     /// By both coordinates of u.
-    pub(crate) by_u: [Rate; 2],
+    pub(crate) by_u: [RayVelocity; 2],
     pub(crate) by_movers: Vec<RayByMover>,
 }
 
 /// How fast a ray's origin and direction move at fixed u, by one coordinate of the velocity of something.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Rate {
+pub(crate) struct RayVelocity {
     pub(crate) x: Vec3<ByU>,
     pub(crate) w: Vec3<ByU>,
 }
@@ -110,7 +110,7 @@ pub(crate) struct Rate {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayByMover {
     pub(crate) mover: Mover,
-    pub(crate) axes: [Rate; 3],
+    pub(crate) axes: [RayVelocity; 3],
 }
 
 /// The shape of a triangle, over any scalar.
@@ -226,40 +226,40 @@ impl Link {
     }
 
     /// `slopes` are the gradients of the normals at the corners, where these are interpolated.
-    fn meeting(&self, before: [Vec3<ByU>; 2], y: Vec3<ByU>, slopes: &Option<[Mat3; 3]>) -> Meeting {
+    fn meeting(&self, before: [Vec3<ByU>; 2], y: Vec3<ByU>, slopes: &Option<[Mat3; 3]>) -> LinkHit {
         let [x, w] = before;
         let weights = self.weights(y);
         let mut slope = Mat3 { cols: [Vec3::zero(); 3] };
         let (Some(normals), Some(slopes)) = (self.normals, slopes) else {
             let n = self.point.ng.lift();
             let length = ByU::from(1.0);
-            return Meeting { w, distance: (y - x).dot(w), n, weights, length, slope };
+            return LinkHit { w, distance: (y - x).dot(w), n, weights, length, slope };
         };
         let mut sum = Vec3::zero();
         for ((normal, corner), weight) in normals.iter().zip(slopes).zip(weights) {
-            sum = sum + normal.lift() * weight;
+            sum += normal.lift() * weight;
             for (col, add) in slope.cols.iter_mut().zip(&corner.cols) {
-                *col = *col + add.lift() * weight;
+                *col += add.lift() * weight;
             }
         }
         let length = sum.length();
         let n = sum * length.recip();
-        Meeting { w, distance: (y - x).dot(w), n, weights, length, slope }
+        LinkHit { w, distance: (y - x).dot(w), n, weights, length, slope }
     }
 }
 
-impl Meeting {
+impl LinkHit {
     /// How the ray that goes on moves, as the one that arrives does.
-    fn pass(&self, bend: Bend, rate: &Rate) -> Rate {
+    fn pass(&self, bend: Bend, rate: &RayVelocity) -> RayVelocity {
         let ray = rate.x + rate.w * self.distance;
         let x = ray - self.w * (self.n.dot(ray) / self.n.dot(self.w));
-        Rate { x, w: self.turn(bend, rate.w, self.slope * x) }
+        RayVelocity { x, w: self.turn(bend, rate.w, self.slope * x) }
     }
 
     /// How it moves as the surface does, by the velocity of the surface's point and the rate of its normal.
-    fn moved(&self, bend: Bend, u: Vec3<ByU>, n: Vec3<ByU>) -> Rate {
+    fn moved(&self, bend: Bend, u: Vec3<ByU>, n: Vec3<ByU>) -> RayVelocity {
         let x = self.w * (self.n.dot(u) / self.n.dot(self.w));
-        Rate { x, w: self.turn(bend, Vec3::zero(), n + self.slope * (x - u)) }
+        RayVelocity { x, w: self.turn(bend, Vec3::zero(), n + self.slope * (x - u)) }
     }
 
     fn turn(&self, bend: Bend, w: Vec3<ByU>, n: Vec3<ByU>) -> Vec3<ByU> {
@@ -288,11 +288,11 @@ pub(crate) fn evened(
     let d = direction(frame, u).to_array();
     let mut before = [start.lift(), d.map(|c| c.re).into()];
     let mut now = Evened {
-        by_u: from_fn(|k| Rate { x: Vec3::zero(), w: d.map(|c| c.eps[k]).into() }),
+        by_u: from_fn(|k| RayVelocity { x: Vec3::zero(), w: d.map(|c| c.eps[k]).into() }),
         by_movers: Vec::new(),
     };
     if viewer_moves {
-        let axes = AXES.map(|axis| Rate { x: axis.lift(), w: Vec3::zero() });
+        let axes = AXES.map(|axis| RayVelocity { x: axis.lift(), w: Vec3::zero() });
         now.by_movers.push(RayByMover { mover: Mover::Viewer, axes });
     }
     let mut pass = |((link, ray), slopes): ((&Link, &RayByU), &Option<[Mat3; 3]>)| {
@@ -311,7 +311,7 @@ pub(crate) fn evened(
 }
 
 impl Link {
-    fn movers(&self, meeting: &Meeting) -> impl Iterator<Item = RayByMover> {
+    fn movers(&self, meeting: &LinkHit) -> impl Iterator<Item = RayByMover> {
         let still = Vec3::zero();
         let places = (0..3).map(move |k| {
             let axes = AXES.map(|axis| {
@@ -413,10 +413,10 @@ fn variable(v: Vec3, k: usize) -> Vec3<ByMatter> {
     from_fn::<_, 3, _>(|axis| Dual::variable(ByU::from(v[axis]), 3 * k + axis)).into()
 }
 
-fn axes(ray: &Ray<ByMatter>, k: usize) -> [Rate; 3] {
+fn axes(ray: &Ray<ByMatter>, k: usize) -> [RayVelocity; 3] {
     from_fn(|axis| {
         let by = |v: Vec3<ByMatter>| v.to_array().map(|c| c.eps[3 * k + axis]).into();
-        Rate { x: by(ray.x), w: by(ray.w) }
+        RayVelocity { x: by(ray.x), w: by(ray.w) }
     })
 }
 

@@ -49,7 +49,7 @@ use drt_math::{Rng, Vec3};
 
 pub(crate) use crate::derivative::velocity::blend::Blend;
 pub(crate) use crate::derivative::velocity::chain::{
-    ByU, Link, Mover, Rate, RayBehind, RayByMover, RayByU, evened, first_ray, ray_by_movers,
+    ByU, Link, Mover, RayBehind, RayByMover, RayByU, RayVelocity, evened, first_ray, ray_by_movers,
     rays_by_u,
 };
 pub(crate) use crate::derivative::velocity::intersection::EdgeMatter;

@@ -62,8 +62,8 @@ use drt_geom::edges::Cone;
 use drt_math::{Frame, Mat3, Real, Vec3, fm};
 
 use crate::derivative::velocity::{
-    ByU, ChainPart, ChainedRay, Link, Mover, Rate, RayBehind, RayByMover, RayByU, TangentPlane,
-    Weight, evened, first_ray, ray_by_movers, rays_by_u,
+    ByU, ChainPart, ChainedRay, Link, Mover, RayBehind, RayByMover, RayByU, RayVelocity,
+    TangentPlane, Weight, evened, first_ray, ray_by_movers, rays_by_u,
 };
 use crate::estimators::warped::edge::TurningEdge;
 use crate::estimators::warped::edges::TurningEdges;
@@ -107,7 +107,7 @@ type Matrix = [[ByU; 2]; 2];
 struct Line<'a> {
     ray: &'a RayByU,
     /// Its continuous derivatives by u, and B, where its own jump.
-    evened: Option<([Rate; 2], ByU)>,
+    evened: Option<([RayVelocity; 2], ByU)>,
     /// Two unit vectors across it.
     across: [Vec3; 2],
     /// Squared tangent of the angle within which edges count.
@@ -148,7 +148,7 @@ impl TurnedBehind {
         let mut inside = ByU::from(1.0);
         for (i, (ray, behind)) in rays.iter().zip(&chain.rays).enumerate() {
             if links[i].is_interpolated() {
-                inside = inside * links[i].inside(ray.x);
+                inside *= links[i].inside(ray.x);
             }
             let evened = evened.as_ref().map(|rays| &rays[i]);
             let line = Line::new((world, edges), ray, behind, &links[i], tangent(angle));
@@ -176,7 +176,7 @@ impl TurnedBehind {
         let all = edges.visit_all::<Infallible>(&cone, |edge| {
             if let Some(beside) = line.beside(edge) {
                 any = true;
-                self.sum = self.sum + beside.weight;
+                self.sum += beside.weight;
                 for (sums, inverse) in sums.iter_mut().zip(&beside.inverses) {
                     for (sum, by) in sums.iter_mut().zip([ByU::from(1.0), beside.distance]) {
                         let by = by * beside.weight;
@@ -297,8 +297,8 @@ impl<'a> Line<'a> {
     }
 
     /// The continuous derivatives by u.
-    fn by_u(&self) -> [Rate; 2] {
-        let own = || from_fn(|k| Rate { x: self.ray.dx[k], w: self.ray.dw[k] });
+    fn by_u(&self) -> [RayVelocity; 2] {
+        let own = || from_fn(|k| RayVelocity { x: self.ray.dx[k], w: self.ray.dw[k] });
         self.evened.map_or_else(own, |(rates, _)| rates)
     }
 
@@ -325,7 +325,7 @@ impl<'a> Line<'a> {
     }
 
     /// A at a distance, from the derivatives by u; `m` is unit. `None` where no turn moves the ray towards the edge.
-    fn inverse(&self, by_u: [Rate; 2], distance: ByU, m: [ByU; 2]) -> Option<Matrix> {
+    fn inverse(&self, by_u: [RayVelocity; 2], distance: ByU, m: [ByU; 2]) -> Option<Matrix> {
         let l = [-m[1], m[0]];
         let columns = by_u.map(|rate| self.coordinates(rate.x + rate.w * distance));
         let [g, f] = [m, l].map(|axis| columns.map(|c| axis[0] * c[0] + axis[1] * c[1]));
@@ -407,12 +407,12 @@ impl<'a> Line<'a> {
         let mut weight = silhouette * within(self.square);
         let narrow = self.square * (NARROW * NARROW);
         if crease && near.re < narrow {
-            weight = weight + within(narrow);
+            weight += within(narrow);
         }
         let inverses = match self.evened {
             None => [[[ByU::from(0.0); 2]; 2], inverse],
             Some((_, inside)) => {
-                let own = from_fn(|k| Rate { x: ray.dx[k], w: ray.dw[k] });
+                let own = from_fn(|k| RayVelocity { x: ray.dx[k], w: ray.dw[k] });
                 let own = self.inverse(own, distance, m)?;
                 let both = near + length_squared(apply(&own, offset));
                 let exact = inside.squared() / (inside.squared() + both / self.square);
