@@ -64,7 +64,7 @@ pub enum Unknown {
 /// # std::fs::write(&path, format!("scene = \"scene.xml\"\n[[parameter]]\n{parameter}\n"))?;
 /// let mut job = PreparedJob::new(load_job(&path, &Overrides::default())?)?;
 /// let light = Unknown::Parameter(0);
-/// let samples = Samples { spp: 4, ..job.samples() };
+/// let samples = Samples { spp: 64, ..job.samples() };
 ///
 /// // The sum of all pixels and channels, and its derivative.
 /// job.set(&[(light, &[0.5])])?;
@@ -72,7 +72,8 @@ pub enum Unknown {
 /// let adjoint = vec![Rgb::ONE; seen.image.pixels.len()];
 /// let gradient = job.gradient(&[light], &adjoint, samples, &Unattended)?.expect("nobody cancels it");
 /// let sum: f64 = seen.image.pixels.iter().map(|pixel| pixel.mean.sum()).sum();
-/// assert!((gradient[0][0] - sum / 1.5).abs() < 1e-9 * sum);
+/// // Both are estimates, of which the image divides by the sum of the filter's weights.
+/// assert!((gradient[0][0] - sum / 1.5).abs() < 0.05 * sum, "{} {sum}", gradient[0][0]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct PreparedJob {
