@@ -547,8 +547,7 @@ mod tests {
     use crate::model::sensor::{Lens, Sensor};
     use crate::model::settings::EstimatorKind;
     use crate::model::surface::{
-        Blend, Dielectric, Diffuse, Mask, Perturbation, Perturbed, Property, RoughConductor,
-        Textured,
+        Blend, Dielectric, Diffuse, Perturbation, Perturbed, Property, RoughConductor, Textured,
     };
     use crate::model::texture::Texture;
 
@@ -675,11 +674,9 @@ mod tests {
             }
         };
         let boxed = |p| Bsdf::Perturbed(alloc::boxed::Box::new(p));
-        for bsdf in [
-            Bsdf::Mask(alloc::boxed::Box::new(Mask { bsdf: inner(), opacity: 0.5 })),
-            boxed(perturbed(Perturbation::Normals)),
-            boxed(perturbed(Perturbation::Heights(1.0))),
-        ] {
+        for bsdf in
+            [boxed(perturbed(Perturbation::Normals)), boxed(perturbed(Perturbation::Heights(1.0)))]
+        {
             let kind = bsdf.name();
             // Also inside of others.
             for bsdf in [bsdf.clone(), blended(bsdf)] {
