@@ -17,7 +17,7 @@ pub struct FieldSteps {
     optimizer: FieldOptimizer,
     /// The shape of the values without their channels, and the number of channels.
     shape: (Vec<usize>, usize),
-    /// Of the mesh whose vertices the group has, if it has one.
+    /// The Laplacian of the mesh whose vertices the group has, if it has one.
     laplacian: Option<MeshLaplacian>,
     /// Weight of the regulariser.
     smooth: f64,

@@ -64,7 +64,7 @@ pub(crate) fn collect<'n>(
 
 /// The sums over batches of a gradient with respect to groups.
 pub(super) struct GroupGradient {
-    /// Of paths and of boundary samples.
+    /// Those of paths, and those of boundary samples.
     sums: [Vec<Vec<f64>>; 2],
 }
 

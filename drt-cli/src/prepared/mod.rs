@@ -83,7 +83,7 @@ pub struct PreparedJob {
     /// The scene at all present values, where parameters are not zero.
     moved: Option<Scene>,
     sessions: Sessions,
-    /// Of the groups, by index, that a gradient was with respect to last.
+    /// The indices of the groups that a gradient was with respect to last, and what collects for each.
     collectors: Option<(Vec<usize>, Vec<Collector>)>,
 }
 

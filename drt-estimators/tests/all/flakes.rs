@@ -32,7 +32,7 @@ fn turns() -> Parameter {
     parameter("turns", 0.0, vec![moves("smoke", turn())])
 }
 
-/// The same everywhere.
+/// Flakes are alike in all of a fog.
 #[test]
 fn in_fog() {
     judge(&in_the_sun(flaky_fog()), &[askew(), turns()], 0.03, 200);

@@ -113,7 +113,7 @@ impl<T: Real> Flakes<T> {
 }
 
 impl Flakes {
-    /// The same as constants of another scalar.
+    /// These flakes with constants of another scalar.
     #[inline]
     #[must_use]
     pub fn lift<T: Real>(&self) -> Flakes<T> {
@@ -130,7 +130,7 @@ impl Flakes {
     /// True of matrices that make a distribution: positive definite ones, by more than rounding, and zero, which is no flakes.
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        /// Of the determinant of the unit matrix with the same trace.
+        /// The least determinant, over that of a multiple of the unit matrix with the same trace.
         const LEAST: f64 = 1e-15;
         let (d, adjugate) = (self.diagonal, self.adjugate());
         if d == Vec3::ZERO && self.off_diagonal == Vec3::ZERO {

@@ -33,7 +33,7 @@ struct Range {
 }
 
 impl Sggx {
-    /// The same S everywhere.
+    /// A field with one S everywhere.
     ///
     /// # Errors
     /// When it is neither positive definite nor zero.

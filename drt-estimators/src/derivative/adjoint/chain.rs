@@ -36,11 +36,11 @@ pub(super) struct Single<'a> {
 impl<'a> Single<'a> {
     /// `None` of other vertices.
     pub(super) fn at(world: &'a World, node: &'a Node) -> Option<Self> {
-        let (vertex, arrival) = (node.vertex()?, node.arrival.as_ref()?);
-        let Some(Scattering::Surface(bsdf)) = world.scattering(vertex).filter(|_| node.single)
-        else {
+        if !node.single {
             return None;
-        };
+        }
+        let (vertex, arrival) = (node.vertex()?, node.arrival.as_ref()?);
+        let Some(Scattering::Surface(bsdf)) = world.scattering(vertex) else { return None };
         let (wo, wi) = (-arrival.dir, node.wi);
         let found = bsdf.specular(wo, wi)?;
         Some(Self { bsdf, point: vertex.surface()?, wo, wi, found })

@@ -41,7 +41,7 @@ const LANES: usize = 9;
 pub(crate) struct Link {
     pub(crate) point: SurfacePoint,
     corners: [Vec3; 3],
-    /// Of the corners, where they are interpolated.
+    /// Unit shading normals of the corners, where they are interpolated.
     normals: Option<[Vec3; 3]>,
     bend: Bend,
 }
@@ -94,7 +94,7 @@ pub(crate) struct RayByU {
 /// Derivatives of a ray that are continuous on bodies with interpolated normals.
 #[derive(Clone, Debug)]
 pub(crate) struct Evened {
-    /// By both coordinates of u.
+    /// Those by both coordinates of u.
     pub(crate) by_u: [RayVelocity; 2],
     pub(crate) by_movers: Vec<RayByMover>,
 }

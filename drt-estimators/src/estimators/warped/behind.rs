@@ -127,7 +127,7 @@ struct End {
 }
 
 impl TurnedBehind {
-    /// Of all edges behind the surfaces of a chain that turn it by less than an `angle`, where `moves` says which points move.
+    /// Adds up what all edges behind the surfaces of a chain do that turn it by less than an `angle`; `moves` says which points move.
     pub(super) fn new(
         world: &World,
         edges: &TurningEdges,
