@@ -34,6 +34,7 @@ impl Motion {
             lists.iter().map(|l| !l.is_empty()).collect()
         }
         let mut bsdfs = some(&tangents.bsdfs);
+        let bending = (0..tangents.bsdfs.len()).map(|b| tangents.bends(b)).collect();
         let mut emitters = some(&tangents.emitters);
         for change in &tangents.texels {
             match change.of {
@@ -47,6 +48,7 @@ impl Motion {
             media: some(&tangents.media),
             grids: tangents.media.iter().map(|l| l.iter().any(|(_, t)| t.moves_grids())).collect(),
             bsdfs,
+            bending,
             emitters,
             moving_emitters: tangents
                 .emitters

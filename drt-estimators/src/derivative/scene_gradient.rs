@@ -11,7 +11,7 @@ use crate::model::emitter::EmitterGradient;
 use crate::model::rendering::Counters;
 use crate::model::scene::Scene;
 use crate::model::sensor::SensorGradient;
-use crate::model::surface::{BsdfParams, Property};
+use crate::model::surface::{BsdfParams, Property, PropertySet};
 use crate::model::texture::TexelGradient;
 use crate::world::World;
 
@@ -48,7 +48,12 @@ impl SceneGradient {
         Self {
             shapes: some(&active.shapes, |i| VertexGradient::zeros(&scene.shapes[i].mesh)),
             media: some(&active.media, |i| MediumGradient::zeros(&scene.media[i].item)),
-            bsdfs: some(&active.bsdfs, |i| BsdfParams::zeros(scene.bsdfs[i].item.differentiated())),
+            bsdfs: some(&active.bsdfs, |i| {
+                let bsdf = &scene.bsdfs[i].item;
+                let index = PropertySet::new(&[Property::Eta]);
+                let turning = if bsdf.bends() { index } else { PropertySet::NONE };
+                BsdfParams::zeros(bsdf.differentiated().without(turning))
+            }),
             texels: (active.bsdfs.iter().zip(&scene.bsdfs))
                 .map(|(wanted, bsdf)| match bsdf.item.textured_part().filter(|_| *wanted) {
                     Some(t) => t

@@ -88,6 +88,8 @@ pub(crate) struct ActiveInputs {
     /// Of those, the ones whose grids move.
     pub(crate) grids: Vec<bool>,
     pub(crate) bsdfs: Vec<bool>,
+    /// BSDFs whose index of refraction changes, and turns light that goes on in a single direction.
+    pub(crate) bending: Vec<bool>,
     pub(crate) emitters: Vec<bool>,
     /// Emitters whose place or direction changes.
     pub(crate) moving_emitters: Vec<bool>,
@@ -95,10 +97,10 @@ pub(crate) struct ActiveInputs {
 }
 
 impl ActiveInputs {
-    /// True when a surface, an inside, an emitter or the camera can move: what boundary terms need.
+    /// True when a surface, an inside, an emitter, the camera or refracted light can move: what boundary terms need.
     pub(crate) fn moves_geometry(&self) -> bool {
         self.sensor
-            || [&self.shapes, &self.volumes, &self.moving_emitters]
+            || [&self.shapes, &self.volumes, &self.moving_emitters, &self.bending]
                 .into_iter()
                 .any(|l| l.contains(&true))
     }

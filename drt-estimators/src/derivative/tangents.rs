@@ -33,6 +33,8 @@ pub(crate) struct Tangents {
     pub(crate) smooth: Vec<Option<SmoothNormals>>,
     pub(crate) media: Vec<Vec<(usize, MediumTangent)>>,
     pub(crate) bsdfs: Vec<Vec<(usize, BsdfTangent)>>,
+    /// BSDFs whose index of refraction turns light that goes on in a single direction.
+    bending: Vec<bool>,
     pub(crate) texels: Vec<TexelMotion>,
     pub(crate) emitters: Vec<Vec<(usize, EmitterTangent)>>,
     /// Of every sensor.
@@ -105,10 +107,16 @@ impl Tangents {
         shapes.chain(media).chain(emitters).chain(sensor)
     }
 
-    /// True when matter or an emitter moves.
+    /// True when matter or an emitter moves, or refracted light turns.
     pub(crate) fn move_light(&self) -> bool {
         let mut light = self.targets().filter(|target| !matches!(target, Target::Sensor(_)));
-        light.any(|target| self.moves(target))
+        light.any(|target| self.moves(target)) || (0..self.bsdfs.len()).any(|b| self.bends(b))
+    }
+
+    /// True of a BSDF whose index of refraction changes, and turns light that goes on in a single direction.
+    pub(crate) fn bends(&self, bsdf: usize) -> bool {
+        let changes = |(_, t): &(usize, BsdfTangent)| !t.get(Property::Eta).is_zero();
+        self.bending[bsdf] && self.bsdfs[bsdf].iter().any(changes)
     }
 
     /// True of what moves, not of what has other colours or coefficients alone.
@@ -466,6 +474,7 @@ impl Apply<'_> {
             }
             tangents[p].scatter(&own, Rgb::ONE);
         }
+        self.tangents.bending.push(self.scene.bsdfs[i].item.bends());
         self.tangents.bsdfs.push(keep(tangents, |t| !t.is_zero()));
         Ok(())
     }

@@ -8,7 +8,8 @@
 //! ```
 //!
 //! and what is found behind the surface moves with it (theory sheet §15). Backwards, what a ray's direction is owed goes to the
-//! direction of the ray before, and to the normal, by the transposes of s_w and s_n. A chain of such surfaces passes one vector on
+//! direction of the ray before, and to the normal, by the transposes of s_w and s_n; an index of refraction that changes is owed
+//! its part likewise. A chain of such surfaces passes one vector on
 //! from vertex to vertex, up to the ray that started it. The value of the scattering, which is Fresnel's factor and those of the
 //! material, depends on the cosine n·wo as well.
 
@@ -16,7 +17,7 @@ use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::derivative::adjoint::{Differentiator, send_material};
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
-use crate::model::surface::{LocalBsdf, SpecularValue};
+use crate::model::surface::{BsdfParams, LocalBsdf, Property, SpecularValue};
 use crate::sampling::record::Node;
 use crate::world::World;
 use crate::world::scatter::Scattering;
@@ -46,10 +47,24 @@ impl<'a> Single<'a> {
         Some(Self { bsdf, point: vertex.surface()?, wo, wi, found })
     }
 
-    /// Sensitivities to `wo` and to the shading normal, from those to the direction in which the walk left.
-    pub(super) fn pull(&self, onward: RgbVec) -> (RgbVec, RgbVec) {
-        let (by_w, by_n) = self.found.bend.pull(-self.wo, self.bsdf.normal(), onward);
+    /// Sensitivities to `wo` and to the shading normal, from those to the direction in which the walk left. What the index of
+    /// refraction is owed goes to the `sink`.
+    pub(super) fn pull<S: AdjointSink>(
+        &self,
+        world: &World,
+        onward: RgbVec,
+        sink: &mut S,
+    ) -> (RgbVec, RgbVec) {
+        let (by_w, by_n, by_index) = self.found.bend.pull(-self.wo, self.bsdf.normal(), onward);
+        send_index(world.scene.shapes[self.point.shape as usize].bsdf, by_index, sink);
         (-by_w, by_n)
+    }
+}
+
+/// Sends what is owed to the index of refraction of a BSDF, as it turns light.
+pub(super) fn send_index<S: AdjointSink>(bsdf: usize, adjoint: Rgb, sink: &mut S) {
+    if sink.active().bending[bsdf] {
+        sink.bsdf(bsdf, &BsdfParams::of(Property::Eta, Rgb::ONE), adjoint);
     }
 }
 
@@ -77,7 +92,7 @@ impl Differentiator<'_> {
             return;
         }
         let by_cosine = found.by_cosine * adjoint;
-        let (to_wo, by_n) = single.pull(onward);
+        let (to_wo, by_n) = single.pull(self.world, onward, sink);
         let to_wo = to_wo + by_cosine.outer(bsdf.normal());
         there.ns += by_n + by_cosine.outer(*wo);
         there.slide += bsdf.slide(*wo, *wi, &found.params) * adjoint;

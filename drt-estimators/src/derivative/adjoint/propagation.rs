@@ -192,7 +192,7 @@ impl Differentiator<'_> {
             let mut turned = RgbVec::ZERO;
             let mut turned_wholly = RgbVec::ZERO;
             if let Some(single) = Single::at(self.world, node) {
-                let (to_wo, by_n) = single.pull(turn);
+                let (to_wo, by_n) = single.pull(self.world, turn, sink);
                 here.ns += by_n;
                 turned -= to_wo;
                 turned_wholly -= to_wo;

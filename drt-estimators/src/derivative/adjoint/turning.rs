@@ -2,6 +2,7 @@
 
 use drt_math::{Rgb, RgbVec, Vec3};
 
+use crate::derivative::adjoint::chain::send_index;
 use crate::derivative::recorded_path::RecordedPath;
 use crate::derivative::sensitivity::{AdjointSink, SurfaceAdjoint};
 use crate::derivative::velocity::{
@@ -74,6 +75,7 @@ impl RayMotion<'_> {
                     let g = g.map(|g| matter.pull(g));
                     send_to(matter.point, SurfaceAdjoint::of_place(g), sink);
                 }
+                Mover::Index(bsdf) => send_index(bsdf, g.dot(Vec3::X), sink),
                 Mover::Normal(point) => {
                     send_to(point, SurfaceAdjoint { ns: g, ..SurfaceAdjoint::default() }, sink);
                 }

@@ -44,6 +44,17 @@ pub(crate) struct Link {
     /// Unit shading normals of the corners, where they are interpolated.
     normals: Option<[Vec3; 3]>,
     bend: Bend,
+    /// Of the surface.
+    bsdf: usize,
+}
+
+/// How a surface of a chain changes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LinkChange {
+    /// Its points move.
+    pub(crate) moves: bool,
+    /// Its index of refraction changes.
+    pub(crate) bends: bool,
 }
 
 /// Where a chain meets a surface, by u.
@@ -80,6 +91,8 @@ pub(crate) enum Mover {
     Place(EdgeMatter),
     /// The rate of the shading normal at a point.
     Normal(MaterialPoint),
+    /// The rate of the index of refraction of a BSDF, as if along the first axis.
+    Index(usize),
 }
 
 /// A ray of a chain by u: its origin x and its unit direction w, each with the derivatives by both coordinates.
@@ -113,10 +126,13 @@ pub(crate) struct RayByMover {
     pub(crate) axes: [RayVelocity; 3],
 }
 
-/// The shape of a triangle, over any scalar.
+/// A triangle of a smooth surface, over any scalar.
+#[derive(Clone, Copy)]
 struct Triangle<T> {
     corners: [Vec3<T>; 3],
     normals: Option<[Vec3<T>; 3]>,
+    /// By how much the index of refraction is higher than it is.
+    more: T,
 }
 
 /// A ray over any scalar.
@@ -140,7 +156,8 @@ impl Link {
     pub(crate) fn new(world: &World, point: SurfacePoint, bend: Bend) -> Self {
         let corners = CORNERS.map(|bary| world.point(point.prim, bary));
         let normals = world.is_smooth(&point).then(|| corners.map(|(corner, _)| corner.ns));
-        Self { point, corners: corners.map(|(_, x)| x), normals, bend }
+        let bsdf = world.scene.shapes[point.shape as usize].bsdf;
+        Self { point, corners: corners.map(|(_, x)| x), normals, bend, bsdf }
     }
 
     /// Where a ray along a unit direction w meets the triangle's plane, and the unit shading normal there, on the side that w points to.
@@ -162,7 +179,7 @@ impl Link {
 
     fn triangle<T: Real>(&self) -> Triangle<T> {
         let lift = |of: [Vec3; 3]| of.map(Vec3::lift);
-        Triangle { corners: lift(self.corners), normals: self.normals.map(lift) }
+        Triangle { corners: lift(self.corners), normals: self.normals.map(lift), more: T::zero() }
     }
 
     fn pass<T: Real>(&self, ray: Ray<T>, triangle: &Triangle<T>) -> Ray<T> {
@@ -179,7 +196,7 @@ impl Link {
                 na * (T::one() - s - t) + nb * s + nc * t
             }
         };
-        Ray { x, w: self.bend.onward(ray.w, n.normalize()) }
+        Ray { x, w: self.bend.onward(ray.w, n.normalize(), triangle.more) }
     }
 }
 
@@ -253,22 +270,29 @@ impl LinkHit {
     fn pass(&self, bend: Bend, rate: &RayVelocity) -> RayVelocity {
         let ray = rate.x + rate.w * self.distance;
         let x = ray - self.w * (self.n.dot(ray) / self.n.dot(self.w));
-        RayVelocity { x, w: self.turn(bend, rate.w, self.slope * x) }
+        RayVelocity { x, w: self.turn(bend, rate.w, self.slope * x, 0.0) }
     }
 
     /// How it moves as the surface does, by the velocity of the surface's point and the rate of its normal.
     fn moved(&self, bend: Bend, u: Vec3<ByU>, n: Vec3<ByU>) -> RayVelocity {
         let x = self.w * (self.n.dot(u) / self.n.dot(self.w));
-        RayVelocity { x, w: self.turn(bend, Vec3::zero(), n + self.slope * (x - u)) }
+        RayVelocity { x, w: self.turn(bend, Vec3::zero(), n + self.slope * (x - u), 0.0) }
     }
 
-    fn turn(&self, bend: Bend, w: Vec3<ByU>, n: Vec3<ByU>) -> Vec3<ByU> {
+    /// How it moves as the surface's index of refraction rises.
+    fn bent(&self, bend: Bend) -> RayVelocity {
+        let still = Vec3::zero();
+        RayVelocity { x: still, w: self.turn(bend, still, still, 1.0) }
+    }
+
+    fn turn(&self, bend: Bend, w: Vec3<ByU>, n: Vec3<ByU>, index: f64) -> Vec3<ByU> {
         let n = n.reject(self.n);
         let variable = |v: Vec3<ByU>, rate: Vec3<ByU>| -> Vec3<Dual<ByU, 1>> {
             let (v, rate) = (v.to_array(), rate.to_array());
             from_fn::<_, 3, _>(|k| Dual::new(v[k], [rate[k]])).into()
         };
-        let onward = bend.onward(variable(self.w, w), variable(self.n, n));
+        let more = Dual::new(ByU::from(0.0), [ByU::from(index)]);
+        let onward = bend.onward(variable(self.w, w), variable(self.n, n), more);
         onward.to_array().map(|c| c.eps[0]).into()
     }
 }
@@ -282,7 +306,7 @@ pub(crate) fn evened(
     links: &[Link],
     rays: &[RayByU],
     slopes: &[Option<[Mat3; 3]>],
-    moves: impl Fn(&SurfacePoint) -> bool,
+    changes: impl Fn(&SurfacePoint) -> LinkChange,
 ) -> Vec<Evened> {
     let u = from_fn(|k| Dual::<ByU, 2>::variable(Dual::variable(0.0, k), k));
     let d = direction(frame, u).to_array();
@@ -302,8 +326,14 @@ pub(crate) fn evened(
         for rate in now.by_u.iter_mut().chain(rates) {
             *rate = meeting.pass(link.bend, rate);
         }
-        if moves(&link.point) {
+        let LinkChange { moves, bends } = changes(&link.point);
+        if moves {
             now.by_movers.extend(link.movers(&meeting));
+        }
+        if bends {
+            let still = RayVelocity { x: Vec3::zero(), w: Vec3::zero() };
+            let axes = [meeting.bent(link.bend), still, still];
+            now.by_movers.push(RayByMover { mover: Mover::Index(link.bsdf), axes });
         }
         now.clone()
     };
@@ -361,13 +391,13 @@ pub(crate) fn rays_by_u(start: Vec3, frame: &Frame, links: &[Link]) -> Vec<RayBy
     links.iter().map(&mut pass).collect()
 }
 
-/// The ray behind the last of a chain's surfaces, by everything of it that moves: the viewer, and the links of which `moves` says so.
+/// The ray behind the last of a chain's surfaces, by everything of it that moves: the viewer, and the links of which `changes` says so.
 pub(crate) fn ray_by_movers(
     start: Vec3,
     viewer_moves: bool,
     frame: &Frame,
     links: &[Link],
-    moves: impl Fn(&SurfacePoint) -> bool,
+    changes: impl Fn(&SurfacePoint) -> LinkChange,
 ) -> Vec<RayByMover> {
     let u = from_fn(|k| ByU::variable(0.0, k));
     let d = direction(frame, u).to_array().map(constant).into();
@@ -383,20 +413,24 @@ pub(crate) fn ray_by_movers(
     let mut before = first;
     for (i, link) in links.iter().enumerate() {
         let still = link.triangle();
-        if moves(&link.point) {
+        let LinkChange { moves, bends } = changes(&link.point);
+        if moves {
             let corner = |k: usize| link.corner(k);
             let mut add = |triangle: &Triangle<ByMatter>, mover: &dyn Fn(usize) -> Mover| {
                 let ray = through(link.pass(before, triangle), i + 1);
                 found.extend((0..3).map(|k| RayByMover { mover: mover(k), axes: axes(&ray, k) }));
             };
             let corners = from_fn(|k| variable(link.corners[k], k));
-            add(&Triangle { corners, normals: still.normals }, &|k| {
-                Mover::Place(EdgeMatter::of(corner(k)))
-            });
+            add(&Triangle { corners, ..still }, &|k| Mover::Place(EdgeMatter::of(corner(k))));
             if let Some(normals) = link.normals {
                 let normals = Some(from_fn(|k| variable(normals[k], k)));
-                add(&Triangle { corners: still.corners, normals }, &|k| Mover::Normal(corner(k)));
+                add(&Triangle { normals, ..still }, &|k| Mover::Normal(corner(k)));
             }
+        }
+        if bends {
+            let more = Dual::variable(ByU::from(0.0), 0);
+            let ray = through(link.pass(before, &Triangle { more, ..still }), i + 1);
+            found.push(RayByMover { mover: Mover::Index(link.bsdf), axes: axes(&ray, 0) });
         }
         before = link.pass(before, &still);
     }
@@ -433,7 +467,7 @@ mod tests {
     /// A mirror, an interface and a surface that light goes straight through, each about across the z axis, at places that a ray along
     /// it meets one after the other.
     fn chain(rng: &mut Rng, interpolated: bool) -> Vec<Link> {
-        let bends = [Bend::Refraction(1.5), Bend::Straight, Bend::Mirror];
+        let bends = [Bend::refraction(1.5, 1.0), Bend::Straight, Bend::Mirror];
         let link = |(i, bend): (u32, Bend)| {
             let place = Vec3::Z * f64::from(i + 1);
             let corners = [vec3(-2.0, -2.0, 0.0), vec3(3.0, -1.0, 0.2), vec3(-1.0, 3.0, -0.2)];
@@ -442,7 +476,13 @@ mod tests {
             let ng = (b - a).cross(c - a).normalize();
             let normals = corners.map(|_| (ng + next(rng) * 0.3).normalize());
             let point = SurfacePoint { prim: 0, shape: i, triangle: 0, bary: [0.3; 2], ng, ns: ng };
-            Link { point, corners, normals: interpolated.then_some(normals), bend }
+            Link {
+                point,
+                corners,
+                normals: interpolated.then_some(normals),
+                bend,
+                bsdf: i as usize,
+            }
         };
         (0..).zip(bends).map(link).collect()
     }
@@ -461,6 +501,10 @@ mod tests {
         for (f, e) in found.into_iter().zip(expected) {
             assert!((f - e).max_abs() < 1e-5 * (1.0 + e.max_abs()), "{what}: {f:?} {e:?}");
         }
+    }
+
+    fn all_changes(_: &SurfacePoint) -> LinkChange {
+        LinkChange { moves: true, bends: true }
     }
 
     const H: f64 = 1e-4;
@@ -492,9 +536,9 @@ mod tests {
             // Evened derivatives are the same where nothing is interpolated.
             if round % 2 == 1 {
                 let slopes = alloc::vec![None; links.len()];
-                let all = evened(start, true, &frame, &links, &rays, &slopes, |_| true);
+                let all = evened(start, true, &frame, &links, &rays, &slopes, all_changes);
                 let even = all.last().unwrap();
-                let exact = ray_by_movers(start, true, &frame, &links, |_| true);
+                let exact = ray_by_movers(start, true, &frame, &links, all_changes);
                 assert_eq!(even.by_movers.len(), exact.len());
                 for (a, b) in even.by_movers.iter().zip(&exact) {
                     for (a, b) in a.axes.iter().zip(&b.axes) {
@@ -515,7 +559,10 @@ mod tests {
             let links = chain(&mut rng, round % 2 == 0);
             let start = next(&mut rng) * 0.5 - Vec3::Z;
             let frame = Frame::from_normal((Vec3::Z + next(&mut rng) * 0.2).normalize());
-            let found = ray_by_movers(start, true, &frame, &links, |s| s.shape != 1);
+            let found = ray_by_movers(start, true, &frame, &links, |s| LinkChange {
+                moves: s.shape != 1,
+                bends: true,
+            });
             for RayByMover { mover, axes } in found {
                 for (rate, axis) in axes.iter().zip(AXES) {
                     let at = |h: f64| {
@@ -528,6 +575,11 @@ mod tests {
                             Mover::Place(EdgeMatter { point, .. }) => {
                                 links[point.shape as usize].corners[corner(point.at.bary)] +=
                                     axis * h;
+                            }
+                            Mover::Index(shape) => {
+                                if let bend @ Bend::Refraction(_) = &mut links[shape].bend {
+                                    *bend = Bend::refraction(1.5 + h * axis.x, 1.0);
+                                }
                             }
                             Mover::Normal(point) => {
                                 let link = &mut links[point.shape as usize];

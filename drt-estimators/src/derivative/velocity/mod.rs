@@ -49,8 +49,8 @@ use drt_math::{Rng, Vec3};
 
 pub(crate) use crate::derivative::velocity::blend::Blend;
 pub(crate) use crate::derivative::velocity::chain::{
-    ByU, Link, Mover, RayBehind, RayByMover, RayByU, RayVelocity, evened, first_ray, ray_by_movers,
-    rays_by_u,
+    ByU, Link, LinkChange, Mover, RayBehind, RayByMover, RayByU, RayVelocity, evened, first_ray,
+    ray_by_movers, rays_by_u,
 };
 pub(crate) use crate::derivative::velocity::intersection::EdgeMatter;
 pub(crate) use crate::derivative::velocity::material::Material;
@@ -175,6 +175,11 @@ pub(crate) trait VelocityField: core::fmt::Debug + Send + Sync {
 
     /// Whether vertices move with the edges beside them; what this adds is a term of its own.
     fn follows_edges(&self) -> bool {
+        false
+    }
+
+    /// Whether an index of refraction changes that turns light where it goes on from a surface point in a single direction.
+    fn bends(&self, _s: &SurfacePoint) -> bool {
         false
     }
 

@@ -152,10 +152,13 @@ impl PathVelocities {
         self.probe.rays += rays;
     }
 
-    /// The walk leaves a node in a single direction, which follows from the ray that found it: nothing else moves the node.
-    pub(crate) fn leave_single(&mut self, node: usize) {
+    /// The walk leaves a node at a vertex in a single direction, which follows from the ray that found it: nothing else moves the node.
+    pub(crate) fn leave_single(&mut self, node: usize, vertex: &Vertex) {
         if self.field.follows_rays() {
             self.vertices[node].blend = Blend::default();
+        }
+        if vertex.surface().is_some_and(|s| self.field.bends(s)) {
+            self.vertices[node].moves = true;
         }
     }
 

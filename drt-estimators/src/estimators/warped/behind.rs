@@ -15,8 +15,11 @@
 //! that is the nearest to this along l, damped where C moves little there: with g = Cᵀ m, f = Cᵀ l, and h = g turned by a right angle,
 //!
 //! ```text
-//! V = A v,    A v = (m·v) g / |g|² + k (l·v - (m·v) f·g / |g|²) h / |g|,    k = a / (a² + (0.1 t)²),    a = f·h / |g|.
+//! V = A v,    A v = (m·v) g / |g|² + k (l·v - (m·v) f·g / |g|²) h / |g|²,    k = r³ / (r⁴ + (1/2)⁴),    r = f·h / |g|².
 //! ```
+//!
+//! r compares how far a turn moves the line along the edge with how far it moves it across: k is 1/r away from folds, and zero at
+//! them. Both are lengths for a radian, so that A has no scale of its own.
 //!
 //! The first ray meets the edge if it turns by A o.
 //!
@@ -62,8 +65,8 @@ use drt_geom::edges::Cone;
 use drt_math::{Frame, Mat3, Real, Vec3, fm};
 
 use crate::derivative::velocity::{
-    ByU, ChainPart, ChainedRay, Link, Mover, RayBehind, RayByMover, RayByU, RayVelocity,
-    TangentPlane, Weight, evened, first_ray, ray_by_movers, rays_by_u,
+    ByU, ChainPart, ChainedRay, Link, LinkChange, Mover, RayBehind, RayByMover, RayByU,
+    RayVelocity, TangentPlane, Weight, evened, first_ray, ray_by_movers, rays_by_u,
 };
 use crate::estimators::warped::edge::TurningEdge;
 use crate::estimators::warped::edges::TurningEdges;
@@ -75,8 +78,8 @@ use crate::world::vertex::SurfacePoint;
 /// The widest angle of a cone in which edges are looked for, in radians.
 const WIDEST: f64 = 1.5;
 
-/// Over the distance of an edge along its ray: how far a turn moves the ray along the edge where half of it is left out.
-const DAMPING: f64 = 0.1;
+/// How far a turn moves a ray along an edge, over how far across it, where half of the motion along the edge is left out.
+const DAMPING: f64 = 0.5;
 
 /// What the edges behind a chain turn its first ray by, divided by nothing as yet.
 #[derive(Debug)]
@@ -127,13 +130,13 @@ struct End {
 }
 
 impl TurnedBehind {
-    /// Adds up what all edges behind the surfaces of a chain do that turn it by less than an `angle`; `moves` says which points move.
+    /// Adds up what all edges behind the surfaces of a chain do that turn it by less than an `angle`; `changes` says how surfaces of the chain do.
     pub(super) fn new(
         world: &World,
         edges: &TurningEdges,
         chain: &ChainedRay<'_>,
         angle: f64,
-        moves: impl Fn(&SurfacePoint) -> bool + Copy,
+        changes: impl Fn(&SurfacePoint) -> LinkChange + Copy,
     ) -> Self {
         let (start, links) = (&chain.start, &chain.links[..]);
         let (from, viewer_moves) = (start.viewer.x, start.moves);
@@ -143,7 +146,7 @@ impl TurnedBehind {
         let evened = links.iter().any(Link::is_interpolated).then(|| {
             let slopes: Vec<_> =
                 links.iter().map(|link| edges.normal_slopes(&link.point)).collect();
-            evened(from, viewer_moves, &frame, links, &rays, &slopes, moves)
+            evened(from, viewer_moves, &frame, links, &rays, &slopes, changes)
         });
         let mut inside = ByU::from(1.0);
         for (i, (ray, behind)) in rays.iter().zip(&chain.rays).enumerate() {
@@ -155,7 +158,7 @@ impl TurnedBehind {
             let line = Line { evened: evened.map(|rates| (rates.by_u, inside)), ..line };
             let smooth = evened.map_or(&[][..], |rates| &rates.by_movers);
             turned.gather(edges, &line.spread_out(tangent(angle)), smooth, || {
-                ray_by_movers(from, viewer_moves, &frame, &links[..=i], moves)
+                ray_by_movers(from, viewer_moves, &frame, &links[..=i], changes)
             });
         }
         turned
@@ -335,8 +338,9 @@ impl<'a> Line<'a> {
         }
         // g rotated by a right angle has the length of g.
         let across = (f[1] * g[0] - f[0] * g[1]) / square;
-        let damped = across.squared() * square + distance.squared() * (DAMPING * DAMPING);
-        let (share, sheared) = (across / damped, (f[0] * g[0] + f[1] * g[1]) / square);
+        let fourth = across.squared().squared() + DAMPING.powi(4);
+        let share = across * across.squared() / (fourth * square);
+        let sheared = (f[0] * g[0] + f[1] * g[1]) / square;
         let turned = [-g[1], g[0]];
         Some(from_fn(|r| {
             from_fn(|c| {

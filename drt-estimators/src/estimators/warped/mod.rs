@@ -158,7 +158,8 @@ impl Estimator for Warped {
         orthographic::refuse(world, changes, Film::Turning)?;
         let Changes { active, settings, .. } = *changes;
         let lights = &active.moving_emitters;
-        let any = active.sensor || active.shapes.contains(&true) || lights.contains(&true);
+        let lists = [&active.shapes, lights, &active.bending];
+        let any = active.sensor || lists.into_iter().any(|list| list.contains(&true));
         refuse(world, settings.warp, any)?;
         let found = if any {
             DiscontinuityEdges::collect(world, &active.shapes)

@@ -7,8 +7,8 @@ use drt_math::Vec3;
 
 use crate::derivative::sensitivity::ActiveInputs;
 use crate::derivative::velocity::{
-    Auxiliary, Blend, ChainPart, ChainedRay, Found, Probe, RayTurn, Spatial, TurnPart, TurnParts,
-    TurningRay, VelocityField, VertexVelocity, Weight,
+    Auxiliary, Blend, ChainPart, ChainedRay, Found, LinkChange, Probe, RayTurn, Spatial, TurnPart,
+    TurnParts, TurningRay, VelocityField, VertexVelocity, Weight,
 };
 use crate::estimators::warped::behind::TurnedBehind;
 use crate::estimators::warped::edges::{TurningEdges, divide};
@@ -33,6 +33,8 @@ pub(super) struct EdgeTurns {
     edges: TurningEdges,
     /// Shapes that move and on which vertices may have a blend weight.
     blended: Vec<bool>,
+    /// Shapes whose index of refraction changes, and turns light that goes on in a single direction.
+    bending: Vec<bool>,
     /// Mean curvatures of the shapes, 1 / scene units: on curved surfaces vertices move with their matter.
     curvatures: Vec<f64>,
 }
@@ -46,9 +48,10 @@ impl EdgeTurns {
     ) -> Self {
         let blends = |s: u32| spatial.blends.acts_on(world, s);
         let blended = (0..).zip(&active.shapes).map(|(s, moves)| *moves && blends(s)).collect();
+        let bending = world.scene.shapes.iter().map(|s| active.bending[s.bsdf]).collect();
         let shapes = 0..world.scene.shapes.len() as u32;
         let curvatures = shapes.map(|s| spatial.blends.curvature(s)).collect();
-        Self { spatial, edges, blended, curvatures }
+        Self { spatial, edges, blended, bending, curvatures }
     }
 
     /// φ of a vertex on a curved surface; `None` on others. `of_camera` is the ray that the path starts with, where it is this
@@ -113,6 +116,10 @@ impl VelocityField for EdgeTurns {
         true
     }
 
+    fn bends(&self, s: &SurfacePoint) -> bool {
+        self.bending[s.shape as usize]
+    }
+
     fn turn(
         &self,
         world: &World,
@@ -138,8 +145,10 @@ impl VelocityField for EdgeTurns {
         let tangent_plane = TurnedBehind::tangent_plane(chain);
         let start = &TurningRay { tangent_plane, ..chain.start };
         let (angle, rest) = around(world, start);
-        let behind =
-            TurnedBehind::new(world, &self.edges, chain, angle, |point| self.spatial.moves(point));
+        let behind = TurnedBehind::new(world, &self.edges, chain, angle, |s| LinkChange {
+            moves: self.spatial.moves(s),
+            bends: self.bends(s),
+        });
         if !(behind.moves || start.moves || self.edges.moves_beside(start, angle)) {
             return None;
         }

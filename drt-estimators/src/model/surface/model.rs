@@ -108,6 +108,8 @@ pub(super) struct Flags {
     pub(super) straight: bool,
     /// Some light is scattered into all directions of a solid angle.
     pub(super) spread: bool,
+    /// Its index of refraction turns light that goes on in a single direction.
+    pub(super) bends: bool,
     /// Directions along the surface are told apart, by its texture coordinates.
     pub(super) oriented: bool,
     /// The value may be differentiated where something moves: it has no jumps besides those that boundary terms sample, and its
@@ -124,6 +126,7 @@ impl Flags {
         smooth: false,
         straight: false,
         spread: true,
+        bends: false,
         oriented: false,
         differentiable: true,
     };
@@ -141,6 +144,7 @@ impl Flags {
             smooth: self.smooth || other.smooth,
             straight: self.straight || other.straight,
             spread: self.spread || other.spread,
+            bends: self.bends || other.bends,
             oriented: self.oriented || other.oriented,
             differentiable: self.differentiable && other.differentiable,
         }

@@ -57,6 +57,22 @@ pub(super) fn slot<'a>(
     }
 }
 
+/// The lane of the cosine in dual numbers, after those of the properties.
+const COSINE: usize = 3;
+
+/// The least probability of refraction into the thinner medium, where light is refracted.
+const LEAST_REFRACTION: f64 = 0.25;
+
+/// The probability with which a walk is reflected, where the part `reflected` of the light is; `eta` is the index beyond over the index on the
+/// walk's side.
+///
+/// At an angle x below the critical one the part 1 - F that is refracted grows like √x, and its derivative like 1/√x. If it also was the
+/// probability, the second moment of that derivative would be ∫ x^(-3/2) dx. With a probability that stays away from zero it grows no faster than
+/// a logarithm.
+fn chance_of_reflection(reflected: f64, eta: f64) -> f64 {
+    if eta < 1.0 && reflected < 1.0 { reflected.min(1.0 - LEAST_REFRACTION) } else { reflected }
+}
+
 impl Model for Dielectric {
     fn name(&self) -> &'static str {
         "dielectric"
@@ -64,10 +80,10 @@ impl Model for Dielectric {
 
     #[inline]
     fn flags(&self) -> Flags {
-        Flags { smooth: true, spread: false, ..Flags::INTERFACE }
+        Flags { smooth: true, spread: false, bends: true, ..Flags::INTERFACE }
     }
 
-    scatters_into_single_directions!(SpecularReflectance, SpecularTransmittance);
+    scatters_into_single_directions!(SpecularReflectance, SpecularTransmittance, Eta);
 
     fn slot(&mut self, property: Property) -> Option<Slot<'_>> {
         let Self { eta, specular_reflectance, specular_transmittance } = self;
@@ -78,8 +94,9 @@ impl Model for Dielectric {
         check(self.eta, self.specular_reflectance, self.specular_transmittance)
     }
 
-    fn undifferentiated(&self, property: Property, _: Textures<'_>) -> Option<&'static str> {
-        (property == Property::Eta).then_some("it turns light that goes through")
+    fn undifferentiated(&self, property: Property, textures: Textures<'_>) -> Option<&'static str> {
+        let varies = property == Property::Eta && textures.of(property).is_some();
+        varies.then_some("it turns light that goes through, and varies")
     }
 
     #[inline(never)]
@@ -98,8 +115,9 @@ impl Model for Dielectric {
             return None;
         }
         let reflected = dielectric_reflected(cos, eta);
-        if choice < reflected {
-            let weight = self.specular_reflectance;
+        let reflecting = chance_of_reflection(reflected, eta);
+        if choice < reflecting {
+            let weight = self.specular_reflectance * (reflected / reflecting);
             return Some(SpecularSample { w: mirrored(from, n), weight, straight: false });
         }
         let (w, _) = refracted(from, n, eta)?;
@@ -108,38 +126,30 @@ impl Model for Dielectric {
             Given::Wo => 1.0 / (eta * eta),
             Given::Wi => 1.0,
         };
-        Some(SpecularSample { w, weight: self.specular_transmittance * scale, straight: false })
+        let weight = self.specular_transmittance * (scale * (1.0 - reflected) / (1.0 - reflecting));
+        Some(SpecularSample { w, weight, straight: false })
     }
 
     #[inline(never)]
     fn specular(&self, _: At<'_>, wo: Vec3, wi: Vec3, n: Vec3) -> Option<SpecularValue> {
-        let cos = n.dot(wo);
-        let (n, eta) = if cos > 0.0 { (n, self.eta) } else { (-n, self.eta.recip()) };
-        let side = cos.signum();
-        let reflected = dielectric_reflected(Dual::variable(cos.abs(), 0), Dual::from(eta));
-        let Dual { re: reflected, eps: [by_cosine] } = reflected;
-        let properties = self.differentiated();
-        let colour = |property, colour| -> Rgb<Dual<f64, 2>> {
-            Lanes::<0>::new(properties).colour(property, colour)
+        let cosine = n.dot(wo);
+        let numbers = Lanes::<0>::new(self.differentiated());
+        let own: Dual<f64, 4> = numbers.number(Property::Eta, self.eta);
+        let (n, eta) = if cosine > 0.0 { (n, own) } else { (-n, own.recip()) };
+        let reflected = dielectric_reflected(Dual::variable(cosine.abs(), COSINE), eta);
+        let reflecting = chance_of_reflection(reflected.re, eta.re);
+        let found = |value: Rgb<Dual<f64, 4>>, probability, bend| {
+            let by_cosine = value.map(|c| c.eps[COSINE] * cosine.signum());
+            SpecularValue::by_duals(self.differentiated(), value, by_cosine, probability, bend)
         };
         if same(mirrored(wo, n), wi) {
-            let value = colour(Property::SpecularReflectance, self.specular_reflectance)
-                * Dual::from(reflected);
-            let by_cosine = self.specular_reflectance * (by_cosine * side);
-            return Some(SpecularValue::by_duals(
-                properties,
-                value,
-                by_cosine,
-                reflected,
-                Bend::Mirror,
-            ));
+            let colour = numbers.colour(Property::SpecularReflectance, self.specular_reflectance);
+            return Some(found(colour * reflected, reflecting, Bend::Mirror));
         }
-        refracted(wo, n, eta).filter(|(w, _)| same(*w, wi))?;
-        let through = (1.0 - reflected) / (eta * eta);
-        let value = colour(Property::SpecularTransmittance, self.specular_transmittance)
-            * Dual::from(through);
-        let by_cosine = self.specular_transmittance * (-by_cosine * side / (eta * eta));
-        let bend = Bend::Refraction(eta);
-        Some(SpecularValue::by_duals(properties, value, by_cosine, 1.0 - reflected, bend))
+        refracted(wo, n, eta.re).filter(|(w, _)| same(*w, wi))?;
+        let colour = numbers.colour(Property::SpecularTransmittance, self.specular_transmittance);
+        let value = colour * ((Dual::from(1.0) - reflected) / eta.squared());
+        let by_property = if cosine > 0.0 { 1.0 } else { -eta.re * eta.re };
+        Some(found(value, 1.0 - reflecting, Bend::refraction(eta.re, by_property)))
     }
 }

@@ -82,34 +82,50 @@ pub(crate) enum Bend {
     Straight,
     /// Reflected.
     Mirror,
-    /// Refracted, by an index on the side of the light's direction over that on the other.
-    Refraction(f64),
+    /// Refracted.
+    Refraction(RelativeIndex),
+}
+
+/// The index of refraction on the side of the light's direction over that on the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct RelativeIndex {
+    pub(crate) value: f64,
+    /// Its derivative by the index that the surface has as a property.
+    pub(crate) by_property: f64,
 }
 
 impl Bend {
-    /// The direction of a ray that goes on from a surface, where it arrives along the unit direction `w`; n is the unit normal, on
-    /// either side. All angles of refraction exist: asked for others, it tells that along the surface.
-    pub(crate) fn onward<T: Real>(self, w: Vec3<T>, n: Vec3<T>) -> Vec3<T> {
+    /// Refracted, by the index on the side of the light's direction over that on the other, and the derivative of this by the index that the
+    /// surface has as a property.
+    pub(crate) fn refraction(value: f64, by_property: f64) -> Self {
+        Self::Refraction(RelativeIndex { value, by_property })
+    }
+
+    /// The direction of a ray that goes on from a surface whose index of refraction is higher by `more`, where it arrives along the unit
+    /// direction `w`; n is the unit normal, on either side. All angles of refraction exist: asked for others, it tells that along the surface.
+    pub(crate) fn onward<T: Real>(self, w: Vec3<T>, n: Vec3<T>, more: T) -> Vec3<T> {
         let cos = n.dot(w);
         match self {
             Self::Straight => w,
             Self::Mirror => w - n * (cos * 2.0),
-            Self::Refraction(eta) => {
-                let beyond = T::one() - (T::one() - cos.squared()) / (eta * eta);
+            Self::Refraction(RelativeIndex { value, by_property }) => {
+                let eta = more * by_property + T::from(value);
+                let beyond = T::one() - (T::one() - cos.squared()) / eta.squared();
                 let beyond = if beyond.re() > 0.0 { beyond.sqrt() } else { T::zero() };
                 let beyond = if cos.re() < 0.0 { -beyond } else { beyond };
-                w / T::from(eta) + n * (beyond - cos / T::from(eta))
+                w / eta + n * (beyond - cos / eta)
             }
         }
     }
 
-    /// Sensitivities by w and by n, from those by the direction [`onward`](Self::onward).
-    pub(crate) fn pull(self, w: Vec3, n: Vec3, g: RgbVec) -> (RgbVec, RgbVec) {
-        let inputs = |v: Vec3, first: usize| -> Vec3<Dual<f64, 6>> {
+    /// Sensitivities by w, by n and by the index of refraction, from those by the direction [`onward`](Self::onward).
+    pub(crate) fn pull(self, w: Vec3, n: Vec3, g: RgbVec) -> (RgbVec, RgbVec, Rgb) {
+        let inputs = |v: Vec3, first: usize| -> Vec3<Dual<f64, 7>> {
             let [x, y, z] = v.to_array();
             [(x, 0), (y, 1), (z, 2)].map(|(v, k)| Dual::variable(v, first + k)).into()
         };
-        let onward = self.onward(inputs(w, 0), inputs(n, 3));
+        let onward = self.onward(inputs(w, 0), inputs(n, 3), Dual::variable(0.0, 6));
+        let by_index: Vec3 = onward.to_array().map(|c| c.eps[6]).into();
         let by = |first: usize| {
             g.map(|g| {
                 let lane = |k: usize| {
@@ -119,7 +135,7 @@ impl Bend {
                 vec3(lane(0), lane(1), lane(2))
             })
         };
-        (by(0), by(3))
+        (by(0), by(3), g.dot(by_index))
     }
 }
 

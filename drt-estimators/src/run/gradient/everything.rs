@@ -80,6 +80,8 @@ pub(crate) fn active(scene: &Scene, wanted: &[Target]) -> ActiveInputs {
         volumes: alloc::vec![false; scene.media.len()],
         media: flags(scene.media.len(), wanted, Target::Medium),
         grids: flags(scene.media.len(), wanted, Target::Medium),
+        // Colours of glass are wanted where nothing may turn, too.
+        bending: alloc::vec![false; scene.bsdfs.len()],
         bsdfs: flags(scene.bsdfs.len(), wanted, Target::Bsdf),
         moving_emitters: emitters.iter().enumerate().map(|(e, w)| *w && placed(e)).collect(),
         emitters,

@@ -57,6 +57,9 @@ impl Session {
     /// * Tetrahedra that [`Settings::insides`] gives are used, without the velocities that are given with them. Other
     ///   kinds of motion in [`Settings::insides`] are ignored.
     ///
+    /// A BSDF has an entry for each of the properties that it is [differentiated](crate::surface::Bsdf::differentiated) by, except the index of
+    /// refraction of smooth interfaces. It turns light, as a motion does, and has a derivative in forward mode alone.
+    ///
     /// The expected value does not depend on this choice. Forward mode is the exact transpose if it has this seed,
     /// these settings, which name an estimator, and this `spp`, without [`guiding`](Settings::guiding), and if both modes ask for one of the
     /// kinds above. Shapes that touch and move differently are an exception: no field follows both, and the flux

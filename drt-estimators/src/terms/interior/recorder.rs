@@ -179,7 +179,7 @@ impl Observer for Recorder<'_, '_> {
         self.record.scatter(leaving, value, inv_pdf);
         for view in self.views.iter_mut() {
             if leaving.pdf().is_none() {
-                view.velocities.leave_single(leaving.node as usize);
+                view.velocities.leave_single(leaving.node as usize, &leaving.vertex);
             }
             view.pairs.offer(view.world, self.record, &view.velocities, leaving, rng);
         }

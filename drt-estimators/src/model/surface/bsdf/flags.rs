@@ -58,6 +58,11 @@ impl Bsdf {
         self.flags().smooth
     }
 
+    /// True where the index of refraction, of which there are derivatives, turns light that goes on in a single direction.
+    pub(crate) fn bends(&self) -> bool {
+        self.flags().bends && self.differentiated().contains(Property::Eta)
+    }
+
     /// True where light is scattered into single directions, and other light into all directions of a solid angle.
     pub(crate) fn is_partly_smooth(&self) -> bool {
         let flags = self.flags();
