@@ -54,7 +54,7 @@ def main():
     work = pathlib.Path(sys.argv[1])
     shutil.rmtree(work, ignore_errors=True)
     members = []
-    for page in sorted([*ROOT.glob("drt-*/README.md"), *ROOT.glob("docs/*.md")]):
+    for page in sorted([*ROOT.glob("drt-*/README.md"), *ROOT.glob("docs/**/*.md")]):
         text = page.read_text()
         # What has no language is Rust to rustdoc, which sees no other pages.
         programs = list(examples(text, ("rust", "") if page.name == "README.md" else ("rust",)))
