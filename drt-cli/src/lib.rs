@@ -12,6 +12,9 @@ mod scene_xml;
 mod testing;
 mod wording;
 
+// What the public interface is made of, so that one dependency is enough.
+pub use {drt_estimators, drt_geom, drt_math, drt_medium, drt_motion};
+
 pub use error::CliError;
 pub use files::atomic::{check_target, write_atomically};
 pub use files::digest::{RunFacts, Verdict, digest, write_digest};

@@ -17,6 +17,9 @@ mod sampling;
 mod terms;
 mod world;
 
+// What the public interface is made of, so that one dependency is enough.
+pub use {drt_geom, drt_math, drt_medium, drt_motion};
+
 pub use derivative::scene_gradient::SceneGradient;
 pub use derivative::tangents::moved;
 pub use drt_motion::interior::{GivenTetrahedra, InteriorMotion};

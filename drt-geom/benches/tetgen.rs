@@ -1,46 +1,68 @@
-//! Seconds to prepare a surface: the search for crossing triangles, and tetrahedra by TetGen.
+//! Tetrahedra around and inside surfaces: our own and TetGen's.
 //!
-//! `cargo bench -p drt-geom --features tetgen,obj --bench tetgen -- [MESH.obj ...]`
+//! `cargo bench -p drt-geom --features tetgen,obj --bench tetgen -- "$PWD"/examples/meshes/*.obj`
 //!
-//! Without a mesh, bumpy spheres of 5 000, 20 000 and 82 000 triangles. The least of three runs.
+//! A bumpy sphere of 20 000 triangles comes after the meshes that are named. Seconds are the least of three runs. The shape of a tetrahedron
+//! is its volume over that of the regular one with its longest edge: 1 is regular, 0 flat. The table has the least shape and the median.
 
 use std::error::Error;
 use std::time::{Duration, Instant};
 
 use drt_geom::{
-    Mesh, TetrahedralizeInput, crossing_pairs, load_obj, procedural, tetrahedralize_tetgen,
+    Mesh, TetMesh, Tetrahedralization, TetrahedralizeInput, load_obj, procedural, tetrahedralize,
+    tetrahedralize_tetgen,
 };
 
 const RUNS: usize = 3;
+const LIMIT: Duration = Duration::from_secs(600);
+
+type Made = Result<Tetrahedralization, Box<dyn Error>>;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut meshes = Vec::new();
     // Cargo adds --bench.
     for path in std::env::args().skip(1).filter(|w| w != "--bench") {
         let mesh = load_obj(&std::fs::read(&path)?, &path)?;
-        meshes.push((path, mesh.drop_degenerate().0));
+        let name = path.rsplit('/').next().unwrap_or(&path).to_owned();
+        meshes.push((name, mesh.drop_degenerate().0));
     }
-    if meshes.is_empty() {
-        let sphere = |n| (format!("bumpy sphere {n}"), procedural::bumpy_sphere(n, 0.2, 6.0));
-        meshes = [4, 5, 6].map(sphere).into();
-    }
-    println!("triangles  crossing s  tetgen s     points       tets");
+    meshes.push(("bumpy sphere".into(), procedural::bumpy_sphere(5, 0.2, 6.0)));
+    println!(
+        "| mesh | triangles | by | seconds | vertices | tetrahedra | least shape | median shape |"
+    );
+    println!("|---|---|---|---|---|---|---|---|");
     for (name, mesh) in &meshes {
-        let (crossing, _) = least(|| crossing_pairs(&[mesh], 1));
-        let (seconds, made) = least(|| tetrahedralize(mesh));
-        let result = match made {
-            Ok((points, tets)) => format!("{points:10} {tets:10}  {name}"),
-            Err(error) => format!("{name}: {error}"),
-        };
-        println!("{:9} {crossing:11.3} {seconds:9.3} {result}", mesh.triangles.len());
+        let input = TetrahedralizeInput { surfaces: &[mesh], points: &[], margin: 0.1 };
+        row(name, mesh, "drt", || Ok(tetrahedralize(&input)?));
+        row(name, mesh, "TetGen", || Ok(tetrahedralize_tetgen(&input, LIMIT)?));
     }
     Ok(())
 }
 
-fn tetrahedralize(mesh: &Mesh) -> Result<(usize, usize), Box<dyn Error>> {
-    let input = TetrahedralizeInput { surfaces: &[mesh], points: &[], margin: 0.1 };
-    let made = tetrahedralize_tetgen(&input, Duration::from_secs(600))?;
-    Ok((made.mesh.positions.len(), made.mesh.tets.len()))
+/// Prints a row of the table.
+fn row(name: &str, mesh: &Mesh, by: &str, make: impl FnMut() -> Made) {
+    let triangles = mesh.triangles.len();
+    let (seconds, made) = least(make);
+    let result = made.map(|made| {
+        let (vertices, tets) = (made.mesh.positions.len(), made.mesh.tets.len());
+        let [worst, median] = shapes(&made.mesh);
+        format!("{seconds:.3} | {vertices} | {tets} | {worst:.1e} | {median:.2}")
+    });
+    let result = result.unwrap_or_else(|error| format!("{error} | | | |"));
+    println!("| {name} | {triangles} | {by} | {result} |");
+}
+
+/// The least and the median shape.
+fn shapes(mesh: &TetMesh) -> [f64; 2] {
+    let shape = |tet: &[u32; 4]| {
+        let [a, b, c, d] = tet.map(|v| mesh.positions[v as usize]);
+        let edges = [b - a, c - a, d - a, c - b, d - b, d - c];
+        let longest = edges.iter().map(|e| e.length()).fold(0.0, f64::max);
+        (b - a).cross(c - a).dot(d - a).abs() * 2.0_f64.sqrt() / longest.powi(3)
+    };
+    let mut shapes: Vec<f64> = mesh.tets.iter().map(shape).collect();
+    shapes.sort_by(f64::total_cmp);
+    [shapes[0], shapes[shapes.len() / 2]]
 }
 
 /// The shortest time, in seconds, and the last result.

@@ -23,6 +23,9 @@ mod topology;
 mod triangulate;
 mod weld;
 
+// What the public interface is made of, so that one dependency is enough.
+pub use drt_math;
+
 pub use aabb::Aabb;
 pub use crossing::{CrossingSegment, crossing_pairs, crossing_segments};
 pub use intersect::ray_plane;

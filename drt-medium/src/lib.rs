@@ -37,6 +37,9 @@ mod vol_error;
 mod volume;
 mod voxel_gradient;
 
+// What the public interface is made of, so that one dependency is enough.
+pub use drt_math;
+
 pub use drt_math::ValueChange;
 
 pub use change::MediumChange;

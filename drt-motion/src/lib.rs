@@ -14,6 +14,9 @@ pub mod parameter;
 pub mod surface;
 pub mod volume;
 
+// What the public interface is made of, so that one dependency is enough.
+pub use {drt_geom, drt_math};
+
 pub use drt_math::{ValueChange, ValueMap};
 
 pub use error::{Cause, MotionError};

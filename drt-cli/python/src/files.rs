@@ -1,30 +1,28 @@
 //! Image files.
 
-use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use drt_cli::files::image::{encode_texels, write_layers};
+use drt_cli::files::image::{NamedLayer, encode_texels, write_layers};
 use drt_cli::{Tone, write_atomically};
-use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArrayDyn};
+use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays::pixels;
 use crate::errors::raised;
 
-/// The layers of an EXR file by name; the image itself is the one without a name.
+/// The layers of an EXR file by name, in the order of their job; the image itself is the one without a name.
 #[pyfunction]
-pub(crate) fn read_exr<'py>(
-    py: Python<'py>,
-    path: PathBuf,
-) -> PyResult<BTreeMap<String, Bound<'py, PyArray3<f32>>>> {
+pub(crate) fn read_exr<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyDict>> {
     let file = py.detach(|| drt_cli::read_exr(&path)).map_err(|e| raised(&e))?;
     let [columns, rows] = file.size.map(|n| n as usize);
-    let layer = |(name, pixels): (String, Vec<[f32; 3]>)| {
-        let numbers = pixels.into_flattened().into_pyarray(py);
-        Ok((name, numbers.reshape([rows, columns, 3])?))
-    };
-    file.layers.into_iter().map(layer).collect()
+    let layers = PyDict::new(py);
+    for (name, pixels) in file.in_order() {
+        let numbers = pixels.as_flattened().to_vec().into_pyarray(py);
+        layers.set_item(name, numbers.reshape([rows, columns, 3])?)?;
+    }
+    Ok(layers)
 }
 
 /// Writes an image of so many columns and rows as EXR.
@@ -59,7 +57,7 @@ pub(crate) fn write_png(
     }
     let tone = Tone { exposure, ..Tone::default() };
     py.detach(|| {
-        let layers: Vec<(&str, &[[f32; 3]])> =
+        let layers: Vec<NamedLayer<'_>> =
             shown.iter().map(|(name, pixels): &(_, Vec<_>)| (*name, pixels.as_slice())).collect();
         write_layers(&path, size, &layers, tone)
     })

@@ -29,7 +29,7 @@ pub(super) fn derivatives(
                 console::note(format_args!("drt: the estimator is {why}"));
             }
             monitor.stage("grad", 0.0, part);
-            Ok(run::sample(&mut session, options, job.spp(), monitor))
+            Ok(run::sample(&mut session, options, job.spp(), monitor, monitor))
         }
     }
 }
@@ -49,7 +49,7 @@ fn by_differences(
     let images = 1.0 + 2.0 * job.parameters.len() as f64;
     let seconds = options.seconds.map(|seconds| seconds / images);
     let of_image = Options { seconds, ..options.clone() };
-    let mut rendering = run::sample(&mut session, &of_image, job.spp(), monitor);
+    let mut rendering = run::sample(&mut session, &of_image, job.spp(), monitor, monitor);
     rendering.derivatives.clear();
     if !rendering.complete {
         return Ok(rendering);

@@ -195,7 +195,7 @@ fn by_its_image(
     job.settings.sensor = view.sensor;
     let mut session = run::prepare_forward(job, &mut run::Shared::default())?;
     monitor.stage("image", 0.0, 0.3);
-    let rendering = run::sample(&mut session, &options.common, job.spp(), monitor);
+    let rendering = run::sample(&mut session, &options.common, job.spp(), monitor, monitor);
     if !rendering.complete {
         return Ok(None);
     }

@@ -9,6 +9,7 @@ mod derivatives;
 mod destinations;
 mod fingerprint;
 mod grad;
+mod growing;
 mod info;
 mod loss_gradient;
 mod markup;
@@ -27,6 +28,7 @@ mod shell;
 mod stop;
 mod table;
 mod targets;
+mod view;
 
 use std::ffi::OsString;
 use std::io::IsTerminal;
@@ -123,6 +125,7 @@ fn dispatch(command: &Command) -> Result<Outcome, CliError> {
         Command::Batch(options) => batch::run(options),
         Command::Merge(options) => merge::run(options),
         Command::Preview(options) => preview::run(options),
+        Command::View(options) => view::run(options),
         Command::Completions { shell } => shell::completions(*shell),
         Command::Man { output } => shell::manual(output.as_deref()),
     }

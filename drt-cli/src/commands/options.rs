@@ -37,6 +37,8 @@ pub(super) enum Command {
     Info(InfoOptions),
     /// Make a picture to look at of the layers of an OpenEXR file.
     Preview(PreviewOptions),
+    /// Show an image file in the terminal, with the layers of an OpenEXR file side by side.
+    View(ViewOptions),
     /// Print what completes commands in a shell.
     Completions {
         /// The shell.
@@ -57,9 +59,27 @@ pub(super) struct PreviewOptions {
     /// Where to write the picture; default: beside the image, as .png.
     #[arg(short, long, value_name = "FILE.png")]
     pub(super) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) layers: Layers,
+}
+
+#[derive(Args, Debug)]
+pub(super) struct ViewOptions {
+    /// An image file: OpenEXR, PNG, JPEG, BMP or Radiance (.hdr).
+    pub(super) input: PathBuf,
+    /// Width of the picture in characters. Default: as wide as it has pixels and the terminal has room for.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) width: Option<u16>,
+    #[command(flatten)]
+    pub(super) layers: Layers,
+}
+
+/// Which layers of a file are shown, and how.
+#[derive(Args, Debug)]
+pub(super) struct Layers {
     /// Only this layer, such as d_NAME (`image` for the image itself); may be repeated. Default: all but standard errors.
-    #[arg(long, value_name = "NAME")]
-    pub(super) layer: Vec<String>,
+    #[arg(long = "layer", value_name = "NAME")]
+    pub(super) names: Vec<String>,
     #[command(flatten)]
     pub(super) look: Look,
 }
@@ -201,6 +221,9 @@ pub(super) struct Changes {
 pub(super) struct RenderOptions {
     #[command(flatten)]
     pub(super) common: Options,
+    /// Write what is finished of the picture about once a second while it is rendered: to --preview, by default beside the image, as .png.
+    #[arg(long, conflicts_with = "shard")]
+    pub(super) watch: bool,
     /// Take only this part of the samples, to be merged with the others: `3/8` is the third of eight.
     #[arg(long, value_name = "K/N", value_parser = shard)]
     pub(super) shard: Option<Shard>,

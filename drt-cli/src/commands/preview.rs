@@ -1,10 +1,12 @@
 //! `drt preview`: layers of an EXR file, to look at.
 
+use std::path::Path;
+
 use super::Outcome;
 use super::destinations::{Destinations, check_ending};
 use super::options::PreviewOptions;
 use crate::error::Place;
-use crate::files::image::{is_error, write_layers};
+use crate::files::image::{ExrFile, NamedLayer, is_error, write_layers};
 use crate::{CliError, read_exr};
 
 pub(super) fn run(options: &PreviewOptions) -> Result<Outcome, CliError> {
@@ -15,26 +17,30 @@ pub(super) fn run(options: &PreviewOptions) -> Result<Outcome, CliError> {
     destinations.check()?;
     check_ending("-o", &output, &["png"])?;
     let file = read_exr(input)?;
-    let all = file.layers.iter().map(|(name, pixels)| (name.as_str(), &pixels[..]));
-    let mut layers: Vec<_> = all.clone().filter(|(name, _)| !is_error(name)).collect();
-    if !options.layer.is_empty() {
-        layers.clear();
-        for wanted in &options.layer {
-            let name = if wanted == "image" { "" } else { wanted };
-            let known = || {
-                let names = all.clone().map(|(n, _)| if n.is_empty() { "image" } else { n });
-                names.collect::<Vec<_>>().join(", ")
-            };
-            let layer = all.clone().find(|(n, _)| *n == name).ok_or_else(|| {
-                let message = format!("it has no layer `{wanted}`; it has {}", known());
-                CliError::input(&Place::file(input), message)
-            })?;
-            layers.push(layer);
-        }
-    }
-    if layers.is_empty() {
-        return Err(CliError::input(&Place::file(input), "it has no layers but standard errors"));
-    }
-    write_layers(&output, file.size, &layers, options.look.tone(None))?;
+    let layers = chosen(input, &file, &options.layers.names)?;
+    write_layers(&output, file.size, &layers, options.layers.look.tone(None))?;
     Ok(Outcome::Done)
+}
+
+/// The layers of a file that are asked for by name, in that order, or else all but standard errors, in the order of their job.
+pub(super) fn chosen<'f>(
+    path: &Path,
+    file: &'f ExrFile,
+    names: &[String],
+) -> Result<Vec<NamedLayer<'f>>, CliError> {
+    let fail = |message: String| CliError::input(&Place::file(path), message);
+    let all: Vec<_> = file.in_order().collect();
+    if names.is_empty() {
+        let layers: Vec<_> = all.into_iter().filter(|(name, _)| !is_error(name)).collect();
+        let none = || fail("it has no layers but standard errors".into());
+        return (!layers.is_empty()).then_some(layers).ok_or_else(none);
+    }
+    let shown = |name: &'f str| if name.is_empty() { "image" } else { name };
+    let layer = |wanted: &String| {
+        all.iter().copied().find(|(name, _)| shown(name) == wanted).ok_or_else(|| {
+            let known: Vec<&str> = all.iter().map(|(name, _)| shown(name)).collect();
+            fail(format!("it has no layer `{wanted}`; it has {}", known.join(", ")))
+        })
+    };
+    names.iter().map(layer).collect()
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use drt_estimators::{Layer, PreparedCache, Rendering, Session, finite_differences};
+use drt_estimators::{Control, Layer, PreparedCache, Rendering, Session, finite_differences};
 use drt_motion::Parameter;
 
 use super::console;
@@ -143,16 +143,17 @@ pub(super) fn tell_one_sided(job: &Job, quiet: bool) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Samples until the options say that it is enough.
+/// Samples until the options say that it is enough, by the monitor's stages, and under this control, which may be the monitor too.
 pub(super) fn sample(
     session: &mut Session,
     options: &Options,
     spp: u32,
     monitor: &Monitor,
+    control: &dyn Control,
 ) -> Rendering {
     let by_count = options.seconds.is_none() && options.target_error.is_none();
     if by_count {
-        session.run(spp, monitor);
+        session.run(spp, control);
         return session.rendering();
     }
     let start = Instant::now();
@@ -160,7 +161,7 @@ pub(super) fn sample(
     let mut pass = u32::min(FIRST_PASS, limit);
     let mut done = 0;
     loop {
-        let going = session.run(pass, monitor);
+        let going = session.run(pass, control);
         let rendering = session.rendering();
         done += pass;
         let mut left = limit - done;

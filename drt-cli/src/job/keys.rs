@@ -255,6 +255,7 @@ pub(super) enum GroupRate {
 pub(super) struct Motion {
     pub(super) medium: String,
     pub(super) kind: MotionKind,
+    pub(super) tetrahedralizer: Option<Tetrahedralizer>,
     pub(super) mesh: Option<PathBuf>,
     pub(super) velocities: Option<PathBuf>,
     pub(super) parameter: Option<String>,
@@ -267,6 +268,14 @@ pub(super) enum MotionKind {
     Tetrahedral,
     MeanValue,
     Static,
+}
+
+/// Who makes the tetrahedra that no file gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Tetrahedralizer {
+    Own,
+    Tetgen,
 }
 
 #[derive(Debug, Deserialize)]

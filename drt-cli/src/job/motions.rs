@@ -10,7 +10,7 @@ use drt_motion::Parameter;
 use toml::Spanned;
 
 use super::document::Document;
-use super::keys::{self, MotionKind};
+use super::keys::{self, MotionKind, Tetrahedralizer};
 use super::refusal::Refusal;
 use super::velocities;
 use crate::CliError;
@@ -41,6 +41,11 @@ pub(super) fn insides(
             (MotionKind::Affine, _) => InteriorMotion::Affine,
             (MotionKind::Static, _) => InteriorMotion::Static,
             (MotionKind::MeanValue, _) => InteriorMotion::MeanValue,
+            (MotionKind::Tetrahedral, None)
+                if keys.tetrahedralizer == Some(Tetrahedralizer::Tetgen) =>
+            {
+                InteriorMotion::Tetgen
+            }
             (MotionKind::Tetrahedral, None) => InteriorMotion::Tetrahedral(None),
             (MotionKind::Tetrahedral, Some(file)) => {
                 let before = insides.remove(&medium);
@@ -84,7 +89,23 @@ pub(super) fn insides(
 
 /// Which keys go together.
 fn check(keys: &keys::Motion) -> Result<(), String> {
-    let keys::Motion { kind, mesh, velocities, parameter, .. } = keys;
+    let keys::Motion { kind, mesh, velocities, parameter, tetrahedralizer, .. } = keys;
+    match (kind, mesh, tetrahedralizer) {
+        (_, _, None) => {}
+        (MotionKind::Tetrahedral, None, Some(Tetrahedralizer::Tetgen)) => {
+            if cfg!(not(feature = "tetgen")) {
+                return Err("`tetrahedralizer` \"tetgen\" is not in this program; expected it to be built with \
+                            `--features tetgen` (TetGen is under the AGPL), or \"own\""
+                    .into());
+            }
+        }
+        (MotionKind::Tetrahedral, None, Some(Tetrahedralizer::Own)) => {}
+        _ => {
+            return Err(
+                "`tetrahedralizer` belongs to the kind `tetrahedral` without a `mesh`".into()
+            );
+        }
+    }
     match (kind, mesh, velocities, parameter) {
         (MotionKind::Tetrahedral, Some(_), Some(_), Some(_))
         | (MotionKind::Tetrahedral, _, None, None)

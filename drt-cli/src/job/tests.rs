@@ -263,6 +263,20 @@ fn keys_of_later_versions_are_read_and_stand_in_the_way_of_derivatives_only() {
     let unnamed = format!("{velocities}\nmesh = \"a.mesh\"");
     refused(&motion(&unnamed), &[], &["need each other"]);
     refused(&motion("kind = \"tetrahedral\"\nmesh = \"a.mesh\""), &[], &["a.mesh"]);
+    let maker = |kind: &str, maker: &str| {
+        motion(&format!("kind = \"{kind}\"\ntetrahedralizer = \"{maker}\""))
+    };
+    refused(&maker("static", "own"), &[], &["job.toml:2", "`tetrahedralizer` belongs to"]);
+    refused(&maker("tetrahedral", "gmsh"), &[], &["`gmsh`", "`own`", "`tetgen`"]);
+    let inside = |text: &str| job(text, &[]).map(|j| j.settings.insides[0].1.clone());
+    use drt_estimators::InteriorMotion::{Tetgen, Tetrahedral};
+    assert_eq!(inside(&maker("tetrahedral", "own")).unwrap(), Tetrahedral(None));
+    let tetgen = maker("tetrahedral", "tetgen");
+    if cfg!(feature = "tetgen") {
+        assert_eq!(inside(&tetgen).unwrap(), Tetgen);
+    } else {
+        refused(&tetgen, &[], &["job.toml:2", "--features tetgen", "AGPL"]);
+    }
     let still = "[[motion]]\nmedium = \"fog\"\nkind = \"static\"";
     let j = job(&text(still), &[]).unwrap();
     j.require_derivatives().unwrap();

@@ -150,3 +150,101 @@ fn contents_as_json() {
     assert_eq!(folder.json("b.json")["sensors"][0]["film"], "8x6");
     expect(&folder.run("info scene.xml --digest scene.xml"), 2, &["scene.xml is read"]);
 }
+
+/// A picture as text: as many lines of half blocks as the picture's shape asks for.
+#[test]
+fn pictures_in_the_terminal() {
+    let folder = Folder::new();
+    folder.file("scene.xml", SCENE);
+    folder.file("job.toml", JOB);
+    expect(&folder.run("grad job.toml --quiet -o a.exr --preview a.png"), 0, &[]);
+    let view = |line: &str| {
+        let output = folder.run(&format!("view {line}"));
+        expect(&output, 0, &[]);
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let blocks = |text: &str| text.matches(['\u{2580}', '\u{2584}']).count();
+    // 8 by 6 pixels, of which two lie above each other in a character.
+    let image = view("a.exr --layer image");
+    assert_eq!((blocks(&image), image.trim_end().lines().count()), (24, 3), "{image:?}");
+    assert!(image.contains("38;2;"), "colours of 24 bits: {image:?}");
+    assert_eq!(blocks(&view("a.exr --layer image --width 4")), 8);
+    assert_eq!(blocks(&view("a.exr --layer image --width 1")), 1);
+    // A derivative has other colours, and all layers are beside each other, as in the preview.
+    assert_ne!(view("a.exr --layer d_light"), image);
+    assert_eq!(view("a.exr --width 60"), view("a.png --width 60"));
+    for (line, part) in [
+        ("view a.exr --layer d_lite", "no layer `d_lite`; it has image, stderr, d_light"),
+        ("view a.png --layer image", "a.png: it has no layer `image`; only OpenEXR"),
+        ("view a.png --exposure 1", "a.png: --exposure: it holds no light"),
+        ("view scene.xml", "scene.xml: "),
+        ("view none.png", "none.png: "),
+        ("view .", ".: "),
+        ("view a.png --width 0", "--width"),
+    ] {
+        expect(&folder.run(line), 2, &[part]);
+    }
+}
+
+/// Layers are in the job's order wherever they are listed, though the format of the file sorts them by name.
+#[test]
+fn layers_have_one_order() {
+    let folder = Folder::new();
+    folder.file("scene.xml", SCENE);
+    let parameter = |name: &str| {
+        format!(
+            "[[parameter]]\nname = \"{name}\"\n[[parameter.effect]]\ntarget = \"sky\"\n\
+             property = \"radiance\"\nmultiply = 1.0\n"
+        )
+    };
+    let names = ["z", "B", "a", "ab"];
+    let parameters: String = names.map(parameter).concat();
+    folder.file("job.toml", format!("scene = \"scene.xml\"\n[estimator]\nspp = 1\n{parameters}"));
+    expect(&folder.run("grad job.toml --terms -o a.exr --digest a.json"), 0, &[]);
+    let file = folder.exr("a.exr");
+    let layers: Vec<&str> = file.in_order().map(|(name, _)| name).collect();
+    assert_eq!(layers[..2], ["", "stderr"]);
+    let derivatives = layers.iter().filter_map(|name| name.strip_prefix("d_"));
+    let of_parameters: Vec<&str> =
+        derivatives.filter(|name| !name.contains('.') && !name.ends_with("_stderr")).collect();
+    assert_eq!(of_parameters, names);
+    let known = format!("it has {}", layers.join(", ").replacen(',', "image,", 1));
+    expect(&folder.run("preview a.exr --layer none"), 2, &[&known]);
+    let digest = std::fs::read_to_string(folder.path().join("a.json")).unwrap();
+    let info = folder.run("info job.toml --digest -").stdout;
+    for (listed, quote) in [(digest, "\""), (String::from_utf8(info).unwrap(), "\"")] {
+        let places = names.map(|name| listed.find(&format!("{quote}{name}{quote}")).unwrap());
+        assert!(places.is_sorted(), "{places:?}");
+    }
+}
+
+/// What is finished is there to be looked at, and the result is the same as without looking.
+#[test]
+fn a_picture_grows() {
+    let folder = Folder::new();
+    folder.file("scene.xml", SCENE);
+    expect(&folder.run("render scene.xml --quiet -o a.exr --preview b.png"), 0, &[]);
+    let output = folder.run("render scene.xml --watch -o w.exr");
+    expect(&output, 0, &["w.png grows while it is rendered"]);
+    assert_eq!(folder.exr("a.exr").layers, folder.exr("w.exr").layers);
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert_eq!(bytes("b.png"), bytes("w.png"), "at the end it is whole");
+    expect(&folder.run("render scene.xml --watch --shard 1/2 -o s.exr"), 2, &["--shard"]);
+    // Long before the end, some of it is there and some is not.
+    let line = "render scene.xml --size 64x64 --spp 1000000 --threads 1 --watch -o g.exr";
+    let mut child = folder.command(line).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let picture = folder.path().join("g.png");
+    let mut last = (0, 0);
+    for _ in 0..100 {
+        std::thread::sleep(std::time::Duration::from_millis(100));
+        let Ok(image) = image::open(&picture) else { continue };
+        let image = image.into_rgb8();
+        last = (image.pixels().filter(|p| p.0 != [0; 3]).count(), image.pixels().count());
+        if last.0 > 0 {
+            break;
+        }
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(0 < last.0 && last.0 < last.1, "{last:?}");
+}

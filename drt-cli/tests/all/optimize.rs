@@ -138,7 +138,11 @@ fn outcome(folder: &Folder) -> (String, String, serde_json::Value) {
 fn killed_at_any_moment_it_ends_in_the_same_bits() {
     let [whole, broken] = [(); 2].map(|()| folder(FIT));
     expect(&whole.run("optimize job.toml --quiet --threads 1"), 0, &[]);
-    let (mut killed, mut random) = (0, 12345_u32);
+    let refreshes = || {
+        let page = std::fs::read_to_string(broken.path().join("run/report.html"));
+        page.is_ok_and(|page| page.contains("http-equiv=\"refresh\""))
+    };
+    let (mut killed, mut random, mut refreshed) = (0, 12345_u32, false);
     for _ in 0..40 {
         let mut child = broken.command("optimize job.toml --quiet --threads 2").spawn().unwrap();
         random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -152,6 +156,7 @@ fn killed_at_any_moment_it_ends_in_the_same_bits() {
             }
         }
         child.wait().unwrap();
+        refreshed |= refreshes();
         if killed == 10 {
             break;
         }
@@ -159,6 +164,7 @@ fn killed_at_any_moment_it_ends_in_the_same_bits() {
     assert!(killed >= 2, "killed {killed} times");
     expect(&broken.run("optimize job.toml --quiet"), 0, &[]);
     assert_eq!(outcome(&whole), outcome(&broken));
+    assert!(refreshed && !refreshes(), "the page is loaded anew until the run has ended");
     let left = std::fs::read_dir(broken.path().join("run")).unwrap();
     let drafts =
         left.filter(|f| f.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));

@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use drt_geom::Mesh;
 use drt_math::Vec3;
 
+use super::tetrahedra::Tetrahedralizer;
 use super::{InteriorError, Surroundings, TetrahedralField};
 
 /// The tetrahedra of one medium, kept from one [plan](Surroundings::plan) to the next. What is taken from
@@ -18,6 +19,7 @@ pub struct TetrahedraCache(Option<Entry>);
 struct Entry {
     surfaces: Vec<Arc<Mesh>>,
     points: Vec<Vec3>,
+    maker: Tetrahedralizer,
     field: Arc<TetrahedralField>,
 }
 
@@ -26,18 +28,20 @@ impl TetrahedraCache {
     pub(super) fn get(
         &mut self,
         around: &Surroundings<'_>,
+        maker: Tetrahedralizer,
     ) -> Result<Arc<TetrahedralField>, InteriorError> {
         let points = around.positions();
         if let Some(known) = &self.0
+            && known.maker == maker
             && known.points == points
             && known.surfaces.len() == around.surfaces.len()
             && known.surfaces.iter().zip(&around.surfaces).all(|(a, b)| a.same_triangles(b.mesh))
         {
             return Ok(known.field.clone());
         }
-        let field = Arc::new(around.tetrahedra()?);
+        let field = Arc::new(around.tetrahedra(maker)?);
         let surfaces = around.surfaces.iter().map(|s| Arc::clone(s.mesh)).collect();
-        self.0 = Some(Entry { surfaces, points, field: field.clone() });
+        self.0 = Some(Entry { surfaces, points, maker, field: field.clone() });
         Ok(field)
     }
 }

@@ -7,7 +7,7 @@ use thiserror::Error;
 use crate::error::Cause;
 
 /// Why the inside of a medium cannot move as asked for.
-#[derive(Clone, Copy, Debug, Error, PartialEq)]
+#[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum InteriorError {
     /// An affine field was asked for where there is none.
@@ -22,6 +22,14 @@ pub enum InteriorError {
     /// Its surfaces cannot be filled with tetrahedra.
     #[error("no tetrahedra fill it: {0}")]
     Unfilled(#[source] TetrahedralizeError),
+    /// TetGen does not fill its surfaces with tetrahedra, for the reason that is given.
+    #[error("TetGen does not fill it: {0}")]
+    Tetgen(String),
+    /// TetGen was asked for in a program without it.
+    #[error(
+        "TetGen is not in this program; expected it to be built with the feature `tetgen`, which is under the AGPL"
+    )]
+    NoTetgen,
     /// Tetrahedra are no mesh of a domain.
     #[error(transparent)]
     Tetrahedra(#[from] TetMeshError),

@@ -97,6 +97,8 @@ pub enum InteriorMotion {
     /// By tetrahedra that fill the space around and inside all surfaces that touch it: those given,
     /// or our own.
     Tetrahedral(Option<Arc<GivenTetrahedra>>),
+    /// By tetrahedra that TetGen makes, which needs the feature `tetgen`.
+    Tetgen,
 }
 
 /// Tetrahedra of somebody else's making.

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use drt_math::Affine;
 
 use super::sites::MovingSite;
+use super::tetrahedra::Tetrahedralizer;
 use super::{
     Blend, GivenTetrahedra, InteriorBasis, InteriorError, InteriorMotion, InteriorVelocity,
     Interpolation, Surroundings, TetrahedraCache,
@@ -143,14 +144,19 @@ impl Planner<'_> {
         let around = self.around;
         let mut tetrahedra = || match self.given() {
             Some(given) => around.given(&given.mesh).map(alloc::sync::Arc::new),
-            None => cache.get(around),
+            None if self.asked == Some(&InteriorMotion::Tetgen) => {
+                cache.get(around, Tetrahedralizer::Tetgen)
+            }
+            None => cache.get(around, Tetrahedralizer::Own),
         };
         let deforms = || {
             let by = |p: &usize| around.surfaces.iter().any(|s| s.deforms_by(*p));
             parameters.iter().any(by)
         };
         match self.asked {
-            Some(InteriorMotion::Tetrahedral(_)) => Ok(InteriorBasis::Tetrahedral(tetrahedra()?)),
+            Some(InteriorMotion::Tetrahedral(_) | InteriorMotion::Tetgen) => {
+                Ok(InteriorBasis::Tetrahedral(tetrahedra()?))
+            }
             Some(InteriorMotion::MeanValue) => {
                 Ok(InteriorBasis::MeanValue(Interpolation::new(around)?))
             }

@@ -14,6 +14,7 @@
 
 use alloc::vec::Vec;
 
+use super::tetrahedra::Tetrahedralizer;
 use super::{InteriorError, InteriorMotion, Surroundings, TetrahedralField};
 
 /// Which of the [`Surroundings`] a gradient is asked for with respect to, by their indices.
@@ -56,10 +57,11 @@ impl Surroundings<'_> {
         let scatters = || moves_points || moving.iter().any(|s| self.surfaces[*s].scatters);
         let field = match asked {
             Some(InteriorMotion::Tetrahedral(Some(given))) => Some(self.given(&given.mesh)?),
-            Some(InteriorMotion::Tetrahedral(None)) => Some(self.tetrahedra()?),
+            Some(InteriorMotion::Tetrahedral(None)) => Some(self.tetrahedra(Tetrahedralizer::Own)?),
+            Some(InteriorMotion::Tetgen) => Some(self.tetrahedra(Tetrahedralizer::Tetgen)?),
             Some(InteriorMotion::Static) => None,
             _ if !scatters() => None,
-            _ => self.tetrahedra().ok(),
+            _ => self.tetrahedra(Tetrahedralizer::Own).ok(),
         };
         let flux_surfaces = match &field {
             None => moving,

@@ -12,14 +12,43 @@ use super::{
     rims,
 };
 
+#[cfg(feature = "tetgen")]
+/// How long TetGen may take: a hundred times what it needs for a hundred thousand triangles.
+const PATIENCE: core::time::Duration = core::time::Duration::from_secs(300);
+
+/// Who makes tetrahedra.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tetrahedralizer {
+    /// The one of drt-geom.
+    Own,
+    /// The library of Hang Si.
+    Tetgen,
+}
+
+impl Tetrahedralizer {
+    fn make(self, input: &TetrahedralizeInput<'_>) -> Result<Tetrahedralization, InteriorError> {
+        match self {
+            Self::Own => tetrahedralize(input).map_err(InteriorError::Unfilled),
+            #[cfg(feature = "tetgen")]
+            Self::Tetgen => drt_geom::tetrahedralize_tetgen(input, PATIENCE)
+                .map_err(|e| InteriorError::Tetgen(alloc::string::ToString::to_string(&e))),
+            #[cfg(not(feature = "tetgen"))]
+            Self::Tetgen => Err(InteriorError::NoTetgen),
+        }
+    }
+}
+
 impl Surroundings<'_> {
     /// Fills the space around and inside all surfaces, up to the enclosing box, with tetrahedra.
-    pub(super) fn tetrahedra(&self) -> Result<TetrahedralField, InteriorError> {
+    pub(super) fn tetrahedra(
+        &self,
+        maker: Tetrahedralizer,
+    ) -> Result<TetrahedralField, InteriorError> {
         let joined = rims::joined(&self.surfaces);
         let surfaces: Vec<&Mesh> = joined.iter().map(|mesh| &**mesh).collect();
         let points = self.positions();
         let input = TetrahedralizeInput { surfaces: &surfaces, points: &points, margin: MARGIN };
-        let mut made = tetrahedralize(&input).map_err(InteriorError::Unfilled)?;
+        let mut made = maker.make(&input)?;
         // Beyond one that lies on a flat face, velocities would be those of another surface.
         made.remove_flat(&surfaces);
         Ok(TetrahedralField::new(made)?)

@@ -128,6 +128,25 @@ fn fields_meet_what_moves_in_rooms_of_sheets() {
     }
 }
 
+/// Tetrahedra by TetGen carry the velocities of the surfaces as our own do; a program without TetGen says so.
+#[test]
+fn tetgen_fills_a_room_where_it_is_built_in() {
+    let room = Room::new(vec![placed(&procedural::cube(), 1.0, Vec3::ZERO)]);
+    let plan = room.plan(Some(&InteriorMotion::Tetgen));
+    if cfg!(not(feature = "tetgen")) {
+        assert_eq!(plan.err(), Some(InteriorError::NoTetgen));
+        return;
+    }
+    let plan = plan.expect("TetGen fills it");
+    let worst = room.worst_miss(&plan);
+    assert!(worst < 1e-4 && plan.flux_surfaces.is_empty(), "{worst:e}");
+    // What crosses is refused by name.
+    let crossing = [Vec3::ZERO, vec3(0.3, 0.2, 0.1)].map(|at| placed(&procedural::cube(), 1.0, at));
+    let error =
+        Room::new(crossing.into()).plan(Some(&InteriorMotion::Tetgen)).expect_err("crosses");
+    assert!(error.to_string().contains("faces cross"), "{error}");
+}
+
 #[test]
 fn rims_may_end_on_edges_and_faces_up_to_rounding() {
     let sheet = |size: Vec3, at: Vec3| {

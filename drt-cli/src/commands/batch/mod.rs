@@ -181,7 +181,7 @@ impl Batch {
             job.require_derivatives()?;
             derivatives(&job, options, &self.monitor, 1.0, shared)?
         } else {
-            render::image(&job, options, &self.monitor, shared)?
+            render::image(&job, options, &self.monitor, &self.monitor, shared)?
         };
         if !rendering.complete {
             return Ok(End::Interrupted);

@@ -175,14 +175,14 @@ impl<'a> Descent<'a> {
             let Some(evaluation) = self.evaluate(&mut fit, monitor)? else {
                 self.store()?;
                 if let Some(seen) = &last {
-                    self.picture(seen, None)?;
+                    self.picture(seen, false, None)?;
                 }
                 return Ok((Outcome::Interrupted, last));
             };
             self.look_at(i, &evaluation)?;
             if i >= problem.iterations {
                 self.store()?;
-                self.picture(&evaluation, None)?;
+                self.picture(&evaluation, false, None)?;
                 return Ok((Outcome::Done, Some(evaluation)));
             }
             self.step(i, &evaluation, &mut fit)?;
@@ -197,7 +197,7 @@ impl<'a> Descent<'a> {
                 self.store()?;
                 (stored, stored_at) = (Instant::now(), self.steps());
                 if waited(pictured, PICTURE_SECONDS) || out_of_time {
-                    self.picture(&evaluation, None)?;
+                    self.picture(&evaluation, !out_of_time, None)?;
                     pictured = Some(Instant::now());
                 }
             }
@@ -364,7 +364,7 @@ impl<'a> Descent<'a> {
     fn fail(&mut self, evaluation: &Evaluation, error: &CliError) -> Result<(), CliError> {
         create(self.folder())?;
         self.store()?;
-        self.picture(evaluation, Some(&error.to_string()))
+        self.picture(evaluation, false, Some(&error.to_string()))
     }
 
     /// Writes what is needed to go on from here, and the tables.
@@ -406,8 +406,13 @@ impl<'a> Descent<'a> {
         })
     }
 
-    /// Shows what was seen last, and the page that tells of it.
-    fn picture(&self, seen: &Evaluation, failure: Option<&str>) -> Result<(), CliError> {
+    /// Shows what was seen last, and the page that tells of it, of a run that is going on, has ended or failed.
+    fn picture(
+        &self,
+        seen: &Evaluation,
+        going: bool,
+        failure: Option<&str>,
+    ) -> Result<(), CliError> {
         let Some((gallery, folder)) =
             self.gallery.as_ref().zip(self.problem.plan.checkpoint.as_ref())
         else {
@@ -428,6 +433,7 @@ impl<'a> Descent<'a> {
             steps: self.steps(),
             outlook,
             spent: self.spent(),
+            going,
             failure,
             limits: &self.limits,
         };

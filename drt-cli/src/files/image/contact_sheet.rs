@@ -5,6 +5,7 @@ use std::path::Path;
 use drt_estimators::{Layer, Rendering};
 use drt_math::Rgb;
 
+use super::exr_file::NamedLayer;
 use super::font;
 use super::picture::{SCREEN, encode_png};
 use super::tone::{self, Pixel, Tone};
@@ -18,10 +19,12 @@ const MARGIN: usize = 6;
 /// Panels narrower than this are enlarged by a whole factor.
 const LEAST_PANEL: usize = 160;
 
-struct Canvas {
-    width: usize,
-    height: usize,
-    pixels: Vec<Pixel>,
+/// A picture as a screen shows it.
+pub(crate) struct Canvas {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    /// Row by row from the top left.
+    pub(crate) pixels: Vec<Pixel>,
 }
 
 impl Canvas {
@@ -73,6 +76,15 @@ impl Panel {
         let range = Some(tone::range_of(image));
         Self { name: name.into(), pixels: tone::diverging(image), range }
     }
+
+    /// A layer of a file, by its name.
+    fn of((name, pixels): &NamedLayer<'_>, tone: Tone) -> Self {
+        let image: Vec<Rgb> = pixels.iter().map(|p| p.map(f64::from).into()).collect();
+        let derivative = name.starts_with("d_") || name.starts_with("fd_");
+        let signed = derivative && !is_error(name) || image.iter().any(|p| p.mean() < 0.0);
+        let shown = if name.is_empty() { "image" } else { name };
+        if signed { Self::signed(shown, &image) } else { Self::light(shown, &image, tone) }
+    }
 }
 
 /// Writes a picture to look at. Without derivatives it is the image alone, pixel for pixel; with some, each is beside it, with the values
@@ -90,7 +102,7 @@ pub fn write_preview(
     let derivatives = rendering.derivatives.iter();
     panels.extend(derivatives.map(|d| Panel::signed(format!("d_{}", d.name), &means(&d.total))));
     panels.extend(further.iter().map(|(name, layer)| Panel::signed(name.clone(), &means(layer))));
-    write_panels(path, rendering.image.size, &mut panels, tone)
+    write_panels(path, rendering.image.size, panels, tone)
 }
 
 /// Writes a preview of layers of a file, by their names: what may be negative from blue through white (zero) to red, each in its own
@@ -101,17 +113,16 @@ pub fn write_preview(
 pub fn write_layers(
     path: &Path,
     size: [u32; 2],
-    layers: &[(&str, &[[f32; 3]])],
+    layers: &[NamedLayer<'_>],
     tone: Tone,
 ) -> Result<(), CliError> {
-    let panel = |(name, pixels): &(&str, &[[f32; 3]])| {
-        let image: Vec<Rgb> = pixels.iter().map(|p| p.map(f64::from).into()).collect();
-        let derivative = name.starts_with("d_") || name.starts_with("fd_");
-        let signed = derivative && !is_error(name) || image.iter().any(|p| p.mean() < 0.0);
-        let shown = if name.is_empty() { "image" } else { name };
-        if signed { Panel::signed(shown, &image) } else { Panel::light(shown, &image, tone) }
-    };
-    write_panels(path, size, &mut layers.iter().map(panel).collect::<Vec<_>>(), tone)
+    write_panels(path, size, layers.iter().map(|layer| Panel::of(layer, tone)).collect(), tone)
+}
+
+/// The picture that [`write_layers`] writes.
+#[cfg(feature = "command")]
+pub(crate) fn show_layers(size: [u32; 2], layers: &[NamedLayer<'_>], tone: Tone) -> Canvas {
+    arranged(size, layers.iter().map(|layer| Panel::of(layer, tone)).collect())
 }
 
 /// True for the name of a layer of standard errors.
@@ -122,21 +133,24 @@ pub fn is_error(name: &str) -> bool {
 fn write_panels(
     path: &Path,
     size: [u32; 2],
-    panels: &mut [Panel],
+    panels: Vec<Panel>,
     tone: Tone,
 ) -> Result<(), CliError> {
-    let [w, h] = size.map(|n| n as usize);
-    let mut note = Some(SCREEN);
-    let canvas = match panels {
-        [Panel { pixels, range, .. }] => {
-            note = note.filter(|_| range.is_some() || tone != Tone::PLAIN);
-            Canvas { width: w, height: h, pixels: core::mem::take(pixels) }
-        }
-        _ => sheet(panels, [w, h]),
-    };
+    let plain = matches!(&panels[..], [Panel { range: None, .. }]) && tone == Tone::PLAIN;
+    let note = (!plain).then_some(SCREEN);
+    let canvas = arranged(size, panels);
     write_atomically(path, |out| {
         Ok(encode_png(out, [canvas.width as u32, canvas.height as u32], &canvas.pixels, note)?)
     })
+}
+
+/// One panel pixel for pixel, or a sheet of several.
+fn arranged(size: [u32; 2], mut panels: Vec<Panel>) -> Canvas {
+    let [width, height] = size.map(|n| n as usize);
+    match &mut panels[..] {
+        [Panel { pixels, .. }] => Canvas { width, height, pixels: core::mem::take(pixels) },
+        panels => sheet(panels, [width, height]),
+    }
 }
 
 fn means(layer: &Layer) -> Vec<Rgb> {

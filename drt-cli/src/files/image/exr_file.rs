@@ -36,6 +36,9 @@ pub struct Provenance {
     pub attachment: Option<Vec<u8>>,
 }
 
+/// The name of a layer, which is empty for the image itself, and its pixels, row by row from the top left.
+pub type NamedLayer<'a> = (&'a str, &'a [[f32; 3]]);
+
 /// An EXR file as read: colours by layer name, the plain `R`, `G`, `B` under the empty name.
 #[derive(Clone, Debug, Default)]
 pub struct ExrFile {
@@ -47,6 +50,22 @@ pub struct ExrFile {
     pub attributes: BTreeMap<String, String>,
 }
 
+impl ExrFile {
+    /// The layers in the order of the job that they come from: the image, then each derivative, with its terms after it, each before its
+    /// standard errors. The format itself sorts channels by name, and so are the layers of files that do not tell an order.
+    pub fn in_order(&self) -> impl Iterator<Item = NamedLayer<'_>> {
+        let told = self.attributes.get(LAYERS).and_then(|told| serde_json::from_str(told).ok());
+        let told: Vec<String> = told.unwrap_or_default();
+        let place = |name: &str| told.iter().position(|n| n == name).unwrap_or(told.len());
+        let mut layers: Vec<NamedLayer<'_>> =
+            self.layers.iter().map(|(name, pixels)| (name.as_str(), &pixels[..])).collect();
+        layers.sort_by_cached_key(|(name, _)| place(name));
+        layers.into_iter()
+    }
+}
+
+/// The attribute of the names of layers in their order, as a JSON array.
+const LAYERS: &str = "drt_layers";
 /// Attributes that tell what a file is the result of, and whether all of it.
 const INPUTS: &str = "drt_inputs";
 const COMPLETE: &str = "drt_complete";
@@ -136,14 +155,16 @@ pub fn write_exr(
         return Err(CliError::write(path, message));
     }
     let mut channels: SmallVec<[_; 4]> = SmallVec::new();
+    let mut names = Vec::new();
     for (name, layer) in layers(rendering, further) {
         let errors = if name.is_empty() { "stderr".into() } else { format!("{name}_stderr") };
         add_channels(&mut channels, &name, layer, |e| e.mean);
         add_channels(&mut channels, &errors, layer, |e| e.stderr);
+        names.extend([name, errors]);
     }
     let layer = exr::prelude::Layer::new(
         (width as usize, height as usize),
-        attributes(rendering, provenance),
+        attributes(rendering, provenance, &names),
         Encoding::SMALL_LOSSLESS,
         AnyChannels::sort(channels),
     );
@@ -207,7 +228,7 @@ fn add_channels(
     }
 }
 
-fn attributes(rendering: &Rendering, provenance: &Provenance) -> LayerAttributes {
+fn attributes(rendering: &Rendering, provenance: &Provenance, names: &[String]) -> LayerAttributes {
     let string = |s: &str| AttributeValue::Text(text(s));
     let mut own = vec![
         ("drt_scene", string(&provenance.scene)),
@@ -216,6 +237,8 @@ fn attributes(rendering: &Rendering, provenance: &Provenance) -> LayerAttributes
         ("drt_spp", string(&rendering.spp.to_string())),
         ("drt_seconds", AttributeValue::F64(provenance.seconds)),
         (COMPLETE, AttributeValue::I32(i32::from(rendering.complete))),
+        // Serialising strings to memory has no way to fail.
+        (LAYERS, string(&serde_json::to_string(names).unwrap_or_default())),
     ];
     own.extend(provenance.inputs.iter().map(|hash| (INPUTS, string(hash))));
     if let Some(bytes) = &provenance.attachment {

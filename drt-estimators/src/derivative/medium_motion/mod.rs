@@ -112,7 +112,7 @@ impl MediumMotions {
             let plan = around
                 .inputs
                 .plan(asked_for(asked, m), kept.tetrahedra(m))
-                .map_err(|e| unusable(world, m, e, named(&e)))?;
+                .map_err(|e| unusable(world, m, &e, named(&e)))?;
             motions.velocities[m] = plan.velocities;
             motions.bases[m] = plan.basis;
             motions.flux[m] = plan.flux;
@@ -130,8 +130,8 @@ fn asked_for(asked: &[(usize, InteriorMotion)], medium: usize) -> Option<&Interi
     asked.iter().rev().find(|(m, _)| *m == medium).map(|(_, kind)| kind)
 }
 
-fn unusable(world: &World, medium: usize, error: InteriorError, message: String) -> Error {
+fn unusable(world: &World, medium: usize, error: &InteriorError, message: String) -> Error {
     let name = world.scene.media[medium].id.clone();
     let element = name.unwrap_or_else(|| alloc::format!("medium[{medium}]"));
-    Error::Element { element, reason: ElementError::Interior { error, message } }
+    Error::Element { element, reason: ElementError::Interior { error: error.clone(), message } }
 }

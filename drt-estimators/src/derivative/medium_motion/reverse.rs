@@ -56,7 +56,7 @@ impl ReverseMediumMotions {
             let plan = around.inputs.plan_reverse(&active, asked_for(asked, m)).map_err(|e| {
                 let surface = |s: usize| world.shape_name(around.shapes[s]);
                 let message = e.with_names(surface, |p| alloc::format!("{p}"));
-                unusable(world, m, e, message)
+                unusable(world, m, &e, message)
             })?;
             motions.flux_shapes.extend(plan.flux_surfaces.iter().map(|s| around.shapes[*s]));
             motions.media.push(plan.field.map(|field| Filled {

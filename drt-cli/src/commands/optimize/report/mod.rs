@@ -18,6 +18,8 @@ use crate::commands::markup::escaped;
 
 /// The name of the page.
 pub(super) const FILE: &str = "report.html";
+/// How often a browser loads the page anew while the run goes on.
+const REFRESH_SECONDS: u32 = 5;
 /// Most parameters with a curve and a derivative image of their own.
 const MOST_SHOWN: usize = 24;
 
@@ -32,6 +34,8 @@ pub(super) struct Report<'a> {
     pub(super) outlook: Option<Outlook>,
     /// Wall and processor time of all runs.
     pub(super) spent: [f64; 2],
+    /// The run goes on, and writes the page anew.
+    pub(super) going: bool,
     /// Why it ended early, where it did.
     pub(super) failure: Option<&'a str>,
     /// What steps were shortened by.
@@ -42,9 +46,14 @@ impl Report<'_> {
     pub(super) fn html(&self) -> String {
         let name = escaped(&self.problem.job.name());
         let style = include_str!("style.css");
+        let refresh = if self.going {
+            format!("<meta http-equiv=\"refresh\" content=\"{REFRESH_SECONDS}\"/>")
+        } else {
+            String::new()
+        };
         let mut page = format!(
             "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"/>\
-             <title>{name}: fit</title>\n<style>\n{style}</style></head><body>\n\
+             {refresh}<title>{name}: fit</title>\n<style>\n{style}</style></head><body>\n\
              <h1>{name}</h1>\n<p>{}</p>\n",
             self.summary()
         );
