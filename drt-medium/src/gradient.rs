@@ -14,9 +14,9 @@ use crate::{
 pub struct FieldGradient {
     /// With respect to a term added everywhere in the medium.
     pub uniform: Rgb,
-    /// With respect to the logarithm of a common factor.
-    pub relative: f64,
-    /// With respect to the voxels' values (after a density's scale); `None` for a constant.
+    /// With respect to the logarithm of a common factor, where no voxels tell it.
+    relative: f64,
+    /// With respect to the voxels' values after a density's scale; `None` for a constant.
     pub voxels: Option<VoxelGradient>,
 }
 
@@ -69,8 +69,10 @@ pub struct MediumGradient {
 }
 
 impl FieldGradient {
-    fn zeros(grid: Option<&Grid>) -> Self {
-        Self { voxels: grid.map(VoxelGradient::zeros), ..Self::default() }
+    /// The derivative with respect to the logarithm of a common factor.
+    #[must_use]
+    pub fn relative(&self) -> f64 {
+        self.relative + self.voxels.as_ref().map_or(0.0, VoxelGradient::relative)
     }
 
     fn scatter(&mut self, field: Rgb, grid: Option<&Grid>, x: Vec3, adjoint: Rgb) {
@@ -78,9 +80,9 @@ impl FieldGradient {
             return;
         }
         self.uniform += adjoint;
-        self.relative += field.dot(adjoint);
-        if let Some(grid) = grid {
-            self.scatter_voxels(grid, x, adjoint);
+        match grid {
+            Some(grid) if self.voxels.is_some() => self.scatter_voxels(grid, x, adjoint),
+            _ => self.relative += field.dot(adjoint),
         }
     }
 
@@ -96,7 +98,11 @@ impl FieldGradient {
         } else {
             self.voxels.as_ref().expect("room for voxels").dot(&tangent.voxels)
         };
-        self.uniform.dot(tangent.uniform) + self.relative * tangent.relative + voxels
+        let by_factor = match tangent.relative {
+            0.0 => 0.0,
+            relative => self.relative() * relative,
+        };
+        self.uniform.dot(tangent.uniform) + by_factor + voxels
     }
 
     fn add(&mut self, o: Self) {
@@ -114,15 +120,17 @@ impl MediumGradient {
     /// No derivative yet, with room for every voxel of the medium.
     #[must_use]
     pub fn zeros(medium: &Medium) -> Self {
-        let [sigma_t, albedo, emission] = medium.volumes().map(FieldGradient::zeros);
-        let of_phase = |p| FieldGradient::zeros(medium.phase.voxels(p));
+        let of = |property| {
+            let zeros = |grid| VoxelGradient::zeros(grid, medium.voxel_scale(property));
+            FieldGradient { voxels: medium.voxels(property).map(zeros), ..Default::default() }
+        };
         Self {
-            sigma_t,
-            albedo,
-            emission,
-            g: of_phase(Property::G),
-            weight: of_phase(Property::Weight),
-            flakes: [Property::SggxDiagonal, Property::SggxOffDiagonal].map(of_phase),
+            sigma_t: of(Property::SigmaT),
+            albedo: of(Property::Albedo),
+            emission: of(Property::Emission),
+            g: of(Property::G),
+            weight: of(Property::Weight),
+            flakes: [Property::SggxDiagonal, Property::SggxOffDiagonal].map(of),
             velocity: Affine::ZERO,
             flow: None,
         }
@@ -132,7 +140,7 @@ impl MediumGradient {
     /// voxel.
     #[must_use]
     pub fn zeros_without_voxels() -> Self {
-        let [sigma_t, albedo, emission, g, weight] = [None; 5].map(FieldGradient::zeros);
+        let [sigma_t, albedo, emission, g, weight] = Default::default();
         let flakes = Default::default();
         Self { sigma_t, albedo, emission, g, weight, flakes, velocity: Affine::ZERO, flow: None }
     }
@@ -219,11 +227,12 @@ impl MediumGradient {
     pub fn scatter_depth(&mut self, medium: &Medium, depth: &DepthEstimate<'_>, adjoint: Rgb) {
         let sigma_t = &mut self.sigma_t;
         sigma_t.uniform += adjoint * depth.length;
-        sigma_t.relative += depth.depth.dot(adjoint);
         if sigma_t.voxels.is_some() {
             for (grid, material, w) in depth.points_inside(medium) {
                 sigma_t.scatter_voxels(grid.density(), material, adjoint * w);
             }
+        } else {
+            sigma_t.relative += depth.depth().dot(adjoint);
         }
         if medium.phase.sggx().is_some() {
             depth.by_flakes(medium, |x, by, weight| {

@@ -250,7 +250,7 @@ impl Group {
             }
             (GroupKind::Voxels(property), Target::Medium(m)) => {
                 let mut medium = scene.media[m].item.clone();
-                let scale = voxel_scale(&medium, *property);
+                let scale = medium.voxel_scale(*property);
                 let step: Vec<f64> = change.iter().map(|c| c * scale).collect();
                 medium.add_to_voxels(*property, &step).map_err(|e| self.refusal(&e))?;
                 medium.check(*property).map_err(|e| self.refusal(&e))?;
@@ -303,7 +303,7 @@ impl Group {
     ) -> Result<Collector, Error> {
         let take = match (&self.kind, self.target) {
             (GroupKind::Voxels(property), Target::Medium(m)) => {
-                Take::Voxels(m, *property, voxel_scale(&given.media[m].item, *property))
+                Take::Voxels(m, *property, given.media[m].item.voxel_scale(*property))
             }
             (GroupKind::LightTexels, Target::Emitter(e)) => Take::LightTexels(e),
             (GroupKind::Texels { property, number }, Target::Bsdf(b)) => {
@@ -355,14 +355,6 @@ impl Group {
             }
         }
         Ok(linear)
-    }
-}
-
-/// What a voxel's stored value is multiplied with to make the property.
-fn voxel_scale(medium: &drt_medium::Medium, property: drt_medium::Property) -> f64 {
-    match (medium.grid(), property) {
-        (Some(grid), drt_medium::Property::SigmaT) => grid.scale(),
-        _ => 1.0,
     }
 }
 
