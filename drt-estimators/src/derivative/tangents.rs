@@ -116,7 +116,7 @@ impl Tangents {
         let of_media = |t: &MediumTangent| t.velocity != Affine::ZERO || !t.flows.is_empty();
         match target {
             Target::Shape(_) | Target::Sensor(_) => true,
-            Target::Bsdf(_) => false,
+            Target::Bsdf(_) | Target::Coefficients(_) => false,
             Target::Medium(m) => self.media[m].iter().any(|(_, t)| of_media(t)),
             Target::Emitter(e) => self.emitters[e].iter().any(|(_, t)| t.moves()),
         }

@@ -76,6 +76,15 @@ impl Group {
         Ok(group)
     }
 
+    /// What a [gradient](crate::Session::gradient) has to be by, so that the group can [collect](Self::collector) its part.
+    #[must_use]
+    pub fn wanted(&self) -> Target {
+        match (&self.kind, self.target) {
+            (GroupKind::Voxels(_), Target::Medium(m)) => Target::Coefficients(m),
+            (_, target) => target,
+        }
+    }
+
     /// Groups of all vertices, voxels and texels of a scene that have gradients, named by their targets and by what
     /// they are: `cube.vertices`, `smoke.sigma_t`, `wall.reflectance`, `sky.radiance`. Vertices of instances are left
     /// out: they have gradients in an [expanded](Scene::expanded) scene.

@@ -58,7 +58,7 @@ fn geometry(scene: &Scene, target: Target, change: &GeometryChange, g: &SceneGra
             let tangent = scene.sensors[i].item.sensor.velocity(&field(change));
             g.sensor.as_ref().expect("wanted").dot(&tangent)
         }
-        (Target::Medium(i), change) => {
+        (Target::Medium(i) | Target::Coefficients(i), change) => {
             let velocity = field(change);
             medium(scene, i, &MediumChange::Place { map: Affine::IDENTITY, velocity }, g)
         }
@@ -95,7 +95,7 @@ fn texels(
 fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient) -> f64 {
     let (op, voxels) = (c.op, c.voxels);
     match target {
-        Target::Medium(i) => {
+        Target::Medium(i) | Target::Coefficients(i) => {
             let change = match c.property.as_str() {
                 "sigma_t" => MediumChange::SigmaT { op, voxels },
                 "albedo" => MediumChange::Albedo { op, voxels },
