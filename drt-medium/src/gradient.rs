@@ -136,6 +136,20 @@ impl MediumGradient {
         }
     }
 
+    /// The derivative with respect to a property.
+    #[must_use]
+    pub fn field(&self, property: Property) -> &FieldGradient {
+        match property {
+            Property::SigmaT => &self.sigma_t,
+            Property::Albedo => &self.albedo,
+            Property::Emission => &self.emission,
+            Property::G => &self.g,
+            Property::Weight => &self.weight,
+            Property::SggxDiagonal => &self.flakes[0],
+            Property::SggxOffDiagonal => &self.flakes[1],
+        }
+    }
+
     /// No derivative yet, without room for voxels: for media none of whose parameters names a
     /// voxel.
     #[must_use]

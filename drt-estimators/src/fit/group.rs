@@ -403,16 +403,7 @@ impl Collector {
         match &self.0 {
             Take::Voxels(m, property, scale) => {
                 let Some(of) = &gradient.media[*m] else { return };
-                let voxels = match property {
-                    drt_medium::Property::SigmaT => &of.sigma_t.voxels,
-                    drt_medium::Property::Albedo => &of.albedo.voxels,
-                    drt_medium::Property::Emission => &of.emission.voxels,
-                    drt_medium::Property::G => &of.g.voxels,
-                    drt_medium::Property::Weight => &of.weight.voxels,
-                    drt_medium::Property::SggxDiagonal => &of.flakes[0].voxels,
-                    drt_medium::Property::SggxOffDiagonal => &of.flakes[1].voxels,
-                };
-                if let Some(voxels) = voxels {
+                if let Some(voxels) = &of.field(*property).voxels {
                     voxels.add_to(numbers, weight * scale);
                 }
             }

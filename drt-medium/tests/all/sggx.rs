@@ -234,17 +234,25 @@ fn changes() -> Vec<MediumChange> {
     let (all, one) = (None, Some([1, 0, 1]));
     let turn = Mat3::rotation(vec3(0.0, 0.6, 0.8), 0.5);
     vec![
-        MediumChange::SggxDiagonal { op: add, voxels: all },
-        MediumChange::SggxOffDiagonal { op: add, voxels: all },
-        MediumChange::SggxDiagonal { op: ValueChange::Multiply(0.4), voxels: all },
-        MediumChange::SggxDiagonal { op: add, voxels: one },
-        MediumChange::SggxOffDiagonal { op: add, voxels: one },
-        MediumChange::SigmaT { op: add, voxels: all },
-        MediumChange::SigmaT { op: ValueChange::Multiply(0.4), voxels: Some([2, 1, 0]) },
+        MediumChange::Value { property: Property::SggxDiagonal, op: add, voxels: all },
+        MediumChange::Value { property: Property::SggxOffDiagonal, op: add, voxels: all },
+        MediumChange::Value {
+            property: Property::SggxDiagonal,
+            op: ValueChange::Multiply(0.4),
+            voxels: all,
+        },
+        MediumChange::Value { property: Property::SggxDiagonal, op: add, voxels: one },
+        MediumChange::Value { property: Property::SggxOffDiagonal, op: add, voxels: one },
+        MediumChange::Value { property: Property::SigmaT, op: add, voxels: all },
+        MediumChange::Value {
+            property: Property::SigmaT,
+            op: ValueChange::Multiply(0.4),
+            voxels: Some([2, 1, 0]),
+        },
         // Both turn what has been turned.
         MediumChange::Place { map: Affine::about(turn, Vec3::X), velocity: Affine::ZERO },
-        MediumChange::SggxOffDiagonal { op: add, voxels: one },
-        MediumChange::SggxDiagonal { op: add, voxels: all },
+        MediumChange::Value { property: Property::SggxOffDiagonal, op: add, voxels: one },
+        MediumChange::Value { property: Property::SggxDiagonal, op: add, voxels: all },
     ]
 }
 
@@ -394,7 +402,11 @@ fn what_makes_no_flakes_is_refused_by_its_place() {
     let refused = medium.check(Property::SggxDiagonal);
     assert!(matches!(refused, Err(MediumError::SggxMatrix { voxel: Some(_), .. })));
     let isotropic = Medium { phase: Phase::Isotropic, ..medium };
-    let change = MediumChange::SggxDiagonal { op: ValueChange::Multiply(1.0), voxels: None };
+    let change = MediumChange::Value {
+        property: Property::SggxDiagonal,
+        op: ValueChange::Multiply(1.0),
+        voxels: None,
+    };
     assert_eq!(isotropic.tangent(&change, 0.0), Err(MediumError::NoSggx));
     assert!(MediumTangent::zero().is_zero());
 }

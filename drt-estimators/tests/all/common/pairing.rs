@@ -96,15 +96,8 @@ fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient
     let (op, voxels) = (c.op, c.voxels);
     match target {
         Target::Medium(i) | Target::Coefficients(i) => {
-            let change = match c.property.as_str() {
-                "sigma_t" => MediumChange::SigmaT { op, voxels },
-                "albedo" => MediumChange::Albedo { op, voxels },
-                "emission" => MediumChange::Emission { op, voxels },
-                "weight" => MediumChange::Weight { op, voxels },
-                "sggx_diagonal" => MediumChange::SggxDiagonal { op, voxels },
-                "sggx_off_diagonal" => MediumChange::SggxOffDiagonal { op, voxels },
-                _ => MediumChange::G { op, voxels },
-            };
+            let property = drt_medium::Property::from_name(&c.property).expect("a property");
+            let change = MediumChange::Value { property, op, voxels };
             medium(scene, i, &change, g)
         }
         Target::Bsdf(i) => {
