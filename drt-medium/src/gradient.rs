@@ -66,6 +66,8 @@ pub struct MediumGradient {
     pub velocity: Affine,
     /// Derivative with respect to the velocities of nodes, where there is room for them.
     pub flow: Option<FlowGradient>,
+    /// Motions of the grids are left out.
+    at_rest: bool,
 }
 
 impl FieldGradient {
@@ -133,6 +135,7 @@ impl MediumGradient {
             flakes: [Property::SggxDiagonal, Property::SggxOffDiagonal].map(of),
             velocity: Affine::ZERO,
             flow: None,
+            at_rest: false,
         }
     }
 
@@ -156,7 +159,15 @@ impl MediumGradient {
     pub fn zeros_without_voxels() -> Self {
         let [sigma_t, albedo, emission, g, weight] = Default::default();
         let flakes = Default::default();
-        Self { sigma_t, albedo, emission, g, weight, flakes, velocity: Affine::ZERO, flow: None }
+        let (velocity, flow, at_rest) = (Affine::ZERO, None, false);
+        Self { sigma_t, albedo, emission, g, weight, flakes, velocity, flow, at_rest }
+    }
+
+    /// The same without what motions of the grids change, of which nothing is computed or added up.
+    #[must_use]
+    pub fn at_rest(mut self) -> Self {
+        self.at_rest = true;
+        self
     }
 
     /// The same with room for the velocities of `nodes` nodes.
@@ -174,7 +185,7 @@ impl MediumGradient {
         self.sigma_t.scatter(c.sigma_t, grids[0], at, adjoint.sigma_t);
         self.albedo.scatter(c.albedo, grids[1], at, adjoint.albedo);
         self.emission.scatter(c.emission, grids[2], at, adjoint.emission);
-        if grids.iter().any(Option::is_some) {
+        if !self.at_rest && grids.iter().any(Option::is_some) {
             let g = medium.gradients(x);
             let pull = g.sigma_t.weighted(adjoint.sigma_t)
                 + g.albedo.weighted(adjoint.albedo)
@@ -224,6 +235,9 @@ impl MediumGradient {
 
     /// Adds the derivative of a loss with respect to the [spin](crate::tangent::spin) of the grids.
     fn scatter_spin(&mut self, adjoint: Vec3) {
+        if self.at_rest {
+            return;
+        }
         let half = adjoint * 0.5;
         for (col, axis) in self.velocity.linear.cols.iter_mut().zip([Vec3::X, Vec3::Y, Vec3::Z]) {
             *col += half.cross(axis);
@@ -254,6 +268,9 @@ impl MediumGradient {
             });
             self.scatter_spin(depth.by_spin().weighted(adjoint));
         }
+        if self.at_rest {
+            return;
+        }
         if let Some(flow) = &mut self.flow {
             depth.pulls(medium, |x, pull| flow.scatter(x, pull.weighted(adjoint)));
         }
@@ -266,6 +283,9 @@ impl MediumGradient {
 
     /// Adds the derivative of a loss with respect to the velocity of the grid's point at x.
     pub fn scatter_velocity(&mut self, x: Vec3, adjoint: Vec3) {
+        if self.at_rest {
+            return;
+        }
         self.scatter_affine(x, adjoint);
         if let Some(flow) = &mut self.flow {
             flow.scatter(x, adjoint);
