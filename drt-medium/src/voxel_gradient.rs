@@ -37,14 +37,28 @@ impl Parts {
 
     #[inline]
     fn push<const N: usize>(&mut self, part: [f64; N]) {
-        match self.0.last_mut() {
-            Some(block) if block.len() + N <= Self::BLOCK => block.extend_from_slice(&part),
-            _ => {
-                let mut block = Vec::with_capacity(Self::BLOCK);
-                block.extend_from_slice(&part);
+        self.with_room(N).extend_from_slice(&part);
+    }
+
+    /// Adds other parts, whose blocks stay as they are unless little is in them.
+    fn append(&mut self, o: Self) {
+        for block in o.0 {
+            if 2 * block.len() > Self::BLOCK {
                 self.0.push(block);
+            } else {
+                self.with_room(block.len()).extend_from_slice(&block);
             }
         }
+    }
+
+    /// The last block, which has room for so many more numbers.
+    #[inline]
+    fn with_room(&mut self, numbers: usize) -> &mut Vec<f64> {
+        if self.0.last().is_none_or(|block| block.len() + numbers > Self::BLOCK) {
+            self.0.push(Vec::with_capacity(Self::BLOCK));
+        }
+        let last = self.0.len() - 1;
+        &mut self.0[last]
     }
 }
 
@@ -82,9 +96,7 @@ impl VoxelGradient {
             *self = o;
             return;
         }
-        for (own, mut other) in self.planes.iter_mut().zip(o.planes) {
-            own.0.append(&mut other.0);
-        }
+        self.planes.iter_mut().zip(o.planes).for_each(|(own, other)| own.append(other));
         self.kept += o.kept;
         if !o.values.is_empty() {
             self.settle();
