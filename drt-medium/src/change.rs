@@ -15,7 +15,7 @@ use crate::{
 pub enum MediumChange {
     /// Changes a property, in its units; entries of the matrix of SGGX are three channels in the order of their names.
     Value {
-        /// Which one.
+        /// The property that changes.
         property: Property,
         /// How.
         op: ValueChange,

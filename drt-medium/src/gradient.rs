@@ -14,9 +14,9 @@ use crate::{
 pub struct FieldGradient {
     /// With respect to a term added everywhere in the medium.
     pub uniform: Rgb,
-    /// With respect to the logarithm of a common factor, where no voxels tell it.
+    /// The derivative with respect to the logarithm of a common factor, as far as no voxels tell it.
     relative: f64,
-    /// With respect to the voxels' values after a density's scale; `None` for a constant.
+    /// The derivative with respect to the voxels' values after a density's scale; `None` for a constant.
     pub voxels: Option<VoxelGradient>,
 }
 
@@ -66,7 +66,7 @@ pub struct MediumGradient {
     pub velocity: Affine,
     /// Derivative with respect to the velocities of nodes, where there is room for them.
     pub flow: Option<FlowGradient>,
-    /// Motions of the grids are left out.
+    /// True where motions of the grids are left out.
     at_rest: bool,
 }
 
@@ -163,7 +163,7 @@ impl MediumGradient {
         Self { sigma_t, albedo, emission, g, weight, flakes, velocity, flow, at_rest }
     }
 
-    /// The same without what motions of the grids change, of which nothing is computed or added up.
+    /// This gradient without what motions of the grids change: nothing of that is computed or added up.
     #[must_use]
     pub fn at_rest(mut self) -> Self {
         self.at_rest = true;

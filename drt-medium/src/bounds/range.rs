@@ -19,14 +19,14 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// From least value, largest magnitude and mean of each channel.
+    /// A range from the least value, the largest magnitude and the mean of each channel.
     #[inline(always)]
     pub(super) fn by_channel([r, g, b]: [[f64; 3]; 3]) -> Self {
         let number = |k: usize| Rgb::new(r[k], g[k], b[k]);
         Self { min: number(0), max: number(1), mean: number(2) }
     }
 
-    /// Least value, largest magnitude and mean of some numbers.
+    /// This is the least value, the largest magnitude and the mean of some numbers.
     pub(super) fn of_numbers(numbers: impl Iterator<Item = f64>) -> [f64; 3] {
         let (mut min, mut max, mut sum, mut count) = (f64::INFINITY, 0.0, 0.0, 0.0);
         // Nested iterators are fast from inside only.
