@@ -48,7 +48,7 @@ impl MediumChange {
         let ValueMap { factor, offset } = change.op.map(theta);
         let bounded = !matches!(change.property, Property::SigmaT | Property::Emission);
         let keeps = offset.is_zero() && (factor == 1.0 || factor >= 0.0 && !bounded);
-        (!keeps).then(|| change.property)
+        (!keeps).then_some(change.property)
     }
 
     pub(crate) fn field(&self) -> Option<FieldChange> {
