@@ -178,7 +178,12 @@ fn seen(
 
 /// Bounds of the voxels with these places along each axis.
 fn range(grid: &Grid, seen: [&[usize]; 3]) -> Range {
-    Range::of(places(seen.map(|along| along.iter().copied())).map(|voxel| grid.voxel(voxel)))
+    let (values, channels) = (grid.values(), grid.channels());
+    let of = |c: usize| {
+        let voxels = places(seen.map(|along| along.iter().copied()));
+        Range::of_numbers(voxels.map(|voxel| values[grid.flatten(voxel) * channels + c]))
+    };
+    Range::by_channel(if channels == 1 { [of(0); 3] } else { [0, 1, 2].map(of) })
 }
 
 /// All places with these numbers along each axis.

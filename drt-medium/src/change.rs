@@ -13,50 +13,10 @@ use crate::{
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum MediumChange {
-    /// Changes the extinction, in 1 / scene unit.
-    SigmaT {
-        /// How.
-        op: ValueChange,
-        /// One voxel only.
-        voxels: Option<[usize; 3]>,
-    },
-    /// Changes the albedo.
-    Albedo {
-        /// How.
-        op: ValueChange,
-        /// One voxel only.
-        voxels: Option<[usize; 3]>,
-    },
-    /// Changes the emitted radiance.
-    Emission {
-        /// How.
-        op: ValueChange,
-        /// One voxel only.
-        voxels: Option<[usize; 3]>,
-    },
-    /// Changes the mean cosine of the phase function.
-    G {
-        /// How.
-        op: ValueChange,
-        /// One voxel only.
-        voxels: Option<[usize; 3]>,
-    },
-    /// Changes the part that the second function of a blend has.
-    Weight {
-        /// How.
-        op: ValueChange,
-        /// One voxel only.
-        voxels: Option<[usize; 3]>,
-    },
-    /// Changes the entries Sxx, Syy and Szz of the matrix of SGGX, three channels in this order.
-    SggxDiagonal {
-        /// How.
-        op: ValueChange,
-        /// One voxel only.
-        voxels: Option<[usize; 3]>,
-    },
-    /// Changes the entries Sxy, Sxz and Syz of the matrix of SGGX, three channels in this order.
-    SggxOffDiagonal {
+    /// Changes a property, in its units; entries of the matrix of SGGX are three channels in the order of their names.
+    Value {
+        /// The property that changes.
+        property: Property,
         /// How.
         op: ValueChange,
         /// One voxel only.
@@ -71,36 +31,10 @@ pub enum MediumChange {
     },
 }
 
-/// What may vary in space.
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Field {
-    SigmaT,
-    Albedo,
-    Emission,
-    G,
-    Weight,
-    SggxDiagonal,
-    SggxOffDiagonal,
-}
-
-impl From<Field> for Property {
-    fn from(f: Field) -> Self {
-        match f {
-            Field::SigmaT => Self::SigmaT,
-            Field::Albedo => Self::Albedo,
-            Field::Emission => Self::Emission,
-            Field::G => Self::G,
-            Field::Weight => Self::Weight,
-            Field::SggxDiagonal => Self::SggxDiagonal,
-            Field::SggxOffDiagonal => Self::SggxOffDiagonal,
-        }
-    }
-}
-
-/// A change of one field of a medium.
+/// A change of one property of a medium.
 #[derive(Clone, Copy)]
 pub(crate) struct FieldChange {
-    pub(crate) field: Field,
+    pub(crate) property: Property,
     pub(crate) op: ValueChange,
     pub(crate) voxel: Option<[usize; 3]>,
 }
@@ -112,21 +46,16 @@ impl MediumChange {
     pub fn pushes(&self, theta: f64) -> Option<Property> {
         let change = self.field()?;
         let ValueMap { factor, offset } = change.op.map(theta);
-        let bounded = !matches!(change.field, Field::SigmaT | Field::Emission);
+        let bounded = !matches!(change.property, Property::SigmaT | Property::Emission);
         let keeps = offset.is_zero() && (factor == 1.0 || factor >= 0.0 && !bounded);
-        (!keeps).then(|| change.property())
+        (!keeps).then_some(change.property)
     }
 
     pub(crate) fn field(&self) -> Option<FieldChange> {
-        let change = |field, op, voxel| Some(FieldChange { field, op, voxel });
         match *self {
-            Self::SigmaT { op, voxels } => change(Field::SigmaT, op, voxels),
-            Self::Albedo { op, voxels } => change(Field::Albedo, op, voxels),
-            Self::Emission { op, voxels } => change(Field::Emission, op, voxels),
-            Self::G { op, voxels } => change(Field::G, op, voxels),
-            Self::Weight { op, voxels } => change(Field::Weight, op, voxels),
-            Self::SggxDiagonal { op, voxels } => change(Field::SggxDiagonal, op, voxels),
-            Self::SggxOffDiagonal { op, voxels } => change(Field::SggxOffDiagonal, op, voxels),
+            Self::Value { property, op, voxels } => {
+                Some(FieldChange { property, op, voxel: voxels })
+            }
             Self::Place { .. } => None,
         }
     }
@@ -141,7 +70,7 @@ impl Medium {
         match change {
             MediumChange::Place { map, .. } => self.place(map),
             _ => match (change.field(), &mut self.kind) {
-                (Some(c), _) if c.property().is_of_phase() => self.phase.change(&c, theta),
+                (Some(c), _) if c.property.is_of_phase() => self.phase.change(&c, theta),
                 (Some(c), MediumKind::Homogeneous(h)) => h.change(c, theta),
                 (Some(_), MediumKind::Uniform(u)) if u.is_deformed() => Err(MediumError::Deformed),
                 (Some(c), MediumKind::Uniform(u)) => u.change(c, theta),
@@ -209,21 +138,23 @@ impl Medium {
 impl Phase {
     /// Refuses a change of what it does not have.
     pub(crate) fn check_change(&self, c: &FieldChange) -> Result<(), MediumError> {
-        let scalar = match (self, c.field) {
+        let scalar = match (self, c.property) {
             (
                 Self::Isotropic | Self::HenyeyGreenstein { .. } | Self::HenyeyGreensteinGrid(_),
-                Field::G,
+                Property::G,
             )
-            | (Self::Blend(_), Field::Weight) => true,
-            (Self::Sggx(_), Field::SggxDiagonal | Field::SggxOffDiagonal) => false,
-            (_, Field::Weight) => return Err(MediumError::NoWeight),
-            (_, Field::SggxDiagonal | Field::SggxOffDiagonal) => return Err(MediumError::NoSggx),
+            | (Self::Blend(_), Property::Weight) => true,
+            (Self::Sggx(_), Property::SggxDiagonal | Property::SggxOffDiagonal) => false,
+            (_, Property::Weight) => return Err(MediumError::NoWeight),
+            (_, Property::SggxDiagonal | Property::SggxOffDiagonal) => {
+                return Err(MediumError::NoSggx);
+            }
             _ => return Err(MediumError::NoMeanCosine),
         };
         if c.op.is_scalar() || !scalar {
             Ok(())
         } else {
-            Err(MediumError::NotScalar { property: c.property() })
+            Err(MediumError::NotScalar { property: c.property })
         }
     }
 
@@ -233,7 +164,8 @@ impl Phase {
             Self::Blend(blend) => return c.of_volume(&mut blend.weight, theta),
             Self::Sggx(flakes) => {
                 let [diagonal, off_diagonal] = &mut flakes.entries;
-                let entries = if c.field == Field::SggxDiagonal { diagonal } else { off_diagonal };
+                let entries =
+                    if c.property == Property::SggxDiagonal { diagonal } else { off_diagonal };
                 c.of_volume(entries, theta)?;
                 flakes.update();
                 return Ok(());
@@ -250,10 +182,10 @@ impl Phase {
 impl Homogeneous {
     fn change(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
         let c0 = &mut self.coefficients;
-        let value = match c.field {
-            Field::SigmaT => &mut c0.sigma_t,
-            Field::Albedo => &mut c0.albedo,
-            Field::Emission => &mut c0.emission,
+        let value = match c.property {
+            Property::SigmaT => &mut c0.sigma_t,
+            Property::Albedo => &mut c0.albedo,
+            Property::Emission => &mut c0.emission,
             // Those of the phase function.
             _ => return Ok(()),
         };
@@ -264,10 +196,10 @@ impl Homogeneous {
 
 impl UniformMedium {
     fn change(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
-        match c.field {
-            Field::SigmaT => self.extinction.change(c, theta),
-            Field::Albedo => c.of_volume(&mut self.albedo, theta),
-            Field::Emission => c.of_volume(&mut self.emission, theta),
+        match c.property {
+            Property::SigmaT => self.extinction.change(c, theta),
+            Property::Albedo => c.of_volume(&mut self.albedo, theta),
+            Property::Emission => c.of_volume(&mut self.emission, theta),
             _ => Ok(()),
         }
     }
@@ -275,10 +207,10 @@ impl UniformMedium {
 
 impl GridMedium {
     fn change(&mut self, c: FieldChange, theta: f64) -> Result<(), MediumError> {
-        let volume = match c.field {
-            Field::SigmaT => return self.change_density(c, theta),
-            Field::Albedo => &mut self.albedo,
-            Field::Emission => &mut self.emission,
+        let volume = match c.property {
+            Property::SigmaT => return self.change_density(c, theta),
+            Property::Albedo => &mut self.albedo,
+            Property::Emission => &mut self.emission,
             _ => return Ok(()),
         };
         c.of_volume(volume, theta)
@@ -310,20 +242,16 @@ impl GridMedium {
 }
 
 impl FieldChange {
-    pub(crate) fn property(&self) -> Property {
-        self.field.into()
-    }
-
     fn finite(&self, value: f64) -> Result<f64, MediumError> {
         if value.is_finite() {
             return Ok(value);
         }
-        Err(MediumError::OutOfRange { property: self.property(), value, expected: "finite" })
+        Err(MediumError::OutOfRange { property: self.property, value, expected: "finite" })
     }
 
     fn of_constant(&self, value: Rgb, theta: f64) -> Result<Rgb, MediumError> {
         if self.voxel.is_some() {
-            return Err(MediumError::NotAGrid { property: self.property() });
+            return Err(MediumError::NotAGrid { property: self.property });
         }
         let changed = self.op.at(value, theta);
         changed.to_array().into_iter().try_for_each(|v| self.finite(v).map(drop))?;
@@ -342,7 +270,7 @@ impl FieldChange {
     fn of_grid(&self, grid: &mut Grid, theta: f64, scale: f64) -> Result<(), MediumError> {
         let size = grid.size();
         if let Some(voxel) = self.voxel.filter(|v| (0..3).any(|k| v[k] >= size[k])) {
-            return Err(MediumError::NoSuchVoxel { property: self.property(), voxel, size });
+            return Err(MediumError::NoSuchVoxel { property: self.property, voxel, size });
         }
         let ValueMap { factor, offset } = self.op.map(theta);
         let term = offset / scale;

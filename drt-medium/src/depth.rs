@@ -15,6 +15,8 @@
 //! σ(x) A(x, w). With P = ∫ ∂(σA)/∂w dt across w, the direction's own rate w' adds w'·P. Flakes that turn with the rate ω
 //! look as if w turned with -ω, so that a grid with the spin ω = curl u / 2 adds -(ω × w)·P = -ω·(w × P).
 
+use core::cell::OnceCell;
+
 use drt_math::{Rgb, RgbVec, Vec3};
 
 use crate::bounds::in_unit_cube;
@@ -26,16 +28,17 @@ use crate::{
 
 /// An estimate of a ray's optical depth and of what its derivatives depend on; unbiased where
 /// [`Medium::line_points`] gave the points.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct DepthEstimate<'a> {
+    medium: &'a Medium,
     /// The ray.
     pub ray: Ray,
     /// The points `(t, w)` and weights of the estimate.
     pub points: &'a [(f64, f64)],
     /// Length of the ray inside the medium, of which microflakes make as much more as their projected area.
     pub length: f64,
-    /// The optical depth, `∫ sigma_t dt`.
-    pub depth: Rgb,
+    /// The optical depth: a gradient by voxels does without, so that it is looked up where somebody asks.
+    depth: OnceCell<Rgb>,
     /// `∫ grad sigma_t dt`; zero unless asked for.
     pub gradient: RgbVec,
     /// `∫ t grad sigma_t dt`; zero unless asked for.
@@ -48,16 +51,25 @@ pub struct DepthEstimate<'a> {
     pub at_rest: bool,
 }
 
+/// What the points of a ray tell of a grid.
+struct GridSums {
+    length: f64,
+    depth: Rgb,
+    gradient: RgbVec,
+    moment: RgbVec,
+}
+
 impl<'a> DepthEstimate<'a> {
     /// The estimate from points of the ray, without the faces of a grid's box. Gradients are looked
     /// up only for what is `moving`. A medium of one extinction, which has closed forms, gives nothing.
     #[must_use]
-    pub fn inside(medium: &Medium, ray: Ray, points: &'a [(f64, f64)], moving: bool) -> Self {
+    pub fn inside(medium: &'a Medium, ray: Ray, points: &'a [(f64, f64)], moving: bool) -> Self {
         let mut estimate = Self {
+            medium,
             ray,
             points,
             length: 0.0,
-            depth: Rgb::ZERO,
+            depth: OnceCell::new(),
             gradient: RgbVec::ZERO,
             moment: RgbVec::ZERO,
             turn: RgbVec::ZERO,
@@ -67,12 +79,28 @@ impl<'a> DepthEstimate<'a> {
         match &medium.kind {
             _ if medium.phase.sggx().is_some() => estimate.add_directed(medium, moving),
             MediumKind::Homogeneous(_) | MediumKind::Uniform(_) => {}
-            MediumKind::Grid(g) if moving => estimate.add_grid::<true>(g),
-            MediumKind::Grid(g) => estimate.add_grid::<false>(g),
+            MediumKind::Grid(g) if moving => {
+                let GridSums { length, depth, gradient, moment } = estimate.in_grid::<true>(g);
+                estimate = Self { length, depth: depth.into(), gradient, moment, ..estimate };
+            }
+            MediumKind::Grid(g) => {
+                estimate.length = estimate.length_in(g);
+                return estimate;
+            }
             MediumKind::Deformed(d) => estimate.add_deformed(d, moving),
             MediumKind::Custom(f) => estimate.add_field(&**f, moving),
         }
+        estimate.depth.get_or_init(|| Rgb::ZERO);
         estimate
+    }
+
+    /// The optical depth, `∫ sigma_t dt`.
+    #[must_use]
+    pub fn depth(&self) -> Rgb {
+        *self.depth.get_or_init(|| match &self.medium.kind {
+            MediumKind::Grid(g) => self.in_grid::<false>(g).depth,
+            _ => Rgb::ZERO,
+        })
     }
 
     /// The same with the faces of a grid's box that the ray passes through.
@@ -86,9 +114,9 @@ impl<'a> DepthEstimate<'a> {
 
     /// This estimate without what motions of the grids change, for derivatives by coefficients alone.
     #[must_use]
-    pub fn at_rest(self) -> Self {
+    pub fn at_rest(&self) -> Self {
         let [gradient, moment] = [RgbVec::ZERO; 2];
-        Self { gradient, moment, faces: false, at_rest: true, ..self }
+        Self { gradient, moment, faces: false, at_rest: true, ..self.clone() }
     }
 
     fn add_face(&mut self, c: &Crossing) {
@@ -100,11 +128,12 @@ impl<'a> DepthEstimate<'a> {
     #[cold]
     fn add_directed(&mut self, medium: &Medium, moving: bool) {
         let w = self.ray.dir;
+        let mut depth = Rgb::ZERO;
         for (x, t, weight) in self.points_in(medium) {
             let (sigma_t, here) = (medium.sigma_t(x), medium.phase_at(x));
             let (area, by) = (here.projected_area(w), medium.area_gradient(x, w));
             self.length += weight * area;
-            self.depth += sigma_t * (weight * area);
+            depth += sigma_t * (weight * area);
             self.turn += sigma_t.outer(by.wo.reject(w)) * weight;
             if moving {
                 let g = medium.gradients(x).sigma_t * area + sigma_t.outer(by.place);
@@ -112,6 +141,7 @@ impl<'a> DepthEstimate<'a> {
                 self.moment += g * (weight * t);
             }
         }
+        self.depth = depth.into();
     }
 
     /// The points of the estimate that lie in the medium, with their distances and weights.
@@ -145,10 +175,11 @@ impl<'a> DepthEstimate<'a> {
     }
 
     fn add_deformed(&mut self, medium: &DeformedGrid, moving: bool) {
+        let mut depth = Rgb::ZERO;
         for &(t, w) in self.points {
             let Some((material, slope)) = medium.material(self.ray.at(t)) else { continue };
             self.length += w;
-            self.depth += medium.grids.sigma_t(material) * w;
+            depth += medium.grids.sigma_t(material) * w;
             if moving {
                 let g = medium.grids.density().gradient(material) * (medium.grids.scale() * w);
                 let g = g.map(|g| slope.transpose_mul(g));
@@ -156,33 +187,49 @@ impl<'a> DepthEstimate<'a> {
                 self.moment += g * t;
             }
         }
+        self.depth = depth.into();
     }
 
     fn add_field(&mut self, field: &dyn DensityField, moving: bool) {
+        let mut depth = Rgb::ZERO;
         for &(t, w) in self.points {
             let x = self.ray.at(t);
             self.length += w;
-            self.depth += field.sigma_t(x) * w;
+            depth += field.sigma_t(x) * w;
             if moving {
                 let g = field.gradients(x).sigma_t * w;
                 self.gradient += g;
                 self.moment += g * t;
             }
         }
+        self.depth = depth.into();
     }
 
-    fn add_grid<const MOVING: bool>(&mut self, medium: &GridMedium) {
+    /// The length of the ray inside the box of a grid.
+    fn length_in(&self, medium: &GridMedium) -> f64 {
+        let [origin, dir] = self.in_unit_cube_of(medium);
+        let inside = self.points.iter().filter(|(t, _)| in_unit_cube(origin + dir * *t));
+        inside.map(|(_, w)| w).sum()
+    }
+
+    /// Origin and direction as a grid sees them.
+    fn in_unit_cube_of(&self, medium: &GridMedium) -> [Vec3; 2] {
+        let unit = medium.density().from_world();
+        [unit.point(self.ray.origin), unit.vector(self.ray.dir)]
+    }
+
+    fn in_grid<const MOVING: bool>(&self, medium: &GridMedium) -> GridSums {
         let grid = medium.density();
-        let unit = grid.from_world();
-        let (origin, dir) = (unit.point(self.ray.origin), unit.vector(self.ray.dir));
+        let [origin, dir] = self.in_unit_cube_of(medium);
         // Sums per channel: of the values, and of the slopes along the lattice with their moments.
         let (mut depth, mut slopes, mut moments) = ([0.0; 3], [Vec3::ZERO; 3], [Vec3::ZERO; 3]);
+        let mut length = 0.0;
         for &(t, w) in self.points {
             let u = origin + dir * t;
             if !in_unit_cube(u) {
                 continue;
             }
-            self.length += w;
+            length += w;
             let cell = grid.cell(u);
             let at = grid.corners(&cell);
             for c in 0..grid.channels() {
@@ -198,15 +245,12 @@ impl<'a> DepthEstimate<'a> {
         let scale = medium.scale();
         // One channel stands for all three.
         let of = |c: usize| if grid.channels() == 1 { 0 } else { c };
-        self.depth = Rgb::new(depth[of(0)], depth[of(1)], depth[of(2)]) * scale;
-        if MOVING {
-            let world = |slopes: &[Vec3; 3]| {
-                let world = |c: usize| grid.slope_in_world(slopes[of(c)]) * scale;
-                RgbVec { r: world(0), g: world(1), b: world(2) }
-            };
-            self.gradient = world(&slopes);
-            self.moment = world(&moments);
-        }
+        let world = |slopes: &[Vec3; 3]| {
+            let world = |c: usize| grid.slope_in_world(slopes[of(c)]) * scale;
+            RgbVec { r: world(0), g: world(1), b: world(2) }
+        };
+        let depth = Rgb::new(depth[of(0)], depth[of(1)], depth[of(2)]) * scale;
+        GridSums { length, depth, gradient: world(&slopes), moment: world(&moments) }
     }
 
     /// The rate of the fixed ray's optical depth along a tangent of the medium, the motion of its
@@ -247,7 +291,11 @@ impl<'a> DepthEstimate<'a> {
     #[must_use]
     pub fn rate_without_flows(&self, medium: &Medium, tangent: &MediumTangent) -> Rgb {
         let MediumTangent { sigma_t, velocity, .. } = tangent;
-        let mut rate = sigma_t.uniform * self.length + self.depth * sigma_t.relative
+        let by_factor = match sigma_t.relative {
+            0.0 => Rgb::ZERO,
+            relative => self.depth() * relative,
+        };
+        let mut rate = sigma_t.uniform * self.length + by_factor
             - self.gradient.dot(velocity.point(self.ray.origin))
             - self.moment.dot(velocity.vector(self.ray.dir));
         if !sigma_t.voxels.is_empty() {

@@ -14,9 +14,9 @@ use crate::{
 pub struct FieldGradient {
     /// With respect to a term added everywhere in the medium.
     pub uniform: Rgb,
-    /// With respect to the logarithm of a common factor.
-    pub relative: f64,
-    /// With respect to the voxels' values (after a density's scale); `None` for a constant.
+    /// The derivative with respect to the logarithm of a common factor, as far as no voxels tell it.
+    relative: f64,
+    /// The derivative with respect to the voxels' values after a density's scale; `None` for a constant.
     pub voxels: Option<VoxelGradient>,
 }
 
@@ -66,11 +66,15 @@ pub struct MediumGradient {
     pub velocity: Affine,
     /// Derivative with respect to the velocities of nodes, where there is room for them.
     pub flow: Option<FlowGradient>,
+    /// True where motions of the grids are left out.
+    at_rest: bool,
 }
 
 impl FieldGradient {
-    fn zeros(grid: Option<&Grid>) -> Self {
-        Self { voxels: grid.map(VoxelGradient::zeros), ..Self::default() }
+    /// The derivative with respect to the logarithm of a common factor.
+    #[must_use]
+    pub fn relative(&self) -> f64 {
+        self.relative + self.voxels.as_ref().map_or(0.0, VoxelGradient::relative)
     }
 
     fn scatter(&mut self, field: Rgb, grid: Option<&Grid>, x: Vec3, adjoint: Rgb) {
@@ -78,9 +82,9 @@ impl FieldGradient {
             return;
         }
         self.uniform += adjoint;
-        self.relative += field.dot(adjoint);
-        if let Some(grid) = grid {
-            self.scatter_voxels(grid, x, adjoint);
+        match grid {
+            Some(grid) if self.voxels.is_some() => self.scatter_voxels(grid, x, adjoint),
+            _ => self.relative += field.dot(adjoint),
         }
     }
 
@@ -96,7 +100,11 @@ impl FieldGradient {
         } else {
             self.voxels.as_ref().expect("room for voxels").dot(&tangent.voxels)
         };
-        self.uniform.dot(tangent.uniform) + self.relative * tangent.relative + voxels
+        let by_factor = match tangent.relative {
+            0.0 => 0.0,
+            relative => self.relative() * relative,
+        };
+        self.uniform.dot(tangent.uniform) + by_factor + voxels
     }
 
     fn add(&mut self, o: Self) {
@@ -114,17 +122,34 @@ impl MediumGradient {
     /// No derivative yet, with room for every voxel of the medium.
     #[must_use]
     pub fn zeros(medium: &Medium) -> Self {
-        let [sigma_t, albedo, emission] = medium.volumes().map(FieldGradient::zeros);
-        let of_phase = |p| FieldGradient::zeros(medium.phase.voxels(p));
+        let of = |property| {
+            let zeros = |grid| VoxelGradient::zeros(grid, medium.voxel_scale(property));
+            FieldGradient { voxels: medium.voxels(property).map(zeros), ..Default::default() }
+        };
         Self {
-            sigma_t,
-            albedo,
-            emission,
-            g: of_phase(Property::G),
-            weight: of_phase(Property::Weight),
-            flakes: [Property::SggxDiagonal, Property::SggxOffDiagonal].map(of_phase),
+            sigma_t: of(Property::SigmaT),
+            albedo: of(Property::Albedo),
+            emission: of(Property::Emission),
+            g: of(Property::G),
+            weight: of(Property::Weight),
+            flakes: [Property::SggxDiagonal, Property::SggxOffDiagonal].map(of),
             velocity: Affine::ZERO,
             flow: None,
+            at_rest: false,
+        }
+    }
+
+    /// The derivative with respect to a property.
+    #[must_use]
+    pub fn field(&self, property: Property) -> &FieldGradient {
+        match property {
+            Property::SigmaT => &self.sigma_t,
+            Property::Albedo => &self.albedo,
+            Property::Emission => &self.emission,
+            Property::G => &self.g,
+            Property::Weight => &self.weight,
+            Property::SggxDiagonal => &self.flakes[0],
+            Property::SggxOffDiagonal => &self.flakes[1],
         }
     }
 
@@ -132,9 +157,17 @@ impl MediumGradient {
     /// voxel.
     #[must_use]
     pub fn zeros_without_voxels() -> Self {
-        let [sigma_t, albedo, emission, g, weight] = [None; 5].map(FieldGradient::zeros);
+        let [sigma_t, albedo, emission, g, weight] = Default::default();
         let flakes = Default::default();
-        Self { sigma_t, albedo, emission, g, weight, flakes, velocity: Affine::ZERO, flow: None }
+        let (velocity, flow, at_rest) = (Affine::ZERO, None, false);
+        Self { sigma_t, albedo, emission, g, weight, flakes, velocity, flow, at_rest }
+    }
+
+    /// This gradient without what motions of the grids change: nothing of that is computed or added up.
+    #[must_use]
+    pub fn at_rest(mut self) -> Self {
+        self.at_rest = true;
+        self
     }
 
     /// The same with room for the velocities of `nodes` nodes.
@@ -152,7 +185,7 @@ impl MediumGradient {
         self.sigma_t.scatter(c.sigma_t, grids[0], at, adjoint.sigma_t);
         self.albedo.scatter(c.albedo, grids[1], at, adjoint.albedo);
         self.emission.scatter(c.emission, grids[2], at, adjoint.emission);
-        if grids.iter().any(Option::is_some) {
+        if !self.at_rest && grids.iter().any(Option::is_some) {
             let g = medium.gradients(x);
             let pull = g.sigma_t.weighted(adjoint.sigma_t)
                 + g.albedo.weighted(adjoint.albedo)
@@ -202,6 +235,9 @@ impl MediumGradient {
 
     /// Adds the derivative of a loss with respect to the [spin](crate::tangent::spin) of the grids.
     fn scatter_spin(&mut self, adjoint: Vec3) {
+        if self.at_rest {
+            return;
+        }
         let half = adjoint * 0.5;
         for (col, axis) in self.velocity.linear.cols.iter_mut().zip([Vec3::X, Vec3::Y, Vec3::Z]) {
             *col += half.cross(axis);
@@ -219,17 +255,21 @@ impl MediumGradient {
     pub fn scatter_depth(&mut self, medium: &Medium, depth: &DepthEstimate<'_>, adjoint: Rgb) {
         let sigma_t = &mut self.sigma_t;
         sigma_t.uniform += adjoint * depth.length;
-        sigma_t.relative += depth.depth.dot(adjoint);
         if sigma_t.voxels.is_some() {
             for (grid, material, w) in depth.points_inside(medium) {
                 sigma_t.scatter_voxels(grid.density(), material, adjoint * w);
             }
+        } else {
+            sigma_t.relative += depth.depth().dot(adjoint);
         }
         if medium.phase.sggx().is_some() {
             depth.by_flakes(medium, |x, by, weight| {
                 self.scatter_flakes(medium, x, by, weight.dot(adjoint));
             });
             self.scatter_spin(depth.by_spin().weighted(adjoint));
+        }
+        if self.at_rest {
+            return;
         }
         if let Some(flow) = &mut self.flow {
             depth.pulls(medium, |x, pull| flow.scatter(x, pull.weighted(adjoint)));
@@ -243,6 +283,9 @@ impl MediumGradient {
 
     /// Adds the derivative of a loss with respect to the velocity of the grid's point at x.
     pub fn scatter_velocity(&mut self, x: Vec3, adjoint: Vec3) {
+        if self.at_rest {
+            return;
+        }
         self.scatter_affine(x, adjoint);
         if let Some(flow) = &mut self.flow {
             flow.scatter(x, adjoint);

@@ -281,6 +281,15 @@ impl Medium {
         }
     }
 
+    /// What the values of these voxels are multiplied with to make the property: the scale of a density, or 1.
+    #[must_use]
+    pub fn voxel_scale(&self, property: Property) -> f64 {
+        match (self.grid(), property) {
+            (Some(grid), Property::SigmaT) => grid.scale(),
+            _ => 1.0,
+        }
+    }
+
     /// True when a motion of the medium can change its coefficients or its phase function: when they vary in space or depend on
     /// more than angles.
     #[must_use]

@@ -3,7 +3,7 @@ use alloc::vec::Vec;
 
 use drt_math::{Affine, Rgb, ValueChange, ValueMap, Vec3, vec3};
 
-use crate::change::{Field, FieldChange};
+use crate::change::FieldChange;
 use crate::{
     CoefficientGradients, CoefficientRates, Coefficients, FlakesGradient, Flow, FlowPlace, Grid,
     Medium, MediumChange, MediumError, PhaseGradient, Property,
@@ -65,7 +65,7 @@ impl FieldTangent {
     /// value of the voxel it names.
     fn of(change: &FieldChange, theta: f64, present: Rgb) -> Result<Self, MediumError> {
         let mut tangent = Self::default();
-        let relative = relative_rate(change.property(), &change.op, theta)?;
+        let relative = relative_rate(change.property, &change.op, theta)?;
         match (change.op, change.voxel) {
             (op, Some(v)) => {
                 tangent.voxels.insert(v, op.rate(present, theta));
@@ -178,21 +178,21 @@ impl MediumTangent {
             }
             _ => {
                 if let Some(change) = later.field() {
-                    self.field_mut(change.field).push_through(&change, theta);
+                    self.field_mut(change.property).push_through(&change, theta);
                 }
             }
         }
     }
 
-    fn field_mut(&mut self, field: Field) -> &mut FieldTangent {
-        match field {
-            Field::SigmaT => &mut self.sigma_t,
-            Field::Albedo => &mut self.albedo,
-            Field::Emission => &mut self.emission,
-            Field::G => &mut self.g,
-            Field::Weight => &mut self.weight,
-            Field::SggxDiagonal => &mut self.flakes[0],
-            Field::SggxOffDiagonal => &mut self.flakes[1],
+    fn field_mut(&mut self, property: Property) -> &mut FieldTangent {
+        match property {
+            Property::SigmaT => &mut self.sigma_t,
+            Property::Albedo => &mut self.albedo,
+            Property::Emission => &mut self.emission,
+            Property::G => &mut self.g,
+            Property::Weight => &mut self.weight,
+            Property::SggxDiagonal => &mut self.flakes[0],
+            Property::SggxOffDiagonal => &mut self.flakes[1],
         }
     }
 
@@ -323,11 +323,11 @@ impl Medium {
             }
             _ => {
                 if let Some(c) = change.field() {
-                    if c.property().is_of_phase() {
+                    if c.property.is_of_phase() {
                         self.phase.check_change(&c)?;
                     }
                     let present = self.voxel_value(&c)?;
-                    *tangent.field_mut(c.field) = FieldTangent::of(&c, theta, present)?;
+                    *tangent.field_mut(c.property) = FieldTangent::of(&c, theta, present)?;
                 }
             }
         }
@@ -336,18 +336,14 @@ impl Medium {
 
     /// Present value of the voxel that a change names; zero when it names none.
     fn voxel_value(&self, change: &FieldChange) -> Result<Rgb, MediumError> {
-        let (property, Some(voxel)) = (change.property(), change.voxel) else {
+        let FieldChange { property, voxel: Some(voxel), .. } = *change else {
             return Ok(Rgb::ZERO);
         };
         let grid = self.voxels(property).ok_or(MediumError::NotAGrid { property })?;
-        let scale = match (change.field, self.grid()) {
-            (Field::SigmaT, Some(medium)) => medium.scale(),
-            _ => 1.0,
-        };
         let size = grid.size();
         if (0..3).any(|k| voxel[k] >= size[k]) {
             return Err(MediumError::NoSuchVoxel { property, voxel, size });
         }
-        Ok(grid.voxel(voxel) * scale)
+        Ok(grid.voxel(voxel) * self.voxel_scale(property))
     }
 }

@@ -76,7 +76,7 @@ impl Medium {
         points.clear();
         self.line_points(ray.origin, ray.dir, length, rng, points);
         let e = DepthEstimate::inside(self, *ray, points, true).with_faces(self);
-        let end = (e.moment + e.depth.outer(ray.dir) + e.turn) * (1.0 / length);
+        let end = (e.moment + e.depth().outer(ray.dir) + e.turn) * (1.0 / length);
         [e.gradient - end, end]
     }
 }

@@ -197,16 +197,45 @@ pub fn write(path: impl AsRef<Path>, volume: &VolFile) -> Result<(), VolError> {
 /// # Errors
 /// When a size exceeds an i32, or a value or corner the range of float32.
 pub fn encode(volume: &VolFile) -> Result<Vec<u8>, VolError> {
-    let (grid, [lo, hi]) = (&volume.grid, volume.bounds);
-    let mut out = Vec::with_capacity(HEADER + 4 * grid.values().len());
+    encode_parts(&[volume])
+}
+
+/// The content of a file of symmetric matrices in float32, from a grid of the entries on the diagonal and one of the others, as
+/// [`read_matrices`] reads it.
+///
+/// # Errors
+/// As [`encode`], and when the grids differ in size or do not have three channels.
+pub fn encode_matrices([diagonal, others]: &[VolFile; 2]) -> Result<Vec<u8>, VolError> {
+    if diagonal.grid.size() != others.grid.size()
+        || [diagonal, others].iter().any(|part| part.grid.channels() != 3)
+    {
+        return Err(VolError::NotStorable(
+            "matrices need two grids of one size and three channels",
+        ));
+    }
+    encode_parts(&[diagonal, others])
+}
+
+/// The channels of grids of one size side by side, in the box of the first.
+fn encode_parts(parts: &[&VolFile]) -> Result<Vec<u8>, VolError> {
+    let (size, [lo, hi]) = (parts[0].grid.size(), parts[0].bounds);
+    let channels = parts.iter().map(|part| part.grid.channels()).sum();
+    let voxels: usize = size.iter().product();
+    let mut out = Vec::with_capacity(HEADER + 4 * voxels * channels);
     out.extend(MAGIC);
     out.extend(1_i32.to_le_bytes());
-    for n in grid.size().into_iter().chain([grid.channels()]) {
+    for n in size.into_iter().chain([channels]) {
         let n = i32::try_from(n).map_err(|_| VolError::NotStorable("a size exceeds 2³¹ - 1"))?;
         out.extend(n.to_le_bytes());
     }
     let corners = lo.to_array().into_iter().chain(hi.to_array());
-    for v in corners.chain(grid.values().iter().copied()) {
+    let voxel = |n: usize| {
+        parts.iter().flat_map(move |part| {
+            let channels = part.grid.channels();
+            part.grid.values()[n * channels..][..channels].iter().copied()
+        })
+    };
+    for v in corners.chain((0..voxels).flat_map(voxel)) {
         let v = v as f32;
         if !v.is_finite() {
             return Err(VolError::NotStorable("a value exceeds the range of float32"));

@@ -315,7 +315,7 @@ fn in_reverse(
     mut each: impl FnMut(&[Collector], GradientBatch),
 ) -> Result<bool, CliError> {
     let scene = job.at_values(&job.scene)?;
-    let wanted: Vec<Target> = job.groups.iter().map(|g| g.group.target).collect();
+    let wanted: Vec<Target> = job.groups.iter().map(|g| g.group.wanted()).collect();
     let collectors = collectors(job, job.groups.iter().map(|g| &g.group), &scene)?;
     let (settings, spp) = (&job.settings, job.spp());
     let mut each = |batch| each(&collectors, batch);

@@ -379,7 +379,7 @@ impl PreparedJob {
             _ => Purpose::Image,
         };
         let mut sum = GroupGradient::new(chosen(), self.grouped.given());
-        let wanted: Vec<_> = chosen().map(|group| group.target).collect();
+        let wanted: Vec<_> = chosen().map(Group::wanted).collect();
         let session = self.sessions.get(&self.job, purpose, samples, scene, &[])?;
         let spp = samples.spp;
         let going = session

@@ -1,5 +1,7 @@
 //! `drt optimize` with groups of unknowns, from outside.
 
+use drt_medium::vol::{self, VolFile};
+
 use crate::common::{Folder, expect};
 
 const SCENE: &str = r#"<scene version="3.0.0">
@@ -220,4 +222,66 @@ fn groups_that_cannot_be_fitted_are_refused_before_anything_is_written() {
         expect(&folder.run("optimize bad.toml --quiet"), 2, &[message]);
         assert!(!folder.path().join("run/checkpoint.json").exists(), "{message}");
     }
+}
+
+/// A cube of microflakes in two voxels.
+const FLAKES: &str = r#"<scene version="3.0.0">
+  <default name="flakes" value="s.vol"/>
+  <integrator type="volpath"><integer name="max_depth" value="3"/></integrator>
+  <sensor type="perspective"><float name="fov" value="40"/>
+    <transform name="to_world"><lookat origin="0 -4 3" target="0 0 0" up="0 0 1"/></transform>
+    <film type="hdrfilm"><integer name="width" value="8"/><integer name="height" value="8"/></film></sensor>
+  <medium type="homogeneous" id="cloud"><rgb name="sigma_t" value="1.5"/><rgb name="albedo" value="0.9"/>
+    <phase type="sggx"><volume name="S" type="gridvolume"><string name="filename" value="$flakes"/>
+      <transform name="to_world"><translate x="-0.5" y="-0.5" z="-0.5"/><scale value="2"/></transform>
+    </volume></phase></medium>
+  <shape type="cube"><bsdf type="null"/><ref name="interior" id="cloud"/></shape>
+  <emitter type="directional"><vector name="direction" x="0.3" y="1" z="-1"/><rgb name="irradiance" value="3"/></emitter>
+</scene>"#;
+
+const FLAKES_JOB: &str = r#"scene = "flakes.xml"
+[estimator]
+spp = 16
+[optimize]
+targets = ["target.exr"]
+checkpoint = "run"
+optimizer = { kind = "adam", learning_rate = 0.02, iterations = 2 }
+[[parameter_group]]
+name = "widths"
+target = "cloud"
+property = "sggx_diagonal"
+voxels = "all"
+[[parameter_group]]
+name = "tilts"
+target = "cloud"
+property = "sggx_off_diagonal"
+voxels = "all"
+"#;
+
+#[test]
+fn fitted_microflakes_can_be_read_again() {
+    let folder = Folder::new();
+    let matrices = |name: &str, numbers: [f64; 12]| {
+        let part = |first: usize| {
+            let own = numbers.chunks(6).flat_map(|six| six[first..first + 3].to_vec());
+            let grid = drt_medium::Grid::new([2, 1, 1], 3, own.collect()).unwrap();
+            VolFile { bounds: grid.world_bounds(), grid }
+        };
+        folder.file(name, vol::encode_matrices(&[part(0), part(3)]).unwrap());
+    };
+    let even = [0.6, 0.6, 0.6, 0.0, 0.0, 0.0];
+    let tilted = [0.9, 0.4, 0.5, 0.2, -0.1, 0.1];
+    matrices("s.vol", [even, even].concat().try_into().unwrap());
+    matrices("truth.vol", [tilted, even].concat().try_into().unwrap());
+    folder.file("flakes.xml", FLAKES);
+    folder.file("job.toml", FLAKES_JOB);
+    let render = "render flakes.xml --quiet --spp 64";
+    expect(&folder.run(&format!("{render} -D flakes=truth.vol -o target.exr")), 0, &[]);
+    expect(&folder.run("optimize job.toml --quiet"), 0, &[]);
+    // Both groups are in either file.
+    assert!(bytes(&folder, "widths.vol") == bytes(&folder, "tilts.vol"));
+    let [widths, tilts] = vol::read_matrices(folder.path().join("run/widths.vol")).unwrap();
+    assert!(widths.grid.values().iter().any(|v| (v - 0.6).abs() > 0.01));
+    assert!(tilts.grid.values().iter().any(|v| v.abs() > 0.01));
+    expect(&folder.run(&format!("{render} -D flakes=run/tilts.vol -o fitted.exr")), 0, &[]);
 }

@@ -47,7 +47,10 @@ impl SceneGradient {
         }
         Self {
             shapes: some(&active.shapes, |i| VertexGradient::zeros(&scene.shapes[i].mesh)),
-            media: some(&active.media, |i| MediumGradient::zeros(&scene.media[i].item)),
+            media: some(&active.media, |i| {
+                let zeros = MediumGradient::zeros(&scene.media[i].item);
+                if active.grids[i] { zeros } else { zeros.at_rest() }
+            }),
             bsdfs: some(&active.bsdfs, |i| {
                 let bsdf = &scene.bsdfs[i].item;
                 let index = PropertySet::new(&[Property::Eta]);

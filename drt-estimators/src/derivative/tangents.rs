@@ -124,7 +124,7 @@ impl Tangents {
         let of_media = |t: &MediumTangent| t.velocity != Affine::ZERO || !t.flows.is_empty();
         match target {
             Target::Shape(_) | Target::Sensor(_) => true,
-            Target::Bsdf(_) => false,
+            Target::Bsdf(_) | Target::Coefficients(_) => false,
             Target::Medium(m) => self.media[m].iter().any(|(_, t)| of_media(t)),
             Target::Emitter(e) => self.emitters[e].iter().any(|(_, t)| t.moves()),
         }
@@ -419,19 +419,11 @@ impl Apply<'_> {
         target: Target,
         change: &PropertyChange,
     ) -> Result<MediumChange, Error> {
-        let (op, voxels) = (change.op, change.voxels);
-        Ok(match change.property.as_str() {
-            "sigma_t" => MediumChange::SigmaT { op, voxels },
-            "albedo" => MediumChange::Albedo { op, voxels },
-            "emission" => MediumChange::Emission { op, voxels },
-            "g" => MediumChange::G { op, voxels },
-            "weight" => MediumChange::Weight { op, voxels },
-            "sggx_diagonal" => MediumChange::SggxDiagonal { op, voxels },
-            "sggx_off_diagonal" => MediumChange::SggxOffDiagonal { op, voxels },
-            other => {
-                return Err(self.fail(p, target, EffectError::MediumProperty(other.into())));
-            }
-        })
+        let PropertyChange { op, voxels, .. } = *change;
+        let property = drt_medium::Property::from_name(&change.property).ok_or_else(|| {
+            self.fail(p, target, EffectError::MediumProperty(change.property.clone()))
+        })?;
+        Ok(MediumChange::Value { property, op, voxels })
     }
 
     fn bsdf(&mut self, i: usize) -> Result<(), Error> {

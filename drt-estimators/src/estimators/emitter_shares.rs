@@ -48,7 +48,7 @@ pub(crate) fn shares(
 pub(crate) fn may_move(scene: &Scene, target: Target) -> bool {
     match target {
         Target::Shape(_) | Target::Sensor(_) => true,
-        Target::Bsdf(_) => false,
+        Target::Bsdf(_) | Target::Coefficients(_) => false,
         Target::Medium(m) => scene.media.get(m).is_some_and(|m| m.item.homogeneous().is_none()),
         Target::Emitter(e) => scene.emitters.get(e).is_some_and(|e| e.item.emitter.is_delta()),
     }

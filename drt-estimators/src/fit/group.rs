@@ -76,6 +76,15 @@ impl Group {
         Ok(group)
     }
 
+    /// What a [gradient](crate::Session::gradient) has to be by, so that the group can [collect](Self::collector) its part.
+    #[must_use]
+    pub fn wanted(&self) -> Target {
+        match (&self.kind, self.target) {
+            (GroupKind::Voxels(_), Target::Medium(m)) => Target::Coefficients(m),
+            (_, target) => target,
+        }
+    }
+
     /// Groups of all vertices, voxels and texels of a scene that have gradients, named by their targets and by what
     /// they are: `cube.vertices`, `smoke.sigma_t`, `wall.reflectance`, `sky.radiance`. Vertices of instances are left
     /// out: they have gradients in an [expanded](Scene::expanded) scene.
@@ -250,7 +259,7 @@ impl Group {
             }
             (GroupKind::Voxels(property), Target::Medium(m)) => {
                 let mut medium = scene.media[m].item.clone();
-                let scale = voxel_scale(&medium, *property);
+                let scale = medium.voxel_scale(*property);
                 let step: Vec<f64> = change.iter().map(|c| c * scale).collect();
                 medium.add_to_voxels(*property, &step).map_err(|e| self.refusal(&e))?;
                 medium.check(*property).map_err(|e| self.refusal(&e))?;
@@ -303,7 +312,7 @@ impl Group {
     ) -> Result<Collector, Error> {
         let take = match (&self.kind, self.target) {
             (GroupKind::Voxels(property), Target::Medium(m)) => {
-                Take::Voxels(m, *property, voxel_scale(&given.media[m].item, *property))
+                Take::Voxels(m, *property, given.media[m].item.voxel_scale(*property))
             }
             (GroupKind::LightTexels, Target::Emitter(e)) => Take::LightTexels(e),
             (GroupKind::Texels { property, number }, Target::Bsdf(b)) => {
@@ -358,14 +367,6 @@ impl Group {
     }
 }
 
-/// What a voxel's stored value is multiplied with to make the property.
-fn voxel_scale(medium: &drt_medium::Medium, property: drt_medium::Property) -> f64 {
-    match (medium.grid(), property) {
-        (Some(grid), drt_medium::Property::SigmaT) => grid.scale(),
-        _ => 1.0,
-    }
-}
-
 /// Extracts a [`Group`]'s part from gradients.
 #[derive(Debug)]
 pub struct Collector(Take);
@@ -402,16 +403,7 @@ impl Collector {
         match &self.0 {
             Take::Voxels(m, property, scale) => {
                 let Some(of) = &gradient.media[*m] else { return };
-                let voxels = match property {
-                    drt_medium::Property::SigmaT => &of.sigma_t.voxels,
-                    drt_medium::Property::Albedo => &of.albedo.voxels,
-                    drt_medium::Property::Emission => &of.emission.voxels,
-                    drt_medium::Property::G => &of.g.voxels,
-                    drt_medium::Property::Weight => &of.weight.voxels,
-                    drt_medium::Property::SggxDiagonal => &of.flakes[0].voxels,
-                    drt_medium::Property::SggxOffDiagonal => &of.flakes[1].voxels,
-                };
-                if let Some(voxels) = voxels {
+                if let Some(voxels) = &of.field(*property).voxels {
                     voxels.add_to(numbers, weight * scale);
                 }
             }

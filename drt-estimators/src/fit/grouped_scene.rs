@@ -106,7 +106,9 @@ impl GroupedScene {
 fn reset(scene: &mut Scene, given: &Scene, target: Target) {
     match target {
         Target::Shape(s) => scene.shapes[s].mesh = given.shapes[s].mesh.clone(),
-        Target::Medium(m) => scene.media[m].item = given.media[m].item.clone(),
+        Target::Medium(m) | Target::Coefficients(m) => {
+            scene.media[m].item = given.media[m].item.clone()
+        }
         Target::Bsdf(b) => scene.bsdfs[b].item = given.bsdfs[b].item.clone(),
         Target::Emitter(e) => scene.emitters[e].item = given.emitters[e].item.clone(),
         Target::Sensor(_) => {}

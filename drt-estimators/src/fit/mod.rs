@@ -404,8 +404,9 @@ fn estimators(
 fn targets(groups: &[Group]) -> Vec<Target> {
     let mut targets: Vec<Target> = Vec::new();
     for group in groups {
-        if !targets.contains(&group.target) {
-            targets.push(group.target);
+        let target = group.wanted();
+        if !targets.contains(&target) {
+            targets.push(target);
         }
     }
     targets

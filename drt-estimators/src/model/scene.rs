@@ -161,6 +161,9 @@ pub enum Target {
     Shape(usize),
     /// A medium.
     Medium(usize),
+    /// A medium at rest: its coefficients and its phase function, not where its grids are. A gradient by these alone takes less
+    /// time than one by the medium. Names find media, not these.
+    Coefficients(usize),
     /// A scattering model.
     Bsdf(usize),
     /// An emitter.
@@ -182,7 +185,7 @@ impl TargetName for Target {
     fn find_in(&self, scene: &Scene) -> Result<Target, Error> {
         let (kind, i, count) = match *self {
             Self::Shape(i) => ("shape", i, scene.shapes.len()),
-            Self::Medium(i) => ("medium", i, scene.media.len()),
+            Self::Medium(i) | Self::Coefficients(i) => ("medium", i, scene.media.len()),
             Self::Bsdf(i) => ("bsdf", i, scene.bsdfs.len()),
             Self::Emitter(i) => ("emitter", i, scene.emitters.len()),
             Self::Sensor(i) => ("sensor", i, scene.sensors.len()),
@@ -431,7 +434,7 @@ impl Scene {
     pub(crate) fn name_of(&self, target: Target) -> String {
         let (kind, i, id) = match target {
             Target::Shape(i) => ("shape", i, &self.shapes[i].id),
-            Target::Medium(i) => ("medium", i, &self.media[i].id),
+            Target::Medium(i) | Target::Coefficients(i) => ("medium", i, &self.media[i].id),
             Target::Bsdf(i) => ("bsdf", i, &self.bsdfs[i].id),
             Target::Emitter(i) => ("emitter", i, &self.emitters[i].id),
             Target::Sensor(i) => ("sensor", i, &self.sensors[i].id),

@@ -3,8 +3,11 @@
 use crate::common::differences::agree_with_differences;
 use crate::common::pairing::{pair, targets};
 use crate::common::*;
-use drt_estimators::{EstimatorKind, InteriorMotion, Scene, Session, Settings, Unattended};
-use drt_math::{Rgb, Rng, ValueChange};
+use drt_estimators::{
+    EstimatorKind, InteriorMotion, Scene, Session, Settings, Target, Unattended, gradient,
+};
+use drt_math::{Affine, Rgb, Rng, ValueChange};
+use drt_medium::Property;
 use drt_motion::Parameter;
 
 fn parameters(value: f64) -> Vec<Parameter> {
@@ -66,6 +69,27 @@ fn judge(scene: &Scene, parameters: &[Parameter]) {
     agree_with_differences(scene, parameters, STEP, 4000, &[EstimatorKind::PathSpace], |found| {
         assert!(found.counters.probes > 0);
     });
+}
+
+/// Coefficients alone take the same paths as the medium with its motion, and leave the motion out.
+#[test]
+fn gradients_of_media_at_rest() {
+    let scene = sparse_cloud();
+    let settings = Settings { estimator: EstimatorKind::PathSpace, ..Settings::default() };
+    let [width, height] = scene.sensors[0].item.sensor.film();
+    let adjoint = vec![Rgb::ONE; (width * height) as usize];
+    let by = |target: Target| {
+        let found = gradient(&scene, &[target], &settings, 4, &adjoint, &Unattended);
+        found.expect("a valid scene").media.swap_remove(0).expect("wanted")
+    };
+    let [moved, at_rest] = [Target::Medium(0), Target::Coefficients(0)].map(by);
+    let [all, alone] = [&moved, &at_rest].map(|g| {
+        let voxels = g.field(Property::SigmaT).voxels.as_ref().expect("a grid");
+        voxels.values().into_owned()
+    });
+    let largest = all.iter().fold(0.0, |m, v| f64::max(m, v.abs()));
+    assert!(largest > 0.0 && all.iter().zip(&alone).all(|(a, b)| (a - b).abs() < 1e-12 * largest));
+    assert!(moved.velocity != Affine::ZERO && at_rest.velocity == Affine::ZERO);
 }
 
 /// The reverse mode is the transpose of the forward mode.

@@ -2,8 +2,6 @@
 
 use alloc::vec::Vec;
 
-use drt_math::Rgb;
-
 use crate::bounds::march::Cells;
 use crate::bounds::range::Range;
 use crate::grid::unflatten;
@@ -37,11 +35,8 @@ impl Level {
     #[inline(always)]
     pub(super) fn range(&self, cell: usize) -> Range {
         match self.channels {
-            1 => read([self.numbers[cell]; 3]),
-            _ => {
-                let [r, g, b] = [0, 1, 2].map(|c| self.numbers[3 * cell + c]);
-                read([r, g, b])
-            }
+            1 => Range::by_channel([self.numbers[cell]; 3]),
+            _ => Range::by_channel([0, 1, 2].map(|c| self.numbers[3 * cell + c])),
         }
     }
 
@@ -68,10 +63,4 @@ impl Level {
 fn stored(range: &Range) -> impl Iterator<Item = [f64; 3]> + use<> {
     let [min, max, mean] = [range.min, range.max, range.mean].map(|c| c.to_array());
     (0..3).map(move |c| [min[c], max[c], mean[c]])
-}
-
-#[inline(always)]
-fn read([r, g, b]: [[f64; 3]; 3]) -> Range {
-    let number = |k: usize| Rgb::new(r[k], g[k], b[k]);
-    Range { min: number(0), max: number(1), mean: number(2) }
 }

@@ -19,6 +19,26 @@ pub(super) struct Range {
 }
 
 impl Range {
+    /// A range from the least value, the largest magnitude and the mean of each channel.
+    #[inline(always)]
+    pub(super) fn by_channel([r, g, b]: [[f64; 3]; 3]) -> Self {
+        let number = |k: usize| Rgb::new(r[k], g[k], b[k]);
+        Self { min: number(0), max: number(1), mean: number(2) }
+    }
+
+    /// This is the least value, the largest magnitude and the mean of some numbers.
+    pub(super) fn of_numbers(numbers: impl Iterator<Item = f64>) -> [f64; 3] {
+        let (mut min, mut max, mut sum, mut count) = (f64::INFINITY, 0.0, 0.0, 0.0);
+        // Nested iterators are fast from inside only.
+        numbers.for_each(|v| {
+            min = f64::min(min, v);
+            max = f64::max(max, v.abs());
+            sum += v;
+            count += 1.0;
+        });
+        [min, max, sum / count]
+    }
+
     pub(super) fn of(values: impl Iterator<Item = Rgb>) -> Self {
         Self::around(values.map(|v| Self { min: v, max: v.abs(), mean: v }))
     }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use drt_math::{Affine, Mat3, Rgb, Rng, ValueChange, Vec3, vec3};
 use drt_medium::{
     CoefficientRates, DensityField, Filter, Grid, GridMedium, Layout, Medium, MediumChange,
-    MediumGradient, MediumTangent, Piece, Ray, TrackingStats, Wrap, tracking,
+    MediumGradient, MediumTangent, Piece, Property, Ray, TrackingStats, Wrap, tracking,
 };
 
 use crate::common::*;
@@ -132,7 +132,12 @@ fn one_voxel_brings_all_bounds_up_to_date() {
     let voxels = [[0, 0, 0], [89, 69, 100], [63, 20, 15], [64, 40, 31]];
     for voxel in voxels {
         let op = ValueChange::Add(Rgb::splat(50.0));
-        medium.apply(&MediumChange::SigmaT { op, voxels: Some(voxel) }, 1.0).expect("a voxel");
+        medium
+            .apply(
+                &MediumChange::Value { property: Property::SigmaT, op, voxels: Some(voxel) },
+                1.0,
+            )
+            .expect("a voxel");
     }
     let changed = medium.grid().expect("a grid");
     let (albedo, emission) = (changed.albedo().clone(), changed.emission().clone());

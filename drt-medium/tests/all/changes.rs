@@ -74,22 +74,30 @@ type ChangeAt = fn(f64) -> MediumChange;
 
 /// All at once, in an order in which each meets what came before.
 const CHANGES: [ChangeAt; 16] = [
-    |_| MediumChange::SigmaT { op: ADD_GRAY, voxels: None },
-    |_| MediumChange::SigmaT { op: MULTIPLY, voxels: Some([2, 1, 1]) },
-    |_| MediumChange::Emission { op: MULTIPLY, voxels: None },
+    |_| MediumChange::Value { property: Property::SigmaT, op: ADD_GRAY, voxels: None },
+    |_| MediumChange::Value { property: Property::SigmaT, op: MULTIPLY, voxels: Some([2, 1, 1]) },
+    |_| MediumChange::Value { property: Property::Emission, op: MULTIPLY, voxels: None },
     turning,
-    |_| MediumChange::SigmaT { op: LOG, voxels: None },
-    |_| MediumChange::SigmaT { op: ADD, voxels: Some([2, 1, 1]) },
-    |_| MediumChange::Albedo { op: LOG, voxels: Some([1, 1, 1]) },
-    |_| MediumChange::SigmaT { op: ADD, voxels: None },
-    |_| MediumChange::Albedo { op: ADD, voxels: None },
+    |_| MediumChange::Value { property: Property::SigmaT, op: LOG, voxels: None },
+    |_| MediumChange::Value { property: Property::SigmaT, op: ADD, voxels: Some([2, 1, 1]) },
+    |_| MediumChange::Value { property: Property::Albedo, op: LOG, voxels: Some([1, 1, 1]) },
+    |_| MediumChange::Value { property: Property::SigmaT, op: ADD, voxels: None },
+    |_| MediumChange::Value { property: Property::Albedo, op: ADD, voxels: None },
     turning,
-    |_| MediumChange::G { op: ValueChange::Add(Rgb { r: 0.2, g: 0.2, b: 0.2 }), voxels: None },
-    |_| MediumChange::G { op: ValueChange::MultiplyLog(0.3), voxels: None },
-    |_| MediumChange::G { op: ADD_GRAY, voxels: Some([2, 1, 1]) },
-    |_| MediumChange::Weight { op: MULTIPLY, voxels: None },
+    |_| MediumChange::Value {
+        property: Property::G,
+        op: ValueChange::Add(Rgb { r: 0.2, g: 0.2, b: 0.2 }),
+        voxels: None,
+    },
+    |_| MediumChange::Value {
+        property: Property::G,
+        op: ValueChange::MultiplyLog(0.3),
+        voxels: None,
+    },
+    |_| MediumChange::Value { property: Property::G, op: ADD_GRAY, voxels: Some([2, 1, 1]) },
+    |_| MediumChange::Value { property: Property::Weight, op: MULTIPLY, voxels: None },
     turning,
-    |_| MediumChange::Weight { op: ADD_GRAY, voxels: Some([1, 1, 2]) },
+    |_| MediumChange::Value { property: Property::Weight, op: ADD_GRAY, voxels: Some([1, 1, 2]) },
 ];
 
 /// Those that a medium has the properties for.
@@ -221,10 +229,10 @@ fn the_chain_rule_is_needed() {
 #[test]
 fn homogeneous_changes() {
     let whole: [ChangeAt; 5] = [
-        |_| MediumChange::SigmaT { op: MULTIPLY, voxels: None },
-        |_| MediumChange::Emission { op: ADD, voxels: None },
-        |_| MediumChange::SigmaT { op: ADD, voxels: None },
-        |_| MediumChange::G { op: ADD_GRAY, voxels: None },
+        |_| MediumChange::Value { property: Property::SigmaT, op: MULTIPLY, voxels: None },
+        |_| MediumChange::Value { property: Property::Emission, op: ADD, voxels: None },
+        |_| MediumChange::Value { property: Property::SigmaT, op: ADD, voxels: None },
+        |_| MediumChange::Value { property: Property::G, op: ADD_GRAY, voxels: None },
         turning,
     ];
     check_rates(&plain(), &whole, 0.3);
@@ -294,7 +302,12 @@ fn one_voxel_keeps_the_bounds() {
     let mut medium = full(1);
     for voxel in [[0, 0, 0], [4, 3, 2], [2, 0, 1]] {
         let op = ValueChange::Add(Rgb::splat(50.0));
-        medium.apply(&MediumChange::SigmaT { op, voxels: Some(voxel) }, 1.0).expect("a voxel");
+        medium
+            .apply(
+                &MediumChange::Value { property: Property::SigmaT, op, voxels: Some(voxel) },
+                1.0,
+            )
+            .expect("a voxel");
     }
     let grid = medium.grid().expect("a grid");
     assert!(grid.largest_sigma_t() > 50.0);
@@ -325,7 +338,7 @@ fn a_step_of_all_voxels_is_the_sum_of_single_ones() {
     for (n, s) in step.chunks_exact(3).enumerate() {
         let voxel = [n % 5, n / 5 % 4, n / 20];
         let op = ValueChange::Add(Rgb::new(s[0], s[1], s[2]));
-        let change = MediumChange::SigmaT { op, voxels: Some(voxel) };
+        let change = MediumChange::Value { property: Property::SigmaT, op, voxels: Some(voxel) };
         single.apply(&change, 1.0).expect("a voxel");
     }
     let largest = |m: &Medium| m.grid().expect("a grid").largest_sigma_t();
@@ -344,7 +357,7 @@ fn a_step_of_all_voxels_is_the_sum_of_single_ones() {
 
 #[test]
 fn changes_that_do_not_fit_say_why() {
-    let sigma = |op, voxels| MediumChange::SigmaT { op, voxels };
+    let sigma = |op, voxels| MediumChange::Value { property: Property::SigmaT, op, voxels };
     let (mut h, mut g) = (plain(), full(1));
     let voxel = Some([0, 0, 3]);
     let property = Property::SigmaT;
@@ -356,17 +369,18 @@ fn changes_that_do_not_fit_say_why() {
     assert!(g.apply(&sigma(MULTIPLY, None), f64::INFINITY).is_err());
     assert!(g.apply(&sigma(ValueChange::MultiplyLog(1e3), Some([0, 0, 0])), 10.0).is_err());
     assert_eq!(
-        g.apply(&MediumChange::G { op: ADD, voxels: None }, 1.0),
+        g.apply(&MediumChange::Value { property: Property::G, op: ADD, voxels: None }, 1.0),
         Err(MediumError::NotScalar { property: Property::G })
     );
     let mut wide = g.clone();
-    wide.apply(&MediumChange::G { op: ADD_GRAY, voxels: None }, 5.0).expect("finite values");
+    wide.apply(&MediumChange::Value { property: Property::G, op: ADD_GRAY, voxels: None }, 5.0)
+        .expect("finite values");
     assert!(wide.check(Property::G).is_err() && g.check(Property::G).is_ok());
-    let of_weight = MediumChange::Weight { op: ADD_GRAY, voxels: None };
+    let of_weight = MediumChange::Value { property: Property::Weight, op: ADD_GRAY, voxels: None };
     assert_eq!(g.apply(&of_weight, 0.1), Err(MediumError::NoWeight));
     let property = Property::G;
     assert_eq!(
-        h.apply(&MediumChange::G { op: ADD_GRAY, voxels: voxel }, 0.1),
+        h.apply(&MediumChange::Value { property: Property::G, op: ADD_GRAY, voxels: voxel }, 0.1),
         Err(MediumError::NotAGrid { property })
     );
     let property = Property::SigmaT;
@@ -385,13 +399,17 @@ fn changes_that_do_not_fit_say_why() {
     let collapse = MediumChange::Place { map: flat, velocity: flat };
     assert_eq!(g.apply(&collapse, 0.0), Err(MediumError::SingularPlacement));
     let rayleigh = &mut Medium { phase: Phase::Rayleigh, ..plain() };
-    let of_g = MediumChange::G { op: ADD_GRAY, voxels: None };
+    let of_g = MediumChange::Value { property: Property::G, op: ADD_GRAY, voxels: None };
     assert_eq!(rayleigh.apply(&of_g, 0.1), Err(MediumError::NoMeanCosine));
 }
 
 #[test]
 fn changes_that_leave_the_physical_range_are_found() {
-    let down = |voxels| MediumChange::SigmaT { op: ValueChange::Add(Rgb::splat(-1.0)), voxels };
+    let down = |voxels| MediumChange::Value {
+        property: Property::SigmaT,
+        op: ValueChange::Add(Rgb::splat(-1.0)),
+        voxels,
+    };
     let mut fog = Medium::new(
         Homogeneous::new(Rgb::splat(0.5), Rgb::splat(0.5), Rgb::ZERO).unwrap(),
         Phase::Isotropic,
@@ -403,10 +421,18 @@ fn changes_that_leave_the_physical_range_are_found() {
     fog.apply(&down(None), 0.5).unwrap();
     let error = fog.check(Property::SigmaT).unwrap_err().to_string();
     assert!(error.contains("sigma_t is -0.5; it must be finite and not negative"), "{error}");
-    let brighter = MediumChange::Albedo { op: ValueChange::Multiply(3.0), voxels: None };
+    let brighter = MediumChange::Value {
+        property: Property::Albedo,
+        op: ValueChange::Multiply(3.0),
+        voxels: None,
+    };
     assert_eq!(brighter.pushes(1.0), Some(Property::Albedo));
     fog.apply(&brighter, 1.0).unwrap();
     assert!(fog.check(Property::Albedo).is_err() && fog.check(Property::Emission).is_ok());
-    let thinner = MediumChange::SigmaT { op: ValueChange::MultiplyLog(-3.0), voxels: None };
+    let thinner = MediumChange::Value {
+        property: Property::SigmaT,
+        op: ValueChange::MultiplyLog(-3.0),
+        voxels: None,
+    };
     assert_eq!(thinner.pushes(1.0), None, "it keeps its sign");
 }

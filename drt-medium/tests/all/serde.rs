@@ -4,7 +4,7 @@ use crate::common::*;
 use drt_math::{Affine, Rgb, vec3};
 use drt_medium::{
     Filter, Grid, Homogeneous, Layout, Medium, MediumChange, MediumKind, Phase, PhaseBlend,
-    UniformMedium, ValueChange, Wrap,
+    Property, UniformMedium, ValueChange, Wrap,
 };
 
 fn round_trip(medium: &Medium) -> Medium {
@@ -55,7 +55,11 @@ fn grids_survive_with_all_their_settings() {
 #[test]
 fn changes_survive() {
     let changes = [
-        MediumChange::SigmaT { op: ValueChange::MultiplyLog(0.5), voxels: Some([1, 2, 3]) },
+        MediumChange::Value {
+            property: Property::SigmaT,
+            op: ValueChange::MultiplyLog(0.5),
+            voxels: Some([1, 2, 3]),
+        },
         MediumChange::Place { map: Affine::IDENTITY, velocity: Affine::ZERO },
     ];
     let text = serde_json::to_string(&changes).expect("serialisable");

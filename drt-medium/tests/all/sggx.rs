@@ -208,7 +208,7 @@ fn through() -> Ray {
 fn a_varying_cloud_lets_through_what_quadrature_says() {
     let (medium, ray) = (cloud(), through());
     let points = middles(ray.t_max, 4000);
-    let depth = DepthEstimate::inside(&medium, ray, &points, false).depth.r;
+    let depth = DepthEstimate::inside(&medium, ray, &points, false).depth().r;
     let truth = (-depth).exp();
     let through = estimate(40_000, |rng, stats| {
         medium.transmittance(ray.origin, ray.dir, ray.t_max, rng, stats).r
@@ -224,7 +224,7 @@ fn a_varying_cloud_lets_through_what_quadrature_says() {
     });
     assert_agrees("free flight", &free, truth, 0.01);
     let isotropic = Medium { phase: Phase::Isotropic, ..medium };
-    let even = DepthEstimate::inside(&isotropic, ray, &points, false).depth.r;
+    let even = DepthEstimate::inside(&isotropic, ray, &points, false).depth().r;
     assert_rejects("through an even cloud", &through, (-even).exp());
 }
 
@@ -234,17 +234,25 @@ fn changes() -> Vec<MediumChange> {
     let (all, one) = (None, Some([1, 0, 1]));
     let turn = Mat3::rotation(vec3(0.0, 0.6, 0.8), 0.5);
     vec![
-        MediumChange::SggxDiagonal { op: add, voxels: all },
-        MediumChange::SggxOffDiagonal { op: add, voxels: all },
-        MediumChange::SggxDiagonal { op: ValueChange::Multiply(0.4), voxels: all },
-        MediumChange::SggxDiagonal { op: add, voxels: one },
-        MediumChange::SggxOffDiagonal { op: add, voxels: one },
-        MediumChange::SigmaT { op: add, voxels: all },
-        MediumChange::SigmaT { op: ValueChange::Multiply(0.4), voxels: Some([2, 1, 0]) },
+        MediumChange::Value { property: Property::SggxDiagonal, op: add, voxels: all },
+        MediumChange::Value { property: Property::SggxOffDiagonal, op: add, voxels: all },
+        MediumChange::Value {
+            property: Property::SggxDiagonal,
+            op: ValueChange::Multiply(0.4),
+            voxels: all,
+        },
+        MediumChange::Value { property: Property::SggxDiagonal, op: add, voxels: one },
+        MediumChange::Value { property: Property::SggxOffDiagonal, op: add, voxels: one },
+        MediumChange::Value { property: Property::SigmaT, op: add, voxels: all },
+        MediumChange::Value {
+            property: Property::SigmaT,
+            op: ValueChange::Multiply(0.4),
+            voxels: Some([2, 1, 0]),
+        },
         // Both turn what has been turned.
         MediumChange::Place { map: Affine::about(turn, Vec3::X), velocity: Affine::ZERO },
-        MediumChange::SggxOffDiagonal { op: add, voxels: one },
-        MediumChange::SggxDiagonal { op: add, voxels: all },
+        MediumChange::Value { property: Property::SggxOffDiagonal, op: add, voxels: one },
+        MediumChange::Value { property: Property::SggxDiagonal, op: add, voxels: all },
     ]
 }
 
@@ -264,7 +272,7 @@ fn motion(theta: f64) -> MediumChange {
 /// What depends on flakes, in one number: an optical depth by a fixed rule, and a value of the phase function.
 fn looked_at(medium: &Medium, points: &[(f64, f64)]) -> [f64; 2] {
     let (x, ray) = (vec3(0.1, 0.7, 0.4), through());
-    let depth = DepthEstimate::inside(medium, ray, points, false).depth.g;
+    let depth = DepthEstimate::inside(medium, ray, points, false).depth().g;
     let [wo, wi] = [vec3(0.48, -0.6, 0.64), vec3(0.0, 0.6, 0.8)];
     [depth, medium.phase_at(x).eval(wo, wi)]
 }
@@ -335,11 +343,11 @@ fn faces_count_by_the_area_that_flakes_show() {
     let medium = at(0.0);
     let tangent = medium.tangent(&motion(0.0), 0.0).expect("fits");
     let [up, down] =
-        [step, -step].map(|s| DepthEstimate::inside(&at(s), ray, &points, false).depth.g);
+        [step, -step].map(|s| DepthEstimate::inside(&at(s), ray, &points, false).depth().g);
     let difference = (up - down) / (2.0 * step);
     let rates = |medium: &Medium| {
         let depth = DepthEstimate::inside(medium, ray, &points, true);
-        [depth, depth.with_faces(medium)].map(|d| d.rate(medium, &tangent).g)
+        [depth.clone(), depth.with_faces(medium)].map(|d| d.rate(medium, &tangent).g)
     };
     let [inside, whole] = rates(&medium);
     assert!((whole - difference).abs() < 0.01, "{whole} {difference}");
@@ -394,7 +402,11 @@ fn what_makes_no_flakes_is_refused_by_its_place() {
     let refused = medium.check(Property::SggxDiagonal);
     assert!(matches!(refused, Err(MediumError::SggxMatrix { voxel: Some(_), .. })));
     let isotropic = Medium { phase: Phase::Isotropic, ..medium };
-    let change = MediumChange::SggxDiagonal { op: ValueChange::Multiply(1.0), voxels: None };
+    let change = MediumChange::Value {
+        property: Property::SggxDiagonal,
+        op: ValueChange::Multiply(1.0),
+        voxels: None,
+    };
     assert_eq!(isotropic.tangent(&change, 0.0), Err(MediumError::NoSggx));
     assert!(MediumTangent::zero().is_zero());
 }

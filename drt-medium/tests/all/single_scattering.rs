@@ -4,7 +4,8 @@
 use crate::common::*;
 use drt_math::{Rgb, Vec3, vec3};
 use drt_medium::{
-    DistanceSample, FlowPlace, Homogeneous, Medium, MediumChange, Phase, TrackingStats, ValueChange,
+    DistanceSample, FlowPlace, Homogeneous, Medium, MediumChange, Phase, Property, TrackingStats,
+    ValueChange,
 };
 
 const LIGHT: Vec3 = vec3(1.5, 0.8, 0.4);
@@ -49,9 +50,21 @@ fn value_and_derivatives_with_respect_to_the_medium() {
     let add = ValueChange::Add(Rgb::ONE);
     let cases = [
         ("value", None, 0.163_273_339_759_29),
-        ("sigma_t", Some(MediumChange::SigmaT { op: add, voxels: None }), -0.083_026_614_548_341),
-        ("albedo", Some(MediumChange::Albedo { op: add, voxels: None }), 0.204_091_674_699_11),
-        ("g", Some(MediumChange::G { op: add, voxels: None }), 0.055_504_958_190_37),
+        (
+            "sigma_t",
+            Some(MediumChange::Value { property: Property::SigmaT, op: add, voxels: None }),
+            -0.083_026_614_548_341,
+        ),
+        (
+            "albedo",
+            Some(MediumChange::Value { property: Property::Albedo, op: add, voxels: None }),
+            0.204_091_674_699_11,
+        ),
+        (
+            "g",
+            Some(MediumChange::Value { property: Property::G, op: add, voxels: None }),
+            0.055_504_958_190_37,
+        ),
     ];
     for (what, change, truth) in cases {
         let e = radiance(change);

@@ -3,7 +3,9 @@
 
 use crate::common::*;
 use drt_math::{Affine, Mat3, Rgb, Rng, Vec3, vec3};
-use drt_medium::{Layout, Medium, MediumChange, MediumTangent, Ray, TrackingStats, ValueChange};
+use drt_medium::{
+    Layout, Medium, MediumChange, MediumTangent, Property, Ray, TrackingStats, ValueChange,
+};
 
 const SAMPLES: u32 = 1_000_000;
 
@@ -44,7 +46,10 @@ fn motion(velocity: Affine) -> MediumTangent {
 fn p07_scale() {
     // The extinction is scale × value, so d/dscale is a relative change by 1 / 0.9.
     let op = ValueChange::Multiply(1.0 / 0.9);
-    let d = p07_derivative(SAMPLES, &tangent(&MediumChange::SigmaT { op, voxels: None }));
+    let d = p07_derivative(
+        SAMPLES,
+        &tangent(&MediumChange::Value { property: Property::SigmaT, op, voxels: None }),
+    );
     assert_derivative("P07 d/dscale", &d, -0.465_646_916_636_44);
 }
 
@@ -52,7 +57,7 @@ fn p07_scale() {
 fn p07_voxel() {
     // The oracle adds to the grid's value before the scale.
     let op = ValueChange::Add(Rgb::splat(0.9));
-    let change = MediumChange::SigmaT { op, voxels: Some([1, 1, 1]) };
+    let change = MediumChange::Value { property: Property::SigmaT, op, voxels: Some([1, 1, 1]) };
     let d = p07_derivative(SAMPLES, &tangent(&change));
     assert_derivative("P07 d/dvoxel", &d, -0.040_848_148_721_56);
     assert_rejects("P07 d/dvoxel after scale", &d, -0.040_848_148_721_56 / 0.9);
@@ -148,8 +153,9 @@ fn homogeneous_rates_are_exact() {
         .expect("a valid medium");
     let medium = Medium::new(h, drt_medium::Phase::Isotropic);
     let op = ValueChange::Add(Rgb::ONE);
-    let tangent =
-        medium.tangent(&MediumChange::SigmaT { op, voxels: None }, 0.0).expect("a change");
+    let tangent = medium
+        .tangent(&MediumChange::Value { property: Property::SigmaT, op, voxels: None }, 0.0)
+        .expect("a change");
     let (rng, stats) = (&mut Rng::new(0, 0, 0), &mut TrackingStats::default());
     let ray = Ray::new(Vec3::ZERO, Vec3::X, 3.0);
     let e = medium.transmittance_rate(&ray, &tangent, rng, stats, &mut Vec::new());

@@ -2,7 +2,9 @@
 
 use drt_math::{Vec3, vec3};
 use drt_medium::Grid;
-use drt_medium::vol::{VolError, VolFile, decode, encode, read, write};
+use drt_medium::vol::{
+    VolError, VolFile, decode, encode, encode_matrices, read, read_matrices, write,
+};
 use proptest::prelude::*;
 
 fn sample() -> VolFile {
@@ -40,6 +42,28 @@ fn written_files_come_back() {
     assert_eq!(again.placement().point(vec3(0.5, 1.0, 0.0)), vec3(0.0, 0.5, 2.0));
     let missing = read(&path).expect_err("no such file").to_string();
     assert!(missing.contains("drt-medium-"), "{missing}");
+}
+
+#[test]
+fn written_matrices_come_back() {
+    let [diagonal, mut others] = [sample(), sample()];
+    let negative = others.grid.values().iter().map(|v| -0.5 * v).collect();
+    others.grid = Grid::new([2, 3, 4], 3, negative).expect("a valid grid");
+    let parts = [diagonal, others];
+    let path = std::env::temp_dir().join(format!("drt-medium-s-{}.vol", std::process::id()));
+    let bytes = encode_matrices(&parts).expect("numbers that fit");
+    // Six channels side by side.
+    assert_eq!(bytes[20], 6);
+    std::fs::write(&path, bytes).expect("a writable folder");
+    let again = read_matrices(&path);
+    let alone = read(&path).expect_err("a file of matrices").to_string();
+    std::fs::remove_file(&path).expect("the file just written");
+    assert_eq!(again.expect("what was written"), parts);
+    assert!(alone.contains("expected 1 or 3"), "{alone}");
+    let [diagonal, _] = parts;
+    let narrow = Grid::new([2, 3, 4], 1, vec![0.0; 24]).expect("a valid grid");
+    let narrow = VolFile { grid: narrow, ..diagonal.clone() };
+    assert!(matches!(encode_matrices(&[diagonal, narrow]), Err(VolError::NotStorable(_))));
 }
 
 #[test]

@@ -8,6 +8,7 @@ use drt_estimators::fit::{Evaluation, Fit, Group, GroupKind};
 use drt_estimators::{Scene, Target};
 use drt_geom::Mesh;
 use drt_math::vec3;
+use drt_medium::Property;
 use drt_medium::vol::{self, VolFile};
 use drt_motion::optimize::OptimizeError;
 use drt_motion::optimize::field::FieldState;
@@ -143,14 +144,16 @@ impl<'a> Fields<'a> {
 
     /// What the groups have become, to be written at any time.
     pub(super) fn results(&self) -> Vec<FieldResult> {
-        let mut scene = self.problem.job.scene.clone();
+        let given = &self.problem.job.scene;
+        let mut scene = given.clone();
+        // They have been given to the fit already. A file may hold the values of several groups.
+        let applied = self.groups().all(|(group, optimizer)| {
+            group.group.apply(given, optimizer.values(), &mut scene).is_ok()
+        });
         let result = |(group, optimizer): (&ParameterGroup, &FieldSteps)| {
-            let (group, values) = (&group.group, optimizer.values());
-            // They have been given to the fit already.
-            group.apply(&self.problem.job.scene, values, &mut scene).ok()?;
-            Some(FieldResult { files: files(group, values, &scene)? })
+            Some(FieldResult { files: files(&group.group, optimizer.values(), &scene)? })
         };
-        self.groups().filter_map(result).collect()
+        self.groups().filter(|_| applied).filter_map(result).collect()
     }
 
     /// The shapes that groups of vertices or of a cage move, as they were and as they are now, by the groups' names.
@@ -224,9 +227,20 @@ fn files(group: &Group, values: &[f64], scene: &Scene) -> Option<Vec<(String, Ve
             ]
         }
         (GroupKind::Voxels(property), Target::Medium(m)) => {
-            let grid = scene.media[m].item.voxels(*property)?.clone();
-            let bounds = grid.world_bounds();
-            vec![(name("vol"), vol::encode(&VolFile { grid, bounds }).ok()?)]
+            let file = |property| {
+                let grid = scene.media[m].item.voxels(property)?.clone();
+                Some(VolFile { bounds: grid.world_bounds(), grid })
+            };
+            let bytes = match property {
+                // What reads `S` takes it as a whole.
+                Property::SggxDiagonal | Property::SggxOffDiagonal => {
+                    let entries = [Property::SggxDiagonal, Property::SggxOffDiagonal].map(file);
+                    let [diagonal, others] = entries;
+                    vol::encode_matrices(&[diagonal?, others?])
+                }
+                _ => vol::encode(&file(*property)?),
+            };
+            vec![(name("vol"), bytes.ok()?)]
         }
         (GroupKind::Texels { property, .. }, Target::Bsdf(b)) => {
             let bsdf = &scene.bsdfs[b].item;

@@ -220,7 +220,7 @@ impl Differentiator<'_> {
                 along.add_turn(&(depth.turn * -weight), path.length);
             }
         }
-        let depth = depth.depth;
+        let depth = if moving { depth.depth() } else { Rgb::ZERO };
         self.points = points;
         depth / path.length
     }

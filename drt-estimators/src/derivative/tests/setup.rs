@@ -179,7 +179,7 @@ impl AdjointSink for Faulty<'_> {
         self.0.phase(medium, x, &gradient, adjoint);
     }
     fn depth(&mut self, medium: usize, depth: &DepthEstimate<'_>, adjoint: Rgb) {
-        let mut depth = *depth;
+        let mut depth = depth.clone();
         if self.1 == Fault::GridFace {
             let of = self.0.world.medium(medium);
             depth = DepthEstimate::inside(of, depth.ray, depth.points, true);

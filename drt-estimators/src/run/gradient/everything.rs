@@ -71,6 +71,8 @@ pub(crate) fn active(scene: &Scene, wanted: &[Target]) -> ActiveInputs {
         (0..n).map(|i| wanted.contains(&of(i))).collect()
     }
     let emitters = flags(scene.emitters.len(), wanted, Target::Emitter);
+    let [moved, at_rest] = [Target::Medium, Target::Coefficients]
+        .map(|kind: fn(usize) -> Target| flags(scene.media.len(), wanted, kind));
     let placed = |e: usize| {
         let emitter = &scene.emitters[e].item.emitter;
         emitter.is_delta()
@@ -78,8 +80,8 @@ pub(crate) fn active(scene: &Scene, wanted: &[Target]) -> ActiveInputs {
     ActiveInputs {
         shapes: flags(scene.shapes.len(), wanted, Target::Shape),
         volumes: alloc::vec![false; scene.media.len()],
-        media: flags(scene.media.len(), wanted, Target::Medium),
-        grids: flags(scene.media.len(), wanted, Target::Medium),
+        media: moved.iter().zip(at_rest).map(|(moved, at_rest)| *moved || at_rest).collect(),
+        grids: moved,
         // Colours of glass are wanted where nothing may turn, too.
         bending: alloc::vec![false; scene.bsdfs.len()],
         bsdfs: flags(scene.bsdfs.len(), wanted, Target::Bsdf),

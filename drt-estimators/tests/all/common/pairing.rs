@@ -58,7 +58,7 @@ fn geometry(scene: &Scene, target: Target, change: &GeometryChange, g: &SceneGra
             let tangent = scene.sensors[i].item.sensor.velocity(&field(change));
             g.sensor.as_ref().expect("wanted").dot(&tangent)
         }
-        (Target::Medium(i), change) => {
+        (Target::Medium(i) | Target::Coefficients(i), change) => {
             let velocity = field(change);
             medium(scene, i, &MediumChange::Place { map: Affine::IDENTITY, velocity }, g)
         }
@@ -95,16 +95,9 @@ fn texels(
 fn property(scene: &Scene, target: Target, c: &PropertyChange, g: &SceneGradient) -> f64 {
     let (op, voxels) = (c.op, c.voxels);
     match target {
-        Target::Medium(i) => {
-            let change = match c.property.as_str() {
-                "sigma_t" => MediumChange::SigmaT { op, voxels },
-                "albedo" => MediumChange::Albedo { op, voxels },
-                "emission" => MediumChange::Emission { op, voxels },
-                "weight" => MediumChange::Weight { op, voxels },
-                "sggx_diagonal" => MediumChange::SggxDiagonal { op, voxels },
-                "sggx_off_diagonal" => MediumChange::SggxOffDiagonal { op, voxels },
-                _ => MediumChange::G { op, voxels },
-            };
+        Target::Medium(i) | Target::Coefficients(i) => {
+            let property = drt_medium::Property::from_name(&c.property).expect("a property");
+            let change = MediumChange::Value { property, op, voxels };
             medium(scene, i, &change, g)
         }
         Target::Bsdf(i) => {

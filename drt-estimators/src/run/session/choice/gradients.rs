@@ -89,7 +89,9 @@ pub(crate) fn probes(scene: &Scene, wanted: &[Target]) -> Vec<Parameter> {
                     })
                     .collect()
             }
-            Target::Medium(_) | Target::Bsdf(_) | Target::Emitter(_) => Vec::new(),
+            Target::Medium(_) | Target::Coefficients(_) | Target::Bsdf(_) | Target::Emitter(_) => {
+                Vec::new()
+            }
         };
         let target = scene.name_of(*target);
         for change in changes.into_iter().take(MOST.saturating_sub(found.len())) {
