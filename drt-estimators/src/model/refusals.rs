@@ -1,0 +1,205 @@
+//! Derivatives that are refused: where something moves, and light jumps or turns in ways that no term here samples.
+
+use drt_geom::Mesh;
+
+use crate::model::emitter::Emitter;
+use crate::model::error::{ElementError, Error};
+use crate::model::scene::{Scene, Shape, Target, unusable};
+use crate::model::surface::Bsdf;
+
+impl Bsdf {
+    /// Why nothing that moves can be differentiated where light meets this on a mesh.
+    fn refuses_motion(&self, mesh: &Mesh, parameter: &str) -> Option<ElementError> {
+        let parameter = || parameter.into();
+        if let Some(bsdf) = self.undifferentiable() {
+            return Some(ElementError::NoDerivatives { bsdf, parameter: parameter() });
+        }
+        let lost = self.is_oriented() && mesh.texcoords.is_none();
+        lost.then(|| ElementError::NoCoordinates { parameter: parameter() })
+    }
+}
+
+impl Scene {
+    /// Refuses derivatives with respect to `parameter` where `moves`, as something moves, and light meets surfaces at which it
+    /// jumps as no term here samples. Where vertices `slide` over surfaces, jumps of textures move under them, which no term here
+    /// samples, either.
+    pub(crate) fn refuse_derivatives(
+        &self,
+        parameter: &str,
+        moves: bool,
+        slide: bool,
+    ) -> Result<(), Error> {
+        for (i, s) in self.shapes.iter().enumerate() {
+            let bsdf = &self.bsdfs[s.bsdf].item;
+            if moves && let Some(reason) = bsdf.refuses_motion(&s.mesh, parameter) {
+                return Err(unusable(&s.id, "shape", i, reason));
+            }
+            if slide && let Some(property) = bsdf.undifferentiated_texture() {
+                let parameter = parameter.into();
+                let reason = ElementError::UndifferentiatedTexture { property, parameter };
+                return Err(unusable(&s.id, "shape", i, reason));
+            }
+            let discontinuous = |e: usize| match &self.emitters[e].item.emitter {
+                Emitter::TexturedArea { texture, .. } => !texture.is_continuous_on(&s.mesh),
+                _ => false,
+            };
+            if slide && (bsdf.is_discontinuous_on(&s.mesh) || s.emitter.is_some_and(discontinuous))
+            {
+                let parameter = parameter.into();
+                return Err(unusable(
+                    &s.id,
+                    "shape",
+                    i,
+                    ElementError::DiscontinuousTexture { parameter },
+                ));
+            }
+        }
+        if moves {
+            self.refuse_beside_smooth_surfaces(parameter)?;
+        }
+        if self.hides_something() {
+            let reason = ElementError::HiddenEmitters { parameter: parameter.into() };
+            return Err(Error::Element { element: "integrator".into(), reason });
+        }
+        Ok(())
+    }
+
+    /// Refuses derivatives by what moves of light that smooth surfaces have no terms for: that of points and directions, whose shadows
+    /// would move rays behind such surfaces, and that which they emit themselves.
+    fn refuse_beside_smooth_surfaces(&self, parameter: &str) -> Result<(), Error> {
+        let Some(smooth) = self.first_smooth() else { return Ok(()) };
+        let (parameter, surface) = (parameter.into(), self.name_of(Target::Shape(smooth)));
+        if let Some(e) = self.emitters.iter().position(|e| e.item.emitter.is_delta()) {
+            let reason = ElementError::DeltaLightPastSmooth { parameter, surface };
+            return Err(unusable(&self.emitters[e].id, "emitter", e, reason));
+        }
+        let emits = |s: &Shape| s.emitter.is_some() && self.bsdfs[s.bsdf].item.is_smooth();
+        if let Some(i) = self.shapes.iter().position(emits) {
+            let reason = ElementError::SmoothEmitter { parameter };
+            return Err(unusable(&self.shapes[i].id, "shape", i, reason));
+        }
+        Ok(())
+    }
+
+    /// The first shape of a smooth surface.
+    pub(crate) fn first_smooth(&self) -> Option<usize> {
+        self.shapes.iter().position(|s| self.bsdfs[s.bsdf].item.is_smooth())
+    }
+
+    /// Refuses derivatives with respect to `parameter`, which moves matter or lights, where light jumps.
+    pub(crate) fn refuse_rims(&self, parameter: &str) -> Result<(), Error> {
+        let Some(i) = self.emitters.iter().position(|e| !e.item.emitter.is_continuous()) else {
+            return Ok(());
+        };
+        let reason = ElementError::Rim { parameter: parameter.into() };
+        Err(unusable(&self.emitters[i].id, "emitter", i, reason))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::string::ToString;
+
+    use drt_math::{Rgb, Vec3};
+
+    use super::*;
+    use crate::model::filter::{Filter, FilterKind};
+    use crate::model::scene::tests::scene;
+    use crate::model::scene::{Named, SceneSensor, Surrounding};
+    use crate::model::sensor::{Lens, Sensor};
+    use crate::model::settings::EstimatorKind;
+    use crate::model::surface::{Blend, Dielectric, Perturbation, Perturbed, Property, Textured};
+    use crate::model::texture::Texture;
+
+    fn blended(bsdf: Bsdf) -> Bsdf {
+        let bsdfs = [Bsdf::Diffuse(Default::default()), bsdf];
+        Bsdf::Blend(alloc::boxed::Box::new(Blend { bsdfs, weight: 0.5 }))
+    }
+
+    #[test]
+    fn smooth_and_textured_surfaces_refuse_derivatives_by_name() {
+        let mut scene = scene();
+        assert!(scene.refuse_derivatives("spin", true, true).is_ok());
+        scene.bsdfs.push(Named::new("glass", Bsdf::Dielectric(Dielectric::default())));
+        // One that no shape has does no harm.
+        assert!(scene.refuse_derivatives("spin", true, true).is_ok());
+        let shape = scene.shapes.len() - 1;
+        scene.shapes[shape].bsdf = scene.bsdfs.len() - 1;
+        let name = scene.name_of(Target::Shape(shape));
+        let spin = drt_motion::GeometryChange::Rotate { axis: Vec3::Y, pivot: Vec3::ZERO };
+        let change = drt_motion::Change::Geometry(spin);
+        let effects = alloc::vec![drt_motion::Effect { target: name.clone(), change }];
+        let parameters = [drt_motion::Parameter { name: "spin".into(), value: 0.0, effects }];
+        let filter = Filter::new(FilterKind::BOX).expect("a filter");
+        let at = [Vec3::Z * 5.0, Vec3::ZERO, Vec3::Y];
+        let sensor = Sensor::look_at(at, Lens::default(), [2, 2], filter).expect("a camera");
+        let item = SceneSensor { sensor, medium: Surrounding::Counted, sample_count: None };
+        scene.sensors.push(Named::new("camera", item));
+        let message = crate::Session::new(&scene, &parameters, &crate::Settings::default());
+        let message = message.err().expect("a refusal").to_string();
+        assert!(message.contains(&name) && message.contains("bulb"), "{message}");
+        assert!(message.contains("`spin` moves something"), "{message}");
+        // Where vertices slide over surfaces, textures must not jump; their values may change.
+        scene.shapes[shape].bsdf = 0;
+        assert!(scene.refuse_derivatives("spin", true, true).is_ok());
+        let texture = Texture::Checkerboard {
+            colours: [Rgb::splat(0.2), Rgb::splat(0.8)],
+            to_uv: crate::texture::UvMap::IDENTITY,
+        };
+        let bsdf = scene.bsdfs[0].item.clone();
+        let textured = Textured::new(bsdf, alloc::vec![(Property::Reflectance, texture)]);
+        scene.bsdfs[0].item = Bsdf::Textured(alloc::boxed::Box::new(textured.expect("a texture")));
+        assert!(scene.refuse_derivatives("spin", true, false).is_ok());
+        let message = scene.refuse_derivatives("spin", true, true).unwrap_err().to_string();
+        assert!(message.contains(&name) && message.contains("discontinuous texture"), "{message}");
+        let op = drt_motion::ValueChange::Add(Rgb::ONE);
+        let change = drt_motion::PropertyChange {
+            property: "reflectance".into(),
+            op,
+            voxels: None,
+            texels: None,
+        };
+        let change = drt_motion::Change::Property(change);
+        let effects = alloc::vec![drt_motion::Effect { target: "grey".into(), change }];
+        let bleach = [drt_motion::Parameter { name: "bleach".into(), value: 0.0, effects }];
+        assert!(crate::Session::new(&scene, &bleach, &crate::Settings::default()).is_ok());
+        // BSDFs that nothing is differentiated at, in any estimator.
+        let inner = || Bsdf::Diffuse(Default::default());
+        let map = crate::texture::Bitmap::new([1, 1], alloc::vec![[0.5, 0.5, 1.0]]).expect("a map");
+        let perturbed = |perturbation| {
+            let map = Texture::Bitmap(map.clone());
+            let (flip_invalid_normals, use_shadowing_function) = (true, true);
+            Perturbed {
+                bsdf: inner(),
+                map,
+                perturbation,
+                flip_invalid_normals,
+                use_shadowing_function,
+            }
+        };
+        let boxed = |p| Bsdf::Perturbed(alloc::boxed::Box::new(p));
+        for bsdf in
+            [boxed(perturbed(Perturbation::Normals)), boxed(perturbed(Perturbation::Heights(1.0)))]
+        {
+            let kind = bsdf.name();
+            // Also inside of others.
+            for bsdf in [bsdf.clone(), blended(bsdf)] {
+                if bsdf.validate().is_err() {
+                    continue;
+                }
+                scene.bsdfs[0].item = bsdf;
+                for estimator in
+                    [EstimatorKind::PathSpace, EstimatorKind::Radiative, EstimatorKind::Warped]
+                {
+                    let settings = crate::Settings { estimator, ..Default::default() };
+                    let message = crate::Session::new(&scene, &parameters, &settings);
+                    let message = message.err().expect("a refusal").to_string();
+                    let wanted = ["`spin`", kind, "by finite differences", name.as_str()];
+                    assert!(wanted.iter().all(|part| message.contains(part)), "{message}");
+                }
+            }
+        }
+        // The image is nobody's derivative.
+        assert!(crate::Session::new(&scene, &[], &crate::Settings::default()).is_ok());
+    }
+}
