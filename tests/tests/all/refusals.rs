@@ -14,7 +14,7 @@ use drt_estimators::{
     AuxiliarySamples, EstimatorKind, Named, PathSampling, Scene, SceneEmitter, Session, Settings,
     Surrounding, Warp,
 };
-use drt_math::{Rgb, ValueChange, vec3};
+use drt_math::{Rgb, ValueChange, Vec3, vec3};
 use drt_tests::matrix::{Cell, Stage, lenses, materials, still, textures};
 use drt_tests::motion::changes;
 
@@ -147,7 +147,12 @@ fn light_that_would_turn_or_go_nowhere() {
         let cell = Cell::new(property, [changes(target, property, ValueChange::Add(Rgb::ONE))]);
         Stage::new("still", scene.clone(), vec![cell])
     };
-    let bends = with(&mirrors.scene, "glass", "eta");
+    // An index of refraction turns light, as what moves does.
+    let mut lit = mirrors.scene.clone();
+    let emitter = Emitter::Point { position: Vec3::Y, intensity: Rgb::ONE };
+    let medium = Surrounding::Counted;
+    lit.emitters.push(Named::new("bulb", SceneEmitter { emitter, medium }));
+    let bends = with(&lit, "glass", "eta");
     let mut whole = veiled.scene.clone();
     let card = whole.shapes.iter().position(|s| s.id.as_deref() == Some("card")).unwrap();
     let bsdf = whole.shapes[card].bsdf;
@@ -156,7 +161,7 @@ fn light_that_would_turn_or_go_nowhere() {
     let whole = with(&whole, "card", "opacity");
     for estimator in [PathSpace, Radiative, Warped] {
         let message = refusal(&bends.scene, &bends, "eta", estimator);
-        assert_refused(message, &["eta", "dielectric", "turns light", "finite differences"]);
+        assert_refused(message, &["`eta` moves something", "bulb"]);
         let message = refusal(&whole.scene, &whole, "opacity", estimator);
         assert_refused(message, &["opacity", "mask", "at 0 and 1", "finite differences"]);
     }

@@ -13,7 +13,8 @@
 //!
 //! It is smooth up to the borders of triangles, that is. Where normals are interpolated, rays are continuous there, but their derivatives
 //! jump. [`Evened`] derivatives do not: they are those of a surface whose tangent plane has the shading normal, and whose curvature is
-//! interpolated, too. They differ from the others by as much as triangles are large.
+//! interpolated, too. They differ from the others by as much as triangles are large, and stay
+//! bounded where a ray grazes.
 
 use alloc::vec::Vec;
 use core::array::from_fn;
@@ -70,6 +71,8 @@ struct LinkHit {
     length: ByU,
     /// The normal's gradient by the place.
     slope: Mat3<ByU>,
+    /// Below which cosine the direction counts as along the surface.
+    grazing: f64,
 }
 
 /// A ray that left a smooth surface.
@@ -250,7 +253,8 @@ impl Link {
         let (Some(normals), Some(slopes)) = (self.normals, slopes) else {
             let n = self.point.ng.lift();
             let length = ByU::from(1.0);
-            return LinkHit { w, distance: (y - x).dot(w), n, weights, length, slope };
+            let distance = (y - x).dot(w);
+            return LinkHit { w, distance, n, weights, length, slope, grazing: 0.0 };
         };
         let mut sum = Vec3::zero();
         for ((normal, corner), weight) in normals.iter().zip(slopes).zip(weights) {
@@ -261,21 +265,28 @@ impl Link {
         }
         let length = sum.length();
         let n = sum * length.recip();
-        LinkHit { w, distance: (y - x).dot(w), n, weights, length, slope }
+        LinkHit { w, distance: (y - x).dot(w), n, weights, length, slope, grazing: GRAZING }
     }
 }
 
 impl LinkHit {
+    /// How far along the ray the surface is met later, where it is farther by v. Facets are seen at angles at which the surface that
+    /// they stand for is not: there the shading normal is across the ray, and so nothing is divided by its cosine.
+    fn later(&self, v: Vec3<ByU>) -> ByU {
+        let cosine = self.n.dot(self.w);
+        self.n.dot(v) * cosine / (cosine.squared() + self.grazing * self.grazing)
+    }
+
     /// How the ray that goes on moves, as the one that arrives does.
     fn pass(&self, bend: Bend, rate: &RayVelocity) -> RayVelocity {
         let ray = rate.x + rate.w * self.distance;
-        let x = ray - self.w * (self.n.dot(ray) / self.n.dot(self.w));
+        let x = ray - self.w * self.later(ray);
         RayVelocity { x, w: self.turn(bend, rate.w, self.slope * x, 0.0) }
     }
 
     /// How it moves as the surface does, by the velocity of the surface's point and the rate of its normal.
     fn moved(&self, bend: Bend, u: Vec3<ByU>, n: Vec3<ByU>) -> RayVelocity {
-        let x = self.w * (self.n.dot(u) / self.n.dot(self.w));
+        let x = self.w * self.later(u);
         RayVelocity { x, w: self.turn(bend, Vec3::zero(), n + self.slope * (x - u), 0.0) }
     }
 
@@ -358,6 +369,9 @@ impl Link {
         places.chain(normals)
     }
 }
+
+/// The cosine of the grazing angle below which [`Evened`] derivatives are less than those of a smooth surface.
+const GRAZING: f64 = 0.05;
 
 const AXES: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
 
