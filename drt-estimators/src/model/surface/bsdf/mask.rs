@@ -165,7 +165,7 @@ impl Model for Mask {
 
     fn undifferentiated(&self, property: Property, textures: Textures<'_>) -> Option<&'static str> {
         if property != Property::Opacity {
-            return self.bsdf.undifferentiated(property);
+            return self.bsdf.undifferentiated_with(property, textures);
         }
         let [least, most] = ends_of(self.opacity, property, textures);
         (least <= 0.0 || most >= 1.0).then_some("at 0 and 1 no path goes where light would")

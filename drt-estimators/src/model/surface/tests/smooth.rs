@@ -7,6 +7,7 @@ use drt_math::testing::z_score;
 
 use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
 use crate::model::surface::tests::*;
+use crate::model::texture::Texture;
 
 const SAMPLES: u32 = 100_000;
 
@@ -207,4 +208,21 @@ fn coatings_out_of_range_are_refused() {
     assert!(Bsdf::Dielectric(bad).validate().is_err());
     let two = TwoSided { front: Bsdf::Dielectric(Dielectric::default()), back: None };
     assert!(Bsdf::TwoSided(Box::new(two)).validate().is_err());
+}
+
+/// An index of refraction that varies over a surface has finite differences alone, under a mask, too.
+#[test]
+fn an_index_that_varies_is_not_differentiated() {
+    let glass = Bsdf::Dielectric(Dielectric::default());
+    let mask = Bsdf::Mask(Mask { bsdf: glass.clone(), opacity: 0.4 }.into());
+    for bsdf in [glass, mask] {
+        assert_eq!(bsdf.undifferentiated(Property::Eta), None);
+        let texture = Texture::Checkerboard {
+            colours: [Rgb::splat(1.4), Rgb::splat(1.6)],
+            to_uv: crate::texture::UvMap::IDENTITY,
+        };
+        let textured = Textured::new(bsdf, alloc::vec![(Property::Eta, texture)]);
+        let textured = Bsdf::Textured(alloc::boxed::Box::new(textured.expect("a texture")));
+        assert!(textured.undifferentiated(Property::Eta).is_some());
+    }
 }
