@@ -157,6 +157,8 @@ pub(crate) struct OutgoingRay {
     pub(crate) dir: Vec3,
     /// Solid-angle density of `dir`, where next-event estimation competes.
     pub(super) pdf: Option<f64>,
+    /// A smooth surface has reflected or refracted it.
+    pub(super) bent: bool,
     pub(crate) throughput: Rgb,
     pub(super) alive: Alive,
     /// Segments before the ray.
@@ -168,7 +170,7 @@ impl OutgoingRay {
     pub(super) fn starting(vertex: Vertex, dir: Vec3, throughput: Rgb) -> Self {
         // Roulette must not end paths for the filter's sake: its derivative needs them.
         let alive = Alive::new(Rgb::ONE);
-        Self { node: 0, vertex, dir, pdf: None, throughput, alive, segments: 0 }
+        Self { node: 0, vertex, dir, pdf: None, bent: false, throughput, alive, segments: 0 }
     }
 
     /// What Russian roulette takes it to carry.

@@ -67,6 +67,7 @@ impl Tracer<'_> {
         if !parted {
             drawn = scattering.sample(stop.from, M::GIVEN, &mut self.rng);
         }
+        let mut bent = false;
         let (to, pdf, value) = match drawn? {
             Drawn::Spread(to, pdf) if pdf > 0.0 && !straight_only => {
                 (to, Some(pdf), M::value(&scattering, stop.from, to))
@@ -76,6 +77,7 @@ impl Tracer<'_> {
             Drawn::Specular(s) => {
                 // Like a null interface, a pane that light goes straight through adds no depth.
                 segments -= u32::from(s.straight && world.any_straight && segments > 0);
+                bent = !s.straight;
                 (s.w, None, s.weight)
             }
         };
@@ -97,6 +99,7 @@ impl Tracer<'_> {
             vertex: stop.vertex,
             dir: to,
             pdf,
+            bent,
             throughput: stop.throughput * sigma_s * (value * inv_pdf),
             alive,
             segments,
@@ -116,6 +119,8 @@ impl Tracer<'_> {
         let (world, counters) = (self.world, &mut self.counters);
         if world.hides_emitters && M::EMISSION && leaving.segments == 0 {
             world.cast_past_emitters(&leaving.vertex, leaving.dir, &mut ray, counters);
+        } else if leaving.bent {
+            world.cast_bent(&leaving.vertex, leaving.dir, &mut ray, counters);
         } else {
             world.cast(&leaving.vertex, leaving.dir, &mut ray, counters);
         }

@@ -7,9 +7,20 @@ use drt_math::{Rgb, Rng, Vec3};
 use drt_medium::TrackingStats;
 
 use crate::model::rendering::Counters;
+use crate::model::surface::agree;
 use crate::world::geometry::Prim;
 use crate::world::vertex::{Kind, SurfacePoint, Vertex};
 use crate::world::{Crossing, RayPath, World, intervals};
+
+/// What a ray goes through besides null interfaces.
+#[derive(Clone, Copy, PartialEq)]
+enum Past {
+    Nothing,
+    /// All area emitters.
+    Emitters,
+    /// One triangle.
+    Facet(u32),
+}
 
 impl World {
     fn skip_of(v: &Vertex) -> Skip {
@@ -23,7 +34,7 @@ impl World {
     /// Follows a ray from `v` along the unit direction `dir` to the first surface that scatters.
     pub(crate) fn cast(&self, v: &Vertex, dir: Vec3, path: &mut RayPath, counters: &mut Counters) {
         path.medium = self.medium_toward(v, dir);
-        self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v, false);
+        self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v, Past::Nothing);
     }
 
     /// As [`World::cast`], past area emitters as if they were null interfaces.
@@ -35,7 +46,7 @@ impl World {
         counters: &mut Counters,
     ) {
         path.medium = self.medium_toward(v, dir);
-        self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v, true);
+        self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v, Past::Emitters);
     }
 
     /// As [`World::cast`] from a point on an edge, past the edge's own faces.
@@ -50,7 +61,26 @@ impl World {
     ) {
         path.medium = medium;
         let v = Vertex { x, medium, kind: Kind::Point };
-        self.cast_from(x, Skip::two(faces[0], faces[1]), dir, path, counters, &v, false);
+        self.cast_from(x, Skip::two(faces[0], faces[1]), dir, path, counters, &v, Past::Nothing);
+    }
+
+    /// As [`World::cast`], along a single direction that a smooth surface reflects or refracts into. If it leads to the other side of the facet than of
+    /// the shading normal, the ray goes through the facet by which it comes back to the latter side.
+    pub(crate) fn cast_bent(
+        &self,
+        v: &Vertex,
+        dir: Vec3,
+        path: &mut RayPath,
+        counters: &mut Counters,
+    ) {
+        self.cast(v, dir, path, counters);
+        let (Kind::Surface(s), Some((end, _))) = (&v.kind, path.end) else { return };
+        let outwards = |s: &SurfacePoint| s.ng.dot(dir) > 0.0;
+        let returns = end.shape == s.shape && outwards(&end) != outwards(s);
+        if returns && self.is_smooth(s) && !agree(s.ng, s.ns, dir) {
+            let past = Past::Facet(end.prim);
+            self.cast_from(v.x, Self::skip_of(v), dir, path, counters, v, past);
+        }
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -63,7 +93,7 @@ impl World {
         path: &mut RayPath,
         counters: &mut Counters,
         v: &Vertex,
-        past_emitters: bool,
+        past: Past,
     ) {
         path.crossings.clear();
         path.end = None;
@@ -83,10 +113,14 @@ impl World {
         }
         counters.rays += 1;
         let ray = Ray { origin, dir, t_max: f64::INFINITY };
-        let end = if self.any_null || past_emitters {
+        let end = if self.any_null || past != Past::Nothing {
             let blocks = |prim: u32| {
                 let shape = self.geometry.prim(prim).shape;
-                let passed = past_emitters && self.scene.shapes[shape as usize].emitter.is_some();
+                let passed = match past {
+                    Past::Nothing => false,
+                    Past::Emitters => self.scene.shapes[shape as usize].emitter.is_some(),
+                    Past::Facet(facet) => prim == facet,
+                };
                 !(self.is_null(shape) || passed)
             };
             let end = self.geometry.bvh.closest_through(&ray, skip, blocks, &mut path.hits);
@@ -322,11 +356,49 @@ pub(crate) fn short_of(x: Vec3, distance: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use drt_geom::procedural::icosphere;
+    use drt_math::vec3;
+
     use super::*;
+    use crate::derivative::tests::scenes::*;
+    use crate::model::surface::{Bsdf, Dielectric};
+    use crate::world::cache::PreparedCache;
+    use crate::world::lights::EmitterMask;
+
+    /// A ray that leaves a coarse ball by the shading normal does not meet it again, even where it passes under the facets.
+    #[test]
+    fn bent_rays_leave_by_shading_normals() {
+        let ball = icosphere(1).with_smooth_normals();
+        let ball = ShapeBuilder::new(ball, Bsdf::Dielectric(Dielectric::default()));
+        let scene = SceneBuilder::new().shape("ball", ball);
+        let scene = seen(scene, [vec3(0.0, 0.0, 4.0), Vec3::ZERO], 3);
+        let mut kept = PreparedCache::default();
+        let world = World::new(scene, 0, Some(3), None, EmitterMask::All, &mut kept).unwrap();
+        let (mut path, mut counters) = (RayPath::default(), Counters::default());
+        let mut rng = Rng::new(3, 0, 0);
+        let (mut under, mut trapped) = (0, 0);
+        for _ in 0..2000 {
+            let [a, b] = rng.next_2d();
+            let prim = (rng.next_f64() * 80.0) as u32;
+            let (point, x) = world.point(prim, [a * (1.0 - b), b]);
+            let across = point.ns.cross(vec3(rng.next_f64(), rng.next_f64(), 0.5)).normalize();
+            let dir = (across + point.ns * 0.02).normalize();
+            if agree(point.ng, point.ns, dir) {
+                continue;
+            }
+            let v = Vertex { x, medium: None, kind: Kind::Surface(point) };
+            world.cast_bent(&v, dir, &mut path, &mut counters);
+            assert!(path.end.is_none(), "{point:?} {dir:?}");
+            world.cast(&v, dir, &mut path, &mut counters);
+            under += 1;
+            trapped += u32::from(path.end.is_some());
+        }
+        assert!(under > 200 && trapped == under, "{trapped} of {under}");
+    }
 
     #[test]
     fn distances_give_way_by_rounding_alone() {
-        let x = drt_math::vec3(1e6, -2.0, 3.0);
+        let x = vec3(1e6, -2.0, 3.0);
         assert_eq!(short_of(x, f64::INFINITY), f64::INFINITY);
         let given = 1.5 - short_of(x, 1.5);
         assert!(given > 1e-10 && given < 1e-8, "{given}");

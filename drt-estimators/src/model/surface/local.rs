@@ -6,18 +6,34 @@
 //! jumps that no boundary term knows. So the value fades to zero over the last [`FADE`] of both
 //! cosines, and the measurement contribution has no jumps besides visibility, which its derivative
 //! relies on.
+//!
+//! # Smooth surfaces
+//!
+//! Light that mirrors and glass scatter does not fade: it meets so many horizons inside of glass that it would lose one percent of itself.
+//! What happens at a horizon is continuous by other means. Let a surface be seen from one side of the facet and the other side of the
+//! shading normal. Where the shading normal is across the ray, all light is reflected, in the ray's own direction. So it is wherever the shading
+//! normal points farther away: the ray goes straight on through the facet, with the weight that reflection has at the horizon.
+//!
+//! A single direction may also lead to the other side of the facet than it does by the shading normal. If the facet decided, a ray that
+//! leaves a glass ball at a grazing angle would be trapped under its facets, and creep from one to the next. The shading normal decides,
+//! and the ray passes the body's next facet as if that was not there
+//! ([`World::cast_bent`](crate::world::World::cast_bent)). On a ball, where a grazing ray is reflected or refracted outwards, this makes
+//! light continuous at both horizons. A ray that is reflected on the inside, at an angle smaller than that of the facets, leaves the body instead.
 
 use drt_geom::edges::Lobes;
 use drt_math::{Real, Rgb, RgbVec, Vec3};
 
 use crate::model::surface::{
-    Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given, RoughnessPartner,
-    SpecularSample, SpecularValue,
+    Bend, Bsdf, BsdfGradient, BsdfParams, DirectionPartner, DirectionSample, Given,
+    RoughnessPartner, SpecularSample, SpecularValue,
 };
 use crate::model::texture::TexturePoint;
 
 /// Cosine below which interpolated surfaces fade: 0.0025 % of a sphere's image.
 const FADE: f64 = 0.005;
+
+/// The cosine of a direction behind the shading horizon with the nearest normal that it is in front of.
+const HORIZON: f64 = 1e-12;
 
 /// A BSDF with the unit normals of a point. Directions are unit, away from the surface.
 #[derive(Clone, Copy, Debug)]
@@ -50,6 +66,12 @@ impl Bsdf {
 fn fade(cosine: f64) -> (f64, f64) {
     let c = Real::abs(cosine) / FADE;
     if c < 1.0 { (c, cosine.signum() / FADE) } else { (1.0, 0.0) }
+}
+
+/// A geometric and a shading normal agree on the side that a direction points to. Normals of which one is the other way round do not count as
+/// disagreeing: there the mesh's corners are listed against its normals.
+pub(crate) fn agree(ng: Vec3, ns: Vec3, w: Vec3) -> bool {
+    ng.dot(w) * ns.dot(w) >= 0.0 || ng.dot(ns) <= 0.0
 }
 
 impl LocalBsdf<'_> {
@@ -86,14 +108,34 @@ impl LocalBsdf<'_> {
         (d, by_ng)
     }
 
+    /// The normal of the facet and that of the shading agree on the side of a direction.
+    fn agrees(&self, w: Vec3) -> bool {
+        !self.interpolated || agree(self.ng, self.ns, w)
+    }
+
+    /// The normal that light from a direction is reflected and refracted by: if the shading normal points to the other side than the facet's,
+    /// the nearest one that does not.
+    fn specular_normal(&self, from: Vec3) -> Vec3 {
+        if self.agrees(from) {
+            return self.ns;
+        }
+        let side = f64::copysign(HORIZON, self.ng.dot(from));
+        self.ns.reject(from).normalize() + from * side
+    }
+
     /// The weight that [`Self::sample_specular`] gives a single direction; `None` of others.
     pub(crate) fn specular(&self, wo: Vec3, wi: Vec3) -> Option<SpecularValue> {
-        self.bsdf.specular(self.at.as_ref(), wo, wi, self.ns)?.of_weight()
+        let normal = self.specular_normal(wo);
+        let found = self.bsdf.specular(self.at.as_ref(), wo, wi, normal)?.of_weight()?;
+        if self.agrees(wo) {
+            return Some(found);
+        }
+        Some(SpecularValue { by_cosine: Rgb::ZERO, bend: Bend::Straight, ..found })
     }
 
     /// The probability with which [`Self::sample_specular`] draws any direction.
     pub(crate) fn single_chance(&self, from: Vec3) -> f64 {
-        self.bsdf.single_chance(self.at.as_ref(), from, self.ns)
+        self.bsdf.single_chance(self.at.as_ref(), from, self.specular_normal(from))
     }
 
     /// Light is scattered into single directions, and other light into all directions of a solid angle.
@@ -123,8 +165,7 @@ impl LocalBsdf<'_> {
         self.bsdf.sample_at(self.at.as_ref(), from, self.ns, u, given)
     }
 
-    /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`]. These do not fade: light that goes
-    /// about in glass meets so many horizons that it would lose one percent.
+    /// Draws one of the single directions of a smooth surface; see [`Bsdf::sample_specular`].
     #[inline]
     pub(crate) fn sample_specular(
         &self,
@@ -132,7 +173,8 @@ impl LocalBsdf<'_> {
         choice: f64,
         given: Given,
     ) -> Option<SpecularSample> {
-        self.bsdf.sample_specular_at(self.at.as_ref(), from, self.ns, choice, given)
+        let normal = self.specular_normal(from);
+        self.bsdf.sample_specular_at(self.at.as_ref(), from, normal, choice, given)
     }
 
     /// Density per steradian with which [`Self::sample`] draws `to`.

@@ -85,7 +85,7 @@ pub use crate::model::surface::diffuse::Diffuse;
 pub(crate) use crate::model::surface::direction_partner::{DirectionPartner, Turn};
 use crate::model::surface::facet::Facet;
 pub(crate) use crate::model::surface::framed::by_corners;
-pub(crate) use crate::model::surface::local::LocalBsdf;
+pub(crate) use crate::model::surface::local::{LocalBsdf, agree};
 pub use crate::model::surface::measured::{Measured, MeasuredError, MeasuredTables, Tensor};
 pub use crate::model::surface::microfacet::Distribution;
 use crate::model::surface::model::Model;

@@ -6,6 +6,7 @@ use drt_math::Moments;
 use drt_math::testing::z_score;
 
 use crate::model::surface::fresnel::{conductor_reflected, dielectric_reflected};
+use crate::model::surface::specular::Bend;
 use crate::model::surface::tests::*;
 use crate::model::texture::Texture;
 
@@ -224,5 +225,39 @@ fn an_index_that_varies_is_not_differentiated() {
         let textured = Textured::new(bsdf, alloc::vec![(Property::Eta, texture)]);
         let textured = Bsdf::Textured(alloc::boxed::Box::new(textured.expect("a texture")));
         assert!(textured.undifferentiated(Property::Eta).is_some());
+    }
+}
+
+/// Behind the horizon of the shading normal, but in front of the facet, light is reflected as at the horizon.
+#[test]
+fn light_is_continuous_at_shading_horizons() {
+    let metal = Conductor { specular_reflectance: Rgb::splat(0.9), ..Conductor::default() };
+    let glass = Dielectric { eta: 1.5, ..Dielectric::default() };
+    for (bsdf, part) in [(Bsdf::Conductor(metal), 0.9), (Bsdf::Dielectric(glass), 1.0)] {
+        let ns = normal();
+        for side in [1.0, -1.0] {
+            // A metal has no inside.
+            if side < 0.0 && part < 1.0 {
+                continue;
+            }
+            // The facet is seen at a larger angle than the normal that is interpolated.
+            let towards = (tilted(90.0) - ns * ns.dot(tilted(90.0))).normalize();
+            let ng = (ns + towards * (0.2 * side)).normalize();
+            let local = bsdf.at(None, ng, ns, true);
+            let from = |cosine: f64| (towards + ns * (side * cosine)).normalize();
+            for cosine in [1e-7, -1e-7, -0.05, -0.15] {
+                let from = from(cosine);
+                let s = local.sample_specular(from, 0.5, Given::Wo).expect("reflected");
+                let value = local.specular(from, s.w).expect("a single direction");
+                assert!((s.w + from).max_abs() < 1e-6, "{side} {cosine}: {:?}", s.w);
+                assert!((s.weight.g - part).abs() < 1e-5, "{side} {cosine}: {:?}", s.weight);
+                assert!((value.value - s.weight).g.abs() < 1e-9);
+                assert!(cosine > 0.0 || (value.by_cosine.g == 0.0 && value.bend == Bend::Straight));
+            }
+            // Planted: the shading normal alone.
+            let alone = bsdf.at(None, ng, ns, false);
+            let s = alone.sample_specular(from(-0.05), 0.5, Given::Wo);
+            assert!(s.is_none_or(|s| (s.w + from(-0.05)).max_abs() > 0.05));
+        }
     }
 }
