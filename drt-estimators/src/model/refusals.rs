@@ -55,7 +55,7 @@ impl Scene {
             }
         }
         if moves {
-            self.refuse_beside_smooth_surfaces(parameter)?;
+            self.refuse_smooth_emitters(parameter)?;
         }
         if self.hides_something() {
             let reason = ElementError::HiddenEmitters { parameter: parameter.into() };
@@ -64,21 +64,26 @@ impl Scene {
         Ok(())
     }
 
-    /// Refuses derivatives by what moves of light that smooth surfaces have no terms for: that of points and directions, whose shadows
-    /// would move rays behind such surfaces, and that which they emit themselves.
-    fn refuse_beside_smooth_surfaces(&self, parameter: &str) -> Result<(), Error> {
-        let Some(smooth) = self.first_smooth() else { return Ok(()) };
-        let (parameter, surface) = (parameter.into(), self.name_of(Target::Shape(smooth)));
-        if let Some(e) = self.emitters.iter().position(|e| e.item.emitter.is_delta()) {
-            let reason = ElementError::DeltaLightPastSmooth { parameter, surface };
-            return Err(unusable(&self.emitters[e].id, "emitter", e, reason));
-        }
+    /// Refuses derivatives of the light that a smooth surface emits by what moves: what the surface reflects moves otherwise.
+    fn refuse_smooth_emitters(&self, parameter: &str) -> Result<(), Error> {
         let emits = |s: &Shape| s.emitter.is_some() && self.bsdfs[s.bsdf].item.is_smooth();
-        if let Some(i) = self.shapes.iter().position(emits) {
-            let reason = ElementError::SmoothEmitter { parameter };
-            return Err(unusable(&self.shapes[i].id, "shape", i, reason));
-        }
-        Ok(())
+        let Some(i) = self.shapes.iter().position(emits) else { return Ok(()) };
+        let reason = ElementError::SmoothEmitter { parameter: parameter.into() };
+        Err(unusable(&self.shapes[i].id, "shape", i, reason))
+    }
+
+    /// Refuses derivatives by what moves of the light of points and directions that is seen past smooth surfaces, for an estimator that
+    /// does not know how its shadows move there.
+    pub(crate) fn refuse_delta_lights_past_smooth_surfaces(
+        &self,
+        parameter: &str,
+    ) -> Result<(), Error> {
+        let Some(smooth) = self.first_smooth() else { return Ok(()) };
+        let lamp = self.emitters.iter().position(|e| e.item.emitter.is_delta());
+        let Some(e) = lamp else { return Ok(()) };
+        let (parameter, surface) = (parameter.into(), self.name_of(Target::Shape(smooth)));
+        let reason = ElementError::DeltaLightPastSmooth { parameter, surface };
+        Err(unusable(&self.emitters[e].id, "emitter", e, reason))
     }
 
     /// The first shape of a smooth surface.
@@ -135,7 +140,10 @@ mod tests {
         let sensor = Sensor::look_at(at, Lens::default(), [2, 2], filter).expect("a camera");
         let item = SceneSensor { sensor, medium: Surrounding::Counted, sample_count: None };
         scene.sensors.push(Named::new("camera", item));
+        assert!(crate::Session::new(&scene, &parameters, &crate::Settings::default()).is_ok());
+        scene.bsdfs.push(Named::new("veil", Bsdf::Null));
         let message = crate::Session::new(&scene, &parameters, &crate::Settings::default());
+        scene.bsdfs.pop();
         let message = message.err().expect("a refusal").to_string();
         assert!(message.contains(&name) && message.contains("bulb"), "{message}");
         assert!(message.contains("`spin` moves something"), "{message}");

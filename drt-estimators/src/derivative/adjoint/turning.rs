@@ -22,7 +22,7 @@ pub(super) struct RayMotion<'a> {
     pub(super) chain: &'a [ChainPart],
     /// Of shadows.
     pub(super) shadows: &'a [ShadowPart],
-    /// That which casts them.
+    /// That which casts them, or which the chain is connected to.
     pub(super) light: Option<&'a LightSample>,
 }
 
@@ -76,6 +76,11 @@ impl RayMotion<'_> {
                     send_to(matter.point, SurfaceAdjoint::of_place(g), sink);
                 }
                 Mover::Index(bsdf) => send_index(bsdf, g.dot(Vec3::X), sink),
+                Mover::Lamp => {
+                    if let Some(light) = self.light {
+                        send_to_light(light, &g, sink);
+                    }
+                }
                 Mover::Normal(point) => {
                     send_to(point, SurfaceAdjoint { ns: g, ..SurfaceAdjoint::default() }, sink);
                 }

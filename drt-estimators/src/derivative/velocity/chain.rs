@@ -15,6 +15,9 @@
 //! jump. [`Evened`] derivatives do not: they are those of a surface whose tangent plane has the shading normal, and whose curvature is
 //! interpolated, too. They differ from the others by as much as triangles are large, and stay
 //! bounded where a ray grazes.
+//!
+//! The connection of a surface point y to a point or directional emitter is a ray of the same kind: it leaves y along w = (p - y) / |p - y|,
+//! or against the flow of a directional emitter, both functions of u and of the emitter.
 
 use alloc::vec::Vec;
 use core::array::from_fn;
@@ -25,6 +28,7 @@ use crate::derivative::velocity::EdgeMatter;
 use crate::model::surface::Bend;
 use crate::sampling::record::Node;
 use crate::world::World;
+use crate::world::lights::{LightKind, LightSample};
 use crate::world::scatter::Scattering;
 use crate::world::vertex::{MaterialPoint, SurfacePoint};
 
@@ -44,9 +48,28 @@ pub(crate) struct Link {
     corners: [Vec3; 3],
     /// Unit shading normals of the corners, where they are interpolated.
     normals: Option<[Vec3; 3]>,
-    bend: Bend,
+    onward: Onward,
     /// Of the surface.
     bsdf: usize,
+}
+
+/// Where a ray goes on to from a surface.
+#[derive(Clone, Copy, Debug)]
+enum Onward {
+    /// Where the surface reflects, refracts or passes it to.
+    Bent(Bend),
+    /// To an emitter, as a connection.
+    To(Lamp),
+}
+
+/// A point or directional emitter that a surface point is connected to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lamp {
+    /// Its position, or the unit direction of its flow where it is at infinity.
+    place: Vec3,
+    at_infinity: bool,
+    /// It moves.
+    moves: bool,
 }
 
 /// How a surface of a chain changes.
@@ -60,6 +83,7 @@ pub(crate) struct LinkChange {
 
 /// Where a chain meets a surface, by u.
 struct LinkHit {
+    y: Vec3<ByU>,
     /// The unit direction in which it arrives, and over which distance.
     w: Vec3<ByU>,
     distance: ByU,
@@ -96,6 +120,8 @@ pub(crate) enum Mover {
     Normal(MaterialPoint),
     /// The rate of the index of refraction of a BSDF, as if along the first axis.
     Index(usize),
+    /// The velocity of the emitter that the chain ends at, or the rate of its flow's direction.
+    Lamp,
 }
 
 /// A ray of a chain by u: its origin x and its unit direction w, each with the derivatives by both coordinates.
@@ -136,6 +162,54 @@ struct Triangle<T> {
     normals: Option<[Vec3<T>; 3]>,
     /// By how much the index of refraction is higher than it is.
     more: T,
+    /// By how much the emitter behind it is elsewhere than it is.
+    shift: Vec3<T>,
+}
+
+/// The rates of what decides where a ray goes on to.
+struct OnwardRates {
+    x: Vec3<ByU>,
+    w: Vec3<ByU>,
+    n: Vec3<ByU>,
+    index: f64,
+    lamp: Vec3<ByU>,
+}
+
+impl OnwardRates {
+    const STILL: Self = Self {
+        x: Vec3 { x: ZERO, y: ZERO, z: ZERO },
+        w: Vec3 { x: ZERO, y: ZERO, z: ZERO },
+        n: Vec3 { x: ZERO, y: ZERO, z: ZERO },
+        index: 0.0,
+        lamp: Vec3 { x: ZERO, y: ZERO, z: ZERO },
+    };
+}
+
+impl Lamp {
+    /// The emitter of a connection, which may move; `None` of emitters with an area.
+    pub(crate) fn of(light: &LightSample, moves: bool) -> Option<Self> {
+        match light.kind {
+            LightKind::Position => Some(Self { place: light.y, at_infinity: false, moves }),
+            LightKind::Direction => Some(Self { place: -light.w, at_infinity: true, moves }),
+            LightKind::Area(_) | LightKind::Environment => None,
+        }
+    }
+
+    /// The unit direction towards it from a place, where it is elsewhere by a `shift`.
+    fn seen_from<T: Real>(&self, x: Vec3<T>, shift: Vec3<T>) -> Vec3<T> {
+        let place = self.place.lift() + shift;
+        if self.at_infinity { -place.normalize() } else { (place - x).normalize() }
+    }
+}
+
+impl Onward {
+    /// The unit direction in which a ray goes on from x, where it arrives along w and n is the unit normal.
+    fn direction<T: Real>(self, ray: &Ray<T>, n: Vec3<T>, more: T, shift: Vec3<T>) -> Vec3<T> {
+        match self {
+            Self::Bent(bend) => bend.onward(ray.w, n, more),
+            Self::To(lamp) => lamp.seen_from(ray.x, shift),
+        }
+    }
 }
 
 /// A ray over any scalar.
@@ -160,7 +234,14 @@ impl Link {
         let corners = CORNERS.map(|bary| world.point(point.prim, bary));
         let normals = world.is_smooth(&point).then(|| corners.map(|(corner, _)| corner.ns));
         let bsdf = world.scene.shapes[point.shape as usize].bsdf;
-        Self { point, corners: corners.map(|(_, x)| x), normals, bend, bsdf }
+        let (corners, onward) = (corners.map(|(_, x)| x), Onward::Bent(bend));
+        Self { point, corners, normals, onward, bsdf }
+    }
+
+    /// A point of a surface that is connected to an emitter.
+    pub(crate) fn connected(world: &World, point: SurfacePoint, lamp: Lamp) -> Self {
+        let at = Self::new(world, point, Bend::Straight);
+        Self { normals: None, onward: Onward::To(lamp), ..at }
     }
 
     /// Where a ray along a unit direction w meets the triangle's plane, and the unit shading normal there, on the side that w points to.
@@ -182,7 +263,12 @@ impl Link {
 
     fn triangle<T: Real>(&self) -> Triangle<T> {
         let lift = |of: [Vec3; 3]| of.map(Vec3::lift);
-        Triangle { corners: lift(self.corners), normals: self.normals.map(lift), more: T::zero() }
+        Triangle {
+            corners: lift(self.corners),
+            normals: self.normals.map(lift),
+            more: T::zero(),
+            shift: Vec3::zero(),
+        }
     }
 
     fn pass<T: Real>(&self, ray: Ray<T>, triangle: &Triangle<T>) -> Ray<T> {
@@ -199,7 +285,9 @@ impl Link {
                 na * (T::one() - s - t) + nb * s + nc * t
             }
         };
-        Ray { x, w: self.bend.onward(ray.w, n.normalize(), triangle.more) }
+        let arrives = Ray { x, w: ray.w };
+        let Triangle { more, shift, .. } = *triangle;
+        Ray { x, w: self.onward.direction(&arrives, n.normalize(), more, shift) }
     }
 }
 
@@ -207,6 +295,10 @@ impl Link {
     /// True where normals are interpolated.
     pub(crate) fn is_interpolated(&self) -> bool {
         self.normals.is_some()
+    }
+
+    fn lamp_moves(&self) -> bool {
+        matches!(self.onward, Onward::To(Lamp { moves: true, .. }))
     }
 
     fn corner(&self, k: usize) -> MaterialPoint {
@@ -254,7 +346,7 @@ impl Link {
             let n = self.point.ng.lift();
             let length = ByU::from(1.0);
             let distance = (y - x).dot(w);
-            return LinkHit { w, distance, n, weights, length, slope, grazing: 0.0 };
+            return LinkHit { y, w, distance, n, weights, length, slope, grazing: 0.0 };
         };
         let mut sum = Vec3::zero();
         for ((normal, corner), weight) in normals.iter().zip(slopes).zip(weights) {
@@ -265,7 +357,8 @@ impl Link {
         }
         let length = sum.length();
         let n = sum * length.recip();
-        LinkHit { w, distance: (y - x).dot(w), n, weights, length, slope, grazing: GRAZING }
+        let distance = (y - x).dot(w);
+        LinkHit { y, w, distance, n, weights, length, slope, grazing: GRAZING }
     }
 }
 
@@ -278,33 +371,31 @@ impl LinkHit {
     }
 
     /// How the ray that goes on moves, as the one that arrives does.
-    fn pass(&self, bend: Bend, rate: &RayVelocity) -> RayVelocity {
+    fn pass(&self, onward: Onward, rate: &RayVelocity) -> RayVelocity {
         let ray = rate.x + rate.w * self.distance;
         let x = ray - self.w * self.later(ray);
-        RayVelocity { x, w: self.turn(bend, rate.w, self.slope * x, 0.0) }
+        let n = self.slope * x;
+        self.turned(onward, OnwardRates { x, w: rate.w, n, ..OnwardRates::STILL })
     }
 
     /// How it moves as the surface does, by the velocity of the surface's point and the rate of its normal.
-    fn moved(&self, bend: Bend, u: Vec3<ByU>, n: Vec3<ByU>) -> RayVelocity {
+    fn moved(&self, onward: Onward, u: Vec3<ByU>, n: Vec3<ByU>) -> RayVelocity {
         let x = self.w * self.later(u);
-        RayVelocity { x, w: self.turn(bend, Vec3::zero(), n + self.slope * (x - u), 0.0) }
+        let n = n + self.slope * (x - u);
+        self.turned(onward, OnwardRates { x, n, ..OnwardRates::STILL })
     }
 
-    /// How it moves as the surface's index of refraction rises.
-    fn bent(&self, bend: Bend) -> RayVelocity {
-        let still = Vec3::zero();
-        RayVelocity { x: still, w: self.turn(bend, still, still, 1.0) }
-    }
-
-    fn turn(&self, bend: Bend, w: Vec3<ByU>, n: Vec3<ByU>, index: f64) -> Vec3<ByU> {
-        let n = n.reject(self.n);
+    fn turned(&self, onward: Onward, rates: OnwardRates) -> RayVelocity {
+        let OnwardRates { x, w, n, index, lamp } = rates;
         let variable = |v: Vec3<ByU>, rate: Vec3<ByU>| -> Vec3<Dual<ByU, 1>> {
             let (v, rate) = (v.to_array(), rate.to_array());
             from_fn::<_, 3, _>(|k| Dual::new(v[k], [rate[k]])).into()
         };
-        let more = Dual::new(ByU::from(0.0), [ByU::from(index)]);
-        let onward = bend.onward(variable(self.w, w), variable(self.n, n), more);
-        onward.to_array().map(|c| c.eps[0]).into()
+        let more = Dual::new(ZERO, [ByU::from(index)]);
+        let arrives = Ray { x: variable(self.y, x), w: variable(self.w, w) };
+        let (n, shift) = (variable(self.n, n.reject(self.n)), variable(Vec3::zero(), lamp));
+        let onward = onward.direction(&arrives, n, more, shift);
+        RayVelocity { x, w: onward.to_array().map(|c| c.eps[0]).into() }
     }
 }
 
@@ -335,7 +426,7 @@ pub(crate) fn evened(
         before = [ray.x, ray.w];
         let rates = now.by_movers.iter_mut().flat_map(|m| &mut m.axes);
         for rate in now.by_u.iter_mut().chain(rates) {
-            *rate = meeting.pass(link.bend, rate);
+            *rate = meeting.pass(link.onward, rate);
         }
         let LinkChange { moves, bends } = changes(&link.point);
         if moves {
@@ -343,8 +434,16 @@ pub(crate) fn evened(
         }
         if bends {
             let still = RayVelocity { x: Vec3::zero(), w: Vec3::zero() };
-            let axes = [meeting.bent(link.bend), still, still];
+            let rates = OnwardRates { index: 1.0, ..OnwardRates::STILL };
+            let axes = [meeting.turned(link.onward, rates), still, still];
             now.by_movers.push(RayByMover { mover: Mover::Index(link.bsdf), axes });
+        }
+        if link.lamp_moves() {
+            let axes = AXES.map(|axis| {
+                let rates = OnwardRates { lamp: axis.lift(), ..OnwardRates::STILL };
+                meeting.turned(link.onward, rates)
+            });
+            now.by_movers.push(RayByMover { mover: Mover::Lamp, axes });
         }
         now.clone()
     };
@@ -357,13 +456,13 @@ impl Link {
         let places = (0..3).map(move |k| {
             let axes = AXES.map(|axis| {
                 let turned = if self.is_interpolated() { still } else { self.normal_rate(k, axis) };
-                meeting.moved(self.bend, axis.lift() * meeting.weights[k], turned)
+                meeting.moved(self.onward, axis.lift() * meeting.weights[k], turned)
             });
             RayByMover { mover: Mover::Place(EdgeMatter::of(self.corner(k))), axes }
         });
         let normals = (0..3).filter(|_| self.is_interpolated()).map(move |k| {
             let share = meeting.weights[k] / meeting.length;
-            let axes = AXES.map(|axis| meeting.moved(self.bend, still, axis.lift() * share));
+            let axes = AXES.map(|axis| meeting.moved(self.onward, still, axis.lift() * share));
             RayByMover { mover: Mover::Normal(self.corner(k)), axes }
         });
         places.chain(normals)
@@ -372,6 +471,8 @@ impl Link {
 
 /// The cosine of the grazing angle below which [`Evened`] derivatives are less than those of a smooth surface.
 const GRAZING: f64 = 0.05;
+
+const ZERO: ByU = Dual { re: 0.0, eps: [0.0; 2] };
 
 const AXES: [Vec3; 3] = [Vec3::X, Vec3::Y, Vec3::Z];
 
@@ -446,6 +547,11 @@ pub(crate) fn ray_by_movers(
             let ray = through(link.pass(before, &Triangle { more, ..still }), i + 1);
             found.push(RayByMover { mover: Mover::Index(link.bsdf), axes: axes(&ray, 0) });
         }
+        if link.lamp_moves() {
+            let shift = variable(Vec3::ZERO, 0);
+            let ray = through(link.pass(before, &Triangle { shift, ..still }), i + 1);
+            found.push(RayByMover { mover: Mover::Lamp, axes: axes(&ray, 0) });
+        }
         before = link.pass(before, &still);
     }
     found
@@ -479,8 +585,8 @@ mod tests {
     }
 
     /// A mirror, an interface and a surface that light goes straight through, each about across the z axis, at places that a ray along
-    /// it meets one after the other.
-    fn chain(rng: &mut Rng, interpolated: bool) -> Vec<Link> {
+    /// it meets one after the other. In place of the mirror a surface may be connected to a lamp, which may be at infinity.
+    fn chain(rng: &mut Rng, interpolated: bool, lamp: Option<bool>) -> Vec<Link> {
         let bends = [Bend::refraction(1.5, 1.0), Bend::Straight, Bend::Mirror];
         let link = |(i, bend): (u32, Bend)| {
             let place = Vec3::Z * f64::from(i + 1);
@@ -490,15 +596,16 @@ mod tests {
             let ng = (b - a).cross(c - a).normalize();
             let normals = corners.map(|_| (ng + next(rng) * 0.3).normalize());
             let point = SurfacePoint { prim: 0, shape: i, triangle: 0, bary: [0.3; 2], ng, ns: ng };
-            Link {
-                point,
-                corners,
-                normals: interpolated.then_some(normals),
-                bend,
-                bsdf: i as usize,
-            }
+            let (normals, onward) = (interpolated.then_some(normals), Onward::Bent(bend));
+            Link { point, corners, normals, onward, bsdf: i as usize }
         };
-        (0..).zip(bends).map(link).collect()
+        let mut links: Vec<Link> = (0..).zip(bends).map(link).collect();
+        if let Some(at_infinity) = lamp {
+            let place = if at_infinity { vec3(0.6, 0.0, 0.8) } else { vec3(0.4, 0.3, 2.0) };
+            links[2].onward = Onward::To(Lamp { place, at_infinity, moves: true });
+            links[2].normals = None;
+        }
+        links
     }
 
     fn traced(start: Vec3, frame: &Frame, u: [f64; 2], links: &[Link]) -> [Vec3; 2] {
@@ -523,12 +630,14 @@ mod tests {
 
     const H: f64 = 1e-4;
 
+    const LAMPS: [Option<bool>; 3] = [None, Some(false), Some(true)];
+
     /// Derivatives by u are differences, and so are those of derivatives.
     #[test]
     fn derivatives_are_differences() {
         let mut rng = Rng::new(5, 0, 0);
         for round in 0..20 {
-            let links = chain(&mut rng, round % 2 == 0);
+            let links = chain(&mut rng, round % 2 == 0, LAMPS[round % 3]);
             let start = next(&mut rng) * 0.5 - Vec3::Z;
             let frame = Frame::from_normal((Vec3::Z + next(&mut rng) * 0.2).normalize());
             let rays = rays_by_u(start, &frame, &links);
@@ -570,7 +679,7 @@ mod tests {
     fn rates_are_differences() {
         let mut rng = Rng::new(6, 0, 0);
         for round in 0..10 {
-            let links = chain(&mut rng, round % 2 == 0);
+            let links = chain(&mut rng, round % 2 == 0, LAMPS[round % 3]);
             let start = next(&mut rng) * 0.5 - Vec3::Z;
             let frame = Frame::from_normal((Vec3::Z + next(&mut rng) * 0.2).normalize());
             let found = ray_by_movers(start, true, &frame, &links, |s| LinkChange {
@@ -591,8 +700,15 @@ mod tests {
                                     axis * h;
                             }
                             Mover::Index(shape) => {
-                                if let bend @ Bend::Refraction(_) = &mut links[shape].bend {
+                                if let Onward::Bent(bend @ Bend::Refraction(_)) =
+                                    &mut links[shape].onward
+                                {
                                     *bend = Bend::refraction(1.5 + h * axis.x, 1.0);
+                                }
+                            }
+                            Mover::Lamp => {
+                                if let Onward::To(lamp) = &mut links[2].onward {
+                                    lamp.place += axis * h;
                                 }
                             }
                             Mover::Normal(point) => {

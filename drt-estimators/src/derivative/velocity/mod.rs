@@ -49,8 +49,8 @@ use drt_math::{Rng, Vec3};
 
 pub(crate) use crate::derivative::velocity::blend::Blend;
 pub(crate) use crate::derivative::velocity::chain::{
-    ByU, Link, LinkChange, Mover, RayBehind, RayByMover, RayByU, RayVelocity, evened, first_ray,
-    ray_by_movers, rays_by_u,
+    ByU, Lamp, Link, LinkChange, Mover, RayBehind, RayByMover, RayByU, RayVelocity, evened,
+    first_ray, ray_by_movers, rays_by_u,
 };
 pub(crate) use crate::derivative::velocity::intersection::EdgeMatter;
 pub(crate) use crate::derivative::velocity::material::Material;

@@ -92,13 +92,21 @@ impl PathVelocities {
         self.turns.extend(turn);
     }
 
-    /// Turns the ray that started a chain of smooth surfaces with what is beside the `last` ray of the chain, too, which leaves a node.
-    #[cold]
-    fn chain(&mut self, world: &World, record: &PathRecord, node: usize, last: RayBehind) {
-        let (mut first, mut links, mut rays) = (node, Vec::new(), alloc::vec![last]);
+    /// The ray that started a chain of smooth surfaces which a node ends, and the chain's first node. `links` and `rays` are what
+    /// follows on the node, last things first: one ray more than links. `eye` is the camera's point.
+    pub(crate) fn chained<'a>(
+        &self,
+        world: &World,
+        record: &'a PathRecord,
+        eye: &'a Vertex,
+        node: usize,
+        mut links: Vec<Link>,
+        mut rays: Vec<RayBehind>,
+    ) -> Option<(usize, ChainedRay<'a>)> {
+        let mut first = node;
         let arrival = loop {
-            let Some(arrival) = &record.nodes[first].arrival else { return };
-            let Some(link) = Link::at(world, &record.nodes[first]) else { return };
+            let arrival = record.nodes[first].arrival.as_ref()?;
+            let link = Link::at(world, &record.nodes[first])?;
             let end = Some(link.point);
             links.push(link);
             let parent = arrival.parent as usize;
@@ -111,18 +119,27 @@ impl PathVelocities {
         links.reverse();
         rays.reverse();
         let parent = arrival.parent as usize;
-        let eye = world.eye_at(record.origin);
         let start = TurningRay {
-            viewer: record.nodes[parent].vertex().unwrap_or(&eye),
+            viewer: record.nodes[parent].vertex().unwrap_or(eye),
             moves: self.vertices[parent].moves,
             of_camera: (parent == 0).then_some(record.camera_ray),
             dir: arrival.dir,
             distance: arrival.distance,
-            end: Some(&links[0].point),
+            end: record.nodes[first].vertex().and_then(Vertex::surface),
             emission_alone: false,
             tangent_plane: None,
         };
-        let chain = ChainedRay { start, links: links.clone(), rays };
+        Some((first, ChainedRay { start, links, rays }))
+    }
+
+    /// Turns the ray that started a chain of smooth surfaces with what is beside the `last` ray of the chain, too, which leaves a node.
+    #[cold]
+    fn chain(&mut self, world: &World, record: &PathRecord, node: usize, last: RayBehind) {
+        let eye = world.eye_at(record.origin);
+        let (links, rays) = (Vec::new(), alloc::vec![last]);
+        let Some((first, chain)) = self.chained(world, record, &eye, node, links, rays) else {
+            return;
+        };
         let (parts, chained) = (&mut self.turn_parts, &mut self.chain_parts);
         let turn = self.field.turn_with_chain(world, &chain, parts, chained);
         let Some(turn) = turn else { return };

@@ -38,6 +38,12 @@
 //! silhouette as seen from x: x moves with u, and where it passes the plane of a face, the sum would jump. Between the facets of curved bodies
 //! the weight of a silhouette rises from zero there.
 //!
+//! # Shadows
+//!
+//! The light of a point or directional emitter that arrives at the point where the chain's last ray ends jumps at the shadows of edges.
+//! The connection from there to the emitter is one ray more: it leaves x(u) towards the emitter, and edges beside it turn the first ray by
+//! the same formulas.
+//!
 //! # Facets of smooth bodies
 //!
 //! At creases of a smooth body with the normals of its faces light jumps; they are edges beside the ray before, and so turn it. With
@@ -124,7 +130,8 @@ struct Line<'a> {
 
 /// Where a ray of a chain ends.
 struct End {
-    shape: u32,
+    /// `None` of an emitter that the chain is connected to.
+    shape: Option<u32>,
     /// The unit normal of the plane there, away from the ray's origin, and a point of that plane.
     plane: [Vec3<ByU>; 2],
 }
@@ -276,7 +283,12 @@ impl<'a> Line<'a> {
                 let foot = ray.x.re() + behind.dir * behind.distance;
                 [side(end.ng), foot].map(Vec3::lift)
             };
-            End { shape: end.shape, plane }
+            End { shape: Some(end.shape), plane }
+        });
+        // Nothing but a connection ends off all surfaces at a finite distance.
+        let end = end.or_else(|| {
+            let lamp = ray.x.re() + behind.dir * behind.distance;
+            behind.distance.is_finite().then(|| End { shape: None, plane: [ray.w, lamp.lift()] })
         });
         Self {
             ray,
@@ -432,10 +444,14 @@ impl<'a> Line<'a> {
         let Some((normals, _)) = edge.crease.filter(|_| edge.facets) else {
             return (ByU::from(1.0), false);
         };
-        let own = self.end.as_ref().is_some_and(|end| edge.within == Some(end.shape));
+        let own =
+            self.end.as_ref().is_some_and(|end| end.shape.is_some() && edge.within == end.shape);
         let crease = own && !edge.untracked;
-        let [a, b] = normals.map(|n| to_start.re().dot(n));
-        if a * b >= 0.0 {
+        let start = to_start.re();
+        let [a, b] = normals.map(|n| start.dot(n));
+        // A ray that starts on a facet sees its edges as no silhouettes; by rounding alone it would see some.
+        let flat = 1e-9 * start.length() + 1e-13 * self.ray.x.re().max_abs();
+        if a * b >= 0.0 || a.abs().min(b.abs()) <= flat {
             return (ByU::from(0.0), crease);
         }
         let view = to_start.normalize();

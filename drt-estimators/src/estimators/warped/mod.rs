@@ -89,7 +89,8 @@
 //! beside those of edges near the ray. Their weights have the form above, with the squared distance of a shadow over
 //! the squared radius of what the ray and the light see within Δ (the two squares are combined as parallel resistances
 //! are). Only silhouettes as seen from the light count. Each such connection is differentiated separately, in one more
-//! step of the backward sweep.
+//! step of the backward sweep. Where the vertex is seen past smooth surfaces, its connection is the last ray of their
+//! chain: shadows turn the chain's first ray, and all of the chain is swept once more.
 //!
 //! # What is left to boundary samples
 //!
@@ -150,7 +151,8 @@ impl Estimator for Warped {
     // What lies behind a connection turns alike for all light that it brings.
     fn takes_delta_lights(&self, scene: &Scene, settings: &Settings) -> bool {
         let volumes = !scene.media.is_empty() || scene.bsdfs.iter().any(|b| b.item.is_null());
-        let from_camera = settings.sampling == PathSampling::Unidirectional;
+        // What is chosen for images, derivatives do not have.
+        let from_camera = settings.sampling != PathSampling::Bidirectional;
         !volumes && matches!(settings.warp, Warp::Edges) && from_camera
     }
 

@@ -166,7 +166,7 @@ fn assert_found(
         ((own.mean() - reference.mean()) / error, error / reference.mean())
     };
     let fair = off(&warped());
-    assert!(fair.0.abs() < 4.0 && fair.1.abs() < 0.1, "{fair:?}");
+    assert!(fair.0.abs() < 4.0 && fair.1.abs() < 0.1, "{fair:?} of {}", reference.mean());
     for fault in faults {
         let (mut prepared, motion) = warped();
         let field = Arc::clone(&prepared.terms.velocity);

@@ -47,10 +47,12 @@ pub enum ElementError {
     /// A shape carries an emitter of another kind than area.
     #[error("it carries an emitter of type `{0}`; only those of type `area` belong on shapes")]
     NotAnArea(&'static str),
-    /// A point or directional emitter where something that moves is to be differentiated past a smooth surface.
+    /// A point or directional emitter where something that moves is to be differentiated past a smooth surface, beside media or by paths
+    /// from both ends.
     #[error(
-        "its light comes from a point or a direction, and `{parameter}` moves something: the shadows that are seen past the smooth \
-         surface `{surface}` cannot be differentiated; give the light a size, make the surface rough, or use finite differences"
+        "its light comes from a point or a direction, and `{parameter}` moves something: beside media and null interfaces, and by paths \
+         from both ends, the shadows that are seen past the smooth surface `{surface}` cannot be differentiated; give the light a size, make \
+         the surface rough, or use finite differences"
     )]
     DeltaLightPastSmooth {
         /// The parameter, or what else was to be differentiated by.

@@ -170,6 +170,9 @@ impl Session {
         if let Some(target) = wanted.first() {
             let slide = slides(estimator, scene, wanted.iter().copied());
             scene.refuse_derivatives(&scene.name_of(*target), moves, slide)?;
+            if moves && !estimator.takes_delta_lights(scene, &self.asked) {
+                scene.refuse_delta_lights_past_smooth_surfaces(&scene.name_of(*target))?;
+            }
             let light = |t: &Target| !matches!(t, Target::Sensor(_)) && may_move(scene, *t);
             if let Some(target) = wanted.iter().find(|target| light(target)) {
                 scene.refuse_rims(&scene.name_of(*target))?;

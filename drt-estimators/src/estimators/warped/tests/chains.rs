@@ -69,3 +69,59 @@ fn the_camera_moves_before_a_mirror() {
     let change = || GeometryChange::Translate(vec3(0.5, 0.3, 0.4));
     compare_mirrored(&one("camera", change()), &one("camera", change()), sum, &[Fault::Direction]);
 }
+
+/// A black block that casts shadows on a wall behind the camera, which sees a mirror, or where it is seen in that.
+fn shadows_in_a_mirror(mirrored: bool) -> Scene {
+    let at = |x: Vec3| if mirrored { x } else { turned_round(x) };
+    let there = |v: Vec3| if mirrored { v } else { vec3(v.x, v.y, -v.z) };
+    let [black, grey] = [diffuse(0.0, 0.0, 0.0), diffuse(0.6, 0.5, 0.4)];
+    let block = placed(procedural::cube(), vec3(0.8, 0.7, 0.3), 0.0, at(vec3(0.4, 0.2, 6.0)));
+    let wall = placed(procedural::cube(), vec3(9.0, 9.0, 0.5), 0.0, at(vec3(0.0, 0.0, 8.0)));
+    let position = at(vec3(0.9, 0.7, 3.8));
+    let bulb = Emitter::Point { position, intensity: Rgb::new(30.0, 40.0, 20.0) };
+    // It comes from beside the mirror.
+    let direction = there(vec3(-0.8, 0.2, 0.6));
+    let sun = Emitter::Directional { direction, irradiance: Rgb::new(2.1, 1.8, 1.5) };
+    let mut scene = SceneBuilder::new()
+        .shape("block", ShapeBuilder::new(block, black))
+        .shape("wall", ShapeBuilder::new(wall, grey))
+        .emitter("bulb", bulb)
+        .emitter("sun", sun);
+    if mirrored {
+        let silver = Bsdf::Conductor(Conductor::default());
+        let mesh = placed(procedural::rectangle(), Vec3::splat(3.0), 0.0, vec3(0.0, 0.0, PLACE));
+        scene = scene.shape("mirror", ShapeBuilder::new(mesh, silver));
+    }
+    seen(scene, [vec3(0.3, 0.2, 2.5), vec3(0.1, 0.0, PLACE)], 3)
+}
+
+/// The shadows of points and directions move in a mirror as they do where it shows them.
+#[test]
+fn shadows_move_in_a_mirror() {
+    let by = vec3(0.5, 0.3, 0.4);
+    let there = vec3(by.x, by.y, -by.z);
+    let shift = |name: &str, by: Vec3| moves(name, GeometryChange::Translate(by));
+    let spin = |name: &str, axis: Vec3| {
+        moves(name, GeometryChange::Rotate { axis, pivot: vec3(0.0, 0.0, PLACE) })
+    };
+    let one = |effect| alloc::vec![effect];
+    let twice = |name| shift(name, Vec3::Z * 0.8);
+    let sum = Sum { samples: 64, ..MOMENT };
+    let cases = [
+        (one(shift("block", by)), one(shift("block", there)), &ALL[..]),
+        (one(shift("bulb", by)), one(shift("bulb", there)), &[Fault::Direction][..]),
+        (one(spin("sun", Vec3::X)), one(spin("sun", -Vec3::X)), &[Fault::Direction][..]),
+        (one(shift("mirror", Vec3::Z * 0.4)), ["block", "wall", "bulb"].map(twice).into(), &[][..]),
+        (one(shift("camera", by)), one(shift("camera", by)), &[][..]),
+    ];
+    for (mirrored, direct, faults) in cases {
+        let [mirrored, direct] = [mirrored, direct].map(|list| parameter("all", 0.0, list));
+        let by = |kind, scene: &Scene, motion: &Parameter, depth| {
+            prepare_lit(kind, EmitterMask::Delta, scene, motion, depth)
+        };
+        let straight = shadows_in_a_mirror(false);
+        let reference = derivative(sum, &by(EstimatorKind::PathSpace, &straight, &direct, 2));
+        let scene = shadows_in_a_mirror(true);
+        assert_found(&reference, sum, || by(EstimatorKind::Warped, &scene, &mirrored, 3), faults);
+    }
+}
